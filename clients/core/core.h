@@ -1,0 +1,124 @@
+/* SPDX-License-Identifier: MIT
+ * The client without input or output: bytes in, bytes out. A C interface, so that it is the same natively and as
+ * WebAssembly.
+ *
+ * A transport feeds every serialised ServerMessage to cs_receive and writes every message that cs_next_outgoing gives
+ * as one ClientMessage. All times are microseconds of one steady clock of the caller's. Not thread-safe: one thread a
+ * client at a time. No function throws or aborts on bytes from outside. Pointers that are returned stay valid until
+ * the next call of cs_receive on the same client, unless said otherwise.
+ */
+#ifndef CLOTHSTREAM_CLIENTS_CORE_CORE_H
+#define CLOTHSTREAM_CLIENTS_CORE_CORE_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define CS_PROTOCOL_VERSION 1u
+
+typedef struct cs_client cs_client;
+
+typedef enum cs_state {
+  CS_STATE_JOINING = 0, /* Hello is out, or waits to be taken */
+  CS_STATE_JOINED = 1,  /* description complete, frames follow */
+  CS_STATE_FAILED = 2   /* cs_error_text says why; nothing more will come */
+} cs_state;
+
+/* What cs_receive changed; a set of bits. */
+enum {
+  CS_EVENT_FRAME = 1,       /* new positions */
+  CS_EVENT_DESCRIPTION = 2, /* cloths, sizes, triangles changed */
+  CS_EVENT_NOTICE = 4,      /* cs_notice_text */
+  CS_EVENT_ERROR = 8,       /* cs_error_text; fatal if the state is CS_STATE_FAILED */
+  CS_EVENT_PARAMETERS = 16, /* somebody changed a parameter */
+  CS_EVENT_SCENES = 32      /* answer to cs_list_scenes */
+};
+
+typedef struct cs_statistics {
+  uint64_t tick;             /* of the newest decoded frame */
+  uint64_t frames;           /* decoded */
+  uint64_t key_frames;       /* of these */
+  uint64_t dropped;          /* frames of the stream that never came, by the gaps in their ticks */
+  uint64_t decode_errors;    /* packets that were refused */
+  uint64_t bytes;            /* of packets received */
+  uint64_t hash_mismatches;  /* decoded frames whose hash is not the server's */
+  double frames_per_second;  /* over the last second */
+  double kbit_per_second;    /* over the last second */
+  double bits_per_vertex;    /* packet bits a vertex a frame, over all frames */
+  double round_trip_ms;      /* smallest of the last pings */
+  double clock_offset_us;    /* server clock - own clock */
+  double decode_ms;          /* of the newest frame; 0 where the caller gives no clock (see cs_set_clock) */
+} cs_statistics;
+
+typedef struct cs_cloth {
+  const char* name;
+  uint32_t first_vertex, vertex_count;
+  uint32_t rows, columns;     /* 0 if not a grid */
+  uint32_t first_index, index_count; /* into cs_triangles */
+} cs_cloth;
+
+typedef struct cs_collider {
+  const char* name;
+  float position[3];
+  float orientation[4]; /* x y z w */
+  float radius;
+  uint64_t participant_id; /* 0: the scene's */
+} cs_collider;
+
+/* scene may be "" for the server's default; strings are copied. NULL when memory is out. */
+cs_client* cs_create(const char* scene, const char* client_name);
+void cs_destroy(cs_client* client);
+/* For decode_ms: a steady clock in microseconds. */
+void cs_set_clock(cs_client* client, uint64_t (*now_us)(void));
+
+/* One ServerMessage. Returns a set of CS_EVENT bits. */
+uint32_t cs_receive(cs_client* client, const uint8_t* message, size_t bytes, uint64_t now_us);
+/* Pings; call at least ten times a second. */
+void cs_update(cs_client* client, uint64_t now_us);
+/* The next ClientMessage to send, or NULL; valid until the next call of this function. */
+const uint8_t* cs_next_outgoing(cs_client* client, size_t* bytes);
+
+cs_state cs_get_state(const cs_client* client);
+const char* cs_error_text(const cs_client* client);
+const char* cs_notice_text(const cs_client* client);
+void cs_get_statistics(const cs_client* client, uint64_t now_us, cs_statistics* out);
+const char* cs_server_name(const cs_client* client);
+const char* cs_device_name(const cs_client* client);
+const char* cs_scene_name(const cs_client* client);
+/* The scene's rates, per second; 0 before the description. */
+uint32_t cs_stream_rate(const cs_client* client);
+
+/* Geometry of the newest frame; 3 floats a vertex. Rest positions before the first frame. */
+uint32_t cs_vertex_count(const cs_client* client);
+const float* cs_positions(const cs_client* client);
+const float* cs_normals(const cs_client* client);
+uint64_t cs_reconstruction_hash(const cs_client* client);
+/* Vertex indices, three a triangle, counter-clockwise seen from +Z of the grid's own frame; until the next
+ * CS_EVENT_DESCRIPTION. */
+const uint32_t* cs_triangles(const cs_client* client, uint32_t* index_count);
+uint32_t cs_cloth_count(const cs_client* client);
+/* 0 if there is no such cloth or collider. */
+int cs_get_cloth(const cs_client* client, uint32_t index, cs_cloth* out);
+uint32_t cs_collider_count(const cs_client* client);
+int cs_get_collider(const cs_client* client, uint32_t index, cs_collider* out);
+
+/* Sphere colliders of this participant: `count` of {x, y, z, radius}; replaces all former ones; 0 takes them away. */
+void cs_set_colliders(cs_client* client, const float* spheres, uint32_t count, uint64_t now_us);
+/* Parameters; NULL leaves one as it is. An empty cloth name means every cloth. */
+void cs_set_environment(cs_client* client, const float* gravity3, const float* wind3, const float* air_density);
+void cs_set_cloth(cs_client* client, const char* cloth, const float* structural2, const float* shear2,
+                  const float* bend2, const float* damping); /* springs: {stiffness, damping} */
+void cs_set_collider(cs_client* client, const char* collider, const float* position3, const float* radius);
+
+/* Asks for the scenes; after CS_EVENT_SCENES cs_scene gives them. */
+void cs_list_scenes(cs_client* client);
+uint32_t cs_scene_count(const cs_client* client);
+const char* cs_scene(const cs_client* client, uint32_t index);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,33 @@
+# What every target of ours is compiled with: link it privately as `clothstream_options`.
+add_library(clothstream_options INTERFACE)
+target_include_directories(clothstream_options INTERFACE ${PROJECT_SOURCE_DIR})
+target_compile_options(clothstream_options INTERFACE
+  -Wall -Wextra -Wpedantic -Wconversion -Wshadow -Wnon-virtual-dtor -Wold-style-cast -Werror
+  -ffp-contract=off)
+target_compile_definitions(clothstream_options INTERFACE SPDLOG_HEADER_ONLY SPDLOG_FMT_EXTERNAL FMT_HEADER_ONLY)
+if(CLOTHSTREAM_SANITIZE)
+  target_compile_options(clothstream_options INTERFACE -fsanitize=${CLOTHSTREAM_SANITIZE}
+    -fno-sanitize-recover=all -fno-omit-frame-pointer)
+  target_link_options(clothstream_options INTERFACE -fsanitize=${CLOTHSTREAM_SANITIZE})
+endif()
+
+# clothstream_library(NAME sources...): a static library of ours with the common options.
+function(clothstream_library name)
+  add_library(${name} STATIC ${ARGN})
+  target_link_libraries(${name} PUBLIC clothstream_options)
+endfunction()
+
+# clothstream_test(NAME LABELS label... SOURCES file... LIBRARIES target...): a GoogleTest program whose every
+# test is one ctest with those labels.
+function(clothstream_test name)
+  cmake_parse_arguments(ARG "" "" "LABELS;SOURCES;LIBRARIES" ${ARGN})
+  add_executable(${name} ${ARG_SOURCES})
+  target_link_libraries(${name} PRIVATE clothstream_options ${ARG_LIBRARIES} GTest::gtest GTest::gmock GTest::gtest_main)
+  set(environment "")
+  if("gpu" IN_LIST ARG_LABELS)
+    list(APPEND environment "CLOTHSTREAM_VALIDATION=1")
+  endif()
+  gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST DISCOVERY_TIMEOUT 60
+    WORKING_DIRECTORY ${PROJECT_SOURCE_DIR}
+    PROPERTIES LABELS "${ARG_LABELS}" ENVIRONMENT "${environment}" TIMEOUT 300)
+endfunction()

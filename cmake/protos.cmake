@@ -1,0 +1,30 @@
+# clothstream_protos: the messages as a library (C++ in <build>/proto). clothstream_protos_grpc: the service too.
+find_package(Protobuf REQUIRED)
+set(protoOut ${PROJECT_BINARY_DIR}/proto_generated)
+set(protoNames scene session)
+set(messageSources)
+foreach(name IN LISTS protoNames)
+  set(source ${PROJECT_SOURCE_DIR}/proto/clothstream/v1/${name}.proto)
+  set(stem ${protoOut}/clothstream/v1/${name})
+  add_custom_command(OUTPUT ${stem}.pb.cc ${stem}.pb.h
+    COMMAND ${CMAKE_COMMAND} -E make_directory ${protoOut}
+    COMMAND protobuf::protoc -I${PROJECT_SOURCE_DIR}/proto --cpp_out=${protoOut} ${source}
+    DEPENDS ${PROJECT_SOURCE_DIR}/proto/clothstream/v1/scene.proto ${source} VERBATIM)
+  list(APPEND messageSources ${stem}.pb.cc ${stem}.pb.h)
+endforeach()
+add_library(clothstream_protos STATIC ${messageSources})
+target_include_directories(clothstream_protos SYSTEM PUBLIC ${protoOut})
+target_link_libraries(clothstream_protos PUBLIC protobuf::libprotobuf)
+
+if(CLOTHSTREAM_RPC)
+  find_package(gRPC CONFIG REQUIRED)
+  set(stem ${protoOut}/clothstream/v1/session)
+  add_custom_command(OUTPUT ${stem}.grpc.pb.cc ${stem}.grpc.pb.h
+    COMMAND protobuf::protoc -I${PROJECT_SOURCE_DIR}/proto --grpc_out=${protoOut}
+      --plugin=protoc-gen-grpc=$<TARGET_FILE:gRPC::grpc_cpp_plugin>
+      ${PROJECT_SOURCE_DIR}/proto/clothstream/v1/session.proto
+    DEPENDS ${PROJECT_SOURCE_DIR}/proto/clothstream/v1/session.proto
+      ${PROJECT_SOURCE_DIR}/proto/clothstream/v1/scene.proto VERBATIM)
+  add_library(clothstream_protos_grpc STATIC ${stem}.grpc.pb.cc ${stem}.grpc.pb.h)
+  target_link_libraries(clothstream_protos_grpc PUBLIC clothstream_protos gRPC::grpc++)
+endif()

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: MIT
+// Packets to vertices. Safe on any bytes: it never reads or writes out of bounds, never allocates by an unchecked
+// count, always ends.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+
+#include "proto/codec/packet_header.h"
+#include "proto/codec/stream_layout.h"
+
+namespace clothstream::codec {
+
+enum class DecodeResult : std::uint8_t {
+  ok,
+  malformed,         // not a packet of this stream's codec; the decoder's state is as before
+  wrongEpoch,        // of another description
+  missingReference,  // refers to a tick that was not decoded: ask for a key frame
+  stale,             // not newer than what is decoded
+};
+
+// One decoder a stream; not thread-safe. Memory is taken once, at construction.
+class Decoder {
+ public:
+  // nullptr if the layout is impossible: no cloth, a grid whose numbers disagree, more than 2^26 vertices, a max
+  // error that is not finite and positive.
+  static std::unique_ptr<Decoder> make(const StreamLayout& layout);
+  ~Decoder();
+  Decoder(const Decoder&) = delete;
+  Decoder& operator=(const Decoder&) = delete;
+
+  [[nodiscard]] DecodeResult decode(std::span<const std::byte> packet);
+
+  // Of the newest decoded frame; undefined before the first.
+  std::uint64_t tick() const;
+  bool hasFrame() const;
+
+  // 3 floats a vertex, metres, cloths one after the other; valid until the next decode.
+  std::span<const float> positions() const;
+  // 3 floats a vertex, unit length: as sent, or computed from the positions where the stream sends none.
+  std::span<const float> normals() const;
+  // 64-bit hash of the reconstruction; equal to the server's (FRAME_FORMAT.md).
+  std::uint64_t reconstructionHash() const;
+
+ private:
+  struct State;
+  explicit Decoder(std::unique_ptr<State> state);
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace clothstream::codec

@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: MIT
+// Frames from simulation state: quantised and predicted on the device, entropy-coded on the CPU.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+
+#include "proto/codec/packet_header.h"
+#include "proto/codec/stream_layout.h"
+#include "server/simulation/cloth_simulation.h"
+#include "server/vulkan/device.h"
+#include "server/vulkan/recorder.h"
+
+namespace clothstream::encode {
+
+// The layout of a scene's stream.
+codec::StreamLayout streamLayout(const scene::Scene& scene, std::uint32_t epoch);
+
+// The readback of one recorded frame, waiting to be entropy-coded.
+struct RecordedFrame {
+  std::uint32_t slot = 0;
+  std::uint64_t tick = 0;
+  codec::PacketKind kind = codec::PacketKind::key;
+  std::uint64_t referenceTick = 0;  // of a predicted frame
+};
+
+struct EncodedFrame {
+  std::size_t bytes = 0;  // written to `out`
+  std::uint64_t reconstructionHash = 0;
+};
+
+// record() belongs to the device's thread, entropyCode() to one other thread (or the same).
+class FrameEncoder {
+ public:
+  // Frames that may be recorded and not yet entropy-coded.
+  static constexpr std::uint32_t kSlots = 3;
+
+  FrameEncoder(const vulkan::Device& device, const simulation::ClothSimulation& simulation,
+               const codec::StreamLayout& layout);
+  ~FrameEncoder();
+  FrameEncoder(const FrameEncoder&) = delete;
+  FrameEncoder& operator=(const FrameEncoder&) = delete;
+
+  // Whether a slot is free.
+  bool canRecord() const;
+
+  // Quantise and predict the simulation's present positions (and normals, which must have been recorded, where the
+  // layout has them). `tick` must grow from call to call. A predicted frame refers to the frame recorded before; the
+  // first is always a key frame, whatever is asked.
+  RecordedFrame record(vulkan::Recorder& recorder, std::uint64_t tick, bool forceKey);
+
+  // After a rollback or restore: the next frame is a key frame.
+  void forgetHistory();
+
+  // Once the recording is complete on the device; frees the slot. `out` holds at least packetBound() bytes.
+  EncodedFrame entropyCode(const RecordedFrame& frame, std::span<std::byte> out);
+
+  std::size_t packetBound() const;
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace clothstream::encode

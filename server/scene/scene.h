@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: MIT
+// What is simulated, as plain data: cloths, springs, pins, colliders, environment.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+
+namespace clothstream::scene {
+
+// Right-handed, +Y up, -Z forward; metres, kilograms, seconds, newtons.
+using Vec3 = Eigen::Vector3f;
+using Quaternion = Eigen::Quaternionf;
+
+struct Pose {
+  Vec3 position = Vec3::Zero();
+  Quaternion orientation = Quaternion::Identity();
+};
+
+// Hooke spring with a dashpot along its axis, [Va21] Eq. 1.
+struct Spring {
+  float stiffness = 0;  // N/m
+  float damping = 0;    // N s/m
+};
+
+// Rectangle of nodes, both ends included, every rowStep-th row and columnStep-th column.
+struct GridRange {
+  std::uint32_t firstRow = 0, lastRow = 0, rowStep = 1;
+  std::uint32_t firstColumn = 0, lastColumn = 0, columnStep = 1;
+};
+
+// rows x columns nodes, row-major. With the identity pose it hangs in the XY plane: columns along +X, centred
+// on x = 0, rows down from y = 0.
+struct Grid {
+  std::uint32_t rows = 2, columns = 2;
+  float width = 1, height = 1;  // m, between the outermost nodes
+  Pose pose;
+
+  std::uint32_t nodeCount() const { return rows * columns; }
+};
+
+struct Cloth {
+  std::string name;
+  Grid grid;
+  float mass = 0;  // kg, of the whole cloth; each node has mass / nodeCount
+  Spring structural, shear, bend;
+  float damping = 0;         // 1/s
+  float drag = 0, lift = 0;  // coefficients, dimensionless
+  float friction = 0.3f;     // Coulomb, dimensionless
+  float thickness = 0.005f;  // m kept from a collider's surface
+  std::vector<GridRange> pins;
+};
+
+struct MotionKey {
+  float time = 0;  // s
+  Vec3 position = Vec3::Zero();
+};
+
+struct SphereCollider {
+  std::string name;
+  float radius = 0.1f;
+  Pose pose;
+  float friction = 1;
+  std::vector<MotionKey> motion;  // empty: it stays at its pose
+};
+
+struct Environment {
+  Vec3 gravity = Vec3(0, -9.81f, 0);
+  Vec3 wind = Vec3::Zero();  // m/s
+  float airDensity = 1.2f;   // kg/m^3
+};
+
+enum class Integrator : std::uint8_t { semiImplicitEuler, explicitEuler };
+enum class Normals : std::uint8_t { none, octahedral };
+
+struct StreamSettings {
+  float maxError = 0.0005f;  // m an axis
+  Normals normals = Normals::none;
+};
+
+struct Scene {
+  std::string name;
+  std::string description;
+  std::uint32_t simulationRate = 72;  // ticks/s
+  std::uint32_t streamRate = 72;      // frames/s, divides simulationRate
+  std::uint32_t substeps = 10;        // per tick
+  Integrator integrator = Integrator::semiImplicitEuler;
+  Environment environment;
+  std::vector<Cloth> cloths;
+  std::vector<SphereCollider> colliders;
+  StreamSettings stream;
+
+  double tickSeconds() const { return 1.0 / simulationRate; }
+  double substepSeconds() const { return tickSeconds() / substeps; }
+  std::uint32_t nodeCount() const;
+};
+
+// Start positions of the nodes, row-major, world space.
+std::vector<Vec3> restPositions(const Grid& grid);
+
+// One byte a node, row-major: 1 where a range covers it. Ranges must lie inside the grid.
+std::vector<std::uint8_t> pinnedNodes(const Cloth& cloth);
+
+// Lengths at rest along a column (between columns), along a row (between rows), and along the diagonal, m.
+struct GridSpacing {
+  float column, row, diagonal;
+};
+GridSpacing spacing(const Grid& grid);
+
+// Position of a collider at a simulated time. Its arithmetic is +, -, *, / in double alone, so that every
+// machine gives the same value.
+Vec3 positionAt(const SphereCollider& collider, double seconds);
+
+}  // namespace clothstream::scene

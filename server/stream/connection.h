@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: MIT
+// One peer of the server, whichever door it came through: serialised ClientMessages in, serialised ServerMessages out.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace clothstream::stream {
+
+class SceneServer;
+
+// A serialised ServerMessage, made once and shared by all who get it.
+using SharedBytes = std::shared_ptr<const std::vector<std::byte>>;
+
+// Largest serialised ClientMessage; doors refuse larger ones before they hold them.
+inline constexpr std::size_t kMaxClientMessageBytes = 64 * 1024;
+
+// Thread-safe. A door makes one for each peer, feeds it what arrives, and writes what next() gives, one write in
+// flight: when the write is done it asks again; when there is nothing it waits for `wake`.
+class Connection {
+ public:
+  // `wake` is called, from any thread and with no lock held, when next() may have something or finished() became
+  // true; it must only pass the word on. `peer` names the other end for logs. The server must outlive the connection.
+  Connection(SceneServer& server, std::string peer, std::function<void()> wake);
+  // Leaves the scene; `wake` is not called any more once this returns.
+  ~Connection();
+  Connection(const Connection&) = delete;
+  Connection& operator=(const Connection&) = delete;
+
+  // One ClientMessage. Whatever is wrong with it is answered by an Error to this peer alone.
+  void receive(std::span<const std::byte> message);
+
+  // The next message to write: control first, then the newest frame that this peer can decode and has room for
+  // (at most two unacknowledged, more on long round trips).
+  std::optional<SharedBytes> next();
+
+  // The peer is to be closed (after a fatal error, or when the server stops), once next() has nothing more.
+  bool finished() const;
+
+ private:
+  struct State;
+  std::shared_ptr<State> state_;
+};
+
+}  // namespace clothstream::stream

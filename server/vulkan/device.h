@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: MIT
+// A Vulkan device with one compute queue: chosen, opened, its limits asked.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <vulkan/vulkan_raii.hpp>
+
+namespace clothstream::vulkan {
+
+enum class DeviceKind : std::uint8_t { discrete, integrated, virtualGpu, software, other };
+
+struct DeviceInfo {
+  std::uint32_t index = 0;  // place in listDevices()
+  std::string name;
+  DeviceKind kind = DeviceKind::other;
+  std::string driver;      // name and version
+  std::string apiVersion;  // such as 1.3.230
+};
+
+struct DeviceOptions {
+  // Empty: the best (discrete before integrated before software). Else an index of listDevices() or a
+  // case-insensitive part of a name.
+  std::string select;
+  // Threads of a software device (LP_NUM_THREADS); set before the instance is made. Absent: the environment's
+  // value or else the measured default.
+  std::optional<std::uint32_t> softwareThreads;
+  // VK_LAYER_KHRONOS_validation with synchronisation checks; its messages are counted (validationMessages()) and
+  // logged. Tests switch it on by the environment variable CLOTHSTREAM_VALIDATION=1.
+  bool validation = false;
+  // Directory of the pipeline cache; empty: none is kept.
+  std::filesystem::path cacheDirectory;
+};
+
+struct Limits {
+  std::uint32_t maxWorkgroupInvocations = 0;
+  std::uint32_t maxWorkgroupSizeX = 0;
+  std::uint32_t maxDispatchX = 0;  // workgroups
+  std::uint32_t maxSharedBytes = 0;
+  std::uint64_t maxStorageRange = 0;   // bytes a binding
+  std::uint64_t maxTexelElements = 0;  // elements a texel-buffer binding
+  std::uint32_t maxPushConstantBytes = 0;
+  std::uint32_t subgroupSize = 0;
+  float timestampPeriod = 0;  // ns a tick of the timestamp counter
+  std::uint64_t deviceMemoryBytes = 0;
+};
+
+// A queue timeline value: reached when all that was submitted up to it is complete.
+using TimelineValue = std::uint64_t;
+
+class Recorder;
+
+// No device at all, or none that matches `select`: what() says what to install or which there are.
+class DeviceError : public std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+// The device was lost (VK_ERROR_DEVICE_LOST): everything made on it must be made anew on another Device.
+class DeviceLost : public std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+std::vector<DeviceInfo> listDevices();
+
+// Everything but wait() and completed() belongs to the one thread that owns the device.
+class Device {
+ public:
+  // Throws DeviceError.
+  explicit Device(const DeviceOptions& options = {});
+  ~Device();  // saves the pipeline cache
+  Device(const Device&) = delete;
+  Device& operator=(const Device&) = delete;
+
+  const DeviceInfo& info() const { return info_; }
+  const Limits& limits() const { return limits_; }
+  bool isSoftware() const { return info_.kind == DeviceKind::software; }
+
+  // Hands a finished recording to the queue and returns the value that the timeline reaches when it is done. The
+  // recorder must not be begun again before that. Throws DeviceLost.
+  TimelineValue submit(Recorder& recorder);
+
+  // False on time-out. Any thread. Throws DeviceLost.
+  bool wait(TimelineValue value, std::chrono::nanoseconds timeout = std::chrono::nanoseconds::max()) const;
+  TimelineValue completed() const;
+
+  // Messages of the validation layer so far, in this process; text of the newest few.
+  static std::uint64_t validationMessages();
+  static std::vector<std::string> validationTexts();
+
+  // For this room alone.
+  const vk::raii::Device& handle() const { return device_; }
+  const vk::raii::PhysicalDevice& physical() const { return physical_; }
+  const vk::raii::PipelineCache& pipelineCache() const { return pipelineCache_; }
+  std::uint32_t queueFamily() const { return queueFamily_; }
+  std::uint32_t memoryType(std::uint32_t typeBits, vk::MemoryPropertyFlags wanted,
+                           vk::MemoryPropertyFlags preferred) const;
+
+ private:
+  vk::raii::Context context_;
+  vk::raii::Instance instance_ = nullptr;
+  vk::raii::DebugUtilsMessengerEXT messenger_ = nullptr;
+  vk::raii::PhysicalDevice physical_ = nullptr;
+  vk::raii::Device device_ = nullptr;
+  vk::raii::Queue queue_ = nullptr;
+  vk::raii::Semaphore timeline_ = nullptr;
+  vk::raii::PipelineCache pipelineCache_ = nullptr;
+  std::uint32_t queueFamily_ = 0;
+  TimelineValue submitted_ = 0;
+  DeviceInfo info_;
+  Limits limits_;
+  DeviceOptions options_;
+};
+
+}  // namespace clothstream::vulkan

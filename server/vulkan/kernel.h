@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: MIT
+// A compute pipeline made from embedded SPIR-V, and the buffers it is bound to.
+#pragma once
+
+#include <cstdint>
+#include <initializer_list>
+#include <span>
+#include <vector>
+
+#include "server/vulkan/buffer.h"
+#include "server/vulkan/device.h"
+
+namespace clothstream::vulkan {
+
+enum class BindingKind : std::uint8_t { storage, texels };
+
+struct KernelDescription {
+  const char* name = "";                       // for errors, validation and timings
+  std::span<const std::uint32_t> spirv;        // from clothstream_add_kernels
+  std::vector<BindingKind> bindings;           // binding 0, 1, 2, ... of set 0
+  std::uint32_t pushConstantBytes = 0;
+  std::vector<std::uint32_t> specialisation;   // constant_id 0, 1, 2, ...; pass floats by std::bit_cast
+  std::uint32_t workgroupSize = 64;            // invocations in x; must be what the shader ends up with
+};
+
+// Throws std::runtime_error naming the kernel where the device refuses it.
+class Kernel {
+ public:
+  Kernel(const Device& device, const KernelDescription& description);
+
+  std::uint32_t workgroupSize() const { return workgroupSize_; }
+
+  // For this room alone.
+  const vk::raii::Pipeline& pipeline() const { return pipeline_; }
+  const vk::raii::PipelineLayout& layout() const { return layout_; }
+  const vk::raii::DescriptorSetLayout& setLayout() const { return setLayout_; }
+  std::span<const BindingKind> bindings() const { return bindings_; }
+  std::uint32_t pushConstantBytes() const { return pushConstantBytes_; }
+
+ private:
+  std::vector<BindingKind> bindings_;
+  std::uint32_t pushConstantBytes_ = 0;
+  std::uint32_t workgroupSize_ = 0;
+  vk::raii::DescriptorSetLayout setLayout_ = nullptr;
+  vk::raii::PipelineLayout layout_ = nullptr;
+  vk::raii::Pipeline pipeline_ = nullptr;
+};
+
+// One buffer for each of the kernel's bindings, in order. Kernel and buffers must outlive it.
+class Bindings {
+ public:
+  Bindings(const Device& device, const Kernel& kernel, std::initializer_list<const Buffer*> buffers);
+
+  const Kernel& kernel() const { return *kernel_; }
+  // For this room alone.
+  const vk::raii::DescriptorSet& set() const { return set_; }
+
+ private:
+  const Kernel* kernel_;
+  vk::raii::DescriptorPool pool_ = nullptr;
+  vk::raii::DescriptorSet set_ = nullptr;
+};
+
+}  // namespace clothstream::vulkan
