@@ -1,0 +1,12 @@
+# Turns the binary SPIRV into the C++ header HEADER with the array clothstream::kernels::NAME.
+file(READ ${SPIRV} bytes HEX)
+string(REGEX REPLACE "(..)(..)(..)(..)" "0x\\4\\3\\2\\1," words "${bytes}")
+string(REGEX REPLACE "(0x........,0x........,0x........,0x........,0x........,0x........,0x........,0x........,)" "\\1\n" words "${words}")
+file(WRITE ${HEADER} "#pragma once
+#include <cstdint>
+namespace clothstream::kernels {
+inline constexpr std::uint32_t ${NAME}[] = {
+${words}
+};
+}
+")
