@@ -1,0 +1,60 @@
+#!/usr/bin/env bash
+# Fails where a file includes what its room must not see (docs/architecture.md: arrows point down only).
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+
+# room | the rooms of ours that it sees, beside itself
+readonly ARROWS='
+server/scene       |
+server/vulkan      |
+proto/codec        |
+server/reference   | server/scene
+server/telemetry   |
+server/simulation  | server/scene server/vulkan shaders
+server/messages    | server/scene clothstream
+server/encode      | server/scene server/simulation server/vulkan proto/codec shaders
+server/stream      | server/scene server/vulkan server/simulation server/encode server/messages server/telemetry proto/codec clothstream
+server/rpc         | server/stream server/telemetry clothstream
+server/web         | server/stream server/telemetry clothstream
+clients/core       | proto/codec
+clients/grpc       | clients/core clothstream
+clients/cli        | clients/core clients/grpc
+'
+# rooms that may include these headers
+readonly OUTSIDE='
+<vulkan/           | server/vulkan server/simulation server/encode
+<grpcpp/           | server/rpc clients/grpc
+<boost/beast       | server/web
+<Eigen/            | server/scene server/reference
+'
+
+failed=0
+complain() { printf 'arrows: %s\n' "$*" && failed=1; }
+
+while IFS='|' read -r room seen; do
+  room=$(echo "$room" | xargs)
+  [ -n "$room" ] && [ -d "$room" ] || continue
+  while IFS=: read -r file line include; do
+    target=$(sed -E 's/.*"([^"]+)".*/\1/' <<<"$include")
+    case "$target" in kernels/*) continue ;; esac
+    allowed=no
+    for prefix in "$room" $seen; do
+      case "$target" in "$prefix"/*) allowed=yes ;; esac
+    done
+    [ $allowed = yes ] || complain "$file:$line: $room must not see $target"
+  done < <(grep -rnE '^#include "' --include='*.h' --include='*.cpp' "$room" || true)
+done <<<"$ARROWS"
+
+while IFS='|' read -r header rooms; do
+  header=$(echo "$header" | xargs)
+  [ -n "$header" ] || continue
+  while IFS=: read -r file line _; do
+    allowed=no
+    for room in $rooms; do
+      case "$file" in "$room"/*) allowed=yes ;; esac
+    done
+    [ $allowed = yes ] || complain "$file:$line: only ${rooms# } may include $header...>"
+  done < <(grep -rnF "#include $header" --include='*.h' --include='*.cpp' server clients proto || true)
+done <<<"$OUTSIDE"
+
+exit $failed
