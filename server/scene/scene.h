@@ -2,13 +2,12 @@
 // What is simulated, as plain data: cloths, springs, pins, colliders, environment.
 #pragma once
 
+#include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
-
-#include <Eigen/Core>
-#include <Eigen/Geometry>
 
 namespace clothstream::scene {
 
@@ -31,6 +30,8 @@ struct Spring {
 struct GridRange {
   std::uint32_t firstRow = 0, lastRow = 0, rowStep = 1;
   std::uint32_t firstColumn = 0, lastColumn = 0, columnStep = 1;
+
+  bool contains(std::uint32_t row, std::uint32_t column) const;
 };
 
 // rows x columns nodes, row-major. With the identity pose it hangs in the XY plane: columns along +X, centred
@@ -65,7 +66,7 @@ struct SphereCollider {
   float radius = 0.1f;
   Pose pose;
   float friction = 1;
-  std::vector<MotionKey> motion;  // empty: it stays at its pose
+  std::vector<MotionKey> motion;  // times ascend from 0; empty: it stays at its pose
 };
 
 struct Environment {
@@ -111,8 +112,8 @@ struct GridSpacing {
 };
 GridSpacing spacing(const Grid& grid);
 
-// Position of a collider at a simulated time. Its arithmetic is +, -, *, / in double alone, so that every
-// machine gives the same value.
+// Position of a collider at a simulated time: from key to key by smoothstep, periodic. Its arithmetic is +,
+// -, *, / and floor in double alone, so that every machine gives the same value.
 Vec3 positionAt(const SphereCollider& collider, double seconds);
 
 }  // namespace clothstream::scene

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: MIT
+// Parameter changes take effect on a scene.
+#include "server/scene/input.h"
+
+#include <algorithm>
+#include <cassert>
+
+namespace clothstream::scene {
+namespace {
+
+template <typename T>
+void assign(T& field, const std::optional<T>& value) {
+  if (value) field = *value;
+}
+
+void apply(Cloth& cloth, const ClothChange& change) {
+  assign(cloth.structural, change.structural);
+  assign(cloth.shear, change.shear);
+  assign(cloth.bend, change.bend);
+  assign(cloth.damping, change.damping);
+  assign(cloth.drag, change.drag);
+  assign(cloth.lift, change.lift);
+  assign(cloth.friction, change.friction);
+}
+
+}  // namespace
+
+void applyChange(Scene& scene, const ParameterChange& change) {
+  assign(scene.environment.gravity, change.gravity);
+  assign(scene.environment.wind, change.wind);
+  assign(scene.environment.airDensity, change.airDensity);
+  for (const ClothChange& clothChange : change.cloths)
+    for (Cloth& cloth : scene.cloths)
+      if (clothChange.name.empty() || clothChange.name == cloth.name) apply(cloth, clothChange);
+  for (const ColliderChange& colliderChange : change.colliders) {
+    const auto collider = std::ranges::find(scene.colliders, colliderChange.name, &SphereCollider::name);
+    assert(collider != scene.colliders.end());
+    if (colliderChange.position) {
+      collider->pose.position = *colliderChange.position;
+      collider->motion.clear();
+    }
+    assign(collider->radius, colliderChange.radius);
+  }
+}
+
+}  // namespace clothstream::scene

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: MIT
+// What participants put into a scene while it runs, as plain data. All values validated before.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "server/scene/scene.h"
+
+namespace clothstream::scene {
+
+// A sphere that belongs to a participant: a hand, a head.
+struct ParticipantCollider {
+  std::uint32_t id = 0;  // unique among this participant's; the same id moves the same collider
+  Pose pose;
+  float radius = 0.1f;  // m
+};
+
+struct ClothChange {
+  std::string name;  // empty: every cloth
+  std::optional<Spring> structural, shear, bend;
+  std::optional<float> damping, drag, lift, friction;
+};
+
+struct ColliderChange {
+  std::string name;
+  std::optional<Vec3> position;  // ends the collider's own motion
+  std::optional<float> radius;
+};
+
+// Takes effect at a tick's start, all of it.
+struct ParameterChange {
+  std::optional<Vec3> gravity, wind;
+  std::optional<float> airDensity;
+  std::vector<ClothChange> cloths;
+  std::vector<ColliderChange> colliders;
+};
+
+// The names in the change must exist in the scene.
+void applyChange(Scene& scene, const ParameterChange& change);
+
+}  // namespace clothstream::scene

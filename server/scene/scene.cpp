@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: MIT
+// Rest positions, pins and motion: what follows from a scene's numbers.
+#include "server/scene/scene.h"
+
+#include <cassert>
+#include <cmath>
+
+namespace clothstream::scene {
+
+std::uint32_t Scene::nodeCount() const {
+  std::uint32_t sum = 0;
+  for (const Cloth& cloth : cloths) sum += cloth.grid.nodeCount();
+  return sum;
+}
+
+std::vector<Vec3> restPositions(const Grid& grid) {
+  const Eigen::Vector3d origin = grid.pose.position.cast<double>();
+  const Eigen::Matrix3d rotation = grid.pose.orientation.cast<double>().toRotationMatrix();
+  std::vector<Vec3> positions;
+  positions.reserve(grid.nodeCount());
+  for (std::uint32_t row = 0; row < grid.rows; ++row) {
+    const double y = -double{grid.height} * row / (grid.rows - 1);
+    for (std::uint32_t column = 0; column < grid.columns; ++column) {
+      const double x = double{grid.width} * column / (grid.columns - 1) - 0.5 * double{grid.width};
+      positions.push_back((origin + rotation * Eigen::Vector3d(x, y, 0)).cast<float>());
+    }
+  }
+  return positions;
+}
+
+bool GridRange::contains(std::uint32_t row, std::uint32_t column) const {
+  return row >= firstRow && row <= lastRow && (row - firstRow) % rowStep == 0 &&  //
+         column >= firstColumn && column <= lastColumn && (column - firstColumn) % columnStep == 0;
+}
+
+std::vector<std::uint8_t> pinnedNodes(const Cloth& cloth) {
+  std::vector<std::uint8_t> pinned(cloth.grid.nodeCount(), 0);
+  for (const GridRange& range : cloth.pins) {
+    assert(range.rowStep > 0 && range.columnStep > 0);
+    assert(range.lastRow < cloth.grid.rows && range.lastColumn < cloth.grid.columns);
+    for (std::uint32_t row = range.firstRow; row <= range.lastRow; row += range.rowStep)
+      for (std::uint32_t column = range.firstColumn; column <= range.lastColumn; column += range.columnStep)
+        pinned[row * cloth.grid.columns + column] = 1;
+  }
+  return pinned;
+}
+
+GridSpacing spacing(const Grid& grid) {
+  const double column = double{grid.width} / (grid.columns - 1);
+  const double row = double{grid.height} / (grid.rows - 1);
+  return {static_cast<float>(column), static_cast<float>(row),
+          static_cast<float>(std::sqrt(column * column + row * row))};
+}
+
+Vec3 positionAt(const SphereCollider& collider, double seconds) {
+  const std::vector<MotionKey>& keys = collider.motion;
+  if (keys.empty()) return collider.pose.position;
+  const double period = keys.back().time;
+  const double time = seconds - period * std::floor(seconds / period);
+  std::size_t next = 1;
+  while (next + 1 < keys.size() && time >= keys[next].time) ++next;
+  const MotionKey& from = keys[next - 1];
+  const MotionKey& to = keys[next];
+  const double u = (time - from.time) / (double{to.time} - from.time);
+  const double smooth = u * u * (3 - 2 * u);
+  Vec3 position;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double start = from.position[axis];
+    position[axis] = static_cast<float>(start + (to.position[axis] - start) * smooth);
+  }
+  return position;
+}
+
+}  // namespace clothstream::scene

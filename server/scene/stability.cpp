@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: MIT
+// Stability bound of explicit integration, by Gershgorin's circles.
+//
+// Small motions about any shape obey M x'' = -K x - C x'. A spring with direction e and length |d| adds to K
+// the graph Laplacian of its two nodes times  k (e e^T + (1 - L/|d|)(I - e e^T)) <= k I,  and to C the same
+// Laplacian times kd e e^T <= kd I. (Under compression the second part of K is negative: that is buckling,
+// which belongs to the cloth and not to the integrator.) Damping adds `damping` M to C, and the air what
+// airDamping() says.
+//
+// A mode's growth z in a step h satisfies, with the Rayleigh quotients s = h^2 x*Kx / x*Mx and c = h x*Cx /
+// x*Mx,
+//   semi-implicit Euler:  z^2 + (s + c - 2) z + 1 - c = 0,      |z| <= 1  if  s + 2c < 4  (Jury's criterion),
+//   explicit Euler:       z^2 + (c - 2) z + 1 - c + s = 0,      |z| <= 1  if  s <= c  and  2c - s < 4.
+//
+// A Laplacian with weights w_ij has, in the row of a node of mass m, the diagonal sum_j w_ij and as much
+// beside it, so no Rayleigh quotient exceeds  max_i 2 sum_j w_ij / m.  Pinned nodes have no row; their
+// springs stay on the diagonals of others. With w = h^2 k + 2 h kd that bounds s + 2c at once. For explicit
+// Euler, s <= c holds spring by spring as far as its dashpot reaches, and mass-proportional damping has to
+// carry the rest.
+#include "server/scene/stability.h"
+
+#include <algorithm>
+#include <vector>
+
+namespace clothstream::scene {
+namespace {
+
+// Springs of each kind at one node.
+struct SpringCounts {
+  std::uint32_t structural, shear, bend;
+  bool operator==(const SpringCounts&) const = default;
+};
+
+// Neighbours at a distance of `step` before and after an index.
+std::uint32_t neighbours(std::uint32_t index, std::uint32_t count, std::uint32_t step) {
+  return (index >= step ? 1u : 0u) + (index + step < count ? 1u : 0u);
+}
+
+// Every combination at nodes that are not pinned; of those the one that exceeds all others, if there is such
+// a node.
+std::vector<SpringCounts> springCounts(const Cloth& cloth) {
+  const std::uint32_t rows = cloth.grid.rows, columns = cloth.grid.columns;
+  const auto at = [&](std::uint32_t row, std::uint32_t column) -> SpringCounts {
+    return {neighbours(row, rows, 1) + neighbours(column, columns, 1),
+            neighbours(row, rows, 1) * neighbours(column, columns, 1),
+            neighbours(row, rows, 2) + neighbours(column, columns, 2)};
+  };
+  const auto atMost = [](std::uint32_t count, std::uint32_t step) {
+    return std::min(2u, (count - 1) / step);
+  };
+  const SpringCounts most{atMost(rows, 1) + atMost(columns, 1), atMost(rows, 1) * atMost(columns, 1),
+                          atMost(rows, 2) + atMost(columns, 2)};
+  std::vector<SpringCounts> found;
+  for (std::uint32_t row = 0; row < rows; ++row)
+    for (std::uint32_t column = 0; column < columns; ++column) {
+      const SpringCounts counts = at(row, column);
+      if (std::ranges::find(found, counts) != found.end()) continue;
+      if (std::ranges::any_of(cloth.pins, [&](const GridRange& pins) { return pins.contains(row, column); }))
+        continue;
+      if (counts == most) return {most};
+      found.push_back(counts);
+    }
+  return found;
+}
+
+// Largest rate in 1/s at which the air can brake a node. A triangle's force is 0.5 rho (C_D |N.u| u + C_L
+// ...), a function of the mean velocity of its three nodes; the symmetric part of its derivative is at most
+// 0.5 rho (2 C_D + C_L) |N| |u|. A third of that goes to each node, and a node has at most six triangles, of
+// half a cell each, so a row sums to  0.5 rho (2 C_D + C_L) |u| cell / m.
+double airDamping(const Cloth& cloth, const Environment& environment) {
+  const GridSpacing lengths = spacing(cloth.grid);
+  const double cell = double{lengths.column} * lengths.row;
+  const double speed = environment.wind.cast<double>().norm() + kAirSpeed;
+  return 0.5 * environment.airDensity * (2.0 * cloth.drag + cloth.lift) * speed * cell *
+         cloth.grid.nodeCount() / cloth.mass;
+}
+
+// Whether semi-implicit Euler with step h is stable: s + 2c < 4.
+bool semiImplicitStable(const Cloth& cloth, const SpringCounts& counts, double air, double h) {
+  const double perMass = cloth.grid.nodeCount() / double{cloth.mass};
+  const auto weight = [&](const Spring& spring) { return h * h * spring.stiffness + 2 * h * spring.damping; };
+  const double springs = counts.structural * weight(cloth.structural) + counts.shear * weight(cloth.shear) +
+                         counts.bend * weight(cloth.bend);
+  return 2 * springs * perMass + 2 * h * (cloth.damping + air) < 4;
+}
+
+// Whether explicit Euler with step h is stable: s <= c, and c < 2, from which 2c - s < 4 follows.
+bool explicitStable(const Cloth& cloth, const SpringCounts& counts, double air, double h) {
+  const double perMass = cloth.grid.nodeCount() / double{cloth.mass};
+  const double tension = 1 - 1 / (1 + double{kTensionStrain});
+  // What damping has to carry of one spring: along it, what the dashpot does not; across it, all of its
+  // tension.
+  const auto deficit = [&](const Spring& spring) {
+    return std::max(h * spring.stiffness - spring.damping, h * spring.stiffness * tension);
+  };
+  const double deficits = counts.structural * deficit(cloth.structural) +
+                          counts.shear * deficit(cloth.shear) + counts.bend * deficit(cloth.bend);
+  const double dashpots = counts.structural * double{cloth.structural.damping} +
+                          counts.shear * double{cloth.shear.damping} +
+                          counts.bend * double{cloth.bend.damping};
+  return 2 * deficits * perMass <= cloth.damping && h * (2 * dashpots * perMass + cloth.damping + air) < 2;
+}
+
+// Fewest substeps from `atLeast` on; both criteria only get easier with smaller steps. 0: none.
+std::uint32_t stableSubsteps(const Scene& scene, const Cloth& cloth, std::uint32_t atLeast) {
+  const double air = airDamping(cloth, scene.environment);
+  const std::vector<SpringCounts> combinations = springCounts(cloth);
+  const auto stable = scene.integrator == Integrator::semiImplicitEuler ? semiImplicitStable : explicitStable;
+  for (std::uint32_t substeps = atLeast; substeps <= kMaxSubsteps; ++substeps) {
+    const double h = scene.tickSeconds() / substeps;
+    if (std::ranges::all_of(combinations,
+                            [&](const SpringCounts& counts) { return stable(cloth, counts, air, h); }))
+      return substeps;
+  }
+  return 0;
+}
+
+}  // namespace
+
+std::uint32_t stableSubsteps(const Scene& scene) {
+  std::uint32_t substeps = 1;
+  for (const Cloth& cloth : scene.cloths) {
+    substeps = stableSubsteps(scene, cloth, substeps);
+    if (substeps == 0) return 0;
+  }
+  return substeps;
+}
+
+}  // namespace clothstream::scene
