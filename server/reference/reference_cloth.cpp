@@ -1,0 +1,208 @@
+// SPDX-License-Identifier: MIT
+// The mass-spring cloth of [Va21] in double precision.
+#include "server/reference/reference_cloth.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+
+namespace clothstream::reference {
+namespace {
+
+constexpr double kTinyLengthSquared = 1e-12;  // m^2, of a spring
+constexpr double kTinyAirSquared = 1e-20;     // of |u||N|, m^6/s^2
+constexpr double kTinyNormalSquared = 1e-30;  // m^4
+
+// u: velocity of the air against the triangle; N: its area vector.
+Vec3 airForce(const Vec3& u, const Vec3& N, double density, double drag, double lift) {
+  const double flow = N.dot(u);
+  const double square = u.squaredNorm() * N.squaredNorm();
+  if (square < kTinyAirSquared) return Vec3::Zero();
+  return 0.5 * density *
+         (drag * std::abs(flow) * u + lift * flow / std::sqrt(square) * (N * u.squaredNorm() - flow * u));
+}
+
+}  // namespace
+
+ReferenceCloth::ReferenceCloth(const scene::Cloth& cloth)
+    : cloth_(cloth),
+      spacing_(scene::spacing(cloth.grid)),
+      velocities_(cloth.grid.nodeCount(), Vec3::Zero()),
+      forces_(cloth.grid.nodeCount(), Vec3::Zero()),
+      inverseMasses_(cloth.grid.nodeCount(), 1 / nodeMass()) {
+  for (const scene::Vec3& position : scene::restPositions(cloth.grid))
+    positions_.push_back(position.cast<double>());
+  const std::vector<std::uint8_t> pinned = scene::pinnedNodes(cloth);
+  for (std::size_t i = 0; i < pinned.size(); ++i)
+    if (pinned[i]) inverseMasses_[i] = 0;
+}
+
+void ReferenceCloth::setParameters(const scene::Cloth& cloth) {
+  assert(cloth.grid.rows == cloth_.grid.rows && cloth.grid.columns == cloth_.grid.columns);
+  cloth_.structural = cloth.structural;
+  cloth_.shear = cloth.shear;
+  cloth_.bend = cloth.bend;
+  cloth_.damping = cloth.damping;
+  cloth_.drag = cloth.drag;
+  cloth_.lift = cloth.lift;
+  cloth_.friction = cloth.friction;
+}
+
+// visit(i, j, spring, rest length), each spring once, i before j.
+template <typename Visit>
+void ReferenceCloth::forEachSpring(const Visit& visit) const {
+  const std::uint32_t rows = cloth_.grid.rows, columns = cloth_.grid.columns;
+  const double alongRow = spacing_.column, alongColumn = spacing_.row, diagonal = spacing_.diagonal;
+  for (std::uint32_t row = 0; row < rows; ++row)
+    for (std::uint32_t column = 0; column < columns; ++column) {
+      const std::uint32_t i = row * columns + column;
+      const bool right = column + 1 < columns, down = row + 1 < rows;
+      if (right) visit(i, i + 1, cloth_.structural, alongRow);
+      if (down) visit(i, i + columns, cloth_.structural, alongColumn);
+      if (down && column > 0) visit(i, i + columns - 1, cloth_.shear, diagonal);
+      if (down && right) visit(i, i + columns + 1, cloth_.shear, diagonal);
+      if (column + 2 < columns) visit(i, i + 2, cloth_.bend, 2 * alongRow);
+      if (row + 2 < rows) visit(i, i + 2 * columns, cloth_.bend, 2 * alongColumn);
+    }
+}
+
+void ReferenceCloth::accumulateSpringForces(std::span<Vec3> forces) const {
+  forEachSpring([&](std::uint32_t i, std::uint32_t j, const scene::Spring& spring, double restLength) {
+    const Vec3 d = positions_[j] - positions_[i];
+    const double square = std::max(d.squaredNorm(), kTinyLengthSquared);
+    const double elastic = spring.stiffness * (1 - restLength / std::sqrt(square));
+    const double viscous = spring.damping * (velocities_[j] - velocities_[i]).dot(d) / square;
+    const Vec3 force = (elastic + viscous) * d;
+    forces[i] += force;
+    forces[j] -= force;
+  });
+}
+
+void ReferenceCloth::accumulateAirForces(const scene::Environment& environment,
+                                         std::span<Vec3> forces) const {
+  const double density = environment.airDensity, drag = cloth_.drag, lift = cloth_.lift;
+  if (density * drag == 0 && density * lift == 0) return;
+  const Vec3 wind = environment.wind.cast<double>();
+  const auto triangle = [&](std::uint32_t p0, std::uint32_t p1, std::uint32_t p2) {
+    const Vec3 velocity = (velocities_[p0] + velocities_[p1] + velocities_[p2]) / 3;
+    const Vec3 N = (positions_[p1] - positions_[p0]).cross(positions_[p2] - positions_[p0]) / 2;
+    const Vec3 share = airForce(wind - velocity, N, density, drag, lift) / 3;
+    for (const std::uint32_t node : {p0, p1, p2}) forces[node] += share;
+  };
+  for (std::uint32_t row = 0; row + 1 < cloth_.grid.rows; ++row)
+    for (std::uint32_t column = 0; column + 1 < cloth_.grid.columns; ++column) {
+      const std::uint32_t a = row * cloth_.grid.columns + column, b = a + 1;
+      const std::uint32_t e = a + cloth_.grid.columns, f = e + 1;
+      triangle(a, e, b);
+      triangle(b, e, f);
+    }
+}
+
+void ReferenceCloth::integrate(const scene::Environment& environment, scene::Integrator integrator,
+                               double h) {
+  std::ranges::fill(forces_, Vec3::Zero());
+  accumulateSpringForces(forces_);
+  accumulateAirForces(environment, forces_);
+  const Vec3 gravity = environment.gravity.cast<double>();
+  const double damping = cloth_.damping;
+  for (std::size_t i = 0; i < positions_.size(); ++i) {
+    if (inverseMasses_[i] == 0) continue;
+    const Vec3 acceleration = forces_[i] * inverseMasses_[i] + gravity - damping * velocities_[i];
+    if (integrator == scene::Integrator::explicitEuler) {
+      positions_[i] += h * velocities_[i];
+      velocities_[i] += h * acceleration;
+    } else {
+      velocities_[i] += h * acceleration;
+      positions_[i] += h * velocities_[i];
+    }
+  }
+}
+
+void ReferenceCloth::collide(const Vec3& centre, const Vec3& velocity, double radius, double friction) {
+  const double distance = radius + cloth_.thickness;
+  const double mu = cloth_.friction * friction;
+  for (std::size_t i = 0; i < positions_.size(); ++i) {
+    if (inverseMasses_[i] == 0) continue;
+    const Vec3 offset = positions_[i] - centre;
+    const double square = offset.squaredNorm();
+    if (square >= distance * distance) continue;
+    const Vec3 normal = square > 0 ? Vec3(offset / std::sqrt(square)) : Vec3::UnitY();
+    positions_[i] = centre + distance * normal;
+    const Vec3 relative = velocities_[i] - velocity;
+    const double approach = relative.dot(normal);
+    if (approach >= 0) continue;
+    const Vec3 tangent = relative - approach * normal;
+    const double speed = tangent.norm();
+    const double kept = speed > 0 ? std::max(0.0, 1 - mu * -approach / speed) : 0;
+    velocities_[i] = velocity + kept * tangent;
+  }
+}
+
+std::vector<Vec3> ReferenceCloth::normals() const {
+  const int rows = static_cast<int>(cloth_.grid.rows), columns = static_cast<int>(cloth_.grid.columns);
+  const auto at = [&](int row, int column) -> const Vec3& {
+    return positions_[static_cast<std::size_t>(row * columns + column)];
+  };
+  struct Direction {
+    int row, column;
+  };
+  // Counter-clockwise seen from +Z: right, up, left, down.
+  constexpr Direction kDirections[] = {{0, 1}, {-1, 0}, {0, -1}, {1, 0}};
+  std::vector<Vec3> normals;
+  normals.reserve(positions_.size());
+  for (int row = 0; row < rows; ++row)
+    for (int column = 0; column < columns; ++column) {
+      Vec3 sum = Vec3::Zero();
+      for (int quadrant = 0; quadrant < 4; ++quadrant) {
+        const Direction a = kDirections[quadrant], b = kDirections[(quadrant + 1) % 4];
+        const int cRow = row + a.row + b.row, cColumn = column + a.column + b.column;
+        if (cRow < 0 || cRow >= rows || cColumn < 0 || cColumn >= columns) continue;
+        const Vec3 toDiagonal = at(cRow, cColumn) - at(row, column);
+        const Vec3 across = at(row + b.row, column + b.column) - at(row + a.row, column + a.column);
+        sum += toDiagonal.cross(across);
+      }
+      const double square = sum.squaredNorm();
+      normals.push_back(square < kTinyNormalSquared ? Vec3::UnitZ() : Vec3(sum / std::sqrt(square)));
+    }
+  return normals;
+}
+
+double ReferenceCloth::kineticEnergy() const {
+  double sum = 0;
+  for (std::size_t i = 0; i < velocities_.size(); ++i)
+    if (inverseMasses_[i] > 0) sum += velocities_[i].squaredNorm();
+  return 0.5 * nodeMass() * sum;
+}
+
+double ReferenceCloth::elasticEnergy() const {
+  double sum = 0;
+  forEachSpring([&](std::uint32_t i, std::uint32_t j, const scene::Spring& spring, double restLength) {
+    const double extension = (positions_[j] - positions_[i]).norm() - restLength;
+    sum += 0.5 * spring.stiffness * extension * extension;
+  });
+  return sum;
+}
+
+double ReferenceCloth::gravityEnergy(const Vec3& gravity) const {
+  double sum = 0;
+  for (std::size_t i = 0; i < positions_.size(); ++i)
+    if (inverseMasses_[i] > 0) sum -= gravity.dot(positions_[i]);
+  return nodeMass() * sum;
+}
+
+Strain ReferenceCloth::strain() const {
+  Strain strain{.max = -1, .mean = 0};
+  std::uint32_t count = 0;
+  forEachSpring([&](std::uint32_t i, std::uint32_t j, const scene::Spring& spring, double restLength) {
+    if (&spring != &cloth_.structural) return;
+    const double stretch = (positions_[j] - positions_[i]).norm() / restLength - 1;
+    strain.max = std::max(strain.max, stretch);
+    strain.mean += std::abs(stretch);
+    ++count;
+  });
+  strain.mean /= count;
+  return strain;
+}
+
+}  // namespace clothstream::reference

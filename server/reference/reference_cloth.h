@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: MIT
+// One cloth in double precision, serial, spring by spring: the oracle of the kernels and the CPU baseline.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "server/scene/scene.h"
+
+namespace clothstream::reference {
+
+using Vec3 = Eigen::Vector3d;
+
+// Of the structural springs: |d| / L - 1.
+struct Strain {
+  double max = 0;   // largest stretch
+  double mean = 0;  // mean of the absolute values
+};
+
+// Nodes are row-major. Not thread-safe; after construction no member allocates but normals().
+class ReferenceCloth {
+ public:
+  // At rest in its start pose. The springs' rest lengths are those of scene::spacing().
+  explicit ReferenceCloth(const scene::Cloth& cloth);
+
+  // Springs, damping, drag, lift, friction from now on; same grid, mass, pins.
+  void setParameters(const scene::Cloth& cloth);
+
+  std::span<Vec3> positions() { return positions_; }
+  std::span<const Vec3> positions() const { return positions_; }
+  std::span<Vec3> velocities() { return velocities_; }
+  std::span<const Vec3> velocities() const { return velocities_; }
+  // 1/kg; 0 for pinned nodes, which never move.
+  std::span<const double> inverseMasses() const { return inverseMasses_; }
+  std::uint32_t nodeCount() const { return cloth_.grid.nodeCount(); }
+  double nodeMass() const { return double{cloth_.mass} / nodeCount(); }
+
+  // Both add to one force a node, N. [Va21] Eq. 1; air with drag and lift a triangle.
+  void accumulateSpringForces(std::span<Vec3> forces) const;
+  void accumulateAirForces(const scene::Environment& environment, std::span<Vec3> forces) const;
+
+  // Forces and one step of h seconds; colliders apart.
+  void integrate(const scene::Environment& environment, scene::Integrator integrator, double h);
+
+  // Nodes within radius + thickness of the centre go to that surface and lose what they move into it; the
+  // rest of their motion relative to the sphere meets Coulomb friction ([Va21] 3.4, Alg. 4).
+  void collide(const Vec3& centre, const Vec3& velocity, double radius, double friction);
+
+  // Unit normals from up to eight triangles round a node ([Va21] 3.5, Alg. 5); (0,0,1) where they vanish.
+  std::vector<Vec3> normals() const;
+
+  // J, of the nodes that can move; gravity's is 0 at the origin.
+  double kineticEnergy() const;
+  double elasticEnergy() const;
+  double gravityEnergy(const Vec3& gravity) const;
+  Strain strain() const;
+
+ private:
+  template <typename Visit>
+  void forEachSpring(const Visit& visit) const;
+
+  scene::Cloth cloth_;
+  scene::GridSpacing spacing_;
+  std::vector<Vec3> positions_, velocities_, forces_;
+  std::vector<double> inverseMasses_;
+};
+
+}  // namespace clothstream::reference

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: MIT
+// All cloths of a scene on the CPU in double precision: ticks of substeps, as the kernels do them.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "server/reference/reference_cloth.h"
+#include "server/scene/scene.h"
+
+namespace clothstream::reference {
+
+// A sphere that moves in a straight line from start to end over a tick's substeps.
+struct MovingSphere {
+  Vec3 start = Vec3::Zero();
+  Vec3 end = Vec3::Zero();
+  double radius = 0;    // m
+  double friction = 1;  // multiplied with the cloth's
+};
+
+struct TickInputs {
+  scene::Environment environment;
+  std::vector<MovingSphere> spheres;
+};
+
+// The scene's own environment and colliders over the given tick: from tick * dt to (tick + 1) * dt.
+TickInputs inputsAt(const scene::Scene& scene, std::uint64_t tick);
+
+class ReferenceSimulation {
+ public:
+  explicit ReferenceSimulation(const scene::Scene& scene);
+
+  // One tick. Cloths do not touch each other.
+  void tick(const TickInputs& inputs);
+  // The next tick of the scene by itself.
+  void tick();
+
+  // Substep `index` of a tick: forces, integration, colliders in order.
+  void substep(const TickInputs& inputs, std::uint32_t index);
+
+  // Ticks done.
+  std::uint64_t ticks() const { return ticks_; }
+  std::vector<ReferenceCloth>& cloths() { return cloths_; }
+  const std::vector<ReferenceCloth>& cloths() const { return cloths_; }
+
+ private:
+  scene::Scene scene_;
+  std::vector<ReferenceCloth> cloths_;
+  std::uint64_t ticks_ = 0;
+};
+
+}  // namespace clothstream::reference
