@@ -26,8 +26,9 @@ class Buffer {
 
   std::size_t bytes() const { return bytes_; }
 
-  // The whole buffer, for upload and readback; empty for the others. Host-coherent. What kernels wrote is visible
-  // once the submission's timeline value is reached (Recorder ends every recording with the barrier for it).
+  // The whole buffer, for upload and readback; empty for the others. Host-coherent. What kernels wrote is
+  // visible once the submission's timeline value is reached (Recorder ends every recording with the barrier
+  // for it).
   template <typename T = std::byte>
   std::span<T> mapped() const {
     return {static_cast<T*>(mapped_), mapped_ == nullptr ? 0 : bytes_ / sizeof(T)};

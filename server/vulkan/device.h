@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -30,8 +31,8 @@ struct DeviceOptions {
   // Threads of a software device (LP_NUM_THREADS); set before the instance is made. Absent: the environment's
   // value or else the measured default.
   std::optional<std::uint32_t> softwareThreads;
-  // VK_LAYER_KHRONOS_validation with synchronisation checks; its messages are counted (validationMessages()) and
-  // logged. Tests switch it on by the environment variable CLOTHSTREAM_VALIDATION=1.
+  // VK_LAYER_KHRONOS_validation with synchronisation checks; its messages are counted (validationMessages())
+  // and logged. Tests switch it on by the environment variable CLOTHSTREAM_VALIDATION=1.
   bool validation = false;
   // Directory of the pipeline cache; empty: none is kept.
   std::filesystem::path cacheDirectory;
@@ -80,8 +81,8 @@ class Device {
   const Limits& limits() const { return limits_; }
   bool isSoftware() const { return info_.kind == DeviceKind::software; }
 
-  // Hands a finished recording to the queue and returns the value that the timeline reaches when it is done. The
-  // recorder must not be begun again before that. Throws DeviceLost.
+  // Hands a finished recording to the queue and returns the value that the timeline reaches when it is done.
+  // The recorder must not be begun again before that. Throws DeviceLost.
   TimelineValue submit(Recorder& recorder);
 
   // False on time-out. Any thread. Throws DeviceLost.

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <initializer_list>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "server/vulkan/buffer.h"
@@ -15,12 +16,13 @@ namespace clothstream::vulkan {
 enum class BindingKind : std::uint8_t { storage, texels };
 
 struct KernelDescription {
-  const char* name = "";                       // for errors, validation and timings
-  std::span<const std::uint32_t> spirv;        // from clothstream_add_kernels
-  std::vector<BindingKind> bindings;           // binding 0, 1, 2, ... of set 0
+  const char* name = "";                 // for errors, validation and timings
+  std::span<const std::uint32_t> spirv;  // from clothstream_add_kernels
+  std::vector<BindingKind> bindings;     // binding 0, 1, 2, ... of set 0
   std::uint32_t pushConstantBytes = 0;
-  std::vector<std::uint32_t> specialisation;   // constant_id 0, 1, 2, ...; pass floats by std::bit_cast
-  std::uint32_t workgroupSize = 64;            // invocations in x; must be what the shader ends up with
+  // Invocations in x. Kernels declare `layout(local_size_x_id = 0) in;`: it is given as constant_id 0.
+  std::uint32_t workgroupSize = 64;
+  std::vector<std::uint32_t> specialisation;  // constant_id 1, 2, 3, ...; pass floats by std::bit_cast
 };
 
 // Throws std::runtime_error naming the kernel where the device refuses it.
@@ -31,6 +33,7 @@ class Kernel {
   std::uint32_t workgroupSize() const { return workgroupSize_; }
 
   // For this room alone.
+  const std::string& name() const { return name_; }
   const vk::raii::Pipeline& pipeline() const { return pipeline_; }
   const vk::raii::PipelineLayout& layout() const { return layout_; }
   const vk::raii::DescriptorSetLayout& setLayout() const { return setLayout_; }
@@ -38,6 +41,7 @@ class Kernel {
   std::uint32_t pushConstantBytes() const { return pushConstantBytes_; }
 
  private:
+  std::string name_;
   std::vector<BindingKind> bindings_;
   std::uint32_t pushConstantBytes_ = 0;
   std::uint32_t workgroupSize_ = 0;

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <string_view>
 #include <type_traits>
 #include <vector>
@@ -18,7 +19,8 @@ struct StageTime {
   double seconds = 0;
 };
 
-// One command buffer and its timestamps, used again and again. Belongs to the device's thread.
+// One command buffer and its timestamps, used again and again. Belongs to the device's thread. Allocates
+// nothing once it has recorded its longest recording.
 class Recorder {
  public:
   explicit Recorder(const Device& device);
@@ -26,11 +28,14 @@ class Recorder {
   // Forgets what was recorded; what was submitted must be complete.
   void begin();
 
-  // Until the next beginStage or the end, work counts to this stage (names in static storage; at most 32 stages a
-  // recording; the same name may come again and is added up).
+  // Until the next beginStage or the end, work counts to this stage (names in static storage; at most
+  // kMaxStages names and kMaxMarks calls a recording; the same name may come again and is added up).
+  static constexpr std::uint32_t kMaxStages = 32;
+  static constexpr std::uint32_t kMaxMarks = 1024;
   void beginStage(std::string_view stage);
 
   // Runs the kernel on at least `threads` invocations in x (whole workgroups: the kernel guards its bounds).
+  // Throws std::runtime_error where that is more than Limits::maxDispatchX workgroups.
   template <typename Push>
   void dispatch(const Bindings& bindings, const Push& push, std::uint64_t threads) {
     static_assert(std::is_trivially_copyable_v<Push>);
@@ -40,7 +45,17 @@ class Recorder {
     dispatchBytes(bindings, nullptr, 0, threads);
   }
 
-  // What comes after sees what came before (kernels and copies).
+  // As many workgroups as three 32-bit numbers (x, y, z) in `groups`, a buffer made as `indirect`, say when
+  // it runs.
+  template <typename Push>
+  void dispatchIndirect(const Bindings& bindings, const Push& push, const Buffer& groups,
+                        std::size_t offset = 0) {
+    static_assert(std::is_trivially_copyable_v<Push>);
+    dispatchIndirectBytes(bindings, &push, sizeof(Push), groups, offset);
+  }
+
+  // What comes after sees what came before: kernels, copies, fills, dispatch sizes. None is needed at the
+  // start or the end of a recording: recordings on one device always see each other's work.
   void barrier();
 
   void copy(const Buffer& from, const Buffer& to, std::size_t bytes, std::size_t fromOffset = 0,
@@ -48,21 +63,29 @@ class Recorder {
   // `bytes` a multiple of 4.
   void fill(const Buffer& buffer, std::uint32_t value, std::size_t bytes, std::size_t offset = 0);
 
-  // Device seconds of each stage of the last submitted recording, in order of first appearance; call when it is
-  // complete.
-  std::vector<StageTime> stageTimes() const;
+  // Device seconds of each stage of the last submitted recording, in order of first appearance; call when it
+  // is complete. Empty where the device has no timestamps. Good until the next call or begin().
+  std::span<const StageTime> stageTimes();
 
-  // For this room alone: ends the recording (with a barrier towards the host).
+  // For this room alone: ends the recording with a barrier towards the host and later recordings.
   const vk::raii::CommandBuffer& finish();
 
  private:
-  void dispatchBytes(const Bindings& bindings, const void* push, std::uint32_t pushBytes, std::uint64_t threads);
+  void dispatchBytes(const Bindings& bindings, const void* push, std::uint32_t pushBytes,
+                     std::uint64_t threads);
+  void dispatchIndirectBytes(const Bindings& bindings, const void* push, std::uint32_t pushBytes,
+                             const Buffer& groups, std::size_t offset);
+  void bind(const Bindings& bindings, const void* push, std::uint32_t pushBytes);
+  void mark();
 
   const Device* device_;
   vk::raii::CommandPool pool_ = nullptr;
-  vk::raii::CommandBuffers buffers_ = nullptr;
-  vk::raii::QueryPool timestamps_ = nullptr;
-  std::vector<std::string_view> stages_;
+  vk::raii::CommandBuffer commands_ = nullptr;
+  vk::raii::QueryPool timestamps_ = nullptr;  // mark i begins stage marks_[i]; one more ends the last
+  std::uint64_t timestampMask_ = 0;
+  std::vector<std::string_view> marks_;
+  std::vector<std::uint64_t> ticks_;
+  std::vector<StageTime> times_;
   bool open_ = false;
 };
 

@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: MIT
+// A Vulkan device with one compute queue: chosen, opened, its limits asked.
+#include "server/vulkan/device.h"
+
+#include <algorithm>
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include "server/vulkan/instance.h"
+#include "server/vulkan/recorder.h"
+
+namespace clothstream::vulkan {
+namespace {
+
+constexpr const char* kLost =
+    "the Vulkan device was lost (VK_ERROR_DEVICE_LOST): everything made on it must be made anew";
+
+Limits limitsOf(const vk::raii::PhysicalDevice& physical) {
+  const auto chain =
+      physical.getProperties2<vk::PhysicalDeviceProperties2, vk::PhysicalDeviceVulkan11Properties>();
+  const vk::PhysicalDeviceLimits& limits = chain.get<vk::PhysicalDeviceProperties2>().properties.limits;
+  std::uint64_t memory = 0;
+  const vk::PhysicalDeviceMemoryProperties heaps = physical.getMemoryProperties();
+  for (std::uint32_t i = 0; i < heaps.memoryHeapCount; ++i)
+    if (heaps.memoryHeaps[i].flags & vk::MemoryHeapFlagBits::eDeviceLocal)
+      memory = std::max<std::uint64_t>(memory, heaps.memoryHeaps[i].size);
+  return {.maxWorkgroupInvocations = limits.maxComputeWorkGroupInvocations,
+          .maxWorkgroupSizeX = limits.maxComputeWorkGroupSize[0],
+          .maxDispatchX = limits.maxComputeWorkGroupCount[0],
+          .maxSharedBytes = limits.maxComputeSharedMemorySize,
+          .maxStorageRange = limits.maxStorageBufferRange,
+          .maxTexelElements = limits.maxTexelBufferElements,
+          .maxPushConstantBytes = limits.maxPushConstantsSize,
+          .subgroupSize = chain.get<vk::PhysicalDeviceVulkan11Properties>().subgroupSize,
+          .timestampPeriod = limits.timestampPeriod,
+          .deviceMemoryBytes = memory};
+}
+
+vk::raii::Device openDevice(const Candidate& candidate) {
+  const float priority = 1;
+  const vk::DeviceQueueCreateInfo queue{
+      .queueFamilyIndex = candidate.queueFamily, .queueCount = 1, .pQueuePriorities = &priority};
+  const vk::PhysicalDeviceVulkan12Features features{.timelineSemaphore = VK_TRUE};
+  return {candidate.physical,
+          vk::DeviceCreateInfo{.pNext = &features, .queueCreateInfoCount = 1, .pQueueCreateInfos = &queue}};
+}
+
+}  // namespace
+
+Device::Device(const DeviceOptions& options)
+    : context_((setSoftwareThreads(options.softwareThreads), openLoader())), options_(options) {
+  const bool validate = options.validation || validationByEnvironment();
+  instance_ = makeInstance(context_, validate);
+  if (validate) messenger_ = makeMessenger(instance_);
+
+  std::vector<Candidate> all = candidates(instance_);
+  Candidate& chosen = all[vulkan::select(all, options.select)];
+  try {
+    device_ = openDevice(chosen);
+    const vk::SemaphoreTypeCreateInfo timeline{.semaphoreType = vk::SemaphoreType::eTimeline};
+    queue_ = device_.getQueue(chosen.queueFamily, 0);
+    timeline_ = vk::raii::Semaphore(device_, vk::SemaphoreCreateInfo{.pNext = &timeline});
+    pipelineCache_ = vk::raii::PipelineCache(device_, vk::PipelineCacheCreateInfo{});
+  } catch (const vk::SystemError& error) {
+    throw DeviceError(
+        fmt::format("the Vulkan device {} cannot be opened: {}", chosen.info.name, error.what()));
+  }
+  limits_ = limitsOf(chosen.physical);
+  queueFamily_ = chosen.queueFamily;
+  info_ = std::move(chosen.info);
+  physical_ = std::move(chosen.physical);
+}
+
+Device::~Device() {
+  try {
+    device_.waitIdle();
+  } catch (const vk::SystemError& error) {
+    spdlog::warn("closing the Vulkan device {}: {}", info_.name, error.what());
+  }
+}
+
+TimelineValue Device::submit(Recorder& recorder) {
+  const vk::CommandBuffer commands = *recorder.finish();
+  const TimelineValue value = submitted_ + 1;
+  const vk::TimelineSemaphoreSubmitInfo timeline{.signalSemaphoreValueCount = 1,
+                                                 .pSignalSemaphoreValues = &value};
+  try {
+    queue_.submit(vk::SubmitInfo{.pNext = &timeline,
+                                 .commandBufferCount = 1,
+                                 .pCommandBuffers = &commands,
+                                 .signalSemaphoreCount = 1,
+                                 .pSignalSemaphores = &*timeline_});
+  } catch (const vk::DeviceLostError&) {
+    throw DeviceLost(kLost);
+  }
+  return submitted_ = value;
+}
+
+bool Device::wait(TimelineValue value, std::chrono::nanoseconds timeout) const {
+  const auto nanoseconds = static_cast<std::uint64_t>(std::max<std::int64_t>(timeout.count(), 0));
+  try {
+    return device_.waitSemaphores({.semaphoreCount = 1, .pSemaphores = &*timeline_, .pValues = &value},
+                                  nanoseconds) == vk::Result::eSuccess;
+  } catch (const vk::DeviceLostError&) {
+    throw DeviceLost(kLost);
+  }
+}
+
+TimelineValue Device::completed() const {
+  try {
+    return timeline_.getCounterValue();
+  } catch (const vk::DeviceLostError&) {
+    throw DeviceLost(kLost);
+  }
+}
+
+std::uint32_t Device::memoryType(std::uint32_t typeBits, vk::MemoryPropertyFlags wanted,
+                                 vk::MemoryPropertyFlags preferred) const {
+  const vk::PhysicalDeviceMemoryProperties memory = physical_.getMemoryProperties();
+  const auto find = [&](vk::MemoryPropertyFlags flags) -> std::optional<std::uint32_t> {
+    for (std::uint32_t i = 0; i < memory.memoryTypeCount; ++i)
+      if ((typeBits >> i & 1u) != 0 && (memory.memoryTypes[i].propertyFlags & flags) == flags) return i;
+    return std::nullopt;
+  };
+  if (const auto best = find(wanted | preferred)) return *best;
+  if (const auto good = find(wanted)) return *good;
+  throw std::runtime_error(fmt::format("{} has no memory that is {}", info_.name, vk::to_string(wanted)));
+}
+
+}  // namespace clothstream::vulkan

@@ -1,0 +1,243 @@
+// SPDX-License-Identifier: MIT
+// The way to the driver: loader, instance, validation, and which device is meant. For this room alone.
+#include "server/vulkan/instance.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cctype>
+#include <charconv>
+#include <cstdlib>
+#include <deque>
+#include <mutex>
+#include <string>
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+namespace clothstream::vulkan {
+namespace {
+
+constexpr const char* kValidationLayer = "VK_LAYER_KHRONOS_validation";
+constexpr std::uint32_t kApiVersion = VK_API_VERSION_1_2;
+
+constexpr std::string_view kInstallDriver =
+    "Install a driver: Debian's mesa-vulkan-drivers has the software device and drives AMD and Intel GPUs; "
+    "for "
+    "NVIDIA install nvidia-driver and nvidia-vulkan-icd. `vulkaninfo --summary` (vulkan-tools) shows what is "
+    "found.";
+
+// What the validation layer said, in this process: messages come from whichever thread calls Vulkan.
+struct Messages {
+  static constexpr std::size_t kKept = 16;
+  std::atomic<std::uint64_t> count = 0;
+  std::mutex mutex;
+  std::deque<std::string> newest;
+};
+
+Messages& messages() {
+  static Messages instance;
+  return instance;
+}
+
+VKAPI_ATTR VkBool32 VKAPI_CALL onMessage(VkDebugUtilsMessageSeverityFlagBitsEXT,
+                                         VkDebugUtilsMessageTypeFlagsEXT,
+                                         const VkDebugUtilsMessengerCallbackDataEXT* data, void*) {
+  Messages& all = messages();
+  {
+    const std::lock_guard lock(all.mutex);
+    if (all.newest.size() == Messages::kKept) all.newest.pop_front();
+    all.newest.emplace_back(data->pMessage);
+  }
+  ++all.count;
+  spdlog::error("Vulkan validation: {}", data->pMessage);
+  return VK_FALSE;
+}
+
+vk::DebugUtilsMessengerCreateInfoEXT messengerInfo() {
+  using Severity = vk::DebugUtilsMessageSeverityFlagBitsEXT;
+  return {.messageSeverity = Severity::eWarning | Severity::eError,
+          .messageType = vk::DebugUtilsMessageTypeFlagBitsEXT::eValidation,
+          .pfnUserCallback = onMessage};
+}
+
+DeviceKind kindOf(vk::PhysicalDeviceType type) {
+  switch (type) {
+    case vk::PhysicalDeviceType::eDiscreteGpu:
+      return DeviceKind::discrete;
+    case vk::PhysicalDeviceType::eIntegratedGpu:
+      return DeviceKind::integrated;
+    case vk::PhysicalDeviceType::eVirtualGpu:
+      return DeviceKind::virtualGpu;
+    case vk::PhysicalDeviceType::eCpu:
+      return DeviceKind::software;
+    default:
+      return DeviceKind::other;
+  }
+}
+
+std::string versionText(std::uint32_t version) {
+  return fmt::format("{}.{}.{}", VK_API_VERSION_MAJOR(version), VK_API_VERSION_MINOR(version),
+                     VK_API_VERSION_PATCH(version));
+}
+
+std::optional<std::uint32_t> computeQueueFamily(const vk::raii::PhysicalDevice& physical) {
+  const auto families = physical.getQueueFamilyProperties();
+  for (std::uint32_t i = 0; i < families.size(); ++i)
+    if (families[i].queueFlags & vk::QueueFlagBits::eCompute) return i;
+  return std::nullopt;
+}
+
+std::string lowerCase(std::string_view text) {
+  std::string lower(text);
+  std::transform(lower.begin(), lower.end(), lower.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return lower;
+}
+
+std::string listText(const std::vector<Candidate>& candidates) {
+  std::string text;
+  for (const Candidate& candidate : candidates)
+    text += fmt::format("\n  {}: {} ({})", candidate.info.index, candidate.info.name, candidate.info.driver);
+  return text;
+}
+
+}  // namespace
+
+bool validationByEnvironment() {
+  const char* value = std::getenv("CLOTHSTREAM_VALIDATION");
+  return value != nullptr && *value != '\0' && std::string_view(value) != "0";
+}
+
+void setSoftwareThreads(std::optional<std::uint32_t> threads) {
+  if (threads) setenv("LP_NUM_THREADS", std::to_string(*threads).c_str(), 1);
+}
+
+vk::raii::Context openLoader() {
+  try {
+    return {};
+  } catch (const std::runtime_error& error) {
+    throw DeviceError(
+        fmt::format("the Vulkan loader libvulkan.so.1 cannot be opened ({}). Install Debian's libvulkan1. {}",
+                    error.what(), kInstallDriver));
+  }
+}
+
+vk::raii::Instance makeInstance(const vk::raii::Context& context, bool validate) {
+  const vk::ApplicationInfo application{.pApplicationName = "clothstream", .apiVersion = kApiVersion};
+  const vk::ValidationFeatureEnableEXT feature = vk::ValidationFeatureEnableEXT::eSynchronizationValidation;
+  const vk::DebugUtilsMessengerCreateInfoEXT messenger = messengerInfo();
+  const vk::ValidationFeaturesEXT features{
+      .pNext = &messenger, .enabledValidationFeatureCount = 1, .pEnabledValidationFeatures = &feature};
+  const char* extension = VK_EXT_DEBUG_UTILS_EXTENSION_NAME;
+  vk::InstanceCreateInfo info{.pApplicationInfo = &application};
+  if (validate) {
+    // Hazards between submissions are found only with this setting, which this layer takes from here alone.
+    setenv("VK_LAYER_ENABLES",
+           "VK_VALIDATION_FEATURE_ENABLE_SYNCHRONIZATION_VALIDATION_EXT:"
+           "VALIDATION_CHECK_ENABLE_SYNCHRONIZATION_VALIDATION_QUEUE_SUBMIT",
+           0);
+    info.pNext = &features;
+    info.enabledLayerCount = 1;
+    info.ppEnabledLayerNames = &kValidationLayer;
+    info.enabledExtensionCount = 1;
+    info.ppEnabledExtensionNames = &extension;
+  }
+  try {
+    return vk::raii::Instance(context, info);
+  } catch (const vk::LayerNotPresentError&) {
+    throw DeviceError(
+        fmt::format("validation was asked for (option or CLOTHSTREAM_VALIDATION), but {} is not installed. "
+                    "Install Debian's "
+                    "vulkan-validationlayers.",
+                    kValidationLayer));
+  } catch (const vk::IncompatibleDriverError&) {
+    throw DeviceError(fmt::format("no Vulkan driver was found. {}", kInstallDriver));
+  } catch (const vk::SystemError& error) {
+    throw DeviceError(fmt::format("vkCreateInstance failed: {}", error.what()));
+  }
+}
+
+vk::raii::DebugUtilsMessengerEXT makeMessenger(const vk::raii::Instance& instance) {
+  return {instance, messengerInfo()};
+}
+
+std::vector<Candidate> candidates(const vk::raii::Instance& instance) {
+  std::vector<Candidate> found;
+  std::string unfit;
+  std::vector<vk::raii::PhysicalDevice> all;
+  try {
+    all = instance.enumeratePhysicalDevices();
+  } catch (const vk::SystemError& error) {
+    throw DeviceError(fmt::format("vkEnumeratePhysicalDevices failed: {}. {}", error.what(), kInstallDriver));
+  }
+  for (vk::raii::PhysicalDevice& physical : all) {
+    const vk::PhysicalDeviceProperties properties = physical.getProperties();
+    const std::optional<std::uint32_t> family = computeQueueFamily(physical);
+    const bool fits = properties.apiVersion >= kApiVersion && family &&
+                      physical.getFeatures2<vk::PhysicalDeviceFeatures2, vk::PhysicalDeviceVulkan12Features>()
+                          .get<vk::PhysicalDeviceVulkan12Features>()
+                          .timelineSemaphore;
+    if (!fits) {
+      unfit +=
+          fmt::format("\n  {} (Vulkan {})", properties.deviceName.data(), versionText(properties.apiVersion));
+      continue;
+    }
+    const auto driver =
+        physical.getProperties2<vk::PhysicalDeviceProperties2, vk::PhysicalDeviceDriverProperties>()
+            .get<vk::PhysicalDeviceDriverProperties>();
+    DeviceInfo info{.name = properties.deviceName.data(),
+                    .kind = kindOf(properties.deviceType),
+                    .driver = fmt::format("{} {}", driver.driverName.data(), driver.driverInfo.data()),
+                    .apiVersion = versionText(properties.apiVersion)};
+    found.push_back({std::move(info), std::move(physical), *family});
+  }
+  if (found.empty()) {
+    if (unfit.empty()) throw DeviceError(fmt::format("no Vulkan device was found. {}", kInstallDriver));
+    throw DeviceError(fmt::format(
+        "no Vulkan device serves: Vulkan 1.2 with timeline semaphores is needed, and there is only{}\n{}",
+        unfit, kInstallDriver));
+  }
+  std::stable_sort(found.begin(), found.end(),
+                   [](const Candidate& a, const Candidate& b) { return a.info.kind < b.info.kind; });
+  for (std::uint32_t i = 0; i < found.size(); ++i) found[i].info.index = i;
+  return found;
+}
+
+std::size_t select(const std::vector<Candidate>& candidates, std::string_view wanted) {
+  if (wanted.empty()) return 0;
+  if (std::all_of(wanted.begin(), wanted.end(), [](unsigned char c) { return std::isdigit(c) != 0; })) {
+    std::size_t index = candidates.size();
+    std::from_chars(wanted.data(), wanted.data() + wanted.size(), index);
+    if (index < candidates.size()) return index;
+    throw DeviceError(
+        fmt::format("there is no Vulkan device with index {}, only{}", wanted, listText(candidates)));
+  }
+  std::vector<std::size_t> matches;
+  for (std::size_t i = 0; i < candidates.size(); ++i)
+    if (lowerCase(candidates[i].info.name).find(lowerCase(wanted)) != std::string::npos) matches.push_back(i);
+  if (matches.size() == 1) return matches.front();
+  throw DeviceError(fmt::format(
+      "the name of {} Vulkan device contains \"{}\"; choose by index or a longer part of a name:{}",
+      matches.empty() ? "no" : "more than one", wanted, listText(candidates)));
+}
+
+std::vector<DeviceInfo> listDevices() {
+  setSoftwareThreads(std::nullopt);
+  const vk::raii::Context context = openLoader();
+  const vk::raii::Instance instance = makeInstance(context, false);
+  std::vector<DeviceInfo> infos;
+  for (Candidate& candidate : candidates(instance)) infos.push_back(std::move(candidate.info));
+  return infos;
+}
+
+std::uint64_t Device::validationMessages() {
+  return messages().count;
+}
+
+std::vector<std::string> Device::validationTexts() {
+  Messages& all = messages();
+  const std::lock_guard lock(all.mutex);
+  return {all.newest.begin(), all.newest.end()};
+}
+
+}  // namespace clothstream::vulkan

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: MIT
+// The way to the driver: loader, instance, validation, and which device is meant. For this room alone.
+#pragma once
+
+#include <optional>
+#include <string_view>
+#include <vector>
+
+#include "server/vulkan/device.h"
+
+namespace clothstream::vulkan {
+
+// Whether CLOTHSTREAM_VALIDATION in the environment asks for validation (anything but empty and 0).
+bool validationByEnvironment();
+
+// Puts the number of threads of software devices into the environment, where Mesa reads it as devices are
+// listed. The environment belongs to the whole process: call before other threads run that read it.
+void setSoftwareThreads(std::optional<std::uint32_t> threads);
+
+// Throws DeviceError where the loader is not installed.
+vk::raii::Context openLoader();
+
+// Vulkan 1.2, with the validation layer where `validate`. Throws DeviceError where there is no driver or no
+// layer.
+vk::raii::Instance makeInstance(const vk::raii::Context& context, bool validate);
+
+// Counts and logs what the validation layer says, for as long as it lives.
+vk::raii::DebugUtilsMessengerEXT makeMessenger(const vk::raii::Instance& instance);
+
+struct Candidate {
+  DeviceInfo info;
+  vk::raii::PhysicalDevice physical;
+  std::uint32_t queueFamily = 0;  // one that computes
+};
+
+// The devices that can serve (Vulkan 1.2, timeline semaphores, compute), best first. Throws DeviceError if
+// none can.
+std::vector<Candidate> candidates(const vk::raii::Instance& instance);
+
+// The one that DeviceOptions::select means. Throws DeviceError that lists what there is.
+std::size_t select(const std::vector<Candidate>& candidates, std::string_view wanted);
+
+}  // namespace clothstream::vulkan

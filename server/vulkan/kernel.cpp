@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: MIT
+// A compute pipeline made from embedded SPIR-V, and the buffers it is bound to.
+#include "server/vulkan/kernel.h"
+
+#include <cassert>
+
+#include <fmt/format.h>
+
+namespace clothstream::vulkan {
+namespace {
+
+constexpr vk::DescriptorType typeOf(BindingKind kind) {
+  return kind == BindingKind::texels ? vk::DescriptorType::eUniformTexelBuffer
+                                     : vk::DescriptorType::eStorageBuffer;
+}
+
+constexpr std::uint32_t kWord = sizeof(std::uint32_t);
+
+}  // namespace
+
+Kernel::Kernel(const Device& device, const KernelDescription& description)
+    : name_(description.name),
+      bindings_(description.bindings),
+      pushConstantBytes_(description.pushConstantBytes),
+      workgroupSize_(description.workgroupSize) {
+  const Limits& limits = device.limits();
+  if (workgroupSize_ > limits.maxWorkgroupSizeX || workgroupSize_ > limits.maxWorkgroupInvocations)
+    throw std::runtime_error(fmt::format(
+        "kernel {}: a workgroup of {} invocations is more than the {} of {}", name_, workgroupSize_,
+        std::min(limits.maxWorkgroupSizeX, limits.maxWorkgroupInvocations), device.info().name));
+  if (pushConstantBytes_ > limits.maxPushConstantBytes)
+    throw std::runtime_error(fmt::format("kernel {}: {} bytes of push constants are more than the {} of {}",
+                                         name_, pushConstantBytes_, limits.maxPushConstantBytes,
+                                         device.info().name));
+
+  std::vector<vk::DescriptorSetLayoutBinding> slots;
+  for (const BindingKind kind : bindings_)
+    slots.push_back({.binding = static_cast<std::uint32_t>(slots.size()),
+                     .descriptorType = typeOf(kind),
+                     .descriptorCount = 1,
+                     .stageFlags = vk::ShaderStageFlagBits::eCompute});
+  std::vector<std::uint32_t> constants{workgroupSize_};
+  constants.insert(constants.end(), description.specialisation.begin(), description.specialisation.end());
+  std::vector<vk::SpecializationMapEntry> entries;
+  for (std::uint32_t id = 0; id < constants.size(); ++id)
+    entries.push_back({.constantID = id, .offset = id * kWord, .size = kWord});
+  const vk::SpecializationInfo specialisation{.mapEntryCount = static_cast<std::uint32_t>(entries.size()),
+                                              .pMapEntries = entries.data(),
+                                              .dataSize = constants.size() * kWord,
+                                              .pData = constants.data()};
+  const vk::PushConstantRange push{.stageFlags = vk::ShaderStageFlagBits::eCompute,
+                                   .size = pushConstantBytes_};
+  try {
+    setLayout_ = vk::raii::DescriptorSetLayout(
+        device.handle(),
+        vk::DescriptorSetLayoutCreateInfo{.bindingCount = static_cast<std::uint32_t>(slots.size()),
+                                          .pBindings = slots.data()});
+    layout_ = vk::raii::PipelineLayout(
+        device.handle(), vk::PipelineLayoutCreateInfo{.setLayoutCount = 1,
+                                                      .pSetLayouts = &*setLayout_,
+                                                      .pushConstantRangeCount = pushConstantBytes_ > 0,
+                                                      .pPushConstantRanges = &push});
+    const vk::raii::ShaderModule module(device.handle(),
+                                        vk::ShaderModuleCreateInfo{.codeSize = description.spirv.size_bytes(),
+                                                                   .pCode = description.spirv.data()});
+    pipeline_ =
+        vk::raii::Pipeline(device.handle(), device.pipelineCache(),
+                           vk::ComputePipelineCreateInfo{.stage = {.stage = vk::ShaderStageFlagBits::eCompute,
+                                                                   .module = *module,
+                                                                   .pName = "main",
+                                                                   .pSpecializationInfo = &specialisation},
+                                                         .layout = *layout_});
+  } catch (const vk::SystemError& error) {
+    throw std::runtime_error(
+        fmt::format("kernel {} is refused by {}: {}", name_, device.info().name, error.what()));
+  }
+}
+
+Bindings::Bindings(const Device& device, const Kernel& kernel, std::initializer_list<const Buffer*> buffers)
+    : kernel_(&kernel) {
+  const std::span<const BindingKind> kinds = kernel.bindings();
+  assert(buffers.size() == kinds.size());
+  const auto count = static_cast<std::uint32_t>(kinds.size());
+  if (count == 0) return;
+
+  std::vector<vk::DescriptorPoolSize> sizes;
+  std::vector<vk::DescriptorBufferInfo> infos(count);
+  std::vector<vk::WriteDescriptorSet> writes;
+  for (std::uint32_t i = 0; i < count; ++i) {
+    const Buffer& buffer = *buffers.begin()[i];
+    if (buffer.bytes() > device.limits().maxStorageRange)
+      throw std::runtime_error(
+          fmt::format("kernel {}, binding {}: a buffer of {} bytes is more than the {} that kernels "
+                      "can bind on {}",
+                      kernel.name(), i, buffer.bytes(), device.limits().maxStorageRange, device.info().name));
+    assert(kinds[i] != BindingKind::texels || *buffer.texelView());
+    infos[i] = vk::DescriptorBufferInfo{.buffer = *buffer.handle(), .range = VK_WHOLE_SIZE};
+    sizes.push_back({.type = typeOf(kinds[i]), .descriptorCount = 1});
+    writes.push_back({.dstBinding = i,
+                      .descriptorCount = 1,
+                      .descriptorType = typeOf(kinds[i]),
+                      .pBufferInfo = &infos[i],
+                      .pTexelBufferView = &*buffer.texelView()});
+  }
+  try {
+    pool_ = vk::raii::DescriptorPool(
+        device.handle(),
+        vk::DescriptorPoolCreateInfo{.flags = vk::DescriptorPoolCreateFlagBits::eFreeDescriptorSet,
+                                     .maxSets = 1,
+                                     .poolSizeCount = count,
+                                     .pPoolSizes = sizes.data()});
+    vk::raii::DescriptorSets sets(
+        device.handle(),
+        vk::DescriptorSetAllocateInfo{
+            .descriptorPool = *pool_, .descriptorSetCount = 1, .pSetLayouts = &*kernel.setLayout()});
+    set_ = std::move(sets.front());
+  } catch (const vk::SystemError& error) {
+    throw std::runtime_error(fmt::format("kernel {} cannot be bound: {}", kernel.name(), error.what()));
+  }
+  for (vk::WriteDescriptorSet& write : writes) write.dstSet = *set_;
+  device.handle().updateDescriptorSets(writes, nullptr);
+}
+
+}  // namespace clothstream::vulkan

@@ -1,0 +1,150 @@
+// SPDX-License-Identifier: MIT
+// Records work for the device: bind, push, dispatch, copy, barrier, timestamp.
+#include "server/vulkan/recorder.h"
+
+#include <algorithm>
+#include <cassert>
+
+#include <fmt/format.h>
+
+namespace clothstream::vulkan {
+namespace {
+
+using Access = vk::AccessFlagBits;
+using Stage = vk::PipelineStageFlagBits;
+
+constexpr vk::PipelineStageFlags kWork = Stage::eComputeShader | Stage::eTransfer;
+constexpr vk::AccessFlags kWrites = Access::eShaderWrite | Access::eTransferWrite;
+constexpr vk::AccessFlags kUses = Access::eShaderRead | Access::eShaderWrite | Access::eTransferRead |
+                                  Access::eTransferWrite | Access::eIndirectCommandRead;
+
+}  // namespace
+
+Recorder::Recorder(const Device& device) : device_(&device) {
+  pool_ = vk::raii::CommandPool(device.handle(),
+                                vk::CommandPoolCreateInfo{.queueFamilyIndex = device.queueFamily()});
+  vk::raii::CommandBuffers all(
+      device.handle(),
+      vk::CommandBufferAllocateInfo{
+          .commandPool = *pool_, .level = vk::CommandBufferLevel::ePrimary, .commandBufferCount = 1});
+  commands_ = std::move(all.front());
+  const std::uint32_t bits =
+      device.physical().getQueueFamilyProperties()[device.queueFamily()].timestampValidBits;
+  if (bits > 0)
+    timestamps_ = vk::raii::QueryPool(
+        device.handle(),
+        vk::QueryPoolCreateInfo{.queryType = vk::QueryType::eTimestamp, .queryCount = kMaxMarks + 1});
+  timestampMask_ = bits >= 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << bits) - 1;
+  marks_.reserve(kMaxMarks);
+  ticks_.resize(kMaxMarks + 1);
+  times_.reserve(kMaxStages);
+}
+
+void Recorder::begin() {
+  assert(!open_);
+  pool_.reset();
+  commands_.begin(vk::CommandBufferBeginInfo{});
+  if (*timestamps_) commands_.resetQueryPool(*timestamps_, 0, kMaxMarks + 1);
+  marks_.clear();
+  open_ = true;
+}
+
+void Recorder::beginStage(std::string_view stage) {
+  assert(open_ && marks_.size() < kMaxMarks);
+  mark();
+  marks_.push_back(stage);
+}
+
+void Recorder::mark() {
+  if (*timestamps_)
+    commands_.writeTimestamp(Stage::eBottomOfPipe, *timestamps_, static_cast<std::uint32_t>(marks_.size()));
+}
+
+void Recorder::dispatchBytes(const Bindings& bindings, const void* push, std::uint32_t pushBytes,
+                             std::uint64_t threads) {
+  if (threads == 0) return;
+  const Kernel& kernel = bindings.kernel();
+  const std::uint64_t groups = (threads + kernel.workgroupSize() - 1) / kernel.workgroupSize();
+  const std::uint32_t most = device_->limits().maxDispatchX;
+  if (groups > most)
+    throw std::runtime_error(fmt::format(
+        "kernel {}: {} invocations are {} workgroups of {}, more than the {} that {} runs at once; make the "
+        "workgroups larger or the invocations fewer",
+        kernel.name(), threads, groups, kernel.workgroupSize(), most, device_->info().name));
+  bind(bindings, push, pushBytes);
+  commands_.dispatch(static_cast<std::uint32_t>(groups), 1, 1);
+}
+
+void Recorder::dispatchIndirectBytes(const Bindings& bindings, const void* push, std::uint32_t pushBytes,
+                                     const Buffer& groups, std::size_t offset) {
+  assert(offset % 4 == 0 && offset + sizeof(VkDispatchIndirectCommand) <= groups.bytes());
+  bind(bindings, push, pushBytes);
+  commands_.dispatchIndirect(*groups.handle(), offset);
+}
+
+void Recorder::bind(const Bindings& bindings, const void* push, std::uint32_t pushBytes) {
+  const Kernel& kernel = bindings.kernel();
+  assert(open_ && pushBytes == kernel.pushConstantBytes());
+  commands_.bindPipeline(vk::PipelineBindPoint::eCompute, *kernel.pipeline());
+  if (*bindings.set())
+    commands_.bindDescriptorSets(vk::PipelineBindPoint::eCompute, *kernel.layout(), 0, *bindings.set(),
+                                 nullptr);
+  if (pushBytes > 0)
+    commands_.pushConstants<std::byte>(*kernel.layout(), vk::ShaderStageFlagBits::eCompute, 0,
+                                       {pushBytes, static_cast<const std::byte*>(push)});
+}
+
+void Recorder::barrier() {
+  assert(open_);
+  const vk::MemoryBarrier memory{.srcAccessMask = kWrites, .dstAccessMask = kUses};
+  commands_.pipelineBarrier(kWork, kWork | Stage::eDrawIndirect, {}, memory, nullptr, nullptr);
+}
+
+void Recorder::copy(const Buffer& from, const Buffer& to, std::size_t bytes, std::size_t fromOffset,
+                    std::size_t toOffset) {
+  assert(open_ && fromOffset + bytes <= from.bytes() && toOffset + bytes <= to.bytes());
+  if (bytes == 0) return;
+  commands_.copyBuffer(*from.handle(), *to.handle(),
+                       vk::BufferCopy{.srcOffset = fromOffset, .dstOffset = toOffset, .size = bytes});
+}
+
+void Recorder::fill(const Buffer& buffer, std::uint32_t value, std::size_t bytes, std::size_t offset) {
+  assert(open_ && bytes % 4 == 0 && offset % 4 == 0 && offset + bytes <= buffer.bytes());
+  if (bytes == 0) return;
+  commands_.fillBuffer(*buffer.handle(), offset, bytes, value);
+}
+
+const vk::raii::CommandBuffer& Recorder::finish() {
+  if (!open_) return commands_;
+  if (!marks_.empty()) mark();
+  const vk::MemoryBarrier memory{.srcAccessMask = kWrites, .dstAccessMask = kUses | Access::eHostRead};
+  commands_.pipelineBarrier(kWork, kWork | Stage::eDrawIndirect | Stage::eHost, {}, memory, nullptr, nullptr);
+  commands_.end();
+  open_ = false;
+  return commands_;
+}
+
+std::span<const StageTime> Recorder::stageTimes() {
+  times_.clear();
+  if (marks_.empty() || !*timestamps_) return times_;
+  const auto count = static_cast<std::uint32_t>(marks_.size() + 1);
+  const VkResult result = device_->handle().getDispatcher()->vkGetQueryPoolResults(
+      *device_->handle(), *timestamps_, 0, count, count * sizeof(std::uint64_t), ticks_.data(),
+      sizeof(std::uint64_t), VK_QUERY_RESULT_64_BIT);
+  if (result != VK_SUCCESS) return times_;
+  for (std::size_t i = 0; i < marks_.size(); ++i) {
+    const double seconds = static_cast<double>((ticks_[i + 1] - ticks_[i]) & timestampMask_) *
+                           static_cast<double>(device_->limits().timestampPeriod) * 1e-9;
+    const auto known = std::find_if(times_.begin(), times_.end(),
+                                    [&](const StageTime& time) { return time.stage == marks_[i]; });
+    if (known != times_.end()) {
+      known->seconds += seconds;
+    } else {
+      assert(times_.size() < kMaxStages);
+      times_.push_back({marks_[i], seconds});
+    }
+  }
+  return times_;
+}
+
+}  // namespace clothstream::vulkan
