@@ -11,6 +11,8 @@
 #include <string>
 #include <vector>
 
+#include "clothstream/v1/session.pb.h"
+
 namespace clothstream::stream {
 
 class SceneServer;
@@ -25,10 +27,10 @@ inline constexpr std::size_t kMaxClientMessageBytes = 64 * 1024;
 // flight: when the write is done it asks again; when there is nothing it waits for `wake`.
 class Connection {
  public:
-  // `wake` is called, from any thread and with no lock held, when next() may have something or finished() became
-  // true; it must only pass the word on. `peer` names the other end for logs. The server must outlive the connection.
+  // `wake` is called, from any thread, when next() may have something or finished() became true; it must only pass the
+  // word on. `peer` names the other end for logs. The server must outlive the connection.
   Connection(SceneServer& server, std::string peer, std::function<void()> wake);
-  // Leaves the scene; `wake` is not called any more once this returns.
+  // Leaves the scene; `wake` is not called any more once this returns (so hold no lock here that `wake` takes).
   ~Connection();
   Connection(const Connection&) = delete;
   Connection& operator=(const Connection&) = delete;
@@ -40,8 +42,11 @@ class Connection {
   // (at most two unacknowledged, more on long round trips).
   std::optional<SharedBytes> next();
 
-  // The peer is to be closed (after a fatal error, or when the server stops), once next() has nothing more.
+  // The peer is to be closed (after a fatal error, or when the server stops), once next() has nothing more. A peer that
+  // does not read is finished too: a door gives its last writes a second or so, then cuts.
   bool finished() const;
+  // The fatal error that finished it; nothing while it goes on, and when the server stops.
+  std::optional<v1::Error> fatalError() const;
 
  private:
   struct State;

@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: MIT
+// The scenes of a server: named, simulated on one device, streamed to whoever joins through a Connection.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <tl/expected.hpp>
+
+#include "clothstream/v1/session.pb.h"
+#include "server/scene/scene.h"
+#include "server/vulkan/device.h"
+
+namespace clothstream::stream {
+
+inline constexpr std::uint32_t kProtocolVersion = 1;
+
+struct ServerOptions {
+  vulkan::DeviceOptions device;
+  // Joined by whoever names no scene; must be one of the scenes.
+  std::string defaultScene;
+  // Sent to clients in Welcome.
+  std::string serverName = "clothstream-server";
+  // A scene sleeps while nobody is in it, unless this is set.
+  bool runAlways = false;
+  std::uint32_t maxConnections = 1024;
+  std::uint32_t maxParticipants = 64;  // a scene
+  // A peer that sends nothing for this long is dropped.
+  std::chrono::milliseconds silence{30'000};
+};
+
+// Thread-safe. Two threads of its own: one owns the device and runs every scene's ticks, one makes packets of frames.
+class SceneServer {
+ public:
+  // The scenes must be valid (server/messages) and their names unique. Throws vulkan::DeviceError, or std::runtime_error
+  // where the device has no room for a scene or the default scene is not among them (naming those there are).
+  SceneServer(std::vector<scene::Scene> scenes, ServerOptions options);
+  // Stops. Every Connection must be gone.
+  ~SceneServer();
+  SceneServer(const SceneServer&) = delete;
+  SceneServer& operator=(const SceneServer&) = delete;
+
+  // The unary calls; inside a stream they are answered by the same functions.
+  v1::ListScenesResponse listScenes() const;
+  tl::expected<v1::GetSceneResponse, v1::Error> getScene(const v1::GetSceneRequest& request) const;
+
+  // Tells everybody that the server stops, and finishes every connection: now and from here on. The ticks end.
+  void stop();
+
+  // Of the device in use, also after it was rebuilt.
+  vulkan::DeviceInfo deviceInfo() const;
+  const std::string& defaultScene() const;
+
+  // Histograms and counters since the start, as a table for people.
+  std::string report() const;
+
+  struct State;
+  // For this room alone.
+  State& state() { return *state_; }
+
+ private:
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace clothstream::stream
