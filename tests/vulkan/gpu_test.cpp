@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: MIT
+// What tests on a Vulkan device share: the device, a way to run work on it, and validation that fails tests.
+#include "tests/vulkan/gpu_test.h"
+
+#include <algorithm>
+#include <memory>
+#include <stdexcept>
+
+namespace clothstream::tests {
+namespace {
+
+std::unique_ptr<vulkan::Device> sharedDevice;
+std::uint64_t expectedMessages = 0;
+
+class ValidationListener : public ::testing::EmptyTestEventListener {
+  void OnTestEnd(const ::testing::TestInfo&) override { failOnMessages(); }
+
+ public:
+  static void failOnMessages() {
+    for (const std::string& text : takeValidationTexts()) ADD_FAILURE() << "Vulkan validation: " << text;
+  }
+};
+
+class SharedDevice : public ::testing::Environment {
+  void TearDown() override {
+    sharedDevice.reset();
+    ValidationListener::failOnMessages();
+  }
+};
+
+[[maybe_unused]] const bool registered = [] {
+  ::testing::AddGlobalTestEnvironment(new SharedDevice);
+  ::testing::UnitTest::GetInstance()->listeners().Append(new ValidationListener);
+  return true;
+}();
+
+}  // namespace
+
+vulkan::Device& device() {
+  if (!sharedDevice) sharedDevice = std::make_unique<vulkan::Device>();
+  return *sharedDevice;
+}
+
+void GpuTest::SetUp() {
+  try {
+    device();
+  } catch (const vulkan::DeviceError& error) {
+    GTEST_SKIP() << error.what();
+  }
+}
+
+void submitAndWait(vulkan::Device& device, vulkan::Recorder& recorder) {
+  const vulkan::TimelineValue value = device.submit(recorder);
+  if (!device.wait(value, std::chrono::minutes(1)))
+    throw std::runtime_error("a submission was not complete after a minute");
+}
+
+void run(const std::function<void(vulkan::Recorder&)>& record) {
+  vulkan::Recorder recorder(device());
+  recorder.begin();
+  record(recorder);
+  submitAndWait(device(), recorder);
+}
+
+std::vector<std::string> takeValidationTexts() {
+  const std::uint64_t count = vulkan::Device::validationMessages();
+  const std::vector<std::string> newest = vulkan::Device::validationTexts();
+  const auto fresh =
+      static_cast<std::ptrdiff_t>(std::min<std::uint64_t>(count - expectedMessages, newest.size()));
+  expectedMessages = count;
+  return {newest.end() - fresh, newest.end()};
+}
+
+}  // namespace clothstream::tests
