@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Packets to vertices. Safe on any bytes: it never reads or writes out of bounds, never allocates by an unchecked
-// count, always ends.
+// Packets to vertices. Safe on any bytes: it never reads or writes out of bounds, never allocates by an
+// unchecked count, always ends.
 #pragma once
 
 #include <cstddef>
@@ -24,8 +24,7 @@ enum class DecodeResult : std::uint8_t {
 // One decoder a stream; not thread-safe. Memory is taken once, at construction.
 class Decoder {
  public:
-  // nullptr if the layout is impossible: no cloth, a grid whose numbers disagree, more than 2^26 vertices, a max
-  // error that is not finite and positive.
+  // nullptr if the layout is impossible (stream_layout.h), or memory is out.
   static std::unique_ptr<Decoder> make(const StreamLayout& layout);
   ~Decoder();
   Decoder(const Decoder&) = delete;
@@ -33,13 +32,14 @@ class Decoder {
 
   [[nodiscard]] DecodeResult decode(std::span<const std::byte> packet);
 
-  // Of the newest decoded frame; undefined before the first.
+  // Of the newest decoded frame, like all that follows; undefined before the first.
   std::uint64_t tick() const;
   bool hasFrame() const;
 
   // 3 floats a vertex, metres, cloths one after the other; valid until the next decode.
   std::span<const float> positions() const;
-  // 3 floats a vertex, unit length: as sent, or computed from the positions where the stream sends none.
+  // 3 floats a vertex, unit length: as sent, or computed from the positions where the stream sends none. The
+  // first call after a decode does the work.
   std::span<const float> normals() const;
   // 64-bit hash of the reconstruction; equal to the server's (FRAME_FORMAT.md).
   std::uint64_t reconstructionHash() const;

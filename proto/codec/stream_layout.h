@@ -17,7 +17,9 @@ struct ClothLayout {
 
 struct StreamLayout {
   std::uint32_t epoch = 0;
-  float maxError = 0.0005f;  // m an axis: the promise the encoder keeps
+  // m an axis: the promise the encoder keeps for whatever lies within 32 m of the origin. Farther out the
+  // spacing of floats there comes on top.
+  float maxError = 0.0005f;
   NormalMode normals = NormalMode::none;
   std::vector<ClothLayout> cloths;
 
@@ -27,5 +29,24 @@ struct StreamLayout {
     return sum;
   }
 };
+
+inline constexpr std::uint32_t kMaxVertices = 1u << 26;
+inline constexpr float kSmallestMaxError = 5e-6f, kLargestMaxError = 1000;
+
+// Whether a stream can have this layout: one cloth or more, none empty, grids whose numbers agree, at most
+// kMaxVertices, a max error within the two bounds above.
+inline bool isPossible(const StreamLayout& layout) {
+  if (!(layout.maxError >= kSmallestMaxError && layout.maxError <= kLargestMaxError)) return false;
+  if (layout.normals != NormalMode::none && layout.normals != NormalMode::octahedral) return false;
+  std::uint64_t vertices = 0;
+  for (const ClothLayout& cloth : layout.cloths) {
+    const std::uint64_t nodes = std::uint64_t{cloth.rows} * cloth.columns;
+    const bool noGrid = cloth.rows == 0 && cloth.columns == 0;
+    if (cloth.vertexCount == 0 || (!noGrid && nodes != cloth.vertexCount)) return false;
+    vertices += cloth.vertexCount;
+    if (vertices > kMaxVertices) return false;
+  }
+  return vertices > 0;
+}
 
 }  // namespace clothstream::codec

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: MIT
+// Vertices to packets on the CPU: the reference that the kernels equal to the bit.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+
+#include "proto/codec/packet_header.h"
+#include "proto/codec/stream_layout.h"
+
+namespace clothstream::codec {
+
+// One encoder a stream; not thread-safe. Memory is taken once, at construction.
+class Encoder {
+ public:
+  // nullptr if the layout is impossible (stream_layout.h).
+  static std::unique_ptr<Encoder> make(const StreamLayout& layout);
+  ~Encoder();
+  Encoder(const Encoder&) = delete;
+  Encoder& operator=(const Encoder&) = delete;
+
+  std::size_t packetBound() const;
+
+  // 3 floats a vertex, metres, within the lattice (32 m at any max error); normals of about unit length, or
+  // nothing where the layout has none. `tick` must grow from call to call. A predicted frame refers to the
+  // frame encoded before; the first is always a key frame, whatever is asked. Writes to `out` (at least
+  // packetBound() bytes) and returns the number of bytes written.
+  std::size_t encode(std::uint64_t tick, PacketKind kind, std::span<const float> positions,
+                     std::span<const float> normals, std::span<std::byte> out);
+
+  // The next frame is a key frame.
+  void forgetHistory();
+
+  // Of the newest frame; equal to the decoder's.
+  std::uint64_t reconstructionHash() const;
+
+ private:
+  struct State;
+  explicit Encoder(std::unique_ptr<State> state);
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace clothstream::codec

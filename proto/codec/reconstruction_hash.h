@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: MIT
+// 64-bit hash of a reconstruction's integers: a sum over vertices, so that any order of work gives the same.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+namespace clothstream::codec {
+
+// Two halves, each a sum modulo 2^32 of one word a vertex; FRAME_FORMAT.md defines it. The kernels do the
+// same.
+class ReconstructionHash {
+ public:
+  // x, y, z: lattice coordinates; normal: u and v as bytes, u | v << 8, 0 where the stream sends no normals.
+  void add(std::uint32_t vertex, std::int32_t x, std::int32_t y, std::int32_t z, std::uint32_t normal) {
+    low_ += word(vertex, x, y, z, normal, 0x243f6a88u);
+    high_ += word(vertex, x, y, z, normal, 0x85a308d3u);
+  }
+
+  std::uint64_t value() const { return std::uint64_t{high_} << 32 | low_; }
+
+ private:
+  // A bijection of 32 bits in which each bit of the input moves each of the output.
+  static constexpr std::uint32_t mix(std::uint32_t h) {
+    h = (h ^ h >> 16) * 0x7feb352du;
+    h = (h ^ h >> 15) * 0x846ca68bu;
+    return h ^ h >> 16;
+  }
+
+  static constexpr std::uint32_t word(std::uint32_t vertex, std::int32_t x, std::int32_t y, std::int32_t z,
+                                      std::uint32_t normal, std::uint32_t seed) {
+    std::uint32_t h = mix(vertex + seed);
+    h = mix(h ^ static_cast<std::uint32_t>(x));
+    h = mix(h ^ static_cast<std::uint32_t>(y));
+    h = mix(h ^ static_cast<std::uint32_t>(z));
+    return mix(h ^ normal);
+  }
+
+  std::uint32_t low_ = 0, high_ = 0;
+};
+
+// Of a frame whose integers lie channel after channel; `normals` null where the stream sends none.
+inline std::uint64_t hashFrame(std::size_t vertices, const std::int32_t* positions,
+                               const std::int8_t* normals) {
+  ReconstructionHash hash;
+  for (std::size_t i = 0; i < vertices; ++i) {
+    std::uint32_t normal = 0;
+    if (normals != nullptr) {
+      normal = static_cast<std::uint8_t>(normals[i]) |
+               std::uint32_t{static_cast<std::uint8_t>(normals[vertices + i])} << 8;
+    }
+    hash.add(static_cast<std::uint32_t>(i), positions[i], positions[vertices + i],
+             positions[2 * vertices + i], normal);
+  }
+  return hash.value();
+}
+
+}  // namespace clothstream::codec
