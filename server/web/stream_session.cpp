@@ -1,0 +1,145 @@
+// SPDX-License-Identifier: MIT
+#include "server/web/stream_session.h"
+
+#include <algorithm>
+#include <chrono>
+#include <string_view>
+#include <utility>
+
+#include <boost/asio/buffer.hpp>
+#include <boost/asio/post.hpp>
+#include <boost/beast/http/rfc7230.hpp>
+#include <fmt/format.h>
+
+#include "clothstream/v1/session.pb.h"
+
+namespace clothstream::web {
+namespace {
+
+namespace beast = boost::beast;
+namespace http = beast::http;
+namespace ws = beast::websocket;
+using namespace std::chrono_literals;
+
+constexpr const char* kSubprotocol = "clothstream.v1";
+constexpr auto kHandshakeTimeout = 2s;
+// Without a byte from the peer for half of it a ping goes out, after the whole of it the peer counts as gone.
+constexpr auto kIdleTimeout = 4s;
+// RFC 6455 5.5: 125 bytes a control frame, of which the code takes two.
+constexpr std::size_t kMaxCloseText = 123;
+
+std::string peerOf(const beast::tcp_stream& socket) {
+  beast::error_code error;
+  const auto endpoint = socket.socket().remote_endpoint(error);
+  return error ? "web" : fmt::format("web {}:{}", endpoint.address().to_string(), endpoint.port());
+}
+
+// The longest start of `text` that a close frame holds and that does not cut a UTF-8 sequence.
+std::string_view closeText(std::string_view text) {
+  std::size_t size = std::min(text.size(), kMaxCloseText);
+  while (size < text.size() && size > 0 && (static_cast<unsigned char>(text[size]) & 0xC0) == 0x80) --size;
+  return text.substr(0, size);
+}
+
+// Why a finished connection ends is what was said last.
+ws::close_reason reasonOf(const stream::SharedBytes& last) {
+  v1::ServerMessage message;
+  if (last && message.ParseFromArray(last->data(), static_cast<int>(last->size())) &&
+      message.error().fatal()) {
+    const std::string_view text = closeText(message.error().text());
+    return {ws::close_code::policy_error, beast::string_view(text.data(), text.size())};
+  }
+  return {ws::close_code::going_away, "the server is stopping"};
+}
+
+}  // namespace
+
+StreamSession::StreamSession(beast::tcp_stream&& socket, DoorContext& door,
+                             std::unique_ptr<ConnectionSlot> slot)
+    : door_(door), slot_(std::move(slot)), socket_(std::move(socket)) {
+  socket_.binary(true);
+  socket_.auto_fragment(false);
+  socket_.read_message_max(stream::kMaxClientMessageBytes);
+  socket_.set_option(ws::stream_base::timeout{kHandshakeTimeout, kIdleTimeout, true});
+}
+
+void StreamSession::accept(http::request<http::empty_body>&& request) {
+  request_ = std::move(request);
+  const bool speaksOurs =
+      http::token_list(request_[http::field::sec_websocket_protocol]).exists(kSubprotocol);
+  socket_.set_option(ws::stream_base::decorator([speaksOurs](ws::response_type& response) {
+    response.set(http::field::server, "clothstream");
+    if (speaksOurs) response.set(http::field::sec_websocket_protocol, kSubprotocol);
+  }));
+  socket_.async_accept(request_, [self = shared_from_this()](beast::error_code error) {
+    if (!error) self->open();
+  });
+}
+
+void StreamSession::open() {
+  if (door_.stopping) return;
+  door_.streams.insert(shared_from_this());
+  // Called from any thread, so it must not own the session: whoever drops the last owner inside a wake would
+  // wait in the connection's destructor for that wake to return.
+  auto wake = [&io = door_.io, weak = weak_from_this(), posted = std::make_shared<std::atomic<bool>>(false)] {
+    if (posted->exchange(true)) return;
+    boost::asio::post(io, [weak, posted] {
+      posted->store(false);
+      if (const auto self = weak.lock()) self->pump();
+    });
+  };
+  connection_.emplace(door_.server, peerOf(socket_.next_layer()), std::move(wake));
+  read();
+  pump();
+}
+
+void StreamSession::read() {
+  socket_.async_read(
+      incoming_, [self = shared_from_this()](beast::error_code error, std::size_t) { self->onRead(error); });
+}
+
+void StreamSession::onRead(beast::error_code error) {
+  if (error) return end();
+  if (closing_ || !connection_) return;
+  if (socket_.got_text())
+    return close({ws::close_code::unknown_data, "messages are binary: one ClientMessage each"});
+  connection_->receive({static_cast<const std::byte*>(incoming_.cdata().data()), incoming_.size()});
+  incoming_.consume(incoming_.size());
+  read();
+}
+
+void StreamSession::pump() {
+  if (writing_ || closing_ || !connection_) return;
+  const bool finished = connection_->finished();  // asked first: what came before it is still to be written
+  if (std::optional<stream::SharedBytes> message = connection_->next()) {
+    outgoing_ = std::move(*message);
+    writing_ = true;
+    socket_.async_write(
+        boost::asio::buffer(outgoing_->data(), outgoing_->size()),
+        [self = shared_from_this()](beast::error_code error, std::size_t) { self->onWritten(error); });
+  } else if (finished) {
+    close(reasonOf(outgoing_));
+  }
+}
+
+void StreamSession::onWritten(beast::error_code error) {
+  writing_ = false;
+  if (error) return end();
+  pump();
+}
+
+void StreamSession::close(const ws::close_reason& reason) {
+  if (std::exchange(closing_, true)) return;
+  leave();
+  socket_.async_close(reason, [self = shared_from_this()](beast::error_code) { self->end(); });
+}
+
+void StreamSession::end() {
+  closing_ = true;
+  leave();
+  socket_.next_layer().close();
+  door_.streams.erase(shared_from_this());
+  if (door_.stopping && door_.streams.empty()) door_.io.stop();
+}
+
+}  // namespace clothstream::web

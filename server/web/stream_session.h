@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: MIT
+// One WebSocket: moves bytes between a socket and a stream::Connection.
+#pragma once
+
+#include <atomic>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include <boost/beast/core/flat_buffer.hpp>
+#include <boost/beast/core/tcp_stream.hpp>
+#include <boost/beast/http/empty_body.hpp>
+#include <boost/beast/http/message.hpp>
+#include <boost/beast/websocket/stream.hpp>
+
+#include "server/stream/connection.h"
+#include "server/web/door_context.h"
+
+namespace clothstream::web {
+
+// All on the io thread. Lives as long as it stands in the door's `streams` or an operation of its socket is
+// pending.
+class StreamSession : public std::enable_shared_from_this<StreamSession> {
+ public:
+  StreamSession(boost::beast::tcp_stream&& socket, DoorContext& door, std::unique_ptr<ConnectionSlot> slot);
+
+  void accept(boost::beast::http::request<boost::beast::http::empty_body>&& request);
+
+  // The closing handshake, at most kHandshakeTimeout of it; then the session ends.
+  void close(const boost::beast::websocket::close_reason& reason);
+
+  // Leaves the scene; the connection's `wake` is not called any more once this returns.
+  void leave() { connection_.reset(); }
+
+ private:
+  void open();
+  void read();
+  void onRead(boost::beast::error_code error);
+  // Writes the next message unless one is being written.
+  void pump();
+  void onWritten(boost::beast::error_code error);
+  void end();
+
+  DoorContext& door_;
+  std::unique_ptr<ConnectionSlot> slot_;
+  // Without permessage-deflate: frames are compressed already.
+  boost::beast::websocket::stream<boost::beast::tcp_stream, false> socket_;
+  boost::beast::http::request<boost::beast::http::empty_body> request_;
+  boost::beast::flat_buffer incoming_;
+  std::optional<stream::Connection> connection_;
+  stream::SharedBytes outgoing_;
+  bool writing_ = false;
+  bool closing_ = false;
+};
+
+}  // namespace clothstream::web
