@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: MIT
+#include "server/rpc/join_stream.h"
+
+#include <optional>
+#include <span>
+#include <utility>
+
+#include "server/rpc/status.h"
+
+namespace clothstream::rpc {
+namespace {
+
+// A view of the message that keeps it alive for as long as gRPC holds the slice.
+grpc::ByteBuffer sharedBuffer(const stream::SharedBytes& message) {
+  // gRPC takes bytes as mutable, and never writes to them.
+  void* const bytes = const_cast<std::byte*>(message->data());
+  const grpc::Slice slice(
+      bytes, message->size(), [](void* owner) { delete static_cast<stream::SharedBytes*>(owner); },
+      new stream::SharedBytes(message));
+  return grpc::ByteBuffer(&slice, 1);
+}
+
+grpc::Status cancelled() {
+  return {grpc::StatusCode::CANCELLED, "the client went away"};
+}
+
+}  // namespace
+
+JoinStream::JoinStream(std::function<void(JoinStream&)> onDone) : onDone_(std::move(onDone)) {}
+
+void JoinStream::open(stream::SceneServer& server, std::string peer, std::function<void()> wake) {
+  const std::lock_guard lock(mutex_);
+  connection_ = std::make_shared<stream::Connection>(server, std::move(peer), std::move(wake));
+  StartRead(&incoming_);
+  pumpLocked();
+}
+
+void JoinStream::pump() {
+  const std::lock_guard lock(mutex_);
+  pumpLocked();
+}
+
+void JoinStream::pumpLocked() {
+  if (writing_ || !connection_) return;
+  const bool finished = connection_->finished();  // asked first: what came before it is still to be written
+  if (std::optional<stream::SharedBytes> message = connection_->next()) {
+    lastMessage_ = std::move(*message);
+    outgoing_ = sharedBuffer(lastMessage_);
+    writing_ = true;
+    StartWrite(&outgoing_);
+  } else if (finished) {
+    finishLocked(closingStatus(lastMessage_));
+  }
+}
+
+void JoinStream::finish(const grpc::Status& status) {
+  const std::lock_guard lock(mutex_);
+  finishLocked(status);
+}
+
+void JoinStream::finishLocked(const grpc::Status& status) {
+  if (!connection_) return;
+  connection_.reset();
+  status_ = status;
+  if (!writing_) Finish(status_);
+}
+
+void JoinStream::OnReadDone(bool ok) {
+  if (!ok) return finish(grpc::Status::OK);  // the client said that it has no more to say
+  std::shared_ptr<stream::Connection> connection;
+  {
+    const std::lock_guard lock(mutex_);
+    connection = connection_;
+  }
+  if (!connection) return;
+  grpc::Slice bytes;
+  if (!incoming_.DumpToSingleSlice(&bytes).ok())
+    return finish({grpc::StatusCode::INTERNAL, "the message could not be read"});
+  connection->receive(std::as_bytes(std::span(bytes.begin(), bytes.size())));
+  const std::lock_guard lock(mutex_);
+  if (connection_) StartRead(&incoming_);
+}
+
+void JoinStream::OnWriteDone(bool ok) {
+  const std::lock_guard lock(mutex_);
+  writing_ = false;
+  if (!connection_) {
+    Finish(status_);
+  } else if (!ok) {
+    finishLocked(cancelled());
+  } else {
+    pumpLocked();
+  }
+}
+
+void JoinStream::OnCancel() {
+  finish(cancelled());
+}
+
+void JoinStream::OnDone() {
+  onDone_(*this);
+}
+
+}  // namespace clothstream::rpc

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: MIT
+// The calls of clothstream.v1.ClothStream.
+#pragma once
+
+#include <grpcpp/support/server_callback.h>
+
+#include "clothstream/v1/session.grpc.pb.h"
+#include "server/rpc/join_streams.h"
+
+namespace clothstream::rpc {
+
+// Join is raw: its messages are already serialised, once for all who get them.
+using ServiceBase =
+    v1::ClothStream::WithRawCallbackMethod_Join<v1::ClothStream::WithCallbackMethod_ListScenes<
+        v1::ClothStream::WithCallbackMethod_GetScene<v1::ClothStream::Service>>>;
+
+class Service final : public ServiceBase {
+ public:
+  Service(stream::SceneServer& server, JoinStreams& streams) : server_(server), streams_(streams) {}
+
+  grpc::ServerUnaryReactor* ListScenes(grpc::CallbackServerContext* context,
+                                       const v1::ListScenesRequest* request,
+                                       v1::ListScenesResponse* response) override;
+  grpc::ServerUnaryReactor* GetScene(grpc::CallbackServerContext* context, const v1::GetSceneRequest* request,
+                                     v1::GetSceneResponse* response) override;
+  grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>* Join(
+      grpc::CallbackServerContext* context) override;
+
+ private:
+  stream::SceneServer& server_;
+  JoinStreams& streams_;
+};
+
+}  // namespace clothstream::rpc

@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: MIT
+#include "server/rpc/status.h"
+
+namespace clothstream::rpc {
+namespace {
+
+grpc::StatusCode codeOf(v1::ErrorCode code) {
+  switch (code) {
+    case v1::ERROR_CODE_MALFORMED_MESSAGE:
+    case v1::ERROR_CODE_INVALID_ARGUMENT:
+      return grpc::StatusCode::INVALID_ARGUMENT;
+    case v1::ERROR_CODE_NOT_FOUND:
+      return grpc::StatusCode::NOT_FOUND;
+    case v1::ERROR_CODE_UNSUPPORTED_VERSION:
+    case v1::ERROR_CODE_UNSUPPORTED_CODEC:
+      return grpc::StatusCode::UNIMPLEMENTED;
+    case v1::ERROR_CODE_RATE_LIMITED:
+    case v1::ERROR_CODE_RESOURCE_EXHAUSTED:
+      return grpc::StatusCode::RESOURCE_EXHAUSTED;
+    case v1::ERROR_CODE_OUT_OF_ORDER:
+      return grpc::StatusCode::FAILED_PRECONDITION;
+    default:
+      return grpc::StatusCode::UNKNOWN;
+  }
+}
+
+}  // namespace
+
+grpc::Status statusOf(const v1::Error& error) {
+  return {codeOf(error.code()), error.text()};
+}
+
+grpc::Status closingStatus(const stream::SharedBytes& lastMessage) {
+  v1::ServerMessage message;
+  if (lastMessage && message.ParseFromArray(lastMessage->data(), static_cast<int>(lastMessage->size())) &&
+      message.error().fatal())
+    return statusOf(message.error());
+  return {grpc::StatusCode::UNAVAILABLE, "the server is stopping"};
+}
+
+}  // namespace clothstream::rpc
