@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: MIT
+// Quantiles from bins on a logarithmic axis.
+#include "server/telemetry/histogram.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+
+#include <boost/histogram/accumulators/thread_safe.hpp>
+#include <boost/histogram/axis/regular.hpp>
+#include <boost/histogram/histogram.hpp>
+#include <boost/histogram/make_histogram.hpp>
+#include <boost/histogram/storage_adaptor.hpp>
+
+namespace clothstream::telemetry {
+namespace {
+
+namespace bh = boost::histogram;
+
+constexpr double kShortest = 1e-6, kLongest = 1e3;
+constexpr unsigned kBinsADecade = 48, kDecades = 9;
+
+using Axis = bh::axis::regular<double, bh::axis::transform::log>;
+using Storage = bh::dense_storage<bh::accumulators::thread_safe<std::uint64_t>>;
+
+}  // namespace
+
+struct Histogram::Bins {
+  bh::histogram<std::tuple<Axis>, Storage> counts =
+      bh::make_histogram_with(Storage(), Axis(kBinsADecade * kDecades, kShortest, kLongest));
+  std::atomic<double> max{0};
+};
+
+Histogram::Histogram() : bins_(std::make_unique<Bins>()) {}
+Histogram::~Histogram() = default;
+
+void Histogram::record(double seconds) {
+  bins_->counts(std::clamp(seconds, kShortest, kLongest));
+  double max = bins_->max.load(std::memory_order_relaxed);
+  while (seconds > max && !bins_->max.compare_exchange_weak(max, seconds, std::memory_order_relaxed)) {
+  }
+}
+
+Summary Histogram::summary() const {
+  const Axis& axis = bins_->counts.axis();
+  // A copy, so that all quantiles speak of the same records while others go on recording. Bin -1 and the last one
+  // hold what lies outside the axis.
+  std::vector<std::uint64_t> counts;
+  for (int bin = -1; bin <= axis.size(); ++bin) counts.push_back(bins_->counts.at(bin).load());
+
+  Summary summary;
+  for (const std::uint64_t count : counts) summary.count += count;
+  if (summary.count == 0) return summary;
+  summary.max = bins_->max.load(std::memory_order_relaxed);
+
+  const auto quantile = [&](double q) {
+    const double wanted = q * static_cast<double>(summary.count);
+    double before = 0;
+    for (std::size_t i = 0; i < counts.size(); ++i) {
+      const double count = static_cast<double>(counts[i]);
+      if (count > 0 && before + count >= wanted)
+        return std::min(axis.value(static_cast<double>(i) - 1 + (wanted - before) / count), summary.max);
+      before += count;
+    }
+    return summary.max;
+  };
+  summary.p50 = quantile(0.5);
+  summary.p90 = quantile(0.9);
+  summary.p99 = quantile(0.99);
+  return summary;
+}
+
+void StageHistograms::record(std::string_view stage, double seconds) {
+  const std::lock_guard lock(mutex_);
+  auto found = std::ranges::find(stages_, stage, [](const auto& entry) { return entry.first; });
+  if (found == stages_.end()) found = stages_.insert(found, {stage, std::make_unique<Histogram>()});
+  found->second->record(seconds);
+}
+
+std::vector<std::pair<std::string_view, Summary>> StageHistograms::summaries() const {
+  const std::lock_guard lock(mutex_);
+  std::vector<std::pair<std::string_view, Summary>> all;
+  for (const auto& [stage, histogram] : stages_) all.emplace_back(stage, histogram->summary());
+  return all;
+}
+
+}  // namespace clothstream::telemetry

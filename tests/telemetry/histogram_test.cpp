@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: MIT
+// Quantiles lie within a bin of the truth, and nothing is lost between threads.
+#include "server/telemetry/histogram.h"
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+#include <thread>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+namespace clothstream::telemetry {
+namespace {
+
+// 48 bins a decade: the ratio of a bin's two edges.
+const double kBinRatio = std::pow(10.0, 1.0 / 48);
+
+TEST(Histogram, IsEmptyAtFirst) {
+  const Summary summary = Histogram().summary();
+  EXPECT_EQ(summary.count, 0u);
+  EXPECT_EQ(summary.max, 0);
+}
+
+TEST(Histogram, QuantilesLieWithinABinOfTheSortedValues) {
+  Histogram histogram;
+  std::mt19937 random(7);
+  std::lognormal_distribution<double> durations(std::log(0.004), 1.2);
+  std::vector<double> values(20'000);
+  for (double& value : values) histogram.record(value = durations(random));
+  std::ranges::sort(values);
+  const auto exact = [&](double q) { return values[static_cast<std::size_t>(q * static_cast<double>(values.size())) - 1]; };
+
+  const Summary summary = histogram.summary();
+  EXPECT_EQ(summary.count, values.size());
+  EXPECT_EQ(summary.max, values.back());
+  for (const auto& [q, value] : {std::pair{0.5, summary.p50}, {0.9, summary.p90}, {0.99, summary.p99}}) {
+    EXPECT_LE(value, exact(q) * kBinRatio) << q;
+    EXPECT_GE(value, exact(q) / kBinRatio) << q;
+  }
+}
+
+TEST(Histogram, CountsWhatLiesOutsideItsRangeToTheEnds) {
+  Histogram histogram;
+  histogram.record(0);
+  histogram.record(-1);
+  histogram.record(5'000);
+  const Summary summary = histogram.summary();
+  EXPECT_EQ(summary.count, 3u);
+  EXPECT_EQ(summary.max, 5'000);
+  EXPECT_LE(summary.p50, 1e-6 * kBinRatio);
+}
+
+TEST(Histogram, LosesNothingBetweenThreads) {
+  Histogram histogram;
+  StageHistograms stages;
+  std::vector<std::thread> threads;
+  for (int thread = 0; thread < 4; ++thread)
+    threads.emplace_back([&] {
+      for (int i = 1; i <= 1'000; ++i) {
+        histogram.record(i * 1e-5);
+        stages.record(i % 2 == 0 ? "springs" : "normals", i * 1e-5);
+      }
+    });
+  for (std::thread& thread : threads) thread.join();
+  EXPECT_EQ(histogram.summary().count, 4'000u);
+  EXPECT_DOUBLE_EQ(histogram.summary().max, 0.01);
+  ASSERT_EQ(stages.summaries().size(), 2u);
+  for (const auto& [stage, summary] : stages.summaries()) EXPECT_EQ(summary.count, 2'000u) << stage;
+}
+
+}  // namespace
+}  // namespace clothstream::telemetry
