@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: MIT
+// What clients send, checked: bytes to envelopes, envelopes to domain types.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "clothstream/v1/session.pb.h"
+#include "server/messages/field_error.h"
+#include "server/scene/input.h"
+
+namespace clothstream::messages {
+
+// The newest protocol version that this server speaks.
+inline constexpr std::uint32_t kProtocolVersion = 1;
+
+// One envelope of at most limits::kMaxClientMessageBytes, with a body. MALFORMED_MESSAGE where the bytes are
+// no ClientMessage, RESOURCE_EXHAUSTED where they are too many.
+[[nodiscard]] Result<v1::ClientMessage> parseClientMessage(std::span<const std::byte> bytes);
+
+// What both ends have agreed on, and who joins.
+struct Joining {
+  std::uint32_t protocolVersion = 0;
+  std::uint32_t codec = 0;
+  std::string scene;  // empty: the server's default
+  std::string clientName, displayName;
+};
+
+// `codecs` are the server's; the client's best that is among them is taken.
+[[nodiscard]] Result<Joining> toJoining(const v1::Hello& message, std::span<const std::uint32_t> codecs);
+
+// At most limits::kMaxParticipantColliders, with unique ids.
+[[nodiscard]] Result<std::vector<scene::ParticipantCollider>> toColliders(const v1::ColliderPoses& message);
+
+// A change that may be applied to this scene as a whole: names exist in it, values are in range, and it stays
+// stable with its substeps.
+[[nodiscard]] Result<scene::ParameterChange> toParameterChange(const v1::ParameterChange& message,
+                                                               const scene::Scene& scene);
+
+}  // namespace clothstream::messages

@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: MIT
+// What a client needs before its first frame, and how large things are cut for the wire.
+#pragma once
+
+#include <cstdint>
+#include <string_view>
+#include <vector>
+
+#include "clothstream/v1/session.pb.h"
+#include "server/scene/input.h"
+#include "server/scene/scene.h"
+
+namespace clothstream::messages {
+
+// Overwrites every field of `state`, so that one message can be filled again each tick. A participant's
+// collider is named by its id.
+void write(const scene::SphereCollider& collider, const scene::Vec3& position, v1::ColliderState& state);
+void write(const scene::ParticipantCollider& collider, std::uint64_t participantId, v1::ColliderState& state);
+
+// Without colliders' states, which only the caller knows. The scene must be valid.
+v1::StreamDescription toDescription(const scene::Scene& scene, std::uint32_t epoch, std::uint32_t codec);
+
+// A scene as a list shows it; who is in it, and whether it runs, only the caller knows.
+v1::SceneSummary toSummary(const scene::Scene& scene);
+
+// Pieces of limits::kMaxChunkBytes (the last may be shorter), in order; one empty piece for empty content.
+// Content has at most limits::kMaxContentBytes.
+std::vector<v1::Chunk> toChunks(std::uint64_t contentId, v1::ContentKind kind, std::string_view content);
+
+}  // namespace clothstream::messages

@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: MIT
+// What is said about a value from outside that is refused.
+#pragma once
+
+#include <string>
+
+#include <tl/expected.hpp>
+
+#include "clothstream/v1/session.pb.h"
+
+namespace clothstream::messages {
+
+// `text` names the field's path, its value and what is allowed, such as
+//   cloths[0].structural.stiffness = -3: must be a finite number from 0 to 1e+06
+struct FieldError {
+  v1::ErrorCode code = v1::ERROR_CODE_INVALID_ARGUMENT;
+  std::string text;
+};
+
+template <typename T>
+using Result = tl::expected<T, FieldError>;
+
+}  // namespace clothstream::messages

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: MIT
+// What values from outside may be: the one place for every number that is checked.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "server/scene/stability.h"
+
+namespace clothstream::messages {
+
+// Both ends included.
+struct Range {
+  double min, max;
+};
+
+namespace limits {
+
+inline constexpr std::uint32_t kMaxRate = 1000;  // ticks/s
+inline constexpr std::uint32_t kMaxSubsteps = scene::kMaxSubsteps;
+inline constexpr std::size_t kMaxCloths = 256;
+inline constexpr std::size_t kMaxColliders = 64;
+inline constexpr std::size_t kMaxPins = 4096;        // ranges a cloth
+inline constexpr std::size_t kMaxMotionKeys = 1024;  // a collider
+inline constexpr std::uint32_t kMinGridNodes = 2;    // a row or column
+inline constexpr std::uint32_t kMaxGridNodes = 8192;
+inline constexpr std::uint64_t kMaxNodes = 16'777'216;  // of a scene
+inline constexpr std::size_t kMaxNameLength = 64;
+inline constexpr std::size_t kMaxTextBytes = 1024;
+
+inline constexpr Range kPosition{-1000, 1000};    // m
+inline constexpr Range kGravity{-1000, 1000};     // m/s^2
+inline constexpr Range kWind{-100, 100};          // m/s
+inline constexpr Range kAirDensity{0, 100};       // kg/m^3
+inline constexpr Range kGridLength{0.001, 1000};  // m
+inline constexpr double kMinSpacing = 0.0001;     // m
+inline constexpr Range kMass{1e-6, 1e6};          // kg
+inline constexpr Range kStiffness{0, 1e6};        // N/m
+inline constexpr Range kSpringDamping{0, 1e4};    // N s/m
+inline constexpr Range kDamping{0, 1000};         // 1/s
+inline constexpr Range kAirCoefficient{0, 10};
+inline constexpr Range kFriction{0, 10};
+inline constexpr Range kThickness{0, 1};               // m
+inline constexpr Range kRadius{0.001, 1000};           // m
+inline constexpr Range kParticipantRadius{0.001, 10};  // m
+inline constexpr Range kMotionTime{0, 86400};          // s
+inline constexpr Range kMaxError{0.00001, 0.1};        // m
+inline constexpr double kUnitTolerance = 0.001;        // of a quaternion's length
+
+inline constexpr float kDefaultArealMass = 0.2f;  // kg/m^2
+inline constexpr std::uint32_t kDefaultStreamRate = 72;
+
+inline constexpr std::size_t kMaxSceneFileBytes = 4 * 1024 * 1024;
+inline constexpr std::size_t kMaxClientMessageBytes = 64 * 1024;
+inline constexpr std::size_t kMaxParticipantColliders = 16;
+inline constexpr std::size_t kMaxChunkBytes = 256 * 1024;
+inline constexpr std::size_t kMaxContentBytes = 256 * 1024 * 1024;
+
+}  // namespace limits
+}  // namespace clothstream::messages

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: MIT
+// The scenes that the program brings along.
+#include <algorithm>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "server/messages/embedded_scenes.h"
+#include "server/messages/scene_file.h"
+
+namespace clothstream::messages {
+
+std::vector<std::string> namedScenes() {
+  std::vector<std::string> names;
+  for (const EmbeddedScene& scene : embeddedScenes()) names.emplace_back(scene.name);
+  return names;
+}
+
+Result<scene::Scene> loadScene(const std::string& nameOrPath) {
+  const auto scenes = embeddedScenes();
+  const auto scene = std::ranges::find(scenes, nameOrPath, &EmbeddedScene::name);
+  if (scene != scenes.end()) return parseScene(scene->json, fmt::format("scene {}", nameOrPath));
+  return readSceneFile(nameOrPath).map_error([](FieldError error) {
+    if (error.code == v1::ERROR_CODE_NOT_FOUND)
+      error.text +=
+          fmt::format(", and no scene of that name; named scenes are {}", fmt::join(namedScenes(), ", "));
+    return error;
+  });
+}
+
+}  // namespace clothstream::messages

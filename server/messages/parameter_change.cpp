@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: MIT
+// Parameter changes from clients, checked against the scene they are for.
+#include <algorithm>
+
+#include <fmt/format.h>
+
+#include "server/messages/client_message.h"
+#include "server/messages/limits.h"
+#include "server/messages/scene_message.h"
+#include "server/messages/validation.h"
+#include "server/messages/vectors.h"
+
+namespace clothstream::messages {
+namespace {
+
+template <typename Named>
+void checkKnown(Checks& checks, const Path& path, const std::string& name,
+                const std::vector<Named>& elements) {
+  if (std::ranges::find(elements, name, &Named::name) != elements.end()) return;
+  std::string known;
+  for (const Named& element : elements) known += (known.empty() ? "" : ", ") + element.name;
+  checks.fail(path, '"' + name + '"', known.empty() ? "the scene has none" : "must be one of " + known,
+              v1::ERROR_CODE_NOT_FOUND);
+}
+
+scene::ClothChange toClothChange(Checks& checks, const Path& path, const v1::ClothChange& message,
+                                 const scene::Scene& scene) {
+  scene::ClothChange change;
+  change.name = message.name();
+  if (!change.name.empty()) checkKnown(checks, path / "name", change.name, scene.cloths);
+  if (message.has_structural())
+    change.structural = toSpring(checks, path / "structural", message.structural());
+  if (message.has_shear()) change.shear = toSpring(checks, path / "shear", message.shear());
+  if (message.has_bend()) change.bend = toSpring(checks, path / "bend", message.bend());
+  if (message.has_damping())
+    change.damping = checks.number(path / "damping", message.damping(), limits::kDamping);
+  if (message.has_drag()) change.drag = checks.number(path / "drag", message.drag(), limits::kAirCoefficient);
+  if (message.has_lift()) change.lift = checks.number(path / "lift", message.lift(), limits::kAirCoefficient);
+  if (message.has_friction())
+    change.friction = checks.number(path / "friction", message.friction(), limits::kFriction);
+  return change;
+}
+
+scene::ColliderChange toColliderChange(Checks& checks, const Path& path, const v1::ColliderChange& message,
+                                       const scene::Scene& scene) {
+  scene::ColliderChange change;
+  change.name = message.name();
+  checkKnown(checks, path / "name", change.name, scene.colliders);
+  if (message.has_position())
+    change.position = toVec3(checks, path / "position", message.position(), limits::kPosition);
+  if (message.has_radius()) change.radius = checks.number(path / "radius", message.radius(), limits::kRadius);
+  return change;
+}
+
+}  // namespace
+
+Result<scene::ParameterChange> toParameterChange(const v1::ParameterChange& message,
+                                                 const scene::Scene& scene) {
+  Checks checks;
+  const Path path("parameterChange");
+  scene::ParameterChange change;
+  if (message.has_gravity())
+    change.gravity = toVec3(checks, path / "gravity" / "value", message.gravity().value(), limits::kGravity);
+  if (message.has_wind())
+    change.wind = toVec3(checks, path / "wind" / "value", message.wind().value(), limits::kWind);
+  if (message.has_air_density())
+    change.airDensity = checks.number(path / "airDensity", message.air_density(), limits::kAirDensity);
+  checks.count(path / "cloths", static_cast<std::size_t>(message.cloths_size()), 0, limits::kMaxCloths);
+  checks.count(path / "colliders", static_cast<std::size_t>(message.colliders_size()), 0,
+               limits::kMaxColliders);
+  for (int i = 0; i < message.cloths_size() && !checks.failed(); ++i)
+    change.cloths.push_back(toClothChange(checks, path.at("cloths", i), message.cloths(i), scene));
+  for (int i = 0; i < message.colliders_size() && !checks.failed(); ++i)
+    change.colliders.push_back(
+        toColliderChange(checks, path.at("colliders", i), message.colliders(i), scene));
+  if (!checks.failed()) {
+    scene::Scene changed = scene;
+    scene::applyChange(changed, change);
+    if (const auto complaint = instability(changed))
+      checks.fail(path, "", fmt::format("with substeps = {}, {}", scene.substeps, *complaint));
+  }
+  return std::move(checks).result(std::move(change));
+}
+
+}  // namespace clothstream::messages

@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: MIT
+// Scene files.
+#include "server/messages/scene_file.h"
+
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+#include <optional>
+
+#include <fmt/format.h>
+#include <google/protobuf/util/json_util.h>
+#include <nlohmann/json.hpp>
+
+#include "server/messages/limits.h"
+#include "server/messages/scene_message.h"
+
+namespace clothstream::messages {
+namespace {
+
+tl::unexpected<FieldError> refuse(v1::ErrorCode code, std::string_view source, std::string_view text) {
+  return tl::unexpected(FieldError{code, fmt::format("{}: {}", source, text)});
+}
+
+// Where the text stops being JSON, with line and column, which protobuf's parser does not tell.
+std::optional<std::string> syntaxError(std::string_view json) {
+  try {
+    [[maybe_unused]] const nlohmann::json parsed = nlohmann::json::parse(json);
+    return std::nullopt;
+  } catch (const nlohmann::json::exception& error) {
+    const std::string_view what = error.what();
+    const std::size_t after = what.find("] ");  // an identifier of the exception stands before
+    return std::string(after == what.npos ? what : what.substr(after + 2));
+  }
+}
+
+}  // namespace
+
+Result<scene::Scene> parseScene(std::string_view json, std::string_view source) {
+  if (const auto error = syntaxError(json)) return refuse(v1::ERROR_CODE_MALFORMED_MESSAGE, source, *error);
+  v1::Scene message;
+  const auto status = google::protobuf::util::JsonStringToMessage({json.data(), json.size()}, &message);
+  if (!status.ok())
+    return refuse(
+        v1::ERROR_CODE_MALFORMED_MESSAGE, source,
+        fmt::format("not a scene: {}", std::string_view(status.message().data(), status.message().size())));
+  return toScene(message).map_error([&](const FieldError& error) {
+    return FieldError{error.code, fmt::format("{}: {}", source, error.text)};
+  });
+}
+
+Result<scene::Scene> readSceneFile(const std::filesystem::path& path) {
+  const std::string source = path.string();
+  std::error_code error;
+  const auto kind = std::filesystem::status(path, error).type();
+  if (kind == std::filesystem::file_type::not_found)
+    return refuse(v1::ERROR_CODE_NOT_FOUND, source, "there is no such file");
+  if (kind == std::filesystem::file_type::directory)
+    return refuse(v1::ERROR_CODE_INVALID_ARGUMENT, source, "is a directory; must be a file");
+  errno = 0;
+  std::ifstream file(path, std::ios::binary);
+  if (!file)
+    return refuse(v1::ERROR_CODE_INVALID_ARGUMENT, source,
+                  fmt::format("cannot be read: {}", std::strerror(errno)));
+  std::string text(limits::kMaxSceneFileBytes + 1, '\0');
+  file.read(text.data(), static_cast<std::streamsize>(text.size()));
+  if (file.bad()) return refuse(v1::ERROR_CODE_INVALID_ARGUMENT, source, "cannot be read to its end");
+  text.resize(static_cast<std::size_t>(file.gcount()));
+  if (text.size() > limits::kMaxSceneFileBytes)
+    return refuse(v1::ERROR_CODE_RESOURCE_EXHAUSTED, source,
+                  fmt::format("is too large: must have at most {} bytes", limits::kMaxSceneFileBytes));
+  return parseScene(text, source);
+}
+
+std::string toJson(const scene::Scene& scene) {
+  google::protobuf::util::JsonPrintOptions options;
+  options.add_whitespace = true;
+  options.always_print_primitive_fields = true;
+  std::string json;
+  // Fails only on Any fields, and a Scene has none.
+  static_cast<void>(google::protobuf::util::MessageToJsonString(toMessage(scene), &json, options));
+  return json;
+}
+
+}  // namespace clothstream::messages

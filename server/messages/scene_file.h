@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: MIT
+// Scenes on disk and by name: the Scene message in protobuf's JSON form.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "server/messages/field_error.h"
+#include "server/scene/scene.h"
+
+namespace clothstream::messages {
+
+// `source` (a file's name) opens the text of an error. Unknown fields are errors.
+[[nodiscard]] Result<scene::Scene> parseScene(std::string_view json, std::string_view source);
+
+// A file of at most limits::kMaxSceneFileBytes.
+[[nodiscard]] Result<scene::Scene> readSceneFile(const std::filesystem::path& path);
+
+// With every field; parseScene() of it gives the scene back.
+std::string toJson(const scene::Scene& scene);
+
+// Names of the scenes that are built into the program (server/scenes/), sorted.
+std::vector<std::string> namedScenes();
+
+// The named scene of that name, else the file of that path.
+[[nodiscard]] Result<scene::Scene> loadScene(const std::string& nameOrPath);
+
+}  // namespace clothstream::messages

@@ -1,0 +1,237 @@
+// SPDX-License-Identifier: MIT
+// From the Scene message to a scene that is valid as a whole.
+#include "server/messages/scene_message.h"
+
+#include <algorithm>
+#include <unordered_set>
+
+#include <fmt/format.h>
+
+#include "server/messages/limits.h"
+#include "server/messages/validation.h"
+#include "server/messages/vectors.h"
+#include "server/scene/stability.h"
+
+namespace clothstream::messages {
+namespace {
+
+scene::Integrator toIntegrator(Checks& checks, const Path& path, v1::Integrator message) {
+  switch (message) {
+    case v1::INTEGRATOR_UNSPECIFIED:
+    case v1::INTEGRATOR_SEMI_IMPLICIT_EULER:
+      return scene::Integrator::semiImplicitEuler;
+    case v1::INTEGRATOR_EXPLICIT_EULER:
+      return scene::Integrator::explicitEuler;
+    default:
+      checks.fail(path, fmt::format("{}", static_cast<int>(message)),
+                  "must be INTEGRATOR_SEMI_IMPLICIT_EULER or INTEGRATOR_EXPLICIT_EULER");
+      return {};
+  }
+}
+
+scene::Normals toNormals(Checks& checks, const Path& path, v1::Normals message) {
+  switch (message) {
+    case v1::NORMALS_UNSPECIFIED:
+    case v1::NORMALS_NONE:
+      return scene::Normals::none;
+    case v1::NORMALS_OCTAHEDRAL:
+      return scene::Normals::octahedral;
+    default:
+      checks.fail(path, fmt::format("{}", static_cast<int>(message)),
+                  "must be NORMALS_NONE or NORMALS_OCTAHEDRAL");
+      return {};
+  }
+}
+
+scene::Environment toEnvironment(Checks& checks, const Path& path, const v1::Environment& message) {
+  scene::Environment environment;
+  if (message.has_gravity())
+    environment.gravity = toVec3(checks, path / "gravity", message.gravity(), limits::kGravity);
+  environment.wind = toVec3(checks, path / "wind", message.wind(), limits::kWind);
+  if (message.has_air_density())
+    environment.airDensity = checks.number(path / "airDensity", message.air_density(), limits::kAirDensity);
+  return environment;
+}
+
+scene::Grid toGrid(Checks& checks, const Path& path, const v1::Grid& message) {
+  scene::Grid grid;
+  grid.rows = checks.integer(path / "rows", message.rows(), limits::kMinGridNodes, limits::kMaxGridNodes);
+  grid.columns =
+      checks.integer(path / "columns", message.columns(), limits::kMinGridNodes, limits::kMaxGridNodes);
+  grid.width = checks.number(path / "width", message.width(), limits::kGridLength);
+  grid.height = checks.number(path / "height", message.height(), limits::kGridLength);
+  grid.pose = toPose(checks, path / "pose", message.pose());
+  const auto spaced = [&](std::string_view field, float length, std::uint32_t nodes, std::string_view what) {
+    const double least = (nodes - 1) * limits::kMinSpacing;
+    if (length < least)
+      checks.fail(path / field, fmt::format("{}", length),
+                  fmt::format("must be at least {:g} with {} {}: nodes lie at least {:g} m apart", least,
+                              nodes, what, limits::kMinSpacing));
+  };
+  if (checks.failed()) return grid;
+  spaced("width", grid.width, grid.columns, "columns");
+  spaced("height", grid.height, grid.rows, "rows");
+  return grid;
+}
+
+scene::GridRange toRange(Checks& checks, const Path& path, const v1::GridRange& message,
+                         const scene::Grid& grid) {
+  scene::GridRange range;
+  range.firstRow = checks.integer(path / "firstRow", message.first_row(), 0, grid.rows - 1);
+  range.firstColumn = checks.integer(path / "firstColumn", message.first_column(), 0, grid.columns - 1);
+  range.lastRow = message.has_last_row()
+                      ? checks.integer(path / "lastRow", message.last_row(), range.firstRow, grid.rows - 1)
+                      : range.firstRow;
+  range.lastColumn = message.has_last_column() ? checks.integer(path / "lastColumn", message.last_column(),
+                                                                range.firstColumn, grid.columns - 1)
+                                               : range.firstColumn;
+  if (message.has_row_step())
+    range.rowStep = checks.integer(path / "rowStep", message.row_step(), 1, limits::kMaxGridNodes);
+  if (message.has_column_step())
+    range.columnStep = checks.integer(path / "columnStep", message.column_step(), 1, limits::kMaxGridNodes);
+  return range;
+}
+
+scene::Cloth toCloth(Checks& checks, const Path& path, const v1::Cloth& message) {
+  scene::Cloth cloth;
+  cloth.name = checks.name(path / "name", message.name());
+  if (message.has_grid())
+    cloth.grid = toGrid(checks, path / "grid", message.grid());
+  else
+    checks.fail(path, "", "has no shape; must have \"grid\"");
+  cloth.mass = message.has_mass() ? checks.number(path / "mass", message.mass(), limits::kMass)
+                                  : limits::kDefaultArealMass * cloth.grid.width * cloth.grid.height;
+  cloth.structural = toSpring(checks, path / "structural", message.structural());
+  cloth.shear = toSpring(checks, path / "shear", message.shear());
+  cloth.bend = toSpring(checks, path / "bend", message.bend());
+  cloth.damping = checks.number(path / "damping", message.damping(), limits::kDamping);
+  cloth.drag = checks.number(path / "drag", message.drag(), limits::kAirCoefficient);
+  cloth.lift = checks.number(path / "lift", message.lift(), limits::kAirCoefficient);
+  if (message.has_friction())
+    cloth.friction = checks.number(path / "friction", message.friction(), limits::kFriction);
+  if (message.has_thickness())
+    cloth.thickness = checks.number(path / "thickness", message.thickness(), limits::kThickness);
+  checks.count(path / "pins", static_cast<std::size_t>(message.pins_size()), 0, limits::kMaxPins);
+  for (int i = 0; i < message.pins_size() && !checks.failed(); ++i)
+    cloth.pins.push_back(toRange(checks, path.at("pins", i), message.pins(i), cloth.grid));
+  return cloth;
+}
+
+std::vector<scene::MotionKey> toMotion(Checks& checks, const Path& path, const v1::Motion& message) {
+  std::vector<scene::MotionKey> motion;
+  checks.count(path / "keys", static_cast<std::size_t>(message.keys_size()), 2, limits::kMaxMotionKeys);
+  for (int i = 0; i < message.keys_size() && !checks.failed(); ++i) {
+    const Path key = path.at("keys", i);
+    const float time = checks.number(key / "time", message.keys(i).time(), limits::kMotionTime);
+    if (i == 0 && time != 0)
+      checks.fail(key / "time", fmt::format("{}", time), "must be 0, where the motion starts");
+    if (i > 0 && time <= motion.back().time)
+      checks.fail(key / "time", fmt::format("{}", time),
+                  fmt::format("must be greater than the time of the key before, {}", motion.back().time));
+    motion.push_back({time, toVec3(checks, key / "position", message.keys(i).position(), limits::kPosition)});
+  }
+  return motion;
+}
+
+scene::SphereCollider toCollider(Checks& checks, const Path& path, const v1::Collider& message) {
+  scene::SphereCollider collider;
+  collider.name = checks.name(path / "name", message.name());
+  if (message.has_sphere())
+    collider.radius = checks.number(path / "sphere" / "radius", message.sphere().radius(), limits::kRadius);
+  else
+    checks.fail(path, "", "has no shape; must have \"sphere\"");
+  collider.pose = toPose(checks, path / "pose", message.pose());
+  if (message.has_friction())
+    collider.friction = checks.number(path / "friction", message.friction(), limits::kFriction);
+  if (message.has_motion()) collider.motion = toMotion(checks, path / "motion", message.motion());
+  return collider;
+}
+
+scene::StreamSettings toStreamSettings(Checks& checks, const Path& path, const v1::StreamSettings& message) {
+  scene::StreamSettings settings;
+  if (message.has_max_error())
+    settings.maxError = checks.number(path / "maxError", message.max_error(), limits::kMaxError);
+  settings.normals = toNormals(checks, path / "normals", message.normals());
+  return settings;
+}
+
+void checkRates(Checks& checks, const scene::Scene& scene) {
+  const Path root;
+  checks.integer(root / "simulationRate", scene.simulationRate, 1, limits::kMaxRate);
+  checks.integer(root / "substeps", scene.substeps, 1, limits::kMaxSubsteps);
+  if (scene.streamRate == 0 || scene.simulationRate % scene.streamRate != 0)
+    checks.fail(root / "streamRate", fmt::format("{}", scene.streamRate),
+                fmt::format("must divide simulationRate, which is {}", scene.simulationRate));
+}
+
+template <typename Named>
+void checkUnique(Checks& checks, std::string_view field, const std::vector<Named>& elements) {
+  std::unordered_set<std::string_view> names;
+  for (std::size_t i = 0; i < elements.size(); ++i)
+    if (!names.insert(elements[i].name).second) {
+      const Path root;
+      const Path element = root.at(field, static_cast<int>(i));
+      checks.fail(element / "name", '"' + elements[i].name + '"',
+                  "is another's name already; names must be unique");
+    }
+}
+
+void checkNodeCount(Checks& checks, const scene::Scene& scene) {
+  std::uint64_t nodes = 0;
+  for (const scene::Cloth& cloth : scene.cloths) nodes += std::uint64_t{cloth.grid.rows} * cloth.grid.columns;
+  if (nodes > limits::kMaxNodes)
+    checks.fail(Path("cloths"), "",
+                fmt::format("have {} nodes in all; must have at most {}", nodes, limits::kMaxNodes));
+}
+
+}  // namespace
+
+std::optional<std::string> instability(const scene::Scene& scene) {
+  const std::uint32_t needed = scene::stableSubsteps(scene);
+  if (needed != 0 && needed <= scene.substeps) return std::nullopt;
+  if (needed != 0)
+    return fmt::format("this scene needs at least {} with its springs, masses and rate", needed);
+  if (scene.integrator == scene::Integrator::explicitEuler)
+    return fmt::format(
+        "no number up to {} keeps this scene stable: INTEGRATOR_EXPLICIT_EULER needs springs with a damping "
+        "of at least "
+        "their stiffness times the step, and a cloth damping beside; or use INTEGRATOR_SEMI_IMPLICIT_EULER",
+        limits::kMaxSubsteps);
+  return fmt::format(
+      "no number up to {} keeps this scene stable: lower stiffness or damping, or raise mass or "
+      "simulationRate",
+      limits::kMaxSubsteps);
+}
+
+Result<scene::Scene> toScene(const v1::Scene& message) {
+  Checks checks;
+  const Path root;
+  scene::Scene scene;
+  scene.name = checks.name(root / "name", message.name());
+  scene.description = checks.text(root / "description", message.description());
+  if (message.has_simulation_rate()) scene.simulationRate = message.simulation_rate();
+  scene.streamRate = message.has_stream_rate() ? message.stream_rate()
+                                               : std::min(limits::kDefaultStreamRate, scene.simulationRate);
+  if (message.has_substeps()) scene.substeps = message.substeps();
+  checkRates(checks, scene);
+  scene.integrator = toIntegrator(checks, root / "integrator", message.integrator());
+  scene.environment = toEnvironment(checks, root / "environment", message.environment());
+
+  checks.count(root / "cloths", static_cast<std::size_t>(message.cloths_size()), 1, limits::kMaxCloths);
+  checks.count(root / "colliders", static_cast<std::size_t>(message.colliders_size()), 0,
+               limits::kMaxColliders);
+  for (int i = 0; i < message.cloths_size() && !checks.failed(); ++i)
+    scene.cloths.push_back(toCloth(checks, root.at("cloths", i), message.cloths(i)));
+  for (int i = 0; i < message.colliders_size() && !checks.failed(); ++i)
+    scene.colliders.push_back(toCollider(checks, root.at("colliders", i), message.colliders(i)));
+  scene.stream = toStreamSettings(checks, root / "stream", message.stream());
+  checkUnique(checks, "cloths", scene.cloths);
+  checkUnique(checks, "colliders", scene.colliders);
+  checkNodeCount(checks, scene);
+  if (!checks.failed())
+    if (const auto complaint = instability(scene))
+      checks.fail(root / "substeps", fmt::format("{}", scene.substeps), *complaint);
+  return std::move(checks).result(std::move(scene));
+}
+
+}  // namespace clothstream::messages

@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: MIT
+// From a scene to its message.
+#include "server/messages/scene_message.h"
+#include "server/messages/vectors.h"
+
+namespace clothstream::messages {
+namespace {
+
+void writeEnvironment(const scene::Environment& environment, v1::Environment& message) {
+  write(environment.gravity, *message.mutable_gravity());
+  write(environment.wind, *message.mutable_wind());
+  message.set_air_density(environment.airDensity);
+}
+
+void writeRange(const scene::GridRange& range, v1::GridRange& message) {
+  message.set_first_row(range.firstRow);
+  message.set_last_row(range.lastRow);
+  message.set_row_step(range.rowStep);
+  message.set_first_column(range.firstColumn);
+  message.set_last_column(range.lastColumn);
+  message.set_column_step(range.columnStep);
+}
+
+void writeCloth(const scene::Cloth& cloth, v1::Cloth& message) {
+  message.set_name(cloth.name);
+  v1::Grid& grid = *message.mutable_grid();
+  grid.set_rows(cloth.grid.rows);
+  grid.set_columns(cloth.grid.columns);
+  grid.set_width(cloth.grid.width);
+  grid.set_height(cloth.grid.height);
+  write(cloth.grid.pose, *grid.mutable_pose());
+  message.set_mass(cloth.mass);
+  write(cloth.structural, *message.mutable_structural());
+  write(cloth.shear, *message.mutable_shear());
+  write(cloth.bend, *message.mutable_bend());
+  message.set_damping(cloth.damping);
+  message.set_drag(cloth.drag);
+  message.set_lift(cloth.lift);
+  message.set_friction(cloth.friction);
+  message.set_thickness(cloth.thickness);
+  for (const scene::GridRange& range : cloth.pins) writeRange(range, *message.add_pins());
+}
+
+void writeCollider(const scene::SphereCollider& collider, v1::Collider& message) {
+  message.set_name(collider.name);
+  message.mutable_sphere()->set_radius(collider.radius);
+  write(collider.pose, *message.mutable_pose());
+  message.set_friction(collider.friction);
+  for (const scene::MotionKey& key : collider.motion) {
+    v1::MotionKey& keyMessage = *message.mutable_motion()->add_keys();
+    keyMessage.set_time(key.time);
+    write(key.position, *keyMessage.mutable_position());
+  }
+}
+
+v1::Integrator toMessage(scene::Integrator integrator) {
+  return integrator == scene::Integrator::explicitEuler ? v1::INTEGRATOR_EXPLICIT_EULER
+                                                        : v1::INTEGRATOR_SEMI_IMPLICIT_EULER;
+}
+
+}  // namespace
+
+v1::Normals toMessage(scene::Normals normals) {
+  return normals == scene::Normals::octahedral ? v1::NORMALS_OCTAHEDRAL : v1::NORMALS_NONE;
+}
+
+v1::Scene toMessage(const scene::Scene& scene) {
+  v1::Scene message;
+  message.set_name(scene.name);
+  message.set_description(scene.description);
+  message.set_simulation_rate(scene.simulationRate);
+  message.set_stream_rate(scene.streamRate);
+  message.set_substeps(scene.substeps);
+  message.set_integrator(toMessage(scene.integrator));
+  writeEnvironment(scene.environment, *message.mutable_environment());
+  for (const scene::Cloth& cloth : scene.cloths) writeCloth(cloth, *message.add_cloths());
+  for (const scene::SphereCollider& collider : scene.colliders) writeCollider(collider, *message.add_colliders());
+  message.mutable_stream()->set_max_error(scene.stream.maxError);
+  message.mutable_stream()->set_normals(toMessage(scene.stream.normals));
+  return message;
+}
+
+}  // namespace clothstream::messages

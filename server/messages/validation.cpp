@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: MIT
+// Checks of single values, and the words for what they refuse.
+#include "server/messages/validation.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+
+namespace clothstream::messages {
+namespace {
+
+// Values in error texts are cut to this, so that an answer stays smaller than a question.
+constexpr std::size_t kMaxShown = 80;
+
+std::string quoted(std::string_view value) {
+  std::string shown = "\"";
+  for (const char c : value.substr(0, kMaxShown)) shown += c >= 0x20 && c < 0x7f ? c : '?';
+  return shown + (value.size() > kMaxShown ? "...\"" : "\"");
+}
+
+}  // namespace
+
+std::string Path::text() const {
+  std::string before = parent_ == nullptr ? "" : parent_->text();
+  if (!before.empty() && !field_.empty()) before += '.';
+  before += field_;
+  return index_ < 0 ? before : fmt::format("{}[{}]", before, index_);
+}
+
+float Checks::number(const Path& path, float value, Range allowed) {
+  if (!(value >= static_cast<float>(allowed.min) && value <= static_cast<float>(allowed.max)))
+    fail(path, fmt::format("{}", value),
+         fmt::format("must be a finite number from {:g} to {:g}", allowed.min, allowed.max));
+  return value;
+}
+
+std::uint32_t Checks::integer(const Path& path, std::uint32_t value, std::uint32_t min, std::uint32_t max) {
+  if (value < min || value > max)
+    fail(path, fmt::format("{}", value), fmt::format("must be a whole number from {} to {}", min, max));
+  return value;
+}
+
+void Checks::count(const Path& path, std::size_t count, std::size_t min, std::size_t max) {
+  if (count < min || count > max)
+    fail(path, "", fmt::format("has {} elements; must have {} to {}", count, min, max));
+}
+
+const std::string& Checks::name(const Path& path, const std::string& value) {
+  const auto allowed = [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '_' || c == '-';
+  };
+  if (value.empty() || value.size() > limits::kMaxNameLength || !std::ranges::all_of(value, allowed))
+    fail(path, quoted(value),
+         fmt::format("must be 1 to {} characters out of [a-z0-9_-]", limits::kMaxNameLength));
+  return value;
+}
+
+const std::string& Checks::text(const Path& path, const std::string& value) {
+  const auto control = [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; };
+  if (value.size() > limits::kMaxTextBytes || std::ranges::any_of(value, control))
+    fail(path, quoted(value),
+         fmt::format("must be one line of at most {} bytes without control characters",
+                     limits::kMaxTextBytes));
+  return value;
+}
+
+void Checks::fail(const Path& path, std::string_view value, std::string_view allowed, v1::ErrorCode code) {
+  if (error_) return;
+  std::string where = path.text();
+  if (!value.empty()) where += fmt::format("{}= {}", where.empty() ? "" : " ", value);
+  error_ = FieldError{code, where.empty() ? std::string(allowed) : fmt::format("{}: {}", where, allowed)};
+}
+
+}  // namespace clothstream::messages
