@@ -1,0 +1,390 @@
+// SPDX-License-Identifier: MIT
+// All cloths of one scene on one Vulkan device: the mass-spring pipeline of [Va21].
+#include "server/simulation/cloth_simulation.h"
+
+#include <algorithm>
+#include <array>
+#include <cassert>
+#include <cstring>
+#include <stdexcept>
+#include <string>
+
+#include <fmt/format.h>
+
+#include "kernels/advance_mass_spring.h"
+#include "kernels/compute_normals.h"
+#include "kernels/hash_state.h"
+#include "server/vulkan/kernel.h"
+
+namespace clothstream::simulation {
+namespace {
+
+using vulkan::BindingKind;
+using vulkan::Buffer;
+using vulkan::BufferPurpose;
+
+constexpr std::size_t kTexelBytes = sizeof(shared::vec4);
+
+// How the work is cut; the results do not depend on it.
+struct Cut {
+  std::uint32_t rowsPerInvocation;
+  std::uint32_t workgroupSize;
+  std::vector<shared::TileRecord> tiles;
+};
+
+// Software devices pay for every load, GPUs for every idle lane (docs/benchmarks.md has the measurements).
+Cut cutScene(const vulkan::Device& device, const scene::Scene& scene, const SimulationOptions& options) {
+  Cut cut{options.rowsPerInvocation, options.workgroupSize, {}};
+  if (cut.rowsPerInvocation == 0) cut.rowsPerInvocation = device.isSoftware() ? 8 : 1;
+  if (cut.workgroupSize == 0) cut.workgroupSize = 64;
+  cut.workgroupSize = std::min(cut.workgroupSize, device.limits().maxWorkgroupInvocations);
+  cut.tiles = tileRecords(scene.cloths, cut.rowsPerInvocation, cut.workgroupSize);
+  while (cut.tiles.size() > device.limits().maxDispatchX) {
+    cut.rowsPerInvocation *= 2;
+    cut.tiles = tileRecords(scene.cloths, cut.rowsPerInvocation, cut.workgroupSize);
+  }
+  return cut;
+}
+
+// Invocations that hash a state share its nodes, enough of them to fill the device.
+std::uint64_t hashInvocations(const vulkan::Device& device, std::uint32_t nodes) {
+  const std::uint64_t nodesPerInvocation = device.isSoftware() ? 64 : 8;
+  return (nodes + nodesPerInvocation - 1) / nodesPerInvocation;
+}
+
+shared::vec4 texel(const scene::Vec3& v, float w) {
+  return {v.x(), v.y(), v.z(), w};
+}
+
+bool isDamped(const shared::ClothRecord& cloth) {
+  return cloth.structuralDamping != 0 || cloth.shearDamping != 0 || cloth.bendDamping != 0;
+}
+
+std::span<const std::uint32_t> advanceSpirv(const SimulationOptions& options) {
+  return options.advanceKernel.empty() ? std::span<const std::uint32_t>(kernels::advance_mass_spring)
+                                       : options.advanceKernel;
+}
+
+bool isBlown(const shared::ClothRecord& cloth) {
+  return cloth.drag != 0 || cloth.lift != 0;
+}
+
+// All memory of a scene on the device.
+struct Buffers {
+  Buffers(const vulkan::Device& device, std::size_t nodes, std::size_t clothCount, std::size_t tileCount);
+
+  std::array<Buffer, 2> positions, velocities;  // by turns
+  Buffer checkpointPositions, checkpointVelocities;
+  Buffer normals;
+  Buffer cloths, tiles, spheres, status;
+  // What the CPU writes and reads. Inputs and status by turns: a tick may be in flight while the next is
+  // recorded.
+  std::array<Buffer, 2> inputs;  // cloths, then spheres
+  Buffer statusReadback;
+  Buffer tileUpload;
+  Buffer stateUpload;    // positions, then velocities
+  Buffer stateReadback;  // the same; made when a state is first saved
+};
+
+Buffers::Buffers(const vulkan::Device& device, std::size_t nodes, std::size_t clothCount,
+                 std::size_t tileCount)
+    : checkpointPositions(device, BufferPurpose::state, nodes * kTexelBytes),
+      checkpointVelocities(device, BufferPurpose::state, nodes * kTexelBytes),
+      normals(device, BufferPurpose::texels, nodes * kTexelBytes),
+      cloths(device, BufferPurpose::state, clothCount * sizeof(shared::ClothRecord)),
+      tiles(device, BufferPurpose::state, tileCount * sizeof(shared::TileRecord)),
+      spheres(device, BufferPurpose::texels, kMaxSpheres * sizeof(shared::SphereRecord)),
+      status(device, BufferPurpose::state, sizeof(shared::StatusRecord)),
+      statusReadback(device, BufferPurpose::readback, 2 * sizeof(shared::StatusRecord)),
+      tileUpload(device, BufferPurpose::upload, tiles.bytes()),
+      stateUpload(device, BufferPurpose::upload, 2 * nodes * kTexelBytes) {
+  for (Buffer& buffer : positions) buffer = Buffer(device, BufferPurpose::texels, nodes * kTexelBytes);
+  for (Buffer& buffer : velocities) buffer = Buffer(device, BufferPurpose::texels, nodes * kTexelBytes);
+  for (Buffer& buffer : inputs)
+    buffer = Buffer(device, BufferPurpose::upload, cloths.bytes() + spheres.bytes());
+}
+
+// A kernel, bound to read each of the two state buffers.
+struct Stage {
+  Stage(const vulkan::Device& device, const vulkan::KernelDescription& description,
+        std::initializer_list<const Buffer*> first, std::initializer_list<const Buffer*> second)
+      : kernel(device, description),
+        from{vulkan::Bindings(device, kernel, first), vulkan::Bindings(device, kernel, second)} {}
+  Stage(const Stage&) = delete;
+  Stage& operator=(const Stage&) = delete;
+
+  vulkan::Kernel kernel;
+  std::array<vulkan::Bindings, 2> from;
+};
+
+Stage makeAdvance(const vulkan::Device& device, const Buffers& b, const Cut& cut,
+                  std::span<const std::uint32_t> spirv, scene::Integrator integrator, bool springDamping,
+                  bool air) {
+  return Stage(
+      device,
+      {.name = "advance_mass_spring",
+       .spirv = spirv,
+       .bindings = {BindingKind::storage, BindingKind::storage, BindingKind::texels, BindingKind::texels,
+                    BindingKind::storage, BindingKind::storage, BindingKind::texels},
+       .pushConstantBytes = sizeof(shared::AdvancePush),
+       .workgroupSize = cut.workgroupSize,
+       .specialisation = {cut.rowsPerInvocation, springDamping ? 1u : 0u, air ? 1u : 0u,
+                          integrator == scene::Integrator::explicitEuler ? 1u : 0u}},
+      {&b.cloths, &b.tiles, &b.positions[0], &b.velocities[0], &b.positions[1], &b.velocities[1], &b.spheres},
+      {&b.cloths, &b.tiles, &b.positions[1], &b.velocities[1], &b.positions[0], &b.velocities[0],
+       &b.spheres});
+}
+
+Stage makeNormals(const vulkan::Device& device, const Buffers& b, const Cut& cut) {
+  return Stage(
+      device,
+      {.name = "compute_normals",
+       .spirv = kernels::compute_normals,
+       .bindings = {BindingKind::storage, BindingKind::storage, BindingKind::texels, BindingKind::storage},
+       .workgroupSize = cut.workgroupSize,
+       .specialisation = {cut.rowsPerInvocation}},
+      {&b.cloths, &b.tiles, &b.positions[0], &b.normals}, {&b.cloths, &b.tiles, &b.positions[1], &b.normals});
+}
+
+Stage makeHash(const vulkan::Device& device, const Buffers& b, const Cut& cut) {
+  return Stage(device,
+               {.name = "hash_state",
+                .spirv = kernels::hash_state,
+                .bindings = {BindingKind::texels, BindingKind::texels, BindingKind::storage},
+                .pushConstantBytes = sizeof(shared::HashPush),
+                .workgroupSize = cut.workgroupSize,
+                .specialisation = {}},
+               {&b.positions[0], &b.velocities[0], &b.status},
+               {&b.positions[1], &b.velocities[1], &b.status});
+}
+
+}  // namespace
+
+struct ClothSimulation::Pipeline {
+  Pipeline(const vulkan::Device& on, const scene::Scene& scene, const SimulationOptions& options);
+
+  void start(vulkan::Recorder& recorder);
+  void recordInputs(vulkan::Recorder& recorder, const TickInputs& inputs);
+  void recordSubsteps(vulkan::Recorder& recorder, const TickInputs& inputs);
+  void recordStatus(vulkan::Recorder& recorder);
+  void writeState(const NodeState& state);
+  void recordUploadedState(vulkan::Recorder& recorder);
+
+  const vulkan::Device& device;
+  std::uint32_t substeps;
+  float substepSeconds, tickRate;
+  std::vector<std::uint32_t> offsets;
+  std::uint32_t nodes;
+  std::vector<shared::ClothRecord> records;
+  std::vector<float> masses;  // inverse
+  Cut cut;
+  Buffers buffers;
+  // By damped springs (the first index) and air.
+  std::array<std::array<Stage, 2>, 2> advance;
+  Stage normals, hash;
+
+  bool started = false;       // the start state and the tiles are on the device
+  std::uint32_t present = 0;  // which state buffers hold the state
+  std::uint32_t slot = 0;     // of inputs and status, of the tick recorded last
+};
+
+ClothSimulation::Pipeline::Pipeline(const vulkan::Device& on, const scene::Scene& scene,
+                                    const SimulationOptions& options)
+    : device(on),
+      substeps(scene.substeps),
+      substepSeconds(static_cast<float>(scene.substepSeconds())),
+      tickRate(static_cast<float>(scene.simulationRate)),
+      offsets(simulation::clothOffsets(scene.cloths)),
+      nodes(offsets.back()),
+      records(clothRecords(scene.cloths)),
+      masses(inverseMasses(scene.cloths)),
+      cut(cutScene(on, scene, options)),
+      buffers(on, nodes, records.size(), cut.tiles.size()),
+      advance{{{makeAdvance(on, buffers, cut, advanceSpirv(options), scene.integrator, false, false),
+                makeAdvance(on, buffers, cut, advanceSpirv(options), scene.integrator, false, true)},
+               {makeAdvance(on, buffers, cut, advanceSpirv(options), scene.integrator, true, false),
+                makeAdvance(on, buffers, cut, advanceSpirv(options), scene.integrator, true, true)}}},
+      normals(makeNormals(on, buffers, cut)),
+      hash(makeHash(on, buffers, cut)) {
+  std::memcpy(buffers.tileUpload.mapped().data(), cut.tiles.data(), buffers.tiles.bytes());
+  std::memcpy(buffers.inputs[slot].mapped().data(), records.data(), buffers.cloths.bytes());
+  writeState(restState(scene.cloths));
+}
+
+void ClothSimulation::Pipeline::writeState(const NodeState& state) {
+  const std::span<shared::vec4> texels = buffers.stateUpload.mapped<shared::vec4>();
+  for (std::uint32_t i = 0; i < nodes; ++i) {
+    texels[i] = texel(state.positions[i], masses[i]);
+    texels[nodes + i] = texel(state.velocities[i], 0);
+  }
+}
+
+void ClothSimulation::Pipeline::recordUploadedState(vulkan::Recorder& recorder) {
+  const std::size_t half = nodes * kTexelBytes;
+  recorder.copy(buffers.stateUpload, buffers.positions[present], half);
+  recorder.copy(buffers.stateUpload, buffers.velocities[present], half, half);
+  recorder.copy(buffers.stateUpload, buffers.checkpointPositions, half);
+  recorder.copy(buffers.stateUpload, buffers.checkpointVelocities, half, half);
+}
+
+void ClothSimulation::Pipeline::start(vulkan::Recorder& recorder) {
+  recorder.barrier();
+  if (started) return;
+  started = true;
+  recorder.copy(buffers.tileUpload, buffers.tiles, buffers.tiles.bytes());
+  recorder.copy(buffers.inputs[slot], buffers.cloths, buffers.cloths.bytes());
+  recordUploadedState(recorder);
+  recorder.barrier();
+}
+
+void ClothSimulation::Pipeline::recordInputs(vulkan::Recorder& recorder, const TickInputs& inputs) {
+  slot = 1 - slot;
+  const Buffer& from = buffers.inputs[slot];
+  const std::size_t clothBytes = buffers.cloths.bytes();
+  const std::size_t sphereBytes = inputs.spheres.size() * sizeof(shared::SphereRecord);
+  std::memcpy(from.mapped().data(), records.data(), clothBytes);
+  std::byte* to = from.mapped().data() + clothBytes;
+  for (const MovingSphere& sphere : inputs.spheres) {
+    const shared::SphereRecord record = sphereRecord(sphere);
+    std::memcpy(to, &record, sizeof(record));
+    to += sizeof(record);
+  }
+  recorder.beginStage("inputs");
+  recorder.copy(from, buffers.cloths, clothBytes);
+  recorder.copy(from, buffers.spheres, sphereBytes, clothBytes);
+  recorder.fill(buffers.status, 0, buffers.status.bytes());
+}
+
+void ClothSimulation::Pipeline::recordSubsteps(vulkan::Recorder& recorder, const TickInputs& inputs) {
+  const scene::Environment& environment = inputs.environment;
+  const bool springDamping = std::any_of(records.begin(), records.end(), isDamped);
+  const bool air = environment.airDensity != 0 && std::any_of(records.begin(), records.end(), isBlown);
+  const Stage& stage = advance[springDamping ? 1 : 0][air ? 1 : 0];
+  shared::AdvancePush push{.gravityStep = texel(environment.gravity, substepSeconds),
+                           .windAir = texel(environment.wind, environment.airDensity / 6),
+                           .sphereCount = static_cast<std::uint32_t>(inputs.spheres.size()),
+                           .sphereProgress = 0,
+                           .tickRate = tickRate,
+                           .reserved = 0};
+  recorder.beginStage("advance");
+  for (std::uint32_t substep = 0; substep < substeps; ++substep) {
+    push.sphereProgress = static_cast<float>(substep + 1) / static_cast<float>(substeps);
+    recorder.barrier();
+    recorder.dispatch(stage.from[present], push, std::uint64_t{cut.tiles.size()} * cut.workgroupSize);
+    present = 1 - present;
+  }
+}
+
+void ClothSimulation::Pipeline::recordStatus(vulkan::Recorder& recorder) {
+  recorder.beginStage("hash");
+  recorder.barrier();
+  recorder.dispatch(hash.from[present], shared::HashPush{nodes}, hashInvocations(device, nodes));
+  recorder.barrier();
+  recorder.copy(buffers.status, buffers.statusReadback, sizeof(shared::StatusRecord), 0,
+                slot * sizeof(shared::StatusRecord));
+}
+
+ClothSimulation::ClothSimulation(const vulkan::Device& device, const scene::Scene& scene,
+                                 SimulationOptions options)
+    : pipeline_(std::make_unique<Pipeline>(device, scene, options)) {}
+
+ClothSimulation::~ClothSimulation() = default;
+
+void ClothSimulation::setCloths(std::span<const scene::Cloth> cloths) {
+  std::vector<shared::ClothRecord> records = clothRecords(cloths);
+  assert(records.size() == pipeline_->records.size());
+  assert(std::equal(records.begin(), records.end(), pipeline_->records.begin(),
+                    [](const shared::ClothRecord& a, const shared::ClothRecord& b) {
+                      return a.rows == b.rows && a.columns == b.columns;
+                    }));
+  pipeline_->records = std::move(records);
+}
+
+void ClothSimulation::recordTick(vulkan::Recorder& recorder, const TickInputs& inputs) {
+  assert(inputs.spheres.size() <= kMaxSpheres);
+  pipeline_->start(recorder);
+  pipeline_->recordInputs(recorder, inputs);
+  pipeline_->recordSubsteps(recorder, inputs);
+  pipeline_->recordStatus(recorder);
+}
+
+void ClothSimulation::recordNormals(vulkan::Recorder& recorder) {
+  pipeline_->start(recorder);
+  recorder.beginStage("normals");
+  recorder.dispatch(pipeline_->normals.from[pipeline_->present],
+                    std::uint64_t{pipeline_->cut.tiles.size()} * pipeline_->cut.workgroupSize);
+}
+
+TickStatus ClothSimulation::status() const {
+  const shared::StatusRecord& record =
+      pipeline_->buffers.statusReadback.mapped<shared::StatusRecord>()[pipeline_->slot];
+  return {std::uint64_t{record.hashHigh} << 32 | record.hashLow, record.unhealthy == 0};
+}
+
+void ClothSimulation::recordCheckpoint(vulkan::Recorder& recorder) {
+  pipeline_->start(recorder);
+  const Buffers& buffers = pipeline_->buffers;
+  recorder.beginStage("checkpoint");
+  recorder.copy(buffers.positions[pipeline_->present], buffers.checkpointPositions, buffers.normals.bytes());
+  recorder.copy(buffers.velocities[pipeline_->present], buffers.checkpointVelocities,
+                buffers.normals.bytes());
+}
+
+void ClothSimulation::recordRollback(vulkan::Recorder& recorder) {
+  pipeline_->start(recorder);
+  const Buffers& buffers = pipeline_->buffers;
+  recorder.beginStage("checkpoint");
+  recorder.copy(buffers.checkpointPositions, buffers.positions[pipeline_->present], buffers.normals.bytes());
+  recorder.copy(buffers.checkpointVelocities, buffers.velocities[pipeline_->present],
+                buffers.normals.bytes());
+}
+
+void ClothSimulation::recordSaveState(vulkan::Recorder& recorder) {
+  pipeline_->start(recorder);
+  Buffers& buffers = pipeline_->buffers;
+  const std::size_t half = pipeline_->nodes * kTexelBytes;
+  if (buffers.stateReadback.bytes() == 0)
+    buffers.stateReadback = Buffer(pipeline_->device, BufferPurpose::readback, 2 * half);
+  recorder.beginStage("state");
+  recorder.copy(buffers.positions[pipeline_->present], buffers.stateReadback, half);
+  recorder.copy(buffers.velocities[pipeline_->present], buffers.stateReadback, half, 0, half);
+}
+
+StateSnapshot ClothSimulation::collectState(std::uint64_t tick) const {
+  const std::span<const shared::vec4> texels = pipeline_->buffers.stateReadback.mapped<const shared::vec4>();
+  assert(!texels.empty());
+  NodeState state;
+  for (const shared::vec4& p : texels.first(pipeline_->nodes)) state.positions.emplace_back(p.x, p.y, p.z);
+  for (const shared::vec4& v : texels.last(pipeline_->nodes)) state.velocities.emplace_back(v.x, v.y, v.z);
+  return pack(state, tick);
+}
+
+void ClothSimulation::recordRestoreState(vulkan::Recorder& recorder, const StateSnapshot& snapshot) {
+  const std::size_t expected = pipeline_->nodes * kSnapshotBytesPerNode;
+  if (snapshot.bytes.size() != expected)
+    throw std::invalid_argument(
+        fmt::format("a snapshot of {} bytes is of another scene: this one's {} nodes take {}",
+                    snapshot.bytes.size(), pipeline_->nodes, expected));
+  pipeline_->start(recorder);
+  pipeline_->writeState(unpack(snapshot));
+  recorder.beginStage("state");
+  pipeline_->recordUploadedState(recorder);
+}
+
+std::uint32_t ClothSimulation::nodeCount() const {
+  return pipeline_->nodes;
+}
+std::span<const std::uint32_t> ClothSimulation::clothOffsets() const {
+  return pipeline_->offsets;
+}
+const Buffer& ClothSimulation::positions(std::uint32_t index) const {
+  return pipeline_->buffers.positions[index];
+}
+std::uint32_t ClothSimulation::presentIndex() const {
+  return pipeline_->present;
+}
+const Buffer& ClothSimulation::normals() const {
+  return pipeline_->buffers.normals;
+}
+
+}  // namespace clothstream::simulation

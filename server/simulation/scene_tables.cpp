@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: MIT
+// A scene as the kernels read it: a record a cloth, a record a workgroup, a record a sphere.
+#include "server/simulation/scene_tables.h"
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <cstddef>
+
+namespace clothstream::simulation {
+namespace {
+
+// As kernels store numbers, so that a state at rest has been through them already.
+float snapTiny(float x) {
+  return std::abs(x) < 1e-20f ? 0.0f : x;
+}
+
+}  // namespace
+
+std::vector<std::uint32_t> clothOffsets(std::span<const scene::Cloth> cloths) {
+  std::vector<std::uint32_t> offsets{0};
+  for (const scene::Cloth& cloth : cloths) offsets.push_back(offsets.back() + cloth.grid.nodeCount());
+  return offsets;
+}
+
+std::vector<shared::ClothRecord> clothRecords(std::span<const scene::Cloth> cloths) {
+  std::vector<shared::ClothRecord> records;
+  std::uint32_t firstNode = 0;
+  for (const scene::Cloth& cloth : cloths) {
+    const scene::GridSpacing spacing = scene::spacing(cloth.grid);
+    records.push_back({.firstNode = firstNode,
+                       .rows = cloth.grid.rows,
+                       .columns = cloth.grid.columns,
+                       .reserved = 0,
+                       .columnSpacing = spacing.column,
+                       .rowSpacing = spacing.row,
+                       .diagonalSpacing = spacing.diagonal,
+                       .damping = cloth.damping,
+                       .structuralStiffness = cloth.structural.stiffness,
+                       .shearStiffness = cloth.shear.stiffness,
+                       .bendStiffness = cloth.bend.stiffness,
+                       .friction = cloth.friction,
+                       .structuralDamping = cloth.structural.damping,
+                       .shearDamping = cloth.shear.damping,
+                       .bendDamping = cloth.bend.damping,
+                       .thickness = cloth.thickness,
+                       .drag = cloth.drag,
+                       .lift = cloth.lift,
+                       .reserved2 = 0,
+                       .reserved3 = 0});
+    firstNode += cloth.grid.nodeCount();
+  }
+  return records;
+}
+
+std::vector<shared::TileRecord> tileRecords(std::span<const scene::Cloth> cloths,
+                                            std::uint32_t rowsPerInvocation, std::uint32_t workgroupSize) {
+  assert(rowsPerInvocation > 0 && workgroupSize > 0);
+  std::vector<shared::TileRecord> tiles;
+  for (std::uint32_t cloth = 0; cloth < cloths.size(); ++cloth) {
+    const scene::Grid& grid = cloths[cloth].grid;
+    const std::uint32_t strips = (grid.rows + rowsPerInvocation - 1) / rowsPerInvocation;
+    const std::uint64_t invocations = std::uint64_t{strips} * grid.columns;
+    for (std::uint64_t first = 0; first < invocations; first += workgroupSize)
+      tiles.push_back({.cloth = cloth,
+                       .row = static_cast<std::uint32_t>(first / grid.columns) * rowsPerInvocation,
+                       .column = static_cast<std::uint32_t>(first % grid.columns),
+                       .reserved = 0});
+  }
+  return tiles;
+}
+
+shared::SphereRecord sphereRecord(const MovingSphere& sphere) {
+  const scene::Vec3 motion = sphere.end - sphere.start;
+  return {{sphere.start.x(), sphere.start.y(), sphere.start.z(), sphere.radius},
+          {motion.x(), motion.y(), motion.z(), sphere.friction}};
+}
+
+std::vector<float> inverseMasses(std::span<const scene::Cloth> cloths) {
+  std::vector<float> all;
+  for (const scene::Cloth& cloth : cloths) {
+    const auto free = static_cast<float>(static_cast<double>(cloth.grid.nodeCount()) / double{cloth.mass});
+    for (const std::uint8_t pinned : scene::pinnedNodes(cloth)) all.push_back(pinned != 0 ? 0.0f : free);
+  }
+  return all;
+}
+
+NodeState restState(std::span<const scene::Cloth> cloths) {
+  NodeState state;
+  for (const scene::Cloth& cloth : cloths) {
+    const std::vector<scene::Vec3> positions = scene::restPositions(cloth.grid);
+    std::transform(positions.begin(), positions.end(), std::back_inserter(state.positions),
+                   [](const scene::Vec3& p) { return scene::Vec3(p.unaryExpr(&snapTiny)); });
+  }
+  state.velocities.assign(state.positions.size(), scene::Vec3::Zero());
+  return state;
+}
+
+}  // namespace clothstream::simulation

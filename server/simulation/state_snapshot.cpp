@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: MIT
+// The state of a scene's nodes outside of the device, exact to the bit, and its hash.
+#include "server/simulation/state_snapshot.h"
+
+#include <array>
+#include <bit>
+#include <cassert>
+#include <cstring>
+
+#include "shaders/shared/state_hash.h"
+
+namespace clothstream::simulation {
+
+static_assert(std::endian::native == std::endian::little);
+static_assert(sizeof(scene::Vec3) == 12);
+
+NodeState unpack(const StateSnapshot& snapshot) {
+  assert(snapshot.bytes.size() % kSnapshotBytesPerNode == 0);
+  const std::size_t nodes = snapshot.bytes.size() / kSnapshotBytesPerNode;
+  NodeState state{std::vector<scene::Vec3>(nodes), std::vector<scene::Vec3>(nodes)};
+  const std::byte* from = snapshot.bytes.data();
+  for (std::size_t i = 0; i < nodes; ++i, from += kSnapshotBytesPerNode) {
+    std::memcpy(state.positions[i].data(), from, 12);
+    std::memcpy(state.velocities[i].data(), from + 12, 12);
+  }
+  return state;
+}
+
+StateSnapshot pack(const NodeState& state, std::uint64_t tick) {
+  assert(state.positions.size() == state.velocities.size());
+  StateSnapshot snapshot{tick, std::vector<std::byte>(state.positions.size() * kSnapshotBytesPerNode)};
+  std::byte* to = snapshot.bytes.data();
+  for (std::size_t i = 0; i < state.positions.size(); ++i, to += kSnapshotBytesPerNode) {
+    std::memcpy(to, state.positions[i].data(), 12);
+    std::memcpy(to + 12, state.velocities[i].data(), 12);
+  }
+  return snapshot;
+}
+
+TickStatus statusOf(const StateSnapshot& snapshot) {
+  assert(snapshot.bytes.size() % kSnapshotBytesPerNode == 0);
+  const auto nodes = static_cast<std::uint32_t>(snapshot.bytes.size() / kSnapshotBytesPerNode);
+  shared::NodeHash sum{0, 0};
+  bool healthy = true;
+  for (std::uint32_t i = 0; i < nodes; ++i) {
+    std::array<std::uint32_t, 6> words;
+    std::memcpy(words.data(), snapshot.bytes.data() + i * kSnapshotBytesPerNode, sizeof(words));
+    const shared::NodeHash hash =
+        shared::hashNode(i, words[0], words[1], words[2], words[3], words[4], words[5]);
+    sum.low += hash.low;
+    sum.high += hash.high;
+    for (const std::uint32_t word : words) healthy = healthy && !shared::isOutsideWorld(word);
+  }
+  return {std::uint64_t{sum.high} << 32 | sum.low, healthy};
+}
+
+}  // namespace clothstream::simulation

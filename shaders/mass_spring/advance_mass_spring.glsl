@@ -1,0 +1,152 @@
+// SPDX-License-Identifier: MIT
+// One substep of every node: spring and air forces, integration, collision; [Va21] Alg. 1, gathered a node at a time.
+//
+// An invocation walks down a strip of one column. Neighbours come from texel buffers into a window of registers that
+// slides with it: five positions are read a node instead of thirteen. The force of a vertical spring, and of a
+// triangle, serves both rows that it touches. Neither changes a bit of the result, which therefore depends on neither
+// the strip's length nor the workgroup's size.
+// Writes cannot race: each node belongs to one invocation, and what is read lies in other buffers.
+
+#include "shaders/mass_spring/air.glsl"
+#include "shaders/mass_spring/spheres.glsl"
+#include "shaders/mass_spring/springs.glsl"
+#include "shaders/shared/grid_strip.glsl"
+
+// As in [Va21]; else semi-implicit Euler.
+layout(constant_id = 4) const bool kExplicitEuler = false;
+
+layout(binding = 2) uniform samplerBuffer positions;  // w: inverse mass
+layout(binding = 3) uniform samplerBuffer velocities;
+layout(std430, binding = 4) writeonly buffer NextPositions { vec4 nextPositions[]; };
+layout(std430, binding = 5) writeonly buffer NextVelocities { vec4 nextVelocities[]; };
+
+layout(push_constant) uniform Push { AdvancePush push; };
+
+vec3 fetchVelocity(uint index) { return texelFetch(velocities, int(index)).xyz; }
+
+// The velocity of a neighbour is read where some force depends on it.
+Node fetchNode(uint index) {
+  vec4 position = texelFetch(positions, int(index));
+  return Node(position.xyz, position.w, kSpringDamping || kAir ? fetchVelocity(index) : vec3(0.0));
+}
+
+void main() {
+  Strip strip = locateStrip();
+  ClothRecord cloth = cloths[strip.cloth];
+  if (strip.row >= cloth.rows) {
+    return;
+  }
+  uint columns = cloth.columns;
+  uint lastRow = cloth.rows - 1;
+  uint endRow = min(strip.row + kRowsPerInvocation, cloth.rows);
+
+  // Loads beyond an edge stay on it: their springs have no stiffness, their triangles no area.
+  bool hasLeft = strip.column > 0;
+  bool hasRight = strip.column + 1 < columns;
+  bool hasLeft2 = strip.column > 1;
+  bool hasRight2 = strip.column + 2 < columns;
+  uint toLeft = hasLeft ? 1 : 0;
+  uint toRight = hasRight ? 1 : 0;
+  uint toLeft2 = hasLeft2 ? 2 : 0;
+  uint toRight2 = hasRight2 ? 2 : 0;
+  uint start = cloth.firstNode + strip.column;
+
+  Spring alongRow = Spring(cloth.structuralStiffness, cloth.structuralDamping, cloth.columnSpacing);
+  Spring alongColumn = Spring(cloth.structuralStiffness, cloth.structuralDamping, cloth.rowSpacing);
+  Spring shear = Spring(cloth.shearStiffness, cloth.shearDamping, cloth.diagonalSpacing);
+  Spring bendRow = Spring(cloth.bendStiffness, cloth.bendDamping, 2.0 * cloth.columnSpacing);
+  Spring bendColumn = Spring(cloth.bendStiffness, cloth.bendDamping, 2.0 * cloth.rowSpacing);
+  Spring leftSpring = where(hasLeft, alongRow);
+  Spring rightSpring = where(hasRight, alongRow);
+  Spring left2Spring = where(hasLeft2, bendRow);
+  Spring right2Spring = where(hasRight2, bendRow);
+  Spring leftShear = where(hasLeft, shear);
+  Spring rightShear = where(hasRight, shear);
+  precise float drag = push.windAir.w * cloth.drag;
+  precise float lift = push.windAir.w * cloth.lift;
+  Air air = Air(push.windAir.xyz, drag, lift);
+
+  // The window: columns left, centre and right; rows above, here and below.
+  uint row = strip.row;
+  uint index = start + row * columns;
+  uint aboveIndex = start + (row > 0 ? row - 1 : 0) * columns;
+  uint belowIndex = start + min(row + 1, lastRow) * columns;
+  Node leftAbove = fetchNode(aboveIndex - toLeft);
+  Node left = fetchNode(index - toLeft);
+  Node above = fetchNode(aboveIndex);
+  Node below = fetchNode(belowIndex);
+  Node rightAbove = fetchNode(aboveIndex + toRight);
+  Node right = fetchNode(index + toRight);
+  Node here = fetchNode(index);
+  here.velocity = fetchVelocity(index);
+
+  // From rows before the strip: upward springs of its first row and the second row's bend, the triangles above.
+  vec3 aboveForce = springForce(here, above, where(row > 0, alongColumn));
+  vec3 above2Force = springForce(here, fetchNode(start + (row > 1 ? row - 2 : 0) * columns), where(row > 1, bendColumn));
+  vec3 nextAbove2Force = springForce(below, above, where(row > 0, bendColumn));
+  vec3 leftAboveAir, rightAboveAir1, rightAboveAir2;
+  if (kAir) {
+    leftAboveAir = airForce(above, left, here, air);
+    rightAboveAir1 = airForce(above, here, rightAbove, air);
+    rightAboveAir2 = airForce(rightAbove, here, right, air);
+  }
+
+  for (; row < endRow; ++row) {
+    bool hasBelow = row < lastRow;
+    bool hasBelow2 = row + 1 < lastRow;
+    index = start + row * columns;
+    belowIndex = start + min(row + 1, lastRow) * columns;
+    Node below2 = fetchNode(start + min(row + 2, lastRow) * columns);
+    Node leftBelow = fetchNode(belowIndex - toLeft);
+    Node rightBelow = fetchNode(belowIndex + toRight);
+
+    vec3 belowForce = springForce(here, below, where(hasBelow, alongColumn));
+    vec3 below2Force = springForce(here, below2, where(hasBelow2, bendColumn));
+    precise vec3 force = springForce(here, left, leftSpring);
+    force = force + springForce(here, right, rightSpring);
+    force = force + aboveForce;
+    force = force + belowForce;
+    force = force + springForce(here, leftAbove, where(row > 0, leftShear));
+    force = force + springForce(here, rightAbove, where(row > 0, rightShear));
+    force = force + springForce(here, leftBelow, where(hasBelow, leftShear));
+    force = force + springForce(here, rightBelow, where(hasBelow, rightShear));
+    force = force + springForce(here, fetchNode(index - toLeft2), left2Spring);
+    force = force + springForce(here, fetchNode(index + toRight2), right2Spring);
+    force = force + above2Force;
+    force = force + below2Force;
+
+    if (kAir) {
+      // Quad by quad, its corners a b / e f: triangles (a, e, b) and (b, e, f).
+      vec3 leftAir1 = airForce(left, leftBelow, here, air);
+      vec3 leftAir2 = airForce(here, leftBelow, below, air);
+      vec3 rightAir1 = airForce(here, below, right, air);
+      precise vec3 sum = leftAboveAir + rightAboveAir1 + rightAboveAir2 + leftAir1 + leftAir2 + rightAir1;
+      force = force + sum;
+      leftAboveAir = leftAir2;
+      rightAboveAir1 = rightAir1;
+      rightAboveAir2 = airForce(right, below, rightBelow, air);
+    }
+
+    precise vec3 acceleration = force * here.inverseMass + push.gravityStep.xyz - cloth.damping * here.velocity;
+    precise vec3 velocity = here.velocity + push.gravityStep.w * acceleration;
+    precise vec3 position = here.position + push.gravityStep.w * (kExplicitEuler ? here.velocity : velocity);
+    Node next = collideWithSpheres(Node(position, here.inverseMass, velocity), push.sphereCount, push.sphereProgress, push.tickRate,
+                                   cloth.thickness, cloth.friction);
+    bool pinned = here.inverseMass == 0.0;
+    nextPositions[index] = vec4(pinned ? here.position : snapTiny(next.position), here.inverseMass);
+    nextVelocities[index] = vec4(pinned ? vec3(0.0) : snapTiny(next.velocity), 0.0);
+
+    aboveForce = -belowForce;
+    above2Force = nextAbove2Force;
+    nextAbove2Force = -below2Force;
+    leftAbove = left;
+    left = leftBelow;
+    rightAbove = right;
+    right = rightBelow;
+    here = below;
+    if (!kSpringDamping && !kAir) {
+      here.velocity = fetchVelocity(belowIndex);
+    }
+    below = below2;
+  }
+}

@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: MIT
+// The hash of the state and whether it is healthy: integer sums, whose order does not matter.
+#version 450
+#extension GL_GOOGLE_include_directive : require
+
+#include "shaders/shared/simulation.h"
+#include "shaders/shared/state_hash.h"
+
+layout(local_size_x_id = 0) in;
+
+layout(binding = 0) uniform samplerBuffer positions;
+layout(binding = 1) uniform samplerBuffer velocities;
+layout(std430, binding = 2) buffer Status { StatusRecord status; };
+
+layout(push_constant) uniform Push { HashPush push; };
+
+// Each invocation takes every stride-th node, and adds what it found with atomics on integers.
+void main() {
+  uint stride = gl_NumWorkGroups.x * gl_WorkGroupSize.x;
+  NodeHash sum = NodeHash(0, 0);
+  bool unhealthy = false;
+  for (uint node = gl_GlobalInvocationID.x; node < push.nodeCount; node += stride) {
+    uvec3 p = floatBitsToUint(texelFetch(positions, int(node)).xyz);
+    uvec3 v = floatBitsToUint(texelFetch(velocities, int(node)).xyz);
+    NodeHash hash = hashNode(node, p.x, p.y, p.z, v.x, v.y, v.z);
+    sum.low += hash.low;
+    sum.high += hash.high;
+    unhealthy = unhealthy || isOutsideWorld(p.x) || isOutsideWorld(p.y) || isOutsideWorld(p.z) ||
+                isOutsideWorld(v.x) || isOutsideWorld(v.y) || isOutsideWorld(v.z);
+  }
+  atomicAdd(status.hashLow, sum.low);
+  atomicAdd(status.hashHigh, sum.high);
+  if (unhealthy) {
+    atomicOr(status.unhealthy, 1u);
+  }
+}
