@@ -4,8 +4,10 @@
  *
  * A transport feeds every serialised ServerMessage to cs_receive and writes every message that cs_next_outgoing gives
  * as one ClientMessage. All times are microseconds of one steady clock of the caller's. Not thread-safe: one thread a
- * client at a time. No function throws or aborts on bytes from outside. Pointers that are returned stay valid until
- * the next call of cs_receive on the same client, unless said otherwise.
+ * client at a time. No function throws or aborts on bytes from outside, and what it holds is bounded: at most 256 MiB of
+ * content on its way, and geometry in proportion to the description that arrived. Where memory runs out all the same, the
+ * native library ends the program and WebAssembly traps. Pointers that are returned stay valid until the next call of
+ * cs_receive on the same client, unless said otherwise; strings are UTF-8, never NULL.
  */
 #ifndef CLOTHSTREAM_CLIENTS_CORE_CORE_H
 #define CLOTHSTREAM_CLIENTS_CORE_CORE_H
@@ -18,6 +20,7 @@ extern "C" {
 #endif
 
 #define CS_PROTOCOL_VERSION 1u
+#define CS_MAX_COLLIDERS 16u
 
 typedef struct cs_client cs_client;
 
@@ -50,8 +53,20 @@ typedef struct cs_statistics {
   double bits_per_vertex;    /* packet bits a vertex a frame, over all frames */
   double round_trip_ms;      /* smallest of the last pings */
   double clock_offset_us;    /* server clock - own clock */
-  double decode_ms;          /* of the newest frame; 0 where the caller gives no clock (see cs_set_clock) */
+  double decode_ms;          /* of the newest frame; 0 where there is no clock (see cs_set_clock) */
 } cs_statistics;
+
+/* As they stand now, everybody's changes included. */
+typedef struct cs_environment {
+  float gravity[3]; /* m/s^2 */
+  float wind[3];    /* m/s */
+  float air_density; /* kg/m^3 */
+} cs_environment;
+
+typedef struct cs_cloth_parameters {
+  float structural[2], shear[2], bend[2]; /* {stiffness in N/m, damping in N s/m} */
+  float damping;                          /* 1/s */
+} cs_cloth_parameters;
 
 typedef struct cs_cloth {
   const char* name;
@@ -68,7 +83,7 @@ typedef struct cs_collider {
   uint64_t participant_id; /* 0: the scene's */
 } cs_collider;
 
-/* scene may be "" for the server's default; strings are copied. NULL when memory is out. */
+/* scene may be "" for the server's default; strings are copied. */
 cs_client* cs_create(const char* scene, const char* client_name);
 void cs_destroy(cs_client* client);
 /* For decode_ms: a steady clock in microseconds. */
@@ -83,13 +98,19 @@ const uint8_t* cs_next_outgoing(cs_client* client, size_t* bytes);
 
 cs_state cs_get_state(const cs_client* client);
 const char* cs_error_text(const cs_client* client);
+/* The server's ErrorCode (session.proto) for the text above; 0 where the client itself found the error. */
+uint32_t cs_error_code(const cs_client* client);
 const char* cs_notice_text(const cs_client* client);
 void cs_get_statistics(const cs_client* client, uint64_t now_us, cs_statistics* out);
 const char* cs_server_name(const cs_client* client);
 const char* cs_device_name(const cs_client* client);
 const char* cs_scene_name(const cs_client* client);
-/* The scene's rates, per second; 0 before the description. */
+/* This participant's id, the scene's rates a second; 0 before they are known. */
+uint64_t cs_participant_id(const cs_client* client);
 uint32_t cs_stream_rate(const cs_client* client);
+uint32_t cs_simulation_rate(const cs_client* client);
+/* Seconds of the caller's clock between the first and the newest decoded frame. */
+double cs_stream_seconds(const cs_client* client);
 
 /* Geometry of the newest frame; 3 floats a vertex. Rest positions before the first frame. */
 uint32_t cs_vertex_count(const cs_client* client);
@@ -104,8 +125,12 @@ uint32_t cs_cloth_count(const cs_client* client);
 int cs_get_cloth(const cs_client* client, uint32_t index, cs_cloth* out);
 uint32_t cs_collider_count(const cs_client* client);
 int cs_get_collider(const cs_client* client, uint32_t index, cs_collider* out);
+/* 0 before the description, and where there is no such cloth. */
+int cs_get_environment(const cs_client* client, cs_environment* out);
+int cs_get_cloth_parameters(const cs_client* client, uint32_t index, cs_cloth_parameters* out);
 
-/* Sphere colliders of this participant: `count` of {x, y, z, radius}; replaces all former ones; 0 takes them away. */
+/* Sphere colliders of this participant: `count` of {x, y, z, radius}, at most CS_MAX_COLLIDERS (the rest is left out);
+ * replaces all former ones; 0 takes them away. Only the newest call counts if the transport is behind. */
 void cs_set_colliders(cs_client* client, const float* spheres, uint32_t count, uint64_t now_us);
 /* Parameters; NULL leaves one as it is. An empty cloth name means every cloth. */
 void cs_set_environment(cs_client* client, const float* gravity3, const float* wind3, const float* air_density);

@@ -1,0 +1,229 @@
+// SPDX-License-Identifier: MIT
+// One message of the server's after the other.
+#include "clients/core/client.h"
+
+#include <utility>
+
+#include "proto/codec/packet_header.h"
+
+namespace clothstream::client {
+
+Client::Client(std::string_view scene, std::string_view clientName) {
+  std::string hello;
+  writeHello(hello, ++lastRequestId_, scene, clientName);
+  send(std::move(hello));
+}
+
+std::uint32_t Client::receive(Bytes bytes, std::uint64_t nowUs) {
+  if (state_ == CS_STATE_FAILED) return 0;
+  const std::optional<ServerMessage> message = readServerMessage(bytes);
+  if (!message) return failMalformed("ServerMessage");
+  switch (message->kind) {
+    case Body::welcome: return welcomed(message->body);
+    case Body::chunk: return chunkReceived(message->body);
+    case Body::frame: return frameReceived(message->body, nowUs);
+    case Body::pong: return pongReceived(message->body, nowUs);
+    case Body::notice: return noticeReceived(message->body);
+    case Body::parameterChanged: return parametersReceived(message->body);
+    case Body::error: return errorReceived(message->body);
+    case Body::listScenes: return scenesReceived(message->body);
+    case Body::none: return 0;
+  }
+  return 0;
+}
+
+void Client::update(std::uint64_t nowUs) {
+  if (!welcomed_ || state_ == CS_STATE_FAILED || !clock_.pingDue(nowUs)) return;
+  std::string ping;
+  writePing(ping, ++lastRequestId_, nowUs);
+  send(std::move(ping));
+  clock_.pingSent(nowUs);
+}
+
+std::uint32_t Client::welcomed(Bytes body) {
+  std::optional<Welcome> welcome = readWelcome(body);
+  if (!welcome) return failMalformed("Welcome");
+  if (welcomed_) return fail("The server said Welcome twice.");
+  if (welcome->protocolVersion != CS_PROTOCOL_VERSION)
+    return fail("The server answers in protocol version " + std::to_string(welcome->protocolVersion) +
+                "; this client speaks version " + std::to_string(CS_PROTOCOL_VERSION) +
+                ". Use a client and a server of the same release.");
+  if (welcome->codec != codec::kCodecLatticeZstd)
+    return fail("The server chose codec " + std::to_string(welcome->codec) + "; this client decodes " +
+                std::to_string(codec::kCodecLatticeZstd) + ".");
+  welcome_ = std::move(*welcome);
+  welcomed_ = true;
+  return 0;
+}
+
+std::uint32_t Client::chunkReceived(Bytes body) {
+  const std::optional<Chunk> chunk = readChunk(body);
+  if (!chunk) return failMalformed("Chunk");
+  if (!welcomed_) return fail("The server sent a description before its Welcome.");
+  auto content = assembly_.add(*chunk);
+  if (!content) return fail("The server sent the description wrongly: " + content.error() + ".");
+  if (!*content) return 0;
+  return described(**content);
+}
+
+std::uint32_t Client::described(Bytes content) {
+  auto description = readDescription(content);
+  if (!description) return fail("The server's description of the scene is wrong: " + description.error() + ".");
+  auto decoder = codec::Decoder::make(description->layout);
+  if (!decoder) return fail("The server's description of the scene is wrong: no stream can have its layout.");
+  description_ = std::move(*description);
+  decoder_ = std::move(decoder);
+  keyFrameRequest_.answered();
+  statistics_.forgetTicks();
+  state_ = CS_STATE_JOINED;
+  return CS_EVENT_DESCRIPTION;
+}
+
+std::uint32_t Client::frameReceived(Bytes body, std::uint64_t nowUs) {
+  if (!readFrame(body, frame_)) return failMalformed("Frame");
+  if (!decoder_) return fail("The server sent a frame before the description.");
+  description_.colliders.resize(frame_.colliders.size());
+  for (std::size_t i = 0; i < frame_.colliders.size(); ++i) {
+    if (!readCollider(frame_.colliders[i], description_.colliders[i])) return failMalformed("ColliderState");
+  }
+  return packetReceived(nowUs);
+}
+
+std::uint32_t Client::packetReceived(std::uint64_t nowUs) {
+  const auto packet = std::as_bytes(std::span(frame_.packet.data(), frame_.packet.size()));
+  const auto parsed = codec::parsePacket(packet);
+  statistics_.arrived(parsed ? std::optional(parsed->header.tick) : std::nullopt, packet.size(),
+                      description_.ticksPerFrame(), nowUs);
+  switch (decode(packet)) {
+    case codec::DecodeResult::ok: break;
+    case codec::DecodeResult::stale: return 0;
+    case codec::DecodeResult::malformed:
+    case codec::DecodeResult::wrongEpoch:
+    case codec::DecodeResult::missingReference:
+      statistics_.refused();
+      requestKeyFrame(nowUs);
+      return 0;
+  }
+  const DecodedFrame decoded{
+      .tick = decoder_->tick(),
+      .key = parsed->header.kind == codec::PacketKind::key,
+      .hashMatches = decoder_->reconstructionHash() == frame_.reconstructionHash,
+      .vertexCount = description_.layout.vertexCount(),
+      .packetBytes = packet.size(),
+  };
+  statistics_.decoded(decoded, nowUs);
+  if (decoded.key) keyFrameRequest_.answered();
+  // A key frame is the way back to what the server holds.
+  if (!decoded.hashMatches) requestKeyFrame(nowUs);
+  outbox_.setAck(decoded.tick);
+  return CS_EVENT_FRAME;
+}
+
+codec::DecodeResult Client::decode(std::span<const std::byte> packet) {
+  if (!nowUs_) return decoder_->decode(packet);
+  const std::uint64_t start = nowUs_();
+  const codec::DecodeResult result = decoder_->decode(packet);
+  decodeMs_ = static_cast<double>(nowUs_() - start) / 1000;
+  return result;
+}
+
+void Client::requestKeyFrame(std::uint64_t nowUs) {
+  if (!keyFrameRequest_.wanted(nowUs)) return;
+  std::string request;
+  writeKeyFrameRequest(request, description_.layout.epoch);
+  send(std::move(request));
+}
+
+std::uint32_t Client::pongReceived(Bytes body, std::uint64_t nowUs) {
+  const std::optional<Pong> pong = readPong(body);
+  if (!pong) return failMalformed("Pong");
+  clock_.pongReceived(*pong, nowUs);
+  return 0;
+}
+
+std::uint32_t Client::noticeReceived(Bytes body) {
+  std::optional<std::string> text = readNotice(body);
+  if (!text) return failMalformed("Notice");
+  noticeText_ = std::move(*text);
+  return CS_EVENT_NOTICE;
+}
+
+std::uint32_t Client::parametersReceived(Bytes body) {
+  const std::optional<ParameterChange> change = readParameterChanged(body);
+  if (!change) return failMalformed("ParameterChanged");
+  apply(*change, description_);
+  return CS_EVENT_PARAMETERS;
+}
+
+std::uint32_t Client::errorReceived(Bytes body) {
+  std::optional<ServerError> error = readError(body);
+  if (!error) return failMalformed("Error");
+  errorCode_ = error->code;
+  if (error->fatal) return fail(std::move(error->text));
+  errorText_ = std::move(error->text);
+  return CS_EVENT_ERROR;
+}
+
+std::uint32_t Client::scenesReceived(Bytes body) {
+  auto scenes = readScenes(body);
+  if (!scenes) return failMalformed("ListScenesResponse");
+  scenes_ = std::move(*scenes);
+  return CS_EVENT_SCENES;
+}
+
+void Client::setColliders(std::span<const Sphere> spheres, std::uint64_t nowUs) {
+  if (state_ == CS_STATE_FAILED) return;
+  writeColliderPoses(outbox_.colliders(), spheres, nowUs);
+}
+
+void Client::change(const ParameterChange& change) {
+  std::string message;
+  writeParameterChange(message, ++lastRequestId_, change);
+  send(std::move(message));
+}
+
+void Client::change(const ColliderChange& change) {
+  std::string message;
+  writeColliderChange(message, ++lastRequestId_, change);
+  send(std::move(message));
+}
+
+void Client::listScenes() {
+  std::string message;
+  writeListScenes(message, ++lastRequestId_);
+  send(std::move(message));
+}
+
+std::span<const float> Client::positions() const {
+  if (decoder_ && decoder_->hasFrame()) return decoder_->positions();
+  return description_.restPositions;
+}
+
+std::span<const float> Client::normals() const {
+  if (decoder_ && decoder_->hasFrame()) return decoder_->normals();
+  return description_.restNormals;
+}
+
+std::uint64_t Client::reconstructionHash() const {
+  return decoder_ && decoder_->hasFrame() ? decoder_->reconstructionHash() : 0;
+}
+
+std::uint32_t Client::fail(std::string text) {
+  state_ = CS_STATE_FAILED;
+  errorText_ = std::move(text);
+  outbox_.clear();
+  return CS_EVENT_ERROR;
+}
+
+std::uint32_t Client::failMalformed(const char* what) {
+  return fail(std::string("The server sent bytes that are no ") + what +
+              " of this protocol: is it a clothstream-server of the same release?");
+}
+
+void Client::send(std::string message) {
+  if (state_ == CS_STATE_FAILED) return;
+  if (!outbox_.addControl(std::move(message)))
+    fail("The connection takes no messages: " + std::to_string(Outbox::kMaxControl) + " wait to be sent.");
+}
+
+}  // namespace clothstream::client

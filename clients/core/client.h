@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: MIT
+// The state machine of a client: joining, description, frames. What it promises is said in core.h.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "clients/core/content_assembly.h"
+#include "clients/core/core.h"
+#include "clients/core/description.h"
+#include "clients/core/frame_statistics.h"
+#include "clients/core/key_frame_request.h"
+#include "clients/core/outbox.h"
+#include "clients/core/server_clock.h"
+#include "clients/core/server_message.h"
+#include "proto/codec/decoder.h"
+
+namespace clothstream::client {
+
+class Client {
+ public:
+  Client(std::string_view scene, std::string_view clientName);
+
+  // A set of CS_EVENT bits.
+  std::uint32_t receive(Bytes message, std::uint64_t nowUs);
+  void update(std::uint64_t nowUs);
+  const std::string* nextOutgoing() { return outbox_.next(); }
+
+  void setClock(std::uint64_t (*nowUs)()) { nowUs_ = nowUs; }
+  void setColliders(std::span<const Sphere> spheres, std::uint64_t nowUs);
+  void change(const ParameterChange& change);
+  void change(const ColliderChange& change);
+  void listScenes();
+
+  cs_state state() const { return state_; }
+  const std::string& errorText() const { return errorText_; }
+  std::uint32_t errorCode() const { return errorCode_; }
+  const std::string& noticeText() const { return noticeText_; }
+  const Welcome& welcome() const { return welcome_; }
+  // Before the first description: empty.
+  const Description& description() const { return description_; }
+  bool described() const { return decoder_ != nullptr; }
+  const FrameStatistics& statistics() const { return statistics_; }
+  const ServerClock& clock() const { return clock_; }
+  double decodeMs() const { return decodeMs_; }
+  const std::vector<std::string>& scenes() const { return scenes_; }
+
+  // Of the newest frame, or at rest.
+  std::span<const float> positions() const;
+  std::span<const float> normals() const;
+  std::uint64_t reconstructionHash() const;
+  const std::vector<Collider>& colliders() const { return description_.colliders; }
+
+ private:
+  std::uint32_t welcomed(Bytes body);
+  std::uint32_t chunkReceived(Bytes body);
+  std::uint32_t described(Bytes content);
+  std::uint32_t frameReceived(Bytes body, std::uint64_t nowUs);
+  std::uint32_t packetReceived(std::uint64_t nowUs);
+  codec::DecodeResult decode(std::span<const std::byte> packet);
+  void requestKeyFrame(std::uint64_t nowUs);
+  std::uint32_t pongReceived(Bytes body, std::uint64_t nowUs);
+  std::uint32_t noticeReceived(Bytes body);
+  std::uint32_t parametersReceived(Bytes body);
+  std::uint32_t errorReceived(Bytes body);
+  std::uint32_t scenesReceived(Bytes body);
+
+  std::uint32_t fail(std::string text);
+  std::uint32_t failMalformed(const char* what);
+  void send(std::string message);
+
+  cs_state state_ = CS_STATE_JOINING;
+  bool welcomed_ = false;
+  std::uint32_t errorCode_ = 0;
+  std::string errorText_, noticeText_;
+  Welcome welcome_;
+  ContentAssembly assembly_;
+  Description description_;
+  std::unique_ptr<codec::Decoder> decoder_;
+  Frame frame_;
+  KeyFrameRequest keyFrameRequest_;
+  FrameStatistics statistics_;
+  ServerClock clock_;
+  Outbox outbox_;
+  std::uint64_t lastRequestId_ = 0;
+  std::uint64_t (*nowUs_)() = nullptr;
+  double decodeMs_ = 0;
+  std::vector<std::string> scenes_;
+};
+
+}  // namespace clothstream::client

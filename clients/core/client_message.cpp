@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: MIT
+// Field numbers of session.proto, going out.
+#include "clients/core/client_message.h"
+
+#include <array>
+#include <protozero/pbf_writer.hpp>
+
+#include "clients/core/core.h"
+#include "proto/codec/packet_header.h"
+
+namespace clothstream::client {
+namespace {
+
+using Writer = protozero::pbf_writer;
+
+// ClientMessage's bodies.
+enum BodyField : std::uint32_t {
+  kHello = 2,
+  kColliderPoses = 3,
+  kParameterChange = 4,
+  kPing = 5,
+  kFrameAck = 6,
+  kKeyFrameRequest = 7,
+  kListScenes = 16,
+};
+
+template <typename Fill>
+void writeMessage(std::string& out, std::uint64_t requestId, BodyField field, Fill fill) {
+  out.clear();
+  Writer message(out);
+  if (requestId != 0) message.add_uint64(1, requestId);
+  Writer body(message, field);
+  fill(body);
+}
+
+void addVec3(Writer& parent, std::uint32_t field, const Vec3& value) {
+  Writer vec3(parent, field);
+  for (std::uint32_t i = 0; i < 3; ++i) vec3.add_float(i + 1, value[i]);
+}
+
+void addVec3Value(Writer& parent, std::uint32_t field, const std::optional<Vec3>& value) {
+  if (!value) return;
+  Writer wrapper(parent, field);
+  addVec3(wrapper, 1, *value);
+}
+
+void addSpring(Writer& parent, std::uint32_t field, const std::optional<Spring>& value) {
+  if (!value) return;
+  Writer spring(parent, field);
+  spring.add_float(1, (*value)[0]);
+  spring.add_float(2, (*value)[1]);
+}
+
+}  // namespace
+
+void writeHello(std::string& out, std::uint64_t requestId, std::string_view scene, std::string_view clientName) {
+  writeMessage(out, requestId, kHello, [&](Writer& hello) {
+    constexpr std::array<std::uint32_t, 1> kCodecs{codec::kCodecLatticeZstd};
+    hello.add_uint32(1, CS_PROTOCOL_VERSION);
+    hello.add_packed_uint32(2, kCodecs.begin(), kCodecs.end());
+    hello.add_string(3, scene.data(), scene.size());
+    hello.add_string(4, clientName.data(), clientName.size());
+  });
+}
+
+void writeColliderPoses(std::string& out, std::span<const Sphere> spheres, std::uint64_t clientTimeUs) {
+  writeMessage(out, 0, kColliderPoses, [&](Writer& poses) {
+    for (std::size_t i = 0; i < spheres.size(); ++i) {
+      Writer collider(poses, 1);
+      collider.add_uint32(1, static_cast<std::uint32_t>(i));
+      {
+        Writer pose(collider, 2);
+        addVec3(pose, 1, spheres[i].position);
+      }
+      Writer sphere(collider, 3);
+      sphere.add_float(1, spheres[i].radius);
+    }
+    poses.add_uint64(2, clientTimeUs);
+  });
+}
+
+void writeParameterChange(std::string& out, std::uint64_t requestId, const ParameterChange& change) {
+  writeMessage(out, requestId, kParameterChange, [&](Writer& parameters) {
+    addVec3Value(parameters, 1, change.gravity);
+    addVec3Value(parameters, 2, change.wind);
+    if (change.airDensity) parameters.add_float(3, *change.airDensity);
+    for (const ClothChange& clothChange : change.cloths) {
+      Writer cloth(parameters, 4);
+      cloth.add_string(1, clothChange.name);
+      addSpring(cloth, 2, clothChange.structural);
+      addSpring(cloth, 3, clothChange.shear);
+      addSpring(cloth, 4, clothChange.bend);
+      if (clothChange.damping) cloth.add_float(5, *clothChange.damping);
+    }
+  });
+}
+
+void writeColliderChange(std::string& out, std::uint64_t requestId, const ColliderChange& change) {
+  writeMessage(out, requestId, kParameterChange, [&](Writer& parameters) {
+    Writer collider(parameters, 5);
+    collider.add_string(1, change.name.data(), change.name.size());
+    if (change.position) addVec3(collider, 2, *change.position);
+    if (change.radius) collider.add_float(3, *change.radius);
+  });
+}
+
+void writePing(std::string& out, std::uint64_t requestId, std::uint64_t clientTimeUs) {
+  writeMessage(out, requestId, kPing, [&](Writer& ping) { ping.add_uint64(1, clientTimeUs); });
+}
+
+void writeFrameAck(std::string& out, std::uint64_t tick) {
+  writeMessage(out, 0, kFrameAck, [&](Writer& ack) { ack.add_uint64(1, tick); });
+}
+
+void writeKeyFrameRequest(std::string& out, std::uint32_t epoch) {
+  writeMessage(out, 0, kKeyFrameRequest, [&](Writer& request) { request.add_uint32(1, epoch); });
+}
+
+void writeListScenes(std::string& out, std::uint64_t requestId) {
+  writeMessage(out, requestId, kListScenes, [](Writer&) {});
+}
+
+}  // namespace clothstream::client

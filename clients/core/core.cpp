@@ -1,0 +1,210 @@
+// SPDX-License-Identifier: MIT
+// The C interface over Client.
+#include "clients/core/core.h"
+
+#include <algorithm>
+#include <array>
+#include <cassert>
+
+#include "clients/core/client.h"
+
+using namespace clothstream::client;
+
+struct cs_client {
+  Client client;
+};
+
+namespace {
+
+std::optional<Vec3> vec3(const float* values) {
+  if (!values) return std::nullopt;
+  return Vec3{values[0], values[1], values[2]};
+}
+
+std::optional<Spring> spring(const float* values) {
+  if (!values) return std::nullopt;
+  return Spring{values[0], values[1]};
+}
+
+std::optional<float> scalar(const float* value) { return value ? std::optional(*value) : std::nullopt; }
+
+template <typename Values>
+void copy(const Values& values, float* out) {
+  std::copy(values.begin(), values.end(), out);
+}
+
+// The element, or nullptr where there is none.
+template <typename Element>
+const Element* at(const std::vector<Element>& elements, std::uint32_t index) {
+  return index < elements.size() ? &elements[index] : nullptr;
+}
+
+}  // namespace
+
+cs_client* cs_create(const char* scene, const char* client_name) {
+  assert(scene && client_name);
+  return new cs_client{Client(scene, client_name)};
+}
+
+void cs_destroy(cs_client* client) { delete client; }
+
+void cs_set_clock(cs_client* client, uint64_t (*now_us)(void)) { client->client.setClock(now_us); }
+
+uint32_t cs_receive(cs_client* client, const uint8_t* message, size_t bytes, uint64_t now_us) {
+  return client->client.receive(Bytes(reinterpret_cast<const char*>(message), bytes), now_us);
+}
+
+void cs_update(cs_client* client, uint64_t now_us) { client->client.update(now_us); }
+
+const uint8_t* cs_next_outgoing(cs_client* client, size_t* bytes) {
+  const std::string* message = client->client.nextOutgoing();
+  *bytes = message ? message->size() : 0;
+  return message ? reinterpret_cast<const uint8_t*>(message->data()) : nullptr;
+}
+
+cs_state cs_get_state(const cs_client* client) { return client->client.state(); }
+
+const char* cs_error_text(const cs_client* client) { return client->client.errorText().c_str(); }
+
+uint32_t cs_error_code(const cs_client* client) { return client->client.errorCode(); }
+
+const char* cs_notice_text(const cs_client* client) { return client->client.noticeText().c_str(); }
+
+void cs_get_statistics(const cs_client* client, uint64_t now_us, cs_statistics* out) {
+  const FrameStatistics& frames = client->client.statistics();
+  *out = {};
+  out->tick = frames.tick();
+  out->frames = frames.frames();
+  out->key_frames = frames.keyFrames();
+  out->dropped = frames.dropped();
+  out->decode_errors = frames.decodeErrors();
+  out->bytes = frames.bytes();
+  out->hash_mismatches = frames.hashMismatches();
+  out->frames_per_second = frames.framesPerSecond(now_us);
+  out->kbit_per_second = frames.kbitPerSecond(now_us);
+  out->bits_per_vertex = frames.bitsPerVertex();
+  out->round_trip_ms = client->client.clock().roundTripMs();
+  out->clock_offset_us = client->client.clock().offsetUs();
+  out->decode_ms = client->client.decodeMs();
+}
+
+const char* cs_server_name(const cs_client* client) { return client->client.welcome().serverName.c_str(); }
+
+const char* cs_device_name(const cs_client* client) { return client->client.welcome().deviceName.c_str(); }
+
+const char* cs_scene_name(const cs_client* client) { return client->client.welcome().scene.c_str(); }
+
+uint64_t cs_participant_id(const cs_client* client) { return client->client.welcome().participantId; }
+
+uint32_t cs_stream_rate(const cs_client* client) { return client->client.description().streamRate; }
+
+uint32_t cs_simulation_rate(const cs_client* client) { return client->client.description().simulationRate; }
+
+double cs_stream_seconds(const cs_client* client) { return client->client.statistics().streamSeconds(); }
+
+uint32_t cs_vertex_count(const cs_client* client) { return client->client.description().layout.vertexCount(); }
+
+const float* cs_positions(const cs_client* client) { return client->client.positions().data(); }
+
+const float* cs_normals(const cs_client* client) { return client->client.normals().data(); }
+
+uint64_t cs_reconstruction_hash(const cs_client* client) { return client->client.reconstructionHash(); }
+
+const uint32_t* cs_triangles(const cs_client* client, uint32_t* index_count) {
+  const std::vector<std::uint32_t>& triangles = client->client.description().triangles;
+  *index_count = static_cast<std::uint32_t>(triangles.size());
+  return triangles.data();
+}
+
+uint32_t cs_cloth_count(const cs_client* client) {
+  return static_cast<std::uint32_t>(client->client.description().cloths.size());
+}
+
+int cs_get_cloth(const cs_client* client, uint32_t index, cs_cloth* out) {
+  const Description& description = client->client.description();
+  const Cloth* cloth = at(description.cloths, index);
+  if (!cloth) return 0;
+  const clothstream::codec::ClothLayout& layout = description.layout.cloths[index];
+  *out = {.name = cloth->name.c_str(),
+          .first_vertex = cloth->firstVertex,
+          .vertex_count = layout.vertexCount,
+          .rows = layout.rows,
+          .columns = layout.columns,
+          .first_index = cloth->firstIndex,
+          .index_count = cloth->indexCount};
+  return 1;
+}
+
+uint32_t cs_collider_count(const cs_client* client) {
+  return static_cast<std::uint32_t>(client->client.colliders().size());
+}
+
+int cs_get_collider(const cs_client* client, uint32_t index, cs_collider* out) {
+  const Collider* collider = at(client->client.colliders(), index);
+  if (!collider) return 0;
+  *out = {};
+  out->name = collider->name.c_str();
+  copy(collider->position, out->position);
+  copy(collider->orientation, out->orientation);
+  out->radius = collider->radius;
+  out->participant_id = collider->participantId;
+  return 1;
+}
+
+int cs_get_environment(const cs_client* client, cs_environment* out) {
+  if (!client->client.described()) return 0;
+  const Environment& environment = client->client.description().environment;
+  copy(environment.gravity, out->gravity);
+  copy(environment.wind, out->wind);
+  out->air_density = environment.airDensity;
+  return 1;
+}
+
+int cs_get_cloth_parameters(const cs_client* client, uint32_t index, cs_cloth_parameters* out) {
+  const Cloth* cloth = at(client->client.description().cloths, index);
+  if (!cloth) return 0;
+  copy(cloth->parameters.structural, out->structural);
+  copy(cloth->parameters.shear, out->shear);
+  copy(cloth->parameters.bend, out->bend);
+  out->damping = cloth->parameters.damping;
+  return 1;
+}
+
+void cs_set_colliders(cs_client* client, const float* spheres, uint32_t count, uint64_t now_us) {
+  std::array<Sphere, CS_MAX_COLLIDERS> colliders;
+  count = std::min(count, CS_MAX_COLLIDERS);
+  for (std::uint32_t i = 0; i < count; ++i) {
+    const float* sphere = spheres + 4 * i;
+    colliders[i] = {{sphere[0], sphere[1], sphere[2]}, sphere[3]};
+  }
+  client->client.setColliders(std::span(colliders.data(), count), now_us);
+}
+
+void cs_set_environment(cs_client* client, const float* gravity3, const float* wind3, const float* air_density) {
+  ParameterChange change;
+  change.gravity = vec3(gravity3);
+  change.wind = vec3(wind3);
+  change.airDensity = scalar(air_density);
+  client->client.change(change);
+}
+
+void cs_set_cloth(cs_client* client, const char* cloth, const float* structural2, const float* shear2,
+                  const float* bend2, const float* damping) {
+  ParameterChange change;
+  change.cloths.push_back({cloth, spring(structural2), spring(shear2), spring(bend2), scalar(damping)});
+  client->client.change(change);
+}
+
+void cs_set_collider(cs_client* client, const char* collider, const float* position3, const float* radius) {
+  const std::optional<Vec3> position = vec3(position3);
+  client->client.change(ColliderChange{collider, position ? &*position : nullptr, radius});
+}
+
+void cs_list_scenes(cs_client* client) { client->client.listScenes(); }
+
+uint32_t cs_scene_count(const cs_client* client) { return static_cast<std::uint32_t>(client->client.scenes().size()); }
+
+const char* cs_scene(const cs_client* client, uint32_t index) {
+  const std::string* scene = at(client->client.scenes(), index);
+  return scene ? scene->c_str() : "";
+}

@@ -1,0 +1,201 @@
+// SPDX-License-Identifier: MIT
+// A StreamDescription, read, checked, and completed with triangles and normals.
+#include "clients/core/description.h"
+
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <iterator>
+
+#include "proto/codec/packet_header.h"
+#include "proto/codec/vertex_normals.h"
+
+namespace clothstream::client {
+namespace {
+
+using Reader = protozero::pbf_reader;
+
+constexpr std::uint32_t kMaxRate = 1000;  // per second, scene.proto
+
+struct ClothMessage {
+  std::string name;
+  codec::ClothLayout layout;
+  Bytes restPositions;
+};
+
+bool setText(std::string& target, Reader& reader) {
+  const Bytes view = reader.get_view();
+  target.assign(view.data(), view.size());
+  return true;
+}
+
+bool readCloth(Bytes message, ClothMessage& cloth) {
+  return readFields(message, [&](std::uint32_t field, Reader& reader) {
+    switch (field) {
+      case bytes(1): return setText(cloth.name, reader);
+      case varint(2): return cloth.layout.vertexCount = reader.get_uint32(), true;
+      case varint(3): return cloth.layout.rows = reader.get_uint32(), true;
+      case varint(4): return cloth.layout.columns = reader.get_uint32(), true;
+      case bytes(5): return cloth.restPositions = reader.get_view(), true;
+      default: return skip(reader);
+    }
+  });
+}
+
+// Of a Scene's Environment.
+bool readEnvironment(Bytes message, Environment& environment) {
+  return readFields(message, [&](std::uint32_t field, Reader& reader) {
+    switch (field) {
+      case bytes(1): return readVec3(reader.get_view(), environment.gravity);
+      case bytes(2): return readVec3(reader.get_view(), environment.wind);
+      case fixed32(3): return std::isfinite(environment.airDensity = reader.get_float());
+      default: return skip(reader);
+    }
+  });
+}
+
+// Of a Scene's Cloth.
+bool readClothParameters(Bytes message, std::string& name, ClothParameters& parameters) {
+  return readFields(message, [&](std::uint32_t field, Reader& reader) {
+    switch (field) {
+      case bytes(1): return setText(name, reader);
+      case bytes(5): return readSpring(reader.get_view(), parameters.structural);
+      case bytes(6): return readSpring(reader.get_view(), parameters.shear);
+      case bytes(7): return readSpring(reader.get_view(), parameters.bend);
+      case fixed32(8): return std::isfinite(parameters.damping = reader.get_float());
+      default: return skip(reader);
+    }
+  });
+}
+
+bool readDefinition(Bytes message, Description& description) {
+  return readFields(message, [&](std::uint32_t field, Reader& reader) {
+    if (field == bytes(7)) return readEnvironment(reader.get_view(), description.environment);
+    if (field != bytes(8)) return skip(reader);
+    std::string name;
+    ClothParameters parameters;
+    if (!readClothParameters(reader.get_view(), name, parameters)) return false;
+    for (Cloth& cloth : description.cloths) {
+      if (cloth.name == name) cloth.parameters = parameters;
+    }
+    return true;
+  });
+}
+
+// Gives false where the message is not well formed; what is well formed and wrong is for check() to say.
+bool readParts(Bytes message, Description& description, std::vector<ClothMessage>& cloths, Bytes& definition) {
+  return readFields(message, [&](std::uint32_t field, Reader& reader) {
+    switch (field) {
+      case varint(1): return description.layout.epoch = reader.get_uint32(), true;
+      case varint(2): return description.codec = reader.get_uint32(), true;
+      case bytes(3): return setText(description.scene, reader);
+      case varint(4): return description.simulationRate = reader.get_uint32(), true;
+      case varint(5): return description.streamRate = reader.get_uint32(), true;
+      case fixed32(6): return description.layout.maxError = reader.get_float(), true;
+      case varint(7):
+        description.layout.normals = reader.get_enum() == 2 ? codec::NormalMode::octahedral : codec::NormalMode::none;
+        return true;
+      case bytes(8):
+        return cloths.size() <= codec::kMaxClothRanges && readCloth(reader.get_view(), cloths.emplace_back());
+      case bytes(9):
+        return description.colliders.size() < kMaxSceneColliders &&
+               readCollider(reader.get_view(), description.colliders.emplace_back());
+      case bytes(10): return definition = reader.get_view(), true;
+      default: return skip(reader);
+    }
+  });
+}
+
+std::string quoted(const std::string& name) { return "cloth \"" + name + "\""; }
+
+// Empty if the numbers agree.
+std::string check(const Description& description, const std::vector<ClothMessage>& cloths) {
+  if (description.codec != codec::kCodecLatticeZstd)
+    return "codec is " + std::to_string(description.codec) + "; this client decodes " +
+           std::to_string(codec::kCodecLatticeZstd);
+  const std::uint32_t simulation = description.simulationRate, stream = description.streamRate;
+  if (simulation == 0 || simulation > kMaxRate)
+    return "simulation_rate is " + std::to_string(simulation) + "; 1 to " + std::to_string(kMaxRate) + " is allowed";
+  if (stream == 0 || simulation % stream != 0)
+    return "stream_rate is " + std::to_string(stream) + "; a divisor of " + std::to_string(simulation) + " is allowed";
+  if (cloths.empty() || cloths.size() > codec::kMaxClothRanges)
+    return std::to_string(cloths.size()) + " cloths; 1 to " + std::to_string(codec::kMaxClothRanges) + " are allowed";
+  for (const ClothMessage& cloth : cloths) {
+    if (cloth.restPositions.size() != std::uint64_t{cloth.layout.vertexCount} * 3 * sizeof(float))
+      return quoted(cloth.name) + ": rest_positions has " + std::to_string(cloth.restPositions.size()) + " bytes for " +
+             std::to_string(cloth.layout.vertexCount) + " vertices; 12 a vertex are needed";
+  }
+  if (!codec::isPossible(description.layout))
+    return "rows, columns, vertex_count or max_error (" + std::to_string(description.layout.maxError) +
+           ") are impossible for a stream";
+  return {};
+}
+
+void appendTriangles(const codec::ClothLayout& cloth, std::uint32_t firstVertex, std::vector<std::uint32_t>& out) {
+  for (std::uint32_t row = 0; row + 1 < cloth.rows; ++row) {
+    for (std::uint32_t column = 0; column + 1 < cloth.columns; ++column) {
+      const std::uint32_t a = firstVertex + row * cloth.columns + column, b = a + 1;
+      const std::uint32_t e = a + cloth.columns, f = e + 1;
+      out.insert(out.end(), {a, e, b, b, e, f});
+    }
+  }
+}
+
+bool appendPositions(Bytes bytes, std::vector<float>& out) {
+  static_assert(std::endian::native == std::endian::little);
+  const std::size_t first = out.size();
+  out.resize(first + bytes.size() / sizeof(float));
+  std::memcpy(out.data() + first, bytes.data(), bytes.size());
+  for (std::size_t i = first; i < out.size(); ++i) {
+    if (!std::isfinite(out[i])) return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+tl::expected<Description, std::string> readDescription(Bytes message) {
+  Description description;
+  std::vector<ClothMessage> cloths;
+  Bytes definition;
+  if (!readParts(message, description, cloths, definition))
+    return tl::unexpected(std::string("its bytes are no StreamDescription"));
+  for (const ClothMessage& cloth : cloths) description.layout.cloths.push_back(cloth.layout);
+  if (std::string problem = check(description, cloths); !problem.empty()) return tl::unexpected(std::move(problem));
+
+  std::uint32_t firstVertex = 0;
+  for (ClothMessage& source : cloths) {
+    Cloth& cloth = description.cloths.emplace_back();
+    cloth.firstVertex = firstVertex;
+    cloth.firstIndex = static_cast<std::uint32_t>(description.triangles.size());
+    appendTriangles(source.layout, firstVertex, description.triangles);
+    cloth.indexCount = static_cast<std::uint32_t>(description.triangles.size()) - cloth.firstIndex;
+    firstVertex += source.layout.vertexCount;
+    if (!appendPositions(source.restPositions, description.restPositions))
+      return tl::unexpected(quoted(source.name) + ": a rest position is not finite");
+    cloth.name = std::move(source.name);
+  }
+  description.restNormals.resize(description.restPositions.size());
+  codec::computeVertexNormals(description.layout, description.restPositions.data(), description.restNormals.data());
+  if (!readDefinition(definition, description)) return tl::unexpected(std::string("its definition is no Scene"));
+  return description;
+}
+
+void apply(const ParameterChange& change, Description& description) {
+  Environment& environment = description.environment;
+  environment.gravity = change.gravity.value_or(environment.gravity);
+  environment.wind = change.wind.value_or(environment.wind);
+  environment.airDensity = change.airDensity.value_or(environment.airDensity);
+  for (const ClothChange& clothChange : change.cloths) {
+    for (Cloth& cloth : description.cloths) {
+      if (!clothChange.name.empty() && clothChange.name != cloth.name) continue;
+      ClothParameters& parameters = cloth.parameters;
+      parameters.structural = clothChange.structural.value_or(parameters.structural);
+      parameters.shear = clothChange.shear.value_or(parameters.shear);
+      parameters.bend = clothChange.bend.value_or(parameters.bend);
+      parameters.damping = clothChange.damping.value_or(parameters.damping);
+    }
+  }
+}
+
+}  // namespace clothstream::client

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: MIT
+// What a stream shows: cloths, rest state, triangles, colliders and the parameters as they stand now.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include <tl/expected.hpp>
+
+#include "clients/core/server_message.h"
+#include "proto/codec/stream_layout.h"
+
+namespace clothstream::client {
+
+struct ClothParameters {
+  Spring structural{}, shear{}, bend{};
+  float damping = 0;
+};
+
+struct Cloth {
+  std::string name;
+  std::uint32_t firstVertex = 0, firstIndex = 0, indexCount = 0;
+  ClothParameters parameters;
+};
+
+struct Environment {
+  Vec3 gravity{0, -9.81f, 0};
+  Vec3 wind{};
+  float airDensity = 1.2f;
+};
+
+struct Description {
+  std::uint32_t codec = 0;
+  std::string scene;
+  std::uint32_t simulationRate = 0, streamRate = 0;
+  codec::StreamLayout layout;  // vertex counts, rows and columns of the cloths
+  std::vector<Cloth> cloths;
+  std::vector<Collider> colliders;
+  Environment environment;
+  std::vector<float> restPositions, restNormals;  // 3 a vertex
+  std::vector<std::uint32_t> triangles;           // 3 indices each
+
+  std::uint32_t ticksPerFrame() const { return simulationRate / streamRate; }
+};
+
+// A serialised StreamDescription. Sizes what it makes by the positions that came, never by numbers alone. The error
+// names the field, its value and what is allowed.
+[[nodiscard]] tl::expected<Description, std::string> readDescription(Bytes message);
+
+void apply(const ParameterChange& change, Description& description);
+
+}  // namespace clothstream::client

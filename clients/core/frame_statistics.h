@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: MIT
+// Counts and rates of the frames that came.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+
+namespace clothstream::client {
+
+struct DecodedFrame {
+  std::uint64_t tick = 0;
+  bool key = false;
+  bool hashMatches = true;
+  std::uint32_t vertexCount = 0;
+  std::size_t packetBytes = 0;
+};
+
+class FrameStatistics {
+ public:
+  // Every packet that came, whatever becomes of it. `tick` is what its header says, if it has one.
+  void arrived(std::optional<std::uint64_t> tick, std::size_t packetBytes, std::uint32_t ticksPerFrame,
+               std::uint64_t nowUs);
+  void refused() { ++decodeErrors_; }
+  void decoded(const DecodedFrame& frame, std::uint64_t nowUs);
+  // A new description: ticks may start anew.
+  void forgetTicks() { newestArrivedTick_.reset(); }
+
+  std::uint64_t tick() const { return tick_; }
+  std::uint64_t frames() const { return frames_; }
+  std::uint64_t keyFrames() const { return keyFrames_; }
+  std::uint64_t dropped() const { return dropped_; }
+  std::uint64_t decodeErrors() const { return decodeErrors_; }
+  std::uint64_t bytes() const { return bytes_; }
+  std::uint64_t hashMismatches() const { return hashMismatches_; }
+
+  // Over the last second, or since the first packet if that is less.
+  double framesPerSecond(std::uint64_t nowUs) const;
+  double kbitPerSecond(std::uint64_t nowUs) const;
+  double bitsPerVertex() const;
+  // Between the first and the newest decoded frame.
+  double streamSeconds() const;
+
+ private:
+  struct Arrival {
+    std::uint64_t timeUs = 0;
+    std::size_t bytes = 0;
+    bool decoded = false;
+  };
+  // A second at the highest stream rate.
+  static constexpr std::size_t kArrivals = 1024;
+
+  template <typename Amount>
+  double perSecond(std::uint64_t nowUs, Amount amount) const;
+
+  std::uint64_t tick_ = 0, frames_ = 0, keyFrames_ = 0, dropped_ = 0, decodeErrors_ = 0, bytes_ = 0;
+  std::uint64_t hashMismatches_ = 0;
+  std::uint64_t decodedBytes_ = 0, decodedVertices_ = 0;
+  std::uint64_t firstArrivalUs_ = 0, firstDecodedUs_ = 0, lastDecodedUs_ = 0;
+  std::optional<std::uint64_t> newestArrivedTick_;
+  std::array<Arrival, kArrivals> arrivals_{};
+  std::size_t arrivalCount_ = 0;
+};
+
+}  // namespace clothstream::client

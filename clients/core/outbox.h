@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: MIT
+// Serialised ClientMessages that wait for the transport.
+#pragma once
+
+#include <cstddef>
+#include <deque>
+#include <optional>
+#include <string>
+
+#include "clients/core/client_message.h"
+
+namespace clothstream::client {
+
+// Of acknowledgements and of collider poses only the newest says anything: a transport that is behind skips the others.
+class Outbox {
+ public:
+  // More control messages than this means a transport that takes nothing.
+  static constexpr std::size_t kMaxControl = 256;
+
+  // False if there is no room.
+  [[nodiscard]] bool addControl(std::string message);
+  void setAck(std::uint64_t tick) { ackTick_ = tick; }
+  // Replaces what waits.
+  std::string& colliders() { return colliders_; }
+  void clear();
+
+  // nullptr where there is nothing; valid until the next call of this function.
+  const std::string* next();
+
+ private:
+  std::deque<std::string> control_;
+  std::string colliders_;  // empty: none waits
+  std::optional<std::uint64_t> ackTick_;
+  std::string taken_;
+};
+
+}  // namespace clothstream::client

@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: MIT
+// What the server says (proto/clothstream/v1/session.proto), as plain structs that look into the message's bytes.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "clients/core/wire.h"
+
+namespace clothstream::client {
+
+using Vec3 = std::array<float, 3>;
+
+// Field numbers of ServerMessage's bodies.
+enum class Body : std::uint32_t {
+  none = 0,
+  welcome = 2,
+  chunk = 3,
+  frame = 4,
+  pong = 5,
+  notice = 6,
+  parameterChanged = 7,
+  error = 8,
+  listScenes = 16,
+};
+
+// A kind of body that this client does not know is `none`.
+struct ServerMessage {
+  Body kind = Body::none;
+  Bytes body;
+};
+
+struct Welcome {
+  std::uint32_t protocolVersion = 0, codec = 0;
+  std::uint64_t participantId = 0;
+  std::string scene, serverName, deviceName;
+};
+
+struct Chunk {
+  std::uint64_t contentId = 0;
+  std::uint32_t kind = 0, index = 0, count = 0;
+  std::uint64_t totalBytes = 0;
+  Bytes data;
+};
+
+struct Collider {
+  std::string name;
+  Vec3 position{};
+  std::array<float, 4> orientation{0, 0, 0, 1};  // x y z w
+  float radius = 0;
+  std::uint64_t participantId = 0;
+};
+
+struct Frame {
+  Bytes packet;
+  std::uint64_t reconstructionHash = 0;
+  std::vector<Bytes> colliders;  // serialised ColliderStates
+};
+
+struct Pong {
+  std::uint64_t clientTimeUs = 0, serverTimeUs = 0;
+};
+
+struct ServerError {
+  std::uint32_t code = 0;
+  std::string text;
+  bool fatal = false;
+};
+
+// {stiffness, damping}
+using Spring = std::array<float, 2>;
+
+struct ClothChange {
+  std::string name;
+  std::optional<Spring> structural, shear, bend;
+  std::optional<float> damping;
+};
+
+struct ParameterChange {
+  std::optional<Vec3> gravity, wind;
+  std::optional<float> airDensity;
+  std::vector<ClothChange> cloths;
+};
+
+// nullopt: not well formed, a number that is not finite where the protocol has finite ones, or more parts than the
+// protocol allows.
+[[nodiscard]] std::optional<ServerMessage> readServerMessage(Bytes message);
+[[nodiscard]] std::optional<Welcome> readWelcome(Bytes message);
+[[nodiscard]] std::optional<Chunk> readChunk(Bytes message);
+// Reuses the memory of `frame`.
+[[nodiscard]] bool readFrame(Bytes message, Frame& frame);
+// Reuses the memory of `collider`.
+[[nodiscard]] bool readCollider(Bytes message, Collider& collider);
+[[nodiscard]] std::optional<Pong> readPong(Bytes message);
+// The text of a Notice.
+[[nodiscard]] std::optional<std::string> readNotice(Bytes message);
+[[nodiscard]] std::optional<ParameterChange> readParameterChanged(Bytes message);
+[[nodiscard]] std::optional<ServerError> readError(Bytes message);
+// The names of the scenes.
+[[nodiscard]] std::optional<std::vector<std::string>> readScenes(Bytes message);
+
+[[nodiscard]] bool readVec3(Bytes message, Vec3& out);
+[[nodiscard]] bool readSpring(Bytes message, Spring& out);
+
+inline constexpr std::size_t kMaxCloths = 256;
+// The scene's and all participants'.
+inline constexpr std::size_t kMaxSceneColliders = 4096;
+inline constexpr std::size_t kMaxScenes = 65536;
+
+}  // namespace clothstream::client
