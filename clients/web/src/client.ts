@@ -1,0 +1,271 @@
+// SPDX-License-Identifier: MIT
+// One client of the core, typed: messages in and out, and what the newest frame holds.
+
+import type { CoreModule } from "./wasm";
+
+export type Vec3 = readonly [number, number, number];
+
+export enum ClientState {
+  joining = 0,
+  joined = 1,
+  failed = 2,
+}
+
+export const ClientEvent = {
+  frame: 1,
+  description: 2,
+  notice: 4,
+  error: 8,
+  parameters: 16,
+  scenes: 32,
+} as const;
+
+export interface Statistics {
+  tick: number;
+  frames: number;
+  keyFrames: number;
+  dropped: number;
+  decodeErrors: number;
+  bytes: number;
+  hashMismatches: number;
+  framesPerSecond: number;
+  kbitPerSecond: number;
+  bitsPerVertex: number;
+  roundTripMs: number;
+}
+
+export interface ClothLayout {
+  name: string;
+  firstVertex: number;
+  vertexCount: number;
+  rows: number;
+  columns: number;
+  firstIndex: number;
+  indexCount: number;
+}
+
+export interface SphereCollider {
+  name: string;
+  position: Vec3;
+  radius: number;
+  participantId: bigint; // 0: the scene's
+}
+
+// {stiffness in N/m, damping in N s/m}
+export type Spring = readonly [number, number];
+
+export interface Environment {
+  gravity: Vec3; // m/s^2
+  wind: Vec3; // m/s
+  airDensity: number; // kg/m^3
+}
+
+export interface ClothParameters {
+  structural: Spring;
+  shear: Spring;
+  bend: Spring;
+  damping: number; // 1/s
+}
+
+// Sizes of the structs of core.h on a 32-bit machine.
+const kStatisticsBytes = 104;
+const kClothBytes = 28;
+const kColliderBytes = 48;
+const kEnvironmentBytes = 28;
+const kClothParametersBytes = 28;
+const kScratchBytes = Math.max(kStatisticsBytes, kClothBytes, kColliderBytes, kEnvironmentBytes, kClothParametersBytes);
+
+// Views that it gives (positions, normals, triangles) look into the core's memory: they are good until the next call.
+export class Client {
+  private readonly handle: number;
+  private readonly scratch: number;
+  private inbox = 0;
+  private inboxBytes = 0;
+
+  // `scene` may be "" for the server's default.
+  constructor(private readonly core: CoreModule, scene: string) {
+    this.handle = core.with([scene, "clothstream page"], core.exports.cs_create);
+    if (this.handle === 0) throw new Error("The client core has no memory left for another client");
+    this.scratch = core.allocate(kScratchBytes);
+  }
+
+  destroy(): void {
+    this.core.exports.cs_destroy(this.handle);
+    this.core.exports.free(this.scratch);
+    this.core.exports.free(this.inbox);
+  }
+
+  // One ServerMessage; gives a set of ClientEvent bits.
+  receive(message: ArrayBuffer): number {
+    if (message.byteLength > this.inboxBytes) {
+      this.core.exports.free(this.inbox);
+      this.inboxBytes = 2 * message.byteLength;
+      this.inbox = this.core.allocate(this.inboxBytes);
+    }
+    this.core.bytes(this.inbox, message.byteLength).set(new Uint8Array(message));
+    return this.core.exports.cs_receive(this.handle, this.inbox, message.byteLength, nowUs());
+  }
+
+  // Pings; to be called ten times a second or more.
+  update(): void {
+    this.core.exports.cs_update(this.handle, nowUs());
+  }
+
+  // The next ClientMessage to send: a copy.
+  nextOutgoing(): Uint8Array<ArrayBuffer> | undefined {
+    const message = this.core.exports.cs_next_outgoing(this.handle, this.scratch);
+    if (message === 0) return undefined;
+    return this.core.bytes(message, this.core.view().getUint32(this.scratch, true)).slice();
+  }
+
+  get state(): ClientState {
+    return this.core.exports.cs_get_state(this.handle);
+  }
+  get errorText(): string {
+    return this.core.text(this.core.exports.cs_error_text(this.handle));
+  }
+  get noticeText(): string {
+    return this.core.text(this.core.exports.cs_notice_text(this.handle));
+  }
+  get deviceName(): string {
+    return this.core.text(this.core.exports.cs_device_name(this.handle));
+  }
+  get sceneName(): string {
+    return this.core.text(this.core.exports.cs_scene_name(this.handle));
+  }
+  get vertexCount(): number {
+    return this.core.exports.cs_vertex_count(this.handle);
+  }
+
+  statistics(): Statistics {
+    this.core.exports.cs_get_statistics(this.handle, nowUs(), this.scratch);
+    const view = this.core.view();
+    const count = (index: number) => Number(view.getBigUint64(this.scratch + 8 * index, true));
+    const real = (index: number) => view.getFloat64(this.scratch + 8 * index, true);
+    return {
+      tick: count(0),
+      frames: count(1),
+      keyFrames: count(2),
+      dropped: count(3),
+      decodeErrors: count(4),
+      bytes: count(5),
+      hashMismatches: count(6),
+      framesPerSecond: real(7),
+      kbitPerSecond: real(8),
+      bitsPerVertex: real(9),
+      roundTripMs: real(10),
+    };
+  }
+
+  // 3 floats a vertex; rest positions before the first frame.
+  positions(): Float32Array {
+    return this.core.floats(this.core.exports.cs_positions(this.handle), 3 * this.vertexCount);
+  }
+
+  normals(): Float32Array {
+    return this.core.floats(this.core.exports.cs_normals(this.handle), 3 * this.vertexCount);
+  }
+
+  triangles(): Uint32Array {
+    const pointer = this.core.exports.cs_triangles(this.handle, this.scratch);
+    return this.core.indices(pointer, this.core.view().getUint32(this.scratch, true));
+  }
+
+  cloths(): ClothLayout[] {
+    return this.list(this.core.exports.cs_cloth_count(this.handle), this.core.exports.cs_get_cloth, (view, at) => ({
+      name: this.core.text(view.getUint32(at, true)),
+      firstVertex: view.getUint32(at + 4, true),
+      vertexCount: view.getUint32(at + 8, true),
+      rows: view.getUint32(at + 12, true),
+      columns: view.getUint32(at + 16, true),
+      firstIndex: view.getUint32(at + 20, true),
+      indexCount: view.getUint32(at + 24, true),
+    }));
+  }
+
+  colliders(): SphereCollider[] {
+    const count = this.core.exports.cs_collider_count(this.handle);
+    return this.list(count, this.core.exports.cs_get_collider, (view, at) => ({
+      name: this.core.text(view.getUint32(at, true)),
+      position: vec3(view, at + 4),
+      radius: view.getFloat32(at + 32, true),
+      participantId: view.getBigUint64(at + 40, true),
+    }));
+  }
+
+  scenes(): string[] {
+    const count = this.core.exports.cs_scene_count(this.handle);
+    return Array.from({ length: count }, (_, index) => this.core.text(this.core.exports.cs_scene(this.handle, index)));
+  }
+
+  // As it stands now; undefined before the description.
+  environment(): Environment | undefined {
+    if (this.core.exports.cs_get_environment(this.handle, this.scratch) === 0) return undefined;
+    const view = this.core.view();
+    return {
+      gravity: vec3(view, this.scratch),
+      wind: vec3(view, this.scratch + 12),
+      airDensity: view.getFloat32(this.scratch + 24, true),
+    };
+  }
+
+  // Of each cloth, as they stand now.
+  clothParameters(): ClothParameters[] {
+    const count = this.core.exports.cs_cloth_count(this.handle);
+    return this.list(count, this.core.exports.cs_get_cloth_parameters, (view, at) => ({
+      structural: spring(view, at),
+      shear: spring(view, at + 8),
+      bend: spring(view, at + 16),
+      damping: view.getFloat32(at + 24, true),
+    }));
+  }
+
+  setEnvironment(change: { gravity?: Vec3; wind?: Vec3 }): void {
+    this.core.with([change.gravity, change.wind], (gravity, wind) =>
+      this.core.exports.cs_set_environment(this.handle, gravity!, wind!, 0),
+    );
+  }
+
+  // An empty name means every cloth.
+  setCloth(cloth: string, change: Partial<ClothParameters>): void {
+    const damping = change.damping === undefined ? undefined : [change.damping];
+    this.core.with([cloth, change.structural, change.shear, change.bend, damping], (name, structural, shear, bend, rate) =>
+      this.core.exports.cs_set_cloth(this.handle, name!, structural!, shear!, bend!, rate!),
+    );
+  }
+
+  setCollider(collider: string, change: { position?: Vec3; radius?: number }): void {
+    const radius = change.radius === undefined ? undefined : [change.radius];
+    this.core.with([collider, change.position, radius], (name, position, size) =>
+      this.core.exports.cs_set_collider(this.handle, name!, position!, size!),
+    );
+  }
+
+  listScenes(): void {
+    this.core.exports.cs_list_scenes(this.handle);
+  }
+
+  private list<Item>(
+    count: number,
+    get: (client: number, index: number, out: number) => number,
+    read: (view: DataView, at: number) => Item,
+  ): Item[] {
+    const items: Item[] = [];
+    for (let index = 0; index < count; ++index) {
+      if (get(this.handle, index, this.scratch) !== 0) items.push(read(this.core.view(), this.scratch));
+    }
+    return items;
+  }
+}
+
+function nowUs(): bigint {
+  return BigInt(Math.round(performance.now() * 1000));
+}
+
+function vec3(view: DataView, at: number): Vec3 {
+  return [view.getFloat32(at, true), view.getFloat32(at + 4, true), view.getFloat32(at + 8, true)];
+}
+
+function spring(view: DataView, at: number): Spring {
+  return [view.getFloat32(at, true), view.getFloat32(at + 4, true)];
+}

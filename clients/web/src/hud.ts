@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: MIT
+// What the page says: where it is connected, how the stream does, and what went wrong.
+
+import type { Client } from "./client";
+import type { SessionState } from "./session";
+
+const kNoticeMs = 6000;
+
+export function element<Type extends HTMLElement>(id: string): Type {
+  const found = document.getElementById(id);
+  if (!found) throw new Error(`The page has no element '${id}'`);
+  return found as Type;
+}
+
+export class Hud {
+  private readonly state = element("state");
+  private readonly banner = element("banner");
+  private readonly bannerText = element("banner-text");
+  private readonly retry = element<HTMLButtonElement>("retry");
+  private readonly notice = element("notice");
+  private readonly figures = new Map(
+    ["fps", "kbit", "bits", "round-trip", "dropped", "vertices"].map((name) => [name, element(`figure-${name}`)]),
+  );
+  private noticeTimer: number | undefined;
+
+  constructor(retry: () => void) {
+    this.retry.addEventListener("click", retry);
+  }
+
+  // To be called when the state changes and while it counts down.
+  showState(state: SessionState): void {
+    let label: string = state.kind;
+    let text = "";
+    if (state.kind === "reconnecting") {
+      const seconds = Math.max(0, Math.ceil((state.attemptAt - performance.now()) / 1000));
+      label = `reconnecting in ${seconds} s`;
+      text = `${state.reason} Trying again in ${seconds} s.`;
+    } else if (state.kind === "failed") {
+      text = state.reason;
+    }
+    write(this.state, label);
+    this.state.dataset["kind"] = state.kind;
+    write(this.bannerText, text);
+    this.banner.hidden = text === "";
+    write(this.retry, state.kind === "failed" ? "Join the default scene" : "Try now");
+  }
+
+  // Nothing more can be done on this page as it is.
+  showFatal(text: string): void {
+    write(this.state, "stopped");
+    this.state.dataset["kind"] = "failed";
+    write(this.bannerText, text);
+    this.banner.hidden = false;
+    this.retry.hidden = true;
+  }
+
+  showNotice(text: string): void {
+    write(this.notice, text);
+    this.notice.hidden = false;
+    window.clearTimeout(this.noticeTimer);
+    this.noticeTimer = window.setTimeout(() => (this.notice.hidden = true), kNoticeMs);
+  }
+
+  showScene(client: Client): void {
+    write(element("scene-name"), client.sceneName);
+    write(element("device"), client.deviceName);
+    document.title = `${client.sceneName} - ClothStream`;
+  }
+
+  showFigures(client: Client): void {
+    const statistics = client.statistics();
+    this.figure("fps", statistics.framesPerSecond.toFixed(0));
+    this.figure("kbit", statistics.kbitPerSecond.toFixed(0));
+    this.figure("bits", statistics.bitsPerVertex.toFixed(1));
+    this.figure("round-trip", `${statistics.roundTripMs.toFixed(1)} ms`);
+    this.figure("dropped", String(statistics.dropped));
+    this.figure("vertices", client.vertexCount.toLocaleString("en"));
+  }
+
+  private figure(name: string, value: string): void {
+    write(this.figures.get(name)!, value);
+  }
+}
+
+// Untouched text stays untouched, so that screen readers do not say it again.
+function write(target: HTMLElement, text: string): void {
+  if (target.textContent !== text) target.textContent = text;
+}

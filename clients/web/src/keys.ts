@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: MIT
+// The keyboard on the picture: arrows turn, plus and minus zoom, W A S D move the sphere, R resets the view.
+
+import type { Controls } from "./controls";
+import type { SphereDrag } from "./sphere_drag";
+import type { View } from "./view";
+
+const kZoomStep = 1.1;
+const kNudge = 0.03; // m
+
+export function listenToKeys(view: View, drag: SphereDrag, controls: Controls): void {
+  const actions: Record<string, () => void> = {
+    arrowleft: () => view.turn(-1, 0),
+    arrowright: () => view.turn(1, 0),
+    arrowup: () => view.turn(0, 1),
+    arrowdown: () => view.turn(0, -1),
+    "+": () => view.zoom(1 / kZoomStep),
+    "=": () => view.zoom(1 / kZoomStep),
+    "-": () => view.zoom(kZoomStep),
+    r: () => view.reset(),
+    w: () => drag.nudge(controls.sphere, 0, kNudge),
+    s: () => drag.nudge(controls.sphere, 0, -kNudge),
+    a: () => drag.nudge(controls.sphere, -kNudge, 0),
+    d: () => drag.nudge(controls.sphere, kNudge, 0),
+  };
+  view.canvas.addEventListener("keydown", (event) => {
+    const action = actions[event.key.toLowerCase()];
+    if (!action || event.ctrlKey || event.metaKey || event.altKey) return;
+    event.preventDefault();
+    action();
+  });
+}

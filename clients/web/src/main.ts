@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: MIT
+// Starts the page: core, view, session and panel, and the loop that draws.
+
+import { Controls } from "./controls";
+import { element, Hud } from "./hud";
+import { listenToKeys } from "./keys";
+import { expose } from "./probe";
+import { Session } from "./session";
+import { SphereDrag } from "./sphere_drag";
+import { View } from "./view";
+import { CoreModule } from "./wasm";
+
+const kFiguresPeriodMs = 250;
+
+async function start(): Promise<void> {
+  const hud = new Hud(() => {
+    if (session.state.kind === "failed") chooseScene("");
+    else session.reconnect();
+  });
+  let view: View;
+  try {
+    view = new View(element<HTMLCanvasElement>("canvas"));
+  } catch (error) {
+    hud.showFatal(
+      "This browser gives the page no WebGL 2, without which it cannot draw. " +
+        "Switch on hardware acceleration, or try another browser.",
+    );
+    console.error(error);
+    return;
+  }
+  const core = await CoreModule.load("clothstream_core.wasm").catch((error: unknown) => {
+    hud.showFatal(`The client core cannot be started: ${error instanceof Error ? error.message : String(error)}`);
+    throw error;
+  });
+
+  const controls = new Controls({ sceneChosen: chooseScene, viewReset: () => view.reset() });
+  const drag = new SphereDrag(view, (sphere) => (controls.sphere = sphere));
+  listenToKeys(view, drag, controls);
+
+  const address = new URL("stream", window.location.href);
+  address.protocol = address.protocol === "https:" ? "wss:" : "ws:";
+  address.search = "";
+  const scene = new URLSearchParams(window.location.search).get("scene") ?? "";
+  const session: Session = new Session(core, address.href, scene, {
+    stateChanged: () => hud.showState(session.state),
+    described: (client) => {
+      hud.showScene(client);
+      probe.described(client);
+      view.describe(client);
+      controls.describe(client);
+    },
+    parametersChanged: (client) => controls.show(client),
+    scenesListed: (scenes) => controls.listScenes(scenes, session.client?.sceneName ?? ""),
+    notice: (text) => hud.showNotice(text),
+    refused: (text) => hud.showNotice(text),
+  });
+  const probe = expose(session, view);
+
+  function chooseScene(name: string): void {
+    const url = new URL(window.location.href);
+    if (name) url.searchParams.set("scene", name);
+    else url.searchParams.delete("scene");
+    window.history.replaceState(null, "", url);
+    session.join(name);
+  }
+
+  let figuresAt = 0;
+  function draw(now: number): void {
+    const client = session.state.kind === "live" ? session.client : undefined;
+    if (client) {
+      controls.apply(client);
+      const target = drag.take();
+      if (target) client.setCollider(target.sphere, { position: target.position });
+      session.flush();
+    }
+    if (now - figuresAt >= kFiguresPeriodMs) {
+      figuresAt = now;
+      if (client) hud.showFigures(client);
+      hud.showState(session.state);
+    }
+    view.draw(session.client);
+    requestAnimationFrame(draw);
+  }
+  requestAnimationFrame(draw);
+}
+
+void start();

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: MIT
+// `window.clothstream`: lets tests and the curious look inside; it changes nothing.
+
+import type { Client, ClothLayout, SphereCollider, Statistics, Vec3 } from "./client";
+import type { Session, SessionState } from "./session";
+import type { View } from "./view";
+
+export interface Probe {
+  readonly state: SessionState["kind"];
+  // Undefined before the first connection; arrays are copies, 3 floats a vertex.
+  readonly statistics: Statistics | undefined;
+  readonly positions: Float32Array | undefined;
+  readonly restPositions: Float32Array | undefined;
+  readonly normals: Float32Array | undefined;
+  readonly cloths: ClothLayout[];
+  readonly colliders: SphereCollider[];
+  readonly canvas: HTMLCanvasElement;
+  // A point of the scene, in CSS pixels of the page.
+  project(point: Vec3): [number, number];
+  // Where the key light casts the point's shadow on the floor.
+  shadowOf(point: Vec3): Vec3;
+}
+
+declare global {
+  interface Window {
+    clothstream?: Probe;
+  }
+}
+
+// The result is to be told each description, before any frame.
+export function expose(session: Session, view: View): { described(client: Client): void } {
+  let restPositions: Float32Array | undefined;
+  window.clothstream = {
+    get state() {
+      return session.state.kind;
+    },
+    get statistics() {
+      return session.client?.statistics();
+    },
+    get positions() {
+      return session.client?.positions().slice();
+    },
+    get restPositions() {
+      return restPositions?.slice();
+    },
+    get normals() {
+      return session.client?.normals().slice();
+    },
+    get cloths() {
+      return session.client?.cloths() ?? [];
+    },
+    get colliders() {
+      return session.client?.colliders() ?? [];
+    },
+    canvas: view.canvas,
+    project: (point) => view.project(point),
+    shadowOf: (point) => view.shadowOf(point),
+  };
+  return { described: (client) => void (restPositions = client.positions().slice()) };
+}

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: MIT
+// The room in which cloths are shown: lights, shadow, floor, background; fitted to the size of what stands in it.
+
+import * as THREE from "three";
+import { aimSoftLight } from "./soft_shadow";
+
+const kBackground = 0x1b1c20;
+const kKeyDirection = new THREE.Vector3(0.85, 1.0, 0.6);
+
+export class Studio {
+  readonly scene = new THREE.Scene();
+  private readonly key = new THREE.DirectionalLight(0xfff1df, 3.6);
+  private readonly rim = new THREE.DirectionalLight(0xb4c4de, 0.7);
+  private readonly floor: THREE.Mesh<THREE.CircleGeometry, THREE.MeshStandardMaterial>;
+  private readonly fog = new THREE.Fog(kBackground);
+
+  constructor() {
+    this.scene.background = new THREE.Color(kBackground);
+    this.scene.fog = this.fog;
+    this.scene.add(new THREE.HemisphereLight(0xe9ecf2, 0x8a8078, 1.5));
+
+    this.scene.add(this.key, this.key.target, this.rim, this.rim.target);
+
+    const material = new THREE.MeshStandardMaterial({ color: 0x2c2d31, roughness: 0.95 });
+    this.floor = new THREE.Mesh(new THREE.CircleGeometry(1, 96), material);
+    this.floor.rotation.x = -Math.PI / 2;
+    this.floor.receiveShadow = true;
+    this.scene.add(this.floor);
+  }
+
+  // Height of the floor, metres.
+  get floorHeight(): number {
+    return this.floor.position.y;
+  }
+
+  // Unit vector towards the key light.
+  get lightDirection(): THREE.Vector3 {
+    return this.key.position.clone().sub(this.key.target.position).normalize();
+  }
+
+  fit(bounds: THREE.Box3): void {
+    const centre = bounds.getCenter(new THREE.Vector3());
+    const radius = bounds.getBoundingSphere(new THREE.Sphere()).radius;
+
+    // The floor is the plane y = 0 where that lies a little below everything, which is how scenes are made.
+    const below = bounds.min.y;
+    this.floor.position.y = below >= 0 && below < 2 * radius ? 0 : below - 0.2 * radius;
+    this.floor.scale.setScalar(14 * radius);
+    this.fog.near = 5 * radius;
+    this.fog.far = 13 * radius;
+
+    aimSoftLight(this.key, new THREE.Sphere(centre, radius), kKeyDirection);
+    this.rim.target.position.copy(centre);
+    this.rim.position.set(-0.8, 0.5, -0.7).normalize().multiplyScalar(4 * radius).add(centre);
+  }
+}

@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: MIT
+// What is seen: the newest frame's cloths and spheres in the studio, and the camera that turns round them.
+
+import * as THREE from "three";
+import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
+import type { Client, SphereCollider, Vec3 } from "./client";
+import { ClothMesh } from "./cloth_mesh";
+import { useSoftShadows } from "./soft_shadow";
+import { Studio } from "./studio";
+
+const kFieldOfView = 32; // degrees, vertical
+const kViewDirection = new THREE.Vector3(0.42, 0.16, 1).normalize();
+const kMargin = 1.0;
+const kTurnStep = Math.PI / 36;
+
+export class View {
+  readonly camera = new THREE.PerspectiveCamera(kFieldOfView);
+  readonly orbit: OrbitControls;
+  readonly spheres: THREE.Mesh<THREE.SphereGeometry, THREE.MeshStandardMaterial>[] = [];
+  private readonly renderer: THREE.WebGLRenderer;
+  private readonly studio = new Studio();
+  private readonly sphereGeometry = new THREE.SphereGeometry(1, 64, 48);
+  private readonly bounds = new THREE.Box3(new THREE.Vector3(-1, 0, -1), new THREE.Vector3(1, 2, 1));
+  private cloths: ClothMesh[] = [];
+
+  // Throws where WebGL is not to be had.
+  constructor(readonly canvas: HTMLCanvasElement) {
+    useSoftShadows();
+    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, powerPreference: "high-performance" });
+    this.renderer.shadowMap.enabled = true;
+    this.renderer.shadowMap.type = THREE.PCFShadowMap;
+    this.renderer.toneMapping = THREE.AgXToneMapping;
+    this.renderer.toneMappingExposure = 1.15;
+    this.orbit = new OrbitControls(this.camera, canvas);
+    this.orbit.enableDamping = true;
+    this.orbit.dampingFactor = 0.12;
+    this.studio.fit(this.bounds);
+    this.reset();
+    new ResizeObserver(() => this.resize()).observe(canvas);
+    this.resize();
+  }
+
+  // Takes the topology and the rest state of a new description, and frames them.
+  describe(client: Client): void {
+    for (const cloth of this.cloths) {
+      this.studio.scene.remove(cloth.mesh);
+      cloth.dispose();
+    }
+    const rest = client.positions();
+    const triangles = client.triangles();
+    this.cloths = client.cloths().map((layout, number) => new ClothMesh(layout, rest, triangles, number));
+    for (const cloth of this.cloths) this.studio.scene.add(cloth.mesh);
+
+    this.bounds.makeEmpty();
+    for (let i = 0; i < rest.length; i += 3) this.bounds.expandByPoint(new THREE.Vector3().fromArray(rest, i));
+    for (const { position, radius } of client.colliders()) {
+      const centre = new THREE.Vector3(...position);
+      this.bounds.expandByPoint(centre.clone().subScalar(radius)).expandByPoint(centre.addScalar(radius));
+    }
+    this.studio.fit(this.bounds);
+    this.reset();
+  }
+
+  // Draws the newest frame. The core's memory is read before this returns.
+  draw(client: Client | undefined): void {
+    if (client && this.cloths.length > 0) {
+      const positions = client.positions();
+      const normals = client.normals();
+      for (const cloth of this.cloths) cloth.update(positions, normals);
+      this.placeSpheres(client.colliders());
+    }
+    this.orbit.update();
+    this.renderer.render(this.studio.scene, this.camera);
+  }
+
+  // The default view: everything in the frame, whatever the canvas's shape.
+  reset(): void {
+    const centre = this.bounds.getCenter(new THREE.Vector3());
+    this.camera.position.copy(centre).add(kViewDirection);
+    this.camera.lookAt(centre);
+    this.camera.updateMatrixWorld();
+    const right = new THREE.Vector3().setFromMatrixColumn(this.camera.matrixWorld, 0);
+    const up = new THREE.Vector3().setFromMatrixColumn(this.camera.matrixWorld, 1);
+    const halfHeight = Math.tan(THREE.MathUtils.degToRad(kFieldOfView / 2)) / kMargin;
+    const halfWidth = halfHeight * this.camera.aspect;
+    let distance = 0;
+    for (let corner = 0; corner < 8; ++corner) {
+      const offset = new THREE.Vector3(
+        corner & 1 ? this.bounds.max.x : this.bounds.min.x,
+        corner & 2 ? this.bounds.max.y : this.bounds.min.y,
+        corner & 4 ? this.bounds.max.z : this.bounds.min.z,
+      ).sub(centre);
+      const spread = Math.max(Math.abs(offset.dot(right)) / halfWidth, Math.abs(offset.dot(up)) / halfHeight);
+      distance = Math.max(distance, spread + offset.dot(kViewDirection));
+    }
+    const size = this.bounds.getSize(new THREE.Vector3()).length();
+    this.camera.position.copy(centre).addScaledVector(kViewDirection, distance);
+    this.camera.near = 0.01 * size;
+    this.camera.far = 40 * size;
+    this.camera.updateProjectionMatrix();
+    this.orbit.target.copy(centre);
+    this.orbit.minDistance = 0.1 * size;
+    this.orbit.maxDistance = 6 * size;
+    this.orbit.update();
+  }
+
+  // Steps to the left and up, for keys.
+  turn(left: number, up: number): void {
+    const offset = this.camera.position.clone().sub(this.orbit.target);
+    const spherical = new THREE.Spherical().setFromVector3(offset);
+    spherical.theta -= left * kTurnStep;
+    spherical.phi -= up * kTurnStep;
+    this.camera.position.setFromSpherical(spherical.makeSafe()).add(this.orbit.target);
+  }
+
+  zoom(factor: number): void {
+    this.camera.position.sub(this.orbit.target).multiplyScalar(factor).add(this.orbit.target);
+  }
+
+  // Vector in the camera-facing plane, metres.
+  inViewPlane(right: number, up: number): THREE.Vector3 {
+    return new THREE.Vector3(right, up, 0).applyQuaternion(this.camera.quaternion);
+  }
+
+  // Where a point is on the canvas, in CSS pixels of the page.
+  project(point: Vec3): [number, number] {
+    const projected = new THREE.Vector3(...point).project(this.camera);
+    const frame = this.canvas.getBoundingClientRect();
+    return [
+      frame.left + ((projected.x + 1) / 2) * frame.width,
+      frame.top + ((1 - projected.y) / 2) * frame.height,
+    ];
+  }
+
+  // Where the key light casts a point's shadow on the floor.
+  shadowOf(point: Vec3): Vec3 {
+    const light = this.studio.lightDirection;
+    const reach = (point[1] - this.studio.floorHeight) / light.y;
+    return [point[0] - reach * light.x, this.studio.floorHeight, point[2] - reach * light.z];
+  }
+
+  private placeSpheres(colliders: SphereCollider[]): void {
+    while (this.spheres.length > colliders.length) this.studio.scene.remove(this.spheres.pop()!);
+    while (this.spheres.length < colliders.length) {
+      const material = new THREE.MeshStandardMaterial({ color: 0xd9d4c8, roughness: 0.35 });
+      const sphere = new THREE.Mesh(this.sphereGeometry, material);
+      sphere.castShadow = sphere.receiveShadow = true;
+      this.spheres.push(sphere);
+      this.studio.scene.add(sphere);
+    }
+    colliders.forEach((collider, index) => {
+      const sphere = this.spheres[index]!;
+      sphere.name = collider.participantId === 0n ? collider.name : "";
+      sphere.position.set(...collider.position);
+      // Slightly smaller than it is: the cloth's triangles cut corners between the nodes that rest on it.
+      sphere.scale.setScalar(0.985 * collider.radius);
+    });
+  }
+
+  private resize(): void {
+    const { clientWidth, clientHeight } = this.canvas;
+    if (clientWidth === 0 || clientHeight === 0) return;
+    const ratio = Math.min(window.devicePixelRatio, 2);
+    this.renderer.setPixelRatio(ratio);
+    this.renderer.setSize(clientWidth, clientHeight, false);
+    this.camera.aspect = clientWidth / clientHeight;
+    this.camera.updateProjectionMatrix();
+  }
+}

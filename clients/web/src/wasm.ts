@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: MIT
+// The client core as a WebAssembly module: loading it, and reading and writing its memory.
+
+type Pointer = number;
+
+// The C interface of clients/core/core.h, as WebAssembly types: size_t and pointers are numbers, uint64_t are bigints.
+export interface CoreExports {
+  memory: WebAssembly.Memory;
+  _initialize(): void;
+  malloc(bytes: number): Pointer;
+  free(pointer: Pointer): void;
+  cs_create(scene: Pointer, clientName: Pointer): Pointer;
+  cs_destroy(client: Pointer): void;
+  cs_receive(client: Pointer, message: Pointer, bytes: number, nowUs: bigint): number;
+  cs_update(client: Pointer, nowUs: bigint): void;
+  cs_next_outgoing(client: Pointer, bytes: Pointer): Pointer;
+  cs_get_state(client: Pointer): number;
+  cs_error_text(client: Pointer): Pointer;
+  cs_notice_text(client: Pointer): Pointer;
+  cs_get_statistics(client: Pointer, nowUs: bigint, out: Pointer): void;
+  cs_device_name(client: Pointer): Pointer;
+  cs_scene_name(client: Pointer): Pointer;
+  cs_vertex_count(client: Pointer): number;
+  cs_positions(client: Pointer): Pointer;
+  cs_normals(client: Pointer): Pointer;
+  cs_triangles(client: Pointer, indexCount: Pointer): Pointer;
+  cs_cloth_count(client: Pointer): number;
+  cs_get_cloth(client: Pointer, index: number, out: Pointer): number;
+  cs_collider_count(client: Pointer): number;
+  cs_get_collider(client: Pointer, index: number, out: Pointer): number;
+  cs_get_environment(client: Pointer, out: Pointer): number;
+  cs_get_cloth_parameters(client: Pointer, index: number, out: Pointer): number;
+  cs_set_environment(client: Pointer, gravity3: Pointer, wind3: Pointer, airDensity: Pointer): void;
+  cs_set_cloth(client: Pointer, cloth: Pointer, structural2: Pointer, shear2: Pointer, bend2: Pointer, damping: Pointer): void;
+  cs_set_collider(client: Pointer, collider: Pointer, position3: Pointer, radius: Pointer): void;
+  cs_list_scenes(client: Pointer): void;
+  cs_scene_count(client: Pointer): number;
+  cs_scene(client: Pointer, index: number): Pointer;
+}
+
+const kNull: Pointer = 0;
+const kWasiSuccess = 0;
+const kWasiBadFile = 8;
+
+// Memory may grow in any call, which detaches every view: views are made anew for each access.
+export class CoreModule {
+  private readonly decoder = new TextDecoder();
+  private readonly encoder = new TextEncoder();
+
+  private constructor(readonly exports: CoreExports) {}
+
+  static async load(url: string): Promise<CoreModule> {
+    const response = await fetch(url);
+    if (!response.ok) throw new Error(`${url} could not be loaded: ${response.status} ${response.statusText}`);
+    const module = await WebAssembly.compile(await response.arrayBuffer());
+    let memory: WebAssembly.Memory | undefined;
+    const instance = await WebAssembly.instantiate(module, { wasi_snapshot_preview1: wasi(() => memory!) });
+    const exports = instance.exports as unknown as CoreExports;
+    memory = exports.memory;
+    exports._initialize();
+    return new CoreModule(exports);
+  }
+
+  view(): DataView {
+    return new DataView(this.exports.memory.buffer);
+  }
+
+  bytes(pointer: Pointer, count: number): Uint8Array<ArrayBuffer> {
+    return new Uint8Array(this.exports.memory.buffer, pointer, count);
+  }
+
+  floats(pointer: Pointer, count: number): Float32Array {
+    return new Float32Array(this.exports.memory.buffer, pointer, count);
+  }
+
+  indices(pointer: Pointer, count: number): Uint32Array {
+    return new Uint32Array(this.exports.memory.buffer, pointer, count);
+  }
+
+  // A zero-terminated string; "" for a null pointer.
+  text(pointer: Pointer): string {
+    if (pointer === kNull) return "";
+    const memory = new Uint8Array(this.exports.memory.buffer, pointer);
+    return this.decoder.decode(memory.subarray(0, memory.indexOf(0)));
+  }
+
+  allocate(bytes: number): Pointer {
+    const pointer = this.exports.malloc(bytes);
+    if (pointer === kNull) throw new Error(`The client core has no memory left for ${bytes} bytes`);
+    return pointer;
+  }
+
+  // Calls `use` with pointers to copies of the values, null for undefined ones; they are freed when it returns.
+  with<Result>(values: (string | readonly number[] | undefined)[], use: (...pointers: Pointer[]) => Result): Result {
+    const pointers = values.map((value) => {
+      if (value === undefined) return kNull;
+      if (typeof value === "string") {
+        const text = this.encoder.encode(value + "\0");
+        const pointer = this.allocate(text.length);
+        this.bytes(pointer, text.length).set(text);
+        return pointer;
+      }
+      const pointer = this.allocate(4 * value.length);
+      this.floats(pointer, value.length).set(value);
+      return pointer;
+    });
+    try {
+      return use(...pointers);
+    } finally {
+      for (const pointer of pointers) this.exports.free(pointer);
+    }
+  }
+}
+
+// The few system calls that the C library links in. The core does no input or output: there are no files, no
+// environment and no arguments; what it prints (only a failed assertion does) goes to the console.
+function wasi(memory: () => WebAssembly.Memory): WebAssembly.ModuleImports {
+  const store = (pointer: Pointer, value: number) => new DataView(memory().buffer).setUint32(pointer, value, true);
+  const none = (count: Pointer, bytes: Pointer) => {
+    store(count, 0);
+    store(bytes, 0);
+    return kWasiSuccess;
+  };
+  return {
+    args_sizes_get: none,
+    args_get: () => kWasiSuccess,
+    environ_sizes_get: none,
+    environ_get: () => kWasiSuccess,
+    clock_time_get: (_clock: number, _precision: bigint, out: Pointer) => {
+      new DataView(memory().buffer).setBigUint64(out, BigInt(Math.round(performance.now() * 1e6)), true);
+      return kWasiSuccess;
+    },
+    random_get: (pointer: Pointer, count: number) => {
+      crypto.getRandomValues(new Uint8Array(memory().buffer, pointer, count));
+      return kWasiSuccess;
+    },
+    fd_close: () => kWasiBadFile,
+    fd_read: () => kWasiBadFile,
+    fd_seek: () => kWasiBadFile,
+    fd_fdstat_get: () => kWasiBadFile,
+    fd_fdstat_set_flags: () => kWasiBadFile,
+    fd_prestat_get: () => kWasiBadFile,
+    fd_prestat_dir_name: () => kWasiBadFile,
+    fd_write: (_file: number, vectors: Pointer, count: number, written: Pointer) => {
+      const view = new DataView(memory().buffer);
+      let total = 0;
+      for (let i = 0; i < count; ++i) {
+        const start = view.getUint32(vectors + 8 * i, true);
+        const length = view.getUint32(vectors + 8 * i + 4, true);
+        console.error(new TextDecoder().decode(new Uint8Array(memory().buffer, start, length)));
+        total += length;
+      }
+      store(written, total);
+      return kWasiSuccess;
+    },
+    proc_exit: (code: number) => {
+      throw new Error(`The client core ended with code ${code}`);
+    },
+    sched_yield: () => kWasiSuccess,
+  };
+}
