@@ -2,8 +2,7 @@
 # unless it is there. Build directories share it, so only one installs at a time.
 set(room ${CMAKE_CURRENT_LIST_DIR})
 set(packages ${room}/node_modules/.package-lock.json) # npm writes it last of all
-file(MAKE_DIRECTORY ${room}/node_modules)
-file(LOCK ${room}/package-lock.json TIMEOUT 600)
+file(LOCK ${room}/../../.cache/npm DIRECTORY TIMEOUT 600)
 if(EXISTS ${packages} AND NOT ${room}/package-lock.json IS_NEWER_THAN ${packages})
   return()
 endif()
