@@ -1,0 +1,55 @@
+# clothstream_core_wasm: the client core as WebAssembly, built from the native core's sources with Debian's clang for
+# wasm32. The global property CLOTHSTREAM_CORE_WASM holds the module's path. It imports nothing and exports its memory,
+# _initialize, malloc, free and the functions of clients/core/core.h.
+find_program(WASM_CC NAMES clang clang-14 REQUIRED)
+find_program(WASM_CXX NAMES clang++ clang++-14 REQUIRED)
+find_program(WASM_LD NAMES wasm-ld wasm-ld-14 REQUIRED)
+
+set(wasmOut ${PROJECT_BINARY_DIR}/web-wasm)
+# Debian has no zstd for wasm32; this npm package carries zstd's own sources.
+set(wasmZstd ${PROJECT_SOURCE_DIR}/clients/web/node_modules/zstd-napi/deps/zstd/lib)
+set(wasmFlags --target=wasm32-wasi -O3 -DNDEBUG -ffp-contract=off -fvisibility=hidden)
+set(wasmCFlags ${wasmFlags} -DZSTD_DISABLE_ASM -DZSTD_LEGACY_SUPPORT=0 -DDEBUGLEVEL=0)
+set(wasmCxxFlags ${wasmFlags} -std=c++20 -fno-rtti -fno-exceptions -Wall -Wextra -Wconversion -Wshadow -Werror
+  -I${PROJECT_SOURCE_DIR} -isystem ${wasmZstd})
+
+# Appends the object of `source` to wasmObjects. Further arguments: the compiler and its flags.
+function(clothstream_wasm_object source)
+  get_filename_component(name ${source} NAME)
+  set(object ${wasmOut}/${name}.o)
+  add_custom_command(OUTPUT ${object}
+    COMMAND ${CMAKE_COMMAND} -E make_directory ${wasmOut}
+    COMMAND ${CMAKE_CXX_COMPILER_LAUNCHER} ${ARGN} -MMD -MF ${object}.d -c -o ${object} ${source}
+    DEPENDS clothstream_npm DEPFILE ${object}.d COMMENT "Compiling ${name} to WebAssembly" VERBATIM)
+  set(wasmObjects ${wasmObjects} ${object} PARENT_SCOPE)
+endfunction()
+
+set(wasmObjects)
+get_property(decoderSources GLOBAL PROPERTY CLOTHSTREAM_DECODER_SOURCES)
+foreach(source IN LISTS CLOTHSTREAM_CLIENT_CORE_SOURCES decoderSources ITEMS
+    ${PROJECT_SOURCE_DIR}/clients/core/wasm/exceptions.cpp)
+  clothstream_wasm_object(${source} ${WASM_CXX} ${wasmCxxFlags})
+endforeach()
+foreach(source common/debug common/entropy_common common/error_private common/fse_decompress common/xxhash
+    common/zstd_common decompress/huf_decompress decompress/zstd_ddict decompress/zstd_decompress
+    decompress/zstd_decompress_block)
+  clothstream_wasm_object(${wasmZstd}/${source}.c ${WASM_CC} ${wasmCFlags})
+endforeach()
+
+# All functions that core.h declares, but the one that takes a function of the caller's.
+set(coreHeader ${PROJECT_SOURCE_DIR}/clients/core/core.h)
+set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${coreHeader})
+file(READ ${coreHeader} coreText)
+string(REGEX MATCHALL "cs_[a-z_]+\\(" wasmExports "${coreText}")
+list(TRANSFORM wasmExports REPLACE "\\($" "")
+list(REMOVE_ITEM wasmExports cs_set_clock)
+list(APPEND wasmExports malloc free)
+list(TRANSFORM wasmExports PREPEND -Wl,--export=)
+
+set(wasmModule ${wasmOut}/clothstream_core.wasm)
+add_custom_command(OUTPUT ${wasmModule}
+  COMMAND ${WASM_CXX} --target=wasm32-wasi -mexec-model=reactor -O3 -Wl,--strip-all -Wl,--gc-sections
+    -Wl,-z,stack-size=262144 ${wasmExports} -o ${wasmModule} ${wasmObjects}
+  DEPENDS ${wasmObjects} COMMENT "Linking the client core as WebAssembly" VERBATIM)
+add_custom_target(clothstream_core_wasm ALL DEPENDS ${wasmModule})
+set_property(GLOBAL PROPERTY CLOTHSTREAM_CORE_WASM ${wasmModule})
