@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: MIT
+// Copies texels, as the simulation reads and writes its state: the floor of its speed.
+#version 450
+
+layout(local_size_x_id = 0) in;
+
+layout(binding = 0) uniform samplerBuffer source;
+layout(std430, binding = 1) writeonly buffer Target { vec4 target[]; };
+
+void main() {
+  uint i = gl_GlobalInvocationID.x;
+  if (i >= target.length()) {
+    return;
+  }
+  target[i] = texelFetch(source, int(i));
+}

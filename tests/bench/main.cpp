@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: MIT
+// clothstream-bench: measures what ClothStream does on the Vulkan device of this machine.
+#include <array>
+#include <cstdio>
+#include <exception>
+#include <map>
+#include <thread>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+
+#include "tests/bench/suite.h"
+
+namespace {
+
+using namespace clothstream;
+
+constexpr std::array kSuites{
+    bench::Suite{"mass_spring", "node-steps a second over grid sizes, 32x32 up to the device's memory",
+                 &bench::runMassSpring},
+    bench::Suite{"curtain", "a tick of a 64x64 curtain in wind with a sphere, ten substeps",
+                 &bench::runCurtain},
+};
+
+void printTable(const bench::Rows& rows) {
+  for (const auto& row : rows) {
+    std::string line;
+    for (const auto& [key, value] : row.items()) {
+      if (key == "device") continue;
+      if (!line.empty()) line += "  ";
+      if (value.is_number_float())
+        line += fmt::format("{} {:.4g}", key, value.get<double>());
+      else
+        line += fmt::format("{} {}", key, value.is_string() ? value.get<std::string>() : value.dump());
+    }
+    fmt::print("{}\n", line);
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app{"Measures what ClothStream does on the Vulkan device of this machine."};
+  std::map<std::string, const bench::Suite*> suites;
+  std::string list;
+  for (const bench::Suite& suite : kSuites) {
+    suites[suite.name] = &suite;
+    list += fmt::format("\n  {}: {}", suite.name, suite.description);
+  }
+  std::string name;
+  bench::Settings settings;
+  bool json = false;
+  std::uint32_t size = 0, softwareThreads = 0;
+  app.add_option("suite", name, "Which suite to run:" + list)->required()->check(CLI::IsMember(suites));
+  CLI::Option* sizeOption =
+      app.add_option("--size", size, "Rows and columns of the grid, instead of a ladder")
+          ->check(CLI::Range(2, 65536));
+  app.add_flag("--json", json, "Print one JSON array of rows");
+  app.add_option("--device", settings.device.select, "Index or part of the name of the Vulkan device");
+  CLI::Option* threadsOption = app.add_option("--software-threads", softwareThreads,
+                                              "Threads of a software device (0: none but the caller's)");
+  app.add_option("--seconds", settings.seconds, "Time to measure, a row")->check(CLI::PositiveNumber);
+  app.add_option("--rows", settings.rowsPerInvocation, "Rows an invocation walks down (0: the default)");
+  app.add_option("--workgroup", settings.workgroupSize, "Invocations in a workgroup (0: the default)");
+  CLI11_PARSE(app, argc, argv);
+  if (*sizeOption) settings.size = size;
+  if (*threadsOption) settings.device.softwareThreads = softwareThreads;
+
+  try {
+    vulkan::Device device(settings.device);
+    if (!json)
+      fmt::print("{}, {}, Vulkan {}, {} CPU threads\n", device.info().name, device.info().driver,
+                 device.info().apiVersion, std::thread::hardware_concurrency());
+    const bench::Rows rows = suites.at(name)->run(device, settings);
+    if (json)
+      fmt::print("{}\n", nlohmann::ordered_json(rows).dump(2));
+    else
+      printTable(rows);
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "clothstream-bench: {}: {}\n", name, error.what());
+    return 1;
+  }
+  return 0;
+}

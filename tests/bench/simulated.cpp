@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: MIT
+// A scene on the device that is timed tick by tick, and checked against the reference first.
+#include "tests/bench/simulated.h"
+
+#include <algorithm>
+#include <random>
+#include <stdexcept>
+
+#include <fmt/format.h>
+
+#include "server/reference/reference_simulation.h"
+
+namespace clothstream::bench {
+namespace {
+
+// Every free node off its place by up to a fifth of the nodes' distance, and moving: no spring is idle.
+simulation::NodeState displacedState(const scene::Scene& scene) {
+  simulation::NodeState state = simulation::restState(scene.cloths);
+  const std::vector<float> masses = simulation::inverseMasses(scene.cloths);
+  const float reach = 0.2f * scene::spacing(scene.cloths.front().grid).column;
+  std::mt19937 random(1);
+  std::uniform_real_distribution<float> unit(-1, 1);
+  for (std::size_t i = 0; i < masses.size(); ++i) {
+    if (masses[i] == 0) continue;
+    state.positions[i] += reach * scene::Vec3(unit(random), unit(random), unit(random));
+    state.velocities[i] = 0.1f * scene::Vec3(unit(random), unit(random), unit(random));
+  }
+  return state;
+}
+
+}  // namespace
+
+Simulated::Simulated(vulkan::Device& device, const scene::Scene& scene,
+                     const simulation::SimulationOptions& options)
+    : device_(device), scene_(scene), recorder_(device), simulation_(device, scene, options) {}
+
+double Simulated::check(const simulation::TickInputs& inputs) {
+  const simulation::NodeState start = displacedState(scene_);
+  runOn(device_, recorder_, [&] { simulation_.recordRestoreState(recorder_, simulation::pack(start, 0)); });
+  tick(inputs);
+  runOn(device_, recorder_, [&] { simulation_.recordSaveState(recorder_); });
+  const simulation::NodeState state = simulation::unpack(simulation_.collectState(1));
+
+  reference::ReferenceSimulation reference(scene_);
+  reference::TickInputs referenceInputs{inputs.environment, {}};
+  for (const simulation::MovingSphere& s : inputs.spheres)
+    referenceInputs.spheres.push_back(
+        {s.start.cast<double>(), s.end.cast<double>(), double{s.radius}, double{s.friction}});
+  std::size_t node = 0;
+  for (reference::ReferenceCloth& cloth : reference.cloths())
+    for (std::uint32_t i = 0; i < cloth.nodeCount(); ++i, ++node) {
+      cloth.positions()[i] = start.positions[node].cast<double>();
+      cloth.velocities()[i] = start.velocities[node].cast<double>();
+    }
+  const double seconds = secondsOf([&] { reference.tick(referenceInputs); });
+
+  // A tick moves a position by sums of rounded terms; each substep rounds it once, to 2^-24 of the cloth's
+  // extent, and twelve spring forces carry the rounding of their ends on. An eighth of a thousandth of the
+  // nodes' distance is far above that and far below what any missing term does.
+  const scene::Grid& grid = scene_.cloths.front().grid;
+  const double extent = std::max(double{grid.width}, double{grid.height});
+  const double tolerance = scene_.substeps * 20 * extent / (1 << 24) + scene::spacing(grid).column / 8000.0;
+  node = 0;
+  for (const reference::ReferenceCloth& cloth : reference.cloths())
+    for (const reference::Vec3& expected : cloth.positions()) {
+      const double distance = (state.positions[node].cast<double>() - expected).norm();
+      if (!(distance <= tolerance))
+        throw std::runtime_error(fmt::format(
+            "node {} is {} m from where the reference has it, {} m are allowed", node, distance, tolerance));
+      ++node;
+    }
+  return seconds;
+}
+
+void Simulated::tick(const simulation::TickInputs& inputs) {
+  wall_.add(
+      secondsOf([&] { runOn(device_, recorder_, [&] { simulation_.recordTick(recorder_, inputs); }); }));
+  for (const vulkan::StageTime& time : recorder_.stageTimes())
+    if (time.stage == "advance") advance_.add(time.seconds);
+  if (!simulation_.status().healthy) throw std::runtime_error("the state is not finite any more");
+}
+
+}  // namespace clothstream::bench

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: MIT
+// A scene on the device that is timed tick by tick, and checked against the reference first.
+#pragma once
+
+#include <string>
+
+#include "server/scene/scene.h"
+#include "server/simulation/cloth_simulation.h"
+#include "server/vulkan/device.h"
+#include "server/vulkan/recorder.h"
+#include "tests/bench/samples.h"
+
+namespace clothstream::bench {
+
+class Simulated {
+ public:
+  Simulated(vulkan::Device& device, const scene::Scene& scene, const simulation::SimulationOptions& options);
+
+  // Two substeps from a displaced state on the device and in the reference; throws std::runtime_error where
+  // they differ by more than float rounding explains. Leaves the state it reached. Returns the reference's
+  // seconds.
+  double check(const simulation::TickInputs& inputs);
+
+  // Records, submits and waits for one tick; throws std::runtime_error if its state is not healthy.
+  void tick(const simulation::TickInputs& inputs);
+
+  // Of a tick: all of it on the wall clock, and its advance stage by the device's clock. s.
+  const Samples& wall() const { return wall_; }
+  const Samples& advance() const { return advance_; }
+  void forgetTimes() { wall_ = advance_ = {}; }
+
+ private:
+  vulkan::Device& device_;
+  scene::Scene scene_;
+  vulkan::Recorder recorder_;
+  simulation::ClothSimulation simulation_;
+  Samples wall_, advance_;
+};
+
+// Records with `record`, submits, waits.
+void runOn(vulkan::Device& device, vulkan::Recorder& recorder, const auto& record) {
+  recorder.begin();
+  record();
+  device.wait(device.submit(recorder));
+}
+
+}  // namespace clothstream::bench

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: MIT
+// What a benchmark suite is given, and what it gives back.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "server/vulkan/device.h"
+
+namespace clothstream::bench {
+
+struct Settings {
+  vulkan::DeviceOptions device;
+  std::optional<std::uint32_t> size;    // one grid size instead of a ladder
+  double seconds = 1;                   // of measuring, a row
+  std::uint32_t rowsPerInvocation = 0;  // 0: as the simulation chooses
+  std::uint32_t workgroupSize = 0;
+};
+
+// One JSON object a row; every row names its suite. A suite checks its results before it reports a time, and
+// throws std::runtime_error when they are wrong.
+using Rows = std::vector<nlohmann::ordered_json>;
+
+struct Suite {
+  const char* name;
+  const char* description;
+  Rows (*run)(vulkan::Device& device, const Settings& settings);
+};
+
+Rows runMassSpring(vulkan::Device& device, const Settings& settings);
+Rows runCurtain(vulkan::Device& device, const Settings& settings);
+
+}  // namespace clothstream::bench

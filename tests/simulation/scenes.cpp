@@ -1,0 +1,143 @@
+// SPDX-License-Identifier: MIT
+// Scenes and states that the tests of the simulation share, and a way to run them.
+#include "tests/simulation/scenes.h"
+
+#include <algorithm>
+
+namespace clothstream::tests {
+
+scene::Cloth calmCloth(std::uint32_t rows, std::uint32_t columns) {
+  scene::Cloth cloth;
+  cloth.name = "cloth";
+  cloth.grid = {.rows = rows,
+                .columns = columns,
+                .width = 0.02f * static_cast<float>(columns - 1),
+                .height = 0.02f * static_cast<float>(rows - 1),
+                .pose = {}};
+  cloth.mass = 0.01f * static_cast<float>(rows * columns);
+  cloth.structural = {200, 0.2f};
+  cloth.shear = {100, 0.1f};
+  cloth.bend = {20, 0.05f};
+  cloth.damping = 0.5f;
+  return cloth;
+}
+
+scene::GridRange topRow(const scene::Cloth& cloth) {
+  return {.firstRow = 0,
+          .lastRow = 0,
+          .rowStep = 1,
+          .firstColumn = 0,
+          .lastColumn = cloth.grid.columns - 1,
+          .columnStep = 1};
+}
+
+scene::Scene sceneOf(std::vector<scene::Cloth> cloths) {
+  scene::Scene scene;
+  scene.cloths = std::move(cloths);
+  return scene;
+}
+
+simulation::NodeState randomState(const scene::Scene& scene, std::mt19937& random, float displacement,
+                                  float speed) {
+  simulation::NodeState state = simulation::restState(scene.cloths);
+  const std::vector<float> masses = simulation::inverseMasses(scene.cloths);
+  std::uniform_real_distribution<float> unit(-1, 1);
+  const auto vector = [&] { return scene::Vec3(unit(random), unit(random), unit(random)); };
+  for (std::size_t i = 0; i < masses.size(); ++i) {
+    if (masses[i] == 0) continue;
+    state.positions[i] += displacement * vector();
+    state.velocities[i] = speed * vector();
+  }
+  return state;
+}
+
+simulation::TickInputs inputsOf(const scene::Scene& scene, std::vector<simulation::MovingSphere> spheres) {
+  return {scene.environment, std::move(spheres)};
+}
+
+reference::TickInputs referenceInputs(const simulation::TickInputs& inputs) {
+  reference::TickInputs result{inputs.environment, {}};
+  for (const simulation::MovingSphere& sphere : inputs.spheres)
+    result.spheres.push_back({sphere.start.cast<double>(), sphere.end.cast<double>(), double{sphere.radius},
+                              double{sphere.friction}});
+  return result;
+}
+
+void setState(reference::ReferenceSimulation& reference, const simulation::NodeState& state) {
+  std::size_t node = 0;
+  for (reference::ReferenceCloth& cloth : reference.cloths())
+    for (std::uint32_t i = 0; i < cloth.nodeCount(); ++i, ++node) {
+      cloth.positions()[i] = state.positions[node].cast<double>();
+      cloth.velocities()[i] = state.velocities[node].cast<double>();
+    }
+}
+
+double largestDistance(const simulation::NodeState& state, const reference::ReferenceSimulation& reference) {
+  double largest = 0;
+  std::size_t node = 0;
+  for (const reference::ReferenceCloth& cloth : reference.cloths())
+    for (const reference::Vec3& position : cloth.positions())
+      largest = std::max(largest, (state.positions[node++].cast<double>() - position).norm());
+  return largest;
+}
+
+double largestSpeedDifference(const simulation::NodeState& state,
+                              const reference::ReferenceSimulation& reference) {
+  double largest = 0;
+  std::size_t node = 0;
+  for (const reference::ReferenceCloth& cloth : reference.cloths())
+    for (const reference::Vec3& velocity : cloth.velocities())
+      largest = std::max(largest, (state.velocities[node++].cast<double>() - velocity).norm());
+  return largest;
+}
+
+Running::Running(const scene::Scene& scene, simulation::SimulationOptions options, vulkan::Device& device)
+    : device_(device), recorder_(device), simulation_(device, scene, options) {}
+
+template <typename Record>
+void Running::run(const Record& record) {
+  recorder_.begin();
+  record();
+  submitAndWait(device_, recorder_);
+}
+
+simulation::TickStatus Running::tick(const simulation::TickInputs& inputs) {
+  run([&] { simulation_.recordTick(recorder_, inputs); });
+  return simulation_.status();
+}
+
+void Running::restore(const simulation::NodeState& state) {
+  restore(simulation::pack(state, 0));
+}
+
+void Running::restore(const simulation::StateSnapshot& snapshot) {
+  run([&] { simulation_.recordRestoreState(recorder_, snapshot); });
+}
+
+simulation::StateSnapshot Running::save() {
+  run([&] { simulation_.recordSaveState(recorder_); });
+  return simulation_.collectState(0);
+}
+
+std::vector<scene::Vec3> Running::normals() {
+  const std::size_t bytes = simulation_.normals().bytes();
+  const vulkan::Buffer readback(device_, vulkan::BufferPurpose::readback, bytes);
+  run([&] {
+    simulation_.recordNormals(recorder_);
+    recorder_.barrier();
+    recorder_.copy(simulation_.normals(), readback, bytes);
+  });
+  std::vector<scene::Vec3> normals;
+  for (const shared::vec4& n : readback.mapped<const shared::vec4>()) normals.emplace_back(n.x, n.y, n.z);
+  return normals;
+}
+
+void Running::checkpoint() {
+  run([&] { simulation_.recordCheckpoint(recorder_); });
+}
+
+void Running::rollback() {
+  run([&] { simulation_.recordRollback(recorder_); });
+}
+
+}  // namespace clothstream::tests

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: MIT
+// Scenes and states that the tests of the simulation share, and a way to run them.
+#pragma once
+
+#include <cstdint>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "server/reference/reference_simulation.h"
+#include "server/scene/scene.h"
+#include "server/simulation/cloth_simulation.h"
+#include "tests/vulkan/gpu_test.h"
+
+namespace clothstream::tests {
+
+// rows x columns nodes with 2 cm between them, 10 g a node, springs and damping far inside the stability
+// bound.
+scene::Cloth calmCloth(std::uint32_t rows, std::uint32_t columns);
+scene::GridRange topRow(const scene::Cloth& cloth);
+// 72 ticks a second of ten substeps.
+scene::Scene sceneOf(std::vector<scene::Cloth> cloths);
+
+// Each component off its place at rest, and each velocity off zero, by up to these; pinned nodes as they are.
+simulation::NodeState randomState(const scene::Scene& scene, std::mt19937& random, float displacement,
+                                  float speed);
+
+simulation::TickInputs inputsOf(const scene::Scene& scene,
+                                std::vector<simulation::MovingSphere> spheres = {});
+reference::TickInputs referenceInputs(const simulation::TickInputs& inputs);
+
+void setState(reference::ReferenceSimulation& reference, const simulation::NodeState& state);
+// Largest distance between corresponding nodes.
+double largestDistance(const simulation::NodeState& state, const reference::ReferenceSimulation& reference);
+double largestSpeedDifference(const simulation::NodeState& state,
+                              const reference::ReferenceSimulation& reference);
+
+// A simulation and what it takes to run it.
+class Running {
+ public:
+  explicit Running(const scene::Scene& scene, simulation::SimulationOptions options = {},
+                   vulkan::Device& device = tests::device());
+
+  simulation::TickStatus tick(const simulation::TickInputs& inputs);
+  void restore(const simulation::NodeState& state);
+  void restore(const simulation::StateSnapshot& snapshot);
+  simulation::StateSnapshot save();
+  simulation::NodeState state() { return simulation::unpack(save()); }
+  std::vector<scene::Vec3> normals();
+  void checkpoint();
+  void rollback();
+
+ private:
+  template <typename Record>
+  void run(const Record& record);
+
+  vulkan::Device& device_;
+  vulkan::Recorder recorder_;
+  simulation::ClothSimulation simulation_;
+};
+
+}  // namespace clothstream::tests
