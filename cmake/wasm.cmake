@@ -27,7 +27,7 @@ endfunction()
 set(wasmObjects)
 get_property(decoderSources GLOBAL PROPERTY CLOTHSTREAM_DECODER_SOURCES)
 foreach(source IN LISTS CLOTHSTREAM_CLIENT_CORE_SOURCES decoderSources ITEMS
-    ${PROJECT_SOURCE_DIR}/clients/core/wasm/exceptions.cpp)
+    ${PROJECT_SOURCE_DIR}/clients/core/wasm/runtime.cpp)
   clothstream_wasm_object(${source} ${WASM_CXX} ${wasmCxxFlags})
 endforeach()
 foreach(source common/debug common/entropy_common common/error_private common/fse_decompress common/xxhash

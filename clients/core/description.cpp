@@ -126,8 +126,8 @@ std::string check(const Description& description, const std::vector<ClothMessage
              std::to_string(cloth.layout.vertexCount) + " vertices; 12 a vertex are needed";
   }
   if (!codec::isPossible(description.layout))
-    return "rows, columns, vertex_count or max_error (" + std::to_string(description.layout.maxError) +
-           ") are impossible for a stream";
+    return "a cloth's rows x columns is not its vertex_count, there are no vertices or more than " +
+           std::to_string(codec::kMaxVertices) + ", or max_error is out of range";
   return {};
 }
 
