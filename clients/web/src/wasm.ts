@@ -39,8 +39,6 @@ export interface CoreExports {
 }
 
 const kNull: Pointer = 0;
-const kWasiSuccess = 0;
-const kWasiBadFile = 8;
 
 // Memory may grow in any call, which detaches every view: views are made anew for each access.
 export class CoreModule {
@@ -52,11 +50,8 @@ export class CoreModule {
   static async load(url: string): Promise<CoreModule> {
     const response = await fetch(url);
     if (!response.ok) throw new Error(`${url} could not be loaded: ${response.status} ${response.statusText}`);
-    const module = await WebAssembly.compile(await response.arrayBuffer());
-    let memory: WebAssembly.Memory | undefined;
-    const instance = await WebAssembly.instantiate(module, { wasi_snapshot_preview1: wasi(() => memory!) });
+    const { instance } = await WebAssembly.instantiate(await response.arrayBuffer());
     const exports = instance.exports as unknown as CoreExports;
-    memory = exports.memory;
     exports._initialize();
     return new CoreModule(exports);
   }
@@ -110,52 +105,4 @@ export class CoreModule {
       for (const pointer of pointers) this.exports.free(pointer);
     }
   }
-}
-
-// The few system calls that the C library links in. The core does no input or output: there are no files, no
-// environment and no arguments; what it prints (only a failed assertion does) goes to the console.
-function wasi(memory: () => WebAssembly.Memory): WebAssembly.ModuleImports {
-  const store = (pointer: Pointer, value: number) => new DataView(memory().buffer).setUint32(pointer, value, true);
-  const none = (count: Pointer, bytes: Pointer) => {
-    store(count, 0);
-    store(bytes, 0);
-    return kWasiSuccess;
-  };
-  return {
-    args_sizes_get: none,
-    args_get: () => kWasiSuccess,
-    environ_sizes_get: none,
-    environ_get: () => kWasiSuccess,
-    clock_time_get: (_clock: number, _precision: bigint, out: Pointer) => {
-      new DataView(memory().buffer).setBigUint64(out, BigInt(Math.round(performance.now() * 1e6)), true);
-      return kWasiSuccess;
-    },
-    random_get: (pointer: Pointer, count: number) => {
-      crypto.getRandomValues(new Uint8Array(memory().buffer, pointer, count));
-      return kWasiSuccess;
-    },
-    fd_close: () => kWasiBadFile,
-    fd_read: () => kWasiBadFile,
-    fd_seek: () => kWasiBadFile,
-    fd_fdstat_get: () => kWasiBadFile,
-    fd_fdstat_set_flags: () => kWasiBadFile,
-    fd_prestat_get: () => kWasiBadFile,
-    fd_prestat_dir_name: () => kWasiBadFile,
-    fd_write: (_file: number, vectors: Pointer, count: number, written: Pointer) => {
-      const view = new DataView(memory().buffer);
-      let total = 0;
-      for (let i = 0; i < count; ++i) {
-        const start = view.getUint32(vectors + 8 * i, true);
-        const length = view.getUint32(vectors + 8 * i + 4, true);
-        console.error(new TextDecoder().decode(new Uint8Array(memory().buffer, start, length)));
-        total += length;
-      }
-      store(written, total);
-      return kWasiSuccess;
-    },
-    proc_exit: (code: number) => {
-      throw new Error(`The client core ended with code ${code}`);
-    },
-    sched_yield: () => kWasiSuccess,
-  };
 }

@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: MIT
+// Debian's Chromium without a window, and how the tests look at a page in it.
+
+import { createRequire } from "node:module";
+import { mkdir } from "node:fs/promises";
+import path from "node:path";
+
+const require = createRequire(new URL("../../clients/web/package.json", import.meta.url));
+const { chromium } = require("playwright-core");
+
+export const kChromium = "/usr/bin/chromium";
+const kScreenshots = process.env.CLOTHSTREAM_SCREENSHOTS;
+const kWaitMs = 60_000;
+
+export function launchBrowser() {
+  return chromium.launch({
+    executablePath: kChromium,
+    args: [
+      "--no-sandbox",
+      "--use-gl=angle",
+      "--use-angle=swiftshader",
+      "--enable-unsafe-swiftshader",
+      "--disable-background-networking",
+      "--disable-component-update",
+      "--no-first-run",
+    ],
+  });
+}
+
+// `prepare` runs in the page before its own scripts. What goes wrong in the page is collected in `errors`.
+export async function openPage(browser, url, { prepare, viewport = { width: 960, height: 540 } } = {}) {
+  const page = await browser.newPage({ viewport });
+  page.setDefaultTimeout(kWaitMs);
+  page.errors = [];
+  page.on("pageerror", (error) => page.errors.push(String(error)));
+  if (prepare) await page.addInitScript(prepare);
+  await page.goto(url);
+  return page;
+}
+
+export function untilState(page, state) {
+  return page.waitForFunction((wanted) => window.clothstream?.state === wanted, state);
+}
+
+// Waits for `count` more frames.
+export async function untilFrames(page, count) {
+  const now = await page.evaluate(() => window.clothstream.statistics?.frames ?? 0);
+  await page.waitForFunction((wanted) => window.clothstream.statistics?.frames >= wanted, now + count);
+}
+
+// Saves a screenshot under its name and gives its pixels: colourAt(x, y) is [red, green, blue], 0 to 255.
+export async function takePicture(page, name) {
+  await mkdir(kScreenshots, { recursive: true });
+  const png = await page.screenshot({ path: path.join(kScreenshots, `${name}.png`) });
+  const { width, height, base64 } = await page.evaluate(async (source) => {
+    const bytes = Uint8Array.from(atob(source), (character) => character.charCodeAt(0));
+    const bitmap = await createImageBitmap(new Blob([bytes], { type: "image/png" }));
+    const canvas = new OffscreenCanvas(bitmap.width, bitmap.height);
+    const context = canvas.getContext("2d");
+    context.drawImage(bitmap, 0, 0);
+    const { data } = context.getImageData(0, 0, bitmap.width, bitmap.height);
+    let text = "";
+    for (let i = 0; i < data.length; i += 8192) text += String.fromCharCode(...data.subarray(i, i + 8192));
+    return { width: bitmap.width, height: bitmap.height, base64: btoa(text) };
+  }, png.toString("base64"));
+  const pixels = Buffer.from(base64, "base64");
+  return {
+    width,
+    height,
+    colourAt(x, y) {
+      const at = 4 * (Math.round(y) * width + Math.round(x));
+      return [pixels[at], pixels[at + 1], pixels[at + 2]];
+    },
+  };
+}
+
+export function luminance([red, green, blue]) {
+  return 0.2126 * red + 0.7152 * green + 0.0722 * blue;
+}

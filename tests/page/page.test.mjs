@@ -1,0 +1,270 @@
+// SPDX-License-Identifier: MIT
+// The page in a browser, on the real server: the cloth moves, hangs, is lit, can be pushed; bad days are told.
+
+import assert from "node:assert/strict";
+import { existsSync } from "node:fs";
+import { readFile } from "node:fs/promises";
+import { after, before, test } from "node:test";
+import { kChromium, launchBrowser, luminance, openPage, takePicture, untilFrames, untilState } from "./browser.mjs";
+import { startServer } from "./server.mjs";
+
+const kSkipped = 77; // CMake's SKIP_RETURN_CODE for this test
+if (!existsSync(kChromium)) {
+  console.log(`skipped: there is no ${kChromium} (apt install chromium)`);
+  process.exit(kSkipped);
+}
+
+// The codec's promise, metres an axis, where the scene does not say otherwise.
+const kMaxError = 0.0005;
+
+const scene = JSON.parse(await readFile(new URL("../../server/scenes/curtain.json", import.meta.url), "utf8"));
+const { rows, columns } = scene.cloths[0].grid;
+const vertexOf = (values, index) => Array.from(values.slice(3 * index, 3 * index + 3));
+const distance = (a, b) => Math.hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
+
+function pinnedNodes() {
+  const nodes = new Set();
+  for (const pin of scene.cloths[0].pins) {
+    for (let row = pin.firstRow ?? 0; row <= (pin.lastRow ?? pin.firstRow ?? 0); row += pin.rowStep ?? 1) {
+      for (let column = pin.firstColumn ?? 0; column <= (pin.lastColumn ?? pin.firstColumn ?? 0); column += pin.columnStep ?? 1)
+        nodes.add(row * columns + column);
+    }
+  }
+  return nodes;
+}
+
+// What the page holds, all of one frame.
+function look(page) {
+  return page.evaluate(() => {
+    const { positions, restPositions, colliders, statistics } = window.clothstream;
+    return {
+      positions: Array.from(positions),
+      rest: Array.from(restPositions),
+      spheres: colliders.map(({ name, position, radius }) => ({ name, position: [...position], radius })),
+      statistics,
+    };
+  });
+}
+
+let server;
+let browser;
+before(async () => {
+  server = await startServer();
+  browser = await launchBrowser();
+});
+after(async () => {
+  await browser?.close();
+  await server?.stop();
+});
+
+async function withPage(options, use) {
+  const page = await openPage(browser, server.url + (options.query ?? ""), options);
+  try {
+    await use(page);
+    assert.deepEqual(page.errors, []);
+  } finally {
+    await page.close();
+  }
+}
+
+test("the cloth moves, and every packet decodes to what the server holds", () =>
+  withPage({}, async (page) => {
+    await untilState(page, "live");
+    await untilFrames(page, 5);
+    const first = await look(page);
+    await untilFrames(page, 60);
+    const second = await look(page);
+    assert.equal(first.positions.length, 3 * rows * columns);
+    let moved = 0;
+    for (let i = 0; i < rows * columns; ++i) moved = Math.max(moved, distance(vertexOf(first.positions, i), vertexOf(second.positions, i)));
+    assert.ok(moved > 10 * kMaxError, `the furthest vertex moved ${moved} m`);
+    assert.equal(second.statistics.decodeErrors, 0);
+    assert.equal(second.statistics.hashMismatches, 0);
+    assert.ok(second.statistics.framesPerSecond > 0 && second.statistics.kbitPerSecond > 0);
+  }));
+
+test("the cloth hangs from its pins, which stay where they start", () =>
+  withPage({}, async (page) => {
+    await untilState(page, "live");
+    await untilFrames(page, 30);
+    const first = await look(page);
+    await untilFrames(page, 30);
+    const second = await look(page);
+    const pins = pinnedNodes();
+    assert.ok(pins.size > 1);
+    for (const node of pins) {
+      assert.deepEqual(vertexOf(second.positions, node), vertexOf(first.positions, node));
+      for (const [axis, value] of vertexOf(second.positions, node).entries())
+        assert.ok(Math.abs(value - second.rest[3 * node + axis]) <= kMaxError, `pin ${node}, axis ${axis}: ${value}`);
+    }
+    const height = (node) => second.positions[3 * node + 1];
+    for (let column = 0; column < columns; ++column) {
+      if (!pins.has(column)) assert.ok(height(column) < second.rest[1], `node ${column} hangs lower than the pins`);
+    }
+    // The ball lifts parts of it, but the lower edge as a whole hangs below the middle, and that below the upper edge.
+    const meanHeight = (row) => {
+      let sum = 0;
+      for (let column = 0; column < columns; ++column) sum += height(row * columns + column);
+      return sum / columns;
+    };
+    assert.ok(meanHeight(rows - 1) < meanHeight(rows >> 1) && meanHeight(rows >> 1) < meanHeight(0));
+  }));
+
+test("the cloth is lit and casts a shadow", () =>
+  withPage({}, async (page) => {
+    await untilState(page, "live");
+    await untilFrames(page, 60);
+    const points = await page.evaluate(() => {
+      const { positions, colliders, canvas } = window.clothstream;
+      const ball = colliders[0];
+      const centre = window.clothstream.project(ball.position);
+      const edge = window.clothstream.project([ball.position[0], ball.position[1] + ball.radius, ball.position[2]]);
+      const reach = 1.5 * Math.hypot(edge[0] - centre[0], edge[1] - centre[1]);
+      // Only where nothing but the canvas is seen, and not the ball.
+      const open = ([x, y]) => document.elementFromPoint(x, y) === canvas && Math.hypot(x - centre[0], y - centre[1]) > reach;
+      const cloth = [];
+      const shadow = [];
+      for (let i = 0; i < positions.length; i += 3) {
+        const point = Array.from(positions.slice(i, i + 3));
+        cloth.push(window.clothstream.project(point));
+        const shade = window.clothstream.shadowOf(point);
+        // The same distance away on the other side, where the light falls from and no shadow does.
+        shadow.push([window.clothstream.project(shade), window.clothstream.project([-shade[0], shade[1], shade[2]])]);
+      }
+      return { cloth: cloth.filter(open), shadow: shadow.filter((pair) => pair.every(open)) };
+    });
+    const picture = await takePicture(page, "curtain");
+
+    // Folds and a moving ball shift some points to the floor behind: the cloth is where red outweighs blue.
+    const isCloth = ([red, , blue]) => red > blue + 20;
+    const cloth = points.cloth.map(([x, y]) => picture.colourAt(x, y)).filter(isCloth).map(luminance);
+    assert.ok(cloth.length > 0.6 * points.cloth.length, `${cloth.length} of ${points.cloth.length} points show cloth`);
+    const mean = cloth.reduce((sum, value) => sum + value, 0) / cloth.length;
+    const deviation = Math.sqrt(cloth.reduce((sum, value) => sum + (value - mean) ** 2, 0) / cloth.length);
+    assert.ok(mean > 30 && mean < 220, `mean luminance ${mean}`);
+    assert.ok(deviation > 4, `light and dark differ by ${deviation}`);
+
+    const pairs = points.shadow.map((pair) => pair.map(([x, y]) => picture.colourAt(x, y))).filter((pair) => !pair.some(isCloth));
+    const ratios = pairs.map(([shade, light]) => luminance(shade) / luminance(light)).sort((a, b) => a - b);
+    assert.ok(ratios.length > 50, `${ratios.length} points of the floor to compare`);
+    const median = ratios[ratios.length >> 1];
+    assert.ok(median < 0.85, `the shadowed floor has ${median} of the lit floor's luminance`);
+  }));
+
+test("the sphere can be dragged through the cloth", () =>
+  withPage({}, async (page) => {
+    await untilState(page, "live");
+    // From the side, so that the drag goes across the cloth: 90 degrees less those of the default view, 5 a key.
+    await page.focus("#canvas");
+    for (let i = 0; i < 13; ++i) await page.keyboard.press("ArrowRight");
+    await page.waitForFunction(() => window.clothstream.colliders[0]?.position[2] > 0.5);
+    const before = await look(page);
+    const ball = before.spheres[0];
+
+    const project = (point) => page.evaluate((at) => window.clothstream.project(at), point);
+    const grip = await project((await look(page)).spheres[0].position);
+    await page.mouse.move(...grip);
+    await page.mouse.down();
+    const goal = await project([0, ball.position[1], -0.25]);
+    await page.mouse.move(...goal, { steps: 30 });
+    await page.waitForFunction(([x, y]) => {
+      const [atX, atY] = window.clothstream.project(window.clothstream.colliders[0].position);
+      return Math.hypot(atX - x, atY - y) < 12;
+    }, goal);
+    await untilFrames(page, 40);
+    const pushed = await look(page);
+    await takePicture(page, "dragged");
+
+    const { position, radius } = pushed.spheres[0];
+    assert.ok(position[2] < 0, `the ball is at z = ${position[2]}`);
+    // Nodes are put on the sphere's surface plus the cloth's thickness; what arrives is rounded by the codec.
+    const keep = radius + scene.cloths[0].thickness - Math.sqrt(3) * kMaxError - 1e-5;
+    let nearest = Infinity;
+    let reach = 0;
+    for (let i = 0; i < rows * columns; ++i) {
+      nearest = Math.min(nearest, distance(vertexOf(pushed.positions, i), position));
+      reach = Math.min(reach, pushed.positions[3 * i + 2]);
+    }
+    assert.ok(nearest >= keep, `a vertex is ${nearest} m from the centre of the ball, less than ${keep} m`);
+    assert.ok(nearest < radius + 0.1, "the cloth lies against the ball");
+    assert.ok(reach < position[2], `the cloth is pushed to z = ${reach}`);
+
+    await page.mouse.up();
+    await untilFrames(page, 20);
+    const left = (await look(page)).spheres[0].position;
+    assert.ok(distance(left, position) < 0.01, "the ball stays where it was left");
+  }));
+
+test("a slider works by keyboard, and others in the scene see it", () =>
+  withPage({}, (first) =>
+    withPage({}, async (second) => {
+      await untilState(first, "live");
+      await untilState(second, "live");
+      await first.focus("#wind");
+      for (let i = 0; i < 20; ++i) await first.keyboard.press("ArrowRight");
+      await second.waitForFunction(() => document.getElementById("wind-value").textContent === "2.0 m/s");
+      await first.focus("#gravity");
+      await first.keyboard.press("End");
+      await second.waitForFunction(() => document.getElementById("gravity-value").textContent === "20.00 m/s²");
+    }),
+  ));
+
+test("an unknown scene is told with the server's words, and the default one is a click away", () =>
+  withPage({ query: "?scene=no_such_scene" }, async (page) => {
+    await untilState(page, "failed");
+    await page.waitForSelector("#banner:not([hidden])");
+    assert.match(await page.textContent("#banner-text"), /no_such_scene/);
+    await takePicture(page, "unknown_scene");
+    await page.click("#retry");
+    await untilState(page, "live");
+    await page.waitForSelector("#banner", { state: "hidden" });
+  }));
+
+test("the scene chooser joins another scene", () =>
+  withPage({}, async (page) => {
+    await untilState(page, "live");
+    await page.waitForFunction(() => document.querySelector('#scene option[value="flag"]'));
+    await page.selectOption("#scene", "flag");
+    await page.waitForFunction(() => document.getElementById("scene-name").textContent === "flag");
+    await untilState(page, "live");
+    assert.match(page.url(), /\?scene=flag$/);
+    await untilFrames(page, 60);
+    await takePicture(page, "flag");
+  }));
+
+test("a lost server is told, and the page comes back with it", () =>
+  withPage({}, async (page) => {
+    await untilState(page, "live");
+    await server.stop();
+    await untilState(page, "reconnecting");
+    await page.waitForFunction(() => /Trying again in \d+ s/.test(document.getElementById("banner-text").textContent));
+    await takePicture(page, "reconnecting");
+    server = await startServer(server.port);
+    await untilState(page, "live");
+    await untilFrames(page, 10);
+    await page.waitForSelector("#banner", { state: "hidden" });
+  }));
+
+test("a browser without WebGL is told what is missing", () =>
+  withPage({ prepare: () => (HTMLCanvasElement.prototype.getContext = () => null) }, async (page) => {
+    await page.waitForSelector("#banner:not([hidden])");
+    assert.match(await page.textContent("#banner-text"), /WebGL/);
+  }));
+
+test("the page fits a small screen", () =>
+  withPage({ viewport: { width: 360, height: 640 } }, async (page) => {
+    await untilState(page, "live");
+    await untilFrames(page, 10);
+    await takePicture(page, "small");
+    assert.ok(await page.evaluate(() => document.documentElement.scrollWidth <= window.innerWidth));
+    const covered = await page.evaluate(() => {
+      const { positions } = window.clothstream;
+      let inside = 0;
+      for (let i = 0; i < positions.length; i += 3) {
+        const [x, y] = window.clothstream.project([positions[i], positions[i + 1], positions[i + 2]]);
+        if (x >= 0 && x <= window.innerWidth && y >= 0 && y <= window.innerHeight) ++inside;
+      }
+      return (3 * inside) / positions.length;
+    });
+    assert.ok(covered > 0.99, `${covered} of the cloth is in the picture`);
+  }));

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: MIT
+// A clothstream-server of the test's own, on ports that are free.
+
+import { spawn } from "node:child_process";
+import { once } from "node:events";
+import { createInterface } from "node:readline";
+
+const kStartMs = 60_000;
+
+// Starts the program named by CLOTHSTREAM_SERVER; resolves once it has said where its page is. `port` 0: any.
+export async function startServer(port = 0) {
+  const program = process.env.CLOTHSTREAM_SERVER;
+  const options = ["--scene", "curtain", "--port", String(port), "--grpc-port", "0"];
+  const child = spawn(program, options, { stdio: ["ignore", "pipe", "pipe"] });
+  const said = [];
+  const address = await new Promise((resolve, reject) => {
+    const timer = setTimeout(() => reject(new Error(`no address within ${kStartMs} ms\n${said.join("\n")}`)), kStartMs);
+    const read = (line) => {
+      said.push(line);
+      const found = /http:\/\/[^\s/]+:(\d+)/.exec(line);
+      if (!found) return;
+      clearTimeout(timer);
+      resolve({ url: `http://127.0.0.1:${found[1]}/`, port: Number(found[1]) });
+    };
+    for (const stream of [child.stdout, child.stderr]) createInterface({ input: stream }).on("line", read);
+    child.once("error", reject);
+    child.once("exit", (code) => {
+      clearTimeout(timer);
+      reject(new Error(`${program} ended with ${code} before it served a page\n${said.join("\n")}`));
+    });
+  });
+  return {
+    ...address,
+    async stop() {
+      if (child.exitCode !== null || child.signalCode !== null) return;
+      child.kill("SIGTERM");
+      await once(child, "exit");
+    },
+  };
+}
