@@ -10,20 +10,6 @@ namespace {
 
 enum class Shape : std::uint8_t { none, average, planar };
 
-constexpr Shape shapeOf(Prediction prediction) {
-  switch (prediction) {
-    case Prediction::average:
-    case Prediction::temporalAverage:
-      return Shape::average;
-    case Prediction::planar:
-    case Prediction::temporalPlanar:
-      return Shape::planar;
-    case Prediction::temporal:
-      break;
-  }
-  return Shape::none;
-}
-
 // Modulo the width of T.
 template <typename T>
 constexpr T add(T a, T b) {

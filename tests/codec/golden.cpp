@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: MIT
+// The golden packets of tests/golden.
+#include "tests/codec/golden.h"
+
+#include <bit>
+#include <fstream>
+#include <iterator>
+#include <stdexcept>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+namespace clothstream::codec {
+namespace {
+
+const std::string kFolder = "tests/golden/";
+
+// 64-bit numbers are hexadecimal strings: JSON's numbers are doubles to many readers.
+std::string hexadecimal(std::uint64_t value) {
+  return fmt::format("{:016x}", value);
+}
+std::uint64_t fromHexadecimal(const nlohmann::json& text) {
+  return std::stoull(text.get<std::string>(), nullptr, 16);
+}
+
+std::ifstream openToRead(const std::string& path) {
+  std::ifstream in(path, std::ios::binary);
+  if (!in) throw std::runtime_error("cannot read " + path);
+  return in;
+}
+
+std::vector<std::byte> readBytes(const std::string& path) {
+  std::ifstream in = openToRead(path);
+  std::vector<std::byte> bytes;
+  for (std::istreambuf_iterator<char> at(in), end; at != end; ++at)
+    bytes.push_back(static_cast<std::byte>(*at));
+  return bytes;
+}
+
+GoldenStream readStream(const nlohmann::json& json) {
+  GoldenStream stream;
+  stream.name = json.at("name");
+  stream.layout.epoch = json.at("epoch");
+  stream.layout.maxError = json.at("maxError");
+  stream.layout.normals = json.at("normals") == "octahedral" ? NormalMode::octahedral : NormalMode::none;
+  for (const nlohmann::json& cloth : json.at("cloths")) {
+    stream.layout.cloths.push_back({cloth.at("vertexCount"), cloth.at("rows"), cloth.at("columns")});
+  }
+  for (const nlohmann::json& packet : json.at("packets")) {
+    const std::string file = packet.at("file");
+    stream.packets.push_back({file, readBytes(kFolder + file), packet.at("tick"),
+                              packet.at("kind") == "key" ? PacketKind::key : PacketKind::predicted,
+                              fromHexadecimal(packet.at("reconstructionHash")),
+                              fromHexadecimal(packet.at("positionsHash"))});
+  }
+  return stream;
+}
+
+nlohmann::ordered_json describe(const GoldenStream& stream) {
+  nlohmann::ordered_json json{
+      {"name", stream.name},
+      {"epoch", stream.layout.epoch},
+      {"maxError", stream.layout.maxError},
+      {"normals", stream.layout.normals == NormalMode::octahedral ? "octahedral" : "none"}};
+  for (const ClothLayout& cloth : stream.layout.cloths) {
+    json["cloths"].push_back(
+        {{"vertexCount", cloth.vertexCount}, {"rows", cloth.rows}, {"columns", cloth.columns}});
+  }
+  for (const GoldenPacket& packet : stream.packets) {
+    json["packets"].push_back({{"file", packet.file},
+                               {"tick", packet.tick},
+                               {"kind", packet.kind == PacketKind::key ? "key" : "predicted"},
+                               {"reconstructionHash", hexadecimal(packet.reconstructionHash)},
+                               {"positionsHash", hexadecimal(packet.positionsHash)}});
+  }
+  return json;
+}
+
+}  // namespace
+
+std::vector<GoldenStream> readGoldenStreams() {
+  std::ifstream in = openToRead(kFolder + "streams.json");
+  std::vector<GoldenStream> streams;
+  for (const nlohmann::json& stream : nlohmann::json::parse(in)) streams.push_back(readStream(stream));
+  return streams;
+}
+
+void writeGoldenStreams(const std::vector<GoldenStream>& streams) {
+  nlohmann::ordered_json json;
+  for (const GoldenStream& stream : streams) {
+    json.push_back(describe(stream));
+    for (const GoldenPacket& packet : stream.packets) {
+      std::ofstream out(kFolder + packet.file, std::ios::binary);
+      for (const std::byte byte : packet.bytes) out.put(static_cast<char>(byte));
+    }
+  }
+  std::ofstream(kFolder + "streams.json") << json.dump(2) << '\n';
+}
+
+std::uint64_t hashFloats(std::span<const float> values) {
+  std::uint64_t hash = 0xcbf29ce484222325u;
+  for (const float value : values) {
+    const auto bits = std::bit_cast<std::uint32_t>(value);
+    for (unsigned shift = 0; shift < 32; shift += 8) hash = (hash ^ (bits >> shift & 0xffu)) * 0x100000001b3u;
+  }
+  return hash;
+}
+
+}  // namespace clothstream::codec

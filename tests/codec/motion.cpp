@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: MIT
+// Cloth-like motions for tests of the codec.
+#include "tests/codec/motion.h"
+
+#include <cmath>
+#include <random>
+
+namespace clothstream::codec {
+namespace {
+
+void append(std::vector<float>& out, double x, double y, double z) {
+  out.insert(out.end(), {static_cast<float>(x), static_cast<float>(y), static_cast<float>(z)});
+}
+
+void appendUnit(std::vector<float>& out, double x, double y, double z) {
+  const double length = std::sqrt(x * x + y * y + z * z);
+  append(out, x / length, y / length, z / length);
+}
+
+}  // namespace
+
+MotionFrame sampleMotion(const StreamLayout& layout, std::uint64_t tick, float amplitude) {
+  MotionFrame frame;
+  const double a = static_cast<double>(amplitude), t = static_cast<double>(tick);
+  double depth = -1;
+  for (const ClothLayout& cloth : layout.cloths) {
+    const std::uint32_t columns = cloth.columns == 0 ? cloth.vertexCount : cloth.columns;
+    for (std::uint32_t i = 0; i < cloth.vertexCount; ++i) {
+      const double x = 0.02 * (i % columns), y = -0.02 * (i / columns);
+      const double slow = 6 * x + 2 * y + 0.21 * t, fast = 17 * y - 5 * x - 0.33 * t;
+      append(frame.positions, x + 0.3 * a * std::sin(0.1 * t + 4 * y), y + 0.2 * a * std::cos(slow),
+             depth + a * std::sin(slow) + 0.3 * a * std::sin(fast));
+      appendUnit(frame.normals, -a * (6 * std::cos(slow) - 1.5 * std::cos(fast)),
+                 -a * (2 * std::cos(slow) + 5 * std::cos(fast)), std::cos(0.02 * t));
+    }
+    depth += 0.5;
+  }
+  return frame;
+}
+
+MotionFrame scatter(const StreamLayout& layout, std::uint32_t seed, float extent) {
+  MotionFrame frame;
+  std::mt19937 random(seed);
+  const auto uniform = [&] { return static_cast<double>(random()) / 2147483648.0 - 1.0; };
+  for (std::uint32_t i = 0; i < layout.vertexCount(); ++i) {
+    const double e = static_cast<double>(extent);
+    append(frame.positions, e * uniform(), e * uniform(), e * uniform());
+    appendUnit(frame.normals, uniform(), uniform(), uniform() + 1e-3);
+  }
+  return frame;
+}
+
+StreamLayout mixedLayout(NormalMode normals) {
+  return {.epoch = 7,
+          .maxError = 0.0005f,
+          .normals = normals,
+          .cloths = {{.vertexCount = 9 * 7, .rows = 9, .columns = 7},
+                     {.vertexCount = 13, .rows = 1, .columns = 13},
+                     {.vertexCount = 1, .rows = 1, .columns = 1},
+                     {.vertexCount = 10, .rows = 0, .columns = 0},
+                     {.vertexCount = 2 * 31, .rows = 2, .columns = 31}}};
+}
+
+}  // namespace clothstream::codec

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: MIT
+// Writes tests/golden anew, from the project's root: only when the format changes, never to make a test pass.
+#include <cstdio>
+#include <exception>
+
+#include "proto/codec/decoder.h"
+#include "proto/codec/encoder.h"
+#include "tests/codec/golden.h"
+#include "tests/codec/motion.h"
+
+namespace clothstream::codec {
+namespace {
+
+GoldenStream makeStream(const std::string& name, const StreamLayout& layout) {
+  GoldenStream stream{.name = name, .layout = layout, .packets = {}};
+  const auto encoder = Encoder::make(layout);
+  const auto decoder = Decoder::make(layout);
+  std::vector<std::byte> packet(encoder->packetBound());
+  // A motion, a still moment, and a jump, so that each prediction has its turn.
+  const struct {
+    std::uint64_t tick;
+    PacketKind kind;
+    MotionFrame frame;
+  } moments[] = {{1, PacketKind::key, sampleMotion(layout, 1, 0.05f)},
+                 {2, PacketKind::predicted, sampleMotion(layout, 2, 0.05f)},
+                 {130, PacketKind::predicted, sampleMotion(layout, 2, 0.05f)},
+                 {131, PacketKind::predicted, scatter(layout, 1, 5)},
+                 {132, PacketKind::predicted, sampleMotion(layout, 4, 0.05f)}};
+  for (const auto& [tick, kind, frame] : moments) {
+    const std::size_t bytes = encoder->encode(tick, kind, frame.positions, frame.normals, packet);
+    GoldenPacket golden{.file = name + "_" + std::to_string(tick) + ".bin",
+                        .bytes = {packet.begin(), packet.begin() + static_cast<std::ptrdiff_t>(bytes)},
+                        .tick = tick,
+                        .kind = kind,
+                        .reconstructionHash = encoder->reconstructionHash(),
+                        .positionsHash = 0};
+    if (decoder->decode(golden.bytes) != DecodeResult::ok)
+      throw std::runtime_error("a packet is not decoded");
+    golden.positionsHash = hashFloats(decoder->positions());
+    stream.packets.push_back(std::move(golden));
+  }
+  return stream;
+}
+
+}  // namespace
+}  // namespace clothstream::codec
+
+int main() try {
+  using namespace clothstream::codec;
+  writeGoldenStreams({makeStream("mixed", mixedLayout(NormalMode::none)),
+                      makeStream("normals", mixedLayout(NormalMode::octahedral)),
+                      makeStream("vertex", {.epoch = 0xffffffffu,
+                                            .maxError = 0.01f,
+                                            .normals = NormalMode::none,
+                                            .cloths = {{.vertexCount = 1, .rows = 0, .columns = 0}}})});
+  return 0;
+} catch (const std::exception& error) {
+  std::fprintf(stderr, "%s\n", error.what());
+  return 1;
+}
