@@ -5,7 +5,7 @@ import * as THREE from "three";
 import type { ClothLayout } from "./client";
 
 // Madder, indigo, ochre, moss, plum, linen: told apart also where colours are not.
-const kColours = [0x8a2f2f, 0x2a567a, 0xb5843c, 0x55714a, 0x745684, 0xb5a98f];
+const kColours = [0x8c3433, 0x2a567a, 0xb5843c, 0x55714a, 0x745684, 0xb5a98f];
 
 // Metres that one tile of the weave covers, which is two threads.
 const kWeaveTile = 0.012;

@@ -43,7 +43,7 @@ float softShadow(sampler2D shadowMap, vec3 coord) {
   float lit = 0.0;
   for (int i = 0; i < 24; ++i) {
     vec2 offset = radius * diskSample(i, 24, turn);
-    lit += step(coord.z - ${(0.5 * kDepthPerWidth).toFixed(6)} * length(offset), unpackRGBAToDepth(texture2D(shadowMap, coord.xy + offset)));
+    lit += step(coord.z - ${(0.8 * kDepthPerWidth).toFixed(6)} * length(offset), unpackRGBAToDepth(texture2D(shadowMap, coord.xy + offset)));
   }
   return lit / 24.0;
 }
@@ -73,5 +73,5 @@ export function aimSoftLight(light: THREE.DirectionalLight, ball: THREE.Sphere, 
   camera.updateProjectionMatrix();
   light.shadow.mapSize.setScalar(kTexels);
   light.shadow.bias = -0.0005;
-  light.shadow.normalBias = (2 * kWidth * ball.radius) / kTexels;
+  light.shadow.normalBias = (3 * kWidth * ball.radius) / kTexels;
 }

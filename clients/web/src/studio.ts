@@ -9,7 +9,7 @@ const kKeyDirection = new THREE.Vector3(0.85, 1.0, 0.6);
 
 export class Studio {
   readonly scene = new THREE.Scene();
-  private readonly key = new THREE.DirectionalLight(0xfff1df, 3.6);
+  private readonly key = new THREE.DirectionalLight(0xfff1df, 3.4);
   private readonly rim = new THREE.DirectionalLight(0xb4c4de, 0.7);
   private readonly floor: THREE.Mesh<THREE.CircleGeometry, THREE.MeshStandardMaterial>;
   private readonly fog = new THREE.Fog(kBackground);
@@ -17,7 +17,7 @@ export class Studio {
   constructor() {
     this.scene.background = new THREE.Color(kBackground);
     this.scene.fog = this.fog;
-    this.scene.add(new THREE.HemisphereLight(0xe9ecf2, 0x8a8078, 1.5));
+    this.scene.add(new THREE.HemisphereLight(0xe9ecf2, 0x948a82, 1.75));
 
     this.scene.add(this.key, this.key.target, this.rim, this.rim.target);
 
@@ -45,9 +45,9 @@ export class Studio {
     // The floor is the plane y = 0 where that lies a little below everything, which is how scenes are made.
     const below = bounds.min.y;
     this.floor.position.y = below >= 0 && below < 2 * radius ? 0 : below - 0.2 * radius;
-    this.floor.scale.setScalar(14 * radius);
-    this.fog.near = 5 * radius;
-    this.fog.far = 13 * radius;
+    this.floor.scale.setScalar(20 * radius);
+    this.fog.near = 3.5 * radius;
+    this.fog.far = 17 * radius;
 
     aimSoftLight(this.key, new THREE.Sphere(centre, radius), kKeyDirection);
     this.rim.target.position.copy(centre);

@@ -22,6 +22,7 @@ export class View {
   private readonly sphereGeometry = new THREE.SphereGeometry(1, 64, 48);
   private readonly bounds = new THREE.Box3(new THREE.Vector3(-1, 0, -1), new THREE.Vector3(1, 2, 1));
   private cloths: ClothMesh[] = [];
+  private vertexCount = 0;
 
   // Throws where WebGL is not to be had.
   constructor(readonly canvas: HTMLCanvasElement) {
@@ -46,6 +47,7 @@ export class View {
       this.studio.scene.remove(cloth.mesh);
       cloth.dispose();
     }
+    this.vertexCount = client.vertexCount;
     const rest = client.positions();
     const triangles = client.triangles();
     this.cloths = client.cloths().map((layout, number) => new ClothMesh(layout, rest, triangles, number));
@@ -63,7 +65,8 @@ export class View {
 
   // Draws the newest frame. The core's memory is read before this returns.
   draw(client: Client | undefined): void {
-    if (client && this.cloths.length > 0) {
+    // A client that joins has no vertices yet: until it has, the last frame of the former one stays.
+    if (client && client.vertexCount === this.vertexCount) {
       const positions = client.positions();
       const normals = client.normals();
       for (const cloth of this.cloths) cloth.update(positions, normals);
