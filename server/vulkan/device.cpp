@@ -3,9 +3,15 @@
 #include "server/vulkan/device.h"
 
 #include <algorithm>
+#include <array>
+#include <cstring>
+#include <fstream>
+#include <iterator>
+#include <span>
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
+#include <unistd.h>
 
 #include "server/vulkan/instance.h"
 #include "server/vulkan/recorder.h"
@@ -46,22 +52,87 @@ vk::raii::Device openDevice(const Candidate& candidate) {
           vk::DeviceCreateInfo{.pNext = &features, .queueCreateInfoCount = 1, .pQueueCreateInfos = &queue}};
 }
 
+// What a pipeline cache file begins with; the driver's own data follows.
+struct CacheFileHeader {
+  std::array<char, 8> magic = {'c', 's', 'p', 'i', 'p', 'e', 's', '1'};
+  std::uint64_t bytes = 0;
+  std::uint64_t checksum = 0;
+};
+
+// FNV-1a: drivers need not survive damaged data, so that it must not reach them.
+std::uint64_t checksum(std::span<const std::uint8_t> bytes) {
+  std::uint64_t hash = 0xcbf29ce484222325u;
+  for (const std::uint8_t byte : bytes) hash = (hash ^ byte) * 0x100000001b3u;
+  return hash;
+}
+
+std::filesystem::path cacheFile(const std::filesystem::path& directory,
+                                const vk::PhysicalDeviceProperties& properties) {
+  if (directory.empty()) return {};
+  std::string name;
+  for (const std::uint8_t byte : properties.pipelineCacheUUID) name += fmt::format("{:02x}", byte);
+  return directory / (name + ".pipelines");
+}
+
+// The driver's data in the file; empty if the file is missing, damaged or of another device or driver.
+std::vector<std::uint8_t> readCache(const std::filesystem::path& path,
+                                    const vk::PhysicalDeviceProperties& properties) {
+  std::ifstream file(path, std::ios::binary);
+  const std::vector<std::uint8_t> all{std::istreambuf_iterator<char>(file), {}};
+  CacheFileHeader header;
+  VkPipelineCacheHeaderVersionOne inner;
+  if (all.size() < sizeof(header) + sizeof(inner)) return {};
+  std::memcpy(&header, all.data(), sizeof(header));
+  std::vector<std::uint8_t> data(all.begin() + sizeof(header), all.end());
+  std::memcpy(&inner, data.data(), sizeof(inner));
+  const bool sound = header.magic == CacheFileHeader{}.magic && header.bytes == data.size() &&
+                     header.checksum == checksum(data);
+  const bool ours = inner.headerVersion == VK_PIPELINE_CACHE_HEADER_VERSION_ONE &&
+                    inner.vendorID == properties.vendorID && inner.deviceID == properties.deviceID &&
+                    std::equal(std::begin(inner.pipelineCacheUUID), std::end(inner.pipelineCacheUUID),
+                               properties.pipelineCacheUUID.begin());
+  if (sound && ours) return data;
+  spdlog::warn("the pipeline cache {} is damaged or of another driver and will be replaced", path.string());
+  return {};
+}
+
+// A reader never sees half a file: it is written beside and then renamed.
+void writeCache(const std::filesystem::path& path, std::span<const std::uint8_t> data) {
+  const CacheFileHeader header{.bytes = data.size(), .checksum = checksum(data)};
+  std::filesystem::create_directories(path.parent_path());
+  const std::filesystem::path draft = fmt::format("{}.{}", path.string(), getpid());
+  {
+    std::ofstream file(draft, std::ios::binary);
+    file.exceptions(std::ios::failbit | std::ios::badbit);
+    file.write(reinterpret_cast<const char*>(&header), sizeof(header));
+    file.write(reinterpret_cast<const char*>(data.data()), static_cast<std::streamsize>(data.size()));
+  }
+  std::filesystem::rename(draft, path);
+}
+
 }  // namespace
 
 Device::Device(const DeviceOptions& options)
-    : context_((setSoftwareThreads(options.softwareThreads), openLoader())), options_(options) {
+    : context_((setSoftwareThreads(options.softwareThreads), openLoader())) {
   const bool validate = options.validation || validationByEnvironment();
   instance_ = makeInstance(context_, validate);
   if (validate) messenger_ = makeMessenger(instance_);
 
   std::vector<Candidate> all = candidates(instance_);
   Candidate& chosen = all[vulkan::select(all, options.select)];
+  const vk::PhysicalDeviceProperties properties = chosen.physical.getProperties();
+  pipelineCacheFile_ = cacheFile(options.cacheDirectory, properties);
+  std::vector<std::uint8_t> cached;
+  if (!pipelineCacheFile_.empty()) cached = readCache(pipelineCacheFile_, properties);
+  pipelineCacheLoaded_ = cached.size();
   try {
     device_ = openDevice(chosen);
     const vk::SemaphoreTypeCreateInfo timeline{.semaphoreType = vk::SemaphoreType::eTimeline};
     queue_ = device_.getQueue(chosen.queueFamily, 0);
     timeline_ = vk::raii::Semaphore(device_, vk::SemaphoreCreateInfo{.pNext = &timeline});
-    pipelineCache_ = vk::raii::PipelineCache(device_, vk::PipelineCacheCreateInfo{});
+    pipelineCache_ = vk::raii::PipelineCache(
+        device_,
+        vk::PipelineCacheCreateInfo{.initialDataSize = cached.size(), .pInitialData = cached.data()});
   } catch (const vk::SystemError& error) {
     throw DeviceError(
         fmt::format("the Vulkan device {} cannot be opened: {}", chosen.info.name, error.what()));
@@ -75,7 +146,8 @@ Device::Device(const DeviceOptions& options)
 Device::~Device() {
   try {
     device_.waitIdle();
-  } catch (const vk::SystemError& error) {
+    if (!pipelineCacheFile_.empty()) writeCache(pipelineCacheFile_, pipelineCache_.getData());
+  } catch (const std::exception& error) {
     spdlog::warn("closing the Vulkan device {}: {}", info_.name, error.what());
   }
 }

@@ -18,24 +18,26 @@ enum class DeviceKind : std::uint8_t { discrete, integrated, virtualGpu, softwar
 
 struct DeviceInfo {
   std::uint32_t index = 0;  // place in listDevices()
-  std::string name;
+  std::string name = {};
   DeviceKind kind = DeviceKind::other;
-  std::string driver;      // name and version
-  std::string apiVersion;  // such as 1.3.230
+  std::string driver = {};      // name and version
+  std::string apiVersion = {};  // such as 1.3.230
 };
 
 struct DeviceOptions {
   // Empty: the best (discrete before integrated before software). Else an index of listDevices() or a
   // case-insensitive part of a name.
-  std::string select;
+  std::string select = {};
   // Threads of a software device (LP_NUM_THREADS); set before the instance is made. Absent: the environment's
   // value or else the measured default.
-  std::optional<std::uint32_t> softwareThreads;
+  std::optional<std::uint32_t> softwareThreads = {};
   // VK_LAYER_KHRONOS_validation with synchronisation checks; its messages are counted (validationMessages())
   // and logged. Tests switch it on by the environment variable CLOTHSTREAM_VALIDATION=1.
   bool validation = false;
-  // Directory of the pipeline cache; empty: none is kept.
-  std::filesystem::path cacheDirectory;
+  // Directory of the pipeline cache, one file a device and driver version; made if missing. Empty: none is
+  // kept. A file that is damaged or of another driver is ignored and replaced; one that cannot be written is
+  // only logged.
+  std::filesystem::path cacheDirectory = {};
 };
 
 struct Limits {
@@ -93,7 +95,11 @@ class Device {
   static std::uint64_t validationMessages();
   static std::vector<std::string> validationTexts();
 
+  // Bytes of pipeline cache that were taken from DeviceOptions::cacheDirectory.
+  std::size_t pipelineCacheLoaded() const { return pipelineCacheLoaded_; }
+
   // For this room alone.
+  bool validates() const { return *messenger_ != vk::DebugUtilsMessengerEXT{}; }
   const vk::raii::Device& handle() const { return device_; }
   const vk::raii::PhysicalDevice& physical() const { return physical_; }
   const vk::raii::PipelineCache& pipelineCache() const { return pipelineCache_; }
@@ -110,11 +116,12 @@ class Device {
   vk::raii::Queue queue_ = nullptr;
   vk::raii::Semaphore timeline_ = nullptr;
   vk::raii::PipelineCache pipelineCache_ = nullptr;
+  std::size_t pipelineCacheLoaded_ = 0;
   std::uint32_t queueFamily_ = 0;
   TimelineValue submitted_ = 0;
   DeviceInfo info_;
   Limits limits_;
-  DeviceOptions options_;
+  std::filesystem::path pipelineCacheFile_;
 };
 
 }  // namespace clothstream::vulkan

@@ -14,7 +14,8 @@ namespace clothstream::vulkan {
 bool validationByEnvironment();
 
 // Puts the number of threads of software devices into the environment, where Mesa reads it as devices are
-// listed. The environment belongs to the whole process: call before other threads run that read it.
+// listed: the given one, else what is there already, else the default. The environment belongs to the whole
+// process: call before other threads run that read it.
 void setSoftwareThreads(std::optional<std::uint32_t> threads);
 
 // Throws DeviceError where the loader is not installed.
@@ -33,8 +34,12 @@ struct Candidate {
   std::uint32_t queueFamily = 0;  // one that computes
 };
 
-// The devices that can serve (Vulkan 1.2, timeline semaphores, compute), best first. Throws DeviceError if
-// none can.
+// Best first (discrete, integrated, virtual, software, other; the loader's order among equals), and numbers
+// them so.
+void rank(std::vector<Candidate>& candidates);
+
+// The devices that can serve (Vulkan 1.2, timeline semaphores, compute), ranked. Throws DeviceError if none
+// can.
 std::vector<Candidate> candidates(const vk::raii::Instance& instance);
 
 // The one that DeviceOptions::select means. Throws DeviceError that lists what there is.

@@ -2,6 +2,7 @@
 // A compute pipeline made from embedded SPIR-V, and the buffers it is bound to.
 #include "server/vulkan/kernel.h"
 
+#include <algorithm>
 #include <cassert>
 
 #include <fmt/format.h>
@@ -70,6 +71,11 @@ Kernel::Kernel(const Device& device, const KernelDescription& description)
                                                                    .pName = "main",
                                                                    .pSpecializationInfo = &specialisation},
                                                          .layout = *layout_});
+    if (device.validates())
+      device.handle().setDebugUtilsObjectNameEXT(
+          {.objectType = vk::ObjectType::ePipeline,
+           .objectHandle = reinterpret_cast<std::uint64_t>(static_cast<VkPipeline>(*pipeline_)),
+           .pObjectName = name_.c_str()});
   } catch (const vk::SystemError& error) {
     throw std::runtime_error(
         fmt::format("kernel {} is refused by {}: {}", name_, device.info().name, error.what()));

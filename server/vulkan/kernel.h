@@ -16,13 +16,13 @@ namespace clothstream::vulkan {
 enum class BindingKind : std::uint8_t { storage, texels };
 
 struct KernelDescription {
-  const char* name = "";                 // for errors, validation and timings
-  std::span<const std::uint32_t> spirv;  // from clothstream_add_kernels
-  std::vector<BindingKind> bindings;     // binding 0, 1, 2, ... of set 0
+  const char* name = "";                      // for errors, validation and timings
+  std::span<const std::uint32_t> spirv = {};  // from clothstream_add_kernels
+  std::vector<BindingKind> bindings = {};     // binding 0, 1, 2, ... of set 0
   std::uint32_t pushConstantBytes = 0;
   // Invocations in x. Kernels declare `layout(local_size_x_id = 0) in;`: it is given as constant_id 0.
   std::uint32_t workgroupSize = 64;
-  std::vector<std::uint32_t> specialisation;  // constant_id 1, 2, 3, ...; pass floats by std::bit_cast
+  std::vector<std::uint32_t> specialisation = {};  // constant_id 1, 2, 3, ...; pass floats by std::bit_cast
 };
 
 // Throws std::runtime_error naming the kernel where the device refuses it.

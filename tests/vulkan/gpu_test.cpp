@@ -37,7 +37,8 @@ class SharedDevice : public ::testing::Environment {
 }  // namespace
 
 vulkan::Device& device() {
-  if (!sharedDevice) sharedDevice = std::make_unique<vulkan::Device>();
+  if (!sharedDevice)
+    sharedDevice = std::make_unique<vulkan::Device>(vulkan::DeviceOptions{.validation = true});
   return *sharedDevice;
 }
 

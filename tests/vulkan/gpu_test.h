@@ -14,8 +14,9 @@
 namespace clothstream::tests {
 
 // Linking `clothstream_gpu_test` makes a test fail when the validation layer says anything while it runs, and
-// the program when closing the shared device makes it speak (something still lives on it). Validation is on
-// where CLOTHSTREAM_VALIDATION=1 is in the environment, as it is under ctest.
+// the program when closing the shared device makes it speak (something still lives on it). The shared device
+// always validates; devices that tests open themselves do so under ctest, which sets
+// CLOTHSTREAM_VALIDATION=1.
 
 // The device of this test program: opened by the first call, closed after the last test. Throws
 // vulkan::DeviceError where there is none.

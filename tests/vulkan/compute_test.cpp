@@ -1,0 +1,299 @@
+// SPDX-License-Identifier: MIT
+// Buffers, kernels and recordings: what goes in comes out, in order.
+#include <bit>
+#include <numeric>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+
+#include "kernels/add_scaled.h"
+#include "kernels/count_up.h"
+#include "kernels/gather_texels.h"
+#include "server/vulkan/buffer.h"
+#include "server/vulkan/kernel.h"
+#include "server/vulkan/recorder.h"
+#include "tests/vulkan/gpu_test.h"
+
+namespace clothstream::vulkan {
+namespace {
+
+using ::testing::Each;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+using ComputeTest = tests::GpuTest;
+
+Buffer uploadOf(const std::vector<std::uint32_t>& values) {
+  Buffer buffer(tests::device(), BufferPurpose::upload, values.size() * sizeof(std::uint32_t));
+  std::copy(values.begin(), values.end(), buffer.mapped<std::uint32_t>().begin());
+  return buffer;
+}
+
+std::vector<std::uint32_t> countedFrom(std::uint32_t first, std::size_t count) {
+  std::vector<std::uint32_t> values(count);
+  std::iota(values.begin(), values.end(), first);
+  return values;
+}
+
+template <typename T>
+std::vector<T> contents(const Buffer& buffer) {
+  const std::span<T> mapped = buffer.mapped<T>();
+  return {mapped.begin(), mapped.end()};
+}
+
+Kernel countUp(std::uint32_t workgroupSize = 64) {
+  return {tests::device(),
+          {.name = "count_up",
+           .spirv = kernels::count_up,
+           .bindings = {BindingKind::storage, BindingKind::storage},
+           .pushConstantBytes = sizeof(std::uint32_t),
+           .workgroupSize = workgroupSize}};
+}
+
+TEST_F(ComputeTest, bufferContentsSurviveTheRoundTrip) {
+  constexpr std::size_t kCount = 1000;
+  constexpr std::size_t kBytes = kCount * sizeof(std::uint32_t);
+  for (const BufferPurpose purpose : {BufferPurpose::state, BufferPurpose::texels, BufferPurpose::indirect}) {
+    const Buffer upload = uploadOf(countedFrom(7, kCount));
+    const Buffer state(tests::device(), purpose, kBytes);
+    const Buffer readback(tests::device(), BufferPurpose::readback, kBytes);
+    EXPECT_THAT(state.mapped(), IsEmpty());
+    tests::run([&](Recorder& recorder) {
+      recorder.copy(upload, state, kBytes);
+      recorder.barrier();
+      recorder.copy(state, readback, kBytes);
+    });
+    EXPECT_EQ(contents<std::uint32_t>(readback), countedFrom(7, kCount));
+  }
+}
+
+TEST_F(ComputeTest, copiesAndFillsTouchOnlyTheirRange) {
+  const Buffer upload = uploadOf({1, 2, 3, 4});
+  const Buffer readback(tests::device(), BufferPurpose::readback, 6 * sizeof(std::uint32_t));
+  tests::run([&](Recorder& recorder) {
+    recorder.fill(readback, 9, readback.bytes());
+    recorder.barrier();
+    recorder.copy(upload, readback, 8, 4, 8);
+    recorder.fill(readback, 5, 4, 20);
+    recorder.copy(upload, readback, 0);
+  });
+  EXPECT_EQ(contents<std::uint32_t>(readback), (std::vector<std::uint32_t>{9, 9, 2, 3, 9, 5}));
+}
+
+TEST_F(ComputeTest, movedBufferKeepsItsContentsAndLeavesAnEmptyOne) {
+  Buffer from = uploadOf({1, 2, 3});
+  const Buffer to = std::move(from);
+  EXPECT_EQ(contents<std::uint32_t>(to), (std::vector<std::uint32_t>{1, 2, 3}));
+  EXPECT_EQ(Buffer().bytes(), 0u);
+  EXPECT_THAT(Buffer().mapped(), IsEmpty());
+}
+
+TEST_F(ComputeTest, kernelGetsSpecialisationPushConstantsAndWorkgroupSize) {
+  struct Push {
+    std::uint32_t count;
+    float factor;
+  };
+  constexpr std::uint32_t kCount = 100;  // no multiple of a workgroup
+  for (const std::uint32_t workgroupSize : {1u, 8u, 64u, 128u}) {
+    const Kernel kernel(tests::device(), {.name = "add_scaled",
+                                          .spirv = kernels::add_scaled,
+                                          .bindings = {BindingKind::storage},
+                                          .pushConstantBytes = sizeof(Push),
+                                          .workgroupSize = workgroupSize,
+                                          .specialisation = {3, std::bit_cast<std::uint32_t>(0.5f)}});
+    const Buffer values(tests::device(), BufferPurpose::readback, (kCount + 28) * sizeof(float));
+    std::fill(values.mapped<float>().begin(), values.mapped<float>().end(), 1.0f);
+    const Bindings bindings(tests::device(), kernel, {&values});
+    tests::run([&](Recorder& recorder) { recorder.dispatch(bindings, Push{kCount, 2.0f}, kCount); });
+    for (std::uint32_t i = 0; i < kCount + 28; ++i) {
+      const float expected = i < kCount ? 1.0f + 2.0f * (3.0f * static_cast<float>(i) + 0.5f) : 1.0f;
+      EXPECT_EQ(values.mapped<float>()[i], expected) << i;  // small integers and halves are exact
+    }
+  }
+}
+
+TEST_F(ComputeTest, kernelReadsTexelsThatCopiesWrote) {
+  constexpr std::uint32_t kCount = 300;
+  const Buffer upload(tests::device(), BufferPurpose::upload, kCount * 16);
+  for (std::uint32_t i = 0; i < kCount * 4; ++i) upload.mapped<float>()[i] = static_cast<float>(i);
+  const Buffer texels(tests::device(), BufferPurpose::texels, kCount * 16);
+  const Buffer sums(tests::device(), BufferPurpose::readback, kCount * sizeof(float));
+  const Kernel kernel(tests::device(), {.name = "gather_texels",
+                                        .spirv = kernels::gather_texels,
+                                        .bindings = {BindingKind::texels, BindingKind::storage},
+                                        .pushConstantBytes = sizeof(std::uint32_t)});
+  const Bindings bindings(tests::device(), kernel, {&texels, &sums});
+  tests::run([&](Recorder& recorder) {
+    recorder.copy(upload, texels, upload.bytes());
+    recorder.barrier();
+    recorder.dispatch(bindings, kCount, kCount);
+  });
+  for (std::uint32_t i = 0; i < kCount; ++i) {
+    const std::uint32_t texel = (i + 1) % kCount;
+    EXPECT_EQ(sums.mapped<float>()[i], static_cast<float>(16 * texel + 6))
+        << i;  // 4t + (4t+1) + (4t+2) + (4t+3)
+  }
+}
+
+// After k steps of to[i] = from[(i + 1) mod n] + 1 from from[i] = i, element i is (i + k) mod n + k.
+std::vector<std::uint32_t> countedUp(std::uint32_t count, std::uint32_t steps) {
+  std::vector<std::uint32_t> values(count);
+  for (std::uint32_t i = 0; i < count; ++i) values[i] = (i + steps) % count + steps;
+  return values;
+}
+
+TEST_F(ComputeTest, barriersOrderDependentDispatches) {
+  constexpr std::uint32_t kCount = 4096;
+  constexpr std::uint32_t kSteps = 100;
+  const Buffer upload = uploadOf(countedFrom(0, kCount));
+  const Buffer a(tests::device(), BufferPurpose::state, upload.bytes());
+  const Buffer b(tests::device(), BufferPurpose::state, upload.bytes());
+  const Buffer readback(tests::device(), BufferPurpose::readback, upload.bytes());
+  const Kernel kernel = countUp();
+  const Bindings there(tests::device(), kernel, {&a, &b});
+  const Bindings back(tests::device(), kernel, {&b, &a});
+  tests::run([&](Recorder& recorder) {
+    recorder.copy(upload, a, upload.bytes());
+    for (std::uint32_t step = 0; step < kSteps; ++step) {
+      recorder.barrier();
+      recorder.dispatch(step % 2 == 0 ? there : back, kCount, kCount);
+    }
+    recorder.barrier();
+    recorder.copy(a, readback, readback.bytes());
+  });
+  EXPECT_EQ(contents<std::uint32_t>(readback), countedUp(kCount, kSteps));
+}
+
+TEST_F(ComputeTest, recordingsSeeTheWorkOfEarlierOnesWithoutWaiting) {
+  constexpr std::uint32_t kCount = 4096;
+  const Buffer upload = uploadOf(countedFrom(0, kCount));
+  const Buffer a(tests::device(), BufferPurpose::state, upload.bytes());
+  const Buffer readback(tests::device(), BufferPurpose::readback, upload.bytes());
+  const Kernel kernel = countUp();
+  const Bindings first(tests::device(), kernel, {&upload, &a});
+  const Bindings second(tests::device(), kernel, {&a, &readback});
+  Recorder early(tests::device());
+  Recorder late(tests::device());
+  early.begin();
+  early.dispatch(first, kCount, kCount);
+  late.begin();
+  late.dispatch(second, kCount, kCount);
+  tests::device().submit(early);
+  tests::submitAndWait(tests::device(), late);
+  EXPECT_EQ(contents<std::uint32_t>(readback), countedUp(kCount, 2));
+}
+
+TEST_F(ComputeTest, recordingRunsAgainWhenItIsSubmittedAgain) {
+  constexpr std::uint32_t kCount = 64;
+  const Buffer a = uploadOf(countedFrom(0, kCount));
+  const Buffer b(tests::device(), BufferPurpose::readback, a.bytes());
+  const Kernel kernel = countUp();
+  const Bindings bindings(tests::device(), kernel, {&a, &b});
+  Recorder recorder(tests::device());
+  recorder.begin();
+  recorder.beginStage("count");
+  recorder.dispatch(bindings, kCount, kCount);
+  tests::submitAndWait(tests::device(), recorder);
+  std::fill(a.mapped<std::uint32_t>().begin(), a.mapped<std::uint32_t>().end(), 41u);
+  tests::submitAndWait(tests::device(), recorder);
+  EXPECT_THAT(contents<std::uint32_t>(b), Each(42u));
+}
+
+TEST_F(ComputeTest, deviceDecidesTheSizeOfAnIndirectDispatch) {
+  constexpr std::uint32_t kCount = 256;
+  const Buffer groups(tests::device(), BufferPurpose::indirect, 4 * sizeof(std::uint32_t));
+  const Buffer a = uploadOf(countedFrom(0, kCount));
+  const Buffer b(tests::device(), BufferPurpose::readback, a.bytes());
+  const Kernel kernel = countUp();
+  const Bindings bindings(tests::device(), kernel, {&a, &b});
+  tests::run([&](Recorder& recorder) {
+    recorder.fill(groups, 1, groups.bytes());
+    recorder.barrier();
+    recorder.fill(groups, 2, 4, 4);
+    recorder.fill(b, 0, b.bytes());
+    recorder.barrier();
+    recorder.dispatchIndirect(bindings, kCount, groups, 4);  // 2 x 1 x 1 workgroups of 64
+  });
+  std::vector<std::uint32_t> expected = countedUp(kCount, 1);
+  std::fill(expected.begin() + 128, expected.end(), 0u);
+  EXPECT_EQ(contents<std::uint32_t>(b), expected);
+}
+
+TEST_F(ComputeTest, stageTimesAddUpByNameAndFitIntoTheWaiting) {
+  constexpr std::size_t kHeavyBytes = 64u << 20;
+  constexpr std::size_t kLightBytes = 4u << 10;
+  const Buffer buffer(tests::device(), BufferPurpose::state, kHeavyBytes);
+  Recorder recorder(tests::device());
+  recorder.begin();
+  for (int i = 0; i < 2; ++i) {
+    recorder.beginStage("heavy");
+    recorder.fill(buffer, 1, kHeavyBytes);
+    recorder.barrier();
+    recorder.beginStage("light");
+    recorder.fill(buffer, 2, kLightBytes);
+    recorder.barrier();
+  }
+  const auto start = std::chrono::steady_clock::now();
+  tests::submitAndWait(tests::device(), recorder);
+  const std::chrono::duration<double> waited = std::chrono::steady_clock::now() - start;
+  const std::span<const StageTime> times = recorder.stageTimes();
+  if (times.empty()) GTEST_SKIP() << "the device has no timestamps";
+  ASSERT_EQ(times.size(), 2u);
+  EXPECT_EQ(times[0].stage, "heavy");
+  EXPECT_EQ(times[1].stage, "light");
+  EXPECT_GT(times[0].seconds, 0);
+  EXPECT_GE(times[1].seconds, 0);
+  // Both clocks count real time; a thousandth is more than they drift apart.
+  EXPECT_LE(times[0].seconds + times[1].seconds, waited.count() * 1.001);
+}
+
+TEST_F(ComputeTest, recordingWithoutStagesHasNoTimes) {
+  Recorder recorder(tests::device());
+  recorder.begin();
+  tests::submitAndWait(tests::device(), recorder);
+  EXPECT_THAT(recorder.stageTimes(), IsEmpty());
+}
+
+template <typename Act>
+std::string runtimeErrorOf(Act act) {
+  try {
+    act();
+  } catch (const std::runtime_error& error) {
+    return error.what();
+  }
+  return {};
+}
+
+TEST_F(ComputeTest, tooLargeABufferIsRefusedWithItsSizeAndTheLimit) {
+  const Limits& limits = tests::device().limits();
+  const std::size_t tooLarge = limits.maxStorageRange + 16;
+  const std::string error =
+      runtimeErrorOf([&] { const Buffer buffer(tests::device(), BufferPurpose::state, tooLarge); });
+  EXPECT_THAT(error, HasSubstr(std::to_string(tooLarge) + " bytes"));
+  EXPECT_THAT(error, HasSubstr(std::to_string(limits.maxStorageRange)));
+  EXPECT_THAT(runtimeErrorOf([&] {
+                const Buffer buffer(tests::device(), BufferPurpose::readback, std::size_t{1} << 60);
+              }),
+              HasSubstr(std::to_string(std::size_t{1} << 60)));
+}
+
+TEST_F(ComputeTest, tooLargeADispatchIsRefusedNamingTheKernel) {
+  const std::uint64_t limit = tests::device().limits().maxDispatchX;
+  const Buffer a = uploadOf({0});
+  const Kernel kernel = countUp(1);
+  const Bindings bindings(tests::device(), kernel, {&a, &a});
+  Recorder recorder(tests::device());
+  recorder.begin();
+  EXPECT_THAT(runtimeErrorOf([&] { recorder.dispatch(bindings, 1u, limit + 1); }),
+              AllOf(HasSubstr("count_up"), HasSubstr(std::to_string(limit + 1))));
+}
+
+TEST_F(ComputeTest, tooLargeAWorkgroupIsRefusedNamingTheKernel) {
+  const std::uint32_t tooLarge = tests::device().limits().maxWorkgroupInvocations + 1;
+  EXPECT_THAT(runtimeErrorOf([&] { countUp(tooLarge); }),
+              AllOf(HasSubstr("count_up"), HasSubstr(std::to_string(tooLarge))));
+}
+
+}  // namespace
+}  // namespace clothstream::vulkan
