@@ -117,7 +117,11 @@ void writeKeyFrameRequest(std::string& out, std::uint32_t epoch) {
 }
 
 void writeListScenes(std::string& out, std::uint64_t requestId) {
-  writeMessage(out, requestId, kListScenes, [](Writer&) {});
+  out.clear();
+  Writer message(out);
+  message.add_uint64(1, requestId);
+  // Said outright: a Writer leaves out a submessage that nothing was added to.
+  message.add_message(kListScenes, std::string());
 }
 
 }  // namespace clothstream::client

@@ -156,6 +156,7 @@ bool appendPositions(Bytes bytes, std::vector<float>& out) {
 
 tl::expected<Description, std::string> readDescription(Bytes message) {
   Description description;
+  description.layout.maxError = 0;  // what is not on the wire is zero
   std::vector<ClothMessage> cloths;
   Bytes definition;
   if (!readParts(message, description, cloths, definition))

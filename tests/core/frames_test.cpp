@@ -1,0 +1,214 @@
+// SPDX-License-Identifier: MIT
+// Frames: decoding, acknowledgements, requests for key frames, hashes, statistics.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/core/scripted_server.h"
+
+namespace clothstream::client {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::SizeIs;
+
+constexpr auto kFrame = static_cast<std::uint32_t>(CS_EVENT_FRAME);
+constexpr std::uint64_t kMs = 1000;
+
+struct Joined {
+  explicit Joined(ScriptedStream stream = {}) : server(std::move(stream)) { client.join(server); }
+
+  std::vector<std::uint64_t> acks() {
+    std::vector<std::uint64_t> ticks;
+    for (const v1::ClientMessage& message : client.outgoing()) {
+      if (message.has_frame_ack()) ticks.push_back(message.frame_ack().tick());
+    }
+    return ticks;
+  }
+
+  std::size_t keyFrameRequests() {
+    std::size_t count = 0;
+    for (const v1::ClientMessage& message : client.outgoing()) count += message.has_key_frame_request();
+    return count;
+  }
+
+  ScriptedServer server;
+  ClientUnderTest client;
+};
+
+class DecodedFrames : public ::testing::TestWithParam<codec::NormalMode> {};
+
+TEST_P(DecodedFrames, AreWithinThePromisedErrorAndAcknowledged) {
+  Joined joined({.normals = GetParam(), .cloths = {{"a", 9, 7}, {"b", 4, 5}}});
+  for (std::uint64_t tick = 1; tick <= 20; ++tick) {
+    ASSERT_EQ(joined.client.receive(joined.server.frame(tick), tick * 14 * kMs), kFrame);
+    EXPECT_THAT(joined.acks(), ElementsAre(tick));
+    const std::vector<float>& sent = joined.server.positions();
+    const float* decoded = cs_positions(joined.client.get());
+    // Half a lattice step, and the rounding of a float of about 2 m.
+    for (std::size_t i = 0; i < sent.size(); ++i) ASSERT_NEAR(decoded[i], sent[i], 0.0005f + 3e-7f) << i;
+    const float* normals = cs_normals(joined.client.get());
+    for (std::size_t i = 0; i < sent.size(); i += 3)
+      ASSERT_NEAR(std::hypot(normals[i], normals[i + 1], normals[i + 2]), 1, 1e-5);
+  }
+  const cs_statistics statistics = joined.client.statistics();
+  EXPECT_EQ(statistics.tick, 20u);
+  EXPECT_EQ(statistics.frames, 20u);
+  EXPECT_EQ(statistics.key_frames, 1u);
+  EXPECT_EQ(statistics.dropped, 0u);
+  EXPECT_EQ(statistics.decode_errors, 0u);
+  EXPECT_EQ(statistics.hash_mismatches, 0u);
+}
+
+INSTANTIATE_TEST_SUITE_P(Normals, DecodedFrames, ::testing::Values(codec::NormalMode::none, codec::NormalMode::octahedral),
+                         [](const auto& mode) { return mode.param == codec::NormalMode::none ? "Computed" : "Sent"; });
+
+TEST(Frames, MoveColliders) {
+  Joined joined;
+  ASSERT_EQ(cs_collider_count(joined.client.get()), 1u);
+  joined.client.receive(joined.server.frame(5));
+  cs_collider collider;
+  ASSERT_EQ(cs_get_collider(joined.client.get(), 0, &collider), 1);
+  EXPECT_STREQ(collider.name, "ball");
+  EXPECT_EQ(collider.position[0], 5);
+  EXPECT_EQ(collider.orientation[3], 1);
+  EXPECT_EQ(collider.radius, 0.25f);
+  EXPECT_EQ(cs_get_collider(joined.client.get(), 1, &collider), 0);
+}
+
+TEST(Frames, OnlyTheNewestIsAcknowledgedWhereTheTransportIsBehind) {
+  Joined joined;
+  for (std::uint64_t tick = 1; tick <= 3; ++tick) joined.client.receive(joined.server.frame(tick));
+  EXPECT_THAT(joined.acks(), ElementsAre(3));
+}
+
+TEST(Frames, CountsWhatNeverCameByTheGapsInTheirTicks) {
+  Joined joined({.simulationRate = 240, .streamRate = 80});  // a frame every 3 ticks
+  joined.client.receive(joined.server.frame(3));
+  joined.client.receive(joined.server.frame(6));
+  EXPECT_EQ(joined.client.statistics().dropped, 0u);
+  joined.client.receive(joined.server.frame(15, codec::PacketKind::key));
+  EXPECT_EQ(joined.client.statistics().dropped, 2u);
+}
+
+TEST(Frames, AsksForAKeyFrameOnceWhenAReferenceIsMissing) {
+  Joined joined;
+  joined.client.receive(joined.server.frame(1), 0);
+  joined.server.frame(2);  // lost
+  EXPECT_EQ(joined.client.receive(joined.server.frame(3), 10 * kMs), 0u);
+  const auto messages = joined.client.outgoing();
+  ASSERT_THAT(messages, SizeIs(2));
+  EXPECT_TRUE(messages[0].has_key_frame_request());
+  EXPECT_EQ(messages[0].key_frame_request().epoch(), 7u);
+  EXPECT_EQ(messages[1].frame_ack().tick(), 1u);
+  joined.client.receive(joined.server.frame(4), 500 * kMs);
+  EXPECT_EQ(joined.keyFrameRequests(), 0u) << "one is outstanding";
+  EXPECT_EQ(joined.client.statistics().decode_errors, 2u);
+  EXPECT_EQ(joined.client.receive(joined.server.frame(5, codec::PacketKind::key), 520 * kMs), kFrame);
+  EXPECT_EQ(joined.client.receive(joined.server.frame(6), 530 * kMs), kFrame);
+}
+
+TEST(Frames, AsksNotMoreOftenThanEvery100MsAndAgainAfterASecondWithoutAKeyFrame) {
+  Joined joined;
+  joined.client.receive(joined.server.frame(1), 0);
+  joined.server.frame(2);
+  joined.client.receive(joined.server.frame(3), 10 * kMs);
+  EXPECT_EQ(joined.keyFrameRequests(), 1u);
+  joined.client.receive(joined.server.frame(4), 1009 * kMs);
+  EXPECT_EQ(joined.keyFrameRequests(), 0u);
+  joined.client.receive(joined.server.frame(5), 1010 * kMs);
+  EXPECT_EQ(joined.keyFrameRequests(), 1u);
+  joined.client.receive(joined.server.frame(6, codec::PacketKind::key), 1020 * kMs);
+  joined.server.frame(7);
+  joined.client.receive(joined.server.frame(8), 1109 * kMs);
+  EXPECT_EQ(joined.keyFrameRequests(), 0u) << "99 ms after the last one";
+  joined.client.receive(joined.server.frame(9), 1110 * kMs);
+  EXPECT_EQ(joined.keyFrameRequests(), 1u);
+}
+
+TEST(Frames, AHashThatIsNotTheServersIsCountedAndAnsweredByARequest) {
+  Joined joined;
+  v1::Frame frame = joined.server.frameMessage(1, codec::PacketKind::key);
+  EXPECT_EQ(joined.client.receive(ScriptedServer::serialise(frame)), kFrame);
+  EXPECT_EQ(cs_reconstruction_hash(joined.client.get()), frame.reconstruction_hash());
+  EXPECT_EQ(joined.keyFrameRequests(), 0u);
+  frame = joined.server.frameMessage(2, codec::PacketKind::predicted);
+  frame.set_reconstruction_hash(frame.reconstruction_hash() + 1);
+  EXPECT_EQ(joined.client.receive(ScriptedServer::serialise(frame)), kFrame);
+  EXPECT_EQ(joined.client.statistics().hash_mismatches, 1u);
+  EXPECT_EQ(joined.keyFrameRequests(), 1u);
+}
+
+TEST(Frames, APacketThatIsNoneIsRefusedAndTheStreamGoesOn) {
+  Joined joined;
+  joined.client.receive(joined.server.frame(1));
+  v1::Frame garbage;
+  garbage.set_packet("garbage");
+  EXPECT_EQ(joined.client.receive(ScriptedServer::serialise(garbage)), 0u);
+  EXPECT_EQ(joined.client.statistics().decode_errors, 1u);
+  EXPECT_EQ(cs_get_state(joined.client.get()), CS_STATE_JOINED);
+  EXPECT_EQ(joined.client.receive(joined.server.frame(2)), kFrame);
+}
+
+TEST(Frames, OneThatCameBeforeIsLeftAside) {
+  Joined joined;
+  const std::string first = joined.server.frame(1);
+  joined.client.receive(first);
+  joined.client.receive(joined.server.frame(2));
+  joined.acks();
+  EXPECT_EQ(joined.client.receive(first), 0u);
+  EXPECT_THAT(joined.acks(), IsEmpty());
+  EXPECT_EQ(joined.client.statistics().decode_errors, 0u);
+}
+
+TEST(Frames, OfAnotherEpochAreRefused) {
+  Joined joined;
+  ScriptedServer other({.epoch = 6});
+  EXPECT_EQ(joined.client.receive(other.frame(1)), 0u);
+  EXPECT_EQ(joined.client.statistics().decode_errors, 1u);
+  EXPECT_EQ(joined.keyFrameRequests(), 1u);
+}
+
+TEST(Statistics, RatesAreThoseOfTheLastSecond) {
+  Joined joined;
+  std::uint64_t nowUs = 0;
+  std::uint64_t bytes = 0, bytesOfLastSecond = 0;
+  for (std::uint64_t tick = 1; tick <= 100; ++tick) {
+    nowUs = tick * 20 * kMs;  // 50 frames/s
+    const v1::Frame frame = joined.server.frameMessage(tick, codec::PacketKind::predicted);
+    joined.client.receive(ScriptedServer::serialise(frame), nowUs);
+    bytes += frame.packet().size();
+    if (tick > 50) bytesOfLastSecond += frame.packet().size();
+  }
+  const cs_statistics statistics = joined.client.statistics(nowUs);
+  EXPECT_DOUBLE_EQ(statistics.frames_per_second, 50);
+  EXPECT_NEAR(statistics.kbit_per_second, static_cast<double>(bytesOfLastSecond) * 8 / 1000, 1e-9);
+  EXPECT_NEAR(statistics.bits_per_vertex, static_cast<double>(bytes) * 8 / (100 * 63), 1e-9);
+  EXPECT_EQ(statistics.bytes, bytes);
+  EXPECT_DOUBLE_EQ(cs_stream_seconds(joined.client.get()), 99 * 0.02);
+  // A stream that stands still has no rate.
+  EXPECT_EQ(joined.client.statistics(nowUs + 1000 * kMs).frames_per_second, 0);
+}
+
+TEST(Statistics, AStreamThatHasJustBegunShowsItsRate) {
+  Joined joined;
+  for (std::uint64_t tick = 1; tick <= 25; ++tick) joined.client.receive(joined.server.frame(tick), tick * 20 * kMs);
+  EXPECT_NEAR(joined.client.statistics(500 * kMs).frames_per_second, 50, 2.1);
+}
+
+TEST(Statistics, DecodeTimeNeedsAClock) {
+  Joined joined;
+  joined.client.receive(joined.server.frame(1));
+  EXPECT_EQ(joined.client.statistics().decode_ms, 0);
+  static std::uint64_t clockUs;
+  clockUs = 0;
+  cs_set_clock(joined.client.get(), [] { return clockUs += 500; });
+  joined.client.receive(joined.server.frame(2));
+  EXPECT_DOUBLE_EQ(joined.client.statistics().decode_ms, 0.5);
+}
+
+}  // namespace
+}  // namespace clothstream::client

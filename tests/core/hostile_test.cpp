@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: MIT
+// Bytes that no server would send: whatever comes, the client says so and lives.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "clients/core/wire.h"
+#include "tests/core/scripted_server.h"
+
+namespace clothstream::client {
+namespace {
+
+using ::testing::HasSubstr;
+
+// One of each kind of message, in an order in which a client takes them all.
+std::vector<std::string> session() {
+  ScriptedServer server({.normals = codec::NormalMode::octahedral, .cloths = {{"a", 4, 3}, {"b", 3, 3}}});
+  std::vector<std::string> messages{server.welcome()};
+  for (std::string& chunk : server.chunks(400)) messages.push_back(std::move(chunk));
+  messages.push_back(server.frame(1));
+  messages.push_back(server.frame(2));
+  messages.push_back(ScriptedServer::pong(1, 2));
+  v1::ServerMessage message;
+  message.mutable_notice()->set_text("notice");
+  messages.push_back(message.SerializeAsString());
+  v1::ParameterChange& change = *message.mutable_parameter_changed()->mutable_change();
+  change.mutable_gravity()->mutable_value()->set_y(-1);
+  change.add_cloths()->mutable_bend()->set_stiffness(1);
+  messages.push_back(message.SerializeAsString());
+  message.mutable_list_scenes()->add_scenes()->set_name("curtain");
+  messages.push_back(message.SerializeAsString());
+  messages.push_back(ScriptedServer::error(v1::ERROR_CODE_INVALID_ARGUMENT, "no", false));
+  return messages;
+}
+
+// Everything that can be read is read, so that a sanitizer sees it.
+void readAll(ClientUnderTest& client) {
+  const std::uint32_t vertices = cs_vertex_count(client.get());
+  float sum = 0;
+  for (std::uint32_t i = 0; i < 3 * vertices; ++i)
+    sum += cs_positions(client.get())[i] + cs_normals(client.get())[i];
+  std::uint32_t indices = 0;
+  const std::uint32_t* triangles = cs_triangles(client.get(), &indices);
+  for (std::uint32_t i = 0; i < indices; ++i) ASSERT_LT(triangles[i], vertices);
+  cs_collider collider;
+  for (std::uint32_t i = 0; cs_get_collider(client.get(), i, &collider) != 0; ++i) sum += collider.radius;
+  volatile float sink = sum;
+  static_cast<void>(sink);
+  client.outgoing();
+}
+
+// Messages before `index` as they are, then `spoilt`, then the rest.
+void runSession(const std::vector<std::string>& messages, std::size_t index, const std::string& spoilt) {
+  ClientUnderTest client;
+  for (std::size_t i = 0; i < messages.size(); ++i) {
+    client.receive(i == index ? spoilt : messages[i], i * 1000);
+    cs_update(client.get(), i * 1000);
+  }
+  readAll(client);
+}
+
+TEST(Hostile, EveryTruncationOfEveryMessage) {
+  const std::vector<std::string> messages = session();
+  for (std::size_t i = 0; i < messages.size(); ++i) {
+    for (std::size_t length = 0; length < messages[i].size(); ++length)
+      runSession(messages, i, messages[i].substr(0, length));
+  }
+}
+
+TEST(Hostile, EveryBitOfEveryMessageFlipped) {
+  const std::vector<std::string> messages = session();
+  for (std::size_t i = 0; i < messages.size(); ++i) {
+    for (std::size_t bit = 0; bit < 8 * messages[i].size(); ++bit) {
+      std::string spoilt = messages[i];
+      spoilt[bit / 8] = static_cast<char>(spoilt[bit / 8] ^ (1 << (bit % 8)));
+      runSession(messages, i, spoilt);
+    }
+  }
+}
+
+TEST(Hostile, RandomBytesOverRandomPlaces) {
+  const std::vector<std::string> messages = session();
+  std::mt19937 random(11);
+  const auto below = [&](std::size_t bound) { return std::uniform_int_distribution<std::size_t>(0, bound - 1)(random); };
+  for (int run = 0; run < 5000; ++run) {
+    const std::size_t index = below(messages.size());
+    std::string spoilt = messages[index];
+    for (std::size_t changes = 1 + below(8); changes > 0 && !spoilt.empty(); --changes)
+      spoilt[below(spoilt.size())] = static_cast<char>(below(256));
+    runSession(messages, index, spoilt);
+  }
+}
+
+TEST(Hostile, BytesThatAreNoMessageEndTheClientWithAReason) {
+  ClientUnderTest client;
+  EXPECT_EQ(client.receive("HTTP/1.1 400 Bad Request\r\n"), static_cast<std::uint32_t>(CS_EVENT_ERROR));
+  EXPECT_EQ(cs_get_state(client.get()), CS_STATE_FAILED);
+  EXPECT_THAT(cs_error_text(client.get()), HasSubstr("is it a clothstream-server"));
+  EXPECT_EQ(client.receive(ScriptedServer().welcome()), 0u) << "nothing more is taken";
+}
+
+TEST(Hostile, FieldsAndBodiesThatAreNotKnownAreSkipped) {
+  // Field 500 as a varint, field 501 as bytes, field 502 as 64 bits, field 503 as 32 bits.
+  const std::string unknown("\xa0\x1f\x05\xaa\x1f\x02xy\xb1\x1f"
+                            "12345678\xbd\x1f"
+                            "1234",
+                            24);
+  ASSERT_TRUE(wellFormed(Bytes(unknown)));
+  ScriptedServer server;
+  ClientUnderTest client;
+  EXPECT_EQ(client.receive(unknown), 0u);
+  client.receive(server.welcome() + unknown);
+  client.receive(server.chunks()[0] + unknown);
+  EXPECT_EQ(client.receive(server.frame(1) + unknown), static_cast<std::uint32_t>(CS_EVENT_FRAME));
+}
+
+TEST(Wire, RefusesWhatProtobufWouldRefuse) {
+  const auto isWhole = [](std::string_view bytes) { return wellFormed(Bytes(bytes.data(), bytes.size())); };
+  using namespace std::string_view_literals;
+  EXPECT_TRUE(isWhole(""sv));
+  EXPECT_TRUE(isWhole("\x08\x01"sv));
+  EXPECT_TRUE(isWhole("\x08\xff\xff\xff\xff\xff\xff\xff\xff\xff\x01"sv));
+  EXPECT_FALSE(isWhole("\x08\xff\xff\xff\xff\xff\xff\xff\xff\xff\xff\x01"sv)) << "a varint of 11 bytes";
+  EXPECT_FALSE(isWhole("\x08"sv));
+  EXPECT_FALSE(isWhole("\x08\x80"sv));
+  EXPECT_FALSE(isWhole("\x00\x01"sv)) << "field 0";
+  EXPECT_FALSE(isWhole("\xc0\xa3\x09\x01"sv)) << "field 19000";
+  EXPECT_FALSE(isWhole("\x0b\x0c"sv)) << "a group";
+  EXPECT_FALSE(isWhole("\x0a\x02x"sv));
+  EXPECT_FALSE(isWhole("\x0a\xff\xff\xff\xff\xff\xff\xff\xff\xff\x01"sv)) << "a length of 2^64 - 1";
+  EXPECT_FALSE(isWhole("\x0d\x01\x02\x03"sv));
+  EXPECT_FALSE(isWhole("\x09\x01\x02\x03\x04\x05\x06\x07"sv));
+}
+
+}  // namespace
+}  // namespace clothstream::client

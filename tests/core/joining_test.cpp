@@ -1,0 +1,244 @@
+// SPDX-License-Identifier: MIT
+// Hello, Welcome, the description in chunks.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "clients/core/content_assembly.h"
+#include "tests/core/scripted_server.h"
+
+namespace clothstream::client {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::SizeIs;
+
+TEST(Joining, SaysHelloFirstAndOnlyThat) {
+  ClientUnderTest client("flag");
+  cs_update(client.get(), 1'000'000);
+  const auto messages = client.outgoing();
+  ASSERT_THAT(messages, SizeIs(1));
+  ASSERT_TRUE(messages[0].has_hello());
+  EXPECT_EQ(messages[0].hello().protocol_version(), CS_PROTOCOL_VERSION);
+  EXPECT_THAT(messages[0].hello().codecs(), ElementsAre(1));
+  EXPECT_EQ(messages[0].hello().scene(), "flag");
+  EXPECT_EQ(messages[0].hello().client_name(), "test");
+  EXPECT_NE(messages[0].request_id(), 0u);
+}
+
+TEST(Joining, IsJoinedOnceTheDescriptionIsWhole) {
+  ScriptedServer server;
+  ClientUnderTest client;
+  EXPECT_EQ(client.receive(server.welcome()), 0u);
+  const auto chunks = server.chunks(100);
+  ASSERT_GT(chunks.size(), 3u);
+  for (std::size_t i = 0; i + 1 < chunks.size(); ++i) {
+    EXPECT_EQ(client.receive(chunks[i]), 0u);
+    EXPECT_EQ(cs_get_state(client.get()), CS_STATE_JOINING);
+  }
+  EXPECT_EQ(client.receive(chunks.back()), static_cast<std::uint32_t>(CS_EVENT_DESCRIPTION));
+  EXPECT_EQ(cs_get_state(client.get()), CS_STATE_JOINED);
+  EXPECT_STREQ(cs_scene_name(client.get()), "curtain");
+  EXPECT_STREQ(cs_server_name(client.get()), "scripted 1");
+  EXPECT_STREQ(cs_device_name(client.get()), "none");
+  EXPECT_EQ(cs_participant_id(client.get()), 42u);
+  EXPECT_EQ(cs_stream_rate(client.get()), 72u);
+}
+
+TEST(Joining, ShowsRestPositionsUntilTheFirstFrame) {
+  ScriptedServer server;
+  ClientUnderTest client;
+  const std::vector<float> rest = server.positions();
+  client.join(server);
+  ASSERT_EQ(cs_vertex_count(client.get()), 63u);
+  EXPECT_EQ(std::vector(cs_positions(client.get()), cs_positions(client.get()) + rest.size()), rest);
+  // A sheet that waves by a few centimetres faces +Z everywhere.
+  for (std::uint32_t i = 0; i < 63; ++i) EXPECT_GT(cs_normals(client.get())[3 * i + 2], 0.9f);
+}
+
+TEST(Joining, GivesTrianglesOfEveryClothInItsPlace) {
+  ScriptedServer server({.cloths = {{"a", 2, 3}, {"b", 2, 2}}});
+  ClientUnderTest client;
+  client.join(server);
+  std::uint32_t count = 0;
+  const std::uint32_t* triangles = cs_triangles(client.get(), &count);
+  EXPECT_THAT(std::vector(triangles, triangles + count),
+              ElementsAre(0, 3, 1, 1, 3, 4, 1, 4, 2, 2, 4, 5, 6, 8, 7, 7, 8, 9));
+  cs_cloth cloth;
+  ASSERT_EQ(cs_cloth_count(client.get()), 2u);
+  ASSERT_EQ(cs_get_cloth(client.get(), 1, &cloth), 1);
+  EXPECT_STREQ(cloth.name, "b");
+  EXPECT_EQ(cloth.first_vertex, 6u);
+  EXPECT_EQ(cloth.vertex_count, 4u);
+  EXPECT_EQ(cloth.first_index, 12u);
+  EXPECT_EQ(cloth.index_count, 6u);
+  EXPECT_EQ(cs_get_cloth(client.get(), 2, &cloth), 0);
+}
+
+TEST(Joining, TakesANewDescriptionWhole) {
+  ClientUnderTest client;
+  client.join(ScriptedServer());
+  ScriptedServer next({.epoch = 8, .cloths = {{"a", 3, 3}, {"b", 2, 2}}});
+  for (const std::string& chunk : next.chunks(64, 9)) client.receive(chunk);
+  EXPECT_EQ(cs_vertex_count(client.get()), 13u);
+  EXPECT_EQ(client.receive(next.frame(1)), static_cast<std::uint32_t>(CS_EVENT_FRAME));
+}
+
+TEST(Joining, RefusesAnotherProtocolVersionAndSaysWhichOnesThereAre) {
+  v1::ServerMessage message;
+  message.mutable_welcome()->set_protocol_version(9);
+  message.mutable_welcome()->set_codec(1);
+  ClientUnderTest client;
+  EXPECT_EQ(client.receive(message.SerializeAsString()), static_cast<std::uint32_t>(CS_EVENT_ERROR));
+  EXPECT_EQ(cs_get_state(client.get()), CS_STATE_FAILED);
+  EXPECT_THAT(cs_error_text(client.get()), HasSubstr("version 9"));
+  EXPECT_THAT(cs_error_text(client.get()), HasSubstr("version 1"));
+  EXPECT_THAT(client.outgoing(), IsEmpty());
+}
+
+TEST(Joining, RefusesACodecItDoesNotDecode) {
+  v1::ServerMessage message;
+  message.mutable_welcome()->set_protocol_version(1);
+  message.mutable_welcome()->set_codec(5);
+  ClientUnderTest client;
+  client.receive(message.SerializeAsString());
+  EXPECT_EQ(cs_get_state(client.get()), CS_STATE_FAILED);
+  EXPECT_THAT(cs_error_text(client.get()), HasSubstr("codec 5"));
+}
+
+TEST(Joining, PassesOnWhyTheServerRefuses) {
+  ClientUnderTest client;
+  client.receive(ScriptedServer::error(v1::ERROR_CODE_NOT_FOUND, "hello.scene: there is no 'x'; there is curtain", true));
+  EXPECT_EQ(cs_get_state(client.get()), CS_STATE_FAILED);
+  EXPECT_STREQ(cs_error_text(client.get()), "hello.scene: there is no 'x'; there is curtain");
+  EXPECT_EQ(cs_error_code(client.get()), static_cast<std::uint32_t>(v1::ERROR_CODE_NOT_FOUND));
+}
+
+TEST(Joining, AnErrorThatIsNotFatalEndsNothing) {
+  ClientUnderTest client;
+  client.join(ScriptedServer());
+  EXPECT_EQ(client.receive(ScriptedServer::error(v1::ERROR_CODE_INVALID_ARGUMENT, "no", false)),
+            static_cast<std::uint32_t>(CS_EVENT_ERROR));
+  EXPECT_EQ(cs_get_state(client.get()), CS_STATE_JOINED);
+}
+
+TEST(Joining, RefusesFramesAndDescriptionsOutOfOrder) {
+  ScriptedServer server;
+  ClientUnderTest early;
+  early.receive(server.chunks()[0]);
+  EXPECT_THAT(cs_error_text(early.get()), HasSubstr("before its Welcome"));
+  ClientUnderTest frameFirst;
+  frameFirst.receive(server.welcome());
+  frameFirst.receive(server.frame(1));
+  EXPECT_THAT(cs_error_text(frameFirst.get()), HasSubstr("before the description"));
+  ClientUnderTest twice;
+  twice.receive(server.welcome());
+  twice.receive(server.welcome());
+  EXPECT_THAT(cs_error_text(twice.get()), HasSubstr("twice"));
+}
+
+// ---- Descriptions that are wrong
+
+struct WrongDescription {
+  const char* name;
+  void (*spoil)(v1::StreamDescription&);
+  const char* says;
+};
+
+class Descriptions : public ::testing::TestWithParam<WrongDescription> {};
+
+TEST_P(Descriptions, AreRefusedWithAReason) {
+  ScriptedServer server;
+  v1::StreamDescription description = server.description();
+  GetParam().spoil(description);
+  ClientUnderTest client;
+  client.receive(server.welcome());
+  client.receiveAll(chunksOf(description.SerializeAsString(), 1000, 1));
+  EXPECT_EQ(cs_get_state(client.get()), CS_STATE_FAILED);
+  EXPECT_THAT(cs_error_text(client.get()), HasSubstr(GetParam().says));
+}
+
+std::string floats(std::initializer_list<float> values) {
+  return std::string(reinterpret_cast<const char*>(values.begin()), values.size() * sizeof(float));
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Wrong, Descriptions,
+    ::testing::Values(
+        WrongDescription{"no_cloth", [](v1::StreamDescription& d) { d.clear_cloths(); }, "0 cloths"},
+        WrongDescription{"a_codec", [](v1::StreamDescription& d) { d.set_codec(2); }, "codec is 2"},
+        WrongDescription{"no_rate", [](v1::StreamDescription& d) { d.set_simulation_rate(0); }, "simulation_rate is 0"},
+        WrongDescription{"rate", [](v1::StreamDescription& d) { d.set_stream_rate(71); }, "stream_rate is 71"},
+        WrongDescription{"rows", [](v1::StreamDescription& d) { d.mutable_cloths(0)->set_rows(8); }, "rows x columns"},
+        WrongDescription{"overflow",
+                         [](v1::StreamDescription& d) {
+                           d.mutable_cloths(0)->set_rows(0x10000);
+                           d.mutable_cloths(0)->set_columns(0x10000);
+                         },
+                         "rows x columns"},
+        WrongDescription{"too_many_vertices",
+                         [](v1::StreamDescription& d) { d.mutable_cloths(0)->set_vertex_count(4'000'000'000); },
+                         "rest_positions has 756 bytes for 4000000000 vertices"},
+        WrongDescription{"max_error", [](v1::StreamDescription& d) { d.set_max_error(0); }, "max_error"},
+        WrongDescription{"not_finite",
+                         [](v1::StreamDescription& d) {
+                           v1::ClothDescription& cloth = *d.mutable_cloths(0);
+                           cloth.set_rows(2);
+                           cloth.set_columns(2);
+                           cloth.set_vertex_count(4);
+                           cloth.set_rest_positions(floats({0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 1, NAN}));
+                         },
+                         "cloth \"curtain\": a rest position is not finite"}),
+    [](const auto& instance) { return std::string(instance.param.name); });
+
+// ---- Chunks
+
+Chunk chunk(std::uint64_t id, std::uint32_t index, std::uint32_t count, std::uint64_t total, const std::string& data) {
+  return {.contentId = id, .kind = 1, .index = index, .count = count, .totalBytes = total, .data = Bytes(data)};
+}
+
+TEST(ContentAssembly, PutsInterleavedContentsTogether) {
+  ContentAssembly assembly;
+  EXPECT_EQ(assembly.add(chunk(1, 0, 2, 4, "ab")).value(), std::nullopt);
+  EXPECT_EQ(assembly.add(chunk(2, 0, 3, 3, "x")).value(), std::nullopt);
+  EXPECT_EQ(assembly.add(chunk(1, 1, 2, 4, "cd")).value(), "abcd");
+  EXPECT_EQ(assembly.add(chunk(2, 1, 3, 3, "y")).value(), std::nullopt);
+  EXPECT_EQ(assembly.add(chunk(2, 2, 3, 3, "z")).value(), "xyz");
+  // The id is free again.
+  EXPECT_EQ(assembly.add(chunk(1, 0, 1, 1, "q")).value(), "q");
+}
+
+TEST(ContentAssembly, LeavesUnknownKindsAside) {
+  ContentAssembly assembly;
+  Chunk unknown = chunk(1, 5, 2, ~0ull, "ab");
+  unknown.kind = 77;
+  EXPECT_EQ(assembly.add(unknown).value(), std::nullopt);
+}
+
+TEST(ContentAssembly, RefusesPiecesThatDoNotFit) {
+  const auto refusal = [](std::initializer_list<Chunk> pieces) {
+    ContentAssembly assembly;
+    std::string text;
+    for (const Chunk& piece : pieces) {
+      if (const auto result = assembly.add(piece); !result) text = result.error();
+    }
+    return text;
+  };
+  EXPECT_THAT(refusal({chunk(1, 1, 2, 4, "ab")}), HasSubstr("first piece is missing"));
+  EXPECT_THAT(refusal({chunk(1, 0, 3, 6, "ab"), chunk(1, 2, 3, 6, "cd")}), HasSubstr("expected piece 1"));
+  EXPECT_THAT(refusal({chunk(1, 0, 3, 6, "ab"), chunk(1, 1, 4, 6, "cd")}), HasSubstr("another size"));
+  EXPECT_THAT(refusal({chunk(1, 0, 0, 0, "")}), HasSubstr("at least one"));
+  EXPECT_THAT(refusal({chunk(1, 0, 2, 3, "abcd")}), HasSubstr("more bytes than the 3"));
+  EXPECT_THAT(refusal({chunk(1, 0, 1, 3, "ab")}), HasSubstr("2 bytes of 3"));
+  EXPECT_THAT(refusal({chunk(1, 0, 2, 256ull * 1024 * 1024 + 1, "ab")}), HasSubstr("268435457 bytes announced"));
+  EXPECT_THAT(refusal({chunk(1, 0, 2, 256ull * 1024 * 1024, "ab"), chunk(2, 0, 2, 1, "")}), HasSubstr("together"));
+  const std::string large(256 * 1024 + 1, 'x');
+  EXPECT_THAT(refusal({chunk(1, 0, 2, large.size(), large)}), HasSubstr("at most 262144"));
+  EXPECT_THAT(refusal({chunk(1, 0, 2, 4, ""), chunk(2, 0, 2, 4, ""), chunk(3, 0, 2, 4, ""), chunk(4, 0, 2, 4, ""),
+                       chunk(5, 0, 2, 4, "")}),
+              HasSubstr("more than 4"));
+}
+
+}  // namespace
+}  // namespace clothstream::client

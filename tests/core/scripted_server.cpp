@@ -1,0 +1,183 @@
+// SPDX-License-Identifier: MIT
+// Waves on a grid, encoded and put into messages.
+#include "tests/core/scripted_server.h"
+
+#include <cmath>
+#include <cstring>
+#include <memory>
+#include <stdexcept>
+
+namespace clothstream::client {
+namespace {
+
+std::string serialised(const v1::ServerMessage& message) { return message.SerializeAsString(); }
+
+}  // namespace
+
+ScriptedServer::ScriptedServer(ScriptedStream stream) : stream_(std::move(stream)) {
+  layout_.epoch = stream_.epoch;
+  layout_.normals = stream_.normals;
+  for (const ClothSize& cloth : stream_.cloths)
+    layout_.cloths.push_back({cloth.rows * cloth.columns, cloth.rows, cloth.columns});
+  encoder_ = codec::Encoder::make(layout_);
+  if (!encoder_) throw std::invalid_argument("no stream can have this layout");
+  pose(0);
+}
+
+void ScriptedServer::pose(std::uint64_t tick) {
+  positions_.clear();
+  normals_.clear();
+  const float phase = static_cast<float>(tick) * 0.1f;
+  for (std::size_t i = 0; i < stream_.cloths.size(); ++i) {
+    for (std::uint32_t row = 0; row < stream_.cloths[i].rows; ++row) {
+      for (std::uint32_t column = 0; column < stream_.cloths[i].columns; ++column) {
+        const float x = 0.1f * static_cast<float>(column), y = -0.1f * static_cast<float>(row);
+        positions_.insert(positions_.end(), {x + 2 * static_cast<float>(i), y, 0.05f * std::sin(phase + 3 * x + 2 * y)});
+        normals_.insert(normals_.end(), {0, 0, 1});
+      }
+    }
+  }
+}
+
+std::string ScriptedServer::welcome() const {
+  v1::ServerMessage message;
+  v1::Welcome& welcome = *message.mutable_welcome();
+  welcome.set_protocol_version(CS_PROTOCOL_VERSION);
+  welcome.set_codec(1);
+  welcome.set_scene("curtain");
+  welcome.set_participant_id(42);
+  welcome.set_server_name("scripted 1");
+  welcome.set_device_name("none");
+  welcome.set_description_content_id(1);
+  return serialised(message);
+}
+
+v1::StreamDescription ScriptedServer::description() const {
+  v1::StreamDescription description;
+  description.set_epoch(stream_.epoch);
+  description.set_codec(1);
+  description.set_scene("curtain");
+  description.set_simulation_rate(stream_.simulationRate);
+  description.set_stream_rate(stream_.streamRate);
+  description.set_max_error(layout_.maxError);
+  description.set_normals(stream_.normals == codec::NormalMode::none ? v1::NORMALS_NONE : v1::NORMALS_OCTAHEDRAL);
+  std::size_t first = 0;
+  for (const ClothSize& size : stream_.cloths) {
+    v1::ClothDescription& cloth = *description.add_cloths();
+    cloth.set_name(size.name);
+    cloth.set_vertex_count(size.rows * size.columns);
+    cloth.set_rows(size.rows);
+    cloth.set_columns(size.columns);
+    std::string rest(std::size_t{size.rows} * size.columns * 12, '\0');
+    std::memcpy(rest.data(), positions_.data() + first, rest.size());
+    cloth.set_rest_positions(std::move(rest));
+    first += std::size_t{size.rows} * size.columns * 3;
+    v1::Cloth& definition = *description.mutable_definition()->add_cloths();
+    definition.set_name(size.name);
+    definition.mutable_structural()->set_stiffness(100);
+    definition.mutable_structural()->set_damping(0.5f);
+    definition.set_damping(0.25f);
+  }
+  v1::ColliderState& ball = *description.add_colliders();
+  ball.set_name("ball");
+  ball.mutable_position()->set_y(1);
+  ball.mutable_sphere()->set_radius(0.25f);
+  description.mutable_definition()->mutable_environment()->mutable_wind()->set_x(3);
+  return description;
+}
+
+std::vector<std::string> chunksOf(const std::string& content, std::size_t pieceBytes, std::uint64_t contentId) {
+  const std::size_t count = (content.size() + pieceBytes - 1) / pieceBytes;
+  std::vector<std::string> messages;
+  for (std::size_t i = 0; i < count; ++i) {
+    v1::ServerMessage message;
+    v1::Chunk& chunk = *message.mutable_chunk();
+    chunk.set_content_id(contentId);
+    chunk.set_kind(v1::CONTENT_KIND_STREAM_DESCRIPTION);
+    chunk.set_index(static_cast<std::uint32_t>(i));
+    chunk.set_count(static_cast<std::uint32_t>(count));
+    chunk.set_total_bytes(content.size());
+    chunk.set_data(content.substr(i * pieceBytes, pieceBytes));
+    messages.push_back(serialised(message));
+  }
+  return messages;
+}
+
+std::vector<std::string> ScriptedServer::chunks(std::size_t pieceBytes, std::uint64_t contentId) const {
+  return chunksOf(description().SerializeAsString(), pieceBytes, contentId);
+}
+
+v1::Frame ScriptedServer::frameMessage(std::uint64_t tick, codec::PacketKind kind) {
+  pose(tick);
+  std::vector<std::byte> packet(encoder_->packetBound());
+  const bool sendsNormals = stream_.normals != codec::NormalMode::none;
+  const std::size_t bytes = encoder_->encode(tick, kind, positions_,
+                                             sendsNormals ? std::span<const float>(normals_) : std::span<const float>(), packet);
+  v1::Frame frame;
+  frame.set_packet(packet.data(), bytes);
+  frame.set_reconstruction_hash(encoder_->reconstructionHash());
+  v1::ColliderState& ball = *frame.add_colliders();
+  ball.set_name("ball");
+  ball.mutable_position()->set_x(static_cast<float>(tick));
+  ball.mutable_sphere()->set_radius(0.25f);
+  return frame;
+}
+
+std::string ScriptedServer::frame(std::uint64_t tick, codec::PacketKind kind) {
+  return serialise(frameMessage(tick, kind));
+}
+
+std::string ScriptedServer::serialise(const v1::Frame& frame) {
+  v1::ServerMessage message;
+  *message.mutable_frame() = frame;
+  return serialised(message);
+}
+
+std::string ScriptedServer::pong(std::uint64_t clientTimeUs, std::uint64_t serverTimeUs) {
+  v1::ServerMessage message;
+  message.mutable_pong()->set_client_time_us(clientTimeUs);
+  message.mutable_pong()->set_server_time_us(serverTimeUs);
+  return serialised(message);
+}
+
+std::string ScriptedServer::error(v1::ErrorCode code, const std::string& text, bool fatal) {
+  v1::ServerMessage message;
+  message.mutable_error()->set_code(code);
+  message.mutable_error()->set_text(text);
+  message.mutable_error()->set_fatal(fatal);
+  return serialised(message);
+}
+
+std::uint32_t ClientUnderTest::receive(const std::string& message, std::uint64_t nowUs) {
+  const auto exact = std::make_unique<std::uint8_t[]>(message.size());
+  std::memcpy(exact.get(), message.data(), message.size());
+  return cs_receive(get(), exact.get(), message.size(), nowUs);
+}
+
+void ClientUnderTest::receiveAll(const std::vector<std::string>& messages, std::uint64_t nowUs) {
+  for (const std::string& message : messages) receive(message, nowUs);
+}
+
+void ClientUnderTest::join(const ScriptedServer& server) {
+  receive(server.welcome());
+  receiveAll(server.chunks());
+  outgoing();
+}
+
+std::vector<v1::ClientMessage> ClientUnderTest::outgoing() {
+  std::vector<v1::ClientMessage> messages;
+  std::size_t bytes = 0;
+  while (const std::uint8_t* message = cs_next_outgoing(get(), &bytes)) {
+    if (!messages.emplace_back().ParseFromArray(message, static_cast<int>(bytes)))
+      throw std::runtime_error("the client sent bytes that are no ClientMessage");
+  }
+  return messages;
+}
+
+cs_statistics ClientUnderTest::statistics(std::uint64_t nowUs) const {
+  cs_statistics statistics;
+  cs_get_statistics(get(), nowUs, &statistics);
+  return statistics;
+}
+
+}  // namespace clothstream::client
