@@ -9,19 +9,17 @@
 #include <optional>
 #include <span>
 #include <string>
-#include <vector>
 
-#include "clothstream/v1/session.pb.h"
+#include "server/messages/limits.h"
+#include "server/stream/envelope.h"
 
 namespace clothstream::stream {
 
 class SceneServer;
-
-// A serialised ServerMessage, made once and shared by all who get it.
-using SharedBytes = std::shared_ptr<const std::vector<std::byte>>;
+class Session;
 
 // Largest serialised ClientMessage; doors refuse larger ones before they hold them.
-inline constexpr std::size_t kMaxClientMessageBytes = 64 * 1024;
+inline constexpr std::size_t kMaxClientMessageBytes = messages::limits::kMaxClientMessageBytes;
 
 // Thread-safe. A door makes one for each peer, feeds it what arrives, and writes what next() gives, one write in
 // flight: when the write is done it asks again; when there is nothing it waits for `wake`.
@@ -43,14 +41,12 @@ class Connection {
   std::optional<SharedBytes> next();
 
   // The peer is to be closed (after a fatal error, or when the server stops), once next() has nothing more. A peer that
-  // does not read is finished too: a door gives its last writes a second or so, then cuts.
+  // does not read is finished too: a door gives its last writes a second or so, then cuts. The last message says why: a
+  // fatal Error, or the Notice that the server stops.
   bool finished() const;
-  // The fatal error that finished it; nothing while it goes on, and when the server stops.
-  std::optional<v1::Error> fatalError() const;
 
  private:
-  struct State;
-  std::shared_ptr<State> state_;
+  std::shared_ptr<Session> session_;
 };
 
 }  // namespace clothstream::stream

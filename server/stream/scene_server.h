@@ -16,8 +16,6 @@
 
 namespace clothstream::stream {
 
-inline constexpr std::uint32_t kProtocolVersion = 1;
-
 struct ServerOptions {
   vulkan::DeviceOptions device;
   // Joined by whoever names no scene; must be one of the scenes.
@@ -47,7 +45,7 @@ class SceneServer {
   v1::ListScenesResponse listScenes() const;
   tl::expected<v1::GetSceneResponse, v1::Error> getScene(const v1::GetSceneRequest& request) const;
 
-  // Tells everybody that the server stops, and finishes every connection: now and from here on. The ticks end.
+  // Tells everybody that the server stops, and finishes every connection, now and from here on.
   void stop();
 
   // Of the device in use, also after it was rebuilt.
@@ -57,8 +55,8 @@ class SceneServer {
   // Histograms and counters since the start, as a table for people.
   std::string report() const;
 
-  struct State;
   // For this room alone.
+  struct State;
   State& state() { return *state_; }
 
  private:

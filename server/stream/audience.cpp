@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: MIT
+// All who are in a scene.
+#include "server/stream/audience.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace clothstream::stream {
+
+bool Audience::join(std::shared_ptr<Mailbox> mailbox, std::size_t limit) {
+  const std::lock_guard lock(mutex_);
+  if (members_.size() >= limit) return false;
+  members_.push_back(std::move(mailbox));
+  return true;
+}
+
+void Audience::leave(const Mailbox& mailbox) {
+  const std::lock_guard lock(mutex_);
+  std::erase_if(members_, [&](const auto& member) { return member.get() == &mailbox; });
+}
+
+std::size_t Audience::size() const {
+  const std::lock_guard lock(mutex_);
+  return members_.size();
+}
+
+void Audience::publish(const PublishedFrame& frame) {
+  {
+    const std::lock_guard lock(mutex_);
+    receivers_.assign(members_.begin(), members_.end());
+  }
+  for (const auto& receiver : receivers_) receiver->deliver(frame);
+  receivers_.clear();
+}
+
+void Audience::announce(const SharedBytes& message) {
+  std::vector<std::shared_ptr<Mailbox>> receivers;
+  {
+    const std::lock_guard lock(mutex_);
+    receivers = members_;
+  }
+  for (const auto& receiver : receivers)
+    if (!receiver->announce(message)) receiver->close(tooSlow());
+}
+
+bool Audience::wantsKeyFrame() const {
+  const std::lock_guard lock(mutex_);
+  return std::ranges::any_of(members_, [](const auto& member) { return member->wantsKeyFrame(); });
+}
+
+}  // namespace clothstream::stream

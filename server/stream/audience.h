@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: MIT
+// All who are in a scene. Whatever publishes to an audience is a source of frames; mailboxes do not know which.
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <mutex>
+#include <vector>
+
+#include "server/stream/mailbox.h"
+
+namespace clothstream::stream {
+
+// Thread-safe; publish() belongs to one thread.
+class Audience {
+ public:
+  // False where there are `limit` members already.
+  [[nodiscard]] bool join(std::shared_ptr<Mailbox> mailbox, std::size_t limit);
+  void leave(const Mailbox& mailbox);
+  std::size_t size() const;
+
+  void publish(const PublishedFrame& frame);
+  // Whoever has no room for it is too slow to be kept: its mailbox is closed.
+  void announce(const SharedBytes& message);
+  // Whether somebody can go on only from a key frame, and has room for one.
+  bool wantsKeyFrame() const;
+
+ private:
+  mutable std::mutex mutex_;
+  std::vector<std::shared_ptr<Mailbox>> members_;
+  // Of publish() alone, so that no mailbox is woken under the lock, and nothing is allocated for a frame.
+  std::vector<std::shared_ptr<Mailbox>> receivers_;
+};
+
+}  // namespace clothstream::stream

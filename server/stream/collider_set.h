@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: MIT
+// Where all colliders of a scene are from tick to tick, the scene's own and the participants'.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include <google/protobuf/repeated_ptr_field.h>
+
+#include "clothstream/v1/session.pb.h"
+#include "server/scene/input.h"
+#include "server/scene/scene.h"
+#include "server/simulation/scene_tables.h"
+
+namespace clothstream::stream {
+
+// A collider that somebody moved faster than this is not swept there: it appears at its new place, at rest. m/s
+inline constexpr float kMaxColliderSpeed = 30;
+
+// Belongs to the device's thread. The order is the same whatever the order of arrival: the scene's colliders as defined,
+// then participants by number, each one's by id.
+class ColliderSet {
+ public:
+  // At the start: simulated time 0.
+  explicit ColliderSet(const scene::Scene& scene);
+
+  // All colliders of this participant. A known id moves there over the next tick, a new one appears at rest, one that is
+  // missing vanishes.
+  void place(std::uint64_t participant, std::span<const scene::ParticipantCollider> colliders);
+
+  // The next tick, which ends at this simulated time: all spheres, each from where it was to where it is then.
+  void advance(const scene::Scene& scene, double endSeconds, std::vector<simulation::MovingSphere>& spheres);
+
+  // Where they are now. `scene` as of the last advance().
+  void write(const scene::Scene& scene, google::protobuf::RepeatedPtrField<v1::ColliderState>& states) const;
+
+ private:
+  struct Held {
+    std::uint64_t participant;
+    scene::ParticipantCollider now;
+    scene::Vec3 before;
+  };
+
+  std::vector<scene::Vec3> scenePositions_;
+  std::vector<Held> colliders_;
+};
+
+}  // namespace clothstream::stream

@@ -1,0 +1,171 @@
+// SPDX-License-Identifier: MIT
+// Runs the ticks of every scene when they are due.
+#include "server/stream/device_thread.h"
+
+#include <algorithm>
+#include <exception>
+#include <utility>
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+namespace clothstream::stream {
+
+DeviceThread::DeviceThread(const vulkan::DeviceOptions& device, const std::vector<std::unique_ptr<LiveScene>>& scenes,
+                           FramePacker& packer, telemetry::ServerMetrics& metrics, bool runAlways)
+    : options_(device), packer_(packer), metrics_(metrics), runAlways_(runAlways) {
+  std::promise<void> ready;
+  std::future<void> isReady = ready.get_future();
+  thread_ = std::thread([this, &scenes, ready = std::move(ready)]() mutable { run(scenes, ready); });
+  try {
+    isReady.get();
+  } catch (...) {
+    thread_.join();
+    throw;
+  }
+}
+
+DeviceThread::~DeviceThread() {
+  {
+    const std::lock_guard lock(mutex_);
+    stopping_ = true;
+  }
+  changed_.notify_all();
+  thread_.join();
+}
+
+void DeviceThread::wake() {
+  {
+    const std::lock_guard lock(mutex_);
+    woken_ = true;
+  }
+  changed_.notify_all();
+}
+
+void DeviceThread::simulateDeviceLoss() {
+  {
+    const std::lock_guard lock(mutex_);
+    loseDevice_ = true;
+  }
+  changed_.notify_all();
+}
+
+vulkan::DeviceInfo DeviceThread::info() const {
+  const std::lock_guard lock(mutex_);
+  return info_;
+}
+
+void DeviceThread::run(const std::vector<std::unique_ptr<LiveScene>>& scenes, std::promise<void>& ready) {
+  try {
+    device_ = std::make_unique<vulkan::Device>(options_);
+    for (const auto& scene : scenes) runs_.push_back(std::make_unique<Run>(*device_, *scene, packer_));
+    due_.reserve(runs_.size());
+    info_ = device_->info();
+  } catch (...) {
+    runs_.clear();
+    device_.reset();
+    ready.set_exception(std::current_exception());
+    return;
+  }
+  ready.set_value();
+
+  while (waitForWork()) {
+    try {
+      startAndStopScenes();
+      runDueTicks();
+    } catch (const std::exception& failure) {
+      rebuild(failure.what());
+    }
+  }
+  packer_.drain();
+  runs_.clear();
+  device_.reset();
+}
+
+bool DeviceThread::waitForWork() {
+  const auto earliest = std::ranges::min_element(runs_, {}, [](const auto& run) {
+    return run->running ? run->pacer.due() : Clock::time_point::max();
+  });
+  const auto something = [&] { return stopping_ || woken_ || loseDevice_; };
+
+  std::unique_lock lock(mutex_);
+  if (earliest != runs_.end() && (*earliest)->running)
+    changed_.wait_until(lock, (*earliest)->pacer.due(), something);
+  else
+    changed_.wait(lock, something);
+  woken_ = false;
+  return !stopping_;
+}
+
+void DeviceThread::startAndStopScenes() {
+  for (const auto& run : runs_) {
+    const bool wanted = runAlways_ || run->host.scene().audience.size() > 0;
+    if (wanted && !run->running) {
+      run->pacer.start(Clock::now());
+      run->slow.restart();
+    }
+    run->running = wanted;
+    run->host.scene().running = wanted;
+  }
+}
+
+void DeviceThread::runDueTicks() {
+  {
+    const std::lock_guard lock(mutex_);
+    if (std::exchange(loseDevice_, false)) throw vulkan::DeviceLost("the device's loss was simulated");
+  }
+  due_.clear();
+  const Clock::time_point now = Clock::now();
+  for (const auto& run : runs_)
+    if (run->running && run->pacer.due() <= now) due_.push_back(run.get());
+  std::ranges::sort(due_, {}, [](const Run* run) { return run->pacer.due(); });
+  for (Run* run : due_) begin(*run, Clock::now());
+  for (Run* run : due_) run->host.finish();
+}
+
+void DeviceThread::begin(Run& run, Clock::time_point now) {
+  const Pacer::Start start = run.pacer.begin(now);
+  LiveScene& scene = run.host.scene();
+  scene.metrics.lateness.record(seconds(start.lateness));
+  if (start.late) scene.metrics.lateTicks.add();
+  scene.metrics.slippedTicks.add(run.wholeSlippedTicks(start.slippedTicks));
+  if (const std::optional<double> speed = run.slow.note(now, start.slippedTicks)) {
+    const std::string text =
+        fmt::format("simulated time runs at {:.0f} % of real time: the device cannot keep {} ticks/s with {} substeps",
+                    *speed * 100, scene.start().simulationRate, scene.start().substeps);
+    spdlog::warn("{}: {}", scene.name(), text);
+    scene.audience.announce(notice(v1::NOTICE_KIND_RUNNING_SLOW, text, run.host.tick()));
+  }
+  run.host.begin(now);
+}
+
+void DeviceThread::rebuild(const std::string& reason) {
+  spdlog::error("device: {}; making everything anew", reason);
+  // Whoever waits for a frame of the old device gets it first: its memory goes with it.
+  packer_.drain();
+  do {
+    std::unique_lock lock(mutex_);
+    if (changed_.wait_until(lock, nextRebuild_, [&] { return stopping_; })) return;
+    nextRebuild_ = Clock::now() + std::chrono::seconds(1);
+  } while (!tryRebuild());
+}
+
+bool DeviceThread::tryRebuild() {
+  for (const auto& run : runs_) run->host.release();
+  device_.reset();
+  try {
+    device_ = std::make_unique<vulkan::Device>(options_);
+    for (const auto& run : runs_) run->host.rebuild(*device_);
+  } catch (const std::exception& failure) {
+    spdlog::error("device: {}; trying again", failure.what());
+    return false;
+  }
+  metrics_.deviceRebuilds.add();
+  for (const auto& run : runs_) run->pacer.start(Clock::now());
+  spdlog::info("device: {} runs {} scenes again", device_->info().name, runs_.size());
+  const std::lock_guard lock(mutex_);
+  info_ = device_->info();
+  return true;
+}
+
+}  // namespace clothstream::stream

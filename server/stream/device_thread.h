@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: MIT
+// The one thread that owns the device: it runs the ticks of every scene when they are due.
+#pragma once
+
+#include <cmath>
+#include <condition_variable>
+#include <cstdint>
+#include <future>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "server/stream/frame_packer.h"
+#include "server/stream/live_scene.h"
+#include "server/stream/pacer.h"
+#include "server/stream/scene_host.h"
+#include "server/stream/slow_watch.h"
+#include "server/telemetry/metrics.h"
+#include "server/vulkan/device.h"
+
+namespace clothstream::stream {
+
+// Thread-safe. Scenes that are due together are all submitted before the first is waited for. A scene sleeps while nobody
+// is in it. When the device is lost, another is made and every scene goes on from the newest state that the CPU has; this
+// is tried once a second until it succeeds.
+class DeviceThread {
+ public:
+  // Device and scenes are ready when it returns. All arguments outlive it. Throws what the device or a scene throws.
+  DeviceThread(const vulkan::DeviceOptions& device, const std::vector<std::unique_ptr<LiveScene>>& scenes,
+               FramePacker& packer, telemetry::ServerMetrics& metrics, bool runAlways);
+  // Ends after the ticks in flight.
+  ~DeviceThread();
+  DeviceThread(const DeviceThread&) = delete;
+  DeviceThread& operator=(const DeviceThread&) = delete;
+
+  // Somebody joined or left.
+  void wake();
+
+  vulkan::DeviceInfo info() const;
+
+  // Before the next tick the device is treated as lost, with all that follows.
+  void simulateDeviceLoss();
+
+ private:
+  struct Run {
+    Run(vulkan::Device& device, LiveScene& scene, FramePacker& packer)
+        : host(device, scene, packer), pacer(scene.start().simulationRate) {}
+    // Of what was given up so far, the whole ticks that are not counted yet.
+    std::uint64_t wholeSlippedTicks(double given) {
+      slipped += given;
+      const double whole = std::floor(slipped);
+      slipped -= whole;
+      return static_cast<std::uint64_t>(whole);
+    }
+
+    SceneHost host;
+    Pacer pacer;
+    SlowWatch slow;
+    double slipped = 0;
+    bool running = false;
+  };
+
+  void run(const std::vector<std::unique_ptr<LiveScene>>& scenes, std::promise<void>& ready);
+  // False when it is time to end.
+  bool waitForWork();
+  void startAndStopScenes();
+  void runDueTicks();
+  void begin(Run& run, Clock::time_point now);
+  void rebuild(const std::string& reason);
+  bool tryRebuild();
+
+  const vulkan::DeviceOptions options_;
+  FramePacker& packer_;
+  telemetry::ServerMetrics& metrics_;
+  const bool runAlways_;
+
+  mutable std::mutex mutex_;
+  std::condition_variable changed_;
+  bool stopping_ = false, woken_ = false, loseDevice_ = false;
+  vulkan::DeviceInfo info_;
+
+  // The thread's own.
+  std::unique_ptr<vulkan::Device> device_;
+  std::vector<std::unique_ptr<Run>> runs_;
+  std::vector<Run*> due_;
+  Clock::time_point nextRebuild_{};  // not before
+
+  std::thread thread_;
+};
+
+}  // namespace clothstream::stream

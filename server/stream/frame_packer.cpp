@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: MIT
+// Frames from the device to everybody in their scene.
+#include "server/stream/frame_packer.h"
+
+#include <cassert>
+#include <utility>
+
+namespace clothstream::stream {
+
+FramePacker::FramePacker(std::size_t capacity, std::function<void()> everySecond)
+    : everySecond_(std::move(everySecond)), ring_(capacity), thread_([this] { run(); }) {}
+
+FramePacker::~FramePacker() {
+  {
+    const std::lock_guard lock(mutex_);
+    stopping_ = true;
+  }
+  changed_.notify_all();
+  thread_.join();
+}
+
+void FramePacker::push(CompleteFrame& frame) {
+  {
+    const std::lock_guard lock(mutex_);
+    assert(waiting_ < ring_.size());
+    std::swap(ring_[(first_ + waiting_++) % ring_.size()], frame);
+  }
+  changed_.notify_all();
+}
+
+void FramePacker::drain() {
+  std::unique_lock lock(mutex_);
+  changed_.wait(lock, [&] { return waiting_ == 0 && !busy_; });
+}
+
+void FramePacker::run() {
+  Clock::time_point nextCall = Clock::now() + std::chrono::seconds(1);
+  for (;;) {
+    {
+      std::unique_lock lock(mutex_);
+      changed_.wait_until(lock, nextCall, [&] { return waiting_ > 0 || stopping_; });
+      if (waiting_ == 0 && stopping_) return;
+      busy_ = waiting_ > 0;
+      if (busy_) {
+        std::swap(frame_, ring_[first_]);
+        first_ = (first_ + 1) % ring_.size();
+        --waiting_;
+      }
+    }
+    if (busy_) {
+      pack();
+      const std::lock_guard lock(mutex_);
+      busy_ = false;
+      changed_.notify_all();
+    }
+    if (Clock::now() >= nextCall) {
+      everySecond_();
+      nextCall = Clock::now() + std::chrono::seconds(1);
+    }
+  }
+}
+
+void FramePacker::pack() {
+  packet_.resize(frame_.encoder->packetBound());
+  const encode::EncodedFrame encoded = frame_.encoder->entropyCode(frame_.recorded, packet_);
+  if (frame_.discarded) return;
+
+  v1::Frame& frame = *message_.mutable_frame();
+  frame.mutable_packet()->assign(reinterpret_cast<const char*>(packet_.data()), encoded.bytes);
+  frame.set_tick_time_us(microseconds(frame_.tickStart));
+  frame.set_reconstruction_hash(encoded.reconstructionHash);
+  frame.set_state_hash(frame_.stateHash);
+  frame.mutable_colliders()->Swap(&frame_.colliders);
+  const Clock::time_point complete = Clock::now();
+  frame.set_packet_time_us(microseconds(complete));
+
+  PublishedFrame published{.message = serialise(message_),
+                           .tick = frame_.recorded.tick,
+                           .key = frame_.recorded.kind == codec::PacketKind::key,
+                           .referenceTick = frame_.recorded.referenceTick,
+                           .complete = complete};
+  // Counted before anybody can have it, so that who holds a frame finds it counted.
+  telemetry::SceneMetrics& metrics = frame_.scene->metrics;
+  metrics.encode.record(seconds(complete - frame_.deviceDone));
+  for (const Clock::time_point arrival : frame_.poseArrivals) metrics.inputToPacket.record(seconds(complete - arrival));
+  metrics.frames.add();
+  if (published.key) metrics.keyFrames.add();
+  metrics.packetBytes.add(encoded.bytes);
+
+  frame_.scene->audience.publish(published);
+}
+
+}  // namespace clothstream::stream

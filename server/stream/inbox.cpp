@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: MIT
+// What participants put into a scene.
+#include "server/stream/inbox.h"
+
+#include <algorithm>
+#include <cassert>
+#include <utility>
+
+namespace clothstream::stream {
+
+void Inbox::postPoses(std::uint64_t participant, std::span<const scene::ParticipantCollider> colliders,
+                      Clock::time_point arrival) {
+  assert(colliders.size() <= messages::limits::kMaxParticipantColliders);
+  const std::lock_guard lock(mutex_);
+  auto poses = std::ranges::find(inputs_.poses, participant, &Poses::participant);
+  if (poses == inputs_.poses.end()) {
+    poses = inputs_.poses.emplace(poses);
+    poses->participant = participant;
+  }
+  poses->count = colliders.size();
+  std::ranges::copy(colliders, poses->colliders.begin());
+  poses->arrival = arrival;
+}
+
+bool Inbox::postChange(AcceptedChange change) {
+  const std::lock_guard lock(mutex_);
+  if (inputs_.changes.size() >= kMaxChanges) return false;
+  inputs_.changes.push_back(std::move(change));
+  return true;
+}
+
+void Inbox::keepColliderChanges() {
+  const std::lock_guard lock(mutex_);
+  for (AcceptedChange& accepted : inputs_.changes) {
+    accepted.change = {.colliders = std::move(accepted.change.colliders)};
+    v1::ParameterChange kept;
+    kept.mutable_colliders()->Swap(accepted.message.mutable_colliders());
+    accepted.message = std::move(kept);
+  }
+  std::erase_if(inputs_.changes, [](const AcceptedChange& accepted) { return accepted.change.colliders.empty(); });
+}
+
+void Inbox::drain(Inputs& out) {
+  out.changes.clear();
+  out.poses.clear();
+  const std::lock_guard lock(mutex_);
+  std::swap(out, inputs_);
+}
+
+}  // namespace clothstream::stream

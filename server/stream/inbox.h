@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: MIT
+// What participants put into a scene, on its way from the doors' threads to the scene's next tick.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <mutex>
+#include <span>
+#include <vector>
+
+#include "clothstream/v1/session.pb.h"
+#include "server/messages/limits.h"
+#include "server/scene/input.h"
+#include "server/stream/clock.h"
+
+namespace clothstream::stream {
+
+// All colliders of one participant, as of its newest message; none once it has left.
+struct Poses {
+  std::uint64_t participant = 0;
+  std::size_t count = 0;
+  std::array<scene::ParticipantCollider, messages::limits::kMaxParticipantColliders> colliders;
+  Clock::time_point arrival{};
+};
+
+// A change that was checked against the scene as all changes before it leave it.
+struct AcceptedChange {
+  std::uint64_t participant = 0;
+  scene::ParameterChange change;
+  v1::ParameterChange message;
+};
+
+struct Inputs {
+  std::vector<AcceptedChange> changes;
+  std::vector<Poses> poses;
+};
+
+// Thread-safe. Bounded: one Poses a participant, kMaxChanges changes.
+class Inbox {
+ public:
+  static constexpr std::size_t kMaxChanges = 64;
+
+  // Replaces what this participant posted since the last tick. At most
+  // limits::kMaxParticipantColliders.
+  void postPoses(std::uint64_t participant, std::span<const scene::ParticipantCollider> colliders,
+                 Clock::time_point arrival);
+  // False if it is full.
+  [[nodiscard]] bool postChange(AcceptedChange change);
+  // Of the changes that wait, what they say of the scene's colliders; the rest is dropped.
+  void keepColliderChanges();
+
+  // Moves everything to `out`, whose former contents go; the two keep swapping their memory.
+  void drain(Inputs& out);
+
+ private:
+  std::mutex mutex_;
+  Inputs inputs_;
+};
+
+}  // namespace clothstream::stream

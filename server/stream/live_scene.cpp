@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: MIT
+// A scene as its participants share it.
+#include "server/stream/live_scene.h"
+
+#include <utility>
+
+#include "proto/codec/packet_header.h"
+#include "server/messages/client_message.h"
+#include "server/messages/description.h"
+#include "server/messages/scene_message.h"
+
+namespace clothstream::stream {
+namespace {
+
+v1::ParameterChange allParameters(const scene::Scene& scene) {
+  const v1::Scene message = messages::toMessage(scene);
+  v1::ParameterChange change;
+  *change.mutable_gravity()->mutable_value() = message.environment().gravity();
+  *change.mutable_wind()->mutable_value() = message.environment().wind();
+  change.set_air_density(message.environment().air_density());
+  for (const v1::Cloth& cloth : message.cloths()) {
+    v1::ClothChange& all = *change.add_cloths();
+    all.set_name(cloth.name());
+    *all.mutable_structural() = cloth.structural();
+    *all.mutable_shear() = cloth.shear();
+    *all.mutable_bend() = cloth.bend();
+    all.set_damping(cloth.damping());
+    all.set_drag(cloth.drag());
+    all.set_lift(cloth.lift());
+    all.set_friction(cloth.friction());
+  }
+  return change;
+}
+
+}  // namespace
+
+LiveScene::LiveScene(scene::Scene definition) : start_(std::move(definition)), definition_(start_) {}
+
+scene::Scene LiveScene::definition() const {
+  const std::lock_guard lock(mutex_);
+  return definition_;
+}
+
+messages::Result<void> LiveScene::change(std::uint64_t participant, const v1::ParameterChange& message) {
+  const std::lock_guard lock(mutex_);
+  messages::Result<scene::ParameterChange> change = messages::toParameterChange(message, definition_);
+  if (!change) return tl::unexpected(std::move(change).error());
+  if (!inbox.postChange({participant, *change, message}))
+    return tl::unexpected(messages::FieldError{
+        v1::ERROR_CODE_RESOURCE_EXHAUSTED, "parameter_change: too many changes for one tick; send it again later"});
+  scene::applyChange(definition_, *change);
+  description_.reset();
+  return {};
+}
+
+v1::ParameterChange LiveScene::resetParameters() {
+  const std::lock_guard lock(mutex_);
+  inbox.keepColliderChanges();
+  definition_.environment = start_.environment;
+  definition_.cloths = start_.cloths;
+  description_.reset();
+  return allParameters(start_);
+}
+
+std::shared_ptr<const Description> LiveScene::description() {
+  const std::lock_guard lock(mutex_);
+  if (description_) return description_;
+  v1::StreamDescription message = messages::toDescription(definition_, kEpoch, codec::kCodecLatticeZstd);
+  const double time = static_cast<double>(tick.load()) * definition_.tickSeconds();
+  for (const scene::SphereCollider& collider : definition_.colliders)
+    messages::write(collider, scene::positionAt(collider, time), *message.add_colliders());
+
+  auto description = std::make_shared<Description>();
+  description->contentId = ++contents_;
+  for (v1::Chunk& chunk : messages::toChunks(description->contentId, v1::CONTENT_KIND_STREAM_DESCRIPTION,
+                                             message.SerializeAsString())) {
+    v1::ServerMessage envelope;
+    *envelope.mutable_chunk() = std::move(chunk);
+    description->chunks.push_back(serialise(envelope));
+  }
+  return description_ = std::move(description);
+}
+
+}  // namespace clothstream::stream

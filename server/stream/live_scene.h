@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: MIT
+// A scene as its participants share it: definition, inbox, audience, metrics. Where doors and the device's thread meet.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <string>
+
+#include "server/messages/field_error.h"
+#include "server/scene/scene.h"
+#include "server/stream/audience.h"
+#include "server/stream/inbox.h"
+#include "server/telemetry/metrics.h"
+
+namespace clothstream::stream {
+
+// Thread-safe.
+class LiveScene {
+ public:
+  // Must be valid.
+  explicit LiveScene(scene::Scene definition);
+
+  const std::string& name() const { return start_.name; }
+  // As it was at first.
+  const scene::Scene& start() const { return start_; }
+  // With all accepted changes, those of the next tick included.
+  scene::Scene definition() const;
+
+  // Checks the change against the definition and puts it into the inbox, or says what is wrong with it.
+  messages::Result<void> change(std::uint64_t participant, const v1::ParameterChange& message);
+  // Environment and cloths as at first, and changes of them that were on their way dropped; returns the change that
+  // says so.
+  v1::ParameterChange resetParameters();
+
+  // For who joins now; must have joined the audience before, so as to miss no change.
+  std::shared_ptr<const Description> description();
+
+  // Of its stream; the first and only one while a server runs.
+  static constexpr std::uint32_t kEpoch = 1;
+
+  Inbox inbox;
+  Audience audience;
+  telemetry::SceneMetrics metrics;
+
+  // Written by the device's thread.
+  std::atomic<bool> running{false};
+  std::atomic<std::uint64_t> tick{0};  // newest complete one
+
+ private:
+  const scene::Scene start_;
+
+  mutable std::mutex mutex_;
+  scene::Scene definition_;
+  std::shared_ptr<const Description> description_;  // null when the definition has changed since
+  std::uint64_t contents_ = 0;                      // ids given
+};
+
+}  // namespace clothstream::stream

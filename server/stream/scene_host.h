@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: MIT
+// One scene on the device: its ticks, frames, checkpoints, and the ways back when something went wrong.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "server/encode/frame_encoder.h"
+#include "server/simulation/cloth_simulation.h"
+#include "server/stream/collider_set.h"
+#include "server/stream/frame_packer.h"
+#include "server/stream/live_scene.h"
+#include "server/stream/token_bucket.h"
+#include "server/vulkan/device.h"
+#include "server/vulkan/recorder.h"
+
+namespace clothstream::stream {
+
+// Belongs to the device's thread. A tick is begin(), then finish(); between the two the device works. Tick n ends at the
+// simulated time n / simulation rate; ticks only ever count up, whatever happens to the state.
+//
+// What can be lost is bounded: every second of healthy ticks the state is kept on the device (a state that went bad goes
+// back to it), every five seconds on the CPU (a lost device goes on from there). A state that goes bad twice within a
+// second goes back to the start, parameters included.
+class SceneHost {
+ public:
+  // At most one key frame in this time, whoever asks: one serves all who wait.
+  static constexpr std::chrono::milliseconds kKeyFrameInterval{100};
+
+  // All outlive it. Throws std::runtime_error where the device has no room for the scene.
+  SceneHost(vulkan::Device& device, LiveScene& scene, FramePacker& packer);
+  ~SceneHost();
+
+  LiveScene& scene() { return live_; }
+
+  // Drains the inbox, records the next tick and submits it. Throws vulkan::DeviceLost.
+  void begin(Clock::time_point now);
+  // Waits for it, and hands its frame on. Throws vulkan::DeviceLost.
+  void finish();
+
+  // The device is gone, or about to be: nothing of it is held any more.
+  void release();
+  // Everything anew on this device, from the newest state that the CPU has.
+  void rebuild(vulkan::Device& device);
+
+  // Of the newest complete tick.
+  std::uint64_t tick() const { return tick_; }
+  simulation::TickStatus status() const { return status_; }
+
+ private:
+  // What lives on the device. Made with its start complete there, and saved.
+  struct OnDevice {
+    OnDevice(vulkan::Device& device, const scene::Scene& scene);
+    vulkan::Device& device;
+    simulation::ClothSimulation simulation;
+    encode::FrameEncoder encoder;
+    vulkan::Recorder recorder;
+  };
+  enum class Recovery : std::uint8_t { none, rollback, reset };
+
+  void applyInputs();
+  void recordRecovery();
+  void recordFrame(Clock::time_point now);
+  void recover();
+  bool every(std::uint32_t seconds) const { return sinceHealthy_ % (std::uint64_t{seconds} * rate_) == 0; }
+
+  LiveScene& live_;
+  FramePacker& packer_;
+  const std::uint32_t rate_;         // ticks/s
+  const std::uint32_t ticksAFrame_;  // simulation rate / stream rate
+
+  scene::Scene scene_;  // as of the tick in hand
+  ColliderSet colliders_;
+  Inputs inputs_;
+  simulation::TickInputs tickInputs_;
+  std::vector<Clock::time_point> poseArrivals_;  // that no frame has shown yet
+
+  std::uint64_t tick_ = 0;
+  simulation::TickStatus status_;
+  Recovery recovery_ = Recovery::none;
+  std::optional<std::uint64_t> lastRecovery_;  // tick
+  std::uint64_t sinceHealthy_ = 0;             // healthy ticks since the start or the last recovery
+  TokenBucket recoveryNotices_{1, 5};
+
+  simulation::StateSnapshot startState_, newestState_;
+  bool savesState_ = false;  // the tick in hand
+
+  Clock::time_point tickStart_{}, lastKeyFrame_{};
+  vulkan::TimelineValue submitted_ = 0;
+  bool hasFrame_ = false;  // the tick in hand
+  CompleteFrame frame_;
+
+  std::unique_ptr<OnDevice> onDevice_;
+};
+
+}  // namespace clothstream::stream

@@ -1,0 +1,211 @@
+// SPDX-License-Identifier: MIT
+// What a peer says and how the server answers.
+#include "server/stream/session.h"
+
+#include <array>
+#include <utility>
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include "proto/codec/packet_header.h"
+#include "server/messages/client_message.h"
+#include "server/stream/server_state.h"
+
+namespace clothstream::stream {
+namespace {
+
+constexpr std::array<std::uint32_t, 1> kCodecs{codec::kCodecLatticeZstd};
+constexpr double kMalformedCost = 60;
+
+}  // namespace
+
+Session::Session(SceneServer::State& server, std::string peer, std::function<void()> wake)
+    : server_(server),
+      peer_(std::move(peer)),
+      mailbox_(std::make_shared<Mailbox>(std::move(wake))),
+      lastHeard_(Clock::now()) {}
+
+void Session::receive(std::span<const std::byte> bytes, Clock::time_point now) {
+  lastHeard_ = now;
+  const std::lock_guard lock(mutex_);
+  if (mailbox_->closed()) return;
+  now_ = now;
+  requestId_ = 0;
+  if (!allowed(messageRate_, "messages")) return;
+  const messages::Result<v1::ClientMessage> message = messages::parseClientMessage(bytes);
+  if (!message) return refuse(message.error(), kMalformedCost);
+  requestId_ = message->request_id();
+  dispatch(*message, now);
+}
+
+void Session::dispatch(const v1::ClientMessage& message, Clock::time_point now) {
+  using Body = v1::ClientMessage;
+  switch (message.body_case()) {
+    case Body::kHello:
+      return hello(message.hello());
+    case Body::kPing: {
+      if (!allowed(queryRate_, "pings and questions")) return;
+      v1::ServerMessage pong;
+      pong.mutable_pong()->set_client_time_us(message.ping().client_time_us());
+      pong.mutable_pong()->set_server_time_us(microseconds(now));
+      return answer(pong);
+    }
+    case Body::kListScenes: {
+      if (!allowed(queryRate_, "pings and questions")) return;
+      v1::ServerMessage list;
+      *list.mutable_list_scenes() = server_.listScenes();
+      return answer(list);
+    }
+    case Body::kGetScene: {
+      if (!allowed(queryRate_, "pings and questions")) return;
+      auto found = server_.getScene(message.get_scene());
+      if (!found) return refuse({found.error().code(), found.error().text()});
+      v1::ServerMessage scene;
+      *scene.mutable_get_scene() = std::move(*found);
+      return answer(scene);
+    }
+    default:
+      break;
+  }
+  if (scene_ == nullptr) return fail(v1::ERROR_CODE_OUT_OF_ORDER, "this stream has joined no scene: send hello first");
+
+  switch (message.body_case()) {
+    case Body::kColliderPoses:
+      if (allowed(poseRate_, "collider poses")) poses(message.collider_poses(), now);
+      return;
+    case Body::kParameterChange:
+      if (!allowed(changeRate_, "parameter changes")) return;
+      if (const auto changed = scene_->change(participant_, message.parameter_change()); !changed)
+        refuse(changed.error());
+      return;
+    case Body::kFrameAck:
+      if (!mailbox_->acknowledge(message.frame_ack().tick(), now))
+        refuse({v1::ERROR_CODE_INVALID_ARGUMENT,
+                fmt::format("frame_ack.tick = {}: must be of a frame that was sent", message.frame_ack().tick())});
+      return;
+    case Body::kKeyFrameRequest:
+      if (allowed(keyFrameRate_, "key frame requests")) mailbox_->restart();
+      return;
+    default:
+      return refuse({v1::ERROR_CODE_MALFORMED_MESSAGE, "the message has no body that this server knows"});
+  }
+}
+
+void Session::hello(const v1::Hello& message) {
+  if (scene_ != nullptr)
+    return fail(v1::ERROR_CODE_OUT_OF_ORDER,
+                fmt::format("this stream has joined '{}' already: open another one", scene_->name()));
+  const messages::Result<messages::Joining> joining = messages::toJoining(message, kCodecs);
+  if (!joining) return fail(joining.error().code, joining.error().text);
+  LiveScene* scene = server_.find(joining->scene);
+  if (scene == nullptr) {
+    const v1::Error error = server_.noSuchScene(joining->scene);
+    return fail(error.code(), error.text());
+  }
+  if (!scene->audience.join(mailbox_, server_.options.maxParticipants))
+    return fail(v1::ERROR_CODE_RESOURCE_EXHAUSTED,
+                fmt::format("'{}' has {} participants, as many as it may have; try again later", scene->name(),
+                            server_.options.maxParticipants));
+  scene_ = scene;
+  participant_ = ++server_.participants;
+  scene->metrics.joins.add();
+  const std::shared_ptr<const Description> description = scene->description();
+
+  v1::ServerMessage reply;
+  v1::Welcome& welcome = *reply.mutable_welcome();
+  welcome.set_protocol_version(joining->protocolVersion);
+  welcome.set_codec(joining->codec);
+  welcome.set_scene(scene->name());
+  welcome.set_participant_id(participant_);
+  welcome.set_server_name(server_.options.serverName);
+  welcome.set_device_name(server_.device.info().name);
+  welcome.set_description_content_id(description->contentId);
+  answer(reply);
+  mailbox_->subscribe(description, scene->start().streamRate, scene->metrics);
+  server_.device.wake();
+  spdlog::info("{}: {} joined as participant {} ({}); {} in it", scene->name(), peer_, participant_,
+               joining->clientName.empty() ? "unnamed client" : joining->clientName, scene->audience.size());
+}
+
+void Session::poses(const v1::ColliderPoses& message, Clock::time_point now) {
+  const auto colliders = messages::toColliders(message);
+  if (!colliders) return refuse(colliders.error());
+  scene_->inbox.postPoses(participant_, *colliders, now);
+  posed_ = true;
+}
+
+void Session::answer(v1::ServerMessage& message) {
+  message.set_request_id(requestId_);
+  if (mailbox_->reply(serialise(message))) return;
+  server_.metrics.droppedConnections.add();
+  spdlog::warn("{}: does not read what it asks for; cut off", peer_);
+  closeLocked(tooSlow());
+}
+
+void Session::refuse(const messages::FieldError& reason, double cost) {
+  (scene_ != nullptr ? scene_->metrics.rejectedMessages : server_.metrics.rejectedMessages).add();
+  spdlog::debug("{}: refused: {}", peer_, reason.text);
+  if (!offences_.take(now_, cost)) {
+    server_.metrics.droppedConnections.add();
+    return fail(reason.code, "too many refused messages, at last: " + reason.text);
+  }
+  if (!errorRate_.take(now_)) return;
+  v1::ServerMessage message;
+  message.mutable_error()->set_code(reason.code);
+  message.mutable_error()->set_text(reason.text);
+  answer(message);
+}
+
+void Session::fail(v1::ErrorCode code, std::string text) {
+  spdlog::info("{}: closed: {}", peer_, text);
+  closeLocked(error(code, std::move(text), true, requestId_));
+}
+
+bool Session::allowed(TokenBucket& bucket, const char* what) {
+  if (bucket.take(now_)) return true;
+  refuse({v1::ERROR_CODE_RATE_LIMITED, fmt::format("too many {}: the last one was ignored", what)});
+  return false;
+}
+
+void Session::close(SharedBytes last) {
+  const std::lock_guard lock(mutex_);
+  closeLocked(std::move(last));
+}
+
+void Session::closeLocked(SharedBytes last) {
+  mailbox_->close(std::move(last));
+  leave();
+}
+
+void Session::checkSilence(Clock::time_point now) {
+  // A mailbox that its scene's audience closed, for want of room, is noticed here too.
+  const bool silent = now - lastHeard_.load() > server_.options.silence;
+  if (!silent && !mailbox_->closed()) return;
+  const std::lock_guard lock(mutex_);
+  if (!mailbox_->closed()) {
+    server_.metrics.droppedConnections.add();
+    spdlog::info("{}: silent for {} s; cut off", peer_, server_.options.silence.count() / 1000.0);
+    mailbox_->close(error(v1::ERROR_CODE_RESOURCE_EXHAUSTED,
+                          fmt::format("nothing was heard for {} s: acknowledge frames, or send pings",
+                                      static_cast<double>(server_.options.silence.count()) / 1000),
+                          true));
+  }
+  leave();
+}
+
+void Session::end() {
+  mailbox_->silence();
+  close(nullptr);
+}
+
+void Session::leave() {
+  if (scene_ == nullptr) return;
+  scene_->audience.leave(*mailbox_);
+  if (posed_) scene_->inbox.postPoses(participant_, {}, now_);
+  server_.device.wake();
+  spdlog::info("{}: {} left; {} in it", scene_->name(), peer_, scene_->audience.size());
+  scene_ = nullptr;
+}
+
+}  // namespace clothstream::stream
