@@ -19,23 +19,23 @@ struct ParticipantCollider {
 };
 
 struct ClothChange {
-  std::string name;  // empty: every cloth
-  std::optional<Spring> structural, shear, bend;
-  std::optional<float> damping, drag, lift, friction;
+  std::string name = {};  // empty: every cloth
+  std::optional<Spring> structural = {}, shear = {}, bend = {};
+  std::optional<float> damping = {}, drag = {}, lift = {}, friction = {};
 };
 
 struct ColliderChange {
-  std::string name;
-  std::optional<Vec3> position;  // ends the collider's own motion
-  std::optional<float> radius;
+  std::string name = {};
+  std::optional<Vec3> position = {};  // ends the collider's own motion
+  std::optional<float> radius = {};
 };
 
 // Takes effect at a tick's start, all of it.
 struct ParameterChange {
-  std::optional<Vec3> gravity, wind;
-  std::optional<float> airDensity;
-  std::vector<ClothChange> cloths;
-  std::vector<ColliderChange> colliders;
+  std::optional<Vec3> gravity = {}, wind = {};
+  std::optional<float> airDensity = {};
+  std::vector<ClothChange> cloths = {};
+  std::vector<ColliderChange> colliders = {};
 };
 
 // The names in the change must exist in the scene.

@@ -39,7 +39,7 @@ struct GridRange {
 struct Grid {
   std::uint32_t rows = 2, columns = 2;
   float width = 1, height = 1;  // m, between the outermost nodes
-  Pose pose;
+  Pose pose = {};
 
   std::uint32_t nodeCount() const { return rows * columns; }
 };

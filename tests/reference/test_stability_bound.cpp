@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: MIT
+// The stability bound of server/scene against what the reference does.
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "server/reference/reference_cloth.h"
+#include "server/scene/stability.h"
+#include "tests/reference/cloths.h"
+
+namespace clothstream::reference {
+namespace {
+
+using scene::Integrator;
+
+scene::Scene stretched(Integrator integrator) {
+  scene::Scene scene;
+  scene.simulationRate = 10;
+  scene.integrator = integrator;
+  scene.environment = kWeightless;
+  scene.cloths = {sheetWithAllSprings(12, 10)};
+  return scene;
+}
+
+// By 5 % in the plane and shaken a little; two nodes of its rim, as far as bend springs reach, are held, so
+// that the rest is in balance.
+ReferenceCloth stretchedCloth(scene::Cloth model) {
+  const std::uint32_t row = model.grid.rows - 1, column = model.grid.columns - 1;
+  model.pins = {{.firstRow = 0, .lastRow = 1, .firstColumn = 0, .lastColumn = column},
+                {.firstRow = row - 1, .lastRow = row, .firstColumn = 0, .lastColumn = column},
+                {.firstRow = 0, .lastRow = row, .firstColumn = 0, .lastColumn = 1},
+                {.firstRow = 0, .lastRow = row, .firstColumn = column - 1, .lastColumn = column}};
+  ReferenceCloth cloth(model);
+  for (Vec3& position : cloth.positions()) position *= 1.05;
+  shake(cloth, 1e-6, 0);
+  return cloth;
+}
+
+double energyAfter(ReferenceCloth& cloth, Integrator integrator, double h, int steps) {
+  for (int i = 0; i < steps; ++i) cloth.integrate(kWeightless, integrator, h);
+  return cloth.kineticEnergy();
+}
+
+// A hundred thousand times what the shaking put in, or no number any more.
+bool diverges(double energy) {
+  return !(energy < 1e-3);
+}
+
+// Largest eigenvalue of M^-1 K, by power iteration on differences of the forces.
+double largestEigenvalue(ReferenceCloth cloth) {
+  const std::size_t nodes = cloth.nodeCount();
+  const std::vector<Vec3> at(cloth.positions().begin(), cloth.positions().end());
+  const auto forcesAt = [&](const std::vector<Vec3>& direction, double step) {
+    for (std::size_t i = 0; i < nodes; ++i) cloth.positions()[i] = at[i] + step * direction[i];
+    std::vector<Vec3> forces(nodes, Vec3::Zero());
+    cloth.accumulateSpringForces(forces);
+    return forces;
+  };
+  std::vector<Vec3> mode(nodes, Vec3::Zero());
+  for (std::size_t i = 0; i < nodes; ++i)
+    if (cloth.inverseMasses()[i] > 0)
+      mode[i] = Vec3(std::sin(3.1 * static_cast<double>(i)), std::cos(2.9 * static_cast<double>(i)), 0.1);
+  double eigenvalue = 0;
+  for (int iteration = 0; iteration < 2000; ++iteration) {
+    const std::vector<Vec3> ahead = forcesAt(mode, 1e-5), behind = forcesAt(mode, -1e-5);
+    double square = 0;
+    for (std::size_t i = 0; i < nodes; ++i) {
+      mode[i] = (behind[i] - ahead[i]) / 2e-5 * cloth.inverseMasses()[i];
+      square += mode[i].squaredNorm();
+    }
+    eigenvalue = std::sqrt(square);
+    for (Vec3& x : mode) x /= eigenvalue;
+  }
+  return eigenvalue;
+}
+
+TEST(StabilityBound, KeepsSemiImplicitEulerBounded) {
+  scene::Scene scene = stretched(Integrator::semiImplicitEuler);
+  const std::uint32_t substeps = scene::stableSubsteps(scene);
+  ASSERT_GT(substeps, 1u);
+  ReferenceCloth cloth = stretchedCloth(scene.cloths[0]);
+  // Shaken by 1e-6 m, springs of 100 N/m hold some 1e-8 J in 120 nodes.
+  EXPECT_LT(energyAfter(cloth, scene.integrator, scene.tickSeconds() / substeps, 20000), 1e-7);
+}
+
+TEST(StabilityBound, IsLessThanTheTrueLimitAndTheTrueLimitIsReal) {
+  scene::Scene scene = stretched(Integrator::semiImplicitEuler);
+  for (scene::Spring* spring : {&scene.cloths[0].structural, &scene.cloths[0].shear, &scene.cloths[0].bend})
+    spring->damping = 0;
+  const std::uint32_t substeps = scene::stableSubsteps(scene);
+  const double bound = scene.tickSeconds() / substeps;
+  const double limit = 2 / std::sqrt(largestEigenvalue(stretchedCloth(scene.cloths[0])));
+  EXPECT_LT(bound, limit);
+  EXPECT_GT(bound, 0.5 * limit);  // of use, too: within a factor of two
+  ReferenceCloth below = stretchedCloth(scene.cloths[0]), above = below;
+  EXPECT_LT(energyAfter(below, scene.integrator, 0.98 * limit, 5000), 1e-6);
+  EXPECT_TRUE(diverges(energyAfter(above, scene.integrator, 1.1 * limit, 1000)));
+}
+
+TEST(StabilityBound, KeepsExplicitEulerBoundedAndItDivergesWithout) {
+  scene::Scene scene = stretched(Integrator::explicitEuler);
+  scene::Cloth& cloth = scene.cloths[0];
+  cloth.structural.damping = cloth.shear.damping = cloth.bend.damping = 0.2f;
+  cloth.damping = 20;
+  const std::uint32_t substeps = scene::stableSubsteps(scene);
+  ASSERT_GT(substeps, 1u);
+  const double h = scene.tickSeconds() / substeps;
+  ReferenceCloth damped = stretchedCloth(cloth);
+  EXPECT_LT(energyAfter(damped, scene.integrator, h, 20000), 1e-7);
+  cloth.structural.damping = cloth.shear.damping = cloth.bend.damping = 0;
+  cloth.damping = 0;
+  EXPECT_EQ(scene::stableSubsteps(scene), 0u);
+  ReferenceCloth undamped = stretchedCloth(cloth);
+  EXPECT_TRUE(diverges(energyAfter(undamped, scene.integrator, h, 20000)));
+}
+
+}  // namespace
+}  // namespace clothstream::reference
