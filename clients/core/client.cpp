@@ -19,15 +19,24 @@ std::uint32_t Client::receive(Bytes bytes, std::uint64_t nowUs) {
   const std::optional<ServerMessage> message = readServerMessage(bytes);
   if (!message) return failMalformed("ServerMessage");
   switch (message->kind) {
-    case Body::welcome: return welcomed(message->body);
-    case Body::chunk: return chunkReceived(message->body);
-    case Body::frame: return frameReceived(message->body, nowUs);
-    case Body::pong: return pongReceived(message->body, nowUs);
-    case Body::notice: return noticeReceived(message->body);
-    case Body::parameterChanged: return parametersReceived(message->body);
-    case Body::error: return errorReceived(message->body);
-    case Body::listScenes: return scenesReceived(message->body);
-    case Body::none: return 0;
+    case Body::welcome:
+      return welcomed(message->body);
+    case Body::chunk:
+      return chunkReceived(message->body);
+    case Body::frame:
+      return frameReceived(message->body, nowUs);
+    case Body::pong:
+      return pongReceived(message->body, nowUs);
+    case Body::notice:
+      return noticeReceived(message->body);
+    case Body::parameterChanged:
+      return parametersReceived(message->body);
+    case Body::error:
+      return errorReceived(message->body);
+    case Body::listScenes:
+      return scenesReceived(message->body);
+    case Body::none:
+      return 0;
   }
   return 0;
 }
@@ -68,7 +77,8 @@ std::uint32_t Client::chunkReceived(Bytes body) {
 
 std::uint32_t Client::described(Bytes content) {
   auto description = readDescription(content);
-  if (!description) return fail("The server's description of the scene is wrong: " + description.error() + ".");
+  if (!description)
+    return fail("The server's description of the scene is wrong: " + description.error() + ".");
   auto decoder = codec::Decoder::make(description->layout);
   if (!decoder) return fail("The server's description of the scene is wrong: no stream can have its layout.");
   description_ = std::move(*description);
@@ -95,8 +105,10 @@ std::uint32_t Client::packetReceived(std::uint64_t nowUs) {
   statistics_.arrived(parsed ? std::optional(parsed->header.tick) : std::nullopt, packet.size(),
                       description_.ticksPerFrame(), nowUs);
   switch (decode(packet)) {
-    case codec::DecodeResult::ok: break;
-    case codec::DecodeResult::stale: return 0;
+    case codec::DecodeResult::ok:
+      break;
+    case codec::DecodeResult::stale:
+      return 0;
     case codec::DecodeResult::malformed:
     case codec::DecodeResult::wrongEpoch:
     case codec::DecodeResult::missingReference:

@@ -3,6 +3,7 @@
 #include "clients/core/client_message.h"
 
 #include <array>
+
 #include <protozero/pbf_writer.hpp>
 
 #include "clients/core/core.h"
@@ -53,7 +54,8 @@ void addSpring(Writer& parent, std::uint32_t field, const std::optional<Spring>&
 
 }  // namespace
 
-void writeHello(std::string& out, std::uint64_t requestId, std::string_view scene, std::string_view clientName) {
+void writeHello(std::string& out, std::uint64_t requestId, std::string_view scene,
+                std::string_view clientName) {
   writeMessage(out, requestId, kHello, [&](Writer& hello) {
     constexpr std::array<std::uint32_t, 1> kCodecs{codec::kCodecLatticeZstd};
     hello.add_uint32(1, CS_PROTOCOL_VERSION);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What a client says (proto/clothstream/v1/session.proto), serialised. Each function replaces what `out` holds and
-// reuses its memory.
+// What a client says (proto/clothstream/v1/session.proto), serialised. Each function replaces what `out`
+// holds and reuses its memory.
 #pragma once
 
 #include <cstdint>
@@ -23,7 +23,8 @@ struct ColliderChange {
   const float* radius = nullptr;
 };
 
-void writeHello(std::string& out, std::uint64_t requestId, std::string_view scene, std::string_view clientName);
+void writeHello(std::string& out, std::uint64_t requestId, std::string_view scene,
+                std::string_view clientName);
 // `ids` of the spheres are their places in the span.
 void writeColliderPoses(std::string& out, std::span<const Sphere> spheres, std::uint64_t clientTimeUs);
 void writeParameterChange(std::string& out, std::uint64_t requestId, const ParameterChange& change);

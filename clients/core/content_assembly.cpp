@@ -9,8 +9,8 @@ namespace clothstream::client {
 namespace {
 
 tl::unexpected<std::string> wrong(const Chunk& chunk, const std::string& what) {
-  return tl::unexpected("piece " + std::to_string(chunk.index) + " of content " + std::to_string(chunk.contentId) + ": " +
-                        what);
+  return tl::unexpected("piece " + std::to_string(chunk.index) + " of content " +
+                        std::to_string(chunk.contentId) + ": " + what);
 }
 
 }  // namespace
@@ -24,7 +24,8 @@ tl::expected<ContentAssembly::Content*, std::string> ContentAssembly::contentOf(
   const auto known = std::find_if(unfinished_.begin(), unfinished_.end(),
                                   [&](const Content& content) { return content.id == chunk.contentId; });
   if (known != unfinished_.end()) {
-    if (chunk.index != known->nextIndex) return wrong(chunk, "expected piece " + std::to_string(known->nextIndex));
+    if (chunk.index != known->nextIndex)
+      return wrong(chunk, "expected piece " + std::to_string(known->nextIndex));
     if (chunk.count != known->count || chunk.totalBytes != known->totalBytes)
       return wrong(chunk, "announces another size than the pieces before");
     return &*known;
@@ -32,7 +33,8 @@ tl::expected<ContentAssembly::Content*, std::string> ContentAssembly::contentOf(
   if (chunk.index != 0) return wrong(chunk, "the first piece is missing");
   if (chunk.count == 0) return wrong(chunk, "a content has at least one piece");
   if (chunk.totalBytes > kMaxContentBytes - announcedBytes())
-    return wrong(chunk, std::to_string(chunk.totalBytes) + " bytes announced; " + std::to_string(kMaxContentBytes) +
+    return wrong(chunk, std::to_string(chunk.totalBytes) + " bytes announced; " +
+                            std::to_string(kMaxContentBytes) +
                             " are allowed, all unfinished contents together");
   if (unfinished_.size() == kMaxUnfinished)
     return wrong(chunk, "more than " + std::to_string(kMaxUnfinished) + " contents at a time");
@@ -46,8 +48,8 @@ tl::expected<ContentAssembly::Content*, std::string> ContentAssembly::contentOf(
 tl::expected<std::optional<std::string>, std::string> ContentAssembly::add(const Chunk& chunk) {
   if (chunk.kind != static_cast<std::uint32_t>(ContentKind::streamDescription)) return std::nullopt;
   if (chunk.data.size() > kMaxChunkBytes)
-    return wrong(chunk, std::to_string(chunk.data.size()) + " bytes; at most " + std::to_string(kMaxChunkBytes) +
-                            " are allowed");
+    return wrong(chunk, std::to_string(chunk.data.size()) + " bytes; at most " +
+                            std::to_string(kMaxChunkBytes) + " are allowed");
   const auto found = contentOf(chunk);
   if (!found) return tl::unexpected(found.error());
   Content& content = **found;

@@ -22,9 +22,9 @@ class ContentAssembly {
   static constexpr std::uint64_t kMaxContentBytes = 256ull * 1024 * 1024;
   static constexpr std::size_t kMaxUnfinished = 4;
 
-  // Pieces of one content come in order; contents may interleave. Gives the bytes of a stream description when its
-  // last piece is in; nothing for kinds that this client does not know, which take no memory. The error says what the
-  // server did wrong. Memory grows with what arrives, not with what is announced.
+  // Pieces of one content come in order; contents may interleave. Gives the bytes of a stream description
+  // when its last piece is in; nothing for kinds that this client does not know, which take no memory. The
+  // error says what the server did wrong. Memory grows with what arrives, not with what is announced.
   [[nodiscard]] tl::expected<std::optional<std::string>, std::string> add(const Chunk& chunk);
 
  private:

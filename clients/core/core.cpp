@@ -26,7 +26,9 @@ std::optional<Spring> spring(const float* values) {
   return Spring{values[0], values[1]};
 }
 
-std::optional<float> scalar(const float* value) { return value ? std::optional(*value) : std::nullopt; }
+std::optional<float> scalar(const float* value) {
+  return value ? std::optional(*value) : std::nullopt;
+}
 
 template <typename Values>
 void copy(const Values& values, float* out) {
@@ -46,15 +48,21 @@ cs_client* cs_create(const char* scene, const char* client_name) {
   return new cs_client{Client(scene, client_name)};
 }
 
-void cs_destroy(cs_client* client) { delete client; }
+void cs_destroy(cs_client* client) {
+  delete client;
+}
 
-void cs_set_clock(cs_client* client, uint64_t (*now_us)(void)) { client->client.setClock(now_us); }
+void cs_set_clock(cs_client* client, uint64_t (*now_us)(void)) {
+  client->client.setClock(now_us);
+}
 
 uint32_t cs_receive(cs_client* client, const uint8_t* message, size_t bytes, uint64_t now_us) {
   return client->client.receive(Bytes(reinterpret_cast<const char*>(message), bytes), now_us);
 }
 
-void cs_update(cs_client* client, uint64_t now_us) { client->client.update(now_us); }
+void cs_update(cs_client* client, uint64_t now_us) {
+  client->client.update(now_us);
+}
 
 const uint8_t* cs_next_outgoing(cs_client* client, size_t* bytes) {
   const std::string* message = client->client.nextOutgoing();
@@ -62,13 +70,21 @@ const uint8_t* cs_next_outgoing(cs_client* client, size_t* bytes) {
   return message ? reinterpret_cast<const uint8_t*>(message->data()) : nullptr;
 }
 
-cs_state cs_get_state(const cs_client* client) { return client->client.state(); }
+cs_state cs_get_state(const cs_client* client) {
+  return client->client.state();
+}
 
-const char* cs_error_text(const cs_client* client) { return client->client.errorText().c_str(); }
+const char* cs_error_text(const cs_client* client) {
+  return client->client.errorText().c_str();
+}
 
-uint32_t cs_error_code(const cs_client* client) { return client->client.errorCode(); }
+uint32_t cs_error_code(const cs_client* client) {
+  return client->client.errorCode();
+}
 
-const char* cs_notice_text(const cs_client* client) { return client->client.noticeText().c_str(); }
+const char* cs_notice_text(const cs_client* client) {
+  return client->client.noticeText().c_str();
+}
 
 void cs_get_statistics(const cs_client* client, uint64_t now_us, cs_statistics* out) {
   const FrameStatistics& frames = client->client.statistics();
@@ -88,27 +104,49 @@ void cs_get_statistics(const cs_client* client, uint64_t now_us, cs_statistics* 
   out->decode_ms = client->client.decodeMs();
 }
 
-const char* cs_server_name(const cs_client* client) { return client->client.welcome().serverName.c_str(); }
+const char* cs_server_name(const cs_client* client) {
+  return client->client.welcome().serverName.c_str();
+}
 
-const char* cs_device_name(const cs_client* client) { return client->client.welcome().deviceName.c_str(); }
+const char* cs_device_name(const cs_client* client) {
+  return client->client.welcome().deviceName.c_str();
+}
 
-const char* cs_scene_name(const cs_client* client) { return client->client.welcome().scene.c_str(); }
+const char* cs_scene_name(const cs_client* client) {
+  return client->client.welcome().scene.c_str();
+}
 
-uint64_t cs_participant_id(const cs_client* client) { return client->client.welcome().participantId; }
+uint64_t cs_participant_id(const cs_client* client) {
+  return client->client.welcome().participantId;
+}
 
-uint32_t cs_stream_rate(const cs_client* client) { return client->client.description().streamRate; }
+uint32_t cs_stream_rate(const cs_client* client) {
+  return client->client.description().streamRate;
+}
 
-uint32_t cs_simulation_rate(const cs_client* client) { return client->client.description().simulationRate; }
+uint32_t cs_simulation_rate(const cs_client* client) {
+  return client->client.description().simulationRate;
+}
 
-double cs_stream_seconds(const cs_client* client) { return client->client.statistics().streamSeconds(); }
+double cs_stream_seconds(const cs_client* client) {
+  return client->client.statistics().streamSeconds();
+}
 
-uint32_t cs_vertex_count(const cs_client* client) { return client->client.description().layout.vertexCount(); }
+uint32_t cs_vertex_count(const cs_client* client) {
+  return client->client.description().layout.vertexCount();
+}
 
-const float* cs_positions(const cs_client* client) { return client->client.positions().data(); }
+const float* cs_positions(const cs_client* client) {
+  return client->client.positions().data();
+}
 
-const float* cs_normals(const cs_client* client) { return client->client.normals().data(); }
+const float* cs_normals(const cs_client* client) {
+  return client->client.normals().data();
+}
 
-uint64_t cs_reconstruction_hash(const cs_client* client) { return client->client.reconstructionHash(); }
+uint64_t cs_reconstruction_hash(const cs_client* client) {
+  return client->client.reconstructionHash();
+}
 
 const uint32_t* cs_triangles(const cs_client* client, uint32_t* index_count) {
   const std::vector<std::uint32_t>& triangles = client->client.description().triangles;
@@ -180,7 +218,8 @@ void cs_set_colliders(cs_client* client, const float* spheres, uint32_t count, u
   client->client.setColliders(std::span(colliders.data(), count), now_us);
 }
 
-void cs_set_environment(cs_client* client, const float* gravity3, const float* wind3, const float* air_density) {
+void cs_set_environment(cs_client* client, const float* gravity3, const float* wind3,
+                        const float* air_density) {
   ParameterChange change;
   change.gravity = vec3(gravity3);
   change.wind = vec3(wind3);
@@ -200,9 +239,13 @@ void cs_set_collider(cs_client* client, const char* collider, const float* posit
   client->client.change(ColliderChange{collider, position ? &*position : nullptr, radius});
 }
 
-void cs_list_scenes(cs_client* client) { client->client.listScenes(); }
+void cs_list_scenes(cs_client* client) {
+  client->client.listScenes();
+}
 
-uint32_t cs_scene_count(const cs_client* client) { return static_cast<std::uint32_t>(client->client.scenes().size()); }
+uint32_t cs_scene_count(const cs_client* client) {
+  return static_cast<std::uint32_t>(client->client.scenes().size());
+}
 
 const char* cs_scene(const cs_client* client, uint32_t index) {
   const std::string* scene = at(client->client.scenes(), index);

@@ -1,13 +1,14 @@
 /* SPDX-License-Identifier: MIT
- * The client without input or output: bytes in, bytes out. A C interface, so that it is the same natively and as
- * WebAssembly.
+ * The client without input or output: bytes in, bytes out. A C interface, so that it is the same natively and
+ * as WebAssembly.
  *
- * A transport feeds every serialised ServerMessage to cs_receive and writes every message that cs_next_outgoing gives
- * as one ClientMessage. All times are microseconds of one steady clock of the caller's. Not thread-safe: one thread a
- * client at a time. No function throws or aborts on bytes from outside, and what it holds is bounded: at most 256 MiB of
- * content on its way, and geometry in proportion to the description that arrived. Where memory runs out all the same, the
- * native library ends the program and WebAssembly traps. Pointers that are returned stay valid until the next call of
- * cs_receive on the same client, unless said otherwise; strings are UTF-8, never NULL.
+ * A transport feeds every serialised ServerMessage to cs_receive and writes every message that
+ * cs_next_outgoing gives as one ClientMessage. All times are microseconds of one steady clock of the
+ * caller's. Not thread-safe: one thread a client at a time. No function throws or aborts on bytes from
+ * outside, and what it holds is bounded: at most 256 MiB of content on its way, and geometry in proportion to
+ * the description that arrived. Where memory runs out all the same, the native library ends the program and
+ * WebAssembly traps. Pointers that are returned stay valid until the next call of cs_receive on the same
+ * client, unless said otherwise; strings are UTF-8, never NULL.
  */
 #ifndef CLOTHSTREAM_CLIENTS_CORE_CORE_H
 #define CLOTHSTREAM_CLIENTS_CORE_CORE_H
@@ -41,25 +42,25 @@ enum {
 };
 
 typedef struct cs_statistics {
-  uint64_t tick;             /* of the newest decoded frame */
-  uint64_t frames;           /* decoded */
-  uint64_t key_frames;       /* of these */
-  uint64_t dropped;          /* frames of the stream that never came, by the gaps in their ticks */
-  uint64_t decode_errors;    /* packets that were refused */
-  uint64_t bytes;            /* of packets received */
-  uint64_t hash_mismatches;  /* decoded frames whose hash is not the server's */
-  double frames_per_second;  /* over the last second */
-  double kbit_per_second;    /* over the last second */
-  double bits_per_vertex;    /* packet bits a vertex a frame, over all frames */
-  double round_trip_ms;      /* smallest of the last pings */
-  double clock_offset_us;    /* server clock - own clock */
-  double decode_ms;          /* of the newest frame; 0 where there is no clock (see cs_set_clock) */
+  uint64_t tick;            /* of the newest decoded frame */
+  uint64_t frames;          /* decoded */
+  uint64_t key_frames;      /* of these */
+  uint64_t dropped;         /* frames of the stream that never came, by the gaps in their ticks */
+  uint64_t decode_errors;   /* packets that were refused */
+  uint64_t bytes;           /* of packets received */
+  uint64_t hash_mismatches; /* decoded frames whose hash is not the server's */
+  double frames_per_second; /* over the last second */
+  double kbit_per_second;   /* over the last second */
+  double bits_per_vertex;   /* packet bits a vertex a frame, over all frames */
+  double round_trip_ms;     /* smallest of the last pings */
+  double clock_offset_us;   /* server clock - own clock */
+  double decode_ms;         /* of the newest frame; 0 where there is no clock (see cs_set_clock) */
 } cs_statistics;
 
 /* As they stand now, everybody's changes included. */
 typedef struct cs_environment {
-  float gravity[3]; /* m/s^2 */
-  float wind[3];    /* m/s */
+  float gravity[3];  /* m/s^2 */
+  float wind[3];     /* m/s */
   float air_density; /* kg/m^3 */
 } cs_environment;
 
@@ -71,7 +72,7 @@ typedef struct cs_cloth_parameters {
 typedef struct cs_cloth {
   const char* name;
   uint32_t first_vertex, vertex_count;
-  uint32_t rows, columns;     /* 0 if not a grid */
+  uint32_t rows, columns;            /* 0 if not a grid */
   uint32_t first_index, index_count; /* into cs_triangles */
 } cs_cloth;
 
@@ -129,11 +130,13 @@ int cs_get_collider(const cs_client* client, uint32_t index, cs_collider* out);
 int cs_get_environment(const cs_client* client, cs_environment* out);
 int cs_get_cloth_parameters(const cs_client* client, uint32_t index, cs_cloth_parameters* out);
 
-/* Sphere colliders of this participant: `count` of {x, y, z, radius}, at most CS_MAX_COLLIDERS (the rest is left out);
- * replaces all former ones; 0 takes them away. Only the newest call counts if the transport is behind. */
+/* Sphere colliders of this participant: `count` of {x, y, z, radius}, at most CS_MAX_COLLIDERS (the rest is
+ * left out); replaces all former ones; 0 takes them away. Only the newest call counts if the transport is
+ * behind. */
 void cs_set_colliders(cs_client* client, const float* spheres, uint32_t count, uint64_t now_us);
 /* Parameters; NULL leaves one as it is. An empty cloth name means every cloth. */
-void cs_set_environment(cs_client* client, const float* gravity3, const float* wind3, const float* air_density);
+void cs_set_environment(cs_client* client, const float* gravity3, const float* wind3,
+                        const float* air_density);
 void cs_set_cloth(cs_client* client, const char* cloth, const float* structural2, const float* shear2,
                   const float* bend2, const float* damping); /* springs: {stiffness, damping} */
 void cs_set_collider(cs_client* client, const char* collider, const float* position3, const float* radius);

@@ -32,12 +32,18 @@ bool setText(std::string& target, Reader& reader) {
 bool readCloth(Bytes message, ClothMessage& cloth) {
   return readFields(message, [&](std::uint32_t field, Reader& reader) {
     switch (field) {
-      case bytes(1): return setText(cloth.name, reader);
-      case varint(2): return cloth.layout.vertexCount = reader.get_uint32(), true;
-      case varint(3): return cloth.layout.rows = reader.get_uint32(), true;
-      case varint(4): return cloth.layout.columns = reader.get_uint32(), true;
-      case bytes(5): return cloth.restPositions = reader.get_view(), true;
-      default: return skip(reader);
+      case bytes(1):
+        return setText(cloth.name, reader);
+      case varint(2):
+        return cloth.layout.vertexCount = reader.get_uint32(), true;
+      case varint(3):
+        return cloth.layout.rows = reader.get_uint32(), true;
+      case varint(4):
+        return cloth.layout.columns = reader.get_uint32(), true;
+      case bytes(5):
+        return cloth.restPositions = reader.get_view(), true;
+      default:
+        return skip(reader);
     }
   });
 }
@@ -46,10 +52,14 @@ bool readCloth(Bytes message, ClothMessage& cloth) {
 bool readEnvironment(Bytes message, Environment& environment) {
   return readFields(message, [&](std::uint32_t field, Reader& reader) {
     switch (field) {
-      case bytes(1): return readVec3(reader.get_view(), environment.gravity);
-      case bytes(2): return readVec3(reader.get_view(), environment.wind);
-      case fixed32(3): return std::isfinite(environment.airDensity = reader.get_float());
-      default: return skip(reader);
+      case bytes(1):
+        return readVec3(reader.get_view(), environment.gravity);
+      case bytes(2):
+        return readVec3(reader.get_view(), environment.wind);
+      case fixed32(3):
+        return std::isfinite(environment.airDensity = reader.get_float());
+      default:
+        return skip(reader);
     }
   });
 }
@@ -58,12 +68,18 @@ bool readEnvironment(Bytes message, Environment& environment) {
 bool readClothParameters(Bytes message, std::string& name, ClothParameters& parameters) {
   return readFields(message, [&](std::uint32_t field, Reader& reader) {
     switch (field) {
-      case bytes(1): return setText(name, reader);
-      case bytes(5): return readSpring(reader.get_view(), parameters.structural);
-      case bytes(6): return readSpring(reader.get_view(), parameters.shear);
-      case bytes(7): return readSpring(reader.get_view(), parameters.bend);
-      case fixed32(8): return std::isfinite(parameters.damping = reader.get_float());
-      default: return skip(reader);
+      case bytes(1):
+        return setText(name, reader);
+      case bytes(5):
+        return readSpring(reader.get_view(), parameters.structural);
+      case bytes(6):
+        return readSpring(reader.get_view(), parameters.shear);
+      case bytes(7):
+        return readSpring(reader.get_view(), parameters.bend);
+      case fixed32(8):
+        return std::isfinite(parameters.damping = reader.get_float());
+      default:
+        return skip(reader);
     }
   });
 }
@@ -83,30 +99,42 @@ bool readDefinition(Bytes message, Description& description) {
 }
 
 // Gives false where the message is not well formed; what is well formed and wrong is for check() to say.
-bool readParts(Bytes message, Description& description, std::vector<ClothMessage>& cloths, Bytes& definition) {
+bool readParts(Bytes message, Description& description, std::vector<ClothMessage>& cloths,
+               Bytes& definition) {
   return readFields(message, [&](std::uint32_t field, Reader& reader) {
     switch (field) {
-      case varint(1): return description.layout.epoch = reader.get_uint32(), true;
-      case varint(2): return description.codec = reader.get_uint32(), true;
-      case bytes(3): return setText(description.scene, reader);
-      case varint(4): return description.simulationRate = reader.get_uint32(), true;
-      case varint(5): return description.streamRate = reader.get_uint32(), true;
-      case fixed32(6): return description.layout.maxError = reader.get_float(), true;
+      case varint(1):
+        return description.layout.epoch = reader.get_uint32(), true;
+      case varint(2):
+        return description.codec = reader.get_uint32(), true;
+      case bytes(3):
+        return setText(description.scene, reader);
+      case varint(4):
+        return description.simulationRate = reader.get_uint32(), true;
+      case varint(5):
+        return description.streamRate = reader.get_uint32(), true;
+      case fixed32(6):
+        return description.layout.maxError = reader.get_float(), true;
       case varint(7):
-        description.layout.normals = reader.get_enum() == 2 ? codec::NormalMode::octahedral : codec::NormalMode::none;
+        description.layout.normals =
+            reader.get_enum() == 2 ? codec::NormalMode::octahedral : codec::NormalMode::none;
         return true;
       case bytes(8):
         return cloths.size() <= codec::kMaxClothRanges && readCloth(reader.get_view(), cloths.emplace_back());
       case bytes(9):
         return description.colliders.size() < kMaxSceneColliders &&
                readCollider(reader.get_view(), description.colliders.emplace_back());
-      case bytes(10): return definition = reader.get_view(), true;
-      default: return skip(reader);
+      case bytes(10):
+        return definition = reader.get_view(), true;
+      default:
+        return skip(reader);
     }
   });
 }
 
-std::string quoted(const std::string& name) { return "cloth \"" + name + "\""; }
+std::string quoted(const std::string& name) {
+  return "cloth \"" + name + "\"";
+}
 
 // Empty if the numbers agree.
 std::string check(const Description& description, const std::vector<ClothMessage>& cloths) {
@@ -115,15 +143,18 @@ std::string check(const Description& description, const std::vector<ClothMessage
            std::to_string(codec::kCodecLatticeZstd);
   const std::uint32_t simulation = description.simulationRate, stream = description.streamRate;
   if (simulation == 0 || simulation > kMaxRate)
-    return "simulation_rate is " + std::to_string(simulation) + "; 1 to " + std::to_string(kMaxRate) + " is allowed";
+    return "simulation_rate is " + std::to_string(simulation) + "; 1 to " + std::to_string(kMaxRate) +
+           " is allowed";
   if (stream == 0 || simulation % stream != 0)
-    return "stream_rate is " + std::to_string(stream) + "; a divisor of " + std::to_string(simulation) + " is allowed";
+    return "stream_rate is " + std::to_string(stream) + "; a divisor of " + std::to_string(simulation) +
+           " is allowed";
   if (cloths.empty() || cloths.size() > codec::kMaxClothRanges)
-    return std::to_string(cloths.size()) + " cloths; 1 to " + std::to_string(codec::kMaxClothRanges) + " are allowed";
+    return std::to_string(cloths.size()) + " cloths; 1 to " + std::to_string(codec::kMaxClothRanges) +
+           " are allowed";
   for (const ClothMessage& cloth : cloths) {
     if (cloth.restPositions.size() != std::uint64_t{cloth.layout.vertexCount} * 3 * sizeof(float))
-      return quoted(cloth.name) + ": rest_positions has " + std::to_string(cloth.restPositions.size()) + " bytes for " +
-             std::to_string(cloth.layout.vertexCount) + " vertices; 12 a vertex are needed";
+      return quoted(cloth.name) + ": rest_positions has " + std::to_string(cloth.restPositions.size()) +
+             " bytes for " + std::to_string(cloth.layout.vertexCount) + " vertices; 12 a vertex are needed";
   }
   if (!codec::isPossible(description.layout))
     return "a cloth's rows x columns is not its vertex_count, there are no vertices or more than " +
@@ -131,7 +162,8 @@ std::string check(const Description& description, const std::vector<ClothMessage
   return {};
 }
 
-void appendTriangles(const codec::ClothLayout& cloth, std::uint32_t firstVertex, std::vector<std::uint32_t>& out) {
+void appendTriangles(const codec::ClothLayout& cloth, std::uint32_t firstVertex,
+                     std::vector<std::uint32_t>& out) {
   for (std::uint32_t row = 0; row + 1 < cloth.rows; ++row) {
     for (std::uint32_t column = 0; column + 1 < cloth.columns; ++column) {
       const std::uint32_t a = firstVertex + row * cloth.columns + column, b = a + 1;
@@ -162,7 +194,8 @@ tl::expected<Description, std::string> readDescription(Bytes message) {
   if (!readParts(message, description, cloths, definition))
     return tl::unexpected(std::string("its bytes are no StreamDescription"));
   for (const ClothMessage& cloth : cloths) description.layout.cloths.push_back(cloth.layout);
-  if (std::string problem = check(description, cloths); !problem.empty()) return tl::unexpected(std::move(problem));
+  if (std::string problem = check(description, cloths); !problem.empty())
+    return tl::unexpected(std::move(problem));
 
   std::uint32_t firstVertex = 0;
   for (ClothMessage& source : cloths) {
@@ -177,8 +210,10 @@ tl::expected<Description, std::string> readDescription(Bytes message) {
     cloth.name = std::move(source.name);
   }
   description.restNormals.resize(description.restPositions.size());
-  codec::computeVertexNormals(description.layout, description.restPositions.data(), description.restNormals.data());
-  if (!readDefinition(definition, description)) return tl::unexpected(std::string("its definition is no Scene"));
+  codec::computeVertexNormals(description.layout, description.restPositions.data(),
+                              description.restNormals.data());
+  if (!readDefinition(definition, description))
+    return tl::unexpected(std::string("its definition is no Scene"));
   return description;
 }
 

@@ -44,8 +44,8 @@ struct Description {
   std::uint32_t ticksPerFrame() const { return simulationRate / streamRate; }
 };
 
-// A serialised StreamDescription. Sizes what it makes by the positions that came, never by numbers alone. The error
-// names the field, its value and what is allowed.
+// A serialised StreamDescription. Sizes what it makes by the positions that came, never by numbers alone. The
+// error names the field, its value and what is allowed.
 [[nodiscard]] tl::expected<Description, std::string> readDescription(Bytes message);
 
 void apply(const ParameterChange& change, Description& description);

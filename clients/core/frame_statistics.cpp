@@ -13,14 +13,15 @@ constexpr std::uint64_t kShortestWindowUs = 100'000;
 
 }  // namespace
 
-void FrameStatistics::arrived(std::optional<std::uint64_t> tick, std::size_t packetBytes, std::uint32_t ticksPerFrame,
-                              std::uint64_t nowUs) {
+void FrameStatistics::arrived(std::optional<std::uint64_t> tick, std::size_t packetBytes,
+                              std::uint32_t ticksPerFrame, std::uint64_t nowUs) {
   if (arrivalCount_ == 0) firstArrivalUs_ = nowUs;
   arrivals_[arrivalCount_ % kArrivals] = {nowUs, packetBytes, false};
   ++arrivalCount_;
   bytes_ += packetBytes;
   if (!tick || (newestArrivedTick_ && *tick <= *newestArrivedTick_)) return;
-  if (newestArrivedTick_) dropped_ += std::max<std::uint64_t>((*tick - *newestArrivedTick_) / ticksPerFrame, 1) - 1;
+  if (newestArrivedTick_)
+    dropped_ += std::max<std::uint64_t>((*tick - *newestArrivedTick_) / ticksPerFrame, 1) - 1;
   newestArrivedTick_ = tick;
 }
 
@@ -54,13 +55,18 @@ double FrameStatistics::framesPerSecond(std::uint64_t nowUs) const {
 }
 
 double FrameStatistics::kbitPerSecond(std::uint64_t nowUs) const {
-  return perSecond(nowUs, [](const Arrival& arrival) { return static_cast<double>(arrival.bytes) * 8 / 1000; });
+  return perSecond(nowUs,
+                   [](const Arrival& arrival) { return static_cast<double>(arrival.bytes) * 8 / 1000; });
 }
 
 double FrameStatistics::bitsPerVertex() const {
-  return decodedVertices_ == 0 ? 0 : static_cast<double>(decodedBytes_) * 8 / static_cast<double>(decodedVertices_);
+  return decodedVertices_ == 0
+             ? 0
+             : static_cast<double>(decodedBytes_) * 8 / static_cast<double>(decodedVertices_);
 }
 
-double FrameStatistics::streamSeconds() const { return static_cast<double>(lastDecodedUs_ - firstDecodedUs_) * 1e-6; }
+double FrameStatistics::streamSeconds() const {
+  return static_cast<double>(lastDecodedUs_ - firstDecodedUs_) * 1e-6;
+}
 
 }  // namespace clothstream::client

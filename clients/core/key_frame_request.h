@@ -7,8 +7,8 @@
 
 namespace clothstream::client {
 
-// One request at a time; no two within kShortestIntervalUs. The server may refuse or forget one: after kPatienceUs
-// without a key frame it is asked again.
+// One request at a time; no two within kShortestIntervalUs. The server may refuse or forget one: after
+// kPatienceUs without a key frame it is asked again.
 class KeyFrameRequest {
  public:
   static constexpr std::uint64_t kShortestIntervalUs = 100'000;

@@ -11,7 +11,8 @@
 
 namespace clothstream::client {
 
-// Of acknowledgements and of collider poses only the newest says anything: a transport that is behind skips the others.
+// Of acknowledgements and of collider poses only the newest says anything: a transport that is behind skips
+// the others.
 class Outbox {
  public:
   // More control messages than this means a transport that takes nothing.

@@ -24,7 +24,8 @@ void ServerClock::pongReceived(const Pong& pong, std::uint64_t nowUs) {
   const std::uint64_t roundTrip = nowUs - pong.clientTimeUs;
   // The difference of two unsigned clocks, read as signed, is right whichever is ahead.
   const auto ahead = static_cast<std::int64_t>(pong.serverTimeUs - pong.clientTimeUs);
-  exchanges_[exchangeCount_ % kWindow] = {roundTrip, static_cast<double>(ahead) - static_cast<double>(roundTrip) / 2};
+  exchanges_[exchangeCount_ % kWindow] = {roundTrip,
+                                          static_cast<double>(ahead) - static_cast<double>(roundTrip) / 2};
   ++exchangeCount_;
 }
 

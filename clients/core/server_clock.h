@@ -10,8 +10,8 @@
 
 namespace clothstream::client {
 
-// A ping's server time was true somewhere between its sending and its pong: the offset is known to half a round trip.
-// Queues only ever lengthen a round trip, so the shortest of the last ones is believed.
+// A ping's server time was true somewhere between its sending and its pong: the offset is known to half a
+// round trip. Queues only ever lengthen a round trip, so the shortest of the last ones is believed.
 class ServerClock {
  public:
   bool pingDue(std::uint64_t nowUs) const;

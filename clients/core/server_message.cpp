@@ -26,7 +26,9 @@ bool setFinite(float& target, Reader& reader) {
   return std::isfinite(target);
 }
 
-bool setFinite(std::optional<float>& target, Reader& reader) { return setFinite(target.emplace(), reader); }
+bool setFinite(std::optional<float>& target, Reader& reader) {
+  return setFinite(target.emplace(), reader);
+}
 
 bool setSpring(std::optional<Spring>& target, Reader& reader) {
   return readSpring(reader.get_view(), target.emplace());
@@ -60,12 +62,18 @@ bool readSphere(Bytes message, float& radius) {
 bool readClothChange(Bytes message, ClothChange& change) {
   return readFields(message, [&](std::uint32_t field, Reader& reader) {
     switch (field) {
-      case bytes(1): return setText(change.name, reader);
-      case bytes(2): return setSpring(change.structural, reader);
-      case bytes(3): return setSpring(change.shear, reader);
-      case bytes(4): return setSpring(change.bend, reader);
-      case fixed32(5): return setFinite(change.damping, reader);
-      default: return skip(reader);
+      case bytes(1):
+        return setText(change.name, reader);
+      case bytes(2):
+        return setSpring(change.structural, reader);
+      case bytes(3):
+        return setSpring(change.shear, reader);
+      case bytes(4):
+        return setSpring(change.bend, reader);
+      case fixed32(5):
+        return setFinite(change.damping, reader);
+      default:
+        return skip(reader);
     }
   });
 }
@@ -73,12 +81,17 @@ bool readClothChange(Bytes message, ClothChange& change) {
 bool readParameterChange(Bytes message, ParameterChange& change) {
   return readFields(message, [&](std::uint32_t field, Reader& reader) {
     switch (field) {
-      case bytes(1): return setVec3Value(change.gravity, reader);
-      case bytes(2): return setVec3Value(change.wind, reader);
-      case fixed32(3): return setFinite(change.airDensity, reader);
+      case bytes(1):
+        return setVec3Value(change.gravity, reader);
+      case bytes(2):
+        return setVec3Value(change.wind, reader);
+      case fixed32(3):
+        return setFinite(change.airDensity, reader);
       case bytes(4):
-        return change.cloths.size() < kMaxCloths && readClothChange(reader.get_view(), change.cloths.emplace_back());
-      default: return skip(reader);
+        return change.cloths.size() < kMaxCloths &&
+               readClothChange(reader.get_view(), change.cloths.emplace_back());
+      default:
+        return skip(reader);
     }
   });
 }
@@ -93,8 +106,8 @@ std::optional<Message> readMessage(Bytes bytes, Visit&& visit) {
 }
 
 Body bodyOf(std::uint32_t field) {
-  constexpr std::array kKnown{Body::welcome, Body::chunk,            Body::frame, Body::pong,
-                              Body::notice,  Body::parameterChanged, Body::error, Body::listScenes};
+  constexpr std::array kKnown{Body::welcome,          Body::chunk, Body::frame,     Body::pong, Body::notice,
+                              Body::parameterChanged, Body::error, Body::listScenes};
   for (const Body body : kKnown) {
     if (field == bytes(static_cast<std::uint32_t>(body))) return body;
   }
@@ -115,13 +128,20 @@ std::optional<ServerMessage> readServerMessage(Bytes bytes) {
 std::optional<Welcome> readWelcome(Bytes message) {
   return readMessage<Welcome>(message, [](Welcome& welcome, std::uint32_t field, Reader& reader) {
     switch (field) {
-      case varint(1): return set(welcome.protocolVersion, reader.get_uint32());
-      case varint(2): return set(welcome.codec, reader.get_uint32());
-      case bytes(3): return setText(welcome.scene, reader);
-      case varint(4): return set(welcome.participantId, reader.get_uint64());
-      case bytes(5): return setText(welcome.serverName, reader);
-      case bytes(6): return setText(welcome.deviceName, reader);
-      default: return skip(reader);
+      case varint(1):
+        return set(welcome.protocolVersion, reader.get_uint32());
+      case varint(2):
+        return set(welcome.codec, reader.get_uint32());
+      case bytes(3):
+        return setText(welcome.scene, reader);
+      case varint(4):
+        return set(welcome.participantId, reader.get_uint64());
+      case bytes(5):
+        return setText(welcome.serverName, reader);
+      case bytes(6):
+        return setText(welcome.deviceName, reader);
+      default:
+        return skip(reader);
     }
   });
 }
@@ -129,13 +149,20 @@ std::optional<Welcome> readWelcome(Bytes message) {
 std::optional<Chunk> readChunk(Bytes message) {
   return readMessage<Chunk>(message, [](Chunk& chunk, std::uint32_t field, Reader& reader) {
     switch (field) {
-      case varint(1): return set(chunk.contentId, reader.get_uint64());
-      case varint(2): return set(chunk.kind, reader.get_uint32());
-      case varint(3): return set(chunk.index, reader.get_uint32());
-      case varint(4): return set(chunk.count, reader.get_uint32());
-      case varint(5): return set(chunk.totalBytes, reader.get_uint64());
-      case bytes(6): return set(chunk.data, reader.get_view());
-      default: return skip(reader);
+      case varint(1):
+        return set(chunk.contentId, reader.get_uint64());
+      case varint(2):
+        return set(chunk.kind, reader.get_uint32());
+      case varint(3):
+        return set(chunk.index, reader.get_uint32());
+      case varint(4):
+        return set(chunk.count, reader.get_uint32());
+      case varint(5):
+        return set(chunk.totalBytes, reader.get_uint64());
+      case bytes(6):
+        return set(chunk.data, reader.get_view());
+      default:
+        return skip(reader);
     }
   });
 }
@@ -146,13 +173,16 @@ bool readFrame(Bytes message, Frame& frame) {
   frame.colliders.clear();
   return readFields(message, [&](std::uint32_t field, Reader& reader) {
     switch (field) {
-      case bytes(1): return set(frame.packet, reader.get_view());
-      case fixed64(4): return set(frame.reconstructionHash, reader.get_fixed64());
+      case bytes(1):
+        return set(frame.packet, reader.get_view());
+      case fixed64(4):
+        return set(frame.reconstructionHash, reader.get_fixed64());
       case bytes(6):
         if (frame.colliders.size() == kMaxSceneColliders) return false;
         frame.colliders.push_back(reader.get_view());
         return true;
-      default: return skip(reader);
+      default:
+        return skip(reader);
     }
   });
 }
@@ -165,17 +195,22 @@ bool readCollider(Bytes message, Collider& collider) {
   collider.participantId = 0;
   return readFields(message, [&](std::uint32_t field, Reader& reader) {
     switch (field) {
-      case bytes(1): return setText(collider.name, reader);
-      case bytes(2): return readVec3(reader.get_view(), collider.position);
+      case bytes(1):
+        return setText(collider.name, reader);
+      case bytes(2):
+        return readVec3(reader.get_view(), collider.position);
       case bytes(3): {
         if (!readFloats(reader.get_view(), collider.orientation)) return false;
         // All zero means no rotation (scene.proto).
         if (collider.orientation == std::array<float, 4>{}) collider.orientation[3] = 1;
         return true;
       }
-      case varint(4): return set(collider.participantId, reader.get_uint64());
-      case bytes(5): return readSphere(reader.get_view(), collider.radius);
-      default: return skip(reader);
+      case varint(4):
+        return set(collider.participantId, reader.get_uint64());
+      case bytes(5):
+        return readSphere(reader.get_view(), collider.radius);
+      default:
+        return skip(reader);
     }
   });
 }
@@ -183,9 +218,12 @@ bool readCollider(Bytes message, Collider& collider) {
 std::optional<Pong> readPong(Bytes message) {
   return readMessage<Pong>(message, [](Pong& pong, std::uint32_t field, Reader& reader) {
     switch (field) {
-      case varint(1): return set(pong.clientTimeUs, reader.get_uint64());
-      case varint(2): return set(pong.serverTimeUs, reader.get_uint64());
-      default: return skip(reader);
+      case varint(1):
+        return set(pong.clientTimeUs, reader.get_uint64());
+      case varint(2):
+        return set(pong.serverTimeUs, reader.get_uint64());
+      default:
+        return skip(reader);
     }
   });
 }
@@ -197,18 +235,23 @@ std::optional<std::string> readNotice(Bytes message) {
 }
 
 std::optional<ParameterChange> readParameterChanged(Bytes message) {
-  return readMessage<ParameterChange>(message, [](ParameterChange& change, std::uint32_t field, Reader& reader) {
-    return field == bytes(1) ? readParameterChange(reader.get_view(), change) : skip(reader);
-  });
+  return readMessage<ParameterChange>(
+      message, [](ParameterChange& change, std::uint32_t field, Reader& reader) {
+        return field == bytes(1) ? readParameterChange(reader.get_view(), change) : skip(reader);
+      });
 }
 
 std::optional<ServerError> readError(Bytes message) {
   return readMessage<ServerError>(message, [](ServerError& error, std::uint32_t field, Reader& reader) {
     switch (field) {
-      case varint(1): return set(error.code, reader.get_uint32());
-      case bytes(2): return setText(error.text, reader);
-      case varint(3): return set(error.fatal, reader.get_bool());
-      default: return skip(reader);
+      case varint(1):
+        return set(error.code, reader.get_uint32());
+      case bytes(2):
+        return setText(error.text, reader);
+      case varint(3):
+        return set(error.fatal, reader.get_bool());
+      default:
+        return skip(reader);
     }
   });
 }
@@ -225,8 +268,12 @@ std::optional<std::vector<std::string>> readScenes(Bytes message) {
   });
 }
 
-bool readVec3(Bytes message, Vec3& out) { return readFloats(message, out); }
+bool readVec3(Bytes message, Vec3& out) {
+  return readFloats(message, out);
+}
 
-bool readSpring(Bytes message, Spring& out) { return readFloats(message, out); }
+bool readSpring(Bytes message, Spring& out) {
+  return readFloats(message, out);
+}
 
 }  // namespace clothstream::client

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What the server says (proto/clothstream/v1/session.proto), as plain structs that look into the message's bytes.
+// What the server says (proto/clothstream/v1/session.proto), as plain structs that look into the message's
+// bytes.
 #pragma once
 
 #include <array>
@@ -85,8 +86,8 @@ struct ParameterChange {
   std::vector<ClothChange> cloths;
 };
 
-// nullopt: not well formed, a number that is not finite where the protocol has finite ones, or more parts than the
-// protocol allows.
+// nullopt: not well formed, a number that is not finite where the protocol has finite ones, or more parts
+// than the protocol allows.
 [[nodiscard]] std::optional<ServerMessage> readServerMessage(Bytes message);
 [[nodiscard]] std::optional<Welcome> readWelcome(Bytes message);
 [[nodiscard]] std::optional<Chunk> readChunk(Bytes message);

@@ -39,7 +39,9 @@ class Cursor {
 };
 
 // Those that protobuf reserves for itself, and zero, are no field's.
-bool isFieldNumber(std::uint64_t number) { return number != 0 && (number < 19000 || number > 19999); }
+bool isFieldNumber(std::uint64_t number) {
+  return number != 0 && (number < 19000 || number > 19999);
+}
 
 bool skipValue(Cursor& cursor, std::uint64_t wireType) {
   switch (static_cast<protozero::pbf_wire_type>(wireType)) {

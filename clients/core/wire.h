@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Reading protobuf messages from outside: structure is checked before protozero reads, so that it cannot throw.
+// Reading protobuf messages from outside: structure is checked before protozero reads, so that it cannot
+// throw.
 #pragma once
 
 #include <protozero/pbf_reader.hpp>
@@ -8,11 +9,12 @@ namespace clothstream::client {
 
 using Bytes = protozero::data_view;
 
-// Whether the bytes are a row of fields, each whole: a tag with a valid number and a wire type of proto3, varints of
-// at most ten bytes, lengths within the message. Submessages are not looked into.
+// Whether the bytes are a row of fields, each whole: a tag with a valid number and a wire type of proto3,
+// varints of at most ten bytes, lengths within the message. Submessages are not looked into.
 [[nodiscard]] bool wellFormed(Bytes message);
 
-// Matches a field number with its wire type: a known number with another type is skipped like an unknown field.
+// Matches a field number with its wire type: a known number with another type is skipped like an unknown
+// field.
 constexpr std::uint32_t varint(std::uint32_t field) {
   return protozero::tag_and_type(field, protozero::pbf_wire_type::varint);
 }
@@ -26,8 +28,8 @@ constexpr std::uint32_t bytes(std::uint32_t field) {
   return protozero::tag_and_type(field, protozero::pbf_wire_type::length_delimited);
 }
 
-// Calls `visit(tagAndType, reader)` at each field; it reads the value or skips it, and returns false to refuse the
-// message. False where the message is not well formed or was refused.
+// Calls `visit(tagAndType, reader)` at each field; it reads the value or skips it, and returns false to
+// refuse the message. False where the message is not well formed or was refused.
 template <typename Visit>
 [[nodiscard]] bool readFields(Bytes message, Visit&& visit) {
   if (!wellFormed(message)) return false;

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 // Pings and what their pongs say of round trip and clock.
+#include <random>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-
-#include <random>
 
 #include "tests/core/scripted_server.h"
 
@@ -35,8 +35,9 @@ TEST(Clock, PingsSoonOnceWelcomedAndThenTwiceASecond) {
 }
 
 TEST(Clock, FindsTheOffsetThroughJitterToHalfTheSmallestQueue) {
-  // 10 ms each way, and queues of up to 20 ms on each. The shortest of 16 round trips bounds the error: a clock's
-  // error is half the difference of the two queues, which for exponential queues of mean 3 ms is small in the best.
+  // 10 ms each way, and queues of up to 20 ms on each. The shortest of 16 round trips bounds the error: a
+  // clock's error is half the difference of the two queues, which for exponential queues of mean 3 ms is
+  // small in the best.
   std::mt19937 random(7);
   std::exponential_distribution<double> queueMs(1 / 3.0);
   constexpr double kOffsetUs = 123'456'789;
@@ -47,7 +48,8 @@ TEST(Clock, FindsTheOffsetThroughJitterToHalfTheSmallestQueue) {
     for (const std::uint64_t sent : pings(client)) {
       const auto up = static_cast<std::uint64_t>((10 + queueMs(random)) * 1000);
       const auto down = static_cast<std::uint64_t>((10 + queueMs(random)) * 1000);
-      client.receive(ScriptedServer::pong(sent, sent + up + static_cast<std::uint64_t>(kOffsetUs)), sent + up + down);
+      client.receive(ScriptedServer::pong(sent, sent + up + static_cast<std::uint64_t>(kOffsetUs)),
+                     sent + up + down);
     }
   }
   const cs_statistics statistics = client.statistics();

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 // Frames: decoding, acknowledgements, requests for key frames, hashes, statistics.
+#include <cmath>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-
-#include <cmath>
 
 #include "tests/core/scripted_server.h"
 
@@ -63,8 +63,11 @@ TEST_P(DecodedFrames, AreWithinThePromisedErrorAndAcknowledged) {
   EXPECT_EQ(statistics.hash_mismatches, 0u);
 }
 
-INSTANTIATE_TEST_SUITE_P(Normals, DecodedFrames, ::testing::Values(codec::NormalMode::none, codec::NormalMode::octahedral),
-                         [](const auto& mode) { return mode.param == codec::NormalMode::none ? "Computed" : "Sent"; });
+INSTANTIATE_TEST_SUITE_P(Normals, DecodedFrames,
+                         ::testing::Values(codec::NormalMode::none, codec::NormalMode::octahedral),
+                         [](const auto& mode) {
+                           return mode.param == codec::NormalMode::none ? "Computed" : "Sent";
+                         });
 
 TEST(Frames, MoveColliders) {
   Joined joined;
@@ -195,7 +198,8 @@ TEST(Statistics, RatesAreThoseOfTheLastSecond) {
 
 TEST(Statistics, AStreamThatHasJustBegunShowsItsRate) {
   Joined joined;
-  for (std::uint64_t tick = 1; tick <= 25; ++tick) joined.client.receive(joined.server.frame(tick), tick * 20 * kMs);
+  for (std::uint64_t tick = 1; tick <= 25; ++tick)
+    joined.client.receive(joined.server.frame(tick), tick * 20 * kMs);
   EXPECT_NEAR(joined.client.statistics(500 * kMs).frames_per_second, 50, 2.1);
 }
 

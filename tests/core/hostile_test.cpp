@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 // Bytes that no server would send: whatever comes, the client says so and lives.
+#include <random>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-
-#include <random>
 
 #include "clients/core/wire.h"
 #include "tests/core/scripted_server.h"
@@ -82,7 +82,9 @@ TEST(Hostile, EveryBitOfEveryMessageFlipped) {
 TEST(Hostile, RandomBytesOverRandomPlaces) {
   const std::vector<std::string> messages = session();
   std::mt19937 random(11);
-  const auto below = [&](std::size_t bound) { return std::uniform_int_distribution<std::size_t>(0, bound - 1)(random); };
+  const auto below = [&](std::size_t bound) {
+    return std::uniform_int_distribution<std::size_t>(0, bound - 1)(random);
+  };
   for (int run = 0; run < 5000; ++run) {
     const std::size_t index = below(messages.size());
     std::string spoilt = messages[index];
@@ -102,10 +104,11 @@ TEST(Hostile, BytesThatAreNoMessageEndTheClientWithAReason) {
 
 TEST(Hostile, FieldsAndBodiesThatAreNotKnownAreSkipped) {
   // Field 500 as a varint, field 501 as bytes, field 502 as 64 bits, field 503 as 32 bits.
-  const std::string unknown("\xa0\x1f\x05\xaa\x1f\x02xy\xb1\x1f"
-                            "12345678\xbd\x1f"
-                            "1234",
-                            24);
+  const std::string unknown(
+      "\xa0\x1f\x05\xaa\x1f\x02xy\xb1\x1f"
+      "12345678\xbd\x1f"
+      "1234",
+      24);
   ASSERT_TRUE(wellFormed(Bytes(unknown)));
   ScriptedServer server;
   ClientUnderTest client;

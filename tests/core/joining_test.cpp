@@ -109,7 +109,8 @@ TEST(Joining, RefusesACodecItDoesNotDecode) {
 
 TEST(Joining, PassesOnWhyTheServerRefuses) {
   ClientUnderTest client;
-  client.receive(ScriptedServer::error(v1::ERROR_CODE_NOT_FOUND, "hello.scene: there is no 'x'; there is curtain", true));
+  client.receive(ScriptedServer::error(v1::ERROR_CODE_NOT_FOUND,
+                                       "hello.scene: there is no 'x'; there is curtain", true));
   EXPECT_EQ(cs_get_state(client.get()), CS_STATE_FAILED);
   EXPECT_STREQ(cs_error_text(client.get()), "hello.scene: there is no 'x'; there is curtain");
   EXPECT_EQ(cs_error_code(client.get()), static_cast<std::uint32_t>(v1::ERROR_CODE_NOT_FOUND));
@@ -168,18 +169,22 @@ INSTANTIATE_TEST_SUITE_P(
     ::testing::Values(
         WrongDescription{"no_cloth", [](v1::StreamDescription& d) { d.clear_cloths(); }, "0 cloths"},
         WrongDescription{"a_codec", [](v1::StreamDescription& d) { d.set_codec(2); }, "codec is 2"},
-        WrongDescription{"no_rate", [](v1::StreamDescription& d) { d.set_simulation_rate(0); }, "simulation_rate is 0"},
-        WrongDescription{"rate", [](v1::StreamDescription& d) { d.set_stream_rate(71); }, "stream_rate is 71"},
-        WrongDescription{"rows", [](v1::StreamDescription& d) { d.mutable_cloths(0)->set_rows(8); }, "rows x columns"},
+        WrongDescription{"no_rate", [](v1::StreamDescription& d) { d.set_simulation_rate(0); },
+                         "simulation_rate is 0"},
+        WrongDescription{"rate", [](v1::StreamDescription& d) { d.set_stream_rate(71); },
+                         "stream_rate is 71"},
+        WrongDescription{"rows", [](v1::StreamDescription& d) { d.mutable_cloths(0)->set_rows(8); },
+                         "rows x columns"},
         WrongDescription{"overflow",
                          [](v1::StreamDescription& d) {
                            d.mutable_cloths(0)->set_rows(0x10000);
                            d.mutable_cloths(0)->set_columns(0x10000);
                          },
                          "rows x columns"},
-        WrongDescription{"too_many_vertices",
-                         [](v1::StreamDescription& d) { d.mutable_cloths(0)->set_vertex_count(4'000'000'000); },
-                         "rest_positions has 756 bytes for 4000000000 vertices"},
+        WrongDescription{
+            "too_many_vertices",
+            [](v1::StreamDescription& d) { d.mutable_cloths(0)->set_vertex_count(4'000'000'000); },
+            "rest_positions has 756 bytes for 4000000000 vertices"},
         WrongDescription{"max_error", [](v1::StreamDescription& d) { d.set_max_error(0); }, "max_error"},
         WrongDescription{"not_finite",
                          [](v1::StreamDescription& d) {
@@ -194,8 +199,10 @@ INSTANTIATE_TEST_SUITE_P(
 
 // ---- Chunks
 
-Chunk chunk(std::uint64_t id, std::uint32_t index, std::uint32_t count, std::uint64_t total, const std::string& data) {
-  return {.contentId = id, .kind = 1, .index = index, .count = count, .totalBytes = total, .data = Bytes(data)};
+Chunk chunk(std::uint64_t id, std::uint32_t index, std::uint32_t count, std::uint64_t total,
+            const std::string& data) {
+  return {
+      .contentId = id, .kind = 1, .index = index, .count = count, .totalBytes = total, .data = Bytes(data)};
 }
 
 TEST(ContentAssembly, PutsInterleavedContentsTogether) {
@@ -231,12 +238,14 @@ TEST(ContentAssembly, RefusesPiecesThatDoNotFit) {
   EXPECT_THAT(refusal({chunk(1, 0, 0, 0, "")}), HasSubstr("at least one"));
   EXPECT_THAT(refusal({chunk(1, 0, 2, 3, "abcd")}), HasSubstr("more bytes than the 3"));
   EXPECT_THAT(refusal({chunk(1, 0, 1, 3, "ab")}), HasSubstr("2 bytes of 3"));
-  EXPECT_THAT(refusal({chunk(1, 0, 2, 256ull * 1024 * 1024 + 1, "ab")}), HasSubstr("268435457 bytes announced"));
-  EXPECT_THAT(refusal({chunk(1, 0, 2, 256ull * 1024 * 1024, "ab"), chunk(2, 0, 2, 1, "")}), HasSubstr("together"));
+  EXPECT_THAT(refusal({chunk(1, 0, 2, 256ull * 1024 * 1024 + 1, "ab")}),
+              HasSubstr("268435457 bytes announced"));
+  EXPECT_THAT(refusal({chunk(1, 0, 2, 256ull * 1024 * 1024, "ab"), chunk(2, 0, 2, 1, "")}),
+              HasSubstr("together"));
   const std::string large(256 * 1024 + 1, 'x');
   EXPECT_THAT(refusal({chunk(1, 0, 2, large.size(), large)}), HasSubstr("at most 262144"));
-  EXPECT_THAT(refusal({chunk(1, 0, 2, 4, ""), chunk(2, 0, 2, 4, ""), chunk(3, 0, 2, 4, ""), chunk(4, 0, 2, 4, ""),
-                       chunk(5, 0, 2, 4, "")}),
+  EXPECT_THAT(refusal({chunk(1, 0, 2, 4, ""), chunk(2, 0, 2, 4, ""), chunk(3, 0, 2, 4, ""),
+                       chunk(4, 0, 2, 4, ""), chunk(5, 0, 2, 4, "")}),
               HasSubstr("more than 4"));
 }
 

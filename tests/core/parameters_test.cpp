@@ -100,7 +100,8 @@ TEST(Parameters, AreThoseOfTheDescriptionUntilSomebodyChangesThem) {
   change.mutable_wind()->mutable_value()->set_z(-1);
   v1::ClothChange& everyCloth = *change.add_cloths();
   everyCloth.mutable_structural()->set_stiffness(50);
-  EXPECT_EQ(joined.client.receive(message.SerializeAsString()), static_cast<std::uint32_t>(CS_EVENT_PARAMETERS));
+  EXPECT_EQ(joined.client.receive(message.SerializeAsString()),
+            static_cast<std::uint32_t>(CS_EVENT_PARAMETERS));
   cs_get_environment(joined.client.get(), &environment);
   EXPECT_EQ(environment.wind[0], 0);
   EXPECT_EQ(environment.wind[2], -1);

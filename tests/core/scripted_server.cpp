@@ -10,7 +10,9 @@
 namespace clothstream::client {
 namespace {
 
-std::string serialised(const v1::ServerMessage& message) { return message.SerializeAsString(); }
+std::string serialised(const v1::ServerMessage& message) {
+  return message.SerializeAsString();
+}
 
 }  // namespace
 
@@ -32,7 +34,8 @@ void ScriptedServer::pose(std::uint64_t tick) {
     for (std::uint32_t row = 0; row < stream_.cloths[i].rows; ++row) {
       for (std::uint32_t column = 0; column < stream_.cloths[i].columns; ++column) {
         const float x = 0.1f * static_cast<float>(column), y = -0.1f * static_cast<float>(row);
-        positions_.insert(positions_.end(), {x + 2 * static_cast<float>(i), y, 0.05f * std::sin(phase + 3 * x + 2 * y)});
+        positions_.insert(positions_.end(),
+                          {x + 2 * static_cast<float>(i), y, 0.05f * std::sin(phase + 3 * x + 2 * y)});
         normals_.insert(normals_.end(), {0, 0, 1});
       }
     }
@@ -60,7 +63,8 @@ v1::StreamDescription ScriptedServer::description() const {
   description.set_simulation_rate(stream_.simulationRate);
   description.set_stream_rate(stream_.streamRate);
   description.set_max_error(layout_.maxError);
-  description.set_normals(stream_.normals == codec::NormalMode::none ? v1::NORMALS_NONE : v1::NORMALS_OCTAHEDRAL);
+  description.set_normals(stream_.normals == codec::NormalMode::none ? v1::NORMALS_NONE
+                                                                     : v1::NORMALS_OCTAHEDRAL);
   std::size_t first = 0;
   for (const ClothSize& size : stream_.cloths) {
     v1::ClothDescription& cloth = *description.add_cloths();
@@ -86,7 +90,8 @@ v1::StreamDescription ScriptedServer::description() const {
   return description;
 }
 
-std::vector<std::string> chunksOf(const std::string& content, std::size_t pieceBytes, std::uint64_t contentId) {
+std::vector<std::string> chunksOf(const std::string& content, std::size_t pieceBytes,
+                                  std::uint64_t contentId) {
   const std::size_t count = (content.size() + pieceBytes - 1) / pieceBytes;
   std::vector<std::string> messages;
   for (std::size_t i = 0; i < count; ++i) {
@@ -111,8 +116,9 @@ v1::Frame ScriptedServer::frameMessage(std::uint64_t tick, codec::PacketKind kin
   pose(tick);
   std::vector<std::byte> packet(encoder_->packetBound());
   const bool sendsNormals = stream_.normals != codec::NormalMode::none;
-  const std::size_t bytes = encoder_->encode(tick, kind, positions_,
-                                             sendsNormals ? std::span<const float>(normals_) : std::span<const float>(), packet);
+  const std::size_t bytes =
+      encoder_->encode(tick, kind, positions_,
+                       sendsNormals ? std::span<const float>(normals_) : std::span<const float>(), packet);
   v1::Frame frame;
   frame.set_packet(packet.data(), bytes);
   frame.set_reconstruction_hash(encoder_->reconstructionHash());

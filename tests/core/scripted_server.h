@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Messages as a server says them, for tests of the client: a small wavy cloth or two through the real encoder.
+// Messages as a server says them, for tests of the client: a small wavy cloth or two through the real
+// encoder.
 #pragma once
 
 #include <cstdint>
@@ -55,7 +56,8 @@ class ScriptedServer {
 };
 
 // Pieces of any content.
-std::vector<std::string> chunksOf(const std::string& content, std::size_t pieceBytes, std::uint64_t contentId);
+std::vector<std::string> chunksOf(const std::string& content, std::size_t pieceBytes,
+                                  std::uint64_t contentId);
 
 // A client under test, and what it said.
 class ClientUnderTest {

@@ -1,17 +1,22 @@
 // SPDX-License-Identifier: MIT
-// What the C++ run-time library would need a terminal and exceptions for: in WebAssembly a throw and lack of memory trap.
+// What the C++ run-time library would need a terminal and exceptions for: in WebAssembly a throw and lack of
+// memory trap.
 //
-// No throw is reached by bytes from outside: wire.h checks a message before protozero reads it. Without these the module
-// would import file functions only to print why it ends.
+// No throw is reached by bytes from outside: wire.h checks a message before protozero reads it. Without these
+// the module would import file functions only to print why it ends.
 #include <cstddef>
 #include <cstdlib>
 #include <new>
 
 extern "C" {
 
-[[noreturn]] void* __cxa_allocate_exception(std::size_t) { __builtin_trap(); }
+[[noreturn]] void* __cxa_allocate_exception(std::size_t) {
+  __builtin_trap();
+}
 
-[[noreturn]] void __cxa_throw(void*, void*, void (*)(void*)) { __builtin_trap(); }
+[[noreturn]] void __cxa_throw(void*, void*, void (*)(void*)) {
+  __builtin_trap();
+}
 
 }  // extern "C"
 
@@ -21,10 +26,18 @@ void* operator new(std::size_t bytes) {
   return memory;
 }
 
-void* operator new(std::size_t bytes, const std::nothrow_t&) noexcept { return std::malloc(bytes == 0 ? 1 : bytes); }
+void* operator new(std::size_t bytes, const std::nothrow_t&) noexcept {
+  return std::malloc(bytes == 0 ? 1 : bytes);
+}
 
-void* operator new[](std::size_t bytes, const std::nothrow_t&) noexcept { return std::malloc(bytes == 0 ? 1 : bytes); }
+void* operator new[](std::size_t bytes, const std::nothrow_t&) noexcept {
+  return std::malloc(bytes == 0 ? 1 : bytes);
+}
 
-void operator delete(void* memory) noexcept { std::free(memory); }
+void operator delete(void* memory) noexcept {
+  std::free(memory);
+}
 
-void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
+void operator delete(void* memory, std::size_t) noexcept {
+  std::free(memory);
+}
