@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "server/rpc/join_stream.h"
 
-#include <optional>
+#include <chrono>
 #include <span>
 #include <utility>
 
@@ -20,17 +20,21 @@ grpc::ByteBuffer sharedBuffer(const stream::SharedBytes& message) {
   return grpc::ByteBuffer(&slice, 1);
 }
 
+// A peer that does not read keeps a write in flight for ever.
+constexpr std::chrono::seconds kLastWriteTimeout{1};
+
 grpc::Status cancelled() {
   return {grpc::StatusCode::CANCELLED, "the client went away"};
 }
 
 }  // namespace
 
-JoinStream::JoinStream(std::function<void(JoinStream&)> onDone) : onDone_(std::move(onDone)) {}
+JoinStream::JoinStream(grpc::CallbackServerContext& context, std::function<void(JoinStream&)> onDone)
+    : onDone_(std::move(onDone)), context_(&context) {}
 
-void JoinStream::open(stream::SceneServer& server, std::string peer, std::function<void()> wake) {
+void JoinStream::open(stream::SceneServer& server, std::function<void()> wake) {
   const std::lock_guard lock(mutex_);
-  connection_ = std::make_shared<stream::Connection>(server, std::move(peer), std::move(wake));
+  connection_ = std::make_shared<stream::Connection>(server, "grpc " + context_->peer(), std::move(wake));
   StartRead(&incoming_);
   pumpLocked();
 }
@@ -41,9 +45,11 @@ void JoinStream::pump() {
 }
 
 void JoinStream::pumpLocked() {
-  if (writing_ || !connection_) return;
+  if (!connection_) return;
   const bool finished = connection_->finished();  // asked first: what came before it is still to be written
-  if (std::optional<stream::SharedBytes> message = connection_->next()) {
+  if (writing_) {
+    if (finished) cancelSoonLocked();
+  } else if (std::optional<stream::SharedBytes> message = connection_->next()) {
     lastMessage_ = std::move(*message);
     outgoing_ = sharedBuffer(lastMessage_);
     writing_ = true;
@@ -62,7 +68,23 @@ void JoinStream::finishLocked(const grpc::Status& status) {
   if (!connection_) return;
   connection_.reset();
   status_ = status;
-  if (!writing_) Finish(status_);
+  if (writing_) {
+    cancelSoonLocked();
+  } else {
+    Finish(status_);
+  }
+}
+
+void JoinStream::cancelSoonLocked() {
+  if (cancellation_) return;
+  cancellation_.emplace();
+  cancellation_->Set(std::chrono::system_clock::now() + kLastWriteTimeout,
+                     [weak = weak_from_this()](bool expired) {
+                       const auto self = weak.lock();
+                       if (!expired || !self) return;
+                       const std::lock_guard lock(self->mutex_);
+                       if (self->context_ != nullptr && self->writing_) self->context_->TryCancel();
+                     });
 }
 
 void JoinStream::OnReadDone(bool ok) {

@@ -5,8 +5,10 @@
 #include <functional>
 #include <memory>
 #include <mutex>
-#include <string>
+#include <optional>
 
+#include <grpcpp/alarm.h>
+#include <grpcpp/server_context.h>
 #include <grpcpp/support/byte_buffer.h>
 #include <grpcpp/support/server_callback.h>
 
@@ -16,13 +18,14 @@ namespace clothstream::rpc {
 
 // Thread-safe. gRPC calls the On... functions, one read and one write in flight; pump() may come from
 // anywhere.
-class JoinStream final : public grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer> {
+class JoinStream final : public grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>,
+                         public std::enable_shared_from_this<JoinStream> {
  public:
   // `onDone` is the last thing that the stream does, and may destroy it.
-  explicit JoinStream(std::function<void(JoinStream&)> onDone);
+  JoinStream(grpc::CallbackServerContext& context, std::function<void(JoinStream&)> onDone);
 
   // Once, before gRPC learns of the stream. `wake` must lead to a call of pump(), but not call it itself.
-  void open(stream::SceneServer& server, std::string peer, std::function<void()> wake);
+  void open(stream::SceneServer& server, std::function<void()> wake);
 
   // Writes the next message unless one is being written; ends the stream when there is none left to come.
   void pump();
@@ -39,14 +42,17 @@ class JoinStream final : public grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::
 
   void pumpLocked();
   void finishLocked(const grpc::Status& status);
+  void cancelSoonLocked();
 
   const std::function<void(JoinStream&)> onDone_;
   std::mutex mutex_;
+  grpc::CallbackServerContext* context_;            // nullptr when the call is done
   std::shared_ptr<stream::Connection> connection_;  // nullptr when the stream is ending
   grpc::ByteBuffer incoming_, outgoing_;
   stream::SharedBytes lastMessage_;
   grpc::Status status_;
   bool writing_ = false;
+  std::optional<grpc::Alarm> cancellation_;  // set when the write in flight is the last that is waited for
 };
 
 }  // namespace clothstream::rpc

@@ -29,7 +29,7 @@ JoinStreams::~JoinStreams() {
 
 grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>* JoinStreams::open(
     grpc::CallbackServerContext& context) {
-  auto stream = std::make_shared<JoinStream>([this](JoinStream& done) {
+  auto stream = std::make_shared<JoinStream>(context, [this](JoinStream& done) {
     const std::lock_guard lock(streamsMutex_);
     streams_.erase(&done);
   });
@@ -43,7 +43,7 @@ grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>* JoinStreams::open(
   }
   // A wake must not own the stream: whoever drops the last owner inside a wake would wait in the connection's
   // destructor for that wake to return.
-  stream->open(server_, "grpc " + context.peer(), [this, weak = std::weak_ptr(stream)] { wake(weak); });
+  stream->open(server_, [this, weak = std::weak_ptr(stream)] { wake(weak); });
   return stream.get();
 }
 

@@ -9,6 +9,7 @@
 #include <iterator>
 #include <optional>
 #include <stdexcept>
+#include <system_error>
 #include <utility>
 
 #include <fmt/format.h>
@@ -95,7 +96,8 @@ Page::Page(const fs::path& directory) {
       entry.disable_recursion_pending();
       continue;
     }
-    if (!entry->is_regular_file()) continue;
+    std::error_code unreachable;  // a link to nothing, or to itself
+    if (!entry->is_regular_file(unreachable)) continue;
     if (entry->is_symlink() && !isInside(fs::canonical(entry->path()), root)) continue;
     total += entry->file_size();
     if (total > kMaxPageBytes)
@@ -104,7 +106,8 @@ Page::Page(const fs::path& directory) {
                       directory.string(), kMaxPageBytes >> 20));
     PageFile file{readFile(entry->path()), contentTypeOf(entry->path()), {}};
     file.entityTag = fmt::format("\"{:016x}\"", std::hash<std::string_view>{}(file.content));
-    files_.emplace("/" + entry->path().lexically_relative(root).generic_string(), std::move(file));
+    files_.emplace((fs::path("/") / entry->path().lexically_relative(root)).generic_string(),
+                   std::move(file));
   }
 }
 

@@ -23,6 +23,7 @@ using namespace std::chrono_literals;
 
 constexpr const char* kSubprotocol = "clothstream.v1";
 constexpr auto kHandshakeTimeout = 2s;
+constexpr auto kClosingTimeout = 2s;
 // Without a byte from the peer for half of it a ping goes out, after the whole of it the peer counts as gone.
 constexpr auto kIdleTimeout = 4s;
 // RFC 6455 5.5: 125 bytes a control frame, of which the code takes two.
@@ -56,7 +57,7 @@ ws::close_reason reasonOf(const stream::SharedBytes& last) {
 
 StreamSession::StreamSession(beast::tcp_stream&& socket, DoorContext& door,
                              std::unique_ptr<ConnectionSlot> slot)
-    : door_(door), slot_(std::move(slot)), socket_(std::move(socket)) {
+    : door_(door), slot_(std::move(slot)), socket_(std::move(socket)), closingTimer_(door.io) {
   socket_.binary(true);
   socket_.auto_fragment(false);
   socket_.read_message_max(stream::kMaxClientMessageBytes);
@@ -109,9 +110,11 @@ void StreamSession::onRead(beast::error_code error) {
 }
 
 void StreamSession::pump() {
-  if (writing_ || closing_ || !connection_) return;
+  if (closing_ || !connection_) return;
   const bool finished = connection_->finished();  // asked first: what came before it is still to be written
-  if (std::optional<stream::SharedBytes> message = connection_->next()) {
+  if (writing_) {
+    if (finished) endSoon();
+  } else if (std::optional<stream::SharedBytes> message = connection_->next()) {
     outgoing_ = std::move(*message);
     writing_ = true;
     socket_.async_write(
@@ -131,12 +134,22 @@ void StreamSession::onWritten(beast::error_code error) {
 void StreamSession::close(const ws::close_reason& reason) {
   if (std::exchange(closing_, true)) return;
   leave();
+  endSoon();
   socket_.async_close(reason, [self = shared_from_this()](beast::error_code) { self->end(); });
+}
+
+void StreamSession::endSoon() {
+  if (std::exchange(ending_, true)) return;
+  closingTimer_.expires_after(kClosingTimeout);
+  closingTimer_.async_wait([self = shared_from_this()](beast::error_code error) {
+    if (!error) self->end();
+  });
 }
 
 void StreamSession::end() {
   closing_ = true;
   leave();
+  closingTimer_.cancel();
   socket_.next_layer().close();
   door_.streams.erase(shared_from_this());
   if (door_.stopping && door_.streams.empty()) door_.io.stop();

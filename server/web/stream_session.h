@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 
+#include <boost/asio/steady_timer.hpp>
 #include <boost/beast/core/flat_buffer.hpp>
 #include <boost/beast/core/tcp_stream.hpp>
 #include <boost/beast/http/empty_body.hpp>
@@ -26,7 +27,7 @@ class StreamSession : public std::enable_shared_from_this<StreamSession> {
 
   void accept(boost::beast::http::request<boost::beast::http::empty_body>&& request);
 
-  // The closing handshake, at most kHandshakeTimeout of it; then the session ends.
+  // The closing handshake, at most kClosingTimeout of it; then the session ends.
   void close(const boost::beast::websocket::close_reason& reason);
 
   // Leaves the scene; the connection's `wake` is not called any more once this returns.
@@ -39,6 +40,8 @@ class StreamSession : public std::enable_shared_from_this<StreamSession> {
   // Writes the next message unless one is being written.
   void pump();
   void onWritten(boost::beast::error_code error);
+  // Ends it in kClosingTimeout, whatever the peer does.
+  void endSoon();
   void end();
 
   DoorContext& door_;
@@ -49,6 +52,8 @@ class StreamSession : public std::enable_shared_from_this<StreamSession> {
   boost::beast::flat_buffer incoming_;
   std::optional<stream::Connection> connection_;
   stream::SharedBytes outgoing_;
+  boost::asio::steady_timer closingTimer_;
+  bool ending_ = false;  // the timer runs
   bool writing_ = false;
   bool closing_ = false;
 };
