@@ -1,0 +1,265 @@
+// SPDX-License-Identifier: MIT
+// What clients send: garbage, greetings, poses, changes.
+#include <limits>
+#include <random>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "server/messages/client_message.h"
+#include "server/messages/limits.h"
+#include "server/messages/scene_message.h"
+#include "tests/messages/scenes.h"
+
+namespace clothstream::messages {
+namespace {
+
+using testing::HasSubstr;
+using testing::StartsWith;
+
+constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+
+std::span<const std::byte> bytesOf(const std::string& text) {
+  return std::as_bytes(std::span(text));
+}
+
+TEST(ParseClientMessage, GivesTheEnvelope) {
+  v1::ClientMessage message;
+  message.set_request_id(7);
+  message.mutable_ping()->set_client_time_us(123);
+  const auto parsed = parseClientMessage(bytesOf(message.SerializeAsString()));
+  ASSERT_TRUE(parsed) << parsed.error().text;
+  EXPECT_EQ(parsed->request_id(), 7u);
+  EXPECT_EQ(parsed->ping().client_time_us(), 123u);
+}
+
+TEST(ParseClientMessage, RefusesNothingAndAnEmptyEnvelope) {
+  EXPECT_EQ(parseClientMessage({}).error().code, v1::ERROR_CODE_MALFORMED_MESSAGE);
+  v1::ClientMessage message;
+  message.set_request_id(7);
+  EXPECT_EQ(parseClientMessage(bytesOf(message.SerializeAsString())).error().code,
+            v1::ERROR_CODE_MALFORMED_MESSAGE);
+}
+
+TEST(ParseClientMessage, RefusesTooManyBytesWithTheLimit) {
+  const auto parsed = parseClientMessage(bytesOf(std::string(limits::kMaxClientMessageBytes + 1, 'x')));
+  ASSERT_FALSE(parsed);
+  EXPECT_EQ(parsed.error().code, v1::ERROR_CODE_RESOURCE_EXHAUSTED);
+  EXPECT_THAT(parsed.error().text, HasSubstr("at most 65536"));
+}
+
+TEST(ParseClientMessage, RefusesTruncatedMessages) {
+  v1::ClientMessage message;
+  message.mutable_hello()->set_scene("curtain");
+  const std::string whole = message.SerializeAsString();
+  for (std::size_t length = 1; length < whole.size(); ++length) {
+    const auto parsed = parseClientMessage(bytesOf(whole.substr(0, length)));
+    ASSERT_FALSE(parsed) << length;
+    EXPECT_EQ(parsed.error().code, v1::ERROR_CODE_MALFORMED_MESSAGE);
+  }
+}
+
+TEST(ParseClientMessage, SurvivesGarbage) {
+  std::mt19937 random(1);
+  int refused = 0;
+  for (int i = 0; i < 10000; ++i) {
+    std::string garbage(random() % 200, '\0');
+    for (char& c : garbage) c = static_cast<char>(random());
+    const auto parsed = parseClientMessage(bytesOf(garbage));
+    if (!parsed) ++refused;
+  }
+  EXPECT_GT(refused, 9000);
+}
+
+const std::uint32_t kCodecs[] = {1, 5};
+
+v1::Hello hello() {
+  v1::Hello message;
+  message.set_protocol_version(1);
+  message.add_codecs(1);
+  return message;
+}
+
+TEST(ToJoining, AgreesOnVersionAndTheClientsBestCodec) {
+  v1::Hello message = hello();
+  message.set_protocol_version(9);
+  message.clear_codecs();
+  for (const std::uint32_t codec : {8u, 5u, 1u}) message.add_codecs(codec);
+  message.set_scene("flag");
+  message.set_client_name("test 1");
+  message.set_display_name("Ann");
+  const auto joining = toJoining(message, kCodecs);
+  ASSERT_TRUE(joining) << joining.error().text;
+  EXPECT_EQ(joining->protocolVersion, kProtocolVersion);
+  EXPECT_EQ(joining->codec, 5u);
+  EXPECT_EQ(joining->scene, "flag");
+  EXPECT_EQ(joining->clientName, "test 1");
+  EXPECT_EQ(joining->displayName, "Ann");
+}
+
+TEST(ToJoining, RefusesWhatItCannotAgreeOn) {
+  v1::Hello message = hello();
+  message.set_protocol_version(0);
+  EXPECT_EQ(toJoining(message, kCodecs).error().code, v1::ERROR_CODE_UNSUPPORTED_VERSION);
+  message = hello();
+  message.set_codecs(0, 77);
+  const auto joining = toJoining(message, kCodecs);
+  EXPECT_EQ(joining.error().code, v1::ERROR_CODE_UNSUPPORTED_CODEC);
+  EXPECT_THAT(joining.error().text, HasSubstr("1, 5"));
+  message.clear_codecs();
+  EXPECT_EQ(toJoining(message, kCodecs).error().code, v1::ERROR_CODE_UNSUPPORTED_CODEC);
+}
+
+TEST(ToJoining, RefusesNamesThatWouldSpoilALog) {
+  v1::Hello message = hello();
+  message.set_client_name("a\nb");
+  EXPECT_THAT(toJoining(message, kCodecs).error().text, StartsWith("hello.clientName = \"a?b\":"));
+  message = hello();
+  message.set_display_name(std::string(2000, 'x'));
+  EXPECT_THAT(toJoining(message, kCodecs).error().text, StartsWith("hello.displayName"));
+  message = hello();
+  message.set_scene("../etc");
+  EXPECT_THAT(toJoining(message, kCodecs).error().text, StartsWith("hello.scene = \"../etc\":"));
+}
+
+v1::ColliderPoses poses(std::uint32_t count) {
+  v1::ColliderPoses message;
+  for (std::uint32_t id = 0; id < count; ++id) {
+    v1::ParticipantCollider& collider = *message.add_colliders();
+    collider.set_id(id);
+    collider.mutable_sphere()->set_radius(0.1f);
+    collider.mutable_pose()->mutable_position()->set_x(static_cast<float>(id));
+  }
+  return message;
+}
+
+TEST(ToColliders, GivesThemAll) {
+  const auto colliders = toColliders(poses(16));
+  ASSERT_TRUE(colliders) << colliders.error().text;
+  ASSERT_EQ(colliders->size(), 16u);
+  EXPECT_EQ((*colliders)[5].id, 5u);
+  EXPECT_EQ((*colliders)[5].pose.position, scene::Vec3(5, 0, 0));
+  EXPECT_EQ((*colliders)[5].radius, 0.1f);
+  EXPECT_TRUE(toColliders(poses(0))->empty());
+}
+
+TEST(ToColliders, RefusesWhatIsWrongWithItsPath) {
+  const auto error = [](auto spoil) {
+    v1::ColliderPoses message = poses(3);
+    spoil(message);
+    const auto colliders = toColliders(message);
+    return colliders ? "no error" : colliders.error().text;
+  };
+  using M = v1::ColliderPoses;
+  EXPECT_THAT(error([](M& m) { m = poses(17); }),
+              StartsWith("colliderPoses.colliders: has 17 elements; must have 0 to 16"));
+  EXPECT_THAT(error([](M& m) { m.mutable_colliders(1)->mutable_pose()->mutable_position()->set_y(kNan); }),
+              StartsWith("colliderPoses.colliders[1].pose.position.y = nan:"));
+  EXPECT_THAT(error([](M& m) { m.mutable_colliders(2)->mutable_pose()->mutable_position()->set_z(1000.5f); }),
+              StartsWith("colliderPoses.colliders[2].pose.position.z = 1000.5:"));
+  EXPECT_THAT(error([](M& m) { m.mutable_colliders(2)->mutable_pose()->mutable_orientation()->set_x(2); }),
+              StartsWith("colliderPoses.colliders[2].pose.orientation = (2, 0, 0, 0):"));
+  EXPECT_THAT(
+      error([](M& m) { m.mutable_colliders(0)->mutable_sphere()->set_radius(10.5f); }),
+      StartsWith(
+          "colliderPoses.colliders[0].sphere.radius = 10.5: must be a finite number from 0.001 to 10"));
+  EXPECT_THAT(error([](M& m) { m.mutable_colliders(0)->mutable_sphere()->set_radius(0); }),
+              StartsWith("colliderPoses.colliders[0].sphere.radius = 0:"));
+  EXPECT_THAT(error([](M& m) { m.mutable_colliders(0)->clear_sphere(); }),
+              StartsWith("colliderPoses.colliders[0]: has no shape"));
+  EXPECT_THAT(error([](M& m) { m.mutable_colliders(2)->set_id(1); }),
+              StartsWith("colliderPoses.colliders[2].id = 1:"));
+}
+
+class ToParameterChange : public testing::Test {
+ protected:
+  std::string error() const {
+    const auto change = toParameterChange(message_, scene_);
+    return change ? "no error" : change.error().text;
+  }
+
+  scene::Scene scene_ = *toScene(smallScene());
+  v1::ParameterChange message_;
+};
+
+TEST_F(ToParameterChange, CarriesEveryField) {
+  message_.mutable_gravity()->mutable_value()->set_y(-1.5f);
+  message_.mutable_wind()->mutable_value()->set_z(4);
+  message_.set_air_density(0.5f);
+  v1::ClothChange& cloth = *message_.add_cloths();
+  cloth.set_name("sheet");
+  cloth.mutable_structural()->set_stiffness(11);
+  cloth.mutable_shear()->set_stiffness(12);
+  cloth.mutable_bend()->set_damping(0.01f);
+  cloth.set_damping(0.5f);
+  cloth.set_drag(0.6f);
+  cloth.set_lift(0.7f);
+  cloth.set_friction(0.8f);
+  v1::ColliderChange& collider = *message_.add_colliders();
+  collider.set_name("ball");
+  collider.mutable_position()->set_x(3);
+  collider.set_radius(0.5f);
+  const auto change = toParameterChange(message_, scene_);
+  ASSERT_TRUE(change) << change.error().text;
+  applyChange(scene_, *change);
+  EXPECT_EQ(scene_.environment.gravity, scene::Vec3(0, -1.5f, 0));
+  EXPECT_EQ(scene_.environment.wind, scene::Vec3(0, 0, 4));
+  EXPECT_EQ(scene_.environment.airDensity, 0.5f);
+  EXPECT_EQ(scene_.cloths[0].structural.stiffness, 11);
+  EXPECT_EQ(scene_.cloths[0].shear.stiffness, 12);
+  EXPECT_EQ(scene_.cloths[0].bend.damping, 0.01f);
+  EXPECT_EQ(scene_.cloths[0].damping, 0.5f);
+  EXPECT_EQ(scene_.cloths[0].drag, 0.6f);
+  EXPECT_EQ(scene_.cloths[0].lift, 0.7f);
+  EXPECT_EQ(scene_.cloths[0].friction, 0.8f);
+  EXPECT_EQ(scene_.colliders[0].pose.position, scene::Vec3(3, 0, 0));
+  EXPECT_EQ(scene_.colliders[0].radius, 0.5f);
+}
+
+TEST_F(ToParameterChange, LeavesOutWhatIsAbsent) {
+  message_.add_cloths();
+  const auto change = toParameterChange(message_, scene_);
+  ASSERT_TRUE(change) << change.error().text;
+  EXPECT_FALSE(change->gravity || change->wind || change->airDensity);
+  EXPECT_FALSE(change->cloths[0].structural || change->cloths[0].drag);
+}
+
+TEST_F(ToParameterChange, NamesWhatTheSceneHas) {
+  message_.add_cloths()->set_name("rug");
+  EXPECT_THAT(error(), StartsWith("parameterChange.cloths[0].name = \"rug\": must be one of sheet"));
+  EXPECT_EQ(toParameterChange(message_, scene_).error().code, v1::ERROR_CODE_NOT_FOUND);
+  message_.clear_cloths();
+  message_.add_colliders();
+  EXPECT_THAT(error(), StartsWith("parameterChange.colliders[0].name = \"\": must be one of ball"));
+}
+
+TEST_F(ToParameterChange, RefusesValuesWithTheirPath) {
+  message_.mutable_gravity()->mutable_value()->set_x(kNan);
+  EXPECT_THAT(error(), StartsWith("parameterChange.gravity.value.x = nan:"));
+  message_.Clear();
+  message_.set_air_density(-1);
+  EXPECT_THAT(error(), StartsWith("parameterChange.airDensity = -1:"));
+  message_.Clear();
+  message_.add_cloths()->mutable_shear()->set_stiffness(-3);
+  EXPECT_THAT(error(), StartsWith("parameterChange.cloths[0].shear.stiffness = -3:"));
+  message_.Clear();
+  message_.add_colliders()->set_name("ball");
+  message_.mutable_colliders(0)->mutable_position()->set_y(5000);
+  EXPECT_THAT(error(), StartsWith("parameterChange.colliders[0].position.y = 5000:"));
+}
+
+TEST_F(ToParameterChange, RefusesWhatWouldMakeTheSceneUnstableNamingTheSubsteps) {
+  message_.add_cloths()->mutable_structural()->set_stiffness(20000);
+  // 4 springs of 20000 N/m at nodes of 0.03 kg: h < 2 / sqrt(2 * 4 * 20000 / 0.03) s = 1 / 1154.7, 16.04 a
+  // tick.
+  EXPECT_THAT(error(), StartsWith("parameterChange: with substeps = 10, this scene needs at least 17"));
+}
+
+TEST_F(ToParameterChange, JudgesAChangeAsAWhole) {
+  message_.add_cloths()->mutable_structural()->set_stiffness(20000);
+  message_.add_cloths()->mutable_structural()->set_stiffness(10);
+  EXPECT_EQ(error(), "no error");
+}
+
+}  // namespace
+}  // namespace clothstream::messages

@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: MIT
+// Descriptions, collider states, chunks.
+#include <cstring>
+
+#include <gtest/gtest.h>
+
+#include "server/messages/description.h"
+#include "server/messages/limits.h"
+#include "server/messages/scene_message.h"
+#include "tests/messages/scenes.h"
+
+namespace clothstream::messages {
+namespace {
+
+TEST(ToDescription, TellsAllThatADecoderNeeds) {
+  const scene::Scene scene = *toScene(smallScene());
+  const v1::StreamDescription description = toDescription(scene, 3, 1);
+  EXPECT_EQ(description.epoch(), 3u);
+  EXPECT_EQ(description.codec(), 1u);
+  EXPECT_EQ(description.scene(), "small");
+  EXPECT_EQ(description.simulation_rate(), 72u);
+  EXPECT_EQ(description.stream_rate(), 72u);
+  EXPECT_EQ(description.max_error(), 0.0005f);
+  EXPECT_EQ(description.normals(), v1::NORMALS_NONE);
+  ASSERT_EQ(description.cloths_size(), 1);
+  const v1::ClothDescription& cloth = description.cloths(0);
+  EXPECT_EQ(cloth.name(), "sheet");
+  EXPECT_EQ(cloth.vertex_count(), 20u);
+  EXPECT_EQ(cloth.rows(), 4u);
+  EXPECT_EQ(cloth.columns(), 5u);
+  ASSERT_EQ(cloth.rest_positions().size(), 20u * 12);
+  const std::vector<scene::Vec3> rest = scene::restPositions(scene.cloths[0].grid);
+  for (std::size_t i = 0; i < rest.size(); ++i) {
+    float position[3];
+    std::memcpy(position, cloth.rest_positions().data() + i * 12, 12);
+    EXPECT_EQ(scene::Vec3(position[0], position[1], position[2]), rest[i]);
+  }
+  EXPECT_TRUE(toScene(description.definition()));
+}
+
+TEST(ToSummary, CountsVerticesAndCloths) {
+  const v1::SceneSummary summary = toSummary(*toScene(smallScene()));
+  EXPECT_EQ(summary.name(), "small");
+  EXPECT_EQ(summary.vertex_count(), 20u);
+  EXPECT_EQ(summary.cloth_count(), 1u);
+}
+
+TEST(ColliderStates, OverwriteWhatWasThere) {
+  v1::ColliderState state;
+  write(scene::ParticipantCollider{.id = 4, .pose = {scene::Vec3(1, 2, 3)}, .radius = 0.5f}, 77, state);
+  EXPECT_EQ(state.name(), "4");
+  EXPECT_EQ(state.participant_id(), 77u);
+  EXPECT_EQ(state.position().z(), 3);
+  EXPECT_EQ(state.orientation().w(), 1);
+  EXPECT_EQ(state.sphere().radius(), 0.5f);
+  const scene::Scene scene = *toScene(smallScene());
+  write(scene.colliders[0], scene::Vec3(9, 0, 0), state);
+  EXPECT_EQ(state.name(), "ball");
+  EXPECT_EQ(state.participant_id(), 0u);
+  EXPECT_EQ(state.position().x(), 9);
+  EXPECT_EQ(state.position().z(), 0);
+  EXPECT_EQ(state.sphere().radius(), 0.25f);
+}
+
+TEST(ToChunks, CutContentThatCanBePutTogetherAgain) {
+  for (const std::size_t size : {std::size_t{0}, std::size_t{1}, limits::kMaxChunkBytes,
+                                 limits::kMaxChunkBytes + 1, 3 * limits::kMaxChunkBytes - 5}) {
+    std::string content(size, '\0');
+    for (std::size_t i = 0; i < size; ++i) content[i] = static_cast<char>(i * 31 >> 3);
+    const std::vector<v1::Chunk> chunks = toChunks(9, v1::CONTENT_KIND_STREAM_DESCRIPTION, content);
+    EXPECT_EQ(chunks.size(),
+              std::max<std::size_t>(1, (size + limits::kMaxChunkBytes - 1) / limits::kMaxChunkBytes));
+    std::string together;
+    for (std::size_t i = 0; i < chunks.size(); ++i) {
+      EXPECT_EQ(chunks[i].content_id(), 9u);
+      EXPECT_EQ(chunks[i].kind(), v1::CONTENT_KIND_STREAM_DESCRIPTION);
+      EXPECT_EQ(chunks[i].index(), i);
+      EXPECT_EQ(chunks[i].count(), chunks.size());
+      EXPECT_EQ(chunks[i].total_bytes(), size);
+      EXPECT_LE(chunks[i].data().size(), limits::kMaxChunkBytes);
+      together += chunks[i].data();
+    }
+    EXPECT_EQ(together, content);
+  }
+}
+
+}  // namespace
+}  // namespace clothstream::messages

@@ -1,0 +1,174 @@
+// SPDX-License-Identifier: MIT
+// Scene files: every field survives, and what is wrong is said with the file's name.
+#include <filesystem>
+#include <fstream>
+
+#include <gmock/gmock.h>
+#include <google/protobuf/descriptor.h>
+#include <google/protobuf/message.h>
+#include <google/protobuf/util/json_util.h>
+#include <google/protobuf/util/message_differencer.h>
+#include <gtest/gtest.h>
+
+#include "server/messages/limits.h"
+#include "server/messages/scene_file.h"
+#include "server/messages/scene_message.h"
+
+namespace clothstream::messages {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::StartsWith;
+
+constexpr const char* kEveryField = R"json({
+  "name": "every_field", "description": "All of it", "simulationRate": 240, "streamRate": 120, "substeps": 40,
+  "integrator": "INTEGRATOR_EXPLICIT_EULER",
+  "environment": {"gravity": {"x": 0.5, "y": -9.5, "z": 0.25}, "wind": {"x": 1, "y": 2, "z": 3}, "airDensity": 1.25},
+  "cloths": [{
+    "name": "sheet",
+    "grid": {"rows": 6, "columns": 7, "width": 1.5, "height": 1.25,
+             "pose": {"position": {"x": 1, "y": 2, "z": 3}, "orientation": {"x": 0.5, "y": 0.5, "z": 0.5, "w": 0.5}}},
+    "mass": 4,
+    "structural": {"stiffness": 20, "damping": 0.5}, "shear": {"stiffness": 10, "damping": 0.25},
+    "bend": {"stiffness": 5, "damping": 0.125},
+    "damping": 3, "drag": 0.5, "lift": 0.25, "friction": 0.75, "thickness": 0.0625,
+    "pins": [{"firstRow": 1, "lastRow": 5, "rowStep": 2, "firstColumn": 1, "lastColumn": 4, "columnStep": 3}]
+  }],
+  "colliders": [{
+    "name": "ball", "sphere": {"radius": 0.5},
+    "pose": {"position": {"x": 4, "y": 5, "z": 6}, "orientation": {"x": -0.5, "y": 0.5, "z": -0.5, "w": 0.5}},
+    "friction": 0.25,
+    "motion": {"keys": [{"time": 0, "position": {"x": 1, "y": 1, "z": 1}},
+                        {"time": 2.5, "position": {"x": 2, "y": 3, "z": 4}}]}
+  }],
+  "stream": {"maxError": 0.001, "normals": "NORMALS_OCTAHEDRAL"}
+})json";
+
+// So that a field that is added to the proto cannot be forgotten above. The first key's time must be 0.
+void expectEveryFieldSet(const google::protobuf::Message& message) {
+  const auto* reflection = message.GetReflection();
+  const auto* descriptor = message.GetDescriptor();
+  for (int i = 0; i < descriptor->field_count(); ++i) {
+    const auto* field = descriptor->field(i);
+    if (field->is_repeated()) {
+      const int size = reflection->FieldSize(message, field);
+      EXPECT_GT(size, 0) << field->full_name();
+      if (size > 0) expectEveryFieldSet(reflection->GetRepeatedMessage(message, field, size - 1));
+    } else {
+      EXPECT_TRUE(reflection->HasField(message, field)) << field->full_name();
+      if (field->message_type() != nullptr) expectEveryFieldSet(reflection->GetMessage(message, field));
+    }
+  }
+}
+
+v1::Scene messageOf(const char* json) {
+  v1::Scene message;
+  EXPECT_TRUE(google::protobuf::util::JsonStringToMessage(json, &message).ok());
+  return message;
+}
+
+TEST(SceneFile, KeepsEveryFieldThroughTheDomainAndBack) {
+  const v1::Scene message = messageOf(kEveryField);
+  expectEveryFieldSet(message);
+  const Result<scene::Scene> scene = parseScene(kEveryField, "test");
+  ASSERT_TRUE(scene) << scene.error().text;
+  std::string difference;
+  google::protobuf::util::MessageDifferencer differencer;
+  differencer.ReportDifferencesToString(&difference);
+  EXPECT_TRUE(differencer.Compare(message, toMessage(*scene))) << difference;
+}
+
+TEST(SceneFile, KeepsEveryFieldThroughJsonAndBack) {
+  const Result<scene::Scene> scene = parseScene(kEveryField, "test");
+  const Result<scene::Scene> again = parseScene(toJson(*scene), "again");
+  ASSERT_TRUE(again) << again.error().text;
+  EXPECT_TRUE(google::protobuf::util::MessageDifferencer::Equals(toMessage(*scene), toMessage(*again)));
+}
+
+std::string errorOf(const char* json) {
+  const Result<scene::Scene> scene = parseScene(json, "my.json");
+  return scene ? "no error" : scene.error().text;
+}
+
+TEST(SceneFile, SaysLineAndColumnOfMalformedJson) {
+  EXPECT_THAT(errorOf("{\n  \"name\": \"a\"\n  \"substeps\": 3}"),
+              AllOf(StartsWith("my.json: "), HasSubstr("line 3, column 12")));
+  EXPECT_THAT(errorOf(""), AllOf(StartsWith("my.json: "), HasSubstr("line 1, column 1")));
+  EXPECT_THAT(errorOf("{\"name\": \"a\"} {}"), HasSubstr("line 1, column 15"));
+  EXPECT_THAT(errorOf("{\"name\": \"\xff\"}"), HasSubstr("UTF-8"));
+}
+
+TEST(SceneFile, NamesUnknownFieldsAndWrongTypes) {
+  EXPECT_THAT(errorOf("{\"subteps\": 3}"), AllOf(StartsWith("my.json: "), HasSubstr("subteps")));
+  EXPECT_THAT(errorOf("{\"cloths\": [{\"mas\": 1}]}"), AllOf(HasSubstr("cloths[0]"), HasSubstr("mas")));
+  EXPECT_THAT(errorOf("{\"cloths\": [{\"mass\": \"heavy\"}]}"),
+              AllOf(HasSubstr("cloths[0].mass"), HasSubstr("heavy")));
+  EXPECT_THAT(errorOf("{\"substeps\": -1}"), AllOf(HasSubstr("substeps"), HasSubstr("-1")));
+  EXPECT_THAT(errorOf("{\"integrator\": \"MAGIC\"}"), AllOf(HasSubstr("integrator"), HasSubstr("MAGIC")));
+  EXPECT_THAT(errorOf("[]"), StartsWith("my.json: not a scene"));
+}
+
+TEST(SceneFile, RefusesNestingWithoutEnd) {
+  const std::string deep = "{\"cloths\":" + std::string(200'000, '[') + std::string(200'000, ']') + "}";
+  EXPECT_THAT(errorOf(deep.c_str()), StartsWith("my.json: "));
+}
+
+TEST(SceneFile, NamesTheFieldOfABadValue) {
+  EXPECT_THAT(errorOf("{\"name\": \"a\", \"substeps\": 300}"),
+              StartsWith("my.json: substeps = 300: must be a whole number from 1 to 256"));
+}
+
+class SceneFileOnDisk : public testing::Test {
+ protected:
+  void SetUp() override { std::filesystem::create_directory(directory_); }
+  void TearDown() override { std::filesystem::remove_all(directory_); }
+
+  std::filesystem::path write(const char* name, std::string_view text) const {
+    std::ofstream(directory_ / name, std::ios::binary) << text;
+    return directory_ / name;
+  }
+
+  std::filesystem::path directory_ =
+      std::filesystem::path(testing::TempDir()) /
+      ("scene_file_" + std::string(testing::UnitTest::GetInstance()->current_test_info()->name()));
+};
+
+TEST_F(SceneFileOnDisk, IsRead) {
+  const Result<scene::Scene> scene = readSceneFile(write("scene.json", kEveryField));
+  ASSERT_TRUE(scene) << scene.error().text;
+  EXPECT_EQ(scene->name, "every_field");
+}
+
+TEST_F(SceneFileOnDisk, IsNotFound) {
+  const Result<scene::Scene> scene = readSceneFile(directory_ / "none.json");
+  ASSERT_FALSE(scene);
+  EXPECT_EQ(scene.error().code, v1::ERROR_CODE_NOT_FOUND);
+  EXPECT_THAT(scene.error().text, AllOf(HasSubstr("none.json"), HasSubstr("no such file")));
+}
+
+TEST_F(SceneFileOnDisk, IsADirectory) {
+  const Result<scene::Scene> scene = readSceneFile(directory_);
+  ASSERT_FALSE(scene);
+  EXPECT_THAT(scene.error().text, HasSubstr("is a directory"));
+}
+
+TEST_F(SceneFileOnDisk, IsTooLarge) {
+  const Result<scene::Scene> scene =
+      readSceneFile(write("large.json", std::string(limits::kMaxSceneFileBytes + 1, ' ')));
+  ASSERT_FALSE(scene);
+  EXPECT_EQ(scene.error().code, v1::ERROR_CODE_RESOURCE_EXHAUSTED);
+  EXPECT_THAT(scene.error().text, AllOf(HasSubstr("large.json"), HasSubstr("too large")));
+}
+
+TEST_F(SceneFileOnDisk, IsFoundByNameOrPath) {
+  EXPECT_EQ(loadScene("flag")->name, "flag");
+  EXPECT_EQ(loadScene(write("flag.json", kEveryField).string())->name, "every_field");
+  const Result<scene::Scene> none = loadScene("no_such_scene");
+  ASSERT_FALSE(none);
+  EXPECT_EQ(none.error().code, v1::ERROR_CODE_NOT_FOUND);
+  EXPECT_THAT(none.error().text, HasSubstr("curtain, flag, sphere_drop"));
+}
+
+}  // namespace
+}  // namespace clothstream::messages

@@ -1,0 +1,291 @@
+// SPDX-License-Identifier: MIT
+// Scene messages: defaults, and everything that is refused, with the words for it.
+#include <cctype>
+#include <functional>
+#include <limits>
+#include <ostream>
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "server/messages/scene_message.h"
+#include "tests/messages/scenes.h"
+
+namespace clothstream::messages {
+namespace {
+
+using testing::HasSubstr;
+using testing::StartsWith;
+
+TEST(ToScene, AppliesTheDefaultsOfTheProto) {
+  const Result<scene::Scene> scene = toScene(smallScene());
+  ASSERT_TRUE(scene) << scene.error().text;
+  EXPECT_EQ(scene->simulationRate, 72u);
+  EXPECT_EQ(scene->streamRate, 72u);
+  EXPECT_EQ(scene->substeps, 10u);
+  EXPECT_EQ(scene->integrator, scene::Integrator::semiImplicitEuler);
+  EXPECT_EQ(scene->environment.gravity, scene::Vec3(0, -9.81f, 0));
+  EXPECT_EQ(scene->environment.wind, scene::Vec3(0, 0, 0));
+  EXPECT_EQ(scene->environment.airDensity, 1.2f);
+  EXPECT_EQ(scene->stream.maxError, 0.0005f);
+  EXPECT_EQ(scene->stream.normals, scene::Normals::none);
+  const scene::Cloth& cloth = scene->cloths.at(0);
+  EXPECT_FLOAT_EQ(cloth.mass, 0.6f);
+  EXPECT_EQ(cloth.damping, 0);
+  EXPECT_EQ(cloth.drag, 0);
+  EXPECT_EQ(cloth.lift, 0);
+  EXPECT_EQ(cloth.friction, 0.3f);
+  EXPECT_EQ(cloth.thickness, 0.005f);
+  EXPECT_TRUE(cloth.pins.empty());
+  EXPECT_TRUE(cloth.grid.pose.orientation.coeffs() == scene::Quaternion::Identity().coeffs());
+  EXPECT_EQ(scene->colliders.at(0).friction, 1);
+  EXPECT_TRUE(scene->colliders.at(0).motion.empty());
+}
+
+TEST(ToScene, StreamsASlowSimulationAtItsOwnRate) {
+  v1::Scene message = smallScene();
+  message.set_simulation_rate(60);
+  EXPECT_EQ(toScene(message)->streamRate, 60u);
+}
+
+TEST(ToScene, TakesExplicitZerosForWhatTheyAre) {
+  v1::Scene message = smallScene();
+  message.mutable_environment()->mutable_gravity();
+  message.mutable_environment()->set_air_density(0);
+  message.mutable_cloths(0)->set_friction(0);
+  message.mutable_cloths(0)->set_thickness(0);
+  const Result<scene::Scene> scene = toScene(message);
+  ASSERT_TRUE(scene) << scene.error().text;
+  EXPECT_EQ(scene->environment.gravity, scene::Vec3(0, 0, 0));
+  EXPECT_EQ(scene->environment.airDensity, 0);
+  EXPECT_EQ(scene->cloths[0].friction, 0);
+  EXPECT_EQ(scene->cloths[0].thickness, 0);
+}
+
+TEST(ToScene, PinsOneNodeWhereARangeHasNoLast) {
+  v1::Scene message = smallScene();
+  v1::GridRange& range = *message.mutable_cloths(0)->add_pins();
+  range.set_first_row(2);
+  range.set_first_column(3);
+  const std::vector<std::uint8_t> pinned = scene::pinnedNodes(toScene(message)->cloths[0]);
+  for (std::size_t i = 0; i < pinned.size(); ++i) EXPECT_EQ(pinned[i], i == 2 * 5 + 3 ? 1 : 0);
+}
+
+TEST(ToScene, NormalisesQuaternionsThatAreNearlyUnit) {
+  v1::Scene message = smallScene();
+  v1::Quaternion& q = *message.mutable_cloths(0)->mutable_grid()->mutable_pose()->mutable_orientation();
+  q.set_x(0.6005f);
+  q.set_w(0.8005f);
+  const Result<scene::Scene> scene = toScene(message);
+  ASSERT_TRUE(scene) << scene.error().text;
+  EXPECT_NEAR(scene->cloths[0].grid.pose.orientation.norm(), 1, 1e-6);
+}
+
+constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
+
+struct BadScene {
+  const char* error;  // what the text starts with
+  std::function<void(v1::Scene&)> spoil;
+  const char* allowed = "must";  // what it says further on
+};
+
+v1::Cloth& cloth(v1::Scene& scene) {
+  return *scene.mutable_cloths(0);
+}
+v1::Grid& grid(v1::Scene& scene) {
+  return *cloth(scene).mutable_grid();
+}
+v1::Collider& collider(v1::Scene& scene) {
+  return *scene.mutable_colliders(0);
+}
+void addKey(v1::Scene& scene, float time) {
+  collider(scene).mutable_motion()->add_keys()->set_time(time);
+}
+
+const BadScene kBadScenes[] = {
+    {"name = \"\":", [](v1::Scene& s) { s.clear_name(); }, "1 to 64 characters out of [a-z0-9_-]"},
+    {"name = \"Small\":", [](v1::Scene& s) { s.set_name("Small"); }},
+    {"name = \"aaaa", [](v1::Scene& s) { s.set_name(std::string(65, 'a')); }},
+    {"description = \"two?lines\":", [](v1::Scene& s) { s.set_description("two\nlines"); }, "one line"},
+    {"simulationRate = 0:", [](v1::Scene& s) { s.set_simulation_rate(0); }, "from 1 to 1000"},
+    {"simulationRate = 1001:", [](v1::Scene& s) { s.set_simulation_rate(1001); }},
+    {"streamRate = 50:", [](v1::Scene& s) { s.set_stream_rate(50); },
+     "must divide simulationRate, which is 72"},
+    {"streamRate = 0:", [](v1::Scene& s) { s.set_stream_rate(0); }},
+    {"streamRate = 144:", [](v1::Scene& s) { s.set_stream_rate(144); }},
+    {"substeps = 0:", [](v1::Scene& s) { s.set_substeps(0); }, "from 1 to 256"},
+    {"substeps = 257:", [](v1::Scene& s) { s.set_substeps(257); }},
+    {"integrator = 7:", [](v1::Scene& s) { s.set_integrator(static_cast<v1::Integrator>(7)); },
+     "INTEGRATOR_EXPLICIT_EULER"},
+    {"environment.gravity.y = nan:",
+     [](v1::Scene& s) { s.mutable_environment()->mutable_gravity()->set_y(kNan); },
+     "a finite number from -1000 to 1000"},
+    {"environment.wind.x = 101:", [](v1::Scene& s) { s.mutable_environment()->mutable_wind()->set_x(101); }},
+    {"environment.airDensity = -1:", [](v1::Scene& s) { s.mutable_environment()->set_air_density(-1); }},
+    {"cloths: has 0 elements", [](v1::Scene& s) { s.clear_cloths(); }, "must have 1 to 256"},
+    {"cloths: has 257 elements",
+     [](v1::Scene& s) {
+       while (s.cloths_size() < 257) s.add_cloths();
+     }},
+    {"cloths[0].name = \"a b\":", [](v1::Scene& s) { cloth(s).set_name("a b"); }},
+    {"cloths[1].name = \"sheet\":", [](v1::Scene& s) { *s.add_cloths() = s.cloths(0); }, "must be unique"},
+    {"cloths[0]: has no shape", [](v1::Scene& s) { cloth(s).clear_grid(); }, "must have \"grid\""},
+    {"cloths[0].grid.rows = 1:", [](v1::Scene& s) { grid(s).set_rows(1); }, "from 2 to 8192"},
+    {"cloths[0].grid.columns = 8193:", [](v1::Scene& s) { grid(s).set_columns(8193); }},
+    {"cloths[0].grid.width = 0:", [](v1::Scene& s) { grid(s).set_width(0); }, "from 0.001 to 1000"},
+    {"cloths[0].grid.height = inf:", [](v1::Scene& s) { grid(s).set_height(kInfinity); }},
+    {"cloths[0].grid.width = 0.002:",
+     [](v1::Scene& s) {
+       grid(s).set_columns(101);
+       grid(s).set_width(0.002f);
+     },
+     "at least 0.01 with 101 columns"},
+    {"cloths[0].grid.pose.position.z = 1001:",
+     [](v1::Scene& s) { grid(s).mutable_pose()->mutable_position()->set_z(1001); }},
+    {"cloths[0].grid.pose.orientation = (0, 0, 0, 0.5):",
+     [](v1::Scene& s) { grid(s).mutable_pose()->mutable_orientation()->set_w(0.5f); }, "a unit quaternion"},
+    {"cloths[0].grid.pose.orientation = (nan, 0, 0, 0):",
+     [](v1::Scene& s) { grid(s).mutable_pose()->mutable_orientation()->set_x(kNan); }},
+    {"cloths[0].mass = 0:", [](v1::Scene& s) { cloth(s).set_mass(0); }, "from 1e-06 to 1e+06"},
+    {"cloths[0].structural.stiffness = -3:",
+     [](v1::Scene& s) { cloth(s).mutable_structural()->set_stiffness(-3); },
+     "must be a finite number from 0 to 1e+06"},
+    {"cloths[0].shear.damping = inf:",
+     [](v1::Scene& s) { cloth(s).mutable_shear()->set_damping(kInfinity); }},
+    {"cloths[0].bend.stiffness = nan:", [](v1::Scene& s) { cloth(s).mutable_bend()->set_stiffness(kNan); }},
+    {"cloths[0].damping = 1001:", [](v1::Scene& s) { cloth(s).set_damping(1001); }},
+    {"cloths[0].drag = 11:", [](v1::Scene& s) { cloth(s).set_drag(11); }},
+    {"cloths[0].lift = -0.5:", [](v1::Scene& s) { cloth(s).set_lift(-0.5f); }},
+    {"cloths[0].friction = 10.5:", [](v1::Scene& s) { cloth(s).set_friction(10.5f); }, "from 0 to 10"},
+    {"cloths[0].thickness = 2:", [](v1::Scene& s) { cloth(s).set_thickness(2); }},
+    {"cloths[0].pins[0].firstRow = 4:", [](v1::Scene& s) { cloth(s).add_pins()->set_first_row(4); },
+     "from 0 to 3"},
+    {"cloths[0].pins[1].lastColumn = 5:",
+     [](v1::Scene& s) {
+       cloth(s).add_pins();
+       cloth(s).add_pins()->set_last_column(5);
+     },
+     "from 0 to 4"},
+    {"cloths[0].pins[0].lastRow = 1:",
+     [](v1::Scene& s) {
+       cloth(s).add_pins()->set_first_row(2);
+       cloth(s).mutable_pins(0)->set_last_row(1);
+     },
+     "from 2 to 3"},
+    {"cloths[0].pins[0].rowStep = 0:", [](v1::Scene& s) { cloth(s).add_pins()->set_row_step(0); }},
+    {"cloths[0].pins[0].columnStep = 0:", [](v1::Scene& s) { cloth(s).add_pins()->set_column_step(0); }},
+    {"cloths[0].pins: has 4097 elements",
+     [](v1::Scene& s) {
+       for (int i = 0; i < 4097; ++i) cloth(s).add_pins();
+     }},
+    {"cloths: have 16842752 nodes",  // 257 rows of 8192 in each of 8 cloths
+     [](v1::Scene& s) {
+       grid(s).set_rows(257);
+       grid(s).set_columns(8192);
+       for (int i = 1; i < 8; ++i) {
+         *s.add_cloths() = s.cloths(0);
+         s.mutable_cloths(i)->set_name("sheet" + std::to_string(i));
+       }
+     },
+     "at most 16777216"},
+    {"colliders: has 65 elements",
+     [](v1::Scene& s) {
+       while (s.colliders_size() < 65) s.add_colliders();
+     }},
+    {"colliders[0].name = \"\":", [](v1::Scene& s) { collider(s).clear_name(); }},
+    {"colliders[1].name = \"ball\":", [](v1::Scene& s) { *s.add_colliders() = s.colliders(0); },
+     "must be unique"},
+    {"colliders[0]: has no shape", [](v1::Scene& s) { collider(s).clear_sphere(); }, "must have \"sphere\""},
+    {"colliders[0].sphere.radius = 0:", [](v1::Scene& s) { collider(s).mutable_sphere()->set_radius(0); }},
+    {"colliders[0].pose.position.x = -inf:",
+     [](v1::Scene& s) { collider(s).mutable_pose()->mutable_position()->set_x(-kInfinity); }},
+    {"colliders[0].friction = -1:", [](v1::Scene& s) { collider(s).set_friction(-1); }},
+    {"colliders[0].motion.keys: has 1 elements", [](v1::Scene& s) { addKey(s, 0); }, "must have 2 to"},
+    {"colliders[0].motion.keys[0].time = 1:",
+     [](v1::Scene& s) {
+       addKey(s, 1);
+       addKey(s, 2);
+     },
+     "must be 0"},
+    {"colliders[0].motion.keys[2].time = 3:",
+     [](v1::Scene& s) {
+       for (const float time : {0.f, 3.f, 3.f}) addKey(s, time);
+     },
+     "greater than the time of the key before, 3"},
+    {"colliders[0].motion.keys[1].time = nan:",
+     [](v1::Scene& s) {
+       addKey(s, 0);
+       addKey(s, kNan);
+     }},
+    {"colliders[0].motion.keys[0].position.y = 2000:",
+     [](v1::Scene& s) {
+       addKey(s, 0);
+       addKey(s, 1);
+       collider(s).mutable_motion()->mutable_keys(0)->mutable_position()->set_y(2000);
+     }},
+    {"stream.maxError = 1:", [](v1::Scene& s) { s.mutable_stream()->set_max_error(1); }, "from 1e-05 to 0.1"},
+    {"stream.normals = 9:",
+     [](v1::Scene& s) { s.mutable_stream()->set_normals(static_cast<v1::Normals>(9)); }},
+    // 4 springs of 4000 N/m at nodes of 0.03 kg: h < 2 / sqrt(2 * 4 * 4000 / 0.03) s = 1 / 516.4, 7.2 a tick.
+    {"substeps = 2: this scene needs at least 8",
+     [](v1::Scene& s) {
+       cloth(s).mutable_structural()->set_stiffness(4000);
+       s.set_substeps(2);
+     },
+     "springs"},
+    {"substeps = 10: no number up to 256",
+     [](v1::Scene& s) {
+       cloth(s).mutable_bend()->set_stiffness(1e6f);
+       cloth(s).set_mass(0.001f);
+     },
+     "raise"},
+    {"substeps = 10: no number up to 256",
+     [](v1::Scene& s) { s.set_integrator(v1::INTEGRATOR_EXPLICIT_EULER); }, "INTEGRATOR_SEMI_IMPLICIT_EULER"},
+};
+
+// The letters and digits of the error: CTest stumbles over brackets and quotes.
+std::string nameOf(const BadScene& bad) {
+  std::string name;
+  for (const char c : std::string_view(bad.error))
+    if (std::isalnum(static_cast<unsigned char>(c))) name += c;
+  return name;
+}
+
+void PrintTo(const BadScene& bad, std::ostream* out) {
+  *out << nameOf(bad);
+}
+
+class ToSceneRefuses : public testing::TestWithParam<BadScene> {};
+
+TEST_P(ToSceneRefuses, WithPathValueAndWhatIsAllowed) {
+  v1::Scene message = smallScene();
+  ASSERT_TRUE(toScene(message));
+  GetParam().spoil(message);
+  const Result<scene::Scene> scene = toScene(message);
+  ASSERT_FALSE(scene);
+  EXPECT_EQ(scene.error().code, v1::ERROR_CODE_INVALID_ARGUMENT);
+  EXPECT_THAT(scene.error().text, StartsWith(GetParam().error));
+  EXPECT_THAT(scene.error().text, HasSubstr(GetParam().allowed));
+}
+
+INSTANTIATE_TEST_SUITE_P(All, ToSceneRefuses, testing::ValuesIn(kBadScenes), [](const auto& info) {
+  return nameOf(info.param) + "_" + std::to_string(info.index);
+});
+
+TEST(ToScene, AcceptsTheSubstepsThatItAskedFor) {
+  v1::Scene message = smallScene();
+  cloth(message).mutable_structural()->set_stiffness(4000);
+  message.set_substeps(8);
+  EXPECT_TRUE(toScene(message));
+}
+
+TEST(ToScene, KeepsErrorsShortWhateverTheInput) {
+  v1::Scene message = smallScene();
+  message.set_name(std::string(1'000'000, 'x'));
+  EXPECT_LT(toScene(message).error().text.size(), 300u);
+}
+
+}  // namespace
+}  // namespace clothstream::messages
