@@ -57,16 +57,11 @@ shared::vec4 texel(const scene::Vec3& v, float w) {
 }
 
 bool isDamped(const shared::ClothRecord& cloth) {
-  return cloth.structuralDamping != 0 || cloth.shearDamping != 0 || cloth.bendDamping != 0;
-}
-
-std::span<const std::uint32_t> advanceSpirv(const SimulationOptions& options) {
-  return options.advanceKernel.empty() ? std::span<const std::uint32_t>(kernels::advance_mass_spring)
-                                       : options.advanceKernel;
+  return cloth.damping.x != 0 || cloth.damping.y != 0 || cloth.damping.z != 0;
 }
 
 bool isBlown(const shared::ClothRecord& cloth) {
-  return cloth.drag != 0 || cloth.lift != 0;
+  return cloth.air.x != 0 || cloth.air.y != 0;
 }
 
 // All memory of a scene on the device.
@@ -91,8 +86,8 @@ Buffers::Buffers(const vulkan::Device& device, std::size_t nodes, std::size_t cl
     : checkpointPositions(device, BufferPurpose::state, nodes * kTexelBytes),
       checkpointVelocities(device, BufferPurpose::state, nodes * kTexelBytes),
       normals(device, BufferPurpose::texels, nodes * kTexelBytes),
-      cloths(device, BufferPurpose::state, clothCount * sizeof(shared::ClothRecord)),
-      tiles(device, BufferPurpose::state, tileCount * sizeof(shared::TileRecord)),
+      cloths(device, BufferPurpose::texels, clothCount * sizeof(shared::ClothRecord)),
+      tiles(device, BufferPurpose::texels, tileCount * sizeof(shared::TileRecord)),
       spheres(device, BufferPurpose::texels, kMaxSpheres * sizeof(shared::SphereRecord)),
       status(device, BufferPurpose::state, sizeof(shared::StatusRecord)),
       statusReadback(device, BufferPurpose::readback, 2 * sizeof(shared::StatusRecord)),
@@ -117,22 +112,38 @@ struct Stage {
   std::array<vulkan::Bindings, 2> from;
 };
 
-Stage makeAdvance(const vulkan::Device& device, const Buffers& b, const Cut& cut,
-                  std::span<const std::uint32_t> spirv, scene::Integrator integrator, bool springDamping,
-                  bool air) {
-  return Stage(
+// What the kernel leaves out where a scene has none of it; the bits are the same.
+struct AdvanceVariant {
+  bool springDamping, air, spheres;
+
+  std::size_t index() const { return (springDamping ? 1u : 0u) | (air ? 2u : 0u) | (spheres ? 4u : 0u); }
+  static constexpr std::size_t kCount = 8;
+};
+
+AdvanceVariant variantOf(std::span<const shared::ClothRecord> cloths, float airDensity, bool spheres) {
+  return {std::any_of(cloths.begin(), cloths.end(), isDamped),
+          airDensity != 0 && std::any_of(cloths.begin(), cloths.end(), isBlown), spheres};
+}
+
+std::unique_ptr<Stage> makeAdvance(const vulkan::Device& device, const Buffers& b, const Cut& cut,
+                                   std::span<const std::uint32_t> spirv, scene::Integrator integrator,
+                                   const AdvanceVariant& variant) {
+  return std::make_unique<Stage>(
       device,
-      {.name = "advance_mass_spring",
-       .spirv = spirv,
-       .bindings = {BindingKind::storage, BindingKind::storage, BindingKind::texels, BindingKind::texels,
-                    BindingKind::storage, BindingKind::storage, BindingKind::texels},
-       .pushConstantBytes = sizeof(shared::AdvancePush),
-       .workgroupSize = cut.workgroupSize,
-       .specialisation = {cut.rowsPerInvocation, springDamping ? 1u : 0u, air ? 1u : 0u,
-                          integrator == scene::Integrator::explicitEuler ? 1u : 0u}},
-      {&b.cloths, &b.tiles, &b.positions[0], &b.velocities[0], &b.positions[1], &b.velocities[1], &b.spheres},
-      {&b.cloths, &b.tiles, &b.positions[1], &b.velocities[1], &b.positions[0], &b.velocities[0],
-       &b.spheres});
+      vulkan::KernelDescription{
+          .name = "advance_mass_spring",
+          .spirv = spirv,
+          .bindings = {BindingKind::texels, BindingKind::texels, BindingKind::texels, BindingKind::texels,
+                       BindingKind::storage, BindingKind::storage, BindingKind::texels},
+          .pushConstantBytes = sizeof(shared::AdvancePush),
+          .workgroupSize = cut.workgroupSize,
+          .specialisation = {cut.rowsPerInvocation, variant.springDamping ? 1u : 0u, variant.air ? 1u : 0u,
+                             variant.spheres ? 1u : 0u,
+                             integrator == scene::Integrator::explicitEuler ? 1u : 0u}},
+      std::initializer_list<const Buffer*>{&b.cloths, &b.tiles, &b.positions[0], &b.velocities[0],
+                                           &b.positions[1], &b.velocities[1], &b.spheres},
+      std::initializer_list<const Buffer*>{&b.cloths, &b.tiles, &b.positions[1], &b.velocities[1],
+                                           &b.positions[0], &b.velocities[0], &b.spheres});
 }
 
 Stage makeNormals(const vulkan::Device& device, const Buffers& b, const Cut& cut) {
@@ -140,7 +151,7 @@ Stage makeNormals(const vulkan::Device& device, const Buffers& b, const Cut& cut
       device,
       {.name = "compute_normals",
        .spirv = kernels::compute_normals,
-       .bindings = {BindingKind::storage, BindingKind::storage, BindingKind::texels, BindingKind::storage},
+       .bindings = {BindingKind::texels, BindingKind::texels, BindingKind::texels, BindingKind::storage},
        .workgroupSize = cut.workgroupSize,
        .specialisation = {cut.rowsPerInvocation}},
       {&b.cloths, &b.tiles, &b.positions[0], &b.normals}, {&b.cloths, &b.tiles, &b.positions[1], &b.normals});
@@ -163,6 +174,7 @@ Stage makeHash(const vulkan::Device& device, const Buffers& b, const Cut& cut) {
 struct ClothSimulation::Pipeline {
   Pipeline(const vulkan::Device& on, const scene::Scene& scene, const SimulationOptions& options);
 
+  const Stage& advance(const AdvanceVariant& variant);
   void start(vulkan::Recorder& recorder);
   void recordInputs(vulkan::Recorder& recorder, const TickInputs& inputs);
   void recordSubsteps(vulkan::Recorder& recorder, const TickInputs& inputs);
@@ -171,6 +183,8 @@ struct ClothSimulation::Pipeline {
   void recordUploadedState(vulkan::Recorder& recorder);
 
   const vulkan::Device& device;
+  std::span<const std::uint32_t> advanceSpirv;
+  scene::Integrator integrator;
   std::uint32_t substeps;
   float substepSeconds, tickRate;
   std::vector<std::uint32_t> offsets;
@@ -179,8 +193,7 @@ struct ClothSimulation::Pipeline {
   std::vector<float> masses;  // inverse
   Cut cut;
   Buffers buffers;
-  // By damped springs (the first index) and air.
-  std::array<std::array<Stage, 2>, 2> advance;
+  std::array<std::unique_ptr<Stage>, AdvanceVariant::kCount> advances;  // made when they are first needed
   Stage normals, hash;
 
   bool started = false;       // the start state and the tiles are on the device
@@ -191,6 +204,10 @@ struct ClothSimulation::Pipeline {
 ClothSimulation::Pipeline::Pipeline(const vulkan::Device& on, const scene::Scene& scene,
                                     const SimulationOptions& options)
     : device(on),
+      advanceSpirv(options.advanceKernel.empty()
+                       ? std::span<const std::uint32_t>(kernels::advance_mass_spring)
+                       : options.advanceKernel),
+      integrator(scene.integrator),
       substeps(scene.substeps),
       substepSeconds(static_cast<float>(scene.substepSeconds())),
       tickRate(static_cast<float>(scene.simulationRate)),
@@ -200,15 +217,18 @@ ClothSimulation::Pipeline::Pipeline(const vulkan::Device& on, const scene::Scene
       masses(inverseMasses(scene.cloths)),
       cut(cutScene(on, scene, options)),
       buffers(on, nodes, records.size(), cut.tiles.size()),
-      advance{{{makeAdvance(on, buffers, cut, advanceSpirv(options), scene.integrator, false, false),
-                makeAdvance(on, buffers, cut, advanceSpirv(options), scene.integrator, false, true)},
-               {makeAdvance(on, buffers, cut, advanceSpirv(options), scene.integrator, true, false),
-                makeAdvance(on, buffers, cut, advanceSpirv(options), scene.integrator, true, true)}}},
       normals(makeNormals(on, buffers, cut)),
       hash(makeHash(on, buffers, cut)) {
   std::memcpy(buffers.tileUpload.mapped().data(), cut.tiles.data(), buffers.tiles.bytes());
   std::memcpy(buffers.inputs[slot].mapped().data(), records.data(), buffers.cloths.bytes());
   writeState(restState(scene.cloths));
+  for (const bool spheres : {false, true}) advance(variantOf(records, scene.environment.airDensity, spheres));
+}
+
+const Stage& ClothSimulation::Pipeline::advance(const AdvanceVariant& variant) {
+  std::unique_ptr<Stage>& stage = advances[variant.index()];
+  if (!stage) stage = makeAdvance(device, buffers, cut, advanceSpirv, integrator, variant);
+  return *stage;
 }
 
 void ClothSimulation::Pipeline::writeState(const NodeState& state) {
@@ -257,9 +277,7 @@ void ClothSimulation::Pipeline::recordInputs(vulkan::Recorder& recorder, const T
 
 void ClothSimulation::Pipeline::recordSubsteps(vulkan::Recorder& recorder, const TickInputs& inputs) {
   const scene::Environment& environment = inputs.environment;
-  const bool springDamping = std::any_of(records.begin(), records.end(), isDamped);
-  const bool air = environment.airDensity != 0 && std::any_of(records.begin(), records.end(), isBlown);
-  const Stage& stage = advance[springDamping ? 1 : 0][air ? 1 : 0];
+  const Stage& stage = advance(variantOf(records, environment.airDensity, !inputs.spheres.empty()));
   shared::AdvancePush push{.gravityStep = texel(environment.gravity, substepSeconds),
                            .windAir = texel(environment.wind, environment.airDensity / 6),
                            .sphereCount = static_cast<std::uint32_t>(inputs.spheres.size()),
@@ -295,7 +313,7 @@ void ClothSimulation::setCloths(std::span<const scene::Cloth> cloths) {
   assert(records.size() == pipeline_->records.size());
   assert(std::equal(records.begin(), records.end(), pipeline_->records.begin(),
                     [](const shared::ClothRecord& a, const shared::ClothRecord& b) {
-                      return a.rows == b.rows && a.columns == b.columns;
+                      return a.place.z == b.place.z && a.place.w == b.place.w;
                     }));
   pipeline_->records = std::move(records);
 }

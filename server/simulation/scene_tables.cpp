@@ -28,26 +28,18 @@ std::vector<shared::ClothRecord> clothRecords(std::span<const scene::Cloth> clot
   std::uint32_t firstNode = 0;
   for (const scene::Cloth& cloth : cloths) {
     const scene::GridSpacing spacing = scene::spacing(cloth.grid);
-    records.push_back({.firstNode = firstNode,
-                       .rows = cloth.grid.rows,
-                       .columns = cloth.grid.columns,
-                       .reserved = 0,
-                       .columnSpacing = spacing.column,
-                       .rowSpacing = spacing.row,
-                       .diagonalSpacing = spacing.diagonal,
-                       .damping = cloth.damping,
-                       .structuralStiffness = cloth.structural.stiffness,
-                       .shearStiffness = cloth.shear.stiffness,
-                       .bendStiffness = cloth.bend.stiffness,
-                       .friction = cloth.friction,
-                       .structuralDamping = cloth.structural.damping,
-                       .shearDamping = cloth.shear.damping,
-                       .bendDamping = cloth.bend.damping,
-                       .thickness = cloth.thickness,
-                       .drag = cloth.drag,
-                       .lift = cloth.lift,
-                       .reserved2 = 0,
-                       .reserved3 = 0});
+    const auto whole = [](std::uint32_t number) {
+      assert(number < 1u << 24);
+      return static_cast<float>(number);
+    };
+    records.push_back(
+        {.place = {whole(firstNode & 0xFFFF), whole(firstNode >> 16), whole(cloth.grid.rows),
+                   whole(cloth.grid.columns)},
+         .spacing = {spacing.column, spacing.row, spacing.diagonal, cloth.damping},
+         .stiffness = {cloth.structural.stiffness, cloth.shear.stiffness, cloth.bend.stiffness,
+                       cloth.friction},
+         .damping = {cloth.structural.damping, cloth.shear.damping, cloth.bend.damping, cloth.thickness},
+         .air = {cloth.drag, cloth.lift, 0, 0}});
     firstNode += cloth.grid.nodeCount();
   }
   return records;
@@ -62,10 +54,10 @@ std::vector<shared::TileRecord> tileRecords(std::span<const scene::Cloth> cloths
     const std::uint32_t strips = (grid.rows + rowsPerInvocation - 1) / rowsPerInvocation;
     const std::uint64_t invocations = std::uint64_t{strips} * grid.columns;
     for (std::uint64_t first = 0; first < invocations; first += workgroupSize)
-      tiles.push_back({.cloth = cloth,
-                       .row = static_cast<std::uint32_t>(first / grid.columns) * rowsPerInvocation,
-                       .column = static_cast<std::uint32_t>(first % grid.columns),
-                       .reserved = 0});
+      tiles.push_back(
+          {{static_cast<float>(cloth),
+            static_cast<float>(static_cast<std::uint32_t>(first / grid.columns) * rowsPerInvocation),
+            static_cast<float>(first % grid.columns), 0}});
   }
   return tiles;
 }

@@ -13,7 +13,7 @@
 #include "shaders/shared/grid_strip.glsl"
 
 // As in [Va21]; else semi-implicit Euler.
-layout(constant_id = 4) const bool kExplicitEuler = false;
+layout(constant_id = 5) const bool kExplicitEuler = false;
 
 layout(binding = 2) uniform samplerBuffer positions;  // w: inverse mass
 layout(binding = 3) uniform samplerBuffer velocities;
@@ -32,13 +32,18 @@ Node fetchNode(uint index) {
 
 void main() {
   Strip strip = locateStrip();
-  ClothRecord cloth = cloths[strip.cloth];
-  if (strip.row >= cloth.rows) {
+  if (strip.row >= strip.rows) {
     return;
   }
-  uint columns = cloth.columns;
-  uint lastRow = cloth.rows - 1;
-  uint endRow = min(strip.row + kRowsPerInvocation, cloth.rows);
+  vec4 spacing = texelFetch(cloths, strip.cloth + 1);
+  vec4 stiffness = texelFetch(cloths, strip.cloth + 2);
+  vec4 damping = texelFetch(cloths, strip.cloth + 3);
+  vec4 resistance = texelFetch(cloths, strip.cloth + 4);
+  float friction = stiffness.w;
+  float thickness = damping.w;
+  uint columns = strip.columns;
+  uint lastRow = strip.rows - 1;
+  uint endRow = min(strip.row + kRowsPerInvocation, strip.rows);
 
   // Loads beyond an edge stay on it: their springs have no stiffness, their triangles no area.
   bool hasLeft = strip.column > 0;
@@ -49,21 +54,21 @@ void main() {
   uint toRight = hasRight ? 1 : 0;
   uint toLeft2 = hasLeft2 ? 2 : 0;
   uint toRight2 = hasRight2 ? 2 : 0;
-  uint start = cloth.firstNode + strip.column;
+  uint start = strip.firstNode + strip.column;
 
-  Spring alongRow = Spring(cloth.structuralStiffness, cloth.structuralDamping, cloth.columnSpacing);
-  Spring alongColumn = Spring(cloth.structuralStiffness, cloth.structuralDamping, cloth.rowSpacing);
-  Spring shear = Spring(cloth.shearStiffness, cloth.shearDamping, cloth.diagonalSpacing);
-  Spring bendRow = Spring(cloth.bendStiffness, cloth.bendDamping, 2.0 * cloth.columnSpacing);
-  Spring bendColumn = Spring(cloth.bendStiffness, cloth.bendDamping, 2.0 * cloth.rowSpacing);
+  Spring alongRow = Spring(stiffness.x, damping.x, spacing.x);
+  Spring alongColumn = Spring(stiffness.x, damping.x, spacing.y);
+  Spring shear = Spring(stiffness.y, damping.y, spacing.z);
+  Spring bendRow = Spring(stiffness.z, damping.z, 2.0 * spacing.x);
+  Spring bendColumn = Spring(stiffness.z, damping.z, 2.0 * spacing.y);
   Spring leftSpring = where(hasLeft, alongRow);
   Spring rightSpring = where(hasRight, alongRow);
   Spring left2Spring = where(hasLeft2, bendRow);
   Spring right2Spring = where(hasRight2, bendRow);
   Spring leftShear = where(hasLeft, shear);
   Spring rightShear = where(hasRight, shear);
-  precise float drag = push.windAir.w * cloth.drag;
-  precise float lift = push.windAir.w * cloth.lift;
+  precise float drag = push.windAir.w * resistance.x;
+  precise float lift = push.windAir.w * resistance.y;
   Air air = Air(push.windAir.xyz, drag, lift);
 
   // The window: columns left, centre and right; rows above, here and below.
@@ -91,7 +96,7 @@ void main() {
     rightAboveAir2 = airForce(rightAbove, here, right, air);
   }
 
-  for (; row < endRow; ++row) {
+  do {
     bool hasBelow = row < lastRow;
     bool hasBelow2 = row + 1 < lastRow;
     index = start + row * columns;
@@ -127,11 +132,13 @@ void main() {
       rightAboveAir2 = airForce(right, below, rightBelow, air);
     }
 
-    precise vec3 acceleration = force * here.inverseMass + push.gravityStep.xyz - cloth.damping * here.velocity;
+    precise vec3 acceleration = force * here.inverseMass + push.gravityStep.xyz - spacing.w * here.velocity;
     precise vec3 velocity = here.velocity + push.gravityStep.w * acceleration;
     precise vec3 position = here.position + push.gravityStep.w * (kExplicitEuler ? here.velocity : velocity);
-    Node next = collideWithSpheres(Node(position, here.inverseMass, velocity), push.sphereCount, push.sphereProgress, push.tickRate,
-                                   cloth.thickness, cloth.friction);
+    Node next = Node(position, here.inverseMass, velocity);
+    if (kSpheres) {
+      next = collideWithSpheres(next, push.sphereCount, push.sphereProgress, push.tickRate, thickness, friction);
+    }
     bool pinned = here.inverseMass == 0.0;
     nextPositions[index] = vec4(pinned ? here.position : snapTiny(next.position), here.inverseMass);
     nextVelocities[index] = vec4(pinned ? vec3(0.0) : snapTiny(next.velocity), 0.0);
@@ -148,5 +155,6 @@ void main() {
       here.velocity = fetchVelocity(belowIndex);
     }
     below = below2;
-  }
+    ++row;
+  } while (row < endRow);
 }

@@ -6,6 +6,9 @@
 #include "shaders/mass_spring/node.glsl"
 #include "shaders/shared/arithmetic.glsl"
 
+// Whether there is a sphere at all.
+layout(constant_id = 4) const bool kSpheres = true;
+
 // Two texels a sphere (SphereRecord).
 layout(binding = 6) uniform samplerBuffer spheres;
 
@@ -32,17 +35,20 @@ Node collideWithSphere(Node node, vec3 centre, vec3 velocity, float radius, floa
   return node;
 }
 
-// In the order of the spheres. `progress` is the part of their motion that is done, `rate` one over its seconds.
+// In the order of the spheres, of which there must be one. `progress` is the part of their motion that is done, `rate`
+// one over its seconds.
 Node collideWithSpheres(Node node, uint count, float progress, float rate, float thickness, float friction) {
-  for (uint i = 0; i < count; ++i) {
-    vec4 startRadius = texelFetch(spheres, int(2 * i));
-    vec4 motionFriction = texelFetch(spheres, int(2 * i + 1));
+  int texel = 0;
+  do {
+    vec4 startRadius = texelFetch(spheres, texel);
+    vec4 motionFriction = texelFetch(spheres, texel + 1);
     precise vec3 centre = startRadius.xyz + progress * motionFriction.xyz;
     precise vec3 velocity = rate * motionFriction.xyz;
     precise float radius = startRadius.w + thickness;
     precise float both = friction * motionFriction.w;
     node = collideWithSphere(node, centre, velocity, radius, both);
-  }
+    texel += 2;
+  } while (texel < int(2 * count));
   return node;
 }
 

@@ -22,15 +22,14 @@ vec3 quadrant(vec3 p, vec3 first, vec3 diagonal, vec3 second) {
 // each node belongs to one invocation.
 void main() {
   Strip strip = locateStrip();
-  uint rows = cloths[strip.cloth].rows;
-  if (strip.row >= rows) {
+  if (strip.row >= strip.rows) {
     return;
   }
-  uint columns = cloths[strip.cloth].columns;
-  uint start = cloths[strip.cloth].firstNode + strip.column;
+  uint columns = strip.columns;
+  uint start = strip.firstNode + strip.column;
   uint toLeft = strip.column > 0 ? 1 : 0;
   uint toRight = strip.column + 1 < columns ? 1 : 0;
-  uint endRow = min(strip.row + kRowsPerInvocation, rows);
+  uint endRow = min(strip.row + kRowsPerInvocation, strip.rows);
 
   uint index = start + strip.row * columns;
   uint aboveIndex = strip.row > 0 ? index - columns : index;
@@ -40,8 +39,9 @@ void main() {
   vec3 left = fetchPosition(index - toLeft);
   vec3 here = fetchPosition(index);
   vec3 right = fetchPosition(index + toRight);
-  for (uint row = strip.row; row < endRow; ++row) {
-    uint belowIndex = row + 1 < rows ? index + columns : index;
+  uint row = strip.row;
+  do {
+    uint belowIndex = row + 1 < strip.rows ? index + columns : index;
     vec3 leftBelow = fetchPosition(belowIndex - toLeft);
     vec3 below = fetchPosition(belowIndex);
     vec3 rightBelow = fetchPosition(belowIndex + toRight);
@@ -61,5 +61,6 @@ void main() {
     here = below;
     right = rightBelow;
     index = belowIndex;
-  }
+    ++row;
+  } while (row < endRow);
 }

@@ -6,24 +6,34 @@
 #include "shaders/shared/simulation.h"
 
 layout(local_size_x_id = 0) in;
-// An invocation walks down this many rows and keeps what neighbouring rows share in registers.
+// An invocation walks down this many rows and keeps what neighbouring rows share in registers. Loops over them test
+// at their end: on a software device a loop that tests first runs once more than it must.
 layout(constant_id = 1) const uint kRowsPerInvocation = 1;
 
-layout(std430, binding = 0) readonly buffer Cloths { ClothRecord cloths[]; };
-layout(std430, binding = 1) readonly buffer Tiles { TileRecord tiles[]; };
+layout(binding = 0) uniform samplerBuffer cloths;  // ClothRecord
+layout(binding = 1) uniform samplerBuffer tiles;   // TileRecord
 
 struct Strip {
-  uint cloth;
-  uint row;  // the first; at or past the cloth's last for invocations that have nothing to do
+  int cloth;  // first texel of its record
+  uint firstNode;
+  uint rows;
+  uint columns;
+  uint row;  // the first of the strip; at or past `rows` for invocations that have nothing to do
   uint column;
 };
 
 Strip locateStrip() {
-  TileRecord tile = tiles[gl_WorkGroupID.x];
-  uint columns = cloths[tile.cloth].columns;
-  Strip strip = Strip(tile.cloth, tile.row, tile.column + gl_LocalInvocationID.x);
-  while (strip.column >= columns) {
-    strip.column -= columns;
+  vec4 tile = texelFetch(tiles, int(gl_WorkGroupID.x));
+  Strip strip;
+  strip.cloth = 5 * int(tile.x);
+  vec4 place = texelFetch(cloths, strip.cloth);
+  strip.firstNode = uint(place.x) + (uint(place.y) << 16);
+  strip.rows = uint(place.z);
+  strip.columns = uint(place.w);
+  strip.row = uint(tile.y);
+  strip.column = uint(tile.z) + gl_LocalInvocationID.x;
+  while (strip.column >= strip.columns) {
+    strip.column -= strip.columns;
     strip.row += kRowsPerInvocation;
   }
   return strip;

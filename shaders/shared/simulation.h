@@ -7,41 +7,22 @@
 
 CLOTHSTREAM_SHARED_BEGIN
 
-// One cloth: where its nodes lie in the scene's buffers, and its material. Row-major, SI units.
+// Kernels read these tables as texels of four floats, which costs a software device a tenth of storage loads. Whole
+// numbers are floats too, exact below 2^24.
+
+// One cloth, five texels: where its nodes lie in the scene's buffers, and its material. Row-major, SI units.
 struct ClothRecord {
-  uint32_t firstNode;
-  uint32_t rows;
-  uint32_t columns;
-  uint32_t reserved;
-
-  float columnSpacing;
-  float rowSpacing;
-  float diagonalSpacing;
-  float damping;
-
-  float structuralStiffness;
-  float shearStiffness;
-  float bendStiffness;
-  float friction;
-
-  float structuralDamping;
-  float shearDamping;
-  float bendDamping;
-  float thickness;
-
-  float drag;
-  float lift;
-  float reserved2;
-  float reserved3;
+  vec4 place;      // first node modulo 2^16, first node / 2^16, rows, columns
+  vec4 spacing;    // of columns, of rows, along the diagonal; damping
+  vec4 stiffness;  // structural, shear, bend; friction
+  vec4 damping;    // structural, shear, bend; thickness
+  vec4 air;        // drag, lift
 };
 
-// One workgroup of a kernel that walks down columns: its first invocation starts at (row, column) of the
-// cloth. The others follow along the row, and from its end at the start of the next strip of rows.
+// One workgroup of a kernel that walks down columns: its first invocation starts at (row, column) of the cloth. The
+// others follow along the row, and from its end at the start of the next strip of rows.
 struct TileRecord {
-  uint32_t cloth;
-  uint32_t row;
-  uint32_t column;
-  uint32_t reserved;
+  vec4 start;  // cloth, row, column
 };
 
 // A sphere over one tick, two texels: where it starts, and how far it moves until the tick's end.
@@ -76,9 +57,9 @@ CLOTHSTREAM_SHARED_END
 
 #ifdef __cplusplus
 namespace clothstream::shared {
-static_assert(sizeof(ClothRecord) == 80 && offsetof(ClothRecord, columnSpacing) == 16 &&
-              offsetof(ClothRecord, structuralStiffness) == 32 &&
-              offsetof(ClothRecord, structuralDamping) == 48 && offsetof(ClothRecord, drag) == 64);
+static_assert(sizeof(ClothRecord) == 80 && offsetof(ClothRecord, spacing) == 16 &&
+              offsetof(ClothRecord, stiffness) == 32 && offsetof(ClothRecord, damping) == 48 &&
+              offsetof(ClothRecord, air) == 64);
 static_assert(sizeof(TileRecord) == 16);
 static_assert(sizeof(SphereRecord) == 32 && offsetof(SphereRecord, motionFriction) == 16);
 static_assert(sizeof(AdvancePush) == 48 && offsetof(AdvancePush, windAir) == 16 &&
