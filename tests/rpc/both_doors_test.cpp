@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: MIT
+// Whoever comes through one door shares the scene with those who came through the other.
+#include <memory>
+
+#include <gmock/gmock.h>
+
+#include "server/rpc/rpc_door.h"
+#include "server/web/web_door.h"
+#include "tests/rpc/rpc_client.h"
+#include "tests/web/small_server.h"
+#include "tests/web/web_client.h"
+
+namespace clothstream::tests {
+namespace {
+
+class BothDoors : public DoorTest {
+ protected:
+  void SetUp() override {
+    DoorTest::SetUp();
+    if (IsSkipped()) return;
+    rpc::RpcDoorOptions rpcOptions;
+    rpcOptions.port = 0;
+    web::WebDoorOptions webOptions;
+    webOptions.port = 0;
+    rpcDoor = std::make_unique<rpc::RpcDoor>(server(), rpcOptions);
+    webDoor = std::make_unique<web::WebDoor>(server(), webOptions);
+  }
+  void TearDown() override {
+    rpcDoor.reset();
+    webDoor.reset();
+    DoorTest::TearDown();
+  }
+
+  std::unique_ptr<rpc::RpcDoor> rpcDoor;
+  std::unique_ptr<web::WebDoor> webDoor;
+};
+
+template <class Mover, class Watcher>
+void expectColliderIsSeen(Mover& mover, Watcher& watcher) {
+  Viewer moved, watched;
+  mover.send(hello());
+  watcher.send(hello());
+  ASSERT_TRUE(mover.watch(moved, [&] { return moved.frames > 0; }));
+  ASSERT_TRUE(watcher.watch(watched, [&] { return watched.frames > 0; }));
+  const std::uint64_t id = moved.welcome.participant_id();
+  EXPECT_NE(id, watched.welcome.participant_id());
+  mover.send(colliderPose(0.5f));
+  ASSERT_TRUE(watcher.watch(watched, [&] { return watched.colliderOf(id).has_value(); }));
+  EXPECT_FLOAT_EQ(watched.colliderOf(id)->position().x(), 0.5f);
+  mover.send(colliderPose(std::nullopt));
+  EXPECT_TRUE(watcher.watch(watched, [&] { return !watched.colliderOf(id).has_value(); }));
+}
+
+TEST_F(BothDoors, APoseThroughGrpcIsSeenThroughWebSocket) {
+  RpcStream mover(rpcDoor->port());
+  WebSocketClient watcher(webDoor->port());
+  expectColliderIsSeen(mover, watcher);
+}
+
+TEST_F(BothDoors, APoseThroughWebSocketIsSeenThroughGrpc) {
+  WebSocketClient mover(webDoor->port());
+  RpcStream watcher(rpcDoor->port());
+  expectColliderIsSeen(mover, watcher);
+}
+
+// The same tick is the same packet, whichever door it went through.
+TEST_F(BothDoors, BothSeeTheSameFrames) {
+  WebSocketClient web(webDoor->port());
+  RpcStream rpc(rpcDoor->port());
+  Viewer webViewer, rpcViewer;
+  web.send(hello());
+  rpc.send(hello());
+  ASSERT_TRUE(web.watch(webViewer, [&] { return webViewer.frames > 0; }));
+  ASSERT_TRUE(rpc.watch(rpcViewer, [&] { return rpcViewer.frames > 0; }));
+  for (int common = 0; common < 5;) {
+    if (webViewer.tick() < rpcViewer.tick()) {
+      ASSERT_TRUE(web.watch(webViewer, [&] { return webViewer.tick() >= rpcViewer.tick(); }));
+    } else if (rpcViewer.tick() < webViewer.tick()) {
+      ASSERT_TRUE(rpc.watch(rpcViewer, [&] { return rpcViewer.tick() >= webViewer.tick(); }));
+    } else {
+      EXPECT_EQ(webViewer.frame.SerializeAsString(), rpcViewer.frame.SerializeAsString());
+      ++common;
+      const std::uint64_t tick = webViewer.tick();
+      ASSERT_TRUE(web.watch(webViewer, [&] { return webViewer.tick() > tick; }));
+    }
+  }
+}
+
+}  // namespace
+}  // namespace clothstream::tests

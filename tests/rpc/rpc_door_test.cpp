@@ -1,0 +1,297 @@
+// SPDX-License-Identifier: MIT
+// The gRPC door, with clients good and bad.
+#include "server/rpc/rpc_door.h"
+
+#include <chrono>
+#include <memory>
+
+#include <gmock/gmock.h>
+#include <netinet/in.h>
+#include <poll.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include "clothstream/v1/session.grpc.pb.h"
+#include "tests/rpc/rpc_client.h"
+#include "tests/web/small_server.h"
+
+namespace clothstream::tests {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+class RpcDoorTest : public DoorTest {
+ protected:
+  void SetUp() override {
+    DoorTest::SetUp();
+    if (!IsSkipped()) open({});
+  }
+  void TearDown() override {
+    door.reset();
+    DoorTest::TearDown();
+  }
+  void open(rpc::RpcDoorOptions options) {
+    door.reset();
+    options.port = 0;
+    door = std::make_unique<rpc::RpcDoor>(server(), options);
+  }
+  std::uint16_t port() const { return door->port(); }
+
+  std::unique_ptr<rpc::RpcDoor> door;
+};
+
+// A client that joined, and what it saw.
+struct Joined {
+  explicit Joined(std::uint16_t port, const std::string& scene = "") : stream(port) {
+    stream.send(hello(scene));
+    see(1);
+  }
+  // Sees `count` frames more; false when the server ends the stream before.
+  bool see(std::uint64_t count) {
+    const std::uint64_t target = viewer.frames + count;
+    return stream.watch(viewer, [&] { return viewer.frames >= target; });
+  }
+  bool seeUntil(const std::function<bool()>& done) { return stream.watch(viewer, done); }
+  // Sees all that comes, until the server ends the stream.
+  grpc::Status seeTheEnd() {
+    seeUntil([] { return false; });
+    return stream.finish();
+  }
+
+  RpcStream stream;
+  Viewer viewer;
+};
+
+TEST_F(RpcDoorTest, ListsScenes) {
+  grpc::ClientContext context;
+  v1::ListScenesResponse response;
+  const auto stub = v1::ClothStream::NewStub(channelTo(port()));
+  ASSERT_TRUE(stub->ListScenes(&context, {}, &response).ok());
+  ASSERT_EQ(response.scenes_size(), 2);
+  std::vector<std::string> names;
+  for (const v1::SceneSummary& scene : response.scenes()) names.push_back(scene.name());
+  EXPECT_THAT(names, testing::UnorderedElementsAre("small", "other"));
+  EXPECT_EQ(response.scenes(0).vertex_count(), 64U);
+}
+
+TEST_F(RpcDoorTest, GetsASceneAndRefusesAnUnknownOne) {
+  const auto stub = v1::ClothStream::NewStub(channelTo(port()));
+  v1::GetSceneRequest request;
+  v1::GetSceneResponse response;
+  request.set_name("other");
+  grpc::ClientContext known;
+  ASSERT_TRUE(stub->GetScene(&known, request, &response).ok());
+  EXPECT_EQ(response.scene().name(), "other");
+  EXPECT_EQ(response.scene().cloths(0).grid().rows(), 8U);
+  request.set_name("nowhere");
+  grpc::ClientContext unknown;
+  const grpc::Status status = stub->GetScene(&unknown, request, &response);
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::NOT_FOUND);
+  EXPECT_THAT(status.error_message(), HasSubstr("nowhere"));
+}
+
+TEST_F(RpcDoorTest, JoinsAndDecodesFrames) {
+  Joined client(port());
+  EXPECT_EQ(client.viewer.welcome.scene(), "small");
+  EXPECT_EQ(client.viewer.description.cloths(0).vertex_count(), 64U);
+  const std::uint64_t first = client.viewer.tick();
+  EXPECT_TRUE(client.see(10));
+  EXPECT_GE(client.viewer.tick(), first + 10);
+  EXPECT_TRUE(client.viewer.errors.empty());
+}
+
+TEST_F(RpcDoorTest, IsHealthy) {
+  for (const char* service : {"", "clothstream.v1.ClothStream"}) {
+    RpcStream call(port(), "/grpc.health.v1.Health/Check");
+    const std::string name(service);
+    // HealthCheckRequest { string service = 1; }
+    ASSERT_TRUE(
+        call.send(name.empty() ? "" : "\x0a" + std::string(1, static_cast<char>(name.size())) + name));
+    call.sendDone();
+    EXPECT_EQ(call.receive(), std::string("\x08\x01")) << service;  // status = 1: SERVING
+    EXPECT_TRUE(call.finish().ok());
+  }
+}
+
+TEST_F(RpcDoorTest, ListsItsServicesByReflection) {
+  RpcStream call(port(), "/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo");
+  ASSERT_TRUE(call.send(std::string("\x3a\x01*")));  // ServerReflectionRequest { string list_services = 7; }
+  const std::optional<std::string> answer = call.receive();
+  ASSERT_TRUE(answer.has_value());
+  EXPECT_THAT(*answer, HasSubstr("clothstream.v1.ClothStream"));
+}
+
+TEST_F(RpcDoorTest, AnUnknownSceneEndsTheStreamWithNotFound) {
+  RpcStream stream(port());
+  stream.send(hello("nowhere"));
+  Viewer viewer;
+  EXPECT_FALSE(stream.watch(viewer, [] { return false; }));
+  ASSERT_EQ(viewer.errors.size(), 1U) << "the error itself comes first";
+  const grpc::Status status = stream.finish();
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::NOT_FOUND);
+  EXPECT_EQ(status.error_message(), viewer.errors[0].text());
+}
+
+TEST_F(RpcDoorTest, AMessageBeforeHelloEndsTheStreamWithFailedPrecondition) {
+  RpcStream stream(port());
+  stream.send(colliderPose(0.25f));
+  Viewer viewer;
+  EXPECT_FALSE(stream.watch(viewer, [] { return false; }));
+  EXPECT_EQ(stream.finish().error_code(), grpc::StatusCode::FAILED_PRECONDITION);
+}
+
+TEST_F(RpcDoorTest, GarbageIsAnsweredByAnErrorToItsSenderAlone) {
+  Joined other(port());
+  Joined client(port());
+  ASSERT_TRUE(client.stream.send(garbage(500)));
+  EXPECT_TRUE(client.seeUntil([&] { return !client.viewer.errors.empty(); }));
+  EXPECT_EQ(client.viewer.errors[0].code(), v1::ERROR_CODE_MALFORMED_MESSAGE);
+  EXPECT_TRUE(other.see(5));
+  EXPECT_TRUE(other.viewer.errors.empty());
+}
+
+TEST_F(RpcDoorTest, GarbageThatGoesOnEndsTheStreamWithInvalidArgument) {
+  Joined other(port());
+  Joined client(port());
+  for (int i = 0; i < 100 && client.stream.send(garbage(50)); ++i) {
+  }
+  EXPECT_EQ(client.seeTheEnd().error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+  EXPECT_TRUE(other.see(5));
+}
+
+TEST_F(RpcDoorTest, AMessageOverTheLimitEndsTheStreamWithResourceExhausted) {
+  Joined other(port());
+  Joined client(port());
+  client.stream.send(garbage(64 * 1024 + 1));
+  EXPECT_EQ(client.seeTheEnd().error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
+  EXPECT_TRUE(other.see(5));
+}
+
+TEST_F(RpcDoorTest, CompressedMessagesAreRefused) {
+  RpcStream stream(port(), kJoin, true);
+  stream.send(hello());
+  EXPECT_EQ(stream.receive(), std::nullopt);
+  EXPECT_EQ(stream.finish().error_code(), grpc::StatusCode::UNIMPLEMENTED);
+}
+
+TEST_F(RpcDoorTest, AClientsColliderIsSeenByOthersAndVanishesWithIt) {
+  Joined watcher(port());
+  auto leaver = std::make_unique<Joined>(port());
+  const std::uint64_t id = leaver->viewer.welcome.participant_id();
+  leaver->stream.send(colliderPose(0.25f));
+  ASSERT_TRUE(watcher.seeUntil([&] { return watcher.viewer.colliderOf(id).has_value(); }));
+  EXPECT_FLOAT_EQ(watcher.viewer.colliderOf(id)->position().x(), 0.25f);
+  leaver->stream.cancel();
+  EXPECT_TRUE(watcher.seeUntil([&] { return !watcher.viewer.colliderOf(id).has_value(); }));
+}
+
+TEST_F(RpcDoorTest, AClientThatIsDoneLeavesWithOk) {
+  Joined watcher(port());
+  Joined leaver(port());
+  const std::uint64_t id = leaver.viewer.welcome.participant_id();
+  leaver.stream.send(colliderPose(0.25f));
+  ASSERT_TRUE(watcher.seeUntil([&] { return watcher.viewer.colliderOf(id).has_value(); }));
+  leaver.stream.sendDone();
+  while (leaver.stream.receive()) {
+  }
+  EXPECT_TRUE(leaver.stream.finish().ok());
+  EXPECT_TRUE(watcher.seeUntil([&] { return !watcher.viewer.colliderOf(id).has_value(); }));
+}
+
+// While one client does not read, others see every frame; when it reads again, what waited for it is at most
+// what it had left unacknowledged, and the next frame is a fresh one.
+TEST_F(RpcDoorTest, AClientThatNeverReadsDelaysNobodyAndGetsFreshFramesAfterwards) {
+  Joined other(port());
+  Joined slow(port());
+  const std::uint64_t stoppedAt = slow.viewer.tick();
+  ASSERT_TRUE(other.see(60));
+  const std::uint64_t now = other.viewer.tick();
+  ASSERT_GE(now, stoppedAt + 60);
+  std::uint64_t stale = 0;
+  EXPECT_TRUE(slow.seeUntil([&] {
+    if (slow.viewer.last.has_frame() && slow.viewer.tick() < now) ++stale;
+    return slow.viewer.tick() >= now;
+  }));
+  EXPECT_LE(stale, 6U);
+  EXPECT_TRUE(slow.see(10));
+}
+
+// A peer whose machine or network is gone does not answer pings, and its socket stays open.
+TEST_F(RpcDoorTest, AConnectionThatDoesNotAnswerPingsIsClosedWithinFiveSeconds) {
+  const int socket = ::socket(AF_INET, SOCK_STREAM, 0);
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_port = htons(port());
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  ASSERT_EQ(::connect(socket, reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
+  // RFC 9113 3.4: the preface and an empty SETTINGS frame, so that the server takes it for a client.
+  const std::string preface =
+      std::string("PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n") + std::string("\0\0\0\4\0\0\0\0\0", 9);
+  ASSERT_EQ(::send(socket, preface.data(), preface.size(), 0), static_cast<ssize_t>(preface.size()));
+  const auto from = std::chrono::steady_clock::now();
+  pollfd readable{socket, POLLIN, 0};
+  char bytes[4096];
+  ssize_t received = 1;
+  while (received > 0 && ::poll(&readable, 1, 10'000) == 1) received = ::recv(socket, bytes, sizeof bytes, 0);
+  EXPECT_LE(received, 0) << "still open";
+  EXPECT_LT(std::chrono::steady_clock::now() - from, std::chrono::seconds(5));
+  ::close(socket);
+}
+
+TEST_F(RpcDoorTest, OneStreamMoreThanTheLimitIsToldSo) {
+  rpc::RpcDoorOptions options;
+  options.maxStreams = 1;
+  open(options);
+  Joined first(port());
+  RpcStream second(port());
+  EXPECT_EQ(second.receive(), std::nullopt);
+  EXPECT_EQ(second.finish().error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
+  EXPECT_TRUE(first.see(2));
+}
+
+TEST_F(RpcDoorTest, ManyClientsComeAndGo) {
+  Joined watcher(port());
+  for (int round = 0; round < 5; ++round) {
+    std::vector<std::unique_ptr<Joined>> crowd;
+    for (int i = 0; i < 5; ++i) crowd.push_back(std::make_unique<Joined>(port(), i % 2 ? "other" : ""));
+  }
+  EXPECT_TRUE(watcher.see(5));
+  EXPECT_TRUE(watcher.viewer.errors.empty());
+}
+
+TEST_F(RpcDoorTest, APortInUseSaysWhatToDo) {
+  rpc::RpcDoorOptions options;
+  options.port = port();
+  EXPECT_THAT([&] { rpc::RpcDoor(server(), options); },
+              testing::ThrowsMessage<std::runtime_error>(
+                  "port " + std::to_string(port()) +
+                  " on 127.0.0.1 is already in use: choose another with --grpc-port"));
+}
+
+TEST_F(RpcDoorTest, AHostOfAnotherMachineIsNamed) {
+  rpc::RpcDoorOptions options;
+  options.host = "192.0.2.1";  // RFC 5737: documentation, nobody's
+  options.port = 0;
+  EXPECT_THAT(
+      [&] { rpc::RpcDoor(server(), options); },
+      testing::ThrowsMessage<std::runtime_error>(HasSubstr("cannot listen on port 0 of 192.0.2.1: ")));
+}
+
+TEST_F(RpcDoorTest, ClosingTheDoorEndsStreamsWithUnavailable) {
+  Joined first(port()), second(port());
+  door.reset();
+  EXPECT_EQ(first.seeTheEnd().error_code(), grpc::StatusCode::UNAVAILABLE);
+  EXPECT_EQ(second.seeTheEnd().error_code(), grpc::StatusCode::UNAVAILABLE);
+}
+
+TEST_F(RpcDoorTest, StoppingTheServerSaysSoAndEndsStreamsWithUnavailable) {
+  Joined client(port());
+  server().stop();
+  EXPECT_EQ(client.seeTheEnd().error_code(), grpc::StatusCode::UNAVAILABLE);
+  ASSERT_FALSE(client.viewer.notices.empty());
+  EXPECT_EQ(client.viewer.notices.back().kind(), v1::NOTICE_KIND_SERVER_STOPPING);
+}
+
+}  // namespace
+}  // namespace clothstream::tests

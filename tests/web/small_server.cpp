@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: MIT
+#include "tests/web/small_server.h"
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "tests/vulkan/gpu_test.h"
+
+namespace clothstream::tests {
+namespace {
+
+scene::Scene smallScene(std::string name) {
+  scene::Cloth cloth;
+  cloth.name = "sheet";
+  cloth.grid = {8, 8, 1.0f, 1.0f, {}};
+  cloth.mass = 0.1f;
+  cloth.structural = {5, 0.001f};
+  cloth.shear = {2, 0.001f};
+  cloth.bend = {0.5f, 0.001f};
+  cloth.damping = 0.5f;
+  cloth.pins = {{0, 0, 1, 0, 7, 1}};
+  scene::Scene scene;
+  scene.name = std::move(name);
+  scene.simulationRate = scene.streamRate = 30;
+  scene.cloths = {cloth};
+  return scene;
+}
+
+}  // namespace
+
+void DoorTest::SetUp() {
+  stream::ServerOptions options;
+  options.defaultScene = "small";
+  try {
+    server_ =
+        std::make_unique<stream::SceneServer>(std::vector{smallScene("small"), smallScene("other")}, options);
+  } catch (const vulkan::DeviceError& error) {
+    GTEST_SKIP() << error.what();
+  }
+}
+
+void DoorTest::TearDown() {
+  closeServer();
+  for (const std::string& text : takeValidationTexts()) ADD_FAILURE() << "Vulkan validation: " << text;
+}
+
+}  // namespace clothstream::tests

@@ -1,0 +1,250 @@
+// SPDX-License-Identifier: MIT
+// The stream over WebSocket, with peers good and bad.
+#include <chrono>
+#include <memory>
+#include <vector>
+
+#include <gmock/gmock.h>
+
+#include "server/web/web_door.h"
+#include "tests/web/small_server.h"
+#include "tests/web/web_client.h"
+
+namespace clothstream::tests {
+namespace {
+
+using testing::HasSubstr;
+using testing::ThrowsMessage;
+
+class StreamDoor : public DoorTest {
+ protected:
+  void SetUp() override {
+    DoorTest::SetUp();
+    if (!IsSkipped()) open({});
+  }
+  void TearDown() override {
+    door.reset();
+    DoorTest::TearDown();
+  }
+  void open(web::WebDoorOptions options) {
+    door.reset();
+    options.port = 0;
+    door = std::make_unique<web::WebDoor>(server(), options);
+  }
+  std::uint16_t port() const { return door->port(); }
+
+  std::unique_ptr<web::WebDoor> door;
+};
+
+// A peer that joined, and what it saw.
+struct Joined {
+  explicit Joined(std::uint16_t port, const std::string& scene = "") : socket(port) {
+    socket.send(hello(scene));
+    see(1);
+  }
+  // Sees `count` frames more; false when the server closes before.
+  bool see(std::uint64_t count) {
+    const std::uint64_t target = viewer.frames + count;
+    return socket.watch(viewer, [&] { return viewer.frames >= target; });
+  }
+  bool seeUntil(const std::function<bool()>& done) { return socket.watch(viewer, done); }
+
+  WebSocketClient socket;
+  Viewer viewer;
+};
+
+TEST_F(StreamDoor, JoinsAndDecodesFrames) {
+  Joined peer(port());
+  EXPECT_EQ(peer.viewer.welcome.scene(), "small");
+  EXPECT_EQ(peer.viewer.description.cloths(0).vertex_count(), 64U);
+  const std::uint64_t first = peer.viewer.tick();
+  EXPECT_TRUE(peer.see(10));
+  EXPECT_GE(peer.viewer.tick(), first + 10);
+  EXPECT_TRUE(peer.viewer.errors.empty());
+}
+
+TEST_F(StreamDoor, AnswersPings) {
+  Joined peer(port());
+  peer.socket.send(ping());
+  EXPECT_TRUE(peer.seeUntil([&] { return peer.viewer.pongs == 1; }));
+}
+
+TEST_F(StreamDoor, ListsScenesBeforeJoining) {
+  WebSocketClient socket(port());
+  v1::ClientMessage question;
+  question.set_request_id(5);
+  question.mutable_list_scenes();
+  socket.send(question.SerializeAsString());
+  Viewer viewer;
+  ASSERT_TRUE(socket.watch(viewer, [&] { return viewer.last.has_list_scenes(); }));
+  EXPECT_EQ(viewer.last.request_id(), 5U);
+  EXPECT_EQ(viewer.last.list_scenes().scenes_size(), 2);
+}
+
+TEST_F(StreamDoor, AgreesOnTheSubprotocolWhereItIsOffered) {
+  WebSocketClient::Handshake handshake;
+  handshake.subprotocol = "other, clothstream.v1";
+  EXPECT_EQ(WebSocketClient(port(), handshake).response()[http::field::sec_websocket_protocol],
+            "clothstream.v1");
+  EXPECT_EQ(WebSocketClient(port()).response().count(http::field::sec_websocket_protocol), 0U);
+}
+
+TEST_F(StreamDoor, PagesOfOtherOriginsAreRefusedUnlessAllowed) {
+  web::WebDoorOptions options;
+  options.allowedOrigins = {"https://friend.example"};
+  open(options);
+  const auto connect = [&](const std::string& origin) {
+    WebSocketClient::Handshake handshake;
+    handshake.origin = origin;
+    WebSocketClient(port(), handshake);
+  };
+  EXPECT_NO_THROW(connect("http://127.0.0.1:" + std::to_string(port())));
+  EXPECT_NO_THROW(connect("https://friend.example"));
+  for (const char* origin :
+       {"http://evil.example", "https://friend.example.evil.example", "http://127.0.0.1", "null"})
+    EXPECT_THAT([&] { connect(origin); }, ThrowsMessage<ClientError>("declined with 403")) << origin;
+}
+
+TEST_F(StreamDoor, AnUnknownSceneIsNamedInTheErrorAndInTheCloseReason) {
+  WebSocketClient socket(port());
+  socket.send(hello("nowhere"));
+  Viewer viewer;
+  EXPECT_FALSE(socket.watch(viewer, [] { return false; }));
+  ASSERT_EQ(viewer.errors.size(), 1U);
+  EXPECT_EQ(viewer.errors[0].code(), v1::ERROR_CODE_NOT_FOUND);
+  EXPECT_THAT(viewer.errors[0].text(), HasSubstr("nowhere"));
+  EXPECT_EQ(socket.closeReason().code, websocket::close_code::policy_error);
+  EXPECT_THAT(std::string(socket.closeReason().reason.c_str()), HasSubstr("nowhere"));
+}
+
+TEST_F(StreamDoor, ATextMessageCloses) {
+  Joined other(port());
+  Joined peer(port());
+  peer.socket.send("{\"hello\": {}}", false);
+  EXPECT_FALSE(peer.seeUntil([] { return false; }));
+  EXPECT_EQ(peer.socket.closeReason().code, websocket::close_code::unknown_data);
+  EXPECT_TRUE(other.see(5));
+}
+
+TEST_F(StreamDoor, AMessageOverTheLimitCloses) {
+  Joined other(port());
+  Joined peer(port());
+  peer.socket.send(garbage(64 * 1024 + 1));
+  EXPECT_FALSE(peer.seeUntil([] { return false; }));
+  EXPECT_EQ(peer.socket.closeReason().code, websocket::close_code::too_big);
+  EXPECT_TRUE(other.see(5));
+}
+
+TEST_F(StreamDoor, GarbageIsAnsweredByAnErrorToItsSenderAlone) {
+  Joined other(port());
+  Joined peer(port());
+  peer.socket.send(garbage(500));
+  EXPECT_TRUE(peer.seeUntil([&] { return !peer.viewer.errors.empty(); }));
+  EXPECT_EQ(peer.viewer.errors[0].code(), v1::ERROR_CODE_MALFORMED_MESSAGE);
+  EXPECT_TRUE(other.see(5));
+  EXPECT_TRUE(other.viewer.errors.empty());
+}
+
+TEST_F(StreamDoor, FramesOfWebSocketThatBreakItsRulesClose) {
+  Joined other(port());
+  HttpClient raw(port());
+  const Response upgraded =
+      raw.get("/stream",
+              "Connection: Upgrade\r\nUpgrade: websocket\r\nSec-WebSocket-Version: 13\r\n"
+              "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n");
+  ASSERT_EQ(upgraded.result(), http::status::switching_protocols);
+  raw.send(std::string("\x82\x05hello", 7));  // RFC 6455 5.1: a client that does not mask is disconnected
+  EXPECT_TRUE(other.see(5));
+}
+
+TEST_F(StreamDoor, APeersColliderIsSeenByOthersAndVanishesWithIt) {
+  Joined watcher(port());
+  auto leaver = std::make_unique<Joined>(port());
+  const std::uint64_t id = leaver->viewer.welcome.participant_id();
+  leaver->socket.send(colliderPose(0.25f));
+  ASSERT_TRUE(watcher.seeUntil([&] { return watcher.viewer.colliderOf(id).has_value(); }));
+  EXPECT_FLOAT_EQ(watcher.viewer.colliderOf(id)->position().x(), 0.25f);
+  leaver->socket.reset();
+  EXPECT_TRUE(watcher.seeUntil([&] { return !watcher.viewer.colliderOf(id).has_value(); }));
+}
+
+TEST_F(StreamDoor, AHalfClosedPeerHasLeft) {
+  Joined watcher(port());
+  Joined leaver(port());
+  const std::uint64_t id = leaver.viewer.welcome.participant_id();
+  leaver.socket.send(colliderPose(0.25f));
+  ASSERT_TRUE(watcher.seeUntil([&] { return watcher.viewer.colliderOf(id).has_value(); }));
+  leaver.socket.shutdownSend();
+  EXPECT_TRUE(watcher.seeUntil([&] { return !watcher.viewer.colliderOf(id).has_value(); }));
+}
+
+// A peer whose machine or network is gone neither reads nor answers pings, and its socket stays open.
+TEST_F(StreamDoor, AVanishedPeerIsFoundWithinFiveSeconds) {
+  Joined watcher(port());
+  Joined vanished(port());
+  const std::uint64_t id = vanished.viewer.welcome.participant_id();
+  vanished.socket.send(colliderPose(0.25f));
+  ASSERT_TRUE(watcher.seeUntil([&] { return watcher.viewer.colliderOf(id).has_value(); }));
+  const auto from = std::chrono::steady_clock::now();
+  EXPECT_TRUE(watcher.seeUntil([&] { return !watcher.viewer.colliderOf(id).has_value(); }));
+  EXPECT_LT(std::chrono::steady_clock::now() - from, std::chrono::seconds(5));
+}
+
+TEST_F(StreamDoor, ASilentPeerThatAnswersPingsStays) {
+  Joined peer(port());
+  EXPECT_FALSE(
+      peer.socket.closesWithin(std::chrono::seconds(6)));  // beyond the time after which it would be gone
+}
+
+// While one peer does not read, others see every frame; when it reads again, what waited for it is at most
+// what it had left unacknowledged, and the next frame is a fresh one.
+TEST_F(StreamDoor, ASlowReaderLosesFramesAndDelaysNobody) {
+  Joined other(port());
+  Joined slow(port());
+  const std::uint64_t stoppedAt = slow.viewer.tick();
+  for (int i = 0; i < 4; ++i) {
+    ASSERT_TRUE(other.see(15));
+    slow.socket.send(ping());  // or it would count as vanished
+  }
+  const std::uint64_t now = other.viewer.tick();
+  ASSERT_GE(now, stoppedAt + 60);
+  std::uint64_t stale = 0;
+  EXPECT_TRUE(slow.seeUntil([&] {
+    if (slow.viewer.last.has_frame() && slow.viewer.tick() < now) ++stale;
+    return slow.viewer.tick() >= now;
+  }));
+  EXPECT_LE(stale, 6U);
+  EXPECT_TRUE(slow.see(10));
+}
+
+TEST_F(StreamDoor, ManyPeersComeAndGo) {
+  Joined watcher(port());
+  for (int round = 0; round < 10; ++round) {
+    std::vector<std::unique_ptr<Joined>> crowd;
+    for (int i = 0; i < 5; ++i) crowd.push_back(std::make_unique<Joined>(port(), i % 2 ? "other" : ""));
+    for (const auto& peer : crowd) peer->socket.reset();
+  }
+  EXPECT_TRUE(watcher.see(5));
+  EXPECT_TRUE(watcher.viewer.errors.empty());
+}
+
+TEST_F(StreamDoor, ClosingTheDoorTellsEveryPeer) {
+  Joined first(port()), second(port());
+  door.reset();
+  for (Joined* peer : {&first, &second}) {
+    EXPECT_FALSE(peer->seeUntil([] { return false; }));
+    EXPECT_EQ(peer->socket.closeReason().code, websocket::close_code::going_away);
+  }
+}
+
+TEST_F(StreamDoor, StoppingTheServerSaysSoAndCloses) {
+  Joined peer(port());
+  server().stop();
+  EXPECT_FALSE(peer.seeUntil([] { return false; }));
+  ASSERT_FALSE(peer.viewer.notices.empty());
+  EXPECT_EQ(peer.viewer.notices.back().kind(), v1::NOTICE_KIND_SERVER_STOPPING);
+  EXPECT_EQ(peer.socket.closeReason().code, websocket::close_code::going_away);
+}
+
+}  // namespace
+}  // namespace clothstream::tests
