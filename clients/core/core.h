@@ -87,7 +87,7 @@ typedef struct cs_collider {
 /* scene may be "" for the server's default; strings are copied. */
 cs_client* cs_create(const char* scene, const char* client_name);
 void cs_destroy(cs_client* client);
-/* For decode_ms: a steady clock in microseconds. */
+/* For decode_ms: a steady clock in microseconds. Not exported by the WebAssembly module. */
 void cs_set_clock(cs_client* client, uint64_t (*now_us)(void));
 
 /* One ServerMessage. Returns a set of CS_EVENT bits. */

@@ -147,6 +147,10 @@ struct WrongDescription {
   const char* says;
 };
 
+void PrintTo(const WrongDescription& wrong, std::ostream* out) {
+  *out << wrong.name;
+}
+
 class Descriptions : public ::testing::TestWithParam<WrongDescription> {};
 
 TEST_P(Descriptions, AreRefusedWithAReason) {

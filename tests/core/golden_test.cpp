@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: MIT
+// The golden packets through the client.
+#include "tests/codec/golden.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/core/sessions.h"
+
+namespace clothstream::client {
+namespace {
+
+TEST(Golden, PacketsGiveWhatTheyAlwaysGave) {
+  const auto streams = codec::readGoldenStreams();
+  ASSERT_FALSE(streams.empty());
+  for (const codec::GoldenStream& stream : streams) {
+    const std::vector<Observation> seen = replay(goldenSession(stream.name));
+    ASSERT_GT(seen.size(), stream.packets.size());
+    for (std::size_t i = 0; i < stream.packets.size(); ++i) {
+      const codec::GoldenPacket& packet = stream.packets[i];
+      const Observation& after = seen[seen.size() - stream.packets.size() + i];
+      EXPECT_EQ(after.events, static_cast<std::uint32_t>(CS_EVENT_FRAME)) << packet.file;
+      EXPECT_EQ(after.tick, packet.tick) << packet.file;
+      EXPECT_EQ(after.reconstructionHash, packet.reconstructionHash) << packet.file;
+      EXPECT_EQ(after.positionsHash, packet.positionsHash) << packet.file;
+    }
+  }
+}
+
+TEST(Golden, SessionsRepeatBitForBit) {
+  for (const Session& session : recordedSessions())
+    EXPECT_EQ(replay(session), replay(session)) << session.name;
+}
+
+}  // namespace
+}  // namespace clothstream::client

@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: MIT
+// Sessions out of the scripted server, the golden packets, and a random generator with a fixed seed.
+#include "tests/core/sessions.h"
+
+#include <random>
+#include <span>
+#include <stdexcept>
+
+#include "tests/codec/golden.h"
+
+namespace clothstream::client {
+namespace {
+
+Session streamOf(const std::string& name, ScriptedStream stream) {
+  ScriptedServer server(std::move(stream));
+  Session session{name, {server.welcome()}};
+  for (std::string& chunk : server.chunks(400)) session.messages.push_back(std::move(chunk));
+  for (std::uint64_t tick = 1; tick <= 12; ++tick) {
+    // One frame is lost, and a key frame comes two frames later.
+    const auto kind = tick == 8 ? codec::PacketKind::key : codec::PacketKind::predicted;
+    std::string frame = server.frame(tick, kind);
+    if (tick != 6) session.messages.push_back(std::move(frame));
+  }
+  session.messages.push_back(
+      ScriptedServer::error(v1::ERROR_CODE_INVALID_ARGUMENT, "wind: 1e9 is too much", false));
+  return session;
+}
+
+Session spoilt(const Session& session, std::mt19937& random, int run) {
+  const auto below = [&](std::size_t bound) { return random() % bound; };
+  Session result{session.name + " spoilt " + std::to_string(run), session.messages};
+  std::string& message = result.messages[below(result.messages.size())];
+  for (std::size_t changes = 1 + below(4); changes > 0; --changes) {
+    if (below(4) == 0) message.resize(below(message.size() + 1));
+    if (message.empty()) break;
+    message[below(message.size())] = static_cast<char>(below(256));
+  }
+  return result;
+}
+
+std::uint64_t hashOf(const float* values, std::uint32_t vertices) {
+  return vertices == 0 ? 0 : codec::hashFloats(std::span(values, std::size_t{3} * vertices));
+}
+
+std::uint64_t hashOfOutgoing(cs_client* client) {
+  std::uint64_t hash = 0xcbf29ce484222325;
+  std::size_t bytes = 0;
+  while (const std::uint8_t* message = cs_next_outgoing(client, &bytes)) {
+    for (const std::uint8_t byte : std::span(message, bytes)) hash = (hash ^ byte) * 0x100000001b3;
+  }
+  return hash;
+}
+
+Observation observe(cs_client* client, std::uint32_t events) {
+  cs_statistics statistics;
+  cs_get_statistics(client, 0, &statistics);
+  const std::uint32_t vertices = cs_vertex_count(client);
+  std::uint32_t indices = 0;
+  cs_triangles(client, &indices);
+  return {.events = events,
+          .state = cs_get_state(client),
+          .tick = statistics.tick,
+          .decodeErrors = statistics.decode_errors,
+          .hashMismatches = statistics.hash_mismatches,
+          .reconstructionHash = cs_reconstruction_hash(client),
+          .positionsHash = hashOf(cs_positions(client), vertices),
+          .normalsHash = hashOf(cs_normals(client), vertices),
+          .triangleCount = indices / 3,
+          .outgoingHash = hashOfOutgoing(client),
+          .errorText = cs_error_text(client)};
+}
+
+}  // namespace
+
+Session goldenSession(const std::string& name) {
+  for (const codec::GoldenStream& stream : codec::readGoldenStreams()) {
+    if (stream.name != name) continue;
+    v1::StreamDescription description;
+    description.set_epoch(stream.layout.epoch);
+    description.set_codec(1);
+    description.set_simulation_rate(72);
+    description.set_stream_rate(72);
+    description.set_max_error(stream.layout.maxError);
+    description.set_normals(stream.layout.normals == codec::NormalMode::none ? v1::NORMALS_NONE
+                                                                             : v1::NORMALS_OCTAHEDRAL);
+    for (const codec::ClothLayout& layout : stream.layout.cloths) {
+      v1::ClothDescription& cloth = *description.add_cloths();
+      cloth.set_vertex_count(layout.vertexCount);
+      cloth.set_rows(layout.rows);
+      cloth.set_columns(layout.columns);
+      cloth.set_rest_positions(std::string(std::size_t{layout.vertexCount} * 12, '\0'));
+    }
+    Session session{"golden " + name, {ScriptedServer().welcome()}};
+    for (std::string& chunk : chunksOf(description.SerializeAsString(), 256 * 1024, 1))
+      session.messages.push_back(std::move(chunk));
+    for (const codec::GoldenPacket& packet : stream.packets) {
+      v1::Frame frame;
+      frame.set_packet(packet.bytes.data(), packet.bytes.size());
+      frame.set_reconstruction_hash(packet.reconstructionHash);
+      session.messages.push_back(ScriptedServer::serialise(frame));
+    }
+    return session;
+  }
+  throw std::invalid_argument("tests/golden has no stream " + name);
+}
+
+std::vector<Session> recordedSessions() {
+  std::vector<Session> sessions{
+      streamOf("one cloth", {}),
+      streamOf("two cloths with normals",
+               {.normals = codec::NormalMode::octahedral, .cloths = {{"a", 4, 3}, {"b", 17, 2}}}),
+      streamOf("a frame every third tick", {.simulationRate = 240, .streamRate = 80}),
+  };
+  for (const codec::GoldenStream& stream : codec::readGoldenStreams())
+    sessions.push_back(goldenSession(stream.name));
+  std::mt19937 random(20);
+  const std::size_t whole = sessions.size();
+  for (int run = 0; run < 300; ++run)
+    sessions.push_back(spoilt(sessions[static_cast<std::size_t>(run) % whole], random, run));
+  return sessions;
+}
+
+std::vector<Observation> replay(const Session& session) {
+  ClientUnderTest client;
+  std::vector<Observation> observations;
+  for (std::size_t i = 0; i < session.messages.size(); ++i) {
+    const std::uint32_t events = client.receive(session.messages[i], i * kStepUs);
+    cs_update(client.get(), i * kStepUs);
+    observations.push_back(observe(client.get(), events));
+  }
+  return observations;
+}
+
+}  // namespace clothstream::client
