@@ -27,8 +27,8 @@ struct Poses {
 // A change that was checked against the scene as all changes before it leave it.
 struct AcceptedChange {
   std::uint64_t participant = 0;
-  scene::ParameterChange change;
-  v1::ParameterChange message;
+  scene::ParameterChange change{};
+  v1::ParameterChange message{};
 };
 
 struct Inputs {

@@ -27,6 +27,7 @@ bool Mailbox::reply(SharedBytes message) {
   {
     const std::lock_guard lock(mutex_);
     if (!push(replies_, std::move(message))) return false;
+    doorWaits_ = false;
   }
   wake();
   return true;
@@ -38,6 +39,7 @@ bool Mailbox::announce(SharedBytes message) {
     const std::lock_guard lock(mutex_);
     if (!push(announcements_, std::move(message))) return false;
     ready = streaming_;
+    if (ready) doorWaits_ = false;
   }
   if (ready) wake();
   return true;
@@ -50,6 +52,7 @@ void Mailbox::subscribe(std::shared_ptr<const Description> description, std::uin
     description_ = std::move(description);
     streamRate_ = streamRate;
     metrics_ = &metrics;
+    doorWaits_ = false;
   }
   wake();
 }
@@ -75,13 +78,14 @@ void Mailbox::deliver(const PublishedFrame& frame) {
     held_.push_back(frame);
     chainTick_ = frame.tick;
     if (!hasRoom()) return;
+    doorWaits_ = false;
   }
   wake();
 }
 
 bool Mailbox::wantsKeyFrame() const {
   const std::lock_guard lock(mutex_);
-  return streaming_ && !closed_ && needsKey_ && hasRoom();
+  return streaming_ && !closed_ && needsKey_ && doorWaits_ && hasRoom();
 }
 
 bool Mailbox::acknowledge(std::uint64_t tick, Clock::time_point now) {
@@ -97,6 +101,7 @@ bool Mailbox::acknowledge(std::uint64_t tick, Clock::time_point now) {
       sent_.pop_front();
     }
     if (held_.empty() || !hasRoom()) return true;
+    doorWaits_ = false;
   }
   wake();
   return true;
@@ -134,6 +139,12 @@ bool Mailbox::closed() const {
 
 std::optional<SharedBytes> Mailbox::next(Clock::time_point now) {
   const std::lock_guard lock(mutex_);
+  std::optional<SharedBytes> message = take(now);
+  doorWaits_ = !message;
+  return message;
+}
+
+std::optional<SharedBytes> Mailbox::take(Clock::time_point now) {
   if (!replies_.messages.empty()) return pop(replies_);
   if (closed_) return std::nullopt;
   if (description_) {

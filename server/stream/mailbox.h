@@ -41,7 +41,7 @@ struct Description {
 //
 // Frames form a chain: a predicted one needs the one before. A subscriber without room has up to kMaxHeld frames held
 // back; if it falls behind more, they are dropped and it goes on with the next key frame, for which it asks
-// (wantsKeyFrame) when it has room again.
+// (wantsKeyFrame) when it has room and its door waits for something to write: who does not read asks for nothing.
 class Mailbox {
  public:
   static constexpr std::size_t kMaxControlBytes = 256 * 1024;
@@ -88,6 +88,7 @@ class Mailbox {
     std::size_t bytes = 0;
   };
 
+  std::optional<SharedBytes> take(Clock::time_point now);
   bool push(Control& control, SharedBytes message);
   static SharedBytes pop(Control& control);
   bool hasRoom() const { return sent_.size() < window(); }
@@ -96,6 +97,7 @@ class Mailbox {
 
   mutable std::mutex mutex_;
   bool closed_ = false;
+  bool doorWaits_ = false;  // it asked, there was nothing, and there is nothing for it since
   Control replies_, announcements_;
 
   std::shared_ptr<const Description> description_;

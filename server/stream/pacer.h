@@ -36,7 +36,7 @@ class Pacer {
     start.late = start.lateness > period() / 4;
     const Clock::duration given = start.lateness - period();
     if (given > Clock::duration::zero()) {
-      start.slippedTicks = seconds(given) * ticksPerSecond_;
+      start.slippedTicks = seconds(given) * static_cast<double>(ticksPerSecond_);
       origin_ += given;
     }
     ++ticks_;

@@ -71,7 +71,7 @@ void SceneHost::applyInputs() {
   }
   for (const Poses& poses : inputs_.poses) {
     colliders_.place(poses.participant, std::span(poses.colliders).first(poses.count));
-    if (poseArrivals_.size() < kMaxPoseArrivals) poseArrivals_.push_back(poses.arrival);
+    if (poses.count > 0 && poseArrivals_.size() < kMaxPoseArrivals) poseArrivals_.push_back(poses.arrival);
   }
 }
 

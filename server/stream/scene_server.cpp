@@ -2,6 +2,7 @@
 // The scenes of a server.
 #include "server/stream/scene_server.h"
 
+#include <cassert>
 #include <stdexcept>
 #include <utility>
 
@@ -9,6 +10,7 @@
 #include <spdlog/spdlog.h>
 
 #include "server/messages/description.h"
+#include "server/messages/limits.h"
 #include "server/messages/scene_message.h"
 #include "server/stream/server_state.h"
 #include "server/stream/session.h"
@@ -102,6 +104,8 @@ tl::expected<v1::GetSceneResponse, v1::Error> SceneServer::State::getScene(const
 }
 
 SceneServer::SceneServer(std::vector<scene::Scene> scenes, ServerOptions options) {
+  assert(options.maxParticipants * messages::limits::kMaxParticipantColliders + messages::limits::kMaxColliders <=
+         simulation::kMaxSpheres);
   bool found = false;
   std::string known;
   for (const scene::Scene& scene : scenes) {

@@ -185,11 +185,10 @@ void Session::checkSilence(Clock::time_point now) {
   const std::lock_guard lock(mutex_);
   if (!mailbox_->closed()) {
     server_.metrics.droppedConnections.add();
-    spdlog::info("{}: silent for {} s; cut off", peer_, server_.options.silence.count() / 1000.0);
-    mailbox_->close(error(v1::ERROR_CODE_RESOURCE_EXHAUSTED,
-                          fmt::format("nothing was heard for {} s: acknowledge frames, or send pings",
-                                      static_cast<double>(server_.options.silence.count()) / 1000),
-                          true));
+    const std::string text =
+        fmt::format("nothing was heard for {} s: acknowledge frames, or send pings", seconds(server_.options.silence));
+    spdlog::info("{}: cut off: {}", peer_, text);
+    mailbox_->close(error(v1::ERROR_CODE_RESOURCE_EXHAUSTED, text, true));
   }
   leave();
 }
