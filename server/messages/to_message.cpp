@@ -74,7 +74,8 @@ v1::Scene toMessage(const scene::Scene& scene) {
   message.set_integrator(toMessage(scene.integrator));
   writeEnvironment(scene.environment, *message.mutable_environment());
   for (const scene::Cloth& cloth : scene.cloths) writeCloth(cloth, *message.add_cloths());
-  for (const scene::SphereCollider& collider : scene.colliders) writeCollider(collider, *message.add_colliders());
+  for (const scene::SphereCollider& collider : scene.colliders)
+    writeCollider(collider, *message.add_colliders());
   message.mutable_stream()->set_max_error(scene.stream.maxError);
   message.mutable_stream()->set_normals(toMessage(scene.stream.normals));
   return message;

@@ -142,7 +142,7 @@ void ReferenceCloth::collide(const Vec3& centre, const Vec3& velocity, double ra
 std::vector<Vec3> ReferenceCloth::normals() const {
   const int rows = static_cast<int>(cloth_.grid.rows), columns = static_cast<int>(cloth_.grid.columns);
   const auto at = [&](int row, int column) -> const Vec3& {
-    return positions_[static_cast<std::size_t>(row * columns + column)];
+    return positions_[static_cast<std::size_t>(row) * cloth_.grid.columns + static_cast<std::size_t>(column)];
   };
   struct Direction {
     int row, column;

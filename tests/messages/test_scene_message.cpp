@@ -270,9 +270,8 @@ TEST_P(ToSceneRefuses, WithPathValueAndWhatIsAllowed) {
   EXPECT_THAT(scene.error().text, HasSubstr(GetParam().allowed));
 }
 
-INSTANTIATE_TEST_SUITE_P(All, ToSceneRefuses, testing::ValuesIn(kBadScenes), [](const auto& bad) {
-  return nameOf(bad.param) + "_" + std::to_string(bad.index);
-});
+INSTANTIATE_TEST_SUITE_P(All, ToSceneRefuses, testing::ValuesIn(kBadScenes),
+                         [](const auto& bad) { return nameOf(bad.param) + "_" + std::to_string(bad.index); });
 
 TEST(ToScene, AcceptsTheSubstepsThatItAskedFor) {
   v1::Scene message = smallScene();
