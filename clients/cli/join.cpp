@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: MIT
+// Joining, waiting for the end, the summary.
+#include "clients/cli/join.h"
+
+#include <chrono>
+#include <csignal>
+#include <ctime>
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include "clients/cli/obj_file.h"
+#include "clients/cli/report.h"
+#include "clients/grpc/grpc_client.h"
+
+namespace clothstream::cli {
+namespace {
+
+using SteadyClock = std::chrono::steady_clock;
+
+constexpr std::chrono::milliseconds kLineInterval{100};
+
+// What the stream says beside its frames goes to standard error as it comes.
+class Listener {
+ public:
+  explicit Listener(const StatusLine& line) : line_(line) {}
+
+  void operator()(cs_client* client, std::uint32_t events) const {
+    if ((events & CS_EVENT_NOTICE) != 0) say("notice", cs_notice_text(client));
+    if ((events & CS_EVENT_ERROR) != 0 && cs_get_state(client) != CS_STATE_FAILED)
+      say("error", cs_error_text(client));
+  }
+
+ private:
+  void say(const char* kind, const char* text) const {
+    line_.clear();
+    fmt::print(stderr, "clothstream: {} from the server: {}\n", kind, text);
+  }
+
+  const StatusLine& line_;
+};
+
+// True if a signal that ends the program came within the time.
+bool interrupted(std::chrono::milliseconds time) {
+  sigset_t signals;
+  sigemptyset(&signals);
+  sigaddset(&signals, SIGINT);
+  sigaddset(&signals, SIGTERM);
+  const timespec timeout{.tv_sec = 0, .tv_nsec = std::chrono::nanoseconds(time).count()};
+  return sigtimedwait(&signals, nullptr, &timeout) > 0;
+}
+
+void sendColliders(GrpcClient& client, const JoinOptions& options) {
+  if (options.colliders.empty()) return;
+  client.visit([&](cs_client* core) {
+    cs_set_colliders(core, options.colliders[0].data(), static_cast<std::uint32_t>(options.colliders.size()),
+                     GrpcClient::nowUs());
+  });
+}
+
+Report reportOf(GrpcClient& client) {
+  Report report;
+  client.visit([&](cs_client* core) { report = Report::of(core, GrpcClient::nowUs()); });
+  return report;
+}
+
+// Until the time is over, a signal comes, or the stream ends; the last is returned.
+std::optional<Failure> follow(GrpcClient& client, const JoinOptions& options, const StatusLine& line) {
+  const auto start = SteadyClock::now();
+  for (;;) {
+    auto wait = kLineInterval;
+    if (options.seconds) {
+      const auto end = start + std::chrono::duration_cast<SteadyClock::duration>(
+                                   std::chrono::duration<double>(*options.seconds));
+      const auto left = std::chrono::ceil<std::chrono::milliseconds>(end - SteadyClock::now());
+      if (left.count() <= 0) return std::nullopt;
+      wait = std::min(wait, left);
+    }
+    if (interrupted(wait)) return std::nullopt;
+    if (std::optional<Failure> failure = client.ended()) return failure;
+    if (line.shown()) line.show(reportOf(client));
+  }
+}
+
+ExitCode complain(ExitCode code, const std::string& text) {
+  fmt::print(stderr, "clothstream: {}\n", text);
+  return code;
+}
+
+}  // namespace
+
+ExitCode join(const JoinOptions& options) {
+  std::optional<ObjFile> obj;
+  if (!options.objPath.empty()) {
+    auto created = ObjFile::create(options.objPath);
+    if (!created) return complain(kNotWritten, created.error());
+    obj.emplace(std::move(*created));
+  }
+  const StatusLine line(!options.json && isatty(STDOUT_FILENO) != 0);
+  auto joined = GrpcClient::join(options.address, {.scene = options.scene, .clientName = "clothstream join"},
+                                 Listener(line));
+  if (!joined) return complain(exitCodeOf(joined.error().kind), joined.error().text);
+  GrpcClient& client = **joined;
+  sendColliders(client, options);
+
+  const std::optional<Failure> failure = follow(client, options, line);
+  line.clear();
+  ExitCode code = kOk;
+  if (failure) code = complain(exitCodeOf(failure->kind), failure->text);
+  const Report report = reportOf(client);
+  if (options.hash && report.statistics.hash_mismatches > 0)
+    code = complain(kHashMismatch, fmt::format("{} of {} decoded frames are not what the server holds",
+                                               report.statistics.hash_mismatches, report.statistics.frames));
+  if (obj && report.statistics.frames == 0) {
+    code = complain(kNotWritten, fmt::format("{} is not written: no frame came", options.objPath));
+  } else if (obj) {
+    client.visit([&](cs_client* core) {
+      if (auto written = obj->write(core); !written) code = complain(kNotWritten, written.error());
+    });
+  }
+  fmt::print("{}\n", options.json ? report.json(options.hash) : report.text(options.hash));
+  return code;
+}
+
+}  // namespace clothstream::cli

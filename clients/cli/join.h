@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: MIT
+// `clothstream join`: follows a stream and says what it was like.
+#pragma once
+
+#include <array>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "clients/cli/exit_code.h"
+
+namespace clothstream::cli {
+
+struct JoinOptions {
+  std::string address;  // as completeAddress gives it
+  std::string scene;
+  std::optional<double> seconds;  // nothing: until a signal
+  std::string objPath;            // empty: none
+  bool json = false;
+  bool hash = false;
+  std::vector<std::array<float, 4>> colliders;  // x, y, z, radius, metres
+};
+
+// SIGINT and SIGTERM must be blocked in every thread: they end the stream like the end of its time.
+ExitCode join(const JoinOptions& options);
+
+}  // namespace clothstream::cli

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: MIT
+// A line, or an object, for each scene.
+#include "clients/cli/list.h"
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "clients/grpc/scene_list.h"
+
+namespace clothstream::cli {
+namespace {
+
+std::string json(const std::vector<SceneSummary>& scenes) {
+  auto array = nlohmann::ordered_json::array();
+  for (const SceneSummary& scene : scenes) {
+    array.push_back({{"name", scene.name},
+                     {"description", scene.description},
+                     {"vertices", scene.vertexCount},
+                     {"cloths", scene.clothCount},
+                     {"participants", scene.participants},
+                     {"running", scene.running}});
+  }
+  return array.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+}
+
+void printTable(const std::vector<SceneSummary>& scenes) {
+  fmt::print("{:<20} {:>9} {:>7} {:>13}  {}\n", "SCENE", "VERTICES", "CLOTHS", "PARTICIPANTS", "DESCRIPTION");
+  for (const SceneSummary& scene : scenes)
+    fmt::print("{:<20} {:>9} {:>7} {:>13}  {}\n", scene.name, scene.vertexCount, scene.clothCount,
+               scene.participants, scene.description);
+}
+
+}  // namespace
+
+ExitCode list(const ListOptions& options) {
+  const auto scenes = listScenes(options.address);
+  if (!scenes) {
+    fmt::print(stderr, "clothstream: {}\n", scenes.error().text);
+    return exitCodeOf(scenes.error().kind);
+  }
+  if (options.json)
+    fmt::print("{}\n", json(*scenes));
+  else
+    printTable(*scenes);
+  return kOk;
+}
+
+}  // namespace clothstream::cli

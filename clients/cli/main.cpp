@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: MIT
+// `clothstream`: what a user of a server needs, on the command line.
+#include <charconv>
+#include <csignal>
+#include <exception>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+
+#include "clients/cli/join.h"
+#include "clients/cli/list.h"
+#include "clients/core/core.h"
+#include "clients/grpc/address.h"
+
+namespace {
+
+using namespace clothstream;
+using namespace clothstream::cli;
+
+// "x,y,z" or "x,y,z,r".
+std::array<float, 4> parseCollider(const std::string& text) {
+  constexpr float kDefaultRadius = 0.1f;
+  std::array<float, 4> values{0, 0, 0, kDefaultRadius};
+  std::size_t count = 0;
+  const char* at = text.data();
+  const char* const end = at + text.size();
+  for (bool more = true; more && count < values.size(); ++count) {
+    const auto [next, error] = std::from_chars(at, end, values[count]);
+    if (error != std::errc() || !std::isfinite(values[count])) break;
+    more = next != end && *next == ',';
+    at = more ? next + 1 : next;
+  }
+  if (count < 3 || at != end || values[3] <= 0)
+    throw CLI::ValidationError(
+        "--collider", fmt::format("\"{}\" is no sphere; write X,Y,Z or X,Y,Z,RADIUS in metres", text));
+  return values;
+}
+
+std::string addressOf(const std::string& text) {
+  auto address = completeAddress(text);
+  if (!address) throw CLI::ValidationError("ADDRESS", address.error());
+  return *address;
+}
+
+// Before any thread starts, so that all inherit it: join() waits for them.
+void blockEndingSignals() {
+  sigset_t signals;
+  sigemptyset(&signals);
+  sigaddset(&signals, SIGINT);
+  sigaddset(&signals, SIGTERM);
+  pthread_sigmask(SIG_BLOCK, &signals, nullptr);
+}
+
+int run(int argc, char** argv) {
+  CLI::App app("Follows the cloth that a clothstream-server simulates.", "clothstream");
+  app.footer(kExitCodes);
+  app.require_subcommand(1);
+  app.set_version_flag("--version", CLOTHSTREAM_VERSION);
+
+  std::string address(kDefaultAddress);
+  JoinOptions joinOptions;
+  std::vector<std::string> colliders;
+  CLI::App& joinCommand = *app.add_subcommand("join", "Join a scene, show what streams, end with a summary");
+  joinCommand.footer(kExitCodes);
+  joinCommand.add_option("ADDRESS", address, "HOST or HOST:PORT of the server")->capture_default_str();
+  joinCommand.add_option("--scene", joinOptions.scene, "The scene to join; the server's default if left out");
+  joinCommand
+      .add_option("--seconds", joinOptions.seconds,
+                  "Leave after this time; otherwise at an interrupt (Ctrl-C)")
+      ->check(CLI::PositiveNumber);
+  joinCommand.add_option("--obj", joinOptions.objPath, "Write the last frame to this Wavefront OBJ file");
+  joinCommand.add_flag("--json", joinOptions.json, "Print the summary as one JSON object, and nothing else");
+  joinCommand.add_flag("--hash", joinOptions.hash,
+                       "Compare every decoded frame with the server's own reconstruction");
+  joinCommand
+      .add_option("--collider", colliders,
+                  "A sphere X,Y,Z[,RADIUS] in metres that the cloth meets while this client is there; may be "
+                  "repeated")
+      ->allow_extra_args(false);
+
+  ListOptions listOptions;
+  CLI::App& listCommand = *app.add_subcommand("list", "List the scenes of a server");
+  listCommand.footer(kExitCodes);
+  listCommand.add_option("ADDRESS", address, "HOST or HOST:PORT of the server")->capture_default_str();
+  listCommand.add_flag("--json", listOptions.json, "Print a JSON array");
+
+  try {
+    app.parse(argc, argv);
+    joinOptions.address = listOptions.address = addressOf(address);
+    if (colliders.size() > CS_MAX_COLLIDERS)
+      throw CLI::ValidationError("--collider", fmt::format("at most {} are allowed", CS_MAX_COLLIDERS));
+    for (const std::string& collider : colliders) joinOptions.colliders.push_back(parseCollider(collider));
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? kOk : kUsage;
+  }
+  blockEndingSignals();
+  return listCommand.parsed() ? list(listOptions) : join(joinOptions);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    return run(argc, argv);
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "clothstream: {}\n", error.what());
+    return kLost;
+  }
+}

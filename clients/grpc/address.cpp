@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: MIT
+// Host and port, taken apart and checked.
+#include "clients/grpc/address.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cstdint>
+
+namespace clothstream {
+namespace {
+
+constexpr std::string_view kDefaultPort = "50051";
+
+bool isPort(std::string_view text) {
+  std::uint16_t port = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), port);
+  return error == std::errc() && end == text.data() + text.size() && port != 0;
+}
+
+bool isHost(std::string_view text) {
+  return !text.empty() && std::none_of(text.begin(), text.end(), [](char c) {
+    return static_cast<unsigned char>(c) <= ' ' || c == '/' || c == '[' || c == ']';
+  });
+}
+
+}  // namespace
+
+tl::expected<std::string, std::string> completeAddress(std::string_view text) {
+  std::string_view host = text, port = kDefaultPort;
+  const std::size_t colon = text.rfind(':');
+  bool v6 = false;
+  if (text.starts_with('[')) {
+    const std::size_t close = text.find(']');
+    if (close == std::string_view::npos)
+      return tl::unexpected("the address \"" + std::string(text) + "\" lacks a ]");
+    v6 = true;
+    host = text.substr(1, close - 1);
+    const std::string_view rest = text.substr(close + 1);
+    if (!rest.empty()) port = rest.starts_with(':') ? rest.substr(1) : std::string_view();
+  } else if (colon != std::string_view::npos && text.find(':') != colon) {
+    v6 = true;
+  } else if (colon != std::string_view::npos) {
+    host = text.substr(0, colon);
+    port = text.substr(colon + 1);
+  }
+  if (!isHost(host))
+    return tl::unexpected("the address \"" + std::string(text) + "\" names no host; write HOST or HOST:PORT");
+  if (!isPort(port))
+    return tl::unexpected("the address \"" + std::string(text) +
+                          "\" has no port from 1 to 65535 after its host");
+  std::string address;
+  address.append(v6 ? "[" : "").append(host).append(v6 ? "]:" : ":").append(port);
+  return address;
+}
+
+}  // namespace clothstream

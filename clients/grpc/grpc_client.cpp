@@ -1,0 +1,311 @@
+// SPDX-License-Identifier: MIT
+// One call, one completion queue, one thread that owns all of it.
+#include "clients/grpc/grpc_client.h"
+
+#include <cassert>
+#include <condition_variable>
+#include <future>
+#include <mutex>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+#include <grpcpp/alarm.h>
+#include <grpcpp/completion_queue.h>
+#include <grpcpp/generic/generic_stub.h>
+
+#include "clients/grpc/channel.h"
+
+namespace clothstream {
+namespace {
+
+using SteadyClock = std::chrono::steady_clock;
+using SystemClock = std::chrono::system_clock;
+
+constexpr const char* kJoinMethod = "/clothstream.v1.ClothStream/Join";
+// How often cs_update is called where nothing else happens.
+constexpr std::chrono::milliseconds kUpdateInterval{50};
+// For the server to end a stream that we have ended.
+constexpr std::chrono::milliseconds kClosingTime{500};
+
+// What a completion is about.
+enum Operation : std::intptr_t { kStarted = 1, kRead, kWritten, kHalfClosed, kFinished, kWoken };
+
+double seconds(std::chrono::milliseconds time) {
+  return std::chrono::duration<double>(time).count();
+}
+
+void* tagOf(Operation operation) {
+  return reinterpret_cast<void*>(operation);
+}
+
+}  // namespace
+
+class GrpcClient::Stream {
+ public:
+  Stream(std::string address, const GrpcClientOptions& options, OnEvents onEvents)
+      : address_(std::move(address)),
+        options_(options),
+        onEvents_(std::move(onEvents)),
+        core_(cs_create(options.scene.c_str(), options.clientName.c_str()), &cs_destroy),
+        stub_(makeChannel(address_)) {
+    cs_set_clock(core_.get(), &GrpcClient::nowUs);
+    thread_ = std::thread([this] { run(); });
+  }
+
+  ~Stream() {
+    {
+      const std::lock_guard lock(mutex_);
+      closing_ = true;
+      wakeLocked();
+    }
+    thread_.join();
+  }
+
+  // Nothing if it is joined by then.
+  std::optional<Failure> waitUntilJoined() {
+    std::unique_lock lock(mutex_);
+    const bool settled = changed_.wait_for(lock, options_.joinTimeout, [&] { return joined_ || ended_; });
+    if (ended_) return ended_;
+    if (settled) return std::nullopt;
+    return Failure{
+        Failure::Kind::unreachable,
+        fmt::format("No clothstream-server answers at {} within {} s: is it running there, and is the "
+                    "address right?",
+                    address_, seconds(options_.joinTimeout))};
+  }
+
+  void visit(const std::function<void(cs_client*)>& task) {
+    assert(std::this_thread::get_id() != thread_.get_id());
+    Task packaged(task);
+    std::future<void> done = packaged.get_future();
+    {
+      const std::lock_guard lock(mutex_);
+      // Nobody else touches the client any more.
+      if (ended_) return task(core_.get());
+      tasks_.push_back(std::move(packaged));
+      wakeLocked();
+    }
+    done.get();
+  }
+
+  std::optional<Failure> ended() const {
+    const std::lock_guard lock(mutex_);
+    return ended_;
+  }
+
+ private:
+  using Task = std::packaged_task<void(cs_client*)>;
+
+  // Only one alarm is on its way: the queue's owner takes all that waits.
+  void wakeLocked() {
+    if (wakeUnderway_ || ended_) return;
+    wakeUnderway_ = true;
+    alarm_.Set(&queue_, SystemClock::now(), tagOf(kWoken));
+  }
+
+  void run() {
+    lastHeard_ = SteadyClock::now();
+    call_ = stub_.PrepareCall(&context_, kJoinMethod, &queue_);
+    ++underway_;
+    call_->StartCall(tagOf(kStarted));
+    while (underway_ > 0) {
+      void* tag = nullptr;
+      bool ok = false;
+      const auto next = queue_.AsyncNext(&tag, &ok, SystemClock::now() + kUpdateInterval);
+      if (next == grpc::CompletionQueue::GOT_EVENT)
+        completed(static_cast<Operation>(reinterpret_cast<std::intptr_t>(tag)), ok);
+      update();
+    }
+    end();
+  }
+
+  void completed(Operation operation, bool ok) {
+    if (operation == kWoken) {
+      {
+        const std::lock_guard lock(mutex_);
+        wakeUnderway_ = false;
+      }
+      return takeTasks();
+    }
+    --underway_;
+    switch (operation) {
+      case kStarted:
+        if (!ok) return finish();
+        started_ = true;
+        return read();
+      case kRead:
+        return ok ? received() : finish();
+      case kWritten:
+        writing_ = false;
+        // A write that fails means that the stream has ended; the read says so too.
+        broken_ |= !ok;
+        return;
+      case kHalfClosed:
+      case kFinished:
+      case kWoken:
+        return;
+    }
+  }
+
+  void read() {
+    ++underway_;
+    call_->Read(&incoming_, tagOf(kRead));
+  }
+
+  void received() {
+    lastHeard_ = SteadyClock::now();
+    grpc::Slice bytes;
+    if (incoming_.DumpToSingleSlice(&bytes).ok()) {
+      const std::uint32_t events = cs_receive(core_.get(), bytes.begin(), bytes.size(), GrpcClient::nowUs());
+      if (events != 0) announce(events);
+    }
+    read();
+  }
+
+  void announce(std::uint32_t events) {
+    onEvents_(core_.get(), events);
+    if ((events & CS_EVENT_DESCRIPTION) == 0) return;
+    const std::lock_guard lock(mutex_);
+    joined_ = true;
+    changed_.notify_all();
+  }
+
+  void takeTasks() {
+    std::vector<Task> tasks;
+    {
+      const std::lock_guard lock(mutex_);
+      tasks.swap(tasks_);
+      leaving_ |= closing_;
+    }
+    for (auto& task : tasks) task(core_.get());
+  }
+
+  void update() {
+    cs_update(core_.get(), GrpcClient::nowUs());
+    const auto now = SteadyClock::now();
+    const bool failed = cs_get_state(core_.get()) == CS_STATE_FAILED;
+    if (leaving_ || failed) return leave(now);
+    if (now - lastHeard_ > options_.silenceTimeout && started_) {
+      silent_ = true;
+      context_.TryCancel();
+    }
+    write();
+  }
+
+  void write() {
+    if (!started_ || writing_ || broken_ || finishing_) return;
+    std::size_t bytes = 0;
+    const std::uint8_t* message = cs_next_outgoing(core_.get(), &bytes);
+    if (!message) return;
+    const grpc::Slice slice(message, bytes);
+    writing_ = true;
+    ++underway_;
+    call_->Write(grpc::ByteBuffer(&slice, 1), tagOf(kWritten));
+  }
+
+  // Says that nothing more comes; the server then ends the stream. It has kClosingTime for that.
+  void leave(SteadyClock::time_point now) {
+    if (!cancelAt_) cancelAt_ = now + kClosingTime;
+    if (!started_ || now >= *cancelAt_) return context_.TryCancel();
+    if (halfClosed_ || writing_ || broken_ || finishing_) return;
+    halfClosed_ = true;
+    ++underway_;
+    call_->WritesDone(tagOf(kHalfClosed));
+  }
+
+  void finish() {
+    finishing_ = true;
+    ++underway_;
+    call_->Finish(&status_, tagOf(kFinished));
+  }
+
+  Failure reason() const {
+    if (cs_get_state(core_.get()) == CS_STATE_FAILED) {
+      const bool saidByServer = cs_error_code(core_.get()) != 0;
+      const char* text = cs_error_text(core_.get());
+      return {Failure::Kind::refused,
+              saidByServer ? fmt::format("The server at {} refuses: {}", address_, text) : text};
+    }
+    if (leaving_) return {Failure::Kind::lost, "The stream was left."};
+    if (silent_)
+      return {Failure::Kind::lost,
+              fmt::format("The server at {} has said nothing for {} s: the stream is lost.", address_,
+                          seconds(options_.silenceTimeout))};
+    return joined_ ? lost(address_, status_) : notJoined(address_, status_);
+  }
+
+  void end() {
+    {
+      std::unique_lock lock(mutex_);
+      // From ended_ on, visitors run their tasks themselves: ours must be done.
+      while (!tasks_.empty()) {
+        lock.unlock();
+        takeTasks();
+        lock.lock();
+      }
+      ended_ = reason();
+    }
+    changed_.notify_all();
+    alarm_.Cancel();
+    queue_.Shutdown();
+    void* tag = nullptr;
+    bool ok = false;
+    while (queue_.Next(&tag, &ok)) {
+    }
+  }
+
+  // Before the thread starts, and shared.
+  const std::string address_;
+  const GrpcClientOptions options_;
+  const OnEvents onEvents_;
+  mutable std::mutex mutex_;
+  std::condition_variable changed_;
+  std::vector<Task> tasks_;  // guarded by mutex_, as all down to alarm_
+  bool joined_ = false, closing_ = false, wakeUnderway_ = false;
+  std::optional<Failure> ended_;
+  grpc::CompletionQueue queue_;
+  grpc::Alarm alarm_;
+
+  // The thread's own.
+  std::unique_ptr<cs_client, decltype(&cs_destroy)> core_;
+  grpc::GenericStub stub_;
+  grpc::ClientContext context_;
+  std::unique_ptr<grpc::GenericClientAsyncReaderWriter> call_;
+  grpc::ByteBuffer incoming_;
+  grpc::Status status_;
+  int underway_ = 0;  // operations on the call
+  bool started_ = false, writing_ = false, broken_ = false, halfClosed_ = false, finishing_ = false;
+  bool leaving_ = false, silent_ = false;
+  std::optional<SteadyClock::time_point> cancelAt_;
+  SteadyClock::time_point lastHeard_;
+  std::thread thread_;
+};
+
+GrpcClient::GrpcClient(std::unique_ptr<Stream> stream) : stream_(std::move(stream)) {}
+
+GrpcClient::~GrpcClient() = default;
+
+tl::expected<std::unique_ptr<GrpcClient>, Failure> GrpcClient::join(const std::string& address,
+                                                                    const GrpcClientOptions& options,
+                                                                    OnEvents onEvents) {
+  auto stream = std::make_unique<Stream>(address, options, std::move(onEvents));
+  if (std::optional<Failure> failure = stream->waitUntilJoined()) return tl::unexpected(std::move(*failure));
+  return std::unique_ptr<GrpcClient>(new GrpcClient(std::move(stream)));
+}
+
+void GrpcClient::visit(const std::function<void(cs_client*)>& task) {
+  stream_->visit(task);
+}
+
+std::optional<Failure> GrpcClient::ended() const {
+  return stream_->ended();
+}
+
+std::uint64_t GrpcClient::nowUs() {
+  const auto now = SteadyClock::now().time_since_epoch();
+  return static_cast<std::uint64_t>(std::chrono::duration_cast<std::chrono::microseconds>(now).count());
+}
+
+}  // namespace clothstream

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: MIT
+// The native client library: clients/core over a gRPC stream.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include <tl/expected.hpp>
+
+#include "clients/core/core.h"
+#include "clients/grpc/failure.h"
+
+namespace clothstream {
+
+struct GrpcClientOptions {
+  std::string scene;  // empty: the server's default
+  std::string clientName = "clothstream";
+  // From the call of join() to the whole description.
+  std::chrono::milliseconds joinTimeout{10'000};
+  // Asked ten times a second while joining: true gives up. May be empty.
+  std::function<bool()> cancelled;
+  // The server answers pings twice a second; when it has said nothing for this long, the stream is lost.
+  std::chrono::milliseconds silenceTimeout{10'000};
+};
+
+// Owns a thread, and that thread owns the cs_client: `onEvents` and what visit() gets run there.
+class GrpcClient {
+ public:
+  // After each message that changed something, with the bits of cs_receive: also before join() returns. Must
+  // not call visit().
+  using OnEvents = std::function<void(cs_client*, std::uint32_t events)>;
+
+  // `address` as completeAddress gives it. Returns once the description is there.
+  [[nodiscard]] static tl::expected<std::unique_ptr<GrpcClient>, Failure> join(
+      const std::string& address, const GrpcClientOptions& options, OnEvents onEvents);
+  // Leaves the scene, if it has not ended: tells the server and waits half a second at most.
+  ~GrpcClient();
+  GrpcClient(const GrpcClient&) = delete;
+  GrpcClient& operator=(const GrpcClient&) = delete;
+
+  // Runs `task` between two messages and returns when it has run; thread-safe. What it sends travels at once.
+  // After the end of the stream the client is still there to be read.
+  void visit(const std::function<void(cs_client*)>& task);
+
+  // Why the stream ended; nothing while it runs. Thread-safe.
+  std::optional<Failure> ended() const;
+
+  // The clock that the cs_client is given, microseconds.
+  static std::uint64_t nowUs();
+
+ private:
+  class Stream;
+  explicit GrpcClient(std::unique_ptr<Stream> stream);
+  std::unique_ptr<Stream> stream_;
+};
+
+}  // namespace clothstream

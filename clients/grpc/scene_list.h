@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: MIT
+// The scenes of a server, asked for without joining.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include <tl/expected.hpp>
+
+#include "clients/grpc/failure.h"
+
+namespace clothstream {
+
+struct SceneSummary {
+  std::string name, description;
+  std::uint32_t vertexCount = 0, clothCount = 0, participants = 0;
+  bool running = false;
+};
+
+// `address` as completeAddress gives it.
+[[nodiscard]] tl::expected<std::vector<SceneSummary>, Failure> listScenes(
+    const std::string& address, std::chrono::milliseconds timeout = std::chrono::milliseconds(10'000));
+
+}  // namespace clothstream
