@@ -3,8 +3,11 @@
 #include "server/vulkan/buffer.h"
 
 #include <cassert>
+#include <optional>
 
 #include <fmt/format.h>
+
+#include "server/vulkan/handles.h"
 
 namespace clothstream::vulkan {
 namespace {
@@ -39,9 +42,26 @@ Traits traitsOf(BufferPurpose purpose) {
   return {storage, {}, Property::eDeviceLocal};
 }
 
+std::uint32_t memoryType(const Device& device, std::uint32_t typeBits, const Traits& traits) {
+  const vk::PhysicalDeviceMemoryProperties memory = device.handles().physical.getMemoryProperties();
+  const auto find = [&](vk::MemoryPropertyFlags flags) -> std::optional<std::uint32_t> {
+    for (std::uint32_t i = 0; i < memory.memoryTypeCount; ++i)
+      if ((typeBits >> i & 1u) != 0 && (memory.memoryTypes[i].propertyFlags & flags) == flags) return i;
+    return std::nullopt;
+  };
+  if (const auto best = find(traits.wanted | traits.preferred)) return *best;
+  if (const auto good = find(traits.wanted)) return *good;
+  throw std::runtime_error(fmt::format("{} has no memory that is {}", device.info().name, vk::to_string(traits.wanted)));
+}
+
 }  // namespace
 
-Buffer::Buffer(const Device& device, BufferPurpose purpose, std::size_t bytes) : bytes_(bytes) {
+Buffer::Buffer() = default;
+Buffer::~Buffer() = default;
+Buffer::Buffer(Buffer&&) noexcept = default;
+Buffer& Buffer::operator=(Buffer&&) noexcept = default;
+
+Buffer::Buffer(const Device& device, BufferPurpose purpose, std::size_t bytes) : bytes_(bytes), handles_(std::make_unique<Handles>()) {
   assert(bytes > 0);
   const bool texels = purpose == BufferPurpose::texels;
   const bool mapped = purpose == BufferPurpose::upload || purpose == BufferPurpose::readback;
@@ -56,19 +76,19 @@ Buffer::Buffer(const Device& device, BufferPurpose purpose, std::size_t bytes) :
         fmt::format("a buffer of {} texels is more than the {} that kernels can read on {}",
                     bytes / kTexelBytes, limits.maxTexelElements, device.info().name));
   const Traits traits = traitsOf(purpose);
+  const vk::raii::Device& vulkan = device.handles().device;
   try {
-    buffer_ = vk::raii::Buffer(device.handle(), vk::BufferCreateInfo{.size = bytes, .usage = traits.usage});
-    const vk::MemoryRequirements needs = buffer_.getMemoryRequirements();
-    memory_ = vk::raii::DeviceMemory(
-        device.handle(), vk::MemoryAllocateInfo{.allocationSize = needs.size,
-                                                .memoryTypeIndex = device.memoryType(
-                                                    needs.memoryTypeBits, traits.wanted, traits.preferred)});
-    buffer_.bindMemory(*memory_, 0);
-    if (mapped) mapped_ = memory_.mapMemory(0, VK_WHOLE_SIZE);
+    handles_->buffer = vk::raii::Buffer(vulkan, vk::BufferCreateInfo{.size = bytes, .usage = traits.usage});
+    const vk::MemoryRequirements needs = handles_->buffer.getMemoryRequirements();
+    handles_->memory = vk::raii::DeviceMemory(
+        vulkan, vk::MemoryAllocateInfo{.allocationSize = needs.size,
+                                       .memoryTypeIndex = memoryType(device, needs.memoryTypeBits, traits)});
+    handles_->buffer.bindMemory(*handles_->memory, 0);
+    if (mapped) mapped_ = handles_->memory.mapMemory(0, VK_WHOLE_SIZE);
     if (texels)
-      texelView_ = vk::raii::BufferView(
-          device.handle(),
-          vk::BufferViewCreateInfo{.buffer = *buffer_, .format = kTexelFormat, .range = VK_WHOLE_SIZE});
+      handles_->texelView = vk::raii::BufferView(
+          vulkan,
+          vk::BufferViewCreateInfo{.buffer = *handles_->buffer, .format = kTexelFormat, .range = VK_WHOLE_SIZE});
   } catch (const vk::SystemError& error) {
     throw std::runtime_error(
         fmt::format("no buffer of {} bytes can be made on {}: {}", bytes, device.info().name, error.what()));

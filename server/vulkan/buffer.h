@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <span>
 
 #include "server/vulkan/device.h"
@@ -21,8 +22,11 @@ enum class BufferPurpose : std::uint8_t {
 // Move-only. Contents start undefined. Throws std::runtime_error naming the size when memory runs out.
 class Buffer {
  public:
-  Buffer() = default;
+  Buffer();
   Buffer(const Device& device, BufferPurpose purpose, std::size_t bytes);
+  ~Buffer();
+  Buffer(Buffer&&) noexcept;
+  Buffer& operator=(Buffer&&) noexcept;
 
   std::size_t bytes() const { return bytes_; }
 
@@ -34,16 +38,14 @@ class Buffer {
     return {static_cast<T*>(mapped_), mapped_ == nullptr ? 0 : bytes_ / sizeof(T)};
   }
 
-  // For this room alone.
-  const vk::raii::Buffer& handle() const { return buffer_; }
-  const vk::raii::BufferView& texelView() const { return texelView_; }
+  // For this room alone (handles.h).
+  struct Handles;
+  const Handles& handles() const { return *handles_; }
 
  private:
   std::size_t bytes_ = 0;
   void* mapped_ = nullptr;
-  vk::raii::DeviceMemory memory_ = nullptr;
-  vk::raii::Buffer buffer_ = nullptr;
-  vk::raii::BufferView texelView_ = nullptr;
+  std::unique_ptr<Handles> handles_;
 };
 
 }  // namespace clothstream::vulkan

@@ -13,6 +13,7 @@
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
+#include "server/vulkan/handles.h"
 #include "server/vulkan/instance.h"
 #include "server/vulkan/recorder.h"
 
@@ -113,12 +114,12 @@ void writeCache(const std::filesystem::path& path, std::span<const std::uint8_t>
 }  // namespace
 
 Device::Device(const DeviceOptions& options)
-    : context_((setSoftwareThreads(options.softwareThreads), openLoader())) {
+    : handles_(new Handles{.context = (setSoftwareThreads(options.softwareThreads), openLoader())}) {
   const bool validate = options.validation || validationByEnvironment();
-  instance_ = makeInstance(context_, validate);
-  if (validate) messenger_ = makeMessenger(instance_);
+  handles_->instance = makeInstance(handles_->context, validate);
+  if (validate) handles_->messenger = makeMessenger(handles_->instance);
 
-  std::vector<Candidate> all = candidates(instance_);
+  std::vector<Candidate> all = candidates(handles_->instance);
   Candidate& chosen = all[vulkan::select(all, options.select)];
   const vk::PhysicalDeviceProperties properties = chosen.physical.getProperties();
   pipelineCacheFile_ = cacheFile(options.cacheDirectory, properties);
@@ -126,43 +127,44 @@ Device::Device(const DeviceOptions& options)
   if (!pipelineCacheFile_.empty()) cached = readCache(pipelineCacheFile_, properties);
   pipelineCacheLoaded_ = cached.size();
   try {
-    device_ = openDevice(chosen);
+    handles_->device = openDevice(chosen);
     const vk::SemaphoreTypeCreateInfo timeline{.semaphoreType = vk::SemaphoreType::eTimeline};
-    queue_ = device_.getQueue(chosen.queueFamily, 0);
-    timeline_ = vk::raii::Semaphore(device_, vk::SemaphoreCreateInfo{.pNext = &timeline});
-    pipelineCache_ = vk::raii::PipelineCache(
-        device_,
+    handles_->queue = handles_->device.getQueue(chosen.queueFamily, 0);
+    handles_->timeline = vk::raii::Semaphore(handles_->device, vk::SemaphoreCreateInfo{.pNext = &timeline});
+    handles_->pipelineCache = vk::raii::PipelineCache(
+        handles_->device,
         vk::PipelineCacheCreateInfo{.initialDataSize = cached.size(), .pInitialData = cached.data()});
   } catch (const vk::SystemError& error) {
     throw DeviceError(
         fmt::format("the Vulkan device {} cannot be opened: {}", chosen.info.name, error.what()));
   }
   limits_ = limitsOf(chosen.physical);
-  queueFamily_ = chosen.queueFamily;
+  handles_->queueFamily = chosen.queueFamily;
   info_ = std::move(chosen.info);
-  physical_ = std::move(chosen.physical);
+  handles_->physical = std::move(chosen.physical);
 }
 
 Device::~Device() {
   try {
-    device_.waitIdle();
-    if (!pipelineCacheFile_.empty()) writeCache(pipelineCacheFile_, pipelineCache_.getData());
+    handles_->device.waitIdle();
+    if (!pipelineCacheFile_.empty()) writeCache(pipelineCacheFile_, handles_->pipelineCache.getData());
   } catch (const std::exception& error) {
     spdlog::warn("closing the Vulkan device {}: {}", info_.name, error.what());
   }
 }
 
 TimelineValue Device::submit(Recorder& recorder) {
-  const vk::CommandBuffer commands = *recorder.finish();
+  recorder.finish();
+  const vk::CommandBuffer commands = *recorder.handles().commands;
   const TimelineValue value = submitted_ + 1;
   const vk::TimelineSemaphoreSubmitInfo timeline{.signalSemaphoreValueCount = 1,
                                                  .pSignalSemaphoreValues = &value};
   try {
-    queue_.submit(vk::SubmitInfo{.pNext = &timeline,
+    handles_->queue.submit(vk::SubmitInfo{.pNext = &timeline,
                                  .commandBufferCount = 1,
                                  .pCommandBuffers = &commands,
                                  .signalSemaphoreCount = 1,
-                                 .pSignalSemaphores = &*timeline_});
+                                 .pSignalSemaphores = &*handles_->timeline});
   } catch (const vk::DeviceLostError&) {
     throw DeviceLost(kLost);
   }
@@ -172,7 +174,7 @@ TimelineValue Device::submit(Recorder& recorder) {
 bool Device::wait(TimelineValue value, std::chrono::nanoseconds timeout) const {
   const auto nanoseconds = static_cast<std::uint64_t>(std::max<std::int64_t>(timeout.count(), 0));
   try {
-    return device_.waitSemaphores({.semaphoreCount = 1, .pSemaphores = &*timeline_, .pValues = &value},
+    return handles_->device.waitSemaphores({.semaphoreCount = 1, .pSemaphores = &*handles_->timeline, .pValues = &value},
                                   nanoseconds) == vk::Result::eSuccess;
   } catch (const vk::DeviceLostError&) {
     throw DeviceLost(kLost);
@@ -181,23 +183,10 @@ bool Device::wait(TimelineValue value, std::chrono::nanoseconds timeout) const {
 
 TimelineValue Device::completed() const {
   try {
-    return timeline_.getCounterValue();
+    return handles_->timeline.getCounterValue();
   } catch (const vk::DeviceLostError&) {
     throw DeviceLost(kLost);
   }
-}
-
-std::uint32_t Device::memoryType(std::uint32_t typeBits, vk::MemoryPropertyFlags wanted,
-                                 vk::MemoryPropertyFlags preferred) const {
-  const vk::PhysicalDeviceMemoryProperties memory = physical_.getMemoryProperties();
-  const auto find = [&](vk::MemoryPropertyFlags flags) -> std::optional<std::uint32_t> {
-    for (std::uint32_t i = 0; i < memory.memoryTypeCount; ++i)
-      if ((typeBits >> i & 1u) != 0 && (memory.memoryTypes[i].propertyFlags & flags) == flags) return i;
-    return std::nullopt;
-  };
-  if (const auto best = find(wanted | preferred)) return *best;
-  if (const auto good = find(wanted)) return *good;
-  throw std::runtime_error(fmt::format("{} has no memory that is {}", info_.name, vk::to_string(wanted)));
 }
 
 }  // namespace clothstream::vulkan

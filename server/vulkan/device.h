@@ -5,12 +5,11 @@
 #include <chrono>
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <stdexcept>
 #include <string>
 #include <vector>
-
-#include <vulkan/vulkan_raii.hpp>
 
 namespace clothstream::vulkan {
 
@@ -98,26 +97,13 @@ class Device {
   // Bytes of pipeline cache that were taken from DeviceOptions::cacheDirectory.
   std::size_t pipelineCacheLoaded() const { return pipelineCacheLoaded_; }
 
-  // For this room alone.
-  bool validates() const { return *messenger_ != vk::DebugUtilsMessengerEXT{}; }
-  const vk::raii::Device& handle() const { return device_; }
-  const vk::raii::PhysicalDevice& physical() const { return physical_; }
-  const vk::raii::PipelineCache& pipelineCache() const { return pipelineCache_; }
-  std::uint32_t queueFamily() const { return queueFamily_; }
-  std::uint32_t memoryType(std::uint32_t typeBits, vk::MemoryPropertyFlags wanted,
-                           vk::MemoryPropertyFlags preferred) const;
+  // For this room alone (handles.h).
+  struct Handles;
+  const Handles& handles() const { return *handles_; }
 
  private:
-  vk::raii::Context context_;
-  vk::raii::Instance instance_ = nullptr;
-  vk::raii::DebugUtilsMessengerEXT messenger_ = nullptr;
-  vk::raii::PhysicalDevice physical_ = nullptr;
-  vk::raii::Device device_ = nullptr;
-  vk::raii::Queue queue_ = nullptr;
-  vk::raii::Semaphore timeline_ = nullptr;
-  vk::raii::PipelineCache pipelineCache_ = nullptr;
+  std::unique_ptr<Handles> handles_;
   std::size_t pipelineCacheLoaded_ = 0;
-  std::uint32_t queueFamily_ = 0;
   TimelineValue submitted_ = 0;
   DeviceInfo info_;
   Limits limits_;

@@ -6,6 +6,8 @@
 #include <string_view>
 #include <vector>
 
+#include <vulkan/vulkan_raii.hpp>
+
 #include "server/vulkan/device.h"
 
 namespace clothstream::vulkan {

@@ -7,6 +7,8 @@
 
 #include <fmt/format.h>
 
+#include "server/vulkan/handles.h"
+
 namespace clothstream::vulkan {
 namespace {
 
@@ -19,11 +21,16 @@ constexpr std::uint32_t kWord = sizeof(std::uint32_t);
 
 }  // namespace
 
+Kernel::~Kernel() = default;
+Kernel::Kernel(Kernel&&) noexcept = default;
+Kernel& Kernel::operator=(Kernel&&) noexcept = default;
+
 Kernel::Kernel(const Device& device, const KernelDescription& description)
     : name_(description.name),
       bindings_(description.bindings),
       pushConstantBytes_(description.pushConstantBytes),
-      workgroupSize_(description.workgroupSize) {
+      workgroupSize_(description.workgroupSize),
+      handles_(std::make_unique<Handles>()) {
   const Limits& limits = device.limits();
   if (workgroupSize_ > limits.maxWorkgroupSizeX || workgroupSize_ > limits.maxWorkgroupInvocations)
     throw std::runtime_error(fmt::format(
@@ -51,30 +58,31 @@ Kernel::Kernel(const Device& device, const KernelDescription& description)
                                               .pData = constants.data()};
   const vk::PushConstantRange push{.stageFlags = vk::ShaderStageFlagBits::eCompute,
                                    .size = pushConstantBytes_};
+  const vk::raii::Device& vulkan = device.handles().device;
   try {
-    setLayout_ = vk::raii::DescriptorSetLayout(
-        device.handle(),
+    handles_->setLayout = vk::raii::DescriptorSetLayout(
+        vulkan,
         vk::DescriptorSetLayoutCreateInfo{.bindingCount = static_cast<std::uint32_t>(slots.size()),
                                           .pBindings = slots.data()});
-    layout_ = vk::raii::PipelineLayout(
-        device.handle(), vk::PipelineLayoutCreateInfo{.setLayoutCount = 1,
-                                                      .pSetLayouts = &*setLayout_,
+    handles_->layout = vk::raii::PipelineLayout(
+        vulkan, vk::PipelineLayoutCreateInfo{.setLayoutCount = 1,
+                                                      .pSetLayouts = &*handles_->setLayout,
                                                       .pushConstantRangeCount = pushConstantBytes_ > 0,
                                                       .pPushConstantRanges = &push});
-    const vk::raii::ShaderModule module(device.handle(),
+    const vk::raii::ShaderModule module(vulkan,
                                         vk::ShaderModuleCreateInfo{.codeSize = description.spirv.size_bytes(),
                                                                    .pCode = description.spirv.data()});
-    pipeline_ =
-        vk::raii::Pipeline(device.handle(), device.pipelineCache(),
+    handles_->pipeline =
+        vk::raii::Pipeline(vulkan, device.handles().pipelineCache,
                            vk::ComputePipelineCreateInfo{.stage = {.stage = vk::ShaderStageFlagBits::eCompute,
                                                                    .module = *module,
                                                                    .pName = "main",
                                                                    .pSpecializationInfo = &specialisation},
-                                                         .layout = *layout_});
-    if (device.validates())
-      device.handle().setDebugUtilsObjectNameEXT(
+                                                         .layout = *handles_->layout});
+    if (device.handles().validates())
+      vulkan.setDebugUtilsObjectNameEXT(
           {.objectType = vk::ObjectType::ePipeline,
-           .objectHandle = reinterpret_cast<std::uint64_t>(static_cast<VkPipeline>(*pipeline_)),
+           .objectHandle = reinterpret_cast<std::uint64_t>(static_cast<VkPipeline>(*handles_->pipeline)),
            .pObjectName = name_.c_str()});
   } catch (const vk::SystemError& error) {
     throw std::runtime_error(
@@ -82,8 +90,12 @@ Kernel::Kernel(const Device& device, const KernelDescription& description)
   }
 }
 
+Bindings::~Bindings() = default;
+Bindings::Bindings(Bindings&&) noexcept = default;
+Bindings& Bindings::operator=(Bindings&&) noexcept = default;
+
 Bindings::Bindings(const Device& device, const Kernel& kernel, std::initializer_list<const Buffer*> buffers)
-    : kernel_(&kernel) {
+    : kernel_(&kernel), handles_(std::make_unique<Handles>()) {
   const std::span<const BindingKind> kinds = kernel.bindings();
   assert(buffers.size() == kinds.size());
   const auto count = static_cast<std::uint32_t>(kinds.size());
@@ -99,32 +111,33 @@ Bindings::Bindings(const Device& device, const Kernel& kernel, std::initializer_
           fmt::format("kernel {}, binding {}: a buffer of {} bytes is more than the {} that kernels "
                       "can bind on {}",
                       kernel.name(), i, buffer.bytes(), device.limits().maxStorageRange, device.info().name));
-    assert(kinds[i] != BindingKind::texels || *buffer.texelView());
-    infos[i] = vk::DescriptorBufferInfo{.buffer = *buffer.handle(), .range = VK_WHOLE_SIZE};
+    assert(kinds[i] != BindingKind::texels || *buffer.handles().texelView);
+    infos[i] = vk::DescriptorBufferInfo{.buffer = *buffer.handles().buffer, .range = VK_WHOLE_SIZE};
     sizes.push_back({.type = typeOf(kinds[i]), .descriptorCount = 1});
     writes.push_back({.dstBinding = i,
                       .descriptorCount = 1,
                       .descriptorType = typeOf(kinds[i]),
                       .pBufferInfo = &infos[i],
-                      .pTexelBufferView = &*buffer.texelView()});
+                      .pTexelBufferView = &*buffer.handles().texelView});
   }
+  const vk::raii::Device& vulkan = device.handles().device;
   try {
-    pool_ = vk::raii::DescriptorPool(
-        device.handle(),
+    handles_->pool = vk::raii::DescriptorPool(
+        vulkan,
         vk::DescriptorPoolCreateInfo{.flags = vk::DescriptorPoolCreateFlagBits::eFreeDescriptorSet,
                                      .maxSets = 1,
                                      .poolSizeCount = count,
                                      .pPoolSizes = sizes.data()});
     vk::raii::DescriptorSets sets(
-        device.handle(),
+        vulkan,
         vk::DescriptorSetAllocateInfo{
-            .descriptorPool = *pool_, .descriptorSetCount = 1, .pSetLayouts = &*kernel.setLayout()});
-    set_ = std::move(sets.front());
+            .descriptorPool = *handles_->pool, .descriptorSetCount = 1, .pSetLayouts = &*kernel.handles().setLayout});
+    handles_->set = std::move(sets.front());
   } catch (const vk::SystemError& error) {
     throw std::runtime_error(fmt::format("kernel {} cannot be bound: {}", kernel.name(), error.what()));
   }
-  for (vk::WriteDescriptorSet& write : writes) write.dstSet = *set_;
-  device.handle().updateDescriptorSets(writes, nullptr);
+  for (vk::WriteDescriptorSet& write : writes) write.dstSet = *handles_->set;
+  vulkan.updateDescriptorSets(writes, nullptr);
 }
 
 }  // namespace clothstream::vulkan

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <initializer_list>
+#include <memory>
 #include <span>
 #include <string>
 #include <vector>
@@ -29,14 +30,16 @@ struct KernelDescription {
 class Kernel {
  public:
   Kernel(const Device& device, const KernelDescription& description);
+  ~Kernel();
+  Kernel(Kernel&&) noexcept;
+  Kernel& operator=(Kernel&&) noexcept;
 
   std::uint32_t workgroupSize() const { return workgroupSize_; }
 
-  // For this room alone.
+  // For this room alone (handles.h).
+  struct Handles;
+  const Handles& handles() const { return *handles_; }
   const std::string& name() const { return name_; }
-  const vk::raii::Pipeline& pipeline() const { return pipeline_; }
-  const vk::raii::PipelineLayout& layout() const { return layout_; }
-  const vk::raii::DescriptorSetLayout& setLayout() const { return setLayout_; }
   std::span<const BindingKind> bindings() const { return bindings_; }
   std::uint32_t pushConstantBytes() const { return pushConstantBytes_; }
 
@@ -45,24 +48,25 @@ class Kernel {
   std::vector<BindingKind> bindings_;
   std::uint32_t pushConstantBytes_ = 0;
   std::uint32_t workgroupSize_ = 0;
-  vk::raii::DescriptorSetLayout setLayout_ = nullptr;
-  vk::raii::PipelineLayout layout_ = nullptr;
-  vk::raii::Pipeline pipeline_ = nullptr;
+  std::unique_ptr<Handles> handles_;
 };
 
 // One buffer for each of the kernel's bindings, in order. Kernel and buffers must outlive it.
 class Bindings {
  public:
   Bindings(const Device& device, const Kernel& kernel, std::initializer_list<const Buffer*> buffers);
+  ~Bindings();
+  Bindings(Bindings&&) noexcept;
+  Bindings& operator=(Bindings&&) noexcept;
 
   const Kernel& kernel() const { return *kernel_; }
-  // For this room alone.
-  const vk::raii::DescriptorSet& set() const { return set_; }
+  // For this room alone (handles.h).
+  struct Handles;
+  const Handles& handles() const { return *handles_; }
 
  private:
   const Kernel* kernel_;
-  vk::raii::DescriptorPool pool_ = nullptr;
-  vk::raii::DescriptorSet set_ = nullptr;
+  std::unique_ptr<Handles> handles_;
 };
 
 }  // namespace clothstream::vulkan

@@ -7,6 +7,8 @@
 
 #include <fmt/format.h>
 
+#include "server/vulkan/handles.h"
+
 namespace clothstream::vulkan {
 namespace {
 
@@ -20,19 +22,24 @@ constexpr vk::AccessFlags kUses = Access::eShaderRead | Access::eShaderWrite | A
 
 }  // namespace
 
-Recorder::Recorder(const Device& device) : device_(&device) {
-  pool_ = vk::raii::CommandPool(device.handle(),
-                                vk::CommandPoolCreateInfo{.queueFamilyIndex = device.queueFamily()});
+Recorder::~Recorder() = default;
+Recorder::Recorder(Recorder&&) noexcept = default;
+Recorder& Recorder::operator=(Recorder&&) noexcept = default;
+
+Recorder::Recorder(const Device& device) : device_(&device), handles_(std::make_unique<Handles>()) {
+  const vk::raii::Device& vulkan = device.handles().device;
+  handles_->pool = vk::raii::CommandPool(vulkan,
+                                vk::CommandPoolCreateInfo{.queueFamilyIndex = device.handles().queueFamily});
   vk::raii::CommandBuffers all(
-      device.handle(),
+      vulkan,
       vk::CommandBufferAllocateInfo{
-          .commandPool = *pool_, .level = vk::CommandBufferLevel::ePrimary, .commandBufferCount = 1});
-  commands_ = std::move(all.front());
+          .commandPool = *handles_->pool, .level = vk::CommandBufferLevel::ePrimary, .commandBufferCount = 1});
+  handles_->commands = std::move(all.front());
   const std::uint32_t bits =
-      device.physical().getQueueFamilyProperties()[device.queueFamily()].timestampValidBits;
+      device.handles().physical.getQueueFamilyProperties()[device.handles().queueFamily].timestampValidBits;
   if (bits > 0)
-    timestamps_ = vk::raii::QueryPool(
-        device.handle(),
+    handles_->timestamps = vk::raii::QueryPool(
+        vulkan,
         vk::QueryPoolCreateInfo{.queryType = vk::QueryType::eTimestamp, .queryCount = kMaxMarks + 1});
   timestampMask_ = bits >= 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << bits) - 1;
   marks_.reserve(kMaxMarks);
@@ -42,9 +49,9 @@ Recorder::Recorder(const Device& device) : device_(&device) {
 
 void Recorder::begin() {
   assert(!open_);
-  pool_.reset();
-  commands_.begin(vk::CommandBufferBeginInfo{});
-  if (*timestamps_) commands_.resetQueryPool(*timestamps_, 0, kMaxMarks + 1);
+  handles_->pool.reset();
+  handles_->commands.begin(vk::CommandBufferBeginInfo{});
+  if (*handles_->timestamps) handles_->commands.resetQueryPool(*handles_->timestamps, 0, kMaxMarks + 1);
   marks_.clear();
   open_ = true;
 }
@@ -56,8 +63,8 @@ void Recorder::beginStage(std::string_view stage) {
 }
 
 void Recorder::mark() {
-  if (*timestamps_)
-    commands_.writeTimestamp(Stage::eBottomOfPipe, *timestamps_, static_cast<std::uint32_t>(marks_.size()));
+  if (*handles_->timestamps)
+    handles_->commands.writeTimestamp(Stage::eBottomOfPipe, *handles_->timestamps, static_cast<std::uint32_t>(marks_.size()));
 }
 
 void Recorder::dispatchBytes(const Bindings& bindings, const void* push, std::uint32_t pushBytes,
@@ -72,64 +79,63 @@ void Recorder::dispatchBytes(const Bindings& bindings, const void* push, std::ui
         "workgroups larger or the invocations fewer",
         kernel.name(), threads, groups, kernel.workgroupSize(), most, device_->info().name));
   bind(bindings, push, pushBytes);
-  commands_.dispatch(static_cast<std::uint32_t>(groups), 1, 1);
+  handles_->commands.dispatch(static_cast<std::uint32_t>(groups), 1, 1);
 }
 
 void Recorder::dispatchIndirectBytes(const Bindings& bindings, const void* push, std::uint32_t pushBytes,
                                      const Buffer& groups, std::size_t offset) {
   assert(offset % 4 == 0 && offset + sizeof(VkDispatchIndirectCommand) <= groups.bytes());
   bind(bindings, push, pushBytes);
-  commands_.dispatchIndirect(*groups.handle(), offset);
+  handles_->commands.dispatchIndirect(*groups.handles().buffer, offset);
 }
 
 void Recorder::bind(const Bindings& bindings, const void* push, std::uint32_t pushBytes) {
   const Kernel& kernel = bindings.kernel();
   assert(open_ && pushBytes == kernel.pushConstantBytes());
-  commands_.bindPipeline(vk::PipelineBindPoint::eCompute, *kernel.pipeline());
-  if (*bindings.set())
-    commands_.bindDescriptorSets(vk::PipelineBindPoint::eCompute, *kernel.layout(), 0, *bindings.set(),
+  handles_->commands.bindPipeline(vk::PipelineBindPoint::eCompute, *kernel.handles().pipeline);
+  if (*bindings.handles().set)
+    handles_->commands.bindDescriptorSets(vk::PipelineBindPoint::eCompute, *kernel.handles().layout, 0, *bindings.handles().set,
                                  nullptr);
   if (pushBytes > 0)
-    commands_.pushConstants<std::byte>(*kernel.layout(), vk::ShaderStageFlagBits::eCompute, 0,
+    handles_->commands.pushConstants<std::byte>(*kernel.handles().layout, vk::ShaderStageFlagBits::eCompute, 0,
                                        {pushBytes, static_cast<const std::byte*>(push)});
 }
 
 void Recorder::barrier() {
   assert(open_);
   const vk::MemoryBarrier memory{.srcAccessMask = kWrites, .dstAccessMask = kUses};
-  commands_.pipelineBarrier(kWork, kWork | Stage::eDrawIndirect, {}, memory, nullptr, nullptr);
+  handles_->commands.pipelineBarrier(kWork, kWork | Stage::eDrawIndirect, {}, memory, nullptr, nullptr);
 }
 
 void Recorder::copy(const Buffer& from, const Buffer& to, std::size_t bytes, std::size_t fromOffset,
                     std::size_t toOffset) {
   assert(open_ && fromOffset + bytes <= from.bytes() && toOffset + bytes <= to.bytes());
   if (bytes == 0) return;
-  commands_.copyBuffer(*from.handle(), *to.handle(),
+  handles_->commands.copyBuffer(*from.handles().buffer, *to.handles().buffer,
                        vk::BufferCopy{.srcOffset = fromOffset, .dstOffset = toOffset, .size = bytes});
 }
 
 void Recorder::fill(const Buffer& buffer, std::uint32_t value, std::size_t bytes, std::size_t offset) {
   assert(open_ && bytes % 4 == 0 && offset % 4 == 0 && offset + bytes <= buffer.bytes());
   if (bytes == 0) return;
-  commands_.fillBuffer(*buffer.handle(), offset, bytes, value);
+  handles_->commands.fillBuffer(*buffer.handles().buffer, offset, bytes, value);
 }
 
-const vk::raii::CommandBuffer& Recorder::finish() {
-  if (!open_) return commands_;
+void Recorder::finish() {
+  if (!open_) return;
   if (!marks_.empty()) mark();
   const vk::MemoryBarrier memory{.srcAccessMask = kWrites, .dstAccessMask = kUses | Access::eHostRead};
-  commands_.pipelineBarrier(kWork, kWork | Stage::eDrawIndirect | Stage::eHost, {}, memory, nullptr, nullptr);
-  commands_.end();
+  handles_->commands.pipelineBarrier(kWork, kWork | Stage::eDrawIndirect | Stage::eHost, {}, memory, nullptr, nullptr);
+  handles_->commands.end();
   open_ = false;
-  return commands_;
 }
 
 std::span<const StageTime> Recorder::stageTimes() {
   times_.clear();
-  if (marks_.empty() || !*timestamps_) return times_;
+  if (marks_.empty() || !*handles_->timestamps) return times_;
   const auto count = static_cast<std::uint32_t>(marks_.size() + 1);
-  const VkResult result = device_->handle().getDispatcher()->vkGetQueryPoolResults(
-      *device_->handle(), *timestamps_, 0, count, count * sizeof(std::uint64_t), ticks_.data(),
+  const VkResult result = device_->handles().device.getDispatcher()->vkGetQueryPoolResults(
+      *device_->handles().device, *handles_->timestamps, 0, count, count * sizeof(std::uint64_t), ticks_.data(),
       sizeof(std::uint64_t), VK_QUERY_RESULT_64_BIT);
   if (result != VK_SUCCESS) return times_;
   for (std::size_t i = 0; i < marks_.size(); ++i) {

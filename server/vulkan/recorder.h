@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <string_view>
 #include <type_traits>
@@ -24,6 +25,9 @@ struct StageTime {
 class Recorder {
  public:
   explicit Recorder(const Device& device);
+  ~Recorder();
+  Recorder(Recorder&&) noexcept;
+  Recorder& operator=(Recorder&&) noexcept;
 
   // Forgets what was recorded; what was submitted must be complete.
   void begin();
@@ -67,8 +71,10 @@ class Recorder {
   // is complete. Empty where the device has no timestamps. Good until the next call or begin().
   std::span<const StageTime> stageTimes();
 
-  // For this room alone: ends the recording with a barrier towards the host and later recordings.
-  const vk::raii::CommandBuffer& finish();
+  // For this room alone (handles.h): ends the recording with a barrier towards the host and later recordings.
+  void finish();
+  struct Handles;
+  const Handles& handles() const { return *handles_; }
 
  private:
   void dispatchBytes(const Bindings& bindings, const void* push, std::uint32_t pushBytes,
@@ -79,9 +85,7 @@ class Recorder {
   void mark();
 
   const Device* device_;
-  vk::raii::CommandPool pool_ = nullptr;
-  vk::raii::CommandBuffer commands_ = nullptr;
-  vk::raii::QueryPool timestamps_ = nullptr;  // mark i begins stage marks_[i]; one more ends the last
+  std::unique_ptr<Handles> handles_;
   std::uint64_t timestampMask_ = 0;
   std::vector<std::string_view> marks_;
   std::vector<std::uint64_t> ticks_;

@@ -8,6 +8,7 @@
 
 #include "kernels/count_up.h"
 #include "server/vulkan/buffer.h"
+#include "server/vulkan/handles.h"
 #include "server/vulkan/kernel.h"
 #include "server/vulkan/recorder.h"
 #include "tests/vulkan/gpu_test.h"
@@ -45,14 +46,14 @@ class ValidationTest : public tests::GpuTest {
   // A command buffer with one dispatch and no barrier, which Recorder would not make.
   vk::raii::CommandBuffer bareDispatch(const vk::raii::CommandPool& pool, const Bindings& bindings) const {
     vk::raii::CommandBuffer commands = std::move(
-        vk::raii::CommandBuffers(device_->handle(),
+        vk::raii::CommandBuffers(device_->handles().device,
                                  vk::CommandBufferAllocateInfo{.commandPool = *pool, .commandBufferCount = 1})
             .front());
     commands.begin(vk::CommandBufferBeginInfo{});
-    commands.bindPipeline(vk::PipelineBindPoint::eCompute, *kernel_->pipeline());
-    commands.bindDescriptorSets(vk::PipelineBindPoint::eCompute, *kernel_->layout(), 0, *bindings.set(),
+    commands.bindPipeline(vk::PipelineBindPoint::eCompute, *kernel_->handles().pipeline);
+    commands.bindDescriptorSets(vk::PipelineBindPoint::eCompute, *kernel_->handles().layout, 0, *bindings.handles().set,
                                 nullptr);
-    commands.pushConstants<std::uint32_t>(*kernel_->layout(), vk::ShaderStageFlagBits::eCompute, 0, kCount);
+    commands.pushConstants<std::uint32_t>(*kernel_->handles().layout, vk::ShaderStageFlagBits::eCompute, 0, kCount);
     commands.dispatch(kCount / kernel_->workgroupSize(), 1, 1);
     commands.end();
     return commands;
@@ -88,11 +89,11 @@ TEST_F(ValidationTest, reportsAMissingBarrierWithinARecording) {
 }
 
 TEST_F(ValidationTest, reportsAMissingBarrierBetweenSubmissions) {
-  const vk::raii::CommandPool pool(device_->handle(),
-                                   vk::CommandPoolCreateInfo{.queueFamilyIndex = device_->queueFamily()});
+  const vk::raii::CommandPool pool(device_->handles().device,
+                                   vk::CommandPoolCreateInfo{.queueFamilyIndex = device_->handles().queueFamily});
   const vk::raii::CommandBuffer first = bareDispatch(pool, *first_);
   const vk::raii::CommandBuffer second = bareDispatch(pool, *second_);
-  const vk::raii::Queue queue = device_->handle().getQueue(device_->queueFamily(), 0);
+  const vk::raii::Queue queue = device_->handles().device.getQueue(device_->handles().queueFamily, 0);
   queue.submit(vk::SubmitInfo{.commandBufferCount = 1, .pCommandBuffers = &*first});
   EXPECT_THAT(tests::takeValidationTexts(), IsEmpty());
   queue.submit(vk::SubmitInfo{.commandBufferCount = 1, .pCommandBuffers = &*second});

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: MIT
+// The Vulkan objects behind this room's classes; kept out of their headers, for the bindings are slow to compile.
+#pragma once
+
+#include <vulkan/vulkan_raii.hpp>
+
+#include "server/vulkan/buffer.h"
+#include "server/vulkan/device.h"
+#include "server/vulkan/kernel.h"
+#include "server/vulkan/recorder.h"
+
+namespace clothstream::vulkan {
+
+struct Device::Handles {
+  vk::raii::Context context;
+  vk::raii::Instance instance = nullptr;
+  vk::raii::DebugUtilsMessengerEXT messenger = nullptr;
+  vk::raii::PhysicalDevice physical = nullptr;
+  vk::raii::Device device = nullptr;
+  vk::raii::Queue queue = nullptr;
+  vk::raii::Semaphore timeline = nullptr;
+  vk::raii::PipelineCache pipelineCache = nullptr;
+  std::uint32_t queueFamily = 0;
+
+  bool validates() const { return *messenger != vk::DebugUtilsMessengerEXT{}; }
+};
+
+struct Buffer::Handles {
+  vk::raii::DeviceMemory memory = nullptr;
+  vk::raii::Buffer buffer = nullptr;
+  vk::raii::BufferView texelView = nullptr;
+};
+
+struct Kernel::Handles {
+  vk::raii::DescriptorSetLayout setLayout = nullptr;
+  vk::raii::PipelineLayout layout = nullptr;
+  vk::raii::Pipeline pipeline = nullptr;
+};
+
+struct Bindings::Handles {
+  vk::raii::DescriptorPool pool = nullptr;
+  vk::raii::DescriptorSet set = nullptr;
+};
+
+struct Recorder::Handles {
+  vk::raii::CommandPool pool = nullptr;
+  vk::raii::CommandBuffer commands = nullptr;
+  vk::raii::QueryPool timestamps = nullptr;  // mark i begins stage marks_[i]; one more ends the last
+};
+
+}  // namespace clothstream::vulkan
