@@ -35,7 +35,7 @@ struct Cut {
 // Software devices pay for every load, GPUs for every idle lane (docs/benchmarks.md has the measurements).
 Cut cutScene(const vulkan::Device& device, const scene::Scene& scene, const SimulationOptions& options) {
   Cut cut{options.rowsPerInvocation, options.workgroupSize, {}};
-  if (cut.rowsPerInvocation == 0) cut.rowsPerInvocation = device.isSoftware() ? 8 : 1;
+  if (cut.rowsPerInvocation == 0) cut.rowsPerInvocation = device.isSoftware() ? 4 : 1;
   if (cut.workgroupSize == 0) cut.workgroupSize = 64;
   cut.workgroupSize = std::min(cut.workgroupSize, device.limits().maxWorkgroupInvocations);
   cut.tiles = tileRecords(scene.cloths, cut.rowsPerInvocation, cut.workgroupSize);

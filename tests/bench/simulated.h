@@ -16,7 +16,7 @@ class Simulated {
  public:
   Simulated(vulkan::Device& device, const scene::Scene& scene, const simulation::SimulationOptions& options);
 
-  // Two substeps from a displaced state on the device and in the reference; throws std::runtime_error where
+  // One tick from a displaced state on the device and in the reference; throws std::runtime_error where
   // they differ by more than float rounding explains. Leaves the state it reached. Returns the reference's
   // seconds.
   double check(const simulation::TickInputs& inputs);

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <random>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -47,6 +48,7 @@ class Running {
   simulation::StateSnapshot save();
   simulation::NodeState state() { return simulation::unpack(save()); }
   std::vector<scene::Vec3> normals();
+  void setCloths(std::span<const scene::Cloth> cloths) { simulation_.setCloths(cloths); }
   void checkpoint();
   void rollback();
 

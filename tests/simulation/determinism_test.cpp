@@ -1,0 +1,148 @@
+// SPDX-License-Identifier: MIT
+// The same inputs give the same bits: however the work is cut, in whatever company, on whichever device.
+#include <cmath>
+#include <set>
+
+#include <gtest/gtest.h>
+
+#include "tests/simulation/scenes.h"
+
+namespace clothstream::tests {
+namespace {
+
+using simulation::NodeState;
+using simulation::StateSnapshot;
+using simulation::TickInputs;
+using simulation::TickStatus;
+
+// Everything at once: two sizes, wind, friction, damping, pins, and a sphere that comes through.
+scene::Scene busyScene() {
+  scene::Cloth curtain = calmCloth(37, 29);
+  curtain.pins = {topRow(curtain)};
+  curtain.drag = 0.6f;
+  curtain.lift = 0.4f;
+  scene::Cloth rag = calmCloth(13, 70);
+  rag.grid.pose.position = scene::Vec3(0.1f, 0.3f, 0.2f);
+  rag.friction = 0.8f;
+  scene::Scene scene = sceneOf({curtain, rag});
+  scene.environment.wind = scene::Vec3(1, 0, 3);
+  return scene;
+}
+
+TickInputs busyInputs(const scene::Scene& scene, int tick) {
+  const auto z = [](int t) { return 0.4f - 0.01f * static_cast<float>(t % 80); };
+  return inputsOf(scene,
+                  {{scene::Vec3(0, -0.4f, z(tick)), scene::Vec3(0, -0.4f, z(tick) - 0.01f), 0.12f, 1}});
+}
+
+class Determinism : public GpuTest {};
+
+TEST_F(Determinism, oneThousandTicksGiveTheSameHashesInTwoRunsHoweverTheWorkIsCut) {
+  const scene::Scene scene = busyScene();
+  Running narrow(scene, {.rowsPerInvocation = 1, .workgroupSize = 32, .advanceKernel = {}});
+  Running wide(scene, {.rowsPerInvocation = 7, .workgroupSize = 128, .advanceKernel = {}});
+  Running usual(scene), again(scene);
+  for (int tick = 0; tick < 1000; ++tick) {
+    const TickInputs inputs = busyInputs(scene, tick);
+    const TickStatus status = usual.tick(inputs);
+    ASSERT_TRUE(status.healthy) << "tick " << tick;
+    ASSERT_EQ(again.tick(inputs).stateHash, status.stateHash) << "tick " << tick;
+    if (tick >= 100) continue;
+    ASSERT_EQ(narrow.tick(inputs).stateHash, status.stateHash) << "tick " << tick;
+    ASSERT_EQ(wide.tick(inputs).stateHash, status.stateHash) << "tick " << tick;
+  }
+}
+
+// The same number on every device: one that fails here cannot take over another's scene, nor replay its
+// recordings.
+TEST_F(Determinism, theHashAfterOneHundredTicksIsThatOfEveryOtherDevice) {
+  const scene::Scene scene = busyScene();
+  Running running(scene);
+  TickStatus status;
+  for (int tick = 0; tick < 100; ++tick) status = running.tick(busyInputs(scene, tick));
+  EXPECT_EQ(status.stateHash, 0x1b83db2a4021b4a7u);
+}
+
+TEST_F(Determinism, clothsInOneSceneMoveAsEachAlone) {
+  const std::pair<std::uint32_t, std::uint32_t> shapes[] = {{2, 2}, {3, 65}, {65, 3}, {31, 33}, {64, 64}};
+  std::vector<scene::Cloth> cloths;
+  for (const auto& [rows, columns] : shapes) {
+    scene::Cloth cloth = calmCloth(rows, columns);
+    // Each of its own material: the first has neither air nor damped springs, which must not change when
+    // others do.
+    const auto i = static_cast<float>(cloths.size());
+    cloth.drag = 0.3f * i;
+    cloth.structural.damping = cloth.shear.damping = cloth.bend.damping = 0.05f * i;
+    cloth.damping = 0.2f * i;
+    cloths.push_back(cloth);
+  }
+  const scene::Scene together = sceneOf(cloths);
+  std::mt19937 random(3);
+  const NodeState start = randomState(together, random, 0.004f, 0.5f);
+  Running all(together);
+  all.restore(start);
+  const TickInputs inputs = busyInputs(together, 35);
+  for (int tick = 0; tick < 5; ++tick) all.tick(inputs);
+  const NodeState end = all.state();
+  EXPECT_NE(end.positions, start.positions);
+
+  const std::vector<std::uint32_t> offsets = simulation::clothOffsets(cloths);
+  for (std::size_t i = 0; i < cloths.size(); ++i) {
+    const auto part = [&](const std::vector<scene::Vec3>& whole) {
+      return std::vector<scene::Vec3>(whole.begin() + offsets[i], whole.begin() + offsets[i + 1]);
+    };
+    Running alone(sceneOf({cloths[i]}));
+    alone.restore(NodeState{part(start.positions), part(start.velocities)});
+    for (int tick = 0; tick < 5; ++tick) alone.tick(inputs);
+    const NodeState own = alone.state();
+    EXPECT_EQ(own.positions, part(end.positions)) << "cloth " << i;
+    EXPECT_EQ(own.velocities, part(end.velocities)) << "cloth " << i;
+  }
+}
+
+TEST_F(Determinism, theDevicesHashIsTheOneComputedOnTheCpu) {
+  const scene::Scene scene = busyScene();
+  Running running(scene);
+  for (int tick = 0; tick < 3; ++tick) {
+    const TickStatus status = running.tick(busyInputs(scene, tick));
+    EXPECT_EQ(status.stateHash, simulation::statusOf(running.save()).stateHash);
+  }
+}
+
+TEST_F(Determinism, noStoredComponentIsTinierThanTheSmallest) {
+  // A cloth at rest in its plane: everything sideways is zero or decays towards it.
+  scene::Scene scene = sceneOf({calmCloth(8, 8)});
+  NodeState state = simulation::restState(scene.cloths);
+  for (scene::Vec3& velocity : state.velocities) velocity.z() = 3e-20f;
+  Running running(scene);
+  running.restore(state);
+  for (int tick = 0; tick < 100; ++tick) {
+    running.tick(inputsOf(scene));
+    const NodeState now = running.state();
+    for (const auto* vectors : {&now.positions, &now.velocities})
+      for (const scene::Vec3& v : *vectors)
+        for (const float component : v)
+          ASSERT_TRUE(component == 0 || std::abs(component) >= 1e-20f) << component;
+  }
+}
+
+TEST(StateHash, changesWithAnyBitAndWithAnyNodesPlace) {
+  NodeState state{{{1, 2, 3}, {4, 5, 6}}, {{0, 0, 0}, {7, 8, 9}}};
+  const auto hash = [](const NodeState& s) { return simulation::statusOf(simulation::pack(s, 0)).stateHash; };
+  const std::uint64_t original = hash(state);
+  NodeState swapped = state;
+  std::swap(swapped.positions[0], swapped.positions[1]);
+  std::swap(swapped.velocities[0], swapped.velocities[1]);
+  EXPECT_NE(hash(swapped), original);
+  const StateSnapshot snapshot = simulation::pack(state, 0);
+  std::set<std::uint64_t> hashes{original};
+  for (std::size_t bit = 0; bit < snapshot.bytes.size() * 8; ++bit) {
+    StateSnapshot flipped = snapshot;
+    flipped.bytes[bit / 8] ^= std::byte{1} << (bit % 8);
+    hashes.insert(simulation::statusOf(flipped).stateHash);
+  }
+  EXPECT_EQ(hashes.size(), snapshot.bytes.size() * 8 + 1);
+}
+
+}  // namespace
+}  // namespace clothstream::tests
