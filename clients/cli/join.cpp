@@ -97,8 +97,11 @@ ExitCode join(const JoinOptions& options) {
     obj.emplace(std::move(*created));
   }
   const StatusLine line(!options.json && isatty(STDOUT_FILENO) != 0);
-  auto joined = GrpcClient::join(options.address, {.scene = options.scene, .clientName = "clothstream join"},
-                                 Listener(line));
+  GrpcClientOptions clientOptions;
+  clientOptions.scene = options.scene;
+  clientOptions.clientName = "clothstream join";
+  clientOptions.cancelled = [] { return interrupted(std::chrono::milliseconds(0)); };
+  auto joined = GrpcClient::join(options.address, clientOptions, Listener(line));
   if (!joined) return complain(exitCodeOf(joined.error().kind), joined.error().text);
   GrpcClient& client = **joined;
   sendColliders(client, options);

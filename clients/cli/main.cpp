@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // `clothstream`: what a user of a server needs, on the command line.
 #include <charconv>
+#include <cmath>
 #include <csignal>
 #include <exception>
 

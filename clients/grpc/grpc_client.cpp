@@ -2,6 +2,7 @@
 // One call, one completion queue, one thread that owns all of it.
 #include "clients/grpc/grpc_client.h"
 
+#include <algorithm>
 #include <cassert>
 #include <condition_variable>
 #include <future>
@@ -28,6 +29,9 @@ constexpr const char* kJoinMethod = "/clothstream.v1.ClothStream/Join";
 constexpr std::chrono::milliseconds kUpdateInterval{50};
 // For the server to end a stream that we have ended.
 constexpr std::chrono::milliseconds kClosingTime{500};
+
+// How often a caller who waits to be joined may give up.
+constexpr std::chrono::milliseconds kCancelInterval{100};
 
 // What a completion is about.
 enum Operation : std::intptr_t { kStarted = 1, kRead, kWritten, kHalfClosed, kFinished, kWoken };
@@ -65,10 +69,14 @@ class GrpcClient::Stream {
 
   // Nothing if it is joined by then.
   std::optional<Failure> waitUntilJoined() {
+    const auto deadline = SteadyClock::now() + options_.joinTimeout;
     std::unique_lock lock(mutex_);
-    const bool settled = changed_.wait_for(lock, options_.joinTimeout, [&] { return joined_ || ended_; });
-    if (ended_) return ended_;
-    if (settled) return std::nullopt;
+    while (SteadyClock::now() < deadline) {
+      const auto wake = std::min(deadline, SteadyClock::now() + kCancelInterval);
+      if (changed_.wait_until(lock, wake, [&] { return joined_ || ended_; })) return ended_;
+      if (options_.cancelled && options_.cancelled())
+        return Failure{Failure::Kind::unreachable, fmt::format("Gave up before {} answered.", address_)};
+    }
     return Failure{
         Failure::Kind::unreachable,
         fmt::format("No clothstream-server answers at {} within {} s: is it running there, and is the "
