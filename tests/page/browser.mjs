@@ -28,7 +28,7 @@ export function launchBrowser() {
 }
 
 // `prepare` runs in the page before its own scripts. What goes wrong in the page is collected in `errors`.
-export async function openPage(browser, url, { prepare, viewport = { width: 960, height: 540 } } = {}) {
+export async function openPage(browser, url, { prepare, viewport = { width: 800, height: 450 } } = {}) {
   const page = await browser.newPage({ viewport });
   page.setDefaultTimeout(kWaitMs);
   page.errors = [];

@@ -5,10 +5,12 @@ import * as THREE from "three";
 import type { ClothLayout } from "./client";
 
 // Madder, indigo, ochre, moss, plum, linen: told apart also where colours are not.
-const kColours = [0x8c3433, 0x2a567a, 0xb5843c, 0x55714a, 0x745684, 0xb5a98f];
+const kColours = [0x8a3433, 0x2a567a, 0xb5843c, 0x55714a, 0x745684, 0xb5a98f];
 
 // Metres that one tile of the weave covers, which is two threads.
 const kWeaveTile = 0.012;
+// How far a cloth moves away from where it starts, in parts of its size.
+const kSwing = 0.3;
 const kWeaveTexels = 32;
 
 export class ClothMesh {
@@ -44,7 +46,7 @@ export class ClothMesh {
     if (layout.rows > 1 && layout.columns > 1) {
       geometry.setAttribute("uv", threadCoordinates(layout, rest));
       material.normalMap = weaveNormals();
-      material.normalScale.setScalar(0.3);
+      material.normalScale.setScalar(0.22);
     }
     this.mesh = new THREE.Mesh(geometry, material);
     this.mesh.castShadow = true;
@@ -59,6 +61,15 @@ export class ClothMesh {
     this.positions.needsUpdate = true;
     this.normals.array = this.part(normals);
     this.normals.needsUpdate = true;
+  }
+
+  // Where the cloth will mostly be: as it starts, and from there down and to both sides, where it falls and flies.
+  reach(): THREE.Box3 {
+    const box = new THREE.Box3().setFromBufferAttribute(this.positions);
+    const size = box.getSize(new THREE.Vector3());
+    const swing = kSwing * Math.max(size.x, size.y, size.z);
+    box.min.y -= swing;
+    return box.expandByVector(new THREE.Vector3(0, 0, swing / 2));
   }
 
   dispose(): void {

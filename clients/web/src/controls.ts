@@ -23,6 +23,7 @@ export class Controls {
   private readonly stiffness = new Slider("stiffness", (value) => `× ${(2 ** value).toFixed(2)}`);
   private readonly damping = new Slider("damping", (value) => `${value.toFixed(2)} /s`);
   private readonly radius = new Slider("radius", (value) => `${value.toFixed(2)} m`);
+  private readonly sliders = [this.wind, this.gravity, this.stiffness, this.damping, this.radius];
   private windDirection = kDefaultWind;
   private gravityDirection = kDown;
   // The cloths as the description found them: what stiffness multiplies.
@@ -50,6 +51,7 @@ export class Controls {
   }
 
   describe(client: Client): void {
+    for (const slider of this.sliders) slider.forget();
     this.base = client.clothParameters();
     const environment = client.environment();
     this.windDirection = direction(environment?.wind ?? kStill, kDefaultWind);
@@ -62,7 +64,13 @@ export class Controls {
     this.show(client);
   }
 
-  // Shows the parameters as they stand, but for a slider that somebody holds.
+  // The server refused a change: the sliders go back to what holds.
+  refused(client: Client): void {
+    for (const slider of this.sliders) slider.forget();
+    this.show(client);
+  }
+
+  // Shows the parameters as they stand.
   show(client: Client): void {
     const environment = client.environment();
     if (environment) this.showEnvironment(environment);
@@ -112,7 +120,8 @@ class Slider {
   private readonly input: HTMLInputElement;
   private readonly output: HTMLElement;
   private changed = false;
-  private touchedAt = -Infinity;
+  // What went to the server and has not come back yet.
+  private sent: number | undefined;
 
   constructor(
     id: string,
@@ -122,7 +131,6 @@ class Slider {
     this.output = element(`${id}-value`);
     this.input.addEventListener("input", () => {
       this.changed = true;
-      this.touchedAt = performance.now();
       this.write();
     });
   }
@@ -131,22 +139,25 @@ class Slider {
   take(): number | undefined {
     if (!this.changed) return undefined;
     this.changed = false;
-    return this.input.valueAsNumber;
+    this.sent = this.input.valueAsNumber;
+    return this.sent;
   }
 
-  // The server's value; it yields to a hand on the slider, whose own changes come back late.
+  // The server's value. Older ones, on their way while a hand moves the slider, do not move it back.
   show(value: number): void {
-    if (performance.now() - this.touchedAt < 1000) return;
+    const step = Number(this.input.step);
+    if (this.sent !== undefined && Math.abs(value - this.sent) < step / 2) this.sent = undefined;
+    if (this.changed || this.sent !== undefined) return;
     if (value > Number(this.input.max)) this.input.max = String(Math.ceil(value));
-    if (Math.abs(this.input.valueAsNumber - value) < Number(this.input.step) / 2 && this.output.textContent) return;
+    if (Math.abs(this.input.valueAsNumber - value) < step / 2 && this.output.textContent) return;
     this.input.valueAsNumber = value;
     this.write();
   }
 
-  // It now stands for something else.
+  // It now stands for something else, or what was sent will not come back.
   forget(): void {
     this.changed = false;
-    this.touchedAt = -Infinity;
+    this.sent = undefined;
   }
 
   private write(): void {

@@ -52,7 +52,10 @@ async function start(): Promise<void> {
     parametersChanged: (client) => controls.show(client),
     scenesListed: (scenes) => controls.listScenes(scenes, session.client?.sceneName ?? ""),
     notice: (text) => hud.showNotice(text),
-    refused: (text) => hud.showNotice(text),
+    refused: (client) => {
+      hud.showNotice(client.errorText);
+      controls.refused(client);
+    },
   });
   const probe = expose(session, view);
 

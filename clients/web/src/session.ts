@@ -18,7 +18,7 @@ export interface SessionListener {
   scenesListed(scenes: string[]): void;
   notice(text: string): void;
   // The server refused something, and goes on.
-  refused(text: string): void;
+  refused(client: Client): void;
 }
 
 const kPingPeriodMs = 100;
@@ -83,7 +83,7 @@ export class Session {
     if (events & ClientEvent.notice) this.listener.notice(client.noticeText);
     if (events & ClientEvent.error) {
       if (client.state === ClientState.failed) this.fail(client.errorText);
-      else this.listener.refused(client.errorText);
+      else this.listener.refused(client);
     }
     if (this.state.kind === "connecting" && client.state === ClientState.joined) this.enter({ kind: "live" });
   }

@@ -10,11 +10,17 @@ const kWidth = 3.2;
 const kNear = 1;
 const kFar = 9;
 // Diameter of the light over its distance.
-const kLightSpread = 0.16;
+const kLightSpread = 0.14;
 // How far in front of a surface, as a part of the camera's depth, something that shades it is looked for.
 const kSearchDepth = 0.25;
+// Samples that look for what shades, and that find how much of it does.
+const kSearchSamples = 12;
+const kFilterSamples = 18;
 
 const kDepthPerWidth = kWidth / (kFar - kNear);
+// Largest slope along a surface that is believed, and how much it may bend within a sample's reach.
+const kSteepest = 6 * kDepthPerWidth;
+const kCurvature = 0.9 * kDepthPerWidth;
 const kUvPerDepth = kLightSpread / 2 / kDepthPerWidth;
 
 const kShadowFunction = /* glsl */ `
@@ -24,16 +30,21 @@ vec2 diskSample(int index, int count, float turn) {
 }
 
 float softShadow(sampler2D shadowMap, vec3 coord) {
+  // Depth over the map's axes along the shaded surface, so that it does not shade itself where it leans.
+  vec3 dx = dFdx(coord);
+  vec3 dy = dFdy(coord);
+  float area = dx.x * dy.y - dx.y * dy.x;
+  vec2 slope = vec2(dy.y * dx.z - dx.y * dy.z, dx.x * dy.z - dy.x * dx.z) / (abs(area) > 1e-12 ? area : 1.0);
+  slope *= min(1.0, ${kSteepest.toFixed(6)} / max(length(slope), 1e-6));
+
   // Interleaved gradient noise turns the disk from pixel to pixel, so that few samples leave no bands.
   float turn = 6.2831853 * fract(52.9829189 * fract(dot(gl_FragCoord.xy, vec2(0.06711056, 0.00583715))));
-  float search = ${(kUvPerDepth * kSearchDepth).toFixed(6)};
   float blockers = 0.0;
   float blockerDepth = 0.0;
-  for (int i = 0; i < 16; ++i) {
-    vec2 offset = search * diskSample(i, 16, turn);
+  for (int i = 0; i < ${kSearchSamples}; ++i) {
+    vec2 offset = ${(kUvPerDepth * kSearchDepth).toFixed(6)} * diskSample(i, ${kSearchSamples}, turn);
     float depth = unpackRGBAToDepth(texture2D(shadowMap, coord.xy + offset));
-    // A surface must not shade itself where it leans towards the light by less than 45 degrees.
-    if (depth < coord.z - ${kDepthPerWidth.toFixed(6)} * length(offset)) {
+    if (depth < coord.z + dot(slope, offset) - ${kCurvature.toFixed(6)} * length(offset)) {
       blockers += 1.0;
       blockerDepth += depth;
     }
@@ -41,11 +52,12 @@ float softShadow(sampler2D shadowMap, vec3 coord) {
   if (blockers == 0.0) return 1.0;
   float radius = max(${kUvPerDepth.toFixed(6)} * (coord.z - blockerDepth / blockers), ${(1.5 / kTexels).toFixed(6)});
   float lit = 0.0;
-  for (int i = 0; i < 24; ++i) {
-    vec2 offset = radius * diskSample(i, 24, turn);
-    lit += step(coord.z - ${(0.8 * kDepthPerWidth).toFixed(6)} * length(offset), unpackRGBAToDepth(texture2D(shadowMap, coord.xy + offset)));
+  for (int i = 0; i < ${kFilterSamples}; ++i) {
+    vec2 offset = radius * diskSample(i, ${kFilterSamples}, turn);
+    float depth = unpackRGBAToDepth(texture2D(shadowMap, coord.xy + offset));
+    lit += step(coord.z + dot(slope, offset) - ${kCurvature.toFixed(6)} * length(offset), depth);
   }
-  return lit / 24.0;
+  return lit / ${kFilterSamples}.0;
 }
 `;
 

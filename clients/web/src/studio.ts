@@ -5,11 +5,11 @@ import * as THREE from "three";
 import { aimSoftLight } from "./soft_shadow";
 
 const kBackground = 0x1b1c20;
-const kKeyDirection = new THREE.Vector3(0.85, 1.0, 0.6);
+const kKeyDirection = new THREE.Vector3(0.8, 1.0, 0.65);
 
 export class Studio {
   readonly scene = new THREE.Scene();
-  private readonly key = new THREE.DirectionalLight(0xfff1df, 3.4);
+  private readonly key = new THREE.DirectionalLight(0xfff1df, 3.0);
   private readonly rim = new THREE.DirectionalLight(0xb4c4de, 0.7);
   private readonly floor: THREE.Mesh<THREE.CircleGeometry, THREE.MeshStandardMaterial>;
   private readonly fog = new THREE.Fog(kBackground);
@@ -17,20 +17,15 @@ export class Studio {
   constructor() {
     this.scene.background = new THREE.Color(kBackground);
     this.scene.fog = this.fog;
-    this.scene.add(new THREE.HemisphereLight(0xe9ecf2, 0x948a82, 1.75));
+    this.scene.add(new THREE.HemisphereLight(0xe9ecf2, 0xa39a93, 2.3));
 
     this.scene.add(this.key, this.key.target, this.rim, this.rim.target);
 
-    const material = new THREE.MeshStandardMaterial({ color: 0x2c2d31, roughness: 0.95 });
+    const material = new THREE.MeshStandardMaterial({ color: 0x27282b, roughness: 0.95 });
     this.floor = new THREE.Mesh(new THREE.CircleGeometry(1, 96), material);
     this.floor.rotation.x = -Math.PI / 2;
     this.floor.receiveShadow = true;
     this.scene.add(this.floor);
-  }
-
-  // Height of the floor, metres.
-  get floorHeight(): number {
-    return this.floor.position.y;
   }
 
   // Unit vector towards the key light.
@@ -38,13 +33,11 @@ export class Studio {
     return this.key.position.clone().sub(this.key.target.position).normalize();
   }
 
-  fit(bounds: THREE.Box3): void {
+  fit(bounds: THREE.Box3, floorHeight: number): void {
     const centre = bounds.getCenter(new THREE.Vector3());
     const radius = bounds.getBoundingSphere(new THREE.Sphere()).radius;
 
-    // The floor is the plane y = 0 where that lies a little below everything, which is how scenes are made.
-    const below = bounds.min.y;
-    this.floor.position.y = below >= 0 && below < 2 * radius ? 0 : below - 0.2 * radius;
+    this.floor.position.y = floorHeight;
     this.floor.scale.setScalar(20 * radius);
     this.fog.near = 3.5 * radius;
     this.fog.far = 17 * radius;

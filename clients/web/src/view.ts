@@ -23,6 +23,7 @@ export class View {
   private readonly bounds = new THREE.Box3(new THREE.Vector3(-1, 0, -1), new THREE.Vector3(1, 2, 1));
   private cloths: ClothMesh[] = [];
   private vertexCount = 0;
+  private floorHeight = 0;
 
   // Throws where WebGL is not to be had.
   constructor(readonly canvas: HTMLCanvasElement) {
@@ -35,8 +36,7 @@ export class View {
     this.orbit = new OrbitControls(this.camera, canvas);
     this.orbit.enableDamping = true;
     this.orbit.dampingFactor = 0.12;
-    this.studio.fit(this.bounds);
-    this.reset();
+    this.fit();
     new ResizeObserver(() => this.resize()).observe(canvas);
     this.resize();
   }
@@ -54,13 +54,12 @@ export class View {
     for (const cloth of this.cloths) this.studio.scene.add(cloth.mesh);
 
     this.bounds.makeEmpty();
-    for (let i = 0; i < rest.length; i += 3) this.bounds.expandByPoint(new THREE.Vector3().fromArray(rest, i));
+    for (const cloth of this.cloths) this.bounds.union(cloth.reach());
     for (const { position, radius } of client.colliders()) {
       const centre = new THREE.Vector3(...position);
       this.bounds.expandByPoint(centre.clone().subScalar(radius)).expandByPoint(centre.addScalar(radius));
     }
-    this.studio.fit(this.bounds);
-    this.reset();
+    this.fit();
   }
 
   // Draws the newest frame. The core's memory is read before this returns.
@@ -138,8 +137,18 @@ export class View {
   // Where the key light casts a point's shadow on the floor.
   shadowOf(point: Vec3): Vec3 {
     const light = this.studio.lightDirection;
-    const reach = (point[1] - this.studio.floorHeight) / light.y;
-    return [point[0] - reach * light.x, this.studio.floorHeight, point[2] - reach * light.z];
+    const reach = (point[1] - this.floorHeight) / light.y;
+    return [point[0] - reach * light.x, this.floorHeight, point[2] - reach * light.z];
+  }
+
+  // The floor is the plane y = 0 where that lies near the lower end of things, which is how scenes are made.
+  private fit(): void {
+    const { min, max } = this.bounds;
+    const size = max.distanceTo(min);
+    this.floorHeight = Math.abs(min.y) < 0.5 * size ? 0 : min.y;
+    min.y = Math.max(min.y, this.floorHeight);
+    this.studio.fit(this.bounds, this.floorHeight);
+    this.reset();
   }
 
   private placeSpheres(colliders: SphereCollider[]): void {
