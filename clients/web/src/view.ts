@@ -106,11 +106,11 @@ export class View {
     this.orbit.update();
   }
 
-  // Steps to the left and up, for keys.
-  turn(left: number, up: number): void {
+  // Moves the camera round what it looks at, in steps to the right and up; for keys.
+  turn(right: number, up: number): void {
     const offset = this.camera.position.clone().sub(this.orbit.target);
     const spherical = new THREE.Spherical().setFromVector3(offset);
-    spherical.theta -= left * kTurnStep;
+    spherical.theta += right * kTurnStep;
     spherical.phi -= up * kTurnStep;
     this.camera.position.setFromSpherical(spherical.makeSafe()).add(this.orbit.target);
   }
