@@ -51,7 +51,8 @@ std::uint32_t memoryType(const Device& device, std::uint32_t typeBits, const Tra
   };
   if (const auto best = find(traits.wanted | traits.preferred)) return *best;
   if (const auto good = find(traits.wanted)) return *good;
-  throw std::runtime_error(fmt::format("{} has no memory that is {}", device.info().name, vk::to_string(traits.wanted)));
+  throw std::runtime_error(
+      fmt::format("{} has no memory that is {}", device.info().name, vk::to_string(traits.wanted)));
 }
 
 }  // namespace
@@ -61,7 +62,8 @@ Buffer::~Buffer() = default;
 Buffer::Buffer(Buffer&&) noexcept = default;
 Buffer& Buffer::operator=(Buffer&&) noexcept = default;
 
-Buffer::Buffer(const Device& device, BufferPurpose purpose, std::size_t bytes) : bytes_(bytes), handles_(std::make_unique<Handles>()) {
+Buffer::Buffer(const Device& device, BufferPurpose purpose, std::size_t bytes)
+    : bytes_(bytes), handles_(std::make_unique<Handles>()) {
   assert(bytes > 0);
   const bool texels = purpose == BufferPurpose::texels;
   const bool mapped = purpose == BufferPurpose::upload || purpose == BufferPurpose::readback;
@@ -87,8 +89,8 @@ Buffer::Buffer(const Device& device, BufferPurpose purpose, std::size_t bytes) :
     if (mapped) mapped_ = handles_->memory.mapMemory(0, VK_WHOLE_SIZE);
     if (texels)
       handles_->texelView = vk::raii::BufferView(
-          vulkan,
-          vk::BufferViewCreateInfo{.buffer = *handles_->buffer, .format = kTexelFormat, .range = VK_WHOLE_SIZE});
+          vulkan, vk::BufferViewCreateInfo{
+                      .buffer = *handles_->buffer, .format = kTexelFormat, .range = VK_WHOLE_SIZE});
   } catch (const vk::SystemError& error) {
     throw std::runtime_error(
         fmt::format("no buffer of {} bytes can be made on {}: {}", bytes, device.info().name, error.what()));

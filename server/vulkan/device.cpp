@@ -161,10 +161,10 @@ TimelineValue Device::submit(Recorder& recorder) {
                                                  .pSignalSemaphoreValues = &value};
   try {
     handles_->queue.submit(vk::SubmitInfo{.pNext = &timeline,
-                                 .commandBufferCount = 1,
-                                 .pCommandBuffers = &commands,
-                                 .signalSemaphoreCount = 1,
-                                 .pSignalSemaphores = &*handles_->timeline});
+                                          .commandBufferCount = 1,
+                                          .pCommandBuffers = &commands,
+                                          .signalSemaphoreCount = 1,
+                                          .pSignalSemaphores = &*handles_->timeline});
   } catch (const vk::DeviceLostError&) {
     throw DeviceLost(kLost);
   }
@@ -174,8 +174,9 @@ TimelineValue Device::submit(Recorder& recorder) {
 bool Device::wait(TimelineValue value, std::chrono::nanoseconds timeout) const {
   const auto nanoseconds = static_cast<std::uint64_t>(std::max<std::int64_t>(timeout.count(), 0));
   try {
-    return handles_->device.waitSemaphores({.semaphoreCount = 1, .pSemaphores = &*handles_->timeline, .pValues = &value},
-                                  nanoseconds) == vk::Result::eSuccess;
+    return handles_->device.waitSemaphores(
+               {.semaphoreCount = 1, .pSemaphores = &*handles_->timeline, .pValues = &value}, nanoseconds) ==
+           vk::Result::eSuccess;
   } catch (const vk::DeviceLostError&) {
     throw DeviceLost(kLost);
   }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The Vulkan objects behind this room's classes; kept out of their headers, for the bindings are slow to compile.
+// The Vulkan objects behind this room's classes; kept out of their headers, for the bindings are slow to
+// compile.
 #pragma once
 
 #include <vulkan/vulkan_raii.hpp>

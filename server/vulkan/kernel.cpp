@@ -61,14 +61,13 @@ Kernel::Kernel(const Device& device, const KernelDescription& description)
   const vk::raii::Device& vulkan = device.handles().device;
   try {
     handles_->setLayout = vk::raii::DescriptorSetLayout(
-        vulkan,
-        vk::DescriptorSetLayoutCreateInfo{.bindingCount = static_cast<std::uint32_t>(slots.size()),
-                                          .pBindings = slots.data()});
+        vulkan, vk::DescriptorSetLayoutCreateInfo{.bindingCount = static_cast<std::uint32_t>(slots.size()),
+                                                  .pBindings = slots.data()});
     handles_->layout = vk::raii::PipelineLayout(
         vulkan, vk::PipelineLayoutCreateInfo{.setLayoutCount = 1,
-                                                      .pSetLayouts = &*handles_->setLayout,
-                                                      .pushConstantRangeCount = pushConstantBytes_ > 0,
-                                                      .pPushConstantRanges = &push});
+                                             .pSetLayouts = &*handles_->setLayout,
+                                             .pushConstantRangeCount = pushConstantBytes_ > 0,
+                                             .pPushConstantRanges = &push});
     const vk::raii::ShaderModule module(vulkan,
                                         vk::ShaderModuleCreateInfo{.codeSize = description.spirv.size_bytes(),
                                                                    .pCode = description.spirv.data()});
@@ -123,15 +122,14 @@ Bindings::Bindings(const Device& device, const Kernel& kernel, std::initializer_
   const vk::raii::Device& vulkan = device.handles().device;
   try {
     handles_->pool = vk::raii::DescriptorPool(
-        vulkan,
-        vk::DescriptorPoolCreateInfo{.flags = vk::DescriptorPoolCreateFlagBits::eFreeDescriptorSet,
-                                     .maxSets = 1,
-                                     .poolSizeCount = count,
-                                     .pPoolSizes = sizes.data()});
-    vk::raii::DescriptorSets sets(
-        vulkan,
-        vk::DescriptorSetAllocateInfo{
-            .descriptorPool = *handles_->pool, .descriptorSetCount = 1, .pSetLayouts = &*kernel.handles().setLayout});
+        vulkan, vk::DescriptorPoolCreateInfo{.flags = vk::DescriptorPoolCreateFlagBits::eFreeDescriptorSet,
+                                             .maxSets = 1,
+                                             .poolSizeCount = count,
+                                             .pPoolSizes = sizes.data()});
+    vk::raii::DescriptorSets sets(vulkan,
+                                  vk::DescriptorSetAllocateInfo{.descriptorPool = *handles_->pool,
+                                                                .descriptorSetCount = 1,
+                                                                .pSetLayouts = &*kernel.handles().setLayout});
     handles_->set = std::move(sets.front());
   } catch (const vk::SystemError& error) {
     throw std::runtime_error(fmt::format("kernel {} cannot be bound: {}", kernel.name(), error.what()));

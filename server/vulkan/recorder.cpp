@@ -28,19 +28,18 @@ Recorder& Recorder::operator=(Recorder&&) noexcept = default;
 
 Recorder::Recorder(const Device& device) : device_(&device), handles_(std::make_unique<Handles>()) {
   const vk::raii::Device& vulkan = device.handles().device;
-  handles_->pool = vk::raii::CommandPool(vulkan,
-                                vk::CommandPoolCreateInfo{.queueFamilyIndex = device.handles().queueFamily});
-  vk::raii::CommandBuffers all(
-      vulkan,
-      vk::CommandBufferAllocateInfo{
-          .commandPool = *handles_->pool, .level = vk::CommandBufferLevel::ePrimary, .commandBufferCount = 1});
+  handles_->pool = vk::raii::CommandPool(
+      vulkan, vk::CommandPoolCreateInfo{.queueFamilyIndex = device.handles().queueFamily});
+  vk::raii::CommandBuffers all(vulkan,
+                               vk::CommandBufferAllocateInfo{.commandPool = *handles_->pool,
+                                                             .level = vk::CommandBufferLevel::ePrimary,
+                                                             .commandBufferCount = 1});
   handles_->commands = std::move(all.front());
   const std::uint32_t bits =
       device.handles().physical.getQueueFamilyProperties()[device.handles().queueFamily].timestampValidBits;
   if (bits > 0)
     handles_->timestamps = vk::raii::QueryPool(
-        vulkan,
-        vk::QueryPoolCreateInfo{.queryType = vk::QueryType::eTimestamp, .queryCount = kMaxMarks + 1});
+        vulkan, vk::QueryPoolCreateInfo{.queryType = vk::QueryType::eTimestamp, .queryCount = kMaxMarks + 1});
   timestampMask_ = bits >= 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << bits) - 1;
   marks_.reserve(kMaxMarks);
   ticks_.resize(kMaxMarks + 1);
@@ -64,7 +63,8 @@ void Recorder::beginStage(std::string_view stage) {
 
 void Recorder::mark() {
   if (*handles_->timestamps)
-    handles_->commands.writeTimestamp(Stage::eBottomOfPipe, *handles_->timestamps, static_cast<std::uint32_t>(marks_.size()));
+    handles_->commands.writeTimestamp(Stage::eBottomOfPipe, *handles_->timestamps,
+                                      static_cast<std::uint32_t>(marks_.size()));
 }
 
 void Recorder::dispatchBytes(const Bindings& bindings, const void* push, std::uint32_t pushBytes,
@@ -94,11 +94,11 @@ void Recorder::bind(const Bindings& bindings, const void* push, std::uint32_t pu
   assert(open_ && pushBytes == kernel.pushConstantBytes());
   handles_->commands.bindPipeline(vk::PipelineBindPoint::eCompute, *kernel.handles().pipeline);
   if (*bindings.handles().set)
-    handles_->commands.bindDescriptorSets(vk::PipelineBindPoint::eCompute, *kernel.handles().layout, 0, *bindings.handles().set,
-                                 nullptr);
+    handles_->commands.bindDescriptorSets(vk::PipelineBindPoint::eCompute, *kernel.handles().layout, 0,
+                                          *bindings.handles().set, nullptr);
   if (pushBytes > 0)
-    handles_->commands.pushConstants<std::byte>(*kernel.handles().layout, vk::ShaderStageFlagBits::eCompute, 0,
-                                       {pushBytes, static_cast<const std::byte*>(push)});
+    handles_->commands.pushConstants<std::byte>(*kernel.handles().layout, vk::ShaderStageFlagBits::eCompute,
+                                                0, {pushBytes, static_cast<const std::byte*>(push)});
 }
 
 void Recorder::barrier() {
@@ -111,8 +111,9 @@ void Recorder::copy(const Buffer& from, const Buffer& to, std::size_t bytes, std
                     std::size_t toOffset) {
   assert(open_ && fromOffset + bytes <= from.bytes() && toOffset + bytes <= to.bytes());
   if (bytes == 0) return;
-  handles_->commands.copyBuffer(*from.handles().buffer, *to.handles().buffer,
-                       vk::BufferCopy{.srcOffset = fromOffset, .dstOffset = toOffset, .size = bytes});
+  handles_->commands.copyBuffer(
+      *from.handles().buffer, *to.handles().buffer,
+      vk::BufferCopy{.srcOffset = fromOffset, .dstOffset = toOffset, .size = bytes});
 }
 
 void Recorder::fill(const Buffer& buffer, std::uint32_t value, std::size_t bytes, std::size_t offset) {
@@ -125,7 +126,8 @@ void Recorder::finish() {
   if (!open_) return;
   if (!marks_.empty()) mark();
   const vk::MemoryBarrier memory{.srcAccessMask = kWrites, .dstAccessMask = kUses | Access::eHostRead};
-  handles_->commands.pipelineBarrier(kWork, kWork | Stage::eDrawIndirect | Stage::eHost, {}, memory, nullptr, nullptr);
+  handles_->commands.pipelineBarrier(kWork, kWork | Stage::eDrawIndirect | Stage::eHost, {}, memory, nullptr,
+                                     nullptr);
   handles_->commands.end();
   open_ = false;
 }
@@ -135,8 +137,8 @@ std::span<const StageTime> Recorder::stageTimes() {
   if (marks_.empty() || !*handles_->timestamps) return times_;
   const auto count = static_cast<std::uint32_t>(marks_.size() + 1);
   const VkResult result = device_->handles().device.getDispatcher()->vkGetQueryPoolResults(
-      *device_->handles().device, *handles_->timestamps, 0, count, count * sizeof(std::uint64_t), ticks_.data(),
-      sizeof(std::uint64_t), VK_QUERY_RESULT_64_BIT);
+      *device_->handles().device, *handles_->timestamps, 0, count, count * sizeof(std::uint64_t),
+      ticks_.data(), sizeof(std::uint64_t), VK_QUERY_RESULT_64_BIT);
   if (result != VK_SUCCESS) return times_;
   for (std::size_t i = 0; i < marks_.size(); ++i) {
     const double seconds = static_cast<double>((ticks_[i + 1] - ticks_[i]) & timestampMask_) *

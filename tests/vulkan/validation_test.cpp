@@ -51,9 +51,10 @@ class ValidationTest : public tests::GpuTest {
             .front());
     commands.begin(vk::CommandBufferBeginInfo{});
     commands.bindPipeline(vk::PipelineBindPoint::eCompute, *kernel_->handles().pipeline);
-    commands.bindDescriptorSets(vk::PipelineBindPoint::eCompute, *kernel_->handles().layout, 0, *bindings.handles().set,
-                                nullptr);
-    commands.pushConstants<std::uint32_t>(*kernel_->handles().layout, vk::ShaderStageFlagBits::eCompute, 0, kCount);
+    commands.bindDescriptorSets(vk::PipelineBindPoint::eCompute, *kernel_->handles().layout, 0,
+                                *bindings.handles().set, nullptr);
+    commands.pushConstants<std::uint32_t>(*kernel_->handles().layout, vk::ShaderStageFlagBits::eCompute, 0,
+                                          kCount);
     commands.dispatch(kCount / kernel_->workgroupSize(), 1, 1);
     commands.end();
     return commands;
@@ -89,8 +90,9 @@ TEST_F(ValidationTest, reportsAMissingBarrierWithinARecording) {
 }
 
 TEST_F(ValidationTest, reportsAMissingBarrierBetweenSubmissions) {
-  const vk::raii::CommandPool pool(device_->handles().device,
-                                   vk::CommandPoolCreateInfo{.queueFamilyIndex = device_->handles().queueFamily});
+  const vk::raii::CommandPool pool(
+      device_->handles().device,
+      vk::CommandPoolCreateInfo{.queueFamilyIndex = device_->handles().queueFamily});
   const vk::raii::CommandBuffer first = bareDispatch(pool, *first_);
   const vk::raii::CommandBuffer second = bareDispatch(pool, *second_);
   const vk::raii::Queue queue = device_->handles().device.getQueue(device_->handles().queueFamily, 0);
