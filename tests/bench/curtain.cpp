@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: MIT
 // Suite curtain: the time of a simulated tick of a hung cloth with wind and a sphere swinging through it.
+#include "tests/bench/curtain.h"
+
 #include <cmath>
 
 #include "tests/bench/simulated.h"
 #include "tests/bench/suite.h"
 
 namespace clothstream::bench {
-namespace {
 
 scene::Scene curtain(std::uint32_t size) {
   scene::Cloth cloth;
@@ -29,24 +30,21 @@ scene::Scene curtain(std::uint32_t size) {
   return scene;
 }
 
-scene::Vec3 spherePosition(double seconds) {
-  return {0, -1.2f, static_cast<float>(0.6 * std::cos(2 * seconds))};
+simulation::TickInputs curtainInputs(const scene::Scene& scene, std::uint64_t tick) {
+  const auto centre = [&](std::uint64_t at) {
+    const double seconds = static_cast<double>(at) * scene.tickSeconds();
+    return scene::Vec3(0, -1.2f, static_cast<float>(0.6 * std::cos(2 * seconds)));
+  };
+  return {scene.environment, {{centre(tick), centre(tick + 1), 0.25f, 1}}};
 }
-
-}  // namespace
 
 Rows runCurtain(vulkan::Device& device, const Settings& settings) {
   const std::uint32_t size = settings.size.value_or(64);
   const scene::Scene scene = curtain(size);
   Simulated simulated(device, scene, {settings.rowsPerInvocation, settings.workgroupSize, {}});
-  simulation::TickInputs inputs{scene.environment, {{}}};
   std::uint64_t tick = 0;
-  const auto advance = [&] {
-    const double start = static_cast<double>(tick++) * scene.tickSeconds();
-    inputs.spheres.front() = {spherePosition(start), spherePosition(start + scene.tickSeconds()), 0.25f, 1};
-    simulated.tick(inputs);
-  };
-  simulated.check(inputs);
+  const auto advance = [&] { simulated.tick(curtainInputs(scene, tick++)); };
+  simulated.check(curtainInputs(scene, 0));
   simulated.forgetTimes();
   double spent = 0;
   while (spent < settings.seconds || simulated.wall().count() < 100) spent += secondsOf(advance);

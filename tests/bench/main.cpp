@@ -20,6 +20,8 @@ constexpr std::array kSuites{
                  &bench::runMassSpring},
     bench::Suite{"curtain", "a tick of a 64x64 curtain in wind with a sphere, ten substeps",
                  &bench::runCurtain},
+    bench::Suite{"codec", "bits a vertex and milliseconds a frame, key and predicted, of the same curtain",
+                 &bench::runCodec},
 };
 
 void printTable(const bench::Rows& rows) {
