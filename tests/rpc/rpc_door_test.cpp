@@ -68,11 +68,9 @@ TEST_F(RpcDoorTest, ListsScenes) {
   v1::ListScenesResponse response;
   const auto stub = v1::ClothStream::NewStub(channelTo(port()));
   ASSERT_TRUE(stub->ListScenes(&context, {}, &response).ok());
-  ASSERT_EQ(response.scenes_size(), 2);
   std::vector<std::string> names;
   for (const v1::SceneSummary& scene : response.scenes()) names.push_back(scene.name());
-  EXPECT_THAT(names, testing::UnorderedElementsAre("small", "other"));
-  EXPECT_EQ(response.scenes(0).vertex_count(), 64U);
+  EXPECT_THAT(names, testing::UnorderedElementsAre("small", "other", "large"));
 }
 
 TEST_F(RpcDoorTest, GetsASceneAndRefusesAnUnknownOne) {
@@ -205,16 +203,36 @@ TEST_F(RpcDoorTest, AClientThatNeverReadsDelaysNobodyAndGetsFreshFramesAfterward
   Joined other(port());
   Joined slow(port());
   const std::uint64_t stoppedAt = slow.viewer.tick();
-  ASSERT_TRUE(other.see(60));
+  ASSERT_TRUE(other.seeUntil([&] { return other.viewer.tick() >= stoppedAt + 60; }));
   const std::uint64_t now = other.viewer.tick();
-  ASSERT_GE(now, stoppedAt + 60);
   std::uint64_t stale = 0;
   EXPECT_TRUE(slow.seeUntil([&] {
     if (slow.viewer.last.has_frame() && slow.viewer.tick() < now) ++stale;
     return slow.viewer.tick() >= now;
   }));
-  EXPECT_LE(stale, 6U);
+  EXPECT_LE(stale, 6U);  // two, and one more for each 33 ms of a round trip on a busy machine
   EXPECT_TRUE(slow.see(10));
+}
+
+// The write in flight to a client that does not read would last for ever.
+TEST_F(RpcDoorTest, AnAbusiveClientThatDoesNotReadIsCutOff) {
+  rpc::RpcDoorOptions options;
+  options.maxStreams = 1;
+  open(options);
+  RpcStream abusive(port());
+  abusive.send(hello("large"));
+  for (int i = 0; i < 100 && abusive.send(garbage(50)); ++i) {
+  }
+  grpc::Status status(grpc::StatusCode::RESOURCE_EXHAUSTED, "");
+  const auto giveUp = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+  while (status.error_code() == grpc::StatusCode::RESOURCE_EXHAUSTED &&
+         std::chrono::steady_clock::now() < giveUp) {
+    RpcStream next(port());
+    next.sendDone();
+    next.receive();
+    status = next.finish();
+  }
+  EXPECT_TRUE(status.ok()) << status.error_message();
 }
 
 // A peer whose machine or network is gone does not answer pings, and its socket stays open.

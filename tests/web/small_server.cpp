@@ -5,21 +5,22 @@
 #include <utility>
 #include <vector>
 
+#include "server/telemetry/log.h"
 #include "tests/vulkan/gpu_test.h"
 
 namespace clothstream::tests {
 namespace {
 
-scene::Scene smallScene(std::string name) {
+scene::Scene sheet(std::string name, std::uint32_t side) {
   scene::Cloth cloth;
   cloth.name = "sheet";
-  cloth.grid = {8, 8, 1.0f, 1.0f, {}};
-  cloth.mass = 0.1f;
+  cloth.grid = {side, side, 1.0f, 1.0f, {}};
+  cloth.mass = 0.0015f * static_cast<float>(side * side);
   cloth.structural = {5, 0.001f};
   cloth.shear = {2, 0.001f};
   cloth.bend = {0.5f, 0.001f};
   cloth.damping = 0.5f;
-  cloth.pins = {{0, 0, 1, 0, 7, 1}};
+  cloth.pins = {{0, 0, 1, 0, side - 1, 1}};
   scene::Scene scene;
   scene.name = std::move(name);
   scene.simulationRate = scene.streamRate = 30;
@@ -30,6 +31,7 @@ scene::Scene smallScene(std::string name) {
 }  // namespace
 
 void DoorTest::SetUp() {
+  telemetry::setUpLog("warning");
   stream::ServerOptions options;
   options.defaultScene = "small";
   try {

@@ -28,8 +28,11 @@ void mustSucceed(beast::error_code error, const char* what) {
   if (error) throw ClientError(std::string(what) + ": " + error.message());
 }
 
-void connect(net::io_context& io, beast::tcp_stream& stream, std::uint16_t port) {
+void connect(net::io_context& io, beast::tcp_stream& stream, std::uint16_t port, int receiveBufferBytes = 0) {
   const tcp::endpoint server(net::ip::address_v4::loopback(), port);
+  stream.socket().open(tcp::v4());
+  if (receiveBufferBytes > 0)
+    stream.socket().set_option(net::socket_base::receive_buffer_size(receiveBufferBytes));
   mustSucceed(await(io, [&](auto handler) { stream.async_connect(server, handler); }), "connect");
 }
 
@@ -68,7 +71,7 @@ void HttpClient::shutdownSend() {
 }
 
 WebSocketClient::WebSocketClient(std::uint16_t port, const Handshake& handshake) : stream_(io_) {
-  connect(io_, stream_.next_layer(), port);
+  connect(io_, stream_.next_layer(), port, handshake.receiveBufferBytes);
   const std::string host = "127.0.0.1:" + std::to_string(port);
   stream_.binary(true);
   stream_.read_message_max(0);
@@ -78,15 +81,15 @@ WebSocketClient::WebSocketClient(std::uint16_t port, const Handshake& handshake)
       request.set(http::field::sec_websocket_protocol, handshake.subprotocol);
   }));
   const beast::error_code error =
-      await(io_, [&](auto handler) { stream_.async_handshake(response_, host, handshake.target, handler); });
+      await(io_, [&](auto handler) { stream_.async_handshake(response_, host, "/stream", handler); });
   if (error == websocket::error::upgrade_declined)
     throw ClientError("declined with " + std::to_string(response_.result_int()));
   mustSucceed(error, "handshake");
 }
 
-void WebSocketClient::send(const std::string& message, bool binary) {
+bool WebSocketClient::send(const std::string& message, bool binary) {
   stream_.binary(binary);
-  mustSucceed(await(io_, [&](auto handler) { stream_.async_write(net::buffer(message), handler); }), "send");
+  return !await(io_, [&](auto handler) { stream_.async_write(net::buffer(message), handler); });
 }
 
 std::optional<std::string> WebSocketClient::receive() {

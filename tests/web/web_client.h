@@ -32,7 +32,7 @@ inline constexpr std::chrono::seconds kPatience{20};
 
 using Response = http::response<http::string_body>;
 
-// Thrown by the clients when nothing happens for kPatience, or the connection breaks where it must not.
+// Thrown by the clients when nothing happens for kPatience, or a connection cannot be made.
 class ClientError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
@@ -59,16 +59,17 @@ class HttpClient {
 class WebSocketClient {
  public:
   struct Handshake {
-    std::string origin;
-    std::string subprotocol;
-    std::string target = "/stream";
+    std::string origin = {};
+    std::string subprotocol = {};
+    int receiveBufferBytes = 0;  // 0: the system's choice
   };
 
   explicit WebSocketClient(std::uint16_t port) : WebSocketClient(port, Handshake{}) {}
   // Throws ClientError with the server's HTTP status if it does not upgrade.
   WebSocketClient(std::uint16_t port, const Handshake& handshake);
 
-  void send(const std::string& message, bool binary = true);
+  // False if the connection is broken.
+  bool send(const std::string& message, bool binary = true);
   // One message; nullopt when the server closes, for which closeReason() says why.
   std::optional<std::string> receive();
   // Receives until `done`, answering as a polite client does; false when the server closes first.
