@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: MIT
+// Addresses as people write them.
+#include "clients/grpc/address.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace clothstream {
+namespace {
+
+using ::testing::HasSubstr;
+
+TEST(Address, WithoutAPortGets50051) {
+  EXPECT_EQ(completeAddress("localhost"), "localhost:50051");
+  EXPECT_EQ(completeAddress("10.0.0.7"), "10.0.0.7:50051");
+  EXPECT_EQ(completeAddress("::1"), "[::1]:50051");
+  EXPECT_EQ(completeAddress("[::1]"), "[::1]:50051");
+}
+
+TEST(Address, KeepsItsPort) {
+  EXPECT_EQ(completeAddress("cloth.example:6000"), "cloth.example:6000");
+  EXPECT_EQ(completeAddress("[fe80::1]:6000"), "[fe80::1]:6000");
+}
+
+TEST(Address, IsRefusedWithAReason) {
+  for (const char* text : {"", ":50051", "http://host", "a b", "[::1", "[]:1"}) {
+    const auto address = completeAddress(text);
+    ASSERT_FALSE(address) << text;
+    EXPECT_THAT(address.error(), HasSubstr("the address"));
+  }
+  for (const char* text : {"host:", "host:0", "host:65536", "host:x", "host:1x", "[::1]50051"}) {
+    const auto address = completeAddress(text);
+    ASSERT_FALSE(address) << text;
+    EXPECT_THAT(address.error(), HasSubstr("1 to 65535")) << text;
+  }
+}
+
+}  // namespace
+}  // namespace clothstream
