@@ -32,7 +32,8 @@ struct Cut {
   std::vector<shared::TileRecord> tiles;
 };
 
-// Software devices pay for every load, GPUs for every idle lane (docs/benchmarks.md has the measurements).
+// Software devices pay for every load, so that an invocation does several rows; longer strips of grids
+// whose rows are a power of two apart fall onto the same few cache lines. GPUs pay for every idle lane.
 Cut cutScene(const vulkan::Device& device, const scene::Scene& scene, const SimulationOptions& options) {
   Cut cut{options.rowsPerInvocation, options.workgroupSize, {}};
   if (cut.rowsPerInvocation == 0) cut.rowsPerInvocation = device.isSoftware() ? 4 : 1;
