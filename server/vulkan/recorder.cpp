@@ -47,7 +47,6 @@ Recorder::Recorder(const Device& device) : device_(&device), handles_(std::make_
 }
 
 void Recorder::begin() {
-  assert(!open_);
   handles_->pool.reset();
   handles_->commands.begin(vk::CommandBufferBeginInfo{});
   if (*handles_->timestamps) handles_->commands.resetQueryPool(*handles_->timestamps, 0, kMaxMarks + 1);

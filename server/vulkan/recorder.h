@@ -34,6 +34,8 @@ class Recorder {
 
   // Until the next beginStage or the end, work counts to this stage (names in static storage; at most
   // kMaxStages names and kMaxMarks calls a recording; the same name may come again and is added up).
+  // A time stamp costs 2 us on lavapipe inline and 30 us with two threads: a stage is all substeps, not each
+  // of them.
   static constexpr std::uint32_t kMaxStages = 32;
   static constexpr std::uint32_t kMaxMarks = 1024;
   void beginStage(std::string_view stage);
