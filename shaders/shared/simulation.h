@@ -7,8 +7,8 @@
 
 CLOTHSTREAM_SHARED_BEGIN
 
-// Kernels read these tables as texels of four floats, which costs a software device a tenth of storage loads. Whole
-// numbers are floats too, exact below 2^24.
+// Kernels read these tables as texels of four floats, which costs a software device a tenth of storage loads.
+// Whole numbers are floats too, exact below 2^24.
 
 // One cloth, five texels: where its nodes lie in the scene's buffers, and its material. Row-major, SI units.
 struct ClothRecord {
@@ -19,8 +19,8 @@ struct ClothRecord {
   vec4 air;        // drag, lift
 };
 
-// One workgroup of a kernel that walks down columns: its first invocation starts at (row, column) of the cloth. The
-// others follow along the row, and from its end at the start of the next strip of rows.
+// One workgroup of a kernel that walks down columns: its first invocation starts at (row, column) of the
+// cloth. The others follow along the row, and from its end at the start of the next strip of rows.
 struct TileRecord {
   vec4 start;  // cloth, row, column
 };
