@@ -1,0 +1,184 @@
+// SPDX-License-Identifier: MIT
+// clothstream-server: scenes on a device, and two doors to them.
+#include <algorithm>
+#include <csignal>
+#include <cstdint>
+#include <cstdio>
+#include <exception>
+#include <filesystem>
+#include <stdexcept>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include "server/messages/scene_file.h"
+#include "server/messages/scene_message.h"
+#include "server/program_options.h"
+#include "server/rpc/rpc_door.h"
+#include "server/stream/scene_server.h"
+#include "server/telemetry/log.h"
+#include "server/vulkan/device.h"
+#include "server/web/web_door.h"
+
+namespace clothstream {
+namespace {
+
+// Held back in every thread, and taken by waitForStop() alone: made before any other thread is.
+class Signals {
+ public:
+  Signals() {
+    sigemptyset(&set_);
+    for (const int signal : {SIGINT, SIGTERM, SIGUSR1}) sigaddset(&set_, signal);
+    pthread_sigmask(SIG_BLOCK, &set_, nullptr);
+    std::signal(SIGPIPE, SIG_IGN);  // a peer that went away is an error of its socket
+  }
+
+  // The next of them; 0 when the time is over.
+  int wait(std::chrono::nanoseconds timeout) const {
+    const auto wholeSeconds = std::chrono::duration_cast<std::chrono::seconds>(timeout);
+    const timespec limit{static_cast<std::time_t>(wholeSeconds.count()),
+                         static_cast<long>((timeout - wholeSeconds).count())};
+    return std::max(0, sigtimedwait(&set_, nullptr, &limit));
+  }
+
+ private:
+  sigset_t set_{};
+};
+
+std::string describe(const vulkan::DeviceInfo& device) {
+  constexpr const char* kKinds[] = {"discrete GPU", "integrated GPU", "virtual GPU", "software", "other"};
+  return fmt::format("{} ({}, {}, Vulkan {})", device.name, kKinds[static_cast<std::size_t>(device.kind)],
+                     device.driver, device.apiVersion);
+}
+
+void listDevices() {
+  for (const vulkan::DeviceInfo& device : vulkan::listDevices()) fmt::print("{}  {}\n", device.index, describe(device));
+}
+
+scene::Scene loaded(messages::Result<scene::Scene> scene) {
+  if (!scene) throw std::runtime_error(scene.error().text);
+  return std::move(*scene);
+}
+
+// The largest stream rate that divides the new simulation rate and is not above the scene's own.
+std::uint32_t streamRateFor(const scene::Scene& scene, std::uint32_t rate) {
+  std::uint32_t streamRate = std::min(scene.streamRate, rate);
+  while (rate % streamRate != 0) --streamRate;
+  return streamRate;
+}
+
+scene::Scene adjusted(scene::Scene scene, const ProgramOptions& options) {
+  if (options.rate) {
+    scene.streamRate = streamRateFor(scene, *options.rate);
+    scene.simulationRate = *options.rate;
+  }
+  scene.substeps = options.substeps.value_or(scene.substeps);
+  scene.stream.maxError = options.maxError.value_or(scene.stream.maxError);
+  scene.stream.normals = options.normals.value_or(scene.stream.normals);
+  auto checked = messages::toScene(messages::toMessage(scene));
+  if (!checked)
+    throw std::runtime_error(fmt::format("scene '{}' with these options: {}", scene.name, checked.error().text));
+  return std::move(*checked);
+}
+
+// The named ones and those from files; a file's takes the place of a named one with its name.
+std::vector<scene::Scene> loadScenes(const ProgramOptions& options) {
+  std::vector<scene::Scene> scenes;
+  for (const std::string& name : messages::namedScenes()) scenes.push_back(loaded(messages::loadScene(name)));
+  for (const std::filesystem::path& file : options.sceneFiles) {
+    scene::Scene scene = loaded(messages::readSceneFile(file));
+    std::erase_if(scenes, [&](const scene::Scene& other) { return other.name == scene.name; });
+    scenes.push_back(std::move(scene));
+  }
+  for (scene::Scene& scene : scenes)
+    if (scene.name == options.scene) scene = adjusted(std::move(scene), options);
+  return scenes;
+}
+
+// Where the build and an installation put the page, seen from the program; empty if it is in neither.
+std::filesystem::path pageBesideProgram() {
+  const std::filesystem::path programs = std::filesystem::read_symlink("/proc/self/exe").parent_path();
+  for (const char* place : {"../web", "../share/clothstream/web"})
+    if (const auto page = programs / place; std::filesystem::exists(page / "index.html")) return page.lexically_normal();
+  return {};
+}
+
+// How somebody on this machine reaches it.
+std::string reachable(const std::string& host, std::uint16_t port) {
+  if (host == "0.0.0.0") return fmt::format("127.0.0.1:{}", port);
+  if (host == "::") return fmt::format("[::1]:{}", port);
+  return host.find(':') == std::string::npos ? fmt::format("{}:{}", host, port) : fmt::format("[{}]:{}", host, port);
+}
+
+void waitForStop(const Signals& signals, const ProgramOptions& options, const stream::SceneServer& server) {
+  using Clock = std::chrono::steady_clock;
+  constexpr std::chrono::hours kLong{24 * 365};
+  const Clock::time_point end =
+      Clock::now() + (options.stopAfter ? std::chrono::duration_cast<Clock::duration>(*options.stopAfter) : kLong);
+  for (;;) {
+    const Clock::duration left = end - Clock::now();
+    const int signal = left > Clock::duration::zero() ? signals.wait(left) : 0;
+    if (signal == SIGUSR1) {
+      fmt::print("{}", server.report());
+      std::fflush(stdout);
+    } else if (signal != 0 || Clock::now() >= end) {
+      return;
+    }
+  }
+}
+
+void serve(const ProgramOptions& options, const Signals& signals) {
+  std::vector<scene::Scene> scenes = loadScenes(options);
+  std::string sceneList;
+  for (const scene::Scene& scene : scenes)
+    sceneList += fmt::format("{}{} ({} vertices)", sceneList.empty() ? "" : ", ", scene.name, scene.nodeCount());
+
+  stream::SceneServer server(std::move(scenes), {.device = {.select = options.device,
+                                                            .softwareThreads = options.softwareThreads,
+                                                            .cacheDirectory = options.cacheDirectory},
+                                                 .defaultScene = options.scene,
+                                                 .serverName = "clothstream-server " CLOTHSTREAM_VERSION,
+                                                 .runAlways = options.alwaysRun});
+  {
+    const std::filesystem::path page = options.page.empty() ? pageBesideProgram() : options.page;
+    if (page.empty()) spdlog::warn("there is no page beside the program: build clothstream_page, or name one by --page");
+    const web::WebDoor web(server, {.host = options.host,
+                                    .port = options.port,
+                                    .pageDirectory = page,
+                                    .allowedOrigins = options.allowedOrigins});
+    const rpc::RpcDoor rpc(server, {.host = options.host, .port = options.grpcPort});
+
+    fmt::print("device  {}\nscenes  {}\npage    http://{}/\ngRPC    {}\n", describe(server.deviceInfo()), sceneList,
+               reachable(options.host, web.port()), reachable(options.host, rpc.port()));
+    std::fflush(stdout);
+    waitForStop(signals, options, server);
+    spdlog::info("stopping");
+    server.stop();
+  }
+  fmt::print("{}", server.report());
+}
+
+}  // namespace
+}  // namespace clothstream
+
+int main(int argc, char** argv) {
+  using namespace clothstream;
+  const auto parsed = parseOptions(argc, argv);
+  if (const int* code = std::get_if<int>(&parsed)) return *code;
+  const ProgramOptions& options = std::get<ProgramOptions>(parsed);
+  try {
+    const Signals signals;
+    telemetry::setUpLog(options.logLevel);
+    if (options.listDevices)
+      listDevices();
+    else
+      serve(options, signals);
+    return 0;
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "clothstream-server: {}\n", error.what());
+    return 1;
+  }
+}

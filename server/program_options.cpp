@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: MIT
+// Reads the command line.
+#include "server/program_options.h"
+
+#include <cstdlib>
+#include <map>
+
+#include <CLI/CLI.hpp>
+
+namespace clothstream {
+namespace {
+
+std::filesystem::path defaultCacheDirectory() {
+  if (const char* cache = std::getenv("XDG_CACHE_HOME"); cache != nullptr && *cache != '\0')
+    return std::filesystem::path(cache) / "clothstream";
+  if (const char* home = std::getenv("HOME"); home != nullptr && *home != '\0')
+    return std::filesystem::path(home) / ".cache" / "clothstream";
+  return {};
+}
+
+}  // namespace
+
+std::variant<ProgramOptions, int> parseOptions(int argc, const char* const* argv) {
+  ProgramOptions options;
+  options.cacheDirectory = defaultCacheDirectory();
+  double seconds = 0;
+  const std::map<std::string, scene::Normals> normals{{"none", scene::Normals::none},
+                                                      {"octahedral", scene::Normals::octahedral}};
+
+  CLI::App app{"Simulates cloth with Vulkan and streams it to browsers and gRPC clients.", "clothstream-server"};
+  app.set_version_flag("--version", "clothstream-server " CLOTHSTREAM_VERSION);
+  app.get_formatter()->column_width(34);
+
+  const char* scenes = "Scenes";
+  app.add_option("--scene", options.scene, "Scene for whoever names none")->capture_default_str()->group(scenes);
+  app.add_option("--scene-file", options.sceneFiles, "Another scene, as a JSON file; may be given again")
+      ->type_name("FILE")
+      ->group(scenes);
+  app.add_option("--rate", options.rate, "Ticks a second of --scene, instead of its own")
+      ->check(CLI::Range(1, 1000))
+      ->group(scenes);
+  app.add_option("--substeps", options.substeps, "Integration steps a tick of --scene")
+      ->check(CLI::Range(1, 256))
+      ->group(scenes);
+  app.add_option("--max-error", options.maxError, "Largest error of a streamed coordinate of --scene, metres")
+      ->group(scenes);
+  app.add_option("--normals", options.normals, "Normals of --scene: none (clients compute them) or octahedral")
+      ->transform(CLI::CheckedTransformer(normals, CLI::ignore_case))
+      ->group(scenes);
+  app.add_flag("--always-run", options.alwaysRun, "Simulate scenes while nobody is in them, too")->group(scenes);
+
+  const char* network = "Network";
+  app.add_option("--host", options.host, "Address to listen on; 0.0.0.0 for every one this machine has")
+      ->capture_default_str()
+      ->group(network);
+  app.add_option("--port", options.port, "Port of the page and the WebSocket; 0 for one that is free")
+      ->capture_default_str()
+      ->group(network);
+  app.add_option("--grpc-port", options.grpcPort, "Port of gRPC; 0 for one that is free")
+      ->capture_default_str()
+      ->group(network);
+  app.add_option("--page", options.page, "Directory of the page, instead of the one beside the program")
+      ->type_name("DIR")
+      ->group(network);
+  app.add_option("--allow-origin", options.allowedOrigins,
+                 "A page from elsewhere that may connect, such as https://example.org; may be given again")
+      ->type_name("ORIGIN")
+      ->group(network);
+
+  const char* device = "Device";
+  app.add_option("--device", options.device, "Index or part of the name of a Vulkan device; else the best")
+      ->group(device);
+  app.add_flag("--list-devices", options.listDevices, "Show the Vulkan devices there are, and exit")->group(device);
+  app.add_option("--software-threads", options.softwareThreads, "Threads of a software device")
+      ->check(CLI::Range(1, 64))
+      ->group(device);
+  app.add_option("--cache-dir", options.cacheDirectory, "Where compiled kernels are kept; '' for nowhere")
+      ->type_name("DIR")
+      ->capture_default_str()
+      ->group(device);
+
+  app.add_option("--log-level", options.logLevel, "trace, debug, info, warning, error or off")->capture_default_str();
+  const CLI::Option* stopAfter = app.add_option("--seconds", seconds, "Stop after so long")->check(CLI::PositiveNumber);
+
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 1;
+  }
+  if (stopAfter->count() > 0) options.stopAfter = std::chrono::duration<double>(seconds);
+  return options;
+}
+
+}  // namespace clothstream

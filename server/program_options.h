@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: MIT
+// What clothstream-server is told on its command line.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "server/scene/scene.h"
+
+namespace clothstream {
+
+struct ProgramOptions {
+  std::string scene = "curtain";
+  std::vector<std::filesystem::path> sceneFiles;
+  // Of the scene above, instead of its own.
+  std::optional<std::uint32_t> rate, substeps;
+  std::optional<float> maxError;
+  std::optional<scene::Normals> normals;
+  bool alwaysRun = false;
+
+  std::string host = "127.0.0.1";
+  std::uint16_t port = 8080, grpcPort = 50051;
+  std::filesystem::path page;  // empty: beside the program, if it is there
+  std::vector<std::string> allowedOrigins;
+
+  std::string device;
+  std::optional<std::uint32_t> softwareThreads;
+  std::filesystem::path cacheDirectory;  // empty: none
+  bool listDevices = false;
+
+  std::string logLevel = "info";
+  std::optional<std::chrono::duration<double>> stopAfter;
+};
+
+// The options, or with what to exit (help, version, or a wrong option: what there is to say has been printed).
+std::variant<ProgramOptions, int> parseOptions(int argc, const char* const* argv);
+
+}  // namespace clothstream

@@ -1,0 +1,160 @@
+// SPDX-License-Identifier: MIT
+// From a participant's message to the spheres of a tick.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "server/stream/collider_set.h"
+#include "server/stream/inbox.h"
+#include "tests/stream/small_scene.h"
+
+namespace clothstream::stream {
+namespace {
+
+using scene::Vec3;
+using simulation::MovingSphere;
+using tests::gravity;
+using tests::handAt;
+
+scene::Scene sceneWithBall() {
+  scene::Scene scene;
+  scene.simulationRate = scene.streamRate = 100;
+  scene::SphereCollider ball;
+  ball.name = "ball";
+  ball.radius = 0.3f;
+  ball.pose.position = Vec3(0, 1, 0);
+  scene.colliders = {ball};
+  return scene;
+}
+
+class ColliderSetTest : public ::testing::Test {
+ protected:
+  const std::vector<MovingSphere>& advance() {
+    colliders.advance(scene, ++tick * scene.tickSeconds(), spheres);
+    return spheres;
+  }
+  scene::Scene scene = sceneWithBall();
+  ColliderSet colliders{scene};
+  std::vector<MovingSphere> spheres;
+  int tick = 0;
+};
+
+TEST_F(ColliderSetTest, APoseAppearsAtRestAndMovesInAStraightLine) {
+  colliders.place(7, std::vector{handAt(1, 0.5f)});
+  ASSERT_EQ(advance().size(), 2u);
+  EXPECT_EQ(spheres[1].start, Vec3(0.5f, 0, 0));
+  EXPECT_EQ(spheres[1].end, Vec3(0.5f, 0, 0));
+  colliders.place(7, std::vector{handAt(1, 0.6f)});
+  advance();
+  EXPECT_EQ(spheres[1].start, Vec3(0.5f, 0, 0));
+  EXPECT_EQ(spheres[1].end, Vec3(0.6f, 0, 0));
+  advance();  // no news: at rest
+  EXPECT_EQ(spheres[1].start, Vec3(0.6f, 0, 0));
+  EXPECT_EQ(spheres[1].end, Vec3(0.6f, 0, 0));
+}
+
+TEST_F(ColliderSetTest, AJumpIsNoMotion) {
+  colliders.place(7, std::vector{handAt(1, 0)});
+  advance();
+  // 30 m/s are 0.3 m in a tick of 10 ms.
+  colliders.place(7, std::vector{handAt(1, 0.31f)});
+  EXPECT_EQ(advance()[1].start, Vec3(0.31f, 0, 0));
+  colliders.place(7, std::vector{handAt(1, 0.6f)});
+  EXPECT_EQ(advance()[1].start, Vec3(0.31f, 0, 0));
+}
+
+TEST_F(ColliderSetTest, WhatIsNotNamedAnyMoreVanishes) {
+  colliders.place(7, std::vector{handAt(1, 0), handAt(2, 1)});
+  colliders.place(8, std::vector{handAt(1, 2)});
+  EXPECT_EQ(advance().size(), 4u);
+  colliders.place(7, std::vector{handAt(2, 1)});
+  ASSERT_EQ(advance().size(), 3u);
+  EXPECT_EQ(spheres[1].end.x(), 1);
+  EXPECT_EQ(spheres[2].end.x(), 2);
+  colliders.place(8, {});
+  EXPECT_EQ(advance().size(), 2u);
+}
+
+TEST_F(ColliderSetTest, OrderDoesNotDependOnWhoCameFirst) {
+  colliders.place(9, std::vector{handAt(5, 95), handAt(2, 92)});
+  colliders.place(3, std::vector{handAt(4, 34)});
+  std::vector<float> xs;
+  for (const MovingSphere& sphere : advance()) xs.push_back(sphere.end.x());
+  EXPECT_THAT(xs, testing::ElementsAre(0, 34, 92, 95));
+}
+
+TEST_F(ColliderSetTest, TheScenesOwnFollowTheirMotionUntilSomebodyMovesThem) {
+  scene.colliders[0].motion = {{0, Vec3(0, 1, 0)}, {1, Vec3(0, 1, 2)}, {2, Vec3(0, 1, 0)}};
+  colliders = ColliderSet(scene);
+  for (int i = 0; i < 100; ++i) advance();
+  EXPECT_EQ(spheres[0].end, Vec3(0, 1, 2));
+  EXPECT_LT(spheres[0].start.z(), 2);
+  scene::ParameterChange change;
+  change.colliders = {{.name = "ball", .position = Vec3(0, 1, 1.9f), .radius = 0.5f}};
+  scene::applyChange(scene, change);
+  advance();
+  EXPECT_EQ(spheres[0].start, Vec3(0, 1, 2));
+  EXPECT_EQ(spheres[0].end, Vec3(0, 1, 1.9f));
+  EXPECT_EQ(spheres[0].radius, 0.5f);
+}
+
+TEST_F(ColliderSetTest, SaysWhereAllAreAndWhose) {
+  colliders.place(7, std::vector{handAt(1, 0.5f)});
+  advance();
+  google::protobuf::RepeatedPtrField<v1::ColliderState> states;
+  colliders.write(scene, states);
+  ASSERT_EQ(states.size(), 2);
+  EXPECT_EQ(states[0].name(), "ball");
+  EXPECT_EQ(states[0].participant_id(), 0u);
+  EXPECT_EQ(states[0].position().y(), 1);
+  EXPECT_EQ(states[1].participant_id(), 7u);
+  EXPECT_EQ(states[1].position().x(), 0.5f);
+}
+
+TEST(Inbox, KeepsOnlyTheNewestPosesOfAParticipant) {
+  Inbox inbox;
+  const Clock::time_point arrival = Clock::now();
+  inbox.postPoses(1, std::vector{handAt(1, 0), handAt(2, 0)}, arrival);
+  inbox.postPoses(2, std::vector{handAt(1, 5)}, arrival);
+  inbox.postPoses(1, std::vector{handAt(3, 1)}, arrival + std::chrono::milliseconds(1));
+  Inputs inputs;
+  inbox.drain(inputs);
+  ASSERT_EQ(inputs.poses.size(), 2u);
+  EXPECT_EQ(inputs.poses[0].participant, 1u);
+  ASSERT_EQ(inputs.poses[0].count, 1u);
+  EXPECT_EQ(inputs.poses[0].colliders[0].id, 3u);
+  EXPECT_EQ(inputs.poses[0].arrival, arrival + std::chrono::milliseconds(1));
+  inbox.drain(inputs);
+  EXPECT_TRUE(inputs.poses.empty());
+}
+
+TEST(Inbox, TakesABoundedNumberOfChanges) {
+  Inbox inbox;
+  std::size_t accepted = 0;
+  while (inbox.postChange({.change = gravity(-1)})) ++accepted;
+  EXPECT_EQ(accepted, Inbox::kMaxChanges);
+  Inputs inputs;
+  inbox.drain(inputs);
+  EXPECT_EQ(inputs.changes.size(), Inbox::kMaxChanges);
+  EXPECT_TRUE(inbox.postChange({}));
+}
+
+TEST(Inbox, ForgetsChangesOfAllButColliders) {
+  Inbox inbox;
+  v1::ParameterChange message;
+  message.set_air_density(2);
+  message.add_colliders()->set_name("ball");
+  scene::ParameterChange both = gravity(-1);
+  both.colliders.emplace_back().name = "ball";
+  ASSERT_TRUE(inbox.postChange({.change = both, .message = message}));
+  ASSERT_TRUE(inbox.postChange({.change = gravity(-3)}));
+  inbox.keepColliderChanges();
+  Inputs inputs;
+  inbox.drain(inputs);
+  ASSERT_EQ(inputs.changes.size(), 1u);
+  EXPECT_FALSE(inputs.changes[0].change.gravity);
+  EXPECT_FALSE(inputs.changes[0].message.has_air_density());
+  EXPECT_EQ(inputs.changes[0].message.colliders_size(), 1);
+}
+
+}  // namespace
+}  // namespace clothstream::stream

@@ -1,0 +1,289 @@
+// SPDX-License-Identifier: MIT
+// A scene's ticks, one at a time: inputs, determinism, and the ways back when something went wrong.
+#include "server/stream/scene_host.h"
+
+#include <algorithm>
+#include <memory>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "proto/codec/decoder.h"
+#include "server/messages/scene_message.h"
+#include "tests/stream/small_scene.h"
+#include "tests/vulkan/gpu_test.h"
+
+namespace clothstream::stream {
+namespace {
+
+using scene::Vec3;
+using tests::gravity;
+using tests::handAt;
+using tests::smallScene;
+using tests::wind;
+
+// One scene on the shared device, with a subscriber that reads everything.
+class HostedScene {
+ public:
+  explicit HostedScene(scene::Scene scene = smallScene(), std::size_t subscribers = 1)
+      : live(std::move(scene)), packer(encode::FrameEncoder::kSlots, [] {}), host(tests::device(), live, packer) {
+    for (std::size_t i = 0; i < subscribers; ++i) {
+      mailboxes.push_back(std::make_shared<Mailbox>([] {}));
+      EXPECT_TRUE(live.audience.join(mailboxes.back(), 100));
+      mailboxes.back()->subscribe(live.description(), live.start().streamRate, live.metrics);
+      while (mailboxes.back()->next(now)) {
+      }
+    }
+    decoder = codec::Decoder::make(encode::streamLayout(live.start(), LiveScene::kEpoch));
+  }
+  ~HostedScene() { packer.drain(); }
+
+  // One tick, its frame packed and read by all.
+  void tick() {
+    now += std::chrono::seconds(1);  // so that no key frame has to wait
+    host.begin(now);
+    host.finish();
+    packer.drain();
+    for (const auto& mailbox : mailboxes)
+      while (const auto message = mailbox->next(now)) {
+        v1::ServerMessage parsed;
+        ASSERT_TRUE(parsed.ParseFromArray((*message)->data(), static_cast<int>((*message)->size())));
+        if (parsed.has_frame()) {
+          if (mailbox == mailboxes.front()) see(parsed.frame());
+          ASSERT_TRUE(mailbox->acknowledge(host.tick(), now));
+        } else if (mailbox == mailboxes.front()) {
+          told.push_back(parsed);
+        }
+      }
+  }
+  void ticks(int count) {
+    for (int i = 0; i < count; ++i) tick();
+  }
+
+  void change(scene::ParameterChange change) {
+    ASSERT_TRUE(live.inbox.postChange({.participant = 5, .change = std::move(change)}));
+  }
+
+  LiveScene live;
+  FramePacker packer;
+  SceneHost host;
+  std::vector<std::shared_ptr<Mailbox>> mailboxes;
+  std::unique_ptr<codec::Decoder> decoder;
+  Clock::time_point now = Clock::now();
+  std::vector<v1::Frame> frames;
+  std::vector<bool> keys;
+  std::vector<v1::ServerMessage> told;
+
+ private:
+  void see(const v1::Frame& frame) {
+    const auto packet = std::as_bytes(std::span(frame.packet()));
+    ASSERT_EQ(decoder->decode(packet), codec::DecodeResult::ok);
+    EXPECT_EQ(decoder->reconstructionHash(), frame.reconstruction_hash());
+    frames.push_back(frame);
+    keys.push_back(codec::parsePacket(packet)->header.kind == codec::PacketKind::key);
+  }
+};
+
+class SceneHostTest : public tests::GpuTest {};
+
+std::vector<std::uint64_t> stateHashes(const HostedScene& hosted) {
+  std::vector<std::uint64_t> hashes;
+  for (const v1::Frame& frame : hosted.frames) hashes.push_back(frame.state_hash());
+  return hashes;
+}
+
+TEST_F(SceneHostTest, StreamsAFrameATickBeginningWithAKeyFrame) {
+  HostedScene hosted;
+  hosted.ticks(20);
+  ASSERT_EQ(hosted.frames.size(), 20u);
+  EXPECT_TRUE(hosted.keys.front());
+  EXPECT_EQ(std::count(hosted.keys.begin(), hosted.keys.end(), true), 1);
+  EXPECT_EQ(hosted.decoder->tick(), 20u);
+  EXPECT_EQ(hosted.live.metrics.frames.value(), 20u);
+  EXPECT_EQ(hosted.live.metrics.keyFrames.value(), 1u);
+  EXPECT_EQ(hosted.live.metrics.ticks.value(), 20u);
+}
+
+TEST_F(SceneHostTest, StreamsAtItsOwnRate) {
+  scene::Scene scene = smallScene();
+  scene.streamRate = 10;
+  HostedScene hosted(scene);
+  hosted.ticks(12);
+  EXPECT_EQ(hosted.frames.size(), 3u);
+  EXPECT_EQ(hosted.decoder->tick(), 12u);
+}
+
+TEST_F(SceneHostTest, WhatIsDecodedIsWithinTheMaxErrorOfTheState) {
+  HostedScene hosted;
+  hosted.ticks(10);
+  vulkan::Recorder recorder(tests::device());
+  // Same scene, same ticks, straight on the simulation.
+  simulation::ClothSimulation simulation(tests::device(), hosted.live.start());
+  ColliderSet colliders(hosted.live.start());
+  simulation::TickInputs inputs{.environment = hosted.live.start().environment, .spheres = {}};
+  for (int tick = 1; tick <= 10; ++tick) {
+    colliders.advance(hosted.live.start(), tick * hosted.live.start().tickSeconds(), inputs.spheres);
+    recorder.begin();
+    simulation.recordTick(recorder, inputs);
+    simulation.recordSaveState(recorder);
+    tests::submitAndWait(tests::device(), recorder);
+  }
+  EXPECT_EQ(simulation.status().stateHash, hosted.frames.back().state_hash());
+  const simulation::NodeState state = simulation::unpack(simulation.collectState(10));
+  const std::span<const float> decoded = hosted.decoder->positions();
+  ASSERT_EQ(decoded.size(), 3 * state.positions.size());
+  for (std::size_t node = 0; node < state.positions.size(); ++node)
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      EXPECT_NEAR(decoded[3 * node + axis], state.positions[node][static_cast<Eigen::Index>(axis)],
+                  hosted.live.start().stream.maxError)
+          << node;
+}
+
+TEST_F(SceneHostTest, SameInputsGiveTheSameStatesWhateverTheAudience) {
+  const auto simulate = [](std::size_t subscribers) {
+    HostedScene hosted(smallScene(), subscribers);
+    for (int tick = 0; tick < 60; ++tick) {
+      if (tick == 10) hosted.change(wind(3));
+      hosted.live.inbox.postPoses(9, std::vector{handAt(1, 0.1f, -0.6f, 0.01f * static_cast<float>(tick) - 0.3f)},
+                                  hosted.now);
+      // Who asks for key frames changes what is sent, not what is simulated.
+      if (tick % 7 == 0) hosted.mailboxes.back()->restart();
+      hosted.tick();
+    }
+    return stateHashes(hosted);
+  };
+  const std::vector<std::uint64_t> alone = simulate(1);
+  EXPECT_EQ(alone.size(), 60u);
+  EXPECT_EQ(simulate(4), alone);
+}
+
+TEST_F(SceneHostTest, AChangeTakesEffectAtTheNextTickAndIsAnnouncedForIt) {
+  HostedScene changed, unchanged;
+  changed.ticks(5);
+  unchanged.ticks(5);
+  v1::ParameterChange message;
+  message.mutable_gravity()->mutable_value()->set_y(-2);
+  ASSERT_TRUE(changed.live.change(42, message));
+  EXPECT_EQ(changed.live.definition().environment.gravity.y(), -2);
+  changed.tick();
+  unchanged.tick();
+  EXPECT_EQ(changed.frames[4].state_hash(), unchanged.frames[4].state_hash());
+  EXPECT_NE(changed.frames[5].state_hash(), unchanged.frames[5].state_hash());
+  ASSERT_EQ(changed.told.size(), 1u);
+  ASSERT_TRUE(changed.told[0].has_parameter_changed());
+  EXPECT_EQ(changed.told[0].parameter_changed().participant_id(), 42u);
+  EXPECT_EQ(changed.told[0].parameter_changed().tick(), 6u);
+  EXPECT_EQ(changed.told[0].parameter_changed().change().gravity().value().y(), -2);
+}
+
+TEST_F(SceneHostTest, ChangesOfSpringsReachTheDevice) {
+  HostedScene changed, unchanged;
+  scene::ParameterChange softer;
+  softer.cloths.emplace_back().structural = scene::Spring{1, 0.001f};
+  changed.change(softer);
+  changed.ticks(3);
+  unchanged.ticks(3);
+  EXPECT_NE(changed.frames[2].state_hash(), unchanged.frames[2].state_hash());
+}
+
+TEST_F(SceneHostTest, AStateThatWentBadIsNotSentAndGoesBackToTheLastGoodOne) {
+  HostedScene hosted;
+  hosted.ticks(90);  // 40 ticks/s: the state was kept at 40 and at 80
+  ASSERT_EQ(hosted.frames.size(), 90u);
+  hosted.change(gravity(-1e30f));  // no message could say this
+  hosted.tick();
+  EXPECT_FALSE(hosted.host.status().healthy);
+  EXPECT_EQ(hosted.frames.size(), 90u);
+  ASSERT_EQ(hosted.told.size(), 2u);  // the change, and the notice
+  EXPECT_EQ(hosted.told[1].notice().kind(), v1::NOTICE_KIND_ROLLED_BACK);
+  EXPECT_EQ(hosted.live.metrics.rollbacks.value(), 1u);
+
+  hosted.change(gravity(-9.81f));
+  hosted.tick();
+  EXPECT_TRUE(hosted.host.status().healthy);
+  ASSERT_EQ(hosted.frames.size(), 91u);
+  EXPECT_TRUE(hosted.keys.back());
+  EXPECT_EQ(hosted.decoder->tick(), 92u);  // ticks count on
+  hosted.tick();
+  EXPECT_FALSE(hosted.keys.back());
+  EXPECT_EQ(hosted.live.metrics.resets.value(), 0u);
+}
+
+TEST_F(SceneHostTest, AStateThatGoesBadAgainAtOnceGoesBackToTheStartWithItsParameters) {
+  HostedScene hosted;
+  hosted.ticks(50);
+  hosted.change(gravity(-1e30f));
+  hosted.change(wind(1));
+  hosted.ticks(2);  // the second from the checkpoint, with the same gravity
+  EXPECT_EQ(hosted.live.metrics.rollbacks.value(), 1u);
+  EXPECT_EQ(hosted.live.metrics.resets.value(), 1u);
+  hosted.ticks(30);
+  EXPECT_TRUE(hosted.host.status().healthy);
+  EXPECT_EQ(hosted.frames.size(), 80u);
+  EXPECT_EQ(hosted.live.definition().environment.wind, Vec3(0, 0, 0));
+  const v1::ServerMessage& reset = hosted.told.at(hosted.told.size() - 2);
+  ASSERT_TRUE(reset.has_parameter_changed());
+  EXPECT_EQ(reset.parameter_changed().participant_id(), 0u);
+  EXPECT_NEAR(reset.parameter_changed().change().gravity().value().y(), -9.81, 1e-6);
+  EXPECT_EQ(hosted.told.back().notice().kind(), v1::NOTICE_KIND_ROLLED_BACK);
+}
+
+TEST_F(SceneHostTest, GoesOnOnAnotherDeviceFromTheNewestStateThatTheCpuHas) {
+  HostedScene hosted;
+  hosted.ticks(210);  // 40 ticks/s: saved with tick 201
+  hosted.host.release();
+  vulkan::Device another(vulkan::DeviceOptions{.validation = true});
+  hosted.host.rebuild(another);
+  hosted.tick();
+  ASSERT_EQ(hosted.told.size(), 1u);
+  EXPECT_EQ(hosted.told[0].notice().kind(), v1::NOTICE_KIND_DEVICE_REBUILT);
+  EXPECT_TRUE(hosted.keys.back());
+  EXPECT_EQ(hosted.decoder->tick(), 211u);
+
+  // A scene of its own that was put into the state of tick 201, and sees the same collider, comes to the same bits.
+  simulation::ClothSimulation simulation(another, hosted.live.start());
+  ColliderSet colliders(hosted.live.start());
+  simulation::TickInputs inputs{.environment = hosted.live.start().environment, .spheres = {}};
+  vulkan::Recorder recorder(another);
+  const auto tick = [&](int number) {
+    colliders.advance(hosted.live.start(), number * hosted.live.start().tickSeconds(), inputs.spheres);
+    recorder.begin();
+    simulation.recordTick(recorder, inputs);
+    simulation.recordSaveState(recorder);
+    tests::submitAndWait(another, recorder);
+  };
+  for (int number = 1; number <= 201; ++number) tick(number);
+  EXPECT_EQ(simulation.status().stateHash, hosted.frames.at(200).state_hash());
+  const simulation::StateSnapshot saved = simulation.collectState(201);
+  for (int number = 202; number <= 210; ++number) tick(number);
+  recorder.begin();
+  simulation.recordRestoreState(recorder, saved);
+  tests::submitAndWait(another, recorder);
+  tick(211);
+  EXPECT_EQ(simulation.status().stateHash, hosted.frames.back().state_hash());
+  hosted.packer.drain();
+  hosted.host.release();  // before its device
+}
+
+TEST_F(SceneHostTest, OneKeyFrameServesAllWhoWaitAndNoneComesTooSoon) {
+  HostedScene hosted(smallScene(), 5);
+  hosted.ticks(3);
+  for (const auto& mailbox : hosted.mailboxes) mailbox->restart();
+  hosted.tick();
+  EXPECT_TRUE(hosted.keys.back());
+  EXPECT_EQ(hosted.live.metrics.keyFrames.value(), 2u);
+
+  // Asked again within the interval: the frames until its end are predicted.
+  hosted.mailboxes.back()->restart();
+  for (int millisecondsLater = 25; millisecondsLater < 100; millisecondsLater += 25) {
+    hosted.host.begin(hosted.now + std::chrono::milliseconds(millisecondsLater));
+    hosted.host.finish();
+  }
+  hosted.packer.drain();
+  EXPECT_EQ(hosted.live.metrics.keyFrames.value(), 2u);
+  hosted.tick();
+  EXPECT_EQ(hosted.live.metrics.keyFrames.value(), 3u);
+}
+
+}  // namespace
+}  // namespace clothstream::stream

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: MIT
+// A server with small scenes on whatever device there is, for tests of what peers see of it.
+#pragma once
+
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "server/stream/scene_server.h"
+#include "server/stream/server_state.h"
+#include "tests/stream/small_scene.h"
+#include "tests/stream/test_peer.h"
+#include "tests/vulkan/gpu_test.h"
+
+namespace clothstream::tests {
+
+// Skips its tests, with the reason, where there is no device.
+class ServerTest : public ::testing::Test {
+ protected:
+  // The scenes "small", which is the default, and "other". Once a test.
+  void start(stream::ServerOptions options = {}) {
+    options.defaultScene = "small";
+    try {
+      server_ = std::make_unique<stream::SceneServer>(std::vector{smallScene("small"), smallScene("other")},
+                                                      std::move(options));
+    } catch (const vulkan::DeviceError& error) {
+      GTEST_SKIP() << error.what();
+    }
+  }
+
+  stream::SceneServer& server() { return *server_; }
+  telemetry::SceneMetrics& metrics() { return server_->state().scenes.front()->metrics; }
+
+ private:
+  std::unique_ptr<stream::SceneServer> server_;
+};
+
+}  // namespace clothstream::tests

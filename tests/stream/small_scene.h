@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: MIT
+// The scene of the stream's tests: small enough for any machine, and nothing in it is still.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <utility>
+
+#include "server/scene/input.h"
+#include "server/scene/scene.h"
+
+namespace clothstream::tests {
+
+// 12 x 10 nodes hung by their first row, a ball beside them that moves by itself. 40 ticks and frames a second.
+inline scene::Scene smallScene(std::string name = "small") {
+  scene::Cloth cloth;
+  cloth.name = "sheet";
+  cloth.grid = {.rows = 12, .columns = 10, .width = 0.9f, .height = 1.1f, .pose = {}};
+  cloth.mass = 0.12f;
+  cloth.structural = {5, 0.001f};
+  cloth.shear = {2, 0.001f};
+  cloth.bend = {0.5f, 0.001f};
+  cloth.damping = 0.5f;
+  cloth.drag = 0.5f;
+  cloth.lift = 0.1f;
+  cloth.pins = {{.firstRow = 0, .lastRow = 0, .rowStep = 1, .firstColumn = 0, .lastColumn = 9, .columnStep = 1}};
+
+  scene::SphereCollider ball;
+  ball.name = "ball";
+  ball.radius = 0.2f;
+  ball.motion = {{0, {0, -0.5f, 0.5f}}, {1, {0, -0.5f, -0.5f}}, {2, {0, -0.5f, 0.5f}}};
+
+  scene::Scene scene;
+  scene.name = std::move(name);
+  scene.simulationRate = scene.streamRate = 40;
+  scene.substeps = 12;
+  scene.cloths = {cloth};
+  scene.colliders = {ball};
+  return scene;
+}
+
+inline scene::ParameterChange gravity(float y) {
+  scene::ParameterChange change;
+  change.gravity = scene::Vec3(0, y, 0);
+  return change;
+}
+
+inline scene::ParameterChange wind(float x) {
+  scene::ParameterChange change;
+  change.wind = scene::Vec3(x, 0, 0);
+  return change;
+}
+
+inline scene::ParticipantCollider handAt(std::uint32_t id, float x, float y = 0, float z = 0) {
+  scene::ParticipantCollider hand;
+  hand.id = id;
+  hand.pose.position = scene::Vec3(x, y, z);
+  return hand;
+}
+
+}  // namespace clothstream::tests
