@@ -18,19 +18,22 @@ grpc::ByteBuffer bufferOf(const std::string& bytes) {
 
 }  // namespace
 
-std::shared_ptr<grpc::Channel> channelTo(std::uint16_t port) {
+std::shared_ptr<grpc::Channel> channelTo(std::uint16_t port, const RpcOptions& options) {
   grpc::ChannelArguments arguments;
   arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
   arguments.SetMaxReceiveMessageSize(-1);
+  if (options.smallWindow) {
+    arguments.SetInt(GRPC_ARG_HTTP2_BDP_PROBE, 0);
+    arguments.SetInt(GRPC_ARG_HTTP2_STREAM_LOOKAHEAD_BYTES, 64 * 1024);
+  }
   return grpc::CreateCustomChannel("127.0.0.1:" + std::to_string(port), grpc::InsecureChannelCredentials(),
                                    arguments);
 }
 
-RpcStream::RpcStream(std::uint16_t port, const std::string& method, bool compressed)
-    : channel_(channelTo(port)) {
+RpcStream::RpcStream(std::uint16_t port, const RpcOptions& options) : channel_(channelTo(port, options)) {
   context_.set_wait_for_ready(true);
-  if (compressed) context_.set_compression_algorithm(GRPC_COMPRESS_GZIP);
-  call_ = grpc::GenericStub(channel_).PrepareCall(&context_, method, &queue_);
+  if (options.compressed) context_.set_compression_algorithm(GRPC_COMPRESS_GZIP);
+  call_ = grpc::GenericStub(channel_).PrepareCall(&context_, options.method, &queue_);
   call_->StartCall(this);
   await("start");
 }

@@ -21,13 +21,20 @@ namespace clothstream::tests {
 
 inline constexpr const char* kJoin = "/clothstream.v1.ClothStream/Join";
 
+struct RpcOptions {
+  std::string method = kJoin;
+  bool compressed = false;
+  // Takes 64 KiB that nobody read, instead of as much as the connection's speed suggests.
+  bool smallWindow = false;
+};
+
 // A channel of its own, so that it shares no connection with others.
-std::shared_ptr<grpc::Channel> channelTo(std::uint16_t port);
+std::shared_ptr<grpc::Channel> channelTo(std::uint16_t port, const RpcOptions& options = {});
 
 // A bidirectional stream of serialised messages.
 class RpcStream {
  public:
-  explicit RpcStream(std::uint16_t port, const std::string& method = kJoin, bool compressed = false);
+  explicit RpcStream(std::uint16_t port, const RpcOptions& options = {});
   ~RpcStream();
   RpcStream(const RpcStream&) = delete;
   RpcStream& operator=(const RpcStream&) = delete;

@@ -101,7 +101,7 @@ TEST_F(RpcDoorTest, JoinsAndDecodesFrames) {
 
 TEST_F(RpcDoorTest, IsHealthy) {
   for (const char* service : {"", "clothstream.v1.ClothStream"}) {
-    RpcStream call(port(), "/grpc.health.v1.Health/Check");
+    RpcStream call(port(), {.method = "/grpc.health.v1.Health/Check"});
     const std::string name(service);
     // HealthCheckRequest { string service = 1; }
     ASSERT_TRUE(
@@ -113,7 +113,7 @@ TEST_F(RpcDoorTest, IsHealthy) {
 }
 
 TEST_F(RpcDoorTest, ListsItsServicesByReflection) {
-  RpcStream call(port(), "/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo");
+  RpcStream call(port(), {.method = "/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo"});
   ASSERT_TRUE(call.send(std::string("\x3a\x01*")));  // ServerReflectionRequest { string list_services = 7; }
   const std::optional<std::string> answer = call.receive();
   ASSERT_TRUE(answer.has_value());
@@ -167,7 +167,7 @@ TEST_F(RpcDoorTest, AMessageOverTheLimitEndsTheStreamWithResourceExhausted) {
 }
 
 TEST_F(RpcDoorTest, CompressedMessagesAreRefused) {
-  RpcStream stream(port(), kJoin, true);
+  RpcStream stream(port(), {.compressed = true});
   stream.send(hello());
   EXPECT_EQ(stream.receive(), std::nullopt);
   EXPECT_EQ(stream.finish().error_code(), grpc::StatusCode::UNIMPLEMENTED);
@@ -217,10 +217,13 @@ TEST_F(RpcDoorTest, AClientThatNeverReadsDelaysNobodyAndGetsFreshFramesAfterward
 // The write in flight to a client that does not read would last for ever.
 TEST_F(RpcDoorTest, AnAbusiveClientThatDoesNotReadIsCutOff) {
   rpc::RpcDoorOptions options;
-  options.maxStreams = 1;
+  options.maxStreams = 2;
   open(options);
-  RpcStream abusive(port());
+  RpcStream abusive(port(), {.smallWindow = true});
   abusive.send(hello("large"));
+  ASSERT_TRUE(abusive.receive().has_value());
+  Joined other(port());
+  ASSERT_TRUE(other.see(10));  // by now the description is under way
   for (int i = 0; i < 100 && abusive.send(garbage(50)); ++i) {
   }
   grpc::Status status(grpc::StatusCode::RESOURCE_EXHAUSTED, "");
@@ -233,6 +236,7 @@ TEST_F(RpcDoorTest, AnAbusiveClientThatDoesNotReadIsCutOff) {
     status = next.finish();
   }
   EXPECT_TRUE(status.ok()) << status.error_message();
+  EXPECT_TRUE(other.see(5));
 }
 
 // A peer whose machine or network is gone does not answer pings, and its socket stays open.

@@ -35,8 +35,8 @@ void DoorTest::SetUp() {
   stream::ServerOptions options;
   options.defaultScene = "small";
   try {
-    server_ =
-        std::make_unique<stream::SceneServer>(std::vector{smallScene("small"), smallScene("other")}, options);
+    server_ = std::make_unique<stream::SceneServer>(
+        std::vector{sheet("small", 8), sheet("other", 8), sheet("large", 128)}, options);
   } catch (const vulkan::DeviceError& error) {
     GTEST_SKIP() << error.what();
   }

@@ -220,10 +220,13 @@ TEST_F(StreamDoor, ASlowReaderLosesFramesAndDelaysNobody) {
 // The write in flight to a peer that does not read would last for ever.
 TEST_F(StreamDoor, AnAbusivePeerThatDoesNotReadIsCutOff) {
   web::WebDoorOptions options;
-  options.maxConnections = 1;
+  options.maxConnections = 2;
   open(options);
   WebSocketClient abusive(port(), {.receiveBufferBytes = 4096});
   abusive.send(hello("large"));
+  ASSERT_TRUE(abusive.receive().has_value());
+  Joined other(port());
+  ASSERT_TRUE(other.see(10));  // by now the description is under way
   for (int i = 0; i < 100 && abusive.send(garbage(50)); ++i) {
   }
   const auto from = std::chrono::steady_clock::now();
@@ -232,6 +235,7 @@ TEST_F(StreamDoor, AnAbusivePeerThatDoesNotReadIsCutOff) {
   }
   // Two seconds after the fatal error, and before it would count as vanished.
   EXPECT_LT(std::chrono::steady_clock::now() - from, std::chrono::seconds(4));
+  EXPECT_TRUE(other.see(5));
 }
 
 TEST_F(StreamDoor, ManyPeersComeAndGo) {
