@@ -55,7 +55,8 @@ std::string describe(const vulkan::DeviceInfo& device) {
 }
 
 void listDevices() {
-  for (const vulkan::DeviceInfo& device : vulkan::listDevices()) fmt::print("{}  {}\n", device.index, describe(device));
+  for (const vulkan::DeviceInfo& device : vulkan::listDevices())
+    fmt::print("{}  {}\n", device.index, describe(device));
 }
 
 scene::Scene loaded(messages::Result<scene::Scene> scene) {
@@ -80,7 +81,8 @@ scene::Scene adjusted(scene::Scene scene, const ProgramOptions& options) {
   scene.stream.normals = options.normals.value_or(scene.stream.normals);
   auto checked = messages::toScene(messages::toMessage(scene));
   if (!checked)
-    throw std::runtime_error(fmt::format("scene '{}' with these options: {}", scene.name, checked.error().text));
+    throw std::runtime_error(
+        fmt::format("scene '{}' with these options: {}", scene.name, checked.error().text));
   return std::move(*checked);
 }
 
@@ -102,7 +104,8 @@ std::vector<scene::Scene> loadScenes(const ProgramOptions& options) {
 std::filesystem::path pageBesideProgram() {
   const std::filesystem::path programs = std::filesystem::read_symlink("/proc/self/exe").parent_path();
   for (const char* place : {"../web", "../share/clothstream/web"})
-    if (const auto page = programs / place; std::filesystem::exists(page / "index.html")) return page.lexically_normal();
+    if (const auto page = programs / place; std::filesystem::exists(page / "index.html"))
+      return page.lexically_normal();
   return {};
 }
 
@@ -110,14 +113,16 @@ std::filesystem::path pageBesideProgram() {
 std::string reachable(const std::string& host, std::uint16_t port) {
   if (host == "0.0.0.0") return fmt::format("127.0.0.1:{}", port);
   if (host == "::") return fmt::format("[::1]:{}", port);
-  return host.find(':') == std::string::npos ? fmt::format("{}:{}", host, port) : fmt::format("[{}]:{}", host, port);
+  return host.find(':') == std::string::npos ? fmt::format("{}:{}", host, port)
+                                             : fmt::format("[{}]:{}", host, port);
 }
 
 void waitForStop(const Signals& signals, const ProgramOptions& options, const stream::SceneServer& server) {
   using Clock = std::chrono::steady_clock;
   constexpr std::chrono::hours kLong{24 * 365};
   const Clock::time_point end =
-      Clock::now() + (options.stopAfter ? std::chrono::duration_cast<Clock::duration>(*options.stopAfter) : kLong);
+      Clock::now() +
+      (options.stopAfter ? std::chrono::duration_cast<Clock::duration>(*options.stopAfter) : kLong);
   for (;;) {
     const Clock::duration left = end - Clock::now();
     const int signal = left > Clock::duration::zero() ? signals.wait(left) : 0;
@@ -134,7 +139,8 @@ void serve(const ProgramOptions& options, const Signals& signals) {
   std::vector<scene::Scene> scenes = loadScenes(options);
   std::string sceneList;
   for (const scene::Scene& scene : scenes)
-    sceneList += fmt::format("{}{} ({} vertices)", sceneList.empty() ? "" : ", ", scene.name, scene.nodeCount());
+    sceneList +=
+        fmt::format("{}{} ({} vertices)", sceneList.empty() ? "" : ", ", scene.name, scene.nodeCount());
 
   stream::SceneServer server(std::move(scenes), {.device = {.select = options.device,
                                                             .softwareThreads = options.softwareThreads,
@@ -144,15 +150,16 @@ void serve(const ProgramOptions& options, const Signals& signals) {
                                                  .runAlways = options.alwaysRun});
   {
     const std::filesystem::path page = options.page.empty() ? pageBesideProgram() : options.page;
-    if (page.empty()) spdlog::warn("there is no page beside the program: build clothstream_page, or name one by --page");
+    if (page.empty())
+      spdlog::warn("there is no page beside the program: build clothstream_page, or name one by --page");
     const web::WebDoor web(server, {.host = options.host,
                                     .port = options.port,
                                     .pageDirectory = page,
                                     .allowedOrigins = options.allowedOrigins});
     const rpc::RpcDoor rpc(server, {.host = options.host, .port = options.grpcPort});
 
-    fmt::print("device  {}\nscenes  {}\npage    http://{}/\ngRPC    {}\n", describe(server.deviceInfo()), sceneList,
-               reachable(options.host, web.port()), reachable(options.host, rpc.port()));
+    fmt::print("device  {}\nscenes  {}\npage    http://{}/\ngRPC    {}\n", describe(server.deviceInfo()),
+               sceneList, reachable(options.host, web.port()), reachable(options.host, rpc.port()));
     std::fflush(stdout);
     waitForStop(signals, options, server);
     spdlog::info("stopping");

@@ -37,7 +37,8 @@ struct ProgramOptions {
   std::optional<std::chrono::duration<double>> stopAfter;
 };
 
-// The options, or with what to exit (help, version, or a wrong option: what there is to say has been printed).
+// The options, or with what to exit (help, version, or a wrong option: what there is to say has been
+// printed).
 std::variant<ProgramOptions, int> parseOptions(int argc, const char* const* argv);
 
 }  // namespace clothstream

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// All who are in a scene. Whatever publishes to an audience is a source of frames; mailboxes do not know which.
+// All who are in a scene. Whatever publishes to an audience is a source of frames; mailboxes do not know
+// which.
 #pragma once
 
 #include <cstddef>

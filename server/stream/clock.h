@@ -14,6 +14,8 @@ inline std::uint64_t microseconds(Clock::time_point time) {
       std::chrono::duration_cast<std::chrono::microseconds>(time.time_since_epoch()).count());
 }
 
-inline double seconds(Clock::duration duration) { return std::chrono::duration<double>(duration).count(); }
+inline double seconds(Clock::duration duration) {
+  return std::chrono::duration<double>(duration).count();
+}
 
 }  // namespace clothstream::stream

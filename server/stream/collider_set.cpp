@@ -10,7 +10,8 @@
 namespace clothstream::stream {
 namespace {
 
-// Where a collider that somebody moved starts: where it was, or there already if that is too far for one tick.
+// Where a collider that somebody moved starts: where it was, or there already if that is too far for one
+// tick.
 scene::Vec3 startOf(const scene::Vec3& before, const scene::Vec3& now, double tickSeconds) {
   const float reach = kMaxColliderSpeed * static_cast<float>(tickSeconds);
   return (now - before).squaredNorm() > reach * reach ? now : before;
@@ -64,8 +65,7 @@ void ColliderSet::write(const scene::Scene& scene,
   states.Clear();
   for (std::size_t i = 0; i < scene.colliders.size(); ++i)
     messages::write(scene.colliders[i], scenePositions_[i], *states.Add());
-  for (const Held& collider : colliders_)
-    messages::write(collider.now, collider.participant, *states.Add());
+  for (const Held& collider : colliders_) messages::write(collider.now, collider.participant, *states.Add());
 }
 
 }  // namespace clothstream::stream

@@ -15,21 +15,23 @@
 
 namespace clothstream::stream {
 
-// A collider that somebody moved faster than this is not swept there: it appears at its new place, at rest. m/s
+// A collider that somebody moved faster than this is not swept there: it appears at its new place, at rest.
+// m/s
 inline constexpr float kMaxColliderSpeed = 30;
 
-// Belongs to the device's thread. The order is the same whatever the order of arrival: the scene's colliders as defined,
-// then participants by number, each one's by id.
+// Belongs to the device's thread. The order is the same whatever the order of arrival: the scene's colliders
+// as defined, then participants by number, each one's by id.
 class ColliderSet {
  public:
   // At the start: simulated time 0.
   explicit ColliderSet(const scene::Scene& scene);
 
-  // All colliders of this participant. A known id moves there over the next tick, a new one appears at rest, one that is
-  // missing vanishes.
+  // All colliders of this participant. A known id moves there over the next tick, a new one appears at rest,
+  // one that is missing vanishes.
   void place(std::uint64_t participant, std::span<const scene::ParticipantCollider> colliders);
 
-  // The next tick, which ends at this simulated time: all spheres, each from where it was to where it is then.
+  // The next tick, which ends at this simulated time: all spheres, each from where it was to where it is
+  // then.
   void advance(const scene::Scene& scene, double endSeconds, std::vector<simulation::MovingSphere>& spheres);
 
   // Where they are now. `scene` as of the last advance().

@@ -14,12 +14,20 @@ Connection::Connection(SceneServer& server, std::string peer, std::function<void
   if (SharedBytes refusal = server.state().add(session_)) session_->close(std::move(refusal));
 }
 
-Connection::~Connection() { session_->end(); }
+Connection::~Connection() {
+  session_->end();
+}
 
-void Connection::receive(std::span<const std::byte> message) { session_->receive(message, Clock::now()); }
+void Connection::receive(std::span<const std::byte> message) {
+  session_->receive(message, Clock::now());
+}
 
-std::optional<SharedBytes> Connection::next() { return session_->next(Clock::now()); }
+std::optional<SharedBytes> Connection::next() {
+  return session_->next(Clock::now());
+}
 
-bool Connection::finished() const { return session_->finished(); }
+bool Connection::finished() const {
+  return session_->finished();
+}
 
 }  // namespace clothstream::stream

@@ -11,8 +11,9 @@
 
 namespace clothstream::stream {
 
-DeviceThread::DeviceThread(const vulkan::DeviceOptions& device, const std::vector<std::unique_ptr<LiveScene>>& scenes,
-                           FramePacker& packer, telemetry::ServerMetrics& metrics, bool runAlways)
+DeviceThread::DeviceThread(const vulkan::DeviceOptions& device,
+                           const std::vector<std::unique_ptr<LiveScene>>& scenes, FramePacker& packer,
+                           telemetry::ServerMetrics& metrics, bool runAlways)
     : options_(device), packer_(packer), metrics_(metrics), runAlways_(runAlways) {
   std::promise<void> ready;
   std::future<void> isReady = ready.get_future();
@@ -83,9 +84,8 @@ void DeviceThread::run(const std::vector<std::unique_ptr<LiveScene>>& scenes, st
 }
 
 bool DeviceThread::waitForWork() {
-  const auto earliest = std::ranges::min_element(runs_, {}, [](const auto& run) {
-    return run->running ? run->pacer.due() : Clock::time_point::max();
-  });
+  const auto earliest = std::ranges::min_element(
+      runs_, {}, [](const auto& run) { return run->running ? run->pacer.due() : Clock::time_point::max(); });
   const auto something = [&] { return stopping_ || woken_ || loseDevice_; };
 
   std::unique_lock lock(mutex_);
@@ -130,9 +130,9 @@ void DeviceThread::begin(Run& run, Clock::time_point now) {
   if (start.late) scene.metrics.lateTicks.add();
   scene.metrics.slippedTicks.add(run.wholeSlippedTicks(start.slippedTicks));
   if (const std::optional<double> speed = run.slow.note(now, start.slippedTicks)) {
-    const std::string text =
-        fmt::format("simulated time runs at {:.0f} % of real time: the device cannot keep {} ticks/s with {} substeps",
-                    *speed * 100, scene.start().simulationRate, scene.start().substeps);
+    const std::string text = fmt::format(
+        "simulated time runs at {:.0f} % of real time: the device cannot keep {} ticks/s with {} substeps",
+        *speed * 100, scene.start().simulationRate, scene.start().substeps);
     spdlog::warn("{}: {}", scene.name(), text);
     scene.audience.announce(notice(v1::NOTICE_KIND_RUNNING_SLOW, text, run.host.tick()));
   }

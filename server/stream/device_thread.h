@@ -22,12 +22,13 @@
 
 namespace clothstream::stream {
 
-// Thread-safe. Scenes that are due together are all submitted before the first is waited for. A scene sleeps while nobody
-// is in it. When the device is lost, another is made and every scene goes on from the newest state that the CPU has; this
-// is tried once a second until it succeeds.
+// Thread-safe. Scenes that are due together are all submitted before the first is waited for. A scene sleeps
+// while nobody is in it. When the device is lost, another is made and every scene goes on from the newest
+// state that the CPU has; this is tried once a second until it succeeds.
 class DeviceThread {
  public:
-  // Device and scenes are ready when it returns. All arguments outlive it. Throws what the device or a scene throws.
+  // Device and scenes are ready when it returns. All arguments outlive it. Throws what the device or a scene
+  // throws.
   DeviceThread(const vulkan::DeviceOptions& device, const std::vector<std::unique_ptr<LiveScene>>& scenes,
                FramePacker& packer, telemetry::ServerMetrics& metrics, bool runAlways);
   // Ends after the ticks in flight.

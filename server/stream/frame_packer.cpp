@@ -82,7 +82,8 @@ void FramePacker::pack() {
   // Counted before anybody can have it, so that who holds a frame finds it counted.
   telemetry::SceneMetrics& metrics = frame_.scene->metrics;
   metrics.encode.record(seconds(complete - frame_.deviceDone));
-  for (const Clock::time_point arrival : frame_.poseArrivals) metrics.inputToPacket.record(seconds(complete - arrival));
+  for (const Clock::time_point arrival : frame_.poseArrivals)
+    metrics.inputToPacket.record(seconds(complete - arrival));
   metrics.frames.add();
   if (published.key) metrics.keyFrames.add();
   metrics.packetBytes.add(encoded.bytes);

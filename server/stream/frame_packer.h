@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Frames from the device to everybody in their scene: entropy-coded, put into one message, published. A thread of its own.
+// Frames from the device to everybody in their scene: entropy-coded, put into one message, published. A
+// thread of its own.
 #pragma once
 
 #include <condition_variable>

@@ -37,7 +37,8 @@ void Inbox::keepColliderChanges() {
     kept.mutable_colliders()->Swap(accepted.message.mutable_colliders());
     accepted.message = std::move(kept);
   }
-  std::erase_if(inputs_.changes, [](const AcceptedChange& accepted) { return accepted.change.colliders.empty(); });
+  std::erase_if(inputs_.changes,
+                [](const AcceptedChange& accepted) { return accepted.change.colliders.empty(); });
 }
 
 void Inbox::drain(Inputs& out) {

@@ -46,8 +46,9 @@ messages::Result<void> LiveScene::change(std::uint64_t participant, const v1::Pa
   messages::Result<scene::ParameterChange> change = messages::toParameterChange(message, definition_);
   if (!change) return tl::unexpected(std::move(change).error());
   if (!inbox.postChange({participant, *change, message}))
-    return tl::unexpected(messages::FieldError{
-        v1::ERROR_CODE_RESOURCE_EXHAUSTED, "parameter_change: too many changes for one tick; send it again later"});
+    return tl::unexpected(
+        messages::FieldError{v1::ERROR_CODE_RESOURCE_EXHAUSTED,
+                             "parameter_change: too many changes for one tick; send it again later"});
   scene::applyChange(definition_, *change);
   description_.reset();
   return {};

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A scene as its participants share it: definition, inbox, audience, metrics. Where doors and the device's thread meet.
+// A scene as its participants share it: definition, inbox, audience, metrics. Where doors and the device's
+// thread meet.
 #pragma once
 
 #include <atomic>
@@ -30,8 +31,8 @@ class LiveScene {
 
   // Checks the change against the definition and puts it into the inbox, or says what is wrong with it.
   messages::Result<void> change(std::uint64_t participant, const v1::ParameterChange& message);
-  // Environment and cloths as at first, and changes of them that were on their way dropped; returns the change that
-  // says so.
+  // Environment and cloths as at first, and changes of them that were on their way dropped; returns the
+  // change that says so.
   v1::ParameterChange resetParameters();
 
   // For who joins now; must have joined the audience before, so as to miss no change.

@@ -95,7 +95,8 @@ bool Mailbox::acknowledge(std::uint64_t tick, Clock::time_point now) {
     while (!sent_.empty() && sent_.front().tick <= tick) {
       if (sent_.front().tick == tick) {
         const double sample = seconds(now - sent_.front().time);
-        // The shortest, but it creeps up (by half in some 200 frames) so that a route that became longer is noticed.
+        // The shortest, but it creeps up (by half in some 200 frames) so that a route that became longer is
+        // noticed.
         roundTrip_ = roundTrip_ ? std::min(sample, *roundTrip_ * 1.002) : sample;
       }
       sent_.pop_front();
@@ -123,7 +124,8 @@ void Mailbox::close(SharedBytes last) {
     held_.clear();
     description_.reset();
     announcements_ = {};
-    // Answers that were on their way are worth having; a peer that does not read them only holds what it held.
+    // Answers that were on their way are worth having; a peer that does not read them only holds what it
+    // held.
     if (last) {
       replies_.bytes += last->size();
       replies_.messages.push_back(std::move(last));

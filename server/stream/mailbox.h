@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What waits to be sent to one subscriber: control first, then the newest frames it can decode and has room for.
+// What waits to be sent to one subscriber: control first, then the newest frames it can decode and has room
+// for.
 #pragma once
 
 #include <cstddef>
@@ -32,16 +33,17 @@ struct Description {
   std::vector<SharedBytes> chunks;
 };
 
-// Thread-safe. Memory of one subscriber: at most kMaxControlBytes of control (or one message that is larger), kMaxHeld
-// frames and one description, the latter two shared with the other subscribers.
+// Thread-safe. Memory of one subscriber: at most kMaxControlBytes of control (or one message that is larger),
+// kMaxHeld frames and one description, the latter two shared with the other subscribers.
 //
-// Room for frames: at most window() of them are out and not acknowledged. It is two, and on long round trips as many more
-// as the scene streams in one; the round trip is the shortest of late from a frame's leaving to its acknowledgement, so
-// that a queue on the way, which makes it longer, does not feed itself.
+// Room for frames: at most window() of them are out and not acknowledged. It is two, and on long round trips
+// as many more as the scene streams in one; the round trip is the shortest of late from a frame's leaving to
+// its acknowledgement, so that a queue on the way, which makes it longer, does not feed itself.
 //
-// Frames form a chain: a predicted one needs the one before. A subscriber without room has up to kMaxHeld frames held
-// back; if it falls behind more, they are dropped and it goes on with the next key frame, for which it asks
-// (wantsKeyFrame) when it has room and its door waits for something to write: who does not read asks for nothing.
+// Frames form a chain: a predicted one needs the one before. A subscriber without room has up to kMaxHeld
+// frames held back; if it falls behind more, they are dropped and it goes on with the next key frame, for
+// which it asks (wantsKeyFrame) when it has room and its door waits for something to write: who does not read
+// asks for nothing.
 class Mailbox {
  public:
   static constexpr std::size_t kMaxControlBytes = 256 * 1024;
@@ -68,7 +70,8 @@ class Mailbox {
   // The peer cannot go on decoding: it starts anew with a key frame.
   void restart();
 
-  // No frames, no announcements any more; what was not sent is dropped, then `last` is the last message (if there is one).
+  // No frames, no announcements any more; what was not sent is dropped, then `last` is the last message (if
+  // there is one).
   void close(SharedBytes last);
   bool closed() const;
 

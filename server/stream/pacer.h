@@ -8,9 +8,9 @@
 
 namespace clothstream::stream {
 
-// Tick n after start() is due n periods later, counted in whole ticks so that no rounding adds up. A scene that is behind
-// catches up at most one tick: what it is behind more than that is given up, and simulated time falls behind real time.
-// Not thread-safe.
+// Tick n after start() is due n periods later, counted in whole ticks so that no rounding adds up. A scene
+// that is behind catches up at most one tick: what it is behind more than that is given up, and simulated
+// time falls behind real time. Not thread-safe.
 class Pacer {
  public:
   explicit Pacer(std::uint32_t ticksPerSecond) : ticksPerSecond_(ticksPerSecond) {}
@@ -47,7 +47,8 @@ class Pacer {
   Clock::duration periods(std::uint64_t count) const {
     // Whole seconds apart from the rest: nothing overflows in years.
     return std::chrono::seconds(count / ticksPerSecond_) +
-           Clock::duration(std::chrono::nanoseconds(count % ticksPerSecond_ * 1'000'000'000 / ticksPerSecond_));
+           Clock::duration(
+               std::chrono::nanoseconds(count % ticksPerSecond_ * 1'000'000'000 / ticksPerSecond_));
   }
 
   std::uint64_t ticksPerSecond_;

@@ -141,8 +141,9 @@ void SceneHost::recover() {
   if (again) {
     recovery_ = Recovery::reset;
     live_.metrics.resets.add();
-    text = "the simulation left the range of numbers twice within a second: it goes on from its start, with the "
-           "parameters it had then";
+    text =
+        "the simulation left the range of numbers twice within a second: it goes on from its start, with the "
+        "parameters it had then";
     v1::ServerMessage message;
     *message.mutable_parameter_changed()->mutable_change() = live_.resetParameters();
     message.mutable_parameter_changed()->set_tick(tick_ + 1);
@@ -153,14 +154,17 @@ void SceneHost::recover() {
   } else {
     recovery_ = Recovery::rollback;
     live_.metrics.rollbacks.add();
-    text = "the simulation left the range of numbers: it goes on from its last good state, at most a second old";
+    text =
+        "the simulation left the range of numbers: it goes on from its last good state, at most a second old";
   }
   if (!recoveryNotices_.take(Clock::now())) return;
   spdlog::warn("{}: tick {}: {}", live_.name(), tick_, text);
   live_.audience.announce(notice(v1::NOTICE_KIND_ROLLED_BACK, text, tick_));
 }
 
-void SceneHost::release() { onDevice_.reset(); }
+void SceneHost::release() {
+  onDevice_.reset();
+}
 
 void SceneHost::rebuild(vulkan::Device& device) {
   auto fresh = std::make_unique<OnDevice>(device, live_.start());
@@ -171,11 +175,10 @@ void SceneHost::rebuild(vulkan::Device& device) {
   onDevice_ = std::move(fresh);
   recovery_ = Recovery::none;
   sinceHealthy_ = 0;
-  live_.audience.announce(
-      notice(v1::NOTICE_KIND_DEVICE_REBUILT,
-             fmt::format("the device was lost; the scene goes on from {:.1f} s before",
-                         static_cast<double>(tick_ - newestState_.tick) / rate_),
-             tick_));
+  live_.audience.announce(notice(v1::NOTICE_KIND_DEVICE_REBUILT,
+                                 fmt::format("the device was lost; the scene goes on from {:.1f} s before",
+                                             static_cast<double>(tick_ - newestState_.tick) / rate_),
+                                 tick_));
 }
 
 }  // namespace clothstream::stream

@@ -19,12 +19,12 @@
 
 namespace clothstream::stream {
 
-// Belongs to the device's thread. A tick is begin(), then finish(); between the two the device works. Tick n ends at the
-// simulated time n / simulation rate; ticks only ever count up, whatever happens to the state.
+// Belongs to the device's thread. A tick is begin(), then finish(); between the two the device works. Tick n
+// ends at the simulated time n / simulation rate; ticks only ever count up, whatever happens to the state.
 //
-// What can be lost is bounded: every second of healthy ticks the state is kept on the device (a state that went bad goes
-// back to it), every five seconds on the CPU (a lost device goes on from there). A state that goes bad twice within a
-// second goes back to the start, parameters included.
+// What can be lost is bounded: every second of healthy ticks the state is kept on the device (a state that
+// went bad goes back to it), every five seconds on the CPU (a lost device goes on from there). A state that
+// goes bad twice within a second goes back to the start, parameters included.
 class SceneHost {
  public:
   // At most one key frame in this time, whoever asks: one serves all who wait.

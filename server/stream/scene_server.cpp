@@ -20,11 +20,14 @@ namespace {
 
 std::vector<std::unique_ptr<LiveScene>> liveScenes(std::vector<scene::Scene> definitions) {
   std::vector<std::unique_ptr<LiveScene>> scenes;
-  for (scene::Scene& definition : definitions) scenes.push_back(std::make_unique<LiveScene>(std::move(definition)));
+  for (scene::Scene& definition : definitions)
+    scenes.push_back(std::make_unique<LiveScene>(std::move(definition)));
   return scenes;
 }
 
-SharedBytes stoppingNotice() { return notice(v1::NOTICE_KIND_SERVER_STOPPING, "the server stops", 0); }
+SharedBytes stoppingNotice() {
+  return notice(v1::NOTICE_KIND_SERVER_STOPPING, "the server stops", 0);
+}
 
 }  // namespace
 
@@ -59,7 +62,8 @@ SharedBytes SceneServer::State::add(const std::shared_ptr<Session>& session) {
   if (sessions.size() >= options.maxConnections) {
     metrics.refusedConnections.add();
     return error(v1::ERROR_CODE_RESOURCE_EXHAUSTED,
-                 fmt::format("the server has {} connections, as many as it may have; try again later", sessions.size()),
+                 fmt::format("the server has {} connections, as many as it may have; try again later",
+                             sessions.size()),
                  true);
   }
   metrics.connections.add();
@@ -80,8 +84,7 @@ void SceneServer::State::stop() {
     const std::lock_guard lock(mutex);
     stopping = true;
   }
-  for (const auto& session : sessionsNow())
-    session->close(stoppingNotice());
+  for (const auto& session : sessionsNow()) session->close(stoppingNotice());
 }
 
 v1::ListScenesResponse SceneServer::State::listScenes() const {
@@ -95,7 +98,8 @@ v1::ListScenesResponse SceneServer::State::listScenes() const {
   return response;
 }
 
-tl::expected<v1::GetSceneResponse, v1::Error> SceneServer::State::getScene(const v1::GetSceneRequest& request) const {
+tl::expected<v1::GetSceneResponse, v1::Error> SceneServer::State::getScene(
+    const v1::GetSceneRequest& request) const {
   const LiveScene* scene = find(request.name());
   if (scene == nullptr) return tl::unexpected(noSuchScene(request.name()));
   v1::GetSceneResponse response;
@@ -104,7 +108,8 @@ tl::expected<v1::GetSceneResponse, v1::Error> SceneServer::State::getScene(const
 }
 
 SceneServer::SceneServer(std::vector<scene::Scene> scenes, ServerOptions options) {
-  assert(options.maxParticipants * messages::limits::kMaxParticipantColliders + messages::limits::kMaxColliders <=
+  assert(options.maxParticipants * messages::limits::kMaxParticipantColliders +
+             messages::limits::kMaxColliders <=
          simulation::kMaxSpheres);
   bool found = false;
   std::string known;
@@ -113,23 +118,35 @@ SceneServer::SceneServer(std::vector<scene::Scene> scenes, ServerOptions options
     known += (known.empty() ? "" : ", ") + scene.name;
   }
   if (!found)
-    throw std::runtime_error(fmt::format("there is no scene '{}'; there are {}", options.defaultScene, known));
+    throw std::runtime_error(
+        fmt::format("there is no scene '{}'; there are {}", options.defaultScene, known));
   state_ = std::make_unique<State>(std::move(scenes), std::move(options));
 }
 
-SceneServer::~SceneServer() { stop(); }
+SceneServer::~SceneServer() {
+  stop();
+}
 
-v1::ListScenesResponse SceneServer::listScenes() const { return state_->listScenes(); }
+v1::ListScenesResponse SceneServer::listScenes() const {
+  return state_->listScenes();
+}
 
-tl::expected<v1::GetSceneResponse, v1::Error> SceneServer::getScene(const v1::GetSceneRequest& request) const {
+tl::expected<v1::GetSceneResponse, v1::Error> SceneServer::getScene(
+    const v1::GetSceneRequest& request) const {
   return state_->getScene(request);
 }
 
-void SceneServer::stop() { state_->stop(); }
+void SceneServer::stop() {
+  state_->stop();
+}
 
-vulkan::DeviceInfo SceneServer::deviceInfo() const { return state_->device.info(); }
+vulkan::DeviceInfo SceneServer::deviceInfo() const {
+  return state_->device.info();
+}
 
-const std::string& SceneServer::defaultScene() const { return state_->options.defaultScene; }
+const std::string& SceneServer::defaultScene() const {
+  return state_->options.defaultScene;
+}
 
 std::string SceneServer::report() const {
   std::string text;

@@ -25,16 +25,19 @@ struct ServerOptions {
   // A scene sleeps while nobody is in it, unless this is set.
   bool runAlways = false;
   std::uint32_t maxConnections = 1024;
-  std::uint32_t maxParticipants = 64;  // a scene; at most 250, for the simulation has room for so many colliders
+  std::uint32_t maxParticipants =
+      64;  // a scene; at most 250, for the simulation has room for so many colliders
   // A peer that sends nothing for this long is dropped.
   std::chrono::milliseconds silence{30'000};
 };
 
-// Thread-safe. Two threads of its own: one owns the device and runs every scene's ticks, one makes packets of frames.
+// Thread-safe. Two threads of its own: one owns the device and runs every scene's ticks, one makes packets of
+// frames.
 class SceneServer {
  public:
-  // The scenes must be valid (server/messages) and their names unique. Throws vulkan::DeviceError, or std::runtime_error
-  // where the device has no room for a scene or the default scene is not among them (naming those there are).
+  // The scenes must be valid (server/messages) and their names unique. Throws vulkan::DeviceError, or
+  // std::runtime_error where the device has no room for a scene or the default scene is not among them
+  // (naming those there are).
   SceneServer(std::vector<scene::Scene> scenes, ServerOptions options);
   // Stops. Every Connection must be gone.
   ~SceneServer();

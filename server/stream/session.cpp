@@ -68,7 +68,8 @@ void Session::dispatch(const v1::ClientMessage& message, Clock::time_point now) 
     default:
       break;
   }
-  if (scene_ == nullptr) return fail(v1::ERROR_CODE_OUT_OF_ORDER, "this stream has joined no scene: send hello first");
+  if (scene_ == nullptr)
+    return fail(v1::ERROR_CODE_OUT_OF_ORDER, "this stream has joined no scene: send hello first");
 
   switch (message.body_case()) {
     case Body::kColliderPoses:
@@ -82,7 +83,8 @@ void Session::dispatch(const v1::ClientMessage& message, Clock::time_point now) 
     case Body::kFrameAck:
       if (!mailbox_->acknowledge(message.frame_ack().tick(), now))
         refuse({v1::ERROR_CODE_INVALID_ARGUMENT,
-                fmt::format("frame_ack.tick = {}: must be of a frame that was sent", message.frame_ack().tick())});
+                fmt::format("frame_ack.tick = {}: must be of a frame that was sent",
+                            message.frame_ack().tick())});
       return;
     case Body::kKeyFrameRequest:
       if (allowed(keyFrameRate_, "key frame requests")) mailbox_->restart();
@@ -105,8 +107,8 @@ void Session::hello(const v1::Hello& message) {
   }
   if (!scene->audience.join(mailbox_, server_.options.maxParticipants))
     return fail(v1::ERROR_CODE_RESOURCE_EXHAUSTED,
-                fmt::format("'{}' has {} participants, as many as it may have; try again later", scene->name(),
-                            server_.options.maxParticipants));
+                fmt::format("'{}' has {} participants, as many as it may have; try again later",
+                            scene->name(), server_.options.maxParticipants));
   scene_ = scene;
   participant_ = ++server_.participants;
   scene->metrics.joins.add();
@@ -185,8 +187,8 @@ void Session::checkSilence(Clock::time_point now) {
   const std::lock_guard lock(mutex_);
   if (!mailbox_->closed()) {
     server_.metrics.droppedConnections.add();
-    const std::string text =
-        fmt::format("nothing was heard for {} s: acknowledge frames, or send pings", seconds(server_.options.silence));
+    const std::string text = fmt::format("nothing was heard for {} s: acknowledge frames, or send pings",
+                                         seconds(server_.options.silence));
     spdlog::info("{}: cut off: {}", peer_, text);
     mailbox_->close(error(v1::ERROR_CODE_RESOURCE_EXHAUSTED, text, true));
   }

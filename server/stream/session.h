@@ -19,8 +19,9 @@
 
 namespace clothstream::stream {
 
-// Thread-safe. What is wrong with a message is answered to this peer alone. Whoever is refused on and on is cut off: every
-// refused message counts against a budget that refills with time, one that is no message at all counts for sixty.
+// Thread-safe. What is wrong with a message is answered to this peer alone. Whoever is refused on and on is
+// cut off: every refused message counts against a budget that refills with time, one that is no message at
+// all counts for sixty.
 class Session {
  public:
   Session(SceneServer::State& server, std::string peer, std::function<void()> wake);

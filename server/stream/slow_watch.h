@@ -8,8 +8,8 @@
 
 namespace clothstream::stream {
 
-// Looks at stretches of two seconds, so that a single hiccup is none of its business, and speaks at most every ten.
-// Not thread-safe.
+// Looks at stretches of two seconds, so that a single hiccup is none of its business, and speaks at most
+// every ten. Not thread-safe.
 class SlowWatch {
  public:
   static constexpr std::chrono::seconds kStretch{2}, kPause{10};
@@ -17,8 +17,8 @@ class SlowWatch {
 
   void restart() { watching_ = false; }
 
-  // A tick started, before which simulated time gave up so many ticks. Its speed in parts of real time, where that is
-  // below kSlow and to be told.
+  // A tick started, before which simulated time gave up so many ticks. Its speed in parts of real time, where
+  // that is below kSlow and to be told.
   std::optional<double> note(Clock::time_point now, double slippedTicks) {
     if (!watching_) {
       watching_ = true;

@@ -16,7 +16,8 @@ class TokenBucket {
   // False, and nothing taken, where there are fewer than `cost` tokens.
   bool take(Clock::time_point now, double cost = 1) {
     if (now > last_) {
-      if (last_ != Clock::time_point{}) tokens_ = std::min(burst_, tokens_ + seconds(now - last_) * perSecond_);
+      if (last_ != Clock::time_point{})
+        tokens_ = std::min(burst_, tokens_ + seconds(now - last_) * perSecond_);
       last_ = now;
     }
     if (tokens_ < cost) return false;

@@ -27,7 +27,7 @@ using Storage = bh::dense_storage<bh::accumulators::thread_safe<std::uint64_t>>;
 
 struct Histogram::Bins {
   bh::histogram<std::tuple<Axis>, Storage> counts =
-      bh::make_histogram_with(Storage(), Axis(kBinsADecade * kDecades, kShortest, kLongest));
+      bh::make_histogram_with(Storage(), Axis(kBinsADecade* kDecades, kShortest, kLongest));
   std::atomic<double> max{0};
 };
 
@@ -43,8 +43,8 @@ void Histogram::record(double seconds) {
 
 Summary Histogram::summary() const {
   const Axis& axis = bins_->counts.axis();
-  // A copy, so that all quantiles speak of the same records while others go on recording. Bin -1 and the last one
-  // hold what lies outside the axis.
+  // A copy, so that all quantiles speak of the same records while others go on recording. Bin -1 and the last
+  // one hold what lies outside the axis.
   std::vector<std::uint64_t> counts;
   for (int bin = -1; bin <= axis.size(); ++bin) counts.push_back(bins_->counts.at(bin).load());
 

@@ -18,8 +18,9 @@ struct Summary {
   double p50 = 0, p90 = 0, p99 = 0, max = 0;
 };
 
-// Thread-safe, without locks; memory is taken once. From 1 microsecond to 1,000 seconds (what lies outside counts to the
-// ends) with 48 bins a decade, so that a quantile is within 5 % of its true value; the maximum is exact.
+// Thread-safe, without locks; memory is taken once. From 1 microsecond to 1,000 seconds (what lies outside
+// counts to the ends) with 48 bins a decade, so that a quantile is within 5 % of its true value; the maximum
+// is exact.
 class Histogram {
  public:
   Histogram();

@@ -13,7 +13,8 @@ void setUpLog(const std::string& level) {
   const spdlog::level::level_enum parsed = spdlog::level::from_str(level);
   // from_str answers `off` to what it does not know.
   if (parsed == spdlog::level::off && level != "off")
-    throw std::invalid_argument("log level '" + level + "' is none of trace, debug, info, warning, error, off");
+    throw std::invalid_argument("log level '" + level +
+                                "' is none of trace, debug, info, warning, error, off");
 
   // Replacing the logger, not its sink, lets tests do it more than once.
   auto logger = std::make_shared<spdlog::logger>("", std::make_shared<spdlog::sinks::stderr_color_sink_mt>());

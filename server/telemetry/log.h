@@ -6,8 +6,8 @@
 
 namespace clothstream::telemetry {
 
-// `level` is one of trace, debug, info, warning, error, off. Throws std::invalid_argument that names them otherwise.
-// Colours where standard error is a terminal. Flushed at every warning.
+// `level` is one of trace, debug, info, warning, error, off. Throws std::invalid_argument that names them
+// otherwise. Colours where standard error is a terminal. Flushed at every warning.
 void setUpLog(const std::string& level);
 
 }  // namespace clothstream::telemetry

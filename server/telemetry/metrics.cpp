@@ -16,8 +16,8 @@ using Counted = std::pair<std::string_view, std::uint64_t>;
 
 void addLine(std::string& text, std::string_view name, const Summary& summary) {
   if (summary.count == 0) return;
-  fmt::format_to(std::back_inserter(text), "  {:<26}{:>9}{:>10.3f}{:>10.3f}{:>10.3f}{:>10.3f}\n", name, summary.count,
-                 summary.p50 * 1e3, summary.p90 * 1e3, summary.p99 * 1e3, summary.max * 1e3);
+  fmt::format_to(std::back_inserter(text), "  {:<26}{:>9}{:>10.3f}{:>10.3f}{:>10.3f}{:>10.3f}\n", name,
+                 summary.count, summary.p50 * 1e3, summary.p90 * 1e3, summary.p99 * 1e3, summary.max * 1e3);
 }
 
 void addCounters(std::string& text, std::initializer_list<Counted> counters) {
@@ -28,12 +28,13 @@ void addCounters(std::string& text, std::initializer_list<Counted> counters) {
 }  // namespace
 
 std::string table(const std::string& scene, const SceneMetrics& m) {
-  std::string text = fmt::format("{:<28}{:>9}{:>10}{:>10}{:>10}{:>10}\n", fmt::format("scene {} (ms)", scene), "count",
-                                 "p50", "p90", "p99", "max");
+  std::string text = fmt::format("{:<28}{:>9}{:>10}{:>10}{:>10}{:>10}\n", fmt::format("scene {} (ms)", scene),
+                                 "count", "p50", "p90", "p99", "max");
   addLine(text, "tick", m.tick.summary());
   addLine(text, "tick lateness", m.lateness.summary());
   addLine(text, "device", m.deviceTotal.summary());
-  for (const auto& [stage, summary] : m.device.summaries()) addLine(text, fmt::format("  {}", stage), summary);
+  for (const auto& [stage, summary] : m.device.summaries())
+    addLine(text, fmt::format("  {}", stage), summary);
   addLine(text, "encode", m.encode.summary());
   addLine(text, "send", m.send.summary());
   addLine(text, "pose arrival to packet", m.inputToPacket.summary());

@@ -23,11 +23,12 @@ class Counter {
 // All of it is recorded by whoever sees it happen, and read at any time.
 struct SceneMetrics {
   // Seconds.
-  Histogram tick;           // from a tick's start to its status on the CPU
-  Histogram lateness;       // of a tick's start behind its due time
-  Histogram deviceTotal;    // on the device, all stages of a tick
-  StageHistograms device;   // on the device, each stage
-  Histogram encode;         // from the tick's completion on the device to the packet, entropy coding and waiting for it
+  Histogram tick;          // from a tick's start to its status on the CPU
+  Histogram lateness;      // of a tick's start behind its due time
+  Histogram deviceTotal;   // on the device, all stages of a tick
+  StageHistograms device;  // on the device, each stage
+  Histogram
+      encode;  // from the tick's completion on the device to the packet, entropy coding and waiting for it
   Histogram send;           // from the packet to a door taking it
   Histogram inputToPacket;  // from a pose's arrival to the packet that shows its effect
 
@@ -54,8 +55,8 @@ struct ServerMetrics {
   Counter deviceRebuilds;
 };
 
-// One line a histogram (count, p50, p90, p99, maximum in milliseconds) and one line of counters; stages that never
-// happened are left out.
+// One line a histogram (count, p50, p90, p99, maximum in milliseconds) and one line of counters; stages that
+// never happened are left out.
 std::string table(const std::string& scene, const SceneMetrics& metrics);
 std::string table(const ServerMetrics& metrics);
 

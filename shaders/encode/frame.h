@@ -14,7 +14,8 @@ struct EncodePush {
   float inverseStep;
 };
 
-// What a frame's kernels gather by integer atomics, whose order does not matter. Zero before the first kernel.
+// What a frame's kernels gather by integer atomics, whose order does not matter. Zero before the first
+// kernel.
 struct FrameStatus {
   uint32_t hashLow;
   uint32_t hashHigh;
@@ -25,10 +26,14 @@ struct FrameStatus {
   uint32_t reserved2[2];
 };
 
-// Where a vertex's neighbours are: bit 31 says that there is one before it in its row, the other bits how far back the
-// one above it is; 0 there for none.
-CLOTHSTREAM_SHARED_FUNCTION bool hasLeft(uint32_t neighbours) { return (neighbours & 0x80000000u) != 0u; }
-CLOTHSTREAM_SHARED_FUNCTION uint32_t distanceUp(uint32_t neighbours) { return neighbours & 0x7FFFFFFFu; }
+// Where a vertex's neighbours are: bit 31 says that there is one before it in its row, the other bits how far
+// back the one above it is; 0 there for none.
+CLOTHSTREAM_SHARED_FUNCTION bool hasLeft(uint32_t neighbours) {
+  return (neighbours & 0x80000000u) != 0u;
+}
+CLOTHSTREAM_SHARED_FUNCTION uint32_t distanceUp(uint32_t neighbours) {
+  return neighbours & 0x7FFFFFFFu;
+}
 
 CLOTHSTREAM_SHARED_END
 

@@ -9,7 +9,9 @@ const uint kCostStride = 4;
 
 shared uint costs[2 * kPredictionCount];
 
-uint bitWidth(int value) { return uint(findMSB(zigzag(value)) + 1); }
+uint bitWidth(int value) {
+  return uint(findMSB(zigzag(value)) + 1);
+}
 
 void measureVertex(uint channel, uint vertex, inout uint sums[kPredictionCount]) {
   Neighbourhood d = gather(channel, vertex, false);

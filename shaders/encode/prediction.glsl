@@ -8,12 +8,22 @@
 layout(local_size_x_id = 0) in;
 layout(constant_id = 1) const uint kHasNormals = 0;
 
-layout(std430, binding = 0) readonly buffer Lattice { int lattice[]; };
-layout(std430, binding = 1) readonly buffer Reference { int reference[]; };
-layout(std430, binding = 2) readonly buffer Neighbours { uint neighbours[]; };
-layout(std430, binding = 3) buffer Status { FrameStatus status; };
+layout(std430, binding = 0) readonly buffer Lattice {
+  int lattice[];
+};
+layout(std430, binding = 1) readonly buffer Reference {
+  int reference[];
+};
+layout(std430, binding = 2) readonly buffer Neighbours {
+  uint neighbours[];
+};
+layout(std430, binding = 3) buffer Status {
+  FrameStatus status;
+};
 
-layout(push_constant) uniform Push { EncodePush push; };
+layout(push_constant) uniform Push {
+  EncodePush push;
+};
 
 const uint kPositionChannels = 3;
 const uint kPredictionCount = 5;
@@ -25,7 +35,9 @@ const uint kTemporalAverage = 3;
 const uint kTemporalPlanar = 4;
 
 // Octahedral components count modulo 256, lattice coordinates modulo 2^32.
-int wrap(uint channel, int value) { return channel < kPositionChannels ? value : bitfieldExtract(value, 0, 8); }
+int wrap(uint channel, int value) {
+  return channel < kPositionChannels ? value : bitfieldExtract(value, 0, 8);
+}
 
 int change(uint channel, uint vertex, bool temporal) {
   uint at = channel * push.vertexCount + vertex;
@@ -60,7 +72,9 @@ int averageResidual(uint channel, Neighbourhood d) {
   return wrap(channel, d.here - guess);
 }
 
-int planarResidual(uint channel, Neighbourhood d) { return wrap(channel, d.here - (d.w + d.n - d.nw)); }
+int planarResidual(uint channel, Neighbourhood d) {
+  return wrap(channel, d.here - (d.w + d.n - d.nw));
+}
 
 int residual(uint channel, uint vertex, uint prediction) {
   Neighbourhood d = gather(channel, vertex, prediction >= kTemporal);
@@ -71,6 +85,8 @@ int residual(uint channel, uint vertex, uint prediction) {
   return average ? averageResidual(channel, d) : planarResidual(channel, d);
 }
 
-uint zigzag(int value) { return (uint(value) << 1) ^ uint(value >> 31); }
+uint zigzag(int value) {
+  return (uint(value) << 1) ^ uint(value >> 31);
+}
 
 #endif

@@ -11,10 +11,16 @@ layout(constant_id = 1) const uint kHasNormals = 0;
 layout(binding = 0) uniform samplerBuffer positions;
 layout(binding = 1) uniform samplerBuffer normals;
 // Channel after channel: x, y, z, and u, v where there are normals.
-layout(std430, binding = 2) writeonly buffer Lattice { int lattice[]; };
-layout(std430, binding = 3) buffer Status { FrameStatus status; };
+layout(std430, binding = 2) writeonly buffer Lattice {
+  int lattice[];
+};
+layout(std430, binding = 3) buffer Status {
+  FrameStatus status;
+};
 
-layout(push_constant) uniform Push { EncodePush push; };
+layout(push_constant) uniform Push {
+  EncodePush push;
+};
 
 const float kLatticeLimit = 8388608.0;
 const float kOne = 32768.0;
@@ -72,7 +78,8 @@ uint hashWord(uint vertex, ivec3 q, uint normal, uint seed) {
   return mixBits(h ^ normal);
 }
 
-// Writes cannot race: each invocation takes every stride-th vertex. The workgroup adds up in shared memory first.
+// Writes cannot race: each invocation takes every stride-th vertex. The workgroup adds up in shared memory
+// first.
 void main() {
   if (gl_LocalInvocationIndex == 0) {
     hashLow = 0;

@@ -6,7 +6,9 @@
 #include "shaders/encode/prediction.glsl"
 
 // 64 bytes that take the status, four planes of positions, the plane of normals; each from a word's start.
-layout(std430, binding = 4) writeonly buffer Packed { uint packed_[]; };
+layout(std430, binding = 4) writeonly buffer Packed {
+  uint packed_[];
+};
 
 const uint kStatusWords = 16;
 

@@ -7,9 +7,13 @@
 #include "shaders/shared/grid_strip.glsl"
 
 layout(binding = 2) uniform samplerBuffer positions;
-layout(std430, binding = 3) writeonly buffer Normals { vec4 normals[]; };
+layout(std430, binding = 3) writeonly buffer Normals {
+  vec4 normals[];
+};
 
-vec3 fetchPosition(uint index) { return texelFetch(positions, int(index)).xyz; }
+vec3 fetchPosition(uint index) {
+  return texelFetch(positions, int(index)).xyz;
+}
 
 // Twice the area vectors of the quadrant's triangles (p, first, diagonal) and (p, diagonal, second), added.
 vec3 quadrant(vec3 p, vec3 first, vec3 diagonal, vec3 second) {
@@ -18,8 +22,8 @@ vec3 quadrant(vec3 p, vec3 first, vec3 diagonal, vec3 second) {
   return crossProduct(across, along);
 }
 
-// Beyond an edge the window repeats the edge: such a quadrant has no area, and adds exactly zero. Writes cannot race:
-// each node belongs to one invocation.
+// Beyond an edge the window repeats the edge: such a quadrant has no area, and adds exactly zero. Writes
+// cannot race: each node belongs to one invocation.
 void main() {
   Strip strip = locateStrip();
   if (strip.row >= strip.rows) {

@@ -10,9 +10,13 @@ layout(local_size_x_id = 0) in;
 
 layout(binding = 0) uniform samplerBuffer positions;
 layout(binding = 1) uniform samplerBuffer velocities;
-layout(std430, binding = 2) buffer Status { StatusRecord status; };
+layout(std430, binding = 2) buffer Status {
+  StatusRecord status;
+};
 
-layout(push_constant) uniform Push { HashPush push; };
+layout(push_constant) uniform Push {
+  HashPush push;
+};
 
 // Each invocation takes every stride-th node, and adds what it found with atomics on integers.
 void main() {

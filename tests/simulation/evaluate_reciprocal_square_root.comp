@@ -6,7 +6,9 @@
 #include "shaders/shared/arithmetic.glsl"
 
 layout(local_size_x_id = 0) in;
-layout(std430, binding = 0) writeonly buffer Results { float results[]; };
+layout(std430, binding = 0) writeonly buffer Results {
+  float results[];
+};
 layout(push_constant) uniform Push {
   uint first;
   uint stride;

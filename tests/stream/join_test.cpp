@@ -11,14 +11,14 @@
 namespace clothstream::stream {
 namespace {
 
+using testing::HasSubstr;
 using tests::SeenFrame;
 using tests::TestPeer;
-using testing::HasSubstr;
 using Body = v1::ServerMessage;
 
 // Skips the rest of a test that found no device.
-#define START(...)        \
-  start(__VA_ARGS__);     \
+#define START(...)    \
+  start(__VA_ARGS__); \
   if (IsSkipped()) return
 
 using JoinTest = tests::ServerTest;
@@ -151,7 +151,8 @@ TEST_F(JoinTest, WhoNeverReadsCostsNobodyAnything) {
   reader.readFrames(80);  // 2 s
   for (std::size_t i = 1; i < 80; ++i) EXPECT_FALSE(reader.frames()[reader.frames().size() - i].key);
   EXPECT_EQ(metrics().keyFrames.value(), keys);
-  // Of 80 frames only those that the reader holds itself are alive, and the few that are held back for the other.
+  // Of 80 frames only those that the reader holds itself are alive, and the few that are held back for the
+  // other.
   std::size_t held = 0;
   for (const SeenFrame& frame : reader.frames()) held += frame.message.use_count() > 1;
   EXPECT_LE(held, Mailbox::kMaxHeld + 1);

@@ -13,7 +13,9 @@ namespace {
 
 using std::chrono::milliseconds;
 
-SharedBytes bytes(std::size_t size) { return std::make_shared<std::vector<std::byte>>(size); }
+SharedBytes bytes(std::size_t size) {
+  return std::make_shared<std::vector<std::byte>>(size);
+}
 
 class MailboxTest : public ::testing::Test {
  protected:
@@ -168,7 +170,8 @@ TEST_F(MailboxTest, HoldsBackAsManyFramesAsItSaysAndNoMore) {
   for (std::uint64_t tick = 3; tick <= 5; ++tick) mailbox.deliver(frames.emplace_back(frame(tick)));
   for (const PublishedFrame& each : frames)
     EXPECT_EQ(each.message.use_count(), each.tick < 3 ? 1 : 2) << each.tick;
-  // One too many: all that is held goes, and nobody is asked for a key frame as long as there is no room for it.
+  // One too many: all that is held goes, and nobody is asked for a key frame as long as there is no room for
+  // it.
   mailbox.deliver(frames.emplace_back(frame(6)));
   for (const PublishedFrame& each : frames) EXPECT_EQ(each.message.use_count(), 1) << each.tick;
   EXPECT_EQ(metrics.framesDropped.value(), 4u);

@@ -11,8 +11,8 @@
 namespace clothstream::stream {
 namespace {
 
-using tests::TestPeer;
 using testing::HasSubstr;
+using tests::TestPeer;
 using Body = v1::ServerMessage;
 
 // A bystander joins first; after each test it must have gone on undisturbed.

@@ -26,7 +26,9 @@ using tests::wind;
 class HostedScene {
  public:
   explicit HostedScene(scene::Scene scene = smallScene(), std::size_t subscribers = 1)
-      : live(std::move(scene)), packer(encode::FrameEncoder::kSlots, [] {}), host(tests::device(), live, packer) {
+      : live(std::move(scene)),
+        packer(encode::FrameEncoder::kSlots, [] {}),
+        host(tests::device(), live, packer) {
     for (std::size_t i = 0; i < subscribers; ++i) {
       mailboxes.push_back(std::make_shared<Mailbox>([] {}));
       EXPECT_TRUE(live.audience.join(mailboxes.back(), 100));
@@ -144,8 +146,8 @@ TEST_F(SceneHostTest, SameInputsGiveTheSameStatesWhateverTheAudience) {
     HostedScene hosted(smallScene(), subscribers);
     for (int tick = 0; tick < 60; ++tick) {
       if (tick == 10) hosted.change(wind(3));
-      hosted.live.inbox.postPoses(9, std::vector{handAt(1, 0.1f, -0.6f, 0.01f * static_cast<float>(tick) - 0.3f)},
-                                  hosted.now);
+      hosted.live.inbox.postPoses(
+          9, std::vector{handAt(1, 0.1f, -0.6f, 0.01f * static_cast<float>(tick) - 0.3f)}, hosted.now);
       // Who asks for key frames changes what is sent, not what is simulated.
       if (tick % 7 == 0) hosted.mailboxes.back()->restart();
       hosted.tick();
@@ -240,7 +242,8 @@ TEST_F(SceneHostTest, GoesOnOnAnotherDeviceFromTheNewestStateThatTheCpuHas) {
   EXPECT_TRUE(hosted.keys.back());
   EXPECT_EQ(hosted.decoder->tick(), 211u);
 
-  // A scene of its own that was put into the state of tick 201, and sees the same collider, comes to the same bits.
+  // A scene of its own that was put into the state of tick 201, and sees the same collider, comes to the same
+  // bits.
   simulation::ClothSimulation simulation(another, hosted.live.start());
   ColliderSet colliders(hosted.live.start());
   simulation::TickInputs inputs{.environment = hosted.live.start().environment, .spheres = {}};

@@ -11,7 +11,8 @@
 
 namespace clothstream::tests {
 
-// 12 x 10 nodes hung by their first row, a ball beside them that moves by itself. 40 ticks and frames a second.
+// 12 x 10 nodes hung by their first row, a ball beside them that moves by itself. 40 ticks and frames a
+// second.
 inline scene::Scene smallScene(std::string name = "small") {
   scene::Cloth cloth;
   cloth.name = "sheet";
@@ -23,7 +24,8 @@ inline scene::Scene smallScene(std::string name = "small") {
   cloth.damping = 0.5f;
   cloth.drag = 0.5f;
   cloth.lift = 0.1f;
-  cloth.pins = {{.firstRow = 0, .lastRow = 0, .rowStep = 1, .firstColumn = 0, .lastColumn = 9, .columnStep = 1}};
+  cloth.pins = {
+      {.firstRow = 0, .lastRow = 0, .rowStep = 1, .firstColumn = 0, .lastColumn = 9, .columnStep = 1}};
 
   scene::SphereCollider ball;
   ball.name = "ball";

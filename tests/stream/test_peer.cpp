@@ -18,9 +18,13 @@ TestPeer::TestPeer(stream::SceneServer& server, std::string name)
         woken_.notify_all();
       })) {}
 
-void TestPeer::send(const v1::ClientMessage& message) { sendBytes(message.SerializeAsString()); }
+void TestPeer::send(const v1::ClientMessage& message) {
+  sendBytes(message.SerializeAsString());
+}
 
-void TestPeer::sendBytes(const std::string& bytes) { connection_->receive(std::as_bytes(std::span(bytes))); }
+void TestPeer::sendBytes(const std::string& bytes) {
+  connection_->receive(std::as_bytes(std::span(bytes)));
+}
 
 void TestPeer::hello(const std::string& scene) {
   v1::ClientMessage message;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A client inside the process, as a door would hold it: serialised messages through a Connection, frames decoded.
+// A client inside the process, as a door would hold it: serialised messages through a Connection, frames
+// decoded.
 #pragma once
 
 #include <chrono>

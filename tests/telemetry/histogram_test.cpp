@@ -29,7 +29,9 @@ TEST(Histogram, QuantilesLieWithinABinOfTheSortedValues) {
   std::vector<double> values(20'000);
   for (double& value : values) histogram.record(value = durations(random));
   std::ranges::sort(values);
-  const auto exact = [&](double q) { return values[static_cast<std::size_t>(q * static_cast<double>(values.size())) - 1]; };
+  const auto exact = [&](double q) {
+    return values[static_cast<std::size_t>(q * static_cast<double>(values.size())) - 1];
+  };
 
   const Summary summary = histogram.summary();
   EXPECT_EQ(summary.count, values.size());

@@ -5,7 +5,9 @@
 layout(local_size_x_id = 0) in;
 
 layout(binding = 0) uniform samplerBuffer source;
-layout(std430, binding = 1) writeonly buffer Target { vec4 target[]; };
+layout(std430, binding = 1) writeonly buffer Target {
+  vec4 target[];
+};
 
 void main() {
   uint i = gl_GlobalInvocationID.x;
