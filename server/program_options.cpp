@@ -27,12 +27,16 @@ std::variant<ProgramOptions, int> parseOptions(int argc, const char* const* argv
   const std::map<std::string, scene::Normals> normals{{"none", scene::Normals::none},
                                                       {"octahedral", scene::Normals::octahedral}};
 
-  CLI::App app{"Simulates cloth with Vulkan and streams it to browsers and gRPC clients.", "clothstream-server"};
+  CLI::App app{"Simulates cloth with Vulkan and streams it to browsers and gRPC clients.",
+               "clothstream-server"};
   app.set_version_flag("--version", "clothstream-server " CLOTHSTREAM_VERSION);
   app.get_formatter()->column_width(34);
+  app.option_defaults()->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);  // scripts append to defaults
 
   const char* scenes = "Scenes";
-  app.add_option("--scene", options.scene, "Scene for whoever names none")->capture_default_str()->group(scenes);
+  app.add_option("--scene", options.scene, "Scene for whoever names none")
+      ->capture_default_str()
+      ->group(scenes);
   app.add_option("--scene-file", options.sceneFiles, "Another scene, as a JSON file; may be given again")
       ->type_name("FILE")
       ->group(scenes);
@@ -44,10 +48,12 @@ std::variant<ProgramOptions, int> parseOptions(int argc, const char* const* argv
       ->group(scenes);
   app.add_option("--max-error", options.maxError, "Largest error of a streamed coordinate of --scene, metres")
       ->group(scenes);
-  app.add_option("--normals", options.normals, "Normals of --scene: none (clients compute them) or octahedral")
+  app.add_option("--normals", options.normals,
+                 "Normals of --scene: none (clients compute them) or octahedral")
       ->transform(CLI::CheckedTransformer(normals, CLI::ignore_case))
       ->group(scenes);
-  app.add_flag("--always-run", options.alwaysRun, "Simulate scenes while nobody is in them, too")->group(scenes);
+  app.add_flag("--always-run", options.alwaysRun, "Simulate scenes while nobody is in them, too")
+      ->group(scenes);
 
   const char* network = "Network";
   app.add_option("--host", options.host, "Address to listen on; 0.0.0.0 for every one this machine has")
@@ -70,7 +76,8 @@ std::variant<ProgramOptions, int> parseOptions(int argc, const char* const* argv
   const char* device = "Device";
   app.add_option("--device", options.device, "Index or part of the name of a Vulkan device; else the best")
       ->group(device);
-  app.add_flag("--list-devices", options.listDevices, "Show the Vulkan devices there are, and exit")->group(device);
+  app.add_flag("--list-devices", options.listDevices, "Show the Vulkan devices there are, and exit")
+      ->group(device);
   app.add_option("--software-threads", options.softwareThreads, "Threads of a software device")
       ->check(CLI::Range(1, 64))
       ->group(device);
@@ -79,8 +86,10 @@ std::variant<ProgramOptions, int> parseOptions(int argc, const char* const* argv
       ->capture_default_str()
       ->group(device);
 
-  app.add_option("--log-level", options.logLevel, "trace, debug, info, warning, error or off")->capture_default_str();
-  const CLI::Option* stopAfter = app.add_option("--seconds", seconds, "Stop after so long")->check(CLI::PositiveNumber);
+  app.add_option("--log-level", options.logLevel, "trace, debug, info, warning, error or off")
+      ->capture_default_str();
+  const CLI::Option* stopAfter =
+      app.add_option("--seconds", seconds, "Stop after so long")->check(CLI::PositiveNumber);
 
   try {
     app.parse(argc, argv);
