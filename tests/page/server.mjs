@@ -7,11 +7,15 @@ import { createInterface } from "node:readline";
 
 const kStartMs = 60_000;
 
+for (const signal of ["SIGINT", "SIGTERM"]) process.once(signal, () => process.exit(1));
+
 // Starts the program named by CLOTHSTREAM_SERVER; resolves once it has said where its page is. `port` 0: any.
 export async function startServer(port = 0) {
   const program = process.env.CLOTHSTREAM_SERVER;
   const options = ["--scene", "curtain", "--port", String(port), "--grpc-port", "0"];
   const child = spawn(program, options, { stdio: ["ignore", "pipe", "pipe"] });
+  // Whatever ends the test, the server does not outlive it.
+  process.once("exit", () => child.kill("SIGKILL"));
   const said = [];
   const address = await new Promise((resolve, reject) => {
     const timer = setTimeout(() => reject(new Error(`no address within ${kStartMs} ms\n${said.join("\n")}`)), kStartMs);
@@ -29,9 +33,13 @@ export async function startServer(port = 0) {
       reject(new Error(`${program} ended with ${code} before it served a page\n${said.join("\n")}`));
     });
   });
+  // So that a test that fails for want of a server says so.
+  const complain = (code, signal) => console.error(`${program} ended with ${code ?? signal}\n${said.join("\n")}`);
+  child.once("exit", complain);
   return {
     ...address,
     async stop() {
+      child.off("exit", complain);
       if (child.exitCode !== null || child.signalCode !== null) return;
       child.kill("SIGTERM");
       await once(child, "exit");
