@@ -35,7 +35,7 @@ std::string table(const std::string& scene, const SceneMetrics& m) {
   addLine(text, "device", m.deviceTotal.summary());
   for (const auto& [stage, summary] : m.device.summaries())
     addLine(text, fmt::format("  {}", stage), summary);
-  addLine(text, "encode", m.encode.summary());
+  addLine(text, "entropy coding", m.encode.summary());
   addLine(text, "send", m.send.summary());
   addLine(text, "pose arrival to packet", m.inputToPacket.summary());
   addCounters(text, {{"ticks", m.ticks.value()},

@@ -331,7 +331,8 @@ TEST_F(JoinTest, TheReportShowsTheStagesOfATick) {
   peer.join();
   peer.readFrames(5);
   const std::string report = server().report();
-  for (const char* part : {"scene small", "tick", "device", "advance", "encode", "send", "connections 1"})
+  for (const char* part :
+       {"scene small", "tick", "device", "advance", "entropy coding", "send", "connections 1"})
     EXPECT_THAT(report, HasSubstr(part));
   EXPECT_THAT(report, testing::Not(HasSubstr("scene other")));  // nobody was in it
 }
