@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 
 #include "tests/bench/suite.h"
+#include "tests/bench/table.h"
 
 namespace {
 
@@ -23,21 +24,6 @@ constexpr std::array kSuites{
     bench::Suite{"codec", "bits a vertex and milliseconds a frame, key and predicted, of the same curtain",
                  &bench::runCodec},
 };
-
-void printTable(const bench::Rows& rows) {
-  for (const auto& row : rows) {
-    std::string line;
-    for (const auto& [key, value] : row.items()) {
-      if (key == "device") continue;
-      if (!line.empty()) line += "  ";
-      if (value.is_number_float())
-        line += fmt::format("{} {:.4g}", key, value.get<double>());
-      else
-        line += fmt::format("{} {}", key, value.is_string() ? value.get<std::string>() : value.dump());
-    }
-    fmt::print("{}\n", line);
-  }
-}
 
 }  // namespace
 
@@ -77,7 +63,7 @@ int main(int argc, char** argv) {
     if (json)
       fmt::print("{}\n", nlohmann::ordered_json(rows).dump(2));
     else
-      printTable(rows);
+      bench::printTable(rows);
   } catch (const std::exception& error) {
     fmt::print(stderr, "clothstream-bench: {}: {}\n", name, error.what());
     return 1;

@@ -38,8 +38,7 @@ double Simulated::check(const simulation::TickInputs& inputs) {
   const simulation::NodeState start = displacedState(scene_);
   runOn(device_, recorder_, [&] { simulation_.recordRestoreState(recorder_, simulation::pack(start, 0)); });
   tick(inputs);
-  runOn(device_, recorder_, [&] { simulation_.recordSaveState(recorder_); });
-  const simulation::NodeState state = simulation::unpack(simulation_.collectState(1));
+  const simulation::NodeState state = this->state();
 
   reference::ReferenceSimulation reference(scene_);
   reference::TickInputs referenceInputs{inputs.environment, {}};
@@ -70,6 +69,17 @@ double Simulated::check(const simulation::TickInputs& inputs) {
       ++node;
     }
   return seconds;
+}
+
+void Simulated::restart() {
+  const simulation::StateSnapshot start = simulation::pack(simulation::restState(scene_.cloths), 0);
+  runOn(device_, recorder_, [&] { simulation_.recordRestoreState(recorder_, start); });
+  forgetTimes();
+}
+
+simulation::NodeState Simulated::state() {
+  runOn(device_, recorder_, [&] { simulation_.recordSaveState(recorder_); });
+  return simulation::unpack(simulation_.collectState(0));
 }
 
 void Simulated::tick(const simulation::TickInputs& inputs) {

@@ -24,6 +24,11 @@ class Simulated {
   // Records, submits and waits for one tick; throws std::runtime_error if its state is not healthy.
   void tick(const simulation::TickInputs& inputs);
 
+  // Back to the scene's start, and the times forgotten.
+  void restart();
+
+  simulation::NodeState state();
+
   // Of a tick: all of it on the wall clock, and its advance stage by the device's clock. s.
   const Samples& wall() const { return wall_; }
   const Samples& advance() const { return advance_; }
