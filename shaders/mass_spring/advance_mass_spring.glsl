@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: MIT
-// One substep of every node: spring and air forces, integration, collision; [Va21] Alg. 1, gathered a node at a time.
+// One substep of every node: spring and air forces, integration, collision; [Va21] Alg. 1, gathered a node at
+// a time.
 //
-// An invocation walks down a strip of one column. Neighbours come from texel buffers into a window of registers that
-// slides with it: five positions are read a node instead of thirteen. The force of a vertical spring, and of a
-// triangle, serves both rows that it touches. Neither changes a bit of the result, which therefore depends on neither
-// the strip's length nor the workgroup's size.
-// Writes cannot race: each node belongs to one invocation, and what is read lies in other buffers.
+// An invocation walks down a strip of one column. Neighbours come from texel buffers into a window of
+// registers that slides with it: five positions are read a node instead of thirteen. The force of a vertical
+// spring, and of a triangle, serves both rows that it touches. Neither changes a bit of the result, which
+// therefore depends on neither the strip's length nor the workgroup's size. Writes cannot race: each node
+// belongs to one invocation, and what is read lies in other buffers.
 
 #include "shaders/mass_spring/air.glsl"
 #include "shaders/mass_spring/spheres.glsl"
@@ -17,12 +18,20 @@ layout(constant_id = 5) const bool kExplicitEuler = false;
 
 layout(binding = 2) uniform samplerBuffer positions;  // w: inverse mass
 layout(binding = 3) uniform samplerBuffer velocities;
-layout(std430, binding = 4) writeonly buffer NextPositions { vec4 nextPositions[]; };
-layout(std430, binding = 5) writeonly buffer NextVelocities { vec4 nextVelocities[]; };
+layout(std430, binding = 4) writeonly buffer NextPositions {
+  vec4 nextPositions[];
+};
+layout(std430, binding = 5) writeonly buffer NextVelocities {
+  vec4 nextVelocities[];
+};
 
-layout(push_constant) uniform Push { AdvancePush push; };
+layout(push_constant) uniform Push {
+  AdvancePush push;
+};
 
-vec3 fetchVelocity(uint index) { return texelFetch(velocities, int(index)).xyz; }
+vec3 fetchVelocity(uint index) {
+  return texelFetch(velocities, int(index)).xyz;
+}
 
 // The velocity of a neighbour is read where some force depends on it.
 Node fetchNode(uint index) {
@@ -85,9 +94,11 @@ void main() {
   Node here = fetchNode(index);
   here.velocity = fetchVelocity(index);
 
-  // From rows before the strip: upward springs of its first row and the second row's bend, the triangles above.
+  // From rows before the strip: upward springs of its first row and the second row's bend, the triangles
+  // above.
   vec3 aboveForce = springForce(here, above, where(row > 0, alongColumn));
-  vec3 above2Force = springForce(here, fetchNode(start + (row > 1 ? row - 2 : 0) * columns), where(row > 1, bendColumn));
+  vec3 above2Force =
+      springForce(here, fetchNode(start + (row > 1 ? row - 2 : 0) * columns), where(row > 1, bendColumn));
   vec3 nextAbove2Force = springForce(below, above, where(row > 0, bendColumn));
   vec3 leftAboveAir, rightAboveAir1, rightAboveAir2;
   if (kAir) {
@@ -137,7 +148,8 @@ void main() {
     precise vec3 position = here.position + push.gravityStep.w * (kExplicitEuler ? here.velocity : velocity);
     Node next = Node(position, here.inverseMass, velocity);
     if (kSpheres) {
-      next = collideWithSpheres(next, push.sphereCount, push.sphereProgress, push.tickRate, thickness, friction);
+      next =
+          collideWithSpheres(next, push.sphereCount, push.sphereProgress, push.tickRate, thickness, friction);
     }
     bool pinned = here.inverseMass == 0.0;
     nextPositions[index] = vec4(pinned ? here.position : snapTiny(next.position), here.inverseMass);

@@ -15,7 +15,8 @@ struct Air {
   float lift;
 };
 
-// On each of the triangle's three nodes. With the air's velocity u relative to the triangle and the area vector N:
+// On each of the triangle's three nodes. With the air's velocity u relative to the triangle and the area
+// vector N:
 //   F = density / 2 (C_drag |N.u| u + C_lift (N.u) / (|u||N|) (N |u|^2 - (N.u) u))
 // A triangle with two corners in one place, as the loads at a cloth's edge make it, gives exactly zero.
 vec3 airForce(Node a, Node b, Node c, Air air) {

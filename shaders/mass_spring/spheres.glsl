@@ -12,8 +12,8 @@ layout(constant_id = 4) const bool kSpheres = true;
 // Two texels a sphere (SphereRecord).
 layout(binding = 6) uniform samplerBuffer spheres;
 
-// Out of the sphere along its normal; the velocity relative to the sphere loses what goes into it, and, of what goes
-// along it, at most friction times that.
+// Out of the sphere along its normal; the velocity relative to the sphere loses what goes into it, and, of
+// what goes along it, at most friction times that.
 Node collideWithSphere(Node node, vec3 centre, vec3 velocity, float radius, float friction) {
   precise vec3 offset = node.position - centre;
   precise float squared = dotProduct(offset, offset);
@@ -35,8 +35,8 @@ Node collideWithSphere(Node node, vec3 centre, vec3 velocity, float radius, floa
   return node;
 }
 
-// In the order of the spheres, of which there must be one. `progress` is the part of their motion that is done, `rate`
-// one over its seconds.
+// In the order of the spheres, of which there must be one. `progress` is the part of their motion that is
+// done, `rate` one over its seconds.
 Node collideWithSpheres(Node node, uint count, float progress, float rate, float thickness, float friction) {
   int texel = 0;
   do {

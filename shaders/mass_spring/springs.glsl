@@ -6,8 +6,8 @@
 #include "shaders/mass_spring/node.glsl"
 #include "shaders/shared/arithmetic.glsl"
 
-// Whether any cloth's springs are damped. Where none is, neighbours' velocities need not be read; the bits are the
-// same, for the damping term is then zero.
+// Whether any cloth's springs are damped. Where none is, neighbours' velocities need not be read; the bits
+// are the same, for the damping term is then zero.
 layout(constant_id = 2) const bool kSpringDamping = true;
 
 struct Spring {
@@ -21,8 +21,8 @@ Spring where(bool exists, Spring spring) {
   return Spring(exists ? spring.stiffness : 0.0, exists ? spring.damping : 0.0, spring.restLength);
 }
 
-// On `node`, from the spring to `other`. Exactly the negative of the force on `other`: swapping the two negates
-// differences, and nothing else.
+// On `node`, from the spring to `other`. Exactly the negative of the force on `other`: swapping the two
+// negates differences, and nothing else.
 vec3 springForce(Node node, Node other, Spring spring) {
   precise vec3 d = other.position - node.position;
   precise float inverseLength = reciprocalSquareRoot(atLeast(dotProduct(d, d), 1e-12));

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: MIT
 // Float arithmetic that gives the same bits on every device.
 //
-// Vulkan fixes the result of addition, subtraction and multiplication alone; division, inversesqrt, dot, length and
-// normalize may differ from device to device, and so may an expression that the compiler is free to contract or
-// reorder. Kernels of the simulation therefore use only + - * and comparisons on `precise` variables, and these
-// functions. Devices may also flush denormal numbers to zero or keep them: what is stored is snapped to zero below
-// kTiny, far above the denormals, so that neither choice can be seen in the state.
+// Vulkan fixes the result of addition, subtraction and multiplication alone; division, inversesqrt, dot,
+// length and normalize may differ from device to device, and so may an expression that the compiler is free
+// to contract or reorder. Kernels of the simulation therefore use only + - * and comparisons on `precise`
+// variables, and these functions. Devices may also flush denormal numbers to zero or keep them: what is
+// stored is snapped to zero below kTiny, far above the denormals, so that neither choice can be seen in the
+// state.
 #ifndef CLOTHSTREAM_SHADERS_SHARED_ARITHMETIC_GLSL
 #define CLOTHSTREAM_SHADERS_SHARED_ARITHMETIC_GLSL
 
@@ -22,12 +23,15 @@ vec3 crossProduct(vec3 a, vec3 b) {
 }
 
 // Where a is NaN it is b, unlike max(), whose result then is undefined.
-float atLeast(float a, float b) { return a > b ? a : b; }
+float atLeast(float a, float b) {
+  return a > b ? a : b;
+}
 
 // 1 / sqrt(x) for a finite, normal x > 0, with a relative error below 2^-23.
-// Subtracting half of the bits from a constant negates and halves the exponent, which leaves a relative error of 3.5 %;
-// constant and coefficients of the first step are the minimax choice over [1, 4) (error 6.5e-4); the second step is
-// of third order (Halley), whose own error is below 1e-9: what remains is the rounding of its last operations.
+// Subtracting half of the bits from a constant negates and halves the exponent, which leaves a relative error
+// of 3.5 %; constant and coefficients of the first step are the minimax choice over [1, 4) (error 6.5e-4);
+// the second step is of third order (Halley), whose own error is below 1e-9: what remains is the rounding of
+// its last operations.
 float reciprocalSquareRoot(float x) {
 #ifdef CLOTHSTREAM_BUILTIN_ARITHMETIC
   return inversesqrt(x);
@@ -48,6 +52,8 @@ float snapTiny(float x) {
 #endif
 }
 
-vec3 snapTiny(vec3 v) { return vec3(snapTiny(v.x), snapTiny(v.y), snapTiny(v.z)); }
+vec3 snapTiny(vec3 v) {
+  return vec3(snapTiny(v.x), snapTiny(v.y), snapTiny(v.z));
+}
 
 #endif
