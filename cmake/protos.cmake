@@ -14,7 +14,10 @@ foreach(name IN LISTS protoNames)
 endforeach()
 add_library(clothstream_protos STATIC ${messageSources})
 target_include_directories(clothstream_protos SYSTEM PUBLIC ${protoOut})
-target_link_libraries(clothstream_protos PUBLIC protobuf::libprotobuf)
+# Programs with the property CLOTHSTREAM_STATIC_PROTOBUF carry it; they cannot have gRPC, which needs the shared one.
+find_library(CLOTHSTREAM_PROTOBUF_ARCHIVE libprotobuf.a REQUIRED)
+target_link_libraries(clothstream_protos PUBLIC
+  $<IF:$<BOOL:$<TARGET_PROPERTY:CLOTHSTREAM_STATIC_PROTOBUF>>,${CLOTHSTREAM_PROTOBUF_ARCHIVE},protobuf::libprotobuf>)
 
 if(CLOTHSTREAM_RPC)
   find_package(gRPC CONFIG REQUIRED)

@@ -32,8 +32,7 @@ struct Cut {
   std::vector<shared::TileRecord> tiles;
 };
 
-// Software devices pay for every load, so that an invocation does several rows; longer strips of grids
-// whose rows are a power of two apart fall onto the same few cache lines. GPUs pay for every idle lane.
+// Software devices pay for every load, so that an invocation does several rows; GPUs pay for every idle lane.
 Cut cutScene(const vulkan::Device& device, const scene::Scene& scene, const SimulationOptions& options) {
   Cut cut{options.rowsPerInvocation, options.workgroupSize, {}};
   if (cut.rowsPerInvocation == 0) cut.rowsPerInvocation = device.isSoftware() ? 4 : 1;

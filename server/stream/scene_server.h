@@ -25,8 +25,8 @@ struct ServerOptions {
   // A scene sleeps while nobody is in it, unless this is set.
   bool runAlways = false;
   std::uint32_t maxConnections = 1024;
-  std::uint32_t maxParticipants =
-      64;  // a scene; at most 250, for the simulation has room for so many colliders
+  // A scene; at most 250, for the simulation has room for so many colliders.
+  std::uint32_t maxParticipants = 64;
   // A peer that sends nothing for this long is dropped.
   std::chrono::milliseconds silence{30'000};
 };

@@ -13,7 +13,7 @@ namespace clothstream::stream {
 class SlowWatch {
  public:
   static constexpr std::chrono::seconds kStretch{2}, kPause{10};
-  static constexpr double kSlow = 0.99;
+  static constexpr double kSlow = 0.95;
 
   void restart() { watching_ = false; }
 

@@ -5,8 +5,11 @@
 // An invocation walks down a strip of one column. Neighbours come from texel buffers into a window of
 // registers that slides with it: five positions are read a node instead of thirteen. The force of a vertical
 // spring, and of a triangle, serves both rows that it touches. Neither changes a bit of the result, which
-// therefore depends on neither the strip's length nor the workgroup's size. Writes cannot race: each node
-// belongs to one invocation, and what is read lies in other buffers.
+// therefore depends on neither the strip's length nor the workgroup's size. The loop over rows is unrolled,
+// so that the window's moves cost nothing. Writes cannot race: each node belongs to one invocation, and what
+// is read lies in other buffers.
+
+#extension GL_EXT_control_flow_attributes : require
 
 #include "shaders/mass_spring/air.glsl"
 #include "shaders/mass_spring/spheres.glsl"
@@ -39,6 +42,11 @@ Node fetchNode(uint index) {
   return Node(position.xyz, position.w, kSpringDamping || kAir ? fetchVelocity(index) : vec3(0.0));
 }
 
+void store(uint index, Node node) {
+  nextPositions[index] = vec4(snapTiny(node.position), node.inverseMass);
+  nextVelocities[index] = vec4(snapTiny(node.velocity), 0.0);
+}
+
 void main() {
   Strip strip = locateStrip();
   if (strip.row >= strip.rows) {
@@ -52,7 +60,6 @@ void main() {
   float thickness = damping.w;
   uint columns = strip.columns;
   uint lastRow = strip.rows - 1;
-  uint endRow = min(strip.row + kRowsPerInvocation, strip.rows);
 
   // Loads beyond an edge stay on it: their springs have no stiffness, their triangles no area.
   bool hasLeft = strip.column > 0;
@@ -107,10 +114,12 @@ void main() {
     rightAboveAir2 = airForce(rightAbove, here, right, air);
   }
 
-  do {
+  Node moved[kRowsPerInvocation];
+  // Rows past the cloth's last repeat it, and are not stored.
+  [[unroll]] for (uint k = 0; k < kRowsPerInvocation; ++k) {
     bool hasBelow = row < lastRow;
     bool hasBelow2 = row + 1 < lastRow;
-    index = start + row * columns;
+    index = start + min(row, lastRow) * columns;
     belowIndex = start + min(row + 1, lastRow) * columns;
     Node below2 = fetchNode(start + min(row + 2, lastRow) * columns);
     Node leftBelow = fetchNode(belowIndex - toLeft);
@@ -146,14 +155,11 @@ void main() {
     precise vec3 acceleration = force * here.inverseMass + push.gravityStep.xyz - spacing.w * here.velocity;
     precise vec3 velocity = here.velocity + push.gravityStep.w * acceleration;
     precise vec3 position = here.position + push.gravityStep.w * (kExplicitEuler ? here.velocity : velocity);
-    Node next = Node(position, here.inverseMass, velocity);
-    if (kSpheres) {
-      next =
-          collideWithSpheres(next, push.sphereCount, push.sphereProgress, push.tickRate, thickness, friction);
-    }
     bool pinned = here.inverseMass == 0.0;
-    nextPositions[index] = vec4(pinned ? here.position : snapTiny(next.position), here.inverseMass);
-    nextVelocities[index] = vec4(pinned ? vec3(0.0) : snapTiny(next.velocity), 0.0);
+    moved[k] = Node(pinned ? here.position : position, here.inverseMass, pinned ? vec3(0.0) : velocity);
+    if (!kSpheres && row <= lastRow) {
+      store(index, moved[k]);
+    }
 
     aboveForce = -belowForce;
     above2Force = nextAbove2Force;
@@ -168,5 +174,22 @@ void main() {
     }
     below = below2;
     ++row;
-  } while (row < endRow);
+  }
+
+  if (kSpheres) {
+    uint i = 0;
+    do {
+      Sphere sphere = fetchSphere(i, push.sphereProgress, push.tickRate, thickness, friction);
+      [[unroll]] for (uint k = 0; k < kRowsPerInvocation; ++k) {
+        moved[k] = collideWithSphere(moved[k], sphere);
+      }
+      ++i;
+    } while (i < push.sphereCount);
+    [[unroll]] for (uint k = 0; k < kRowsPerInvocation; ++k) {
+      row = strip.row + k;
+      if (row <= lastRow) {
+        store(start + row * columns, moved[k]);
+      }
+    }
+  }
 }

@@ -24,7 +24,7 @@ vec3 airForce(Node a, Node b, Node c, Air air) {
   precise vec3 area = 0.5 * crossProduct(b.position - a.position, c.position - a.position);
   precise float flow = dotProduct(area, relative);
   precise float speedSquared = dotProduct(relative, relative);
-  precise float inverse = reciprocalSquareRoot(atLeast(speedSquared * dotProduct(area, area), 1e-20));
+  precise float inverse = reciprocalSquareRoot(max(speedSquared * dotProduct(area, area), 1e-20));
   precise float lift = air.lift * flow * inverse;
   precise vec3 force = (air.drag * abs(flow) - lift * flow) * relative + (lift * speedSquared) * area;
   return force;

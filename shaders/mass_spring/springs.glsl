@@ -21,11 +21,11 @@ Spring where(bool exists, Spring spring) {
   return Spring(exists ? spring.stiffness : 0.0, exists ? spring.damping : 0.0, spring.restLength);
 }
 
-// On `node`, from the spring to `other`. Exactly the negative of the force on `other`: swapping the two
-// negates differences, and nothing else.
+// On `node`, from the spring to `other`; not finite where an end is not. Exactly the negative of the force on
+// `other`: swapping the two negates differences, and nothing else.
 vec3 springForce(Node node, Node other, Spring spring) {
   precise vec3 d = other.position - node.position;
-  precise float inverseLength = reciprocalSquareRoot(atLeast(dotProduct(d, d), 1e-12));
+  precise float inverseLength = reciprocalSquareRoot(max(dotProduct(d, d), 1e-12));
   precise float scale = spring.stiffness * (1.0 - spring.restLength * inverseLength);
   if (kSpringDamping) {
     precise vec3 relative = other.velocity - node.velocity;

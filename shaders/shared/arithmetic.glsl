@@ -4,9 +4,9 @@
 // Vulkan fixes the result of addition, subtraction and multiplication alone; division, inversesqrt, dot,
 // length and normalize may differ from device to device, and so may an expression that the compiler is free
 // to contract or reorder. Kernels of the simulation therefore use only + - * and comparisons on `precise`
-// variables, and these functions. Devices may also flush denormal numbers to zero or keep them: what is
-// stored is snapped to zero below kTiny, far above the denormals, so that neither choice can be seen in the
-// state.
+// variables, and these functions (and max() where neither side is NaN). Devices may also flush denormal
+// numbers to zero or keep them: what is stored is snapped to zero below kTiny, far above the denormals, so
+// that neither choice can be seen in the state.
 #ifndef CLOTHSTREAM_SHADERS_SHARED_ARITHMETIC_GLSL
 #define CLOTHSTREAM_SHADERS_SHARED_ARITHMETIC_GLSL
 
@@ -22,25 +22,19 @@ vec3 crossProduct(vec3 a, vec3 b) {
   return c;
 }
 
-// Where a is NaN it is b, unlike max(), whose result then is undefined.
-float atLeast(float a, float b) {
-  return a > b ? a : b;
-}
-
-// 1 / sqrt(x) for a finite, normal x > 0, with a relative error below 2^-23.
-// Subtracting half of the bits from a constant negates and halves the exponent, which leaves a relative error
-// of 3.5 %; constant and coefficients of the first step are the minimax choice over [1, 4) (error 6.5e-4);
-// the second step is of third order (Halley), whose own error is below 1e-9: what remains is the rounding of
-// its last operations.
+// 1 / sqrt(x) for a finite, normal x > 0, with a relative error below 7e-7.
+// Subtracting half of the bits from a constant negates and halves the exponent: x seed^2 then lies in [0.875,
+// 0.9924], whatever x. With u = 1 - x seed^2, what is left is (1 - u)^(-1/2), by its minimax cubic over that
+// range (error 6.5e-7; the rest is rounding). Springs err by less than by the rounding of their ends'
+// positions, which is 1e-7 of their distance from the origin.
 float reciprocalSquareRoot(float x) {
 #ifdef CLOTHSTREAM_BUILTIN_ARITHMETIC
   return inversesqrt(x);
 #else
-  precise float seed = uintBitsToFloat(0x5F5FC400u - (floatBitsToUint(x) >> 1));
-  precise float first = seed * (1.19071327 - 0.249778119 * (x * seed * seed));
-  precise float residual = 1.0 - (x * first) * first;
-  precise float second = first + first * (residual * (0.5 + 0.375 * residual));
-  return second;
+  precise float seed = uintBitsToFloat(0x5F300000u - (floatBitsToUint(x) >> 1));
+  precise float u = 1.0 - (x * seed) * seed;
+  precise float root = seed * (0.999997973 + u * (0.500250757 + u * (0.367106825 + u * 0.398869693)));
+  return root;
 #endif
 }
 

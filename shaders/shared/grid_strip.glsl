@@ -6,8 +6,8 @@
 #include "shaders/shared/simulation.h"
 
 layout(local_size_x_id = 0) in;
-// An invocation walks down this many rows and keeps what neighbouring rows share in registers. Loops over
-// them test at their end: on a software device a loop that tests first runs once more than it must.
+// An invocation walks down this many rows and keeps what neighbouring rows share in registers. Loops that are
+// not unrolled test at their end: on a software device a loop that tests first runs once more than it must.
 layout(constant_id = 1) const uint kRowsPerInvocation = 1;
 
 layout(binding = 0) uniform samplerBuffer cloths;  // ClothRecord

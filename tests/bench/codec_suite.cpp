@@ -11,7 +11,7 @@
 #include "proto/codec/decoder.h"
 #include "server/encode/frame_encoder.h"
 #include "server/scene/stability.h"
-#include "tests/bench/curtain.h"
+#include "tests/bench/hung_cloth.h"
 #include "tests/bench/simulated.h"
 #include "tests/bench/suite.h"
 
@@ -42,7 +42,7 @@ nlohmann::ordered_json measure(vulkan::Device& device, const scene::Scene& scene
   for (std::uint64_t tick = 1; tick <= kFirstTick + kTicks; ++tick) {
     encode::RecordedFrame frame;
     runOn(device, recorder, [&] {
-      simulation.recordTick(recorder, curtainInputs(scene, tick));
+      simulation.recordTick(recorder, hungClothInputs(scene, tick));
       if (layout.normals != codec::NormalMode::none) simulation.recordNormals(recorder);
       frame = encoder.record(recorder, tick, kind == codec::PacketKind::key);
     });
@@ -87,7 +87,7 @@ Rows runCodec(vulkan::Device& device, const Settings& settings) {
   Rows rows;
   for (const scene::Normals normals : {scene::Normals::none, scene::Normals::octahedral}) {
     for (const codec::PacketKind kind : {codec::PacketKind::predicted, codec::PacketKind::key}) {
-      scene::Scene scene = curtain(settings.size.value_or(100));
+      scene::Scene scene = hungCloth(settings.size.value_or(100));
       scene.substeps = std::max(scene.substeps, scene::stableSubsteps(scene));
       scene.stream.normals = normals;
       rows.push_back(measure(device, scene, kind));

@@ -1,67 +1,139 @@
 // SPDX-License-Identifier: MIT
-// Suite curtain: the time of a simulated tick of a hung cloth with wind and a sphere swinging through it.
-#include "tests/bench/curtain.h"
-
+// Suite curtain: the named scene in real time, as clothstream-server runs it, with one client in this process
+// who decodes every frame and moves a hand.
+#include <algorithm>
+#include <chrono>
 #include <cmath>
+#include <condition_variable>
+#include <memory>
+#include <mutex>
+#include <stdexcept>
+#include <string>
 
-#include "tests/bench/simulated.h"
+#include <fmt/format.h>
+
+#include "clients/core/core.h"
+#include "server/messages/scene_file.h"
+#include "server/stream/connection.h"
+#include "server/stream/scene_server.h"
+#include "server/stream/server_state.h"
 #include "tests/bench/suite.h"
 
 namespace clothstream::bench {
+namespace {
 
-scene::Scene curtain(std::uint32_t size) {
-  scene::Cloth cloth;
-  cloth.name = "curtain";
-  cloth.grid.rows = cloth.grid.columns = size;
-  cloth.grid.width = cloth.grid.height = 2;
-  cloth.mass = 1;
-  cloth.structural = {30, 0.02f};
-  cloth.shear = {15, 0.01f};
-  cloth.bend = {2, 0.002f};
-  cloth.damping = 0.4f;
-  cloth.drag = 0.5f;
-  cloth.lift = 0.3f;
-  cloth.pins = {
-      {.firstRow = 0, .lastRow = 0, .rowStep = 1, .firstColumn = 0, .lastColumn = size - 1, .columnStep = 3}};
-  scene::Scene scene;
-  scene.name = "curtain";
-  scene.environment.wind = scene::Vec3(0, 0, 2);
-  scene.cloths = {cloth};
-  return scene;
+using Clock = std::chrono::steady_clock;
+
+// A tick's p99 says little below some hundreds of ticks.
+constexpr double kLeastSeconds = 10;
+// Of poses, as a headset's tracking gives them; no multiple of the scene's rate, so that they arrive at every
+// phase of a tick.
+constexpr std::chrono::microseconds kPoseInterval{1'000'000 / 90};
+
+class Viewer {
+ public:
+  explicit Viewer(stream::SceneServer& server)
+      : connection_(server, "bench", [this] {
+          const std::lock_guard lock(mutex_);
+          awake_ = true;
+          woken_.notify_one();
+        }) {}
+
+  void watchUntil(Clock::time_point end) {
+    for (Clock::time_point now = Clock::now(); now < end; now = Clock::now()) {
+      if (now >= nextPose_) {
+        moveHand(now);
+        nextPose_ = std::max(nextPose_ + kPoseInterval, now);
+      }
+      cs_update(core_.get(), microseconds(now));
+      while (const auto message = connection_.next()) receive(**message);
+      std::size_t size = 0;
+      while (const std::uint8_t* message = cs_next_outgoing(core_.get(), &size))
+        connection_.receive(std::as_bytes(std::span(message, size)));
+      std::unique_lock lock(mutex_);
+      woken_.wait_until(lock, std::min(nextPose_, end), [this] { return awake_; });
+      awake_ = false;
+    }
+  }
+
+  cs_statistics statistics() const {
+    cs_statistics statistics;
+    cs_get_statistics(core_.get(), microseconds(Clock::now()), &statistics);
+    return statistics;
+  }
+
+ private:
+  static std::uint64_t microseconds(Clock::time_point time) {
+    return static_cast<std::uint64_t>(
+        std::chrono::duration_cast<std::chrono::microseconds>(time.time_since_epoch()).count());
+  }
+
+  void receive(const std::vector<std::byte>& message) {
+    cs_receive(core_.get(), reinterpret_cast<const std::uint8_t*>(message.data()), message.size(),
+               microseconds(Clock::now()));
+    if (cs_get_state(core_.get()) == CS_STATE_FAILED) throw std::runtime_error(cs_error_text(core_.get()));
+  }
+
+  // To and fro through the curtain.
+  void moveHand(Clock::time_point now) {
+    const double seconds = std::chrono::duration<double>(now.time_since_epoch()).count();
+    const float hand[4] = {0.6f, 1.2f, static_cast<float>(0.3 * std::sin(2 * seconds)), 0.1f};
+    if (cs_get_state(core_.get()) == CS_STATE_JOINED)
+      cs_set_colliders(core_.get(), hand, 1, microseconds(now));
+  }
+
+  std::mutex mutex_;
+  std::condition_variable woken_;
+  bool awake_ = false;
+  Clock::time_point nextPose_{};
+  std::unique_ptr<cs_client, void (*)(cs_client*)> core_{cs_create("", "bench"), &cs_destroy};
+  stream::Connection connection_;
+};
+
+void checkFrames(const cs_statistics& seen) {
+  if (seen.frames == 0 || seen.decode_errors + seen.hash_mismatches > 0)
+    throw std::runtime_error(fmt::format("of {} frames {} were refused and {} decoded to something else",
+                                         seen.frames, seen.decode_errors, seen.hash_mismatches));
 }
 
-simulation::TickInputs curtainInputs(const scene::Scene& scene, std::uint64_t tick) {
-  const auto centre = [&](std::uint64_t at) {
-    const double seconds = static_cast<double>(at) * scene.tickSeconds();
-    return scene::Vec3(0, -1.2f, static_cast<float>(0.6 * std::cos(2 * seconds)));
-  };
-  return {scene.environment, {{centre(tick), centre(tick + 1), 0.25f, 1}}};
-}
+}  // namespace
 
 Rows runCurtain(vulkan::Device& device, const Settings& settings) {
-  const std::uint32_t size = settings.size.value_or(64);
-  const scene::Scene scene = curtain(size);
-  Simulated simulated(device, scene, {settings.rowsPerInvocation, settings.workgroupSize, {}});
-  std::uint64_t tick = 0;
-  const auto advance = [&] { simulated.tick(curtainInputs(scene, tick++)); };
-  simulated.check(curtainInputs(scene, 0));
-  simulated.forgetTimes();
-  double spent = 0;
-  while (spent < settings.seconds || simulated.wall().count() < 100) spent += secondsOf(advance);
+  if (settings.size) throw std::runtime_error("the scene has a size of its own: leave out --size");
+  const scene::Scene scene = *messages::loadScene("curtain");
+  stream::SceneServer server({scene}, {.device = settings.device, .defaultScene = scene.name});
+  const telemetry::SceneMetrics& metrics = server.state().scenes.front()->metrics;
+  const double seconds = std::max(settings.seconds, kLeastSeconds);
+  cs_statistics seen;
+  {
+    Viewer viewer(server);
+    viewer.watchUntil(Clock::now() +
+                      std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(seconds)));
+    seen = viewer.statistics();
+  }
+  checkFrames(seen);
 
-  const Samples& wall = simulated.wall();
-  const double budget = scene.tickSeconds();
+  const telemetry::Summary tick = metrics.tick.summary(), onDevice = metrics.deviceTotal.summary(),
+                           encode = metrics.encode.summary(), pose = metrics.inputToPacket.summary();
+  if (pose.count == 0) throw std::runtime_error("no pose reached the scene");
   return {{{"suite", "curtain"},
-           {"size", size},
-           {"nodes", size * size},
+           {"nodes", scene.nodeCount()},
            {"substeps", scene.substeps},
-           {"tickMsMin", wall.min() * 1e3},
-           {"tickMsMedian", wall.median() * 1e3},
-           {"tickMsP99", wall.p99() * 1e3},
-           {"advanceMs", simulated.advance().median() * 1e3},
-           {"budgetMs", budget * 1e3},
-           {"realTime", budget / wall.p99()},
-           {"ticks", wall.count()},
+           {"rate", scene.simulationRate},
+           {"budgetMs", scene.tickSeconds() * 1e3},
+           {"tickMsMedian", tick.p50 * 1e3},
+           {"tickMsP99", tick.p99 * 1e3},
+           {"deviceMsMedian", onDevice.p50 * 1e3},
+           {"encodeMsMedian", encode.p50 * 1e3},
+           {"poseToPacketMsMedian", pose.p50 * 1e3},
+           {"poseToPacketMsP99", pose.p99 * 1e3},
+           {"poses", pose.count},
+           {"ticks", metrics.ticks.value()},
+           {"lateTicks", metrics.lateTicks.value()},
+           {"slippedTicks", metrics.slippedTicks.value()},
+           {"frames", seen.frames},
+           {"dropped", seen.dropped},
+           {"bitsPerVertex", seen.bits_per_vertex},
            {"device", device.info().name}}};
 }
 

@@ -19,9 +19,9 @@ using namespace clothstream;
 constexpr std::array kSuites{
     bench::Suite{"mass_spring", "node-steps a second over grid sizes, 32x32 up to the device's memory",
                  &bench::runMassSpring},
-    bench::Suite{"curtain", "a tick of a 64x64 curtain in wind with a sphere, ten substeps",
+    bench::Suite{"curtain", "the scene curtain, served to one client in this process: tick, pose to packet",
                  &bench::runCurtain},
-    bench::Suite{"codec", "bits a vertex and milliseconds a frame, key and predicted, of the same curtain",
+    bench::Suite{"codec", "bits a vertex and milliseconds a frame, key and predicted, of a hung cloth",
                  &bench::runCodec},
 };
 

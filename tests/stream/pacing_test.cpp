@@ -61,6 +61,13 @@ TEST(SlowWatch, TellsOfASceneThatCannotKeepUpOnceInAWhile) {
   EXPECT_EQ(told, 2);  // after 2 s, and more than 10 s later
 }
 
+TEST(SlowWatch, IsSilentAboutWhatNobodySees) {
+  SlowWatch watch;
+  // Every tick of 10 ms takes 10.3: 97 % of real time.
+  for (int tick = 0; tick < 1'000; ++tick)
+    EXPECT_FALSE(watch.note(kStart + std::chrono::microseconds(10'300) * tick, 0.03)) << tick;
+}
+
 TEST(SlowWatch, IsSilentAboutASingleHiccup) {
   SlowWatch watch;
   for (int tick = 0; tick < 1'000; ++tick)

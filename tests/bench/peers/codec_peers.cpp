@@ -9,7 +9,7 @@
 #include "proto/codec/decoder.h"
 #include "proto/codec/encoder.h"
 #include "server/scene/stability.h"
-#include "tests/bench/curtain.h"
+#include "tests/bench/hung_cloth.h"
 #include "tests/bench/peers/peer_codecs.h"
 #include "tests/bench/peers/peers.h"
 #include "tests/bench/samples.h"
@@ -63,7 +63,7 @@ double largestError(std::span<const float> a, std::span<const float> b) {
 }  // namespace
 
 Rows compareCodecs(vulkan::Device& device) {
-  scene::Scene scene = curtain(100);
+  scene::Scene scene = hungCloth(100);
   scene.substeps = std::max(scene.substeps, scene::stableSubsteps(scene));
   const scene::Grid& grid = scene.cloths.front().grid;
   Simulated simulated(device, scene, {});
@@ -81,7 +81,7 @@ Rows compareCodecs(vulkan::Device& device) {
 
   std::vector<float> positions(3 * grid.nodeCount()), decoded(positions.size());
   for (std::uint32_t frame = 0; frame < kFrames; ++frame) {
-    simulated.tick(curtainInputs(scene, frame));
+    simulated.tick(hungClothInputs(scene, frame));
     const simulation::NodeState state = simulated.state();
     for (std::size_t i = 0; i < state.positions.size(); ++i)
       for (int axis = 0; axis < 3; ++axis)

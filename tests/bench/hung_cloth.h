@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The scene of the suites that need a cloth in motion: hung at the top, in wind, a sphere swings through it.
+// The scene of the suites that need a cloth in motion at any size: hung at the top, in wind, a sphere swings
+// through it.
 #pragma once
 
 #include <cstdint>
@@ -10,9 +11,9 @@
 namespace clothstream::bench {
 
 // size x size nodes, 2 m x 2 m, ten substeps a tick, 72 ticks a second.
-scene::Scene curtain(std::uint32_t size);
+scene::Scene hungCloth(std::uint32_t size);
 
 // The scene's environment, and the sphere as it moves during this tick.
-simulation::TickInputs curtainInputs(const scene::Scene& scene, std::uint64_t tick);
+simulation::TickInputs hungClothInputs(const scene::Scene& scene, std::uint64_t tick);
 
 }  // namespace clothstream::bench

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: MIT
+#include "tests/bench/hung_cloth.h"
+
+#include <cmath>
+
+namespace clothstream::bench {
+
+scene::Scene hungCloth(std::uint32_t size) {
+  scene::Cloth cloth;
+  cloth.name = "hung";
+  cloth.grid.rows = cloth.grid.columns = size;
+  cloth.grid.width = cloth.grid.height = 2;
+  cloth.mass = 1;
+  cloth.structural = {30, 0.02f};
+  cloth.shear = {15, 0.01f};
+  cloth.bend = {2, 0.002f};
+  cloth.damping = 0.4f;
+  cloth.drag = 0.5f;
+  cloth.lift = 0.3f;
+  cloth.pins = {
+      {.firstRow = 0, .lastRow = 0, .rowStep = 1, .firstColumn = 0, .lastColumn = size - 1, .columnStep = 3}};
+  scene::Scene scene;
+  scene.name = "hung_cloth";
+  scene.environment.wind = scene::Vec3(0, 0, 2);
+  scene.cloths = {cloth};
+  return scene;
+}
+
+simulation::TickInputs hungClothInputs(const scene::Scene& scene, std::uint64_t tick) {
+  const auto centre = [&](std::uint64_t at) {
+    const double seconds = static_cast<double>(at) * scene.tickSeconds();
+    return scene::Vec3(0, -1.2f, static_cast<float>(0.6 * std::cos(2 * seconds)));
+  };
+  return {scene.environment, {{centre(tick), centre(tick + 1), 0.25f, 1}}};
+}
+
+}  // namespace clothstream::bench
