@@ -24,6 +24,27 @@ SceneHost::OnDevice::OnDevice(vulkan::Device& device_, const scene::Scene& scene
   recorder.begin();
   simulation.recordSaveState(recorder);
   device.wait(device.submit(recorder));
+  start = simulation.collectState(0);
+  warmUp(scene);
+}
+
+void SceneHost::OnDevice::warmUp(const scene::Scene& scene) {
+  simulation::TickInputs inputs{scene.environment, {}};
+  std::vector<std::byte> packet(encoder.packetBound());
+  for (std::uint64_t tick = 1; tick <= 2; ++tick) {
+    recorder.begin();
+    simulation.recordTick(recorder, inputs);
+    if (scene.stream.normals == scene::Normals::octahedral) simulation.recordNormals(recorder);
+    const encode::RecordedFrame frame = encoder.record(recorder, tick, false);
+    device.wait(device.submit(recorder));
+    encoder.entropyCode(frame, packet);
+    inputs.spheres.push_back(
+        {.start = scene::Vec3::Zero(), .end = scene::Vec3::Zero(), .radius = 1, .friction = 1});
+  }
+  encoder.forgetHistory();
+  recorder.begin();
+  simulation.recordRestoreState(recorder, start);
+  device.wait(device.submit(recorder));
 }
 
 SceneHost::SceneHost(vulkan::Device& device, LiveScene& scene, FramePacker& packer)
@@ -34,7 +55,7 @@ SceneHost::SceneHost(vulkan::Device& device, LiveScene& scene, FramePacker& pack
       scene_(scene.start()),
       colliders_(scene_),
       onDevice_(std::make_unique<OnDevice>(device, scene_)) {
-  startState_ = newestState_ = onDevice_->simulation.collectState(0);
+  newestState_ = onDevice_->start;
 }
 
 SceneHost::~SceneHost() = default;
@@ -79,7 +100,7 @@ void SceneHost::recordRecovery() {
   OnDevice& on = *onDevice_;
   if (recovery_ == Recovery::none) return;
   if (recovery_ == Recovery::rollback) on.simulation.recordRollback(on.recorder);
-  if (recovery_ == Recovery::reset) on.simulation.recordRestoreState(on.recorder, startState_);
+  if (recovery_ == Recovery::reset) on.simulation.recordRestoreState(on.recorder, on.start);
   on.encoder.forgetHistory();
   recovery_ = Recovery::none;
 }

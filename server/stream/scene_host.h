@@ -51,13 +51,18 @@ class SceneHost {
   simulation::TickStatus status() const { return status_; }
 
  private:
-  // What lives on the device. Made with its start complete there, and saved.
+  // What lives on the device. Made with its start complete there, and `start` that state.
   struct OnDevice {
     OnDevice(vulkan::Device& device, const scene::Scene& scene);
+    // A tick and a frame with all that they may need: software devices compile a kernel when it first runs,
+    // which takes tenths of a second. Leaves the start state.
+    void warmUp(const scene::Scene& scene);
+
     vulkan::Device& device;
     simulation::ClothSimulation simulation;
     encode::FrameEncoder encoder;
     vulkan::Recorder recorder;
+    simulation::StateSnapshot start;
   };
   enum class Recovery : std::uint8_t { none, rollback, reset };
 
@@ -85,7 +90,7 @@ class SceneHost {
   std::uint64_t sinceHealthy_ = 0;             // healthy ticks since the start or the last recovery
   TokenBucket recoveryNotices_{1, 5};
 
-  simulation::StateSnapshot startState_, newestState_;
+  simulation::StateSnapshot newestState_;
   bool savesState_ = false;  // the tick in hand
 
   Clock::time_point tickStart_{}, lastKeyFrame_{};
