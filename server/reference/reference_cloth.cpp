@@ -27,7 +27,7 @@ Vec3 airForce(const Vec3& u, const Vec3& N, double density, double drag, double 
 
 ReferenceCloth::ReferenceCloth(const scene::Cloth& cloth)
     : cloth_(cloth),
-      spacing_(scene::spacing(cloth.grid)),
+      links_(scene::springLinks(cloth)),
       velocities_(cloth.grid.nodeCount(), Vec3::Zero()),
       forces_(cloth.grid.nodeCount(), Vec3::Zero()),
       inverseMasses_(cloth.grid.nodeCount(), 1 / nodeMass()) {
@@ -49,34 +49,17 @@ void ReferenceCloth::setParameters(const scene::Cloth& cloth) {
   cloth_.friction = cloth.friction;
 }
 
-// visit(i, j, spring, rest length), each spring once, i before j.
-template <typename Visit>
-void ReferenceCloth::forEachSpring(const Visit& visit) const {
-  const std::uint32_t rows = cloth_.grid.rows, columns = cloth_.grid.columns;
-  const double alongRow = spacing_.column, alongColumn = spacing_.row, diagonal = spacing_.diagonal;
-  for (std::uint32_t row = 0; row < rows; ++row)
-    for (std::uint32_t column = 0; column < columns; ++column) {
-      const std::uint32_t i = row * columns + column;
-      const bool right = column + 1 < columns, down = row + 1 < rows;
-      if (right) visit(i, i + 1, cloth_.structural, alongRow);
-      if (down) visit(i, i + columns, cloth_.structural, alongColumn);
-      if (down && column > 0) visit(i, i + columns - 1, cloth_.shear, diagonal);
-      if (down && right) visit(i, i + columns + 1, cloth_.shear, diagonal);
-      if (column + 2 < columns) visit(i, i + 2, cloth_.bend, 2 * alongRow);
-      if (row + 2 < rows) visit(i, i + 2 * columns, cloth_.bend, 2 * alongColumn);
-    }
-}
-
 void ReferenceCloth::accumulateSpringForces(std::span<Vec3> forces) const {
-  forEachSpring([&](std::uint32_t i, std::uint32_t j, const scene::Spring& spring, double restLength) {
-    const Vec3 d = positions_[j] - positions_[i];
+  for (const scene::SpringLink& link : links_) {
+    const scene::Spring& spring = scene::springOf(cloth_, link.kind);
+    const Vec3 d = positions_[link.b] - positions_[link.a];
     const double square = std::max(d.squaredNorm(), kTinyLengthSquared);
-    const double elastic = spring.stiffness * (1 - restLength / std::sqrt(square));
-    const double viscous = spring.damping * (velocities_[j] - velocities_[i]).dot(d) / square;
+    const double elastic = spring.stiffness * (1 - double{link.restLength} / std::sqrt(square));
+    const double viscous = spring.damping * (velocities_[link.b] - velocities_[link.a]).dot(d) / square;
     const Vec3 force = (elastic + viscous) * d;
-    forces[i] += force;
-    forces[j] -= force;
-  });
+    forces[link.a] += force;
+    forces[link.b] -= force;
+  }
 }
 
 void ReferenceCloth::accumulateAirForces(const scene::Environment& environment,
@@ -177,10 +160,10 @@ double ReferenceCloth::kineticEnergy() const {
 
 double ReferenceCloth::elasticEnergy() const {
   double sum = 0;
-  forEachSpring([&](std::uint32_t i, std::uint32_t j, const scene::Spring& spring, double restLength) {
-    const double extension = (positions_[j] - positions_[i]).norm() - restLength;
-    sum += 0.5 * spring.stiffness * extension * extension;
-  });
+  for (const scene::SpringLink& link : links_) {
+    const double extension = (positions_[link.b] - positions_[link.a]).norm() - double{link.restLength};
+    sum += 0.5 * scene::springOf(cloth_, link.kind).stiffness * extension * extension;
+  }
   return sum;
 }
 
@@ -194,13 +177,13 @@ double ReferenceCloth::gravityEnergy(const Vec3& gravity) const {
 Strain ReferenceCloth::strain() const {
   Strain strain{.max = -1, .mean = 0};
   std::uint32_t count = 0;
-  forEachSpring([&](std::uint32_t i, std::uint32_t j, const scene::Spring& spring, double restLength) {
-    if (&spring != &cloth_.structural) return;
-    const double stretch = (positions_[j] - positions_[i]).norm() / restLength - 1;
+  for (const scene::SpringLink& link : links_) {
+    if (link.kind != scene::SpringKind::structural) continue;
+    const double stretch = (positions_[link.b] - positions_[link.a]).norm() / double{link.restLength} - 1;
     strain.max = std::max(strain.max, stretch);
     strain.mean += std::abs(stretch);
     ++count;
-  });
+  }
   strain.mean /= count;
   return strain;
 }

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "server/scene/scene.h"
+#include "server/scene/springs.h"
 
 namespace clothstream::reference {
 
@@ -22,7 +23,7 @@ struct Strain {
 // Nodes are row-major. Not thread-safe; after construction no member allocates but normals().
 class ReferenceCloth {
  public:
-  // At rest in its start pose. The springs' rest lengths are those of scene::spacing().
+  // At rest in its start pose. Springs are those of scene::springLinks().
   explicit ReferenceCloth(const scene::Cloth& cloth);
 
   // Springs, damping, drag, lift, friction from now on; same grid, mass, pins.
@@ -58,11 +59,8 @@ class ReferenceCloth {
   Strain strain() const;
 
  private:
-  template <typename Visit>
-  void forEachSpring(const Visit& visit) const;
-
   scene::Cloth cloth_;
-  scene::GridSpacing spacing_;
+  std::vector<scene::SpringLink> links_;
   std::vector<Vec3> positions_, velocities_, forces_;
   std::vector<double> inverseMasses_;
 };

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: MIT
+// Springs of grids, and adjacency of any springs.
+#include "server/scene/springs.h"
+
+namespace clothstream::scene {
+
+std::vector<SpringLink> springLinks(const Cloth& cloth) {
+  const std::uint32_t rows = cloth.grid.rows, columns = cloth.grid.columns;
+  const GridSpacing lengths = spacing(cloth.grid);
+  std::vector<SpringLink> links;
+  links.reserve(std::size_t{6} * rows * columns);
+  for (std::uint32_t row = 0; row < rows; ++row)
+    for (std::uint32_t column = 0; column < columns; ++column) {
+      const std::uint32_t a = row * columns + column;
+      const bool right = column + 1 < columns, down = row + 1 < rows;
+      if (right) links.push_back({a, a + 1, SpringKind::structural, lengths.column});
+      if (down) links.push_back({a, a + columns, SpringKind::structural, lengths.row});
+      if (down && column > 0) links.push_back({a, a + columns - 1, SpringKind::shear, lengths.diagonal});
+      if (down && right) links.push_back({a, a + columns + 1, SpringKind::shear, lengths.diagonal});
+      if (column + 2 < columns) links.push_back({a, a + 2, SpringKind::bend, 2 * lengths.column});
+      if (row + 2 < rows) links.push_back({a, a + 2 * columns, SpringKind::bend, 2 * lengths.row});
+    }
+  return links;
+}
+
+const Spring& springOf(const Cloth& cloth, SpringKind kind) {
+  return kind == SpringKind::structural ? cloth.structural
+         : kind == SpringKind::shear    ? cloth.shear
+                                        : cloth.bend;
+}
+
+SpringAdjacency springAdjacency(std::span<const SpringLink> links, std::uint32_t nodeCount) {
+  SpringAdjacency adjacency{std::vector<std::uint32_t>(nodeCount + 1, 0),
+                            std::vector<std::uint32_t>(2 * links.size())};
+  for (const SpringLink& link : links)
+    for (const std::uint32_t node : {link.a, link.b}) ++adjacency.first[node + 1];
+  for (std::uint32_t node = 0; node < nodeCount; ++node) adjacency.first[node + 1] += adjacency.first[node];
+  std::vector<std::uint32_t> next(adjacency.first.begin(), adjacency.first.end() - 1);
+  for (std::uint32_t i = 0; i < links.size(); ++i)
+    for (const std::uint32_t node : {links[i].a, links[i].b}) adjacency.springs[next[node]++] = i;
+  return adjacency;
+}
+
+}  // namespace clothstream::scene

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: MIT
+// The springs of a cloth as a list, and which of them meet at a node.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "server/scene/scene.h"
+
+namespace clothstream::scene {
+
+enum class SpringKind : std::uint8_t { structural, shear, bend };
+inline constexpr std::size_t kSpringKinds = 3;
+
+// Between two nodes of one cloth, a < b.
+struct SpringLink {
+  std::uint32_t a = 0, b = 0;
+  SpringKind kind = SpringKind::structural;
+  float restLength = 0;  // m
+};
+
+// Every spring once, by ascending a; of one a by kind, then by ascending b. [Va21] Fig. 1.
+std::vector<SpringLink> springLinks(const Cloth& cloth);
+
+const Spring& springOf(const Cloth& cloth, SpringKind kind);
+
+// Which springs meet at each node, in the order of the list.
+struct SpringAdjacency {
+  std::vector<std::uint32_t> first;    // a node's first place in `springs`; one more at the end
+  std::vector<std::uint32_t> springs;  // indices into the list, each twice
+
+  std::span<const std::uint32_t> of(std::uint32_t node) const {
+    return std::span(springs).subspan(first[node], first[node + 1] - first[node]);
+  }
+};
+SpringAdjacency springAdjacency(std::span<const SpringLink> links, std::uint32_t nodeCount);
+
+}  // namespace clothstream::scene
