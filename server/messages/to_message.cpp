@@ -21,6 +21,18 @@ void writeRange(const scene::GridRange& range, v1::GridRange& message) {
   message.set_column_step(range.columnStep);
 }
 
+void writeSolver(const scene::Solver& solver, v1::Solver& message) {
+  if (solver.kind == scene::SolverKind::massSpring) {
+    message.mutable_mass_spring();
+    return;
+  }
+  v1::ConstraintSolver& constraint = *message.mutable_constraint();
+  constraint.set_bend_constraints(solver.bendConstraints);
+  if (solver.compliance) constraint.set_compliance(*solver.compliance);
+  constraint.set_iterations(solver.iterations);
+  constraint.set_tolerance(solver.tolerance);
+}
+
 void writeCloth(const scene::Cloth& cloth, v1::Cloth& message) {
   message.set_name(cloth.name);
   v1::Grid& grid = *message.mutable_grid();
@@ -39,6 +51,7 @@ void writeCloth(const scene::Cloth& cloth, v1::Cloth& message) {
   message.set_friction(cloth.friction);
   message.set_thickness(cloth.thickness);
   for (const scene::GridRange& range : cloth.pins) writeRange(range, *message.add_pins());
+  writeSolver(cloth.solver, *message.mutable_solver());
 }
 
 void writeCollider(const scene::SphereCollider& collider, v1::Collider& message) {

@@ -7,6 +7,8 @@
 #include <cassert>
 #include <cmath>
 
+#include "server/reference/constraint_system.h"
+
 namespace clothstream::reference {
 namespace {
 
@@ -47,11 +49,12 @@ void ReferenceCloth::setParameters(const scene::Cloth& cloth) {
   cloth_.drag = cloth.drag;
   cloth_.lift = cloth.lift;
   cloth_.friction = cloth.friction;
+  cloth_.solver = cloth.solver;
 }
 
 void ReferenceCloth::accumulateSpringForces(std::span<Vec3> forces) const {
   for (const scene::SpringLink& link : links_) {
-    const scene::Spring& spring = scene::springOf(cloth_, link.kind);
+    const scene::Spring spring = scene::forceOf(cloth_, link.kind);
     const Vec3 d = positions_[link.b] - positions_[link.a];
     const double square = std::max(d.squaredNorm(), kTinyLengthSquared);
     const double elastic = spring.stiffness * (1 - double{link.restLength} / std::sqrt(square));
@@ -89,6 +92,8 @@ void ReferenceCloth::integrate(const scene::Environment& environment, scene::Int
   accumulateAirForces(environment, forces_);
   const Vec3 gravity = environment.gravity.cast<double>();
   const double damping = cloth_.damping;
+  const bool constrained = cloth_.solver.kind == scene::SolverKind::constraint;
+  if (constrained) start_ = positions_;
   for (std::size_t i = 0; i < positions_.size(); ++i) {
     if (inverseMasses_[i] == 0) continue;
     const Vec3 acceleration = forces_[i] * inverseMasses_[i] + gravity - damping * velocities_[i];
@@ -99,6 +104,22 @@ void ReferenceCloth::integrate(const scene::Environment& environment, scene::Int
       velocities_[i] += h * acceleration;
       positions_[i] += h * velocities_[i];
     }
+  }
+  if (constrained) enforceConstraints(h);
+}
+
+void ReferenceCloth::enforceConstraints(double h) {
+  std::vector<scene::SpringLink> constraints = links_;
+  std::erase_if(constraints, [&](const scene::SpringLink& link) {
+    return !scene::isConstraint(cloth_.solver, link.kind);
+  });
+  const ConstraintSystem system(constraints, start_, velocities_, inverseMasses_,
+                                scene::scaledCompliance(cloth_, h), h);
+  const std::vector<Vec3> moves = system.moves(
+      system.conjugateGradients(cloth_.solver.iterations, double{cloth_.solver.tolerance}).multipliers);
+  for (std::size_t i = 0; i < positions_.size(); ++i) {
+    positions_[i] += moves[i];
+    velocities_[i] += moves[i] / h;
   }
 }
 

@@ -44,6 +44,24 @@ struct Grid {
   std::uint32_t nodeCount() const { return rows * columns; }
 };
 
+enum class SolverKind : std::uint8_t {
+  massSpring,  // every spring is a force
+  constraint,  // structural and shear springs keep their length: implicit constraint enforcement, [Va21] Eq.
+               // 3-11
+};
+
+// What turns a cloth's springs into motion. All but `kind` are the constraint solver's.
+struct Solver {
+  SolverKind kind = SolverKind::massSpring;
+  bool bendConstraints = false;     // bend springs keep their length too: the paper's "all springs"
+  std::optional<float> compliance;  // m/N; absent: kRelativeCompliance of what a node gives way in a substep
+  std::uint32_t iterations = 20;    // of conjugate gradients in a substep, at most
+  float tolerance = 0.001f;         // of the residual's norm, relative to where it started
+};
+
+// Of h^2 / m, the compliance with which the number of iterations hardly depends on the cloth's size.
+inline constexpr float kRelativeCompliance = 0.01f;
+
 struct Cloth {
   std::string name;
   Grid grid;
@@ -54,6 +72,9 @@ struct Cloth {
   float friction = 0.3f;     // Coulomb, dimensionless
   float thickness = 0.005f;  // m kept from a collider's surface
   std::vector<GridRange> pins;
+  Solver solver;
+
+  float nodeMass() const { return mass / static_cast<float>(grid.nodeCount()); }  // kg
 };
 
 struct MotionKey {
