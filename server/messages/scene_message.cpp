@@ -92,19 +92,30 @@ scene::GridRange toRange(Checks& checks, const Path& path, const v1::GridRange& 
   return range;
 }
 
+void readConstraint(Checks& checks, const Path& path, const v1::ConstraintSolver& message,
+                    scene::Solver& solver) {
+  solver.bendConstraints = message.bend_constraints();
+  if (message.has_compliance())
+    solver.compliance = checks.number(path / "compliance", message.compliance(), limits::kCompliance);
+  if (message.has_iterations())
+    solver.iterations = checks.integer(path / "iterations", message.iterations(), 1, limits::kMaxIterations);
+  if (message.has_tolerance())
+    solver.tolerance = checks.number(path / "tolerance", message.tolerance(), limits::kTolerance);
+}
+
 scene::Solver toSolver(Checks& checks, const Path& path, const v1::Solver& message) {
   scene::Solver solver;
-  if (!message.has_constraint()) return solver;
-  const v1::ConstraintSolver& constraint = message.constraint();
-  const Path at = path / "constraint";
-  solver.kind = scene::SolverKind::constraint;
-  solver.bendConstraints = constraint.bend_constraints();
-  if (constraint.has_compliance())
-    solver.compliance = checks.number(at / "compliance", constraint.compliance(), limits::kCompliance);
-  if (constraint.has_iterations())
-    solver.iterations = checks.integer(at / "iterations", constraint.iterations(), 1, limits::kMaxIterations);
-  if (constraint.has_tolerance())
-    solver.tolerance = checks.number(at / "tolerance", constraint.tolerance(), limits::kTolerance);
+  if (message.has_constraint()) {
+    solver.kind = scene::SolverKind::constraint;
+    readConstraint(checks, path / "constraint", message.constraint(), solver);
+  } else if (message.has_acad()) {
+    const v1::AcadSolver& acad = message.acad();
+    const Path at = path / "acad";
+    solver.kind = scene::SolverKind::acad;
+    if (acad.has_activation())
+      solver.activation = checks.number(at / "activation", acad.activation(), limits::kActivation);
+    readConstraint(checks, at / "constraint", acad.constraint(), solver);
+  }
   return solver;
 }
 
@@ -197,14 +208,14 @@ void checkSolvers(Checks& checks, const scene::Scene& scene) {
   const Path root;
   for (std::size_t i = 0; i < scene.cloths.size(); ++i) {
     const scene::Cloth& cloth = scene.cloths[i];
-    if (cloth.solver.kind != scene::SolverKind::constraint) continue;
+    if (cloth.solver.kind == scene::SolverKind::massSpring) continue;
     const Path element = root.at("cloths", static_cast<int>(i));
     if (scene.integrator != scene::Integrator::semiImplicitEuler)
-      checks.fail(element / "solver", "constraint", "needs INTEGRATOR_SEMI_IMPLICIT_EULER");
+      checks.fail(element / "solver", "", "has constraints, which need INTEGRATOR_SEMI_IMPLICIT_EULER");
     if (cloth.grid.nodeCount() > limits::kMaxConstraintNodes)
-      checks.fail(element / "solver", "constraint",
-                  fmt::format("takes at most {} nodes; this cloth has {}", limits::kMaxConstraintNodes,
-                              cloth.grid.nodeCount()));
+      checks.fail(element / "solver", "",
+                  fmt::format("has constraints, for at most {} nodes; this cloth has {}",
+                              limits::kMaxConstraintNodes, cloth.grid.nodeCount()));
   }
 }
 

@@ -21,16 +21,26 @@ void writeRange(const scene::GridRange& range, v1::GridRange& message) {
   message.set_column_step(range.columnStep);
 }
 
+void writeConstraint(const scene::Solver& solver, v1::ConstraintSolver& message) {
+  message.set_bend_constraints(solver.bendConstraints);
+  if (solver.compliance) message.set_compliance(*solver.compliance);
+  message.set_iterations(solver.iterations);
+  message.set_tolerance(solver.tolerance);
+}
+
 void writeSolver(const scene::Solver& solver, v1::Solver& message) {
-  if (solver.kind == scene::SolverKind::massSpring) {
-    message.mutable_mass_spring();
-    return;
+  switch (solver.kind) {
+    case scene::SolverKind::massSpring:
+      message.mutable_mass_spring();
+      break;
+    case scene::SolverKind::constraint:
+      writeConstraint(solver, *message.mutable_constraint());
+      break;
+    case scene::SolverKind::acad:
+      message.mutable_acad()->set_activation(solver.activation);
+      writeConstraint(solver, *message.mutable_acad()->mutable_constraint());
+      break;
   }
-  v1::ConstraintSolver& constraint = *message.mutable_constraint();
-  constraint.set_bend_constraints(solver.bendConstraints);
-  if (solver.compliance) constraint.set_compliance(*solver.compliance);
-  constraint.set_iterations(solver.iterations);
-  constraint.set_tolerance(solver.tolerance);
 }
 
 void writeCloth(const scene::Cloth& cloth, v1::Cloth& message) {

@@ -13,7 +13,7 @@ Eigen::Index index(std::size_t i) {
 
 }  // namespace
 
-ConstraintSystem::ConstraintSystem(std::span<const scene::SpringLink> links,
+ConstraintSystem::ConstraintSystem(std::span<const Constraint> constraints,
                                    std::span<const Eigen::Vector3d> start,
                                    std::span<const Eigen::Vector3d> velocities,
                                    std::span<const double> inverseMasses, double compliance, double h)
@@ -22,7 +22,7 @@ ConstraintSystem::ConstraintSystem(std::span<const scene::SpringLink> links,
     inverseMasses_.segment<3>(index(3 * i)).setConstant(inverseMasses[i]);
   std::vector<Eigen::Triplet<double>> entries;
   std::vector<double> side;
-  for (const scene::SpringLink& link : links) {
+  for (const Constraint& link : constraints) {
     if (inverseMasses[link.a] == 0 && inverseMasses[link.b] == 0) continue;
     const Eigen::Vector3d d = start[link.b] - start[link.a];
     const Eigen::Vector3d direction = d.normalized();
@@ -31,8 +31,7 @@ ConstraintSystem::ConstraintSystem(std::span<const scene::SpringLink> links,
       entries.emplace_back(row, index(3 * link.a) + axis, -direction[axis]);
       entries.emplace_back(row, index(3 * link.b) + axis, direction[axis]);
     }
-    side.push_back(d.norm() - double{link.restLength} +
-                   h * direction.dot(velocities[link.b] - velocities[link.a]));
+    side.push_back(link.excess + h * direction.dot(velocities[link.b] - velocities[link.a]));
   }
   side_ = Eigen::Map<const Eigen::VectorXd>(side.data(), index(side.size()));
   jacobian_.resize(side_.size(), inverseMasses_.size());

@@ -8,9 +8,14 @@
 #include <span>
 #include <vector>
 
-#include "server/scene/springs.h"
-
 namespace clothstream::reference {
+
+// Between two nodes, which a substep is to bring nearer to each other by `excess`, m, than they are at its
+// start.
+struct Constraint {
+  std::uint32_t a = 0, b = 0;
+  double excess = 0;
+};
 
 // One substep's system  (J M^-1 J^T + compliance I) lambda = b,  b = C + h J v,  with C = |x_b - x_a| - r and
 // J its derivative at the substep's start; then x -= M^-1 J^T lambda. In this form (lambda times h^2 of the
@@ -18,8 +23,9 @@ namespace clothstream::reference {
 class ConstraintSystem {
  public:
   // `start`: positions that J is of; `velocities`: those that the forces alone give. `compliance` in 1/kg,
-  // scaled by 1 / h^2 already. Links between nodes without inverse mass are left out.
-  ConstraintSystem(std::span<const scene::SpringLink> links, std::span<const Eigen::Vector3d> start,
+  // scaled by 1 / h^2 already. Constraints between nodes without
+  // inverse mass are left out.
+  ConstraintSystem(std::span<const Constraint> constraints, std::span<const Eigen::Vector3d> start,
                    std::span<const Eigen::Vector3d> velocities, std::span<const double> inverseMasses,
                    double compliance, double h);
 

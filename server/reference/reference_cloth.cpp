@@ -92,7 +92,7 @@ void ReferenceCloth::integrate(const scene::Environment& environment, scene::Int
   accumulateAirForces(environment, forces_);
   const Vec3 gravity = environment.gravity.cast<double>();
   const double damping = cloth_.damping;
-  const bool constrained = cloth_.solver.kind == scene::SolverKind::constraint;
+  const bool constrained = cloth_.solver.kind != scene::SolverKind::massSpring;
   if (constrained) start_ = positions_;
   for (std::size_t i = 0; i < positions_.size(); ++i) {
     if (inverseMasses_[i] == 0) continue;
@@ -109,14 +109,23 @@ void ReferenceCloth::integrate(const scene::Environment& environment, scene::Int
 }
 
 void ReferenceCloth::enforceConstraints(double h) {
-  std::vector<scene::SpringLink> constraints = links_;
-  std::erase_if(constraints, [&](const scene::SpringLink& link) {
-    return !scene::isConstraint(cloth_.solver, link.kind);
-  });
+  const scene::Solver& solver = cloth_.solver;
+  std::vector<Constraint> constraints;
+  for (const scene::SpringLink& link : links_) {
+    if (!scene::isConstraint(solver, link.kind)) continue;
+    const double rest = link.restLength, longest = rest * (1 + double{solver.activation});
+    const Vec3 d = start_[link.b] - start_[link.a];
+    if (solver.kind == scene::SolverKind::constraint) {
+      constraints.push_back({link.a, link.b, d.norm() - rest});
+    } else if ((d + h * (velocities_[link.b] - velocities_[link.a])).norm() > longest) {
+      const double excess = d.norm() - longest;
+      constraints.push_back({link.a, link.b, excess > 0 ? double{scene::kTakenBack} * excess : excess});
+    }
+  }
   const ConstraintSystem system(constraints, start_, velocities_, inverseMasses_,
                                 scene::scaledCompliance(cloth_, h), h);
-  const std::vector<Vec3> moves = system.moves(
-      system.conjugateGradients(cloth_.solver.iterations, double{cloth_.solver.tolerance}).multipliers);
+  const std::vector<Vec3> moves =
+      system.moves(system.conjugateGradients(solver.iterations, double{solver.tolerance}).multipliers);
   for (std::size_t i = 0; i < positions_.size(); ++i) {
     positions_[i] += moves[i];
     velocities_[i] += moves[i] / h;

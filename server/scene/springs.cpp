@@ -30,12 +30,12 @@ const Spring& springOf(const Cloth& cloth, SpringKind kind) {
 }
 
 bool isConstraint(const Solver& solver, SpringKind kind) {
-  return solver.kind == SolverKind::constraint && (kind != SpringKind::bend || solver.bendConstraints);
+  return solver.kind != SolverKind::massSpring && (kind != SpringKind::bend || solver.bendConstraints);
 }
 
 Spring forceOf(const Cloth& cloth, SpringKind kind) {
   Spring spring = springOf(cloth, kind);
-  if (isConstraint(cloth.solver, kind)) spring.stiffness = 0;
+  if (cloth.solver.kind == SolverKind::constraint && isConstraint(cloth.solver, kind)) spring.stiffness = 0;
   return spring;
 }
 

@@ -104,11 +104,12 @@ bool explicitStable(const Cloth& cloth, const SpringCounts& counts, double air, 
 }
 
 // Fewest substeps from `atLeast` on; both criteria only get easier with smaller steps. 0: none. Constraints
-// are solved for implicitly: they set no bound.
+// are solved for implicitly: they set no bound, and hold those springs that become constraints when they
+// stretch too far.
 std::uint32_t stableSubsteps(const Scene& scene, Cloth cloth, std::uint32_t atLeast) {
-  cloth.structural = forceOf(cloth, SpringKind::structural);
-  cloth.shear = forceOf(cloth, SpringKind::shear);
-  cloth.bend = forceOf(cloth, SpringKind::bend);
+  if (isConstraint(cloth.solver, SpringKind::structural))
+    cloth.structural.stiffness = cloth.shear.stiffness = 0;
+  if (isConstraint(cloth.solver, SpringKind::bend)) cloth.bend.stiffness = 0;
   const double air = airDamping(cloth, scene.environment);
   const std::vector<SpringCounts> combinations = springCounts(cloth);
   const auto stable = scene.integrator == Integrator::semiImplicitEuler ? semiImplicitStable : explicitStable;

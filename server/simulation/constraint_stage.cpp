@@ -45,11 +45,12 @@ Rounds roundsOf(const ConstraintTables& tables, std::uint32_t workgroupSize) {
     links = std::max(links, shares(system.links.z));
     nodes = std::max(nodes, shares(system.nodes.y));
   }
-  const std::uint32_t lanes =
-      3 * (CLOTHSTREAM_SOLVE_LANES / workgroupSize + 1);  // with what they start and end
-  const std::uint32_t sum = links + 2 * lanes + 8;
-  // A gather's loop over four constraints may be unrolled; it is counted as if it were not.
-  return {sum, nodes * (1 + 6 * (texels + 1)) + 2 * sum + links};
+  // Loops round a loop end once more than they work.
+  const std::uint32_t lanes = CLOTHSTREAM_SOLVE_LANES / workgroupSize + 2;
+  const std::uint32_t sum = links + 2 * lanes + 2 * CLOTHSTREAM_SOLVE_LANES / workgroupSize + 16;
+  const std::uint32_t gather = texels + 2;
+  const std::uint32_t list = 2 * (links + 2 * lanes) + CLOTHSTREAM_SOLVE_LANES;
+  return {list + sum, std::max(nodes * gather, links / 4 * 2 * gather) + 2 * sum + links};
 }
 
 // A solve is one workgroup with barriers between its passes: on a software device these cost nothing as long
@@ -75,6 +76,17 @@ SolveCut cutSolve(const vulkan::Device& device, const ConstraintTables& tables, 
   return cut;
 }
 
+vulkan::Kernel makeSolve(const vulkan::Device& device, const SolveCut& cut, bool adaptive) {
+  return vulkan::Kernel(
+      device, {.name = "solve_constraints",
+               .spirv = kernels::solve_constraints,
+               .bindings = {kTexels, kTexels, kTexels, kTexels, kTexels, kTexels, kTexels, kStorage, kStorage,
+                            kStorage, kStorage, kStorage, kStorage, kStorage},
+               .pushConstantBytes = sizeof(shared::SolvePush),
+               .workgroupSize = cut.workgroupSize,
+               .specialisation = {adaptive ? 1u : 0u}});
+}
+
 template <typename T>
 std::span<const std::byte> bytesOf(const std::vector<T>& records) {
   assert(!records.empty());
@@ -94,6 +106,7 @@ ConstraintStage::ConstraintStage(const vulkan::Device& device, const ConstraintT
     : linkCount_(static_cast<std::uint32_t>(tables.links.size())),
       nodeCount_(static_cast<std::uint32_t>(tables.incidences.size())),
       systemCount_(static_cast<std::uint32_t>(tables.systems.size())),
+      alwaysCount_(tables.always),
       cut_(cutSolve(device, tables, workgroupSize)),
       systems_(device, bytesOf(tables.systems)),
       links_(device, bytesOf(tables.links)),
@@ -105,21 +118,18 @@ ConstraintStage::ConstraintStage(const vulkan::Device& device, const ConstraintT
       directions_(device, BufferPurpose::state, linkCount_ * sizeof(float)),
       products_(device, BufferPurpose::state, linkCount_ * sizeof(float)),
       moves_(device, BufferPurpose::state, nodeCount_ * sizeof(shared::vec4)),
+      actives_(device, BufferPurpose::state, linkCount_ * sizeof(std::uint32_t)),
       solves_(device, BufferPurpose::state, systemCount_ * sizeof(shared::SolveRecord)),
       solvesReadback_(device, BufferPurpose::readback, systemCount_ * sizeof(shared::SolveRecord)),
-      prepare_(device, {.name = "prepare_constraints",
-                        .spirv = kernels::prepare_constraints,
-                        .bindings = {kTexels, kTexels, kTexels, kStorage},
-                        .pushConstantBytes = sizeof(shared::ConstraintPush),
-                        .workgroupSize = kWorkgroup,
-                        .specialisation = {}}),
-      solve_(device, {.name = "solve_constraints",
-                      .spirv = kernels::solve_constraints,
-                      .bindings = {kTexels, kTexels, kTexels, kTexels, kTexels, kTexels, kTexels, kStorage,
-                                   kStorage, kStorage, kStorage, kStorage, kStorage},
-                      .pushConstantBytes = sizeof(shared::SolvePush),
-                      .workgroupSize = cut_.workgroupSize,
-                      .specialisation = {}}),
+      prepare_(device,
+               {.name = "prepare_constraints",
+                .spirv = kernels::prepare_constraints,
+                .bindings = {kTexels, kTexels, kTexels, kTexels, kStorage, kStorage, kStorage, kStorage},
+                .pushConstantBytes = sizeof(shared::ConstraintPush),
+                .workgroupSize = kWorkgroup,
+                .specialisation = {}}),
+      solveAll_(makeSolve(device, cut_, false)),
+      solveActive_(makeSolve(device, cut_, true)),
       apply_(device, {.name = "apply_constraints",
                       .spirv = kernels::apply_constraints,
                       .bindings = {kTexels, kTexels, kTexels, kTexels, kTexels, kStorage, kTexels, kStorage,
@@ -127,23 +137,32 @@ ConstraintStage::ConstraintStage(const vulkan::Device& device, const ConstraintT
                       .pushConstantBytes = sizeof(shared::ConstraintPush),
                       .workgroupSize = kWorkgroup,
                       .specialisation = {}}),
-      prepareFrom_{
-          Bindings(device, prepare_, {&links_.texels, state.positions[0], state.velocities[1], &rows_}),
-          Bindings(device, prepare_, {&links_.texels, state.positions[1], state.velocities[0], &rows_})},
-      solveFrom_{Bindings(device, solve_,
-                          {&state.cloths, &systems_.texels, &incidences_.texels, &lists_.texels, &rows_,
-                           &links_.texels, state.positions[0], &multipliers_, &residuals_, &directions_,
-                           &products_, &moves_, &solves_}),
-                 Bindings(device, solve_,
-                          {&state.cloths, &systems_.texels, &incidences_.texels, &lists_.texels, &rows_,
-                           &links_.texels, state.positions[1], &multipliers_, &residuals_, &directions_,
-                           &products_, &moves_, &solves_})},
-      applyTo_{Bindings(device, apply_,
-                        {&state.cloths, &systems_.texels, &incidences_.texels, &lists_.texels, &rows_,
-                         &multipliers_, &state.spheres, state.positions[0], state.velocities[0]}),
-               Bindings(device, apply_,
-                        {&state.cloths, &systems_.texels, &incidences_.texels, &lists_.texels, &rows_,
-                         &multipliers_, &state.spheres, state.positions[1], state.velocities[1]})} {}
+      prepareFrom_{prepareFrom(device, state, 0), prepareFrom(device, state, 1)},
+      solveAllBindings_(solveBindings(device, solveAll_, state)),
+      solveActiveBindings_(solveBindings(device, solveActive_, state)),
+      applyTo_{applyTo(device, state, 0), applyTo(device, state, 1)} {}
+
+Bindings ConstraintStage::prepareFrom(const vulkan::Device& device, const StateBuffers& state,
+                                      std::size_t from) const {
+  return Bindings(device, prepare_,
+                  {&links_.texels, state.positions[from], state.velocities[1 - from], &state.cloths, &rows_,
+                   &multipliers_, &residuals_, &directions_});
+}
+
+Bindings ConstraintStage::solveBindings(const vulkan::Device& device, const vulkan::Kernel& kernel,
+                                        const StateBuffers& state) const {
+  return Bindings(device, kernel,
+                  {&state.cloths, &systems_.texels, &incidences_.texels, &lists_.texels, &rows_,
+                   &links_.texels, state.positions[0], &multipliers_, &residuals_, &directions_, &products_,
+                   &moves_, &actives_, &solves_});
+}
+
+Bindings ConstraintStage::applyTo(const vulkan::Device& device, const StateBuffers& state,
+                                  std::size_t to) const {
+  return Bindings(device, apply_,
+                  {&state.cloths, &systems_.texels, &incidences_.texels, &lists_.texels, &rows_,
+                   &multipliers_, &state.spheres, state.positions[to], state.velocities[to]});
+}
 
 void ConstraintStage::recordTables(vulkan::Recorder& recorder) const {
   for (const Table* table : {&systems_, &links_, &incidences_, &lists_})
@@ -155,16 +174,24 @@ void ConstraintStage::record(vulkan::Recorder& recorder, std::uint32_t from, std
   push.count = linkCount_;
   recorder.barrier();
   recorder.dispatch(prepareFrom_[from], push, linkCount_);
-  for (std::uint32_t first = 0; first < iterations;) {
-    const std::uint32_t end = first + std::min(cut_.iterationsPerDispatch, iterations - first);
-    recorder.barrier();
-    recorder.dispatch(solveFrom_[from], shared::SolvePush{first, end},
-                      std::uint64_t{systemCount_} * cut_.workgroupSize);
-    first = end;
-  }
+  recordSolve(recorder, solveAllBindings_, 0, alwaysCount_, iterations);
+  recordSolve(recorder, solveActiveBindings_, alwaysCount_, systemCount_ - alwaysCount_, iterations);
   push.count = nodeCount_;
   recorder.barrier();
   recorder.dispatch(applyTo_[1 - from], push, nodeCount_);
+}
+
+void ConstraintStage::recordSolve(vulkan::Recorder& recorder, const Bindings& bindings,
+                                  std::uint32_t firstSystem, std::uint32_t systems,
+                                  std::uint32_t iterations) const {
+  if (systems == 0) return;
+  for (std::uint32_t first = 0; first < iterations;) {
+    const std::uint32_t end = first + std::min(cut_.iterationsPerDispatch, iterations - first);
+    recorder.barrier();
+    recorder.dispatch(bindings, shared::SolvePush{first, end, firstSystem},
+                      std::uint64_t{systems} * cut_.workgroupSize);
+    first = end;
+  }
 }
 
 void ConstraintStage::recordReport(vulkan::Recorder& recorder) const {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Implicit constraint enforcement on the device: cloths whose springs keep their length.
+// Implicit constraint enforcement on the device: cloths whose springs keep their length, always or where they
+// are stretched too far.
 #pragma once
 
 #include <array>
@@ -51,17 +52,28 @@ class ConstraintStage {
   std::span<const shared::SolveRecord> report() const;
 
  private:
+  vulkan::Bindings prepareFrom(const vulkan::Device& device, const StateBuffers& state,
+                               std::size_t from) const;
+  vulkan::Bindings solveBindings(const vulkan::Device& device, const vulkan::Kernel& kernel,
+                                 const StateBuffers& state) const;
+  vulkan::Bindings applyTo(const vulkan::Device& device, const StateBuffers& state, std::size_t to) const;
+  void recordSolve(vulkan::Recorder& recorder, const vulkan::Bindings& bindings, std::uint32_t firstSystem,
+                   std::uint32_t systems, std::uint32_t iterations) const;
+
   struct Table {
     Table(const vulkan::Device& device, std::span<const std::byte> bytes);
     vulkan::Buffer upload, texels;
   };
 
-  std::uint32_t linkCount_, nodeCount_, systemCount_;
+  std::uint32_t linkCount_, nodeCount_, systemCount_, alwaysCount_;
   SolveCut cut_;
   Table systems_, links_, incidences_, lists_;
-  vulkan::Buffer rows_, multipliers_, residuals_, directions_, products_, moves_, solves_, solvesReadback_;
-  vulkan::Kernel prepare_, solve_, apply_;
-  std::array<vulkan::Bindings, 2> prepareFrom_, solveFrom_, applyTo_;
+  vulkan::Buffer rows_, multipliers_, residuals_, directions_, products_, moves_, actives_, solves_,
+      solvesReadback_;
+  vulkan::Kernel prepare_, solveAll_, solveActive_, apply_;
+  std::array<vulkan::Bindings, 2> prepareFrom_;
+  vulkan::Bindings solveAllBindings_, solveActiveBindings_;
+  std::array<vulkan::Bindings, 2> applyTo_;
 };
 
 }  // namespace clothstream::simulation

@@ -37,34 +37,41 @@ void appendList(std::span<const std::uint32_t> springs, std::span<const scene::S
   }
 }
 
+void appendSystem(const scene::Cloth& cloth, std::size_t number, std::uint32_t firstNode,
+                  ConstraintTables& tables) {
+  const std::vector<scene::SpringLink> links = constraintsOf(cloth);
+  if (links.empty()) return;
+  const std::uint32_t nodes = cloth.grid.nodeCount();
+  tables.systems.push_back(
+      {.links = halves(tables.links.size(), static_cast<float>(links.size()), static_cast<float>(number)),
+       .nodes = {static_cast<float>(firstNode), static_cast<float>(nodes), 0, 0}});
+  for (const scene::SpringLink& link : links)
+    tables.links.push_back({{static_cast<float>(firstNode + link.a), static_cast<float>(firstNode + link.b),
+                             link.restLength, static_cast<float>(number)}});
+  const scene::SpringAdjacency adjacency = scene::springAdjacency(links, nodes);
+  for (std::uint32_t node = 0; node < nodes; ++node) {
+    const std::size_t first = tables.lists.size();
+    appendList(adjacency.of(node), links, node, tables.lists);
+    tables.incidences[firstNode + node] = {halves(first, static_cast<float>(tables.lists.size() - first),
+                                                  static_cast<float>(tables.systems.size()))};
+  }
+}
+
 }  // namespace
 
 ConstraintTables constraintTables(std::span<const scene::Cloth> cloths) {
   ConstraintTables tables;
-  std::uint32_t firstNode = 0;
-  for (std::size_t cloth = 0; cloth < cloths.size(); ++cloth) {
-    const std::uint32_t nodes = cloths[cloth].grid.nodeCount();
-    const std::vector<scene::SpringLink> links = constraintsOf(cloths[cloth]);
-    if (links.empty()) {
-      tables.incidences.resize(tables.incidences.size() + nodes, {{0, 0, 0, 0}});
-      firstNode += nodes;
-      continue;
-    }
-    tables.systems.push_back(
-        {.links = halves(tables.links.size(), static_cast<float>(links.size()), static_cast<float>(cloth)),
-         .nodes = {static_cast<float>(firstNode), static_cast<float>(nodes), 0, 0}});
-    for (const scene::SpringLink& link : links)
-      tables.links.push_back({{static_cast<float>(firstNode + link.a), static_cast<float>(firstNode + link.b),
-                               link.restLength, 0}});
-    const scene::SpringAdjacency adjacency = scene::springAdjacency(links, nodes);
-    for (std::uint32_t node = 0; node < nodes; ++node) {
-      const std::size_t first = tables.lists.size();
-      appendList(adjacency.of(node), links, node, tables.lists);
-      tables.incidences.push_back({halves(first, static_cast<float>(tables.lists.size() - first),
-                                          static_cast<float>(tables.systems.size()))});
-    }
-    firstNode += nodes;
-  }
+  std::uint32_t nodes = 0;
+  for (const scene::Cloth& cloth : cloths) nodes += cloth.grid.nodeCount();
+  tables.incidences.resize(nodes, {{0, 0, 0, 0}});
+  const auto append = [&](scene::SolverKind kind) {
+    std::uint32_t firstNode = 0;
+    for (std::size_t i = 0; i < cloths.size(); firstNode += cloths[i++].grid.nodeCount())
+      if (cloths[i].solver.kind == kind) appendSystem(cloths[i], i, firstNode, tables);
+  };
+  append(scene::SolverKind::constraint);
+  tables.always = static_cast<std::uint32_t>(tables.systems.size());
+  append(scene::SolverKind::acad);
   return tables;
 }
 

@@ -11,8 +11,9 @@
 namespace clothstream::simulation {
 
 struct ConstraintTables {
-  std::vector<shared::SystemRecord> systems;        // a cloth whose solver is `constraint`
-  std::vector<shared::LinkRecord> links;            // in the order of scene::springLinks(), cloth by cloth
+  std::vector<shared::SystemRecord> systems;  // a cloth with constraints: first those that always have all
+  std::uint32_t always = 0;                   // of the systems
+  std::vector<shared::LinkRecord> links;      // in the order of scene::springLinks(), cloth by cloth
   std::vector<shared::IncidenceRecord> incidences;  // a node of the scene
   std::vector<shared::vec4> lists;
 };

@@ -17,6 +17,13 @@ float snapTiny(float x) {
   return std::abs(x) < 1e-20f ? 0.0f : x;
 }
 
+// Where springs become constraints, how much of what is too much is taken back; the third tells from those
+// that always are.
+shared::vec4 limitsOf(const scene::Solver& solver) {
+  if (solver.kind != scene::SolverKind::acad) return {0, 1, 0, 0};
+  return {solver.activation, scene::kTakenBack, 1, 0};
+}
+
 }  // namespace
 
 std::vector<std::uint32_t> clothOffsets(std::span<const scene::Cloth> cloths) {
@@ -45,7 +52,8 @@ std::vector<shared::ClothRecord> clothRecords(std::span<const scene::Cloth> clot
          .air = {cloth.drag, cloth.lift, 0, 0},
          .solver = {static_cast<float>(scene::scaledCompliance(cloth, substepSeconds)),
                     static_cast<float>(cloth.solver.iterations),
-                    cloth.solver.tolerance * cloth.solver.tolerance, 0}});
+                    cloth.solver.tolerance * cloth.solver.tolerance, 0},
+         .limits = limitsOf(cloth.solver)});
     firstNode += cloth.grid.nodeCount();
   }
   return records;
@@ -71,6 +79,7 @@ Tiles makeTiles(std::span<const scene::Cloth> cloths, std::uint32_t rowsPerInvoc
   append(scene::SolverKind::massSpring);
   tiles.withoutConstraints = static_cast<std::uint32_t>(tiles.records.size());
   append(scene::SolverKind::constraint);
+  append(scene::SolverKind::acad);
   return tiles;
 }
 

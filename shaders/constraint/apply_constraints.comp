@@ -36,6 +36,7 @@ void main() {
   }
   vec4 place = texelFetch(systems, CLOTHSTREAM_SYSTEM_TEXELS * (int(incidence.w) - 1));
   uint firstLink = wholeNumber(place.x, place.y);
+  int record = CLOTHSTREAM_CLOTH_TEXELS * int(place.w);
   vec4 start = positions[index];
   Node node = Node(start.xyz, start.w, velocities[index].xyz);
   if (node.inverseMass > 0.0 && incidence.z > 0.0) {
@@ -47,7 +48,6 @@ void main() {
     node.position = position;
     node.velocity = velocity;
   }
-  int record = CLOTHSTREAM_CLOTH_TEXELS * int(place.w);
   float friction = texelFetch(cloths, record + 2).w;
   float thickness = texelFetch(cloths, record + 3).w;
   for (uint i = 0; i < push.sphereCount; ++i) {

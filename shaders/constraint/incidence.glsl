@@ -3,13 +3,15 @@
 #ifndef CLOTHSTREAM_SHADERS_CONSTRAINT_INCIDENCE_GLSL
 #define CLOTHSTREAM_SHADERS_CONSTRAINT_INCIDENCE_GLSL
 
+#extension GL_EXT_control_flow_attributes : require
+
 #include "shaders/shared/simulation.h"
 
 layout(binding = 0) uniform samplerBuffer cloths;      // ClothRecord
 layout(binding = 1) uniform samplerBuffer systems;     // SystemRecord
 layout(binding = 2) uniform samplerBuffer incidences;  // IncidenceRecord, a node
 layout(binding = 3) uniform samplerBuffer lists;
-layout(binding = 4) uniform samplerBuffer rows;  // a constraint: its direction from a to b; right-hand side
+layout(binding = 4) uniform samplerBuffer rows;  // a constraint: its direction from a to b; 0: not active
 
 uint wholeNumber(float low, float high) {
   return uint(low) + (uint(high) << 16);
@@ -26,7 +28,7 @@ uint wholeNumber(float low, float high) {
     precise vec3 sum = vec3(0.0);                                                       \
     while (texel < end) {                                                               \
       vec4 four = texelFetch(lists, texel);                                             \
-      for (int k = 0; k < 4; ++k) {                                                     \
+      [[unroll]] for (int k = 0; k < 4; ++k) {                                          \
         float number = four[k];                                                         \
         uint link = firstLink + uint(max(abs(number), 1.0)) - 1;                        \
         float along = number == 0.0 ? 0.0 : (number < 0.0 ? -1.0 : 1.0) * SCALAR(link); \

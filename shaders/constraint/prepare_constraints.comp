@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The rows of J at the substep's start, and the right-hand sides: how long each constraint would become under
-// the velocities that the forces alone give, [Va21] Eq. 11 times h^2, with C = |x_b - x_a| - r.
+// the velocities that the forces alone give, [Va21] Eq. 11 times h^2, with C = |x_b - x_a| - r. A spring that
+// may still be a force gets a row of zeros unless these velocities would stretch it too far, [Va21] 3.3.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 
@@ -12,8 +13,18 @@ layout(local_size_x_id = 0) in;
 layout(binding = 0) uniform samplerBuffer links;  // LinkRecord
 layout(binding = 1) uniform samplerBuffer positions;
 layout(binding = 2) uniform samplerBuffer freeVelocities;
-layout(std430, binding = 3) writeonly buffer Rows {
+layout(binding = 3) uniform samplerBuffer cloths;  // ClothRecord
+layout(std430, binding = 4) writeonly buffer Rows {
   vec4 rows[];
+};
+layout(std430, binding = 5) writeonly buffer Multipliers {
+  float multipliers[];
+};
+layout(std430, binding = 6) writeonly buffer Residuals {
+  float residuals[];
+};
+layout(std430, binding = 7) writeonly buffer Directions {
+  float directions[];
 };
 
 layout(push_constant) uniform Push {
@@ -33,7 +44,17 @@ void main() {
   float inverseLength = reciprocalSquareRoot(squared);
   precise vec3 direction = d * inverseLength;
   precise vec3 relative = texelFetch(freeVelocities, b).xyz - texelFetch(freeVelocities, a).xyz;
-  precise float stretch = squared * inverseLength - ends.z;
-  precise float side = stretch + push.substepSeconds * dotProduct(direction, relative);
-  rows[link] = vec4(direction, side);
+  vec4 limits = texelFetch(cloths, CLOTHSTREAM_CLOTH_TEXELS * int(ends.w) + 6);
+  precise vec3 freeEnds = d + push.substepSeconds * relative;
+  precise float longest = ends.z + limits.x * ends.z;
+  bool isActive = limits.z == 0.0 || dotProduct(freeEnds, freeEnds) > longest * longest;
+
+  precise float excess = squared * inverseLength - longest;
+  precise float side =
+      (excess > 0.0 ? limits.y * excess : excess) + push.substepSeconds * dotProduct(direction, relative);
+  // The solve starts from no multipliers: residual and direction are the right-hand side.
+  rows[link] = isActive ? vec4(direction, 0.0) : vec4(0.0);
+  multipliers[link] = 0.0;
+  residuals[link] = isActive ? side : 0.0;
+  directions[link] = isActive ? side : 0.0;
 }

@@ -11,7 +11,7 @@ CLOTHSTREAM_SHARED_BEGIN
 // Whole numbers are floats too, exact below 2^24.
 
 // One cloth: where its nodes lie in the scene's buffers, its material and its solver. Row-major, SI units.
-#define CLOTHSTREAM_CLOTH_TEXELS 6
+#define CLOTHSTREAM_CLOTH_TEXELS 7
 struct ClothRecord {
   vec4 place;      // first node modulo 2^16, first node / 2^16, rows, columns
   vec4 spacing;    // of columns, of rows, along the diagonal; damping
@@ -19,6 +19,7 @@ struct ClothRecord {
   vec4 damping;    // structural, shear, bend; thickness
   vec4 air;        // drag, lift
   vec4 solver;     // compliance / h^2, iterations, square of the tolerance
+  vec4 limits;     // stretch that springs are held at; part of more that is taken back; 0: always
 };
 
 // One workgroup of a kernel that walks down columns: its first invocation starts at (row, column) of the
@@ -36,7 +37,7 @@ struct SystemRecord {
 
 // A constraint: its two nodes in the scene, its length.
 struct LinkRecord {
-  vec4 ends;  // a, b, rest length
+  vec4 ends;  // a, b, rest length; the cloth
 };
 
 // Which constraints meet at a node. The lists that it points to hold, four a texel, the number of a
@@ -54,6 +55,7 @@ struct SolveRecord {
   float residual;  // its norm, relative to where it started
   float start;     // square of the residual's norm then, and now
   float square;
+  uint32_t constraints;  // active ones
 };
 
 // A sphere over one tick, two texels: where it starts, and how far it moves until the tick's end.
@@ -84,6 +86,7 @@ struct ConstraintPush {
 struct SolvePush {
   uint32_t firstIteration;  // of this dispatch; 0 begins the solve
   uint32_t endIteration;
+  uint32_t firstSystem;
 };
 
 struct HashPush {
@@ -105,9 +108,9 @@ namespace clothstream::shared {
 static_assert(sizeof(ClothRecord) == CLOTHSTREAM_CLOTH_TEXELS * sizeof(vec4) &&
               offsetof(ClothRecord, spacing) == 16 && offsetof(ClothRecord, stiffness) == 32 &&
               offsetof(ClothRecord, damping) == 48 && offsetof(ClothRecord, air) == 64 &&
-              offsetof(ClothRecord, solver) == 80);
+              offsetof(ClothRecord, solver) == 80 && offsetof(ClothRecord, limits) == 96);
 static_assert(sizeof(SystemRecord) == CLOTHSTREAM_SYSTEM_TEXELS * sizeof(vec4));
-static_assert(sizeof(SolveRecord) == 16 && sizeof(ConstraintPush) == 24);
+static_assert(sizeof(SolveRecord) == 20 && sizeof(ConstraintPush) == 24);
 static_assert(sizeof(TileRecord) == 16);
 static_assert(sizeof(SphereRecord) == 32 && offsetof(SphereRecord, motionFriction) == 16);
 static_assert(sizeof(AdvancePush) == 48 && offsetof(AdvancePush, windAir) == 16 &&

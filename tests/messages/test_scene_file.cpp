@@ -43,6 +43,13 @@ constexpr const char* kEveryField = R"json({
                              "pose": {"position": {}, "orientation": {"w": 1}}},
     "mass": 1, "structural": {}, "shear": {}, "bend": {}, "damping": 0, "drag": 0, "lift": 0, "friction": 0.5, "thickness": 0.25,
     "solver": {"constraint": {"bendConstraints": true, "compliance": 0.0625, "iterations": 30, "tolerance": 0.25}}
+  }, {
+    "name": "adaptive", "grid": {"rows": 2, "columns": 2, "width": 1, "height": 1,
+                                 "pose": {"position": {}, "orientation": {"w": 1}}},
+    "mass": 1, "structural": {}, "shear": {}, "bend": {}, "damping": 0, "drag": 0, "lift": 0, "friction": 0.5,
+    "thickness": 0.25,
+    "solver": {"acad": {"activation": 0.25,
+                        "constraint": {"bendConstraints": true, "compliance": 0, "iterations": 30, "tolerance": 0}}}
   }],
   "colliders": [{
     "name": "ball", "sphere": {"radius": 0.5},

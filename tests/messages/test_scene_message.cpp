@@ -234,7 +234,13 @@ const BadScene kBadScenes[] = {
     {"cloths[0].solver.constraint.compliance = -1:",
      [](v1::Scene& s) { cloth(s).mutable_solver()->mutable_constraint()->set_compliance(-1); },
      "from 0 to 1"},
-    {"cloths[0].solver = constraint:",
+    {"cloths[0].solver.acad.activation = 11:",
+     [](v1::Scene& s) { cloth(s).mutable_solver()->mutable_acad()->set_activation(11); }, "from 0 to 10"},
+    {"cloths[0].solver.acad.constraint.iterations = 0:",
+     [](v1::Scene& s) {
+       cloth(s).mutable_solver()->mutable_acad()->mutable_constraint()->set_iterations(0);
+     }},
+    {"cloths[0].solver: has constraints,",
      [](v1::Scene& s) {
        cloth(s).mutable_solver()->mutable_constraint();
        s.set_integrator(v1::INTEGRATOR_EXPLICIT_EULER);
