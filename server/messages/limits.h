@@ -45,7 +45,12 @@ inline constexpr Range kRadius{0.001, 1000};           // m
 inline constexpr Range kParticipantRadius{0.001, 10};  // m
 inline constexpr Range kMotionTime{0, 86400};          // s
 inline constexpr Range kMaxError{0.00001, 0.1};        // m
-inline constexpr double kUnitTolerance = 0.001;        // of a quaternion's length
+inline constexpr Range kCompliance{0, 1};              // m/N
+inline constexpr Range kTolerance{0, 1};
+inline constexpr Range kActivation{0, 10};  // part of a length
+inline constexpr std::uint32_t kMaxIterations = 10'000;
+inline constexpr std::uint32_t kMaxConstraintNodes = 1'048'576;  // of a cloth
+inline constexpr double kUnitTolerance = 0.001;                  // of a quaternion's length
 
 inline constexpr float kDefaultArealMass = 0.2f;  // kg/m^2
 inline constexpr std::uint32_t kDefaultStreamRate = 72;

@@ -92,6 +92,33 @@ scene::GridRange toRange(Checks& checks, const Path& path, const v1::GridRange& 
   return range;
 }
 
+void readConstraint(Checks& checks, const Path& path, const v1::ConstraintSolver& message,
+                    scene::Solver& solver) {
+  solver.bendConstraints = message.bend_constraints();
+  if (message.has_compliance())
+    solver.compliance = checks.number(path / "compliance", message.compliance(), limits::kCompliance);
+  if (message.has_iterations())
+    solver.iterations = checks.integer(path / "iterations", message.iterations(), 1, limits::kMaxIterations);
+  if (message.has_tolerance())
+    solver.tolerance = checks.number(path / "tolerance", message.tolerance(), limits::kTolerance);
+}
+
+scene::Solver toSolver(Checks& checks, const Path& path, const v1::Solver& message) {
+  scene::Solver solver;
+  if (message.has_constraint()) {
+    solver.kind = scene::SolverKind::constraint;
+    readConstraint(checks, path / "constraint", message.constraint(), solver);
+  } else if (message.has_acad()) {
+    const v1::AcadSolver& acad = message.acad();
+    const Path at = path / "acad";
+    solver.kind = scene::SolverKind::acad;
+    if (acad.has_activation())
+      solver.activation = checks.number(at / "activation", acad.activation(), limits::kActivation);
+    readConstraint(checks, at / "constraint", acad.constraint(), solver);
+  }
+  return solver;
+}
+
 scene::Cloth toCloth(Checks& checks, const Path& path, const v1::Cloth& message) {
   scene::Cloth cloth;
   cloth.name = checks.name(path / "name", message.name());
@@ -114,6 +141,7 @@ scene::Cloth toCloth(Checks& checks, const Path& path, const v1::Cloth& message)
   checks.count(path / "pins", static_cast<std::size_t>(message.pins_size()), 0, limits::kMaxPins);
   for (int i = 0; i < message.pins_size() && !checks.failed(); ++i)
     cloth.pins.push_back(toRange(checks, path.at("pins", i), message.pins(i), cloth.grid));
+  cloth.solver = toSolver(checks, path / "solver", message.solver());
   return cloth;
 }
 
@@ -176,6 +204,21 @@ void checkUnique(Checks& checks, std::string_view field, const std::vector<Named
     }
 }
 
+void checkSolvers(Checks& checks, const scene::Scene& scene) {
+  const Path root;
+  for (std::size_t i = 0; i < scene.cloths.size(); ++i) {
+    const scene::Cloth& cloth = scene.cloths[i];
+    if (cloth.solver.kind == scene::SolverKind::massSpring) continue;
+    const Path element = root.at("cloths", static_cast<int>(i));
+    if (scene.integrator != scene::Integrator::semiImplicitEuler)
+      checks.fail(element / "solver", "", "has constraints, which need INTEGRATOR_SEMI_IMPLICIT_EULER");
+    if (cloth.grid.nodeCount() > limits::kMaxConstraintNodes)
+      checks.fail(element / "solver", "",
+                  fmt::format("has constraints, for at most {} nodes; this cloth has {}",
+                              limits::kMaxConstraintNodes, cloth.grid.nodeCount()));
+  }
+}
+
 void checkNodeCount(Checks& checks, const scene::Scene& scene) {
   std::uint64_t nodes = 0;
   for (const scene::Cloth& cloth : scene.cloths) nodes += std::uint64_t{cloth.grid.rows} * cloth.grid.columns;
@@ -228,6 +271,7 @@ Result<scene::Scene> toScene(const v1::Scene& message) {
   checkUnique(checks, "cloths", scene.cloths);
   checkUnique(checks, "colliders", scene.colliders);
   checkNodeCount(checks, scene);
+  checkSolvers(checks, scene);
   if (!checks.failed())
     if (const auto complaint = instability(scene))
       checks.fail(root / "substeps", fmt::format("{}", scene.substeps), *complaint);

@@ -21,6 +21,28 @@ void writeRange(const scene::GridRange& range, v1::GridRange& message) {
   message.set_column_step(range.columnStep);
 }
 
+void writeConstraint(const scene::Solver& solver, v1::ConstraintSolver& message) {
+  message.set_bend_constraints(solver.bendConstraints);
+  if (solver.compliance) message.set_compliance(*solver.compliance);
+  message.set_iterations(solver.iterations);
+  message.set_tolerance(solver.tolerance);
+}
+
+void writeSolver(const scene::Solver& solver, v1::Solver& message) {
+  switch (solver.kind) {
+    case scene::SolverKind::massSpring:
+      message.mutable_mass_spring();
+      break;
+    case scene::SolverKind::constraint:
+      writeConstraint(solver, *message.mutable_constraint());
+      break;
+    case scene::SolverKind::acad:
+      message.mutable_acad()->set_activation(solver.activation);
+      writeConstraint(solver, *message.mutable_acad()->mutable_constraint());
+      break;
+  }
+}
+
 void writeCloth(const scene::Cloth& cloth, v1::Cloth& message) {
   message.set_name(cloth.name);
   v1::Grid& grid = *message.mutable_grid();
@@ -39,6 +61,7 @@ void writeCloth(const scene::Cloth& cloth, v1::Cloth& message) {
   message.set_friction(cloth.friction);
   message.set_thickness(cloth.thickness);
   for (const scene::GridRange& range : cloth.pins) writeRange(range, *message.add_pins());
+  writeSolver(cloth.solver, *message.mutable_solver());
 }
 
 void writeCollider(const scene::SphereCollider& collider, v1::Collider& message) {

@@ -7,6 +7,8 @@
 #include <cassert>
 #include <cmath>
 
+#include "server/reference/constraint_system.h"
+
 namespace clothstream::reference {
 namespace {
 
@@ -47,11 +49,12 @@ void ReferenceCloth::setParameters(const scene::Cloth& cloth) {
   cloth_.drag = cloth.drag;
   cloth_.lift = cloth.lift;
   cloth_.friction = cloth.friction;
+  cloth_.solver = cloth.solver;
 }
 
 void ReferenceCloth::accumulateSpringForces(std::span<Vec3> forces) const {
   for (const scene::SpringLink& link : links_) {
-    const scene::Spring& spring = scene::springOf(cloth_, link.kind);
+    const scene::Spring spring = scene::forceOf(cloth_, link.kind);
     const Vec3 d = positions_[link.b] - positions_[link.a];
     const double square = std::max(d.squaredNorm(), kTinyLengthSquared);
     const double elastic = spring.stiffness * (1 - double{link.restLength} / std::sqrt(square));
@@ -89,6 +92,8 @@ void ReferenceCloth::integrate(const scene::Environment& environment, scene::Int
   accumulateAirForces(environment, forces_);
   const Vec3 gravity = environment.gravity.cast<double>();
   const double damping = cloth_.damping;
+  const bool constrained = cloth_.solver.kind != scene::SolverKind::massSpring;
+  if (constrained) start_ = positions_;
   for (std::size_t i = 0; i < positions_.size(); ++i) {
     if (inverseMasses_[i] == 0) continue;
     const Vec3 acceleration = forces_[i] * inverseMasses_[i] + gravity - damping * velocities_[i];
@@ -99,6 +104,31 @@ void ReferenceCloth::integrate(const scene::Environment& environment, scene::Int
       velocities_[i] += h * acceleration;
       positions_[i] += h * velocities_[i];
     }
+  }
+  if (constrained) enforceConstraints(h);
+}
+
+void ReferenceCloth::enforceConstraints(double h) {
+  const scene::Solver& solver = cloth_.solver;
+  std::vector<Constraint> constraints;
+  for (const scene::SpringLink& link : links_) {
+    if (!scene::isConstraint(solver, link.kind)) continue;
+    const double rest = link.restLength, longest = rest * (1 + double{solver.activation});
+    const Vec3 d = start_[link.b] - start_[link.a];
+    if (solver.kind == scene::SolverKind::constraint) {
+      constraints.push_back({link.a, link.b, d.norm() - rest});
+    } else if ((d + h * (velocities_[link.b] - velocities_[link.a])).norm() > longest) {
+      const double excess = d.norm() - longest;
+      constraints.push_back({link.a, link.b, excess > 0 ? double{scene::kTakenBack} * excess : excess});
+    }
+  }
+  const ConstraintSystem system(constraints, start_, velocities_, inverseMasses_,
+                                scene::scaledCompliance(cloth_, h), h);
+  const std::vector<Vec3> moves =
+      system.moves(system.conjugateGradients(solver.iterations, double{solver.tolerance}).multipliers);
+  for (std::size_t i = 0; i < positions_.size(); ++i) {
+    positions_[i] += moves[i];
+    velocities_[i] += moves[i] / h;
   }
 }
 

@@ -20,13 +20,14 @@ struct Strain {
   double mean = 0;  // mean of the absolute values
 };
 
-// Nodes are row-major. Not thread-safe; after construction no member allocates but normals().
+// Nodes are row-major. Not thread-safe; after construction no member allocates but normals(), and
+// constraints.
 class ReferenceCloth {
  public:
   // At rest in its start pose. Springs are those of scene::springLinks().
   explicit ReferenceCloth(const scene::Cloth& cloth);
 
-  // Springs, damping, drag, lift, friction from now on; same grid, mass, pins.
+  // Springs, damping, drag, lift, friction, solver from now on; same grid, mass, pins.
   void setParameters(const scene::Cloth& cloth);
 
   std::span<Vec3> positions() { return positions_; }
@@ -42,7 +43,7 @@ class ReferenceCloth {
   void accumulateSpringForces(std::span<Vec3> forces) const;
   void accumulateAirForces(const scene::Environment& environment, std::span<Vec3> forces) const;
 
-  // Forces and one step of h seconds; colliders apart.
+  // Forces, one step of h seconds, and the cloth's constraints; colliders apart.
   void integrate(const scene::Environment& environment, scene::Integrator integrator, double h);
 
   // Nodes within radius + thickness of the centre go to that surface and lose what they move into it; the
@@ -59,9 +60,12 @@ class ReferenceCloth {
   Strain strain() const;
 
  private:
+  void enforceConstraints(double h);
+
   scene::Cloth cloth_;
   std::vector<scene::SpringLink> links_;
   std::vector<Vec3> positions_, velocities_, forces_;
+  std::vector<Vec3> start_;  // of the substep, where there are constraints
   std::vector<double> inverseMasses_;
 };
 

@@ -44,6 +44,32 @@ struct Grid {
   std::uint32_t nodeCount() const { return rows * columns; }
 };
 
+enum class SolverKind : std::uint8_t {
+  massSpring,  // every spring is a force
+  constraint,  // structural and shear springs keep their length: implicit constraint enforcement, [Va21] Eq.
+               // 3-11
+  acad,  // they are forces until a substep would stretch them too far: then constraints for that substep,
+         // [Va21] 3.3
+};
+
+// What turns a cloth's springs into motion. All but `kind` are of solvers with constraints.
+struct Solver {
+  SolverKind kind = SolverKind::massSpring;
+  bool bendConstraints = false;     // bend springs as well: the paper's "all springs"
+  std::optional<float> compliance;  // m/N; absent: kRelativeCompliance of what a node gives way in a substep
+  std::uint32_t iterations = 20;    // of conjugate gradients in a substep, at most
+  float tolerance = 0.001f;         // of the residual's norm, relative to where it started
+  // acad: the stretch, as a part of its length, beyond which no substep is to take a spring.
+  float activation = 0.1f;
+};
+
+// acad: the part of what a spring is stretched too far already that a substep takes back (Baumgarte's
+// stabilisation). All of it would give the nodes that speed.
+inline constexpr float kTakenBack = 0.15f;
+
+// Of h^2 / m, the compliance with which the number of iterations hardly depends on the cloth's size.
+inline constexpr float kRelativeCompliance = 0.01f;
+
 struct Cloth {
   std::string name;
   Grid grid;
@@ -54,6 +80,9 @@ struct Cloth {
   float friction = 0.3f;     // Coulomb, dimensionless
   float thickness = 0.005f;  // m kept from a collider's surface
   std::vector<GridRange> pins;
+  Solver solver;
+
+  float nodeMass() const { return mass / static_cast<float>(grid.nodeCount()); }  // kg
 };
 
 struct MotionKey {

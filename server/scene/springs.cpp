@@ -29,6 +29,21 @@ const Spring& springOf(const Cloth& cloth, SpringKind kind) {
                                         : cloth.bend;
 }
 
+bool isConstraint(const Solver& solver, SpringKind kind) {
+  return solver.kind != SolverKind::massSpring && (kind != SpringKind::bend || solver.bendConstraints);
+}
+
+Spring forceOf(const Cloth& cloth, SpringKind kind) {
+  Spring spring = springOf(cloth, kind);
+  if (cloth.solver.kind == SolverKind::constraint && isConstraint(cloth.solver, kind)) spring.stiffness = 0;
+  return spring;
+}
+
+double scaledCompliance(const Cloth& cloth, double h) {
+  if (cloth.solver.compliance) return *cloth.solver.compliance / (h * h);
+  return double{kRelativeCompliance} / cloth.nodeMass();
+}
+
 SpringAdjacency springAdjacency(std::span<const SpringLink> links, std::uint32_t nodeCount) {
   SpringAdjacency adjacency{std::vector<std::uint32_t>(nodeCount + 1, 0),
                             std::vector<std::uint32_t>(2 * links.size())};

@@ -25,6 +25,16 @@ std::vector<SpringLink> springLinks(const Cloth& cloth);
 
 const Spring& springOf(const Cloth& cloth, SpringKind kind);
 
+// Whether the cloth's solver keeps springs of this kind at their length, always or when they are stretched
+// too far.
+bool isConstraint(const Solver& solver, SpringKind kind);
+
+// As a force: without stiffness where it always is a constraint. Constraints keep their damping.
+Spring forceOf(const Cloth& cloth, SpringKind kind);
+
+// Of the cloth's constraints, 1/kg: what stands on the diagonal of their system in a substep of h seconds.
+double scaledCompliance(const Cloth& cloth, double h);
+
 // Which springs meet at each node, in the order of the list.
 struct SpringAdjacency {
   std::vector<std::uint32_t> first;    // a node's first place in `springs`; one more at the end

@@ -22,6 +22,8 @@
 #include <algorithm>
 #include <vector>
 
+#include "server/scene/springs.h"
+
 namespace clothstream::scene {
 namespace {
 
@@ -101,8 +103,13 @@ bool explicitStable(const Cloth& cloth, const SpringCounts& counts, double air, 
   return 2 * deficits * perMass <= cloth.damping && h * (2 * dashpots * perMass + cloth.damping + air) < 2;
 }
 
-// Fewest substeps from `atLeast` on; both criteria only get easier with smaller steps. 0: none.
-std::uint32_t stableSubsteps(const Scene& scene, const Cloth& cloth, std::uint32_t atLeast) {
+// Fewest substeps from `atLeast` on; both criteria only get easier with smaller steps. 0: none. Constraints
+// are solved for implicitly: they set no bound, and hold those springs that become constraints when they
+// stretch too far.
+std::uint32_t stableSubsteps(const Scene& scene, Cloth cloth, std::uint32_t atLeast) {
+  if (isConstraint(cloth.solver, SpringKind::structural))
+    cloth.structural.stiffness = cloth.shear.stiffness = 0;
+  if (isConstraint(cloth.solver, SpringKind::bend)) cloth.bend.stiffness = 0;
   const double air = airDamping(cloth, scene.environment);
   const std::vector<SpringCounts> combinations = springCounts(cloth);
   const auto stable = scene.integrator == Integrator::semiImplicitEuler ? semiImplicitStable : explicitStable;

@@ -14,6 +14,7 @@
 #include "kernels/advance_mass_spring.h"
 #include "kernels/compute_normals.h"
 #include "kernels/hash_state.h"
+#include "server/simulation/constraint_stage.h"
 #include "server/vulkan/kernel.h"
 
 namespace clothstream::simulation {
@@ -29,7 +30,7 @@ constexpr std::size_t kTexelBytes = sizeof(shared::vec4);
 struct Cut {
   std::uint32_t rowsPerInvocation;
   std::uint32_t workgroupSize;
-  std::vector<shared::TileRecord> tiles;
+  Tiles tiles;
 };
 
 // Software devices pay for every load, so that an invocation does several rows; GPUs pay for every idle lane.
@@ -38,10 +39,10 @@ Cut cutScene(const vulkan::Device& device, const scene::Scene& scene, const Simu
   if (cut.rowsPerInvocation == 0) cut.rowsPerInvocation = device.isSoftware() ? 4 : 1;
   if (cut.workgroupSize == 0) cut.workgroupSize = 64;
   cut.workgroupSize = std::min(cut.workgroupSize, device.limits().maxWorkgroupInvocations);
-  cut.tiles = tileRecords(scene.cloths, cut.rowsPerInvocation, cut.workgroupSize);
-  while (cut.tiles.size() > device.limits().maxDispatchX) {
+  cut.tiles = makeTiles(scene.cloths, cut.rowsPerInvocation, cut.workgroupSize);
+  while (cut.tiles.records.size() > device.limits().maxDispatchX) {
     cut.rowsPerInvocation *= 2;
-    cut.tiles = tileRecords(scene.cloths, cut.rowsPerInvocation, cut.workgroupSize);
+    cut.tiles = makeTiles(scene.cloths, cut.rowsPerInvocation, cut.workgroupSize);
   }
   return cut;
 }
@@ -178,6 +179,8 @@ struct ClothSimulation::Pipeline {
   void start(vulkan::Recorder& recorder);
   void recordInputs(vulkan::Recorder& recorder, const TickInputs& inputs);
   void recordSubsteps(vulkan::Recorder& recorder, const TickInputs& inputs);
+  void recordAdvance(vulkan::Recorder& recorder, const TickInputs& inputs, bool spheres,
+                     std::uint32_t firstTile, std::size_t tiles, shared::AdvancePush push);
   void recordStatus(vulkan::Recorder& recorder);
   void writeState(const NodeState& state);
   void recordUploadedState(vulkan::Recorder& recorder);
@@ -186,7 +189,8 @@ struct ClothSimulation::Pipeline {
   std::span<const std::uint32_t> advanceSpirv;
   scene::Integrator integrator;
   std::uint32_t substeps;
-  float substepSeconds, tickRate;
+  double substepSeconds;
+  float tickRate;
   std::vector<std::uint32_t> offsets;
   std::uint32_t nodes;
   std::vector<shared::ClothRecord> records;
@@ -195,6 +199,7 @@ struct ClothSimulation::Pipeline {
   Buffers buffers;
   std::array<std::unique_ptr<Stage>, AdvanceVariant::kCount> advances;  // made when they are first needed
   Stage normals, hash;
+  std::unique_ptr<ConstraintStage> constraints;  // where there are any
 
   bool started = false;       // the start state and the tiles are on the device
   std::uint32_t present = 0;  // which state buffers hold the state
@@ -209,19 +214,28 @@ ClothSimulation::Pipeline::Pipeline(const vulkan::Device& on, const scene::Scene
                        : options.advanceKernel),
       integrator(scene.integrator),
       substeps(scene.substeps),
-      substepSeconds(static_cast<float>(scene.substepSeconds())),
+      substepSeconds(scene.substepSeconds()),
       tickRate(static_cast<float>(scene.simulationRate)),
       offsets(simulation::clothOffsets(scene.cloths)),
       nodes(offsets.back()),
-      records(clothRecords(scene.cloths)),
+      records(clothRecords(scene.cloths, substepSeconds)),
       masses(inverseMasses(scene.cloths)),
       cut(cutScene(on, scene, options)),
-      buffers(on, nodes, records.size(), cut.tiles.size()),
+      buffers(on, nodes, records.size(), cut.tiles.records.size()),
       normals(makeNormals(on, buffers, cut)),
       hash(makeHash(on, buffers, cut)) {
-  std::memcpy(buffers.tileUpload.mapped().data(), cut.tiles.data(), buffers.tiles.bytes());
+  std::memcpy(buffers.tileUpload.mapped().data(), cut.tiles.records.data(), buffers.tiles.bytes());
   std::memcpy(buffers.inputs[slot].mapped().data(), records.data(), buffers.cloths.bytes());
   writeState(restState(scene.cloths));
+  const ConstraintTables tables = constraintTables(scene.cloths);
+  if (!tables.links.empty())
+    constraints =
+        std::make_unique<ConstraintStage>(on, tables,
+                                          StateBuffers{buffers.cloths,
+                                                       buffers.spheres,
+                                                       {&buffers.positions[0], &buffers.positions[1]},
+                                                       {&buffers.velocities[0], &buffers.velocities[1]}},
+                                          options.workgroupSize);
   for (const bool spheres : {false, true}) advance(variantOf(records, scene.environment.airDensity, spheres));
 }
 
@@ -254,6 +268,7 @@ void ClothSimulation::Pipeline::start(vulkan::Recorder& recorder) {
   recorder.copy(buffers.tileUpload, buffers.tiles, buffers.tiles.bytes());
   recorder.copy(buffers.inputs[slot], buffers.cloths, buffers.cloths.bytes());
   recordUploadedState(recorder);
+  if (constraints) constraints->recordTables(recorder);
   recorder.barrier();
 }
 
@@ -275,20 +290,42 @@ void ClothSimulation::Pipeline::recordInputs(vulkan::Recorder& recorder, const T
   recorder.fill(buffers.status, 0, buffers.status.bytes());
 }
 
+void ClothSimulation::Pipeline::recordAdvance(vulkan::Recorder& recorder, const TickInputs& inputs,
+                                              bool spheres, std::uint32_t firstTile, std::size_t tiles,
+                                              shared::AdvancePush push) {
+  if (tiles == 0) return;
+  push.firstTile = firstTile;
+  const Stage& stage = advance(variantOf(records, inputs.environment.airDensity, spheres));
+  recorder.dispatch(stage.from[present], push, std::uint64_t{tiles} * cut.workgroupSize);
+}
+
 void ClothSimulation::Pipeline::recordSubsteps(vulkan::Recorder& recorder, const TickInputs& inputs) {
   const scene::Environment& environment = inputs.environment;
-  const Stage& stage = advance(variantOf(records, environment.airDensity, !inputs.spheres.empty()));
-  shared::AdvancePush push{.gravityStep = texel(environment.gravity, substepSeconds),
+  const std::uint32_t free = cut.tiles.withoutConstraints;
+  std::uint32_t iterations = 0;
+  for (const shared::ClothRecord& record : records)
+    iterations = std::max(iterations, static_cast<std::uint32_t>(record.solver.y));
+  shared::AdvancePush push{.gravityStep = texel(environment.gravity, static_cast<float>(substepSeconds)),
                            .windAir = texel(environment.wind, environment.airDensity / 6),
                            .sphereCount = static_cast<std::uint32_t>(inputs.spheres.size()),
                            .sphereProgress = 0,
                            .tickRate = tickRate,
-                           .reserved = 0};
+                           .firstTile = 0};
   recorder.beginStage("advance");
   for (std::uint32_t substep = 0; substep < substeps; ++substep) {
     push.sphereProgress = static_cast<float>(substep + 1) / static_cast<float>(substeps);
     recorder.barrier();
-    recorder.dispatch(stage.from[present], push, std::uint64_t{cut.tiles.size()} * cut.workgroupSize);
+    recordAdvance(recorder, inputs, push.sphereCount > 0, 0, free, push);
+    // Constrained cloths collide after their constraints.
+    recordAdvance(recorder, inputs, false, free, cut.tiles.records.size() - free, push);
+    if (constraints)
+      constraints->record(recorder, present, iterations,
+                          {.count = 0,
+                           .sphereCount = push.sphereCount,
+                           .sphereProgress = push.sphereProgress,
+                           .tickRate = tickRate,
+                           .substepSeconds = static_cast<float>(substepSeconds),
+                           .substepRate = tickRate * static_cast<float>(substeps)});
     present = 1 - present;
   }
 }
@@ -300,6 +337,7 @@ void ClothSimulation::Pipeline::recordStatus(vulkan::Recorder& recorder) {
   recorder.barrier();
   recorder.copy(buffers.status, buffers.statusReadback, sizeof(shared::StatusRecord), 0,
                 slot * sizeof(shared::StatusRecord));
+  if (constraints) constraints->recordReport(recorder);
 }
 
 ClothSimulation::ClothSimulation(const vulkan::Device& device, const scene::Scene& scene,
@@ -309,7 +347,7 @@ ClothSimulation::ClothSimulation(const vulkan::Device& device, const scene::Scen
 ClothSimulation::~ClothSimulation() = default;
 
 void ClothSimulation::setCloths(std::span<const scene::Cloth> cloths) {
-  std::vector<shared::ClothRecord> records = clothRecords(cloths);
+  std::vector<shared::ClothRecord> records = clothRecords(cloths, pipeline_->substepSeconds);
   assert(records.size() == pipeline_->records.size());
   assert(std::equal(records.begin(), records.end(), pipeline_->records.begin(),
                     [](const shared::ClothRecord& a, const shared::ClothRecord& b) {
@@ -330,7 +368,7 @@ void ClothSimulation::recordNormals(vulkan::Recorder& recorder) {
   pipeline_->start(recorder);
   recorder.beginStage("normals");
   recorder.dispatch(pipeline_->normals.from[pipeline_->present],
-                    std::uint64_t{pipeline_->cut.tiles.size()} * pipeline_->cut.workgroupSize);
+                    std::uint64_t{pipeline_->cut.tiles.records.size()} * pipeline_->cut.workgroupSize);
 }
 
 TickStatus ClothSimulation::status() const {
@@ -387,6 +425,10 @@ void ClothSimulation::recordRestoreState(vulkan::Recorder& recorder, const State
   pipeline_->writeState(unpack(snapshot));
   recorder.beginStage("state");
   pipeline_->recordUploadedState(recorder);
+}
+
+std::span<const shared::SolveRecord> ClothSimulation::solves() const {
+  return pipeline_->constraints ? pipeline_->constraints->report() : std::span<const shared::SolveRecord>();
 }
 
 std::uint32_t ClothSimulation::nodeCount() const {

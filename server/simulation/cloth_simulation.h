@@ -64,6 +64,8 @@ class ClothSimulation {
 
   // Of the last recorded tick, once it is complete.
   TickStatus status() const;
+  // Of its last substep: one a cloth with constraints, in their order.
+  std::span<const shared::SolveRecord> solves() const;
 
   // Keeps the present state on the device; goes back to what was kept last (the start, if nothing was).
   // Stage "checkpoint".

@@ -7,12 +7,21 @@
 #include <cmath>
 #include <cstddef>
 
+#include "server/scene/springs.h"
+
 namespace clothstream::simulation {
 namespace {
 
 // As kernels store numbers, so that a state at rest has been through them already.
 float snapTiny(float x) {
   return std::abs(x) < 1e-20f ? 0.0f : x;
+}
+
+// Where springs become constraints, how much of what is too much is taken back; the third tells from those
+// that always are.
+shared::vec4 limitsOf(const scene::Solver& solver) {
+  if (solver.kind != scene::SolverKind::acad) return {0, 1, 0, 0};
+  return {solver.activation, scene::kTakenBack, 1, 0};
 }
 
 }  // namespace
@@ -23,7 +32,7 @@ std::vector<std::uint32_t> clothOffsets(std::span<const scene::Cloth> cloths) {
   return offsets;
 }
 
-std::vector<shared::ClothRecord> clothRecords(std::span<const scene::Cloth> cloths) {
+std::vector<shared::ClothRecord> clothRecords(std::span<const scene::Cloth> cloths, double substepSeconds) {
   std::vector<shared::ClothRecord> records;
   std::uint32_t firstNode = 0;
   for (const scene::Cloth& cloth : cloths) {
@@ -36,29 +45,41 @@ std::vector<shared::ClothRecord> clothRecords(std::span<const scene::Cloth> clot
         {.place = {whole(firstNode & 0xFFFF), whole(firstNode >> 16), whole(cloth.grid.rows),
                    whole(cloth.grid.columns)},
          .spacing = {spacing.column, spacing.row, spacing.diagonal, cloth.damping},
-         .stiffness = {cloth.structural.stiffness, cloth.shear.stiffness, cloth.bend.stiffness,
-                       cloth.friction},
+         .stiffness = {scene::forceOf(cloth, scene::SpringKind::structural).stiffness,
+                       scene::forceOf(cloth, scene::SpringKind::shear).stiffness,
+                       scene::forceOf(cloth, scene::SpringKind::bend).stiffness, cloth.friction},
          .damping = {cloth.structural.damping, cloth.shear.damping, cloth.bend.damping, cloth.thickness},
-         .air = {cloth.drag, cloth.lift, 0, 0}});
+         .air = {cloth.drag, cloth.lift, 0, 0},
+         .solver = {static_cast<float>(scene::scaledCompliance(cloth, substepSeconds)),
+                    static_cast<float>(cloth.solver.iterations),
+                    cloth.solver.tolerance * cloth.solver.tolerance, 0},
+         .limits = limitsOf(cloth.solver)});
     firstNode += cloth.grid.nodeCount();
   }
   return records;
 }
 
-std::vector<shared::TileRecord> tileRecords(std::span<const scene::Cloth> cloths,
-                                            std::uint32_t rowsPerInvocation, std::uint32_t workgroupSize) {
+Tiles makeTiles(std::span<const scene::Cloth> cloths, std::uint32_t rowsPerInvocation,
+                std::uint32_t workgroupSize) {
   assert(rowsPerInvocation > 0 && workgroupSize > 0);
-  std::vector<shared::TileRecord> tiles;
-  for (std::uint32_t cloth = 0; cloth < cloths.size(); ++cloth) {
-    const scene::Grid& grid = cloths[cloth].grid;
-    const std::uint32_t strips = (grid.rows + rowsPerInvocation - 1) / rowsPerInvocation;
-    const std::uint64_t invocations = std::uint64_t{strips} * grid.columns;
-    for (std::uint64_t first = 0; first < invocations; first += workgroupSize)
-      tiles.push_back(
-          {{static_cast<float>(cloth),
-            static_cast<float>(static_cast<std::uint32_t>(first / grid.columns) * rowsPerInvocation),
-            static_cast<float>(first % grid.columns), 0}});
-  }
+  Tiles tiles;
+  const auto append = [&](scene::SolverKind kind) {
+    for (std::uint32_t cloth = 0; cloth < cloths.size(); ++cloth) {
+      if (cloths[cloth].solver.kind != kind) continue;
+      const scene::Grid& grid = cloths[cloth].grid;
+      const std::uint32_t strips = (grid.rows + rowsPerInvocation - 1) / rowsPerInvocation;
+      const std::uint64_t invocations = std::uint64_t{strips} * grid.columns;
+      for (std::uint64_t first = 0; first < invocations; first += workgroupSize)
+        tiles.records.push_back(
+            {{static_cast<float>(cloth),
+              static_cast<float>(static_cast<std::uint32_t>(first / grid.columns) * rowsPerInvocation),
+              static_cast<float>(first % grid.columns), 0}});
+    }
+  };
+  append(scene::SolverKind::massSpring);
+  tiles.withoutConstraints = static_cast<std::uint32_t>(tiles.records.size());
+  append(scene::SolverKind::constraint);
+  append(scene::SolverKind::acad);
   return tiles;
 }
 

@@ -23,11 +23,16 @@ struct MovingSphere {
 // First node of each cloth, and at the end the number of nodes: clothCount + 1 numbers.
 std::vector<std::uint32_t> clothOffsets(std::span<const scene::Cloth> cloths);
 
-std::vector<shared::ClothRecord> clothRecords(std::span<const scene::Cloth> cloths);
+std::vector<shared::ClothRecord> clothRecords(std::span<const scene::Cloth> cloths, double substepSeconds);
 
-// One tile a workgroup: together they cover every node once, `rowsPerInvocation` rows an invocation.
-std::vector<shared::TileRecord> tileRecords(std::span<const scene::Cloth> cloths,
-                                            std::uint32_t rowsPerInvocation, std::uint32_t workgroupSize);
+// One tile a workgroup: together they cover every node once, `rowsPerInvocation` rows an invocation. Those of
+// cloths without constraints come first.
+struct Tiles {
+  std::vector<shared::TileRecord> records;
+  std::uint32_t withoutConstraints = 0;  // of the records
+};
+Tiles makeTiles(std::span<const scene::Cloth> cloths, std::uint32_t rowsPerInvocation,
+                std::uint32_t workgroupSize);
 
 shared::SphereRecord sphereRecord(const MovingSphere& sphere);
 

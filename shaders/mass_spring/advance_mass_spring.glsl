@@ -48,7 +48,7 @@ void store(uint index, Node node) {
 }
 
 void main() {
-  Strip strip = locateStrip();
+  Strip strip = locateStrip(push.firstTile);
   if (strip.row >= strip.rows) {
     return;
   }

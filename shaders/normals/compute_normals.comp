@@ -25,7 +25,7 @@ vec3 quadrant(vec3 p, vec3 first, vec3 diagonal, vec3 second) {
 // Beyond an edge the window repeats the edge: such a quadrant has no area, and adds exactly zero. Writes
 // cannot race: each node belongs to one invocation.
 void main() {
-  Strip strip = locateStrip();
+  Strip strip = locateStrip(0);
   if (strip.row >= strip.rows) {
     return;
   }

@@ -22,10 +22,10 @@ struct Strip {
   uint column;
 };
 
-Strip locateStrip() {
-  vec4 tile = texelFetch(tiles, int(gl_WorkGroupID.x));
+Strip locateStrip(uint firstTile) {
+  vec4 tile = texelFetch(tiles, int(firstTile + gl_WorkGroupID.x));
   Strip strip;
-  strip.cloth = 5 * int(tile.x);
+  strip.cloth = CLOTHSTREAM_CLOTH_TEXELS * int(tile.x);
   vec4 place = texelFetch(cloths, strip.cloth);
   strip.firstNode = uint(place.x) + (uint(place.y) << 16);
   strip.rows = uint(place.z);

@@ -10,19 +10,52 @@ CLOTHSTREAM_SHARED_BEGIN
 // Kernels read these tables as texels of four floats, which costs a software device a tenth of storage loads.
 // Whole numbers are floats too, exact below 2^24.
 
-// One cloth, five texels: where its nodes lie in the scene's buffers, and its material. Row-major, SI units.
+// One cloth: where its nodes lie in the scene's buffers, its material and its solver. Row-major, SI units.
+#define CLOTHSTREAM_CLOTH_TEXELS 7
 struct ClothRecord {
   vec4 place;      // first node modulo 2^16, first node / 2^16, rows, columns
   vec4 spacing;    // of columns, of rows, along the diagonal; damping
   vec4 stiffness;  // structural, shear, bend; friction
   vec4 damping;    // structural, shear, bend; thickness
   vec4 air;        // drag, lift
+  vec4 solver;     // compliance / h^2, iterations, square of the tolerance
+  vec4 limits;     // stretch that springs are held at; part of more that is taken back; 0: always
 };
 
 // One workgroup of a kernel that walks down columns: its first invocation starts at (row, column) of the
 // cloth. The others follow along the row, and from its end at the start of the next strip of rows.
 struct TileRecord {
   vec4 start;  // cloth, row, column
+};
+
+// One cloth whose springs are constraints, one workgroup.
+#define CLOTHSTREAM_SYSTEM_TEXELS 2
+struct SystemRecord {
+  vec4 links;  // the first modulo 2^16, the first / 2^16, how many; the cloth
+  vec4 nodes;  // the first, how many
+};
+
+// A constraint: its two nodes in the scene, its length.
+struct LinkRecord {
+  vec4 ends;  // a, b, rest length; the cloth
+};
+
+// Which constraints meet at a node. The lists that it points to hold, four a texel, the number of a
+// constraint of the cloth plus one, negative where the node is its first end; 0 fills the last texel.
+struct IncidenceRecord {
+  vec4 list;  // the first texel modulo 2^16, the first / 2^16, how many texels; system + 1, 0: none
+};
+
+// Partial sums of a dot product.
+#define CLOTHSTREAM_SOLVE_LANES 256
+
+// What a solve says of itself, and what it goes on from in its next dispatch.
+struct SolveRecord {
+  uint32_t iterations;
+  float residual;  // its norm, relative to where it started
+  float start;     // square of the residual's norm then, and now
+  float square;
+  uint32_t constraints;  // active ones
 };
 
 // A sphere over one tick, two texels: where it starts, and how far it moves until the tick's end.
@@ -38,7 +71,22 @@ struct AdvancePush {
   uint32_t sphereCount;
   float sphereProgress;  // of the tick's motion, at the end of this substep
   float tickRate;        // 1/s
-  uint32_t reserved;
+  uint32_t firstTile;
+};
+
+struct ConstraintPush {
+  uint32_t count;  // links, or nodes
+  uint32_t sphereCount;
+  float sphereProgress;  // as above
+  float tickRate;        // 1/s
+  float substepSeconds;
+  float substepRate;  // 1/s
+};
+
+struct SolvePush {
+  uint32_t firstIteration;  // of this dispatch; 0 begins the solve
+  uint32_t endIteration;
+  uint32_t firstSystem;
 };
 
 struct HashPush {
@@ -57,9 +105,12 @@ CLOTHSTREAM_SHARED_END
 
 #ifdef __cplusplus
 namespace clothstream::shared {
-static_assert(sizeof(ClothRecord) == 80 && offsetof(ClothRecord, spacing) == 16 &&
-              offsetof(ClothRecord, stiffness) == 32 && offsetof(ClothRecord, damping) == 48 &&
-              offsetof(ClothRecord, air) == 64);
+static_assert(sizeof(ClothRecord) == CLOTHSTREAM_CLOTH_TEXELS * sizeof(vec4) &&
+              offsetof(ClothRecord, spacing) == 16 && offsetof(ClothRecord, stiffness) == 32 &&
+              offsetof(ClothRecord, damping) == 48 && offsetof(ClothRecord, air) == 64 &&
+              offsetof(ClothRecord, solver) == 80 && offsetof(ClothRecord, limits) == 96);
+static_assert(sizeof(SystemRecord) == CLOTHSTREAM_SYSTEM_TEXELS * sizeof(vec4));
+static_assert(sizeof(SolveRecord) == 20 && sizeof(ConstraintPush) == 24);
 static_assert(sizeof(TileRecord) == 16);
 static_assert(sizeof(SphereRecord) == 32 && offsetof(SphereRecord, motionFriction) == 16);
 static_assert(sizeof(AdvancePush) == 48 && offsetof(AdvancePush, windAir) == 16 &&

@@ -2,6 +2,9 @@
 // Scene files: every field survives, and what is wrong is said with the file's name.
 #include <filesystem>
 #include <fstream>
+#include <set>
+#include <string>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <google/protobuf/descriptor.h>
@@ -23,7 +26,7 @@ using testing::StartsWith;
 
 constexpr const char* kEveryField = R"json({
   "name": "every_field", "description": "All of it", "simulationRate": 240, "streamRate": 120, "substeps": 40,
-  "integrator": "INTEGRATOR_EXPLICIT_EULER",
+  "integrator": "INTEGRATOR_SEMI_IMPLICIT_EULER",
   "environment": {"gravity": {"x": 0.5, "y": -9.5, "z": 0.25}, "wind": {"x": 1, "y": 2, "z": 3}, "airDensity": 1.25},
   "cloths": [{
     "name": "sheet",
@@ -33,7 +36,20 @@ constexpr const char* kEveryField = R"json({
     "structural": {"stiffness": 20, "damping": 0.5}, "shear": {"stiffness": 10, "damping": 0.25},
     "bend": {"stiffness": 5, "damping": 0.125},
     "damping": 3, "drag": 0.5, "lift": 0.25, "friction": 0.75, "thickness": 0.0625,
-    "pins": [{"firstRow": 1, "lastRow": 5, "rowStep": 2, "firstColumn": 1, "lastColumn": 4, "columnStep": 3}]
+    "pins": [{"firstRow": 1, "lastRow": 5, "rowStep": 2, "firstColumn": 1, "lastColumn": 4, "columnStep": 3}],
+    "solver": {"massSpring": {}}
+  }, {
+    "name": "held", "grid": {"rows": 2, "columns": 2, "width": 1, "height": 1,
+                             "pose": {"position": {}, "orientation": {"w": 1}}},
+    "mass": 1, "structural": {}, "shear": {}, "bend": {}, "damping": 0, "drag": 0, "lift": 0, "friction": 0.5, "thickness": 0.25,
+    "solver": {"constraint": {"bendConstraints": true, "compliance": 0.0625, "iterations": 30, "tolerance": 0.25}}
+  }, {
+    "name": "adaptive", "grid": {"rows": 2, "columns": 2, "width": 1, "height": 1,
+                                 "pose": {"position": {}, "orientation": {"w": 1}}},
+    "mass": 1, "structural": {}, "shear": {}, "bend": {}, "damping": 0, "drag": 0, "lift": 0, "friction": 0.5,
+    "thickness": 0.25,
+    "solver": {"acad": {"activation": 0.25,
+                        "constraint": {"bendConstraints": true, "compliance": 0, "iterations": 30, "tolerance": 0}}}
   }],
   "colliders": [{
     "name": "ball", "sphere": {"radius": 0.5},
@@ -45,21 +61,39 @@ constexpr const char* kEveryField = R"json({
   "stream": {"maxError": 0.001, "normals": "NORMALS_OCTAHEDRAL"}
 })json";
 
-// So that a field that is added to the proto cannot be forgotten above. The first key's time must be 0.
-void expectEveryFieldSet(const google::protobuf::Message& message) {
-  const auto* reflection = message.GetReflection();
-  const auto* descriptor = message.GetDescriptor();
+using Names = std::set<std::string>;
+
+// Of every field of a message of this kind, and of the messages in it.
+void addFields(const google::protobuf::Descriptor* descriptor, Names& names) {
   for (int i = 0; i < descriptor->field_count(); ++i) {
     const auto* field = descriptor->field(i);
-    if (field->is_repeated()) {
-      const int size = reflection->FieldSize(message, field);
-      EXPECT_GT(size, 0) << field->full_name();
-      if (size > 0) expectEveryFieldSet(reflection->GetRepeatedMessage(message, field, size - 1));
-    } else {
-      EXPECT_TRUE(reflection->HasField(message, field)) << field->full_name();
-      if (field->message_type() != nullptr) expectEveryFieldSet(reflection->GetMessage(message, field));
-    }
+    names.insert(field->full_name());
+    if (field->message_type() != nullptr) addFields(field->message_type(), names);
   }
+}
+
+// Of those that are set.
+void addSetFields(const google::protobuf::Message& message, Names& names) {
+  const auto* reflection = message.GetReflection();
+  std::vector<const google::protobuf::FieldDescriptor*> fields;
+  reflection->ListFields(message, &fields);
+  for (const auto* field : fields) {
+    names.insert(field->full_name());
+    if (field->message_type() == nullptr) continue;
+    if (field->is_repeated())
+      for (int i = 0; i < reflection->FieldSize(message, field); ++i)
+        addSetFields(reflection->GetRepeatedMessage(message, field, i), names);
+    else
+      addSetFields(reflection->GetMessage(message, field), names);
+  }
+}
+
+// So that a field that is added to the proto cannot be forgotten above.
+void expectEveryFieldSet(const v1::Scene& message) {
+  Names all, set;
+  addFields(message.GetDescriptor(), all);
+  addSetFields(message, set);
+  EXPECT_THAT(set, testing::ContainerEq(all));
 }
 
 v1::Scene messageOf(const char* json) {

@@ -226,6 +226,26 @@ const BadScene kBadScenes[] = {
        collider(s).mutable_motion()->mutable_keys(0)->mutable_position()->set_y(2000);
      }},
     {"stream.maxError = 1:", [](v1::Scene& s) { s.mutable_stream()->set_max_error(1); }, "from 1e-05 to 0.1"},
+    {"cloths[0].solver.constraint.iterations = 0:",
+     [](v1::Scene& s) { cloth(s).mutable_solver()->mutable_constraint()->set_iterations(0); },
+     "from 1 to 10000"},
+    {"cloths[0].solver.constraint.tolerance = 2:",
+     [](v1::Scene& s) { cloth(s).mutable_solver()->mutable_constraint()->set_tolerance(2); }, "from 0 to 1"},
+    {"cloths[0].solver.constraint.compliance = -1:",
+     [](v1::Scene& s) { cloth(s).mutable_solver()->mutable_constraint()->set_compliance(-1); },
+     "from 0 to 1"},
+    {"cloths[0].solver.acad.activation = 11:",
+     [](v1::Scene& s) { cloth(s).mutable_solver()->mutable_acad()->set_activation(11); }, "from 0 to 10"},
+    {"cloths[0].solver.acad.constraint.iterations = 0:",
+     [](v1::Scene& s) {
+       cloth(s).mutable_solver()->mutable_acad()->mutable_constraint()->set_iterations(0);
+     }},
+    {"cloths[0].solver: has constraints,",
+     [](v1::Scene& s) {
+       cloth(s).mutable_solver()->mutable_constraint();
+       s.set_integrator(v1::INTEGRATOR_EXPLICIT_EULER);
+     },
+     "INTEGRATOR_SEMI_IMPLICIT_EULER"},
     {"stream.normals = 9:",
      [](v1::Scene& s) { s.mutable_stream()->set_normals(static_cast<v1::Normals>(9)); }},
     // 4 springs of 4000 N/m at nodes of 0.03 kg: h < 2 / sqrt(2 * 4 * 4000 / 0.03) s = 1 / 516.4, 7.2 a tick.

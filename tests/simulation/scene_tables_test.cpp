@@ -15,7 +15,8 @@ std::vector<int> visitsOf(const std::vector<scene::Cloth>& cloths, std::uint32_t
                           std::uint32_t workgroupSize) {
   const std::vector<std::uint32_t> offsets = simulation::clothOffsets(cloths);
   std::vector<int> visits(offsets.back());
-  for (const shared::TileRecord& tile : simulation::tileRecords(cloths, rowsPerInvocation, workgroupSize))
+  for (const shared::TileRecord& tile :
+       simulation::makeTiles(cloths, rowsPerInvocation, workgroupSize).records)
     for (std::uint32_t lane = 0; lane < workgroupSize; ++lane) {
       const auto cloth = static_cast<std::uint32_t>(tile.start.x);
       const scene::Grid& grid = cloths[cloth].grid;
@@ -47,7 +48,7 @@ TEST(SceneTables, pinnedNodesHaveNoInverseMass) {
 
 TEST(SceneTables, firstNodesOfLargeScenesAreExact) {
   const std::vector<scene::Cloth> cloths{calmCloth(5000, 5003), calmCloth(2, 2)};
-  const shared::ClothRecord record = simulation::clothRecords(cloths).back();
+  const shared::ClothRecord record = simulation::clothRecords(cloths, 0.001).back();
   EXPECT_EQ(static_cast<std::uint32_t>(record.place.x) + (static_cast<std::uint32_t>(record.place.y) << 16),
             5000u * 5003u);
 }

@@ -48,6 +48,7 @@ class Running {
   simulation::StateSnapshot save();
   simulation::NodeState state() { return simulation::unpack(save()); }
   std::vector<scene::Vec3> normals();
+  std::span<const shared::SolveRecord> solves() const { return simulation_.solves(); }
   void setCloths(std::span<const scene::Cloth> cloths) { simulation_.setCloths(cloths); }
   void checkpoint();
   void rollback();

@@ -1,0 +1,360 @@
+// SPDX-License-Identifier: MIT
+// Springs that keep their length: the solver against the double-precision system, and whole runs.
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "server/reference/constraint_system.h"
+#include "server/scene/springs.h"
+#include "tests/simulation/scenes.h"
+
+namespace clothstream::tests {
+namespace {
+
+using simulation::NodeState;
+
+constexpr double kRounding = 1.0 / (1 << 24);
+constexpr double kExtent = 4;  // m, further than any state here
+
+class Constraints : public GpuTest {};
+
+scene::Cloth constrained(std::uint32_t rows, std::uint32_t columns, bool bendConstraints = false) {
+  scene::Cloth cloth = calmCloth(rows, columns);
+  cloth.solver.kind = scene::SolverKind::constraint;
+  cloth.solver.bendConstraints = bendConstraints;
+  return cloth;
+}
+
+// size x size nodes, a metre of cloth of 0.2 kg, horizontal, hung by one edge.
+scene::Scene swing(std::uint32_t size, std::uint32_t substeps, std::uint32_t iterations) {
+  scene::Cloth cloth;
+  cloth.name = "sheet";
+  cloth.grid = {.rows = size, .columns = size, .width = 1, .height = 1, .pose = {}};
+  cloth.grid.pose.orientation =
+      scene::Quaternion(Eigen::AngleAxisf(static_cast<float>(M_PI / 2), scene::Vec3::UnitX()));
+  cloth.mass = 0.2f;
+  cloth.pins = {topRow(cloth)};
+  cloth.solver.kind = scene::SolverKind::constraint;
+  cloth.solver.iterations = iterations;
+  cloth.solver.tolerance = 0;
+  scene::Scene scene = sceneOf({cloth});
+  scene.substeps = substeps;
+  return scene;
+}
+
+double norm(const std::vector<scene::Vec3>& vectors) {
+  double sum = 0;
+  for (const scene::Vec3& v : vectors) sum += v.cast<double>().squaredNorm();
+  return std::sqrt(sum);
+}
+
+// Off the reference by what the solve may leave. With e the error of lambda and rho = A e what is left of the
+// right-hand side, the moves M^-1 J^T e have m |moves|^2 <= e A e = rho A^-1 rho <= |rho|^2 / compliance; and
+// compliance is 0.01 / m: |moves| <= 10 |rho|. rho is the tolerance times |b|, and the rounding of m rows: of
+// two positions each (2 kRounding kExtent), and of their directions (1e-6 of a row's own size, of which there
+// are `iterations`).
+void expectLikeReference(scene::Scene scene, unsigned seed) {
+  scene.substeps = 1;
+  scene.simulationRate = 720;
+  for (scene::Cloth& cloth : scene.cloths) {
+    cloth.solver.iterations = 2000;
+    cloth.solver.tolerance = 1e-4f;
+  }
+  std::mt19937 random(seed);
+  const NodeState start = randomState(scene, random, 0.002f, 0.5f);
+  Running running(scene);
+  running.restore(start);
+  EXPECT_TRUE(running.tick(inputsOf(scene)).healthy);
+  reference::ReferenceSimulation reference(scene);
+  setState(reference, start);
+  reference.tick(referenceInputs(inputsOf(scene)));
+
+  double rows = 0;
+  for (const scene::Cloth& cloth : scene.cloths)
+    rows += static_cast<double>(scene::springLinks(cloth).size());
+  const double side = std::sqrt(rows) * 0.007;  // two ends off by up to 2 mm an axis
+  const double left = (1e-4 + 1e-6) * side + std::sqrt(rows) * 2 * kRounding * kExtent;
+  const double tolerance = 10 * left;
+  const NodeState state = running.state();
+  EXPECT_LT(largestDistance(state, reference), tolerance);
+  EXPECT_LT(largestSpeedDifference(state, reference), 720 * tolerance);
+  for (const shared::SolveRecord& solve : running.solves()) {
+    EXPECT_LE(solve.residual, 1e-4f) << solve.iterations;
+    EXPECT_GT(solve.iterations, 1u);
+    EXPECT_LT(solve.iterations, 2000u);
+  }
+  // Without the solve it would be elsewhere: the comparison can fail.
+  for (scene::Cloth& cloth : scene.cloths) cloth.solver.compliance = 1;
+  reference::ReferenceSimulation soft(scene);
+  setState(soft, start);
+  soft.tick(referenceInputs(inputsOf(scene)));
+  EXPECT_GT(largestDistance(state, soft), 4 * tolerance);
+}
+
+TEST_F(Constraints, moveNodesAsTheReferenceOnEveryShapeOfGrid) {
+  const std::pair<std::uint32_t, std::uint32_t> shapes[] = {{2, 2}, {2, 7}, {9, 3}, {17, 23}};
+  unsigned seed = 1;
+  for (const auto& [rows, columns] : shapes) {
+    SCOPED_TRACE(::testing::Message() << rows << " x " << columns);
+    scene::Cloth cloth = constrained(rows, columns);
+    cloth.pins = {{.firstRow = 0, .lastRow = 0, .firstColumn = 0, .lastColumn = columns - 1}};
+    expectLikeReference(sceneOf({cloth}), seed++);
+  }
+}
+
+TEST_F(Constraints, ofBendSpringsMoveNodesAsTheReference) {
+  expectLikeReference(sceneOf({constrained(12, 11, true)}), 5);
+}
+
+TEST_F(Constraints, ofSeveralClothsAreSolvedApart) {
+  scene::Cloth second = constrained(8, 5, true);
+  second.name = "second";
+  expectLikeReference(sceneOf({constrained(6, 9), second}), 6);
+}
+
+// Multipliers act on both ends alike, to the bit but for the sums' rounding.
+TEST_F(Constraints, keepAFreeClothsMomentum) {
+  scene::Cloth cloth = constrained(20, 20);
+  cloth.damping = 0;
+  scene::Scene scene = sceneOf({cloth});
+  scene.environment.gravity = scene::Vec3::Zero();
+  std::mt19937 random(7);
+  const NodeState start = randomState(scene, random, 0.001f, 0.5f);
+  const auto momentum = [](const NodeState& state) {
+    reference::Vec3 sum = reference::Vec3::Zero();
+    for (const scene::Vec3& v : state.velocities) sum += v.cast<double>();
+    return sum;
+  };
+  Running running(scene);
+  running.restore(start);
+  for (int tick = 0; tick < 20; ++tick) running.tick(inputsOf(scene));
+  const double flow = norm(start.velocities) * 20;  // sum of speeds, at most sqrt(400) times the norm
+  EXPECT_LT((momentum(running.state()) - momentum(start)).norm(), 1e-6 * flow * 200);
+}
+
+reference::Strain strainOf(const scene::Scene& scene, const NodeState& state) {
+  reference::ReferenceSimulation reference(scene);
+  setState(reference, state);
+  return reference.cloths().front().strain();
+}
+
+// The sheet swings down from horizontal, the hardest part of its life; 0.8 s.
+TEST_F(Constraints, holdASwingingSheet) {
+  const scene::Scene scene = swing(32, 10, 20);
+  Running running(scene);
+  double most = 0, mean = 0;
+  const int ticks = 58;
+  for (int tick = 0; tick < ticks; ++tick) {
+    running.tick(inputsOf(scene));
+    const reference::Strain strain = strainOf(scene, running.state());
+    most = std::max(most, strain.max);
+    mean += strain.mean / ticks;
+  }
+  RecordProperty("maxStrain", std::to_string(most));
+  RecordProperty("meanStrain", std::to_string(mean));
+  EXPECT_LT(most, 0.05);
+  EXPECT_LT(mean, 0.0005);
+}
+
+TEST_F(Constraints, letASheetHangWithinOnePercent) {
+  scene::Scene scene = swing(32, 10, 20);
+  scene.cloths.front().damping = 4;
+  Running running(scene);
+  for (int tick = 0; tick < 360; ++tick) running.tick(inputsOf(scene));
+  EXPECT_LT(strainOf(scene, running.state()).max, 0.01);
+}
+
+TEST_F(Constraints, leaveNothingInsideASphere) {
+  scene::Scene scene = swing(24, 10, 20);
+  const simulation::MovingSphere ball{scene::Vec3(0, -0.3f, -0.3f), scene::Vec3(0, -0.3f, -0.3f), 0.2f, 1};
+  Running running(scene);
+  for (int tick = 0; tick < 72; ++tick) running.tick(inputsOf(scene, {ball}));
+  const double distance = 0.2 + double{scene.cloths.front().thickness};
+  double nearest = 1;
+  const NodeState state = running.state();
+  const std::vector<float> masses = simulation::inverseMasses(scene.cloths);
+  for (std::size_t i = 0; i < masses.size(); ++i)
+    if (masses[i] > 0) nearest = std::min(nearest, (state.positions[i] - ball.start).cast<double>().norm());
+  EXPECT_GT(nearest, distance * (1 - 1e-5));
+  EXPECT_LT(nearest, distance * 1.01);  // and it does touch it
+}
+
+TEST_F(Constraints, giveTheSameBitsWhateverTheWorkgroups) {
+  scene::Scene scene = swing(16, 6, 20);
+  std::vector<std::uint64_t> hashes;
+  for (const std::uint32_t workgroup : {8u, 16u, 64u, 128u}) {
+    Running running(scene, {.rowsPerInvocation = 0, .workgroupSize = workgroup});
+    simulation::TickStatus status;
+    for (int tick = 0; tick < 30; ++tick) status = running.tick(inputsOf(scene));
+    hashes.push_back(status.stateHash);
+  }
+  for (const std::uint64_t hash : hashes) EXPECT_EQ(hash, hashes.front());
+}
+
+TEST_F(Constraints, leaveAMassSpringClothBesideThemAsItIsAlone) {
+  scene::Cloth free = calmCloth(9, 14);
+  free.pins = {topRow(free)};
+  scene::Cloth held = constrained(7, 8);
+  held.name = "held";
+  const scene::Scene alone = sceneOf({free}), together = sceneOf({held, free});
+  Running one(alone), both(together);
+  for (int tick = 0; tick < 20; ++tick) {
+    one.tick(inputsOf(alone));
+    both.tick(inputsOf(together));
+  }
+  const NodeState expected = one.state(), found = both.state();
+  for (std::size_t i = 0; i < expected.positions.size(); ++i)
+    EXPECT_EQ(expected.positions[i], found.positions[56 + i]) << i;
+}
+
+class Adaptive : public GpuTest {};
+
+scene::Cloth adaptive(std::uint32_t rows, std::uint32_t columns) {
+  scene::Cloth cloth = constrained(rows, columns);
+  cloth.solver.kind = scene::SolverKind::acad;
+  return cloth;
+}
+
+// [Va21] Fig. 15: steps of 0.016 s and springs of 200 N/m; the paper gives no node's mass: 0.05 kg here, with
+// which 2 (4 + 4 + 4) ks h^2 / m = 24.6 where explicit springs bear 4. A sheet hung by two corners, and a
+// ball under it.
+scene::Scene figure15(scene::SolverKind solver) {
+  scene::Cloth cloth;
+  cloth.name = "sheet";
+  cloth.grid = {.rows = 32, .columns = 32, .width = 3.1f, .height = 3.1f, .pose = {}};
+  cloth.mass = 0.05f * 1024;
+  cloth.structural = cloth.shear = cloth.bend = {200, 0.1f};
+  cloth.bend.stiffness = 20;
+  cloth.damping = 0.5f;
+  cloth.pins = {{.firstRow = 0, .lastRow = 0, .firstColumn = 0, .lastColumn = 31, .columnStep = 31}};
+  cloth.solver.kind = solver;
+  scene::Scene scene = sceneOf({cloth});
+  scene.simulationRate = 62;
+  scene.streamRate = 62;
+  scene.substeps = 1;
+  return scene;
+}
+
+TEST_F(Adaptive, moveNodesAsTheReference) {
+  scene::Scene scene = sceneOf({adaptive(9, 14)});
+  scene.substeps = 1;
+  scene.simulationRate = 720;
+  scene.cloths.front().solver.iterations = 2000;
+  scene.cloths.front().solver.tolerance = 1e-4f;
+  std::mt19937 random(4);
+  const NodeState start = randomState(scene, random, 0.0025f, 0.5f);
+  Running running(scene);
+  running.restore(start);
+  EXPECT_TRUE(running.tick(inputsOf(scene)).healthy);
+  const shared::SolveRecord solve = running.solves().front();
+  // Some are constraints and some are not.
+  EXPECT_GT(solve.constraints, 20u);
+  EXPECT_LT(solve.constraints, 400u);
+
+  reference::ReferenceSimulation reference(scene);
+  setState(reference, start);
+  reference.tick(referenceInputs(inputsOf(scene)));
+  // As expectLikeReference() derives it; forces on top as in the kernels' tests, far below.
+  const double rows = solve.constraints, side = std::sqrt(rows) * 0.007;
+  const double tolerance = 10 * (1e-4 * side + std::sqrt(rows) * 2 * kRounding * kExtent);
+  EXPECT_LT(largestDistance(running.state(), reference), tolerance);
+}
+
+TEST_F(Adaptive, areMassSpringClothToTheBitWhereNothingIsStretched) {
+  scene::Cloth cloth = adaptive(13, 12);
+  cloth.pins = {topRow(cloth)};
+  scene::Scene held = sceneOf({cloth});
+  held.environment.gravity = scene::Vec3(0, -1, 0);  // under which it stretches by 3 %
+  scene::Scene free = held;
+  free.cloths.front().solver.kind = scene::SolverKind::massSpring;
+  const simulation::MovingSphere ball{scene::Vec3(0, -0.12f, 0.1f), scene::Vec3(0, -0.12f, 0.1f), 0.094f, 1};
+  Running one(held), other(free);
+  for (int tick = 0; tick < 30; ++tick) {
+    EXPECT_EQ(one.tick(inputsOf(held, {ball})).stateHash, other.tick(inputsOf(free, {ball})).stateHash);
+    EXPECT_EQ(one.solves().front().constraints, 0u);
+  }
+}
+
+TEST_F(Adaptive, holdASheetWhereMassSpringBlowsUp) {
+  const scene::Scene free = figure15(scene::SolverKind::massSpring);
+  Running blown(free);
+  bool healthy = true;
+  for (int tick = 0; tick < 186 && healthy; ++tick) healthy = blown.tick(inputsOf(free)).healthy;
+  EXPECT_FALSE(healthy);
+
+  const scene::Scene scene = figure15(scene::SolverKind::acad);
+  const simulation::MovingSphere ball{scene::Vec3(0, -1.5f, 0.4f), scene::Vec3(0, -1.5f, 0.4f), 0.5f, 1};
+  Running running(scene);
+  for (int tick = 0; tick < 186; ++tick) ASSERT_TRUE(running.tick(inputsOf(scene, {ball})).healthy) << tick;
+  // It is far from calm, as in the paper, but it is a cloth still: half as long again at most.
+  const NodeState state = running.state();
+  EXPECT_LT(strainOf(scene, state).mean, 0.5);
+  for (const scene::Vec3& p : state.positions) EXPECT_LT(p.norm(), 1.5f * 4.7f);
+}
+
+// Hung by its corners it would stretch by more than half. While it falls into its constraints, springs beside
+// those that are held go beyond for a few substeps.
+TEST_F(Adaptive, keepEverySpringWithinItsBound) {
+  scene::Cloth cloth = adaptive(24, 24);
+  cloth.structural.stiffness = 60;
+  cloth.shear.stiffness = 20;
+  cloth.damping = 2;
+  cloth.pins = {{.firstRow = 0, .lastRow = 0, .firstColumn = 0, .lastColumn = 23, .columnStep = 23}};
+  const scene::Scene scene = sceneOf({cloth});
+  Running running(scene);
+  double falling = 0, hanging = 0;
+  for (int tick = 0; tick < 216; ++tick) {
+    running.tick(inputsOf(scene));
+    double& most = tick < 108 ? falling : hanging;
+    most = std::max(most, strainOf(scene, running.state()).max);
+  }
+  RecordProperty("fallingStrain", std::to_string(falling));
+  RecordProperty("hangingStrain", std::to_string(hanging));
+  EXPECT_GT(running.solves().front().constraints, 0u);
+  EXPECT_LT(falling, 0.15);
+  EXPECT_LT(hanging, 0.12);
+
+  scene::Scene free = scene;
+  free.cloths.front().solver.kind = scene::SolverKind::massSpring;
+  Running loose(free);
+  for (int tick = 0; tick < 144; ++tick) loose.tick(inputsOf(free));
+  EXPECT_GT(strainOf(free, loose.state()).max, 0.3);
+}
+
+TEST_F(Adaptive, giveTheSameBitsWhateverTheWorkgroups) {
+  scene::Cloth cloth = adaptive(16, 15);
+  cloth.structural.stiffness = 60;
+  cloth.pins = {{.firstRow = 0, .lastRow = 0, .firstColumn = 0, .lastColumn = 14, .columnStep = 14}};
+  const scene::Scene scene = sceneOf({cloth});
+  std::vector<std::uint64_t> hashes;
+  for (const std::uint32_t workgroup : {8u, 32u, 128u}) {
+    Running running(scene, {.rowsPerInvocation = 0, .workgroupSize = workgroup});
+    simulation::TickStatus status;
+    for (int tick = 0; tick < 40; ++tick) status = running.tick(inputsOf(scene));
+    EXPECT_GT(running.solves().front().constraints, 0u);
+    hashes.push_back(status.stateHash);
+  }
+  for (const std::uint64_t hash : hashes) EXPECT_EQ(hash, hashes.front());
+}
+
+TEST(ConstraintSystem, conjugateGradientsReachTheDirectSolution) {
+  const scene::Cloth cloth = constrained(6, 7);
+  std::mt19937 random(3);
+  const NodeState state = randomState(sceneOf({cloth}), random, 0.003f, 1);
+  std::vector<reference::Vec3> positions, velocities;
+  for (const scene::Vec3& p : state.positions) positions.push_back(p.cast<double>());
+  for (const scene::Vec3& v : state.velocities) velocities.push_back(v.cast<double>());
+  const std::vector<double> inverseMasses(positions.size(), 100);
+  std::vector<reference::Constraint> constraints;
+  for (const scene::SpringLink& link : scene::springLinks(cloth))
+    constraints.push_back({link.a, link.b, (positions[link.b] - positions[link.a]).norm() - link.restLength});
+  const reference::ConstraintSystem system(constraints, positions, velocities, inverseMasses, 1, 0.001);
+  const Eigen::MatrixXd A = system.matrix();
+  const Eigen::VectorXd direct = A.ldlt().solve(system.side());
+  const auto solution = system.conjugateGradients(1000, 1e-10);
+  EXPECT_LT((solution.multipliers - direct).norm(), 1e-6 * direct.norm());
+  EXPECT_LE(solution.residual, 1e-10);
+}
+
+}  // namespace
+}  // namespace clothstream::tests
