@@ -19,6 +19,8 @@ using namespace clothstream;
 constexpr std::array kSuites{
     bench::Suite{"mass_spring", "node-steps a second over grid sizes, 32x32 up to the device's memory",
                  &bench::runMassSpring},
+    bench::Suite{"paper", "Figures 7 to 10 of the paper at its sizes, beside its frames per second",
+                 &bench::runPaper},
     bench::Suite{"curtain", "the scene curtain, served to one client in this process: tick, pose to packet",
                  &bench::runCurtain},
     bench::Suite{"codec", "bits a vertex and milliseconds a frame, key and predicted, of a hung cloth",

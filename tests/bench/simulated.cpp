@@ -35,6 +35,16 @@ Simulated::Simulated(vulkan::Device& device, const scene::Scene& scene,
     : device_(device), scene_(scene), recorder_(device), simulation_(device, scene, options) {}
 
 double Simulated::check(const simulation::TickInputs& inputs) {
+  // A tick moves a position by sums of rounded terms; each substep rounds it once, to 2^-24 of the cloth's
+  // extent, and twelve spring forces carry the rounding of their ends on. An eighth of a thousandth of the
+  // nodes' distance is far above that and far below what any missing term does.
+  const scene::Grid& grid = scene_.cloths.front().grid;
+  const double extent = std::max(double{grid.width}, double{grid.height});
+  const double tolerance = scene_.substeps * 20 * extent / (1 << 24) + scene::spacing(grid).column / 8000.0;
+  return check(inputs, tolerance);
+}
+
+double Simulated::check(const simulation::TickInputs& inputs, double tolerance) {
   const simulation::NodeState start = displacedState(scene_);
   runOn(device_, recorder_, [&] { simulation_.recordRestoreState(recorder_, simulation::pack(start, 0)); });
   tick(inputs);
@@ -53,12 +63,6 @@ double Simulated::check(const simulation::TickInputs& inputs) {
     }
   const double seconds = secondsOf([&] { reference.tick(referenceInputs); });
 
-  // A tick moves a position by sums of rounded terms; each substep rounds it once, to 2^-24 of the cloth's
-  // extent, and twelve spring forces carry the rounding of their ends on. An eighth of a thousandth of the
-  // nodes' distance is far above that and far below what any missing term does.
-  const scene::Grid& grid = scene_.cloths.front().grid;
-  const double extent = std::max(double{grid.width}, double{grid.height});
-  const double tolerance = scene_.substeps * 20 * extent / (1 << 24) + scene::spacing(grid).column / 8000.0;
   node = 0;
   for (const reference::ReferenceCloth& cloth : reference.cloths())
     for (const reference::Vec3& expected : cloth.positions()) {

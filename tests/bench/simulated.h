@@ -2,6 +2,7 @@
 // A scene on the device that is timed tick by tick, and checked against the reference first.
 #pragma once
 
+#include <span>
 #include <string>
 
 #include "server/scene/scene.h"
@@ -20,6 +21,8 @@ class Simulated {
   // they differ by more than float rounding explains. Leaves the state it reached. Returns the reference's
   // seconds.
   double check(const simulation::TickInputs& inputs);
+  // The same with this distance allowed, m.
+  double check(const simulation::TickInputs& inputs, double tolerance);
 
   // Records, submits and waits for one tick; throws std::runtime_error if its state is not healthy.
   void tick(const simulation::TickInputs& inputs);
@@ -28,6 +31,7 @@ class Simulated {
   void restart();
 
   simulation::NodeState state();
+  std::span<const shared::SolveRecord> solves() const { return simulation_.solves(); }
 
   // Of a tick: all of it on the wall clock, and its advance stage by the device's clock. s.
   const Samples& wall() const { return wall_; }

@@ -32,6 +32,7 @@ struct Suite {
 };
 
 Rows runMassSpring(vulkan::Device& device, const Settings& settings);
+Rows runPaper(vulkan::Device& device, const Settings& settings);
 Rows runCurtain(vulkan::Device& device, const Settings& settings);
 Rows runCodec(vulkan::Device& device, const Settings& settings);
 
