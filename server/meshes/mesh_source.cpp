@@ -211,6 +211,31 @@ Problem appendFace(const MeshSource& source, std::size_t f, const Numbering& num
   return fromFirst ? append(0, 2, 3) : append(1, 2, 3);
 }
 
+// Those of the source that come as two triangles.
+Problem addQuads(const MeshSource& source, const std::vector<std::size_t>& faceOfTriangle,
+                 scene::MeshShape& shape) {
+  std::size_t free = 0;
+  for (const std::size_t f : source.halves) {
+    const auto refuse = [&](std::string_view why) {
+      return fmt::format("faces {} and {} are no quad: {}", f, f + 1, why);
+    };
+    if (f < free || f + 1 >= source.faces.size())
+      return refuse("a quad is a face and the one after it, in ascending order, each of one quad");
+    if (source.faces[f].cornerCount != 3 || source.faces[f + 1].cornerCount != 3)
+      return refuse("its halves must be triangles");
+    free = f + 2;
+    const auto t =
+        static_cast<std::size_t>(std::ranges::lower_bound(faceOfTriangle, f) - faceOfTriangle.begin());
+    const Triangle &first = shape.triangles[t], &second = shape.triangles[t + 1];
+    const auto shared = std::ranges::count_if(
+        first, [&](std::uint32_t node) { return std::ranges::count(second, node) > 0; });
+    if (shared != 2) return refuse("they share no edge");
+    shape.quads.push_back(static_cast<std::uint32_t>(t));
+  }
+  std::ranges::sort(shape.quads);
+  return std::nullopt;
+}
+
 Problem checkEdges(const scene::MeshShape& shape, const std::vector<std::size_t>& faceOfTriangle,
                    const std::vector<std::uint32_t>& vertexOfNode) {
   struct Side {
@@ -282,6 +307,7 @@ tl::expected<BuiltMesh, std::string> buildMesh(const MeshSource& source, const M
     if (!problem) problem = appendFace(source, f, numbering, shape, faceOfTriangle);
     if (problem) return tl::unexpected(std::move(*problem));
   }
+  if (Problem problem = addQuads(source, faceOfTriangle, shape)) return tl::unexpected(std::move(*problem));
   if (Problem problem = checkEdges(shape, faceOfTriangle, numbering.vertexOfNode))
     return tl::unexpected(std::move(*problem));
   shape.submeshes = submeshes(source, faceOfTriangle);

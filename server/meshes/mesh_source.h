@@ -24,6 +24,8 @@ struct MeshSource {
   std::vector<scene::Vec3> vertices;
   std::vector<scene::Uv> uvs;  // empty: none, and none in the faces
   std::vector<SourceFace> faces;
+  // Triangles that with the face after them are the halves of a quad, ascending.
+  std::vector<std::size_t> halves;
   struct Part {
     std::string name;
     std::size_t firstFace = 0;

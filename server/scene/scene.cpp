@@ -51,9 +51,21 @@ bool GridRange::contains(std::uint32_t row, std::uint32_t column) const {
          column >= firstColumn && column <= lastColumn && (column - firstColumn) % columnStep == 0;
 }
 
+bool Region::contains(const Vec3& point) const {
+  const Eigen::Vector3d away = (point.cast<double>() - centre.cast<double>()).cwiseAbs();
+  if (radius) return away.squaredNorm() <= double{*radius} * double{*radius};
+  return (2 * away.array() <= size.cast<double>().array()).all();
+}
+
 std::vector<std::uint8_t> pinnedNodes(const Cloth& cloth) {
   std::vector<std::uint8_t> pinned(cloth.nodeCount(), 0);
   for (const std::uint32_t node : cloth.pinnedVertices) pinned[node] = 1;
+  if (!cloth.pinnedRegions.empty()) {
+    const std::vector<Vec3> rest = restPositions(cloth);
+    for (const Region& region : cloth.pinnedRegions)
+      for (std::size_t i = 0; i < rest.size(); ++i)
+        if (region.contains(rest[i])) pinned[i] = 1;
+  }
   for (const GridRange& range : cloth.pins) {
     assert(range.rowStep > 0 && range.columnStep > 0);
     assert(range.lastRow < cloth.grid.rows && range.lastColumn < cloth.grid.columns);

@@ -73,6 +73,15 @@ inline constexpr float kRelativeCompliance = 0.01f;
 
 struct Mesh;  // mesh.h
 
+// A part of space, its surface included.
+struct Region {
+  Vec3 centre = Vec3::Zero();
+  std::optional<float> radius;  // m, of a sphere; absent: a box
+  Vec3 size = Vec3::Zero();     // m, of the box, from face to face
+
+  bool contains(const Vec3& point) const;
+};
+
 struct Cloth {
   std::string name;
   Grid grid;                         // of a cloth without mesh
@@ -84,7 +93,8 @@ struct Cloth {
   float friction = 0.3f;                      // Coulomb, dimensionless
   float thickness = 0.005f;                   // m kept from a collider's surface
   std::vector<GridRange> pins;                // of a grid
-  std::vector<std::uint32_t> pinnedVertices;  // nodes of a mesh
+  std::vector<std::uint32_t> pinnedVertices;  // nodes
+  std::vector<Region> pinnedRegions;          // whatever starts there
   Solver solver;
 
   std::uint32_t nodeCount() const;
@@ -142,7 +152,7 @@ std::vector<Vec3> restPositions(const Cloth& cloth);
 // kg a node, pinned or not: a grid's all alike, a mesh's by their shares of its area.
 std::vector<double> nodeMasses(const Cloth& cloth);
 
-// One byte a node: 1 where it is pinned. Ranges must lie inside the grid.
+// One byte a node: 1 where it is pinned. Ranges must lie inside the grid, vertices must exist.
 std::vector<std::uint8_t> pinnedNodes(const Cloth& cloth);
 
 // Lengths at rest along a column (between columns), along a row (between rows), and along the diagonal, m.

@@ -57,6 +57,8 @@ std::vector<NodeSprings> gridSprings(const Cloth& cloth) {
   };
   const NodeSprings most{atMost(rows, 1) + atMost(columns, 1), atMost(rows, 1) * atMost(columns, 1),
                          atMost(rows, 2) + atMost(columns, 2), perMass};
+  const bool pinnedSingly = !cloth.pinnedVertices.empty() || !cloth.pinnedRegions.empty();
+  const std::vector<std::uint8_t> pinned = pinnedSingly ? pinnedNodes(cloth) : std::vector<std::uint8_t>();
   std::vector<NodeSprings> found;
   for (std::uint32_t row = 0; row < rows; ++row)
     for (std::uint32_t column = 0; column < columns; ++column) {
@@ -64,6 +66,7 @@ std::vector<NodeSprings> gridSprings(const Cloth& cloth) {
       if (std::ranges::any_of(found, [&](const NodeSprings& f) { return f.sameCounts(node); })) continue;
       if (std::ranges::any_of(cloth.pins, [&](const GridRange& pins) { return pins.contains(row, column); }))
         continue;
+      if (pinnedSingly && pinned[row * columns + column] != 0) continue;
       if (node.sameCounts(most)) return {most};
       found.push_back(node);
     }
