@@ -11,7 +11,8 @@ proto/codec        |
 server/reference   | server/scene
 server/telemetry   |
 server/simulation  | server/scene server/vulkan shaders
-server/messages    | server/scene clothstream
+server/meshes      | server/scene
+server/messages    | server/scene server/meshes clothstream
 server/encode      | server/scene server/simulation server/vulkan proto/codec shaders
 server/stream      | server/scene server/vulkan server/simulation server/encode server/messages server/telemetry proto/codec clothstream
 server/rpc         | server/stream server/telemetry clothstream

@@ -10,13 +10,37 @@
 #include "server/messages/limits.h"
 #include "server/messages/scene_message.h"
 #include "server/messages/vectors.h"
+#include "server/scene/mesh.h"
 
 namespace clothstream::messages {
 namespace {
 
-std::string littleEndian(const std::vector<scene::Vec3>& positions) {
-  static_assert(std::endian::native == std::endian::little && sizeof(scene::Vec3) == 12);
-  return {reinterpret_cast<const char*>(positions.data()), positions.size() * sizeof(scene::Vec3)};
+static_assert(sizeof(scene::Vec3) == 12 && sizeof(scene::Uv) == 8 && sizeof(scene::Triangle) == 12);
+
+// Of elements that are floats or numbers side by side.
+template <typename Element>
+std::string littleEndian(const std::vector<Element>& elements) {
+  static_assert(std::endian::native == std::endian::little);
+  return {reinterpret_cast<const char*>(elements.data()), elements.size() * sizeof(Element)};
+}
+
+void writeShape(const scene::Cloth& cloth, v1::ClothDescription& message) {
+  message.set_vertex_count(cloth.nodeCount());
+  message.set_rest_positions(littleEndian(scene::restPositions(cloth)));
+  if (!cloth.mesh) {
+    message.set_rows(cloth.grid.rows);
+    message.set_columns(cloth.grid.columns);
+    return;
+  }
+  const scene::MeshShape& shape = cloth.mesh->shape;
+  message.set_triangles(littleEndian(shape.triangles));
+  message.set_uvs(littleEndian(shape.uvs));
+  message.set_uv_triangles(littleEndian(shape.uvTriangles));
+  for (const scene::Submesh& part : shape.submeshes) {
+    v1::Submesh& partMessage = *message.add_submeshes();
+    partMessage.set_name(part.name);
+    partMessage.set_triangle_count(part.triangleCount);
+  }
 }
 
 }  // namespace
@@ -50,12 +74,11 @@ v1::StreamDescription toDescription(const scene::Scene& scene, std::uint32_t epo
   for (const scene::Cloth& cloth : scene.cloths) {
     v1::ClothDescription& message = *description.add_cloths();
     message.set_name(cloth.name);
-    message.set_vertex_count(cloth.grid.nodeCount());
-    message.set_rows(cloth.grid.rows);
-    message.set_columns(cloth.grid.columns);
-    message.set_rest_positions(littleEndian(scene::restPositions(cloth.grid)));
+    writeShape(cloth, message);
   }
   *description.mutable_definition() = toMessage(scene);
+  for (v1::Cloth& cloth : *description.mutable_definition()->mutable_cloths())
+    if (cloth.has_mesh()) cloth.mutable_mesh()->Clear();
   return description;
 }
 

@@ -1,5 +1,11 @@
-# Writes SOURCE: the text of every scene file in the list FILES, by its name.
+# Writes SOURCE: the text of every scene file in the list FILES, and of every mesh in MESHES, by its name.
 set(entries)
+set(meshes)
+foreach(file IN LISTS MESHES)
+  get_filename_component(name ${file} NAME)
+  file(READ ${file} text)
+  string(APPEND meshes "    {\"${name}\", R\"obj(${text})obj\"},\n")
+endforeach()
 foreach(file IN LISTS FILES)
   get_filename_component(name ${file} NAME_WE)
   file(READ ${file} text)
@@ -13,6 +19,12 @@ std::span<const EmbeddedScene> embeddedScenes() {
   static constexpr EmbeddedScene kScenes[] = {
 ${entries}  };
   return kScenes;
+}
+
+std::span<const EmbeddedMesh> embeddedMeshes() {
+  static constexpr EmbeddedMesh kMeshes[] = {
+${meshes}  };
+  return kMeshes;
 }
 
 }  // namespace clothstream::messages

@@ -15,4 +15,11 @@ struct EmbeddedScene {
 // In the order of their names.
 std::span<const EmbeddedScene> embeddedScenes();
 
+// An OBJ file that one of them names.
+struct EmbeddedMesh {
+  std::string_view file;
+  std::string_view obj;
+};
+std::span<const EmbeddedMesh> embeddedMeshes();
+
 }  // namespace clothstream::messages

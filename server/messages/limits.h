@@ -33,7 +33,10 @@ inline constexpr Range kGravity{-1000, 1000};     // m/s^2
 inline constexpr Range kWind{-100, 100};          // m/s
 inline constexpr Range kAirDensity{0, 100};       // kg/m^3
 inline constexpr Range kGridLength{0.001, 1000};  // m
-inline constexpr double kMinSpacing = 0.0001;     // m
+inline constexpr double kMinSpacing = 0.0001;     // m; also of a mesh's edges
+inline constexpr Range kScale{1e-6, 1e6};         // m a unit
+inline constexpr Range kWeldDistance{0, 0.1};     // m
+inline constexpr Range kRegionLength{0, 1000};    // m
 inline constexpr Range kMass{1e-6, 1e6};          // kg
 inline constexpr Range kStiffness{0, 1e6};        // N/m
 inline constexpr Range kSpringDamping{0, 1e4};    // N s/m
@@ -52,10 +55,12 @@ inline constexpr std::uint32_t kMaxIterations = 10'000;
 inline constexpr std::uint32_t kMaxConstraintNodes = 1'048'576;  // of a cloth
 inline constexpr double kUnitTolerance = 0.001;                  // of a quaternion's length
 
-inline constexpr float kDefaultArealMass = 0.2f;  // kg/m^2
+inline constexpr float kDefaultWeldDistance = 1e-5f;  // m
+inline constexpr float kDefaultArealMass = 0.2f;      // kg/m^2
 inline constexpr std::uint32_t kDefaultStreamRate = 72;
 
 inline constexpr std::size_t kMaxSceneFileBytes = 4 * 1024 * 1024;
+inline constexpr std::size_t kMaxMeshFileBytes = 512 * 1024 * 1024;
 inline constexpr std::size_t kMaxClientMessageBytes = 64 * 1024;
 inline constexpr std::size_t kMaxParticipantColliders = 16;
 inline constexpr std::size_t kMaxChunkBytes = 256 * 1024;

@@ -5,10 +5,22 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "server/meshes/mesh_file.h"
 #include "server/messages/embedded_scenes.h"
 #include "server/messages/scene_file.h"
 
 namespace clothstream::messages {
+
+namespace {
+
+tl::expected<meshes::MeshSource, std::string> readEmbeddedMesh(const std::string& file) {
+  const auto all = embeddedMeshes();
+  const auto mesh = std::ranges::find(all, file, &EmbeddedMesh::file);
+  if (mesh == all.end()) return tl::unexpected(std::string("is not built into the program"));
+  return meshes::parseObj(mesh->obj);
+}
+
+}  // namespace
 
 std::vector<std::string> namedScenes() {
   std::vector<std::string> names;
@@ -19,7 +31,8 @@ std::vector<std::string> namedScenes() {
 Result<scene::Scene> loadScene(const std::string& nameOrPath) {
   const auto scenes = embeddedScenes();
   const auto scene = std::ranges::find(scenes, nameOrPath, &EmbeddedScene::name);
-  if (scene != scenes.end()) return parseScene(scene->json, fmt::format("scene {}", nameOrPath));
+  if (scene != scenes.end())
+    return parseScene(scene->json, fmt::format("scene {}", nameOrPath), readEmbeddedMesh);
   return readSceneFile(nameOrPath).map_error([](FieldError error) {
     if (error.code == v1::ERROR_CODE_NOT_FOUND)
       error.text +=

@@ -11,6 +11,7 @@
 #include <google/protobuf/util/json_util.h>
 #include <nlohmann/json.hpp>
 
+#include "server/meshes/mesh_file.h"
 #include "server/messages/limits.h"
 #include "server/messages/scene_message.h"
 
@@ -35,7 +36,7 @@ std::optional<std::string> syntaxError(std::string_view json) {
 
 }  // namespace
 
-Result<scene::Scene> parseScene(std::string_view json, std::string_view source) {
+Result<scene::Scene> parseScene(std::string_view json, std::string_view source, const MeshReader& readMesh) {
   if (const auto error = syntaxError(json)) return refuse(v1::ERROR_CODE_MALFORMED_MESSAGE, source, *error);
   v1::Scene message;
   const auto status = google::protobuf::util::JsonStringToMessage({json.data(), json.size()}, &message);
@@ -43,7 +44,7 @@ Result<scene::Scene> parseScene(std::string_view json, std::string_view source) 
     return refuse(
         v1::ERROR_CODE_MALFORMED_MESSAGE, source,
         fmt::format("not a scene: {}", std::string_view(status.message().data(), status.message().size())));
-  return toScene(message).map_error([&](const FieldError& error) {
+  return toScene(message, readMesh).map_error([&](const FieldError& error) {
     return FieldError{error.code, fmt::format("{}: {}", source, error.text)};
   });
 }
@@ -68,7 +69,9 @@ Result<scene::Scene> readSceneFile(const std::filesystem::path& path) {
   if (text.size() > limits::kMaxSceneFileBytes)
     return refuse(v1::ERROR_CODE_RESOURCE_EXHAUSTED, source,
                   fmt::format("is too large: must have at most {} bytes", limits::kMaxSceneFileBytes));
-  return parseScene(text, source);
+  return parseScene(text, source, [&](const std::string& mesh) {
+    return meshes::readMeshFile(path.parent_path() / mesh, limits::kMaxMeshFileBytes);
+  });
 }
 
 std::string toJson(const scene::Scene& scene) {

@@ -8,14 +8,17 @@
 #include <vector>
 
 #include "server/messages/field_error.h"
+#include "server/messages/mesh_message.h"
 #include "server/scene/scene.h"
 
 namespace clothstream::messages {
 
-// `source` (a file's name) opens the text of an error. Unknown fields are errors.
-[[nodiscard]] Result<scene::Scene> parseScene(std::string_view json, std::string_view source);
+// `source` (a file's name) opens the text of an error. Unknown fields are errors. Meshes may be named as
+// files only where there is a reader.
+[[nodiscard]] Result<scene::Scene> parseScene(std::string_view json, std::string_view source,
+                                              const MeshReader& readMesh = {});
 
-// A file of at most limits::kMaxSceneFileBytes.
+// A file of at most limits::kMaxSceneFileBytes; the meshes that it names lie relative to it.
 [[nodiscard]] Result<scene::Scene> readSceneFile(const std::filesystem::path& path);
 
 // With every field; parseScene() of it gives the scene back.

@@ -10,6 +10,7 @@
 #include "server/messages/limits.h"
 #include "server/messages/validation.h"
 #include "server/messages/vectors.h"
+#include "server/scene/mesh.h"
 #include "server/scene/stability.h"
 
 namespace clothstream::messages {
@@ -119,15 +120,48 @@ scene::Solver toSolver(Checks& checks, const Path& path, const v1::Solver& messa
   return solver;
 }
 
-scene::Cloth toCloth(Checks& checks, const Path& path, const v1::Cloth& message) {
+// Pins of a grid by number.
+void toPinnedVertices(Checks& checks, const Path& path, const v1::Cloth& message, scene::Cloth& cloth) {
+  for (int i = 0; i < message.pinned_vertices_size() && !checks.failed(); ++i)
+    cloth.pinnedVertices.push_back(checks.integer(path.at("pinnedVertices", i), message.pinned_vertices(i), 0,
+                                                  cloth.grid.nodeCount() - 1));
+}
+
+void toShape(Checks& checks, const Path& path, const v1::Cloth& message, const MeshReader& readMesh,
+             scene::Cloth& cloth) {
+  checks.count(path / "pins", static_cast<std::size_t>(message.pins_size()), 0, limits::kMaxPins);
+  checks.count(path / "pinnedRegions", static_cast<std::size_t>(message.pinned_regions_size()), 0,
+               limits::kMaxPins);
+  switch (message.shape_case()) {
+    case v1::Cloth::kGrid:
+      cloth.grid = toGrid(checks, path / "grid", message.grid());
+      toPinnedVertices(checks, path, message, cloth);
+      for (int i = 0; i < message.pins_size() && !checks.failed(); ++i)
+        cloth.pins.push_back(toRange(checks, path.at("pins", i), message.pins(i), cloth.grid));
+      break;
+    case v1::Cloth::kMesh:
+      if (message.pins_size() > 0)
+        checks.fail(path / "pins", "", "are of grids; a mesh has \"pinnedVertices\" and \"pinnedRegions\"");
+      toMeshCloth(checks, path, message, readMesh, cloth);
+      break;
+    case v1::Cloth::SHAPE_NOT_SET:
+      checks.fail(path, "", "has no shape; must have \"grid\" or \"mesh\"");
+  }
+  for (int i = 0; i < message.pinned_regions_size() && !checks.failed(); ++i)
+    cloth.pinnedRegions.push_back(toRegion(checks, path.at("pinnedRegions", i), message.pinned_regions(i)));
+}
+
+float defaultMass(const scene::Cloth& cloth) {
+  if (cloth.mesh) return static_cast<float>(limits::kDefaultArealMass * cloth.mesh->area());
+  return limits::kDefaultArealMass * cloth.grid.width * cloth.grid.height;
+}
+
+scene::Cloth toCloth(Checks& checks, const Path& path, const v1::Cloth& message, const MeshReader& readMesh) {
   scene::Cloth cloth;
   cloth.name = checks.name(path / "name", message.name());
-  if (message.has_grid())
-    cloth.grid = toGrid(checks, path / "grid", message.grid());
-  else
-    checks.fail(path, "", "has no shape; must have \"grid\"");
-  cloth.mass = message.has_mass() ? checks.number(path / "mass", message.mass(), limits::kMass)
-                                  : limits::kDefaultArealMass * cloth.grid.width * cloth.grid.height;
+  toShape(checks, path, message, readMesh, cloth);
+  cloth.mass =
+      message.has_mass() ? checks.number(path / "mass", message.mass(), limits::kMass) : defaultMass(cloth);
   cloth.structural = toSpring(checks, path / "structural", message.structural());
   cloth.shear = toSpring(checks, path / "shear", message.shear());
   cloth.bend = toSpring(checks, path / "bend", message.bend());
@@ -138,9 +172,6 @@ scene::Cloth toCloth(Checks& checks, const Path& path, const v1::Cloth& message)
     cloth.friction = checks.number(path / "friction", message.friction(), limits::kFriction);
   if (message.has_thickness())
     cloth.thickness = checks.number(path / "thickness", message.thickness(), limits::kThickness);
-  checks.count(path / "pins", static_cast<std::size_t>(message.pins_size()), 0, limits::kMaxPins);
-  for (int i = 0; i < message.pins_size() && !checks.failed(); ++i)
-    cloth.pins.push_back(toRange(checks, path.at("pins", i), message.pins(i), cloth.grid));
   cloth.solver = toSolver(checks, path / "solver", message.solver());
   return cloth;
 }
@@ -212,16 +243,16 @@ void checkSolvers(Checks& checks, const scene::Scene& scene) {
     const Path element = root.at("cloths", static_cast<int>(i));
     if (scene.integrator != scene::Integrator::semiImplicitEuler)
       checks.fail(element / "solver", "", "has constraints, which need INTEGRATOR_SEMI_IMPLICIT_EULER");
-    if (cloth.grid.nodeCount() > limits::kMaxConstraintNodes)
+    if (cloth.nodeCount() > limits::kMaxConstraintNodes)
       checks.fail(element / "solver", "",
                   fmt::format("has constraints, for at most {} nodes; this cloth has {}",
-                              limits::kMaxConstraintNodes, cloth.grid.nodeCount()));
+                              limits::kMaxConstraintNodes, cloth.nodeCount()));
   }
 }
 
 void checkNodeCount(Checks& checks, const scene::Scene& scene) {
   std::uint64_t nodes = 0;
-  for (const scene::Cloth& cloth : scene.cloths) nodes += std::uint64_t{cloth.grid.rows} * cloth.grid.columns;
+  for (const scene::Cloth& cloth : scene.cloths) nodes += cloth.nodeCount();
   if (nodes > limits::kMaxNodes)
     checks.fail(Path("cloths"), "",
                 fmt::format("have {} nodes in all; must have at most {}", nodes, limits::kMaxNodes));
@@ -246,7 +277,7 @@ std::optional<std::string> instability(const scene::Scene& scene) {
       limits::kMaxSubsteps);
 }
 
-Result<scene::Scene> toScene(const v1::Scene& message) {
+Result<scene::Scene> toScene(const v1::Scene& message, const MeshReader& readMesh) {
   Checks checks;
   const Path root;
   scene::Scene scene;
@@ -264,7 +295,7 @@ Result<scene::Scene> toScene(const v1::Scene& message) {
   checks.count(root / "colliders", static_cast<std::size_t>(message.colliders_size()), 0,
                limits::kMaxColliders);
   for (int i = 0; i < message.cloths_size() && !checks.failed(); ++i)
-    scene.cloths.push_back(toCloth(checks, root.at("cloths", i), message.cloths(i)));
+    scene.cloths.push_back(toCloth(checks, root.at("cloths", i), message.cloths(i), readMesh));
   for (int i = 0; i < message.colliders_size() && !checks.failed(); ++i)
     scene.colliders.push_back(toCollider(checks, root.at("colliders", i), message.colliders(i)));
   scene.stream = toStreamSettings(checks, root / "stream", message.stream());

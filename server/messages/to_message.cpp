@@ -2,6 +2,7 @@
 // From a scene to its message.
 #include "server/messages/scene_message.h"
 #include "server/messages/vectors.h"
+#include "server/scene/mesh.h"
 
 namespace clothstream::messages {
 namespace {
@@ -43,14 +44,20 @@ void writeSolver(const scene::Solver& solver, v1::Solver& message) {
   }
 }
 
+void writeGrid(const scene::Grid& grid, v1::Grid& message) {
+  message.set_rows(grid.rows);
+  message.set_columns(grid.columns);
+  message.set_width(grid.width);
+  message.set_height(grid.height);
+  write(grid.pose, *message.mutable_pose());
+}
+
 void writeCloth(const scene::Cloth& cloth, v1::Cloth& message) {
   message.set_name(cloth.name);
-  v1::Grid& grid = *message.mutable_grid();
-  grid.set_rows(cloth.grid.rows);
-  grid.set_columns(cloth.grid.columns);
-  grid.set_width(cloth.grid.width);
-  grid.set_height(cloth.grid.height);
-  write(cloth.grid.pose, *grid.mutable_pose());
+  if (cloth.mesh)
+    write(*cloth.mesh, *message.mutable_mesh());
+  else
+    writeGrid(cloth.grid, *message.mutable_grid());
   message.set_mass(cloth.mass);
   write(cloth.structural, *message.mutable_structural());
   write(cloth.shear, *message.mutable_shear());
@@ -62,6 +69,8 @@ void writeCloth(const scene::Cloth& cloth, v1::Cloth& message) {
   message.set_thickness(cloth.thickness);
   for (const scene::GridRange& range : cloth.pins) writeRange(range, *message.add_pins());
   writeSolver(cloth.solver, *message.mutable_solver());
+  message.mutable_pinned_vertices()->Add(cloth.pinnedVertices.begin(), cloth.pinnedVertices.end());
+  for (const scene::Region& region : cloth.pinnedRegions) write(region, *message.add_pinned_regions());
 }
 
 void writeCollider(const scene::SphereCollider& collider, v1::Collider& message) {

@@ -25,23 +25,30 @@ Vec3 airForce(const Vec3& u, const Vec3& N, double density, double drag, double 
          (drag * std::abs(flow) * u + lift * flow / std::sqrt(square) * (N * u.squaredNorm() - flow * u));
 }
 
+Vec3 unitNormal(const Vec3& sum) {
+  const double square = sum.squaredNorm();
+  return square < kTinyNormalSquared ? Vec3::UnitZ() : Vec3(sum / std::sqrt(square));
+}
+
 }  // namespace
 
 ReferenceCloth::ReferenceCloth(const scene::Cloth& cloth)
     : cloth_(cloth),
       links_(scene::springLinks(cloth)),
-      velocities_(cloth.grid.nodeCount(), Vec3::Zero()),
-      forces_(cloth.grid.nodeCount(), Vec3::Zero()),
-      inverseMasses_(cloth.grid.nodeCount(), 1 / nodeMass()) {
-  for (const scene::Vec3& position : scene::restPositions(cloth.grid))
+      triangles_(scene::clothTriangles(cloth)),
+      velocities_(cloth.nodeCount(), Vec3::Zero()),
+      forces_(cloth.nodeCount(), Vec3::Zero()),
+      masses_(scene::nodeMasses(cloth)) {
+  for (const scene::Vec3& position : scene::restPositions(cloth))
     positions_.push_back(position.cast<double>());
+  for (const double mass : masses_) inverseMasses_.push_back(1 / mass);
   const std::vector<std::uint8_t> pinned = scene::pinnedNodes(cloth);
   for (std::size_t i = 0; i < pinned.size(); ++i)
     if (pinned[i]) inverseMasses_[i] = 0;
 }
 
 void ReferenceCloth::setParameters(const scene::Cloth& cloth) {
-  assert(cloth.grid.rows == cloth_.grid.rows && cloth.grid.columns == cloth_.grid.columns);
+  assert(cloth.nodeCount() == cloth_.nodeCount() && cloth.mesh == cloth_.mesh);
   cloth_.structural = cloth.structural;
   cloth_.shear = cloth.shear;
   cloth_.bend = cloth.bend;
@@ -70,19 +77,13 @@ void ReferenceCloth::accumulateAirForces(const scene::Environment& environment,
   const double density = environment.airDensity, drag = cloth_.drag, lift = cloth_.lift;
   if (density * drag == 0 && density * lift == 0) return;
   const Vec3 wind = environment.wind.cast<double>();
-  const auto triangle = [&](std::uint32_t p0, std::uint32_t p1, std::uint32_t p2) {
+  for (const scene::Triangle& triangle : triangles_) {
+    const auto [p0, p1, p2] = triangle;
     const Vec3 velocity = (velocities_[p0] + velocities_[p1] + velocities_[p2]) / 3;
     const Vec3 N = (positions_[p1] - positions_[p0]).cross(positions_[p2] - positions_[p0]) / 2;
     const Vec3 share = airForce(wind - velocity, N, density, drag, lift) / 3;
-    for (const std::uint32_t node : {p0, p1, p2}) forces[node] += share;
-  };
-  for (std::uint32_t row = 0; row + 1 < cloth_.grid.rows; ++row)
-    for (std::uint32_t column = 0; column + 1 < cloth_.grid.columns; ++column) {
-      const std::uint32_t a = row * cloth_.grid.columns + column, b = a + 1;
-      const std::uint32_t e = a + cloth_.grid.columns, f = e + 1;
-      triangle(a, e, b);
-      triangle(b, e, f);
-    }
+    for (const std::uint32_t node : triangle) forces[node] += share;
+  }
 }
 
 void ReferenceCloth::integrate(const scene::Environment& environment, scene::Integrator integrator,
@@ -153,6 +154,21 @@ void ReferenceCloth::collide(const Vec3& centre, const Vec3& velocity, double ra
 }
 
 std::vector<Vec3> ReferenceCloth::normals() const {
+  return cloth_.mesh ? meshNormals() : gridNormals();
+}
+
+std::vector<Vec3> ReferenceCloth::meshNormals() const {
+  std::vector<Vec3> normals(positions_.size(), Vec3::Zero());
+  for (const scene::Triangle& triangle : triangles_) {
+    const auto [p0, p1, p2] = triangle;
+    const Vec3 N = (positions_[p1] - positions_[p0]).cross(positions_[p2] - positions_[p0]);
+    for (const std::uint32_t node : triangle) normals[node] += N;
+  }
+  for (Vec3& normal : normals) normal = unitNormal(normal);
+  return normals;
+}
+
+std::vector<Vec3> ReferenceCloth::gridNormals() const {
   const int rows = static_cast<int>(cloth_.grid.rows), columns = static_cast<int>(cloth_.grid.columns);
   const auto at = [&](int row, int column) -> const Vec3& {
     return positions_[static_cast<std::size_t>(row) * cloth_.grid.columns + static_cast<std::size_t>(column)];
@@ -175,8 +191,7 @@ std::vector<Vec3> ReferenceCloth::normals() const {
         const Vec3 across = at(row + b.row, column + b.column) - at(row + a.row, column + a.column);
         sum += toDiagonal.cross(across);
       }
-      const double square = sum.squaredNorm();
-      normals.push_back(square < kTinyNormalSquared ? Vec3::UnitZ() : Vec3(sum / std::sqrt(square)));
+      normals.push_back(unitNormal(sum));
     }
   return normals;
 }
@@ -184,8 +199,8 @@ std::vector<Vec3> ReferenceCloth::normals() const {
 double ReferenceCloth::kineticEnergy() const {
   double sum = 0;
   for (std::size_t i = 0; i < velocities_.size(); ++i)
-    if (inverseMasses_[i] > 0) sum += velocities_[i].squaredNorm();
-  return 0.5 * nodeMass() * sum;
+    if (inverseMasses_[i] > 0) sum += masses_[i] * velocities_[i].squaredNorm();
+  return 0.5 * sum;
 }
 
 double ReferenceCloth::elasticEnergy() const {
@@ -200,8 +215,8 @@ double ReferenceCloth::elasticEnergy() const {
 double ReferenceCloth::gravityEnergy(const Vec3& gravity) const {
   double sum = 0;
   for (std::size_t i = 0; i < positions_.size(); ++i)
-    if (inverseMasses_[i] > 0) sum -= gravity.dot(positions_[i]);
-  return nodeMass() * sum;
+    if (inverseMasses_[i] > 0) sum -= masses_[i] * gravity.dot(positions_[i]);
+  return sum;
 }
 
 Strain ReferenceCloth::strain() const {

@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "server/scene/mesh.h"
 #include "server/scene/scene.h"
 #include "server/scene/springs.h"
 
@@ -20,14 +21,14 @@ struct Strain {
   double mean = 0;  // mean of the absolute values
 };
 
-// Nodes are row-major. Not thread-safe; after construction no member allocates but normals(), and
+// A grid's nodes are row-major. Not thread-safe; after construction no member allocates but normals(), and
 // constraints.
 class ReferenceCloth {
  public:
   // At rest in its start pose. Springs are those of scene::springLinks().
   explicit ReferenceCloth(const scene::Cloth& cloth);
 
-  // Springs, damping, drag, lift, friction, solver from now on; same grid, mass, pins.
+  // Springs, damping, drag, lift, friction, solver from now on; same shape, mass, pins.
   void setParameters(const scene::Cloth& cloth);
 
   std::span<Vec3> positions() { return positions_; }
@@ -36,8 +37,9 @@ class ReferenceCloth {
   std::span<const Vec3> velocities() const { return velocities_; }
   // 1/kg; 0 for pinned nodes, which never move.
   std::span<const double> inverseMasses() const { return inverseMasses_; }
-  std::uint32_t nodeCount() const { return cloth_.grid.nodeCount(); }
-  double nodeMass() const { return double{cloth_.mass} / nodeCount(); }
+  std::uint32_t nodeCount() const { return cloth_.nodeCount(); }
+  // kg; of pinned nodes too.
+  std::span<const double> masses() const { return masses_; }
 
   // Both add to one force a node, N. [Va21] Eq. 1; air with drag and lift a triangle.
   void accumulateSpringForces(std::span<Vec3> forces) const;
@@ -50,7 +52,8 @@ class ReferenceCloth {
   // rest of their motion relative to the sphere meets Coulomb friction ([Va21] 3.4, Alg. 4).
   void collide(const Vec3& centre, const Vec3& velocity, double radius, double friction);
 
-  // Unit normals from up to eight triangles round a node ([Va21] 3.5, Alg. 5); (0,0,1) where they vanish.
+  // Unit normals; (0,0,1) where they vanish. A grid's from up to eight triangles round a node ([Va21] 3.5,
+  // Alg. 5), a mesh's from the area vectors of a node's triangles.
   std::vector<Vec3> normals() const;
 
   // J, of the nodes that can move; gravity's is 0 at the origin.
@@ -61,12 +64,15 @@ class ReferenceCloth {
 
  private:
   void enforceConstraints(double h);
+  std::vector<Vec3> gridNormals() const;
+  std::vector<Vec3> meshNormals() const;
 
   scene::Cloth cloth_;
   std::vector<scene::SpringLink> links_;
+  std::vector<scene::Triangle> triangles_;
   std::vector<Vec3> positions_, velocities_, forces_;
   std::vector<Vec3> start_;  // of the substep, where there are constraints
-  std::vector<double> inverseMasses_;
+  std::vector<double> masses_, inverseMasses_;
 };
 
 }  // namespace clothstream::reference

@@ -5,12 +5,18 @@
 #include <cassert>
 #include <cmath>
 
+#include "server/scene/mesh.h"
+
 namespace clothstream::scene {
 
 std::uint32_t Scene::nodeCount() const {
   std::uint32_t sum = 0;
-  for (const Cloth& cloth : cloths) sum += cloth.grid.nodeCount();
+  for (const Cloth& cloth : cloths) sum += cloth.nodeCount();
   return sum;
+}
+
+std::uint32_t Cloth::nodeCount() const {
+  return mesh ? mesh->nodeCount() : grid.nodeCount();
 }
 
 std::vector<Vec3> restPositions(const Grid& grid) {
@@ -28,13 +34,38 @@ std::vector<Vec3> restPositions(const Grid& grid) {
   return positions;
 }
 
+std::vector<Vec3> restPositions(const Cloth& cloth) {
+  return cloth.mesh ? cloth.mesh->shape.positions : restPositions(cloth.grid);
+}
+
+std::vector<double> nodeMasses(const Cloth& cloth) {
+  if (!cloth.mesh) return std::vector<double>(cloth.nodeCount(), double{cloth.mass} / cloth.nodeCount());
+  std::vector<double> masses;
+  masses.reserve(cloth.nodeCount());
+  for (const double share : cloth.mesh->shares) masses.push_back(share * cloth.mass);
+  return masses;
+}
+
 bool GridRange::contains(std::uint32_t row, std::uint32_t column) const {
   return row >= firstRow && row <= lastRow && (row - firstRow) % rowStep == 0 &&  //
          column >= firstColumn && column <= lastColumn && (column - firstColumn) % columnStep == 0;
 }
 
+bool Region::contains(const Vec3& point) const {
+  const Eigen::Vector3d away = (point.cast<double>() - centre.cast<double>()).cwiseAbs();
+  if (radius) return away.squaredNorm() <= double{*radius} * double{*radius};
+  return (2 * away.array() <= size.cast<double>().array()).all();
+}
+
 std::vector<std::uint8_t> pinnedNodes(const Cloth& cloth) {
-  std::vector<std::uint8_t> pinned(cloth.grid.nodeCount(), 0);
+  std::vector<std::uint8_t> pinned(cloth.nodeCount(), 0);
+  for (const std::uint32_t node : cloth.pinnedVertices) pinned[node] = 1;
+  if (!cloth.pinnedRegions.empty()) {
+    const std::vector<Vec3> rest = restPositions(cloth);
+    for (const Region& region : cloth.pinnedRegions)
+      for (std::size_t i = 0; i < rest.size(); ++i)
+        if (region.contains(rest[i])) pinned[i] = 1;
+  }
   for (const GridRange& range : cloth.pins) {
     assert(range.rowStep > 0 && range.columnStep > 0);
     assert(range.lastRow < cloth.grid.rows && range.lastColumn < cloth.grid.columns);

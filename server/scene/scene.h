@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -70,19 +71,34 @@ inline constexpr float kTakenBack = 0.15f;
 // Of h^2 / m, the compliance with which the number of iterations hardly depends on the cloth's size.
 inline constexpr float kRelativeCompliance = 0.01f;
 
+struct Mesh;  // mesh.h
+
+// A part of space, its surface included.
+struct Region {
+  Vec3 centre = Vec3::Zero();
+  std::optional<float> radius;  // m, of a sphere; absent: a box
+  Vec3 size = Vec3::Zero();     // m, of the box, from face to face
+
+  bool contains(const Vec3& point) const;
+};
+
 struct Cloth {
   std::string name;
-  Grid grid;
-  float mass = 0;  // kg, of the whole cloth; each node has mass / nodeCount
+  Grid grid;                         // of a cloth without mesh
+  std::shared_ptr<const Mesh> mesh;  // null: the cloth is the grid
+  float mass = 0;                    // kg, of the whole cloth; nodeMasses() says how it is spread
   Spring structural, shear, bend;
-  float damping = 0;         // 1/s
-  float drag = 0, lift = 0;  // coefficients, dimensionless
-  float friction = 0.3f;     // Coulomb, dimensionless
-  float thickness = 0.005f;  // m kept from a collider's surface
-  std::vector<GridRange> pins;
+  float damping = 0;                          // 1/s
+  float drag = 0, lift = 0;                   // coefficients, dimensionless
+  float friction = 0.3f;                      // Coulomb, dimensionless
+  float thickness = 0.005f;                   // m kept from a collider's surface
+  std::vector<GridRange> pins;                // of a grid
+  std::vector<std::uint32_t> pinnedVertices;  // nodes
+  std::vector<Region> pinnedRegions;          // whatever starts there
   Solver solver;
 
-  float nodeMass() const { return mass / static_cast<float>(grid.nodeCount()); }  // kg
+  std::uint32_t nodeCount() const;
+  float nodeMass() const { return mass / static_cast<float>(nodeCount()); }  // kg, mean
 };
 
 struct MotionKey {
@@ -129,10 +145,14 @@ struct Scene {
   std::uint32_t nodeCount() const;
 };
 
-// Start positions of the nodes, row-major, world space.
+// Start positions of the nodes, world space; a grid's row-major.
 std::vector<Vec3> restPositions(const Grid& grid);
+std::vector<Vec3> restPositions(const Cloth& cloth);
 
-// One byte a node, row-major: 1 where a range covers it. Ranges must lie inside the grid.
+// kg a node, pinned or not: a grid's all alike, a mesh's by their shares of its area.
+std::vector<double> nodeMasses(const Cloth& cloth);
+
+// One byte a node: 1 where it is pinned. Ranges must lie inside the grid, vertices must exist.
 std::vector<std::uint8_t> pinnedNodes(const Cloth& cloth);
 
 // Lengths at rest along a column (between columns), along a row (between rows), and along the diagonal, m.

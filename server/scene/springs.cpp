@@ -2,9 +2,12 @@
 // Springs of grids, and adjacency of any springs.
 #include "server/scene/springs.h"
 
+#include "server/scene/mesh.h"
+
 namespace clothstream::scene {
 
 std::vector<SpringLink> springLinks(const Cloth& cloth) {
+  if (cloth.mesh) return cloth.mesh->links;
   const std::uint32_t rows = cloth.grid.rows, columns = cloth.grid.columns;
   const GridSpacing lengths = spacing(cloth.grid);
   std::vector<SpringLink> links;

@@ -20,7 +20,8 @@ struct SpringLink {
   float restLength = 0;  // m
 };
 
-// Every spring once, by ascending a; of one a by kind, then by ascending b. [Va21] Fig. 1.
+// Every spring once, by ascending a; of one a by kind, then by ascending b. A grid's: [Va21] Fig. 1; a
+// mesh's: makeMesh().
 std::vector<SpringLink> springLinks(const Cloth& cloth);
 
 const Spring& springOf(const Cloth& cloth, SpringKind kind);

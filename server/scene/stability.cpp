@@ -22,15 +22,19 @@
 #include <algorithm>
 #include <vector>
 
-#include "server/scene/springs.h"
+#include "server/scene/mesh.h"
 
 namespace clothstream::scene {
 namespace {
 
-// Springs of each kind at one node.
-struct SpringCounts {
+// Springs of each kind at one node, and one over its mass.
+struct NodeSprings {
   std::uint32_t structural, shear, bend;
-  bool operator==(const SpringCounts&) const = default;
+  double perMass;
+
+  bool sameCounts(const NodeSprings& other) const {
+    return structural == other.structural && shear == other.shear && bend == other.bend;
+  }
 };
 
 // Neighbours at a distance of `step` before and after an index.
@@ -40,67 +44,103 @@ std::uint32_t neighbours(std::uint32_t index, std::uint32_t count, std::uint32_t
 
 // Every combination at nodes that are not pinned; of those the one that exceeds all others, if there is such
 // a node.
-std::vector<SpringCounts> springCounts(const Cloth& cloth) {
+std::vector<NodeSprings> gridSprings(const Cloth& cloth) {
   const std::uint32_t rows = cloth.grid.rows, columns = cloth.grid.columns;
-  const auto at = [&](std::uint32_t row, std::uint32_t column) -> SpringCounts {
+  const double perMass = cloth.grid.nodeCount() / double{cloth.mass};
+  const auto at = [&](std::uint32_t row, std::uint32_t column) -> NodeSprings {
     return {neighbours(row, rows, 1) + neighbours(column, columns, 1),
             neighbours(row, rows, 1) * neighbours(column, columns, 1),
-            neighbours(row, rows, 2) + neighbours(column, columns, 2)};
+            neighbours(row, rows, 2) + neighbours(column, columns, 2), perMass};
   };
   const auto atMost = [](std::uint32_t count, std::uint32_t step) {
     return std::min(2u, (count - 1) / step);
   };
-  const SpringCounts most{atMost(rows, 1) + atMost(columns, 1), atMost(rows, 1) * atMost(columns, 1),
-                          atMost(rows, 2) + atMost(columns, 2)};
-  std::vector<SpringCounts> found;
+  const NodeSprings most{atMost(rows, 1) + atMost(columns, 1), atMost(rows, 1) * atMost(columns, 1),
+                         atMost(rows, 2) + atMost(columns, 2), perMass};
+  const bool pinnedSingly = !cloth.pinnedVertices.empty() || !cloth.pinnedRegions.empty();
+  const std::vector<std::uint8_t> pinned = pinnedSingly ? pinnedNodes(cloth) : std::vector<std::uint8_t>();
+  std::vector<NodeSprings> found;
   for (std::uint32_t row = 0; row < rows; ++row)
     for (std::uint32_t column = 0; column < columns; ++column) {
-      const SpringCounts counts = at(row, column);
-      if (std::ranges::find(found, counts) != found.end()) continue;
+      const NodeSprings node = at(row, column);
+      if (std::ranges::any_of(found, [&](const NodeSprings& f) { return f.sameCounts(node); })) continue;
       if (std::ranges::any_of(cloth.pins, [&](const GridRange& pins) { return pins.contains(row, column); }))
         continue;
-      if (counts == most) return {most};
-      found.push_back(counts);
+      if (pinnedSingly && pinned[row * columns + column] != 0) continue;
+      if (node.sameCounts(most)) return {most};
+      found.push_back(node);
     }
   return found;
 }
 
+// Every combination of springs at nodes that are not pinned, with the lightest such node's mass.
+std::vector<NodeSprings> meshSprings(const Cloth& cloth) {
+  std::vector<NodeSprings> nodes;
+  nodes.reserve(cloth.nodeCount());
+  for (const double mass : nodeMasses(cloth)) nodes.push_back({0, 0, 0, 1 / mass});
+  for (const SpringLink& link : cloth.mesh->links)
+    for (const std::uint32_t node : {link.a, link.b})
+      ++(link.kind == SpringKind::structural ? nodes[node].structural
+         : link.kind == SpringKind::shear    ? nodes[node].shear
+                                             : nodes[node].bend);
+  const std::vector<std::uint8_t> pinned = pinnedNodes(cloth);
+  std::vector<NodeSprings> found;
+  for (std::size_t i = 0; i < nodes.size(); ++i) {
+    if (pinned[i] != 0) continue;
+    const auto same =
+        std::ranges::find_if(found, [&](const NodeSprings& f) { return f.sameCounts(nodes[i]); });
+    if (same == found.end())
+      found.push_back(nodes[i]);
+    else
+      same->perMass = std::max(same->perMass, nodes[i].perMass);
+  }
+  return found;
+}
+
+// The largest area round a node over its mass, m^2/kg. A node of a grid has at most six triangles, of half a
+// cell each, and a third of each node.
+double areaPerMass(const Cloth& cloth) {
+  if (!cloth.mesh) {
+    const GridSpacing lengths = spacing(cloth.grid);
+    return double{lengths.column} * lengths.row * cloth.grid.nodeCount() / cloth.mass;
+  }
+  double most = 0;
+  for (std::size_t i = 0; i < cloth.mesh->areas.size(); ++i)
+    most = std::max(most, cloth.mesh->areas[i] / cloth.mesh->shares[i]);
+  return most / cloth.mass;
+}
+
 // Largest rate in 1/s at which the air can brake a node. A triangle's force is 0.5 rho (C_D |N.u| u + C_L
 // ...), a function of the mean velocity of its three nodes; the symmetric part of its derivative is at most
-// 0.5 rho (2 C_D + C_L) |N| |u|. A third of that goes to each node, and a node has at most six triangles, of
-// half a cell each, so a row sums to  0.5 rho (2 C_D + C_L) |u| cell / m.
+// 0.5 rho (2 C_D + C_L) |N| |u|. A third of that goes to each node, so a row sums to
+// 0.5 rho (2 C_D + C_L) |u| area / m.
 double airDamping(const Cloth& cloth, const Environment& environment) {
-  const GridSpacing lengths = spacing(cloth.grid);
-  const double cell = double{lengths.column} * lengths.row;
   const double speed = environment.wind.cast<double>().norm() + kAirSpeed;
-  return 0.5 * environment.airDensity * (2.0 * cloth.drag + cloth.lift) * speed * cell *
-         cloth.grid.nodeCount() / cloth.mass;
+  return 0.5 * environment.airDensity * (2.0 * cloth.drag + cloth.lift) * speed * areaPerMass(cloth);
 }
 
 // Whether semi-implicit Euler with step h is stable: s + 2c < 4.
-bool semiImplicitStable(const Cloth& cloth, const SpringCounts& counts, double air, double h) {
-  const double perMass = cloth.grid.nodeCount() / double{cloth.mass};
+bool semiImplicitStable(const Cloth& cloth, const NodeSprings& node, double air, double h) {
   const auto weight = [&](const Spring& spring) { return h * h * spring.stiffness + 2 * h * spring.damping; };
-  const double springs = counts.structural * weight(cloth.structural) + counts.shear * weight(cloth.shear) +
-                         counts.bend * weight(cloth.bend);
-  return 2 * springs * perMass + 2 * h * (cloth.damping + air) < 4;
+  const double springs = node.structural * weight(cloth.structural) + node.shear * weight(cloth.shear) +
+                         node.bend * weight(cloth.bend);
+  return 2 * springs * node.perMass + 2 * h * (cloth.damping + air) < 4;
 }
 
 // Whether explicit Euler with step h is stable: s <= c, and c < 2, from which 2c - s < 4 follows.
-bool explicitStable(const Cloth& cloth, const SpringCounts& counts, double air, double h) {
-  const double perMass = cloth.grid.nodeCount() / double{cloth.mass};
+bool explicitStable(const Cloth& cloth, const NodeSprings& node, double air, double h) {
   const double tension = 1 - 1 / (1 + double{kTensionStrain});
   // What damping has to carry of one spring: along it, what the dashpot does not; across it, all of its
   // tension.
   const auto deficit = [&](const Spring& spring) {
     return std::max(h * spring.stiffness - spring.damping, h * spring.stiffness * tension);
   };
-  const double deficits = counts.structural * deficit(cloth.structural) +
-                          counts.shear * deficit(cloth.shear) + counts.bend * deficit(cloth.bend);
-  const double dashpots = counts.structural * double{cloth.structural.damping} +
-                          counts.shear * double{cloth.shear.damping} +
-                          counts.bend * double{cloth.bend.damping};
-  return 2 * deficits * perMass <= cloth.damping && h * (2 * dashpots * perMass + cloth.damping + air) < 2;
+  const double deficits = node.structural * deficit(cloth.structural) + node.shear * deficit(cloth.shear) +
+                          node.bend * deficit(cloth.bend);
+  const double dashpots = node.structural * double{cloth.structural.damping} +
+                          node.shear * double{cloth.shear.damping} + node.bend * double{cloth.bend.damping};
+  return 2 * deficits * node.perMass <= cloth.damping &&
+         h * (2 * dashpots * node.perMass + cloth.damping + air) < 2;
 }
 
 // Fewest substeps from `atLeast` on; both criteria only get easier with smaller steps. 0: none. Constraints
@@ -111,12 +151,12 @@ std::uint32_t stableSubsteps(const Scene& scene, Cloth cloth, std::uint32_t atLe
     cloth.structural.stiffness = cloth.shear.stiffness = 0;
   if (isConstraint(cloth.solver, SpringKind::bend)) cloth.bend.stiffness = 0;
   const double air = airDamping(cloth, scene.environment);
-  const std::vector<SpringCounts> combinations = springCounts(cloth);
+  const std::vector<NodeSprings> combinations = cloth.mesh ? meshSprings(cloth) : gridSprings(cloth);
   const auto stable = scene.integrator == Integrator::semiImplicitEuler ? semiImplicitStable : explicitStable;
   for (std::uint32_t substeps = atLeast; substeps <= kMaxSubsteps; ++substeps) {
     const double h = scene.tickSeconds() / substeps;
     if (std::ranges::all_of(combinations,
-                            [&](const SpringCounts& counts) { return stable(cloth, counts, air, h); }))
+                            [&](const NodeSprings& node) { return stable(cloth, node, air, h); }))
       return substeps;
   }
   return 0;

@@ -14,7 +14,9 @@
 #include "kernels/advance_mass_spring.h"
 #include "kernels/compute_normals.h"
 #include "kernels/hash_state.h"
+#include "server/simulation/advance_variant.h"
 #include "server/simulation/constraint_stage.h"
+#include "server/simulation/mesh_stage.h"
 #include "server/vulkan/kernel.h"
 
 namespace clothstream::simulation {
@@ -88,7 +90,7 @@ Buffers::Buffers(const vulkan::Device& device, std::size_t nodes, std::size_t cl
       checkpointVelocities(device, BufferPurpose::state, nodes * kTexelBytes),
       normals(device, BufferPurpose::texels, nodes * kTexelBytes),
       cloths(device, BufferPurpose::texels, clothCount * sizeof(shared::ClothRecord)),
-      tiles(device, BufferPurpose::texels, tileCount * sizeof(shared::TileRecord)),
+      tiles(device, BufferPurpose::texels, std::max<std::size_t>(1, tileCount) * sizeof(shared::TileRecord)),
       spheres(device, BufferPurpose::texels, kMaxSpheres * sizeof(shared::SphereRecord)),
       status(device, BufferPurpose::state, sizeof(shared::StatusRecord)),
       statusReadback(device, BufferPurpose::readback, 2 * sizeof(shared::StatusRecord)),
@@ -98,6 +100,13 @@ Buffers::Buffers(const vulkan::Device& device, std::size_t nodes, std::size_t cl
   for (Buffer& buffer : velocities) buffer = Buffer(device, BufferPurpose::texels, nodes * kTexelBytes);
   for (Buffer& buffer : inputs)
     buffer = Buffer(device, BufferPurpose::upload, cloths.bytes() + spheres.bytes());
+}
+
+StateBuffers stateOf(const Buffers& b) {
+  return {.cloths = b.cloths,
+          .spheres = b.spheres,
+          .positions = {&b.positions[0], &b.positions[1]},
+          .velocities = {&b.velocities[0], &b.velocities[1]}};
 }
 
 // A kernel, bound to read each of the two state buffers.
@@ -111,14 +120,6 @@ struct Stage {
 
   vulkan::Kernel kernel;
   std::array<vulkan::Bindings, 2> from;
-};
-
-// What the kernel leaves out where a scene has none of it; the bits are the same.
-struct AdvanceVariant {
-  bool springDamping, air, spheres;
-
-  std::size_t index() const { return (springDamping ? 1u : 0u) | (air ? 2u : 0u) | (spheres ? 4u : 0u); }
-  static constexpr std::size_t kCount = 8;
 };
 
 AdvanceVariant variantOf(std::span<const shared::ClothRecord> cloths, float airDensity, bool spheres) {
@@ -138,9 +139,7 @@ std::unique_ptr<Stage> makeAdvance(const vulkan::Device& device, const Buffers& 
                        BindingKind::storage, BindingKind::storage, BindingKind::texels},
           .pushConstantBytes = sizeof(shared::AdvancePush),
           .workgroupSize = cut.workgroupSize,
-          .specialisation = {cut.rowsPerInvocation, variant.springDamping ? 1u : 0u, variant.air ? 1u : 0u,
-                             variant.spheres ? 1u : 0u,
-                             integrator == scene::Integrator::explicitEuler ? 1u : 0u}},
+          .specialisation = variant.specialisation(cut.rowsPerInvocation, integrator)},
       std::initializer_list<const Buffer*>{&b.cloths, &b.tiles, &b.positions[0], &b.velocities[0],
                                            &b.positions[1], &b.velocities[1], &b.spheres},
       std::initializer_list<const Buffer*>{&b.cloths, &b.tiles, &b.positions[1], &b.velocities[1],
@@ -176,11 +175,12 @@ struct ClothSimulation::Pipeline {
   Pipeline(const vulkan::Device& on, const scene::Scene& scene, const SimulationOptions& options);
 
   const Stage& advance(const AdvanceVariant& variant);
+  void prepare(const AdvanceVariant& variant);
   void start(vulkan::Recorder& recorder);
   void recordInputs(vulkan::Recorder& recorder, const TickInputs& inputs);
   void recordSubsteps(vulkan::Recorder& recorder, const TickInputs& inputs);
-  void recordAdvance(vulkan::Recorder& recorder, const TickInputs& inputs, bool spheres,
-                     std::uint32_t firstTile, std::size_t tiles, shared::AdvancePush push);
+  void recordAdvance(vulkan::Recorder& recorder, const TickInputs& inputs, bool constrained,
+                     shared::AdvancePush push);
   void recordStatus(vulkan::Recorder& recorder);
   void writeState(const NodeState& state);
   void recordUploadedState(vulkan::Recorder& recorder);
@@ -199,7 +199,8 @@ struct ClothSimulation::Pipeline {
   Buffers buffers;
   std::array<std::unique_ptr<Stage>, AdvanceVariant::kCount> advances;  // made when they are first needed
   Stage normals, hash;
-  std::unique_ptr<ConstraintStage> constraints;  // where there are any
+  std::unique_ptr<MeshStage> meshes;             // where there are any
+  std::unique_ptr<ConstraintStage> constraints;  // likewise
 
   bool started = false;       // the start state and the tiles are on the device
   std::uint32_t present = 0;  // which state buffers hold the state
@@ -224,19 +225,23 @@ ClothSimulation::Pipeline::Pipeline(const vulkan::Device& on, const scene::Scene
       buffers(on, nodes, records.size(), cut.tiles.records.size()),
       normals(makeNormals(on, buffers, cut)),
       hash(makeHash(on, buffers, cut)) {
-  std::memcpy(buffers.tileUpload.mapped().data(), cut.tiles.records.data(), buffers.tiles.bytes());
+  std::memcpy(buffers.tileUpload.mapped().data(), cut.tiles.records.data(),
+              std::span(cut.tiles.records).size_bytes());
   std::memcpy(buffers.inputs[slot].mapped().data(), records.data(), buffers.cloths.bytes());
   writeState(restState(scene.cloths));
+  const MeshTables meshTables = simulation::meshTables(scene.cloths, cut.workgroupSize);
+  if (!meshTables.nodes.empty())
+    meshes = std::make_unique<MeshStage>(on, meshTables, stateOf(buffers), buffers.normals, integrator,
+                                         cut.workgroupSize);
   const ConstraintTables tables = constraintTables(scene.cloths);
   if (!tables.links.empty())
-    constraints =
-        std::make_unique<ConstraintStage>(on, tables,
-                                          StateBuffers{buffers.cloths,
-                                                       buffers.spheres,
-                                                       {&buffers.positions[0], &buffers.positions[1]},
-                                                       {&buffers.velocities[0], &buffers.velocities[1]}},
-                                          options.workgroupSize);
-  for (const bool spheres : {false, true}) advance(variantOf(records, scene.environment.airDensity, spheres));
+    constraints = std::make_unique<ConstraintStage>(on, tables, stateOf(buffers), options.workgroupSize);
+  for (const bool spheres : {false, true}) prepare(variantOf(records, scene.environment.airDensity, spheres));
+}
+
+void ClothSimulation::Pipeline::prepare(const AdvanceVariant& variant) {
+  if (!cut.tiles.records.empty()) advance(variant);
+  if (meshes) meshes->prepare(variant);
 }
 
 const Stage& ClothSimulation::Pipeline::advance(const AdvanceVariant& variant) {
@@ -267,6 +272,7 @@ void ClothSimulation::Pipeline::start(vulkan::Recorder& recorder) {
   started = true;
   recorder.copy(buffers.tileUpload, buffers.tiles, buffers.tiles.bytes());
   recorder.copy(buffers.inputs[slot], buffers.cloths, buffers.cloths.bytes());
+  if (meshes) meshes->recordTables(recorder);
   recordUploadedState(recorder);
   if (constraints) constraints->recordTables(recorder);
   recorder.barrier();
@@ -290,18 +296,20 @@ void ClothSimulation::Pipeline::recordInputs(vulkan::Recorder& recorder, const T
   recorder.fill(buffers.status, 0, buffers.status.bytes());
 }
 
+// Constrained cloths collide after their constraints.
 void ClothSimulation::Pipeline::recordAdvance(vulkan::Recorder& recorder, const TickInputs& inputs,
-                                              bool spheres, std::uint32_t firstTile, std::size_t tiles,
-                                              shared::AdvancePush push) {
-  if (tiles == 0) return;
-  push.firstTile = firstTile;
-  const Stage& stage = advance(variantOf(records, inputs.environment.airDensity, spheres));
-  recorder.dispatch(stage.from[present], push, std::uint64_t{tiles} * cut.workgroupSize);
+                                              bool constrained, shared::AdvancePush push) {
+  const bool spheres = push.sphereCount > 0 && !constrained;
+  const AdvanceVariant variant = variantOf(records, inputs.environment.airDensity, spheres);
+  const TileRange tiles = cut.tiles.range(constrained);
+  push.firstTile = tiles.first;
+  if (tiles.count > 0)
+    recorder.dispatch(advance(variant).from[present], push, std::uint64_t{tiles.count} * cut.workgroupSize);
+  if (meshes) meshes->recordAdvance(recorder, present, variant, constrained, push);
 }
 
 void ClothSimulation::Pipeline::recordSubsteps(vulkan::Recorder& recorder, const TickInputs& inputs) {
   const scene::Environment& environment = inputs.environment;
-  const std::uint32_t free = cut.tiles.withoutConstraints;
   std::uint32_t iterations = 0;
   for (const shared::ClothRecord& record : records)
     iterations = std::max(iterations, static_cast<std::uint32_t>(record.solver.y));
@@ -315,9 +323,7 @@ void ClothSimulation::Pipeline::recordSubsteps(vulkan::Recorder& recorder, const
   for (std::uint32_t substep = 0; substep < substeps; ++substep) {
     push.sphereProgress = static_cast<float>(substep + 1) / static_cast<float>(substeps);
     recorder.barrier();
-    recordAdvance(recorder, inputs, push.sphereCount > 0, 0, free, push);
-    // Constrained cloths collide after their constraints.
-    recordAdvance(recorder, inputs, false, free, cut.tiles.records.size() - free, push);
+    for (const bool constrained : {false, true}) recordAdvance(recorder, inputs, constrained, push);
     if (constraints)
       constraints->record(recorder, present, iterations,
                           {.count = 0,
@@ -367,8 +373,10 @@ void ClothSimulation::recordTick(vulkan::Recorder& recorder, const TickInputs& i
 void ClothSimulation::recordNormals(vulkan::Recorder& recorder) {
   pipeline_->start(recorder);
   recorder.beginStage("normals");
-  recorder.dispatch(pipeline_->normals.from[pipeline_->present],
-                    std::uint64_t{pipeline_->cut.tiles.records.size()} * pipeline_->cut.workgroupSize);
+  const std::uint64_t tiles = pipeline_->cut.tiles.records.size();
+  if (tiles > 0)
+    recorder.dispatch(pipeline_->normals.from[pipeline_->present], tiles * pipeline_->cut.workgroupSize);
+  if (pipeline_->meshes) pipeline_->meshes->recordNormals(recorder, pipeline_->present);
 }
 
 TickStatus ClothSimulation::status() const {

@@ -51,15 +51,15 @@ class ClothSimulation {
   ClothSimulation& operator=(const ClothSimulation&) = delete;
 
   // Parameters of cloths (springs, damping, drag, lift, friction, thickness) from the next recorded tick on.
-  // Same cloths, same grids, same masses, same pins as at construction.
+  // Same cloths, same shapes, same masses, same pins as at construction.
   void setCloths(std::span<const scene::Cloth> cloths);
 
   // All substeps of one tick, and its status. At most one tick may be in flight when it is called.
   // Stages: "inputs", "advance", "hash".
   void recordTick(vulkan::Recorder& recorder, const TickInputs& inputs);
 
-  // Vertex normals of the present positions ([Va21] 3.5, Alg. 5). Only when somebody needs them. Stage
-  // "normals".
+  // Vertex normals of the present positions ([Va21] 3.5, Alg. 5; of meshes from their triangles). Only when
+  // somebody needs them. Stage "normals".
   void recordNormals(vulkan::Recorder& recorder);
 
   // Of the last recorded tick, once it is complete.

@@ -8,19 +8,13 @@
 #include <span>
 
 #include "server/simulation/constraint_tables.h"
+#include "server/simulation/state_buffers.h"
 #include "server/vulkan/buffer.h"
 #include "server/vulkan/device.h"
 #include "server/vulkan/kernel.h"
 #include "server/vulkan/recorder.h"
 
 namespace clothstream::simulation {
-
-// The scene's buffers that a stage works on; they outlive it. State lies in two by turns.
-struct StateBuffers {
-  const vulkan::Buffer& cloths;
-  const vulkan::Buffer& spheres;
-  std::array<const vulkan::Buffer*, 2> positions, velocities;
-};
 
 // How a solve is cut; the results do not depend on it.
 struct SolveCut {

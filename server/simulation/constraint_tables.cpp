@@ -41,7 +41,7 @@ void appendSystem(const scene::Cloth& cloth, std::size_t number, std::uint32_t f
                   ConstraintTables& tables) {
   const std::vector<scene::SpringLink> links = constraintsOf(cloth);
   if (links.empty()) return;
-  const std::uint32_t nodes = cloth.grid.nodeCount();
+  const std::uint32_t nodes = cloth.nodeCount();
   tables.systems.push_back(
       {.links = halves(tables.links.size(), static_cast<float>(links.size()), static_cast<float>(number)),
        .nodes = {static_cast<float>(firstNode), static_cast<float>(nodes), 0, 0}});
@@ -62,11 +62,11 @@ void appendSystem(const scene::Cloth& cloth, std::size_t number, std::uint32_t f
 ConstraintTables constraintTables(std::span<const scene::Cloth> cloths) {
   ConstraintTables tables;
   std::uint32_t nodes = 0;
-  for (const scene::Cloth& cloth : cloths) nodes += cloth.grid.nodeCount();
+  for (const scene::Cloth& cloth : cloths) nodes += cloth.nodeCount();
   tables.incidences.resize(nodes, {{0, 0, 0, 0}});
   const auto append = [&](scene::SolverKind kind) {
     std::uint32_t firstNode = 0;
-    for (std::size_t i = 0; i < cloths.size(); firstNode += cloths[i++].grid.nodeCount())
+    for (std::size_t i = 0; i < cloths.size(); firstNode += cloths[i++].nodeCount())
       if (cloths[i].solver.kind == kind) appendSystem(cloths[i], i, firstNode, tables);
   };
   append(scene::SolverKind::constraint);

@@ -28,7 +28,7 @@ shared::vec4 limitsOf(const scene::Solver& solver) {
 
 std::vector<std::uint32_t> clothOffsets(std::span<const scene::Cloth> cloths) {
   std::vector<std::uint32_t> offsets{0};
-  for (const scene::Cloth& cloth : cloths) offsets.push_back(offsets.back() + cloth.grid.nodeCount());
+  for (const scene::Cloth& cloth : cloths) offsets.push_back(offsets.back() + cloth.nodeCount());
   return offsets;
 }
 
@@ -42,8 +42,8 @@ std::vector<shared::ClothRecord> clothRecords(std::span<const scene::Cloth> clot
       return static_cast<float>(number);
     };
     records.push_back(
-        {.place = {whole(firstNode & 0xFFFF), whole(firstNode >> 16), whole(cloth.grid.rows),
-                   whole(cloth.grid.columns)},
+        {.place = {whole(firstNode & 0xFFFF), whole(firstNode >> 16), cloth.mesh ? 0 : whole(cloth.grid.rows),
+                   whole(cloth.mesh ? cloth.nodeCount() : cloth.grid.columns)},
          .spacing = {spacing.column, spacing.row, spacing.diagonal, cloth.damping},
          .stiffness = {scene::forceOf(cloth, scene::SpringKind::structural).stiffness,
                        scene::forceOf(cloth, scene::SpringKind::shear).stiffness,
@@ -54,7 +54,7 @@ std::vector<shared::ClothRecord> clothRecords(std::span<const scene::Cloth> clot
                     static_cast<float>(cloth.solver.iterations),
                     cloth.solver.tolerance * cloth.solver.tolerance, 0},
          .limits = limitsOf(cloth.solver)});
-    firstNode += cloth.grid.nodeCount();
+    firstNode += cloth.nodeCount();
   }
   return records;
 }
@@ -65,7 +65,7 @@ Tiles makeTiles(std::span<const scene::Cloth> cloths, std::uint32_t rowsPerInvoc
   Tiles tiles;
   const auto append = [&](scene::SolverKind kind) {
     for (std::uint32_t cloth = 0; cloth < cloths.size(); ++cloth) {
-      if (cloths[cloth].solver.kind != kind) continue;
+      if (cloths[cloth].mesh || cloths[cloth].solver.kind != kind) continue;
       const scene::Grid& grid = cloths[cloth].grid;
       const std::uint32_t strips = (grid.rows + rowsPerInvocation - 1) / rowsPerInvocation;
       const std::uint64_t invocations = std::uint64_t{strips} * grid.columns;
@@ -92,8 +92,10 @@ shared::SphereRecord sphereRecord(const MovingSphere& sphere) {
 std::vector<float> inverseMasses(std::span<const scene::Cloth> cloths) {
   std::vector<float> all;
   for (const scene::Cloth& cloth : cloths) {
-    const auto free = static_cast<float>(static_cast<double>(cloth.grid.nodeCount()) / double{cloth.mass});
-    for (const std::uint8_t pinned : scene::pinnedNodes(cloth)) all.push_back(pinned != 0 ? 0.0f : free);
+    const std::vector<double> masses = scene::nodeMasses(cloth);
+    const std::vector<std::uint8_t> pinned = scene::pinnedNodes(cloth);
+    for (std::size_t i = 0; i < masses.size(); ++i)
+      all.push_back(pinned[i] != 0 ? 0.0f : static_cast<float>(1 / masses[i]));
   }
   return all;
 }
@@ -101,7 +103,7 @@ std::vector<float> inverseMasses(std::span<const scene::Cloth> cloths) {
 NodeState restState(std::span<const scene::Cloth> cloths) {
   NodeState state;
   for (const scene::Cloth& cloth : cloths) {
-    const std::vector<scene::Vec3> positions = scene::restPositions(cloth.grid);
+    const std::vector<scene::Vec3> positions = scene::restPositions(cloth);
     std::transform(positions.begin(), positions.end(), std::back_inserter(state.positions),
                    [](const scene::Vec3& p) { return scene::Vec3(p.unaryExpr(&snapTiny)); });
   }

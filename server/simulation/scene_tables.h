@@ -25,12 +25,24 @@ std::vector<std::uint32_t> clothOffsets(std::span<const scene::Cloth> cloths);
 
 std::vector<shared::ClothRecord> clothRecords(std::span<const scene::Cloth> cloths, double substepSeconds);
 
-// One tile a workgroup: together they cover every node once, `rowsPerInvocation` rows an invocation. Those of
-// cloths without constraints come first.
+struct TileRange {
+  std::uint32_t first, count;
+};
+
+// Those of cloths without constraints come first.
 struct Tiles {
   std::vector<shared::TileRecord> records;
   std::uint32_t withoutConstraints = 0;  // of the records
+
+  TileRange range(bool constrained) const {
+    const auto all = static_cast<std::uint32_t>(records.size());
+    return constrained ? TileRange{withoutConstraints, all - withoutConstraints}
+                       : TileRange{0, withoutConstraints};
+  }
 };
+
+// One tile a workgroup: together they cover every node of the grids once, `rowsPerInvocation` rows an
+// invocation.
 Tiles makeTiles(std::span<const scene::Cloth> cloths, std::uint32_t rowsPerInvocation,
                 std::uint32_t workgroupSize);
 
@@ -39,7 +51,7 @@ shared::SphereRecord sphereRecord(const MovingSphere& sphere);
 // 1/kg a node; 0 for pinned nodes.
 std::vector<float> inverseMasses(std::span<const scene::Cloth> cloths);
 
-// Every node where its cloth's pose puts it, at rest.
+// Every node where it starts, at rest.
 NodeState restState(std::span<const scene::Cloth> cloths);
 
 }  // namespace clothstream::simulation

@@ -11,41 +11,8 @@
 
 #extension GL_EXT_control_flow_attributes : require
 
-#include "shaders/mass_spring/air.glsl"
-#include "shaders/mass_spring/spheres.glsl"
-#include "shaders/mass_spring/springs.glsl"
+#include "shaders/mass_spring/state.glsl"
 #include "shaders/shared/grid_strip.glsl"
-
-// As in [Va21]; else semi-implicit Euler.
-layout(constant_id = 5) const bool kExplicitEuler = false;
-
-layout(binding = 2) uniform samplerBuffer positions;  // w: inverse mass
-layout(binding = 3) uniform samplerBuffer velocities;
-layout(std430, binding = 4) writeonly buffer NextPositions {
-  vec4 nextPositions[];
-};
-layout(std430, binding = 5) writeonly buffer NextVelocities {
-  vec4 nextVelocities[];
-};
-
-layout(push_constant) uniform Push {
-  AdvancePush push;
-};
-
-vec3 fetchVelocity(uint index) {
-  return texelFetch(velocities, int(index)).xyz;
-}
-
-// The velocity of a neighbour is read where some force depends on it.
-Node fetchNode(uint index) {
-  vec4 position = texelFetch(positions, int(index));
-  return Node(position.xyz, position.w, kSpringDamping || kAir ? fetchVelocity(index) : vec3(0.0));
-}
-
-void store(uint index, Node node) {
-  nextPositions[index] = vec4(snapTiny(node.position), node.inverseMass);
-  nextVelocities[index] = vec4(snapTiny(node.velocity), 0.0);
-}
 
 void main() {
   Strip strip = locateStrip(push.firstTile);
@@ -152,11 +119,7 @@ void main() {
       rightAboveAir2 = airForce(right, below, rightBelow, air);
     }
 
-    precise vec3 acceleration = force * here.inverseMass + push.gravityStep.xyz - spacing.w * here.velocity;
-    precise vec3 velocity = here.velocity + push.gravityStep.w * acceleration;
-    precise vec3 position = here.position + push.gravityStep.w * (kExplicitEuler ? here.velocity : velocity);
-    bool pinned = here.inverseMass == 0.0;
-    moved[k] = Node(pinned ? here.position : position, here.inverseMass, pinned ? vec3(0.0) : velocity);
+    moved[k] = moveNode(here, force, spacing.w);
     if (!kSpheres && row <= lastRow) {
       store(index, moved[k]);
     }

@@ -13,7 +13,7 @@ CLOTHSTREAM_SHARED_BEGIN
 // One cloth: where its nodes lie in the scene's buffers, its material and its solver. Row-major, SI units.
 #define CLOTHSTREAM_CLOTH_TEXELS 7
 struct ClothRecord {
-  vec4 place;      // first node modulo 2^16, first node / 2^16, rows, columns
+  vec4 place;      // first node modulo 2^16, first node / 2^16, rows, columns; of a mesh: 0, nodes
   vec4 spacing;    // of columns, of rows, along the diagonal; damping
   vec4 stiffness;  // structural, shear, bend; friction
   vec4 damping;    // structural, shear, bend; thickness

@@ -42,8 +42,8 @@ TEST_P(NamedScene, StaysAClothThatNoSphereIsIn) {
 INSTANTIATE_TEST_SUITE_P(All, NamedScene, testing::ValuesIn(namedScenes()),
                          [](const auto& name) { return name.param; });
 
-TEST(NamedScenes, AreTheThreeOfTheHouse) {
-  EXPECT_EQ(namedScenes(), (std::vector<std::string>{"curtain", "flag", "sphere_drop"}));
+TEST(NamedScenes, AreThoseOfTheHouse) {
+  EXPECT_EQ(namedScenes(), (std::vector<std::string>{"curtain", "flag", "sphere_drop", "tablecloth"}));
 }
 
 TEST(NamedScenes, SphereDropComesToRestOnTheSphere) {

@@ -71,6 +71,22 @@ TEST_F(Kernels, springsPullAsInTheReferenceOnEveryShapeOfGrid) {
   }
 }
 
+// A grid given as a mesh, and a disc whose lightest node is no lighter than a grid's; grids before and
+// between.
+TEST_F(Kernels, meshesPullAsInTheReference) {
+  expectLikeReference(sceneOf({scene::asMesh(calmCloth(17, 23))}), {}, 21);
+  expectLikeReference(sceneOf({discCloth(11)}), {}, 22);
+  scene::Cloth pinned = discCloth(5);
+  pinned.pinnedVertices = {0, 3, 60};
+  expectLikeReference(sceneOf({calmCloth(5, 7), discCloth(6), calmCloth(9, 4), pinned}), {}, 23);
+}
+
+TEST_F(Kernels, undampedMeshesPullAsInTheReference) {
+  scene::Cloth cloth = discCloth(9);
+  cloth.structural.damping = cloth.bend.damping = 0;
+  expectLikeReference(sceneOf({cloth}), {}, 24);
+}
+
 TEST_F(Kernels, undampedSpringsPullAsInTheReference) {
   scene::Cloth cloth = calmCloth(17, 23);
   cloth.structural.damping = cloth.shear.damping = cloth.bend.damping = 0;
@@ -104,6 +120,17 @@ TEST_F(Kernels, airDragsAndLiftsAsInTheReference) {
   expectLikeReference(scene, {}, 5, {.extraForce = air});
 }
 
+TEST_F(Kernels, airDragsAndLiftsMeshesAsInTheReference) {
+  scene::Cloth cloth = discCloth(9);
+  cloth.drag = 0.8f;
+  cloth.lift = 0.6f;
+  scene::Scene scene = sceneOf({cloth});
+  scene.environment.wind = scene::Vec3(3, -1, 8);
+  const double pressure = 1.2 / 6 * 15 * 15 * (0.8 + 2 * 0.6);
+  const double air = 6 * kRounding * pressure * (2 * kExtent * 2 * 0.03 + 20 * 2e-4);
+  expectLikeReference(scene, {}, 25, {.extraForce = air});
+}
+
 TEST_F(Kernels, airPushesStillClothWithoutSpringDamping) {
   scene::Cloth cloth = calmCloth(12, 9);
   cloth.structural.damping = cloth.shear.damping = cloth.bend.damping = 0;
@@ -131,8 +158,20 @@ TEST_F(Kernels, movingSpheresCollideAsInTheReference) {
                       {.displacement = 0.005f, .speed = 1, .extraForce = turned});
 }
 
+TEST_F(Kernels, movingSpheresCollideWithMeshesAsInTheReference) {
+  scene::Cloth cloth = discCloth(12);
+  cloth.friction = 0.4f;
+  const std::vector<simulation::MovingSphere> spheres{
+      {scene::Vec3(0.05f, 0.08f, 0), scene::Vec3(0.051f, 0.075f, 0), 0.1f, 1},
+      {scene::Vec3(-0.1f, -0.06f, 0.02f), scene::Vec3(-0.1f, -0.05f, 0.02f), 0.1f, 5}};
+  const double h = 1.0 / 720, nodeMass = 0.01;
+  const double turned = 10 * kSpeed * 2 * kRounding * kExtent / 0.05 * nodeMass / h;
+  expectLikeReference(sceneOf({cloth}), spheres, 26,
+                      {.displacement = 0.005f, .speed = 1, .extraForce = turned});
+}
+
 TEST_F(Kernels, normalsPointAsInTheReference) {
-  scene::Scene scene = sceneOf({calmCloth(19, 33), calmCloth(2, 2)});
+  scene::Scene scene = sceneOf({calmCloth(19, 33), calmCloth(2, 2), discCloth(8)});
   scene.cloths[1].grid.pose.position = scene::Vec3(0, 1, 0);
   std::mt19937 random(8);
   const NodeState state = randomState(scene, random, 0.006f, 0);

@@ -22,6 +22,14 @@ scene::Cloth calmCloth(std::uint32_t rows, std::uint32_t columns) {
   return cloth;
 }
 
+scene::Cloth discCloth(std::uint32_t rings) {
+  scene::Cloth cloth = calmCloth(2, 2);
+  cloth.mesh = std::make_shared<const scene::Mesh>(
+      scene::makeMesh(scene::disc(rings, 0.02f * static_cast<float>(rings))));
+  cloth.mass = 0.02f * static_cast<float>(cloth.nodeCount());
+  return cloth;
+}
+
 scene::GridRange topRow(const scene::Cloth& cloth) {
   return {.firstRow = 0,
           .lastRow = 0,

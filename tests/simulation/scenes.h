@@ -11,6 +11,7 @@
 #include "server/reference/reference_simulation.h"
 #include "server/scene/scene.h"
 #include "server/simulation/cloth_simulation.h"
+#include "tests/scene/meshes.h"
 #include "tests/vulkan/gpu_test.h"
 
 namespace clothstream::tests {
@@ -18,6 +19,8 @@ namespace clothstream::tests {
 // rows x columns nodes with 2 cm between them, 10 g a node, springs and damping far inside the stability
 // bound.
 scene::Cloth calmCloth(std::uint32_t rows, std::uint32_t columns);
+// A disc of rings 2 cm apart with the springs of a calm cloth; its lightest node has more than 10 g.
+scene::Cloth discCloth(std::uint32_t rings);
 scene::GridRange topRow(const scene::Cloth& cloth);
 // 72 ticks a second of ten substeps.
 scene::Scene sceneOf(std::vector<scene::Cloth> cloths);

@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: MIT
+// Wavefront OBJ, read by tinyobjloader.
+#include <istream>
+#include <streambuf>
+
+#include <fmt/format.h>
+#include <tiny_obj_loader.h>
+
+#include "server/meshes/mesh_file.h"
+
+namespace clothstream::meshes {
+namespace {
+
+// A text as a stream, without a copy.
+class TextBuffer : public std::streambuf {
+ public:
+  explicit TextBuffer(std::string_view text) {
+    char* begin = const_cast<char*>(text.data());  // get areas are never written
+    setg(begin, begin, begin + text.size());
+  }
+};
+
+// The loader takes what is no number as 0 without a word.
+tl::expected<void, std::string> checkVertexLines(std::string_view text) {
+  std::size_t line = 1;
+  for (std::size_t start = 0; start < text.size(); ++line) {
+    const std::size_t end = std::min(text.find('\n', start), text.size());
+    const std::string_view content = text.substr(start, end - start);
+    if (content.starts_with("v ") && content.find_first_not_of("0123456789+-.eE \t\r", 2) != content.npos)
+      return tl::unexpected(fmt::format("line {} is \"{}\": a vertex's coordinates must be finite numbers",
+                                        line, content.substr(0, 60)));
+    start = end + 1;
+  }
+  return {};
+}
+
+// What the loader calls, statement by statement.
+class ObjReader {
+ public:
+  tl::expected<MeshSource, std::string> read(std::string_view text) {
+    TextBuffer buffer(text);
+    std::istream stream(&buffer);
+    tinyobj::callback_t callbacks;
+    callbacks.vertex_cb = [](void* self, float x, float y, float z, float) { of(self).vertex(x, y, z); };
+    callbacks.texcoord_cb = [](void* self, float u, float v, float) {
+      of(self).source_.uvs.emplace_back(u, v);
+    };
+    callbacks.index_cb = [](void* self, tinyobj::index_t* corners, int count) {
+      of(self).face(std::span(corners, static_cast<std::size_t>(count)));
+    };
+    callbacks.usemtl_cb = [](void* self, const char* name, int) { of(self).enter(of(self).material_, name); };
+    callbacks.object_cb = [](void* self, const char* name) { of(self).enter(of(self).object_, name); };
+    callbacks.group_cb = [](void* self, const char** names, int count) {
+      of(self).enter(of(self).object_, count > 0 ? names[0] : "");
+    };
+    std::string warning, error;
+    const bool read = tinyobj::LoadObjWithCallback(stream, callbacks, this, nullptr, &warning, &error);
+    if (!problem_.empty()) return tl::unexpected(std::move(problem_));
+    if (!read) return tl::unexpected(fmt::format("is no OBJ: {}", error));
+    if (!everyCornerHasUv_) source_.uvs.clear();
+    return std::move(source_);
+  }
+
+ private:
+  static ObjReader& of(void* self) { return *static_cast<ObjReader*>(self); }
+
+  void vertex(float x, float y, float z) { source_.vertices.emplace_back(x, y, z); }
+
+  void enter(std::string& name, const char* value) {
+    name = value;
+    partOpen_ = false;
+  }
+
+  void face(std::span<const tinyobj::index_t> corners) {
+    if (!problem_.empty()) return;
+    const std::size_t number = source_.faces.size();
+    if (corners.size() != 3 && corners.size() != 4) {
+      problem_ = fmt::format("face {} has {} corners; faces must have 3 or 4: triangulate it when you export",
+                             number, corners.size());
+      return;
+    }
+    if (!partOpen_) source_.parts.push_back({material_.empty() ? object_ : material_, number});
+    partOpen_ = true;
+    SourceFace& face = source_.faces.emplace_back();
+    face.cornerCount = static_cast<std::uint32_t>(corners.size());
+    for (std::size_t i = 0; i < corners.size(); ++i) {
+      face.vertices[i] = absolute(corners[i].vertex_index, source_.vertices.size());
+      face.uvs[i] = absolute(corners[i].texcoord_index, source_.uvs.size());
+      everyCornerHasUv_ = everyCornerHasUv_ && corners[i].texcoord_index != 0;
+    }
+  }
+
+  // From 1 upwards, or backwards from the newest; what is neither comes out too large, which buildMesh()
+  // refuses.
+  static std::uint32_t absolute(int index, std::size_t count) {
+    return static_cast<std::uint32_t>(index > 0    ? index - 1
+                                      : index == 0 ? -1
+                                                   : static_cast<int>(count) + index);
+  }
+
+  MeshSource source_;
+  std::string object_, material_, problem_;
+  bool partOpen_ = false, everyCornerHasUv_ = true;
+};
+
+}  // namespace
+
+tl::expected<MeshSource, std::string> parseObj(std::string_view text) {
+  if (const auto checked = checkVertexLines(text); !checked) return tl::unexpected(checked.error());
+  return ObjReader().read(text);
+}
+
+}  // namespace clothstream::meshes

@@ -1,0 +1,164 @@
+// SPDX-License-Identifier: MIT
+// Meshes in messages, and those that messages name.
+#include "server/messages/mesh_message.h"
+
+#include <numeric>
+
+#include <fmt/format.h>
+
+#include "server/messages/limits.h"
+#include "server/messages/vectors.h"
+
+namespace clothstream::messages {
+namespace {
+
+constexpr meshes::MeshLimits kMeshLimits{.maxVertices = limits::kMaxNodes,
+                                         .maxCoordinate = static_cast<float>(limits::kPosition.max),
+                                         .minEdge = static_cast<float>(limits::kMinSpacing)};
+
+void checkWhole(Checks& checks, const Path& path, int size, int each) {
+  if (size % each != 0)
+    checks.fail(path, "", fmt::format("has {} numbers; must have {} for each element", size, each));
+}
+
+void addParts(Checks& checks, const Path& path, const v1::Mesh& message, meshes::MeshSource& source) {
+  std::size_t first = 0;
+  for (int i = 0; i < message.submeshes_size(); ++i) {
+    const v1::Submesh& part = message.submeshes(i);
+    const Path at = path.at("submeshes", i);
+    source.parts.push_back({checks.text(at / "name", part.name()), first});
+    if (part.triangle_count() == 0 || part.triangle_count() > source.faces.size() - first)
+      checks.fail(
+          at / "triangleCount", fmt::format("{}", part.triangle_count()),
+          fmt::format("must be 1 or more, and there are {} triangles left", source.faces.size() - first));
+    if (checks.failed()) return;
+    first += part.triangle_count();
+  }
+  if (!source.parts.empty() && first != source.faces.size())
+    checks.fail(path / "submeshes", "",
+                fmt::format("have {} triangles of {}; must have all", first, source.faces.size()));
+}
+
+meshes::MeshSource toSource(Checks& checks, const Path& path, const v1::Mesh& message) {
+  meshes::MeshSource source;
+  checkWhole(checks, path / "positions", message.positions_size(), 3);
+  checkWhole(checks, path / "triangles", message.triangles_size(), 3);
+  checkWhole(checks, path / "uvs", message.uvs_size(), 2);
+  const bool ownUvs = message.uv_triangles_size() > 0;
+  if (ownUvs && message.uv_triangles_size() != message.triangles_size())
+    checks.fail(path / "uvTriangles", "",
+                fmt::format("has {} numbers; must have as many as triangles, {}, or none",
+                            message.uv_triangles_size(), message.triangles_size()));
+  if (!ownUvs && message.uvs_size() > 0 && 3 * message.uvs_size() != 2 * message.positions_size())
+    checks.fail(path / "uvs", "",
+                fmt::format("has {} numbers for {} vertices; without uvTriangles it must have two for each",
+                            message.uvs_size(), message.positions_size() / 3));
+  if (checks.failed()) return source;
+  for (int i = 0; i < message.positions_size(); i += 3)
+    source.vertices.emplace_back(message.positions(i), message.positions(i + 1), message.positions(i + 2));
+  for (int i = 0; i < message.uvs_size(); i += 2) source.uvs.emplace_back(message.uvs(i), message.uvs(i + 1));
+  for (int i = 0; i < message.triangles_size(); i += 3) {
+    meshes::SourceFace& face = source.faces.emplace_back();
+    for (int corner = 0; corner < 3; ++corner) {
+      const auto at = static_cast<std::size_t>(corner);
+      face.vertices[at] = message.triangles(i + corner);
+      face.uvs[at] = ownUvs ? message.uv_triangles(i + corner) : face.vertices[at];
+    }
+  }
+  source.halves.assign(message.quads().begin(), message.quads().end());
+  addParts(checks, path, message, source);
+  return source;
+}
+
+meshes::MeshSource readSource(Checks& checks, const Path& path, const v1::Mesh& message,
+                              const MeshReader& readMesh) {
+  const std::string shown = '"' + message.file() + '"';
+  if (message.positions_size() > 0 || message.triangles_size() > 0) {
+    checks.fail(path / "file", shown, "stands beside positions or triangles; must have one or the other");
+    return {};
+  }
+  if (!readMesh) {
+    checks.fail(path / "file", shown, "files are read for scene files only; send positions and triangles");
+    return {};
+  }
+  auto source = readMesh(message.file());
+  if (source) return std::move(*source);
+  checks.fail(path / "file", shown, source.error());
+  return {};
+}
+
+void toPinnedVertices(Checks& checks, const Path& path, const v1::Cloth& message,
+                      const std::vector<std::uint32_t>& nodeOfVertex, scene::Cloth& cloth) {
+  for (int i = 0; i < message.pinned_vertices_size() && !checks.failed(); ++i) {
+    const Path at = path.at("pinnedVertices", i);
+    const std::uint32_t vertex = checks.integer(at, message.pinned_vertices(i), 0,
+                                                static_cast<std::uint32_t>(nodeOfVertex.size()) - 1);
+    if (checks.failed()) return;
+    if (nodeOfVertex[vertex] == meshes::kNoNode)
+      checks.fail(at, fmt::format("{}", vertex), "is a vertex without a face, which is left out");
+    cloth.pinnedVertices.push_back(nodeOfVertex[vertex]);
+  }
+}
+
+}  // namespace
+
+void toMeshCloth(Checks& checks, const Path& path, const v1::Cloth& message, const MeshReader& readMesh,
+                 scene::Cloth& cloth) {
+  const v1::Mesh& mesh = message.mesh();
+  const Path at = path / "mesh";
+  meshes::MeshOptions options{.pose = toPose(checks, at / "pose", mesh.pose()),
+                              .scale = 1,
+                              .weldDistance = limits::kDefaultWeldDistance};
+  if (mesh.has_scale()) options.scale = checks.number(at / "scale", mesh.scale(), limits::kScale);
+  if (mesh.has_weld_distance())
+    options.weldDistance = checks.number(at / "weldDistance", mesh.weld_distance(), limits::kWeldDistance);
+  if (checks.failed()) return;
+  const meshes::MeshSource source =
+      mesh.file().empty() ? toSource(checks, at, mesh) : readSource(checks, at, mesh, readMesh);
+  if (checks.failed()) return;
+  auto built = meshes::buildMesh(source, options, kMeshLimits);
+  if (!built) return checks.fail(at, mesh.file().empty() ? "" : '"' + mesh.file() + '"', built.error());
+  cloth.mesh = std::make_shared<const scene::Mesh>(std::move(built->mesh));
+  toPinnedVertices(checks, path, message, built->nodeOfVertex, cloth);
+}
+
+scene::Region toRegion(Checks& checks, const Path& path, const v1::Region& message) {
+  scene::Region region;
+  region.centre = toVec3(checks, path / "centre", message.centre(), limits::kPosition);
+  switch (message.shape_case()) {
+    case v1::Region::kRadius:
+      region.radius = checks.number(path / "radius", message.radius(), limits::kRegionLength);
+      break;
+    case v1::Region::kSize:
+      region.size = toVec3(checks, path / "size", message.size(), limits::kRegionLength);
+      break;
+    case v1::Region::SHAPE_NOT_SET:
+      checks.fail(path, "", "has no shape; must have \"radius\" or \"size\"");
+  }
+  return region;
+}
+
+void write(const scene::Mesh& mesh, v1::Mesh& message) {
+  const scene::MeshShape& shape = mesh.shape;
+  for (const scene::Vec3& p : shape.positions) message.mutable_positions()->Add(p.data(), p.data() + 3);
+  for (const scene::Triangle& t : shape.triangles) message.mutable_triangles()->Add(t.begin(), t.end());
+  message.mutable_quads()->Add(shape.quads.begin(), shape.quads.end());
+  for (const scene::Uv& uv : shape.uvs) message.mutable_uvs()->Add(uv.data(), uv.data() + 2);
+  for (const scene::Triangle& t : shape.uvTriangles) message.mutable_uv_triangles()->Add(t.begin(), t.end());
+  for (const scene::Submesh& part : shape.submeshes) {
+    v1::Submesh& partMessage = *message.add_submeshes();
+    partMessage.set_name(part.name);
+    partMessage.set_triangle_count(part.triangleCount);
+  }
+  message.set_weld_distance(0);
+}
+
+void write(const scene::Region& region, v1::Region& message) {
+  write(region.centre, *message.mutable_centre());
+  if (region.radius)
+    message.set_radius(*region.radius);
+  else
+    write(region.size, *message.mutable_size());
+}
+
+}  // namespace clothstream::messages

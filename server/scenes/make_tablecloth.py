@@ -1,0 +1,42 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+# Writes tablecloth.obj: a disc in the XZ plane, of rings that are turned against each other, with a hem.
+from math import cos, pi, sin
+
+RINGS, RADIUS, HEM = 22, 0.8, 2  # rings; metres; outer rings that are the hem
+
+points = [(0.0, 0.0)]
+rings = [[1]]  # numbers of a ring's vertices, from 1
+for ring in range(1, RINGS + 1):
+    rings.append([])
+    for i in range(6 * ring):
+        angle = 2 * pi * (i / (6 * ring)) + 0.013 * (RINGS - ring)
+        points.append((RADIUS * ring / RINGS * cos(angle), -RADIUS * ring / RINGS * sin(angle)))
+        rings[-1].append(len(points))
+
+
+def strip(ring):
+    inner, outer = rings[ring - 1], rings[ring]
+    for sector in range(6):
+        for i in range(ring):
+            k, j = sector * ring + i, sector * (ring - 1) + i
+            a, b = outer[k], outer[(k + 1) % len(outer)]
+            c, d = inner[j % len(inner)], inner[(j + 1) % len(inner)]
+            yield a, b, c
+            if i + 1 < ring:
+                yield c, b, d
+
+
+with open("tablecloth.obj", "w") as out:
+    out.write("# made by make_tablecloth.py\no tablecloth\n")
+    for x, z in points:
+        out.write(f"v {x:.6f} 0 {z:.6f}\n")
+    for x, z in points:
+        out.write(f"vt {0.5 + x / (2 * RADIUS):.5f} {0.5 - z / (2 * RADIUS):.5f}\n")
+    for ring in range(1, RINGS + 1):
+        if ring == 1:
+            out.write("usemtl linen\n")
+        if ring == RINGS - HEM + 1:
+            out.write("usemtl hem\n")
+        for face in strip(ring):
+            out.write("f " + " ".join(f"{v}/{v}" for v in face) + "\n")

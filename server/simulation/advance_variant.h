@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: MIT
+// Which build of a kernel advances a scene.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "server/scene/scene.h"
+
+namespace clothstream::simulation {
+
+// What the kernel leaves out where a scene has none of it; the bits are the same.
+struct AdvanceVariant {
+  bool springDamping, air, spheres;
+
+  std::size_t index() const { return (springDamping ? 1u : 0u) | (air ? 2u : 0u) | (spheres ? 4u : 0u); }
+  static constexpr std::size_t kCount = 8;
+
+  // constant_id 1 and on.
+  std::vector<std::uint32_t> specialisation(std::uint32_t rowsPerInvocation,
+                                            scene::Integrator integrator) const {
+    return {rowsPerInvocation, springDamping ? 1u : 0u, air ? 1u : 0u, spheres ? 1u : 0u,
+            integrator == scene::Integrator::explicitEuler ? 1u : 0u};
+  }
+};
+
+}  // namespace clothstream::simulation

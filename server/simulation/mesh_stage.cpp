@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: MIT
+// Kernels of meshes, and their tables.
+#include "server/simulation/mesh_stage.h"
+
+#include <cstring>
+
+#include "kernels/advance_mesh.h"
+#include "kernels/compute_mesh_normals.h"
+
+namespace clothstream::simulation {
+
+using vulkan::BindingKind;
+using vulkan::Bindings;
+using vulkan::BufferPurpose;
+using vulkan::Kernel;
+
+template <typename Record>
+MeshStage::Table::Table(const vulkan::Device& device, BufferPurpose purpose,
+                        const std::vector<Record>& records)
+    : upload(device, BufferPurpose::upload, records.size() * sizeof(Record)),
+      buffer(device, purpose, upload.bytes()) {
+  std::memcpy(upload.mapped().data(), records.data(), upload.bytes());
+}
+
+MeshStage::MeshStage(const vulkan::Device& device, const MeshTables& tables, const StateBuffers& state,
+                     const vulkan::Buffer& normals, scene::Integrator integrator, std::uint32_t workgroupSize)
+    : device_(device),
+      state_(state),
+      integrator_(integrator),
+      workgroupSize_(workgroupSize),
+      tileRanges_{tables.tiles.range(false), tables.tiles.range(true)},
+      tiles_(device, BufferPurpose::texels, tables.tiles.records),
+      nodes_(device, BufferPurpose::state, tables.nodes),
+      springEnds_(device, BufferPurpose::state, tables.springEnds),
+      corners_(device, BufferPurpose::state, tables.corners),
+      normals_(device, {.name = "compute_mesh_normals",
+                        .spirv = kernels::compute_mesh_normals,
+                        .bindings = {BindingKind::texels, BindingKind::texels, BindingKind::texels,
+                                     BindingKind::storage, BindingKind::storage, BindingKind::storage},
+                        .workgroupSize = workgroupSize}),
+      normalsOf_{Bindings(device, normals_,
+                          {&state.cloths, &tiles_.buffer, state.positions[0], &normals, &nodes_.buffer,
+                           &corners_.buffer}),
+                 Bindings(device, normals_,
+                          {&state.cloths, &tiles_.buffer, state.positions[1], &normals, &nodes_.buffer,
+                           &corners_.buffer})} {}
+
+vulkan::Bindings MeshStage::advanceFrom(const Kernel& kernel, std::size_t from) const {
+  const std::size_t to = 1 - from;
+  return Bindings(
+      device_, kernel,
+      {&state_.cloths, &tiles_.buffer, state_.positions[from], state_.velocities[from], state_.positions[to],
+       state_.velocities[to], &state_.spheres, &nodes_.buffer, &corners_.buffer, &springEnds_.buffer});
+}
+
+MeshStage::Advance::Advance(const MeshStage& stage, const AdvanceVariant& variant)
+    : kernel(stage.device_,
+             {.name = "advance_mesh",
+              .spirv = kernels::advance_mesh,
+              .bindings = {BindingKind::texels, BindingKind::texels, BindingKind::texels, BindingKind::texels,
+                           BindingKind::storage, BindingKind::storage, BindingKind::texels,
+                           BindingKind::storage, BindingKind::storage, BindingKind::storage},
+              .pushConstantBytes = sizeof(shared::AdvancePush),
+              .workgroupSize = stage.workgroupSize_,
+              .specialisation = variant.specialisation(1, stage.integrator_)}),
+      from{stage.advanceFrom(kernel, 0), stage.advanceFrom(kernel, 1)} {}
+
+const MeshStage::Advance& MeshStage::advance(const AdvanceVariant& variant) {
+  std::unique_ptr<Advance>& made = advances_[variant.index()];
+  if (!made) made = std::make_unique<Advance>(*this, variant);
+  return *made;
+}
+
+void MeshStage::recordTables(vulkan::Recorder& recorder) const {
+  for (const Table* table : {&tiles_, &nodes_, &springEnds_, &corners_})
+    recorder.copy(table->upload, table->buffer, table->buffer.bytes());
+}
+
+void MeshStage::recordAdvance(vulkan::Recorder& recorder, std::uint32_t from, const AdvanceVariant& variant,
+                              bool constrained, shared::AdvancePush push) {
+  const TileRange tiles = tileRanges_[constrained ? 1 : 0];
+  push.firstTile = tiles.first;
+  if (tiles.count > 0)
+    recorder.dispatch(advance(variant).from[from], push, std::uint64_t{tiles.count} * workgroupSize_);
+}
+
+void MeshStage::recordNormals(vulkan::Recorder& recorder, std::uint32_t present) const {
+  const std::uint64_t tiles = tileRanges_[0].count + tileRanges_[1].count;
+  recorder.dispatch(normalsOf_[present], tiles * workgroupSize_);
+}
+
+}  // namespace clothstream::simulation

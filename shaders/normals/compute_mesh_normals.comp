@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: MIT
+// Vertex normals of every mesh of a scene: of a node's triangles the area vectors, added.
+#version 450
+#extension GL_GOOGLE_include_directive : require
+
+#define CLOTHSTREAM_MESH_BINDING 4
+
+#include "shaders/shared/arithmetic.glsl"
+#include "shaders/shared/mesh_node.glsl"
+
+layout(binding = 2) uniform samplerBuffer positions;
+layout(std430, binding = 3) writeonly buffer Normals {
+  vec4 normals[];
+};
+
+vec3 fetchPosition(uint index) {
+  return texelFetch(positions, int(index)).xyz;
+}
+
+// Writes cannot race: each node belongs to one invocation.
+void main() {
+  MeshNode self = locateMeshNode(0);
+  if (!self.exists) {
+    return;
+  }
+  vec3 here = fetchPosition(self.index);
+  precise vec3 sum = vec3(0.0);
+  uint end = self.lists.firstTriangle + self.lists.triangleCount;
+  uint i = self.lists.firstTriangle;
+  while (i < end) {
+    TriangleCornerRecord corner = triangleCorners[i];
+    precise vec3 toSecond = fetchPosition(corner.second) - here;
+    precise vec3 toThird = fetchPosition(corner.third) - here;
+    sum = sum + crossProduct(toSecond, toThird);
+    ++i;
+  }
+  precise float squared = dotProduct(sum, sum);
+  precise vec3 normal = squared < 1e-30 ? vec3(0.0, 0.0, 1.0) : sum * reciprocalSquareRoot(squared);
+  normals[self.index] = vec4(snapTiny(normal), 0.0);
+}

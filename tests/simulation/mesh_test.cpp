@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: MIT
+// Meshes over time: the motion of a grid given as one, repetition to the bit, changes while it runs.
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "tests/simulation/scenes.h"
+
+namespace clothstream::tests {
+namespace {
+
+class Meshes : public GpuTest {};
+
+// Both hang from their top row and drop into their springs. Around a taut cloth the difference x of the two
+// obeys M x'' + C x' + K x = f with K >= 0, so in no mode does it grow beyond that of a free mass: of all
+// nodes together, rms(x) <= |f| / m T^2 / 2. What differs, f, is for each of a node's twelve springs its
+// stiffness times the rounding of its rest length (four roundings of where the nodes are, scene/mesh.h), of
+// its ends' difference in both (twice two), and some ten roundings of its own length; the dashpots' is far
+// less.
+TEST_F(Meshes, moveAsTheGridThatTheyAre) {
+  scene::Cloth cloth = calmCloth(24, 20);
+  cloth.structural.stiffness = 50;
+  cloth.shear.stiffness = cloth.bend.stiffness = 25;
+  cloth.pins = {topRow(cloth)};
+  const scene::Scene grid = sceneOf({cloth}), mesh = sceneOf({scene::asMesh(cloth)});
+  Running ofGrid(grid), ofMesh(mesh);
+  const int ticks = 36;
+  for (int tick = 0; tick < ticks; ++tick) {
+    ofGrid.tick(inputsOf(grid));
+    ofMesh.tick(inputsOf(mesh));
+  }
+  const double extent = 0.7, length = 0.04, rounding = std::ldexp(1.0, -24);
+  const double force = 4 * (50 + 25 + 25) * rounding * (4 * extent + 4 * extent + 10 * length);
+  const double seconds = ticks / 72.0, bound = force / 0.01 * seconds * seconds / 2;
+  const simulation::NodeState a = ofGrid.state(), b = ofMesh.state(),
+                              start = simulation::restState(grid.cloths);
+  double difference = 0, motion = 0;
+  for (std::size_t i = 0; i < a.positions.size(); ++i) {
+    difference += (a.positions[i] - b.positions[i]).squaredNorm();
+    motion += (a.positions[i] - start.positions[i]).squaredNorm();
+  }
+  const auto nodes = static_cast<double>(a.positions.size());
+  EXPECT_LT(std::sqrt(difference / nodes), bound);
+  EXPECT_GT(std::sqrt(motion / nodes), 10 * bound);  // it moved by far more: the comparison can fail
+}
+
+scene::Scene discs() {
+  scene::Cloth low = discCloth(14), high = discCloth(9);
+  low.drag = high.drag = 0.5f;
+  high.lift = 0.2f;
+  low.pinnedVertices = {0};
+  scene::Scene scene = sceneOf({low, calmCloth(8, 9), high});
+  scene.environment.wind = scene::Vec3(2, 1, -1);
+  return scene;
+}
+
+simulation::TickInputs discInputs(const scene::Scene& scene) {
+  return inputsOf(scene, {{scene::Vec3(0.1f, -0.2f, 0), scene::Vec3(0.1f, -0.19f, 0.01f), 0.15f, 0.5f}});
+}
+
+TEST_F(Meshes, haveTheSameBitsWhateverTheWorkgroup) {
+  const scene::Scene scene = discs();
+  std::vector<std::uint64_t> hashes;
+  for (const std::uint32_t workgroup : {64u, 8u, 32u, 128u}) {
+    Running running(scene, {.rowsPerInvocation = 0, .workgroupSize = workgroup});
+    simulation::TickStatus status{};
+    for (int tick = 0; tick < 30; ++tick) status = running.tick(discInputs(scene));
+    EXPECT_TRUE(status.healthy);
+    hashes.push_back(status.stateHash);
+  }
+  EXPECT_EQ(std::vector<std::uint64_t>(hashes.size(), hashes.front()), hashes);
+}
+
+TEST_F(Meshes, keepPinnedNodesWhereTheyStart) {
+  const scene::Scene scene = discs();
+  Running running(scene);
+  for (int tick = 0; tick < 20; ++tick) running.tick(discInputs(scene));
+  const simulation::NodeState start = simulation::restState(scene.cloths), state = running.state();
+  EXPECT_EQ(state.positions[0], start.positions[0]);
+  EXPECT_GT((state.positions[5] - start.positions[5]).norm(), 0.001f);
+}
+
+TEST_F(Meshes, takeParametersWhileTheyRun) {
+  scene::Scene scene = sceneOf({discCloth(6)});
+  Running soft(scene), stiff(scene);
+  scene.cloths[0].structural.stiffness = 400;
+  stiff.setCloths(scene.cloths);
+  std::mt19937 random(4);
+  const simulation::NodeState start = randomState(scene, random, 0.003f, 0);
+  soft.restore(start);
+  stiff.restore(start);
+  EXPECT_NE(soft.tick(inputsOf(scene)).stateHash, stiff.tick(inputsOf(scene)).stateHash);
+  reference::ReferenceSimulation reference(scene);
+  setState(reference, start);
+  reference.tick(referenceInputs(inputsOf(scene)));
+  EXPECT_LT(largestDistance(stiff.state(), reference), 1e-5);
+  EXPECT_GT(largestDistance(soft.state(), reference), 1e-4);
+}
+
+}  // namespace
+}  // namespace clothstream::tests
