@@ -173,6 +173,32 @@ int cs_get_cloth(const cs_client* client, uint32_t index, cs_cloth* out) {
   return 1;
 }
 
+const float* cs_uvs(const cs_client* client, uint32_t cloth, uint32_t* count) {
+  const Cloth* found = at(client->client.description().cloths, cloth);
+  *count = found ? static_cast<std::uint32_t>(found->uvs.size() / 2) : 0;
+  return *count > 0 ? found->uvs.data() : nullptr;
+}
+
+const uint32_t* cs_uv_indices(const cs_client* client, uint32_t cloth, uint32_t* count) {
+  const Cloth* found = at(client->client.description().cloths, cloth);
+  *count = found ? static_cast<std::uint32_t>(found->uvIndices.size()) : 0;
+  return *count > 0 ? found->uvIndices.data() : nullptr;
+}
+
+uint32_t cs_submesh_count(const cs_client* client, uint32_t cloth) {
+  const Cloth* found = at(client->client.description().cloths, cloth);
+  return found ? static_cast<std::uint32_t>(found->submeshes.size()) : 0;
+}
+
+int cs_get_submesh(const cs_client* client, uint32_t cloth, uint32_t index, cs_submesh* out) {
+  const Cloth* found = at(client->client.description().cloths, cloth);
+  const Submesh* submesh = found ? at(found->submeshes, index) : nullptr;
+  if (!submesh) return 0;
+  *out = {
+      .name = submesh->name.c_str(), .first_index = submesh->firstIndex, .index_count = submesh->indexCount};
+  return 1;
+}
+
 uint32_t cs_collider_count(const cs_client* client) {
   return static_cast<std::uint32_t>(client->client.colliders().size());
 }

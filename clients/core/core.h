@@ -76,6 +76,11 @@ typedef struct cs_cloth {
   uint32_t first_index, index_count; /* into cs_triangles */
 } cs_cloth;
 
+typedef struct cs_submesh {
+  const char* name;                  /* may be "" */
+  uint32_t first_index, index_count; /* into cs_triangles */
+} cs_submesh;
+
 typedef struct cs_collider {
   const char* name;
   float position[3];
@@ -118,12 +123,20 @@ uint32_t cs_vertex_count(const cs_client* client);
 const float* cs_positions(const cs_client* client);
 const float* cs_normals(const cs_client* client);
 uint64_t cs_reconstruction_hash(const cs_client* client);
-/* Vertex indices, three a triangle, counter-clockwise seen from +Z of the grid's own frame; until the next
- * CS_EVENT_DESCRIPTION. */
+/* Vertex indices, three a triangle, counter-clockwise seen from the front: of a grid from +Z of its own
+ * frame; until the next CS_EVENT_DESCRIPTION. */
 const uint32_t* cs_triangles(const cs_client* client, uint32_t* index_count);
 uint32_t cs_cloth_count(const cs_client* client);
 /* 0 if there is no such cloth or collider. */
 int cs_get_cloth(const cs_client* client, uint32_t index, cs_cloth* out);
+/* Texture coordinates of a mesh: `count` of {u, v}, v upwards; and for each of the cloth's index_count
+ * triangle corners the number of the one it has. NULL and 0 where it has none. Until the next
+ * CS_EVENT_DESCRIPTION, as submeshes' names. */
+const float* cs_uvs(const cs_client* client, uint32_t cloth, uint32_t* count);
+const uint32_t* cs_uv_indices(const cs_client* client, uint32_t cloth, uint32_t* count);
+/* The parts of a mesh by material; 0 of a grid. */
+uint32_t cs_submesh_count(const cs_client* client, uint32_t cloth);
+int cs_get_submesh(const cs_client* client, uint32_t cloth, uint32_t index, cs_submesh* out);
 uint32_t cs_collider_count(const cs_client* client);
 int cs_get_collider(const cs_client* client, uint32_t index, cs_collider* out);
 /* 0 before the description, and where there is no such cloth. */

@@ -2,6 +2,7 @@
 // A StreamDescription, read, checked, and completed with triangles and normals.
 #include "clients/core/description.h"
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <cstring>
@@ -17,16 +18,33 @@ using Reader = protozero::pbf_reader;
 
 constexpr std::uint32_t kMaxRate = 1000;  // per second, scene.proto
 
+bool isFinite(float number) {
+  return std::isfinite(number);
+}
+
 struct ClothMessage {
   std::string name;
   codec::ClothLayout layout;
-  Bytes restPositions;
+  Bytes restPositions, triangles, uvs, uvTriangles;
+  std::vector<Submesh> submeshes;  // their firstIndex not yet known
 };
+
+constexpr std::size_t kMaxSubmeshes = 65536;
 
 bool setText(std::string& target, Reader& reader) {
   const Bytes view = reader.get_view();
   target.assign(view.data(), view.size());
   return true;
+}
+
+bool readSubmesh(Bytes message, Submesh& submesh) {
+  return readFields(message, [&](std::uint32_t field, Reader& reader) {
+    if (field == bytes(1)) return setText(submesh.name, reader);
+    if (field != varint(2)) return skip(reader);
+    const std::uint32_t triangles = reader.get_uint32();
+    submesh.indexCount = 3 * triangles;
+    return triangles <= codec::kMaxVertices;
+  });
 }
 
 bool readCloth(Bytes message, ClothMessage& cloth) {
@@ -42,6 +60,15 @@ bool readCloth(Bytes message, ClothMessage& cloth) {
         return cloth.layout.columns = reader.get_uint32(), true;
       case bytes(5):
         return cloth.restPositions = reader.get_view(), true;
+      case bytes(6):
+        return cloth.triangles = reader.get_view(), true;
+      case bytes(7):
+        return cloth.uvs = reader.get_view(), true;
+      case bytes(8):
+        return cloth.uvTriangles = reader.get_view(), true;
+      case bytes(9):
+        return cloth.submeshes.size() < kMaxSubmeshes &&
+               readSubmesh(reader.get_view(), cloth.submeshes.emplace_back());
       default:
         return skip(reader);
     }
@@ -136,6 +163,40 @@ std::string quoted(const std::string& name) {
   return "cloth \"" + name + "\"";
 }
 
+// Little-endian numbers; false where the bytes are no whole ones.
+template <typename T>
+bool appendNumbers(Bytes bytes, std::vector<T>& out) {
+  static_assert(std::endian::native == std::endian::little);
+  const std::size_t first = out.size();
+  out.resize(first + bytes.size() / sizeof(T));
+  if (bytes.size() > 0) std::memcpy(out.data() + first, bytes.data(), (out.size() - first) * sizeof(T));
+  return bytes.size() % sizeof(T) == 0;
+}
+
+bool allBelow(const std::vector<std::uint32_t>& numbers, std::size_t limit) {
+  return std::all_of(numbers.begin(), numbers.end(), [&](std::uint32_t number) { return number < limit; });
+}
+
+// Texture coordinates and submeshes; empty if they fit the triangles.
+std::string readDrawing(const ClothMessage& source, Cloth& cloth) {
+  const bool whole =
+      appendNumbers(source.uvs, cloth.uvs) && appendNumbers(source.uvTriangles, cloth.uvIndices);
+  if (!whole || cloth.uvs.size() % 2 != 0 || !std::all_of(cloth.uvs.begin(), cloth.uvs.end(), isFinite))
+    return "uvs are not pairs of finite numbers";
+  if (cloth.uvIndices.size() != (cloth.uvs.empty() ? 0 : cloth.indexCount) ||
+      !allBelow(cloth.uvIndices, cloth.uvs.size() / 2))
+    return "uv_triangles are not one of " + std::to_string(cloth.uvs.size() / 2) +
+           " texture coordinates for each of " + std::to_string(cloth.indexCount) + " corners";
+  std::uint64_t next = cloth.firstIndex;
+  for (const Submesh& submesh : source.submeshes) {
+    cloth.submeshes.push_back({submesh.name, static_cast<std::uint32_t>(next), submesh.indexCount});
+    next += submesh.indexCount;
+  }
+  if (!source.submeshes.empty() && next != std::uint64_t{cloth.firstIndex} + cloth.indexCount)
+    return "submeshes are not all of its " + std::to_string(cloth.indexCount / 3) + " triangles";
+  return {};
+}
+
 // Empty if the numbers agree.
 std::string check(const Description& description, const std::vector<ClothMessage>& cloths) {
   if (description.codec != codec::kCodecLatticeZstd)
@@ -157,13 +218,16 @@ std::string check(const Description& description, const std::vector<ClothMessage
              " bytes for " + std::to_string(cloth.layout.vertexCount) + " vertices; 12 a vertex are needed";
   }
   if (!codec::isPossible(description.layout))
-    return "a cloth's rows x columns is not its vertex_count, there are no vertices or more than " +
+    return "a cloth's rows x columns is not its vertex_count, a triangle names a vertex that is not there, "
+           "there are "
+           "no vertices or more than " +
            std::to_string(codec::kMaxVertices) + ", or max_error is out of range";
   return {};
 }
 
 void appendTriangles(const codec::ClothLayout& cloth, std::uint32_t firstVertex,
                      std::vector<std::uint32_t>& out) {
+  for (const std::uint32_t vertex : cloth.triangles) out.push_back(firstVertex + vertex);
   for (std::uint32_t row = 0; row + 1 < cloth.rows; ++row) {
     for (std::uint32_t column = 0; column + 1 < cloth.columns; ++column) {
       const std::uint32_t a = firstVertex + row * cloth.columns + column, b = a + 1;
@@ -174,14 +238,9 @@ void appendTriangles(const codec::ClothLayout& cloth, std::uint32_t firstVertex,
 }
 
 bool appendPositions(Bytes bytes, std::vector<float>& out) {
-  static_assert(std::endian::native == std::endian::little);
-  const std::size_t first = out.size();
-  out.resize(first + bytes.size() / sizeof(float));
-  std::memcpy(out.data() + first, bytes.data(), bytes.size());
-  for (std::size_t i = first; i < out.size(); ++i) {
-    if (!std::isfinite(out[i])) return false;
-  }
-  return true;
+  const auto first = static_cast<std::ptrdiff_t>(out.size());
+  appendNumbers(bytes, out);
+  return std::all_of(out.begin() + first, out.end(), isFinite);
 }
 
 }  // namespace
@@ -193,7 +252,11 @@ tl::expected<Description, std::string> readDescription(Bytes message) {
   Bytes definition;
   if (!readParts(message, description, cloths, definition))
     return tl::unexpected(std::string("its bytes are no StreamDescription"));
-  for (const ClothMessage& cloth : cloths) description.layout.cloths.push_back(cloth.layout);
+  for (ClothMessage& cloth : cloths) {
+    if (!appendNumbers(cloth.triangles, cloth.layout.triangles))
+      return tl::unexpected(quoted(cloth.name) + ": triangles are not whole numbers of 4 bytes");
+    description.layout.cloths.push_back(cloth.layout);
+  }
   if (std::string problem = check(description, cloths); !problem.empty())
     return tl::unexpected(std::move(problem));
 
@@ -204,6 +267,8 @@ tl::expected<Description, std::string> readDescription(Bytes message) {
     cloth.firstIndex = static_cast<std::uint32_t>(description.triangles.size());
     appendTriangles(source.layout, firstVertex, description.triangles);
     cloth.indexCount = static_cast<std::uint32_t>(description.triangles.size()) - cloth.firstIndex;
+    if (const std::string problem = readDrawing(source, cloth); !problem.empty())
+      return tl::unexpected(quoted(source.name) + ": " + problem);
     firstVertex += source.layout.vertexCount;
     if (!appendPositions(source.restPositions, description.restPositions))
       return tl::unexpected(quoted(source.name) + ": a rest position is not finite");

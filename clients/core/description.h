@@ -18,9 +18,18 @@ struct ClothParameters {
   float damping = 0;
 };
 
+// Triangles that are drawn with one material.
+struct Submesh {
+  std::string name;
+  std::uint32_t firstIndex = 0, indexCount = 0;  // of the description's triangles
+};
+
 struct Cloth {
   std::string name;
   std::uint32_t firstVertex = 0, firstIndex = 0, indexCount = 0;
+  std::vector<float> uvs;                // 2 each; of meshes that have any
+  std::vector<std::uint32_t> uvIndices;  // one a corner of the cloth's triangles, where there are uvs
+  std::vector<Submesh> submeshes;        // of meshes; together all of its triangles
   ClothParameters parameters;
 };
 
@@ -34,7 +43,7 @@ struct Description {
   std::uint32_t codec = 0;
   std::string scene;
   std::uint32_t simulationRate = 0, streamRate = 0;
-  codec::StreamLayout layout;  // vertex counts, rows and columns of the cloths
+  codec::StreamLayout layout;  // vertex counts, rows and columns, or triangles, of the cloths
   std::vector<Cloth> cloths;
   std::vector<Collider> colliders;
   Environment environment;

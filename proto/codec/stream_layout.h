@@ -13,6 +13,8 @@ enum class NormalMode : std::uint8_t { none = 0, octahedral = 1 };
 struct ClothLayout {
   std::uint32_t vertexCount = 0;
   std::uint32_t rows = 0, columns = 0;
+  // Of a cloth that is no grid, for its normals: three of the cloth's own vertices each, counter-clockwise.
+  std::vector<std::uint32_t> triangles = {};
 };
 
 struct StreamLayout {
@@ -33,8 +35,8 @@ struct StreamLayout {
 inline constexpr std::uint32_t kMaxVertices = 1u << 26;
 inline constexpr float kSmallestMaxError = 5e-6f, kLargestMaxError = 1000;
 
-// Whether a stream can have this layout: one cloth or more, none empty, grids whose numbers agree, at most
-// kMaxVertices, a max error within the two bounds above.
+// Whether a stream can have this layout: one cloth or more, none empty, grids whose numbers agree, triangles
+// of vertices that there are, at most kMaxVertices, a max error within the two bounds above.
 inline bool isPossible(const StreamLayout& layout) {
   if (!(layout.maxError >= kSmallestMaxError && layout.maxError <= kLargestMaxError)) return false;
   if (layout.normals != NormalMode::none && layout.normals != NormalMode::octahedral) return false;
@@ -43,6 +45,9 @@ inline bool isPossible(const StreamLayout& layout) {
     const std::uint64_t nodes = std::uint64_t{cloth.rows} * cloth.columns;
     const bool noGrid = cloth.rows == 0 && cloth.columns == 0;
     if (cloth.vertexCount == 0 || (!noGrid && nodes != cloth.vertexCount)) return false;
+    if (cloth.triangles.size() % 3 != 0 || (!noGrid && !cloth.triangles.empty())) return false;
+    for (const std::uint32_t vertex : cloth.triangles)
+      if (vertex >= cloth.vertexCount) return false;
     vertices += cloth.vertexCount;
     if (vertices > kMaxVertices) return false;
   }

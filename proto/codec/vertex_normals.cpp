@@ -2,6 +2,7 @@
 // Vertex normals from positions.
 #include "proto/codec/vertex_normals.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 
@@ -60,6 +61,22 @@ void computeGridNormals(const ClothLayout& cloth, const float* positions, float*
   }
 }
 
+void computeMeshNormals(const ClothLayout& cloth, const float* positions, float* normals) {
+  std::fill_n(normals, 3 * std::size_t{cloth.vertexCount}, 0.0f);
+  for (std::size_t t = 0; t < cloth.triangles.size(); t += 3) {
+    const std::uint32_t* corner = &cloth.triangles[t];
+    const Vec3 p = load(positions, corner[0]);
+    const Vec3 area = cross(load(positions, corner[1]) - p, load(positions, corner[2]) - p);
+    for (std::size_t i = 0; i < 3; ++i) {
+      float* sum = normals + 3 * std::size_t{corner[i]};
+      sum[0] += area.x;
+      sum[1] += area.y;
+      sum[2] += area.z;
+    }
+  }
+  for (std::size_t i = 0; i < cloth.vertexCount; ++i) store(normals, i, load(normals, i));
+}
+
 }  // namespace
 
 void computeVertexNormals(const StreamLayout& layout, const float* positions, float* normals) {
@@ -67,7 +84,7 @@ void computeVertexNormals(const StreamLayout& layout, const float* positions, fl
     if (cloth.rows > 0) {
       computeGridNormals(cloth, positions, normals);
     } else {
-      for (std::size_t i = 0; i < cloth.vertexCount; ++i) store(normals, i, {0, 0, 0});
+      computeMeshNormals(cloth, positions, normals);
     }
     positions += 3 * std::size_t{cloth.vertexCount};
     normals += 3 * std::size_t{cloth.vertexCount};

@@ -7,8 +7,9 @@
 namespace clothstream::codec {
 
 // `positions` and `normals`: 3 floats a vertex. For each quad round a vertex p with neighbours A and B along
-// the grid (counter-clockwise) and diagonal C, the cross product (C - p) x (B - A); their sum, normalised.
-// (0, 0, 1) where the sum vanishes, and for cloths that are no grid.
+// the grid (counter-clockwise) and diagonal C, the cross product (C - p) x (B - A); of a cloth that is no
+// grid, for each triangle (p, q, r) the cross product (q - p) x (r - p); their sum, normalised. (0, 0, 1)
+// where the sum vanishes.
 void computeVertexNormals(const StreamLayout& layout, const float* positions, float* normals);
 
 }  // namespace clothstream::codec

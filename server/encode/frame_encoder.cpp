@@ -15,6 +15,7 @@
 #include "proto/codec/packet_writer.h"
 #include "proto/codec/prediction.h"
 #include "proto/codec/residual_planes.h"
+#include "server/scene/mesh.h"
 #include "server/vulkan/kernel.h"
 #include "shaders/encode/frame.h"
 
@@ -75,6 +76,14 @@ struct SlotShape {
   std::size_t planeBytes, normalBytes;
 };
 
+std::vector<std::uint32_t> trianglesOf(const scene::Mesh& mesh) {
+  std::vector<std::uint32_t> corners;
+  corners.reserve(3 * mesh.shape.triangles.size());
+  for (const scene::Triangle& triangle : mesh.shape.triangles)
+    corners.insert(corners.end(), triangle.begin(), triangle.end());
+  return corners;
+}
+
 }  // namespace
 
 codec::StreamLayout streamLayout(const scene::Scene& scene, std::uint32_t epoch) {
@@ -85,7 +94,10 @@ codec::StreamLayout streamLayout(const scene::Scene& scene, std::uint32_t epoch)
                                             : codec::NormalMode::none,
                              .cloths = {}};
   for (const scene::Cloth& cloth : scene.cloths) {
-    layout.cloths.push_back({cloth.grid.nodeCount(), cloth.grid.rows, cloth.grid.columns});
+    if (cloth.mesh)
+      layout.cloths.push_back({.vertexCount = cloth.nodeCount(), .triangles = trianglesOf(*cloth.mesh)});
+    else
+      layout.cloths.push_back({cloth.nodeCount(), cloth.grid.rows, cloth.grid.columns});
   }
   return layout;
 }

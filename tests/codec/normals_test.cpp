@@ -94,7 +94,31 @@ TEST(VertexNormals, FollowASphere) {
   }
 }
 
-TEST(VertexNormals, OfWhatHasNoAreaOrNoGridPointAlongZ) {
+// A pyramid over a square, its base left out: at the top the sides' mean, at a corner the two sides'.
+TEST(VertexNormals, OfATriangleMeshAreTheMeanOfItsTriangles) {
+  const StreamLayout layout{
+      .epoch = 1,
+      .cloths = {{.vertexCount = 1, .rows = 1, .columns = 1},
+                 {.vertexCount = 5, .triangles = {0, 1, 4, 1, 2, 4, 2, 3, 4, 3, 0, 4}}}};
+  ASSERT_TRUE(isPossible(layout));
+  const std::vector<float> positions{9, 9, 9, 0, 0, 0, 2, 0, 0, 2, 2, 0, 0, 2, 0, 1, 1, 1};
+  std::vector<float> normals(18);
+  computeVertexNormals(layout, positions.data(), normals.data());
+  const float a = 1 / std::sqrt(6.0f);
+  const std::vector<float> expected{-a, -a, 2 * a, a, -a, 2 * a, a, a, 2 * a, -a, a, 2 * a, 0, 0, 1};
+  for (std::size_t i = 0; i < expected.size(); ++i) EXPECT_NEAR(normals[3 + i], expected[i], 1e-6) << i;
+}
+
+TEST(VertexNormals, AreOfTrianglesThatExist) {
+  for (const std::vector<std::uint32_t>& triangles :
+       {std::vector<std::uint32_t>{0, 1}, std::vector<std::uint32_t>{0, 1, 3}}) {
+    EXPECT_FALSE(isPossible({.epoch = 1, .cloths = {{.vertexCount = 3, .triangles = triangles}}}));
+  }
+  EXPECT_FALSE(isPossible(
+      {.epoch = 1, .cloths = {{.vertexCount = 4, .rows = 2, .columns = 2, .triangles = {0, 1, 2}}}}));
+}
+
+TEST(VertexNormals, OfWhatHasNoAreaOrNoTrianglesPointAlongZ) {
   const StreamLayout layout{
       .epoch = 1,
       .cloths = {{.vertexCount = 4, .rows = 2, .columns = 2}, {.vertexCount = 2, .rows = 0, .columns = 0}}};

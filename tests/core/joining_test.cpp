@@ -76,6 +76,108 @@ TEST(Joining, GivesTrianglesOfEveryClothInItsPlace) {
   EXPECT_EQ(cs_get_cloth(client.get(), 2, &cloth), 0);
 }
 
+template <typename T>
+std::string littleEndian(const std::vector<T>& values) {
+  return std::string(reinterpret_cast<const char*>(values.data()), values.size() * sizeof(T));
+}
+
+// The first cloth is a grid of 2 x 2, the second a mesh of two triangles whose seam has two texture
+// coordinates.
+v1::StreamDescription withMesh(const ScriptedServer& server) {
+  v1::StreamDescription description = server.description();
+  v1::ClothDescription& cloth = *description.mutable_cloths(1);
+  cloth.set_rows(0);
+  cloth.set_columns(0);
+  cloth.set_triangles(littleEndian<std::uint32_t>({0, 1, 3, 0, 3, 2}));
+  cloth.set_uvs(littleEndian<float>({0, 0, 1, 0, 0, 1, 1, 1, 0.5f, 0.25f}));
+  cloth.set_uv_triangles(littleEndian<std::uint32_t>({0, 1, 3, 4, 3, 2}));
+  for (const char* name : {"cotton", "silk"}) {
+    v1::Submesh& part = *cloth.add_submeshes();
+    part.set_name(name);
+    part.set_triangle_count(1);
+  }
+  return description;
+}
+
+TEST(Joining, GivesAMeshsTrianglesTextureCoordinatesAndParts) {
+  ScriptedServer server({.cloths = {{"a", 2, 2}, {"b", 2, 2}}});
+  ClientUnderTest client;
+  client.receive(server.welcome());
+  client.receiveAll(chunksOf(withMesh(server).SerializeAsString(), 100, 1));
+  ASSERT_EQ(cs_get_state(client.get()), CS_STATE_JOINED) << cs_error_text(client.get());
+  std::uint32_t count = 0;
+  const std::uint32_t* triangles = cs_triangles(client.get(), &count);
+  EXPECT_THAT(std::vector(triangles + 6, triangles + count), ElementsAre(4, 5, 7, 4, 7, 6));
+  cs_cloth cloth;
+  ASSERT_EQ(cs_get_cloth(client.get(), 1, &cloth), 1);
+  EXPECT_EQ(cloth.rows, 0u);
+  EXPECT_EQ(cloth.index_count, 6u);
+  const float* uvs = cs_uvs(client.get(), 1, &count);
+  ASSERT_EQ(count, 5u);
+  EXPECT_EQ(uvs[8], 0.5f);
+  const std::uint32_t* corners = cs_uv_indices(client.get(), 1, &count);
+  EXPECT_THAT(std::vector(corners, corners + count), ElementsAre(0, 1, 3, 4, 3, 2));
+  ASSERT_EQ(cs_submesh_count(client.get(), 1), 2u);
+  cs_submesh part;
+  ASSERT_EQ(cs_get_submesh(client.get(), 1, 1, &part), 1);
+  EXPECT_STREQ(part.name, "silk");
+  EXPECT_EQ(part.first_index, 9u);
+  EXPECT_EQ(part.index_count, 3u);
+  EXPECT_EQ(cs_get_submesh(client.get(), 1, 2, &part), 0);
+  EXPECT_EQ(cs_uvs(client.get(), 0, &count), nullptr);
+  EXPECT_EQ(cs_submesh_count(client.get(), 0), 0u);
+  EXPECT_EQ(cs_uv_indices(client.get(), 7, &count), nullptr);
+  // The mesh's triangles run the other way round than the grid's.
+  const float* normals = cs_normals(client.get());
+  for (std::size_t i = 0; i < 8; ++i) EXPECT_GT((i < 4 ? 1.0f : -1.0f) * normals[3 * i + 2], 0.5f) << i;
+}
+
+TEST(Joining, RefusesMeshesThatDoNotAddUp) {
+  struct Wrong {
+    const char* says;
+    void (*spoil)(v1::ClothDescription&);
+  };
+  const Wrong cases[] = {
+      {"triangles are not whole numbers", [](auto& c) { c.set_triangles("abc"); }},
+      {"a triangle names a vertex that is not there",
+       [](auto& c) {
+         c.set_triangles(littleEndian<std::uint32_t>({0, 1, 3, 0, 3, 4}));
+       }},
+      {"a triangle names a vertex that is not there",
+       [](auto& c) {
+         c.set_triangles(littleEndian<std::uint32_t>({0, 1}));
+       }},
+      {"rows x columns", [](auto& c) { c.set_rows(2), c.set_columns(2); }},
+      {"uvs are not pairs", [](auto& c) { c.set_uvs(littleEndian<float>({1})); }},
+      {"uvs are not pairs",
+       [](auto& c) {
+         c.set_uvs(littleEndian<float>({1, NAN}));
+       }},
+      {"uv_triangles are not one of 4",
+       [](auto& c) {
+         c.set_uvs(littleEndian<float>({0, 0, 1, 0, 0, 1, 1, 1}));
+       }},
+      {"uv_triangles are not one of 0", [](auto& c) { c.clear_uvs(); }},
+      {"for each of 6 corners",
+       [](auto& c) {
+         c.set_uv_triangles(littleEndian<std::uint32_t>({0, 1}));
+       }},
+      {"submeshes are not all of its 2 triangles",
+       [](auto& c) { c.mutable_submeshes(0)->set_triangle_count(2); }},
+      {"no StreamDescription", [](auto& c) { c.mutable_submeshes(0)->set_triangle_count(4'000'000'000); }},
+  };
+  for (const Wrong& wrong : cases) {
+    ScriptedServer server({.cloths = {{"a", 2, 2}, {"b", 2, 2}}});
+    v1::StreamDescription description = withMesh(server);
+    wrong.spoil(*description.mutable_cloths(1));
+    ClientUnderTest client;
+    client.receive(server.welcome());
+    client.receiveAll(chunksOf(description.SerializeAsString(), 1000, 1));
+    EXPECT_EQ(cs_get_state(client.get()), CS_STATE_FAILED) << wrong.says;
+    EXPECT_THAT(cs_error_text(client.get()), HasSubstr(wrong.says));
+  }
+}
+
 TEST(Joining, TakesANewDescriptionWhole) {
   ClientUnderTest client;
   client.join(ScriptedServer());

@@ -180,6 +180,14 @@ TEST_P(FrameEncoder, KeepsTheErrorAtRoundingsEdges) {
   }
 }
 
+TEST_P(FrameEncoder, MakesThoseOfMeshesToo) {
+  scene::Scene scene = clothsOf(GetParam());
+  scene.cloths.insert(scene.cloths.begin() + 1, discCloth(9));
+  Encoding encoding(scene);
+  for (std::uint64_t tick = 1; tick <= 30 && !testing::Test::HasFailure(); ++tick)
+    encoding.tick(tick, tick % 10 == 0);
+}
+
 class FrameEncoderSlots : public GpuTest {};
 
 TEST_F(FrameEncoderSlots, AreFreedByEntropyCodingInAnyOrderAndOnAnotherThread) {

@@ -106,6 +106,14 @@ TEST_F(Constraints, ofBendSpringsMoveNodesAsTheReference) {
   expectLikeReference(sceneOf({constrained(12, 11, true)}), 5);
 }
 
+TEST_F(Constraints, ofMeshesMoveNodesAsTheReference) {
+  scene::Cloth disc = discCloth(7);
+  disc.mass = 0.01f * static_cast<float>(disc.nodeCount());
+  disc.solver.kind = scene::SolverKind::constraint;
+  disc.pinnedVertices = {0};
+  expectLikeReference(sceneOf({constrained(6, 9), disc}), 7);
+}
+
 TEST_F(Constraints, ofSeveralClothsAreSolvedApart) {
   scene::Cloth second = constrained(8, 5, true);
   second.name = "second";

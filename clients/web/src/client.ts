@@ -44,6 +44,13 @@ export interface ClothLayout {
   indexCount: number;
 }
 
+// What a mesh is drawn with; nothing of it is there for a grid.
+export interface Drawing {
+  uvs: Float32Array; // (u, v) each, v upwards; empty where there are none
+  uvIndices: Uint32Array; // one a corner of the cloth's triangles
+  submeshes: { name: string; firstIndex: number; indexCount: number }[]; // of the scene's triangles
+}
+
 export interface SphereCollider {
   name: string;
   position: Vec3;
@@ -181,6 +188,25 @@ export class Client {
       firstIndex: view.getUint32(at + 20, true),
       indexCount: view.getUint32(at + 24, true),
     }));
+  }
+
+  // Of the cloth of that number: copies.
+  drawing(cloth: number): Drawing {
+    const { exports } = this.core;
+    const uvs = exports.cs_uvs(this.handle, cloth, this.scratch);
+    const uvCount = this.core.view().getUint32(this.scratch, true);
+    const uvIndices = exports.cs_uv_indices(this.handle, cloth, this.scratch);
+    const indexCount = this.core.view().getUint32(this.scratch, true);
+    const submesh = (client: number, index: number, out: number) => exports.cs_get_submesh(client, cloth, index, out);
+    return {
+      uvs: this.core.floats(uvs, 2 * uvCount).slice(),
+      uvIndices: this.core.indices(uvIndices, indexCount).slice(),
+      submeshes: this.list(exports.cs_submesh_count(this.handle, cloth), submesh, (view, at) => ({
+        name: this.core.text(view.getUint32(at, true)),
+        firstIndex: view.getUint32(at + 4, true),
+        indexCount: view.getUint32(at + 8, true),
+      })),
+    };
   }
 
   colliders(): SphereCollider[] {

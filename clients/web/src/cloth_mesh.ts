@@ -2,7 +2,8 @@
 // One cloth as a three.js mesh, whose vertices are drawn straight from the core's memory.
 
 import * as THREE from "three";
-import type { ClothLayout } from "./client";
+import type { ClothLayout, Drawing } from "./client";
+import { type DrawnVertices, separateSeams } from "./seams";
 
 // Madder, indigo, ochre, moss, plum, linen: told apart also where colours are not.
 const kColours = [0x8a3433, 0x2a567a, 0xb5843c, 0x55714a, 0x745684, 0xb5a98f];
@@ -14,41 +15,38 @@ const kSwing = 0.3;
 const kWeaveTexels = 32;
 
 export class ClothMesh {
-  readonly mesh: THREE.Mesh<THREE.BufferGeometry, THREE.MeshPhysicalMaterial>;
+  readonly mesh: THREE.Mesh<THREE.BufferGeometry, THREE.MeshPhysicalMaterial[]>;
   private readonly positions: THREE.BufferAttribute;
   private readonly normals: THREE.BufferAttribute;
+  private readonly drawn: DrawnVertices;
 
   // `restPositions` and `triangles` are those of the whole scene; they are copied.
   constructor(
     private readonly layout: ClothLayout,
+    drawing: Drawing,
     restPositions: Float32Array,
     triangles: Uint32Array,
     number: number,
   ) {
-    const rest = this.part(restPositions).slice();
+    const corners = triangles
+      .subarray(layout.firstIndex, layout.firstIndex + layout.indexCount)
+      .map((index) => index - layout.firstVertex);
+    this.drawn = separateSeams(layout.vertexCount, corners, drawing.uvIndices);
+    const rest = new Float32Array(3 * this.drawn.count);
+    this.place(restPositions, rest);
     this.positions = new THREE.BufferAttribute(rest, 3).setUsage(THREE.DynamicDrawUsage);
     this.normals = new THREE.BufferAttribute(new Float32Array(rest.length), 3).setUsage(THREE.DynamicDrawUsage);
     const geometry = new THREE.BufferGeometry();
     geometry.setAttribute("position", this.positions);
     geometry.setAttribute("normal", this.normals);
-    const indices = triangles.subarray(layout.firstIndex, layout.firstIndex + layout.indexCount);
-    geometry.setIndex(new THREE.BufferAttribute(indices.map((index) => index - layout.firstVertex), 1));
+    geometry.setIndex(new THREE.BufferAttribute(this.drawn.indices, 1));
+    const uvs = this.threadCoordinates(drawing, rest);
+    if (uvs) geometry.setAttribute("uv", new THREE.BufferAttribute(uvs, 2));
 
-    const colour = new THREE.Color(kColours[number % kColours.length]);
-    const material = new THREE.MeshPhysicalMaterial({
-      color: colour,
-      roughness: 0.82,
-      sheen: 0.35,
-      sheenRoughness: 0.45,
-      sheenColor: colour.clone().lerp(new THREE.Color(0xffffff), 0.35),
-      side: THREE.DoubleSide,
-    });
-    if (layout.rows > 1 && layout.columns > 1) {
-      geometry.setAttribute("uv", threadCoordinates(layout, rest));
-      material.normalMap = weaveNormals();
-      material.normalScale.setScalar(0.22);
-    }
-    this.mesh = new THREE.Mesh(geometry, material);
+    const parts = drawing.submeshes.length > 0 ? drawing.submeshes : [layout];
+    parts.forEach((part, index) => geometry.addGroup(part.firstIndex - layout.firstIndex, part.indexCount, index));
+    const materials = parts.map((_, index) => fabric(kColours[(number + 2 * index) % kColours.length]!, uvs !== undefined));
+    this.mesh = new THREE.Mesh(geometry, materials);
     this.mesh.castShadow = true;
     this.mesh.receiveShadow = true;
     // The vertices move every frame: bounds kept up to date would cost more than drawing.
@@ -57,10 +55,14 @@ export class ClothMesh {
 
   // The arrays are the whole scene's, in the core's memory: they are read when the frame is drawn, not kept.
   update(positions: Float32Array, normals: Float32Array): void {
-    this.positions.array = this.part(positions);
-    this.positions.needsUpdate = true;
-    this.normals.array = this.part(normals);
-    this.normals.needsUpdate = true;
+    for (const [attribute, values] of [
+      [this.positions, positions],
+      [this.normals, normals],
+    ] as const) {
+      if (this.drawn.count === this.layout.vertexCount) attribute.array = this.part(values);
+      else this.place(values, attribute.array as Float32Array);
+      attribute.needsUpdate = true;
+    }
   }
 
   // Where the cloth will mostly be: as it starts, and from there down and to both sides, where it falls and flies.
@@ -74,7 +76,27 @@ export class ClothMesh {
 
   dispose(): void {
     this.mesh.geometry.dispose();
-    this.mesh.material.dispose();
+    for (const material of this.mesh.material) material.dispose();
+  }
+
+  // Texture coordinates that count threads, so that every cloth has threads of the same size; undefined for a mesh
+  // that has none.
+  private threadCoordinates(drawing: Drawing, rest: Float32Array): Float32Array | undefined {
+    if (this.layout.rows > 1 && this.layout.columns > 1) return gridThreads(this.layout, rest);
+    if (drawing.uvs.length === 0) return undefined;
+    const uvs = new Float32Array(2 * this.drawn.count);
+    this.drawn.uvs.forEach((uv, vertex) => uvs.set(drawing.uvs.subarray(2 * uv, 2 * uv + 2), 2 * vertex));
+    const scale = metresAUv(this.drawn.indices, rest, uvs) / kWeaveTile;
+    return uvs.map((coordinate) => coordinate * scale);
+  }
+
+  // Copies the cloth's vertices to `out`, and those at seams once more.
+  private place(values: Float32Array, out: Float32Array): void {
+    const own = this.part(values);
+    out.set(own);
+    this.drawn.copies.forEach((vertex, copy) => {
+      out.set(own.subarray(3 * vertex, 3 * vertex + 3), own.length + 3 * copy);
+    });
   }
 
   private part(values: Float32Array): Float32Array {
@@ -82,8 +104,38 @@ export class ClothMesh {
   }
 }
 
-// Texture coordinates that count threads, so that every cloth has threads of the same size.
-function threadCoordinates(layout: ClothLayout, rest: Float32Array): THREE.BufferAttribute {
+function fabric(colourOfThreads: number, woven: boolean): THREE.MeshPhysicalMaterial {
+  const colour = new THREE.Color(colourOfThreads);
+  const material = new THREE.MeshPhysicalMaterial({
+    color: colour,
+    roughness: 0.82,
+    sheen: 0.35,
+    sheenRoughness: 0.45,
+    sheenColor: colour.clone().lerp(new THREE.Color(0xffffff), 0.35),
+    side: THREE.DoubleSide,
+  });
+  if (woven) {
+    material.normalMap = weaveNormals();
+    material.normalScale.setScalar(0.22);
+  }
+  return material;
+}
+
+// How many metres of cloth one unit of texture coordinates covers, by the areas of all triangles.
+function metresAUv(indices: Uint32Array, rest: Float32Array, uvs: Float32Array): number {
+  const corner = (k: number) => new THREE.Vector3().fromArray(rest, 3 * indices[k]!);
+  const uv = (k: number) => new THREE.Vector2().fromArray(uvs, 2 * indices[k]!);
+  let cloth = 0;
+  let texture = 0;
+  for (let t = 0; t < indices.length; t += 3) {
+    const origin = corner(t);
+    cloth += corner(t + 1).sub(origin).cross(corner(t + 2).sub(origin)).length();
+    texture += Math.abs(uv(t + 1).sub(uv(t)).cross(uv(t + 2).sub(uv(t))));
+  }
+  return texture > 0 ? Math.sqrt(cloth / texture) : 0;
+}
+
+function gridThreads(layout: ClothLayout, rest: Float32Array): Float32Array {
   const vertex = (row: number, column: number) =>
     new THREE.Vector3().fromArray(rest, 3 * (row * layout.columns + column));
   const width = vertex(0, 0).distanceTo(vertex(0, layout.columns - 1)) / kWeaveTile;
@@ -93,7 +145,7 @@ function threadCoordinates(layout: ClothLayout, rest: Float32Array): THREE.Buffe
     coordinates[2 * i] = ((i % layout.columns) / (layout.columns - 1)) * width;
     coordinates[2 * i + 1] = -(Math.floor(i / layout.columns) / (layout.rows - 1)) * height;
   }
-  return new THREE.BufferAttribute(coordinates, 2);
+  return coordinates;
 }
 
 let weave: THREE.DataTexture | undefined;

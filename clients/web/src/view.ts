@@ -48,9 +48,11 @@ export class View {
       cloth.dispose();
     }
     this.vertexCount = client.vertexCount;
+    const layouts = client.cloths();
+    const drawings = layouts.map((_, number) => client.drawing(number));
     const rest = client.positions();
     const triangles = client.triangles();
-    this.cloths = client.cloths().map((layout, number) => new ClothMesh(layout, rest, triangles, number));
+    this.cloths = layouts.map((layout, number) => new ClothMesh(layout, drawings[number]!, rest, triangles, number));
     for (const cloth of this.cloths) this.studio.scene.add(cloth.mesh);
 
     this.bounds.makeEmpty();

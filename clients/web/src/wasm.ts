@@ -26,6 +26,10 @@ export interface CoreExports {
   cs_triangles(client: Pointer, indexCount: Pointer): Pointer;
   cs_cloth_count(client: Pointer): number;
   cs_get_cloth(client: Pointer, index: number, out: Pointer): number;
+  cs_uvs(client: Pointer, cloth: number, count: Pointer): Pointer;
+  cs_uv_indices(client: Pointer, cloth: number, count: Pointer): Pointer;
+  cs_submesh_count(client: Pointer, cloth: number): number;
+  cs_get_submesh(client: Pointer, cloth: number, index: number, out: Pointer): number;
   cs_collider_count(client: Pointer): number;
   cs_get_collider(client: Pointer, index: number, out: Pointer): number;
   cs_get_environment(client: Pointer, out: Pointer): number;
