@@ -15,10 +15,14 @@ struct ClothLayout {
   std::uint32_t rows = 0, columns = 0;
 };
 
+inline constexpr std::uint8_t kCodecLatticeZstd = 1, kCodecHierarchical = 2;
+
 struct StreamLayout {
   std::uint32_t epoch = 0;
-  // m an axis: the promise the encoder keeps for whatever lies within 32 m of the origin. Farther out the
-  // spacing of floats there comes on top.
+  std::uint8_t codec = kCodecLatticeZstd;
+  // m along each of three axes: the promise the encoder keeps for whatever lies within 32 m of the origin.
+  // Farther out the spacing of floats there comes on top. The axes of codec 1 are x, y and z. Those of codec 2
+  // turn with the surface, and what it promises is the distance that follows: sqrt(3) maxError at most.
   float maxError = 0.0005f;
   NormalMode normals = NormalMode::none;
   std::vector<ClothLayout> cloths;
@@ -33,11 +37,13 @@ struct StreamLayout {
 inline constexpr std::uint32_t kMaxVertices = 1u << 26;
 inline constexpr float kSmallestMaxError = 5e-6f, kLargestMaxError = 1000;
 
-// Whether a stream can have this layout: one cloth or more, none empty, grids whose numbers agree, at most
-// kMaxVertices, a max error within the two bounds above.
+// Whether a stream can have this layout: a codec of ours (codec 2 sends no normals), one cloth or more, none
+// empty, grids whose numbers agree, at most kMaxVertices, a max error within the two bounds above.
 inline bool isPossible(const StreamLayout& layout) {
   if (!(layout.maxError >= kSmallestMaxError && layout.maxError <= kLargestMaxError)) return false;
   if (layout.normals != NormalMode::none && layout.normals != NormalMode::octahedral) return false;
+  if (layout.codec != kCodecLatticeZstd && layout.codec != kCodecHierarchical) return false;
+  if (layout.codec == kCodecHierarchical && layout.normals != NormalMode::none) return false;
   std::uint64_t vertices = 0;
   for (const ClothLayout& cloth : layout.cloths) {
     const std::uint64_t nodes = std::uint64_t{cloth.rows} * cloth.columns;
