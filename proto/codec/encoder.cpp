@@ -20,7 +20,8 @@ struct Encoder::State {
 std::unique_ptr<Encoder> Encoder::make(const StreamLayout& layout) {
   if (!isPossible(layout)) return nullptr;
   auto state = std::make_unique<State>();
-  state->body = layout.codec == kCodecLatticeZstd ? makeLatticeEncoder(layout) : makeHierarchicalEncoder(layout);
+  state->body =
+      layout.codec == kCodecLatticeZstd ? makeLatticeEncoder(layout) : makeHierarchicalEncoder(layout);
   state->floats = 3 * std::size_t{layout.vertexCount()};
   state->hasNormals = layout.normals == NormalMode::octahedral;
   return std::unique_ptr<Encoder>(new Encoder(std::move(state)));

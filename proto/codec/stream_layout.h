@@ -2,6 +2,7 @@
 // What encoder and decoder know of a stream before its first packet.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -16,13 +17,19 @@ struct ClothLayout {
 };
 
 inline constexpr std::uint8_t kCodecLatticeZstd = 1, kCodecHierarchical = 2;
+// All there are, the best first.
+inline constexpr std::array<std::uint32_t, 2> kCodecs{kCodecHierarchical, kCodecLatticeZstd};
+
+constexpr bool isCodec(std::uint32_t id) {
+  return id == kCodecLatticeZstd || id == kCodecHierarchical;
+}
 
 struct StreamLayout {
   std::uint32_t epoch = 0;
   std::uint8_t codec = kCodecLatticeZstd;
   // m along each of three axes: the promise the encoder keeps for whatever lies within 32 m of the origin.
-  // Farther out the spacing of floats there comes on top. The axes of codec 1 are x, y and z. Those of codec 2
-  // turn with the surface, and what it promises is the distance that follows: sqrt(3) maxError at most.
+  // Farther out the spacing of floats there comes on top. The axes of codec 1 are x, y and z. Those of codec
+  // 2 turn with the surface, and what it promises is the distance that follows: sqrt(3) maxError at most.
   float maxError = 0.0005f;
   NormalMode normals = NormalMode::none;
   std::vector<ClothLayout> cloths;
@@ -42,7 +49,7 @@ inline constexpr float kSmallestMaxError = 5e-6f, kLargestMaxError = 1000;
 inline bool isPossible(const StreamLayout& layout) {
   if (!(layout.maxError >= kSmallestMaxError && layout.maxError <= kLargestMaxError)) return false;
   if (layout.normals != NormalMode::none && layout.normals != NormalMode::octahedral) return false;
-  if (layout.codec != kCodecLatticeZstd && layout.codec != kCodecHierarchical) return false;
+  if (!isCodec(layout.codec)) return false;
   if (layout.codec == kCodecHierarchical && layout.normals != NormalMode::none) return false;
   std::uint64_t vertices = 0;
   for (const ClothLayout& cloth : layout.cloths) {

@@ -36,6 +36,7 @@ class Loop {
   }
 
   Encoder& encoder() { return *encoder_; }
+  const Decoder& decoder() const { return *decoder_; }
 
  private:
   // Codec 1 promises each coordinate, codec 2 the distance.
@@ -45,7 +46,8 @@ class Loop {
     for (std::size_t i = 0; i < frame.positions.size(); i += 3) {
       double squared = 0;
       for (std::size_t c = i; c < i + 3; ++c) {
-        const double error = static_cast<double>(frame.positions[c]) - static_cast<double>(decoder_->positions()[c]);
+        const double error =
+            static_cast<double>(frame.positions[c]) - static_cast<double>(decoder_->positions()[c]);
         squared += error * error;
         if (eachAxis) {
           EXPECT_LE(std::fabs(error), maxError) << "tick " << tick << " coordinate " << c;
@@ -81,7 +83,8 @@ class ClosedLoop : public testing::TestWithParam<Sort> {
 };
 INSTANTIATE_TEST_SUITE_P(Sorts, ClosedLoop,
                          testing::Values(Sort{"lattice", kCodecLatticeZstd, NormalMode::none},
-                                         Sort{"latticeWithNormals", kCodecLatticeZstd, NormalMode::octahedral},
+                                         Sort{"latticeWithNormals", kCodecLatticeZstd,
+                                              NormalMode::octahedral},
                                          Sort{"hierarchical", kCodecHierarchical, NormalMode::none}),
                          [](const auto& chosen) { return chosen.param.name; });
 
@@ -149,9 +152,8 @@ TEST_P(ClosedLoop, SurvivesPositionsThatAreNone) {
 }
 
 StreamLayout square(std::uint32_t edge, std::uint8_t codec) {
-  return {.epoch = 1,
-          .codec = codec,
-          .cloths = {{.vertexCount = edge * edge, .rows = edge, .columns = edge}}};
+  return {
+      .epoch = 1, .codec = codec, .cloths = {{.vertexCount = edge * edge, .rows = edge, .columns = edge}}};
 }
 
 TEST(Hierarchical, SendsAStillClothInATwentiethOfABitAVertex) {
@@ -159,11 +161,30 @@ TEST(Hierarchical, SendsAStillClothInATwentiethOfABitAVertex) {
   Loop loop(layout);
   PacketHeader last;
   for (std::uint64_t tick = 1; tick <= 40; ++tick) {
-    last = loop.send(tick, PacketKind::predicted, sampleMotion(layout, std::min<std::uint64_t>(tick, 8), 0.05f));
+    last =
+        loop.send(tick, PacketKind::predicted, sampleMotion(layout, std::min<std::uint64_t>(tick, 8), 0.05f));
   }
   std::size_t bits = 0;
   for (std::size_t i = 0; i < last.sectionCount; ++i) bits += std::size_t{8} * last.sectionBytes[i];
   EXPECT_LT(bits, 10'000 / 20);
+}
+
+TEST(Hierarchical, LetsPinsStandStillInAMovingCloth) {
+  const StreamLayout layout = square(20, kCodecHierarchical);
+  Loop loop(layout);
+  std::vector<float> before;
+  for (std::uint64_t tick = 1; tick <= 40; ++tick) {
+    MotionFrame frame = sampleMotion(layout, tick, 0.05f);
+    const MotionFrame start = sampleMotion(layout, 1, 0.05f);
+    std::copy_n(start.positions.begin(), 3 * 20, frame.positions.begin());
+    loop.send(tick, PacketKind::predicted, frame);
+    const std::span<const float> decoded = loop.decoder().positions();
+    const std::vector<float> pins(decoded.begin(), decoded.begin() + 3 * 20);
+    if (tick > 10) {
+      EXPECT_EQ(pins, before) << tick;
+    }
+    before = pins;
+  }
 }
 
 TEST(Hierarchical, TakesAThirdOfCodecOneOnAMotion) {

@@ -21,6 +21,9 @@ LatticeUnit latticeUnit(float maxError);
 // A packet's sections: changes of the weights (empty where there are none), symbols, bits beside them.
 inline constexpr std::size_t kSections = 3;
 inline constexpr unsigned kWeightGammaBits = 4, kEscapeGammaBits = 2;
+// Stands for the first number beyond the symbols. Along the normal it is no residual: the vertex is where it
+// was in the frame before, and has no other residuals.
+inline constexpr std::uint32_t kStays = 0;
 
 // Vertices that are predicted before the first of them is coded: few enough to stay in the nearest cache.
 inline constexpr std::uint32_t kChunk = 64;

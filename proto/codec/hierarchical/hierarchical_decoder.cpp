@@ -47,6 +47,13 @@ class HierarchicalDecoder final : public BodyDecoder {
   std::uint32_t decodeChunk(std::uint32_t begin, std::uint32_t end, const FeatureVectors& weights,
                             const ScaleModel* model, Streams& streams);
   // The residuals of up to kCoders vertices, from predictions_[first] on.
+  void setStaying(std::size_t i) {
+    stays_[i] = true;
+    for (std::size_t c = 0; c < kComponents; ++c) {
+      residuals_[i][c] = 0;
+      magnitudes_[i][c] = 0;
+    }
+  }
   template <typename Count>
   void readResiduals(std::size_t first, Count count, const ScaleModel& model, Streams& streams);
 
@@ -58,6 +65,7 @@ class HierarchicalDecoder final : public BodyDecoder {
   alignas(16) std::int32_t expected_[kChunk][4];
   std::int32_t residuals_[kChunk][kComponents];
   std::uint32_t magnitudes_[kChunk][kComponents];
+  std::array<bool, kChunk> stays_;
 };
 
 bool HierarchicalDecoder::readWeights(std::span<const std::byte> section, bool key, Weights& weights,
@@ -121,12 +129,15 @@ std::uint32_t HierarchicalDecoder::decodeChunk(std::uint32_t begin, std::uint32_
   } else {
     std::memset(residuals_, 0, sizeof residuals_);
     std::memset(magnitudes_, 0, sizeof magnitudes_);
+    stays_.fill(false);
   }
   std::uint32_t outside = 0;
   for (std::size_t i = 0; i < count; ++i) {
-    const Int32x4 position = predictor_.reconstruct(predictions_[i], residuals_[i]);
+    const Int32x4 position =
+        stays_[i] ? predictions_[i].last : predictor_.reconstruct(predictions_[i], residuals_[i]);
     outside |= isOutside(position);
-    predictor_.place(begin + static_cast<std::uint32_t>(i), predictions_[i], position, packMagnitudes(magnitudes_[i]));
+    predictor_.place(begin + static_cast<std::uint32_t>(i), predictions_[i], position,
+                     packMagnitudes(magnitudes_[i]));
   }
   return outside;
 }
@@ -138,9 +149,21 @@ void HierarchicalDecoder::readResiduals(std::size_t first, Count count, const Sc
   for (const Component component : kCodingOrder) {
     for (std::size_t coder = 0; coder < count; ++coder) {
       const std::size_t i = first + coder;
+      if (component == kAlongNormal) stays_[i] = false;
+      if (stays_[i]) continue;
       const std::uint32_t scale = model.scale(component, expected_[i][component], magnitudes_[i]);
       std::uint32_t number = streams.symbols.read(coder, tables[distributionOf(component, scale)]);
-      if (number == kEscape) number += streams.bits.getGamma(kEscapeGammaBits);
+      if (number == kEscape) {
+        const std::uint32_t beyond = streams.bits.getGamma(kEscapeGammaBits);
+        if (component == kAlongNormal) {
+          if (beyond == kStays) {
+            setStaying(i);
+            continue;
+          }
+          number -= 1;
+        }
+        number += beyond;
+      }
       if (const unsigned raw = rawBits(scale); raw > 0) number = number << raw | streams.bits.get(raw);
       residuals_[i][component] = unzigzag(number);
       magnitudes_[i][component] = countedMagnitude(residuals_[i][component]);

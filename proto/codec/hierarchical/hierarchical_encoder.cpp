@@ -23,6 +23,9 @@ constexpr std::array<std::uint32_t, kWeightClasses> kFitStride{6, 6, 2, 2, 1, 1}
 // What so few vertices would gain is less than what their weights take.
 constexpr std::uint32_t kFewVertices = 100;
 
+constexpr std::uint8_t kStillFrames = 3;
+constexpr std::uint32_t kMostRests = 64;
+
 constexpr std::size_t kMaxWeightBytes = kWeightClasses * kFeatures * 4;
 // Of an escape and what stands beside it, at most.
 constexpr std::size_t kMaxExtraBytes = 8;
@@ -49,10 +52,13 @@ struct HierarchicalEncoder::State {
       : vertices(layout.vertexCount()),
         unit(latticeUnit(layout.maxError)),
         wanted(vertices),
+        stillFrames(vertices),
         symbols(kComponents * vertices),
         extra((kComponents * kMaxExtraBytes + 1) * vertices + kMaxExtraBytes) {
-    if (!predictor.allocate(layout, unit.stepBits)) std::abort();  // memory is out, as of any other allocation here
-    for (const Phase& phase : predictor.hierarchy().phases) classSizes[phase.weightClass] += phase.end - phase.begin;
+    if (!predictor.allocate(layout, unit.stepBits))
+      std::abort();  // memory is out, as of any other allocation here
+    for (const Phase& phase : predictor.hierarchy().phases)
+      classSizes[phase.weightClass] += phase.end - phase.begin;
     header.codec = kCodecHierarchical;
     header.epoch = layout.epoch;
     header.rangeCount = 1;
@@ -71,12 +77,16 @@ struct HierarchicalEncoder::State {
   void economise(const Local& wish, std::int32_t* residual) const;
   bool isAtRest() const;
   std::size_t writeWeights(bool key, std::byte* out);
+  bool startsToRest(std::uint32_t slot, const Prediction& prediction);
+  bool goesOnResting(std::uint32_t slot, const Prediction& prediction) const;
   void encodePhase(const Phase& phase, BitWriter& bits);
   // Returns whether a residual is not 0.
-  std::int32_t encodeChunk(std::uint32_t begin, std::uint32_t end, std::uint32_t weightClass, BitWriter& bits);
+  std::int32_t encodeChunk(std::uint32_t begin, std::uint32_t end, std::uint32_t weightClass,
+                           BitWriter& bits);
   void fitTo(std::uint32_t weightClass, const FeatureVectors& features, const Prediction& prediction,
              Int32x4 target, const std::uint32_t* magnitudes);
-  void code(Component component, std::uint32_t scale, std::int32_t residual, std::size_t coder, BitWriter& bits);
+  void code(Component component, std::uint32_t scale, std::int32_t residual, std::size_t coder,
+            BitWriter& bits);
   void note(const Prediction& prediction, std::uint32_t weightClass, std::size_t i);
 
   std::size_t vertices;
@@ -84,7 +94,10 @@ struct HierarchicalEncoder::State {
   Predictor predictor;
   std::array<std::uint32_t, kWeightClasses + 1> classSizes{};
   PacketHeader header;
-  std::vector<Node> wanted;  // in coding order
+  // In coding order.
+  std::vector<Node> wanted;
+  std::vector<std::uint8_t> stillFrames;  // how long the same was wanted, up to kStillFrames
+  std::uint32_t restsLeft = 0;            // that may start in this frame
   RansWriter symbols;
   std::vector<std::byte> extra;
   WeightFitter fitter;
@@ -97,6 +110,7 @@ struct HierarchicalEncoder::State {
   alignas(16) std::int32_t expected[kChunk][4];
   std::int32_t residuals[kChunk][kComponents];
   std::uint32_t magnitudes[kChunk][kComponents];
+  std::array<bool, kChunk> stays;
 };
 
 void HierarchicalEncoder::State::quantise(std::span<const float> positions) {
@@ -112,7 +126,11 @@ void HierarchicalEncoder::State::quantise(std::span<const float> positions) {
   };
   for (std::size_t slot = 0; slot < vertices; ++slot) {
     const float* p = &positions[3 * std::size_t{vertexOf[slot]}];
-    wanted[slot] = {coordinate(p[0]), coordinate(p[1]), coordinate(p[2]), 0};
+    const Node next{coordinate(p[0]), coordinate(p[1]), coordinate(p[2]), 0};
+    const bool still = next.load().sameThree(wanted[slot].load());
+    stillFrames[slot] =
+        still ? static_cast<std::uint8_t>(std::min<std::uint32_t>(stillFrames[slot] + 1u, kStillFrames)) : 0;
+    wanted[slot] = next;
   }
 }
 
@@ -151,9 +169,9 @@ Int32x4 HierarchicalEncoder::State::choose(const Prediction& prediction, Int32x4
   return position;
 }
 
-// What is promised is a distance, half the diagonal of a cube of steps: seldom is a vertex in a corner, so that
-// a smaller residual along the surface often serves as well. Along the normal, where the eye looks, the nearest
-// one stays.
+// What is promised is a distance, half the diagonal of a cube of steps: seldom is a vertex in a corner, so
+// that a smaller residual along the surface often serves as well. Along the normal, where the eye looks, the
+// nearest one stays.
 void HierarchicalEncoder::State::economise(const Local& wish, std::int32_t* residual) const {
   const std::array<float, 3> wishes{wish.u, wish.v, wish.n};
   std::array<float, 3> error;
@@ -210,6 +228,21 @@ std::size_t HierarchicalEncoder::State::writeWeights(bool key, std::byte* out) {
   return bytes;
 }
 
+// What is wanted in the same place for some frames is pinned, it seems: it is to stand still. To say so takes
+// two bytes.
+bool HierarchicalEncoder::State::startsToRest(std::uint32_t slot, const Prediction& prediction) {
+  if (frame == 0 || restsLeft == 0 || stillFrames[slot] < kStillFrames || predictor.nodes()[slot].rests())
+    return false;
+  if (squaredLength(wanted[slot].load() - prediction.last) > squaredPromise()) return false;
+  --restsLeft;
+  return true;
+}
+
+bool HierarchicalEncoder::State::goesOnResting(std::uint32_t slot, const Prediction& prediction) const {
+  return frame > 0 && predictor.nodes()[slot].rests() &&
+         squaredLength(wanted[slot].load() - prediction.last) <= squaredPromise();
+}
+
 // A phase without residuals is a bit that says so, in place of all that was written of it.
 void HierarchicalEncoder::State::encodePhase(const Phase& phase, BitWriter& bits) {
   const BitWriter bitsBefore = bits;
@@ -228,8 +261,8 @@ void HierarchicalEncoder::State::encodePhase(const Phase& phase, BitWriter& bits
   symbols.shrink(symbolsBefore);
 }
 
-std::int32_t HierarchicalEncoder::State::encodeChunk(std::uint32_t begin, std::uint32_t end, std::uint32_t weightClass,
-                                             BitWriter& bits) {
+std::int32_t HierarchicalEncoder::State::encodeChunk(std::uint32_t begin, std::uint32_t end,
+                                                     std::uint32_t weightClass, BitWriter& bits) {
   const ScaleModel model(kScaleWeights[weightClass / 2]);
   const bool fits = weightClass < kWeightClasses;
   const std::uint32_t stride = fits ? kFitStride[weightClass] : 1;
@@ -240,7 +273,11 @@ std::int32_t HierarchicalEncoder::State::encodeChunk(std::uint32_t begin, std::u
     FeatureVectors features;
     predictor.predict(slot, vectors[weightClass], features, prediction);
     const Int32x4 target = wanted[slot].load();
-    const Int32x4 position = choose(prediction, target, residuals[i]);
+    stays[i] = startsToRest(slot, prediction);
+    const bool still = stays[i] || goesOnResting(slot, prediction);
+    if (still) std::memset(residuals[i], 0, sizeof residuals[i]);
+    const Int32x4 position = still ? prediction.last : choose(prediction, target, residuals[i]);
+    any |= stays[i] ? 1 : 0;
     for (std::size_t c = 0; c < kComponents; ++c) {
       magnitudes[i][c] = countedMagnitude(residuals[i][c]);
       any |= residuals[i][c];
@@ -256,8 +293,14 @@ std::int32_t HierarchicalEncoder::State::encodeChunk(std::uint32_t begin, std::u
     for (const Component component : kCodingOrder) {
       for (std::uint32_t slot = group; slot < groupEnd; ++slot) {
         const std::size_t i = slot - begin;
+        if (stays[i] && component != kAlongNormal) continue;
         const std::uint32_t scale = model.scale(component, expected[i][component], magnitudes[i]);
-        code(component, scale, residuals[i][component], slot - group, bits);
+        if (stays[i]) {
+          bits.putGamma(kStays, kEscapeGammaBits);
+          symbols.add(slot - group, distributionOf(component, scale), kEscape);
+        } else {
+          code(component, scale, residuals[i][component], slot - group, bits);
+        }
       }
     }
   }
@@ -270,7 +313,7 @@ void HierarchicalEncoder::State::code(Component component, std::uint32_t scale, 
   const std::uint32_t number = zigzag(residual);
   std::uint32_t symbol = number >> raw;
   if (symbol >= kEscape) {
-    bits.putGamma(symbol - kEscape, kEscapeGammaBits);
+    bits.putGamma(symbol - kEscape + (component == kAlongNormal ? kStays + 1 : 0), kEscapeGammaBits);
     symbol = kEscape;
   }
   if (raw > 0) bits.put(number & ((1u << raw) - 1), raw);
@@ -278,10 +321,10 @@ void HierarchicalEncoder::State::code(Component component, std::uint32_t scale, 
 }
 
 void HierarchicalEncoder::State::fitTo(std::uint32_t weightClass, const FeatureVectors& features,
-                                       const Prediction& prediction, Int32x4 target,
-                                       const std::uint32_t* m) {
+                                       const Prediction& prediction, Int32x4 target, const std::uint32_t* m) {
   Int32x4 predicted = Int32x4::all(0);
-  for (std::size_t i = 0; i < kFeaturePairs; ++i) predicted = predicted + dotPairs(features[i], vectors[weightClass][i]);
+  for (std::size_t i = 0; i < kFeaturePairs; ++i)
+    predicted = predicted + dotPairs(features[i], vectors[weightClass][i]);
   const Int32x4 goal =
       (target - prediction.position).shiftedRight(unit.stepBits - 4) + predicted.shiftedRight(kWeightBits);
   // What is hard to predict here is not to spoil the weights for the rest.
@@ -291,17 +334,20 @@ void HierarchicalEncoder::State::fitTo(std::uint32_t weightClass, const FeatureV
   fitter.add(weightClass, features, goal, 1 / (0.15f + 0.1f * own * own + 0.025f * near));
 }
 
-void HierarchicalEncoder::State::note(const Prediction& prediction, std::uint32_t weightClass, std::size_t i) {
+void HierarchicalEncoder::State::note(const Prediction& prediction, std::uint32_t weightClass,
+                                      std::size_t i) {
   for (std::size_t c = 0; c < kComponents; ++c) {
     const auto byte = [c](std::uint32_t bytes) { return static_cast<std::uint8_t>(bytes >> 8 * c); };
     recorded->push_back({static_cast<std::uint8_t>(c), static_cast<std::uint8_t>(weightClass / 2),
                          byte(prediction.parentMagnitudes), byte(prediction.ringMagnitudes),
-                         byte(prediction.lastMagnitudes), static_cast<std::uint8_t>(magnitudes[i][kAlongNormal]),
+                         byte(prediction.lastMagnitudes),
+                         static_cast<std::uint8_t>(magnitudes[i][kAlongNormal]),
                          static_cast<std::uint8_t>(magnitudes[i][kAlongU]), residuals[i][c]});
   }
 }
 
-HierarchicalEncoder::HierarchicalEncoder(const StreamLayout& layout) : state_(std::make_unique<State>(layout)) {}
+HierarchicalEncoder::HierarchicalEncoder(const StreamLayout& layout)
+    : state_(std::make_unique<State>(layout)) {}
 HierarchicalEncoder::~HierarchicalEncoder() = default;
 
 std::size_t HierarchicalEncoder::packetBound() const {
@@ -333,6 +379,7 @@ std::size_t HierarchicalEncoder::encode(std::uint64_t tick, PacketKind kind, std
   BitWriter bits(s.extra.data());
   s.predictor.begin(key);
   s.quiet = true;
+  s.restsLeft = kMostRests;
   for (const Phase& phase : s.predictor.hierarchy().phases) s.encodePhase(phase, bits);
   s.predictor.keep();
   if (key) {

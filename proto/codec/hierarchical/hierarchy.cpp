@@ -123,7 +123,8 @@ class Builder {
   }
 
   void setParents(Neighbours& neighbours, std::span<const std::uint32_t> known) const {
-    constexpr std::uint8_t kChoice[5][4] = {{0, 0, 0, 0}, {0, 0, 0, 0}, {0, 1, 0, 1}, {0, 1, 0, 2}, {0, 1, 2, 3}};
+    constexpr std::uint8_t kChoice[5][4] = {
+        {0, 0, 0, 0}, {0, 0, 0, 0}, {0, 1, 0, 1}, {0, 1, 0, 2}, {0, 1, 2, 3}};
     for (std::size_t i = 0; i < 4; ++i) {
       neighbours.parents[i] = known.empty() ? none_ : known[kChoice[known.size()][i]];
     }

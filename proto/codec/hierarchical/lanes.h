@@ -9,7 +9,8 @@
 
 namespace clothstream::codec::hierarchical {
 
-// Addresses of loads and stores are aligned to 16 bytes. Arithmetic is modulo the width unless said otherwise.
+// Addresses of loads and stores are aligned to 16 bytes. Arithmetic is modulo the width unless said
+// otherwise.
 struct Int32x4 {
   simde__m128i v;
 
@@ -26,6 +27,10 @@ struct Int32x4 {
   // Keeps the sign.
   Int32x4 shiftedRight(int bits) const { return {simde_mm_sra_epi32(v, simde_mm_cvtsi32_si128(bits))}; }
   Int32x4 shiftedLeft(int bits) const { return {simde_mm_sll_epi32(v, simde_mm_cvtsi32_si128(bits))}; }
+  // Whether the first three are the same.
+  bool sameThree(Int32x4 other) const {
+    return (simde_mm_movemask_epi8(simde_mm_cmpeq_epi32(v, other.v)) & 0xfff) == 0xfff;
+  }
   std::int32_t fourth() const { return simde_mm_cvtsi128_si32(simde_mm_shuffle_epi32(v, 0xff)); }
 };
 
@@ -47,9 +52,13 @@ struct Int16x8 {
     return {simde_mm_setr_epi16(a0, a1, a0, a1, a0, a1, a0, a1)};
   }
   // a0 a1 a2 0 a4 a5 a6 0.
-  Int16x8 withoutFourth() const { return {simde_mm_and_si128(v, simde_mm_setr_epi16(-1, -1, -1, 0, -1, -1, -1, 0))}; }
+  Int16x8 withoutFourth() const {
+    return {simde_mm_and_si128(v, simde_mm_setr_epi16(-1, -1, -1, 0, -1, -1, -1, 0))};
+  }
   // a1 a0 a3 a2 a5 a4 a7 a6.
-  Int16x8 pairsSwapped() const { return {simde_mm_or_si128(simde_mm_slli_epi32(v, 16), simde_mm_srli_epi32(v, 16))}; }
+  Int16x8 pairsSwapped() const {
+    return {simde_mm_or_si128(simde_mm_slli_epi32(v, 16), simde_mm_srli_epi32(v, 16))};
+  }
   // The pair of these lanes four times.
   template <int pair>
   Int16x8 broadcastPair() const {
@@ -103,7 +112,8 @@ inline Int32x4 addNeighbours(Int32x4 a, Int32x4 b) {
 inline std::uint32_t countNotAbove(Int16x8 low, Int16x8 high, Int16x8 wanted) {
   const simde__m128i above =
       simde_mm_packs_epi16(simde_mm_cmpgt_epi16(low.v, wanted.v), simde_mm_cmpgt_epi16(high.v, wanted.v));
-  return static_cast<std::uint32_t>(std::countr_zero(static_cast<std::uint32_t>(simde_mm_movemask_epi8(above))));
+  return static_cast<std::uint32_t>(
+      std::countr_zero(static_cast<std::uint32_t>(simde_mm_movemask_epi8(above))));
 }
 
 }  // namespace clothstream::codec::hierarchical

@@ -11,7 +11,8 @@ bool Predictor::allocate(const StreamLayout& layout, int stepBits) {
   stepBits_ = stepBits;
   fineBits_ = stepBits - 4;
   const std::size_t vertices = layout.vertexCount();
-  bool allocated = hierarchy_.build(layout) && curvatures_.allocate(vertices) && magnitudes_.allocate(vertices);
+  bool allocated =
+      hierarchy_.build(layout) && curvatures_.allocate(vertices) && magnitudes_.allocate(vertices);
   for (Array<Node>& nodes : nodes_) {
     allocated = allocated && nodes.allocate(vertices + 1);
     if (allocated) nodes[vertices] = Node{};

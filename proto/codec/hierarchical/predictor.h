@@ -19,12 +19,14 @@ inline constexpr std::int32_t kMaxCoordinate = 1 << 27;
 inline constexpr std::uint32_t kMaxMagnitude = 31;
 
 // A vertex's position, in units. In `magnitudes` the lowest byte is the residual along u without its sign, at
-// most kMaxMagnitude, the next along v, then n: loaded and added up together with the position.
+// most kMaxMagnitude, the next along v, then n: loaded and added up together with the position. In the
+// highest byte is 1 where the vertex rests: it is exactly where it was in the frame before.
 struct alignas(16) Node {
   std::int32_t x = 0, y = 0, z = 0;
   std::uint32_t magnitudes = 0;
 
   Int32x4 load() const { return Int32x4::load(&x); }
+  bool rests() const { return magnitudes >> 24 != 0; }
 };
 
 // What the frames to come need of a vertex. 16-bit vectors are in sixteenths of a step, saturated.
@@ -50,9 +52,11 @@ using Weights = std::array<std::array<std::int16_t, kFeatures>, kWeightClasses +
 // What is known of a vertex before its residual.
 struct Prediction {
   Int32x4 position, average;
+  Int32x4 last;  // position; of no meaning in a key frame
   SurfaceFrame frame;
   Int16x8 ring, twistRing;  // the ring at the odd lanes; both as in the record
-  // Sums over the parents, over the ring, and of the last frame: of this vertex four times and of the nearest.
+  // Sums over the parents, over the ring, and of the last frame: of this vertex four times and of the
+  // nearest.
   std::uint32_t parentMagnitudes, ringMagnitudes, lastMagnitudes;
 };
 
@@ -70,7 +74,8 @@ class Predictor {
     FeatureVectors features;
     predict(slot, weights, features, out);
   }
-  void predict(std::uint32_t slot, const FeatureVectors& weights, FeatureVectors& features, Prediction& out) const;
+  void predict(std::uint32_t slot, const FeatureVectors& weights, FeatureVectors& features,
+               Prediction& out) const;
   // The position to which these residuals lead, in steps along u, v and n.
   Int32x4 reconstruct(const Prediction& prediction, const std::int32_t* residual) const;
   void place(std::uint32_t slot, const Prediction& prediction, Int32x4 position, std::uint32_t magnitudes);
@@ -154,7 +159,10 @@ inline void Predictor::predict(std::uint32_t slot, const FeatureVectors& weights
   const int down = kWeightBits - fineBits_;
   Int32x4 change = Int32x4::all(1 << (down - 1));
   for (std::size_t i = 0; i < kFeaturePairs; ++i) change = change + dotPairs(features[i], weights[i]);
-  out.position = average + (pastNodes_[at].load() - average1) + change.shiftedRight(down);
+  // What rests is expected to go on resting: pins do, in the middle of a moving cloth.
+  const Node& own = pastNodes_[at];
+  out.last = own.load();
+  out.position = own.rests() ? out.last : average + (out.last - average1) + change.shiftedRight(down);
 }
 
 inline Int32x4 Predictor::reconstruct(const Prediction& prediction, const std::int32_t* r) const {
@@ -171,7 +179,8 @@ inline void Predictor::place(std::uint32_t slot, const Prediction& prediction, I
                              std::uint32_t magnitudes) {
   Node& node = nodes_[0][slot];
   position.store(&node.x);
-  node.magnitudes = magnitudes;
+  const bool rests = !key_ && position.sameThree(prediction.last);
+  node.magnitudes = magnitudes | (rests ? 1u << 24 : 0u);
   const Int32x4 detail = (position - prediction.average).shiftedRight(fineBits_);
   const Int16x8 narrowed = narrow(detail, detail).withoutFourth();
   Record& record = records_[0][slot];

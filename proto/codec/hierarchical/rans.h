@@ -33,7 +33,8 @@ struct alignas(16) SymbolTable {
   // Of the kProbabilityBits bits that choose it.
   std::uint32_t symbolAt(std::uint32_t bits) const {
     const Int16x8 wanted = Int16x8::all(static_cast<std::int16_t>(bits));
-    return countNotAbove(Int16x8::load(&bounds[kFirstBound]), Int16x8::load(&bounds[kFirstBound + 8]), wanted);
+    return countNotAbove(Int16x8::load(&bounds[kFirstBound]), Int16x8::load(&bounds[kFirstBound + 8]),
+                         wanted);
   }
 
   static constexpr std::size_t kFirstBound = 8;

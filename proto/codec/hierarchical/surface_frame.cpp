@@ -67,7 +67,8 @@ Vec3 cross(const Vec3& a, const Vec3& b) {
 }
 
 std::int32_t pair(std::int32_t low, std::int32_t high) {
-  return static_cast<std::int32_t>((static_cast<std::uint32_t>(low) & 0xffffu) | static_cast<std::uint32_t>(high) << 16);
+  return static_cast<std::int32_t>((static_cast<std::uint32_t>(low) & 0xffffu) |
+                                   static_cast<std::uint32_t>(high) << 16);
 }
 
 Vec3 load(Int32x4 lanes) {

@@ -17,10 +17,13 @@ struct SurfaceFrame {
 
   // u a + v b + n c, of which the lanes are x, y, z: `along` has a b in all pairs, `across` c 0.
   Int32x4 combine(Int16x8 along, Int16x8 across) const {
-    return dotPairs(interleaveHalves(tangents), along) + dotPairs(interleave(normal, Int16x8::zero()), across);
+    return dotPairs(interleaveHalves(tangents), along) +
+           dotPairs(interleave(normal, Int16x8::zero()), across);
   }
   // The products with u, v and n of what has x y z 0 x y z 0, in units of 2^-kUnitBits; the fourth lane 0.
-  Int32x4 project(Int16x8 vector) const { return addNeighbours(dotPairs(vector, tangents), dotPairs(vector, normal)); }
+  Int32x4 project(Int16x8 vector) const {
+    return addNeighbours(dotPairs(vector, tangents), dotPairs(vector, normal));
+  }
 };
 
 // u along `first`, n across both; the axes x, y, z where the two span no plane. The fourth lanes are ignored.

@@ -8,7 +8,7 @@
 namespace clothstream::codec::hierarchical {
 namespace {
 
-constexpr double kFade = 0.85;  // of what was known, at each fit
+constexpr double kFade = 0.75;  // of what was known, at each fit
 constexpr double kStay = 0.01;  // how much the former weights count beside what was added
 
 using Matrix = std::array<std::array<double, kFeatures>, kFeatures>;
@@ -36,7 +36,8 @@ void solve(Matrix& m, Vector& x) {
 
 }  // namespace
 
-void WeightFitter::add(std::size_t weightClass, const FeatureVectors& features, Int32x4 goal, float importance) {
+void WeightFitter::add(std::size_t weightClass, const FeatureVectors& features, Int32x4 goal,
+                       float importance) {
   simde__m128 values[kColumns];
   const simde__m128 lanes = simde_mm_setr_ps(1, 1, 1, 0);
   for (std::size_t pair = 0; pair < kFeaturePairs; ++pair) {
@@ -68,14 +69,16 @@ void WeightFitter::fit(Weights& weights) {
     double trace = 0;
     for (std::size_t i = 0; i < kFeatures; ++i) trace += sums.all[i * kColumns + i];
     for (std::size_t i = 0; i < kFeatures; ++i) {
-      for (std::size_t j = 0; j < kFeatures; ++j) m[i][j] = sums.all[std::min(i, j) * kColumns + std::max(i, j)];
+      for (std::size_t j = 0; j < kFeatures; ++j)
+        m[i][j] = sums.all[std::min(i, j) * kColumns + std::max(i, j)];
       const double stay = kStay * (m[i][i] + 1e-3 * trace / kFeatures) + 1e-9;
       m[i][i] += stay;
       x[i] = sums.all[i * kColumns + kFeatures] + stay * weights[c][i] / (1 << kWeightBits);
     }
     solve(m, x);
     for (std::size_t i = 0; i < kFeatures; ++i) {
-      const double weight = std::clamp(std::round(x[i] * (1 << kWeightBits)), -double{kMaxWeight}, double{kMaxWeight});
+      const double weight =
+          std::clamp(std::round(x[i] * (1 << kWeightBits)), -double{kMaxWeight}, double{kMaxWeight});
       weights[c][i] = static_cast<std::int16_t>(weight);
     }
   }

@@ -12,8 +12,8 @@
 #include "proto/codec/lattice/lattice.h"
 #include "proto/codec/lattice/octahedral.h"
 #include "proto/codec/lattice/prediction.h"
-#include "proto/codec/reconstruction_hash.h"
 #include "proto/codec/lattice/residual_planes.h"
+#include "proto/codec/reconstruction_hash.h"
 
 namespace clothstream::codec {
 namespace {
@@ -120,8 +120,8 @@ bool LatticeDecoder::decode(const ParsedPacket& packet) {
 }
 
 bool LatticeDecoder::decodePositions(const Modes& modes) {
-  const std::array<const std::byte*, kMaxPlanes> sources{planes_[0].data(), planes_[1].data(), planes_[2].data(),
-                                                         planes_[3].data()};
+  const std::array<const std::byte*, kMaxPlanes> sources{planes_[0].data(), planes_[1].data(),
+                                                         planes_[2].data(), planes_[3].data()};
   for (std::size_t c = 0; c < kPositionChannels; ++c) {
     const std::size_t offset = c * vertexCount_;
     std::int32_t* values = next_.positions.data() + offset;

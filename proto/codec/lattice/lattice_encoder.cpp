@@ -11,8 +11,8 @@
 #include "proto/codec/lattice/octahedral.h"
 #include "proto/codec/lattice/packet_writer.h"
 #include "proto/codec/lattice/prediction.h"
-#include "proto/codec/reconstruction_hash.h"
 #include "proto/codec/lattice/residual_planes.h"
+#include "proto/codec/reconstruction_hash.h"
 
 namespace clothstream::codec {
 namespace {
@@ -103,9 +103,8 @@ std::size_t LatticeEncoder::encode(std::uint64_t tick, PacketKind kind, std::uin
   for (std::size_t start = 0; start < present_.positions.size(); start += n) {
     predict(layout_, frame.positionPrediction, &present_.positions[start], &reference_.positions[start],
             residuals_.data());
-    bits |=
-        splitPlanes(residuals_.data(), n,
-                    {planes_[0].data(), planes_[1].data(), planes_[2].data(), planes_[3].data()}, start);
+    bits |= splitPlanes(residuals_.data(), n,
+                        {planes_[0].data(), planes_[1].data(), planes_[2].data(), planes_[3].data()}, start);
   }
   frame.planeCount = planeCount(bits);
   for (std::size_t p = 0; p < frame.planeCount; ++p) frame.planes[p] = planes_[p];
