@@ -34,5 +34,6 @@ struct Suite {
 Rows runMassSpring(vulkan::Device& device, const Settings& settings);
 Rows runCurtain(vulkan::Device& device, const Settings& settings);
 Rows runCodec(vulkan::Device& device, const Settings& settings);
+Rows runCodecMotions(vulkan::Device& device, const Settings& settings);
 
 }  // namespace clothstream::bench
