@@ -10,7 +10,11 @@ set(wasmOut ${PROJECT_BINARY_DIR}/web-wasm)
 set(wasmZstd ${PROJECT_SOURCE_DIR}/clients/web/node_modules/zstd-napi/deps/zstd/lib)
 set(wasmFlags --target=wasm32-wasi -O3 -DNDEBUG -ffp-contract=off -fvisibility=hidden)
 set(wasmCFlags ${wasmFlags} -DZSTD_DISABLE_ASM -DZSTD_LEGACY_SUPPORT=0 -DDEBUGLEVEL=0)
-set(wasmCxxFlags ${wasmFlags} -std=c++20 -fno-rtti -fno-exceptions -Wall -Wextra -Wconversion -Wshadow -Werror
+# SIMDe alone of what Debian's include folder has: the rest is for the machine that builds.
+find_path(SIMDE_INCLUDE simde/x86/sse2.h REQUIRED)
+file(MAKE_DIRECTORY ${wasmOut}/include)
+file(CREATE_LINK ${SIMDE_INCLUDE}/simde ${wasmOut}/include/simde SYMBOLIC)
+set(wasmCxxFlags ${wasmFlags} -msimd128 -isystem ${wasmOut}/include -std=c++20 -fno-rtti -fno-exceptions -Wall -Wextra -Wconversion -Wshadow -Werror
   -I${PROJECT_SOURCE_DIR} -isystem ${wasmZstd})
 
 # Appends the object of `source` to wasmObjects. Further arguments: the compiler and its flags.

@@ -4,6 +4,7 @@
 
 #include <utility>
 
+#include "clients/core/description.h"
 #include "proto/codec/packet_header.h"
 
 namespace clothstream::client {
@@ -57,9 +58,9 @@ std::uint32_t Client::welcomed(Bytes body) {
     return fail("The server answers in protocol version " + std::to_string(welcome->protocolVersion) +
                 "; this client speaks version " + std::to_string(CS_PROTOCOL_VERSION) +
                 ". Use a client and a server of the same release.");
-  if (welcome->codec != codec::kCodecLatticeZstd)
+  if (!codec::isCodec(welcome->codec))
     return fail("The server chose codec " + std::to_string(welcome->codec) + "; this client decodes " +
-                std::to_string(codec::kCodecLatticeZstd) + ".");
+                decodedCodecs() + ".");
   welcome_ = std::move(*welcome);
   welcomed_ = true;
   return 0;

@@ -2,12 +2,10 @@
 // Field numbers of session.proto, going out.
 #include "clients/core/client_message.h"
 
-#include <array>
-
 #include <protozero/pbf_writer.hpp>
 
 #include "clients/core/core.h"
-#include "proto/codec/packet_header.h"
+#include "proto/codec/stream_layout.h"
 
 namespace clothstream::client {
 namespace {
@@ -57,9 +55,8 @@ void addSpring(Writer& parent, std::uint32_t field, const std::optional<Spring>&
 void writeHello(std::string& out, std::uint64_t requestId, std::string_view scene,
                 std::string_view clientName) {
   writeMessage(out, requestId, kHello, [&](Writer& hello) {
-    constexpr std::array<std::uint32_t, 1> kCodecs{codec::kCodecLatticeZstd};
     hello.add_uint32(1, CS_PROTOCOL_VERSION);
-    hello.add_packed_uint32(2, kCodecs.begin(), kCodecs.end());
+    hello.add_packed_uint32(2, codec::kCodecs.begin(), codec::kCodecs.end());
     hello.add_string(3, scene.data(), scene.size());
     hello.add_string(4, clientName.data(), clientName.size());
   });

@@ -133,7 +133,9 @@ bool readParts(Bytes message, Description& description, std::vector<ClothMessage
       case varint(1):
         return description.layout.epoch = reader.get_uint32(), true;
       case varint(2):
-        return description.codec = reader.get_uint32(), true;
+        description.codec = reader.get_uint32();
+        description.layout.codec = static_cast<std::uint8_t>(description.codec);
+        return true;
       case bytes(3):
         return setText(description.scene, reader);
       case varint(4):
@@ -199,9 +201,10 @@ std::string readDrawing(const ClothMessage& source, Cloth& cloth) {
 
 // Empty if the numbers agree.
 std::string check(const Description& description, const std::vector<ClothMessage>& cloths) {
-  if (description.codec != codec::kCodecLatticeZstd)
-    return "codec is " + std::to_string(description.codec) + "; this client decodes " +
-           std::to_string(codec::kCodecLatticeZstd);
+  if (!codec::isCodec(description.codec))
+    return "codec is " + std::to_string(description.codec) + "; this client decodes " + decodedCodecs();
+  if (description.codec == codec::kCodecHierarchical && description.layout.normals != codec::NormalMode::none)
+    return "normals is NORMALS_OCTAHEDRAL; codec " + std::to_string(description.codec) + " sends none";
   const std::uint32_t simulation = description.simulationRate, stream = description.streamRate;
   if (simulation == 0 || simulation > kMaxRate)
     return "simulation_rate is " + std::to_string(simulation) + "; 1 to " + std::to_string(kMaxRate) +
@@ -297,6 +300,15 @@ void apply(const ParameterChange& change, Description& description) {
       parameters.damping = clothChange.damping.value_or(parameters.damping);
     }
   }
+}
+
+std::string decodedCodecs() {
+  std::string list;
+  for (const std::uint32_t id : codec::kCodecs) {
+    if (!list.empty()) list += ", ";
+    list += std::to_string(id);
+  }
+  return list;
 }
 
 }  // namespace clothstream::client

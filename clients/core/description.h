@@ -59,4 +59,7 @@ struct Description {
 
 void apply(const ParameterChange& change, Description& description);
 
+// The ids of all codecs, for a text.
+std::string decodedCodecs();
+
 }  // namespace clothstream::client

@@ -8,12 +8,13 @@
 #include <optional>
 #include <span>
 
+#include "proto/codec/stream_layout.h"
+
 namespace clothstream::codec {
 
 enum class PacketKind : std::uint8_t { key = 0, predicted = 1 };
 
 inline constexpr std::uint8_t kPacketVersion = 1;
-inline constexpr std::uint8_t kCodecLatticeZstd = 1;
 inline constexpr std::size_t kMaxReferences = 4;
 inline constexpr std::size_t kMaxClothRanges = 256;
 inline constexpr std::size_t kMaxSections = 8;

@@ -2,6 +2,7 @@
 // What encoder and decoder know of a stream before its first packet.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -17,10 +18,20 @@ struct ClothLayout {
   std::vector<std::uint32_t> triangles = {};
 };
 
+inline constexpr std::uint8_t kCodecLatticeZstd = 1, kCodecHierarchical = 2;
+// All there are, the best first.
+inline constexpr std::array<std::uint32_t, 2> kCodecs{kCodecHierarchical, kCodecLatticeZstd};
+
+constexpr bool isCodec(std::uint32_t id) {
+  return id == kCodecLatticeZstd || id == kCodecHierarchical;
+}
+
 struct StreamLayout {
   std::uint32_t epoch = 0;
-  // m an axis: the promise the encoder keeps for whatever lies within 32 m of the origin. Farther out the
-  // spacing of floats there comes on top.
+  std::uint8_t codec = kCodecLatticeZstd;
+  // m along each of three axes: the promise the encoder keeps for whatever lies within 32 m of the origin.
+  // Farther out the spacing of floats there comes on top. The axes of codec 1 are x, y and z. Those of codec
+  // 2 turn with the surface, and what it promises is the distance that follows: sqrt(3) maxError at most.
   float maxError = 0.0005f;
   NormalMode normals = NormalMode::none;
   std::vector<ClothLayout> cloths;
@@ -35,11 +46,14 @@ struct StreamLayout {
 inline constexpr std::uint32_t kMaxVertices = 1u << 26;
 inline constexpr float kSmallestMaxError = 5e-6f, kLargestMaxError = 1000;
 
-// Whether a stream can have this layout: one cloth or more, none empty, grids whose numbers agree, triangles
-// of vertices that there are, at most kMaxVertices, a max error within the two bounds above.
+// Whether a stream can have this layout: a codec of ours (codec 2 sends no normals), one cloth or more, none
+// empty, grids whose numbers agree, triangles of vertices that there are, at most kMaxVertices, a max error
+// within the two bounds above.
 inline bool isPossible(const StreamLayout& layout) {
   if (!(layout.maxError >= kSmallestMaxError && layout.maxError <= kLargestMaxError)) return false;
   if (layout.normals != NormalMode::none && layout.normals != NormalMode::octahedral) return false;
+  if (!isCodec(layout.codec)) return false;
+  if (layout.codec == kCodecHierarchical && layout.normals != NormalMode::none) return false;
   std::uint64_t vertices = 0;
   for (const ClothLayout& cloth : layout.cloths) {
     const std::uint64_t nodes = std::uint64_t{cloth.rows} * cloth.columns;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Frames from simulation state: quantised and predicted on the device, entropy-coded on the CPU.
+// Frames from simulation state: prepared on the device, entropy-coded on the CPU.
 #pragma once
 
 #include <cstddef>
@@ -15,7 +15,7 @@
 
 namespace clothstream::encode {
 
-// The layout of a scene's stream.
+// The layout of a scene's stream. Codec 2, but where normals are sent, which only codec 1 does.
 codec::StreamLayout streamLayout(const scene::Scene& scene, std::uint32_t epoch);
 
 // The readback of one recorded frame, waiting to be entropy-coded.
@@ -46,7 +46,7 @@ class FrameEncoder {
   // Whether a slot is free.
   bool canRecord() const;
 
-  // Quantise and predict the simulation's present positions (and normals, which must have been recorded,
+  // Takes the simulation's present positions (and normals, which must have been recorded,
   // where the layout has them). `tick` must grow from call to call. A predicted frame refers to the frame
   // recorded before; the first is always a key frame, whatever is asked.
   RecordedFrame record(vulkan::Recorder& recorder, std::uint64_t tick, bool forceKey);
@@ -54,7 +54,8 @@ class FrameEncoder {
   // After a rollback or restore: the next frame is a key frame.
   void forgetHistory();
 
-  // Once the recording is complete on the device; frees the slot. `out` holds at least packetBound() bytes.
+  // Once the recording is complete on the device, in the order of record(); frees the slot. `out` holds at
+  // least packetBound() bytes.
   EncodedFrame entropyCode(const RecordedFrame& frame, std::span<std::byte> out);
 
   std::size_t packetBound() const;

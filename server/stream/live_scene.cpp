@@ -4,7 +4,7 @@
 
 #include <utility>
 
-#include "proto/codec/packet_header.h"
+#include "server/encode/frame_encoder.h"
 #include "server/messages/client_message.h"
 #include "server/messages/description.h"
 #include "server/messages/scene_message.h"
@@ -54,6 +54,10 @@ messages::Result<void> LiveScene::change(std::uint64_t participant, const v1::Pa
   return {};
 }
 
+std::uint32_t LiveScene::codec() const {
+  return encode::streamLayout(start_, kEpoch).codec;
+}
+
 v1::ParameterChange LiveScene::resetParameters() {
   const std::lock_guard lock(mutex_);
   inbox.keepColliderChanges();
@@ -66,7 +70,7 @@ v1::ParameterChange LiveScene::resetParameters() {
 std::shared_ptr<const Description> LiveScene::description() {
   const std::lock_guard lock(mutex_);
   if (description_) return description_;
-  v1::StreamDescription message = messages::toDescription(definition_, kEpoch, codec::kCodecLatticeZstd);
+  v1::StreamDescription message = messages::toDescription(definition_, kEpoch, codec());
   const double time = static_cast<double>(tick.load()) * definition_.tickSeconds();
   for (const scene::SphereCollider& collider : definition_.colliders)
     messages::write(collider, scene::positionAt(collider, time), *message.add_colliders());

@@ -26,6 +26,8 @@ class LiveScene {
   const std::string& name() const { return start_.name; }
   // As it was at first.
   const scene::Scene& start() const { return start_; }
+  // Of its stream.
+  std::uint32_t codec() const;
   // With all accepted changes, those of the next tick included.
   scene::Scene definition() const;
 

@@ -2,7 +2,7 @@
 // What a peer says and how the server answers.
 #include "server/stream/session.h"
 
-#include <array>
+#include <algorithm>
 #include <utility>
 
 #include <fmt/format.h>
@@ -15,7 +15,6 @@
 namespace clothstream::stream {
 namespace {
 
-constexpr std::array<std::uint32_t, 1> kCodecs{codec::kCodecLatticeZstd};
 constexpr double kMalformedCost = 60;
 
 }  // namespace
@@ -98,13 +97,18 @@ void Session::hello(const v1::Hello& message) {
   if (scene_ != nullptr)
     return fail(v1::ERROR_CODE_OUT_OF_ORDER,
                 fmt::format("this stream has joined '{}' already: open another one", scene_->name()));
-  const messages::Result<messages::Joining> joining = messages::toJoining(message, kCodecs);
+  const messages::Result<messages::Joining> joining = messages::toJoining(message, codec::kCodecs);
   if (!joining) return fail(joining.error().code, joining.error().text);
   LiveScene* scene = server_.find(joining->scene);
   if (scene == nullptr) {
     const v1::Error error = server_.noSuchScene(joining->scene);
     return fail(error.code(), error.text());
   }
+  // One stream for all: it has one codec.
+  if (std::ranges::find(message.codecs(), scene->codec()) == message.codecs().end())
+    return fail(
+        v1::ERROR_CODE_UNSUPPORTED_CODEC,
+        fmt::format("hello.codecs: must have {}, in which '{}' is sent", scene->codec(), scene->name()));
   if (!scene->audience.join(mailbox_, server_.options.maxParticipants))
     return fail(v1::ERROR_CODE_RESOURCE_EXHAUSTED,
                 fmt::format("'{}' has {} participants, as many as it may have; try again later",
@@ -117,7 +121,7 @@ void Session::hello(const v1::Hello& message) {
   v1::ServerMessage reply;
   v1::Welcome& welcome = *reply.mutable_welcome();
   welcome.set_protocol_version(joining->protocolVersion);
-  welcome.set_codec(joining->codec);
+  welcome.set_codec(scene->codec());
   welcome.set_scene(scene->name());
   welcome.set_participant_id(participant_);
   welcome.set_server_name(server_.options.serverName);

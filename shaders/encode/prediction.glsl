@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Integer prediction from neighbours and the reference frame, as in proto/codec/prediction.h.
+// Integer prediction from neighbours and the reference frame, as in proto/codec/lattice/prediction.h.
 #ifndef CLOTHSTREAM_SHADERS_ENCODE_PREDICTION_GLSL
 #define CLOTHSTREAM_SHADERS_ENCODE_PREDICTION_GLSL
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Positions and normals to integers (proto/codec/lattice.h, octahedral.h), and the hash of them.
+// Positions and normals to integers (proto/codec/lattice/lattice.h, octahedral.h), and the hash of them.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Residuals of the cheapest prediction as planes of bytes, as in proto/codec/residual_planes.h.
+// Residuals of the cheapest prediction as planes of bytes, as in proto/codec/lattice/residual_planes.h.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 

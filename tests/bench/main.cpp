@@ -25,6 +25,8 @@ constexpr std::array kSuites{
                  &bench::runCurtain},
     bench::Suite{"codec", "bits a vertex and milliseconds a frame, key and predicted, of a hung cloth",
                  &bench::runCodec},
+    bench::Suite{"codec_motions", "both codecs on the CPU over four motions of a 100x100 cloth",
+                 &bench::runCodecMotions},
 };
 
 }  // namespace

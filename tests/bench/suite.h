@@ -35,5 +35,6 @@ Rows runMassSpring(vulkan::Device& device, const Settings& settings);
 Rows runPaper(vulkan::Device& device, const Settings& settings);
 Rows runCurtain(vulkan::Device& device, const Settings& settings);
 Rows runCodec(vulkan::Device& device, const Settings& settings);
+Rows runCodecMotions(vulkan::Device& device, const Settings& settings);
 
 }  // namespace clothstream::bench

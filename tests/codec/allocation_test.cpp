@@ -48,8 +48,7 @@ void operator delete(void* memory, std::size_t) noexcept {
 namespace clothstream::codec {
 namespace {
 
-TEST(Allocation, HappensOnlyAtConstruction) {
-  const StreamLayout layout = mixedLayout(NormalMode::octahedral);
+void expectAllocationOnlyAtConstruction(const StreamLayout& layout) {
   const std::vector<MotionFrame> frames{sampleMotion(layout, 1, 0.1f), sampleMotion(layout, 2, 0.1f),
                                         scatter(layout, 1, 30.0f), sampleMotion(layout, 3, 0.1f)};
   const std::size_t before = allocations;
@@ -71,6 +70,14 @@ TEST(Allocation, HappensOnlyAtConstruction) {
   EXPECT_EQ(allocations, constructed);
   EXPECT_TRUE(decoded);
   EXPECT_NE(sum, 0.0f);
+}
+
+TEST(Allocation, OfTheLatticeCodecHappensOnlyAtConstruction) {
+  expectAllocationOnlyAtConstruction(mixedLayout(NormalMode::octahedral, kCodecLatticeZstd));
+}
+
+TEST(Allocation, OfTheHierarchicalCodecHappensOnlyAtConstruction) {
+  expectAllocationOnlyAtConstruction(mixedLayout(NormalMode::none, kCodecHierarchical));
 }
 
 }  // namespace

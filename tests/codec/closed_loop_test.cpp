@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+#include <algorithm>
 #include <cmath>
 #include <string>
 #include <vector>
@@ -7,7 +8,7 @@
 
 #include "proto/codec/decoder.h"
 #include "proto/codec/encoder.h"
-#include "proto/codec/octahedral.h"
+#include "proto/codec/lattice/octahedral.h"
 #include "tests/codec/motion.h"
 
 namespace clothstream::codec {
@@ -29,19 +30,33 @@ class Loop {
     EXPECT_EQ(decoder_->decode(packet), DecodeResult::ok) << tick;
     EXPECT_EQ(decoder_->tick(), tick);
     EXPECT_EQ(decoder_->reconstructionHash(), encoder_->reconstructionHash()) << tick;
-    for (std::size_t i = 0; i < frame.positions.size(); ++i) {
-      const double error =
-          static_cast<double>(frame.positions[i]) - static_cast<double>(decoder_->positions()[i]);
-      EXPECT_LE(std::fabs(error), static_cast<double>(layout_.maxError))
-          << "tick " << tick << " coordinate " << i;
-    }
+    expectPositions(tick, frame);
     if (layout_.normals == NormalMode::octahedral) expectNormals(frame);
     return parsePacket(packet)->header;
   }
 
   Encoder& encoder() { return *encoder_; }
+  const Decoder& decoder() const { return *decoder_; }
 
  private:
+  // Codec 1 promises each coordinate, codec 2 the distance.
+  void expectPositions(std::uint64_t tick, const MotionFrame& frame) {
+    const double maxError = static_cast<double>(layout_.maxError);
+    const bool eachAxis = layout_.codec == kCodecLatticeZstd;
+    for (std::size_t i = 0; i < frame.positions.size(); i += 3) {
+      double squared = 0;
+      for (std::size_t c = i; c < i + 3; ++c) {
+        const double error =
+            static_cast<double>(frame.positions[c]) - static_cast<double>(decoder_->positions()[c]);
+        squared += error * error;
+        if (eachAxis) {
+          EXPECT_LE(std::fabs(error), maxError) << "tick " << tick << " coordinate " << c;
+        }
+      }
+      EXPECT_LE(squared, 3 * maxError * maxError) << "tick " << tick << " vertex " << i / 3;
+    }
+  }
+
   void expectNormals(const MotionFrame& frame) {
     for (std::size_t i = 0; i < frame.normals.size(); i += 3) {
       float sent[3];
@@ -56,14 +71,25 @@ class Loop {
   std::vector<std::byte> packet_;
 };
 
-class ClosedLoop : public testing::TestWithParam<NormalMode> {};
-INSTANTIATE_TEST_SUITE_P(Normals, ClosedLoop, testing::Values(NormalMode::none, NormalMode::octahedral),
-                         [](const auto& chosen) {
-                           return chosen.param == NormalMode::none ? "none" : "octahedral";
-                         });
+struct Sort {
+  const char* name;
+  std::uint8_t codec;
+  NormalMode normals;
+};
+
+class ClosedLoop : public testing::TestWithParam<Sort> {
+ protected:
+  static StreamLayout mixed() { return mixedLayout(GetParam().normals, GetParam().codec); }
+};
+INSTANTIATE_TEST_SUITE_P(Sorts, ClosedLoop,
+                         testing::Values(Sort{"lattice", kCodecLatticeZstd, NormalMode::none},
+                                         Sort{"latticeWithNormals", kCodecLatticeZstd,
+                                              NormalMode::octahedral},
+                                         Sort{"hierarchical", kCodecHierarchical, NormalMode::none}),
+                         [](const auto& chosen) { return chosen.param.name; });
 
 TEST_P(ClosedLoop, KeepsTheMaxErrorOverAMotion) {
-  const StreamLayout layout = mixedLayout(GetParam());
+  const StreamLayout layout = mixed();
   Loop loop(layout);
   for (std::uint64_t tick = 1; tick <= 60; ++tick) {
     const bool key = tick % 20 == 1;
@@ -78,7 +104,7 @@ TEST_P(ClosedLoop, KeepsTheMaxErrorOverAMotion) {
 }
 
 TEST_P(ClosedLoop, KeepsTheMaxErrorWhenEverythingJumps) {
-  const StreamLayout layout = mixedLayout(GetParam());
+  const StreamLayout layout = mixed();
   Loop loop(layout);
   for (std::uint32_t tick = 1; tick <= 30; ++tick) {
     loop.send(tick, PacketKind::predicted, scatter(layout, tick, tick % 3 == 0 ? 0.01f : 31.9f));
@@ -86,23 +112,92 @@ TEST_P(ClosedLoop, KeepsTheMaxErrorWhenEverythingJumps) {
 }
 
 TEST_P(ClosedLoop, KeepsTheMaxErrorAtTheFinestAndAtTheCoarsest) {
-  for (const float maxError : {1e-5f, 0.1f}) {
-    StreamLayout layout = mixedLayout(GetParam());
+  for (const float maxError : {kSmallestMaxError, 1e-5f, 2e-4f, 0.1f}) {
+    StreamLayout layout = mixed();
     layout.maxError = maxError;
     Loop loop(layout);
     for (std::uint64_t tick = 1; tick <= 10; ++tick) {
       loop.send(tick, PacketKind::predicted, sampleMotion(layout, tick, 0.3f));
     }
+    for (std::uint32_t tick = 11; tick <= 14; ++tick) {
+      loop.send(tick, PacketKind::predicted, scatter(layout, tick, 31.9f));
+    }
   }
 }
 
-TEST(ClosedLoopKinds, StartsWithAKeyFrameWhateverIsAsked) {
-  const StreamLayout layout = mixedLayout(NormalMode::none);
+TEST_P(ClosedLoop, StartsWithAKeyFrameWhateverIsAsked) {
+  const StreamLayout layout = mixed();
   Loop loop(layout);
   EXPECT_EQ(loop.send(5, PacketKind::predicted, sampleMotion(layout, 5, 0.1f)).kind, PacketKind::key);
   EXPECT_EQ(loop.send(6, PacketKind::predicted, sampleMotion(layout, 6, 0.1f)).kind, PacketKind::predicted);
   loop.encoder().forgetHistory();
   EXPECT_EQ(loop.send(7, PacketKind::predicted, sampleMotion(layout, 7, 0.1f)).kind, PacketKind::key);
+}
+
+TEST_P(ClosedLoop, SurvivesPositionsThatAreNone) {
+  const StreamLayout layout = mixed();
+  const auto encoder = Encoder::make(layout);
+  const auto decoder = Decoder::make(layout);
+  std::vector<std::byte> packet(encoder->packetBound());
+  MotionFrame frame = sampleMotion(layout, 1, 0.1f);
+  std::fill(frame.positions.begin() + 5, frame.positions.begin() + 40, std::nanf(""));
+  std::fill(frame.positions.begin() + 40, frame.positions.begin() + 80, -INFINITY);
+  for (std::uint64_t tick = 1; tick <= 3; ++tick) {
+    const std::size_t bytes =
+        encoder->encode(tick, PacketKind::predicted, frame.positions, frame.normals, packet);
+    ASSERT_EQ(decoder->decode(std::span(packet).first(bytes)), DecodeResult::ok);
+    EXPECT_EQ(decoder->reconstructionHash(), encoder->reconstructionHash());
+    for (const float x : decoder->positions()) EXPECT_TRUE(std::isfinite(x));
+  }
+}
+
+StreamLayout square(std::uint32_t edge, std::uint8_t codec) {
+  return {
+      .epoch = 1, .codec = codec, .cloths = {{.vertexCount = edge * edge, .rows = edge, .columns = edge}}};
+}
+
+TEST(Hierarchical, SendsAStillClothInATwentiethOfABitAVertex) {
+  const StreamLayout layout = square(100, kCodecHierarchical);
+  Loop loop(layout);
+  PacketHeader last;
+  for (std::uint64_t tick = 1; tick <= 40; ++tick) {
+    last =
+        loop.send(tick, PacketKind::predicted, sampleMotion(layout, std::min<std::uint64_t>(tick, 8), 0.05f));
+  }
+  std::size_t bits = 0;
+  for (std::size_t i = 0; i < last.sectionCount; ++i) bits += std::size_t{8} * last.sectionBytes[i];
+  EXPECT_LT(bits, 10'000 / 20);
+}
+
+TEST(Hierarchical, LetsPinsStandStillInAMovingCloth) {
+  const StreamLayout layout = square(20, kCodecHierarchical);
+  Loop loop(layout);
+  std::vector<float> before;
+  for (std::uint64_t tick = 1; tick <= 40; ++tick) {
+    MotionFrame frame = sampleMotion(layout, tick, 0.05f);
+    const MotionFrame start = sampleMotion(layout, 1, 0.05f);
+    std::copy_n(start.positions.begin(), 3 * 20, frame.positions.begin());
+    loop.send(tick, PacketKind::predicted, frame);
+    const std::span<const float> decoded = loop.decoder().positions();
+    const std::vector<float> pins(decoded.begin(), decoded.begin() + 3 * 20);
+    if (tick > 10) {
+      EXPECT_EQ(pins, before) << tick;
+    }
+    before = pins;
+  }
+}
+
+TEST(Hierarchical, TakesAThirdOfCodecOneOnAMotion) {
+  std::size_t bytes[2] = {};
+  for (const std::uint8_t codec : {kCodecLatticeZstd, kCodecHierarchical}) {
+    const StreamLayout layout = square(64, codec);
+    Loop loop(layout);
+    for (std::uint64_t tick = 1; tick <= 30; ++tick) {
+      const PacketHeader header = loop.send(tick, PacketKind::predicted, sampleMotion(layout, tick, 0.02f));
+      for (std::size_t i = 0; i < header.sectionCount; ++i) bytes[codec - 1] += header.sectionBytes[i];
+    }
+  }
+  EXPECT_LT(3 * bytes[1], bytes[0]);
 }
 
 TEST(ClosedLoopKinds, SendsAStillClothInAFewBytes) {
@@ -115,7 +210,7 @@ TEST(ClosedLoopKinds, SendsAStillClothInAFewBytes) {
 }
 
 TEST(ClosedLoopKinds, PredictionPaysOnASlowMotion) {
-  const StreamLayout layout{.epoch = 1, .cloths = {{.vertexCount = 64 * 64, .rows = 64, .columns = 64}}};
+  const StreamLayout layout = square(64, kCodecLatticeZstd);
   const auto predicted = Encoder::make(layout), keys = Encoder::make(layout);
   std::vector<std::byte> packet(keys->packetBound());
   std::size_t predictedBytes = 0, keyBytes = 0;
@@ -134,7 +229,7 @@ TEST(ClosedLoopKinds, PredictionPaysOnASlowMotion) {
 TEST(Layout, ThatIsImpossibleMakesNoCodec) {
   const StreamLayout good = mixedLayout(NormalMode::none);
   ASSERT_NE(Decoder::make(good), nullptr);
-  std::vector<StreamLayout> bad(9, good);
+  std::vector<StreamLayout> bad(12, good);
   bad[0].cloths.clear();
   bad[1].cloths[0].rows = 8;
   bad[2].cloths[0].rows = 0;
@@ -144,6 +239,9 @@ TEST(Layout, ThatIsImpossibleMakesNoCodec) {
   bad[6].maxError = INFINITY;
   bad[7].cloths.assign(2, {.vertexCount = (1u << 25) + 1, .rows = 0, .columns = 0});
   bad[8].cloths.assign(1, {.vertexCount = 4, .rows = 0x80000002u, .columns = 2});  // 4 modulo 2^32
+  bad[9].codec = 0;
+  bad[10].codec = 3;
+  bad[11] = mixedLayout(NormalMode::octahedral, kCodecHierarchical);
   for (std::size_t i = 0; i < bad.size(); ++i) {
     EXPECT_EQ(Decoder::make(bad[i]), nullptr) << i;
     EXPECT_EQ(Encoder::make(bad[i]), nullptr) << i;

@@ -41,6 +41,7 @@ GoldenStream readStream(const nlohmann::json& json) {
   GoldenStream stream;
   stream.name = json.at("name");
   stream.layout.epoch = json.at("epoch");
+  stream.layout.codec = json.at("codec");
   stream.layout.maxError = json.at("maxError");
   stream.layout.normals = json.at("normals") == "octahedral" ? NormalMode::octahedral : NormalMode::none;
   for (const nlohmann::json& cloth : json.at("cloths")) {
@@ -60,6 +61,7 @@ nlohmann::ordered_json describe(const GoldenStream& stream) {
   nlohmann::ordered_json json{
       {"name", stream.name},
       {"epoch", stream.layout.epoch},
+      {"codec", stream.layout.codec},
       {"maxError", stream.layout.maxError},
       {"normals", stream.layout.normals == NormalMode::octahedral ? "octahedral" : "none"}};
   for (const ClothLayout& cloth : stream.layout.cloths) {

@@ -116,7 +116,9 @@ TEST(HostilePacket, OfAnotherLayoutIsRefused) {
   larger.cloths[0] = {.vertexCount = 9 * 8, .rows = 9, .columns = 8};
   withNormals.normals = NormalMode::octahedral;
   fewer.cloths.pop_back();
-  for (const StreamLayout& layout : {larger, withNormals, fewer}) {
+  StreamLayout otherCodec = streams[0].layout;
+  otherCodec.codec = kCodecHierarchical;
+  for (const StreamLayout& layout : {larger, withNormals, fewer, otherCodec}) {
     EXPECT_EQ(Decoder::make(layout)->decode(streams[0].packets[0].bytes), DecodeResult::malformed);
   }
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "proto/codec/lattice.h"
+#include "proto/codec/lattice/lattice.h"
 
 #include <cmath>
 #include <limits>

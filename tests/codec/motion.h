@@ -22,6 +22,6 @@ MotionFrame sampleMotion(const StreamLayout& layout, std::uint64_t tick, float a
 MotionFrame scatter(const StreamLayout& layout, std::uint32_t seed, float extent);
 
 // Odd-sized grids, a grid of one row, one of one vertex, a cloth that is no grid.
-StreamLayout mixedLayout(NormalMode normals);
+StreamLayout mixedLayout(NormalMode normals, std::uint8_t codec = kCodecLatticeZstd);
 
 }  // namespace clothstream::codec

@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-#include "proto/codec/octahedral.h"
+#include "proto/codec/lattice/octahedral.h"
 #include "proto/codec/vertex_normals.h"
 
 namespace clothstream::codec {

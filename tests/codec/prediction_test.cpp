@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "proto/codec/prediction.h"
+#include "proto/codec/lattice/prediction.h"
 
 #include <limits>
 #include <random>

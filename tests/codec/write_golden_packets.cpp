@@ -47,12 +47,20 @@ GoldenStream makeStream(const std::string& name, const StreamLayout& layout) {
 
 int main() try {
   using namespace clothstream::codec;
-  writeGoldenStreams({makeStream("mixed", mixedLayout(NormalMode::none)),
-                      makeStream("normals", mixedLayout(NormalMode::octahedral)),
-                      makeStream("vertex", {.epoch = 0xffffffffu,
-                                            .maxError = 0.01f,
-                                            .normals = NormalMode::none,
-                                            .cloths = {{.vertexCount = 1, .rows = 0, .columns = 0}}})});
+  writeGoldenStreams(
+      {makeStream("mixed", mixedLayout(NormalMode::none)),
+       makeStream("normals", mixedLayout(NormalMode::octahedral)),
+       makeStream("hierarchical", mixedLayout(NormalMode::none, kCodecHierarchical)),
+       makeStream("fine_hierarchical", {.epoch = 8,
+                                        .codec = kCodecHierarchical,
+                                        .maxError = 0.00002f,
+                                        .normals = NormalMode::none,
+                                        .cloths = {{.vertexCount = 150, .rows = 15, .columns = 10}}}),
+       makeStream("vertex", {.epoch = 0xffffffffu,
+                             .codec = kCodecLatticeZstd,
+                             .maxError = 0.01f,
+                             .normals = NormalMode::none,
+                             .cloths = {{.vertexCount = 1, .rows = 0, .columns = 0}}})});
   return 0;
 } catch (const std::exception& error) {
   std::fprintf(stderr, "%s\n", error.what());

@@ -21,7 +21,7 @@ TEST(Joining, SaysHelloFirstAndOnlyThat) {
   ASSERT_THAT(messages, SizeIs(1));
   ASSERT_TRUE(messages[0].has_hello());
   EXPECT_EQ(messages[0].hello().protocol_version(), CS_PROTOCOL_VERSION);
-  EXPECT_THAT(messages[0].hello().codecs(), ElementsAre(1));
+  EXPECT_THAT(messages[0].hello().codecs(), ElementsAre(2, 1));
   EXPECT_EQ(messages[0].hello().scene(), "flag");
   EXPECT_EQ(messages[0].hello().client_name(), "test");
   EXPECT_NE(messages[0].request_id(), 0u);
@@ -274,7 +274,10 @@ INSTANTIATE_TEST_SUITE_P(
     Wrong, Descriptions,
     ::testing::Values(
         WrongDescription{"no_cloth", [](v1::StreamDescription& d) { d.clear_cloths(); }, "0 cloths"},
-        WrongDescription{"a_codec", [](v1::StreamDescription& d) { d.set_codec(2); }, "codec is 2"},
+        WrongDescription{"a_codec", [](v1::StreamDescription& d) { d.set_codec(3); }, "codec is 3"},
+        WrongDescription{"normals_of_codec_2",
+                         [](v1::StreamDescription& d) { d.set_normals(v1::NORMALS_OCTAHEDRAL); },
+                         "normals is NORMALS_OCTAHEDRAL"},
         WrongDescription{"no_rate", [](v1::StreamDescription& d) { d.set_simulation_rate(0); },
                          "simulation_rate is 0"},
         WrongDescription{"rate", [](v1::StreamDescription& d) { d.set_stream_rate(71); },

@@ -19,6 +19,8 @@ std::string serialised(const v1::ServerMessage& message) {
 ScriptedServer::ScriptedServer(ScriptedStream stream) : stream_(std::move(stream)) {
   layout_.epoch = stream_.epoch;
   layout_.normals = stream_.normals;
+  layout_.codec =
+      stream_.normals == codec::NormalMode::none ? codec::kCodecHierarchical : codec::kCodecLatticeZstd;
   for (const ClothSize& cloth : stream_.cloths)
     layout_.cloths.push_back({cloth.rows * cloth.columns, cloth.rows, cloth.columns});
   encoder_ = codec::Encoder::make(layout_);
@@ -46,7 +48,7 @@ std::string ScriptedServer::welcome() const {
   v1::ServerMessage message;
   v1::Welcome& welcome = *message.mutable_welcome();
   welcome.set_protocol_version(CS_PROTOCOL_VERSION);
-  welcome.set_codec(1);
+  welcome.set_codec(layout_.codec);
   welcome.set_scene("curtain");
   welcome.set_participant_id(42);
   welcome.set_server_name("scripted 1");
@@ -58,7 +60,7 @@ std::string ScriptedServer::welcome() const {
 v1::StreamDescription ScriptedServer::description() const {
   v1::StreamDescription description;
   description.set_epoch(stream_.epoch);
-  description.set_codec(1);
+  description.set_codec(layout_.codec);
   description.set_scene("curtain");
   description.set_simulation_rate(stream_.simulationRate);
   description.set_stream_rate(stream_.streamRate);

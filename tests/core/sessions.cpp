@@ -77,7 +77,7 @@ Session goldenSession(const std::string& name) {
     if (stream.name != name) continue;
     v1::StreamDescription description;
     description.set_epoch(stream.layout.epoch);
-    description.set_codec(1);
+    description.set_codec(stream.layout.codec);
     description.set_simulation_rate(72);
     description.set_stream_rate(72);
     description.set_max_error(stream.layout.maxError);

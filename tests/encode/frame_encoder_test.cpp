@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <random>
 #include <thread>
 #include <vector>
@@ -46,10 +47,10 @@ std::vector<simulation::MovingSphere> sphereAt(std::uint64_t tick) {
 // A simulation whose frames are encoded on the device and on the CPU.
 class Encoding {
  public:
-  explicit Encoding(const scene::Scene& scene)
+  explicit Encoding(const scene::Scene& scene, std::optional<std::uint8_t> codec = {})
       : scene_(scene),
         simulation(device(), scene),
-        layout(encode::streamLayout(scene, kEpoch)),
+        layout(layoutOf(scene, codec)),
         encoder(device(), simulation, layout),
         recorder_(device()),
         normals_(device(), vulkan::BufferPurpose::readback, simulation.normals().bytes()),
@@ -69,6 +70,12 @@ class Encoding {
     recorder_.begin();
     simulation.recordRestoreState(recorder_, simulation::pack(state, tick));
     return encodeAndCompare(tick, forceKey);
+  }
+
+  static codec::StreamLayout layoutOf(const scene::Scene& scene, std::optional<std::uint8_t> codec) {
+    codec::StreamLayout layout = encode::streamLayout(scene, kEpoch);
+    layout.codec = codec.value_or(layout.codec);
+    return layout;
   }
 
   double kilobytes() const { return bytes_ / 1000; }
@@ -102,10 +109,23 @@ class Encoding {
     ASSERT_EQ(decoder_->decode(packet), codec::DecodeResult::ok) << "tick " << frame.tick;
     EXPECT_EQ(decoder_->reconstructionHash(), encoded.reconstructionHash);
     bytes_ += static_cast<double>(encoded.bytes);
-    for (std::size_t i = 0; i < positions.size(); ++i) {
-      if (std::fabs(positions[i]) > 32) continue;  // farther out the promise is another one
-      const double error = static_cast<double>(positions[i]) - static_cast<double>(decoder_->positions()[i]);
-      ASSERT_LE(std::fabs(error), static_cast<double>(layout.maxError)) << "tick " << frame.tick;
+    // Each coordinate is promised by codec 1, the distance by both.
+    const double maxError = static_cast<double>(layout.maxError);
+    for (std::size_t i = 0; i < positions.size(); i += 3) {
+      double squared = 0;
+      bool isNear = true;  // farther out the promise is another one
+      for (std::size_t c = i; c < i + 3; ++c) {
+        isNear = isNear && std::fabs(positions[c]) <= 32;
+        const double error =
+            static_cast<double>(positions[c]) - static_cast<double>(decoder_->positions()[c]);
+        squared += error * error;
+        if (layout.codec == codec::kCodecLatticeZstd && std::fabs(positions[c]) <= 32) {
+          ASSERT_LE(std::fabs(error), maxError) << "tick " << frame.tick;
+        }
+      }
+      if (isNear) {
+        ASSERT_LE(squared, 3 * maxError * maxError) << "tick " << frame.tick;
+      }
     }
   }
 
@@ -125,15 +145,22 @@ class Encoding {
   double bytes_ = 0;
 };
 
-class FrameEncoder : public GpuTest, public testing::WithParamInterface<scene::Normals> {};
-INSTANTIATE_TEST_SUITE_P(Normals, FrameEncoder,
-                         testing::Values(scene::Normals::none, scene::Normals::octahedral),
-                         [](const auto& chosen) {
-                           return chosen.param == scene::Normals::none ? "none" : "octahedral";
-                         });
+struct Sort {
+  const char* name;
+  std::uint8_t codec;
+  scene::Normals normals;
+};
+
+class FrameEncoder : public GpuTest, public testing::WithParamInterface<Sort> {};
+INSTANTIATE_TEST_SUITE_P(
+    Sorts, FrameEncoder,
+    testing::Values(Sort{"lattice", codec::kCodecLatticeZstd, scene::Normals::none},
+                    Sort{"latticeWithNormals", codec::kCodecLatticeZstd, scene::Normals::octahedral},
+                    Sort{"hierarchical", codec::kCodecHierarchical, scene::Normals::none}),
+    [](const auto& chosen) { return chosen.param.name; });
 
 TEST_P(FrameEncoder, MakesThePacketsOfTheReferenceEncoder) {
-  Encoding encoding(clothsOf(GetParam()));
+  Encoding encoding(clothsOf(GetParam().normals), GetParam().codec);
   for (std::uint64_t tick = 1; tick <= 120; ++tick) {
     const encode::RecordedFrame frame = encoding.tick(tick, tick % 40 == 0);
     EXPECT_EQ(frame.kind == codec::PacketKind::key, tick == 1 || tick % 40 == 0) << tick;
@@ -144,7 +171,7 @@ TEST_P(FrameEncoder, MakesThePacketsOfTheReferenceEncoder) {
 }
 
 TEST_P(FrameEncoder, EqualsTheReferenceOnStatesOfAnySize) {
-  Encoding encoding(clothsOf(GetParam()));
+  Encoding encoding(clothsOf(GetParam().normals), GetParam().codec);
   std::mt19937 random(1);
   for (std::uint64_t tick = 1; tick <= 12; ++tick) {
     const float extents[] = {1e-19f, 0.001f, 1, 32, 8000, 1e6f};
@@ -161,7 +188,7 @@ TEST_P(FrameEncoder, EqualsTheReferenceOnStatesOfAnySize) {
 TEST_P(FrameEncoder, KeepsTheErrorAtRoundingsEdges) {
   // Half way between lattice points, and the floats beside it: where a device that rounds otherwise would
   // differ.
-  Encoding encoding(clothsOf(GetParam()));
+  Encoding encoding(clothsOf(GetParam().normals), GetParam().codec);
   const float step = 2 * encoding.layout.maxError - 0x1p-18f;
   std::mt19937 random(2);
   std::uniform_int_distribution<int> point(-30000, 30000), offset(-3, 3);
@@ -188,9 +215,15 @@ TEST_P(FrameEncoder, MakesThoseOfMeshesToo) {
     encoding.tick(tick, tick % 10 == 0);
 }
 
+TEST(StreamLayout, IsCodecTwosButWhereNormalsAreSent) {
+  EXPECT_EQ(encode::streamLayout(clothsOf(scene::Normals::none), kEpoch).codec, codec::kCodecHierarchical);
+  EXPECT_EQ(encode::streamLayout(clothsOf(scene::Normals::octahedral), kEpoch).codec,
+            codec::kCodecLatticeZstd);
+}
+
 class FrameEncoderSlots : public GpuTest {};
 
-TEST_F(FrameEncoderSlots, AreFreedByEntropyCodingInAnyOrderAndOnAnotherThread) {
+TEST_F(FrameEncoderSlots, AreFreedByEntropyCodingOnAnotherThread) {
   const scene::Scene scene = clothsOf(scene::Normals::none);
   Encoding encoding(scene);
   vulkan::Recorder recorder(device());
@@ -206,7 +239,7 @@ TEST_F(FrameEncoderSlots, AreFreedByEntropyCodingInAnyOrderAndOnAnotherThread) {
 
   std::vector<std::vector<std::byte>> packets(frames.size());
   std::thread packer([&] {
-    for (const std::size_t i : {2u, 0u, 1u}) {
+    for (std::size_t i = 0; i < frames.size(); ++i) {
       packets[i].resize(encoding.encoder.packetBound());
       packets[i].resize(encoding.encoder.entropyCode(frames[i], packets[i]).bytes);
     }

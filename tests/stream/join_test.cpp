@@ -35,7 +35,7 @@ TEST_F(JoinTest, GivesWelcomeDescriptionAndFramesFromAKeyFrameOn) {
   peer.join();
   EXPECT_EQ(peer.welcome().scene(), "small");
   EXPECT_EQ(peer.welcome().protocol_version(), 1u);
-  EXPECT_EQ(peer.welcome().codec(), codec::kCodecLatticeZstd);
+  EXPECT_EQ(peer.welcome().codec(), codec::kCodecHierarchical);
   EXPECT_GT(peer.welcome().participant_id(), 0u);
   EXPECT_EQ(peer.welcome().device_name(), server().deviceInfo().name);
   EXPECT_EQ(peer.description().simulation_rate(), 40u);

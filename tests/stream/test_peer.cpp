@@ -30,7 +30,7 @@ void TestPeer::hello(const std::string& scene) {
   v1::ClientMessage message;
   message.set_request_id(1);
   message.mutable_hello()->set_protocol_version(1);
-  message.mutable_hello()->add_codecs(codec::kCodecLatticeZstd);
+  for (const std::uint32_t codec : codec::kCodecs) message.mutable_hello()->add_codecs(codec);
   message.mutable_hello()->set_scene(scene);
   message.mutable_hello()->set_client_name("test");
   send(message);
@@ -119,6 +119,7 @@ void TestPeer::seeChunk(const v1::Chunk& chunk) {
   const bool octahedral = description_.normals() == v1::NORMALS_OCTAHEDRAL;
   codec::StreamLayout layout;
   layout.epoch = description_.epoch();
+  layout.codec = static_cast<std::uint8_t>(description_.codec());
   layout.maxError = description_.max_error();
   layout.normals = octahedral ? codec::NormalMode::octahedral : codec::NormalMode::none;
   for (const v1::ClothDescription& cloth : description_.cloths())

@@ -16,6 +16,7 @@ std::string serialised(const v1::ClientMessage& message) {
 codec::StreamLayout layoutOf(const v1::StreamDescription& description) {
   codec::StreamLayout layout;
   layout.epoch = description.epoch();
+  layout.codec = static_cast<std::uint8_t>(description.codec());
   layout.maxError = description.max_error();
   layout.normals = description.normals() == v1::NORMALS_OCTAHEDRAL ? codec::NormalMode::octahedral
                                                                    : codec::NormalMode::none;
@@ -29,7 +30,7 @@ codec::StreamLayout layoutOf(const v1::StreamDescription& description) {
 std::string hello(const std::string& scene) {
   v1::ClientMessage message;
   message.mutable_hello()->set_protocol_version(1);
-  message.mutable_hello()->add_codecs(codec::kCodecLatticeZstd);
+  for (const std::uint32_t codec : codec::kCodecs) message.mutable_hello()->add_codecs(codec);
   message.mutable_hello()->set_scene(scene);
   message.mutable_hello()->set_client_name("test");
   return serialised(message);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Residuals to packets.
-#include "proto/codec/packet_writer.h"
+#include "proto/codec/lattice/packet_writer.h"
 
 #include <cassert>
 #include <cstdlib>

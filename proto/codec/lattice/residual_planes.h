@@ -7,8 +7,8 @@
 #include <cstdint>
 #include <span>
 
+#include "proto/codec/lattice/prediction.h"
 #include "proto/codec/packet_header.h"
-#include "proto/codec/prediction.h"
 #include "proto/codec/stream_layout.h"
 
 namespace clothstream::codec {

@@ -6,7 +6,7 @@
 #include <memory>
 #include <span>
 
-#include "proto/codec/residual_planes.h"
+#include "proto/codec/lattice/residual_planes.h"
 #include "proto/codec/stream_layout.h"
 
 namespace clothstream::codec {

@@ -8,6 +8,7 @@
 #include <span>
 
 #include "proto/codec/stream_layout.h"
+#include "proto/codec/zigzag.h"
 
 namespace clothstream::codec {
 
@@ -50,13 +51,5 @@ void measure(const StreamLayout& layout, const T* values, const T* reference, Pr
 
 // The first of the cheapest among those that a frame of this kind may use.
 Prediction cheapest(std::span<const std::uint32_t, kPredictionCount> costs, bool hasReference);
-
-// Small magnitudes of either sign to small numbers: 0, -1, 1, -2, ... to 0, 1, 2, 3, ...
-constexpr std::uint32_t zigzag(std::int32_t value) {
-  return (static_cast<std::uint32_t>(value) << 1) ^ static_cast<std::uint32_t>(value >> 31);
-}
-constexpr std::int32_t unzigzag(std::uint32_t value) {
-  return static_cast<std::int32_t>((value >> 1) ^ (0u - (value & 1u)));
-}
 
 }  // namespace clothstream::codec

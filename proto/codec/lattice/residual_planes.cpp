@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Residuals as planes of bytes.
-#include "proto/codec/residual_planes.h"
+#include "proto/codec/lattice/residual_planes.h"
 
 namespace clothstream::codec {
 

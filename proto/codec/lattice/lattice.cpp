@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Positions on a lattice of integers.
-#include "proto/codec/lattice.h"
+#include "proto/codec/lattice/lattice.h"
 
 namespace clothstream::codec {
 

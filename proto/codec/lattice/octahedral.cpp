@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Unit normals as two signed bytes on the unfolded octahedron.
-#include "proto/codec/octahedral.h"
+#include "proto/codec/lattice/octahedral.h"
 
 #include <cmath>
 #include <cstdlib>

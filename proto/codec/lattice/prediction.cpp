@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Integer prediction of one channel from neighbours and the reference frame.
-#include "proto/codec/prediction.h"
+#include "proto/codec/lattice/prediction.h"
 
 #include <bit>
 #include <type_traits>

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: MIT
+// What a codec does with the part of a packet behind the header. Who refers to what, and whether a packet is
+// for this stream, is checked before.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+
+#include "proto/codec/packet_header.h"
+#include "proto/codec/stream_layout.h"
+
+namespace clothstream::codec {
+
+class BodyDecoder {
+ public:
+  virtual ~BodyDecoder() = default;
+  // False where the sections are not those of a frame of this layout; then nothing has changed.
+  [[nodiscard]] virtual bool decode(const ParsedPacket& packet) = 0;
+  // Of the newest frame: 3 floats a vertex.
+  virtual void writePositions(float* out) const = 0;
+  // Only where the stream sends normals.
+  virtual void writeNormals(float* out) const = 0;
+  virtual std::uint64_t reconstructionHash() const = 0;
+};
+
+class BodyEncoder {
+ public:
+  virtual ~BodyEncoder() = default;
+  virtual std::size_t packetBound() const = 0;
+  // A whole packet, header and all. `referenceTick` is the newest frame's, of no meaning for a key frame; the
+  // rest as in Encoder::encode().
+  virtual std::size_t encode(std::uint64_t tick, PacketKind kind, std::uint64_t referenceTick,
+                             std::span<const float> positions, std::span<const float> normals,
+                             std::span<std::byte> out) = 0;
+  // Of the newest frame.
+  virtual std::uint64_t reconstructionHash() const = 0;
+};
+
+// Those of each codec, for a layout that is possible; decoders are null if memory is out.
+std::unique_ptr<BodyDecoder> makeLatticeDecoder(const StreamLayout& layout);
+std::unique_ptr<BodyDecoder> makeHierarchicalDecoder(const StreamLayout& layout);
+std::unique_ptr<BodyEncoder> makeLatticeEncoder(const StreamLayout& layout);
+std::unique_ptr<BodyEncoder> makeHierarchicalEncoder(const StreamLayout& layout);
+
+}  // namespace clothstream::codec

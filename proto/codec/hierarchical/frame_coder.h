@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: MIT
+// What encoder and decoder of codec 2 agree on beside the prediction.
+#pragma once
+
+#include <array>
+#include <cstddef>
+
+#include "proto/codec/hierarchical/predictor.h"
+
+namespace clothstream::codec::hierarchical {
+
+// Positions are multiples of `unit`; residuals are steps of 2^stepBits units.
+struct LatticeUnit {
+  int stepBits;
+  float unit;  // m
+};
+// Half a step and two units, which all roundings take together, are 2^-19 m less than the max error: as much
+// as the floats that a decoder gives are off at 32 m. As many stepBits as leave room for that.
+LatticeUnit latticeUnit(float maxError);
+
+// A packet's sections: changes of the weights (empty where there are none), symbols, bits beside them.
+inline constexpr std::size_t kSections = 3;
+inline constexpr unsigned kWeightGammaBits = 4, kEscapeGammaBits = 2;
+// Stands for the first number beyond the symbols. Along the normal it is no residual: the vertex is where it
+// was in the frame before, and has no other residuals.
+inline constexpr std::uint32_t kStays = 0;
+
+// Vertices that are predicted before the first of them is coded: few enough to stay in the nearest cache.
+inline constexpr std::uint32_t kChunk = 64;
+
+// The first section, where it is not empty, starts with a bit: 1 where nothing follows and all weights are 0
+// in this frame alone, so that what is at rest stays where it is; else changes follow.
+
+// What a key frame's changes apply to, and those of the first frame after it. Later ones change the weights
+// of the frame before.
+Weights keyFrameWeights();
+Weights startingWeights();
+
+using WeightVectors = std::array<FeatureVectors, kWeightClasses + 1>;
+WeightVectors weightVectors(const Weights& weights);
+
+// The features whose weights a frame of this kind can change.
+constexpr std::size_t firstWeight(bool key) {
+  return key ? kRingFeature : 0;
+}
+constexpr std::size_t endWeight(bool key) {
+  return key ? kRingFeature + 1 : kFeatures;
+}
+
+// Of the newest frame; in the layout's order of vertices.
+std::uint64_t hashNodes(const Predictor& predictor);
+
+}  // namespace clothstream::codec::hierarchical

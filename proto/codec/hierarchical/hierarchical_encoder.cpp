@@ -1,0 +1,415 @@
+// SPDX-License-Identifier: MIT
+// Codec 2: vertices to packets.
+#include "proto/codec/hierarchical/hierarchical_encoder.h"
+
+#include <cmath>
+#include <cstdlib>
+#include <cstring>
+
+#include "proto/codec/hierarchical/bits.h"
+#include "proto/codec/hierarchical/frame_coder.h"
+#include "proto/codec/hierarchical/rans.h"
+#include "proto/codec/hierarchical/weight_fitter.h"
+#include "proto/codec/zigzag.h"
+
+namespace clothstream::codec::hierarchical {
+namespace {
+
+// The weights are fitted and sent once in so many frames, and in each of the first after a key frame.
+constexpr std::uint32_t kWeightInterval = 4, kEagerFrames = 3;
+// Vertices of each weight class that are fitted to: one in so many.
+constexpr std::array<std::uint32_t, kWeightClasses> kFitStride{6, 6, 2, 2, 1, 1};
+
+// What so few vertices would gain is less than what their weights take.
+constexpr std::uint32_t kFewVertices = 100;
+
+constexpr std::uint8_t kStillFrames = 3;
+constexpr std::uint32_t kMostRests = 64;
+
+constexpr std::size_t kMaxWeightBytes = kWeightClasses * kFeatures * 4;
+// Of an escape and what stands beside it, at most.
+constexpr std::size_t kMaxExtraBytes = 8;
+
+struct Local {
+  float u, v, n;
+};
+
+double squaredLength(Int32x4 difference) {
+  alignas(16) std::int32_t d[4];
+  difference.store(d);
+  const double x = d[0], y = d[1], z = d[2];
+  return x * x + y * y + z * z;
+}
+
+std::int32_t nearest(float value) {
+  return simde_mm_cvtss_si32(simde_mm_set_ss(value));
+}
+
+}  // namespace
+
+struct HierarchicalEncoder::State {
+  explicit State(const StreamLayout& layout)
+      : vertices(layout.vertexCount()),
+        unit(latticeUnit(layout.maxError)),
+        wanted(vertices),
+        stillFrames(vertices),
+        symbols(kComponents * vertices),
+        extra((kComponents * kMaxExtraBytes + 1) * vertices + kMaxExtraBytes) {
+    if (!predictor.allocate(layout, unit.stepBits))
+      std::abort();  // memory is out, as of any other allocation here
+    for (const Phase& phase : predictor.hierarchy().phases)
+      classSizes[phase.weightClass] += phase.end - phase.begin;
+    header.codec = kCodecHierarchical;
+    header.epoch = layout.epoch;
+    header.rangeCount = 1;
+    header.ranges[0] = {0, static_cast<std::uint32_t>(layout.cloths.size())};
+    header.sectionCount = kSections;
+  }
+
+  // Of the distance, in units: half a step along three axes, and a unit for roundings.
+  double squaredPromise() const {
+    const double perAxis = (1 << (unit.stepBits - 1)) + 1;
+    return 3 * perAxis * perAxis;
+  }
+  void quantise(std::span<const float> positions);
+  Local local(const SurfaceFrame& frame, Int32x4 difference) const;
+  Int32x4 choose(const Prediction& prediction, Int32x4 target, std::int32_t* residual) const;
+  void economise(const Local& wish, std::int32_t* residual) const;
+  bool isAtRest() const;
+  std::size_t writeWeights(bool key, std::byte* out);
+  bool startsToRest(std::uint32_t slot, const Prediction& prediction);
+  bool goesOnResting(std::uint32_t slot, const Prediction& prediction) const;
+  void encodePhase(const Phase& phase, BitWriter& bits);
+  // Returns whether a residual is not 0.
+  std::int32_t encodeChunk(std::uint32_t begin, std::uint32_t end, std::uint32_t weightClass,
+                           BitWriter& bits);
+  void fitTo(std::uint32_t weightClass, const FeatureVectors& features, const Prediction& prediction,
+             Int32x4 target, const std::uint32_t* magnitudes);
+  void code(Component component, std::uint32_t scale, std::int32_t residual, std::size_t coder,
+            BitWriter& bits);
+  void note(const Prediction& prediction, std::uint32_t weightClass, std::size_t i);
+
+  std::size_t vertices;
+  LatticeUnit unit;
+  Predictor predictor;
+  std::array<std::uint32_t, kWeightClasses + 1> classSizes{};
+  PacketHeader header;
+  // In coding order.
+  std::vector<Node> wanted;
+  std::vector<std::uint8_t> stillFrames;  // how long the same was wanted, up to kStillFrames
+  std::uint32_t restsLeft = 0;            // that may start in this frame
+  RansWriter symbols;
+  std::vector<std::byte> extra;
+  WeightFitter fitter;
+  Weights weights{};
+  WeightVectors vectors{};
+  std::uint32_t frame = 0;  // since the key frame
+  bool quiet = false;       // no residual in the newest frame
+  std::vector<CodedResidual>* recorded = nullptr;
+  // Of the chunk that is being encoded.
+  alignas(16) std::int32_t expected[kChunk][4];
+  std::int32_t residuals[kChunk][kComponents];
+  std::uint32_t magnitudes[kChunk][kComponents];
+  std::array<bool, kChunk> stays;
+};
+
+void HierarchicalEncoder::State::quantise(std::span<const float> positions) {
+  // A residual ends within a step of what was wanted, which is then still possible.
+  constexpr std::int32_t kLimit = kMaxCoordinate - (4 << 8);
+  constexpr double limit = kLimit;
+  const Array<std::uint32_t>& vertexOf = predictor.hierarchy().vertexOf;
+  const double perUnit = 1 / static_cast<double>(unit.unit);
+  const auto coordinate = [&](float x) {
+    const double q = std::floor(static_cast<double>(x) * perUnit + 0.5);
+    if (!(q >= -limit)) return -kLimit;  // what is no number, too
+    return q > limit ? kLimit : static_cast<std::int32_t>(q);
+  };
+  for (std::size_t slot = 0; slot < vertices; ++slot) {
+    const float* p = &positions[3 * std::size_t{vertexOf[slot]}];
+    const Node next{coordinate(p[0]), coordinate(p[1]), coordinate(p[2]), 0};
+    const bool still = next.load().sameThree(wanted[slot].load());
+    stillFrames[slot] =
+        still ? static_cast<std::uint8_t>(std::min<std::uint32_t>(stillFrames[slot] + 1u, kStillFrames)) : 0;
+    wanted[slot] = next;
+  }
+}
+
+// In steps.
+Local HierarchicalEncoder::State::local(const SurfaceFrame& frame_, Int32x4 difference) const {
+  alignas(16) std::int32_t d[4];
+  alignas(16) std::int16_t t[8], n[8];
+  difference.store(d);
+  frame_.tangents.store(t);
+  frame_.normal.store(n);
+  const float scale = 1.0f / static_cast<float>(1 << (kUnitBits + unit.stepBits));
+  const float x = scale * static_cast<float>(d[0]), y = scale * static_cast<float>(d[1]),
+              z = scale * static_cast<float>(d[2]);
+  const auto dot = [&](const std::int16_t* e) {
+    return static_cast<float>(e[0]) * x + static_cast<float>(e[1]) * y + static_cast<float>(e[2]) * z;
+  };
+  return {dot(t), dot(t + 4), dot(n)};
+}
+
+Int32x4 HierarchicalEncoder::State::choose(const Prediction& prediction, Int32x4 target,
+                                           std::int32_t* residual) const {
+  const Local wish = local(prediction.frame, target - prediction.position);
+  residual[kAlongU] = nearest(wish.u);
+  residual[kAlongV] = nearest(wish.v);
+  residual[kAlongNormal] = nearest(wish.n);
+  economise(wish, residual);
+  Int32x4 position = predictor.reconstruct(prediction, residual);
+  // The frame is orthonormal to one in thousands: after a long way a second and a third look are needed.
+  for (int look = 0; look < 8 && squaredLength(position - target) > squaredPromise(); ++look) {
+    const Local rest = local(prediction.frame, target - position);
+    residual[kAlongU] += nearest(rest.u);
+    residual[kAlongV] += nearest(rest.v);
+    residual[kAlongNormal] += nearest(rest.n);
+    position = predictor.reconstruct(prediction, residual);
+  }
+  return position;
+}
+
+// What is promised is a distance, half the diagonal of a cube of steps: seldom is a vertex in a corner, so
+// that a smaller residual along the surface often serves as well. Along the normal, where the eye looks, the
+// nearest one stays.
+void HierarchicalEncoder::State::economise(const Local& wish, std::int32_t* residual) const {
+  const std::array<float, 3> wishes{wish.u, wish.v, wish.n};
+  std::array<float, 3> error;
+  for (std::size_t c = 0; c < 3; ++c) error[c] = wishes[c] - static_cast<float>(residual[c]);
+  const std::array<std::size_t, 2> order = std::fabs(error[0]) > std::fabs(error[1])
+                                               ? std::array<std::size_t, 2>{0, 1}
+                                               : std::array<std::size_t, 2>{1, 0};
+  for (const std::size_t c : order) {
+    if (residual[c] == 0) continue;
+    const std::int32_t smaller = residual[c] - (residual[c] > 0 ? 1 : -1);
+    const float moved = wishes[c] - static_cast<float>(smaller);
+    const float rest = error[0] * error[0] + error[1] * error[1] + error[2] * error[2] - error[c] * error[c];
+    if (rest + moved * moved > 0.75f) continue;
+    residual[c] = smaller;
+    error[c] = moved;
+  }
+}
+
+// Whether the newest frame serves once more.
+bool HierarchicalEncoder::State::isAtRest() const {
+  const std::span<const Node> newest = predictor.nodes();
+  const double limit = squaredPromise();
+  for (std::size_t slot = 0; slot < vertices; ++slot) {
+    if (squaredLength(wanted[slot].load() - newest[slot].load()) > limit) return false;
+  }
+  return true;
+}
+
+std::size_t HierarchicalEncoder::State::writeWeights(bool key, std::byte* out) {
+  if (key) weights = keyFrameWeights();
+  if (!key && isAtRest()) {
+    vectors = weightVectors(Weights{});
+    out[0] = std::byte{1};
+    return 1;
+  }
+  const bool due = !key && !quiet && (frame <= kEagerFrames || frame % kWeightInterval == 0);
+  std::size_t bytes = 0;
+  if (due) {
+    Weights next = weights;
+    fitter.fit(next);
+    BitWriter writer(out);
+    writer.put(0, 1);
+    for (std::size_t c = 0; c < kWeightClasses; ++c) {
+      const bool changes = classSizes[c] >= kFewVertices;
+      writer.put(changes ? 1 : 0, 1);
+      for (std::size_t f = 0; changes && f < kFeatures; ++f) {
+        writer.putGamma(zigzag(next[c][f] - weights[c][f]), kWeightGammaBits);
+        weights[c][f] = next[c][f];
+      }
+    }
+    bytes = static_cast<std::size_t>(writer.finish() - out);
+  }
+  vectors = weightVectors(weights);
+  return bytes;
+}
+
+// What is wanted in the same place for some frames is pinned, it seems: it is to stand still. To say so takes
+// two bytes.
+bool HierarchicalEncoder::State::startsToRest(std::uint32_t slot, const Prediction& prediction) {
+  if (frame == 0 || restsLeft == 0 || stillFrames[slot] < kStillFrames || predictor.nodes()[slot].rests())
+    return false;
+  if (squaredLength(wanted[slot].load() - prediction.last) > squaredPromise()) return false;
+  --restsLeft;
+  return true;
+}
+
+bool HierarchicalEncoder::State::goesOnResting(std::uint32_t slot, const Prediction& prediction) const {
+  return frame > 0 && predictor.nodes()[slot].rests() &&
+         squaredLength(wanted[slot].load() - prediction.last) <= squaredPromise();
+}
+
+// A phase without residuals is a bit that says so, in place of all that was written of it.
+void HierarchicalEncoder::State::encodePhase(const Phase& phase, BitWriter& bits) {
+  const BitWriter bitsBefore = bits;
+  const std::size_t symbolsBefore = symbols.count();
+  bits.put(0, 1);
+  std::int32_t any = 0;
+  for (std::uint32_t begin = phase.begin; begin < phase.end; begin += kChunk) {
+    any |= encodeChunk(begin, std::min(begin + kChunk, phase.end), phase.weightClass, bits);
+  }
+  if (any != 0) {
+    quiet = false;
+    return;
+  }
+  bits = bitsBefore;
+  bits.put(1, 1);
+  symbols.shrink(symbolsBefore);
+}
+
+std::int32_t HierarchicalEncoder::State::encodeChunk(std::uint32_t begin, std::uint32_t end,
+                                                     std::uint32_t weightClass, BitWriter& bits) {
+  const ScaleModel model(kScaleWeights[weightClass / 2]);
+  const bool fits = weightClass < kWeightClasses;
+  const std::uint32_t stride = fits ? kFitStride[weightClass] : 1;
+  std::int32_t any = 0;
+  for (std::uint32_t slot = begin; slot < end; ++slot) {
+    const std::size_t i = slot - begin;
+    Prediction prediction;
+    FeatureVectors features;
+    predictor.predict(slot, vectors[weightClass], features, prediction);
+    const Int32x4 target = wanted[slot].load();
+    stays[i] = startsToRest(slot, prediction);
+    const bool still = stays[i] || goesOnResting(slot, prediction);
+    if (still) std::memset(residuals[i], 0, sizeof residuals[i]);
+    const Int32x4 position = still ? prediction.last : choose(prediction, target, residuals[i]);
+    any |= stays[i] ? 1 : 0;
+    for (std::size_t c = 0; c < kComponents; ++c) {
+      magnitudes[i][c] = countedMagnitude(residuals[i][c]);
+      any |= residuals[i][c];
+    }
+    predictor.place(slot, prediction, position, packMagnitudes(magnitudes[i]));
+    model.expect(prediction).store(expected[i]);
+    // Others in each frame.
+    if (fits && (slot + frame) % stride == 0) fitTo(weightClass, features, prediction, target, magnitudes[i]);
+    if (recorded != nullptr) note(prediction, weightClass, i);
+  }
+  for (std::uint32_t group = begin; group < end; group += kCoders) {
+    const std::uint32_t groupEnd = std::min<std::uint32_t>(group + kCoders, end);
+    for (const Component component : kCodingOrder) {
+      for (std::uint32_t slot = group; slot < groupEnd; ++slot) {
+        const std::size_t i = slot - begin;
+        if (stays[i] && component != kAlongNormal) continue;
+        const std::uint32_t scale = model.scale(component, expected[i][component], magnitudes[i]);
+        if (stays[i]) {
+          bits.putGamma(kStays, kEscapeGammaBits);
+          symbols.add(slot - group, distributionOf(component, scale), kEscape);
+        } else {
+          code(component, scale, residuals[i][component], slot - group, bits);
+        }
+      }
+    }
+  }
+  return any;
+}
+
+void HierarchicalEncoder::State::code(Component component, std::uint32_t scale, std::int32_t residual,
+                                      std::size_t coder, BitWriter& bits) {
+  const unsigned raw = rawBits(scale);
+  const std::uint32_t number = zigzag(residual);
+  std::uint32_t symbol = number >> raw;
+  if (symbol >= kEscape) {
+    bits.putGamma(symbol - kEscape + (component == kAlongNormal ? kStays + 1 : 0), kEscapeGammaBits);
+    symbol = kEscape;
+  }
+  if (raw > 0) bits.put(number & ((1u << raw) - 1), raw);
+  symbols.add(coder, distributionOf(component, scale), symbol);
+}
+
+void HierarchicalEncoder::State::fitTo(std::uint32_t weightClass, const FeatureVectors& features,
+                                       const Prediction& prediction, Int32x4 target, const std::uint32_t* m) {
+  Int32x4 predicted = Int32x4::all(0);
+  for (std::size_t i = 0; i < kFeaturePairs; ++i)
+    predicted = predicted + dotPairs(features[i], vectors[weightClass][i]);
+  const Int32x4 goal =
+      (target - prediction.position).shiftedRight(unit.stepBits - 4) + predicted.shiftedRight(kWeightBits);
+  // What is hard to predict here is not to spoil the weights for the rest.
+  const std::uint32_t around = prediction.parentMagnitudes;
+  const auto near = static_cast<float>((around & 255u) + (around >> 8 & 255u) + (around >> 16 & 255u));
+  const auto own = static_cast<float>(m[0] + m[1] + m[2]);
+  fitter.add(weightClass, features, goal, 1 / (0.15f + 0.1f * own * own + 0.025f * near));
+}
+
+void HierarchicalEncoder::State::note(const Prediction& prediction, std::uint32_t weightClass,
+                                      std::size_t i) {
+  for (std::size_t c = 0; c < kComponents; ++c) {
+    const auto byte = [c](std::uint32_t bytes) { return static_cast<std::uint8_t>(bytes >> 8 * c); };
+    recorded->push_back({static_cast<std::uint8_t>(c), static_cast<std::uint8_t>(weightClass / 2),
+                         byte(prediction.parentMagnitudes), byte(prediction.ringMagnitudes),
+                         byte(prediction.lastMagnitudes),
+                         static_cast<std::uint8_t>(magnitudes[i][kAlongNormal]),
+                         static_cast<std::uint8_t>(magnitudes[i][kAlongU]), residuals[i][c]});
+  }
+}
+
+HierarchicalEncoder::HierarchicalEncoder(const StreamLayout& layout)
+    : state_(std::make_unique<State>(layout)) {}
+HierarchicalEncoder::~HierarchicalEncoder() = default;
+
+std::size_t HierarchicalEncoder::packetBound() const {
+  const State& s = *state_;
+  PacketHeader largest = s.header;
+  largest.kind = PacketKind::predicted;
+  largest.referenceCount = 1;
+  return headerBound(largest) + kMaxWeightBytes + s.symbols.bound() + s.extra.size();
+}
+
+std::size_t HierarchicalEncoder::encode(std::uint64_t tick, PacketKind kind, std::uint64_t referenceTick,
+                                        std::span<const float> positions, std::span<const float>,
+                                        std::span<std::byte> out) {
+  State& s = *state_;
+  const bool key = kind == PacketKind::key;
+  s.frame = key ? 0 : s.frame + 1;
+  s.quantise(positions);
+  PacketHeader& header = s.header;
+  header.kind = kind;
+  header.tick = tick;
+  header.referenceCount = key ? 0 : 1;
+  header.references[0] = referenceTick;
+
+  // The header's length depends on the sections' sizes: they are written behind its bound and moved up.
+  const std::size_t bodyStart = headerBound(header);
+  std::size_t end = bodyStart + s.writeWeights(key, out.data() + bodyStart);
+  header.sectionBytes[0] = static_cast<std::uint32_t>(end - bodyStart);
+  s.symbols.shrink(0);
+  BitWriter bits(s.extra.data());
+  s.predictor.begin(key);
+  s.quiet = true;
+  s.restsLeft = kMostRests;
+  for (const Phase& phase : s.predictor.hierarchy().phases) s.encodePhase(phase, bits);
+  s.predictor.keep();
+  if (key) {
+    s.weights = startingWeights();
+    s.fitter.clear();
+  }
+  header.sectionBytes[1] = static_cast<std::uint32_t>(s.symbols.write(out.data() + end));
+  end += header.sectionBytes[1];
+  header.sectionBytes[2] = static_cast<std::uint32_t>(bits.finish() - s.extra.data());
+  std::memcpy(out.data() + end, s.extra.data(), header.sectionBytes[2]);
+  end += header.sectionBytes[2];
+  const std::size_t headerBytes = writeHeader(header, out);
+  std::memmove(out.data() + headerBytes, out.data() + bodyStart, end - bodyStart);
+  return headerBytes + (end - bodyStart);
+}
+
+std::uint64_t HierarchicalEncoder::reconstructionHash() const {
+  return hashNodes(state_->predictor);
+}
+
+void HierarchicalEncoder::record(std::vector<CodedResidual>* residuals) {
+  state_->recorded = residuals;
+}
+
+}  // namespace clothstream::codec::hierarchical
+
+namespace clothstream::codec {
+
+std::unique_ptr<BodyEncoder> makeHierarchicalEncoder(const StreamLayout& layout) {
+  return std::make_unique<hierarchical::HierarchicalEncoder>(layout);
+}
+
+}  // namespace clothstream::codec

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: MIT
+// Codec 2: vertices to packets.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "proto/codec/body.h"
+
+namespace clothstream::codec::hierarchical {
+
+// A residual and what was known when it was coded: what the tables of residual_tables.cpp are fitted to.
+struct CodedResidual {
+  std::uint8_t component, scaleClass;
+  std::uint8_t parents, ring, last, normal, u;  // the magnitudes that ScaleWeights multiplies
+  std::int32_t residual;
+};
+
+class HierarchicalEncoder final : public BodyEncoder {
+ public:
+  explicit HierarchicalEncoder(const StreamLayout& layout);
+  ~HierarchicalEncoder() override;
+
+  std::size_t packetBound() const override;
+  std::size_t encode(std::uint64_t tick, PacketKind kind, std::uint64_t referenceTick,
+                     std::span<const float> positions, std::span<const float> normals,
+                     std::span<std::byte> out) override;
+  std::uint64_t reconstructionHash() const override;
+
+  // Appends to `residuals` what is coded from now on; null: no more.
+  void record(std::vector<CodedResidual>* residuals);
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace clothstream::codec::hierarchical

@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: MIT
+// Vectors of 128 bits: SSE2's, NEON's and WebAssembly's, whatever the target has (SIMDe).
+#pragma once
+
+#include <bit>
+#include <cstdint>
+
+#include <simde/x86/sse2.h>
+
+namespace clothstream::codec::hierarchical {
+
+// Addresses of loads and stores are aligned to 16 bytes. Arithmetic is modulo the width unless said
+// otherwise.
+struct Int32x4 {
+  simde__m128i v;
+
+  static Int32x4 load(const std::int32_t* from) {
+    return {simde_mm_load_si128(reinterpret_cast<const simde__m128i*>(from))};
+  }
+  void store(std::int32_t* to) const { simde_mm_store_si128(reinterpret_cast<simde__m128i*>(to), v); }
+  static Int32x4 of(std::int32_t a0, std::int32_t a1, std::int32_t a2, std::int32_t a3) {
+    return {simde_mm_setr_epi32(a0, a1, a2, a3)};
+  }
+  static Int32x4 all(std::int32_t value) { return {simde_mm_set1_epi32(value)}; }
+  friend Int32x4 operator+(Int32x4 a, Int32x4 b) { return {simde_mm_add_epi32(a.v, b.v)}; }
+  friend Int32x4 operator-(Int32x4 a, Int32x4 b) { return {simde_mm_sub_epi32(a.v, b.v)}; }
+  // Keeps the sign.
+  Int32x4 shiftedRight(int bits) const { return {simde_mm_sra_epi32(v, simde_mm_cvtsi32_si128(bits))}; }
+  Int32x4 shiftedLeft(int bits) const { return {simde_mm_sll_epi32(v, simde_mm_cvtsi32_si128(bits))}; }
+  // Whether the first three are the same.
+  bool sameThree(Int32x4 other) const {
+    return (simde_mm_movemask_epi8(simde_mm_cmpeq_epi32(v, other.v)) & 0xfff) == 0xfff;
+  }
+  std::int32_t fourth() const { return simde_mm_cvtsi128_si32(simde_mm_shuffle_epi32(v, 0xff)); }
+};
+
+struct Int16x8 {
+  simde__m128i v;
+
+  static Int16x8 load(const std::int16_t* from) {
+    return {simde_mm_load_si128(reinterpret_cast<const simde__m128i*>(from))};
+  }
+  void store(std::int16_t* to) const { simde_mm_store_si128(reinterpret_cast<simde__m128i*>(to), v); }
+  static Int16x8 zero() { return {simde_mm_setzero_si128()}; }
+  static Int16x8 all(std::int16_t value) { return {simde_mm_set1_epi16(value)}; }
+  static Int16x8 of(std::int16_t a0, std::int16_t a1, std::int16_t a2, std::int16_t a3, std::int16_t a4,
+                    std::int16_t a5) {
+    return {simde_mm_setr_epi16(a0, a1, a2, a3, a4, a5, 0, 0)};
+  }
+  // a0 a1 four times.
+  static Int16x8 allPairs(std::int16_t a0, std::int16_t a1) {
+    return {simde_mm_setr_epi16(a0, a1, a0, a1, a0, a1, a0, a1)};
+  }
+  // a0 a1 a2 0 a4 a5 a6 0.
+  Int16x8 withoutFourth() const {
+    return {simde_mm_and_si128(v, simde_mm_setr_epi16(-1, -1, -1, 0, -1, -1, -1, 0))};
+  }
+  // a1 a0 a3 a2 a5 a4 a7 a6.
+  Int16x8 pairsSwapped() const {
+    return {simde_mm_or_si128(simde_mm_slli_epi32(v, 16), simde_mm_srli_epi32(v, 16))};
+  }
+  // The pair of these lanes four times.
+  template <int pair>
+  Int16x8 broadcastPair() const {
+    return {simde_mm_shuffle_epi32(v, pair * 0x55)};
+  }
+  // The even or the odd lanes, each with its sign.
+  Int32x4 even() const { return {simde_mm_srai_epi32(simde_mm_slli_epi32(v, 16), 16)}; }
+  Int32x4 odd() const { return {simde_mm_srai_epi32(v, 16)}; }
+  // Saturates.
+  friend Int16x8 operator-(Int16x8 a, Int16x8 b) { return {simde_mm_subs_epi16(a.v, b.v)}; }
+};
+
+// a's lanes, then b's; saturates.
+inline Int16x8 narrow(Int32x4 a, Int32x4 b) {
+  return {simde_mm_packs_epi32(a.v, b.v)};
+}
+
+// a0 b0 a1 b1 a2 b2 a3 b3.
+inline Int16x8 interleave(Int16x8 a, Int16x8 b) {
+  return {simde_mm_unpacklo_epi16(a.v, b.v)};
+}
+// a0 a4 a1 a5 a2 a6 a3 a7.
+inline Int16x8 interleaveHalves(Int16x8 a) {
+  return {simde_mm_unpacklo_epi16(a.v, simde_mm_unpackhi_epi64(a.v, a.v))};
+}
+// a0 b1 a2 b3 a4 b5 a6 b7.
+inline Int16x8 evenAndOdd(Int16x8 a, Int16x8 b) {
+  const simde__m128i mask = simde_mm_set1_epi32(0xffff);
+  return {simde_mm_or_si128(simde_mm_and_si128(a.v, mask), simde_mm_andnot_si128(mask, b.v))};
+}
+
+// The four bytes, from the lowest, to the first four lanes; the others 0.
+inline Int16x8 widenBytes(std::uint32_t bytes) {
+  const simde__m128i all = simde_mm_cvtsi32_si128(static_cast<std::int32_t>(bytes));
+  return {simde_mm_unpacklo_epi8(all, simde_mm_setzero_si128())};
+}
+
+// a0 b0 + a1 b1, a2 b2 + a3 b3, ...
+inline Int32x4 dotPairs(Int16x8 a, Int16x8 b) {
+  return {simde_mm_madd_epi16(a.v, b.v)};
+}
+
+// a0 + a1, a2 + a3, b0 + b1, b2 + b3.
+inline Int32x4 addNeighbours(Int32x4 a, Int32x4 b) {
+  const simde__m128 low = simde_mm_castsi128_ps(a.v), high = simde_mm_castsi128_ps(b.v);
+  return {simde_mm_add_epi32(simde_mm_castps_si128(simde_mm_shuffle_ps(low, high, 0x88)),
+                             simde_mm_castps_si128(simde_mm_shuffle_ps(low, high, 0xdd)))};
+}
+
+// Of sixteen ascending values, the last of which is above `wanted`: how many are not above it.
+inline std::uint32_t countNotAbove(Int16x8 low, Int16x8 high, Int16x8 wanted) {
+  const simde__m128i above =
+      simde_mm_packs_epi16(simde_mm_cmpgt_epi16(low.v, wanted.v), simde_mm_cmpgt_epi16(high.v, wanted.v));
+  return static_cast<std::uint32_t>(
+      std::countr_zero(static_cast<std::uint32_t>(simde_mm_movemask_epi8(above))));
+}
+
+}  // namespace clothstream::codec::hierarchical

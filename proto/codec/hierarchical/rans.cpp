@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: MIT
+// Range coding with asymmetric numeral systems.
+#include "proto/codec/hierarchical/rans.h"
+
+namespace clothstream::codec::hierarchical {
+
+SymbolTable::SymbolTable(const Distribution& frequencies) : bounds{} {
+  for (std::size_t i = 0; i < kSymbols; ++i) {
+    bounds[kFirstBound + i] = static_cast<std::int16_t>(bounds[kFirstBound - 1 + i] + frequencies[i]);
+  }
+}
+
+const std::array<SymbolTable, 2 * kScales>& symbolTables() {
+  static const std::array<SymbolTable, 2 * kScales> tables = [] {
+    std::array<SymbolTable, 2 * kScales> made;
+    for (std::size_t i = 0; i < made.size(); ++i) made[i] = SymbolTable(kDistributions[i]);
+    return made;
+  }();
+  return tables;
+}
+
+std::size_t RansWriter::write(std::byte* out) {
+  if (count_ == 0) return 0;
+  const std::array<SymbolTable, 2 * kScales>& tables = symbolTables();
+  std::array<std::uint32_t, kCoders> states;
+  states.fill(kLowestState);
+  std::uint16_t* const end = words_.data() + words_.size();
+  std::uint16_t* first = end;
+  // The last symbol first: a reader takes them in the order of add().
+  for (std::size_t i = count_; i-- > 0;) {
+    const Entry entry = entries_[i];
+    std::uint32_t& state = states[entry.coder];
+    const std::uint32_t start = tables[entry.table].start(entry.symbol);
+    const std::uint32_t frequency = tables[entry.table].frequency(entry.symbol);
+    // Below 2^32 after this symbol, that is.
+    if (state >> (32 - kProbabilityBits) >= frequency) {
+      *--first = static_cast<std::uint16_t>(state);
+      state >>= 16;
+    }
+    state = ((state / frequency) << kProbabilityBits) + state % frequency + start;
+  }
+  std::byte* to = out;
+  const auto put = [&to](std::uint32_t word) {
+    *to++ = static_cast<std::byte>(word);
+    *to++ = static_cast<std::byte>(word >> 8);
+  };
+  for (const std::uint32_t state : states) {
+    put(state);
+    put(state >> 16);
+  }
+  for (; first != end; ++first) put(*first);
+  return static_cast<std::size_t>(to - out);
+}
+
+}  // namespace clothstream::codec::hierarchical

@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: MIT
+// Range coding with asymmetric numeral systems: J. Duda, arXiv:1311.2540. Several coders take turns, so that
+// a processor works on several symbols at a time.
+#pragma once
+
+#include <array>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "proto/codec/hierarchical/lanes.h"
+#include "proto/codec/hierarchical/residual_model.h"
+
+namespace clothstream::codec::hierarchical {
+
+inline constexpr std::size_t kCoders = 4;
+// A coder's state before the first symbol that is written, which is the last that is read.
+inline constexpr std::uint32_t kLowestState = 1u << 16;
+
+// A distribution as RansReader searches it.
+struct alignas(16) SymbolTable {
+  SymbolTable() = default;
+  explicit SymbolTable(const Distribution& frequencies);
+
+  std::uint32_t start(std::uint32_t symbol) const {
+    return static_cast<std::uint32_t>(bounds[kFirstBound - 1 + symbol]);
+  }
+  std::uint32_t frequency(std::uint32_t symbol) const {
+    return static_cast<std::uint32_t>(bounds[kFirstBound + symbol] - bounds[kFirstBound - 1 + symbol]);
+  }
+  // Of the kProbabilityBits bits that choose it.
+  std::uint32_t symbolAt(std::uint32_t bits) const {
+    const Int16x8 wanted = Int16x8::all(static_cast<std::int16_t>(bits));
+    return countNotAbove(Int16x8::load(&bounds[kFirstBound]), Int16x8::load(&bounds[kFirstBound + 8]),
+                         wanted);
+  }
+
+  static constexpr std::size_t kFirstBound = 8;
+  // From the first bound on: where each symbol ends.
+  std::int16_t bounds[kFirstBound + kSymbols];
+};
+
+// Those of kDistributions.
+const std::array<SymbolTable, 2 * kScales>& symbolTables();
+
+// Reads what RansWriter wrote; any bytes may be given to it.
+class RansReader {
+ public:
+  explicit RansReader(std::span<const std::byte> bytes) : bytes_(bytes) {
+    states_.fill(kLowestState);
+    if (bytes.empty()) return;
+    for (std::uint32_t& state : states_) {
+      state = word();
+      state |= word() << 16;
+    }
+  }
+
+  std::uint32_t read(std::size_t coder, const SymbolTable& table) {
+    std::uint32_t state = states_[coder];
+    const std::uint32_t bits = state & ((1u << kProbabilityBits) - 1);
+    const std::uint32_t symbol = table.symbolAt(bits);
+    state = table.frequency(symbol) * (state >> kProbabilityBits) + bits - table.start(symbol);
+    if (state < kLowestState) state = state << 16 | word();
+    states_[coder] = state;
+    return symbol;
+  }
+
+  // All of it was read, and nothing beyond.
+  bool atEnd() const {
+    bool end = at_ == bytes_.size();
+    for (const std::uint32_t state : states_) end = end && state == kLowestState;
+    return end;
+  }
+
+ private:
+  // 0 past the end.
+  std::uint32_t word() {
+    const std::size_t at = at_;
+    at_ += 2;
+    if (at_ > bytes_.size()) return 0;
+    return static_cast<std::uint32_t>(bytes_[at]) | static_cast<std::uint32_t>(bytes_[at + 1]) << 8;
+  }
+
+  std::span<const std::byte> bytes_;
+  std::size_t at_ = 0;
+  std::array<std::uint32_t, kCoders> states_;
+};
+
+class RansWriter {
+ public:
+  explicit RansWriter(std::size_t mostSymbols) : entries_(mostSymbols), words_(mostSymbols) {}
+
+  std::size_t count() const { return count_; }
+  // What was added after the first `count` is forgotten.
+  void shrink(std::size_t count) { count_ = count; }
+  void add(std::size_t coder, std::size_t table, std::uint32_t symbol) {
+    entries_[count_++] = {static_cast<std::uint8_t>(coder), static_cast<std::uint8_t>(table),
+                          static_cast<std::uint8_t>(symbol)};
+  }
+
+  // Bytes that write() writes at most; it writes none where there is no symbol.
+  std::size_t bound() const { return 4 * kCoders + 2 * words_.size(); }
+  std::size_t write(std::byte* out);
+
+ private:
+  struct Entry {
+    std::uint8_t coder, table, symbol;
+  };
+  std::vector<Entry> entries_;
+  std::vector<std::uint16_t> words_;
+  std::size_t count_ = 0;
+};
+
+}  // namespace clothstream::codec::hierarchical

@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: MIT
+// Signed numbers as unsigned ones.
+#pragma once
+
+#include <cstdint>
+
+namespace clothstream::codec {
+
+// Small magnitudes of either sign to small numbers: 0, -1, 1, -2, ... to 0, 1, 2, 3, ...
+constexpr std::uint32_t zigzag(std::int32_t value) {
+  return (static_cast<std::uint32_t>(value) << 1) ^ static_cast<std::uint32_t>(value >> 31);
+}
+constexpr std::int32_t unzigzag(std::uint32_t value) {
+  return static_cast<std::int32_t>((value >> 1) ^ (0u - (value & 1u)));
+}
+
+}  // namespace clothstream::codec

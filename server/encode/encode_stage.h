@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: MIT
+// What a codec records and codes of a frame; slots, kinds and references are FrameEncoder's.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+
+#include "server/encode/frame_encoder.h"
+
+namespace clothstream::encode {
+
+inline constexpr std::uint32_t kFrameSlots = FrameEncoder::kSlots;
+
+// record() belongs to the device's thread, entropyCode() to one other thread (or the same).
+class EncodeStage {
+ public:
+  virtual ~EncodeStage() = default;
+  virtual std::size_t packetBound() const = 0;
+  // After a barrier, in the stage "encode".
+  virtual void record(vulkan::Recorder& recorder, std::uint32_t slot, bool predicted) = 0;
+  // In the order of record().
+  virtual EncodedFrame entropyCode(const RecordedFrame& frame, std::span<std::byte> out) = 0;
+};
+
+std::unique_ptr<EncodeStage> makeLatticeStage(const vulkan::Device& device,
+                                              const simulation::ClothSimulation& simulation,
+                                              const codec::StreamLayout& layout);
+std::unique_ptr<EncodeStage> makeHierarchicalStage(const vulkan::Device& device,
+                                                   const simulation::ClothSimulation& simulation,
+                                                   const codec::StreamLayout& layout);
+
+}  // namespace clothstream::encode
