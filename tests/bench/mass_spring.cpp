@@ -10,6 +10,7 @@
 #include "tests/bench/bytes_moved.h"
 #include "tests/bench/simulated.h"
 #include "tests/bench/suite.h"
+#include "tests/scene/meshes.h"
 
 namespace clothstream::bench {
 namespace {
@@ -26,6 +27,7 @@ struct Variant {
   bool air = false;
   std::uint32_t spheres = 0;
   bool builtin = false;
+  bool mesh = false;  // the same cloth, given as a mesh
 };
 
 scene::Scene squareCloth(std::uint32_t size, const Variant& variant) {
@@ -48,7 +50,7 @@ scene::Scene squareCloth(std::uint32_t size, const Variant& variant) {
                  .columnStep = size - 1}};
   scene::Scene scene;
   scene.name = "square";
-  scene.cloths = {cloth};
+  scene.cloths = {variant.mesh ? scene::asMesh(cloth) : cloth};
   return scene;
 }
 
@@ -121,6 +123,7 @@ Rows measureSize(vulkan::Device& device, const Settings& settings, std::uint32_t
                     {"springDamping", candidate.variant.springDamping},
                     {"air", candidate.variant.air},
                     {"spheres", candidate.variant.spheres},
+                    {"shape", candidate.variant.mesh ? "mesh" : "grid"},
                     {"arithmetic", candidate.variant.builtin ? "builtin" : "deterministic"},
                     {"nodeStepsPerSecond", nodeSteps / wall.median()},
                     {"nsMin", wall.min() * nanoseconds},
@@ -154,7 +157,9 @@ Rows runMassSpring(vulkan::Device& device, const Settings& settings) {
                                        {.air = true},
                                        {.springDamping = true, .air = true},
                                        {.spheres = 1},
-                                       {.spheres = 16}});
+                                       {.spheres = 16},
+                                       {.mesh = true},
+                                       {.springDamping = true, .air = true, .mesh = true}});
     for (auto& row : measureSize(device, settings, size, variants)) rows.push_back(std::move(row));
     if (settings.size) break;
   }

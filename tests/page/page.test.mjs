@@ -168,6 +168,39 @@ test("the cloth is lit and casts a shadow", () =>
     assert.ok(median < 0.85, `the shadowed floor has ${median} of the lit floor's luminance`);
   }));
 
+// The hem of the round cloth is a part of its own, in a colour with more green; inside are the first vertices of the OBJ.
+test("a mesh falls and is drawn in the colours of its parts", () =>
+  withPage({ query: "?scene=tablecloth" }, async (page) => {
+    await untilState(page, "live");
+    await untilFrames(page, 60);
+    const seen = await look(page);
+    assert.equal(seen.positions.length, 3 * 1519);
+    assert.ok(furthest(seen.rest, seen.positions) > 0.1, "it fell");
+    assert.equal(seen.statistics.decodeErrors + seen.statistics.hashMismatches, 0);
+    const points = await page.evaluate(() => {
+      const { positions, restPositions, canvas, project } = window.clothstream;
+      const open = ([x, y]) => document.elementFromPoint(x, y) === canvas;
+      const within = (from, to) => {
+        const places = [];
+        for (let i = 0; i < positions.length; i += 3) {
+          const radius = Math.hypot(restPositions[i], restPositions[i + 2]);
+          if (radius > from && radius < to) places.push(project(Array.from(positions.slice(i, i + 3))));
+        }
+        return places.filter(open);
+      };
+      return { linen: within(0, 0.6), hem: within(0.75, 0.79) };
+    });
+    const picture = await takePicture(page, "tablecloth");
+    const greens = (places) => {
+      const cloth = places.map(([x, y]) => picture.colourAt(x, y)).filter(([red, , blue]) => red > blue + 20);
+      assert.ok(cloth.length > 0.7 * places.length, `${cloth.length} of ${places.length} vertices show as cloth`);
+      return cloth.map(([red, green]) => green / red).sort((a, b) => a - b)[cloth.length >> 1];
+    };
+    const linen = greens(points.linen);
+    const hem = greens(points.hem);
+    assert.ok(hem > 1.2 * linen, `green over red is ${hem} at the hem, ${linen} inside`);
+  }));
+
 test("the sphere can be dragged through the cloth", () =>
   withPage({}, async (page) => {
     await untilState(page, "live");
