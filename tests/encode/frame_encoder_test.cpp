@@ -208,9 +208,9 @@ TEST_P(FrameEncoder, KeepsTheErrorAtRoundingsEdges) {
 }
 
 TEST_P(FrameEncoder, MakesThoseOfMeshesToo) {
-  scene::Scene scene = clothsOf(GetParam());
+  scene::Scene scene = clothsOf(GetParam().normals);
   scene.cloths.insert(scene.cloths.begin() + 1, discCloth(9));
-  Encoding encoding(scene);
+  Encoding encoding(scene, GetParam().codec);
   for (std::uint64_t tick = 1; tick <= 30 && !testing::Test::HasFailure(); ++tick)
     encoding.tick(tick, tick % 10 == 0);
 }
