@@ -47,11 +47,7 @@ class BitReader {
 
   // 0 past the end.
   std::uint32_t get(unsigned bits) {
-    while (count_ < bits) {
-      if (at_ < bytes_.size()) pending_ |= std::uint64_t{static_cast<std::uint8_t>(bytes_[at_])} << count_;
-      ++at_;
-      count_ += 8;
-    }
+    if (count_ < bits) refill();
     const auto value = static_cast<std::uint32_t>(pending_ & ((std::uint64_t{1} << bits) - 1));
     pending_ >>= bits;
     count_ -= bits;
@@ -66,11 +62,20 @@ class BitReader {
     return (get(width) | 1u << width) - (1u << k);
   }
   // All bytes were used, none was missing, and what is left of the last are zeros.
-  bool atEnd() const { return !broken_ && at_ == bytes_.size() && pending_ == 0; }
+  bool atEnd() const {
+    const std::size_t whole = count_ / 8;  // bytes that are pending and untouched
+    return !broken_ && at_ == bytes_.size() + whole && pending_ == 0;
+  }
 
  private:
+  void refill() {
+    for (; count_ <= 56; count_ += 8, ++at_) {
+      if (at_ < bytes_.size()) pending_ |= std::uint64_t{static_cast<std::uint8_t>(bytes_[at_])} << count_;
+    }
+  }
+
   std::span<const std::byte> bytes_;
-  std::size_t at_ = 0;
+  std::size_t at_ = 0;  // of the next byte; beyond the end where zeros were taken instead
   std::uint64_t pending_ = 0;
   unsigned count_ = 0;
   bool broken_ = false;

@@ -120,9 +120,9 @@ void HierarchicalEncoder::State::quantise(std::span<const float> positions) {
   const Array<std::uint32_t>& vertexOf = predictor.hierarchy().vertexOf;
   const double perUnit = 1 / static_cast<double>(unit.unit);
   const auto coordinate = [&](float x) {
-    const double q = std::floor(static_cast<double>(x) * perUnit + 0.5);
+    const double q = static_cast<double>(x) * perUnit;
     if (!(q >= -limit)) return -kLimit;  // what is no number, too
-    return q > limit ? kLimit : static_cast<std::int32_t>(q);
+    return q > limit ? kLimit : simde_mm_cvtsd_si32(simde_mm_set_sd(q));
   };
   for (std::size_t slot = 0; slot < vertices; ++slot) {
     const float* p = &positions[3 * std::size_t{vertexOf[slot]}];

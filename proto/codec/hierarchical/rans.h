@@ -62,8 +62,10 @@ class RansReader {
     const std::uint32_t bits = state & ((1u << kProbabilityBits) - 1);
     const std::uint32_t symbol = table.symbolAt(bits);
     state = table.frequency(symbol) * (state >> kProbabilityBits) + bits - table.start(symbol);
-    if (state < kLowestState) state = state << 16 | word();
-    states_[coder] = state;
+    // Seldom, and hard to foretell: without a branch.
+    const bool low = state < kLowestState;
+    states_[coder] = low ? state << 16 | wordAt(at_) : state;
+    at_ += low ? 2 : 0;
     return symbol;
   }
 
@@ -75,11 +77,13 @@ class RansReader {
   }
 
  private:
-  // 0 past the end.
   std::uint32_t word() {
-    const std::size_t at = at_;
     at_ += 2;
-    if (at_ > bytes_.size()) return 0;
+    return wordAt(at_ - 2);
+  }
+  // 0 past the end.
+  std::uint32_t wordAt(std::size_t at) const {
+    if (at + 2 > bytes_.size()) return 0;
     return static_cast<std::uint32_t>(bytes_[at]) | static_cast<std::uint32_t>(bytes_[at + 1]) << 8;
   }
 
