@@ -9,6 +9,7 @@
 #include <fmt/ranges.h>
 
 #include "server/messages/limits.h"
+#include "server/messages/shapes.h"
 #include "server/messages/validation.h"
 #include "server/messages/vectors.h"
 
@@ -68,10 +69,7 @@ Result<std::vector<scene::ParticipantCollider>> toColliders(const v1::ColliderPo
     const Path path = poses.at("colliders", i);
     if (!ids.insert(from.id()).second)
       checks.fail(path / "id", fmt::format("{}", from.id()), "is another's id already; ids must be unique");
-    if (!from.has_sphere()) checks.fail(path, "", "has no shape; must have \"sphere\"");
-    colliders.push_back(
-        {from.id(), toPose(checks, path / "pose", from.pose()),
-         checks.number(path / "sphere" / "radius", from.sphere().radius(), limits::kParticipantRadius)});
+    colliders.push_back({from.id(), toPose(checks, path / "pose", from.pose()), toShape(checks, path, from)});
   }
   return std::move(checks).result(std::move(colliders));
 }

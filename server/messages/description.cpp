@@ -9,6 +9,7 @@
 
 #include "server/messages/limits.h"
 #include "server/messages/scene_message.h"
+#include "server/messages/shapes.h"
 #include "server/messages/vectors.h"
 #include "server/scene/mesh.h"
 
@@ -45,12 +46,12 @@ void writeShape(const scene::Cloth& cloth, v1::ClothDescription& message) {
 
 }  // namespace
 
-void write(const scene::SphereCollider& collider, const scene::Vec3& position, v1::ColliderState& state) {
+void write(const scene::Collider& collider, const scene::Pose& pose, v1::ColliderState& state) {
   state.set_name(collider.name);
-  write(position, *state.mutable_position());
-  write(collider.pose.orientation, *state.mutable_orientation());
+  write(pose.position, *state.mutable_position());
+  write(pose.orientation, *state.mutable_orientation());
   state.set_participant_id(0);
-  state.mutable_sphere()->set_radius(collider.radius);
+  write(collider.shape, state);
 }
 
 void write(const scene::ParticipantCollider& collider, std::uint64_t participantId,
@@ -59,10 +60,11 @@ void write(const scene::ParticipantCollider& collider, std::uint64_t participant
   write(collider.pose.position, *state.mutable_position());
   write(collider.pose.orientation, *state.mutable_orientation());
   state.set_participant_id(participantId);
-  state.mutable_sphere()->set_radius(collider.radius);
+  write(collider.shape, state);
 }
 
-v1::StreamDescription toDescription(const scene::Scene& scene, std::uint32_t epoch, std::uint32_t codec) {
+v1::StreamDescription toDescription(const scene::Scene& scene, std::uint32_t epoch, std::uint32_t codec,
+                                    double seconds) {
   v1::StreamDescription description;
   description.set_epoch(epoch);
   description.set_codec(codec);
@@ -75,6 +77,12 @@ v1::StreamDescription toDescription(const scene::Scene& scene, std::uint32_t epo
     v1::ClothDescription& message = *description.add_cloths();
     message.set_name(cloth.name);
     writeShape(cloth, message);
+  }
+  for (const scene::Collider& collider : scene.colliders) {
+    v1::ColliderState& state = *description.add_colliders();
+    write(collider, scene::poseAt(collider, seconds), state);
+    if (const auto* hull = std::get_if<scene::Hull>(&collider.shape))
+      writeHull(**hull, *state.mutable_hull());
   }
   *description.mutable_definition() = toMessage(scene);
   for (v1::Cloth& cloth : *description.mutable_definition()->mutable_cloths())

@@ -13,12 +13,14 @@
 namespace clothstream::messages {
 
 // Overwrites every field of `state`, so that one message can be filled again each tick. A participant's
-// collider is named by its id.
-void write(const scene::SphereCollider& collider, const scene::Vec3& position, v1::ColliderState& state);
+// collider is named by its id. A hull's shape is left out.
+void write(const scene::Collider& collider, const scene::Pose& pose, v1::ColliderState& state);
 void write(const scene::ParticipantCollider& collider, std::uint64_t participantId, v1::ColliderState& state);
 
-// Without colliders' states, which only the caller knows. The scene must be valid.
-v1::StreamDescription toDescription(const scene::Scene& scene, std::uint32_t epoch, std::uint32_t codec);
+// With the scene's own colliders, hulls too, as they are at `seconds` of simulated time. The scene must be
+// valid.
+v1::StreamDescription toDescription(const scene::Scene& scene, std::uint32_t epoch, std::uint32_t codec,
+                                    double seconds);
 
 // A scene as a list shows it; who is in it, and whether it runs, only the caller knows.
 v1::SceneSummary toSummary(const scene::Scene& scene);

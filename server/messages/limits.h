@@ -22,7 +22,9 @@ inline constexpr std::size_t kMaxCloths = 256;
 inline constexpr std::size_t kMaxColliders = 64;
 inline constexpr std::size_t kMaxPins = 4096;        // ranges a cloth
 inline constexpr std::size_t kMaxMotionKeys = 1024;  // a collider
-inline constexpr std::uint32_t kMinGridNodes = 2;    // a row or column
+inline constexpr std::size_t kMinHullParts = 4;      // vertices, faces
+inline constexpr std::size_t kMaxHullParts = 128;
+inline constexpr std::uint32_t kMinGridNodes = 2;  // a row or column
 inline constexpr std::uint32_t kMaxGridNodes = 8192;
 inline constexpr std::uint64_t kMaxNodes = 16'777'216;  // of a scene
 inline constexpr std::size_t kMaxNameLength = 64;
@@ -45,7 +47,11 @@ inline constexpr Range kAirCoefficient{0, 10};
 inline constexpr Range kFriction{0, 10};
 inline constexpr Range kThickness{0, 1};               // m
 inline constexpr Range kRadius{0.001, 1000};           // m
+inline constexpr Range kShapeLength{0, 1000};          // m
+inline constexpr Range kShapeSize{0.001, 1000};        // m
 inline constexpr Range kParticipantRadius{0.001, 10};  // m
+inline constexpr Range kParticipantLength{0, 10};      // m
+inline constexpr Range kParticipantSize{0.001, 10};    // m
 inline constexpr Range kMotionTime{0, 86400};          // s
 inline constexpr Range kMaxError{0.00001, 0.1};        // m
 inline constexpr Range kCompliance{0, 1};              // m/N
@@ -62,7 +68,7 @@ inline constexpr std::uint32_t kDefaultStreamRate = 72;
 inline constexpr std::size_t kMaxSceneFileBytes = 4 * 1024 * 1024;
 inline constexpr std::size_t kMaxMeshFileBytes = 512 * 1024 * 1024;
 inline constexpr std::size_t kMaxClientMessageBytes = 64 * 1024;
-inline constexpr std::size_t kMaxParticipantColliders = 16;
+inline constexpr std::size_t kMaxParticipantColliders = 40;
 inline constexpr std::size_t kMaxChunkBytes = 256 * 1024;
 inline constexpr std::size_t kMaxContentBytes = 256 * 1024 * 1024;
 

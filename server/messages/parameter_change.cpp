@@ -48,7 +48,14 @@ scene::ColliderChange toColliderChange(Checks& checks, const Path& path, const v
   checkKnown(checks, path / "name", change.name, scene.colliders);
   if (message.has_position())
     change.position = toVec3(checks, path / "position", message.position(), limits::kPosition);
-  if (message.has_radius()) change.radius = checks.number(path / "radius", message.radius(), limits::kRadius);
+  if (message.has_orientation())
+    change.orientation = toQuaternion(checks, path / "orientation", message.orientation());
+  if (!message.has_radius() || checks.failed()) return change;
+  change.radius = checks.number(path / "radius", message.radius(), limits::kRadius);
+  scene::Shape shape = std::ranges::find(scene.colliders, change.name, &scene::Collider::name)->shape;
+  if (scene::radiusOf(shape) == nullptr)
+    checks.fail(path / "radius", fmt::format("{}", message.radius()),
+                fmt::format("must be absent: \"{}\" is neither sphere nor capsule", change.name));
   return change;
 }
 

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "server/messages/limits.h"
+#include "server/messages/shapes.h"
 #include "server/messages/validation.h"
 #include "server/messages/vectors.h"
 #include "server/scene/mesh.h"
@@ -176,33 +177,37 @@ scene::Cloth toCloth(Checks& checks, const Path& path, const v1::Cloth& message,
   return cloth;
 }
 
-std::vector<scene::MotionKey> toMotion(Checks& checks, const Path& path, const v1::Motion& message) {
-  std::vector<scene::MotionKey> motion;
+scene::Motion toMotion(Checks& checks, const Path& path, const v1::Motion& message,
+                       const scene::Quaternion& orientation) {
+  scene::Motion motion{{}, message.steady()};
   checks.count(path / "keys", static_cast<std::size_t>(message.keys_size()), 2, limits::kMaxMotionKeys);
   for (int i = 0; i < message.keys_size() && !checks.failed(); ++i) {
+    const v1::MotionKey& from = message.keys(i);
     const Path key = path.at("keys", i);
-    const float time = checks.number(key / "time", message.keys(i).time(), limits::kMotionTime);
+    const float time = checks.number(key / "time", from.time(), limits::kMotionTime);
     if (i == 0 && time != 0)
       checks.fail(key / "time", fmt::format("{}", time), "must be 0, where the motion starts");
-    if (i > 0 && time <= motion.back().time)
-      checks.fail(key / "time", fmt::format("{}", time),
-                  fmt::format("must be greater than the time of the key before, {}", motion.back().time));
-    motion.push_back({time, toVec3(checks, key / "position", message.keys(i).position(), limits::kPosition)});
+    if (i > 0 && time <= motion.keys.back().time)
+      checks.fail(
+          key / "time", fmt::format("{}", time),
+          fmt::format("must be greater than the time of the key before, {}", motion.keys.back().time));
+    motion.keys.push_back({time, toVec3(checks, key / "position", from.position(), limits::kPosition),
+                           from.has_orientation()
+                               ? toQuaternion(checks, key / "orientation", from.orientation())
+                               : orientation});
   }
   return motion;
 }
 
-scene::SphereCollider toCollider(Checks& checks, const Path& path, const v1::Collider& message) {
-  scene::SphereCollider collider;
+scene::Collider toCollider(Checks& checks, const Path& path, const v1::Collider& message) {
+  scene::Collider collider;
   collider.name = checks.name(path / "name", message.name());
-  if (message.has_sphere())
-    collider.radius = checks.number(path / "sphere" / "radius", message.sphere().radius(), limits::kRadius);
-  else
-    checks.fail(path, "", "has no shape; must have \"sphere\"");
+  collider.shape = toShape(checks, path, message);
   collider.pose = toPose(checks, path / "pose", message.pose());
   if (message.has_friction())
     collider.friction = checks.number(path / "friction", message.friction(), limits::kFriction);
-  if (message.has_motion()) collider.motion = toMotion(checks, path / "motion", message.motion());
+  if (message.has_motion())
+    collider.motion = toMotion(checks, path / "motion", message.motion(), collider.pose.orientation);
   return collider;
 }
 

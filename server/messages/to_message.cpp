@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // From a scene to its message.
 #include "server/messages/scene_message.h"
+#include "server/messages/shapes.h"
 #include "server/messages/vectors.h"
 #include "server/scene/mesh.h"
 
@@ -73,15 +74,18 @@ void writeCloth(const scene::Cloth& cloth, v1::Cloth& message) {
   for (const scene::Region& region : cloth.pinnedRegions) write(region, *message.add_pinned_regions());
 }
 
-void writeCollider(const scene::SphereCollider& collider, v1::Collider& message) {
+void writeCollider(const scene::Collider& collider, v1::Collider& message) {
   message.set_name(collider.name);
-  message.mutable_sphere()->set_radius(collider.radius);
+  write(collider.shape, message);
   write(collider.pose, *message.mutable_pose());
   message.set_friction(collider.friction);
-  for (const scene::MotionKey& key : collider.motion) {
+  if (collider.motion.keys.empty()) return;
+  message.mutable_motion()->set_steady(collider.motion.steady);
+  for (const scene::MotionKey& key : collider.motion.keys) {
     v1::MotionKey& keyMessage = *message.mutable_motion()->add_keys();
     keyMessage.set_time(key.time);
     write(key.position, *keyMessage.mutable_position());
+    write(key.orientation, *keyMessage.mutable_orientation());
   }
 }
 
@@ -106,8 +110,7 @@ v1::Scene toMessage(const scene::Scene& scene) {
   message.set_integrator(toMessage(scene.integrator));
   writeEnvironment(scene.environment, *message.mutable_environment());
   for (const scene::Cloth& cloth : scene.cloths) writeCloth(cloth, *message.add_cloths());
-  for (const scene::SphereCollider& collider : scene.colliders)
-    writeCollider(collider, *message.add_colliders());
+  for (const scene::Collider& collider : scene.colliders) writeCollider(collider, *message.add_colliders());
   message.mutable_stream()->set_max_error(scene.stream.maxError);
   message.mutable_stream()->set_normals(toMessage(scene.stream.normals));
   return message;

@@ -133,23 +133,22 @@ void ReferenceCloth::enforceConstraints(double h) {
   }
 }
 
-void ReferenceCloth::collide(const Vec3& centre, const Vec3& velocity, double radius, double friction) {
-  const double distance = radius + cloth_.thickness;
+void ReferenceCloth::collide(const scene::Shape& shape, const ColliderStep& step, double friction,
+                             std::span<const Vec3> from) {
   const double mu = cloth_.friction * friction;
   for (std::size_t i = 0; i < positions_.size(); ++i) {
     if (inverseMasses_[i] == 0) continue;
-    const Vec3 offset = positions_[i] - centre;
-    const double square = offset.squaredNorm();
-    if (square >= distance * distance) continue;
-    const Vec3 normal = square > 0 ? Vec3(offset / std::sqrt(square)) : Vec3::UnitY();
-    positions_[i] = centre + distance * normal;
-    const Vec3 relative = velocities_[i] - velocity;
-    const double approach = relative.dot(normal);
+    const std::optional<Contact> contact = contactOf(shape, cloth_.thickness, step, from[i], positions_[i]);
+    if (!contact) continue;
+    positions_[i] += contact->depth * contact->normal;
+    const Vec3 carried = step.velocity + step.spin.cross(positions_[i] - step.after.position);
+    const Vec3 relative = velocities_[i] - carried;
+    const double approach = relative.dot(contact->normal);
     if (approach >= 0) continue;
-    const Vec3 tangent = relative - approach * normal;
+    const Vec3 tangent = relative - approach * contact->normal;
     const double speed = tangent.norm();
     const double kept = speed > 0 ? std::max(0.0, 1 - mu * -approach / speed) : 0;
-    velocities_[i] = velocity + kept * tangent;
+    velocities_[i] = carried + kept * tangent;
   }
 }
 

@@ -7,13 +7,12 @@
 #include <span>
 #include <vector>
 
+#include "server/reference/contact.h"
 #include "server/scene/mesh.h"
 #include "server/scene/scene.h"
 #include "server/scene/springs.h"
 
 namespace clothstream::reference {
-
-using Vec3 = Eigen::Vector3d;
 
 // Of the structural springs: |d| / L - 1.
 struct Strain {
@@ -48,9 +47,11 @@ class ReferenceCloth {
   // Forces, one step of h seconds, and the cloth's constraints; colliders apart.
   void integrate(const scene::Environment& environment, scene::Integrator integrator, double h);
 
-  // Nodes within radius + thickness of the centre go to that surface and lose what they move into it; the
-  // rest of their motion relative to the sphere meets Coulomb friction ([Va21] 3.4, Alg. 4).
-  void collide(const Vec3& centre, const Vec3& velocity, double radius, double friction);
+  // Nodes on their way from `from`, one place a node, to where they are go out of the shape; their velocity
+  // relative to its surface loses what goes into it, and the rest meets Coulomb friction ([Va21] 3.4, Alg.
+  // 4).
+  void collide(const scene::Shape& shape, const ColliderStep& step, double friction,
+               std::span<const Vec3> from);
 
   // Unit normals; (0,0,1) where they vanish. A grid's from up to eight triangles round a node ([Va21] 3.5,
   // Alg. 5), a mesh's from the area vectors of a node's triangles.

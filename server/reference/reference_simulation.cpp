@@ -8,10 +8,9 @@ TickInputs inputsAt(const scene::Scene& scene, std::uint64_t tick) {
   TickInputs inputs{scene.environment, {}};
   const double start = static_cast<double>(tick) * scene.tickSeconds();
   const double end = static_cast<double>(tick + 1) * scene.tickSeconds();
-  for (const scene::SphereCollider& collider : scene.colliders)
-    inputs.spheres.push_back({scene::positionAt(collider, start).cast<double>(),
-                              scene::positionAt(collider, end).cast<double>(), collider.radius,
-                              collider.friction});
+  for (const scene::Collider& collider : scene.colliders)
+    inputs.colliders.push_back({collider.shape, toPose(scene::poseAt(collider, start)),
+                                toPose(scene::poseAt(collider, end)), collider.friction});
   return inputs;
 }
 
@@ -29,12 +28,12 @@ void ReferenceSimulation::tick() {
 
 void ReferenceSimulation::substep(const TickInputs& inputs, std::uint32_t index) {
   for (ReferenceCloth& cloth : cloths_) {
+    before_.assign(cloth.positions().begin(), cloth.positions().end());
     cloth.integrate(inputs.environment, scene_.integrator, scene_.substepSeconds());
-    for (const MovingSphere& sphere : inputs.spheres) {
-      const Vec3 path = sphere.end - sphere.start;
-      const Vec3 centre = sphere.start + path * (index + 1.0) / scene_.substeps;
-      cloth.collide(centre, path / scene_.tickSeconds(), sphere.radius, sphere.friction);
-    }
+    for (const MovingCollider& collider : inputs.colliders)
+      cloth.collide(collider.shape,
+                    stepOf(collider.start, collider.end, index, scene_.substeps, scene_.tickSeconds()),
+                    collider.friction, before_);
   }
 }
 

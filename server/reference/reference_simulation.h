@@ -10,17 +10,16 @@
 
 namespace clothstream::reference {
 
-// A sphere that moves in a straight line from start to end over a tick's substeps.
-struct MovingSphere {
-  Vec3 start = Vec3::Zero();
-  Vec3 end = Vec3::Zero();
-  double radius = 0;    // m
+// Moves from start to end over a tick's substeps.
+struct MovingCollider {
+  scene::Shape shape = scene::Sphere{};
+  Pose start = {}, end = {};
   double friction = 1;  // multiplied with the cloth's
 };
 
 struct TickInputs {
   scene::Environment environment;
-  std::vector<MovingSphere> spheres;
+  std::vector<MovingCollider> colliders;
 };
 
 // The scene's own environment and colliders over the given tick: from tick * dt to (tick + 1) * dt.
@@ -46,6 +45,7 @@ class ReferenceSimulation {
  private:
   scene::Scene scene_;
   std::vector<ReferenceCloth> cloths_;
+  std::vector<Vec3> before_;  // a cloth's nodes at the start of a substep
   std::uint64_t ticks_ = 0;
 };
 

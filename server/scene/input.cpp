@@ -23,6 +23,17 @@ void apply(Cloth& cloth, const ClothChange& change) {
   assign(cloth.friction, change.friction);
 }
 
+// A motion that ends leaves what is not changed at the pose that the scene gives.
+void apply(Collider& collider, const ColliderChange& change) {
+  if (change.position || change.orientation) collider.motion.keys.clear();
+  assign(collider.pose.position, change.position);
+  assign(collider.pose.orientation, change.orientation);
+  if (!change.radius) return;
+  float* radius = radiusOf(collider.shape);
+  assert(radius != nullptr);
+  *radius = *change.radius;
+}
+
 }  // namespace
 
 void applyChange(Scene& scene, const ParameterChange& change) {
@@ -33,13 +44,9 @@ void applyChange(Scene& scene, const ParameterChange& change) {
     for (Cloth& cloth : scene.cloths)
       if (clothChange.name.empty() || clothChange.name == cloth.name) apply(cloth, clothChange);
   for (const ColliderChange& colliderChange : change.colliders) {
-    const auto collider = std::ranges::find(scene.colliders, colliderChange.name, &SphereCollider::name);
+    const auto collider = std::ranges::find(scene.colliders, colliderChange.name, &Collider::name);
     assert(collider != scene.colliders.end());
-    if (colliderChange.position) {
-      collider->pose.position = *colliderChange.position;
-      collider->motion.clear();
-    }
-    assign(collider->radius, colliderChange.radius);
+    apply(*collider, colliderChange);
   }
 }
 

@@ -11,11 +11,11 @@
 
 namespace clothstream::scene {
 
-// A sphere that belongs to a participant: a hand, a head.
+// A shape that belongs to a participant: a hand, a part of a finger, a head.
 struct ParticipantCollider {
   std::uint32_t id = 0;  // unique among this participant's; the same id moves the same collider
   Pose pose;
-  float radius = 0.1f;  // m
+  Shape shape = Sphere{};  // sphere, capsule or box
 };
 
 struct ClothChange {
@@ -26,8 +26,10 @@ struct ClothChange {
 
 struct ColliderChange {
   std::string name = {};
-  std::optional<Vec3> position = {};  // ends the collider's own motion
-  std::optional<float> radius = {};
+  // Either ends the collider's own motion.
+  std::optional<Vec3> position = {};
+  std::optional<Quaternion> orientation = {};
+  std::optional<float> radius = {};  // of a shape that has one
 };
 
 // Takes effect at a tick's start, all of it.

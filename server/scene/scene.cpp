@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Rest positions, pins and motion: what follows from a scene's numbers.
+// Rest positions and pins: what follows from a scene's numbers.
 #include "server/scene/scene.h"
 
 #include <cassert>
@@ -81,25 +81,6 @@ GridSpacing spacing(const Grid& grid) {
   const double row = double{grid.height} / (grid.rows - 1);
   return {static_cast<float>(column), static_cast<float>(row),
           static_cast<float>(std::sqrt(column * column + row * row))};
-}
-
-Vec3 positionAt(const SphereCollider& collider, double seconds) {
-  const std::vector<MotionKey>& keys = collider.motion;
-  if (keys.empty()) return collider.pose.position;
-  const double period = keys.back().time;
-  const double time = seconds - period * std::floor(seconds / period);
-  std::size_t next = 1;
-  while (next + 1 < keys.size() && time >= keys[next].time) ++next;
-  const MotionKey& from = keys[next - 1];
-  const MotionKey& to = keys[next];
-  const double u = (time - from.time) / (double{to.time} - from.time);
-  const double smooth = u * u * (3 - 2 * u);
-  Vec3 position;
-  for (int axis = 0; axis < 3; ++axis) {
-    const double start = from.position[axis];
-    position[axis] = static_cast<float>(start + (to.position[axis] - start) * smooth);
-  }
-  return position;
 }
 
 }  // namespace clothstream::scene

@@ -2,24 +2,18 @@
 // What is simulated, as plain data: cloths, springs, pins, colliders, environment.
 #pragma once
 
-#include <Eigen/Core>
-#include <Eigen/Geometry>
 #include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "server/scene/collider.h"
+#include "server/scene/pose.h"
+
 namespace clothstream::scene {
 
-// Right-handed, +Y up, -Z forward; metres, kilograms, seconds, newtons.
-using Vec3 = Eigen::Vector3f;
-using Quaternion = Eigen::Quaternionf;
-
-struct Pose {
-  Vec3 position = Vec3::Zero();
-  Quaternion orientation = Quaternion::Identity();
-};
+// Metres, kilograms, seconds, newtons; coordinates as in pose.h.
 
 // Hooke spring with a dashpot along its axis, [Va21] Eq. 1.
 struct Spring {
@@ -101,19 +95,6 @@ struct Cloth {
   float nodeMass() const { return mass / static_cast<float>(nodeCount()); }  // kg, mean
 };
 
-struct MotionKey {
-  float time = 0;  // s
-  Vec3 position = Vec3::Zero();
-};
-
-struct SphereCollider {
-  std::string name;
-  float radius = 0.1f;
-  Pose pose;
-  float friction = 1;
-  std::vector<MotionKey> motion;  // times ascend from 0; empty: it stays at its pose
-};
-
 struct Environment {
   Vec3 gravity = Vec3(0, -9.81f, 0);
   Vec3 wind = Vec3::Zero();  // m/s
@@ -137,7 +118,7 @@ struct Scene {
   Integrator integrator = Integrator::semiImplicitEuler;
   Environment environment;
   std::vector<Cloth> cloths;
-  std::vector<SphereCollider> colliders;
+  std::vector<Collider> colliders;
   StreamSettings stream;
 
   double tickSeconds() const { return 1.0 / simulationRate; }
@@ -160,9 +141,5 @@ struct GridSpacing {
   float column, row, diagonal;
 };
 GridSpacing spacing(const Grid& grid);
-
-// Position of a collider at a simulated time: from key to key by smoothstep, periodic. Its arithmetic is +,
-// -, *, / and floor in double alone, so that every machine gives the same value.
-Vec3 positionAt(const SphereCollider& collider, double seconds);
 
 }  // namespace clothstream::scene

@@ -12,15 +12,15 @@ namespace clothstream::simulation {
 
 // What the kernel leaves out where a scene has none of it; the bits are the same.
 struct AdvanceVariant {
-  bool springDamping, air, spheres;
+  bool springDamping, air, colliders;
 
-  std::size_t index() const { return (springDamping ? 1u : 0u) | (air ? 2u : 0u) | (spheres ? 4u : 0u); }
+  std::size_t index() const { return (springDamping ? 1u : 0u) | (air ? 2u : 0u) | (colliders ? 4u : 0u); }
   static constexpr std::size_t kCount = 8;
 
   // constant_id 1 and on.
   std::vector<std::uint32_t> specialisation(std::uint32_t rowsPerInvocation,
                                             scene::Integrator integrator) const {
-    return {rowsPerInvocation, springDamping ? 1u : 0u, air ? 1u : 0u, spheres ? 1u : 0u,
+    return {rowsPerInvocation, springDamping ? 1u : 0u, air ? 1u : 0u, colliders ? 1u : 0u,
             integrator == scene::Integrator::explicitEuler ? 1u : 0u};
   }
 };

@@ -15,6 +15,7 @@
 #include "kernels/compute_normals.h"
 #include "kernels/hash_state.h"
 #include "server/simulation/advance_variant.h"
+#include "server/simulation/collision/collision_stage.h"
 #include "server/simulation/constraint_stage.h"
 #include "server/simulation/mesh_stage.h"
 #include "server/vulkan/kernel.h"
@@ -74,10 +75,10 @@ struct Buffers {
   std::array<Buffer, 2> positions, velocities;  // by turns
   Buffer checkpointPositions, checkpointVelocities;
   Buffer normals;
-  Buffer cloths, tiles, spheres, status;
+  Buffer cloths, tiles, status;
   // What the CPU writes and reads. Inputs and status by turns: a tick may be in flight while the next is
   // recorded.
-  std::array<Buffer, 2> inputs;  // cloths, then spheres
+  std::array<Buffer, 2> inputs;  // cloths
   Buffer statusReadback;
   Buffer tileUpload;
   Buffer stateUpload;    // positions, then velocities
@@ -91,20 +92,19 @@ Buffers::Buffers(const vulkan::Device& device, std::size_t nodes, std::size_t cl
       normals(device, BufferPurpose::texels, nodes * kTexelBytes),
       cloths(device, BufferPurpose::texels, clothCount * sizeof(shared::ClothRecord)),
       tiles(device, BufferPurpose::texels, std::max<std::size_t>(1, tileCount) * sizeof(shared::TileRecord)),
-      spheres(device, BufferPurpose::texels, kMaxSpheres * sizeof(shared::SphereRecord)),
       status(device, BufferPurpose::state, sizeof(shared::StatusRecord)),
       statusReadback(device, BufferPurpose::readback, 2 * sizeof(shared::StatusRecord)),
       tileUpload(device, BufferPurpose::upload, tiles.bytes()),
       stateUpload(device, BufferPurpose::upload, 2 * nodes * kTexelBytes) {
   for (Buffer& buffer : positions) buffer = Buffer(device, BufferPurpose::texels, nodes * kTexelBytes);
   for (Buffer& buffer : velocities) buffer = Buffer(device, BufferPurpose::texels, nodes * kTexelBytes);
-  for (Buffer& buffer : inputs)
-    buffer = Buffer(device, BufferPurpose::upload, cloths.bytes() + spheres.bytes());
+  for (Buffer& buffer : inputs) buffer = Buffer(device, BufferPurpose::upload, cloths.bytes());
 }
 
-StateBuffers stateOf(const Buffers& b) {
+StateBuffers stateOf(const Buffers& b, const CollisionStage& collision) {
   return {.cloths = b.cloths,
-          .spheres = b.spheres,
+          .colliders = collision.colliders(),
+          .nearColliders = collision.nearLists(),
           .positions = {&b.positions[0], &b.positions[1]},
           .velocities = {&b.velocities[0], &b.velocities[1]}};
 }
@@ -122,28 +122,29 @@ struct Stage {
   std::array<vulkan::Bindings, 2> from;
 };
 
-AdvanceVariant variantOf(std::span<const shared::ClothRecord> cloths, float airDensity, bool spheres) {
+AdvanceVariant variantOf(std::span<const shared::ClothRecord> cloths, float airDensity, bool colliders) {
   return {std::any_of(cloths.begin(), cloths.end(), isDamped),
-          airDensity != 0 && std::any_of(cloths.begin(), cloths.end(), isBlown), spheres};
+          airDensity != 0 && std::any_of(cloths.begin(), cloths.end(), isBlown), colliders};
 }
 
-std::unique_ptr<Stage> makeAdvance(const vulkan::Device& device, const Buffers& b, const Cut& cut,
-                                   std::span<const std::uint32_t> spirv, scene::Integrator integrator,
-                                   const AdvanceVariant& variant) {
+std::unique_ptr<Stage> makeAdvance(const vulkan::Device& device, const Buffers& b, const CollisionStage& c,
+                                   const Cut& cut, std::span<const std::uint32_t> spirv,
+                                   scene::Integrator integrator, const AdvanceVariant& variant) {
   return std::make_unique<Stage>(
       device,
       vulkan::KernelDescription{
           .name = "advance_mass_spring",
           .spirv = spirv,
           .bindings = {BindingKind::texels, BindingKind::texels, BindingKind::texels, BindingKind::texels,
-                       BindingKind::storage, BindingKind::storage, BindingKind::texels},
+                       BindingKind::storage, BindingKind::storage, BindingKind::texels, BindingKind::texels},
           .pushConstantBytes = sizeof(shared::AdvancePush),
           .workgroupSize = cut.workgroupSize,
           .specialisation = variant.specialisation(cut.rowsPerInvocation, integrator)},
       std::initializer_list<const Buffer*>{&b.cloths, &b.tiles, &b.positions[0], &b.velocities[0],
-                                           &b.positions[1], &b.velocities[1], &b.spheres},
+                                           &b.positions[1], &b.velocities[1], &c.colliders(), &c.nearLists()},
       std::initializer_list<const Buffer*>{&b.cloths, &b.tiles, &b.positions[1], &b.velocities[1],
-                                           &b.positions[0], &b.velocities[0], &b.spheres});
+                                           &b.positions[0], &b.velocities[0], &c.colliders(),
+                                           &c.nearLists()});
 }
 
 Stage makeNormals(const vulkan::Device& device, const Buffers& b, const Cut& cut) {
@@ -197,6 +198,7 @@ struct ClothSimulation::Pipeline {
   std::vector<float> masses;  // inverse
   Cut cut;
   Buffers buffers;
+  CollisionStage collision;
   std::array<std::unique_ptr<Stage>, AdvanceVariant::kCount> advances;  // made when they are first needed
   Stage normals, hash;
   std::unique_ptr<MeshStage> meshes;             // where there are any
@@ -223,6 +225,8 @@ ClothSimulation::Pipeline::Pipeline(const vulkan::Device& on, const scene::Scene
       masses(inverseMasses(scene.cloths)),
       cut(cutScene(on, scene, options)),
       buffers(on, nodes, records.size(), cut.tiles.records.size()),
+      collision(on, nodes, {&buffers.positions[0], &buffers.positions[1]},
+                {&buffers.velocities[0], &buffers.velocities[1]}),
       normals(makeNormals(on, buffers, cut)),
       hash(makeHash(on, buffers, cut)) {
   std::memcpy(buffers.tileUpload.mapped().data(), cut.tiles.records.data(),
@@ -231,12 +235,14 @@ ClothSimulation::Pipeline::Pipeline(const vulkan::Device& on, const scene::Scene
   writeState(restState(scene.cloths));
   const MeshTables meshTables = simulation::meshTables(scene.cloths, cut.workgroupSize);
   if (!meshTables.nodes.empty())
-    meshes = std::make_unique<MeshStage>(on, meshTables, stateOf(buffers), buffers.normals, integrator,
-                                         cut.workgroupSize);
+    meshes = std::make_unique<MeshStage>(on, meshTables, stateOf(buffers, collision), buffers.normals,
+                                         integrator, cut.workgroupSize);
   const ConstraintTables tables = constraintTables(scene.cloths);
   if (!tables.links.empty())
-    constraints = std::make_unique<ConstraintStage>(on, tables, stateOf(buffers), options.workgroupSize);
-  for (const bool spheres : {false, true}) prepare(variantOf(records, scene.environment.airDensity, spheres));
+    constraints =
+        std::make_unique<ConstraintStage>(on, tables, stateOf(buffers, collision), options.workgroupSize);
+  for (const bool colliders : {false, true})
+    prepare(variantOf(records, scene.environment.airDensity, colliders));
 }
 
 void ClothSimulation::Pipeline::prepare(const AdvanceVariant& variant) {
@@ -246,7 +252,7 @@ void ClothSimulation::Pipeline::prepare(const AdvanceVariant& variant) {
 
 const Stage& ClothSimulation::Pipeline::advance(const AdvanceVariant& variant) {
   std::unique_ptr<Stage>& stage = advances[variant.index()];
-  if (!stage) stage = makeAdvance(device, buffers, cut, advanceSpirv, integrator, variant);
+  if (!stage) stage = makeAdvance(device, buffers, collision, cut, advanceSpirv, integrator, variant);
   return *stage;
 }
 
@@ -282,25 +288,18 @@ void ClothSimulation::Pipeline::recordInputs(vulkan::Recorder& recorder, const T
   slot = 1 - slot;
   const Buffer& from = buffers.inputs[slot];
   const std::size_t clothBytes = buffers.cloths.bytes();
-  const std::size_t sphereBytes = inputs.spheres.size() * sizeof(shared::SphereRecord);
   std::memcpy(from.mapped().data(), records.data(), clothBytes);
-  std::byte* to = from.mapped().data() + clothBytes;
-  for (const MovingSphere& sphere : inputs.spheres) {
-    const shared::SphereRecord record = sphereRecord(sphere);
-    std::memcpy(to, &record, sizeof(record));
-    to += sizeof(record);
-  }
   recorder.beginStage("inputs");
   recorder.copy(from, buffers.cloths, clothBytes);
-  recorder.copy(from, buffers.spheres, sphereBytes, clothBytes);
+  collision.recordInputs(recorder, inputs.colliders);
   recorder.fill(buffers.status, 0, buffers.status.bytes());
 }
 
 // Constrained cloths collide after their constraints.
 void ClothSimulation::Pipeline::recordAdvance(vulkan::Recorder& recorder, const TickInputs& inputs,
                                               bool constrained, shared::AdvancePush push) {
-  const bool spheres = push.sphereCount > 0 && !constrained;
-  const AdvanceVariant variant = variantOf(records, inputs.environment.airDensity, spheres);
+  const AdvanceVariant variant =
+      variantOf(records, inputs.environment.airDensity, collision.active() && !constrained);
   const TileRange tiles = cut.tiles.range(constrained);
   push.firstTile = tiles.first;
   if (tiles.count > 0)
@@ -315,23 +314,30 @@ void ClothSimulation::Pipeline::recordSubsteps(vulkan::Recorder& recorder, const
     iterations = std::max(iterations, static_cast<std::uint32_t>(record.solver.y));
   shared::AdvancePush push{.gravityStep = texel(environment.gravity, static_cast<float>(substepSeconds)),
                            .windAir = texel(environment.wind, environment.airDensity / 6),
-                           .sphereCount = static_cast<std::uint32_t>(inputs.spheres.size()),
-                           .sphereProgress = 0,
-                           .tickRate = tickRate,
-                           .firstTile = 0};
+                           .collision = {},
+                           .firstTile = 0,
+                           .reserved0 = 0,
+                           .reserved1 = 0,
+                           .reserved2 = 0};
+  if (collision.active()) {
+    float thickness = 0;
+    for (const shared::ClothRecord& record : records) thickness = std::max(thickness, record.damping.w);
+    recorder.beginStage("near");
+    recorder.barrier();
+    collision.recordGather(recorder, present, 1 / tickRate, thickness);
+  }
   recorder.beginStage("advance");
   for (std::uint32_t substep = 0; substep < substeps; ++substep) {
-    push.sphereProgress = static_cast<float>(substep + 1) / static_cast<float>(substeps);
+    push.collision = collision.push(substep, substeps, tickRate);
     recorder.barrier();
     for (const bool constrained : {false, true}) recordAdvance(recorder, inputs, constrained, push);
     if (constraints)
       constraints->record(recorder, present, iterations,
-                          {.count = 0,
-                           .sphereCount = push.sphereCount,
-                           .sphereProgress = push.sphereProgress,
-                           .tickRate = tickRate,
+                          {.collision = push.collision,
+                           .count = 0,
                            .substepSeconds = static_cast<float>(substepSeconds),
-                           .substepRate = tickRate * static_cast<float>(substeps)});
+                           .substepRate = tickRate * static_cast<float>(substeps),
+                           .reserved = 0});
     present = 1 - present;
   }
 }
@@ -363,7 +369,7 @@ void ClothSimulation::setCloths(std::span<const scene::Cloth> cloths) {
 }
 
 void ClothSimulation::recordTick(vulkan::Recorder& recorder, const TickInputs& inputs) {
-  assert(inputs.spheres.size() <= kMaxSpheres);
+  assert(inputs.colliders.size() <= kMaxColliders);
   pipeline_->start(recorder);
   pipeline_->recordInputs(recorder, inputs);
   pipeline_->recordSubsteps(recorder, inputs);

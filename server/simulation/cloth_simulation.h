@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "server/scene/scene.h"
+#include "server/simulation/collision/moving_collider.h"
 #include "server/simulation/scene_tables.h"
 #include "server/simulation/state_snapshot.h"
 #include "server/vulkan/buffer.h"
@@ -27,9 +28,8 @@ namespace clothstream::simulation {
 // What may change from tick to tick. All values validated before.
 struct TickInputs {
   scene::Environment environment;
-  std::vector<MovingSphere> spheres;  // at most kMaxSpheres
+  std::vector<MovingCollider> colliders;  // at most kMaxColliders, in the order in which they act
 };
-inline constexpr std::size_t kMaxSpheres = 4096;
 
 struct SimulationOptions {
   // Rows of a grid that one invocation walks down. 0: the measured best for the device (more on software
@@ -55,7 +55,7 @@ class ClothSimulation {
   void setCloths(std::span<const scene::Cloth> cloths);
 
   // All substeps of one tick, and its status. At most one tick may be in flight when it is called.
-  // Stages: "inputs", "advance", "hash".
+  // Stages: "inputs", "near" (where there are colliders), "advance", "hash".
   void recordTick(vulkan::Recorder& recorder, const TickInputs& inputs);
 
   // Vertex normals of the present positions ([Va21] 3.5, Alg. 5; of meshes from their triangles). Only when

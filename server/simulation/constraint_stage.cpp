@@ -132,8 +132,8 @@ ConstraintStage::ConstraintStage(const vulkan::Device& device, const ConstraintT
       solveActive_(makeSolve(device, cut_, true)),
       apply_(device, {.name = "apply_constraints",
                       .spirv = kernels::apply_constraints,
-                      .bindings = {kTexels, kTexels, kTexels, kTexels, kTexels, kStorage, kTexels, kStorage,
-                                   kStorage},
+                      .bindings = {kTexels, kTexels, kTexels, kTexels, kTexels, kStorage, kTexels, kTexels,
+                                   kTexels, kStorage, kStorage},
                       .pushConstantBytes = sizeof(shared::ConstraintPush),
                       .workgroupSize = kWorkgroup,
                       .specialisation = {}}),
@@ -161,7 +161,8 @@ Bindings ConstraintStage::applyTo(const vulkan::Device& device, const StateBuffe
                                   std::size_t to) const {
   return Bindings(device, apply_,
                   {&state.cloths, &systems_.texels, &incidences_.texels, &lists_.texels, &rows_,
-                   &multipliers_, &state.spheres, state.positions[to], state.velocities[to]});
+                   &multipliers_, &state.colliders, &state.nearColliders, state.positions[1 - to],
+                   state.positions[to], state.velocities[to]});
 }
 
 void ConstraintStage::recordTables(vulkan::Recorder& recorder) const {

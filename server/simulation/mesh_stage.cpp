@@ -47,22 +47,22 @@ MeshStage::MeshStage(const vulkan::Device& device, const MeshTables& tables, con
 
 vulkan::Bindings MeshStage::advanceFrom(const Kernel& kernel, std::size_t from) const {
   const std::size_t to = 1 - from;
-  return Bindings(
-      device_, kernel,
-      {&state_.cloths, &tiles_.buffer, state_.positions[from], state_.velocities[from], state_.positions[to],
-       state_.velocities[to], &state_.spheres, &nodes_.buffer, &corners_.buffer, &springEnds_.buffer});
+  return Bindings(device_, kernel,
+                  {&state_.cloths, &tiles_.buffer, state_.positions[from], state_.velocities[from],
+                   state_.positions[to], state_.velocities[to], &state_.colliders, &state_.nearColliders,
+                   &nodes_.buffer, &corners_.buffer, &springEnds_.buffer});
 }
 
 MeshStage::Advance::Advance(const MeshStage& stage, const AdvanceVariant& variant)
-    : kernel(stage.device_,
-             {.name = "advance_mesh",
-              .spirv = kernels::advance_mesh,
-              .bindings = {BindingKind::texels, BindingKind::texels, BindingKind::texels, BindingKind::texels,
-                           BindingKind::storage, BindingKind::storage, BindingKind::texels,
-                           BindingKind::storage, BindingKind::storage, BindingKind::storage},
-              .pushConstantBytes = sizeof(shared::AdvancePush),
-              .workgroupSize = stage.workgroupSize_,
-              .specialisation = variant.specialisation(1, stage.integrator_)}),
+    : kernel(stage.device_, {.name = "advance_mesh",
+                             .spirv = kernels::advance_mesh,
+                             .bindings = {BindingKind::texels, BindingKind::texels, BindingKind::texels,
+                                          BindingKind::texels, BindingKind::storage, BindingKind::storage,
+                                          BindingKind::texels, BindingKind::texels, BindingKind::storage,
+                                          BindingKind::storage, BindingKind::storage},
+                             .pushConstantBytes = sizeof(shared::AdvancePush),
+                             .workgroupSize = stage.workgroupSize_,
+                             .specialisation = variant.specialisation(1, stage.integrator_)}),
       from{stage.advanceFrom(kernel, 0), stage.advanceFrom(kernel, 1)} {}
 
 const MeshStage::Advance& MeshStage::advance(const AdvanceVariant& variant) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A scene as the kernels read it: a record a cloth, a record a workgroup, a record a sphere.
+// A scene as the kernels read it: a record a cloth, a record a workgroup.
 #include "server/simulation/scene_tables.h"
 
 #include <algorithm>
@@ -81,12 +81,6 @@ Tiles makeTiles(std::span<const scene::Cloth> cloths, std::uint32_t rowsPerInvoc
   append(scene::SolverKind::constraint);
   append(scene::SolverKind::acad);
   return tiles;
-}
-
-shared::SphereRecord sphereRecord(const MovingSphere& sphere) {
-  const scene::Vec3 motion = sphere.end - sphere.start;
-  return {{sphere.start.x(), sphere.start.y(), sphere.start.z(), sphere.radius},
-          {motion.x(), motion.y(), motion.z(), sphere.friction}};
 }
 
 std::vector<float> inverseMasses(std::span<const scene::Cloth> cloths) {

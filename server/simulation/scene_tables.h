@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A scene as the kernels read it: a record a cloth, a record a workgroup, a record a sphere.
+// A scene as the kernels read it: a record a cloth, a record a workgroup.
 #pragma once
 
 #include <cstdint>
@@ -11,14 +11,6 @@
 #include "shaders/shared/simulation.h"
 
 namespace clothstream::simulation {
-
-// A sphere as a tick sees it: it moves in a straight line from start to end over the tick's substeps.
-struct MovingSphere {
-  scene::Vec3 start = scene::Vec3::Zero();
-  scene::Vec3 end = scene::Vec3::Zero();
-  float radius = 0;    // m
-  float friction = 1;  // Coulomb; multiplied with the cloth's
-};
 
 // First node of each cloth, and at the end the number of nodes: clothCount + 1 numbers.
 std::vector<std::uint32_t> clothOffsets(std::span<const scene::Cloth> cloths);
@@ -45,8 +37,6 @@ struct Tiles {
 // invocation.
 Tiles makeTiles(std::span<const scene::Cloth> cloths, std::uint32_t rowsPerInvocation,
                 std::uint32_t workgroupSize);
-
-shared::SphereRecord sphereRecord(const MovingSphere& sphere);
 
 // 1/kg a node; 0 for pinned nodes.
 std::vector<float> inverseMasses(std::span<const scene::Cloth> cloths);

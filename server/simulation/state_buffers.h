@@ -11,7 +11,8 @@ namespace clothstream::simulation {
 // They outlive the stages. State lies in two by turns.
 struct StateBuffers {
   const vulkan::Buffer& cloths;
-  const vulkan::Buffer& spheres;
+  const vulkan::Buffer& colliders;      // CollisionStage::colliders()
+  const vulkan::Buffer& nearColliders;  // CollisionStage::nearLists()
   std::array<const vulkan::Buffer*, 2> positions, velocities;
 };
 

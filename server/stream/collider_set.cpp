@@ -3,6 +3,7 @@
 #include "server/stream/collider_set.h"
 
 #include <algorithm>
+#include <cmath>
 #include <tuple>
 
 #include "server/messages/description.h"
@@ -12,16 +13,17 @@ namespace {
 
 // Where a collider that somebody moved starts: where it was, or there already if that is too far for one
 // tick.
-scene::Vec3 startOf(const scene::Vec3& before, const scene::Vec3& now, double tickSeconds) {
+scene::Pose startOf(const scene::Pose& before, const scene::Pose& now, double tickSeconds) {
   const float reach = kMaxColliderSpeed * static_cast<float>(tickSeconds);
-  return (now - before).squaredNorm() > reach * reach ? now : before;
+  const bool jumped = (now.position - before.position).squaredNorm() > reach * reach ||
+                      std::abs(now.orientation.dot(before.orientation)) < kMaxColliderTurn;
+  return jumped ? now : before;
 }
 
 }  // namespace
 
 ColliderSet::ColliderSet(const scene::Scene& scene) {
-  for (const scene::SphereCollider& collider : scene.colliders)
-    scenePositions_.push_back(scene::positionAt(collider, 0));
+  for (const scene::Collider& collider : scene.colliders) scenePoses_.push_back(scene::poseAt(collider, 0));
 }
 
 void ColliderSet::place(std::uint64_t participant, std::span<const scene::ParticipantCollider> colliders) {
@@ -35,27 +37,25 @@ void ColliderSet::place(std::uint64_t participant, std::span<const scene::Partic
     if (place != colliders_.end() && key(*place) == std::tuple(participant, collider.id))
       place->now = collider;
     else
-      colliders_.insert(place, {participant, collider, collider.pose.position});
+      colliders_.insert(place, {participant, collider, collider.pose});
   }
 }
 
 void ColliderSet::advance(const scene::Scene& scene, double endSeconds,
-                          std::vector<simulation::MovingSphere>& spheres) {
-  spheres.clear();
+                          std::vector<simulation::MovingCollider>& colliders) {
+  colliders.clear();
   for (std::size_t i = 0; i < scene.colliders.size(); ++i) {
-    const scene::SphereCollider& collider = scene.colliders[i];
-    const scene::Vec3 end = scene::positionAt(collider, endSeconds);
-    const scene::Vec3 start =
-        collider.motion.empty() ? startOf(scenePositions_[i], end, scene.tickSeconds()) : scenePositions_[i];
-    spheres.push_back({.start = start, .end = end, .radius = collider.radius, .friction = collider.friction});
-    scenePositions_[i] = end;
+    const scene::Collider& collider = scene.colliders[i];
+    const scene::Pose end = scene::poseAt(collider, endSeconds);
+    const bool byItself = !collider.motion.keys.empty();
+    colliders.push_back({collider.shape,
+                         byItself ? scenePoses_[i] : startOf(scenePoses_[i], end, scene.tickSeconds()), end,
+                         collider.friction});
+    scenePoses_[i] = end;
   }
   for (Held& collider : colliders_) {
-    const scene::Vec3 end = collider.now.pose.position;
-    spheres.push_back({.start = startOf(collider.before, end, scene.tickSeconds()),
-                       .end = end,
-                       .radius = collider.now.radius,
-                       .friction = 1});
+    const scene::Pose& end = collider.now.pose;
+    colliders.push_back({collider.now.shape, startOf(collider.before, end, scene.tickSeconds()), end, 1});
     collider.before = end;
   }
 }
@@ -64,7 +64,7 @@ void ColliderSet::write(const scene::Scene& scene,
                         google::protobuf::RepeatedPtrField<v1::ColliderState>& states) const {
   states.Clear();
   for (std::size_t i = 0; i < scene.colliders.size(); ++i)
-    messages::write(scene.colliders[i], scenePositions_[i], *states.Add());
+    messages::write(scene.colliders[i], scenePoses_[i], *states.Add());
   for (const Held& collider : colliders_) messages::write(collider.now, collider.participant, *states.Add());
 }
 

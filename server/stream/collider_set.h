@@ -11,13 +11,14 @@
 #include "clothstream/v1/session.pb.h"
 #include "server/scene/input.h"
 #include "server/scene/scene.h"
-#include "server/simulation/scene_tables.h"
+#include "server/simulation/collision/moving_collider.h"
 
 namespace clothstream::stream {
 
-// A collider that somebody moved faster than this is not swept there: it appears at its new place, at rest.
-// m/s
+// A collider that somebody moved faster than this (m/s), or turned by more than kMaxColliderTurn in a tick
+// (the cosine of half the angle: 120 degrees), is not swept there: it appears at its new place, at rest.
 inline constexpr float kMaxColliderSpeed = 30;
+inline constexpr float kMaxColliderTurn = 0.5f;
 
 // Belongs to the device's thread. The order is the same whatever the order of arrival: the scene's colliders
 // as defined, then participants by number, each one's by id.
@@ -30,9 +31,10 @@ class ColliderSet {
   // one that is missing vanishes.
   void place(std::uint64_t participant, std::span<const scene::ParticipantCollider> colliders);
 
-  // The next tick, which ends at this simulated time: all spheres, each from where it was to where it is
+  // The next tick, which ends at this simulated time: all colliders, each from where it was to where it is
   // then.
-  void advance(const scene::Scene& scene, double endSeconds, std::vector<simulation::MovingSphere>& spheres);
+  void advance(const scene::Scene& scene, double endSeconds,
+               std::vector<simulation::MovingCollider>& colliders);
 
   // Where they are now. `scene` as of the last advance().
   void write(const scene::Scene& scene, google::protobuf::RepeatedPtrField<v1::ColliderState>& states) const;
@@ -41,10 +43,10 @@ class ColliderSet {
   struct Held {
     std::uint64_t participant;
     scene::ParticipantCollider now;
-    scene::Vec3 before;
+    scene::Pose before;
   };
 
-  std::vector<scene::Vec3> scenePositions_;
+  std::vector<scene::Pose> scenePoses_;
   std::vector<Held> colliders_;
 };
 

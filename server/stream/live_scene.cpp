@@ -70,10 +70,8 @@ v1::ParameterChange LiveScene::resetParameters() {
 std::shared_ptr<const Description> LiveScene::description() {
   const std::lock_guard lock(mutex_);
   if (description_) return description_;
-  v1::StreamDescription message = messages::toDescription(definition_, kEpoch, codec());
-  const double time = static_cast<double>(tick.load()) * definition_.tickSeconds();
-  for (const scene::SphereCollider& collider : definition_.colliders)
-    messages::write(collider, scene::positionAt(collider, time), *message.add_colliders());
+  const double seconds = static_cast<double>(tick.load()) * definition_.tickSeconds();
+  const v1::StreamDescription message = messages::toDescription(definition_, kEpoch, codec(), seconds);
 
   auto description = std::make_shared<Description>();
   description->contentId = ++contents_;

@@ -38,8 +38,7 @@ void SceneHost::OnDevice::warmUp(const scene::Scene& scene) {
     const encode::RecordedFrame frame = encoder.record(recorder, tick, false);
     device.wait(device.submit(recorder));
     encoder.entropyCode(frame, packet);
-    inputs.spheres.push_back(
-        {.start = scene::Vec3::Zero(), .end = scene::Vec3::Zero(), .radius = 1, .friction = 1});
+    inputs.colliders.emplace_back();
   }
   encoder.forgetHistory();
   recorder.begin();
@@ -64,7 +63,7 @@ void SceneHost::begin(Clock::time_point now) {
   tickStart_ = now;
   applyInputs();
   const double endSeconds = static_cast<double>(tick_ + 1) * scene_.tickSeconds();
-  colliders_.advance(scene_, endSeconds, tickInputs_.spheres);
+  colliders_.advance(scene_, endSeconds, tickInputs_.colliders);
   tickInputs_.environment = scene_.environment;
 
   OnDevice& on = *onDevice_;

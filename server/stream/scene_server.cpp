@@ -110,7 +110,7 @@ tl::expected<v1::GetSceneResponse, v1::Error> SceneServer::State::getScene(
 SceneServer::SceneServer(std::vector<scene::Scene> scenes, ServerOptions options) {
   assert(options.maxParticipants * messages::limits::kMaxParticipantColliders +
              messages::limits::kMaxColliders <=
-         simulation::kMaxSpheres);
+         simulation::kMaxColliders);
   bool found = false;
   std::string known;
   for (const scene::Scene& scene : scenes) {

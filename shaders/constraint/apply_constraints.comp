@@ -3,8 +3,11 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
 
+const int kColliderBinding = 6;
+
+#include "shaders/collision/collide.glsl"
 #include "shaders/constraint/incidence.glsl"
-#include "shaders/mass_spring/spheres.glsl"
+#include "shaders/mass_spring/node.glsl"
 #include "shaders/shared/arithmetic.glsl"
 
 layout(local_size_x_id = 0) in;
@@ -12,10 +15,11 @@ layout(local_size_x_id = 0) in;
 layout(std430, binding = 5) readonly buffer Multipliers {
   float multipliers[];
 };
-layout(std430, binding = 7) buffer Positions {
+layout(binding = 8) uniform samplerBuffer startPositions;  // of the substep
+layout(std430, binding = 9) buffer Positions {
   vec4 positions[];
 };
-layout(std430, binding = 8) buffer Velocities {
+layout(std430, binding = 10) buffer Velocities {
   vec4 velocities[];
 };
 
@@ -50,8 +54,9 @@ void main() {
   }
   float friction = texelFetch(cloths, record + 2).w;
   float thickness = texelFetch(cloths, record + 3).w;
-  for (uint i = 0; i < push.sphereCount; ++i) {
-    node = collideWithSphere(node, fetchSphere(i, push.sphereProgress, push.tickRate, thickness, friction));
+  if (node.inverseMass > 0.0 && push.collision.colliderCount > 0) {
+    collideWithAll(index, push.collision, thickness, friction, texelFetch(startPositions, int(index)).xyz,
+                   node.position, node.velocity);
   }
   positions[index] = vec4(snapTiny(node.position), start.w);
   velocities[index] = vec4(snapTiny(node.velocity), 0.0);

@@ -82,6 +82,8 @@ void main() {
   }
 
   Node moved[kRowsPerInvocation];
+  vec3 origins[kRowsPerInvocation];
+  bool idle = true;
   // Rows past the cloth's last repeat it, and are not stored.
   [[unroll]] for (uint k = 0; k < kRowsPerInvocation; ++k) {
     bool hasBelow = row < lastRow;
@@ -120,7 +122,11 @@ void main() {
     }
 
     moved[k] = moveNode(here, force, spacing.w);
-    if (!kSpheres && row <= lastRow) {
+    if (kColliders) {
+      origins[k] = here.position;
+      NearList list = fetchNearList(index);
+      idle = idle && list.count == 0 && covers(list, here.position, moved[k].position);
+    } else if (row <= lastRow) {
       store(index, moved[k]);
     }
 
@@ -139,19 +145,30 @@ void main() {
     ++row;
   }
 
-  if (kSpheres) {
-    uint i = 0;
+  if (kColliders) {
+    // Row by row, the first one of the window; a software device runs all that is written here once, even
+    // where nothing is near, and that is not to be four times.
+    uint k = 0;
     do {
-      Sphere sphere = fetchSphere(i, push.sphereProgress, push.tickRate, thickness, friction);
-      [[unroll]] for (uint k = 0; k < kRowsPerInvocation; ++k) {
-        moved[k] = collideWithSphere(moved[k], sphere);
+      Node node = moved[0];
+      vec3 from = origins[0];
+      if (!idle) {
+        if (node.inverseMass > 0.0) {
+          collideWithAll(start + min(strip.row + k, lastRow) * columns, push.collision, thickness, friction,
+                         from, node.position, node.velocity);
+        }
+        [[unroll]] for (uint i = 0; i + 1 < kRowsPerInvocation; ++i) {
+          moved[i] = moved[i + 1];
+          origins[i] = origins[i + 1];
+        }
+        moved[kRowsPerInvocation - 1] = node;
       }
-      ++i;
-    } while (i < push.sphereCount);
-    [[unroll]] for (uint k = 0; k < kRowsPerInvocation; ++k) {
-      row = strip.row + k;
+      ++k;
+    } while (!idle && k < kRowsPerInvocation);
+    [[unroll]] for (uint i = 0; i < kRowsPerInvocation; ++i) {
+      row = strip.row + i;
       if (row <= lastRow) {
-        store(start + row * columns, moved[k]);
+        store(start + row * columns, moved[i]);
       }
     }
   }

@@ -4,7 +4,7 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
 
-#define CLOTHSTREAM_MESH_BINDING 7
+#define CLOTHSTREAM_MESH_BINDING 8
 
 #include "shaders/mass_spring/state.glsl"
 #include "shaders/shared/mesh_node.glsl"
@@ -57,11 +57,9 @@ void main() {
     force = force + airForces(here, self.lists, texelFetch(cloths, self.cloth + 4));
   }
   Node moved = moveNode(here, force, texelFetch(cloths, self.cloth + 1).w);
-  if (kSpheres) {
-    for (uint i = 0; i < push.sphereCount; ++i) {
-      moved = collideWithSphere(moved,
-                                fetchSphere(i, push.sphereProgress, push.tickRate, damping.w, stiffness.w));
-    }
+  if (kColliders && moved.inverseMass > 0.0) {
+    collideWithAll(self.index, push.collision, damping.w, stiffness.w, here.position, moved.position,
+                   moved.velocity);
   }
   store(self.index, moved);
 }

@@ -3,11 +3,15 @@
 #ifndef CLOTHSTREAM_SHADERS_MASS_SPRING_STATE_GLSL
 #define CLOTHSTREAM_SHADERS_MASS_SPRING_STATE_GLSL
 
+const int kColliderBinding = 6;
+
+#include "shaders/collision/collide.glsl"
 #include "shaders/mass_spring/air.glsl"
-#include "shaders/mass_spring/spheres.glsl"
 #include "shaders/mass_spring/springs.glsl"
 #include "shaders/shared/simulation.h"
 
+// Whether there is a collider at all.
+layout(constant_id = 4) const bool kColliders = true;
 // As in [Va21]; else semi-implicit Euler.
 layout(constant_id = 5) const bool kExplicitEuler = false;
 

@@ -3,6 +3,7 @@
 #ifndef CLOTHSTREAM_SHADERS_SHARED_SIMULATION_H
 #define CLOTHSTREAM_SHADERS_SHARED_SIMULATION_H
 
+#include "shaders/collision/collision.h"
 #include "shaders/shared/types.h"
 
 CLOTHSTREAM_SHARED_BEGIN
@@ -58,29 +59,21 @@ struct SolveRecord {
   uint32_t constraints;  // active ones
 };
 
-// A sphere over one tick, two texels: where it starts, and how far it moves until the tick's end.
-struct SphereRecord {
-  vec4 startRadius;
-  vec4 motionFriction;
-};
-
 // What differs from substep to substep and from tick to tick.
 struct AdvancePush {
   vec4 gravityStep;  // w: seconds of a substep
   vec4 windAir;      // w: air density / 6, half of it for each of a triangle's three nodes
-  uint32_t sphereCount;
-  float sphereProgress;  // of the tick's motion, at the end of this substep
-  float tickRate;        // 1/s
+  CollisionPush collision;
   uint32_t firstTile;
+  uint32_t reserved0, reserved1, reserved2;
 };
 
 struct ConstraintPush {
+  CollisionPush collision;
   uint32_t count;  // links, or nodes
-  uint32_t sphereCount;
-  float sphereProgress;  // as above
-  float tickRate;        // 1/s
   float substepSeconds;
   float substepRate;  // 1/s
+  uint32_t reserved;
 };
 
 struct SolvePush {
@@ -110,11 +103,10 @@ static_assert(sizeof(ClothRecord) == CLOTHSTREAM_CLOTH_TEXELS * sizeof(vec4) &&
               offsetof(ClothRecord, damping) == 48 && offsetof(ClothRecord, air) == 64 &&
               offsetof(ClothRecord, solver) == 80 && offsetof(ClothRecord, limits) == 96);
 static_assert(sizeof(SystemRecord) == CLOTHSTREAM_SYSTEM_TEXELS * sizeof(vec4));
-static_assert(sizeof(SolveRecord) == 20 && sizeof(ConstraintPush) == 24);
+static_assert(sizeof(SolveRecord) == 20 && sizeof(ConstraintPush) == 48);
 static_assert(sizeof(TileRecord) == 16);
-static_assert(sizeof(SphereRecord) == 32 && offsetof(SphereRecord, motionFriction) == 16);
-static_assert(sizeof(AdvancePush) == 48 && offsetof(AdvancePush, windAir) == 16 &&
-              offsetof(AdvancePush, sphereCount) == 32);
+static_assert(sizeof(AdvancePush) == 80 && offsetof(AdvancePush, windAir) == 16 &&
+              offsetof(AdvancePush, collision) == 32 && offsetof(AdvancePush, firstTile) == 64);
 static_assert(sizeof(HashPush) == 4);
 static_assert(sizeof(StatusRecord) == 16 && offsetof(StatusRecord, unhealthy) == 8);
 }  // namespace clothstream::shared

@@ -31,7 +31,7 @@ simulation::TickInputs hungClothInputs(const scene::Scene& scene, std::uint64_t 
     const double seconds = static_cast<double>(at) * scene.tickSeconds();
     return scene::Vec3(0, -1.2f, static_cast<float>(0.6 * std::cos(2 * seconds)));
   };
-  return {scene.environment, {{centre(tick), centre(tick + 1), 0.25f, 1}}};
+  return {scene.environment, {{scene::Sphere{0.25f}, {centre(tick)}, {centre(tick + 1)}, 1}}};
 }
 
 }  // namespace clothstream::bench

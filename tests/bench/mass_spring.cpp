@@ -59,7 +59,7 @@ simulation::TickInputs inputsOf(const scene::Scene& scene, const Variant& varian
   // Out of the cloth's way: what is measured is the search, and the check stays the same.
   for (std::uint32_t i = 0; i < variant.spheres; ++i) {
     const scene::Vec3 place(static_cast<float>(i), 5, 0);
-    inputs.spheres.push_back({place, place, 0.1f, 1});
+    inputs.colliders.push_back({scene::Sphere{0.1f}, {place}, {place}, 1});
   }
   return inputs;
 }

@@ -52,9 +52,9 @@ double Simulated::check(const simulation::TickInputs& inputs, double tolerance) 
 
   reference::ReferenceSimulation reference(scene_);
   reference::TickInputs referenceInputs{inputs.environment, {}};
-  for (const simulation::MovingSphere& s : inputs.spheres)
-    referenceInputs.spheres.push_back(
-        {s.start.cast<double>(), s.end.cast<double>(), double{s.radius}, double{s.friction}});
+  for (const simulation::MovingCollider& collider : inputs.colliders)
+    referenceInputs.colliders.push_back({collider.shape, reference::toPose(collider.start),
+                                         reference::toPose(collider.end), double{collider.friction}});
   std::size_t node = 0;
   for (reference::ReferenceCloth& cloth : reference.cloths())
     for (std::uint32_t i = 0; i < cloth.nodeCount(); ++i, ++node) {

@@ -35,12 +35,12 @@ scene::Scene clothsOf(scene::Normals normals) {
   return scene;
 }
 
-std::vector<simulation::MovingSphere> sphereAt(std::uint64_t tick) {
+std::vector<simulation::MovingCollider> sphereAt(std::uint64_t tick) {
   const auto z = [](std::uint64_t t) { return -0.5f + 0.01f * static_cast<float>(t); };
-  simulation::MovingSphere sphere;
-  sphere.start = {0, -0.15f, z(tick)};
-  sphere.end = {0, -0.15f, z(tick + 1)};
-  sphere.radius = 0.08f;
+  simulation::MovingCollider sphere;
+  sphere.shape = scene::Sphere{0.08f};
+  sphere.start.position = {0, -0.15f, z(tick)};
+  sphere.end.position = {0, -0.15f, z(tick + 1)};
   return {sphere};
 }
 

@@ -2,6 +2,8 @@
 // Scene messages that tests start from.
 #pragma once
 
+#include <array>
+
 #include "clothstream/v1/scene.pb.h"
 
 namespace clothstream::messages {
@@ -21,6 +23,19 @@ inline v1::Scene smallScene() {
   v1::Collider& collider = *scene.add_colliders();
   collider.set_name("ball");
   collider.mutable_sphere()->set_radius(0.25f);
+  return scene;
+}
+
+// The same with a tetrahedron for the ball.
+inline v1::Scene sceneWithHull() {
+  v1::Scene scene = smallScene();
+  v1::ConvexHull& hull = *scene.mutable_colliders(0)->mutable_hull();
+  hull.add_vertices();
+  hull.add_vertices()->set_x(1);
+  hull.add_vertices()->set_y(1);
+  hull.add_vertices()->set_z(1);
+  for (const auto& face : {std::array{0u, 2u, 1u}, {0u, 1u, 3u}, {0u, 3u, 2u}, {1u, 2u, 3u}})
+    hull.add_faces()->mutable_vertices()->Assign(face.begin(), face.end());
   return scene;
 }
 

@@ -134,13 +134,34 @@ v1::ColliderPoses poses(std::uint32_t count) {
 }
 
 TEST(ToColliders, GivesThemAll) {
-  const auto colliders = toColliders(poses(16));
+  const auto colliders = toColliders(poses(40));
   ASSERT_TRUE(colliders) << colliders.error().text;
-  ASSERT_EQ(colliders->size(), 16u);
+  ASSERT_EQ(colliders->size(), 40u);
   EXPECT_EQ((*colliders)[5].id, 5u);
   EXPECT_EQ((*colliders)[5].pose.position, scene::Vec3(5, 0, 0));
-  EXPECT_EQ((*colliders)[5].radius, 0.1f);
+  EXPECT_EQ(std::get<scene::Sphere>((*colliders)[5].shape).radius, 0.1f);
   EXPECT_TRUE(toColliders(poses(0))->empty());
+}
+
+TEST(ToColliders, TakesCapsulesAndBoxes) {
+  v1::ColliderPoses message = poses(2);
+  message.mutable_colliders(0)->mutable_capsule()->set_radius(0.01f);
+  message.mutable_colliders(0)->mutable_capsule()->set_length(0.03f);
+  message.mutable_colliders(0)->mutable_pose()->mutable_orientation()->set_z(1);
+  message.mutable_colliders(1)->mutable_box()->mutable_size()->set_x(1);
+  message.mutable_colliders(1)->mutable_box()->mutable_size()->set_y(2);
+  EXPECT_THAT(toColliders(message).error().text, StartsWith("colliderPoses.colliders[1].box.size.z = 0:"));
+  message.mutable_colliders(1)->mutable_box()->mutable_size()->set_z(3);
+  const auto colliders = toColliders(message);
+  ASSERT_TRUE(colliders) << colliders.error().text;
+  EXPECT_EQ(std::get<scene::Capsule>((*colliders)[0].shape).radius, 0.01f);
+  EXPECT_EQ(std::get<scene::Capsule>((*colliders)[0].shape).length, 0.03f);
+  EXPECT_EQ((*colliders)[0].pose.orientation.z(), 1);
+  EXPECT_EQ(std::get<scene::Box>((*colliders)[1].shape).size, scene::Vec3(1, 2, 3));
+  message.mutable_colliders(0)->mutable_capsule()->set_length(11);
+  EXPECT_THAT(
+      toColliders(message).error().text,
+      StartsWith("colliderPoses.colliders[0].capsule.length = 11: must be a finite number from 0 to 10"));
 }
 
 TEST(ToColliders, RefusesWhatIsWrongWithItsPath) {
@@ -151,8 +172,8 @@ TEST(ToColliders, RefusesWhatIsWrongWithItsPath) {
     return colliders ? "no error" : colliders.error().text;
   };
   using M = v1::ColliderPoses;
-  EXPECT_THAT(error([](M& m) { m = poses(17); }),
-              StartsWith("colliderPoses.colliders: has 17 elements; must have 0 to 16"));
+  EXPECT_THAT(error([](M& m) { m = poses(41); }),
+              StartsWith("colliderPoses.colliders: has 41 elements; must have 0 to 40"));
   EXPECT_THAT(error([](M& m) { m.mutable_colliders(1)->mutable_pose()->mutable_position()->set_y(kNan); }),
               StartsWith("colliderPoses.colliders[1].pose.position.y = nan:"));
   EXPECT_THAT(error([](M& m) { m.mutable_colliders(2)->mutable_pose()->mutable_position()->set_z(1000.5f); }),
@@ -182,6 +203,14 @@ class ToParameterChange : public testing::Test {
   v1::ParameterChange message_;
 };
 
+TEST_F(ToParameterChange, RefusesARadiusForWhatHasNone) {
+  scene_ = *toScene(sceneWithHull());
+  message_.add_colliders()->set_name("ball");
+  message_.mutable_colliders(0)->set_radius(0.5f);
+  EXPECT_THAT(error(),
+              StartsWith("parameterChange.colliders[0].radius = 0.5: must be absent: \"ball\" is neither"));
+}
+
 TEST_F(ToParameterChange, CarriesEveryField) {
   message_.mutable_gravity()->mutable_value()->set_y(-1.5f);
   message_.mutable_wind()->mutable_value()->set_z(4);
@@ -198,6 +227,7 @@ TEST_F(ToParameterChange, CarriesEveryField) {
   v1::ColliderChange& collider = *message_.add_colliders();
   collider.set_name("ball");
   collider.mutable_position()->set_x(3);
+  collider.mutable_orientation()->set_y(1);
   collider.set_radius(0.5f);
   const auto change = toParameterChange(message_, scene_);
   ASSERT_TRUE(change) << change.error().text;
@@ -213,7 +243,8 @@ TEST_F(ToParameterChange, CarriesEveryField) {
   EXPECT_EQ(scene_.cloths[0].lift, 0.7f);
   EXPECT_EQ(scene_.cloths[0].friction, 0.8f);
   EXPECT_EQ(scene_.colliders[0].pose.position, scene::Vec3(3, 0, 0));
-  EXPECT_EQ(scene_.colliders[0].radius, 0.5f);
+  EXPECT_EQ(scene_.colliders[0].pose.orientation.y(), 1);
+  EXPECT_EQ(std::get<scene::Sphere>(scene_.colliders[0].shape).radius, 0.5f);
 }
 
 TEST_F(ToParameterChange, LeavesOutWhatIsAbsent) {

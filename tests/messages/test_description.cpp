@@ -14,7 +14,7 @@ namespace {
 
 TEST(ToDescription, TellsAllThatADecoderNeeds) {
   const scene::Scene scene = *toScene(smallScene());
-  const v1::StreamDescription description = toDescription(scene, 3, 1);
+  const v1::StreamDescription description = toDescription(scene, 3, 1, 0);
   EXPECT_EQ(description.epoch(), 3u);
   EXPECT_EQ(description.codec(), 1u);
   EXPECT_EQ(description.scene(), "small");
@@ -47,19 +47,49 @@ TEST(ToSummary, CountsVerticesAndCloths) {
 
 TEST(ColliderStates, OverwriteWhatWasThere) {
   v1::ColliderState state;
-  write(scene::ParticipantCollider{.id = 4, .pose = {scene::Vec3(1, 2, 3)}, .radius = 0.5f}, 77, state);
+  write(scene::ParticipantCollider{.id = 4, .pose = {scene::Vec3(1, 2, 3)}, .shape = scene::Sphere{0.5f}}, 77,
+        state);
   EXPECT_EQ(state.name(), "4");
   EXPECT_EQ(state.participant_id(), 77u);
   EXPECT_EQ(state.position().z(), 3);
   EXPECT_EQ(state.orientation().w(), 1);
   EXPECT_EQ(state.sphere().radius(), 0.5f);
   const scene::Scene scene = *toScene(smallScene());
-  write(scene.colliders[0], scene::Vec3(9, 0, 0), state);
+  write(scene.colliders[0], scene::Pose{scene::Vec3(9, 0, 0)}, state);
   EXPECT_EQ(state.name(), "ball");
   EXPECT_EQ(state.participant_id(), 0u);
   EXPECT_EQ(state.position().x(), 9);
   EXPECT_EQ(state.position().z(), 0);
   EXPECT_EQ(state.sphere().radius(), 0.25f);
+}
+
+TEST(ColliderStates, SayTheShapeButForAHulls) {
+  v1::ColliderState state;
+  const scene::Pose pose{scene::Vec3(1, 2, 3), scene::Quaternion(0, 0, 1, 0)};
+  write(scene::Collider{.name = "a", .shape = scene::Capsule{.radius = 0.1f, .length = 0.4f}}, pose, state);
+  EXPECT_EQ(state.capsule().length(), 0.4f);
+  EXPECT_EQ(state.orientation().y(), 1);
+  write(scene::Collider{.name = "b", .shape = scene::Plane{}}, pose, state);
+  EXPECT_TRUE(state.has_plane());
+  write(scene::Collider{.name = "c", .shape = scene::Box{scene::Vec3(1, 2, 3)}}, pose, state);
+  EXPECT_EQ(state.box().size().z(), 3);
+  const scene::Scene scene = *toScene(sceneWithHull());
+  write(scene.colliders[0], pose, state);
+  EXPECT_EQ(state.shape_case(), v1::ColliderState::SHAPE_NOT_SET);
+}
+
+TEST(ToDescription, HasTheCollidersHullsTooAsTheyAreAtThatTime) {
+  v1::Scene message = sceneWithHull();
+  v1::Motion& motion = *message.mutable_colliders(0)->mutable_motion();
+  motion.set_steady(true);
+  motion.add_keys();
+  motion.add_keys()->set_time(2);
+  motion.mutable_keys(1)->mutable_position()->set_x(4);
+  const v1::StreamDescription description = toDescription(*toScene(message), 1, 1, 0.5);
+  ASSERT_EQ(description.colliders_size(), 1);
+  EXPECT_EQ(description.colliders(0).position().x(), 1);
+  EXPECT_EQ(description.colliders(0).hull().vertices_size(), 4);
+  EXPECT_EQ(description.colliders(0).hull().faces(2).vertices_size(), 3);
 }
 
 TEST(ToChunks, CutContentThatCanBePutTogetherAgain) {

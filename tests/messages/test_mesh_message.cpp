@@ -110,7 +110,7 @@ TEST(MeshMessage, GridsAreAlsoPinnedByVertexAndRegion) {
 TEST(MeshMessage, IsDescribedToClientsOnce) {
   const Result<scene::Scene> scene = toScene(meshScene());
   ASSERT_TRUE(scene) << scene.error().text;
-  const v1::StreamDescription description = toDescription(*scene, 1, 1);
+  const v1::StreamDescription description = toDescription(*scene, 1, 1, 0);
   const v1::ClothDescription& cloth = description.cloths(0);
   EXPECT_EQ(cloth.vertex_count(), 5u);
   EXPECT_EQ(cloth.rows(), 0u);

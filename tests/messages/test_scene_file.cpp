@@ -61,11 +61,29 @@ constexpr const char* kEveryField = R"json({
                         "constraint": {"bendConstraints": true, "compliance": 0, "iterations": 30, "tolerance": 0}}}
   }],
   "colliders": [{
+    "name": "finger", "capsule": {"radius": 0.25, "length": 0.5}, "pose": {"position": {"x": 1, "y": 0, "z": 0},
+    "orientation": {"x": 0, "y": 0, "z": 0, "w": 1}}, "friction": 1
+  }, {
+    "name": "floor", "plane": {}, "pose": {"position": {"x": 1, "y": 0, "z": 0},
+    "orientation": {"x": 0, "y": 0, "z": 0, "w": 1}}, "friction": 1
+  }, {
+    "name": "table", "box": {"size": {"x": 1, "y": 2, "z": 3}}, "pose": {"position": {"x": 1, "y": 0, "z": 0},
+    "orientation": {"x": 0, "y": 0, "z": 0, "w": 1}}, "friction": 1
+  }, {
+    "name": "stone", "hull": {
+      "vertices": [{"x": 0, "y": 0, "z": 0}, {"x": 1, "y": 0, "z": 0}, {"x": 0, "y": 1, "z": 0},
+                   {"x": 0.25, "y": 0.25, "z": 1}],
+      "faces": [{"vertices": [0, 2, 1]}, {"vertices": [0, 1, 3]}, {"vertices": [0, 3, 2]}, {"vertices": [1, 2, 3]}]
+    }, "pose": {"position": {"x": 1, "y": 0, "z": 0},
+    "orientation": {"x": 0, "y": 0, "z": 0, "w": 1}}, "friction": 1
+  }, {
     "name": "ball", "sphere": {"radius": 0.5},
     "pose": {"position": {"x": 4, "y": 5, "z": 6}, "orientation": {"x": -0.5, "y": 0.5, "z": -0.5, "w": 0.5}},
     "friction": 0.25,
-    "motion": {"keys": [{"time": 0, "position": {"x": 1, "y": 1, "z": 1}},
-                        {"time": 2.5, "position": {"x": 2, "y": 3, "z": 4}}]}
+    "motion": {"keys": [{"time": 0, "position": {"x": 1, "y": 1, "z": 1}, "orientation": {"w": 1}},
+                        {"time": 2.5, "position": {"x": 2, "y": 3, "z": 4},
+                         "orientation": {"x": 0.5, "y": 0.5, "z": -0.5, "w": 0.5}}],
+               "steady": true}
   }],
   "stream": {"maxError": 0.001, "normals": "NORMALS_OCTAHEDRAL"}
 })json";

@@ -40,7 +40,7 @@ TEST(ToScene, AppliesTheDefaultsOfTheProto) {
   EXPECT_TRUE(cloth.pins.empty());
   EXPECT_TRUE(cloth.grid.pose.orientation.coeffs() == scene::Quaternion::Identity().coeffs());
   EXPECT_EQ(scene->colliders.at(0).friction, 1);
-  EXPECT_TRUE(scene->colliders.at(0).motion.empty());
+  EXPECT_TRUE(scene->colliders.at(0).motion.keys.empty());
 }
 
 TEST(ToScene, StreamsASlowSimulationAtItsOwnRate) {
@@ -99,6 +99,9 @@ v1::Grid& grid(v1::Scene& scene) {
 }
 v1::Collider& collider(v1::Scene& scene) {
   return *scene.mutable_colliders(0);
+}
+v1::ConvexHull& hull(v1::Scene& scene) {
+  return *collider(scene).mutable_hull();
 }
 void addKey(v1::Scene& scene, float time) {
   collider(scene).mutable_motion()->add_keys()->set_time(time);
@@ -198,6 +201,48 @@ const BadScene kBadScenes[] = {
     {"colliders[1].name = \"ball\":", [](v1::Scene& s) { *s.add_colliders() = s.colliders(0); },
      "must be unique"},
     {"colliders[0]: has no shape", [](v1::Scene& s) { collider(s).clear_sphere(); }, "must have \"sphere\""},
+    {"colliders[0].capsule.radius = 0:", [](v1::Scene& s) { collider(s).mutable_capsule(); }},
+    {"colliders[0].capsule.length = -1:",
+     [](v1::Scene& s) {
+       collider(s).mutable_capsule()->set_radius(1);
+       collider(s).mutable_capsule()->set_length(-1);
+     }},
+    {"colliders[0].box.size.x = 0:", [](v1::Scene& s) { collider(s).mutable_box(); }},
+    {"colliders[0].hull.vertices: has 0 elements", [](v1::Scene& s) { collider(s).mutable_hull(); },
+     "must have 4 to 128"},
+    {"colliders[0].hull.vertices: has 129 elements",
+     [](v1::Scene& s) {
+       s = sceneWithHull();
+       while (hull(s).vertices_size() < 129) hull(s).add_vertices();
+     }},
+    {"colliders[0].hull.faces: has 3 elements",
+     [](v1::Scene& s) {
+       s = sceneWithHull();
+       hull(s).mutable_faces()->RemoveLast();
+     }},
+    {"colliders[0].hull.vertices[2].y = nan:",
+     [](v1::Scene& s) {
+       s = sceneWithHull();
+       hull(s).mutable_vertices(2)->set_y(kNan);
+     }},
+    {"colliders[0].hull.faces[1].vertices: has 0 elements",
+     [](v1::Scene& s) {
+       s = sceneWithHull();
+       hull(s).mutable_faces(1)->clear_vertices();
+     },
+     "must have 3 to 128"},
+    {"colliders[0].hull.faces[3]: names vertex 7",
+     [](v1::Scene& s) {
+       s = sceneWithHull();
+       hull(s).mutable_faces(3)->set_vertices(1, 7);
+     },
+     "there are 4"},
+    {"colliders[0].hull.faces[0]: has vertex 3 in front of it",
+     [](v1::Scene& s) {
+       s = sceneWithHull();
+       hull(s).mutable_vertices(3)->set_z(-1);
+     },
+     "must be convex"},
     {"colliders[0].sphere.radius = 0:", [](v1::Scene& s) { collider(s).mutable_sphere()->set_radius(0); }},
     {"colliders[0].pose.position.x = -inf:",
      [](v1::Scene& s) { collider(s).mutable_pose()->mutable_position()->set_x(-kInfinity); }},

@@ -17,11 +17,20 @@ scene::Cloth patch(float friction) {
   return cloth;
 }
 
+// Collides with a sphere that stands still, or moves with this velocity, as if each node had been in its
+// place before.
+void collideWithSphere(ReferenceCloth& cloth, const Vec3& centre, const Vec3& velocity, float radius,
+                       double friction) {
+  const ColliderStep step{.before = {centre}, .after = {centre}, .velocity = velocity, .spin = Vec3::Zero()};
+  const std::vector<Vec3> from(cloth.positions().begin(), cloth.positions().end());
+  cloth.collide(scene::Sphere{radius}, step, friction, from);
+}
+
 TEST(ReferenceCollision, PutsNodesOnTheSurfacePlusThickness) {
   ReferenceCloth cloth(patch(0));
   cloth.positions()[0] = Vec3(0.3, 0, 0.4);
   cloth.positions()[1] = Vec3(5, 0, 0);
-  cloth.collide(Vec3::Zero(), Vec3::Zero(), 1, 1);
+  collideWithSphere(cloth, Vec3::Zero(), Vec3::Zero(), 1, 1);
   EXPECT_LT((cloth.positions()[0] - 1.01 * Vec3(0.6, 0, 0.8)).norm(), 1e-8);  // 0.01 is a float
   EXPECT_EQ(cloth.positions()[1], Vec3(5, 0, 0));
 }
@@ -29,7 +38,7 @@ TEST(ReferenceCollision, PutsNodesOnTheSurfacePlusThickness) {
 TEST(ReferenceCollision, PushesANodeInTheCentreUp) {
   ReferenceCloth cloth(patch(0));
   cloth.positions()[0] = Vec3(1, 2, 3);
-  cloth.collide(Vec3(1, 2, 3), Vec3::Zero(), 1, 1);
+  collideWithSphere(cloth, Vec3(1, 2, 3), Vec3::Zero(), 1, 1);
   EXPECT_LT((cloth.positions()[0] - Vec3(1, 3.01, 3)).norm(), 1e-8);
 }
 
@@ -37,7 +46,7 @@ TEST(ReferenceCollision, TakesTheApproachAndFrictionsShareOfTheSlide) {
   ReferenceCloth cloth(patch(0.5f));
   cloth.positions()[0] = Vec3(0, 0.9, 0);
   cloth.velocities()[0] = Vec3(3, -2, 4);
-  cloth.collide(Vec3::Zero(), Vec3::Zero(), 1, 0.8);
+  collideWithSphere(cloth, Vec3::Zero(), Vec3::Zero(), 1, 0.8);
   // mu = 0.4, |rn| = 2: the slide of 5 m/s loses 0.8.
   EXPECT_LT((cloth.velocities()[0] - Vec3(3, 0, 4) * (4.2 / 5)).norm(), 1e-6);
 }
@@ -46,7 +55,7 @@ TEST(ReferenceCollision, SticksWhereFrictionIsEnough) {
   ReferenceCloth cloth(patch(2));
   cloth.positions()[0] = Vec3(0, 0.9, 0);
   cloth.velocities()[0] = Vec3(3, -2, 0);
-  cloth.collide(Vec3::Zero(), Vec3(0, 0.5, 0), 1, 1);
+  collideWithSphere(cloth, Vec3::Zero(), Vec3(0, 0.5, 0), 1, 1);
   EXPECT_EQ(cloth.velocities()[0], Vec3(0, 0.5, 0));
 }
 
@@ -54,7 +63,7 @@ TEST(ReferenceCollision, LeavesTheVelocityOfNodesThatLeave) {
   ReferenceCloth cloth(patch(1));
   cloth.positions()[0] = Vec3(0, 0.9, 0);
   cloth.velocities()[0] = Vec3(3, 2, 0);
-  cloth.collide(Vec3::Zero(), Vec3::Zero(), 1, 1);
+  collideWithSphere(cloth, Vec3::Zero(), Vec3::Zero(), 1, 1);
   EXPECT_EQ(cloth.velocities()[0], Vec3(3, 2, 0));
 }
 
@@ -69,7 +78,7 @@ double slideOn(double slope, float friction, double seconds) {
   const double h = 0.001;
   for (int i = 0; i < static_cast<int>(seconds / h); ++i) {
     cloth.integrate(environment, scene::Integrator::semiImplicitEuler, h);
-    cloth.collide(Vec3(0, -1000, 0), Vec3::Zero(), 1000, 1);
+    collideWithSphere(cloth, Vec3(0, -1000, 0), Vec3::Zero(), 1000, 1);
   }
   return cloth.velocities()[0].x();
 }
@@ -91,7 +100,7 @@ TEST(ReferenceTick, MovesASphereInAStraightLineOverItsSubsteps) {
   scene.environment = kWeightless;
   scene.substeps = 4;
   ReferenceSimulation simulation(scene);
-  const TickInputs inputs{kWeightless, {{Vec3(0, 0, 0), Vec3(0, 0, 4), 0.5, 1}}};
+  const TickInputs inputs{kWeightless, {{scene::Sphere{0.5f}, {Vec3(0, 0, 0)}, {Vec3(0, 0, 4)}, 1}}};
   ReferenceCloth& cloth = simulation.cloths()[0];
   // Where substep 2 ends the sphere is at z = 3: a node just in front of its pole is pushed then, and by no
   // other.
@@ -111,15 +120,15 @@ TEST(ReferenceInputs, FollowTheScenesMotion) {
   scene::Scene scene;
   scene.simulationRate = 10;
   scene.colliders.resize(1);
-  scene.colliders[0].radius = 0.25f;
+  scene.colliders[0].shape = scene::Sphere{0.25f};
   scene.colliders[0].friction = 0.5f;
-  scene.colliders[0].motion = {{0, scene::Vec3(0, 0, 0)}, {1, scene::Vec3(8, 0, 0)}};
+  scene.colliders[0].motion.keys = {{0, scene::Vec3(0, 0, 0)}, {1, scene::Vec3(8, 0, 0)}};
   const TickInputs inputs = inputsAt(scene, 5);
-  ASSERT_EQ(inputs.spheres.size(), 1u);
-  EXPECT_EQ(inputs.spheres[0].start, Vec3(4, 0, 0));
-  EXPECT_EQ(inputs.spheres[0].end, scene::positionAt(scene.colliders[0], 0.6).cast<double>());
-  EXPECT_EQ(inputs.spheres[0].radius, 0.25);
-  EXPECT_EQ(inputs.spheres[0].friction, 0.5);
+  ASSERT_EQ(inputs.colliders.size(), 1u);
+  EXPECT_EQ(inputs.colliders[0].start.position, Vec3(4, 0, 0));
+  EXPECT_EQ(inputs.colliders[0].end.position, scene::poseAt(scene.colliders[0], 0.6).position.cast<double>());
+  EXPECT_EQ(std::get<scene::Sphere>(inputs.colliders[0].shape).radius, 0.25f);
+  EXPECT_EQ(inputs.colliders[0].friction, 0.5);
 }
 
 }  // namespace

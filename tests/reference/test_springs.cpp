@@ -176,7 +176,7 @@ TEST(ReferencePins, NeverMove) {
   scene.cloths = {model};
   scene.environment.wind = scene::Vec3(0, 0, 5);
   scene.colliders.resize(1);
-  scene.colliders[0].radius = 10;
+  scene.colliders[0].shape = scene::Sphere{10};
   ReferenceSimulation simulation(scene);
   for (int i = 0; i < 20; ++i) simulation.tick();
   const std::vector<scene::Vec3> rest = scene::restPositions(model.grid);
@@ -193,7 +193,7 @@ TEST(ReferenceSymmetry, OfASheetOnASphereIsKept) {
   model.damping = 2;
   scene.cloths = {model};
   scene.colliders.resize(1);
-  scene.colliders[0].radius = 0.3f;
+  scene.colliders[0].shape = scene::Sphere{0.3f};
   scene.environment.airDensity = 0;
   ReferenceSimulation simulation(scene);
   for (int i = 0; i < 36; ++i) simulation.tick();

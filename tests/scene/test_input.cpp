@@ -14,7 +14,7 @@ Scene twoClothsAndABall() {
   scene.cloths[1].name = "right";
   scene.colliders.resize(1);
   scene.colliders[0].name = "ball";
-  scene.colliders[0].motion = {{0, Vec3(0, 0, 0)}, {1, Vec3(1, 0, 0)}};
+  scene.colliders[0].motion.keys = {{0, Vec3(0, 0, 0)}, {1, Vec3(1, 0, 0)}};
   return scene;
 }
 
@@ -23,7 +23,7 @@ TEST(ApplyChange, ChangesNothingWhenEmpty) {
   applyChange(scene, {});
   EXPECT_EQ(scene.environment.gravity, Vec3(0, -9.81f, 0));
   EXPECT_EQ(scene.cloths[0].friction, 0.3f);
-  EXPECT_EQ(scene.colliders[0].motion.size(), 2u);
+  EXPECT_EQ(scene.colliders[0].motion.keys.size(), 2u);
 }
 
 TEST(ApplyChange, SetsTheEnvironment) {
@@ -70,10 +70,19 @@ TEST(ApplyChange, SetsEveryClothWithoutAName) {
 TEST(ApplyChange, EndsAMotionByAPositionButNotByARadius) {
   Scene scene = twoClothsAndABall();
   applyChange(scene, {.colliders = {{.name = "ball", .radius = 0.7f}}});
-  EXPECT_EQ(scene.colliders[0].radius, 0.7f);
-  EXPECT_EQ(scene.colliders[0].motion.size(), 2u);
+  EXPECT_EQ(std::get<Sphere>(scene.colliders[0].shape).radius, 0.7f);
+  EXPECT_EQ(scene.colliders[0].motion.keys.size(), 2u);
   applyChange(scene, {.colliders = {{.name = "ball", .position = Vec3(1, 2, 3)}}});
-  EXPECT_EQ(positionAt(scene.colliders[0], 0.5), Vec3(1, 2, 3));
+  EXPECT_EQ(poseAt(scene.colliders[0], 0.5).position, Vec3(1, 2, 3));
+}
+
+TEST(ApplyChange, TurnsAColliderInItsPlace) {
+  Scene scene = twoClothsAndABall();
+  scene.colliders[0].pose.position = Vec3(1, 2, 3);
+  const Quaternion onItsSide(0, 1, 0, 0);
+  applyChange(scene, {.colliders = {{.name = "ball", .orientation = onItsSide}}});
+  EXPECT_EQ(poseAt(scene.colliders[0], 0.5).position, Vec3(1, 2, 3));
+  EXPECT_EQ(poseAt(scene.colliders[0], 0.5).orientation.coeffs(), onItsSide.coeffs());
 }
 
 }  // namespace

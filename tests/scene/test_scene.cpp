@@ -56,40 +56,6 @@ TEST(PinnedNodes, AreNoneWithoutRanges) {
   EXPECT_EQ(pinnedNodes(cloth), std::vector<std::uint8_t>(9, 0));
 }
 
-SphereCollider moving() {
-  SphereCollider collider;
-  collider.pose.position = Vec3(7, 7, 7);
-  collider.motion = {{0, Vec3(0, 0, 0)}, {1, Vec3(4, 0, 0)}, {4, Vec3(4, 8, 0)}};
-  return collider;
-}
-
-TEST(PositionAt, IsThePoseWithoutMotion) {
-  SphereCollider collider = moving();
-  collider.motion.clear();
-  EXPECT_EQ(positionAt(collider, 123.4), Vec3(7, 7, 7));
-}
-
-TEST(PositionAt, GoesThroughItsKeysBySmoothstep) {
-  const SphereCollider collider = moving();
-  EXPECT_EQ(positionAt(collider, 0), Vec3(0, 0, 0));
-  EXPECT_EQ(positionAt(collider, 0.5), Vec3(2, 0, 0));
-  EXPECT_EQ(positionAt(collider, 0.25), Vec3(4 * 0.15625f, 0, 0));  // 3/16 - 2/64
-  EXPECT_EQ(positionAt(collider, 1), Vec3(4, 0, 0));
-  EXPECT_EQ(positionAt(collider, 2.5), Vec3(4, 4, 0));
-}
-
-TEST(PositionAt, StartsAgainAfterItsPeriod) {
-  const SphereCollider collider = moving();
-  EXPECT_EQ(positionAt(collider, 4), Vec3(0, 0, 0));
-  EXPECT_EQ(positionAt(collider, 4 * 1000 + 2.5), Vec3(4, 4, 0));
-}
-
-TEST(PositionAt, IsSlowAtItsKeys) {
-  const SphereCollider collider = moving();
-  // Smoothstep starts as 3 u^2: after 1 % of the time 0.03 % of the way.
-  EXPECT_LT(positionAt(collider, 0.01).x(), 4 * 0.00031f);
-}
-
 TEST(Scene, CountsTheNodesOfAllCloths) {
   Scene scene;
   scene.cloths.resize(2);

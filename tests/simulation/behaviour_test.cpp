@@ -94,8 +94,9 @@ TEST_F(Behaviour, pinnedNodesKeepEveryBit) {
   const NodeState start = running.state();
   // The sphere goes through pinned nodes too.
   for (int tick = 0; tick < 50; ++tick)
-    running.tick(
-        inputsOf(scene, {{scene::Vec3(0.1f, 1.7f, -0.3f), scene::Vec3(0.1f, 1.6f, -0.3f), 0.2f, 1}}));
+    running.tick(inputsOf(
+        scene,
+        {{scene::Sphere{0.2f}, {scene::Vec3(0.1f, 1.7f, -0.3f)}, {scene::Vec3(0.1f, 1.6f, -0.3f)}, 1}}));
   const NodeState end = running.state();
   const std::vector<std::uint8_t> pinned = scene::pinnedNodes(cloth);
   int moved = 0;
@@ -157,7 +158,7 @@ TEST_F(Behaviour, aClothDroppedOnASphereRestsOnItsSurface) {
   double deepest = 0;
   bool touched = false;
   for (int tick = 0; tick < 144; ++tick) {
-    running.tick(inputsOf(scene, {{centre, centre, static_cast<float>(radius), 1}}));
+    running.tick(inputsOf(scene, {{scene::Sphere{static_cast<float>(radius)}, {centre}, {centre}, 1}}));
     for (const scene::Vec3& position : running.state().positions) {
       const double distance = position.cast<double>().norm();
       deepest = std::max(deepest, radius + 0.005 - distance);
@@ -184,7 +185,7 @@ TEST_F(Behaviour, frictionCarriesAClothAlongWithASphere) {
     const float speed = 0.2f;
     for (int tick = 0; tick < 72; ++tick) {
       const auto at = [&](int t) { return scene::Vec3(speed / 72 * static_cast<float>(t), -radius, 0); };
-      running.tick(inputsOf(scene, {{at(tick), at(tick + 1), radius, 1}}));
+      running.tick(inputsOf(scene, {{scene::Sphere{radius}, {at(tick)}, {at(tick + 1)}, 1}}));
     }
     return running.state().velocities[12].x();
   };
@@ -208,7 +209,8 @@ TEST_F(Behaviour, frictionSlowsByItsCoefficientTimesTheLoad) {
   running.restore(state);
   const scene::Vec3 centre(0, -100, 0);
   const int ticks = 18;
-  for (int tick = 0; tick < ticks; ++tick) running.tick(inputsOf(scene, {{centre, centre, 100, 1}}));
+  for (int tick = 0; tick < ticks; ++tick)
+    running.tick(inputsOf(scene, {{scene::Sphere{100}, {centre}, {centre}, 1}}));
   double mean = 0;
   for (const scene::Vec3& velocity : running.state().velocities) mean += double{velocity.x()} / 25;
   const double seconds = ticks / 72.0;

@@ -174,7 +174,8 @@ TEST_F(Constraints, letASheetHangWithinOnePercent) {
 
 TEST_F(Constraints, leaveNothingInsideASphere) {
   scene::Scene scene = swing(24, 10, 20);
-  const simulation::MovingSphere ball{scene::Vec3(0, -0.3f, -0.3f), scene::Vec3(0, -0.3f, -0.3f), 0.2f, 1};
+  const simulation::MovingCollider ball{
+      scene::Sphere{0.2f}, {scene::Vec3(0, -0.3f, -0.3f)}, {scene::Vec3(0, -0.3f, -0.3f)}, 1};
   Running running(scene);
   for (int tick = 0; tick < 72; ++tick) running.tick(inputsOf(scene, {ball}));
   const double distance = 0.2 + double{scene.cloths.front().thickness};
@@ -182,7 +183,8 @@ TEST_F(Constraints, leaveNothingInsideASphere) {
   const NodeState state = running.state();
   const std::vector<float> masses = simulation::inverseMasses(scene.cloths);
   for (std::size_t i = 0; i < masses.size(); ++i)
-    if (masses[i] > 0) nearest = std::min(nearest, (state.positions[i] - ball.start).cast<double>().norm());
+    if (masses[i] > 0)
+      nearest = std::min(nearest, (state.positions[i] - ball.start.position).cast<double>().norm());
   EXPECT_GT(nearest, distance * (1 - 1e-5));
   EXPECT_LT(nearest, distance * 1.01);  // and it does touch it
 }
@@ -275,7 +277,8 @@ TEST_F(Adaptive, areMassSpringClothToTheBitWhereNothingIsStretched) {
   held.environment.gravity = scene::Vec3(0, -1, 0);  // under which it stretches by 3 %
   scene::Scene free = held;
   free.cloths.front().solver.kind = scene::SolverKind::massSpring;
-  const simulation::MovingSphere ball{scene::Vec3(0, -0.12f, 0.1f), scene::Vec3(0, -0.12f, 0.1f), 0.094f, 1};
+  const simulation::MovingCollider ball{
+      scene::Sphere{0.094f}, {scene::Vec3(0, -0.12f, 0.1f)}, {scene::Vec3(0, -0.12f, 0.1f)}, 1};
   Running one(held), other(free);
   for (int tick = 0; tick < 30; ++tick) {
     EXPECT_EQ(one.tick(inputsOf(held, {ball})).stateHash, other.tick(inputsOf(free, {ball})).stateHash);
@@ -291,7 +294,8 @@ TEST_F(Adaptive, holdASheetWhereMassSpringBlowsUp) {
   EXPECT_FALSE(healthy);
 
   const scene::Scene scene = figure15(scene::SolverKind::acad);
-  const simulation::MovingSphere ball{scene::Vec3(0, -1.5f, 0.4f), scene::Vec3(0, -1.5f, 0.4f), 0.5f, 1};
+  const simulation::MovingCollider ball{
+      scene::Sphere{0.5f}, {scene::Vec3(0, -1.5f, 0.4f)}, {scene::Vec3(0, -1.5f, 0.4f)}, 1};
   Running running(scene);
   for (int tick = 0; tick < 186; ++tick) ASSERT_TRUE(running.tick(inputsOf(scene, {ball})).healthy) << tick;
   // It is far from calm, as in the paper, but it is a cloth still: half as long again at most.

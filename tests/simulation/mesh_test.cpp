@@ -55,7 +55,9 @@ scene::Scene discs() {
 }
 
 simulation::TickInputs discInputs(const scene::Scene& scene) {
-  return inputsOf(scene, {{scene::Vec3(0.1f, -0.2f, 0), scene::Vec3(0.1f, -0.19f, 0.01f), 0.15f, 0.5f}});
+  return inputsOf(
+      scene,
+      {{scene::Sphere{0.15f}, {scene::Vec3(0.1f, -0.2f, 0)}, {scene::Vec3(0.1f, -0.19f, 0.01f)}, 0.5f}});
 }
 
 TEST_F(Meshes, haveTheSameBitsWhateverTheWorkgroup) {

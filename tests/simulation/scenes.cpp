@@ -3,6 +3,8 @@
 #include "tests/simulation/scenes.h"
 
 #include <algorithm>
+#include <cmath>
+#include <memory>
 
 namespace clothstream::tests {
 
@@ -59,16 +61,30 @@ simulation::NodeState randomState(const scene::Scene& scene, std::mt19937& rando
   return state;
 }
 
-simulation::TickInputs inputsOf(const scene::Scene& scene, std::vector<simulation::MovingSphere> spheres) {
-  return {scene.environment, std::move(spheres)};
+simulation::TickInputs inputsOf(const scene::Scene& scene,
+                                std::vector<simulation::MovingCollider> colliders) {
+  return {scene.environment, std::move(colliders)};
 }
 
 reference::TickInputs referenceInputs(const simulation::TickInputs& inputs) {
   reference::TickInputs result{inputs.environment, {}};
-  for (const simulation::MovingSphere& sphere : inputs.spheres)
-    result.spheres.push_back({sphere.start.cast<double>(), sphere.end.cast<double>(), double{sphere.radius},
-                              double{sphere.friction}});
+  for (const simulation::MovingCollider& collider : inputs.colliders)
+    result.colliders.push_back({collider.shape, reference::toPose(collider.start),
+                                reference::toPose(collider.end), double{collider.friction}});
   return result;
+}
+
+scene::Hull octahedron() {
+  std::vector<scene::Vec3> corners;
+  for (int axis = 0; axis < 3; ++axis)
+    for (const float side : {0.1f, -0.1f}) corners.push_back(side * scene::Vec3::Unit(axis));
+  auto made = scene::makeConvexHull(
+      corners, {{0, 2, 4}, {2, 1, 4}, {1, 3, 4}, {3, 0, 4}, {2, 0, 5}, {1, 2, 5}, {3, 1, 5}, {0, 3, 5}});
+  return std::make_shared<const scene::ConvexHull>(std::get<scene::ConvexHull>(std::move(made)));
+}
+
+scene::Quaternion turned(float degrees, const scene::Vec3& axis) {
+  return scene::Quaternion(Eigen::AngleAxisf(degrees * std::acos(-1.0f) / 180, axis.normalized()));
 }
 
 void setState(reference::ReferenceSimulation& reference, const simulation::NodeState& state) {

@@ -30,8 +30,12 @@ simulation::NodeState randomState(const scene::Scene& scene, std::mt19937& rando
                                   float speed);
 
 simulation::TickInputs inputsOf(const scene::Scene& scene,
-                                std::vector<simulation::MovingSphere> spheres = {});
+                                std::vector<simulation::MovingCollider> colliders = {});
 reference::TickInputs referenceInputs(const simulation::TickInputs& inputs);
+
+// An octahedron of 20 cm, its corners on the axes.
+scene::Hull octahedron();
+scene::Quaternion turned(float degrees, const scene::Vec3& axis);
 
 void setState(reference::ReferenceSimulation& reference, const simulation::NodeState& state);
 // Largest distance between corresponding nodes.

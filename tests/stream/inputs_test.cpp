@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: MIT
-// From a participant's message to the spheres of a tick.
+// From a participant's message to the colliders of a tick.
+#include <cmath>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -11,16 +13,16 @@ namespace clothstream::stream {
 namespace {
 
 using scene::Vec3;
-using simulation::MovingSphere;
+using simulation::MovingCollider;
 using tests::gravity;
 using tests::handAt;
 
 scene::Scene sceneWithBall() {
   scene::Scene scene;
   scene.simulationRate = scene.streamRate = 100;
-  scene::SphereCollider ball;
+  scene::Collider ball;
   ball.name = "ball";
-  ball.radius = 0.3f;
+  ball.shape = scene::Sphere{0.3f};
   ball.pose.position = Vec3(0, 1, 0);
   scene.colliders = {ball};
   return scene;
@@ -28,28 +30,28 @@ scene::Scene sceneWithBall() {
 
 class ColliderSetTest : public ::testing::Test {
  protected:
-  const std::vector<MovingSphere>& advance() {
-    colliders.advance(scene, ++tick * scene.tickSeconds(), spheres);
-    return spheres;
+  const std::vector<MovingCollider>& advance() {
+    colliders.advance(scene, ++tick * scene.tickSeconds(), moving);
+    return moving;
   }
   scene::Scene scene = sceneWithBall();
   ColliderSet colliders{scene};
-  std::vector<MovingSphere> spheres;
+  std::vector<MovingCollider> moving;
   int tick = 0;
 };
 
 TEST_F(ColliderSetTest, APoseAppearsAtRestAndMovesInAStraightLine) {
   colliders.place(7, std::vector{handAt(1, 0.5f)});
   ASSERT_EQ(advance().size(), 2u);
-  EXPECT_EQ(spheres[1].start, Vec3(0.5f, 0, 0));
-  EXPECT_EQ(spheres[1].end, Vec3(0.5f, 0, 0));
+  EXPECT_EQ(moving[1].start.position, Vec3(0.5f, 0, 0));
+  EXPECT_EQ(moving[1].end.position, Vec3(0.5f, 0, 0));
   colliders.place(7, std::vector{handAt(1, 0.6f)});
   advance();
-  EXPECT_EQ(spheres[1].start, Vec3(0.5f, 0, 0));
-  EXPECT_EQ(spheres[1].end, Vec3(0.6f, 0, 0));
+  EXPECT_EQ(moving[1].start.position, Vec3(0.5f, 0, 0));
+  EXPECT_EQ(moving[1].end.position, Vec3(0.6f, 0, 0));
   advance();  // no news: at rest
-  EXPECT_EQ(spheres[1].start, Vec3(0.6f, 0, 0));
-  EXPECT_EQ(spheres[1].end, Vec3(0.6f, 0, 0));
+  EXPECT_EQ(moving[1].start.position, Vec3(0.6f, 0, 0));
+  EXPECT_EQ(moving[1].end.position, Vec3(0.6f, 0, 0));
 }
 
 TEST_F(ColliderSetTest, AJumpIsNoMotion) {
@@ -57,9 +59,28 @@ TEST_F(ColliderSetTest, AJumpIsNoMotion) {
   advance();
   // 30 m/s are 0.3 m in a tick of 10 ms.
   colliders.place(7, std::vector{handAt(1, 0.31f)});
-  EXPECT_EQ(advance()[1].start, Vec3(0.31f, 0, 0));
+  EXPECT_EQ(advance()[1].start.position, Vec3(0.31f, 0, 0));
   colliders.place(7, std::vector{handAt(1, 0.6f)});
-  EXPECT_EQ(advance()[1].start, Vec3(0.31f, 0, 0));
+  EXPECT_EQ(advance()[1].start.position, Vec3(0.31f, 0, 0));
+}
+
+TEST_F(ColliderSetTest, ATurnIsMadeOverATickUnlessItIsAJump) {
+  scene::ParticipantCollider finger = handAt(1, 0);
+  finger.shape = scene::Capsule{.radius = 0.01f, .length = 0.03f};
+  colliders.place(7, std::vector{finger});
+  advance();
+  const auto turned = [&](float degrees) {
+    finger.pose.orientation =
+        scene::Quaternion(Eigen::AngleAxisf(degrees * std::acos(-1.0f) / 180, Vec3::UnitZ()));
+    colliders.place(7, std::vector{finger});
+    return advance()[1];
+  };
+  const MovingCollider some = turned(100);
+  EXPECT_EQ(std::get<scene::Capsule>(some.shape).length, 0.03f);
+  EXPECT_EQ(some.start.orientation.coeffs(), scene::Quaternion::Identity().coeffs());
+  EXPECT_EQ(some.end.orientation.coeffs(), finger.pose.orientation.coeffs());
+  const MovingCollider jump = turned(-130);
+  EXPECT_EQ(jump.start.orientation.coeffs(), finger.pose.orientation.coeffs());
 }
 
 TEST_F(ColliderSetTest, WhatIsNotNamedAnyMoreVanishes) {
@@ -68,8 +89,8 @@ TEST_F(ColliderSetTest, WhatIsNotNamedAnyMoreVanishes) {
   EXPECT_EQ(advance().size(), 4u);
   colliders.place(7, std::vector{handAt(2, 1)});
   ASSERT_EQ(advance().size(), 3u);
-  EXPECT_EQ(spheres[1].end.x(), 1);
-  EXPECT_EQ(spheres[2].end.x(), 2);
+  EXPECT_EQ(moving[1].end.position.x(), 1);
+  EXPECT_EQ(moving[2].end.position.x(), 2);
   colliders.place(8, {});
   EXPECT_EQ(advance().size(), 2u);
 }
@@ -78,23 +99,23 @@ TEST_F(ColliderSetTest, OrderDoesNotDependOnWhoCameFirst) {
   colliders.place(9, std::vector{handAt(5, 95), handAt(2, 92)});
   colliders.place(3, std::vector{handAt(4, 34)});
   std::vector<float> xs;
-  for (const MovingSphere& sphere : advance()) xs.push_back(sphere.end.x());
+  for (const MovingCollider& collider : advance()) xs.push_back(collider.end.position.x());
   EXPECT_THAT(xs, testing::ElementsAre(0, 34, 92, 95));
 }
 
 TEST_F(ColliderSetTest, TheScenesOwnFollowTheirMotionUntilSomebodyMovesThem) {
-  scene.colliders[0].motion = {{0, Vec3(0, 1, 0)}, {1, Vec3(0, 1, 2)}, {2, Vec3(0, 1, 0)}};
+  scene.colliders[0].motion.keys = {{0, Vec3(0, 1, 0)}, {1, Vec3(0, 1, 2)}, {2, Vec3(0, 1, 0)}};
   colliders = ColliderSet(scene);
   for (int i = 0; i < 100; ++i) advance();
-  EXPECT_EQ(spheres[0].end, Vec3(0, 1, 2));
-  EXPECT_LT(spheres[0].start.z(), 2);
+  EXPECT_EQ(moving[0].end.position, Vec3(0, 1, 2));
+  EXPECT_LT(moving[0].start.position.z(), 2);
   scene::ParameterChange change;
   change.colliders = {{.name = "ball", .position = Vec3(0, 1, 1.9f), .radius = 0.5f}};
   scene::applyChange(scene, change);
   advance();
-  EXPECT_EQ(spheres[0].start, Vec3(0, 1, 2));
-  EXPECT_EQ(spheres[0].end, Vec3(0, 1, 1.9f));
-  EXPECT_EQ(spheres[0].radius, 0.5f);
+  EXPECT_EQ(moving[0].start.position, Vec3(0, 1, 2));
+  EXPECT_EQ(moving[0].end.position, Vec3(0, 1, 1.9f));
+  EXPECT_EQ(std::get<scene::Sphere>(moving[0].shape).radius, 0.5f);
 }
 
 TEST_F(ColliderSetTest, SaysWhereAllAreAndWhose) {

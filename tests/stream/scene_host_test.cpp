@@ -122,9 +122,9 @@ TEST_F(SceneHostTest, WhatIsDecodedIsWithinTheMaxErrorOfTheState) {
   // Same scene, same ticks, straight on the simulation.
   simulation::ClothSimulation simulation(tests::device(), hosted.live.start());
   ColliderSet colliders(hosted.live.start());
-  simulation::TickInputs inputs{.environment = hosted.live.start().environment, .spheres = {}};
+  simulation::TickInputs inputs{.environment = hosted.live.start().environment, .colliders = {}};
   for (int tick = 1; tick <= 10; ++tick) {
-    colliders.advance(hosted.live.start(), tick * hosted.live.start().tickSeconds(), inputs.spheres);
+    colliders.advance(hosted.live.start(), tick * hosted.live.start().tickSeconds(), inputs.colliders);
     recorder.begin();
     simulation.recordTick(recorder, inputs);
     simulation.recordSaveState(recorder);
@@ -247,10 +247,10 @@ TEST_F(SceneHostTest, GoesOnOnAnotherDeviceFromTheNewestStateThatTheCpuHas) {
   // bits.
   simulation::ClothSimulation simulation(another, hosted.live.start());
   ColliderSet colliders(hosted.live.start());
-  simulation::TickInputs inputs{.environment = hosted.live.start().environment, .spheres = {}};
+  simulation::TickInputs inputs{.environment = hosted.live.start().environment, .colliders = {}};
   vulkan::Recorder recorder(another);
   const auto tick = [&](int number) {
-    colliders.advance(hosted.live.start(), number * hosted.live.start().tickSeconds(), inputs.spheres);
+    colliders.advance(hosted.live.start(), number * hosted.live.start().tickSeconds(), inputs.colliders);
     recorder.begin();
     simulation.recordTick(recorder, inputs);
     simulation.recordSaveState(recorder);

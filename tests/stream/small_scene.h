@@ -27,10 +27,10 @@ inline scene::Scene smallScene(std::string name = "small") {
   cloth.pins = {
       {.firstRow = 0, .lastRow = 0, .rowStep = 1, .firstColumn = 0, .lastColumn = 9, .columnStep = 1}};
 
-  scene::SphereCollider ball;
+  scene::Collider ball;
   ball.name = "ball";
-  ball.radius = 0.2f;
-  ball.motion = {{0, {0, -0.5f, 0.5f}}, {1, {0, -0.5f, -0.5f}}, {2, {0, -0.5f, 0.5f}}};
+  ball.shape = scene::Sphere{0.2f};
+  ball.motion.keys = {{0, {0, -0.5f, 0.5f}}, {1, {0, -0.5f, -0.5f}}, {2, {0, -0.5f, 0.5f}}};
 
   scene::Scene scene;
   scene.name = std::move(name);

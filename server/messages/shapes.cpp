@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: MIT
+// Conversion and checks of shapes.
+#include "server/messages/shapes.h"
+
+#include <cmath>
+#include <memory>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "server/messages/limits.h"
+#include "server/messages/vectors.h"
+
+namespace clothstream::messages {
+namespace {
+
+template <typename... Visitors>
+struct Overloaded : Visitors... {
+  using Visitors::operator()...;
+};
+
+// What sizes may be, which differs for a scene and for its participants.
+struct Sizes {
+  Range radius, length, size;
+};
+constexpr Sizes kOfScene{limits::kRadius, limits::kShapeLength, limits::kShapeSize};
+constexpr Sizes kOfParticipant{limits::kParticipantRadius, limits::kParticipantLength,
+                               limits::kParticipantSize};
+
+scene::Shape toSphere(Checks& checks, const Path& path, const v1::Sphere& message, const Sizes& sizes) {
+  return scene::Sphere{checks.number(path / "radius", message.radius(), sizes.radius)};
+}
+
+scene::Shape toCapsule(Checks& checks, const Path& path, const v1::Capsule& message, const Sizes& sizes) {
+  return scene::Capsule{checks.number(path / "radius", message.radius(), sizes.radius),
+                        checks.number(path / "length", message.length(), sizes.length)};
+}
+
+scene::Shape toBox(Checks& checks, const Path& path, const v1::Box& message, const Sizes& sizes) {
+  return scene::Box{toVec3(checks, path / "size", message.size(), sizes.size)};
+}
+
+scene::Shape toHull(Checks& checks, const Path& path, const v1::ConvexHull& message) {
+  const auto count = [&](std::string_view field, int elements) {
+    checks.count(path / field, static_cast<std::size_t>(elements), limits::kMinHullParts,
+                 limits::kMaxHullParts);
+  };
+  count("vertices", message.vertices_size());
+  count("faces", message.faces_size());
+  if (checks.failed()) return {};
+  std::vector<scene::Vec3> vertices;
+  for (int i = 0; i < message.vertices_size(); ++i)
+    vertices.push_back(toVec3(checks, path.at("vertices", i), message.vertices(i), limits::kPosition));
+  std::vector<std::vector<std::uint32_t>> faces;
+  for (int i = 0; i < message.faces_size(); ++i) {
+    const v1::Face& face = message.faces(i);
+    const Path corners = path.at("faces", i);
+    checks.count(corners / "vertices", static_cast<std::size_t>(face.vertices_size()), 3,
+                 limits::kMaxHullParts);
+    faces.emplace_back(face.vertices().begin(), face.vertices().end());
+  }
+  if (checks.failed()) return {};
+  auto made = scene::makeConvexHull(std::move(vertices), std::move(faces));
+  if (const auto* problem = std::get_if<scene::HullProblem>(&made)) {
+    if (problem->face)
+      checks.fail(path.at("faces", static_cast<int>(*problem->face)), "", problem->text);
+    else
+      checks.fail(path, "", problem->text);
+    return {};
+  }
+  return std::make_shared<const scene::ConvexHull>(std::get<scene::ConvexHull>(std::move(made)));
+}
+
+// What all messages that have a shape have in common.
+template <typename Message>
+void writeSimple(const scene::Shape& shape, Message& message) {
+  std::visit(
+      Overloaded{[&](const scene::Sphere& sphere) { message.mutable_sphere()->set_radius(sphere.radius); },
+                 [&](const scene::Capsule& capsule) {
+                   message.mutable_capsule()->set_radius(capsule.radius);
+                   message.mutable_capsule()->set_length(capsule.length);
+                 },
+                 [&](const scene::Plane&) { message.mutable_plane(); },
+                 [&](const scene::Box& box) { write(box.size, *message.mutable_box()->mutable_size()); },
+                 [&](const scene::Hull&) { message.clear_shape(); }},
+      shape);
+}
+
+}  // namespace
+
+scene::Shape toShape(Checks& checks, const Path& path, const v1::Collider& message) {
+  switch (message.shape_case()) {
+    case v1::Collider::kSphere:
+      return toSphere(checks, path / "sphere", message.sphere(), kOfScene);
+    case v1::Collider::kCapsule:
+      return toCapsule(checks, path / "capsule", message.capsule(), kOfScene);
+    case v1::Collider::kPlane:
+      return scene::Plane{};
+    case v1::Collider::kBox:
+      return toBox(checks, path / "box", message.box(), kOfScene);
+    case v1::Collider::kHull:
+      return toHull(checks, path / "hull", message.hull());
+    case v1::Collider::SHAPE_NOT_SET:
+      break;
+  }
+  checks.fail(path, "", "has no shape; must have \"sphere\", \"capsule\", \"plane\", \"box\" or \"hull\"");
+  return {};
+}
+
+scene::Shape toShape(Checks& checks, const Path& path, const v1::ParticipantCollider& message) {
+  switch (message.shape_case()) {
+    case v1::ParticipantCollider::kSphere:
+      return toSphere(checks, path / "sphere", message.sphere(), kOfParticipant);
+    case v1::ParticipantCollider::kCapsule:
+      return toCapsule(checks, path / "capsule", message.capsule(), kOfParticipant);
+    case v1::ParticipantCollider::kBox:
+      return toBox(checks, path / "box", message.box(), kOfParticipant);
+    case v1::ParticipantCollider::SHAPE_NOT_SET:
+      break;
+  }
+  checks.fail(path, "", "has no shape; must have \"sphere\", \"capsule\" or \"box\"");
+  return {};
+}
+
+void write(const scene::Shape& shape, v1::Collider& message) {
+  writeSimple(shape, message);
+  if (const auto* hull = std::get_if<scene::Hull>(&shape)) writeHull(**hull, *message.mutable_hull());
+}
+
+void write(const scene::Shape& shape, v1::ColliderState& message) {
+  writeSimple(shape, message);
+}
+
+void writeHull(const scene::ConvexHull& hull, v1::ConvexHull& message) {
+  message.Clear();
+  for (const scene::Vec3& vertex : hull.vertices) write(vertex, *message.add_vertices());
+  for (const std::vector<std::uint32_t>& face : hull.faces)
+    message.add_faces()->mutable_vertices()->Assign(face.begin(), face.end());
+}
+
+}  // namespace clothstream::messages

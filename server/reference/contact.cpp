@@ -1,0 +1,139 @@
+// SPDX-License-Identifier: MIT
+// Contact by the height over a convex surface, which is a convex function along any straight way.
+#include "server/reference/contact.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <vector>
+
+namespace clothstream::reference {
+namespace {
+
+// Over the nearest part of a shape's surface, thickness counted; negative inside.
+struct Surface {
+  double height;
+  Vec3 normal;
+};
+
+Surface overRound(const Vec3& p, double radius, double length) {
+  const Vec3 centre(0, std::clamp(p.y(), -length / 2, length / 2), 0);
+  const Vec3 offset = p - centre;
+  const double distance = offset.norm();
+  return {distance - radius, distance > 1e-12 ? Vec3(offset / distance) : Vec3::UnitY()};
+}
+
+void raise(Surface& surface, const Vec3& normal, double height) {
+  if (height > surface.height) surface = {height, normal};
+}
+
+Surface overBox(const Vec3& p, const Vec3& size, double thickness) {
+  Surface surface{-INFINITY, Vec3::UnitY()};
+  for (int axis = 0; axis < 3; ++axis)
+    for (const double side : {1.0, -1.0})
+      raise(surface, side * Vec3::Unit(axis), side * p[axis] - size[axis] / 2 - thickness);
+  return surface;
+}
+
+Surface overHull(const Vec3& p, const scene::ConvexHull& hull, double thickness) {
+  Surface surface{-INFINITY, Vec3::UnitY()};
+  for (const scene::HalfSpace& plane : hull.planes) {
+    const Vec3 normal = plane.normal.cast<double>();
+    raise(surface, normal, normal.dot(p) - plane.offset - thickness);
+  }
+  return surface;
+}
+
+Surface over(const scene::Shape& shape, double thickness, const Vec3& p) {
+  if (const auto* sphere = std::get_if<scene::Sphere>(&shape))
+    return overRound(p, sphere->radius + thickness, 0);
+  if (const auto* capsule = std::get_if<scene::Capsule>(&shape))
+    return overRound(p, capsule->radius + thickness, capsule->length);
+  if (const auto* box = std::get_if<scene::Box>(&shape))
+    return overBox(p, box->size.cast<double>(), thickness);
+  if (const auto* hull = std::get_if<scene::Hull>(&shape)) return overHull(p, **hull, thickness);
+  return {p.y() - thickness, Vec3::UnitY()};
+}
+
+bool isRound(const scene::Shape& shape) {
+  return std::holds_alternative<scene::Sphere>(shape) || std::holds_alternative<scene::Capsule>(shape);
+}
+
+// Where between from, outside, and to the height first is zero.
+std::optional<Vec3> entry(const scene::Shape& shape, double thickness, const Vec3& from, const Vec3& to) {
+  const auto height = [&](double t) { return over(shape, thickness, from + t * (to - from)).height; };
+  // The lowest point, by thirds.
+  double low = 0, high = 1;
+  if (height(1) >= 0)
+    for (int i = 0; i < 80; ++i) {
+      const double a = low + (high - low) / 3, b = high - (high - low) / 3;
+      (height(a) < height(b) ? high : low) = height(a) < height(b) ? b : a;
+    }
+  const double lowest = height(1) < 0 ? 1 : (low + high) / 2;
+  if (height(lowest) >= 0) return std::nullopt;
+  double outside = 0, inside = lowest;
+  for (int i = 0; i < 60; ++i) {
+    const double middle = (outside + inside) / 2;
+    (height(middle) > 0 ? outside : inside) = middle;
+  }
+  return from + inside * (to - from);
+}
+
+// Both in the shape's frame.
+std::optional<Contact> contactOf(const scene::Shape& shape, double thickness, const Vec3& from,
+                                 const Vec3& to) {
+  const bool begunInside = over(shape, thickness, from).height <= 0;
+  const std::optional<Vec3> entered = begunInside ? from : entry(shape, thickness, from, to);
+  if (!entered) return std::nullopt;
+  const Surface there = over(shape, thickness, *entered);
+  // Round shapes push along their own normal where that is on the side that the way came from.
+  if (isRound(shape)) {
+    const Surface end = over(shape, thickness, to);
+    if (end.normal.dot(there.normal) > 0) {
+      if (end.height < 0) return Contact{end.normal, -end.height};
+      if (begunInside) return std::nullopt;
+    }
+  }
+  const Vec3 touched = *entered - there.height * there.normal;
+  const double depth = (touched - to).dot(there.normal);
+  if (depth <= 0) return std::nullopt;
+  return Contact{there.normal, depth};
+}
+
+}  // namespace
+
+double heightOver(const scene::Shape& shape, const Pose& pose, const Vec3& point) {
+  return over(shape, 0, pose.orientation.conjugate() * (point - pose.position)).height;
+}
+
+Pose between(const Pose& from, const Pose& to, double part) {
+  const double sign = from.orientation.dot(to.orientation) < 0 ? -1 : 1;
+  Quaternion mean(from.orientation.coeffs() * (1 - part) + to.orientation.coeffs() * (sign * part));
+  mean.normalize();
+  return {from.position + part * (to.position - from.position), mean};
+}
+
+ColliderStep stepOf(const Pose& start, const Pose& end, std::uint32_t index, std::uint32_t substeps,
+                    double tickSeconds) {
+  ColliderStep step;
+  step.before = between(start, end, static_cast<double>(index) / substeps);
+  step.after = between(start, end, (index + 1.0) / substeps);
+  step.velocity = (end.position - start.position) / tickSeconds;
+  const Quaternion turn = step.after.orientation * step.before.orientation.conjugate();
+  step.spin = 2 * substeps / tickSeconds * turn.vec();
+  return step;
+}
+
+std::optional<Contact> contactOf(const scene::Shape& shape, double thickness, const ColliderStep& step,
+                                 const Vec3& from, const Vec3& to) {
+  const Vec3 after = to - step.after.position;
+  const double reach = scene::reachOf(shape) + 2 * thickness;
+  const Vec3 before = from - step.before.position;
+  if (after.norm() > reach + (after - before).norm()) return std::nullopt;
+  std::optional<Contact> contact = contactOf(shape, thickness, step.before.orientation.conjugate() * before,
+                                             step.after.orientation.conjugate() * after);
+  if (contact) contact->normal = step.after.orientation * contact->normal;
+  return contact;
+}
+
+}  // namespace clothstream::reference

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: MIT
+// Where a point on its way runs into a shape, in double precision.
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <optional>
+
+#include "server/scene/collider.h"
+
+namespace clothstream::reference {
+
+using Vec3 = Eigen::Vector3d;
+using Quaternion = Eigen::Quaterniond;
+
+struct Pose {
+  Vec3 position = Vec3::Zero();
+  Quaternion orientation = Quaternion::Identity();
+};
+
+inline Pose toPose(const scene::Pose& pose) {
+  return {pose.position.cast<double>(), pose.orientation.cast<double>()};
+}
+
+// In a straight line, and by the normalised mean of the quaternions the shorter way; part from 0 to 1.
+Pose between(const Pose& from, const Pose& to, double part);
+
+// A collider over one substep.
+struct ColliderStep {
+  Pose before, after;
+  Vec3 velocity = Vec3::Zero();
+  Vec3 spin = Vec3::Zero();  // axis times twice the sine of half the angle, over the substep's seconds
+};
+
+// Substep `index` of `substeps` on the way from start to end.
+ColliderStep stepOf(const Pose& start, const Pose& end, std::uint32_t index, std::uint32_t substeps,
+                    double tickSeconds);
+
+// Metres from the point to the shape's surface (to the highest plane of what has planes); negative inside.
+double heightOver(const scene::Shape& shape, const Pose& pose, const Vec3& point);
+
+struct Contact {
+  Vec3 normal;   // out of the shape
+  double depth;  // how far along it the end of the way has to go
+};
+
+// Cloth keeps `thickness` from the surface (from the planes of what has planes). A way that begins outside
+// meets the shape where it first enters; one that begins inside leaves by the nearest way at its beginning.
+std::optional<Contact> contactOf(const scene::Shape& shape, double thickness, const ColliderStep& step,
+                                 const Vec3& from, const Vec3& to);
+
+}  // namespace clothstream::reference

@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: MIT
+// Colliders as the kernels read them.
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "server/simulation/collision/moving_collider.h"
+#include "shaders/collision/collision.h"
+
+namespace clothstream::simulation {
+
+struct ColliderTables {
+  std::vector<shared::ColliderRecord> records;
+  std::vector<shared::vec4> planes;  // of planes and hulls, as records number them
+  // Of each group of kColliderGroup that follow each other, then of each collider.
+  std::vector<shared::ColliderBounds> bounds;
+};
+
+// Replaces what `tables` hold and reuses its memory. At most kMaxColliders, with kMaxColliderPlanes.
+void fill(ColliderTables& tables, std::span<const MovingCollider> colliders);
+
+}  // namespace clothstream::simulation

@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: MIT
+// Upload of colliders, and the kernel that finds those near a tile.
+#include "server/simulation/collision/collision_stage.h"
+
+#include <cstring>
+#include <vector>
+
+#include "kernels/gather_near_colliders.h"
+
+namespace clothstream::simulation {
+namespace {
+
+using vulkan::BindingKind;
+using vulkan::Buffer;
+using vulkan::BufferPurpose;
+
+constexpr std::size_t kColliderBytes =
+    kMaxColliders * sizeof(shared::ColliderRecord) + kMaxColliderPlanes * sizeof(shared::vec4);
+constexpr std::size_t kBoundsBytes =
+    (kMaxColliders + kMaxColliders / shared::kColliderGroup) * sizeof(shared::ColliderBounds);
+
+constexpr std::size_t listsOf(std::uint32_t nodes) {
+  return (std::size_t{nodes} + shared::kNearNodes - 1) / shared::kNearNodes;
+}
+
+// Copies to the upload buffer, and from there to the device.
+template <typename Record>
+std::size_t upload(vulkan::Recorder& recorder, const std::vector<Record>& records, const Buffer& through,
+                   std::size_t offset, const Buffer& to, std::size_t toOffset) {
+  const std::size_t bytes = records.size() * sizeof(Record);
+  if (bytes == 0) return offset;
+  std::memcpy(through.mapped().data() + offset, records.data(), bytes);
+  recorder.copy(through, to, bytes, offset, toOffset);
+  return offset + bytes;
+}
+
+}  // namespace
+
+CollisionStage::CollisionStage(const vulkan::Device& device, std::uint32_t nodeCount,
+                               std::array<const Buffer*, 2> positions,
+                               std::array<const Buffer*, 2> velocities)
+    : nodeCount_(nodeCount),
+      colliders_(device, BufferPurpose::texels, kColliderBytes),
+      bounds_(device, BufferPurpose::texels, kBoundsBytes),
+      nearLists_(device, BufferPurpose::texels, listsOf(nodeCount) * shared::kNearStride * sizeof(float)),
+      uploads_{Buffer(device, BufferPurpose::upload, kColliderBytes + kBoundsBytes),
+               Buffer(device, BufferPurpose::upload, kColliderBytes + kBoundsBytes)},
+      kernel_(device, {.name = "gather_near_colliders",
+                       .spirv = kernels::gather_near_colliders,
+                       .bindings = {BindingKind::texels, BindingKind::texels, BindingKind::texels,
+                                    BindingKind::storage},
+                       .pushConstantBytes = sizeof(shared::GatherPush),
+                       .workgroupSize = 32,
+                       .specialisation = {}}),
+      from_{vulkan::Bindings(device, kernel_, {positions[0], velocities[0], &bounds_, &nearLists_}),
+            vulkan::Bindings(device, kernel_, {positions[1], velocities[1], &bounds_, &nearLists_})} {}
+
+void CollisionStage::recordInputs(vulkan::Recorder& recorder, std::span<const MovingCollider> colliders) {
+  fill(tables_, colliders);
+  count_ = static_cast<std::uint32_t>(colliders.size());
+  slot_ = 1 - slot_;
+  const Buffer& through = uploads_[slot_];
+  std::size_t offset = upload(recorder, tables_.records, through, 0, colliders_, 0);
+  offset = upload(recorder, tables_.planes, through, offset, colliders_, offset);
+  upload(recorder, tables_.bounds, through, offset, bounds_, 0);
+}
+
+void CollisionStage::recordGather(vulkan::Recorder& recorder, std::uint32_t present, float tickSeconds,
+                                  float thickness) {
+  if (!active()) return;
+  recorder.dispatch(from_[present], shared::GatherPush{nodeCount_, count_, tickSeconds, thickness},
+                    listsOf(nodeCount_));
+}
+
+shared::CollisionPush CollisionStage::push(std::uint32_t substep, std::uint32_t substeps,
+                                           float tickRate) const {
+  return {.colliderCount = count_,
+          .progressBefore = static_cast<float>(substep) / static_cast<float>(substeps),
+          .progressAfter = static_cast<float>(substep + 1) / static_cast<float>(substeps),
+          .tickRate = tickRate,
+          .substepRate = tickRate * static_cast<float>(substeps),
+          .reserved0 = 0,
+          .reserved1 = 0,
+          .reserved2 = 0};
+}
+
+}  // namespace clothstream::simulation

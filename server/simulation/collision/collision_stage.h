@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: MIT
+// Colliders on the device: uploaded a tick, and found for the nodes that may touch them.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+
+#include "server/simulation/collision/collider_tables.h"
+#include "server/simulation/collision/moving_collider.h"
+#include "server/vulkan/buffer.h"
+#include "server/vulkan/device.h"
+#include "server/vulkan/kernel.h"
+#include "server/vulkan/recorder.h"
+
+namespace clothstream::simulation {
+
+// A kernel that includes shaders/collision/collide.glsl binds colliders() and nearLists(), and is pushed
+// push(). Belongs to the device's thread.
+//
+// A tick:   recordInputs -> barrier -> recordGather -> substeps
+class CollisionStage {
+ public:
+  // `positions` and `velocities` are the scene's, by turns: texels that outlive the stage.
+  CollisionStage(const vulkan::Device& device, std::uint32_t nodeCount,
+                 std::array<const vulkan::Buffer*, 2> positions,
+                 std::array<const vulkan::Buffer*, 2> velocities);
+
+  // The colliders of the tick to come; at most one tick may be in flight.
+  void recordInputs(vulkan::Recorder& recorder, std::span<const MovingCollider> colliders);
+
+  // Lists what nodes may touch within `tickSeconds`, the state being in the buffers `present`; no cloth is
+  // thicker than `thickness`. Begins no stage and no barrier of its own; records nothing where there are no
+  // colliders.
+  void recordGather(vulkan::Recorder& recorder, std::uint32_t present, float tickSeconds, float thickness);
+
+  // Whether the tick has colliders.
+  bool active() const { return count_ > 0; }
+  shared::CollisionPush push(std::uint32_t substep, std::uint32_t substeps, float tickRate) const;
+
+  const vulkan::Buffer& colliders() const { return colliders_; }
+  const vulkan::Buffer& nearLists() const { return nearLists_; }
+
+ private:
+  std::uint32_t nodeCount_;
+  std::uint32_t count_ = 0;
+  std::uint32_t slot_ = 0;
+  ColliderTables tables_;
+  vulkan::Buffer colliders_, bounds_, nearLists_;
+  std::array<vulkan::Buffer, 2> uploads_;  // by turns: a tick may be in flight while the next is recorded
+  vulkan::Kernel kernel_;
+  std::array<vulkan::Bindings, 2> from_;
+};
+
+}  // namespace clothstream::simulation
