@@ -184,9 +184,9 @@ std::uint32_t Client::scenesReceived(Bytes body) {
   return CS_EVENT_SCENES;
 }
 
-void Client::setColliders(std::span<const Sphere> spheres, std::uint64_t nowUs) {
+void Client::setColliders(std::span<const cs_own_collider> colliders, std::uint64_t nowUs) {
   if (state_ == CS_STATE_FAILED) return;
-  writeColliderPoses(outbox_.colliders(), spheres, nowUs);
+  writeColliderPoses(outbox_.colliders(), colliders, nowUs);
 }
 
 void Client::change(const ParameterChange& change) {

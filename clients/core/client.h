@@ -31,7 +31,7 @@ class Client {
   const std::string* nextOutgoing() { return outbox_.next(); }
 
   void setClock(std::uint64_t (*nowUs)()) { nowUs_ = nowUs; }
-  void setColliders(std::span<const Sphere> spheres, std::uint64_t nowUs);
+  void setColliders(std::span<const cs_own_collider> colliders, std::uint64_t nowUs);
   void change(const ParameterChange& change);
   void change(const ColliderChange& change);
   void listScenes();

@@ -2,6 +2,8 @@
 // Field numbers of session.proto, going out.
 #include "clients/core/client_message.h"
 
+#include <algorithm>
+
 #include <protozero/pbf_writer.hpp>
 
 #include "clients/core/core.h"
@@ -50,6 +52,31 @@ void addSpring(Writer& parent, std::uint32_t field, const std::optional<Spring>&
   spring.add_float(2, (*value)[1]);
 }
 
+// Absent where it is not turned, for a Writer leaves out nothing by itself.
+void addPose(Writer& parent, std::uint32_t field, const cs_own_collider& collider) {
+  Writer pose(parent, field);
+  addVec3(pose, 1, {collider.position[0], collider.position[1], collider.position[2]});
+  if (std::all_of(collider.orientation, collider.orientation + 4, [](float part) { return part == 0; }))
+    return;
+  Writer orientation(pose, 2);
+  for (std::uint32_t i = 0; i < 4; ++i) orientation.add_float(i + 1, collider.orientation[i]);
+}
+
+// Of a ParticipantCollider. What is none of its shapes is left out, and refused by the server.
+void addShape(Writer& parent, const cs_own_collider& collider) {
+  if (collider.shape == CS_SHAPE_SPHERE) {
+    Writer sphere(parent, 3);
+    sphere.add_float(1, collider.radius);
+  } else if (collider.shape == CS_SHAPE_CAPSULE) {
+    Writer capsule(parent, 4);
+    capsule.add_float(1, collider.radius);
+    capsule.add_float(2, collider.length);
+  } else if (collider.shape == CS_SHAPE_BOX) {
+    Writer box(parent, 5);
+    addVec3(box, 1, {collider.size[0], collider.size[1], collider.size[2]});
+  }
+}
+
 }  // namespace
 
 void writeHello(std::string& out, std::uint64_t requestId, std::string_view scene,
@@ -62,17 +89,14 @@ void writeHello(std::string& out, std::uint64_t requestId, std::string_view scen
   });
 }
 
-void writeColliderPoses(std::string& out, std::span<const Sphere> spheres, std::uint64_t clientTimeUs) {
+void writeColliderPoses(std::string& out, std::span<const cs_own_collider> colliders,
+                        std::uint64_t clientTimeUs) {
   writeMessage(out, 0, kColliderPoses, [&](Writer& poses) {
-    for (std::size_t i = 0; i < spheres.size(); ++i) {
+    for (std::size_t i = 0; i < colliders.size(); ++i) {
       Writer collider(poses, 1);
       collider.add_uint32(1, static_cast<std::uint32_t>(i));
-      {
-        Writer pose(collider, 2);
-        addVec3(pose, 1, spheres[i].position);
-      }
-      Writer sphere(collider, 3);
-      sphere.add_float(1, spheres[i].radius);
+      addPose(collider, 2, colliders[i]);
+      addShape(collider, colliders[i]);
     }
     poses.add_uint64(2, clientTimeUs);
   });

@@ -8,14 +8,10 @@
 #include <string>
 #include <string_view>
 
+#include "clients/core/core.h"
 #include "clients/core/server_message.h"
 
 namespace clothstream::client {
-
-struct Sphere {
-  Vec3 position{};
-  float radius = 0;
-};
 
 struct ColliderChange {
   std::string_view name;
@@ -25,8 +21,9 @@ struct ColliderChange {
 
 void writeHello(std::string& out, std::uint64_t requestId, std::string_view scene,
                 std::string_view clientName);
-// `ids` of the spheres are their places in the span.
-void writeColliderPoses(std::string& out, std::span<const Sphere> spheres, std::uint64_t clientTimeUs);
+// Ids of the colliders are their places in the span.
+void writeColliderPoses(std::string& out, std::span<const cs_own_collider> colliders,
+                        std::uint64_t clientTimeUs);
 void writeParameterChange(std::string& out, std::uint64_t requestId, const ParameterChange& change);
 void writeColliderChange(std::string& out, std::uint64_t requestId, const ColliderChange& change);
 void writePing(std::string& out, std::uint64_t requestId, std::uint64_t clientTimeUs);

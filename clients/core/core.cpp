@@ -210,9 +210,22 @@ int cs_get_collider(const cs_client* client, uint32_t index, cs_collider* out) {
   out->name = collider->name.c_str();
   copy(collider->position, out->position);
   copy(collider->orientation, out->orientation);
+  out->shape = collider->shape;
   out->radius = collider->radius;
+  out->length = collider->length;
+  copy(collider->size, out->size);
   out->participant_id = collider->participantId;
   return 1;
+}
+
+const float* cs_get_hull(const cs_client* client, uint32_t index, uint32_t* vertex_count,
+                         const uint32_t** triangles, uint32_t* index_count) {
+  const Collider* collider = at(client->client.colliders(), index);
+  const Hull* hull = collider ? hullOf(*collider, client->client.description()) : nullptr;
+  *vertex_count = hull ? static_cast<std::uint32_t>(hull->vertices.size() / 3) : 0;
+  *index_count = hull ? static_cast<std::uint32_t>(hull->triangles.size()) : 0;
+  *triangles = hull ? hull->triangles.data() : nullptr;
+  return hull ? hull->vertices.data() : nullptr;
 }
 
 int cs_get_environment(const cs_client* client, cs_environment* out) {
@@ -235,13 +248,19 @@ int cs_get_cloth_parameters(const cs_client* client, uint32_t index, cs_cloth_pa
 }
 
 void cs_set_colliders(cs_client* client, const float* spheres, uint32_t count, uint64_t now_us) {
-  std::array<Sphere, CS_MAX_COLLIDERS> colliders;
+  std::array<cs_own_collider, CS_MAX_COLLIDERS> colliders{};
   count = std::min(count, CS_MAX_COLLIDERS);
   for (std::uint32_t i = 0; i < count; ++i) {
     const float* sphere = spheres + 4 * i;
-    colliders[i] = {{sphere[0], sphere[1], sphere[2]}, sphere[3]};
+    colliders[i].shape = CS_SHAPE_SPHERE;
+    std::copy(sphere, sphere + 3, colliders[i].position);
+    colliders[i].radius = sphere[3];
   }
-  client->client.setColliders(std::span(colliders.data(), count), now_us);
+  cs_set_shapes(client, colliders.data(), count, now_us);
+}
+
+void cs_set_shapes(cs_client* client, const cs_own_collider* colliders, uint32_t count, uint64_t now_us) {
+  client->client.setColliders(std::span(colliders, std::min(count, CS_MAX_COLLIDERS)), now_us);
 }
 
 void cs_set_environment(cs_client* client, const float* gravity3, const float* wind3,

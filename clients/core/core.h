@@ -21,7 +21,7 @@ extern "C" {
 #endif
 
 #define CS_PROTOCOL_VERSION 1u
-#define CS_MAX_COLLIDERS 16u
+#define CS_MAX_COLLIDERS 40u
 
 typedef struct cs_client cs_client;
 
@@ -81,13 +81,31 @@ typedef struct cs_submesh {
   uint32_t first_index, index_count; /* into cs_triangles */
 } cs_submesh;
 
+/* Solid, in the collider's own frame; metres. */
+typedef enum cs_shape {
+  CS_SHAPE_SPHERE = 0,  /* radius */
+  CS_SHAPE_CAPSULE = 1, /* radius, length of its segment along Y, which is centred on the origin */
+  CS_SHAPE_PLANE = 2,   /* everything with y <= 0 */
+  CS_SHAPE_BOX = 3,     /* size, centred on the origin */
+  CS_SHAPE_HULL = 4     /* see cs_get_hull */
+} cs_shape;
+
 typedef struct cs_collider {
   const char* name;
+  uint32_t shape; /* cs_shape */
   float position[3];
   float orientation[4]; /* x y z w */
-  float radius;
+  float radius, length, size[3];
   uint64_t participant_id; /* 0: the scene's */
 } cs_collider;
+
+/* One of this participant's own: sphere, capsule or box. */
+typedef struct cs_own_collider {
+  uint32_t shape; /* cs_shape */
+  float position[3];
+  float orientation[4]; /* x y z w; all zero: not turned */
+  float radius, length, size[3];
+} cs_own_collider;
 
 /* scene may be "" for the server's default; strings are copied. */
 cs_client* cs_create(const char* scene, const char* client_name);
@@ -139,6 +157,10 @@ uint32_t cs_submesh_count(const cs_client* client, uint32_t cloth);
 int cs_get_submesh(const cs_client* client, uint32_t cloth, uint32_t index, cs_submesh* out);
 uint32_t cs_collider_count(const cs_client* client);
 int cs_get_collider(const cs_client* client, uint32_t index, cs_collider* out);
+/* Corners (3 floats each) and triangles (counter-clockwise seen from outside) of a collider that is a hull,
+ * in its own frame; NULL and 0 for others. Until the next CS_EVENT_DESCRIPTION. */
+const float* cs_get_hull(const cs_client* client, uint32_t index, uint32_t* vertex_count,
+                         const uint32_t** triangles, uint32_t* index_count);
 /* 0 before the description, and where there is no such cloth. */
 int cs_get_environment(const cs_client* client, cs_environment* out);
 int cs_get_cloth_parameters(const cs_client* client, uint32_t index, cs_cloth_parameters* out);
@@ -147,6 +169,8 @@ int cs_get_cloth_parameters(const cs_client* client, uint32_t index, cs_cloth_pa
  * left out); replaces all former ones; 0 takes them away. Only the newest call counts if the transport is
  * behind. */
 void cs_set_colliders(cs_client* client, const float* spheres, uint32_t count, uint64_t now_us);
+/* The same with other shapes and turned: the joints of a hand as capsules, say. */
+void cs_set_shapes(cs_client* client, const cs_own_collider* colliders, uint32_t count, uint64_t now_us);
 /* Parameters; NULL leaves one as it is. An empty cloth name means every cloth. */
 void cs_set_environment(cs_client* client, const float* gravity3, const float* wind3,
                         const float* air_density);

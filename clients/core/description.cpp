@@ -263,6 +263,14 @@ tl::expected<Description, std::string> readDescription(Bytes message) {
   if (std::string problem = check(description, cloths); !problem.empty())
     return tl::unexpected(std::move(problem));
 
+  for (Collider& collider : description.colliders) {
+    if (collider.hull.empty()) continue;
+    std::optional<Hull> hull = readHull(collider.hull);
+    if (!hull) return tl::unexpected("collider \"" + collider.name + "\" is no hull");
+    description.hulls[collider.name] = std::move(*hull);
+    collider.hull = {};
+  }
+
   std::uint32_t firstVertex = 0;
   for (ClothMessage& source : cloths) {
     Cloth& cloth = description.cloths.emplace_back();
@@ -283,6 +291,12 @@ tl::expected<Description, std::string> readDescription(Bytes message) {
   if (!readDefinition(definition, description))
     return tl::unexpected(std::string("its definition is no Scene"));
   return description;
+}
+
+const Hull* hullOf(const Collider& collider, const Description& description) {
+  if (collider.shape != CS_SHAPE_HULL || collider.participantId != 0) return nullptr;
+  const auto found = description.hulls.find(collider.name);
+  return found == description.hulls.end() ? nullptr : &found->second;
 }
 
 void apply(const ParameterChange& change, Description& description) {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -46,6 +47,7 @@ struct Description {
   codec::StreamLayout layout;  // vertex counts, rows and columns, or triangles, of the cloths
   std::vector<Cloth> cloths;
   std::vector<Collider> colliders;
+  std::map<std::string, Hull> hulls;  // of the colliders that are hulls, by name
   Environment environment;
   std::vector<float> restPositions, restNormals;  // 3 a vertex
   std::vector<std::uint32_t> triangles;           // 3 indices each
@@ -56,6 +58,9 @@ struct Description {
 // A serialised StreamDescription. Sizes what it makes by the positions that came, never by numbers alone. The
 // error names the field, its value and what is allowed.
 [[nodiscard]] tl::expected<Description, std::string> readDescription(Bytes message);
+
+// nullptr where the collider is no hull of this description.
+const Hull* hullOf(const Collider& collider, const Description& description);
 
 void apply(const ParameterChange& change, Description& description);
 

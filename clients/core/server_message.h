@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "clients/core/core.h"
 #include "clients/core/wire.h"
 
 namespace clothstream::client {
@@ -51,8 +52,17 @@ struct Collider {
   std::string name;
   Vec3 position{};
   std::array<float, 4> orientation{0, 0, 0, 1};  // x y z w
-  float radius = 0;
+  cs_shape shape = CS_SHAPE_HULL;
+  float radius = 0, length = 0;
+  Vec3 size{};
+  Bytes hull;  // a serialised ConvexHull, good as long as the message; frames have none
   std::uint64_t participantId = 0;
+};
+
+// Of a hull, in its own frame.
+struct Hull {
+  std::vector<float> vertices;  // 3 each
+  std::vector<std::uint32_t> triangles;
 };
 
 struct Frame {
@@ -95,6 +105,7 @@ struct ParameterChange {
 [[nodiscard]] bool readFrame(Bytes message, Frame& frame);
 // Reuses the memory of `collider`.
 [[nodiscard]] bool readCollider(Bytes message, Collider& collider);
+[[nodiscard]] std::optional<Hull> readHull(Bytes message);
 [[nodiscard]] std::optional<Pong> readPong(Bytes message);
 // The text of a Notice.
 [[nodiscard]] std::optional<std::string> readNotice(Bytes message);
@@ -109,6 +120,7 @@ struct ParameterChange {
 inline constexpr std::size_t kMaxCloths = 256;
 // The scene's and all participants'.
 inline constexpr std::size_t kMaxSceneColliders = 4096;
+inline constexpr std::size_t kMaxHullParts = 128;  // vertices, faces
 inline constexpr std::size_t kMaxScenes = 65536;
 
 }  // namespace clothstream::client

@@ -72,4 +72,14 @@ bool wellFormed(Bytes message) {
   return true;
 }
 
+bool readPackedVarints(Bytes packed, std::size_t max, std::vector<std::uint32_t>& out) {
+  Cursor cursor(packed);
+  while (!cursor.atEnd()) {
+    const std::optional<std::uint64_t> value = cursor.varintValue();
+    if (!value || out.size() == max) return false;
+    out.push_back(static_cast<std::uint32_t>(*value));
+  }
+  return true;
+}
+
 }  // namespace clothstream::client

@@ -3,6 +3,10 @@
 // throw.
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
 #include <protozero/pbf_reader.hpp>
 
 namespace clothstream::client {
@@ -39,6 +43,10 @@ template <typename Visit>
   }
   return true;
 }
+
+// Appends the varints of a packed field, each to its lower 32 bits. False where the bytes are no whole
+// varints, or `out` would hold more than `max`.
+[[nodiscard]] bool readPackedVarints(Bytes packed, std::size_t max, std::vector<std::uint32_t>& out);
 
 inline bool skip(protozero::pbf_reader& reader) {
   reader.skip();

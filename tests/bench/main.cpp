@@ -23,6 +23,8 @@ constexpr std::array kSuites{
                  &bench::runPaper},
     bench::Suite{"curtain", "the scene curtain, served to one client in this process: tick, pose to packet",
                  &bench::runCurtain},
+    bench::Suite{"colliders", "a tick with 0, 1, 100 and 4,000 colliders, most of them far from the cloth",
+                 &bench::runColliders},
     bench::Suite{"codec", "bits a vertex and milliseconds a frame, key and predicted, of a hung cloth",
                  &bench::runCodec},
     bench::Suite{"codec_motions", "both codecs on the CPU over four motions of a 100x100 cloth",

@@ -90,7 +90,10 @@ void Simulated::tick(const simulation::TickInputs& inputs) {
   wall_.add(
       secondsOf([&] { runOn(device_, recorder_, [&] { simulation_.recordTick(recorder_, inputs); }); }));
   for (const vulkan::StageTime& time : recorder_.stageTimes())
-    if (time.stage == "advance") advance_.add(time.seconds);
+    if (time.stage == "advance")
+      advance_.add(time.seconds);
+    else if (time.stage == "near")
+      near_.add(time.seconds);
   if (!simulation_.status().healthy) throw std::runtime_error("the state is not finite any more");
 }
 

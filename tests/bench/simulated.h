@@ -36,14 +36,16 @@ class Simulated {
   // Of a tick: all of it on the wall clock, and its advance stage by the device's clock. s.
   const Samples& wall() const { return wall_; }
   const Samples& advance() const { return advance_; }
-  void forgetTimes() { wall_ = advance_ = {}; }
+  // Its search for what is near; where there are colliders.
+  const Samples& near() const { return near_; }
+  void forgetTimes() { wall_ = advance_ = near_ = {}; }
 
  private:
   vulkan::Device& device_;
   scene::Scene scene_;
   vulkan::Recorder recorder_;
   simulation::ClothSimulation simulation_;
-  Samples wall_, advance_;
+  Samples wall_, advance_, near_;
 };
 
 // Records with `record`, submits, waits.

@@ -34,6 +34,7 @@ struct Suite {
 Rows runMassSpring(vulkan::Device& device, const Settings& settings);
 Rows runPaper(vulkan::Device& device, const Settings& settings);
 Rows runCurtain(vulkan::Device& device, const Settings& settings);
+Rows runColliders(vulkan::Device& device, const Settings& settings);
 Rows runCodec(vulkan::Device& device, const Settings& settings);
 Rows runCodecMotions(vulkan::Device& device, const Settings& settings);
 

@@ -75,7 +75,7 @@ INSTANTIATE_TEST_SUITE_P(Normals, DecodedFrames,
 
 TEST(Frames, MoveColliders) {
   Joined joined;
-  ASSERT_EQ(cs_collider_count(joined.client.get()), 1u);
+  ASSERT_EQ(cs_collider_count(joined.client.get()), 2u);
   joined.client.receive(joined.server.frame(5));
   cs_collider collider;
   ASSERT_EQ(cs_get_collider(joined.client.get(), 0, &collider), 1);
@@ -83,7 +83,38 @@ TEST(Frames, MoveColliders) {
   EXPECT_EQ(collider.position[0], 5);
   EXPECT_EQ(collider.orientation[3], 1);
   EXPECT_EQ(collider.radius, 0.25f);
-  EXPECT_EQ(cs_get_collider(joined.client.get(), 1, &collider), 0);
+  EXPECT_EQ(cs_get_collider(joined.client.get(), 5, &collider), 0);
+}
+
+TEST(Frames, HaveCollidersOfEveryShape) {
+  Joined joined;
+  joined.client.receive(joined.server.frame(5));
+  const cs_client* client = joined.client.get();
+  std::vector<cs_collider> colliders(cs_collider_count(client));
+  ASSERT_EQ(colliders.size(), 5u);
+  for (std::uint32_t i = 0; i < colliders.size(); ++i) cs_get_collider(client, i, &colliders[i]);
+  EXPECT_EQ(colliders[0].shape, CS_SHAPE_SPHERE);
+  EXPECT_EQ(colliders[1].shape, CS_SHAPE_HULL);
+  EXPECT_EQ(colliders[2].shape, CS_SHAPE_CAPSULE);
+  EXPECT_EQ(colliders[2].length, 0.03f);
+  EXPECT_EQ(colliders[2].participant_id, 7u);
+  EXPECT_EQ(colliders[3].shape, CS_SHAPE_PLANE);
+  EXPECT_EQ(colliders[4].shape, CS_SHAPE_BOX);
+  EXPECT_EQ(colliders[4].size[1], 2);
+}
+
+TEST(Frames, KeepTheHullsOfTheDescription) {
+  Joined joined;
+  joined.client.receive(joined.server.frame(5));
+  std::uint32_t vertices = 0, indices = 0;
+  const std::uint32_t* triangles = nullptr;
+  const float* corners = cs_get_hull(joined.client.get(), 1, &vertices, &triangles, &indices);
+  ASSERT_EQ(vertices, 4u);
+  EXPECT_EQ(corners[9], 3);
+  EXPECT_EQ(std::vector<std::uint32_t>(triangles, triangles + indices),
+            (std::vector<std::uint32_t>{0, 1, 2, 0, 2, 3, 3, 2, 1, 3, 1, 0}));
+  EXPECT_EQ(cs_get_hull(joined.client.get(), 0, &vertices, &triangles, &indices), nullptr);
+  EXPECT_EQ(vertices, 0u);
 }
 
 TEST(Frames, OnlyTheNewestIsAcknowledgedWhereTheTransportIsBehind) {

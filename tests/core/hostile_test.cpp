@@ -45,6 +45,11 @@ void readAll(ClientUnderTest& client) {
   for (std::uint32_t i = 0; i < indices; ++i) ASSERT_LT(triangles[i], vertices);
   cs_collider collider;
   for (std::uint32_t i = 0; cs_get_collider(client.get(), i, &collider) != 0; ++i) sum += collider.radius;
+  for (std::uint32_t i = 0, corners = 0; cs_get_collider(client.get(), i, &collider) != 0; ++i) {
+    const float* hull = cs_get_hull(client.get(), i, &corners, &triangles, &indices);
+    for (std::uint32_t k = 0; k < 3 * corners; ++k) sum += hull[k];
+    for (std::uint32_t k = 0; k < indices; ++k) ASSERT_LT(triangles[k], corners);
+  }
   volatile float sink = sum;
   static_cast<void>(sink);
   client.outgoing();

@@ -34,6 +34,30 @@ TEST(Colliders, TravelWithTheTimeTheyWereTrue) {
   EXPECT_EQ(poses.colliders(1).sphere().radius(), 0.2f);
 }
 
+TEST(Colliders, TravelWithTheirShapeAndTurn) {
+  Joined joined;
+  const cs_own_collider own[] = {{.shape = CS_SHAPE_CAPSULE,
+                                  .position = {1, 2, 3},
+                                  .orientation = {0, 0.6f, 0, 0.8f},
+                                  .radius = 0.01f,
+                                  .length = 0.03f,
+                                  .size = {}},
+                                 {.shape = CS_SHAPE_BOX,
+                                  .position = {},
+                                  .orientation = {},
+                                  .radius = 0,
+                                  .length = 0,
+                                  .size = {0.1f, 0.2f, 0.3f}}};
+  cs_set_shapes(joined.client.get(), own, 2, 5);
+  const v1::ColliderPoses poses = joined.sent().collider_poses();
+  ASSERT_THAT(poses.colliders(), SizeIs(2));
+  EXPECT_EQ(poses.colliders(0).capsule().radius(), 0.01f);
+  EXPECT_EQ(poses.colliders(0).capsule().length(), 0.03f);
+  EXPECT_EQ(poses.colliders(0).pose().orientation().w(), 0.8f);
+  EXPECT_EQ(poses.colliders(1).box().size().z(), 0.3f);
+  EXPECT_FALSE(poses.colliders(1).pose().has_orientation());
+}
+
 TEST(Colliders, OnlyTheNewestTravelWhereTheTransportIsBehindAndNoneMeansNone) {
   Joined joined;
   const float sphere[] = {1, 2, 3, 0.1f};
@@ -47,8 +71,8 @@ TEST(Colliders, OnlyTheNewestTravelWhereTheTransportIsBehindAndNoneMeansNone) {
 
 TEST(Colliders, MoreThanAllowedAreLeftOut) {
   Joined joined;
-  const std::vector<float> spheres(4 * 20, 1.0f);
-  cs_set_colliders(joined.client.get(), spheres.data(), 20, 1);
+  const std::vector<float> spheres(4 * 50, 1.0f);
+  cs_set_colliders(joined.client.get(), spheres.data(), 50, 1);
   EXPECT_THAT(joined.sent().collider_poses().colliders(), SizeIs(CS_MAX_COLLIDERS));
 }
 

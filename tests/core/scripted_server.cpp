@@ -2,6 +2,7 @@
 // Waves on a grid, encoded and put into messages.
 #include "tests/core/scripted_server.h"
 
+#include <array>
 #include <cmath>
 #include <cstring>
 #include <memory>
@@ -88,6 +89,11 @@ v1::StreamDescription ScriptedServer::description() const {
   ball.set_name("ball");
   ball.mutable_position()->set_y(1);
   ball.mutable_sphere()->set_radius(0.25f);
+  v1::ColliderState& stone = *description.add_colliders();
+  stone.set_name("stone");
+  for (const float corner : {0.0f, 1.0f, 2.0f, 3.0f}) stone.mutable_hull()->add_vertices()->set_x(corner);
+  for (const auto& face : {std::array{0u, 1u, 2u, 3u}, {3u, 2u, 1u, 0u}})
+    stone.mutable_hull()->add_faces()->mutable_vertices()->Assign(face.begin(), face.end());
   description.mutable_definition()->mutable_environment()->mutable_wind()->set_x(3);
   return description;
 }
@@ -128,6 +134,13 @@ v1::Frame ScriptedServer::frameMessage(std::uint64_t tick, codec::PacketKind kin
   ball.set_name("ball");
   ball.mutable_position()->set_x(static_cast<float>(tick));
   ball.mutable_sphere()->set_radius(0.25f);
+  frame.add_colliders()->set_name("stone");
+  v1::ColliderState& finger = *frame.add_colliders();
+  finger.set_participant_id(7);
+  finger.mutable_capsule()->set_radius(0.01f);
+  finger.mutable_capsule()->set_length(0.03f);
+  frame.add_colliders()->mutable_plane();
+  frame.add_colliders()->mutable_box()->mutable_size()->set_y(2);
   return frame;
 }
 

@@ -51,11 +51,31 @@ export interface Drawing {
   submeshes: { name: string; firstIndex: number; indexCount: number }[]; // of the scene's triangles
 }
 
-export interface SphereCollider {
+export enum Shape {
+  sphere = 0,
+  capsule = 1,
+  plane = 2,
+  box = 3,
+  hull = 4,
+}
+
+// Sizes are those of its shape, in its own frame (core.h); metres.
+export interface Collider {
+  index: number;
   name: string;
+  shape: Shape;
   position: Vec3;
+  orientation: readonly [number, number, number, number]; // x y z w
   radius: number;
+  length: number;
+  size: Vec3;
   participantId: bigint; // 0: the scene's
+}
+
+// Corners, 3 floats each, and triangles.
+export interface Hull {
+  vertices: Float32Array;
+  triangles: Uint32Array;
 }
 
 // {stiffness in N/m, damping in N s/m}
@@ -77,7 +97,7 @@ export interface ClothParameters {
 // Sizes of the structs of core.h on a 32-bit machine.
 const kStatisticsBytes = 104;
 const kClothBytes = 28;
-const kColliderBytes = 48;
+const kColliderBytes = 64;
 const kEnvironmentBytes = 28;
 const kClothParametersBytes = 28;
 const kScratchBytes = Math.max(kStatisticsBytes, kClothBytes, kColliderBytes, kEnvironmentBytes, kClothParametersBytes);
@@ -209,14 +229,31 @@ export class Client {
     };
   }
 
-  colliders(): SphereCollider[] {
+  colliders(): Collider[] {
     const count = this.core.exports.cs_collider_count(this.handle);
-    return this.list(count, this.core.exports.cs_get_collider, (view, at) => ({
+    return this.list(count, this.core.exports.cs_get_collider, (view, at, index) => ({
+      index,
       name: this.core.text(view.getUint32(at, true)),
-      position: vec3(view, at + 4),
-      radius: view.getFloat32(at + 32, true),
-      participantId: view.getBigUint64(at + 40, true),
+      shape: view.getUint32(at + 4, true),
+      position: vec3(view, at + 8),
+      orientation: [...vec3(view, at + 20), view.getFloat32(at + 32, true)] as const,
+      radius: view.getFloat32(at + 36, true),
+      length: view.getFloat32(at + 40, true),
+      size: vec3(view, at + 44),
+      participantId: view.getBigUint64(at + 56, true),
     }));
+  }
+
+  // Of a collider that is a hull: copies.
+  hull(collider: Collider): Hull {
+    const { cs_get_hull } = this.core.exports;
+    const [vertexCount, triangles, indexCount] = [this.scratch, this.scratch + 4, this.scratch + 8];
+    const vertices = cs_get_hull(this.handle, collider.index, vertexCount, triangles, indexCount);
+    const view = this.core.view();
+    return {
+      vertices: this.core.floats(vertices, 3 * view.getUint32(vertexCount, true)).slice(),
+      triangles: this.core.indices(view.getUint32(triangles, true), view.getUint32(indexCount, true)).slice(),
+    };
   }
 
   scenes(): string[] {
@@ -274,11 +311,11 @@ export class Client {
   private list<Item>(
     count: number,
     get: (client: number, index: number, out: number) => number,
-    read: (view: DataView, at: number) => Item,
+    read: (view: DataView, at: number, index: number) => Item,
   ): Item[] {
     const items: Item[] = [];
     for (let index = 0; index < count; ++index) {
-      if (get(this.handle, index, this.scratch) !== 0) items.push(read(this.core.view(), this.scratch));
+      if (get(this.handle, index, this.scratch) !== 0) items.push(read(this.core.view(), this.scratch, index));
     }
     return items;
   }

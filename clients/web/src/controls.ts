@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// The panel: scene, wind, gravity, stiffness, damping, sphere. What people change goes out once a drawn frame.
+// The panel: scene, wind, gravity, stiffness, damping, collider. What people change goes out once a drawn frame.
 
-import type { Client, ClothParameters, Environment, Spring, Vec3 } from "./client";
+import { Shape, type Client, type ClothParameters, type Environment, type Spring, type Vec3 } from "./client";
 import { element } from "./hud";
 
 const kStill: Vec3 = [0, 0, 0];
@@ -16,7 +16,7 @@ export interface ControlsListener {
 
 export class Controls {
   private readonly scenes = element<HTMLSelectElement>("scene");
-  private readonly spheres = element<HTMLSelectElement>("sphere");
+  private readonly choice = element<HTMLSelectElement>("collider");
   private readonly wind = new Slider("wind", (value) => `${value.toFixed(1)} m/s`);
   private readonly gravity = new Slider("gravity", (value) => `${value.toFixed(2)} m/s²`);
   // On a scale of powers of two.
@@ -31,7 +31,7 @@ export class Controls {
 
   constructor(listener: ControlsListener) {
     this.scenes.addEventListener("change", () => listener.sceneChosen(this.scenes.value));
-    this.spheres.addEventListener("change", () => this.radius.forget());
+    this.choice.addEventListener("change", () => this.radius.forget());
     element("reset").addEventListener("click", () => listener.viewReset());
     if (window.matchMedia("(max-width: 640px)").matches) element<HTMLDetailsElement>("panel").open = false;
   }
@@ -40,13 +40,13 @@ export class Controls {
     this.scenes.replaceChildren(...scenes.map((scene) => new Option(scene, scene, false, scene === current)));
   }
 
-  // Name of the sphere that the keys and the radius belong to; "" if there is none.
-  get sphere(): string {
-    return this.spheres.value;
+  // Name of the collider that the keys and the radius belong to; "" if there is none.
+  get collider(): string {
+    return this.choice.value;
   }
-  set sphere(name: string) {
-    if (this.spheres.value === name) return;
-    this.spheres.value = name;
+  set collider(name: string) {
+    if (this.choice.value === name) return;
+    this.choice.value = name;
     this.radius.forget();
   }
 
@@ -57,9 +57,8 @@ export class Controls {
     this.windDirection = direction(environment?.wind ?? kStill, kDefaultWind);
     this.gravityDirection = direction(environment?.gravity ?? kStill, kDown);
     const names = client.colliders().filter(({ participantId }) => participantId === 0n).map(({ name }) => name);
-    this.spheres.replaceChildren(...names.map((name) => new Option(name)));
-    element("sphere-row").hidden = names.length < 2;
-    element("radius-row").hidden = names.length === 0;
+    this.choice.replaceChildren(...names.map((name) => new Option(name)));
+    element("collider-row").hidden = names.length < 2;
     this.scenes.value = client.sceneName;
     this.show(client);
   }
@@ -100,7 +99,7 @@ export class Controls {
       });
     }
     if (damping !== undefined) client.setCloth("", { damping });
-    if (radius !== undefined && this.sphere) client.setCollider(this.sphere, { radius });
+    if (radius !== undefined && this.collider) client.setCollider(this.collider, { radius });
     this.showRadius(client);
   }
 
@@ -110,8 +109,10 @@ export class Controls {
   }
 
   private showRadius(client: Client): void {
-    const collider = client.colliders().find(({ name, participantId }) => participantId === 0n && name === this.sphere);
-    if (collider) this.radius.show(collider.radius);
+    const collider = client.colliders().find(({ name, participantId }) => participantId === 0n && name === this.collider);
+    const round = collider?.shape === Shape.sphere || collider?.shape === Shape.capsule;
+    element("radius-row").hidden = !round;
+    if (collider && round) this.radius.show(collider.radius);
   }
 }
 

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: MIT
-// The keyboard on the picture: arrows turn, plus and minus zoom, W A S D move the sphere, R resets the view.
+// The keyboard on the picture: arrows turn, plus and minus zoom, W A S D move the collider, R resets the view.
 
 import type { Controls } from "./controls";
-import type { SphereDrag } from "./sphere_drag";
+import type { ColliderDrag } from "./collider_drag";
 import type { View } from "./view";
 
 const kZoomStep = 1.1;
 const kNudge = 0.03; // m
 
-export function listenToKeys(view: View, drag: SphereDrag, controls: Controls): void {
+export function listenToKeys(view: View, drag: ColliderDrag, controls: Controls): void {
   const actions: Record<string, () => void> = {
     arrowleft: () => view.turn(-1, 0),
     arrowright: () => view.turn(1, 0),
@@ -18,10 +18,10 @@ export function listenToKeys(view: View, drag: SphereDrag, controls: Controls): 
     "=": () => view.zoom(1 / kZoomStep),
     "-": () => view.zoom(kZoomStep),
     r: () => view.reset(),
-    w: () => drag.nudge(controls.sphere, 0, kNudge),
-    s: () => drag.nudge(controls.sphere, 0, -kNudge),
-    a: () => drag.nudge(controls.sphere, -kNudge, 0),
-    d: () => drag.nudge(controls.sphere, kNudge, 0),
+    w: () => drag.nudge(controls.collider, 0, kNudge),
+    s: () => drag.nudge(controls.collider, 0, -kNudge),
+    a: () => drag.nudge(controls.collider, -kNudge, 0),
+    d: () => drag.nudge(controls.collider, kNudge, 0),
   };
   view.canvas.addEventListener("keydown", (event) => {
     const action = actions[event.key.toLowerCase()];

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
 // Starts the page: core, view, session and panel, and the loop that draws.
 
+import { ColliderDrag } from "./collider_drag";
 import { Controls } from "./controls";
 import { element, Hud } from "./hud";
 import { listenToKeys } from "./keys";
 import { expose } from "./probe";
 import { Session } from "./session";
-import { SphereDrag } from "./sphere_drag";
 import { View } from "./view";
 import { CoreModule } from "./wasm";
 
@@ -34,7 +34,7 @@ async function start(): Promise<void> {
   });
 
   const controls = new Controls({ sceneChosen: chooseScene, viewReset: () => view.reset() });
-  const drag = new SphereDrag(view, (sphere) => (controls.sphere = sphere));
+  const drag = new ColliderDrag(view, (collider) => (controls.collider = collider));
   listenToKeys(view, drag, controls);
 
   const address = new URL("stream", window.location.href);
@@ -73,7 +73,7 @@ async function start(): Promise<void> {
     if (client) {
       controls.apply(client);
       const target = drag.take();
-      if (target) client.setCollider(target.sphere, { position: target.position });
+      if (target) client.setCollider(target.collider, { position: target.position });
       session.flush();
     }
     if (now - figuresAt >= kFiguresPeriodMs) {

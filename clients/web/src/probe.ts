@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // `window.clothstream`: lets tests and the curious look inside; it changes nothing.
 
-import type { Client, ClothLayout, SphereCollider, Statistics, Vec3 } from "./client";
+import type { Client, ClothLayout, Collider, Statistics, Vec3 } from "./client";
 import type { Session, SessionState } from "./session";
 import type { View } from "./view";
 
@@ -13,7 +13,7 @@ export interface Probe {
   readonly restPositions: Float32Array | undefined;
   readonly normals: Float32Array | undefined;
   readonly cloths: ClothLayout[];
-  readonly colliders: SphereCollider[];
+  readonly colliders: Collider[];
   readonly canvas: HTMLCanvasElement;
   // A point of the scene, in CSS pixels of the page.
   project(point: Vec3): [number, number];

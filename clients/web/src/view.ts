@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: MIT
-// What is seen: the newest frame's cloths and spheres in the studio, and the camera that turns round them.
+// What is seen: the newest frame's cloths and colliders in the studio, and the camera that turns round them.
 
 import * as THREE from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
-import type { Client, SphereCollider, Vec3 } from "./client";
+import { Shape, type Client, type Vec3 } from "./client";
 import { ClothMesh } from "./cloth_mesh";
+import { ColliderMeshes, reachOf, type ColliderMesh } from "./collider_meshes";
 import { useSoftShadows } from "./soft_shadow";
 import { Studio } from "./studio";
 
@@ -16,10 +17,9 @@ const kTurnStep = Math.PI / 36;
 export class View {
   readonly camera = new THREE.PerspectiveCamera(kFieldOfView);
   readonly orbit: OrbitControls;
-  readonly spheres: THREE.Mesh<THREE.SphereGeometry, THREE.MeshStandardMaterial>[] = [];
   private readonly renderer: THREE.WebGLRenderer;
   private readonly studio = new Studio();
-  private readonly sphereGeometry = new THREE.SphereGeometry(1, 64, 48);
+  private readonly colliderMeshes = new ColliderMeshes(this.studio.scene);
   private readonly bounds = new THREE.Box3(new THREE.Vector3(-1, 0, -1), new THREE.Vector3(1, 2, 1));
   private cloths: ClothMesh[] = [];
   private vertexCount = 0;
@@ -41,6 +41,10 @@ export class View {
     this.resize();
   }
 
+  get colliders(): readonly ColliderMesh[] {
+    return this.colliderMeshes.meshes;
+  }
+
   // Takes the topology and the rest state of a new description, and frames them.
   describe(client: Client): void {
     for (const cloth of this.cloths) {
@@ -57,9 +61,12 @@ export class View {
 
     this.bounds.makeEmpty();
     for (const cloth of this.cloths) this.bounds.union(cloth.reach());
-    for (const { position, radius } of client.colliders()) {
-      const centre = new THREE.Vector3(...position);
-      this.bounds.expandByPoint(centre.clone().subScalar(radius)).expandByPoint(centre.addScalar(radius));
+    this.colliderMeshes.describe();
+    for (const collider of client.colliders()) {
+      if (collider.shape === Shape.plane) continue;
+      const centre = new THREE.Vector3(...collider.position);
+      const reach = reachOf(client, collider);
+      this.bounds.expandByPoint(centre.clone().subScalar(reach)).expandByPoint(centre.addScalar(reach));
     }
     this.fit();
   }
@@ -71,7 +78,7 @@ export class View {
       const positions = client.positions();
       const normals = client.normals();
       for (const cloth of this.cloths) cloth.update(positions, normals);
-      this.placeSpheres(client.colliders());
+      this.colliderMeshes.place(client);
     }
     this.orbit.update();
     this.renderer.render(this.studio.scene, this.camera);
@@ -151,24 +158,6 @@ export class View {
     min.y = Math.max(min.y, this.floorHeight);
     this.studio.fit(this.bounds, this.floorHeight);
     this.reset();
-  }
-
-  private placeSpheres(colliders: SphereCollider[]): void {
-    while (this.spheres.length > colliders.length) this.studio.scene.remove(this.spheres.pop()!);
-    while (this.spheres.length < colliders.length) {
-      const material = new THREE.MeshStandardMaterial({ color: 0xd9d4c8, roughness: 0.35 });
-      const sphere = new THREE.Mesh(this.sphereGeometry, material);
-      sphere.castShadow = sphere.receiveShadow = true;
-      this.spheres.push(sphere);
-      this.studio.scene.add(sphere);
-    }
-    colliders.forEach((collider, index) => {
-      const sphere = this.spheres[index]!;
-      sphere.name = collider.participantId === 0n ? collider.name : "";
-      sphere.position.set(...collider.position);
-      // Slightly smaller than it is: the cloth's triangles cut corners between the nodes that rest on it.
-      sphere.scale.setScalar(0.985 * collider.radius);
-    });
   }
 
   private resize(): void {

@@ -32,6 +32,7 @@ export interface CoreExports {
   cs_get_submesh(client: Pointer, cloth: number, index: number, out: Pointer): number;
   cs_collider_count(client: Pointer): number;
   cs_get_collider(client: Pointer, index: number, out: Pointer): number;
+  cs_get_hull(client: Pointer, index: number, vertexCount: Pointer, triangles: Pointer, indexCount: Pointer): Pointer;
   cs_get_environment(client: Pointer, out: Pointer): number;
   cs_get_cloth_parameters(client: Pointer, index: number, out: Pointer): number;
   cs_set_environment(client: Pointer, gravity3: Pointer, wind3: Pointer, airDensity: Pointer): void;

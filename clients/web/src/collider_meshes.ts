@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: MIT
+// The colliders as three.js meshes: one for each, in the order of the newest frame.
+
+import * as THREE from "three";
+import { Shape, type Client, type Collider } from "./client";
+
+export type ColliderMesh = THREE.Mesh<THREE.BufferGeometry, THREE.MeshStandardMaterial>;
+
+// Slightly smaller than they are: the cloth's triangles cut corners between the nodes that rest on a shape.
+const kShrink = 0.985;
+// Metres of a plane that are drawn, to each side of its origin.
+const kPlaneReach = 4;
+
+export class ColliderMeshes {
+  readonly meshes: ColliderMesh[] = [];
+
+  constructor(private readonly scene: THREE.Scene) {}
+
+  // Hulls come with a description: those of a former one go.
+  describe(): void {
+    for (const mesh of this.meshes.splice(0)) this.remove(mesh);
+  }
+
+  place(client: Client): void {
+    const colliders = client.colliders();
+    while (this.meshes.length > colliders.length) this.remove(this.meshes.pop()!);
+    colliders.forEach((collider, index) => {
+      const look = lookOf(collider);
+      let mesh = this.meshes[index];
+      if (mesh?.userData["look"] !== look) {
+        if (mesh) this.remove(mesh);
+        mesh = this.meshes[index] = makeMesh(client, collider, look);
+        this.scene.add(mesh);
+      }
+      mesh.name = collider.participantId === 0n ? collider.name : "";
+      mesh.position.set(...collider.position);
+      mesh.quaternion.set(...collider.orientation);
+    });
+  }
+
+  private remove(mesh: ColliderMesh): void {
+    this.scene.remove(mesh);
+    mesh.geometry.dispose();
+    mesh.material.dispose();
+  }
+}
+
+// A sphere that holds the shape, for the view's bounds; none for a plane.
+export function reachOf(client: Client, collider: Collider): number {
+  switch (collider.shape) {
+    case Shape.sphere:
+      return collider.radius;
+    case Shape.capsule:
+      return collider.radius + collider.length / 2;
+    case Shape.plane:
+      return 0;
+    case Shape.box:
+      return Math.hypot(...collider.size) / 2;
+    case Shape.hull: {
+      const { vertices } = client.hull(collider);
+      let reach = 0;
+      for (let i = 0; i < vertices.length; i += 3) reach = Math.max(reach, Math.hypot(...vertices.subarray(i, i + 3)));
+      return reach;
+    }
+  }
+}
+
+// What a mesh is made for: as long as that stays, the mesh stays.
+function lookOf({ shape, name, radius, length, size }: Collider): string {
+  return [shape, shape === Shape.hull ? name : "", radius, length, ...size].join(" ");
+}
+
+function makeMesh(client: Client, collider: Collider, look: string): ColliderMesh {
+  const material = new THREE.MeshStandardMaterial({ color: 0xd9d4c8, roughness: 0.35 });
+  const mesh = new THREE.Mesh(geometryOf(client, collider), material);
+  mesh.castShadow = collider.shape !== Shape.plane;
+  mesh.receiveShadow = true;
+  mesh.userData["look"] = look;
+  return mesh;
+}
+
+function geometryOf(client: Client, collider: Collider): THREE.BufferGeometry {
+  const { radius, length, size } = collider;
+  switch (collider.shape) {
+    case Shape.sphere:
+      return new THREE.SphereGeometry(kShrink * radius, 64, 48);
+    case Shape.capsule:
+      return new THREE.CapsuleGeometry(kShrink * radius, length, 16, 48);
+    case Shape.plane:
+      // Below itself by as much as others are smaller, which also keeps it off a floor in the same place.
+      return new THREE.PlaneGeometry(2 * kPlaneReach, 2 * kPlaneReach).rotateX(-Math.PI / 2).translate(0, -0.002, 0);
+    case Shape.box:
+      return new THREE.BoxGeometry(...size.map((edge) => kShrink * edge));
+    case Shape.hull:
+      return hullGeometry(client, collider);
+  }
+}
+
+function hullGeometry(client: Client, collider: Collider): THREE.BufferGeometry {
+  const { vertices, triangles } = client.hull(collider);
+  const indexed = new THREE.BufferGeometry();
+  indexed.setAttribute("position", new THREE.BufferAttribute(vertices, 3));
+  indexed.setIndex(new THREE.BufferAttribute(triangles, 1));
+  // Each face with corners of its own, so that its edges are sharp.
+  const geometry = indexed.toNonIndexed().scale(kShrink, kShrink, kShrink);
+  geometry.computeVertexNormals();
+  return geometry;
+}

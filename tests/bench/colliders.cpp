@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: MIT
+// Suite colliders: what 1, 100 and 4,000 colliders cost, the hands of a hundred people among them.
+#include <cmath>
+#include <cstdint>
+#include <random>
+
+#include "tests/bench/hung_cloth.h"
+#include "tests/bench/simulated.h"
+#include "tests/bench/suite.h"
+
+namespace clothstream::bench {
+namespace {
+
+constexpr std::size_t kHand = 40;  // capsules of one person's two hands
+
+// Hands in a room of 6 x 2.5 x 6 m in whose middle the cloth hangs: some in the cloth, most far away, all
+// moving.
+std::vector<simulation::MovingCollider> hands(std::size_t count) {
+  std::mt19937 random(4);
+  std::uniform_real_distribution<float> unit(-1, 1);
+  const auto vector = [&] { return scene::Vec3(unit(random), unit(random), unit(random)); };
+  std::vector<simulation::MovingCollider> colliders;
+  scene::Vec3 palm = scene::Vec3::Zero(), way = scene::Vec3::Zero();
+  for (std::size_t i = 0; i < count; ++i) {
+    if (i % kHand == 0) {
+      palm = vector().cwiseProduct(scene::Vec3(3, 1.25f, 3)) - scene::Vec3(0, 1, 0);
+      way = 0.014f * vector();  // in a tick: 1 m/s
+    }
+    const scene::Quaternion turn(Eigen::AngleAxisf(3 * unit(random), vector().normalized()));
+    const scene::Vec3 place = palm + 0.1f * vector();
+    colliders.push_back(
+        {scene::Capsule{.radius = 0.008f, .length = 0.025f}, {place, turn}, {place + way, turn}, 1});
+  }
+  return colliders;
+}
+
+}  // namespace
+
+Rows runColliders(vulkan::Device& device, const Settings& settings) {
+  const std::uint32_t size = settings.size.value_or(128);
+  const scene::Scene scene = hungCloth(size);
+  Rows rows;
+  for (const std::size_t count : {std::size_t{0}, std::size_t{1}, std::size_t{100}, std::size_t{4000}}) {
+    const simulation::TickInputs inputs{scene.environment, hands(count)};
+    Simulated simulated(device, scene, {settings.rowsPerInvocation, settings.workgroupSize, {}});
+    const double referenceSeconds = simulated.check(inputs);
+    simulated.tick(inputs);
+    simulated.restart();
+    double spent = 0;
+    while (spent < settings.seconds || simulated.wall().count() < 7)
+      spent += secondsOf([&] { simulated.tick(inputs); });
+    const double nodeSteps = static_cast<double>(size) * size * scene.substeps;
+    rows.push_back({{"suite", "colliders"},
+                    {"size", size},
+                    {"colliders", count},
+                    {"tickMsMin", simulated.wall().min() * 1e3},
+                    {"tickMsMedian", simulated.wall().median() * 1e3},
+                    {"tickMsP99", simulated.wall().p99() * 1e3},
+                    {"nearMsMedian", count > 0 ? simulated.near().median() * 1e3 : 0},
+                    {"nsMin", simulated.wall().min() / nodeSteps * 1e9},
+                    {"nsMedian", simulated.wall().median() / nodeSteps * 1e9},
+                    {"referenceMs", referenceSeconds * 1e3},
+                    {"ticks", simulated.wall().count()},
+                    {"device", device.info().name}});
+  }
+  return rows;
+}
+
+}  // namespace clothstream::bench
