@@ -75,33 +75,37 @@ Problem place(const MeshSource& source, const MeshOptions& options, const MeshLi
   return std::nullopt;
 }
 
-// Cells of the weld distance; 21 bits an axis wrap, which only makes some cells share a key.
+// 21 bits an axis wrap, which only makes some cells share a key.
 std::uint64_t cellKey(std::int64_t x, std::int64_t y, std::int64_t z) {
   constexpr std::int64_t kMask = (1 << 21) - 1;
   return static_cast<std::uint64_t>((x & kMask) | (y & kMask) << 21 | (z & kMask) << 42);
 }
 
-// Of each vertex the first one before it that is near enough, else itself.
+// Of each vertex the first one before it that is near enough, else itself. Cells are some times larger, so
+// that what is near enough mostly lies in the vertex's own.
 std::vector<std::uint32_t> weld(const std::vector<Vec3>& positions, float distance) {
   std::vector<std::uint32_t> first(positions.size());
   std::iota(first.begin(), first.end(), 0u);
   if (distance <= 0) return first;
+  const double reach = distance, cell = 4 * reach;
+  const auto cellOf = [&](double coordinate) {
+    return static_cast<std::int64_t>(std::floor(coordinate / cell));
+  };
   std::unordered_multimap<std::uint64_t, std::uint32_t> cells;
   cells.reserve(positions.size());
   for (std::uint32_t i = 0; i < positions.size(); ++i) {
-    const auto cell = [&](int axis) {
-      return static_cast<std::int64_t>(std::floor(double{positions[i][axis]} / double{distance}));
-    };
+    const Eigen::Vector3d p = positions[i].cast<double>();
     std::uint32_t nearest = i;
-    for (int neighbour = 0; neighbour < 27; ++neighbour) {
-      const auto [begin, end] = cells.equal_range(
-          cellKey(cell(0) + neighbour % 3 - 1, cell(1) + neighbour / 3 % 3 - 1, cell(2) + neighbour / 9 - 1));
-      for (auto it = begin; it != end; ++it)
-        if ((positions[it->second] - positions[i]).norm() <= distance)
-          nearest = std::min(nearest, it->second);
-    }
+    for (std::int64_t x = cellOf(p.x() - reach); x <= cellOf(p.x() + reach); ++x)
+      for (std::int64_t y = cellOf(p.y() - reach); y <= cellOf(p.y() + reach); ++y)
+        for (std::int64_t z = cellOf(p.z() - reach); z <= cellOf(p.z() + reach); ++z) {
+          const auto [begin, end] = cells.equal_range(cellKey(x, y, z));
+          for (auto it = begin; it != end; ++it)
+            if ((positions[it->second] - positions[i]).norm() <= distance)
+              nearest = std::min(nearest, it->second);
+        }
     first[i] = nearest;
-    if (nearest == i) cells.emplace(cellKey(cell(0), cell(1), cell(2)), i);
+    if (nearest == i) cells.emplace(cellKey(cellOf(p.x()), cellOf(p.y()), cellOf(p.z())), i);
   }
   return first;
 }

@@ -14,37 +14,59 @@ void appendTiles(std::uint32_t cloth, std::uint32_t nodes, std::size_t nodesBefo
         {{static_cast<float>(cloth), static_cast<float>(first), static_cast<float>(nodesBefore + first), 0}});
 }
 
+// Texels from `first` to the table's end.
+shared::vec4 listFrom(std::size_t first, std::size_t end) {
+  return {static_cast<float>(first & 0xFFFF), static_cast<float>(first >> 16),
+          static_cast<float>(end - first), 0};
+}
+
 void appendSprings(const scene::Mesh& mesh, std::uint32_t firstNode, std::span<shared::MeshNodeRecord> nodes,
-                   std::vector<shared::SpringEndRecord>& ends) {
+                   std::vector<shared::SpringPairRecord>& pairs) {
   const scene::SpringAdjacency adjacency = scene::springAdjacency(mesh.links, mesh.nodeCount());
+  const auto numberOf = [&](std::uint32_t node) { return static_cast<float>(firstNode + node + 1); };
   for (std::uint32_t node = 0; node < mesh.nodeCount(); ++node) {
-    nodes[node].firstSpring = static_cast<std::uint32_t>(ends.size());
-    nodes[node].springCount = static_cast<std::uint32_t>(adjacency.of(node).size());
+    const std::size_t first = pairs.size();
+    bool full = true;
     for (const std::uint32_t spring : adjacency.of(node)) {
       const scene::SpringLink& link = mesh.links[spring];
-      const std::uint32_t other = firstNode + (link.a == node ? link.b : link.a);
-      ends.push_back({shared::packOther(other, static_cast<std::uint32_t>(link.kind)), link.restLength});
+      const float other = numberOf(link.a == node ? link.b : link.a);
+      const float signedOther = link.kind == scene::SpringKind::shear ? -other : other;
+      const float signedLength = link.kind == scene::SpringKind::bend ? -link.restLength : link.restLength;
+      if (full)
+        pairs.push_back({{signedOther, signedLength, numberOf(node), 1}});
+      else
+        pairs.back().ends.z = signedOther, pairs.back().ends.w = signedLength;
+      full = !full;
     }
+    nodes[node].springs = listFrom(first, pairs.size());
   }
 }
 
 // In the order of the triangles.
 void appendCorners(const scene::Mesh& mesh, std::uint32_t firstNode, std::span<shared::MeshNodeRecord> nodes,
-                   std::vector<shared::TriangleCornerRecord>& corners) {
+                   std::vector<shared::CornerPairRecord>& pairs) {
+  std::vector<std::uint32_t> counts(mesh.nodeCount(), 0);
   for (const scene::Triangle& triangle : mesh.shape.triangles)
-    for (const std::uint32_t node : triangle) ++nodes[node].triangleCount;
-  std::size_t next = corners.size();
-  for (shared::MeshNodeRecord& node : nodes) {
-    node.firstTriangle = static_cast<std::uint32_t>(next);
-    next += node.triangleCount;
-    node.triangleCount = 0;
+    for (const std::uint32_t node : triangle) ++counts[node];
+  for (std::uint32_t node = 0; node < mesh.nodeCount(); ++node) {
+    const std::uint32_t texels = (counts[node] + 1) / 2;
+    const auto self = static_cast<float>(firstNode + node);
+    nodes[node].triangles = listFrom(pairs.size(), pairs.size() + texels);
+    pairs.resize(pairs.size() + texels, {{self, self, self, self}});
+    counts[node] = 0;  // now how many are written
   }
-  corners.resize(next);
   for (const scene::Triangle& triangle : mesh.shape.triangles)
     for (std::size_t i = 0; i < 3; ++i) {
-      shared::MeshNodeRecord& node = nodes[triangle[i]];
-      corners[node.firstTriangle + node.triangleCount++] = {firstNode + triangle[(i + 1) % 3],
-                                                            firstNode + triangle[(i + 2) % 3]};
+      const std::uint32_t node = triangle[i], written = counts[node]++;
+      const shared::vec4& list = nodes[node].triangles;
+      const std::size_t start = static_cast<std::size_t>(list.x) + (static_cast<std::size_t>(list.y) << 16);
+      const auto second = static_cast<float>(firstNode + triangle[(i + 1) % 3]);
+      const auto third = static_cast<float>(firstNode + triangle[(i + 2) % 3]);
+      shared::vec4& corners = pairs[start + written / 2].corners;
+      if (written % 2 == 0)
+        corners.x = second, corners.y = third;
+      else
+        corners.z = second, corners.w = third;
     }
 }
 
@@ -70,7 +92,7 @@ MeshTables meshTables(std::span<const scene::Cloth> cloths, std::uint32_t workgr
     if (!cloths[i].mesh) continue;
     const scene::Mesh& mesh = *cloths[i].mesh;
     const std::size_t before = tables.nodes.size();
-    tables.nodes.resize(before + mesh.nodeCount(), {0, 0, 0, 0});
+    tables.nodes.resize(before + mesh.nodeCount());
     const std::span<shared::MeshNodeRecord> nodes = std::span(tables.nodes).subspan(before);
     appendSprings(mesh, firstNode, nodes, tables.springEnds);
     appendCorners(mesh, firstNode, nodes, tables.corners);

@@ -16,8 +16,8 @@ struct MeshTables {
   // One a workgroup: cloth, first node in the cloth, its number among the nodes of all meshes.
   Tiles tiles;
   std::vector<shared::MeshNodeRecord> nodes;  // of all meshes
-  std::vector<shared::SpringEndRecord> springEnds;
-  std::vector<shared::TriangleCornerRecord> corners;
+  std::vector<shared::SpringPairRecord> springEnds;
+  std::vector<shared::CornerPairRecord> corners;
 };
 
 // Empty where no cloth is a mesh.

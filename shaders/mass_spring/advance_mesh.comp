@@ -9,35 +9,40 @@
 #include "shaders/mass_spring/state.glsl"
 #include "shaders/shared/mesh_node.glsl"
 
-layout(std430, binding = CLOTHSTREAM_MESH_BINDING + 2) readonly buffer SpringEnds {
-  SpringEndRecord springEnds[];
-};
+layout(binding = CLOTHSTREAM_MESH_BINDING + 2) uniform samplerBuffer springEnds;  // SpringPairRecord
 
-vec3 springForces(Node here, MeshNodeRecord lists, vec4 stiffness, vec4 damping) {
+// Of the spring that `end` is half a SpringPairRecord of.
+vec3 endForce(Node here, vec2 end, vec4 stiffness, vec4 damping) {
+  bool isShear = end.x < 0.0;
+  bool isBend = end.y < 0.0;
+  Spring spring = Spring(isShear ? stiffness.y : (isBend ? stiffness.z : stiffness.x),
+                         isShear ? damping.y : (isBend ? damping.z : damping.x), abs(end.y));
+  return springForce(here, fetchNode(uint(abs(end.x)) - 1), spring);
+}
+
+vec3 springForces(Node here, MeshNode self, vec4 stiffness, vec4 damping) {
   precise vec3 force = vec3(0.0);
-  uint end = lists.firstSpring + lists.springCount;
-  uint i = lists.firstSpring;
-  while (i < end) {
-    SpringEndRecord ending = springEnds[i];
-    uint kind = springKind(ending.other);
-    Spring spring = Spring(stiffness[kind], damping[kind], ending.restLength);
-    force = force + springForce(here, fetchNode(otherNode(ending.other)), spring);
-    ++i;
+  TexelRange springs = springsOf(self);
+  while (springs.first < springs.end) {
+    vec4 ends = texelFetch(springEnds, springs.first);
+    force = force + endForce(here, ends.xy, stiffness, damping);
+    force = force + endForce(here, ends.zw, stiffness, damping);
+    ++springs.first;
   }
   return force;
 }
 
-vec3 airForces(Node here, MeshNodeRecord lists, vec4 resistance) {
+vec3 airForces(Node here, MeshNode self, vec4 resistance) {
   precise float drag = push.windAir.w * resistance.x;
   precise float lift = push.windAir.w * resistance.y;
   Air air = Air(push.windAir.xyz, drag, lift);
   precise vec3 force = vec3(0.0);
-  uint end = lists.firstTriangle + lists.triangleCount;
-  uint i = lists.firstTriangle;
-  while (i < end) {
-    TriangleCornerRecord corner = triangleCorners[i];
-    force = force + airForce(here, fetchNode(corner.second), fetchNode(corner.third), air);
-    ++i;
+  TexelRange triangles = trianglesOf(self);
+  while (triangles.first < triangles.end) {
+    vec4 corners = texelFetch(triangleCorners, triangles.first);
+    force = force + airForce(here, fetchNode(uint(corners.x)), fetchNode(uint(corners.y)), air);
+    force = force + airForce(here, fetchNode(uint(corners.z)), fetchNode(uint(corners.w)), air);
+    ++triangles.first;
   }
   return force;
 }
@@ -52,9 +57,9 @@ void main() {
   vec4 damping = texelFetch(cloths, self.cloth + 3);
   Node here = fetchNode(self.index);
   here.velocity = fetchVelocity(self.index);
-  precise vec3 force = springForces(here, self.lists, stiffness, damping);
+  precise vec3 force = springForces(here, self, stiffness, damping);
   if (kAir) {
-    force = force + airForces(here, self.lists, texelFetch(cloths, self.cloth + 4));
+    force = force + airForces(here, self, texelFetch(cloths, self.cloth + 4));
   }
   Node moved = moveNode(here, force, texelFetch(cloths, self.cloth + 1).w);
   if (kColliders && moved.inverseMass > 0.0) {

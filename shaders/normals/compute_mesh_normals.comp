@@ -17,6 +17,13 @@ vec3 fetchPosition(uint index) {
   return texelFetch(positions, int(index)).xyz;
 }
 
+// Twice the area vector of a triangle.
+vec3 areaOf(vec3 here, vec2 others) {
+  precise vec3 toSecond = fetchPosition(uint(others.x)) - here;
+  precise vec3 toThird = fetchPosition(uint(others.y)) - here;
+  return crossProduct(toSecond, toThird);
+}
+
 // Writes cannot race: each node belongs to one invocation.
 void main() {
   MeshNode self = locateMeshNode(0);
@@ -25,14 +32,12 @@ void main() {
   }
   vec3 here = fetchPosition(self.index);
   precise vec3 sum = vec3(0.0);
-  uint end = self.lists.firstTriangle + self.lists.triangleCount;
-  uint i = self.lists.firstTriangle;
-  while (i < end) {
-    TriangleCornerRecord corner = triangleCorners[i];
-    precise vec3 toSecond = fetchPosition(corner.second) - here;
-    precise vec3 toThird = fetchPosition(corner.third) - here;
-    sum = sum + crossProduct(toSecond, toThird);
-    ++i;
+  TexelRange triangles = trianglesOf(self);
+  while (triangles.first < triangles.end) {
+    vec4 corners = texelFetch(triangleCorners, triangles.first);
+    sum = sum + areaOf(here, corners.xy);
+    sum = sum + areaOf(here, corners.zw);
+    ++triangles.first;
   }
   precise float squared = dotProduct(sum, sum);
   precise vec3 normal = squared < 1e-30 ? vec3(0.0, 0.0, 1.0) : sum * reciprocalSquareRoot(squared);

@@ -7,43 +7,34 @@
 
 CLOTHSTREAM_SHARED_BEGIN
 
-// Where the springs and triangles of a node are listed. Nodes of all meshes in their order.
+// Read as texels of four floats, as the tables of simulation.h are.
+
+// Where the springs and triangles of a node are listed, two texels. Nodes of all meshes in their order.
+#define CLOTHSTREAM_MESH_NODE_TEXELS 2
 struct MeshNodeRecord {
-  uint32_t firstSpring;
-  uint32_t springCount;
-  uint32_t firstTriangle;
-  uint32_t triangleCount;
+  vec4 springs;    // first texel modulo 2^16, first / 2^16, how many texels
+  vec4 triangles;  // likewise
 };
 
-// A spring as one of its nodes sees it, in the order of scene::springAdjacency().
-struct SpringEndRecord {
-  uint32_t other;  // node of the scene; the kind of spring in the two highest bits
-  float restLength;
+// Two springs as one of their nodes sees them, in the order of scene::springAdjacency(): the other node's
+// number in the scene plus one, negative of a shear spring; the rest length, negative of a bend spring. The
+// last texel is filled with a spring from the node to itself, which pulls with exactly zero.
+struct SpringPairRecord {
+  vec4 ends;
 };
 
-// A triangle as one of its corners sees it: the others, nodes of the scene, in the triangle's own sense.
-struct TriangleCornerRecord {
-  uint32_t second;
-  uint32_t third;
+// Two triangles as one of their corners sees them: the others, nodes of the scene, in the triangle's own
+// sense. The last texel is filled with a triangle of the node alone, which has exactly no area.
+struct CornerPairRecord {
+  vec4 corners;
 };
-
-CLOTHSTREAM_SHARED_FUNCTION uint32_t packOther(uint32_t node, uint32_t kind) {
-  return node | (kind << 30);
-}
-CLOTHSTREAM_SHARED_FUNCTION uint32_t otherNode(uint32_t other) {
-  return other & 0x3FFFFFFFu;
-}
-CLOTHSTREAM_SHARED_FUNCTION uint32_t springKind(uint32_t other) {
-  return other >> 30;
-}
 
 CLOTHSTREAM_SHARED_END
 
 #ifdef __cplusplus
 namespace clothstream::shared {
-static_assert(sizeof(MeshNodeRecord) == 16 && offsetof(MeshNodeRecord, triangleCount) == 12);
-static_assert(sizeof(SpringEndRecord) == 8 && offsetof(SpringEndRecord, restLength) == 4);
-static_assert(sizeof(TriangleCornerRecord) == 8 && offsetof(TriangleCornerRecord, third) == 4);
+static_assert(sizeof(MeshNodeRecord) == 32 && offsetof(MeshNodeRecord, triangles) == 16);
+static_assert(sizeof(SpringPairRecord) == 16 && sizeof(CornerPairRecord) == 16);
 }  // namespace clothstream::shared
 #endif
 

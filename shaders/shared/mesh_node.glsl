@@ -14,18 +14,14 @@ layout(local_size_x_id = 0) in;
 layout(binding = 0) uniform samplerBuffer cloths;  // ClothRecord
 layout(binding = 1) uniform samplerBuffer tiles;   // TileRecord of meshes
 // Where a kernel binds the lists; it says so before it includes this.
-layout(std430, binding = CLOTHSTREAM_MESH_BINDING) readonly buffer MeshNodes {
-  MeshNodeRecord meshNodes[];
-};
-layout(std430, binding = CLOTHSTREAM_MESH_BINDING + 1) readonly buffer TriangleCorners {
-  TriangleCornerRecord triangleCorners[];
-};
+layout(binding = CLOTHSTREAM_MESH_BINDING) uniform samplerBuffer meshNodes;            // MeshNodeRecord
+layout(binding = CLOTHSTREAM_MESH_BINDING + 1) uniform samplerBuffer triangleCorners;  // CornerPairRecord
 
 struct MeshNode {
   bool exists;
   int cloth;   // first texel of its record
   uint index;  // in the scene
-  MeshNodeRecord lists;
+  int lists;   // first texel of its MeshNodeRecord
 };
 
 MeshNode locateMeshNode(uint firstTile) {
@@ -36,10 +32,25 @@ MeshNode locateMeshNode(uint firstTile) {
   uint inCloth = uint(tile.y) + gl_LocalInvocationID.x;
   node.exists = inCloth < uint(place.w);
   node.index = uint(place.x) + (uint(place.y) << 16) + inCloth;
-  if (node.exists) {
-    node.lists = meshNodes[uint(tile.z) + gl_LocalInvocationID.x];
-  }
+  node.lists = CLOTHSTREAM_MESH_NODE_TEXELS * int(uint(tile.z) + gl_LocalInvocationID.x);
   return node;
+}
+
+struct TexelRange {
+  int first;
+  int end;
+};
+
+TexelRange springsOf(MeshNode node) {
+  vec4 list = texelFetch(meshNodes, node.lists);
+  int first = int(uint(list.x) + (uint(list.y) << 16));
+  return TexelRange(first, first + int(list.z));
+}
+
+TexelRange trianglesOf(MeshNode node) {
+  vec4 list = texelFetch(meshNodes, node.lists + 1);
+  int first = int(uint(list.x) + (uint(list.y) << 16));
+  return TexelRange(first, first + int(list.z));
 }
 
 #endif
