@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
 #include <cmath>
+#include <numeric>
+#include <random>
 #include <string>
 #include <vector>
 
@@ -167,6 +169,74 @@ TEST(Hierarchical, SendsAStillClothInATwentiethOfABitAVertex) {
   std::size_t bits = 0;
   for (std::size_t i = 0; i < last.sectionCount; ++i) bits += std::size_t{8} * last.sectionBytes[i];
   EXPECT_LT(bits, 10'000 / 20);
+}
+
+// A grid as a mesh: each quad cut one way or the other, vertices numbered in any order.
+struct CutGrid {
+  explicit CutGrid(std::uint32_t edge) : numbers(edge * edge) {
+    std::mt19937 random(7);
+    std::iota(numbers.begin(), numbers.end(), 0u);
+    std::shuffle(numbers.begin(), numbers.end(), random);
+    layout = square(edge, kCodecHierarchical);
+    layout.cloths[0].rows = layout.cloths[0].columns = 0;
+    std::vector<std::uint32_t>& triangles = layout.cloths[0].triangles;
+    for (std::uint32_t row = 0; row + 1 < edge; ++row) {
+      for (std::uint32_t column = 0; column + 1 < edge; ++column) {
+        const std::uint32_t i = row * edge + column;
+        const std::uint32_t a = numbers[i], b = numbers[i + 1], c = numbers[i + edge],
+                            d = numbers[i + edge + 1];
+        if (random() % 2 == 0)
+          triangles.insert(triangles.end(), {a, c, b, b, c, d});
+        else
+          triangles.insert(triangles.end(), {a, c, d, a, d, b});
+      }
+    }
+  }
+
+  MotionFrame renumbered(const MotionFrame& grid) const {
+    MotionFrame mesh = grid;
+    for (std::size_t i = 0; i < numbers.size(); ++i) {
+      std::copy_n(&grid.positions[3 * i], 3, &mesh.positions[3 * std::size_t{numbers[i]}]);
+    }
+    return mesh;
+  }
+
+  std::vector<std::uint32_t> numbers;
+  StreamLayout layout;
+};
+
+TEST(Hierarchical, FindsAMeshsOrderInItsTriangles) {
+  const CutGrid mesh(64);
+  StreamLayout row = mesh.layout;
+  row.cloths[0].triangles.clear();
+  Loop meshLoop(mesh.layout), rowLoop(row);
+  std::size_t meshBytes = 0, rowBytes = 0;
+  const auto bytesOf = [](const PacketHeader& header) {
+    std::size_t sum = 0;
+    for (std::size_t i = 0; i < header.sectionCount; ++i) sum += header.sectionBytes[i];
+    return sum;
+  };
+  for (std::uint64_t tick = 1; tick <= 20; ++tick) {
+    const MotionFrame frame = mesh.renumbered(sampleMotion(square(64, kCodecHierarchical), tick, 0.03f));
+    meshBytes += bytesOf(meshLoop.send(tick, PacketKind::predicted, frame));
+    rowBytes += bytesOf(rowLoop.send(tick, PacketKind::predicted, frame));
+  }
+  EXPECT_LT(2 * meshBytes, rowBytes);
+}
+
+TEST(Hierarchical, CodesMeshesOfAnyShape) {
+  // A fan whose hub comes last, triangles that share no vertex, one that names a vertex thrice, lone
+  // vertices.
+  StreamLayout layout{.epoch = 2, .codec = kCodecHierarchical, .cloths = {}};
+  ClothLayout fan{.vertexCount = 3001}, apart{.vertexCount = 300}, odd{.vertexCount = 40};
+  for (std::uint32_t i = 0; i + 1 < 3000; ++i) fan.triangles.insert(fan.triangles.end(), {i, i + 1, 3000});
+  for (std::uint32_t i = 0; i < 300; ++i) apart.triangles.push_back(i);
+  odd.triangles = {5, 5, 5, 6, 7, 6};
+  layout.cloths = {fan, apart, odd};
+  Loop loop(layout);
+  for (std::uint64_t tick = 1; tick <= 5; ++tick) {
+    loop.send(tick, PacketKind::predicted, sampleMotion(layout, tick, 0.03f));
+  }
 }
 
 TEST(Hierarchical, LetsPinsStandStillInAMovingCloth) {

@@ -5,11 +5,121 @@
 #include <algorithm>
 #include <bit>
 #include <span>
+#include <utility>
+#include <vector>
 
 namespace clothstream::codec::hierarchical {
 namespace {
 
 constexpr std::uint32_t kNotCoded = ~0u;
+
+// Of a level of a mesh: where a search for others ends. They bound the work, whatever the mesh is.
+constexpr std::size_t kMaxVisited = 64, kMaxFound = 12;
+constexpr std::size_t kMaxMeshLevels = 24, kFewVertices = 16;
+constexpr std::size_t kMeshPhases = 5;  // of a level
+
+// Which vertices of a level of a mesh are near which others: the nearest first, then by number.
+struct Graph {
+  std::span<const std::uint32_t> of(std::uint32_t vertex) const {
+    return std::span(others).subspan(starts[vertex], starts[vertex + 1] - starts[vertex]);
+  }
+
+  std::vector<std::size_t> starts;  // by vertex, and the end
+  std::vector<std::uint32_t> others;
+};
+
+// Those that have an edge in common: round each vertex from triangle to triangle, as far as that goes.
+Graph edgesOf(const ClothLayout& cloth) {
+  // Each triangle leads, round each of its corners, from one of the other two to the last.
+  struct Link {
+    std::uint32_t centre, from, to;
+    auto operator<=>(const Link&) const = default;
+  };
+  std::vector<Link> links;
+  links.reserve(cloth.triangles.size());
+  for (std::size_t i = 0; i < cloth.triangles.size(); i += 3) {
+    const std::uint32_t* t = &cloth.triangles[i];
+    if (t[0] == t[1] || t[1] == t[2] || t[2] == t[0]) continue;
+    for (std::size_t c = 0; c < 3; ++c) links.push_back({t[c], t[(c + 1) % 3], t[(c + 2) % 3]});
+  }
+  std::sort(links.begin(), links.end());
+  Graph graph;
+  graph.starts.assign(std::size_t{cloth.vertexCount} + 1, 0);
+  std::vector<std::uint32_t> seen(cloth.vertexCount, kNotCoded);
+  std::vector<std::uint32_t> ends;
+  auto link = links.begin();
+  for (std::uint32_t v = 0; v < cloth.vertexCount; ++v) {
+    const auto first = link;
+    while (link != links.end() && link->centre == v) ++link;
+    const auto walk = [&](std::uint32_t at) {
+      while (seen[at] != v) {
+        seen[at] = v;
+        graph.others.push_back(at);
+        const auto next = std::lower_bound(first, link, at,
+                                           [](const Link& l, std::uint32_t from) { return l.from < from; });
+        if (next != link && next->from == at) at = next->to;
+      }
+    };
+    // A border's first neighbour is no triangle's last.
+    ends.clear();
+    for (auto l = first; l != link; ++l) ends.push_back(l->to);
+    std::sort(ends.begin(), ends.end());
+    for (auto l = first; l != link; ++l) {
+      if (!std::binary_search(ends.begin(), ends.end(), l->from)) walk(l->from);
+    }
+    for (auto l = first; l != link; ++l) walk(l->from);
+    for (auto l = first; l != link; ++l) walk(l->to);
+    graph.starts[v + 1] = graph.others.size();
+  }
+  return graph;
+}
+
+// Breadth-first searches in the graphs of one mesh.
+class Search {
+ public:
+  explicit Search(std::uint32_t vertices) : seen_(vertices, 0) {}
+
+  // The first of those round `start` that are wanted, at most kMaxFound, up to so many edges away.
+  template <typename IsWanted>
+  std::span<const std::uint32_t> find(const Graph& graph, std::uint32_t start, std::size_t edges,
+                                      IsWanted&& isWanted) {
+    ++search_;
+    visited_.assign(1, start);
+    seen_[start] = search_;
+    found_.clear();
+    std::size_t next = 0;
+    for (std::size_t edge = 0; edge < edges; ++edge) {
+      for (const std::size_t end = visited_.size(); next < end; ++next) {
+        for (const std::uint32_t other : graph.of(visited_[next])) {
+          if (seen_[other] == search_) continue;
+          if (visited_.size() == kMaxVisited || found_.size() == kMaxFound) return found_;
+          seen_[other] = search_;
+          visited_.push_back(other);
+          if (isWanted(other)) found_.push_back(other);
+        }
+      }
+    }
+    return found_;
+  }
+
+ private:
+  std::vector<std::uint32_t> seen_;  // by vertex: the last search that came by
+  std::uint32_t search_ = 0;
+  std::vector<std::uint32_t> visited_, found_;
+};
+
+// In this order those that have no neighbour among those taken before.
+std::vector<std::uint32_t> takeApart(const Graph& graph, std::span<const std::uint32_t> vertices,
+                                     std::vector<bool>& taken) {
+  std::vector<std::uint32_t> apart;
+  for (const std::uint32_t vertex : vertices) {
+    const auto near = graph.of(vertex);
+    if (std::any_of(near.begin(), near.end(), [&](std::uint32_t other) { return taken[other]; })) continue;
+    taken[vertex] = true;
+    apart.push_back(vertex);
+  }
+  return apart;
+}
 
 // Rows or columns of a grid at one level: the multiples of a stride, and the last one.
 class Axis {
@@ -51,6 +161,54 @@ class Builder {
     addNearest();
   }
 
+  // Each level is what of the level below stands apart.
+  void addMesh(std::uint32_t first, const ClothLayout& cloth) {
+    first_ = first;
+    std::fill_n(slotOf_.data() + first, cloth.vertexCount, kNotCoded);
+    struct Level {
+      std::vector<std::uint32_t> vertices;
+      Graph graph;
+    };
+    std::vector<Level> levels(1);
+    levels[0].graph = edgesOf(cloth);
+    for (std::uint32_t v = 0; v < cloth.vertexCount; ++v) levels[0].vertices.push_back(v);
+    Search search(cloth.vertexCount);
+    while (levels.size() < kMaxMeshLevels && levels.back().vertices.size() > kFewVertices) {
+      const Level& fine = levels.back();
+      std::vector<bool> taken(cloth.vertexCount);
+      Level coarse{takeApart(fine.graph, fine.vertices, taken), {}};
+      if (coarse.vertices.size() == fine.vertices.size()) break;
+      coarse.graph.starts.assign(std::size_t{cloth.vertexCount} + 1, 0);
+      std::size_t next = 0;
+      for (std::uint32_t v = 0; v < cloth.vertexCount; ++v) {
+        if (next < coarse.vertices.size() && coarse.vertices[next] == v) {
+          ++next;
+          const auto near = search.find(fine.graph, v, 3, [&](std::uint32_t other) { return taken[other]; });
+          coarse.graph.others.insert(coarse.graph.others.end(), near.begin(), near.end());
+        }
+        coarse.graph.starts[v + 1] = coarse.graph.others.size();
+      }
+      levels.push_back(std::move(coarse));
+    }
+    addCoarsest(levels.back().vertices);
+    for (std::size_t level = levels.size() - 1; level-- > 0;) {
+      const auto& [vertices, graph] = levels[level];
+      const std::uint32_t weightClass = 2 * static_cast<std::uint32_t>(std::min<std::size_t>(level, 2));
+      std::vector<std::uint32_t> left;
+      for (const std::uint32_t v : vertices) {
+        if (slotOf_[first + v] == kNotCoded) left.push_back(v);
+      }
+      for (std::size_t phase = 0; phase < kMeshPhases && !left.empty(); ++phase) {
+        std::vector<bool> taken(cloth.vertexCount);
+        const bool last = phase + 1 == kMeshPhases;
+        const std::vector<std::uint32_t> apart = last ? left : takeApart(graph, left, taken);
+        addPhase(apart, weightClass + (phase == 0 ? 0 : 1), graph, search);
+        std::erase_if(left, [&](std::uint32_t v) { return taken[v]; });
+      }
+    }
+    for (std::uint32_t v = 0; v < cloth.vertexCount; ++v) setNearest(v, levels[0].graph.of(v));
+  }
+
   bool finish() {
     if (!hierarchy_.phases.allocate(phaseCount_)) return false;
     std::copy_n(phases_.data(), phaseCount_, hierarchy_.phases.data());
@@ -58,6 +216,70 @@ class Builder {
   }
 
  private:
+  // A few, each from those before it; or many that have no neighbours left, from nothing.
+  void addCoarsest(std::span<const std::uint32_t> vertices) {
+    const bool few = vertices.size() <= kFewVertices;
+    std::vector<std::uint32_t> known;
+    Neighbours neighbours;
+    openPhase(kWeightClasses);
+    for (const std::uint32_t v : vertices) {
+      if (few) openPhase(kWeightClasses);
+      setParents(neighbours,
+                 std::span<const std::uint32_t>(known).first(std::min<std::size_t>(known.size(), 4)));
+      setRing(neighbours, known);
+      if (few) known.push_back(next_);
+      code(first_ + v, neighbours);
+    }
+  }
+
+  void addPhase(std::span<const std::uint32_t> vertices, std::uint32_t weightClass, const Graph& graph,
+                Search& search) {
+    openPhase(weightClass);
+    const std::uint32_t begin = next_;
+    for (const std::uint32_t v : vertices) {
+      const auto found = search.find(graph, v, kMaxVisited,
+                                     [&](std::uint32_t other) { return slotOf_[first_ + other] < begin; });
+      std::array<std::uint32_t, kMaxFound> known;
+      for (std::size_t i = 0; i < found.size(); ++i) known[i] = slotOf_[first_ + found[i]];
+      const auto direct = graph.of(v);
+      std::size_t near = 0;
+      while (near < found.size() && std::find(direct.begin(), direct.end(), found[near]) != direct.end())
+        ++near;
+      Neighbours neighbours;
+      std::size_t parents = near;
+      if (near >= 4) {
+        // Two pairs, each across from one side to the other; they go to the front.
+        const std::size_t half = near / 2, quarter = near / 4;
+        const std::array<std::uint32_t, 4> pairs{known[0], known[half], known[quarter],
+                                                 known[quarter + half]};
+        const auto isPair = [&](std::uint32_t slot) {
+          return std::find(pairs.begin(), pairs.end(), slot) != pairs.end();
+        };
+        std::stable_partition(known.begin(), known.begin() + static_cast<std::ptrdiff_t>(found.size()),
+                              isPair);
+        std::copy(pairs.begin(), pairs.end(), known.begin());
+        parents = 4;
+      } else if (near < 2) {
+        parents = std::min<std::size_t>(found.size(), 4);
+      }
+      const std::span<const std::uint32_t> all = std::span<const std::uint32_t>(known).first(found.size());
+      setParents(neighbours, all.first(parents));
+      setRing(neighbours, all.subspan(parents));
+      code(first_ + v, neighbours);
+    }
+  }
+
+  // Four of them, spread over all.
+  void setNearest(std::uint32_t vertex, std::span<const std::uint32_t> others) {
+    const std::uint32_t slot = slotOf_[first_ + vertex];
+    for (std::size_t i = 0; i < 4; ++i) {
+      const bool few = others.size() < 4;
+      const std::size_t choice = few ? i : i * others.size() / 4;
+      hierarchy_.neighbours[slot].nearest[i] =
+          choice < others.size() ? slotOf_[first_ + others[choice]] : slot;
+    }
+  }
+
   std::uint32_t vertexAt(std::int64_t column, std::int64_t row) const {
     return first_ + static_cast<std::uint32_t>(row * columns_ + column);
   }
@@ -175,14 +397,19 @@ class Builder {
 }  // namespace
 
 bool Hierarchy::build(const StreamLayout& layout) {
-  // Four corners, and two phases a level.
-  constexpr std::size_t kMaxPhasesPerCloth = 4 + 2 * 32;
+  // Of a grid four corners, and two a level; of a mesh more of the first, fewer of the others.
+  constexpr std::size_t kMaxPhasesPerCloth = 4 + 2 * 32 + 80;
+  static_assert(kMaxPhasesPerCloth >= kFewVertices + kMeshPhases * kMaxMeshLevels);
   Builder builder(*this, layout.vertexCount());
   if (!builder.allocate(kMaxPhasesPerCloth * layout.cloths.size() + 1)) return false;
   std::uint32_t first = 0;
   for (const ClothLayout& cloth : layout.cloths) {
-    const bool grid = cloth.rows > 0;
-    builder.addGrid(first, grid ? cloth.rows : 1, grid ? cloth.columns : cloth.vertexCount);
+    if (!cloth.triangles.empty()) {
+      builder.addMesh(first, cloth);
+    } else {
+      const bool grid = cloth.rows > 0;
+      builder.addGrid(first, grid ? cloth.rows : 1, grid ? cloth.columns : cloth.vertexCount);
+    }
     first += cloth.vertexCount;
   }
   return builder.finish();

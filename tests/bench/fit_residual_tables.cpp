@@ -1,0 +1,181 @@
+// SPDX-License-Identifier: MIT
+// Fits the tables of codec 2 to cloth in motion and prints residual_tables.cpp: only when the format changes.
+// The motions are others than those of suite codec_motions.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "proto/codec/hierarchical/hierarchical_encoder.h"
+#include "proto/codec/hierarchical/residual_model.h"
+#include "proto/codec/zigzag.h"
+#include "tests/bench/cloth_motion.h"
+
+namespace clothstream::bench {
+namespace {
+
+using codec::hierarchical::CodedResidual;
+using namespace codec::hierarchical;
+
+constexpr std::size_t kTerms = 6;  // of ScaleWeights
+using Terms = std::array<double, kTerms>;
+using Estimators = std::array<std::array<Terms, kComponents>, kScaleClasses>;
+
+std::vector<CodedResidual> codeMotions() {
+  const std::array motions{
+      MotionSettings{.name = "",
+                     .scene = MotionScene::flag,
+                     .wind = 0.8,
+                     .size = 80,
+                     .substeps = 16,
+                     .damping = 1.5,
+                     .seed = 5},
+      MotionSettings{
+          .name = "", .scene = MotionScene::drape, .size = 72, .substeps = 16, .damping = 1.5, .seed = 9},
+      MotionSettings{
+          .name = "", .scene = MotionScene::curtain, .size = 90, .substeps = 16, .damping = 2.5, .seed = 4},
+      MotionSettings{.name = "", .scene = MotionScene::flag, .wind = 0.35, .size = 110, .seed = 11}};
+  std::vector<CodedResidual> residuals;
+  for (MotionSettings motion : motions) {
+    motion.frames = 200;
+    for (const float maxError : {0.001f, 0.0005f, 0.00025f}) {
+      HierarchicalEncoder encoder({.epoch = 1,
+                                   .codec = codec::kCodecHierarchical,
+                                   .maxError = maxError,
+                                   .cloths = {{motion.size * motion.size, motion.size, motion.size}}});
+      std::vector<std::byte> packet(encoder.packetBound());
+      playMotion(motion, [&](std::uint32_t frame, std::span<const float> positions) {
+        const bool key = frame == 0 || frame == 60;
+        const bool counts = frame >= 6 && (frame < 10 || frame % 3 == 0 || frame == 61);
+        encoder.record(counts ? &residuals : nullptr);
+        const auto kind = key ? codec::PacketKind::key : codec::PacketKind::predicted;
+        encoder.encode(frame + 1, kind, frame, positions, {}, packet);
+      });
+    }
+  }
+  return residuals;
+}
+
+Terms termsOf(const CodedResidual& r) {
+  const double normal = r.component == kAlongNormal ? 0 : r.normal, u = r.component == kAlongV ? r.u : 0;
+  return {
+      static_cast<double>(r.parents), static_cast<double>(r.ring), static_cast<double>(r.last), normal, u, 1};
+}
+
+double expectation(const Terms& weights, const Terms& terms) {
+  double sum = 0;
+  for (std::size_t i = 0; i < kTerms; ++i) sum += weights[i] * terms[i];
+  return sum;
+}
+
+// Weighted least squares by Gauss-Jordan; in steps.
+Terms fit(const std::vector<CodedResidual>& residuals, std::size_t scaleClass, std::size_t component,
+          Terms weights) {
+  for (int pass = 0; pass < 6; ++pass) {
+    std::array<std::array<double, kTerms + 1>, kTerms> m{};
+    for (const CodedResidual& r : residuals) {
+      if (r.scaleClass != scaleClass || r.component != component) continue;
+      const Terms terms = termsOf(r);
+      // The larger is expected, the larger is the error that counts the same.
+      const double expected = std::max(expectation(weights, terms), 0.02);
+      const double importance = 1 / (expected * expected + 0.02 * expected);
+      for (std::size_t i = 0; i < kTerms; ++i) {
+        for (std::size_t j = 0; j < kTerms; ++j) m[i][j] += importance * terms[i] * terms[j];
+        m[i][kTerms] += importance * terms[i] * std::min(std::abs(r.residual), 40);
+      }
+    }
+    for (std::size_t i = 0; i < kTerms; ++i) m[i][i] = 1.0005 * m[i][i] + 1e-6;
+    for (std::size_t i = 0; i < kTerms; ++i) {
+      for (std::size_t j = 0; j < kTerms; ++j) {
+        if (j == i) continue;
+        const double part = m[j][i] / m[i][i];
+        for (std::size_t k = i; k <= kTerms; ++k) m[j][k] -= part * m[i][k];
+      }
+    }
+    for (std::size_t i = 0; i < kTerms; ++i) weights[i] = m[i][kTerms] / m[i][i];
+    weights[kTerms - 1] = std::max(weights[kTerms - 1], 1 / 256.0);
+  }
+  return weights;
+}
+
+// Frequencies of what was counted, and a little of what a geometric distribution of that scale has.
+Distribution toDistribution(const std::array<double, kSymbols>& counts, std::uint32_t scale) {
+  const unsigned raw = rawBits(scale);
+  const double expected = std::exp2(scale / 2.0 + 2.25) / 256 / (1u << raw), decay = std::max(0.1, expected);
+  std::array<double, kSymbols> geometric, parts;
+  double sum = 0, total = 0;
+  for (std::size_t i = 0; i < kSymbols; ++i) {
+    geometric[i] = std::exp(-static_cast<double>((i + 1) / 2) / decay);
+    sum += geometric[i];
+    total += counts[i];
+  }
+  for (std::size_t i = 0; i < kSymbols; ++i) parts[i] = (counts[i] + 30 * geometric[i] / sum) / (total + 30);
+  // Neither sign is more likely.
+  for (std::size_t i = 1; raw == 0 && i + 1 < kEscape; i += 2)
+    parts[i] = parts[i + 1] = (parts[i] + parts[i + 1]) / 2;
+  Distribution frequencies;
+  int left = 1 << kProbabilityBits;
+  for (std::size_t i = 0; i < kSymbols; ++i) {
+    const double share = parts[i] * ((1 << kProbabilityBits) - static_cast<int>(kSymbols));
+    frequencies[i] = static_cast<std::int16_t>(std::max(1.0, std::round(share)));
+    left -= frequencies[i];
+  }
+  std::int16_t& largest = *std::max_element(frequencies.begin(), frequencies.end());
+  largest = static_cast<std::int16_t>(largest + left);
+  return frequencies;
+}
+
+void print(const Estimators& estimators, const std::array<Distribution, 2 * kScales>& distributions) {
+  fmt::print(
+      "// SPDX-License-Identifier: MIT\n// Fitted by tests/bench/fit_residual_tables.cpp.\n"
+      "#include \"proto/codec/hierarchical/residual_model.h\"\n\n"
+      "namespace clothstream::codec::hierarchical {{\n\n// clang-format off\n"
+      "const std::array<std::array<ScaleWeights, kComponents>, kScaleClasses> kScaleWeights{{{{\n");
+  for (std::size_t c = 0; c < kScaleClasses; ++c) {
+    fmt::print("    {{{{");
+    for (std::size_t k = 0; k < kComponents; ++k)
+      fmt::print("{}{{{}}}", k == 0 ? "" : ", ", fmt::join(estimators[c][k], ", "));
+    fmt::print("}}}}{}\n", c + 1 < kScaleClasses ? "," : "}};\n");
+  }
+  fmt::print("const std::array<Distribution, 2 * kScales> kDistributions{{{{\n");
+  for (std::size_t t = 0; t < distributions.size(); ++t) {
+    fmt::print("    {{{{{}}}}}{}\n", fmt::join(distributions[t], ", "),
+               t + 1 < distributions.size() ? "," : "}};");
+  }
+  fmt::print("// clang-format on\n\n}}  // namespace clothstream::codec::hierarchical\n");
+}
+
+void fitTables() {
+  const std::vector<CodedResidual> residuals = codeMotions();
+  Estimators estimators;  // rounded, in 1/256 of a step, as they are printed
+  for (std::size_t c = 0; c < kScaleClasses; ++c) {
+    for (std::size_t k = 0; k < kComponents; ++k) {
+      const Terms fitted = fit(residuals, c, k, {0.05, 0.02, 0.03, 0.02, 0.02, 0.01});
+      for (std::size_t i = 0; i < kTerms; ++i) estimators[c][k][i] = std::round(256 * fitted[i]) + 0.0;  // no -0
+    }
+  }
+  std::array<std::array<double, kSymbols>, 2 * kScales> counts{};
+  for (const CodedResidual& r : residuals) {
+    const double expected = expectation(estimators[r.scaleClass][r.component], termsOf(r));
+    const std::uint32_t scale = scaleOf(static_cast<std::int32_t>(expected));
+    const std::uint32_t symbol = std::min(codec::zigzag(r.residual) >> rawBits(scale), kEscape);
+    counts[distributionOf(static_cast<Component>(r.component), scale)][symbol] += 1;
+  }
+  std::array<Distribution, 2 * kScales> distributions;
+  for (std::size_t t = 0; t < counts.size(); ++t) {
+    distributions[t] = toDistribution(counts[t], static_cast<std::uint32_t>(t % kScales));
+  }
+  print(estimators, distributions);
+}
+
+}  // namespace
+}  // namespace clothstream::bench
+
+int main() {
+  clothstream::bench::fitTables();
+  return 0;
+}
