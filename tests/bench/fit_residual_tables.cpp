@@ -155,7 +155,8 @@ void fitTables() {
   for (std::size_t c = 0; c < kScaleClasses; ++c) {
     for (std::size_t k = 0; k < kComponents; ++k) {
       const Terms fitted = fit(residuals, c, k, {0.05, 0.02, 0.03, 0.02, 0.02, 0.01});
-      for (std::size_t i = 0; i < kTerms; ++i) estimators[c][k][i] = std::round(256 * fitted[i]) + 0.0;  // no -0
+      for (std::size_t i = 0; i < kTerms; ++i)
+        estimators[c][k][i] = std::round(256 * fitted[i]) + 0.0;  // no -0
     }
   }
   std::array<std::array<double, kSymbols>, 2 * kScales> counts{};

@@ -106,7 +106,8 @@ TEST_F(ServerProgram, NamesThePortAndTheOptionWhenAPortIsInUse) {
 TEST_F(ServerProgram, NamesTheScenesThereAre) {
   ServerProcess server({"--scene", "nowhere"});
   EXPECT_EQ(server.exitCode(), 1);
-  EXPECT_THAT(server.said(), HasSubstr("there is no scene 'nowhere'; there are curtain, flag, obstacles, sphere_drop"));
+  EXPECT_THAT(server.said(),
+              HasSubstr("there is no scene 'nowhere'; there are curtain, flag, obstacles, sphere_drop"));
 }
 
 TEST_F(ServerProgram, NamesTheSubstepsThatWouldDo) {
