@@ -260,8 +260,8 @@ std::optional<Hull> readHull(Bytes message) {
     out.vertices.insert(out.vertices.end(), vertex.begin(), vertex.end());
     return out.vertices.size() <= 3 * kMaxHullParts;
   });
-  if (hull && std::ranges::any_of(hull->triangles,
-                                  [&](std::uint32_t corner) { return corner >= hull->vertices.size() / 3; }))
+  if (hull && std::any_of(hull->triangles.begin(), hull->triangles.end(),
+                          [&](std::uint32_t corner) { return corner >= hull->vertices.size() / 3; }))
     hull.reset();
   return hull;
 }
