@@ -63,6 +63,14 @@ void write(const scene::ParticipantCollider& collider, std::uint64_t participant
   write(collider.shape, state);
 }
 
+std::size_t geometryBytes(const scene::Cloth& cloth) {
+  std::size_t bytes = sizeof(scene::Vec3) * cloth.nodeCount();
+  if (!cloth.mesh) return bytes;
+  const scene::MeshShape& shape = cloth.mesh->shape;
+  return bytes + sizeof(scene::Triangle) * (shape.triangles.size() + shape.uvTriangles.size()) +
+         sizeof(scene::Uv) * shape.uvs.size();
+}
+
 v1::StreamDescription toDescription(const scene::Scene& scene, std::uint32_t epoch, std::uint32_t codec,
                                     double seconds) {
   v1::StreamDescription description;

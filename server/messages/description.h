@@ -2,6 +2,7 @@
 // What a client needs before its first frame, and how large things are cut for the wire.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <string_view>
 #include <vector>
@@ -16,6 +17,9 @@ namespace clothstream::messages {
 // collider is named by its id. A hull's shape is left out.
 void write(const scene::Collider& collider, const scene::Pose& pose, v1::ColliderState& state);
 void write(const scene::ParticipantCollider& collider, std::uint64_t participantId, v1::ColliderState& state);
+
+// What a cloth's vertices, triangles and texture coordinates take in a description.
+std::size_t geometryBytes(const scene::Cloth& cloth);
 
 // With the scene's own colliders, hulls too, as they are at `seconds` of simulated time. The scene must be
 // valid.

@@ -71,6 +71,8 @@ inline constexpr std::size_t kMaxClientMessageBytes = 64 * 1024;
 inline constexpr std::size_t kMaxParticipantColliders = 40;
 inline constexpr std::size_t kMaxChunkBytes = 256 * 1024;
 inline constexpr std::size_t kMaxContentBytes = 256 * 1024 * 1024;
+// Of all cloths in a description, beside which everything else finds room.
+inline constexpr std::size_t kMaxGeometryBytes = kMaxContentBytes - 8 * 1024 * 1024;
 
 }  // namespace limits
 }  // namespace clothstream::messages

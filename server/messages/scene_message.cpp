@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "server/messages/description.h"
 #include "server/messages/limits.h"
 #include "server/messages/shapes.h"
 #include "server/messages/validation.h"
@@ -255,12 +256,20 @@ void checkSolvers(Checks& checks, const scene::Scene& scene) {
   }
 }
 
-void checkNodeCount(Checks& checks, const scene::Scene& scene) {
+void checkSize(Checks& checks, const scene::Scene& scene) {
   std::uint64_t nodes = 0;
   for (const scene::Cloth& cloth : scene.cloths) nodes += cloth.nodeCount();
   if (nodes > limits::kMaxNodes)
     checks.fail(Path("cloths"), "",
                 fmt::format("have {} nodes in all; must have at most {}", nodes, limits::kMaxNodes));
+  std::size_t bytes = 0;
+  for (const scene::Cloth& cloth : scene.cloths) bytes += geometryBytes(cloth);
+  if (bytes > limits::kMaxGeometryBytes)
+    checks.fail(
+        Path("cloths"), "",
+        fmt::format("have {} bytes of positions, triangles and texture coordinates; a client takes at most "
+                    "{}: simplify the meshes, or leave their texture coordinates out",
+                    bytes, limits::kMaxGeometryBytes));
 }
 
 }  // namespace
@@ -306,7 +315,7 @@ Result<scene::Scene> toScene(const v1::Scene& message, const MeshReader& readMes
   scene.stream = toStreamSettings(checks, root / "stream", message.stream());
   checkUnique(checks, "cloths", scene.cloths);
   checkUnique(checks, "colliders", scene.colliders);
-  checkNodeCount(checks, scene);
+  checkSize(checks, scene);
   checkSolvers(checks, scene);
   if (!checks.failed())
     if (const auto complaint = instability(scene))

@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "server/messages/description.h"
+#include "server/messages/limits.h"
 #include "server/messages/scene_message.h"
 #include "server/scene/mesh.h"
 #include "tests/messages/scenes.h"
@@ -119,8 +120,22 @@ TEST(MeshMessage, IsDescribedToClientsOnce) {
   EXPECT_EQ(cloth.uvs().size(), 6u * 8);
   EXPECT_EQ(cloth.uv_triangles().size(), 3u * 12);
   EXPECT_EQ(cloth.submeshes(0).triangle_count(), 2u);
+  EXPECT_EQ(geometryBytes(scene->cloths[0]), cloth.rest_positions().size() + cloth.triangles().size() +
+                                                 cloth.uvs().size() + cloth.uv_triangles().size());
   EXPECT_TRUE(description.definition().cloths(0).has_mesh());
   EXPECT_EQ(description.definition().cloths(0).mesh().positions_size(), 0);
+}
+
+// Texture coordinates alone are too many, used or not.
+TEST(MeshMessage, FitsIntoADescription) {
+  v1::Scene message = meshScene();
+  v1::Mesh& mesh = *message.mutable_cloths(0)->mutable_mesh();
+  for (const std::uint32_t i : {0u, 1u, 3u, 1u, 2u, 3u, 1u, 5u, 2u}) mesh.add_uv_triangles(i);
+  mesh.mutable_uvs()->Resize(2 * (limits::kMaxGeometryBytes / 8), 0);
+  const Result<scene::Scene> scene = toScene(message);
+  ASSERT_FALSE(scene);
+  EXPECT_THAT(scene.error().text,
+              HasSubstr("bytes of positions, triangles and texture coordinates; a client"));
 }
 
 struct BadCase {
