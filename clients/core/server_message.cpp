@@ -260,8 +260,10 @@ std::optional<Hull> readHull(Bytes message) {
     out.vertices.insert(out.vertices.end(), vertex.begin(), vertex.end());
     return out.vertices.size() <= 3 * kMaxHullParts;
   });
-  if (hull && std::ranges::any_of(hull->triangles,
-                                  [&](std::uint32_t corner) { return corner >= hull->vertices.size() / 3; }))
+  if (!hull) return hull;
+  const std::size_t corners = hull->vertices.size() / 3;
+  if (std::any_of(hull->triangles.begin(), hull->triangles.end(),
+                  [&](std::uint32_t corner) { return corner >= corners; }))
     hull.reset();
   return hull;
 }
