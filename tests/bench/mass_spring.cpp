@@ -19,7 +19,7 @@ namespace {
 constexpr double kTexelsMovedPerNodeStep = 2;
 constexpr float kSpacing = 0.02f;
 // Device memory of a ClothSimulation and host memory of the check, a node.
-constexpr std::uint64_t kDeviceBytesPerNode = 13 * 16;
+constexpr std::uint64_t kDeviceBytesPerNode = 14 * 16;
 constexpr std::uint64_t kHostBytesPerNode = 400;
 
 struct Variant {
