@@ -171,7 +171,7 @@ bool appendNumbers(Bytes bytes, std::vector<T>& out) {
   static_assert(std::endian::native == std::endian::little);
   const std::size_t first = out.size();
   out.resize(first + bytes.size() / sizeof(T));
-  if (bytes.size() > 0) std::memcpy(out.data() + first, bytes.data(), (out.size() - first) * sizeof(T));
+  if (out.size() > first) std::memcpy(out.data() + first, bytes.data(), (out.size() - first) * sizeof(T));
   return bytes.size() % sizeof(T) == 0;
 }
 

@@ -229,8 +229,7 @@ ClothSimulation::Pipeline::Pipeline(const vulkan::Device& on, const scene::Scene
                 {&buffers.velocities[0], &buffers.velocities[1]}),
       normals(makeNormals(on, buffers, cut)),
       hash(makeHash(on, buffers, cut)) {
-  std::memcpy(buffers.tileUpload.mapped().data(), cut.tiles.records.data(),
-              std::span(cut.tiles.records).size_bytes());
+  std::ranges::copy(cut.tiles.records, buffers.tileUpload.mapped<shared::TileRecord>().begin());
   std::memcpy(buffers.inputs[slot].mapped().data(), records.data(), buffers.cloths.bytes());
   writeState(restState(scene.cloths));
   const MeshTables meshTables = simulation::meshTables(scene.cloths, cut.workgroupSize);
