@@ -17,14 +17,13 @@ struct Constraint {
   double excess = 0;
 };
 
-// One substep's system  (J M^-1 J^T + compliance I) lambda = b,  b = C + h J v,  with C = |x_b - x_a| - r and
-// J its derivative at the substep's start; then x -= M^-1 J^T lambda. In this form (lambda times h^2 of the
-// paper's) lambda is a mass times a length over a length: kg m / m.
+// One substep's system  (J M^-1 J^T + compliance I) lambda = b,  b = C + h J v,  with C the constraints'
+// excess and J the derivative of |x_b - x_a| at the substep's start; then x -= M^-1 J^T lambda. In this form
+// (lambda times h^2 of the paper's) lambda is a mass times a length over a length: kg m / m.
 class ConstraintSystem {
  public:
   // `start`: positions that J is of; `velocities`: those that the forces alone give. `compliance` in 1/kg,
-  // scaled by 1 / h^2 already. Constraints between nodes without
-  // inverse mass are left out.
+  // scaled by 1 / h^2 already. Constraints between nodes without inverse mass are left out.
   ConstraintSystem(std::span<const Constraint> constraints, std::span<const Eigen::Vector3d> start,
                    std::span<const Eigen::Vector3d> velocities, std::span<const double> inverseMasses,
                    double compliance, double h);

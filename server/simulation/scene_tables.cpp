@@ -51,7 +51,9 @@ std::vector<shared::ClothRecord> clothRecords(std::span<const scene::Cloth> clot
          .damping = {cloth.structural.damping, cloth.shear.damping, cloth.bend.damping, cloth.thickness},
          .air = {cloth.drag, cloth.lift, 0, 0},
          .solver = {static_cast<float>(scene::scaledCompliance(cloth, substepSeconds)),
-                    static_cast<float>(cloth.solver.iterations),
+                    cloth.solver.kind == scene::SolverKind::massSpring
+                        ? 0.0f
+                        : static_cast<float>(cloth.solver.iterations),
                     cloth.solver.tolerance * cloth.solver.tolerance, 0},
          .limits = limitsOf(cloth.solver)});
     firstNode += cloth.nodeCount();
