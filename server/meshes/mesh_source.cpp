@@ -81,13 +81,16 @@ std::uint64_t cellKey(std::int64_t x, std::int64_t y, std::int64_t z) {
   return static_cast<std::uint64_t>((x & kMask) | (y & kMask) << 21 | (z & kMask) << 42);
 }
 
+// m; keeps the numbers of cells within 64 bits.
+constexpr double kSmallestCell = 1e-9;
+
 // Of each vertex the first one before it that is near enough, else itself. Cells are some times larger, so
 // that what is near enough mostly lies in the vertex's own.
 std::vector<std::uint32_t> weld(const std::vector<Vec3>& positions, float distance) {
   std::vector<std::uint32_t> first(positions.size());
   std::iota(first.begin(), first.end(), 0u);
   if (distance <= 0) return first;
-  const double reach = distance, cell = 4 * reach;
+  const double reach = distance, cell = std::max(4 * reach, kSmallestCell);
   const auto cellOf = [&](double coordinate) {
     return static_cast<std::int64_t>(std::floor(coordinate / cell));
   };

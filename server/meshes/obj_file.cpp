@@ -26,7 +26,9 @@ tl::expected<void, std::string> checkVertexLines(std::string_view text) {
   for (std::size_t start = 0; start < text.size(); ++line) {
     const std::size_t end = std::min(text.find('\n', start), text.size());
     const std::string_view content = text.substr(start, end - start);
-    if (content.starts_with("v ") && content.find_first_not_of("0123456789+-.eE \t\r", 2) != content.npos)
+    const std::size_t word = std::min(content.find_first_not_of(" \t"), content.size());
+    const bool isVertex = content.substr(word, 2) == "v " || content.substr(word, 2) == "v\t";
+    if (isVertex && content.find_first_not_of("0123456789+-.eE \t\r", word + 2) != content.npos)
       return tl::unexpected(fmt::format("line {} is \"{}\": a vertex's coordinates must be finite numbers",
                                         line, content.substr(0, 60)));
     start = end + 1;

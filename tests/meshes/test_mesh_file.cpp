@@ -81,6 +81,7 @@ TEST_F(MeshFile, ObjWithoutCoordinatesAtSomeCornerHasNone) {
 TEST_F(MeshFile, BadObjIsRefusedOrHasIndicesThatBuildMeshRefuses) {
   for (const auto& [text, says] :
        {std::pair("v 0 0 0\nv 1 nan 0\n", "line 2 is \"v 1 nan 0\""), std::pair("v 0 0 inf\n", "line 1"),
+        std::pair("  v nan 0 0\n", "line 1"), std::pair("v\t0 nan 0\n", "line 1"),
         std::pair("v 0 0 0\nv 1 0 0\nf 1 2\n", "face 0 has 2 corners"),
         std::pair("v 0 0 0\nf 1 1 1 1 1\n", "face 0 has 5 corners; faces must have 3 or 4")}) {
     const auto source = parseObj(text);

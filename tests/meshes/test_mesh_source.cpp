@@ -63,6 +63,9 @@ TEST(BuildMesh, WeldsWhatLiesNearerThanTheWeldDistance) {
   const auto apart = buildMesh(soup(disc, 0), {.weldDistance = 0}, kLimits);
   ASSERT_TRUE(apart) << apart.error();
   EXPECT_EQ(apart->mesh.nodeCount(), 3 * disc.triangles.size());
+  const auto same = buildMesh(soup(disc, 0), {.weldDistance = 1e-30f}, kLimits);
+  ASSERT_TRUE(same) << same.error();
+  EXPECT_EQ(same->mesh.nodeCount(), disc.positions.size());
 }
 
 TEST(BuildMesh, KeepsEveryVertexWhereItWasUnderAnotherNumber) {

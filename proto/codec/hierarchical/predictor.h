@@ -166,8 +166,8 @@ inline void Predictor::predict(std::uint32_t slot, const FeatureVectors& weights
 }
 
 inline Int32x4 Predictor::reconstruct(const Prediction& prediction, const std::int32_t* r) const {
-  const std::int32_t wide = (r[0] + 0x8000) | (r[1] + 0x8000) | (r[2] + 0x8000);
-  if (wide >> 16 != 0) return reconstructFar(prediction, r);
+  const auto fromLowest = [r](std::size_t c) { return static_cast<std::uint32_t>(r[c]) + 0x8000u; };
+  if ((fromLowest(0) | fromLowest(1) | fromLowest(2)) >> 16 != 0) return reconstructFar(prediction, r);
   const Int32x4 moved = prediction.frame.combine(
       Int16x8::allPairs(static_cast<std::int16_t>(r[0]), static_cast<std::int16_t>(r[1])),
       Int16x8::allPairs(static_cast<std::int16_t>(r[2]), 0));
