@@ -173,10 +173,10 @@ void serve(const ProgramOptions& options, const Signals& signals) {
 
 int main(int argc, char** argv) {
   using namespace clothstream;
-  const auto parsed = parseOptions(argc, argv);
-  if (const int* code = std::get_if<int>(&parsed)) return *code;
-  const ProgramOptions& options = std::get<ProgramOptions>(parsed);
   try {
+    const auto parsed = parseOptions(argc, argv);
+    if (const int* code = std::get_if<int>(&parsed)) return *code;
+    const ProgramOptions& options = std::get<ProgramOptions>(parsed);
     const Signals signals;
     telemetry::setUpLog(options.logLevel);
     if (options.listDevices)
@@ -185,7 +185,7 @@ int main(int argc, char** argv) {
       serve(options, signals);
     return 0;
   } catch (const std::exception& error) {
-    fmt::print(stderr, "clothstream-server: {}\n", error.what());
+    std::fprintf(stderr, "clothstream-server: %s\n", error.what());
     return 1;
   }
 }

@@ -3,6 +3,7 @@
 #include <charconv>
 #include <cmath>
 #include <csignal>
+#include <cstdio>
 #include <exception>
 
 #include <CLI/CLI.hpp>
@@ -104,7 +105,7 @@ int main(int argc, char** argv) {
   try {
     return run(argc, argv);
   } catch (const std::exception& error) {
-    fmt::print(stderr, "clothstream: {}\n", error.what());
+    std::fprintf(stderr, "clothstream: %s\n", error.what());
     return kLost;
   }
 }

@@ -23,6 +23,7 @@ extern "C" {
 #define CS_PROTOCOL_VERSION 1u
 #define CS_MAX_COLLIDERS 40u
 
+/* NOLINTBEGIN(modernize-use-using): C has no using. */
 typedef struct cs_client cs_client;
 
 typedef enum cs_state {
@@ -182,6 +183,8 @@ void cs_set_collider(cs_client* client, const char* collider, const float* posit
 void cs_list_scenes(cs_client* client);
 uint32_t cs_scene_count(const cs_client* client);
 const char* cs_scene(const cs_client* client, uint32_t index);
+
+/* NOLINTEND(modernize-use-using) */
 
 #ifdef __cplusplus
 }
