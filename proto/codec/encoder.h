@@ -24,9 +24,9 @@ class Encoder {
   std::size_t packetBound() const;
 
   // 3 floats a vertex, metres, within the lattice (32 m at any max error); normals of about unit length, or
-  // nothing where the layout has none. `tick` must grow from call to call. A predicted frame refers to the
-  // frame encoded before; the first is always a key frame, whatever is asked. Writes to `out` (at least
-  // packetBound() bytes) and returns the number of bytes written.
+  // nothing where the layout has none. `tick` must grow from call to call, but where history was forgotten. A
+  // predicted frame refers to the frame encoded before; the first is always a key frame, whatever is asked.
+  // Writes to `out` (at least packetBound() bytes) and returns the number of bytes written.
   std::size_t encode(std::uint64_t tick, PacketKind kind, std::span<const float> positions,
                      std::span<const float> normals, std::span<std::byte> out);
 

@@ -36,6 +36,8 @@ class HierarchicalStage final : public EncodeStage {
       *position++ = node.y;
       *position++ = node.z;
     }
+    // The frames before it may be of a history that was given up, and of later ticks.
+    if (frame.kind == codec::PacketKind::key) encoder_->forgetHistory();
     const std::size_t bytes = encoder_->encode(frame.tick, frame.kind, positions_, {}, out);
     return {.bytes = bytes, .reconstructionHash = encoder_->reconstructionHash()};
   }

@@ -160,6 +160,7 @@ class Gatherer {
         if (!mesh) return tl::unexpected(fmt::format("mesh {} is not there", node->mesh));
         if (auto done = addMesh(*mesh, transform); !done) return done;
       }
+      // NOLINTNEXTLINE(modernize-loop-convert): backwards
       for (auto child = node->children.rbegin(); child != node->children.rend(); ++child)
         open.emplace_back(*child, transform);
     }

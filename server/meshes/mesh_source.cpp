@@ -213,7 +213,7 @@ Problem appendFace(const MeshSource& source, std::size_t f, const Numbering& num
   shape.quads.push_back(static_cast<std::uint32_t>(shape.triangles.size()));
   // On a tie the second, as a grid given row by row is halved.
   const bool fromFirst = (at(0) - at(2)).squaredNorm() < 0.9999f * (at(1) - at(3)).squaredNorm();
-  const Problem problem = fromFirst ? append(0, 1, 2) : append(0, 1, 3);
+  Problem problem = fromFirst ? append(0, 1, 2) : append(0, 1, 3);
   if (problem) return problem;
   return fromFirst ? append(0, 2, 3) : append(1, 2, 3);
 }

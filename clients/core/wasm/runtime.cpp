@@ -8,6 +8,7 @@
 #include <cstdlib>
 #include <new>
 
+// NOLINTBEGIN(bugprone-reserved-identifier): names of the C++ ABI.
 extern "C" {
 
 [[noreturn]] void* __cxa_allocate_exception(std::size_t) {
@@ -19,6 +20,7 @@ extern "C" {
 }
 
 }  // extern "C"
+// NOLINTEND(bugprone-reserved-identifier)
 
 void* operator new(std::size_t bytes) {
   void* memory = std::malloc(bytes == 0 ? 1 : bytes);

@@ -27,7 +27,7 @@ class BitWriter {
     const auto width = static_cast<unsigned>(std::bit_width(shifted));
     put(0, width - 1 - k);
     put(1, 1);
-    put(shifted & ((1u << (width - 1)) - 1), width - 1);
+    put(shifted - std::bit_floor(shifted), width - 1);
   }
   // Zeros up to a whole byte; where the next byte would stand.
   std::byte* finish() {

@@ -33,7 +33,7 @@ Graph edgesOf(const ClothLayout& cloth) {
   // Each triangle leads, round each of its corners, from one of the other two to the last.
   struct Link {
     std::uint32_t centre, from, to;
-    auto operator<=>(const Link&) const = default;
+    auto operator<=>(const Link&) const = default;  // NOLINT(modernize-use-nullptr): of what is generated
   };
   std::vector<Link> links;
   links.reserve(cloth.triangles.size());
