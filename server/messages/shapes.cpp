@@ -14,11 +14,6 @@
 namespace clothstream::messages {
 namespace {
 
-template <typename... Visitors>
-struct Overloaded : Visitors... {
-  using Visitors::operator()...;
-};
-
 // What sizes may be, which differs for a scene and for its participants.
 struct Sizes {
   Range radius, length, size;
@@ -74,8 +69,8 @@ scene::Shape toHull(Checks& checks, const Path& path, const v1::ConvexHull& mess
 // What all messages that have a shape have in common.
 template <typename Message>
 void writeSimple(const scene::Shape& shape, Message& message) {
-  std::visit(
-      Overloaded{[&](const scene::Sphere& sphere) { message.mutable_sphere()->set_radius(sphere.radius); },
+  std::visit(scene::ShapeVisitor{
+                 [&](const scene::Sphere& sphere) { message.mutable_sphere()->set_radius(sphere.radius); },
                  [&](const scene::Capsule& capsule) {
                    message.mutable_capsule()->set_radius(capsule.radius);
                    message.mutable_capsule()->set_length(capsule.length);
@@ -83,7 +78,7 @@ void writeSimple(const scene::Shape& shape, Message& message) {
                  [&](const scene::Plane&) { message.mutable_plane(); },
                  [&](const scene::Box& box) { write(box.size, *message.mutable_box()->mutable_size()); },
                  [&](const scene::Hull&) { message.clear_shape(); }},
-      shape);
+             shape);
 }
 
 }  // namespace

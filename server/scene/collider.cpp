@@ -8,11 +8,6 @@
 namespace clothstream::scene {
 namespace {
 
-template <typename... Visitors>
-struct Overloaded : Visitors... {
-  using Visitors::operator()...;
-};
-
 Quaternion between(const Quaternion& from, const Quaternion& to, double part) {
   const Eigen::Vector4d a = from.coeffs().cast<double>();
   const Eigen::Vector4d b = to.coeffs().cast<double>();
@@ -34,16 +29,16 @@ Quaternion between(const Quaternion& from, const Quaternion& to, double part) {
 }  // namespace
 
 float reachOf(const Shape& shape) {
-  return std::visit(Overloaded{[](const Sphere& sphere) { return sphere.radius; },
-                               [](const Capsule& capsule) { return capsule.radius + capsule.length / 2; },
-                               [](const Plane&) { return std::numeric_limits<float>::infinity(); },
-                               [](const Box& box) { return box.size.norm() / 2; },
-                               [](const Hull& hull) {
-                                 Vec3 corner = Vec3::Zero();
-                                 for (const Vec3& vertex : hull->vertices)
-                                   corner = corner.cwiseMax(vertex.cwiseAbs());
-                                 return corner.norm();
-                               }},
+  return std::visit(ShapeVisitor{[](const Sphere& sphere) { return sphere.radius; },
+                                 [](const Capsule& capsule) { return capsule.radius + capsule.length / 2; },
+                                 [](const Plane&) { return std::numeric_limits<float>::infinity(); },
+                                 [](const Box& box) { return box.size.norm() / 2; },
+                                 [](const Hull& hull) {
+                                   Vec3 corner = Vec3::Zero();
+                                   for (const Vec3& vertex : hull->vertices)
+                                     corner = corner.cwiseMax(vertex.cwiseAbs());
+                                   return corner.norm();
+                                 }},
                     shape);
 }
 

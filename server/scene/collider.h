@@ -36,6 +36,14 @@ using Hull = std::shared_ptr<const ConvexHull>;
 
 using Shape = std::variant<Sphere, Capsule, Plane, Box, Hull>;
 
+// For std::visit: a function for each of them.
+template <typename... Visitors>
+struct ShapeVisitor : Visitors... {
+  using Visitors::operator()...;
+};
+template <typename... Visitors>
+ShapeVisitor(Visitors...) -> ShapeVisitor<Visitors...>;
+
 // A sphere of this radius about its frame's origin holds the shape (a hull: the box that holds it); infinite
 // for a plane.
 float reachOf(const Shape& shape);

@@ -14,11 +14,6 @@ constexpr std::size_t kRecordTexels = sizeof(shared::ColliderRecord) / sizeof(ve
 // Instead of infinity, whose square kernels would have to avoid.
 constexpr float kFar = 1e15f;
 
-template <typename... Visitors>
-struct Overloaded : Visitors... {
-  using Visitors::operator()...;
-};
-
 vec4 texel(const scene::Vec3& v, float w) {
   return {v.x(), v.y(), v.z(), w};
 }
@@ -27,24 +22,24 @@ vec4 texel(const scene::Vec3& v, float w) {
 vec4 shapeTexel(const scene::Shape& shape, std::size_t firstPlane, std::vector<vec4>& planes) {
   const auto first = static_cast<float>(firstPlane + planes.size());
   return std::visit(
-      Overloaded{[](const scene::Sphere& sphere) -> vec4 {
-                   return {shared::kRoundShape, sphere.radius, 0, 0};
-                 },
-                 [](const scene::Capsule& capsule) -> vec4 {
-                   return {shared::kRoundShape, capsule.radius, capsule.length / 2, 0};
-                 },
-                 [&](const scene::Plane&) -> vec4 {
-                   planes.push_back({0, 1, 0, 0});
-                   return {shared::kPlanesShape, first, 1, 0};
-                 },
-                 [](const scene::Box& box) -> vec4 {
-                   return {shared::kBoxShape, box.size.x() / 2, box.size.y() / 2, box.size.z() / 2};
-                 },
-                 [&](const scene::Hull& hull) -> vec4 {
-                   for (const scene::HalfSpace& plane : hull->planes)
-                     planes.push_back(texel(plane.normal, plane.offset));
-                   return {shared::kPlanesShape, first, static_cast<float>(hull->planes.size()), 0};
-                 }},
+      scene::ShapeVisitor{[](const scene::Sphere& sphere) -> vec4 {
+                            return {shared::kRoundShape, sphere.radius, 0, 0};
+                          },
+                          [](const scene::Capsule& capsule) -> vec4 {
+                            return {shared::kRoundShape, capsule.radius, capsule.length / 2, 0};
+                          },
+                          [&](const scene::Plane&) -> vec4 {
+                            planes.push_back({0, 1, 0, 0});
+                            return {shared::kPlanesShape, first, 1, 0};
+                          },
+                          [](const scene::Box& box) -> vec4 {
+                            return {shared::kBoxShape, box.size.x() / 2, box.size.y() / 2, box.size.z() / 2};
+                          },
+                          [&](const scene::Hull& hull) -> vec4 {
+                            for (const scene::HalfSpace& plane : hull->planes)
+                              planes.push_back(texel(plane.normal, plane.offset));
+                            return {shared::kPlanesShape, first, static_cast<float>(hull->planes.size()), 0};
+                          }},
       shape);
 }
 
