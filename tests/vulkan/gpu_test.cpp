@@ -12,10 +12,6 @@
 extern "C" int dlclose(void* /*library*/) {
   return 0;
 }
-// The validation layer does lose memory with every instance.
-extern "C" const char* __lsan_default_suppressions() {
-  return "leak:libVkLayer_khronos_validation.so";
-}
 #endif
 
 namespace clothstream::tests {
