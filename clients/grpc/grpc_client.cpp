@@ -41,8 +41,8 @@ double seconds(std::chrono::milliseconds time) {
 }
 
 void* tagOf(Operation operation) {
-  return reinterpret_cast<void*>(
-      operation);  // NOLINT(performance-no-int-to-ptr): gRPC hands it back, no more
+  // gRPC hands it back, no more. NOLINTNEXTLINE(performance-no-int-to-ptr)
+  return reinterpret_cast<void*>(operation);
 }
 
 }  // namespace
