@@ -15,6 +15,7 @@ server/meshes      | server/scene
 server/messages    | server/scene server/meshes clothstream
 server/encode      | server/scene server/simulation server/vulkan proto/codec shaders
 server/stream      | server/scene server/vulkan server/simulation server/encode server/messages server/telemetry proto/codec clothstream
+server/step        | server/scene server/vulkan server/simulation server/messages
 server/rpc         | server/stream server/telemetry clothstream
 server/web         | server/stream server/telemetry clothstream
 clients/core       | proto/codec

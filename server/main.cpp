@@ -48,6 +48,14 @@ class Signals {
   sigset_t set_{};
 };
 
+constexpr const char* kServerName = "clothstream-server " CLOTHSTREAM_VERSION;
+
+vulkan::DeviceOptions deviceOptions(const ProgramOptions& options) {
+  return {.select = options.device,
+          .softwareThreads = options.softwareThreads,
+          .cacheDirectory = options.cacheDirectory};
+}
+
 std::string describe(const vulkan::DeviceInfo& device) {
   constexpr const char* kKinds[] = {"discrete GPU", "integrated GPU", "virtual GPU", "software", "other"};
   return fmt::format("{} ({}, {}, Vulkan {})", device.name, kKinds[static_cast<std::size_t>(device.kind)],
@@ -142,12 +150,11 @@ void serve(const ProgramOptions& options, const Signals& signals) {
     sceneList +=
         fmt::format("{}{} ({} vertices)", sceneList.empty() ? "" : ", ", scene.name, scene.nodeCount());
 
-  stream::SceneServer server(std::move(scenes), {.device = {.select = options.device,
-                                                            .softwareThreads = options.softwareThreads,
-                                                            .cacheDirectory = options.cacheDirectory},
+  stream::SceneServer server(std::move(scenes), {.device = deviceOptions(options),
                                                  .defaultScene = options.scene,
-                                                 .serverName = "clothstream-server " CLOTHSTREAM_VERSION,
-                                                 .runAlways = options.alwaysRun});
+                                                 .serverName = kServerName,
+                                                 .runAlways = options.alwaysRun,
+                                                 .reportRate = options.reportRate});
   {
     const std::filesystem::path page = options.page.empty() ? pageBesideProgram() : options.page;
     if (page.empty())
@@ -168,6 +175,27 @@ void serve(const ProgramOptions& options, const Signals& signals) {
   fmt::print("{}", server.report());
 }
 
+int runSteps(const ProgramOptions& options, const Signals& signals) {
+  const scene::Scene scene = adjusted(loaded(messages::loadScene(options.scene)), options);
+  vulkan::Device device(deviceOptions(options));
+  step::StepOptions stepOptions = *options.step;
+  stepOptions.serverName = kServerName;
+  const auto interrupted = [&] {
+    const int signal = signals.wait(std::chrono::nanoseconds(0));
+    return signal == SIGINT || signal == SIGTERM;
+  };
+  constexpr int kInterrupted = 130;  // as shells have it
+  switch (step::run(device, scene, stepOptions, interrupted)) {
+    case step::Outcome::complete:
+      return 0;
+    case step::Outcome::interrupted:
+      return kInterrupted;
+    case step::Outcome::unhealthy:
+      return 1;
+  }
+  return 1;
+}
+
 }  // namespace
 }  // namespace clothstream
 
@@ -179,6 +207,7 @@ int main(int argc, char** argv) {
     const ProgramOptions& options = std::get<ProgramOptions>(parsed);
     const Signals signals;
     telemetry::setUpLog(options.logLevel);
+    if (options.step) return runSteps(options, signals);
     if (options.listDevices)
       listDevices();
     else

@@ -18,6 +18,46 @@ std::filesystem::path defaultCacheDirectory() {
   return {};
 }
 
+constexpr const char* kDevice = "Device";
+
+void addDeviceOptions(CLI::App& app, ProgramOptions& options) {
+  app.add_option("--device", options.device, "Index or part of the name of a Vulkan device; else the best")
+      ->group(kDevice);
+  app.add_option("--software-threads", options.softwareThreads, "Threads of a software device")
+      ->check(CLI::Range(1, 64))
+      ->group(kDevice);
+  app.add_option("--cache-dir", options.cacheDirectory, "Where compiled kernels are kept; '' for nowhere")
+      ->type_name("DIR")
+      ->capture_default_str()
+      ->group(kDevice);
+}
+
+void addStepOptions(CLI::App& app, ProgramOptions& options, step::StepOptions& stepOptions) {
+  app.footer(
+      "The file holds frames of little-endian float32, six a node: position and velocity. FILE.json says how "
+      "many of "
+      "what,\n"
+      "and how the simulation did. In Python: numpy.fromfile(FILE, '<f4').reshape(json.load(open(FILE + "
+      "'.json'))['shape'])\n"
+      "Ends with 0 if all ticks were run, 1 for an error or a state that left the range of numbers, 130 if "
+      "interrupted.");
+  app.add_option("--scene", options.scene, "Name of a scene, or a JSON file")->required();
+  app.add_option("--ticks", stepOptions.ticks, "How many")
+      ->required()
+      ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1'000'000'000}));
+  app.add_option("--out", stepOptions.out, "The file that is written; FILE.json stands beside it")
+      ->type_name("FILE")
+      ->required();
+  app.add_option("--every", stepOptions.every, "Write a state every so many ticks; the start is the first")
+      ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1'000'000'000}))
+      ->capture_default_str();
+  app.add_option("--rate", options.rate, "Ticks a second, instead of the scene's own")
+      ->check(CLI::Range(1, 1000));
+  app.add_option("--substeps", options.substeps, "Integration steps a tick, instead of the scene's own")
+      ->check(CLI::Range(1, 256));
+  addDeviceOptions(app, options);
+}
+
 }  // namespace
 
 std::variant<ProgramOptions, int> parseOptions(int argc, const char* const* argv) {
@@ -54,6 +94,11 @@ std::variant<ProgramOptions, int> parseOptions(int argc, const char* const* argv
       ->group(scenes);
   app.add_flag("--always-run", options.alwaysRun, "Simulate scenes while nobody is in them, too")
       ->group(scenes);
+  app.add_option("--reports", options.reportRate,
+                 "Frames a second that tell how the simulation does: strain, energy, ...; 0: none")
+      ->check(CLI::Range(0.0, 1000.0))
+      ->capture_default_str()
+      ->group(scenes);
 
   const char* network = "Network";
   app.add_option("--host", options.host, "Address to listen on; 0.0.0.0 for every one this machine has")
@@ -73,18 +118,14 @@ std::variant<ProgramOptions, int> parseOptions(int argc, const char* const* argv
       ->type_name("ORIGIN")
       ->group(network);
 
-  const char* device = "Device";
-  app.add_option("--device", options.device, "Index or part of the name of a Vulkan device; else the best")
-      ->group(device);
+  addDeviceOptions(app, options);
   app.add_flag("--list-devices", options.listDevices, "Show the Vulkan devices there are, and exit")
-      ->group(device);
-  app.add_option("--software-threads", options.softwareThreads, "Threads of a software device")
-      ->check(CLI::Range(1, 64))
-      ->group(device);
-  app.add_option("--cache-dir", options.cacheDirectory, "Where compiled kernels are kept; '' for nowhere")
-      ->type_name("DIR")
-      ->capture_default_str()
-      ->group(device);
+      ->group(kDevice);
+
+  step::StepOptions stepOptions;
+  CLI::App& stepCommand =
+      *app.add_subcommand("step", "Run a scene without clock or network, and write its states to a file");
+  addStepOptions(stepCommand, options, stepOptions);
 
   app.add_option("--log-level", options.logLevel, "trace, debug, info, warning, error or off")
       ->capture_default_str();
@@ -96,6 +137,7 @@ std::variant<ProgramOptions, int> parseOptions(int argc, const char* const* argv
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : 1;
   }
+  if (stepCommand.parsed()) options.step = stepOptions;
   if (stopAfter->count() > 0) options.stopAfter = std::chrono::duration<double>(seconds);
   return options;
 }

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "server/scene/scene.h"
+#include "server/step/step.h"
 
 namespace clothstream {
 
@@ -22,6 +23,8 @@ struct ProgramOptions {
   std::optional<float> maxError;
   std::optional<scene::Normals> normals;
   bool alwaysRun = false;
+  double reportRate = 4;
+  std::optional<step::StepOptions> step;  // instead of serving
 
   std::string host = "127.0.0.1";
   std::uint16_t port = 8080, grpcPort = 50051;

@@ -38,7 +38,25 @@ scene::ClothChange toClothChange(Checks& checks, const Path& path, const v1::Clo
   if (message.has_lift()) change.lift = checks.number(path / "lift", message.lift(), limits::kAirCoefficient);
   if (message.has_friction())
     change.friction = checks.number(path / "friction", message.friction(), limits::kFriction);
+  if (message.has_thickness())
+    change.thickness = checks.number(path / "thickness", message.thickness(), limits::kThickness);
+  if (message.has_solver()) change.solver = toSolver(checks, path / "solver", message.solver());
   return change;
+}
+
+// Those that the change chooses, for the cloths that get them.
+void checkSolvers(Checks& checks, const Path& path, const scene::Scene& changed,
+                  const scene::ParameterChange& change) {
+  for (std::size_t i = 0; i < change.cloths.size(); ++i) {
+    const scene::ClothChange& chosen = change.cloths[i];
+    if (!chosen.solver) continue;
+    for (const scene::Cloth& cloth : changed.cloths) {
+      if (!chosen.name.empty() && chosen.name != cloth.name) continue;
+      const Path element = path.at("cloths", static_cast<int>(i));
+      if (const auto complaint = unfitSolver(changed, cloth))
+        checks.fail(element / "solver", "", fmt::format("\"{}\" {}", cloth.name, *complaint));
+    }
+  }
 }
 
 scene::ColliderChange toColliderChange(Checks& checks, const Path& path, const v1::ColliderChange& message,
@@ -83,6 +101,7 @@ Result<scene::ParameterChange> toParameterChange(const v1::ParameterChange& mess
   if (!checks.failed()) {
     scene::Scene changed = scene;
     scene::applyChange(changed, change);
+    checkSolvers(checks, path, changed, change);
     if (const auto complaint = instability(changed))
       checks.fail(path, "", fmt::format("with substeps = {}, {}", scene.substeps, *complaint));
   }

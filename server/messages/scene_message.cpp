@@ -106,22 +106,6 @@ void readConstraint(Checks& checks, const Path& path, const v1::ConstraintSolver
     solver.tolerance = checks.number(path / "tolerance", message.tolerance(), limits::kTolerance);
 }
 
-scene::Solver toSolver(Checks& checks, const Path& path, const v1::Solver& message) {
-  scene::Solver solver;
-  if (message.has_constraint()) {
-    solver.kind = scene::SolverKind::constraint;
-    readConstraint(checks, path / "constraint", message.constraint(), solver);
-  } else if (message.has_acad()) {
-    const v1::AcadSolver& acad = message.acad();
-    const Path at = path / "acad";
-    solver.kind = scene::SolverKind::acad;
-    if (acad.has_activation())
-      solver.activation = checks.number(at / "activation", acad.activation(), limits::kActivation);
-    readConstraint(checks, at / "constraint", acad.constraint(), solver);
-  }
-  return solver;
-}
-
 // Pins of a grid by number.
 void toPinnedVertices(Checks& checks, const Path& path, const v1::Cloth& message, scene::Cloth& cloth) {
   for (int i = 0; i < message.pinned_vertices_size() && !checks.failed(); ++i)
@@ -243,17 +227,11 @@ void checkUnique(Checks& checks, std::string_view field, const std::vector<Named
 
 void checkSolvers(Checks& checks, const scene::Scene& scene) {
   const Path root;
-  for (std::size_t i = 0; i < scene.cloths.size(); ++i) {
-    const scene::Cloth& cloth = scene.cloths[i];
-    if (cloth.solver.kind == scene::SolverKind::massSpring) continue;
-    const Path element = root.at("cloths", static_cast<int>(i));
-    if (scene.integrator != scene::Integrator::semiImplicitEuler)
-      checks.fail(element / "solver", "", "has constraints, which need INTEGRATOR_SEMI_IMPLICIT_EULER");
-    if (cloth.nodeCount() > limits::kMaxConstraintNodes)
-      checks.fail(element / "solver", "",
-                  fmt::format("has constraints, for at most {} nodes; this cloth has {}",
-                              limits::kMaxConstraintNodes, cloth.nodeCount()));
-  }
+  for (std::size_t i = 0; i < scene.cloths.size(); ++i)
+    if (const auto complaint = unfitSolver(scene, scene.cloths[i])) {
+      const Path element = root.at("cloths", static_cast<int>(i));
+      checks.fail(element / "solver", "", *complaint);
+    }
 }
 
 void checkSize(Checks& checks, const scene::Scene& scene) {
@@ -273,6 +251,32 @@ void checkSize(Checks& checks, const scene::Scene& scene) {
 }
 
 }  // namespace
+
+scene::Solver toSolver(Checks& checks, const Path& path, const v1::Solver& message) {
+  scene::Solver solver;
+  if (message.has_constraint()) {
+    solver.kind = scene::SolverKind::constraint;
+    readConstraint(checks, path / "constraint", message.constraint(), solver);
+  } else if (message.has_acad()) {
+    const v1::AcadSolver& acad = message.acad();
+    const Path at = path / "acad";
+    solver.kind = scene::SolverKind::acad;
+    if (acad.has_activation())
+      solver.activation = checks.number(at / "activation", acad.activation(), limits::kActivation);
+    readConstraint(checks, at / "constraint", acad.constraint(), solver);
+  }
+  return solver;
+}
+
+std::optional<std::string> unfitSolver(const scene::Scene& scene, const scene::Cloth& cloth) {
+  if (cloth.solver.kind == scene::SolverKind::massSpring) return std::nullopt;
+  if (scene.integrator != scene::Integrator::semiImplicitEuler)
+    return "has constraints, which need INTEGRATOR_SEMI_IMPLICIT_EULER";
+  if (cloth.nodeCount() > limits::kMaxConstraintNodes)
+    return fmt::format("has constraints, for at most {} nodes; this cloth has {}",
+                       limits::kMaxConstraintNodes, cloth.nodeCount());
+  return std::nullopt;
+}
 
 std::optional<std::string> instability(const scene::Scene& scene) {
   const std::uint32_t needed = scene::stableSubsteps(scene);

@@ -8,6 +8,7 @@
 #include "clothstream/v1/scene.pb.h"
 #include "server/messages/field_error.h"
 #include "server/messages/mesh_message.h"
+#include "server/messages/validation.h"
 #include "server/scene/scene.h"
 
 namespace clothstream::messages {
@@ -20,6 +21,12 @@ namespace clothstream::messages {
 // Every field set, defaults too, meshes in full. toScene() of it gives the scene back.
 v1::Scene toMessage(const scene::Scene& scene);
 v1::Normals toMessage(scene::Normals normals);
+
+// The solver that a cloth names; what a cloth of this scene must be for it, unfitSolver() says.
+scene::Solver toSolver(Checks& checks, const Path& path, const v1::Solver& message);
+v1::Solver toMessage(const scene::Solver& solver);
+// What to say of a cloth whose solver cannot serve it in this scene; nullopt if it can.
+std::optional<std::string> unfitSolver(const scene::Scene& scene, const scene::Cloth& cloth);
 
 // What to say of a scene whose integrator is not stable with its substeps; nullopt if it is.
 std::optional<std::string> instability(const scene::Scene& scene);

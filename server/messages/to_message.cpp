@@ -30,21 +30,6 @@ void writeConstraint(const scene::Solver& solver, v1::ConstraintSolver& message)
   message.set_tolerance(solver.tolerance);
 }
 
-void writeSolver(const scene::Solver& solver, v1::Solver& message) {
-  switch (solver.kind) {
-    case scene::SolverKind::massSpring:
-      message.mutable_mass_spring();
-      break;
-    case scene::SolverKind::constraint:
-      writeConstraint(solver, *message.mutable_constraint());
-      break;
-    case scene::SolverKind::acad:
-      message.mutable_acad()->set_activation(solver.activation);
-      writeConstraint(solver, *message.mutable_acad()->mutable_constraint());
-      break;
-  }
-}
-
 void writeGrid(const scene::Grid& grid, v1::Grid& message) {
   message.set_rows(grid.rows);
   message.set_columns(grid.columns);
@@ -69,7 +54,7 @@ void writeCloth(const scene::Cloth& cloth, v1::Cloth& message) {
   message.set_friction(cloth.friction);
   message.set_thickness(cloth.thickness);
   for (const scene::GridRange& range : cloth.pins) writeRange(range, *message.add_pins());
-  writeSolver(cloth.solver, *message.mutable_solver());
+  *message.mutable_solver() = toMessage(cloth.solver);
   message.mutable_pinned_vertices()->Add(cloth.pinnedVertices.begin(), cloth.pinnedVertices.end());
   for (const scene::Region& region : cloth.pinnedRegions) write(region, *message.add_pinned_regions());
 }
@@ -98,6 +83,23 @@ v1::Integrator toMessage(scene::Integrator integrator) {
 
 v1::Normals toMessage(scene::Normals normals) {
   return normals == scene::Normals::octahedral ? v1::NORMALS_OCTAHEDRAL : v1::NORMALS_NONE;
+}
+
+v1::Solver toMessage(const scene::Solver& solver) {
+  v1::Solver message;
+  switch (solver.kind) {
+    case scene::SolverKind::massSpring:
+      message.mutable_mass_spring();
+      break;
+    case scene::SolverKind::constraint:
+      writeConstraint(solver, *message.mutable_constraint());
+      break;
+    case scene::SolverKind::acad:
+      message.mutable_acad()->set_activation(solver.activation);
+      writeConstraint(solver, *message.mutable_acad()->mutable_constraint());
+      break;
+  }
+  return message;
 }
 
 v1::Scene toMessage(const scene::Scene& scene) {

@@ -56,6 +56,7 @@ void ReferenceCloth::setParameters(const scene::Cloth& cloth) {
   cloth_.drag = cloth.drag;
   cloth_.lift = cloth.lift;
   cloth_.friction = cloth.friction;
+  cloth_.thickness = cloth.thickness;
   cloth_.solver = cloth.solver;
 }
 
@@ -111,16 +112,17 @@ void ReferenceCloth::integrate(const scene::Environment& environment, scene::Int
 
 void ReferenceCloth::enforceConstraints(double h) {
   const scene::Solver& solver = cloth_.solver;
+  const double takenBack = scene::takenBack(solver);
   std::vector<Constraint> constraints;
   for (const scene::SpringLink& link : links_) {
     if (!scene::isConstraint(solver, link.kind)) continue;
     const double rest = link.restLength, longest = rest * (1 + double{solver.activation});
     const Vec3 d = start_[link.b] - start_[link.a];
     if (solver.kind == scene::SolverKind::constraint) {
-      constraints.push_back({link.a, link.b, d.norm() - rest});
+      constraints.push_back({link.a, link.b, takenBack * (d.norm() - rest)});
     } else if ((d + h * (velocities_[link.b] - velocities_[link.a])).norm() > longest) {
       const double excess = d.norm() - longest;
-      constraints.push_back({link.a, link.b, excess > 0 ? double{scene::kTakenBack} * excess : excess});
+      constraints.push_back({link.a, link.b, excess > 0 ? takenBack * excess : excess});
     }
   }
   const ConstraintSystem system(constraints, start_, velocities_, inverseMasses_,
@@ -218,17 +220,26 @@ double ReferenceCloth::gravityEnergy(const Vec3& gravity) const {
   return sum;
 }
 
+double ReferenceCloth::penetration(const scene::Shape& shape, const Pose& pose) const {
+  double deepest = 0;
+  for (std::size_t i = 0; i < positions_.size(); ++i)
+    if (inverseMasses_[i] > 0) deepest = std::max(deepest, -heightOver(shape, pose, positions_[i]));
+  return deepest;
+}
+
 Strain ReferenceCloth::strain() const {
-  Strain strain{.max = -1, .mean = 0};
-  std::uint32_t count = 0;
+  Strain strain{.max = -1};
+  std::vector<double> stretches;
   for (const scene::SpringLink& link : links_) {
     if (link.kind != scene::SpringKind::structural) continue;
     const double stretch = (positions_[link.b] - positions_[link.a]).norm() / double{link.restLength} - 1;
     strain.max = std::max(strain.max, stretch);
     strain.mean += std::abs(stretch);
-    ++count;
+    stretches.push_back(stretch);
   }
-  strain.mean /= count;
+  strain.mean /= static_cast<double>(stretches.size());
+  std::ranges::sort(stretches);
+  strain.p99 = stretches[(99 * stretches.size() + 99) / 100 - 1];
   return strain;
 }
 

@@ -17,6 +17,7 @@ namespace clothstream::reference {
 // Of the structural springs: |d| / L - 1.
 struct Strain {
   double max = 0;   // largest stretch
+  double p99 = 0;   // the smallest that 99 % of them do not exceed
   double mean = 0;  // mean of the absolute values
 };
 
@@ -27,7 +28,7 @@ class ReferenceCloth {
   // At rest in its start pose. Springs are those of scene::springLinks().
   explicit ReferenceCloth(const scene::Cloth& cloth);
 
-  // Springs, damping, drag, lift, friction, solver from now on; same shape, mass, pins.
+  // Springs, damping, drag, lift, friction, thickness, solver from now on; same shape, mass, pins.
   void setParameters(const scene::Cloth& cloth);
 
   std::span<Vec3> positions() { return positions_; }
@@ -62,6 +63,8 @@ class ReferenceCloth {
   double elasticEnergy() const;
   double gravityEnergy(const Vec3& gravity) const;
   Strain strain() const;
+  // How deep the deepest node that can move lies below the shape's surface, m; 0 where none does.
+  double penetration(const scene::Shape& shape, const Pose& pose) const;
 
  private:
   void enforceConstraints(double h);

@@ -21,6 +21,8 @@ void apply(Cloth& cloth, const ClothChange& change) {
   assign(cloth.drag, change.drag);
   assign(cloth.lift, change.lift);
   assign(cloth.friction, change.friction);
+  assign(cloth.thickness, change.thickness);
+  assign(cloth.solver, change.solver);
 }
 
 // A motion that ends leaves what is not changed at the pose that the scene gives.

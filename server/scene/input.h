@@ -21,7 +21,8 @@ struct ParticipantCollider {
 struct ClothChange {
   std::string name = {};  // empty: every cloth
   std::optional<Spring> structural = {}, shear = {}, bend = {};
-  std::optional<float> damping = {}, drag = {}, lift = {}, friction = {};
+  std::optional<float> damping = {}, drag = {}, lift = {}, friction = {}, thickness = {};
+  std::optional<Solver> solver = {};
 };
 
 struct ColliderChange {

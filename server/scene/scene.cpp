@@ -15,6 +15,10 @@ std::uint32_t Scene::nodeCount() const {
   return sum;
 }
 
+float takenBack(const Solver& solver) {
+  return solver.takenBack.value_or(solver.kind == SolverKind::acad ? kTakenBack : 1.0f);
+}
+
 std::uint32_t Cloth::nodeCount() const {
   return mesh ? mesh->nodeCount() : grid.nodeCount();
 }

@@ -56,11 +56,14 @@ struct Solver {
   float tolerance = 0.001f;         // of the residual's norm, relative to where it started
   // acad: the stretch, as a part of its length, beyond which no substep is to take a spring.
   float activation = 0.1f;
+  // The part of what a spring is too long already that a substep takes back (Baumgarte's stabilisation); of
+  // `constraint` also of what it is too short. All of it gives the nodes that speed. Absent: all for
+  // `constraint`, kTakenBack for acad.
+  std::optional<float> takenBack = {};
 };
 
-// acad: the part of what a spring is stretched too far already that a substep takes back (Baumgarte's
-// stabilisation). All of it would give the nodes that speed.
 inline constexpr float kTakenBack = 0.15f;
+float takenBack(const Solver& solver);
 
 // Of h^2 / m, the compliance with which the number of iterations hardly depends on the cloth's size.
 inline constexpr float kRelativeCompliance = 0.01f;

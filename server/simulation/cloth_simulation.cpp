@@ -18,6 +18,7 @@
 #include "server/simulation/collision/collision_stage.h"
 #include "server/simulation/constraint_stage.h"
 #include "server/simulation/mesh_stage.h"
+#include "server/simulation/report_stage.h"
 #include "server/vulkan/kernel.h"
 
 namespace clothstream::simulation {
@@ -122,6 +123,17 @@ struct Stage {
   std::array<vulkan::Bindings, 2> from;
 };
 
+std::vector<scene::Solver> solversOf(std::span<const scene::Cloth> cloths) {
+  std::vector<scene::Solver> solvers;
+  for (const scene::Cloth& cloth : cloths) solvers.push_back(cloth.solver);
+  return solvers;
+}
+
+// Whether they make the same constraints; how these are solved may differ.
+bool sameTables(const scene::Solver& a, const scene::Solver& b) {
+  return a.kind == b.kind && a.bendConstraints == b.bendConstraints;
+}
+
 AdvanceVariant variantOf(std::span<const shared::ClothRecord> cloths, float airDensity, bool colliders) {
   return {std::any_of(cloths.begin(), cloths.end(), isDamped),
           airDensity != 0 && std::any_of(cloths.begin(), cloths.end(), isBlown), colliders};
@@ -177,6 +189,7 @@ struct ClothSimulation::Pipeline {
 
   const Stage& advance(const AdvanceVariant& variant);
   void prepare(const AdvanceVariant& variant);
+  void setSolvers(std::span<const scene::Cloth> cloths);
   void start(vulkan::Recorder& recorder);
   void recordInputs(vulkan::Recorder& recorder, const TickInputs& inputs);
   void recordSubsteps(vulkan::Recorder& recorder, const TickInputs& inputs);
@@ -201,10 +214,15 @@ struct ClothSimulation::Pipeline {
   CollisionStage collision;
   std::array<std::unique_ptr<Stage>, AdvanceVariant::kCount> advances;  // made when they are first needed
   Stage normals, hash;
-  std::unique_ptr<MeshStage> meshes;             // where there are any
-  std::unique_ptr<ConstraintStage> constraints;  // likewise
+  std::unique_ptr<MeshStage> meshes;  // where there are any
+  ConstraintStage constraints;
+  std::vector<scene::Solver> solvers;   // of the cloths, as the tables have them
+  std::vector<shared::vec4> stiffness;  // of their springs
+  std::unique_ptr<ReportStage> report;  // made when it is first wanted
+  std::uint32_t workgroupSize;          // as asked for
 
-  bool started = false;       // the start state and the tiles are on the device
+  bool started = false;       // the start state is on the device
+  bool tabled = false;        // the tables of the solvers are
   std::uint32_t present = 0;  // which state buffers hold the state
   std::uint32_t slot = 0;     // of inputs and status, of the tick recorded last
 };
@@ -228,7 +246,11 @@ ClothSimulation::Pipeline::Pipeline(const vulkan::Device& on, const scene::Scene
       collision(on, nodes, {&buffers.positions[0], &buffers.positions[1]},
                 {&buffers.velocities[0], &buffers.velocities[1]}),
       normals(makeNormals(on, buffers, cut)),
-      hash(makeHash(on, buffers, cut)) {
+      hash(makeHash(on, buffers, cut)),
+      constraints(on, constraintTables(scene.cloths), stateOf(buffers, collision), options.workgroupSize),
+      solvers(solversOf(scene.cloths)),
+      stiffness(springStiffness(scene.cloths)),
+      workgroupSize(options.workgroupSize) {
   std::ranges::copy(cut.tiles.records, buffers.tileUpload.mapped<shared::TileRecord>().begin());
   std::memcpy(buffers.inputs[slot].mapped().data(), records.data(), buffers.cloths.bytes());
   writeState(restState(scene.cloths));
@@ -236,10 +258,6 @@ ClothSimulation::Pipeline::Pipeline(const vulkan::Device& on, const scene::Scene
   if (!meshTables.nodes.empty())
     meshes = std::make_unique<MeshStage>(on, meshTables, stateOf(buffers, collision), buffers.normals,
                                          integrator, cut.workgroupSize);
-  const ConstraintTables tables = constraintTables(scene.cloths);
-  if (!tables.links.empty())
-    constraints =
-        std::make_unique<ConstraintStage>(on, tables, stateOf(buffers, collision), options.workgroupSize);
   for (const bool colliders : {false, true})
     prepare(variantOf(records, scene.environment.airDensity, colliders));
 }
@@ -271,16 +289,29 @@ void ClothSimulation::Pipeline::recordUploadedState(vulkan::Recorder& recorder) 
   recorder.copy(buffers.stateUpload, buffers.checkpointVelocities, half, half);
 }
 
+void ClothSimulation::Pipeline::setSolvers(std::span<const scene::Cloth> cloths) {
+  std::vector<scene::Solver> wanted = solversOf(cloths);
+  if (std::ranges::equal(wanted, solvers, sameTables)) return;
+  constraints.setTables(constraintTables(cloths));
+  cut.tiles = makeTiles(cloths, cut.rowsPerInvocation, cut.workgroupSize);
+  std::ranges::copy(cut.tiles.records, buffers.tileUpload.mapped<shared::TileRecord>().begin());
+  if (meshes) meshes->setTiles(meshTiles(cloths, cut.workgroupSize));
+  solvers = std::move(wanted);
+  tabled = false;
+}
+
 void ClothSimulation::Pipeline::start(vulkan::Recorder& recorder) {
   recorder.barrier();
-  if (started) return;
-  started = true;
+  if (started && tabled) return;
+  if (!started) {
+    recorder.copy(buffers.inputs[slot], buffers.cloths, buffers.cloths.bytes());
+    recordUploadedState(recorder);
+  }
   recorder.copy(buffers.tileUpload, buffers.tiles, buffers.tiles.bytes());
-  recorder.copy(buffers.inputs[slot], buffers.cloths, buffers.cloths.bytes());
   if (meshes) meshes->recordTables(recorder);
-  recordUploadedState(recorder);
-  if (constraints) constraints->recordTables(recorder);
+  if (constraints.active()) constraints.recordTables(recorder);
   recorder.barrier();
+  started = tabled = true;
 }
 
 void ClothSimulation::Pipeline::recordInputs(vulkan::Recorder& recorder, const TickInputs& inputs) {
@@ -330,13 +361,13 @@ void ClothSimulation::Pipeline::recordSubsteps(vulkan::Recorder& recorder, const
     push.collision = collision.push(substep, substeps, tickRate);
     recorder.barrier();
     for (const bool constrained : {false, true}) recordAdvance(recorder, inputs, constrained, push);
-    if (constraints)
-      constraints->record(recorder, present, iterations,
-                          {.collision = push.collision,
-                           .count = 0,
-                           .substepSeconds = static_cast<float>(substepSeconds),
-                           .substepRate = tickRate * static_cast<float>(substeps),
-                           .reserved = 0});
+    if (constraints.active())
+      constraints.record(recorder, present, iterations,
+                         {.collision = push.collision,
+                          .count = 0,
+                          .substepSeconds = static_cast<float>(substepSeconds),
+                          .substepRate = tickRate * static_cast<float>(substeps),
+                          .reserved = 0});
     present = 1 - present;
   }
 }
@@ -348,7 +379,7 @@ void ClothSimulation::Pipeline::recordStatus(vulkan::Recorder& recorder) {
   recorder.barrier();
   recorder.copy(buffers.status, buffers.statusReadback, sizeof(shared::StatusRecord), 0,
                 slot * sizeof(shared::StatusRecord));
-  if (constraints) constraints->recordReport(recorder);
+  if (constraints.active()) constraints.recordReport(recorder);
 }
 
 ClothSimulation::ClothSimulation(const vulkan::Device& device, const scene::Scene& scene,
@@ -364,6 +395,8 @@ void ClothSimulation::setCloths(std::span<const scene::Cloth> cloths) {
                     [](const shared::ClothRecord& a, const shared::ClothRecord& b) {
                       return a.place.z == b.place.z && a.place.w == b.place.w;
                     }));
+  pipeline_->setSolvers(cloths);
+  pipeline_->stiffness = springStiffness(cloths);
   pipeline_->records = std::move(records);
 }
 
@@ -382,6 +415,31 @@ void ClothSimulation::recordNormals(vulkan::Recorder& recorder) {
   if (tiles > 0)
     recorder.dispatch(pipeline_->normals.from[pipeline_->present], tiles * pipeline_->cut.workgroupSize);
   if (pipeline_->meshes) pipeline_->meshes->recordNormals(recorder, pipeline_->present);
+}
+
+void ClothSimulation::recordReport(vulkan::Recorder& recorder, const TickInputs& inputs) {
+  Pipeline& on = *pipeline_;
+  if (!on.report)
+    on.report =
+        std::make_unique<ReportStage>(on.device, on.records, stateOf(on.buffers, on.collision),
+                                      on.meshes ? on.meshes->springs() : MeshSprings{}, on.workgroupSize);
+  recorder.beginStage("report");
+  on.report->record(recorder, on.present, on.stiffness, inputs.environment.gravity,
+                    on.collision.push(on.substeps - 1, on.substeps, on.tickRate));
+}
+
+std::vector<ClothReport> ClothSimulation::report() const {
+  assert(pipeline_->report);
+  std::vector<ClothReport> reports = pipeline_->report->collect();
+  if (!pipeline_->constraints.active()) return reports;
+  const std::span<const shared::SolveRecord> solves = pipeline_->constraints.report();
+  const std::span<const std::uint32_t> cloths = pipeline_->constraints.cloths();
+  for (std::size_t i = 0; i < solves.size(); ++i) {
+    reports[cloths[i]].activeConstraints = solves[i].constraints;
+    reports[cloths[i]].iterations = solves[i].iterations;
+    reports[cloths[i]].residual = solves[i].residual;
+  }
+  return reports;
 }
 
 TickStatus ClothSimulation::status() const {
@@ -441,7 +499,8 @@ void ClothSimulation::recordRestoreState(vulkan::Recorder& recorder, const State
 }
 
 std::span<const shared::SolveRecord> ClothSimulation::solves() const {
-  return pipeline_->constraints ? pipeline_->constraints->report() : std::span<const shared::SolveRecord>();
+  return pipeline_->constraints.active() ? pipeline_->constraints.report()
+                                         : std::span<const shared::SolveRecord>();
 }
 
 std::uint32_t ClothSimulation::nodeCount() const {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "server/scene/scene.h"
+#include "server/simulation/cloth_report.h"
 #include "server/simulation/collision/moving_collider.h"
 #include "server/simulation/scene_tables.h"
 #include "server/simulation/state_snapshot.h"
@@ -50,8 +51,10 @@ class ClothSimulation {
   ClothSimulation(const ClothSimulation&) = delete;
   ClothSimulation& operator=(const ClothSimulation&) = delete;
 
-  // Parameters of cloths (springs, damping, drag, lift, friction, thickness) from the next recorded tick on.
-  // Same cloths, same shapes, same masses, same pins as at construction.
+  // Parameters of cloths (springs, damping, drag, lift, friction, thickness, solver) from the next recorded
+  // tick on. Same cloths, same shapes, same masses, same pins as at construction; the state stays. Where a
+  // solver is another, no tick may be in flight; throws std::runtime_error where the device has no room for
+  // it, and changes nothing then. A solver's kernels are made when a cloth first has it, and kept.
   void setCloths(std::span<const scene::Cloth> cloths);
 
   // All substeps of one tick, and its status. At most one tick may be in flight when it is called.
@@ -66,6 +69,11 @@ class ClothSimulation {
   TickStatus status() const;
   // Of its last substep: one a cloth with constraints, in their order.
   std::span<const shared::SolveRecord> solves() const;
+
+  // What the cloths are like, each of them: recorded after a tick in the same recording, and read when that
+  // is complete. Only when somebody wants it: other ticks cost nothing. Stage "report".
+  void recordReport(vulkan::Recorder& recorder, const TickInputs& inputs);
+  std::vector<ClothReport> report() const;
 
   // Keeps the present state on the device; goes back to what was kept last (the start, if nothing was).
   // Stage "checkpoint".

@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <span>
 
 #include "server/simulation/constraint_tables.h"
@@ -16,12 +17,6 @@
 
 namespace clothstream::simulation {
 
-// How a solve is cut; the results do not depend on it.
-struct SolveCut {
-  std::uint32_t workgroupSize;
-  std::uint32_t iterationsPerDispatch;
-};
-
 // Belongs to the device's thread. After the forces have given every node a free velocity and position, it
 // solves
 //   (J M^-1 J^T + compliance / h^2) lambda = C + h J v,   C = |x_b - x_a| - r, J at the substep's start,
@@ -29,11 +24,19 @@ struct SolveCut {
 // collide.
 class ConstraintStage {
  public:
-  // There must be a constraint. `workgroupSize` of a solve; 0: the measured best for the device.
+  // `workgroupSize` of a solve; 0: the measured best for the device. Throws std::runtime_error where the
+  // device cannot take the constraints.
   ConstraintStage(const vulkan::Device& device, const ConstraintTables& tables, const StateBuffers& state,
                   std::uint32_t workgroupSize);
+  ~ConstraintStage();
 
-  // Its tables, once, before the first substep.
+  // Other constraints, or none, from now on; kernels that were made are kept. Nothing of this stage may be in
+  // flight. Where it throws, all is as before.
+  void setTables(const ConstraintTables& tables);
+  // Whether there is a constraint; nothing below may be called where there is none.
+  bool active() const { return systems_ != nullptr; }
+
+  // Its tables, before the first substep with them.
   void recordTables(vulkan::Recorder& recorder) const;
   // One substep whose free motion leads from state `from` to the other; corrects the latter in place. Begins
   // with a barrier.
@@ -45,29 +48,21 @@ class ConstraintStage {
   void recordReport(vulkan::Recorder& recorder) const;
   std::span<const shared::SolveRecord> report() const;
 
+  // The cloth of each system.
+  std::span<const std::uint32_t> cloths() const;
+
  private:
-  vulkan::Bindings prepareFrom(const vulkan::Device& device, const StateBuffers& state,
-                               std::size_t from) const;
-  vulkan::Bindings solveBindings(const vulkan::Device& device, const vulkan::Kernel& kernel,
-                                 const StateBuffers& state) const;
-  vulkan::Bindings applyTo(const vulkan::Device& device, const StateBuffers& state, std::size_t to) const;
+  struct Kernels;
+  struct Systems;
+
   void recordSolve(vulkan::Recorder& recorder, const vulkan::Bindings& bindings, std::uint32_t firstSystem,
                    std::uint32_t systems, std::uint32_t iterations) const;
 
-  struct Table {
-    Table(const vulkan::Device& device, std::span<const std::byte> bytes);
-    vulkan::Buffer upload, texels;
-  };
-
-  std::uint32_t linkCount_, nodeCount_, systemCount_, alwaysCount_;
-  SolveCut cut_;
-  Table systems_, links_, incidences_, lists_;
-  vulkan::Buffer rows_, multipliers_, residuals_, directions_, products_, moves_, actives_, solves_,
-      solvesReadback_;
-  vulkan::Kernel prepare_, solveAll_, solveActive_, apply_;
-  std::array<vulkan::Bindings, 2> prepareFrom_;
-  vulkan::Bindings solveAllBindings_, solveActiveBindings_;
-  std::array<vulkan::Bindings, 2> applyTo_;
+  const vulkan::Device& device_;
+  StateBuffers state_;
+  std::uint32_t workgroupSize_;
+  std::unique_ptr<Kernels> kernels_;  // from the first constraint on
+  std::unique_ptr<Systems> systems_;  // null where there are none
 };
 
 }  // namespace clothstream::simulation

@@ -2,6 +2,7 @@
 // Kernels of meshes, and their tables.
 #include "server/simulation/mesh_stage.h"
 
+#include <cassert>
 #include <cstring>
 
 #include "kernels/advance_mesh.h"
@@ -69,6 +70,12 @@ const MeshStage::Advance& MeshStage::advance(const AdvanceVariant& variant) {
   std::unique_ptr<Advance>& made = advances_[variant.index()];
   if (!made) made = std::make_unique<Advance>(*this, variant);
   return *made;
+}
+
+void MeshStage::setTiles(const Tiles& tiles) {
+  assert(tiles.records.size() * sizeof(shared::TileRecord) == tiles_.upload.bytes());
+  std::memcpy(tiles_.upload.mapped().data(), tiles.records.data(), tiles_.upload.bytes());
+  tileRanges_ = {tiles.range(false), tiles.range(true)};
 }
 
 void MeshStage::recordTables(vulkan::Recorder& recorder) const {

@@ -9,6 +9,7 @@
 
 #include "server/simulation/advance_variant.h"
 #include "server/simulation/mesh_tables.h"
+#include "server/simulation/report_stage.h"
 #include "server/simulation/state_buffers.h"
 #include "server/vulkan/buffer.h"
 #include "server/vulkan/device.h"
@@ -25,12 +26,15 @@ class MeshStage {
   MeshStage(const vulkan::Device& device, const MeshTables& tables, const StateBuffers& state,
             const vulkan::Buffer& normals, scene::Integrator integrator, std::uint32_t workgroupSize);
 
-  // Its tables, once, before anything else.
+  // Of the same meshes, other solvers' order of them; nothing of this stage may be in flight.
+  void setTiles(const Tiles& tiles);
+  // Its tables, before anything else that is with them.
   void recordTables(vulkan::Recorder& recorder) const;
   // One substep from state `from` to the other, of the meshes with constraints or of those without.
   void recordAdvance(vulkan::Recorder& recorder, std::uint32_t from, const AdvanceVariant& variant,
                      bool constrained, shared::AdvancePush push);
   void recordNormals(vulkan::Recorder& recorder, std::uint32_t present) const;
+  MeshSprings springs() const { return {.nodes = &nodes_.buffer, .ends = &springEnds_.buffer}; }
   // Makes the kernel of this variant now rather than when it is first needed.
   void prepare(const AdvanceVariant& variant) { advance(variant); }
 

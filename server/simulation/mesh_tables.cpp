@@ -72,20 +72,26 @@ void appendCorners(const scene::Mesh& mesh, std::uint32_t firstNode, std::span<s
 
 }  // namespace
 
-MeshTables meshTables(std::span<const scene::Cloth> cloths, std::uint32_t workgroupSize) {
-  MeshTables tables;
+Tiles meshTiles(std::span<const scene::Cloth> cloths, std::uint32_t workgroupSize) {
+  Tiles tiles;
   const auto append = [&](bool constrained) {
     std::size_t nodes = 0;
     for (std::uint32_t i = 0; i < cloths.size(); ++i) {
       if (!cloths[i].mesh) continue;
       if (constrained == (cloths[i].solver.kind != scene::SolverKind::massSpring))
-        appendTiles(i, cloths[i].nodeCount(), nodes, workgroupSize, tables.tiles.records);
+        appendTiles(i, cloths[i].nodeCount(), nodes, workgroupSize, tiles.records);
       nodes += cloths[i].nodeCount();
     }
   };
   append(false);
-  tables.tiles.withoutConstraints = static_cast<std::uint32_t>(tables.tiles.records.size());
+  tiles.withoutConstraints = static_cast<std::uint32_t>(tiles.records.size());
   append(true);
+  return tiles;
+}
+
+MeshTables meshTables(std::span<const scene::Cloth> cloths, std::uint32_t workgroupSize) {
+  MeshTables tables;
+  tables.tiles = meshTiles(cloths, workgroupSize);
 
   std::uint32_t firstNode = 0;
   for (std::uint32_t i = 0; i < cloths.size(); firstNode += cloths[i++].nodeCount()) {

@@ -20,6 +20,9 @@ struct MeshTables {
   std::vector<shared::CornerPairRecord> corners;
 };
 
+// Of the meshes; MeshTables has them.
+Tiles meshTiles(std::span<const scene::Cloth> cloths, std::uint32_t workgroupSize);
+
 // Empty where no cloth is a mesh.
 MeshTables meshTables(std::span<const scene::Cloth> cloths, std::uint32_t workgroupSize);
 

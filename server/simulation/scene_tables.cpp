@@ -20,8 +20,8 @@ float snapTiny(float x) {
 // Where springs become constraints, how much of what is too much is taken back; the third tells from those
 // that always are.
 shared::vec4 limitsOf(const scene::Solver& solver) {
-  if (solver.kind != scene::SolverKind::acad) return {0, 1, 0, 0};
-  return {solver.activation, scene::kTakenBack, 1, 0};
+  if (solver.kind != scene::SolverKind::acad) return {0, scene::takenBack(solver), 0, 0};
+  return {solver.activation, scene::takenBack(solver), 1, 0};
 }
 
 }  // namespace

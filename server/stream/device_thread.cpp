@@ -13,8 +13,8 @@ namespace clothstream::stream {
 
 DeviceThread::DeviceThread(const vulkan::DeviceOptions& device,
                            const std::vector<std::unique_ptr<LiveScene>>& scenes, FramePacker& packer,
-                           telemetry::ServerMetrics& metrics, bool runAlways)
-    : options_(device), packer_(packer), metrics_(metrics), runAlways_(runAlways) {
+                           telemetry::ServerMetrics& metrics, bool runAlways, double reportRate)
+    : options_(device), packer_(packer), metrics_(metrics), runAlways_(runAlways), reportRate_(reportRate) {
   std::promise<void> ready;
   std::future<void> isReady = ready.get_future();
   thread_ = std::thread([this, &scenes, ready = std::move(ready)]() mutable { run(scenes, ready); });
@@ -59,7 +59,8 @@ vulkan::DeviceInfo DeviceThread::info() const {
 void DeviceThread::run(const std::vector<std::unique_ptr<LiveScene>>& scenes, std::promise<void>& ready) {
   try {
     device_ = std::make_unique<vulkan::Device>(options_);
-    for (const auto& scene : scenes) runs_.push_back(std::make_unique<Run>(*device_, *scene, packer_));
+    for (const auto& scene : scenes)
+      runs_.push_back(std::make_unique<Run>(*device_, *scene, packer_, reportRate_));
     due_.reserve(runs_.size());
     info_ = device_->info();
   } catch (...) {

@@ -30,7 +30,7 @@ class DeviceThread {
   // Device and scenes are ready when it returns. All arguments outlive it. Throws what the device or a scene
   // throws.
   DeviceThread(const vulkan::DeviceOptions& device, const std::vector<std::unique_ptr<LiveScene>>& scenes,
-               FramePacker& packer, telemetry::ServerMetrics& metrics, bool runAlways);
+               FramePacker& packer, telemetry::ServerMetrics& metrics, bool runAlways, double reportRate);
   // Ends after the ticks in flight.
   ~DeviceThread();
   DeviceThread(const DeviceThread&) = delete;
@@ -46,8 +46,8 @@ class DeviceThread {
 
  private:
   struct Run {
-    Run(vulkan::Device& device, LiveScene& scene, FramePacker& packer)
-        : host(device, scene, packer), pacer(scene.start().simulationRate) {}
+    Run(vulkan::Device& device, LiveScene& scene, FramePacker& packer, double reportRate)
+        : host(device, scene, packer, reportRate), pacer(scene.start().simulationRate) {}
     // Of what was given up so far, the whole ticks that are not counted yet.
     std::uint64_t wholeSlippedTicks(double given) {
       slipped += given;
@@ -76,6 +76,7 @@ class DeviceThread {
   FramePacker& packer_;
   telemetry::ServerMetrics& metrics_;
   const bool runAlways_;
+  const double reportRate_;
 
   mutable std::mutex mutex_;
   std::condition_variable changed_;

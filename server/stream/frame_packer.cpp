@@ -71,6 +71,10 @@ void FramePacker::pack() {
   frame.set_reconstruction_hash(encoded.reconstructionHash);
   frame.set_state_hash(frame_.stateHash);
   frame.mutable_colliders()->Swap(&frame_.colliders);
+  if (frame_.hasReport)
+    frame.mutable_report()->Swap(&frame_.report);
+  else
+    frame.clear_report();
   const Clock::time_point complete = Clock::now();
   frame.set_packet_time_us(microseconds(complete));
 

@@ -31,6 +31,8 @@ struct CompleteFrame {
   google::protobuf::RepeatedPtrField<v1::ColliderState> colliders;
   // Of the poses whose effect it is the first to show.
   std::vector<Clock::time_point> poseArrivals;
+  bool hasReport = false;
+  v1::SimulationReport report;
 };
 
 // push() and drain() belong to the device's thread.

@@ -41,6 +41,11 @@ void Inbox::keepColliderChanges() {
                 [](const AcceptedChange& accepted) { return accepted.change.colliders.empty(); });
 }
 
+void Inbox::forEachChange(const std::function<void(const scene::ParameterChange&)>& visit) {
+  const std::lock_guard lock(mutex_);
+  for (const AcceptedChange& accepted : inputs_.changes) visit(accepted.change);
+}
+
 void Inbox::drain(Inputs& out) {
   out.changes.clear();
   out.poses.clear();

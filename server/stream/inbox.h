@@ -5,6 +5,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <mutex>
 #include <span>
 #include <vector>
@@ -49,6 +50,9 @@ class Inbox {
   [[nodiscard]] bool postChange(AcceptedChange change);
   // Of the changes that wait, what they say of the scene's colliders; the rest is dropped.
   void keepColliderChanges();
+
+  // Those that wait, oldest first. `visit` must not call this inbox.
+  void forEachChange(const std::function<void(const scene::ParameterChange&)>& visit);
 
   // Moves everything to `out`, whose former contents go; the two keep swapping their memory.
   void drain(Inputs& out);

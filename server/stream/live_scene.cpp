@@ -28,6 +28,8 @@ v1::ParameterChange allParameters(const scene::Scene& scene) {
     all.set_drag(cloth.drag());
     all.set_lift(cloth.lift());
     all.set_friction(cloth.friction());
+    all.set_thickness(cloth.thickness());
+    *all.mutable_solver() = cloth.solver();
   }
   return change;
 }
@@ -65,6 +67,14 @@ v1::ParameterChange LiveScene::resetParameters() {
   definition_.cloths = start_.cloths;
   description_.reset();
   return allParameters(start_);
+}
+
+v1::ParameterChange LiveScene::correct(const scene::Scene& now) {
+  const std::lock_guard lock(mutex_);
+  definition_ = now;
+  inbox.forEachChange([&](const scene::ParameterChange& change) { scene::applyChange(definition_, change); });
+  description_.reset();
+  return allParameters(now);
 }
 
 std::shared_ptr<const Description> LiveScene::description() {

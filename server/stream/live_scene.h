@@ -37,6 +37,9 @@ class LiveScene {
   // change that says so.
   v1::ParameterChange resetParameters();
 
+  // The definition becomes what holds now and the changes that wait; returns the change that says what holds.
+  v1::ParameterChange correct(const scene::Scene& now);
+
   // For who joins now; must have joined the audience before, so as to miss no change.
   std::shared_ptr<const Description> description();
 

@@ -2,14 +2,21 @@
 // One scene on the device.
 #include "server/stream/scene_host.h"
 
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
 #include <utility>
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include "server/stream/report_message.h"
+
 namespace clothstream::stream {
 namespace {
 
+// After a change of solver what springs are too long is taken back as exp(-t / kGentleTime).
+constexpr double kGentleSeconds = 0.5, kGentleTime = 0.1;
 constexpr std::uint32_t kCheckpointSeconds = 1, kSnapshotSeconds = 5;
 // Poses whose latency a frame reports: one a participant and tick, at most this many.
 constexpr std::size_t kMaxPoseArrivals = 256;
@@ -34,6 +41,7 @@ void SceneHost::OnDevice::warmUp(const scene::Scene& scene) {
   for (std::uint64_t tick = 1; tick <= 2; ++tick) {
     recorder.begin();
     simulation.recordTick(recorder, inputs);
+    simulation.recordReport(recorder, inputs);
     if (scene.stream.normals == scene::Normals::octahedral) simulation.recordNormals(recorder);
     const encode::RecordedFrame frame = encoder.record(recorder, tick, false);
     device.wait(device.submit(recorder));
@@ -46,13 +54,15 @@ void SceneHost::OnDevice::warmUp(const scene::Scene& scene) {
   device.wait(device.submit(recorder));
 }
 
-SceneHost::SceneHost(vulkan::Device& device, LiveScene& scene, FramePacker& packer)
+SceneHost::SceneHost(vulkan::Device& device, LiveScene& scene, FramePacker& packer, double reportRate)
     : live_(scene),
       packer_(packer),
       rate_(scene.start().simulationRate),
       ticksAFrame_(rate_ / scene.start().streamRate),
+      ticksAReport_(reportRate > 0 ? static_cast<std::uint64_t>(std::ceil(rate_ / reportRate)) : 0),
       scene_(scene.start()),
       colliders_(scene_),
+      gentleUntil_(scene_.cloths.size(), 0),
       onDevice_(std::make_unique<OnDevice>(device, scene_)) {
   newestState_ = onDevice_->start;
 }
@@ -61,6 +71,7 @@ SceneHost::~SceneHost() = default;
 
 void SceneHost::begin(Clock::time_point now) {
   tickStart_ = now;
+  endGentleness();
   applyInputs();
   const double endSeconds = static_cast<double>(tick_ + 1) * scene_.tickSeconds();
   colliders_.advance(scene_, endSeconds, tickInputs_.colliders);
@@ -80,19 +91,68 @@ void SceneHost::begin(Clock::time_point now) {
 
 void SceneHost::applyInputs() {
   live_.inbox.drain(inputs_);
+  std::string problem;
   for (const AcceptedChange& accepted : inputs_.changes) {
-    scene::applyChange(scene_, accepted.change);
-    if (!accepted.change.cloths.empty()) onDevice_->simulation.setCloths(scene_.cloths);
+    if (!apply(accepted.change, problem)) continue;
     v1::ServerMessage message;
     *message.mutable_parameter_changed()->mutable_change() = accepted.message;
     message.mutable_parameter_changed()->set_participant_id(accepted.participant);
     message.mutable_parameter_changed()->set_tick(tick_ + 1);
     live_.audience.announce(serialise(message));
   }
+  if (!problem.empty()) takeBack(problem);
   for (const Poses& poses : inputs_.poses) {
     colliders_.place(poses.participant, std::span(poses.colliders).first(poses.count));
     if (poses.count > 0 && poseArrivals_.size() < kMaxPoseArrivals) poseArrivals_.push_back(poses.arrival);
   }
+}
+
+bool SceneHost::apply(const scene::ParameterChange& change, std::string& problem) {
+  scene::Scene changed = scene_;
+  scene::applyChange(changed, change);
+  changeGently(changed);
+  if (!change.cloths.empty()) {
+    try {
+      onDevice_->simulation.setCloths(changed.cloths);
+    } catch (const vulkan::DeviceLost&) {
+      throw;
+    } catch (const std::runtime_error& noRoom) {
+      problem = noRoom.what();
+      return false;
+    }
+  }
+  scene_ = std::move(changed);
+  return true;
+}
+
+void SceneHost::changeGently(scene::Scene& changed) {
+  const auto part = static_cast<float>(changed.substepSeconds() / kGentleTime);
+  for (std::size_t i = 0; i < changed.cloths.size(); ++i) {
+    scene::Solver& solver = changed.cloths[i].solver;
+    if (solver.kind != scene_.cloths[i].solver.kind)
+      gentleUntil_[i] = tick_ + static_cast<std::uint64_t>(std::ceil(kGentleSeconds * rate_));
+    if (gentleUntil_[i] > tick_) solver.takenBack = std::min(part, scene::takenBack(solver));
+  }
+}
+
+void SceneHost::endGentleness() {
+  bool ended = false;
+  for (std::size_t i = 0; i < gentleUntil_.size(); ++i) {
+    if (gentleUntil_[i] != tick_ || !scene_.cloths[i].solver.takenBack) continue;
+    scene_.cloths[i].solver.takenBack.reset();
+    ended = true;
+  }
+  if (ended) onDevice_->simulation.setCloths(scene_.cloths);
+}
+
+void SceneHost::takeBack(const std::string& reason) {
+  const std::string text = fmt::format("a change of parameters was taken back: {}", reason);
+  spdlog::warn("{}: tick {}: {}", live_.name(), tick_, text);
+  v1::ServerMessage message;
+  *message.mutable_parameter_changed()->mutable_change() = live_.correct(scene_);
+  message.mutable_parameter_changed()->set_tick(tick_ + 1);
+  live_.audience.announce(serialise(message));
+  live_.audience.announce(notice(v1::NOTICE_KIND_CHANGE_UNDONE, text, tick_));
 }
 
 void SceneHost::recordRecovery() {
@@ -112,6 +172,11 @@ void SceneHost::recordFrame(Clock::time_point now) {
     return;
   }
   if (scene_.stream.normals == scene::Normals::octahedral) on.simulation.recordNormals(on.recorder);
+  frame_.hasReport = ticksAReport_ > 0 && tick_ + 1 >= nextReport_;
+  if (frame_.hasReport) {
+    on.simulation.recordReport(on.recorder, tickInputs_);
+    nextReport_ = tick_ + 1 + ticksAReport_;
+  }
   const bool key = now - lastKeyFrame_ >= kKeyFrameInterval && live_.audience.wantsKeyFrame();
   frame_.recorded = on.encoder.record(on.recorder, tick_ + 1, key);
   if (frame_.recorded.kind == codec::PacketKind::key) lastKeyFrame_ = now;
@@ -134,7 +199,15 @@ void SceneHost::finish() {
     live_.tick = tick_;
     if (savesState_) newestState_ = on.simulation.collectState(tick_);
   }
+  telemetry::SceneMetrics& metrics = live_.metrics;
+  double total = 0, report = 0;
+  for (const vulkan::StageTime& stage : on.recorder.stageTimes()) {
+    metrics.device.record(stage.stage, stage.seconds);
+    total += stage.seconds;
+    if (stage.stage == "report") report = stage.seconds;
+  }
   if (hasFrame_) {
+    if (frame_.hasReport) write(on.simulation.report(), total - report, frame_.report);
     frame_.discarded = !status_.healthy;
     frame_.stateHash = status_.stateHash;
     frame_.deviceDone = done;
@@ -142,14 +215,8 @@ void SceneHost::finish() {
   }
   if (!status_.healthy) recover();
 
-  telemetry::SceneMetrics& metrics = live_.metrics;
   metrics.ticks.add();
   metrics.tick.record(seconds(done - tickStart_));
-  double total = 0;
-  for (const vulkan::StageTime& stage : on.recorder.stageTimes()) {
-    metrics.device.record(stage.stage, stage.seconds);
-    total += stage.seconds;
-  }
   metrics.deviceTotal.record(total);
 }
 

@@ -30,8 +30,12 @@ class SceneHost {
   // At most one key frame in this time, whoever asks: one serves all who wait.
   static constexpr std::chrono::milliseconds kKeyFrameInterval{100};
 
-  // All outlive it. Throws std::runtime_error where the device has no room for the scene.
-  SceneHost(vulkan::Device& device, LiveScene& scene, FramePacker& packer);
+  // Of frames with a report, a second.
+  static constexpr double kReportRate = 4;
+
+  // All outlive it. `reportRate` 0: no frame has one. Throws std::runtime_error where the device has no room
+  // for the scene.
+  SceneHost(vulkan::Device& device, LiveScene& scene, FramePacker& packer, double reportRate = kReportRate);
   ~SceneHost();
 
   LiveScene& scene() { return live_; }
@@ -67,6 +71,13 @@ class SceneHost {
   enum class Recovery : std::uint8_t { none, rollback, reset };
 
   void applyInputs();
+  // False, and nothing changed, where the device has no room for what the change asks for: `problem` says
+  // why.
+  bool apply(const scene::ParameterChange& change, std::string& problem);
+  void takeBack(const std::string& reason);
+  // Cloths that just got another solver are pulled to their springs' length over kGentleSeconds, not at once.
+  void changeGently(scene::Scene& changed);
+  void endGentleness();
   void recordRecovery();
   void recordFrame(Clock::time_point now);
   void recover();
@@ -74,14 +85,17 @@ class SceneHost {
 
   LiveScene& live_;
   FramePacker& packer_;
-  const std::uint32_t rate_;         // ticks/s
-  const std::uint32_t ticksAFrame_;  // simulation rate / stream rate
+  const std::uint32_t rate_;          // ticks/s
+  const std::uint32_t ticksAFrame_;   // simulation rate / stream rate
+  const std::uint64_t ticksAReport_;  // at least; 0: none
 
   scene::Scene scene_;  // as of the tick in hand
   ColliderSet colliders_;
   Inputs inputs_;
   simulation::TickInputs tickInputs_;
   std::vector<Clock::time_point> poseArrivals_;  // that no frame has shown yet
+
+  std::vector<std::uint64_t> gentleUntil_;  // tick, a cloth
 
   std::uint64_t tick_ = 0;
   simulation::TickStatus status_;
@@ -95,7 +109,8 @@ class SceneHost {
 
   Clock::time_point tickStart_{}, lastKeyFrame_{};
   vulkan::TimelineValue submitted_ = 0;
-  bool hasFrame_ = false;  // the tick in hand
+  bool hasFrame_ = false;         // the tick in hand
+  std::uint64_t nextReport_ = 0;  // tick
   CompleteFrame frame_;
 
   std::unique_ptr<OnDevice> onDevice_;

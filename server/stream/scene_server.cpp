@@ -38,7 +38,7 @@ SceneServer::State::State(std::vector<scene::Scene> definitions, ServerOptions o
              [this] {
                for (const auto& session : sessionsNow()) session->checkSilence(Clock::now());
              }),
-      device(options.device, scenes, packer, metrics, options.runAlways) {}
+      device(options.device, scenes, packer, metrics, options.runAlways, options.reportRate) {}
 
 LiveScene* SceneServer::State::find(const std::string& name) const {
   for (const auto& scene : scenes)

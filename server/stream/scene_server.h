@@ -24,6 +24,8 @@ struct ServerOptions {
   std::string serverName = "clothstream-server";
   // A scene sleeps while nobody is in it, unless this is set.
   bool runAlways = false;
+  // Frames of a scene that tell how its simulation does, a second; 0: none.
+  double reportRate = 4;
   std::uint32_t maxConnections = 1024;
   // A scene; at most 250, for the simulation has room for so many colliders.
   std::uint32_t maxParticipants = 64;

@@ -50,8 +50,8 @@ void main() {
   bool isActive = limits.z == 0.0 || dotProduct(freeEnds, freeEnds) > longest * longest;
 
   precise float excess = squared * inverseLength - longest;
-  precise float side =
-      (excess > 0.0 ? limits.y * excess : excess) + push.substepSeconds * dotProduct(direction, relative);
+  precise float takenBack = excess > 0.0 || limits.z == 0.0 ? limits.y * excess : excess;
+  precise float side = takenBack + push.substepSeconds * dotProduct(direction, relative);
   // The solve starts from no multipliers: residual and direction are the right-hand side.
   rows[link] = isActive ? vec4(direction, 0.0) : vec4(0.0);
   multipliers[link] = 0.0;

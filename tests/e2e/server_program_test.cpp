@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: MIT
 // The server program: what it says, what its options do, how it ends.
+#include <algorithm>
 #include <csignal>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 
 #include "server/messages/scene_file.h"
 #include "tests/e2e/server_process.h"
@@ -126,6 +129,115 @@ TEST_F(ServerProgram, SaysWhereASceneFileIsWrong) {
   EXPECT_THAT(missing.said(), HasSubstr("/nowhere/scene.json"));
 }
 
+std::vector<float> numbersIn(const std::filesystem::path& path) {
+  std::vector<float> numbers(std::filesystem::file_size(path) / sizeof(float));
+  std::ifstream(path, std::ios::binary)
+      .read(reinterpret_cast<char*>(numbers.data()),
+            static_cast<std::streamsize>(numbers.size() * sizeof(float)));
+  return numbers;
+}
+
+// Two runs write the same bytes, whatever is left out between.
+TEST_F(ServerProgram, StepsASceneIntoAFileThatOthersCanRead) {
+  const std::filesystem::path whole = sceneFile().replace_filename("whole.f32");
+  const std::filesystem::path some = sceneFile().replace_filename("some.f32");
+  std::ofstream(some.string() + ".json") << "of a former run";
+  ServerProcess every({"step", "--scene", sceneFile(), "--ticks", "20", "--out", whole});
+  EXPECT_EQ(every.exitCode(), 0) << every.said();
+  ServerProcess fifth({"step", "--scene", sceneFile(), "--ticks", "20", "--out", some, "--every", "5"});
+  EXPECT_EQ(fifth.exitCode(), 0) << fifth.said();
+
+  const scene::Scene scene = smallScene("small");
+  const std::size_t frame = std::size_t{scene.nodeCount()} * 6;
+  const std::vector<float> all = numbersIn(whole), few = numbersIn(some);
+  ASSERT_EQ(all.size(), 21 * frame);
+  ASSERT_EQ(few.size(), 5 * frame);
+  for (std::size_t i = 0; i < 5; ++i)
+    EXPECT_TRUE(std::equal(few.begin() + static_cast<std::ptrdiff_t>(i * frame),
+                           few.begin() + static_cast<std::ptrdiff_t>((i + 1) * frame),
+                           all.begin() + static_cast<std::ptrdiff_t>(5 * i * frame)))
+        << "frame " << i;
+  // Frame 0 is the start: at rest, the first node at its corner. Later ones fall.
+  EXPECT_EQ(few[0], -0.45f);
+  EXPECT_EQ(few[3], 0);
+  EXPECT_LT(few[4 * frame + 6 * 115 + 1], few[6 * 115 + 1]);
+
+  const auto said = nlohmann::json::parse(std::ifstream(some.string() + ".json"));
+  EXPECT_EQ(said["shape"], (std::vector<std::size_t>{5, 120, 6}));
+  EXPECT_EQ(said["dtype"], "<f4");
+  EXPECT_EQ(said["file"], "some.f32");
+  EXPECT_EQ(said["complete"], true);
+  EXPECT_EQ(said["ticks"], (std::vector<int>{0, 5, 10, 15, 20}));
+  EXPECT_EQ(said["hashes"].size(), 5u);
+  EXPECT_EQ(said["cloths"][0]["name"], "sheet");
+  EXPECT_EQ(said["cloths"][0]["rows"], 12);
+  EXPECT_TRUE(said["reports"][0].is_null());
+  const auto& report = said["reports"][4]["cloths"][0];
+  EXPECT_GT(report["strainMax"], 0);
+  EXPECT_GT(report["kineticEnergy"], 0);
+  EXPECT_GE(report["penetration"], 0);
+  EXPECT_EQ(said["scene"]["cloths"][0]["grid"]["columns"], 10);
+  EXPECT_THAT(said["server"].get<std::string>(), HasSubstr("clothstream-server 0."));
+}
+
+// What docs/simulation.md shows, with what Python always has.
+TEST_F(ServerProgram, WritesWhatPythonReads) {
+  const std::filesystem::path out = sceneFile().replace_filename("state.f32");
+  ServerProcess server({"step", "--scene", sceneFile(), "--ticks", "8", "--every", "4", "--out", out});
+  ASSERT_EQ(server.exitCode(), 0) << server.said();
+  const std::filesystem::path script = sceneFile().replace_filename("read.py");
+  std::ofstream(script) << R"(
+import array, json, sys
+said = json.load(open(sys.argv[1] + '.json'))
+frames, nodes, columns = said['shape']
+numbers = array.array('f')
+numbers.fromfile(open(sys.argv[1], 'rb'), frames * nodes * columns)
+assert (frames, nodes, columns) == (3, 120, 6) and said['columns'][1] == 'py'
+height = lambda frame: sum(numbers[(frame * nodes + node) * columns + 1] for node in range(nodes)) / nodes
+assert height(2) < height(1) < height(0), 'it falls'
+energy = [sum(report['cloths'][0][kind] for kind in ('kineticEnergy', 'elasticEnergy', 'gravityEnergy'))
+          for report in said['reports'][1:]]
+assert len(energy) == 2
+)";
+  const std::string command = "python3 '" + script.string() + "' '" + out.string() + "'";
+  EXPECT_EQ(std::system(command.c_str()), 0);
+}
+
+TEST_F(ServerProgram, LeavesAValidFileWhenAStepIsInterrupted) {
+  const std::filesystem::path out = sceneFile().replace_filename("long.f32");
+  ServerProcess server(
+      {"step", "--scene", sceneFile(), "--ticks", "100000000", "--every", "3", "--out", out});
+  server.lineWith("tick ");  // says how far it is
+  server.signal(SIGINT);
+  EXPECT_EQ(server.exitCode(), 130);
+  EXPECT_THAT(server.said(), HasSubstr("interrupted after tick"));
+  const auto said = nlohmann::json::parse(std::ifstream(out.string() + ".json"));
+  EXPECT_EQ(said["complete"], false);
+  const std::size_t frames = said["shape"][0];
+  EXPECT_GT(frames, 1u);
+  EXPECT_EQ(std::filesystem::file_size(out), frames * 120 * 6 * sizeof(float));
+  EXPECT_EQ(said["ticks"].size(), frames);
+  EXPECT_EQ(said["reports"].size(), frames);
+}
+
+TEST_F(ServerProgram, SaysWhatIsWrongWithAStep) {
+  const auto fails = [](const std::vector<std::string>& options, const std::string& text) {
+    ServerProcess server(options);
+    EXPECT_EQ(server.exitCode(), 1) << server.said();
+    EXPECT_THAT(server.said(), HasSubstr(text));
+  };
+  const std::string file = sceneFile(), out = sceneFile().replace_filename("x.f32");
+  fails({"step", "--scene", file, "--ticks", "1"}, "--out");
+  fails({"step", "--scene", file, "--ticks", "0", "--out", out}, "--ticks");
+  fails({"step", "--scene", "nowhere", "--ticks", "1", "--out", out}, "nowhere");
+  fails({"step", "--scene", file, "--ticks", "1", "--out", "/nowhere/x.f32"}, "cannot write /nowhere/x.f32");
+  fails({"step", "--scene", file, "--ticks", "1", "--out", out, "--substeps", "1"}, "substeps");
+  ServerProcess help({"step", "--help"});
+  EXPECT_EQ(help.exitCode(), 0);
+  for (const char* word : {"--scene", "--ticks", "--out", "--every", "--device", "numpy"})
+    EXPECT_THAT(help.said(), HasSubstr(word));
+}
+
 TEST_F(ServerProgram, NamesTheDevicesThereAre) {
   ServerProcess list({"--list-devices"});
   EXPECT_EQ(list.exitCode(), 0);
@@ -139,8 +251,8 @@ TEST_F(ServerProgram, ExplainsItsOptions) {
   ServerProcess help({"--help"});
   EXPECT_EQ(help.exitCode(), 0);
   for (const char* option : {"--scene", "--scene-file", "--rate", "--substeps", "--max-error", "--normals",
-                             "--host", "--port", "--grpc-port", "--page", "--device", "--list-devices",
-                             "--software-threads", "--log-level", "--seconds"})
+                             "--reports", "step", "--host", "--port", "--grpc-port", "--page", "--device",
+                             "--list-devices", "--software-threads", "--log-level", "--seconds"})
     EXPECT_THAT(help.said(), HasSubstr(option));
   ServerProcess version({"--version"});
   EXPECT_EQ(version.exitCode(), 0);

@@ -224,6 +224,9 @@ TEST_F(ToParameterChange, CarriesEveryField) {
   cloth.set_drag(0.6f);
   cloth.set_lift(0.7f);
   cloth.set_friction(0.8f);
+  cloth.set_thickness(0.02f);
+  cloth.mutable_solver()->mutable_acad()->set_activation(0.25f);
+  cloth.mutable_solver()->mutable_acad()->mutable_constraint()->set_iterations(7);
   v1::ColliderChange& collider = *message_.add_colliders();
   collider.set_name("ball");
   collider.mutable_position()->set_x(3);
@@ -242,6 +245,10 @@ TEST_F(ToParameterChange, CarriesEveryField) {
   EXPECT_EQ(scene_.cloths[0].drag, 0.6f);
   EXPECT_EQ(scene_.cloths[0].lift, 0.7f);
   EXPECT_EQ(scene_.cloths[0].friction, 0.8f);
+  EXPECT_EQ(scene_.cloths[0].thickness, 0.02f);
+  EXPECT_EQ(scene_.cloths[0].solver.kind, scene::SolverKind::acad);
+  EXPECT_EQ(scene_.cloths[0].solver.activation, 0.25f);
+  EXPECT_EQ(scene_.cloths[0].solver.iterations, 7u);
   EXPECT_EQ(scene_.colliders[0].pose.position, scene::Vec3(3, 0, 0));
   EXPECT_EQ(scene_.colliders[0].pose.orientation.y(), 1);
   EXPECT_EQ(std::get<scene::Sphere>(scene_.colliders[0].shape).radius, 0.5f);
@@ -284,6 +291,31 @@ TEST_F(ToParameterChange, RefusesWhatWouldMakeTheSceneUnstableNamingTheSubsteps)
   // 4 springs of 20000 N/m at nodes of 0.03 kg: h < 2 / sqrt(2 * 4 * 20000 / 0.03) s = 1 / 1154.7, 16.04 a
   // tick.
   EXPECT_THAT(error(), StartsWith("parameterChange: with substeps = 10, this scene needs at least 17"));
+}
+
+// Constraints set no bound on the step; going back to forces meets it again.
+TEST_F(ToParameterChange, RefusesASolverThatTheSceneCannotHave) {
+  v1::ClothChange& cloth = *message_.add_cloths();
+  cloth.mutable_structural()->set_stiffness(20000);
+  cloth.mutable_solver()->mutable_constraint();
+  const auto change = toParameterChange(message_, scene_);
+  ASSERT_TRUE(change) << change.error().text;
+  applyChange(scene_, *change);
+  message_.Clear();
+  message_.add_cloths()->mutable_solver()->mutable_mass_spring();
+  EXPECT_THAT(error(), StartsWith("parameterChange: with substeps = 10, this scene needs at least 17"));
+
+  message_.mutable_cloths(0)->mutable_solver()->mutable_constraint()->set_iterations(0);
+  EXPECT_THAT(error(), StartsWith("parameterChange.cloths[0].solver.constraint.iterations = 0:"));
+  message_.mutable_cloths(0)->mutable_solver()->mutable_acad()->set_activation(-1);
+  EXPECT_THAT(error(), StartsWith("parameterChange.cloths[0].solver.acad.activation = -1:"));
+  message_.mutable_cloths(0)->mutable_solver()->mutable_acad()->set_activation(0.1f);
+  scene_.integrator = scene::Integrator::explicitEuler;
+  EXPECT_THAT(error(), StartsWith("parameterChange.cloths[0].solver: \"sheet\" has constraints, which need "
+                                  "INTEGRATOR_SEMI_IMPLICIT_EULER"));
+  message_.mutable_cloths(0)->clear_solver();
+  message_.mutable_cloths(0)->set_thickness(2);
+  EXPECT_THAT(error(), StartsWith("parameterChange.cloths[0].thickness = 2:"));
 }
 
 TEST_F(ToParameterChange, JudgesAChangeAsAWhole) {

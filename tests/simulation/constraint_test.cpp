@@ -102,6 +102,13 @@ TEST_F(Constraints, moveNodesAsTheReferenceOnEveryShapeOfGrid) {
   }
 }
 
+// As after a change of solver.
+TEST_F(Constraints, thatArePulledGentlyMoveNodesAsTheReference) {
+  scene::Cloth cloth = constrained(9, 8);
+  cloth.solver.takenBack = 0.125f;
+  expectLikeReference(sceneOf({cloth}), 8);
+}
+
 TEST_F(Constraints, ofBendSpringsMoveNodesAsTheReference) {
   expectLikeReference(sceneOf({constrained(12, 11, true)}), 5);
 }

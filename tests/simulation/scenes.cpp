@@ -130,6 +130,14 @@ simulation::TickStatus Running::tick(const simulation::TickInputs& inputs) {
   return simulation_.status();
 }
 
+std::vector<simulation::ClothReport> Running::tickAndReport(const simulation::TickInputs& inputs) {
+  run([&] {
+    simulation_.recordTick(recorder_, inputs);
+    simulation_.recordReport(recorder_, inputs);
+  });
+  return simulation_.report();
+}
+
 void Running::restore(const simulation::NodeState& state) {
   restore(simulation::pack(state, 0));
 }

@@ -3,13 +3,21 @@
 #include "server/stream/scene_host.h"
 
 #include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
 #include <memory>
+#include <string>
 #include <vector>
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+#include <unistd.h>
 
 #include "proto/codec/decoder.h"
 #include "server/messages/scene_message.h"
+#include "server/step/step.h"
 #include "tests/stream/small_scene.h"
 #include "tests/vulkan/gpu_test.h"
 
@@ -287,6 +295,105 @@ TEST_F(SceneHostTest, OneKeyFrameServesAllWhoWaitAndNoneComesTooSoon) {
   EXPECT_EQ(hosted.live.metrics.keyFrames.value(), 2u);
   hosted.tick();
   EXPECT_EQ(hosted.live.metrics.keyFrames.value(), 3u);
+}
+
+// How far the lowest node of any column hangs below where it would if no spring were stretched, and where all
+// are.
+double stretchedBy(const std::vector<float>& positions, std::vector<float>* heights = nullptr) {
+  double most = 0;
+  for (std::size_t column = 0; column < 10; ++column) {
+    double length = 0;
+    for (std::size_t row = 0; row + 1 < 12; ++row) {
+      const float* a = positions.data() + 3 * (10 * row + column);
+      const float* b = a + 30;
+      length += std::hypot(double{b[0]} - a[0], double{b[1]} - a[1], double{b[2]} - a[2]);
+    }
+    most = std::max(most, length - 1.1);
+    if (heights != nullptr) heights->push_back(positions[3 * (110 + column) + 1]);
+  }
+  return most;
+}
+
+// Soft springs hang stretched by S of a metre. At once, that would be gone within a tick; gently it fades
+// as exp(-t / 0.1 s), which is at most a quarter of it in a tick of 25 ms, besides what moves anyway.
+TEST_F(SceneHostTest, AnotherSolverActsFromTheNextTickOnAndWithoutAJump) {
+  scene::Scene scene = smallScene();
+  scene.colliders.clear();
+  scene.cloths[0].damping = 3;
+  scene.cloths[0].structural.stiffness = 0.7f;
+  scene.cloths[0].shear.stiffness = 0.5f;
+  HostedScene hosted(scene);
+  hosted.ticks(120);
+  const auto lowest = [&] {
+    std::vector<float> heights;
+    const std::vector<float> positions(hosted.decoder->positions().begin(),
+                                       hosted.decoder->positions().end());
+    stretchedBy(positions, &heights);
+    return heights;
+  };
+  const auto stretch = [&] {
+    return stretchedBy({hosted.decoder->positions().begin(), hosted.decoder->positions().end()});
+  };
+  const double before = stretch();
+  ASSERT_GT(before, 0.2);
+  scene::ParameterChange change;
+  scene::Solver constraint;
+  constraint.kind = scene::SolverKind::constraint;
+  change.cloths = {{.name = "sheet", .solver = constraint}};
+  hosted.change(change);
+  std::vector<float> was = lowest();
+  for (int tick = 0; tick < 40; ++tick) {
+    hosted.tick();
+    const std::vector<float> now = lowest();
+    for (std::size_t i = 0; i < now.size(); ++i)
+      ASSERT_LT(std::abs(now[i] - was[i]), 0.25 * before + 0.02) << "tick " << tick;
+    was = now;
+  }
+  EXPECT_TRUE(hosted.host.status().healthy);
+  EXPECT_LT(stretch(), 0.02);
+  ASSERT_FALSE(hosted.told.empty());
+  EXPECT_EQ(hosted.told.back().parameter_changed().participant_id(), 5u);
+}
+
+// What it says is what can be seen of the frame: two ends of a spring of 0.1 m, each off by the codec's error
+// along three axes.
+TEST_F(SceneHostTest, TellsFourTimesASecondHowTheSimulationDoes) {
+  HostedScene hosted;
+  hosted.ticks(21);
+  ASSERT_EQ(hosted.frames.size(), 21u);
+  for (std::size_t i = 0; i < 21; ++i) EXPECT_EQ(hosted.frames[i].has_report(), i % 10 == 0) << "frame " << i;
+  const auto positions = hosted.decoder->positions();
+  double largest = -1;
+  for (std::size_t row = 0; row < 12; ++row)
+    for (std::size_t column = 0; column < 10; ++column)
+      for (const std::size_t next : {1, 10}) {
+        if ((next == 1 && column == 9) || (next == 10 && row == 11)) continue;
+        const float* a = positions.data() + 3 * (10 * row + column);
+        const float* b = a + 3 * next;
+        largest = std::max(
+            largest, std::hypot(double{b[0]} - a[0], double{b[1]} - a[1], double{b[2]} - a[2]) / 0.1 - 1);
+      }
+  const v1::SimulationReport& report = hosted.frames.back().report();
+  ASSERT_EQ(report.cloths_size(), 1);
+  EXPECT_NEAR(report.cloths(0).strain_max(), largest, 2 * std::sqrt(3.0) * 0.0005 / 0.1 + 1e-5);
+  EXPECT_GT(report.cloths(0).kinetic_energy(), 0);
+  EXPECT_GE(report.device_seconds(), 0);
+}
+
+TEST_F(SceneHostTest, HasTheStatesThatAStepWithoutAServerHas) {
+  const std::filesystem::path out =
+      std::filesystem::temp_directory_path() / ("clothstream-stepped-" + std::to_string(getpid()) + ".f32");
+  ASSERT_EQ(step::run(tests::device(), smallScene(), {.ticks = 30, .out = out}, [] { return false; }),
+            step::Outcome::complete);
+  const auto said = nlohmann::json::parse(std::ifstream(out.string() + ".json"));
+  std::filesystem::remove(out);
+  std::filesystem::remove(out.string() + ".json");
+  HostedScene hosted;
+  hosted.ticks(30);
+  ASSERT_EQ(hosted.frames.size(), 30u);
+  for (std::size_t i = 0; i < 30; ++i)
+    EXPECT_EQ(said["hashes"][i + 1], fmt::format("{:016x}", hosted.frames[i].state_hash()))
+        << "tick " << i + 1;
 }
 
 }  // namespace

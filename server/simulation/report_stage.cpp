@@ -1,0 +1,186 @@
+// SPDX-License-Identifier: MIT
+// Kernels of the report, and what its counts say.
+#include "server/simulation/report_stage.h"
+
+#include <algorithm>
+#include <bit>
+#include <cassert>
+#include <cstring>
+#include <numeric>
+#include <utility>
+
+#include "kernels/add_up_cloths.h"
+#include "kernels/measure_cloths.h"
+#include "kernels/measure_penetrations.h"
+
+namespace clothstream::simulation {
+namespace {
+
+using vulkan::BindingKind;
+using vulkan::Bindings;
+using vulkan::Buffer;
+using vulkan::BufferPurpose;
+
+constexpr auto kTexels = BindingKind::texels;
+constexpr auto kStorage = BindingKind::storage;
+
+ReportBlocks blocksOf(std::span<const shared::ClothRecord> cloths) {
+  ReportBlocks blocks;
+  std::uint32_t inMeshes = 0;
+  for (std::size_t cloth = 0; cloth < cloths.size(); ++cloth) {
+    const shared::vec4& place = cloths[cloth].place;
+    const bool isMesh = place.z == 0;
+    const std::uint32_t nodes =
+        isMesh ? static_cast<std::uint32_t>(place.w)
+               : static_cast<std::uint32_t>(place.z) * static_cast<std::uint32_t>(place.w);
+    const std::uint32_t count = (nodes + shared::kReportBlock - 1) / shared::kReportBlock;
+    blocks.cloths.push_back(
+        {.stiffness = {},
+         .blocks = {static_cast<float>(blocks.records.size()), static_cast<float>(count), 0, 0}});
+    for (std::uint32_t first = 0; first < nodes; first += shared::kReportBlock)
+      blocks.records.push_back({{static_cast<float>(cloth), static_cast<float>(first),
+                                 static_cast<float>(isMesh ? inMeshes + first : 0), 0}});
+    if (isMesh) inMeshes += nodes;
+  }
+  return blocks;
+}
+
+template <typename Record>
+Buffer uploadOf(const vulkan::Device& device, const std::vector<Record>& records) {
+  Buffer upload(device, BufferPurpose::upload, records.size() * sizeof(Record));
+  std::memcpy(upload.mapped().data(), records.data(), upload.bytes());
+  return upload;
+}
+
+// The upper end of the bin in which 99 % of all are reached.
+float p99Of(std::span<const std::uint32_t> bins, std::uint64_t all) {
+  const std::uint64_t rank = (99 * all + 99) / 100;
+  std::uint64_t before = 0;
+  for (std::uint32_t bin = 0; bin < bins.size(); ++bin)
+    if ((before += bins[bin]) >= rank) return std::bit_cast<float>((shared::kStretchFirst + bin) << 18);
+  return 0;
+}
+
+}  // namespace
+
+std::vector<shared::vec4> springStiffness(std::span<const scene::Cloth> cloths) {
+  std::vector<shared::vec4> all;
+  for (const scene::Cloth& cloth : cloths)
+    all.push_back({cloth.structural.stiffness, cloth.shear.stiffness, cloth.bend.stiffness, 0});
+  return all;
+}
+
+ReportStage::ReportStage(const vulkan::Device& device, std::span<const shared::ClothRecord> cloths,
+                         const StateBuffers& state, const MeshSprings& meshes, std::uint32_t workgroupSize)
+    : ReportStage(
+          device, blocksOf(cloths), state, meshes,
+          std::min(workgroupSize == 0 ? 64 : workgroupSize, device.limits().maxWorkgroupInvocations)) {}
+
+ReportStage::ReportStage(const vulkan::Device& device, ReportBlocks blocks, const StateBuffers& state,
+                         const MeshSprings& meshes, std::uint32_t workgroupSize)
+    : workgroupSize_(workgroupSize),
+      of_(std::move(blocks)),
+      blockUpload_(uploadOf(device, of_.records)),
+      blocks_(device, BufferPurpose::texels, blockUpload_.bytes()),
+      cloths_(device, BufferPurpose::texels, of_.cloths.size() * sizeof(shared::ReportClothRecord)),
+      runs_(device, BufferPurpose::state,
+            of_.records.size() * shared::kReportRuns * sizeof(shared::ReportSums)),
+      sums_(device, BufferPurpose::state, of_.cloths.size() * sizeof(shared::ReportSums)),
+      counts_(device, BufferPurpose::state,
+              of_.cloths.size() * shared::kReportCounts * sizeof(std::uint32_t)),
+      readback_(device, BufferPurpose::readback, sums_.bytes() + counts_.bytes()),
+      clothUploads_{uploadOf(device, of_.cloths), uploadOf(device, of_.cloths)},
+      measure_(device, {.name = "measure_cloths",
+                        .spirv = kernels::measure_cloths,
+                        .bindings = {kTexels, kTexels, kTexels, kTexels, kTexels, kTexels, kTexels, kStorage,
+                                     kStorage},
+                        .pushConstantBytes = sizeof(shared::MeasurePush),
+                        .workgroupSize = workgroupSize,
+                        .specialisation = {}}),
+      penetrations_(device, {.name = "measure_penetrations",
+                             .spirv = kernels::measure_penetrations,
+                             .bindings = {kTexels, kTexels, kTexels, kStorage, kTexels, kTexels},
+                             .pushConstantBytes = sizeof(shared::PenetrationPush),
+                             .workgroupSize = workgroupSize,
+                             .specialisation = {}}),
+      addUp_(device, {.name = "add_up_cloths",
+                      .spirv = kernels::add_up_cloths,
+                      .bindings = {kTexels, kStorage, kStorage},
+                      .workgroupSize = workgroupSize,
+                      .specialisation = {}}),
+      measureIn_{measureIn(device, state, meshes, 0), measureIn(device, state, meshes, 1)},
+      penetrationsIn_{penetrationsIn(device, state, 0), penetrationsIn(device, state, 1)},
+      addUpAll_(device, addUp_, {&cloths_, &runs_, &sums_}) {}
+
+Bindings ReportStage::measureIn(const vulkan::Device& device, const StateBuffers& state,
+                                const MeshSprings& meshes, std::size_t present) const {
+  return Bindings(device, measure_,
+                  {&state.cloths, &blocks_, &cloths_, state.positions[present], state.velocities[present],
+                   meshes.nodes != nullptr ? meshes.nodes : &blocks_,
+                   meshes.ends != nullptr ? meshes.ends : &blocks_, &runs_, &counts_});
+}
+
+Bindings ReportStage::penetrationsIn(const vulkan::Device& device, const StateBuffers& state,
+                                     std::size_t present) const {
+  return Bindings(
+      device, penetrations_,
+      {&state.cloths, &blocks_, state.positions[present], &counts_, &state.colliders, &state.nearColliders});
+}
+
+void ReportStage::record(vulkan::Recorder& recorder, std::uint32_t present,
+                         std::span<const shared::vec4> stiffness, const scene::Vec3& gravity,
+                         const shared::CollisionPush& collision) {
+  assert(stiffness.size() == of_.cloths.size());
+  for (std::size_t i = 0; i < stiffness.size(); ++i) of_.cloths[i].stiffness = stiffness[i];
+  slot_ = 1 - slot_;
+  const Buffer& upload = clothUploads_[slot_];
+  std::memcpy(upload.mapped().data(), of_.cloths.data(), upload.bytes());
+  recorder.barrier();
+  if (!std::exchange(tabled_, true)) recorder.copy(blockUpload_, blocks_, blocks_.bytes());
+  recorder.copy(upload, cloths_, upload.bytes());
+  recorder.fill(counts_, 0, counts_.bytes());
+  recorder.barrier();
+  const auto blocks = static_cast<std::uint32_t>(of_.records.size());
+  recorder.dispatch(measureIn_[present],
+                    shared::MeasurePush{.gravity = {gravity.x(), gravity.y(), gravity.z(), 0},
+                                        .blockCount = blocks,
+                                        .reserved0 = 0,
+                                        .reserved1 = 0,
+                                        .reserved2 = 0},
+                    std::uint64_t{blocks} * shared::kReportRuns);
+  if (collision.colliderCount > 0)
+    recorder.dispatch(
+        penetrationsIn_[present],
+        shared::PenetrationPush{
+            .collision = collision, .blockCount = blocks, .reserved0 = 0, .reserved1 = 0, .reserved2 = 0},
+        std::uint64_t{blocks} * (shared::kReportBlock / shared::kReportDepths));
+  recorder.barrier();
+  recorder.dispatch(addUpAll_, of_.cloths.size() * workgroupSize_);
+  recorder.barrier();
+  recorder.copy(sums_, readback_, sums_.bytes());
+  recorder.copy(counts_, readback_, counts_.bytes(), 0, sums_.bytes());
+}
+
+std::vector<ClothReport> ReportStage::collect() const {
+  const std::span<const std::byte> bytes = readback_.mapped();
+  std::vector<ClothReport> reports;
+  for (std::size_t cloth = 0; cloth < of_.cloths.size(); ++cloth) {
+    shared::ReportSums sums;
+    std::memcpy(&sums, bytes.data() + cloth * sizeof(sums), sizeof(sums));
+    std::array<std::uint32_t, shared::kReportCounts> counts;
+    std::memcpy(counts.data(), bytes.data() + sums_.bytes() + cloth * sizeof(counts), sizeof(counts));
+    const std::span<const std::uint32_t> bins = std::span(counts).first(shared::kStretchBins);
+    const std::uint64_t springs = std::accumulate(bins.begin(), bins.end(), std::uint64_t{0});
+    ClothReport& report = reports.emplace_back();
+    report.strainMax = sums.largest;
+    report.strainP99 = std::min(p99Of(bins, springs), sums.largest);
+    report.strainMean = sums.strain / static_cast<float>(springs);
+    report.kineticEnergy = sums.kinetic;
+    report.elasticEnergy = sums.elastic;
+    report.gravityEnergy = sums.gravity;
+    report.penetration = std::bit_cast<float>(counts[shared::kStretchBins]);
+  }
+  return reports;
+}
+
+}  // namespace clothstream::simulation

@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: MIT
+// What cloths are like at a tick's end, measured on the device.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "server/scene/scene.h"
+#include "server/simulation/cloth_report.h"
+#include "server/simulation/state_buffers.h"
+#include "server/vulkan/buffer.h"
+#include "server/vulkan/device.h"
+#include "server/vulkan/kernel.h"
+#include "server/vulkan/recorder.h"
+#include "shaders/collision/collision.h"
+#include "shaders/report/report.h"
+#include "shaders/shared/simulation.h"
+
+namespace clothstream::simulation {
+
+// The springs of meshes by their nodes; null where no cloth is a mesh.
+struct MeshSprings {
+  const vulkan::Buffer* nodes = nullptr;
+  const vulkan::Buffer* ends = nullptr;
+};
+
+// Stiffness of each kind of spring, whether it is a force or a constraint.
+std::vector<shared::vec4> springStiffness(std::span<const scene::Cloth> cloths);
+
+// How cloths are cut into blocks.
+struct ReportBlocks {
+  std::vector<shared::ReportBlockRecord> records;
+  std::vector<shared::ReportClothRecord> cloths;  // without their stiffness
+};
+
+// Belongs to the device's thread. Costs nothing in recordings that it has no part in. The bits depend neither
+// on the workgroup's size nor on the device.
+class ReportStage {
+ public:
+  // `cloths` say where the nodes of each are. `workgroupSize` 0: the measured best for the device.
+  ReportStage(const vulkan::Device& device, std::span<const shared::ClothRecord> cloths,
+              const StateBuffers& state, const MeshSprings& meshes, std::uint32_t workgroupSize);
+
+  // Of the state in the buffers `present`, against colliders as they are at the end of `collision`. Begins
+  // with a barrier. At most one recording of it may be in flight.
+  void record(vulkan::Recorder& recorder, std::uint32_t present, std::span<const shared::vec4> stiffness,
+              const scene::Vec3& gravity, const shared::CollisionPush& collision);
+  // Of a complete recording, without what a solve says: a cloth each.
+  std::vector<ClothReport> collect() const;
+
+ private:
+  ReportStage(const vulkan::Device& device, ReportBlocks blocks, const StateBuffers& state,
+              const MeshSprings& meshes, std::uint32_t workgroupSize);
+  vulkan::Bindings measureIn(const vulkan::Device& device, const StateBuffers& state,
+                             const MeshSprings& meshes, std::size_t present) const;
+  vulkan::Bindings penetrationsIn(const vulkan::Device& device, const StateBuffers& state,
+                                  std::size_t present) const;
+
+  std::uint32_t workgroupSize_;
+  std::uint32_t slot_ = 0;
+  bool tabled_ = false;  // the blocks are on the device
+  ReportBlocks of_;
+  vulkan::Buffer blockUpload_, blocks_, cloths_, runs_, sums_, counts_, readback_;
+  std::array<vulkan::Buffer, 2>
+      clothUploads_;  // by turns: a recording may be in flight while the next is made
+  vulkan::Kernel measure_, penetrations_, addUp_;
+  std::array<vulkan::Bindings, 2> measureIn_, penetrationsIn_;
+  vulkan::Bindings addUpAll_;
+};
+
+}  // namespace clothstream::simulation

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: MIT
+// Raw frames, and the JSON beside them.
+#include "server/step/state_file.h"
+
+#include <bit>
+#include <cerrno>
+#include <cstring>
+#include <stdexcept>
+#include <utility>
+
+#include <fmt/format.h>
+
+namespace clothstream::step {
+namespace {
+
+static_assert(std::endian::native == std::endian::little);
+
+[[noreturn]] void fail(const std::filesystem::path& path) {
+  throw std::runtime_error(fmt::format("cannot write {}: {}", path.string(), std::strerror(errno)));
+}
+
+}  // namespace
+
+StateFile::StateFile(std::filesystem::path path)
+    : path_(std::move(path)), file_(path_, std::ios::binary | std::ios::trunc) {
+  if (!file_) fail(path_);
+  std::error_code none;
+  std::filesystem::remove(sidecar(), none);  // it is of a former file
+}
+
+std::filesystem::path StateFile::sidecar() const {
+  return path_.string() + ".json";
+}
+
+void StateFile::append(std::span<const std::byte> frame) {
+  file_.write(reinterpret_cast<const char*>(frame.data()), static_cast<std::streamsize>(frame.size()));
+  if (!file_) fail(path_);
+  ++frames_;
+}
+
+void StateFile::finish(nlohmann::ordered_json description, std::uint32_t nodes) {
+  file_.close();
+  if (!file_) fail(path_);
+  nlohmann::ordered_json whole{{"format", "clothstream-state-1"},
+                               {"file", path_.filename().string()},
+                               {"dtype", "<f4"},
+                               {"shape", {frames_, nodes, 6}},
+                               {"columns", {"px", "py", "pz", "vx", "vy", "vz"}}};
+  whole.update(description);
+  const std::filesystem::path temporary = sidecar().string() + ".part";
+  std::ofstream out(temporary);
+  // Names of devices and files need not be UTF-8.
+  out << whole.dump(1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) << '\n';
+  out.close();
+  if (!out) fail(temporary);
+  std::error_code problem;
+  std::filesystem::rename(temporary, sidecar(), problem);
+  if (problem)
+    throw std::runtime_error(fmt::format("cannot write {}: {}", sidecar().string(), problem.message()));
+}
+
+}  // namespace clothstream::step

@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: MIT
+// Cloths that get another solver while they move: no jump, and from there on the motion that the new solver
+// makes.
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include <gtest/gtest.h>
+
+#include "server/scene/springs.h"
+#include "tests/simulation/scenes.h"
+
+namespace clothstream::tests {
+namespace {
+
+using scene::SolverKind;
+using simulation::NodeState;
+using simulation::StateSnapshot;
+
+constexpr SolverKind kKinds[] = {SolverKind::massSpring, SolverKind::constraint, SolverKind::acad};
+
+class SolverChange : public GpuTest {};
+
+// A grid and a mesh, so soft that they stretch far under their own weight as forces.
+scene::Scene softScene() {
+  scene::Cloth sheet = calmCloth(14, 11);
+  sheet.structural = {12, 0.01f};
+  sheet.shear = {6, 0.01f};
+  sheet.bend = {1, 0.01f};
+  sheet.pins = {topRow(sheet)};
+  scene::Cloth disc = discCloth(5);
+  disc.name = "disc";
+  disc.structural = {12, 0.01f};
+  disc.shear = {6, 0.01f};
+  disc.bend = {1, 0.01f};
+  disc.pinnedVertices = {0, 1, 2};
+  return sceneOf({sheet, disc});
+}
+
+scene::Scene withSolvers(scene::Scene scene, SolverKind first, SolverKind second) {
+  scene.cloths[0].solver.kind = first;
+  scene.cloths[1].solver.kind = second;
+  return scene;
+}
+
+simulation::TickInputs inputsWithBall(const scene::Scene& scene) {
+  const scene::Pose place{scene::Vec3(0, -0.15f, 0.03f), scene::Quaternion::Identity()};
+  return inputsOf(scene, {{scene::Sphere{0.04f}, place, place, 1}});
+}
+
+float largestStrain(const scene::Cloth& cloth, const NodeState& state) {
+  float largest = -1;
+  for (const scene::SpringLink& link : scene::springLinks(cloth))
+    if (link.kind == scene::SpringKind::structural)
+      largest =
+          std::max(largest, (state.positions[link.b] - state.positions[link.a]).norm() / link.restLength - 1);
+  return largest;
+}
+
+// Every solver after every other, and back: the state stays to the bit, and goes on to the bit as one that
+// had this solver from its start would from the same state.
+TEST_F(SolverChange, goesOnAsAClothThatAlwaysHadTheSolver) {
+  const scene::Scene scene = softScene();
+  const simulation::TickInputs inputs = inputsWithBall(scene);
+  Running changing(scene);
+  std::optional<SolverKind> before;
+  for (const SolverKind first : kKinds)
+    for (const SolverKind second : kKinds) {
+      SCOPED_TRACE(::testing::Message() << static_cast<int>(first) << ", " << static_cast<int>(second));
+      const scene::Scene changed = withSolvers(scene, first, second);
+      const StateSnapshot kept = changing.save();
+      changing.setCloths(changed.cloths);
+      EXPECT_EQ(changing.save().bytes, kept.bytes);
+      Running always(changed);
+      always.restore(kept);
+      for (int tick = 0; tick < 6; ++tick) {
+        const simulation::TickStatus status = changing.tick(inputs);
+        ASSERT_TRUE(status.healthy);
+        ASSERT_EQ(status.stateHash, always.tick(inputs).stateHash) << "tick " << tick;
+      }
+      EXPECT_EQ(changing.solves().size(), always.solves().size());
+    }
+}
+
+// As forces the sheet hangs stretched by tens of percents. ACAD lets go of 15 % of what is beyond 10 % a
+// substep, constraints of all of it: both are there within a second, and no node is thrown.
+TEST_F(SolverChange, changesTheStrainAsTheSolverPromises) {
+  scene::Scene scene = softScene();
+  scene.cloths.pop_back();
+  scene.cloths[0].damping = 2;
+  const simulation::TickInputs inputs = inputsOf(scene);
+  Running running(scene);
+  const auto run = [&](int ticks) {
+    for (int tick = 0; tick < ticks; ++tick) ASSERT_TRUE(running.tick(inputs).healthy);
+  };
+  const auto changeTo = [&](SolverKind kind) {
+    scene.cloths[0].solver.kind = kind;
+    scene.cloths[0].solver.iterations = 100;
+    running.setCloths(scene.cloths);
+  };
+  run(150);
+  const float asForces = largestStrain(scene.cloths[0], running.state());
+  ASSERT_GT(asForces, 0.3f);
+  changeTo(SolverKind::acad);
+  run(150);
+  EXPECT_LT(largestStrain(scene.cloths[0], running.state()), 0.13f);  // 10 %, and 3 while it moves (docs)
+  changeTo(SolverKind::constraint);
+  run(150);
+  EXPECT_LT(largestStrain(scene.cloths[0], running.state()), 0.02f);
+  changeTo(SolverKind::massSpring);
+  run(300);
+  EXPECT_NEAR(largestStrain(scene.cloths[0], running.state()), asForces, 0.2f * asForces);
+}
+
+TEST_F(SolverChange, ofOtherSettingsOrAnotherThicknessKeepsTheStateToo) {
+  scene::Scene scene = withSolvers(softScene(), SolverKind::constraint, SolverKind::acad);
+  Running running(scene);
+  const simulation::TickInputs inputs = inputsWithBall(scene);
+  for (int tick = 0; tick < 10; ++tick) running.tick(inputs);
+  const StateSnapshot kept = running.save();
+  scene.cloths[0].solver.bendConstraints = true;
+  scene.cloths[0].thickness = 0.02f;
+  scene.cloths[1].solver.activation = 0.02f;
+  running.setCloths(scene.cloths);
+  EXPECT_EQ(running.save().bytes, kept.bytes);
+  Running always(scene);
+  always.restore(kept);
+  for (int tick = 0; tick < 10; ++tick)
+    ASSERT_EQ(running.tick(inputs).stateHash, always.tick(inputs).stateHash) << "tick " << tick;
+  // The ball's surface and the thickness on it; the last rounding is that of 0.2 m.
+  const NodeState state = running.state();
+  for (std::size_t i = 0; i < scene.cloths[0].nodeCount(); ++i)
+    EXPECT_GT((state.positions[i] - scene::Vec3(0, -0.15f, 0.03f)).norm(), 0.06f - 1e-6f);
+}
+
+}  // namespace
+}  // namespace clothstream::tests
