@@ -19,7 +19,8 @@ enum ExitCode : int {
 inline constexpr const char* kExitCodes =
     "Ends with 0 if all went well, 1 if --hash found a frame that is not the server's, 2 for wrong "
     "arguments, 3 if no\n"
-    "server answers, 4 if the server refuses (an unknown scene, for example), 5 if the stream is lost, 6 if "
+    "server answers, 4 if the server refuses (an unknown scene, a value that is not allowed), 5 if the "
+    "stream is lost, 6 if "
     "the --obj\n"
     "file cannot be written.";
 

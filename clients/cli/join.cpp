@@ -4,6 +4,7 @@
 
 #include <chrono>
 #include <csignal>
+#include <cstdio>
 #include <ctime>
 
 #include <fmt/format.h>
@@ -23,12 +24,18 @@ constexpr std::chrono::milliseconds kLineInterval{100};
 // What the stream says beside its frames goes to standard error as it comes.
 class Listener {
  public:
-  explicit Listener(const StatusLine& line) : line_(line) {}
+  Listener(const StatusLine& line, bool report) : line_(line), report_(report) {}
 
   void operator()(cs_client* client, std::uint32_t events) const {
     if ((events & CS_EVENT_NOTICE) != 0) say("notice", cs_notice_text(client));
     if ((events & CS_EVENT_ERROR) != 0 && cs_get_state(client) != CS_STATE_FAILED)
       say("error", cs_error_text(client));
+    if (report_ && (events & CS_EVENT_REPORT) != 0) {
+      line_.clear();
+      for (const ClothFigures& figures : Report::of(client, GrpcClient::nowUs()).cloths)
+        fmt::print("{}\n", text(figures));
+      std::fflush(stdout);
+    }
   }
 
  private:
@@ -38,6 +45,7 @@ class Listener {
   }
 
   const StatusLine& line_;
+  bool report_;
 };
 
 // True if a signal that ends the program came within the time.
@@ -101,7 +109,7 @@ ExitCode join(const JoinOptions& options) {
   clientOptions.scene = options.scene;
   clientOptions.clientName = "clothstream join";
   clientOptions.cancelled = [] { return interrupted(std::chrono::milliseconds(0)); };
-  auto joined = GrpcClient::join(options.address, clientOptions, Listener(line));
+  auto joined = GrpcClient::join(options.address, clientOptions, Listener(line, options.report));
   if (!joined) return complain(exitCodeOf(joined.error().kind), joined.error().text);
   GrpcClient& client = **joined;
   sendColliders(client, options);

@@ -18,6 +18,7 @@ struct JoinOptions {
   std::string objPath;            // empty: none
   bool json = false;
   bool hash = false;
+  bool report = false;                          // a line for each report of the simulation as it comes
   std::vector<std::array<float, 4>> colliders;  // x, y, z, radius, metres
 };
 

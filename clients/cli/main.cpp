@@ -11,6 +11,8 @@
 
 #include "clients/cli/join.h"
 #include "clients/cli/list.h"
+#include "clients/cli/set.h"
+#include "clients/cli/set_options.h"
 #include "clients/core/core.h"
 #include "clients/grpc/address.h"
 
@@ -75,10 +77,21 @@ int run(int argc, char** argv) {
   joinCommand.add_flag("--hash", joinOptions.hash,
                        "Compare every decoded frame with the server's own reconstruction");
   joinCommand
+      .add_flag("--report", joinOptions.report,
+                "Print how the simulation of each cloth does whenever the server says: strain, energy, ...")
+      ->excludes("--json");
+  joinCommand
       .add_option("--collider", colliders,
                   "A sphere X,Y,Z[,RADIUS] in metres that the cloth meets while this client is there; may be "
                   "repeated")
       ->allow_extra_args(false);
+
+  SetOptions setOptions;
+  CLI::App& setCommand =
+      *app.add_subcommand("set", "Change parameters of a scene that runs, for everybody in it");
+  addSetOptions(setCommand, setOptions);
+  setCommand.footer(kExitCodes);
+  setCommand.add_option("ADDRESS", address, "HOST or HOST:PORT of the server")->capture_default_str();
 
   ListOptions listOptions;
   CLI::App& listCommand = *app.add_subcommand("list", "List the scenes of a server");
@@ -88,7 +101,9 @@ int run(int argc, char** argv) {
 
   try {
     app.parse(argc, argv);
-    joinOptions.address = listOptions.address = addressOf(address);
+    joinOptions.address = listOptions.address = setOptions.address = addressOf(address);
+    if (setCommand.parsed() && !changesAnything(setOptions))
+      throw CLI::ValidationError("set", "nothing to change is given; see clothstream set --help");
     if (colliders.size() > CS_MAX_COLLIDERS)
       throw CLI::ValidationError("--collider", fmt::format("at most {} are allowed", CS_MAX_COLLIDERS));
     for (const std::string& collider : colliders) joinOptions.colliders.push_back(parseCollider(collider));
@@ -96,6 +111,7 @@ int run(int argc, char** argv) {
     return app.exit(error) == 0 ? kOk : kUsage;
   }
   blockEndingSignals();
+  if (setCommand.parsed()) return set(setOptions);
   return listCommand.parsed() ? list(listOptions) : join(joinOptions);
 }
 

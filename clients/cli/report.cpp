@@ -9,6 +9,34 @@
 
 namespace clothstream::cli {
 
+std::string solverName(std::uint32_t solver) {
+  switch (solver) {
+    case CS_SOLVER_MASS_SPRING:
+      return "massSpring";
+    case CS_SOLVER_CONSTRAINT:
+      return "constraint";
+    case CS_SOLVER_ACAD:
+      return "acad";
+    default:
+      return fmt::format("solver {}", solver);
+  }
+}
+
+std::string text(const ClothFigures& figures) {
+  const cs_cloth_report& now = figures.report;
+  std::string line = fmt::format(
+      "{} ({}), tick {}: strain {:.2f} % at most, {:.2f} % p99, {:.2f} % mean; energy {:.4g} J kinetic, "
+      "{:.4g} J "
+      "elastic, {:.4g} J gravity",
+      figures.name, figures.solver, now.tick, 100 * now.strain_max, 100 * now.strain_p99,
+      100 * now.strain_mean, now.kinetic_energy, now.elastic_energy, now.gravity_energy);
+  if (now.iterations > 0 || now.active_constraints > 0)
+    line += fmt::format("; {} constraints, {} iterations, residual {:.2g}", now.active_constraints,
+                        now.iterations, now.residual);
+  return line + fmt::format("; {:.2g} mm into a collider; {:.2f} ms on the device", 1000 * now.penetration,
+                            now.device_ms);
+}
+
 Report Report::of(const cs_client* client, std::uint64_t nowUs) {
   Report report;
   report.scene = cs_scene_name(client);
@@ -18,6 +46,16 @@ Report Report::of(const cs_client* client, std::uint64_t nowUs) {
   report.streamRate = cs_stream_rate(client);
   report.seconds = cs_stream_seconds(client);
   cs_get_statistics(client, nowUs, &report.statistics);
+  cs_cloth cloth;
+  for (std::uint32_t i = 0; cs_get_cloth(client, i, &cloth) != 0; ++i) {
+    ClothFigures figures{.name = cloth.name, .solver = {}};
+    figures.report.version = CS_CLOTH_REPORT_VERSION;
+    if (cs_get_cloth_report(client, i, &figures.report) == 0) break;
+    cs_cloth_settings settings{};
+    settings.version = CS_CLOTH_SETTINGS_VERSION;
+    if (cs_get_cloth_settings(client, i, &settings) != 0) figures.solver = solverName(settings.solver);
+    report.cloths.push_back(std::move(figures));
+  }
   return report;
 }
 
@@ -46,6 +84,24 @@ std::string Report::json(bool hash) const {
       {"dropped", statistics.dropped},
       {"decodeErrors", statistics.decode_errors},
   };
+  object["cloths"] = nlohmann::ordered_json::array();
+  for (const ClothFigures& figures : cloths) {
+    const cs_cloth_report& now = figures.report;
+    object["cloths"].push_back({{"name", figures.name},
+                                {"solver", figures.solver},
+                                {"tick", now.tick},
+                                {"strainMax", now.strain_max},
+                                {"strainP99", now.strain_p99},
+                                {"strainMean", now.strain_mean},
+                                {"kineticEnergy", now.kinetic_energy},
+                                {"elasticEnergy", now.elastic_energy},
+                                {"gravityEnergy", now.gravity_energy},
+                                {"activeConstraints", now.active_constraints},
+                                {"iterations", now.iterations},
+                                {"residual", now.residual},
+                                {"penetration", now.penetration},
+                                {"deviceMs", now.device_ms}});
+  }
   if (hash) object["hashMismatches"] = statistics.hash_mismatches;
   // Names come from the server and need not be UTF-8.
   return object.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
@@ -62,6 +118,7 @@ std::string Report::text(bool hash) const {
   if (hash)
     text += fmt::format("\n{} of {} frames are what the server holds",
                         statistics.frames - statistics.hash_mismatches, statistics.frames);
+  for (const ClothFigures& figures : cloths) text += '\n' + cli::text(figures);
   return text;
 }
 

@@ -4,16 +4,30 @@
 
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "clients/core/core.h"
 
 namespace clothstream::cli {
+
+// How the simulation of one cloth does, as the server said last.
+struct ClothFigures {
+  std::string name, solver;
+  cs_cloth_report report{};
+};
+
+// A line for people.
+std::string text(const ClothFigures& figures);
+
+// The name of a cs_solver, as the scene files have it; of one that this client does not know, its number.
+std::string solverName(std::uint32_t solver);
 
 struct Report {
   std::string scene, server, device;
   std::uint32_t vertices = 0, streamRate = 0;
   double seconds = 0;  // from the first frame to the newest
   cs_statistics statistics{};
+  std::vector<ClothFigures> cloths;  // none before the first report
 
   static Report of(const cs_client* client, std::uint64_t nowUs);
 

@@ -86,6 +86,7 @@ std::uint32_t Client::described(Bytes content) {
   decoder_ = std::move(decoder);
   keyFrameRequest_.answered();
   statistics_.forgetTicks();
+  report_ = {};
   state_ = CS_STATE_JOINED;
   return CS_EVENT_DESCRIPTION;
 }
@@ -97,7 +98,11 @@ std::uint32_t Client::frameReceived(Bytes body, std::uint64_t nowUs) {
   for (std::size_t i = 0; i < frame_.colliders.size(); ++i) {
     if (!readCollider(frame_.colliders[i], description_.colliders[i])) return failMalformed("ColliderState");
   }
-  return packetReceived(nowUs);
+  const std::uint32_t events = packetReceived(nowUs);
+  if (!frame_.report || (events & CS_EVENT_FRAME) == 0) return events;
+  if (!readReport(*frame_.report, report_)) return failMalformed("SimulationReport");
+  reportTick_ = decoder_->tick();
+  return events | CS_EVENT_REPORT;
 }
 
 std::uint32_t Client::packetReceived(std::uint64_t nowUs) {
@@ -165,6 +170,7 @@ std::uint32_t Client::parametersReceived(Bytes body) {
   const std::optional<ParameterChange> change = readParameterChanged(body);
   if (!change) return failMalformed("ParameterChanged");
   apply(*change, description_);
+  parametersParticipant_ = change->participantId;
   return CS_EVENT_PARAMETERS;
 }
 

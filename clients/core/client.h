@@ -53,6 +53,10 @@ class Client {
   std::span<const float> positions() const;
   std::span<const float> normals() const;
   std::uint64_t reconstructionHash() const;
+  std::uint64_t parametersParticipant() const { return parametersParticipant_; }
+  // The newest, and its tick; no cloths before the first.
+  const SimulationReport& report() const { return report_; }
+  std::uint64_t reportTick() const { return reportTick_; }
   const std::vector<Collider>& colliders() const { return description_.colliders; }
 
  private:
@@ -90,6 +94,9 @@ class Client {
   std::uint64_t (*nowUs_)() = nullptr;
   double decodeMs_ = 0;
   std::vector<std::string> scenes_;
+  SimulationReport report_;
+  std::uint64_t reportTick_ = 0;
+  std::uint64_t parametersParticipant_ = 0;
 };
 
 }  // namespace clothstream::client

@@ -52,6 +52,31 @@ void addSpring(Writer& parent, std::uint32_t field, const std::optional<Spring>&
   spring.add_float(2, (*value)[1]);
 }
 
+std::string constraintMessage(const Solver& solver) {
+  std::string settings;
+  Writer writer(settings);
+  writer.add_bool(1, solver.bendConstraints);
+  if (solver.compliance) writer.add_float(2, *solver.compliance);
+  writer.add_uint32(3, solver.iterations);
+  writer.add_float(4, solver.tolerance);
+  return settings;
+}
+
+// A kind whose settings this client does not know says them as they came.
+std::string solverMessage(const Solver& solver) {
+  std::string settings = solver.settings;
+  if (solver.kind == CS_SOLVER_CONSTRAINT) settings = constraintMessage(solver);
+  if (solver.kind == CS_SOLVER_ACAD) {
+    settings.clear();
+    Writer writer(settings);
+    writer.add_float(1, solver.activation);
+    writer.add_message(2, constraintMessage(solver));
+  }
+  std::string message;
+  Writer(message).add_message(solver.kind, settings);
+  return message;
+}
+
 // Absent where it is not turned, for a Writer leaves out nothing by itself.
 void addPose(Writer& parent, std::uint32_t field, const cs_own_collider& collider) {
   Writer pose(parent, field);
@@ -114,6 +139,11 @@ void writeParameterChange(std::string& out, std::uint64_t requestId, const Param
       addSpring(cloth, 3, clothChange.shear);
       addSpring(cloth, 4, clothChange.bend);
       if (clothChange.damping) cloth.add_float(5, *clothChange.damping);
+      if (clothChange.drag) cloth.add_float(6, *clothChange.drag);
+      if (clothChange.lift) cloth.add_float(7, *clothChange.lift);
+      if (clothChange.friction) cloth.add_float(8, *clothChange.friction);
+      if (clothChange.thickness) cloth.add_float(9, *clothChange.thickness);
+      if (clothChange.solver) cloth.add_message(20, solverMessage(*clothChange.solver));
     }
   });
 }

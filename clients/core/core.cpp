@@ -5,6 +5,9 @@
 #include <algorithm>
 #include <array>
 #include <cassert>
+#include <cmath>
+#include <limits>
+#include <string_view>
 
 #include "clients/core/client.h"
 
@@ -28,6 +31,51 @@ std::optional<Spring> spring(const float* values) {
 
 std::optional<float> scalar(const float* value) {
   return value ? std::optional(*value) : std::nullopt;
+}
+
+constexpr float kAsIs = std::numeric_limits<float>::quiet_NaN();
+
+std::optional<float> given(float value) {
+  return std::isnan(value) ? std::nullopt : std::optional(value);
+}
+
+// What is not given of a spring is as it is now.
+std::optional<Spring> changed(const float* values, const Spring& now) {
+  if (std::isnan(values[0]) && std::isnan(values[1])) return std::nullopt;
+  return Spring{given(values[0]).value_or(now[0]), given(values[1]).value_or(now[1])};
+}
+
+std::optional<Solver> changed(const cs_cloth_settings& settings, const ClothParameters& now) {
+  const bool any = settings.solver != CS_SOLVER_AS_IS || settings.bend_constraints >= 0 ||
+                   settings.iterations != 0 || given(settings.tolerance) || given(settings.compliance) ||
+                   given(settings.activation);
+  if (!any) return std::nullopt;
+  Solver solver = now.solver;
+  if (settings.solver != CS_SOLVER_AS_IS && settings.solver != solver.kind) {
+    const auto known = now.solvers.find(settings.solver);
+    solver = known == now.solvers.end() ? Solver{} : known->second;
+    solver.kind = settings.solver;
+  }
+  if (settings.bend_constraints >= 0) solver.bendConstraints = settings.bend_constraints != 0;
+  if (settings.iterations != 0) solver.iterations = settings.iterations;
+  solver.tolerance = given(settings.tolerance).value_or(solver.tolerance);
+  if (given(settings.compliance)) solver.compliance = settings.compliance;
+  solver.activation = given(settings.activation).value_or(solver.activation);
+  return solver;
+}
+
+ClothChange changeOf(const Cloth& cloth, const cs_cloth_settings& settings) {
+  const ClothParameters& now = cloth.parameters;
+  return {.name = cloth.name,
+          .structural = changed(settings.structural, now.structural),
+          .shear = changed(settings.shear, now.shear),
+          .bend = changed(settings.bend, now.bend),
+          .damping = given(settings.damping),
+          .drag = given(settings.drag),
+          .lift = given(settings.lift),
+          .friction = given(settings.friction),
+          .thickness = given(settings.thickness),
+          .solver = changed(settings, now)};
 }
 
 template <typename Values>
@@ -247,6 +295,82 @@ int cs_get_cloth_parameters(const cs_client* client, uint32_t index, cs_cloth_pa
   return 1;
 }
 
+int cs_get_cloth_settings(const cs_client* client, uint32_t index, cs_cloth_settings* out) {
+  const Cloth* cloth = at(client->client.description().cloths, index);
+  if (!cloth || out->version != CS_CLOTH_SETTINGS_VERSION) return 0;
+  const ClothParameters& parameters = cloth->parameters;
+  cs_keep_cloth_settings(out);
+  copy(parameters.structural, out->structural);
+  copy(parameters.shear, out->shear);
+  copy(parameters.bend, out->bend);
+  out->damping = parameters.damping;
+  out->drag = parameters.drag;
+  out->lift = parameters.lift;
+  out->friction = parameters.friction;
+  out->thickness = parameters.thickness;
+  out->solver = parameters.solver.kind;
+  if (out->solver != CS_SOLVER_CONSTRAINT && out->solver != CS_SOLVER_ACAD) return 1;
+  out->bend_constraints = parameters.solver.bendConstraints ? 1 : 0;
+  out->iterations = parameters.solver.iterations;
+  out->tolerance = parameters.solver.tolerance;
+  out->compliance = parameters.solver.compliance.value_or(kAsIs);
+  out->activation = parameters.solver.activation;
+  return 1;
+}
+
+int cs_get_cloth_report(const cs_client* client, uint32_t index, cs_cloth_report* out) {
+  const SimulationReport& report = client->client.report();
+  const ClothReport* cloth = at(report.cloths, index);
+  if (!cloth || out->version != CS_CLOTH_REPORT_VERSION) return 0;
+  *out = {.version = CS_CLOTH_REPORT_VERSION,
+          .active_constraints = cloth->activeConstraints,
+          .iterations = cloth->iterations,
+          .residual = cloth->residual,
+          .strain_max = cloth->strainMax,
+          .strain_p99 = cloth->strainP99,
+          .strain_mean = cloth->strainMean,
+          .kinetic_energy = cloth->kineticEnergy,
+          .elastic_energy = cloth->elasticEnergy,
+          .gravity_energy = cloth->gravityEnergy,
+          .penetration = cloth->penetration,
+          .device_ms = static_cast<float>(1000 * report.deviceSeconds),
+          .tick = client->client.reportTick()};
+  return 1;
+}
+
+uint64_t cs_parameters_participant(const cs_client* client) {
+  return client->client.parametersParticipant();
+}
+
+void cs_keep_cloth_settings(cs_cloth_settings* out) {
+  *out = {.version = CS_CLOTH_SETTINGS_VERSION,
+          .structural = {kAsIs, kAsIs},
+          .shear = {kAsIs, kAsIs},
+          .bend = {kAsIs, kAsIs},
+          .damping = kAsIs,
+          .drag = kAsIs,
+          .lift = kAsIs,
+          .friction = kAsIs,
+          .thickness = kAsIs,
+          .solver = CS_SOLVER_AS_IS,
+          .bend_constraints = -1,
+          .iterations = 0,
+          .tolerance = kAsIs,
+          .compliance = kAsIs,
+          .activation = kAsIs};
+}
+
+int cs_change_cloth(cs_client* client, const char* cloth, const cs_cloth_settings* settings) {
+  if (settings->version != CS_CLOTH_SETTINGS_VERSION) return 0;
+  ParameterChange change;
+  const std::string_view name = cloth;
+  for (const Cloth& present : client->client.description().cloths)
+    if (name.empty() || name == present.name) change.cloths.push_back(changeOf(present, *settings));
+  if (change.cloths.empty()) return 0;
+  client->client.change(change);
+  return 1;
+}
+
 void cs_set_colliders(cs_client* client, const float* spheres, uint32_t count, uint64_t now_us) {
   std::array<cs_own_collider, CS_MAX_COLLIDERS> colliders{};
   count = std::min(count, CS_MAX_COLLIDERS);
@@ -275,7 +399,12 @@ void cs_set_environment(cs_client* client, const float* gravity3, const float* w
 void cs_set_cloth(cs_client* client, const char* cloth, const float* structural2, const float* shear2,
                   const float* bend2, const float* damping) {
   ParameterChange change;
-  change.cloths.push_back({cloth, spring(structural2), spring(shear2), spring(bend2), scalar(damping)});
+  ClothChange& clothChange = change.cloths.emplace_back();
+  clothChange.name = cloth;
+  clothChange.structural = spring(structural2);
+  clothChange.shear = spring(shear2);
+  clothChange.bend = spring(bend2);
+  clothChange.damping = scalar(damping);
   client->client.change(change);
 }
 

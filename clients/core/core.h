@@ -39,7 +39,8 @@ enum {
   CS_EVENT_NOTICE = 4,      /* cs_notice_text */
   CS_EVENT_ERROR = 8,       /* cs_error_text; fatal if the state is CS_STATE_FAILED */
   CS_EVENT_PARAMETERS = 16, /* somebody changed a parameter */
-  CS_EVENT_SCENES = 32      /* answer to cs_list_scenes */
+  CS_EVENT_SCENES = 32,     /* answer to cs_list_scenes */
+  CS_EVENT_REPORT = 64      /* cs_get_cloth_report */
 };
 
 typedef struct cs_statistics {
@@ -69,6 +70,45 @@ typedef struct cs_cloth_parameters {
   float structural[2], shear[2], bend[2]; /* {stiffness in N/m, damping in N s/m} */
   float damping;                          /* 1/s */
 } cs_cloth_parameters;
+
+/* Solver.kind of scene.proto. */
+typedef enum cs_solver {
+  CS_SOLVER_AS_IS = 0,
+  CS_SOLVER_MASS_SPRING = 1,
+  CS_SOLVER_CONSTRAINT = 2,
+  CS_SOLVER_ACAD = 3
+} cs_solver;
+
+/* What can change of a cloth while it runs. In a change, NaN (of a solver 0, of bend_constraints -1, of
+ * iterations 0) leaves a thing as it is; of what the server has not told, these are said too. What follows
+ * `solver` is of solvers with constraints. */
+#define CS_CLOTH_SETTINGS_VERSION 1u
+typedef struct cs_cloth_settings {
+  uint32_t version;                       /* CS_CLOTH_SETTINGS_VERSION; later ones add fields at the end */
+  float structural[2], shear[2], bend[2]; /* {stiffness in N/m, damping in N s/m} */
+  float damping;                          /* 1/s */
+  float drag, lift, friction;
+  float thickness;          /* m */
+  uint32_t solver;          /* cs_solver, or one that this client does not know yet */
+  int32_t bend_constraints; /* 0 or 1 */
+  uint32_t iterations;
+  float tolerance;
+  float compliance; /* m/N; NaN: the server's default */
+  float activation; /* of CS_SOLVER_ACAD */
+} cs_cloth_settings;
+
+/* How the simulation of a cloth does, as the server says now and then (ClothReport in session.proto). */
+#define CS_CLOTH_REPORT_VERSION 1u
+typedef struct cs_cloth_report {
+  uint32_t version;                          /* CS_CLOTH_REPORT_VERSION; later ones add fields at the end */
+  uint32_t active_constraints, iterations;   /* of the last solve; 0 where springs are forces */
+  float residual;                            /* of that solve, relative to where it started */
+  float strain_max, strain_p99, strain_mean; /* parts of a length */
+  float kinetic_energy, elastic_energy, gravity_energy; /* J */
+  float penetration;                                    /* m into a collider */
+  float device_ms; /* the whole tick of the scene on the server's device */
+  uint64_t tick;   /* of which all this is */
+} cs_cloth_report;
 
 typedef struct cs_cloth {
   const char* name;
@@ -165,6 +205,11 @@ const float* cs_get_hull(const cs_client* client, uint32_t index, uint32_t* vert
 /* 0 before the description, and where there is no such cloth. */
 int cs_get_environment(const cs_client* client, cs_environment* out);
 int cs_get_cloth_parameters(const cs_client* client, uint32_t index, cs_cloth_parameters* out);
+/* `out->version` is to be set. 0 as above, where the version is not known, and where no report came yet. */
+int cs_get_cloth_settings(const cs_client* client, uint32_t index, cs_cloth_settings* out);
+int cs_get_cloth_report(const cs_client* client, uint32_t index, cs_cloth_report* out);
+/* Who made the newest change that CS_EVENT_PARAMETERS told of; 0: the server. */
+uint64_t cs_parameters_participant(const cs_client* client);
 
 /* Sphere colliders of this participant: `count` of {x, y, z, radius}, at most CS_MAX_COLLIDERS (the rest is
  * left out); replaces all former ones; 0 takes them away. Only the newest call counts if the transport is
@@ -177,6 +222,12 @@ void cs_set_environment(cs_client* client, const float* gravity3, const float* w
                         const float* air_density);
 void cs_set_cloth(cs_client* client, const char* cloth, const float* structural2, const float* shear2,
                   const float* bend2, const float* damping); /* springs: {stiffness, damping} */
+/* Settings that change nothing, to begin a change from. */
+void cs_keep_cloth_settings(cs_cloth_settings* out);
+/* Another kind of solver comes with the settings that it last had as far as this client was told, else with
+ * the defaults of scene.proto. Before the description nothing can be changed: 0, as for a version that is not
+ * known and for a cloth that is not there. */
+int cs_change_cloth(cs_client* client, const char* cloth, const cs_cloth_settings* settings);
 void cs_set_collider(cs_client* client, const char* collider, const float* position3, const float* radius);
 
 /* Asks for the scenes; after CS_EVENT_SCENES cs_scene gives them. */

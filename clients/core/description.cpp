@@ -30,6 +30,7 @@ struct ClothMessage {
 };
 
 constexpr std::size_t kMaxSubmeshes = 65536;
+constexpr std::size_t kMaxSolvers = 32;  // kinds that are remembered of a cloth
 
 bool setText(std::string& target, Reader& reader) {
   const Bytes view = reader.get_view();
@@ -105,6 +106,16 @@ bool readClothParameters(Bytes message, std::string& name, ClothParameters& para
         return readSpring(reader.get_view(), parameters.bend);
       case fixed32(8):
         return std::isfinite(parameters.damping = reader.get_float());
+      case fixed32(9):
+        return std::isfinite(parameters.drag = reader.get_float());
+      case fixed32(10):
+        return std::isfinite(parameters.lift = reader.get_float());
+      case fixed32(11):
+        return std::isfinite(parameters.friction = reader.get_float());
+      case fixed32(12):
+        return std::isfinite(parameters.thickness = reader.get_float());
+      case bytes(20):
+        return readSolver(reader.get_view(), parameters.solver);
       default:
         return skip(reader);
     }
@@ -118,6 +129,7 @@ bool readDefinition(Bytes message, Description& description) {
     std::string name;
     ClothParameters parameters;
     if (!readClothParameters(reader.get_view(), name, parameters)) return false;
+    parameters.solvers[parameters.solver.kind] = parameters.solver;
     for (Cloth& cloth : description.cloths) {
       if (cloth.name == name) cloth.parameters = parameters;
     }
@@ -312,6 +324,14 @@ void apply(const ParameterChange& change, Description& description) {
       parameters.shear = clothChange.shear.value_or(parameters.shear);
       parameters.bend = clothChange.bend.value_or(parameters.bend);
       parameters.damping = clothChange.damping.value_or(parameters.damping);
+      parameters.drag = clothChange.drag.value_or(parameters.drag);
+      parameters.lift = clothChange.lift.value_or(parameters.lift);
+      parameters.friction = clothChange.friction.value_or(parameters.friction);
+      parameters.thickness = clothChange.thickness.value_or(parameters.thickness);
+      if (!clothChange.solver) continue;
+      parameters.solver = *clothChange.solver;
+      if (parameters.solvers.size() < kMaxSolvers)
+        parameters.solvers[parameters.solver.kind] = parameters.solver;
     }
   }
 }

@@ -16,7 +16,10 @@ namespace clothstream::client {
 
 struct ClothParameters {
   Spring structural{}, shear{}, bend{};
-  float damping = 0;
+  float damping = 0, drag = 0, lift = 0;
+  float friction = 0.3f, thickness = 0.005f;
+  Solver solver;
+  std::map<std::uint32_t, Solver> solvers;  // of each kind what was told last
 };
 
 // Triangles that are drawn with one material.

@@ -95,6 +95,69 @@ bool readClothChange(Bytes message, ClothChange& change) {
         return setSpring(change.bend, reader);
       case fixed32(5):
         return setFinite(change.damping, reader);
+      case fixed32(6):
+        return setFinite(change.drag, reader);
+      case fixed32(7):
+        return setFinite(change.lift, reader);
+      case fixed32(8):
+        return setFinite(change.friction, reader);
+      case fixed32(9):
+        return setFinite(change.thickness, reader);
+      case bytes(20):
+        return readSolver(reader.get_view(), change.solver.emplace());
+      default:
+        return skip(reader);
+    }
+  });
+}
+
+bool readConstraintSolver(Bytes message, Solver& solver) {
+  return readFields(message, [&](std::uint32_t field, Reader& reader) {
+    switch (field) {
+      case varint(1):
+        return set(solver.bendConstraints, reader.get_bool());
+      case fixed32(2):
+        return setFinite(solver.compliance, reader);
+      case varint(3):
+        return set(solver.iterations, reader.get_uint32());
+      case fixed32(4):
+        return setFinite(solver.tolerance, reader);
+      default:
+        return skip(reader);
+    }
+  });
+}
+
+bool readAcadSolver(Bytes message, Solver& solver) {
+  return readFields(message, [&](std::uint32_t field, Reader& reader) {
+    if (field == fixed32(1)) return setFinite(solver.activation, reader);
+    return field == bytes(2) ? readConstraintSolver(reader.get_view(), solver) : skip(reader);
+  });
+}
+
+bool readClothReport(Bytes message, ClothReport& report) {
+  return readFields(message, [&](std::uint32_t field, Reader& reader) {
+    switch (field) {
+      case fixed32(1):
+        return setFinite(report.strainMax, reader);
+      case fixed32(2):
+        return setFinite(report.strainP99, reader);
+      case fixed32(3):
+        return setFinite(report.strainMean, reader);
+      case fixed32(4):
+        return setFinite(report.kineticEnergy, reader);
+      case fixed32(5):
+        return setFinite(report.elasticEnergy, reader);
+      case fixed32(6):
+        return setFinite(report.gravityEnergy, reader);
+      case varint(7):
+        return set(report.activeConstraints, reader.get_uint32());
+      case varint(8):
+        return set(report.iterations, reader.get_uint32());
+      case fixed32(9):
+        return setFinite(report.residual, reader);
+      case fixed32(10):
+        return setFinite(report.penetration, reader);
       default:
         return skip(reader);
     }
@@ -194,6 +257,7 @@ bool readFrame(Bytes message, Frame& frame) {
   frame.packet = {};
   frame.reconstructionHash = 0;
   frame.colliders.clear();
+  frame.report.reset();
   return readFields(message, [&](std::uint32_t field, Reader& reader) {
     switch (field) {
       case bytes(1):
@@ -203,6 +267,9 @@ bool readFrame(Bytes message, Frame& frame) {
       case bytes(6):
         if (frame.colliders.size() == kMaxSceneColliders) return false;
         frame.colliders.push_back(reader.get_view());
+        return true;
+      case bytes(7):
+        frame.report = reader.get_view();
         return true;
       default:
         return skip(reader);
@@ -288,6 +355,7 @@ std::optional<std::string> readNotice(Bytes message) {
 std::optional<ParameterChange> readParameterChanged(Bytes message) {
   return readMessage<ParameterChange>(
       message, [](ParameterChange& change, std::uint32_t field, Reader& reader) {
+        if (field == varint(2)) return set(change.participantId, reader.get_uint64());
         return field == bytes(1) ? readParameterChange(reader.get_view(), change) : skip(reader);
       });
 }
@@ -321,6 +389,29 @@ std::optional<std::vector<std::string>> readScenes(Bytes message) {
 
 bool readVec3(Bytes message, Vec3& out) {
   return readFloats(message, out);
+}
+
+// A kind that this client does not know keeps its number and its settings.
+bool readSolver(Bytes message, Solver& out) {
+  out = {};
+  return readFields(message, [&](std::uint32_t field, Reader& reader) {
+    if (field % 8 != bytes(0) % 8) return skip(reader);
+    const Bytes settings = reader.get_view();
+    out.kind = field / 8;
+    out.settings.assign(settings.data(), settings.size());
+    if (out.kind == CS_SOLVER_CONSTRAINT) return readConstraintSolver(settings, out);
+    return out.kind != CS_SOLVER_ACAD || readAcadSolver(settings, out);
+  });
+}
+
+bool readReport(Bytes message, SimulationReport& out) {
+  out.cloths.clear();
+  out.deviceSeconds = 0;
+  return readFields(message, [&](std::uint32_t field, Reader& reader) {
+    if (field == fixed64(2)) return std::isfinite(out.deviceSeconds = reader.get_double());
+    if (field != bytes(1)) return skip(reader);
+    return out.cloths.size() < kMaxCloths && readClothReport(reader.get_view(), out.cloths.emplace_back());
+  });
 }
 
 bool readSpring(Bytes message, Spring& out) {

@@ -65,10 +65,23 @@ struct Hull {
   std::vector<std::uint32_t> triangles;
 };
 
+struct ClothReport {
+  float strainMax = 0, strainP99 = 0, strainMean = 0;
+  float kineticEnergy = 0, elasticEnergy = 0, gravityEnergy = 0;
+  std::uint32_t activeConstraints = 0, iterations = 0;
+  float residual = 0, penetration = 0;
+};
+
+struct SimulationReport {
+  std::vector<ClothReport> cloths;
+  double deviceSeconds = 0;
+};
+
 struct Frame {
   Bytes packet;
   std::uint64_t reconstructionHash = 0;
   std::vector<Bytes> colliders;  // serialised ColliderStates
+  std::optional<Bytes> report;   // a serialised SimulationReport
 };
 
 struct Pong {
@@ -84,16 +97,28 @@ struct ServerError {
 // {stiffness, damping}
 using Spring = std::array<float, 2>;
 
+struct Solver {
+  std::uint32_t kind = CS_SOLVER_MASS_SPRING;  // the field that Solver.kind is
+  bool bendConstraints = false;
+  std::uint32_t iterations = 20;
+  float tolerance = 0.001f;
+  std::optional<float> compliance;
+  float activation = 0.1f;
+  std::string settings;  // the kind's own message as it came
+};
+
 struct ClothChange {
   std::string name;
   std::optional<Spring> structural, shear, bend;
-  std::optional<float> damping;
+  std::optional<float> damping, drag, lift, friction, thickness;
+  std::optional<Solver> solver;
 };
 
 struct ParameterChange {
   std::optional<Vec3> gravity, wind;
   std::optional<float> airDensity;
   std::vector<ClothChange> cloths;
+  std::uint64_t participantId = 0;  // who made it
 };
 
 // nullopt: not well formed, a number that is not finite where the protocol has finite ones, or more parts
@@ -116,6 +141,9 @@ struct ParameterChange {
 
 [[nodiscard]] bool readVec3(Bytes message, Vec3& out);
 [[nodiscard]] bool readSpring(Bytes message, Spring& out);
+[[nodiscard]] bool readSolver(Bytes message, Solver& out);
+// Reuses the memory of `out`.
+[[nodiscard]] bool readReport(Bytes message, SimulationReport& out);
 
 inline constexpr std::size_t kMaxCloths = 256;
 // The scene's and all participants'.

@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: MIT
 // Colliders and parameters on their way to the server, and changes, notices and scenes on their way back.
+#include <cmath>
+#include <limits>
+
 #include <gmock/gmock.h>
+#include <google/protobuf/unknown_field_set.h>
 #include <gtest/gtest.h>
 
 #include "clients/core/outbox.h"
@@ -142,6 +146,161 @@ TEST(Parameters, ThereAreNoneBeforeTheDescription) {
   EXPECT_EQ(cs_get_environment(client.get(), &environment), 0);
   EXPECT_EQ(cs_get_cloth_parameters(client.get(), 0, &cloth), 0);
   EXPECT_EQ(cs_vertex_count(client.get()), 0u);
+}
+
+TEST(ClothSettings, SayWhatHoldsAndChangeOnlyWhatIsGiven) {
+  ScriptedServer server;
+  v1::StreamDescription description = server.description();
+  v1::Cloth& definition = *description.mutable_definition()->mutable_cloths(0);
+  definition.set_friction(0.5f);
+  definition.set_thickness(0.02f);
+  definition.mutable_solver()->mutable_acad()->set_activation(0.25f);
+  definition.mutable_solver()->mutable_acad()->mutable_constraint()->set_iterations(7);
+  definition.mutable_solver()->mutable_acad()->mutable_constraint()->set_tolerance(0.5f);
+  ClientUnderTest client;
+  client.receive(server.welcome());
+  client.receiveAll(chunksOf(description.SerializeAsString(), 1 << 18, 1));
+  client.outgoing();
+
+  cs_cloth_settings now{};
+  now.version = CS_CLOTH_SETTINGS_VERSION;
+  ASSERT_EQ(cs_get_cloth_settings(client.get(), 0, &now), 1);
+  EXPECT_EQ(now.structural[0], 100);
+  EXPECT_EQ(now.friction, 0.5f);
+  EXPECT_EQ(now.thickness, 0.02f);
+  EXPECT_EQ(now.solver, static_cast<std::uint32_t>(CS_SOLVER_ACAD));
+  EXPECT_EQ(now.activation, 0.25f);
+  EXPECT_EQ(now.iterations, 7u);
+  EXPECT_TRUE(std::isnan(now.compliance));
+  EXPECT_EQ(cs_get_cloth_settings(client.get(), 1, &now), 0);
+  now.version = 99;
+  EXPECT_EQ(cs_get_cloth_settings(client.get(), 0, &now), 0);
+
+  const auto sent = [&] {
+    const auto messages = client.outgoing();
+    EXPECT_THAT(messages, SizeIs(1));
+    return messages.empty() ? v1::ClothChange() : messages[0].parameter_change().cloths(0);
+  };
+  cs_cloth_settings change;
+  cs_keep_cloth_settings(&change);
+  change.structural[0] = 50;
+  change.lift = 0.125f;
+  ASSERT_EQ(cs_change_cloth(client.get(), "", &change), 1);
+  const v1::ClothChange springs = sent();
+  EXPECT_EQ(springs.name(), "curtain");
+  EXPECT_EQ(springs.structural().stiffness(), 50);
+  EXPECT_EQ(springs.structural().damping(), 0.5f);  // as it was
+  EXPECT_EQ(springs.lift(), 0.125f);
+  EXPECT_FALSE(springs.has_shear() || springs.has_damping() || springs.has_thickness() ||
+               springs.has_solver());
+
+  cs_keep_cloth_settings(&change);
+  change.iterations = 30;
+  cs_change_cloth(client.get(), "curtain", &change);
+  const v1::Solver solver = sent().solver();
+  EXPECT_EQ(solver.acad().activation(), 0.25f);
+  EXPECT_EQ(solver.acad().constraint().iterations(), 30u);
+  EXPECT_EQ(solver.acad().constraint().tolerance(), 0.5f);
+  EXPECT_FALSE(solver.acad().constraint().has_compliance());
+
+  EXPECT_EQ(cs_change_cloth(client.get(), "rug", &change), 0);
+  change.version = 99;
+  EXPECT_EQ(cs_change_cloth(client.get(), "", &change), 0);
+  EXPECT_THAT(client.outgoing(), SizeIs(0));
+}
+
+// A solver that is left and chosen again has the settings that it had; one that this client does not know
+// too.
+TEST(ClothSettings, OfASolverAreKeptForItsReturn) {
+  Joined joined;
+  const auto told = [&](const v1::Solver& solver, std::uint64_t participant) {
+    v1::ServerMessage message;
+    message.mutable_parameter_changed()->set_participant_id(participant);
+    *message.mutable_parameter_changed()->mutable_change()->add_cloths()->mutable_solver() = solver;
+    EXPECT_EQ(joined.client.receive(message.SerializeAsString()),
+              static_cast<std::uint32_t>(CS_EVENT_PARAMETERS));
+  };
+  v1::Solver constraint, unknown, massSpring;
+  constraint.mutable_constraint()->set_iterations(9);
+  constraint.mutable_constraint()->set_compliance(0.5f);
+  massSpring.mutable_mass_spring();
+  unknown.GetReflection()->MutableUnknownFields(&unknown)->AddLengthDelimited(9)->assign(
+      "\x0d\x01\x02\x03\x04");
+  told(constraint, 42);
+  EXPECT_EQ(cs_parameters_participant(joined.client.get()), cs_participant_id(joined.client.get()));
+  told(unknown, 3);
+  EXPECT_EQ(cs_parameters_participant(joined.client.get()), 3u);
+  cs_cloth_settings now{};
+  now.version = CS_CLOTH_SETTINGS_VERSION;
+  ASSERT_EQ(cs_get_cloth_settings(joined.client.get(), 0, &now), 1);
+  EXPECT_EQ(now.solver, 9u);
+  told(massSpring, 3);
+
+  cs_cloth_settings change;
+  cs_keep_cloth_settings(&change);
+  change.solver = CS_SOLVER_CONSTRAINT;
+  cs_change_cloth(joined.client.get(), "", &change);
+  const v1::Solver back = joined.sent().parameter_change().cloths(0).solver();
+  EXPECT_EQ(back.constraint().iterations(), 9u);
+  EXPECT_EQ(back.constraint().compliance(), 0.5f);
+  change.solver = 9;
+  cs_change_cloth(joined.client.get(), "", &change);
+  EXPECT_EQ(joined.sent().parameter_change().cloths(0).solver().SerializeAsString(),
+            unknown.SerializeAsString());
+}
+
+TEST(Reports, AreHandedOnWithTheTickThatTheyAreOf) {
+  ScriptedServer server;
+  ClientUnderTest client;
+  client.join(server);
+  cs_cloth_report report{};
+  report.version = CS_CLOTH_REPORT_VERSION;
+  client.receive(server.frame(1, codec::PacketKind::key));
+  EXPECT_EQ(cs_get_cloth_report(client.get(), 0, &report), 0);
+  v1::Frame frame = server.frameMessage(5, codec::PacketKind::predicted);
+  frame.mutable_report()->set_device_seconds(0.002);
+  v1::ClothReport& cloth = *frame.mutable_report()->add_cloths();
+  cloth.set_strain_max(0.5f);
+  cloth.set_strain_p99(0.25f);
+  cloth.set_strain_mean(0.125f);
+  cloth.set_kinetic_energy(1);
+  cloth.set_elastic_energy(2);
+  cloth.set_gravity_energy(-3);
+  cloth.set_active_constraints(40);
+  cloth.set_iterations(6);
+  cloth.set_residual(0.01f);
+  cloth.set_penetration(0.003f);
+  EXPECT_EQ(client.receive(ScriptedServer::serialise(frame)),
+            static_cast<std::uint32_t>(CS_EVENT_FRAME | CS_EVENT_REPORT));
+  // Frames without one leave it.
+  EXPECT_EQ(client.receive(server.frame(6)), static_cast<std::uint32_t>(CS_EVENT_FRAME));
+  ASSERT_EQ(cs_get_cloth_report(client.get(), 0, &report), 1);
+  EXPECT_EQ(report.tick, 5u);
+  EXPECT_EQ(report.strain_max, 0.5f);
+  EXPECT_EQ(report.strain_p99, 0.25f);
+  EXPECT_EQ(report.strain_mean, 0.125f);
+  EXPECT_EQ(report.kinetic_energy, 1);
+  EXPECT_EQ(report.elastic_energy, 2);
+  EXPECT_EQ(report.gravity_energy, -3);
+  EXPECT_EQ(report.active_constraints, 40u);
+  EXPECT_EQ(report.iterations, 6u);
+  EXPECT_EQ(report.residual, 0.01f);
+  EXPECT_EQ(report.penetration, 0.003f);
+  EXPECT_FLOAT_EQ(report.device_ms, 2);
+  EXPECT_EQ(cs_get_cloth_report(client.get(), 1, &report), 0);
+  report.version = 0;
+  EXPECT_EQ(cs_get_cloth_report(client.get(), 0, &report), 0);
+}
+
+TEST(Reports, ThatAreNoneEndTheClient) {
+  ScriptedServer server;
+  ClientUnderTest client;
+  client.join(server);
+  v1::Frame frame = server.frameMessage(1, codec::PacketKind::key);
+  frame.mutable_report()->add_cloths()->set_strain_max(std::numeric_limits<float>::quiet_NaN());
+  client.receive(ScriptedServer::serialise(frame));
+  EXPECT_EQ(cs_get_state(client.get()), CS_STATE_FAILED);
+  EXPECT_THAT(cs_error_text(client.get()), HasSubstr("SimulationReport"));
 }
 
 TEST(Notices, AreHandedOn) {

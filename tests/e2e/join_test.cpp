@@ -275,6 +275,50 @@ TEST(JoinWithoutServer, LeavesNoFileBehind) {
   EXPECT_TRUE(std::filesystem::is_empty(directory.path()));
 }
 
+TEST_F(JoinTest, SaysHowTheSimulationDoes) {
+  const auto client = clothstream({"join", address_, "--json", "--seconds", "2"});
+  ASSERT_EQ(client->waitForEnd(kEnd), 0) << client->errors();
+  const auto cloths = nlohmann::json::parse(client->output())["cloths"];
+  ASSERT_EQ(cloths.size(), 2u);
+  for (const auto& cloth : cloths) {
+    EXPECT_EQ(cloth["solver"], "massSpring");
+    EXPECT_GT(cloth["tick"], 0);
+    EXPECT_GE(cloth["strainMax"], cloth["strainP99"]);
+    EXPECT_GT(cloth["strainMean"], 0);
+    EXPECT_GT(cloth["elasticEnergy"], 0);
+    EXPECT_EQ(cloth["activeConstraints"], 0);
+    EXPECT_GE(cloth["penetration"], 0);
+  }
+  const auto talking = clothstream({"join", address_, "--report"});
+  EXPECT_TRUE(talking->waitForOutput("% mean; energy", kStart)) << talking->errors();
+  talking->signal(SIGINT);
+  EXPECT_EQ(talking->waitForEnd(kEnd), 0);
+}
+
+TEST_F(JoinTest, SetsParametersForEverybody) {
+  const std::string cloth = [&] {
+    const auto client = clothstream({"join", address_, "--json", "--seconds", "1"});
+    EXPECT_EQ(client->waitForEnd(kEnd), 0) << client->errors();
+    return nlohmann::json::parse(client->output())["cloths"][0]["name"].get<std::string>();
+  }();
+  const auto set = clothstream({"set", address_, "--cloth", cloth, "--solver", "acad", "--activation", "0.02",
+                                "--thickness", "0.02", "--wind", "0,0,-2"});
+  ASSERT_EQ(set->waitForEnd(kEnd), 0) << set->errors();
+  EXPECT_THAT(set->errors(), IsEmpty());
+  const auto client = clothstream({"join", address_, "--json", "--seconds", "2"});
+  ASSERT_EQ(client->waitForEnd(kEnd), 0) << client->errors();
+  const auto cloths = nlohmann::json::parse(client->output())["cloths"];
+  EXPECT_EQ(cloths[0]["solver"], "acad");
+  EXPECT_EQ(cloths[1]["solver"], "massSpring");
+
+  const auto refused = clothstream({"set", address_, "--stiffness", "1e5"});
+  EXPECT_EQ(refused->waitForEnd(kEnd), 4);
+  EXPECT_THAT(refused->errors(), HasSubstr("substeps"));
+  const auto unknown = clothstream({"set", address_, "--cloth", "rug", "--damping", "1"});
+  EXPECT_EQ(unknown->waitForEnd(kEnd), 4);
+  EXPECT_THAT(unknown->errors(), HasSubstr("there is no cloth 'rug'"));
+}
+
 TEST(JoinWithoutServer, RefusesWrongArguments) {
   std::string errors;
   EXPECT_EQ(run({"join", "127.0.0.1:port"}, errors), 2);
@@ -283,6 +327,10 @@ TEST(JoinWithoutServer, RefusesWrongArguments) {
   EXPECT_EQ(run({"join", "--collider", "1,2"}, errors), 2);
   EXPECT_THAT(errors, HasSubstr("X,Y,Z or X,Y,Z,RADIUS"));
   EXPECT_EQ(run({"follow"}, errors), 2);
+  EXPECT_EQ(run({"set"}, errors), 2);
+  EXPECT_THAT(errors, HasSubstr("nothing to change"));
+  EXPECT_EQ(run({"set", "--solver", "magic"}, errors), 2);
+  EXPECT_EQ(run({"set", "--wind", "1,2"}, errors), 2);
 }
 
 }  // namespace

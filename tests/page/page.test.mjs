@@ -262,6 +262,39 @@ test("a slider works by keyboard, and others in the scene see it", () =>
     }),
   ));
 
+// The soft curtain hangs stretched; as constraints its springs keep their length, and the server's report says so.
+test("each cloth's solver can be chosen, and the panel says how its simulation does", () =>
+  withPage({ viewport: { width: 1000, height: 900 } }, (first) =>
+    withPage({}, async (second) => {
+      await untilState(first, "live");
+      await untilState(second, "live");
+      const figure = (page, name) => page.textContent(`#cloths [data-figure="${name}"]`);
+      const untilReport = (page, since) =>
+        page.waitForFunction((tick) => window.clothstream.reports[0]?.tick > tick, since);
+      await untilReport(first, 0);
+      assert.equal(await figure(first, "nodes"), (rows * columns).toLocaleString("en"));
+      assert.equal(await figure(first, "constraints"), "none");
+      await first.waitForFunction(() => /^\d+\.\d\d ms/.test(document.getElementById("device-ms").textContent));
+      const before = await first.evaluate(() => window.clothstream.reports[0]);
+      assert.ok(before.strainMax >= before.strainP99 && before.strainP99 > 0 && before.strainMean > 0);
+      assert.ok(before.kineticEnergy >= 0 && before.elasticEnergy > 0 && before.deviceMs > 0);
+      assert.equal(before.activeConstraints, 0);
+
+      await first.selectOption("#solver-0", "2");
+      await second.waitForFunction(() => document.getElementById("solver-0").value === "2");
+      await first.waitForFunction(() => window.clothstream.reports[0].activeConstraints > 0);
+      await first.waitForFunction((p99) => window.clothstream.reports[0].strainP99 < p99, before.strainP99);
+      const after = await first.evaluate(() => window.clothstream.reports[0]);
+      assert.ok(after.iterations > 0 && after.residual > 0);
+      assert.match(await figure(first, "constraints"), /^[\d,]+$/);
+      assert.match(await figure(first, "strain max"), /^-?\d+\.\d\d %$/);
+      await first.locator("#cloths").scrollIntoViewIfNeeded();
+      await takePicture(first, "report");
+      await second.selectOption("#solver-0", "1");
+      await first.waitForFunction(() => document.getElementById("solver-0").value === "1");
+    }),
+  ));
+
 test("an unknown scene is told with the server's words, and the default one is a click away", () =>
   withPage({ query: "?scene=no_such_scene" }, async (page) => {
     await untilState(page, "failed");

@@ -18,6 +18,7 @@ export const ClientEvent = {
   error: 8,
   parameters: 16,
   scenes: 32,
+  report: 64,
 } as const;
 
 export interface Statistics {
@@ -94,13 +95,49 @@ export interface ClothParameters {
   damping: number; // 1/s
 }
 
+// cs_solver; a server may have others.
+export const Solvers: ReadonlyMap<number, string> = new Map([
+  [1, "mass-spring"],
+  [2, "constraint"],
+  [3, "ACAD"],
+]);
+
+// How the simulation of a cloth does (cs_cloth_report); SI units, strains as parts of a length.
+export interface ClothReport {
+  activeConstraints: number;
+  iterations: number;
+  residual: number;
+  strainMax: number;
+  strainP99: number;
+  strainMean: number;
+  kineticEnergy: number;
+  elasticEnergy: number;
+  gravityEnergy: number;
+  penetration: number;
+  deviceMs: number;
+  tick: number;
+}
+
 // Sizes of the structs of core.h on a 32-bit machine.
 const kStatisticsBytes = 104;
 const kClothBytes = 28;
 const kColliderBytes = 64;
 const kEnvironmentBytes = 28;
 const kClothParametersBytes = 28;
-const kScratchBytes = Math.max(kStatisticsBytes, kClothBytes, kColliderBytes, kEnvironmentBytes, kClothParametersBytes);
+const kClothReportBytes = 56;
+const kClothReportVersion = 1;
+const kClothSettingsBytes = 72;
+const kClothSettingsVersion = 1;
+const kSolverAt = 48; // in cs_cloth_settings
+const kScratchBytes = Math.max(
+  kStatisticsBytes,
+  kClothBytes,
+  kColliderBytes,
+  kEnvironmentBytes,
+  kClothParametersBytes,
+  kClothReportBytes,
+  kClothSettingsBytes,
+);
 
 // Views that it gives (positions, normals, triangles) look into the core's memory: they are good until the next call.
 export class Client {
@@ -281,6 +318,42 @@ export class Client {
       bend: spring(view, at + 16),
       damping: view.getFloat32(at + 24, true),
     }));
+  }
+
+  // cs_solver of a cloth.
+  solver(cloth: number): number {
+    this.core.view().setUint32(this.scratch, kClothSettingsVersion, true);
+    if (this.core.exports.cs_get_cloth_settings(this.handle, cloth, this.scratch) === 0) return 0;
+    return this.core.view().getUint32(this.scratch + kSolverAt, true);
+  }
+
+  // The cloth goes on with what it last had for this solver, else with the defaults.
+  setSolver(cloth: string, solver: number): void {
+    this.core.exports.cs_keep_cloth_settings(this.scratch);
+    this.core.view().setUint32(this.scratch + kSolverAt, solver, true);
+    this.core.with([cloth], (name) => this.core.exports.cs_change_cloth(this.handle, name!, this.scratch));
+  }
+
+  // The newest; undefined before the first.
+  report(cloth: number): ClothReport | undefined {
+    this.core.view().setUint32(this.scratch, kClothReportVersion, true);
+    if (this.core.exports.cs_get_cloth_report(this.handle, cloth, this.scratch) === 0) return undefined;
+    const view = this.core.view();
+    const real = (place: number) => view.getFloat32(this.scratch + 4 * place, true);
+    return {
+      activeConstraints: view.getUint32(this.scratch + 4, true),
+      iterations: view.getUint32(this.scratch + 8, true),
+      residual: real(3),
+      strainMax: real(4),
+      strainP99: real(5),
+      strainMean: real(6),
+      kineticEnergy: real(7),
+      elasticEnergy: real(8),
+      gravityEnergy: real(9),
+      penetration: real(10),
+      deviceMs: real(11),
+      tick: Number(view.getBigUint64(this.scratch + 48, true)),
+    };
   }
 
   setEnvironment(change: { gravity?: Vec3; wind?: Vec3 }): void {

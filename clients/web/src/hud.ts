@@ -83,6 +83,6 @@ export class Hud {
 }
 
 // Untouched text stays untouched, so that screen readers do not say it again.
-function write(target: HTMLElement, text: string): void {
+export function write(target: HTMLElement, text: string): void {
   if (target.textContent !== text) target.textContent = text;
 }

@@ -2,6 +2,7 @@
 // Starts the page: core, view, session and panel, and the loop that draws.
 
 import { ColliderDrag } from "./collider_drag";
+import { ClothReports } from "./cloth_reports";
 import { Controls } from "./controls";
 import { element, Hud } from "./hud";
 import { listenToKeys } from "./keys";
@@ -34,6 +35,7 @@ async function start(): Promise<void> {
   });
 
   const controls = new Controls({ sceneChosen: chooseScene, viewReset: () => view.reset() });
+  const reports = new ClothReports();
   const drag = new ColliderDrag(view, (collider) => (controls.collider = collider));
   listenToKeys(view, drag, controls);
 
@@ -48,13 +50,18 @@ async function start(): Promise<void> {
       probe.described(client);
       view.describe(client);
       controls.describe(client);
+      reports.describe(client);
     },
-    parametersChanged: (client) => controls.show(client),
+    parametersChanged: (client) => {
+      controls.show(client);
+      reports.showSolvers(client);
+    },
     scenesListed: (scenes) => controls.listScenes(scenes, session.client?.sceneName ?? ""),
     notice: (text) => hud.showNotice(text),
     refused: (client) => {
       hud.showNotice(client.errorText);
       controls.refused(client);
+      reports.showSolvers(client);
     },
   });
   const probe = expose(session, view);
@@ -72,13 +79,17 @@ async function start(): Promise<void> {
     const client = session.state.kind === "live" ? session.client : undefined;
     if (client) {
       controls.apply(client);
+      reports.apply(client);
       const target = drag.take();
       if (target) client.setCollider(target.collider, { position: target.position });
       session.flush();
     }
     if (now - figuresAt >= kFiguresPeriodMs) {
       figuresAt = now;
-      if (client) hud.showFigures(client);
+      if (client) {
+        hud.showFigures(client);
+        reports.showReports(client);
+      }
       hud.showState(session.state);
     }
     view.draw(session.client);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // `window.clothstream`: lets tests and the curious look inside; it changes nothing.
 
-import type { Client, ClothLayout, Collider, Statistics, Vec3 } from "./client";
+import type { Client, ClothLayout, ClothReport, Collider, Statistics, Vec3 } from "./client";
 import type { Session, SessionState } from "./session";
 import type { View } from "./view";
 
@@ -13,6 +13,8 @@ export interface Probe {
   readonly restPositions: Float32Array | undefined;
   readonly normals: Float32Array | undefined;
   readonly cloths: ClothLayout[];
+  // Of each cloth, once there is one.
+  readonly reports: (ClothReport | undefined)[];
   readonly colliders: Collider[];
   readonly canvas: HTMLCanvasElement;
   // A point of the scene, in CSS pixels of the page.
@@ -48,6 +50,10 @@ export function expose(session: Session, view: View): { described(client: Client
     },
     get cloths() {
       return session.client?.cloths() ?? [];
+    },
+    get reports() {
+      const { client } = session;
+      return client?.cloths().map((_, index) => client.report(index)) ?? [];
     },
     get colliders() {
       return session.client?.colliders() ?? [];

@@ -35,6 +35,10 @@ export interface CoreExports {
   cs_get_hull(client: Pointer, index: number, vertexCount: Pointer, triangles: Pointer, indexCount: Pointer): Pointer;
   cs_get_environment(client: Pointer, out: Pointer): number;
   cs_get_cloth_parameters(client: Pointer, index: number, out: Pointer): number;
+  cs_get_cloth_settings(client: Pointer, index: number, out: Pointer): number;
+  cs_get_cloth_report(client: Pointer, index: number, out: Pointer): number;
+  cs_keep_cloth_settings(out: Pointer): void;
+  cs_change_cloth(client: Pointer, cloth: Pointer, settings: Pointer): number;
   cs_set_environment(client: Pointer, gravity3: Pointer, wind3: Pointer, airDensity: Pointer): void;
   cs_set_cloth(client: Pointer, cloth: Pointer, structural2: Pointer, shear2: Pointer, bend2: Pointer, damping: Pointer): void;
   cs_set_collider(client: Pointer, collider: Pointer, position3: Pointer, radius: Pointer): void;

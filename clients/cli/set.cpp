@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: MIT
+// A change, and the answer to it.
+#include "clients/cli/set.h"
+
+#include <condition_variable>
+#include <cstring>
+#include <mutex>
+
+#include <fmt/format.h>
+
+#include "clients/grpc/grpc_client.h"
+
+namespace clothstream::cli {
+namespace {
+
+constexpr std::chrono::seconds kPatience{10};
+
+bool changesCloths(const SetOptions& options) {
+  cs_cloth_settings none;
+  cs_keep_cloth_settings(&none);
+  return std::memcmp(&none, &options.settings, sizeof(none)) != 0;
+}
+
+bool changesEnvironment(const SetOptions& options) {
+  return !options.gravity.empty() || !options.wind.empty() || options.airDensity;
+}
+
+// What the server said of this client's changes, on its way from the stream's thread.
+class Answers {
+ public:
+  void heard(cs_client* client, std::uint32_t events) {
+    const std::lock_guard lock(mutex_);
+    if ((events & CS_EVENT_ERROR) != 0) refusal_ = cs_error_text(client);
+    if ((events & CS_EVENT_PARAMETERS) != 0 && cs_parameters_participant(client) == cs_participant_id(client))
+      ++held_;
+    changed_.notify_all();
+  }
+
+  // Empty once `count` changes hold; else why not.
+  std::string waitFor(int count) {
+    std::unique_lock lock(mutex_);
+    if (!changed_.wait_for(lock, kPatience, [&] { return held_ >= count || !refusal_.empty(); }))
+      return fmt::format("the server has not answered within {} s", kPatience.count());
+    return refusal_;
+  }
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  int held_ = 0;
+  std::string refusal_;
+};
+
+ExitCode complain(ExitCode code, const std::string& text) {
+  fmt::print(stderr, "clothstream: {}\n", text);
+  return code;
+}
+
+std::string noSuchCloth(const cs_client* client, const std::string& name) {
+  std::string known;
+  cs_cloth cloth;
+  for (std::uint32_t i = 0; cs_get_cloth(client, i, &cloth) != 0; ++i)
+    known += (known.empty() ? "" : ", ") + std::string(cloth.name);
+  return fmt::format("there is no cloth '{}' in the scene {}; there are {}", name, cs_scene_name(client),
+                     known);
+}
+
+}  // namespace
+
+bool changesAnything(const SetOptions& options) {
+  return changesCloths(options) || changesEnvironment(options);
+}
+
+ExitCode set(const SetOptions& options) {
+  Answers answers;
+  GrpcClientOptions clientOptions;
+  clientOptions.scene = options.scene;
+  clientOptions.clientName = "clothstream set";
+  auto joined =
+      GrpcClient::join(options.address, clientOptions,
+                       [&](cs_client* client, std::uint32_t events) { answers.heard(client, events); });
+  if (!joined) return complain(exitCodeOf(joined.error().kind), joined.error().text);
+  int changes = 0;
+  std::string unknown;
+  (*joined)->visit([&](cs_client* client) {
+    if (changesCloths(options)) {
+      if (cs_change_cloth(client, options.cloth.c_str(), &options.settings) == 0)
+        return void(unknown = noSuchCloth(client, options.cloth));
+      ++changes;
+    }
+    if (changesEnvironment(options)) {
+      cs_set_environment(client, options.gravity.empty() ? nullptr : options.gravity.data(),
+                         options.wind.empty() ? nullptr : options.wind.data(),
+                         options.airDensity ? &*options.airDensity : nullptr);
+      ++changes;
+    }
+  });
+  if (!unknown.empty()) return complain(kRefused, unknown);
+  const std::string refusal = answers.waitFor(changes);
+  if (const auto failure = (*joined)->ended(); failure && !refusal.empty())
+    return complain(exitCodeOf(failure->kind), failure->text);
+  if (!refusal.empty()) return complain(kRefused, refusal);
+  return kOk;
+}
+
+}  // namespace clothstream::cli

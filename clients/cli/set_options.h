@@ -1,0 +1,14 @@
+// SPDX-License-Identifier: MIT
+// The options of `clothstream set`.
+#pragma once
+
+#include <CLI/CLI.hpp>
+
+#include "clients/cli/set.h"
+
+namespace clothstream::cli {
+
+// `options` must outlive the parsing.
+void addSetOptions(CLI::App& app, SetOptions& options);
+
+}  // namespace clothstream::cli

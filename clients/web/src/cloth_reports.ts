@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: MIT
+// The part of the panel that says of each cloth which solver it has, and how its simulation does.
+
+import { Solvers, type Client, type ClothReport } from "./client";
+import { element, write } from "./hud";
+
+const kFigures = ["nodes", "strain max", "strain p99", "strain mean", "constraints", "iterations", "energy", "penetration"] as const;
+type Figure = (typeof kFigures)[number];
+
+interface Card {
+  solver: HTMLSelectElement;
+  figures: Map<Figure, HTMLElement>;
+}
+
+export class ClothReports {
+  private readonly list = element("cloths");
+  private readonly deviceMs = element("device-ms");
+  private cards: Card[] = [];
+  // What people chose and the client has not been told yet.
+  private readonly chosen = new Map<string, number>();
+
+  // Other cloths than before.
+  describe(client: Client): void {
+    this.chosen.clear();
+    this.list.replaceChildren();
+    this.cards = client.cloths().map(({ name, vertexCount }, index) => {
+      const card = this.addCard(name, index);
+      write(card.figures.get("nodes")!, vertexCount.toLocaleString("en"));
+      return card;
+    });
+    this.showSolvers(client);
+  }
+
+  // As they stand.
+  showSolvers(client: Client): void {
+    this.cards.forEach(({ solver }, index) => {
+      const kind = client.solver(index);
+      if (!Solvers.has(kind) && solver.querySelector(`option[value="${kind}"]`) === null)
+        solver.append(new Option(`solver ${kind}`, String(kind)));
+      solver.value = String(kind);
+    });
+  }
+
+  // Of the newest report; to be called now and then.
+  showReports(client: Client): void {
+    this.cards.forEach(({ figures }, index) => {
+      const report = client.report(index);
+      if (!report) return;
+      for (const [figure, text] of texts(report)) write(figures.get(figure)!, text);
+      write(this.deviceMs, `${report.deviceMs.toFixed(2)} ms on the device`);
+    });
+  }
+
+  // Hands choices to the client; to be called once a drawn frame.
+  apply(client: Client): void {
+    for (const [cloth, solver] of this.chosen) client.setSolver(cloth, solver);
+    this.chosen.clear();
+  }
+
+  private addCard(name: string, index: number): Card {
+    const card = document.createElement("section");
+    card.className = "cloth";
+    const solver = document.createElement("select");
+    solver.id = `solver-${index}`;
+    solver.append(...Array.from(Solvers, ([kind, label]) => new Option(label, String(kind))));
+    solver.addEventListener("change", () => this.chosen.set(name, Number(solver.value)));
+    const label = document.createElement("label");
+    label.className = "row";
+    label.htmlFor = solver.id;
+    label.textContent = name;
+    const terms = document.createElement("dl");
+    const figures = new Map<Figure, HTMLElement>();
+    for (const figure of kFigures) {
+      const entry = document.createElement("div");
+      const term = document.createElement("dt");
+      const value = document.createElement("dd");
+      term.textContent = figure;
+      value.textContent = "–";
+      value.dataset["figure"] = figure;
+      entry.append(term, value);
+      terms.append(entry);
+      figures.set(figure, value);
+    }
+    card.append(label, solver, terms);
+    this.list.append(card);
+    return { solver, figures };
+  }
+}
+
+function texts(report: ClothReport): [Figure, string][] {
+  const percent = (part: number) => `${(100 * part).toFixed(2)} %`;
+  const solved = report.iterations > 0 || report.activeConstraints > 0;
+  return [
+    ["strain max", percent(report.strainMax)],
+    ["strain p99", percent(report.strainP99)],
+    ["strain mean", percent(report.strainMean)],
+    ["constraints", solved ? report.activeConstraints.toLocaleString("en") : "none"],
+    ["iterations", solved ? `${report.iterations} (${report.residual.toExponential(0)})` : "none"],
+    ["energy", `${(report.kineticEnergy + report.elasticEnergy + report.gravityEnergy).toFixed(3)} J`],
+    ["penetration", report.penetration > 0 ? `${(1000 * report.penetration).toPrecision(2)} mm` : "none"],
+  ];
+}
