@@ -262,19 +262,20 @@ test("a slider works by keyboard, and others in the scene see it", () =>
     }),
   ));
 
-// The soft curtain hangs stretched; as constraints its springs keep their length, and the server's report says so.
+// The soft flag flutters stretched; as constraints its springs keep their length, and the server's report says so.
 test("each cloth's solver can be chosen, and the panel says how its simulation does", () =>
-  withPage({ viewport: { width: 1000, height: 900 } }, (first) =>
-    withPage({}, async (second) => {
+  withPage({ query: "?scene=flag", viewport: { width: 1000, height: 900 } }, (first) =>
+    withPage({ query: "?scene=flag" }, async (second) => {
       await untilState(first, "live");
       await untilState(second, "live");
       const figure = (page, name) => page.textContent(`#cloths [data-figure="${name}"]`);
       const untilReport = (page, since) =>
         page.waitForFunction((tick) => window.clothstream.reports[0]?.tick > tick, since);
       await untilReport(first, 0);
-      assert.equal(await figure(first, "nodes"), (rows * columns).toLocaleString("en"));
+      const nodes = await first.evaluate(() => window.clothstream.cloths[0].vertexCount.toLocaleString("en"));
+      assert.equal(await figure(first, "nodes"), nodes);
       assert.equal(await figure(first, "constraints"), "none");
-      await first.waitForFunction(() => /^\d+\.\d\d ms/.test(document.getElementById("device-ms").textContent));
+      await first.waitForFunction(() => /^\d+\.\d ms a tick$/.test(document.getElementById("device-ms").textContent));
       const before = await first.evaluate(() => window.clothstream.reports[0]);
       assert.ok(before.strainMax >= before.strainP99 && before.strainP99 > 0 && before.strainMean > 0);
       assert.ok(before.kineticEnergy >= 0 && before.elasticEnergy > 0 && before.deviceMs > 0);
@@ -283,7 +284,7 @@ test("each cloth's solver can be chosen, and the panel says how its simulation d
       await first.selectOption("#solver-0", "2");
       await second.waitForFunction(() => document.getElementById("solver-0").value === "2");
       await first.waitForFunction(() => window.clothstream.reports[0].activeConstraints > 0);
-      await first.waitForFunction((p99) => window.clothstream.reports[0].strainP99 < p99, before.strainP99);
+      await first.waitForFunction((p99) => window.clothstream.reports[0].strainP99 < p99 / 2, before.strainP99);
       const after = await first.evaluate(() => window.clothstream.reports[0]);
       assert.ok(after.iterations > 0 && after.residual > 0);
       assert.match(await figure(first, "constraints"), /^[\d,]+$/);

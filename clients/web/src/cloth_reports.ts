@@ -4,7 +4,7 @@
 import { Solvers, type Client, type ClothReport } from "./client";
 import { element, write } from "./hud";
 
-const kFigures = ["nodes", "strain max", "strain p99", "strain mean", "constraints", "iterations", "energy", "penetration"] as const;
+const kFigures = ["nodes", "strain max", "strain p99", "strain mean", "constraints", "iterations", "residual", "energy", "penetration"] as const;
 type Figure = (typeof kFigures)[number];
 
 interface Card {
@@ -47,7 +47,7 @@ export class ClothReports {
       const report = client.report(index);
       if (!report) return;
       for (const [figure, text] of texts(report)) write(figures.get(figure)!, text);
-      write(this.deviceMs, `${report.deviceMs.toFixed(2)} ms on the device`);
+      write(this.deviceMs, `${report.deviceMs.toFixed(1)} ms a tick`);
     });
   }
 
@@ -95,7 +95,8 @@ function texts(report: ClothReport): [Figure, string][] {
     ["strain p99", percent(report.strainP99)],
     ["strain mean", percent(report.strainMean)],
     ["constraints", solved ? report.activeConstraints.toLocaleString("en") : "none"],
-    ["iterations", solved ? `${report.iterations} (${report.residual.toExponential(0)})` : "none"],
+    ["iterations", solved ? String(report.iterations) : "none"],
+    ["residual", solved ? report.residual.toPrecision(2) : "none"],
     ["energy", `${(report.kineticEnergy + report.elasticEnergy + report.gravityEnergy).toFixed(3)} J`],
     ["penetration", report.penetration > 0 ? `${(1000 * report.penetration).toPrecision(2)} mm` : "none"],
   ];
