@@ -6,6 +6,7 @@
 #include <bit>
 #include <cassert>
 #include <cstring>
+#include <limits>
 #include <numeric>
 #include <utility>
 
@@ -52,13 +53,13 @@ Buffer uploadOf(const vulkan::Device& device, const std::vector<Record>& records
   return upload;
 }
 
-// The upper end of the bin in which 99 % of all are reached.
+// The upper end of the bin in which 99 % of all are reached; the last one has none.
 float p99Of(std::span<const std::uint32_t> bins, std::uint64_t all) {
   const std::uint64_t rank = (99 * all + 99) / 100;
   std::uint64_t before = 0;
-  for (std::uint32_t bin = 0; bin < bins.size(); ++bin)
+  for (std::uint32_t bin = 0; bin + 1 < bins.size(); ++bin)
     if ((before += bins[bin]) >= rank) return std::bit_cast<float>((shared::kStretchFirst + bin) << 18);
-  return 0;
+  return std::numeric_limits<float>::infinity();
 }
 
 }  // namespace

@@ -396,5 +396,20 @@ TEST_F(SceneHostTest, HasTheStatesThatAStepWithoutAServerHas) {
         << "tick " << i + 1;
 }
 
+TEST(LiveScene, ThatIsCorrectedHasWhatHoldsAndTheChangesThatWait) {
+  LiveScene live(smallScene());
+  v1::ParameterChange waiting;
+  waiting.mutable_wind()->mutable_value()->set_x(3);
+  ASSERT_TRUE(live.change(1, waiting));
+  scene::Scene now = smallScene();
+  now.cloths[0].thickness = 0.02f;
+  const v1::ParameterChange said = live.correct(now);
+  EXPECT_EQ(said.cloths(0).thickness(), 0.02f);
+  EXPECT_TRUE(said.cloths(0).solver().has_mass_spring());
+  EXPECT_EQ(said.wind().value().x(), 0);
+  EXPECT_EQ(live.definition().cloths[0].thickness, 0.02f);
+  EXPECT_EQ(live.definition().environment.wind.x(), 3);
+}
+
 }  // namespace
 }  // namespace clothstream::stream
