@@ -262,10 +262,10 @@ test("a slider works by keyboard, and others in the scene see it", () =>
     }),
   ));
 
-// The soft flag flutters stretched; as constraints its springs keep their length, and the server's report says so.
+// The soft curtain hangs stretched; as constraints its springs keep their length, and the server's report says so.
 test("each cloth's solver can be chosen, and the panel says how its simulation does", () =>
-  withPage({ query: "?scene=flag", viewport: { width: 1000, height: 900 } }, (first) =>
-    withPage({ query: "?scene=flag" }, async (second) => {
+  withPage({ viewport: { width: 1000, height: 900 } }, (first) =>
+    withPage({}, async (second) => {
       await untilState(first, "live");
       await untilState(second, "live");
       const figure = (page, name) => page.textContent(`#cloths [data-figure="${name}"]`);
@@ -284,7 +284,7 @@ test("each cloth's solver can be chosen, and the panel says how its simulation d
       await first.selectOption("#solver-0", "2");
       await second.waitForFunction(() => document.getElementById("solver-0").value === "2");
       await first.waitForFunction(() => window.clothstream.reports[0].activeConstraints > 0);
-      await first.waitForFunction((p99) => window.clothstream.reports[0].strainP99 < p99 / 2, before.strainP99);
+      await first.waitForFunction((p99) => window.clothstream.reports[0].strainP99 < p99, before.strainP99);
       const after = await first.evaluate(() => window.clothstream.reports[0]);
       assert.ok(after.iterations > 0 && after.residual > 0);
       assert.match(await figure(first, "constraints"), /^[\d,]+$/);
