@@ -58,8 +58,8 @@ inline constexpr Range kCompliance{0, 1};              // m/N
 inline constexpr Range kTolerance{0, 1};
 inline constexpr Range kActivation{0, 10};  // part of a length
 inline constexpr std::uint32_t kMaxIterations = 10'000;
-inline constexpr std::uint32_t kMaxConstraintNodes = 1'048'576;  // of a cloth
-inline constexpr double kUnitTolerance = 0.001;                  // of a quaternion's length
+inline constexpr std::uint32_t kMaxSolverNodes = 1'048'576;  // of a cloth
+inline constexpr double kUnitTolerance = 0.001;              // of a quaternion's length
 
 inline constexpr float kDefaultWeldDistance = 1e-5f;  // m
 inline constexpr float kDefaultArealMass = 0.2f;      // kg/m^2

@@ -25,9 +25,12 @@ scene::Integrator toIntegrator(Checks& checks, const Path& path, v1::Integrator 
       return scene::Integrator::semiImplicitEuler;
     case v1::INTEGRATOR_EXPLICIT_EULER:
       return scene::Integrator::explicitEuler;
+    case v1::INTEGRATOR_RUNGE_KUTTA_4:
+      return scene::Integrator::rungeKutta4;
     default:
-      checks.fail(path, fmt::format("{}", static_cast<int>(message)),
-                  "must be INTEGRATOR_SEMI_IMPLICIT_EULER or INTEGRATOR_EXPLICIT_EULER");
+      checks.fail(
+          path, fmt::format("{}", static_cast<int>(message)),
+          "must be INTEGRATOR_SEMI_IMPLICIT_EULER, INTEGRATOR_EXPLICIT_EULER or INTEGRATOR_RUNGE_KUTTA_4");
       return {};
   }
 }
@@ -95,15 +98,21 @@ scene::GridRange toRange(Checks& checks, const Path& path, const v1::GridRange& 
   return range;
 }
 
+// What all messages of solvers that iterate have.
+template <typename Message>
+void readIterations(Checks& checks, const Path& path, const Message& message, scene::Solver& solver) {
+  if (message.has_iterations())
+    solver.iterations = checks.integer(path / "iterations", message.iterations(), 1, limits::kMaxIterations);
+  if (message.has_tolerance())
+    solver.tolerance = checks.number(path / "tolerance", message.tolerance(), limits::kTolerance);
+}
+
 void readConstraint(Checks& checks, const Path& path, const v1::ConstraintSolver& message,
                     scene::Solver& solver) {
   solver.bendConstraints = message.bend_constraints();
   if (message.has_compliance())
     solver.compliance = checks.number(path / "compliance", message.compliance(), limits::kCompliance);
-  if (message.has_iterations())
-    solver.iterations = checks.integer(path / "iterations", message.iterations(), 1, limits::kMaxIterations);
-  if (message.has_tolerance())
-    solver.tolerance = checks.number(path / "tolerance", message.tolerance(), limits::kTolerance);
+  readIterations(checks, path, message, solver);
 }
 
 // Pins of a grid by number.
@@ -264,6 +273,9 @@ scene::Solver toSolver(Checks& checks, const Path& path, const v1::Solver& messa
     if (acad.has_activation())
       solver.activation = checks.number(at / "activation", acad.activation(), limits::kActivation);
     readConstraint(checks, at / "constraint", acad.constraint(), solver);
+  } else if (message.has_implicit_euler()) {
+    solver.kind = scene::SolverKind::implicitEuler;
+    readIterations(checks, path / "implicitEuler", message.implicit_euler(), solver);
   }
   return solver;
 }
@@ -271,10 +283,10 @@ scene::Solver toSolver(Checks& checks, const Path& path, const v1::Solver& messa
 std::optional<std::string> unfitSolver(const scene::Scene& scene, const scene::Cloth& cloth) {
   if (cloth.solver.kind == scene::SolverKind::massSpring) return std::nullopt;
   if (scene.integrator != scene::Integrator::semiImplicitEuler)
-    return "has constraints, which need INTEGRATOR_SEMI_IMPLICIT_EULER";
-  if (cloth.nodeCount() > limits::kMaxConstraintNodes)
-    return fmt::format("has constraints, for at most {} nodes; this cloth has {}",
-                       limits::kMaxConstraintNodes, cloth.nodeCount());
+    return "solves a system, which needs INTEGRATOR_SEMI_IMPLICIT_EULER";
+  if (cloth.nodeCount() > limits::kMaxSolverNodes)
+    return fmt::format("solves a system, for at most {} nodes; this cloth has {}", limits::kMaxSolverNodes,
+                       cloth.nodeCount());
   return std::nullopt;
 }
 

@@ -75,8 +75,14 @@ void writeCollider(const scene::Collider& collider, v1::Collider& message) {
 }
 
 v1::Integrator toMessage(scene::Integrator integrator) {
-  return integrator == scene::Integrator::explicitEuler ? v1::INTEGRATOR_EXPLICIT_EULER
-                                                        : v1::INTEGRATOR_SEMI_IMPLICIT_EULER;
+  switch (integrator) {
+    case scene::Integrator::explicitEuler:
+      return v1::INTEGRATOR_EXPLICIT_EULER;
+    case scene::Integrator::rungeKutta4:
+      return v1::INTEGRATOR_RUNGE_KUTTA_4;
+    default:
+      return v1::INTEGRATOR_SEMI_IMPLICIT_EULER;
+  }
 }
 
 }  // namespace
@@ -97,6 +103,10 @@ v1::Solver toMessage(const scene::Solver& solver) {
     case scene::SolverKind::acad:
       message.mutable_acad()->set_activation(solver.activation);
       writeConstraint(solver, *message.mutable_acad()->mutable_constraint());
+      break;
+    case scene::SolverKind::implicitEuler:
+      message.mutable_implicit_euler()->set_iterations(solver.iterations);
+      message.mutable_implicit_euler()->set_tolerance(solver.tolerance);
       break;
   }
   return message;

@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "server/reference/constraint_system.h"
+#include "server/reference/implicit_system.h"
 
 namespace clothstream::reference {
 namespace {
@@ -87,27 +88,71 @@ void ReferenceCloth::accumulateAirForces(const scene::Environment& environment,
   }
 }
 
-void ReferenceCloth::integrate(const scene::Environment& environment, scene::Integrator integrator,
-                               double h) {
+const std::vector<Vec3>& ReferenceCloth::accelerations(const scene::Environment& environment) {
   std::ranges::fill(forces_, Vec3::Zero());
   accumulateSpringForces(forces_);
   accumulateAirForces(environment, forces_);
   const Vec3 gravity = environment.gravity.cast<double>();
-  const double damping = cloth_.damping;
-  const bool constrained = cloth_.solver.kind != scene::SolverKind::massSpring;
-  if (constrained) start_ = positions_;
+  for (std::size_t i = 0; i < positions_.size(); ++i)
+    forces_[i] =
+        inverseMasses_[i] == 0
+            ? Vec3(Vec3::Zero())
+            : Vec3(forces_[i] * inverseMasses_[i] + gravity - double{cloth_.damping} * velocities_[i]);
+  return forces_;
+}
+
+void ReferenceCloth::integrateRungeKutta(const scene::Environment& environment, double h) {
+  const std::vector<Vec3> start = positions_, startVelocities = velocities_;
+  std::vector<Vec3> moves(start.size(), Vec3::Zero()), changes(start.size(), Vec3::Zero());
+  constexpr double kNext[] = {0.5, 0.5, 1, 0}, kWeight[] = {1.0 / 6, 1.0 / 3, 1.0 / 3, 1.0 / 6};
+  for (int stage = 0; stage < 4; ++stage) {
+    const std::vector<Vec3>& rates = accelerations(environment);
+    for (std::size_t i = 0; i < start.size(); ++i) {
+      const Vec3 velocity = velocities_[i];
+      moves[i] += kWeight[stage] * h * velocity;
+      changes[i] += kWeight[stage] * h * rates[i];
+      positions_[i] = start[i] + kNext[stage] * h * velocity;
+      velocities_[i] = startVelocities[i] + kNext[stage] * h * rates[i];
+    }
+  }
+  for (std::size_t i = 0; i < start.size(); ++i) {
+    positions_[i] = start[i] + moves[i];
+    velocities_[i] = startVelocities[i] + changes[i];
+  }
+}
+
+void ReferenceCloth::integrate(const scene::Environment& environment, scene::Integrator integrator,
+                               double h) {
+  if (integrator == scene::Integrator::rungeKutta4) return integrateRungeKutta(environment, h);
+  const std::vector<Vec3>& rates = accelerations(environment);
+  const scene::SolverKind solver = cloth_.solver.kind;
+  if (solver != scene::SolverKind::massSpring) start_ = positions_;
+  if (solver == scene::SolverKind::implicitEuler) startVelocities_ = velocities_;
   for (std::size_t i = 0; i < positions_.size(); ++i) {
-    if (inverseMasses_[i] == 0) continue;
-    const Vec3 acceleration = forces_[i] * inverseMasses_[i] + gravity - damping * velocities_[i];
     if (integrator == scene::Integrator::explicitEuler) {
       positions_[i] += h * velocities_[i];
-      velocities_[i] += h * acceleration;
+      velocities_[i] += h * rates[i];
     } else {
-      velocities_[i] += h * acceleration;
+      velocities_[i] += h * rates[i];
       positions_[i] += h * velocities_[i];
     }
   }
-  if (constrained) enforceConstraints(h);
+  if (solver == scene::SolverKind::constraint || solver == scene::SolverKind::acad) enforceConstraints(h);
+  if (solver == scene::SolverKind::implicitEuler) takeImplicitVelocities(h);
+}
+
+void ReferenceCloth::takeImplicitVelocities(double h) {
+  std::vector<ImplicitSpring> springs;
+  for (const scene::SpringLink& link : links_) {
+    const scene::Spring& spring = scene::springOf(cloth_, link.kind);
+    springs.push_back({link.a, link.b, spring.stiffness, spring.damping, link.restLength});
+  }
+  const std::vector<Vec3> changes =
+      ImplicitSystem(springs, start_, startVelocities_, velocities_, inverseMasses_, h).solve();
+  for (std::size_t i = 0; i < positions_.size(); ++i) {
+    velocities_[i] += changes[i];
+    positions_[i] += h * changes[i];
+  }
 }
 
 void ReferenceCloth::enforceConstraints(double h) {

@@ -22,7 +22,7 @@ struct Strain {
 };
 
 // A grid's nodes are row-major. Not thread-safe; after construction no member allocates but normals(), and
-// constraints.
+// solvers that solve a system.
 class ReferenceCloth {
  public:
   // At rest in its start pose. Springs are those of scene::springLinks().
@@ -67,7 +67,11 @@ class ReferenceCloth {
   double penetration(const scene::Shape& shape, const Pose& pose) const;
 
  private:
+  // m/s^2; 0 of pinned nodes. Until the next call.
+  const std::vector<Vec3>& accelerations(const scene::Environment& environment);
+  void integrateRungeKutta(const scene::Environment& environment, double h);
   void enforceConstraints(double h);
+  void takeImplicitVelocities(double h);
   std::vector<Vec3> gridNormals() const;
   std::vector<Vec3> meshNormals() const;
 
@@ -75,7 +79,7 @@ class ReferenceCloth {
   std::vector<scene::SpringLink> links_;
   std::vector<scene::Triangle> triangles_;
   std::vector<Vec3> positions_, velocities_, forces_;
-  std::vector<Vec3> start_;  // of the substep, where there are constraints
+  std::vector<Vec3> start_, startVelocities_;  // of the substep, where a system is solved
   std::vector<double> masses_, inverseMasses_;
 };
 

@@ -45,9 +45,12 @@ enum class SolverKind : std::uint8_t {
                // 3-11
   acad,  // they are forces until a substep would stretch them too far: then constraints for that substep,
          // [Va21] 3.3
+  implicitEuler,  // every spring is a force, that of the substep's end: Baraff and Witkin, "Large steps in
+                  // cloth simulation", 1998
 };
 
-// What turns a cloth's springs into motion. All but `kind` are of solvers with constraints.
+// What turns a cloth's springs into motion. All but `kind` are of solvers that solve a system; iterations and
+// tolerance of all of these.
 struct Solver {
   SolverKind kind = SolverKind::massSpring;
   bool bendConstraints = false;     // bend springs as well: the paper's "all springs"
@@ -104,7 +107,7 @@ struct Environment {
   float airDensity = 1.2f;   // kg/m^3
 };
 
-enum class Integrator : std::uint8_t { semiImplicitEuler, explicitEuler };
+enum class Integrator : std::uint8_t { semiImplicitEuler, explicitEuler, rungeKutta4 };
 enum class Normals : std::uint8_t { none, octahedral };
 
 struct StreamSettings {

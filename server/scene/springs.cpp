@@ -33,7 +33,8 @@ const Spring& springOf(const Cloth& cloth, SpringKind kind) {
 }
 
 bool isConstraint(const Solver& solver, SpringKind kind) {
-  return solver.kind != SolverKind::massSpring && (kind != SpringKind::bend || solver.bendConstraints);
+  return (solver.kind == SolverKind::constraint || solver.kind == SolverKind::acad) &&
+         (kind != SpringKind::bend || solver.bendConstraints);
 }
 
 Spring forceOf(const Cloth& cloth, SpringKind kind) {

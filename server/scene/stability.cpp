@@ -10,6 +10,8 @@
 // A mode's growth z in a step h satisfies, with the Rayleigh quotients s = h^2 x*Kx / x*Mx and c = h x*Cx /
 // x*Mx,
 //   semi-implicit Euler:  z^2 + (s + c - 2) z + 1 - c = 0,      |z| <= 1  if  s + 2c < 4  (Jury's criterion),
+//   Runge-Kutta of 4th order: |z| <= 1 if h |w| <= kRungeKuttaRadius for the mode's rate w, Re w <= 0, with
+//   h^2 |w|^2 = s or h |w| <= c  (underdamped or not),
 //   explicit Euler:       z^2 + (c - 2) z + 1 - c + s = 0,      |z| <= 1  if  s <= c  and  2c - s < 4.
 //
 // A Laplacian with weights w_ij has, in the row of a node of mass m, the diagonal sum_j w_ij and as much
@@ -127,6 +129,19 @@ bool semiImplicitStable(const Cloth& cloth, const NodeSprings& node, double air,
   return 2 * springs * node.perMass + 2 * h * (cloth.damping + air) < 4;
 }
 
+// Whether the Runge-Kutta method with step h is stable: s <= r^2 and c <= r.
+bool rungeKuttaStable(const Cloth& cloth, const NodeSprings& node, double air, double h) {
+  // Of the largest half disc round 0 within |1 + z + z^2/2 + z^3/6 + z^4/24| <= 1, rounded down.
+  constexpr double kRungeKuttaRadius = 2.61;
+  const auto sum = [&](auto&& of) {
+    return node.structural * of(cloth.structural) + node.shear * of(cloth.shear) + node.bend * of(cloth.bend);
+  };
+  const double stiffness = sum([](const Spring& spring) { return double{spring.stiffness}; });
+  const double damping = sum([](const Spring& spring) { return double{spring.damping}; });
+  return h * h * 2 * stiffness * node.perMass <= kRungeKuttaRadius * kRungeKuttaRadius &&
+         h * (2 * damping * node.perMass + cloth.damping + air) <= kRungeKuttaRadius;
+}
+
 // Whether explicit Euler with step h is stable: s <= c, and c < 2, from which 2c - s < 4 follows.
 bool explicitStable(const Cloth& cloth, const NodeSprings& node, double air, double h) {
   const double tension = 1 - 1 / (1 + double{kTensionStrain});
@@ -143,16 +158,19 @@ bool explicitStable(const Cloth& cloth, const NodeSprings& node, double air, dou
          h * (2 * dashpots * node.perMass + cloth.damping + air) < 2;
 }
 
-// Fewest substeps from `atLeast` on; both criteria only get easier with smaller steps. 0: none. Constraints
-// are solved for implicitly: they set no bound, and hold those springs that become constraints when they
-// stretch too far.
+// Fewest substeps from `atLeast` on; both criteria only get easier with smaller steps. 0: none. Constraints,
+// and the springs of implicit Euler, are solved for: they set no bound, and hold those springs that become
+// constraints when they stretch too far.
 std::uint32_t stableSubsteps(const Scene& scene, Cloth cloth, std::uint32_t atLeast) {
   if (isConstraint(cloth.solver, SpringKind::structural))
     cloth.structural.stiffness = cloth.shear.stiffness = 0;
   if (isConstraint(cloth.solver, SpringKind::bend)) cloth.bend.stiffness = 0;
+  if (cloth.solver.kind == SolverKind::implicitEuler) cloth.structural = cloth.shear = cloth.bend = {};
   const double air = airDamping(cloth, scene.environment);
   const std::vector<NodeSprings> combinations = cloth.mesh ? meshSprings(cloth) : gridSprings(cloth);
-  const auto stable = scene.integrator == Integrator::semiImplicitEuler ? semiImplicitStable : explicitStable;
+  const auto stable = scene.integrator == Integrator::semiImplicitEuler ? semiImplicitStable
+                      : scene.integrator == Integrator::rungeKutta4     ? rungeKuttaStable
+                                                                        : explicitStable;
   for (std::uint32_t substeps = atLeast; substeps <= kMaxSubsteps; ++substeps) {
     const double h = scene.tickSeconds() / substeps;
     if (std::ranges::all_of(combinations,

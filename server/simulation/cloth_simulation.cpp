@@ -17,8 +17,10 @@
 #include "server/simulation/advance_variant.h"
 #include "server/simulation/collision/collision_stage.h"
 #include "server/simulation/constraint_stage.h"
+#include "server/simulation/implicit_stage.h"
 #include "server/simulation/mesh_stage.h"
 #include "server/simulation/report_stage.h"
+#include "server/simulation/runge_kutta_stage.h"
 #include "server/vulkan/kernel.h"
 
 namespace clothstream::simulation {
@@ -193,8 +195,9 @@ struct ClothSimulation::Pipeline {
   void start(vulkan::Recorder& recorder);
   void recordInputs(vulkan::Recorder& recorder, const TickInputs& inputs);
   void recordSubsteps(vulkan::Recorder& recorder, const TickInputs& inputs);
-  void recordAdvance(vulkan::Recorder& recorder, const TickInputs& inputs, bool constrained,
-                     shared::AdvancePush push);
+  void recordAdvance(vulkan::Recorder& recorder, std::uint32_t from, const AdvanceVariant& variant,
+                     bool constrained, shared::AdvancePush push);
+  void recordRungeKutta(vulkan::Recorder& recorder, const TickInputs& inputs, shared::AdvancePush push);
   void recordStatus(vulkan::Recorder& recorder);
   void writeState(const NodeState& state);
   void recordUploadedState(vulkan::Recorder& recorder);
@@ -208,14 +211,17 @@ struct ClothSimulation::Pipeline {
   std::vector<std::uint32_t> offsets;
   std::uint32_t nodes;
   std::vector<shared::ClothRecord> records;
+  SolveIterations iterations;
   std::vector<float> masses;  // inverse
   Cut cut;
   Buffers buffers;
   CollisionStage collision;
   std::array<std::unique_ptr<Stage>, AdvanceVariant::kCount> advances;  // made when they are first needed
   Stage normals, hash;
-  std::unique_ptr<MeshStage> meshes;  // where there are any
+  std::unique_ptr<MeshStage> meshes;            // where there are any
+  std::unique_ptr<RungeKuttaStage> rungeKutta;  // where that is the integrator
   ConstraintStage constraints;
+  ImplicitStage implicit;
   std::vector<scene::Solver> solvers;   // of the cloths, as the tables have them
   std::vector<shared::vec4> stiffness;  // of their springs
   std::unique_ptr<ReportStage> report;  // made when it is first wanted
@@ -240,6 +246,7 @@ ClothSimulation::Pipeline::Pipeline(const vulkan::Device& on, const scene::Scene
       offsets(simulation::clothOffsets(scene.cloths)),
       nodes(offsets.back()),
       records(clothRecords(scene.cloths, substepSeconds)),
+      iterations(solveIterations(scene.cloths)),
       masses(inverseMasses(scene.cloths)),
       cut(cutScene(on, scene, options)),
       buffers(on, nodes, records.size(), cut.tiles.records.size()),
@@ -248,6 +255,7 @@ ClothSimulation::Pipeline::Pipeline(const vulkan::Device& on, const scene::Scene
       normals(makeNormals(on, buffers, cut)),
       hash(makeHash(on, buffers, cut)),
       constraints(on, constraintTables(scene.cloths), stateOf(buffers, collision), options.workgroupSize),
+      implicit(on, implicitTables(scene.cloths), stateOf(buffers, collision), options.workgroupSize),
       solvers(solversOf(scene.cloths)),
       stiffness(springStiffness(scene.cloths)),
       workgroupSize(options.workgroupSize) {
@@ -258,6 +266,8 @@ ClothSimulation::Pipeline::Pipeline(const vulkan::Device& on, const scene::Scene
   if (!meshTables.nodes.empty())
     meshes = std::make_unique<MeshStage>(on, meshTables, stateOf(buffers, collision), buffers.normals,
                                          integrator, cut.workgroupSize);
+  if (integrator == scene::Integrator::rungeKutta4)
+    rungeKutta = std::make_unique<RungeKuttaStage>(on, stateOf(buffers, collision), offsets);
   for (const bool colliders : {false, true})
     prepare(variantOf(records, scene.environment.airDensity, colliders));
 }
@@ -293,6 +303,7 @@ void ClothSimulation::Pipeline::setSolvers(std::span<const scene::Cloth> cloths)
   std::vector<scene::Solver> wanted = solversOf(cloths);
   if (std::ranges::equal(wanted, solvers, sameTables)) return;
   constraints.setTables(constraintTables(cloths));
+  implicit.setTables(implicitTables(cloths));
   cut.tiles = makeTiles(cloths, cut.rowsPerInvocation, cut.workgroupSize);
   std::ranges::copy(cut.tiles.records, buffers.tileUpload.mapped<shared::TileRecord>().begin());
   if (meshes) meshes->setTiles(meshTiles(cloths, cut.workgroupSize));
@@ -310,6 +321,7 @@ void ClothSimulation::Pipeline::start(vulkan::Recorder& recorder) {
   recorder.copy(buffers.tileUpload, buffers.tiles, buffers.tiles.bytes());
   if (meshes) meshes->recordTables(recorder);
   if (constraints.active()) constraints.recordTables(recorder);
+  if (implicit.active()) implicit.recordTables(recorder);
   recorder.barrier();
   started = tabled = true;
 }
@@ -325,23 +337,27 @@ void ClothSimulation::Pipeline::recordInputs(vulkan::Recorder& recorder, const T
   recorder.fill(buffers.status, 0, buffers.status.bytes());
 }
 
-// Constrained cloths collide after their constraints.
-void ClothSimulation::Pipeline::recordAdvance(vulkan::Recorder& recorder, const TickInputs& inputs,
-                                              bool constrained, shared::AdvancePush push) {
-  const AdvanceVariant variant =
-      variantOf(records, inputs.environment.airDensity, collision.active() && !constrained);
+void ClothSimulation::Pipeline::recordAdvance(vulkan::Recorder& recorder, std::uint32_t from,
+                                              const AdvanceVariant& variant, bool constrained,
+                                              shared::AdvancePush push) {
   const TileRange tiles = cut.tiles.range(constrained);
   push.firstTile = tiles.first;
   if (tiles.count > 0)
-    recorder.dispatch(advance(variant).from[present], push, std::uint64_t{tiles.count} * cut.workgroupSize);
-  if (meshes) meshes->recordAdvance(recorder, present, variant, constrained, push);
+    recorder.dispatch(advance(variant).from[from], push, std::uint64_t{tiles.count} * cut.workgroupSize);
+  if (meshes) meshes->recordAdvance(recorder, from, variant, constrained, push);
+}
+
+void ClothSimulation::Pipeline::recordRungeKutta(vulkan::Recorder& recorder, const TickInputs& inputs,
+                                                 shared::AdvancePush push) {
+  const AdvanceVariant variant = variantOf(records, inputs.environment.airDensity, false);
+  rungeKutta->record(recorder, present, push.collision, [&](std::uint32_t from, float part) {
+    push.gravityStep.w = part * static_cast<float>(substepSeconds);
+    recordAdvance(recorder, from, variant, false, push);
+  });
 }
 
 void ClothSimulation::Pipeline::recordSubsteps(vulkan::Recorder& recorder, const TickInputs& inputs) {
   const scene::Environment& environment = inputs.environment;
-  std::uint32_t iterations = 0;
-  for (const shared::ClothRecord& record : records)
-    iterations = std::max(iterations, static_cast<std::uint32_t>(record.solver.y));
   shared::AdvancePush push{.gravityStep = texel(environment.gravity, static_cast<float>(substepSeconds)),
                            .windAir = texel(environment.wind, environment.airDensity / 6),
                            .collision = {},
@@ -360,14 +376,22 @@ void ClothSimulation::Pipeline::recordSubsteps(vulkan::Recorder& recorder, const
   for (std::uint32_t substep = 0; substep < substeps; ++substep) {
     push.collision = collision.push(substep, substeps, tickRate);
     recorder.barrier();
-    for (const bool constrained : {false, true}) recordAdvance(recorder, inputs, constrained, push);
-    if (constraints.active())
-      constraints.record(recorder, present, iterations,
-                         {.collision = push.collision,
-                          .count = 0,
-                          .substepSeconds = static_cast<float>(substepSeconds),
-                          .substepRate = tickRate * static_cast<float>(substeps),
-                          .reserved = 0});
+    if (rungeKutta) {
+      recordRungeKutta(recorder, inputs, push);
+    } else {
+      // Cloths for which a system is solved collide after that.
+      for (const bool constrained : {false, true})
+        recordAdvance(recorder, present,
+                      variantOf(records, inputs.environment.airDensity, collision.active() && !constrained),
+                      constrained, push);
+    }
+    const shared::ConstraintPush solve{.collision = push.collision,
+                                       .count = 0,
+                                       .substepSeconds = static_cast<float>(substepSeconds),
+                                       .substepRate = tickRate * static_cast<float>(substeps),
+                                       .reserved = 0};
+    if (constraints.active()) constraints.record(recorder, present, iterations.constraints, solve);
+    if (implicit.active()) implicit.record(recorder, present, iterations.implicit, solve);
     present = 1 - present;
   }
 }
@@ -380,6 +404,7 @@ void ClothSimulation::Pipeline::recordStatus(vulkan::Recorder& recorder) {
   recorder.copy(buffers.status, buffers.statusReadback, sizeof(shared::StatusRecord), 0,
                 slot * sizeof(shared::StatusRecord));
   if (constraints.active()) constraints.recordReport(recorder);
+  if (implicit.active()) implicit.recordReport(recorder);
 }
 
 ClothSimulation::ClothSimulation(const vulkan::Device& device, const scene::Scene& scene,
@@ -398,6 +423,7 @@ void ClothSimulation::setCloths(std::span<const scene::Cloth> cloths) {
   pipeline_->setSolvers(cloths);
   pipeline_->stiffness = springStiffness(cloths);
   pipeline_->records = std::move(records);
+  pipeline_->iterations = solveIterations(cloths);
 }
 
 void ClothSimulation::recordTick(vulkan::Recorder& recorder, const TickInputs& inputs) {
@@ -431,14 +457,18 @@ void ClothSimulation::recordReport(vulkan::Recorder& recorder, const TickInputs&
 std::vector<ClothReport> ClothSimulation::report() const {
   assert(pipeline_->report);
   std::vector<ClothReport> reports = pipeline_->report->collect();
-  if (!pipeline_->constraints.active()) return reports;
-  const std::span<const shared::SolveRecord> solves = pipeline_->constraints.report();
-  const std::span<const std::uint32_t> cloths = pipeline_->constraints.cloths();
-  for (std::size_t i = 0; i < solves.size(); ++i) {
-    reports[cloths[i]].activeConstraints = solves[i].constraints;
-    reports[cloths[i]].iterations = solves[i].iterations;
-    reports[cloths[i]].residual = solves[i].residual;
-  }
+  const auto add = [&](const auto& stage) {
+    if (!stage.active()) return;
+    const std::span<const shared::SolveRecord> solves = stage.report();
+    for (std::size_t i = 0; i < solves.size(); ++i) {
+      ClothReport& report = reports[stage.cloths()[i]];
+      report.activeConstraints = solves[i].constraints;
+      report.iterations = solves[i].iterations;
+      report.residual = solves[i].residual;
+    }
+  };
+  add(pipeline_->constraints);
+  add(pipeline_->implicit);
   return reports;
 }
 

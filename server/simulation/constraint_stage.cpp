@@ -3,15 +3,13 @@
 #include "server/simulation/constraint_stage.h"
 
 #include <algorithm>
-#include <cassert>
-#include <cstring>
-#include <stdexcept>
-
-#include <fmt/format.h>
+#include <vector>
 
 #include "kernels/apply_constraints.h"
 #include "kernels/prepare_constraints.h"
 #include "kernels/solve_constraints.h"
+#include "server/simulation/device_table.h"
+#include "server/simulation/solve_cut.h"
 
 namespace clothstream::simulation {
 namespace {
@@ -26,60 +24,19 @@ constexpr auto kStorage = BindingKind::storage;
 
 constexpr std::uint32_t kWorkgroup = 64;
 
-// lavapipe lets an invocation make this many rounds of loops, all loops together, and then ends each after
-// one.
-constexpr std::uint32_t kSoftwareRounds = 65'535;
-
-// Rounds of loops of one invocation in the largest system: of the solve's beginning and end, and of an
-// iteration.
-struct Rounds {
-  std::uint32_t fixed, iteration;
-};
-Rounds roundsOf(const ConstraintTables& tables, std::uint32_t workgroupSize) {
-  const auto shares = [&](float count) { return static_cast<std::uint32_t>(count) / workgroupSize + 2; };
+SolveRounds roundsOf(const ConstraintTables& tables, std::uint32_t workgroupSize) {
   std::uint32_t texels = 0;
   for (const shared::IncidenceRecord& incidence : tables.incidences)
     texels = std::max(texels, static_cast<std::uint32_t>(incidence.list.z));
-  std::uint32_t links = 0, nodes = 0;
+  std::uint32_t links = 0, nodes = 0, sum = 0;
   for (const shared::SystemRecord& system : tables.systems) {
-    links = std::max(links, shares(system.links.z));
-    nodes = std::max(nodes, shares(system.nodes.y));
+    links = std::max(links, roundsOfShare(system.links.z, workgroupSize));
+    nodes = std::max(nodes, roundsOfShare(system.nodes.y, workgroupSize));
+    sum = std::max(sum, roundsOfSum(system.links.z, workgroupSize));
   }
-  // Loops round a loop end once more than they work.
-  const std::uint32_t lanes = CLOTHSTREAM_SOLVE_LANES / workgroupSize + 2;
-  const std::uint32_t sum = links + 2 * lanes + 2 * CLOTHSTREAM_SOLVE_LANES / workgroupSize + 16;
   const std::uint32_t gather = texels + 2;
-  const std::uint32_t list = 2 * (links + 2 * lanes) + CLOTHSTREAM_SOLVE_LANES;
+  const std::uint32_t list = 2 * sum + CLOTHSTREAM_SOLVE_LANES;
   return {list + sum, std::max(nodes * gather, links / 4 * 2 * gather) + 2 * sum + links};
-}
-
-// How a solve is cut; the results do not depend on it.
-struct SolveCut {
-  std::uint32_t workgroupSize;
-  std::uint32_t iterationsPerDispatch;
-};
-
-// A solve is one workgroup with barriers between its passes: on a software device these cost nothing as long
-// as it is no wider than the CPU's vectors, for it then runs without switching between invocations.
-SolveCut cutSolve(const vulkan::Device& device, const ConstraintTables& tables, std::uint32_t workgroupSize) {
-  SolveCut cut{workgroupSize, ~0u};
-  const std::uint32_t most = std::min(256u, device.limits().maxWorkgroupInvocations);
-  if (!device.isSoftware()) {
-    if (workgroupSize == 0) cut.workgroupSize = most;
-    return cut;
-  }
-  if (workgroupSize == 0) cut.workgroupSize = 8;
-  Rounds rounds = roundsOf(tables, cut.workgroupSize);
-  while (rounds.fixed + rounds.iteration > kSoftwareRounds) {
-    if (cut.workgroupSize >= most)
-      throw std::runtime_error(
-          fmt::format("a cloth of {} constraints is more than the constraint solver takes on {}",
-                      tables.links.size(), device.info().name));
-    cut.workgroupSize *= 2;
-    rounds = roundsOf(tables, cut.workgroupSize);
-  }
-  cut.iterationsPerDispatch = (kSoftwareRounds - rounds.fixed) / rounds.iteration;
-  return cut;
 }
 
 vulkan::Kernel makeSolve(const vulkan::Device& device, std::uint32_t workgroupSize, bool adaptive) {
@@ -92,21 +49,6 @@ vulkan::Kernel makeSolve(const vulkan::Device& device, std::uint32_t workgroupSi
                .workgroupSize = workgroupSize,
                .specialisation = {adaptive ? 1u : 0u}});
 }
-
-template <typename T>
-std::span<const std::byte> bytesOf(const std::vector<T>& records) {
-  assert(!records.empty());
-  return std::as_bytes(std::span(records));
-}
-
-struct Table {
-  Table(const vulkan::Device& device, std::span<const std::byte> bytes)
-      : upload(device, BufferPurpose::upload, bytes.size()),
-        texels(device, BufferPurpose::texels, bytes.size()) {
-    std::memcpy(upload.mapped().data(), bytes.data(), bytes.size());
-  }
-  Buffer upload, texels;
-};
 
 }  // namespace
 
@@ -141,10 +83,10 @@ struct ConstraintStage::Systems {
         systemCount(static_cast<std::uint32_t>(tables.systems.size())),
         alwaysCount(tables.always),
         cut(solveCut),
-        systems(device, bytesOf(tables.systems)),
-        links(device, bytesOf(tables.links)),
-        incidences(device, bytesOf(tables.incidences)),
-        lists(device, bytesOf(tables.lists)),
+        systems(device, tables.systems),
+        links(device, tables.links),
+        incidences(device, tables.incidences),
+        lists(device, tables.lists),
         rows(device, BufferPurpose::texels, linkCount * sizeof(shared::vec4)),
         multipliers(device, BufferPurpose::state, linkCount * sizeof(float)),
         residuals(device, BufferPurpose::state, linkCount * sizeof(float)),
@@ -166,28 +108,28 @@ struct ConstraintStage::Systems {
   Bindings bindPrepare(const vulkan::Device& device, const vulkan::Kernel& kernel, const StateBuffers& state,
                        std::size_t from) const {
     return Bindings(device, kernel,
-                    {&links.texels, state.positions[from], state.velocities[1 - from], &state.cloths, &rows,
+                    {&links.texels(), state.positions[from], state.velocities[1 - from], &state.cloths, &rows,
                      &multipliers, &residuals, &directions});
   }
   Bindings bindSolve(const vulkan::Device& device, const vulkan::Kernel& kernel,
                      const StateBuffers& state) const {
     return Bindings(
         device, kernel,
-        {&state.cloths, &systems.texels, &incidences.texels, &lists.texels, &rows, &links.texels,
+        {&state.cloths, &systems.texels(), &incidences.texels(), &lists.texels(), &rows, &links.texels(),
          state.positions[0], &multipliers, &residuals, &directions, &products, &moves, &actives, &solves});
   }
   Bindings bindApply(const vulkan::Device& device, const vulkan::Kernel& kernel, const StateBuffers& state,
                      std::size_t to) const {
     return Bindings(device, kernel,
-                    {&state.cloths, &systems.texels, &incidences.texels, &lists.texels, &rows, &multipliers,
-                     &state.colliders, &state.nearColliders, state.positions[1 - to], state.positions[to],
-                     state.velocities[to]});
+                    {&state.cloths, &systems.texels(), &incidences.texels(), &lists.texels(), &rows,
+                     &multipliers, &state.colliders, &state.nearColliders, state.positions[1 - to],
+                     state.positions[to], state.velocities[to]});
   }
 
   std::uint32_t linkCount, nodeCount, systemCount, alwaysCount;
   SolveCut cut;
   std::vector<std::uint32_t> cloths;
-  Table systems, links, incidences, lists;
+  DeviceTable systems, links, incidences, lists;
   Buffer rows, multipliers, residuals, directions, products, moves, actives, solves, solvesReadback;
   std::array<Bindings, 2> prepareFrom;
   Bindings solveAll, solveActive;
@@ -204,7 +146,8 @@ ConstraintStage::~ConstraintStage() = default;
 
 void ConstraintStage::setTables(const ConstraintTables& tables) {
   if (tables.links.empty()) return systems_.reset();
-  const SolveCut cut = cutSolve(device_, tables, workgroupSize_);
+  const SolveCut cut = cutSolve(device_, workgroupSize_, "a cloth of that many constraints",
+                                [&](std::uint32_t size) { return roundsOf(tables, size); });
   std::unique_ptr<Kernels> fresh;
   if (!kernels_ || kernels_->solveAll.workgroupSize() != cut.workgroupSize)
     fresh = std::make_unique<Kernels>(device_, cut.workgroupSize);
@@ -213,8 +156,9 @@ void ConstraintStage::setTables(const ConstraintTables& tables) {
 }
 
 void ConstraintStage::recordTables(vulkan::Recorder& recorder) const {
-  for (const Table* table : {&systems_->systems, &systems_->links, &systems_->incidences, &systems_->lists})
-    recorder.copy(table->upload, table->texels, table->upload.bytes());
+  for (const DeviceTable* table :
+       {&systems_->systems, &systems_->links, &systems_->incidences, &systems_->lists})
+    table->recordUpload(recorder);
 }
 
 void ConstraintStage::record(vulkan::Recorder& recorder, std::uint32_t from, std::uint32_t iterations,
@@ -223,25 +167,11 @@ void ConstraintStage::record(vulkan::Recorder& recorder, std::uint32_t from, std
   push.count = on.linkCount;
   recorder.barrier();
   recorder.dispatch(on.prepareFrom[from], push, on.linkCount);
-  recordSolve(recorder, on.solveAll, 0, on.alwaysCount, iterations);
-  recordSolve(recorder, on.solveActive, on.alwaysCount, on.systemCount - on.alwaysCount, iterations);
+  recordSolve(recorder, on.solveAll, on.cut, 0, on.alwaysCount, iterations);
+  recordSolve(recorder, on.solveActive, on.cut, on.alwaysCount, on.systemCount - on.alwaysCount, iterations);
   push.count = on.nodeCount;
   recorder.barrier();
   recorder.dispatch(on.applyTo[1 - from], push, on.nodeCount);
-}
-
-void ConstraintStage::recordSolve(vulkan::Recorder& recorder, const Bindings& bindings,
-                                  std::uint32_t firstSystem, std::uint32_t systems,
-                                  std::uint32_t iterations) const {
-  if (systems == 0) return;
-  const SolveCut& cut = systems_->cut;
-  for (std::uint32_t first = 0; first < iterations;) {
-    const std::uint32_t end = first + std::min(cut.iterationsPerDispatch, iterations - first);
-    recorder.barrier();
-    recorder.dispatch(bindings, shared::SolvePush{first, end, firstSystem},
-                      std::uint64_t{systems} * cut.workgroupSize);
-    first = end;
-  }
 }
 
 void ConstraintStage::recordReport(vulkan::Recorder& recorder) const {

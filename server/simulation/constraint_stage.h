@@ -55,9 +55,6 @@ class ConstraintStage {
   struct Kernels;
   struct Systems;
 
-  void recordSolve(vulkan::Recorder& recorder, const vulkan::Bindings& bindings, std::uint32_t firstSystem,
-                   std::uint32_t systems, std::uint32_t iterations) const;
-
   const vulkan::Device& device_;
   StateBuffers state_;
   std::uint32_t workgroupSize_;

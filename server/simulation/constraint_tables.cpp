@@ -6,14 +6,10 @@
 #include <cstdint>
 
 #include "server/scene/springs.h"
+#include "server/simulation/halves.h"
 
 namespace clothstream::simulation {
 namespace {
-
-// The two halves of a whole number as floats hold them exactly.
-shared::vec4 halves(std::size_t number, float z, float w) {
-  return {static_cast<float>(number & 0xFFFF), static_cast<float>(number >> 16), z, w};
-}
 
 std::vector<scene::SpringLink> constraintsOf(const scene::Cloth& cloth) {
   std::vector<scene::SpringLink> links = scene::springLinks(cloth);

@@ -2,9 +2,6 @@
 // Kernels of meshes, and their tables.
 #include "server/simulation/mesh_stage.h"
 
-#include <cassert>
-#include <cstring>
-
 #include "kernels/advance_mesh.h"
 #include "kernels/compute_mesh_normals.h"
 
@@ -12,16 +9,7 @@ namespace clothstream::simulation {
 
 using vulkan::BindingKind;
 using vulkan::Bindings;
-using vulkan::BufferPurpose;
 using vulkan::Kernel;
-
-template <typename Record>
-MeshStage::Table::Table(const vulkan::Device& device, BufferPurpose purpose,
-                        const std::vector<Record>& records)
-    : upload(device, BufferPurpose::upload, records.size() * sizeof(Record)),
-      buffer(device, purpose, upload.bytes()) {
-  std::memcpy(upload.mapped().data(), records.data(), upload.bytes());
-}
 
 MeshStage::MeshStage(const vulkan::Device& device, const MeshTables& tables, const StateBuffers& state,
                      const vulkan::Buffer& normals, scene::Integrator integrator, std::uint32_t workgroupSize)
@@ -30,28 +18,28 @@ MeshStage::MeshStage(const vulkan::Device& device, const MeshTables& tables, con
       integrator_(integrator),
       workgroupSize_(workgroupSize),
       tileRanges_{tables.tiles.range(false), tables.tiles.range(true)},
-      tiles_(device, BufferPurpose::texels, tables.tiles.records),
-      nodes_(device, BufferPurpose::texels, tables.nodes),
-      springEnds_(device, BufferPurpose::texels, tables.springEnds),
-      corners_(device, BufferPurpose::texels, tables.corners),
+      tiles_(device, tables.tiles.records),
+      nodes_(device, tables.nodes),
+      springEnds_(device, tables.springEnds),
+      corners_(device, tables.corners),
       normals_(device, {.name = "compute_mesh_normals",
                         .spirv = kernels::compute_mesh_normals,
                         .bindings = {BindingKind::texels, BindingKind::texels, BindingKind::texels,
                                      BindingKind::storage, BindingKind::texels, BindingKind::texels},
                         .workgroupSize = workgroupSize}),
       normalsOf_{Bindings(device, normals_,
-                          {&state.cloths, &tiles_.buffer, state.positions[0], &normals, &nodes_.buffer,
-                           &corners_.buffer}),
+                          {&state.cloths, &tiles_.texels(), state.positions[0], &normals, &nodes_.texels(),
+                           &corners_.texels()}),
                  Bindings(device, normals_,
-                          {&state.cloths, &tiles_.buffer, state.positions[1], &normals, &nodes_.buffer,
-                           &corners_.buffer})} {}
+                          {&state.cloths, &tiles_.texels(), state.positions[1], &normals, &nodes_.texels(),
+                           &corners_.texels()})} {}
 
 vulkan::Bindings MeshStage::advanceFrom(const Kernel& kernel, std::size_t from) const {
   const std::size_t to = 1 - from;
   return Bindings(device_, kernel,
-                  {&state_.cloths, &tiles_.buffer, state_.positions[from], state_.velocities[from],
+                  {&state_.cloths, &tiles_.texels(), state_.positions[from], state_.velocities[from],
                    state_.positions[to], state_.velocities[to], &state_.colliders, &state_.nearColliders,
-                   &nodes_.buffer, &corners_.buffer, &springEnds_.buffer});
+                   &nodes_.texels(), &corners_.texels(), &springEnds_.texels()});
 }
 
 MeshStage::Advance::Advance(const MeshStage& stage, const AdvanceVariant& variant)
@@ -73,14 +61,12 @@ const MeshStage::Advance& MeshStage::advance(const AdvanceVariant& variant) {
 }
 
 void MeshStage::setTiles(const Tiles& tiles) {
-  assert(tiles.records.size() * sizeof(shared::TileRecord) == tiles_.upload.bytes());
-  std::memcpy(tiles_.upload.mapped().data(), tiles.records.data(), tiles_.upload.bytes());
+  tiles_.set(tiles.records);
   tileRanges_ = {tiles.range(false), tiles.range(true)};
 }
 
 void MeshStage::recordTables(vulkan::Recorder& recorder) const {
-  for (const Table* table : {&tiles_, &nodes_, &springEnds_, &corners_})
-    recorder.copy(table->upload, table->buffer, table->buffer.bytes());
+  for (const DeviceTable* table : {&tiles_, &nodes_, &springEnds_, &corners_}) table->recordUpload(recorder);
 }
 
 void MeshStage::recordAdvance(vulkan::Recorder& recorder, std::uint32_t from, const AdvanceVariant& variant,

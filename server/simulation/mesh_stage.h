@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "server/simulation/advance_variant.h"
+#include "server/simulation/device_table.h"
 #include "server/simulation/mesh_tables.h"
 #include "server/simulation/report_stage.h"
 #include "server/simulation/state_buffers.h"
@@ -39,11 +40,6 @@ class MeshStage {
   void prepare(const AdvanceVariant& variant) { advance(variant); }
 
  private:
-  struct Table {
-    template <typename Record>
-    Table(const vulkan::Device& device, vulkan::BufferPurpose purpose, const std::vector<Record>& records);
-    vulkan::Buffer upload, buffer;
-  };
   struct Advance {
     Advance(const MeshStage& stage, const AdvanceVariant& variant);
     Advance(const Advance&) = delete;
@@ -61,7 +57,7 @@ class MeshStage {
   scene::Integrator integrator_;
   std::uint32_t workgroupSize_;
   std::array<TileRange, 2> tileRanges_;  // without constraints, with
-  Table tiles_, nodes_, springEnds_, corners_;
+  DeviceTable tiles_, nodes_, springEnds_, corners_;
   std::array<std::unique_ptr<Advance>, AdvanceVariant::kCount> advances_;
   vulkan::Kernel normals_;
   std::array<vulkan::Bindings, 2> normalsOf_;

@@ -61,6 +61,17 @@ std::vector<shared::ClothRecord> clothRecords(std::span<const scene::Cloth> clot
   return records;
 }
 
+SolveIterations solveIterations(std::span<const scene::Cloth> cloths) {
+  SolveIterations most;
+  for (const scene::Cloth& cloth : cloths) {
+    if (cloth.solver.kind == scene::SolverKind::massSpring) continue;
+    std::uint32_t& of =
+        cloth.solver.kind == scene::SolverKind::implicitEuler ? most.implicit : most.constraints;
+    of = std::max(of, cloth.solver.iterations);
+  }
+  return most;
+}
+
 Tiles makeTiles(std::span<const scene::Cloth> cloths, std::uint32_t rowsPerInvocation,
                 std::uint32_t workgroupSize) {
   assert(rowsPerInvocation > 0 && workgroupSize > 0);
@@ -82,6 +93,7 @@ Tiles makeTiles(std::span<const scene::Cloth> cloths, std::uint32_t rowsPerInvoc
   tiles.withoutConstraints = static_cast<std::uint32_t>(tiles.records.size());
   append(scene::SolverKind::constraint);
   append(scene::SolverKind::acad);
+  append(scene::SolverKind::implicitEuler);
   return tiles;
 }
 

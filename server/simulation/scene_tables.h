@@ -17,11 +17,18 @@ std::vector<std::uint32_t> clothOffsets(std::span<const scene::Cloth> cloths);
 
 std::vector<shared::ClothRecord> clothRecords(std::span<const scene::Cloth> cloths, double substepSeconds);
 
+// The most iterations in a substep that a cloth asks for: of those with constraints, and of implicit ones.
+struct SolveIterations {
+  std::uint32_t constraints = 0, implicit = 0;
+};
+SolveIterations solveIterations(std::span<const scene::Cloth> cloths);
+
 struct TileRange {
   std::uint32_t first, count;
 };
 
-// Those of cloths without constraints come first.
+// Those of cloths whose substep ends with the forces come first; then those of cloths for which a system is
+// solved.
 struct Tiles {
   std::vector<shared::TileRecord> records;
   std::uint32_t withoutConstraints = 0;  // of the records

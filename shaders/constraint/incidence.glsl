@@ -6,16 +6,13 @@
 #extension GL_EXT_control_flow_attributes : require
 
 #include "shaders/shared/simulation.h"
+#include "shaders/shared/whole_number.glsl"
 
 layout(binding = 0) uniform samplerBuffer cloths;      // ClothRecord
 layout(binding = 1) uniform samplerBuffer systems;     // SystemRecord
 layout(binding = 2) uniform samplerBuffer incidences;  // IncidenceRecord, a node
 layout(binding = 3) uniform samplerBuffer lists;
 layout(binding = 4) uniform samplerBuffer rows;  // a constraint: its direction from a to b; 0: not active
-
-uint wholeNumber(float low, float high) {
-  return uint(low) + (uint(high) << 16);
-}
 
 // Loops whose number of rounds differs between invocations test first: lavapipe 22.3 lets those that are done
 // run on in a loop that tests at its end.

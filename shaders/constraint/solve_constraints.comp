@@ -3,15 +3,15 @@
 // matrix-free: J is applied as two gathers. One workgroup solves one cloth, as many iterations in a dispatch
 // as the device lets it.
 //
-// Dot products add up in kLanes fixed lanes and then a fixed tree, so that their bits do not depend on the
-// workgroup's size; everything else is done an element at a time.
+// The bits do not depend on the workgroup's size: dot products are fixed sums, everything else is done an
+// element at a time.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 
 #include "shaders/constraint/incidence.glsl"
 #include "shaders/shared/arithmetic.glsl"
+#include "shaders/shared/fixed_sums.glsl"
 
-layout(local_size_x_id = 0) in;
 // Whether some of the constraints are not active: rows of zeros. The others are listed then.
 layout(constant_id = 1) const bool kAdaptive = false;
 
@@ -43,34 +43,10 @@ layout(push_constant) uniform Push {
   SolvePush push;
 };
 
-const uint kLanes = CLOTHSTREAM_SOLVE_LANES;
 // Where fewer than one in so many constraints is active, their nodes' sums are made for each of them anew.
 const uint kSparse = 4;
 
-shared float lanes[kLanes];
 shared uint counts[kLanes];
-
-uint self() {
-  return gl_LocalInvocationID.x;
-}
-uint width() {
-  return gl_WorkGroupSize.x;
-}
-
-// Of the lanes, written by whoever; every invocation gets it.
-float sumOfLanes() {
-  barrier();
-  for (uint half_ = kLanes / 2; half_ > 0; half_ /= 2) {
-    for (uint lane = self(); lane < half_; lane += width()) {
-      precise float sum = lanes[lane] + lanes[lane + half_];
-      lanes[lane] = sum;
-    }
-    barrier();
-  }
-  float sum = lanes[0];
-  barrier();
-  return sum;
-}
 
 // Lists those rows that are not zero, in their order; returns how many.
 uint listActives(uint firstLink, uint linkCount) {
@@ -224,8 +200,6 @@ void main() {
     ++done;
   }
   if (self() == 0) {
-    precise float ratio = square * reciprocal(max(start, 1e-30));
-    float left = ratio > 1e-30 ? ratio * reciprocalSquareRoot(ratio) : 0.0;
-    solves[system] = SolveRecord(done, left, start, square, count);
+    solves[system] = SolveRecord(done, relativeNorm(square, start), start, square, count);
   }
 }

@@ -41,6 +41,16 @@ struct LinkRecord {
   vec4 ends;  // a, b, rest length; the cloth
 };
 
+// A spring of an implicit cloth is a LinkRecord whose last number is the cloth times this, plus its kind in
+// the order of ClothRecord::stiffness.
+#define CLOTHSTREAM_SPRING_KINDS 3
+
+// Two of the springs that meet at a node: the number of a spring of the cloth plus one, negative where the
+// node is its second end, and the other end in the scene; 0 and the node itself fill the last texel.
+struct SpringEndsRecord {
+  vec4 two;  // number, other end; number, other end
+};
+
 // Which constraints meet at a node. The lists that it points to hold, four a texel, the number of a
 // constraint of the cloth plus one, negative where the node is its first end; 0 fills the last texel.
 struct IncidenceRecord {
@@ -76,6 +86,14 @@ struct ConstraintPush {
   uint32_t reserved;
 };
 
+struct RungeKuttaPush {
+  CollisionPush collision;
+  uint32_t firstNode;
+  uint32_t count;
+  uint32_t cloth;
+  uint32_t reserved;
+};
+
 struct SolvePush {
   uint32_t firstIteration;  // of this dispatch; 0 begins the solve
   uint32_t endIteration;
@@ -103,7 +121,7 @@ static_assert(sizeof(ClothRecord) == CLOTHSTREAM_CLOTH_TEXELS * sizeof(vec4) &&
               offsetof(ClothRecord, damping) == 48 && offsetof(ClothRecord, air) == 64 &&
               offsetof(ClothRecord, solver) == 80 && offsetof(ClothRecord, limits) == 96);
 static_assert(sizeof(SystemRecord) == CLOTHSTREAM_SYSTEM_TEXELS * sizeof(vec4));
-static_assert(sizeof(SolveRecord) == 20 && sizeof(ConstraintPush) == 48);
+static_assert(sizeof(SolveRecord) == 20 && sizeof(ConstraintPush) == 48 && sizeof(RungeKuttaPush) == 48);
 static_assert(sizeof(TileRecord) == 16);
 static_assert(sizeof(AdvancePush) == 80 && offsetof(AdvancePush, windAir) == 16 &&
               offsetof(AdvancePush, collision) == 32 && offsetof(AdvancePush, firstTile) == 64);

@@ -285,7 +285,16 @@ const BadScene kBadScenes[] = {
      [](v1::Scene& s) {
        cloth(s).mutable_solver()->mutable_acad()->mutable_constraint()->set_iterations(0);
      }},
-    {"cloths[0].solver: has constraints,",
+    {"cloths[0].solver.implicitEuler.iterations = 0:",
+     [](v1::Scene& s) { cloth(s).mutable_solver()->mutable_implicit_euler()->set_iterations(0); },
+     "from 1 to 10000"},
+    {"cloths[0].solver: solves a system,",
+     [](v1::Scene& s) {
+       cloth(s).mutable_solver()->mutable_implicit_euler();
+       s.set_integrator(v1::INTEGRATOR_EXPLICIT_EULER);
+     },
+     "INTEGRATOR_SEMI_IMPLICIT_EULER"},
+    {"cloths[0].solver: solves a system,",
      [](v1::Scene& s) {
        cloth(s).mutable_solver()->mutable_constraint();
        s.set_integrator(v1::INTEGRATOR_EXPLICIT_EULER);

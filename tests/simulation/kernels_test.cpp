@@ -22,6 +22,7 @@ struct Expectation {
   float displacement = 0.005f;
   float speed = 1;
   double extraForce = 0;  // N, of rounding that is not the springs'
+  int steps = 1;          // that a substep is made of
 };
 
 class Kernels : public GpuTest {
@@ -50,8 +51,8 @@ class Kernels : public GpuTest {
     const double force =
         12 * kRounding * (spring.stiffness * (2 * kExtent + 10 * longest) + spring.damping * 20 * kSpeed) +
         expectation.extraForce;
-    const double speed = h / nodeMass * force + 8 * kRounding * kSpeed;
-    const double distance = h * speed + 2 * kRounding * kExtent;
+    const double speed = expectation.steps * (h / nodeMass * force + 8 * kRounding * kSpeed);
+    const double distance = h * speed + expectation.steps * 2 * kRounding * kExtent;
     const NodeState state = running.state();
     EXPECT_LT(largestSpeedDifference(state, reference), speed);
     EXPECT_LT(largestDistance(state, reference), distance);
@@ -104,6 +105,19 @@ TEST_F(Kernels, explicitEulerStepsAsTheReference) {
   scene::Scene scene = sceneOf({calmCloth(17, 23)});
   scene.integrator = scene::Integrator::explicitEuler;
   expectLikeReference(scene, {}, 4);
+}
+
+TEST_F(Kernels, rungeKuttaStepsAsTheReference) {
+  scene::Scene scene = sceneOf({calmCloth(17, 23), discCloth(6), calmCloth(2, 3)});
+  scene.integrator = scene::Integrator::rungeKutta4;
+  scene.cloths.front().pins = {topRow(scene.cloths.front())};
+  expectLikeReference(scene, {}, 31, {.steps = 4});
+  scene.environment.gravity =
+      scene::Vec3(0, 0, -100);  // far from the plane's edge between the two arithmetics
+  const scene::Quaternion up = turned(90, scene::Vec3::UnitX());
+  expectLikeReference(scene,
+                      {{scene::Plane{}, {scene::Vec3(0, 0, 0.02f), up}, {scene::Vec3(0, 0, 0.02f), up}, 1}},
+                      32, {.steps = 4});
 }
 
 TEST_F(Kernels, airDragsAndLiftsAsInTheReference) {

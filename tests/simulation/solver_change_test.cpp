@@ -17,7 +17,8 @@ using scene::SolverKind;
 using simulation::NodeState;
 using simulation::StateSnapshot;
 
-constexpr SolverKind kKinds[] = {SolverKind::massSpring, SolverKind::constraint, SolverKind::acad};
+constexpr SolverKind kKinds[] = {SolverKind::massSpring, SolverKind::constraint, SolverKind::acad,
+                                 SolverKind::implicitEuler};
 
 class SolverChange : public GpuTest {};
 

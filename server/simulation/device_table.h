@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: MIT
+// A table that kernels read.
+#pragma once
+
+#include <cassert>
+#include <cstring>
+#include <vector>
+
+#include "server/vulkan/buffer.h"
+#include "server/vulkan/device.h"
+#include "server/vulkan/recorder.h"
+
+namespace clothstream::simulation {
+
+// Belongs to the device's thread.
+class DeviceTable {
+ public:
+  // There must be a record. Throws std::runtime_error where the device has no room.
+  template <typename Record>
+  DeviceTable(const vulkan::Device& device, const std::vector<Record>& records)
+      : upload_(device, vulkan::BufferPurpose::upload, records.size() * sizeof(Record)),
+        texels_(device, vulkan::BufferPurpose::texels, upload_.bytes()) {
+    assert(!records.empty());
+    set(records);
+  }
+
+  // As many others, from the next upload on. None may be in flight.
+  template <typename Record>
+  void set(const std::vector<Record>& records) {
+    assert(records.size() * sizeof(Record) == upload_.bytes());
+    std::memcpy(upload_.mapped().data(), records.data(), upload_.bytes());
+  }
+
+  // Before a kernel reads it.
+  void recordUpload(vulkan::Recorder& recorder) const { recorder.copy(upload_, texels_, upload_.bytes()); }
+
+  const vulkan::Buffer& texels() const { return texels_; }
+
+ private:
+  vulkan::Buffer upload_, texels_;
+};
+
+}  // namespace clothstream::simulation

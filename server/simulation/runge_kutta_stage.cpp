@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: MIT
+// The fourth-order Runge-Kutta method on the device.
+#include "server/simulation/runge_kutta_stage.h"
+
+#include "kernels/combine_runge_kutta.h"
+
+namespace clothstream::simulation {
+namespace {
+
+using vulkan::BindingKind;
+using vulkan::Bindings;
+using vulkan::Buffer;
+using vulkan::BufferPurpose;
+using vulkan::Kernel;
+
+constexpr auto kTexels = BindingKind::texels;
+constexpr auto kStorage = BindingKind::storage;
+
+// Of a substep, of explicit Euler's steps.
+constexpr std::array<float, 4> kParts{0.5f, 0.5f, 1.0f, 1.0f / 6};
+
+Buffer makeBuffer(const vulkan::Device& device, BufferPurpose purpose, std::uint32_t nodes) {
+  return Buffer(device, purpose, nodes * sizeof(shared::vec4));
+}
+
+}  // namespace
+
+RungeKuttaStage::RungeKuttaStage(const vulkan::Device& device, const StateBuffers& state,
+                                 std::span<const std::uint32_t> clothOffsets)
+    : offsets_(clothOffsets.begin(), clothOffsets.end()),
+      start_(makeBuffer(device, BufferPurpose::texels, offsets_.back())),
+      startVelocities_(makeBuffer(device, BufferPurpose::state, offsets_.back())),
+      sums_(makeBuffer(device, BufferPurpose::state, offsets_.back())),
+      velocitySums_(makeBuffer(device, BufferPurpose::state, offsets_.back())),
+      combine_{makeCombine(device, 1), makeCombine(device, 2), makeCombine(device, 3),
+               makeCombine(device, 4)},
+      combineFrom_{{{combineFrom(device, state, 0, 0), combineFrom(device, state, 0, 1)},
+                    {combineFrom(device, state, 1, 0), combineFrom(device, state, 1, 1)},
+                    {combineFrom(device, state, 2, 0), combineFrom(device, state, 2, 1)},
+                    {combineFrom(device, state, 3, 0), combineFrom(device, state, 3, 1)}}} {}
+
+Kernel RungeKuttaStage::makeCombine(const vulkan::Device& device, std::uint32_t stage) const {
+  return Kernel(device, {.name = "combine_runge_kutta",
+                         .spirv = kernels::combine_runge_kutta,
+                         .bindings = {kTexels, kTexels, kTexels, kTexels, kStorage, kStorage, kStorage,
+                                      kStorage, kStorage, kStorage, kStorage, kStorage},
+                         .pushConstantBytes = sizeof(shared::RungeKuttaPush),
+                         .workgroupSize = 64,
+                         .specialisation = {stage}});
+}
+
+Bindings RungeKuttaStage::combineFrom(const vulkan::Device& device, const StateBuffers& state,
+                                      std::size_t stage, std::size_t from) const {
+  const std::size_t to = 1 - from;
+  return Bindings(device, combine_[stage],
+                  {&state.cloths, &state.colliders, &state.nearColliders, &start_, state.positions[from],
+                   state.velocities[from], state.positions[to], state.velocities[to], &start_,
+                   &startVelocities_, &sums_, &velocitySums_});
+}
+
+void RungeKuttaStage::record(vulkan::Recorder& recorder, std::uint32_t from,
+                             const shared::CollisionPush& collision, const RecordEuler& recordEuler) const {
+  for (std::size_t stage = 0; stage < kStages; ++stage) {
+    const std::size_t stepFrom = stage % 2 == 0 ? from : 1 - from;
+    if (stage > 0) recorder.barrier();
+    recordEuler(static_cast<std::uint32_t>(stepFrom), kParts[stage]);
+    shared::RungeKuttaPush push{
+        .collision = collision, .firstNode = 0, .count = offsets_.back(), .cloth = 0, .reserved = 0};
+    if (stage + 1 < kStages) {
+      recorder.barrier();
+      recorder.dispatch(combineFrom_[stage][stepFrom], push, push.count);
+      continue;
+    }
+    // Each cloth has a friction and a thickness of its own.
+    for (; push.cloth + 1 < offsets_.size(); ++push.cloth) {
+      push.firstNode = offsets_[push.cloth];
+      push.count = offsets_[push.cloth + 1] - push.firstNode;
+      recorder.barrier();
+      recorder.dispatch(combineFrom_[stage][stepFrom], push, push.count);
+    }
+  }
+}
+
+}  // namespace clothstream::simulation

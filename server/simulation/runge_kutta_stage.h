@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: MIT
+// The fourth-order Runge-Kutta method on the device, from steps of explicit Euler.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <vector>
+
+#include "server/simulation/state_buffers.h"
+#include "server/vulkan/buffer.h"
+#include "server/vulkan/device.h"
+#include "server/vulkan/kernel.h"
+#include "server/vulkan/recorder.h"
+#include "shaders/shared/simulation.h"
+
+namespace clothstream::simulation {
+
+// Belongs to the device's thread. For scenes whose every cloth is integrated by it.
+class RungeKuttaStage {
+ public:
+  // `clothOffsets`: the first node of each cloth, and at the end the number of nodes.
+  RungeKuttaStage(const vulkan::Device& device, const StateBuffers& state,
+                  std::span<const std::uint32_t> clothOffsets);
+
+  // Records a step of explicit Euler from state `from` to the other, by this part of a substep.
+  using RecordEuler = std::function<void(std::uint32_t from, float part)>;
+  // One substep from state `from` to the other, collisions included; the former is left as it was.
+  void record(vulkan::Recorder& recorder, std::uint32_t from, const shared::CollisionPush& collision,
+              const RecordEuler& recordEuler) const;
+
+ private:
+  static constexpr std::size_t kStages = 4;
+
+  vulkan::Kernel makeCombine(const vulkan::Device& device, std::uint32_t stage) const;
+  vulkan::Bindings combineFrom(const vulkan::Device& device, const StateBuffers& state, std::size_t stage,
+                               std::size_t from) const;
+
+  std::vector<std::uint32_t> offsets_;
+  vulkan::Buffer start_, startVelocities_, sums_, velocitySums_;
+  std::array<vulkan::Kernel, kStages> combine_;
+  // The steps that they follow go there and back: of a substep from either state.
+  std::array<std::array<vulkan::Bindings, 2>, kStages> combineFrom_;
+};
+
+}  // namespace clothstream::simulation

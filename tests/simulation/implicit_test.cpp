@@ -1,0 +1,269 @@
+// SPDX-License-Identifier: MIT
+// Implicit Euler: the solver against the factorised double-precision system, an analytic case, and whole
+// runs.
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "server/reference/implicit_system.h"
+#include "server/scene/springs.h"
+#include "server/scene/stability.h"
+#include "tests/simulation/scenes.h"
+
+namespace clothstream::tests {
+namespace {
+
+using reference::Vec3;
+using simulation::NodeState;
+
+constexpr double kRounding = 1.0 / (1 << 24);
+
+class ImplicitEuler : public GpuTest {};
+
+scene::Cloth implicitCloth(scene::Cloth cloth) {
+  cloth.solver.kind = scene::SolverKind::implicitEuler;
+  return cloth;
+}
+
+// Far beyond what explicit springs bear: h^2 k / m = 7.7 a structural spring.
+scene::Cloth stiffCloth(std::uint32_t rows, std::uint32_t columns) {
+  scene::Cloth cloth = implicitCloth(calmCloth(rows, columns));
+  cloth.structural = {400, 0.5f};
+  cloth.shear = {200, 0.1f};
+  return cloth;
+}
+
+scene::Scene steps(std::vector<scene::Cloth> cloths, std::uint32_t rate) {
+  scene::Scene scene = sceneOf(std::move(cloths));
+  scene.simulationRate = rate;
+  scene.streamRate = rate;
+  scene.substeps = 1;
+  return scene;
+}
+
+// How far the solve may leave u from the exact one, m/s. With e the error and rho = A e what is left,
+//   m |e|^2 <= e A e = rho A^-1 rho <= |rho|^2 / m,  m the lightest node,
+// and with D the preconditioner, rho D^-1 rho <= tolerance^2 b D^-1 b:  |e| <= sqrt(largest D / m) tolerance
+// |b| / m. Float arithmetic makes D, b and products of A from rows that err by 2e-6 (two reciprocal roots),
+// which is as if |b| and A u did.
+double errorOfSolve(const reference::ImplicitSystem& system, double lightest, double tolerance) {
+  double diagonal = 0;
+  for (Eigen::Index i = 0; i < system.matrix().rows(); ++i)
+    diagonal = std::max(diagonal, system.matrix().coeff(i, i));
+  return (std::sqrt(diagonal / lightest) * tolerance + 2 * 2e-6) * system.side().norm() / lightest;
+}
+
+reference::ImplicitSystem systemOf(const scene::Scene& scene, const NodeState& start) {
+  const scene::Cloth& cloth = scene.cloths.front();
+  std::vector<reference::ImplicitSpring> springs;
+  for (const scene::SpringLink& link : scene::springLinks(cloth)) {
+    const scene::Spring& spring = scene::springOf(cloth, link.kind);
+    springs.push_back({link.a, link.b, spring.stiffness, spring.damping, link.restLength});
+  }
+  scene::Scene free = scene;
+  free.cloths.front().solver.kind = scene::SolverKind::massSpring;
+  reference::ReferenceSimulation simulation(free);
+  setState(simulation, start);
+  const std::vector<Vec3> positions(simulation.cloths().front().positions().begin(),
+                                    simulation.cloths().front().positions().end());
+  const std::vector<Vec3> velocities(simulation.cloths().front().velocities().begin(),
+                                     simulation.cloths().front().velocities().end());
+  simulation.tick(reference::inputsAt(free, 0));
+  return reference::ImplicitSystem(springs, positions, velocities, simulation.cloths().front().velocities(),
+                                   simulation.cloths().front().inverseMasses(), scene.substepSeconds());
+}
+
+void expectLikeReference(scene::Cloth cloth, std::uint32_t rate, unsigned seed) {
+  constexpr float kTolerance = 1e-5f;
+  cloth.solver.iterations = 500;
+  cloth.solver.tolerance = kTolerance;
+  const scene::Scene scene = steps({cloth}, rate);
+  std::mt19937 random(seed);
+  const NodeState start = randomState(scene, random, 0.002f, 0.3f);
+  Running running(scene);
+  running.restore(start);
+  const simulation::ClothReport report = running.tickAndReport(inputsOf(scene)).front();
+  EXPECT_LE(report.residual, kTolerance);
+  EXPECT_GT(report.iterations, 1u);
+
+  reference::ReferenceSimulation reference(scene);
+  setState(reference, start);
+  reference.tick(referenceInputs(inputsOf(scene)));
+  double lightest = 1;
+  for (const double mass : reference.cloths().front().masses()) lightest = std::min(lightest, mass);
+  const double error = errorOfSolve(systemOf(scene, start), lightest, double{kTolerance});
+  const double h = scene.substepSeconds();
+  const NodeState state = running.state();
+  EXPECT_LT(largestSpeedDifference(state, reference), error);
+  EXPECT_LT(largestDistance(state, reference), h * error + kRounding * 2);
+
+  // The forces' own step would be elsewhere: the comparison can fail.
+  scene::Scene explicitly = scene;
+  explicitly.cloths.front().solver.kind = scene::SolverKind::massSpring;
+  reference::ReferenceSimulation other(explicitly);
+  setState(other, start);
+  other.tick(referenceInputs(inputsOf(scene)));
+  EXPECT_GT(largestSpeedDifference(state, other), 4 * error);
+}
+
+TEST_F(ImplicitEuler, movesNodesAsTheReferenceOnEveryShapeOfGrid) {
+  const std::pair<std::uint32_t, std::uint32_t> shapes[] = {{2, 2}, {2, 7}, {9, 3}, {17, 23}};
+  unsigned seed = 1;
+  for (const auto& [rows, columns] : shapes) {
+    SCOPED_TRACE(::testing::Message() << rows << " x " << columns);
+    scene::Cloth cloth = implicitCloth(calmCloth(rows, columns));
+    cloth.pins = {topRow(cloth)};
+    expectLikeReference(cloth, 720, seed++);
+  }
+}
+
+TEST_F(ImplicitEuler, movesStiffClothsAsTheReference) {
+  expectLikeReference(stiffCloth(11, 8), 72, 5);
+}
+
+TEST_F(ImplicitEuler, movesMeshesAsTheReference) {
+  scene::Cloth disc = implicitCloth(discCloth(6));
+  disc.pinnedVertices = {0};
+  expectLikeReference(disc, 72, 6);
+}
+
+// Two nodes that hang from two pinned ones by springs along y alone: x'' = -omega^2 x for their stretch, for
+// which implicit Euler is  v' = (v - h omega^2 x) / (1 + h^2 omega^2),  x' = x + h v'. omega h = 3; explicit
+// springs bear 2.
+TEST_F(ImplicitEuler, swingsASpringAsTheFormulaDoes) {
+  scene::Cloth cloth = implicitCloth(calmCloth(2, 2));
+  const double h = 1.0 / 72, omega = 3 / h;
+  cloth.structural = {static_cast<float>(0.01 * omega * omega), 0};
+  cloth.shear = cloth.bend = {};
+  cloth.damping = 0;
+  cloth.pins = {topRow(cloth)};
+  cloth.solver.tolerance = 1e-6f;
+  scene::Scene scene = steps({cloth}, 72);
+  scene.environment.gravity = scene::Vec3::Zero();
+  Running running(scene);
+  NodeState state = simulation::restState(scene.cloths);
+  double x = 0.005, v = 0;
+  for (const std::size_t node : {2, 3}) state.positions[node].y() -= static_cast<float>(x);
+  running.restore(state);
+  // Of 2 cm a rounding of 1e-9 m, which h omega^2 makes a speed of at every step; decaying by a third.
+  const double rounding = 0.02 * kRounding * 4, tolerance = 2 * rounding * omega * omega * h;
+  for (int step = 0; step < 8; ++step) {
+    running.tick(inputsOf(scene));
+    v = (v - h * omega * omega * x) / (1 + h * h * omega * omega);
+    x += h * v;
+    state = running.state();
+    for (const std::size_t node : {2, 3}) {
+      EXPECT_NEAR(-0.02 - state.positions[node].y(), x, h * tolerance) << step;
+      EXPECT_NEAR(-state.velocities[node].y(), v, tolerance) << step;
+    }
+  }
+}
+
+// However long the step: where it comes to rest, the springs carry the weight.
+TEST_F(ImplicitEuler, hangsWhereForcesBalance) {
+  scene::Cloth cloth = stiffCloth(12, 12);
+  cloth.pins = {topRow(cloth)};
+  cloth.damping = 2;
+  const scene::Scene scene = steps({cloth}, 30);
+  EXPECT_EQ(scene::stableSubsteps(scene), 1u);
+  Running running(scene);
+  for (int tick = 0; tick < 300; ++tick) ASSERT_TRUE(running.tick(inputsOf(scene)).healthy) << tick;
+  reference::ReferenceSimulation reference(scene);
+  setState(reference, running.state());
+  reference::ReferenceCloth& hung = reference.cloths().front();
+  std::vector<Vec3> forces(hung.nodeCount(), Vec3::Zero());
+  hung.accumulateSpringForces(forces);
+  double most = 0;
+  for (std::uint32_t i = 0; i < hung.nodeCount(); ++i)
+    if (hung.inverseMasses()[i] > 0)
+      most = std::max(most, (forces[i] * hung.inverseMasses()[i] + Vec3(0, -9.81, 0)).norm());
+  EXPECT_LT(most, 0.01 * 9.81);
+  EXPECT_GT(hung.strain().max, 0.001);  // they do carry it
+}
+
+// Corrections are exchanged between a spring's ends, to the bit but for the sums' rounding and what the solve
+// leaves.
+TEST_F(ImplicitEuler, keepsAFreeClothsMomentum) {
+  scene::Cloth cloth = stiffCloth(20, 20);
+  cloth.damping = 0;
+  cloth.solver.tolerance = 1e-6f;
+  cloth.solver.iterations = 500;
+  scene::Scene scene = steps({cloth}, 72);
+  scene.environment.gravity = scene::Vec3::Zero();
+  std::mt19937 random(7);
+  const NodeState start = randomState(scene, random, 0.001f, 0.5f);
+  const auto momentum = [](const NodeState& state) {
+    Vec3 sum = Vec3::Zero();
+    for (const scene::Vec3& v : state.velocities) sum += v.cast<double>();
+    return sum;
+  };
+  Running running(scene);
+  running.restore(start);
+  for (int tick = 0; tick < 20; ++tick) running.tick(inputsOf(scene));
+  double flow = 0;
+  for (const scene::Vec3& v : start.velocities) flow += v.norm();
+  // A free velocity is (h^2 k / m) times the springs' stretch over h, a hundred times what comes of it, and a
+  // sum of twelve forces, each of which rounds it once.
+  EXPECT_LT((momentum(running.state()) - momentum(start)).norm(), 20 * 12 * 100 * kRounding * flow);
+}
+
+TEST_F(ImplicitEuler, holdsASheetWhereMassSpringBlowsUp) {
+  for (const scene::SolverKind solver : {scene::SolverKind::massSpring, scene::SolverKind::implicitEuler}) {
+    scene::Cloth cloth = stiffCloth(16, 16);
+    cloth.solver.kind = solver;
+    cloth.pins = {{.firstRow = 0, .lastRow = 0, .firstColumn = 0, .lastColumn = 15, .columnStep = 15}};
+    const scene::Scene scene = steps({cloth}, 60);
+    const simulation::MovingCollider ball{
+        scene::Sphere{0.06f}, {scene::Vec3(0, -0.2f, 0.05f)}, {scene::Vec3(0, -0.2f, 0.05f)}, 1};
+    Running running(scene);
+    bool healthy = true;
+    for (int tick = 0; tick < 180 && healthy; ++tick) healthy = running.tick(inputsOf(scene, {ball})).healthy;
+    EXPECT_EQ(healthy, solver == scene::SolverKind::implicitEuler);
+    if (!healthy) continue;
+    const double distance = 0.06 + double{cloth.thickness};
+    for (const scene::Vec3& p : running.state().positions)
+      EXPECT_GT((p - ball.start.position).cast<double>().norm(), distance * (1 - 1e-5));
+  }
+}
+
+TEST_F(ImplicitEuler, givesTheSameBitsWhateverTheWorkgroups) {
+  scene::Cloth cloth = stiffCloth(13, 17);
+  cloth.pins = {topRow(cloth)};
+  const scene::Scene scene = steps({cloth}, 72);
+  std::vector<std::uint64_t> hashes;
+  for (const std::uint32_t workgroup : {8u, 16u, 64u, 128u}) {
+    Running running(scene, {.rowsPerInvocation = 0, .workgroupSize = workgroup});
+    simulation::TickStatus status;
+    for (int tick = 0; tick < 30; ++tick) status = running.tick(inputsOf(scene));
+    hashes.push_back(status.stateHash);
+  }
+  for (const std::uint64_t hash : hashes) EXPECT_EQ(hash, hashes.front());
+}
+
+TEST_F(ImplicitEuler, livesBesideEveryOtherSolver) {
+  scene::Cloth free = calmCloth(9, 14), held = calmCloth(7, 8), implicit = stiffCloth(8, 6);
+  scene::Cloth disc = implicitCloth(discCloth(4));
+  free.pins = {topRow(free)};
+  held.solver.kind = scene::SolverKind::constraint;
+  held.name = "held";
+  implicit.name = "implicit";
+  disc.name = "disc";
+  const scene::Scene together = sceneOf({held, implicit, free, disc});
+  Running all(together);
+  for (int tick = 0; tick < 20; ++tick) EXPECT_TRUE(all.tick(inputsOf(together)).healthy);
+  std::size_t first = 0;
+  const NodeState found = all.state();
+  for (const scene::Cloth& cloth : together.cloths) {
+    SCOPED_TRACE(cloth.name);
+    const scene::Scene alone = sceneOf({cloth});
+    Running one(alone);
+    for (int tick = 0; tick < 20; ++tick) one.tick(inputsOf(alone));
+    const NodeState expected = one.state();
+    for (std::size_t i = 0; i < expected.positions.size(); ++i)
+      EXPECT_EQ(expected.positions[i], found.positions[first + i]) << i;
+    first += expected.positions.size();
+  }
+}
+
+}  // namespace
+}  // namespace clothstream::tests
