@@ -21,9 +21,11 @@ void addSetOptions(CLI::App& app, SetOptions& options) {
   app.add_option("--bend-damping", settings.bend[1], "Of bend springs")->group(springs);
 
   const char* solver = "Solver";
-  const std::map<std::string, std::uint32_t> solvers{
-      {"massSpring", CS_SOLVER_MASS_SPRING}, {"constraint", CS_SOLVER_CONSTRAINT}, {"acad", CS_SOLVER_ACAD}};
-  app.add_option("--solver", settings.solver, "massSpring, constraint or acad")
+  const std::map<std::string, std::uint32_t> solvers{{"massSpring", CS_SOLVER_MASS_SPRING},
+                                                     {"constraint", CS_SOLVER_CONSTRAINT},
+                                                     {"acad", CS_SOLVER_ACAD},
+                                                     {"implicitEuler", CS_SOLVER_IMPLICIT_EULER}};
+  app.add_option("--solver", settings.solver, "massSpring, constraint, acad or implicitEuler")
       ->transform(CLI::CheckedTransformer(solvers, CLI::ignore_case))
       ->group(solver);
   app.add_option("--iterations", settings.iterations, "Of a solve, at most")

@@ -72,6 +72,12 @@ std::string solverMessage(const Solver& solver) {
     writer.add_float(1, solver.activation);
     writer.add_message(2, constraintMessage(solver));
   }
+  if (solver.kind == CS_SOLVER_IMPLICIT_EULER) {
+    settings.clear();
+    Writer writer(settings);
+    writer.add_uint32(1, solver.iterations);
+    writer.add_float(2, solver.tolerance);
+  }
   std::string message;
   Writer(message).add_message(solver.kind, settings);
   return message;

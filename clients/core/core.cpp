@@ -309,10 +309,12 @@ int cs_get_cloth_settings(const cs_client* client, uint32_t index, cs_cloth_sett
   out->friction = parameters.friction;
   out->thickness = parameters.thickness;
   out->solver = parameters.solver.kind;
-  if (out->solver != CS_SOLVER_CONSTRAINT && out->solver != CS_SOLVER_ACAD) return 1;
-  out->bend_constraints = parameters.solver.bendConstraints ? 1 : 0;
+  const bool constrained = out->solver == CS_SOLVER_CONSTRAINT || out->solver == CS_SOLVER_ACAD;
+  if (!constrained && out->solver != CS_SOLVER_IMPLICIT_EULER) return 1;
   out->iterations = parameters.solver.iterations;
   out->tolerance = parameters.solver.tolerance;
+  if (!constrained) return 1;
+  out->bend_constraints = parameters.solver.bendConstraints ? 1 : 0;
   out->compliance = parameters.solver.compliance.value_or(kAsIs);
   out->activation = parameters.solver.activation;
   return 1;

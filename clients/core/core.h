@@ -76,12 +76,14 @@ typedef enum cs_solver {
   CS_SOLVER_AS_IS = 0,
   CS_SOLVER_MASS_SPRING = 1,
   CS_SOLVER_CONSTRAINT = 2,
-  CS_SOLVER_ACAD = 3
+  CS_SOLVER_ACAD = 3,
+  CS_SOLVER_IMPLICIT_EULER = 5
 } cs_solver;
 
 /* What can change of a cloth while it runs. In a change, NaN (of a solver 0, of bend_constraints -1, of
  * iterations 0) leaves a thing as it is; of what the server has not told, these are said too. What follows
- * `solver` is of solvers with constraints. */
+ * `solver` is of solvers that solve a system: iterations and tolerance of all, the rest of those with
+ * constraints. */
 #define CS_CLOTH_SETTINGS_VERSION 1u
 typedef struct cs_cloth_settings {
   uint32_t version;                       /* CS_CLOTH_SETTINGS_VERSION; later ones add fields at the end */

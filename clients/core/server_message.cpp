@@ -135,6 +135,13 @@ bool readAcadSolver(Bytes message, Solver& solver) {
   });
 }
 
+bool readImplicitEulerSolver(Bytes message, Solver& solver) {
+  return readFields(message, [&](std::uint32_t field, Reader& reader) {
+    if (field == varint(1)) return set(solver.iterations, reader.get_uint32());
+    return field == fixed32(2) ? setFinite(solver.tolerance, reader) : skip(reader);
+  });
+}
+
 bool readClothReport(Bytes message, ClothReport& report) {
   return readFields(message, [&](std::uint32_t field, Reader& reader) {
     switch (field) {
@@ -399,8 +406,16 @@ bool readSolver(Bytes message, Solver& out) {
     const Bytes settings = reader.get_view();
     out.kind = field / 8;
     out.settings.assign(settings.data(), settings.size());
-    if (out.kind == CS_SOLVER_CONSTRAINT) return readConstraintSolver(settings, out);
-    return out.kind != CS_SOLVER_ACAD || readAcadSolver(settings, out);
+    switch (out.kind) {
+      case CS_SOLVER_CONSTRAINT:
+        return readConstraintSolver(settings, out);
+      case CS_SOLVER_ACAD:
+        return readAcadSolver(settings, out);
+      case CS_SOLVER_IMPLICIT_EULER:
+        return readImplicitEulerSolver(settings, out);
+      default:
+        return true;
+    }
   });
 }
 

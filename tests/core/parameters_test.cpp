@@ -209,6 +209,33 @@ TEST(ClothSettings, SayWhatHoldsAndChangeOnlyWhatIsGiven) {
   EXPECT_THAT(client.outgoing(), SizeIs(0));
 }
 
+TEST(ClothSettings, OfImplicitEulerAreItsIterationsAndTolerance) {
+  ScriptedServer server;
+  v1::StreamDescription description = server.description();
+  v1::Solver& solver = *description.mutable_definition()->mutable_cloths(0)->mutable_solver();
+  solver.mutable_implicit_euler()->set_iterations(9);
+  solver.mutable_implicit_euler()->set_tolerance(0.25f);
+  ClientUnderTest client;
+  client.receive(server.welcome());
+  client.receiveAll(chunksOf(description.SerializeAsString(), 1 << 18, 1));
+  client.outgoing();
+  cs_cloth_settings now{};
+  now.version = CS_CLOTH_SETTINGS_VERSION;
+  ASSERT_EQ(cs_get_cloth_settings(client.get(), 0, &now), 1);
+  EXPECT_EQ(now.solver, static_cast<std::uint32_t>(CS_SOLVER_IMPLICIT_EULER));
+  EXPECT_EQ(now.iterations, 9u);
+  EXPECT_EQ(now.tolerance, 0.25f);
+  cs_cloth_settings change;
+  cs_keep_cloth_settings(&change);
+  change.iterations = 30;
+  ASSERT_EQ(cs_change_cloth(client.get(), "", &change), 1);
+  const auto messages = client.outgoing();
+  ASSERT_THAT(messages, SizeIs(1));
+  const v1::ImplicitEulerSolver& sent = messages[0].parameter_change().cloths(0).solver().implicit_euler();
+  EXPECT_EQ(sent.iterations(), 30u);
+  EXPECT_EQ(sent.tolerance(), 0.25f);
+}
+
 // A solver that is left and chosen again has the settings that it had; one that this client does not know
 // too.
 TEST(ClothSettings, OfASolverAreKeptForItsReturn) {

@@ -100,6 +100,7 @@ export const Solvers: ReadonlyMap<number, string> = new Map([
   [1, "mass-spring"],
   [2, "constraint"],
   [3, "ACAD"],
+  [5, "implicit Euler"],
 ]);
 
 // How the simulation of a cloth does (cs_cloth_report); SI units, strains as parts of a length.
