@@ -58,6 +58,7 @@ inline constexpr Range kCompliance{0, 1};              // m/N
 inline constexpr Range kTolerance{0, 1};
 inline constexpr Range kActivation{0, 10};  // part of a length
 inline constexpr std::uint32_t kMaxIterations = 10'000;
+inline constexpr std::uint32_t kMaxXpbdIterations = 1'000;
 inline constexpr std::uint32_t kMaxSolverNodes = 1'048'576;  // of a cloth
 inline constexpr double kUnitTolerance = 0.001;              // of a quaternion's length
 

@@ -273,6 +273,15 @@ scene::Solver toSolver(Checks& checks, const Path& path, const v1::Solver& messa
     if (acad.has_activation())
       solver.activation = checks.number(at / "activation", acad.activation(), limits::kActivation);
     readConstraint(checks, at / "constraint", acad.constraint(), solver);
+  } else if (message.has_xpbd()) {
+    const v1::XpbdSolver& xpbd = message.xpbd();
+    const Path at = path / "xpbd";
+    solver.kind = scene::SolverKind::xpbd;
+    solver.iterations = xpbd.has_iterations() ? checks.integer(at / "iterations", xpbd.iterations(), 1,
+                                                               limits::kMaxXpbdIterations)
+                                              : 1;
+    if (xpbd.has_compliance())
+      solver.compliance = checks.number(at / "compliance", xpbd.compliance(), limits::kCompliance);
   } else if (message.has_implicit_euler()) {
     solver.kind = scene::SolverKind::implicitEuler;
     readIterations(checks, path / "implicitEuler", message.implicit_euler(), solver);

@@ -104,6 +104,10 @@ v1::Solver toMessage(const scene::Solver& solver) {
       message.mutable_acad()->set_activation(solver.activation);
       writeConstraint(solver, *message.mutable_acad()->mutable_constraint());
       break;
+    case scene::SolverKind::xpbd:
+      message.mutable_xpbd()->set_iterations(solver.iterations);
+      if (solver.compliance) message.mutable_xpbd()->set_compliance(*solver.compliance);
+      break;
     case scene::SolverKind::implicitEuler:
       message.mutable_implicit_euler()->set_iterations(solver.iterations);
       message.mutable_implicit_euler()->set_tolerance(solver.tolerance);

@@ -139,6 +139,7 @@ void ReferenceCloth::integrate(const scene::Environment& environment, scene::Int
   }
   if (solver == scene::SolverKind::constraint || solver == scene::SolverKind::acad) enforceConstraints(h);
   if (solver == scene::SolverKind::implicitEuler) takeImplicitVelocities(h);
+  if (solver == scene::SolverKind::xpbd) correctSprings(h);
 }
 
 void ReferenceCloth::takeImplicitVelocities(double h) {
@@ -153,6 +154,35 @@ void ReferenceCloth::takeImplicitVelocities(double h) {
     velocities_[i] += changes[i];
     positions_[i] += h * changes[i];
   }
+}
+
+// [MMC16] Alg. 1, Eq. 18 and 26, with C the length's excess, the gradient a unit vector at b and its negative
+// at a.
+void ReferenceCloth::correctSprings(double h) {
+  if (colours_.links.empty()) colours_ = scene::springColours(cloth_);
+  std::vector<double> multipliers(colours_.links.size(), 0);
+  for (std::uint32_t iteration = 0; iteration < cloth_.solver.iterations; ++iteration)
+    for (std::size_t i = 0; i < colours_.links.size(); ++i) {
+      const scene::SpringLink& link = colours_.links[i];
+      const double weight = inverseMasses_[link.a] + inverseMasses_[link.b];
+      const scene::Spring& spring = scene::springOf(cloth_, link.kind);
+      const bool overridden = cloth_.solver.compliance && link.kind != scene::SpringKind::bend;
+      if (weight == 0 || (!overridden && spring.stiffness == 0)) continue;
+      const double compliance = overridden ? double{*cloth_.solver.compliance} : 1 / double{spring.stiffness};
+      const double scaled = compliance / (h * h), gamma = compliance * spring.damping / h;
+      const Vec3 d = positions_[link.b] - positions_[link.a];
+      const double length = std::sqrt(std::max(d.squaredNorm(), kTinyLengthSquared));
+      const Vec3 direction = d / length;
+      const double growth = direction.dot(d - (start_[link.b] - start_[link.a]));
+      const double excess = length - double{link.restLength};
+      const double step =
+          -(excess + scaled * multipliers[i] + gamma * growth) / ((1 + gamma) * weight + scaled);
+      multipliers[i] += step;
+      positions_[link.a] -= inverseMasses_[link.a] * step * direction;
+      positions_[link.b] += inverseMasses_[link.b] * step * direction;
+    }
+  for (std::size_t i = 0; i < positions_.size(); ++i)
+    if (inverseMasses_[i] > 0) velocities_[i] = (positions_[i] - start_[i]) / h;
 }
 
 void ReferenceCloth::enforceConstraints(double h) {

@@ -10,6 +10,7 @@
 #include "server/reference/contact.h"
 #include "server/scene/mesh.h"
 #include "server/scene/scene.h"
+#include "server/scene/spring_colours.h"
 #include "server/scene/springs.h"
 
 namespace clothstream::reference {
@@ -72,6 +73,7 @@ class ReferenceCloth {
   void integrateRungeKutta(const scene::Environment& environment, double h);
   void enforceConstraints(double h);
   void takeImplicitVelocities(double h);
+  void correctSprings(double h);
   std::vector<Vec3> gridNormals() const;
   std::vector<Vec3> meshNormals() const;
 
@@ -80,6 +82,7 @@ class ReferenceCloth {
   std::vector<scene::Triangle> triangles_;
   std::vector<Vec3> positions_, velocities_, forces_;
   std::vector<Vec3> start_, startVelocities_;  // of the substep, where a system is solved
+  scene::SpringColours colours_;               // of xpbd, once they are needed
   std::vector<double> masses_, inverseMasses_;
 };
 

@@ -45,18 +45,21 @@ enum class SolverKind : std::uint8_t {
                // 3-11
   acad,  // they are forces until a substep would stretch them too far: then constraints for that substep,
          // [Va21] 3.3
+  xpbd,  // each spring is corrected in turn, as far as its stiffness says: extended position-based dynamics,
+         // [MMC16]
   implicitEuler,  // every spring is a force, that of the substep's end: Baraff and Witkin, "Large steps in
                   // cloth simulation", 1998
 };
 
-// What turns a cloth's springs into motion. All but `kind` are of solvers that solve a system; iterations and
-// tolerance of all of these.
+// What turns a cloth's springs into motion. All but `kind` are of solvers that iterate.
 struct Solver {
   SolverKind kind = SolverKind::massSpring;
-  bool bendConstraints = false;     // bend springs as well: the paper's "all springs"
-  std::optional<float> compliance;  // m/N; absent: kRelativeCompliance of what a node gives way in a substep
-  std::uint32_t iterations = 20;    // of conjugate gradients in a substep, at most
-  float tolerance = 0.001f;         // of the residual's norm, relative to where it started
+  bool bendConstraints = false;  // bend springs as well: the paper's "all springs"
+  // m/N. Absent: kRelativeCompliance of what a node gives way in a substep; xpbd: of structural and shear
+  // springs, and absent one over their stiffness.
+  std::optional<float> compliance;
+  std::uint32_t iterations = 20;  // in a substep: of conjugate gradients, at most; xpbd: through all springs
+  float tolerance = 0.001f;       // of the residual's norm, relative to where it started
   // acad: the stretch, as a part of its length, beyond which no substep is to take a spring.
   float activation = 0.1f;
   // The part of what a spring is too long already that a substep takes back (Baumgarte's stabilisation); of

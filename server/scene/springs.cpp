@@ -2,6 +2,8 @@
 // Springs of grids, and adjacency of any springs.
 #include "server/scene/springs.h"
 
+#include <algorithm>
+
 #include "server/scene/mesh.h"
 
 namespace clothstream::scene {
@@ -33,11 +35,13 @@ const Spring& springOf(const Cloth& cloth, SpringKind kind) {
 }
 
 bool isConstraint(const Solver& solver, SpringKind kind) {
+  if (solver.kind == SolverKind::xpbd) return true;
   return (solver.kind == SolverKind::constraint || solver.kind == SolverKind::acad) &&
          (kind != SpringKind::bend || solver.bendConstraints);
 }
 
 Spring forceOf(const Cloth& cloth, SpringKind kind) {
+  if (cloth.solver.kind == SolverKind::xpbd) return {};
   Spring spring = springOf(cloth, kind);
   if (cloth.solver.kind == SolverKind::constraint && isConstraint(cloth.solver, kind)) spring.stiffness = 0;
   return spring;
@@ -46,6 +50,16 @@ Spring forceOf(const Cloth& cloth, SpringKind kind) {
 double scaledCompliance(const Cloth& cloth, double h) {
   if (cloth.solver.compliance) return *cloth.solver.compliance / (h * h);
   return double{kRelativeCompliance} / cloth.nodeMass();
+}
+
+XpbdSpring xpbdSpring(const Cloth& cloth, SpringKind kind, double h) {
+  const Spring& spring = springOf(cloth, kind);
+  const bool overridden = cloth.solver.compliance && kind != SpringKind::bend;
+  if (!overridden && spring.stiffness == 0) return {};
+  const double compliance = overridden ? double{*cloth.solver.compliance} : 1 / double{spring.stiffness};
+  const double memory = compliance / (h * h), damping = compliance * spring.damping / h;
+  const double scale = 1 / std::max(1.0, memory);
+  return {scale, damping * scale, memory * scale};
 }
 
 SpringAdjacency springAdjacency(std::span<const SpringLink> links, std::uint32_t nodeCount) {

@@ -30,11 +30,22 @@ const Spring& springOf(const Cloth& cloth, SpringKind kind);
 // too far.
 bool isConstraint(const Solver& solver, SpringKind kind);
 
-// As a force: without stiffness where it always is a constraint. Constraints keep their damping.
+// As a force: without stiffness where it always is a constraint. Constraints keep their damping, but those of
+// xpbd, which are damped as constraints.
 Spring forceOf(const Cloth& cloth, SpringKind kind);
 
 // Of the cloth's constraints, 1/kg: what stands on the diagonal of their system in a substep of h seconds.
 double scaledCompliance(const Cloth& cloth, double h);
+
+// What xpbd does with a spring in a substep of h seconds. Its excess of length C, how much that grew in this
+// substep, D, and its multiplier lambda so far give
+//   -(stretch C + damping D + memory lambda) / ((stretch + damping) (w_a + w_b) + memory)
+// more of lambda, [MMC16] Eq. 18 and 26 times whatever keeps all three numbers small. All but memory 0: the
+// spring is not there.
+struct XpbdSpring {
+  double stretch = 0, damping = 0, memory = 1;
+};
+XpbdSpring xpbdSpring(const Cloth& cloth, SpringKind kind, double h);
 
 // Which springs meet at each node, in the order of the list.
 struct SpringAdjacency {

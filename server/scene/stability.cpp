@@ -160,12 +160,13 @@ bool explicitStable(const Cloth& cloth, const NodeSprings& node, double air, dou
 
 // Fewest substeps from `atLeast` on; both criteria only get easier with smaller steps. 0: none. Constraints,
 // and the springs of implicit Euler, are solved for: they set no bound, and hold those springs that become
-// constraints when they stretch too far.
+// constraints when they stretch too far. Those of xpbd are damped implicitly, too.
 std::uint32_t stableSubsteps(const Scene& scene, Cloth cloth, std::uint32_t atLeast) {
   if (isConstraint(cloth.solver, SpringKind::structural))
     cloth.structural.stiffness = cloth.shear.stiffness = 0;
   if (isConstraint(cloth.solver, SpringKind::bend)) cloth.bend.stiffness = 0;
-  if (cloth.solver.kind == SolverKind::implicitEuler) cloth.structural = cloth.shear = cloth.bend = {};
+  if (cloth.solver.kind == SolverKind::implicitEuler || cloth.solver.kind == SolverKind::xpbd)
+    cloth.structural = cloth.shear = cloth.bend = {};
   const double air = airDamping(cloth, scene.environment);
   const std::vector<NodeSprings> combinations = cloth.mesh ? meshSprings(cloth) : gridSprings(cloth);
   const auto stable = scene.integrator == Integrator::semiImplicitEuler ? semiImplicitStable

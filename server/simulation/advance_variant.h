@@ -12,16 +12,22 @@ namespace clothstream::simulation {
 
 // What the kernel leaves out where a scene has none of it; the bits are the same.
 struct AdvanceVariant {
-  bool springDamping, air, colliders;
+  bool springDamping, air, colliders, springForces;
 
-  std::size_t index() const { return (springDamping ? 1u : 0u) | (air ? 2u : 0u) | (colliders ? 4u : 0u); }
-  static constexpr std::size_t kCount = 8;
+  std::size_t index() const {
+    return (springDamping ? 1u : 0u) | (air ? 2u : 0u) | (colliders ? 4u : 0u) | (springForces ? 8u : 0u);
+  }
+  static constexpr std::size_t kCount = 16;
 
   // constant_id 1 and on. The Runge-Kutta method is made of steps of explicit Euler.
   std::vector<std::uint32_t> specialisation(std::uint32_t rowsPerInvocation,
                                             scene::Integrator integrator) const {
-    return {rowsPerInvocation, springDamping ? 1u : 0u, air ? 1u : 0u, colliders ? 1u : 0u,
-            integrator == scene::Integrator::semiImplicitEuler ? 0u : 1u};
+    return {rowsPerInvocation,
+            springDamping ? 1u : 0u,
+            air ? 1u : 0u,
+            colliders ? 1u : 0u,
+            integrator == scene::Integrator::semiImplicitEuler ? 0u : 1u,
+            springForces ? 1u : 0u};
   }
 };
 

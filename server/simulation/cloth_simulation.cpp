@@ -21,6 +21,8 @@
 #include "server/simulation/mesh_stage.h"
 #include "server/simulation/report_stage.h"
 #include "server/simulation/runge_kutta_stage.h"
+#include "server/simulation/stage.h"
+#include "server/simulation/xpbd_stage.h"
 #include "server/vulkan/kernel.h"
 
 namespace clothstream::simulation {
@@ -112,33 +114,25 @@ StateBuffers stateOf(const Buffers& b, const CollisionStage& collision) {
           .velocities = {&b.velocities[0], &b.velocities[1]}};
 }
 
-// A kernel, bound to read each of the two state buffers.
-struct Stage {
-  Stage(const vulkan::Device& device, const vulkan::KernelDescription& description,
-        std::initializer_list<const Buffer*> first, std::initializer_list<const Buffer*> second)
-      : kernel(device, description),
-        from{vulkan::Bindings(device, kernel, first), vulkan::Bindings(device, kernel, second)} {}
-  Stage(const Stage&) = delete;
-  Stage& operator=(const Stage&) = delete;
-
-  vulkan::Kernel kernel;
-  std::array<vulkan::Bindings, 2> from;
-};
-
 std::vector<scene::Solver> solversOf(std::span<const scene::Cloth> cloths) {
   std::vector<scene::Solver> solvers;
   for (const scene::Cloth& cloth : cloths) solvers.push_back(cloth.solver);
   return solvers;
 }
 
-// Whether they make the same constraints; how these are solved may differ.
+// Whether they make the same tables; how systems are solved may differ.
 bool sameTables(const scene::Solver& a, const scene::Solver& b) {
-  return a.kind == b.kind && a.bendConstraints == b.bendConstraints;
+  return a.kind == b.kind && a.bendConstraints == b.bendConstraints &&
+         (a.kind != scene::SolverKind::xpbd || a.iterations == b.iterations);
 }
 
-AdvanceVariant variantOf(std::span<const shared::ClothRecord> cloths, float airDensity, bool colliders) {
-  return {std::any_of(cloths.begin(), cloths.end(), isDamped),
-          airDensity != 0 && std::any_of(cloths.begin(), cloths.end(), isBlown), colliders};
+// Cloths collide at once where nothing follows.
+AdvanceVariant variantOf(std::span<const shared::ClothRecord> cloths, float airDensity, bool colliders,
+                         Follow follow) {
+  const bool springs = follow != Follow::corrections;
+  return {springs && std::any_of(cloths.begin(), cloths.end(), isDamped),
+          airDensity != 0 && std::any_of(cloths.begin(), cloths.end(), isBlown),
+          colliders && follow == Follow::nothing, springs};
 }
 
 std::unique_ptr<Stage> makeAdvance(const vulkan::Device& device, const Buffers& b, const CollisionStage& c,
@@ -190,13 +184,14 @@ struct ClothSimulation::Pipeline {
   Pipeline(const vulkan::Device& on, const scene::Scene& scene, const SimulationOptions& options);
 
   const Stage& advance(const AdvanceVariant& variant);
-  void prepare(const AdvanceVariant& variant);
+  void prepare(float airDensity);
+  void makeXpbd(std::span<const scene::Cloth> cloths);
   void setSolvers(std::span<const scene::Cloth> cloths);
   void start(vulkan::Recorder& recorder);
   void recordInputs(vulkan::Recorder& recorder, const TickInputs& inputs);
   void recordSubsteps(vulkan::Recorder& recorder, const TickInputs& inputs);
   void recordAdvance(vulkan::Recorder& recorder, std::uint32_t from, const AdvanceVariant& variant,
-                     bool constrained, shared::AdvancePush push);
+                     Follow follow, shared::AdvancePush push);
   void recordRungeKutta(vulkan::Recorder& recorder, const TickInputs& inputs, shared::AdvancePush push);
   void recordStatus(vulkan::Recorder& recorder);
   void writeState(const NodeState& state);
@@ -222,10 +217,11 @@ struct ClothSimulation::Pipeline {
   std::unique_ptr<RungeKuttaStage> rungeKutta;  // where that is the integrator
   ConstraintStage constraints;
   ImplicitStage implicit;
+  std::unique_ptr<XpbdStage> xpbd;      // where a cloth's solver is that
   std::vector<scene::Solver> solvers;   // of the cloths, as the tables have them
   std::vector<shared::vec4> stiffness;  // of their springs
   std::unique_ptr<ReportStage> report;  // made when it is first wanted
-  std::uint32_t workgroupSize;          // as asked for
+  SimulationOptions options;
 
   bool started = false;       // the start state is on the device
   bool tabled = false;        // the tables of the solvers are
@@ -258,7 +254,7 @@ ClothSimulation::Pipeline::Pipeline(const vulkan::Device& on, const scene::Scene
       implicit(on, implicitTables(scene.cloths), stateOf(buffers, collision), options.workgroupSize),
       solvers(solversOf(scene.cloths)),
       stiffness(springStiffness(scene.cloths)),
-      workgroupSize(options.workgroupSize) {
+      options(options) {
   std::ranges::copy(cut.tiles.records, buffers.tileUpload.mapped<shared::TileRecord>().begin());
   std::memcpy(buffers.inputs[slot].mapped().data(), records.data(), buffers.cloths.bytes());
   writeState(restState(scene.cloths));
@@ -268,13 +264,28 @@ ClothSimulation::Pipeline::Pipeline(const vulkan::Device& on, const scene::Scene
                                          integrator, cut.workgroupSize);
   if (integrator == scene::Integrator::rungeKutta4)
     rungeKutta = std::make_unique<RungeKuttaStage>(on, stateOf(buffers, collision), offsets);
-  for (const bool colliders : {false, true})
-    prepare(variantOf(records, scene.environment.airDensity, colliders));
+  makeXpbd(scene.cloths);
+  prepare(scene.environment.airDensity);
 }
 
-void ClothSimulation::Pipeline::prepare(const AdvanceVariant& variant) {
-  if (!cut.tiles.records.empty()) advance(variant);
-  if (meshes) meshes->prepare(variant);
+// The kernels that the scene starts with, and those that it needs as soon as somebody brings a collider.
+void ClothSimulation::Pipeline::prepare(float airDensity) {
+  for (const bool colliders : {false, true}) {
+    for (const Follow follow : kFollows) {
+      const AdvanceVariant variant = variantOf(records, airDensity, colliders, follow);
+      if (cut.tiles.ranges.of(follow).count > 0) advance(variant);
+      if (meshes) meshes->prepare(variant, follow);
+    }
+    if (xpbd) xpbd->prepare(xpbdVariantOf(records, colliders));
+  }
+}
+
+void ClothSimulation::Pipeline::makeXpbd(std::span<const scene::Cloth> cloths) {
+  const bool any = std::ranges::any_of(
+      cloths, [](const scene::Cloth& cloth) { return cloth.solver.kind == scene::SolverKind::xpbd; });
+  xpbd = any ? std::make_unique<XpbdStage>(device, cloths, stateOf(buffers, collision), options.workgroupSize,
+                                           options.xpbdWholeNodes)
+             : nullptr;
 }
 
 const Stage& ClothSimulation::Pipeline::advance(const AdvanceVariant& variant) {
@@ -304,6 +315,7 @@ void ClothSimulation::Pipeline::setSolvers(std::span<const scene::Cloth> cloths)
   if (std::ranges::equal(wanted, solvers, sameTables)) return;
   constraints.setTables(constraintTables(cloths));
   implicit.setTables(implicitTables(cloths));
+  makeXpbd(cloths);
   cut.tiles = makeTiles(cloths, cut.rowsPerInvocation, cut.workgroupSize);
   std::ranges::copy(cut.tiles.records, buffers.tileUpload.mapped<shared::TileRecord>().begin());
   if (meshes) meshes->setTiles(meshTiles(cloths, cut.workgroupSize));
@@ -322,6 +334,7 @@ void ClothSimulation::Pipeline::start(vulkan::Recorder& recorder) {
   if (meshes) meshes->recordTables(recorder);
   if (constraints.active()) constraints.recordTables(recorder);
   if (implicit.active()) implicit.recordTables(recorder);
+  if (xpbd) xpbd->recordTables(recorder);
   recorder.barrier();
   started = tabled = true;
 }
@@ -338,21 +351,21 @@ void ClothSimulation::Pipeline::recordInputs(vulkan::Recorder& recorder, const T
 }
 
 void ClothSimulation::Pipeline::recordAdvance(vulkan::Recorder& recorder, std::uint32_t from,
-                                              const AdvanceVariant& variant, bool constrained,
+                                              const AdvanceVariant& variant, Follow follow,
                                               shared::AdvancePush push) {
-  const TileRange tiles = cut.tiles.range(constrained);
+  const TileRange tiles = cut.tiles.ranges.of(follow);
   push.firstTile = tiles.first;
   if (tiles.count > 0)
     recorder.dispatch(advance(variant).from[from], push, std::uint64_t{tiles.count} * cut.workgroupSize);
-  if (meshes) meshes->recordAdvance(recorder, from, variant, constrained, push);
+  if (meshes) meshes->recordAdvance(recorder, from, variant, follow, push);
 }
 
 void ClothSimulation::Pipeline::recordRungeKutta(vulkan::Recorder& recorder, const TickInputs& inputs,
                                                  shared::AdvancePush push) {
-  const AdvanceVariant variant = variantOf(records, inputs.environment.airDensity, false);
+  const AdvanceVariant variant = variantOf(records, inputs.environment.airDensity, false, Follow::nothing);
   rungeKutta->record(recorder, present, push.collision, [&](std::uint32_t from, float part) {
     push.gravityStep.w = part * static_cast<float>(substepSeconds);
-    recordAdvance(recorder, from, variant, false, push);
+    recordAdvance(recorder, from, variant, Follow::nothing, push);
   });
 }
 
@@ -379,11 +392,10 @@ void ClothSimulation::Pipeline::recordSubsteps(vulkan::Recorder& recorder, const
     if (rungeKutta) {
       recordRungeKutta(recorder, inputs, push);
     } else {
-      // Cloths for which a system is solved collide after that.
-      for (const bool constrained : {false, true})
+      for (const Follow follow : kFollows)
         recordAdvance(recorder, present,
-                      variantOf(records, inputs.environment.airDensity, collision.active() && !constrained),
-                      constrained, push);
+                      variantOf(records, inputs.environment.airDensity, collision.active(), follow), follow,
+                      push);
     }
     const shared::ConstraintPush solve{.collision = push.collision,
                                        .count = 0,
@@ -392,6 +404,13 @@ void ClothSimulation::Pipeline::recordSubsteps(vulkan::Recorder& recorder, const
                                        .reserved = 0};
     if (constraints.active()) constraints.record(recorder, present, iterations.constraints, solve);
     if (implicit.active()) implicit.record(recorder, present, iterations.implicit, solve);
+    if (xpbd)
+      xpbd->record(recorder, present, xpbdVariantOf(records, collision.active()),
+                   {.collision = push.collision,
+                    .substepSeconds = static_cast<float>(substepSeconds),
+                    .substepRate = tickRate * static_cast<float>(substeps),
+                    .firstTile = 0,
+                    .reserved = 0});
     present = 1 - present;
   }
 }
@@ -446,9 +465,9 @@ void ClothSimulation::recordNormals(vulkan::Recorder& recorder) {
 void ClothSimulation::recordReport(vulkan::Recorder& recorder, const TickInputs& inputs) {
   Pipeline& on = *pipeline_;
   if (!on.report)
-    on.report =
-        std::make_unique<ReportStage>(on.device, on.records, stateOf(on.buffers, on.collision),
-                                      on.meshes ? on.meshes->springs() : MeshSprings{}, on.workgroupSize);
+    on.report = std::make_unique<ReportStage>(on.device, on.records, stateOf(on.buffers, on.collision),
+                                              on.meshes ? on.meshes->springs() : MeshSprings{},
+                                              on.options.workgroupSize);
   recorder.beginStage("report");
   on.report->record(recorder, on.present, on.stiffness, inputs.environment.gravity,
                     on.collision.push(on.substeps - 1, on.substeps, on.tickRate));

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -38,6 +39,9 @@ struct SimulationOptions {
   std::uint32_t rowsPerInvocation = 0;
   // Invocations in a workgroup. 0: the measured best for the device.
   std::uint32_t workgroupSize = 0;
+  // Nodes of the largest cloth whose springs one workgroup corrects, where its solver is xpbd. Absent: the
+  // measured best for the device.
+  std::optional<std::uint32_t> xpbdWholeNodes = {};
   // Another build of the kernel advance_mass_spring, for comparisons; empty: the one that belongs here.
   std::span<const std::uint32_t> advanceKernel = {};
 };

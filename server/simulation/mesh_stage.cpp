@@ -17,7 +17,7 @@ MeshStage::MeshStage(const vulkan::Device& device, const MeshTables& tables, con
       state_(state),
       integrator_(integrator),
       workgroupSize_(workgroupSize),
-      tileRanges_{tables.tiles.range(false), tables.tiles.range(true)},
+      tileRanges_(tables.tiles.ranges),
       tiles_(device, tables.tiles.records),
       nodes_(device, tables.nodes),
       springEnds_(device, tables.springEnds),
@@ -62,7 +62,7 @@ const MeshStage::Advance& MeshStage::advance(const AdvanceVariant& variant) {
 
 void MeshStage::setTiles(const Tiles& tiles) {
   tiles_.set(tiles.records);
-  tileRanges_ = {tiles.range(false), tiles.range(true)};
+  tileRanges_ = tiles.ranges;
 }
 
 void MeshStage::recordTables(vulkan::Recorder& recorder) const {
@@ -70,16 +70,15 @@ void MeshStage::recordTables(vulkan::Recorder& recorder) const {
 }
 
 void MeshStage::recordAdvance(vulkan::Recorder& recorder, std::uint32_t from, const AdvanceVariant& variant,
-                              bool constrained, shared::AdvancePush push) {
-  const TileRange tiles = tileRanges_[constrained ? 1 : 0];
+                              Follow follow, shared::AdvancePush push) {
+  const TileRange tiles = tileRanges_.of(follow);
   push.firstTile = tiles.first;
   if (tiles.count > 0)
     recorder.dispatch(advance(variant).from[from], push, std::uint64_t{tiles.count} * workgroupSize_);
 }
 
 void MeshStage::recordNormals(vulkan::Recorder& recorder, std::uint32_t present) const {
-  const std::uint64_t tiles = tileRanges_[0].count + tileRanges_[1].count;
-  recorder.dispatch(normalsOf_[present], tiles * workgroupSize_);
+  recorder.dispatch(normalsOf_[present], std::uint64_t{tileRanges_.count()} * workgroupSize_);
 }
 
 }  // namespace clothstream::simulation

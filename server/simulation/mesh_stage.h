@@ -31,13 +31,15 @@ class MeshStage {
   void setTiles(const Tiles& tiles);
   // Its tables, before anything else that is with them.
   void recordTables(vulkan::Recorder& recorder) const;
-  // One substep from state `from` to the other, of the meshes with constraints or of those without.
+  // One substep from state `from` to the other, of the meshes whose forces are followed by this.
   void recordAdvance(vulkan::Recorder& recorder, std::uint32_t from, const AdvanceVariant& variant,
-                     bool constrained, shared::AdvancePush push);
+                     Follow follow, shared::AdvancePush push);
   void recordNormals(vulkan::Recorder& recorder, std::uint32_t present) const;
-  MeshSprings springs() const { return {.nodes = &nodes_.buffer, .ends = &springEnds_.buffer}; }
+  MeshSprings springs() const { return {.nodes = &nodes_.texels(), .ends = &springEnds_.texels()}; }
   // Makes the kernel of this variant now rather than when it is first needed.
-  void prepare(const AdvanceVariant& variant) { advance(variant); }
+  void prepare(const AdvanceVariant& variant, Follow follow) {
+    if (tileRanges_.of(follow).count > 0) advance(variant);
+  }
 
  private:
   struct Advance {
@@ -56,7 +58,7 @@ class MeshStage {
   StateBuffers state_;
   scene::Integrator integrator_;
   std::uint32_t workgroupSize_;
-  std::array<TileRange, 2> tileRanges_;  // without constraints, with
+  TileRanges tileRanges_;
   DeviceTable tiles_, nodes_, springEnds_, corners_;
   std::array<std::unique_ptr<Advance>, AdvanceVariant::kCount> advances_;
   vulkan::Kernel normals_;

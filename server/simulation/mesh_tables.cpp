@@ -74,18 +74,16 @@ void appendCorners(const scene::Mesh& mesh, std::uint32_t firstNode, std::span<s
 
 Tiles meshTiles(std::span<const scene::Cloth> cloths, std::uint32_t workgroupSize) {
   Tiles tiles;
-  const auto append = [&](bool constrained) {
+  for (const Follow follow : kFollows) {
     std::size_t nodes = 0;
     for (std::uint32_t i = 0; i < cloths.size(); ++i) {
       if (!cloths[i].mesh) continue;
-      if (constrained == (cloths[i].solver.kind != scene::SolverKind::massSpring))
+      if (followOf(cloths[i].solver.kind) == follow)
         appendTiles(i, cloths[i].nodeCount(), nodes, workgroupSize, tiles.records);
       nodes += cloths[i].nodeCount();
     }
-  };
-  append(false);
-  tiles.withoutConstraints = static_cast<std::uint32_t>(tiles.records.size());
-  append(true);
+    tiles.ranges.ends[static_cast<std::size_t>(follow)] = static_cast<std::uint32_t>(tiles.records.size());
+  }
   return tiles;
 }
 

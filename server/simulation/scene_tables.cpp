@@ -24,7 +24,26 @@ shared::vec4 limitsOf(const scene::Solver& solver) {
   return {solver.activation, scene::takenBack(solver), 1, 0};
 }
 
+// Compliance over h^2, iterations and tolerance of conjugate gradients.
+shared::vec4 solverOf(const scene::Cloth& cloth, double substepSeconds) {
+  if (followOf(cloth.solver.kind) != Follow::solve) return {0, 0, 0, 0};
+  return {static_cast<float>(scene::scaledCompliance(cloth, substepSeconds)),
+          static_cast<float>(cloth.solver.iterations), cloth.solver.tolerance * cloth.solver.tolerance, 0};
+}
+
+shared::vec4 xpbdSpringOf(const scene::Cloth& cloth, scene::SpringKind kind, double substepSeconds, float w) {
+  if (cloth.solver.kind != scene::SolverKind::xpbd) return {0, 0, 0, 0};
+  const scene::XpbdSpring spring = scene::xpbdSpring(cloth, kind, substepSeconds);
+  return {static_cast<float>(spring.stretch), static_cast<float>(spring.damping),
+          static_cast<float>(spring.memory), w};
+}
+
 }  // namespace
+
+Follow followOf(scene::SolverKind kind) {
+  if (kind == scene::SolverKind::massSpring) return Follow::nothing;
+  return kind == scene::SolverKind::xpbd ? Follow::corrections : Follow::solve;
+}
 
 std::vector<std::uint32_t> clothOffsets(std::span<const scene::Cloth> cloths) {
   std::vector<std::uint32_t> offsets{0};
@@ -41,21 +60,24 @@ std::vector<shared::ClothRecord> clothRecords(std::span<const scene::Cloth> clot
       assert(number < 1u << 24);
       return static_cast<float>(number);
     };
+    const auto force = [&](scene::SpringKind kind) { return scene::forceOf(cloth, kind); };
+    const auto xpbd = [&](scene::SpringKind kind, float w) {
+      return xpbdSpringOf(cloth, kind, substepSeconds, w);
+    };
+    const auto inverseMass = static_cast<float>(cloth.nodeCount() / double{cloth.mass});
+    using enum scene::SpringKind;
     records.push_back(
         {.place = {whole(firstNode & 0xFFFF), whole(firstNode >> 16), cloth.mesh ? 0 : whole(cloth.grid.rows),
                    whole(cloth.mesh ? cloth.nodeCount() : cloth.grid.columns)},
          .spacing = {spacing.column, spacing.row, spacing.diagonal, cloth.damping},
-         .stiffness = {scene::forceOf(cloth, scene::SpringKind::structural).stiffness,
-                       scene::forceOf(cloth, scene::SpringKind::shear).stiffness,
-                       scene::forceOf(cloth, scene::SpringKind::bend).stiffness, cloth.friction},
-         .damping = {cloth.structural.damping, cloth.shear.damping, cloth.bend.damping, cloth.thickness},
+         .stiffness = {force(structural).stiffness, force(shear).stiffness, force(bend).stiffness,
+                       cloth.friction},
+         .damping = {force(structural).damping, force(shear).damping, force(bend).damping, cloth.thickness},
          .air = {cloth.drag, cloth.lift, 0, 0},
-         .solver = {static_cast<float>(scene::scaledCompliance(cloth, substepSeconds)),
-                    cloth.solver.kind == scene::SolverKind::massSpring
-                        ? 0.0f
-                        : static_cast<float>(cloth.solver.iterations),
-                    cloth.solver.tolerance * cloth.solver.tolerance, 0},
-         .limits = limitsOf(cloth.solver)});
+         .solver = solverOf(cloth, substepSeconds),
+         .limits = limitsOf(cloth.solver),
+         .springs = {xpbd(structural, static_cast<float>(cloth.solver.iterations)), xpbd(shear, inverseMass),
+                     xpbd(bend, 0)}});
     firstNode += cloth.nodeCount();
   }
   return records;
@@ -64,7 +86,7 @@ std::vector<shared::ClothRecord> clothRecords(std::span<const scene::Cloth> clot
 SolveIterations solveIterations(std::span<const scene::Cloth> cloths) {
   SolveIterations most;
   for (const scene::Cloth& cloth : cloths) {
-    if (cloth.solver.kind == scene::SolverKind::massSpring) continue;
+    if (followOf(cloth.solver.kind) != Follow::solve) continue;
     std::uint32_t& of =
         cloth.solver.kind == scene::SolverKind::implicitEuler ? most.implicit : most.constraints;
     of = std::max(of, cloth.solver.iterations);
@@ -76,9 +98,9 @@ Tiles makeTiles(std::span<const scene::Cloth> cloths, std::uint32_t rowsPerInvoc
                 std::uint32_t workgroupSize) {
   assert(rowsPerInvocation > 0 && workgroupSize > 0);
   Tiles tiles;
-  const auto append = [&](scene::SolverKind kind) {
+  for (const Follow follow : kFollows) {
     for (std::uint32_t cloth = 0; cloth < cloths.size(); ++cloth) {
-      if (cloths[cloth].mesh || cloths[cloth].solver.kind != kind) continue;
+      if (cloths[cloth].mesh || followOf(cloths[cloth].solver.kind) != follow) continue;
       const scene::Grid& grid = cloths[cloth].grid;
       const std::uint32_t strips = (grid.rows + rowsPerInvocation - 1) / rowsPerInvocation;
       const std::uint64_t invocations = std::uint64_t{strips} * grid.columns;
@@ -88,12 +110,8 @@ Tiles makeTiles(std::span<const scene::Cloth> cloths, std::uint32_t rowsPerInvoc
               static_cast<float>(static_cast<std::uint32_t>(first / grid.columns) * rowsPerInvocation),
               static_cast<float>(first % grid.columns), 0}});
     }
-  };
-  append(scene::SolverKind::massSpring);
-  tiles.withoutConstraints = static_cast<std::uint32_t>(tiles.records.size());
-  append(scene::SolverKind::constraint);
-  append(scene::SolverKind::acad);
-  append(scene::SolverKind::implicitEuler);
+    tiles.ranges.ends[static_cast<std::size_t>(follow)] = static_cast<std::uint32_t>(tiles.records.size());
+  }
   return tiles;
 }
 

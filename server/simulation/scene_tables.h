@@ -2,6 +2,7 @@
 // A scene as the kernels read it: a record a cloth, a record a workgroup.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -27,17 +28,30 @@ struct TileRange {
   std::uint32_t first, count;
 };
 
-// Those of cloths whose substep ends with the forces come first; then those of cloths for which a system is
-// solved.
+// What a cloth's forces are followed by in a substep.
+enum class Follow : std::uint8_t {
+  nothing,      // they collide at once
+  solve,        // ConstraintStage, ImplicitStage
+  corrections,  // XpbdStage; of springs there are no forces
+};
+inline constexpr std::array kFollows{Follow::nothing, Follow::solve, Follow::corrections};
+Follow followOf(scene::SolverKind kind);
+
+// Tiles in the order of kFollows.
+struct TileRanges {
+  std::array<std::uint32_t, kFollows.size()> ends{};  // of each kind
+
+  TileRange of(Follow follow) const {
+    const auto i = static_cast<std::size_t>(follow);
+    const std::uint32_t first = i == 0 ? 0 : ends[i - 1];
+    return {first, ends[i] - first};
+  }
+  std::uint32_t count() const { return ends.back(); }
+};
+
 struct Tiles {
   std::vector<shared::TileRecord> records;
-  std::uint32_t withoutConstraints = 0;  // of the records
-
-  TileRange range(bool constrained) const {
-    const auto all = static_cast<std::uint32_t>(records.size());
-    return constrained ? TileRange{withoutConstraints, all - withoutConstraints}
-                       : TileRange{0, withoutConstraints};
-  }
+  TileRanges ranges;
 };
 
 // One tile a workgroup: together they cover every node of the grids once, `rowsPerInvocation` rows an

@@ -22,6 +22,9 @@ vec3 endForce(Node here, vec2 end, vec4 stiffness, vec4 damping) {
 
 vec3 springForces(Node here, MeshNode self, vec4 stiffness, vec4 damping) {
   precise vec3 force = vec3(0.0);
+  if (!kSpringForces) {
+    return force;
+  }
   TexelRange springs = springsOf(self);
   while (springs.first < springs.end) {
     vec4 ends = texelFetch(springEnds, springs.first);

@@ -10,6 +10,9 @@
 // are the same, for the damping term is then zero.
 layout(constant_id = 2) const bool kSpringDamping = true;
 
+// Whether any spring is a force at all.
+layout(constant_id = 6) const bool kSpringForces = true;
+
 struct Spring {
   float stiffness;
   float damping;
@@ -24,6 +27,9 @@ Spring where(bool exists, Spring spring) {
 // On `node`, from the spring to `other`; not finite where an end is not. Exactly the negative of the force on
 // `other`: swapping the two negates differences, and nothing else.
 vec3 springForce(Node node, Node other, Spring spring) {
+  if (!kSpringForces) {
+    return vec3(0.0);
+  }
   precise vec3 d = other.position - node.position;
   precise float inverseLength = reciprocalSquareRoot(max(dotProduct(d, d), 1e-12));
   precise float scale = spring.stiffness * (1.0 - spring.restLength * inverseLength);

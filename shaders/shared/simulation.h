@@ -12,7 +12,8 @@ CLOTHSTREAM_SHARED_BEGIN
 // Whole numbers are floats too, exact below 2^24.
 
 // One cloth: where its nodes lie in the scene's buffers, its material and its solver. Row-major, SI units.
-#define CLOTHSTREAM_CLOTH_TEXELS 7
+#define CLOTHSTREAM_CLOTH_TEXELS 10
+#define CLOTHSTREAM_XPBD_TEXEL 7
 struct ClothRecord {
   vec4 place;      // first node modulo 2^16, first node / 2^16, rows, columns; of a mesh: 0, nodes
   vec4 spacing;    // of columns, of rows, along the diagonal; damping
@@ -21,6 +22,9 @@ struct ClothRecord {
   vec4 air;        // drag, lift
   vec4 solver;     // compliance / h^2, iterations, square of the tolerance
   vec4 limits;     // stretch that springs are held at; part of more that is taken back; 0: always
+  // Of xpbd: structural, shear, bend as scene::XpbdSpring; of their w the first is the number of iterations,
+  // the second the inverse mass of a grid's nodes.
+  vec4 springs[3];
 };
 
 // One workgroup of a kernel that walks down columns: its first invocation starts at (row, column) of the
@@ -69,6 +73,22 @@ struct SolveRecord {
   uint32_t constraints;  // active ones
 };
 
+// A workgroup of a kernel that corrects springs.
+struct XpbdTile {
+  vec4 start;  // cloth; of a grid: the first block, the first multiplier modulo 2^24, and / 2^24;
+               // of a mesh: the first colour, colours
+};
+
+// A colour of a mesh that one workgroup corrects.
+struct ColourRecord {
+  vec4 springs;  // the first modulo 2^24, and / 2^24; how many
+};
+
+// A spring of a mesh that is corrected.
+struct XpbdLinkRecord {
+  vec4 ends;  // a, b, rest length; structural, shear or bend: 0, 1, 2
+};
+
 // What differs from substep to substep and from tick to tick.
 struct AdvancePush {
   vec4 gravityStep;  // w: seconds of a substep
@@ -100,6 +120,25 @@ struct SolvePush {
   uint32_t firstSystem;
 };
 
+struct XpbdPush {
+  uint32_t firstTile;
+  uint32_t firstIteration;  // of this dispatch
+  uint32_t endIteration;
+  // Of a mesh, where a dispatch does one colour.
+  uint32_t cloth;
+  uint32_t firstSpring;
+  uint32_t springs;
+  uint32_t firstMultiplier;  // of all meshes
+};
+
+struct FinishPush {
+  CollisionPush collision;
+  float substepSeconds;
+  float substepRate;  // 1/s
+  uint32_t firstTile;
+  uint32_t reserved;
+};
+
 struct HashPush {
   uint32_t nodeCount;
 };
@@ -119,7 +158,10 @@ namespace clothstream::shared {
 static_assert(sizeof(ClothRecord) == CLOTHSTREAM_CLOTH_TEXELS * sizeof(vec4) &&
               offsetof(ClothRecord, spacing) == 16 && offsetof(ClothRecord, stiffness) == 32 &&
               offsetof(ClothRecord, damping) == 48 && offsetof(ClothRecord, air) == 64 &&
-              offsetof(ClothRecord, solver) == 80 && offsetof(ClothRecord, limits) == 96);
+              offsetof(ClothRecord, solver) == 80 && offsetof(ClothRecord, limits) == 96 &&
+              offsetof(ClothRecord, springs) == CLOTHSTREAM_XPBD_TEXEL * sizeof(vec4));
+static_assert(sizeof(XpbdTile) == 16 && sizeof(ColourRecord) == 16 && sizeof(XpbdLinkRecord) == 16);
+static_assert(sizeof(XpbdPush) == 28 && sizeof(FinishPush) == 48);
 static_assert(sizeof(SystemRecord) == CLOTHSTREAM_SYSTEM_TEXELS * sizeof(vec4));
 static_assert(sizeof(SolveRecord) == 20 && sizeof(ConstraintPush) == 48 && sizeof(RungeKuttaPush) == 48);
 static_assert(sizeof(TileRecord) == 16);

@@ -59,6 +59,11 @@ constexpr const char* kEveryField = R"json({
     "thickness": 0.25,
     "solver": {"acad": {"activation": 0.25,
                         "constraint": {"bendConstraints": true, "compliance": 0, "iterations": 30, "tolerance": 0}}}
+  }, {
+    "name": "corrected", "grid": {"rows": 2, "columns": 2, "width": 1, "height": 1,
+                                  "pose": {"position": {}, "orientation": {"w": 1}}},
+    "mass": 1, "structural": {}, "shear": {}, "bend": {}, "damping": 0, "drag": 0, "lift": 0, "friction": 0.5,
+    "thickness": 0.25, "solver": {"xpbd": {"iterations": 3, "compliance": 0}}
   }],
   "colliders": [{
     "name": "finger", "capsule": {"radius": 0.25, "length": 0.5}, "pose": {"position": {"x": 1, "y": 0, "z": 0},

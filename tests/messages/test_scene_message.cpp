@@ -63,6 +63,20 @@ TEST(ToScene, TakesExplicitZerosForWhatTheyAre) {
   EXPECT_EQ(scene->cloths[0].thickness, 0);
 }
 
+TEST(ToScene, SweepsOnceWhereXpbdDoesNotSayOtherwise) {
+  v1::Scene message = smallScene();
+  message.mutable_cloths(0)->mutable_solver()->mutable_xpbd();
+  // No bound on explicit steps is asked of its springs.
+  message.mutable_cloths(0)->mutable_structural()->set_stiffness(1e6f);
+  message.set_substeps(1);
+  const Result<scene::Scene> scene = toScene(message);
+  ASSERT_TRUE(scene) << scene.error().text;
+  const scene::Solver& solver = scene->cloths[0].solver;
+  EXPECT_EQ(solver.kind, scene::SolverKind::xpbd);
+  EXPECT_EQ(solver.iterations, 1u);
+  EXPECT_FALSE(solver.compliance);
+}
+
 TEST(ToScene, PinsOneNodeWhereARangeHasNoLast) {
   v1::Scene message = smallScene();
   v1::GridRange& range = *message.mutable_cloths(0)->add_pins();
@@ -285,6 +299,18 @@ const BadScene kBadScenes[] = {
      [](v1::Scene& s) {
        cloth(s).mutable_solver()->mutable_acad()->mutable_constraint()->set_iterations(0);
      }},
+    {"cloths[0].solver.xpbd.iterations = 0:",
+     [](v1::Scene& s) { cloth(s).mutable_solver()->mutable_xpbd()->set_iterations(0); }, "from 1 to 1000"},
+    {"cloths[0].solver.xpbd.iterations = 1001:",
+     [](v1::Scene& s) { cloth(s).mutable_solver()->mutable_xpbd()->set_iterations(1001); }, "from 1 to 1000"},
+    {"cloths[0].solver.xpbd.compliance = nan:",
+     [](v1::Scene& s) { cloth(s).mutable_solver()->mutable_xpbd()->set_compliance(kNan); }},
+    {"cloths[0].solver: solves a system, which",
+     [](v1::Scene& s) {
+       cloth(s).mutable_solver()->mutable_xpbd();
+       s.set_integrator(v1::INTEGRATOR_EXPLICIT_EULER);
+     },
+     "INTEGRATOR_SEMI_IMPLICIT_EULER"},
     {"cloths[0].solver.implicitEuler.iterations = 0:",
      [](v1::Scene& s) { cloth(s).mutable_solver()->mutable_implicit_euler()->set_iterations(0); },
      "from 1 to 10000"},

@@ -84,6 +84,16 @@ TEST(StableSubsteps, AreOneForAClothThatIsAllPinned) {
   EXPECT_EQ(stableSubsteps(scene), 1u);
 }
 
+TEST(StableSubsteps, DoNotCountSpringsOfXpbd) {
+  Scene scene = sheet(10, 10);
+  scene.cloths[0].structural = scene.cloths[0].bend = {1e6f, 1e4f};
+  scene.cloths[0].solver.kind = SolverKind::xpbd;
+  EXPECT_EQ(stableSubsteps(scene), 1u);
+  // Its own damping is explicit: h c < 2.
+  scene.cloths[0].damping = 500;
+  EXPECT_EQ(stableSubsteps(scene), 3u);
+}
+
 TEST(StableSubsteps, AreNoneWhereNotEvenTheMostWouldDo) {
   Scene scene = sheet(10, 10);
   scene.cloths[0].structural.stiffness = 1e6f;

@@ -1,0 +1,223 @@
+// SPDX-License-Identifier: MIT
+// Extended position-based dynamics on the device.
+#include "server/simulation/xpbd_stage.h"
+
+#include <algorithm>
+#include <cstring>
+
+#include "kernels/correct_grids.h"
+#include "kernels/correct_meshes.h"
+#include "kernels/finish_corrections.h"
+
+namespace clothstream::simulation {
+namespace {
+
+using vulkan::BindingKind;
+using vulkan::Bindings;
+using vulkan::Buffer;
+using vulkan::BufferPurpose;
+using vulkan::Kernel;
+
+constexpr auto kTexels = BindingKind::texels;
+constexpr auto kStorage = BindingKind::storage;
+
+constexpr std::uint32_t kAllPasses = 7;
+
+// On a software device barriers cost nothing as long as the workgroup is no wider than the CPU's vectors, and
+// a loop goes round 65,535 times at most. A cloth in one workgroup saves dispatches (a grid two, a mesh one
+// less than it has colours) and leaves all other CPUs idle: on two of them, that turns at about these sizes.
+XpbdCut cutXpbd(const vulkan::Device& device, std::uint32_t workgroupSize,
+                std::optional<std::uint32_t> wholeNodes) {
+  const bool software = device.isSoftware();
+  const std::uint32_t most = device.limits().maxWorkgroupInvocations;
+  XpbdCut cut{.wholeWorkgroup = workgroupSize != 0 ? workgroupSize
+                                : software         ? 8
+                                                   : 256,
+              .partWorkgroup = workgroupSize != 0 ? workgroupSize : 64,
+              .wholeGridNodes = wholeNodes.value_or(2'048),
+              .wholeMeshNodes = wholeNodes.value_or(8'192),
+              .rounds = software ? 65'000 : ~0u};
+  cut.wholeWorkgroup = std::min(cut.wholeWorkgroup, most);
+  cut.partWorkgroup = std::min(cut.partWorkgroup, most);
+  return cut;
+}
+
+template <typename T>
+std::span<const std::byte> bytesOf(const std::vector<T>& records) {
+  return std::as_bytes(std::span(records));
+}
+
+std::uint64_t threads(const TileRange& tiles, std::uint32_t workgroupSize) {
+  return std::uint64_t{tiles.count} * workgroupSize;
+}
+
+// All of them work on the same positions: each waits for the one before it.
+void dispatch(vulkan::Recorder& recorder, const Bindings& bindings, const auto& push, std::uint64_t threads) {
+  recorder.barrier();
+  recorder.dispatch(bindings, push, threads);
+}
+
+}  // namespace
+
+XpbdVariant xpbdVariantOf(std::span<const shared::ClothRecord> cloths, bool colliders) {
+  XpbdVariant variant{false, false, colliders};
+  for (const shared::ClothRecord& cloth : cloths) {
+    for (const shared::vec4& spring : cloth.springs) variant.damped = variant.damped || spring.y != 0;
+    variant.bend = variant.bend || cloth.springs[2].x != 0;
+  }
+  return variant;
+}
+
+// Bindings want a buffer, even of what there is none.
+XpbdStage::Table::Table(const vulkan::Device& device, std::span<const std::byte> bytes)
+    : upload(device, BufferPurpose::upload, std::max(bytes.size(), sizeof(shared::vec4))),
+      texels(device, BufferPurpose::texels, upload.bytes()) {
+  if (!bytes.empty()) std::memcpy(upload.mapped().data(), bytes.data(), bytes.size());
+}
+
+XpbdStage::XpbdStage(const vulkan::Device& device, std::span<const scene::Cloth> cloths,
+                     const StateBuffers& state, std::uint32_t workgroupSize,
+                     std::optional<std::uint32_t> wholeNodes)
+    : device_(device),
+      state_(state),
+      cut_(cutXpbd(device, workgroupSize, wholeNodes)),
+      tables_(xpbdTables(cloths, cut_)),
+      tiles_(device, bytesOf(tables_.tiles)),
+      colours_(device, bytesOf(tables_.colours)),
+      links_(device, bytesOf(tables_.links)),
+      multipliers_(
+          device, BufferPurpose::state,
+          sizeof(float) * (tables_.iterated ? tables_.gridMultipliers + tables_.links.size() + 1 : 4)) {}
+
+void XpbdStage::recordTables(vulkan::Recorder& recorder) const {
+  for (const Table* table : {&tiles_, &colours_, &links_})
+    recorder.copy(table->upload, table->texels, table->upload.bytes());
+}
+
+const Stage& XpbdStage::grids(const XpbdVariant& variant, std::uint32_t passes) {
+  // Corners have no bend springs.
+  const bool bend = variant.bend && passes != 1;
+  const std::size_t pass = passes == kAllPasses ? 3 : passes / 2;
+  std::unique_ptr<Stage>& stage = grids_[pass | (variant.damped ? 4u : 0u) | (bend ? 8u : 0u)];
+  if (stage) return *stage;
+  const Buffer *one = state_.positions[0], *other = state_.positions[1];
+  stage = std::make_unique<Stage>(
+      device_,
+      vulkan::KernelDescription{
+          .name = "correct_grids",
+          .spirv = kernels::correct_grids,
+          .bindings = {kTexels, kTexels, kTexels, kTexels, kStorage, kStorage},
+          .pushConstantBytes = sizeof(shared::XpbdPush),
+          .workgroupSize = passes == kAllPasses ? cut_.wholeWorkgroup : cut_.partWorkgroup,
+          .specialisation = {variant.damped ? 1u : 0u, tables_.iterated ? 1u : 0u, passes, bend ? 1u : 0u}},
+      Stage::Buffers{&state_.cloths, &tiles_.texels, one, other, other, &multipliers_},
+      Stage::Buffers{&state_.cloths, &tiles_.texels, other, one, one, &multipliers_});
+  return *stage;
+}
+
+const Stage& XpbdStage::meshes(const XpbdVariant& variant, bool whole) {
+  std::unique_ptr<Stage>& stage = meshes_[(whole ? 1u : 0u) | (variant.damped ? 2u : 0u)];
+  if (stage) return *stage;
+  const Buffer *one = state_.positions[0], *other = state_.positions[1];
+  stage = std::make_unique<Stage>(
+      device_,
+      vulkan::KernelDescription{
+          .name = "correct_meshes",
+          .spirv = kernels::correct_meshes,
+          .bindings = {kTexels, kTexels, kTexels, kTexels, kStorage, kStorage, kTexels, kTexels},
+          .pushConstantBytes = sizeof(shared::XpbdPush),
+          .workgroupSize = whole ? cut_.wholeWorkgroup : cut_.partWorkgroup,
+          .specialisation = {variant.damped ? 1u : 0u, tables_.iterated ? 1u : 0u, whole ? 1u : 0u}},
+      Stage::Buffers{&state_.cloths, &tiles_.texels, one, other, other, &multipliers_, &colours_.texels,
+                     &links_.texels},
+      Stage::Buffers{&state_.cloths, &tiles_.texels, other, one, one, &multipliers_, &colours_.texels,
+                     &links_.texels});
+  return *stage;
+}
+
+const Stage& XpbdStage::finish(const XpbdVariant& variant) {
+  std::unique_ptr<Stage>& stage = finish_[variant.colliders ? 1 : 0];
+  if (stage) return *stage;
+  const auto& [one, other] = state_.positions;
+  const auto& [oneVelocity, otherVelocity] = state_.velocities;
+  const Buffer *colliders = &state_.colliders, *near = &state_.nearColliders;
+  stage = std::make_unique<Stage>(
+      device_,
+      vulkan::KernelDescription{
+          .name = "finish_corrections",
+          .spirv = kernels::finish_corrections,
+          .bindings = {kTexels, kTexels, kTexels, kTexels, kTexels, kTexels, kStorage, kStorage, kTexels},
+          .pushConstantBytes = sizeof(shared::FinishPush),
+          .workgroupSize = cut_.partWorkgroup,
+          .specialisation = {variant.colliders ? 1u : 0u}},
+      Stage::Buffers{&state_.cloths, &tiles_.texels, one, other, colliders, near, other, otherVelocity,
+                     otherVelocity},
+      Stage::Buffers{&state_.cloths, &tiles_.texels, other, one, colliders, near, one, oneVelocity,
+                     oneVelocity});
+  return *stage;
+}
+
+void XpbdStage::prepare(const XpbdVariant& variant) {
+  if (tables_.wholeGrids.count > 0) grids(variant, kAllPasses);
+  if (tables_.partGrids[0].count > 0)
+    for (std::uint32_t pass = 0; pass < kGridPasses; ++pass) grids(variant, 1u << pass);
+  if (tables_.wholeMeshes.count > 0) meshes(variant, true);
+  if (!tables_.partMeshes.empty()) meshes(variant, false);
+  finish(variant);
+}
+
+// In as many dispatches as the device's limit on loops asks for.
+void XpbdStage::recordWhole(vulkan::Recorder& recorder, std::uint32_t from, const XpbdVariant& variant) {
+  const std::uint32_t each = std::max(1u, cut_.rounds / std::max(1u, tables_.roundsPerIteration));
+  for (std::uint32_t first = 0; first < tables_.wholeIterations; first += each) {
+    shared::XpbdPush push{};
+    push.firstMultiplier = tables_.gridMultipliers;
+    push.firstIteration = first;
+    push.endIteration = first + std::min(each, tables_.wholeIterations - first);
+    if (tables_.wholeGrids.count > 0) {
+      push.firstTile = tables_.wholeGrids.first;
+      dispatch(recorder, grids(variant, kAllPasses).from[from], push,
+               threads(tables_.wholeGrids, cut_.wholeWorkgroup));
+    }
+    if (tables_.wholeMeshes.count > 0) {
+      push.firstTile = tables_.wholeMeshes.first;
+      dispatch(recorder, meshes(variant, true).from[from], push,
+               threads(tables_.wholeMeshes, cut_.wholeWorkgroup));
+    }
+  }
+}
+
+void XpbdStage::recordParts(vulkan::Recorder& recorder, std::uint32_t from, const XpbdVariant& variant) {
+  shared::XpbdPush push{};
+  push.firstMultiplier = tables_.gridMultipliers;
+  for (; push.firstIteration < tables_.partGridIterations; ++push.firstIteration)
+    for (std::uint32_t pass = 0; pass < kGridPasses; ++pass) {
+      push.endIteration = push.firstIteration + 1;
+      push.firstTile = tables_.partGrids[pass].first;
+      dispatch(recorder, grids(variant, 1u << pass).from[from], push,
+               threads(tables_.partGrids[pass], cut_.partWorkgroup));
+    }
+  for (const XpbdTables::PartMesh& mesh : tables_.partMeshes) {
+    push.cloth = mesh.cloth;
+    for (push.firstIteration = 0; push.firstIteration < mesh.iterations; ++push.firstIteration)
+      for (const TileRange& colour : mesh.colours) {
+        push.firstSpring = colour.first;
+        push.springs = colour.count;
+        dispatch(recorder, meshes(variant, false).from[from], push, colour.count);
+      }
+  }
+}
+
+void XpbdStage::record(vulkan::Recorder& recorder, std::uint32_t from, const XpbdVariant& variant,
+                       shared::FinishPush push) {
+  recordWhole(recorder, from, variant);
+  recordParts(recorder, from, variant);
+  const std::uint32_t most = device_.limits().maxDispatchX;
+  for (std::uint32_t done = 0; done < tables_.nodes.count; done += most) {
+    push.firstTile = tables_.nodes.first + done;
+    dispatch(recorder, finish(variant).from[from], push,
+             std::uint64_t{std::min(most, tables_.nodes.count - done)} * cut_.partWorkgroup);
+  }
+}
+
+}  // namespace clothstream::simulation

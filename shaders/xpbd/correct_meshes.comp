@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: MIT
+// Corrects the springs of meshes, colour by colour. Writes cannot race: no two springs of a colour share a
+// node. A workgroup does its part of one colour, or all colours of a whole cloth with barriers between; the
+// bits are the same.
+#version 450
+#extension GL_GOOGLE_include_directive : require
+
+#include "shaders/xpbd/spring.glsl"
+
+layout(local_size_x_id = 0) in;
+layout(constant_id = 3) const bool kWhole = true;
+
+layout(binding = 0) uniform samplerBuffer cloths;          // ClothRecord
+layout(binding = 1) uniform samplerBuffer tiles;           // XpbdTile
+layout(binding = 2) uniform samplerBuffer startPositions;  // of the substep
+layout(binding = 3) uniform samplerBuffer
+    heldPositions;  // the same as the next, where nobody else writes them
+layout(std430, binding = 4) buffer Positions {
+  vec4 positions[];  // w: inverse mass
+};
+layout(std430, binding = 5) buffer Multipliers {
+  float multipliers[];
+};
+layout(binding = 6) uniform samplerBuffer colours;  // ColourRecord
+layout(binding = 7) uniform samplerBuffer links;    // XpbdLinkRecord
+
+layout(push_constant) uniform Push {
+  XpbdPush push;
+};
+
+vec4 fetchNode(int index) {
+  return kWhole ? positions[index] : texelFetch(heldPositions, index);
+}
+
+void correct(uint link, int cloth, bool again) {
+  vec4 ends = texelFetch(links, int(link));
+  int a = int(ends.x);
+  int b = int(ends.y);
+  Spring spring = springFrom(texelFetch(cloths, cloth + CLOTHSTREAM_XPBD_TEXEL + int(ends.w)), ends.z);
+  vec4 nodeA = fetchNode(a);
+  vec4 nodeB = fetchNode(b);
+  precise vec3 d = nodeB.xyz - nodeA.xyz;
+  precise vec3 begun = vec3(0.0);
+  if (kDamped) {
+    begun = texelFetch(startPositions, b).xyz - texelFetch(startPositions, a).xyz;
+  }
+  precise float inverseMasses = nodeA.w + nodeB.w;
+  float multiplier = 0.0;
+  if (kIterated && again) {
+    multiplier = multipliers[push.firstMultiplier + link];
+  }
+  vec3 pull = pullOf(d, begun, spring, inverseResistance(spring, inverseMasses), multiplier);
+  if (kIterated) {
+    multipliers[push.firstMultiplier + link] = multiplier;
+  }
+  precise vec3 movedA = nodeA.xyz - nodeA.w * pull;
+  precise vec3 movedB = nodeB.xyz + nodeB.w * pull;
+  positions[a].xyz = snapTiny(movedA);
+  positions[b].xyz = snapTiny(movedB);
+}
+
+void correctCloth() {
+  vec4 tile = texelFetch(tiles, int(push.firstTile + gl_WorkGroupID.x));
+  int cloth = CLOTHSTREAM_CLOTH_TEXELS * int(tile.x);
+  uint endIteration = min(uint(texelFetch(cloths, cloth + CLOTHSTREAM_XPBD_TEXEL).w), push.endIteration);
+  uint iteration = push.firstIteration;
+  if (iteration >= endIteration) {
+    return;
+  }
+  // Of colours there is one at least, and of a colour's springs.
+  do {
+    int colour = int(tile.y);
+    do {
+      vec4 springs = texelFetch(colours, colour);
+      uint first = uint(springs.x) + (uint(springs.y) << 24);
+      uint count = uint(springs.z);
+      uint i = gl_LocalInvocationID.x;
+      uint rounds = (count + gl_WorkGroupSize.x - 1) / gl_WorkGroupSize.x;
+      do {
+        if (i < count) {
+          correct(first + i, cloth, iteration > 0);
+        }
+        i += gl_WorkGroupSize.x;
+        --rounds;
+      } while (rounds > 0);
+      memoryBarrierBuffer();
+      barrier();
+      ++colour;
+    } while (colour < int(tile.y) + int(tile.z));
+    ++iteration;
+  } while (iteration < endIteration);
+}
+
+void main() {
+  if (kWhole) {
+    correctCloth();
+  } else if (gl_GlobalInvocationID.x < push.springs) {
+    correct(push.firstSpring + gl_GlobalInvocationID.x, CLOTHSTREAM_CLOTH_TEXELS * int(push.cloth),
+            push.firstIteration > 0);
+  }
+}

@@ -1,0 +1,375 @@
+// SPDX-License-Identifier: MIT
+// Extended position-based dynamics: kernels against the double-precision reference, and what it must keep.
+#include <algorithm>
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "server/scene/springs.h"
+#include "tests/simulation/scenes.h"
+
+namespace clothstream::tests {
+namespace {
+
+using simulation::NodeState;
+
+constexpr double kRounding = 1.0 / (1 << 24);
+
+class Xpbd : public GpuTest {};
+
+scene::Cloth corrected(scene::Cloth cloth, std::uint32_t iterations = 1) {
+  cloth.solver.kind = scene::SolverKind::xpbd;
+  cloth.solver.iterations = iterations;
+  return cloth;
+}
+
+scene::Cloth grid(std::uint32_t rows, std::uint32_t columns, std::uint32_t iterations = 1) {
+  scene::Cloth cloth = corrected(calmCloth(rows, columns), iterations);
+  cloth.pins = {{.firstRow = 0, .lastRow = 0, .firstColumn = 0, .lastColumn = columns - 1, .columnStep = 2}};
+  return cloth;
+}
+
+scene::Cloth mesh(std::uint32_t rings, std::uint32_t iterations = 1) {
+  scene::Cloth cloth = corrected(discCloth(rings), iterations);
+  cloth.name = "mesh";
+  cloth.pinnedVertices = {0, 1};
+  return cloth;
+}
+
+// size x size nodes, a metre of cloth of 0.2 kg, hung by one edge; upright, or swinging down from horizontal.
+scene::Scene sheet(std::uint32_t size, std::uint32_t substeps, bool upright) {
+  scene::Cloth cloth;
+  cloth.name = "sheet";
+  cloth.grid = {.rows = size, .columns = size, .width = 1, .height = 1, .pose = {}};
+  if (!upright) cloth.grid.pose.orientation = turned(90, scene::Vec3::UnitX());
+  cloth.mass = 0.2f;
+  cloth.pins = {topRow(cloth)};
+  cloth.solver.compliance = 0.0f;
+  scene::Scene scene = sceneOf({corrected(cloth)});
+  scene.substeps = substeps;
+  return scene;
+}
+
+void expectLikeReference(scene::Scene scene, unsigned seed, simulation::SimulationOptions options = {}) {
+  scene.substeps = 1;
+  scene.simulationRate = 720;
+  // Far beyond what springs as forces bear: a sweep then moves nodes by much of what they are off.
+  for (scene::Cloth& cloth : scene.cloths)
+    for (scene::Spring* spring : {&cloth.structural, &cloth.shear, &cloth.bend}) spring->stiffness *= 30;
+  std::mt19937 random(seed);
+  const NodeState start = randomState(scene, random, 0.002f, 0.5f);
+  const auto referenceAfter = [&](const scene::Scene& of) {
+    reference::ReferenceSimulation reference(of);
+    setState(reference, start);
+    reference.tick(referenceInputs(inputsOf(of)));
+    return reference;
+  };
+  Running running(scene, options);
+  running.restore(start);
+  EXPECT_TRUE(running.tick(inputsOf(scene)).healthy);
+  const NodeState state = running.state();
+  const reference::ReferenceSimulation expected = referenceAfter(scene);
+
+  // A correction rounds each end to half of 2^-24 of at most half a metre on each axis, 2.6e-8 m in all, and
+  // takes a length of at most 0.04 m from such ends with a relative error of 1e-6: 1e-7 m with room to spare.
+  // A sweep corrects a node twelve times, of the disc fifteen; what errors it finds at its neighbours it
+  // makes smaller.
+  std::uint32_t iterations = 0;
+  for (const scene::Cloth& cloth : scene.cloths) iterations = std::max(iterations, cloth.solver.iterations);
+  const double tolerance = iterations * 15 * 1e-7;
+  EXPECT_LT(largestDistance(state, expected), tolerance);
+  EXPECT_LT(largestSpeedDifference(state, expected), 720 * tolerance);
+
+  // It would see a sweep too many, and a little less stiffness.
+  scene::Scene other = scene;
+  for (scene::Cloth& cloth : other.cloths) ++cloth.solver.iterations;
+  EXPECT_GT(largestDistance(state, referenceAfter(other)), 2 * tolerance);
+  other = scene;
+  for (scene::Cloth& cloth : other.cloths) {
+    cloth.structural.stiffness *= 0.8f;
+    if (cloth.solver.compliance) *cloth.solver.compliance += 0.002f;
+  }
+  EXPECT_GT(largestDistance(state, referenceAfter(other)), 2 * tolerance);
+}
+
+TEST_F(Xpbd, movesNodesAsTheReferenceOnEveryShapeOfGrid) {
+  unsigned seed = 1;
+  for (const auto& [rows, columns] :
+       {std::pair{2u, 2u}, {2u, 7u}, {9u, 3u}, {4u, 4u}, {5u, 6u}, {7u, 8u}, {17u, 23u}}) {
+    SCOPED_TRACE(::testing::Message() << rows << " x " << columns);
+    expectLikeReference(sceneOf({grid(rows, columns)}), seed++);
+  }
+}
+
+TEST_F(Xpbd, movesNodesAsTheReferenceInParts) {
+  expectLikeReference(sceneOf({grid(17, 23)}), 8, {.xpbdWholeNodes = 0});
+  expectLikeReference(sceneOf({mesh(7)}), 9, {.xpbdWholeNodes = 0});
+}
+
+TEST_F(Xpbd, movesNodesAsTheReferenceInSeveralSweeps) {
+  expectLikeReference(sceneOf({grid(9, 14, 3)}), 10);
+  expectLikeReference(sceneOf({mesh(5, 3)}), 11);
+}
+
+TEST_F(Xpbd, movesMeshesAsTheReference) {
+  expectLikeReference(sceneOf({mesh(7), grid(6, 9)}), 12);
+}
+
+TEST_F(Xpbd, movesNodesAsTheReferenceWithoutDashpotsOrBendSprings) {
+  scene::Cloth cloth = grid(11, 9);
+  cloth.structural.damping = cloth.shear.damping = cloth.bend.damping = 0;
+  expectLikeReference(sceneOf({cloth}), 13);
+  cloth.bend.stiffness = 0;
+  expectLikeReference(sceneOf({cloth}), 14);
+}
+
+TEST_F(Xpbd, movesNodesAsTheReferenceWithACompliance) {
+  for (const float compliance : {0.0f, 0.001f}) {
+    scene::Cloth cloth = grid(11, 9, 2);
+    cloth.solver.compliance = compliance;
+    expectLikeReference(sceneOf({cloth}), 15);
+  }
+}
+
+TEST_F(Xpbd, feelsTheAirAsTheReferenceDoes) {
+  scene::Cloth cloth = grid(9, 10);
+  cloth.drag = 0.8f;
+  cloth.lift = 0.5f;
+  scene::Scene scene = sceneOf({cloth});
+  scene.environment.wind = scene::Vec3(2, 0, 5);
+  expectLikeReference(scene, 16);
+}
+
+// A chain hangs still where a substep's corrections undo exactly what gravity does in it. What the spring
+// below n nodes then gives is h^2 times its force n m g, whatever the sweep's order: right after it was
+// corrected it is n m g / k too long, and what is corrected after it moves each of its ends by at most h^2 /
+// m times the largest force.
+TEST_F(Xpbd, letsAColumnHangAsItsStiffnessSays) {
+  constexpr std::uint32_t kNodes = 12;
+  scene::Cloth cloth = corrected(calmCloth(kNodes, 2));
+  cloth.structural = {200, 0};
+  cloth.shear = cloth.bend = {};
+  cloth.damping = 20;
+  cloth.pins = {topRow(cloth)};
+  scene::Scene scene = sceneOf({cloth});
+  scene.substeps = 40;
+  Running running(scene);
+  for (const float stiffness : {200.0f, 400.0f}) {
+    cloth.structural.stiffness = stiffness;
+    running.setCloths(std::vector{cloth});
+    for (int tick = 0; tick < 108; ++tick) ASSERT_TRUE(running.tick(inputsOf(scene)).healthy);
+    const NodeState state = running.state();
+    const double h = scene.substepSeconds(), g = double{9.81f}, mass = 0.01;
+    const double tolerance = 2 * h * h * (kNodes - 1) * g + 20 * kRounding;
+    EXPECT_LT(tolerance, 0.02 * (kNodes - 1) * mass * g / double{stiffness});
+    for (std::uint32_t row = 0; row + 1 < kNodes; ++row) {
+      const double length = double{(state.positions[2 * row + 2] - state.positions[2 * row]).norm()};
+      EXPECT_NEAR(length - 0.02, (kNodes - 1 - row) * mass * g / double{stiffness}, tolerance) << row;
+    }
+  }
+}
+
+reference::Vec3 sumOf(const std::vector<scene::Vec3>& vectors) {
+  reference::Vec3 sum = reference::Vec3::Zero();
+  for (const scene::Vec3& v : vectors) sum += v.cast<double>();
+  return sum;
+}
+
+// A correction gives both ends the same momentum, but for the rounding of their positions: each to within
+// half of 2^-24 of the cloth's 0.4 m, which h makes a speed. Roundings are independent; six of their standard
+// deviations.
+TEST_F(Xpbd, keepsAFreeClothsMomentum) {
+  scene::Cloth cloth = corrected(calmCloth(20, 20));
+  cloth.damping = 0;
+  scene::Scene scene = sceneOf({cloth});
+  scene.environment.gravity = scene::Vec3::Zero();
+  std::mt19937 random(7);
+  const NodeState start = randomState(scene, random, 0.001f, 0.5f);
+  Running running(scene);
+  running.restore(start);
+  constexpr int kTicks = 20;
+  for (int tick = 0; tick < kTicks; ++tick) running.tick(inputsOf(scene));
+  const double roundings = 400.0 * kTicks * 10 * 12;
+  const double rounding = 0.4 * kRounding * 720 / std::sqrt(3.0);
+  const NodeState end = running.state();
+  EXPECT_LT((sumOf(end.velocities) - sumOf(start.velocities)).cwiseAbs().maxCoeff(),
+            6 * std::sqrt(roundings) * rounding);
+  // And it has not just stood still.
+  double change = 0;
+  for (std::size_t i = 0; i < end.velocities.size(); ++i)
+    change += double{(end.velocities[i] - start.velocities[i]).norm()};
+  EXPECT_GT(change, 10);
+}
+
+// Velocities are not taken from rounded places: what nothing corrects falls as gravity says, however short
+// the substep.
+TEST_F(Xpbd, fallsExactlyWhereNothingIsStretched) {
+  scene::Cloth cloth = corrected(calmCloth(8, 8));
+  cloth.damping = 0;
+  cloth.grid.pose.position = scene::Vec3(3, 5, 1);
+  scene::Scene scene = sceneOf({cloth});
+  scene.substeps = 200;
+  Running running(scene);
+  for (int tick = 0; tick < 36; ++tick) running.tick(inputsOf(scene));
+  // Springs see the rounding of their ends' places, 5 m from the origin: they shift momentum between nodes,
+  // and their sum stays.
+  const reference::Vec3 mean = sumOf(running.state().velocities) / 64;
+  EXPECT_NEAR(mean.y(), -9.81 * 0.5, 0.001 * 9.81 * 0.5);
+}
+
+TEST_F(Xpbd, leavesPinnedNodesWhereTheyAre) {
+  const scene::Scene scene = sceneOf({grid(9, 14), mesh(4)});
+  const simulation::MovingCollider ball{
+      scene::Sphere{0.1f}, {scene::Vec3(0, -0.05f, 0)}, {scene::Vec3(0, -0.05f, 0)}, 1};
+  Running running(scene);
+  for (int tick = 0; tick < 30; ++tick) running.tick(inputsOf(scene, {ball}));
+  const NodeState rest = simulation::restState(scene.cloths), state = running.state();
+  const std::vector<float> masses = simulation::inverseMasses(scene.cloths);
+  for (std::size_t i = 0; i < masses.size(); ++i) {
+    if (masses[i] > 0) continue;
+    EXPECT_EQ(state.positions[i], rest.positions[i]) << i;
+    EXPECT_EQ(state.velocities[i], scene::Vec3(0, 0, 0)) << i;
+  }
+}
+
+reference::Strain strainOf(const scene::Scene& scene, const NodeState& state) {
+  reference::ReferenceSimulation reference(scene);
+  setState(reference, state);
+  return reference.cloths().front().strain();
+}
+
+// What a hard spring is too long is what its neighbours, corrected after it, have pulled: h^2 / m times their
+// forces. A row carries at most 32 m g a column, so that with h = 1/720 s one such pull is 6e-4 m of 0.032
+// m, 1.9 %; at the ends of the two springs of a column that is two of them. Short substeps are what counts:
+// four times as many leave a sixteenth.
+TEST_F(Xpbd, letsHardSpringsStretchAsLittleAsTheSubstepIsShort) {
+  std::vector<double> strains;
+  for (const std::uint32_t substeps : {10u, 40u}) {
+    scene::Scene scene = sheet(32, substeps, true);
+    scene.cloths.front().damping = 4;
+    scene.cloths.front().structural = scene.cloths.front().shear = {100, 0};
+    Running running(scene);
+    for (int tick = 0; tick < 180; ++tick) running.tick(inputsOf(scene));
+    strains.push_back(strainOf(scene, running.state()).max);
+  }
+  RecordProperty("strain10", std::to_string(strains[0]));
+  RecordProperty("strain40", std::to_string(strains[1]));
+  EXPECT_LT(strains[0], 0.04);
+  EXPECT_LT(strains[1], strains[0] / 10);
+}
+
+TEST_F(Xpbd, leavesNothingInsideASphere) {
+  const scene::Scene scene = sheet(24, 20, false);
+  const scene::Pose place{scene::Vec3(0, -0.3f, -0.3f)};
+  const simulation::MovingCollider ball{scene::Sphere{0.2f}, place, place, 1};
+  Running running(scene);
+  for (int tick = 0; tick < 72; ++tick) ASSERT_TRUE(running.tick(inputsOf(scene, {ball})).healthy);
+  const double distance = 0.2 + double{scene.cloths.front().thickness};
+  double nearest = 1;
+  const NodeState state = running.state();
+  const std::vector<float> masses = simulation::inverseMasses(scene.cloths);
+  for (std::size_t i = 0; i < masses.size(); ++i)
+    if (masses[i] > 0)
+      nearest = std::min(nearest, (state.positions[i] - ball.start.position).cast<double>().norm());
+  EXPECT_GT(nearest, distance * (1 - 1e-5));
+  EXPECT_LT(nearest, distance * 1.01);  // and it does touch it
+}
+
+// A cloth of each solver, a mesh, several sweeps, a ball.
+scene::Scene mixedScene() {
+  scene::Cloth free = calmCloth(9, 14);
+  free.name = "free";
+  free.pins = {topRow(free)};
+  scene::Cloth held = free, adaptive = free;
+  held.name = "held";
+  held.solver.kind = scene::SolverKind::constraint;
+  adaptive.name = "adaptive";
+  adaptive.solver.kind = scene::SolverKind::acad;
+  scene::Cloth swept = grid(13, 11, 3);
+  swept.name = "swept";
+  swept.drag = 0.5f;
+  scene::Scene scene = sceneOf({held, grid(19, 16), free, mesh(6), adaptive, swept, mesh(3, 2)});
+  scene.cloths[1].solver.compliance = 0.0f;
+  scene.cloths.back().name = "small";
+  scene.environment.wind = scene::Vec3(0, 0, 2);
+  return scene;
+}
+
+// Leaves out those that conjugate gradients solve: their own tests have them.
+void eraseSystems(scene::Scene& scene) {
+  std::erase_if(scene.cloths, [](const scene::Cloth& cloth) {
+    return cloth.solver.kind == scene::SolverKind::constraint || cloth.solver.kind == scene::SolverKind::acad;
+  });
+}
+
+simulation::TickInputs mixedInputs(const scene::Scene& scene, int tick) {
+  const auto place = [](int t) {
+    return scene::Pose{scene::Vec3(0.02f, -0.15f, 0.2f - 0.005f * static_cast<float>(t % 80))};
+  };
+  return inputsOf(scene, {{scene::Sphere{0.08f}, place(tick), place(tick + 1), 1}});
+}
+
+TEST_F(Xpbd, givesTheSameBitsHoweverTheWorkIsCut) {
+  scene::Scene scene = mixedScene();
+  eraseSystems(scene);
+  std::vector<std::uint64_t> hashes;
+  for (const auto& [workgroup, wholeNodes] :
+       {std::pair{0u, 0u}, {0u, 150u}, {0u, 1'000'000u}, {32u, 0u}, {128u, 1'000'000u}}) {
+    Running running(scene, {.workgroupSize = workgroup, .xpbdWholeNodes = wholeNodes});
+    simulation::TickStatus status;
+    for (int tick = 0; tick < 12; ++tick) status = running.tick(mixedInputs(scene, tick));
+    EXPECT_TRUE(status.healthy);
+    hashes.push_back(status.stateHash);
+  }
+  for (const std::uint64_t hash : hashes) EXPECT_EQ(hash, hashes.front());
+}
+
+TEST_F(Xpbd, givesTheSameHashesInRunsOfAThousandTicks) {
+  scene::Scene scene = mixedScene();
+  eraseSystems(scene);
+  scene.substeps = 3;
+  for (scene::Cloth& cloth : scene.cloths) cloth.structural.stiffness = cloth.shear.stiffness = 60;
+  Running one(scene), again(scene), other(scene, {.workgroupSize = 16, .xpbdWholeNodes = 0});
+  for (int tick = 0; tick < 1000; ++tick) {
+    const simulation::TickInputs inputs = mixedInputs(scene, tick);
+    const simulation::TickStatus status = one.tick(inputs);
+    ASSERT_TRUE(status.healthy) << tick;
+    ASSERT_EQ(again.tick(inputs).stateHash, status.stateHash) << tick;
+    if (tick < 100) {
+      ASSERT_EQ(other.tick(inputs).stateHash, status.stateHash) << tick;
+    }
+  }
+}
+
+// The same number on every device.
+TEST_F(Xpbd, reachesTheHashOfEveryOtherDevice) {
+  scene::Scene scene = mixedScene();
+  eraseSystems(scene);
+  Running running(scene);
+  simulation::TickStatus status;
+  for (int tick = 0; tick < 60; ++tick) status = running.tick(mixedInputs(scene, tick));
+  EXPECT_EQ(status.stateHash, 0xb62da311813aa0f5u);
+}
+
+TEST_F(Xpbd, leavesClothsOfOtherSolversAsTheyAreAlone) {
+  const scene::Scene together = mixedScene();
+  scene::Scene alone = together;
+  std::erase_if(alone.cloths, [](const scene::Cloth& c) { return c.solver.kind == scene::SolverKind::xpbd; });
+  Running one(alone), both(together);
+  for (int tick = 0; tick < 20; ++tick) {
+    one.tick(mixedInputs(alone, tick));
+    both.tick(mixedInputs(together, tick));
+  }
+  const NodeState expected = one.state(), found = both.state();
+  const std::vector<std::uint32_t> offsets = simulation::clothOffsets(together.cloths);
+  std::size_t node = 0;
+  for (std::size_t i = 0; i < together.cloths.size(); ++i) {
+    if (together.cloths[i].solver.kind == scene::SolverKind::xpbd) continue;
+    for (std::uint32_t k = offsets[i]; k < offsets[i + 1]; ++k, ++node)
+      ASSERT_EQ(expected.positions[node], found.positions[k]) << together.cloths[i].name << " " << k;
+  }
+  EXPECT_EQ(node, expected.positions.size());
+}
+
+}  // namespace
+}  // namespace clothstream::tests
