@@ -21,6 +21,8 @@ constexpr std::array kSuites{
                  &bench::runMassSpring},
     bench::Suite{"paper", "Figures 7 to 10 of the paper at its sizes, beside its frames per second",
                  &bench::runPaper},
+    bench::Suite{"solvers", "a hanging sheet by every solver: what a substep costs and what it stretches",
+                 &bench::runSolvers},
     bench::Suite{"curtain", "the scene curtain, served to one client in this process: tick, pose to packet",
                  &bench::runCurtain},
     bench::Suite{"colliders", "a tick with 0, 1, 100 and 4,000 colliders, most of them far from the cloth",
@@ -44,7 +46,7 @@ int main(int argc, char** argv) {
   std::string name;
   bench::Settings settings;
   bool json = false;
-  std::uint32_t size = 0, softwareThreads = 0;
+  std::uint32_t size = 0, softwareThreads = 0, xpbdWholeNodes = 0;
   app.add_option("suite", name, "Which suite to run:" + list)->required()->check(CLI::IsMember(suites));
   CLI::Option* sizeOption =
       app.add_option("--size", size, "Rows and columns of the grid, instead of a ladder")
@@ -56,8 +58,11 @@ int main(int argc, char** argv) {
   app.add_option("--seconds", settings.seconds, "Time to measure, a row")->check(CLI::PositiveNumber);
   app.add_option("--rows", settings.rowsPerInvocation, "Rows an invocation walks down (0: the default)");
   app.add_option("--workgroup", settings.workgroupSize, "Invocations in a workgroup (0: the default)");
+  CLI::Option* wholeOption = app.add_option("--xpbd-whole", xpbdWholeNodes,
+                                            "Nodes of the largest cloth that one workgroup sweeps (xpbd)");
   CLI11_PARSE(app, argc, argv);
   if (*sizeOption) settings.size = size;
+  if (*wholeOption) settings.xpbdWholeNodes = xpbdWholeNodes;
   if (*threadsOption) settings.device.softwareThreads = softwareThreads;
 
   try {

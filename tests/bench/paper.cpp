@@ -8,6 +8,7 @@
 
 #include "server/scene/springs.h"
 #include "tests/bench/simulated.h"
+#include "tests/bench/strain.h"
 #include "tests/bench/suite.h"
 
 namespace clothstream::bench {
@@ -96,15 +97,6 @@ void check(vulkan::Device& device, scene::Scene scene, std::size_t links,
   Simulated(device, scene, {}).check(inputs, 10 * double{solver.tolerance} * side);
 }
 
-// Of the structural springs.
-double strainP99(const std::vector<scene::SpringLink>& links, const simulation::NodeState& state) {
-  Samples strains;
-  for (const scene::SpringLink& link : links)
-    if (link.kind == scene::SpringKind::structural)
-      strains.add(double{(state.positions[link.b] - state.positions[link.a]).norm() / link.restLength} - 1);
-  return strains.p99();
-}
-
 Rows::value_type measure(vulkan::Device& device, const Settings& settings, const Case& experiment) {
   const scene::Scene scene = sceneOf(experiment);
   const scene::Cloth& cloth = scene.cloths.front();
@@ -149,7 +141,7 @@ Rows::value_type measure(vulkan::Device& device, const Settings& settings, const
     row["converged"] = finite && residuals.p99() <= double{kConverged};
   }
   row["finite"] = finite;
-  if (finite) row["strainP99"] = strainP99(links, simulated.state());
+  if (finite) row["strainP99"] = structuralStrains(cloth, simulated.state()).p99();
   row["frames"] = simulated.wall().count();
   row["device"] = device.info().name;
   return row;

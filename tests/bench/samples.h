@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstddef>
+#include <numeric>
 #include <vector>
 
 namespace clothstream::bench {
@@ -18,6 +19,9 @@ class Samples {
   double min() const { return quantile(0); }
   double median() const { return quantile(0.5); }
   double p99() const { return quantile(0.99); }
+  double mean() const {
+    return std::accumulate(values_.begin(), values_.end(), 0.0) / static_cast<double>(values_.size());
+  }
 
   // The smallest value that at least this part of all does not exceed. There must be one.
   double quantile(double part) const {

@@ -19,6 +19,7 @@ struct Settings {
   double seconds = 1;                   // of measuring, a row
   std::uint32_t rowsPerInvocation = 0;  // 0: as the simulation chooses
   std::uint32_t workgroupSize = 0;
+  std::optional<std::uint32_t> xpbdWholeNodes;  // likewise where it is absent
 };
 
 // One JSON object a row; every row names its suite. A suite checks its results before it reports a time, and
@@ -33,6 +34,7 @@ struct Suite {
 
 Rows runMassSpring(vulkan::Device& device, const Settings& settings);
 Rows runPaper(vulkan::Device& device, const Settings& settings);
+Rows runSolvers(vulkan::Device& device, const Settings& settings);
 Rows runCurtain(vulkan::Device& device, const Settings& settings);
 Rows runColliders(vulkan::Device& device, const Settings& settings);
 Rows runCodec(vulkan::Device& device, const Settings& settings);

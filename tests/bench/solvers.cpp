@@ -1,0 +1,112 @@
+// SPDX-License-Identifier: MIT
+// Suite solvers: the same hanging sheet by every solver, what a substep costs and what it stretches.
+#include <limits>
+#include <optional>
+#include <stdexcept>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "tests/bench/simulated.h"
+#include "tests/bench/strain.h"
+#include "tests/bench/suite.h"
+
+namespace clothstream::bench {
+namespace {
+
+constexpr std::uint32_t kTicks = 72;  // a second
+
+struct Case {
+  const char* method;
+  scene::SolverKind kind;
+  std::uint32_t substeps = 10;
+  float stiffness = 0;  // N/m; 0: as stiff as a force may be
+  std::uint32_t sweeps = 1;
+  std::optional<float> compliance = {};
+};
+
+// XPBD's stiffness is that of cloth which hardly stretches under its own weight.
+constexpr Case kCases[] = {{"mass_spring", scene::SolverKind::massSpring},
+                           {"acad", scene::SolverKind::acad},
+                           {"constraint", scene::SolverKind::constraint},
+                           {"xpbd", scene::SolverKind::xpbd, 10, 1000},
+                           {"xpbd, 4 sweeps", scene::SolverKind::xpbd, 10, 1000, 4},
+                           {"xpbd", scene::SolverKind::xpbd, 40, 1000},
+                           {"xpbd, compliance 0", scene::SolverKind::xpbd, 40, 0, 1, 0.0f}};
+
+// A square metre of 0.2 kg, hung by its upper edge.
+scene::Scene sceneOf(const Case& experiment, std::uint32_t size) {
+  scene::Scene scene;
+  scene.name = "solvers";
+  scene.substeps = experiment.substeps;
+  scene::Cloth cloth;
+  cloth.name = "sheet";
+  cloth.grid = {.rows = size, .columns = size, .width = 1, .height = 1, .pose = {}};
+  cloth.mass = 0.2f;
+  cloth.damping = 1;
+  cloth.pins = {{.firstRow = 0, .lastRow = 0, .firstColumn = 0, .lastColumn = size - 1}};
+  cloth.solver.kind = experiment.kind;
+  if (experiment.kind == scene::SolverKind::xpbd) cloth.solver.iterations = experiment.sweeps;
+  cloth.solver.compliance = experiment.compliance;
+  // 2 (4 + 4 / 2 + 4 / 10) k h^2 / m = 3.2 of the 4 that a step bears.
+  const double h = scene.substepSeconds();
+  const auto bearable = static_cast<float>(0.25 * double{cloth.nodeMass()} / (h * h));
+  const float stiffness = experiment.stiffness > 0 ? experiment.stiffness : bearable;
+  cloth.structural.stiffness = stiffness;
+  cloth.shear.stiffness = stiffness / 2;
+  cloth.bend.stiffness = bearable / 10;
+  scene.cloths = {cloth};
+  return scene;
+}
+
+// Of a structural spring, parts of its length. Xpbd: what its stiffness and its neighbours' corrections in a
+// substep allow (docs/simulation.md), twice over for the fall. Constraints: that they hold at all. Of forces
+// none: how much they stretch is what the row is to show.
+double mostStrain(const scene::Scene& scene) {
+  const scene::Cloth& cloth = scene.cloths.front();
+  if (cloth.solver.kind == scene::SolverKind::massSpring) return std::numeric_limits<double>::max();
+  if (cloth.solver.kind != scene::SolverKind::xpbd) return 1;
+  const double rows = cloth.grid.rows, length = double{cloth.grid.height} / (rows - 1),
+               h = scene.substepSeconds();
+  const double compliance =
+      cloth.solver.compliance ? double{*cloth.solver.compliance} : 1 / double{cloth.structural.stiffness};
+  return 2 * rows * 9.81 * (double{cloth.nodeMass()} * compliance + 2 * h * h) / length;
+}
+
+Rows::value_type measure(vulkan::Device& device, const Settings& settings, const Case& experiment,
+                         std::uint32_t size) {
+  const scene::Scene scene = sceneOf(experiment, size);
+  const simulation::TickInputs inputs{scene.environment, {}};
+  Simulated simulated(device, scene,
+                      {.rowsPerInvocation = settings.rowsPerInvocation,
+                       .workgroupSize = settings.workgroupSize,
+                       .xpbdWholeNodes = settings.xpbdWholeNodes});
+  for (std::uint32_t tick = 0; tick < kTicks; ++tick) simulated.tick(inputs);
+  const Samples strains = structuralStrains(scene.cloths.front(), simulated.state());
+  if (!(strains.quantile(1) <= mostStrain(scene)))
+    throw std::runtime_error(fmt::format("{}, {} nodes a side: a spring stretches by {}", experiment.method,
+                                         size, strains.quantile(1)));
+  const auto substeps = static_cast<double>(std::uint64_t{scene.nodeCount()} * scene.substeps);
+  return {{"suite", "solvers"},
+          {"method", experiment.method},
+          {"nodes", scene.nodeCount()},
+          {"substeps", scene.substeps},
+          {"stiffness", scene.cloths.front().structural.stiffness},
+          {"nsPerNodeSubstep", simulated.wall().median() / substeps * 1e9},
+          {"nsPerNodeSubstepMin", simulated.wall().min() / substeps * 1e9},
+          {"strainMean", strains.mean()},
+          {"strainP99", strains.p99()},
+          {"strainMax", strains.quantile(1)},
+          {"device", device.info().name}};
+}
+
+}  // namespace
+
+Rows runSolvers(vulkan::Device& device, const Settings& settings) {
+  Rows rows;
+  for (const std::uint32_t size : settings.size ? std::vector{*settings.size} : std::vector{64u, 256u})
+    for (const Case& experiment : kCases) rows.push_back(measure(device, settings, experiment, size));
+  return rows;
+}
+
+}  // namespace clothstream::bench
