@@ -17,6 +17,8 @@ std::string solverName(std::uint32_t solver) {
       return "constraint";
     case CS_SOLVER_ACAD:
       return "acad";
+    case CS_SOLVER_XPBD:
+      return "xpbd";
     case CS_SOLVER_IMPLICIT_EULER:
       return "implicitEuler";
     default:

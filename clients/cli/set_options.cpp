@@ -24,8 +24,9 @@ void addSetOptions(CLI::App& app, SetOptions& options) {
   const std::map<std::string, std::uint32_t> solvers{{"massSpring", CS_SOLVER_MASS_SPRING},
                                                      {"constraint", CS_SOLVER_CONSTRAINT},
                                                      {"acad", CS_SOLVER_ACAD},
+                                                     {"xpbd", CS_SOLVER_XPBD},
                                                      {"implicitEuler", CS_SOLVER_IMPLICIT_EULER}};
-  app.add_option("--solver", settings.solver, "massSpring, constraint, acad or implicitEuler")
+  app.add_option("--solver", settings.solver, "massSpring, constraint, acad, xpbd or implicitEuler")
       ->transform(CLI::CheckedTransformer(solvers, CLI::ignore_case))
       ->group(solver);
   app.add_option("--iterations", settings.iterations, "Of a solve, at most")

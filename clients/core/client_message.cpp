@@ -72,6 +72,12 @@ std::string solverMessage(const Solver& solver) {
     writer.add_float(1, solver.activation);
     writer.add_message(2, constraintMessage(solver));
   }
+  if (solver.kind == CS_SOLVER_XPBD) {
+    settings.clear();
+    Writer writer(settings);
+    writer.add_uint32(1, solver.iterations);
+    if (solver.compliance) writer.add_float(2, *solver.compliance);
+  }
   if (solver.kind == CS_SOLVER_IMPLICIT_EULER) {
     settings.clear();
     Writer writer(settings);

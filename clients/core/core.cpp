@@ -310,12 +310,13 @@ int cs_get_cloth_settings(const cs_client* client, uint32_t index, cs_cloth_sett
   out->thickness = parameters.thickness;
   out->solver = parameters.solver.kind;
   const bool constrained = out->solver == CS_SOLVER_CONSTRAINT || out->solver == CS_SOLVER_ACAD;
-  if (!constrained && out->solver != CS_SOLVER_IMPLICIT_EULER) return 1;
-  out->iterations = parameters.solver.iterations;
-  out->tolerance = parameters.solver.tolerance;
+  if (constrained || out->solver == CS_SOLVER_XPBD || out->solver == CS_SOLVER_IMPLICIT_EULER)
+    out->iterations = parameters.solver.iterations;
+  if (constrained || out->solver == CS_SOLVER_IMPLICIT_EULER) out->tolerance = parameters.solver.tolerance;
+  if (constrained || out->solver == CS_SOLVER_XPBD)
+    out->compliance = parameters.solver.compliance.value_or(kAsIs);
   if (!constrained) return 1;
   out->bend_constraints = parameters.solver.bendConstraints ? 1 : 0;
-  out->compliance = parameters.solver.compliance.value_or(kAsIs);
   out->activation = parameters.solver.activation;
   return 1;
 }

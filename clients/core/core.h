@@ -77,6 +77,7 @@ typedef enum cs_solver {
   CS_SOLVER_MASS_SPRING = 1,
   CS_SOLVER_CONSTRAINT = 2,
   CS_SOLVER_ACAD = 3,
+  CS_SOLVER_XPBD = 4,
   CS_SOLVER_IMPLICIT_EULER = 5
 } cs_solver;
 

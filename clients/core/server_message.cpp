@@ -135,6 +135,13 @@ bool readAcadSolver(Bytes message, Solver& solver) {
   });
 }
 
+bool readXpbdSolver(Bytes message, Solver& solver) {
+  return readFields(message, [&](std::uint32_t field, Reader& reader) {
+    if (field == varint(1)) return set(solver.iterations, reader.get_uint32());
+    return field == fixed32(2) ? setFinite(solver.compliance, reader) : skip(reader);
+  });
+}
+
 bool readImplicitEulerSolver(Bytes message, Solver& solver) {
   return readFields(message, [&](std::uint32_t field, Reader& reader) {
     if (field == varint(1)) return set(solver.iterations, reader.get_uint32());
@@ -411,6 +418,8 @@ bool readSolver(Bytes message, Solver& out) {
         return readConstraintSolver(settings, out);
       case CS_SOLVER_ACAD:
         return readAcadSolver(settings, out);
+      case CS_SOLVER_XPBD:
+        return readXpbdSolver(settings, out);
       case CS_SOLVER_IMPLICIT_EULER:
         return readImplicitEulerSolver(settings, out);
       default:

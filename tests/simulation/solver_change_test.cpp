@@ -18,7 +18,7 @@ using simulation::NodeState;
 using simulation::StateSnapshot;
 
 constexpr SolverKind kKinds[] = {SolverKind::massSpring, SolverKind::constraint, SolverKind::acad,
-                                 SolverKind::implicitEuler};
+                                 SolverKind::xpbd, SolverKind::implicitEuler};
 
 class SolverChange : public GpuTest {};
 

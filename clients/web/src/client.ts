@@ -100,6 +100,7 @@ export const Solvers: ReadonlyMap<number, string> = new Map([
   [1, "mass-spring"],
   [2, "constraint"],
   [3, "ACAD"],
+  [4, "XPBD"],
   [5, "implicit Euler"],
 ]);
 
