@@ -59,8 +59,10 @@ inline constexpr Range kTolerance{0, 1};
 inline constexpr Range kActivation{0, 10};  // part of a length
 inline constexpr std::uint32_t kMaxIterations = 10'000;
 inline constexpr std::uint32_t kMaxXpbdIterations = 1'000;
-inline constexpr std::uint32_t kMaxSolverNodes = 1'048'576;  // of a cloth
-inline constexpr double kUnitTolerance = 0.001;              // of a quaternion's length
+inline constexpr std::uint32_t kMaxSolverNodes = 1'048'576;       // of a cloth
+inline constexpr double kMinBallRadius = 0.00005;                 // m, of self-collision
+inline constexpr std::uint32_t kMaxSelfCollisionNodes = 524'288;  // of a scene
+inline constexpr double kUnitTolerance = 0.001;                   // of a quaternion's length
 
 inline constexpr float kDefaultWeldDistance = 1e-5f;  // m
 inline constexpr float kDefaultArealMass = 0.2f;      // kg/m^2

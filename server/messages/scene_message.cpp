@@ -13,6 +13,7 @@
 #include "server/messages/validation.h"
 #include "server/messages/vectors.h"
 #include "server/scene/mesh.h"
+#include "server/scene/springs.h"
 #include "server/scene/stability.h"
 
 namespace clothstream::messages {
@@ -115,6 +116,18 @@ void readConstraint(Checks& checks, const Path& path, const v1::ConstraintSolver
   readIterations(checks, path, message, solver);
 }
 
+scene::SelfCollision toSelfCollision(Checks& checks, const Path& path, const v1::SelfCollision& message,
+                                     const scene::Cloth& cloth) {
+  const float shortest = scene::shortestSpring(cloth);
+  scene::SelfCollision collision{.radius = shortest / 2};
+  if (message.has_radius())
+    collision.radius =
+        checks.number(path / "radius", message.radius(), {limits::kMinBallRadius, double{shortest}});
+  if (message.has_friction())
+    collision.friction = checks.number(path / "friction", message.friction(), limits::kFriction);
+  return collision;
+}
+
 // Pins of a grid by number.
 void toPinnedVertices(Checks& checks, const Path& path, const v1::Cloth& message, scene::Cloth& cloth) {
   for (int i = 0; i < message.pinned_vertices_size() && !checks.failed(); ++i)
@@ -168,6 +181,8 @@ scene::Cloth toCloth(Checks& checks, const Path& path, const v1::Cloth& message,
   if (message.has_thickness())
     cloth.thickness = checks.number(path / "thickness", message.thickness(), limits::kThickness);
   cloth.solver = toSolver(checks, path / "solver", message.solver());
+  if (message.has_self_collision() && !checks.failed())
+    cloth.selfCollision = toSelfCollision(checks, path / "selfCollision", message.self_collision(), cloth);
   return cloth;
 }
 
@@ -241,6 +256,17 @@ void checkSolvers(Checks& checks, const scene::Scene& scene) {
       const Path element = root.at("cloths", static_cast<int>(i));
       checks.fail(element / "solver", "", *complaint);
     }
+}
+
+void checkSelfCollision(Checks& checks, const scene::Scene& scene) {
+  const auto has = [](const scene::Cloth& cloth) { return cloth.selfCollision.has_value(); };
+  const auto first = std::ranges::find_if(scene.cloths, has);
+  if (first == scene.cloths.end() || scene.nodeCount() <= limits::kMaxSelfCollisionNodes) return;
+  const Path root;
+  const Path element = root.at("cloths", static_cast<int>(first - scene.cloths.begin()));
+  checks.fail(element / "selfCollision", "",
+              fmt::format("is for scenes of at most {} nodes; this one has {}",
+                          limits::kMaxSelfCollisionNodes, scene.nodeCount()));
 }
 
 void checkSize(Checks& checks, const scene::Scene& scene) {
@@ -342,6 +368,7 @@ Result<scene::Scene> toScene(const v1::Scene& message, const MeshReader& readMes
   checkUnique(checks, "colliders", scene.colliders);
   checkSize(checks, scene);
   checkSolvers(checks, scene);
+  checkSelfCollision(checks, scene);
   if (!checks.failed())
     if (const auto complaint = instability(scene))
       checks.fail(root / "substeps", fmt::format("{}", scene.substeps), *complaint);

@@ -55,6 +55,10 @@ void writeCloth(const scene::Cloth& cloth, v1::Cloth& message) {
   message.set_thickness(cloth.thickness);
   for (const scene::GridRange& range : cloth.pins) writeRange(range, *message.add_pins());
   *message.mutable_solver() = toMessage(cloth.solver);
+  if (cloth.selfCollision) {
+    message.mutable_self_collision()->set_radius(cloth.selfCollision->radius);
+    message.mutable_self_collision()->set_friction(cloth.selfCollision->friction);
+  }
   message.mutable_pinned_vertices()->Add(cloth.pinnedVertices.begin(), cloth.pinnedVertices.end());
   for (const scene::Region& region : cloth.pinnedRegions) write(region, *message.add_pinned_regions());
 }

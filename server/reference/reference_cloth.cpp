@@ -211,10 +211,10 @@ void ReferenceCloth::enforceConstraints(double h) {
 }
 
 void ReferenceCloth::collide(const scene::Shape& shape, const ColliderStep& step, double friction,
-                             std::span<const Vec3> from) {
+                             std::span<const Vec3> from, std::span<const std::uint8_t> only) {
   const double mu = cloth_.friction * friction;
   for (std::size_t i = 0; i < positions_.size(); ++i) {
-    if (inverseMasses_[i] == 0) continue;
+    if (inverseMasses_[i] == 0 || (!only.empty() && only[i] == 0)) continue;
     const std::optional<Contact> contact = contactOf(shape, cloth_.thickness, step, from[i], positions_[i]);
     if (!contact) continue;
     positions_[i] += contact->depth * contact->normal;

@@ -51,9 +51,9 @@ class ReferenceCloth {
 
   // Nodes on their way from `from`, one place a node, to where they are go out of the shape; their velocity
   // relative to its surface loses what goes into it, and the rest meets Coulomb friction ([Va21] 3.4, Alg.
-  // 4).
+  // 4). `only`: one byte a node, which of them; empty: all.
   void collide(const scene::Shape& shape, const ColliderStep& step, double friction,
-               std::span<const Vec3> from);
+               std::span<const Vec3> from, std::span<const std::uint8_t> only = {});
 
   // Unit normals; (0,0,1) where they vanish. A grid's from up to eight triangles round a node ([Va21] 3.5,
   // Alg. 5), a mesh's from the area vectors of a node's triangles.

@@ -2,6 +2,8 @@
 // Ticks of the reference.
 #include "server/reference/reference_simulation.h"
 
+#include <algorithm>
+
 namespace clothstream::reference {
 
 TickInputs inputsAt(const scene::Scene& scene, std::uint64_t tick) {
@@ -15,7 +17,10 @@ TickInputs inputsAt(const scene::Scene& scene, std::uint64_t tick) {
 }
 
 ReferenceSimulation::ReferenceSimulation(const scene::Scene& scene)
-    : scene_(scene), cloths_(scene.cloths.begin(), scene.cloths.end()) {}
+    : scene_(scene),
+      cloths_(scene.cloths.begin(), scene.cloths.end()),
+      selfCollision_(scene),
+      before_(scene.cloths.size()) {}
 
 void ReferenceSimulation::tick(const TickInputs& inputs) {
   for (std::uint32_t index = 0; index < scene_.substeps; ++index) substep(inputs, index);
@@ -27,13 +32,40 @@ void ReferenceSimulation::tick() {
 }
 
 void ReferenceSimulation::substep(const TickInputs& inputs, std::uint32_t index) {
-  for (ReferenceCloth& cloth : cloths_) {
-    before_.assign(cloth.positions().begin(), cloth.positions().end());
+  for (std::size_t i = 0; i < cloths_.size(); ++i) {
+    ReferenceCloth& cloth = cloths_[i];
+    before_[i].assign(cloth.positions().begin(), cloth.positions().end());
     cloth.integrate(inputs.environment, scene_.integrator, scene_.substepSeconds());
     for (const MovingCollider& collider : inputs.colliders)
       cloth.collide(collider.shape,
                     stepOf(collider.start, collider.end, index, scene_.substeps, scene_.tickSeconds()),
-                    collider.friction, before_);
+                    collider.friction, before_[i]);
+  }
+  if (!selfCollision_.exists()) return;
+  for (int i = 0; i < scene::kContactIterations; ++i) collideWithCloth(inputs, index);
+}
+
+void ReferenceSimulation::collideWithCloth(const TickInputs& inputs, std::uint32_t index) {
+  std::vector<Vec3> positions, velocities;
+  std::vector<double> inverseMasses;
+  for (const ReferenceCloth& cloth : cloths_) {
+    positions.insert(positions.end(), cloth.positions().begin(), cloth.positions().end());
+    velocities.insert(velocities.end(), cloth.velocities().begin(), cloth.velocities().end());
+    inverseMasses.insert(inverseMasses.end(), cloth.inverseMasses().begin(), cloth.inverseMasses().end());
+  }
+  const std::vector<std::uint8_t> touched =
+      selfCollision_.resolve(positions, velocities, inverseMasses, scene_.substepSeconds());
+  std::size_t first = 0;
+  for (std::size_t i = 0; i < cloths_.size(); ++i) {
+    ReferenceCloth& cloth = cloths_[i];
+    const std::size_t nodes = cloth.nodeCount();
+    std::copy_n(positions.begin() + static_cast<std::ptrdiff_t>(first), nodes, cloth.positions().begin());
+    std::copy_n(velocities.begin() + static_cast<std::ptrdiff_t>(first), nodes, cloth.velocities().begin());
+    for (const MovingCollider& collider : inputs.colliders)
+      cloth.collide(collider.shape,
+                    stepOf(collider.start, collider.end, index, scene_.substeps, scene_.tickSeconds()),
+                    collider.friction, before_[i], std::span(touched).subspan(first, nodes));
+    first += nodes;
   }
 }
 

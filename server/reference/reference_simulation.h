@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "server/reference/reference_cloth.h"
+#include "server/reference/self_collision.h"
 #include "server/scene/scene.h"
 
 namespace clothstream::reference {
@@ -29,12 +30,12 @@ class ReferenceSimulation {
  public:
   explicit ReferenceSimulation(const scene::Scene& scene);
 
-  // One tick. Cloths do not touch each other.
+  // One tick.
   void tick(const TickInputs& inputs);
   // The next tick of the scene by itself.
   void tick();
 
-  // Substep `index` of a tick: forces, integration, colliders in order.
+  // Substep `index` of a tick: forces, integration, colliders in order; self-collision, and colliders again.
   void substep(const TickInputs& inputs, std::uint32_t index);
 
   // Ticks done.
@@ -43,9 +44,12 @@ class ReferenceSimulation {
   const std::vector<ReferenceCloth>& cloths() const { return cloths_; }
 
  private:
+  void collideWithCloth(const TickInputs& inputs, std::uint32_t index);
+
   scene::Scene scene_;
   std::vector<ReferenceCloth> cloths_;
-  std::vector<Vec3> before_;  // a cloth's nodes at the start of a substep
+  SelfCollision selfCollision_;
+  std::vector<std::vector<Vec3>> before_;  // each cloth's nodes at the start of a substep
   std::uint64_t ticks_ = 0;
 };
 

@@ -74,6 +74,20 @@ float takenBack(const Solver& solver);
 // Of h^2 / m, the compliance with which the number of iterations hardly depends on the cloth's size.
 inline constexpr float kRelativeCompliance = 0.01f;
 
+// Nodes are balls that keep out of each other. Pairs of one cloth that are nearer at rest than kNeighbours
+// times the sum of their radii do not collide: springs keep them apart.
+struct SelfCollision {
+  float radius = 0;       // m, above 0
+  float friction = 0.3f;  // Coulomb; of two cloths the mean counts
+};
+inline constexpr float kNeighbours = 1.1f;
+
+// How often a substep looks who touches and puts them apart. The part of an overlap that is taken back each
+// time, and the most speed that balls get for that, m/s.
+inline constexpr int kContactIterations = 2;
+inline constexpr float kOverlapTakenBack = 0.5f;
+inline constexpr float kPushOutSpeed = 3;
+
 struct Mesh;  // mesh.h
 
 // A part of space, its surface included.
@@ -99,6 +113,7 @@ struct Cloth {
   std::vector<std::uint32_t> pinnedVertices;  // nodes
   std::vector<Region> pinnedRegions;          // whatever starts there
   Solver solver;
+  std::optional<SelfCollision> selfCollision;  // absent: it passes through cloth
 
   std::uint32_t nodeCount() const;
   float nodeMass() const { return mass / static_cast<float>(nodeCount()); }  // kg, mean

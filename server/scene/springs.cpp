@@ -3,6 +3,7 @@
 #include "server/scene/springs.h"
 
 #include <algorithm>
+#include <limits>
 
 #include "server/scene/mesh.h"
 
@@ -26,6 +27,14 @@ std::vector<SpringLink> springLinks(const Cloth& cloth) {
       if (row + 2 < rows) links.push_back({a, a + 2 * columns, SpringKind::bend, 2 * lengths.row});
     }
   return links;
+}
+
+float shortestSpring(const Cloth& cloth) {
+  if (!cloth.mesh) return std::min(spacing(cloth.grid).column, spacing(cloth.grid).row);
+  float shortest = std::numeric_limits<float>::infinity();
+  for (const SpringLink& link : cloth.mesh->links)
+    if (link.kind == SpringKind::structural) shortest = std::min(shortest, link.restLength);
+  return shortest;
 }
 
 const Spring& springOf(const Cloth& cloth, SpringKind kind) {

@@ -24,6 +24,9 @@ struct SpringLink {
 // mesh's: makeMesh().
 std::vector<SpringLink> springLinks(const Cloth& cloth);
 
+// Length at rest of the shortest structural spring, m.
+float shortestSpring(const Cloth& cloth);
+
 const Spring& springOf(const Cloth& cloth, SpringKind kind);
 
 // Whether the cloth's solver keeps springs of this kind at their length, always or when they are stretched

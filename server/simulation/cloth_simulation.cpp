@@ -21,6 +21,7 @@
 #include "server/simulation/mesh_stage.h"
 #include "server/simulation/report_stage.h"
 #include "server/simulation/runge_kutta_stage.h"
+#include "server/simulation/self_collision/self_collision_stage.h"
 #include "server/simulation/stage.h"
 #include "server/simulation/xpbd_stage.h"
 #include "server/vulkan/kernel.h"
@@ -217,10 +218,11 @@ struct ClothSimulation::Pipeline {
   std::unique_ptr<RungeKuttaStage> rungeKutta;  // where that is the integrator
   ConstraintStage constraints;
   ImplicitStage implicit;
-  std::unique_ptr<XpbdStage> xpbd;      // where a cloth's solver is that
-  std::vector<scene::Solver> solvers;   // of the cloths, as the tables have them
-  std::vector<shared::vec4> stiffness;  // of their springs
-  std::unique_ptr<ReportStage> report;  // made when it is first wanted
+  std::unique_ptr<XpbdStage> xpbd;                    // where a cloth's solver is that
+  std::unique_ptr<SelfCollisionStage> selfCollision;  // where a cloth has it
+  std::vector<scene::Solver> solvers;                 // of the cloths, as the tables have them
+  std::vector<shared::vec4> stiffness;                // of their springs
+  std::unique_ptr<ReportStage> report;                // made when it is first wanted
   SimulationOptions options;
 
   bool started = false;       // the start state is on the device
@@ -265,6 +267,9 @@ ClothSimulation::Pipeline::Pipeline(const vulkan::Device& on, const scene::Scene
   if (integrator == scene::Integrator::rungeKutta4)
     rungeKutta = std::make_unique<RungeKuttaStage>(on, stateOf(buffers, collision), offsets);
   makeXpbd(scene.cloths);
+  if (SelfCollisionStage::isIn(scene))
+    selfCollision =
+        std::make_unique<SelfCollisionStage>(on, scene, stateOf(buffers, collision), cut.workgroupSize);
   prepare(scene.environment.airDensity);
 }
 
@@ -335,6 +340,7 @@ void ClothSimulation::Pipeline::start(vulkan::Recorder& recorder) {
   if (constraints.active()) constraints.recordTables(recorder);
   if (implicit.active()) implicit.recordTables(recorder);
   if (xpbd) xpbd->recordTables(recorder);
+  if (selfCollision) selfCollision->recordTables(recorder);
   recorder.barrier();
   started = tabled = true;
 }
@@ -348,6 +354,7 @@ void ClothSimulation::Pipeline::recordInputs(vulkan::Recorder& recorder, const T
   recorder.copy(from, buffers.cloths, clothBytes);
   collision.recordInputs(recorder, inputs.colliders);
   recorder.fill(buffers.status, 0, buffers.status.bytes());
+  if (selfCollision) selfCollision->recordClear(recorder);
 }
 
 void ClothSimulation::Pipeline::recordAdvance(vulkan::Recorder& recorder, std::uint32_t from,
@@ -411,6 +418,7 @@ void ClothSimulation::Pipeline::recordSubsteps(vulkan::Recorder& recorder, const
                     .substepRate = tickRate * static_cast<float>(substeps),
                     .firstTile = 0,
                     .reserved = 0});
+    if (selfCollision) selfCollision->recordSubstep(recorder, present, substep, push.collision);
     present = 1 - present;
   }
 }
@@ -424,6 +432,7 @@ void ClothSimulation::Pipeline::recordStatus(vulkan::Recorder& recorder) {
                 slot * sizeof(shared::StatusRecord));
   if (constraints.active()) constraints.recordReport(recorder);
   if (implicit.active()) implicit.recordReport(recorder);
+  if (selfCollision) selfCollision->recordReport(recorder, slot);
 }
 
 ClothSimulation::ClothSimulation(const vulkan::Device& device, const scene::Scene& scene,
@@ -494,7 +503,12 @@ std::vector<ClothReport> ClothSimulation::report() const {
 TickStatus ClothSimulation::status() const {
   const shared::StatusRecord& record =
       pipeline_->buffers.statusReadback.mapped<shared::StatusRecord>()[pipeline_->slot];
-  return {std::uint64_t{record.hashHigh} << 32 | record.hashLow, record.unhealthy == 0};
+  TickStatus status{std::uint64_t{record.hashHigh} << 32 | record.hashLow, record.unhealthy == 0};
+  if (pipeline_->selfCollision) {
+    const shared::CrowdReport& report = pipeline_->selfCollision->report(pipeline_->slot);
+    status.crowded = report.lists + report.balls;
+  }
+  return status;
 }
 
 void ClothSimulation::recordCheckpoint(vulkan::Recorder& recorder) {

@@ -30,6 +30,8 @@ StateSnapshot pack(const NodeState& state, std::uint64_t tick);
 struct TickStatus {
   std::uint64_t stateHash = 0;  // of positions and velocities, bits
   bool healthy = true;          // every component finite, and within kWorldExtent of zero (m; m/s)
+  // Self-collision: how many lists of neighbours were too long, and how often a ball touched too many.
+  std::uint32_t crowded = 0;
 };
 inline constexpr float kWorldExtent = 8192;
 

@@ -216,6 +216,7 @@ void SceneHost::finish() {
   if (!status_.healthy) recover();
 
   metrics.ticks.add();
+  metrics.crowdedBalls.add(status_.crowded);
   metrics.tick.record(seconds(done - tickStart_));
   metrics.deviceTotal.record(total);
 }

@@ -42,7 +42,8 @@ std::string table(const std::string& scene, const SceneMetrics& m) {
                      {"late", m.lateTicks.value()},
                      {"slipped", m.slippedTicks.value()},
                      {"rollbacks", m.rollbacks.value()},
-                     {"resets", m.resets.value()}});
+                     {"resets", m.resets.value()},
+                     {"crowded", m.crowdedBalls.value()}});
   addCounters(text, {{"frames", m.frames.value()},
                      {"key", m.keyFrames.value()},
                      {"bytes", m.packetBytes.value()},

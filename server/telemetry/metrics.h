@@ -43,6 +43,7 @@ struct SceneMetrics {
   Counter framesDropped;     // not sent to a subscriber that was behind, each subscriber's
   Counter rollbacks;         // to the last good state
   Counter resets;            // to the start
+  Counter crowdedBalls;      // of self-collision: lists too long, and balls that touch too many others
   Counter rejectedMessages;  // answered by an Error
   Counter joins;
 };

@@ -19,7 +19,7 @@ struct ClothRecord {
   vec4 spacing;    // of columns, of rows, along the diagonal; damping
   vec4 stiffness;  // structural, shear, bend; friction
   vec4 damping;    // structural, shear, bend; thickness
-  vec4 air;        // drag, lift
+  vec4 air;        // drag, lift; of self-collision: radius, friction
   vec4 solver;     // compliance / h^2, iterations, square of the tolerance
   vec4 limits;     // stretch that springs are held at; part of more that is taken back; 0: always
   // Of xpbd: structural, shear, bend as scene::XpbdSpring; of their w the first is the number of iterations,

@@ -96,6 +96,25 @@ TEST(ToScene, NormalisesQuaternionsThatAreNearlyUnit) {
   EXPECT_NEAR(scene->cloths[0].grid.pose.orientation.norm(), 1, 1e-6);
 }
 
+TEST(ToScene, MakesBallsOfHalfTheShortestStructuralSpring) {
+  v1::Scene message = smallScene();
+  EXPECT_FALSE(toScene(message)->cloths[0].selfCollision);
+  message.mutable_cloths(0)->mutable_grid()->set_height(1.2f);  // rows 0.4 m apart, columns 0.5 m
+  message.mutable_cloths(0)->mutable_self_collision();
+  const Result<scene::Scene> scene = toScene(message);
+  ASSERT_TRUE(scene) << scene.error().text;
+  ASSERT_TRUE(scene->cloths[0].selfCollision);
+  EXPECT_FLOAT_EQ(scene->cloths[0].selfCollision->radius, 0.2f);
+  EXPECT_EQ(scene->cloths[0].selfCollision->friction, 0.3f);
+  // And keeps them on its way through a message.
+  message.mutable_cloths(0)->mutable_self_collision()->set_radius(0.4f);
+  message.mutable_cloths(0)->mutable_self_collision()->set_friction(0);
+  const Result<scene::Scene> again = toScene(toMessage(*toScene(message)));
+  ASSERT_TRUE(again) << again.error().text;
+  EXPECT_EQ(again->cloths[0].selfCollision->radius, 0.4f);
+  EXPECT_EQ(again->cloths[0].selfCollision->friction, 0);
+}
+
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
@@ -149,6 +168,20 @@ const BadScene kBadScenes[] = {
     {"cloths[0].name = \"a b\":", [](v1::Scene& s) { cloth(s).set_name("a b"); }},
     {"cloths[1].name = \"sheet\":", [](v1::Scene& s) { *s.add_cloths() = s.cloths(0); }, "must be unique"},
     {"cloths[0]: has no shape", [](v1::Scene& s) { cloth(s).clear_grid(); }, "must have \"grid\""},
+    {"cloths[0].selfCollision.radius = 0.6:",
+     [](v1::Scene& s) { cloth(s).mutable_self_collision()->set_radius(0.6f); },
+     "a finite number from 5e-05 to 0.5"},
+    {"cloths[0].selfCollision.radius = 0:",
+     [](v1::Scene& s) { cloth(s).mutable_self_collision()->set_radius(0); }},
+    {"cloths[0].selfCollision.friction = -1:",
+     [](v1::Scene& s) { cloth(s).mutable_self_collision()->set_friction(-1); }},
+    {"cloths[0].selfCollision:",
+     [](v1::Scene& s) {
+       cloth(s).mutable_self_collision();
+       grid(s).set_rows(725);
+       grid(s).set_columns(725);
+     },
+     "is for scenes of at most 524288 nodes; this one has 525625"},
     {"cloths[0].grid.rows = 1:", [](v1::Scene& s) { grid(s).set_rows(1); }, "from 2 to 8192"},
     {"cloths[0].grid.columns = 8193:", [](v1::Scene& s) { grid(s).set_columns(8193); }},
     {"cloths[0].grid.width = 0:", [](v1::Scene& s) { grid(s).set_width(0); }, "from 0.001 to 1000"},

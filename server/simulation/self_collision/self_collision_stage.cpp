@@ -1,0 +1,254 @@
+// SPDX-License-Identifier: MIT
+// Self-collision on the device.
+#include "server/simulation/self_collision/self_collision_stage.h"
+
+#include <algorithm>
+#include <bit>
+#include <cassert>
+#include <limits>
+
+#include "kernels/count_cells.h"
+#include "kernels/count_contacts.h"
+#include "kernels/fill_cells.h"
+#include "kernels/gather_neighbours.h"
+#include "kernels/measure_velocities.h"
+#include "kernels/resolve_contacts.h"
+#include "kernels/sort_cells.h"
+#include "kernels/start_cells.h"
+#include "server/simulation/scene_tables.h"
+
+namespace clothstream::simulation {
+namespace {
+
+using vulkan::Bindings;
+using vulkan::Buffer;
+using vulkan::BufferPurpose;
+
+constexpr auto kTexels = vulkan::BindingKind::texels;
+constexpr auto kStorage = vulkan::BindingKind::storage;
+constexpr std::size_t kTexelBytes = sizeof(shared::vec4);
+
+constexpr std::uint32_t kListsATick = 3;
+// Of the time that lists are for: velocities change in it.
+constexpr float kAhead = 1.25f;
+
+// Twice as many entries as nodes: cells that are not neighbours seldom share one.
+std::uint32_t cellCountOf(std::uint32_t nodes) {
+  return std::max(shared::kCellBlock, std::bit_ceil(2 * nodes));
+}
+
+std::size_t tableBytes(std::uint32_t cells) {
+  return (std::size_t{cells} + cells / shared::kCellBlock + shared::kTableWords) * sizeof(std::uint32_t);
+}
+
+float reachOf(const scene::Scene& scene) {
+  float radius = 0;
+  for (const scene::Cloth& cloth : scene.cloths)
+    if (cloth.selfCollision) radius = std::max(radius, cloth.selfCollision->radius);
+  return 2 * radius;
+}
+
+std::uint32_t hasSeveralMaterials(const scene::Scene& scene) {
+  const scene::SelfCollision* first = nullptr;
+  for (const scene::Cloth& cloth : scene.cloths) {
+    if (!cloth.selfCollision) continue;
+    if (first == nullptr) first = &*cloth.selfCollision;
+    if (first->radius != cloth.selfCollision->radius || first->friction != cloth.selfCollision->friction)
+      return 1;
+  }
+  return 0;
+}
+
+// Where each node is at rest, and cloth + 1; 0 of cloths without self-collision.
+void fillRests(const scene::Scene& scene, std::span<shared::vec4> rests) {
+  const NodeState state = restState(scene.cloths);
+  std::size_t node = 0;
+  for (std::size_t cloth = 0; cloth < scene.cloths.size(); ++cloth)
+    for (std::uint32_t i = 0; i < scene.cloths[cloth].nodeCount(); ++i, ++node) {
+      const scene::Vec3& rest = state.positions[node];
+      const bool balls = scene.cloths[cloth].selfCollision.has_value();
+      rests[node] = {rest.x(), rest.y(), rest.z(), balls ? static_cast<float>(cloth + 1) : 0.0f};
+    }
+}
+
+}  // namespace
+
+bool SelfCollisionStage::isIn(const scene::Scene& scene) {
+  return std::ranges::any_of(scene.cloths, [](const auto& cloth) { return cloth.selfCollision.has_value(); });
+}
+
+SelfCollisionStage::SelfCollisionStage(const vulkan::Device& device, const scene::Scene& scene,
+                                       const StateBuffers& state, std::uint32_t workgroupSize)
+    : nodeCount_(scene.nodeCount()),
+      cellCount_(cellCountOf(nodeCount_)),
+      measureInvocations_((nodeCount_ + 63) / 64),
+      interval_((scene.substeps + kListsATick - 1) / kListsATick),
+      substepSeconds_(static_cast<float>(scene.substepSeconds())),
+      reach_(reachOf(scene)),
+      restsUpload_(device, BufferPurpose::upload, nodeCount_ * kTexelBytes),
+      rests_(device, BufferPurpose::texels, nodeCount_ * kTexelBytes),
+      table_(device, BufferPurpose::state, tableBytes(cellCount_)),
+      starts_(device, BufferPurpose::state, (cellCount_ + 1) * sizeof(std::uint32_t)),
+      entries_(device, BufferPurpose::state, nodeCount_ * sizeof(std::uint32_t)),
+      order_(device, BufferPurpose::state, nodeCount_ * sizeof(std::uint32_t)),
+      sorted_(device, BufferPurpose::texels, nodeCount_ * kTexelBytes),
+      neighbours_(device, BufferPurpose::texels,
+                  std::size_t{nodeCount_} * shared::kNeighbourStride * sizeof(float)),
+      contactPositions_(device, BufferPurpose::texels, nodeCount_ * kTexelBytes),
+      contactVelocities_(device, BufferPurpose::texels, nodeCount_ * kTexelBytes),
+      contacts_(device, BufferPurpose::texels,
+                std::size_t{nodeCount_} * shared::kMaxContacts * sizeof(float)),
+      touching_(device, BufferPurpose::state, nodeCount_ * sizeof(std::uint32_t)),
+      groups_(device, BufferPurpose::indirect, sizeof(shared::ContactGroups)),
+      report_(device, BufferPurpose::state, sizeof(shared::CrowdReport)),
+      reportReadback_(device, BufferPurpose::readback, 2 * sizeof(shared::CrowdReport)),
+      measure_(device,
+               {.name = "measure_velocities",
+                .spirv = kernels::measure_velocities,
+                .bindings = {kTexels, kTexels, kStorage},
+                .pushConstantBytes = sizeof(shared::NeighbourPush),
+                .workgroupSize = workgroupSize},
+               [&](const vulkan::Kernel& kernel, std::size_t of) {
+                 return Bindings(device, kernel, {&rests_, state.velocities[of], &table_});
+               }),
+      countCells_(device,
+                  {.name = "count_cells",
+                   .spirv = kernels::count_cells,
+                   .bindings = {kTexels, kTexels, kStorage, kStorage},
+                   .pushConstantBytes = sizeof(shared::NeighbourPush),
+                   .workgroupSize = workgroupSize},
+                  [&](const vulkan::Kernel& kernel, std::size_t of) {
+                    return Bindings(device, kernel, {&rests_, state.positions[of], &table_, &entries_});
+                  }),
+      startCells_(device,
+                  {.name = "start_cells",
+                   .spirv = kernels::start_cells,
+                   .bindings = {kStorage, kStorage},
+                   .pushConstantBytes = sizeof(shared::NeighbourPush),
+                   .workgroupSize = workgroupSize},
+                  [&](const vulkan::Kernel& kernel, std::size_t) {
+                    return Bindings(device, kernel, {&table_, &starts_});
+                  }),
+      fillCells_(device,
+                 {.name = "fill_cells",
+                  .spirv = kernels::fill_cells,
+                  .bindings = {kTexels, kStorage, kStorage, kStorage},
+                  .pushConstantBytes = sizeof(shared::NeighbourPush),
+                  .workgroupSize = workgroupSize},
+                 [&](const vulkan::Kernel& kernel, std::size_t) {
+                   return Bindings(device, kernel, {&rests_, &entries_, &table_, &order_});
+                 }),
+      sortCells_(
+          device,
+          {.name = "sort_cells",
+           .spirv = kernels::sort_cells,
+           .bindings = {kTexels, kStorage, kStorage, kStorage, kStorage},
+           .pushConstantBytes = sizeof(shared::NeighbourPush),
+           .workgroupSize = workgroupSize},
+          [&](const vulkan::Kernel& kernel, std::size_t of) {
+            return Bindings(device, kernel, {state.positions[of], &entries_, &starts_, &order_, &sorted_});
+          }),
+      gather_(device,
+              {.name = "gather_neighbours",
+               .spirv = kernels::gather_neighbours,
+               .bindings = {kTexels, kTexels, kTexels, kTexels, kStorage, kStorage, kStorage, kStorage},
+               .pushConstantBytes = sizeof(shared::NeighbourPush),
+               .workgroupSize = workgroupSize},
+              [&](const vulkan::Kernel& kernel, std::size_t of) {
+                return Bindings(device, kernel,
+                                {&state.cloths, &rests_, &sorted_, state.velocities[of], &table_, &starts_,
+                                 &neighbours_, &report_});
+              }),
+      countContacts_(device,
+                     {.name = "count_contacts",
+                      .spirv = kernels::count_contacts,
+                      .bindings = {kTexels, kTexels, kTexels, kTexels, kTexels, kStorage, kStorage, kStorage,
+                                   kStorage, kStorage, kStorage},
+                      .pushConstantBytes = sizeof(shared::ContactPush),
+                      .workgroupSize = workgroupSize,
+                      .specialisation = {hasSeveralMaterials(scene)}},
+                     [&](const vulkan::Kernel& kernel, std::size_t of) {
+                       return Bindings(device, kernel,
+                                       {&state.cloths, &rests_, &neighbours_, state.positions[of],
+                                        state.velocities[of], &contactPositions_, &contactVelocities_,
+                                        &contacts_, &touching_, &groups_, &report_});
+                     }),
+      resolve_(device,
+               {.name = "resolve_contacts",
+                .spirv = kernels::resolve_contacts,
+                .bindings = {kTexels, kTexels, kTexels, kTexels, kTexels, kTexels, kTexels, kTexels, kStorage,
+                             kStorage, kStorage, kStorage},
+                .pushConstantBytes = sizeof(shared::ContactPush),
+                .workgroupSize = workgroupSize,
+                .specialisation = {hasSeveralMaterials(scene)}},
+               [&](const vulkan::Kernel& kernel, std::size_t of) {
+                 return Bindings(device, kernel,
+                                 {&state.cloths, &rests_, &state.colliders, &state.nearColliders, &contacts_,
+                                  &contactPositions_, &contactVelocities_, state.positions[1 - of],
+                                  &touching_, &groups_, state.positions[of], state.velocities[of]});
+               }) {
+  assert(isIn(scene));
+  fillRests(scene, restsUpload_.mapped<shared::vec4>());
+}
+
+void SelfCollisionStage::recordTables(vulkan::Recorder& recorder) const {
+  recorder.copy(restsUpload_, rests_, rests_.bytes());
+  recorder.fill(groups_, 1, groups_.bytes());
+}
+
+void SelfCollisionStage::recordClear(vulkan::Recorder& recorder) const {
+  recorder.fill(report_, 0, report_.bytes());
+}
+
+void SelfCollisionStage::recordSubstep(vulkan::Recorder& recorder, std::uint32_t from, std::uint32_t index,
+                                       const shared::CollisionPush& collision) const {
+  if (index % interval_ == 0) recordNeighbours(recorder, 1 - from);
+  for (int i = 0; i < scene::kContactIterations; ++i) recordContacts(recorder, 1 - from, collision);
+}
+
+void SelfCollisionStage::recordNeighbours(vulkan::Recorder& recorder, std::uint32_t state) const {
+  const shared::NeighbourPush push{
+      .nodeCount = nodeCount_,
+      .cellCount = cellCount_,
+      .aheadSeconds = kAhead * substepSeconds_ * static_cast<float>(interval_ - 1),
+      .reach = reach_,
+      .restFactor = scene::kNeighbours};
+  const auto dispatch = [&](const Kernel& kernel, std::uint64_t invocations) {
+    recorder.barrier();
+    recorder.dispatch(kernel.on[state], push, invocations);
+  };
+  recorder.barrier();
+  recorder.fill(table_, 0, table_.bytes());
+  dispatch(measure_, measureInvocations_);
+  dispatch(countCells_, nodeCount_);
+  dispatch(startCells_, cellCount_ / shared::kCellBlock);
+  dispatch(fillCells_, nodeCount_);
+  dispatch(sortCells_, nodeCount_);
+  dispatch(gather_, nodeCount_);
+}
+
+void SelfCollisionStage::recordContacts(vulkan::Recorder& recorder, std::uint32_t state,
+                                        const shared::CollisionPush& collision) const {
+  const shared::ContactPush push{.collision = collision,
+                                 .nodeCount = nodeCount_,
+                                 .substepSeconds = substepSeconds_,
+                                 .takenBack = scene::kOverlapTakenBack / substepSeconds_,
+                                 .pushOutSpeed = scene::kPushOutSpeed};
+  recorder.barrier();
+  recorder.fill(groups_, 0, sizeof(std::uint32_t), offsetof(shared::ContactGroups, x));
+  recorder.fill(groups_, 0, sizeof(std::uint32_t), offsetof(shared::ContactGroups, touching));
+  recorder.barrier();
+  recorder.dispatch(countContacts_.on[state], push, nodeCount_);
+  recorder.barrier();
+  recorder.dispatchIndirect(resolve_.on[state], push, groups_);
+}
+
+void SelfCollisionStage::recordReport(vulkan::Recorder& recorder, std::uint32_t slot) const {
+  recorder.copy(report_, reportReadback_, report_.bytes(), 0, slot * report_.bytes());
+}
+
+const shared::CrowdReport& SelfCollisionStage::report(std::uint32_t slot) const {
+  return reportReadback_.mapped<const shared::CrowdReport>()[slot];
+}
+
+}  // namespace clothstream::simulation

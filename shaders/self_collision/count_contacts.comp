@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: MIT
+// Which others each ball touches, of those that it may; who touches any; and the state that contacts are
+// resolved from, for they write where it was.
+//
+// The order of those who touch is whatever it comes to be: none of them looks at another's place in it. Other
+// writes cannot race: each node belongs to one invocation.
+#version 450
+#extension GL_GOOGLE_include_directive : require
+
+const int kMaterialBinding = 0;
+
+#include "shaders/self_collision/neighbours.glsl"
+
+layout(local_size_x_id = 0) in;
+
+layout(binding = 2) uniform samplerBuffer neighbours;  // kNeighbourStride floats a node
+layout(binding = 3) uniform samplerBuffer positions;   // w: inverse mass
+layout(binding = 4) uniform samplerBuffer velocities;
+layout(std430, binding = 5) writeonly buffer Positions {
+  vec4 contactPositions[];
+};
+layout(std430, binding = 6) writeonly buffer Velocities {
+  vec4 contactVelocities[];  // w: how many it touches
+};
+layout(std430, binding = 7) writeonly buffer Contacts {
+  float contacts[];  // kMaxContacts a node
+};
+layout(std430, binding = 8) writeonly buffer Touching {
+  uint touching[];
+};
+layout(std430, binding = 9) buffer Groups {
+  ContactGroups groups;
+};
+layout(std430, binding = 10) buffer Report {
+  CrowdReport report;
+};
+
+layout(push_constant) uniform Push {
+  ContactPush push;
+};
+
+void main() {
+  uint node = gl_GlobalInvocationID.x;
+  if (node >= push.nodeCount || texelFetch(rests, int(node)).w == 0.0) {
+    return;
+  }
+  vec4 here = texelFetch(positions, int(node));
+  int texel = int(node * (kNeighbourStride / 4));
+  vec4 head = texelFetch(neighbours, texel);
+  int end = texel + (int(head.x) + 3) / 4;
+  Material own = Material(head.y, head.z);
+  uint first = node * kMaxContacts;
+  uint count = 0;
+  while (texel < end) {
+    ++texel;
+    vec4 four = texelFetch(neighbours, texel);
+    [[unroll]] for (int k = 0; k < 4; ++k) {
+      uint other = nodeOf(four[k], node);
+      float distance = bothOf(own, four[k], other).radius;
+      precise vec3 apart = here.xyz - texelFetch(positions, int(other)).xyz;
+      precise float limit = distance * distance;
+      if (dotProduct(apart, apart) < limit) {
+        if (count < kMaxContacts) {
+          contacts[first + count] = four[k];
+        }
+        ++count;
+      }
+    }
+  }
+  contactPositions[node] = here;
+  contactVelocities[node] = vec4(texelFetch(velocities, int(node)).xyz, float(count));
+  if (count > 0 && here.w > 0.0) {
+    uint place = atomicAdd(groups.touching, 1u);
+    touching[place] = node;
+    atomicMax(groups.x, place / gl_WorkGroupSize.x + 1);
+  }
+  if (count > kMaxContacts) {
+    atomicAdd(report.balls, 1u);
+  }
+  for (uint i = count; i < kMaxContacts && (i & 3u) != 0; ++i) {
+    contacts[first + i] = 0.0;
+  }
+}

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: MIT
+// The balls of a cell in the order of their nodes, whatever the order in which they came: each counts those
+// that belong before it. Writes cannot race: no two nodes have one rank.
+#version 450
+#extension GL_GOOGLE_include_directive : require
+
+#include "shaders/self_collision/self_collision.h"
+
+layout(local_size_x_id = 0) in;
+
+layout(binding = 0) uniform samplerBuffer positions;
+layout(std430, binding = 1) readonly buffer Entries {
+  uint entries[];
+};
+layout(std430, binding = 2) readonly buffer Starts {
+  uint starts[];
+};
+layout(std430, binding = 3) readonly buffer Order {
+  uint order[];
+};
+layout(std430, binding = 4) writeonly buffer Sorted {
+  vec4 sorted[];  // position, node
+};
+
+layout(push_constant) uniform Push {
+  NeighbourPush push;
+};
+
+void main() {
+  uint slot = gl_GlobalInvocationID.x;
+  if (slot >= starts[push.cellCount]) {
+    return;
+  }
+  uint node = order[slot];
+  uint entry = entries[node];
+  uint first = starts[entry];
+  uint end = starts[entry + 1];
+  uint place = slot;
+  // A cell with more is passed over by all who would read it.
+  if (end - first <= kMaxInRow) {
+    place = first;
+    while (first < end) {
+      place += order[first] < node ? 1 : 0;
+      ++first;
+    }
+  }
+  sorted[place] = vec4(texelFetch(positions, int(node)).xyz, float(node));
+}

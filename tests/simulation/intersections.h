@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: MIT
+// Where a cloth passes through itself or through another.
+#pragma once
+
+#include <cstddef>
+#include <span>
+
+#include "server/scene/scene.h"
+
+namespace clothstream::tests {
+
+// How often an edge of one triangle pierces another triangle of the scene with which it has no node in
+// common.
+std::size_t intersections(const scene::Scene& scene, std::span<const scene::Vec3> positions);
+
+}  // namespace clothstream::tests
