@@ -109,8 +109,9 @@ TEST_F(ServerProgram, NamesThePortAndTheOptionWhenAPortIsInUse) {
 TEST_F(ServerProgram, NamesTheScenesThereAre) {
   ServerProcess server({"--scene", "nowhere"});
   EXPECT_EQ(server.exitCode(), 1);
-  EXPECT_THAT(server.said(),
-              HasSubstr("there is no scene 'nowhere'; there are curtain, flag, obstacles, sphere_drop"));
+  EXPECT_THAT(
+      server.said(),
+      HasSubstr("there is no scene 'nowhere'; there are curtain, flag, folds, obstacles, sphere_drop"));
 }
 
 TEST_F(ServerProgram, NamesTheSubstepsThatWouldDo) {

@@ -45,7 +45,7 @@ INSTANTIATE_TEST_SUITE_P(All, NamedScene, testing::ValuesIn(namedScenes()),
 
 TEST(NamedScenes, AreThoseOfTheHouse) {
   EXPECT_EQ(namedScenes(),
-            (std::vector<std::string>{"curtain", "flag", "obstacles", "sphere_drop", "tablecloth"}));
+            (std::vector<std::string>{"curtain", "flag", "folds", "obstacles", "sphere_drop", "tablecloth"}));
 }
 
 TEST(NamedScenes, SphereDropComesToRestOnTheSphere) {

@@ -40,7 +40,7 @@ constexpr const char* kEveryField = R"json({
     "pinnedVertices": [3, 41],
     "pinnedRegions": [{"centre": {"x": 1, "y": 2, "z": 3}, "size": {"x": 0.5, "y": 0.25, "z": 1}},
                       {"centre": {"x": 1, "y": 0, "z": 0}, "radius": 2}],
-    "solver": {"massSpring": {}}
+    "solver": {"massSpring": {}}, "selfCollision": {"radius": 0.125, "friction": 0.5}
   }, {
     "name": "mesh", "mesh": {"positions": [0, 0, 0, 1, 0, 0, 0, 1, 0, 1, 1, 0], "triangles": [0, 1, 2, 1, 3, 2],
       "quads": [0], "uvs": [0, 0, 1, 0, 0, 1, 1, 1], "uvTriangles": [0, 1, 2, 1, 3, 2],
@@ -260,7 +260,7 @@ TEST_F(SceneFileOnDisk, IsFoundByNameOrPath) {
   const Result<scene::Scene> none = loadScene("no_such_scene");
   ASSERT_FALSE(none);
   EXPECT_EQ(none.error().code, v1::ERROR_CODE_NOT_FOUND);
-  EXPECT_THAT(none.error().text, HasSubstr("curtain, flag, obstacles, sphere_drop"));
+  EXPECT_THAT(none.error().text, HasSubstr("curtain, flag, folds, obstacles, sphere_drop"));
 }
 
 }  // namespace

@@ -201,6 +201,21 @@ test("a mesh falls and is drawn in the colours of its parts", () =>
     assert.ok(hem > 1.2 * linen, `green over red is ${hem} at the hem, ${linen} inside`);
   }));
 
+// Its lower half comes to lie on the floor, in more layers than one: balls of 12.5 mm that rest on each other.
+test("a sheet falls into folds and lies on itself", () =>
+  withPage({ query: "?scene=folds" }, async (page) => {
+    await untilState(page, "live");
+    await untilFrames(page, 200);
+    const seen = await look(page);
+    assert.equal(seen.positions.length, 3 * 44 * 28);
+    assert.equal(seen.statistics.decodeErrors + seen.statistics.hashMismatches, 0);
+    const heights = seen.positions.filter((_, i) => i % 3 === 1);
+    const above = heights.filter((height) => height > 0.01 + 0.0125).length;
+    assert.ok(above > 0.2 * heights.length, `${above} of ${heights.length} vertices lie above others`);
+    assert.ok(Math.max(...heights) < 0.5, `the highest is ${Math.max(...heights)} m up`);
+    await takePicture(page, "folds");
+  }));
+
 test("the sphere can be dragged through the cloth", () =>
   withPage({}, async (page) => {
     await untilState(page, "live");
