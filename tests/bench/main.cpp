@@ -27,6 +27,8 @@ constexpr std::array kSuites{
                  &bench::runCurtain},
     bench::Suite{"colliders", "a tick with 0, 1, 100 and 4,000 colliders, most of them far from the cloth",
                  &bench::runColliders},
+    bench::Suite{"self_collision", "a sheet that collides with itself or does not, flat and in folds",
+                 &bench::runSelfCollision},
     bench::Suite{"codec", "bits a vertex and milliseconds a frame, key and predicted, of a hung cloth",
                  &bench::runCodec},
     bench::Suite{"codec_motions", "both codecs on the CPU over four motions of a 100x100 cloth",

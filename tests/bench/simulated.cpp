@@ -45,7 +45,11 @@ double Simulated::check(const simulation::TickInputs& inputs) {
 }
 
 double Simulated::check(const simulation::TickInputs& inputs, double tolerance) {
-  const simulation::NodeState start = displacedState(scene_);
+  return check(displacedState(scene_), inputs, tolerance);
+}
+
+double Simulated::check(const simulation::NodeState& start, const simulation::TickInputs& inputs,
+                        double tolerance) {
   runOn(device_, recorder_, [&] { simulation_.recordRestoreState(recorder_, simulation::pack(start, 0)); });
   tick(inputs);
   const simulation::NodeState state = this->state();
@@ -76,8 +80,11 @@ double Simulated::check(const simulation::TickInputs& inputs, double tolerance) 
 }
 
 void Simulated::restart() {
-  const simulation::StateSnapshot start = simulation::pack(simulation::restState(scene_.cloths), 0);
-  runOn(device_, recorder_, [&] { simulation_.recordRestoreState(recorder_, start); });
+  restart(simulation::restState(scene_.cloths));
+}
+
+void Simulated::restart(const simulation::NodeState& start) {
+  runOn(device_, recorder_, [&] { simulation_.recordRestoreState(recorder_, simulation::pack(start, 0)); });
   forgetTimes();
 }
 

@@ -23,12 +23,18 @@ class Simulated {
   double check(const simulation::TickInputs& inputs);
   // The same with this distance allowed, m.
   double check(const simulation::TickInputs& inputs, double tolerance);
+  // From this state.
+  double check(const simulation::NodeState& start, const simulation::TickInputs& inputs, double tolerance);
 
   // Records, submits and waits for one tick; throws std::runtime_error if its state is not healthy.
   void tick(const simulation::TickInputs& inputs);
 
-  // Back to the scene's start, and the times forgotten.
+  // Back to the scene's start, or to this state, and the times forgotten.
   void restart();
+  void restart(const simulation::NodeState& start);
+
+  // Of the last tick.
+  simulation::TickStatus status() const { return simulation_.status(); }
 
   simulation::NodeState state();
   std::span<const shared::SolveRecord> solves() const { return simulation_.solves(); }

@@ -37,6 +37,7 @@ Rows runPaper(vulkan::Device& device, const Settings& settings);
 Rows runSolvers(vulkan::Device& device, const Settings& settings);
 Rows runCurtain(vulkan::Device& device, const Settings& settings);
 Rows runColliders(vulkan::Device& device, const Settings& settings);
+Rows runSelfCollision(vulkan::Device& device, const Settings& settings);
 Rows runCodec(vulkan::Device& device, const Settings& settings);
 Rows runCodecMotions(vulkan::Device& device, const Settings& settings);
 
