@@ -45,6 +45,14 @@ std::optional<Spring> changed(const float* values, const Spring& now) {
   return Spring{given(values[0]).value_or(now[0]), given(values[1]).value_or(now[1])};
 }
 
+// What the server takes for what is not said (scene.proto).
+Solver defaultSolver(std::uint32_t kind) {
+  Solver solver;
+  solver.kind = kind;
+  if (kind == CS_SOLVER_XPBD) solver.iterations = 1;
+  return solver;
+}
+
 std::optional<Solver> changed(const cs_cloth_settings& settings, const ClothParameters& now) {
   const bool any = settings.solver != CS_SOLVER_AS_IS || settings.bend_constraints >= 0 ||
                    settings.iterations != 0 || given(settings.tolerance) || given(settings.compliance) ||
@@ -53,8 +61,7 @@ std::optional<Solver> changed(const cs_cloth_settings& settings, const ClothPara
   Solver solver = now.solver;
   if (settings.solver != CS_SOLVER_AS_IS && settings.solver != solver.kind) {
     const auto known = now.solvers.find(settings.solver);
-    solver = known == now.solvers.end() ? Solver{} : known->second;
-    solver.kind = settings.solver;
+    solver = known == now.solvers.end() ? defaultSolver(settings.solver) : known->second;
   }
   if (settings.bend_constraints >= 0) solver.bendConstraints = settings.bend_constraints != 0;
   if (settings.iterations != 0) solver.iterations = settings.iterations;

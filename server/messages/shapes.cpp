@@ -44,6 +44,7 @@ scene::Shape toHull(Checks& checks, const Path& path, const v1::ConvexHull& mess
   count("faces", message.faces_size());
   if (checks.failed()) return {};
   std::vector<scene::Vec3> vertices;
+  vertices.reserve(static_cast<std::size_t>(message.vertices_size()));
   for (int i = 0; i < message.vertices_size(); ++i)
     vertices.push_back(toVec3(checks, path.at("vertices", i), message.vertices(i), limits::kPosition));
   std::vector<std::vector<std::uint32_t>> faces;
