@@ -80,7 +80,8 @@ class DeviceThread {
 
   mutable std::mutex mutex_;
   std::condition_variable changed_;
-  bool stopping_ = false, woken_ = false, loseDevice_ = false;
+  // Woken from the start: a scene may run with nobody in it.
+  bool stopping_ = false, woken_ = true, loseDevice_ = false;
   vulkan::DeviceInfo info_;
 
   // The thread's own.

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: MIT
 // Joining, frames, input and notices, as peers see them.
 #include <algorithm>
+#include <chrono>
 #include <set>
+#include <thread>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -137,6 +139,16 @@ TEST_F(JoinTest, ASceneSleepsWhileNobodyIsInItAndGoesOnWhereItWas) {
   again.join();
   EXPECT_GT(again.frames().front().tick, left);
   EXPECT_LT(again.frames().front().tick, left + 10);
+}
+
+TEST_F(JoinTest, AServerThatAlwaysRunsNeedsNobody) {
+  ServerOptions options;
+  options.runAlways = true;
+  START(options);
+  const auto ticks = [&] { return metrics().ticks.value(); };
+  for (int i = 0; i < 1000 && ticks() < 5; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  EXPECT_GE(ticks(), 5u);
+  EXPECT_TRUE(server().listScenes().scenes(0).running());
 }
 
 TEST_F(JoinTest, WhoNeverReadsCostsNobodyAnything) {
