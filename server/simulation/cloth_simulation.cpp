@@ -223,7 +223,7 @@ struct ClothSimulation::Pipeline {
   std::vector<scene::Solver> solvers;                 // of the cloths, as the tables have them
   std::vector<shared::vec4> stiffness;                // of their springs
   std::unique_ptr<ReportStage> report;                // made when it is first wanted
-  SimulationOptions options;
+  SimulationOptions asked;
 
   bool started = false;       // the start state is on the device
   bool tabled = false;        // the tables of the solvers are
@@ -256,7 +256,7 @@ ClothSimulation::Pipeline::Pipeline(const vulkan::Device& on, const scene::Scene
       implicit(on, implicitTables(scene.cloths), stateOf(buffers, collision), options.workgroupSize),
       solvers(solversOf(scene.cloths)),
       stiffness(springStiffness(scene.cloths)),
-      options(options) {
+      asked(options) {
   std::ranges::copy(cut.tiles.records, buffers.tileUpload.mapped<shared::TileRecord>().begin());
   std::memcpy(buffers.inputs[slot].mapped().data(), records.data(), buffers.cloths.bytes());
   writeState(restState(scene.cloths));
@@ -288,8 +288,8 @@ void ClothSimulation::Pipeline::prepare(float airDensity) {
 void ClothSimulation::Pipeline::makeXpbd(std::span<const scene::Cloth> cloths) {
   const bool any = std::ranges::any_of(
       cloths, [](const scene::Cloth& cloth) { return cloth.solver.kind == scene::SolverKind::xpbd; });
-  xpbd = any ? std::make_unique<XpbdStage>(device, cloths, stateOf(buffers, collision), options.workgroupSize,
-                                           options.xpbdWholeNodes)
+  xpbd = any ? std::make_unique<XpbdStage>(device, cloths, stateOf(buffers, collision), asked.workgroupSize,
+                                           asked.xpbdWholeNodes)
              : nullptr;
 }
 
@@ -476,7 +476,7 @@ void ClothSimulation::recordReport(vulkan::Recorder& recorder, const TickInputs&
   if (!on.report)
     on.report = std::make_unique<ReportStage>(on.device, on.records, stateOf(on.buffers, on.collision),
                                               on.meshes ? on.meshes->springs() : MeshSprings{},
-                                              on.options.workgroupSize);
+                                              on.asked.workgroupSize);
   recorder.beginStage("report");
   on.report->record(recorder, on.present, on.stiffness, inputs.environment.gravity,
                     on.collision.push(on.substeps - 1, on.substeps, on.tickRate));
