@@ -311,7 +311,7 @@ TEST_F(ToParameterChange, RefusesASolverThatTheSceneCannotHave) {
   EXPECT_THAT(error(), StartsWith("parameterChange.cloths[0].solver.acad.activation = -1:"));
   message_.mutable_cloths(0)->mutable_solver()->mutable_acad()->set_activation(0.1f);
   scene_.integrator = scene::Integrator::explicitEuler;
-  EXPECT_THAT(error(), StartsWith("parameterChange.cloths[0].solver: \"sheet\" has constraints, which need "
+  EXPECT_THAT(error(), StartsWith("parameterChange.cloths[0].solver: \"sheet\" solves a system, which needs "
                                   "INTEGRATOR_SEMI_IMPLICIT_EULER"));
   message_.mutable_cloths(0)->clear_solver();
   message_.mutable_cloths(0)->set_thickness(2);

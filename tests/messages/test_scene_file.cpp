@@ -64,6 +64,11 @@ constexpr const char* kEveryField = R"json({
                                   "pose": {"position": {}, "orientation": {"w": 1}}},
     "mass": 1, "structural": {}, "shear": {}, "bend": {}, "damping": 0, "drag": 0, "lift": 0, "friction": 0.5,
     "thickness": 0.25, "solver": {"xpbd": {"iterations": 3, "compliance": 0}}
+  }, {
+    "name": "implicit", "grid": {"rows": 2, "columns": 2, "width": 1, "height": 1,
+                                 "pose": {"position": {}, "orientation": {"w": 1}}},
+    "mass": 1, "structural": {}, "shear": {}, "bend": {}, "damping": 0, "drag": 0, "lift": 0, "friction": 0.5,
+    "thickness": 0.25, "solver": {"implicitEuler": {"iterations": 3, "tolerance": 0.25}}
   }],
   "colliders": [{
     "name": "finger", "capsule": {"radius": 0.25, "length": 0.5}, "pose": {"position": {"x": 1, "y": 0, "z": 0},

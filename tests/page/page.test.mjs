@@ -277,10 +277,10 @@ test("a slider works by keyboard, and others in the scene see it", () =>
     }),
   ));
 
-// The soft curtain hangs stretched; as constraints its springs keep their length, and the server's report says so.
+// The flag pulls at its pole; as constraints its springs keep their length, and the server's report says so.
 test("each cloth's solver can be chosen, and the panel says how its simulation does", () =>
-  withPage({ viewport: { width: 1000, height: 900 } }, (first) =>
-    withPage({}, async (second) => {
+  withPage({ query: "?scene=flag", viewport: { width: 1000, height: 900 } }, (first) =>
+    withPage({ query: "?scene=flag" }, async (second) => {
       await untilState(first, "live");
       await untilState(second, "live");
       const figure = (page, name) => page.textContent(`#cloths [data-figure="${name}"]`);
