@@ -107,20 +107,21 @@ test("the cloth moves, and every packet decodes to what the server holds", () =>
 test("the cloth hangs from its pins, which stay where they start", () =>
   withPage({}, async (page) => {
     await untilState(page, "live");
-    await untilFrames(page, 30);
-    const first = await look(page);
-    await untilFrames(page, 30);
-    const second = await look(page);
     const pins = pinnedNodes();
     assert.ok(pins.size > 1);
-    for (const node of pins) {
-      assert.deepEqual(vertexOf(second.positions, node), vertexOf(first.positions, node));
-      const off = Math.hypot(...vertexOf(second.positions, node).map((value, axis) => value - second.rest[3 * node + axis]));
-      assert.ok(off <= Math.sqrt(3) * kMaxError, `pin ${node}: ${off} m off`);
+    let seen;
+    // Within what the codec promises, which a key frame in between may use otherwise.
+    for (let i = 0; i < 2; ++i) {
+      await untilFrames(page, 30);
+      seen = await look(page);
+      for (const node of pins) {
+        const off = distance(vertexOf(seen.positions, node), vertexOf(seen.rest, node));
+        assert.ok(off <= Math.sqrt(3) * kMaxError, `pin ${node}: ${off} m off`);
+      }
     }
-    const height = (node) => second.positions[3 * node + 1];
+    const height = (node) => seen.positions[3 * node + 1];
     for (let column = 0; column < columns; ++column) {
-      if (!pins.has(column)) assert.ok(height(column) < second.rest[1], `node ${column} hangs lower than the pins`);
+      if (!pins.has(column)) assert.ok(height(column) < seen.rest[1], `node ${column} hangs lower than the pins`);
     }
     // The ball lifts parts of it, but the lower edge as a whole hangs below the middle, and that below the upper edge.
     const meanHeight = (row) => {
