@@ -25,10 +25,12 @@ struct Case {
   std::optional<float> compliance = {};
 };
 
-// XPBD's stiffness is that of cloth which hardly stretches under its own weight.
+// The stiffness of XPBD and of implicit Euler is that of cloth which hardly stretches under its own weight.
 constexpr Case kCases[] = {{"mass_spring", scene::SolverKind::massSpring},
                            {"acad", scene::SolverKind::acad},
                            {"constraint", scene::SolverKind::constraint},
+                           {"implicit_euler", scene::SolverKind::implicitEuler, 10, 1000},
+                           {"implicit_euler", scene::SolverKind::implicitEuler, 2, 1000},
                            {"xpbd", scene::SolverKind::xpbd, 10, 1000},
                            {"xpbd, 4 sweeps", scene::SolverKind::xpbd, 10, 1000, 4},
                            {"xpbd", scene::SolverKind::xpbd, 40, 1000},
@@ -60,8 +62,9 @@ scene::Scene sceneOf(const Case& experiment, std::uint32_t size) {
 }
 
 // Of a structural spring, parts of its length. Xpbd: what its stiffness and its neighbours' corrections in a
-// substep allow (docs/simulation.md), twice over for the fall. Constraints: that they hold at all. Of forces
-// none: how much they stretch is what the row is to show.
+// substep allow (docs/simulation.md), twice over for the fall. Constraints, and forces of
+// the substep's end: that they hold at all. Of forces of its start none: how much they stretch is what the
+// row is to show.
 double mostStrain(const scene::Scene& scene) {
   const scene::Cloth& cloth = scene.cloths.front();
   if (cloth.solver.kind == scene::SolverKind::massSpring) return std::numeric_limits<double>::max();
@@ -104,7 +107,7 @@ Rows::value_type measure(vulkan::Device& device, const Settings& settings, const
 
 Rows runSolvers(vulkan::Device& device, const Settings& settings) {
   Rows rows;
-  for (const std::uint32_t size : settings.size ? std::vector{*settings.size} : std::vector{64u, 256u})
+  for (const std::uint32_t size : settings.size ? std::vector{*settings.size} : std::vector{32u, 64u})
     for (const Case& experiment : kCases) rows.push_back(measure(device, settings, experiment, size));
   return rows;
 }
