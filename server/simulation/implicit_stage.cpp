@@ -44,14 +44,14 @@ struct ImplicitStage::Kernels {
   Kernels(const vulkan::Device& device, std::uint32_t solveWorkgroup)
       : prepare(device, {.name = "prepare_springs",
                          .spirv = kernels::prepare_springs,
-                         .bindings = {kTexels, kTexels, kTexels, kTexels, kTexels, kStorage, kStorage},
+                         .bindings = {kTexels, kTexels, kTexels, kTexels, kStorage, kStorage},
                          .pushConstantBytes = sizeof(shared::ConstraintPush),
                          .workgroupSize = kWorkgroup,
                          .specialisation = {}}),
         solve(device, {.name = "solve_velocities",
                        .spirv = kernels::solve_velocities,
-                       .bindings = {kTexels, kTexels, kTexels, kTexels, kTexels, kTexels, kTexels, kStorage,
-                                    kStorage, kStorage, kStorage, kStorage},
+                       .bindings = {kTexels, kTexels, kTexels, kTexels, kTexels, kTexels, kTexels, kTexels,
+                                    kTexels, kStorage, kStorage, kStorage, kStorage, kStorage},
                        .pushConstantBytes = sizeof(shared::SolvePush),
                        .workgroupSize = solveWorkgroup,
                        .specialisation = {}}),
@@ -88,9 +88,7 @@ struct ImplicitStage::Systems {
         solvesReadback(device, BufferPurpose::readback, systemCount * sizeof(shared::SolveRecord)),
         prepareFrom{bindPrepare(device, kernels.prepare, state, 0),
                     bindPrepare(device, kernels.prepare, state, 1)},
-        solve(device, kernels.solve,
-              {&state.cloths, &systems.texels(), &incidences.texels(), &lists.texels(), &rows, &impulses,
-               state.positions[0], &corrections, &residuals, &directions, &products, &solves}),
+        solveFrom{bindSolve(device, kernels.solve, state, 0), bindSolve(device, kernels.solve, state, 1)},
         applyTo{bindApply(device, kernels.apply, state, 0), bindApply(device, kernels.apply, state, 1)} {
     for (const shared::SystemRecord& system : tables.systems)
       cloths.push_back(static_cast<std::uint32_t>(system.links.w));
@@ -98,9 +96,16 @@ struct ImplicitStage::Systems {
 
   Bindings bindPrepare(const vulkan::Device& device, const vulkan::Kernel& kernel, const StateBuffers& state,
                        std::size_t from) const {
+    return Bindings(
+        device, kernel,
+        {&springs.texels(), state.positions[from], state.velocities[from], &state.cloths, &rows, &impulses});
+  }
+  Bindings bindSolve(const vulkan::Device& device, const vulkan::Kernel& kernel, const StateBuffers& state,
+                     std::size_t from) const {
     return Bindings(device, kernel,
-                    {&springs.texels(), state.positions[from], state.velocities[from],
-                     state.velocities[1 - from], &state.cloths, &rows, &impulses});
+                    {&state.cloths, &systems.texels(), &incidences.texels(), &lists.texels(), &rows,
+                     &impulses, state.positions[from], state.velocities[from], state.velocities[1 - from],
+                     &corrections, &residuals, &directions, &products, &solves});
   }
   Bindings bindApply(const vulkan::Device& device, const vulkan::Kernel& kernel, const StateBuffers& state,
                      std::size_t to) const {
@@ -115,9 +120,7 @@ struct ImplicitStage::Systems {
   std::vector<std::uint32_t> cloths;
   DeviceTable systems, springs, incidences, lists;
   Buffer rows, impulses, corrections, residuals, directions, products, solves, solvesReadback;
-  std::array<Bindings, 2> prepareFrom;
-  Bindings solve;
-  std::array<Bindings, 2> applyTo;
+  std::array<Bindings, 2> prepareFrom, solveFrom, applyTo;
 };
 
 ImplicitStage::ImplicitStage(const vulkan::Device& device, const ImplicitTables& tables,
@@ -151,7 +154,7 @@ void ImplicitStage::record(vulkan::Recorder& recorder, std::uint32_t from, std::
   push.count = on.springCount;
   recorder.barrier();
   recorder.dispatch(on.prepareFrom[from], push, on.springCount);
-  recordSolve(recorder, on.solve, on.cut, 0, on.systemCount, iterations);
+  recordSolve(recorder, on.solveFrom[from], on.cut, 0, on.systemCount, iterations);
   push.count = on.nodeCount;
   recorder.barrier();
   recorder.dispatch(on.applyTo[1 - from], push, on.nodeCount);

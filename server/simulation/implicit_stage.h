@@ -15,9 +15,9 @@ namespace clothstream::simulation {
 
 // Belongs to the device's thread. After the forces have given every node a free velocity and position, it
 // solves
-//   (M + h D + h^2 K) u = -(h D (v_free - v) + h^2 K v_free),   K, D at the substep's start,
-// for the velocities v_free + u that linearised implicit Euler gives (Baraff and Witkin, "Large steps in
-// cloth simulation", 1998, Eq. 15-16), moves the nodes by h u, and lets them collide.
+//   (M + h D + h^2 K) (v' - v) = M (v_free - v) - h^2 K v,   K, D at the substep's start,
+// for the velocities v' that linearised implicit Euler gives (Baraff and Witkin, "Large steps in
+// cloth simulation", 1998, Eq. 15-16), moves the nodes by h v', and lets them collide.
 class ImplicitStage {
  public:
   // `workgroupSize` of a solve; 0: the measured best for the device. Throws std::runtime_error where the

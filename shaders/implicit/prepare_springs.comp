@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // What every spring adds to the system of implicit Euler: its part of h D + h^2 K at the substep's start, and
-// the impulse by which it brakes the velocities that the forces alone give.
+// the impulse h^2 K v by which it brakes the velocities that the nodes have.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 
@@ -12,12 +12,11 @@ layout(local_size_x_id = 0) in;
 layout(binding = 0) uniform samplerBuffer springs;  // LinkRecord
 layout(binding = 1) uniform samplerBuffer positions;
 layout(binding = 2) uniform samplerBuffer velocities;
-layout(binding = 3) uniform samplerBuffer freeVelocities;
-layout(binding = 4) uniform samplerBuffer cloths;  // ClothRecord
-layout(std430, binding = 5) writeonly buffer Rows {
+layout(binding = 3) uniform samplerBuffer cloths;  // ClothRecord
+layout(std430, binding = 4) writeonly buffer Rows {
   vec4 rows[];
 };
-layout(std430, binding = 6) writeonly buffer Impulses {
+layout(std430, binding = 5) writeonly buffer Impulses {
   vec4 impulses[];
 };
 
@@ -47,17 +46,15 @@ void main() {
   float inverseLength = reciprocalSquareRoot(max(dotProduct(d, d), 1e-12));
   precise vec3 direction = d * inverseLength;
   precise vec3 change = texelFetch(velocities, b).xyz - texelFetch(velocities, a).xyz;
-  precise vec3 freeChange = texelFetch(freeVelocities, b).xyz - texelFetch(freeVelocities, a).xyz;
 
   precise float elastic = push.substepSeconds * push.substepSeconds * stiffness;
   precise float viscous = push.substepSeconds * damping;
   precise float across = elastic * max(1.0 - ends.z * inverseLength, 0.0);
   precise float difference = elastic + viscous - across;
   precise float root = difference > 1e-30 ? difference * reciprocalSquareRoot(difference) : 0.0;
-  precise float alongImpulse =
-      difference * dotProduct(direction, freeChange) - viscous * dotProduct(direction, change);
+  precise float alongImpulse = (elastic - across) * dotProduct(direction, change);
   precise vec3 row = root * direction;
-  precise vec3 impulse = alongImpulse * direction + across * freeChange;
+  precise vec3 impulse = alongImpulse * direction + across * change;
   rows[index] = vec4(row, across);
   impulses[index] = vec4(impulse, 0.0);
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// (M + h D + h^2 K) u = -(h D (v_free - v) + h^2 K v_free): by how much implicit Euler's velocities differ
-// from those that the forces alone give (Baraff and Witkin, "Large steps in cloth simulation", 1998).
+// (M + h D + h^2 K) (v' - v) = M (v_free - v) - h^2 K v:  implicit Euler's velocities v' from those at the
+// substep's start and those that the forces alone give (Baraff and Witkin, "Large steps in cloth simulation",
+// 1998). From v' = v on, so that a solve that ends early leaves motion out rather than forces unbraked.
 // Conjugate gradients with the diagonal as preconditioner, matrix-free: a product is one gather. One
 // workgroup solves one cloth, as many iterations in a dispatch as the device lets it.
 //
@@ -14,20 +15,22 @@
 #include "shaders/shared/fixed_sums.glsl"
 
 layout(binding = 5) uniform samplerBuffer impulses;
-layout(binding = 6) uniform samplerBuffer positions;  // w: inverse mass
-layout(std430, binding = 7) buffer Corrections {
-  vec4 corrections[];
+layout(binding = 6) uniform samplerBuffer positions;   // w: inverse mass
+layout(binding = 7) uniform samplerBuffer velocities;  // at the substep's start
+layout(binding = 8) uniform samplerBuffer freeVelocities;
+layout(std430, binding = 9) buffer Corrections {
+  vec4 corrections[];  // of the free velocities
 };
-layout(std430, binding = 8) buffer Residuals {
+layout(std430, binding = 10) buffer Residuals {
   vec4 residuals[];  // w: one over the matrix's diagonal, 0 for pinned nodes
 };
-layout(std430, binding = 9) buffer Directions {
+layout(std430, binding = 11) buffer Directions {
   vec4 directions[];
 };
-layout(std430, binding = 10) buffer Products {
+layout(std430, binding = 12) buffer Products {
   vec4 products[];
 };
-layout(std430, binding = 11) buffer Solves {
+layout(std430, binding = 13) buffer Solves {
   SolveRecord solves[];
 };
 
@@ -38,9 +41,11 @@ layout(push_constant) uniform Push {
 // The right-hand side, and the diagonal: a third of the trace of a node's block.
 void begin(uint node, uint firstSpring) {
   float inverseMass = texelFetch(positions, int(node)).w;
+  precise vec3 gained = texelFetch(freeVelocities, int(node)).xyz - texelFetch(velocities, int(node)).xyz;
   precise vec3 residual = vec3(0.0);
   float inverseDiagonal = 0.0;
   if (inverseMass > 0.0) {
+    residual = reciprocal(inverseMass) * gained;
     precise float trace = 0.0;
     SpringList list = springsOf(node);
     while (list.first < list.end) {
@@ -58,7 +63,7 @@ void begin(uint node, uint firstSpring) {
     inverseDiagonal = reciprocal(diagonal);
   }
   precise vec3 direction = inverseDiagonal * residual;
-  corrections[node] = vec4(0.0);
+  corrections[node] = vec4(-gained, 0.0);
   residuals[node] = vec4(residual, inverseDiagonal);
   directions[node] = vec4(direction, 0.0);
 }
