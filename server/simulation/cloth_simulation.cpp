@@ -318,9 +318,12 @@ void ClothSimulation::Pipeline::recordUploadedState(vulkan::Recorder& recorder) 
 void ClothSimulation::Pipeline::setSolvers(std::span<const scene::Cloth> cloths) {
   std::vector<scene::Solver> wanted = solversOf(cloths);
   if (std::ranges::equal(wanted, solvers, sameTables)) return;
-  constraints.setTables(constraintTables(cloths));
-  implicit.setTables(implicitTables(cloths));
+  // Whatever the device has no room for is found before anything changes.
+  constraints.makeTables(constraintTables(cloths));
+  implicit.makeTables(implicitTables(cloths));
   makeXpbd(cloths);
+  constraints.takeTables();
+  implicit.takeTables();
   cut.tiles = makeTiles(cloths, cut.rowsPerInvocation, cut.workgroupSize);
   std::ranges::copy(cut.tiles.records, buffers.tileUpload.mapped<shared::TileRecord>().begin());
   if (meshes) meshes->setTiles(meshTiles(cloths, cut.workgroupSize));

@@ -139,20 +139,27 @@ struct ConstraintStage::Systems {
 ConstraintStage::ConstraintStage(const vulkan::Device& device, const ConstraintTables& tables,
                                  const StateBuffers& state, std::uint32_t workgroupSize)
     : device_(device), state_(state), workgroupSize_(workgroupSize) {
-  setTables(tables);
+  makeTables(tables);
+  takeTables();
 }
 
 ConstraintStage::~ConstraintStage() = default;
 
-void ConstraintStage::setTables(const ConstraintTables& tables) {
-  if (tables.links.empty()) return systems_.reset();
+void ConstraintStage::makeTables(const ConstraintTables& tables) {
+  nextSystems_.reset();
+  nextKernels_.reset();
+  if (tables.links.empty()) return;
   const SolveCut cut = cutSolve(device_, workgroupSize_, "a cloth of that many constraints",
                                 [&](std::uint32_t size) { return roundsOf(tables, size); });
-  std::unique_ptr<Kernels> fresh;
   if (!kernels_ || kernels_->solveAll.workgroupSize() != cut.workgroupSize)
-    fresh = std::make_unique<Kernels>(device_, cut.workgroupSize);
-  systems_ = std::make_unique<Systems>(device_, tables, state_, fresh ? *fresh : *kernels_, cut);
-  if (fresh) kernels_ = std::move(fresh);
+    nextKernels_ = std::make_unique<Kernels>(device_, cut.workgroupSize);
+  nextSystems_ =
+      std::make_unique<Systems>(device_, tables, state_, nextKernels_ ? *nextKernels_ : *kernels_, cut);
+}
+
+void ConstraintStage::takeTables() {
+  systems_ = std::move(nextSystems_);
+  if (nextKernels_) kernels_ = std::move(nextKernels_);
 }
 
 void ConstraintStage::recordTables(vulkan::Recorder& recorder) const {

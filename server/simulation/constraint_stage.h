@@ -30,9 +30,10 @@ class ConstraintStage {
                   std::uint32_t workgroupSize);
   ~ConstraintStage();
 
-  // Other constraints, or none, from now on; kernels that were made are kept. Nothing of this stage may be in
-  // flight. Where it throws, all is as before.
-  void setTables(const ConstraintTables& tables);
+  // Other constraints, or none, are made ready; then they are taken from now on, with nothing of this stage
+  // in flight. Kernels that were made are kept. Where the former throws, all is as before.
+  void makeTables(const ConstraintTables& tables);
+  void takeTables();
   // Whether there is a constraint; nothing below may be called where there is none.
   bool active() const { return systems_ != nullptr; }
 
@@ -58,8 +59,10 @@ class ConstraintStage {
   const vulkan::Device& device_;
   StateBuffers state_;
   std::uint32_t workgroupSize_;
-  std::unique_ptr<Kernels> kernels_;  // from the first constraint on
-  std::unique_ptr<Systems> systems_;  // null where there are none
+  std::unique_ptr<Kernels> kernels_;      // from the first constraint on
+  std::unique_ptr<Systems> systems_;      // null where there are none
+  std::unique_ptr<Kernels> nextKernels_;  // null: those that there are
+  std::unique_ptr<Systems> nextSystems_;
 };
 
 }  // namespace clothstream::simulation

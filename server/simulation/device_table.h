@@ -2,7 +2,9 @@
 // A table that kernels read.
 #pragma once
 
+#include <algorithm>
 #include <cassert>
+#include <cstddef>
 #include <cstring>
 #include <vector>
 
@@ -15,13 +17,13 @@ namespace clothstream::simulation {
 // Belongs to the device's thread.
 class DeviceTable {
  public:
-  // There must be a record. Throws std::runtime_error where the device has no room.
+  // Bindings want a buffer, even of no record. Throws std::runtime_error where the device has no room.
   template <typename Record>
   DeviceTable(const vulkan::Device& device, const std::vector<Record>& records)
-      : upload_(device, vulkan::BufferPurpose::upload, records.size() * sizeof(Record)),
+      : upload_(device, vulkan::BufferPurpose::upload,
+                std::max<std::size_t>(1, records.size()) * sizeof(Record)),
         texels_(device, vulkan::BufferPurpose::texels, upload_.bytes()) {
-    assert(!records.empty());
-    set(records);
+    if (!records.empty()) set(records);
   }
 
   // As many others, from the next upload on. None may be in flight.

@@ -126,20 +126,27 @@ struct ImplicitStage::Systems {
 ImplicitStage::ImplicitStage(const vulkan::Device& device, const ImplicitTables& tables,
                              const StateBuffers& state, std::uint32_t workgroupSize)
     : device_(device), state_(state), workgroupSize_(workgroupSize) {
-  setTables(tables);
+  makeTables(tables);
+  takeTables();
 }
 
 ImplicitStage::~ImplicitStage() = default;
 
-void ImplicitStage::setTables(const ImplicitTables& tables) {
-  if (tables.springs.empty()) return systems_.reset();
+void ImplicitStage::makeTables(const ImplicitTables& tables) {
+  nextSystems_.reset();
+  nextKernels_.reset();
+  if (tables.springs.empty()) return;
   const SolveCut cut = cutSolve(device_, workgroupSize_, "an implicit cloth of that many nodes",
                                 [&](std::uint32_t size) { return roundsOf(tables, size); });
-  std::unique_ptr<Kernels> fresh;
   if (!kernels_ || kernels_->solve.workgroupSize() != cut.workgroupSize)
-    fresh = std::make_unique<Kernels>(device_, cut.workgroupSize);
-  systems_ = std::make_unique<Systems>(device_, tables, state_, fresh ? *fresh : *kernels_, cut);
-  if (fresh) kernels_ = std::move(fresh);
+    nextKernels_ = std::make_unique<Kernels>(device_, cut.workgroupSize);
+  nextSystems_ =
+      std::make_unique<Systems>(device_, tables, state_, nextKernels_ ? *nextKernels_ : *kernels_, cut);
+}
+
+void ImplicitStage::takeTables() {
+  systems_ = std::move(nextSystems_);
+  if (nextKernels_) kernels_ = std::move(nextKernels_);
 }
 
 void ImplicitStage::recordTables(vulkan::Recorder& recorder) const {

@@ -26,9 +26,10 @@ class ImplicitStage {
                 std::uint32_t workgroupSize);
   ~ImplicitStage();
 
-  // Other cloths, or none, from now on; kernels that were made are kept. Nothing of this stage may be in
-  // flight. Where it throws, all is as before.
-  void setTables(const ImplicitTables& tables);
+  // Other cloths, or none, are made ready; then they are taken from now on, with nothing of this stage in
+  // flight. Kernels that were made are kept. Where the former throws, all is as before.
+  void makeTables(const ImplicitTables& tables);
+  void takeTables();
   // Whether there is an implicit cloth; nothing below may be called where there is none.
   bool active() const { return systems_ != nullptr; }
 
@@ -53,8 +54,10 @@ class ImplicitStage {
   const vulkan::Device& device_;
   StateBuffers state_;
   std::uint32_t workgroupSize_;
-  std::unique_ptr<Kernels> kernels_;  // from the first implicit cloth on
-  std::unique_ptr<Systems> systems_;  // null where there are none
+  std::unique_ptr<Kernels> kernels_;      // from the first implicit cloth on
+  std::unique_ptr<Systems> systems_;      // null where there are none
+  std::unique_ptr<Kernels> nextKernels_;  // null: those that there are
+  std::unique_ptr<Systems> nextSystems_;
 };
 
 }  // namespace clothstream::simulation

@@ -3,7 +3,6 @@
 #include "server/simulation/xpbd_stage.h"
 
 #include <algorithm>
-#include <cstring>
 
 #include "kernels/correct_grids.h"
 #include "kernels/correct_meshes.h"
@@ -42,11 +41,6 @@ XpbdCut cutXpbd(const vulkan::Device& device, std::uint32_t workgroupSize,
   return cut;
 }
 
-template <typename T>
-std::span<const std::byte> bytesOf(const std::vector<T>& records) {
-  return std::as_bytes(std::span(records));
-}
-
 std::uint64_t threads(const TileRange& tiles, std::uint32_t workgroupSize) {
   return std::uint64_t{tiles.count} * workgroupSize;
 }
@@ -68,13 +62,6 @@ XpbdVariant xpbdVariantOf(std::span<const shared::ClothRecord> cloths, bool coll
   return variant;
 }
 
-// Bindings want a buffer, even of what there is none.
-XpbdStage::Table::Table(const vulkan::Device& device, std::span<const std::byte> bytes)
-    : upload(device, BufferPurpose::upload, std::max(bytes.size(), sizeof(shared::vec4))),
-      texels(device, BufferPurpose::texels, upload.bytes()) {
-  if (!bytes.empty()) std::memcpy(upload.mapped().data(), bytes.data(), bytes.size());
-}
-
 XpbdStage::XpbdStage(const vulkan::Device& device, std::span<const scene::Cloth> cloths,
                      const StateBuffers& state, std::uint32_t workgroupSize,
                      std::optional<std::uint32_t> wholeNodes)
@@ -82,16 +69,15 @@ XpbdStage::XpbdStage(const vulkan::Device& device, std::span<const scene::Cloth>
       state_(state),
       cut_(cutXpbd(device, workgroupSize, wholeNodes)),
       tables_(xpbdTables(cloths, cut_)),
-      tiles_(device, bytesOf(tables_.tiles)),
-      colours_(device, bytesOf(tables_.colours)),
-      links_(device, bytesOf(tables_.links)),
+      tiles_(device, tables_.tiles),
+      colours_(device, tables_.colours),
+      links_(device, tables_.links),
       multipliers_(
           device, BufferPurpose::state,
           sizeof(float) * (tables_.iterated ? tables_.gridMultipliers + tables_.links.size() + 1 : 4)) {}
 
 void XpbdStage::recordTables(vulkan::Recorder& recorder) const {
-  for (const Table* table : {&tiles_, &colours_, &links_})
-    recorder.copy(table->upload, table->texels, table->upload.bytes());
+  for (const DeviceTable* table : {&tiles_, &colours_, &links_}) table->recordUpload(recorder);
 }
 
 const Stage& XpbdStage::grids(const XpbdVariant& variant, std::uint32_t passes) {
@@ -110,8 +96,8 @@ const Stage& XpbdStage::grids(const XpbdVariant& variant, std::uint32_t passes) 
           .pushConstantBytes = sizeof(shared::XpbdPush),
           .workgroupSize = passes == kAllPasses ? cut_.wholeWorkgroup : cut_.partWorkgroup,
           .specialisation = {variant.damped ? 1u : 0u, tables_.iterated ? 1u : 0u, passes, bend ? 1u : 0u}},
-      Stage::Buffers{&state_.cloths, &tiles_.texels, one, other, other, &multipliers_},
-      Stage::Buffers{&state_.cloths, &tiles_.texels, other, one, one, &multipliers_});
+      Stage::Buffers{&state_.cloths, &tiles_.texels(), one, other, other, &multipliers_},
+      Stage::Buffers{&state_.cloths, &tiles_.texels(), other, one, one, &multipliers_});
   return *stage;
 }
 
@@ -128,10 +114,10 @@ const Stage& XpbdStage::meshes(const XpbdVariant& variant, bool whole) {
           .pushConstantBytes = sizeof(shared::XpbdPush),
           .workgroupSize = whole ? cut_.wholeWorkgroup : cut_.partWorkgroup,
           .specialisation = {variant.damped ? 1u : 0u, tables_.iterated ? 1u : 0u, whole ? 1u : 0u}},
-      Stage::Buffers{&state_.cloths, &tiles_.texels, one, other, other, &multipliers_, &colours_.texels,
-                     &links_.texels},
-      Stage::Buffers{&state_.cloths, &tiles_.texels, other, one, one, &multipliers_, &colours_.texels,
-                     &links_.texels});
+      Stage::Buffers{&state_.cloths, &tiles_.texels(), one, other, other, &multipliers_, &colours_.texels(),
+                     &links_.texels()},
+      Stage::Buffers{&state_.cloths, &tiles_.texels(), other, one, one, &multipliers_, &colours_.texels(),
+                     &links_.texels()});
   return *stage;
 }
 
@@ -150,9 +136,9 @@ const Stage& XpbdStage::finish(const XpbdVariant& variant) {
           .pushConstantBytes = sizeof(shared::FinishPush),
           .workgroupSize = cut_.partWorkgroup,
           .specialisation = {variant.colliders ? 1u : 0u}},
-      Stage::Buffers{&state_.cloths, &tiles_.texels, one, other, colliders, near, other, otherVelocity,
+      Stage::Buffers{&state_.cloths, &tiles_.texels(), one, other, colliders, near, other, otherVelocity,
                      otherVelocity},
-      Stage::Buffers{&state_.cloths, &tiles_.texels, other, one, colliders, near, one, oneVelocity,
+      Stage::Buffers{&state_.cloths, &tiles_.texels(), other, one, colliders, near, one, oneVelocity,
                      oneVelocity});
   return *stage;
 }

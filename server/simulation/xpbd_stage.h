@@ -10,6 +10,7 @@
 #include <span>
 
 #include "server/scene/scene.h"
+#include "server/simulation/device_table.h"
 #include "server/simulation/stage.h"
 #include "server/simulation/state_buffers.h"
 #include "server/simulation/xpbd_tables.h"
@@ -49,10 +50,6 @@ class XpbdStage {
               shared::FinishPush push);
 
  private:
-  struct Table {
-    Table(const vulkan::Device& device, std::span<const std::byte> bytes);
-    vulkan::Buffer upload, texels;
-  };
   template <std::size_t count>
   using Stages = std::array<std::unique_ptr<Stage>, count>;  // made when they are first needed
 
@@ -66,7 +63,7 @@ class XpbdStage {
   StateBuffers state_;
   XpbdCut cut_;
   XpbdTables tables_;
-  Table tiles_, colours_, links_;
+  DeviceTable tiles_, colours_, links_;
   vulkan::Buffer multipliers_;
   Stages<16> grids_;
   Stages<4> meshes_;
