@@ -2,6 +2,7 @@
 // One message of the server's after the other.
 #include "clients/core/client.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "clients/core/description.h"
@@ -34,6 +35,8 @@ std::uint32_t Client::receive(Bytes bytes, std::uint64_t nowUs) {
       return parametersReceived(message->body);
     case Body::error:
       return errorReceived(message->body);
+    case Body::tickEvents:
+      return eventsReceived(message->body);
     case Body::listScenes:
       return scenesReceived(message->body);
     case Body::none:
@@ -159,6 +162,11 @@ std::uint32_t Client::pongReceived(Bytes body, std::uint64_t nowUs) {
   return 0;
 }
 
+std::uint32_t Client::eventsReceived(Bytes body) {
+  if (!readTickEvents(body, grabEvents_)) return failMalformed("TickEvents");
+  return CS_EVENT_GRABS;
+}
+
 std::uint32_t Client::noticeReceived(Bytes body) {
   std::optional<std::string> text = readNotice(body);
   if (!text) return failMalformed("Notice");
@@ -190,9 +198,37 @@ std::uint32_t Client::scenesReceived(Bytes body) {
   return CS_EVENT_SCENES;
 }
 
+const std::string* Client::nextOutgoing() {
+  const std::string* message = outbox_.next();
+  // Attachments stay where they are put: it need not be said again.
+  if (outbox_.poses().empty()) poses_.attachments.clear();
+  return message;
+}
+
 void Client::setColliders(std::span<const cs_own_collider> colliders, std::uint64_t nowUs) {
+  poses_.colliders.assign(colliders.begin(), colliders.end());
+  sendPoses(nowUs);
+}
+
+void Client::setGrabs(std::span<const cs_grab> grabs, std::uint64_t nowUs) {
+  poses_.grabs.assign(grabs.begin(), grabs.end());
+  sendPoses(nowUs);
+}
+
+void Client::move(AttachmentPose attachment, std::uint64_t nowUs) {
+  const auto known =
+      std::find_if(poses_.attachments.begin(), poses_.attachments.end(),
+                   [&](const AttachmentPose& waiting) { return waiting.name == attachment.name; });
+  if (known != poses_.attachments.end())
+    *known = std::move(attachment);
+  else
+    poses_.attachments.push_back(std::move(attachment));
+  sendPoses(nowUs);
+}
+
+void Client::sendPoses(std::uint64_t nowUs) {
   if (state_ == CS_STATE_FAILED) return;
-  writeColliderPoses(outbox_.colliders(), colliders, nowUs);
+  writeColliderPoses(outbox_.poses(), poses_, nowUs);
 }
 
 void Client::change(const ParameterChange& change) {

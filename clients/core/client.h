@@ -28,10 +28,12 @@ class Client {
   // A set of CS_EVENT bits.
   std::uint32_t receive(Bytes message, std::uint64_t nowUs);
   void update(std::uint64_t nowUs);
-  const std::string* nextOutgoing() { return outbox_.next(); }
+  const std::string* nextOutgoing();
 
   void setClock(std::uint64_t (*nowUs)()) { nowUs_ = nowUs; }
   void setColliders(std::span<const cs_own_collider> colliders, std::uint64_t nowUs);
+  void setGrabs(std::span<const cs_grab> grabs, std::uint64_t nowUs);
+  void move(AttachmentPose attachment, std::uint64_t nowUs);
   void change(const ParameterChange& change);
   void change(const ColliderChange& change);
   void listScenes();
@@ -57,9 +59,11 @@ class Client {
   // The newest, and its tick; no cloths before the first.
   const SimulationReport& report() const { return report_; }
   std::uint64_t reportTick() const { return reportTick_; }
+  const std::vector<cs_grab_event>& grabEvents() const { return grabEvents_; }
   const std::vector<Collider>& colliders() const { return description_.colliders; }
 
  private:
+  void sendPoses(std::uint64_t nowUs);
   std::uint32_t welcomed(Bytes body);
   std::uint32_t chunkReceived(Bytes body);
   std::uint32_t described(Bytes content);
@@ -68,6 +72,7 @@ class Client {
   codec::DecodeResult decode(std::span<const std::byte> packet);
   void requestKeyFrame(std::uint64_t nowUs);
   std::uint32_t pongReceived(Bytes body, std::uint64_t nowUs);
+  std::uint32_t eventsReceived(Bytes body);
   std::uint32_t noticeReceived(Bytes body);
   std::uint32_t parametersReceived(Bytes body);
   std::uint32_t errorReceived(Bytes body);
@@ -90,10 +95,12 @@ class Client {
   FrameStatistics statistics_;
   ServerClock clock_;
   Outbox outbox_;
+  Poses poses_;  // of this participant
   std::uint64_t lastRequestId_ = 0;
   std::uint64_t (*nowUs_)() = nullptr;
   double decodeMs_ = 0;
   std::vector<std::string> scenes_;
+  std::vector<cs_grab_event> grabEvents_;
   SimulationReport report_;
   std::uint64_t reportTick_ = 0;
   std::uint64_t parametersParticipant_ = 0;

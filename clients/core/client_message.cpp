@@ -3,6 +3,8 @@
 #include "clients/core/client_message.h"
 
 #include <algorithm>
+#include <cmath>
+#include <span>
 
 #include <protozero/pbf_writer.hpp>
 
@@ -90,13 +92,22 @@ std::string solverMessage(const Solver& solver) {
 }
 
 // Absent where it is not turned, for a Writer leaves out nothing by itself.
-void addPose(Writer& parent, std::uint32_t field, const cs_own_collider& collider) {
+void addPose(Writer& parent, std::uint32_t field, std::span<const float, 3> position,
+             std::span<const float, 4> orientation) {
   Writer pose(parent, field);
-  addVec3(pose, 1, {collider.position[0], collider.position[1], collider.position[2]});
-  if (std::all_of(collider.orientation, collider.orientation + 4, [](float part) { return part == 0; }))
-    return;
-  Writer orientation(pose, 2);
-  for (std::uint32_t i = 0; i < 4; ++i) orientation.add_float(i + 1, collider.orientation[i]);
+  addVec3(pose, 1, {position[0], position[1], position[2]});
+  if (std::all_of(orientation.begin(), orientation.end(), [](float part) { return part == 0; })) return;
+  Writer turned(pose, 2);
+  for (std::uint32_t i = 0; i < 4; ++i) turned.add_float(i + 1, orientation[i]);
+}
+
+void addGrab(Writer& poses, const cs_grab& grab) {
+  Writer message(poses, 3);
+  message.add_uint32(1, grab.id);
+  addPose(message, 2, grab.position, grab.orientation);
+  const float settings[] = {grab.radius, grab.reach, grab.max_force, grab.slip_distance};
+  for (std::uint32_t i = 0; i < 4; ++i)
+    if (!std::isnan(settings[i])) message.add_float(3 + i, settings[i]);
 }
 
 // Of a ParticipantCollider. What is none of its shapes is left out, and refused by the server.
@@ -126,16 +137,22 @@ void writeHello(std::string& out, std::uint64_t requestId, std::string_view scen
   });
 }
 
-void writeColliderPoses(std::string& out, std::span<const cs_own_collider> colliders,
-                        std::uint64_t clientTimeUs) {
-  writeMessage(out, 0, kColliderPoses, [&](Writer& poses) {
-    for (std::size_t i = 0; i < colliders.size(); ++i) {
-      Writer collider(poses, 1);
+void writeColliderPoses(std::string& out, const Poses& poses, std::uint64_t clientTimeUs) {
+  writeMessage(out, 0, kColliderPoses, [&](Writer& message) {
+    for (std::size_t i = 0; i < poses.colliders.size(); ++i) {
+      const cs_own_collider& from = poses.colliders[i];
+      Writer collider(message, 1);
       collider.add_uint32(1, static_cast<std::uint32_t>(i));
-      addPose(collider, 2, colliders[i]);
-      addShape(collider, colliders[i]);
+      addPose(collider, 2, from.position, from.orientation);
+      addShape(collider, from);
     }
-    poses.add_uint64(2, clientTimeUs);
+    message.add_uint64(2, clientTimeUs);
+    for (const cs_grab& grab : poses.grabs) addGrab(message, grab);
+    for (const AttachmentPose& put : poses.attachments) {
+      Writer attachment(message, 4);
+      attachment.add_string(1, put.name.data(), put.name.size());
+      addPose(attachment, 2, put.position, put.orientation);
+    }
   });
 }
 

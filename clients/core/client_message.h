@@ -3,10 +3,11 @@
 // holds and reuses its memory.
 #pragma once
 
+#include <array>
 #include <cstdint>
-#include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "clients/core/core.h"
 #include "clients/core/server_message.h"
@@ -21,9 +22,19 @@ struct ColliderChange {
 
 void writeHello(std::string& out, std::uint64_t requestId, std::string_view scene,
                 std::string_view clientName);
-// Ids of the colliders are their places in the span.
-void writeColliderPoses(std::string& out, std::span<const cs_own_collider> colliders,
-                        std::uint64_t clientTimeUs);
+struct AttachmentPose {
+  std::string name;
+  std::array<float, 3> position{};
+  std::array<float, 4> orientation{};  // all zero: not turned
+};
+
+// What this participant does.
+struct Poses {
+  std::vector<cs_own_collider> colliders;  // their ids are their places
+  std::vector<cs_grab> grabs;
+  std::vector<AttachmentPose> attachments;
+};
+void writeColliderPoses(std::string& out, const Poses& poses, std::uint64_t clientTimeUs);
 void writeParameterChange(std::string& out, std::uint64_t requestId, const ParameterChange& change);
 void writeColliderChange(std::string& out, std::uint64_t requestId, const ColliderChange& change);
 void writePing(std::string& out, std::uint64_t requestId, std::uint64_t clientTimeUs);

@@ -381,6 +381,17 @@ int cs_change_cloth(cs_client* client, const char* cloth, const cs_cloth_setting
   return 1;
 }
 
+uint32_t cs_grab_event_count(const cs_client* client) {
+  return static_cast<std::uint32_t>(client->client.grabEvents().size());
+}
+
+int cs_get_grab_event(const cs_client* client, uint32_t index, cs_grab_event* out) {
+  const cs_grab_event* event = at(client->client.grabEvents(), index);
+  if (!event) return 0;
+  *out = *event;
+  return 1;
+}
+
 void cs_set_colliders(cs_client* client, const float* spheres, uint32_t count, uint64_t now_us) {
   std::array<cs_own_collider, CS_MAX_COLLIDERS> colliders{};
   count = std::min(count, CS_MAX_COLLIDERS);
@@ -395,6 +406,18 @@ void cs_set_colliders(cs_client* client, const float* spheres, uint32_t count, u
 
 void cs_set_shapes(cs_client* client, const cs_own_collider* colliders, uint32_t count, uint64_t now_us) {
   client->client.setColliders(std::span(colliders, std::min(count, CS_MAX_COLLIDERS)), now_us);
+}
+
+void cs_set_grabs(cs_client* client, const cs_grab* grabs, uint32_t count, uint64_t now_us) {
+  client->client.setGrabs(std::span(grabs, std::min(count, CS_MAX_GRABS)), now_us);
+}
+
+void cs_move_attachment(cs_client* client, const char* attachment, const float* position3,
+                        const float* orientation4, uint64_t now_us) {
+  AttachmentPose pose{.name = attachment};
+  std::copy(position3, position3 + 3, pose.position.begin());
+  if (orientation4 != nullptr) std::copy(orientation4, orientation4 + 4, pose.orientation.begin());
+  client->client.move(std::move(pose), now_us);
 }
 
 void cs_set_environment(cs_client* client, const float* gravity3, const float* wind3,

@@ -22,6 +22,7 @@ extern "C" {
 
 #define CS_PROTOCOL_VERSION 1u
 #define CS_MAX_COLLIDERS 40u
+#define CS_MAX_GRABS 10u
 
 /* NOLINTBEGIN(modernize-use-using): C has no using. */
 typedef struct cs_client cs_client;
@@ -40,7 +41,8 @@ enum {
   CS_EVENT_ERROR = 8,       /* cs_error_text; fatal if the state is CS_STATE_FAILED */
   CS_EVENT_PARAMETERS = 16, /* somebody changed a parameter */
   CS_EVENT_SCENES = 32,     /* answer to cs_list_scenes */
-  CS_EVENT_REPORT = 64      /* cs_get_cloth_report */
+  CS_EVENT_REPORT = 64,     /* cs_get_cloth_report */
+  CS_EVENT_GRABS = 128      /* cs_grab_event_count */
 };
 
 typedef struct cs_statistics {
@@ -151,6 +153,30 @@ typedef struct cs_own_collider {
   float radius, length, size[3];
 } cs_own_collider;
 
+/* A grip on cloth, as Grab in session.proto says. NaN: the server's default. */
+typedef struct cs_grab {
+  uint32_t id; /* one that was not in use begins to hold; one that is missing lets go */
+  float position[3];
+  float orientation[4]; /* x y z w; all zero: not turned */
+  float radius, reach;  /* m */
+  float max_force;      /* N */
+  float slip_distance;  /* m */
+} cs_grab;
+
+/* GrabEventKind of session.proto. */
+typedef enum cs_grab_event_kind {
+  CS_GRAB_TAKEN = 1,   /* a grip began */
+  CS_GRAB_SLIPPED = 2, /* it lost some of its vertices, or the last */
+  CS_GRAB_RELEASED = 3 /* its participant let go, or left */
+} cs_grab_event_kind;
+
+typedef struct cs_grab_event {
+  uint64_t participant_id;
+  uint32_t grab_id;
+  uint32_t kind;     /* cs_grab_event_kind, or one that this client does not know yet */
+  uint32_t vertices; /* that the grip holds now */
+} cs_grab_event;
+
 /* scene may be "" for the server's default; strings are copied. */
 cs_client* cs_create(const char* scene, const char* client_name);
 void cs_destroy(cs_client* client);
@@ -214,12 +240,21 @@ int cs_get_cloth_report(const cs_client* client, uint32_t index, cs_cloth_report
 /* Who made the newest change that CS_EVENT_PARAMETERS told of; 0: the server. */
 uint64_t cs_parameters_participant(const cs_client* client);
 
+/* What became of everybody's grips, as the newest CS_EVENT_GRABS told. 0 if there is no such event. */
+uint32_t cs_grab_event_count(const cs_client* client);
+int cs_get_grab_event(const cs_client* client, uint32_t index, cs_grab_event* out);
+
 /* Sphere colliders of this participant: `count` of {x, y, z, radius}, at most CS_MAX_COLLIDERS (the rest is
  * left out); replaces all former ones; 0 takes them away. Only the newest call counts if the transport is
  * behind. */
 void cs_set_colliders(cs_client* client, const float* spheres, uint32_t count, uint64_t now_us);
 /* The same with other shapes and turned: the joints of a hand as capsules, say. */
 void cs_set_shapes(cs_client* client, const cs_own_collider* colliders, uint32_t count, uint64_t now_us);
+/* This participant's grips, at most CS_MAX_GRABS (the rest is left out); replaces all former ones. */
+void cs_set_grabs(cs_client* client, const cs_grab* grabs, uint32_t count, uint64_t now_us);
+/* Where an attachment of the scene is to go; orientation4 NULL: not turned. It stays there. */
+void cs_move_attachment(cs_client* client, const char* attachment, const float* position3,
+                        const float* orientation4, uint64_t now_us);
 /* Parameters; NULL leaves one as it is. An empty cloth name means every cloth. */
 void cs_set_environment(cs_client* client, const float* gravity3, const float* wind3,
                         const float* air_density);

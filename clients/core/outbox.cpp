@@ -14,7 +14,7 @@ bool Outbox::addControl(std::string message) {
 
 void Outbox::clear() {
   control_.clear();
-  colliders_.clear();
+  poses_.clear();
   ackTick_.reset();
 }
 
@@ -25,9 +25,9 @@ const std::string* Outbox::next() {
   } else if (ackTick_) {
     writeFrameAck(taken_, *ackTick_);
     ackTick_.reset();
-  } else if (!colliders_.empty()) {
-    taken_.swap(colliders_);
-    colliders_.clear();
+  } else if (!poses_.empty()) {
+    taken_.swap(poses_);
+    poses_.clear();
   } else {
     return nullptr;
   }

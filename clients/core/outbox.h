@@ -11,7 +11,7 @@
 
 namespace clothstream::client {
 
-// Of acknowledgements and of collider poses only the newest says anything: a transport that is behind skips
+// Of acknowledgements and of poses only the newest says anything: a transport that is behind skips
 // the others.
 class Outbox {
  public:
@@ -22,7 +22,7 @@ class Outbox {
   [[nodiscard]] bool addControl(std::string message);
   void setAck(std::uint64_t tick) { ackTick_ = tick; }
   // Replaces what waits.
-  std::string& colliders() { return colliders_; }
+  std::string& poses() { return poses_; }
   void clear();
 
   // nullptr where there is nothing; valid until the next call of this function.
@@ -30,7 +30,7 @@ class Outbox {
 
  private:
   std::deque<std::string> control_;
-  std::string colliders_;  // empty: none waits
+  std::string poses_;  // empty: none waits
   std::optional<std::uint64_t> ackTick_;
   std::string taken_;
 };

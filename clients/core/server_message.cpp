@@ -206,8 +206,9 @@ std::optional<Message> readMessage(Bytes bytes, Visit&& visit) {
 }
 
 Body bodyOf(std::uint32_t field) {
-  constexpr std::array kKnown{Body::welcome,          Body::chunk, Body::frame,     Body::pong, Body::notice,
-                              Body::parameterChanged, Body::error, Body::listScenes};
+  constexpr std::array kKnown{Body::welcome, Body::chunk,      Body::frame,
+                              Body::pong,    Body::notice,     Body::parameterChanged,
+                              Body::error,   Body::tickEvents, Body::listScenes};
   for (const Body body : kKnown) {
     if (field == bytes(static_cast<std::uint32_t>(body))) return body;
   }
@@ -386,6 +387,29 @@ std::optional<ServerError> readError(Bytes message) {
       default:
         return skip(reader);
     }
+  });
+}
+
+bool readTickEvents(Bytes message, std::vector<cs_grab_event>& events) {
+  events.clear();
+  return readFields(message, [&](std::uint32_t field, Reader& reader) {
+    if (field != bytes(2)) return skip(reader);
+    if (events.size() == kMaxGrabEvents) return false;
+    cs_grab_event& event = events.emplace_back(cs_grab_event{});
+    return readFields(reader.get_view(), [&](std::uint32_t eventField, Reader& of) {
+      switch (eventField) {
+        case varint(1):
+          return set(event.participant_id, of.get_uint64());
+        case varint(2):
+          return set(event.grab_id, of.get_uint32());
+        case varint(3):
+          return set(event.kind, of.get_uint32());
+        case varint(4):
+          return set(event.vertices, of.get_uint32());
+        default:
+          return skip(of);
+      }
+    });
   });
 }
 

@@ -26,6 +26,7 @@ enum class Body : std::uint32_t {
   notice = 6,
   parameterChanged = 7,
   error = 8,
+  tickEvents = 9,
   listScenes = 16,
 };
 
@@ -136,6 +137,8 @@ struct ParameterChange {
 [[nodiscard]] std::optional<std::string> readNotice(Bytes message);
 [[nodiscard]] std::optional<ParameterChange> readParameterChanged(Bytes message);
 [[nodiscard]] std::optional<ServerError> readError(Bytes message);
+// Of the grips. Reuses the memory of `events`.
+[[nodiscard]] bool readTickEvents(Bytes message, std::vector<cs_grab_event>& events);
 // The names of the scenes.
 [[nodiscard]] std::optional<std::vector<std::string>> readScenes(Bytes message);
 
@@ -150,5 +153,6 @@ inline constexpr std::size_t kMaxCloths = 256;
 inline constexpr std::size_t kMaxSceneColliders = 4096;
 inline constexpr std::size_t kMaxHullParts = 128;  // vertices, faces
 inline constexpr std::size_t kMaxScenes = 65536;
+inline constexpr std::size_t kMaxGrabEvents = 65536;
 
 }  // namespace clothstream::client

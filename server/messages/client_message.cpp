@@ -20,6 +20,63 @@ tl::unexpected<FieldError> refuse(v1::ErrorCode code, std::string text) {
   return tl::unexpected(FieldError{code, std::move(text)});
 }
 
+void checkNew(Checks& checks, const Path& path, std::uint32_t id, std::unordered_set<std::uint32_t>& ids) {
+  if (!ids.insert(id).second)
+    checks.fail(path / "id", fmt::format("{}", id), "is another's id already; ids must be unique");
+}
+
+void readColliders(Checks& checks, const Path& poses, const v1::ColliderPoses& message,
+                   scene::ParticipantPoses& to) {
+  checks.count(poses / "colliders", static_cast<std::size_t>(message.colliders_size()), 0,
+               limits::kMaxParticipantColliders);
+  std::unordered_set<std::uint32_t> ids;
+  for (int i = 0; i < message.colliders_size() && !checks.failed(); ++i) {
+    const v1::ParticipantCollider& from = message.colliders(i);
+    const Path path = poses.at("colliders", i);
+    checkNew(checks, path, from.id(), ids);
+    to.colliders.push_back(
+        {from.id(), toPose(checks, path / "pose", from.pose()), toShape(checks, path, from)});
+  }
+}
+
+void readGrabs(Checks& checks, const Path& poses, const v1::ColliderPoses& message,
+               scene::ParticipantPoses& to) {
+  checks.count(poses / "grabs", static_cast<std::size_t>(message.grabs_size()), 0,
+               limits::kMaxParticipantGrabs);
+  std::unordered_set<std::uint32_t> ids;
+  for (int i = 0; i < message.grabs_size() && !checks.failed(); ++i) {
+    const v1::Grab& from = message.grabs(i);
+    const Path path = poses.at("grabs", i);
+    checkNew(checks, path, from.id(), ids);
+    scene::Grab grab{.id = from.id(), .pose = toPose(checks, path / "pose", from.pose())};
+    if (from.has_radius()) grab.radius = checks.number(path / "radius", from.radius(), limits::kGrabRadius);
+    if (from.has_reach()) grab.reach = checks.number(path / "reach", from.reach(), limits::kGrabReach);
+    if (from.has_max_force())
+      grab.maxForce = checks.number(path / "maxForce", from.max_force(), limits::kGrabForce);
+    if (from.has_slip_distance())
+      grab.slipDistance = checks.number(path / "slipDistance", from.slip_distance(), limits::kSlipDistance);
+    to.grabs.push_back(grab);
+  }
+}
+
+void readAttachments(Checks& checks, const Path& poses, const v1::ColliderPoses& message,
+                     const scene::Scene& scene, scene::ParticipantPoses& to) {
+  checks.count(poses / "attachments", static_cast<std::size_t>(message.attachments_size()), 0,
+               limits::kMaxAttachments);
+  if (message.attachments_size() == 0 || checks.failed()) return;
+  std::vector<scene::Attachment> known;
+  for (const scene::Cloth& cloth : scene.cloths)
+    known.insert(known.end(), cloth.attachments.begin(), cloth.attachments.end());
+  for (int i = 0; i < message.attachments_size() && !checks.failed(); ++i) {
+    const v1::AttachmentPose& from = message.attachments(i);
+    const Path path = poses.at("attachments", i);
+    checkKnown(checks, path / "name", from.name(), known);
+    const auto found = std::ranges::find(known, from.name(), &scene::Attachment::name);
+    to.attachments.push_back(
+        {static_cast<std::size_t>(found - known.begin()), toPose(checks, path / "pose", from.pose())});
+  }
+}
+
 }  // namespace
 
 Result<v1::ClientMessage> parseClientMessage(std::span<const std::byte> bytes) {
@@ -57,21 +114,14 @@ Result<Joining> toJoining(const v1::Hello& message, std::span<const std::uint32_
                  message.client_name(), message.display_name()};
 }
 
-Result<std::vector<scene::ParticipantCollider>> toColliders(const v1::ColliderPoses& message) {
+Result<scene::ParticipantPoses> toPoses(const v1::ColliderPoses& message, const scene::Scene& scene) {
   Checks checks;
-  const Path poses("colliderPoses");
-  checks.count(poses / "colliders", static_cast<std::size_t>(message.colliders_size()), 0,
-               limits::kMaxParticipantColliders);
-  std::vector<scene::ParticipantCollider> colliders;
-  std::unordered_set<std::uint32_t> ids;
-  for (int i = 0; i < message.colliders_size() && !checks.failed(); ++i) {
-    const v1::ParticipantCollider& from = message.colliders(i);
-    const Path path = poses.at("colliders", i);
-    if (!ids.insert(from.id()).second)
-      checks.fail(path / "id", fmt::format("{}", from.id()), "is another's id already; ids must be unique");
-    colliders.push_back({from.id(), toPose(checks, path / "pose", from.pose()), toShape(checks, path, from)});
-  }
-  return std::move(checks).result(std::move(colliders));
+  const Path path("colliderPoses");
+  scene::ParticipantPoses poses;
+  readColliders(checks, path, message, poses);
+  readGrabs(checks, path, message, poses);
+  readAttachments(checks, path, message, scene, poses);
+  return std::move(checks).result(std::move(poses));
 }
 
 }  // namespace clothstream::messages

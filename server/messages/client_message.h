@@ -32,8 +32,10 @@ struct Joining {
 // `codecs` are the server's; the client's best that is among them is taken.
 [[nodiscard]] Result<Joining> toJoining(const v1::Hello& message, std::span<const std::uint32_t> codecs);
 
-// At most limits::kMaxParticipantColliders, with unique ids.
-[[nodiscard]] Result<std::vector<scene::ParticipantCollider>> toColliders(const v1::ColliderPoses& message);
+// At most limits::kMaxParticipantColliders and limits::kMaxParticipantGrabs, with unique ids; attachments
+// that this scene has, each once.
+[[nodiscard]] Result<scene::ParticipantPoses> toPoses(const v1::ColliderPoses& message,
+                                                      const scene::Scene& scene);
 
 // A change that may be applied to this scene as a whole: names exist in it, values are in range, and it stays
 // stable with its substeps.

@@ -21,6 +21,7 @@ inline constexpr std::uint32_t kMaxSubsteps = scene::kMaxSubsteps;
 inline constexpr std::size_t kMaxCloths = 256;
 inline constexpr std::size_t kMaxColliders = 64;
 inline constexpr std::size_t kMaxPins = 4096;        // ranges a cloth
+inline constexpr std::size_t kMaxAttachments = 64;   // of a scene
 inline constexpr std::size_t kMaxMotionKeys = 1024;  // a collider
 inline constexpr std::size_t kMinHullParts = 4;      // vertices, faces
 inline constexpr std::size_t kMaxHullParts = 128;
@@ -56,7 +57,12 @@ inline constexpr Range kMotionTime{0, 86400};          // s
 inline constexpr Range kMaxError{0.00001, 0.1};        // m
 inline constexpr Range kCompliance{0, 1};              // m/N
 inline constexpr Range kTolerance{0, 1};
-inline constexpr Range kActivation{0, 10};  // part of a length
+inline constexpr Range kActivation{0, 10};        // part of a length
+inline constexpr Range kSlack{0, 1};              // part of a length
+inline constexpr Range kGrabRadius{0.001, 1};     // m
+inline constexpr Range kGrabReach{0, 1};          // m
+inline constexpr Range kGrabForce{0.001, 1e6};    // N
+inline constexpr Range kSlipDistance{0.001, 10};  // m
 inline constexpr std::uint32_t kMaxIterations = 10'000;
 inline constexpr std::uint32_t kMaxXpbdIterations = 1'000;
 inline constexpr std::uint32_t kMaxSolverNodes = 1'048'576;       // of a cloth
@@ -72,6 +78,7 @@ inline constexpr std::size_t kMaxSceneFileBytes = 4 * 1024 * 1024;
 inline constexpr std::size_t kMaxMeshFileBytes = 512 * 1024 * 1024;
 inline constexpr std::size_t kMaxClientMessageBytes = 64 * 1024;
 inline constexpr std::size_t kMaxParticipantColliders = 40;
+inline constexpr std::size_t kMaxParticipantGrabs = 10;
 inline constexpr std::size_t kMaxChunkBytes = 256 * 1024;
 inline constexpr std::size_t kMaxContentBytes = 256 * 1024 * 1024;
 // Of all cloths in a description, beside which everything else finds room.

@@ -87,23 +87,10 @@ meshes::MeshSource readSource(Checks& checks, const Path& path, const v1::Mesh& 
   return {};
 }
 
-void toPinnedVertices(Checks& checks, const Path& path, const v1::Cloth& message,
-                      const std::vector<std::uint32_t>& nodeOfVertex, scene::Cloth& cloth) {
-  for (int i = 0; i < message.pinned_vertices_size() && !checks.failed(); ++i) {
-    const Path at = path.at("pinnedVertices", i);
-    const std::uint32_t vertex = checks.integer(at, message.pinned_vertices(i), 0,
-                                                static_cast<std::uint32_t>(nodeOfVertex.size()) - 1);
-    if (checks.failed()) return;
-    if (nodeOfVertex[vertex] == meshes::kNoNode)
-      checks.fail(at, fmt::format("{}", vertex), "is a vertex without a face, which is left out");
-    cloth.pinnedVertices.push_back(nodeOfVertex[vertex]);
-  }
-}
-
 }  // namespace
 
-void toMeshCloth(Checks& checks, const Path& path, const v1::Cloth& message, const MeshReader& readMesh,
-                 scene::Cloth& cloth) {
+std::vector<std::uint32_t> toMeshCloth(Checks& checks, const Path& path, const v1::Cloth& message,
+                                       const MeshReader& readMesh, scene::Cloth& cloth) {
   const v1::Mesh& mesh = message.mesh();
   const Path at = path / "mesh";
   meshes::MeshOptions options{.pose = toPose(checks, at / "pose", mesh.pose()),
@@ -112,30 +99,17 @@ void toMeshCloth(Checks& checks, const Path& path, const v1::Cloth& message, con
   if (mesh.has_scale()) options.scale = checks.number(at / "scale", mesh.scale(), limits::kScale);
   if (mesh.has_weld_distance())
     options.weldDistance = checks.number(at / "weldDistance", mesh.weld_distance(), limits::kWeldDistance);
-  if (checks.failed()) return;
+  if (checks.failed()) return {};
   const meshes::MeshSource source =
       mesh.file().empty() ? toSource(checks, at, mesh) : readSource(checks, at, mesh, readMesh);
-  if (checks.failed()) return;
+  if (checks.failed()) return {};
   auto built = meshes::buildMesh(source, options, kMeshLimits);
-  if (!built) return checks.fail(at, mesh.file().empty() ? "" : '"' + mesh.file() + '"', built.error());
-  cloth.mesh = std::make_shared<const scene::Mesh>(std::move(built->mesh));
-  toPinnedVertices(checks, path, message, built->nodeOfVertex, cloth);
-}
-
-scene::Region toRegion(Checks& checks, const Path& path, const v1::Region& message) {
-  scene::Region region;
-  region.centre = toVec3(checks, path / "centre", message.centre(), limits::kPosition);
-  switch (message.shape_case()) {
-    case v1::Region::kRadius:
-      region.radius = checks.number(path / "radius", message.radius(), limits::kRegionLength);
-      break;
-    case v1::Region::kSize:
-      region.size = toVec3(checks, path / "size", message.size(), limits::kRegionLength);
-      break;
-    case v1::Region::SHAPE_NOT_SET:
-      checks.fail(path, "", "has no shape; must have \"radius\" or \"size\"");
+  if (!built) {
+    checks.fail(at, mesh.file().empty() ? "" : '"' + mesh.file() + '"', built.error());
+    return {};
   }
-  return region;
+  cloth.mesh = std::make_shared<const scene::Mesh>(std::move(built->mesh));
+  return std::move(built->nodeOfVertex);
 }
 
 void write(const scene::Mesh& mesh, v1::Mesh& message) {
@@ -151,14 +125,6 @@ void write(const scene::Mesh& mesh, v1::Mesh& message) {
     partMessage.set_triangle_count(part.triangleCount);
   }
   message.set_weld_distance(0);
-}
-
-void write(const scene::Region& region, v1::Region& message) {
-  write(region.centre, *message.mutable_centre());
-  if (region.radius)
-    message.set_radius(*region.radius);
-  else
-    write(region.size, *message.mutable_size());
 }
 
 }  // namespace clothstream::messages

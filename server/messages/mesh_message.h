@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: MIT
-// Meshes, pinned vertices and regions between messages and the domain.
+// Meshes between messages and the domain.
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <string>
+#include <vector>
 
 #include <tl/expected.hpp>
 
@@ -17,13 +19,12 @@ namespace clothstream::messages {
 // Gives the mesh that a scene names as its file; the error says which file, and what is wrong with it.
 using MeshReader = std::function<tl::expected<meshes::MeshSource, std::string>(const std::string& file)>;
 
-// Sets the cloth's mesh and the nodes that are its pinned vertices. Without a reader no file may be named.
-void toMeshCloth(Checks& checks, const Path& path, const v1::Cloth& message, const MeshReader& readMesh,
-                 scene::Cloth& cloth);
-scene::Region toRegion(Checks& checks, const Path& path, const v1::Region& message);
+// Sets the cloth's mesh; returns the node that each vertex of the message became, or meshes::kNoNode. Without
+// a reader no file may be named.
+std::vector<std::uint32_t> toMeshCloth(Checks& checks, const Path& path, const v1::Cloth& message,
+                                       const MeshReader& readMesh, scene::Cloth& cloth);
 
 // The mesh itself, whatever file it came from: in the scene's frame, welded, in the order of its nodes.
 void write(const scene::Mesh& mesh, v1::Mesh& message);
-void write(const scene::Region& region, v1::Region& message);
 
 }  // namespace clothstream::messages

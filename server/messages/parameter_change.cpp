@@ -13,16 +13,6 @@
 namespace clothstream::messages {
 namespace {
 
-template <typename Named>
-void checkKnown(Checks& checks, const Path& path, const std::string& name,
-                const std::vector<Named>& elements) {
-  if (std::ranges::find(elements, name, &Named::name) != elements.end()) return;
-  std::string known;
-  for (const Named& element : elements) known += (known.empty() ? "" : ", ") + element.name;
-  checks.fail(path, '"' + name + '"', known.empty() ? "the scene has none" : "must be one of " + known,
-              v1::ERROR_CODE_NOT_FOUND);
-}
-
 scene::ClothChange toClothChange(Checks& checks, const Path& path, const v1::ClothChange& message,
                                  const scene::Scene& scene) {
   scene::ClothChange change;

@@ -9,6 +9,7 @@
 
 #include "server/messages/description.h"
 #include "server/messages/limits.h"
+#include "server/messages/node_selection.h"
 #include "server/messages/shapes.h"
 #include "server/messages/validation.h"
 #include "server/messages/vectors.h"
@@ -81,24 +82,6 @@ scene::Grid toGrid(Checks& checks, const Path& path, const v1::Grid& message) {
   return grid;
 }
 
-scene::GridRange toRange(Checks& checks, const Path& path, const v1::GridRange& message,
-                         const scene::Grid& grid) {
-  scene::GridRange range;
-  range.firstRow = checks.integer(path / "firstRow", message.first_row(), 0, grid.rows - 1);
-  range.firstColumn = checks.integer(path / "firstColumn", message.first_column(), 0, grid.columns - 1);
-  range.lastRow = message.has_last_row()
-                      ? checks.integer(path / "lastRow", message.last_row(), range.firstRow, grid.rows - 1)
-                      : range.firstRow;
-  range.lastColumn = message.has_last_column() ? checks.integer(path / "lastColumn", message.last_column(),
-                                                                range.firstColumn, grid.columns - 1)
-                                               : range.firstColumn;
-  if (message.has_row_step())
-    range.rowStep = checks.integer(path / "rowStep", message.row_step(), 1, limits::kMaxGridNodes);
-  if (message.has_column_step())
-    range.columnStep = checks.integer(path / "columnStep", message.column_step(), 1, limits::kMaxGridNodes);
-  return range;
-}
-
 // What all messages of solvers that iterate have.
 template <typename Message>
 void readIterations(Checks& checks, const Path& path, const Message& message, scene::Solver& solver) {
@@ -128,62 +111,30 @@ scene::SelfCollision toSelfCollision(Checks& checks, const Path& path, const v1:
   return collision;
 }
 
-// Pins of a grid by number.
-void toPinnedVertices(Checks& checks, const Path& path, const v1::Cloth& message, scene::Cloth& cloth) {
-  for (int i = 0; i < message.pinned_vertices_size() && !checks.failed(); ++i)
-    cloth.pinnedVertices.push_back(checks.integer(path.at("pinnedVertices", i), message.pinned_vertices(i), 0,
-                                                  cloth.grid.nodeCount() - 1));
-}
-
-void toShape(Checks& checks, const Path& path, const v1::Cloth& message, const MeshReader& readMesh,
-             scene::Cloth& cloth) {
-  checks.count(path / "pins", static_cast<std::size_t>(message.pins_size()), 0, limits::kMaxPins);
-  checks.count(path / "pinnedRegions", static_cast<std::size_t>(message.pinned_regions_size()), 0,
-               limits::kMaxPins);
+// Returns what toMeshCloth() does; nothing for a grid.
+std::vector<std::uint32_t> toShape(Checks& checks, const Path& path, const v1::Cloth& message,
+                                   const MeshReader& readMesh, scene::Cloth& cloth) {
   switch (message.shape_case()) {
     case v1::Cloth::kGrid:
       cloth.grid = toGrid(checks, path / "grid", message.grid());
-      toPinnedVertices(checks, path, message, cloth);
-      for (int i = 0; i < message.pins_size() && !checks.failed(); ++i)
-        cloth.pins.push_back(toRange(checks, path.at("pins", i), message.pins(i), cloth.grid));
       break;
     case v1::Cloth::kMesh:
-      if (message.pins_size() > 0)
-        checks.fail(path / "pins", "", "are of grids; a mesh has \"pinnedVertices\" and \"pinnedRegions\"");
-      toMeshCloth(checks, path, message, readMesh, cloth);
-      break;
+      return toMeshCloth(checks, path, message, readMesh, cloth);
     case v1::Cloth::SHAPE_NOT_SET:
       checks.fail(path, "", "has no shape; must have \"grid\" or \"mesh\"");
   }
-  for (int i = 0; i < message.pinned_regions_size() && !checks.failed(); ++i)
-    cloth.pinnedRegions.push_back(toRegion(checks, path.at("pinnedRegions", i), message.pinned_regions(i)));
+  return {};
 }
 
-float defaultMass(const scene::Cloth& cloth) {
-  if (cloth.mesh) return static_cast<float>(limits::kDefaultArealMass * cloth.mesh->area());
-  return limits::kDefaultArealMass * cloth.grid.width * cloth.grid.height;
-}
-
-scene::Cloth toCloth(Checks& checks, const Path& path, const v1::Cloth& message, const MeshReader& readMesh) {
-  scene::Cloth cloth;
-  cloth.name = checks.name(path / "name", message.name());
-  toShape(checks, path, message, readMesh, cloth);
-  cloth.mass =
-      message.has_mass() ? checks.number(path / "mass", message.mass(), limits::kMass) : defaultMass(cloth);
-  cloth.structural = toSpring(checks, path / "structural", message.structural());
-  cloth.shear = toSpring(checks, path / "shear", message.shear());
-  cloth.bend = toSpring(checks, path / "bend", message.bend());
-  cloth.damping = checks.number(path / "damping", message.damping(), limits::kDamping);
-  cloth.drag = checks.number(path / "drag", message.drag(), limits::kAirCoefficient);
-  cloth.lift = checks.number(path / "lift", message.lift(), limits::kAirCoefficient);
-  if (message.has_friction())
-    cloth.friction = checks.number(path / "friction", message.friction(), limits::kFriction);
-  if (message.has_thickness())
-    cloth.thickness = checks.number(path / "thickness", message.thickness(), limits::kThickness);
-  cloth.solver = toSolver(checks, path / "solver", message.solver());
-  if (message.has_self_collision() && !checks.failed())
-    cloth.selfCollision = toSelfCollision(checks, path / "selfCollision", message.self_collision(), cloth);
-  return cloth;
+void readPins(Checks& checks, const Path& path, const v1::Cloth& message,
+              std::span<const std::uint32_t> nodeOfVertex, scene::Cloth& cloth) {
+  NodeSelection pins = toSelection(checks, path,
+                                   {"pins", "pinnedVertices", "pinnedRegions", message.pins(),
+                                    message.pinned_vertices(), message.pinned_regions()},
+                                   cloth, nodeOfVertex);
+  cloth.pins = std::move(pins.ranges);
+  cloth.pinnedVertices = std::move(pins.vertices);
+  cloth.pinnedRegions = std::move(pins.regions);
 }
 
 scene::Motion toMotion(Checks& checks, const Path& path, const v1::Motion& message,
@@ -206,6 +157,101 @@ scene::Motion toMotion(Checks& checks, const Path& path, const v1::Motion& messa
                                : orientation});
   }
   return motion;
+}
+
+scene::Attachment toAttachment(Checks& checks, const Path& path, const v1::Attachment& message,
+                               const scene::Cloth& cloth, std::span<const std::uint32_t> nodeOfVertex) {
+  scene::Attachment attachment;
+  attachment.name = checks.name(path / "name", message.name());
+  NodeSelection nodes =
+      toSelection(checks, path,
+                  {"ranges", "vertices", "regions", message.ranges(), message.vertices(), message.regions()},
+                  cloth, nodeOfVertex);
+  attachment.ranges = std::move(nodes.ranges);
+  attachment.vertices = std::move(nodes.vertices);
+  attachment.regions = std::move(nodes.regions);
+  attachment.collider = message.collider();
+  if (!message.collider().empty() && (message.has_pose() || message.has_motion()))
+    checks.fail(path / "collider", '"' + message.collider() + '"',
+                "stands beside a pose or motion; the frame is one or the other");
+  attachment.pose = toPose(checks, path / "pose", message.pose());
+  if (message.has_motion())
+    attachment.motion = toMotion(checks, path / "motion", message.motion(), attachment.pose.orientation);
+  return attachment;
+}
+
+// No node is held twice.
+void checkAttached(Checks& checks, const Path& path, const scene::Cloth& cloth) {
+  scene::Cloth pinnedOnly = cloth;
+  pinnedOnly.attachments.clear();
+  std::vector<std::uint8_t> held = scene::pinnedNodes(pinnedOnly);
+  for (std::size_t i = 0; i < cloth.attachments.size(); ++i) {
+    const Path element = path.at("attachments", static_cast<int>(i));
+    const std::vector<std::uint8_t> attached = scene::attachedNodes(cloth, cloth.attachments[i]);
+    if (std::ranges::find(attached, 1) == attached.end())
+      checks.fail(element, "",
+                  "has no node; must have one at least of \"ranges\", \"vertices\" and \"regions\"");
+    for (std::size_t node = 0; node < attached.size() && !checks.failed(); ++node) {
+      if (attached[node] == 0) continue;
+      if (held[node] != 0)
+        checks.fail(element, "", fmt::format("has node {}, which is pinned or attached already", node));
+      held[node] = 1;
+    }
+  }
+}
+
+void readAttachments(Checks& checks, const Path& path, const v1::Cloth& message,
+                     std::span<const std::uint32_t> nodeOfVertex, scene::Cloth& cloth) {
+  checks.count(path / "attachments", static_cast<std::size_t>(message.attachments_size()), 0,
+               limits::kMaxAttachments);
+  for (int i = 0; i < message.attachments_size() && !checks.failed(); ++i)
+    cloth.attachments.push_back(
+        toAttachment(checks, path.at("attachments", i), message.attachments(i), cloth, nodeOfVertex));
+  if (!checks.failed() && !cloth.attachments.empty()) checkAttached(checks, path, cloth);
+}
+
+scene::Tethers toTethers(Checks& checks, const Path& path, const v1::Tethers& message,
+                         const scene::Cloth& cloth) {
+  scene::Tethers tethers;
+  if (message.has_slack()) tethers.slack = checks.number(path / "slack", message.slack(), limits::kSlack);
+  if (cloth.nodeCount() > limits::kMaxSolverNodes)
+    checks.fail(path, "",
+                fmt::format("are for cloths of at most {} nodes; this one has {}", limits::kMaxSolverNodes,
+                            cloth.nodeCount()));
+  return tethers;
+}
+
+float defaultMass(const scene::Cloth& cloth) {
+  if (cloth.mesh) return static_cast<float>(limits::kDefaultArealMass * cloth.mesh->area());
+  return limits::kDefaultArealMass * cloth.grid.width * cloth.grid.height;
+}
+
+scene::Cloth toCloth(Checks& checks, const Path& path, const v1::Cloth& message, const MeshReader& readMesh) {
+  scene::Cloth cloth;
+  cloth.name = checks.name(path / "name", message.name());
+  const std::vector<std::uint32_t> nodeOfVertex = toShape(checks, path, message, readMesh, cloth);
+  if (!checks.failed()) {
+    readPins(checks, path, message, nodeOfVertex, cloth);
+    readAttachments(checks, path, message, nodeOfVertex, cloth);
+  }
+  if (message.has_tethers() && !checks.failed())
+    cloth.tethers = toTethers(checks, path / "tethers", message.tethers(), cloth);
+  cloth.mass =
+      message.has_mass() ? checks.number(path / "mass", message.mass(), limits::kMass) : defaultMass(cloth);
+  cloth.structural = toSpring(checks, path / "structural", message.structural());
+  cloth.shear = toSpring(checks, path / "shear", message.shear());
+  cloth.bend = toSpring(checks, path / "bend", message.bend());
+  cloth.damping = checks.number(path / "damping", message.damping(), limits::kDamping);
+  cloth.drag = checks.number(path / "drag", message.drag(), limits::kAirCoefficient);
+  cloth.lift = checks.number(path / "lift", message.lift(), limits::kAirCoefficient);
+  if (message.has_friction())
+    cloth.friction = checks.number(path / "friction", message.friction(), limits::kFriction);
+  if (message.has_thickness())
+    cloth.thickness = checks.number(path / "thickness", message.thickness(), limits::kThickness);
+  cloth.solver = toSolver(checks, path / "solver", message.solver());
+  if (message.has_self_collision() && !checks.failed())
+    cloth.selfCollision = toSelfCollision(checks, path / "selfCollision", message.self_collision(), cloth);
+  return cloth;
 }
 
 scene::Collider toCollider(Checks& checks, const Path& path, const v1::Collider& message) {
@@ -267,6 +313,25 @@ void checkSelfCollision(Checks& checks, const scene::Scene& scene) {
   checks.fail(element / "selfCollision", "",
               fmt::format("is for scenes of at most {} nodes; this one has {}",
                           limits::kMaxSelfCollisionNodes, scene.nodeCount()));
+}
+
+// Of all cloths together: names, number, and the colliders that they follow.
+void checkAttachments(Checks& checks, const scene::Scene& scene) {
+  std::unordered_set<std::string_view> names;
+  for (std::size_t i = 0; i < scene.cloths.size(); ++i)
+    for (std::size_t k = 0; k < scene.cloths[i].attachments.size(); ++k) {
+      const scene::Attachment& attachment = scene.cloths[i].attachments[k];
+      const Path root;
+      const Path cloth = root.at("cloths", static_cast<int>(i));
+      const Path element = cloth.at("attachments", static_cast<int>(k));
+      if (!names.insert(attachment.name).second)
+        checks.fail(element / "name", '"' + attachment.name + '"',
+                    "is another's name already; names must be unique");
+      if (!attachment.collider.empty())
+        checkKnown(checks, element / "collider", attachment.collider, scene.colliders,
+                   v1::ERROR_CODE_INVALID_ARGUMENT);
+    }
+  checks.count(Path("attachments"), names.size(), 0, limits::kMaxAttachments);
 }
 
 void checkSize(Checks& checks, const scene::Scene& scene) {
@@ -366,6 +431,7 @@ Result<scene::Scene> toScene(const v1::Scene& message, const MeshReader& readMes
   scene.stream = toStreamSettings(checks, root / "stream", message.stream());
   checkUnique(checks, "cloths", scene.cloths);
   checkUnique(checks, "colliders", scene.colliders);
+  checkAttachments(checks, scene);
   checkSize(checks, scene);
   checkSolvers(checks, scene);
   checkSelfCollision(checks, scene);

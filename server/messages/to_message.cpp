@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // From a scene to its message.
+#include "server/messages/node_selection.h"
 #include "server/messages/scene_message.h"
 #include "server/messages/shapes.h"
 #include "server/messages/vectors.h"
@@ -12,15 +13,6 @@ void writeEnvironment(const scene::Environment& environment, v1::Environment& me
   write(environment.gravity, *message.mutable_gravity());
   write(environment.wind, *message.mutable_wind());
   message.set_air_density(environment.airDensity);
-}
-
-void writeRange(const scene::GridRange& range, v1::GridRange& message) {
-  message.set_first_row(range.firstRow);
-  message.set_last_row(range.lastRow);
-  message.set_row_step(range.rowStep);
-  message.set_first_column(range.firstColumn);
-  message.set_last_column(range.lastColumn);
-  message.set_column_step(range.columnStep);
 }
 
 void writeConstraint(const scene::Solver& solver, v1::ConstraintSolver& message) {
@@ -38,6 +30,29 @@ void writeGrid(const scene::Grid& grid, v1::Grid& message) {
   write(grid.pose, *message.mutable_pose());
 }
 
+void writeMotion(const scene::Motion& motion, v1::Motion& message) {
+  message.set_steady(motion.steady);
+  for (const scene::MotionKey& key : motion.keys) {
+    v1::MotionKey& keyMessage = *message.add_keys();
+    keyMessage.set_time(key.time);
+    write(key.position, *keyMessage.mutable_position());
+    write(key.orientation, *keyMessage.mutable_orientation());
+  }
+}
+
+void writeAttachment(const scene::Attachment& attachment, v1::Attachment& message) {
+  message.set_name(attachment.name);
+  for (const scene::GridRange& range : attachment.ranges) write(range, *message.add_ranges());
+  message.mutable_vertices()->Add(attachment.vertices.begin(), attachment.vertices.end());
+  for (const scene::Region& region : attachment.regions) write(region, *message.add_regions());
+  if (!attachment.collider.empty()) {
+    message.set_collider(attachment.collider);
+    return;
+  }
+  write(attachment.pose, *message.mutable_pose());
+  if (!attachment.motion.keys.empty()) writeMotion(attachment.motion, *message.mutable_motion());
+}
+
 void writeCloth(const scene::Cloth& cloth, v1::Cloth& message) {
   message.set_name(cloth.name);
   if (cloth.mesh)
@@ -53,7 +68,7 @@ void writeCloth(const scene::Cloth& cloth, v1::Cloth& message) {
   message.set_lift(cloth.lift);
   message.set_friction(cloth.friction);
   message.set_thickness(cloth.thickness);
-  for (const scene::GridRange& range : cloth.pins) writeRange(range, *message.add_pins());
+  for (const scene::GridRange& range : cloth.pins) write(range, *message.add_pins());
   *message.mutable_solver() = toMessage(cloth.solver);
   if (cloth.selfCollision) {
     message.mutable_self_collision()->set_radius(cloth.selfCollision->radius);
@@ -61,6 +76,9 @@ void writeCloth(const scene::Cloth& cloth, v1::Cloth& message) {
   }
   message.mutable_pinned_vertices()->Add(cloth.pinnedVertices.begin(), cloth.pinnedVertices.end());
   for (const scene::Region& region : cloth.pinnedRegions) write(region, *message.add_pinned_regions());
+  for (const scene::Attachment& attachment : cloth.attachments)
+    writeAttachment(attachment, *message.add_attachments());
+  if (cloth.tethers) message.mutable_tethers()->set_slack(cloth.tethers->slack);
 }
 
 void writeCollider(const scene::Collider& collider, v1::Collider& message) {
@@ -68,14 +86,7 @@ void writeCollider(const scene::Collider& collider, v1::Collider& message) {
   write(collider.shape, message);
   write(collider.pose, *message.mutable_pose());
   message.set_friction(collider.friction);
-  if (collider.motion.keys.empty()) return;
-  message.mutable_motion()->set_steady(collider.motion.steady);
-  for (const scene::MotionKey& key : collider.motion.keys) {
-    v1::MotionKey& keyMessage = *message.mutable_motion()->add_keys();
-    keyMessage.set_time(key.time);
-    write(key.position, *keyMessage.mutable_position());
-    write(key.orientation, *keyMessage.mutable_orientation());
-  }
+  if (!collider.motion.keys.empty()) writeMotion(collider.motion, *message.mutable_motion());
 }
 
 v1::Integrator toMessage(scene::Integrator integrator) {

@@ -2,10 +2,12 @@
 // The checks that every message, file and change goes through.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "server/messages/field_error.h"
 #include "server/messages/limits.h"
@@ -60,5 +62,15 @@ class Checks {
  private:
   std::optional<FieldError> error_;
 };
+
+// Whether one of the elements has this name.
+template <typename Named>
+void checkKnown(Checks& checks, const Path& path, const std::string& name, const std::vector<Named>& elements,
+                v1::ErrorCode code = v1::ERROR_CODE_NOT_FOUND) {
+  if (std::ranges::find(elements, name, &Named::name) != elements.end()) return;
+  std::string known;
+  for (const Named& element : elements) known += (known.empty() ? "" : ", ") + element.name;
+  checks.fail(path, '"' + name + '"', known.empty() ? "the scene has none" : "must be one of " + known, code);
+}
 
 }  // namespace clothstream::messages

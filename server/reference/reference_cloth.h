@@ -36,7 +36,7 @@ class ReferenceCloth {
   std::span<const Vec3> positions() const { return positions_; }
   std::span<Vec3> velocities() { return velocities_; }
   std::span<const Vec3> velocities() const { return velocities_; }
-  // 1/kg; 0 for pinned nodes, which never move.
+  // 1/kg; 0 for pinned nodes, which go on at the velocity that they are given.
   std::span<const double> inverseMasses() const { return inverseMasses_; }
   std::uint32_t nodeCount() const { return cloth_.nodeCount(); }
   // kg; of pinned nodes too.

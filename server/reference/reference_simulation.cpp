@@ -13,12 +13,16 @@ TickInputs inputsAt(const scene::Scene& scene, std::uint64_t tick) {
   for (const scene::Collider& collider : scene.colliders)
     inputs.colliders.push_back({collider.shape, toPose(scene::poseAt(collider, start)),
                                 toPose(scene::poseAt(collider, end)), collider.friction});
+  for (const scene::Cloth& cloth : scene.cloths)
+    for (const scene::Attachment& attachment : cloth.attachments)
+      inputs.attachments.push_back(toPose(scene::frameAt(scene, attachment, end)));
   return inputs;
 }
 
 ReferenceSimulation::ReferenceSimulation(const scene::Scene& scene)
     : scene_(scene),
       cloths_(scene.cloths.begin(), scene.cloths.end()),
+      holds_(scene),
       selfCollision_(scene),
       before_(scene.cloths.size()) {}
 
@@ -32,6 +36,7 @@ void ReferenceSimulation::tick() {
 }
 
 void ReferenceSimulation::substep(const TickInputs& inputs, std::uint32_t index) {
+  if (index == 0) holds_.begin(cloths_, inputs.attachments, inputs.grips, scene_.tickSeconds());
   for (std::size_t i = 0; i < cloths_.size(); ++i) {
     ReferenceCloth& cloth = cloths_[i];
     before_[i].assign(cloth.positions().begin(), cloth.positions().end());
@@ -41,6 +46,7 @@ void ReferenceSimulation::substep(const TickInputs& inputs, std::uint32_t index)
                     stepOf(collider.start, collider.end, index, scene_.substeps, scene_.tickSeconds()),
                     collider.friction, before_[i]);
   }
+  holds_.apply(cloths_, inputs.grips, index, scene_.substeps, scene_.tickSeconds());
   if (!selfCollision_.exists()) return;
   for (int i = 0; i < scene::kContactIterations; ++i) collideWithCloth(inputs, index);
 }

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "server/reference/holds.h"
 #include "server/reference/reference_cloth.h"
 #include "server/reference/self_collision.h"
 #include "server/scene/scene.h"
@@ -21,9 +22,13 @@ struct MovingCollider {
 struct TickInputs {
   scene::Environment environment;
   std::vector<MovingCollider> colliders;
+  std::vector<Pose> attachments =
+      {};  // at the tick's end, in the order of the cloths; none: where they start
+  std::vector<Grip> grips = {};
 };
 
-// The scene's own environment and colliders over the given tick: from tick * dt to (tick + 1) * dt.
+// The scene's own environment, colliders and attachments over the given tick: from tick * dt to (tick + 1) *
+// dt.
 TickInputs inputsAt(const scene::Scene& scene, std::uint64_t tick);
 
 class ReferenceSimulation {
@@ -35,19 +40,22 @@ class ReferenceSimulation {
   // The next tick of the scene by itself.
   void tick();
 
-  // Substep `index` of a tick: forces, integration, colliders in order; self-collision, and colliders again.
+  // Substep `index` of a tick: forces, integration, colliders in order; what holds the cloths;
+  // self-collision, and colliders again.
   void substep(const TickInputs& inputs, std::uint32_t index);
 
   // Ticks done.
   std::uint64_t ticks() const { return ticks_; }
   std::vector<ReferenceCloth>& cloths() { return cloths_; }
   const std::vector<ReferenceCloth>& cloths() const { return cloths_; }
+  const Holds& holds() const { return holds_; }
 
  private:
   void collideWithCloth(const TickInputs& inputs, std::uint32_t index);
 
   scene::Scene scene_;
   std::vector<ReferenceCloth> cloths_;
+  Holds holds_;
   SelfCollision selfCollision_;
   std::vector<std::vector<Vec3>> before_;  // each cloth's nodes at the start of a substep
   std::uint64_t ticks_ = 0;

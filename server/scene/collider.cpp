@@ -48,9 +48,9 @@ float* radiusOf(Shape& shape) {
   return nullptr;
 }
 
-Pose poseAt(const Collider& collider, double seconds) {
-  const std::vector<MotionKey>& keys = collider.motion.keys;
-  if (keys.empty()) return collider.pose;
+Pose poseAt(const Pose& resting, const Motion& motion, double seconds) {
+  const std::vector<MotionKey>& keys = motion.keys;
+  if (keys.empty()) return resting;
   const double period = keys.back().time;
   const double time = seconds - period * std::floor(seconds / period);
   std::size_t next = 1;
@@ -58,7 +58,7 @@ Pose poseAt(const Collider& collider, double seconds) {
   const MotionKey& from = keys[next - 1];
   const MotionKey& to = keys[next];
   const double u = (time - from.time) / (double{to.time} - from.time);
-  const double part = collider.motion.steady ? u : u * u * (3 - 2 * u);
+  const double part = motion.steady ? u : u * u * (3 - 2 * u);
   Pose pose{Vec3::Zero(), between(from.orientation, to.orientation, part)};
   for (int axis = 0; axis < 3; ++axis) {
     const double start = from.position[axis];

@@ -71,9 +71,12 @@ struct Collider {
   Motion motion = {};
 };
 
-// Where a collider is at a simulated time. Between keys the orientation takes the shorter way, by the
-// normalised mean of the quaternions. The arithmetic is + - * / floor and sqrt in double alone, so that every
-// machine gives the same value.
-Pose poseAt(const Collider& collider, double seconds);
+// Where something that moves by itself, or else stays at a pose, is at a simulated time. Between keys the
+// orientation takes the shorter way, by the normalised mean of the quaternions. The arithmetic is + - * /
+// floor and sqrt in double alone, so that every machine gives the same value.
+Pose poseAt(const Pose& pose, const Motion& motion, double seconds);
+inline Pose poseAt(const Collider& collider, double seconds) {
+  return poseAt(collider.pose, collider.motion, seconds);
+}
 
 }  // namespace clothstream::scene

@@ -18,6 +18,27 @@ struct ParticipantCollider {
   Shape shape = Sphere{};  // sphere, capsule or box
 };
 
+// A participant's grip on cloth, as scene.proto's Grab says. Metres, newtons.
+struct Grab {
+  std::uint32_t id = 0;  // unique among this participant's; the same id is the same grip
+  Pose pose = {};
+  float radius = 0.03f, reach = 0.1f;
+  float maxForce = 20;
+  float slipDistance = 0.1f;
+};
+
+struct AttachmentPose {
+  std::size_t attachment = 0;  // of all of the scene's, in the order of its cloths
+  Pose pose = {};
+};
+
+// What a participant does at one time.
+struct ParticipantPoses {
+  std::vector<ParticipantCollider> colliders = {};
+  std::vector<Grab> grabs = {};
+  std::vector<AttachmentPose> attachments = {};
+};
+
 struct ClothChange {
   std::string name = {};  // empty: every cloth
   std::optional<Spring> structural = {}, shear = {}, bend = {};

@@ -2,6 +2,7 @@
 // Rest positions and pins: what follows from a scene's numbers.
 #include "server/scene/scene.h"
 
+#include <algorithm>
 #include <cassert>
 #include <cmath>
 
@@ -50,6 +51,29 @@ std::vector<double> nodeMasses(const Cloth& cloth) {
   return masses;
 }
 
+namespace {
+
+void choose(const Cloth& cloth, const std::vector<GridRange>& ranges,
+            const std::vector<std::uint32_t>& vertices, const std::vector<Region>& regions,
+            std::vector<std::uint8_t>& chosen) {
+  for (const std::uint32_t node : vertices) chosen[node] = 1;
+  if (!regions.empty()) {
+    const std::vector<Vec3> rest = restPositions(cloth);
+    for (const Region& region : regions)
+      for (std::size_t i = 0; i < rest.size(); ++i)
+        if (region.contains(rest[i])) chosen[i] = 1;
+  }
+  for (const GridRange& range : ranges) {
+    assert(range.rowStep > 0 && range.columnStep > 0);
+    assert(range.lastRow < cloth.grid.rows && range.lastColumn < cloth.grid.columns);
+    for (std::uint32_t row = range.firstRow; row <= range.lastRow; row += range.rowStep)
+      for (std::uint32_t column = range.firstColumn; column <= range.lastColumn; column += range.columnStep)
+        chosen[row * cloth.grid.columns + column] = 1;
+  }
+}
+
+}  // namespace
+
 bool GridRange::contains(std::uint32_t row, std::uint32_t column) const {
   return row >= firstRow && row <= lastRow && (row - firstRow) % rowStep == 0 &&  //
          column >= firstColumn && column <= lastColumn && (column - firstColumn) % columnStep == 0;
@@ -63,21 +87,23 @@ bool Region::contains(const Vec3& point) const {
 
 std::vector<std::uint8_t> pinnedNodes(const Cloth& cloth) {
   std::vector<std::uint8_t> pinned(cloth.nodeCount(), 0);
-  for (const std::uint32_t node : cloth.pinnedVertices) pinned[node] = 1;
-  if (!cloth.pinnedRegions.empty()) {
-    const std::vector<Vec3> rest = restPositions(cloth);
-    for (const Region& region : cloth.pinnedRegions)
-      for (std::size_t i = 0; i < rest.size(); ++i)
-        if (region.contains(rest[i])) pinned[i] = 1;
-  }
-  for (const GridRange& range : cloth.pins) {
-    assert(range.rowStep > 0 && range.columnStep > 0);
-    assert(range.lastRow < cloth.grid.rows && range.lastColumn < cloth.grid.columns);
-    for (std::uint32_t row = range.firstRow; row <= range.lastRow; row += range.rowStep)
-      for (std::uint32_t column = range.firstColumn; column <= range.lastColumn; column += range.columnStep)
-        pinned[row * cloth.grid.columns + column] = 1;
-  }
+  choose(cloth, cloth.pins, cloth.pinnedVertices, cloth.pinnedRegions, pinned);
+  for (const Attachment& attachment : cloth.attachments)
+    choose(cloth, attachment.ranges, attachment.vertices, attachment.regions, pinned);
   return pinned;
+}
+
+std::vector<std::uint8_t> attachedNodes(const Cloth& cloth, const Attachment& attachment) {
+  std::vector<std::uint8_t> attached(cloth.nodeCount(), 0);
+  choose(cloth, attachment.ranges, attachment.vertices, attachment.regions, attached);
+  return attached;
+}
+
+Pose frameAt(const Scene& scene, const Attachment& attachment, double seconds) {
+  if (attachment.collider.empty()) return poseAt(attachment.pose, attachment.motion, seconds);
+  const auto collider = std::ranges::find(scene.colliders, attachment.collider, &Collider::name);
+  assert(collider != scene.colliders.end());
+  return poseAt(collider->pose, collider->motion, seconds);
 }
 
 GridSpacing spacing(const Grid& grid) {

@@ -99,6 +99,29 @@ struct Region {
   bool contains(const Vec3& point) const;
 };
 
+// Nodes that move as one with a frame: each keeps the place in it that it has at rest, when the frame is
+// where it starts.
+struct Attachment {
+  std::string name;
+  std::vector<GridRange> ranges;        // of a grid
+  std::vector<std::uint32_t> vertices;  // nodes
+  std::vector<Region> regions;          // whatever starts there
+  std::string collider;                 // whose frame it is; empty: the one that follows
+  Pose pose;
+  Motion motion;
+};
+
+// An attached node moves no faster, m/s.
+inline constexpr float kMaxAttachmentSpeed = 30;
+
+// Of the way that a node in somebody's grip is out of its place, what a substep takes back.
+inline constexpr float kCaughtUp = 0.25f;
+
+// Long-range attachments: [KCM12] Kim, Chentanez, Mueller-Fischer, "Long Range Attachments", SCA 2012.
+struct Tethers {
+  float slack = 0.02f;  // beyond the distance along the cloth at rest, a part of it
+};
+
 struct Cloth {
   std::string name;
   Grid grid;                         // of a cloth without mesh
@@ -114,6 +137,8 @@ struct Cloth {
   std::vector<Region> pinnedRegions;          // whatever starts there
   Solver solver;
   std::optional<SelfCollision> selfCollision;  // absent: it passes through cloth
+  std::vector<Attachment> attachments;
+  std::optional<Tethers> tethers;
 
   std::uint32_t nodeCount() const;
   float nodeMass() const { return mass / static_cast<float>(nodeCount()); }  // kg, mean
@@ -157,8 +182,15 @@ std::vector<Vec3> restPositions(const Cloth& cloth);
 // kg a node, pinned or not: a grid's all alike, a mesh's by their shares of its area.
 std::vector<double> nodeMasses(const Cloth& cloth);
 
-// One byte a node: 1 where it is pinned. Ranges must lie inside the grid, vertices must exist.
+// One byte a node: 1 where no force moves it, because it is pinned or attached. Ranges must lie inside the
+// grid, vertices must exist.
 std::vector<std::uint8_t> pinnedNodes(const Cloth& cloth);
+
+// Likewise: 1 where the attachment has it.
+std::vector<std::uint8_t> attachedNodes(const Cloth& cloth, const Attachment& attachment);
+
+// Where the frame of an attachment is at a simulated time, when nobody moved it.
+Pose frameAt(const Scene& scene, const Attachment& attachment, double seconds);
 
 // Lengths at rest along a column (between columns), along a row (between rows), and along the diagonal, m.
 struct GridSpacing {

@@ -59,7 +59,8 @@ std::vector<NodeSprings> gridSprings(const Cloth& cloth) {
   };
   const NodeSprings most{atMost(rows, 1) + atMost(columns, 1), atMost(rows, 1) * atMost(columns, 1),
                          atMost(rows, 2) + atMost(columns, 2), perMass};
-  const bool pinnedSingly = !cloth.pinnedVertices.empty() || !cloth.pinnedRegions.empty();
+  const bool pinnedSingly =
+      !cloth.pinnedVertices.empty() || !cloth.pinnedRegions.empty() || !cloth.attachments.empty();
   const std::vector<std::uint8_t> pinned = pinnedSingly ? pinnedNodes(cloth) : std::vector<std::uint8_t>();
   std::vector<NodeSprings> found;
   for (std::uint32_t row = 0; row < rows; ++row)

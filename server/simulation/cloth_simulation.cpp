@@ -17,6 +17,7 @@
 #include "server/simulation/advance_variant.h"
 #include "server/simulation/collision/collision_stage.h"
 #include "server/simulation/constraint_stage.h"
+#include "server/simulation/hold/hold_stage.h"
 #include "server/simulation/implicit_stage.h"
 #include "server/simulation/mesh_stage.h"
 #include "server/simulation/report_stage.h"
@@ -187,6 +188,7 @@ struct ClothSimulation::Pipeline {
   const Stage& advance(const AdvanceVariant& variant);
   void prepare(float airDensity);
   void makeXpbd(std::span<const scene::Cloth> cloths);
+  void makeHolds(const HoldTables& tables);
   void setSolvers(std::span<const scene::Cloth> cloths);
   void start(vulkan::Recorder& recorder);
   void recordInputs(vulkan::Recorder& recorder, const TickInputs& inputs);
@@ -222,6 +224,7 @@ struct ClothSimulation::Pipeline {
   std::unique_ptr<SelfCollisionStage> selfCollision;  // where a cloth has it
   std::vector<scene::Solver> solvers;                 // of the cloths, as the tables have them
   std::vector<shared::vec4> stiffness;                // of their springs
+  std::unique_ptr<HoldStage> holds;                   // where something holds cloth, or did
   std::unique_ptr<ReportStage> report;                // made when it is first wanted
   SimulationOptions asked;
 
@@ -270,7 +273,12 @@ ClothSimulation::Pipeline::Pipeline(const vulkan::Device& on, const scene::Scene
   if (SelfCollisionStage::isIn(scene))
     selfCollision =
         std::make_unique<SelfCollisionStage>(on, scene, stateOf(buffers, collision), cut.workgroupSize);
+  if (const HoldTables tables = holdTables(scene); !tables.empty()) makeHolds(tables);
   prepare(scene.environment.airDensity);
+}
+
+void ClothSimulation::Pipeline::makeHolds(const HoldTables& tables) {
+  holds = std::make_unique<HoldStage>(device, tables, stateOf(buffers, collision), nodes, cut.workgroupSize);
 }
 
 // The kernels that the scene starts with, and those that it needs as soon as somebody brings a collider.
@@ -356,6 +364,8 @@ void ClothSimulation::Pipeline::recordInputs(vulkan::Recorder& recorder, const T
   recorder.beginStage("inputs");
   recorder.copy(from, buffers.cloths, clothBytes);
   collision.recordInputs(recorder, inputs.colliders);
+  if (!holds && !inputs.grips.empty()) makeHolds({});
+  if (holds) holds->recordInputs(recorder, inputs.attachments, inputs.grips);
   recorder.fill(buffers.status, 0, buffers.status.bytes());
   if (selfCollision) selfCollision->recordClear(recorder);
 }
@@ -388,6 +398,11 @@ void ClothSimulation::Pipeline::recordSubsteps(vulkan::Recorder& recorder, const
                            .reserved0 = 0,
                            .reserved1 = 0,
                            .reserved2 = 0};
+  if (holds && holds->aims()) {
+    recorder.beginStage("hold");
+    recorder.barrier();
+    holds->recordAim(recorder, present, tickRate);
+  }
   if (collision.active()) {
     float thickness = 0;
     for (const shared::ClothRecord& record : records) thickness = std::max(thickness, record.damping.w);
@@ -421,6 +436,7 @@ void ClothSimulation::Pipeline::recordSubsteps(vulkan::Recorder& recorder, const
                     .substepRate = tickRate * static_cast<float>(substeps),
                     .firstTile = 0,
                     .reserved = 0});
+    if (holds) holds->recordSubstep(recorder, present, substep, substeps, tickRate);
     if (selfCollision) selfCollision->recordSubstep(recorder, present, substep, push.collision);
     present = 1 - present;
   }
@@ -436,6 +452,7 @@ void ClothSimulation::Pipeline::recordStatus(vulkan::Recorder& recorder) {
   if (constraints.active()) constraints.recordReport(recorder);
   if (implicit.active()) implicit.recordReport(recorder);
   if (selfCollision) selfCollision->recordReport(recorder, slot);
+  if (holds) holds->recordReport(recorder);
 }
 
 ClothSimulation::ClothSimulation(const vulkan::Device& device, const scene::Scene& scene,
@@ -483,6 +500,14 @@ void ClothSimulation::recordReport(vulkan::Recorder& recorder, const TickInputs&
   recorder.beginStage("report");
   on.report->record(recorder, on.present, on.stiffness, inputs.environment.gravity,
                     on.collision.push(on.substeps - 1, on.substeps, on.tickRate));
+}
+
+std::vector<GripStatus> ClothSimulation::grips() const {
+  std::vector<GripStatus> grips;
+  if (pipeline_->holds)
+    for (const shared::GripReport& report : pipeline_->holds->report())
+      grips.push_back({report.held, report.slipped});
+  return grips;
 }
 
 std::vector<ClothReport> ClothSimulation::report() const {

@@ -11,6 +11,7 @@
 #include "server/scene/scene.h"
 #include "server/simulation/cloth_report.h"
 #include "server/simulation/collision/moving_collider.h"
+#include "server/simulation/hold/grip.h"
 #include "server/simulation/scene_tables.h"
 #include "server/simulation/state_snapshot.h"
 #include "server/vulkan/buffer.h"
@@ -31,6 +32,12 @@ namespace clothstream::simulation {
 struct TickInputs {
   scene::Environment environment;
   std::vector<MovingCollider> colliders;  // at most kMaxColliders, in the order in which they act
+  // Where each attachment of the scene is at the tick's end, in the order of its cloths; none: where they
+  // start.
+  std::vector<scene::Pose> attachments = {};
+  // At most kMaxGrips. One that holds has the place of the one that took hold; before a place is another's,
+  // it is free for a tick.
+  std::vector<Grip> grips = {};
 };
 
 struct SimulationOptions {
@@ -62,7 +69,8 @@ class ClothSimulation {
   void setCloths(std::span<const scene::Cloth> cloths);
 
   // All substeps of one tick, and its status. At most one tick may be in flight when it is called.
-  // Stages: "inputs", "near" (where there are colliders), "advance", "hash".
+  // Stages: "inputs", "hold" (where something holds cloth), "near" (where there are colliders), "advance",
+  // "hash".
   void recordTick(vulkan::Recorder& recorder, const TickInputs& inputs);
 
   // Vertex normals of the present positions ([Va21] 3.5, Alg. 5; of meshes from their triangles). Only when
@@ -73,6 +81,9 @@ class ClothSimulation {
   TickStatus status() const;
   // Of its last substep: one a cloth with constraints, in their order.
   std::span<const shared::SolveRecord> solves() const;
+
+  // Of the last recorded tick's grips, once it is complete.
+  std::vector<GripStatus> grips() const;
 
   // What the cloths are like, each of them: recorded after a tick in the same recording, and read when that
   // is complete. Only when somebody wants it: other ticks cost nothing. Stage "report".

@@ -26,6 +26,9 @@ simulation::TickInputs inputsAt(const scene::Scene& scene, std::uint64_t tick) {
   for (const scene::Collider& collider : scene.colliders)
     inputs.colliders.push_back(
         {collider.shape, scene::poseAt(collider, start), scene::poseAt(collider, end), collider.friction});
+  for (const scene::Cloth& cloth : scene.cloths)
+    for (const scene::Attachment& attachment : cloth.attachments)
+      inputs.attachments.push_back(scene::frameAt(scene, attachment, end));
   return inputs;
 }
 

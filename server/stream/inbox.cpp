@@ -3,23 +3,24 @@
 #include "server/stream/inbox.h"
 
 #include <algorithm>
-#include <cassert>
 #include <utility>
 
 namespace clothstream::stream {
 
-void Inbox::postPoses(std::uint64_t participant, std::span<const scene::ParticipantCollider> colliders,
-                      Clock::time_point arrival) {
-  assert(colliders.size() <= messages::limits::kMaxParticipantColliders);
+void Inbox::postPoses(std::uint64_t participant, scene::ParticipantPoses poses, Clock::time_point arrival) {
   const std::lock_guard lock(mutex_);
-  auto poses = std::ranges::find(inputs_.poses, participant, &Poses::participant);
-  if (poses == inputs_.poses.end()) {
-    poses = inputs_.poses.emplace(poses);
-    poses->participant = participant;
+  const auto last = std::ranges::find(inputs_.poses, participant, &Poses::participant);
+  if (last == inputs_.poses.end()) {
+    inputs_.poses.push_back({participant, std::move(poses), arrival});
+    return;
   }
-  poses->count = colliders.size();
-  std::ranges::copy(colliders, poses->colliders.begin());
-  poses->arrival = arrival;
+  // Of two places for one attachment the later counts.
+  std::vector<scene::AttachmentPose>& before = last->now.attachments;
+  poses.attachments.insert(poses.attachments.begin(), before.begin(), before.end());
+  if (poses.attachments.size() > kMaxAttachmentPoses)
+    poses.attachments.erase(poses.attachments.begin(), poses.attachments.end() - kMaxAttachmentPoses);
+  last->now = std::move(poses);
+  last->arrival = arrival;
 }
 
 bool Inbox::postChange(AcceptedChange change) {

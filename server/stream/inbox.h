@@ -2,26 +2,22 @@
 // What participants put into a scene, on its way from the doors' threads to the scene's next tick.
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <mutex>
-#include <span>
 #include <vector>
 
 #include "clothstream/v1/session.pb.h"
-#include "server/messages/limits.h"
 #include "server/scene/input.h"
 #include "server/stream/clock.h"
 
 namespace clothstream::stream {
 
-// All colliders of one participant, as of its newest message; none once it has left.
+// What one participant does, as of its newest message; nothing once it has left.
 struct Poses {
   std::uint64_t participant = 0;
-  std::size_t count = 0;
-  std::array<scene::ParticipantCollider, messages::limits::kMaxParticipantColliders> colliders;
+  scene::ParticipantPoses now{};
   Clock::time_point arrival{};
 };
 
@@ -41,11 +37,12 @@ struct Inputs {
 class Inbox {
  public:
   static constexpr std::size_t kMaxChanges = 64;
+  // Of one participant in a tick; the oldest go.
+  static constexpr std::ptrdiff_t kMaxAttachmentPoses = 256;
 
-  // Replaces what this participant posted since the last tick. At most
-  // limits::kMaxParticipantColliders.
-  void postPoses(std::uint64_t participant, std::span<const scene::ParticipantCollider> colliders,
-                 Clock::time_point arrival);
+  // Replaces what this participant posted since the last tick, but for where it put attachments that `poses`
+  // says nothing of.
+  void postPoses(std::uint64_t participant, scene::ParticipantPoses poses, Clock::time_point arrival);
   // False if it is full.
   [[nodiscard]] bool postChange(AcceptedChange change);
   // Of the changes that wait, what they say of the scene's colliders; the rest is dropped.

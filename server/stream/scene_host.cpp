@@ -47,6 +47,7 @@ void SceneHost::OnDevice::warmUp(const scene::Scene& scene) {
     device.wait(device.submit(recorder));
     encoder.entropyCode(frame, packet);
     inputs.colliders.emplace_back();
+    inputs.grips.emplace_back();
   }
   encoder.forgetHistory();
   recorder.begin();
@@ -62,6 +63,7 @@ SceneHost::SceneHost(vulkan::Device& device, LiveScene& scene, FramePacker& pack
       ticksAReport_(reportRate > 0 ? static_cast<std::uint64_t>(std::ceil(rate_ / reportRate)) : 0),
       scene_(scene.start()),
       colliders_(scene_),
+      holds_(scene_),
       gentleUntil_(scene_.cloths.size(), 0),
       onDevice_(std::make_unique<OnDevice>(device, scene_)) {
   newestState_ = onDevice_->start;
@@ -75,6 +77,7 @@ void SceneHost::begin(Clock::time_point now) {
   applyInputs();
   const double endSeconds = static_cast<double>(tick_ + 1) * scene_.tickSeconds();
   colliders_.advance(scene_, endSeconds, tickInputs_.colliders);
+  holds_.advance(scene_, endSeconds, tickInputs_);
   tickInputs_.environment = scene_.environment;
 
   OnDevice& on = *onDevice_;
@@ -102,8 +105,11 @@ void SceneHost::applyInputs() {
   }
   if (!problem.empty()) takeBack(problem);
   for (const Poses& poses : inputs_.poses) {
-    colliders_.place(poses.participant, std::span(poses.colliders).first(poses.count));
-    if (poses.count > 0 && poseArrivals_.size() < kMaxPoseArrivals) poseArrivals_.push_back(poses.arrival);
+    colliders_.place(poses.participant, poses.now.colliders);
+    holds_.place(poses.participant, poses.now.grabs, poses.now.attachments);
+    const bool moves =
+        !poses.now.colliders.empty() || !poses.now.grabs.empty() || !poses.now.attachments.empty();
+    if (moves && poseArrivals_.size() < kMaxPoseArrivals) poseArrivals_.push_back(poses.arrival);
   }
 }
 
@@ -213,12 +219,22 @@ void SceneHost::finish() {
     frame_.deviceDone = done;
     packer_.push(frame_);
   }
+  announceEvents();
   if (!status_.healthy) recover();
 
   metrics.ticks.add();
   metrics.crowdedBalls.add(status_.crowded);
   metrics.tick.record(seconds(done - tickStart_));
   metrics.deviceTotal.record(total);
+}
+
+void SceneHost::announceEvents() {
+  v1::ServerMessage message;
+  v1::TickEvents& events = *message.mutable_tick_events();
+  holds_.addEvents(onDevice_->simulation.grips(), *events.mutable_grabs());
+  if (events.grabs().empty()) return;
+  events.set_tick(tick_);
+  live_.audience.announce(serialise(message));
 }
 
 void SceneHost::recover() {
@@ -261,6 +277,7 @@ void SceneHost::rebuild(vulkan::Device& device) {
   fresh->simulation.recordRestoreState(fresh->recorder, newestState_);
   device.wait(device.submit(fresh->recorder));
   onDevice_ = std::move(fresh);
+  holds_.takeAnew();
   recovery_ = Recovery::none;
   sinceHealthy_ = 0;
   live_.audience.announce(notice(v1::NOTICE_KIND_DEVICE_REBUILT,

@@ -12,6 +12,7 @@
 #include "server/simulation/cloth_simulation.h"
 #include "server/stream/collider_set.h"
 #include "server/stream/frame_packer.h"
+#include "server/stream/hold_set.h"
 #include "server/stream/live_scene.h"
 #include "server/stream/token_bucket.h"
 #include "server/vulkan/device.h"
@@ -80,6 +81,7 @@ class SceneHost {
   void endGentleness();
   void recordRecovery();
   void recordFrame(Clock::time_point now);
+  void announceEvents();
   void recover();
   bool every(std::uint32_t seconds) const { return sinceHealthy_ % (std::uint64_t{seconds} * rate_) == 0; }
 
@@ -91,6 +93,7 @@ class SceneHost {
 
   scene::Scene scene_;  // as of the tick in hand
   ColliderSet colliders_;
+  HoldSet holds_;
   Inputs inputs_;
   simulation::TickInputs tickInputs_;
   std::vector<Clock::time_point> poseArrivals_;  // that no frame has shown yet

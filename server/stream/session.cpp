@@ -135,9 +135,9 @@ void Session::hello(const v1::Hello& message) {
 }
 
 void Session::poses(const v1::ColliderPoses& message, Clock::time_point now) {
-  const auto colliders = messages::toColliders(message);
-  if (!colliders) return refuse(colliders.error());
-  scene_->inbox.postPoses(participant_, *colliders, now);
+  auto poses = messages::toPoses(message, scene_->start());
+  if (!poses) return refuse(poses.error());
+  scene_->inbox.postPoses(participant_, std::move(*poses), now);
   posed_ = true;
 }
 

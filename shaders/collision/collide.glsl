@@ -8,6 +8,7 @@
 #define CLOTHSTREAM_SHADERS_COLLISION_COLLIDE_GLSL
 
 #include "shaders/collision/contact.glsl"
+#include "shaders/shared/rotation.glsl"
 
 layout(binding = kColliderBinding) uniform samplerBuffer colliders;  // ColliderRecord, then planes
 layout(binding = kColliderBinding +
@@ -97,16 +98,6 @@ bool mayTouch(Collider collider, vec3 from, vec3 to) {
   return dotProduct(after, after) <= doubled;
 }
 
-// The normalised mean of two quaternions, one Newton step more exact than our reciprocal square root.
-vec4 turnedAt(vec4 start, vec4 turn, float progress) {
-  precise vec4 q = start + progress * turn;
-  precise float squared = q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w;
-  precise float inverse = reciprocalSquareRoot(squared);
-  precise float half_ = (0.5 * squared * inverse) * inverse;
-  precise vec4 unit_ = q * (inverse * (1.5 - half_));
-  return unit_;
-}
-
 ColliderFrame fetchFrame(Collider collider, CollisionPush push) {
   vec4 shape = texelFetch(colliders, collider.record + 4);
   vec4 start = texelFetch(colliders, collider.record + 2);
@@ -117,17 +108,6 @@ ColliderFrame fetchFrame(Collider collider, CollisionPush push) {
   precise vec3 difference = before.w * after.xyz - after.w * before.xyz - crossProduct(after.xyz, before.xyz);
   precise vec3 spin = (2.0 * push.substepRate) * difference;
   return ColliderFrame(before, after, spin, shape);
-}
-
-vec3 rotate(vec4 q, vec3 v) {
-  precise vec3 twice = 2.0 * crossProduct(q.xyz, v);
-  precise vec3 rotated = v + q.w * twice + crossProduct(q.xyz, twice);
-  return rotated;
-}
-
-vec3 rotateBack(vec4 q, vec3 v) {
-  precise vec3 axis = -q.xyz;
-  return rotate(vec4(axis, q.w), v);
 }
 
 // ---- What they do

@@ -43,13 +43,14 @@ void store(uint index, Node node) {
   nextVelocities[index] = vec4(snapTiny(node.velocity), 0.0);
 }
 
-// By all forces on it and its own decay, one over seconds; `node` has its velocity. Pinned nodes stay.
+// By all forces on it and its own decay, one over seconds; `node` has its velocity. No force moves
+// a pinned node: it goes on at its velocity, which is 0 but where it is attached to something that moves.
 Node moveNode(Node node, vec3 force, float decay) {
   precise vec3 acceleration = force * node.inverseMass + push.gravityStep.xyz - decay * node.velocity;
   precise vec3 velocity = node.velocity + push.gravityStep.w * acceleration;
+  velocity = node.inverseMass == 0.0 ? node.velocity : velocity;
   precise vec3 position = node.position + push.gravityStep.w * (kExplicitEuler ? node.velocity : velocity);
-  bool pinned = node.inverseMass == 0.0;
-  return Node(pinned ? node.position : position, node.inverseMass, pinned ? vec3(0.0) : velocity);
+  return Node(position, node.inverseMass, velocity);
 }
 
 #endif

@@ -13,6 +13,8 @@
 namespace clothstream::client {
 namespace {
 
+constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+
 using ::testing::HasSubstr;
 using ::testing::SizeIs;
 
@@ -71,6 +73,71 @@ TEST(Colliders, OnlyTheNewestTravelWhereTheTransportIsBehindAndNoneMeansNone) {
   ASSERT_TRUE(message.has_collider_poses());
   EXPECT_EQ(message.collider_poses().client_time_us(), 2u);
   EXPECT_THAT(message.collider_poses().colliders(), SizeIs(0));
+}
+
+TEST(Grabs, TravelBesideTheCollidersWithWhatIsNotTheDefault) {
+  Joined joined;
+  const float sphere[] = {1, 2, 3, 0.1f};
+  cs_set_colliders(joined.client.get(), sphere, 1, 1);
+  cs_grab grab{.id = 7,
+               .position = {1, 2, 3},
+               .orientation = {},
+               .radius = kNan,
+               .reach = 0.5f,
+               .max_force = kNan,
+               .slip_distance = kNan};
+  cs_set_grabs(joined.client.get(), &grab, 1, 2);
+  const v1::ColliderPoses both = joined.sent().collider_poses();
+  EXPECT_THAT(both.colliders(), SizeIs(1));
+  ASSERT_THAT(both.grabs(), SizeIs(1));
+  EXPECT_EQ(both.grabs(0).id(), 7u);
+  EXPECT_EQ(both.grabs(0).pose().position().z(), 3);
+  EXPECT_FALSE(both.grabs(0).pose().has_orientation());
+  EXPECT_FALSE(both.grabs(0).has_radius());
+  EXPECT_EQ(both.grabs(0).reach(), 0.5f);
+  EXPECT_FALSE(both.grabs(0).has_max_force());
+  EXPECT_FALSE(both.grabs(0).has_slip_distance());
+  // Colliders that move do not let go.
+  cs_set_colliders(joined.client.get(), sphere, 1, 3);
+  EXPECT_THAT(joined.sent().collider_poses().grabs(), SizeIs(1));
+  cs_set_grabs(joined.client.get(), nullptr, 0, 4);
+  EXPECT_THAT(joined.sent().collider_poses().grabs(), SizeIs(0));
+}
+
+TEST(Grabs, WhatBecomesOfThemIsTold) {
+  Joined joined;
+  v1::ServerMessage message;
+  message.mutable_tick_events()->set_tick(9);
+  v1::GrabEvent& event = *message.mutable_tick_events()->add_grabs();
+  event.set_participant_id(5);
+  event.set_grab_id(2);
+  event.set_kind(v1::GRAB_EVENT_KIND_SLIPPED);
+  event.set_vertices(11);
+  EXPECT_EQ(joined.client.receive(message.SerializeAsString()), static_cast<std::uint32_t>(CS_EVENT_GRABS));
+  ASSERT_EQ(cs_grab_event_count(joined.client.get()), 1u);
+  cs_grab_event told;
+  ASSERT_EQ(cs_get_grab_event(joined.client.get(), 0, &told), 1);
+  EXPECT_EQ(told.participant_id, 5u);
+  EXPECT_EQ(told.grab_id, 2u);
+  EXPECT_EQ(told.kind, static_cast<std::uint32_t>(CS_GRAB_SLIPPED));
+  EXPECT_EQ(told.vertices, 11u);
+  EXPECT_EQ(cs_get_grab_event(joined.client.get(), 1, &told), 0);
+}
+
+TEST(Attachments, AreMovedOnceEachToWhereTheyWereLastPut) {
+  Joined joined;
+  const float first[] = {1, 0, 0}, second[] = {2, 0, 0}, turned[] = {0, 0, 0, 1};
+  cs_move_attachment(joined.client.get(), "rod", first, nullptr, 1);
+  cs_move_attachment(joined.client.get(), "knot", first, nullptr, 1);
+  cs_move_attachment(joined.client.get(), "rod", second, turned, 1);
+  const v1::ColliderPoses poses = joined.sent().collider_poses();
+  ASSERT_THAT(poses.attachments(), SizeIs(2));
+  EXPECT_EQ(poses.attachments(0).name(), "rod");
+  EXPECT_EQ(poses.attachments(0).pose().position().x(), 2);
+  EXPECT_EQ(poses.attachments(0).pose().orientation().w(), 1);
+  EXPECT_EQ(poses.attachments(1).name(), "knot");
+  cs_set_colliders(joined.client.get(), nullptr, 0, 2);
+  EXPECT_THAT(joined.sent().collider_poses().attachments(), SizeIs(0));
 }
 
 TEST(Colliders, MoreThanAllowedAreLeftOut) {

@@ -133,14 +133,90 @@ v1::ColliderPoses poses(std::uint32_t count) {
   return message;
 }
 
+// A scene with an attachment on each of its two cloths.
+scene::Scene sceneWithAttachments() {
+  scene::Scene scene;
+  for (const char* name : {"rod", "knot"}) {
+    scene::Cloth& cloth = scene.cloths.emplace_back();
+    cloth.attachments.emplace_back().name = name;
+  }
+  return scene;
+}
+
+Result<std::vector<scene::ParticipantCollider>> collidersOf(const v1::ColliderPoses& message) {
+  return toPoses(message, sceneWithAttachments()).map([](const auto& poses) { return poses.colliders; });
+}
+
+TEST(ToPoses, GivesGrabsWithTheirDefaultsAndAttachmentsByTheirPlace) {
+  v1::ColliderPoses message;
+  message.add_grabs()->set_id(3);
+  v1::Grab& strong = *message.add_grabs();
+  strong.set_id(4);
+  strong.mutable_pose()->mutable_position()->set_y(2);
+  strong.set_radius(0.5f);
+  strong.set_reach(0);
+  strong.set_max_force(100);
+  strong.set_slip_distance(1);
+  message.add_attachments()->set_name("knot");
+  message.mutable_attachments(0)->mutable_pose()->mutable_position()->set_x(7);
+  const auto poses = toPoses(message, sceneWithAttachments());
+  ASSERT_TRUE(poses) << poses.error().text;
+  ASSERT_EQ(poses->grabs.size(), 2u);
+  EXPECT_EQ(poses->grabs[0].id, 3u);
+  EXPECT_EQ(poses->grabs[0].radius, 0.03f);
+  EXPECT_EQ(poses->grabs[0].reach, 0.1f);
+  EXPECT_EQ(poses->grabs[0].maxForce, 20);
+  EXPECT_EQ(poses->grabs[0].slipDistance, 0.1f);
+  EXPECT_EQ(poses->grabs[1].pose.position, scene::Vec3(0, 2, 0));
+  EXPECT_EQ(poses->grabs[1].radius, 0.5f);
+  EXPECT_EQ(poses->grabs[1].reach, 0);
+  EXPECT_EQ(poses->grabs[1].maxForce, 100);
+  EXPECT_EQ(poses->grabs[1].slipDistance, 1);
+  ASSERT_EQ(poses->attachments.size(), 1u);
+  EXPECT_EQ(poses->attachments[0].attachment, 1u);
+  EXPECT_EQ(poses->attachments[0].pose.position, scene::Vec3(7, 0, 0));
+}
+
+TEST(ToPoses, RefusesWrongGrabsAndAttachmentsWithTheirPath) {
+  const auto error = [](auto spoil) {
+    v1::ColliderPoses message;
+    message.add_grabs()->set_id(1);
+    message.add_grabs()->set_id(2);
+    message.add_attachments()->set_name("rod");
+    spoil(message);
+    const auto poses = toPoses(message, sceneWithAttachments());
+    return poses ? "no error" : poses.error().text;
+  };
+  using M = v1::ColliderPoses;
+  EXPECT_EQ(error([](M&) {}), "no error");
+  EXPECT_THAT(error([](M& m) { m.mutable_grabs(1)->set_id(1); }),
+              StartsWith("colliderPoses.grabs[1].id = 1:"));
+  EXPECT_THAT(error([](M& m) { m.mutable_grabs(0)->set_radius(0); }),
+              StartsWith("colliderPoses.grabs[0].radius = 0: must be a finite number from 0.001 to 1"));
+  EXPECT_THAT(error([](M& m) { m.mutable_grabs(0)->set_reach(2); }),
+              StartsWith("colliderPoses.grabs[0].reach = 2:"));
+  EXPECT_THAT(error([](M& m) { m.mutable_grabs(0)->set_max_force(kNan); }),
+              StartsWith("colliderPoses.grabs[0].maxForce = nan:"));
+  EXPECT_THAT(error([](M& m) { m.mutable_grabs(0)->set_slip_distance(-1); }),
+              StartsWith("colliderPoses.grabs[0].slipDistance = -1:"));
+  EXPECT_THAT(error([](M& m) {
+                for (std::uint32_t id = 3; id <= 11; ++id) m.add_grabs()->set_id(id);
+              }),
+              StartsWith("colliderPoses.grabs: has 11 elements; must have 0 to 10"));
+  EXPECT_THAT(error([](M& m) { m.mutable_attachments(0)->set_name("rope"); }),
+              StartsWith("colliderPoses.attachments[0].name = \"rope\": must be one of rod, knot"));
+  EXPECT_THAT(error([](M& m) { m.mutable_attachments(0)->mutable_pose()->mutable_position()->set_x(2000); }),
+              StartsWith("colliderPoses.attachments[0].pose.position.x = 2000:"));
+}
+
 TEST(ToColliders, GivesThemAll) {
-  const auto colliders = toColliders(poses(40));
+  const auto colliders = collidersOf(poses(40));
   ASSERT_TRUE(colliders) << colliders.error().text;
   ASSERT_EQ(colliders->size(), 40u);
   EXPECT_EQ((*colliders)[5].id, 5u);
   EXPECT_EQ((*colliders)[5].pose.position, scene::Vec3(5, 0, 0));
   EXPECT_EQ(std::get<scene::Sphere>((*colliders)[5].shape).radius, 0.1f);
-  EXPECT_TRUE(toColliders(poses(0))->empty());
+  EXPECT_TRUE(collidersOf(poses(0))->empty());
 }
 
 TEST(ToColliders, TakesCapsulesAndBoxes) {
@@ -150,9 +226,9 @@ TEST(ToColliders, TakesCapsulesAndBoxes) {
   message.mutable_colliders(0)->mutable_pose()->mutable_orientation()->set_z(1);
   message.mutable_colliders(1)->mutable_box()->mutable_size()->set_x(1);
   message.mutable_colliders(1)->mutable_box()->mutable_size()->set_y(2);
-  EXPECT_THAT(toColliders(message).error().text, StartsWith("colliderPoses.colliders[1].box.size.z = 0:"));
+  EXPECT_THAT(collidersOf(message).error().text, StartsWith("colliderPoses.colliders[1].box.size.z = 0:"));
   message.mutable_colliders(1)->mutable_box()->mutable_size()->set_z(3);
-  const auto colliders = toColliders(message);
+  const auto colliders = collidersOf(message);
   ASSERT_TRUE(colliders) << colliders.error().text;
   EXPECT_EQ(std::get<scene::Capsule>((*colliders)[0].shape).radius, 0.01f);
   EXPECT_EQ(std::get<scene::Capsule>((*colliders)[0].shape).length, 0.03f);
@@ -160,7 +236,7 @@ TEST(ToColliders, TakesCapsulesAndBoxes) {
   EXPECT_EQ(std::get<scene::Box>((*colliders)[1].shape).size, scene::Vec3(1, 2, 3));
   message.mutable_colliders(0)->mutable_capsule()->set_length(11);
   EXPECT_THAT(
-      toColliders(message).error().text,
+      collidersOf(message).error().text,
       StartsWith("colliderPoses.colliders[0].capsule.length = 11: must be a finite number from 0 to 10"));
 }
 
@@ -168,7 +244,7 @@ TEST(ToColliders, RefusesWhatIsWrongWithItsPath) {
   const auto error = [](auto spoil) {
     v1::ColliderPoses message = poses(3);
     spoil(message);
-    const auto colliders = toColliders(message);
+    const auto colliders = collidersOf(message);
     return colliders ? "no error" : colliders.error().text;
   };
   using M = v1::ColliderPoses;

@@ -44,8 +44,8 @@ INSTANTIATE_TEST_SUITE_P(All, NamedScene, testing::ValuesIn(namedScenes()),
                          [](const auto& name) { return name.param; });
 
 TEST(NamedScenes, AreThoseOfTheHouse) {
-  EXPECT_EQ(namedScenes(),
-            (std::vector<std::string>{"curtain", "flag", "folds", "obstacles", "sphere_drop", "tablecloth"}));
+  EXPECT_EQ(namedScenes(), (std::vector<std::string>{"curtain", "flag", "folds", "obstacles", "sphere_drop",
+                                                     "swing", "tablecloth"}));
 }
 
 TEST(NamedScenes, SphereDropComesToRestOnTheSphere) {

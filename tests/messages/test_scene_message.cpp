@@ -115,6 +115,45 @@ TEST(ToScene, MakesBallsOfHalfTheShortestStructuralSpring) {
   EXPECT_EQ(again->cloths[0].selfCollision->friction, 0);
 }
 
+TEST(ToScene, KeepsAttachmentsAndTethersOnTheirWayThroughAMessage) {
+  v1::Scene message = smallScene();
+  v1::Cloth& cloth = *message.mutable_cloths(0);
+  cloth.clear_pins();
+  v1::Attachment& rod = *cloth.add_attachments();
+  rod.set_name("rod");
+  rod.add_ranges()->set_last_column(4);
+  rod.mutable_pose()->mutable_position()->set_y(1);
+  for (const float time : {0.0f, 2.0f}) rod.mutable_motion()->add_keys()->set_time(time);
+  v1::Attachment& knot = *cloth.add_attachments();
+  knot.set_name("knot");
+  knot.add_vertices(7);
+  v1::Region& region = *knot.add_regions();
+  region.set_radius(0.001f);
+  region.mutable_centre()->set_y(-100);
+  knot.set_collider(message.colliders(0).name());
+  cloth.mutable_tethers();
+  const Result<scene::Scene> scene = toScene(toMessage(*toScene(message)));
+  ASSERT_TRUE(scene) << scene.error().text;
+  const std::vector<scene::Attachment>& attachments = scene->cloths[0].attachments;
+  ASSERT_EQ(attachments.size(), 2u);
+  EXPECT_EQ(attachments[0].name, "rod");
+  EXPECT_EQ(attachments[0].ranges.at(0).lastColumn, 4u);
+  EXPECT_EQ(attachments[0].pose.position.y(), 1);
+  EXPECT_EQ(attachments[0].motion.keys.size(), 2u);
+  EXPECT_EQ(attachments[1].vertices, std::vector<std::uint32_t>{7});
+  EXPECT_EQ(attachments[1].regions.at(0).radius, 0.001f);
+  EXPECT_EQ(attachments[1].collider, message.colliders(0).name());
+  ASSERT_TRUE(scene->cloths[0].tethers);
+  EXPECT_EQ(scene->cloths[0].tethers->slack, 0.02f);
+}
+
+v1::Attachment& attachment(v1::Scene& scene, const char* name) {
+  v1::Attachment& added = *scene.mutable_cloths(0)->add_attachments();
+  added.set_name(name);
+  added.add_vertices(static_cast<std::uint32_t>(10 + scene.cloths(0).attachments_size()));
+  return added;
+}
+
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
@@ -145,6 +184,36 @@ const BadScene kBadScenes[] = {
     {"name = \"Small\":", [](v1::Scene& s) { s.set_name("Small"); }},
     {"name = \"aaaa", [](v1::Scene& s) { s.set_name(std::string(65, 'a')); }},
     {"description = \"two?lines\":", [](v1::Scene& s) { s.set_description("two\nlines"); }, "one line"},
+    {"cloths[0].attachments[0].name = \"Rod\":", [](v1::Scene& s) { attachment(s, "Rod"); }},
+    {"cloths[0].attachments[0]: has no node", [](v1::Scene& s) { attachment(s, "rod").clear_vertices(); }},
+    {"cloths[0].attachments[0].vertices[0] = 99:", [](v1::Scene& s) { attachment(s, "rod").set_vertices(0, 99); }},
+    {"cloths[0].attachments[0].ranges[0].lastColumn = 9:",
+     [](v1::Scene& s) { attachment(s, "rod").add_ranges()->set_last_column(9); }},
+    {"cloths[0].attachments[0].regions[0]: has no shape", [](v1::Scene& s) { attachment(s, "rod").add_regions(); }},
+    {"cloths[0].attachments[1]: has node 12, which is pinned or attached already",
+     [](v1::Scene& s) {
+       attachment(s, "rod");
+       attachment(s, "knot").set_vertices(0, s.cloths(0).attachments(0).vertices(0));
+       s.mutable_cloths(0)->mutable_attachments(0)->set_vertices(0, 12);
+       s.mutable_cloths(0)->mutable_attachments(1)->set_vertices(0, 12);
+     },
+     "attached already"},
+    {"cloths[0].attachments[1].name = \"rod\": is another's name already",
+     [](v1::Scene& s) {
+       attachment(s, "rod");
+       attachment(s, "rod");
+     },
+     "unique"},
+    {"cloths[0].attachments[0].collider = \"nobody\":", [](v1::Scene& s) { attachment(s, "rod").set_collider("nobody"); }},
+    {"cloths[0].attachments[0].collider = ",
+     [](v1::Scene& s) {
+       attachment(s, "rod").set_collider(s.colliders(0).name());
+       s.mutable_cloths(0)->mutable_attachments(0)->mutable_pose();
+     },
+     "one or the other"},
+    {"cloths[0].attachments[0].motion.keys: has 1 elements",
+     [](v1::Scene& s) { attachment(s, "rod").mutable_motion()->add_keys(); }},
+    {"cloths[0].tethers.slack = 2:", [](v1::Scene& s) { cloth(s).mutable_tethers()->set_slack(2); }},
     {"simulationRate = 0:", [](v1::Scene& s) { s.set_simulation_rate(0); }, "from 1 to 1000"},
     {"simulationRate = 1001:", [](v1::Scene& s) { s.set_simulation_rate(1001); }},
     {"streamRate = 50:", [](v1::Scene& s) { s.set_stream_rate(50); },

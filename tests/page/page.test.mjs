@@ -264,6 +264,38 @@ test("the sphere can be dragged through the cloth", () =>
     assert.ok(distance(left, position) < 0.01, "the ball stays where it was left");
   }));
 
+// The middle of the lower edge goes where the mouse does, and falls back when it lets go.
+test("the cloth can be taken hold of", () =>
+  withPage({ query: "?scene=swing" }, async (page) => {
+    await untilState(page, "live");
+    await untilFrames(page, 60);
+    const corner = 39 * 32 + 16;
+    const seen = await look(page);
+    const start = vertexOf(seen.positions, corner);
+    const goal = [start[0], start[1] + 0.4, start[2]];
+    const project = (point) => page.evaluate((at) => window.clothstream.project(at), point);
+    const [x, y] = await project(start);
+    const [goalX, goalY] = await project(goal);
+    // A little above the edge, so that the pointer is on the cloth.
+    await page.mouse.move(x, y - 6);
+    await page.mouse.down();
+    assert.equal(await page.evaluate(() => window.clothstream.canvas.style.cursor), "grabbing");
+    await page.mouse.move(goalX, goalY - 6, { steps: 20 });
+    await page.waitForFunction(
+      ([vertex, height]) => window.clothstream.positions[3 * vertex + 1] > height,
+      [corner, goal[1] - 0.05],
+    );
+    await untilFrames(page, 72);
+    const held = (await look(page)).positions[3 * corner + 1];
+    assert.ok(Math.abs(held - goal[1]) < 0.1, `the held vertex is at y = ${held}, not near ${goal[1]}`);
+    await takePicture(page, "held");
+    await page.mouse.up();
+    await page.waitForFunction(
+      ([vertex, height]) => window.clothstream.positions[3 * vertex + 1] < height,
+      [corner, start[1] + 0.1],
+    );
+  }));
+
 test("a slider works by keyboard, and others in the scene see it", () =>
   withPage({}, (first) =>
     withPage({}, async (second) => {

@@ -71,6 +71,15 @@ reference::TickInputs referenceInputs(const simulation::TickInputs& inputs) {
   for (const simulation::MovingCollider& collider : inputs.colliders)
     result.colliders.push_back({collider.shape, reference::toPose(collider.start),
                                 reference::toPose(collider.end), double{collider.friction}});
+  for (const scene::Pose& pose : inputs.attachments) result.attachments.push_back(reference::toPose(pose));
+  for (const simulation::Grip& grip : inputs.grips)
+    result.grips.push_back({.state = static_cast<reference::Grip::State>(grip.state),
+                            .start = reference::toPose(grip.start),
+                            .end = reference::toPose(grip.end),
+                            .radius = double{grip.radius},
+                            .reach = double{grip.reach},
+                            .maxForce = double{grip.maxForce},
+                            .slipDistance = double{grip.slipDistance}});
   return result;
 }
 

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "server/stream/collider_set.h"
+#include "server/stream/hold_set.h"
 #include "server/stream/inbox.h"
 #include "tests/stream/small_scene.h"
 
@@ -25,6 +26,23 @@ scene::Scene sceneWithBall() {
   ball.shape = scene::Sphere{0.3f};
   ball.pose.position = Vec3(0, 1, 0);
   scene.colliders = {ball};
+  return scene;
+}
+
+// A rod that moves by itself and one that goes with the ball.
+scene::Scene sceneWithAttachments() {
+  scene::Scene scene = sceneWithBall();
+  scene::Cloth& cloth = scene.cloths.emplace_back();
+  cloth.grid.rows = cloth.grid.columns = 3;
+  scene::Attachment rod;
+  rod.name = "rod";
+  rod.ranges = {{}};
+  rod.motion = {.keys = {{.time = 0}, {.time = 1, .position = Vec3(1, 0, 0)}}, .steady = true};
+  scene::Attachment knot;
+  knot.name = "knot";
+  knot.vertices = {8};
+  knot.collider = "ball";
+  cloth.attachments = {rod, knot};
   return scene;
 }
 
@@ -131,18 +149,110 @@ TEST_F(ColliderSetTest, SaysWhereAllAreAndWhose) {
   EXPECT_EQ(states[1].position().x(), 0.5f);
 }
 
+// Attachments stay where they are put: a message that says nothing of one does not take back what an earlier
+// one said.
+TEST(Inbox, KeepsWhereAttachmentsWerePut) {
+  Inbox inbox;
+  const auto put = [](std::size_t attachment, float x) {
+    return scene::AttachmentPose{attachment, {Vec3(x, 0, 0), scene::Quaternion::Identity()}};
+  };
+  inbox.postPoses(1, {.attachments = {put(0, 1), put(1, 2)}}, Clock::now());
+  inbox.postPoses(1, {.colliders = {handAt(1, 0)}, .attachments = {put(0, 3)}}, Clock::now());
+  Inputs inputs;
+  inbox.drain(inputs);
+  ASSERT_EQ(inputs.poses.size(), 1u);
+  const scene::Scene scene = sceneWithAttachments();
+  HoldSet holds(scene);
+  holds.place(1, inputs.poses[0].now.grabs, inputs.poses[0].now.attachments);
+  simulation::TickInputs tick;
+  holds.advance(scene, 0.01, tick);
+  ASSERT_EQ(tick.attachments.size(), 2u);
+  EXPECT_EQ(tick.attachments[0].position.x(), 3);
+  EXPECT_EQ(tick.attachments[1].position.x(), 2);
+}
+
+TEST(HoldSet, AttachmentsGoByThemselvesUntilSomebodyMovesThem) {
+  scene::Scene scene = sceneWithAttachments();
+  HoldSet holds(scene);
+  simulation::TickInputs tick;
+  holds.advance(scene, 0.25, tick);
+  EXPECT_EQ(tick.attachments[0].position, Vec3(0.25f, 0, 0));
+  EXPECT_EQ(tick.attachments[1].position, Vec3(0, 1, 0));
+  scene.colliders[0].pose.position = Vec3(0, 2, 0);
+  holds.place(7, {}, std::vector{scene::AttachmentPose{0, {Vec3(5, 5, 5), scene::Quaternion::Identity()}}});
+  for (const double seconds : {0.5, 0.75}) {
+    holds.advance(scene, seconds, tick);
+    EXPECT_EQ(tick.attachments[0].position, Vec3(5, 5, 5));
+    EXPECT_EQ(tick.attachments[1].position, Vec3(0, 2, 0));
+  }
+}
+
+TEST(HoldSet, AGripTakesHoldsAndLetsGo) {
+  using State = simulation::Grip::State;
+  const scene::Scene scene = sceneWithBall();
+  HoldSet holds(scene);
+  simulation::TickInputs tick;
+  const auto grabAt = [](std::uint32_t id, float x) {
+    return scene::Grab{.id = id, .pose = {Vec3(x, 0, 0), scene::Quaternion::Identity()}};
+  };
+  holds.place(7, std::vector{grabAt(1, 0)}, {});
+  holds.place(8, std::vector{grabAt(1, 9)}, {});
+  holds.advance(scene, 0.01, tick);
+  ASSERT_EQ(tick.grips.size(), 2u);
+  EXPECT_EQ(tick.grips[0].state, State::takes);
+  holds.place(7, std::vector{grabAt(1, 0.1f)}, {});
+  holds.advance(scene, 0.02, tick);
+  EXPECT_EQ(tick.grips[0].state, State::holds);
+  EXPECT_EQ(tick.grips[0].start.position.x(), 0);
+  EXPECT_EQ(tick.grips[0].end.position.x(), 0.1f);
+  holds.advance(scene, 0.03, tick);  // no news: at rest
+  EXPECT_EQ(tick.grips[0].start.position.x(), 0.1f);
+  // The device forgot; what was held before is held again.
+  holds.takeAnew();
+  holds.advance(scene, 0.04, tick);
+  EXPECT_EQ(tick.grips[0].state, State::takes);
+  EXPECT_EQ(tick.grips[1].state, State::takes);
+  // Its place is free for a tick before it is another's.
+  holds.place(7, {}, {});
+  holds.place(9, std::vector{grabAt(5, 3)}, {});
+  holds.advance(scene, 0.05, tick);
+  ASSERT_EQ(tick.grips.size(), 3u);
+  EXPECT_EQ(tick.grips[0].state, State::free);
+  EXPECT_EQ(tick.grips[2].state, State::takes);
+  holds.place(10, std::vector{grabAt(5, 4)}, {});
+  holds.advance(scene, 0.06, tick);
+  ASSERT_EQ(tick.grips.size(), 3u);
+  EXPECT_EQ(tick.grips[0].state, State::takes);
+  EXPECT_EQ(tick.grips[0].end.position.x(), 4);
+  for (const std::uint64_t participant : {8u, 9u, 10u}) holds.place(participant, {}, {});
+  holds.advance(scene, 0.07, tick);
+  EXPECT_EQ(tick.grips.size(), 3u);
+  holds.advance(scene, 0.08, tick);
+  EXPECT_TRUE(tick.grips.empty());
+}
+
+TEST(HoldSet, NoMoreGripsThanTheDeviceHasRoomFor) {
+  const scene::Scene scene = sceneWithBall();
+  HoldSet holds(scene);
+  for (std::uint64_t participant = 1; participant <= simulation::kMaxGrips + 5; ++participant)
+    holds.place(participant, std::vector{scene::Grab{.id = 1}}, {});
+  simulation::TickInputs tick;
+  holds.advance(scene, 0.01, tick);
+  EXPECT_EQ(tick.grips.size(), simulation::kMaxGrips);
+}
+
 TEST(Inbox, KeepsOnlyTheNewestPosesOfAParticipant) {
   Inbox inbox;
   const Clock::time_point arrival = Clock::now();
-  inbox.postPoses(1, std::vector{handAt(1, 0), handAt(2, 0)}, arrival);
-  inbox.postPoses(2, std::vector{handAt(1, 5)}, arrival);
-  inbox.postPoses(1, std::vector{handAt(3, 1)}, arrival + std::chrono::milliseconds(1));
+  inbox.postPoses(1, {.colliders = {handAt(1, 0), handAt(2, 0)}}, arrival);
+  inbox.postPoses(2, {.colliders = {handAt(1, 5)}}, arrival);
+  inbox.postPoses(1, {.colliders = {handAt(3, 1)}}, arrival + std::chrono::milliseconds(1));
   Inputs inputs;
   inbox.drain(inputs);
   ASSERT_EQ(inputs.poses.size(), 2u);
   EXPECT_EQ(inputs.poses[0].participant, 1u);
-  ASSERT_EQ(inputs.poses[0].count, 1u);
-  EXPECT_EQ(inputs.poses[0].colliders[0].id, 3u);
+  ASSERT_EQ(inputs.poses[0].now.colliders.size(), 1u);
+  EXPECT_EQ(inputs.poses[0].now.colliders[0].id, 3u);
   EXPECT_EQ(inputs.poses[0].arrival, arrival + std::chrono::milliseconds(1));
   inbox.drain(inputs);
   EXPECT_TRUE(inputs.poses.empty());

@@ -155,8 +155,12 @@ TEST_F(SceneHostTest, SameInputsGiveTheSameStatesWhateverTheAudience) {
     HostedScene hosted(smallScene(), subscribers);
     for (int tick = 0; tick < 60; ++tick) {
       if (tick == 10) hosted.change(wind(3));
+      const float z = 0.01f * static_cast<float>(tick) - 0.3f;
       hosted.live.inbox.postPoses(
-          9, std::vector{handAt(1, 0.1f, -0.6f, 0.01f * static_cast<float>(tick) - 0.3f)}, hosted.now);
+          9,
+          {.colliders = {handAt(1, 0.1f, -0.6f, z)},
+           .grabs = {{.id = 1, .pose = {scene::Vec3(0, -0.4f, z), scene::Quaternion::Identity()}}}},
+          hosted.now);
       // Who asks for key frames changes what is sent, not what is simulated.
       if (tick % 7 == 0) hosted.mailboxes.back()->restart();
       hosted.tick();
@@ -185,6 +189,49 @@ TEST_F(SceneHostTest, AChangeTakesEffectAtTheNextTickAndIsAnnouncedForIt) {
   EXPECT_EQ(changed.told[0].parameter_changed().participant_id(), 42u);
   EXPECT_EQ(changed.told[0].parameter_changed().tick(), 6u);
   EXPECT_EQ(changed.told[0].parameter_changed().change().gravity().value().y(), -2);
+}
+
+// A grip at the middle of the lower edge is told of when it takes hold, when it slips and when it lets go.
+TEST_F(SceneHostTest, WhatBecomesOfGripsIsTold) {
+  HostedScene hosted;
+  const auto grabAt = [&](Vec3 place) {
+    hosted.live.inbox.postPoses(
+        7, {.grabs = {{.id = 3, .pose = {place, scene::Quaternion::Identity()}, .radius = 0.06f}}},
+        hosted.now);
+    hosted.tick();
+  };
+  const auto newest = [&] {
+    const v1::TickEvents events = hosted.told.empty() ? v1::TickEvents() : hosted.told.back().tick_events();
+    hosted.told.clear();
+    return events;
+  };
+  grabAt(Vec3(0.05f, -1.1f, 0));
+  const v1::TickEvents taken = newest();
+  ASSERT_EQ(taken.grabs_size(), 1);
+  EXPECT_EQ(taken.tick(), 1u);
+  EXPECT_EQ(taken.grabs(0).participant_id(), 7u);
+  EXPECT_EQ(taken.grabs(0).grab_id(), 3u);
+  EXPECT_EQ(taken.grabs(0).kind(), v1::GRAB_EVENT_KIND_TAKEN);
+  EXPECT_EQ(taken.grabs(0).vertices(), 1u);
+  hosted.ticks(3);
+  EXPECT_EQ(newest().grabs_size(), 0);
+  grabAt(Vec3(0.05f, -1.1f, 3));
+  const v1::TickEvents slipped = newest();
+  ASSERT_EQ(slipped.grabs_size(), 1);
+  EXPECT_EQ(slipped.grabs(0).kind(), v1::GRAB_EVENT_KIND_SLIPPED);
+  EXPECT_EQ(slipped.grabs(0).vertices(), 0u);
+  hosted.live.inbox.postPoses(7, {}, hosted.now);
+  hosted.tick();
+  const v1::TickEvents released = newest();
+  ASSERT_EQ(released.grabs_size(), 1);
+  EXPECT_EQ(released.grabs(0).kind(), v1::GRAB_EVENT_KIND_RELEASED);
+
+  // Where there is nothing to take hold of.
+  grabAt(Vec3(10, 0, 0));
+  const v1::TickEvents nothing = newest();
+  ASSERT_EQ(nothing.grabs_size(), 1);
+  EXPECT_EQ(nothing.grabs(0).kind(), v1::GRAB_EVENT_KIND_TAKEN);
+  EXPECT_EQ(nothing.grabs(0).vertices(), 0u);
 }
 
 TEST_F(SceneHostTest, ChangesOfSpringsReachTheDevice) {

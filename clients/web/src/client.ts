@@ -19,6 +19,7 @@ export const ClientEvent = {
   parameters: 16,
   scenes: 32,
   report: 64,
+  grabs: 128,
 } as const;
 
 export interface Statistics {
@@ -130,6 +131,8 @@ const kClothReportBytes = 56;
 const kClothReportVersion = 1;
 const kClothSettingsBytes = 72;
 const kClothSettingsVersion = 1;
+const kGrabBytes = 48;
+const kGrabEventBytes = 24;
 const kSolverAt = 48; // in cs_cloth_settings
 const kScratchBytes = Math.max(
   kStatisticsBytes,
@@ -139,6 +142,8 @@ const kScratchBytes = Math.max(
   kClothParametersBytes,
   kClothReportBytes,
   kClothSettingsBytes,
+  kGrabBytes,
+  kGrabEventBytes,
 );
 
 // Views that it gives (positions, normals, triangles) look into the core's memory: they are good until the next call.
@@ -370,6 +375,33 @@ export class Client {
     this.core.with([cloth, change.structural, change.shear, change.bend, damping], (name, structural, shear, bend, rate) =>
       this.core.exports.cs_set_cloth(this.handle, name!, structural!, shear!, bend!, rate!),
     );
+  }
+
+  // Those of this participant's grips that hold nothing any more, as the newest ClientEvent.grabs told.
+  lostGrabs(): number[] {
+    const own = this.core.exports.cs_participant_id(this.handle);
+    const events = this.list(
+      this.core.exports.cs_grab_event_count(this.handle),
+      this.core.exports.cs_get_grab_event,
+      (view, at) => ({
+        participant: view.getBigUint64(at, true),
+        grab: view.getUint32(at + 8, true),
+        vertices: view.getUint32(at + 16, true),
+      }),
+    );
+    return events.filter(({ participant, vertices }) => participant === own && vertices === 0).map(({ grab }) => grab);
+  }
+
+  // This participant's grip on cloth; none: it lets go. Another id takes hold anew.
+  setGrab(grab: { id: number; position: Vec3 } | undefined): void {
+    const view = this.core.view();
+    if (grab) {
+      view.setUint32(this.scratch, grab.id, true);
+      const turned = [0, 0, 0, 0];
+      const byDefault = [NaN, NaN, NaN, NaN]; // radius, reach, force, slip distance
+      [...grab.position, ...turned, ...byDefault].forEach((value, i) => view.setFloat32(this.scratch + 4 + 4 * i, value, true));
+    }
+    this.core.exports.cs_set_grabs(this.handle, this.scratch, grab ? 1 : 0, nowUs());
   }
 
   setCollider(collider: string, change: { position?: Vec3; radius?: number }): void {

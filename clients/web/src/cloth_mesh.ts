@@ -49,8 +49,9 @@ export class ClothMesh {
     this.mesh = new THREE.Mesh(geometry, materials);
     this.mesh.castShadow = true;
     this.mesh.receiveShadow = true;
-    // The vertices move every frame: bounds kept up to date would cost more than drawing.
+    // The vertices move every frame: bounds kept up to date would cost more than drawing, and than picking.
     this.mesh.frustumCulled = false;
+    geometry.boundingSphere = new THREE.Sphere(new THREE.Vector3(), Infinity);
   }
 
   // The arrays are the whole scene's, in the core's memory: they are read when the frame is drawn, not kept.

@@ -2,13 +2,13 @@
 // The keyboard on the picture: arrows turn, plus and minus zoom, W A S D move the collider, R resets the view.
 
 import type { Controls } from "./controls";
-import type { ColliderDrag } from "./collider_drag";
+import type { Drag } from "./drag";
 import type { View } from "./view";
 
 const kZoomStep = 1.1;
 const kNudge = 0.03; // m
 
-export function listenToKeys(view: View, drag: ColliderDrag, controls: Controls): void {
+export function listenToKeys(view: View, drag: Drag, controls: Controls): void {
   const actions: Record<string, () => void> = {
     arrowleft: () => view.turn(-1, 0),
     arrowright: () => view.turn(1, 0),

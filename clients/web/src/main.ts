@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 // Starts the page: core, view, session and panel, and the loop that draws.
 
-import { ColliderDrag } from "./collider_drag";
 import { ClothReports } from "./cloth_reports";
 import { Controls } from "./controls";
+import { Drag } from "./drag";
 import { element, Hud } from "./hud";
 import { listenToKeys } from "./keys";
 import { expose } from "./probe";
@@ -36,7 +36,7 @@ async function start(): Promise<void> {
 
   const controls = new Controls({ sceneChosen: chooseScene, viewReset: () => view.reset() });
   const reports = new ClothReports();
-  const drag = new ColliderDrag(view, (collider) => (controls.collider = collider));
+  const drag = new Drag(view, (collider) => (controls.collider = collider));
   listenToKeys(view, drag, controls);
 
   const address = new URL("stream", window.location.href);
@@ -57,6 +57,7 @@ async function start(): Promise<void> {
       reports.showSolvers(client);
     },
     scenesListed: (scenes) => controls.listScenes(scenes, session.client?.sceneName ?? ""),
+    grabsLost: (client) => client.lostGrabs().forEach((grab) => drag.slipped(grab)),
     notice: (text) => hud.showNotice(text),
     refused: (client) => {
       hud.showNotice(client.errorText);
@@ -81,7 +82,8 @@ async function start(): Promise<void> {
       controls.apply(client);
       reports.apply(client);
       const target = drag.take();
-      if (target) client.setCollider(target.collider, { position: target.position });
+      if (target?.kind === "collider") client.setCollider(target.collider, { position: target.position });
+      if (target?.kind === "grab") client.setGrab(target.grab);
       session.flush();
     }
     if (now - figuresAt >= kFiguresPeriodMs) {

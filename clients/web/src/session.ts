@@ -16,6 +16,7 @@ export interface SessionListener {
   described(client: Client): void;
   parametersChanged(client: Client): void;
   scenesListed(scenes: string[]): void;
+  grabsLost(client: Client): void;
   notice(text: string): void;
   // The server refused something, and goes on.
   refused(client: Client): void;
@@ -80,6 +81,7 @@ export class Session {
     if (events & ClientEvent.description) this.listener.described(client);
     if (events & (ClientEvent.description | ClientEvent.parameters)) this.listener.parametersChanged(client);
     if (events & ClientEvent.scenes) this.listener.scenesListed(client.scenes());
+    if (events & ClientEvent.grabs) this.listener.grabsLost(client);
     if (events & ClientEvent.notice) this.listener.notice(client.noticeText);
     if (events & ClientEvent.error) {
       if (client.state === ClientState.failed) this.fail(client.errorText);

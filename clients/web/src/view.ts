@@ -45,6 +45,10 @@ export class View {
     return this.colliderMeshes.meshes;
   }
 
+  get clothMeshes(): THREE.Mesh[] {
+    return this.cloths.map((cloth) => cloth.mesh);
+  }
+
   // Takes the topology and the rest state of a new description, and frames them.
   describe(client: Client): void {
     for (const cloth of this.cloths) {

@@ -39,6 +39,10 @@ export interface CoreExports {
   cs_get_cloth_report(client: Pointer, index: number, out: Pointer): number;
   cs_keep_cloth_settings(out: Pointer): void;
   cs_change_cloth(client: Pointer, cloth: Pointer, settings: Pointer): number;
+  cs_participant_id(client: Pointer): bigint;
+  cs_grab_event_count(client: Pointer): number;
+  cs_get_grab_event(client: Pointer, index: number, out: Pointer): number;
+  cs_set_grabs(client: Pointer, grabs: Pointer, count: number, nowUs: bigint): void;
   cs_set_environment(client: Pointer, gravity3: Pointer, wind3: Pointer, airDensity: Pointer): void;
   cs_set_cloth(client: Pointer, cloth: Pointer, structural2: Pointer, shear2: Pointer, bend2: Pointer, damping: Pointer): void;
   cs_set_collider(client: Pointer, collider: Pointer, position3: Pointer, radius: Pointer): void;

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: MIT
+// Which nodes of a cloth its pins and attachments name.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "clothstream/v1/scene.pb.h"
+#include "server/messages/validation.h"
+#include "server/scene/scene.h"
+
+namespace clothstream::messages {
+
+struct NodeSelection {
+  std::vector<scene::GridRange> ranges;
+  std::vector<std::uint32_t> vertices;  // nodes
+  std::vector<scene::Region> regions;
+};
+
+// The fields of a message that name nodes, and what they are called.
+struct NamedNodes {
+  std::string_view rangesField, verticesField, regionsField;
+  const google::protobuf::RepeatedPtrField<v1::GridRange>& ranges;
+  const google::protobuf::RepeatedField<std::uint32_t>& vertices;
+  const google::protobuf::RepeatedPtrField<v1::Region>& regions;
+};
+
+// Of a cloth whose shape is read already; `nodeOfVertex` as toMeshCloth() gives it, empty for grids.
+NodeSelection toSelection(Checks& checks, const Path& path, const NamedNodes& named,
+                          const scene::Cloth& cloth, std::span<const std::uint32_t> nodeOfVertex);
+
+void write(const scene::GridRange& range, v1::GridRange& message);
+void write(const scene::Region& region, v1::Region& message);
+
+}  // namespace clothstream::messages

@@ -1,0 +1,182 @@
+// SPDX-License-Identifier: MIT
+// Kernels of attachments, tethers and grips.
+#include "server/simulation/hold/hold_stage.h"
+
+#include <algorithm>
+#include <cassert>
+#include <cstring>
+#include <utility>
+
+#include "kernels/aim_attachments.h"
+#include "kernels/find_nearest.h"
+#include "kernels/hold_nodes.h"
+#include "kernels/take_hold.h"
+
+namespace clothstream::simulation {
+namespace {
+
+using vulkan::Buffer;
+using vulkan::BufferPurpose;
+
+constexpr auto kTexels = vulkan::BindingKind::texels;
+constexpr auto kStorage = vulkan::BindingKind::storage;
+constexpr std::size_t kGripBytes = kMaxGrips * sizeof(shared::GripRecord);
+constexpr std::size_t kReportBytes = kMaxGrips * sizeof(shared::GripReport);
+
+float stateOf(Grip::State state) {
+  switch (state) {
+    case Grip::State::holds:
+      return shared::kHoldingGrip;
+    case Grip::State::takes:
+      return shared::kTakingGrip;
+    default:
+      return shared::kFreeGrip;
+  }
+}
+
+// Turns the shorter way.
+shared::GripRecord recordOf(const Grip& grip) {
+  const scene::Vec3& start = grip.start.position;
+  const scene::Vec3 motion = grip.end.position - start;
+  const Eigen::Vector4f from = grip.start.orientation.coeffs();
+  const Eigen::Vector4f to = grip.end.orientation.coeffs();
+  const Eigen::Vector4f turn = (from.dot(to) < 0 ? Eigen::Vector4f(-to) : to) - from;
+  return {.start = {start.x(), start.y(), start.z(), grip.slipDistance * grip.slipDistance},
+          .motion = {motion.x(), motion.y(), motion.z(), grip.maxForce},
+          .turned = {from.x(), from.y(), from.z(), from.w()},
+          .turn = {turn.x(), turn.y(), turn.z(), turn.w()},
+          .state = {stateOf(grip.state), grip.radius * grip.radius, grip.reach * grip.reach, 0}};
+}
+
+}  // namespace
+
+HoldStage::HoldStage(const vulkan::Device& device, const HoldTables& tables, const StateBuffers& state,
+                     std::uint32_t nodeCount, std::uint32_t workgroupSize)
+    : workgroupSize_(workgroupSize),
+      nodeCount_(nodeCount),
+      attachedCount_(static_cast<std::uint32_t>(tables.attached.size())),
+      hasTethers_(!tables.tethers.empty()),
+      attached_(device, tables.attached),
+      tethers_(device, tables.tethers),
+      startFrames_(tables.frames),
+      frames_(device, BufferPurpose::texels,
+              std::max<std::size_t>(1, tables.frames.size()) * sizeof(shared::FrameRecord)),
+      grips_(device, BufferPurpose::texels, kGripBytes),
+      holds_(device, BufferPurpose::state, nodeCount * sizeof(shared::vec4)),
+      reports_(device, BufferPurpose::state, kReportBytes),
+      uploads_{Buffer(device, BufferPurpose::upload, frames_.bytes() + kGripBytes),
+               Buffer(device, BufferPurpose::upload, frames_.bytes() + kGripBytes)},
+      readbacks_{Buffer(device, BufferPurpose::readback, kReportBytes),
+                 Buffer(device, BufferPurpose::readback, kReportBytes)},
+      aim_(device,
+           {.name = "aim_attachments",
+            .spirv = kernels::aim_attachments,
+            .bindings = {kTexels, kTexels, kTexels, kStorage},
+            .pushConstantBytes = sizeof(shared::AimPush),
+            .workgroupSize = workgroupSize},
+           {&attached_.texels(), &frames_, state.positions[0], state.velocities[0]},
+           {&attached_.texels(), &frames_, state.positions[1], state.velocities[1]}),
+      findNearest_(device,
+                   {.name = "find_nearest",
+                    .spirv = kernels::find_nearest,
+                    .bindings = {kTexels, kStorage, kTexels},
+                    .pushConstantBytes = sizeof(shared::GripPush),
+                    .workgroupSize = workgroupSize},
+                   {&grips_, &reports_, state.positions[0]}, {&grips_, &reports_, state.positions[1]}),
+      takeHold_(device,
+                {.name = "take_hold",
+                 .spirv = kernels::take_hold,
+                 .bindings = {kTexels, kStorage, kTexels, kStorage},
+                 .pushConstantBytes = sizeof(shared::GripPush),
+                 .workgroupSize = workgroupSize},
+                {&grips_, &reports_, state.positions[0], &holds_},
+                {&grips_, &reports_, state.positions[1], &holds_}),
+      tie_(makeHold(device, state, false)),
+      hold_(makeHold(device, state, true)) {}
+
+// From the substep's start it is the other buffers that hold its result.
+Stage HoldStage::makeHold(const vulkan::Device& device, const StateBuffers& state, bool grips) const {
+  return Stage(device,
+               {.name = "hold_nodes",
+                .spirv = kernels::hold_nodes,
+                .bindings = {kTexels, kStorage, kTexels, kStorage, kStorage, kStorage},
+                .pushConstantBytes = sizeof(shared::HoldPush),
+                .workgroupSize = workgroupSize_,
+                .specialisation = {hasTethers_ ? 1u : 0u, grips ? 1u : 0u}},
+               {&grips_, &reports_, &tethers_.texels(), state.positions[1], state.velocities[1], &holds_},
+               {&grips_, &reports_, &tethers_.texels(), state.positions[0], state.velocities[0], &holds_});
+}
+
+std::uint64_t HoldStage::invocations() const {
+  constexpr std::uint64_t kMost = 1 << 20;
+  return std::min<std::uint64_t>(nodeCount_, kMost);
+}
+
+void HoldStage::recordInputs(vulkan::Recorder& recorder, std::span<const scene::Pose> frames,
+                             std::span<const Grip> grips) {
+  assert(frames.empty() || frames.size() == startFrames_.size());
+  assert(grips.size() <= kMaxGrips);
+  if (!std::exchange(tabled_, true)) {
+    attached_.recordUpload(recorder);
+    tethers_.recordUpload(recorder);
+    recorder.fill(holds_, 0, holds_.bytes());
+    recorder.fill(reports_, 0, reports_.bytes());
+    recorder.barrier();
+  }
+  slot_ = 1 - slot_;
+  const Buffer& through = uploads_[slot_];
+  const std::span<shared::FrameRecord> frameRecords = through.mapped<shared::FrameRecord>();
+  for (std::size_t i = 0; i < startFrames_.size(); ++i)
+    frameRecords[i] = frames.empty() ? startFrames_[i] : frameRecord(frames[i]);
+  if (!startFrames_.empty()) recorder.copy(through, frames_, frames_.bytes());
+  gripCount_ = static_cast<std::uint32_t>(grips.size());
+  takes_ = false;
+  if (grips.empty()) return;
+  for (std::size_t i = 0; i < grips.size(); ++i) {
+    const shared::GripRecord record = recordOf(grips[i]);
+    std::memcpy(through.mapped().data() + frames_.bytes() + i * sizeof(record), &record, sizeof(record));
+    if (grips[i].state != Grip::State::takes) continue;
+    takes_ = true;
+    const std::size_t report = i * sizeof(shared::GripReport);
+    recorder.fill(reports_, ~0u, sizeof(shared::uint32_t), report + offsetof(shared::GripReport, nearest));
+    recorder.fill(reports_, 0, sizeof(shared::GripReport) - offsetof(shared::GripReport, held),
+                  report + offsetof(shared::GripReport, held));
+  }
+  recorder.copy(through, grips_, grips.size() * sizeof(shared::GripRecord), frames_.bytes());
+}
+
+void HoldStage::recordAim(vulkan::Recorder& recorder, std::uint32_t present, float tickRate) {
+  if (attachedCount_ > 0)
+    recorder.dispatch(aim_.from[present],
+                      shared::AimPush{attachedCount_, tickRate, scene::kMaxAttachmentSpeed}, attachedCount_);
+  if (!takes_) return;
+  recorder.dispatch(findNearest_.from[present], shared::GripPush{nodeCount_, gripCount_}, invocations());
+  recorder.barrier();
+  recorder.dispatch(takeHold_.from[present], shared::GripPush{nodeCount_, gripCount_}, invocations());
+}
+
+void HoldStage::recordSubstep(vulkan::Recorder& recorder, std::uint32_t present, std::uint32_t substep,
+                              std::uint32_t substeps, float tickRate) {
+  if (!hasTethers_ && gripCount_ == 0) return;
+  const float rate = tickRate * static_cast<float>(substeps);
+  recorder.barrier();
+  recorder.dispatch(
+      (gripCount_ > 0 ? hold_ : tie_).from[present],
+      shared::HoldPush{.nodeCount = nodeCount_,
+                       .progressBefore = static_cast<float>(substep) / static_cast<float>(substeps),
+                       .progressAfter = static_cast<float>(substep + 1) / static_cast<float>(substeps),
+                       .substepSeconds = 1 / rate,
+                       .substepRate = rate,
+                       .caughtUp = scene::kCaughtUp},
+      invocations());
+}
+
+void HoldStage::recordReport(vulkan::Recorder& recorder) {
+  if (gripCount_ > 0) recorder.copy(reports_, readbacks_[slot_], gripCount_ * sizeof(shared::GripReport));
+}
+
+std::span<const shared::GripReport> HoldStage::report() const {
+  return readbacks_[slot_].mapped<const shared::GripReport>().first(gripCount_);
+}
+
+}  // namespace clothstream::simulation

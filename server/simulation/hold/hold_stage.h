@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: MIT
+// What holds cloth, on the device: nodes attached to moving frames, tethers, participants' grips.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+
+#include "server/scene/pose.h"
+#include "server/simulation/device_table.h"
+#include "server/simulation/hold/grip.h"
+#include "server/simulation/hold/hold_tables.h"
+#include "server/simulation/stage.h"
+#include "server/simulation/state_buffers.h"
+#include "server/vulkan/buffer.h"
+#include "server/vulkan/device.h"
+#include "server/vulkan/recorder.h"
+
+namespace clothstream::simulation {
+
+// Belongs to the device's thread.
+//
+// A tick:   recordInputs -> barrier -> recordAim -> substeps, each with recordSubstep at its end ->
+// recordReport
+class HoldStage {
+ public:
+  // Throws std::runtime_error where the device has no room.
+  HoldStage(const vulkan::Device& device, const HoldTables& tables, const StateBuffers& state,
+            std::uint32_t nodeCount, std::uint32_t workgroupSize);
+
+  // `frames`: where each attachment of the tables is at the tick's end; none: where they start. At most one
+  // tick may be in flight.
+  void recordInputs(vulkan::Recorder& recorder, std::span<const scene::Pose> frames,
+                    std::span<const Grip> grips);
+  // Whether recordAim() has something to do in this tick.
+  bool aims() const { return attachedCount_ > 0 || takes_; }
+  // Attached nodes get their velocities, grips that begin take hold; the state lies in the buffers `present`.
+  void recordAim(vulkan::Recorder& recorder, std::uint32_t present, float tickRate);
+  // The substep's result lies in the buffers that are not `present`.
+  void recordSubstep(vulkan::Recorder& recorder, std::uint32_t present, std::uint32_t substep,
+                     std::uint32_t substeps, float tickRate);
+  void recordReport(vulkan::Recorder& recorder);
+
+  // Of the grips of the last recorded tick, once it is complete.
+  std::span<const shared::GripReport> report() const;
+
+ private:
+  Stage makeHold(const vulkan::Device& device, const StateBuffers& state, bool grips) const;
+  // They share the nodes.
+  std::uint64_t invocations() const;
+
+  std::uint32_t workgroupSize_, nodeCount_, attachedCount_;
+  bool hasTethers_;
+  bool tabled_ = false;  // what does not change is on the device
+  bool takes_ = false;   // some grip takes hold in this tick
+  std::uint32_t gripCount_ = 0, slot_ = 0;
+
+  DeviceTable attached_, tethers_;
+  std::vector<shared::FrameRecord> startFrames_;
+  vulkan::Buffer frames_, grips_, holds_, reports_;
+  // By turns: a tick may be in flight while the next is recorded.
+  std::array<vulkan::Buffer, 2> uploads_;  // frames, then grips
+  std::array<vulkan::Buffer, 2> readbacks_;
+  Stage aim_, findNearest_, takeHold_, tie_, hold_;
+};
+
+}  // namespace clothstream::simulation

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: MIT
+// Attached nodes and tethers of a scene.
+#include "server/simulation/hold/hold_tables.h"
+
+#include <algorithm>
+#include <array>
+
+#include "server/scene/tethers.h"
+
+namespace clothstream::simulation {
+namespace {
+
+// `first`: the cloth's first node.
+void addAttached(const scene::Scene& scene, const scene::Cloth& cloth, std::uint32_t first,
+                 HoldTables& tables) {
+  const std::vector<scene::Vec3> rest = scene::restPositions(cloth);
+  for (const scene::Attachment& attachment : cloth.attachments) {
+    const scene::Pose start = scene::frameAt(scene, attachment, 0);
+    const auto frame = static_cast<float>(tables.frames.size());
+    tables.frames.push_back(frameRecord(start));
+    const std::vector<std::uint8_t> attached = scene::attachedNodes(cloth, attachment);
+    for (std::uint32_t node = 0; node < attached.size(); ++node) {
+      if (attached[node] == 0) continue;
+      const Eigen::Vector3d away = (rest[node] - start.position).cast<double>();
+      const scene::Vec3 place = (start.orientation.cast<double>().conjugate() * away).cast<float>();
+      tables.attached.push_back(
+          {{static_cast<float>(first + node), frame, 0, 0}, {place.x(), place.y(), place.z(), 0}});
+    }
+  }
+}
+
+shared::TetherRecord record(const scene::NodeTethers& tethers, float slack, std::uint32_t first) {
+  shared::TetherRecord record{};
+  const auto number = [&](const scene::Tether& tether) {
+    return tether.anchor == scene::Tether::kNone ? 0.0f : static_cast<float>(first + tether.anchor + 1);
+  };
+  record.anchors = {number(tethers[0]), tethers[0].length * (1 + slack), number(tethers[1]),
+                    tethers[1].length * (1 + slack)};
+  return record;
+}
+
+}  // namespace
+
+shared::FrameRecord frameRecord(const scene::Pose& pose) {
+  const auto& q = pose.orientation;
+  return {{pose.position.x(), pose.position.y(), pose.position.z(), 0}, {q.x(), q.y(), q.z(), q.w()}};
+}
+
+HoldTables holdTables(const scene::Scene& scene) {
+  HoldTables tables;
+  const bool anyTethers =
+      std::ranges::any_of(scene.cloths, [](const scene::Cloth& cloth) { return cloth.tethers.has_value(); });
+  std::uint32_t first = 0;
+  for (const scene::Cloth& cloth : scene.cloths) {
+    addAttached(scene, cloth, first, tables);
+    if (cloth.tethers)
+      for (const scene::NodeTethers& tethers : scene::nodeTethers(cloth))
+        tables.tethers.push_back(record(tethers, cloth.tethers->slack, first));
+    else if (anyTethers)
+      tables.tethers.resize(tables.tethers.size() + cloth.nodeCount());
+    first += cloth.nodeCount();
+  }
+  return tables;
+}
+
+}  // namespace clothstream::simulation

@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: MIT
+// Tables and push constants of what holds cloth: attachments, grips, tethers. Alike in C++ and in GLSL's
+// std430.
+#ifndef CLOTHSTREAM_SHADERS_HOLD_HOLD_H
+#define CLOTHSTREAM_SHADERS_HOLD_HOLD_H
+
+#include "shaders/shared/types.h"
+
+CLOTHSTREAM_SHARED_BEGIN
+
+// A node that goes with a frame, two texels.
+struct AttachedRecord {
+  vec4 node;   // its number, the frame's
+  vec4 place;  // in the frame, m
+};
+
+// Where a frame is at the tick's end, two texels.
+struct FrameRecord {
+  vec4 position;
+  vec4 orientation;  // unit quaternion
+};
+
+// How far a node may get from two nodes that forces do not move, a texel.
+struct TetherRecord {
+  vec4 anchors;  // number + 1, or 0 where there is none, and metres; of another one likewise
+};
+
+// What GripRecord::state is.
+const float kFreeGrip = 0;  // whatever it held it lets go
+const float kHoldingGrip = 1;
+const float kTakingGrip = 2;  // from this tick's start on
+
+// A grip over one tick, five texels.
+struct GripRecord {
+  vec4 start;   // where it is; w: square of the distance beyond which a node slips away
+  vec4 motion;  // how far it goes until the tick's end; w: force, N
+  vec4 turned;  // unit quaternion
+  vec4 turn;    // what is added until the tick's end
+  vec4 state;   // kFreeGrip ...; squares of radius and reach
+};
+
+// What becomes of a grip.
+struct GripReport {
+  uint32_t nearest;  // bits of the square of the distance of the node nearest to it when it took hold
+  uint32_t held;     // nodes that it took hold of
+  uint32_t slipped;  // those of them that slipped away
+  uint32_t reserved;
+};
+
+struct AimPush {
+  uint32_t count;
+  float tickRate;  // 1/s
+  float maxSpeed;  // m/s
+};
+
+struct GripPush {
+  uint32_t nodeCount;
+  uint32_t gripCount;
+};
+
+struct HoldPush {
+  uint32_t nodeCount;
+  float progressBefore;  // of the tick's motion, at the substep's start
+  float progressAfter;
+  float substepSeconds;
+  float substepRate;  // 1/s
+  float caughtUp;     // scene::kCaughtUp
+};
+
+CLOTHSTREAM_SHARED_END
+
+#ifdef __cplusplus
+namespace clothstream::shared {
+static_assert(sizeof(AttachedRecord) == 32 && sizeof(FrameRecord) == 32 && sizeof(TetherRecord) == 16);
+static_assert(sizeof(GripRecord) == 80 && sizeof(GripReport) == 16);
+}  // namespace clothstream::shared
+#endif
+
+#endif

@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: MIT
+// What tethers and grips do to a node at a substep's end, after its solver and its collisions.
+#version 450
+#extension GL_GOOGLE_include_directive : require
+
+#include "shaders/hold/grip.glsl"
+
+// What there is none of is left out.
+layout(constant_id = 1) const bool kTethers = true;
+layout(constant_id = 2) const bool kGrips = true;
+
+layout(binding = 2) uniform samplerBuffer tethers;  // TetherRecord, a node
+layout(std430, binding = 3) buffer Positions {
+  vec4 positions[];  // w: inverse mass
+};
+layout(std430, binding = 4) buffer Velocities {
+  vec4 velocities[];
+};
+layout(std430, binding = 5) buffer Holds {
+  vec4 holds[];  // as in take_hold.comp
+};
+
+layout(push_constant) uniform Push {
+  HoldPush push;
+};
+
+struct State {
+  vec3 position;
+  vec3 velocity;
+};
+
+// Back to the end of the tether, [KCM12] 3.2, without the velocity that led beyond it. Anchors are nodes that
+// this kernel does not write.
+State tie(State node, float anchor, float length_) {
+  if (anchor == 0.0) {
+    return node;
+  }
+  int at = int(anchor) - 1;
+  vec3 end = positions[at].xyz;
+  precise vec3 away = node.position - end;
+  precise float squared = dotProduct(away, away);
+  if (squared <= length_ * length_) {
+    return node;
+  }
+  precise vec3 direction = away * reciprocalSquareRoot(max(squared, 1e-24));
+  precise vec3 position = end + length_ * direction;
+  precise float leaving = max(dotProduct(node.velocity - velocities[at].xyz, direction), 0.0);
+  precise vec3 velocity = node.velocity - leaving * direction;
+  return State(position, velocity);
+}
+
+// The velocity of its place in the grip, and what takes the node there, as far as the grip's force does.
+State pull(State node, float inverseMass, uint grip, vec3 inGrip, vec3 after) {
+  vec4 start = gripTexel(grip, 0);
+  vec4 motion = gripTexel(grip, 1);
+  vec4 turned = turnedAt(gripTexel(grip, 2), gripTexel(grip, 3), push.progressBefore);
+  precise vec3 before = start.xyz + push.progressBefore * motion.xyz + rotate(turned, inGrip);
+  precise vec3 carried = push.substepRate * (after - before);
+  precise vec3 lag = push.substepRate * (after - node.position);
+  precise vec3 wanted = (1.0 - push.caughtUp) * (carried - node.velocity) + push.caughtUp * lag;
+  precise float share = motion.w * reciprocal(float(reports[grip].held));
+  precise float most = (share * inverseMass) * push.substepSeconds;
+  precise float squared = dotProduct(wanted, wanted);
+  precise vec3 gained = wanted;
+  if (squared > most * most) {
+    gained = wanted * (most * reciprocalSquareRoot(max(squared, 1e-24)));
+  }
+  precise vec3 position = node.position + push.substepSeconds * gained;
+  precise vec3 velocity = node.velocity + gained;
+  return State(position, velocity);
+}
+
+vec3 placeAtEnd(uint grip, vec3 inGrip) {
+  vec4 start = gripTexel(grip, 0);
+  vec4 motion = gripTexel(grip, 1);
+  vec4 turned = turnedAt(gripTexel(grip, 2), gripTexel(grip, 3), push.progressAfter);
+  precise vec3 place = start.xyz + push.progressAfter * motion.xyz + rotate(turned, inGrip);
+  return place;
+}
+
+void hold(uint index) {
+  vec4 tether = kTethers ? texelFetch(tethers, int(index)) : vec4(0.0);
+  vec4 hold = kGrips ? holds[index] : vec4(0.0);
+  if (tether.x == 0.0 && hold.w == 0.0) {
+    return;
+  }
+  float inverseMass = positions[index].w;
+  if (inverseMass == 0.0) {
+    return;
+  }
+  State node = State(positions[index].xyz, velocities[index].xyz);
+  if (kTethers) {
+    // The shorter last: it holds exactly.
+    node = tie(node, tether.z, tether.w);
+    node = tie(node, tether.x, tether.y);
+  }
+  if (kGrips && hold.w > 0.0) {
+    uint grip = uint(hold.w) - 1;
+    vec3 place = placeAtEnd(grip, hold.xyz);
+    precise vec3 out_ = place - node.position;
+    bool lets = gripTexel(grip, 4).x == kFreeGrip;
+    bool slips = dotProduct(out_, out_) > gripTexel(grip, 0).w;
+    if (lets || slips) {
+      holds[index] = vec4(0.0);
+      if (!lets) {
+        atomicAdd(reports[grip].slipped, 1);
+      }
+    } else {
+      node = pull(node, inverseMass, grip, hold.xyz, place);
+    }
+  }
+  positions[index].xyz = snapTiny(node.position);
+  velocities[index].xyz = snapTiny(node.velocity);
+}
+
+void main() {
+  for (uint node = gl_GlobalInvocationID.x; node < push.nodeCount; node += invocations()) {
+    hold(node);
+  }
+}
