@@ -14,7 +14,11 @@
 
 namespace clothstream::vulkan {
 
-enum class BindingKind : std::uint8_t { storage, texels };
+enum class BindingKind : std::uint8_t {
+  storage,
+  texels,  // read only
+  images,  // RGBA32F texels that the kernel also writes
+};
 
 struct KernelDescription {
   const char* name = "";                      // for errors, validation and timings

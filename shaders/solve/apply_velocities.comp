@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: MIT
+// What was solved for takes every node of its cloths from where the forces alone took it; then it collides.
+// One chunk a workgroup; every node belongs to one invocation.
+#version 450
+#extension GL_GOOGLE_include_directive : require
+
+const int kColliderBinding = 4;
+const int kStateBinding = 6;
+
+#include "shaders/solve/system.glsl"
+// Reads `cloths`.
+#include "shaders/shared/end_of_substep.glsl"
+
+layout(binding = 3) uniform samplerBuffer vectors;
+
+layout(push_constant) uniform Push {
+  ApplyPush push;
+};
+
+void main() {
+  vec4 part = texelFetch(chunks, int(push.firstChunk + gl_WorkGroupID.x));
+  System system = systemAt(uint(part.x));
+  uint lane = self();
+  do {
+    Walk walk = walkAt(system, uint(part.y) * kLanes + lane);
+    uint k = 0;
+    do {
+      if (k < walk.count) {
+        uint node = walk.first + k * walk.step;
+        vec3 correction = texelFetch(vectors, int(kCorrections * push.nodes + node)).xyz;
+        precise vec3 position = positions[node].xyz + push.substepSeconds * correction;
+        precise vec3 velocity = velocities[node].xyz + correction;
+        endSubstep(node, position, velocity, positions[node].w, system.cloth, push.collision);
+      }
+      ++k;
+    } while (k < kWalk);
+    lane += width();
+  } while (lane < kLanes);
+}
