@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "kernels/apply_velocities.h"
+#include "kernels/check_stretch.h"
 #include "kernels/multiply_residuals.h"
 #include "kernels/prepare_grids.h"
 #include "kernels/prepare_meshes.h"
@@ -29,8 +30,22 @@ constexpr auto kTexels = BindingKind::texels;
 constexpr auto kImages = BindingKind::images;
 constexpr auto kStorage = BindingKind::storage;
 constexpr std::uint32_t kLanes = CLOTHSTREAM_SOLVE_LANES;
-constexpr std::uint32_t kVectors = 5;          // shaders/solve/system.glsl
-constexpr std::uint32_t kNumbersOfGroups = 3;  // x, y, z
+constexpr std::uint32_t kVectors = 5;  // shaders/solve/system.glsl
+// Sizes of dispatches, x, y, z each: of a group's chunks, of its small systems, of the large ones'
+// iterations.
+constexpr std::uint32_t kSize = 3, kSmallSystems = kSize, kIteration = 2 * kSize;
+
+std::uint32_t sizesOf(const SolveGroup& group) {
+  return kIteration + kSize * (group.iterations + 1);
+}
+
+bool isAdaptive(const SolveGroup& group) {
+  return group.kind == scene::SolverKind::acad;
+}
+
+bool isImplicit(const SolveGroup& group) {
+  return group.kind == scene::SolverKind::implicitEuler;
+}
 
 // A workgroup is a chunk, or solves a system chunk by chunk, with barriers between its passes: on a software
 // device these cost nothing as long as it is no wider than the CPU's vectors, for it then runs without
@@ -56,7 +71,7 @@ std::uint32_t iterationsPerDispatch(const vulkan::Device& device, const SolveGro
 
 // All kernels of a group but those that it does not need: systems that one workgroup solves, or several.
 struct GroupKernels {
-  std::unique_ptr<Kernel> springs, prepare, whole, multiply, measure, update;
+  std::unique_ptr<Kernel> check, springs, prepare, whole, multiply, measure, update;
 };
 
 struct SolveStage::Kernels {
@@ -66,35 +81,43 @@ struct SolveStage::Kernels {
                                std::vector<BindingKind> bindings, std::size_t push, const SolveGroup& group,
                                bool measure = false) const {
     return std::make_unique<Kernel>(
-        device, vulkan::KernelDescription{
-                    .name = name,
-                    .spirv = spirv,
-                    .bindings = std::move(bindings),
-                    .pushConstantBytes = static_cast<std::uint32_t>(push),
-                    .workgroupSize = workgroup,
-                    .specialisation = {group.implicit ? 1u : 0u, group.mesh ? 1u : 0u, measure ? 1u : 0u}});
+        device,
+        vulkan::KernelDescription{
+            .name = name,
+            .spirv = spirv,
+            .bindings = std::move(bindings),
+            .pushConstantBytes = static_cast<std::uint32_t>(push),
+            .workgroupSize = workgroup,
+            .specialisation = {isImplicit(group) ? 1u : 0u, group.mesh ? 1u : 0u, group.bend ? 1u : 0u,
+                               isAdaptive(group) ? 1u : 0u, measure ? 1u : 0u}});
   }
 
   const GroupKernels& of(const SolveGroup& group) {
-    GroupKernels& on = groups[(group.implicit ? 1u : 0u) + (group.mesh ? 2u : 0u)];
+    const std::size_t kind = isImplicit(group) ? 2 : (isAdaptive(group) ? 1 : 0);
+    GroupKernels& on = groups[(2 * kind + (group.mesh ? 1 : 0)) * 2 + (group.bend ? 1 : 0)];
+    // The same first ones of all that weigh springs.
+    const auto weighing = [](std::initializer_list<BindingKind> more) {
+      std::vector<BindingKind> bindings = {kTexels, kTexels, kTexels,  kTexels,  kTexels,
+                                           kTexels, kTexels, kStorage, kStorage, kStorage};
+      bindings.insert(bindings.end(), more);
+      return bindings;
+    };
     const std::vector<BindingKind> vectors = {kTexels,  kTexels,  kTexels, kTexels, kTexels,
                                               kTexels,  kTexels,  kTexels, kImages, kStorage,
                                               kStorage, kStorage, kStorage};
     std::vector<BindingKind> multiply = vectors;
     multiply.push_back(kStorage);
     if (!on.prepare && group.mesh) {
-      on.springs = make("prepare_springs", kernels::prepare_springs,
-                        {kTexels, kTexels, kTexels, kTexels, kTexels, kTexels, kStorage, kStorage, kStorage,
-                         kTexels, kStorage, kStorage},
+      on.springs = make("prepare_springs", kernels::prepare_springs, weighing({kTexels, kStorage, kStorage}),
                         sizeof(shared::PreparePush), group);
-      on.prepare = make("prepare_meshes", kernels::prepare_meshes,
-                        {kTexels, kTexels, kTexels, kTexels, kTexels, kTexels, kStorage, kStorage, kStorage,
-                         kTexels, kTexels, kTexels, kTexels, kStorage},
-                        sizeof(shared::PreparePush), group);
+      on.prepare =
+          make("prepare_meshes", kernels::prepare_meshes,
+               weighing({kTexels, kTexels, kTexels, kTexels, kStorage}), sizeof(shared::PreparePush), group);
     } else if (!on.prepare) {
-      on.prepare = make("prepare_grids", kernels::prepare_grids,
-                        {kTexels, kTexels, kTexels, kTexels, kTexels, kTexels, kStorage, kStorage, kStorage,
-                         kStorage, kStorage, kStorage},
+      if (isAdaptive(group))
+        on.check =
+            make("check_stretch", kernels::check_stretch, weighing({}), sizeof(shared::PreparePush), group);
+      on.prepare = make("prepare_grids", kernels::prepare_grids, weighing({kStorage, kStorage, kStorage}),
                         sizeof(shared::PreparePush), group);
     }
     if (!on.whole && group.smallSystems > 0)
@@ -114,15 +137,16 @@ struct SolveStage::Kernels {
   const Kernel& apply(const SolveGroup& group) {
     std::unique_ptr<Kernel>& kernel = applies[group.mesh ? 1 : 0];
     if (!kernel)
-      kernel = make("apply_velocities", kernels::apply_velocities,
-                    {kTexels, kTexels, kTexels, kTexels, kTexels, kTexels, kTexels, kStorage, kStorage},
-                    sizeof(shared::ApplyPush), group);
+      kernel =
+          make("apply_velocities", kernels::apply_velocities,
+               {kTexels, kTexels, kTexels, kTexels, kTexels, kTexels, kTexels, kStorage, kStorage, kStorage},
+               sizeof(shared::ApplyPush), group);
     return *kernel;
   }
 
   const vulkan::Device& device;
   std::uint32_t workgroup;
-  std::array<GroupKernels, 4> groups;
+  std::array<GroupKernels, 12> groups;
   std::array<std::unique_ptr<Kernel>, 2> applies;
 };
 
@@ -132,8 +156,8 @@ struct SolveStage::Systems {
   struct Group {
     SolveGroup on;
     std::uint32_t iterationsPerDispatch;
-    std::size_t firstNumber;  // of the dispatches' sizes
-    std::vector<Bindings> springs{}, prepare{}, whole{}, multiply{}, measure{}, update{}, apply{};
+    std::uint32_t firstSize;  // of its dispatches'
+    std::vector<Bindings> check{}, springs{}, prepare{}, whole{}, multiply{}, measure{}, update{}, apply{};
   };
 
   Systems(const vulkan::Device& device, const SolveTables& tables, const StateBuffers& state,
@@ -145,11 +169,11 @@ struct SolveStage::Systems {
         springs(device, tables.springs),
         incidences(device, tables.incidences),
         lists(device, tables.lists),
-        emptyGroups(device, BufferPurpose::upload, numbersOf(tables) * sizeof(std::uint32_t)),
+        emptyGroups(device, BufferPurpose::upload, allSizes(tables) * sizeof(std::uint32_t)),
         groupSizes(device, BufferPurpose::indirect, emptyGroups.bytes()),
         along(device, BufferPurpose::texels, texels(2 * nodes, has(tables, [](auto& g) { return !g.mesh; }))),
         across(device, BufferPurpose::texels,
-               texels(2 * nodes, has(tables, [](auto& g) { return !g.mesh && g.implicit; }))),
+               texels(2 * nodes, has(tables, [](auto& g) { return !g.mesh && isImplicit(g); }))),
         rows(device, BufferPurpose::texels, texels(tables.springs.size(), !tables.springs.empty())),
         impulses(device, BufferPurpose::texels, rows.bytes()),
         vectors(device, BufferPurpose::texels, texels(kVectors * std::size_t{nodes}, true)),
@@ -158,24 +182,24 @@ struct SolveStage::Systems {
         solves(device, BufferPurpose::state, tables.systems.size() * sizeof(shared::SolveRecord)),
         solvesReadback(device, BufferPurpose::readback, solves.bytes()) {
     const std::span<std::uint32_t> numbers = emptyGroups.mapped<std::uint32_t>();
-    for (std::size_t i = 0; i < numbers.size(); ++i) numbers[i] = i % kNumbersOfGroups == 0 ? 0 : 1;
+    for (std::size_t i = 0; i < numbers.size(); ++i) numbers[i] = i % kSize == 0 ? 0 : 1;
     for (const shared::SystemRecord& system : tables.systems)
       cloths.push_back(static_cast<std::uint32_t>(system.springs.w));
-    std::size_t number = 0;
+    std::uint32_t size = 0;
     for (const SolveGroup& on : tables.groups) {
       groups.push_back(
           {.on = on,
            .iterationsPerDispatch = simulation::iterationsPerDispatch(device, on, tables.listed, workgroup),
-           .firstNumber = number});
-      number += kNumbersOfGroups * (on.iterations + 1);
+           .firstSize = size});
+      size += sizesOf(on);
       for (const std::size_t from : {0, 1}) bind(device, kernels, state, from, groups.back());
     }
   }
 
-  static std::size_t numbersOf(const SolveTables& tables) {
-    std::size_t numbers = 0;
-    for (const SolveGroup& group : tables.groups) numbers += kNumbersOfGroups * (group.iterations + 1);
-    return numbers;
+  static std::size_t allSizes(const SolveTables& tables) {
+    std::size_t sizes = 0;
+    for (const SolveGroup& group : tables.groups) sizes += sizesOf(group);
+    return sizes;
   }
   static bool has(const SolveTables& tables, auto what) { return std::ranges::any_of(tables.groups, what); }
   // Bindings want a buffer even of nothing.
@@ -184,51 +208,48 @@ struct SolveStage::Systems {
   void bind(const vulkan::Device& device, Kernels& kernels, const StateBuffers& state, std::size_t from,
             Group& group) {
     const GroupKernels& with = kernels.of(group.on);
-    const Buffer &position = *state.positions[from], &velocity = *state.velocities[from],
-                 &free = *state.velocities[1 - from];
-    const Buffer& weights = group.on.mesh ? rows : along;
-    if (with.springs)
-      group.springs.emplace_back(
-          device, *with.springs,
-          std::initializer_list<const Buffer*>{&state.cloths, &systems.texels(), &chunks.texels(), &position,
-                                               &velocity, &free, &solves, &actives, &groupSizes,
-                                               &springs.texels(), &rows, &impulses});
-    if (group.on.mesh)
-      group.prepare.emplace_back(
-          device, *with.prepare,
-          std::initializer_list<const Buffer*>{
-              &state.cloths, &systems.texels(), &chunks.texels(), &position, &velocity, &free, &solves,
-              &actives, &groupSizes, &incidences.texels(), &lists.texels(), &rows, &impulses, &vectors});
-    else
-      group.prepare.emplace_back(device, *with.prepare,
-                                 std::initializer_list<const Buffer*>{
-                                     &state.cloths, &systems.texels(), &chunks.texels(), &position, &velocity,
-                                     &free, &solves, &actives, &groupSizes, &along, &across, &vectors});
-    const auto iterate = [&](std::vector<Bindings>& bindings, const std::unique_ptr<Kernel>& kernel) {
-      bindings.emplace_back(
-          device, *kernel,
-          std::initializer_list<const Buffer*>{&state.cloths, &systems.texels(), &chunks.texels(), &position,
-                                               &incidences.texels(), &lists.texels(), &weights, &across,
-                                               &vectors, &vectors, &sums, &solves, &actives});
+    const Buffer &position = *state.positions[from], &freePosition = *state.positions[1 - from],
+                 &velocity = *state.velocities[from], &freeVelocity = *state.velocities[1 - from];
+    const auto bindTo = [&](std::vector<Bindings>& bindings, const std::unique_ptr<Kernel>& kernel,
+                            std::vector<const Buffer*> first, std::initializer_list<const Buffer*> more) {
+      first.insert(first.end(), more);
+      bindings.emplace_back(device, *kernel, first);
     };
-    const auto multiply = [&](std::vector<Bindings>& bindings, const std::unique_ptr<Kernel>& kernel) {
-      bindings.emplace_back(
-          device, *kernel,
-          std::initializer_list<const Buffer*>{&state.cloths, &systems.texels(), &chunks.texels(), &position,
-                                               &incidences.texels(), &lists.texels(), &weights, &across,
-                                               &vectors, &vectors, &sums, &solves, &actives, &groupSizes});
-    };
-    if (group.on.smallSystems > 0) iterate(group.whole, with.whole);
+    const std::vector<const Buffer*> weighing = {
+        &state.cloths, &systems.texels(), &chunks.texels(), &position, &velocity,
+        &freeVelocity, &freePosition,     &solves,          &actives,  &groupSizes};
+    if (with.check) bindTo(group.check, with.check, weighing, {});
+    if (group.on.mesh) {
+      bindTo(group.springs, with.springs, weighing, {&springs.texels(), &rows, &impulses});
+      bindTo(group.prepare, with.prepare, weighing,
+             {&incidences.texels(), &lists.texels(), &rows, &impulses, &vectors});
+    } else {
+      bindTo(group.prepare, with.prepare, weighing, {&along, &across, &vectors});
+    }
+    const std::vector<const Buffer*> iterating = {&state.cloths,
+                                                  &systems.texels(),
+                                                  &chunks.texels(),
+                                                  &position,
+                                                  &incidences.texels(),
+                                                  &lists.texels(),
+                                                  group.on.mesh ? &rows : &along,
+                                                  &across,
+                                                  &vectors,
+                                                  &vectors,
+                                                  &sums,
+                                                  &solves,
+                                                  &actives};
+    if (group.on.smallSystems > 0) bindTo(group.whole, with.whole, iterating, {});
     if (group.on.hasLarge()) {
-      multiply(group.multiply, with.multiply);
-      multiply(group.measure, with.measure);
-      iterate(group.update, with.update);
+      bindTo(group.multiply, with.multiply, iterating, {&groupSizes});
+      bindTo(group.measure, with.measure, iterating, {&groupSizes});
+      bindTo(group.update, with.update, iterating, {});
     }
     group.apply.emplace_back(
         device, kernels.apply(group.on),
         std::initializer_list<const Buffer*>{&state.cloths, &systems.texels(), &chunks.texels(), &vectors,
-                                             &state.colliders, &state.nearColliders, &position,
-                                             state.positions[1 - from], state.velocities[1 - from]});
+                                             &state.colliders, &state.nearColliders, &position, &freePosition,
+                                             &freeVelocity, &actives});
   }
 
   void recordPrepare(vulkan::Recorder& recorder, const Group& group, std::uint32_t from, double h) const;
@@ -271,6 +292,9 @@ void SolveStage::recordTables(vulkan::Recorder& recorder) const {
   for (const DeviceTable* table :
        {&systems_->systems, &systems_->chunks, &systems_->springs, &systems_->incidences, &systems_->lists})
     table->recordUpload(recorder);
+  // What ACAD does not prepare has no weight.
+  for (const Buffer* buffer : {&systems_->along, &systems_->vectors, &systems_->actives})
+    recorder.fill(*buffer, 0, buffer->bytes());
 }
 
 void SolveStage::Systems::recordPrepare(vulkan::Recorder& recorder, const Group& group, std::uint32_t from,
@@ -278,19 +302,28 @@ void SolveStage::Systems::recordPrepare(vulkan::Recorder& recorder, const Group&
   const SolveGroup& on = group.on;
   const shared::PreparePush push{.nodes = nodes,
                                  .firstChunk = on.firstChunk,
+                                 .chunks = on.endChunk - on.firstChunk,
+                                 .smallSystems = on.smallSystems,
                                  .firstLargeChunk = on.firstLargeChunk,
                                  .largeChunks = on.endChunk - on.firstLargeChunk,
-                                 .firstGroup = static_cast<std::uint32_t>(group.firstNumber),
+                                 .firstGroup = group.firstSize,
                                  .substepSeconds = static_cast<float>(h),
                                  .substepRate = static_cast<float>(1 / h),
                                  .firstSpring = on.firstSpring,
                                  .endSpring = on.endSpring};
+  const std::uint64_t all = std::uint64_t{push.chunks} * workgroup;
   recorder.barrier();
   if (on.mesh) {
     recorder.dispatch(group.springs[from], push, on.endSpring - on.firstSpring);
     recorder.barrier();
   }
-  recorder.dispatch(group.prepare[from], push, std::uint64_t{on.endChunk - on.firstChunk} * workgroup);
+  if (group.check.empty()) {
+    recorder.dispatch(group.prepare[from], push, all);
+    return;
+  }
+  recorder.dispatch(group.check[from], push, all);
+  recorder.barrier();
+  recorder.dispatchIndirect(group.prepare[from], push, groupSizes, group.firstSize * sizeof(std::uint32_t));
 }
 
 void SolveStage::Systems::recordSmall(vulkan::Recorder& recorder, const Group& group,
@@ -299,15 +332,15 @@ void SolveStage::Systems::recordSmall(vulkan::Recorder& recorder, const Group& g
   for (std::uint32_t first = 0; first < group.on.iterations;) {
     const std::uint32_t end = first + std::min(group.iterationsPerDispatch, group.on.iterations - first);
     recorder.barrier();
-    recorder.dispatch(group.whole[from],
-                      shared::SolvePush{.nodes = nodes,
-                                        .firstSystem = group.on.firstSystem,
-                                        .firstIteration = first,
-                                        .endIteration = end,
-                                        .firstChunk = 0,
-                                        .chunks = 0,
-                                        .nextGroup = 0},
-                      std::uint64_t{group.on.smallSystems} * workgroup);
+    recorder.dispatchIndirect(group.whole[from],
+                              shared::SolvePush{.nodes = nodes,
+                                                .firstSystem = group.on.firstSystem,
+                                                .firstIteration = first,
+                                                .endIteration = end,
+                                                .firstChunk = 0,
+                                                .chunks = 0,
+                                                .nextGroup = 0},
+                              groupSizes, (group.firstSize + kSmallSystems) * sizeof(std::uint32_t));
     first = end;
   }
 }
@@ -317,7 +350,7 @@ void SolveStage::Systems::recordLarge(vulkan::Recorder& recorder, const Group& g
   const SolveGroup& on = group.on;
   if (!on.hasLarge()) return;
   const auto number = [&](std::uint32_t iteration) {
-    return static_cast<std::uint32_t>(group.firstNumber) + kNumbersOfGroups * iteration;
+    return group.firstSize + kIteration + kSize * iteration;
   };
   shared::SolvePush push{.nodes = nodes,
                          .firstSystem = 0,
@@ -349,15 +382,19 @@ void SolveStage::record(vulkan::Recorder& recorder, std::uint32_t from,
     all.recordPrepare(recorder, group, from, substepSeconds);
     all.recordSmall(recorder, group, from);
     all.recordLarge(recorder, group, from);
-    const std::uint32_t chunks = group.on.endChunk - group.on.firstChunk;
+    const shared::ApplyPush push{.collision = collision,
+                                 .nodes = all.nodes,
+                                 .firstChunk = group.on.firstChunk,
+                                 .substepSeconds = static_cast<float>(substepSeconds),
+                                 .reserved = 0};
     recorder.barrier();
-    recorder.dispatch(group.apply[from],
-                      shared::ApplyPush{.collision = collision,
-                                        .nodes = all.nodes,
-                                        .firstChunk = group.on.firstChunk,
-                                        .substepSeconds = static_cast<float>(substepSeconds),
-                                        .reserved = 0},
-                      std::uint64_t{chunks} * all.workgroup);
+    // What ACAD leaves alone stays where it is, unless it may collide.
+    if (isAdaptive(group.on) && collision.colliderCount == 0)
+      recorder.dispatchIndirect(group.apply[from], push, all.groupSizes,
+                                group.firstSize * sizeof(std::uint32_t));
+    else
+      recorder.dispatch(group.apply[from], push,
+                        std::uint64_t{group.on.endChunk - group.on.firstChunk} * all.workgroup);
   }
 }
 

@@ -84,11 +84,11 @@ void appendCloths(std::span<const scene::Cloth> cloths, SolveGroup& group, bool 
   std::uint32_t firstNode = 0;
   for (std::size_t i = 0; i < cloths.size(); firstNode += cloths[i++].nodeCount()) {
     const scene::Cloth& cloth = cloths[i];
-    const bool implicit = cloth.solver.kind == scene::SolverKind::implicitEuler;
-    if (followOf(cloth.solver.kind) != Follow::solve || implicit != group.implicit ||
-        (cloth.mesh != nullptr) != group.mesh || (cloth.nodeCount() > wholeNodes) != large)
+    if (cloth.solver.kind != group.kind || (cloth.mesh != nullptr) != group.mesh ||
+        (cloth.nodeCount() > wholeNodes) != large)
       continue;
     appendSystem(cloth, i, firstNode, tables);
+    group.bend = group.bend || group.kind == scene::SolverKind::implicitEuler || cloth.solver.bendConstraints;
     group.iterations = std::max(group.iterations, cloth.solver.iterations);
     if (large) continue;
     ++group.smallSystems;
@@ -103,9 +103,10 @@ SolveTables solveTables(std::span<const scene::Cloth> cloths, std::uint32_t whol
   for (const scene::Cloth& cloth : cloths) tables.nodes += cloth.nodeCount();
   tables.incidences.resize(tables.nodes, {{0, 0, 0, 0}});
   const auto count = [](const auto& table) { return static_cast<std::uint32_t>(table.size()); };
-  for (const bool implicit : {false, true})
+  using enum scene::SolverKind;
+  for (const scene::SolverKind kind : {constraint, acad, implicitEuler})
     for (const bool mesh : {false, true}) {
-      SolveGroup group{.implicit = implicit, .mesh = mesh};
+      SolveGroup group{.kind = kind, .mesh = mesh};
       group.firstSystem = count(tables.systems);
       group.firstChunk = count(tables.chunks);
       group.firstSpring = count(tables.springs);

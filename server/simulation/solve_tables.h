@@ -14,8 +14,9 @@ namespace clothstream::simulation {
 // Systems that the same kernels solve, one after the other in the tables: first those that one workgroup
 // solves each, then the large ones.
 struct SolveGroup {
-  bool implicit = false;  // implicit Euler; else constraints, always or where they are stretched
+  scene::SolverKind kind = scene::SolverKind::constraint;
   bool mesh = false;
+  bool bend = false;  // some grid has bend springs in its system
   std::uint32_t firstSystem = 0, smallSystems = 0;
   std::uint32_t firstChunk = 0, firstLargeChunk = 0, endChunk = 0;
   std::uint32_t firstSpring = 0, endSpring = 0;  // of meshes

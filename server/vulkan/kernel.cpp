@@ -100,7 +100,7 @@ Bindings::~Bindings() = default;
 Bindings::Bindings(Bindings&&) noexcept = default;
 Bindings& Bindings::operator=(Bindings&&) noexcept = default;
 
-Bindings::Bindings(const Device& device, const Kernel& kernel, std::initializer_list<const Buffer*> buffers)
+Bindings::Bindings(const Device& device, const Kernel& kernel, std::span<const Buffer* const> buffers)
     : kernel_(&kernel), handles_(std::make_unique<Handles>()) {
   const std::span<const BindingKind> kinds = kernel.bindings();
   assert(buffers.size() == kinds.size());
@@ -111,7 +111,7 @@ Bindings::Bindings(const Device& device, const Kernel& kernel, std::initializer_
   std::vector<vk::DescriptorBufferInfo> infos(count);
   std::vector<vk::WriteDescriptorSet> writes;
   for (std::uint32_t i = 0; i < count; ++i) {
-    const Buffer& buffer = *buffers.begin()[i];
+    const Buffer& buffer = *buffers[i];
     if (buffer.bytes() > device.limits().maxStorageRange)
       throw std::runtime_error(
           fmt::format("kernel {}, binding {}: a buffer of {} bytes is more than the {} that kernels "

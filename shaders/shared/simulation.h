@@ -117,9 +117,11 @@ struct RungeKuttaPush {
 struct PreparePush {
   uint32_t nodes;  // of the scene
   uint32_t firstChunk;
-  uint32_t firstLargeChunk;  // of those whose systems are solved by several workgroups
+  uint32_t chunks;
+  uint32_t smallSystems;  // which one workgroup solves each
+  uint32_t firstLargeChunk;
   uint32_t largeChunks;
-  uint32_t firstGroup;  // where their number goes
+  uint32_t firstGroup;  // where the number of workgroups goes: of chunks, of small systems, of large chunks
   float substepSeconds;
   float substepRate;     // 1/s
   uint32_t firstSpring;  // of meshes
@@ -187,7 +189,7 @@ static_assert(sizeof(ClothRecord) == CLOTHSTREAM_CLOTH_TEXELS * sizeof(vec4) &&
 static_assert(sizeof(XpbdTile) == 16 && sizeof(ColourRecord) == 16 && sizeof(XpbdLinkRecord) == 16);
 static_assert(sizeof(XpbdPush) == 28 && sizeof(FinishPush) == 48);
 static_assert(sizeof(SystemRecord) == CLOTHSTREAM_SYSTEM_TEXELS * sizeof(vec4));
-static_assert(sizeof(SolveRecord) == 36 && sizeof(PreparePush) == 36 && sizeof(SolvePush) == 28 &&
+static_assert(sizeof(SolveRecord) == 36 && sizeof(PreparePush) == 44 && sizeof(SolvePush) == 28 &&
               sizeof(ApplyPush) == 48 && sizeof(RungeKuttaPush) == 48);
 static_assert(sizeof(TileRecord) == 16);
 static_assert(sizeof(AdvancePush) == 80 && offsetof(AdvancePush, windAir) == 16 &&

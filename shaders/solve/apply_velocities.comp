@@ -13,6 +13,10 @@ const int kStateBinding = 6;
 
 layout(binding = 3) uniform samplerBuffer vectors;
 
+layout(std430, binding = 9) readonly buffer Actives {
+  uint actives[];  // a chunk: kActive
+};
+
 layout(push_constant) uniform Push {
   ApplyPush push;
 };
@@ -20,6 +24,7 @@ layout(push_constant) uniform Push {
 void main() {
   vec4 part = texelFetch(chunks, int(push.firstChunk + gl_WorkGroupID.x));
   System system = systemAt(uint(part.x));
+  bool solved = (actives[system.firstChunk + uint(part.y)] & kActive) != 0;
   uint lane = self();
   do {
     Walk walk = walkAt(system, uint(part.y) * kLanes + lane);
@@ -27,7 +32,8 @@ void main() {
     do {
       if (k < walk.count) {
         uint node = walk.first + k * walk.step;
-        vec3 correction = texelFetch(vectors, int(kCorrections * push.nodes + node)).xyz;
+        vec4 fetched = texelFetch(vectors, int(kCorrections * push.nodes + node));
+        vec3 correction = solved ? fetched.xyz : vec3(0.0);
         precise vec3 position = positions[node].xyz + push.substepSeconds * correction;
         precise vec3 velocity = velocities[node].xyz + correction;
         endSubstep(node, position, velocity, positions[node].w, system.cloth, push.collision);

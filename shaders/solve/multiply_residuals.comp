@@ -7,7 +7,7 @@
 #include "shaders/solve/vectors.glsl"
 
 // Only the residual's norm, for the report.
-layout(constant_id = 3) const bool kMeasure = false;
+layout(constant_id = 5) const bool kMeasure = false;
 
 layout(std430, binding = 13) buffer Groups {
   uint groups[];  // three numbers an iteration: how many workgroups it takes

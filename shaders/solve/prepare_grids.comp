@@ -6,13 +6,13 @@
 
 #include "shaders/solve/weigh.glsl"
 
-layout(std430, binding = 9) writeonly buffer Along {
+layout(std430, binding = 10) writeonly buffer Along {
   vec4 along[];  // vectors.glsl
 };
-layout(std430, binding = 10) writeonly buffer Across {
+layout(std430, binding = 11) writeonly buffer Across {
   vec4 across[];
 };
-layout(std430, binding = 11) writeonly buffer Vectors {
+layout(std430, binding = 12) writeonly buffer Vectors {
   vec4 vectors[];
 };
 
@@ -37,8 +37,8 @@ Cloth clothOf(System system) {
   vec4 d = texelFetch(cloths, system.cloth + 3);
   return Cloth(system.firstNode, system.rows, system.columns, kindOf(spacing.x, k.x, d.x),
                kindOf(spacing.y, k.x, d.x), kindOf(spacing.z, k.y, d.y), kindOf(2.0 * spacing.x, k.z, d.z),
-               kindOf(2.0 * spacing.y, k.z, d.z), solver.w != 0.0, texelFetch(cloths, system.cloth + 6),
-               solver.x);
+               kindOf(2.0 * spacing.y, k.z, d.z), kBend && solver.w != 0.0,
+               texelFetch(cloths, system.cloth + 6), solver.x);
 }
 
 // A node beyond an edge lies on it.
@@ -109,16 +109,22 @@ void main() {
   System system = systemAt(uint(part.x));
   uint chunk = uint(part.y);
   Cloth cloth = clothOf(system);
+  // Of ACAD's chunks check_stretch.comp has said which.
+  bool wanted = !kAdaptive || (actives[system.firstChunk + chunk] & kPrepared) != 0;
+  uint end = wanted ? kLanes : 0;
   beginChunk();
   uint lane = self();
   do {
     Walk walk = walkAt(system, chunk * kLanes + lane);
     uint k = 0;
     do {
-      prepareNode(cloth, int(walk.row + k), int(walk.column), k < walk.count);
+      prepareNode(cloth, int(walk.row + k), int(walk.column), k < walk.count && lane < end);
       ++k;
     } while (k < kWalk);
     lane += width();
-  } while (lane < kLanes);
-  endChunk(system, chunk);
+  } while (lane < end);
+  if (!kAdaptive) {
+    keepActive(system, chunk);
+  }
+  keepActiveSprings(system);
 }

@@ -6,11 +6,11 @@
 
 #include "shaders/solve/weigh.glsl"
 
-layout(binding = 9) uniform samplerBuffer incidences;  // IncidenceRecord, a node
-layout(binding = 10) uniform samplerBuffer lists;      // SpringEndsRecord
-layout(binding = 11) uniform samplerBuffer rows;       // prepare_springs.comp
-layout(binding = 12) uniform samplerBuffer impulses;
-layout(std430, binding = 13) writeonly buffer Vectors {
+layout(binding = 10) uniform samplerBuffer incidences;  // IncidenceRecord, a node
+layout(binding = 11) uniform samplerBuffer lists;       // SpringEndsRecord
+layout(binding = 12) uniform samplerBuffer rows;        // prepare_springs.comp
+layout(binding = 13) uniform samplerBuffer impulses;
+layout(std430, binding = 14) writeonly buffer Vectors {
   vec4 vectors[];
 };
 
@@ -66,5 +66,6 @@ void main() {
     } while (k < kWalk);
     lane += width();
   } while (lane < kLanes);
-  endChunk(system, chunk);
+  keepActive(system, chunk);
+  keepActiveSprings(system);
 }

@@ -6,11 +6,11 @@
 
 #include "shaders/solve/weigh.glsl"
 
-layout(binding = 9) uniform samplerBuffer springs;  // LinkRecord
-layout(std430, binding = 10) writeonly buffer Rows {
+layout(binding = 10) uniform samplerBuffer springs;  // LinkRecord
+layout(std430, binding = 11) writeonly buffer Rows {
   vec4 rows[];
 };
-layout(std430, binding = 11) writeonly buffer Impulses {
+layout(std430, binding = 12) writeonly buffer Impulses {
   vec4 impulses[];
 };
 

@@ -23,6 +23,10 @@ layout(local_size_x_id = 0) in;
 // Whether springs pull as they will (implicit Euler) or hold their length.
 layout(constant_id = 1) const bool kImplicit = false;
 layout(constant_id = 2) const bool kMesh = false;
+// Whether bend springs of any grid are solved for.
+layout(constant_id = 3) const bool kBend = true;
+// Whether springs are constraints only where they would be stretched too far.
+layout(constant_id = 4) const bool kAdaptive = false;
 
 layout(binding = 0) uniform samplerBuffer cloths;   // ClothRecord
 layout(binding = 1) uniform samplerBuffer systems;  // SystemRecord
@@ -34,6 +38,9 @@ const uint kWalk = CLOTHSTREAM_SOLVE_WALK;
 // The vectors of a solve, which lie one after the other: residual r, w: the preconditioner, 0 for pinned
 // nodes; direction p; A p; A z, z the preconditioned residual; what is solved for.
 const uint kResiduals = 0, kDirections = 1, kImages = 2, kProducts = 3, kCorrections = 4;
+
+// Of a chunk: it has something to solve; what it had is to be cleared, or it has.
+const uint kActive = 1, kPrepared = 2;
 
 // A software device runs what a branch leaves out too, masked, and a loop that tests first once more than it
 // must. Loops over lanes and chunks therefore test last, with a bound of 0 where there is nothing to do;

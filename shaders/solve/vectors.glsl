@@ -29,7 +29,7 @@ layout(std430, binding = 11) coherent buffer Solves {
   SolveRecord solves[];
 };
 layout(std430, binding = 12) readonly buffer Actives {
-  uint actives[];  // a chunk: whether it has anything to solve
+  uint actives[];  // a chunk: kActive, kPrepared
 };
 
 layout(push_constant) uniform Push {
@@ -138,8 +138,11 @@ vec2 multiplyGrid(System system, Walk walk) {
   Weights above2Along = ALONG(row > 1, above2Index);
   Weights above2Across = ACROSS(row > 1, above2Index);
   vec3 aboveForce = pull(here, above, aboveAlong.near.y, aboveAcross.near.y);
-  vec3 above2Force = pull(here, pointAt(above2Index), above2Along.far.y, above2Across.far.y);
-  vec3 nextAbove2Force = pull(below, above, aboveAlong.far.y, aboveAcross.far.y);
+  vec3 above2Force, nextAbove2Force;
+  if (kBend) {
+    above2Force = pull(here, pointAt(above2Index), above2Along.far.y, above2Across.far.y);
+    nextAbove2Force = pull(below, above, aboveAlong.far.y, aboveAcross.far.y);
+  }
 
   precise vec2 sums = vec2(0.0);
   [[unroll]] for (uint k = 0; k < kWalk; ++k) {
@@ -152,11 +155,8 @@ vec2 multiplyGrid(System system, Walk walk) {
     Weights ownAcross = ACROSS(true, index);
     Weights ofLeft = ALONG(hasLeft, index - toLeft);
     Weights ofLeftAcross = ACROSS(hasLeft, index - toLeft);
-    float left2Along = ALONG(hasLeft2, index - toLeft2).far.x;
-    float left2Across = ACROSS(hasLeft2, index - toLeft2).far.x;
 
     vec3 belowForce = pull(here, below, own.near.y, ownAcross.near.y);
-    vec3 below2Force = pull(here, below2, own.far.y, ownAcross.far.y);
     precise vec3 sum = own.far.z * here.residual.xyz;
     sum = sum + pull(here, left, ofLeft.near.x, ofLeftAcross.near.x);
     sum = sum + pull(here, right, own.near.x, ownAcross.near.x);
@@ -166,17 +166,22 @@ vec2 multiplyGrid(System system, Walk walk) {
     sum = sum + pull(here, rightAbove, aboveAlong.near.w, aboveAcross.near.w);
     sum = sum + pull(here, leftBelow, ofLeft.near.w, ofLeftAcross.near.w);
     sum = sum + pull(here, rightBelow, own.near.z, ownAcross.near.z);
-    sum = sum + pull(here, pointAt(index - toLeft2), left2Along, left2Across);
-    sum = sum + pull(here, pointAt(index + toRight2), own.far.x, ownAcross.far.x);
-    sum = sum + above2Force;
-    sum = sum + below2Force;
+    if (kBend) {
+      float left2Along = ALONG(hasLeft2, index - toLeft2).far.x;
+      float left2Across = ACROSS(hasLeft2, index - toLeft2).far.x;
+      vec3 below2Force = pull(here, below2, own.far.y, ownAcross.far.y);
+      sum = sum + pull(here, pointAt(index - toLeft2), left2Along, left2Across);
+      sum = sum + pull(here, pointAt(index + toRight2), own.far.x, ownAcross.far.x);
+      sum = sum + above2Force;
+      sum = sum + below2Force;
+      above2Force = nextAbove2Force;
+      nextAbove2Force = -below2Force;
+    }
     if (row <= lastRow) {
       sums = sums + keepProduct(index, here, sum);
     }
 
     aboveForce = -belowForce;
-    above2Force = nextAbove2Force;
-    nextAbove2Force = -below2Force;
     leftAbove = left;
     rightAbove = right;
     left = leftBelow;
@@ -228,7 +233,7 @@ vec2 multiplyMesh(System system, Walk walk) {
 }
 
 uint lanesOf(System system, uint chunk) {
-  return actives[system.firstChunk + chunk] == 0 ? 0 : kLanes;
+  return (actives[system.firstChunk + chunk] & kActive) == 0 ? 0 : kLanes;
 }
 
 void keepSums(System system, uint chunk) {
@@ -279,7 +284,7 @@ void takeSums(System system, bool norm) {
   for (uint lane = self(); lane < kLanes; lane += width()) {
     precise vec2 sum = vec2(0.0);
     for (uint chunk = system.firstChunk + lane; chunk < system.firstChunk + system.chunks; chunk += kLanes) {
-      sum = sum + (actives[chunk] == 0 ? vec2(0.0) : chunkSums[chunk]);
+      sum = sum + ((actives[chunk] & kActive) == 0 ? vec2(0.0) : chunkSums[chunk]);
     }
     lanes[lane] = sum;
   }

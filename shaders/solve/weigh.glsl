@@ -20,13 +20,14 @@
 layout(binding = 3) uniform samplerBuffer positions;   // at the substep's start; w: inverse mass
 layout(binding = 4) uniform samplerBuffer velocities;  // then
 layout(binding = 5) uniform samplerBuffer freeVelocities;
-layout(std430, binding = 6) buffer Solves {
+layout(binding = 6) uniform samplerBuffer freePositions;
+layout(std430, binding = 7) buffer Solves {
   SolveRecord solves[];
 };
-layout(std430, binding = 7) buffer Actives {
-  uint actives[];  // a chunk
+layout(std430, binding = 8) buffer Actives {
+  uint actives[];  // a chunk: kActive, kPrepared
 };
-layout(std430, binding = 8) buffer Groups {
+layout(std430, binding = 9) buffer Groups {
   uint groups[];  // three numbers an iteration: how many workgroups it takes
 };
 
@@ -34,17 +35,24 @@ layout(push_constant) uniform Push {
   PreparePush push;
 };
 
+bool isTooLong(vec3 a, vec3 b, float longest) {
+  precise vec3 d = b - a;
+  return dotProduct(d, d) > longest * longest;
+}
+
 struct End {
   vec3 place;
   float inverseMass;
   vec3 velocity;
   vec3 freeVelocity;
+  vec3 freePlace;
 };
 
 End endAt(uint node) {
   vec4 position = texelFetch(positions, int(node));
   return End(position.xyz, position.w, kImplicit ? texelFetch(velocities, int(node)).xyz : vec3(0.0),
-             texelFetch(freeVelocities, int(node)).xyz);
+             texelFetch(freeVelocities, int(node)).xyz,
+             kAdaptive ? texelFetch(freePositions, int(node)).xyz : vec3(0.0));
 }
 
 struct Kind {
@@ -78,13 +86,12 @@ Weight weigh(End here, End other, Kind kind, vec4 limits, bool exists) {
                   exists ? trace : 0.0);
   }
   precise vec3 relative = other.freeVelocity - here.freeVelocity;
-  precise vec3 freeEnds = d + push.substepSeconds * relative;
   precise float longest = kind.restLength + limits.x * kind.restLength;
   // Between two pinned nodes nothing can move.
-  bool moves = here.inverseMass + other.inverseMass > 0.0;
-  bool isActive = exists && moves && (limits.z == 0.0 || dotProduct(freeEnds, freeEnds) > longest * longest);
+  bool isActive = exists && here.inverseMass + other.inverseMass > 0.0 &&
+                  (!kAdaptive || isTooLong(here.freePlace, other.freePlace, longest));
   precise float excess = squared * inverseLength - longest;
-  precise float takenBack = excess > 0.0 || limits.z == 0.0 ? limits.y * excess : excess;
+  precise float takenBack = excess > 0.0 || !kAdaptive ? limits.y * excess : excess;
   precise float side = push.substepRate * takenBack + inverseLength * dotProduct(d, relative);
   precise vec3 impulse = (side * inverseLength) * d;
   return Weight(isActive ? inverseSquared : 0.0, 0.0, isActive ? impulse : vec3(0.0), 0.0);
@@ -123,17 +130,28 @@ void beginChunk() {
   barrier();
 }
 
-// Which springs a chunk's nodes found active, and whether it has anything to solve.
-void endChunk(System system, uint chunk) {
+// Whether a chunk has anything to solve, by all of its nodes; and how many workgroups there are then of the
+// group's chunks, of its small systems, of the large ones' first iteration.
+void keepActive(System system, uint chunk) {
   barrier();
   if (self() == 0) {
-    actives[system.firstChunk + chunk] = touched;
-    if (activeSprings > 0) {
-      atomicAdd(solves[system.number].constraints, activeSprings);
+    uint place = system.firstChunk + chunk;
+    bool before = kAdaptive && (actives[place] & kActive) != 0;
+    actives[place] = (touched != 0 ? kActive | kPrepared : 0) | (before ? kPrepared : 0);
+    if (touched != 0 || before) {
+      atomicMax(groups[push.firstGroup], push.chunks);
     }
-    if (touched != 0 && system.firstChunk + chunk >= push.firstLargeChunk) {
-      atomicMax(groups[push.firstGroup], push.largeChunks);
+    if (touched != 0) {
+      bool large = place >= push.firstLargeChunk;
+      atomicMax(groups[push.firstGroup + (large ? 6 : 3)], large ? push.largeChunks : push.smallSystems);
     }
+  }
+}
+
+void keepActiveSprings(System system) {
+  barrier();
+  if (self() == 0 && activeSprings > 0) {
+    atomicAdd(solves[system.number].constraints, activeSprings);
   }
 }
 
