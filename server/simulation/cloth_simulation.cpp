@@ -16,13 +16,12 @@
 #include "kernels/hash_state.h"
 #include "server/simulation/advance_variant.h"
 #include "server/simulation/collision/collision_stage.h"
-#include "server/simulation/constraint_stage.h"
 #include "server/simulation/hold/hold_stage.h"
-#include "server/simulation/implicit_stage.h"
 #include "server/simulation/mesh_stage.h"
 #include "server/simulation/report_stage.h"
 #include "server/simulation/runge_kutta_stage.h"
 #include "server/simulation/self_collision/self_collision_stage.h"
+#include "server/simulation/solve_stage.h"
 #include "server/simulation/stage.h"
 #include "server/simulation/xpbd_stage.h"
 #include "server/vulkan/kernel.h"
@@ -125,7 +124,7 @@ std::vector<scene::Solver> solversOf(std::span<const scene::Cloth> cloths) {
 // Whether they make the same tables; how systems are solved may differ.
 bool sameTables(const scene::Solver& a, const scene::Solver& b) {
   return a.kind == b.kind && a.bendConstraints == b.bendConstraints &&
-         (a.kind != scene::SolverKind::xpbd || a.iterations == b.iterations);
+         (a.kind == scene::SolverKind::massSpring || a.iterations == b.iterations);
 }
 
 // Cloths collide at once where nothing follows.
@@ -209,7 +208,6 @@ struct ClothSimulation::Pipeline {
   std::vector<std::uint32_t> offsets;
   std::uint32_t nodes;
   std::vector<shared::ClothRecord> records;
-  SolveIterations iterations;
   std::vector<float> masses;  // inverse
   Cut cut;
   Buffers buffers;
@@ -218,8 +216,7 @@ struct ClothSimulation::Pipeline {
   Stage normals, hash;
   std::unique_ptr<MeshStage> meshes;            // where there are any
   std::unique_ptr<RungeKuttaStage> rungeKutta;  // where that is the integrator
-  ConstraintStage constraints;
-  ImplicitStage implicit;
+  SolveStage solves;
   std::unique_ptr<XpbdStage> xpbd;                    // where a cloth's solver is that
   std::unique_ptr<SelfCollisionStage> selfCollision;  // where a cloth has it
   std::vector<scene::Solver> solvers;                 // of the cloths, as the tables have them
@@ -247,7 +244,6 @@ ClothSimulation::Pipeline::Pipeline(const vulkan::Device& on, const scene::Scene
       offsets(simulation::clothOffsets(scene.cloths)),
       nodes(offsets.back()),
       records(clothRecords(scene.cloths, substepSeconds)),
-      iterations(solveIterations(scene.cloths)),
       masses(inverseMasses(scene.cloths)),
       cut(cutScene(on, scene, options)),
       buffers(on, nodes, records.size(), cut.tiles.records.size()),
@@ -255,8 +251,7 @@ ClothSimulation::Pipeline::Pipeline(const vulkan::Device& on, const scene::Scene
                 {&buffers.velocities[0], &buffers.velocities[1]}),
       normals(makeNormals(on, buffers, cut)),
       hash(makeHash(on, buffers, cut)),
-      constraints(on, constraintTables(scene.cloths), stateOf(buffers, collision), options.workgroupSize),
-      implicit(on, implicitTables(scene.cloths), stateOf(buffers, collision), options.workgroupSize),
+      solves(on, scene.cloths, stateOf(buffers, collision), options.workgroupSize, options.solveWholeNodes),
       solvers(solversOf(scene.cloths)),
       stiffness(springStiffness(scene.cloths)),
       asked(options) {
@@ -327,11 +322,9 @@ void ClothSimulation::Pipeline::setSolvers(std::span<const scene::Cloth> cloths)
   std::vector<scene::Solver> wanted = solversOf(cloths);
   if (std::ranges::equal(wanted, solvers, sameTables)) return;
   // Whatever the device has no room for is found before anything changes.
-  constraints.makeTables(constraintTables(cloths));
-  implicit.makeTables(implicitTables(cloths));
+  solves.makeTables(cloths);
   makeXpbd(cloths);
-  constraints.takeTables();
-  implicit.takeTables();
+  solves.takeTables();
   cut.tiles = makeTiles(cloths, cut.rowsPerInvocation, cut.workgroupSize);
   std::ranges::copy(cut.tiles.records, buffers.tileUpload.mapped<shared::TileRecord>().begin());
   if (meshes) meshes->setTiles(meshTiles(cloths, cut.workgroupSize));
@@ -348,8 +341,7 @@ void ClothSimulation::Pipeline::start(vulkan::Recorder& recorder) {
   }
   recorder.copy(buffers.tileUpload, buffers.tiles, buffers.tiles.bytes());
   if (meshes) meshes->recordTables(recorder);
-  if (constraints.active()) constraints.recordTables(recorder);
-  if (implicit.active()) implicit.recordTables(recorder);
+  if (solves.active()) solves.recordTables(recorder);
   if (xpbd) xpbd->recordTables(recorder);
   if (selfCollision) selfCollision->recordTables(recorder);
   recorder.barrier();
@@ -422,13 +414,7 @@ void ClothSimulation::Pipeline::recordSubsteps(vulkan::Recorder& recorder, const
                       variantOf(records, inputs.environment.airDensity, collision.active(), follow), follow,
                       push);
     }
-    const shared::ConstraintPush solve{.collision = push.collision,
-                                       .count = 0,
-                                       .substepSeconds = static_cast<float>(substepSeconds),
-                                       .substepRate = tickRate * static_cast<float>(substeps),
-                                       .reserved = 0};
-    if (constraints.active()) constraints.record(recorder, present, iterations.constraints, solve);
-    if (implicit.active()) implicit.record(recorder, present, iterations.implicit, solve);
+    if (solves.active()) solves.record(recorder, present, push.collision, substepSeconds);
     if (xpbd)
       xpbd->record(recorder, present, xpbdVariantOf(records, collision.active()),
                    {.collision = push.collision,
@@ -449,8 +435,7 @@ void ClothSimulation::Pipeline::recordStatus(vulkan::Recorder& recorder) {
   recorder.barrier();
   recorder.copy(buffers.status, buffers.statusReadback, sizeof(shared::StatusRecord), 0,
                 slot * sizeof(shared::StatusRecord));
-  if (constraints.active()) constraints.recordReport(recorder);
-  if (implicit.active()) implicit.recordReport(recorder);
+  if (solves.active()) solves.recordReport(recorder);
   if (selfCollision) selfCollision->recordReport(recorder, slot);
   if (holds) holds->recordReport(recorder);
 }
@@ -471,7 +456,6 @@ void ClothSimulation::setCloths(std::span<const scene::Cloth> cloths) {
   pipeline_->setSolvers(cloths);
   pipeline_->stiffness = springStiffness(cloths);
   pipeline_->records = std::move(records);
-  pipeline_->iterations = solveIterations(cloths);
 }
 
 void ClothSimulation::recordTick(vulkan::Recorder& recorder, const TickInputs& inputs) {
@@ -513,18 +497,14 @@ std::vector<GripStatus> ClothSimulation::grips() const {
 std::vector<ClothReport> ClothSimulation::report() const {
   assert(pipeline_->report);
   std::vector<ClothReport> reports = pipeline_->report->collect();
-  const auto add = [&](const auto& stage) {
-    if (!stage.active()) return;
-    const std::span<const shared::SolveRecord> solves = stage.report();
-    for (std::size_t i = 0; i < solves.size(); ++i) {
-      ClothReport& report = reports[stage.cloths()[i]];
-      report.activeConstraints = solves[i].constraints;
-      report.iterations = solves[i].iterations;
-      report.residual = solves[i].residual;
-    }
-  };
-  add(pipeline_->constraints);
-  add(pipeline_->implicit);
+  if (!pipeline_->solves.active()) return reports;
+  const std::span<const shared::SolveRecord> solves = pipeline_->solves.report();
+  for (std::size_t i = 0; i < solves.size(); ++i) {
+    ClothReport& report = reports[pipeline_->solves.cloths()[i]];
+    report.activeConstraints = solves[i].constraints;
+    report.iterations = solves[i].iterations;
+    report.residual = solves[i].residual;
+  }
   return reports;
 }
 
@@ -590,8 +570,7 @@ void ClothSimulation::recordRestoreState(vulkan::Recorder& recorder, const State
 }
 
 std::span<const shared::SolveRecord> ClothSimulation::solves() const {
-  return pipeline_->constraints.active() ? pipeline_->constraints.report()
-                                         : std::span<const shared::SolveRecord>();
+  return pipeline_->solves.active() ? pipeline_->solves.report() : std::span<const shared::SolveRecord>();
 }
 
 std::uint32_t ClothSimulation::nodeCount() const {

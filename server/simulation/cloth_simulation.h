@@ -49,6 +49,8 @@ struct SimulationOptions {
   // Nodes of the largest cloth whose springs one workgroup corrects, where its solver is xpbd. Absent: the
   // measured best for the device.
   std::optional<std::uint32_t> xpbdWholeNodes = {};
+  // Nodes of the largest cloth whose linear system one workgroup solves. Absent: likewise.
+  std::optional<std::uint32_t> solveWholeNodes = {};
   // Another build of the kernel advance_mass_spring, for comparisons; empty: the one that belongs here.
   std::span<const std::uint32_t> advanceKernel = {};
 };
@@ -79,7 +81,8 @@ class ClothSimulation {
 
   // Of the last recorded tick, once it is complete.
   TickStatus status() const;
-  // Of its last substep: one a cloth with constraints, in their order.
+  // Of its last substep: one a cloth that a linear system is solved for; first constraints, then implicit
+  // Euler, each first of grids and first of small ones.
   std::span<const shared::SolveRecord> solves() const;
 
   // Of the last recorded tick's grips, once it is complete.

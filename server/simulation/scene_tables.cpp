@@ -24,11 +24,12 @@ shared::vec4 limitsOf(const scene::Solver& solver) {
   return {solver.activation, scene::takenBack(solver), 1, 0};
 }
 
-// Compliance over h^2, iterations and tolerance of conjugate gradients.
+// Compliance over h^2, iterations and tolerance of conjugate gradients; whether it has bend springs.
 shared::vec4 solverOf(const scene::Cloth& cloth, double substepSeconds) {
   if (followOf(cloth.solver.kind) != Follow::solve) return {0, 0, 0, 0};
+  const bool bend = cloth.solver.kind == scene::SolverKind::implicitEuler || cloth.solver.bendConstraints;
   return {static_cast<float>(scene::scaledCompliance(cloth, substepSeconds)),
-          static_cast<float>(cloth.solver.iterations), cloth.solver.tolerance * cloth.solver.tolerance, 0};
+          static_cast<float>(cloth.solver.iterations), cloth.solver.tolerance * cloth.solver.tolerance, bend ? 1.0f : 0.0f};
 }
 
 shared::vec4 xpbdSpringOf(const scene::Cloth& cloth, scene::SpringKind kind, double substepSeconds, float w) {
@@ -82,17 +83,6 @@ std::vector<shared::ClothRecord> clothRecords(std::span<const scene::Cloth> clot
     firstNode += cloth.nodeCount();
   }
   return records;
-}
-
-SolveIterations solveIterations(std::span<const scene::Cloth> cloths) {
-  SolveIterations most;
-  for (const scene::Cloth& cloth : cloths) {
-    if (followOf(cloth.solver.kind) != Follow::solve) continue;
-    std::uint32_t& of =
-        cloth.solver.kind == scene::SolverKind::implicitEuler ? most.implicit : most.constraints;
-    of = std::max(of, cloth.solver.iterations);
-  }
-  return most;
 }
 
 Tiles makeTiles(std::span<const scene::Cloth> cloths, std::uint32_t rowsPerInvocation,

@@ -18,12 +18,6 @@ std::vector<std::uint32_t> clothOffsets(std::span<const scene::Cloth> cloths);
 
 std::vector<shared::ClothRecord> clothRecords(std::span<const scene::Cloth> cloths, double substepSeconds);
 
-// The most iterations in a substep that a cloth asks for: of those with constraints, and of implicit ones.
-struct SolveIterations {
-  std::uint32_t constraints = 0, implicit = 0;
-};
-SolveIterations solveIterations(std::span<const scene::Cloth> cloths);
-
 struct TileRange {
   std::uint32_t first, count;
 };
@@ -31,7 +25,7 @@ struct TileRange {
 // What a cloth's forces are followed by in a substep.
 enum class Follow : std::uint8_t {
   nothing,      // they collide at once
-  solve,        // ConstraintStage, ImplicitStage
+  solve,        // SolveStage
   corrections,  // XpbdStage; of springs there are no forces
 };
 inline constexpr std::array kFollows{Follow::nothing, Follow::solve, Follow::corrections};

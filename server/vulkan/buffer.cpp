@@ -29,7 +29,7 @@ Traits traitsOf(BufferPurpose purpose) {
   const vk::MemoryPropertyFlags mapped = Property::eHostVisible | Property::eHostCoherent;
   switch (purpose) {
     case BufferPurpose::texels:
-      return {storage | Usage::eUniformTexelBuffer, {}, Property::eDeviceLocal};
+      return {storage | Usage::eUniformTexelBuffer | Usage::eStorageTexelBuffer, {}, Property::eDeviceLocal};
     case BufferPurpose::upload:
       return {storage, mapped, {}};
     case BufferPurpose::readback:

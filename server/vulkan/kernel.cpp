@@ -13,8 +13,15 @@ namespace clothstream::vulkan {
 namespace {
 
 constexpr vk::DescriptorType typeOf(BindingKind kind) {
-  return kind == BindingKind::texels ? vk::DescriptorType::eUniformTexelBuffer
-                                     : vk::DescriptorType::eStorageBuffer;
+  switch (kind) {
+    case BindingKind::texels:
+      return vk::DescriptorType::eUniformTexelBuffer;
+    case BindingKind::images:
+      return vk::DescriptorType::eStorageTexelBuffer;
+    case BindingKind::storage:
+      break;
+  }
+  return vk::DescriptorType::eStorageBuffer;
 }
 
 constexpr std::uint32_t kWord = sizeof(std::uint32_t);
@@ -93,7 +100,7 @@ Bindings::~Bindings() = default;
 Bindings::Bindings(Bindings&&) noexcept = default;
 Bindings& Bindings::operator=(Bindings&&) noexcept = default;
 
-Bindings::Bindings(const Device& device, const Kernel& kernel, std::initializer_list<const Buffer*> buffers)
+Bindings::Bindings(const Device& device, const Kernel& kernel, std::span<const Buffer* const> buffers)
     : kernel_(&kernel), handles_(std::make_unique<Handles>()) {
   const std::span<const BindingKind> kinds = kernel.bindings();
   assert(buffers.size() == kinds.size());
@@ -104,13 +111,13 @@ Bindings::Bindings(const Device& device, const Kernel& kernel, std::initializer_
   std::vector<vk::DescriptorBufferInfo> infos(count);
   std::vector<vk::WriteDescriptorSet> writes;
   for (std::uint32_t i = 0; i < count; ++i) {
-    const Buffer& buffer = *buffers.begin()[i];
+    const Buffer& buffer = *buffers[i];
     if (buffer.bytes() > device.limits().maxStorageRange)
       throw std::runtime_error(
           fmt::format("kernel {}, binding {}: a buffer of {} bytes is more than the {} that kernels "
                       "can bind on {}",
                       kernel.name(), i, buffer.bytes(), device.limits().maxStorageRange, device.info().name));
-    assert(kinds[i] != BindingKind::texels || *buffer.handles().texelView);
+    assert(kinds[i] == BindingKind::storage || *buffer.handles().texelView);
     infos[i] = vk::DescriptorBufferInfo{.buffer = *buffer.handles().buffer, .range = VK_WHOLE_SIZE};
     sizes.push_back({.type = typeOf(kinds[i]), .descriptorCount = 1});
     writes.push_back({.dstBinding = i,

@@ -14,7 +14,11 @@
 
 namespace clothstream::vulkan {
 
-enum class BindingKind : std::uint8_t { storage, texels };
+enum class BindingKind : std::uint8_t {
+  storage,
+  texels,  // read only
+  images,  // RGBA32F texels that the kernel also writes
+};
 
 struct KernelDescription {
   const char* name = "";                      // for errors, validation and timings
@@ -54,7 +58,9 @@ class Kernel {
 // One buffer for each of the kernel's bindings, in order. Kernel and buffers must outlive it.
 class Bindings {
  public:
-  Bindings(const Device& device, const Kernel& kernel, std::initializer_list<const Buffer*> buffers);
+  Bindings(const Device& device, const Kernel& kernel, std::span<const Buffer* const> buffers);
+  Bindings(const Device& device, const Kernel& kernel, std::initializer_list<const Buffer*> buffers)
+      : Bindings(device, kernel, std::span(buffers.begin(), buffers.size())) {}
   ~Bindings();
   Bindings(Bindings&&) noexcept;
   Bindings& operator=(Bindings&&) noexcept;

@@ -20,8 +20,8 @@ struct ClothRecord {
   vec4 stiffness;  // structural, shear, bend; friction
   vec4 damping;    // structural, shear, bend; thickness
   vec4 air;        // drag, lift; of self-collision: radius, friction
-  vec4 solver;     // compliance / h^2, iterations, square of the tolerance
-  vec4 limits;     // stretch that springs are held at; part of more that is taken back; 0: always
+  vec4 solver;  // compliance / h^2, iterations, square of the tolerance; whether bend springs are solved for
+  vec4 limits;  // stretch that springs are held at; part of more that is taken back; 0: always
   // Of xpbd: structural, shear, bend as scene::XpbdSpring; of their w the first is the number of iterations,
   // the second the inverse mass of a grid's nodes.
   vec4 springs[3];
@@ -33,21 +33,29 @@ struct TileRecord {
   vec4 start;  // cloth, row, column
 };
 
-// One cloth whose springs are constraints, one workgroup.
-#define CLOTHSTREAM_SYSTEM_TEXELS 2
+// Nodes that one invocation of a solve walks along, and walks in a chunk: the lanes of its sums.
+#define CLOTHSTREAM_SOLVE_WALK 4
+#define CLOTHSTREAM_SOLVE_LANES 64
+
+// One cloth that a linear system is solved for.
+#define CLOTHSTREAM_SYSTEM_TEXELS 3
 struct SystemRecord {
-  vec4 links;  // the first modulo 2^16, the first / 2^16, how many; the cloth
-  vec4 nodes;  // the first, how many
+  vec4 springs;  // of a mesh: the first modulo 2^16, the first / 2^16, how many; of all: the cloth
+  vec4 nodes;    // the first, how many; of a grid: rows, columns
+  vec4 chunks;   // the first, how many
 };
 
-// A constraint: its two nodes in the scene, its length.
-struct LinkRecord {
-  vec4 ends;  // a, b, rest length; the cloth
+// A workgroup of most of a solve's kernels.
+struct ChunkRecord {
+  vec4 part;  // system, which of its chunks
 };
 
-// A spring of an implicit cloth is a LinkRecord whose last number is the cloth times this, plus its kind in
-// the order of ClothRecord::stiffness.
+// A spring of a mesh: its two nodes in the scene, its length. Its last number is the cloth times
+// CLOTHSTREAM_SPRING_KINDS, plus its kind in the order of ClothRecord::stiffness.
 #define CLOTHSTREAM_SPRING_KINDS 3
+struct LinkRecord {
+  vec4 ends;  // a, b, rest length; cloth and kind
+};
 
 // Two of the springs that meet at a node: the number of a spring of the cloth plus one, negative where the
 // node is its second end, and the other end in the scene; 0 and the node itself fill the last texel.
@@ -55,22 +63,22 @@ struct SpringEndsRecord {
   vec4 two;  // number, other end; number, other end
 };
 
-// Which constraints meet at a node. The lists that it points to hold, four a texel, the number of a
-// constraint of the cloth plus one, negative where the node is its first end; 0 fills the last texel.
+// Which springs meet at a node of a mesh: SpringEndsRecords.
 struct IncidenceRecord {
-  vec4 list;  // the first texel modulo 2^16, the first / 2^16, how many texels; system + 1, 0: none
+  vec4 list;  // the first texel modulo 2^16, the first / 2^16, how many texels
 };
 
-// Partial sums of a dot product.
-#define CLOTHSTREAM_SOLVE_LANES 256
-
-// What a solve says of itself, and what it goes on from in its next dispatch.
+// What a solve says of itself, and what it goes on from.
 struct SolveRecord {
   uint32_t iterations;
-  float residual;  // its norm, relative to where it started
-  float start;     // square of the residual's norm then, and now
-  float square;
+  float residual;        // its norm, relative to where it started
   uint32_t constraints;  // active ones
+  uint32_t running;      // whether this iteration takes a step
+  float start;           // square of the residual's norm when it started, and in this iteration
+  float square;
+  float stepLength;  // of this iteration, and how much of the last direction is in this one's
+  float turn;
+  uint32_t arrived;  // chunks of this iteration
 };
 
 // A workgroup of a kernel that corrects springs.
@@ -98,14 +106,6 @@ struct AdvancePush {
   uint32_t reserved0, reserved1, reserved2;
 };
 
-struct ConstraintPush {
-  CollisionPush collision;
-  uint32_t count;  // links, or nodes
-  float substepSeconds;
-  float substepRate;  // 1/s
-  uint32_t reserved;
-};
-
 struct RungeKuttaPush {
   CollisionPush collision;
   uint32_t firstNode;
@@ -114,10 +114,36 @@ struct RungeKuttaPush {
   uint32_t reserved;
 };
 
+struct PreparePush {
+  uint32_t nodes;  // of the scene
+  uint32_t firstChunk;
+  uint32_t chunks;
+  uint32_t smallSystems;  // which one workgroup solves each
+  uint32_t firstLargeChunk;
+  uint32_t largeChunks;
+  uint32_t firstGroup;  // where the number of workgroups goes: of chunks, of small systems, of large chunks
+  float substepSeconds;
+  float substepRate;     // 1/s
+  uint32_t firstSpring;  // of meshes
+  uint32_t endSpring;
+};
+
 struct SolvePush {
-  uint32_t firstIteration;  // of this dispatch; 0 begins the solve
+  uint32_t nodes;           // of the scene
+  uint32_t firstSystem;     // where one workgroup solves a system
+  uint32_t firstIteration;  // of this dispatch
   uint32_t endIteration;
-  uint32_t firstSystem;
+  uint32_t firstChunk;  // where several do
+  uint32_t chunks;
+  uint32_t nextGroup;  // where their number goes if another iteration is to come
+};
+
+struct ApplyPush {
+  CollisionPush collision;
+  uint32_t nodes;  // of the scene
+  uint32_t firstChunk;
+  float substepSeconds;
+  uint32_t reserved;
 };
 
 struct XpbdPush {
@@ -163,7 +189,8 @@ static_assert(sizeof(ClothRecord) == CLOTHSTREAM_CLOTH_TEXELS * sizeof(vec4) &&
 static_assert(sizeof(XpbdTile) == 16 && sizeof(ColourRecord) == 16 && sizeof(XpbdLinkRecord) == 16);
 static_assert(sizeof(XpbdPush) == 28 && sizeof(FinishPush) == 48);
 static_assert(sizeof(SystemRecord) == CLOTHSTREAM_SYSTEM_TEXELS * sizeof(vec4));
-static_assert(sizeof(SolveRecord) == 20 && sizeof(ConstraintPush) == 48 && sizeof(RungeKuttaPush) == 48);
+static_assert(sizeof(SolveRecord) == 36 && sizeof(PreparePush) == 44 && sizeof(SolvePush) == 28 &&
+              sizeof(ApplyPush) == 48 && sizeof(RungeKuttaPush) == 48);
 static_assert(sizeof(TileRecord) == 16);
 static_assert(sizeof(AdvancePush) == 80 && offsetof(AdvancePush, windAir) == 16 &&
               offsetof(AdvancePush, collision) == 32 && offsetof(AdvancePush, firstTile) == 64);

@@ -23,6 +23,8 @@ constexpr std::array kSuites{
                  &bench::runPaper},
     bench::Suite{"solvers", "a hanging sheet by every solver: what a substep costs and what it stretches",
                  &bench::runSolvers},
+    bench::Suite{"enforcement", "constraint enforcement over all springs, by one workgroup and by several",
+                 &bench::runEnforcement},
     bench::Suite{"curtain", "the scene curtain, served to one client in this process: tick, pose to packet",
                  &bench::runCurtain},
     bench::Suite{"colliders", "a tick with 0, 1, 100 and 4,000 colliders, most of them far from the cloth",
@@ -48,7 +50,7 @@ int main(int argc, char** argv) {
   std::string name;
   bench::Settings settings;
   bool json = false;
-  std::uint32_t size = 0, softwareThreads = 0, xpbdWholeNodes = 0;
+  std::uint32_t size = 0, softwareThreads = 0, xpbdWholeNodes = 0, solveWholeNodes = 0;
   app.add_option("suite", name, "Which suite to run:" + list)->required()->check(CLI::IsMember(suites));
   CLI::Option* sizeOption =
       app.add_option("--size", size, "Rows and columns of the grid, instead of a ladder")
@@ -62,9 +64,12 @@ int main(int argc, char** argv) {
   app.add_option("--workgroup", settings.workgroupSize, "Invocations in a workgroup (0: the default)");
   CLI::Option* wholeOption = app.add_option("--xpbd-whole", xpbdWholeNodes,
                                             "Nodes of the largest cloth that one workgroup sweeps (xpbd)");
+  CLI::Option* solveOption = app.add_option("--solve-whole", solveWholeNodes,
+                                            "Nodes of the largest cloth that one workgroup solves");
   CLI11_PARSE(app, argc, argv);
   if (*sizeOption) settings.size = size;
   if (*wholeOption) settings.xpbdWholeNodes = xpbdWholeNodes;
+  if (*solveOption) settings.solveWholeNodes = solveWholeNodes;
   if (*threadsOption) settings.device.softwareThreads = softwareThreads;
 
   try {

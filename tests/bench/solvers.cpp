@@ -83,7 +83,8 @@ Rows::value_type measure(vulkan::Device& device, const Settings& settings, const
   Simulated simulated(device, scene,
                       {.rowsPerInvocation = settings.rowsPerInvocation,
                        .workgroupSize = settings.workgroupSize,
-                       .xpbdWholeNodes = settings.xpbdWholeNodes});
+                       .xpbdWholeNodes = settings.xpbdWholeNodes,
+                       .solveWholeNodes = settings.solveWholeNodes});
   for (std::uint32_t tick = 0; tick < kTicks; ++tick) simulated.tick(inputs);
   const Samples strains = structuralStrains(scene.cloths.front(), simulated.state());
   if (!(strains.quantile(1) <= mostStrain(scene)))

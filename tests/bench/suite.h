@@ -20,6 +20,7 @@ struct Settings {
   std::uint32_t rowsPerInvocation = 0;  // 0: as the simulation chooses
   std::uint32_t workgroupSize = 0;
   std::optional<std::uint32_t> xpbdWholeNodes;  // likewise where it is absent
+  std::optional<std::uint32_t> solveWholeNodes;
 };
 
 // One JSON object a row; every row names its suite. A suite checks its results before it reports a time, and
@@ -35,6 +36,7 @@ struct Suite {
 Rows runMassSpring(vulkan::Device& device, const Settings& settings);
 Rows runPaper(vulkan::Device& device, const Settings& settings);
 Rows runSolvers(vulkan::Device& device, const Settings& settings);
+Rows runEnforcement(vulkan::Device& device, const Settings& settings);
 Rows runCurtain(vulkan::Device& device, const Settings& settings);
 Rows runColliders(vulkan::Device& device, const Settings& settings);
 Rows runSelfCollision(vulkan::Device& device, const Settings& settings);

@@ -48,21 +48,30 @@ double norm(const std::vector<scene::Vec3>& vectors) {
   return std::sqrt(sum);
 }
 
-// Off the reference by what the solve may leave. With e the error of lambda and rho = A e what is left of the
-// right-hand side, the moves M^-1 J^T e have m |moves|^2 <= e A e = rho A^-1 rho <= |rho|^2 / compliance; and
-// compliance is 0.01 / m: |moves| <= 10 |rho|. rho is the tolerance times |b|, and the rounding of m rows: of
-// two positions each (2 kRounding kExtent), and of their directions (1e-6 of a row's own size, of which there
-// are `iterations`).
-void expectLikeReference(scene::Scene scene, unsigned seed) {
+// Of a solve that is to be compared.
+constexpr float kTolerance = 1e-6f;
+constexpr std::uint32_t kIterations = 2000;
+
+// Off the reference by what the solve may leave, m. It solves A e = side with A = c M + J^T J and c M = 0.01
+// (times one), of a side J^T b. With rho = A e what is left, |e| <= 100 |rho|; |rho| is the tolerance times
+// |J^T b|, plus the rounding of rows, 1e-6 of it; |J^T b| <= 5 |b|, as |J^T J| is at most twice the springs
+// of a node, 24. b is as long as nodes were displaced, and rounded in two positions of each row (2 kRounding
+// kExtent), of which the solution makes at most |b| / (2 sqrt(0.01)).
+double errorOfSolve(double rows) {
+  const double side = std::sqrt(rows) * 0.007;  // two ends off by up to 2 mm an axis
+  return 100 * (double{kTolerance} + 1e-6) * 5 * side + 5 * std::sqrt(rows) * 2 * kRounding * kExtent;
+}
+
+void expectLikeReference(scene::Scene scene, unsigned seed, simulation::SimulationOptions options = {}) {
   scene.substeps = 1;
   scene.simulationRate = 720;
   for (scene::Cloth& cloth : scene.cloths) {
-    cloth.solver.iterations = 2000;
-    cloth.solver.tolerance = 1e-4f;
+    cloth.solver.iterations = kIterations;
+    cloth.solver.tolerance = kTolerance;
   }
   std::mt19937 random(seed);
   const NodeState start = randomState(scene, random, 0.002f, 0.5f);
-  Running running(scene);
+  Running running(scene, options);
   running.restore(start);
   EXPECT_TRUE(running.tick(inputsOf(scene)).healthy);
   reference::ReferenceSimulation reference(scene);
@@ -72,16 +81,14 @@ void expectLikeReference(scene::Scene scene, unsigned seed) {
   double rows = 0;
   for (const scene::Cloth& cloth : scene.cloths)
     rows += static_cast<double>(scene::springLinks(cloth).size());
-  const double side = std::sqrt(rows) * 0.007;  // two ends off by up to 2 mm an axis
-  const double left = (1e-4 + 1e-6) * side + std::sqrt(rows) * 2 * kRounding * kExtent;
-  const double tolerance = 10 * left;
+  const double tolerance = errorOfSolve(rows);
   const NodeState state = running.state();
   EXPECT_LT(largestDistance(state, reference), tolerance);
   EXPECT_LT(largestSpeedDifference(state, reference), 720 * tolerance);
   for (const shared::SolveRecord& solve : running.solves()) {
-    EXPECT_LE(solve.residual, 1e-4f) << solve.iterations;
+    EXPECT_LE(solve.residual, kTolerance) << solve.iterations;
     EXPECT_GT(solve.iterations, 1u);
-    EXPECT_LT(solve.iterations, 2000u);
+    EXPECT_LT(solve.iterations, kIterations);
   }
   // Without the solve it would be elsewhere: the comparison can fail.
   for (scene::Cloth& cloth : scene.cloths) cloth.solver.compliance = 1;
@@ -119,6 +126,30 @@ TEST_F(Constraints, ofMeshesMoveNodesAsTheReference) {
   disc.solver.kind = scene::SolverKind::constraint;
   disc.pinnedVertices = {0};
   expectLikeReference(sceneOf({constrained(6, 9), disc}), 7);
+}
+
+// Of cloths that several workgroups solve, some of them with empty lanes.
+TEST_F(Constraints, thatSeveralWorkgroupsSolveMoveNodesAsTheReference) {
+  scene::Cloth disc = discCloth(7);
+  disc.mass = 0.01f * static_cast<float>(disc.nodeCount());
+  disc.solver.kind = scene::SolverKind::constraint;
+  disc.pinnedVertices = {0};
+  expectLikeReference(sceneOf({constrained(21, 26, true), disc}), 9, {.solveWholeNodes = 0});
+}
+
+// [Va21]'s system, which is singular, and more equations than unknowns: in this form least squares, which
+// have a solution.
+TEST_F(Constraints, withoutComplianceConverge) {
+  scene::Scene scene = swing(20, 10, 200);
+  scene::Solver& solver = scene.cloths.front().solver;
+  solver.bendConstraints = true;
+  solver.compliance = 0;
+  solver.tolerance = 0.01f;
+  Running running(scene);
+  for (int tick = 0; tick < 40; ++tick) {
+    ASSERT_TRUE(running.tick(inputsOf(scene)).healthy) << tick;
+    ASSERT_LE(running.solves().front().residual, solver.tolerance) << tick;
+  }
 }
 
 TEST_F(Constraints, ofSeveralClothsAreSolvedApart) {
@@ -196,18 +227,6 @@ TEST_F(Constraints, leaveNothingInsideASphere) {
   EXPECT_LT(nearest, distance * 1.01);  // and it does touch it
 }
 
-TEST_F(Constraints, giveTheSameBitsWhateverTheWorkgroups) {
-  scene::Scene scene = swing(16, 6, 20);
-  std::vector<std::uint64_t> hashes;
-  for (const std::uint32_t workgroup : {8u, 16u, 64u, 128u}) {
-    Running running(scene, {.rowsPerInvocation = 0, .workgroupSize = workgroup});
-    simulation::TickStatus status;
-    for (int tick = 0; tick < 30; ++tick) status = running.tick(inputsOf(scene));
-    hashes.push_back(status.stateHash);
-  }
-  for (const std::uint64_t hash : hashes) EXPECT_EQ(hash, hashes.front());
-}
-
 TEST_F(Constraints, leaveAMassSpringClothBesideThemAsItIsAlone) {
   scene::Cloth free = calmCloth(9, 14);
   free.pins = {topRow(free)};
@@ -256,8 +275,8 @@ TEST_F(Adaptive, moveNodesAsTheReference) {
   scene::Scene scene = sceneOf({adaptive(9, 14)});
   scene.substeps = 1;
   scene.simulationRate = 720;
-  scene.cloths.front().solver.iterations = 2000;
-  scene.cloths.front().solver.tolerance = 1e-4f;
+  scene.cloths.front().solver.iterations = kIterations;
+  scene.cloths.front().solver.tolerance = kTolerance;
   std::mt19937 random(4);
   const NodeState start = randomState(scene, random, 0.0025f, 0.5f);
   Running running(scene);
@@ -271,9 +290,8 @@ TEST_F(Adaptive, moveNodesAsTheReference) {
   reference::ReferenceSimulation reference(scene);
   setState(reference, start);
   reference.tick(referenceInputs(inputsOf(scene)));
-  // As expectLikeReference() derives it; forces on top as in the kernels' tests, far below.
-  const double rows = solve.constraints, side = std::sqrt(rows) * 0.007;
-  const double tolerance = 10 * (1e-4 * side + std::sqrt(rows) * 2 * kRounding * kExtent);
+  // Forces on top as in the kernels' tests, far below.
+  const double tolerance = errorOfSolve(solve.constraints);
   EXPECT_LT(largestDistance(running.state(), reference), tolerance);
 }
 
@@ -338,22 +356,6 @@ TEST_F(Adaptive, keepEverySpringWithinItsBound) {
   Running loose(free);
   for (int tick = 0; tick < 144; ++tick) loose.tick(inputsOf(free));
   EXPECT_GT(strainOf(free, loose.state()).max, 0.3);
-}
-
-TEST_F(Adaptive, giveTheSameBitsWhateverTheWorkgroups) {
-  scene::Cloth cloth = adaptive(16, 15);
-  cloth.structural.stiffness = 60;
-  cloth.pins = {{.firstRow = 0, .lastRow = 0, .firstColumn = 0, .lastColumn = 14, .columnStep = 14}};
-  const scene::Scene scene = sceneOf({cloth});
-  std::vector<std::uint64_t> hashes;
-  for (const std::uint32_t workgroup : {8u, 32u, 128u}) {
-    Running running(scene, {.rowsPerInvocation = 0, .workgroupSize = workgroup});
-    simulation::TickStatus status;
-    for (int tick = 0; tick < 40; ++tick) status = running.tick(inputsOf(scene));
-    EXPECT_GT(running.solves().front().constraints, 0u);
-    hashes.push_back(status.stateHash);
-  }
-  for (const std::uint64_t hash : hashes) EXPECT_EQ(hash, hashes.front());
 }
 
 TEST(ConstraintSystem, conjugateGradientsReachTheDirectSolution) {

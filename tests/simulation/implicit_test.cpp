@@ -257,20 +257,6 @@ TEST_F(ImplicitEuler, staysCalmWhereTheSolveEndsEarly) {
   EXPECT_LT(hung.kineticEnergy(), 0.01 * 576 * 9.81 * 0.46);
 }
 
-TEST_F(ImplicitEuler, givesTheSameBitsWhateverTheWorkgroups) {
-  scene::Cloth cloth = stiffCloth(13, 17);
-  cloth.pins = {topRow(cloth)};
-  const scene::Scene scene = steps({cloth}, 72);
-  std::vector<std::uint64_t> hashes;
-  for (const std::uint32_t workgroup : {8u, 16u, 64u, 128u}) {
-    Running running(scene, {.rowsPerInvocation = 0, .workgroupSize = workgroup});
-    simulation::TickStatus status;
-    for (int tick = 0; tick < 30; ++tick) status = running.tick(inputsOf(scene));
-    hashes.push_back(status.stateHash);
-  }
-  for (const std::uint64_t hash : hashes) EXPECT_EQ(hash, hashes.front());
-}
-
 TEST_F(ImplicitEuler, livesBesideEveryOtherSolver) {
   scene::Cloth free = calmCloth(9, 14), held = calmCloth(7, 8), implicit = stiffCloth(8, 6);
   scene::Cloth disc = implicitCloth(discCloth(4));

@@ -1,0 +1,413 @@
+// SPDX-License-Identifier: MIT
+// Linear systems on the device.
+#include "server/simulation/solve_stage.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <vector>
+
+#include "kernels/apply_velocities.h"
+#include "kernels/check_stretch.h"
+#include "kernels/multiply_residuals.h"
+#include "kernels/prepare_grids.h"
+#include "kernels/prepare_meshes.h"
+#include "kernels/prepare_springs.h"
+#include "kernels/solve_velocities.h"
+#include "kernels/update_corrections.h"
+#include "server/simulation/device_table.h"
+
+namespace clothstream::simulation {
+namespace {
+
+using vulkan::BindingKind;
+using vulkan::Bindings;
+using vulkan::Buffer;
+using vulkan::BufferPurpose;
+using vulkan::Kernel;
+
+constexpr auto kTexels = BindingKind::texels;
+constexpr auto kImages = BindingKind::images;
+constexpr auto kStorage = BindingKind::storage;
+constexpr std::uint32_t kLanes = CLOTHSTREAM_SOLVE_LANES;
+constexpr std::uint32_t kVectors = 5;  // shaders/solve/system.glsl
+// Sizes of dispatches, x, y, z each: of a group's chunks, of its small systems, of the large ones'
+// iterations.
+constexpr std::uint32_t kSize = 3, kSmallSystems = kSize, kIteration = 2 * kSize;
+
+std::uint32_t sizesOf(const SolveGroup& group) {
+  return kIteration + kSize * (group.iterations + 1);
+}
+
+bool isAdaptive(const SolveGroup& group) {
+  return group.kind == scene::SolverKind::acad;
+}
+
+bool isImplicit(const SolveGroup& group) {
+  return group.kind == scene::SolverKind::implicitEuler;
+}
+
+// A workgroup is a chunk, or solves a system chunk by chunk, with barriers between its passes: on a software
+// device these cost nothing as long as it is no wider than the CPU's vectors, for it then runs without
+// switching between invocations. Loops over the lanes count on a divisor of their number.
+std::uint32_t solveWorkgroup(const vulkan::Device& device, std::uint32_t wanted) {
+  if (wanted == 0) wanted = device.isSoftware() ? 8 : kLanes;
+  return std::bit_floor(std::min({wanted, kLanes, device.limits().maxWorkgroupInvocations}));
+}
+
+// lavapipe lets an invocation make 65,535 rounds of loops, all loops together, and then ends each after one.
+std::uint32_t iterationsPerDispatch(const vulkan::Device& device, const SolveGroup& group,
+                                    std::uint32_t listed, std::uint32_t workgroup) {
+  if (!device.isSoftware()) return ~0u;
+  const std::uint32_t tree = 2 * kLanes / workgroup + 16;
+  const std::uint32_t walks = kLanes / workgroup;
+  const std::uint32_t walk = group.mesh ? CLOTHSTREAM_SOLVE_WALK * (listed + 2) + 2 : 1;
+  const std::uint32_t chunk = walks * (walk + 2) + tree;
+  const std::uint32_t iteration = group.smallChunks * (chunk + 2) + tree + group.smallChunks;
+  return std::max(1u, (65'535 - 2 * iteration) / iteration);
+}
+
+}  // namespace
+
+// All kernels of a group but those that it does not need: systems that one workgroup solves, or several.
+struct GroupKernels {
+  std::unique_ptr<Kernel> check, springs, prepare, whole, multiply, measure, update;
+};
+
+struct SolveStage::Kernels {
+  Kernels(const vulkan::Device& on, std::uint32_t size) : device(on), workgroup(size) {}
+
+  std::unique_ptr<Kernel> make(const char* name, std::span<const std::uint32_t> spirv,
+                               std::vector<BindingKind> bindings, std::size_t push, const SolveGroup& group,
+                               bool measure = false) const {
+    return std::make_unique<Kernel>(
+        device,
+        vulkan::KernelDescription{
+            .name = name,
+            .spirv = spirv,
+            .bindings = std::move(bindings),
+            .pushConstantBytes = static_cast<std::uint32_t>(push),
+            .workgroupSize = workgroup,
+            .specialisation = {isImplicit(group) ? 1u : 0u, group.mesh ? 1u : 0u, group.bend ? 1u : 0u,
+                               isAdaptive(group) ? 1u : 0u, measure ? 1u : 0u}});
+  }
+
+  const GroupKernels& of(const SolveGroup& group) {
+    const std::size_t kind = isImplicit(group) ? 2 : (isAdaptive(group) ? 1 : 0);
+    GroupKernels& on = groups[(2 * kind + (group.mesh ? 1 : 0)) * 2 + (group.bend ? 1 : 0)];
+    // The same first ones of all that weigh springs.
+    const auto weighing = [](std::initializer_list<BindingKind> more) {
+      std::vector<BindingKind> bindings = {kTexels, kTexels, kTexels,  kTexels,  kTexels,
+                                           kTexels, kTexels, kStorage, kStorage, kStorage};
+      bindings.insert(bindings.end(), more);
+      return bindings;
+    };
+    const std::vector<BindingKind> vectors = {kTexels,  kTexels,  kTexels, kTexels, kTexels,
+                                              kTexels,  kTexels,  kTexels, kImages, kStorage,
+                                              kStorage, kStorage, kStorage};
+    std::vector<BindingKind> multiply = vectors;
+    multiply.push_back(kStorage);
+    if (!on.prepare && group.mesh) {
+      on.springs = make("prepare_springs", kernels::prepare_springs, weighing({kTexels, kStorage, kStorage}),
+                        sizeof(shared::PreparePush), group);
+      on.prepare =
+          make("prepare_meshes", kernels::prepare_meshes,
+               weighing({kTexels, kTexels, kTexels, kTexels, kStorage}), sizeof(shared::PreparePush), group);
+    } else if (!on.prepare) {
+      if (isAdaptive(group))
+        on.check =
+            make("check_stretch", kernels::check_stretch, weighing({}), sizeof(shared::PreparePush), group);
+      on.prepare = make("prepare_grids", kernels::prepare_grids, weighing({kStorage, kStorage, kStorage}),
+                        sizeof(shared::PreparePush), group);
+    }
+    if (!on.whole && group.smallSystems > 0)
+      on.whole =
+          make("solve_velocities", kernels::solve_velocities, vectors, sizeof(shared::SolvePush), group);
+    if (!on.multiply && group.hasLarge()) {
+      on.multiply =
+          make("multiply_residuals", kernels::multiply_residuals, multiply, sizeof(shared::SolvePush), group);
+      on.measure = make("multiply_residuals", kernels::multiply_residuals, multiply,
+                        sizeof(shared::SolvePush), group, true);
+      on.update =
+          make("update_corrections", kernels::update_corrections, vectors, sizeof(shared::SolvePush), group);
+    }
+    return on;
+  }
+
+  const Kernel& apply(const SolveGroup& group) {
+    std::unique_ptr<Kernel>& kernel = applies[group.mesh ? 1 : 0];
+    if (!kernel)
+      kernel =
+          make("apply_velocities", kernels::apply_velocities,
+               {kTexels, kTexels, kTexels, kTexels, kTexels, kTexels, kTexels, kStorage, kStorage, kStorage},
+               sizeof(shared::ApplyPush), group);
+    return *kernel;
+  }
+
+  const vulkan::Device& device;
+  std::uint32_t workgroup;
+  std::array<GroupKernels, 12> groups;
+  std::array<std::unique_ptr<Kernel>, 2> applies;
+};
+
+// All whose size follows from the cloths, and what binds it.
+struct SolveStage::Systems {
+  // Of a group, for when the state lies in the first of the two buffers and for when it lies in the second.
+  struct Group {
+    SolveGroup on;
+    std::uint32_t iterationsPerDispatch;
+    std::uint32_t firstSize;  // of its dispatches'
+    std::vector<Bindings> check{}, springs{}, prepare{}, whole{}, multiply{}, measure{}, update{}, apply{};
+  };
+
+  Systems(const vulkan::Device& device, const SolveTables& tables, const StateBuffers& state,
+          Kernels& kernels)
+      : nodes(tables.nodes),
+        workgroup(kernels.workgroup),
+        systems(device, tables.systems),
+        chunks(device, tables.chunks),
+        springs(device, tables.springs),
+        incidences(device, tables.incidences),
+        lists(device, tables.lists),
+        emptyGroups(device, BufferPurpose::upload, allSizes(tables) * sizeof(std::uint32_t)),
+        groupSizes(device, BufferPurpose::indirect, emptyGroups.bytes()),
+        along(device, BufferPurpose::texels, texels(2 * nodes, has(tables, [](auto& g) { return !g.mesh; }))),
+        across(device, BufferPurpose::texels,
+               texels(2 * nodes, has(tables, [](auto& g) { return !g.mesh && isImplicit(g); }))),
+        rows(device, BufferPurpose::texels, texels(tables.springs.size(), !tables.springs.empty())),
+        impulses(device, BufferPurpose::texels, rows.bytes()),
+        vectors(device, BufferPurpose::texels, texels(kVectors * std::size_t{nodes}, true)),
+        sums(device, BufferPurpose::state, tables.chunks.size() * 2 * sizeof(float)),
+        actives(device, BufferPurpose::state, tables.chunks.size() * sizeof(std::uint32_t)),
+        solves(device, BufferPurpose::state, tables.systems.size() * sizeof(shared::SolveRecord)),
+        solvesReadback(device, BufferPurpose::readback, solves.bytes()) {
+    const std::span<std::uint32_t> numbers = emptyGroups.mapped<std::uint32_t>();
+    for (std::size_t i = 0; i < numbers.size(); ++i) numbers[i] = i % kSize == 0 ? 0 : 1;
+    for (const shared::SystemRecord& system : tables.systems)
+      cloths.push_back(static_cast<std::uint32_t>(system.springs.w));
+    std::uint32_t size = 0;
+    for (const SolveGroup& on : tables.groups) {
+      groups.push_back(
+          {.on = on,
+           .iterationsPerDispatch = simulation::iterationsPerDispatch(device, on, tables.listed, workgroup),
+           .firstSize = size});
+      size += sizesOf(on);
+      for (const std::size_t from : {0, 1}) bind(device, kernels, state, from, groups.back());
+    }
+  }
+
+  static std::size_t allSizes(const SolveTables& tables) {
+    std::size_t sizes = 0;
+    for (const SolveGroup& group : tables.groups) sizes += sizesOf(group);
+    return sizes;
+  }
+  static bool has(const SolveTables& tables, auto what) { return std::ranges::any_of(tables.groups, what); }
+  // Bindings want a buffer even of nothing.
+  static std::size_t texels(std::size_t count, bool any) { return (any ? count : 1) * sizeof(shared::vec4); }
+
+  void bind(const vulkan::Device& device, Kernels& kernels, const StateBuffers& state, std::size_t from,
+            Group& group) {
+    const GroupKernels& with = kernels.of(group.on);
+    const Buffer &position = *state.positions[from], &freePosition = *state.positions[1 - from],
+                 &velocity = *state.velocities[from], &freeVelocity = *state.velocities[1 - from];
+    const auto bindTo = [&](std::vector<Bindings>& bindings, const std::unique_ptr<Kernel>& kernel,
+                            std::vector<const Buffer*> first, std::initializer_list<const Buffer*> more) {
+      first.insert(first.end(), more);
+      bindings.emplace_back(device, *kernel, first);
+    };
+    const std::vector<const Buffer*> weighing = {
+        &state.cloths, &systems.texels(), &chunks.texels(), &position, &velocity,
+        &freeVelocity, &freePosition,     &solves,          &actives,  &groupSizes};
+    if (with.check) bindTo(group.check, with.check, weighing, {});
+    if (group.on.mesh) {
+      bindTo(group.springs, with.springs, weighing, {&springs.texels(), &rows, &impulses});
+      bindTo(group.prepare, with.prepare, weighing,
+             {&incidences.texels(), &lists.texels(), &rows, &impulses, &vectors});
+    } else {
+      bindTo(group.prepare, with.prepare, weighing, {&along, &across, &vectors});
+    }
+    const std::vector<const Buffer*> iterating = {&state.cloths,
+                                                  &systems.texels(),
+                                                  &chunks.texels(),
+                                                  &position,
+                                                  &incidences.texels(),
+                                                  &lists.texels(),
+                                                  group.on.mesh ? &rows : &along,
+                                                  &across,
+                                                  &vectors,
+                                                  &vectors,
+                                                  &sums,
+                                                  &solves,
+                                                  &actives};
+    if (group.on.smallSystems > 0) bindTo(group.whole, with.whole, iterating, {});
+    if (group.on.hasLarge()) {
+      bindTo(group.multiply, with.multiply, iterating, {&groupSizes});
+      bindTo(group.measure, with.measure, iterating, {&groupSizes});
+      bindTo(group.update, with.update, iterating, {});
+    }
+    group.apply.emplace_back(
+        device, kernels.apply(group.on),
+        std::initializer_list<const Buffer*>{&state.cloths, &systems.texels(), &chunks.texels(), &vectors,
+                                             &state.colliders, &state.nearColliders, &position, &freePosition,
+                                             &freeVelocity, &actives});
+  }
+
+  void recordPrepare(vulkan::Recorder& recorder, const Group& group, std::uint32_t from, double h) const;
+  void recordSmall(vulkan::Recorder& recorder, const Group& group, std::uint32_t from) const;
+  void recordLarge(vulkan::Recorder& recorder, const Group& group, std::uint32_t from) const;
+
+  std::uint32_t nodes, workgroup;
+  std::vector<std::uint32_t> cloths;
+  DeviceTable systems, chunks, springs, incidences, lists;
+  Buffer emptyGroups, groupSizes;
+  Buffer along, across, rows, impulses, vectors, sums, actives, solves, solvesReadback;
+  std::vector<Group> groups;
+};
+
+SolveStage::SolveStage(const vulkan::Device& device, std::span<const scene::Cloth> cloths,
+                       const StateBuffers& state, std::uint32_t workgroupSize,
+                       std::optional<std::uint32_t> wholeNodes)
+    : device_(device),
+      state_(state),
+      workgroupSize_(solveWorkgroup(device, workgroupSize)),
+      wholeNodes_(wholeNodes.value_or(1024)),
+      kernels_(std::make_unique<Kernels>(device, workgroupSize_)) {
+  makeTables(cloths);
+  takeTables();
+}
+
+SolveStage::~SolveStage() = default;
+
+void SolveStage::makeTables(std::span<const scene::Cloth> cloths) {
+  nextSystems_.reset();
+  const SolveTables tables = solveTables(cloths, wholeNodes_);
+  if (!tables.systems.empty()) nextSystems_ = std::make_unique<Systems>(device_, tables, state_, *kernels_);
+}
+
+void SolveStage::takeTables() {
+  systems_ = std::move(nextSystems_);
+}
+
+void SolveStage::recordTables(vulkan::Recorder& recorder) const {
+  for (const DeviceTable* table :
+       {&systems_->systems, &systems_->chunks, &systems_->springs, &systems_->incidences, &systems_->lists})
+    table->recordUpload(recorder);
+  // What ACAD does not prepare has no weight.
+  for (const Buffer* buffer : {&systems_->along, &systems_->vectors, &systems_->actives})
+    recorder.fill(*buffer, 0, buffer->bytes());
+}
+
+void SolveStage::Systems::recordPrepare(vulkan::Recorder& recorder, const Group& group, std::uint32_t from,
+                                        double h) const {
+  const SolveGroup& on = group.on;
+  const shared::PreparePush push{.nodes = nodes,
+                                 .firstChunk = on.firstChunk,
+                                 .chunks = on.endChunk - on.firstChunk,
+                                 .smallSystems = on.smallSystems,
+                                 .firstLargeChunk = on.firstLargeChunk,
+                                 .largeChunks = on.endChunk - on.firstLargeChunk,
+                                 .firstGroup = group.firstSize,
+                                 .substepSeconds = static_cast<float>(h),
+                                 .substepRate = static_cast<float>(1 / h),
+                                 .firstSpring = on.firstSpring,
+                                 .endSpring = on.endSpring};
+  const std::uint64_t all = std::uint64_t{push.chunks} * workgroup;
+  recorder.barrier();
+  if (on.mesh) {
+    recorder.dispatch(group.springs[from], push, on.endSpring - on.firstSpring);
+    recorder.barrier();
+  }
+  if (group.check.empty()) {
+    recorder.dispatch(group.prepare[from], push, all);
+    return;
+  }
+  recorder.dispatch(group.check[from], push, all);
+  recorder.barrier();
+  recorder.dispatchIndirect(group.prepare[from], push, groupSizes, group.firstSize * sizeof(std::uint32_t));
+}
+
+void SolveStage::Systems::recordSmall(vulkan::Recorder& recorder, const Group& group,
+                                      std::uint32_t from) const {
+  if (group.on.smallSystems == 0) return;
+  for (std::uint32_t first = 0; first < group.on.iterations;) {
+    const std::uint32_t end = first + std::min(group.iterationsPerDispatch, group.on.iterations - first);
+    recorder.barrier();
+    recorder.dispatchIndirect(group.whole[from],
+                              shared::SolvePush{.nodes = nodes,
+                                                .firstSystem = group.on.firstSystem,
+                                                .firstIteration = first,
+                                                .endIteration = end,
+                                                .firstChunk = 0,
+                                                .chunks = 0,
+                                                .nextGroup = 0},
+                              groupSizes, (group.firstSize + kSmallSystems) * sizeof(std::uint32_t));
+    first = end;
+  }
+}
+
+void SolveStage::Systems::recordLarge(vulkan::Recorder& recorder, const Group& group,
+                                      std::uint32_t from) const {
+  const SolveGroup& on = group.on;
+  if (!on.hasLarge()) return;
+  const auto number = [&](std::uint32_t iteration) {
+    return group.firstSize + kIteration + kSize * iteration;
+  };
+  shared::SolvePush push{.nodes = nodes,
+                         .firstSystem = 0,
+                         .firstIteration = 0,
+                         .endIteration = 0,
+                         .firstChunk = on.firstLargeChunk,
+                         .chunks = on.endChunk - on.firstLargeChunk,
+                         .nextGroup = 0};
+  for (std::uint32_t iteration = 0; iteration < on.iterations; ++iteration) {
+    const std::size_t size = number(iteration) * sizeof(std::uint32_t);
+    push.nextGroup = number(iteration + 1);
+    recorder.barrier();
+    recorder.dispatchIndirect(group.multiply[from], push, groupSizes, size);
+    recorder.barrier();
+    recorder.dispatchIndirect(group.update[from], push, groupSizes, size);
+  }
+  recorder.barrier();
+  recorder.dispatchIndirect(group.measure[from], push, groupSizes,
+                            number(on.iterations) * sizeof(std::uint32_t));
+}
+
+void SolveStage::record(vulkan::Recorder& recorder, std::uint32_t from,
+                        const shared::CollisionPush& collision, double substepSeconds) const {
+  const Systems& all = *systems_;
+  recorder.barrier();
+  recorder.copy(all.emptyGroups, all.groupSizes, all.groupSizes.bytes());
+  recorder.fill(all.solves, 0, all.solves.bytes());
+  for (const Systems::Group& group : all.groups) {
+    all.recordPrepare(recorder, group, from, substepSeconds);
+    all.recordSmall(recorder, group, from);
+    all.recordLarge(recorder, group, from);
+    const shared::ApplyPush push{.collision = collision,
+                                 .nodes = all.nodes,
+                                 .firstChunk = group.on.firstChunk,
+                                 .substepSeconds = static_cast<float>(substepSeconds),
+                                 .reserved = 0};
+    recorder.barrier();
+    // What ACAD leaves alone stays where it is, unless it may collide.
+    if (isAdaptive(group.on) && collision.colliderCount == 0)
+      recorder.dispatchIndirect(group.apply[from], push, all.groupSizes,
+                                group.firstSize * sizeof(std::uint32_t));
+    else
+      recorder.dispatch(group.apply[from], push,
+                        std::uint64_t{group.on.endChunk - group.on.firstChunk} * all.workgroup);
+  }
+}
+
+void SolveStage::recordReport(vulkan::Recorder& recorder) const {
+  recorder.copy(systems_->solves, systems_->solvesReadback, systems_->solves.bytes());
+}
+
+std::span<const shared::SolveRecord> SolveStage::report() const {
+  return systems_->solvesReadback.mapped<const shared::SolveRecord>();
+}
+
+std::span<const std::uint32_t> SolveStage::cloths() const {
+  return systems_->cloths;
+}
+
+}  // namespace clothstream::simulation

@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: MIT
+// The linear systems of a scene as the kernels read them.
+#include "server/simulation/solve_tables.h"
+
+#include <algorithm>
+
+#include "server/scene/springs.h"
+#include "server/simulation/halves.h"
+#include "server/simulation/scene_tables.h"
+
+namespace clothstream::simulation {
+namespace {
+
+std::vector<scene::SpringLink> springsOf(const scene::Cloth& cloth) {
+  std::vector<scene::SpringLink> links = scene::springLinks(cloth);
+  const std::vector<std::uint8_t> pinned = scene::pinnedNodes(cloth);
+  const bool all = cloth.solver.kind == scene::SolverKind::implicitEuler;
+  std::erase_if(links, [&](const scene::SpringLink& link) {
+    return (pinned[link.a] != 0 && pinned[link.b] != 0) ||
+           (!all && !scene::isConstraint(cloth.solver, link.kind));
+  });
+  return links;
+}
+
+// The springs that meet at a node of the cloth, two a record.
+void appendList(std::span<const std::uint32_t> springs, std::span<const scene::SpringLink> links,
+                std::uint32_t node, std::uint32_t firstNode, std::vector<shared::SpringEndsRecord>& lists) {
+  const auto self = static_cast<float>(firstNode + node);
+  for (std::size_t i = 0; i < springs.size(); ++i) {
+    const scene::SpringLink& link = links[springs[i]];
+    const bool isFirstEnd = link.a == node;
+    const float number = static_cast<float>(springs[i] + 1) * (isFirstEnd ? 1.0f : -1.0f);
+    const auto other = static_cast<float>(firstNode + (isFirstEnd ? link.b : link.a));
+    if (i % 2 == 0)
+      lists.push_back({{number, other, 0, self}});
+    else
+      lists.back().two.z = number, lists.back().two.w = other;
+  }
+}
+
+void appendMesh(const scene::Cloth& cloth, std::size_t number, std::uint32_t firstNode, SolveTables& tables) {
+  const std::vector<scene::SpringLink> links = springsOf(cloth);
+  for (const scene::SpringLink& link : links)
+    tables.springs.push_back(
+        {{static_cast<float>(firstNode + link.a), static_cast<float>(firstNode + link.b), link.restLength,
+          static_cast<float>(CLOTHSTREAM_SPRING_KINDS * number + static_cast<std::size_t>(link.kind))}});
+  const scene::SpringAdjacency adjacency = scene::springAdjacency(links, cloth.nodeCount());
+  for (std::uint32_t node = 0; node < cloth.nodeCount(); ++node) {
+    const std::size_t first = tables.lists.size();
+    appendList(adjacency.of(node), links, node, firstNode, tables.lists);
+    const auto listed = static_cast<std::uint32_t>(tables.lists.size() - first);
+    tables.incidences[firstNode + node] = {halves(first, static_cast<float>(listed), 0)};
+    tables.listed = std::max(tables.listed, listed);
+  }
+}
+
+std::uint32_t chunksOf(const scene::Cloth& cloth) {
+  constexpr std::uint32_t kWalk = CLOTHSTREAM_SOLVE_WALK, kLanes = CLOTHSTREAM_SOLVE_LANES;
+  const auto walks = [](std::uint32_t nodes) { return (nodes + kWalk - 1) / kWalk; };
+  const std::uint32_t all =
+      cloth.mesh ? walks(cloth.nodeCount()) : walks(cloth.grid.rows) * cloth.grid.columns;
+  return (all + kLanes - 1) / kLanes;
+}
+
+void appendSystem(const scene::Cloth& cloth, std::size_t number, std::uint32_t firstNode,
+                  SolveTables& tables) {
+  const std::size_t firstSpring = tables.springs.size();
+  if (cloth.mesh) appendMesh(cloth, number, firstNode, tables);
+  const std::uint32_t chunks = chunksOf(cloth);
+  const auto system = static_cast<float>(tables.systems.size());
+  tables.systems.push_back(
+      {.springs = halves(firstSpring, static_cast<float>(tables.springs.size() - firstSpring),
+                         static_cast<float>(number)),
+       .nodes = {static_cast<float>(firstNode), static_cast<float>(cloth.nodeCount()),
+                 static_cast<float>(cloth.grid.rows), static_cast<float>(cloth.grid.columns)},
+       .chunks = {static_cast<float>(tables.chunks.size()), static_cast<float>(chunks), 0, 0}});
+  for (std::uint32_t chunk = 0; chunk < chunks; ++chunk)
+    tables.chunks.push_back({{system, static_cast<float>(chunk), 0, 0}});
+}
+
+// All cloths of a group: the small ones or the large ones.
+void appendCloths(std::span<const scene::Cloth> cloths, SolveGroup& group, bool large,
+                  std::uint32_t wholeNodes, SolveTables& tables) {
+  std::uint32_t firstNode = 0;
+  for (std::size_t i = 0; i < cloths.size(); firstNode += cloths[i++].nodeCount()) {
+    const scene::Cloth& cloth = cloths[i];
+    if (cloth.solver.kind != group.kind || (cloth.mesh != nullptr) != group.mesh ||
+        (cloth.nodeCount() > wholeNodes) != large)
+      continue;
+    appendSystem(cloth, i, firstNode, tables);
+    group.bend = group.bend || group.kind == scene::SolverKind::implicitEuler || cloth.solver.bendConstraints;
+    group.iterations = std::max(group.iterations, cloth.solver.iterations);
+    if (large) continue;
+    ++group.smallSystems;
+    group.smallChunks = std::max(group.smallChunks, chunksOf(cloth));
+  }
+}
+
+}  // namespace
+
+SolveTables solveTables(std::span<const scene::Cloth> cloths, std::uint32_t wholeNodes) {
+  SolveTables tables;
+  for (const scene::Cloth& cloth : cloths) tables.nodes += cloth.nodeCount();
+  tables.incidences.resize(tables.nodes, {{0, 0, 0, 0}});
+  const auto count = [](const auto& table) { return static_cast<std::uint32_t>(table.size()); };
+  using enum scene::SolverKind;
+  for (const scene::SolverKind kind : {constraint, acad, implicitEuler})
+    for (const bool mesh : {false, true}) {
+      SolveGroup group{.kind = kind, .mesh = mesh};
+      group.firstSystem = count(tables.systems);
+      group.firstChunk = count(tables.chunks);
+      group.firstSpring = count(tables.springs);
+      appendCloths(cloths, group, false, wholeNodes, tables);
+      group.firstLargeChunk = count(tables.chunks);
+      appendCloths(cloths, group, true, wholeNodes, tables);
+      group.endChunk = count(tables.chunks);
+      group.endSpring = count(tables.springs);
+      if (group.firstSystem < tables.systems.size()) tables.groups.push_back(group);
+    }
+  return tables;
+}
+
+}  // namespace clothstream::simulation

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: MIT
+// The matrix times the preconditioned residuals, a chunk a workgroup, and the dot products of an iteration of
+// conjugate gradients. Whichever workgroup of a system ends last adds up the chunks' sums, in their order.
+#version 450
+#extension GL_GOOGLE_include_directive : require
+
+#include "shaders/solve/vectors.glsl"
+
+// Only the residual's norm, for the report.
+layout(constant_id = 5) const bool kMeasure = false;
+
+layout(std430, binding = 13) buffer Groups {
+  uint groups[];  // three numbers an iteration: how many workgroups it takes
+};
+
+shared bool last;
+
+void main() {
+  vec4 part = texelFetch(chunks, int(push.firstChunk + gl_WorkGroupID.x));
+  System system = systemAt(uint(part.x));
+  if (kMeasure) {
+    measureChunk(system, uint(part.y));
+  } else {
+    multiplyChunk(system, uint(part.y));
+  }
+  if (self() == 0) {
+    memoryBarrierBuffer();
+    last = atomicAdd(solves[system.number].arrived, 1) + 1 == system.chunks;
+  }
+  barrier();
+  if (last) {
+    memoryBarrierBuffer();
+    takeSums(system, kMeasure);
+    if (self() == 0 && !kMeasure && solves[system.number].running != 0) {
+      atomicMax(groups[push.nextGroup], push.chunks);
+    }
+  }
+}

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: MIT
+// A solve by conjugate gradients, one workgroup a cloth, as many iterations in a dispatch as the device lets
+// it. The same bits as by multiply_residuals.comp and update_corrections.comp in turn.
+#version 450
+#extension GL_GOOGLE_include_directive : require
+
+#include "shaders/solve/vectors.glsl"
+
+void main() {
+  System system = systemAt(push.firstSystem + gl_WorkGroupID.x);
+  uint iteration = push.firstIteration;
+  SolveRecord solve;
+  do {
+    uint chunk = 0;
+    do {
+      multiplyChunk(system, chunk);
+      ++chunk;
+    } while (chunk < system.chunks);
+    memoryBarrier();
+    barrier();
+    takeSums(system, false);
+    memoryBarrier();
+    barrier();
+    solve = solves[system.number];
+    uint end = solve.running == 0 ? 0 : system.chunks;
+    chunk = 0;
+    do {
+      updateChunk(system, chunk, solve);
+      ++chunk;
+    } while (chunk < end);
+    memoryBarrier();
+    barrier();
+    ++iteration;
+  } while (solve.running != 0 && iteration < push.endIteration);
+  uint chunk = 0;
+  do {
+    measureChunk(system, chunk);
+    ++chunk;
+  } while (chunk < system.chunks);
+  memoryBarrier();
+  barrier();
+  takeSums(system, true);
+}

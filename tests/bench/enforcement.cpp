@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: MIT
+// Suite enforcement: implicit constraint enforcement over all springs, ten substeps of twenty iterations, by
+// one workgroup and by several, beside the bytes that an iteration moves.
+#include <cmath>
+#include <memory>
+#include <stdexcept>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "server/scene/springs.h"
+#include "tests/bench/bytes_moved.h"
+#include "tests/bench/simulated.h"
+#include "tests/bench/strain.h"
+#include "tests/bench/suite.h"
+
+namespace clothstream::bench {
+namespace {
+
+constexpr std::uint32_t kSubsteps = 10, kIterations = 20;
+// A node's texels in an iteration: its position, its residual and two of weights are read and a product is
+// written; five vectors are read and four written. A copy reads one and writes one.
+constexpr double kTexelsMoved = 5 + 9, kTexelsOfACopy = 2;
+// What the sheet may be stretched by while it swings, and in the mean when it hangs; docs/simulation.md.
+constexpr double kMostStrain = 0.05, kMeanStrain = 0.001;
+
+// A square metre of 0.2 kg, hung by its upper edge.
+scene::Scene hungSheet(std::uint32_t size) {
+  scene::Cloth cloth;
+  cloth.name = "sheet";
+  cloth.grid = {.rows = size, .columns = size, .width = 1, .height = 1, .pose = {}};
+  cloth.mass = 0.2f;
+  cloth.damping = 1;
+  cloth.pins = {{.firstRow = 0, .lastRow = 0, .firstColumn = 0, .lastColumn = size - 1}};
+  cloth.solver.kind = scene::SolverKind::constraint;
+  cloth.solver.bendConstraints = true;
+  cloth.solver.iterations = kIterations;
+  cloth.solver.tolerance = 0;
+  scene::Scene scene;
+  scene.name = "enforcement";
+  scene.substeps = kSubsteps;
+  scene.cloths = {cloth};
+  return scene;
+}
+
+simulation::SimulationOptions optionsOf(const Settings& settings, bool whole) {
+  return {.rowsPerInvocation = settings.rowsPerInvocation,
+          .workgroupSize = settings.workgroupSize,
+          .solveWholeNodes = whole ? ~0u : 0u};
+}
+
+// One substep solved to the end against the reference. With A = c M + J^T J of what is solved, c M 0.01 of
+// it, and rho = A e what is left, nodes are off by |e| <= 100 |rho|; and |rho| is the tolerance times |J^T b|
+// <= 5 |b|, b being as long as nodes were displaced.
+void check(vulkan::Device& device, const Settings& settings, scene::Scene scene, bool whole) {
+  scene.substeps = 1;
+  scene.simulationRate = scene.streamRate = 720;
+  scene::Solver& solver = scene.cloths.front().solver;
+  solver.iterations = 2000;
+  solver.tolerance = 1e-5f;
+  const double links = static_cast<double>(scene::springLinks(scene.cloths.front()).size());
+  const double displaced = std::sqrt(links) * 0.4 * double{scene::spacing(scene.cloths.front().grid).column};
+  Simulated(device, scene, optionsOf(settings, whole))
+      .check({scene.environment, {}}, 500 * double{solver.tolerance} * displaced);
+}
+
+Rows measureSize(vulkan::Device& device, const Settings& settings, std::uint32_t size) {
+  const scene::Scene scene = hungSheet(size);
+  const scene::Cloth& cloth = scene.cloths.front();
+  const simulation::TickInputs inputs{scene.environment, {}};
+  // By turns, so that what disturbs the machine disturbs both alike.
+  std::vector<std::unique_ptr<Simulated>> both;
+  for (const bool whole : {true, false}) {
+    if (size <= 32) check(device, settings, scene, whole);
+    both.push_back(std::make_unique<Simulated>(device, scene, optionsOf(settings, whole)));
+    both.back()->tick(inputs);
+    both.back()->forgetTimes();
+  }
+  double spent = 0;
+  while (spent < 2 * settings.seconds || both.front()->wall().count() < 7) {
+    for (const std::unique_ptr<Simulated>& one : both) spent += secondsOf([&] { one->tick(inputs); });
+    if (both[0]->status().stateHash != both[1]->status().stateHash)
+      throw std::runtime_error("one workgroup and several do not give the same bits");
+  }
+  const double floor = secondsToCopyTexels(device, cloth.nodeCount()) * kTexelsMoved / kTexelsOfACopy;
+  Rows rows;
+  for (const std::unique_ptr<Simulated>& one : both) {
+    for (const shared::SolveRecord& solve : one->solves())
+      if (solve.iterations != kIterations)
+        throw std::runtime_error(fmt::format("a solve took {} iterations", solve.iterations));
+    const Samples strains = structuralStrains(cloth, one->state());
+    if (!(strains.quantile(1) <= kMostStrain && std::abs(strains.mean()) <= kMeanStrain))
+      throw std::runtime_error(
+          fmt::format("springs are stretched by {}, by {} in the mean", strains.quantile(1), strains.mean()));
+    constexpr double kRounds = kSubsteps * kIterations;
+    rows.push_back({{"suite", "enforcement"},
+                    {"nodes", cloth.nodeCount()},
+                    {"springs", scene::springLinks(cloth).size()},
+                    {"workgroups", one == both.front() ? "one" : "several"},
+                    {"framesPerSecond", 1 / one->wall().median()},
+                    {"framesPerSecondBest", 1 / one->wall().min()},
+                    {"usPerIteration", one->wall().median() / kRounds * 1e6},
+                    {"nsPerNodeIteration", one->wall().median() / kRounds / cloth.nodeCount() * 1e9},
+                    {"usToMoveItsBytes", floor * 1e6},
+                    {"strainMean", strains.mean()},
+                    {"strainMax", strains.quantile(1)},
+                    {"ticks", one->wall().count()},
+                    {"device", device.info().name}});
+  }
+  return rows;
+}
+
+}  // namespace
+
+Rows runEnforcement(vulkan::Device& device, const Settings& settings) {
+  Rows rows;
+  for (const std::uint32_t size :
+       settings.size ? std::vector{*settings.size} : std::vector{16u, 32u, 64u, 128u})
+    for (auto& row : measureSize(device, settings, size)) rows.push_back(std::move(row));
+  return rows;
+}
+
+}  // namespace clothstream::bench
