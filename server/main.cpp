@@ -18,6 +18,7 @@
 #include "server/messages/scene_message.h"
 #include "server/program_options.h"
 #include "server/rpc/rpc_door.h"
+#include "server/scene/material.h"
 #include "server/stream/scene_server.h"
 #include "server/telemetry/log.h"
 #include "server/vulkan/device.h"
@@ -65,6 +66,13 @@ std::string describe(const vulkan::DeviceInfo& device) {
 void listDevices() {
   for (const vulkan::DeviceInfo& device : vulkan::listDevices())
     fmt::print("{}  {}\n", device.index, describe(device));
+}
+
+void listMaterials() {
+  fmt::print("{:<12}{:>8}{:>10}{:>8}{:>10}  {}\n", "", "kg/m^2", "N/m", "shear", "uN m", "");
+  for (const scene::Material& material : scene::materials())
+    fmt::print("{:<12}{:>8}{:>10}{:>8}{:>10.3g}  {}\n", material.name, material.arealMass, material.tension,
+               material.shear, 1e6 * double{material.rigidity}, material.description);
 }
 
 scene::Scene loaded(messages::Result<scene::Scene> scene) {
@@ -210,6 +218,8 @@ int main(int argc, char** argv) {
     if (options.step) return runSteps(options, signals);
     if (options.listDevices)
       listDevices();
+    else if (options.listMaterials)
+      listMaterials();
     else
       serve(options, signals);
     return 0;

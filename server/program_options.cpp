@@ -100,6 +100,9 @@ std::variant<ProgramOptions, int> parseOptions(int argc, const char* const* argv
       ->capture_default_str()
       ->group(scenes);
 
+  app.add_flag("--list-materials", options.listMaterials, "Show what cloths may be made of, and exit")
+      ->group(scenes);
+
   const char* network = "Network";
   app.add_option("--host", options.host, "Address to listen on; 0.0.0.0 for every one this machine has")
       ->capture_default_str()

@@ -34,7 +34,7 @@ struct ProgramOptions {
   std::string device;
   std::optional<std::uint32_t> softwareThreads;
   std::filesystem::path cacheDirectory;  // empty: none
-  bool listDevices = false;
+  bool listDevices = false, listMaterials = false;
 
   std::string logLevel = "info";
   std::optional<std::chrono::duration<double>> stopAfter;

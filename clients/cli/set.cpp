@@ -14,6 +14,7 @@ namespace clothstream::cli {
 namespace {
 
 constexpr std::chrono::seconds kPatience{10};
+constexpr float kGustSeconds = 2;  // as scene.proto has it
 
 bool changesCloths(const SetOptions& options) {
   cs_cloth_settings none;
@@ -68,7 +69,8 @@ std::string noSuchCloth(const cs_client* client, const std::string& name) {
 }  // namespace
 
 bool changesAnything(const SetOptions& options) {
-  return changesCloths(options) || changesEnvironment(options);
+  return changesCloths(options) || changesEnvironment(options) || !options.gust.empty() ||
+         !options.material.empty();
 }
 
 ExitCode set(const SetOptions& options) {
@@ -81,11 +83,22 @@ ExitCode set(const SetOptions& options) {
                        [&](cs_client* client, std::uint32_t events) { answers.heard(client, events); });
   if (!joined) return complain(exitCodeOf(joined.error().kind), joined.error().text);
   int changes = 0;
-  std::string unknown;
-  (*joined)->visit([&](cs_client* client) {
+  std::string refusal;
+  const auto changeBy = [&](const auto& send) {
+    if (!refusal.empty()) return;
+    (*joined)->visit([&](cs_client* client) { send(client); });
+    if (refusal.empty()) refusal = answers.waitFor(changes);
+  };
+  // Settings are of the cloth as its material makes it: that is to hold before.
+  changeBy([&](cs_client* client) {
+    if (options.material.empty()) return;
+    cs_set_material(client, options.cloth.c_str(), options.material.c_str());
+    ++changes;
+  });
+  changeBy([&](cs_client* client) {
     if (changesCloths(options)) {
       if (cs_change_cloth(client, options.cloth.c_str(), &options.settings) == 0)
-        return void(unknown = noSuchCloth(client, options.cloth));
+        return void(refusal = noSuchCloth(client, options.cloth));
       ++changes;
     }
     if (changesEnvironment(options)) {
@@ -94,9 +107,11 @@ ExitCode set(const SetOptions& options) {
                          options.airDensity ? &*options.airDensity : nullptr);
       ++changes;
     }
+    if (!options.gust.empty()) {
+      cs_set_gust(client, options.gust[0], options.gust.size() > 1 ? options.gust[1] : kGustSeconds);
+      ++changes;
+    }
   });
-  if (!unknown.empty()) return complain(kRefused, unknown);
-  const std::string refusal = answers.waitFor(changes);
   if (const auto failure = (*joined)->ended(); failure && !refusal.empty())
     return complain(exitCodeOf(failure->kind), failure->text);
   if (!refusal.empty()) return complain(kRefused, refusal);

@@ -18,6 +18,8 @@ struct SetOptions {
   cs_cloth_settings settings;        // what is not given is as cs_keep_cloth_settings leaves it
   std::vector<float> gravity, wind;  // three numbers, or none
   std::optional<float> airDensity;
+  std::vector<float> gust;  // strength, and seconds; or none
+  std::string material;     // empty: as it is
 
   SetOptions() { cs_keep_cloth_settings(&settings); }
 };

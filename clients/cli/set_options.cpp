@@ -42,6 +42,11 @@ void addSetOptions(CLI::App& app, SetOptions& options) {
       ->group(solver);
 
   const char* material = "Material";
+  app.add_option(
+         "--material", options.material,
+         "Springs, damping, air, friction, mass and solver of a material by name; options beside it go "
+         "before it")
+      ->group(material);
   app.add_option("--damping", settings.damping, "Decay of velocities, 1/s")->group(material);
   app.add_option("--drag", settings.drag, "Of the air")->group(material);
   app.add_option("--lift", settings.lift, "Of the air")->group(material);
@@ -54,6 +59,10 @@ void addSetOptions(CLI::App& app, SetOptions& options) {
       ->expected(3)
       ->group(environment);
   app.add_option("--wind", options.wind, "X,Y,Z in m/s")->delimiter(',')->expected(3)->group(environment);
+  app.add_option("--gust", options.gust, "STRENGTH[,SECONDS]: m/s that the wind strays by, and how fast (2)")
+      ->delimiter(',')
+      ->expected(1, 2)
+      ->group(environment);
   app.add_option("--air-density", options.airDensity, "kg/m^3")->group(environment);
 }
 

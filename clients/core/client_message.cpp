@@ -161,6 +161,11 @@ void writeParameterChange(std::string& out, std::uint64_t requestId, const Param
     addVec3Value(parameters, 1, change.gravity);
     addVec3Value(parameters, 2, change.wind);
     if (change.airDensity) parameters.add_float(3, *change.airDensity);
+    if (change.gust) {
+      Writer gust(parameters, 40);
+      gust.add_float(1, change.gust->strength);
+      gust.add_float(2, change.gust->seconds);
+    }
     for (const ClothChange& clothChange : change.cloths) {
       Writer cloth(parameters, 4);
       cloth.add_string(1, clothChange.name);
@@ -173,6 +178,7 @@ void writeParameterChange(std::string& out, std::uint64_t requestId, const Param
       if (clothChange.friction) cloth.add_float(8, *clothChange.friction);
       if (clothChange.thickness) cloth.add_float(9, *clothChange.thickness);
       if (clothChange.solver) cloth.add_message(20, solverMessage(*clothChange.solver));
+      if (clothChange.material) cloth.add_string(40, *clothChange.material);
     }
   });
 }

@@ -289,6 +289,8 @@ int cs_get_environment(const cs_client* client, cs_environment* out) {
   copy(environment.gravity, out->gravity);
   copy(environment.wind, out->wind);
   out->air_density = environment.airDensity;
+  out->gust_strength = environment.gust.strength;
+  out->gust_seconds = environment.gust.seconds;
   return 1;
 }
 
@@ -346,6 +348,20 @@ int cs_get_cloth_report(const cs_client* client, uint32_t index, cs_cloth_report
           .device_ms = static_cast<float>(1000 * report.deviceSeconds),
           .tick = client->client.reportTick()};
   return 1;
+}
+
+uint32_t cs_material_count(const cs_client* client) {
+  return static_cast<std::uint32_t>(client->client.description().materials.size());
+}
+
+const char* cs_material(const cs_client* client, uint32_t index) {
+  const std::string* material = at(client->client.description().materials, index);
+  return material ? material->c_str() : "";
+}
+
+const char* cs_cloth_material(const cs_client* client, uint32_t cloth) {
+  const Cloth* found = at(client->client.description().cloths, cloth);
+  return found ? found->parameters.material.c_str() : "";
 }
 
 uint64_t cs_parameters_participant(const cs_client* client) {
@@ -426,6 +442,20 @@ void cs_set_environment(cs_client* client, const float* gravity3, const float* w
   change.gravity = vec3(gravity3);
   change.wind = vec3(wind3);
   change.airDensity = scalar(air_density);
+  client->client.change(change);
+}
+
+void cs_set_gust(cs_client* client, float strength, float seconds) {
+  ParameterChange change;
+  change.gust = Gust{strength, seconds};
+  client->client.change(change);
+}
+
+void cs_set_material(cs_client* client, const char* cloth, const char* material) {
+  ParameterChange change;
+  ClothChange& clothChange = change.cloths.emplace_back();
+  clothChange.name = cloth;
+  clothChange.material = material;
   client->client.change(change);
 }
 

@@ -63,9 +63,11 @@ typedef struct cs_statistics {
 
 /* As they stand now, everybody's changes included. */
 typedef struct cs_environment {
-  float gravity[3];  /* m/s^2 */
-  float wind[3];     /* m/s */
-  float air_density; /* kg/m^3 */
+  float gravity[3];    /* m/s^2 */
+  float wind[3];       /* m/s */
+  float air_density;   /* kg/m^3 */
+  float gust_strength; /* m/s that each component of the wind strays by at most; 0: none */
+  float gust_seconds;  /* from turn to turn */
 } cs_environment;
 
 typedef struct cs_cloth_parameters {
@@ -237,6 +239,11 @@ int cs_get_cloth_parameters(const cs_client* client, uint32_t index, cs_cloth_pa
 /* `out->version` is to be set. 0 as above, where the version is not known, and where no report came yet. */
 int cs_get_cloth_settings(const cs_client* client, uint32_t index, cs_cloth_settings* out);
 int cs_get_cloth_report(const cs_client* client, uint32_t index, cs_cloth_report* out);
+/* Names of the materials that cloths may be made of, as the server told with the description. What a cloth
+ * was made of last; "" where that is none. */
+uint32_t cs_material_count(const cs_client* client);
+const char* cs_material(const cs_client* client, uint32_t index);
+const char* cs_cloth_material(const cs_client* client, uint32_t cloth);
 /* Who made the newest change that CS_EVENT_PARAMETERS told of; 0: the server. */
 uint64_t cs_parameters_participant(const cs_client* client);
 
@@ -258,6 +265,7 @@ void cs_move_attachment(cs_client* client, const char* attachment, const float* 
 /* Parameters; NULL leaves one as it is. An empty cloth name means every cloth. */
 void cs_set_environment(cs_client* client, const float* gravity3, const float* wind3,
                         const float* air_density);
+void cs_set_gust(cs_client* client, float strength, float seconds);
 void cs_set_cloth(cs_client* client, const char* cloth, const float* structural2, const float* shear2,
                   const float* bend2, const float* damping); /* springs: {stiffness, damping} */
 /* Settings that change nothing, to begin a change from. */
@@ -266,6 +274,9 @@ void cs_keep_cloth_settings(cs_cloth_settings* out);
  * the defaults of scene.proto. Before the description nothing can be changed: 0, as for a version that is not
  * known and for a cloth that is not there. */
 int cs_change_cloth(cs_client* client, const char* cloth, const cs_cloth_settings* settings);
+/* The cloth, or with "" every one, becomes one of this material: springs, damping, drag, lift, friction, mass
+ * and solver. The server knows which there are: cs_material. */
+void cs_set_material(cs_client* client, const char* cloth, const char* material);
 void cs_set_collider(cs_client* client, const char* collider, const float* position3, const float* radius);
 
 /* Asks for the scenes; after CS_EVENT_SCENES cs_scene gives them. */

@@ -30,6 +30,7 @@ struct ClothMessage {
 };
 
 constexpr std::size_t kMaxSubmeshes = 65536;
+constexpr std::size_t kMaxMaterials = 1024;
 constexpr std::size_t kMaxSolvers = 32;  // kinds that are remembered of a cloth
 
 bool setText(std::string& target, Reader& reader) {
@@ -86,6 +87,8 @@ bool readEnvironment(Bytes message, Environment& environment) {
         return readVec3(reader.get_view(), environment.wind);
       case fixed32(3):
         return std::isfinite(environment.airDensity = reader.get_float());
+      case bytes(4):
+        return readGust(reader.get_view(), environment.gust);
       default:
         return skip(reader);
     }
@@ -116,6 +119,8 @@ bool readClothParameters(Bytes message, std::string& name, ClothParameters& para
         return std::isfinite(parameters.thickness = reader.get_float());
       case bytes(20):
         return readSolver(reader.get_view(), parameters.solver);
+      case bytes(40):
+        return setText(parameters.material, reader);
       default:
         return skip(reader);
     }
@@ -167,6 +172,9 @@ bool readParts(Bytes message, Description& description, std::vector<ClothMessage
                readCollider(reader.get_view(), description.colliders.emplace_back());
       case bytes(10):
         return definition = reader.get_view(), true;
+      case bytes(40):
+        return description.materials.size() < kMaxMaterials &&
+               setText(description.materials.emplace_back(), reader);
       default:
         return skip(reader);
     }
@@ -316,6 +324,7 @@ void apply(const ParameterChange& change, Description& description) {
   environment.gravity = change.gravity.value_or(environment.gravity);
   environment.wind = change.wind.value_or(environment.wind);
   environment.airDensity = change.airDensity.value_or(environment.airDensity);
+  environment.gust = change.gust.value_or(environment.gust);
   for (const ClothChange& clothChange : change.cloths) {
     for (Cloth& cloth : description.cloths) {
       if (!clothChange.name.empty() && clothChange.name != cloth.name) continue;
@@ -328,6 +337,7 @@ void apply(const ParameterChange& change, Description& description) {
       parameters.lift = clothChange.lift.value_or(parameters.lift);
       parameters.friction = clothChange.friction.value_or(parameters.friction);
       parameters.thickness = clothChange.thickness.value_or(parameters.thickness);
+      parameters.material = clothChange.material.value_or(parameters.material);
       if (!clothChange.solver) continue;
       parameters.solver = *clothChange.solver;
       if (parameters.solvers.size() < kMaxSolvers)

@@ -15,6 +15,7 @@
 namespace clothstream::client {
 
 struct ClothParameters {
+  std::string material;
   Spring structural{}, shear{}, bend{};
   float damping = 0, drag = 0, lift = 0;
   float friction = 0.3f, thickness = 0.005f;
@@ -41,6 +42,7 @@ struct Environment {
   Vec3 gravity{0, -9.81f, 0};
   Vec3 wind{};
   float airDensity = 1.2f;
+  Gust gust;
 };
 
 struct Description {
@@ -52,6 +54,7 @@ struct Description {
   std::vector<Collider> colliders;
   std::map<std::string, Hull> hulls;  // of the colliders that are hulls, by name
   Environment environment;
+  std::vector<std::string> materials;             // that the server has
   std::vector<float> restPositions, restNormals;  // 3 a vertex
   std::vector<std::uint32_t> triangles;           // 3 indices each
 

@@ -105,6 +105,8 @@ bool readClothChange(Bytes message, ClothChange& change) {
         return setFinite(change.thickness, reader);
       case bytes(20):
         return readSolver(reader.get_view(), change.solver.emplace());
+      case bytes(40):
+        return setText(change.material.emplace(), reader);
       default:
         return skip(reader);
     }
@@ -190,6 +192,8 @@ bool readParameterChange(Bytes message, ParameterChange& change) {
       case bytes(4):
         return change.cloths.size() < kMaxCloths &&
                readClothChange(reader.get_view(), change.cloths.emplace_back());
+      case bytes(40):
+        return readGust(reader.get_view(), change.gust.emplace());
       default:
         return skip(reader);
     }
@@ -430,6 +434,14 @@ bool readVec3(Bytes message, Vec3& out) {
 }
 
 // A kind that this client does not know keeps its number and its settings.
+bool readGust(Bytes message, Gust& out) {
+  out = {};
+  return readFields(message, [&](std::uint32_t field, Reader& reader) {
+    if (field == fixed32(1)) return setFinite(out.strength, reader);
+    return field == fixed32(2) ? setFinite(out.seconds, reader) : skip(reader);
+  });
+}
+
 bool readSolver(Bytes message, Solver& out) {
   out = {};
   return readFields(message, [&](std::uint32_t field, Reader& reader) {

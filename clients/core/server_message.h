@@ -108,16 +108,23 @@ struct Solver {
   std::string settings;  // the kind's own message as it came
 };
 
+struct Gust {
+  float strength = 0;  // m/s
+  float seconds = 2;
+};
+
 struct ClothChange {
   std::string name;
   std::optional<Spring> structural, shear, bend;
   std::optional<float> damping, drag, lift, friction, thickness;
   std::optional<Solver> solver;
+  std::optional<std::string> material = {};
 };
 
 struct ParameterChange {
   std::optional<Vec3> gravity, wind;
   std::optional<float> airDensity;
+  std::optional<Gust> gust;
   std::vector<ClothChange> cloths;
   std::uint64_t participantId = 0;  // who made it
 };
@@ -144,6 +151,7 @@ struct ParameterChange {
 
 [[nodiscard]] bool readVec3(Bytes message, Vec3& out);
 [[nodiscard]] bool readSpring(Bytes message, Spring& out);
+[[nodiscard]] bool readGust(Bytes message, Gust& out);
 [[nodiscard]] bool readSolver(Bytes message, Solver& out);
 // Reuses the memory of `out`.
 [[nodiscard]] bool readReport(Bytes message, SimulationReport& out);

@@ -95,6 +95,8 @@ v1::StreamDescription toDescription(const scene::Scene& scene, std::uint32_t epo
   *description.mutable_definition() = toMessage(scene);
   for (v1::Cloth& cloth : *description.mutable_definition()->mutable_cloths())
     if (cloth.has_mesh()) cloth.mutable_mesh()->Clear();
+  for (const scene::Material& material : scene::materials())
+    description.add_materials(std::string(material.name));
   return description;
 }
 

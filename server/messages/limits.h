@@ -41,6 +41,9 @@ inline constexpr Range kScale{1e-6, 1e6};         // m a unit
 inline constexpr Range kWeldDistance{0, 0.1};     // m
 inline constexpr Range kRegionLength{0, 1000};    // m
 inline constexpr Range kMass{1e-6, 1e6};          // kg
+inline constexpr Range kArealMass{1e-4, 1000};    // kg/m^2
+inline constexpr Range kGustStrength{0, 100};     // m/s
+inline constexpr Range kGustSeconds{0.01, 3600};  // s
 inline constexpr Range kStiffness{0, 1e6};        // N/m
 inline constexpr Range kSpringDamping{0, 1e4};    // N s/m
 inline constexpr Range kDamping{0, 1000};         // 1/s

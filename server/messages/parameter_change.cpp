@@ -31,6 +31,10 @@ scene::ClothChange toClothChange(Checks& checks, const Path& path, const v1::Clo
   if (message.has_thickness())
     change.thickness = checks.number(path / "thickness", message.thickness(), limits::kThickness);
   if (message.has_solver()) change.solver = toSolver(checks, path / "solver", message.solver());
+  if (message.has_material() && toMaterial(checks, path / "material", message.material()) != nullptr)
+    change.material = message.material();
+  if (message.has_areal_mass())
+    change.arealMass = checks.number(path / "arealMass", message.areal_mass(), limits::kArealMass);
   return change;
 }
 
@@ -39,12 +43,13 @@ void checkSolvers(Checks& checks, const Path& path, const scene::Scene& changed,
                   const scene::ParameterChange& change) {
   for (std::size_t i = 0; i < change.cloths.size(); ++i) {
     const scene::ClothChange& chosen = change.cloths[i];
-    if (!chosen.solver) continue;
+    if (!chosen.solver && !chosen.material) continue;
     for (const scene::Cloth& cloth : changed.cloths) {
       if (!chosen.name.empty() && chosen.name != cloth.name) continue;
       const Path element = path.at("cloths", static_cast<int>(i));
       if (const auto complaint = unfitSolver(changed, cloth))
-        checks.fail(element / "solver", "", fmt::format("\"{}\" {}", cloth.name, *complaint));
+        checks.fail(element / (chosen.solver ? "solver" : "material"), "",
+                    fmt::format("\"{}\" {}", cloth.name, *complaint));
     }
   }
 }
@@ -80,6 +85,7 @@ Result<scene::ParameterChange> toParameterChange(const v1::ParameterChange& mess
     change.wind = toVec3(checks, path / "wind" / "value", message.wind().value(), limits::kWind);
   if (message.has_air_density())
     change.airDensity = checks.number(path / "airDensity", message.air_density(), limits::kAirDensity);
+  if (message.has_gust()) change.gust = toGust(checks, path / "gust", message.gust());
   checks.count(path / "cloths", static_cast<std::size_t>(message.cloths_size()), 0, limits::kMaxCloths);
   checks.count(path / "colliders", static_cast<std::size_t>(message.colliders_size()), 0,
                limits::kMaxColliders);

@@ -13,6 +13,7 @@
 #include "server/messages/shapes.h"
 #include "server/messages/validation.h"
 #include "server/messages/vectors.h"
+#include "server/scene/material.h"
 #include "server/scene/mesh.h"
 #include "server/scene/springs.h"
 #include "server/scene/stability.h"
@@ -58,6 +59,7 @@ scene::Environment toEnvironment(Checks& checks, const Path& path, const v1::Env
   environment.wind = toVec3(checks, path / "wind", message.wind(), limits::kWind);
   if (message.has_air_density())
     environment.airDensity = checks.number(path / "airDensity", message.air_density(), limits::kAirDensity);
+  environment.gust = toGust(checks, path / "gust", message.gust());
   return environment;
 }
 
@@ -221,34 +223,45 @@ scene::Tethers toTethers(Checks& checks, const Path& path, const v1::Tethers& me
   return tethers;
 }
 
-float defaultMass(const scene::Cloth& cloth) {
-  if (cloth.mesh) return static_cast<float>(limits::kDefaultArealMass * cloth.mesh->area());
-  return limits::kDefaultArealMass * cloth.grid.width * cloth.grid.height;
+// kg; what the material says is there already.
+void readMass(Checks& checks, const Path& path, const v1::Cloth& message, scene::Cloth& cloth) {
+  if (message.has_mass() && message.has_areal_mass())
+    checks.fail(path / "arealMass", fmt::format("{}", message.areal_mass()),
+                "must be absent where \"mass\" is given: it says the same");
+  if (message.has_mass()) cloth.mass = checks.number(path / "mass", message.mass(), limits::kMass);
+  if (message.has_areal_mass())
+    cloth.mass = static_cast<float>(
+        double{checks.number(path / "arealMass", message.areal_mass(), limits::kArealMass)} *
+        scene::areaOf(cloth));
 }
 
 scene::Cloth toCloth(Checks& checks, const Path& path, const v1::Cloth& message, const MeshReader& readMesh) {
   scene::Cloth cloth;
   cloth.name = checks.name(path / "name", message.name());
   const std::vector<std::uint32_t> nodeOfVertex = toShape(checks, path, message, readMesh, cloth);
-  if (!checks.failed()) {
-    readPins(checks, path, message, nodeOfVertex, cloth);
-    readAttachments(checks, path, message, nodeOfVertex, cloth);
-  }
+  if (checks.failed()) return cloth;
+  readPins(checks, path, message, nodeOfVertex, cloth);
+  readAttachments(checks, path, message, nodeOfVertex, cloth);
   if (message.has_tethers() && !checks.failed())
     cloth.tethers = toTethers(checks, path / "tethers", message.tethers(), cloth);
-  cloth.mass =
-      message.has_mass() ? checks.number(path / "mass", message.mass(), limits::kMass) : defaultMass(cloth);
-  cloth.structural = toSpring(checks, path / "structural", message.structural());
-  cloth.shear = toSpring(checks, path / "shear", message.shear());
-  cloth.bend = toSpring(checks, path / "bend", message.bend());
-  cloth.damping = checks.number(path / "damping", message.damping(), limits::kDamping);
-  cloth.drag = checks.number(path / "drag", message.drag(), limits::kAirCoefficient);
-  cloth.lift = checks.number(path / "lift", message.lift(), limits::kAirCoefficient);
+  cloth.mass = static_cast<float>(double{limits::kDefaultArealMass} * scene::areaOf(cloth));
+  if (!message.material().empty())
+    if (const scene::Material* material = toMaterial(checks, path / "material", message.material()))
+      scene::makeOf(*material, cloth);
+  readMass(checks, path, message, cloth);
+  if (message.has_structural())
+    cloth.structural = toSpring(checks, path / "structural", message.structural());
+  if (message.has_shear()) cloth.shear = toSpring(checks, path / "shear", message.shear());
+  if (message.has_bend()) cloth.bend = toSpring(checks, path / "bend", message.bend());
+  if (message.has_damping())
+    cloth.damping = checks.number(path / "damping", message.damping(), limits::kDamping);
+  if (message.has_drag()) cloth.drag = checks.number(path / "drag", message.drag(), limits::kAirCoefficient);
+  if (message.has_lift()) cloth.lift = checks.number(path / "lift", message.lift(), limits::kAirCoefficient);
   if (message.has_friction())
     cloth.friction = checks.number(path / "friction", message.friction(), limits::kFriction);
   if (message.has_thickness())
     cloth.thickness = checks.number(path / "thickness", message.thickness(), limits::kThickness);
-  cloth.solver = toSolver(checks, path / "solver", message.solver());
+  if (message.has_solver()) cloth.solver = toSolver(checks, path / "solver", message.solver());
   if (message.has_self_collision() && !checks.failed())
     cloth.selfCollision = toSelfCollision(checks, path / "selfCollision", message.self_collision(), cloth);
   return cloth;
@@ -351,6 +364,25 @@ void checkSize(Checks& checks, const scene::Scene& scene) {
 }
 
 }  // namespace
+
+scene::Gust toGust(Checks& checks, const Path& path, const v1::Gust& message) {
+  scene::Gust gust;
+  gust.strength = checks.number(path / "strength", message.strength(), limits::kGustStrength);
+  if (message.has_seconds())
+    gust.seconds = checks.number(path / "seconds", message.seconds(), limits::kGustSeconds);
+  return gust;
+}
+
+const scene::Material* toMaterial(Checks& checks, const Path& path, const std::string& name) {
+  const scene::Material* material = scene::findMaterial(name);
+  if (material == nullptr) {
+    std::string known;
+    for (const scene::Material& one : scene::materials())
+      known += fmt::format("{}{}", known.empty() ? "" : ", ", one.name);
+    checks.failNamed(path, name, fmt::format("must be one of {}", known));
+  }
+  return material;
+}
 
 scene::Solver toSolver(Checks& checks, const Path& path, const v1::Solver& message) {
   scene::Solver solver;

@@ -9,6 +9,7 @@
 #include "server/messages/field_error.h"
 #include "server/messages/mesh_message.h"
 #include "server/messages/validation.h"
+#include "server/scene/material.h"
 #include "server/scene/scene.h"
 
 namespace clothstream::messages {
@@ -25,6 +26,13 @@ v1::Normals toMessage(scene::Normals normals);
 // The solver that a cloth names; what a cloth of this scene must be for it, unfitSolver() says.
 scene::Solver toSolver(Checks& checks, const Path& path, const v1::Solver& message);
 v1::Solver toMessage(const scene::Solver& solver);
+// What stands in Environment and in ParameterChange alike.
+scene::Gust toGust(Checks& checks, const Path& path, const v1::Gust& message);
+void write(const scene::Gust& gust, v1::Gust& message);
+
+// nullptr, and the check failed with the names that there are: none of this name.
+const scene::Material* toMaterial(Checks& checks, const Path& path, const std::string& name);
+
 // What to say of a cloth whose solver cannot serve it in this scene; nullopt if it can.
 std::optional<std::string> unfitSolver(const scene::Scene& scene, const scene::Cloth& cloth);
 

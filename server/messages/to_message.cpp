@@ -13,6 +13,7 @@ void writeEnvironment(const scene::Environment& environment, v1::Environment& me
   write(environment.gravity, *message.mutable_gravity());
   write(environment.wind, *message.mutable_wind());
   message.set_air_density(environment.airDensity);
+  write(environment.gust, *message.mutable_gust());
 }
 
 void writeConstraint(const scene::Solver& solver, v1::ConstraintSolver& message) {
@@ -60,6 +61,7 @@ void writeCloth(const scene::Cloth& cloth, v1::Cloth& message) {
   else
     writeGrid(cloth.grid, *message.mutable_grid());
   message.set_mass(cloth.mass);
+  message.set_material(cloth.material);
   write(cloth.structural, *message.mutable_structural());
   write(cloth.shear, *message.mutable_shear());
   write(cloth.bend, *message.mutable_bend());
@@ -104,6 +106,11 @@ v1::Integrator toMessage(scene::Integrator integrator) {
 
 v1::Normals toMessage(scene::Normals normals) {
   return normals == scene::Normals::octahedral ? v1::NORMALS_OCTAHEDRAL : v1::NORMALS_NONE;
+}
+
+void write(const scene::Gust& gust, v1::Gust& message) {
+  message.set_strength(gust.strength);
+  message.set_seconds(gust.seconds);
 }
 
 v1::Solver toMessage(const scene::Solver& solver) {

@@ -65,6 +65,11 @@ const std::string& Checks::text(const Path& path, const std::string& value) {
   return value;
 }
 
+void Checks::failNamed(const Path& path, std::string_view name, std::string_view allowed,
+                       v1::ErrorCode code) {
+  fail(path, quoted(name), allowed, code);
+}
+
 void Checks::fail(const Path& path, std::string_view value, std::string_view allowed, v1::ErrorCode code) {
   if (error_) return;
   std::string where = path.text();

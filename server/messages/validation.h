@@ -52,6 +52,10 @@ class Checks {
   void fail(const Path& path, std::string_view value, std::string_view allowed,
             v1::ErrorCode code = v1::ERROR_CODE_INVALID_ARGUMENT);
 
+  // The same for a text from outside, which is quoted and cut to what an answer may hold.
+  void failNamed(const Path& path, std::string_view name, std::string_view allowed,
+                 v1::ErrorCode code = v1::ERROR_CODE_INVALID_ARGUMENT);
+
   bool failed() const { return error_.has_value(); }
   template <typename T>
   Result<T> result(T value) && {

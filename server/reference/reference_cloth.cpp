@@ -48,6 +48,13 @@ ReferenceCloth::ReferenceCloth(const scene::Cloth& cloth)
     if (pinned[i]) inverseMasses_[i] = 0;
 }
 
+void ReferenceCloth::setMass(float mass) {
+  cloth_.mass = mass;
+  masses_ = scene::nodeMasses(cloth_);
+  for (std::size_t i = 0; i < masses_.size(); ++i)
+    if (inverseMasses_[i] > 0) inverseMasses_[i] = 1 / masses_[i];
+}
+
 void ReferenceCloth::setParameters(const scene::Cloth& cloth) {
   assert(cloth.nodeCount() == cloth_.nodeCount() && cloth.mesh == cloth_.mesh);
   cloth_.structural = cloth.structural;
@@ -59,6 +66,7 @@ void ReferenceCloth::setParameters(const scene::Cloth& cloth) {
   cloth_.friction = cloth.friction;
   cloth_.thickness = cloth.thickness;
   cloth_.solver = cloth.solver;
+  setMass(cloth.mass);
 }
 
 void ReferenceCloth::accumulateSpringForces(std::span<Vec3> forces) const {

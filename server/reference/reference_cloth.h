@@ -29,7 +29,7 @@ class ReferenceCloth {
   // At rest in its start pose. Springs are those of scene::springLinks().
   explicit ReferenceCloth(const scene::Cloth& cloth);
 
-  // Springs, damping, drag, lift, friction, thickness, solver from now on; same shape, mass, pins.
+  // Springs, damping, drag, lift, friction, thickness, mass, solver from now on; same shape, same pins.
   void setParameters(const scene::Cloth& cloth);
 
   std::span<Vec3> positions() { return positions_; }
@@ -68,6 +68,7 @@ class ReferenceCloth {
   double penetration(const scene::Shape& shape, const Pose& pose) const;
 
  private:
+  void setMass(float mass);
   // m/s^2; 0 of pinned nodes. Until the next call.
   const std::vector<Vec3>& accelerations(const scene::Environment& environment);
   void integrateRungeKutta(const scene::Environment& environment, double h);

@@ -4,10 +4,12 @@
 
 #include <algorithm>
 
+#include "server/scene/wind.h"
+
 namespace clothstream::reference {
 
 TickInputs inputsAt(const scene::Scene& scene, std::uint64_t tick) {
-  TickInputs inputs{scene.environment, {}};
+  TickInputs inputs{scene::environmentAt(scene, tick), {}};
   const double start = static_cast<double>(tick) * scene.tickSeconds();
   const double end = static_cast<double>(tick + 1) * scene.tickSeconds();
   for (const scene::Collider& collider : scene.colliders)

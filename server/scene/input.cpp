@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cassert>
 
+#include "server/scene/material.h"
+
 namespace clothstream::scene {
 namespace {
 
@@ -14,6 +16,7 @@ void assign(T& field, const std::optional<T>& value) {
 }
 
 void apply(Cloth& cloth, const ClothChange& change) {
+  if (change.material) makeOf(*findMaterial(*change.material), cloth);
   assign(cloth.structural, change.structural);
   assign(cloth.shear, change.shear);
   assign(cloth.bend, change.bend);
@@ -23,6 +26,7 @@ void apply(Cloth& cloth, const ClothChange& change) {
   assign(cloth.friction, change.friction);
   assign(cloth.thickness, change.thickness);
   assign(cloth.solver, change.solver);
+  if (change.arealMass) cloth.mass = static_cast<float>(double{*change.arealMass} * areaOf(cloth));
 }
 
 // A motion that ends leaves what is not changed at the pose that the scene gives.
@@ -42,6 +46,7 @@ void applyChange(Scene& scene, const ParameterChange& change) {
   assign(scene.environment.gravity, change.gravity);
   assign(scene.environment.wind, change.wind);
   assign(scene.environment.airDensity, change.airDensity);
+  assign(scene.environment.gust, change.gust);
   for (const ClothChange& clothChange : change.cloths)
     for (Cloth& cloth : scene.cloths)
       if (clothChange.name.empty() || clothChange.name == cloth.name) apply(cloth, clothChange);

@@ -44,6 +44,8 @@ struct ClothChange {
   std::optional<Spring> structural = {}, shear = {}, bend = {};
   std::optional<float> damping = {}, drag = {}, lift = {}, friction = {}, thickness = {};
   std::optional<Solver> solver = {};
+  std::optional<std::string> material = {};  // one of materials(); what is given above goes before it
+  std::optional<float> arealMass = {};       // kg/m^2
 };
 
 struct ColliderChange {
@@ -60,6 +62,7 @@ struct ParameterChange {
   std::optional<float> airDensity = {};
   std::vector<ClothChange> cloths = {};
   std::vector<ColliderChange> colliders = {};
+  std::optional<Gust> gust = {};
 };
 
 // The names in the change must exist in the scene.

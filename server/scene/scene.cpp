@@ -24,6 +24,10 @@ std::uint32_t Cloth::nodeCount() const {
   return mesh ? mesh->nodeCount() : grid.nodeCount();
 }
 
+double areaOf(const Cloth& cloth) {
+  return cloth.mesh ? cloth.mesh->area() : double{cloth.grid.width} * double{cloth.grid.height};
+}
+
 std::vector<Vec3> restPositions(const Grid& grid) {
   const Eigen::Vector3d origin = grid.pose.position.cast<double>();
   const Eigen::Matrix3d rotation = grid.pose.orientation.cast<double>().toRotationMatrix();

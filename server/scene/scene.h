@@ -124,6 +124,7 @@ struct Tethers {
 
 struct Cloth {
   std::string name;
+  std::string material;              // that it was made of, some numbers changed perhaps; empty: none
   Grid grid;                         // of a cloth without mesh
   std::shared_ptr<const Mesh> mesh;  // null: the cloth is the grid
   float mass = 0;                    // kg, of the whole cloth; nodeMasses() says how it is spread
@@ -144,10 +145,17 @@ struct Cloth {
   float nodeMass() const { return mass / static_cast<float>(nodeCount()); }  // kg, mean
 };
 
+// What the wind strays by; wind.h says how.
+struct Gust {
+  float strength = 0;  // m/s, of each component
+  float seconds = 2;   // from turn to turn
+};
+
 struct Environment {
   Vec3 gravity = Vec3(0, -9.81f, 0);
-  Vec3 wind = Vec3::Zero();  // m/s
+  Vec3 wind = Vec3::Zero();  // m/s; in a scene the mean
   float airDensity = 1.2f;   // kg/m^3
+  Gust gust = {};            // of a scene; none where the wind is that of a tick
 };
 
 enum class Integrator : std::uint8_t { semiImplicitEuler, explicitEuler, rungeKutta4 };
@@ -174,6 +182,9 @@ struct Scene {
   double substepSeconds() const { return tickSeconds() / substeps; }
   std::uint32_t nodeCount() const;
 };
+
+// At rest, m^2.
+double areaOf(const Cloth& cloth);
 
 // Start positions of the nodes, world space; a grid's row-major.
 std::vector<Vec3> restPositions(const Grid& grid);

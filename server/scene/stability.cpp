@@ -22,6 +22,7 @@
 #include "server/scene/stability.h"
 
 #include <algorithm>
+#include <cmath>
 #include <vector>
 
 #include "server/scene/mesh.h"
@@ -118,7 +119,8 @@ double areaPerMass(const Cloth& cloth) {
 // 0.5 rho (2 C_D + C_L) |N| |u|. A third of that goes to each node, so a row sums to
 // 0.5 rho (2 C_D + C_L) |u| area / m.
 double airDamping(const Cloth& cloth, const Environment& environment) {
-  const double speed = environment.wind.cast<double>().norm() + kAirSpeed;
+  const double gust = std::sqrt(3.0) * environment.gust.strength;
+  const double speed = environment.wind.cast<double>().norm() + gust + kAirSpeed;
   return 0.5 * environment.airDensity * (2.0 * cloth.drag + cloth.lift) * speed * areaPerMass(cloth);
 }
 

@@ -17,6 +17,7 @@
 #include "server/simulation/advance_variant.h"
 #include "server/simulation/collision/collision_stage.h"
 #include "server/simulation/hold/hold_stage.h"
+#include "server/simulation/mass_stage.h"
 #include "server/simulation/mesh_stage.h"
 #include "server/simulation/report_stage.h"
 #include "server/simulation/runge_kutta_stage.h"
@@ -121,6 +122,12 @@ std::vector<scene::Solver> solversOf(std::span<const scene::Cloth> cloths) {
   return solvers;
 }
 
+std::vector<float> massesOf(std::span<const scene::Cloth> cloths) {
+  std::vector<float> masses;
+  for (const scene::Cloth& cloth : cloths) masses.push_back(cloth.mass);
+  return masses;
+}
+
 // Whether they make the same tables; how systems are solved may differ.
 bool sameTables(const scene::Solver& a, const scene::Solver& b) {
   return a.kind == b.kind && a.bendConstraints == b.bendConstraints &&
@@ -189,6 +196,8 @@ struct ClothSimulation::Pipeline {
   void makeXpbd(std::span<const scene::Cloth> cloths);
   void makeHolds(const HoldTables& tables);
   void setSolvers(std::span<const scene::Cloth> cloths);
+  void makeMassStage();
+  void setMasses(std::span<const scene::Cloth> cloths);
   void start(vulkan::Recorder& recorder);
   void recordInputs(vulkan::Recorder& recorder, const TickInputs& inputs);
   void recordSubsteps(vulkan::Recorder& recorder, const TickInputs& inputs);
@@ -208,7 +217,8 @@ struct ClothSimulation::Pipeline {
   std::vector<std::uint32_t> offsets;
   std::uint32_t nodes;
   std::vector<shared::ClothRecord> records;
-  std::vector<float> masses;  // inverse
+  std::vector<float> masses;       // inverse, of nodes
+  std::vector<float> clothMasses;  // kg
   Cut cut;
   Buffers buffers;
   CollisionStage collision;
@@ -223,10 +233,12 @@ struct ClothSimulation::Pipeline {
   std::vector<shared::vec4> stiffness;                // of their springs
   std::unique_ptr<HoldStage> holds;                   // where something holds cloth, or did
   std::unique_ptr<ReportStage> report;                // made when it is first wanted
+  std::unique_ptr<MassStage> massChange;              // made when one first changes
   SimulationOptions asked;
 
   bool started = false;       // the start state is on the device
   bool tabled = false;        // the tables of the solvers are
+  bool weighed = true;        // the masses are those that the states on the device have
   std::uint32_t present = 0;  // which state buffers hold the state
   std::uint32_t slot = 0;     // of inputs and status, of the tick recorded last
 };
@@ -245,6 +257,7 @@ ClothSimulation::Pipeline::Pipeline(const vulkan::Device& on, const scene::Scene
       nodes(offsets.back()),
       records(clothRecords(scene.cloths, substepSeconds)),
       masses(inverseMasses(scene.cloths)),
+      clothMasses(massesOf(scene.cloths)),
       cut(cutScene(on, scene, options)),
       buffers(on, nodes, records.size(), cut.tiles.records.size()),
       collision(on, nodes, {&buffers.positions[0], &buffers.positions[1]},
@@ -332,9 +345,23 @@ void ClothSimulation::Pipeline::setSolvers(std::span<const scene::Cloth> cloths)
   tabled = false;
 }
 
+void ClothSimulation::Pipeline::makeMassStage() {
+  if (massChange) return;
+  const Buffers& b = buffers;
+  massChange = std::make_unique<MassStage>(
+      device, nodes, std::array{&b.positions[0], &b.positions[1], &b.checkpointPositions});
+}
+
+void ClothSimulation::Pipeline::setMasses(std::span<const scene::Cloth> cloths) {
+  masses = inverseMasses(cloths);
+  massChange->set(masses);
+  clothMasses = massesOf(cloths);
+  weighed = false;
+}
+
 void ClothSimulation::Pipeline::start(vulkan::Recorder& recorder) {
   recorder.barrier();
-  if (started && tabled) return;
+  if (started && tabled && weighed) return;
   if (!started) {
     recorder.copy(buffers.inputs[slot], buffers.cloths, buffers.cloths.bytes());
     recordUploadedState(recorder);
@@ -345,7 +372,11 @@ void ClothSimulation::Pipeline::start(vulkan::Recorder& recorder) {
   if (xpbd) xpbd->recordTables(recorder);
   if (selfCollision) selfCollision->recordTables(recorder);
   recorder.barrier();
-  started = tabled = true;
+  if (!weighed) {
+    massChange->record(recorder);
+    recorder.barrier();
+  }
+  started = tabled = weighed = true;
 }
 
 void ClothSimulation::Pipeline::recordInputs(vulkan::Recorder& recorder, const TickInputs& inputs) {
@@ -453,7 +484,10 @@ void ClothSimulation::setCloths(std::span<const scene::Cloth> cloths) {
                     [](const shared::ClothRecord& a, const shared::ClothRecord& b) {
                       return a.place.z == b.place.z && a.place.w == b.place.w;
                     }));
+  const bool heavier = massesOf(cloths) != pipeline_->clothMasses;
+  if (heavier) pipeline_->makeMassStage();
   pipeline_->setSolvers(cloths);
+  if (heavier) pipeline_->setMasses(cloths);
   pipeline_->stiffness = springStiffness(cloths);
   pipeline_->records = std::move(records);
 }

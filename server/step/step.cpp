@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "server/messages/scene_file.h"
+#include "server/scene/wind.h"
 #include "server/simulation/cloth_simulation.h"
 #include "server/step/state_file.h"
 #include "server/vulkan/recorder.h"
@@ -20,7 +21,7 @@ using Json = nlohmann::ordered_json;
 using Clock = std::chrono::steady_clock;
 
 simulation::TickInputs inputsAt(const scene::Scene& scene, std::uint64_t tick) {
-  simulation::TickInputs inputs{scene.environment, {}};
+  simulation::TickInputs inputs{scene::environmentAt(scene, tick), {}};
   const double start = static_cast<double>(tick) * scene.tickSeconds();
   const double end = static_cast<double>(tick + 1) * scene.tickSeconds();
   for (const scene::Collider& collider : scene.colliders)

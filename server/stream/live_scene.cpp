@@ -2,6 +2,7 @@
 // A scene as its participants share it.
 #include "server/stream/live_scene.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "server/encode/frame_encoder.h"
@@ -18,8 +19,12 @@ v1::ParameterChange allParameters(const scene::Scene& scene) {
   *change.mutable_gravity()->mutable_value() = message.environment().gravity();
   *change.mutable_wind()->mutable_value() = message.environment().wind();
   change.set_air_density(message.environment().air_density());
-  for (const v1::Cloth& cloth : message.cloths()) {
+  *change.mutable_gust() = message.environment().gust();
+  for (std::size_t i = 0; i < scene.cloths.size(); ++i) {
+    const v1::Cloth& cloth = message.cloths(static_cast<int>(i));
     v1::ClothChange& all = *change.add_cloths();
+    all.set_areal_mass(static_cast<float>(double{cloth.mass()} / scene::areaOf(scene.cloths[i])));
+    if (!cloth.material().empty()) all.set_material(cloth.material());
     all.set_name(cloth.name());
     *all.mutable_structural() = cloth.structural();
     *all.mutable_shear() = cloth.shear();
@@ -47,11 +52,17 @@ messages::Result<void> LiveScene::change(std::uint64_t participant, const v1::Pa
   const std::lock_guard lock(mutex_);
   messages::Result<scene::ParameterChange> change = messages::toParameterChange(message, definition_);
   if (!change) return tl::unexpected(std::move(change).error());
-  if (!inbox.postChange({participant, *change, message}))
+  scene::Scene changed = definition_;
+  scene::applyChange(changed, *change);
+  v1::ParameterChange told = message;
+  if (std::ranges::any_of(change->cloths,
+                          [](const scene::ClothChange& cloth) { return cloth.material.has_value(); }))
+    *told.mutable_cloths() = allParameters(changed).cloths();
+  if (!inbox.postChange({participant, *change, std::move(told)}))
     return tl::unexpected(
         messages::FieldError{v1::ERROR_CODE_RESOURCE_EXHAUSTED,
                              "parameter_change: too many changes for one tick; send it again later"});
-  scene::applyChange(definition_, *change);
+  definition_ = std::move(changed);
   description_.reset();
   return {};
 }

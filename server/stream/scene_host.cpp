@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include "server/scene/wind.h"
 #include "server/stream/report_message.h"
 
 namespace clothstream::stream {
@@ -78,7 +79,7 @@ void SceneHost::begin(Clock::time_point now) {
   const double endSeconds = static_cast<double>(tick_ + 1) * scene_.tickSeconds();
   colliders_.advance(scene_, endSeconds, tickInputs_.colliders);
   holds_.advance(scene_, endSeconds, tickInputs_);
-  tickInputs_.environment = scene_.environment;
+  tickInputs_.environment = scene::environmentAt(scene_, tick_);
 
   OnDevice& on = *onDevice_;
   on.recorder.begin();

@@ -21,6 +21,8 @@ constexpr std::array kSuites{
                  &bench::runMassSpring},
     bench::Suite{"paper", "Figures 7 to 10 of the paper at its sizes, beside its frames per second",
                  &bench::runPaper},
+    bench::Suite{"behaviour", "Figures 11 to 15 of the paper as pictures, and whether they show what it says",
+                 &bench::runBehaviour},
     bench::Suite{"solvers", "a hanging sheet by every solver: what a substep costs and what it stretches",
                  &bench::runSolvers},
     bench::Suite{"enforcement", "constraint enforcement over all springs, by one workgroup and by several",
@@ -62,6 +64,9 @@ int main(int argc, char** argv) {
   app.add_option("--seconds", settings.seconds, "Time to measure, a row")->check(CLI::PositiveNumber);
   app.add_option("--rows", settings.rowsPerInvocation, "Rows an invocation walks down (0: the default)");
   app.add_option("--workgroup", settings.workgroupSize, "Invocations in a workgroup (0: the default)");
+  app.add_option("--pictures", settings.pictures, "Directory that pictures go to")
+      ->check(CLI::ExistingDirectory)
+      ->capture_default_str();
   CLI::Option* wholeOption = app.add_option("--xpbd-whole", xpbdWholeNodes,
                                             "Nodes of the largest cloth that one workgroup sweeps (xpbd)");
   CLI::Option* solveOption = app.add_option("--solve-whole", solveWholeNodes,

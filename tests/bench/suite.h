@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <optional>
 #include <string>
 #include <vector>
@@ -21,6 +22,7 @@ struct Settings {
   std::uint32_t workgroupSize = 0;
   std::optional<std::uint32_t> xpbdWholeNodes;  // likewise where it is absent
   std::optional<std::uint32_t> solveWholeNodes;
+  std::filesystem::path pictures = ".";  // where suites that make some put them
 };
 
 // One JSON object a row; every row names its suite. A suite checks its results before it reports a time, and
@@ -35,6 +37,7 @@ struct Suite {
 
 Rows runMassSpring(vulkan::Device& device, const Settings& settings);
 Rows runPaper(vulkan::Device& device, const Settings& settings);
+Rows runBehaviour(vulkan::Device& device, const Settings& settings);
 Rows runSolvers(vulkan::Device& device, const Settings& settings);
 Rows runEnforcement(vulkan::Device& device, const Settings& settings);
 Rows runCurtain(vulkan::Device& device, const Settings& settings);

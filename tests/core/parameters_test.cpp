@@ -206,6 +206,49 @@ TEST(Parameters, AreThoseOfTheDescriptionUntilSomebodyChangesThem) {
   EXPECT_EQ(cloth.damping, 0.25f);
 }
 
+TEST(Parameters, GustsAndMaterialsAreToldAndChanged) {
+  ScriptedServer server;
+  v1::StreamDescription description = server.description();
+  description.add_materials("cotton");
+  description.add_materials("denim");
+  description.mutable_definition()->mutable_cloths(0)->set_material("denim");
+  description.mutable_definition()->mutable_environment()->mutable_gust()->set_strength(1.5f);
+  description.mutable_definition()->mutable_environment()->mutable_gust()->set_seconds(4);
+  ClientUnderTest client;
+  EXPECT_EQ(cs_material_count(client.get()), 0u);
+  client.receive(server.welcome());
+  client.receiveAll(chunksOf(description.SerializeAsString(), 1 << 18, 1));
+  client.outgoing();
+  ASSERT_EQ(cs_material_count(client.get()), 2u);
+  EXPECT_STREQ(cs_material(client.get(), 1), "denim");
+  EXPECT_STREQ(cs_material(client.get(), 2), "");
+  EXPECT_STREQ(cs_cloth_material(client.get(), 0), "denim");
+  EXPECT_STREQ(cs_cloth_material(client.get(), 9), "");
+  cs_environment environment;
+  cs_get_environment(client.get(), &environment);
+  EXPECT_EQ(environment.gust_strength, 1.5f);
+  EXPECT_EQ(environment.gust_seconds, 4);
+
+  cs_set_material(client.get(), "curtain", "cotton");
+  cs_set_gust(client.get(), 2, 0.5f);
+  const auto sent = client.outgoing();
+  ASSERT_THAT(sent, SizeIs(2));
+  EXPECT_EQ(sent[0].parameter_change().cloths(0).name(), "curtain");
+  EXPECT_EQ(sent[0].parameter_change().cloths(0).material(), "cotton");
+  EXPECT_EQ(sent[1].parameter_change().gust().strength(), 2);
+  EXPECT_EQ(sent[1].parameter_change().gust().seconds(), 0.5f);
+
+  v1::ServerMessage message;
+  v1::ParameterChange& change = *message.mutable_parameter_changed()->mutable_change();
+  change.mutable_gust()->set_strength(3);
+  change.mutable_gust()->set_seconds(1);
+  change.add_cloths()->set_material("cotton");
+  client.receive(message.SerializeAsString());
+  cs_get_environment(client.get(), &environment);
+  EXPECT_EQ(environment.gust_strength, 3);
+  EXPECT_STREQ(cs_cloth_material(client.get(), 0), "cotton");
+}
+
 TEST(Parameters, ThereAreNoneBeforeTheDescription) {
   ClientUnderTest client;
   cs_environment environment;

@@ -311,6 +311,13 @@ TEST_F(JoinTest, SetsParametersForEverybody) {
   EXPECT_EQ(cloths[0]["solver"], "acad");
   EXPECT_EQ(cloths[1]["solver"], "massSpring");
 
+  const auto made = clothstream(
+      {"set", address_, "--cloth", cloth, "--material", "silk", "--friction", "0.9", "--gust", "2,0.5"});
+  ASSERT_EQ(made->waitForEnd(kEnd), 0) << made->errors();
+  const auto none = clothstream({"set", address_, "--material", "velvet"});
+  EXPECT_EQ(none->waitForEnd(kEnd), 4);
+  EXPECT_THAT(none->errors(), HasSubstr("must be one of cotton, denim"));
+
   const auto refused = clothstream({"set", address_, "--stiffness", "1e5"});
   EXPECT_EQ(refused->waitForEnd(kEnd), 4);
   EXPECT_THAT(refused->errors(), HasSubstr("substeps"));

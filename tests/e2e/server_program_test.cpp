@@ -248,12 +248,19 @@ TEST_F(ServerProgram, NamesTheDevicesThereAre) {
   EXPECT_THAT(server.said(), HasSubstr("no such device"));
 }
 
+TEST_F(ServerProgram, NamesTheMaterialsThereAre) {
+  ServerProcess list({"--list-materials"});
+  EXPECT_EQ(list.exitCode(), 0);
+  for (const char* word : {"cotton", "wool", "0.324", "denim"}) EXPECT_THAT(list.said(), HasSubstr(word));
+}
+
 TEST_F(ServerProgram, ExplainsItsOptions) {
   ServerProcess help({"--help"});
   EXPECT_EQ(help.exitCode(), 0);
-  for (const char* option : {"--scene", "--scene-file", "--rate", "--substeps", "--max-error", "--normals",
-                             "--reports", "step", "--host", "--port", "--grpc-port", "--page", "--device",
-                             "--list-devices", "--software-threads", "--log-level", "--seconds"})
+  for (const char* option :
+       {"--scene", "--scene-file", "--rate", "--substeps", "--max-error", "--normals", "--reports", "step",
+        "--host", "--port", "--grpc-port", "--page", "--device", "--list-devices", "--list-materials",
+        "--software-threads", "--log-level", "--seconds"})
     EXPECT_THAT(help.said(), HasSubstr(option));
   ServerProcess version({"--version"});
   EXPECT_EQ(version.exitCode(), 0);

@@ -291,6 +291,8 @@ TEST_F(ToParameterChange, CarriesEveryField) {
   message_.mutable_gravity()->mutable_value()->set_y(-1.5f);
   message_.mutable_wind()->mutable_value()->set_z(4);
   message_.set_air_density(0.5f);
+  message_.mutable_gust()->set_strength(1.5f);
+  message_.mutable_gust()->set_seconds(4);
   v1::ClothChange& cloth = *message_.add_cloths();
   cloth.set_name("sheet");
   cloth.mutable_structural()->set_stiffness(11);
@@ -314,6 +316,8 @@ TEST_F(ToParameterChange, CarriesEveryField) {
   EXPECT_EQ(scene_.environment.gravity, scene::Vec3(0, -1.5f, 0));
   EXPECT_EQ(scene_.environment.wind, scene::Vec3(0, 0, 4));
   EXPECT_EQ(scene_.environment.airDensity, 0.5f);
+  EXPECT_EQ(scene_.environment.gust.strength, 1.5f);
+  EXPECT_EQ(scene_.environment.gust.seconds, 4);
   EXPECT_EQ(scene_.cloths[0].structural.stiffness, 11);
   EXPECT_EQ(scene_.cloths[0].shear.stiffness, 12);
   EXPECT_EQ(scene_.cloths[0].bend.damping, 0.01f);
@@ -392,6 +396,47 @@ TEST_F(ToParameterChange, RefusesASolverThatTheSceneCannotHave) {
   message_.mutable_cloths(0)->clear_solver();
   message_.mutable_cloths(0)->set_thickness(2);
   EXPECT_THAT(error(), StartsWith("parameterChange.cloths[0].thickness = 2:"));
+}
+
+TEST_F(ToParameterChange, MakesClothsOfAMaterial) {
+  v1::ClothChange& cloth = *message_.add_cloths();
+  cloth.set_material("denim");
+  cloth.set_areal_mass(0.5f);
+  cloth.mutable_bend()->set_stiffness(7);
+  const auto change = toParameterChange(message_, scene_);
+  ASSERT_TRUE(change) << change.error().text;
+  applyChange(scene_, *change);
+  EXPECT_EQ(scene_.cloths[0].material, "denim");
+  EXPECT_EQ(scene_.cloths[0].structural.stiffness, scene::findMaterial("denim")->tension);
+  EXPECT_EQ(scene_.cloths[0].bend.stiffness, 7);
+  EXPECT_FLOAT_EQ(scene_.cloths[0].mass, 1.5f);
+  EXPECT_EQ(scene_.cloths[0].solver.kind, scene::SolverKind::xpbd);
+}
+
+TEST_F(ToParameterChange, RefusesMaterialsThatThereAreNotAndThoseThatTheSceneCannotHave) {
+  v1::ClothChange& cloth = *message_.add_cloths();
+  cloth.set_material("velvet");
+  EXPECT_THAT(error(),
+              StartsWith("parameterChange.cloths[0].material = \"velvet\": must be one of cotton, denim, "));
+  cloth.set_material("");
+  EXPECT_THAT(error(), StartsWith("parameterChange.cloths[0].material = \"\": must be one of cotton, "));
+  cloth.set_material("denim");
+  scene_.integrator = scene::Integrator::explicitEuler;
+  EXPECT_THAT(error(),
+              StartsWith("parameterChange.cloths[0].material: \"sheet\" solves a system, which needs"));
+  scene_.integrator = scene::Integrator::semiImplicitEuler;
+  cloth.mutable_solver()->mutable_mass_spring();
+  cloth.mutable_structural()->set_stiffness(20000);
+  EXPECT_THAT(error(), StartsWith("parameterChange: with substeps = 10, this scene needs at least"));
+  message_.Clear();
+  message_.add_cloths()->set_areal_mass(0);
+  EXPECT_THAT(error(), StartsWith("parameterChange.cloths[0].arealMass = 0:"));
+  message_.Clear();
+  message_.mutable_gust()->set_strength(-1);
+  EXPECT_THAT(error(), StartsWith("parameterChange.gust.strength = -1:"));
+  message_.mutable_gust()->set_strength(1);
+  message_.mutable_gust()->set_seconds(0);
+  EXPECT_THAT(error(), StartsWith("parameterChange.gust.seconds = 0:"));
 }
 
 TEST_F(ToParameterChange, JudgesAChangeAsAWhole) {

@@ -27,12 +27,13 @@ using testing::StartsWith;
 constexpr const char* kEveryField = R"json({
   "name": "every_field", "description": "All of it", "simulationRate": 240, "streamRate": 120, "substeps": 40,
   "integrator": "INTEGRATOR_SEMI_IMPLICIT_EULER",
-  "environment": {"gravity": {"x": 0.5, "y": -9.5, "z": 0.25}, "wind": {"x": 1, "y": 2, "z": 3}, "airDensity": 1.25},
+  "environment": {"gravity": {"x": 0.5, "y": -9.5, "z": 0.25}, "wind": {"x": 1, "y": 2, "z": 3}, "airDensity": 1.25,
+                  "gust": {"strength": 0.5, "seconds": 4}},
   "cloths": [{
     "name": "sheet",
     "grid": {"rows": 6, "columns": 7, "width": 1.5, "height": 1.25,
              "pose": {"position": {"x": 1, "y": 2, "z": 3}, "orientation": {"x": 0.5, "y": 0.5, "z": 0.5, "w": 0.5}}},
-    "mass": 4,
+    "mass": 4, "material": "wool",
     "structural": {"stiffness": 20, "damping": 0.5}, "shear": {"stiffness": 10, "damping": 0.25},
     "bend": {"stiffness": 5, "damping": 0.125},
     "damping": 3, "drag": 0.5, "lift": 0.25, "friction": 0.75, "thickness": 0.0625,
@@ -132,6 +133,7 @@ void expectEveryFieldSet(const v1::Scene& message) {
   addSetFields(message, set);
   // A mesh comes back as it lies in the scene, whatever file it came from (test_mesh_message.cpp).
   for (const char* field : {"file", "pose", "scale"}) all.erase(std::string("clothstream.v1.Mesh.") + field);
+  all.erase("clothstream.v1.Cloth.areal_mass");  // comes back as `mass`
   EXPECT_THAT(set, testing::ContainerEq(all));
 }
 

@@ -63,6 +63,50 @@ TEST(ToScene, TakesExplicitZerosForWhatTheyAre) {
   EXPECT_EQ(scene->cloths[0].thickness, 0);
 }
 
+TEST(ToScene, MakesClothsOfTheirMaterialButForWhatIsGiven) {
+  v1::Scene message = smallScene();
+  v1::Cloth& described = *message.mutable_cloths(0);
+  described.clear_structural();
+  described.set_material("wool");
+  described.set_friction(0.9f);
+  const scene::Material& wool = *scene::findMaterial("wool");
+  const Result<scene::Scene> scene = toScene(message);
+  ASSERT_TRUE(scene) << scene.error().text;
+  const scene::Cloth& cloth = scene->cloths[0];
+  EXPECT_EQ(cloth.material, "wool");
+  EXPECT_FLOAT_EQ(cloth.mass, 3 * wool.arealMass);
+  EXPECT_EQ(cloth.structural.stiffness, wool.tension);
+  EXPECT_EQ(cloth.bend.stiffness, static_cast<float>(scene::bendStiffness(wool, cloth)));
+  EXPECT_EQ(cloth.drag, wool.drag);
+  EXPECT_EQ(cloth.friction, 0.9f);
+  EXPECT_EQ(cloth.solver.kind, scene::SolverKind::xpbd);
+  // All of it, the name too, comes back from a message.
+  const Result<scene::Scene> again = toScene(toMessage(*scene));
+  ASSERT_TRUE(again) << again.error().text;
+  EXPECT_EQ(again->cloths[0].material, "wool");
+  EXPECT_EQ(again->cloths[0].mass, cloth.mass);
+  EXPECT_EQ(again->cloths[0].friction, 0.9f);
+  // As forces its springs are too stiff for these steps, and it says so.
+  described.mutable_solver()->mutable_mass_spring();
+  described.mutable_grid()->set_rows(64);
+  EXPECT_THAT(toScene(message).error().text, HasSubstr("this scene needs at least"));
+  described.clear_solver();
+  described.clear_material();
+  described.set_areal_mass(0.5f);
+  EXPECT_FLOAT_EQ(toScene(message)->cloths[0].mass, 1.5f);
+}
+
+TEST(ToScene, HasTheGustsOfItsMessage) {
+  v1::Scene message = smallScene();
+  EXPECT_EQ(toScene(message)->environment.gust.strength, 0);
+  message.mutable_environment()->mutable_gust()->set_strength(3);
+  EXPECT_EQ(toScene(message)->environment.gust.seconds, 2);
+  message.mutable_environment()->mutable_gust()->set_seconds(0.5f);
+  const scene::Gust gust = toScene(toMessage(*toScene(message)))->environment.gust;
+  EXPECT_EQ(gust.strength, 3);
+  EXPECT_EQ(gust.seconds, 0.5f);
+}
+
 TEST(ToScene, SweepsOnceWhereXpbdDoesNotSayOtherwise) {
   v1::Scene message = smallScene();
   message.mutable_cloths(0)->mutable_solver()->mutable_xpbd();
@@ -228,6 +272,19 @@ const BadScene kBadScenes[] = {
      [](v1::Scene& s) { s.mutable_environment()->mutable_gravity()->set_y(kNan); },
      "a finite number from -1000 to 1000"},
     {"environment.wind.x = 101:", [](v1::Scene& s) { s.mutable_environment()->mutable_wind()->set_x(101); }},
+    {"environment.gust.strength = 101:",
+     [](v1::Scene& s) { s.mutable_environment()->mutable_gust()->set_strength(101); }, "from 0 to 100"},
+    {"environment.gust.seconds = 0:",
+     [](v1::Scene& s) { s.mutable_environment()->mutable_gust()->set_seconds(0); }, "from 0.01 to 3600"},
+    {"cloths[0].material = \"velvet\":", [](v1::Scene& s) { cloth(s).set_material("velvet"); },
+     "must be one of cotton, denim, flag_nylon, leather, paper, rubber, silk, wool"},
+    {"cloths[0].arealMass = 0:", [](v1::Scene& s) { cloth(s).set_areal_mass(0); }, "from 0.0001 to 1000"},
+    {"cloths[0].arealMass = 1:",
+     [](v1::Scene& s) {
+       cloth(s).set_mass(1);
+       cloth(s).set_areal_mass(1);
+     },
+     "must be absent where \"mass\" is given"},
     {"environment.airDensity = -1:", [](v1::Scene& s) { s.mutable_environment()->set_air_density(-1); }},
     {"cloths: has 0 elements", [](v1::Scene& s) { s.clear_cloths(); }, "must have 1 to 256"},
     {"cloths: has 257 elements",

@@ -134,5 +134,32 @@ TEST_F(SolverChange, ofOtherSettingsOrAnotherThicknessKeepsTheStateToo) {
     EXPECT_GT((state.positions[i] - scene::Vec3(0, -0.15f, 0.03f)).norm(), 0.06f - 1e-6f);
 }
 
+// Whichever buffer holds the state, in the checkpoint too, under every solver: it goes on to the bit as one
+// that always had these masses would.
+TEST_F(SolverChange, ofMassesGoesOnAsAClothThatAlwaysHadThem) {
+  const scene::Scene light = softScene();
+  const simulation::TickInputs inputs = inputsWithBall(light);
+  for (const SolverKind kind : kKinds) {
+    SCOPED_TRACE(static_cast<int>(kind));
+    scene::Scene scene = withSolvers(light, kind, kind);
+    Running changing(scene);
+    for (int tick = 0; tick < 5; ++tick) changing.tick(inputs);
+    changing.checkpoint();
+    for (scene::Cloth& cloth : scene.cloths) cloth.mass *= 3;
+    const StateSnapshot kept = changing.save();
+    changing.setCloths(scene.cloths);
+    EXPECT_EQ(changing.save().bytes, kept.bytes);
+    Running always(scene);
+    always.restore(kept);
+    for (int tick = 0; tick < 3; ++tick)
+      ASSERT_EQ(changing.tick(inputs).stateHash, always.tick(inputs).stateHash) << "tick " << tick;
+    changing.rollback();
+    always.restore(kept);
+    for (int tick = 0; tick < 3; ++tick)
+      ASSERT_EQ(changing.tick(inputs).stateHash, always.tick(inputs).stateHash)
+          << "rolled back, tick " << tick;
+  }
+}
+
 }  // namespace
 }  // namespace clothstream::tests

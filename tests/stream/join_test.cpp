@@ -8,6 +8,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "server/scene/material.h"
 #include "tests/stream/server_test.h"
 
 namespace clothstream::stream {
@@ -260,6 +261,25 @@ TEST_F(JoinTest, AParameterChangeIsToldToAllAndStandsInLaterDescriptions) {
   late.join();
   EXPECT_EQ(late.description().definition().environment().wind().x(), 4);
   EXPECT_EQ(late.description().definition().colliders(0).pose().position().y(), 3);
+}
+
+TEST_F(JoinTest, AMaterialIsToldWithAllThatItMakesOfTheCloth) {
+  START();
+  TestPeer changer(server());
+  changer.join();
+  EXPECT_THAT(changer.description().materials(), testing::Contains("wool"));
+  v1::ParameterChange change;
+  change.add_cloths()->set_material("wool");
+  changer.change(change);
+  const v1::ParameterChanged told = changer.readUntil(Body::kParameterChanged).parameter_changed();
+  const v1::ClothChange& cloth = told.change().cloths(0);
+  const scene::Material& wool = *scene::findMaterial("wool");
+  EXPECT_EQ(cloth.material(), "wool");
+  EXPECT_EQ(cloth.structural().stiffness(), wool.tension);
+  EXPECT_EQ(cloth.friction(), wool.friction);
+  EXPECT_FLOAT_EQ(cloth.areal_mass(), wool.arealMass);
+  EXPECT_TRUE(cloth.solver().has_xpbd());
+  changer.readUntil([&](const Body&) { return changer.frames().back().tick >= told.tick(); });
 }
 
 TEST_F(JoinTest, AStateThatGoesBadIsToldAndTheStreamGoesOn) {

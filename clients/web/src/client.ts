@@ -87,6 +87,8 @@ export interface Environment {
   gravity: Vec3; // m/s^2
   wind: Vec3; // m/s
   airDensity: number; // kg/m^3
+  gustStrength: number; // m/s
+  gustSeconds: number;
 }
 
 export interface ClothParameters {
@@ -313,6 +315,8 @@ export class Client {
       gravity: vec3(view, this.scratch),
       wind: vec3(view, this.scratch + 12),
       airDensity: view.getFloat32(this.scratch + 24, true),
+      gustStrength: view.getFloat32(this.scratch + 28, true),
+      gustSeconds: view.getFloat32(this.scratch + 32, true),
     };
   }
 
@@ -339,6 +343,24 @@ export class Client {
     this.core.exports.cs_keep_cloth_settings(this.scratch);
     this.core.view().setUint32(this.scratch + kSolverAt, solver, true);
     this.core.with([cloth], (name) => this.core.exports.cs_change_cloth(this.handle, name!, this.scratch));
+  }
+
+  // What a cloth may be made of, and what it was made of last; "" for nothing.
+  materials(): string[] {
+    const count = this.core.exports.cs_material_count(this.handle);
+    return Array.from({ length: count }, (_, index) => this.core.text(this.core.exports.cs_material(this.handle, index)));
+  }
+
+  material(cloth: number): string {
+    return this.core.text(this.core.exports.cs_cloth_material(this.handle, cloth));
+  }
+
+  setMaterial(cloth: string, material: string): void {
+    this.core.with([cloth, material], (name, chosen) => this.core.exports.cs_set_material(this.handle, name!, chosen!));
+  }
+
+  setGust(strength: number, seconds: number): void {
+    this.core.exports.cs_set_gust(this.handle, strength, seconds);
   }
 
   // The newest; undefined before the first.

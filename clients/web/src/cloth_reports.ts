@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The part of the panel that says of each cloth which solver it has, and how its simulation does.
+// The part of the panel that says of each cloth what it is made of and which solver it has, and how its simulation does.
 
 import { Solvers, type Client, type ClothReport } from "./client";
 import { element, write } from "./hud";
@@ -8,6 +8,7 @@ const kFigures = ["nodes", "strain max", "strain p99", "strain mean", "constrain
 type Figure = (typeof kFigures)[number];
 
 interface Card {
+  material: HTMLSelectElement;
   solver: HTMLSelectElement;
   figures: Map<Figure, HTMLElement>;
 }
@@ -18,13 +19,15 @@ export class ClothReports {
   private cards: Card[] = [];
   // What people chose and the client has not been told yet.
   private readonly chosen = new Map<string, number>();
+  private readonly chosenMaterials = new Map<string, string>();
 
   // Other cloths than before.
   describe(client: Client): void {
     this.chosen.clear();
+    this.chosenMaterials.clear();
     this.list.replaceChildren();
     this.cards = client.cloths().map(({ name, vertexCount }, index) => {
-      const card = this.addCard(name, index);
+      const card = this.addCard(name, index, client.materials());
       write(card.figures.get("nodes")!, vertexCount.toLocaleString("en"));
       return card;
     });
@@ -33,7 +36,8 @@ export class ClothReports {
 
   // As they stand.
   showSolvers(client: Client): void {
-    this.cards.forEach(({ solver }, index) => {
+    this.cards.forEach(({ material, solver }, index) => {
+      material.value = client.material(index);
       const kind = client.solver(index);
       if (!Solvers.has(kind) && solver.querySelector(`option[value="${kind}"]`) === null)
         solver.append(new Option(`solver ${kind}`, String(kind)));
@@ -53,11 +57,13 @@ export class ClothReports {
 
   // Hands choices to the client; to be called once a drawn frame.
   apply(client: Client): void {
+    for (const [cloth, material] of this.chosenMaterials) client.setMaterial(cloth, material);
     for (const [cloth, solver] of this.chosen) client.setSolver(cloth, solver);
+    this.chosenMaterials.clear();
     this.chosen.clear();
   }
 
-  private addCard(name: string, index: number): Card {
+  private addCard(name: string, index: number, materials: string[]): Card {
     const card = document.createElement("section");
     card.className = "cloth";
     const solver = document.createElement("select");
@@ -68,6 +74,13 @@ export class ClothReports {
     label.className = "row";
     label.htmlFor = solver.id;
     label.textContent = name;
+    const material = document.createElement("select");
+    material.id = `material-${index}`;
+    material.setAttribute("aria-label", `Material of ${name}`);
+    const none = new Option("no material", "");
+    none.disabled = true;
+    material.append(none, ...materials.map((one) => new Option(one.replace("_", " "), one)));
+    material.addEventListener("change", () => this.chosenMaterials.set(name, material.value));
     const terms = document.createElement("dl");
     const figures = new Map<Figure, HTMLElement>();
     for (const figure of kFigures) {
@@ -81,9 +94,9 @@ export class ClothReports {
       terms.append(entry);
       figures.set(figure, value);
     }
-    card.append(label, solver, terms);
+    card.append(label, material, solver, terms);
     this.list.append(card);
-    return { solver, figures };
+    return { material, solver, figures };
   }
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The panel: scene, wind, gravity, stiffness, damping, collider. What people change goes out once a drawn frame.
+// The panel: scene, wind, gusts, gravity, stiffness, damping, collider. What people change goes out once a drawn frame.
 
 import { Shape, type Client, type ClothParameters, type Environment, type Spring, type Vec3 } from "./client";
 import { element } from "./hud";
@@ -8,6 +8,7 @@ const kStill: Vec3 = [0, 0, 0];
 // Where the scene itself has none: from the viewer's side, and down.
 const kDefaultWind: Vec3 = [0, 0, -1];
 const kDown: Vec3 = [0, -1, 0];
+const kGustSeconds = 2; // as scene.proto has it
 
 export interface ControlsListener {
   sceneChosen(scene: string): void;
@@ -18,16 +19,18 @@ export class Controls {
   private readonly scenes = element<HTMLSelectElement>("scene");
   private readonly choice = element<HTMLSelectElement>("collider");
   private readonly wind = new Slider("wind", (value) => `${value.toFixed(1)} m/s`);
+  private readonly gust = new Slider("gust", (value) => `${value.toFixed(1)} m/s`);
   private readonly gravity = new Slider("gravity", (value) => `${value.toFixed(2)} m/s²`);
   // On a scale of powers of two.
   private readonly stiffness = new Slider("stiffness", (value) => `× ${(2 ** value).toFixed(2)}`);
   private readonly damping = new Slider("damping", (value) => `${value.toFixed(2)} /s`);
   private readonly radius = new Slider("radius", (value) => `${value.toFixed(2)} m`);
-  private readonly sliders = [this.wind, this.gravity, this.stiffness, this.damping, this.radius];
+  private readonly sliders = [this.wind, this.gust, this.gravity, this.stiffness, this.damping, this.radius];
   private windDirection = kDefaultWind;
   private gravityDirection = kDown;
-  // The cloths as the description found them: what stiffness multiplies.
+  // The cloths as the description found them, or as their material made them: what stiffness multiplies.
   private base: ClothParameters[] = [];
+  private materials: string[] = [];
 
   constructor(listener: ControlsListener) {
     this.scenes.addEventListener("change", () => listener.sceneChosen(this.scenes.value));
@@ -52,7 +55,7 @@ export class Controls {
 
   describe(client: Client): void {
     for (const slider of this.sliders) slider.forget();
-    this.base = client.clothParameters();
+    this.rebase(client);
     const environment = client.environment();
     this.windDirection = direction(environment?.wind ?? kStill, kDefaultWind);
     this.gravityDirection = direction(environment?.gravity ?? kStill, kDown);
@@ -73,6 +76,7 @@ export class Controls {
   show(client: Client): void {
     const environment = client.environment();
     if (environment) this.showEnvironment(environment);
+    if (this.materialsOf(client).some((material, index) => material !== this.materials[index])) this.rebase(client);
     const cloth = client.clothParameters()[0];
     const base = this.base[0];
     if (cloth && base) {
@@ -86,11 +90,13 @@ export class Controls {
   // Hands changes to the client; to be called once a drawn frame.
   apply(client: Client): void {
     const wind = this.wind.take();
+    const gust = this.gust.take();
     const gravity = this.gravity.take();
     const stiffness = this.stiffness.take();
     const damping = this.damping.take();
     const radius = this.radius.take();
     if (wind !== undefined) client.setEnvironment({ wind: scaled(this.windDirection, wind) });
+    if (gust !== undefined) client.setGust(gust, client.environment()?.gustSeconds ?? kGustSeconds);
     if (gravity !== undefined) client.setEnvironment({ gravity: scaled(this.gravityDirection, gravity) });
     if (stiffness !== undefined) {
       client.cloths().forEach(({ name }, index) => {
@@ -103,8 +109,18 @@ export class Controls {
     this.showRadius(client);
   }
 
+  private rebase(client: Client): void {
+    this.base = client.clothParameters();
+    this.materials = this.materialsOf(client);
+  }
+
+  private materialsOf(client: Client): string[] {
+    return client.cloths().map((_, index) => client.material(index));
+  }
+
   private showEnvironment(environment: Environment): void {
     this.wind.show(Math.hypot(...environment.wind));
+    this.gust.show(environment.gustStrength);
     this.gravity.show(Math.hypot(...environment.gravity));
   }
 

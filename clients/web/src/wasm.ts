@@ -44,6 +44,11 @@ export interface CoreExports {
   cs_get_grab_event(client: Pointer, index: number, out: Pointer): number;
   cs_set_grabs(client: Pointer, grabs: Pointer, count: number, nowUs: bigint): void;
   cs_set_environment(client: Pointer, gravity3: Pointer, wind3: Pointer, airDensity: Pointer): void;
+  cs_set_gust(client: Pointer, strength: number, seconds: number): void;
+  cs_set_material(client: Pointer, cloth: Pointer, material: Pointer): void;
+  cs_material_count(client: Pointer): number;
+  cs_material(client: Pointer, index: number): Pointer;
+  cs_cloth_material(client: Pointer, cloth: number): Pointer;
   cs_set_cloth(client: Pointer, cloth: Pointer, structural2: Pointer, shear2: Pointer, bend2: Pointer, damping: Pointer): void;
   cs_set_collider(client: Pointer, collider: Pointer, position3: Pointer, radius: Pointer): void;
   cs_list_scenes(client: Pointer): void;

@@ -1,0 +1,251 @@
+// SPDX-License-Identifier: MIT
+// Suite behaviour: Figures 11 to 15 of [Va21] as pictures, each with a check of what it shows.
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <span>
+#include <stdexcept>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "tests/bench/picture/picture.h"
+#include "tests/bench/picture/render.h"
+#include "tests/bench/simulated.h"
+#include "tests/bench/strain.h"
+#include "tests/bench/suite.h"
+
+namespace clothstream::bench {
+namespace {
+
+// The paper gives neither masses nor lengths. Its springs of 200 N/m are stable at 0.005 s and blow up at
+// 0.016 s, which a node of 0.03 to 0.3 kg has with twelve of them; its sheets are as wide as Unity's plane.
+constexpr std::uint32_t kNodes = 32;  // a side: the 1,024 nodes and 5,826 springs of its Figure 10
+constexpr float kNodeMass = 0.13f, kWidth = 10, kSpringDamping = 0.1f;
+// Ticks of one step. 0.016 s is no whole number of steps a second: this is 0.0161.
+constexpr std::uint32_t kShortSteps = 200, kLongSteps = 62;
+constexpr std::uint32_t kSeconds = 6;
+
+// Of a spring that shows that all is lost, parts of its length.
+constexpr double kTorn = 6;
+
+constexpr float kBallRadius = 2.5f;
+const scene::Vec3 kBall(0, 3.3f, 0);
+
+struct Panel {
+  const char* method;
+  float stiffness;  // N/m
+  scene::Solver solver = {};
+};
+
+struct Outcome {
+  Panel panel;
+  bool healthy = true;
+  Samples strains = {};
+  double lowest = 1000;  // m, of its nodes
+  double depth = 0;      // m, of the deepest node in the ball
+  Picture picture = {};
+};
+
+struct Figure {
+  int number;
+  std::uint32_t stepsASecond;
+  std::vector<Panel> panels;
+  // Throws std::runtime_error where it does not show what the paper's does.
+  void (*check)(std::span<const Outcome> outcomes);
+};
+
+void expect(bool holds, const std::string& what) {
+  if (!holds) throw std::runtime_error(what);
+}
+
+void expectHealthy(std::span<const Outcome> outcomes) {
+  for (const Outcome& outcome : outcomes)
+    expect(outcome.healthy, fmt::format("{}, ks {}: left the range of numbers", outcome.panel.method,
+                                        outcome.panel.stiffness));
+}
+
+// "Large ks presents as hard cloth, small ks as soft cloth."
+void expectHarderFromLeftToRight(std::span<const Outcome> outcomes) {
+  expectHealthy(outcomes);
+  for (std::size_t i = 1; i < outcomes.size(); ++i)
+    expect(outcomes[i].strains.mean() < outcomes[i - 1].strains.mean(),
+           fmt::format("ks {} stretches by {} in the mean, ks {} by {}", outcomes[i].panel.stiffness,
+                       outcomes[i].strains.mean(), outcomes[i - 1].panel.stiffness,
+                       outcomes[i - 1].strains.mean()));
+  for (const Outcome& outcome : outcomes)
+    expect(outcome.depth == 0,
+           fmt::format("ks {}: {} m inside the ball", outcome.panel.stiffness, outcome.depth));
+}
+
+void checkAcad(std::span<const Outcome> outcomes) {
+  expectHarderFromLeftToRight(outcomes);
+  for (const Outcome& outcome : outcomes)
+    expect(
+        outcome.strains.quantile(1) < 0.15,
+        fmt::format("ks {}: a spring stretched by {}", outcome.panel.stiffness, outcome.strains.quantile(1)));
+}
+
+// Constraints hold; with bend springs among them the sheet is a plate, which does not hang down so far.
+void checkBend(std::span<const Outcome> outcomes) {
+  expectHealthy(outcomes);
+  for (const Outcome& outcome : outcomes)
+    expect(outcome.strains.quantile(1) < 0.1,
+           fmt::format("{}: a spring stretched by {}", outcome.panel.method, outcome.strains.quantile(1)));
+  expect(outcomes[0].lowest < outcomes[1].lowest,
+         fmt::format("without bend springs it reaches down to {} m, with them to {}", outcomes[0].lowest,
+                     outcomes[1].lowest));
+}
+
+// "The cloth is stretched more" without bend springs.
+void checkBendAndStretch(std::span<const Outcome> outcomes) {
+  checkBend(outcomes);
+  expect(outcomes[0].strains.p99() > outcomes[1].strains.p99(),
+         fmt::format("without bend springs it stretches by {} at p99, with them by {}",
+                     outcomes[0].strains.p99(), outcomes[1].strains.p99()));
+}
+
+void checkBlowUp(std::span<const Outcome> outcomes) {
+  expect(!outcomes[0].healthy, "the mass-spring sheet did not blow up");
+  expectHealthy(outcomes.subspan(1));
+  expect(outcomes[1].depth == 0 && outcomes[1].strains.p99() < 0.5,
+         fmt::format("ACAD: {} m inside the ball, stretched by {} at p99", outcomes[1].depth,
+                     outcomes[1].strains.p99()));
+}
+
+scene::Solver solverOf(scene::SolverKind kind, bool bend) {
+  scene::Solver solver;
+  solver.kind = kind;
+  solver.bendConstraints = bend;
+  solver.iterations = 60;
+  return solver;
+}
+
+std::vector<Figure> figures() {
+  const scene::Solver acad = solverOf(scene::SolverKind::acad, true);
+  const std::vector<Panel> bend{
+      {"constraint, without bend", 200, solverOf(scene::SolverKind::constraint, false)},
+      {"constraint, with bend", 200, solverOf(scene::SolverKind::constraint, true)}};
+  return {{11,
+           kShortSteps,
+           {{"mass_spring", 100}, {"mass_spring", 200}, {"mass_spring", 600}},
+           &expectHarderFromLeftToRight},
+          {12, kShortSteps, bend, &checkBendAndStretch},
+          {13, kShortSteps, {{"acad", 100, acad}, {"acad", 200, acad}, {"acad", 600, acad}}, &checkAcad},
+          {14, kLongSteps, bend, &checkBend},
+          {15, kLongSteps, {{"mass_spring", 200}, {"acad", 200, acad}}, &checkBlowUp}};
+}
+
+scene::Scene sceneOf(const Figure& figure, const Panel& panel) {
+  scene::Cloth cloth;
+  cloth.name = "sheet";
+  cloth.grid = {.rows = kNodes, .columns = kNodes, .width = kWidth, .height = kWidth, .pose = {}};
+  cloth.grid.pose.position = {0, kBall.y() + kBallRadius + 0.5f, -kWidth / 2};
+  cloth.grid.pose.orientation = scene::Quaternion(std::sqrt(0.5f), -std::sqrt(0.5f), 0, 0);
+  cloth.mass = kNodeMass * static_cast<float>(kNodes * kNodes);
+  cloth.structural = cloth.shear = cloth.bend = {panel.stiffness, kSpringDamping};
+  if (panel.solver.kind == scene::SolverKind::constraint && !panel.solver.bendConstraints) cloth.bend = {};
+  cloth.damping = 0.5f;
+  cloth.friction = 0.8f;
+  cloth.thickness = 0.1f;
+  cloth.solver = panel.solver;
+  scene::Scene scene;
+  scene.name = "behaviour";
+  scene.simulationRate = scene.streamRate = figure.stepsASecond;
+  scene.substeps = 1;
+  scene.cloths = {cloth};
+  scene.colliders.resize(2);
+  scene.colliders[0].name = "ball";
+  scene.colliders[0].shape = scene::Sphere{kBallRadius};
+  scene.colliders[0].pose.position = kBall;
+  scene.colliders[1].name = "floor";
+  scene.colliders[1].shape = scene::Plane{};
+  return scene;
+}
+
+Picture pictureOf(const scene::Scene& scene, const simulation::NodeState& state) {
+  const scene::Grid& grid = scene.cloths.front().grid;
+  Surface cloth{state.positions,
+                scene::clothTriangles(scene.cloths.front()),
+                {0.72f, 0.12f, 0.13f},
+                {0.85f, 0.55f, 0.20f},
+                {}};
+  for (std::uint32_t row = 0; row < grid.rows; ++row)
+    for (std::uint32_t column = 0; column < grid.columns; ++column)
+      cloth.lines.emplace_back(static_cast<float>(column) / 4 + 0.125f, static_cast<float>(row) / 4 + 0.125f);
+  constexpr float kMiddle = 2.8f;
+  const Surface surfaces[] = {std::move(cloth), sphereSurface(kBall, kBallRadius, {0.25f, 0.45f, 0.75f})};
+  return render(
+      {.eye = {7, kMiddle + 7, 17}, .target = {0, kMiddle, 0}, .height = 10.5f, .width = 320, .rows = 300},
+      surfaces);
+}
+
+// All of its seconds, or until it leaves the range of numbers: then what it was like when a spring was first
+// torn.
+Outcome run(vulkan::Device& device, const Figure& figure, const Panel& panel) {
+  const scene::Scene scene = sceneOf(figure, panel);
+  const scene::Cloth& cloth = scene.cloths.front();
+  simulation::TickInputs inputs{scene.environment, {}};
+  for (const scene::Collider& collider : scene.colliders)
+    inputs.colliders.push_back({collider.shape, collider.pose, collider.pose, collider.friction});
+  Simulated simulated(device, scene, {});
+  Outcome outcome{panel};
+  std::optional<simulation::NodeState> torn;
+  for (std::uint32_t tick = 0; tick < kSeconds * figure.stepsASecond && outcome.healthy; ++tick) {
+    try {
+      simulated.tick(inputs);
+    } catch (const std::runtime_error&) {
+      outcome.healthy = false;
+      break;
+    }
+    if (figure.number != 15 || torn) continue;
+    simulation::NodeState state = simulated.state();
+    if (structuralStrains(cloth, state).quantile(1) > kTorn) torn = std::move(state);
+  }
+  const simulation::NodeState state = outcome.healthy || !torn ? simulated.state() : *torn;
+  outcome.strains = structuralStrains(cloth, state);
+  for (const scene::Vec3& position : state.positions) {
+    outcome.lowest = std::min(outcome.lowest, double{position.y()});
+    outcome.depth = std::max(outcome.depth, double{kBallRadius - (position - kBall).norm()});
+  }
+  outcome.picture = pictureOf(scene, state);
+  return outcome;
+}
+
+}  // namespace
+
+Rows runBehaviour(vulkan::Device& device, const Settings& settings) {
+  if (settings.size) throw std::runtime_error("the sizes are the paper's: leave out --size");
+  Rows rows;
+  for (const Figure& figure : figures()) {
+    std::vector<Outcome> outcomes;
+    std::vector<Picture> pictures;
+    for (const Panel& panel : figure.panels) {
+      outcomes.push_back(run(device, figure, panel));
+      pictures.push_back(outcomes.back().picture);
+    }
+    const auto file = settings.pictures / fmt::format("figure_{}.png", figure.number);
+    writePng(besideEachOther(pictures), file);
+    for (const Outcome& outcome : outcomes)
+      rows.push_back({{"suite", "behaviour"},
+                      {"figure", figure.number},
+                      {"method", outcome.panel.method},
+                      {"stepSeconds", 1.0 / figure.stepsASecond},
+                      {"stiffness", outcome.panel.stiffness},
+                      {"healthy", outcome.healthy},
+                      {"strainMean", outcome.strains.mean()},
+                      {"strainP99", outcome.strains.p99()},
+                      {"strainMax", outcome.strains.quantile(1)},
+                      {"lowest", outcome.lowest},
+                      {"picture", file.string()},
+                      {"device", device.info().name}});
+    try {
+      figure.check(outcomes);
+    } catch (const std::runtime_error& error) {
+      throw std::runtime_error(fmt::format("Figure {}: {}", figure.number, error.what()));
+    }
+  }
+  return rows;
+}
+
+}  // namespace clothstream::bench
