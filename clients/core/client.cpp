@@ -163,8 +163,18 @@ std::uint32_t Client::pongReceived(Bytes body, std::uint64_t nowUs) {
 }
 
 std::uint32_t Client::eventsReceived(Bytes body) {
-  if (!readTickEvents(body, grabEvents_)) return failMalformed("TickEvents");
-  return CS_EVENT_GRABS;
+  TickEvents events;
+  if (!readTickEvents(body, events)) return failMalformed("TickEvents");
+  std::uint32_t changed = 0;
+  if (!events.grabs.empty()) {
+    events_.grabs = std::move(events.grabs);
+    changed |= CS_EVENT_GRABS;
+  }
+  if (!events.contacts.empty()) {
+    events_.contacts = std::move(events.contacts);
+    changed |= CS_EVENT_CONTACTS;
+  }
+  return changed;
 }
 
 std::uint32_t Client::noticeReceived(Bytes body) {
@@ -212,6 +222,11 @@ void Client::setColliders(std::span<const cs_own_collider> colliders, std::uint6
 
 void Client::setGrabs(std::span<const cs_grab> grabs, std::uint64_t nowUs) {
   poses_.grabs.assign(grabs.begin(), grabs.end());
+  sendPoses(nowUs);
+}
+
+void Client::wantContacts(bool wants, std::uint64_t nowUs) {
+  poses_.wantsContacts = wants;
   sendPoses(nowUs);
 }
 

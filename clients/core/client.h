@@ -33,6 +33,7 @@ class Client {
   void setClock(std::uint64_t (*nowUs)()) { nowUs_ = nowUs; }
   void setColliders(std::span<const cs_own_collider> colliders, std::uint64_t nowUs);
   void setGrabs(std::span<const cs_grab> grabs, std::uint64_t nowUs);
+  void wantContacts(bool wants, std::uint64_t nowUs);
   void move(AttachmentPose attachment, std::uint64_t nowUs);
   void change(const ParameterChange& change);
   void change(const ColliderChange& change);
@@ -59,7 +60,8 @@ class Client {
   // The newest, and its tick; no cloths before the first.
   const SimulationReport& report() const { return report_; }
   std::uint64_t reportTick() const { return reportTick_; }
-  const std::vector<cs_grab_event>& grabEvents() const { return grabEvents_; }
+  const std::vector<cs_grab_event>& grabEvents() const { return events_.grabs; }
+  const std::vector<ContactEvent>& contactEvents() const { return events_.contacts; }
   const std::vector<Collider>& colliders() const { return description_.colliders; }
 
  private:
@@ -100,7 +102,7 @@ class Client {
   std::uint64_t (*nowUs_)() = nullptr;
   double decodeMs_ = 0;
   std::vector<std::string> scenes_;
-  std::vector<cs_grab_event> grabEvents_;
+  TickEvents events_;
   SimulationReport report_;
   std::uint64_t reportTick_ = 0;
   std::uint64_t parametersParticipant_ = 0;

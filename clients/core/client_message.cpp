@@ -153,6 +153,7 @@ void writeColliderPoses(std::string& out, const Poses& poses, std::uint64_t clie
       attachment.add_string(1, put.name.data(), put.name.size());
       addPose(attachment, 2, put.position, put.orientation);
     }
+    if (poses.wantsContacts) message.add_bool(5, true);
   });
 }
 

@@ -33,6 +33,7 @@ struct Poses {
   std::vector<cs_own_collider> colliders;  // their ids are their places
   std::vector<cs_grab> grabs;
   std::vector<AttachmentPose> attachments;
+  bool wantsContacts = false;
 };
 void writeColliderPoses(std::string& out, const Poses& poses, std::uint64_t clientTimeUs);
 void writeParameterChange(std::string& out, std::uint64_t requestId, const ParameterChange& change);

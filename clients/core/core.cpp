@@ -408,6 +408,27 @@ int cs_get_grab_event(const cs_client* client, uint32_t index, cs_grab_event* ou
   return 1;
 }
 
+void cs_want_contacts(cs_client* client, int wants, uint64_t now_us) {
+  client->client.wantContacts(wants != 0, now_us);
+}
+
+uint32_t cs_contact_event_count(const cs_client* client) {
+  return static_cast<std::uint32_t>(client->client.contactEvents().size());
+}
+
+int cs_get_contact_event(const cs_client* client, uint32_t index, cs_contact_event* out) {
+  const ContactEvent* event = at(client->client.contactEvents(), index);
+  if (!event) return 0;
+  *out = {.kind = event->kind,
+          .collider_id = event->colliderId,
+          .participant_id = event->participantId,
+          .collider = event->collider.c_str(),
+          .cloth = event->cloth.c_str(),
+          .impulse = event->impulse,
+          .seconds = event->seconds};
+  return 1;
+}
+
 void cs_set_colliders(cs_client* client, const float* spheres, uint32_t count, uint64_t now_us) {
   std::array<cs_own_collider, CS_MAX_COLLIDERS> colliders{};
   count = std::min(count, CS_MAX_COLLIDERS);

@@ -42,7 +42,8 @@ enum {
   CS_EVENT_PARAMETERS = 16, /* somebody changed a parameter */
   CS_EVENT_SCENES = 32,     /* answer to cs_list_scenes */
   CS_EVENT_REPORT = 64,     /* cs_get_cloth_report */
-  CS_EVENT_GRABS = 128      /* cs_grab_event_count */
+  CS_EVENT_GRABS = 128,     /* cs_grab_event_count */
+  CS_EVENT_CONTACTS = 256   /* cs_contact_event_count */
 };
 
 typedef struct cs_statistics {
@@ -179,6 +180,19 @@ typedef struct cs_grab_event {
   uint32_t vertices; /* that the grip holds now */
 } cs_grab_event;
 
+/* ContactEventKind of session.proto. */
+typedef enum cs_contact_event_kind { CS_CONTACT_BEGAN = 1, CS_CONTACT_ENDED = 2 } cs_contact_event_kind;
+
+typedef struct cs_contact_event {
+  uint32_t kind;           /* cs_contact_event_kind, or one that this client does not know yet */
+  uint32_t collider_id;    /* of a participant's: its place in cs_set_shapes */
+  uint64_t participant_id; /* 0: the scene's */
+  const char* collider;    /* of the scene's: its name */
+  const char* cloth;
+  float impulse; /* N s, in the tick in which the contact began; since then, where it ended */
+  float seconds; /* that it took; 0 where it began */
+} cs_contact_event;
+
 /* scene may be "" for the server's default; strings are copied. */
 cs_client* cs_create(const char* scene, const char* client_name);
 void cs_destroy(cs_client* client);
@@ -250,6 +264,12 @@ uint64_t cs_parameters_participant(const cs_client* client);
 /* What became of everybody's grips, as the newest CS_EVENT_GRABS told. 0 if there is no such event. */
 uint32_t cs_grab_event_count(const cs_client* client);
 int cs_get_grab_event(const cs_client* client, uint32_t index, cs_grab_event* out);
+
+/* Whether this participant wants CS_EVENT_CONTACTS; not at first. */
+void cs_want_contacts(cs_client* client, int wants, uint64_t now_us);
+/* What began and ended, as the newest CS_EVENT_CONTACTS told. 0 if there is no such event. */
+uint32_t cs_contact_event_count(const cs_client* client);
+int cs_get_contact_event(const cs_client* client, uint32_t index, cs_contact_event* out);
 
 /* Sphere colliders of this participant: `count` of {x, y, z, radius}, at most CS_MAX_COLLIDERS (the rest is
  * left out); replaces all former ones; 0 takes them away. Only the newest call counts if the transport is

@@ -394,26 +394,60 @@ std::optional<ServerError> readError(Bytes message) {
   });
 }
 
-bool readTickEvents(Bytes message, std::vector<cs_grab_event>& events) {
-  events.clear();
+namespace {
+
+bool readGrabEvent(Bytes message, cs_grab_event& out) {
   return readFields(message, [&](std::uint32_t field, Reader& reader) {
-    if (field != bytes(2)) return skip(reader);
-    if (events.size() == kMaxGrabEvents) return false;
-    cs_grab_event& event = events.emplace_back(cs_grab_event{});
-    return readFields(reader.get_view(), [&](std::uint32_t eventField, Reader& of) {
-      switch (eventField) {
-        case varint(1):
-          return set(event.participant_id, of.get_uint64());
-        case varint(2):
-          return set(event.grab_id, of.get_uint32());
-        case varint(3):
-          return set(event.kind, of.get_uint32());
-        case varint(4):
-          return set(event.vertices, of.get_uint32());
-        default:
-          return skip(of);
-      }
-    });
+    switch (field) {
+      case varint(1):
+        return set(out.participant_id, reader.get_uint64());
+      case varint(2):
+        return set(out.grab_id, reader.get_uint32());
+      case varint(3):
+        return set(out.kind, reader.get_uint32());
+      case varint(4):
+        return set(out.vertices, reader.get_uint32());
+      default:
+        return skip(reader);
+    }
+  });
+}
+
+bool readContactEvent(Bytes message, ContactEvent& out) {
+  return readFields(message, [&](std::uint32_t field, Reader& reader) {
+    switch (field) {
+      case varint(1):
+        return set(out.kind, reader.get_uint32());
+      case bytes(2):
+        return setText(out.collider, reader);
+      case varint(3):
+        return set(out.participantId, reader.get_uint64());
+      case varint(4):
+        return set(out.colliderId, reader.get_uint32());
+      case bytes(5):
+        return setText(out.cloth, reader);
+      case fixed32(6):
+        return std::isfinite(out.impulse = reader.get_float());
+      case fixed32(7):
+        return std::isfinite(out.seconds = reader.get_float());
+      default:
+        return skip(reader);
+    }
+  });
+}
+
+}  // namespace
+
+bool readTickEvents(Bytes message, TickEvents& events) {
+  events = {};
+  return readFields(message, [&](std::uint32_t field, Reader& reader) {
+    if (field == bytes(2))
+      return events.grabs.size() < kMaxEvents &&
+             readGrabEvent(reader.get_view(), events.grabs.emplace_back());
+    if (field == bytes(3))
+      return events.contacts.size() < kMaxEvents &&
+             readContactEvent(reader.get_view(), events.contacts.emplace_back());
+    return skip(reader);
   });
 }
 

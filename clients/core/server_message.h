@@ -129,6 +129,18 @@ struct ParameterChange {
   std::uint64_t participantId = 0;  // who made it
 };
 
+struct ContactEvent {
+  std::uint32_t kind = 0, colliderId = 0;
+  std::uint64_t participantId = 0;
+  std::string collider, cloth;
+  float impulse = 0, seconds = 0;
+};
+
+struct TickEvents {
+  std::vector<cs_grab_event> grabs;
+  std::vector<ContactEvent> contacts;
+};
+
 // nullopt: not well formed, a number that is not finite where the protocol has finite ones, or more parts
 // than the protocol allows.
 [[nodiscard]] std::optional<ServerMessage> readServerMessage(Bytes message);
@@ -144,8 +156,7 @@ struct ParameterChange {
 [[nodiscard]] std::optional<std::string> readNotice(Bytes message);
 [[nodiscard]] std::optional<ParameterChange> readParameterChanged(Bytes message);
 [[nodiscard]] std::optional<ServerError> readError(Bytes message);
-// Of the grips. Reuses the memory of `events`.
-[[nodiscard]] bool readTickEvents(Bytes message, std::vector<cs_grab_event>& events);
+[[nodiscard]] bool readTickEvents(Bytes message, TickEvents& events);
 // The names of the scenes.
 [[nodiscard]] std::optional<std::vector<std::string>> readScenes(Bytes message);
 
@@ -161,6 +172,6 @@ inline constexpr std::size_t kMaxCloths = 256;
 inline constexpr std::size_t kMaxSceneColliders = 4096;
 inline constexpr std::size_t kMaxHullParts = 128;  // vertices, faces
 inline constexpr std::size_t kMaxScenes = 65536;
-inline constexpr std::size_t kMaxGrabEvents = 65536;
+inline constexpr std::size_t kMaxEvents = 65536;  // of a kind
 
 }  // namespace clothstream::client

@@ -121,6 +121,7 @@ Result<scene::ParticipantPoses> toPoses(const v1::ColliderPoses& message, const 
   readColliders(checks, path, message, poses);
   readGrabs(checks, path, message, poses);
   readAttachments(checks, path, message, scene, poses);
+  poses.wantsContacts = message.contact_events();
   return std::move(checks).result(std::move(poses));
 }
 

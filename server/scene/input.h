@@ -37,6 +37,7 @@ struct ParticipantPoses {
   std::vector<ParticipantCollider> colliders = {};
   std::vector<Grab> grabs = {};
   std::vector<AttachmentPose> attachments = {};
+  bool wantsContacts = false;  // to be told what colliders do to cloth
 };
 
 struct ClothChange {

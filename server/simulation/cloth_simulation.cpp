@@ -112,6 +112,7 @@ StateBuffers stateOf(const Buffers& b, const CollisionStage& collision) {
   return {.cloths = b.cloths,
           .colliders = collision.colliders(),
           .nearColliders = collision.nearLists(),
+          .toldContacts = collision.toldContacts(),
           .positions = {&b.positions[0], &b.positions[1]},
           .velocities = {&b.velocities[0], &b.velocities[1]}};
 }
@@ -148,19 +149,20 @@ std::unique_ptr<Stage> makeAdvance(const vulkan::Device& device, const Buffers& 
                                    scene::Integrator integrator, const AdvanceVariant& variant) {
   return std::make_unique<Stage>(
       device,
-      vulkan::KernelDescription{
-          .name = "advance_mass_spring",
-          .spirv = spirv,
-          .bindings = {BindingKind::texels, BindingKind::texels, BindingKind::texels, BindingKind::texels,
-                       BindingKind::storage, BindingKind::storage, BindingKind::texels, BindingKind::texels},
-          .pushConstantBytes = sizeof(shared::AdvancePush),
-          .workgroupSize = cut.workgroupSize,
-          .specialisation = variant.specialisation(cut.rowsPerInvocation, integrator)},
+      vulkan::KernelDescription{.name = "advance_mass_spring",
+                                .spirv = spirv,
+                                .bindings = {BindingKind::texels, BindingKind::texels, BindingKind::texels,
+                                             BindingKind::texels, BindingKind::storage, BindingKind::storage,
+                                             BindingKind::texels, BindingKind::texels, BindingKind::storage},
+                                .pushConstantBytes = sizeof(shared::AdvancePush),
+                                .workgroupSize = cut.workgroupSize,
+                                .specialisation = variant.specialisation(cut.rowsPerInvocation, integrator)},
       std::initializer_list<const Buffer*>{&b.cloths, &b.tiles, &b.positions[0], &b.velocities[0],
-                                           &b.positions[1], &b.velocities[1], &c.colliders(), &c.nearLists()},
+                                           &b.positions[1], &b.velocities[1], &c.colliders(), &c.nearLists(),
+                                           &c.toldContacts()},
       std::initializer_list<const Buffer*>{&b.cloths, &b.tiles, &b.positions[1], &b.velocities[1],
-                                           &b.positions[0], &b.velocities[0], &c.colliders(),
-                                           &c.nearLists()});
+                                           &b.positions[0], &b.velocities[0], &c.colliders(), &c.nearLists(),
+                                           &c.toldContacts()});
 }
 
 Stage makeNormals(const vulkan::Device& device, const Buffers& b, const Cut& cut) {
@@ -260,7 +262,8 @@ ClothSimulation::Pipeline::Pipeline(const vulkan::Device& on, const scene::Scene
       clothMasses(massesOf(scene.cloths)),
       cut(cutScene(on, scene, options)),
       buffers(on, nodes, records.size(), cut.tiles.records.size()),
-      collision(on, nodes, {&buffers.positions[0], &buffers.positions[1]},
+      collision(on, nodes, static_cast<std::uint32_t>(records.size()),
+                {&buffers.positions[0], &buffers.positions[1]},
                 {&buffers.velocities[0], &buffers.velocities[1]}),
       normals(makeNormals(on, buffers, cut)),
       hash(makeHash(on, buffers, cut)),
@@ -386,7 +389,7 @@ void ClothSimulation::Pipeline::recordInputs(vulkan::Recorder& recorder, const T
   std::memcpy(from.mapped().data(), records.data(), clothBytes);
   recorder.beginStage("inputs");
   recorder.copy(from, buffers.cloths, clothBytes);
-  collision.recordInputs(recorder, inputs.colliders);
+  collision.recordInputs(recorder, inputs.colliders, inputs.tellsContacts);
   if (!holds && !inputs.grips.empty()) makeHolds({});
   if (holds) holds->recordInputs(recorder, inputs.attachments, inputs.grips);
   recorder.fill(buffers.status, 0, buffers.status.bytes());
@@ -469,6 +472,7 @@ void ClothSimulation::Pipeline::recordStatus(vulkan::Recorder& recorder) {
   if (solves.active()) solves.recordReport(recorder);
   if (selfCollision) selfCollision->recordReport(recorder, slot);
   if (holds) holds->recordReport(recorder);
+  collision.recordTold(recorder);
 }
 
 ClothSimulation::ClothSimulation(const vulkan::Device& device, const scene::Scene& scene,
@@ -518,6 +522,10 @@ void ClothSimulation::recordReport(vulkan::Recorder& recorder, const TickInputs&
   recorder.beginStage("report");
   on.report->record(recorder, on.present, on.stiffness, inputs.environment.gravity,
                     on.collision.push(on.substeps - 1, on.substeps, on.tickRate));
+}
+
+std::vector<ContactStatus> ClothSimulation::contacts() const {
+  return pipeline_->collision.told();
 }
 
 std::vector<GripStatus> ClothSimulation::grips() const {

@@ -32,6 +32,7 @@ namespace clothstream::simulation {
 struct TickInputs {
   scene::Environment environment;
   std::vector<MovingCollider> colliders;  // at most kMaxColliders, in the order in which they act
+  bool tellsContacts = false;             // whether contacts() has something to say after this tick
   // Where each attachment of the scene is at the tick's end, in the order of its cloths; none: where they
   // start.
   std::vector<scene::Pose> attachments = {};
@@ -84,6 +85,10 @@ class ClothSimulation {
   // Of its last substep: one a cloth that a linear system is solved for; first constraints, then implicit
   // Euler, each first of grids and first of small ones.
   std::span<const shared::SolveRecord> solves() const;
+
+  // Of the last recorded tick, once it is complete: by colliders, then by cloths. Colliders that did nothing
+  // have none.
+  std::vector<ContactStatus> contacts() const;
 
   // Of the last recorded tick's grips, once it is complete.
   std::vector<GripStatus> grips() const;

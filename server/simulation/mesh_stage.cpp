@@ -39,7 +39,7 @@ vulkan::Bindings MeshStage::advanceFrom(const Kernel& kernel, std::size_t from) 
   return Bindings(device_, kernel,
                   {&state_.cloths, &tiles_.texels(), state_.positions[from], state_.velocities[from],
                    state_.positions[to], state_.velocities[to], &state_.colliders, &state_.nearColliders,
-                   &nodes_.texels(), &corners_.texels(), &springEnds_.texels()});
+                   &state_.toldContacts, &nodes_.texels(), &corners_.texels(), &springEnds_.texels()});
 }
 
 MeshStage::Advance::Advance(const MeshStage& stage, const AdvanceVariant& variant)
@@ -47,8 +47,8 @@ MeshStage::Advance::Advance(const MeshStage& stage, const AdvanceVariant& varian
                              .spirv = kernels::advance_mesh,
                              .bindings = {BindingKind::texels, BindingKind::texels, BindingKind::texels,
                                           BindingKind::texels, BindingKind::storage, BindingKind::storage,
-                                          BindingKind::texels, BindingKind::texels, BindingKind::texels,
-                                          BindingKind::texels, BindingKind::texels},
+                                          BindingKind::texels, BindingKind::texels, BindingKind::storage,
+                                          BindingKind::texels, BindingKind::texels, BindingKind::texels},
                              .pushConstantBytes = sizeof(shared::AdvancePush),
                              .workgroupSize = stage.workgroupSize_,
                              .specialisation = variant.specialisation(1, stage.integrator_)}),

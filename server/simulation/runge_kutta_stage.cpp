@@ -43,7 +43,7 @@ Kernel RungeKuttaStage::makeCombine(const vulkan::Device& device, std::uint32_t 
   return Kernel(device, {.name = "combine_runge_kutta",
                          .spirv = kernels::combine_runge_kutta,
                          .bindings = {kTexels, kTexels, kTexels, kTexels, kStorage, kStorage, kStorage,
-                                      kStorage, kStorage, kStorage, kStorage, kStorage},
+                                      kStorage, kStorage, kStorage, kStorage, kStorage, kStorage},
                          .pushConstantBytes = sizeof(shared::RungeKuttaPush),
                          .workgroupSize = 64,
                          .specialisation = {stage}});
@@ -55,7 +55,7 @@ Bindings RungeKuttaStage::combineFrom(const vulkan::Device& device, const StateB
   return Bindings(device, combine_[stage],
                   {&state.cloths, &state.colliders, &state.nearColliders, &start_, state.positions[from],
                    state.velocities[from], state.positions[to], state.velocities[to], &start_,
-                   &startVelocities_, &sums_, &velocitySums_});
+                   &startVelocities_, &sums_, &velocitySums_, &state.toldContacts});
 }
 
 void RungeKuttaStage::record(vulkan::Recorder& recorder, std::uint32_t from,

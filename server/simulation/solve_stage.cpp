@@ -137,10 +137,10 @@ struct SolveStage::Kernels {
   const Kernel& apply(const SolveGroup& group) {
     std::unique_ptr<Kernel>& kernel = applies[group.mesh ? 1 : 0];
     if (!kernel)
-      kernel =
-          make("apply_velocities", kernels::apply_velocities,
-               {kTexels, kTexels, kTexels, kTexels, kTexels, kTexels, kTexels, kStorage, kStorage, kStorage},
-               sizeof(shared::ApplyPush), group);
+      kernel = make("apply_velocities", kernels::apply_velocities,
+                    {kTexels, kTexels, kTexels, kTexels, kTexels, kTexels, kTexels, kStorage, kStorage,
+                     kStorage, kStorage},
+                    sizeof(shared::ApplyPush), group);
     return *kernel;
   }
 
@@ -249,7 +249,7 @@ struct SolveStage::Systems {
         device, kernels.apply(group.on),
         std::initializer_list<const Buffer*>{&state.cloths, &systems.texels(), &chunks.texels(), &vectors,
                                              &state.colliders, &state.nearColliders, &position, &freePosition,
-                                             &freeVelocity, &actives});
+                                             &freeVelocity, &actives, &state.toldContacts});
   }
 
   void recordPrepare(vulkan::Recorder& recorder, const Group& group, std::uint32_t from, double h) const;

@@ -129,17 +129,17 @@ const Stage& XpbdStage::finish(const XpbdVariant& variant) {
   const Buffer *colliders = &state_.colliders, *near = &state_.nearColliders;
   stage = std::make_unique<Stage>(
       device_,
-      vulkan::KernelDescription{
-          .name = "finish_corrections",
-          .spirv = kernels::finish_corrections,
-          .bindings = {kTexels, kTexels, kTexels, kTexels, kTexels, kTexels, kStorage, kStorage, kTexels},
-          .pushConstantBytes = sizeof(shared::FinishPush),
-          .workgroupSize = cut_.partWorkgroup,
-          .specialisation = {variant.colliders ? 1u : 0u}},
+      vulkan::KernelDescription{.name = "finish_corrections",
+                                .spirv = kernels::finish_corrections,
+                                .bindings = {kTexels, kTexels, kTexels, kTexels, kTexels, kTexels, kStorage,
+                                             kStorage, kTexels, kStorage},
+                                .pushConstantBytes = sizeof(shared::FinishPush),
+                                .workgroupSize = cut_.partWorkgroup,
+                                .specialisation = {variant.colliders ? 1u : 0u}},
       Stage::Buffers{&state_.cloths, &tiles_.texels(), one, other, colliders, near, other, otherVelocity,
-                     otherVelocity},
+                     otherVelocity, &state_.toldContacts},
       Stage::Buffers{&state_.cloths, &tiles_.texels(), other, one, colliders, near, one, oneVelocity,
-                     oneVelocity});
+                     oneVelocity, &state_.toldContacts});
   return *stage;
 }
 

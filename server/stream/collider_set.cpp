@@ -60,6 +60,12 @@ void ColliderSet::advance(const scene::Scene& scene, double endSeconds,
   }
 }
 
+ColliderSet::Identity ColliderSet::identity(std::size_t index) const {
+  if (index < scenePoses_.size()) return {0, static_cast<std::uint32_t>(index)};
+  const Held& held = colliders_[index - scenePoses_.size()];
+  return {held.participant, held.now.id};
+}
+
 void ColliderSet::write(const scene::Scene& scene,
                         google::protobuf::RepeatedPtrField<v1::ColliderState>& states) const {
   states.Clear();

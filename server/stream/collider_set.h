@@ -2,6 +2,7 @@
 // Where all colliders of a scene are from tick to tick, the scene's own and the participants'.
 #pragma once
 
+#include <compare>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -35,6 +36,15 @@ class ColliderSet {
   // then.
   void advance(const scene::Scene& scene, double endSeconds,
                std::vector<simulation::MovingCollider>& colliders);
+
+  // Which collider is the index-th of the last advance(). Of the scene's the participant is 0 and the id
+  // their place.
+  struct Identity {
+    std::uint64_t participant;
+    std::uint32_t id;
+    auto operator<=>(const Identity&) const = default;
+  };
+  Identity identity(std::size_t index) const;
 
   // Where they are now. `scene` as of the last advance().
   void write(const scene::Scene& scene, google::protobuf::RepeatedPtrField<v1::ColliderState>& states) const;

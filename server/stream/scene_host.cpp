@@ -79,6 +79,7 @@ void SceneHost::begin(Clock::time_point now) {
   const double endSeconds = static_cast<double>(tick_ + 1) * scene_.tickSeconds();
   colliders_.advance(scene_, endSeconds, tickInputs_.colliders);
   holds_.advance(scene_, endSeconds, tickInputs_);
+  tickInputs_.tellsContacts = contacts_.wanted();
   tickInputs_.environment = scene::environmentAt(scene_, tick_);
 
   OnDevice& on = *onDevice_;
@@ -108,6 +109,7 @@ void SceneHost::applyInputs() {
   for (const Poses& poses : inputs_.poses) {
     colliders_.place(poses.participant, poses.now.colliders);
     holds_.place(poses.participant, poses.now.grabs, poses.now.attachments);
+    contacts_.want(poses.participant, poses.now.wantsContacts);
     const bool moves =
         !poses.now.colliders.empty() || !poses.now.grabs.empty() || !poses.now.attachments.empty();
     if (moves && poseArrivals_.size() < kMaxPoseArrivals) poseArrivals_.push_back(poses.arrival);
@@ -233,7 +235,9 @@ void SceneHost::announceEvents() {
   v1::ServerMessage message;
   v1::TickEvents& events = *message.mutable_tick_events();
   holds_.addEvents(onDevice_->simulation.grips(), *events.mutable_grabs());
-  if (events.grabs().empty()) return;
+  contacts_.addEvents(tick_, scene_, colliders_, onDevice_->simulation.contacts(),
+                      *events.mutable_contacts());
+  if (events.grabs().empty() && events.contacts().empty()) return;
   events.set_tick(tick_);
   live_.audience.announce(serialise(message));
 }

@@ -11,6 +11,7 @@
 #include "server/encode/frame_encoder.h"
 #include "server/simulation/cloth_simulation.h"
 #include "server/stream/collider_set.h"
+#include "server/stream/contact_log.h"
 #include "server/stream/frame_packer.h"
 #include "server/stream/hold_set.h"
 #include "server/stream/live_scene.h"
@@ -94,6 +95,7 @@ class SceneHost {
   scene::Scene scene_;  // as of the tick in hand
   ColliderSet colliders_;
   HoldSet holds_;
+  ContactLog contacts_;
   Inputs inputs_;
   simulation::TickInputs tickInputs_;
   std::vector<Clock::time_point> poseArrivals_;  // that no frame has shown yet

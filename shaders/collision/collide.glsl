@@ -2,8 +2,8 @@
 // Collision of a node with moving shapes over a substep, with Coulomb friction: [Va21] 3.4, Alg. 4, and more
 // shapes.
 //
-// The kernel that includes this defines kColliderBinding, the first of two bindings, and calls
-// collideWithAll() with a node's index in the scene.
+// The kernel that includes this defines kColliderBinding, the first of two bindings, and kToldBinding, and
+// calls collideWithAll() with a node's index in the scene.
 #ifndef CLOTHSTREAM_SHADERS_COLLISION_COLLIDE_GLSL
 #define CLOTHSTREAM_SHADERS_COLLISION_COLLIDE_GLSL
 
@@ -13,6 +13,16 @@
 layout(binding = kColliderBinding) uniform samplerBuffer colliders;  // ColliderRecord, then planes
 layout(binding = kColliderBinding +
                  1) uniform samplerBuffer nearColliders;  // a list for each kNearNodes nodes
+
+layout(std430, binding = kToldBinding) buffer ToldContacts {
+  uint toldContacts[];  // a collider, a cloth: kImpulseUnits
+};
+
+// Who collides: its cloth's number; 0 where its contacts are not to be told.
+struct Toucher {
+  uint cloth;
+  float inverseMass;
+};
 
 // ---- Which colliders
 
@@ -128,9 +138,18 @@ Contact findContact(Collider collider, ColliderFrame frame, vec3 from, vec3 to) 
   return contact;
 }
 
+// Whole numbers, so that the sum does not depend on who comes first.
+void tell(uint contact, vec3 gained, float inverseMass) {
+  precise float squared = max(dotProduct(gained, gained), 1e-30);
+  precise float impulse = (squared * reciprocalSquareRoot(squared)) * reciprocal(inverseMass);
+  precise float units = min(impulse, kMostImpulse) * kImpulseUnits;
+  atomicAdd(toldContacts[contact], uint(units) + 1);
+}
+
 // Puts a node that comes from `from` out of the collider. Its velocity relative to the surface loses what
 // goes into it, and, of what goes along it, at most friction times that. For nodes that can move.
-void collide(Collider collider, ColliderFrame frame, vec3 from, inout vec3 position, inout vec3 velocity) {
+void collide(uint index, Collider collider, ColliderFrame frame, CollisionPush push, Toucher who, vec3 from,
+             inout vec3 position, inout vec3 velocity) {
   Contact contact = findContact(collider, frame, from, position);
   if (contact.depth <= 0.0) {
     return;
@@ -141,18 +160,24 @@ void collide(Collider collider, ColliderFrame frame, vec3 from, inout vec3 posit
   precise vec3 carried = collider.velocity + crossProduct(frame.spin, arm);
   precise vec3 relative = velocity - carried;
   precise float approach = dotProduct(relative, contact.normal);
+  vec3 gained = vec3(0.0);
   if (approach < 0.0) {
     precise vec3 slip = relative - approach * contact.normal;
     precise float inverseSlip = reciprocalSquareRoot(max(dotProduct(slip, slip), 1e-30));
     precise float kept = max(1.0 + collider.friction * approach * inverseSlip, 0.0);
     precise vec3 after = carried + kept * slip;
+    precise vec3 difference = after - velocity;
+    gained = difference;
     velocity = after;
+  }
+  if (push.toldCloths > 0 && who.inverseMass > 0.0) {
+    tell(index * push.toldCloths + who.cloth, gained, who.inverseMass);
   }
 }
 
 // Every collider that the node may touch, in ascending order. One that is pushed out of what the list covers
 // goes on with the collider that comes next of all.
-void collideWithAll(uint node, CollisionPush push, float thickness, float friction, vec3 from,
+void collideWithAll(uint node, Toucher who, CollisionPush push, float thickness, float friction, vec3 from,
                     inout vec3 position, inout vec3 velocity) {
   NearList list = fetchNearList(node);
   uint i = 0;
@@ -166,7 +191,7 @@ void collideWithAll(uint node, CollisionPush push, float thickness, float fricti
       uint index = colliderAt(list, i);
       Collider collider = fetchCollider(index, push, thickness, friction);
       if (mayTouch(collider, from, position)) {
-        collide(collider, fetchFrame(collider, push), from, position, velocity);
+        collide(index, collider, fetchFrame(collider, push), push, who, from, position, velocity);
       }
       next = index + 1;
       ++i;

@@ -45,8 +45,15 @@ struct CollisionPush {
   float progressAfter;
   float tickRate;  // 1/s
   float substepRate;
-  uint32_t reserved0, reserved1, reserved2;
+  uint32_t toldCloths;  // cloths of the scene, where contacts are to be told of; else 0
+  uint32_t reserved0, reserved1;
 };
+
+// What a collider does to a cloth in a tick is one number, at collider times cloths plus cloth: the impulse
+// in units of which a N s has so many, and one more for each touch; 0: they do not touch.
+const float kImpulseUnits = 1e6f;
+// The most that one touch adds.
+const float kMostImpulse = 1000;
 
 struct GatherPush {
   uint32_t nodeCount;

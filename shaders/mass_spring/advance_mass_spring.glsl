@@ -154,8 +154,11 @@ void main() {
       vec3 from = origins[0];
       if (!idle) {
         if (node.inverseMass > 0.0) {
-          collideWithAll(start + min(strip.row + k, lastRow) * columns, push.collision, thickness, friction,
-                         from, node.position, node.velocity);
+          bool exists = strip.row + k <= lastRow;
+          Toucher who =
+              Toucher(uint(strip.cloth) / CLOTHSTREAM_CLOTH_TEXELS, exists ? node.inverseMass : 0.0);
+          collideWithAll(start + min(strip.row + k, lastRow) * columns, who, push.collision, thickness,
+                         friction, from, node.position, node.velocity);
         }
         [[unroll]] for (uint i = 0; i + 1 < kRowsPerInvocation; ++i) {
           moved[i] = moved[i + 1];

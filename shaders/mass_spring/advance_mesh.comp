@@ -4,7 +4,7 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
 
-#define CLOTHSTREAM_MESH_BINDING 8
+#define CLOTHSTREAM_MESH_BINDING 9
 
 #include "shaders/mass_spring/state.glsl"
 #include "shaders/shared/mesh_node.glsl"
@@ -66,7 +66,8 @@ void main() {
   }
   Node moved = moveNode(here, force, texelFetch(cloths, self.cloth + 1).w);
   if (kColliders && moved.inverseMass > 0.0) {
-    collideWithAll(self.index, push.collision, damping.w, stiffness.w, here.position, moved.position,
+    Toucher who = Toucher(uint(self.cloth) / CLOTHSTREAM_CLOTH_TEXELS, moved.inverseMass);
+    collideWithAll(self.index, who, push.collision, damping.w, stiffness.w, here.position, moved.position,
                    moved.velocity);
   }
   store(self.index, moved);

@@ -9,6 +9,7 @@
 
 const int kColliderBinding = 1;
 const int kStateBinding = 3;
+const int kToldBinding = 12;
 
 #include "shaders/shared/simulation.h"
 

@@ -12,6 +12,7 @@
 
 const int kMaterialBinding = 0;
 const int kColliderBinding = 2;
+const int kToldBinding = 12;
 
 #include "shaders/collision/collide.glsl"
 #include "shaders/self_collision/neighbours.glsl"
@@ -92,8 +93,10 @@ void main() {
   precise vec3 position = here.xyz + push.substepSeconds * change;
   if (push.collision.colliderCount > 0) {
     // With the cloth's friction and thickness against colliders.
-    collideWithAll(node, push.collision, texelFetch(cloths, record + 3).w, texelFetch(cloths, record + 2).w,
-                   texelFetch(startPositions, int(node)).xyz, position, velocity);
+    Toucher who = Toucher(uint(record) / CLOTHSTREAM_CLOTH_TEXELS, here.w);
+    collideWithAll(node, who, push.collision, texelFetch(cloths, record + 3).w,
+                   texelFetch(cloths, record + 2).w, texelFetch(startPositions, int(node)).xyz, position,
+                   velocity);
   }
   positions[node] = vec4(snapTiny(position), here.w);
   velocities[node] = vec4(snapTiny(velocity), 0.0);

@@ -6,6 +6,7 @@
 
 const int kColliderBinding = 4;
 const int kStateBinding = 6;
+const int kToldBinding = 10;
 
 #include "shaders/solve/system.glsl"
 // Reads `cloths`.

@@ -124,6 +124,36 @@ TEST(Grabs, WhatBecomesOfThemIsTold) {
   EXPECT_EQ(cs_get_grab_event(joined.client.get(), 1, &told), 0);
 }
 
+TEST(Contacts, AreWantedAndTold) {
+  Joined joined;
+  cs_want_contacts(joined.client.get(), 1, 1);
+  EXPECT_TRUE(joined.sent().collider_poses().contact_events());
+  v1::ServerMessage message;
+  v1::ContactEvent& event = *message.mutable_tick_events()->add_contacts();
+  event.set_kind(v1::CONTACT_EVENT_KIND_ENDED);
+  event.set_participant_id(5);
+  event.set_collider_id(2);
+  event.set_cloth("sheet");
+  event.set_impulse(0.25f);
+  event.set_seconds(1.5f);
+  EXPECT_EQ(joined.client.receive(message.SerializeAsString()),
+            static_cast<std::uint32_t>(CS_EVENT_CONTACTS));
+  ASSERT_EQ(cs_contact_event_count(joined.client.get()), 1u);
+  cs_contact_event told;
+  ASSERT_EQ(cs_get_contact_event(joined.client.get(), 0, &told), 1);
+  EXPECT_EQ(told.kind, static_cast<std::uint32_t>(CS_CONTACT_ENDED));
+  EXPECT_EQ(told.participant_id, 5u);
+  EXPECT_EQ(told.collider_id, 2u);
+  EXPECT_STREQ(told.collider, "");
+  EXPECT_STREQ(told.cloth, "sheet");
+  EXPECT_EQ(told.impulse, 0.25f);
+  EXPECT_EQ(told.seconds, 1.5f);
+  EXPECT_EQ(cs_get_contact_event(joined.client.get(), 1, &told), 0);
+  event.set_impulse(kNan);
+  joined.client.receive(message.SerializeAsString());
+  EXPECT_EQ(cs_get_state(joined.client.get()), CS_STATE_FAILED);
+}
+
 TEST(Attachments, AreMovedOnceEachToWhereTheyWereLastPut) {
   Joined joined;
   const float first[] = {1, 0, 0}, second[] = {2, 0, 0}, turned[] = {0, 0, 0, 1};

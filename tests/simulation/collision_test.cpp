@@ -274,5 +274,61 @@ TEST_F(Collision, asManyCollidersAsThereMayBeActAsInTheReference) {
   EXPECT_GT(largestDistance(simulation::restState(scene.cloths), reference), 0.001);
 }
 
+// What falls on the ground and comes to rest has got back what gravity gave it: M g t. With every kernel that
+// collides.
+TEST_F(Collision, whatCollidersGiveToTheClothIsTold) {
+  using enum scene::SolverKind;
+  struct Kernel {
+    scene::SolverKind solver = massSpring;
+    scene::Integrator integrator = scene::Integrator::semiImplicitEuler;
+    bool isMesh = false, selfCollides = false;
+  };
+  const Kernel kernels[] = {{},
+                            {.isMesh = true},
+                            {.integrator = scene::Integrator::rungeKutta4},
+                            {.solver = constraint},
+                            {.solver = acad, .isMesh = true},
+                            {.solver = xpbd},
+                            {.solver = implicitEuler},
+                            {.selfCollides = true}};
+  for (const Kernel& kernel : kernels) {
+    scene::Cloth cloth = lyingCloth(5, 7, 0.02f);
+    cloth.friction = 0;
+    cloth.solver.kind = kernel.solver;
+    if (kernel.solver == xpbd) cloth.solver.iterations = 1;
+    if (kernel.isMesh) cloth = scene::asMesh(cloth);
+    if (kernel.selfCollides) cloth.selfCollision = scene::SelfCollision{.radius = 0.008f};
+    // Another, far above, that touches nothing.
+    scene::Cloth above = lyingCloth(3, 3, 50);
+    above.name = "above";
+    scene::Scene scene = sceneOf({above, cloth});
+    scene.integrator = kernel.integrator;
+    Running running(scene), untold(scene);
+    // Far below, and never touched.
+    simulation::TickInputs inputs =
+        inputsOf(scene, {resting(scene::Sphere{0.1f}, {scene::Vec3(0, -9, 0), scene::Quaternion::Identity()}),
+                         resting(scene::Plane{}, {})});
+    double impulse = 0;
+    for (int tick = 0; tick < 36; ++tick) {
+      inputs.tellsContacts = false;
+      const std::uint64_t expected = untold.tick(inputs).stateHash;
+      EXPECT_TRUE(untold.contacts().empty());
+      inputs.tellsContacts = true;
+      EXPECT_EQ(running.tick(inputs).stateHash, expected);
+      for (const simulation::ContactStatus& contact : running.contacts()) {
+        EXPECT_EQ(contact.collider, 1u);
+        EXPECT_EQ(contact.cloth, 1u);
+        impulse += contact.impulse;
+      }
+      // It falls 64 ms, four ticks and a half.
+      if (tick == 3) {
+        EXPECT_EQ(impulse, 0);
+      }
+    }
+    const double expected = double{cloth.mass} * 9.81 * 36 / 72;
+    EXPECT_NEAR(impulse, expected, 0.01 * expected) << static_cast<int>(kernel.solver);
+  }
+}
+
 }  // namespace
 }  // namespace clothstream::tests

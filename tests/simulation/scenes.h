@@ -56,6 +56,7 @@ class Running {
   simulation::NodeState state() { return simulation::unpack(save()); }
   std::vector<scene::Vec3> normals();
   std::span<const shared::SolveRecord> solves() const { return simulation_.solves(); }
+  std::vector<simulation::ContactStatus> contacts() const { return simulation_.contacts(); }
   std::vector<simulation::GripStatus> grips() const { return simulation_.grips(); }
   // A tick, and what its end is like.
   std::vector<simulation::ClothReport> tickAndReport(const simulation::TickInputs& inputs);

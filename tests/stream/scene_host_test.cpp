@@ -234,6 +234,51 @@ TEST_F(SceneHostTest, WhatBecomesOfGripsIsTold) {
   EXPECT_EQ(nothing.grabs(0).vertices(), 0u);
 }
 
+// A hand in the sheet for ten ticks, then gone. The scene's ball swings through it too.
+TEST_F(SceneHostTest, ContactsAreToldToWhoWantsThem) {
+  scene::Scene scene = smallScene();
+  scene.colliders[0].motion.keys.clear();
+  scene.colliders[0].pose.position = Vec3(0, -0.5f, 3);
+  HostedScene hosted(scene);
+  const auto contacts = [&] {
+    std::vector<v1::ContactEvent> events;
+    for (const v1::ServerMessage& message : hosted.told)
+      events.insert(events.end(), message.tick_events().contacts().begin(),
+                    message.tick_events().contacts().end());
+    hosted.told.clear();
+    return events;
+  };
+  const auto touch = [&](bool wants) {
+    hosted.live.inbox.postPoses(7, {.colliders = {handAt(4, 0, -0.6f, 0.05f)}, .wantsContacts = wants},
+                                hosted.now);
+    hosted.ticks(10);
+    hosted.live.inbox.postPoses(7, {.colliders = {handAt(4, 5)}, .wantsContacts = wants}, hosted.now);
+    hosted.ticks(5);
+  };
+  touch(false);
+  EXPECT_THAT(contacts(), ::testing::IsEmpty());
+  touch(true);
+  const std::vector<v1::ContactEvent> events = contacts();
+  ASSERT_GE(events.size(), 2u);
+  EXPECT_EQ(events.size() % 2, 0u);
+  for (std::size_t i = 0; i < events.size(); ++i) {
+    EXPECT_EQ(events[i].kind(), i % 2 == 0 ? v1::CONTACT_EVENT_KIND_BEGAN : v1::CONTACT_EVENT_KIND_ENDED);
+    EXPECT_EQ(events[i].participant_id(), 7u);
+    EXPECT_EQ(events[i].collider_id(), 4u);
+    EXPECT_EQ(events[i].collider(), "");
+    EXPECT_EQ(events[i].cloth(), "sheet");
+    EXPECT_GT(events[i].impulse(), 0);
+  }
+  EXPECT_GT(events[1].seconds(), 0);
+  EXPECT_LE(events[1].seconds(), 10.0f / 40 + 1e-6f);
+  // Whoever leaves wants nothing any more.
+  hosted.live.inbox.postPoses(7, {}, hosted.now);
+  hosted.tick();
+  hosted.live.inbox.postPoses(8, {.colliders = {handAt(1, 0, -0.6f, 0.05f)}}, hosted.now);
+  hosted.ticks(5);
+  EXPECT_THAT(contacts(), ::testing::IsEmpty());
+}
+
 TEST_F(SceneHostTest, ChangesOfSpringsReachTheDevice) {
   HostedScene changed, unchanged;
   scene::ParameterChange softer;

@@ -37,14 +37,17 @@ std::size_t upload(vulkan::Recorder& recorder, const std::vector<Record>& record
 }  // namespace
 
 CollisionStage::CollisionStage(const vulkan::Device& device, std::uint32_t nodeCount,
-                               std::array<const Buffer*, 2> positions,
+                               std::uint32_t clothCount, std::array<const Buffer*, 2> positions,
                                std::array<const Buffer*, 2> velocities)
     : nodeCount_(nodeCount),
+      clothCount_(clothCount),
       colliders_(device, BufferPurpose::texels, kColliderBytes),
       bounds_(device, BufferPurpose::texels, kBoundsBytes),
       nearLists_(device, BufferPurpose::texels, listsOf(nodeCount) * shared::kNearStride * sizeof(float)),
+      toldContacts_(device, BufferPurpose::state, kMaxColliders * clothCount * sizeof(std::uint32_t)),
       uploads_{Buffer(device, BufferPurpose::upload, kColliderBytes + kBoundsBytes),
                Buffer(device, BufferPurpose::upload, kColliderBytes + kBoundsBytes)},
+      device_(device),
       kernel_(device, {.name = "gather_near_colliders",
                        .spirv = kernels::gather_near_colliders,
                        .bindings = {BindingKind::texels, BindingKind::texels, BindingKind::texels,
@@ -55,7 +58,8 @@ CollisionStage::CollisionStage(const vulkan::Device& device, std::uint32_t nodeC
       from_{vulkan::Bindings(device, kernel_, {positions[0], velocities[0], &bounds_, &nearLists_}),
             vulkan::Bindings(device, kernel_, {positions[1], velocities[1], &bounds_, &nearLists_})} {}
 
-void CollisionStage::recordInputs(vulkan::Recorder& recorder, std::span<const MovingCollider> colliders) {
+void CollisionStage::recordInputs(vulkan::Recorder& recorder, std::span<const MovingCollider> colliders,
+                                  bool tells) {
   fill(tables_, colliders);
   count_ = static_cast<std::uint32_t>(colliders.size());
   slot_ = 1 - slot_;
@@ -63,6 +67,25 @@ void CollisionStage::recordInputs(vulkan::Recorder& recorder, std::span<const Mo
   std::size_t offset = upload(recorder, tables_.records, through, 0, colliders_, 0);
   offset = upload(recorder, tables_.planes, through, offset, colliders_, offset);
   upload(recorder, tables_.bounds, through, offset, bounds_, 0);
+  tells_ = tells && count_ > 0;
+  if (tells_) recorder.fill(toldContacts_, 0, toldBytes());
+}
+
+void CollisionStage::recordTold(vulkan::Recorder& recorder) {
+  if (!tells_) return;
+  Buffer& readback = toldReadbacks_[slot_];
+  if (readback.bytes() == 0) readback = Buffer(device_, BufferPurpose::readback, toldContacts_.bytes());
+  recorder.copy(toldContacts_, readback, toldBytes());
+}
+
+std::vector<ContactStatus> CollisionStage::told() const {
+  std::vector<ContactStatus> told;
+  if (!tells_) return told;
+  const auto units = toldReadbacks_[slot_].mapped<const std::uint32_t>();
+  for (std::uint32_t i = 0; i < count_ * clothCount_; ++i)
+    if (units[i] != 0)
+      told.push_back({i / clothCount_, i % clothCount_, units[i] / double{shared::kImpulseUnits}});
+  return told;
 }
 
 void CollisionStage::recordGather(vulkan::Recorder& recorder, std::uint32_t present, float tickSeconds,
@@ -79,9 +102,9 @@ shared::CollisionPush CollisionStage::push(std::uint32_t substep, std::uint32_t 
           .progressAfter = static_cast<float>(substep + 1) / static_cast<float>(substeps),
           .tickRate = tickRate,
           .substepRate = tickRate * static_cast<float>(substeps),
+          .toldCloths = tells_ ? clothCount_ : 0,
           .reserved0 = 0,
-          .reserved1 = 0,
-          .reserved2 = 0};
+          .reserved1 = 0};
 }
 
 }  // namespace clothstream::simulation

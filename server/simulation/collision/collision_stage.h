@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 #include <span>
+#include <vector>
 
 #include "server/simulation/collision/collider_tables.h"
 #include "server/simulation/collision/moving_collider.h"
@@ -22,12 +23,13 @@ namespace clothstream::simulation {
 class CollisionStage {
  public:
   // `positions` and `velocities` are the scene's, by turns: texels that outlive the stage.
-  CollisionStage(const vulkan::Device& device, std::uint32_t nodeCount,
+  CollisionStage(const vulkan::Device& device, std::uint32_t nodeCount, std::uint32_t clothCount,
                  std::array<const vulkan::Buffer*, 2> positions,
                  std::array<const vulkan::Buffer*, 2> velocities);
 
-  // The colliders of the tick to come; at most one tick may be in flight.
-  void recordInputs(vulkan::Recorder& recorder, std::span<const MovingCollider> colliders);
+  // The colliders of the tick to come; at most one tick may be in flight. Whether their contacts are to be
+  // told.
+  void recordInputs(vulkan::Recorder& recorder, std::span<const MovingCollider> colliders, bool tells);
 
   // Lists what nodes may touch within `tickSeconds`, the state being in the buffers `present`; no cloth is
   // thicker than `thickness`. Begins no stage and no barrier of its own; records nothing where there are no
@@ -38,16 +40,29 @@ class CollisionStage {
   bool active() const { return count_ > 0; }
   shared::CollisionPush push(std::uint32_t substep, std::uint32_t substeps, float tickRate) const;
 
+  // After the tick's substeps, with a barrier before.
+  void recordTold(vulkan::Recorder& recorder);
+  // Of the last recorded tick, once it is complete.
+  std::vector<ContactStatus> told() const;
+
   const vulkan::Buffer& colliders() const { return colliders_; }
   const vulkan::Buffer& nearLists() const { return nearLists_; }
+  const vulkan::Buffer& toldContacts() const { return toldContacts_; }
 
  private:
-  std::uint32_t nodeCount_;
+  std::size_t toldBytes() const {
+    return tells_ ? std::size_t{count_} * clothCount_ * sizeof(std::uint32_t) : 0;
+  }
+
+  std::uint32_t nodeCount_, clothCount_;
+  bool tells_ = false;
   std::uint32_t count_ = 0;
   std::uint32_t slot_ = 0;
   ColliderTables tables_;
-  vulkan::Buffer colliders_, bounds_, nearLists_;
+  vulkan::Buffer colliders_, bounds_, nearLists_, toldContacts_;
   std::array<vulkan::Buffer, 2> uploads_;  // by turns: a tick may be in flight while the next is recorded
+  std::array<vulkan::Buffer, 2> toldReadbacks_;  // likewise; made when they are first wanted
+  const vulkan::Device& device_;
   vulkan::Kernel kernel_;
   std::array<vulkan::Bindings, 2> from_;
 };

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 
 #include "server/scene/collider.h"
 
@@ -14,6 +15,12 @@ struct MovingCollider {
   scene::Shape shape = scene::Sphere{};
   scene::Pose start = {}, end = {};
   float friction = 1;  // Coulomb; multiplied with the cloth's
+};
+
+// What a collider did to a cloth in a tick.
+struct ContactStatus {
+  std::uint32_t collider = 0, cloth = 0;
+  double impulse = 0;  // N s: the sum of the sizes of what its nodes got, of each at least a millionth
 };
 
 // At most so many in a tick, and so many planes of their hulls in all.

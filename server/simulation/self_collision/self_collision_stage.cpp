@@ -177,15 +177,16 @@ SelfCollisionStage::SelfCollisionStage(const vulkan::Device& device, const scene
                {.name = "resolve_contacts",
                 .spirv = kernels::resolve_contacts,
                 .bindings = {kTexels, kTexels, kTexels, kTexels, kTexels, kTexels, kTexels, kTexels, kStorage,
-                             kStorage, kStorage, kStorage},
+                             kStorage, kStorage, kStorage, kStorage},
                 .pushConstantBytes = sizeof(shared::ContactPush),
                 .workgroupSize = workgroupSize,
                 .specialisation = {hasSeveralMaterials(scene)}},
                [&](const vulkan::Kernel& kernel, std::size_t of) {
-                 return Bindings(device, kernel,
-                                 {&state.cloths, &rests_, &state.colliders, &state.nearColliders, &contacts_,
-                                  &contactPositions_, &contactVelocities_, state.positions[1 - of],
-                                  &touching_, &groups_, state.positions[of], state.velocities[of]});
+                 return Bindings(
+                     device, kernel,
+                     {&state.cloths, &rests_, &state.colliders, &state.nearColliders, &contacts_,
+                      &contactPositions_, &contactVelocities_, state.positions[1 - of], &touching_, &groups_,
+                      state.positions[of], state.velocities[of], &state.toldContacts});
                }) {
   assert(isIn(scene));
   fillRests(scene, restsUpload_.mapped<shared::vec4>());
