@@ -30,6 +30,15 @@ simulation::NodeState displacedState(const scene::Scene& scene) {
 
 }  // namespace
 
+reference::ReferenceCloth measuredCloth(const scene::Cloth& cloth, const simulation::NodeState& state) {
+  reference::ReferenceCloth measured(cloth);
+  for (std::uint32_t node = 0; node < cloth.nodeCount(); ++node) {
+    measured.positions()[node] = state.positions[node].cast<double>();
+    measured.velocities()[node] = state.velocities[node].cast<double>();
+  }
+  return measured;
+}
+
 Simulated::Simulated(vulkan::Device& device, const scene::Scene& scene,
                      const simulation::SimulationOptions& options)
     : device_(device), scene_(scene), recorder_(device), simulation_(device, scene, options) {}

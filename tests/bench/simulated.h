@@ -5,6 +5,7 @@
 #include <span>
 #include <string>
 
+#include "server/reference/reference_cloth.h"
 #include "server/scene/scene.h"
 #include "server/simulation/cloth_simulation.h"
 #include "server/vulkan/device.h"
@@ -53,6 +54,9 @@ class Simulated {
   simulation::ClothSimulation simulation_;
   Samples wall_, advance_, near_;
 };
+
+// A scene's only cloth in this state, with its strain and energies.
+reference::ReferenceCloth measuredCloth(const scene::Cloth& cloth, const simulation::NodeState& state);
 
 // Records with `record`, submits, waits.
 void runOn(vulkan::Device& device, vulkan::Recorder& recorder, const auto& record) {

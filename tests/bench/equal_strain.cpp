@@ -1,0 +1,164 @@
+// SPDX-License-Identifier: MIT
+// Suite equal_strain: what a node and frame cost with the cheapest setting of each solver that stretches a
+// sheet no more than a bound.
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <stdexcept>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "server/reference/reference_cloth.h"
+#include "tests/bench/simulated.h"
+#include "tests/bench/suite.h"
+
+namespace clothstream::bench {
+namespace {
+
+// Mean strains of NvCloth's CPU solver, 5 iterations a frame, under the same sheets.
+struct Bound {
+  std::uint32_t size;
+  double strain;
+};
+constexpr Bound kBounds[] = {{32, 0.008}, {64, 0.026}, {128, 0.041}, {256, 0.053}};
+
+// J that the sheet's gravity must have lost by then, 90 % of what one that hangs has: a solve that ends early
+// holds a sheet together by hardly letting it fall.
+constexpr float kMass = 0.2f;
+constexpr double kFallen = 0.9 * double{kMass} * 9.81 * 0.5;
+
+constexpr std::uint32_t kFramesPerSecond = 60, kFrames = 3 * kFramesPerSecond;
+
+struct Setting {
+  std::uint32_t substeps, iterations;
+};
+
+// From cheap to dear.
+struct Ladder {
+  const char* method;
+  scene::SolverKind kind;
+  std::uint32_t largest;  // rows; where one workgroup solves a cloth, software devices take minutes beyond
+  std::vector<Setting> settings;
+};
+
+std::vector<Ladder> ladders() {
+  using enum scene::SolverKind;
+  return {{"mass_spring",
+           massSpring,
+           256,
+           {{8, 0},
+            {10, 0},
+            {12, 0},
+            {14, 0},
+            {16, 0},
+            {20, 0},
+            {24, 0},
+            {28, 0},
+            {32, 0},
+            {40, 0},
+            {48, 0},
+            {64, 0},
+            {96, 0}}},
+          {"xpbd",
+           xpbd,
+           256,
+           {{2, 1}, {3, 1}, {4, 1}, {5, 1}, {6, 1}, {7, 1}, {8, 1}, {10, 1}, {12, 1}, {16, 1}, {24, 1}}},
+          {"implicit_euler", implicitEuler, 64, {{1, 3}, {1, 5}, {1, 8}, {1, 12}, {1, 20}, {1, 40}, {1, 80}}},
+          {"constraint", constraint, 32, {{1, 20}, {2, 20}, {4, 20}}}};
+}
+
+// A square metre of 0.2 kg that starts level and swings down from two corners.
+scene::Scene sceneOf(const Ladder& ladder, const Setting& setting, std::uint32_t size) {
+  scene::Scene scene;
+  scene.name = "equal_strain";
+  scene.simulationRate = scene.streamRate = kFramesPerSecond;
+  scene.substeps = setting.substeps;
+  scene::Cloth cloth;
+  cloth.name = "sheet";
+  cloth.grid = {.rows = size, .columns = size, .width = 1, .height = 1, .pose = {}};
+  cloth.grid.pose.orientation = scene::Quaternion(std::sqrt(0.5f), -std::sqrt(0.5f), 0, 0);
+  cloth.mass = kMass;
+  cloth.damping = 1;
+  cloth.pins = {
+      {.firstRow = 0, .lastRow = 0, .firstColumn = 0, .lastColumn = size - 1, .columnStep = size - 1}};
+  cloth.solver.kind = ladder.kind;
+  cloth.solver.iterations = std::max(1u, setting.iterations);
+  // Forces as stiff as the step bears: 8 (0.36 + 0.08 + 0.04) k h^2 / m are 3.84 of 4, k being m / h^2. The
+  // others as stiff as cloth is.
+  const double h = scene.substepSeconds();
+  const double bearable = double{cloth.nodeMass()} / (h * h);
+  const bool forces = ladder.kind == scene::SolverKind::massSpring;
+  cloth.structural.stiffness = forces ? static_cast<float>(0.36 * bearable) : 1500.0f;
+  cloth.shear.stiffness = forces ? static_cast<float>(0.08 * bearable) : 60.0f;
+  cloth.bend.stiffness = static_cast<float>(0.04 * bearable);
+  scene.cloths = {cloth};
+  return scene;
+}
+
+// J since the start.
+double gravityEnergyLost(const scene::Scene& scene, const reference::ReferenceCloth& measured) {
+  const reference::Vec3 gravity = scene.environment.gravity.cast<double>();
+  return reference::ReferenceCloth(scene.cloths.front()).gravityEnergy(gravity) -
+         measured.gravityEnergy(gravity);
+}
+
+Rows::value_type rowOf(const Ladder& ladder, const Setting& setting, const Bound& bound,
+                       const scene::Scene& scene, const reference::ReferenceCloth& measured,
+                       const Simulated& simulated) {
+  const double nodes = scene.nodeCount();
+  return {{"suite", "equal_strain"},
+          {"nodes", scene.nodeCount()},
+          {"bound", bound.strain},
+          {"method", ladder.method},
+          {"substeps", setting.substeps},
+          {"iterations", setting.iterations},
+          {"nsPerNodeFrame", simulated.wall().median() / nodes * 1e9},
+          {"nsPerNodeFrameMin", simulated.wall().min() / nodes * 1e9},
+          {"strainMean", measured.strain().mean},
+          {"strainP99", measured.strain().p99},
+          {"kineticEnergy", measured.kineticEnergy()},
+          {"elasticEnergy", measured.elasticEnergy()},
+          {"gravityEnergyLost", gravityEnergyLost(scene, measured)}};
+}
+
+// The first setting of the ladder with which the sheet falls and stretches no more than the bound; nullopt:
+// none does.
+std::optional<Rows::value_type> cheapest(vulkan::Device& device, const Settings& settings,
+                                         const Ladder& ladder, const Bound& bound) {
+  for (const Setting& setting : ladder.settings) {
+    const scene::Scene scene = sceneOf(ladder, setting, bound.size);
+    const simulation::TickInputs inputs{scene.environment, {}};
+    Simulated simulated(device, scene,
+                        {.rowsPerInvocation = settings.rowsPerInvocation,
+                         .workgroupSize = settings.workgroupSize,
+                         .xpbdWholeNodes = settings.xpbdWholeNodes});
+    for (std::uint32_t frame = 0; frame < kFrames; ++frame) simulated.tick(inputs);
+    const reference::ReferenceCloth measured = measuredCloth(scene.cloths.front(), simulated.state());
+    if (measured.strain().mean > bound.strain || gravityEnergyLost(scene, measured) < kFallen) continue;
+    Rows::value_type row = rowOf(ladder, setting, bound, scene, measured, simulated);
+    row["device"] = device.info().name;
+    return row;
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+Rows runEqualStrain(vulkan::Device& device, const Settings& settings) {
+  Rows rows;
+  for (const Bound& bound : kBounds) {
+    if (settings.size && *settings.size != bound.size) continue;
+    const std::size_t before = rows.size();
+    for (const Ladder& ladder : ladders())
+      if (bound.size <= ladder.largest)
+        if (auto row = cheapest(device, settings, ladder, bound)) rows.push_back(std::move(*row));
+    if (rows.size() == before)
+      throw std::runtime_error(
+          fmt::format("{} nodes a side: every setting stretches by more than {}", bound.size, bound.strain));
+  }
+  if (rows.empty()) throw std::runtime_error("--size must be 32, 64, 128 or 256");
+  return rows;
+}
+
+}  // namespace clothstream::bench

@@ -1,0 +1,194 @@
+// SPDX-License-Identifier: MIT
+// Suite work_precision: what a simulated second costs by every solver, against how far it is from what the
+// springs really do.
+#include <Eigen/Geometry>
+#include <cmath>
+#include <optional>
+#include <stdexcept>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "server/reference/reference_simulation.h"
+#include "server/scene/wind.h"
+#include "tests/bench/picture/log_plot.h"
+#include "tests/bench/simulated.h"
+#include "tests/bench/suite.h"
+
+namespace clothstream::bench {
+namespace {
+
+constexpr std::uint32_t kSize = 32, kFramesPerSecond = 60, kFrames = 30;
+// Of the run in double precision that the others are compared with, and of the one that says how far that is
+// from its limit.
+constexpr std::uint32_t kReferenceSubsteps = 1024, kCoarserSubsteps = 512;
+
+struct Method {
+  const char* name;
+  scene::SolverKind kind;
+  scene::Integrator integrator;
+  std::uint32_t iterations;
+  std::vector<std::uint32_t> substeps;
+};
+
+// Forces from the fewest substeps on that they bear.
+std::vector<Method> methods() {
+  using enum scene::SolverKind;
+  using enum scene::Integrator;
+  return {{"mass_spring", massSpring, semiImplicitEuler, 1, {32, 64, 128, 256}},
+          {"Runge-Kutta", massSpring, rungeKutta4, 1, {32, 64}},
+          {"acad", acad, semiImplicitEuler, 40, {32, 64}},
+          {"xpbd", xpbd, semiImplicitEuler, 1, {4, 8, 16, 32, 64, 128}},
+          {"implicit_euler", implicitEuler, semiImplicitEuler, 60, {1, 2, 4, 8, 16}},
+          {"constraint", constraint, semiImplicitEuler, 40, {12, 24}}};
+}
+
+// A square metre of 0.2 kg, whose springs of 200 N/m give way by a few percent.
+scene::Cloth sheet() {
+  scene::Cloth cloth;
+  cloth.name = "sheet";
+  cloth.grid = {.rows = kSize, .columns = kSize, .width = 1, .height = 1, .pose = {}};
+  cloth.mass = 0.2f;
+  cloth.structural = {200, 0.01f};
+  cloth.shear = {20, 0.005f};
+  cloth.bend = {10, 0.005f};
+  cloth.damping = 1;
+  cloth.friction = 0.5f;
+  cloth.thickness = 0.01f;
+  return cloth;
+}
+
+scene::Scene sceneOf(const char* name, scene::Cloth cloth) {
+  scene::Scene scene;
+  scene.name = name;
+  scene.simulationRate = scene.streamRate = kFramesPerSecond;
+  scene.cloths = {std::move(cloth)};
+  return scene;
+}
+
+// Half a second each, of motions that springs decide: what folds by itself does so at random.
+std::vector<scene::Scene> scenes() {
+  const scene::GridRange upperEdge{.lastColumn = kSize - 1};
+  scene::Cloth swinging = sheet();
+  swinging.grid.pose.orientation = scene::Quaternion(Eigen::AngleAxisf(-1, scene::Vec3::UnitX()));
+  swinging.pins = {upperEdge};
+
+  scene::Cloth pushed = sheet();
+  pushed.pins = {upperEdge};
+  scene::Scene push = sceneOf("push", pushed);
+  push.colliders.resize(1);
+  push.colliders[0].name = "ball";
+  push.colliders[0].shape = scene::Sphere{0.2f};
+  push.colliders[0].motion.keys = {{0, scene::Vec3(0.05f, -0.6f, 0.25f)},
+                                   {0.5f, scene::Vec3(0.05f, -0.6f, -0.1f)}};
+
+  scene::Cloth flying = sheet();
+  flying.pins = {{.lastRow = kSize - 1}};
+  flying.drag = flying.lift = 0.5f;
+  scene::Scene flag = sceneOf("flag", flying);
+  flag.environment.wind = scene::Vec3(4, 0, 1.5f);
+  flag.environment.gust = {.strength = 1, .seconds = 1};
+  return {sceneOf("swing", swinging), push, flag};
+}
+
+// Where the nodes are after each frame, and the energy at the end, J.
+struct Trajectory {
+  std::vector<std::vector<reference::Vec3>> frames;
+  double energy = 0;
+};
+
+double energyOf(const reference::ReferenceCloth& cloth, const scene::Scene& scene) {
+  return cloth.kineticEnergy() + cloth.elasticEnergy() +
+         cloth.gravityEnergy(scene.environment.gravity.cast<double>());
+}
+
+Trajectory referenceTrajectory(scene::Scene scene, std::uint32_t substeps) {
+  scene.substeps = substeps;
+  reference::ReferenceSimulation simulation(scene);
+  const reference::ReferenceCloth& cloth = simulation.cloths().front();
+  Trajectory trajectory;
+  for (std::uint32_t frame = 0; frame < kFrames; ++frame) {
+    simulation.tick();
+    trajectory.frames.emplace_back(cloth.positions().begin(), cloth.positions().end());
+  }
+  trajectory.energy = energyOf(cloth, scene);
+  return trajectory;
+}
+
+// Root of the mean square over nodes and frames, m.
+double distance(const Trajectory& a, const Trajectory& b) {
+  double sum = 0;
+  for (std::size_t frame = 0; frame < a.frames.size(); ++frame)
+    for (std::size_t node = 0; node < a.frames[frame].size(); ++node)
+      sum += (a.frames[frame][node] - b.frames[frame][node]).squaredNorm();
+  return std::sqrt(sum / static_cast<double>(a.frames.size() * a.frames[0].size()));
+}
+
+struct Measured {
+  Trajectory trajectory;
+  double seconds;  // a simulated one
+};
+
+Measured measure(vulkan::Device& device, scene::Scene scene, const Method& method, std::uint32_t substeps) {
+  scene.substeps = substeps;
+  scene.integrator = method.integrator;
+  scene.cloths.front().solver.kind = method.kind;
+  scene.cloths.front().solver.iterations = method.iterations;
+  Simulated simulated(device, scene, {});
+  Measured measured{};
+  simulation::NodeState state;
+  for (std::uint32_t frame = 0; frame < kFrames; ++frame) {
+    simulation::TickInputs inputs{scene::environmentAt(scene, frame), {}};
+    for (const scene::Collider& collider : scene.colliders)
+      inputs.colliders.push_back({collider.shape, scene::poseAt(collider, frame * scene.tickSeconds()),
+                                  scene::poseAt(collider, (frame + 1) * scene.tickSeconds()),
+                                  collider.friction});
+    simulated.tick(inputs);
+    state = simulated.state();
+    std::vector<reference::Vec3>& positions = measured.trajectory.frames.emplace_back();
+    for (const scene::Vec3& position : state.positions) positions.push_back(position.cast<double>());
+  }
+  measured.trajectory.energy = energyOf(measuredCloth(scene.cloths.front(), state), scene);
+  measured.seconds = simulated.wall().median() * kFramesPerSecond;
+  return measured;
+}
+
+}  // namespace
+
+Rows runWorkPrecision(vulkan::Device& device, const Settings& settings) {
+  if (settings.size) throw std::runtime_error("the sheet has 32x32 nodes: leave out --size");
+  Rows rows;
+  std::vector<LogPlot> plots;
+  for (const scene::Scene& scene : scenes()) {
+    const Trajectory truth = referenceTrajectory(scene, kReferenceSubsteps);
+    const double floor = distance(referenceTrajectory(scene, kCoarserSubsteps), truth);
+    LogPlot& plot =
+        plots.emplace_back(LogPlot{scene.name, "s of two cores a simulated second", "error, m", {}});
+    std::optional<double> worst;
+    for (const Method& method : methods()) {
+      LogPlot::Curve& curve = plot.curves.emplace_back(LogPlot::Curve{method.name, {}});
+      for (const std::uint32_t substeps : method.substeps) {
+        const Measured measured = measure(device, scene, method, substeps);
+        const double error = distance(measured.trajectory, truth);
+        if (method.kind == scene::SolverKind::massSpring) worst = error;
+        curve.points.push_back({measured.seconds, error});
+        rows.push_back({{"suite", "work_precision"},
+                        {"scene", scene.name},
+                        {"method", method.name},
+                        {"substeps", substeps},
+                        {"secondsPerSecond", measured.seconds},
+                        {"error", error},
+                        {"referenceError", floor},
+                        {"energyLost", truth.energy - measured.trajectory.energy},
+                        {"device", device.info().name}});
+      }
+    }
+    // Forces go to the truth with their steps; where they do not, something is wrong.
+    if (!(*worst < 0.005))
+      throw std::runtime_error(fmt::format("{}: the finest forces are {} m off", scene.name, *worst));
+  }
+  writeSvg(plots, settings.pictures / "work_precision.svg");
+  return rows;
+}
+
+}  // namespace clothstream::bench
