@@ -27,6 +27,7 @@ constexpr std::array kSuites{
                  &bench::runSolvers},
     bench::Suite{"enforcement", "constraint enforcement over all springs, by one workgroup and by several",
                  &bench::runEnforcement},
+    bench::Suite{"acad", "a sheet of which 0, 1, 5 and 20 % of the springs are constraints", &bench::runAcad},
     bench::Suite{"curtain", "the scene curtain, served to one client in this process: tick, pose to packet",
                  &bench::runCurtain},
     bench::Suite{"colliders", "a tick with 0, 1, 100 and 4,000 colliders, most of them far from the cloth",
