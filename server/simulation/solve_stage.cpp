@@ -270,7 +270,7 @@ SolveStage::SolveStage(const vulkan::Device& device, std::span<const scene::Clot
     : device_(device),
       state_(state),
       workgroupSize_(solveWorkgroup(device, workgroupSize)),
-      wholeNodes_(wholeNodes.value_or(1024)),
+      wholeNodes_(wholeNodes.value_or(device.isSoftware() ? 4096 : 1024)),
       kernels_(std::make_unique<Kernels>(device, workgroupSize_)) {
   makeTables(cloths);
   takeTables();
