@@ -81,8 +81,8 @@ scene::Scene sceneOf(const Case& experiment) {
   return scene;
 }
 
-// Against the reference, with a solve tight enough to compare: with the default compliance nodes are off by at
-// most 500 times the tolerance of what is demanded of the constraints (tests/simulation derives it).
+// Against the reference, with a solve tight enough to compare: with the default compliance nodes are off by
+// at most 500 times the tolerance of what is demanded of the constraints (tests/simulation derives it).
 void check(vulkan::Device& device, scene::Scene scene, std::size_t links,
            const simulation::TickInputs& inputs) {
   scene::Solver& solver = scene.cloths.front().solver;
