@@ -178,7 +178,7 @@ struct SolveStage::Systems {
         impulses(device, BufferPurpose::texels, rows.bytes()),
         vectors(device, BufferPurpose::texels, texels(kVectors * std::size_t{nodes}, true)),
         sums(device, BufferPurpose::state, tables.chunks.size() * 2 * sizeof(float)),
-        actives(device, BufferPurpose::state, tables.chunks.size() * sizeof(std::uint32_t)),
+        actives(device, BufferPurpose::state, 2 * tables.chunks.size() * sizeof(std::uint32_t)),
         solves(device, BufferPurpose::state, tables.systems.size() * sizeof(shared::SolveRecord)),
         solvesReadback(device, BufferPurpose::readback, solves.bytes()) {
     const std::span<std::uint32_t> numbers = emptyGroups.mapped<std::uint32_t>();
@@ -270,7 +270,7 @@ SolveStage::SolveStage(const vulkan::Device& device, std::span<const scene::Clot
     : device_(device),
       state_(state),
       workgroupSize_(solveWorkgroup(device, workgroupSize)),
-      wholeNodes_(wholeNodes.value_or(1024)),
+      wholeNodes_(wholeNodes.value_or(device.isSoftware() ? 4096 : 1024)),
       kernels_(std::make_unique<Kernels>(device, workgroupSize_)) {
   makeTables(cloths);
   takeTables();
@@ -338,7 +338,6 @@ void SolveStage::Systems::recordSmall(vulkan::Recorder& recorder, const Group& g
                                                 .firstIteration = first,
                                                 .endIteration = end,
                                                 .firstChunk = 0,
-                                                .chunks = 0,
                                                 .nextGroup = 0},
                               groupSizes, (group.firstSize + kSmallSystems) * sizeof(std::uint32_t));
     first = end;
@@ -357,7 +356,6 @@ void SolveStage::Systems::recordLarge(vulkan::Recorder& recorder, const Group& g
                          .firstIteration = 0,
                          .endIteration = 0,
                          .firstChunk = on.firstLargeChunk,
-                         .chunks = on.endChunk - on.firstLargeChunk,
                          .nextGroup = 0};
   for (std::uint32_t iteration = 0; iteration < on.iterations; ++iteration) {
     const std::size_t size = number(iteration) * sizeof(std::uint32_t);

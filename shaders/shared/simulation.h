@@ -78,7 +78,7 @@ struct SolveRecord {
   float square;
   float stepLength;  // of this iteration, and how much of the last direction is in this one's
   float turn;
-  uint32_t arrived;  // chunks of this iteration
+  uint32_t arrived;  // active chunks times 2^16, those that have done this iteration
 };
 
 // A workgroup of a kernel that corrects springs.
@@ -134,8 +134,7 @@ struct SolvePush {
   uint32_t firstIteration;  // of this dispatch
   uint32_t endIteration;
   uint32_t firstChunk;  // where several do
-  uint32_t chunks;
-  uint32_t nextGroup;  // where their number goes if another iteration is to come
+  uint32_t nextGroup;   // where their number goes if another iteration is to come
 };
 
 struct ApplyPush {
@@ -189,7 +188,7 @@ static_assert(sizeof(ClothRecord) == CLOTHSTREAM_CLOTH_TEXELS * sizeof(vec4) &&
 static_assert(sizeof(XpbdTile) == 16 && sizeof(ColourRecord) == 16 && sizeof(XpbdLinkRecord) == 16);
 static_assert(sizeof(XpbdPush) == 28 && sizeof(FinishPush) == 48);
 static_assert(sizeof(SystemRecord) == CLOTHSTREAM_SYSTEM_TEXELS * sizeof(vec4));
-static_assert(sizeof(SolveRecord) == 36 && sizeof(PreparePush) == 44 && sizeof(SolvePush) == 28 &&
+static_assert(sizeof(SolveRecord) == 36 && sizeof(PreparePush) == 44 && sizeof(SolvePush) == 24 &&
               sizeof(ApplyPush) == 48 && sizeof(RungeKuttaPush) == 48);
 static_assert(sizeof(TileRecord) == 16);
 static_assert(sizeof(AdvancePush) == 80 && offsetof(AdvancePush, windAir) == 16 &&

@@ -16,7 +16,7 @@ layout(std430, binding = 13) buffer Groups {
 shared bool last;
 
 void main() {
-  vec4 part = texelFetch(chunks, int(push.firstChunk + gl_WorkGroupID.x));
+  vec4 part = ownChunk();
   System system = systemAt(uint(part.x));
   if (kMeasure) {
     measureChunk(system, uint(part.y));
@@ -25,14 +25,15 @@ void main() {
   }
   if (self() == 0) {
     memoryBarrierBuffer();
-    last = atomicAdd(solves[system.number].arrived, 1) + 1 == system.chunks;
+    uint before = atomicAdd(solves[system.number].arrived, 1);
+    last = (before & 0xFFFF) + 1 == before >> 16;
   }
   barrier();
   if (last) {
     memoryBarrierBuffer();
     takeSums(system, kMeasure);
     if (self() == 0 && !kMeasure && solves[system.number].running != 0) {
-      atomicMax(groups[push.nextGroup], push.chunks);
+      atomicMax(groups[push.nextGroup], gl_NumWorkGroups.x);
     }
   }
 }

@@ -6,7 +6,7 @@
 #include "shaders/solve/vectors.glsl"
 
 void main() {
-  vec4 part = texelFetch(chunks, int(push.firstChunk + gl_WorkGroupID.x));
+  vec4 part = ownChunk();
   System system = systemAt(uint(part.x));
   updateChunk(system, uint(part.y), solves[system.number]);
 }

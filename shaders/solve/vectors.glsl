@@ -29,7 +29,7 @@ layout(std430, binding = 11) coherent buffer Solves {
   SolveRecord solves[];
 };
 layout(std430, binding = 12) readonly buffer Actives {
-  uint actives[];  // a chunk: kActive, kPrepared
+  uint actives[];  // a chunk: kActive, kPrepared; then those that are, a group after the other
 };
 
 layout(push_constant) uniform Push {
@@ -279,6 +279,11 @@ void measureChunk(System system, uint chunk) {
   keepSums(system, chunk);
 }
 
+// The chunk that a workgroup has where several solve a system.
+vec4 ownChunk() {
+  return texelFetch(chunks, int(actives[actives.length() / 2 + push.firstChunk + gl_WorkGroupID.x]));
+}
+
 // Once all chunks have their sums: whether to go on, and how far. By one workgroup.
 void takeSums(System system, bool norm) {
   for (uint lane = self(); lane < kLanes; lane += width()) {
@@ -301,7 +306,7 @@ void takeSums(System system, bool norm) {
   precise float ratio = sums.x * reciprocal(max(solve.start, 1e-30));
   precise float residual = ratio * reciprocalSquareRoot(max(ratio, 1e-30));
   solve.residual = ratio > 1e-30 ? residual : 0.0;
-  solve.arrived = 0;
+  solve.arrived &= 0xFFFF0000;
   precise float enough = max(solve.start * solver.z, 1e-30);
   solve.running = !norm && sums.x > enough && solve.iterations < uint(solver.y) ? 1 : 0;
   if (solve.running != 0) {

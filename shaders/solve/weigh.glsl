@@ -25,7 +25,7 @@ layout(std430, binding = 7) buffer Solves {
   SolveRecord solves[];
 };
 layout(std430, binding = 8) buffer Actives {
-  uint actives[];  // a chunk: kActive, kPrepared
+  uint actives[];  // a chunk: kActive, kPrepared; then those that are, a group after the other
 };
 layout(std430, binding = 9) buffer Groups {
   uint groups[];  // three numbers an iteration: how many workgroups it takes
@@ -131,7 +131,8 @@ void beginChunk() {
 }
 
 // Whether a chunk has anything to solve, by all of its nodes; and how many workgroups there are then of the
-// group's chunks, of its small systems, of the large ones' first iteration.
+// group's chunks, of its small systems, of the large ones' chunks. Those are listed, in whatever order: it
+// does not matter who does which.
 void keepActive(System system, uint chunk) {
   barrier();
   if (self() == 0) {
@@ -141,9 +142,13 @@ void keepActive(System system, uint chunk) {
     if (touched != 0 || before) {
       atomicMax(groups[push.firstGroup], push.chunks);
     }
-    if (touched != 0) {
-      bool large = place >= push.firstLargeChunk;
-      atomicMax(groups[push.firstGroup + (large ? 6 : 3)], large ? push.largeChunks : push.smallSystems);
+    if (touched != 0 && place < push.firstLargeChunk) {
+      atomicMax(groups[push.firstGroup + 3], push.smallSystems);
+    }
+    if (touched != 0 && place >= push.firstLargeChunk) {
+      atomicAdd(solves[system.number].arrived, 0x10000);
+      uint listed = atomicAdd(groups[push.firstGroup + 6], 1);
+      actives[actives.length() / 2 + push.firstLargeChunk + listed] = place;
     }
   }
 }

@@ -32,6 +32,7 @@ constexpr std::array kSuites{
     bench::Suite{"work_precision",
                  "what a simulated second costs and how far it is from the truth, every solver",
                  &bench::runWorkPrecision},
+    bench::Suite{"acad", "a sheet of which 0, 1, 5 and 20 % of the springs are constraints", &bench::runAcad},
     bench::Suite{"curtain", "the scene curtain, served to one client in this process: tick, pose to packet",
                  &bench::runCurtain},
     bench::Suite{"colliders", "a tick with 0, 1, 100 and 4,000 colliders, most of them far from the cloth",

@@ -1,0 +1,157 @@
+// SPDX-License-Identifier: MIT
+// Suite acad: adaptive constraints where 0, 1, 5 and 20 % of the springs are constraints, beside mass-spring
+// and full constraint enforcement of the same cloth.
+#include <cmath>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "server/scene/springs.h"
+#include "tests/bench/bytes_moved.h"
+#include "tests/bench/simulated.h"
+#include "tests/bench/suite.h"
+
+namespace clothstream::bench {
+namespace {
+
+// Texels of a node and substep that must move: a mass-spring step reads two and writes two; the check reads
+// one; a node of a chunk with constraints is prepared (four read, four written), in each iteration as in the
+// suite enforcement, and corrected (three read, two written). A copy reads one and writes one.
+constexpr double kForces = 4, kCheck = 1, kPrepared = 8 + 5, kIteration = 14, kTexelsOfACopy = 2;
+constexpr std::uint32_t kTicks = 40;
+
+// A sheet that hangs at rest by its upper edge, as stiff as its substeps bear, under so much gravity that its
+// uppermost rows would be stretched beyond 10 %; every fourth of their springs is vertical, and all of these
+// are stretched.
+struct Case {
+  std::string method;
+  scene::SolverKind kind;
+  double active = 0;  // part of the springs
+};
+
+constexpr float kMass = 0.2f, kActivation = 0.1f;
+
+scene::Scene sceneOf(const Case& experiment, std::uint32_t size) {
+  scene::Cloth cloth;
+  cloth.name = "sheet";
+  cloth.grid = {.rows = size, .columns = size, .width = 1, .height = 1, .pose = {}};
+  cloth.mass = kMass;
+  cloth.damping = 1;
+  cloth.pins = {{.firstRow = 0, .lastRow = 0, .firstColumn = 0, .lastColumn = size - 1}};
+  cloth.solver.kind = experiment.kind;
+  cloth.solver.activation = kActivation;
+  scene::Scene scene;
+  const double h = scene.substepSeconds();
+  cloth.structural.stiffness = static_cast<float>(0.25 * double{cloth.nodeMass()} / (h * h));
+  cloth.shear.stiffness = 0.01f * cloth.structural.stiffness;
+  // Below row i of N hang (N - i) nodes a column: k strain L = (N - i) m g.
+  const double rows = 4 * experiment.active, length = 1.0 / (size - 1);
+  const double most = experiment.active == 0 ? 0.5 * double{kActivation} : double{kActivation} / (1 - rows);
+  scene.environment.gravity = scene::Vec3(
+      0, -static_cast<float>(most * double{cloth.structural.stiffness} * length * size / double{kMass}), 0);
+  scene.name = "acad";
+  scene.cloths = {cloth};
+  return scene;
+}
+
+// Where its rows hang at rest, none beyond the bound; a little beyond it where constraints hold it.
+simulation::NodeState hanging(const scene::Scene& scene) {
+  const scene::Cloth& cloth = scene.cloths.front();
+  const scene::Grid& grid = cloth.grid;
+  simulation::NodeState state = simulation::restState(scene.cloths);
+  const double length = double{scene::spacing(grid).row};
+  const double weight = -double{cloth.nodeMass()} * double{scene.environment.gravity.y()};
+  double y = 0;
+  for (std::uint32_t row = 1; row < grid.rows; ++row) {
+    const double strain = (grid.rows - row) * weight / (double{cloth.structural.stiffness} * length);
+    y += length *
+         (1 + std::min(strain, cloth.solver.kind == scene::SolverKind::acad ? double{kActivation} : strain));
+    for (std::uint32_t column = 0; column < grid.columns; ++column)
+      state.positions[row * grid.columns + column].y() = static_cast<float>(-y);
+  }
+  return state;
+}
+
+struct Candidate {
+  Case experiment;
+  scene::Scene scene;
+  std::unique_ptr<Simulated> simulated;
+  Samples constraints = {}, iterations = {};
+};
+
+Rows measureSize(vulkan::Device& device, const Settings& settings, std::uint32_t size) {
+  using enum scene::SolverKind;
+  std::vector<Candidate> candidates;
+  for (const Case& experiment :
+       {Case{"mass_spring", massSpring}, Case{"acad", acad, 0}, Case{"acad", acad, 0.01},
+        Case{"acad", acad, 0.05}, Case{"acad", acad, 0.2}, Case{"constraint", constraint}}) {
+    Candidate candidate{experiment, sceneOf(experiment, size), nullptr};
+    candidate.simulated = std::make_unique<Simulated>(
+        device, candidate.scene,
+        simulation::SimulationOptions{.rowsPerInvocation = settings.rowsPerInvocation,
+                                      .workgroupSize = settings.workgroupSize,
+                                      .solveWholeNodes = settings.solveWholeNodes});
+    candidate.simulated->restart(hanging(candidate.scene));
+    candidates.push_back(std::move(candidate));
+  }
+  // By turns, so that what disturbs the machine disturbs them alike.
+  for (std::uint32_t tick = 0; tick < kTicks; ++tick)
+    for (Candidate& candidate : candidates) {
+      candidate.simulated->tick({candidate.scene.environment, {}});
+      for (const shared::SolveRecord& solve : candidate.simulated->solves()) {
+        candidate.constraints.add(solve.constraints);
+        candidate.iterations.add(solve.iterations);
+      }
+    }
+  const double copy = secondsToCopyTexels(device, std::size_t{size} * size) / kTexelsOfACopy;
+  const double forces = candidates.front().simulated->wall().median();
+  const double full = candidates.back().simulated->wall().median();
+  Rows rows;
+  for (const Candidate& candidate : candidates) {
+    const scene::Scene& scene = candidate.scene;
+    const double substeps = static_cast<double>(std::uint64_t{scene.nodeCount()} * scene.substeps);
+    const double seconds = candidate.simulated->wall().median();
+    nlohmann::ordered_json row{{"suite", "acad"},
+                               {"method", candidate.experiment.method},
+                               {"nodes", scene.nodeCount()},
+                               {"nsPerNodeSubstep", seconds / substeps * 1e9},
+                               {"timesMassSpring", seconds / forces},
+                               {"timesFasterThanConstraint", full / seconds}};
+    if (candidate.experiment.kind == acad) {
+      double springs = 0;
+      for (const scene::SpringLink& link : scene::springLinks(scene.cloths.front()))
+        springs += scene::isConstraint(scene.cloths.front().solver, link.kind) ? 1 : 0;
+      const double active = candidate.constraints.mean() / springs, wanted = candidate.experiment.active;
+      if (!(active >= 0.5 * wanted && active <= 2 * wanted))
+        throw std::runtime_error(
+            fmt::format("{} of the springs are constraints where {} should be", active, wanted));
+      // Active springs are the vertical ones of whole rows.
+      const double nodes = std::min(1.0, 4 * active);
+      const double floor =
+          copy * (kForces + kCheck + nodes * (kPrepared + kIteration * candidate.iterations.mean()));
+      row["active"] = active;
+      row["iterations"] = candidate.iterations.mean();
+      row["floorNs"] = floor / scene.nodeCount() * 1e9;
+      row["timesFloor"] = seconds / scene.substeps / floor;
+      row["nsBeyondMassSpring"] = (seconds - forces) / substeps * 1e9;
+    }
+    row["ticks"] = candidate.simulated->wall().count();
+    row["device"] = device.info().name;
+    rows.push_back(row);
+  }
+  return rows;
+}
+
+}  // namespace
+
+Rows runAcad(vulkan::Device& device, const Settings& settings) {
+  Rows rows;
+  for (const std::uint32_t size : settings.size ? std::vector{*settings.size} : std::vector{64u, 128u})
+    for (auto& row : measureSize(device, settings, size)) rows.push_back(std::move(row));
+  return rows;
+}
+
+}  // namespace clothstream::bench
