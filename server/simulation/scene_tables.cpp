@@ -29,7 +29,8 @@ shared::vec4 solverOf(const scene::Cloth& cloth, double substepSeconds) {
   if (followOf(cloth.solver.kind) != Follow::solve) return {0, 0, 0, 0};
   const bool bend = cloth.solver.kind == scene::SolverKind::implicitEuler || cloth.solver.bendConstraints;
   return {static_cast<float>(scene::scaledCompliance(cloth, substepSeconds)),
-          static_cast<float>(cloth.solver.iterations), cloth.solver.tolerance * cloth.solver.tolerance, bend ? 1.0f : 0.0f};
+          static_cast<float>(cloth.solver.iterations), cloth.solver.tolerance * cloth.solver.tolerance,
+          bend ? 1.0f : 0.0f};
 }
 
 shared::vec4 xpbdSpringOf(const scene::Cloth& cloth, scene::SpringKind kind, double substepSeconds, float w) {

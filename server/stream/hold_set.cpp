@@ -75,7 +75,8 @@ void HoldSet::advance(const scene::Scene& scene, double endSeconds, simulation::
 
 void HoldSet::addEvents(std::span<const simulation::GripStatus> grips,
                         google::protobuf::RepeatedPtrField<v1::GrabEvent>& events) {
-  const auto add = [&](std::uint64_t participant, std::uint32_t id, v1::GrabEventKind kind, std::uint32_t vertices) {
+  const auto add = [&](std::uint64_t participant, std::uint32_t id, v1::GrabEventKind kind,
+                       std::uint32_t vertices) {
     v1::GrabEvent& event = *events.Add();
     event.set_participant_id(participant);
     event.set_grab_id(id);

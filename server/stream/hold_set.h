@@ -31,7 +31,8 @@ class HoldSet {
   // The next tick, which ends at this simulated time: its attachments and grips.
   void advance(const scene::Scene& scene, double endSeconds, simulation::TickInputs& inputs);
 
-  // What became of the grips of the last tick, which is complete: `grips` is what the simulation says of them.
+  // What became of the grips of the last tick, which is complete: `grips` is what the simulation says of
+  // them.
   void addEvents(std::span<const simulation::GripStatus> grips,
                  google::protobuf::RepeatedPtrField<v1::GrabEvent>& events);
 
