@@ -142,7 +142,7 @@ Contact findContact(Collider collider, ColliderFrame frame, vec3 from, vec3 to) 
 void tell(uint contact, vec3 gained, float inverseMass) {
   precise float squared = max(dotProduct(gained, gained), 1e-30);
   precise float impulse = (squared * reciprocalSquareRoot(squared)) * reciprocal(inverseMass);
-  precise float units = min(impulse, kMostImpulse) * kImpulseUnits;
+  precise float units = (impulse < kMostImpulse ? impulse : kMostImpulse) * kImpulseUnits;
   atomicAdd(toldContacts[contact], uint(units) + 1);
 }
 

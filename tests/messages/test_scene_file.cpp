@@ -69,7 +69,19 @@ constexpr const char* kEveryField = R"json({
     "name": "implicit", "grid": {"rows": 2, "columns": 2, "width": 1, "height": 1,
                                  "pose": {"position": {}, "orientation": {"w": 1}}},
     "mass": 1, "structural": {}, "shear": {}, "bend": {}, "damping": 0, "drag": 0, "lift": 0, "friction": 0.5,
-    "thickness": 0.25, "solver": {"implicitEuler": {"iterations": 3, "tolerance": 0.25}}
+    "thickness": 0.25, "solver": {"implicitEuler": {"iterations": 3, "tolerance": 0.25}},
+    "tethers": {"slack": 0.25},
+    "attachments": [{
+      "name": "knot", "vertices": [2], "collider": "table"
+    }, {
+      "name": "rod",
+      "ranges": [{"firstRow": 0, "lastRow": 0, "rowStep": 1, "firstColumn": 1, "lastColumn": 1, "columnStep": 1}],
+      "regions": [{"centre": {"x": 9, "y": 9, "z": 9}, "radius": 0.25}],
+      "pose": {"position": {"x": 1, "y": 2, "z": 3}, "orientation": {"x": 0, "y": 0, "z": 0, "w": 1}},
+      "motion": {"keys": [{"time": 0, "position": {"x": 1, "y": 2, "z": 3}, "orientation": {"x": 0, "y": 0, "z": 0, "w": 1}},
+                          {"time": 1, "position": {"x": 3, "y": 2, "z": 1}, "orientation": {"x": 0, "y": 0, "z": 0, "w": 1}}],
+                 "steady": false}
+    }]
   }],
   "colliders": [{
     "name": "finger", "capsule": {"radius": 0.25, "length": 0.5}, "pose": {"position": {"x": 1, "y": 0, "z": 0},
