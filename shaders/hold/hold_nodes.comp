@@ -29,19 +29,24 @@ struct State {
   vec3 velocity;
 };
 
+bool isTaut(vec3 position, float anchor, float length_) {
+  if (anchor == 0.0) {
+    return false;
+  }
+  precise vec3 away = position - positions[int(anchor) - 1].xyz;
+  return dotProduct(away, away) > length_ * length_;
+}
+
 // Back to the end of the tether, [KCM12] 3.2, without the velocity that led beyond it. Anchors are nodes that
 // this kernel does not write.
 State tie(State node, float anchor, float length_) {
-  if (anchor == 0.0) {
+  if (!isTaut(node.position, anchor, length_)) {
     return node;
   }
   int at = int(anchor) - 1;
   vec3 end = positions[at].xyz;
   precise vec3 away = node.position - end;
   precise float squared = dotProduct(away, away);
-  if (squared <= length_ * length_) {
-    return node;
-  }
   precise vec3 direction = away * reciprocalSquareRoot(max(squared, 1e-24));
   precise vec3 position = end + length_ * direction;
   precise float leaving = max(dotProduct(node.velocity - velocities[at].xyz, direction), 0.0);
@@ -84,11 +89,14 @@ void hold(uint index) {
   if (tether.x == 0.0 && hold.w == 0.0) {
     return;
   }
-  float inverseMass = positions[index].w;
-  if (inverseMass == 0.0) {
+  vec4 position = positions[index];
+  float inverseMass = position.w;
+  bool isPulled =
+      hold.w != 0.0 || isTaut(position.xyz, tether.x, tether.y) || isTaut(position.xyz, tether.z, tether.w);
+  if (inverseMass == 0.0 || !isPulled) {
     return;
   }
-  State node = State(positions[index].xyz, velocities[index].xyz);
+  State node = State(position.xyz, velocities[index].xyz);
   if (kTethers) {
     // The shorter last: it holds exactly.
     node = tie(node, tether.z, tether.w);

@@ -40,32 +40,39 @@ struct Ladder {
   scene::SolverKind kind;
   std::uint32_t largest;  // rows; where one workgroup solves a cloth, software devices take minutes beyond
   std::vector<Setting> settings;
+  bool tethers = false;
 };
 
 std::vector<Ladder> ladders() {
   using enum scene::SolverKind;
-  return {{"mass_spring",
-           massSpring,
-           256,
-           {{8, 0},
-            {10, 0},
-            {12, 0},
-            {14, 0},
-            {16, 0},
-            {20, 0},
-            {24, 0},
-            {28, 0},
-            {32, 0},
-            {40, 0},
-            {48, 0},
-            {64, 0},
-            {96, 0}}},
-          {"xpbd",
-           xpbd,
-           256,
-           {{2, 1}, {3, 1}, {4, 1}, {5, 1}, {6, 1}, {7, 1}, {8, 1}, {10, 1}, {12, 1}, {16, 1}, {24, 1}}},
-          {"implicit_euler", implicitEuler, 64, {{1, 3}, {1, 5}, {1, 8}, {1, 12}, {1, 20}, {1, 40}, {1, 80}}},
-          {"constraint", constraint, 32, {{1, 20}, {2, 20}, {4, 20}}}};
+  return {
+      {"mass_spring",
+       massSpring,
+       256,
+       {{8, 0},
+        {10, 0},
+        {12, 0},
+        {14, 0},
+        {16, 0},
+        {20, 0},
+        {24, 0},
+        {28, 0},
+        {32, 0},
+        {40, 0},
+        {48, 0},
+        {64, 0},
+        {96, 0}}},
+      {"xpbd",
+       xpbd,
+       256,
+       {{2, 1}, {3, 1}, {4, 1}, {5, 1}, {6, 1}, {7, 1}, {8, 1}, {10, 1}, {12, 1}, {16, 1}, {24, 1}}},
+      {"mass_spring_tethered",
+       massSpring,
+       256,
+       {{3, 0}, {4, 0}, {5, 0}, {6, 0}, {7, 0}, {8, 0}, {10, 0}, {12, 0}, {16, 0}, {24, 0}, {32, 0}, {48, 0}},
+       true},
+      {"implicit_euler", implicitEuler, 64, {{1, 3}, {1, 5}, {1, 8}, {1, 12}, {1, 20}, {1, 40}, {1, 80}}},
+      {"constraint", constraint, 32, {{1, 20}, {2, 20}, {4, 20}}}};
 }
 
 // A square metre of 0.2 kg that starts level and swings down from two corners.
@@ -82,6 +89,7 @@ scene::Scene sceneOf(const Ladder& ladder, const Setting& setting, std::uint32_t
   cloth.damping = 1;
   cloth.pins = {
       {.firstRow = 0, .lastRow = 0, .firstColumn = 0, .lastColumn = size - 1, .columnStep = size - 1}};
+  if (ladder.tethers) cloth.tethers = scene::Tethers{};
   cloth.solver.kind = ladder.kind;
   cloth.solver.iterations = std::max(1u, setting.iterations);
   // Forces as stiff as the step bears: 8 (0.36 + 0.08 + 0.04) k h^2 / m are 3.84 of 4, k being m / h^2. The
