@@ -2,8 +2,10 @@
 // A change, and the answer to it.
 #include "clients/cli/set.h"
 
+#include <array>
+#include <bit>
 #include <condition_variable>
-#include <cstring>
+#include <cstdint>
 #include <mutex>
 
 #include <fmt/format.h>
@@ -17,9 +19,11 @@ constexpr std::chrono::seconds kPatience{10};
 constexpr float kGustSeconds = 2;  // as scene.proto has it
 
 bool changesCloths(const SetOptions& options) {
+  // By its bits: what is not to change is NaN.
+  using Words = std::array<std::uint32_t, sizeof(cs_cloth_settings) / sizeof(std::uint32_t)>;
   cs_cloth_settings none;
   cs_keep_cloth_settings(&none);
-  return std::memcmp(&none, &options.settings, sizeof(none)) != 0;
+  return std::bit_cast<Words>(none) != std::bit_cast<Words>(options.settings);
 }
 
 bool changesEnvironment(const SetOptions& options) {

@@ -99,9 +99,10 @@ class LinkFinder {
 
   std::vector<SpringLink> ordered() {
     std::ranges::sort(links_, {}, [](const SpringLink& l) { return std::tuple(l.a, l.b, l.kind); });
-    const auto twice = std::ranges::unique(
-        links_, [](const SpringLink& x, const SpringLink& y) { return x.a == y.a && x.b == y.b; });
-    links_.erase(twice.begin(), twice.end());
+    links_.erase(
+        std::unique(links_.begin(), links_.end(),
+                    [](const SpringLink& x, const SpringLink& y) { return x.a == y.a && x.b == y.b; }),
+        links_.end());
     std::ranges::sort(links_, {}, [](const SpringLink& l) { return std::tuple(l.a, l.kind, l.b); });
     return std::move(links_);
   }

@@ -15,7 +15,6 @@ using vulkan::BindingKind;
 using vulkan::Bindings;
 using vulkan::Buffer;
 using vulkan::BufferPurpose;
-using vulkan::Kernel;
 
 constexpr auto kTexels = BindingKind::texels;
 constexpr auto kStorage = BindingKind::storage;

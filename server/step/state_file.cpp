@@ -38,7 +38,7 @@ void StateFile::append(std::span<const std::byte> frame) {
   ++frames_;
 }
 
-void StateFile::finish(nlohmann::ordered_json description, std::uint32_t nodes) {
+void StateFile::finish(const nlohmann::ordered_json& description, std::uint32_t nodes) {
   file_.close();
   if (!file_) fail(path_);
   nlohmann::ordered_json whole{{"format", "clothstream-state-1"},

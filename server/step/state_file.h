@@ -23,7 +23,7 @@ class StateFile {
 
   void append(std::span<const std::byte> frame);
   // `description` gets this format's own fields: format, file, dtype, shape, columns.
-  void finish(nlohmann::ordered_json description, std::uint32_t nodes);
+  void finish(const nlohmann::ordered_json& description, std::uint32_t nodes);
   std::uint64_t frames() const { return frames_; }
 
  private:

@@ -2,9 +2,9 @@
 // Where all colliders of a scene are from tick to tick, the scene's own and the participants'.
 #pragma once
 
-#include <compare>
 #include <cstdint>
 #include <span>
+#include <tuple>
 #include <vector>
 
 #include <google/protobuf/repeated_ptr_field.h>
@@ -42,7 +42,9 @@ class ColliderSet {
   struct Identity {
     std::uint64_t participant;
     std::uint32_t id;
-    auto operator<=>(const Identity&) const = default;
+    bool operator<(const Identity& other) const {
+      return std::tie(participant, id) < std::tie(other.participant, other.id);
+    }
   };
   Identity identity(std::size_t index) const;
 

@@ -2,11 +2,11 @@
 // When colliders begin and end to touch cloth.
 #pragma once
 
-#include <compare>
 #include <cstdint>
 #include <map>
 #include <set>
 #include <span>
+#include <tuple>
 
 #include <google/protobuf/repeated_ptr_field.h>
 
@@ -37,7 +37,9 @@ class ContactLog {
   struct Pair {
     ColliderSet::Identity collider;
     std::uint32_t cloth;
-    auto operator<=>(const Pair&) const = default;
+    bool operator<(const Pair& other) const {
+      return std::tie(collider, cloth) < std::tie(other.collider, other.cloth);
+    }
   };
   struct Contact {
     std::uint64_t begun, touched;  // ticks

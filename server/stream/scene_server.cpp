@@ -20,6 +20,7 @@ namespace {
 
 std::vector<std::unique_ptr<LiveScene>> liveScenes(std::vector<scene::Scene> definitions) {
   std::vector<std::unique_ptr<LiveScene>> scenes;
+  scenes.reserve(definitions.size());
   for (scene::Scene& definition : definitions)
     scenes.push_back(std::make_unique<LiveScene>(std::move(definition)));
   return scenes;

@@ -21,7 +21,6 @@ namespace clothstream::simulation {
 namespace {
 
 using vulkan::Bindings;
-using vulkan::Buffer;
 using vulkan::BufferPurpose;
 
 constexpr auto kTexels = vulkan::BindingKind::texels;
