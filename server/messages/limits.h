@@ -45,6 +45,7 @@ inline constexpr Range kArealMass{1e-4, 1000};    // kg/m^2
 inline constexpr Range kGustStrength{0, 100};     // m/s
 inline constexpr Range kGustSeconds{0.01, 3600};  // s
 inline constexpr Range kStiffness{0, 1e6};        // N/m
+inline constexpr Range kDihedralBending{0, 1};    // N m
 inline constexpr Range kSpringDamping{0, 1e4};    // N s/m
 inline constexpr Range kDamping{0, 1000};         // 1/s
 inline constexpr Range kAirCoefficient{0, 10};

@@ -13,6 +13,35 @@
 namespace clothstream::messages {
 namespace {
 
+// Those that the change is for.
+template <typename Check>
+void forEachCloth(const scene::Scene& scene, const std::string& name, const Check& check) {
+  for (const scene::Cloth& cloth : scene.cloths)
+    if (name.empty() || name == cloth.name) check(cloth);
+}
+
+void readSelfCollision(Checks& checks, const Path& path, const v1::SelfCollision& message,
+                       const scene::Scene& scene, scene::ClothChange& change) {
+  if (message.has_friction())
+    change.ballFriction = checks.number(path / "friction", message.friction(), limits::kFriction);
+  forEachCloth(scene, change.name, [&](const scene::Cloth& cloth) {
+    if (!cloth.selfCollision)
+      checks.fail(path, "", fmt::format("must be absent: \"{}\" has none from its start", cloth.name));
+    if (message.has_radius())
+      change.ballRadius = toBallRadius(checks, path / "radius", message.radius(), cloth);
+  });
+}
+
+void readTethers(Checks& checks, const Path& path, const v1::Tethers& message, const scene::Scene& scene,
+                 scene::ClothChange& change) {
+  if (message.has_slack())
+    change.tetherSlack = checks.number(path / "slack", message.slack(), limits::kSlack);
+  forEachCloth(scene, change.name, [&](const scene::Cloth& cloth) {
+    if (!cloth.tethers)
+      checks.fail(path, "", fmt::format("must be absent: \"{}\" has none from its start", cloth.name));
+  });
+}
+
 scene::ClothChange toClothChange(Checks& checks, const Path& path, const v1::ClothChange& message,
                                  const scene::Scene& scene) {
   scene::ClothChange change;
@@ -22,6 +51,12 @@ scene::ClothChange toClothChange(Checks& checks, const Path& path, const v1::Clo
     change.structural = toSpring(checks, path / "structural", message.structural());
   if (message.has_shear()) change.shear = toSpring(checks, path / "shear", message.shear());
   if (message.has_bend()) change.bend = toSpring(checks, path / "bend", message.bend());
+  if (message.has_dihedral_bending())
+    change.dihedralBending =
+        checks.number(path / "dihedralBending", message.dihedral_bending(), limits::kDihedralBending);
+  if (message.has_self_collision())
+    readSelfCollision(checks, path / "selfCollision", message.self_collision(), scene, change);
+  if (message.has_tethers()) readTethers(checks, path / "tethers", message.tethers(), scene, change);
   if (message.has_damping())
     change.damping = checks.number(path / "damping", message.damping(), limits::kDamping);
   if (message.has_drag()) change.drag = checks.number(path / "drag", message.drag(), limits::kAirCoefficient);
@@ -44,13 +79,12 @@ void checkSolvers(Checks& checks, const Path& path, const scene::Scene& changed,
   for (std::size_t i = 0; i < change.cloths.size(); ++i) {
     const scene::ClothChange& chosen = change.cloths[i];
     if (!chosen.solver && !chosen.material) continue;
-    for (const scene::Cloth& cloth : changed.cloths) {
-      if (!chosen.name.empty() && chosen.name != cloth.name) continue;
+    forEachCloth(changed, chosen.name, [&](const scene::Cloth& cloth) {
       const Path element = path.at("cloths", static_cast<int>(i));
       if (const auto complaint = unfitSolver(changed, cloth))
         checks.fail(element / (chosen.solver ? "solver" : "material"), "",
                     fmt::format("\"{}\" {}", cloth.name, *complaint));
-    }
+    });
   }
 }
 
@@ -63,12 +97,28 @@ scene::ColliderChange toColliderChange(Checks& checks, const Path& path, const v
     change.position = toVec3(checks, path / "position", message.position(), limits::kPosition);
   if (message.has_orientation())
     change.orientation = toQuaternion(checks, path / "orientation", message.orientation());
-  if (!message.has_radius() || checks.failed()) return change;
-  change.radius = checks.number(path / "radius", message.radius(), limits::kRadius);
+  if (message.has_friction())
+    change.friction = checks.number(path / "friction", message.friction(), limits::kFriction);
+  if (checks.failed()) return change;
   scene::Shape shape = std::ranges::find(scene.colliders, change.name, &scene::Collider::name)->shape;
-  if (scene::radiusOf(shape) == nullptr)
-    checks.fail(path / "radius", fmt::format("{}", message.radius()),
-                fmt::format("must be absent: \"{}\" is neither sphere nor capsule", change.name));
+  const auto needs = [&](const char* field, const std::string& value, bool has, const char* what) {
+    if (!has)
+      checks.fail(path / field, value, fmt::format("must be absent: \"{}\" is {}", change.name, what));
+  };
+  if (message.has_radius()) {
+    change.radius = checks.number(path / "radius", message.radius(), limits::kRadius);
+    needs("radius", fmt::format("{}", *change.radius), scene::radiusOf(shape) != nullptr,
+          "neither sphere nor capsule");
+  }
+  if (message.has_length()) {
+    change.length = checks.number(path / "length", message.length(), limits::kShapeLength);
+    needs("length", fmt::format("{}", *change.length), std::holds_alternative<scene::Capsule>(shape),
+          "no capsule");
+  }
+  if (message.has_size()) {
+    change.size = toVec3(checks, path / "size", message.size(), limits::kShapeSize);
+    needs("size", "", std::holds_alternative<scene::Box>(shape), "no box");
+  }
   return change;
 }
 
@@ -98,6 +148,8 @@ Result<scene::ParameterChange> toParameterChange(const v1::ParameterChange& mess
     scene::Scene changed = scene;
     scene::applyChange(changed, change);
     checkSolvers(checks, path, changed, change);
+    if (const auto complaint = unfitBending(changed))
+      checks.fail(path / "cloths[].dihedralBending", "", *complaint);
     if (const auto complaint = instability(changed))
       checks.fail(path, "", fmt::format("with substeps = {}, {}", scene.substeps, *complaint));
   }

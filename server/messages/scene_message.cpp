@@ -99,15 +99,26 @@ void readConstraint(Checks& checks, const Path& path, const v1::ConstraintSolver
   if (message.has_compliance())
     solver.compliance = checks.number(path / "compliance", message.compliance(), limits::kCompliance);
   readIterations(checks, path, message, solver);
+  switch (message.path()) {
+    case v1::CONSTRAINT_PATH_UNSPECIFIED:
+    case v1::CONSTRAINT_PATH_MATRIX_FREE:
+      break;
+    case v1::CONSTRAINT_PATH_ASSEMBLED:
+      solver.path = scene::ConstraintPath::assembled;
+      if (solver.kind == scene::SolverKind::acad)
+        checks.fail(path / "path", "CONSTRAINT_PATH_ASSEMBLED",
+                    "must be CONSTRAINT_PATH_MATRIX_FREE for acad, whose constraints change every substep");
+      break;
+    default:
+      checks.fail(path / "path", fmt::format("{}", static_cast<int>(message.path())),
+                  "must be CONSTRAINT_PATH_MATRIX_FREE or CONSTRAINT_PATH_ASSEMBLED");
+  }
 }
 
 scene::SelfCollision toSelfCollision(Checks& checks, const Path& path, const v1::SelfCollision& message,
                                      const scene::Cloth& cloth) {
-  const float shortest = scene::shortestSpring(cloth);
-  scene::SelfCollision collision{.radius = shortest / 2};
-  if (message.has_radius())
-    collision.radius =
-        checks.number(path / "radius", message.radius(), {limits::kMinBallRadius, double{shortest}});
+  scene::SelfCollision collision{.radius = scene::shortestSpring(cloth) / 2};
+  if (message.has_radius()) collision.radius = toBallRadius(checks, path / "radius", message.radius(), cloth);
   if (message.has_friction())
     collision.friction = checks.number(path / "friction", message.friction(), limits::kFriction);
   return collision;
@@ -253,6 +264,9 @@ scene::Cloth toCloth(Checks& checks, const Path& path, const v1::Cloth& message,
     cloth.structural = toSpring(checks, path / "structural", message.structural());
   if (message.has_shear()) cloth.shear = toSpring(checks, path / "shear", message.shear());
   if (message.has_bend()) cloth.bend = toSpring(checks, path / "bend", message.bend());
+  if (message.has_dihedral_bending())
+    cloth.dihedralBending =
+        checks.number(path / "dihedralBending", message.dihedral_bending(), limits::kDihedralBending);
   if (message.has_damping())
     cloth.damping = checks.number(path / "damping", message.damping(), limits::kDamping);
   if (message.has_drag()) cloth.drag = checks.number(path / "drag", message.drag(), limits::kAirCoefficient);
@@ -365,6 +379,10 @@ void checkSize(Checks& checks, const scene::Scene& scene) {
 
 }  // namespace
 
+float toBallRadius(Checks& checks, const Path& path, float value, const scene::Cloth& cloth) {
+  return checks.number(path, value, {limits::kMinBallRadius, double{scene::shortestSpring(cloth)}});
+}
+
 scene::Gust toGust(Checks& checks, const Path& path, const v1::Gust& message) {
   scene::Gust gust;
   gust.strength = checks.number(path / "strength", message.strength(), limits::kGustStrength);
@@ -422,6 +440,18 @@ std::optional<std::string> unfitSolver(const scene::Scene& scene, const scene::C
   return std::nullopt;
 }
 
+std::optional<std::string> unfitBending(const scene::Scene& scene) {
+  std::uint64_t nodes = 0;
+  for (const scene::Cloth& cloth : scene.cloths) nodes += cloth.dihedralBending > 0 ? cloth.nodeCount() : 0;
+  if (nodes == 0) return std::nullopt;
+  if (scene.integrator != scene::Integrator::semiImplicitEuler)
+    return "must be 0: other values need INTEGRATOR_SEMI_IMPLICIT_EULER";
+  if (nodes > limits::kMaxSolverNodes)
+    return fmt::format("must be 0 but for cloths of at most {} nodes in all; here they have {}",
+                       limits::kMaxSolverNodes, nodes);
+  return std::nullopt;
+}
+
 std::optional<std::string> instability(const scene::Scene& scene) {
   const std::uint32_t needed = scene::stableSubsteps(scene);
   if (needed != 0 && needed <= scene.substeps) return std::nullopt;
@@ -467,6 +497,8 @@ Result<scene::Scene> toScene(const v1::Scene& message, const MeshReader& readMes
   checkSize(checks, scene);
   checkSolvers(checks, scene);
   checkSelfCollision(checks, scene);
+  if (const auto complaint = unfitBending(scene))
+    checks.fail(Path("cloths[].dihedralBending"), "", *complaint);
   if (!checks.failed())
     if (const auto complaint = instability(scene))
       checks.fail(root / "substeps", fmt::format("{}", scene.substeps), *complaint);

@@ -30,11 +30,17 @@ v1::Solver toMessage(const scene::Solver& solver);
 scene::Gust toGust(Checks& checks, const Path& path, const v1::Gust& message);
 void write(const scene::Gust& gust, v1::Gust& message);
 
+// The radius of a cloth's balls in self-collision, m.
+float toBallRadius(Checks& checks, const Path& path, float value, const scene::Cloth& cloth);
+
 // nullptr, and the check failed with the names that there are: none of this name.
 const scene::Material* toMaterial(Checks& checks, const Path& path, const std::string& name);
 
 // What to say of a cloth whose solver cannot serve it in this scene; nullopt if it can.
 std::optional<std::string> unfitSolver(const scene::Scene& scene, const scene::Cloth& cloth);
+
+// What to say of the dihedral bending of a scene's cloths where it cannot be; nullopt if it can.
+std::optional<std::string> unfitBending(const scene::Scene& scene);
 
 // What to say of a scene whose integrator is not stable with its substeps; nullopt if it is.
 std::optional<std::string> instability(const scene::Scene& scene);

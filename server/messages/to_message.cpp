@@ -21,6 +21,8 @@ void writeConstraint(const scene::Solver& solver, v1::ConstraintSolver& message)
   if (solver.compliance) message.set_compliance(*solver.compliance);
   message.set_iterations(solver.iterations);
   message.set_tolerance(solver.tolerance);
+  message.set_path(solver.path == scene::ConstraintPath::assembled ? v1::CONSTRAINT_PATH_ASSEMBLED
+                                                                   : v1::CONSTRAINT_PATH_MATRIX_FREE);
 }
 
 void writeGrid(const scene::Grid& grid, v1::Grid& message) {
@@ -65,6 +67,7 @@ void writeCloth(const scene::Cloth& cloth, v1::Cloth& message) {
   write(cloth.structural, *message.mutable_structural());
   write(cloth.shear, *message.mutable_shear());
   write(cloth.bend, *message.mutable_bend());
+  message.set_dihedral_bending(cloth.dihedralBending);
   message.set_damping(cloth.damping);
   message.set_drag(cloth.drag);
   message.set_lift(cloth.lift);

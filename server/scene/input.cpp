@@ -26,6 +26,12 @@ void apply(Cloth& cloth, const ClothChange& change) {
   assign(cloth.friction, change.friction);
   assign(cloth.thickness, change.thickness);
   assign(cloth.solver, change.solver);
+  assign(cloth.dihedralBending, change.dihedralBending);
+  if (cloth.selfCollision) {
+    assign(cloth.selfCollision->radius, change.ballRadius);
+    assign(cloth.selfCollision->friction, change.ballFriction);
+  }
+  if (cloth.tethers) assign(cloth.tethers->slack, change.tetherSlack);
   if (change.arealMass) cloth.mass = static_cast<float>(double{*change.arealMass} * areaOf(cloth));
 }
 
@@ -34,10 +40,10 @@ void apply(Collider& collider, const ColliderChange& change) {
   if (change.position || change.orientation) collider.motion.keys.clear();
   assign(collider.pose.position, change.position);
   assign(collider.pose.orientation, change.orientation);
-  if (!change.radius) return;
-  float* radius = radiusOf(collider.shape);
-  assert(radius != nullptr);
-  *radius = *change.radius;
+  assign(collider.friction, change.friction);
+  if (float* radius = radiusOf(collider.shape)) assign(*radius, change.radius);
+  if (auto* capsule = std::get_if<Capsule>(&collider.shape)) assign(capsule->length, change.length);
+  if (auto* box = std::get_if<Box>(&collider.shape)) assign(box->size, change.size);
 }
 
 }  // namespace

@@ -47,6 +47,9 @@ struct ClothChange {
   std::optional<Solver> solver = {};
   std::optional<std::string> material = {};  // one of materials(); what is given above goes before it
   std::optional<float> arealMass = {};       // kg/m^2
+  // Of cloths that have self-collision, and of those that have tethers.
+  std::optional<float> ballRadius = {}, ballFriction = {}, tetherSlack = {};
+  std::optional<float> dihedralBending = {};
 };
 
 struct ColliderChange {
@@ -54,7 +57,10 @@ struct ColliderChange {
   // Either ends the collider's own motion.
   std::optional<Vec3> position = {};
   std::optional<Quaternion> orientation = {};
-  std::optional<float> radius = {};  // of a shape that has one
+  // Of shapes that have them.
+  std::optional<float> radius = {}, length = {};
+  std::optional<Vec3> size = {};
+  std::optional<float> friction = {};
 };
 
 // Takes effect at a tick's start, all of it.

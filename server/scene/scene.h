@@ -51,6 +51,12 @@ enum class SolverKind : std::uint8_t {
                   // cloth simulation", 1998
 };
 
+// How a constraint system is kept while it is solved. Both give the same motion but for rounding.
+enum class ConstraintPath : std::uint8_t {
+  matrixFree,  // products are gathered from the springs
+  assembled,   // the paper's sparse matrices, [Va21] 3.2.2: a baseline
+};
+
 // What turns a cloth's springs into motion. All but `kind` are of solvers that iterate.
 struct Solver {
   SolverKind kind = SolverKind::massSpring;
@@ -66,6 +72,7 @@ struct Solver {
   // `constraint` also of what it is too short. All of it gives the nodes that speed. Absent: all for
   // `constraint`, kTakenBack for acad.
   std::optional<float> takenBack = {};
+  ConstraintPath path = ConstraintPath::matrixFree;  // of `constraint`
 };
 
 inline constexpr float kTakenBack = 0.15f;
@@ -129,6 +136,7 @@ struct Cloth {
   std::shared_ptr<const Mesh> mesh;  // null: the cloth is the grid
   float mass = 0;                    // kg, of the whole cloth; nodeMasses() says how it is spread
   Spring structural, shear, bend;
+  float dihedralBending = 0;                  // N m, across edges between faces
   float damping = 0;                          // 1/s
   float drag = 0, lift = 0;                   // coefficients, dimensionless
   float friction = 0.3f;                      // Coulomb, dimensionless

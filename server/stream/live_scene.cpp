@@ -35,6 +35,9 @@ v1::ParameterChange allParameters(const scene::Scene& scene) {
     all.set_friction(cloth.friction());
     all.set_thickness(cloth.thickness());
     *all.mutable_solver() = cloth.solver();
+    all.set_dihedral_bending(cloth.dihedral_bending());
+    if (cloth.has_self_collision()) *all.mutable_self_collision() = cloth.self_collision();
+    if (cloth.has_tethers()) *all.mutable_tethers() = cloth.tethers();
   }
   return change;
 }
