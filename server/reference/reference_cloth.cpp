@@ -4,6 +4,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cassert>
 #include <cmath>
 
@@ -46,6 +47,7 @@ ReferenceCloth::ReferenceCloth(const scene::Cloth& cloth)
   const std::vector<std::uint8_t> pinned = scene::pinnedNodes(cloth);
   for (std::size_t i = 0; i < pinned.size(); ++i)
     if (pinned[i]) inverseMasses_[i] = 0;
+  if (cloth_.dihedralBending > 0) hinges_ = scene::hinges(cloth_);
 }
 
 void ReferenceCloth::setMass(float mass) {
@@ -60,6 +62,8 @@ void ReferenceCloth::setParameters(const scene::Cloth& cloth) {
   cloth_.structural = cloth.structural;
   cloth_.shear = cloth.shear;
   cloth_.bend = cloth.bend;
+  cloth_.dihedralBending = cloth.dihedralBending;
+  if (cloth_.dihedralBending > 0 && hinges_.empty()) hinges_ = scene::hinges(cloth_);
   cloth_.damping = cloth.damping;
   cloth_.drag = cloth.drag;
   cloth_.lift = cloth.lift;
@@ -80,6 +84,46 @@ void ReferenceCloth::accumulateSpringForces(std::span<Vec3> forces) const {
     forces[link.a] += force;
     forces[link.b] -= force;
   }
+}
+
+namespace {
+
+std::array<Vec3, 4> cornersOf(const scene::Hinge& hinge, std::span<const Vec3> positions) {
+  std::array<Vec3, 4> corners;
+  for (std::size_t i = 0; i < corners.size(); ++i) corners[i] = positions[hinge.nodes[i]];
+  return corners;
+}
+
+}  // namespace
+
+void ReferenceCloth::accumulateBendingForces(std::span<Vec3> forces) const {
+  for (const scene::Hinge& hinge : hinges_) {
+    const scene::HingeShape shape = scene::hingeShape(cornersOf(hinge, positions_), hinge.leastSquare);
+    const double strength = double{cloth_.dihedralBending} * hinge.weight * (hinge.bent - shape.bent);
+    for (std::size_t i = 0; i < hinge.nodes.size(); ++i)
+      forces[hinge.nodes[i]] += strength * shape.gradients[i];
+  }
+}
+
+// The integral of 2 sin(theta / 2) - bent from the shape at rest on.
+double ReferenceCloth::bendingEnergy() const {
+  double sum = 0;
+  for (const scene::Hinge& hinge : hinges_) {
+    const double now = scene::hingeShape(cornersOf(hinge, positions_), hinge.leastSquare).bent;
+    const auto integral = [&](double bent) {
+      const double half = std::asin(std::clamp(bent / 2, -1.0, 1.0));
+      return -4 * std::cos(half) - 2 * hinge.bent * half;
+    };
+    sum += hinge.weight * (integral(now) - integral(hinge.bent));
+  }
+  return cloth_.dihedralBending * sum;
+}
+
+void ReferenceCloth::bend(double h) {
+  if (cloth_.dihedralBending == 0) return;
+  std::ranges::fill(forces_, Vec3::Zero());
+  accumulateBendingForces(forces_);
+  for (std::size_t i = 0; i < forces_.size(); ++i) velocities_[i] += h * inverseMasses_[i] * forces_[i];
 }
 
 void ReferenceCloth::accumulateAirForces(const scene::Environment& environment,
@@ -132,6 +176,7 @@ void ReferenceCloth::integrateRungeKutta(const scene::Environment& environment, 
 void ReferenceCloth::integrate(const scene::Environment& environment, scene::Integrator integrator,
                                double h) {
   if (integrator == scene::Integrator::rungeKutta4) return integrateRungeKutta(environment, h);
+  bend(h);
   const std::vector<Vec3>& rates = accelerations(environment);
   const scene::SolverKind solver = cloth_.solver.kind;
   if (solver != scene::SolverKind::massSpring) start_ = positions_;

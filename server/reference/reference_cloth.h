@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "server/reference/contact.h"
+#include "server/scene/hinges.h"
 #include "server/scene/mesh.h"
 #include "server/scene/scene.h"
 #include "server/scene/spring_colours.h"
@@ -29,7 +30,8 @@ class ReferenceCloth {
   // At rest in its start pose. Springs are those of scene::springLinks().
   explicit ReferenceCloth(const scene::Cloth& cloth);
 
-  // Springs, damping, drag, lift, friction, thickness, mass, solver from now on; same shape, same pins.
+  // Springs, bending, damping, drag, lift, friction, thickness, mass, solver from now on; same shape, same
+  // pins.
   void setParameters(const scene::Cloth& cloth);
 
   std::span<Vec3> positions() { return positions_; }
@@ -45,6 +47,10 @@ class ReferenceCloth {
   // Both add to one force a node, N. [Va21] Eq. 1; air with drag and lift a triangle.
   void accumulateSpringForces(std::span<Vec3> forces) const;
   void accumulateAirForces(const scene::Environment& environment, std::span<Vec3> forces) const;
+
+  // J of dihedral bending, and what it pulls at nodes with, N: scene/hinges.h.
+  double bendingEnergy() const;
+  void accumulateBendingForces(std::span<Vec3> forces) const;
 
   // Forces, one step of h seconds, and the cloth's constraints; colliders apart.
   void integrate(const scene::Environment& environment, scene::Integrator integrator, double h);
@@ -72,6 +78,7 @@ class ReferenceCloth {
   // m/s^2; 0 of pinned nodes. Until the next call.
   const std::vector<Vec3>& accelerations(const scene::Environment& environment);
   void integrateRungeKutta(const scene::Environment& environment, double h);
+  void bend(double h);
   void enforceConstraints(double h);
   void takeImplicitVelocities(double h);
   void correctSprings(double h);
@@ -81,6 +88,7 @@ class ReferenceCloth {
   scene::Cloth cloth_;
   std::vector<scene::SpringLink> links_;
   std::vector<scene::Triangle> triangles_;
+  std::vector<scene::Hinge> hinges_;  // once they are needed
   std::vector<Vec3> positions_, velocities_, forces_;
   std::vector<Vec3> start_, startVelocities_;  // of the substep, where a system is solved
   scene::SpringColours colours_;               // of xpbd, once they are needed

@@ -15,7 +15,8 @@
 //   explicit Euler:       z^2 + (c - 2) z + 1 - c + s = 0,      |z| <= 1  if  s <= c  and  2c - s < 4.
 //
 // A Laplacian with weights w_ij has, in the row of a node of mass m, the diagonal sum_j w_ij and as much
-// beside it, so no Rayleigh quotient exceeds  max_i 2 sum_j w_ij / m.  Pinned nodes have no row; their
+// beside it, so no Rayleigh quotient exceeds  max_i 2 sum_j w_ij / m.  Dihedral bending, which only
+// semi-implicit Euler has, adds h^2 times bendingRate() to s. Pinned nodes have no row; their
 // springs stay on the diagonals of others. With w = h^2 k + 2 h kd that bounds s + 2c at once. For explicit
 // Euler, s <= c holds spring by spring as far as its dashpot reaches, and mass-proportional damping has to
 // carry the rest.
@@ -25,6 +26,7 @@
 #include <cmath>
 #include <vector>
 
+#include "server/scene/hinges.h"
 #include "server/scene/mesh.h"
 
 namespace clothstream::scene {
@@ -125,15 +127,15 @@ double airDamping(const Cloth& cloth, const Environment& environment) {
 }
 
 // Whether semi-implicit Euler with step h is stable: s + 2c < 4.
-bool semiImplicitStable(const Cloth& cloth, const NodeSprings& node, double air, double h) {
+bool semiImplicitStable(const Cloth& cloth, const NodeSprings& node, double air, double bending, double h) {
   const auto weight = [&](const Spring& spring) { return h * h * spring.stiffness + 2 * h * spring.damping; };
   const double springs = node.structural * weight(cloth.structural) + node.shear * weight(cloth.shear) +
                          node.bend * weight(cloth.bend);
-  return 2 * springs * node.perMass + 2 * h * (cloth.damping + air) < 4;
+  return 2 * springs * node.perMass + h * h * bending + 2 * h * (cloth.damping + air) < 4;
 }
 
 // Whether the Runge-Kutta method with step h is stable: s <= r^2 and c <= r.
-bool rungeKuttaStable(const Cloth& cloth, const NodeSprings& node, double air, double h) {
+bool rungeKuttaStable(const Cloth& cloth, const NodeSprings& node, double air, double, double h) {
   // Of the largest half disc round 0 within |1 + z + z^2/2 + z^3/6 + z^4/24| <= 1, rounded down.
   constexpr double kRungeKuttaRadius = 2.61;
   const auto sum = [&](auto&& of) {
@@ -146,7 +148,7 @@ bool rungeKuttaStable(const Cloth& cloth, const NodeSprings& node, double air, d
 }
 
 // Whether explicit Euler with step h is stable: s <= c, and c < 2, from which 2c - s < 4 follows.
-bool explicitStable(const Cloth& cloth, const NodeSprings& node, double air, double h) {
+bool explicitStable(const Cloth& cloth, const NodeSprings& node, double air, double, double h) {
   const double tension = 1 - 1 / (1 + double{kTensionStrain});
   // What damping has to carry of one spring: along it, what the dashpot does not; across it, all of its
   // tension.
@@ -171,6 +173,7 @@ std::uint32_t stableSubsteps(const Scene& scene, Cloth cloth, std::uint32_t atLe
   if (cloth.solver.kind == SolverKind::implicitEuler || cloth.solver.kind == SolverKind::xpbd)
     cloth.structural = cloth.shear = cloth.bend = {};
   const double air = airDamping(cloth, scene.environment);
+  const double bending = cloth.dihedralBending > 0 ? cloth.dihedralBending * bendingRate(cloth) : 0;
   const std::vector<NodeSprings> combinations = cloth.mesh ? meshSprings(cloth) : gridSprings(cloth);
   const auto stable = scene.integrator == Integrator::semiImplicitEuler ? semiImplicitStable
                       : scene.integrator == Integrator::rungeKutta4     ? rungeKuttaStable
@@ -178,7 +181,7 @@ std::uint32_t stableSubsteps(const Scene& scene, Cloth cloth, std::uint32_t atLe
   for (std::uint32_t substeps = atLeast; substeps <= kMaxSubsteps; ++substeps) {
     const double h = scene.tickSeconds() / substeps;
     if (std::ranges::all_of(combinations,
-                            [&](const NodeSprings& node) { return stable(cloth, node, air, h); }))
+                            [&](const NodeSprings& node) { return stable(cloth, node, air, bending, h); }))
       return substeps;
   }
   return 0;

@@ -15,6 +15,7 @@
 #include "kernels/compute_normals.h"
 #include "kernels/hash_state.h"
 #include "server/simulation/advance_variant.h"
+#include "server/simulation/bending/bending_stage.h"
 #include "server/simulation/collision/collision_stage.h"
 #include "server/simulation/hold/hold_stage.h"
 #include "server/simulation/mass_stage.h"
@@ -196,6 +197,7 @@ struct ClothSimulation::Pipeline {
   const Stage& advance(const AdvanceVariant& variant);
   void prepare(float airDensity);
   void makeXpbd(std::span<const scene::Cloth> cloths);
+  void makeBending(std::span<const scene::Cloth> cloths);
   void makeHolds(const HoldTables& tables);
   void setSolvers(std::span<const scene::Cloth> cloths);
   void makeMassStage();
@@ -230,6 +232,8 @@ struct ClothSimulation::Pipeline {
   std::unique_ptr<RungeKuttaStage> rungeKutta;  // where that is the integrator
   SolveStage solves;
   std::unique_ptr<XpbdStage> xpbd;                    // where a cloth's solver is that
+  std::unique_ptr<BendingStage> bending;              // where a cloth has it, or had
+  bool bends = false;                                 // some has it now
   std::unique_ptr<SelfCollisionStage> selfCollision;  // where a cloth has it
   std::vector<scene::Solver> solvers;                 // of the cloths, as the tables have them
   std::vector<shared::vec4> stiffness;                // of their springs
@@ -281,10 +285,14 @@ ClothSimulation::Pipeline::Pipeline(const vulkan::Device& on, const scene::Scene
   if (integrator == scene::Integrator::rungeKutta4)
     rungeKutta = std::make_unique<RungeKuttaStage>(on, stateOf(buffers, collision), offsets);
   makeXpbd(scene.cloths);
+  makeBending(scene.cloths);
   if (SelfCollisionStage::isIn(scene))
     selfCollision =
         std::make_unique<SelfCollisionStage>(on, scene, stateOf(buffers, collision), cut.workgroupSize);
-  if (const HoldTables tables = holdTables(scene); !tables.empty()) makeHolds(tables);
+  if (const HoldTables tables = holdTables(scene); !tables.empty()) {
+    makeHolds(tables);
+    holds->setSlack(scene.cloths);
+  }
   prepare(scene.environment.airDensity);
 }
 
@@ -310,6 +318,15 @@ void ClothSimulation::Pipeline::makeXpbd(std::span<const scene::Cloth> cloths) {
   xpbd = any ? std::make_unique<XpbdStage>(device, cloths, stateOf(buffers, collision), asked.workgroupSize,
                                            asked.xpbdWholeNodes)
              : nullptr;
+}
+
+void ClothSimulation::Pipeline::makeBending(std::span<const scene::Cloth> cloths) {
+  const bool wanted = BendingStage::isIn(cloths);
+  if (wanted && !(bending && bending->serves(cloths))) {
+    bending = std::make_unique<BendingStage>(device, cloths, stateOf(buffers, collision), cut.workgroupSize);
+    tabled = false;
+  }
+  bends = wanted;
 }
 
 const Stage& ClothSimulation::Pipeline::advance(const AdvanceVariant& variant) {
@@ -373,6 +390,7 @@ void ClothSimulation::Pipeline::start(vulkan::Recorder& recorder) {
   if (meshes) meshes->recordTables(recorder);
   if (solves.active()) solves.recordTables(recorder);
   if (xpbd) xpbd->recordTables(recorder);
+  if (bending) bending->recordTables(recorder);
   if (selfCollision) selfCollision->recordTables(recorder);
   recorder.barrier();
   if (!weighed) {
@@ -440,6 +458,10 @@ void ClothSimulation::Pipeline::recordSubsteps(vulkan::Recorder& recorder, const
   for (std::uint32_t substep = 0; substep < substeps; ++substep) {
     push.collision = collision.push(substep, substeps, tickRate);
     recorder.barrier();
+    if (bends) {
+      bending->record(recorder, present, substepSeconds);
+      recorder.barrier();
+    }
     if (rungeKutta) {
       recordRungeKutta(recorder, inputs, push);
     } else {
@@ -490,8 +512,11 @@ void ClothSimulation::setCloths(std::span<const scene::Cloth> cloths) {
                     }));
   const bool heavier = massesOf(cloths) != pipeline_->clothMasses;
   if (heavier) pipeline_->makeMassStage();
+  pipeline_->makeBending(cloths);
   pipeline_->setSolvers(cloths);
   if (heavier) pipeline_->setMasses(cloths);
+  if (pipeline_->selfCollision) pipeline_->selfCollision->setCloths(cloths);
+  if (pipeline_->holds) pipeline_->holds->setSlack(cloths);
   pipeline_->stiffness = springStiffness(cloths);
   pipeline_->records = std::move(records);
 }

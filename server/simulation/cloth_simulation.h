@@ -65,10 +65,10 @@ class ClothSimulation {
   ClothSimulation(const ClothSimulation&) = delete;
   ClothSimulation& operator=(const ClothSimulation&) = delete;
 
-  // Parameters of cloths (springs, damping, drag, lift, friction, thickness, mass, solver) from the next
-  // recorded tick on. Same cloths, same shapes, same pins as at construction; the state stays. Where a
-  // solver or a mass is another, no tick may be in flight; throws std::runtime_error where the device has no
-  // room for it, and changes nothing then. A solver's kernels are made when a cloth first has it, and kept.
+  // Parameters of cloths from the next recorded tick on. Same cloths, same shapes, same pins and attachments
+  // as at construction, self-collision and tethers of the same cloths; the state stays. No tick may be in
+  // flight. Throws std::runtime_error where the device has no room for what is asked for, and changes nothing
+  // then. Kernels are made when a cloth first needs them, and kept.
   void setCloths(std::span<const scene::Cloth> cloths);
 
   // All substeps of one tick, and its status. At most one tick may be in flight when it is called.

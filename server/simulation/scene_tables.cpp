@@ -19,9 +19,11 @@ float snapTiny(float x) {
 
 // Where springs become constraints, how much of what is too much is taken back; the third tells from those
 // that always are.
-shared::vec4 limitsOf(const scene::Solver& solver) {
-  if (solver.kind != scene::SolverKind::acad) return {0, scene::takenBack(solver), 0, 0};
-  return {solver.activation, scene::takenBack(solver), 1, 0};
+shared::vec4 limitsOf(const scene::Cloth& cloth) {
+  const scene::Solver& solver = cloth.solver;
+  const bool adaptive = solver.kind == scene::SolverKind::acad;
+  return {adaptive ? solver.activation : 0, scene::takenBack(solver), adaptive ? 1.0f : 0.0f,
+          cloth.dihedralBending};
 }
 
 // Compliance over h^2, iterations and tolerance of conjugate gradients; whether it has bend springs.
@@ -78,7 +80,7 @@ std::vector<shared::ClothRecord> clothRecords(std::span<const scene::Cloth> clot
          .air = {cloth.drag, cloth.lift, cloth.selfCollision ? cloth.selfCollision->radius : 0.0f,
                  cloth.selfCollision ? cloth.selfCollision->friction : 0.0f},
          .solver = solverOf(cloth, substepSeconds),
-         .limits = limitsOf(cloth.solver),
+         .limits = limitsOf(cloth),
          .springs = {xpbd(structural, static_cast<float>(cloth.solver.iterations)), xpbd(shear, inverseMass),
                      xpbd(bend, 0)}});
     firstNode += cloth.nodeCount();

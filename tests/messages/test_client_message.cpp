@@ -279,6 +279,78 @@ class ToParameterChange : public testing::Test {
   v1::ParameterChange message_;
 };
 
+TEST_F(ToParameterChange, RefusesWhatAColliderDoesNotHave) {
+  v1::ColliderChange& change = *message_.add_colliders();
+  change.set_name("ball");
+  change.set_length(0.2f);
+  EXPECT_EQ(error(), "parameterChange.colliders[0].length = 0.2: must be absent: \"ball\" is no capsule");
+  change.clear_length();
+  change.mutable_size()->set_x(1);
+  change.mutable_size()->set_y(1);
+  change.mutable_size()->set_z(1);
+  EXPECT_EQ(error(), "parameterChange.colliders[0].size: must be absent: \"ball\" is no box");
+  change.clear_size();
+  change.set_friction(11);
+  EXPECT_EQ(error(), "parameterChange.colliders[0].friction = 11: must be a finite number from 0 to 10");
+}
+
+TEST_F(ToParameterChange, TakesSizesOfTheShape) {
+  scene_.colliders[0].shape = scene::Box{};
+  v1::ColliderChange& change = *message_.add_colliders();
+  change.set_name("ball");
+  change.mutable_size()->set_x(1);
+  change.mutable_size()->set_y(2);
+  change.mutable_size()->set_z(3);
+  change.set_friction(2);
+  scene::applyChange(scene_, toParameterChange(message_, scene_).value());
+  EXPECT_EQ(std::get<scene::Box>(scene_.colliders[0].shape).size, scene::Vec3(1, 2, 3));
+  EXPECT_EQ(scene_.colliders[0].friction, 2);
+  scene_.colliders[0].shape = scene::Capsule{};
+  change.clear_size();
+  change.set_length(0.7f);
+  change.set_radius(0.2f);
+  scene::applyChange(scene_, toParameterChange(message_, scene_).value());
+  EXPECT_EQ(std::get<scene::Capsule>(scene_.colliders[0].shape).length, 0.7f);
+  EXPECT_EQ(std::get<scene::Capsule>(scene_.colliders[0].shape).radius, 0.2f);
+}
+
+TEST_F(ToParameterChange, ChangesSelfCollisionAndTethersWhereTheyAre) {
+  v1::ClothChange& change = *message_.add_cloths();
+  change.mutable_self_collision()->set_friction(1);
+  EXPECT_EQ(error(), "parameterChange.cloths[0].selfCollision: must be absent: \"" + scene_.cloths[0].name +
+                         "\" has none from its start");
+  change.clear_self_collision();
+  change.mutable_tethers()->set_slack(0.5f);
+  EXPECT_EQ(error(), "parameterChange.cloths[0].tethers: must be absent: \"" + scene_.cloths[0].name +
+                         "\" has none from its start");
+  scene_.cloths[0].tethers.emplace();
+  scene_.cloths[0].selfCollision = scene::SelfCollision{.radius = 0.01f};
+  change.mutable_self_collision()->set_friction(1);
+  change.mutable_self_collision()->set_radius(10);
+  EXPECT_THAT(error(), StartsWith("parameterChange.cloths[0].selfCollision.radius = 10: must be"));
+  change.mutable_self_collision()->clear_radius();
+  scene::applyChange(scene_, toParameterChange(message_, scene_).value());
+  EXPECT_EQ(scene_.cloths[0].selfCollision->radius, 0.01f);
+  EXPECT_EQ(scene_.cloths[0].selfCollision->friction, 1);
+  EXPECT_EQ(scene_.cloths[0].tethers->slack, 0.5f);
+}
+
+TEST_F(ToParameterChange, RefusesDihedralBendingThatCannotBe) {
+  v1::ClothChange& change = *message_.add_cloths();
+  change.set_dihedral_bending(2);
+  EXPECT_EQ(error(), "parameterChange.cloths[0].dihedralBending = 2: must be a finite number from 0 to 1");
+  scene_.cloths[0].structural = scene_.cloths[0].shear = scene_.cloths[0].bend = {};
+  scene_.cloths[0].mass = 1e-5f;
+  change.set_dihedral_bending(1);
+  EXPECT_THAT(error(), StartsWith("parameterChange: with substeps = "));
+  change.set_dihedral_bending(1e-9f);
+  EXPECT_EQ(error(), "no error");
+  scene_.integrator = scene::Integrator::rungeKutta4;
+  EXPECT_EQ(error(),
+            "parameterChange.cloths[].dihedralBending: must be 0: other values need "
+            "INTEGRATOR_SEMI_IMPLICIT_EULER");
+}
+
 TEST_F(ToParameterChange, RefusesARadiusForWhatHasNone) {
   scene_ = *toScene(sceneWithHull());
   message_.add_colliders()->set_name("ball");

@@ -161,5 +161,32 @@ TEST_F(SolverChange, ofMassesGoesOnAsAClothThatAlwaysHadThem) {
   }
 }
 
+// Balls of another size and friction, alike and not; tethers of another length.
+TEST_F(SolverChange, ofSelfCollisionAndTethersGoesOnAsAClothThatAlwaysHadThem) {
+  scene::Scene scene = softScene();
+  for (scene::Cloth& cloth : scene.cloths) {
+    cloth.selfCollision = scene::SelfCollision{.radius = 0.01f, .friction = 0.3f};
+    cloth.tethers = scene::Tethers{.slack = 0.02f};
+  }
+  const simulation::TickInputs inputs = inputsWithBall(scene);
+  Running changing(scene);
+  const auto change = [&](std::size_t cloth, float radius, float friction, float slack) {
+    scene.cloths[cloth].selfCollision = scene::SelfCollision{.radius = radius, .friction = friction};
+    scene.cloths[cloth].tethers->slack = slack;
+  };
+  for (int round = 0; round < 3; ++round) {
+    SCOPED_TRACE(round);
+    if (round == 1) change(0, 0.006f, 1, 0.3f);
+    if (round == 2) change(1, 0.006f, 1, 0);
+    const StateSnapshot kept = changing.save();
+    changing.setCloths(scene.cloths);
+    EXPECT_EQ(changing.save().bytes, kept.bytes);
+    Running always(scene);
+    always.restore(kept);
+    for (int tick = 0; tick < 6; ++tick)
+      ASSERT_EQ(changing.tick(inputs).stateHash, always.tick(inputs).stateHash) << "tick " << tick;
+  }
+}
+
 }  // namespace
 }  // namespace clothstream::tests

@@ -58,6 +58,7 @@ HoldStage::HoldStage(const vulkan::Device& device, const HoldTables& tables, con
       hasTethers_(!tables.tethers.empty()),
       attached_(device, tables.attached),
       tethers_(device, tables.tethers),
+      restTethers_(tables.tethers),
       startFrames_(tables.frames),
       frames_(device, BufferPurpose::texels,
               std::max<std::size_t>(1, tables.frames.size()) * sizeof(shared::FrameRecord)),
@@ -112,17 +113,31 @@ std::uint64_t HoldStage::invocations() const {
   return std::min<std::uint64_t>(nodeCount_, kMost);
 }
 
+void HoldStage::setSlack(std::span<const scene::Cloth> cloths) {
+  if (!hasTethers_) return;
+  std::vector<shared::TetherRecord> tethers = restTethers_;
+  std::size_t node = 0;
+  for (const scene::Cloth& cloth : cloths)
+    for (std::uint32_t i = 0; i < cloth.nodeCount(); ++i, ++node) {
+      const float longer = 1 + (cloth.tethers ? cloth.tethers->slack : 0);
+      tethers[node].anchors.y *= longer;
+      tethers[node].anchors.w *= longer;
+    }
+  tethers_.set(tethers);
+  slackened_ = false;
+}
+
 void HoldStage::recordInputs(vulkan::Recorder& recorder, std::span<const scene::Pose> frames,
                              std::span<const Grip> grips) {
   assert(frames.empty() || frames.size() == startFrames_.size());
   assert(grips.size() <= kMaxGrips);
   if (!std::exchange(tabled_, true)) {
     attached_.recordUpload(recorder);
-    tethers_.recordUpload(recorder);
     recorder.fill(holds_, 0, holds_.bytes());
     recorder.fill(reports_, 0, reports_.bytes());
     recorder.barrier();
   }
+  if (!std::exchange(slackened_, true)) tethers_.recordUpload(recorder);
   slot_ = 1 - slot_;
   const Buffer& through = uploads_[slot_];
   const std::span<shared::FrameRecord> frameRecords = through.mapped<shared::FrameRecord>();

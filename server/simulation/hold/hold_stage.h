@@ -7,6 +7,7 @@
 #include <span>
 
 #include "server/scene/pose.h"
+#include "server/scene/scene.h"
 #include "server/simulation/device_table.h"
 #include "server/simulation/hold/grip.h"
 #include "server/simulation/hold/hold_tables.h"
@@ -27,6 +28,9 @@ class HoldStage {
   // Throws std::runtime_error where the device has no room.
   HoldStage(const vulkan::Device& device, const HoldTables& tables, const StateBuffers& state,
             std::uint32_t nodeCount, std::uint32_t workgroupSize);
+
+  // Of the tethers of these cloths, from the next tick on: to be called before the first.
+  void setSlack(std::span<const scene::Cloth> cloths);
 
   // `frames`: where each attachment of the tables is at the tick's end; none: where they start. At most one
   // tick may be in flight.
@@ -51,11 +55,13 @@ class HoldStage {
 
   std::uint32_t workgroupSize_, nodeCount_, attachedCount_;
   bool hasTethers_;
-  bool tabled_ = false;  // what does not change is on the device
-  bool takes_ = false;   // some grip takes hold in this tick
+  bool tabled_ = false;    // what does not change is on the device
+  bool slackened_ = true;  // the tethers are
+  bool takes_ = false;     // some grip takes hold in this tick
   std::uint32_t gripCount_ = 0, slot_ = 0;
 
   DeviceTable attached_, tethers_;
+  std::vector<shared::TetherRecord> restTethers_;  // without slack
   std::vector<shared::FrameRecord> startFrames_;
   vulkan::Buffer frames_, grips_, holds_, reports_;
   // By turns: a tick may be in flight while the next is recorded.

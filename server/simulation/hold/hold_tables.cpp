@@ -29,13 +29,12 @@ void addAttached(const scene::Scene& scene, const scene::Cloth& cloth, std::uint
   }
 }
 
-shared::TetherRecord record(const scene::NodeTethers& tethers, float slack, std::uint32_t first) {
+shared::TetherRecord record(const scene::NodeTethers& tethers, std::uint32_t first) {
   shared::TetherRecord record{};
   const auto number = [&](const scene::Tether& tether) {
     return tether.anchor == scene::Tether::kNone ? 0.0f : static_cast<float>(first + tether.anchor + 1);
   };
-  record.anchors = {number(tethers[0]), tethers[0].length * (1 + slack), number(tethers[1]),
-                    tethers[1].length * (1 + slack)};
+  record.anchors = {number(tethers[0]), tethers[0].length, number(tethers[1]), tethers[1].length};
   return record;
 }
 
@@ -55,7 +54,7 @@ HoldTables holdTables(const scene::Scene& scene) {
     addAttached(scene, cloth, first, tables);
     if (cloth.tethers)
       for (const scene::NodeTethers& tethers : scene::nodeTethers(cloth))
-        tables.tethers.push_back(record(tethers, cloth.tethers->slack, first));
+        tables.tethers.push_back(record(tethers, first));
     else if (anyTethers)
       tables.tethers.resize(tables.tethers.size() + cloth.nodeCount());
     first += cloth.nodeCount();

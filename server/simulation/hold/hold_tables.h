@@ -11,8 +11,9 @@ namespace clothstream::simulation {
 
 struct HoldTables {
   std::vector<shared::AttachedRecord> attached;
-  std::vector<shared::FrameRecord> frames;    // of the attachments, in the order of the cloths, at the start
-  std::vector<shared::TetherRecord> tethers;  // a node of the scene; none where no cloth has tethers
+  std::vector<shared::FrameRecord> frames;  // of the attachments, in the order of the cloths, at the start
+  // A node of the scene, without slack; none where no cloth has tethers.
+  std::vector<shared::TetherRecord> tethers;
 
   bool empty() const { return attached.empty() && tethers.empty(); }
 };

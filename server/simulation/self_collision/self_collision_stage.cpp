@@ -40,22 +40,22 @@ std::size_t tableBytes(std::uint32_t cells) {
   return (std::size_t{cells} + cells / shared::kCellBlock + shared::kTableWords) * sizeof(std::uint32_t);
 }
 
-float reachOf(const scene::Scene& scene) {
+float reachOf(std::span<const scene::Cloth> cloths) {
   float radius = 0;
-  for (const scene::Cloth& cloth : scene.cloths)
+  for (const scene::Cloth& cloth : cloths)
     if (cloth.selfCollision) radius = std::max(radius, cloth.selfCollision->radius);
   return 2 * radius;
 }
 
-std::uint32_t hasSeveralMaterials(const scene::Scene& scene) {
+bool hasSeveralMaterials(std::span<const scene::Cloth> cloths) {
   const scene::SelfCollision* first = nullptr;
-  for (const scene::Cloth& cloth : scene.cloths) {
+  for (const scene::Cloth& cloth : cloths) {
     if (!cloth.selfCollision) continue;
     if (first == nullptr) first = &*cloth.selfCollision;
     if (first->radius != cloth.selfCollision->radius || first->friction != cloth.selfCollision->friction)
-      return 1;
+      return true;
   }
-  return 0;
+  return false;
 }
 
 // Where each node is at rest, and cloth + 1; 0 of cloths without self-collision.
@@ -78,12 +78,15 @@ bool SelfCollisionStage::isIn(const scene::Scene& scene) {
 
 SelfCollisionStage::SelfCollisionStage(const vulkan::Device& device, const scene::Scene& scene,
                                        const StateBuffers& state, std::uint32_t workgroupSize)
-    : nodeCount_(scene.nodeCount()),
+    : device_(device),
+      state_(state),
+      workgroupSize_(workgroupSize),
+      nodeCount_(scene.nodeCount()),
       cellCount_(cellCountOf(nodeCount_)),
       measureInvocations_((nodeCount_ + 63) / 64),
       interval_((scene.substeps + kListsATick - 1) / kListsATick),
       substepSeconds_(static_cast<float>(scene.substepSeconds())),
-      reach_(reachOf(scene)),
+      reach_(reachOf(scene.cloths)),
       restsUpload_(device, BufferPurpose::upload, nodeCount_ * kTexelBytes),
       rests_(device, BufferPurpose::texels, nodeCount_ * kTexelBytes),
       table_(device, BufferPurpose::state, tableBytes(cellCount_)),
@@ -157,38 +160,54 @@ SelfCollisionStage::SelfCollisionStage(const vulkan::Device& device, const scene
                 return Bindings(device, kernel,
                                 {&state.cloths, &rests_, &sorted_, state.velocities[of], &table_, &starts_,
                                  &neighbours_, &report_});
-              }),
-      countContacts_(device,
-                     {.name = "count_contacts",
-                      .spirv = kernels::count_contacts,
-                      .bindings = {kTexels, kTexels, kTexels, kTexels, kTexels, kStorage, kStorage, kStorage,
-                                   kStorage, kStorage, kStorage},
-                      .pushConstantBytes = sizeof(shared::ContactPush),
-                      .workgroupSize = workgroupSize,
-                      .specialisation = {hasSeveralMaterials(scene)}},
-                     [&](const vulkan::Kernel& kernel, std::size_t of) {
-                       return Bindings(device, kernel,
-                                       {&state.cloths, &rests_, &neighbours_, state.positions[of],
-                                        state.velocities[of], &contactPositions_, &contactVelocities_,
-                                        &contacts_, &touching_, &groups_, &report_});
-                     }),
-      resolve_(device,
-               {.name = "resolve_contacts",
-                .spirv = kernels::resolve_contacts,
-                .bindings = {kTexels, kTexels, kTexels, kTexels, kTexels, kTexels, kTexels, kTexels, kStorage,
-                             kStorage, kStorage, kStorage, kStorage},
-                .pushConstantBytes = sizeof(shared::ContactPush),
-                .workgroupSize = workgroupSize,
-                .specialisation = {hasSeveralMaterials(scene)}},
-               [&](const vulkan::Kernel& kernel, std::size_t of) {
-                 return Bindings(
-                     device, kernel,
-                     {&state.cloths, &rests_, &state.colliders, &state.nearColliders, &contacts_,
-                      &contactPositions_, &contactVelocities_, state.positions[1 - of], &touching_, &groups_,
-                      state.positions[of], state.velocities[of], &state.toldContacts});
-               }) {
+              }) {
   assert(isIn(scene));
   fillRests(scene, restsUpload_.mapped<shared::vec4>());
+  makeContacts(scene.cloths);
+}
+
+SelfCollisionStage::Contacts::Contacts(const vulkan::Device& device, const StateBuffers& state,
+                                       const SelfCollisionStage& stage, bool several)
+    : count(device,
+            {.name = "count_contacts",
+             .spirv = kernels::count_contacts,
+             .bindings = {kTexels, kTexels, kTexels, kTexels, kTexels, kStorage, kStorage, kStorage, kStorage,
+                          kStorage, kStorage},
+             .pushConstantBytes = sizeof(shared::ContactPush),
+             .workgroupSize = stage.workgroupSize_,
+             .specialisation = {several ? 1u : 0u}},
+            [&](const vulkan::Kernel& kernel, std::size_t of) {
+              return Bindings(device, kernel,
+                              {&state.cloths, &stage.rests_, &stage.neighbours_, state.positions[of],
+                               state.velocities[of], &stage.contactPositions_, &stage.contactVelocities_,
+                               &stage.contacts_, &stage.touching_, &stage.groups_, &stage.report_});
+            }),
+      resolve(device,
+              {.name = "resolve_contacts",
+               .spirv = kernels::resolve_contacts,
+               .bindings = {kTexels, kTexels, kTexels, kTexels, kTexels, kTexels, kTexels, kTexels, kStorage,
+                            kStorage, kStorage, kStorage, kStorage},
+               .pushConstantBytes = sizeof(shared::ContactPush),
+               .workgroupSize = stage.workgroupSize_,
+               .specialisation = {several ? 1u : 0u}},
+              [&](const vulkan::Kernel& kernel, std::size_t of) {
+                return Bindings(device, kernel,
+                                {&state.cloths, &stage.rests_, &state.colliders, &state.nearColliders,
+                                 &stage.contacts_, &stage.contactPositions_, &stage.contactVelocities_,
+                                 state.positions[1 - of], &stage.touching_, &stage.groups_,
+                                 state.positions[of], state.velocities[of], &state.toldContacts});
+              }) {}
+
+void SelfCollisionStage::makeContacts(std::span<const scene::Cloth> cloths) {
+  const bool several = hasSeveralMaterials(cloths);
+  std::unique_ptr<Contacts>& kernels = contactKernels_[several ? 1 : 0];
+  if (!kernels) kernels = std::make_unique<Contacts>(device_, state_, *this, several);
+  several_ = several ? 1 : 0;
+}
+
+void SelfCollisionStage::setCloths(std::span<const scene::Cloth> cloths) {
+  makeContacts(cloths);
+  reach_ = reachOf(cloths);
 }
 
 void SelfCollisionStage::recordTables(vulkan::Recorder& recorder) const {
@@ -238,9 +257,9 @@ void SelfCollisionStage::recordContacts(vulkan::Recorder& recorder, std::uint32_
   recorder.fill(groups_, 0, sizeof(std::uint32_t), offsetof(shared::ContactGroups, x));
   recorder.fill(groups_, 0, sizeof(std::uint32_t), offsetof(shared::ContactGroups, touching));
   recorder.barrier();
-  recorder.dispatch(countContacts_.on[state], push, nodeCount_);
+  recorder.dispatch(contactKernels_[several_]->count.on[state], push, nodeCount_);
   recorder.barrier();
-  recorder.dispatchIndirect(resolve_.on[state], push, groups_);
+  recorder.dispatchIndirect(contactKernels_[several_]->resolve.on[state], push, groups_);
 }
 
 void SelfCollisionStage::recordReport(vulkan::Recorder& recorder, std::uint32_t slot) const {

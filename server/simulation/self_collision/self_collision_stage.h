@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <span>
 
 #include "server/scene/scene.h"
@@ -30,6 +31,9 @@ class SelfCollisionStage {
                      std::uint32_t workgroupSize);
 
   static bool isIn(const scene::Scene& scene);
+
+  // Other radii and frictions for the cloths that have self-collision. No tick may be in flight.
+  void setCloths(std::span<const scene::Cloth> cloths);
 
   // Its tables, once, before the first tick.
   void recordTables(vulkan::Recorder& recorder) const;
@@ -59,10 +63,21 @@ class SelfCollisionStage {
     std::array<vulkan::Bindings, 2> on;  // the state of this index
   };
 
+  // Kernels of contacts, for when all cloths are alike and for when they are not.
+  struct Contacts {
+    Contacts(const vulkan::Device& device, const StateBuffers& state, const SelfCollisionStage& stage,
+             bool several);
+    Kernel count, resolve;
+  };
+  void makeContacts(std::span<const scene::Cloth> cloths);
+
   void recordNeighbours(vulkan::Recorder& recorder, std::uint32_t state) const;
   void recordContacts(vulkan::Recorder& recorder, std::uint32_t state,
                       const shared::CollisionPush& collision) const;
 
+  const vulkan::Device& device_;
+  const StateBuffers state_;
+  std::uint32_t workgroupSize_;
   std::uint32_t nodeCount_, cellCount_, measureInvocations_;
   std::uint32_t interval_;  // substeps that lists are for
   float substepSeconds_, reach_;
@@ -70,7 +85,9 @@ class SelfCollisionStage {
   vulkan::Buffer table_, starts_, entries_, order_, sorted_, neighbours_;
   vulkan::Buffer contactPositions_, contactVelocities_, contacts_, touching_, groups_;
   vulkan::Buffer report_, reportReadback_;
-  Kernel measure_, countCells_, startCells_, fillCells_, sortCells_, gather_, countContacts_, resolve_;
+  Kernel measure_, countCells_, startCells_, fillCells_, sortCells_, gather_;
+  std::array<std::unique_ptr<Contacts>, 2> contactKernels_;
+  std::size_t several_ = 0;  // which of them
 };
 
 }  // namespace clothstream::simulation

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: MIT
+// Dihedral bending on the device: scene/hinges.h.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "server/scene/scene.h"
+#include "server/simulation/bending/bending_tables.h"
+#include "server/simulation/device_table.h"
+#include "server/simulation/stage.h"
+#include "server/simulation/state_buffers.h"
+#include "server/vulkan/buffer.h"
+#include "server/vulkan/device.h"
+#include "server/vulkan/recorder.h"
+
+namespace clothstream::simulation {
+
+// Belongs to the device's thread. Changes velocities before everything else in a substep, whatever the cloth's
+// solver.
+class BendingStage {
+ public:
+  // Throws std::runtime_error where the device has no room.
+  BendingStage(const vulkan::Device& device, std::span<const scene::Cloth> cloths, const StateBuffers& state,
+               std::uint32_t workgroupSize);
+
+  static bool isIn(std::span<const scene::Cloth> cloths);
+  // Whether it has the hinges of all that bend now.
+  bool serves(std::span<const scene::Cloth> cloths) const;
+
+  // Its tables, before the next substep.
+  void recordTables(vulkan::Recorder& recorder) const;
+  // The substep's start lies in the buffers `present`. Begins behind a barrier and must be followed by one.
+  void record(vulkan::Recorder& recorder, std::uint32_t present, double substepSeconds) const;
+
+ private:
+  BendingStage(const vulkan::Device& device, const BendingTables& tables, std::span<const scene::Cloth> cloths,
+               const StateBuffers& state, std::uint32_t workgroupSize);
+
+  std::vector<bool> bends_;  // cloths in the tables
+  std::uint32_t hingeCount_, nodeCount_;
+  DeviceTable hinges_, incidences_, lists_;
+  vulkan::Buffer forces_;
+  Stage measure_, bend_;
+};
+
+}  // namespace clothstream::simulation

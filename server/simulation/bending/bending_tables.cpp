@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: MIT
+// Hinges of a scene as the kernels read them.
+#include "server/simulation/bending/bending_tables.h"
+
+#include "server/scene/hinges.h"
+
+namespace clothstream::simulation {
+namespace {
+
+void addLists(const std::vector<std::vector<std::uint32_t>>& numbers, BendingTables& tables) {
+  for (const std::vector<std::uint32_t>& ofNode : numbers) {
+    const auto first = static_cast<std::uint32_t>(tables.lists.size());
+    for (std::size_t i = 0; i < ofNode.size(); i += 4) {
+      const auto at = [&](std::size_t k) { return k < ofNode.size() ? static_cast<float>(ofNode[k]) : 0.0f; };
+      tables.lists.push_back({at(i), at(i + 1), at(i + 2), at(i + 3)});
+    }
+    tables.incidences.push_back({{static_cast<float>(first & 0xFFFF), static_cast<float>(first >> 16),
+                                  static_cast<float>(tables.lists.size() - first), 0}});
+  }
+}
+
+}  // namespace
+
+BendingTables bendingTables(std::span<const scene::Cloth> cloths) {
+  BendingTables tables;
+  std::uint32_t firstNode = 0;
+  for (std::size_t i = 0; i < cloths.size(); ++i) {
+    const scene::Cloth& cloth = cloths[i];
+    std::vector<std::vector<std::uint32_t>> numbers(cloth.nodeCount());
+    for (const scene::Hinge& hinge : cloth.dihedralBending > 0 ? scene::hinges(cloth)
+                                                               : std::vector<scene::Hinge>()) {
+      const auto slot = static_cast<std::uint32_t>(4 * tables.hinges.size());
+      const auto node = [&](std::size_t place) { return static_cast<float>(firstNode + hinge.nodes[place]); };
+      tables.hinges.push_back({{node(0), node(1), node(2), node(3)},
+                               {hinge.weight, hinge.bent, hinge.leastSquare, static_cast<float>(i)}});
+      for (std::uint32_t place = 0; place < 4; ++place)
+        numbers[hinge.nodes[place]].push_back(slot + place + 1);
+    }
+    addLists(numbers, tables);
+    firstNode += cloth.nodeCount();
+  }
+  return tables;
+}
+
+}  // namespace clothstream::simulation

@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: MIT
+// Hinges of a scene as the kernels read them.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "server/scene/scene.h"
+#include "shaders/bending/bending.h"
+#include "shaders/shared/types.h"
+
+namespace clothstream::simulation {
+
+struct BendingTables {
+  std::vector<shared::HingeRecord> hinges;
+  std::vector<shared::HingeListRecord> incidences;  // a node of the scene
+  std::vector<shared::vec4> lists;
+};
+
+// Of the cloths with dihedral bending.
+BendingTables bendingTables(std::span<const scene::Cloth> cloths);
+
+}  // namespace clothstream::simulation
