@@ -162,7 +162,8 @@ void serve(const ProgramOptions& options, const Signals& signals) {
                                                  .defaultScene = options.scene,
                                                  .serverName = kServerName,
                                                  .runAlways = options.alwaysRun,
-                                                 .reportRate = options.reportRate});
+                                                 .reportRate = options.reportRate,
+                                                 .maxCreatedScenes = options.maxCreatedScenes});
   {
     const std::filesystem::path page = options.page.empty() ? pageBesideProgram() : options.page;
     if (page.empty())
@@ -216,7 +217,9 @@ int main(int argc, char** argv) {
     const Signals signals;
     telemetry::setUpLog(options.logLevel);
     if (options.step) return runSteps(options, signals);
-    if (options.listDevices)
+    if (!options.printScene.empty())
+      fmt::print("{}\n", messages::toJson(loaded(messages::loadScene(options.printScene))));
+    else if (options.listDevices)
       listDevices();
     else if (options.listMaterials)
       listMaterials();

@@ -100,6 +100,11 @@ std::variant<ProgramOptions, int> parseOptions(int argc, const char* const* argv
       ->capture_default_str()
       ->group(scenes);
 
+  app.add_option("--max-created-scenes", options.maxCreatedScenes,
+                 "Scenes that clients may create beside these; 0: none")
+      ->check(CLI::Range(0, 1000))
+      ->capture_default_str()
+      ->group(scenes);
   app.add_flag("--list-materials", options.listMaterials, "Show what cloths may be made of, and exit")
       ->group(scenes);
 
@@ -124,6 +129,10 @@ std::variant<ProgramOptions, int> parseOptions(int argc, const char* const* argv
   addDeviceOptions(app, options);
   app.add_flag("--list-devices", options.listDevices, "Show the Vulkan devices there are, and exit")
       ->group(kDevice);
+
+  CLI::App& printCommand = *app.add_subcommand(
+      "print-scene", "Print a scene as JSON with every default, and its meshes' geometry, filled in");
+  printCommand.add_option("SCENE", options.printScene, "Name of a scene, or a JSON file")->required();
 
   step::StepOptions stepOptions;
   CLI::App& stepCommand =

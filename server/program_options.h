@@ -24,6 +24,7 @@ struct ProgramOptions {
   std::optional<scene::Normals> normals;
   bool alwaysRun = false;
   double reportRate = 4;
+  std::uint32_t maxCreatedScenes = 16;
   std::optional<step::StepOptions> step;  // instead of serving
 
   std::string host = "127.0.0.1";
@@ -35,6 +36,7 @@ struct ProgramOptions {
   std::optional<std::uint32_t> softwareThreads;
   std::filesystem::path cacheDirectory;  // empty: none
   bool listDevices = false, listMaterials = false;
+  std::string printScene;  // instead of serving; empty: none
 
   std::string logLevel = "info";
   std::optional<std::chrono::duration<double>> stopAfter;

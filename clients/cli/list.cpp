@@ -18,7 +18,9 @@ std::string json(const std::vector<SceneSummary>& scenes) {
                      {"vertices", scene.vertexCount},
                      {"cloths", scene.clothCount},
                      {"participants", scene.participants},
-                     {"running", scene.running}});
+                     {"running", scene.running},
+                     {"paused", scene.paused},
+                     {"created", scene.created}});
   }
   return array.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
 }

@@ -11,6 +11,7 @@
 
 #include "clients/cli/join.h"
 #include "clients/cli/list.h"
+#include "clients/cli/scene.h"
 #include "clients/cli/set.h"
 #include "clients/cli/set_options.h"
 #include "clients/core/core.h"
@@ -99,8 +100,12 @@ int run(int argc, char** argv) {
   listCommand.add_option("ADDRESS", address, "HOST or HOST:PORT of the server")->capture_default_str();
   listCommand.add_flag("--json", listOptions.json, "Print a JSON array");
 
+  SceneCommands sceneCommands;
+  sceneCommands.add(app, address);
+
   try {
     app.parse(argc, argv);
+    sceneCommands.check();
     joinOptions.address = listOptions.address = setOptions.address = addressOf(address);
     if (setCommand.parsed() && !changesAnything(setOptions))
       throw CLI::ValidationError("set", "nothing to change is given; see clothstream set --help");
@@ -111,6 +116,7 @@ int run(int argc, char** argv) {
     return app.exit(error) == 0 ? kOk : kUsage;
   }
   blockEndingSignals();
+  if (sceneCommands.parsed()) return sceneCommands.run(joinOptions.address);
   if (setCommand.parsed()) return set(setOptions);
   return listCommand.parsed() ? list(listOptions) : join(joinOptions);
 }

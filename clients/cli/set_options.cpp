@@ -20,6 +20,12 @@ void addSetOptions(CLI::App& app, SetOptions& options) {
   app.add_option("--bend", settings.bend[0], "Stiffness of bend springs")->group(springs);
   app.add_option("--bend-damping", settings.bend[1], "Of bend springs")->group(springs);
 
+  app.add_option("--dihedral-bending", settings.dihedral_bending, "Flexural rigidity across edges, N m")
+      ->group(springs);
+  app.add_option("--tether-slack", settings.tether_slack,
+                 "Of a cloth with tethers: what they allow beyond the way along the cloth, a part of it")
+      ->group(springs);
+
   const char* solver = "Solver";
   const std::map<std::string, std::uint32_t> solvers{{"massSpring", CS_SOLVER_MASS_SPRING},
                                                      {"constraint", CS_SOLVER_CONSTRAINT},
@@ -41,6 +47,11 @@ void addSetOptions(CLI::App& app, SetOptions& options) {
       ->check(CLI::Range(0, 1))
       ->group(solver);
 
+  app.add_option("--assembled", settings.assembled,
+                 "Of constraint: whether it multiplies sparse matrices, for comparison: 0, 1")
+      ->check(CLI::Range(0, 1))
+      ->group(solver);
+
   const char* material = "Material";
   app.add_option(
          "--material", options.material,
@@ -52,6 +63,10 @@ void addSetOptions(CLI::App& app, SetOptions& options) {
   app.add_option("--lift", settings.lift, "Of the air")->group(material);
   app.add_option("--friction", settings.friction, "Against colliders")->group(material);
   app.add_option("--thickness", settings.thickness, "Distance kept from colliders, m")->group(material);
+
+  app.add_option("--ball-radius", settings.ball_radius, "Of a cloth with self-collision, m")->group(material);
+  app.add_option("--ball-friction", settings.ball_friction, "Of a cloth with self-collision")
+      ->group(material);
 
   const char* environment = "Environment";
   app.add_option("--gravity", options.gravity, "X,Y,Z in m/s^2")

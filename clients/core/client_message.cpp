@@ -61,6 +61,7 @@ std::string constraintMessage(const Solver& solver) {
   if (solver.compliance) writer.add_float(2, *solver.compliance);
   writer.add_uint32(3, solver.iterations);
   writer.add_float(4, solver.tolerance);
+  if (solver.kind == CS_SOLVER_CONSTRAINT) writer.add_uint32(5, solver.path);
   return settings;
 }
 
@@ -179,6 +180,13 @@ void writeParameterChange(std::string& out, std::uint64_t requestId, const Param
       if (clothChange.friction) cloth.add_float(8, *clothChange.friction);
       if (clothChange.thickness) cloth.add_float(9, *clothChange.thickness);
       if (clothChange.solver) cloth.add_message(20, solverMessage(*clothChange.solver));
+      if (clothChange.ballRadius || clothChange.ballFriction) {
+        Writer balls(cloth, 21);
+        if (clothChange.ballRadius) balls.add_float(1, *clothChange.ballRadius);
+        if (clothChange.ballFriction) balls.add_float(2, *clothChange.ballFriction);
+      }
+      if (clothChange.tetherSlack) Writer(cloth, 23).add_float(1, *clothChange.tetherSlack);
+      if (clothChange.dihedralBending) cloth.add_float(24, *clothChange.dihedralBending);
       if (clothChange.material) cloth.add_string(40, *clothChange.material);
     }
   });

@@ -55,8 +55,8 @@ Solver defaultSolver(std::uint32_t kind) {
 
 std::optional<Solver> changed(const cs_cloth_settings& settings, const ClothParameters& now) {
   const bool any = settings.solver != CS_SOLVER_AS_IS || settings.bend_constraints >= 0 ||
-                   settings.iterations != 0 || given(settings.tolerance) || given(settings.compliance) ||
-                   given(settings.activation);
+                   settings.assembled >= 0 || settings.iterations != 0 || given(settings.tolerance) ||
+                   given(settings.compliance) || given(settings.activation);
   if (!any) return std::nullopt;
   Solver solver = now.solver;
   if (settings.solver != CS_SOLVER_AS_IS && settings.solver != solver.kind) {
@@ -64,6 +64,7 @@ std::optional<Solver> changed(const cs_cloth_settings& settings, const ClothPara
     solver = known == now.solvers.end() ? defaultSolver(settings.solver) : known->second;
   }
   if (settings.bend_constraints >= 0) solver.bendConstraints = settings.bend_constraints != 0;
+  if (settings.assembled >= 0) solver.path = settings.assembled != 0 ? kAssembled : kMatrixFree;
   if (settings.iterations != 0) solver.iterations = settings.iterations;
   solver.tolerance = given(settings.tolerance).value_or(solver.tolerance);
   if (given(settings.compliance)) solver.compliance = settings.compliance;
@@ -82,7 +83,11 @@ ClothChange changeOf(const Cloth& cloth, const cs_cloth_settings& settings) {
           .lift = given(settings.lift),
           .friction = given(settings.friction),
           .thickness = given(settings.thickness),
-          .solver = changed(settings, now)};
+          .solver = changed(settings, now),
+          .ballRadius = given(settings.ball_radius),
+          .ballFriction = given(settings.ball_friction),
+          .tetherSlack = given(settings.tether_slack),
+          .dihedralBending = given(settings.dihedral_bending)};
 }
 
 template <typename Values>
@@ -317,6 +322,10 @@ int cs_get_cloth_settings(const cs_client* client, uint32_t index, cs_cloth_sett
   out->lift = parameters.lift;
   out->friction = parameters.friction;
   out->thickness = parameters.thickness;
+  out->dihedral_bending = parameters.dihedralBending;
+  out->ball_radius = parameters.ballRadius.value_or(kAsIs);
+  out->ball_friction = parameters.ballFriction.value_or(kAsIs);
+  out->tether_slack = parameters.tetherSlack.value_or(kAsIs);
   out->solver = parameters.solver.kind;
   const bool constrained = out->solver == CS_SOLVER_CONSTRAINT || out->solver == CS_SOLVER_ACAD;
   if (constrained || out->solver == CS_SOLVER_XPBD || out->solver == CS_SOLVER_IMPLICIT_EULER)
@@ -326,6 +335,7 @@ int cs_get_cloth_settings(const cs_client* client, uint32_t index, cs_cloth_sett
     out->compliance = parameters.solver.compliance.value_or(kAsIs);
   if (!constrained) return 1;
   out->bend_constraints = parameters.solver.bendConstraints ? 1 : 0;
+  if (out->solver == CS_SOLVER_CONSTRAINT) out->assembled = parameters.solver.path == kAssembled ? 1 : 0;
   out->activation = parameters.solver.activation;
   return 1;
 }
@@ -383,7 +393,12 @@ void cs_keep_cloth_settings(cs_cloth_settings* out) {
           .iterations = 0,
           .tolerance = kAsIs,
           .compliance = kAsIs,
-          .activation = kAsIs};
+          .activation = kAsIs,
+          .assembled = -1,
+          .dihedral_bending = kAsIs,
+          .ball_radius = kAsIs,
+          .ball_friction = kAsIs,
+          .tether_slack = kAsIs};
 }
 
 int cs_change_cloth(cs_client* client, const char* cloth, const cs_cloth_settings* settings) {

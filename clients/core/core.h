@@ -101,8 +101,13 @@ typedef struct cs_cloth_settings {
   int32_t bend_constraints; /* 0 or 1 */
   uint32_t iterations;
   float tolerance;
-  float compliance; /* m/N; NaN: the server's default */
-  float activation; /* of CS_SOLVER_ACAD */
+  float compliance;       /* m/N; NaN: the server's default */
+  float activation;       /* of CS_SOLVER_ACAD */
+  int32_t assembled;      /* of CS_SOLVER_CONSTRAINT, whether it multiplies matrices: 0 or 1 */
+  float dihedral_bending; /* N m */
+  /* Of self-collision, m and dimensionless, and of tethers, a part of a length; only cloths that have these
+   * from their start let them be changed, and of others they are NaN. */
+  float ball_radius, ball_friction, tether_slack;
 } cs_cloth_settings;
 
 /* How the simulation of a cloth does, as the server says now and then (ClothReport in session.proto). */

@@ -119,6 +119,12 @@ bool readClothParameters(Bytes message, std::string& name, ClothParameters& para
         return std::isfinite(parameters.thickness = reader.get_float());
       case bytes(20):
         return readSolver(reader.get_view(), parameters.solver);
+      case bytes(21):
+        return readSelfCollision(reader.get_view(), parameters.ballRadius, parameters.ballFriction);
+      case bytes(23):
+        return readTethers(reader.get_view(), parameters.tetherSlack);
+      case fixed32(24):
+        return std::isfinite(parameters.dihedralBending = reader.get_float());
       case bytes(40):
         return setText(parameters.material, reader);
       default:
@@ -338,6 +344,10 @@ void apply(const ParameterChange& change, Description& description) {
       parameters.friction = clothChange.friction.value_or(parameters.friction);
       parameters.thickness = clothChange.thickness.value_or(parameters.thickness);
       parameters.material = clothChange.material.value_or(parameters.material);
+      parameters.dihedralBending = clothChange.dihedralBending.value_or(parameters.dihedralBending);
+      if (clothChange.ballRadius) parameters.ballRadius = clothChange.ballRadius;
+      if (clothChange.ballFriction) parameters.ballFriction = clothChange.ballFriction;
+      if (clothChange.tetherSlack) parameters.tetherSlack = clothChange.tetherSlack;
       if (!clothChange.solver) continue;
       parameters.solver = *clothChange.solver;
       if (parameters.solvers.size() < kMaxSolvers)

@@ -82,6 +82,23 @@ bool readFace(Bytes message, std::vector<std::uint32_t>& triangles) {
   return read;
 }
 
+}  // namespace
+
+bool readSelfCollision(Bytes message, std::optional<float>& radius, std::optional<float>& friction) {
+  return readFields(message, [&](std::uint32_t field, Reader& reader) {
+    if (field == fixed32(1)) return setFinite(radius, reader);
+    return field == fixed32(2) ? setFinite(friction, reader) : skip(reader);
+  });
+}
+
+bool readTethers(Bytes message, std::optional<float>& slack) {
+  return readFields(message, [&](std::uint32_t field, Reader& reader) {
+    return field == fixed32(1) ? setFinite(slack, reader) : skip(reader);
+  });
+}
+
+namespace {
+
 bool readClothChange(Bytes message, ClothChange& change) {
   return readFields(message, [&](std::uint32_t field, Reader& reader) {
     switch (field) {
@@ -105,6 +122,12 @@ bool readClothChange(Bytes message, ClothChange& change) {
         return setFinite(change.thickness, reader);
       case bytes(20):
         return readSolver(reader.get_view(), change.solver.emplace());
+      case bytes(21):
+        return readSelfCollision(reader.get_view(), change.ballRadius, change.ballFriction);
+      case bytes(23):
+        return readTethers(reader.get_view(), change.tetherSlack);
+      case fixed32(24):
+        return setFinite(change.dihedralBending, reader);
       case bytes(40):
         return setText(change.material.emplace(), reader);
       default:
@@ -124,6 +147,8 @@ bool readConstraintSolver(Bytes message, Solver& solver) {
         return set(solver.iterations, reader.get_uint32());
       case fixed32(4):
         return setFinite(solver.tolerance, reader);
+      case varint(5):
+        return solver.path = reader.get_uint32(), true;
       default:
         return skip(reader);
     }

@@ -98,6 +98,9 @@ struct ServerError {
 // {stiffness, damping}
 using Spring = std::array<float, 2>;
 
+// ConstraintPath in scene.proto.
+inline constexpr std::uint32_t kMatrixFree = 1, kAssembled = 2;
+
 struct Solver {
   std::uint32_t kind = CS_SOLVER_MASS_SPRING;  // the field that Solver.kind is
   bool bendConstraints = false;
@@ -105,6 +108,7 @@ struct Solver {
   float tolerance = 0.001f;
   std::optional<float> compliance;
   float activation = 0.1f;
+  std::uint32_t path = kMatrixFree;
   std::string settings;  // the kind's own message as it came
 };
 
@@ -119,6 +123,7 @@ struct ClothChange {
   std::optional<float> damping, drag, lift, friction, thickness;
   std::optional<Solver> solver;
   std::optional<std::string> material = {};
+  std::optional<float> ballRadius = {}, ballFriction = {}, tetherSlack = {}, dihedralBending = {};
 };
 
 struct ParameterChange {
@@ -163,7 +168,10 @@ struct TickEvents {
 [[nodiscard]] bool readVec3(Bytes message, Vec3& out);
 [[nodiscard]] bool readSpring(Bytes message, Spring& out);
 [[nodiscard]] bool readGust(Bytes message, Gust& out);
-[[nodiscard]] bool readSolver(Bytes message, Solver& out);
+[[nodiscard]] // Of a SelfCollision and of Tethers, in a Scene's Cloth and in a change.
+bool readSelfCollision(Bytes message, std::optional<float>& radius, std::optional<float>& friction);
+bool readTethers(Bytes message, std::optional<float>& slack);
+bool readSolver(Bytes message, Solver& out);
 // Reuses the memory of `out`.
 [[nodiscard]] bool readReport(Bytes message, SimulationReport& out);
 

@@ -22,7 +22,9 @@ tl::expected<std::vector<SceneSummary>, Failure> listScenes(const std::string& a
                       .vertexCount = scene.vertex_count(),
                       .clothCount = scene.cloth_count(),
                       .participants = scene.participants(),
-                      .running = scene.running()});
+                      .running = scene.running(),
+                      .paused = scene.paused(),
+                      .created = scene.created()});
   }
   return scenes;
 }

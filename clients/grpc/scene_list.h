@@ -16,7 +16,7 @@ namespace clothstream {
 struct SceneSummary {
   std::string name, description;
   std::uint32_t vertexCount = 0, clothCount = 0, participants = 0;
-  bool running = false;
+  bool running = false, paused = false, created = false;
 };
 
 // `address` as completeAddress gives it.

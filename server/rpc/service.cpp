@@ -7,6 +7,16 @@
 #include "server/stream/scene_server.h"
 
 namespace clothstream::rpc {
+namespace {
+
+// Ends a call with what the server answered.
+template <typename Response>
+void finish(grpc::ServerUnaryReactor* reactor, Response* response, tl::expected<Response, v1::Error> answer) {
+  if (answer) *response = std::move(*answer);
+  reactor->Finish(answer ? grpc::Status::OK : statusOf(answer.error()));
+}
+
+}  // namespace
 
 grpc::ServerUnaryReactor* Service::ListScenes(grpc::CallbackServerContext* context,
                                               const v1::ListScenesRequest*,
@@ -21,9 +31,31 @@ grpc::ServerUnaryReactor* Service::GetScene(grpc::CallbackServerContext* context
                                             const v1::GetSceneRequest* request,
                                             v1::GetSceneResponse* response) {
   grpc::ServerUnaryReactor* const reactor = context->DefaultReactor();
-  auto answer = server_.getScene(*request);
-  if (answer) *response = std::move(*answer);
-  reactor->Finish(answer ? grpc::Status::OK : statusOf(answer.error()));
+  finish(reactor, response, server_.getScene(*request));
+  return reactor;
+}
+
+grpc::ServerUnaryReactor* Service::CreateScene(grpc::CallbackServerContext* context,
+                                               const v1::CreateSceneRequest* request,
+                                               v1::CreateSceneResponse* response) {
+  grpc::ServerUnaryReactor* const reactor = context->DefaultReactor();
+  server_.createScene(*request, [=](auto answer) { finish(reactor, response, std::move(answer)); });
+  return reactor;
+}
+
+grpc::ServerUnaryReactor* Service::DeleteScene(grpc::CallbackServerContext* context,
+                                               const v1::DeleteSceneRequest* request,
+                                               v1::DeleteSceneResponse* response) {
+  grpc::ServerUnaryReactor* const reactor = context->DefaultReactor();
+  server_.deleteScene(*request, [=](auto answer) { finish(reactor, response, std::move(answer)); });
+  return reactor;
+}
+
+grpc::ServerUnaryReactor* Service::ControlScene(grpc::CallbackServerContext* context,
+                                                const v1::ControlSceneRequest* request,
+                                                v1::ControlSceneResponse* response) {
+  grpc::ServerUnaryReactor* const reactor = context->DefaultReactor();
+  finish(reactor, response, server_.controlScene(*request));
   return reactor;
 }
 

@@ -10,9 +10,10 @@
 namespace clothstream::rpc {
 
 // Join is raw: its messages are already serialised, once for all who get them.
-using ServiceBase =
-    v1::ClothStream::WithRawCallbackMethod_Join<v1::ClothStream::WithCallbackMethod_ListScenes<
-        v1::ClothStream::WithCallbackMethod_GetScene<v1::ClothStream::Service>>>;
+using ServiceBase = v1::ClothStream::WithRawCallbackMethod_Join<
+    v1::ClothStream::WithCallbackMethod_ListScenes<v1::ClothStream::WithCallbackMethod_GetScene<
+        v1::ClothStream::WithCallbackMethod_CreateScene<v1::ClothStream::WithCallbackMethod_DeleteScene<
+            v1::ClothStream::WithCallbackMethod_ControlScene<v1::ClothStream::Service>>>>>>;
 
 class Service final : public ServiceBase {
  public:
@@ -23,6 +24,15 @@ class Service final : public ServiceBase {
                                        v1::ListScenesResponse* response) override;
   grpc::ServerUnaryReactor* GetScene(grpc::CallbackServerContext* context, const v1::GetSceneRequest* request,
                                      v1::GetSceneResponse* response) override;
+  grpc::ServerUnaryReactor* CreateScene(grpc::CallbackServerContext* context,
+                                        const v1::CreateSceneRequest* request,
+                                        v1::CreateSceneResponse* response) override;
+  grpc::ServerUnaryReactor* DeleteScene(grpc::CallbackServerContext* context,
+                                        const v1::DeleteSceneRequest* request,
+                                        v1::DeleteSceneResponse* response) override;
+  grpc::ServerUnaryReactor* ControlScene(grpc::CallbackServerContext* context,
+                                         const v1::ControlSceneRequest* request,
+                                         v1::ControlSceneResponse* response) override;
   grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>* Join(
       grpc::CallbackServerContext* context) override;
 

@@ -20,8 +20,8 @@ constexpr double kLeastPart = 0.25;
 // Below this |n1 + n2|^2 of unit normals the faces lie on each other.
 constexpr double kFolded = 1e-6;
 
-// What the diagonals of a quad count, of what they would in a triangle mesh: enough that quads that are twisted in turn
-// resist.
+// What the diagonals of a quad count, of what they would in a triangle mesh: enough that quads that are
+// twisted in turn resist.
 constexpr float kDiagonalPart = 0.125f;
 
 // Corners of a triangle or of a quad, counter-clockwise.
@@ -90,8 +90,8 @@ HingeShape hingeShape(const std::array<Vector3d, 4>& positions, double leastSqua
   const Vector3d h2 = second / std::max(second.squaredNorm(), leastSquare);
   const double cosine2 = std::sqrt(std::max((n1 + n2).squaredNorm(), kFolded));  // 2 cos(theta / 2)
   return {2 * n2.cross(n1).dot(along) / cosine2,
-          {-(b - c).dot(along) * h1 - (b - d).dot(along) * h2, (a - c).dot(along) * h1 + (a - d).dot(along) * h2,
-           length * h1, length * h2}};
+          {-(b - c).dot(along) * h1 - (b - d).dot(along) * h2,
+           (a - c).dot(along) * h1 + (a - d).dot(along) * h2, length * h1, length * h2}};
 }
 
 std::vector<Hinge> hinges(const Cloth& cloth) {

@@ -20,19 +20,19 @@ struct Hinge {
                       // bend like those
 };
 
-// [BMF03] Bridson, Marino, Fedkiw, "Simulation of Clothing with Folds and Wrinkles", SCA 2003, 3: a hinge turned by
-// theta pulls at node i with -B weight (2 sin(theta / 2) - bent) grad_i theta. With this weight the energy of a
-// sheet of equilateral triangles that is bent to a cylinder is that of a plate of flexural rigidity B (N m): B / 2
-// times the square of the curvature times the area.
+// [BMF03] Bridson, Marino, Fedkiw, "Simulation of Clothing with Folds and Wrinkles", SCA 2003, 3: a hinge
+// turned by theta pulls at node i with -B weight (2 sin(theta / 2) - bent) grad_i theta. With this weight the
+// energy of a sheet of equilateral triangles that is bent to a cylinder is that of a plate of flexural
+// rigidity B (N m): B / 2 times the square of the curvature times the area.
 struct HingeShape {
-  double bent;  // 2 sin(theta / 2); above 0 where the front is hollow
+  double bent;                               // 2 sin(theta / 2); above 0 where the front is hollow
   std::array<Eigen::Vector3d, 4> gradients;  // of theta, 1/m
 };
 HingeShape hingeShape(const std::array<Eigen::Vector3d, 4>& positions, double leastSquare);
 
-// Of every edge between two faces; where one is a quad, half for each way of cutting it, and its two diagonals an
-// eighth together, so that a sheet of squares resists along its diagonals as along its rows but for 12 %, whichever
-// way triangles cut the squares.
+// Of every edge between two faces; where one is a quad, half for each way of cutting it, and its two
+// diagonals an eighth together, so that a sheet of squares resists along its diagonals as along its rows but
+// for 12 %, whichever way triangles cut the squares.
 std::vector<Hinge> hinges(const Cloth& cloth);
 
 // The largest square of a mode's rate for a flexural rigidity of 1 N m about the shape at rest, at most,

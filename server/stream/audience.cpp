@@ -7,11 +7,22 @@
 
 namespace clothstream::stream {
 
-bool Audience::join(std::shared_ptr<Mailbox> mailbox, std::size_t limit) {
+Audience::Joining Audience::join(std::shared_ptr<Mailbox> mailbox, std::size_t limit) {
   const std::lock_guard lock(mutex_);
-  if (members_.size() >= limit) return false;
+  if (closed_) return Joining::closed;
+  if (members_.size() >= limit) return Joining::full;
   members_.push_back(std::move(mailbox));
-  return true;
+  return Joining::joined;
+}
+
+void Audience::close(const SharedBytes& last) {
+  std::vector<std::shared_ptr<Mailbox>> members;
+  {
+    const std::lock_guard lock(mutex_);
+    closed_ = true;
+    members = members_;
+  }
+  for (const auto& member : members) member->close(last);
 }
 
 void Audience::leave(const Mailbox& mailbox) {

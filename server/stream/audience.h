@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <mutex>
 #include <vector>
@@ -15,20 +16,24 @@ namespace clothstream::stream {
 // Thread-safe; publish() belongs to one thread.
 class Audience {
  public:
-  // False where there are `limit` members already.
-  [[nodiscard]] bool join(std::shared_ptr<Mailbox> mailbox, std::size_t limit);
+  enum class Joining : std::uint8_t { joined, full, closed };
+  // Full where there are `limit` members already.
+  [[nodiscard]] Joining join(std::shared_ptr<Mailbox> mailbox, std::size_t limit);
   void leave(const Mailbox& mailbox);
   std::size_t size() const;
 
   void publish(const PublishedFrame& frame);
   // Whoever has no room for it is too slow to be kept: its mailbox is closed.
   void announce(const SharedBytes& message);
+  // Everybody's last message; nobody joins from here on.
+  void close(const SharedBytes& last);
   // Whether somebody can go on only from a key frame, and has room for one.
   bool wantsKeyFrame() const;
 
  private:
   mutable std::mutex mutex_;
   std::vector<std::shared_ptr<Mailbox>> members_;
+  bool closed_ = false;
   // Of publish() alone, so that no mailbox is woken under the lock, and nothing is allocated for a frame.
   std::vector<std::shared_ptr<Mailbox>> receivers_;
 };

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <exception>
+#include <stdexcept>
 #include <utility>
 
 #include <fmt/format.h>
@@ -12,7 +13,7 @@
 namespace clothstream::stream {
 
 DeviceThread::DeviceThread(const vulkan::DeviceOptions& device,
-                           const std::vector<std::unique_ptr<LiveScene>>& scenes, FramePacker& packer,
+                           const std::vector<std::shared_ptr<LiveScene>>& scenes, FramePacker& packer,
                            telemetry::ServerMetrics& metrics, bool runAlways, double reportRate)
     : options_(device), packer_(packer), metrics_(metrics), runAlways_(runAlways), reportRate_(reportRate) {
   std::promise<void> ready;
@@ -56,12 +57,46 @@ vulkan::DeviceInfo DeviceThread::info() const {
   return info_;
 }
 
-void DeviceThread::run(const std::vector<std::unique_ptr<LiveScene>>& scenes, std::promise<void>& ready) {
+std::future<void> DeviceThread::post(std::function<void()> task) {
+  std::packaged_task<void()> packaged(std::move(task));
+  std::future<void> done = packaged.get_future();
+  {
+    const std::lock_guard lock(mutex_);
+    tasks_.push_back(std::move(packaged));
+  }
+  wake();
+  return done;
+}
+
+std::future<void> DeviceThread::add(std::shared_ptr<LiveScene> scene) {
+  return post([this, scene = std::move(scene)] {
+    if (!device_) throw std::runtime_error("there is no device at present");
+    runs_.push_back(std::make_unique<Run>(*device_, scene, packer_, reportRate_));
+  });
+}
+
+std::future<void> DeviceThread::remove(std::shared_ptr<LiveScene> scene) {
+  return post([this, scene = std::move(scene)] {
+    // Frames that wait point to what goes now.
+    packer_.drain();
+    std::erase_if(runs_, [&](const auto& run) { return run->scene == scene; });
+  });
+}
+
+void DeviceThread::runTasks() {
+  std::vector<std::packaged_task<void()>> tasks;
+  {
+    const std::lock_guard lock(mutex_);
+    tasks.swap(tasks_);
+  }
+  for (std::packaged_task<void()>& task : tasks) task();
+}
+
+void DeviceThread::run(const std::vector<std::shared_ptr<LiveScene>>& scenes, std::promise<void>& ready) {
   try {
     device_ = std::make_unique<vulkan::Device>(options_);
     for (const auto& scene : scenes)
-      runs_.push_back(std::make_unique<Run>(*device_, *scene, packer_, reportRate_));
-    due_.reserve(runs_.size());
+      runs_.push_back(std::make_unique<Run>(*device_, scene, packer_, reportRate_));
     info_ = device_->info();
   } catch (...) {
     runs_.clear();
@@ -73,6 +108,7 @@ void DeviceThread::run(const std::vector<std::unique_ptr<LiveScene>>& scenes, st
 
   while (waitForWork()) {
     try {
+      runTasks();
       startAndStopScenes();
       runDueTicks();
     } catch (const std::exception& failure) {
@@ -100,7 +136,8 @@ bool DeviceThread::waitForWork() {
 
 void DeviceThread::startAndStopScenes() {
   for (const auto& run : runs_) {
-    const bool wanted = runAlways_ || run->host.scene().audience.size() > 0;
+    const LiveScene& scene = *run->scene;
+    const bool wanted = !scene.paused && (runAlways_ || scene.audience.size() > 0);
     if (wanted && !run->running) {
       run->pacer.start(Clock::now());
       run->slow.restart();
@@ -145,6 +182,7 @@ void DeviceThread::rebuild(const std::string& reason) {
   // Whoever waits for a frame of the old device gets it first: its memory goes with it.
   packer_.drain();
   do {
+    runTasks();
     std::unique_lock lock(mutex_);
     if (changed_.wait_until(lock, nextRebuild_, [&] { return stopping_; })) return;
     nextRebuild_ = Clock::now() + std::chrono::seconds(1);

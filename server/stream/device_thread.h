@@ -5,6 +5,7 @@
 #include <cmath>
 #include <condition_variable>
 #include <cstdint>
+#include <functional>
 #include <future>
 #include <memory>
 #include <mutex>
@@ -29,15 +30,21 @@ class DeviceThread {
  public:
   // Device and scenes are ready when it returns. All arguments outlive it. Throws what the device or a scene
   // throws.
-  DeviceThread(const vulkan::DeviceOptions& device, const std::vector<std::unique_ptr<LiveScene>>& scenes,
+  DeviceThread(const vulkan::DeviceOptions& device, const std::vector<std::shared_ptr<LiveScene>>& scenes,
                FramePacker& packer, telemetry::ServerMetrics& metrics, bool runAlways, double reportRate);
   // Ends after the ticks in flight.
   ~DeviceThread();
   DeviceThread(const DeviceThread&) = delete;
   DeviceThread& operator=(const DeviceThread&) = delete;
 
-  // Somebody joined or left.
+  // Somebody joined or left, or a scene is to be paused, go on or begin anew.
   void wake();
+
+  // A scene from the next round on. The future throws what the device or the scene throws, and
+  // std::runtime_error where the thread ends before; nothing has changed then.
+  std::future<void> add(std::shared_ptr<LiveScene> scene);
+  // The scene is held no more when the future is ready.
+  std::future<void> remove(std::shared_ptr<LiveScene> scene);
 
   vulkan::DeviceInfo info() const;
 
@@ -46,8 +53,10 @@ class DeviceThread {
 
  private:
   struct Run {
-    Run(vulkan::Device& device, LiveScene& scene, FramePacker& packer, double reportRate)
-        : host(device, scene, packer, reportRate), pacer(scene.start().simulationRate) {}
+    Run(vulkan::Device& device, std::shared_ptr<LiveScene> live, FramePacker& packer, double reportRate)
+        : scene(std::move(live)),
+          host(device, *scene, packer, reportRate),
+          pacer(scene->start().simulationRate) {}
     // Of what was given up so far, the whole ticks that are not counted yet.
     std::uint64_t wholeSlippedTicks(double given) {
       slipped += given;
@@ -56,6 +65,7 @@ class DeviceThread {
       return static_cast<std::uint64_t>(whole);
     }
 
+    std::shared_ptr<LiveScene> scene;
     SceneHost host;
     Pacer pacer;
     SlowWatch slow;
@@ -63,7 +73,9 @@ class DeviceThread {
     bool running = false;
   };
 
-  void run(const std::vector<std::unique_ptr<LiveScene>>& scenes, std::promise<void>& ready);
+  void run(const std::vector<std::shared_ptr<LiveScene>>& scenes, std::promise<void>& ready);
+  std::future<void> post(std::function<void()> task);
+  void runTasks();
   // False when it is time to end.
   bool waitForWork();
   void startAndStopScenes();
@@ -83,6 +95,7 @@ class DeviceThread {
   // Woken from the start: a scene may run with nobody in it.
   bool stopping_ = false, woken_ = true, loseDevice_ = false;
   vulkan::DeviceInfo info_;
+  std::vector<std::packaged_task<void()>> tasks_;
 
   // The thread's own.
   std::unique_ptr<vulkan::Device> device_;

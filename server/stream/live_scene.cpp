@@ -44,7 +44,8 @@ v1::ParameterChange allParameters(const scene::Scene& scene) {
 
 }  // namespace
 
-LiveScene::LiveScene(scene::Scene definition) : start_(std::move(definition)), definition_(start_) {}
+LiveScene::LiveScene(scene::Scene definition, bool wasCreated)
+    : created(wasCreated), start_(std::move(definition)), definition_(start_) {}
 
 scene::Scene LiveScene::definition() const {
   const std::lock_guard lock(mutex_);
@@ -106,6 +107,10 @@ std::shared_ptr<const Description> LiveScene::description() {
     description->chunks.push_back(serialise(envelope));
   }
   return description_ = std::move(description);
+}
+
+SharedBytes pausedNotice(const LiveScene& scene) {
+  return notice(v1::NOTICE_KIND_SCENE_PAUSED, "the scene is paused", scene.tick.load());
 }
 
 }  // namespace clothstream::stream

@@ -20,8 +20,8 @@ namespace clothstream::stream {
 // Thread-safe.
 class LiveScene {
  public:
-  // Must be valid.
-  explicit LiveScene(scene::Scene definition);
+  // Must be valid. `created`: while the server runs, by a peer.
+  explicit LiveScene(scene::Scene definition, bool created = false);
 
   const std::string& name() const { return start_.name; }
   // As it was at first.
@@ -46,6 +46,10 @@ class LiveScene {
   // Of its stream; the first and only one while a server runs.
   static constexpr std::uint32_t kEpoch = 1;
 
+  const bool created;
+  std::atomic<bool> paused{false};       // its clock is stopped
+  std::atomic<bool> resetWanted{false};  // taken at the next tick
+
   Inbox inbox;
   Audience audience;
   telemetry::SceneMetrics metrics;
@@ -62,5 +66,8 @@ class LiveScene {
   std::shared_ptr<const Description> description_;  // null when the definition has changed since
   std::uint64_t contents_ = 0;                      // ids given
 };
+
+// Tells that a scene's clock is stopped.
+SharedBytes pausedNotice(const LiveScene& scene);
 
 }  // namespace clothstream::stream

@@ -74,6 +74,7 @@ SceneHost::~SceneHost() = default;
 
 void SceneHost::begin(Clock::time_point now) {
   tickStart_ = now;
+  if (live_.resetWanted.exchange(false)) reset();
   endGentleness();
   applyInputs();
   const double endSeconds = static_cast<double>(tick_ + 1) * scene_.tickSeconds();
@@ -92,6 +93,13 @@ void SceneHost::begin(Clock::time_point now) {
   savesState_ = sinceHealthy_ > 0 && every(kSnapshotSeconds);
   if (savesState_) on.simulation.recordSaveState(on.recorder);
   submitted_ = on.device.submit(on.recorder);
+}
+
+void SceneHost::reset() {
+  recovery_ = Recovery::reset;
+  sinceHealthy_ = 0;
+  newestState_ = onDevice_->start;
+  newestState_.tick = tick_;
 }
 
 void SceneHost::applyInputs() {

@@ -72,6 +72,8 @@ class SceneHost {
   };
   enum class Recovery : std::uint8_t { none, rollback, reset };
 
+  // The cloths go back to where they start.
+  void reset();
   void applyInputs();
   // False, and nothing changed, where the device has no room for what the change asks for: `problem` says
   // why.

@@ -18,11 +18,11 @@
 namespace clothstream::stream {
 namespace {
 
-std::vector<std::unique_ptr<LiveScene>> liveScenes(std::vector<scene::Scene> definitions) {
-  std::vector<std::unique_ptr<LiveScene>> scenes;
+std::vector<std::shared_ptr<LiveScene>> liveScenes(std::vector<scene::Scene> definitions) {
+  std::vector<std::shared_ptr<LiveScene>> scenes;
   scenes.reserve(definitions.size());
   for (scene::Scene& definition : definitions)
-    scenes.push_back(std::make_unique<LiveScene>(std::move(definition)));
+    scenes.push_back(std::make_shared<LiveScene>(std::move(definition)));
   return scenes;
 }
 
@@ -32,24 +32,50 @@ SharedBytes stoppingNotice() {
 
 }  // namespace
 
+v1::SceneSummary summaryOf(const LiveScene& scene) {
+  v1::SceneSummary summary = messages::toSummary(scene.start());
+  summary.set_participants(static_cast<std::uint32_t>(scene.audience.size()));
+  summary.set_running(scene.running);
+  summary.set_paused(scene.paused);
+  summary.set_created(scene.created);
+  return summary;
+}
+
 SceneServer::State::State(std::vector<scene::Scene> definitions, ServerOptions options_)
     : options(std::move(options_)),
+      uploads(options.maxUploadBytes),
       scenes(liveScenes(std::move(definitions))),
-      packer(scenes.size() * encode::FrameEncoder::kSlots,
+      packer((scenes.size() + options.maxCreatedScenes) * encode::FrameEncoder::kSlots,
              [this] {
                for (const auto& session : sessionsNow()) session->checkSilence(Clock::now());
              }),
-      device(options.device, scenes, packer, metrics, options.runAlways, options.reportRate) {}
+      device(options.device, scenes, packer, metrics, options.runAlways, options.reportRate),
+      maker(*this) {}
 
-LiveScene* SceneServer::State::find(const std::string& name) const {
-  for (const auto& scene : scenes)
-    if (scene->name() == (name.empty() ? options.defaultScene : name)) return scene.get();
+std::shared_ptr<LiveScene> SceneServer::State::find(const std::string& name) const {
+  for (const auto& scene : scenesNow())
+    if (scene->name() == (name.empty() ? options.defaultScene : name)) return scene;
   return nullptr;
+}
+
+std::vector<std::shared_ptr<LiveScene>> SceneServer::State::scenesNow() const {
+  const std::lock_guard lock(mutex);
+  return scenes;
+}
+
+void SceneServer::State::insert(std::shared_ptr<LiveScene> scene) {
+  const std::lock_guard lock(mutex);
+  scenes.push_back(std::move(scene));
+}
+
+void SceneServer::State::erase(const LiveScene& scene) {
+  const std::lock_guard lock(mutex);
+  std::erase_if(scenes, [&](const auto& known) { return known.get() == &scene; });
 }
 
 v1::Error SceneServer::State::noSuchScene(const std::string& name) const {
   std::string known;
-  for (const auto& scene : scenes) known += (known.empty() ? "" : ", ") + scene->name();
+  for (const auto& scene : scenesNow()) known += (known.empty() ? "" : ", ") + scene->name();
   v1::Error error;
   error.set_code(v1::ERROR_CODE_NOT_FOUND);
   error.set_text(fmt::format("there is no scene '{:.64}'; there are {}", name, known));
@@ -90,21 +116,35 @@ void SceneServer::State::stop() {
 
 v1::ListScenesResponse SceneServer::State::listScenes() const {
   v1::ListScenesResponse response;
-  for (const auto& scene : scenes) {
-    v1::SceneSummary& summary = *response.add_scenes();
-    summary = messages::toSummary(scene->start());
-    summary.set_participants(static_cast<std::uint32_t>(scene->audience.size()));
-    summary.set_running(scene->running);
-  }
+  for (const auto& scene : scenesNow()) *response.add_scenes() = summaryOf(*scene);
   return response;
 }
 
 tl::expected<v1::GetSceneResponse, v1::Error> SceneServer::State::getScene(
     const v1::GetSceneRequest& request) const {
-  const LiveScene* scene = find(request.name());
-  if (scene == nullptr) return tl::unexpected(noSuchScene(request.name()));
+  const std::shared_ptr<LiveScene> scene = find(request.name());
+  if (!scene) return tl::unexpected(noSuchScene(request.name()));
   v1::GetSceneResponse response;
   *response.mutable_scene() = messages::toMessage(scene->definition());
+  return response;
+}
+
+tl::expected<v1::ControlSceneResponse, v1::Error> SceneServer::State::controlScene(
+    const v1::ControlSceneRequest& request) {
+  const std::shared_ptr<LiveScene> scene = find(request.name());
+  if (!scene) return tl::unexpected(noSuchScene(request.name()));
+  if (request.has_paused() && scene->paused.exchange(request.paused()) != request.paused())
+    scene->audience.announce(
+        request.paused() ? pausedNotice(*scene)
+                         : notice(v1::NOTICE_KIND_SCENE_RESUMED, "the scene goes on", scene->tick.load()));
+  if (request.reset()) {
+    scene->resetWanted = true;
+    scene->audience.announce(
+        notice(v1::NOTICE_KIND_SCENE_RESET, "the scene begins anew", scene->tick.load()));
+  }
+  device.wake();
+  v1::ControlSceneResponse response;
+  *response.mutable_scene() = summaryOf(*scene);
   return response;
 }
 
@@ -137,6 +177,25 @@ tl::expected<v1::GetSceneResponse, v1::Error> SceneServer::getScene(
   return state_->getScene(request);
 }
 
+void SceneServer::createScene(const v1::CreateSceneRequest& request, CreateDone done) {
+  if (request.source_case() == v1::CreateSceneRequest::kUploadedContentId) {
+    v1::Error error;
+    error.set_code(v1::ERROR_CODE_NOT_FOUND);
+    error.set_text("createScene.uploadedContentId: upload and ask in one joined stream");
+    return done(tl::unexpected(std::move(error)));
+  }
+  state_->maker.create(request, {}, std::move(done));
+}
+
+void SceneServer::deleteScene(const v1::DeleteSceneRequest& request, DeleteDone done) {
+  state_->maker.remove(request, std::move(done));
+}
+
+tl::expected<v1::ControlSceneResponse, v1::Error> SceneServer::controlScene(
+    const v1::ControlSceneRequest& request) {
+  return state_->controlScene(request);
+}
+
 void SceneServer::stop() {
   state_->stop();
 }
@@ -151,7 +210,7 @@ const std::string& SceneServer::defaultScene() const {
 
 std::string SceneServer::report() const {
   std::string text;
-  for (const auto& scene : state_->scenes)
+  for (const auto& scene : state_->scenesNow())
     if (scene->metrics.ticks.value() > 0) text += telemetry::table(scene->name(), scene->metrics);
   return text + telemetry::table(state_->metrics);
 }

@@ -3,7 +3,9 @@
 #pragma once
 
 #include <chrono>
+#include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -29,12 +31,20 @@ struct ServerOptions {
   std::uint32_t maxConnections = 1024;
   // A scene; at most 250, for the simulation has room for so many colliders.
   std::uint32_t maxParticipants = 64;
+  // Beside those that the server starts with; 0: peers make none.
+  std::uint32_t maxCreatedScenes = 16;
+  // Of what all peers upload at the same time.
+  std::size_t maxUploadBytes = std::size_t{256} << 20;
   // A peer that sends nothing for this long is dropped.
   std::chrono::milliseconds silence{30'000};
 };
 
-// Thread-safe. Two threads of its own: one owns the device and runs every scene's ticks, one makes packets of
-// frames.
+// Called once, on any thread; must only pass the word on.
+using CreateDone = std::function<void(tl::expected<v1::CreateSceneResponse, v1::Error>)>;
+using DeleteDone = std::function<void(tl::expected<v1::DeleteSceneResponse, v1::Error>)>;
+
+// Thread-safe. Three threads of its own: one owns the device and runs every scene's ticks, one makes packets
+// of frames, one makes scenes.
 class SceneServer {
  public:
   // The scenes must be valid (server/messages) and their names unique. Throws vulkan::DeviceError, or
@@ -49,6 +59,10 @@ class SceneServer {
   // The unary calls; inside a stream they are answered by the same functions.
   v1::ListScenesResponse listScenes() const;
   tl::expected<v1::GetSceneResponse, v1::Error> getScene(const v1::GetSceneRequest& request) const;
+  // Outside a stream nothing can have been uploaded.
+  void createScene(const v1::CreateSceneRequest& request, CreateDone done);
+  void deleteScene(const v1::DeleteSceneRequest& request, DeleteDone done);
+  tl::expected<v1::ControlSceneResponse, v1::Error> controlScene(const v1::ControlSceneRequest& request);
 
   // Tells everybody that the server stops, and finishes every connection, now and from here on.
   void stop();

@@ -13,19 +13,26 @@
 #include "server/stream/device_thread.h"
 #include "server/stream/frame_packer.h"
 #include "server/stream/live_scene.h"
+#include "server/stream/scene_maker.h"
 #include "server/stream/scene_server.h"
+#include "server/stream/upload.h"
 #include "server/telemetry/metrics.h"
 
 namespace clothstream::stream {
 
 class Session;
 
+v1::SceneSummary summaryOf(const LiveScene& scene);
+
 // Thread-safe. Members are declared in the order in which they need each other.
 struct SceneServer::State {
   State(std::vector<scene::Scene> definitions, ServerOptions options);
 
   // nullptr if there is none of that name; an empty one is the default scene's.
-  LiveScene* find(const std::string& name) const;
+  std::shared_ptr<LiveScene> find(const std::string& name) const;
+  std::vector<std::shared_ptr<LiveScene>> scenesNow() const;
+  void insert(std::shared_ptr<LiveScene> scene);
+  void erase(const LiveScene& scene);
   // Such as: there is no scene 'x'; there are curtain, flag.
   v1::Error noSuchScene(const std::string& name) const;
 
@@ -34,19 +41,22 @@ struct SceneServer::State {
   std::vector<std::shared_ptr<Session>> sessionsNow() const;
   v1::ListScenesResponse listScenes() const;
   tl::expected<v1::GetSceneResponse, v1::Error> getScene(const v1::GetSceneRequest& request) const;
+  tl::expected<v1::ControlSceneResponse, v1::Error> controlScene(const v1::ControlSceneRequest& request);
   void stop();
 
   const ServerOptions options;
   telemetry::ServerMetrics metrics;
-  const std::vector<std::unique_ptr<LiveScene>> scenes;
+  UploadRoom uploads;
   std::atomic<std::uint64_t> participants{0};  // numbers given
 
-  mutable std::mutex mutex;
+  mutable std::mutex mutex;  // of what follows
+  std::vector<std::shared_ptr<LiveScene>> scenes;
   std::vector<std::weak_ptr<Session>> sessions;
   bool stopping = false;
 
   FramePacker packer;
   DeviceThread device;
+  SceneMaker maker;
 };
 
 }  // namespace clothstream::stream

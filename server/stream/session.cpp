@@ -23,7 +23,8 @@ Session::Session(SceneServer::State& server, std::string peer, std::function<voi
     : server_(server),
       peer_(std::move(peer)),
       mailbox_(std::make_shared<Mailbox>(std::move(wake))),
-      lastHeard_(Clock::now()) {}
+      lastHeard_(Clock::now()),
+      upload_(server.uploads) {}
 
 void Session::receive(std::span<const std::byte> bytes, Clock::time_point now) {
   lastHeard_ = now;
@@ -36,6 +37,23 @@ void Session::receive(std::span<const std::byte> bytes, Clock::time_point now) {
   if (!message) return refuse(message.error(), kMalformedCost);
   requestId_ = message->request_id();
   dispatch(*message, now);
+}
+
+template <typename Response>
+std::function<void(tl::expected<Response, v1::Error>)> Session::answering(
+    Response* (v1::ServerMessage::*body)()) {
+  return [weak = weak_from_this(), requestId = requestId_, body](tl::expected<Response, v1::Error> response) {
+    const std::shared_ptr<Session> session = weak.lock();
+    if (!session) return;
+    const std::lock_guard lock(session->mutex_);
+    if (session->mailbox_->closed()) return;
+    session->now_ = Clock::now();
+    session->requestId_ = requestId;
+    if (!response) return session->refuse({response.error().code(), response.error().text()});
+    v1::ServerMessage message;
+    *(message.*body)() = std::move(*response);
+    session->answer(message);
+  };
 }
 
 void Session::dispatch(const v1::ClientMessage& message, Clock::time_point now) {
@@ -63,6 +81,22 @@ void Session::dispatch(const v1::ClientMessage& message, Clock::time_point now) 
       v1::ServerMessage scene;
       *scene.mutable_get_scene() = std::move(*found);
       return answer(scene);
+    }
+    case Body::kUpload:
+      return upload(message.upload());
+    case Body::kCreateScene:
+      return create(message.create_scene());
+    case Body::kDeleteScene:
+      if (!allowed(controlRate_, "requests about scenes")) return;
+      return server_.maker.remove(message.delete_scene(), answering<v1::DeleteSceneResponse>(
+                                                              &v1::ServerMessage::mutable_delete_scene));
+    case Body::kControlScene: {
+      if (!allowed(controlRate_, "requests about scenes")) return;
+      auto controlled = server_.controlScene(message.control_scene());
+      if (!controlled) return refuse({controlled.error().code(), controlled.error().text()});
+      v1::ServerMessage reply;
+      *reply.mutable_control_scene() = std::move(*controlled);
+      return answer(reply);
     }
     default:
       break;
@@ -99,8 +133,8 @@ void Session::hello(const v1::Hello& message) {
                 fmt::format("this stream has joined '{}' already: open another one", scene_->name()));
   const messages::Result<messages::Joining> joining = messages::toJoining(message, codec::kCodecs);
   if (!joining) return fail(joining.error().code, joining.error().text);
-  LiveScene* scene = server_.find(joining->scene);
-  if (scene == nullptr) {
+  const std::shared_ptr<LiveScene> scene = server_.find(joining->scene);
+  if (!scene) {
     const v1::Error error = server_.noSuchScene(joining->scene);
     return fail(error.code(), error.text());
   }
@@ -109,7 +143,10 @@ void Session::hello(const v1::Hello& message) {
     return fail(
         v1::ERROR_CODE_UNSUPPORTED_CODEC,
         fmt::format("hello.codecs: must have {}, in which '{}' is sent", scene->codec(), scene->name()));
-  if (!scene->audience.join(mailbox_, server_.options.maxParticipants))
+  const Audience::Joining joined = scene->audience.join(mailbox_, server_.options.maxParticipants);
+  if (joined == Audience::Joining::closed)
+    return fail(v1::ERROR_CODE_NOT_FOUND, fmt::format("'{}' was just deleted", scene->name()));
+  if (joined == Audience::Joining::full)
     return fail(v1::ERROR_CODE_RESOURCE_EXHAUSTED,
                 fmt::format("'{}' has {} participants, as many as it may have; try again later",
                             scene->name(), server_.options.maxParticipants));
@@ -129,9 +166,26 @@ void Session::hello(const v1::Hello& message) {
   welcome.set_description_content_id(description->contentId);
   answer(reply);
   mailbox_->subscribe(description, scene->start().streamRate, scene->metrics);
+  if (scene->paused && !mailbox_->announce(pausedNotice(*scene))) return closeLocked(tooSlow());
   server_.device.wake();
   spdlog::info("{}: {} joined as participant {} ({}); {} in it", scene->name(), peer_, participant_,
                joining->clientName.empty() ? "unnamed client" : joining->clientName, scene->audience.size());
+}
+
+void Session::upload(const v1::Chunk& chunk) {
+  if (const auto added = upload_.add(chunk); !added) refuse(added.error());
+}
+
+void Session::create(const v1::CreateSceneRequest& request) {
+  if (!allowed(controlRate_, "requests about scenes")) return;
+  std::string uploaded;
+  if (request.source_case() == v1::CreateSceneRequest::kUploadedContentId) {
+    messages::Result<std::string> taken = upload_.take(request.uploaded_content_id());
+    if (!taken) return refuse(taken.error());
+    uploaded = std::move(*taken);
+  }
+  server_.maker.create(request, std::move(uploaded),
+                       answering<v1::CreateSceneResponse>(&v1::ServerMessage::mutable_create_scene));
 }
 
 void Session::poses(const v1::ColliderPoses& message, Clock::time_point now) {

@@ -12,17 +12,20 @@
 #include <span>
 #include <string>
 
+#include <tl/expected.hpp>
+
 #include "server/stream/live_scene.h"
 #include "server/stream/mailbox.h"
 #include "server/stream/scene_server.h"
 #include "server/stream/token_bucket.h"
+#include "server/stream/upload.h"
 
 namespace clothstream::stream {
 
 // Thread-safe. What is wrong with a message is answered to this peer alone. Whoever is refused on and on is
 // cut off: every refused message counts against a budget that refills with time, one that is no message at
 // all counts for sixty.
-class Session {
+class Session : public std::enable_shared_from_this<Session> {
  public:
   Session(SceneServer::State& server, std::string peer, std::function<void()> wake);
 
@@ -41,6 +44,11 @@ class Session {
   void dispatch(const v1::ClientMessage& message, Clock::time_point now);
   void hello(const v1::Hello& message);
   void poses(const v1::ColliderPoses& message, Clock::time_point now);
+  void upload(const v1::Chunk& chunk);
+  void create(const v1::CreateSceneRequest& request);
+  // Answers the message in hand when what it asks for is done.
+  template <typename Response>
+  std::function<void(tl::expected<Response, v1::Error>)> answering(Response* (v1::ServerMessage::*body)());
   void answer(v1::ServerMessage& message);
   void refuse(const messages::FieldError& reason, double cost = 1);
   void fail(v1::ErrorCode code, std::string text);
@@ -54,9 +62,10 @@ class Session {
   std::atomic<Clock::time_point> lastHeard_;
 
   std::mutex mutex_;  // of all below
-  LiveScene* scene_ = nullptr;
+  std::shared_ptr<LiveScene> scene_;
   std::uint64_t participant_ = 0;
   bool posed_ = false;
+  Upload upload_;
   // Of the message in hand.
   std::uint64_t requestId_ = 0;
   Clock::time_point now_{};
@@ -65,6 +74,7 @@ class Session {
   TokenBucket changeRate_{60, 30};
   TokenBucket keyFrameRate_{10, 5};
   TokenBucket queryRate_{20, 20};
+  TokenBucket controlRate_{10, 10};
   TokenBucket messageRate_{1000, 500};  // of all kinds
   TokenBucket offences_{100, 500};
   TokenBucket errorRate_{50, 50};  // told; further ones only count

@@ -15,8 +15,8 @@ struct HingeRecord {
   vec4 rest;   // weight, bent, least square of a normal as scene::Hinge has them; the cloth
 };
 
-// Of a node: the texels that name its hinges' forces. Each has up to four numbers: four times a hinge plus the node's
-// place in it, plus one; 0: none.
+// Of a node: the texels that name its hinges' forces. Each has up to four numbers: four times a hinge plus
+// the node's place in it, plus one; 0: none.
 struct HingeListRecord {
   vec4 list;  // the first modulo 2^16, the first / 2^16, how many
 };

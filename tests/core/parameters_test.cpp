@@ -349,6 +349,56 @@ TEST(ClothSettings, SayWhatHoldsAndChangeOnlyWhatIsGiven) {
   EXPECT_THAT(client.outgoing(), SizeIs(0));
 }
 
+TEST(ClothSettings, OfBendingSelfCollisionTethersAndPath) {
+  ScriptedServer server;
+  v1::StreamDescription description = server.description();
+  v1::Cloth& definition = *description.mutable_definition()->mutable_cloths(0);
+  definition.set_dihedral_bending(0.5f);
+  definition.mutable_self_collision()->set_radius(0.25f);
+  definition.mutable_self_collision()->set_friction(0.75f);
+  v1::ConstraintSolver& solver = *definition.mutable_solver()->mutable_constraint();
+  solver.set_path(v1::CONSTRAINT_PATH_ASSEMBLED);
+  ClientUnderTest client;
+  client.receive(server.welcome());
+  client.receiveAll(chunksOf(description.SerializeAsString(), 1 << 18, 1));
+  client.outgoing();
+  cs_cloth_settings now{};
+  now.version = CS_CLOTH_SETTINGS_VERSION;
+  ASSERT_EQ(cs_get_cloth_settings(client.get(), 0, &now), 1);
+  EXPECT_EQ(now.dihedral_bending, 0.5f);
+  EXPECT_EQ(now.ball_radius, 0.25f);
+  EXPECT_EQ(now.ball_friction, 0.75f);
+  EXPECT_TRUE(std::isnan(now.tether_slack));
+  EXPECT_EQ(now.assembled, 1);
+
+  cs_cloth_settings change;
+  cs_keep_cloth_settings(&change);
+  change.dihedral_bending = 0.125f;
+  change.ball_friction = 0.5f;
+  change.tether_slack = 0.0625f;
+  change.iterations = 30;
+  ASSERT_EQ(cs_change_cloth(client.get(), "", &change), 1);
+  const auto messages = client.outgoing();
+  ASSERT_THAT(messages, SizeIs(1));
+  const v1::ClothChange& sent = messages[0].parameter_change().cloths(0);
+  EXPECT_EQ(sent.dihedral_bending(), 0.125f);
+  EXPECT_FALSE(sent.self_collision().has_radius());
+  EXPECT_EQ(sent.self_collision().friction(), 0.5f);
+  EXPECT_EQ(sent.tethers().slack(), 0.0625f);
+  // As it was.
+  EXPECT_EQ(sent.solver().constraint().path(), v1::CONSTRAINT_PATH_ASSEMBLED);
+
+  v1::ServerMessage changed;
+  *changed.mutable_parameter_changed()->mutable_change()->add_cloths() = sent;
+  client.receive(changed.SerializeAsString());
+  ASSERT_EQ(cs_get_cloth_settings(client.get(), 0, &now), 1);
+  EXPECT_EQ(now.dihedral_bending, 0.125f);
+  EXPECT_EQ(now.ball_radius, 0.25f);
+  EXPECT_EQ(now.ball_friction, 0.5f);
+  EXPECT_EQ(now.tether_slack, 0.0625f);
+  EXPECT_EQ(now.iterations, 30u);
+}
+
 TEST(ClothSettings, OfImplicitEulerAreItsIterationsAndTolerance) {
   ScriptedServer server;
   v1::StreamDescription description = server.description();

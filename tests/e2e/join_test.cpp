@@ -196,6 +196,53 @@ TEST_F(JoinTest, AnUnknownSceneIsRefusedWithTheNamesThereAre) {
   EXPECT_THAT(client->output(), IsEmpty());
 }
 
+TEST_F(JoinTest, ScenesAreCreatedPausedResetAndDeleted) {
+  const auto run = [&](std::vector<std::string> arguments) {
+    arguments.insert(arguments.end(), {"--server", address_});
+    const auto client = clothstream(arguments);
+    const int code = client->waitForEnd(kEnd).value_or(-1);
+    return std::pair(code, client->output() + client->errors());
+  };
+  const auto stateOf = [&](const std::string& name) {
+    const auto list = clothstream({"list", address_, "--json"});
+    EXPECT_EQ(list->waitForEnd(kEnd), 0);
+    for (const auto& scene : nlohmann::json::parse(list->output()))
+      if (scene.at("name") == name) return scene;
+    return nlohmann::json();
+  };
+  EXPECT_EQ(run({"create", "tests/e2e/small.json", "--name", "mine"}), std::pair(0, std::string("mine\n")));
+  EXPECT_EQ(stateOf("mine").at("vertices"), kVertices);
+  EXPECT_EQ(stateOf("mine").at("created"), true);
+  EXPECT_EQ(run({"create", "--named", "tablecloth", "--name", "cloth-2"}),
+            std::pair(0, std::string("cloth-2\n")));
+  const auto client =
+      clothstream({"join", address_, "--scene", "mine", "--json", "--hash", "--seconds", "1"});
+  ASSERT_EQ(client->waitForEnd(kEnd), 0) << client->errors();
+  EXPECT_EQ(nlohmann::json::parse(client->output()).at("hashMismatches"), 0);
+
+  EXPECT_EQ(run({"pause", "mine"}).first, 0);
+  EXPECT_EQ(stateOf("mine").at("paused"), true);
+  EXPECT_EQ(run({"resume", "mine"}).first, 0);
+  EXPECT_EQ(stateOf("mine").at("paused"), false);
+  EXPECT_EQ(run({"reset", "mine"}).first, 0);
+  EXPECT_EQ(run({"delete", "mine"}).first, 0);
+  EXPECT_TRUE(stateOf("mine").is_null());
+
+  const auto refused = run({"delete", "small"});
+  EXPECT_EQ(refused.first, 4);
+  EXPECT_THAT(refused.second, HasSubstr("must be of a scene that was created"));
+  EXPECT_EQ(run({"pause", "nowhere"}).first, 4);
+  EXPECT_EQ(run({"create", "tests/e2e/nowhere.json"}).first, 2);
+  EXPECT_EQ(run({"create"}).first, 2);
+  // A scene that names a file of the server's.
+  const TemporaryDirectory directory;
+  const std::filesystem::path file = directory.path() / "mesh.json";
+  std::ofstream(file) << R"({"name": "m", "cloths": [{"name": "c", "mesh": {"file": "dress.obj"}}]})";
+  const auto meshless = run({"create", file});
+  EXPECT_EQ(meshless.first, 2);
+  EXPECT_THAT(meshless.second, HasSubstr("print-scene"));
+}
+
 TEST_F(JoinTest, AServerThatIsKilledIsNoticed) {
   const auto client = clothstream({"join", address_}, Process::Output::terminal);
   ASSERT_TRUE(client->waitForOutput("fps", kStart)) << client->errors();

@@ -89,6 +89,36 @@ TEST_F(RpcDoorTest, GetsASceneAndRefusesAnUnknownOne) {
   EXPECT_THAT(status.error_message(), HasSubstr("nowhere"));
 }
 
+TEST_F(RpcDoorTest, CreatesASceneAndRefusesWhatIsWrongWithIt) {
+  const auto stub = v1::ClothStream::NewStub(channelTo(port()));
+  v1::GetSceneRequest get;
+  get.set_name("other");
+  v1::GetSceneResponse other;
+  grpc::ClientContext getting;
+  ASSERT_TRUE(stub->GetScene(&getting, get, &other).ok());
+  v1::CreateSceneRequest request;
+  *request.mutable_scene() = other.scene();
+  request.set_name("another");
+  v1::CreateSceneResponse response;
+  grpc::ClientContext creating;
+  ASSERT_TRUE(stub->CreateScene(&creating, request, &response).ok());
+  EXPECT_EQ(response.scene().name(), "another");
+  EXPECT_TRUE(response.scene().created());
+  request.mutable_scene()->set_substeps(0);
+  grpc::ClientContext wrong;
+  const grpc::Status status = stub->CreateScene(&wrong, request, &response);
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+  EXPECT_THAT(status.error_message(), HasSubstr("substeps = 0"));
+  request.set_uploaded_content_id(1);
+  grpc::ClientContext nothing;
+  EXPECT_EQ(stub->CreateScene(&nothing, request, &response).error_code(), grpc::StatusCode::NOT_FOUND);
+  v1::DeleteSceneRequest deletion;
+  deletion.set_name("another");
+  v1::DeleteSceneResponse deleted;
+  grpc::ClientContext deleting;
+  EXPECT_TRUE(stub->DeleteScene(&deleting, deletion, &deleted).ok());
+}
+
 TEST_F(RpcDoorTest, JoinsAndDecodesFrames) {
   Joined client(port());
   EXPECT_EQ(client.viewer.welcome.scene(), "small");

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
 // Dihedral bending: geometry, energy, and the bound on its rate.
+#include <Eigen/Geometry>
 #include <array>
 #include <cmath>
 #include <memory>
 
-#include <Eigen/Geometry>
 #include <gtest/gtest.h>
 
 #include "server/scene/hinges.h"
@@ -27,7 +27,8 @@ double angleOf(const Corners& at) {
 TEST(Hinges, HaveTheAngleAndItsGradient) {
   for (const double lift : {-3.0, -0.4, 0.0, 0.01, 0.7, 5.0}) {
     SCOPED_TRACE(lift);
-    const Corners at = {Vector3d(0.1, 0, 0.2), Vector3d(0, 1, 0), Vector3d(-1, 0.3, lift), Vector3d(0.8, 0.6, 0.1)};
+    const Corners at = {Vector3d(0.1, 0, 0.2), Vector3d(0, 1, 0), Vector3d(-1, 0.3, lift),
+                        Vector3d(0.8, 0.6, 0.1)};
     const HingeShape shape = hingeShape(at, 0);
     EXPECT_NEAR(shape.bent, 2 * std::sin(angleOf(at) / 2), 1e-12);
     Vector3d sum = Vector3d::Zero(), moment = Vector3d::Zero();
@@ -82,8 +83,8 @@ std::vector<Vector3d> rolled(const std::vector<Vec3>& flat, double curvature, do
   return bent;
 }
 
-// Of cloths of 10, 20 and 30 times as many cells a side: a fringe has fewer hinges, so that what is compared is
-// how the energy grows with the area. It is quadratic in n: inside n^2, at the edges n, at the corners 1.
+// Of cloths of 10, 20 and 30 times as many cells a side: a fringe has fewer hinges, so that what is compared
+// is how the energy grows with the area. It is quadratic in n: inside n^2, at the edges n, at the corners 1.
 template <typename Patch>
 double energyOfACell(const Patch& patch, double curvature, double degrees) {
   const auto energy = [&](std::uint32_t n) {
@@ -117,8 +118,9 @@ TEST(Hinges, HaveThePlatesEnergyInEveryDirectionOnEquilateralTriangles) {
     MeshShape shape;
     for (std::uint32_t row = 0; row <= n; ++row)
       for (std::uint32_t column = 0; column <= n; ++column)
-        shape.positions.emplace_back(0.01f * (static_cast<float>(column) + 0.5f * static_cast<float>(row) - 0.75f * side),
-                                     0.01f * std::sqrt(0.75f) * (static_cast<float>(row) - 0.5f * side), 0.0f);
+        shape.positions.emplace_back(
+            0.01f * (static_cast<float>(column) + 0.5f * static_cast<float>(row) - 0.75f * side),
+            0.01f * std::sqrt(0.75f) * (static_cast<float>(row) - 0.5f * side), 0.0f);
     for (std::uint32_t row = 0; row < n; ++row)
       for (std::uint32_t column = 0; column < n; ++column) {
         const std::uint32_t a = row * (n + 1) + column, b = a + 1, c = a + n + 1, d = c + 1;
@@ -144,10 +146,11 @@ TEST(Hinges, ResistTwistsInTurn) {
   std::vector<Vector3d> bent;
   for (const Vec3& node : restPositions(cloth)) bent.push_back(node.cast<double>());
   for (std::size_t i = 0; i < bent.size(); ++i) bent[i].z() = i % 2 == 0 ? 1e-4 : -1e-4;
-  // A diagonal's faces turn by twice 2e-4 over half of its length, on either diagonal of 16 squares; all weigh 1/8 of
-  // 2 together.
+  // A diagonal's faces turn by twice 2e-4 over half of its length, on either diagonal of 16 squares; all
+  // weigh 1/8 of 2 together.
   const double turn = 2 * 2e-4 / (0.01 / std::sqrt(2.0));
-  EXPECT_NEAR(plateEnergy(hinges(cloth), bent), 16 * 0.5 * 0.25 * turn * turn, 1e-3 * 16 * 0.5 * 0.25 * turn * turn);
+  EXPECT_NEAR(plateEnergy(hinges(cloth), bent), 16 * 0.5 * 0.25 * turn * turn,
+              1e-3 * 16 * 0.5 * 0.25 * turn * turn);
 }
 
 // Of a square of which one corner is free, by hand: the diagonal opposite of it, and the one through it.
@@ -161,8 +164,8 @@ TEST(Hinges, BoundTheTimeStep) {
   scene.cloths = {cloth};
   scene.environment.airDensity = 0;
   scene.simulationRate = 10;
-  // Either weighs a sixteenth of 0.1^2 2 / 0.1^2. Opposite corners have heights of 0.1 / sqrt(2) over it, and each end
-  // half of both.
+  // Either weighs a sixteenth of 0.1^2 2 / 0.1^2. Opposite corners have heights of 0.1 / sqrt(2) over it, and
+  // each end half of both.
   const double gradient = std::sqrt(2.0) / 0.1;
   const double rate = 2 * (2.0 / 16) * gradient * 4 * gradient / 0.01;
   EXPECT_NEAR(bendingRate(cloth), rate, 1e-5 * rate);

@@ -39,7 +39,7 @@ class HostedScene {
         host(tests::device(), live, packer) {
     for (std::size_t i = 0; i < subscribers; ++i) {
       mailboxes.push_back(std::make_shared<Mailbox>([] {}));
-      EXPECT_TRUE(live.audience.join(mailboxes.back(), 100));
+      EXPECT_EQ(live.audience.join(mailboxes.back(), 100), Audience::Joining::joined);
       mailboxes.back()->subscribe(live.description(), live.start().streamRate, live.metrics);
       while (mailboxes.back()->next(now)) {
       }

@@ -2,6 +2,7 @@
 // A client inside the process.
 #include "tests/stream/test_peer.h"
 
+#include <cstring>
 #include <stdexcept>
 #include <utility>
 
@@ -109,6 +110,16 @@ void TestPeer::see(const v1::ServerMessage& message, const stream::SharedBytes& 
   if (message.has_frame()) seeFrame(message.frame(), bytes);
 }
 
+namespace {
+
+std::vector<std::uint32_t> trianglesOf(const v1::ClothDescription& cloth) {
+  std::vector<std::uint32_t> numbers(cloth.triangles().size() / sizeof(std::uint32_t));
+  std::memcpy(numbers.data(), cloth.triangles().data(), numbers.size() * sizeof(std::uint32_t));
+  return numbers;
+}
+
+}  // namespace
+
 void TestPeer::seeChunk(const v1::Chunk& chunk) {
   EXPECT_EQ(chunk.content_id(), welcome_.description_content_id());
   EXPECT_EQ(chunk.kind(), v1::CONTENT_KIND_STREAM_DESCRIPTION);
@@ -123,7 +134,7 @@ void TestPeer::seeChunk(const v1::Chunk& chunk) {
   layout.maxError = description_.max_error();
   layout.normals = octahedral ? codec::NormalMode::octahedral : codec::NormalMode::none;
   for (const v1::ClothDescription& cloth : description_.cloths())
-    layout.cloths.push_back({cloth.vertex_count(), cloth.rows(), cloth.columns()});
+    layout.cloths.push_back({cloth.vertex_count(), cloth.rows(), cloth.columns(), trianglesOf(cloth)});
   decoder_ = codec::Decoder::make(layout);
   ASSERT_TRUE(decoder_);
 }

@@ -17,8 +17,8 @@
 
 namespace clothstream::simulation {
 
-// Belongs to the device's thread. Changes velocities before everything else in a substep, whatever the cloth's
-// solver.
+// Belongs to the device's thread. Changes velocities before everything else in a substep, whatever the
+// cloth's solver.
 class BendingStage {
  public:
   // Throws std::runtime_error where the device has no room.
@@ -35,8 +35,8 @@ class BendingStage {
   void record(vulkan::Recorder& recorder, std::uint32_t present, double substepSeconds) const;
 
  private:
-  BendingStage(const vulkan::Device& device, const BendingTables& tables, std::span<const scene::Cloth> cloths,
-               const StateBuffers& state, std::uint32_t workgroupSize);
+  BendingStage(const vulkan::Device& device, const BendingTables& tables,
+               std::span<const scene::Cloth> cloths, const StateBuffers& state, std::uint32_t workgroupSize);
 
   std::vector<bool> bends_;  // cloths in the tables
   std::uint32_t hingeCount_, nodeCount_;

@@ -27,8 +27,8 @@ BendingTables bendingTables(std::span<const scene::Cloth> cloths) {
   for (std::size_t i = 0; i < cloths.size(); ++i) {
     const scene::Cloth& cloth = cloths[i];
     std::vector<std::vector<std::uint32_t>> numbers(cloth.nodeCount());
-    for (const scene::Hinge& hinge : cloth.dihedralBending > 0 ? scene::hinges(cloth)
-                                                               : std::vector<scene::Hinge>()) {
+    for (const scene::Hinge& hinge :
+         cloth.dihedralBending > 0 ? scene::hinges(cloth) : std::vector<scene::Hinge>()) {
       const auto slot = static_cast<std::uint32_t>(4 * tables.hinges.size());
       const auto node = [&](std::size_t place) { return static_cast<float>(firstNode + hinge.nodes[place]); };
       tables.hinges.push_back({{node(0), node(1), node(2), node(3)},

@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: MIT
+// Scenes of a server, made and ended.
+#include "clients/cli/scene.h"
+
+#include <fstream>
+#include <iterator>
+
+#include <fmt/format.h>
+#include <google/protobuf/util/json_util.h>
+#include <unistd.h>
+
+#include "clients/grpc/scene_control.h"
+
+namespace clothstream::cli {
+namespace {
+
+ExitCode complain(ExitCode code, const std::string& text) {
+  fmt::print(stderr, "clothstream: {}\n", text);
+  return code;
+}
+
+tl::expected<v1::Scene, std::string> readScene(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  const std::string json{std::istreambuf_iterator<char>(file), {}};
+  if (!file) return tl::unexpected(fmt::format("{}: cannot be read", path));
+  v1::Scene scene;
+  const auto status = google::protobuf::util::JsonStringToMessage(json, &scene);
+  if (!status.ok()) return tl::unexpected(fmt::format("{}: {}", path, std::string(status.message())));
+  for (const v1::Cloth& cloth : scene.cloths())
+    if (!cloth.mesh().file().empty())
+      return tl::unexpected(
+          fmt::format("{}: the cloth '{}' names the mesh file {}, which the server does not have; `clothstream-server "
+                      "print-scene {}` gives the scene with its geometry",
+                      path, cloth.name(), cloth.mesh().file(), path));
+  return scene;
+}
+
+ExitCode done(const tl::expected<void, Failure>& result) {
+  return result ? kOk : complain(exitCodeOf(result.error().kind), result.error().text);
+}
+
+}  // namespace
+
+void SceneCommands::add(CLI::App& app, std::string& address) {
+  const auto command = [&](const char* name, const char* what) {
+    CLI::App* added = app.add_subcommand(name, what);
+    added->footer(kExitCodes);
+    return added;
+  };
+  const auto takesAddress = [&](CLI::App* added) {
+    added->add_option("--server", address, "HOST or HOST:PORT of the server")->capture_default_str();
+  };
+  create_ = command("create", "Make another scene on a server, from a JSON file or one that it knows");
+  CLI::Option* file = create_->add_option("FILE", options_.file, "A scene in JSON");
+  create_->add_option("--named", options_.named, "A copy of this scene of the server's instead of a file")
+      ->excludes(file);
+  create_->add_option("--name", options_.name, "The new scene's name, instead of its own");
+  takesAddress(create_);
+  delete_ = command("delete", "End a scene that was created; who is in it is told");
+  pause_ = command("pause", "Stop the clock of a scene");
+  resume_ = command("resume", "Let a paused scene go on");
+  reset_ = command("reset", "Put the cloths of a scene back to where they start");
+  for (CLI::App* added : {delete_, pause_, resume_, reset_}) {
+    added->add_option("SCENE", options_.name, "Its name")->required();
+    takesAddress(added);
+  }
+}
+
+void SceneCommands::check() const {
+  if (create_->parsed() && options_.file.empty() && options_.named.empty())
+    throw CLI::ValidationError("create", "give a FILE, or --named and a scene that the server knows");
+}
+
+bool SceneCommands::parsed() const {
+  for (const CLI::App* command : {create_, delete_, pause_, resume_, reset_})
+    if (command->parsed()) return true;
+  return false;
+}
+
+ExitCode SceneCommands::create() const {
+  CreateSceneOptions create;
+  create.named = options_.named;
+  create.name = options_.name;
+  if (options_.named.empty()) {
+    auto scene = readScene(options_.file);
+    if (!scene) return complain(kUsage, scene.error());
+    create.scene = std::move(*scene);
+  }
+  if (isatty(STDERR_FILENO) != 0)
+    create.progress = [](std::size_t sent, std::size_t all) {
+      if (all > (1 << 20)) fmt::print(stderr, "\rsent {} of {} KiB{}", sent / 1024, all / 1024, sent == all ? "\n" : "");
+    };
+  const auto created = createScene(options_.address, create);
+  if (!created) return complain(exitCodeOf(created.error().kind), created.error().text);
+  fmt::print("{}\n", *created);
+  return kOk;
+}
+
+ExitCode SceneCommands::run(const std::string& address) {
+  options_.address = address;
+  if (create_->parsed()) return create();
+  if (delete_->parsed()) return done(deleteScene(address, options_.name));
+  if (reset_->parsed()) return done(controlScene(address, options_.name, std::nullopt, true));
+  return done(controlScene(address, options_.name, pause_->parsed(), false));
+}
+
+}  // namespace clothstream::cli

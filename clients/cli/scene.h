@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: MIT
+// `clothstream create`, `delete`, `pause`, `resume` and `reset`: scenes of a server.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include <CLI/CLI.hpp>
+
+#include "clients/cli/exit_code.h"
+
+namespace clothstream::cli {
+
+struct SceneOptions {
+  std::string address;  // as completeAddress gives it
+  std::string file;     // create: of a scene, in JSON
+  std::string named;    // create: instead of a file, one that the server knows
+  std::string name;     // of the scene; create: instead of its own
+};
+
+// The commands, of which one may be parsed. Both outlive the parsing.
+class SceneCommands {
+ public:
+  // `address` is shared with the other commands.
+  void add(CLI::App& app, std::string& address);
+  // Throws CLI::ValidationError where what is given does not make sense together.
+  void check() const;
+  bool parsed() const;
+  ExitCode run(const std::string& address);
+
+ private:
+  ExitCode create() const;
+
+  SceneOptions options_;
+  CLI::App *create_ = nullptr, *delete_ = nullptr, *pause_ = nullptr, *resume_ = nullptr, *reset_ = nullptr;
+};
+
+}  // namespace clothstream::cli

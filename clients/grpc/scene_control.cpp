@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: MIT
+// CreateScene inside a stream, DeleteScene and ControlScene as calls.
+#include "clients/grpc/scene_control.h"
+
+#include <algorithm>
+
+#include "clients/grpc/channel.h"
+#include "clothstream/v1/session.grpc.pb.h"
+
+namespace clothstream {
+namespace {
+
+constexpr std::size_t kPieceBytes = 48 * 1024;  // a message is at most 64 KiB
+constexpr std::uint64_t kContentId = 1;
+constexpr std::chrono::seconds kTimeout{10};
+
+using Stream = grpc::ClientReaderWriter<v1::ClientMessage, v1::ServerMessage>;
+
+bool upload(Stream& stream, const std::string& bytes, const CreateSceneOptions& options) {
+  const std::size_t count = std::max<std::size_t>(1, (bytes.size() + kPieceBytes - 1) / kPieceBytes);
+  v1::ClientMessage message;
+  v1::Chunk& chunk = *message.mutable_upload();
+  chunk.set_content_id(kContentId);
+  chunk.set_kind(v1::CONTENT_KIND_SCENE);
+  chunk.set_count(static_cast<std::uint32_t>(count));
+  chunk.set_total_bytes(bytes.size());
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::size_t first = i * kPieceBytes;
+    chunk.set_index(static_cast<std::uint32_t>(i));
+    chunk.set_data(bytes.substr(first, kPieceBytes));
+    if (!stream.Write(message)) return false;
+    if (options.progress) options.progress(first + chunk.data().size(), bytes.size());
+  }
+  return true;
+}
+
+template <typename Request, typename Response, typename Call>
+tl::expected<void, Failure> call(const std::string& address, const Request& request, const Call& method) {
+  const auto stub = v1::ClothStream::NewStub(makeChannel(address));
+  grpc::ClientContext context;
+  context.set_deadline(std::chrono::system_clock::now() + kTimeout);
+  Response response;
+  const grpc::Status status = (*stub.*method)(&context, request, &response);
+  if (!status.ok()) return tl::unexpected(notJoined(address, status));
+  return {};
+}
+
+}  // namespace
+
+tl::expected<std::string, Failure> createScene(const std::string& address, const CreateSceneOptions& options) {
+  const auto stub = v1::ClothStream::NewStub(makeChannel(address));
+  grpc::ClientContext context;
+  context.set_deadline(std::chrono::system_clock::now() + options.timeout);
+  const std::unique_ptr<Stream> stream = stub->Join(&context);
+  v1::ClientMessage message;
+  message.set_request_id(1);
+  v1::CreateSceneRequest& request = *message.mutable_create_scene();
+  request.set_name(options.name);
+  bool sent = true;
+  if (options.named.empty()) {
+    sent = upload(*stream, options.scene.SerializeAsString(), options);
+    request.set_uploaded_content_id(kContentId);
+  } else {
+    request.set_named(options.named);
+  }
+  sent = sent && stream->Write(message);
+  v1::ServerMessage answer;
+  while (stream->Read(&answer) && !answer.has_error() && !answer.has_create_scene()) {
+  }
+  // Whoever ends its own half of the stream leaves: not before the answer.
+  stream->WritesDone();
+  if (answer.has_create_scene() || answer.has_error()) context.TryCancel();
+  const grpc::Status status = stream->Finish();
+  if (answer.has_create_scene()) return answer.create_scene().scene().name();
+  if (answer.has_error())
+    return tl::unexpected(
+        Failure{Failure::Kind::refused, "The server at " + address + " refuses: " + answer.error().text()});
+  return tl::unexpected(sent ? notJoined(address, status) : lost(address, status));
+}
+
+tl::expected<void, Failure> deleteScene(const std::string& address, const std::string& name) {
+  v1::DeleteSceneRequest request;
+  request.set_name(name);
+  return call<v1::DeleteSceneRequest, v1::DeleteSceneResponse>(address, request,
+                                                               &v1::ClothStream::Stub::DeleteScene);
+}
+
+tl::expected<void, Failure> controlScene(const std::string& address, const std::string& name,
+                                         std::optional<bool> paused, bool reset) {
+  v1::ControlSceneRequest request;
+  request.set_name(name);
+  if (paused) request.set_paused(*paused);
+  request.set_reset(reset);
+  return call<v1::ControlSceneRequest, v1::ControlSceneResponse>(address, request,
+                                                                 &v1::ClothStream::Stub::ControlScene);
+}
+
+}  // namespace clothstream

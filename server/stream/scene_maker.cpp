@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: MIT
+// Scenes that come and go while the server runs.
+#include "server/stream/scene_maker.h"
+
+#include <algorithm>
+#include <exception>
+#include <memory>
+#include <utility>
+
+#include <boost/asio/post.hpp>
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include "server/messages/scene_file.h"
+#include "server/messages/scene_message.h"
+#include "server/messages/validation.h"
+#include "server/stream/server_state.h"
+
+namespace clothstream::stream {
+namespace {
+
+tl::unexpected<v1::Error> refused(v1::ErrorCode code, std::string text) {
+  v1::Error error;
+  error.set_code(code);
+  error.set_text(std::move(text));
+  return tl::unexpected(std::move(error));
+}
+
+tl::expected<scene::Scene, v1::Error> checked(messages::Result<scene::Scene> scene) {
+  if (!scene) return refused(scene.error().code, "createScene.scene: " + scene.error().text);
+  return std::move(*scene);
+}
+
+}  // namespace
+
+void SceneMaker::create(v1::CreateSceneRequest request, std::string uploaded, CreateDone done) {
+  boost::asio::post(thread_, [this, request = std::move(request), uploaded = std::move(uploaded),
+                              done = std::move(done)] { done(make(request, uploaded)); });
+}
+
+void SceneMaker::remove(v1::DeleteSceneRequest request, DeleteDone done) {
+  boost::asio::post(thread_, [this, request = std::move(request), done = std::move(done)] {
+    done(removeNow(request));
+  });
+}
+
+tl::expected<scene::Scene, v1::Error> SceneMaker::definitionOf(const v1::CreateSceneRequest& request,
+                                                               const std::string& uploaded) const {
+  switch (request.source_case()) {
+    case v1::CreateSceneRequest::kScene:
+      return checked(messages::toScene(request.scene()));
+    case v1::CreateSceneRequest::kUploadedContentId: {
+      v1::Scene message;
+      if (!message.ParseFromString(uploaded))
+        return refused(v1::ERROR_CODE_MALFORMED_MESSAGE, "createScene: what was uploaded is no Scene message");
+      return checked(messages::toScene(message));
+    }
+    case v1::CreateSceneRequest::kNamed:
+      if (const std::shared_ptr<LiveScene> live = server_.find(request.named())) return live->start();
+      if (std::ranges::count(messages::namedScenes(), request.named()) > 0)
+        return checked(messages::loadScene(request.named()));
+      return tl::unexpected(server_.noSuchScene(request.named()));
+    default:
+      return refused(v1::ERROR_CODE_INVALID_ARGUMENT,
+                     "createScene: must have one of \"scene\", \"uploadedContentId\" and \"named\"");
+  }
+}
+
+tl::expected<v1::CreateSceneResponse, v1::Error> SceneMaker::make(const v1::CreateSceneRequest& request,
+                                                                  const std::string& uploaded) {
+  auto definition = definitionOf(request, uploaded);
+  if (!definition) return tl::unexpected(std::move(definition).error());
+  if (!request.name().empty()) {
+    messages::Checks checks;
+    definition->name = checks.name(messages::Path("createScene.name"), request.name());
+    if (auto named = std::move(checks).result(true); !named)
+      return refused(named.error().code, named.error().text);
+  }
+  const std::vector<std::shared_ptr<LiveScene>> scenes = server_.scenesNow();
+  const auto created = static_cast<std::uint32_t>(
+      std::ranges::count_if(scenes, [](const auto& scene) { return scene->created; }));
+  if (created >= server_.options.maxCreatedScenes)
+    return refused(v1::ERROR_CODE_RESOURCE_EXHAUSTED,
+                   fmt::format("the server has {} created scenes, as many as it may have: delete one first",
+                               created));
+  if (std::ranges::any_of(scenes, [&](const auto& scene) { return scene->name() == definition->name; }))
+    return refused(v1::ERROR_CODE_INVALID_ARGUMENT,
+                   fmt::format("createScene: there is a scene '{}' already; give this one another name",
+                               definition->name));
+  const auto scene = std::make_shared<LiveScene>(std::move(*definition), true);
+  try {
+    server_.device.add(scene).get();
+  } catch (const std::exception& failure) {
+    return refused(v1::ERROR_CODE_RESOURCE_EXHAUSTED,
+                   fmt::format("createScene: the device cannot run it: {}", failure.what()));
+  }
+  server_.insert(scene);
+  spdlog::info("{}: created, {} vertices", scene->name(), scene->start().nodeCount());
+  v1::CreateSceneResponse response;
+  *response.mutable_scene() = summaryOf(*scene);
+  return response;
+}
+
+tl::expected<v1::DeleteSceneResponse, v1::Error> SceneMaker::removeNow(const v1::DeleteSceneRequest& request) {
+  const std::shared_ptr<LiveScene> scene = request.name().empty() ? nullptr : server_.find(request.name());
+  if (!scene) return tl::unexpected(server_.noSuchScene(request.name()));
+  if (!scene->created)
+    return refused(v1::ERROR_CODE_INVALID_ARGUMENT,
+                   fmt::format("deleteScene.name = \"{}\": must be of a scene that was created; the server started "
+                               "with this one",
+                               request.name()));
+  server_.erase(*scene);
+  scene->audience.close(notice(v1::NOTICE_KIND_SCENE_DELETED,
+                               fmt::format("the scene '{}' was deleted", scene->name()), scene->tick.load()));
+  server_.device.remove(scene).wait();
+  spdlog::info("{}: deleted", scene->name());
+  return v1::DeleteSceneResponse();
+}
+
+}  // namespace clothstream::stream

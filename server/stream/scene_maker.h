@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: MIT
+// Scenes that come and go while the server runs.
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <string>
+
+#include <boost/asio/thread_pool.hpp>
+#include <tl/expected.hpp>
+
+#include "server/stream/scene_server.h"
+
+namespace clothstream::stream {
+
+// One after the other, on a thread of its own: checking a large mesh takes seconds, and the device makes the
+// scene between two of its ticks. Thread-safe.
+class SceneMaker {
+ public:
+  explicit SceneMaker(SceneServer::State& server) : server_(server), thread_(1) {}
+  // What was asked for is done first.
+  ~SceneMaker() { thread_.join(); }
+  SceneMaker(const SceneMaker&) = delete;
+  SceneMaker& operator=(const SceneMaker&) = delete;
+
+  // `uploaded`: what `request` names as uploaded, if it does.
+  void create(v1::CreateSceneRequest request, std::string uploaded, CreateDone done);
+  void remove(v1::DeleteSceneRequest request, DeleteDone done);
+
+ private:
+  tl::expected<v1::CreateSceneResponse, v1::Error> make(const v1::CreateSceneRequest& request,
+                                                        const std::string& uploaded);
+  tl::expected<scene::Scene, v1::Error> definitionOf(const v1::CreateSceneRequest& request,
+                                                     const std::string& uploaded) const;
+  tl::expected<v1::DeleteSceneResponse, v1::Error> removeNow(const v1::DeleteSceneRequest& request);
+
+  SceneServer::State& server_;
+  boost::asio::thread_pool thread_;
+};
+
+}  // namespace clothstream::stream

@@ -1,0 +1,268 @@
+// SPDX-License-Identifier: MIT
+// Scenes that peers create, delete, pause and put back to their start.
+#include <chrono>
+#include <thread>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "server/messages/scene_message.h"
+#include "tests/scene/meshes.h"
+#include "tests/stream/server_test.h"
+
+namespace clothstream::stream {
+namespace {
+
+using testing::HasSubstr;
+using testing::StartsWith;
+using tests::TestPeer;
+using Body = v1::ServerMessage;
+
+#define START(...)    \
+  start(__VA_ARGS__); \
+  if (IsSkipped()) return
+
+using ScenesTest = tests::ServerTest;
+
+// A cloth of any triangles, as a client would describe it.
+v1::Scene discScene(std::uint32_t rings) {
+  scene::Scene scene = tests::smallScene("disc");
+  scene.cloths[0].mesh = std::make_shared<const scene::Mesh>(scene::makeMesh(scene::disc(rings, 0.5f)));
+  scene.cloths[0].mass = 0.2f;
+  scene.cloths[0].pins.clear();
+  scene.cloths[0].pinnedVertices = {0};
+  scene.substeps = 30;
+  return messages::toMessage(scene);
+}
+
+v1::ClientMessage piece(const std::string& content, std::uint32_t index, std::uint32_t count,
+                        std::size_t bytesAPiece) {
+  v1::ClientMessage message;
+  v1::Chunk& chunk = *message.mutable_upload();
+  chunk.set_content_id(9);
+  chunk.set_kind(v1::CONTENT_KIND_SCENE);
+  chunk.set_index(index);
+  chunk.set_count(count);
+  chunk.set_total_bytes(content.size());
+  chunk.set_data(content.substr(index * bytesAPiece, bytesAPiece));
+  return message;
+}
+
+void upload(TestPeer& peer, const std::string& content) {
+  constexpr std::size_t kBytes = 40'000;
+  const auto count = static_cast<std::uint32_t>((content.size() + kBytes - 1) / kBytes);
+  for (std::uint32_t i = 0; i < count; ++i) peer.send(piece(content, i, count, kBytes));
+}
+
+v1::ServerMessage ask(TestPeer& peer, v1::ClientMessage message) {
+  message.set_request_id(77);
+  peer.send(message);
+  return peer.readUntil([](const v1::ServerMessage& answer) { return answer.request_id() == 77; });
+}
+
+v1::ServerMessage createUploaded(TestPeer& peer, const std::string& name = "") {
+  v1::ClientMessage message;
+  message.mutable_create_scene()->set_uploaded_content_id(9);
+  message.mutable_create_scene()->set_name(name);
+  return ask(peer, message);
+}
+
+v1::ServerMessage createNamed(TestPeer& peer, const std::string& named, const std::string& name) {
+  v1::ClientMessage message;
+  message.mutable_create_scene()->set_named(named);
+  message.mutable_create_scene()->set_name(name);
+  return ask(peer, message);
+}
+
+v1::ServerMessage deleteScene(TestPeer& peer, const std::string& name) {
+  v1::ClientMessage message;
+  message.mutable_delete_scene()->set_name(name);
+  return ask(peer, message);
+}
+
+v1::ServerMessage control(TestPeer& peer, const std::string& name, std::optional<bool> paused, bool reset) {
+  v1::ClientMessage message;
+  message.mutable_control_scene()->set_name(name);
+  if (paused) message.mutable_control_scene()->set_paused(*paused);
+  message.mutable_control_scene()->set_reset(reset);
+  return ask(peer, message);
+}
+
+TEST_F(ScenesTest, AMeshIsUploadedInPiecesAndJoined) {
+  START();
+  const v1::Scene scene = discScene(40);
+  const std::string content = scene.SerializeAsString();
+  ASSERT_GT(content.size(), 100'000u);
+  TestPeer maker(server());
+  upload(maker, content);
+  const v1::ServerMessage made = createUploaded(maker);
+  ASSERT_TRUE(made.has_create_scene()) << made.DebugString();
+  EXPECT_EQ(made.create_scene().scene().name(), "disc");
+  EXPECT_EQ(made.create_scene().scene().vertex_count(), 4921u);
+  EXPECT_TRUE(made.create_scene().scene().created());
+
+  TestPeer peer(server());
+  peer.join("disc");
+  peer.readFrames(3);
+  EXPECT_EQ(peer.description().cloths(0).vertex_count(), 4921u);
+  EXPECT_EQ(peer.decoder().positions().size(), 3 * 4921u);
+  // It is the scene that was sent: its own message says the same.
+  EXPECT_EQ(peer.description().cloths(0).triangles().size(), 3 * sizeof(std::uint32_t) * 6 * 40 * 40);
+
+  // The content went with the call.
+  EXPECT_EQ(createUploaded(maker, "again").error().code(), v1::ERROR_CODE_NOT_FOUND);
+}
+
+TEST_F(ScenesTest, ACreatedSceneLivesUntilItIsDeleted) {
+  START();
+  TestPeer maker(server());
+  ASSERT_TRUE(createNamed(maker, "small", "mine").has_create_scene());
+  EXPECT_EQ(server().listScenes().scenes_size(), 3);
+  EXPECT_THAT(createNamed(maker, "small", "mine").error().text(), HasSubstr("already"));
+  EXPECT_EQ(createNamed(maker, "nowhere", "x").error().code(), v1::ERROR_CODE_NOT_FOUND);
+  EXPECT_THAT(createNamed(maker, "small", "No Name").error().text(), StartsWith("createScene.name = "));
+  EXPECT_THAT(createNamed(maker, "../../etc/passwd", "x").error().text(), HasSubstr("there is no scene"));
+
+  TestPeer inside(server()), outside(server());
+  inside.join("mine");
+  outside.join("small");
+  ASSERT_TRUE(deleteScene(maker, "mine").has_delete_scene());
+  const v1::ServerMessage last = inside.readToTheEnd();
+  EXPECT_EQ(last.notice().kind(), v1::NOTICE_KIND_SCENE_DELETED);
+  EXPECT_EQ(server().listScenes().scenes_size(), 2);
+  outside.readFrames(3);
+  EXPECT_EQ(deleteScene(maker, "mine").error().code(), v1::ERROR_CODE_NOT_FOUND);
+  EXPECT_THAT(deleteScene(maker, "small").error().text(), HasSubstr("must be of a scene that was created"));
+  // The name is free again.
+  EXPECT_TRUE(createNamed(maker, "small", "mine").has_create_scene());
+  TestPeer again(server());
+  again.join("mine");
+}
+
+TEST_F(ScenesTest, ThereIsAnEndToThem) {
+  ServerOptions options;
+  options.maxCreatedScenes = 1;
+  START(options);
+  TestPeer maker(server());
+  ASSERT_TRUE(createNamed(maker, "small", "one").has_create_scene());
+  EXPECT_EQ(createNamed(maker, "small", "two").error().code(), v1::ERROR_CODE_RESOURCE_EXHAUSTED);
+  ASSERT_TRUE(deleteScene(maker, "one").has_delete_scene());
+  EXPECT_TRUE(createNamed(maker, "small", "two").has_create_scene());
+}
+
+TEST_F(ScenesTest, WhatIsWrongWithASceneIsSaid) {
+  START();
+  TestPeer maker(server());
+  v1::Scene scene = discScene(3);
+  scene.mutable_cloths(0)->mutable_structural()->set_stiffness(-1);
+  upload(maker, scene.SerializeAsString());
+  const v1::ServerMessage refused = createUploaded(maker);
+  EXPECT_EQ(refused.error().code(), v1::ERROR_CODE_INVALID_ARGUMENT);
+  EXPECT_THAT(refused.error().text(),
+              StartsWith("createScene.scene: cloths[0].structural.stiffness = -1: must be"));
+  EXPECT_FALSE(refused.error().fatal());
+
+  scene = discScene(3);
+  scene.mutable_cloths(0)->mutable_mesh()->Clear();
+  scene.mutable_cloths(0)->mutable_mesh()->set_file("/etc/passwd");
+  upload(maker, scene.SerializeAsString());
+  EXPECT_TRUE(createUploaded(maker).has_error());
+  upload(maker, std::string(100, '\xff'));
+  EXPECT_EQ(createUploaded(maker).error().code(), v1::ERROR_CODE_MALFORMED_MESSAGE);
+  EXPECT_EQ(ask(maker, [] {
+              v1::ClientMessage message;
+              message.mutable_create_scene();
+              return message;
+            }())
+                .error()
+                .code(),
+            v1::ERROR_CODE_INVALID_ARGUMENT);
+  EXPECT_EQ(server().listScenes().scenes_size(), 2);
+}
+
+TEST_F(ScenesTest, PiecesThatDoNotFitAreRefusedAndForgotten) {
+  ServerOptions options;
+  options.maxUploadBytes = 1000;
+  START(options);
+  TestPeer maker(server());
+  const std::string content(600, '\xff');
+  const auto refusal = [&](const v1::ClientMessage& message) {
+    maker.send(message);
+    return maker.readUntil(Body::kError).error().text();
+  };
+  EXPECT_THAT(refusal(piece(content, 1, 3, 200)), StartsWith("upload.index = 1"));
+  maker.send(piece(content, 0, 3, 200));
+  EXPECT_THAT(refusal(piece(content, 2, 3, 200)), StartsWith("upload.index = 2"));
+  v1::ClientMessage wrong = piece(content, 0, 1, 600);
+  wrong.mutable_upload()->set_total_bytes(601);
+  EXPECT_THAT(refusal(wrong), StartsWith("upload.data: makes 600 bytes of the 601"));
+  wrong = piece(content, 0, 2, 200);
+  wrong.mutable_upload()->set_kind(v1::CONTENT_KIND_STREAM_DESCRIPTION);
+  EXPECT_THAT(refusal(wrong), StartsWith("upload.kind = 1"));
+  wrong = piece(content, 0, 2, 200);
+  wrong.mutable_upload()->set_total_bytes(std::uint64_t{1} << 40);
+  EXPECT_THAT(refusal(wrong), StartsWith("upload.totalBytes = "));
+  EXPECT_EQ(createUploaded(maker).error().code(), v1::ERROR_CODE_NOT_FOUND);
+
+  // What one peer holds, another cannot; what it gives back, it can.
+  maker.send(piece(content, 0, 2, 300));
+  maker.send(piece(content, 1, 2, 300));
+  TestPeer other(server());
+  other.send(piece(content, 0, 1, 600));
+  EXPECT_EQ(other.readUntil(Body::kError).error().code(), v1::ERROR_CODE_RESOURCE_EXHAUSTED);
+  maker.vanish();
+  other.send(piece(content, 0, 1, 600));
+  EXPECT_EQ(createUploaded(other).error().code(), v1::ERROR_CODE_MALFORMED_MESSAGE);
+}
+
+TEST_F(ScenesTest, APausedSceneStandsStillAndGoesOnWhereItWas) {
+  START();
+  TestPeer peer(server()), other(server());
+  peer.join();
+  other.join("other");
+  ASSERT_TRUE(control(other, "small", true, false).control_scene().scene().paused());
+  peer.readUntil([](const v1::ServerMessage& m) { return m.notice().kind() == v1::NOTICE_KIND_SCENE_PAUSED; });
+  // Whatever was on its way when the pause began is there after a few ticks of another scene.
+  other.readFrames(4);
+  const std::uint64_t ticks = metrics().ticks.value();
+  other.readFrames(10);
+  EXPECT_EQ(metrics().ticks.value(), ticks);
+  EXPECT_FALSE(server().listScenes().scenes(0).running());
+  // Told to who comes now, too.
+  TestPeer late(server());
+  late.hello();
+  late.readUntil([](const v1::ServerMessage& m) { return m.notice().kind() == v1::NOTICE_KIND_SCENE_PAUSED; });
+
+  ASSERT_FALSE(control(other, "small", false, false).control_scene().scene().paused());
+  peer.readUntil([](const v1::ServerMessage& m) { return m.notice().kind() == v1::NOTICE_KIND_SCENE_RESUMED; });
+  const std::uint64_t before = peer.frames().back().tick;
+  peer.readFrames(5);
+  EXPECT_LT(peer.frames().back().tick, before + 20);
+  EXPECT_EQ(control(other, "nowhere", true, false).error().code(), v1::ERROR_CODE_NOT_FOUND);
+}
+
+TEST_F(ScenesTest, AResetSceneBeginsAnewWithItsParametersAsTheyAre) {
+  START();
+  TestPeer peer(server());
+  peer.join();
+  v1::ParameterChange change;
+  change.mutable_gravity()->mutable_value();  // none
+  peer.change(change);
+  peer.readFrames(20);
+  const auto lowest = [&] {
+    float y = 1e9f;
+    for (std::size_t i = 1; i < peer.decoder().positions().size(); i += 3)
+      y = std::min(y, peer.decoder().positions()[i]);
+    return y;
+  };
+  ASSERT_TRUE(control(peer, "", std::nullopt, true).has_control_scene());
+  peer.readUntil([](const v1::ServerMessage& m) { return m.notice().kind() == v1::NOTICE_KIND_SCENE_RESET; });
+  peer.readFrames(3);
+  // At rest and without gravity, but for the ball that pushes it.
+  EXPECT_NEAR(lowest(), -1.1f, 0.02f);
+  EXPECT_EQ(peer.description().definition().name(), "small");
+  EXPECT_EQ(server().getScene({}).value().scene().environment().gravity().y(), 0);
+}
+
+}  // namespace
+}  // namespace clothstream::stream
