@@ -92,7 +92,8 @@ std::variant<ProgramOptions, int> parseOptions(int argc, const char* const* argv
                  "Normals of --scene: none (clients compute them) or octahedral")
       ->transform(CLI::CheckedTransformer(normals, CLI::ignore_case))
       ->group(scenes);
-  app.add_flag("--always-run", options.alwaysRun, "Simulate scenes while nobody is in them, too")
+  app.add_flag("--always-run", options.alwaysRun,
+               "Go on simulating while nobody is there: --scene from the start, others once somebody came")
       ->group(scenes);
   app.add_option("--reports", options.reportRate,
                  "Frames a second that tell how the simulation does: strain, energy, ...; 0: none")

@@ -28,10 +28,10 @@ tl::expected<v1::Scene, std::string> readScene(const std::string& path) {
   if (!status.ok()) return tl::unexpected(fmt::format("{}: {}", path, std::string(status.message())));
   for (const v1::Cloth& cloth : scene.cloths())
     if (!cloth.mesh().file().empty())
-      return tl::unexpected(
-          fmt::format("{}: the cloth '{}' names the mesh file {}, which the server does not have; `clothstream-server "
-                      "print-scene {}` gives the scene with its geometry",
-                      path, cloth.name(), cloth.mesh().file(), path));
+      return tl::unexpected(fmt::format(
+          "{}: the cloth '{}' names the mesh file {}, which the server does not have; `clothstream-server "
+          "print-scene {}` gives the scene with its geometry",
+          path, cloth.name(), cloth.mesh().file(), path));
   return scene;
 }
 
@@ -88,7 +88,8 @@ ExitCode SceneCommands::create() const {
   }
   if (isatty(STDERR_FILENO) != 0)
     create.progress = [](std::size_t sent, std::size_t all) {
-      if (all > (1 << 20)) fmt::print(stderr, "\rsent {} of {} KiB{}", sent / 1024, all / 1024, sent == all ? "\n" : "");
+      if (all > (1 << 20))
+        fmt::print(stderr, "\rsent {} of {} KiB{}", sent / 1024, all / 1024, sent == all ? "\n" : "");
     };
   const auto created = createScene(options_.address, create);
   if (!created) return complain(exitCodeOf(created.error().kind), created.error().text);

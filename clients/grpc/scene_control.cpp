@@ -47,7 +47,8 @@ tl::expected<void, Failure> call(const std::string& address, const Request& requ
 
 }  // namespace
 
-tl::expected<std::string, Failure> createScene(const std::string& address, const CreateSceneOptions& options) {
+tl::expected<std::string, Failure> createScene(const std::string& address,
+                                               const CreateSceneOptions& options) {
   const auto stub = v1::ClothStream::NewStub(makeChannel(address));
   grpc::ClientContext context;
   context.set_deadline(std::chrono::system_clock::now() + options.timeout);

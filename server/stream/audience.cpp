@@ -15,14 +15,21 @@ Audience::Joining Audience::join(std::shared_ptr<Mailbox> mailbox, std::size_t l
   return Joining::joined;
 }
 
-void Audience::close(const SharedBytes& last) {
+void Audience::dismiss(const SharedBytes& last) {
   std::vector<std::shared_ptr<Mailbox>> members;
   {
     const std::lock_guard lock(mutex_);
-    closed_ = true;
-    members = members_;
+    members.swap(members_);
   }
   for (const auto& member : members) member->close(last);
+}
+
+void Audience::close(const SharedBytes& last) {
+  {
+    const std::lock_guard lock(mutex_);
+    closed_ = true;
+  }
+  dismiss(last);
 }
 
 void Audience::leave(const Mailbox& mailbox) {

@@ -25,7 +25,9 @@ class Audience {
   void publish(const PublishedFrame& frame);
   // Whoever has no room for it is too slow to be kept: its mailbox is closed.
   void announce(const SharedBytes& message);
-  // Everybody's last message; nobody joins from here on.
+  // Everybody's last message.
+  void dismiss(const SharedBytes& last);
+  // The same, and nobody joins from here on.
   void close(const SharedBytes& last);
   // Whether somebody can go on only from a key frame, and has room for one.
   bool wantsKeyFrame() const;

@@ -10,6 +10,8 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include "server/stream/envelope.h"
+
 namespace clothstream::stream {
 
 DeviceThread::DeviceThread(const vulkan::DeviceOptions& device,
@@ -71,7 +73,9 @@ std::future<void> DeviceThread::post(std::function<void()> task) {
 std::future<void> DeviceThread::add(std::shared_ptr<LiveScene> scene) {
   return post([this, scene = std::move(scene)] {
     if (!device_) throw std::runtime_error("there is no device at present");
-    runs_.push_back(std::make_unique<Run>(*device_, scene, packer_, reportRate_));
+    auto run = std::make_unique<Run>(scene);
+    makeHost(*run);
+    runs_.push_back(std::move(run));
   });
 }
 
@@ -95,8 +99,8 @@ void DeviceThread::runTasks() {
 void DeviceThread::run(const std::vector<std::shared_ptr<LiveScene>>& scenes, std::promise<void>& ready) {
   try {
     device_ = std::make_unique<vulkan::Device>(options_);
-    for (const auto& scene : scenes)
-      runs_.push_back(std::make_unique<Run>(*device_, scene, packer_, reportRate_));
+    for (const auto& scene : scenes) runs_.push_back(std::make_unique<Run>(scene));
+    makeHost(*runs_.front());
     info_ = device_->info();
   } catch (...) {
     runs_.clear();
@@ -134,16 +138,36 @@ bool DeviceThread::waitForWork() {
   return !stopping_;
 }
 
+void DeviceThread::makeHost(Run& run) {
+  run.host = std::make_unique<SceneHost>(*device_, *run.scene, packer_, reportRate_);
+}
+
+bool DeviceThread::tryMakeHost(Run& run) {
+  if (run.host) return true;
+  try {
+    makeHost(run);
+  } catch (const vulkan::DeviceLost&) {
+    throw;
+  } catch (const std::exception& failure) {
+    const std::string text =
+        fmt::format("the device cannot run the scene '{}': {}", run.scene->name(), failure.what());
+    spdlog::error("{}", text);
+    run.scene->audience.dismiss(error(v1::ERROR_CODE_RESOURCE_EXHAUSTED, text, true));
+  }
+  return run.host != nullptr;
+}
+
 void DeviceThread::startAndStopScenes() {
   for (const auto& run : runs_) {
     const LiveScene& scene = *run->scene;
-    const bool wanted = !scene.paused && (runAlways_ || scene.audience.size() > 0);
+    const bool wanted =
+        !scene.paused && ((runAlways_ && run->host) || (scene.audience.size() > 0 && tryMakeHost(*run)));
     if (wanted && !run->running) {
       run->pacer.start(Clock::now());
       run->slow.restart();
     }
     run->running = wanted;
-    run->host.scene().running = wanted;
+    run->scene->running = wanted;
   }
 }
 
@@ -158,12 +182,12 @@ void DeviceThread::runDueTicks() {
     if (run->running && run->pacer.due() <= now) due_.push_back(run.get());
   std::ranges::sort(due_, {}, [](const Run* run) { return run->pacer.due(); });
   for (Run* run : due_) begin(*run, Clock::now());
-  for (Run* run : due_) run->host.finish();
+  for (Run* run : due_) run->host->finish();
 }
 
 void DeviceThread::begin(Run& run, Clock::time_point now) {
   const Pacer::Start start = run.pacer.begin(now);
-  LiveScene& scene = run.host.scene();
+  LiveScene& scene = *run.scene;
   scene.metrics.lateness.record(seconds(start.lateness));
   if (start.late) scene.metrics.lateTicks.add();
   scene.metrics.slippedTicks.add(run.wholeSlippedTicks(start.slippedTicks));
@@ -172,9 +196,9 @@ void DeviceThread::begin(Run& run, Clock::time_point now) {
         "simulated time runs at {:.0f} % of real time: the device cannot keep {} ticks/s with {} substeps",
         *speed * 100, scene.start().simulationRate, scene.start().substeps);
     spdlog::warn("{}: {}", scene.name(), text);
-    scene.audience.announce(notice(v1::NOTICE_KIND_RUNNING_SLOW, text, run.host.tick()));
+    scene.audience.announce(notice(v1::NOTICE_KIND_RUNNING_SLOW, text, run.host->tick()));
   }
-  run.host.begin(now);
+  run.host->begin(now);
 }
 
 void DeviceThread::rebuild(const std::string& reason) {
@@ -190,11 +214,13 @@ void DeviceThread::rebuild(const std::string& reason) {
 }
 
 bool DeviceThread::tryRebuild() {
-  for (const auto& run : runs_) run->host.release();
+  for (const auto& run : runs_)
+    if (run->host) run->host->release();
   device_.reset();
   try {
     device_ = std::make_unique<vulkan::Device>(options_);
-    for (const auto& run : runs_) run->host.rebuild(*device_);
+    for (const auto& run : runs_)
+      if (run->host) run->host->rebuild(*device_);
   } catch (const std::exception& failure) {
     spdlog::error("device: {}; trying again", failure.what());
     return false;

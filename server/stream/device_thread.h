@@ -23,13 +23,14 @@
 
 namespace clothstream::stream {
 
-// Thread-safe. Scenes that are due together are all submitted before the first is waited for. A scene sleeps
-// while nobody is in it. When the device is lost, another is made and every scene goes on from the newest
-// state that the CPU has; this is tried once a second until it succeeds.
+// Thread-safe. Scenes that are due together are all submitted before the first is waited for. A scene takes
+// room on the device from when somebody first joins it, and sleeps while nobody is in it. When the device is
+// lost, another is made and every scene goes on from the newest state that the CPU has; this is tried once a
+// second until it succeeds.
 class DeviceThread {
  public:
-  // Device and scenes are ready when it returns. All arguments outlive it. Throws what the device or a scene
-  // throws.
+  // Device and first scene are ready when it returns. All arguments outlive it. Throws what the device or the
+  // first scene throws.
   DeviceThread(const vulkan::DeviceOptions& device, const std::vector<std::shared_ptr<LiveScene>>& scenes,
                FramePacker& packer, telemetry::ServerMetrics& metrics, bool runAlways, double reportRate);
   // Ends after the ticks in flight.
@@ -53,10 +54,8 @@ class DeviceThread {
 
  private:
   struct Run {
-    Run(vulkan::Device& device, std::shared_ptr<LiveScene> live, FramePacker& packer, double reportRate)
-        : scene(std::move(live)),
-          host(device, *scene, packer, reportRate),
-          pacer(scene->start().simulationRate) {}
+    explicit Run(std::shared_ptr<LiveScene> live)
+        : scene(std::move(live)), pacer(scene->start().simulationRate) {}
     // Of what was given up so far, the whole ticks that are not counted yet.
     std::uint64_t wholeSlippedTicks(double given) {
       slipped += given;
@@ -66,7 +65,7 @@ class DeviceThread {
     }
 
     std::shared_ptr<LiveScene> scene;
-    SceneHost host;
+    std::unique_ptr<SceneHost> host;  // once somebody joined
     Pacer pacer;
     SlowWatch slow;
     double slipped = 0;
@@ -79,6 +78,9 @@ class DeviceThread {
   // False when it is time to end.
   bool waitForWork();
   void startAndStopScenes();
+  void makeHost(Run& run);
+  // False, and who is in the scene is told, where the device has no room for it.
+  bool tryMakeHost(Run& run);
   void runDueTicks();
   void begin(Run& run, Clock::time_point now);
   void rebuild(const std::string& reason);

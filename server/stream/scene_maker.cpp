@@ -39,9 +39,8 @@ void SceneMaker::create(v1::CreateSceneRequest request, std::string uploaded, Cr
 }
 
 void SceneMaker::remove(v1::DeleteSceneRequest request, DeleteDone done) {
-  boost::asio::post(thread_, [this, request = std::move(request), done = std::move(done)] {
-    done(removeNow(request));
-  });
+  boost::asio::post(
+      thread_, [this, request = std::move(request), done = std::move(done)] { done(removeNow(request)); });
 }
 
 tl::expected<scene::Scene, v1::Error> SceneMaker::definitionOf(const v1::CreateSceneRequest& request,
@@ -52,7 +51,8 @@ tl::expected<scene::Scene, v1::Error> SceneMaker::definitionOf(const v1::CreateS
     case v1::CreateSceneRequest::kUploadedContentId: {
       v1::Scene message;
       if (!message.ParseFromString(uploaded))
-        return refused(v1::ERROR_CODE_MALFORMED_MESSAGE, "createScene: what was uploaded is no Scene message");
+        return refused(v1::ERROR_CODE_MALFORMED_MESSAGE,
+                       "createScene: what was uploaded is no Scene message");
       return checked(messages::toScene(message));
     }
     case v1::CreateSceneRequest::kNamed:
@@ -80,9 +80,9 @@ tl::expected<v1::CreateSceneResponse, v1::Error> SceneMaker::make(const v1::Crea
   const auto created = static_cast<std::uint32_t>(
       std::ranges::count_if(scenes, [](const auto& scene) { return scene->created; }));
   if (created >= server_.options.maxCreatedScenes)
-    return refused(v1::ERROR_CODE_RESOURCE_EXHAUSTED,
-                   fmt::format("the server has {} created scenes, as many as it may have: delete one first",
-                               created));
+    return refused(
+        v1::ERROR_CODE_RESOURCE_EXHAUSTED,
+        fmt::format("the server has {} created scenes, as many as it may have: delete one first", created));
   if (std::ranges::any_of(scenes, [&](const auto& scene) { return scene->name() == definition->name; }))
     return refused(v1::ERROR_CODE_INVALID_ARGUMENT,
                    fmt::format("createScene: there is a scene '{}' already; give this one another name",
@@ -101,14 +101,16 @@ tl::expected<v1::CreateSceneResponse, v1::Error> SceneMaker::make(const v1::Crea
   return response;
 }
 
-tl::expected<v1::DeleteSceneResponse, v1::Error> SceneMaker::removeNow(const v1::DeleteSceneRequest& request) {
+tl::expected<v1::DeleteSceneResponse, v1::Error> SceneMaker::removeNow(
+    const v1::DeleteSceneRequest& request) {
   const std::shared_ptr<LiveScene> scene = request.name().empty() ? nullptr : server_.find(request.name());
   if (!scene) return tl::unexpected(server_.noSuchScene(request.name()));
   if (!scene->created)
-    return refused(v1::ERROR_CODE_INVALID_ARGUMENT,
-                   fmt::format("deleteScene.name = \"{}\": must be of a scene that was created; the server started "
-                               "with this one",
-                               request.name()));
+    return refused(
+        v1::ERROR_CODE_INVALID_ARGUMENT,
+        fmt::format("deleteScene.name = \"{}\": must be of a scene that was created; the server started "
+                    "with this one",
+                    request.name()));
   server_.erase(*scene);
   scene->audience.close(notice(v1::NOTICE_KIND_SCENE_DELETED,
                                fmt::format("the scene '{}' was deleted", scene->name()), scene->tick.load()));

@@ -2,6 +2,7 @@
 // The scenes of a server.
 #include "server/stream/scene_server.h"
 
+#include <algorithm>
 #include <cassert>
 #include <stdexcept>
 #include <utility>
@@ -161,6 +162,9 @@ SceneServer::SceneServer(std::vector<scene::Scene> scenes, ServerOptions options
   if (!found)
     throw std::runtime_error(
         fmt::format("there is no scene '{}'; there are {}", options.defaultScene, known));
+  // The first is ready when the server is.
+  std::ranges::stable_partition(
+      scenes, [&](const scene::Scene& scene) { return scene.name == options.defaultScene; });
   state_ = std::make_unique<State>(std::move(scenes), std::move(options));
 }
 

@@ -24,7 +24,8 @@ struct ServerOptions {
   std::string defaultScene;
   // Sent to clients in Welcome.
   std::string serverName = "clothstream-server";
-  // A scene sleeps while nobody is in it, unless this is set.
+  // A scene sleeps while nobody is in it, unless this is set: then the default scene runs from the start, and
+  // others from when somebody first joins them.
   bool runAlways = false;
   // Frames of a scene that tell how its simulation does, a second; 0: none.
   double reportRate = 4;
@@ -48,8 +49,8 @@ using DeleteDone = std::function<void(tl::expected<v1::DeleteSceneResponse, v1::
 class SceneServer {
  public:
   // The scenes must be valid (server/messages) and their names unique. Throws vulkan::DeviceError, or
-  // std::runtime_error where the device has no room for a scene or the default scene is not among them
-  // (naming those there are).
+  // std::runtime_error where the device has no room for the default scene or it is not among them (naming
+  // those there are).
   SceneServer(std::vector<scene::Scene> scenes, ServerOptions options);
   // Stops. Every Connection must be gone.
   ~SceneServer();

@@ -23,19 +23,20 @@ messages::Result<void> Upload::check(const v1::Chunk& chunk) const {
     return tl::unexpected(messages::FieldError{v1::ERROR_CODE_INVALID_ARGUMENT, std::move(text)});
   };
   if (chunk.kind() != v1::CONTENT_KIND_SCENE)
-    return invalid(fmt::format("upload.kind = {}: must be CONTENT_KIND_SCENE", static_cast<int>(chunk.kind())));
+    return invalid(
+        fmt::format("upload.kind = {}: must be CONTENT_KIND_SCENE", static_cast<int>(chunk.kind())));
   if (chunk.total_bytes() > messages::limits::kMaxContentBytes)
     return invalid(fmt::format("upload.totalBytes = {}: must be at most {}", chunk.total_bytes(),
                                messages::limits::kMaxContentBytes));
   if (chunk.index() >= chunk.count())
     return invalid(fmt::format("upload.index = {}: must be below upload.count, which is {}", chunk.index(),
                                chunk.count()));
-  if (chunk.index() != next_ ||
-      (next_ > 0 && (chunk.content_id() != contentId_ || chunk.count() != count_ ||
-                     chunk.total_bytes() != totalBytes_)))
-    return invalid(fmt::format("upload.index = {} of content {}: must be 0, or piece {} of content {} with the "
-                               "count and totalBytes of its first",
-                               chunk.index(), chunk.content_id(), next_, contentId_));
+  if (chunk.index() != next_ || (next_ > 0 && (chunk.content_id() != contentId_ || chunk.count() != count_ ||
+                                               chunk.total_bytes() != totalBytes_)))
+    return invalid(
+        fmt::format("upload.index = {} of content {}: must be 0, or piece {} of content {} with the "
+                    "count and totalBytes of its first",
+                    chunk.index(), chunk.content_id(), next_, contentId_));
   const std::uint64_t bytes = bytes_.size() + chunk.data().size();
   const bool last = chunk.index() + 1 == chunk.count();
   if (last ? bytes != chunk.total_bytes() : bytes > chunk.total_bytes())
@@ -52,8 +53,8 @@ messages::Result<void> Upload::add(const v1::Chunk& chunk) {
   }
   if (!room_.take(chunk.data().size())) {
     drop();
-    return tl::unexpected(messages::FieldError{
-        v1::ERROR_CODE_RESOURCE_EXHAUSTED, "upload: the server has no room for it now; try again later"});
+    return tl::unexpected(messages::FieldError{v1::ERROR_CODE_RESOURCE_EXHAUSTED,
+                                               "upload: the server has no room for it now; try again later"});
   }
   taken_ += chunk.data().size();
   contentId_ = chunk.content_id();
@@ -68,7 +69,8 @@ messages::Result<std::string> Upload::take(std::uint64_t contentId) {
   if (next_ == 0 || contentId != contentId_ || next_ != count_)
     return tl::unexpected(messages::FieldError{
         v1::ERROR_CODE_NOT_FOUND,
-        fmt::format("createScene.uploadedContentId = {}: this stream has not uploaded all of it", contentId)});
+        fmt::format("createScene.uploadedContentId = {}: this stream has not uploaded all of it",
+                    contentId)});
   std::string bytes = std::move(bytes_);
   drop();
   return bytes;

@@ -37,15 +37,34 @@ TEST_P(NamedScene, StaysAClothThatNothingIsIn) {
               << "tick " << simulation.ticks();
     }
   }
-  EXPECT_LT(worstMeanStrain, 0.1);
+  // Those of the paper's figures show how soft springs of 100 N/m are, while they fall on the ball too.
+  EXPECT_LT(worstMeanStrain, GetParam().starts_with("figure_") ? 0.15 : 0.1);
 }
 
 INSTANTIATE_TEST_SUITE_P(All, NamedScene, testing::ValuesIn(namedScenes()),
                          [](const auto& name) { return name.param; });
 
 TEST(NamedScenes, AreThoseOfTheHouse) {
-  EXPECT_EQ(namedScenes(), (std::vector<std::string>{"curtain", "flag", "folds", "obstacles", "sphere_drop",
-                                                     "swing", "tablecloth"}));
+  EXPECT_EQ(namedScenes(), (std::vector<std::string>{"curtain",
+                                                     "figure_07",
+                                                     "figure_09",
+                                                     "figure_10",
+                                                     "figure_11",
+                                                     "figure_12",
+                                                     "figure_13",
+                                                     "figure_14",
+                                                     "figure_15",
+                                                     "flag",
+                                                     "folds",
+                                                     "obstacles",
+                                                     "solver_acad",
+                                                     "solver_constraint",
+                                                     "solver_implicit_euler",
+                                                     "solver_mass_spring",
+                                                     "solver_xpbd",
+                                                     "sphere_drop",
+                                                     "swing",
+                                                     "tablecloth"}));
 }
 
 TEST(NamedScenes, SphereDropComesToRestOnTheSphere) {
