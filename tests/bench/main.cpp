@@ -27,6 +27,8 @@ constexpr std::array kSuites{
                  &bench::runSolvers},
     bench::Suite{"enforcement", "constraint enforcement over all springs, by one workgroup and by several",
                  &bench::runEnforcement},
+    bench::Suite{"assembled", "constraints with sparse matrices, as in the paper, beside the matrix-free solve",
+                 &bench::runAssembled},
     bench::Suite{"equal_strain", "the cheapest setting of each solver that stretches no more than NvCloth's",
                  &bench::runEqualStrain},
     bench::Suite{"work_precision",
