@@ -73,8 +73,8 @@ void appendCloths(std::span<const scene::Cloth> cloths, SolveGroup& group, bool 
   std::uint32_t firstNode = 0;
   for (std::size_t i = 0; i < cloths.size(); firstNode += cloths[i++].nodeCount()) {
     const scene::Cloth& cloth = cloths[i];
-    if (cloth.solver.kind != group.kind || scene::isAssembled(cloth.solver) || (cloth.mesh != nullptr) != group.mesh ||
-        (cloth.nodeCount() > wholeNodes) != large)
+    if (cloth.solver.kind != group.kind || scene::isAssembled(cloth.solver) ||
+        (cloth.mesh != nullptr) != group.mesh || (cloth.nodeCount() > wholeNodes) != large)
       continue;
     appendSystem(cloth, i, firstNode, tables);
     group.bend = group.bend || group.kind == scene::SolverKind::implicitEuler || cloth.solver.bendConstraints;

@@ -31,8 +31,7 @@ void fillRow(uint row, float takenBack) {
   precise float squared = max(dotProduct(d, d), 1e-12);
   float inverseLength = reciprocalSquareRoot(squared);
   precise vec3 direction = inverseLength * d;
-  precise vec3 relative =
-      texelFetch(velocities, int(link.y)).xyz - texelFetch(velocities, int(link.x)).xyz;
+  precise vec3 relative = texelFetch(velocities, int(link.y)).xyz - texelFetch(velocities, int(link.x)).xyz;
   precise float excess = takenBack * (squared * inverseLength - link.z);
   precise float side = push.substepRate * excess + dotProduct(direction, relative);
   blocks[2 * row] = vec4(-direction, a.w);
@@ -58,7 +57,7 @@ void main() {
     lane += width();
   } while (lane < kLanes);
   if (chunk == 0 && self() == 0) {
-    solves[system.number] = SolveRecord(0, 0.0, system.endRow - system.firstRow, 1, 0.0, 0.0, 0.0, 0.0,
-                                        uint(part.z) << 16);
+    solves[system.number] =
+        SolveRecord(0, 0.0, system.endRow - system.firstRow, 1, 0.0, 0.0, 0.0, 0.0, uint(part.z) << 16);
   }
 }

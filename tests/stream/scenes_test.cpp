@@ -169,11 +169,12 @@ TEST_F(ScenesTest, WhatIsWrongWithASceneIsSaid) {
   EXPECT_TRUE(createUploaded(maker).has_error());
   upload(maker, std::string(100, '\xff'));
   EXPECT_EQ(createUploaded(maker).error().code(), v1::ERROR_CODE_MALFORMED_MESSAGE);
-  EXPECT_EQ(ask(maker, [] {
-              v1::ClientMessage message;
-              message.mutable_create_scene();
-              return message;
-            }())
+  EXPECT_EQ(ask(maker,
+                [] {
+                  v1::ClientMessage message;
+                  message.mutable_create_scene();
+                  return message;
+                }())
                 .error()
                 .code(),
             v1::ERROR_CODE_INVALID_ARGUMENT);
@@ -221,7 +222,8 @@ TEST_F(ScenesTest, APausedSceneStandsStillAndGoesOnWhereItWas) {
   peer.join();
   other.join("other");
   ASSERT_TRUE(control(other, "small", true, false).control_scene().scene().paused());
-  peer.readUntil([](const v1::ServerMessage& m) { return m.notice().kind() == v1::NOTICE_KIND_SCENE_PAUSED; });
+  peer.readUntil(
+      [](const v1::ServerMessage& m) { return m.notice().kind() == v1::NOTICE_KIND_SCENE_PAUSED; });
   // Whatever was on its way when the pause began is there after a few ticks of another scene.
   other.readFrames(4);
   const std::uint64_t ticks = metrics().ticks.value();
@@ -231,10 +233,12 @@ TEST_F(ScenesTest, APausedSceneStandsStillAndGoesOnWhereItWas) {
   // Told to who comes now, too.
   TestPeer late(server());
   late.hello();
-  late.readUntil([](const v1::ServerMessage& m) { return m.notice().kind() == v1::NOTICE_KIND_SCENE_PAUSED; });
+  late.readUntil(
+      [](const v1::ServerMessage& m) { return m.notice().kind() == v1::NOTICE_KIND_SCENE_PAUSED; });
 
   ASSERT_FALSE(control(other, "small", false, false).control_scene().scene().paused());
-  peer.readUntil([](const v1::ServerMessage& m) { return m.notice().kind() == v1::NOTICE_KIND_SCENE_RESUMED; });
+  peer.readUntil(
+      [](const v1::ServerMessage& m) { return m.notice().kind() == v1::NOTICE_KIND_SCENE_RESUMED; });
   const std::uint64_t before = peer.frames().back().tick;
   peer.readFrames(5);
   EXPECT_LT(peer.frames().back().tick, before + 20);
