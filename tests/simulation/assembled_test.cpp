@@ -59,6 +59,7 @@ constexpr double kDisplaced = 0.007;  // of a length, two ends of which are off 
 struct Compared {
   std::uint32_t iterations = kIterations;
   float tolerance = kTolerance;
+  std::vector<scene::Pose> attachments = {};
 };
 
 // One substep from a random state.
@@ -72,15 +73,17 @@ void expectLikeReference(scene::Scene scene, unsigned seed, simulation::Simulati
   }
   std::mt19937 random(seed);
   const NodeState start = randomState(scene, random, 0.002f, 0.5f);
+  simulation::TickInputs inputs = inputsOf(scene);
+  inputs.attachments = compared.attachments;
   const auto referenceAfter = [&](const scene::Scene& of) {
     reference::ReferenceSimulation reference(of);
     setState(reference, start);
-    reference.tick(referenceInputs(inputsOf(of)));
+    reference.tick(referenceInputs(inputs));
     return reference;
   };
   Running running(scene, options);
   running.restore(start);
-  EXPECT_TRUE(running.tick(inputsOf(scene)).healthy);
+  EXPECT_TRUE(running.tick(inputs).healthy);
   const NodeState state = running.state();
   const reference::ReferenceSimulation expected = referenceAfter(scene);
   const double tolerance = errorOfSolve(rowsOf(scene), kDisplaced);
@@ -133,6 +136,18 @@ TEST_F(Assembled, ofBendSpringsMoveNodesAsTheReference) {
 
 TEST_F(Assembled, ofMeshesMoveNodesAsTheReference) {
   expectLikeReference(sceneOf({assembled(calmCloth(6, 9)), disc(7)}), 7);
+}
+
+// Attached nodes move at a speed of their own, which is part of b.
+TEST_F(Assembled, followAttachmentsAsTheReferenceDoes) {
+  scene::Cloth cloth = assembled(calmCloth(8, 7));
+  scene::Attachment rod;
+  rod.name = "rod";
+  rod.ranges = {topRow(cloth)};
+  cloth.attachments = {rod};
+  Compared compared;
+  compared.attachments = {{scene::Vec3(0.0006f, 0.0008f, -0.0003f)}};
+  expectLikeReference(sceneOf({cloth}), 11, {}, compared);
 }
 
 TEST_F(Assembled, thatSeveralWorkgroupsSolveMoveNodesAsTheReference) {
@@ -253,7 +268,7 @@ scene::Scene systems() {
 
 simulation::TickInputs inputsAt(const scene::Scene& scene, int tick) {
   const auto place = [](int t) {
-    return scene::Pose{scene::Vec3(0.02f, -0.15f, 0.2f - 0.005f * static_cast<float>(t % 80)), {}};
+    return scene::Pose{scene::Vec3(0.02f, -0.15f, 0.2f - 0.005f * static_cast<float>(t % 80))};
   };
   return inputsOf(scene, {{scene::Sphere{0.08f}, place(tick), place(tick + 1), 1}});
 }

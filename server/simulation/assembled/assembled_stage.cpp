@@ -17,7 +17,6 @@ namespace clothstream::simulation {
 namespace {
 
 using vulkan::BindingKind;
-using vulkan::Buffer;
 using vulkan::BufferPurpose;
 
 constexpr auto kTexels = BindingKind::texels;
