@@ -69,8 +69,10 @@ inline constexpr Range kGrabForce{0.001, 1e6};    // N
 inline constexpr Range kSlipDistance{0.001, 10};  // m
 inline constexpr std::uint32_t kMaxIterations = 10'000;
 inline constexpr std::uint32_t kMaxXpbdIterations = 1'000;
-inline constexpr std::uint32_t kMaxSolverNodes = 1'048'576;       // of a cloth
-inline constexpr double kMinBallRadius = 0.00005;                 // m, of self-collision
+inline constexpr std::uint32_t kMaxSolverNodes = 1'048'576;  // of a cloth
+inline constexpr std::uint64_t kMaxAssembledNodes = 65'536;  // of a scene, where systems are assembled
+inline constexpr std::uint64_t kMaxAssembledEntries = 256;   // a node, of a cloth's matrix: 20 bytes each
+inline constexpr double kMinBallRadius = 0.00005;            // m, of self-collision
 inline constexpr std::uint32_t kMaxSelfCollisionNodes = 524'288;  // of a scene
 inline constexpr double kUnitTolerance = 0.001;                   // of a quaternion's length
 

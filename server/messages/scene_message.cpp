@@ -430,6 +430,27 @@ scene::Solver toSolver(Checks& checks, const Path& path, const v1::Solver& messa
   return solver;
 }
 
+namespace {
+
+std::optional<std::string> unfitAssembly(const scene::Scene& scene, const scene::Cloth& cloth) {
+  std::uint64_t nodes = 0;
+  for (const scene::Cloth& one : scene.cloths) nodes += scene::isAssembled(one.solver) ? one.nodeCount() : 0;
+  if (nodes > limits::kMaxAssembledNodes)
+    return fmt::format(
+        "assembles its system (CONSTRAINT_PATH_ASSEMBLED), for cloths of at most {} nodes in all; here they "
+        "have {}",
+        limits::kMaxAssembledNodes, nodes);
+  const std::uint64_t entries = scene::systemEntries(cloth);
+  if (entries > limits::kMaxAssembledEntries * cloth.nodeCount())
+    return fmt::format(
+        "assembles its system (CONSTRAINT_PATH_ASSEMBLED), for matrices of at most {} entries a node; this "
+        "one's has {} for {} nodes",
+        limits::kMaxAssembledEntries, entries, cloth.nodeCount());
+  return std::nullopt;
+}
+
+}  // namespace
+
 std::optional<std::string> unfitSolver(const scene::Scene& scene, const scene::Cloth& cloth) {
   if (cloth.solver.kind == scene::SolverKind::massSpring) return std::nullopt;
   if (scene.integrator != scene::Integrator::semiImplicitEuler)
@@ -437,7 +458,7 @@ std::optional<std::string> unfitSolver(const scene::Scene& scene, const scene::C
   if (cloth.nodeCount() > limits::kMaxSolverNodes)
     return fmt::format("solves a system, for at most {} nodes; this cloth has {}", limits::kMaxSolverNodes,
                        cloth.nodeCount());
-  return std::nullopt;
+  return scene::isAssembled(cloth.solver) ? unfitAssembly(scene, cloth) : std::nullopt;
 }
 
 std::optional<std::string> unfitBending(const scene::Scene& scene) {

@@ -20,6 +20,10 @@ float takenBack(const Solver& solver) {
   return solver.takenBack.value_or(solver.kind == SolverKind::acad ? kTakenBack : 1.0f);
 }
 
+bool isAssembled(const Solver& solver) {
+  return solver.kind == SolverKind::constraint && solver.path == ConstraintPath::assembled;
+}
+
 std::uint32_t Cloth::nodeCount() const {
   return mesh ? mesh->nodeCount() : grid.nodeCount();
 }

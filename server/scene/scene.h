@@ -78,6 +78,9 @@ struct Solver {
 inline constexpr float kTakenBack = 0.15f;
 float takenBack(const Solver& solver);
 
+// Whether its system is one of sparse matrices.
+bool isAssembled(const Solver& solver);
+
 // Of h^2 / m, the compliance with which the number of iterations hardly depends on the cloth's size.
 inline constexpr float kRelativeCompliance = 0.01f;
 

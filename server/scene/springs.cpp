@@ -49,6 +49,28 @@ bool isConstraint(const Solver& solver, SpringKind kind) {
          (kind != SpringKind::bend || solver.bendConstraints);
 }
 
+std::vector<SpringLink> systemLinks(const Cloth& cloth) {
+  std::vector<SpringLink> links = springLinks(cloth);
+  const std::vector<std::uint8_t> pinned = pinnedNodes(cloth);
+  const bool all = cloth.solver.kind == SolverKind::implicitEuler;
+  std::erase_if(links, [&](const SpringLink& link) {
+    return (pinned[link.a] != 0 && pinned[link.b] != 0) || (!all && !isConstraint(cloth.solver, link.kind));
+  });
+  return links;
+}
+
+std::uint64_t systemEntries(const Cloth& cloth) {
+  const std::vector<SpringLink> links = systemLinks(cloth);
+  const std::vector<std::uint8_t> pinned = pinnedNodes(cloth);
+  std::vector<std::uint64_t> meeting(cloth.nodeCount(), 0);
+  for (const SpringLink& link : links)
+    for (const std::uint32_t node : {link.a, link.b}) ++meeting[node];
+  std::uint64_t entries = links.size();
+  for (std::uint32_t node = 0; node < cloth.nodeCount(); ++node)
+    if (pinned[node] == 0 && meeting[node] > 0) entries += meeting[node] * (meeting[node] - 1);
+  return entries;
+}
+
 Spring forceOf(const Cloth& cloth, SpringKind kind) {
   if (cloth.solver.kind == SolverKind::xpbd) return {};
   Spring spring = springOf(cloth, kind);

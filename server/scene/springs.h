@@ -33,6 +33,14 @@ const Spring& springOf(const Cloth& cloth, SpringKind kind);
 // too far.
 bool isConstraint(const Solver& solver, SpringKind kind);
 
+// Those that the cloth's linear system is of (its constraints; of implicit Euler all), in the order of
+// springLinks(), but for springs between two nodes that no force moves: they have no part in it.
+std::vector<SpringLink> systemLinks(const Cloth& cloth);
+
+// Entries of the matrix that an assembled path multiplies out of these: where two of them, or one with
+// itself, share a node that can move. A mesh's grow with the square of what meets at a node.
+std::uint64_t systemEntries(const Cloth& cloth);
+
 // As a force: without stiffness where it always is a constraint. Constraints keep their damping, but those of
 // xpbd, which are damped as constraints.
 Spring forceOf(const Cloth& cloth, SpringKind kind);

@@ -6,6 +6,7 @@
 #include <array>
 #include <cassert>
 #include <cstring>
+#include <iterator>
 #include <stdexcept>
 #include <string>
 
@@ -15,6 +16,7 @@
 #include "kernels/compute_normals.h"
 #include "kernels/hash_state.h"
 #include "server/simulation/advance_variant.h"
+#include "server/simulation/assembled/assembled_stage.h"
 #include "server/simulation/bending/bending_stage.h"
 #include "server/simulation/collision/collision_stage.h"
 #include "server/simulation/hold/hold_stage.h"
@@ -132,7 +134,7 @@ std::vector<float> massesOf(std::span<const scene::Cloth> cloths) {
 
 // Whether they make the same tables; how systems are solved may differ.
 bool sameTables(const scene::Solver& a, const scene::Solver& b) {
-  return a.kind == b.kind && a.bendConstraints == b.bendConstraints &&
+  return a.kind == b.kind && a.bendConstraints == b.bendConstraints && a.path == b.path &&
          (a.kind == scene::SolverKind::massSpring || a.iterations == b.iterations);
 }
 
@@ -196,7 +198,8 @@ struct ClothSimulation::Pipeline {
 
   const Stage& advance(const AdvanceVariant& variant);
   void prepare(float airDensity);
-  void makeXpbd(std::span<const scene::Cloth> cloths);
+  std::unique_ptr<XpbdStage> makeXpbd(std::span<const scene::Cloth> cloths);
+  std::unique_ptr<AssembledStage> makeAssembled(std::span<const scene::Cloth> cloths);
   void makeBending(std::span<const scene::Cloth> cloths);
   void makeHolds(const HoldTables& tables);
   void setSolvers(std::span<const scene::Cloth> cloths);
@@ -232,6 +235,7 @@ struct ClothSimulation::Pipeline {
   std::unique_ptr<RungeKuttaStage> rungeKutta;  // where that is the integrator
   SolveStage solves;
   std::unique_ptr<XpbdStage> xpbd;                    // where a cloth's solver is that
+  std::unique_ptr<AssembledStage> assembled;          // where a cloth's system is that
   std::unique_ptr<BendingStage> bending;              // where a cloth has it, or had
   bool bends = false;                                 // some has it now
   std::unique_ptr<SelfCollisionStage> selfCollision;  // where a cloth has it
@@ -284,7 +288,8 @@ ClothSimulation::Pipeline::Pipeline(const vulkan::Device& on, const scene::Scene
                                          integrator, cut.workgroupSize);
   if (integrator == scene::Integrator::rungeKutta4)
     rungeKutta = std::make_unique<RungeKuttaStage>(on, stateOf(buffers, collision), offsets);
-  makeXpbd(scene.cloths);
+  xpbd = makeXpbd(scene.cloths);
+  assembled = makeAssembled(scene.cloths);
   makeBending(scene.cloths);
   if (SelfCollisionStage::isIn(scene))
     selfCollision =
@@ -312,12 +317,19 @@ void ClothSimulation::Pipeline::prepare(float airDensity) {
   }
 }
 
-void ClothSimulation::Pipeline::makeXpbd(std::span<const scene::Cloth> cloths) {
+std::unique_ptr<XpbdStage> ClothSimulation::Pipeline::makeXpbd(std::span<const scene::Cloth> cloths) {
   const bool any = std::ranges::any_of(
       cloths, [](const scene::Cloth& cloth) { return cloth.solver.kind == scene::SolverKind::xpbd; });
-  xpbd = any ? std::make_unique<XpbdStage>(device, cloths, stateOf(buffers, collision), asked.workgroupSize,
+  return any ? std::make_unique<XpbdStage>(device, cloths, stateOf(buffers, collision), asked.workgroupSize,
                                            asked.xpbdWholeNodes)
              : nullptr;
+}
+
+std::unique_ptr<AssembledStage> ClothSimulation::Pipeline::makeAssembled(
+    std::span<const scene::Cloth> cloths) {
+  if (!AssembledStage::isIn(cloths)) return nullptr;
+  return std::make_unique<AssembledStage>(device, cloths, stateOf(buffers, collision), asked.workgroupSize,
+                                          asked.solveWholeNodes);
 }
 
 void ClothSimulation::Pipeline::makeBending(std::span<const scene::Cloth> cloths) {
@@ -356,8 +368,11 @@ void ClothSimulation::Pipeline::setSolvers(std::span<const scene::Cloth> cloths)
   if (std::ranges::equal(wanted, solvers, sameTables)) return;
   // Whatever the device has no room for is found before anything changes.
   solves.makeTables(cloths);
-  makeXpbd(cloths);
+  std::unique_ptr<XpbdStage> otherXpbd = makeXpbd(cloths);
+  std::unique_ptr<AssembledStage> otherAssembled = makeAssembled(cloths);
   solves.takeTables();
+  xpbd = std::move(otherXpbd);
+  assembled = std::move(otherAssembled);
   cut.tiles = makeTiles(cloths, cut.rowsPerInvocation, cut.workgroupSize);
   std::ranges::copy(cut.tiles.records, buffers.tileUpload.mapped<shared::TileRecord>().begin());
   if (meshes) meshes->setTiles(meshTiles(cloths, cut.workgroupSize));
@@ -390,6 +405,7 @@ void ClothSimulation::Pipeline::start(vulkan::Recorder& recorder) {
   if (meshes) meshes->recordTables(recorder);
   if (solves.active()) solves.recordTables(recorder);
   if (xpbd) xpbd->recordTables(recorder);
+  if (assembled) assembled->recordTables(recorder);
   if (bending) bending->recordTables(recorder);
   if (selfCollision) selfCollision->recordTables(recorder);
   recorder.barrier();
@@ -471,6 +487,8 @@ void ClothSimulation::Pipeline::recordSubsteps(vulkan::Recorder& recorder, const
                       push);
     }
     if (solves.active()) solves.record(recorder, present, push.collision, substepSeconds);
+    if (assembled)
+      assembled->record(recorder, present, push.collision, substepSeconds, substep + 1 == substeps);
     if (xpbd)
       xpbd->record(recorder, present, xpbdVariantOf(records, collision.active()),
                    {.collision = push.collision,
@@ -492,6 +510,7 @@ void ClothSimulation::Pipeline::recordStatus(vulkan::Recorder& recorder) {
   recorder.copy(buffers.status, buffers.statusReadback, sizeof(shared::StatusRecord), 0,
                 slot * sizeof(shared::StatusRecord));
   if (solves.active()) solves.recordReport(recorder);
+  if (assembled) assembled->recordReport(recorder);
   if (selfCollision) selfCollision->recordReport(recorder, slot);
   if (holds) holds->recordReport(recorder);
   collision.recordTold(recorder);
@@ -564,14 +583,17 @@ std::vector<GripStatus> ClothSimulation::grips() const {
 std::vector<ClothReport> ClothSimulation::report() const {
   assert(pipeline_->report);
   std::vector<ClothReport> reports = pipeline_->report->collect();
-  if (!pipeline_->solves.active()) return reports;
-  const std::span<const shared::SolveRecord> solves = pipeline_->solves.report();
-  for (std::size_t i = 0; i < solves.size(); ++i) {
-    ClothReport& report = reports[pipeline_->solves.cloths()[i]];
-    report.activeConstraints = solves[i].constraints;
-    report.iterations = solves[i].iterations;
-    report.residual = solves[i].residual;
-  }
+  const auto take = [&](const auto& stage) {
+    const std::span<const shared::SolveRecord> solves = stage.report();
+    for (std::size_t i = 0; i < solves.size(); ++i) {
+      ClothReport& report = reports[stage.cloths()[i]];
+      report.activeConstraints = solves[i].constraints;
+      report.iterations = solves[i].iterations;
+      report.residual = solves[i].residual;
+    }
+  };
+  if (pipeline_->solves.active()) take(pipeline_->solves);
+  if (pipeline_->assembled) take(*pipeline_->assembled);
   return reports;
 }
 
@@ -636,8 +658,12 @@ void ClothSimulation::recordRestoreState(vulkan::Recorder& recorder, const State
   pipeline_->recordUploadedState(recorder);
 }
 
-std::span<const shared::SolveRecord> ClothSimulation::solves() const {
-  return pipeline_->solves.active() ? pipeline_->solves.report() : std::span<const shared::SolveRecord>();
+std::vector<shared::SolveRecord> ClothSimulation::solves() const {
+  std::vector<shared::SolveRecord> solves;
+  const auto take = [&](const auto& stage) { std::ranges::copy(stage.report(), std::back_inserter(solves)); };
+  if (pipeline_->solves.active()) take(pipeline_->solves);
+  if (pipeline_->assembled) take(*pipeline_->assembled);
+  return solves;
 }
 
 std::uint32_t ClothSimulation::nodeCount() const {

@@ -83,8 +83,8 @@ class ClothSimulation {
   // Of the last recorded tick, once it is complete.
   TickStatus status() const;
   // Of its last substep: one a cloth that a linear system is solved for; first constraints, then implicit
-  // Euler, each first of grids and first of small ones.
-  std::span<const shared::SolveRecord> solves() const;
+  // Euler, each first of grids and first of small ones; then those whose systems are assembled.
+  std::vector<shared::SolveRecord> solves() const;
 
   // Of the last recorded tick, once it is complete: by colliders, then by cloths. Colliders that did nothing
   // have none.

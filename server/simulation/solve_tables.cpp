@@ -11,17 +11,6 @@
 namespace clothstream::simulation {
 namespace {
 
-std::vector<scene::SpringLink> springsOf(const scene::Cloth& cloth) {
-  std::vector<scene::SpringLink> links = scene::springLinks(cloth);
-  const std::vector<std::uint8_t> pinned = scene::pinnedNodes(cloth);
-  const bool all = cloth.solver.kind == scene::SolverKind::implicitEuler;
-  std::erase_if(links, [&](const scene::SpringLink& link) {
-    return (pinned[link.a] != 0 && pinned[link.b] != 0) ||
-           (!all && !scene::isConstraint(cloth.solver, link.kind));
-  });
-  return links;
-}
-
 // The springs that meet at a node of the cloth, two a record.
 void appendList(std::span<const std::uint32_t> springs, std::span<const scene::SpringLink> links,
                 std::uint32_t node, std::uint32_t firstNode, std::vector<shared::SpringEndsRecord>& lists) {
@@ -39,7 +28,7 @@ void appendList(std::span<const std::uint32_t> springs, std::span<const scene::S
 }
 
 void appendMesh(const scene::Cloth& cloth, std::size_t number, std::uint32_t firstNode, SolveTables& tables) {
-  const std::vector<scene::SpringLink> links = springsOf(cloth);
+  const std::vector<scene::SpringLink> links = scene::systemLinks(cloth);
   for (const scene::SpringLink& link : links)
     tables.springs.push_back(
         {{static_cast<float>(firstNode + link.a), static_cast<float>(firstNode + link.b), link.restLength,
@@ -84,8 +73,8 @@ void appendCloths(std::span<const scene::Cloth> cloths, SolveGroup& group, bool 
   std::uint32_t firstNode = 0;
   for (std::size_t i = 0; i < cloths.size(); firstNode += cloths[i++].nodeCount()) {
     const scene::Cloth& cloth = cloths[i];
-    if (cloth.solver.kind != group.kind || (cloth.mesh != nullptr) != group.mesh ||
-        (cloth.nodeCount() > wholeNodes) != large)
+    if (cloth.solver.kind != group.kind || scene::isAssembled(cloth.solver) ||
+        (cloth.mesh != nullptr) != group.mesh || (cloth.nodeCount() > wholeNodes) != large)
       continue;
     appendSystem(cloth, i, firstNode, tables);
     group.bend = group.bend || group.kind == scene::SolverKind::implicitEuler || cloth.solver.bendConstraints;

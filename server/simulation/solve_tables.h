@@ -37,8 +37,8 @@ struct SolveTables {
   std::uint32_t listed = 0;  // texels of the longest list
 };
 
-// `wholeNodes`: of the largest cloth that one workgroup solves. Of meshes, springs between two pinned nodes
-// are left out: nothing can move there.
+// `wholeNodes`: of the largest cloth that one workgroup solves. Cloths whose systems are assembled are left
+// out (AssembledStage); of meshes, springs between two pinned nodes, where nothing can move.
 SolveTables solveTables(std::span<const scene::Cloth> cloths, std::uint32_t wholeNodes);
 
 }  // namespace clothstream::simulation

@@ -3,7 +3,6 @@
 #ifndef CLOTHSTREAM_SHADERS_SHARED_FIXED_SUMS_GLSL
 #define CLOTHSTREAM_SHADERS_SHARED_FIXED_SUMS_GLSL
 
-#include "shaders/shared/arithmetic.glsl"
 #include "shaders/shared/simulation.h"
 
 // Before gl_WorkGroupSize is used, or it would be 1.
@@ -11,7 +10,7 @@ layout(local_size_x_id = 0) in;
 
 const uint kLanes = CLOTHSTREAM_SOLVE_LANES;
 
-shared float lanes[kLanes];
+shared vec2 lanes[kLanes];
 
 uint self() {
   return gl_LocalInvocationID.x;
@@ -21,25 +20,18 @@ uint width() {
 }
 
 // Of the lanes, written by whoever; every invocation gets it.
-float sumOfLanes() {
+vec2 sumOfLanes() {
   barrier();
   for (uint half_ = kLanes / 2; half_ > 0; half_ /= 2) {
     for (uint lane = self(); lane < half_; lane += width()) {
-      precise float sum = lanes[lane] + lanes[lane + half_];
+      precise vec2 sum = lanes[lane] + lanes[lane + half_];
       lanes[lane] = sum;
     }
     barrier();
   }
-  float sum = lanes[0];
+  vec2 sum = lanes[0];
   barrier();
   return sum;
-}
-
-// What is left of a residual, of its norm at the start; from their squares.
-float relativeNorm(float square, float start) {
-  precise float ratio = square * reciprocal(max(start, 1e-30));
-  precise float norm = ratio * reciprocalSquareRoot(max(ratio, 1e-30));
-  return ratio > 1e-30 ? norm : 0.0;
 }
 
 #endif

@@ -14,11 +14,9 @@
 #extension GL_EXT_control_flow_attributes : require
 
 #include "shaders/shared/arithmetic.glsl"
+#include "shaders/shared/fixed_sums.glsl"
 #include "shaders/shared/simulation.h"
 #include "shaders/shared/whole_number.glsl"
-
-// Before gl_WorkGroupSize is used, or it would be 1.
-layout(local_size_x_id = 0) in;
 
 // Whether springs pull as they will (implicit Euler) or hold their length.
 layout(constant_id = 1) const bool kImplicit = false;
@@ -32,7 +30,6 @@ layout(binding = 0) uniform samplerBuffer cloths;   // ClothRecord
 layout(binding = 1) uniform samplerBuffer systems;  // SystemRecord
 layout(binding = 2) uniform samplerBuffer chunks;   // ChunkRecord
 
-const uint kLanes = CLOTHSTREAM_SOLVE_LANES;
 const uint kWalk = CLOTHSTREAM_SOLVE_WALK;
 
 // The vectors of a solve, which lie one after the other: residual r, w: the preconditioner, 0 for pinned
@@ -45,13 +42,6 @@ const uint kActive = 1, kPrepared = 2;
 // A software device runs what a branch leaves out too, masked, and a loop that tests first once more than it
 // must. Loops over lanes and chunks therefore test last, with a bound of 0 where there is nothing to do;
 // their counts do not differ between invocations, as width() divides kLanes.
-
-uint self() {
-  return gl_LocalInvocationID.x;
-}
-uint width() {
-  return gl_WorkGroupSize.x;
-}
 
 struct System {
   uint number;

@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: MIT
 // The vectors of conjugate gradients, and its two halves: the matrix times the residuals with the dot
-// products of that, and the step that they give. In the form that needs all its sums at once (Chronopoulos
-// and Gear, "s-step iterative methods for symmetric linear systems", 1989, with s = 1); the preconditioner is
-// a number a node.
+// products of that, and the step that they give. The preconditioner is a number a node.
 #ifndef CLOTHSTREAM_SHADERS_SOLVE_VECTORS_GLSL
 #define CLOTHSTREAM_SHADERS_SOLVE_VECTORS_GLSL
 
+#include "shaders/shared/conjugate_gradients.glsl"
 #include "shaders/solve/system.glsl"
 
 layout(binding = 3) uniform samplerBuffer positions;   // at the substep's start; w: inverse mass
@@ -41,23 +40,6 @@ uint vectorAt(uint which, uint node) {
 }
 vec4 fetch(uint which, uint node) {
   return imageLoad(texels, int(vectorAt(which, node)));
-}
-
-shared vec2 lanes[kLanes];
-
-// Of the lanes, written by whoever; every invocation gets it.
-vec2 sumOfLanes() {
-  barrier();
-  for (uint half_ = kLanes / 2; half_ > 0; half_ /= 2) {
-    for (uint lane = self(); lane < half_; lane += width()) {
-      precise vec2 sum = lanes[lane] + lanes[lane + half_];
-      lanes[lane] = sum;
-    }
-    barrier();
-  }
-  vec2 sum = lanes[0];
-  barrier();
-  return sum;
 }
 
 struct Point {
@@ -297,27 +279,10 @@ void takeSums(System system, bool norm) {
   if (self() != 0) {
     return;
   }
-  SolveRecord solve = solves[system.number];
   vec4 solver = texelFetch(cloths, system.cloth + 5);
-  bool first = solve.iterations == 0;
-  if (first) {
-    solve.start = sums.x;
-  }
-  precise float ratio = sums.x * reciprocal(max(solve.start, 1e-30));
-  precise float residual = ratio * reciprocalSquareRoot(max(ratio, 1e-30));
-  solve.residual = ratio > 1e-30 ? residual : 0.0;
-  solve.arrived &= 0xFFFF0000;
-  precise float enough = max(solve.start * solver.z, 1e-30);
-  solve.running = !norm && sums.x > enough && solve.iterations < uint(solver.y) ? 1 : 0;
+  SolveRecord solve = measured(solves[system.number], sums.x, solver, norm);
   if (solve.running != 0) {
-    precise float turn = first ? 0.0 : sums.x * reciprocal(max(solve.square, 1e-30));
-    precise float gained = first ? 0.0 : turn * (sums.x * reciprocal(max(solve.stepLength, 1e-30)));
-    precise float curvature = sums.y - gained;
-    precise float stepLength = sums.x * reciprocal(max(curvature, 1e-30));
-    solve.square = sums.x;
-    solve.turn = turn;
-    solve.stepLength = stepLength;
-    ++solve.iterations;
+    solve = stepped(solve, sums);
   }
   solves[system.number] = solve;
 }

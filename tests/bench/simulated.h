@@ -38,7 +38,7 @@ class Simulated {
   simulation::TickStatus status() const { return simulation_.status(); }
 
   simulation::NodeState state();
-  std::span<const shared::SolveRecord> solves() const { return simulation_.solves(); }
+  std::vector<shared::SolveRecord> solves() const { return simulation_.solves(); }
 
   // Of a tick: all of it on the wall clock, and its advance stage by the device's clock. s.
   const Samples& wall() const { return wall_; }

@@ -42,6 +42,7 @@ Rows runEqualStrain(vulkan::Device& device, const Settings& settings);
 Rows runWorkPrecision(vulkan::Device& device, const Settings& settings);
 Rows runSolvers(vulkan::Device& device, const Settings& settings);
 Rows runEnforcement(vulkan::Device& device, const Settings& settings);
+Rows runAssembled(vulkan::Device& device, const Settings& settings);
 Rows runAcad(vulkan::Device& device, const Settings& settings);
 Rows runCurtain(vulkan::Device& device, const Settings& settings);
 Rows runColliders(vulkan::Device& device, const Settings& settings);

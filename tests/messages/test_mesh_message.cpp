@@ -2,6 +2,7 @@
 // Meshes in messages: there and back, pins, and every refusal.
 #include <cmath>
 #include <functional>
+#include <numbers>
 
 #include <gmock/gmock.h>
 #include <google/protobuf/util/message_differencer.h>
@@ -106,6 +107,27 @@ TEST(MeshMessage, GridsAreAlsoPinnedByVertexAndRegion) {
   ASSERT_FALSE(bad);
   EXPECT_THAT(bad.error().text,
               HasSubstr("cloths[0].pinnedVertices[1] = 100000: must be a whole number from 0 to"));
+}
+
+// A fan: one node where all triangles meet.
+TEST(MeshMessage, WhoseMatrixWouldBeTooLargeIsNotAssembled) {
+  v1::Scene message = smallScene();
+  v1::Cloth& cloth = *message.mutable_cloths(0);
+  cloth.clear_pins();
+  v1::Mesh& mesh = *cloth.mutable_mesh();
+  constexpr std::uint32_t kSpokes = 400;
+  for (std::uint32_t i = 0; i <= kSpokes; ++i) {
+    const float angle = 2 * std::numbers::pi_v<float> * static_cast<float>(i) / kSpokes;
+    for (const float x : {std::cos(angle), std::sin(angle), 0.0f}) mesh.add_positions(i < kSpokes ? x : 0);
+    if (i < kSpokes)
+      for (const std::uint32_t corner : {i, (i + 1) % kSpokes, kSpokes}) mesh.add_triangles(corner);
+  }
+  v1::ConstraintSolver& solver = *cloth.mutable_solver()->mutable_constraint();
+  EXPECT_TRUE(toScene(message));
+  solver.set_path(v1::CONSTRAINT_PATH_ASSEMBLED);
+  const Result<scene::Scene> bad = toScene(message);
+  ASSERT_FALSE(bad);
+  EXPECT_THAT(bad.error().text, HasSubstr("matrices of at most 256 entries a node; this one's has"));
 }
 
 TEST(MeshMessage, IsDescribedToClientsOnce) {

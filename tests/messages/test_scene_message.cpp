@@ -485,6 +485,14 @@ const BadScene kBadScenes[] = {
        s.set_integrator(v1::INTEGRATOR_EXPLICIT_EULER);
      },
      "INTEGRATOR_SEMI_IMPLICIT_EULER"},
+    {"cloths[0].solver: assembles its system (CONSTRAINT_PATH_ASSEMBLED), for cloths of at most 65536 nodes in all; "
+     "here they have 65792",
+     [](v1::Scene& s) {
+       grid(s).set_rows(257);
+       grid(s).set_columns(256);
+       cloth(s).mutable_solver()->mutable_constraint()->set_path(v1::CONSTRAINT_PATH_ASSEMBLED);
+     },
+     "65536"},
     {"stream.normals = 9:",
      [](v1::Scene& s) { s.mutable_stream()->set_normals(static_cast<v1::Normals>(9)); }},
     // 4 springs of 4000 N/m at nodes of 0.03 kg: h < 2 / sqrt(2 * 4 * 4000 / 0.03) s = 1 / 516.4, 7.2 a tick.

@@ -49,6 +49,24 @@ TEST(SpringLinks, AreOrderedAndEachIsThereOnce) {
   }
 }
 
+// Rows of 1 + (d_a - 1) + (d_b - 1) entries, where d springs meet at a node that can move.
+TEST(SystemEntries, AreThoseOfNodesThatCanMove) {
+  Cloth cloth = grid(7, 6);
+  cloth.solver.kind = SolverKind::constraint;
+  cloth.solver.bendConstraints = true;
+  cloth.pins = {{.firstRow = 0, .lastRow = 1, .firstColumn = 0, .lastColumn = 5}};
+  const std::vector<std::uint8_t> pinned = pinnedNodes(cloth);
+  const std::vector<SpringLink> links = systemLinks(cloth);
+  EXPECT_EQ(links.size(), springLinks(cloth).size() - (2 * 5 + 6 + 2 * 5 + 2 * 4));
+  std::uint64_t entries = 0;
+  for (const SpringLink& row : links)
+    for (const SpringLink& column : links)
+      for (const std::uint32_t node : {row.a, row.b})
+        if (pinned[node] == 0 && (node == column.a || node == column.b)) ++entries;
+  for (const SpringLink& row : links) entries -= pinned[row.a] == 0 && pinned[row.b] == 0 ? 1 : 0;
+  EXPECT_EQ(systemEntries(cloth), entries);
+}
+
 TEST(SpringAdjacency, NamesEachSpringAtBothOfItsNodesInTheListsOrder) {
   const std::vector<SpringLink> links = springLinks(grid(5, 5));
   const SpringAdjacency adjacency = springAdjacency(links, 25);

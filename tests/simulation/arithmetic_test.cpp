@@ -12,6 +12,9 @@
 #include "kernels/advance_mass_spring.h"
 #include "kernels/compute_normals.h"
 #include "kernels/evaluate_reciprocal_square_root.h"
+#include "kernels/fill_jacobian.h"
+#include "kernels/multiply_jacobians.h"
+#include "kernels/solve_multipliers.h"
 #include "server/vulkan/kernel.h"
 #include "tests/vulkan/gpu_test.h"
 
@@ -119,6 +122,12 @@ TEST(KernelArithmetic, advanceAddsSubtractsAndMultipliesWithoutContraction) {
 
 TEST(KernelArithmetic, normalsAddSubtractAndMultiplyWithoutContraction) {
   expectExact(kernels::compute_normals);
+}
+
+TEST(KernelArithmetic, assemblyAddsSubtractsAndMultipliesWithoutContraction) {
+  expectExact(kernels::fill_jacobian);
+  expectExact(kernels::multiply_jacobians);
+  expectExact(kernels::solve_multipliers);
 }
 
 }  // namespace

@@ -55,7 +55,7 @@ class Running {
   simulation::StateSnapshot save();
   simulation::NodeState state() { return simulation::unpack(save()); }
   std::vector<scene::Vec3> normals();
-  std::span<const shared::SolveRecord> solves() const { return simulation_.solves(); }
+  std::vector<shared::SolveRecord> solves() const { return simulation_.solves(); }
   std::vector<simulation::ContactStatus> contacts() const { return simulation_.contacts(); }
   std::vector<simulation::GripStatus> grips() const { return simulation_.grips(); }
   // A tick, and what its end is like.

@@ -1,0 +1,189 @@
+// SPDX-License-Identifier: MIT
+// Constraint enforcement on the device with the matrices written out.
+#include "server/simulation/assembled/assembled_stage.h"
+
+#include <algorithm>
+#include <bit>
+#include <vector>
+
+#include "kernels/apply_multipliers.h"
+#include "kernels/fill_jacobian.h"
+#include "kernels/multiply_jacobians.h"
+#include "kernels/multiply_system.h"
+#include "kernels/solve_multipliers.h"
+#include "kernels/update_multipliers.h"
+
+namespace clothstream::simulation {
+namespace {
+
+using vulkan::BindingKind;
+using vulkan::BufferPurpose;
+
+constexpr auto kTexels = BindingKind::texels;
+constexpr auto kImages = BindingKind::images;
+constexpr auto kStorage = BindingKind::storage;
+
+// As SolveStage: a workgroup on a software device is no wider than the CPU's vectors, and an invocation makes
+// 65,535 rounds of loops at most.
+AssembledCut cutAssembled(const vulkan::Device& device, std::uint32_t workgroupSize,
+                          std::optional<std::uint32_t> wholeNodes) {
+  constexpr std::uint32_t kLanes = CLOTHSTREAM_SOLVE_LANES;
+  const bool software = device.isSoftware();
+  if (workgroupSize == 0) workgroupSize = software ? 8 : kLanes;
+  return {
+      .workgroup = std::bit_floor(std::min({workgroupSize, kLanes, device.limits().maxWorkgroupInvocations})),
+      .wholeNodes = wholeNodes.value_or(software ? 4096 : 1024),
+      .rounds = software ? 65'000 : ~0u};
+}
+
+// Bindings want a buffer even of nothing.
+std::size_t texels(std::size_t count) {
+  return std::max<std::size_t>(1, count) * sizeof(shared::vec4);
+}
+
+vulkan::KernelDescription kernel(const char* name, std::span<const std::uint32_t> spirv,
+                                 std::vector<BindingKind> bindings, std::size_t push,
+                                 const AssembledCut& cut) {
+  return {.name = name,
+          .spirv = spirv,
+          .bindings = std::move(bindings),
+          .pushConstantBytes = static_cast<std::uint32_t>(push),
+          .workgroupSize = cut.workgroup,
+          .specialisation = {}};
+}
+
+}  // namespace
+
+bool AssembledStage::isIn(std::span<const scene::Cloth> cloths) {
+  return std::ranges::any_of(cloths, [](const scene::Cloth& cloth) { return isAssembled(cloth.solver); });
+}
+
+AssembledStage::AssembledStage(const vulkan::Device& device, std::span<const scene::Cloth> cloths,
+                               const StateBuffers& state, std::uint32_t workgroupSize,
+                               std::optional<std::uint32_t> wholeNodes)
+    : cut_(cutAssembled(device, workgroupSize, wholeNodes)),
+      tables_(assembledTables(cloths, cut_)),
+      systems_(device, tables_.systems),
+      chunks_(device, tables_.chunks),
+      rows_(device, tables_.rows),
+      entries_(device, tables_.entries),
+      columns_(device, tables_.columns),
+      sources_(device, tables_.sources),
+      nodeEntries_(device, tables_.nodeEntries),
+      nodeRows_(device, tables_.nodeRows),
+      nodeRanges_(device, tables_.nodeRanges),
+      blocks_(device, BufferPurpose::texels, texels(2 * tables_.rows.size())),
+      values_(device, BufferPurpose::texels, texels(tables_.columns.size())),
+      vectors_(device, BufferPurpose::texels, texels(2 * tables_.rows.size())),
+      sums_(device, BufferPurpose::state, tables_.chunks.size() * 2 * sizeof(float)),
+      solves_(device, BufferPurpose::state, tables_.systems.size() * sizeof(shared::SolveRecord)),
+      solvesReadback_(device, BufferPurpose::readback, solves_.bytes()),
+      fill_(device,
+            kernel("fill_jacobian", kernels::fill_jacobian,
+                   {kTexels, kTexels, kTexels, kTexels, kTexels, kTexels, kStorage, kStorage, kStorage},
+                   sizeof(shared::AssemblePush), cut_),
+            {&state.cloths, &systems_.texels(), &chunks_.texels(), &rows_.texels(), state.positions[0],
+             state.velocities[1], &blocks_, &vectors_, &solves_},
+            {&state.cloths, &systems_.texels(), &chunks_.texels(), &rows_.texels(), state.positions[1],
+             state.velocities[0], &blocks_, &vectors_, &solves_}),
+      multiplyJacobians_(
+          device,
+          kernel("multiply_jacobians", kernels::multiply_jacobians,
+                 {kTexels, kTexels, kTexels, kTexels, kTexels, kTexels, kTexels, kStorage}, 0, cut_),
+          {&state.cloths, &systems_.texels(), &chunks_.texels(), &entries_.texels(), &columns_.texels(),
+           &sources_.texels(), &blocks_, &values_}),
+      apply_(device,
+             kernel("apply_multipliers", kernels::apply_multipliers,
+                    {kTexels, kTexels, kTexels, kTexels, kTexels, kTexels, kTexels, kStorage, kStorage,
+                     kTexels, kStorage, kTexels},
+                    sizeof(shared::ApplyMultiplierPush), cut_),
+             {&state.cloths, &nodeRanges_.texels(), &nodeEntries_.texels(), &nodeRows_.texels(),
+              &state.colliders, &state.nearColliders, state.positions[0], state.positions[1],
+              state.velocities[1], &blocks_, &state.toldContacts, &vectors_},
+             {&state.cloths, &nodeRanges_.texels(), &nodeEntries_.texels(), &nodeRows_.texels(),
+              &state.colliders, &state.nearColliders, state.positions[1], state.positions[0],
+              state.velocities[0], &blocks_, &state.toldContacts, &vectors_}) {
+  const auto make = [&](const char* name, std::span<const std::uint32_t> spirv) {
+    return std::make_unique<Pass>(
+        device,
+        kernel(name, spirv,
+               {kTexels, kTexels, kTexels, kTexels, kTexels, kTexels, kImages, kStorage, kStorage, kStorage},
+               sizeof(shared::MultiplierPush), cut_),
+        Stage::Buffers{&state.cloths, &systems_.texels(), &chunks_.texels(), &entries_.texels(),
+                       &columns_.texels(), &values_, &vectors_, &vectors_, &sums_, &solves_});
+  };
+  if (tables_.wholeSystems.count > 0) solve_ = make("solve_multipliers", kernels::solve_multipliers);
+  if (tables_.partChunks.count > 0) {
+    multiply_ = make("multiply_system", kernels::multiply_system);
+    update_ = make("update_multipliers", kernels::update_multipliers);
+  }
+}
+
+void AssembledStage::recordTables(vulkan::Recorder& recorder) const {
+  for (const DeviceTable* table : {&systems_, &chunks_, &rows_, &entries_, &columns_, &sources_,
+                                   &nodeEntries_, &nodeRows_, &nodeRanges_})
+    table->recordUpload(recorder);
+}
+
+// In as many dispatches as the device's limit on loops asks for.
+void AssembledStage::recordWhole(vulkan::Recorder& recorder, bool measures) const {
+  if (!solve_) return;
+  shared::MultiplierPush push{};
+  push.rows = static_cast<std::uint32_t>(tables_.rows.size());
+  const std::uint32_t each = cut_.rounds / tables_.wholeRounds - 1;
+  while (push.firstIteration < tables_.wholeIterations) {
+    push.endIteration = push.firstIteration + std::min(each, tables_.wholeIterations - push.firstIteration);
+    push.measures = measures && push.endIteration == tables_.wholeIterations ? 1 : 0;
+    recorder.barrier();
+    recorder.dispatch(solve_->bindings, push, std::uint64_t{tables_.wholeSystems.count} * cut_.workgroup);
+    push.firstIteration = push.endIteration;
+  }
+}
+
+void AssembledStage::recordParts(vulkan::Recorder& recorder, bool measures) const {
+  if (!multiply_) return;
+  shared::MultiplierPush push{};
+  push.rows = static_cast<std::uint32_t>(tables_.rows.size());
+  push.firstChunk = tables_.partChunks.first;
+  const std::uint64_t threads = std::uint64_t{tables_.partChunks.count} * cut_.workgroup;
+  for (std::uint32_t iteration = 0; iteration < tables_.partIterations; ++iteration)
+    for (const Pass* half : {multiply_.get(), update_.get()}) {
+      recorder.barrier();
+      recorder.dispatch(half->bindings, push, threads);
+    }
+  if (!measures) return;
+  push.measures = 1;
+  recorder.barrier();
+  recorder.dispatch(multiply_->bindings, push, threads);
+}
+
+void AssembledStage::record(vulkan::Recorder& recorder, std::uint32_t from,
+                            const shared::CollisionPush& collision, double substepSeconds,
+                            bool measures) const {
+  const std::uint64_t chunkThreads = std::uint64_t{tables_.chunks.size()} * cut_.workgroup;
+  recorder.barrier();
+  recorder.dispatch(fill_.from[from], shared::AssemblePush{static_cast<float>(1 / substepSeconds)},
+                    chunkThreads);
+  recorder.barrier();
+  recorder.dispatch(multiplyJacobians_.bindings, chunkThreads);
+  recordWhole(recorder, measures);
+  recordParts(recorder, measures);
+  recorder.barrier();
+  recorder.dispatch(apply_.from[from],
+                    shared::ApplyMultiplierPush{.collision = collision,
+                                                .substepSeconds = static_cast<float>(substepSeconds),
+                                                .reserved0 = 0,
+                                                .reserved1 = 0,
+                                                .reserved2 = 0},
+                    std::uint64_t{tables_.nodeRanges.size()} * cut_.workgroup);
+}
+
+void AssembledStage::recordReport(vulkan::Recorder& recorder) const {
+  recorder.copy(solves_, solvesReadback_, solves_.bytes());
+}
+
+std::span<const shared::SolveRecord> AssembledStage::report() const {
+  return solvesReadback_.mapped<const shared::SolveRecord>();
+}
+
+}  // namespace clothstream::simulation

@@ -1,0 +1,172 @@
+// SPDX-License-Identifier: MIT
+// Suite assembled: the constraints' system as the paper has it, sparse matrices that each substep fills and
+// multiplies ([Va21] 3.2.2), beside the matrix-free solve of the same scene, by turns in one run.
+#include <array>
+#include <cmath>
+#include <memory>
+#include <stdexcept>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "server/scene/springs.h"
+#include "tests/bench/bytes_moved.h"
+#include "tests/bench/simulated.h"
+#include "tests/bench/strain.h"
+#include "tests/bench/suite.h"
+
+namespace clothstream::bench {
+namespace {
+
+using scene::ConstraintPath;
+
+constexpr std::uint32_t kSubsteps = 10, kFew = 20, kMany = 40;
+constexpr ConstraintPath kPaths[] = {ConstraintPath::matrixFree, ConstraintPath::assembled};
+// What the sheet may be stretched by while it swings, and in the mean when it hangs; docs/simulation.md.
+constexpr double kMostStrain = 0.05, kMeanStrain = 0.001;
+
+// A square metre of 0.2 kg, hung by its upper edge. No solve ends before its last iteration.
+scene::Scene hungSheet(std::uint32_t size, bool bend, ConstraintPath path, std::uint32_t iterations) {
+  scene::Cloth cloth;
+  cloth.name = "sheet";
+  cloth.grid = {.rows = size, .columns = size, .width = 1, .height = 1, .pose = {}};
+  cloth.mass = 0.2f;
+  cloth.damping = 1;
+  cloth.pins = {{.firstRow = 0, .lastRow = 0, .firstColumn = 0, .lastColumn = size - 1}};
+  cloth.solver.kind = scene::SolverKind::constraint;
+  cloth.solver.path = path;
+  cloth.solver.bendConstraints = bend;
+  cloth.solver.iterations = iterations;
+  cloth.solver.tolerance = 0;
+  scene::Scene scene;
+  scene.name = "assembled";
+  scene.substeps = kSubsteps;
+  scene.cloths = {cloth};
+  return scene;
+}
+
+// Bytes that an iteration reads and writes, each table and vector once.
+double bytesOfIteration(const scene::Cloth& cloth) {
+  constexpr double kTexel = sizeof(shared::vec4);
+  if (!scene::isAssembled(cloth.solver)) {
+    // A node: positions, residuals and two texels of weights are read, a product is written (12 of 16 bytes);
+    // then five vectors are read and four written.
+    return cloth.nodeCount() * (4 * kTexel + 12 + 5 * kTexel + 4 * 12);
+  }
+  // An entry: its column and its value, in fours. A row: where it is listed, its state, and its product; then
+  // both are read, and the state is written.
+  const double rows = static_cast<double>(scene::systemLinks(cloth).size());
+  return static_cast<double>(scene::systemEntries(cloth)) * 8 + rows * (2 * kTexel + 4 + 2 * kTexel + kTexel);
+}
+
+// Bytes that a substep moves to fill J and to multiply it into the matrix: links, positions, velocities;
+// blocks written and read again; columns, sources and values.
+double bytesOfAssembly(const scene::Cloth& cloth) {
+  constexpr double kTexel = sizeof(shared::vec4);
+  const double rows = static_cast<double>(scene::systemLinks(cloth).size());
+  return rows * (kTexel + 2 * kTexel + kTexel) + cloth.nodeCount() * 2 * kTexel + rows * 3 * kTexel +
+         static_cast<double>(scene::systemEntries(cloth)) * 12;
+}
+
+// As suite enforcement: one substep solved to the end against the reference. Returns the iterations it took.
+std::uint32_t check(vulkan::Device& device, const Settings& settings, scene::Scene scene) {
+  scene.substeps = 1;
+  scene.simulationRate = scene.streamRate = 720;
+  scene::Solver& solver = scene.cloths.front().solver;
+  solver.iterations = 2000;
+  solver.tolerance = 1e-5f;
+  const double links = static_cast<double>(scene::springLinks(scene.cloths.front()).size());
+  const double displaced = std::sqrt(links) * 0.4 * double{scene::spacing(scene.cloths.front().grid).column};
+  Simulated simulated(device, scene,
+                      {.workgroupSize = settings.workgroupSize, .solveWholeNodes = settings.solveWholeNodes});
+  simulated.check({scene.environment, {}}, 500 * double{solver.tolerance} * displaced);
+  return simulated.solves().front().iterations;
+}
+
+// A path with few iterations and with many: what is between them is iterations. By the least ticks, as a
+// difference of medians would be of what disturbs the machine.
+struct Contender {
+  std::uint32_t iterationsToConverge;
+  std::unique_ptr<Simulated> few, many;
+
+  double secondsOfIteration() const {
+    return (many->wall().min() - few->wall().min()) / (kSubsteps * (kMany - kFew));
+  }
+};
+
+void checkStrain(const scene::Cloth& cloth, Simulated& simulated, std::uint32_t iterations) {
+  for (const shared::SolveRecord& solve : simulated.solves())
+    if (solve.iterations != iterations)
+      throw std::runtime_error(fmt::format("a solve took {} iterations", solve.iterations));
+  const Samples strains = structuralStrains(cloth, simulated.state());
+  if (!(strains.quantile(1) <= kMostStrain && std::abs(strains.mean()) <= kMeanStrain))
+    throw std::runtime_error(
+        fmt::format("springs are stretched by {}, by {} in the mean", strains.quantile(1), strains.mean()));
+}
+
+Rows measureSize(vulkan::Device& device, const Settings& settings, std::uint32_t size, bool bend) {
+  const simulation::TickInputs inputs{scene::Scene{}.environment, {}};
+  std::array<Contender, 2> contenders;
+  std::vector<Simulated*> all;
+  for (std::size_t i = 0; i < contenders.size(); ++i) {
+    const std::uint32_t iterations = check(device, settings, hungSheet(size, bend, kPaths[i], kFew));
+    const auto make = [&](std::uint32_t most) {
+      auto made = std::make_unique<Simulated>(
+          device, hungSheet(size, bend, kPaths[i], most),
+          simulation::SimulationOptions{.workgroupSize = settings.workgroupSize,
+                                        .solveWholeNodes = settings.solveWholeNodes});
+      made->tick(inputs);
+      made->forgetTimes();
+      all.push_back(made.get());
+      return made;
+    };
+    contenders[i] = {iterations, make(kFew), make(kMany)};
+  }
+  // By turns, so that what disturbs the machine disturbs all alike.
+  double spent = 0;
+  while (spent < 4 * settings.seconds || all.front()->wall().count() < 7)
+    for (Simulated* one : all) spent += secondsOf([&] { one->tick(inputs); });
+
+  Rows rows;
+  for (std::size_t i = 0; i < contenders.size(); ++i) {
+    const Contender& contender = contenders[i];
+    const scene::Scene scene = hungSheet(size, bend, kPaths[i], kFew);
+    const scene::Cloth& cloth = scene.cloths.front();
+    checkStrain(cloth, *contender.few, kFew);
+    checkStrain(cloth, *contender.many, kMany);
+    const bool assembled = scene::isAssembled(cloth.solver);
+    const double bytes = bytesOfIteration(cloth), iteration = contender.secondsOfIteration(),
+                 substep = contender.few->wall().min() / kSubsteps;
+    const auto texels = static_cast<std::size_t>(bytes / (2 * sizeof(shared::vec4)));
+    rows.push_back(
+        {{"suite", "assembled"},
+         {"path", assembled ? "assembled" : "matrix-free"},
+         {"nodes", cloth.nodeCount()},
+         {"springs", scene::systemLinks(cloth).size()},
+         {"bend", bend},
+         {"usPerIteration", iteration * 1e6},
+         {"usPerIterationWithAll", substep / kFew * 1e6},
+         {"usPerIterationWithAllMedian", contender.few->wall().median() / (kSubsteps * kFew) * 1e6},
+         {"usBesideIterations", (substep - kFew * iteration) * 1e6},
+         {"iterationsToConverge", contender.iterationsToConverge},
+         {"kilobytesPerIteration", bytes / 1e3},
+         {"kilobytesToAssemble", assembled ? bytesOfAssembly(cloth) / 1e3 : 0},
+         {"usToMoveItsBytes", secondsToCopyTexels(device, texels) * 1e6},
+         {"strainMean", structuralStrains(cloth, contender.few->state()).mean()},
+         {"ticks", contender.few->wall().count()},
+         {"device", device.info().name}});
+  }
+  return rows;
+}
+
+}  // namespace
+
+Rows runAssembled(vulkan::Device& device, const Settings& settings) {
+  Rows rows;
+  for (const std::uint32_t size : settings.size ? std::vector{*settings.size} : std::vector{32u, 64u})
+    for (const bool bend : {false, true})
+      for (auto& row : measureSize(device, settings, size, bend)) rows.push_back(std::move(row));
+  return rows;
+}
+
+}  // namespace clothstream::bench

@@ -1,0 +1,392 @@
+// SPDX-License-Identifier: MIT
+// Constraints whose matrices are assembled: against the double-precision system and the matrix-free path.
+#include <cmath>
+#include <utility>
+
+#include <gtest/gtest.h>
+
+#include "server/scene/springs.h"
+#include "tests/simulation/scenes.h"
+
+namespace clothstream::tests {
+namespace {
+
+using scene::ConstraintPath;
+using scene::SolverKind;
+using simulation::NodeState;
+using simulation::StateSnapshot;
+
+constexpr double kRounding = 1.0 / (1 << 24);
+constexpr double kExtent = 4;  // m, further than any state here
+
+class Assembled : public GpuTest {};
+
+scene::Cloth assembled(scene::Cloth cloth, bool bendConstraints = false) {
+  cloth.solver.kind = SolverKind::constraint;
+  cloth.solver.path = ConstraintPath::assembled;
+  cloth.solver.bendConstraints = bendConstraints;
+  return cloth;
+}
+
+scene::Scene withPath(scene::Scene scene, ConstraintPath path) {
+  for (scene::Cloth& cloth : scene.cloths) cloth.solver.path = path;
+  return scene;
+}
+
+double rowsOf(const scene::Scene& scene) {
+  double rows = 0;
+  for (const scene::Cloth& cloth : scene.cloths)
+    rows += static_cast<double>(scene::systemLinks(cloth).size());
+  return rows;
+}
+
+// Of a solve that is to be compared.
+constexpr float kTolerance = 1e-6f;
+constexpr std::uint32_t kIterations = 2000;
+
+// Off the solution by what the solve may leave, m. With w the largest inverse mass, c >= 0.01 w and rho what
+// is left of b - A lambda, nodes are off by |M^-1 J^T A^-1 rho| <= |rho| sqrt(w) / (2 sqrt(c)) = 5 |rho|. Of
+// b, as long as `side`, rho is the tolerance, and the rounding of A lambda: entries are good to 1e-6, |A| <=
+// 24 w (J^T J is at most twice the springs of a node), and |lambda| <= 5 |b| / w, as b is as good as all J
+// times something. And b is rounded in two positions of each row.
+double errorOfSolve(double rows, double side) {
+  return 5 * (double{kTolerance} + 1e-6 * 24 * 5) * std::sqrt(rows) * side +
+         5 * std::sqrt(rows) * 2 * kRounding * kExtent;
+}
+
+constexpr double kDisplaced = 0.007;  // of a length, two ends of which are off by up to 2 mm an axis
+
+struct Compared {
+  std::uint32_t iterations = kIterations;
+  float tolerance = kTolerance;
+  std::vector<scene::Pose> attachments = {};
+};
+
+// One substep from a random state.
+void expectLikeReference(scene::Scene scene, unsigned seed, simulation::SimulationOptions options = {},
+                         Compared compared = {}) {
+  scene.substeps = 1;
+  scene.simulationRate = 720;
+  for (scene::Cloth& cloth : scene.cloths) {
+    cloth.solver.iterations = compared.iterations;
+    cloth.solver.tolerance = compared.tolerance;
+  }
+  std::mt19937 random(seed);
+  const NodeState start = randomState(scene, random, 0.002f, 0.5f);
+  simulation::TickInputs inputs = inputsOf(scene);
+  inputs.attachments = compared.attachments;
+  const auto referenceAfter = [&](const scene::Scene& of) {
+    reference::ReferenceSimulation reference(of);
+    setState(reference, start);
+    reference.tick(referenceInputs(inputs));
+    return reference;
+  };
+  Running running(scene, options);
+  running.restore(start);
+  EXPECT_TRUE(running.tick(inputs).healthy);
+  const NodeState state = running.state();
+  const reference::ReferenceSimulation expected = referenceAfter(scene);
+  const double tolerance = errorOfSolve(rowsOf(scene), kDisplaced);
+  EXPECT_LT(largestDistance(state, expected), tolerance);
+  EXPECT_LT(largestSpeedDifference(state, expected), 720 * tolerance);
+  for (const shared::SolveRecord& solve : running.solves()) {
+    EXPECT_LE(solve.iterations, compared.iterations);
+    if (solve.iterations < compared.iterations) {
+      EXPECT_LE(solve.residual, compared.tolerance);
+    }
+  }
+  // Without the solve, or with an iteration less where few are made, it would be elsewhere: the comparison
+  // can fail.
+  for (scene::Cloth& cloth : scene.cloths)
+    if (compared.iterations < kIterations)
+      --cloth.solver.iterations;
+    else
+      cloth.solver.compliance = 1;
+  EXPECT_GT(largestDistance(state, referenceAfter(scene)), 2 * tolerance);
+}
+
+scene::Cloth disc(std::uint32_t rings) {
+  scene::Cloth cloth = assembled(discCloth(rings));
+  cloth.name = "disc";
+  cloth.mass = 0.01f * static_cast<float>(cloth.nodeCount());
+  cloth.pinnedVertices = {0, 1};
+  return cloth;
+}
+
+TEST_F(Assembled, moveNodesAsTheReferenceOnEveryShapeOfGrid) {
+  const std::pair<std::uint32_t, std::uint32_t> shapes[] = {{2, 2}, {2, 7}, {9, 3}, {17, 23}};
+  unsigned seed = 1;
+  for (const auto& [rows, columns] : shapes) {
+    SCOPED_TRACE(::testing::Message() << rows << " x " << columns);
+    scene::Cloth cloth = assembled(calmCloth(rows, columns));
+    cloth.pins = {topRow(cloth)};
+    expectLikeReference(sceneOf({cloth}), seed++);
+  }
+}
+
+TEST_F(Assembled, thatArePulledGentlyMoveNodesAsTheReference) {
+  scene::Cloth cloth = assembled(calmCloth(9, 8));
+  cloth.solver.takenBack = 0.125f;
+  expectLikeReference(sceneOf({cloth}), 8);
+}
+
+TEST_F(Assembled, ofBendSpringsMoveNodesAsTheReference) {
+  expectLikeReference(sceneOf({assembled(calmCloth(12, 11), true)}), 5);
+}
+
+TEST_F(Assembled, ofMeshesMoveNodesAsTheReference) {
+  expectLikeReference(sceneOf({assembled(calmCloth(6, 9)), disc(7)}), 7);
+}
+
+// Attached nodes move at a speed of their own, which is part of b.
+TEST_F(Assembled, followAttachmentsAsTheReferenceDoes) {
+  scene::Cloth cloth = assembled(calmCloth(8, 7));
+  scene::Attachment rod;
+  rod.name = "rod";
+  rod.ranges = {topRow(cloth)};
+  cloth.attachments = {rod};
+  Compared compared;
+  compared.attachments = {{scene::Vec3(0.0006f, 0.0008f, -0.0003f)}};
+  expectLikeReference(sceneOf({cloth}), 11, {}, compared);
+}
+
+TEST_F(Assembled, thatSeveralWorkgroupsSolveMoveNodesAsTheReference) {
+  expectLikeReference(sceneOf({assembled(calmCloth(21, 26)), disc(7)}), 9, {.solveWholeNodes = 0});
+}
+
+// The same iterates, not just the same limit: [Va21] Eq. 12-17. Few enough that rounding has not grown.
+TEST_F(Assembled, goAsFarInFewIterationsAsTheReference) {
+  for (const std::uint32_t wholeNodes : {1'000'000u, 0u})
+    for (const std::uint32_t iterations : {1u, 2u, 4u}) {
+      SCOPED_TRACE(::testing::Message() << iterations << " iterations, " << wholeNodes);
+      expectLikeReference(sceneOf({assembled(calmCloth(13, 9), true)}), 10, {.solveWholeNodes = wholeNodes},
+                          {.iterations = iterations, .tolerance = 0});
+    }
+}
+
+// From a random state, three substeps. What one is off by stays in the velocity: n^2 / 2 times as much after
+// n, of two paths twice that.
+TEST_F(Assembled, moveAsTheMatrixFreePathDoes) {
+  scene::Cloth cloth = assembled(calmCloth(8, 7));
+  cloth.pins = {{.firstRow = 0, .lastRow = 2, .firstColumn = 0, .lastColumn = 6}};
+  scene::Scene scene = sceneOf({cloth, disc(3)});
+  scene.simulationRate = 240;
+  scene.substeps = 3;
+  for (scene::Cloth& one : scene.cloths) {
+    one.solver.iterations = kIterations;
+    one.solver.tolerance = kTolerance;
+  }
+  std::mt19937 random(12);
+  const NodeState start = randomState(scene, random, 0.002f, 0.5f);
+  const auto after = [&](const scene::Scene& of) {
+    Running running(of);
+    running.restore(start);
+    EXPECT_TRUE(running.tick(inputsOf(of)).healthy);
+    return running.state();
+  };
+  const auto apart = [](const NodeState& a, const NodeState& b) {
+    double most = 0;
+    for (std::size_t i = 0; i < a.positions.size(); ++i)
+      most = std::max(most, (a.positions[i] - b.positions[i]).cast<double>().norm());
+    return most;
+  };
+  const double tolerance = 3 * 3 * errorOfSolve(rowsOf(scene), kDisplaced);
+  const NodeState state = after(scene);
+  EXPECT_LT(apart(state, after(withPath(scene, ConstraintPath::matrixFree))), tolerance);
+  for (scene::Cloth& one : scene.cloths) one.solver.compliance = 1;
+  EXPECT_GT(apart(state, after(scene)), 2 * tolerance);
+}
+
+// Of pinned nodes alone there is nothing to solve, and beside others they are no row.
+TEST_F(Assembled, leavePinnedNodesWhereTheyAre) {
+  scene::Cloth stiff = assembled(calmCloth(5, 4), true);
+  stiff.pins = {{.firstRow = 0, .lastRow = 4, .firstColumn = 0, .lastColumn = 3}};
+  scene::Cloth half = assembled(calmCloth(8, 9), true);
+  half.name = "half";
+  half.pins = {{.firstRow = 0, .lastRow = 4, .firstColumn = 0, .lastColumn = 8}};
+  for (const std::uint32_t wholeNodes : {1'000'000u, 0u}) {
+    const scene::Scene scene = sceneOf({stiff, half});
+    Running running(scene, {.solveWholeNodes = wholeNodes});
+    std::vector<simulation::ClothReport> reports;
+    for (int tick = 0; tick < 10; ++tick) reports = running.tickAndReport(inputsOf(scene));
+    EXPECT_EQ(reports[0].activeConstraints, 0u);
+    EXPECT_EQ(reports[0].iterations, 0u);
+    EXPECT_EQ(reports[1].activeConstraints, scene::systemLinks(half).size());
+    EXPECT_GT(reports[1].iterations, 0u);
+    const NodeState state = running.state(), start = simulation::restState(scene.cloths);
+    const std::vector<float> masses = simulation::inverseMasses(scene.cloths);
+    for (std::size_t i = 0; i < masses.size(); ++i)
+      if (masses[i] == 0) {
+        EXPECT_EQ(state.positions[i], start.positions[i]) << i;
+      }
+  }
+}
+
+// [Va21]'s system, singular, and in general without a solution: few iterations hold a sheet. More of them
+// throw its nodes about, in double precision too.
+TEST_F(Assembled, withoutComplianceHoldASheetInFewIterations) {
+  scene::Cloth cloth = assembled(calmCloth(20, 20), true);
+  cloth.pins = {topRow(cloth)};
+  cloth.damping = 2;
+  cloth.solver.compliance = 0;
+  scene::Scene scene = sceneOf({cloth});
+  std::mt19937 random(4);
+  const NodeState start = randomState(scene, random, 0.002f, 0.5f);
+  Running running(scene);
+  running.restore(start);
+  std::vector<simulation::ClothReport> reports;
+  for (int tick = 0; tick < 30; ++tick) reports = running.tickAndReport(inputsOf(scene));
+  EXPECT_LT(reports[0].strainMax, 0.01f);
+
+  scene.cloths[0].solver.iterations = 200;
+  reference::ReferenceSimulation reference(scene);
+  setState(reference, start);
+  reference.tick(referenceInputs(inputsOf(scene)));
+  EXPECT_GT(reference.cloths().front().strain().max, 1);
+}
+
+// Grids and meshes, large and small, beside cloths of other solvers; and a ball.
+scene::Scene systems() {
+  scene::Cloth held = assembled(calmCloth(37, 29), true);
+  held.pins = {topRow(held)};
+  held.name = "held";
+  scene::Cloth free = calmCloth(9, 14);
+  free.name = "free";
+  free.pins = {topRow(free)};
+  scene::Cloth small = assembled(calmCloth(5, 3));
+  small.name = "small";
+  small.solver.tolerance = 0.1f;
+  scene::Cloth other = small;
+  other.name = "other";
+  other.solver.path = ConstraintPath::matrixFree;
+  scene::Cloth round = disc(10);
+  round.solver.iterations = 7;
+  scene::Scene scene = sceneOf({held, free, round, other, small});
+  scene.substeps = 4;
+  return scene;
+}
+
+simulation::TickInputs inputsAt(const scene::Scene& scene, int tick) {
+  const auto place = [](int t) {
+    return scene::Pose{scene::Vec3(0.02f, -0.15f, 0.2f - 0.005f * static_cast<float>(t % 80))};
+  };
+  return inputsOf(scene, {{scene::Sphere{0.08f}, place(tick), place(tick + 1), 1}});
+}
+
+TEST_F(Assembled, giveTheSameBitsHoweverTheWorkIsCut) {
+  const scene::Scene scene = systems();
+  std::uint64_t first = 0;
+  for (const auto& [workgroup, wholeNodes] :
+       {std::pair{8u, 1'000'000u}, {8u, 0u}, {0u, 700u}, {16u, 700u}, {64u, 0u}, {100u, 1'000'000u}}) {
+    SCOPED_TRACE(::testing::Message() << workgroup << ", " << wholeNodes);
+    Running running(scene, {.workgroupSize = workgroup, .solveWholeNodes = wholeNodes});
+    simulation::TickStatus status;
+    for (int tick = 0; tick < 10; ++tick) status = running.tick(inputsAt(scene, tick));
+    EXPECT_TRUE(status.healthy);
+    if (first == 0) first = status.stateHash;
+    EXPECT_EQ(status.stateHash, first);
+  }
+}
+
+TEST_F(Assembled, reportTheSameWhoeverSolves) {
+  const scene::Scene scene = systems();
+  Running whole(scene, {.solveWholeNodes = 1'000'000}), parts(scene, {.solveWholeNodes = 0});
+  for (int tick = 0; tick < 10; ++tick) {
+    const auto one = whole.tickAndReport(inputsAt(scene, tick)),
+               other = parts.tickAndReport(inputsAt(scene, tick));
+    for (std::size_t i = 0; i < one.size(); ++i) {
+      SCOPED_TRACE(::testing::Message() << scene.cloths[i].name << ", tick " << tick);
+      EXPECT_EQ(one[i].iterations, other[i].iterations);
+      EXPECT_EQ(one[i].residual, other[i].residual);
+      EXPECT_EQ(one[i].activeConstraints, other[i].activeConstraints);
+      EXPECT_LE(one[i].iterations, scene.cloths[i].solver.iterations);
+      if (one[i].iterations < scene.cloths[i].solver.iterations) {
+        EXPECT_LE(one[i].residual, scene.cloths[i].solver.tolerance);
+      }
+      if (scene::isAssembled(scene.cloths[i].solver)) {
+        EXPECT_EQ(one[i].activeConstraints, scene::systemLinks(scene.cloths[i]).size());
+        EXPECT_GT(one[i].iterations, 0u);
+      }
+    }
+  }
+  EXPECT_EQ(whole.solves().size(), 4u);
+}
+
+// More iterations than a dispatch may make where one workgroup solves.
+TEST_F(Assembled, giveTheSameBitsInSeveralDispatches) {
+  scene::Cloth cloth = assembled(calmCloth(37, 29), true);
+  cloth.pins = {topRow(cloth)};
+  cloth.solver.iterations = 150;
+  cloth.solver.tolerance = 0;
+  const scene::Scene scene = sceneOf({cloth});
+  Running whole(scene, {.solveWholeNodes = 1'000'000}), parts(scene, {.solveWholeNodes = 0});
+  for (int tick = 0; tick < 3; ++tick)
+    ASSERT_EQ(whole.tick(inputsOf(scene)).stateHash, parts.tick(inputsOf(scene)).stateHash);
+  EXPECT_EQ(whole.solves().front().iterations, 150u);
+  EXPECT_EQ(whole.solves().front().residual, parts.solves().front().residual);
+}
+
+TEST_F(Assembled, giveTheSameHashesInRunsOfAThousandTicks) {
+  scene::Scene scene = systems();
+  scene.substeps = 1;
+  scene.simulationRate = 288;
+  for (scene::Cloth& cloth : scene.cloths) cloth.solver.iterations = 4;
+  Running one(scene), again(scene), other(scene, {.workgroupSize = 16, .solveWholeNodes = 0});
+  for (int tick = 0; tick < 1000; ++tick) {
+    const simulation::TickInputs inputs = inputsAt(scene, tick);
+    const simulation::TickStatus status = one.tick(inputs);
+    ASSERT_TRUE(status.healthy) << tick;
+    ASSERT_EQ(again.tick(inputs).stateHash, status.stateHash) << tick;
+    if (tick < 100) {
+      ASSERT_EQ(other.tick(inputs).stateHash, status.stateHash) << tick;
+    }
+  }
+}
+
+// The same number on every device.
+TEST_F(Assembled, reachTheHashOfEveryOtherDevice) {
+  const scene::Scene scene = systems();
+  Running running(scene, {.solveWholeNodes = 700});
+  simulation::TickStatus status;
+  for (int tick = 0; tick < 12; ++tick) status = running.tick(inputsAt(scene, tick));
+  EXPECT_EQ(status.stateHash, 0x2cdc132fea593d4cu);
+}
+
+// Back and forth: the state stays to the bit, and goes on to the bit as one that always had this path would
+// from the same state.
+TEST_F(Assembled, takeOverFromTheMatrixFreePathWithoutAJump) {
+  scene::Scene scene = sceneOf({assembled(calmCloth(14, 11)), disc(5)});
+  scene.cloths[0].pins = {topRow(scene.cloths[0])};
+  const simulation::TickInputs inputs = inputsAt(scene, 30);
+  scene = withPath(scene, ConstraintPath::matrixFree);
+  Running changing(scene);
+  for (int tick = 0; tick < 6; ++tick) changing.tick(inputs);
+  for (const ConstraintPath path :
+       {ConstraintPath::assembled, ConstraintPath::matrixFree, ConstraintPath::assembled}) {
+    scene = withPath(scene, path);
+    scene.cloths[0].solver.bendConstraints = !scene.cloths[0].solver.bendConstraints;
+    const StateSnapshot kept = changing.save();
+    changing.setCloths(scene.cloths);
+    EXPECT_EQ(changing.save().bytes, kept.bytes);
+    Running always(scene);
+    always.restore(kept);
+    for (int tick = 0; tick < 6; ++tick) {
+      const simulation::TickStatus status = changing.tick(inputs);
+      ASSERT_TRUE(status.healthy);
+      ASSERT_EQ(status.stateHash, always.tick(inputs).stateHash) << "tick " << tick;
+    }
+    EXPECT_EQ(changing.solves().size(), 2u);
+  }
+  // Another mass and compliance need no other tables.
+  scene.cloths[0].mass *= 3;
+  scene.cloths[1].solver.compliance = 1e-6f;
+  const StateSnapshot kept = changing.save();
+  changing.setCloths(scene.cloths);
+  Running always(scene);
+  always.restore(kept);
+  for (int tick = 0; tick < 3; ++tick)
+    ASSERT_EQ(changing.tick(inputs).stateHash, always.tick(inputs).stateHash) << "tick " << tick;
+}
+
+}  // namespace
+}  // namespace clothstream::tests
