@@ -27,6 +27,7 @@
 #include "server/simulation/self_collision/self_collision_stage.h"
 #include "server/simulation/solve_stage.h"
 #include "server/simulation/stage.h"
+#include "server/simulation/state_memory.h"
 #include "server/simulation/xpbd_stage.h"
 #include "server/vulkan/kernel.h"
 
@@ -80,10 +81,9 @@ bool isBlown(const shared::ClothRecord& cloth) {
 
 // All memory of a scene on the device.
 struct Buffers {
-  Buffers(const vulkan::Device& device, std::size_t nodes, std::size_t clothCount, std::size_t tileCount);
+  Buffers(const vulkan::Device& device, std::uint32_t nodes, std::size_t clothCount, std::size_t tileCount);
 
-  std::array<Buffer, 2> positions, velocities;  // by turns
-  Buffer checkpointPositions, checkpointVelocities;
+  StateMemory state;
   Buffer normals;
   Buffer cloths, tiles, status;
   // What the CPU writes and reads. Inputs and status by turns: a tick may be in flight while the next is
@@ -91,23 +91,17 @@ struct Buffers {
   std::array<Buffer, 2> inputs;  // cloths
   Buffer statusReadback;
   Buffer tileUpload;
-  Buffer stateUpload;    // positions, then velocities
-  Buffer stateReadback;  // the same; made when a state is first saved
 };
 
-Buffers::Buffers(const vulkan::Device& device, std::size_t nodes, std::size_t clothCount,
+Buffers::Buffers(const vulkan::Device& device, std::uint32_t nodes, std::size_t clothCount,
                  std::size_t tileCount)
-    : checkpointPositions(device, BufferPurpose::state, nodes * kTexelBytes),
-      checkpointVelocities(device, BufferPurpose::state, nodes * kTexelBytes),
+    : state(device, nodes),
       normals(device, BufferPurpose::texels, nodes * kTexelBytes),
       cloths(device, BufferPurpose::texels, clothCount * sizeof(shared::ClothRecord)),
       tiles(device, BufferPurpose::texels, std::max<std::size_t>(1, tileCount) * sizeof(shared::TileRecord)),
       status(device, BufferPurpose::state, sizeof(shared::StatusRecord)),
       statusReadback(device, BufferPurpose::readback, 2 * sizeof(shared::StatusRecord)),
-      tileUpload(device, BufferPurpose::upload, tiles.bytes()),
-      stateUpload(device, BufferPurpose::upload, 2 * nodes * kTexelBytes) {
-  for (Buffer& buffer : positions) buffer = Buffer(device, BufferPurpose::texels, nodes * kTexelBytes);
-  for (Buffer& buffer : velocities) buffer = Buffer(device, BufferPurpose::texels, nodes * kTexelBytes);
+      tileUpload(device, BufferPurpose::upload, tiles.bytes()) {
   for (Buffer& buffer : inputs) buffer = Buffer(device, BufferPurpose::upload, cloths.bytes());
 }
 
@@ -116,8 +110,8 @@ StateBuffers stateOf(const Buffers& b, const CollisionStage& collision) {
           .colliders = collision.colliders(),
           .nearColliders = collision.nearLists(),
           .toldContacts = collision.toldContacts(),
-          .positions = {&b.positions[0], &b.positions[1]},
-          .velocities = {&b.velocities[0], &b.velocities[1]}};
+          .positions = {&b.state.positions[0], &b.state.positions[1]},
+          .velocities = {&b.state.velocities[0], &b.state.velocities[1]}};
 }
 
 std::vector<scene::Solver> solversOf(std::span<const scene::Cloth> cloths) {
@@ -160,12 +154,12 @@ std::unique_ptr<Stage> makeAdvance(const vulkan::Device& device, const Buffers& 
                                 .pushConstantBytes = sizeof(shared::AdvancePush),
                                 .workgroupSize = cut.workgroupSize,
                                 .specialisation = variant.specialisation(cut.rowsPerInvocation, integrator)},
-      std::initializer_list<const Buffer*>{&b.cloths, &b.tiles, &b.positions[0], &b.velocities[0],
-                                           &b.positions[1], &b.velocities[1], &c.colliders(), &c.nearLists(),
-                                           &c.toldContacts()},
-      std::initializer_list<const Buffer*>{&b.cloths, &b.tiles, &b.positions[1], &b.velocities[1],
-                                           &b.positions[0], &b.velocities[0], &c.colliders(), &c.nearLists(),
-                                           &c.toldContacts()});
+      std::initializer_list<const Buffer*>{&b.cloths, &b.tiles, &b.state.positions[0], &b.state.velocities[0],
+                                           &b.state.positions[1], &b.state.velocities[1], &c.colliders(),
+                                           &c.nearLists(), &c.toldContacts()},
+      std::initializer_list<const Buffer*>{&b.cloths, &b.tiles, &b.state.positions[1], &b.state.velocities[1],
+                                           &b.state.positions[0], &b.state.velocities[0], &c.colliders(),
+                                           &c.nearLists(), &c.toldContacts()});
 }
 
 Stage makeNormals(const vulkan::Device& device, const Buffers& b, const Cut& cut) {
@@ -176,7 +170,8 @@ Stage makeNormals(const vulkan::Device& device, const Buffers& b, const Cut& cut
        .bindings = {BindingKind::texels, BindingKind::texels, BindingKind::texels, BindingKind::storage},
        .workgroupSize = cut.workgroupSize,
        .specialisation = {cut.rowsPerInvocation}},
-      {&b.cloths, &b.tiles, &b.positions[0], &b.normals}, {&b.cloths, &b.tiles, &b.positions[1], &b.normals});
+      {&b.cloths, &b.tiles, &b.state.positions[0], &b.normals},
+      {&b.cloths, &b.tiles, &b.state.positions[1], &b.normals});
 }
 
 Stage makeHash(const vulkan::Device& device, const Buffers& b, const Cut& cut) {
@@ -187,8 +182,8 @@ Stage makeHash(const vulkan::Device& device, const Buffers& b, const Cut& cut) {
                 .pushConstantBytes = sizeof(shared::HashPush),
                 .workgroupSize = cut.workgroupSize,
                 .specialisation = {}},
-               {&b.positions[0], &b.velocities[0], &b.status},
-               {&b.positions[1], &b.velocities[1], &b.status});
+               {&b.state.positions[0], &b.state.velocities[0], &b.status},
+               {&b.state.positions[1], &b.state.velocities[1], &b.status});
 }
 
 }  // namespace
@@ -212,8 +207,6 @@ struct ClothSimulation::Pipeline {
                      Follow follow, shared::AdvancePush push);
   void recordRungeKutta(vulkan::Recorder& recorder, const TickInputs& inputs, shared::AdvancePush push);
   void recordStatus(vulkan::Recorder& recorder);
-  void writeState(const NodeState& state);
-  void recordUploadedState(vulkan::Recorder& recorder);
 
   const vulkan::Device& device;
   std::span<const std::uint32_t> advanceSpirv;
@@ -271,8 +264,8 @@ ClothSimulation::Pipeline::Pipeline(const vulkan::Device& on, const scene::Scene
       cut(cutScene(on, scene, options)),
       buffers(on, nodes, records.size(), cut.tiles.records.size()),
       collision(on, nodes, static_cast<std::uint32_t>(records.size()),
-                {&buffers.positions[0], &buffers.positions[1]},
-                {&buffers.velocities[0], &buffers.velocities[1]}),
+                {&buffers.state.positions[0], &buffers.state.positions[1]},
+                {&buffers.state.velocities[0], &buffers.state.velocities[1]}),
       normals(makeNormals(on, buffers, cut)),
       hash(makeHash(on, buffers, cut)),
       solves(on, scene.cloths, stateOf(buffers, collision), options.workgroupSize, options.solveWholeNodes),
@@ -281,7 +274,7 @@ ClothSimulation::Pipeline::Pipeline(const vulkan::Device& on, const scene::Scene
       asked(options) {
   std::ranges::copy(cut.tiles.records, buffers.tileUpload.mapped<shared::TileRecord>().begin());
   std::memcpy(buffers.inputs[slot].mapped().data(), records.data(), buffers.cloths.bytes());
-  writeState(restState(scene.cloths));
+  buffers.state.write(restState(scene.cloths), masses);
   const MeshTables meshTables = simulation::meshTables(scene.cloths, cut.workgroupSize);
   if (!meshTables.nodes.empty())
     meshes = std::make_unique<MeshStage>(on, meshTables, stateOf(buffers, collision), buffers.normals,
@@ -347,22 +340,6 @@ const Stage& ClothSimulation::Pipeline::advance(const AdvanceVariant& variant) {
   return *stage;
 }
 
-void ClothSimulation::Pipeline::writeState(const NodeState& state) {
-  const std::span<shared::vec4> texels = buffers.stateUpload.mapped<shared::vec4>();
-  for (std::uint32_t i = 0; i < nodes; ++i) {
-    texels[i] = texel(state.positions[i], masses[i]);
-    texels[nodes + i] = texel(state.velocities[i], 0);
-  }
-}
-
-void ClothSimulation::Pipeline::recordUploadedState(vulkan::Recorder& recorder) {
-  const std::size_t half = nodes * kTexelBytes;
-  recorder.copy(buffers.stateUpload, buffers.positions[present], half);
-  recorder.copy(buffers.stateUpload, buffers.velocities[present], half, half);
-  recorder.copy(buffers.stateUpload, buffers.checkpointPositions, half);
-  recorder.copy(buffers.stateUpload, buffers.checkpointVelocities, half, half);
-}
-
 void ClothSimulation::Pipeline::setSolvers(std::span<const scene::Cloth> cloths) {
   std::vector<scene::Solver> wanted = solversOf(cloths);
   if (std::ranges::equal(wanted, solvers, sameTables)) return;
@@ -384,7 +361,7 @@ void ClothSimulation::Pipeline::makeMassStage() {
   if (massChange) return;
   const Buffers& b = buffers;
   massChange = std::make_unique<MassStage>(
-      device, nodes, std::array{&b.positions[0], &b.positions[1], &b.checkpointPositions});
+      device, nodes, std::array{&b.state.positions[0], &b.state.positions[1], &b.state.checkpointPositions});
 }
 
 void ClothSimulation::Pipeline::setMasses(std::span<const scene::Cloth> cloths) {
@@ -399,7 +376,7 @@ void ClothSimulation::Pipeline::start(vulkan::Recorder& recorder) {
   if (started && tabled && weighed) return;
   if (!started) {
     recorder.copy(buffers.inputs[slot], buffers.cloths, buffers.cloths.bytes());
-    recordUploadedState(recorder);
+    buffers.state.recordUpload(recorder, present);
   }
   recorder.copy(buffers.tileUpload, buffers.tiles, buffers.tiles.bytes());
   if (meshes) meshes->recordTables(recorder);
@@ -610,40 +587,24 @@ TickStatus ClothSimulation::status() const {
 
 void ClothSimulation::recordCheckpoint(vulkan::Recorder& recorder) {
   pipeline_->start(recorder);
-  const Buffers& buffers = pipeline_->buffers;
   recorder.beginStage("checkpoint");
-  recorder.copy(buffers.positions[pipeline_->present], buffers.checkpointPositions, buffers.normals.bytes());
-  recorder.copy(buffers.velocities[pipeline_->present], buffers.checkpointVelocities,
-                buffers.normals.bytes());
+  pipeline_->buffers.state.recordCheckpoint(recorder, pipeline_->present);
 }
 
 void ClothSimulation::recordRollback(vulkan::Recorder& recorder) {
   pipeline_->start(recorder);
-  const Buffers& buffers = pipeline_->buffers;
   recorder.beginStage("checkpoint");
-  recorder.copy(buffers.checkpointPositions, buffers.positions[pipeline_->present], buffers.normals.bytes());
-  recorder.copy(buffers.checkpointVelocities, buffers.velocities[pipeline_->present],
-                buffers.normals.bytes());
+  pipeline_->buffers.state.recordRollback(recorder, pipeline_->present);
 }
 
 void ClothSimulation::recordSaveState(vulkan::Recorder& recorder) {
   pipeline_->start(recorder);
-  Buffers& buffers = pipeline_->buffers;
-  const std::size_t half = pipeline_->nodes * kTexelBytes;
-  if (buffers.stateReadback.bytes() == 0)
-    buffers.stateReadback = Buffer(pipeline_->device, BufferPurpose::readback, 2 * half);
   recorder.beginStage("state");
-  recorder.copy(buffers.positions[pipeline_->present], buffers.stateReadback, half);
-  recorder.copy(buffers.velocities[pipeline_->present], buffers.stateReadback, half, 0, half);
+  pipeline_->buffers.state.recordSave(recorder, pipeline_->present);
 }
 
 StateSnapshot ClothSimulation::collectState(std::uint64_t tick) const {
-  const std::span<const shared::vec4> texels = pipeline_->buffers.stateReadback.mapped<const shared::vec4>();
-  assert(!texels.empty());
-  NodeState state;
-  for (const shared::vec4& p : texels.first(pipeline_->nodes)) state.positions.emplace_back(p.x, p.y, p.z);
-  for (const shared::vec4& v : texels.last(pipeline_->nodes)) state.velocities.emplace_back(v.x, v.y, v.z);
-  return pack(state, tick);
+  return pack(pipeline_->buffers.state.collect(), tick);
 }
 
 void ClothSimulation::recordRestoreState(vulkan::Recorder& recorder, const StateSnapshot& snapshot) {
@@ -653,9 +614,9 @@ void ClothSimulation::recordRestoreState(vulkan::Recorder& recorder, const State
         fmt::format("a snapshot of {} bytes is of another scene: this one's {} nodes take {}",
                     snapshot.bytes.size(), pipeline_->nodes, expected));
   pipeline_->start(recorder);
-  pipeline_->writeState(unpack(snapshot));
+  pipeline_->buffers.state.write(unpack(snapshot), pipeline_->masses);
   recorder.beginStage("state");
-  pipeline_->recordUploadedState(recorder);
+  pipeline_->buffers.state.recordUpload(recorder, pipeline_->present);
 }
 
 std::vector<shared::SolveRecord> ClothSimulation::solves() const {
@@ -673,7 +634,7 @@ std::span<const std::uint32_t> ClothSimulation::clothOffsets() const {
   return pipeline_->offsets;
 }
 const Buffer& ClothSimulation::positions(std::uint32_t index) const {
-  return pipeline_->buffers.positions[index];
+  return pipeline_->buffers.state.positions[index];
 }
 std::uint32_t ClothSimulation::presentIndex() const {
   return pipeline_->present;

@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: MIT
+// The state of a scene on the device.
+#include "server/simulation/state_memory.h"
+
+#include <cassert>
+
+#include "shaders/shared/types.h"
+
+namespace clothstream::simulation {
+namespace {
+
+using vulkan::Buffer;
+using vulkan::BufferPurpose;
+
+shared::vec4 texel(const scene::Vec3& v, float w) {
+  return {v.x(), v.y(), v.z(), w};
+}
+
+}  // namespace
+
+StateMemory::StateMemory(const vulkan::Device& device, std::uint32_t nodes)
+    : checkpointPositions(device, BufferPurpose::state, nodes * sizeof(shared::vec4)),
+      checkpointVelocities(device, BufferPurpose::state, bytes()),
+      device_(device),
+      nodes_(nodes),
+      upload_(device, BufferPurpose::upload, 2 * bytes()) {
+  for (Buffer& buffer : positions) buffer = Buffer(device, BufferPurpose::texels, bytes());
+  for (Buffer& buffer : velocities) buffer = Buffer(device, BufferPurpose::texels, bytes());
+}
+
+void StateMemory::write(const NodeState& state, std::span<const float> inverseMasses) {
+  const std::span<shared::vec4> texels = upload_.mapped<shared::vec4>();
+  for (std::uint32_t i = 0; i < nodes_; ++i) {
+    texels[i] = texel(state.positions[i], inverseMasses[i]);
+    texels[nodes_ + i] = texel(state.velocities[i], 0);
+  }
+}
+
+void StateMemory::recordUpload(vulkan::Recorder& recorder, std::uint32_t present) const {
+  recorder.copy(upload_, positions[present], bytes());
+  recorder.copy(upload_, velocities[present], bytes(), bytes());
+  recorder.copy(upload_, checkpointPositions, bytes());
+  recorder.copy(upload_, checkpointVelocities, bytes(), bytes());
+}
+
+void StateMemory::recordCheckpoint(vulkan::Recorder& recorder, std::uint32_t present) const {
+  recorder.copy(positions[present], checkpointPositions, bytes());
+  recorder.copy(velocities[present], checkpointVelocities, bytes());
+}
+
+void StateMemory::recordRollback(vulkan::Recorder& recorder, std::uint32_t present) const {
+  recorder.copy(checkpointPositions, positions[present], bytes());
+  recorder.copy(checkpointVelocities, velocities[present], bytes());
+}
+
+void StateMemory::recordSave(vulkan::Recorder& recorder, std::uint32_t present) {
+  if (readback_.bytes() == 0) readback_ = Buffer(device_, BufferPurpose::readback, 2 * bytes());
+  recorder.copy(positions[present], readback_, bytes());
+  recorder.copy(velocities[present], readback_, bytes(), 0, bytes());
+}
+
+NodeState StateMemory::collect() const {
+  const std::span<const shared::vec4> texels = readback_.mapped<const shared::vec4>();
+  assert(!texels.empty());
+  NodeState state;
+  for (const shared::vec4& p : texels.first(nodes_)) state.positions.emplace_back(p.x, p.y, p.z);
+  for (const shared::vec4& v : texels.last(nodes_)) state.velocities.emplace_back(v.x, v.y, v.z);
+  return state;
+}
+
+}  // namespace clothstream::simulation
