@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The two halves of conjugate gradients on the assembled system: the matrix times the residuals (SpMV, [Va21]
-// 3.2.2) with the dot products of that, and the step that they give. There is no preconditioner: so it is the
-// same method as that on the nodes with their masses as one (shaders/solve).
+// 3.2.2) with the dot products of that, and the step that they give. Without preconditioner, as in the paper:
+// the eigenvalues are those of the nodes' system with their masses as one (shaders/solve).
 #ifndef CLOTHSTREAM_SHADERS_ASSEMBLED_MULTIPLIERS_GLSL
 #define CLOTHSTREAM_SHADERS_ASSEMBLED_MULTIPLIERS_GLSL
 

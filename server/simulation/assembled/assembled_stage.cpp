@@ -117,6 +117,11 @@ AssembledStage::AssembledStage(const vulkan::Device& device, std::span<const sce
     multiply_ = make("multiply_system", kernels::multiply_system);
     update_ = make("update_multipliers", kernels::update_multipliers);
   }
+  // By far the largest tables; the device has them.
+  for (std::vector<shared::NumbersRecord>* table : {&tables_.columns, &tables_.sources}) {
+    table->clear();
+    table->shrink_to_fit();
+  }
 }
 
 void AssembledStage::recordTables(vulkan::Recorder& recorder) const {
