@@ -248,18 +248,16 @@ class Decoder:
             self.history = []
         weights = self.read_weights(sections[0], key)
         symbols, bits = Symbols(sections[1]), Bits(sections[2])
-        now = {name: [None] * self.count for name in "RSGQEDM"}
+        now = {name: [None] * self.count for name in "RSGQEDMW"}
         now["rests"] = [False] * self.count
         for weight_class, phase in self.cloths.phases:
             quiet = bits.get(1)
             for start in range(0, len(phase), 64):
-                for four in range(start, min(start + 64, len(phase)), 4):
-                    end = min(four + 4, start + 64, len(phase))
-                    group = phase[four:end]
-                    predicted = [self.predict(now, v, weights[weight_class]) for v in group]
-                    residuals, stays = self.read_residuals(now, group, weight_class // 2, quiet, symbols, bits)
-                    for i, v in enumerate(group):
-                        self.place(now, v, predicted[i], residuals[i], stays[i])
+                group = phase[start:start + 64]
+                predicted = [self.predict(now, v, weights[weight_class]) for v in group]
+                residuals, stays = self.read_residuals(now, group, weight_class // 2, quiet, symbols, bits)
+                for i, v in enumerate(group):
+                    self.place(now, v, predicted[i], residuals[i], stays[i])
         symbols.check_end()
         bits.check_end()
         now["C"] = []
@@ -285,20 +283,20 @@ class Decoder:
         past = lambda name, i: self.past(name, i, v)
         e1, e2, e3 = (past("E", i) for i in (1, 2, 3))
         g1, g2, g3 = (past("G", i) for i in (1, 2, 3))
-        s1, s2, s3 = (past("S", i) for i in (1, 2, 3))
-        d1 = past("D", 1)
-        change = subs(d1, past("D", 2))
-        along = lambda d: sat(shift(add(times(u, d[0]), times(v_, d[1])), 14))
-        across = lambda d: sat(shift(times(n, d[2]), 14))
+        s1 = past("S", 1)
+        moved = sat(shift(sub(s, s1), f)) if self.history else (0, 0, 0)
+        d1, d2 = past("D", 1), past("D", 2)
+        pairs = (w[12], w[14]), (w[12], w[14]), (w[13], w[15])
+        turned = [sat16(a * x + b * (x - y) + 512 >> 10) for (a, b), x, y in zip(pairs, d1, d2)]
         features = [e1, g1, subs(e1, e2), subs(g1, g2), subs(e2, e3), subs(g2, g3), subs(q, past("Q", 1)), subs(g, g1),
-                    past("C", 1), past("C", 2), sat(shift(add(s, times(s1, -2), s2), f)),
-                    sat(shift(add(s1, times(s2, -2), s3), f)), along(d1), across(d1), along(change), across(change)]
+                    past("C", 1), past("C", 2), subs(moved, past("W", 1)), subs(past("W", 1), past("W", 2))]
         total = add(*(times(feature, weight) for feature, weight in zip(features, w)), (1 << 9 - f,) * 3)
         r1 = past("R", 1)
-        prediction = add(s, r1, times(s1, -1), shift(total, 10 - f))
+        prediction = add(s, r1, times(s1, -1), shift(total, 10 - f),
+                         shift(add(*map(times, axes, turned)), 14 - f))
         if self.history and self.history[0]["rests"][v]:
             prediction = r1
-        now["S"][v], now["G"][v], now["Q"][v] = s, g, q
+        now["S"][v], now["G"][v], now["Q"][v], now["W"][v] = s, g, q, moved
         return prediction, axes
 
     def read_residuals(self, now, group, scale_class, quiet, symbols, bits):
@@ -322,7 +320,7 @@ class Decoder:
                     o = e.bit_length() - 1
                     scale = 2 * (o - 2) + (e >> o - 1 & 1)
                     b = 0 if scale < 16 else (scale - 14) // 2
-                    number = symbols.get(i, DISTRIBUTIONS[scale + (24 if c == 2 else 0)])
+                    number = symbols.get(i % 4, DISTRIBUTIONS[scale + (24 if c == 2 else 0)])
                     if number == 15:
                         beyond = bits.gamma(2)
                         if c == 2:

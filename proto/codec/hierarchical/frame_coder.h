@@ -25,9 +25,6 @@ inline constexpr unsigned kWeightGammaBits = 4, kEscapeGammaBits = 2;
 // was in the frame before, and has no other residuals.
 inline constexpr std::uint32_t kStays = 0;
 
-// Vertices that are predicted before the first of them is coded: few enough to stay in the nearest cache.
-inline constexpr std::uint32_t kChunk = 64;
-
 // The first section, where it is not empty, starts with a bit: 1 where nothing follows and all weights are 0
 // in this frame alone, so that what is at rest stays where it is; else changes follow.
 
@@ -36,8 +33,7 @@ inline constexpr std::uint32_t kChunk = 64;
 Weights keyFrameWeights();
 Weights startingWeights();
 
-using WeightVectors = std::array<FeatureVectors, kWeightClasses + 1>;
-WeightVectors weightVectors(const Weights& weights);
+std::array<WeightVectors, kWeightClasses + 1> weightVectors(const Weights& weights);
 
 // The features whose weights a frame of this kind can change.
 constexpr std::size_t firstWeight(bool key) {

@@ -30,8 +30,12 @@ constexpr std::size_t kMaxWeightBytes = kWeightClasses * kFeatures * 4;
 // Of an escape and what stands beside it, at most.
 constexpr std::size_t kMaxExtraBytes = 8;
 
+// Along u, v and n, in steps: of one vertex, and of four.
 struct Local {
   float u, v, n;
+};
+struct Local4 {
+  Float32x4 u, v, n;
 };
 
 double squaredLength(Int32x4 difference) {
@@ -73,20 +77,20 @@ struct HierarchicalEncoder::State {
   }
   void quantise(std::span<const float> positions);
   Local local(const SurfaceFrame& frame, Int32x4 difference) const;
-  Int32x4 choose(const Prediction& prediction, Int32x4 target, std::int32_t* residual) const;
-  void economise(const Local& wish, std::int32_t* residual) const;
+  void choose(std::uint32_t begin, std::size_t first, std::array<Int32x4, 4>& positions);
+  Int32x4 chooseFar(const Prediction& prediction, Int32x4 target, std::int32_t* residual) const;
   bool isAtRest() const;
   std::size_t writeWeights(bool key, std::byte* out);
   bool startsToRest(std::uint32_t slot, const Prediction& prediction);
   bool goesOnResting(std::uint32_t slot, const Prediction& prediction) const;
   void encodePhase(const Phase& phase, BitWriter& bits);
   // Returns whether a residual is not 0.
-  std::int32_t encodeChunk(std::uint32_t begin, std::uint32_t end, std::uint32_t weightClass,
-                           BitWriter& bits);
+  bool encodeChunk(std::uint32_t begin, std::uint32_t count, std::uint32_t weightClass, BitWriter& bits);
+  void rest(std::uint32_t begin, std::size_t first, std::size_t count, std::array<Int32x4, 4>& positions);
+  void codeChunk(std::size_t count, const ScaleModel& model, BitWriter& bits);
   void fitTo(std::uint32_t weightClass, const FeatureVectors& features, const Prediction& prediction,
-             Int32x4 target, const std::uint32_t* magnitudes);
-  void code(Component component, std::uint32_t scale, std::int32_t residual, std::size_t coder,
-            BitWriter& bits);
+             Int32x4 target, std::size_t i);
+  void code(Component component, std::uint32_t scale, std::size_t i, std::size_t coder, BitWriter& bits);
   void note(const Prediction& prediction, std::uint32_t weightClass, std::size_t i);
 
   std::size_t vertices;
@@ -102,15 +106,19 @@ struct HierarchicalEncoder::State {
   std::vector<std::byte> extra;
   WeightFitter fitter;
   Weights weights{};
-  WeightVectors vectors{};
+  Weights used{};  // in this frame
+  std::array<WeightVectors, kWeightClasses + 1> vectors{};
   std::uint32_t frame = 0;  // since the key frame
   bool quiet = false;       // no residual in the newest frame
   std::vector<CodedResidual>* recorded = nullptr;
   // Of the chunk that is being encoded.
-  alignas(16) std::int32_t expected[kChunk][4];
-  std::int32_t residuals[kChunk][kComponents];
-  std::uint32_t magnitudes[kChunk][kComponents];
-  std::array<bool, kChunk> stays;
+  std::array<Prediction, kChunk> predictions;
+  std::array<SurfaceFrames, kChunk / 4> frames;
+  // By component.
+  alignas(16) std::int32_t residuals[kComponents][kChunk];
+  alignas(16) std::int32_t magnitudes[kComponents][kChunk];
+  std::array<bool, kChunk> stays{};
+  std::uint32_t staying = 0;  // how many
 };
 
 void HierarchicalEncoder::State::quantise(std::span<const float> positions) {
@@ -150,15 +158,77 @@ Local HierarchicalEncoder::State::local(const SurfaceFrame& frame_, Int32x4 diff
   return {dot(t), dot(t + 4), dot(n)};
 }
 
-Int32x4 HierarchicalEncoder::State::choose(const Prediction& prediction, Int32x4 target,
-                                           std::int32_t* residual) const {
-  const Local wish = local(prediction.frame, target - prediction.position);
-  residual[kAlongU] = nearest(wish.u);
-  residual[kAlongV] = nearest(wish.v);
-  residual[kAlongNormal] = nearest(wish.n);
-  economise(wish, residual);
+// What is promised is a distance, half the diagonal of a cube of steps: seldom is a vertex in a corner, so
+// that a smaller residual along the surface often serves as well. Along the normal, where the eye looks, the
+// nearest one stays.
+Vectors4 economise(const Local4& wish) {
+  Vectors4 r{wish.u.rounded(), wish.v.rounded(), wish.n.rounded()};
+  Float32x4 u = wish.u - Float32x4::of(r.x), v = wish.v - Float32x4::of(r.y);
+  const Float32x4 n = wish.n - Float32x4::of(r.z);
+  const auto tryLess = [&](Float32x4 wished, Int32x4& residual, Float32x4& error) {
+    const Int32x4 sign = residual.shiftedRight(31) | Int32x4::all(1);
+    const Int32x4 smaller = residual - sign;
+    const Float32x4 moved = wished - Float32x4::of(smaller);
+    const Float32x4 rest = u * u + v * v + n * n - error * error;
+    const Int32x4 stays = (rest + moved * moved > Float32x4::all(0.75f)) | (residual == Int32x4::all(0));
+    residual = select(stays, residual, smaller);
+    error = select(stays, error, moved);
+  };
+  // The one that is farther off first.
+  const Int32x4 uFirst = u.magnitude() > v.magnitude();
+  for (const bool second : {false, true}) {
+    const Int32x4 isU = second ? Int32x4::without(uFirst, Int32x4::all(-1)) : uFirst;
+    Int32x4 residual = select(isU, r.x, r.y);
+    Float32x4 error = select(isU, u, v);
+    tryLess(select(isU, wish.u, wish.v), residual, error);
+    r.x = select(isU, residual, r.x);
+    u = select(isU, error, u);
+    r.y = select(isU, r.y, residual);
+    v = select(isU, v, error);
+  }
+  return r;
+}
+
+// The residuals of four vertices, and where they lead.
+void HierarchicalEncoder::State::choose(std::uint32_t begin, std::size_t first,
+                                        std::array<Int32x4, 4>& positions) {
+  std::array<Int32x4, 4> differences;
+  for (std::size_t i = 0; i < 4; ++i)
+    differences[i] =
+        wanted[std::min(begin + first + i, vertices - 1)].load() - predictions[first + i].position;
+  const Vectors4 d = transposed(differences);
+  const SurfaceFrames& f = frames[first / 4];
+  const Float32x4 scale = Float32x4::all(1.0f / static_cast<float>(1 << (kUnitBits + unit.stepBits)));
+  const Float32x4 x = scale * Float32x4::of(d.x), y = scale * Float32x4::of(d.y),
+                  z = scale * Float32x4::of(d.z);
+  const auto dot = [&](const Vectors4& e) {
+    return Float32x4::of(e.x) * x + Float32x4::of(e.y) * y + Float32x4::of(e.z) * z;
+  };
+  const Vectors4 r = economise({dot(f.u), dot(f.v), dot(f.n)});
+  r.x.store(&residuals[kAlongU][first]);
+  r.y.store(&residuals[kAlongV][first]);
+  r.z.store(&residuals[kAlongNormal][first]);
+  const Vectors4 moved = predictor.moved(f, r);
+  const auto squared = [](Int32x4 a) { return Float32x4::of(a) * Float32x4::of(a); };
+  const Float32x4 distance = squared(d.x - moved.x) + squared(d.y - moved.y) + squared(d.z - moved.z);
+  const int far =
+      (beyond16Bits(r) | (distance > Float32x4::all(static_cast<float>(squaredPromise())))).signs();
+  positions = transposed(moved);
+  for (std::size_t i = 0; i < 4; ++i) {
+    positions[i] = positions[i] + predictions[first + i].position;
+    if ((far >> i & 1) == 0) continue;
+    std::int32_t residual[kComponents];
+    for (std::size_t c = 0; c < kComponents; ++c) residual[c] = residuals[c][first + i];
+    positions[i] =
+        chooseFar(predictions[first + i], predictions[first + i].position + differences[i], residual);
+    for (std::size_t c = 0; c < kComponents; ++c) residuals[c][first + i] = residual[c];
+  }
+}
+
+// The frame is orthonormal to one in thousands: after a long way a second and a third look are needed.
+Int32x4 HierarchicalEncoder::State::chooseFar(const Prediction& prediction, Int32x4 target,
+                                              std::int32_t* residual) const {
   Int32x4 position = predictor.reconstruct(prediction, residual);
-  // The frame is orthonormal to one in thousands: after a long way a second and a third look are needed.
   for (int look = 0; look < 8 && squaredLength(position - target) > squaredPromise(); ++look) {
     const Local rest = local(prediction.frame, target - position);
     residual[kAlongU] += nearest(rest.u);
@@ -167,27 +237,6 @@ Int32x4 HierarchicalEncoder::State::choose(const Prediction& prediction, Int32x4
     position = predictor.reconstruct(prediction, residual);
   }
   return position;
-}
-
-// What is promised is a distance, half the diagonal of a cube of steps: seldom is a vertex in a corner, so
-// that a smaller residual along the surface often serves as well. Along the normal, where the eye looks, the
-// nearest one stays.
-void HierarchicalEncoder::State::economise(const Local& wish, std::int32_t* residual) const {
-  const std::array<float, 3> wishes{wish.u, wish.v, wish.n};
-  std::array<float, 3> error;
-  for (std::size_t c = 0; c < 3; ++c) error[c] = wishes[c] - static_cast<float>(residual[c]);
-  const std::array<std::size_t, 2> order = std::fabs(error[0]) > std::fabs(error[1])
-                                               ? std::array<std::size_t, 2>{0, 1}
-                                               : std::array<std::size_t, 2>{1, 0};
-  for (const std::size_t c : order) {
-    if (residual[c] == 0) continue;
-    const std::int32_t smaller = residual[c] - (residual[c] > 0 ? 1 : -1);
-    const float moved = wishes[c] - static_cast<float>(smaller);
-    const float rest = error[0] * error[0] + error[1] * error[1] + error[2] * error[2] - error[c] * error[c];
-    if (rest + moved * moved > 0.75f) continue;
-    residual[c] = smaller;
-    error[c] = moved;
-  }
 }
 
 // Whether the newest frame serves once more.
@@ -203,7 +252,8 @@ bool HierarchicalEncoder::State::isAtRest() const {
 std::size_t HierarchicalEncoder::State::writeWeights(bool key, std::byte* out) {
   if (key) weights = keyFrameWeights();
   if (!key && isAtRest()) {
-    vectors = weightVectors(Weights{});
+    used = Weights{};
+    vectors = weightVectors(used);
     out[0] = std::byte{1};
     return 1;
   }
@@ -224,7 +274,8 @@ std::size_t HierarchicalEncoder::State::writeWeights(bool key, std::byte* out) {
     }
     bytes = static_cast<std::size_t>(writer.finish() - out);
   }
-  vectors = weightVectors(weights);
+  used = weights;
+  vectors = weightVectors(used);
   return bytes;
 }
 
@@ -248,11 +299,12 @@ void HierarchicalEncoder::State::encodePhase(const Phase& phase, BitWriter& bits
   const BitWriter bitsBefore = bits;
   const std::size_t symbolsBefore = symbols.count();
   bits.put(0, 1);
-  std::int32_t any = 0;
+  bool any = false;
   for (std::uint32_t begin = phase.begin; begin < phase.end; begin += kChunk) {
-    any |= encodeChunk(begin, std::min(begin + kChunk, phase.end), phase.weightClass, bits);
+    const std::uint32_t count = std::min(kChunk, phase.end - begin);
+    any = encodeChunk(begin, count, phase.weightClass, bits) || any;
   }
-  if (any != 0) {
+  if (any) {
     quiet = false;
     return;
   }
@@ -261,56 +313,96 @@ void HierarchicalEncoder::State::encodePhase(const Phase& phase, BitWriter& bits
   symbols.shrink(symbolsBefore);
 }
 
-std::int32_t HierarchicalEncoder::State::encodeChunk(std::uint32_t begin, std::uint32_t end,
-                                                     std::uint32_t weightClass, BitWriter& bits) {
+bool HierarchicalEncoder::State::encodeChunk(std::uint32_t begin, std::uint32_t count,
+                                             std::uint32_t weightClass, BitWriter& bits) {
   const ScaleModel model(kScaleWeights[weightClass / 2]);
   const bool fits = weightClass < kWeightClasses;
   const std::uint32_t stride = fits ? kFitStride[weightClass] : 1;
-  std::int32_t any = 0;
-  for (std::uint32_t slot = begin; slot < end; ++slot) {
-    const std::size_t i = slot - begin;
-    Prediction prediction;
-    FeatureVectors features;
-    predictor.predict(slot, vectors[weightClass], features, prediction);
-    const Int32x4 target = wanted[slot].load();
-    stays[i] = startsToRest(slot, prediction);
-    const bool still = stays[i] || goesOnResting(slot, prediction);
-    if (still) std::memset(residuals[i], 0, sizeof residuals[i]);
-    const Int32x4 position = still ? prediction.last : choose(prediction, target, residuals[i]);
-    any |= stays[i] ? 1 : 0;
+  bool any = false;
+  staying = 0;
+  predictor.predict(begin, count, vectors[weightClass], predictions.data(), frames.data());
+  for (std::size_t first = 0; first < count; first += 4) {
+    const std::size_t four = std::min<std::size_t>(count - first, 4);
+    std::array<Int32x4, 4> positions;
+    choose(begin, first, positions);
+    rest(begin, first, four, positions);
+    Int32x4 counted[kComponents];
     for (std::size_t c = 0; c < kComponents; ++c) {
-      magnitudes[i][c] = countedMagnitude(residuals[i][c]);
-      any |= residuals[i][c];
+      counted[c] = countedMagnitudes(Int32x4::load(&residuals[c][first]));
+      counted[c].store(&magnitudes[c][first]);
     }
-    predictor.place(slot, prediction, position, packMagnitudes(magnitudes[i]));
-    model.expect(prediction).store(expected[i]);
+    alignas(16) std::int32_t packed[4];
+    packMagnitudes(counted[kAlongU], counted[kAlongV], counted[kAlongNormal]).store(packed);
+    for (std::size_t i = 0; i < four; ++i) {
+      any = any || packed[i] != 0;
+      predictor.place(begin + static_cast<std::uint32_t>(first + i), predictions[first + i], positions[i],
+                      static_cast<std::uint32_t>(packed[i]));
+    }
+  }
+  codeChunk(count, model, bits);
+  for (std::uint32_t i = 0; fits && i < count; ++i) {
+    const std::uint32_t slot = begin + i;
     // Others in each frame.
-    if (fits && (slot + frame) % stride == 0) fitTo(weightClass, features, prediction, target, magnitudes[i]);
-    if (recorded != nullptr) note(prediction, weightClass, i);
+    if ((slot + frame) % stride == 0)
+      fitTo(weightClass, predictor.features(slot, predictions[i]), predictions[i], wanted[slot].load(), i);
   }
-  for (std::uint32_t group = begin; group < end; group += kCoders) {
-    const std::uint32_t groupEnd = std::min<std::uint32_t>(group + kCoders, end);
-    for (const Component component : kCodingOrder) {
-      for (std::uint32_t slot = group; slot < groupEnd; ++slot) {
-        const std::size_t i = slot - begin;
-        if (stays[i] && component != kAlongNormal) continue;
-        const std::uint32_t scale = model.scale(component, expected[i][component], magnitudes[i]);
-        if (stays[i]) {
-          bits.putGamma(kStays, kEscapeGammaBits);
-          symbols.add(slot - group, distributionOf(component, scale), kEscape);
-        } else {
-          code(component, scale, residuals[i][component], slot - group, bits);
-        }
-      }
-    }
+  if (recorded != nullptr) {
+    for (std::size_t i = 0; i < count; ++i) note(predictions[i], weightClass, i);
   }
-  return any;
+  return any || staying > 0;
 }
 
-void HierarchicalEncoder::State::code(Component component, std::uint32_t scale, std::int32_t residual,
+// Leaves out the residuals of what rests, or starts to.
+void HierarchicalEncoder::State::rest(std::uint32_t begin, std::size_t first, std::size_t count,
+                                      std::array<Int32x4, 4>& positions) {
+  for (std::size_t i = first; i < first + count; ++i) {
+    const std::uint32_t slot = begin + static_cast<std::uint32_t>(i);
+    stays[i] = startsToRest(slot, predictions[i]);
+    staying += stays[i] ? 1 : 0;
+    if (!stays[i] && !goesOnResting(slot, predictions[i])) continue;
+    positions[i - first] = predictions[i].last;
+    for (std::size_t c = 0; c < kComponents; ++c) residuals[c][i] = 0;
+  }
+}
+
+void HierarchicalEncoder::State::codeChunk(std::size_t count, const ScaleModel& model, BitWriter& bits) {
+  std::array<Vectors4, kChunk / 4> expected;
+  for (std::size_t i = 0; i < count; i += 4) expected[i / 4] = model.expect(&predictions[i]);
+  for (const Component component : kCodingOrder) {
+    for (std::size_t first = 0; first < count; first += 4) {
+      const Vectors4& e = expected[first / 4];
+      const Int32x4 byComponent[]{e.x, e.y, e.z};
+      const Int32x4 scales =
+          model.scales(component, byComponent[component], Int32x4::load(&magnitudes[kAlongNormal][first]),
+                       Int32x4::load(&magnitudes[kAlongU][first]));
+      const Int32x4 residual = Int32x4::load(&residuals[component][first]);
+      const Int32x4 number =
+          Int32x4{simde_mm_xor_si128(residual.shiftedLeft(1).v, residual.shiftedRight(31).v)};
+      const Int32x4 isHard = (scales > Int32x4::all(15)) | (number > Int32x4::all(kEscape - 1)) | number;
+      const std::size_t coder = first % kCoders;
+      if (first + 4 <= count && isHard.signs() == 0 && staying == 0) {
+        symbols.addFour(coder, scales + Int32x4::all(static_cast<std::int32_t>(distributionOf(component, 0))),
+                        number);
+        continue;
+      }
+      alignas(16) std::int32_t scale[4];
+      scales.store(scale);
+      for (std::size_t i = 0; i < 4 && first + i < count; ++i)
+        code(component, static_cast<std::uint32_t>(scale[i]), first + i, coder + i, bits);
+    }
+  }
+}
+
+void HierarchicalEncoder::State::code(Component component, std::uint32_t scale, std::size_t i,
                                       std::size_t coder, BitWriter& bits) {
+  if (stays[i]) {
+    if (component != kAlongNormal) return;
+    bits.putGamma(kStays, kEscapeGammaBits);
+    symbols.add(coder, distributionOf(component, scale), kEscape);
+    return;
+  }
   const unsigned raw = rawBits(scale);
-  const std::uint32_t number = zigzag(residual);
+  const std::uint32_t number = zigzag(residuals[component][i]);
   std::uint32_t symbol = number >> raw;
   if (symbol >= kEscape) {
     bits.putGamma(symbol - kEscape + (component == kAlongNormal ? kStays + 1 : 0), kEscapeGammaBits);
@@ -321,16 +413,17 @@ void HierarchicalEncoder::State::code(Component component, std::uint32_t scale, 
 }
 
 void HierarchicalEncoder::State::fitTo(std::uint32_t weightClass, const FeatureVectors& features,
-                                       const Prediction& prediction, Int32x4 target, const std::uint32_t* m) {
+                                       const Prediction& prediction, Int32x4 target, std::size_t i) {
+  const auto& w = used[weightClass];
   Int32x4 predicted = Int32x4::all(0);
-  for (std::size_t i = 0; i < kFeaturePairs; ++i)
-    predicted = predicted + dotPairs(features[i], vectors[weightClass][i]);
+  for (std::size_t f = 0; f < kFeaturePairs; ++f)
+    predicted = predicted + dotPairs(features[f], Int16x8::allPairs(w[2 * f], w[2 * f + 1]));
   const Int32x4 goal =
       (target - prediction.position).shiftedRight(unit.stepBits - 4) + predicted.shiftedRight(kWeightBits);
   // What is hard to predict here is not to spoil the weights for the rest.
   const std::uint32_t around = prediction.parentMagnitudes;
   const auto near = static_cast<float>((around & 255u) + (around >> 8 & 255u) + (around >> 16 & 255u));
-  const auto own = static_cast<float>(m[0] + m[1] + m[2]);
+  const auto own = static_cast<float>(magnitudes[0][i] + magnitudes[1][i] + magnitudes[2][i]);
   fitter.add(weightClass, features, goal, 1 / (0.15f + 0.1f * own * own + 0.025f * near));
 }
 
@@ -341,8 +434,8 @@ void HierarchicalEncoder::State::note(const Prediction& prediction, std::uint32_
     recorded->push_back({static_cast<std::uint8_t>(c), static_cast<std::uint8_t>(weightClass / 2),
                          byte(prediction.parentMagnitudes), byte(prediction.ringMagnitudes),
                          byte(prediction.lastMagnitudes),
-                         static_cast<std::uint8_t>(magnitudes[i][kAlongNormal]),
-                         static_cast<std::uint8_t>(magnitudes[i][kAlongU]), residuals[i][c]});
+                         static_cast<std::uint8_t>(magnitudes[kAlongNormal][i]),
+                         static_cast<std::uint8_t>(magnitudes[kAlongU][i]), residuals[c][i]});
   }
 }
 

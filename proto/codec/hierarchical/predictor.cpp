@@ -11,8 +11,7 @@ bool Predictor::allocate(const StreamLayout& layout, int stepBits) {
   stepBits_ = stepBits;
   fineBits_ = stepBits - 4;
   const std::size_t vertices = layout.vertexCount();
-  bool allocated =
-      hierarchy_.build(layout) && curvatures_.allocate(vertices) && magnitudes_.allocate(vertices);
+  bool allocated = hierarchy_.build(layout);
   for (Array<Node>& nodes : nodes_) {
     allocated = allocated && nodes.allocate(vertices + 1);
     if (allocated) nodes[vertices] = Node{};
@@ -24,21 +23,37 @@ bool Predictor::allocate(const StreamLayout& layout, int stepBits) {
 void Predictor::begin(bool key) {
   static constexpr Node kNoNode{};
   static constexpr Record kNoRecord{};
-  static constexpr Curvature kNoCurvature{};
-  static constexpr std::uint32_t kNoMagnitudes = 0;
   key_ = key;
   stride_ = key ? 0 : 1;
   pastNodes_ = key ? &kNoNode : nodes_[1].data();
-  pastCurvatures_ = key ? &kNoCurvature : curvatures_.data();
-  pastMagnitudes_ = key ? &kNoMagnitudes : magnitudes_.data();
-  // Before a history that is too short all was at rest.
-  for (std::size_t i = 0; i < past_.size(); ++i) {
-    past_[i] = key ? &kNoRecord : records_[std::min(i + 1, depth_)].data();
-  }
+  pastRecords_ = key ? &kNoRecord : records_[1].data();
 }
 
-// Residuals of more than 16 bits.
-Int32x4 Predictor::reconstructFar(const Prediction& prediction, const std::int32_t* r) const {
+FeatureVectors Predictor::features(std::uint32_t slot, const Prediction& p) const {
+  const Record& past = pastRecords_[slot * stride_];
+  const std::array<Int16x8, kPlainPairs> plain = plainFeatures(past, p);
+  const Int16x8 locals = Int16x8::load(past.local);
+  const Int32x4 now32 = locals.even(), change32 = now32 - locals.odd();
+  const Int16x8 local = narrow(now32, change32);
+  const Int16x8 tangents = interleaveHalves(p.frame.tangents);
+  const Int16x8 normal = interleave(p.frame.normal, Int16x8::zero());
+  const auto turned = [&](Int16x8 u_v, Int16x8 n_) {
+    const Int32x4 along = dotPairs(tangents, u_v).shiftedRight(kUnitBits);
+    const Int32x4 across = dotPairs(normal, n_).shiftedRight(kUnitBits);
+    return interleaveHalves(narrow(along, across));
+  };
+  return {plain[0],
+          plain[1],
+          plain[2],
+          plain[3],
+          plain[4],
+          plain[5],
+          turned(local.broadcastPair<0>(), local.broadcastPair<1>()),
+          turned(local.broadcastPair<2>(), local.broadcastPair<3>())};
+}
+
+// In 64 bits: residuals may be of more than 16.
+Int32x4 Predictor::reconstruct(const Prediction& prediction, const std::int32_t* r) const {
   alignas(16) std::int32_t position[4];
   alignas(16) std::int16_t tangents[8], normal[8];
   prediction.position.store(position);
@@ -56,22 +71,21 @@ Int32x4 Predictor::reconstructFar(const Prediction& prediction, const std::int32
 
 void Predictor::keep() {
   const Node* nodes = nodes_[0].data();
-  for (std::size_t slot = 0; slot < magnitudes_.size(); ++slot) {
-    const std::array<std::uint32_t, 4>& nearest = hierarchy_.neighbours[slot].nearest;
+  for (std::size_t slot = 0; slot < hierarchy_.vertexOf.size(); ++slot) {
+    const Nearest& nearest = hierarchy_.nearest[slot];
     const Int32x4 sum = nodes[nearest[0]].load() + nodes[nearest[1]].load() + nodes[nearest[2]].load() +
                         nodes[nearest[3]].load();
     const Int32x4 own = nodes[slot].load().shiftedLeft(2);
-    magnitudes_[slot] = static_cast<std::uint32_t>((sum + own).fourth());
+    Record& record = records_[0][slot];
+    record.magnitudes = static_cast<std::uint32_t>((sum + own).fourth());
     const Int32x4 curvature = (sum - own).shiftedRight(fineBits_);
     const Int16x8 narrowed = narrow(curvature, curvature).withoutFourth();
     const Int16x8 present = interleave(narrowed, narrowed);
-    std::int16_t* newAndOld = curvatures_[slot].newAndOld;
-    const Int16x8 past = key_ ? present : Int16x8::load(newAndOld).pairsSwapped();
-    evenAndOdd(present, past).store(newAndOld);
+    const Int16x8 past = key_ ? present : Int16x8::load(record.curvatures).pairsSwapped();
+    evenAndOdd(present, past).store(record.curvatures);
   }
   std::swap(nodes_[0], nodes_[1]);
-  std::rotate(records_.begin(), records_.end() - 1, records_.end());
-  depth_ = key_ ? 1 : std::min<std::size_t>(depth_ + 1, past_.size());
+  std::swap(records_[0], records_[1]);
 }
 
 }  // namespace clothstream::codec::hierarchical
