@@ -67,6 +67,7 @@ class Measurement {
     return {{"suite", "codec_motions"},
             {"motion", motion},
             {"codec", layout_.codec},
+            {"temporalLayers", layout_.temporalLayers},
             {"nodes", layout_.vertexCount()},
             {"maxErrorMm", layout_.maxError * 1e3},
             {"bitsPerVertex", sum_ / static_cast<double>(bytes_.count()) * bits},
@@ -132,7 +133,11 @@ Rows runCodecMotions(vulkan::Device&, const Settings& settings) {
     std::vector<Measurement> measurements;
     for (const std::uint32_t id : codec::kCodecs) {
       layout.codec = static_cast<std::uint8_t>(id);
-      measurements.emplace_back(layout);
+      const std::uint8_t layers =
+          id == codec::kCodecHierarchical ? codec::kMaxTemporalLayers : std::uint8_t{1};
+      for (layout.temporalLayers = 1; layout.temporalLayers <= layers; ++layout.temporalLayers)
+        measurements.emplace_back(layout);
+      layout.temporalLayers = 1;
     }
     playMotion(motion, [&](std::uint32_t frame, std::span<const float> positions) {
       for (Measurement& measurement : measurements) measurement.add(frame, positions);

@@ -53,7 +53,7 @@ std::vector<CodedResidual> codeMotions() {
         const bool counts = frame >= 6 && (frame < 10 || frame % 3 == 0 || frame == 61);
         encoder.record(counts ? &residuals : nullptr);
         const auto kind = key ? codec::PacketKind::key : codec::PacketKind::predicted;
-        encoder.encode(frame + 1, kind, frame, positions, {}, packet);
+        encoder.encode({.tick = frame + 1, .kind = kind, .referenceTick = frame}, positions, {}, packet);
       });
     }
   }

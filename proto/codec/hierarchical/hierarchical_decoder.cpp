@@ -17,10 +17,11 @@ class HierarchicalDecoder final : public BodyDecoder {
  public:
   bool allocate(const StreamLayout& layout) {
     unit_ = latticeUnit(layout.maxError);
+    layers_ = layout.temporalLayers;
     return predictor_.allocate(layout, unit_.stepBits);
   }
 
-  bool decode(const ParsedPacket& packet) override;
+  bool decode(const ParsedPacket& packet, std::uint8_t referenceLayer) override;
   void writePositions(float* out) const override;
   void writeNormals(float*) const override {}
   std::uint64_t reconstructionHash() const override;
@@ -31,7 +32,9 @@ class HierarchicalDecoder final : public BodyDecoder {
     BitReader bits;
   };
 
-  bool readWeights(std::span<const std::byte> section, bool key, Weights& weights, bool& atRest) const;
+  // Changes those of `weights` that a frame of this layer can.
+  bool readWeights(std::span<const std::byte> section, bool key, std::uint8_t layer, LayerWeights& weights,
+                   bool& atRest) const;
   // Without a model there are no residuals.
   void decodeChunk(std::uint32_t begin, std::uint32_t count, const WeightVectors& weights,
                    const ScaleModel* model, Streams& streams);
@@ -45,7 +48,8 @@ class HierarchicalDecoder final : public BodyDecoder {
 
   LatticeUnit unit_{};
   Predictor predictor_;
-  Weights weights_{};
+  std::uint8_t layers_ = 1;
+  std::array<LayerWeights, kMaxTemporalLayers> weights_{};  // that the newest frame of each layer left
   bool outside_ = false;  // a coordinate of the frame that is being decoded is beyond kMaxCoordinate
   // Of the chunk that is being decoded.
   std::array<Prediction, kChunk> predictions_{};
@@ -56,36 +60,42 @@ class HierarchicalDecoder final : public BodyDecoder {
   bool anyStays_ = false;
 };
 
-bool HierarchicalDecoder::readWeights(std::span<const std::byte> section, bool key, Weights& weights,
-                                      bool& atRest) const {
+bool HierarchicalDecoder::readWeights(std::span<const std::byte> section, bool key, std::uint8_t layer,
+                                      LayerWeights& weights, bool& atRest) const {
   atRest = false;
   if (section.empty()) return true;
   BitReader reader(section);
   atRest = reader.get(1) != 0;
-  for (std::size_t c = 0; !atRest && c < kWeightClasses; ++c) {
-    if (reader.get(1) == 0) continue;
-    for (std::size_t f = firstWeight(key); f < endWeight(key); ++f) {
-      const std::int64_t value = std::int64_t{weights[c][f]} + unzigzag(reader.getGamma(kWeightGammaBits));
-      if (value < -kMaxWeight || value > kMaxWeight) return false;
-      weights[c][f] = static_cast<std::int16_t>(value);
+  const std::uint8_t layers = atRest ? layer : key ? 1 : layers_;
+  for (; layer < layers; ++layer) {
+    for (std::size_t c = 0; c < kWeightClasses; ++c) {
+      if (reader.get(1) == 0) continue;
+      for (std::size_t f = firstWeight(key); f < endWeight(key); ++f) {
+        std::int16_t& weight = weights[layer][c][f];
+        const std::int64_t value = std::int64_t{weight} + unzigzag(reader.getGamma(kWeightGammaBits));
+        if (value < -kMaxWeight || value > kMaxWeight) return false;
+        weight = static_cast<std::int16_t>(value);
+      }
     }
   }
   return reader.atEnd();
 }
 
-bool HierarchicalDecoder::decode(const ParsedPacket& packet) {
+bool HierarchicalDecoder::decode(const ParsedPacket& packet, std::uint8_t referenceLayer) {
   const PacketHeader& header = packet.header;
   if (header.sectionCount != kSections) return false;
   const bool key = header.kind == PacketKind::key;
+  const std::uint8_t layer = header.temporalLayer;
   const std::size_t weightBytes = header.sectionBytes[0], symbolBytes = header.sectionBytes[1];
-  Weights weights = key ? keyFrameWeights() : weights_;
+  LayerWeights weights = weights_[referenceLayer];
+  if (key) weights.fill(keyFrameWeights());
   bool atRest;
-  if (!readWeights(packet.body.first(weightBytes), key, weights, atRest)) return false;
-  const auto vectors = weightVectors(atRest ? Weights{} : weights);
+  if (!readWeights(packet.body.first(weightBytes), key, layer, weights, atRest)) return false;
+  const auto vectors = weightVectors(atRest ? Weights{} : weights[layer]);
   Streams streams{RansReader(packet.body.subspan(weightBytes, symbolBytes)),
                   BitReader(packet.body.subspan(weightBytes + symbolBytes))};
   outside_ = false;
-  predictor_.begin(key);
+  predictor_.begin(key, referenceLayer);
   for (const Phase& phase : predictor_.hierarchy().phases) {
     const ScaleModel model(kScaleWeights[phase.weightClass / 2]);
     const bool quiet = streams.bits.get(1) != 0;
@@ -95,8 +105,9 @@ bool HierarchicalDecoder::decode(const ParsedPacket& packet) {
     }
   }
   if (outside_ || !streams.symbols.atEnd() || !streams.bits.atEnd()) return false;
-  predictor_.keep();
-  weights_ = key ? startingWeights() : weights;
+  predictor_.keep(layer);
+  if (key) weights.fill(startingWeights());
+  weights_[layer] = weights;
   return true;
 }
 

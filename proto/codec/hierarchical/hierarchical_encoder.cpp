@@ -26,7 +26,7 @@ constexpr std::uint32_t kFewVertices = 100;
 constexpr std::uint8_t kStillFrames = 3;
 constexpr std::uint32_t kMostRests = 64;
 
-constexpr std::size_t kMaxWeightBytes = kWeightClasses * kFeatures * 4;
+constexpr std::size_t kMaxWeightBytes = kMaxTemporalLayers * kWeightClasses * kFeatures * 4;
 // Of an escape and what stands beside it, at most.
 constexpr std::size_t kMaxExtraBytes = 8;
 
@@ -54,11 +54,13 @@ std::int32_t nearest(float value) {
 struct HierarchicalEncoder::State {
   explicit State(const StreamLayout& layout)
       : vertices(layout.vertexCount()),
+        layers(layout.temporalLayers),
         unit(latticeUnit(layout.maxError)),
         wanted(vertices),
         stillFrames(vertices),
         symbols(kComponents * vertices),
-        extra((kComponents * kMaxExtraBytes + 1) * vertices + kMaxExtraBytes) {
+        extra((kComponents * kMaxExtraBytes + 1) * vertices + kMaxExtraBytes),
+        fitters(layers) {
     if (!predictor.allocate(layout, unit.stepBits))
       std::abort();  // memory is out, as of any other allocation here
     for (const Phase& phase : predictor.hierarchy().phases)
@@ -80,7 +82,8 @@ struct HierarchicalEncoder::State {
   void choose(std::uint32_t begin, std::size_t first, std::array<Int32x4, 4>& positions);
   Int32x4 chooseFar(const Prediction& prediction, Int32x4 target, std::int32_t* residual) const;
   bool isAtRest() const;
-  std::size_t writeWeights(bool key, std::byte* out);
+  std::size_t writeWeights(const FrameRole& role, std::byte* out);
+  void writeChanges(std::size_t of, BitWriter& writer);
   bool startsToRest(std::uint32_t slot, const Prediction& prediction);
   bool goesOnResting(std::uint32_t slot, const Prediction& prediction) const;
   void encodePhase(const Phase& phase, BitWriter& bits);
@@ -94,6 +97,7 @@ struct HierarchicalEncoder::State {
   void note(const Prediction& prediction, std::uint32_t weightClass, std::size_t i);
 
   std::size_t vertices;
+  std::uint8_t layers;
   LatticeUnit unit;
   Predictor predictor;
   std::array<std::uint32_t, kWeightClasses + 1> classSizes{};
@@ -104,12 +108,14 @@ struct HierarchicalEncoder::State {
   std::uint32_t restsLeft = 0;            // that may start in this frame
   RansWriter symbols;
   std::vector<std::byte> extra;
-  WeightFitter fitter;
-  Weights weights{};
-  Weights used{};  // in this frame
+  std::vector<WeightFitter> fitters;                    // by layer
+  std::array<LayerWeights, kMaxTemporalLayers> kept{};  // that the newest frame of each layer left
+  LayerWeights weights{};                               // that this one leaves
+  Weights used{};                                       // in this frame
   std::array<WeightVectors, kWeightClasses + 1> vectors{};
   std::uint32_t frame = 0;  // since the key frame
-  bool quiet = false;       // no residual in the newest frame
+  std::uint8_t layer = 0;
+  bool quiet = false;  // no residual in the newest frame
   std::vector<CodedResidual>* recorded = nullptr;
   // Of the chunk that is being encoded.
   std::array<Prediction, kChunk> predictions;
@@ -239,58 +245,65 @@ Int32x4 HierarchicalEncoder::State::chooseFar(const Prediction& prediction, Int3
   return position;
 }
 
-// Whether the newest frame serves once more.
+// Whether the reference serves once more.
 bool HierarchicalEncoder::State::isAtRest() const {
-  const std::span<const Node> newest = predictor.nodes();
+  const std::span<const Node> former = predictor.reference();
   const double limit = squaredPromise();
   for (std::size_t slot = 0; slot < vertices; ++slot) {
-    if (squaredLength(wanted[slot].load() - newest[slot].load()) > limit) return false;
+    if (squaredLength(wanted[slot].load() - former[slot].load()) > limit) return false;
   }
   return true;
 }
 
-std::size_t HierarchicalEncoder::State::writeWeights(bool key, std::byte* out) {
-  if (key) weights = keyFrameWeights();
+std::size_t HierarchicalEncoder::State::writeWeights(const FrameRole& role, std::byte* out) {
+  const bool key = role.kind == PacketKind::key;
+  weights = key ? LayerWeights{keyFrameWeights()} : kept[role.referenceLayer];
   if (!key && isAtRest()) {
     used = Weights{};
     vectors = weightVectors(used);
     out[0] = std::byte{1};
     return 1;
   }
-  const bool due = !key && !quiet && (frame <= kEagerFrames || frame % kWeightInterval == 0);
+  // With layers it is the base that sends the weights of all: it is never left out.
+  const bool eager = layers == 1 && frame <= kEagerFrames;
+  const bool due = role.layer == 0 && !key && !quiet && (eager || frame % kWeightInterval == 0);
   std::size_t bytes = 0;
   if (due) {
-    Weights next = weights;
-    fitter.fit(next);
     BitWriter writer(out);
     writer.put(0, 1);
-    for (std::size_t c = 0; c < kWeightClasses; ++c) {
-      const bool changes = classSizes[c] >= kFewVertices;
-      writer.put(changes ? 1 : 0, 1);
-      for (std::size_t f = 0; changes && f < kFeatures; ++f) {
-        writer.putGamma(zigzag(next[c][f] - weights[c][f]), kWeightGammaBits);
-        weights[c][f] = next[c][f];
-      }
-    }
+    for (std::size_t of = 0; of < layers; ++of) writeChanges(of, writer);
     bytes = static_cast<std::size_t>(writer.finish() - out);
   }
-  used = weights;
+  used = weights[role.layer];
   vectors = weightVectors(used);
   return bytes;
+}
+
+void HierarchicalEncoder::State::writeChanges(std::size_t of, BitWriter& writer) {
+  Weights& current = weights[of];
+  Weights next = current;
+  fitters[of].fit(next);
+  for (std::size_t c = 0; c < kWeightClasses; ++c) {
+    const bool changes = classSizes[c] >= kFewVertices && next[c] != current[c];
+    writer.put(changes ? 1 : 0, 1);
+    if (!changes) continue;
+    for (std::size_t f = 0; f < kFeatures; ++f)
+      writer.putGamma(zigzag(next[c][f] - current[c][f]), kWeightGammaBits);
+    current[c] = next[c];
+  }
 }
 
 // What is wanted in the same place for some frames is pinned, it seems: it is to stand still. To say so takes
 // two bytes.
 bool HierarchicalEncoder::State::startsToRest(std::uint32_t slot, const Prediction& prediction) {
-  if (frame == 0 || restsLeft == 0 || stillFrames[slot] < kStillFrames || predictor.nodes()[slot].rests())
-    return false;
+  if (restsLeft == 0 || stillFrames[slot] < kStillFrames || predictor.reference()[slot].rests()) return false;
   if (squaredLength(wanted[slot].load() - prediction.last) > squaredPromise()) return false;
   --restsLeft;
   return true;
 }
 
 bool HierarchicalEncoder::State::goesOnResting(std::uint32_t slot, const Prediction& prediction) const {
-  return frame > 0 && predictor.nodes()[slot].rests() &&
+  return frame > 0 && predictor.reference()[slot].rests() &&
          squaredLength(wanted[slot].load() - prediction.last) <= squaredPromise();
 }
 
@@ -415,16 +428,19 @@ void HierarchicalEncoder::State::code(Component component, std::uint32_t scale, 
 void HierarchicalEncoder::State::fitTo(std::uint32_t weightClass, const FeatureVectors& features,
                                        const Prediction& prediction, Int32x4 target, std::size_t i) {
   const auto& w = used[weightClass];
-  Int32x4 predicted = Int32x4::all(0);
-  for (std::size_t f = 0; f < kFeaturePairs; ++f)
-    predicted = predicted + dotPairs(features[f], Int16x8::allPairs(w[2 * f], w[2 * f + 1]));
+  Int32x4 predicted = Int32x4::all(0), turned = predicted;
+  for (std::size_t f = 0; f < kFeaturePairs; ++f) {
+    Int32x4& sum = f < kPlainPairs ? predicted : turned;
+    sum = sum + dotPairs(features[f], Int16x8::allPairs(w[2 * f], w[2 * f + 1]));
+  }
+  predicted = predicted + turned.shiftedRight(kTurnedBits);
   const Int32x4 goal =
       (target - prediction.position).shiftedRight(unit.stepBits - 4) + predicted.shiftedRight(kWeightBits);
   // What is hard to predict here is not to spoil the weights for the rest.
   const std::uint32_t around = prediction.parentMagnitudes;
   const auto near = static_cast<float>((around & 255u) + (around >> 8 & 255u) + (around >> 16 & 255u));
   const auto own = static_cast<float>(magnitudes[0][i] + magnitudes[1][i] + magnitudes[2][i]);
-  fitter.add(weightClass, features, goal, 1 / (0.15f + 0.1f * own * own + 0.025f * near));
+  fitters[layer].add(weightClass, features, goal, 1 / (0.15f + 0.1f * own * own + 0.025f * near));
 }
 
 void HierarchicalEncoder::State::note(const Prediction& prediction, std::uint32_t weightClass,
@@ -451,34 +467,37 @@ std::size_t HierarchicalEncoder::packetBound() const {
   return headerBound(largest) + kMaxWeightBytes + s.symbols.bound() + s.extra.size();
 }
 
-std::size_t HierarchicalEncoder::encode(std::uint64_t tick, PacketKind kind, std::uint64_t referenceTick,
-                                        std::span<const float> positions, std::span<const float>,
-                                        std::span<std::byte> out) {
+std::size_t HierarchicalEncoder::encode(const FrameRole& role, std::span<const float> positions,
+                                        std::span<const float>, std::span<std::byte> out) {
   State& s = *state_;
-  const bool key = kind == PacketKind::key;
+  const bool key = role.kind == PacketKind::key;
   s.frame = key ? 0 : s.frame + 1;
+  s.layer = role.layer;
   s.quantise(positions);
   PacketHeader& header = s.header;
-  header.kind = kind;
-  header.tick = tick;
+  header.kind = role.kind;
+  header.temporalLayer = role.layer;
+  header.tick = role.tick;
   header.referenceCount = key ? 0 : 1;
-  header.references[0] = referenceTick;
+  header.references[0] = role.referenceTick;
 
   // The header's length depends on the sections' sizes: they are written behind its bound and moved up.
   const std::size_t bodyStart = headerBound(header);
-  std::size_t end = bodyStart + s.writeWeights(key, out.data() + bodyStart);
+  s.predictor.begin(key, role.referenceLayer);
+  std::size_t end = bodyStart + s.writeWeights(role, out.data() + bodyStart);
   header.sectionBytes[0] = static_cast<std::uint32_t>(end - bodyStart);
   s.symbols.shrink(0);
   BitWriter bits(s.extra.data());
-  s.predictor.begin(key);
   s.quiet = true;
-  s.restsLeft = kMostRests;
+  // Once in the base is enough: the others refer to it.
+  s.restsLeft = key || role.layer > 0 ? 0 : kMostRests;
   for (const Phase& phase : s.predictor.hierarchy().phases) s.encodePhase(phase, bits);
-  s.predictor.keep();
+  s.predictor.keep(role.layer);
   if (key) {
-    s.weights = startingWeights();
-    s.fitter.clear();
+    s.weights.fill(startingWeights());
+    for (WeightFitter& fitter : s.fitters) fitter.clear();
   }
+  s.kept[role.layer] = s.weights;
   header.sectionBytes[1] = static_cast<std::uint32_t>(s.symbols.write(out.data() + end));
   end += header.sectionBytes[1];
   header.sectionBytes[2] = static_cast<std::uint32_t>(bits.finish() - s.extra.data());

@@ -12,21 +12,26 @@ bool Predictor::allocate(const StreamLayout& layout, int stepBits) {
   fineBits_ = stepBits - 4;
   const std::size_t vertices = layout.vertexCount();
   bool allocated = hierarchy_.build(layout);
-  for (Array<Node>& nodes : nodes_) {
-    allocated = allocated && nodes.allocate(vertices + 1);
-    if (allocated) nodes[vertices] = Node{};
+  for (std::size_t i = 0; i <= layout.temporalLayers; ++i) {
+    Moment& moment = moments_[i];
+    allocated = allocated && moment.nodes.allocate(vertices + 1) && moment.records.allocate(vertices);
+    if (allocated) moment.nodes[vertices] = Node{};
+    if (i < layout.temporalLayers) ofLayer_[i] = i;
   }
-  for (Array<Record>& records : records_) allocated = allocated && records.allocate(vertices);
+  made_ = layout.temporalLayers;
   return allocated;
 }
 
-void Predictor::begin(bool key) {
+void Predictor::begin(bool key, std::uint8_t referenceLayer) {
   static constexpr Node kNoNode{};
   static constexpr Record kNoRecord{};
+  const Moment& past = moments_[ofLayer_[referenceLayer]];
   key_ = key;
   stride_ = key ? 0 : 1;
-  pastNodes_ = key ? &kNoNode : nodes_[1].data();
-  pastRecords_ = key ? &kNoRecord : records_[1].data();
+  pastNodes_ = key ? &kNoNode : past.nodes.data();
+  pastRecords_ = key ? &kNoRecord : past.records.data();
+  nodes_ = moments_[made_].nodes.data();
+  records_ = moments_[made_].records.data();
 }
 
 FeatureVectors Predictor::features(std::uint32_t slot, const Prediction& p) const {
@@ -38,8 +43,10 @@ FeatureVectors Predictor::features(std::uint32_t slot, const Prediction& p) cons
   const Int16x8 tangents = interleaveHalves(p.frame.tangents);
   const Int16x8 normal = interleave(p.frame.normal, Int16x8::zero());
   const auto turned = [&](Int16x8 u_v, Int16x8 n_) {
-    const Int32x4 along = dotPairs(tangents, u_v).shiftedRight(kUnitBits);
-    const Int32x4 across = dotPairs(normal, n_).shiftedRight(kUnitBits);
+    const int down = kUnitBits - kTurnedBits;
+    const Int32x4 half = Int32x4::all(1 << (down - 1));
+    const Int32x4 along = (dotPairs(tangents, u_v) + half).shiftedRight(down);
+    const Int32x4 across = (dotPairs(normal, n_) + half).shiftedRight(down);
     return interleaveHalves(narrow(along, across));
   };
   return {plain[0],
@@ -69,14 +76,14 @@ Int32x4 Predictor::reconstruct(const Prediction& prediction, const std::int32_t*
   return Int32x4::load(position);
 }
 
-void Predictor::keep() {
-  const Node* nodes = nodes_[0].data();
+void Predictor::keep(std::uint8_t layer) {
+  const Node* nodes = nodes_;
   for (std::size_t slot = 0; slot < hierarchy_.vertexOf.size(); ++slot) {
     const Nearest& nearest = hierarchy_.nearest[slot];
     const Int32x4 sum = nodes[nearest[0]].load() + nodes[nearest[1]].load() + nodes[nearest[2]].load() +
                         nodes[nearest[3]].load();
     const Int32x4 own = nodes[slot].load().shiftedLeft(2);
-    Record& record = records_[0][slot];
+    Record& record = records_[slot];
     record.magnitudes = static_cast<std::uint32_t>((sum + own).fourth());
     const Int32x4 curvature = (sum - own).shiftedRight(fineBits_);
     const Int16x8 narrowed = narrow(curvature, curvature).withoutFourth();
@@ -84,8 +91,8 @@ void Predictor::keep() {
     const Int16x8 past = key_ ? present : Int16x8::load(record.curvatures).pairsSwapped();
     evenAndOdd(present, past).store(record.curvatures);
   }
-  std::swap(nodes_[0], nodes_[1]);
-  std::swap(records_[0], records_[1]);
+  newest_ = made_;
+  std::swap(made_, ofLayer_[layer]);
 }
 
 }  // namespace clothstream::codec::hierarchical

@@ -50,8 +50,9 @@ inline constexpr std::size_t kFeatures = 2 * kFeaturePairs;
 inline constexpr std::size_t kRingFeature = 1, kDetailChangeFeature = 2;
 using FeatureVectors = std::array<Int16x8, kFeaturePairs>;
 
-// The others are turned with the surface.
+// The others are turned with the surface: their sum is, to 2^-kTurnedBits of what the others are told in.
 inline constexpr std::size_t kPlainPairs = 6;
+inline constexpr int kTurnedBits = 2;
 
 // A weight of 1 is 2^kWeightBits.
 inline constexpr int kWeightBits = 10;
@@ -88,22 +89,25 @@ class Predictor {
 
   const Hierarchy& hierarchy() const { return hierarchy_; }
 
-  void begin(bool key);
+  // A predicted frame refers to the newest one of that layer.
+  void begin(bool key, std::uint8_t referenceLayer);
   // Of up to kChunk vertices, none of which is a parent or of the ring of another; `out` and `frames` have
   // room for whole fours of them.
   void predict(std::uint32_t begin, std::uint32_t count, const WeightVectors& weights, Prediction* out,
                SurfaceFrames* frames) const;
-  // What the weights multiplied, to a sixteenth of a step.
+  // What the weights multiplied; the turned ones in parts of 2^-kTurnedBits.
   FeatureVectors features(std::uint32_t slot, const Prediction& prediction) const;
   // How far these residuals of four vertices move them, in steps along u, v and n: each within 16 bits.
   Vectors4 moved(const SurfaceFrames& frames, const Vectors4& residuals) const;
   // The position to which these residuals lead, whatever they are.
   Int32x4 reconstruct(const Prediction& prediction, const std::int32_t* residual) const;
   void place(std::uint32_t slot, const Prediction& prediction, Int32x4 position, std::uint32_t magnitudes);
-  void keep();
+  // The frame is now the newest one of that layer.
+  void keep(std::uint8_t layer);
 
-  // Of the newest frame that was kept, in coding order.
-  std::span<const Node> nodes() const { return {nodes_[1].data(), hierarchy_.vertexOf.size()}; }
+  // In coding order, of the newest frame that was kept, and of the one that this one refers to.
+  std::span<const Node> nodes() const { return {moments_[newest_].nodes.data(), hierarchy_.vertexOf.size()}; }
+  std::span<const Node> reference() const { return {pastNodes_, hierarchy_.vertexOf.size()}; }
 
  private:
   std::array<Int16x8, kPlainPairs> plainFeatures(const Record& past, const Prediction& prediction) const;
@@ -111,21 +115,29 @@ class Predictor {
 
   Hierarchy hierarchy_;
   int stepBits_ = 0, fineBits_ = 0;  // a sixteenth of a step is 2^fineBits_ units
-  // [0] of the frame that is being made, [1] of the one that it refers to.
-  std::array<Array<Node>, 2> nodes_;
-  std::array<Array<Record>, 2> records_;
+  // What a frame leaves.
+  struct Moment {
+    Array<Node> nodes;
+    Array<Record> records;
+  };
+  // Of each layer's newest frame, and of the one that is being made.
+  std::array<Moment, kMaxTemporalLayers + 1> moments_;
+  std::array<std::size_t, kMaxTemporalLayers> ofLayer_{};
+  std::size_t made_ = 0, newest_ = 0;
 
   // What predict() reads of the past: of a key frame one of each that is all zero, by a stride of 0.
   bool key_ = true;
   std::size_t stride_ = 0;
   const Node* pastNodes_ = nullptr;
   const Record* pastRecords_ = nullptr;
+  Node* nodes_ = nullptr;  // of the frame that is being made
+  Record* records_ = nullptr;
 };
 
 // What is known without the past, but for the frame. `first` and `second` span the surface.
 inline void Predictor::look(std::uint32_t slot, Prediction& out, Int32x4& first, Int32x4& second) const {
   const Neighbours& neighbours = hierarchy_.neighbours[slot];
-  const Node* nodes = nodes_[0].data();
+  const Node* nodes = nodes_;
   const Int32x4 p0 = nodes[neighbours.parents[0]].load(), p1 = nodes[neighbours.parents[1]].load();
   const Int32x4 p2 = nodes[neighbours.parents[2]].load(), p3 = nodes[neighbours.parents[3]].load();
   const Int32x4 pair = p0 + p1, otherPair = p2 + p3, sum = pair + otherPair;
@@ -161,7 +173,7 @@ inline std::array<Int16x8, kPlainPairs> Predictor::plainFeatures(const Record& p
 inline void Predictor::predict(std::uint32_t begin, std::uint32_t count, const WeightVectors& weights,
                                Prediction* out, SurfaceFrames* frames) const {
   // Sixteenths of a step in 2^-kWeightBits, to units; half a unit for the rounding.
-  const int down = kWeightBits - fineBits_, turnedDown = kUnitBits - fineBits_;
+  const int down = kWeightBits - fineBits_;
   for (std::uint32_t four = 0; four < count; four += 4) {
     std::array<Int32x4, 4> first, second;
     for (std::uint32_t i = 0; i < 4; ++i)
@@ -177,17 +189,18 @@ inline void Predictor::predict(std::uint32_t begin, std::uint32_t count, const W
       const std::array<Int16x8, kPlainPairs> plain = plainFeatures(past, p);
       Int32x4 change = Int32x4::all(1 << (down - 1));
       for (std::size_t f = 0; f < kPlainPairs; ++f) change = change + dotPairs(plain[f], weights.plain[f]);
-      const Int32x4 local =
-          (dotPairs(Int16x8::load(past.local), weights.local) + Int32x4::all(1 << (kWeightBits - 1)))
-              .shiftedRight(kWeightBits);
+      const Int32x4 local = (dotPairs(Int16x8::load(past.local), weights.local) +
+                             Int32x4::all(1 << (kWeightBits - kTurnedBits - 1)))
+                                .shiftedRight(kWeightBits - kTurnedBits);
       const Int16x8 wished = narrow(local, local);
       const Int32x4 turned = p.frame.combine(wished.broadcastPair<0>(), wished.broadcastPair<1>());
+      change = change + turned.shiftedRight(kUnitBits + kTurnedBits - kWeightBits);
       const Node& own = pastNodes_[at];
       p.last = own.load();
       // What rests is expected to go on resting: pins do, in the middle of a moving cloth.
-      p.position = own.rests() ? p.last
-                               : p.average + (p.last - Int32x4::load(past.average)) +
-                                     change.shiftedRight(down) + turned.shiftedRight(turnedDown);
+      p.position = own.rests()
+                       ? p.last
+                       : p.average + (p.last - Int32x4::load(past.average)) + change.shiftedRight(down);
     }
   }
 }
@@ -212,7 +225,7 @@ inline Vectors4 Predictor::moved(const SurfaceFrames& f, const Vectors4& residua
 
 inline void Predictor::place(std::uint32_t slot, const Prediction& prediction, Int32x4 position,
                              std::uint32_t magnitudes) {
-  Node& node = nodes_[0][slot];
+  Node& node = nodes_[slot];
   position.store(&node.x);
   const bool rests = !key_ && position.sameThree(prediction.last);
   node.magnitudes = magnitudes | (rests ? 1u << 24 : 0u);
@@ -223,7 +236,7 @@ inline void Predictor::place(std::uint32_t slot, const Prediction& prediction, I
   const Int16x8 detailAndRing =
       interleave(narrowed, interleave64High(prediction.twistAndRing, prediction.twistAndRing));
   const Record& past = pastRecords_[slot * stride_];
-  Record& record = records_[0][slot];
+  Record& record = records_[slot];
   prediction.average.store(record.average);  // and what keep() puts beside it
   prediction.twistAndRing.store(record.twistAndRing);
   detailAndRing.store(record.detailAndRing);
