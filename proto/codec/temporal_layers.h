@@ -18,8 +18,8 @@ constexpr std::uint8_t layerOf(std::uint64_t frame, std::uint8_t layers) {
   return place == 0 ? std::uint8_t{0} : static_cast<std::uint8_t>(layers - 1 - std::countr_zero(place));
 }
 
-// The newest frame of each layer since the last key frame, by its tick. Both ends hold them; what a reader was
-// not sent it does not hold, and nothing that it is sent refers to it.
+// The newest frame of each layer since the last key frame, by its tick. Both ends hold them; what a reader
+// was not sent it does not hold, and nothing that it is sent refers to it.
 class HeldFrames {
  public:
   void clear() { ticks_ = {}; }

@@ -19,7 +19,7 @@ def read_tables():
                             for row in re.findall(r"\{(-?\d+(?:, -?\d+){%d})\}" % (n - 1), part)]
     scales, distributions = text.split("kDistributions{{")
     weights = rows(scales, 6)
-    return [weights[3 * i:3 * i + 3] for i in range(4)], rows(distributions, 16)
+    return [weights[3 * i:3 * i + 3] for i in range(8)], rows(distributions, 16)
 
 
 SCALE_WEIGHTS, DISTRIBUTIONS = read_tables()
@@ -224,7 +224,7 @@ class Decoder:
         """The weights that the frame uses; those that it leaves, by layer."""
         alone = lambda f, w: [[w if i == f and c < 6 else 0 for i in range(16)] for c in range(7)]
         if key:
-            left = [alone(1, -256)] * 3
+            left = [alone(7, -192)] * 3
         else:
             left = self.history[0]["weights"]
         left = [[row[:] for row in weights] for weights in left]
@@ -237,7 +237,7 @@ class Decoder:
                 for weights in left[layer:1 if key else self.layers]:
                     for c in range(6):
                         if bits.get(1):
-                            for f in [1] if key else range(16):
+                            for f in (6, 7) if key else range(16):
                                 weights[c][f] += unzigzag(bits.gamma(4))
             bits.check_end()
         return used, [alone(2, 700)] * 3 if key else left
@@ -260,7 +260,7 @@ class Decoder:
             for start in range(0, len(phase), 64):
                 group = phase[start:start + 64]
                 predicted = [self.predict(now, v, weights[weight_class]) for v in group]
-                residuals, stays = self.read_residuals(now, group, weight_class // 2, quiet, symbols, bits)
+                residuals, stays = self.read_residuals(now, group, weight_class // 2 + (4 if key else 0), quiet, symbols, bits)
                 for i, v in enumerate(group):
                     self.place(now, v, predicted[i], residuals[i], stays[i])
         symbols.check_end()

@@ -27,7 +27,8 @@ StreamLayout layered(std::uint8_t layers) {
 }
 
 // Moves, rests for a while, and moves again; key frames where they are asked for.
-std::vector<Sent> send(const StreamLayout& layout, const std::set<std::uint64_t>& keys, std::uint64_t frames) {
+std::vector<Sent> send(const StreamLayout& layout, const std::set<std::uint64_t>& keys,
+                       std::uint64_t frames) {
   const auto encoder = Encoder::make(layout);
   std::vector<std::byte> packet(encoder->packetBound());
   std::vector<Sent> sent;
@@ -64,9 +65,10 @@ TEST(TemporalLayers, ReferToLowerOnesOrWithinTheBase) {
   }
 }
 
-// Whatever is left out, a frame is decoded where what it refers to was, to the bits that it always has; else the
-// decoder says so at once.
-void expectSameBits(const StreamLayout& layout, const std::vector<Sent>& sent, const std::vector<bool>& leftOut) {
+// Whatever is left out, a frame is decoded where what it refers to was, to the bits that it always has; else
+// the decoder says so at once.
+void expectSameBits(const StreamLayout& layout, const std::vector<Sent>& sent,
+                    const std::vector<bool>& leftOut) {
   const auto decoder = Decoder::make(layout);
   std::set<std::uint64_t> decoded;
   for (std::size_t i = 0; i < sent.size(); ++i) {
@@ -74,7 +76,8 @@ void expectSameBits(const StreamLayout& layout, const std::vector<Sent>& sent, c
     const auto& [bytes, header, hash] = sent[i];
     if (header.kind == PacketKind::key) decoded.clear();
     const bool possible = header.kind == PacketKind::key || decoded.contains(header.references[0]);
-    ASSERT_EQ(decoder->decode(bytes), possible ? DecodeResult::ok : DecodeResult::missingReference) << header.tick;
+    ASSERT_EQ(decoder->decode(bytes), possible ? DecodeResult::ok : DecodeResult::missingReference)
+        << header.tick;
     if (!possible) continue;
     EXPECT_EQ(decoder->tick(), header.tick);
     EXPECT_EQ(decoder->reconstructionHash(), hash) << header.tick;
@@ -133,7 +136,8 @@ TEST(TemporalLayers, AKeyFrameHealsTheLossOfABaseFrame) {
       continue;
     }
     if (header.kind == PacketKind::key) lost = false;
-    ASSERT_EQ(decoder->decode(bytes), lost ? DecodeResult::missingReference : DecodeResult::ok) << header.tick;
+    ASSERT_EQ(decoder->decode(bytes), lost ? DecodeResult::missingReference : DecodeResult::ok)
+        << header.tick;
     if (!lost) {
       EXPECT_EQ(decoder->reconstructionHash(), hash);
     }

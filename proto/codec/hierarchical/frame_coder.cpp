@@ -16,7 +16,7 @@ LatticeUnit latticeUnit(float maxError) {
 
 Weights keyFrameWeights() {
   Weights weights{};
-  for (std::size_t c = 0; c < kWeightClasses; ++c) weights[c][kRingFeature] = -256;
+  for (std::size_t c = 0; c < kWeightClasses; ++c) weights[c][kRingFeature] = -192;
   return weights;
 }
 

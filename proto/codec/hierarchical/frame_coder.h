@@ -40,7 +40,7 @@ std::array<WeightVectors, kWeightClasses + 1> weightVectors(const Weights& weigh
 
 // The features whose weights a frame of this kind can change.
 constexpr std::size_t firstWeight(bool key) {
-  return key ? kRingFeature : 0;
+  return key ? kTwistFeature : 0;
 }
 constexpr std::size_t endWeight(bool key) {
   return key ? kRingFeature + 1 : kFeatures;

@@ -97,7 +97,7 @@ bool HierarchicalDecoder::decode(const ParsedPacket& packet, std::uint8_t refere
   outside_ = false;
   predictor_.begin(key, referenceLayer);
   for (const Phase& phase : predictor_.hierarchy().phases) {
-    const ScaleModel model(kScaleWeights[phase.weightClass / 2]);
+    const ScaleModel model(kScaleWeights[scaleClassOf(phase.weightClass, key)]);
     const bool quiet = streams.bits.get(1) != 0;
     for (std::uint32_t begin = phase.begin; begin < phase.end; begin += kChunk) {
       decodeChunk(begin, std::min(kChunk, phase.end - begin), vectors[phase.weightClass],

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
+#include <utility>
 
 #include "proto/codec/hierarchical/bits.h"
 #include "proto/codec/hierarchical/frame_coder.h"
@@ -83,7 +84,10 @@ struct HierarchicalEncoder::State {
   Int32x4 chooseFar(const Prediction& prediction, Int32x4 target, std::int32_t* residual) const;
   bool isAtRest() const;
   std::size_t writeWeights(const FrameRole& role, std::byte* out);
-  void writeChanges(std::size_t of, BitWriter& writer);
+  void writeChanges(bool key, std::size_t of, BitWriter& writer);
+  void use(const Weights& chosen);
+  void attempt();
+  void encodePhases(BitWriter& bits);
   bool startsToRest(std::uint32_t slot, const Prediction& prediction);
   bool goesOnResting(std::uint32_t slot, const Prediction& prediction) const;
   void encodePhase(const Phase& phase, BitWriter& bits);
@@ -255,31 +259,33 @@ bool HierarchicalEncoder::State::isAtRest() const {
   return true;
 }
 
+void HierarchicalEncoder::State::use(const Weights& chosen) {
+  used = chosen;
+  vectors = weightVectors(used);
+}
+
 std::size_t HierarchicalEncoder::State::writeWeights(const FrameRole& role, std::byte* out) {
   const bool key = role.kind == PacketKind::key;
-  weights = key ? LayerWeights{keyFrameWeights()} : kept[role.referenceLayer];
   if (!key && isAtRest()) {
-    used = Weights{};
-    vectors = weightVectors(used);
+    use(Weights{});
     out[0] = std::byte{1};
     return 1;
   }
   // With layers it is the base that sends the weights of all: it is never left out.
   const bool eager = layers == 1 && frame <= kEagerFrames;
-  const bool due = role.layer == 0 && !key && !quiet && (eager || frame % kWeightInterval == 0);
+  const bool due = key || (role.layer == 0 && !quiet && (eager || frame % kWeightInterval == 0));
   std::size_t bytes = 0;
   if (due) {
     BitWriter writer(out);
     writer.put(0, 1);
-    for (std::size_t of = 0; of < layers; ++of) writeChanges(of, writer);
+    for (std::size_t of = 0; of < (key ? 1u : layers); ++of) writeChanges(key, of, writer);
     bytes = static_cast<std::size_t>(writer.finish() - out);
   }
-  used = weights[role.layer];
-  vectors = weightVectors(used);
+  use(weights[role.layer]);
   return bytes;
 }
 
-void HierarchicalEncoder::State::writeChanges(std::size_t of, BitWriter& writer) {
+void HierarchicalEncoder::State::writeChanges(bool key, std::size_t of, BitWriter& writer) {
   Weights& current = weights[of];
   Weights next = current;
   fitters[of].fit(next);
@@ -287,10 +293,26 @@ void HierarchicalEncoder::State::writeChanges(std::size_t of, BitWriter& writer)
     const bool changes = classSizes[c] >= kFewVertices && next[c] != current[c];
     writer.put(changes ? 1 : 0, 1);
     if (!changes) continue;
-    for (std::size_t f = 0; f < kFeatures; ++f)
+    for (std::size_t f = firstWeight(key); f < endWeight(key); ++f)
       writer.putGamma(zigzag(next[c][f] - current[c][f]), kWeightGammaBits);
     current[c] = next[c];
   }
+}
+
+// What a key frame leaves out of account is the past: its weights are fitted to a first attempt at itself.
+void HierarchicalEncoder::State::attempt() {
+  for (WeightFitter& fitter : fitters) fitter.clear();
+  use(weights[0]);
+  BitWriter bits(extra.data());
+  std::vector<CodedResidual>* const record = std::exchange(recorded, nullptr);
+  encodePhases(bits);
+  recorded = record;
+}
+
+void HierarchicalEncoder::State::encodePhases(BitWriter& bits) {
+  symbols.shrink(0);
+  quiet = true;
+  for (const Phase& phase : predictor.hierarchy().phases) encodePhase(phase, bits);
 }
 
 // What is wanted in the same place for some frames is pinned, it seems: it is to stand still. To say so takes
@@ -328,7 +350,7 @@ void HierarchicalEncoder::State::encodePhase(const Phase& phase, BitWriter& bits
 
 bool HierarchicalEncoder::State::encodeChunk(std::uint32_t begin, std::uint32_t count,
                                              std::uint32_t weightClass, BitWriter& bits) {
-  const ScaleModel model(kScaleWeights[weightClass / 2]);
+  const ScaleModel model(kScaleWeights[scaleClassOf(weightClass, frame == 0)]);
   const bool fits = weightClass < kWeightClasses;
   const std::uint32_t stride = fits ? kFitStride[weightClass] : 1;
   bool any = false;
@@ -447,11 +469,11 @@ void HierarchicalEncoder::State::note(const Prediction& prediction, std::uint32_
                                       std::size_t i) {
   for (std::size_t c = 0; c < kComponents; ++c) {
     const auto byte = [c](std::uint32_t bytes) { return static_cast<std::uint8_t>(bytes >> 8 * c); };
-    recorded->push_back({static_cast<std::uint8_t>(c), static_cast<std::uint8_t>(weightClass / 2),
-                         byte(prediction.parentMagnitudes), byte(prediction.ringMagnitudes),
-                         byte(prediction.lastMagnitudes),
-                         static_cast<std::uint8_t>(magnitudes[kAlongNormal][i]),
-                         static_cast<std::uint8_t>(magnitudes[kAlongU][i]), residuals[c][i]});
+    recorded->push_back(
+        {static_cast<std::uint8_t>(c), static_cast<std::uint8_t>(scaleClassOf(weightClass, frame == 0)),
+         byte(prediction.parentMagnitudes), byte(prediction.ringMagnitudes), byte(prediction.lastMagnitudes),
+         static_cast<std::uint8_t>(magnitudes[kAlongNormal][i]),
+         static_cast<std::uint8_t>(magnitudes[kAlongU][i]), residuals[c][i]});
   }
 }
 
@@ -484,14 +506,14 @@ std::size_t HierarchicalEncoder::encode(const FrameRole& role, std::span<const f
   // The header's length depends on the sections' sizes: they are written behind its bound and moved up.
   const std::size_t bodyStart = headerBound(header);
   s.predictor.begin(key, role.referenceLayer);
-  std::size_t end = bodyStart + s.writeWeights(role, out.data() + bodyStart);
-  header.sectionBytes[0] = static_cast<std::uint32_t>(end - bodyStart);
-  s.symbols.shrink(0);
-  BitWriter bits(s.extra.data());
-  s.quiet = true;
+  s.weights = key ? LayerWeights{keyFrameWeights()} : s.kept[role.referenceLayer];
   // Once in the base is enough: the others refer to it.
   s.restsLeft = key || role.layer > 0 ? 0 : kMostRests;
-  for (const Phase& phase : s.predictor.hierarchy().phases) s.encodePhase(phase, bits);
+  if (key) s.attempt();
+  std::size_t end = bodyStart + s.writeWeights(role, out.data() + bodyStart);
+  header.sectionBytes[0] = static_cast<std::uint32_t>(end - bodyStart);
+  BitWriter bits(s.extra.data());
+  s.encodePhases(bits);
   s.predictor.keep(role.layer);
   if (key) {
     s.weights.fill(startingWeights());

@@ -47,7 +47,7 @@ struct alignas(64) Record {
 // What predicts a change: vectors in sixteenths of a step, interleaved by two, and their weights.
 inline constexpr std::size_t kFeaturePairs = 8;
 inline constexpr std::size_t kFeatures = 2 * kFeaturePairs;
-inline constexpr std::size_t kRingFeature = 1, kDetailChangeFeature = 2;
+inline constexpr std::size_t kDetailChangeFeature = 2, kTwistFeature = 6, kRingFeature = 7;
 using FeatureVectors = std::array<Int16x8, kFeaturePairs>;
 
 // The others are turned with the surface: their sum is, to 2^-kTurnedBits of what the others are told in.
@@ -155,7 +155,8 @@ inline void Predictor::look(std::uint32_t slot, Prediction& out, Int32x4& first,
 
   const Record& past = pastRecords_[slot * stride_];
   out.lastMagnitudes = past.magnitudes;
-  const Int32x4 moved = (average - Int32x4::load(past.average)).shiftedRight(fineBits_);
+  const Int32x4 before = key_ ? average : Int32x4::load(past.average);
+  const Int32x4 moved = (average - before).shiftedRight(fineBits_);
   const Int16x8 narrowed = narrow(moved, moved);
   out.movedAndFaster = interleave64Low(narrowed, narrowed - Int16x8::load(past.movedAndFaster));
 }
@@ -239,17 +240,16 @@ inline void Predictor::place(std::uint32_t slot, const Prediction& prediction, I
   Record& record = records_[slot];
   prediction.average.store(record.average);  // and what keep() puts beside it
   prediction.twistAndRing.store(record.twistAndRing);
+  prediction.movedAndFaster.store(record.movedAndFaster);
   detailAndRing.store(record.detailAndRing);
   Int16x8::load(past.change).store(record.changeBefore);
   Int16x8::load(past.curvatures).store(record.curvatures);
   if (key_) {
     // All was at rest before.
     Int16x8::zero().store(record.change);
-    Int16x8::zero().store(record.movedAndFaster);
     interleave(local, local).store(record.local);
   } else {
     (detailAndRing - Int16x8::load(past.detailAndRing)).store(record.change);
-    prediction.movedAndFaster.store(record.movedAndFaster);
     evenAndOdd(interleave(local, local), Int16x8::load(past.local).evenToOdd()).store(record.local);
   }
 }

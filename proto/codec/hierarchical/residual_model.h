@@ -22,7 +22,11 @@ struct ScaleWeights {
   std::int16_t normal, u;            // times the magnitudes of this vertex that are known by then
   std::int16_t constant;
 };
-inline constexpr std::size_t kScaleClasses = 4;  // two weight classes each; the last is the corners'
+// Two weight classes each, the fourth the corners'; then the same of key frames, which know of no last frame.
+inline constexpr std::size_t kScaleClasses = 8;
+constexpr std::size_t scaleClassOf(std::uint32_t weightClass, bool key) {
+  return weightClass / 2 + (key ? kScaleClasses / 2 : 0);
+}
 extern const std::array<std::array<ScaleWeights, kComponents>, kScaleClasses> kScaleWeights;
 
 // Frequencies of symbols, of 2^kProbabilityBits; the last symbol is the escape.
