@@ -17,7 +17,8 @@ CutGrid::CutGrid(std::uint32_t edge)
   for (std::uint32_t row = 0; row + 1 < edge; ++row) {
     for (std::uint32_t column = 0; column + 1 < edge; ++column) {
       const std::uint32_t i = row * edge + column;
-      const std::uint32_t a = numbers_[i], b = numbers_[i + 1], c = numbers_[i + edge], d = numbers_[i + edge + 1];
+      const std::uint32_t a = numbers_[i], b = numbers_[i + 1], c = numbers_[i + edge],
+                          d = numbers_[i + edge + 1];
       if (random() % 2 == 0)
         triangles.insert(triangles.end(), {a, c, b, b, c, d});
       else
