@@ -396,7 +396,7 @@ void HierarchicalEncoder::State::rest(std::uint32_t begin, std::size_t first, st
     staying += stays[i] ? 1 : 0;
     if (!stays[i] && !goesOnResting(slot, predictions[i])) continue;
     positions[i - first] = predictions[i].last;
-    for (std::size_t c = 0; c < kComponents; ++c) residuals[c][i] = 0;
+    for (auto& component : residuals) component[i] = 0;
   }
 }
 
@@ -411,8 +411,7 @@ void HierarchicalEncoder::State::codeChunk(std::size_t count, const ScaleModel& 
           model.scales(component, byComponent[component], Int32x4::load(&magnitudes[kAlongNormal][first]),
                        Int32x4::load(&magnitudes[kAlongU][first]));
       const Int32x4 residual = Int32x4::load(&residuals[component][first]);
-      const Int32x4 number =
-          Int32x4{simde_mm_xor_si128(residual.shiftedLeft(1).v, residual.shiftedRight(31).v)};
+      const Int32x4 number = residual.shiftedLeft(1) ^ residual.shiftedRight(31);
       const Int32x4 isHard = (scales > Int32x4::all(15)) | (number > Int32x4::all(kEscape - 1)) | number;
       const std::size_t coder = first % kCoders;
       if (first + 4 <= count && isHard.signs() == 0 && staying == 0) {

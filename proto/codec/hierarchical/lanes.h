@@ -28,20 +28,23 @@ struct Int32x4 {
   // Keeps the sign.
   Int32x4 shiftedRight(int bits) const { return {simde_mm_sra_epi32(v, simde_mm_cvtsi32_si128(bits))}; }
   Int32x4 shiftedLeft(int bits) const { return {simde_mm_sll_epi32(v, simde_mm_cvtsi32_si128(bits))}; }
+  // Brings in zeros.
+  Int32x4 bitsShiftedRight(int bits) const { return {simde_mm_srl_epi32(v, simde_mm_cvtsi32_si128(bits))}; }
   // Whether the first three are the same.
   bool sameThree(Int32x4 other) const {
     return (simde_mm_movemask_epi8(simde_mm_cmpeq_epi32(v, other.v)) & 0xfff) == 0xfff;
   }
   friend Int32x4 operator&(Int32x4 a, Int32x4 b) { return {simde_mm_and_si128(a.v, b.v)}; }
   friend Int32x4 operator|(Int32x4 a, Int32x4 b) { return {simde_mm_or_si128(a.v, b.v)}; }
+  friend Int32x4 operator^(Int32x4 a, Int32x4 b) { return {simde_mm_xor_si128(a.v, b.v)}; }
   // The bits of b that are not a's.
   static Int32x4 without(Int32x4 a, Int32x4 b) { return {simde_mm_andnot_si128(a.v, b.v)}; }
   // All bits where it is so, else none.
   friend Int32x4 operator>(Int32x4 a, Int32x4 b) { return {simde_mm_cmpgt_epi32(a.v, b.v)}; }
   friend Int32x4 operator==(Int32x4 a, Int32x4 b) { return {simde_mm_cmpeq_epi32(a.v, b.v)}; }
   Int32x4 magnitude() const {
-    const simde__m128i sign = simde_mm_srai_epi32(v, 31);
-    return {simde_mm_sub_epi32(simde_mm_xor_si128(v, sign), sign)};
+    const Int32x4 sign = shiftedRight(31);
+    return (*this ^ sign) - sign;
   }
   // A bit a lane: its highest.
   int signs() const { return simde_mm_movemask_ps(simde_mm_castsi128_ps(v)); }

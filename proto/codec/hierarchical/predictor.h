@@ -105,7 +105,8 @@ class Predictor {
   // The frame is now the newest one of that layer.
   void keep(std::uint8_t layer);
 
-  // In coding order, of the newest frame that was kept, and of the one that this one refers to.
+  // In coding order, of the newest frame that was kept, and of the one that this one refers to (of no meaning
+  // in a key frame).
   std::span<const Node> nodes() const { return {moments_[newest_].nodes.data(), hierarchy_.vertexOf.size()}; }
   std::span<const Node> reference() const { return {pastNodes_, hierarchy_.vertexOf.size()}; }
 
@@ -134,7 +135,7 @@ class Predictor {
   Record* records_ = nullptr;
 };
 
-// What is known without the past, but for the frame. `first` and `second` span the surface.
+// All but the frame and what follows from it. `first` and `second` span the surface.
 inline void Predictor::look(std::uint32_t slot, Prediction& out, Int32x4& first, Int32x4& second) const {
   const Neighbours& neighbours = hierarchy_.neighbours[slot];
   const Node* nodes = nodes_;
@@ -155,6 +156,7 @@ inline void Predictor::look(std::uint32_t slot, Prediction& out, Int32x4& first,
 
   const Record& past = pastRecords_[slot * stride_];
   out.lastMagnitudes = past.magnitudes;
+  // In a key frame nothing moves.
   const Int32x4 before = key_ ? average : Int32x4::load(past.average);
   const Int32x4 moved = (average - before).shiftedRight(fineBits_);
   const Int16x8 narrowed = narrow(moved, moved);
@@ -208,9 +210,7 @@ inline void Predictor::predict(std::uint32_t begin, std::uint32_t count, const W
 
 // All bits where a component is not within 16 bits.
 inline Int32x4 beyond16Bits(const Vectors4& a) {
-  const auto beyond = [](Int32x4 c) {
-    return Int32x4{simde_mm_srai_epi32(simde_mm_slli_epi32(c.v, 16), 16)} == c;
-  };
+  const auto beyond = [](Int32x4 c) { return c.shiftedLeft(16).shiftedRight(16) == c; };
   return Int32x4::without(beyond(a.x) & beyond(a.y) & beyond(a.z), Int32x4::all(-1));
 }
 

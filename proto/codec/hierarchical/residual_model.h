@@ -58,7 +58,7 @@ constexpr unsigned rawBits(std::uint32_t scale) {
 inline Int32x4 scalesOf(Int32x4 expected) {
   // A float's exponent and the bit below are that.
   const Float32x4 e = clamp(Float32x4::of(expected), 4, 16383);
-  return Int32x4{simde_mm_srli_epi32(e.bits().v, 22)} - Int32x4::all(2 * (127 + 2));
+  return e.bits().bitsShiftedRight(22) - Int32x4::all(2 * (127 + 2));
 }
 
 // A scale class's weights as vectors.
@@ -91,14 +91,10 @@ class ScaleModel {
   std::array<Int16x8, kComponents> own_;
 };
 
-// As it counts in a Node.
-constexpr std::uint32_t countedMagnitude(std::int32_t residual) {
-  const auto bits = static_cast<std::uint32_t>(residual);
-  return std::min(residual < 0 ? 0u - bits : bits, kMaxMagnitude);
-}
+// As they count in a Node.
 inline Int32x4 countedMagnitudes(Int32x4 residuals) {
   const Int32x4 m = residuals.magnitude(), most = Int32x4::all(kMaxMagnitude);
-  return select(Int32x4{simde_mm_srli_epi32(m.v, 5)} == Int32x4::all(0), m, most);
+  return select(m.bitsShiftedRight(5) == Int32x4::all(0), m, most);
 }
 // Along u, v and n, as in a Node.
 inline Int32x4 packMagnitudes(Int32x4 u, Int32x4 v, Int32x4 n) {

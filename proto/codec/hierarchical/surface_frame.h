@@ -59,7 +59,7 @@ inline Int32x4 scale(Vectors4& a) {
   const Int32x4 all = a.x.magnitude() | a.y.magnitude() | a.z.magnitude();
   // Of two ones beside each other the lower goes, so that the float is not rounded to the next power of two.
   const Int32x4 exponent =
-      Int32x4{simde_mm_srli_epi32(Float32x4::of(Int32x4::without(all.shiftedRight(1), all)).bits().v, 23)};
+      Float32x4::of(Int32x4::without(all.shiftedRight(1), all)).bits().bitsShiftedRight(23);
   const Float32x4 factor = Float32x4::ofBits((Int32x4::all(266) - exponent).shiftedLeft(23));
   // Bits that the shift takes away, and a float has no room for.
   const Int32x4 lost = (all > Int32x4::all((1 << 18) - 1)) & Int32x4::all(31);
