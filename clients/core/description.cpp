@@ -178,6 +178,10 @@ bool readParts(Bytes message, Description& description, std::vector<ClothMessage
                readCollider(reader.get_view(), description.colliders.emplace_back());
       case bytes(10):
         return definition = reader.get_view(), true;
+      case varint(11):
+        description.layout.temporalLayers =
+            static_cast<std::uint8_t>(std::clamp<std::uint32_t>(reader.get_uint32(), 1, 255));
+        return true;
       case bytes(40):
         return description.materials.size() < kMaxMaterials &&
                setText(description.materials.emplace_back(), reader);
@@ -250,7 +254,7 @@ std::string check(const Description& description, const std::vector<ClothMessage
     return "a cloth's rows x columns is not its vertex_count, a triangle names a vertex that is not there, "
            "there are "
            "no vertices or more than " +
-           std::to_string(codec::kMaxVertices) + ", or max_error is out of range";
+           std::to_string(codec::kMaxVertices) + ", or max_error or temporal_layers is out of range";
   return {};
 }
 

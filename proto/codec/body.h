@@ -13,11 +13,22 @@
 
 namespace clothstream::codec {
 
+// What a frame is to the others of its stream.
+struct FrameRole {
+  std::uint64_t tick = 0;
+  PacketKind kind = PacketKind::key;
+  std::uint8_t layer = 0;
+  // Of no meaning for a key frame.
+  std::uint8_t referenceLayer = 0;  // it refers to the newest frame of that layer,
+  std::uint64_t referenceTick = 0;  // of this tick
+};
+
 class BodyDecoder {
  public:
   virtual ~BodyDecoder() = default;
   // False where the sections are not those of a frame of this layout; then nothing has changed.
-  [[nodiscard]] virtual bool decode(const ParsedPacket& packet) = 0;
+  // A predicted frame refers to the newest one of that layer.
+  [[nodiscard]] virtual bool decode(const ParsedPacket& packet, std::uint8_t referenceLayer) = 0;
   // Of the newest frame: 3 floats a vertex.
   virtual void writePositions(float* out) const = 0;
   // Only where the stream sends normals.
@@ -29,11 +40,9 @@ class BodyEncoder {
  public:
   virtual ~BodyEncoder() = default;
   virtual std::size_t packetBound() const = 0;
-  // A whole packet, header and all. `referenceTick` is the newest frame's, of no meaning for a key frame; the
-  // rest as in Encoder::encode().
-  virtual std::size_t encode(std::uint64_t tick, PacketKind kind, std::uint64_t referenceTick,
-                             std::span<const float> positions, std::span<const float> normals,
-                             std::span<std::byte> out) = 0;
+  // A whole packet, header and all; the rest as in Encoder::encode().
+  virtual std::size_t encode(const FrameRole& role, std::span<const float> positions,
+                             std::span<const float> normals, std::span<std::byte> out) = 0;
   // Of the newest frame.
   virtual std::uint64_t reconstructionHash() const = 0;
 };

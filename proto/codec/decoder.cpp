@@ -3,10 +3,12 @@
 #include "proto/codec/decoder.h"
 
 #include <new>
+#include <optional>
 #include <utility>
 
 #include "proto/codec/array.h"
 #include "proto/codec/body.h"
+#include "proto/codec/temporal_layers.h"
 #include "proto/codec/vertex_normals.h"
 
 namespace clothstream::codec {
@@ -30,10 +32,18 @@ struct Decoder::State {
     if (header.rangeCount != 1 || range.first != 0 || range.count != layout.cloths.size())
       return DecodeResult::malformed;
     if (header.referenceCount > 1) return DecodeResult::malformed;
-    if (header.kind == PacketKind::predicted && !(hasFrame && header.references[0] == tick)) {
-      return DecodeResult::missingReference;
+    const bool key = header.kind == PacketKind::key;
+    if (header.temporalLayer >= (key ? 1 : layout.temporalLayers)) return DecodeResult::malformed;
+    std::uint8_t referenceLayer = 0;
+    if (!key) {
+      const std::optional<std::uint8_t> found = held.find(header.references[0]);
+      if (!found) return DecodeResult::missingReference;
+      if (*found > header.temporalLayer) return DecodeResult::malformed;
+      referenceLayer = *found;
     }
-    if (!body->decode(*packet)) return DecodeResult::malformed;
+    if (!body->decode(*packet, referenceLayer)) return DecodeResult::malformed;
+    if (key) held.clear();
+    held.hold(header.temporalLayer, header.tick);
     tick = header.tick;
     hasFrame = true;
     hasHash = hasNormals = false;
@@ -49,6 +59,7 @@ struct Decoder::State {
   StreamLayout layout;
   std::unique_ptr<BodyDecoder> body;
   Array<float> positions, normals;
+  HeldFrames held;
   std::uint64_t tick = 0;
   std::uint64_t hash = 0;
   bool hasFrame = false;

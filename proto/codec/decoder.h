@@ -17,7 +17,8 @@ enum class DecodeResult : std::uint8_t {
   ok,
   malformed,         // not a packet of this stream's codec; the decoder's state is as before
   wrongEpoch,        // of another description
-  missingReference,  // refers to a tick that was not decoded: ask for a key frame
+  missingReference,  // refers to a tick that was not decoded, or is no longer held: ask for a key frame, or
+                     // leave it out where it is of a layer above the base
   stale,             // not newer than what is decoded
 };
 

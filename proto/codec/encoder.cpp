@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "proto/codec/body.h"
+#include "proto/codec/temporal_layers.h"
 
 namespace clothstream::codec {
 
@@ -13,8 +14,10 @@ struct Encoder::State {
   std::unique_ptr<BodyEncoder> body;
   std::size_t floats = 0;
   bool hasNormals = false;
+  std::uint8_t layers = 1;
+  HeldFrames held;
   std::uint64_t tick = 0;
-  bool hasReference = false;
+  std::uint64_t frame = 0;  // the next one's number since the key frame; 0: it is a key frame
 };
 
 std::unique_ptr<Encoder> Encoder::make(const StreamLayout& layout) {
@@ -23,6 +26,7 @@ std::unique_ptr<Encoder> Encoder::make(const StreamLayout& layout) {
   state->body =
       layout.codec == kCodecLatticeZstd ? makeLatticeEncoder(layout) : makeHierarchicalEncoder(layout);
   state->floats = 3 * std::size_t{layout.vertexCount()};
+  state->layers = layout.temporalLayers;
   state->hasNormals = layout.normals == NormalMode::octahedral;
   return std::unique_ptr<Encoder>(new Encoder(std::move(state)));
 }
@@ -39,17 +43,27 @@ std::size_t Encoder::encode(std::uint64_t tick, PacketKind kind, std::span<const
   State& s = *state_;
   assert(positions.size() == s.floats);
   assert(!s.hasNormals || normals.size() == s.floats);
-  assert(!s.hasReference || tick > s.tick);
+  assert(s.frame == 0 || tick > s.tick);
   assert(out.size() >= packetBound());
-  const PacketKind possible = s.hasReference ? kind : PacketKind::key;
-  const std::size_t bytes = s.body->encode(tick, possible, s.tick, positions, normals, out);
+  FrameRole role{.tick = tick};
+  if (kind == PacketKind::key || s.frame == 0) {
+    s.frame = 0;
+    s.held.clear();
+  } else {
+    role.kind = PacketKind::predicted;
+    role.layer = layerOf(s.frame, s.layers);
+    role.referenceLayer = s.held.referenceOf(role.layer);
+    role.referenceTick = *s.held.tick(role.referenceLayer);
+  }
+  const std::size_t bytes = s.body->encode(role, positions, normals, out);
+  s.held.hold(role.layer, tick);
   s.tick = tick;
-  s.hasReference = true;
+  s.frame += 1;
   return bytes;
 }
 
 void Encoder::forgetHistory() {
-  state_->hasReference = false;
+  state_->frame = 0;
 }
 
 std::uint64_t Encoder::reconstructionHash() const {

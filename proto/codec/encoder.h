@@ -25,8 +25,9 @@ class Encoder {
 
   // 3 floats a vertex, metres, within the lattice (32 m at any max error); normals of about unit length, or
   // nothing where the layout has none. `tick` must grow from call to call, but where history was forgotten. A
-  // predicted frame refers to the frame encoded before; the first is always a key frame, whatever is asked.
-  // Writes to `out` (at least packetBound() bytes) and returns the number of bytes written.
+  // predicted frame refers to the frame encoded before, or with temporal layers to the newest of a lower
+  // layer (of its own in the base), and the header says which; the first is always a key frame, whatever is
+  // asked. Writes to `out` (at least packetBound() bytes) and returns the number of bytes written.
   std::size_t encode(std::uint64_t tick, PacketKind kind, std::span<const float> positions,
                      std::span<const float> normals, std::span<std::byte> out);
 

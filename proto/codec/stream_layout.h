@@ -26,6 +26,9 @@ constexpr bool isCodec(std::uint32_t id) {
   return id == kCodecLatticeZstd || id == kCodecHierarchical;
 }
 
+// Frames at full, half and a quarter of the rate.
+inline constexpr std::uint8_t kMaxTemporalLayers = 3;
+
 struct StreamLayout {
   std::uint32_t epoch = 0;
   std::uint8_t codec = kCodecLatticeZstd;
@@ -34,6 +37,10 @@ struct StreamLayout {
   // 2 turn with the surface, and what it promises is the distance that follows: sqrt(3) maxError at most.
   float maxError = 0.0005f;
   NormalMode normals = NormalMode::none;
+  // 1: each frame refers to the one before it, and none can be left out. 2 or 3, of codec 2 alone: every
+  // second frame can, or all but every fourth, layer by layer from the highest; it costs bits
+  // (docs/codec.md).
+  std::uint8_t temporalLayers = 1;
   std::vector<ClothLayout> cloths;
 
   std::uint32_t vertexCount() const {
@@ -46,14 +53,16 @@ struct StreamLayout {
 inline constexpr std::uint32_t kMaxVertices = 1u << 26;
 inline constexpr float kSmallestMaxError = 5e-6f, kLargestMaxError = 1000;
 
-// Whether a stream can have this layout: a codec of ours (codec 2 sends no normals), one cloth or more, none
-// empty, grids whose numbers agree, triangles of vertices that there are, at most kMaxVertices, a max error
-// within the two bounds above.
+// Whether a stream can have this layout: a codec of ours (codec 2 sends no normals, codec 1 has one temporal
+// layer), 1 to kMaxTemporalLayers layers, one cloth or more, none empty, grids whose numbers agree, triangles
+// of vertices that there are, at most kMaxVertices, a max error within the two bounds above.
 inline bool isPossible(const StreamLayout& layout) {
   if (!(layout.maxError >= kSmallestMaxError && layout.maxError <= kLargestMaxError)) return false;
   if (layout.normals != NormalMode::none && layout.normals != NormalMode::octahedral) return false;
   if (!isCodec(layout.codec)) return false;
   if (layout.codec == kCodecHierarchical && layout.normals != NormalMode::none) return false;
+  if (layout.temporalLayers < 1 || layout.temporalLayers > kMaxTemporalLayers) return false;
+  if (layout.codec == kCodecLatticeZstd && layout.temporalLayers > 1) return false;
   std::uint64_t vertices = 0;
   for (const ClothLayout& cloth : layout.cloths) {
     const std::uint64_t nodes = std::uint64_t{cloth.rows} * cloth.columns;

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: MIT
-// Suite codec_motions: both codecs over four motions that they were not fitted to.
+// Suite codec_motions: both codecs over four motions that they were not fitted to; codec 2 with temporal
+// layers, and of the cloth as a mesh, too.
 #include <array>
 #include <cmath>
 #include <numbers>
 #include <stdexcept>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
@@ -12,6 +14,7 @@
 #include "proto/codec/encoder.h"
 #include "proto/codec/vertex_normals.h"
 #include "tests/bench/cloth_motion.h"
+#include "tests/bench/cut_grid.h"
 #include "tests/bench/samples.h"
 #include "tests/bench/suite.h"
 
@@ -67,6 +70,8 @@ class Measurement {
     return {{"suite", "codec_motions"},
             {"motion", motion},
             {"codec", layout_.codec},
+            {"cloth", layout_.cloths[0].rows > 0 ? "grid" : "mesh"},
+            {"temporalLayers", layout_.temporalLayers},
             {"nodes", layout_.vertexCount()},
             {"maxErrorMm", layout_.maxError * 1e3},
             {"bitsPerVertex", sum_ / static_cast<double>(bytes_.count()) * bits},
@@ -130,13 +135,20 @@ Rows runCodecMotions(vulkan::Device&, const Settings& settings) {
     codec::StreamLayout layout{
         .epoch = 1, .maxError = kMaxError, .cloths = {{motion.size * motion.size, motion.size, motion.size}}};
     std::vector<Measurement> measurements;
-    for (const std::uint32_t id : codec::kCodecs) {
-      layout.codec = static_cast<std::uint8_t>(id);
+    measurements.emplace_back(layout);
+    layout.codec = codec::kCodecHierarchical;
+    for (layout.temporalLayers = 1; layout.temporalLayers <= codec::kMaxTemporalLayers;
+         ++layout.temporalLayers)
       measurements.emplace_back(layout);
-    }
+    layout.temporalLayers = 1;
+    CutGrid mesh(motion.size);
+    layout.cloths = {mesh.cloth()};
+    Measurement ofMesh(layout);
     playMotion(motion, [&](std::uint32_t frame, std::span<const float> positions) {
       for (Measurement& measurement : measurements) measurement.add(frame, positions);
+      ofMesh.add(frame, mesh.renumbered(positions));
     });
+    measurements.push_back(std::move(ofMesh));
     for (const Measurement& measurement : measurements) rows.push_back(measurement.row(motion.name));
   }
   return rows;

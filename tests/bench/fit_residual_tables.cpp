@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <deque>
 #include <string>
 #include <utility>
 #include <vector>
@@ -25,6 +26,27 @@ constexpr std::size_t kTerms = 6;  // of ScaleWeights
 using Terms = std::array<double, kTerms>;
 using Estimators = std::array<std::array<Terms, kComponents>, kScaleClasses>;
 
+// An encoder on its way through a motion.
+struct Trainee {
+  Trainee(const codec::ClothLayout& cloth, bool onlyKeys, float maxError)
+      : keysAlone(onlyKeys),
+        encoder({.epoch = 1, .codec = codec::kCodecHierarchical, .maxError = maxError, .cloths = {cloth}}),
+        packet(encoder.packetBound()) {}
+
+  void code(std::uint32_t frame, std::span<const float> positions, std::vector<CodedResidual>& residuals) {
+    if (keysAlone && frame % 20 != 0) return;
+    const bool key = keysAlone || frame == 0 || frame == 60;
+    const bool counts = keysAlone || (frame >= 6 && (frame < 10 || frame % 3 == 0 || frame == 61));
+    encoder.record(counts ? &residuals : nullptr);
+    const auto kind = key ? codec::PacketKind::key : codec::PacketKind::predicted;
+    encoder.encode({.tick = frame + 1, .kind = kind, .referenceTick = frame}, positions, {}, packet);
+  }
+
+  bool keysAlone;  // and few frames
+  HierarchicalEncoder encoder;
+  std::vector<std::byte> packet;
+};
+
 std::vector<CodedResidual> codeMotions() {
   const std::array motions{
       MotionSettings{.name = "",
@@ -42,20 +64,14 @@ std::vector<CodedResidual> codeMotions() {
   std::vector<CodedResidual> residuals;
   for (MotionSettings motion : motions) {
     motion.frames = 200;
+    const codec::ClothLayout cloth{motion.size * motion.size, motion.size, motion.size};
+    std::deque<Trainee> trainees;
     for (const float maxError : {0.001f, 0.0005f, 0.00025f}) {
-      HierarchicalEncoder encoder({.epoch = 1,
-                                   .codec = codec::kCodecHierarchical,
-                                   .maxError = maxError,
-                                   .cloths = {{motion.size * motion.size, motion.size, motion.size}}});
-      std::vector<std::byte> packet(encoder.packetBound());
-      playMotion(motion, [&](std::uint32_t frame, std::span<const float> positions) {
-        const bool key = frame == 0 || frame == 60;
-        const bool counts = frame >= 6 && (frame < 10 || frame % 3 == 0 || frame == 61);
-        encoder.record(counts ? &residuals : nullptr);
-        const auto kind = key ? codec::PacketKind::key : codec::PacketKind::predicted;
-        encoder.encode(frame + 1, kind, frame, positions, {}, packet);
-      });
+      for (const bool keysAlone : {false, true}) trainees.emplace_back(cloth, keysAlone, maxError);
     }
+    playMotion(motion, [&](std::uint32_t frame, std::span<const float> positions) {
+      for (Trainee& trainee : trainees) trainee.code(frame, positions, residuals);
+    });
   }
   return residuals;
 }

@@ -80,5 +80,11 @@ TEST(Allocation, OfTheHierarchicalCodecHappensOnlyAtConstruction) {
   expectAllocationOnlyAtConstruction(mixedLayout(NormalMode::none, kCodecHierarchical));
 }
 
+TEST(Allocation, OfTemporalLayersHappensOnlyAtConstruction) {
+  StreamLayout layout = mixedLayout(NormalMode::none, kCodecHierarchical);
+  layout.temporalLayers = 3;
+  expectAllocationOnlyAtConstruction(layout);
+}
+
 }  // namespace
 }  // namespace clothstream::codec

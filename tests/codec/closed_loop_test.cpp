@@ -299,7 +299,7 @@ TEST(ClosedLoopKinds, PredictionPaysOnASlowMotion) {
 TEST(Layout, ThatIsImpossibleMakesNoCodec) {
   const StreamLayout good = mixedLayout(NormalMode::none);
   ASSERT_NE(Decoder::make(good), nullptr);
-  std::vector<StreamLayout> bad(12, good);
+  std::vector<StreamLayout> bad(15, good);
   bad[0].cloths.clear();
   bad[1].cloths[0].rows = 8;
   bad[2].cloths[0].rows = 0;
@@ -312,6 +312,10 @@ TEST(Layout, ThatIsImpossibleMakesNoCodec) {
   bad[9].codec = 0;
   bad[10].codec = 3;
   bad[11] = mixedLayout(NormalMode::octahedral, kCodecHierarchical);
+  bad[12].temporalLayers = 0;
+  bad[13].temporalLayers = 2;  // of codec 1
+  bad[14] = mixedLayout(NormalMode::none, kCodecHierarchical);
+  bad[14].temporalLayers = kMaxTemporalLayers + 1;
   for (std::size_t i = 0; i < bad.size(); ++i) {
     EXPECT_EQ(Decoder::make(bad[i]), nullptr) << i;
     EXPECT_EQ(Encoder::make(bad[i]), nullptr) << i;

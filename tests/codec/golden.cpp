@@ -43,6 +43,7 @@ GoldenStream readStream(const nlohmann::json& json) {
   stream.layout.epoch = json.at("epoch");
   stream.layout.codec = json.at("codec");
   stream.layout.maxError = json.at("maxError");
+  stream.layout.temporalLayers = json.value("temporalLayers", std::uint8_t{1});
   stream.layout.normals = json.at("normals") == "octahedral" ? NormalMode::octahedral : NormalMode::none;
   for (const nlohmann::json& cloth : json.at("cloths")) {
     stream.layout.cloths.push_back({cloth.at("vertexCount"), cloth.at("rows"), cloth.at("columns")});
@@ -64,6 +65,7 @@ nlohmann::ordered_json describe(const GoldenStream& stream) {
       {"codec", stream.layout.codec},
       {"maxError", stream.layout.maxError},
       {"normals", stream.layout.normals == NormalMode::octahedral ? "octahedral" : "none"}};
+  if (stream.layout.temporalLayers > 1) json["temporalLayers"] = stream.layout.temporalLayers;
   for (const ClothLayout& cloth : stream.layout.cloths) {
     json["cloths"].push_back(
         {{"vertexCount", cloth.vertexCount}, {"rows", cloth.rows}, {"columns", cloth.columns}});

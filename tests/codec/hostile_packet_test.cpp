@@ -128,6 +128,7 @@ TEST(HostilePacket, ThatRefersToWhatWasNotDecodedAsksForAKeyFrame) {
     Victim victim(stream);
     victim.receiveUpTo(0);
     EXPECT_EQ(victim.receive(stream.packets[1].bytes), DecodeResult::missingReference);
+    if (stream.layout.temporalLayers > 1) continue;  // packet 2 refers to packet 0: temporal_layers_test.cpp
     victim.receiveUpTo(1);
     EXPECT_EQ(victim.receive(stream.packets[2].bytes), DecodeResult::missingReference);
     victim.expectState(1);

@@ -19,7 +19,7 @@ def read_tables():
                             for row in re.findall(r"\{(-?\d+(?:, -?\d+){%d})\}" % (n - 1), part)]
     scales, distributions = text.split("kDistributions{{")
     weights = rows(scales, 6)
-    return [weights[3 * i:3 * i + 3] for i in range(4)], rows(distributions, 16)
+    return [weights[3 * i:3 * i + 3] for i in range(8)], rows(distributions, 16)
 
 
 SCALE_WEIGHTS, DISTRIBUTIONS = read_tables()
@@ -216,62 +216,67 @@ class Decoder:
         self.k = 8
         while self.k > 4 and error / (2 ** (self.k - 1) + 2) * 2 ** 27 < 40:
             self.k -= 1
-        self.history = []  # the newest first
-        self.weights = None
+        self.layers = stream.get("temporalLayers", 1)
+        self.held = {}  # the newest frame of each layer, by layer
+        self.history = []  # what the frame that is decoded refers to, what that one does, and so on
 
-    def read_weights(self, section, key):
-        weights = [[0] * 16 for _ in range(7)]
+    def read_weights(self, section, key, layer):
+        """The weights that the frame uses; those that it leaves, by layer."""
+        alone = lambda f, w: [[w if i == f and c < 6 else 0 for i in range(16)] for c in range(7)]
         if key:
-            for c in range(6):
-                weights[c][1] = -256
-        elif len(self.history) == 1:
-            for c in range(6):
-                weights[c][2] = 700
+            left = [alone(7, -192)] * 3
         else:
-            weights = [row[:] for row in self.weights]
+            left = self.history[0]["weights"]
+        left = [[row[:] for row in weights] for weights in left]
+        used = left[layer]
         if section:
             bits = Bits(section)
             if bits.get(1):
-                bits.check_end()
-                self.weights = weights
-                return [[0] * 16] * 7
-            for c in range(6):
-                if bits.get(1):
-                    for f in [1] if key else range(16):
-                        weights[c][f] += unzigzag(bits.gamma(4))
+                used = [[0] * 16] * 7
+            else:
+                for weights in left[layer:1 if key else self.layers]:
+                    for c in range(6):
+                        if bits.get(1):
+                            for f in (6, 7) if key else range(16):
+                                weights[c][f] += unzigzag(bits.gamma(4))
             bits.check_end()
-        self.weights = weights
-        return weights
+        return used, [alone(2, 700)] * 3 if key else left
 
-    def decode(self, key, sections):
+    def decode(self, packet):
+        key, layer, tick, reference, sections = packet
+        self.history = []
         if key:
-            self.history = []
-        weights = self.read_weights(sections[0], key)
+            self.held = {}
+        else:
+            at = next(frame for frame in self.held.values() if frame["tick"] == reference)
+            assert at["layer"] <= layer < self.layers
+            self.history = [at, at["history"][0], at["history"][1]]
+        weights, left = self.read_weights(sections[0], key, layer)
         symbols, bits = Symbols(sections[1]), Bits(sections[2])
-        now = {name: [None] * self.count for name in "RSGQEDM"}
+        now = {name: [None] * self.count for name in "RSGQEDMW"}
         now["rests"] = [False] * self.count
         for weight_class, phase in self.cloths.phases:
             quiet = bits.get(1)
             for start in range(0, len(phase), 64):
-                for four in range(start, min(start + 64, len(phase)), 4):
-                    end = min(four + 4, start + 64, len(phase))
-                    group = phase[four:end]
-                    predicted = [self.predict(now, v, weights[weight_class]) for v in group]
-                    residuals, stays = self.read_residuals(now, group, weight_class // 2, quiet, symbols, bits)
-                    for i, v in enumerate(group):
-                        self.place(now, v, predicted[i], residuals[i], stays[i])
+                group = phase[start:start + 64]
+                predicted = [self.predict(now, v, weights[weight_class]) for v in group]
+                residuals, stays = self.read_residuals(now, group, weight_class // 2 + (4 if key else 0), quiet, symbols, bits)
+                for i, v in enumerate(group):
+                    self.place(now, v, predicted[i], residuals[i], stays[i])
         symbols.check_end()
         bits.check_end()
         now["C"] = []
         for v in range(self.count):
             around = add(*(now["R"][n] for n in self.cloths.nearest[v]))
             now["C"].append(sat(shift(sub(around, times(now["R"][v], 4)), self.k - 4)))
-        self.history = [now] + self.history[:2]
+        now.update(tick=tick, layer=layer, weights=left)
+        now["history"] = self.history[:2] or [now, now]
+        self.newest = self.held[layer] = now
 
     def past(self, name, i, v):
         if not self.history:
             return (0, 0, 0)
-        return self.history[min(i, len(self.history)) - 1][name][v]
+        return self.history[i - 1][name][v]
 
     def predict(self, now, v, w):
         f = self.k - 4
@@ -285,20 +290,20 @@ class Decoder:
         past = lambda name, i: self.past(name, i, v)
         e1, e2, e3 = (past("E", i) for i in (1, 2, 3))
         g1, g2, g3 = (past("G", i) for i in (1, 2, 3))
-        s1, s2, s3 = (past("S", i) for i in (1, 2, 3))
-        d1 = past("D", 1)
-        change = subs(d1, past("D", 2))
-        along = lambda d: sat(shift(add(times(u, d[0]), times(v_, d[1])), 14))
-        across = lambda d: sat(shift(times(n, d[2]), 14))
+        s1 = past("S", 1)
+        moved = sat(shift(sub(s, s1), f)) if self.history else (0, 0, 0)
+        d1, d2 = past("D", 1), past("D", 2)
+        pairs = (w[12], w[14]), (w[12], w[14]), (w[13], w[15])
+        turned = [sat16(a * x + b * (x - y) + 128 >> 8) for (a, b), x, y in zip(pairs, d1, d2)]
         features = [e1, g1, subs(e1, e2), subs(g1, g2), subs(e2, e3), subs(g2, g3), subs(q, past("Q", 1)), subs(g, g1),
-                    past("C", 1), past("C", 2), sat(shift(add(s, times(s1, -2), s2), f)),
-                    sat(shift(add(s1, times(s2, -2), s3), f)), along(d1), across(d1), along(change), across(change)]
-        total = add(*(times(feature, weight) for feature, weight in zip(features, w)), (1 << 9 - f,) * 3)
+                    past("C", 1), past("C", 2), subs(moved, past("W", 1)), subs(past("W", 1), past("W", 2))]
+        total = add(*(times(feature, weight) for feature, weight in zip(features, w)), (1 << 9 - f,) * 3,
+                    shift(add(*map(times, axes, turned)), 6))
         r1 = past("R", 1)
         prediction = add(s, r1, times(s1, -1), shift(total, 10 - f))
         if self.history and self.history[0]["rests"][v]:
             prediction = r1
-        now["S"][v], now["G"][v], now["Q"][v] = s, g, q
+        now["S"][v], now["G"][v], now["Q"][v], now["W"][v] = s, g, q, moved
         return prediction, axes
 
     def read_residuals(self, now, group, scale_class, quiet, symbols, bits):
@@ -322,7 +327,7 @@ class Decoder:
                     o = e.bit_length() - 1
                     scale = 2 * (o - 2) + (e >> o - 1 & 1)
                     b = 0 if scale < 16 else (scale - 14) // 2
-                    number = symbols.get(i, DISTRIBUTIONS[scale + (24 if c == 2 else 0)])
+                    number = symbols.get(i % 4, DISTRIBUTIONS[scale + (24 if c == 2 else 0)])
                     if number == 15:
                         beyond = bits.gamma(2)
                         if c == 2:
@@ -359,7 +364,7 @@ class Decoder:
         halves = []
         for seed in 0x85a308d3, 0x243f6a88:
             total = 0
-            for i, position in enumerate(self.history[0]["R"]):
+            for i, position in enumerate(self.newest["R"]):
                 h = mix(i + seed & mask)
                 for x in position:
                     h = mix(h ^ x & mask)
@@ -368,7 +373,7 @@ class Decoder:
         return "%08x%08x" % tuple(halves)
 
 
-def sections_of(packet):
+def parse(packet):
     at = 5
 
     def byte():
@@ -386,9 +391,9 @@ def sections_of(packet):
                 return value
 
     assert packet[0] == 1 and packet[1] == 2
-    varint(), varint()  # epoch, tick
-    for _ in range(byte()):
-        varint()
+    varint()  # epoch
+    tick = varint()
+    references = [tick - varint() for _ in range(byte())]
     for _ in range(varint()):
         varint(), varint()
     sizes = [varint() for _ in range(byte())]
@@ -397,7 +402,7 @@ def sections_of(packet):
     for size in sizes:
         sections.append(packet[at:at + size])
         at += size
-    return packet[2] == 0, sections
+    return packet[2] == 0, packet[4], tick, references[0] if references else None, sections
 
 
 def main():
@@ -407,7 +412,7 @@ def main():
             continue
         decoder = Decoder(stream)
         for packet in stream["packets"]:
-            decoder.decode(*sections_of(open(GOLDEN + packet["file"], "rb").read()))
+            decoder.decode(parse(open(GOLDEN + packet["file"], "rb").read()))
             if decoder.hash() != packet["reconstructionHash"]:
                 sys.exit("%s: %s, not %s" % (packet["file"], decoder.hash(), packet["reconstructionHash"]))
             packets += 1

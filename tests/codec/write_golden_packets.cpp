@@ -11,21 +11,18 @@
 namespace clothstream::codec {
 namespace {
 
-GoldenStream makeStream(const std::string& name, const StreamLayout& layout) {
+struct Moment {
+  std::uint64_t tick;
+  PacketKind kind;
+  MotionFrame frame;
+};
+
+GoldenStream makeStream(const std::string& name, const StreamLayout& layout,
+                        const std::vector<Moment>& moments) {
   GoldenStream stream{.name = name, .layout = layout, .packets = {}};
   const auto encoder = Encoder::make(layout);
   const auto decoder = Decoder::make(layout);
   std::vector<std::byte> packet(encoder->packetBound());
-  // A motion, a still moment, and a jump, so that each prediction has its turn.
-  const struct {
-    std::uint64_t tick;
-    PacketKind kind;
-    MotionFrame frame;
-  } moments[] = {{1, PacketKind::key, sampleMotion(layout, 1, 0.05f)},
-                 {2, PacketKind::predicted, sampleMotion(layout, 2, 0.05f)},
-                 {130, PacketKind::predicted, sampleMotion(layout, 2, 0.05f)},
-                 {131, PacketKind::predicted, scatter(layout, 1, 5)},
-                 {132, PacketKind::predicted, sampleMotion(layout, 4, 0.05f)}};
   for (const auto& [tick, kind, frame] : moments) {
     const std::size_t bytes = encoder->encode(tick, kind, frame.positions, frame.normals, packet);
     GoldenPacket golden{.file = name + "_" + std::to_string(tick) + ".bin",
@@ -42,6 +39,26 @@ GoldenStream makeStream(const std::string& name, const StreamLayout& layout) {
   return stream;
 }
 
+// A motion, a still moment, and a jump, so that each prediction has its turn.
+GoldenStream makeStream(const std::string& name, const StreamLayout& layout) {
+  return makeStream(name, layout,
+                    {{1, PacketKind::key, sampleMotion(layout, 1, 0.05f)},
+                     {2, PacketKind::predicted, sampleMotion(layout, 2, 0.05f)},
+                     {130, PacketKind::predicted, sampleMotion(layout, 2, 0.05f)},
+                     {131, PacketKind::predicted, scatter(layout, 1, 5)},
+                     {132, PacketKind::predicted, sampleMotion(layout, 4, 0.05f)}});
+}
+
+// A motion that goes on until weights have come for each layer.
+GoldenStream makeLongStream(const std::string& name, const StreamLayout& layout) {
+  std::vector<Moment> moments;
+  for (std::uint64_t tick = 1; tick <= 12; ++tick) {
+    moments.push_back(
+        {tick, tick == 1 ? PacketKind::key : PacketKind::predicted, sampleMotion(layout, tick, 0.02f)});
+  }
+  return makeStream(name, layout, moments);
+}
+
 }  // namespace
 }  // namespace clothstream::codec
 
@@ -56,6 +73,13 @@ int main() try {
                                         .maxError = 0.00002f,
                                         .normals = NormalMode::none,
                                         .cloths = {{.vertexCount = 150, .rows = 15, .columns = 10}}}),
+       makeLongStream("weighted", {.epoch = 9,
+                                   .codec = kCodecHierarchical,
+                                   .cloths = {{.vertexCount = 400, .rows = 20, .columns = 20}}}),
+       makeLongStream("layered", {.epoch = 9,
+                                  .codec = kCodecHierarchical,
+                                  .temporalLayers = 3,
+                                  .cloths = {{.vertexCount = 400, .rows = 20, .columns = 20}}}),
        makeStream("vertex", {.epoch = 0xffffffffu,
                              .codec = kCodecLatticeZstd,
                              .maxError = 0.01f,

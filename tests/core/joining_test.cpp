@@ -295,6 +295,8 @@ INSTANTIATE_TEST_SUITE_P(
             [](v1::StreamDescription& d) { d.mutable_cloths(0)->set_vertex_count(4'000'000'000); },
             "rest_positions has 756 bytes for 4000000000 vertices"},
         WrongDescription{"max_error", [](v1::StreamDescription& d) { d.set_max_error(0); }, "max_error"},
+        WrongDescription{"temporal_layers", [](v1::StreamDescription& d) { d.set_temporal_layers(257); },
+                         "temporal_layers"},
         WrongDescription{"not_finite",
                          [](v1::StreamDescription& d) {
                            v1::ClothDescription& cloth = *d.mutable_cloths(0);

@@ -16,7 +16,7 @@ LatticeUnit latticeUnit(float maxError) {
 
 Weights keyFrameWeights() {
   Weights weights{};
-  for (std::size_t c = 0; c < kWeightClasses; ++c) weights[c][kRingFeature] = -256;
+  for (std::size_t c = 0; c < kWeightClasses; ++c) weights[c][kRingFeature] = -192;
   return weights;
 }
 
@@ -26,12 +26,19 @@ Weights startingWeights() {
   return weights;
 }
 
-WeightVectors weightVectors(const Weights& weights) {
-  WeightVectors vectors;
+std::array<WeightVectors, kWeightClasses + 1> weightVectors(const Weights& weights) {
+  std::array<WeightVectors, kWeightClasses + 1> vectors;
   for (std::size_t c = 0; c < weights.size(); ++c) {
-    for (std::size_t pair = 0; pair < kFeaturePairs; ++pair) {
-      vectors[c][pair] = Int16x8::allPairs(weights[c][2 * pair], weights[c][2 * pair + 1]);
+    const auto& w = weights[c];
+    for (std::size_t pair = 0; pair < kPlainPairs; ++pair) {
+      vectors[c].plain[pair] = Int16x8::allPairs(w[2 * pair], w[2 * pair + 1]);
     }
+    // Of what is now, and of what was before.
+    const auto now = [&](std::size_t f) { return static_cast<std::int16_t>(w[f] + w[f + 2]); };
+    const auto before = [&](std::size_t f) { return static_cast<std::int16_t>(-w[f + 2]); };
+    constexpr std::size_t along = 2 * kPlainPairs, across = along + 1;
+    vectors[c].local =
+        Int16x8::of(now(along), before(along), now(along), before(along), now(across), before(across));
   }
   return vectors;
 }

@@ -25,23 +25,22 @@ inline constexpr unsigned kWeightGammaBits = 4, kEscapeGammaBits = 2;
 // was in the frame before, and has no other residuals.
 inline constexpr std::uint32_t kStays = 0;
 
-// Vertices that are predicted before the first of them is coded: few enough to stay in the nearest cache.
-inline constexpr std::uint32_t kChunk = 64;
-
 // The first section, where it is not empty, starts with a bit: 1 where nothing follows and all weights are 0
-// in this frame alone, so that what is at rest stays where it is; else changes follow.
+// in this frame alone, so that what is at rest stays where it is; else changes follow, by layer.
 
-// What a key frame's changes apply to, and those of the first frame after it. Later ones change the weights
-// of the frame before.
+// What a key frame's changes apply to; what it leaves, for every layer.
 Weights keyFrameWeights();
 Weights startingWeights();
 
-using WeightVectors = std::array<FeatureVectors, kWeightClasses + 1>;
-WeightVectors weightVectors(const Weights& weights);
+// By layer. A frame starts with those that its reference left, changes those of its own layer and of higher
+// ones, and leaves them to the frames that refer to it.
+using LayerWeights = std::array<Weights, kMaxTemporalLayers>;
+
+std::array<WeightVectors, kWeightClasses + 1> weightVectors(const Weights& weights);
 
 // The features whose weights a frame of this kind can change.
 constexpr std::size_t firstWeight(bool key) {
-  return key ? kRingFeature : 0;
+  return key ? kTwistFeature : 0;
 }
 constexpr std::size_t endWeight(bool key) {
   return key ? kRingFeature + 1 : kFeatures;

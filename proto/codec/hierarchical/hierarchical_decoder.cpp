@@ -13,25 +13,15 @@
 namespace clothstream::codec::hierarchical {
 namespace {
 
-// Not 0 where a coordinate is beyond kMaxCoordinate.
-std::uint32_t isOutside(Int32x4 position) {
-  alignas(16) std::int32_t p[4];
-  position.store(p);
-  std::uint32_t outside = 0;
-  for (std::size_t c = 0; c < 3; ++c) {
-    outside |= static_cast<std::uint32_t>(p[c]) + kMaxCoordinate > 2u * kMaxCoordinate ? 1u : 0u;
-  }
-  return outside;
-}
-
 class HierarchicalDecoder final : public BodyDecoder {
  public:
   bool allocate(const StreamLayout& layout) {
     unit_ = latticeUnit(layout.maxError);
+    layers_ = layout.temporalLayers;
     return predictor_.allocate(layout, unit_.stepBits);
   }
 
-  bool decode(const ParsedPacket& packet) override;
+  bool decode(const ParsedPacket& packet, std::uint8_t referenceLayer) override;
   void writePositions(float* out) const override;
   void writeNormals(float*) const override {}
   std::uint64_t reconstructionHash() const override;
@@ -42,133 +32,189 @@ class HierarchicalDecoder final : public BodyDecoder {
     BitReader bits;
   };
 
-  bool readWeights(std::span<const std::byte> section, bool key, Weights& weights, bool& atRest) const;
-  // Without a model there are no residuals. Returns whether a position lies outside.
-  std::uint32_t decodeChunk(std::uint32_t begin, std::uint32_t end, const FeatureVectors& weights,
-                            const ScaleModel* model, Streams& streams);
-  // The residuals of up to kCoders vertices, from predictions_[first] on.
-  void setStaying(std::size_t i) {
-    stays_[i] = true;
-    for (std::size_t c = 0; c < kComponents; ++c) {
-      residuals_[i][c] = 0;
-      magnitudes_[i][c] = 0;
-    }
-  }
-  template <typename Count>
-  void readResiduals(std::size_t first, Count count, const ScaleModel& model, Streams& streams);
+  // Changes those of `weights` that a frame of this layer can.
+  bool readWeights(std::span<const std::byte> section, bool key, std::uint8_t layer, LayerWeights& weights,
+                   bool& atRest) const;
+  // Without a model there are no residuals.
+  void decodeChunk(std::uint32_t begin, std::uint32_t count, const WeightVectors& weights,
+                   const ScaleModel* model, Streams& streams);
+  void readResiduals(std::uint32_t count, const ScaleModel& model, Streams& streams);
+  void readComponent(Component component, std::uint32_t count, Streams& streams);
+  template <bool within>
+  void readSymbols(Component component, std::uint32_t count, Streams& streams);
+  std::uint32_t readEscaped(Component component, std::size_t i, BitReader& bits);
+  void reconstruct(std::uint32_t begin, std::uint32_t count);
+  void place(std::uint32_t slot, const Prediction& prediction, Int32x4 position, std::uint32_t magnitudes);
 
   LatticeUnit unit_{};
   Predictor predictor_;
-  Weights weights_{};
+  std::uint8_t layers_ = 1;
+  std::array<LayerWeights, kMaxTemporalLayers> weights_{};  // that the newest frame of each layer left
+  bool outside_ = false;  // a coordinate of the frame that is being decoded is beyond kMaxCoordinate
   // Of the chunk that is being decoded.
-  std::array<Prediction, kChunk> predictions_;
-  alignas(16) std::int32_t expected_[kChunk][4];
-  std::int32_t residuals_[kChunk][kComponents];
-  std::uint32_t magnitudes_[kChunk][kComponents];
-  std::array<bool, kChunk> stays_;
+  std::array<Prediction, kChunk> predictions_{};
+  std::array<SurfaceFrames, kChunk / 4> frames_;
+  alignas(16) std::int32_t residuals_[kComponents][kChunk] = {};
+  alignas(16) std::int32_t scales_[kChunk];
+  std::array<bool, kChunk> stays_{};
+  bool anyStays_ = false;
 };
 
-bool HierarchicalDecoder::readWeights(std::span<const std::byte> section, bool key, Weights& weights,
-                                      bool& atRest) const {
+bool HierarchicalDecoder::readWeights(std::span<const std::byte> section, bool key, std::uint8_t layer,
+                                      LayerWeights& weights, bool& atRest) const {
   atRest = false;
   if (section.empty()) return true;
   BitReader reader(section);
   atRest = reader.get(1) != 0;
-  for (std::size_t c = 0; !atRest && c < kWeightClasses; ++c) {
-    if (reader.get(1) == 0) continue;
-    for (std::size_t f = firstWeight(key); f < endWeight(key); ++f) {
-      const std::int64_t value = std::int64_t{weights[c][f]} + unzigzag(reader.getGamma(kWeightGammaBits));
-      if (value < -kMaxWeight || value > kMaxWeight) return false;
-      weights[c][f] = static_cast<std::int16_t>(value);
+  const std::uint8_t layers = atRest ? layer : key ? 1 : layers_;
+  for (; layer < layers; ++layer) {
+    for (std::size_t c = 0; c < kWeightClasses; ++c) {
+      if (reader.get(1) == 0) continue;
+      for (std::size_t f = firstWeight(key); f < endWeight(key); ++f) {
+        std::int16_t& weight = weights[layer][c][f];
+        const std::int64_t value = std::int64_t{weight} + unzigzag(reader.getGamma(kWeightGammaBits));
+        if (value < -kMaxWeight || value > kMaxWeight) return false;
+        weight = static_cast<std::int16_t>(value);
+      }
     }
   }
   return reader.atEnd();
 }
 
-bool HierarchicalDecoder::decode(const ParsedPacket& packet) {
+bool HierarchicalDecoder::decode(const ParsedPacket& packet, std::uint8_t referenceLayer) {
   const PacketHeader& header = packet.header;
   if (header.sectionCount != kSections) return false;
   const bool key = header.kind == PacketKind::key;
+  const std::uint8_t layer = header.temporalLayer;
   const std::size_t weightBytes = header.sectionBytes[0], symbolBytes = header.sectionBytes[1];
-  Weights weights = key ? keyFrameWeights() : weights_;
+  LayerWeights weights = weights_[referenceLayer];
+  if (key) weights.fill(keyFrameWeights());
   bool atRest;
-  if (!readWeights(packet.body.first(weightBytes), key, weights, atRest)) return false;
-  const WeightVectors vectors = weightVectors(atRest ? Weights{} : weights);
+  if (!readWeights(packet.body.first(weightBytes), key, layer, weights, atRest)) return false;
+  const auto vectors = weightVectors(atRest ? Weights{} : weights[layer]);
   Streams streams{RansReader(packet.body.subspan(weightBytes, symbolBytes)),
                   BitReader(packet.body.subspan(weightBytes + symbolBytes))};
-  std::uint32_t outside = 0;
-  predictor_.begin(key);
+  outside_ = false;
+  predictor_.begin(key, referenceLayer);
   for (const Phase& phase : predictor_.hierarchy().phases) {
-    const ScaleModel model(kScaleWeights[phase.weightClass / 2]);
+    const ScaleModel model(kScaleWeights[scaleClassOf(phase.weightClass, key)]);
     const bool quiet = streams.bits.get(1) != 0;
     for (std::uint32_t begin = phase.begin; begin < phase.end; begin += kChunk) {
-      const std::uint32_t end = std::min(begin + kChunk, phase.end);
-      outside |= decodeChunk(begin, end, vectors[phase.weightClass], quiet ? nullptr : &model, streams);
+      decodeChunk(begin, std::min(kChunk, phase.end - begin), vectors[phase.weightClass],
+                  quiet ? nullptr : &model, streams);
     }
   }
-  if (outside != 0 || !streams.symbols.atEnd() || !streams.bits.atEnd()) return false;
-  predictor_.keep();
-  weights_ = key ? startingWeights() : weights;
+  if (outside_ || !streams.symbols.atEnd() || !streams.bits.atEnd()) return false;
+  predictor_.keep(layer);
+  if (key) weights.fill(startingWeights());
+  weights_[layer] = weights;
   return true;
 }
 
-std::uint32_t HierarchicalDecoder::decodeChunk(std::uint32_t begin, std::uint32_t end,
-                                               const FeatureVectors& weights, const ScaleModel* model,
-                                               Streams& streams) {
-  const std::size_t count = end - begin;
-  for (std::size_t i = 0; i < count; ++i) {
-    predictor_.predict(begin + static_cast<std::uint32_t>(i), weights, predictions_[i]);
-    if (model != nullptr) model->expect(predictions_[i]).store(expected_[i]);
-  }
+void HierarchicalDecoder::decodeChunk(std::uint32_t begin, std::uint32_t count, const WeightVectors& weights,
+                                      const ScaleModel* model, Streams& streams) {
+  predictor_.predict(begin, count, weights, predictions_.data(), frames_.data());
   if (model != nullptr) {
-    std::size_t first = 0;
-    for (; first + kCoders <= count; first += kCoders) {
-      readResiduals(first, std::integral_constant<std::size_t, kCoders>(), *model, streams);
-    }
-    readResiduals(first, count - first, *model, streams);
-  } else {
-    std::memset(residuals_, 0, sizeof residuals_);
-    std::memset(magnitudes_, 0, sizeof magnitudes_);
-    stays_.fill(false);
+    readResiduals(count, *model, streams);
+    reconstruct(begin, count);
+    return;
   }
-  std::uint32_t outside = 0;
-  for (std::size_t i = 0; i < count; ++i) {
-    const Int32x4 position =
-        stays_[i] ? predictions_[i].last : predictor_.reconstruct(predictions_[i], residuals_[i]);
-    outside |= isOutside(position);
-    predictor_.place(begin + static_cast<std::uint32_t>(i), predictions_[i], position,
-                     packMagnitudes(magnitudes_[i]));
-  }
-  return outside;
+  for (std::uint32_t i = 0; i < count; ++i) place(begin + i, predictions_[i], predictions_[i].position, 0);
 }
 
-template <typename Count>
-void HierarchicalDecoder::readResiduals(std::size_t first, Count count, const ScaleModel& model,
-                                        Streams& streams) {
-  const auto& tables = symbolTables();
-  for (const Component component : kCodingOrder) {
-    for (std::size_t coder = 0; coder < count; ++coder) {
-      const std::size_t i = first + coder;
-      if (component == kAlongNormal) stays_[i] = false;
-      if (stays_[i]) continue;
-      const std::uint32_t scale = model.scale(component, expected_[i][component], magnitudes_[i]);
-      std::uint32_t number = streams.symbols.read(coder, tables[distributionOf(component, scale)]);
-      if (number == kEscape) {
-        const std::uint32_t beyond = streams.bits.getGamma(kEscapeGammaBits);
-        if (component == kAlongNormal) {
-          if (beyond == kStays) {
-            setStaying(i);
-            continue;
-          }
-          number -= 1;
-        }
-        number += beyond;
+void HierarchicalDecoder::readResiduals(std::uint32_t count, const ScaleModel& model, Streams& streams) {
+  stays_.fill(false);
+  anyStays_ = false;
+  std::array<Vectors4, kChunk / 4> expected;
+  for (std::size_t i = 0; i < count; i += 4) expected[i / 4] = model.expect(&predictions_[i]);
+  const auto counted = [&](Component component, std::size_t i) {
+    return countedMagnitudes(Int32x4::load(&residuals_[component][i]));
+  };
+  const Int32x4 none = Int32x4::all(0);
+  for (std::size_t i = 0; i < count; i += 4)
+    model.scales(kAlongNormal, expected[i / 4].z, none, none).store(&scales_[i]);
+  readComponent(kAlongNormal, count, streams);
+  for (std::size_t i = 0; i < count; i += 4)
+    model.scales(kAlongU, expected[i / 4].x, counted(kAlongNormal, i), none).store(&scales_[i]);
+  readComponent(kAlongU, count, streams);
+  for (std::size_t i = 0; i < count; i += 4) {
+    model.scales(kAlongV, expected[i / 4].y, counted(kAlongNormal, i), counted(kAlongU, i))
+        .store(&scales_[i]);
+  }
+  readComponent(kAlongV, count, streams);
+}
+
+void HierarchicalDecoder::readComponent(Component component, std::uint32_t count, Streams& streams) {
+  if (streams.symbols.hasRoomFor(count + 1))
+    readSymbols<true>(component, count, streams);
+  else
+    readSymbols<false>(component, count, streams);
+}
+
+template <bool within>
+void HierarchicalDecoder::readSymbols(Component component, std::uint32_t count, Streams& streams) {
+  const SymbolTable* tables = &symbolTables()[distributionOf(component, 0)];
+  RansReader symbols = streams.symbols;  // its states in registers
+  const auto read = [&](std::size_t i, std::size_t coder) {
+    std::int32_t& residual = residuals_[component][i];
+    if (anyStays_ && stays_[i]) {
+      residual = 0;
+      return;
+    }
+    const auto scale = static_cast<std::uint32_t>(scales_[i]);
+    std::uint32_t number = symbols.read<within>(coder, tables[scale]);
+    if (number == kEscape) number = readEscaped(component, i, streams.bits);
+    if (const unsigned raw = rawBits(scale); raw > 0 && !stays_[i])
+      number = number << raw | streams.bits.get(raw);
+    residual = unzigzag(number);
+  };
+  std::size_t i = 0;
+  static_assert(kCoders == 4);
+  for (; i + kCoders <= count; i += kCoders) {
+    read(i, 0);
+    read(i + 1, 1);
+    read(i + 2, 2);
+    read(i + 3, 3);
+  }
+  for (std::size_t coder = 0; i + coder < count; ++coder) read(i + coder, coder);
+  streams.symbols = symbols;
+}
+
+std::uint32_t HierarchicalDecoder::readEscaped(Component component, std::size_t i, BitReader& bits) {
+  const std::uint32_t beyond = bits.getGamma(kEscapeGammaBits);
+  if (component != kAlongNormal) return kEscape + beyond;
+  if (beyond != kStays) return kEscape + beyond - 1;
+  stays_[i] = anyStays_ = true;
+  return 0;
+}
+
+void HierarchicalDecoder::reconstruct(std::uint32_t begin, std::uint32_t count) {
+  for (std::uint32_t first = 0; first < count; first += 4) {
+    const Vectors4 r{Int32x4::load(&residuals_[kAlongU][first]), Int32x4::load(&residuals_[kAlongV][first]),
+                     Int32x4::load(&residuals_[kAlongNormal][first])};
+    const std::array<Int32x4, 4> moved = transposed(predictor_.moved(frames_[first / 4], r));
+    const int far = beyond16Bits(r).signs();
+    alignas(16) std::int32_t magnitudes[4];
+    packMagnitudes(countedMagnitudes(r.x), countedMagnitudes(r.y), countedMagnitudes(r.z)).store(magnitudes);
+    for (std::uint32_t i = 0; i < std::min(count - first, 4u); ++i) {
+      const Prediction& prediction = predictions_[first + i];
+      Int32x4 position = prediction.position + moved[i];
+      if (anyStays_ && stays_[first + i]) position = prediction.last;
+      if ((far >> i & 1) != 0) {
+        const std::int32_t residual[]{residuals_[kAlongU][first + i], residuals_[kAlongV][first + i],
+                                      residuals_[kAlongNormal][first + i]};
+        position = predictor_.reconstruct(prediction, residual);
       }
-      if (const unsigned raw = rawBits(scale); raw > 0) number = number << raw | streams.bits.get(raw);
-      residuals_[i][component] = unzigzag(number);
-      magnitudes_[i][component] = countedMagnitude(residuals_[i][component]);
+      place(begin + first + i, prediction, position, static_cast<std::uint32_t>(magnitudes[i]));
     }
   }
+}
+
+void HierarchicalDecoder::place(std::uint32_t slot, const Prediction& prediction, Int32x4 position,
+                                std::uint32_t magnitudes) {
+  const Int32x4 limit = Int32x4::all(kMaxCoordinate);
+  outside_ = outside_ || ((position.magnitude() > limit).signs() & 7) != 0;
+  predictor_.place(slot, prediction, position, magnitudes);
 }
 
 void HierarchicalDecoder::writePositions(float* out) const {

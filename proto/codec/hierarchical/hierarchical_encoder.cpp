@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
+#include <utility>
 
 #include "proto/codec/hierarchical/bits.h"
 #include "proto/codec/hierarchical/frame_coder.h"
@@ -26,12 +27,16 @@ constexpr std::uint32_t kFewVertices = 100;
 constexpr std::uint8_t kStillFrames = 3;
 constexpr std::uint32_t kMostRests = 64;
 
-constexpr std::size_t kMaxWeightBytes = kWeightClasses * kFeatures * 4;
+constexpr std::size_t kMaxWeightBytes = kMaxTemporalLayers * kWeightClasses * kFeatures * 4;
 // Of an escape and what stands beside it, at most.
 constexpr std::size_t kMaxExtraBytes = 8;
 
+// Along u, v and n, in steps: of one vertex, and of four.
 struct Local {
   float u, v, n;
+};
+struct Local4 {
+  Float32x4 u, v, n;
 };
 
 double squaredLength(Int32x4 difference) {
@@ -50,11 +55,13 @@ std::int32_t nearest(float value) {
 struct HierarchicalEncoder::State {
   explicit State(const StreamLayout& layout)
       : vertices(layout.vertexCount()),
+        layers(layout.temporalLayers),
         unit(latticeUnit(layout.maxError)),
         wanted(vertices),
         stillFrames(vertices),
         symbols(kComponents * vertices),
-        extra((kComponents * kMaxExtraBytes + 1) * vertices + kMaxExtraBytes) {
+        extra((kComponents * kMaxExtraBytes + 1) * vertices + kMaxExtraBytes),
+        fitters(layers) {
     if (!predictor.allocate(layout, unit.stepBits))
       std::abort();  // memory is out, as of any other allocation here
     for (const Phase& phase : predictor.hierarchy().phases)
@@ -73,23 +80,28 @@ struct HierarchicalEncoder::State {
   }
   void quantise(std::span<const float> positions);
   Local local(const SurfaceFrame& frame, Int32x4 difference) const;
-  Int32x4 choose(const Prediction& prediction, Int32x4 target, std::int32_t* residual) const;
-  void economise(const Local& wish, std::int32_t* residual) const;
+  void choose(std::uint32_t begin, std::size_t first, std::array<Int32x4, 4>& positions);
+  Int32x4 chooseFar(const Prediction& prediction, Int32x4 target, std::int32_t* residual) const;
   bool isAtRest() const;
-  std::size_t writeWeights(bool key, std::byte* out);
+  std::size_t writeWeights(const FrameRole& role, std::byte* out);
+  void writeChanges(bool key, std::size_t of, BitWriter& writer);
+  void use(const Weights& chosen);
+  void attempt();
+  void encodePhases(BitWriter& bits);
   bool startsToRest(std::uint32_t slot, const Prediction& prediction);
   bool goesOnResting(std::uint32_t slot, const Prediction& prediction) const;
   void encodePhase(const Phase& phase, BitWriter& bits);
   // Returns whether a residual is not 0.
-  std::int32_t encodeChunk(std::uint32_t begin, std::uint32_t end, std::uint32_t weightClass,
-                           BitWriter& bits);
+  bool encodeChunk(std::uint32_t begin, std::uint32_t count, std::uint32_t weightClass, BitWriter& bits);
+  void rest(std::uint32_t begin, std::size_t first, std::size_t count, std::array<Int32x4, 4>& positions);
+  void codeChunk(std::size_t count, const ScaleModel& model, BitWriter& bits);
   void fitTo(std::uint32_t weightClass, const FeatureVectors& features, const Prediction& prediction,
-             Int32x4 target, const std::uint32_t* magnitudes);
-  void code(Component component, std::uint32_t scale, std::int32_t residual, std::size_t coder,
-            BitWriter& bits);
+             Int32x4 target, std::size_t i);
+  void code(Component component, std::uint32_t scale, std::size_t i, std::size_t coder, BitWriter& bits);
   void note(const Prediction& prediction, std::uint32_t weightClass, std::size_t i);
 
   std::size_t vertices;
+  std::uint8_t layers;
   LatticeUnit unit;
   Predictor predictor;
   std::array<std::uint32_t, kWeightClasses + 1> classSizes{};
@@ -100,17 +112,23 @@ struct HierarchicalEncoder::State {
   std::uint32_t restsLeft = 0;            // that may start in this frame
   RansWriter symbols;
   std::vector<std::byte> extra;
-  WeightFitter fitter;
-  Weights weights{};
-  WeightVectors vectors{};
+  std::vector<WeightFitter> fitters;                    // by layer
+  std::array<LayerWeights, kMaxTemporalLayers> kept{};  // that the newest frame of each layer left
+  LayerWeights weights{};                               // that this one leaves
+  Weights used{};                                       // in this frame
+  std::array<WeightVectors, kWeightClasses + 1> vectors{};
   std::uint32_t frame = 0;  // since the key frame
-  bool quiet = false;       // no residual in the newest frame
+  std::uint8_t layer = 0;
+  bool quiet = false;  // no residual in the newest frame
   std::vector<CodedResidual>* recorded = nullptr;
   // Of the chunk that is being encoded.
-  alignas(16) std::int32_t expected[kChunk][4];
-  std::int32_t residuals[kChunk][kComponents];
-  std::uint32_t magnitudes[kChunk][kComponents];
-  std::array<bool, kChunk> stays;
+  std::array<Prediction, kChunk> predictions;
+  std::array<SurfaceFrames, kChunk / 4> frames;
+  // By component.
+  alignas(16) std::int32_t residuals[kComponents][kChunk];
+  alignas(16) std::int32_t magnitudes[kComponents][kChunk];
+  std::array<bool, kChunk> stays{};
+  std::uint32_t staying = 0;  // how many
 };
 
 void HierarchicalEncoder::State::quantise(std::span<const float> positions) {
@@ -150,15 +168,77 @@ Local HierarchicalEncoder::State::local(const SurfaceFrame& frame_, Int32x4 diff
   return {dot(t), dot(t + 4), dot(n)};
 }
 
-Int32x4 HierarchicalEncoder::State::choose(const Prediction& prediction, Int32x4 target,
-                                           std::int32_t* residual) const {
-  const Local wish = local(prediction.frame, target - prediction.position);
-  residual[kAlongU] = nearest(wish.u);
-  residual[kAlongV] = nearest(wish.v);
-  residual[kAlongNormal] = nearest(wish.n);
-  economise(wish, residual);
+// What is promised is a distance, half the diagonal of a cube of steps: seldom is a vertex in a corner, so
+// that a smaller residual along the surface often serves as well. Along the normal, where the eye looks, the
+// nearest one stays.
+Vectors4 economise(const Local4& wish) {
+  Vectors4 r{wish.u.rounded(), wish.v.rounded(), wish.n.rounded()};
+  Float32x4 u = wish.u - Float32x4::of(r.x), v = wish.v - Float32x4::of(r.y);
+  const Float32x4 n = wish.n - Float32x4::of(r.z);
+  const auto tryLess = [&](Float32x4 wished, Int32x4& residual, Float32x4& error) {
+    const Int32x4 sign = residual.shiftedRight(31) | Int32x4::all(1);
+    const Int32x4 smaller = residual - sign;
+    const Float32x4 moved = wished - Float32x4::of(smaller);
+    const Float32x4 rest = u * u + v * v + n * n - error * error;
+    const Int32x4 stays = (rest + moved * moved > Float32x4::all(0.75f)) | (residual == Int32x4::all(0));
+    residual = select(stays, residual, smaller);
+    error = select(stays, error, moved);
+  };
+  // The one that is farther off first.
+  const Int32x4 uFirst = u.magnitude() > v.magnitude();
+  for (const bool second : {false, true}) {
+    const Int32x4 isU = second ? Int32x4::without(uFirst, Int32x4::all(-1)) : uFirst;
+    Int32x4 residual = select(isU, r.x, r.y);
+    Float32x4 error = select(isU, u, v);
+    tryLess(select(isU, wish.u, wish.v), residual, error);
+    r.x = select(isU, residual, r.x);
+    u = select(isU, error, u);
+    r.y = select(isU, r.y, residual);
+    v = select(isU, v, error);
+  }
+  return r;
+}
+
+// The residuals of four vertices, and where they lead.
+void HierarchicalEncoder::State::choose(std::uint32_t begin, std::size_t first,
+                                        std::array<Int32x4, 4>& positions) {
+  std::array<Int32x4, 4> differences;
+  for (std::size_t i = 0; i < 4; ++i)
+    differences[i] =
+        wanted[std::min(begin + first + i, vertices - 1)].load() - predictions[first + i].position;
+  const Vectors4 d = transposed(differences);
+  const SurfaceFrames& f = frames[first / 4];
+  const Float32x4 scale = Float32x4::all(1.0f / static_cast<float>(1 << (kUnitBits + unit.stepBits)));
+  const Float32x4 x = scale * Float32x4::of(d.x), y = scale * Float32x4::of(d.y),
+                  z = scale * Float32x4::of(d.z);
+  const auto dot = [&](const Vectors4& e) {
+    return Float32x4::of(e.x) * x + Float32x4::of(e.y) * y + Float32x4::of(e.z) * z;
+  };
+  const Vectors4 r = economise({dot(f.u), dot(f.v), dot(f.n)});
+  r.x.store(&residuals[kAlongU][first]);
+  r.y.store(&residuals[kAlongV][first]);
+  r.z.store(&residuals[kAlongNormal][first]);
+  const Vectors4 moved = predictor.moved(f, r);
+  const auto squared = [](Int32x4 a) { return Float32x4::of(a) * Float32x4::of(a); };
+  const Float32x4 distance = squared(d.x - moved.x) + squared(d.y - moved.y) + squared(d.z - moved.z);
+  const int far =
+      (beyond16Bits(r) | (distance > Float32x4::all(static_cast<float>(squaredPromise())))).signs();
+  positions = transposed(moved);
+  for (std::size_t i = 0; i < 4; ++i) {
+    positions[i] = positions[i] + predictions[first + i].position;
+    if ((far >> i & 1) == 0) continue;
+    std::int32_t residual[kComponents];
+    for (std::size_t c = 0; c < kComponents; ++c) residual[c] = residuals[c][first + i];
+    positions[i] =
+        chooseFar(predictions[first + i], predictions[first + i].position + differences[i], residual);
+    for (std::size_t c = 0; c < kComponents; ++c) residuals[c][first + i] = residual[c];
+  }
+}
+
+// The frame is orthonormal to one in thousands: after a long way a second and a third look are needed.
+Int32x4 HierarchicalEncoder::State::chooseFar(const Prediction& prediction, Int32x4 target,
+                                              std::int32_t* residual) const {
   Int32x4 position = predictor.reconstruct(prediction, residual);
-  // The frame is orthonormal to one in thousands: after a long way a second and a third look are needed.
   for (int look = 0; look < 8 && squaredLength(position - target) > squaredPromise(); ++look) {
     const Local rest = local(prediction.frame, target - position);
     residual[kAlongU] += nearest(rest.u);
@@ -169,77 +249,83 @@ Int32x4 HierarchicalEncoder::State::choose(const Prediction& prediction, Int32x4
   return position;
 }
 
-// What is promised is a distance, half the diagonal of a cube of steps: seldom is a vertex in a corner, so
-// that a smaller residual along the surface often serves as well. Along the normal, where the eye looks, the
-// nearest one stays.
-void HierarchicalEncoder::State::economise(const Local& wish, std::int32_t* residual) const {
-  const std::array<float, 3> wishes{wish.u, wish.v, wish.n};
-  std::array<float, 3> error;
-  for (std::size_t c = 0; c < 3; ++c) error[c] = wishes[c] - static_cast<float>(residual[c]);
-  const std::array<std::size_t, 2> order = std::fabs(error[0]) > std::fabs(error[1])
-                                               ? std::array<std::size_t, 2>{0, 1}
-                                               : std::array<std::size_t, 2>{1, 0};
-  for (const std::size_t c : order) {
-    if (residual[c] == 0) continue;
-    const std::int32_t smaller = residual[c] - (residual[c] > 0 ? 1 : -1);
-    const float moved = wishes[c] - static_cast<float>(smaller);
-    const float rest = error[0] * error[0] + error[1] * error[1] + error[2] * error[2] - error[c] * error[c];
-    if (rest + moved * moved > 0.75f) continue;
-    residual[c] = smaller;
-    error[c] = moved;
-  }
-}
-
-// Whether the newest frame serves once more.
+// Whether the reference serves once more.
 bool HierarchicalEncoder::State::isAtRest() const {
-  const std::span<const Node> newest = predictor.nodes();
+  const std::span<const Node> former = predictor.reference();
   const double limit = squaredPromise();
   for (std::size_t slot = 0; slot < vertices; ++slot) {
-    if (squaredLength(wanted[slot].load() - newest[slot].load()) > limit) return false;
+    if (squaredLength(wanted[slot].load() - former[slot].load()) > limit) return false;
   }
   return true;
 }
 
-std::size_t HierarchicalEncoder::State::writeWeights(bool key, std::byte* out) {
-  if (key) weights = keyFrameWeights();
+void HierarchicalEncoder::State::use(const Weights& chosen) {
+  used = chosen;
+  vectors = weightVectors(used);
+}
+
+std::size_t HierarchicalEncoder::State::writeWeights(const FrameRole& role, std::byte* out) {
+  const bool key = role.kind == PacketKind::key;
   if (!key && isAtRest()) {
-    vectors = weightVectors(Weights{});
+    use(Weights{});
     out[0] = std::byte{1};
     return 1;
   }
-  const bool due = !key && !quiet && (frame <= kEagerFrames || frame % kWeightInterval == 0);
+  // With layers it is the base that sends the weights of all: it is never left out.
+  const bool eager = layers == 1 && frame <= kEagerFrames;
+  const bool due = key || (role.layer == 0 && !quiet && (eager || frame % kWeightInterval == 0));
   std::size_t bytes = 0;
   if (due) {
-    Weights next = weights;
-    fitter.fit(next);
     BitWriter writer(out);
     writer.put(0, 1);
-    for (std::size_t c = 0; c < kWeightClasses; ++c) {
-      const bool changes = classSizes[c] >= kFewVertices;
-      writer.put(changes ? 1 : 0, 1);
-      for (std::size_t f = 0; changes && f < kFeatures; ++f) {
-        writer.putGamma(zigzag(next[c][f] - weights[c][f]), kWeightGammaBits);
-        weights[c][f] = next[c][f];
-      }
-    }
+    for (std::size_t of = 0; of < (key ? 1u : layers); ++of) writeChanges(key, of, writer);
     bytes = static_cast<std::size_t>(writer.finish() - out);
   }
-  vectors = weightVectors(weights);
+  use(weights[role.layer]);
   return bytes;
+}
+
+void HierarchicalEncoder::State::writeChanges(bool key, std::size_t of, BitWriter& writer) {
+  Weights& current = weights[of];
+  Weights next = current;
+  fitters[of].fit(next);
+  for (std::size_t c = 0; c < kWeightClasses; ++c) {
+    const bool changes = classSizes[c] >= kFewVertices && next[c] != current[c];
+    writer.put(changes ? 1 : 0, 1);
+    if (!changes) continue;
+    for (std::size_t f = firstWeight(key); f < endWeight(key); ++f)
+      writer.putGamma(zigzag(next[c][f] - current[c][f]), kWeightGammaBits);
+    current[c] = next[c];
+  }
+}
+
+// What a key frame leaves out of account is the past: its weights are fitted to a first attempt at itself.
+void HierarchicalEncoder::State::attempt() {
+  for (WeightFitter& fitter : fitters) fitter.clear();
+  use(weights[0]);
+  BitWriter bits(extra.data());
+  std::vector<CodedResidual>* const record = std::exchange(recorded, nullptr);
+  encodePhases(bits);
+  recorded = record;
+}
+
+void HierarchicalEncoder::State::encodePhases(BitWriter& bits) {
+  symbols.shrink(0);
+  quiet = true;
+  for (const Phase& phase : predictor.hierarchy().phases) encodePhase(phase, bits);
 }
 
 // What is wanted in the same place for some frames is pinned, it seems: it is to stand still. To say so takes
 // two bytes.
 bool HierarchicalEncoder::State::startsToRest(std::uint32_t slot, const Prediction& prediction) {
-  if (frame == 0 || restsLeft == 0 || stillFrames[slot] < kStillFrames || predictor.nodes()[slot].rests())
-    return false;
+  if (restsLeft == 0 || stillFrames[slot] < kStillFrames || predictor.reference()[slot].rests()) return false;
   if (squaredLength(wanted[slot].load() - prediction.last) > squaredPromise()) return false;
   --restsLeft;
   return true;
 }
 
 bool HierarchicalEncoder::State::goesOnResting(std::uint32_t slot, const Prediction& prediction) const {
-  return frame > 0 && predictor.nodes()[slot].rests() &&
+  return frame > 0 && predictor.reference()[slot].rests() &&
          squaredLength(wanted[slot].load() - prediction.last) <= squaredPromise();
 }
 
@@ -248,11 +334,12 @@ void HierarchicalEncoder::State::encodePhase(const Phase& phase, BitWriter& bits
   const BitWriter bitsBefore = bits;
   const std::size_t symbolsBefore = symbols.count();
   bits.put(0, 1);
-  std::int32_t any = 0;
+  bool any = false;
   for (std::uint32_t begin = phase.begin; begin < phase.end; begin += kChunk) {
-    any |= encodeChunk(begin, std::min(begin + kChunk, phase.end), phase.weightClass, bits);
+    const std::uint32_t count = std::min(kChunk, phase.end - begin);
+    any = encodeChunk(begin, count, phase.weightClass, bits) || any;
   }
-  if (any != 0) {
+  if (any) {
     quiet = false;
     return;
   }
@@ -261,56 +348,95 @@ void HierarchicalEncoder::State::encodePhase(const Phase& phase, BitWriter& bits
   symbols.shrink(symbolsBefore);
 }
 
-std::int32_t HierarchicalEncoder::State::encodeChunk(std::uint32_t begin, std::uint32_t end,
-                                                     std::uint32_t weightClass, BitWriter& bits) {
-  const ScaleModel model(kScaleWeights[weightClass / 2]);
+bool HierarchicalEncoder::State::encodeChunk(std::uint32_t begin, std::uint32_t count,
+                                             std::uint32_t weightClass, BitWriter& bits) {
+  const ScaleModel model(kScaleWeights[scaleClassOf(weightClass, frame == 0)]);
   const bool fits = weightClass < kWeightClasses;
   const std::uint32_t stride = fits ? kFitStride[weightClass] : 1;
-  std::int32_t any = 0;
-  for (std::uint32_t slot = begin; slot < end; ++slot) {
-    const std::size_t i = slot - begin;
-    Prediction prediction;
-    FeatureVectors features;
-    predictor.predict(slot, vectors[weightClass], features, prediction);
-    const Int32x4 target = wanted[slot].load();
-    stays[i] = startsToRest(slot, prediction);
-    const bool still = stays[i] || goesOnResting(slot, prediction);
-    if (still) std::memset(residuals[i], 0, sizeof residuals[i]);
-    const Int32x4 position = still ? prediction.last : choose(prediction, target, residuals[i]);
-    any |= stays[i] ? 1 : 0;
+  bool any = false;
+  staying = 0;
+  predictor.predict(begin, count, vectors[weightClass], predictions.data(), frames.data());
+  for (std::size_t first = 0; first < count; first += 4) {
+    const std::size_t four = std::min<std::size_t>(count - first, 4);
+    std::array<Int32x4, 4> positions;
+    choose(begin, first, positions);
+    rest(begin, first, four, positions);
+    Int32x4 counted[kComponents];
     for (std::size_t c = 0; c < kComponents; ++c) {
-      magnitudes[i][c] = countedMagnitude(residuals[i][c]);
-      any |= residuals[i][c];
+      counted[c] = countedMagnitudes(Int32x4::load(&residuals[c][first]));
+      counted[c].store(&magnitudes[c][first]);
     }
-    predictor.place(slot, prediction, position, packMagnitudes(magnitudes[i]));
-    model.expect(prediction).store(expected[i]);
+    alignas(16) std::int32_t packed[4];
+    packMagnitudes(counted[kAlongU], counted[kAlongV], counted[kAlongNormal]).store(packed);
+    for (std::size_t i = 0; i < four; ++i) {
+      any = any || packed[i] != 0;
+      predictor.place(begin + static_cast<std::uint32_t>(first + i), predictions[first + i], positions[i],
+                      static_cast<std::uint32_t>(packed[i]));
+    }
+  }
+  codeChunk(count, model, bits);
+  for (std::uint32_t i = 0; fits && i < count; ++i) {
+    const std::uint32_t slot = begin + i;
     // Others in each frame.
-    if (fits && (slot + frame) % stride == 0) fitTo(weightClass, features, prediction, target, magnitudes[i]);
-    if (recorded != nullptr) note(prediction, weightClass, i);
+    if ((slot + frame) % stride == 0)
+      fitTo(weightClass, predictor.features(slot, predictions[i]), predictions[i], wanted[slot].load(), i);
   }
-  for (std::uint32_t group = begin; group < end; group += kCoders) {
-    const std::uint32_t groupEnd = std::min<std::uint32_t>(group + kCoders, end);
-    for (const Component component : kCodingOrder) {
-      for (std::uint32_t slot = group; slot < groupEnd; ++slot) {
-        const std::size_t i = slot - begin;
-        if (stays[i] && component != kAlongNormal) continue;
-        const std::uint32_t scale = model.scale(component, expected[i][component], magnitudes[i]);
-        if (stays[i]) {
-          bits.putGamma(kStays, kEscapeGammaBits);
-          symbols.add(slot - group, distributionOf(component, scale), kEscape);
-        } else {
-          code(component, scale, residuals[i][component], slot - group, bits);
-        }
-      }
-    }
+  if (recorded != nullptr) {
+    for (std::size_t i = 0; i < count; ++i) note(predictions[i], weightClass, i);
   }
-  return any;
+  return any || staying > 0;
 }
 
-void HierarchicalEncoder::State::code(Component component, std::uint32_t scale, std::int32_t residual,
+// Leaves out the residuals of what rests, or starts to.
+void HierarchicalEncoder::State::rest(std::uint32_t begin, std::size_t first, std::size_t count,
+                                      std::array<Int32x4, 4>& positions) {
+  for (std::size_t i = first; i < first + count; ++i) {
+    const std::uint32_t slot = begin + static_cast<std::uint32_t>(i);
+    stays[i] = startsToRest(slot, predictions[i]);
+    staying += stays[i] ? 1 : 0;
+    if (!stays[i] && !goesOnResting(slot, predictions[i])) continue;
+    positions[i - first] = predictions[i].last;
+    for (auto& component : residuals) component[i] = 0;
+  }
+}
+
+void HierarchicalEncoder::State::codeChunk(std::size_t count, const ScaleModel& model, BitWriter& bits) {
+  std::array<Vectors4, kChunk / 4> expected;
+  for (std::size_t i = 0; i < count; i += 4) expected[i / 4] = model.expect(&predictions[i]);
+  for (const Component component : kCodingOrder) {
+    for (std::size_t first = 0; first < count; first += 4) {
+      const Vectors4& e = expected[first / 4];
+      const Int32x4 byComponent[]{e.x, e.y, e.z};
+      const Int32x4 scales =
+          model.scales(component, byComponent[component], Int32x4::load(&magnitudes[kAlongNormal][first]),
+                       Int32x4::load(&magnitudes[kAlongU][first]));
+      const Int32x4 residual = Int32x4::load(&residuals[component][first]);
+      const Int32x4 number = residual.shiftedLeft(1) ^ residual.shiftedRight(31);
+      const Int32x4 isHard = (scales > Int32x4::all(15)) | (number > Int32x4::all(kEscape - 1)) | number;
+      const std::size_t coder = first % kCoders;
+      if (first + 4 <= count && isHard.signs() == 0 && staying == 0) {
+        symbols.addFour(coder, scales + Int32x4::all(static_cast<std::int32_t>(distributionOf(component, 0))),
+                        number);
+        continue;
+      }
+      alignas(16) std::int32_t scale[4];
+      scales.store(scale);
+      for (std::size_t i = 0; i < 4 && first + i < count; ++i)
+        code(component, static_cast<std::uint32_t>(scale[i]), first + i, coder + i, bits);
+    }
+  }
+}
+
+void HierarchicalEncoder::State::code(Component component, std::uint32_t scale, std::size_t i,
                                       std::size_t coder, BitWriter& bits) {
+  if (stays[i]) {
+    if (component != kAlongNormal) return;
+    bits.putGamma(kStays, kEscapeGammaBits);
+    symbols.add(coder, distributionOf(component, scale), kEscape);
+    return;
+  }
   const unsigned raw = rawBits(scale);
-  const std::uint32_t number = zigzag(residual);
+  const std::uint32_t number = zigzag(residuals[component][i]);
   std::uint32_t symbol = number >> raw;
   if (symbol >= kEscape) {
     bits.putGamma(symbol - kEscape + (component == kAlongNormal ? kStays + 1 : 0), kEscapeGammaBits);
@@ -321,28 +447,32 @@ void HierarchicalEncoder::State::code(Component component, std::uint32_t scale, 
 }
 
 void HierarchicalEncoder::State::fitTo(std::uint32_t weightClass, const FeatureVectors& features,
-                                       const Prediction& prediction, Int32x4 target, const std::uint32_t* m) {
-  Int32x4 predicted = Int32x4::all(0);
-  for (std::size_t i = 0; i < kFeaturePairs; ++i)
-    predicted = predicted + dotPairs(features[i], vectors[weightClass][i]);
+                                       const Prediction& prediction, Int32x4 target, std::size_t i) {
+  const auto& w = used[weightClass];
+  Int32x4 predicted = Int32x4::all(0), turned = predicted;
+  for (std::size_t f = 0; f < kFeaturePairs; ++f) {
+    Int32x4& sum = f < kPlainPairs ? predicted : turned;
+    sum = sum + dotPairs(features[f], Int16x8::allPairs(w[2 * f], w[2 * f + 1]));
+  }
+  predicted = predicted + turned.shiftedRight(kTurnedBits);
   const Int32x4 goal =
       (target - prediction.position).shiftedRight(unit.stepBits - 4) + predicted.shiftedRight(kWeightBits);
   // What is hard to predict here is not to spoil the weights for the rest.
   const std::uint32_t around = prediction.parentMagnitudes;
   const auto near = static_cast<float>((around & 255u) + (around >> 8 & 255u) + (around >> 16 & 255u));
-  const auto own = static_cast<float>(m[0] + m[1] + m[2]);
-  fitter.add(weightClass, features, goal, 1 / (0.15f + 0.1f * own * own + 0.025f * near));
+  const auto own = static_cast<float>(magnitudes[0][i] + magnitudes[1][i] + magnitudes[2][i]);
+  fitters[layer].add(weightClass, features, goal, 1 / (0.15f + 0.1f * own * own + 0.025f * near));
 }
 
 void HierarchicalEncoder::State::note(const Prediction& prediction, std::uint32_t weightClass,
                                       std::size_t i) {
   for (std::size_t c = 0; c < kComponents; ++c) {
     const auto byte = [c](std::uint32_t bytes) { return static_cast<std::uint8_t>(bytes >> 8 * c); };
-    recorded->push_back({static_cast<std::uint8_t>(c), static_cast<std::uint8_t>(weightClass / 2),
-                         byte(prediction.parentMagnitudes), byte(prediction.ringMagnitudes),
-                         byte(prediction.lastMagnitudes),
-                         static_cast<std::uint8_t>(magnitudes[i][kAlongNormal]),
-                         static_cast<std::uint8_t>(magnitudes[i][kAlongU]), residuals[i][c]});
+    recorded->push_back(
+        {static_cast<std::uint8_t>(c), static_cast<std::uint8_t>(scaleClassOf(weightClass, frame == 0)),
+         byte(prediction.parentMagnitudes), byte(prediction.ringMagnitudes), byte(prediction.lastMagnitudes),
+         static_cast<std::uint8_t>(magnitudes[kAlongNormal][i]),
+         static_cast<std::uint8_t>(magnitudes[kAlongU][i]), residuals[c][i]});
   }
 }
 
@@ -358,34 +488,37 @@ std::size_t HierarchicalEncoder::packetBound() const {
   return headerBound(largest) + kMaxWeightBytes + s.symbols.bound() + s.extra.size();
 }
 
-std::size_t HierarchicalEncoder::encode(std::uint64_t tick, PacketKind kind, std::uint64_t referenceTick,
-                                        std::span<const float> positions, std::span<const float>,
-                                        std::span<std::byte> out) {
+std::size_t HierarchicalEncoder::encode(const FrameRole& role, std::span<const float> positions,
+                                        std::span<const float>, std::span<std::byte> out) {
   State& s = *state_;
-  const bool key = kind == PacketKind::key;
+  const bool key = role.kind == PacketKind::key;
   s.frame = key ? 0 : s.frame + 1;
+  s.layer = role.layer;
   s.quantise(positions);
   PacketHeader& header = s.header;
-  header.kind = kind;
-  header.tick = tick;
+  header.kind = role.kind;
+  header.temporalLayer = role.layer;
+  header.tick = role.tick;
   header.referenceCount = key ? 0 : 1;
-  header.references[0] = referenceTick;
+  header.references[0] = role.referenceTick;
 
   // The header's length depends on the sections' sizes: they are written behind its bound and moved up.
   const std::size_t bodyStart = headerBound(header);
-  std::size_t end = bodyStart + s.writeWeights(key, out.data() + bodyStart);
+  s.predictor.begin(key, role.referenceLayer);
+  s.weights = key ? LayerWeights{keyFrameWeights()} : s.kept[role.referenceLayer];
+  // Once in the base is enough: the others refer to it.
+  s.restsLeft = key || role.layer > 0 ? 0 : kMostRests;
+  if (key) s.attempt();
+  std::size_t end = bodyStart + s.writeWeights(role, out.data() + bodyStart);
   header.sectionBytes[0] = static_cast<std::uint32_t>(end - bodyStart);
-  s.symbols.shrink(0);
   BitWriter bits(s.extra.data());
-  s.predictor.begin(key);
-  s.quiet = true;
-  s.restsLeft = kMostRests;
-  for (const Phase& phase : s.predictor.hierarchy().phases) s.encodePhase(phase, bits);
-  s.predictor.keep();
+  s.encodePhases(bits);
+  s.predictor.keep(role.layer);
   if (key) {
-    s.weights = startingWeights();
-    s.fitter.clear();
+    s.weights.fill(startingWeights());
+    for (WeightFitter& fitter : s.fitters) fitter.clear();
   }
+  s.kept[role.layer] = s.weights;
   header.sectionBytes[1] = static_cast<std::uint32_t>(s.symbols.write(out.data() + end));
   end += header.sectionBytes[1];
   header.sectionBytes[2] = static_cast<std::uint32_t>(bits.finish() - s.extra.data());

@@ -22,8 +22,7 @@ class HierarchicalEncoder final : public BodyEncoder {
   ~HierarchicalEncoder() override;
 
   std::size_t packetBound() const override;
-  std::size_t encode(std::uint64_t tick, PacketKind kind, std::uint64_t referenceTick,
-                     std::span<const float> positions, std::span<const float> normals,
+  std::size_t encode(const FrameRole& role, std::span<const float> positions, std::span<const float> normals,
                      std::span<std::byte> out) override;
   std::uint64_t reconstructionHash() const override;
 

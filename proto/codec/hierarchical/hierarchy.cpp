@@ -145,7 +145,8 @@ class Builder {
 
   bool allocate(std::size_t phases) {
     return slotOf_.allocate(none_) && hierarchy_.vertexOf.allocate(none_) &&
-           hierarchy_.neighbours.allocate(none_) && phases_.allocate(phases);
+           hierarchy_.neighbours.allocate(none_) && hierarchy_.nearest.allocate(none_) &&
+           phases_.allocate(phases);
   }
 
   void addGrid(std::uint32_t first, std::uint32_t rows, std::uint32_t columns) {
@@ -275,8 +276,7 @@ class Builder {
     for (std::size_t i = 0; i < 4; ++i) {
       const bool few = others.size() < 4;
       const std::size_t choice = few ? i : i * others.size() / 4;
-      hierarchy_.neighbours[slot].nearest[i] =
-          choice < others.size() ? slotOf_[first_ + others[choice]] : slot;
+      hierarchy_.nearest[slot][i] = choice < others.size() ? slotOf_[first_ + others[choice]] : slot;
     }
   }
 
@@ -378,8 +378,8 @@ class Builder {
           const bool inside = c >= 0 && r >= 0 && c < columns_ && r < rows_;
           return inside ? slotOf_[vertexAt(c, r)] : slot;
         };
-        hierarchy_.neighbours[slot].nearest = {at(column - 1, row), at(column + 1, row), at(column, row - 1),
-                                               at(column, row + 1)};
+        hierarchy_.nearest[slot] = {at(column - 1, row), at(column + 1, row), at(column, row - 1),
+                                    at(column, row + 1)};
       }
     }
   }

@@ -27,9 +27,9 @@ struct Neighbours {
   std::array<std::uint32_t, 4> parents;
   // Coded earlier, farther out.
   std::array<std::uint32_t, 8> ring;
-  // The nearest at the finest level, coded earlier or later; the vertex itself where there is none.
-  std::array<std::uint32_t, 4> nearest;
 };
+// The nearest at the finest level, coded earlier or later; the vertex itself where there is none.
+using Nearest = std::array<std::uint32_t, 4>;
 
 // From the layout alone: both ends compute the same.
 struct Hierarchy {
@@ -38,6 +38,7 @@ struct Hierarchy {
 
   Array<std::uint32_t> vertexOf;  // by slot
   Array<Neighbours> neighbours;   // by slot
+  Array<Nearest> nearest;         // by slot
   Array<Phase> phases;
 };
 

@@ -2,6 +2,7 @@
 // Vectors of 128 bits: SSE2's, NEON's and WebAssembly's, whatever the target has (SIMDe).
 #pragma once
 
+#include <array>
 #include <bit>
 #include <cstdint>
 
@@ -27,12 +28,87 @@ struct Int32x4 {
   // Keeps the sign.
   Int32x4 shiftedRight(int bits) const { return {simde_mm_sra_epi32(v, simde_mm_cvtsi32_si128(bits))}; }
   Int32x4 shiftedLeft(int bits) const { return {simde_mm_sll_epi32(v, simde_mm_cvtsi32_si128(bits))}; }
+  // Brings in zeros.
+  Int32x4 bitsShiftedRight(int bits) const { return {simde_mm_srl_epi32(v, simde_mm_cvtsi32_si128(bits))}; }
   // Whether the first three are the same.
   bool sameThree(Int32x4 other) const {
     return (simde_mm_movemask_epi8(simde_mm_cmpeq_epi32(v, other.v)) & 0xfff) == 0xfff;
   }
+  friend Int32x4 operator&(Int32x4 a, Int32x4 b) { return {simde_mm_and_si128(a.v, b.v)}; }
+  friend Int32x4 operator|(Int32x4 a, Int32x4 b) { return {simde_mm_or_si128(a.v, b.v)}; }
+  friend Int32x4 operator^(Int32x4 a, Int32x4 b) { return {simde_mm_xor_si128(a.v, b.v)}; }
+  // The bits of b that are not a's.
+  static Int32x4 without(Int32x4 a, Int32x4 b) { return {simde_mm_andnot_si128(a.v, b.v)}; }
+  // All bits where it is so, else none.
+  friend Int32x4 operator>(Int32x4 a, Int32x4 b) { return {simde_mm_cmpgt_epi32(a.v, b.v)}; }
+  friend Int32x4 operator==(Int32x4 a, Int32x4 b) { return {simde_mm_cmpeq_epi32(a.v, b.v)}; }
+  Int32x4 magnitude() const {
+    const Int32x4 sign = shiftedRight(31);
+    return (*this ^ sign) - sign;
+  }
+  // A bit a lane: its highest.
+  int signs() const { return simde_mm_movemask_ps(simde_mm_castsi128_ps(v)); }
   std::int32_t fourth() const { return simde_mm_cvtsi128_si32(simde_mm_shuffle_epi32(v, 0xff)); }
 };
+
+// Where `mask` has all bits `yes`, where it has none `no`.
+inline Int32x4 select(Int32x4 mask, Int32x4 yes, Int32x4 no) {
+  return (mask & yes) | Int32x4::without(mask, no);
+}
+
+struct Float32x4 {
+  simde__m128 v;
+
+  static Float32x4 of(Int32x4 a) { return {simde_mm_cvtepi32_ps(a.v)}; }
+  static Float32x4 ofBits(Int32x4 a) { return {simde_mm_castsi128_ps(a.v)}; }
+  static Float32x4 all(float value) { return {simde_mm_set1_ps(value)}; }
+  Int32x4 bits() const { return {simde_mm_castps_si128(v)}; }
+  // To the nearest, the even one of two; towards zero. -2^31 where it is beyond 32 bits.
+  Int32x4 rounded() const { return {simde_mm_cvtps_epi32(v)}; }
+  Int32x4 truncated() const { return {simde_mm_cvttps_epi32(v)}; }
+  Float32x4 magnitude() const { return {simde_mm_andnot_ps(simde_mm_set1_ps(-0.0f), v)}; }
+  friend Float32x4 operator+(Float32x4 a, Float32x4 b) { return {simde_mm_add_ps(a.v, b.v)}; }
+  friend Float32x4 operator-(Float32x4 a, Float32x4 b) { return {simde_mm_sub_ps(a.v, b.v)}; }
+  friend Float32x4 operator*(Float32x4 a, Float32x4 b) { return {simde_mm_mul_ps(a.v, b.v)}; }
+  // All bits where it is so, else none.
+  friend Int32x4 operator>(Float32x4 a, Float32x4 b) {
+    return {simde_mm_castps_si128(simde_mm_cmpgt_ps(a.v, b.v))};
+  }
+};
+inline Float32x4 clamp(Float32x4 a, float low, float high) {
+  return {simde_mm_min_ps(simde_mm_max_ps(a.v, simde_mm_set1_ps(low)), simde_mm_set1_ps(high))};
+}
+inline Float32x4 select(Int32x4 mask, Float32x4 yes, Float32x4 no) {
+  return Float32x4::ofBits(select(mask, yes.bits(), no.bits()));
+}
+
+// The same of four vertices: lanes are vertices.
+struct Vectors4 {
+  Int32x4 x, y, z;
+};
+
+// Of four vertices x, y and z (the fourth lane of each, in `w`) to the x of all, and so on.
+inline Vectors4 transposed(const std::array<Int32x4, 4>& a) {
+  const simde__m128i low01 = simde_mm_unpacklo_epi32(a[0].v, a[1].v),
+                     low23 = simde_mm_unpacklo_epi32(a[2].v, a[3].v);
+  const simde__m128i high01 = simde_mm_unpackhi_epi32(a[0].v, a[1].v),
+                     high23 = simde_mm_unpackhi_epi32(a[2].v, a[3].v);
+  return {{simde_mm_unpacklo_epi64(low01, low23)},
+          {simde_mm_unpackhi_epi64(low01, low23)},
+          {simde_mm_unpacklo_epi64(high01, high23)}};
+}
+// And back; the fourth lanes are zero.
+inline std::array<Int32x4, 4> transposed(const Vectors4& a) {
+  const simde__m128i zero = simde_mm_setzero_si128();
+  const simde__m128i lowXy = simde_mm_unpacklo_epi32(a.x.v, a.y.v),
+                     highXy = simde_mm_unpackhi_epi32(a.x.v, a.y.v);
+  const simde__m128i lowZ = simde_mm_unpacklo_epi32(a.z.v, zero),
+                     highZ = simde_mm_unpackhi_epi32(a.z.v, zero);
+  return {{{simde_mm_unpacklo_epi64(lowXy, lowZ)},
+           {simde_mm_unpackhi_epi64(lowXy, lowZ)},
+           {simde_mm_unpacklo_epi64(highXy, highZ)},
+           {simde_mm_unpackhi_epi64(highXy, highZ)}}};
+}
 
 struct Int16x8 {
   simde__m128i v;
@@ -41,6 +117,8 @@ struct Int16x8 {
     return {simde_mm_load_si128(reinterpret_cast<const simde__m128i*>(from))};
   }
   void store(std::int16_t* to) const { simde_mm_store_si128(reinterpret_cast<simde__m128i*>(to), v); }
+  // The first four, to any address.
+  void storeFour(std::uint16_t* to) const { simde_mm_storel_epi64(reinterpret_cast<simde__m128i*>(to), v); }
   static Int16x8 zero() { return {simde_mm_setzero_si128()}; }
   static Int16x8 all(std::int16_t value) { return {simde_mm_set1_epi16(value)}; }
   static Int16x8 of(std::int16_t a0, std::int16_t a1, std::int16_t a2, std::int16_t a3, std::int16_t a4,
@@ -59,6 +137,8 @@ struct Int16x8 {
   Int16x8 pairsSwapped() const {
     return {simde_mm_or_si128(simde_mm_slli_epi32(v, 16), simde_mm_srli_epi32(v, 16))};
   }
+  // 0 a0 0 a2 0 a4 0 a6.
+  Int16x8 evenToOdd() const { return {simde_mm_slli_epi32(v, 16)}; }
   // The pair of these lanes four times.
   template <int pair>
   Int16x8 broadcastPair() const {
@@ -84,6 +164,10 @@ inline Int16x8 interleave(Int16x8 a, Int16x8 b) {
 inline Int16x8 interleaveHalves(Int16x8 a) {
   return {simde_mm_unpacklo_epi16(a.v, simde_mm_unpackhi_epi64(a.v, a.v))};
 }
+// a4 b4 a5 b5 a6 b6 a7 b7.
+inline Int16x8 interleaveUpper(Int16x8 a, Int16x8 b) {
+  return {simde_mm_unpackhi_epi16(a.v, b.v)};
+}
 // a0 b1 a2 b3 a4 b5 a6 b7.
 inline Int16x8 evenAndOdd(Int16x8 a, Int16x8 b) {
   const simde__m128i mask = simde_mm_set1_epi32(0xffff);
@@ -94,6 +178,29 @@ inline Int16x8 evenAndOdd(Int16x8 a, Int16x8 b) {
 inline Int16x8 widenBytes(std::uint32_t bytes) {
   const simde__m128i all = simde_mm_cvtsi32_si128(static_cast<std::int32_t>(bytes));
   return {simde_mm_unpacklo_epi8(all, simde_mm_setzero_si128())};
+}
+
+// From 32 bits each, whose lowest 16 count: a0 b0 a1 b1 a2 b2 a3 b3.
+inline Int16x8 pairs(Int32x4 a, Int32x4 b) {
+  return {
+      simde_mm_or_si128(simde_mm_and_si128(a.v, simde_mm_set1_epi32(0xffff)), simde_mm_slli_epi32(b.v, 16))};
+}
+// a0 0 a1 0 a2 0 a3 0.
+inline Int16x8 pairs(Int32x4 a) {
+  return {simde_mm_and_si128(a.v, simde_mm_set1_epi32(0xffff))};
+}
+// Their 32-bit lanes by turns: a0 b0 a1 b1, a2 b2 a3 b3; and 64-bit lanes: a0 b0, a1 b1.
+inline Int16x8 interleave32Low(Int16x8 a, Int16x8 b) {
+  return {simde_mm_unpacklo_epi32(a.v, b.v)};
+}
+inline Int16x8 interleave32High(Int16x8 a, Int16x8 b) {
+  return {simde_mm_unpackhi_epi32(a.v, b.v)};
+}
+inline Int16x8 interleave64Low(Int16x8 a, Int16x8 b) {
+  return {simde_mm_unpacklo_epi64(a.v, b.v)};
+}
+inline Int16x8 interleave64High(Int16x8 a, Int16x8 b) {
+  return {simde_mm_unpackhi_epi64(a.v, b.v)};
 }
 
 // a0 b0 + a1 b1, a2 b2 + a3 b3, ...
@@ -113,7 +220,7 @@ inline std::uint32_t countNotAbove(Int16x8 low, Int16x8 high, Int16x8 wanted) {
   const simde__m128i above =
       simde_mm_packs_epi16(simde_mm_cmpgt_epi16(low.v, wanted.v), simde_mm_cmpgt_epi16(high.v, wanted.v));
   return static_cast<std::uint32_t>(
-      std::countr_zero(static_cast<std::uint32_t>(simde_mm_movemask_epi8(above))));
+      std::countr_zero(static_cast<std::uint32_t>(simde_mm_movemask_epi8(above)) | 1u << 15));
 }
 
 }  // namespace clothstream::codec::hierarchical

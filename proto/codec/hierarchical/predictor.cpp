@@ -11,34 +11,56 @@ bool Predictor::allocate(const StreamLayout& layout, int stepBits) {
   stepBits_ = stepBits;
   fineBits_ = stepBits - 4;
   const std::size_t vertices = layout.vertexCount();
-  bool allocated =
-      hierarchy_.build(layout) && curvatures_.allocate(vertices) && magnitudes_.allocate(vertices);
-  for (Array<Node>& nodes : nodes_) {
-    allocated = allocated && nodes.allocate(vertices + 1);
-    if (allocated) nodes[vertices] = Node{};
+  bool allocated = hierarchy_.build(layout);
+  for (std::size_t i = 0; i <= layout.temporalLayers; ++i) {
+    Moment& moment = moments_[i];
+    allocated = allocated && moment.nodes.allocate(vertices + 1) && moment.records.allocate(vertices);
+    if (allocated) moment.nodes[vertices] = Node{};
+    if (i < layout.temporalLayers) ofLayer_[i] = i;
   }
-  for (Array<Record>& records : records_) allocated = allocated && records.allocate(vertices);
+  made_ = layout.temporalLayers;
   return allocated;
 }
 
-void Predictor::begin(bool key) {
+void Predictor::begin(bool key, std::uint8_t referenceLayer) {
   static constexpr Node kNoNode{};
   static constexpr Record kNoRecord{};
-  static constexpr Curvature kNoCurvature{};
-  static constexpr std::uint32_t kNoMagnitudes = 0;
+  const Moment& past = moments_[ofLayer_[referenceLayer]];
   key_ = key;
   stride_ = key ? 0 : 1;
-  pastNodes_ = key ? &kNoNode : nodes_[1].data();
-  pastCurvatures_ = key ? &kNoCurvature : curvatures_.data();
-  pastMagnitudes_ = key ? &kNoMagnitudes : magnitudes_.data();
-  // Before a history that is too short all was at rest.
-  for (std::size_t i = 0; i < past_.size(); ++i) {
-    past_[i] = key ? &kNoRecord : records_[std::min(i + 1, depth_)].data();
-  }
+  pastNodes_ = key ? &kNoNode : past.nodes.data();
+  pastRecords_ = key ? &kNoRecord : past.records.data();
+  nodes_ = moments_[made_].nodes.data();
+  records_ = moments_[made_].records.data();
 }
 
-// Residuals of more than 16 bits.
-Int32x4 Predictor::reconstructFar(const Prediction& prediction, const std::int32_t* r) const {
+FeatureVectors Predictor::features(std::uint32_t slot, const Prediction& p) const {
+  const Record& past = pastRecords_[slot * stride_];
+  const std::array<Int16x8, kPlainPairs> plain = plainFeatures(past, p);
+  const Int16x8 locals = Int16x8::load(past.local);
+  const Int32x4 now32 = locals.even(), change32 = now32 - locals.odd();
+  const Int16x8 local = narrow(now32, change32);
+  const Int16x8 tangents = interleaveHalves(p.frame.tangents);
+  const Int16x8 normal = interleave(p.frame.normal, Int16x8::zero());
+  const auto turned = [&](Int16x8 u_v, Int16x8 n_) {
+    const int down = kUnitBits - kTurnedBits;
+    const Int32x4 half = Int32x4::all(1 << (down - 1));
+    const Int32x4 along = (dotPairs(tangents, u_v) + half).shiftedRight(down);
+    const Int32x4 across = (dotPairs(normal, n_) + half).shiftedRight(down);
+    return interleaveHalves(narrow(along, across));
+  };
+  return {plain[0],
+          plain[1],
+          plain[2],
+          plain[3],
+          plain[4],
+          plain[5],
+          turned(local.broadcastPair<0>(), local.broadcastPair<1>()),
+          turned(local.broadcastPair<2>(), local.broadcastPair<3>())};
+}
+
+// In 64 bits: residuals may be of more than 16.
+Int32x4 Predictor::reconstruct(const Prediction& prediction, const std::int32_t* r) const {
   alignas(16) std::int32_t position[4];
   alignas(16) std::int16_t tangents[8], normal[8];
   prediction.position.store(position);
@@ -54,24 +76,23 @@ Int32x4 Predictor::reconstructFar(const Prediction& prediction, const std::int32
   return Int32x4::load(position);
 }
 
-void Predictor::keep() {
-  const Node* nodes = nodes_[0].data();
-  for (std::size_t slot = 0; slot < magnitudes_.size(); ++slot) {
-    const std::array<std::uint32_t, 4>& nearest = hierarchy_.neighbours[slot].nearest;
+void Predictor::keep(std::uint8_t layer) {
+  const Node* nodes = nodes_;
+  for (std::size_t slot = 0; slot < hierarchy_.vertexOf.size(); ++slot) {
+    const Nearest& nearest = hierarchy_.nearest[slot];
     const Int32x4 sum = nodes[nearest[0]].load() + nodes[nearest[1]].load() + nodes[nearest[2]].load() +
                         nodes[nearest[3]].load();
     const Int32x4 own = nodes[slot].load().shiftedLeft(2);
-    magnitudes_[slot] = static_cast<std::uint32_t>((sum + own).fourth());
+    Record& record = records_[slot];
+    record.magnitudes = static_cast<std::uint32_t>((sum + own).fourth());
     const Int32x4 curvature = (sum - own).shiftedRight(fineBits_);
     const Int16x8 narrowed = narrow(curvature, curvature).withoutFourth();
     const Int16x8 present = interleave(narrowed, narrowed);
-    std::int16_t* newAndOld = curvatures_[slot].newAndOld;
-    const Int16x8 past = key_ ? present : Int16x8::load(newAndOld).pairsSwapped();
-    evenAndOdd(present, past).store(newAndOld);
+    const Int16x8 past = key_ ? present : Int16x8::load(record.curvatures).pairsSwapped();
+    evenAndOdd(present, past).store(record.curvatures);
   }
-  std::swap(nodes_[0], nodes_[1]);
-  std::rotate(records_.begin(), records_.end() - 1, records_.end());
-  depth_ = key_ ? 1 : std::min<std::size_t>(depth_ + 1, past_.size());
+  newest_ = made_;
+  std::swap(made_, ofLayer_[layer]);
 }
 
 }  // namespace clothstream::codec::hierarchical

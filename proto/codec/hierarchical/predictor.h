@@ -3,6 +3,7 @@
 // the frames before. The same integers at both ends.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <span>
@@ -29,19 +30,29 @@ struct alignas(16) Node {
   bool rests() const { return magnitudes >> 24 != 0; }
 };
 
-// What the frames to come need of a vertex. 16-bit vectors are in sixteenths of a step, saturated.
-struct alignas(16) Record {
-  std::int32_t average[4];        // of the parents
-  std::int16_t detailAndRing[8];  // of the vertex, and of the ring, relative to that average: x x y y z z
-  std::int16_t twistAndRing[8];   // half the difference of the two pairs of parents; the ring's once more
-  std::int16_t local[8];          // the detail along u, v and n
+// What the frames that refer to this one need of a vertex. The frame before is the one that this one refers
+// to; after a key frame all was at rest. 16-bit vectors are in sixteenths of a step, saturated.
+struct alignas(64) Record {
+  std::int32_t average[3];        // of the parents
+  std::uint32_t magnitudes;       // of the residuals: of this vertex four times and of the nearest
+  std::int16_t curvatures[8];     // the discrete Laplacian, and that of the frame before: x x y y z z
+  std::int16_t twistAndRing[8];   // half the difference of the two pairs of parents; the ring off the average
+  std::int16_t detailAndRing[8];  // of the vertex, and of the ring, off the average: x x y y z z
+  std::int16_t change[8];         // of these two since the frame before
+  std::int16_t changeBefore[8];   // the same of the frame before
+  std::int16_t movedAndFaster[8];  // what the average was off that of the frame before; the change of that
+  std::int16_t local[8];           // the detail along u, v and n, and that of the frame before: u u v v n n
 };
 
 // What predicts a change: vectors in sixteenths of a step, interleaved by two, and their weights.
 inline constexpr std::size_t kFeaturePairs = 8;
 inline constexpr std::size_t kFeatures = 2 * kFeaturePairs;
-inline constexpr std::size_t kRingFeature = 1, kDetailChangeFeature = 2;
+inline constexpr std::size_t kDetailChangeFeature = 2, kTwistFeature = 6, kRingFeature = 7;
 using FeatureVectors = std::array<Int16x8, kFeaturePairs>;
+
+// The others are turned with the surface: their sum is, to 2^-kTurnedBits of what the others are told in.
+inline constexpr std::size_t kPlainPairs = 6;
+inline constexpr int kTurnedBits = 2;
 
 // A weight of 1 is 2^kWeightBits.
 inline constexpr int kWeightBits = 10;
@@ -49,16 +60,25 @@ inline constexpr std::int32_t kMaxWeight = 2047;
 // The last class, of the corners, has none.
 using Weights = std::array<std::array<std::int16_t, kFeatures>, kWeightClasses + 1>;
 
+// A class's weights as what they multiply.
+struct WeightVectors {
+  std::array<Int16x8, kPlainPairs> plain;
+  Int16x8 local;  // of a record
+};
+
 // What is known of a vertex before its residual.
 struct Prediction {
   Int32x4 position, average;
   Int32x4 last;  // position; of no meaning in a key frame
   SurfaceFrame frame;
-  Int16x8 ring, twistRing;  // the ring at the odd lanes; both as in the record
+  Int16x8 twistAndRing, movedAndFaster;  // as in the record
   // Sums over the parents, over the ring, and of the last frame: of this vertex four times and of the
   // nearest.
   std::uint32_t parentMagnitudes, ringMagnitudes, lastMagnitudes;
 };
+
+// Vertices that are predicted before the first of them is coded: few enough to stay in the nearest cache.
+inline constexpr std::uint32_t kChunk = 64;
 
 // A frame is begin(), then predict() and place() for all vertices in coding order, then keep(), or nothing
 // where the frame is given up.
@@ -69,126 +89,169 @@ class Predictor {
 
   const Hierarchy& hierarchy() const { return hierarchy_; }
 
-  void begin(bool key);
-  void predict(std::uint32_t slot, const FeatureVectors& weights, Prediction& out) const {
-    FeatureVectors features;
-    predict(slot, weights, features, out);
-  }
-  void predict(std::uint32_t slot, const FeatureVectors& weights, FeatureVectors& features,
-               Prediction& out) const;
-  // The position to which these residuals lead, in steps along u, v and n.
+  // A predicted frame refers to the newest one of that layer.
+  void begin(bool key, std::uint8_t referenceLayer);
+  // Of up to kChunk vertices, none of which is a parent or of the ring of another; `out` and `frames` have
+  // room for whole fours of them.
+  void predict(std::uint32_t begin, std::uint32_t count, const WeightVectors& weights, Prediction* out,
+               SurfaceFrames* frames) const;
+  // What the weights multiplied; the turned ones in parts of 2^-kTurnedBits.
+  FeatureVectors features(std::uint32_t slot, const Prediction& prediction) const;
+  // How far these residuals of four vertices move them, in steps along u, v and n: each within 16 bits.
+  Vectors4 moved(const SurfaceFrames& frames, const Vectors4& residuals) const;
+  // The position to which these residuals lead, whatever they are.
   Int32x4 reconstruct(const Prediction& prediction, const std::int32_t* residual) const;
   void place(std::uint32_t slot, const Prediction& prediction, Int32x4 position, std::uint32_t magnitudes);
-  void keep();
+  // The frame is now the newest one of that layer.
+  void keep(std::uint8_t layer);
 
-  // Of the newest frame that was kept, in coding order.
-  std::span<const Node> nodes() const { return {nodes_[1].data(), hierarchy_.vertexOf.size()}; }
+  // In coding order, of the newest frame that was kept, and of the one that this one refers to (of no meaning
+  // in a key frame).
+  std::span<const Node> nodes() const { return {moments_[newest_].nodes.data(), hierarchy_.vertexOf.size()}; }
+  std::span<const Node> reference() const { return {pastNodes_, hierarchy_.vertexOf.size()}; }
 
  private:
-  // The discrete Laplacian of the last frame, and of the one before: x x y y z z.
-  struct alignas(16) Curvature {
-    std::int16_t newAndOld[8] = {};
-  };
-
-  Int32x4 reconstructFar(const Prediction& prediction, const std::int32_t* residual) const;
+  std::array<Int16x8, kPlainPairs> plainFeatures(const Record& past, const Prediction& prediction) const;
+  void look(std::uint32_t slot, Prediction& out, Int32x4& first, Int32x4& second) const;
 
   Hierarchy hierarchy_;
   int stepBits_ = 0, fineBits_ = 0;  // a sixteenth of a step is 2^fineBits_ units
-  // [0] of the frame that is being made, then of those before.
-  std::array<Array<Node>, 2> nodes_;
-  std::array<Array<Record>, 4> records_;
-  Array<Curvature> curvatures_;
-  Array<std::uint32_t> magnitudes_;
-  std::size_t depth_ = 0;  // frames that were kept since the last key frame and with it; at most 3
+  // What a frame leaves.
+  struct Moment {
+    Array<Node> nodes;
+    Array<Record> records;
+  };
+  // Of each layer's newest frame, and of the one that is being made.
+  std::array<Moment, kMaxTemporalLayers + 1> moments_;
+  std::array<std::size_t, kMaxTemporalLayers> ofLayer_{};
+  std::size_t made_ = 0, newest_ = 0;
 
   // What predict() reads of the past: of a key frame one of each that is all zero, by a stride of 0.
   bool key_ = true;
   std::size_t stride_ = 0;
   const Node* pastNodes_ = nullptr;
-  std::array<const Record*, 3> past_{};
-  const Curvature* pastCurvatures_ = nullptr;
-  const std::uint32_t* pastMagnitudes_ = nullptr;
+  const Record* pastRecords_ = nullptr;
+  Node* nodes_ = nullptr;  // of the frame that is being made
+  Record* records_ = nullptr;
 };
 
-inline void Predictor::predict(std::uint32_t slot, const FeatureVectors& weights, FeatureVectors& features,
-                               Prediction& out) const {
+// All but the frame and what follows from it. `first` and `second` span the surface.
+inline void Predictor::look(std::uint32_t slot, Prediction& out, Int32x4& first, Int32x4& second) const {
   const Neighbours& neighbours = hierarchy_.neighbours[slot];
-  const Node* nodes = nodes_[0].data();
+  const Node* nodes = nodes_;
   const Int32x4 p0 = nodes[neighbours.parents[0]].load(), p1 = nodes[neighbours.parents[1]].load();
   const Int32x4 p2 = nodes[neighbours.parents[2]].load(), p3 = nodes[neighbours.parents[3]].load();
-  const Int32x4 first = p0 + p1, second = p2 + p3, sum = first + second;
+  const Int32x4 pair = p0 + p1, otherPair = p2 + p3, sum = pair + otherPair;
   Int32x4 ringSum = nodes[neighbours.ring[0]].load();
   for (std::size_t i = 1; i < 8; ++i) ringSum = ringSum + nodes[neighbours.ring[i]].load();
   const Int32x4 average = (sum + Int32x4::all(2)).shiftedRight(2);
   out.average = average;
   out.parentMagnitudes = static_cast<std::uint32_t>(sum.fourth());
   out.ringMagnitudes = static_cast<std::uint32_t>(ringSum.fourth());
-  out.frame = surfaceFrame(p1 - p0, p3 - p2);
+  first = p1 - p0;
+  second = p3 - p2;
   const Int32x4 ring = ((ringSum + Int32x4::all(4)).shiftedRight(3) - average).shiftedRight(fineBits_);
-  const Int32x4 twist = (first - second).shiftedRight(2 + fineBits_);
-  const Int16x8 twistRing = interleaveHalves(narrow(twist, ring));
-  out.twistRing = twistRing;
-  out.ring = interleave(Int16x8::zero(), narrow(ring, ring));
+  const Int32x4 twist = (pair - otherPair).shiftedRight(2 + fineBits_);
+  out.twistAndRing = narrow(twist, ring);
 
-  const std::size_t at = slot * stride_;
-  const Record &last = past_[0][at], &before = past_[1][at], &first3 = past_[2][at];
-  out.lastMagnitudes = pastMagnitudes_[at];
-  const Int32x4 average1 = Int32x4::load(last.average), average2 = Int32x4::load(before.average);
-  const Int32x4 average3 = Int32x4::load(first3.average);
-  const Int32x4 change0 = average - average1, change1 = average1 - average2, change2 = average2 - average3;
-  const Int16x8 detail1 = Int16x8::load(last.detailAndRing), detail2 = Int16x8::load(before.detailAndRing);
-  const Int16x8 detail3 = Int16x8::load(first3.detailAndRing);
-  const Int16x8 local = Int16x8::load(last.local), localChange = local - Int16x8::load(before.local);
-  const Int16x8 tangents = interleaveHalves(out.frame.tangents);
-  const Int16x8 normal = interleave(out.frame.normal, Int16x8::zero());
-  const auto turned = [&](Int16x8 detail) {
-    const Int32x4 along = dotPairs(tangents, detail.broadcastPair<0>()).shiftedRight(kUnitBits);
-    const Int32x4 across = dotPairs(normal, detail.broadcastPair<1>()).shiftedRight(kUnitBits);
-    return interleaveHalves(narrow(along, across));
-  };
-  features = {detail1,
-              detail1 - detail2,
-              detail2 - detail3,
-              twistRing - Int16x8::load(last.twistAndRing),
-              Int16x8::load(pastCurvatures_[at].newAndOld),
-              interleaveHalves(narrow((change0 - change1).shiftedRight(fineBits_),
-                                      (change1 - change2).shiftedRight(fineBits_))),
-              turned(local),
-              turned(localChange)};
-  // Sixteenths of a step in 2^-kWeightBits, to units; half a unit for the rounding.
-  const int down = kWeightBits - fineBits_;
-  Int32x4 change = Int32x4::all(1 << (down - 1));
-  for (std::size_t i = 0; i < kFeaturePairs; ++i) change = change + dotPairs(features[i], weights[i]);
-  // What rests is expected to go on resting: pins do, in the middle of a moving cloth.
-  const Node& own = pastNodes_[at];
-  out.last = own.load();
-  out.position = own.rests() ? out.last : average + (out.last - average1) + change.shiftedRight(down);
+  const Record& past = pastRecords_[slot * stride_];
+  out.lastMagnitudes = past.magnitudes;
+  // In a key frame nothing moves.
+  const Int32x4 before = key_ ? average : Int32x4::load(past.average);
+  const Int32x4 moved = (average - before).shiftedRight(fineBits_);
+  const Int16x8 narrowed = narrow(moved, moved);
+  out.movedAndFaster = interleave64Low(narrowed, narrowed - Int16x8::load(past.movedAndFaster));
 }
 
-inline Int32x4 Predictor::reconstruct(const Prediction& prediction, const std::int32_t* r) const {
-  const auto fromLowest = [r](std::size_t c) { return static_cast<std::uint32_t>(r[c]) + 0x8000u; };
-  if ((fromLowest(0) | fromLowest(1) | fromLowest(2)) >> 16 != 0) return reconstructFar(prediction, r);
-  const Int32x4 moved = prediction.frame.combine(
-      Int16x8::allPairs(static_cast<std::int16_t>(r[0]), static_cast<std::int16_t>(r[1])),
-      Int16x8::allPairs(static_cast<std::int16_t>(r[2]), 0));
+inline std::array<Int16x8, kPlainPairs> Predictor::plainFeatures(const Record& past,
+                                                                 const Prediction& p) const {
+  return {Int16x8::load(past.detailAndRing),
+          Int16x8::load(past.change),
+          Int16x8::load(past.changeBefore),
+          interleaveHalves(p.twistAndRing - Int16x8::load(past.twistAndRing)),
+          Int16x8::load(past.curvatures),
+          interleaveUpper(p.movedAndFaster, Int16x8::load(past.movedAndFaster))};
+}
+
+inline void Predictor::predict(std::uint32_t begin, std::uint32_t count, const WeightVectors& weights,
+                               Prediction* out, SurfaceFrames* frames) const {
+  // Sixteenths of a step in 2^-kWeightBits, to units; half a unit for the rounding.
+  const int down = kWeightBits - fineBits_;
+  for (std::uint32_t four = 0; four < count; four += 4) {
+    std::array<Int32x4, 4> first, second;
+    for (std::uint32_t i = 0; i < 4; ++i)
+      look(begin + std::min(four + i, count - 1), out[four + i], first[i], second[i]);
+    const SurfaceFrames made = surfaceFrames(transposed(first), transposed(second));
+    frames[four / 4] = made;
+    const std::array<SurfaceFrame, 4> split = made.split();
+    for (std::uint32_t i = 0; i < 4; ++i) {
+      Prediction& p = out[four + i];
+      p.frame = split[i];
+      const std::size_t at = (begin + std::min(four + i, count - 1)) * stride_;
+      const Record& past = pastRecords_[at];
+      const std::array<Int16x8, kPlainPairs> plain = plainFeatures(past, p);
+      Int32x4 change = Int32x4::all(1 << (down - 1));
+      for (std::size_t f = 0; f < kPlainPairs; ++f) change = change + dotPairs(plain[f], weights.plain[f]);
+      const Int32x4 local = (dotPairs(Int16x8::load(past.local), weights.local) +
+                             Int32x4::all(1 << (kWeightBits - kTurnedBits - 1)))
+                                .shiftedRight(kWeightBits - kTurnedBits);
+      const Int16x8 wished = narrow(local, local);
+      const Int32x4 turned = p.frame.combine(wished.broadcastPair<0>(), wished.broadcastPair<1>());
+      change = change + turned.shiftedRight(kUnitBits + kTurnedBits - kWeightBits);
+      const Node& own = pastNodes_[at];
+      p.last = own.load();
+      // What rests is expected to go on resting: pins do, in the middle of a moving cloth.
+      p.position = own.rests()
+                       ? p.last
+                       : p.average + (p.last - Int32x4::load(past.average)) + change.shiftedRight(down);
+    }
+  }
+}
+
+// All bits where a component is not within 16 bits.
+inline Int32x4 beyond16Bits(const Vectors4& a) {
+  const auto beyond = [](Int32x4 c) { return c.shiftedLeft(16).shiftedRight(16) == c; };
+  return Int32x4::without(beyond(a.x) & beyond(a.y) & beyond(a.z), Int32x4::all(-1));
+}
+
+inline Vectors4 Predictor::moved(const SurfaceFrames& f, const Vectors4& residuals) const {
+  const Int16x8 alongUv = pairs(residuals.x, residuals.y), alongN = pairs(residuals.z);
   const int down = kUnitBits - stepBits_;
-  return prediction.position + (moved + Int32x4::all(1 << (down - 1))).shiftedRight(down);
+  const auto component = [&](Int32x4 u, Int32x4 v, Int32x4 n) {
+    const Int32x4 sum = dotPairs(pairs(u, v), alongUv) + dotPairs(Int16x8{n.v}, alongN);
+    return (sum + Int32x4::all(1 << (down - 1))).shiftedRight(down);
+  };
+  return {component(f.u.x, f.v.x, f.n.x), component(f.u.y, f.v.y, f.n.y), component(f.u.z, f.v.z, f.n.z)};
 }
 
 inline void Predictor::place(std::uint32_t slot, const Prediction& prediction, Int32x4 position,
                              std::uint32_t magnitudes) {
-  Node& node = nodes_[0][slot];
+  Node& node = nodes_[slot];
   position.store(&node.x);
   const bool rests = !key_ && position.sameThree(prediction.last);
   node.magnitudes = magnitudes | (rests ? 1u << 24 : 0u);
   const Int32x4 detail = (position - prediction.average).shiftedRight(fineBits_);
   const Int16x8 narrowed = narrow(detail, detail).withoutFourth();
-  Record& record = records_[0][slot];
-  prediction.average.store(record.average);
-  evenAndOdd(interleave(narrowed, narrowed), prediction.ring).store(record.detailAndRing);
-  prediction.twistRing.store(record.twistAndRing);
-  const Int32x4 local = prediction.frame.project(narrowed).shiftedRight(kUnitBits);
-  narrow(local, local).store(record.local);
+  const Int32x4 local32 = prediction.frame.project(narrowed).shiftedRight(kUnitBits);
+  const Int16x8 local = narrow(local32, local32);
+  const Int16x8 detailAndRing =
+      interleave(narrowed, interleave64High(prediction.twistAndRing, prediction.twistAndRing));
+  const Record& past = pastRecords_[slot * stride_];
+  Record& record = records_[slot];
+  prediction.average.store(record.average);  // and what keep() puts beside it
+  prediction.twistAndRing.store(record.twistAndRing);
+  prediction.movedAndFaster.store(record.movedAndFaster);
+  detailAndRing.store(record.detailAndRing);
+  Int16x8::load(past.change).store(record.changeBefore);
+  Int16x8::load(past.curvatures).store(record.curvatures);
+  if (key_) {
+    // All was at rest before.
+    Int16x8::zero().store(record.change);
+    interleave(local, local).store(record.local);
+  } else {
+    (detailAndRing - Int16x8::load(past.detailAndRing)).store(record.change);
+    evenAndOdd(interleave(local, local), Int16x8::load(past.local).evenToOdd()).store(record.local);
+  }
 }
 
 }  // namespace clothstream::codec::hierarchical

@@ -28,10 +28,10 @@ std::size_t RansWriter::write(std::byte* out) {
   std::uint16_t* first = end;
   // The last symbol first: a reader takes them in the order of add().
   for (std::size_t i = count_; i-- > 0;) {
-    const Entry entry = entries_[i];
-    std::uint32_t& state = states[entry.coder];
-    const std::uint32_t start = tables[entry.table].start(entry.symbol);
-    const std::uint32_t frequency = tables[entry.table].frequency(entry.symbol);
+    const std::uint32_t entry = entries_[i], symbol = entry & (kSymbols - 1);
+    std::uint32_t& state = states[entry >> kCoderShift];
+    const SymbolTable& table = tables[entry >> kTableShift & ((1u << (kCoderShift - kTableShift)) - 1)];
+    const std::uint32_t start = table.start(symbol), frequency = table.frequency(symbol);
     // Below 2^32 after this symbol, that is.
     if (state >> (32 - kProbabilityBits) >= frequency) {
       *--first = static_cast<std::uint16_t>(state);

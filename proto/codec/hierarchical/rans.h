@@ -7,6 +7,7 @@
 #include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <span>
 #include <vector>
 
@@ -57,15 +58,21 @@ class RansReader {
     }
   }
 
+  // Whether so many symbols more cannot lead beyond the end.
+  bool hasRoomFor(std::size_t symbols) const { return at_ + 2 * symbols <= bytes_.size(); }
+
+  // 0 stands for what is beyond the end. `within`: the symbol cannot lead there.
+  template <bool within>
   std::uint32_t read(std::size_t coder, const SymbolTable& table) {
     std::uint32_t state = states_[coder];
     const std::uint32_t bits = state & ((1u << kProbabilityBits) - 1);
     const std::uint32_t symbol = table.symbolAt(bits);
     state = table.frequency(symbol) * (state >> kProbabilityBits) + bits - table.start(symbol);
     // Seldom, and hard to foretell: without a branch.
-    const bool low = state < kLowestState;
-    states_[coder] = low ? state << 16 | wordAt(at_) : state;
-    at_ += low ? 2 : 0;
+    const std::uint32_t low = state < kLowestState ? 1 : 0;
+    const std::uint32_t next = within ? wordWithin(at_) : wordAt(at_);
+    states_[coder] = state << 16 * low | (next & (0u - low));
+    at_ += 2 * low;
     return symbol;
   }
 
@@ -84,7 +91,14 @@ class RansReader {
   // 0 past the end.
   std::uint32_t wordAt(std::size_t at) const {
     if (at + 2 > bytes_.size()) return 0;
-    return static_cast<std::uint32_t>(bytes_[at]) | static_cast<std::uint32_t>(bytes_[at + 1]) << 8;
+    return wordWithin(at);
+  }
+  std::uint32_t wordWithin(std::size_t at) const {
+    std::uint16_t word;
+    std::memcpy(&word, &bytes_[at], sizeof word);
+    if constexpr (std::endian::native == std::endian::big)
+      word = static_cast<std::uint16_t>(word << 8 | word >> 8);
+    return word;
   }
 
   std::span<const std::byte> bytes_;
@@ -94,14 +108,21 @@ class RansReader {
 
 class RansWriter {
  public:
-  explicit RansWriter(std::size_t mostSymbols) : entries_(mostSymbols), words_(mostSymbols) {}
+  explicit RansWriter(std::size_t mostSymbols) : entries_(mostSymbols + 8), words_(mostSymbols) {}
 
   std::size_t count() const { return count_; }
   // What was added after the first `count` is forgotten.
   void shrink(std::size_t count) { count_ = count; }
   void add(std::size_t coder, std::size_t table, std::uint32_t symbol) {
-    entries_[count_++] = {static_cast<std::uint8_t>(coder), static_cast<std::uint8_t>(table),
-                          static_cast<std::uint8_t>(symbol)};
+    entries_[count_++] = static_cast<std::uint16_t>(coder << kCoderShift | table << kTableShift | symbol);
+  }
+  // One with each of four coders, from `coder` on.
+  void addFour(std::size_t coder, Int32x4 tables, Int32x4 some) {
+    const auto c = static_cast<std::int32_t>(coder);
+    const Int32x4 entries =
+        Int32x4::of(c, c + 1, c + 2, c + 3).shiftedLeft(kCoderShift) | tables.shiftedLeft(kTableShift) | some;
+    narrow(entries, entries).storeFour(&entries_[count_]);
+    count_ += 4;
   }
 
   // Bytes that write() writes at most; it writes none where there is no symbol.
@@ -109,10 +130,9 @@ class RansWriter {
   std::size_t write(std::byte* out);
 
  private:
-  struct Entry {
-    std::uint8_t coder, table, symbol;
-  };
-  std::vector<Entry> entries_;
+  static constexpr int kTableShift = 4, kCoderShift = 10;
+
+  std::vector<std::uint16_t> entries_;  // coder, table and symbol
   std::vector<std::uint16_t> words_;
   std::size_t count_ = 0;
 };

@@ -22,7 +22,11 @@ struct ScaleWeights {
   std::int16_t normal, u;            // times the magnitudes of this vertex that are known by then
   std::int16_t constant;
 };
-inline constexpr std::size_t kScaleClasses = 4;  // two weight classes each; the last is the corners'
+// Two weight classes each, the fourth the corners'; then the same of key frames, which know of no last frame.
+inline constexpr std::size_t kScaleClasses = 8;
+constexpr std::size_t scaleClassOf(std::uint32_t weightClass, bool key) {
+  return weightClass / 2 + (key ? kScaleClasses / 2 : 0);
+}
 extern const std::array<std::array<ScaleWeights, kComponents>, kScaleClasses> kScaleWeights;
 
 // Frequencies of symbols, of 2^kProbabilityBits; the last symbol is the escape.
@@ -50,41 +54,51 @@ constexpr unsigned rawBits(std::uint32_t scale) {
   return scale < 16 ? 0 : (scale - 14) / 2;
 }
 
+// The same of four.
+inline Int32x4 scalesOf(Int32x4 expected) {
+  // A float's exponent and the bit below are that.
+  const Float32x4 e = clamp(Float32x4::of(expected), 4, 16383);
+  return e.bits().bitsShiftedRight(22) - Int32x4::all(2 * (127 + 2));
+}
+
 // A scale class's weights as vectors.
 class ScaleModel {
  public:
   explicit ScaleModel(const std::array<ScaleWeights, kComponents>& w)
       : near_(Int16x8::of(w[0].parents, w[0].ring, w[1].parents, w[1].ring, w[2].parents, w[2].ring)),
         past_(Int16x8::of(w[0].last, w[0].constant, w[1].last, w[1].constant, w[2].last, w[2].constant)),
-        weights_(&w) {}
+        own_{Int16x8::allPairs(w[0].normal, 0), Int16x8::allPairs(w[1].normal, w[1].u), Int16x8::zero()} {}
 
-  // What is expected before the vertex's own residuals are known, by component.
-  Int32x4 expect(const Prediction& p) const {
-    const Int16x8 near = interleave(widenBytes(p.parentMagnitudes), widenBytes(p.ringMagnitudes));
-    const Int16x8 past = interleave(widenBytes(p.lastMagnitudes), Int16x8::all(1));
-    return dotPairs(near, near_) + dotPairs(past, past_);
+  // What is expected of four before the vertices' own residuals are known: along u, v and n.
+  Vectors4 expect(const Prediction* four) const {
+    std::array<Int32x4, 4> expected;
+    for (std::size_t i = 0; i < 4; ++i) {
+      const Prediction& p = four[i];
+      const Int16x8 near = interleave(widenBytes(p.parentMagnitudes), widenBytes(p.ringMagnitudes));
+      const Int16x8 past = interleave(widenBytes(p.lastMagnitudes), Int16x8::all(1));
+      expected[i] = dotPairs(near, near_) + dotPairs(past, past_);
+    }
+    return transposed(expected);
   }
 
-  // `magnitudes` of the components that come before it in kCodingOrder.
-  std::uint32_t scale(Component component, std::int32_t expected, const std::uint32_t* magnitudes) const {
-    const ScaleWeights& w = (*weights_)[component];
-    if (component != kAlongNormal) expected += w.normal * static_cast<std::int32_t>(magnitudes[kAlongNormal]);
-    if (component == kAlongV) expected += w.u * static_cast<std::int32_t>(magnitudes[kAlongU]);
-    return scaleOf(expected);
+  // Magnitudes of a component that comes later in kCodingOrder are of no matter.
+  Int32x4 scales(Component component, Int32x4 expected, Int32x4 normalMagnitudes, Int32x4 uMagnitudes) const {
+    return scalesOf(expected + dotPairs(pairs(normalMagnitudes, uMagnitudes), own_[component]));
   }
 
  private:
   Int16x8 near_, past_;
-  const std::array<ScaleWeights, kComponents>* weights_;
+  std::array<Int16x8, kComponents> own_;
 };
 
-// As it counts in a Node.
-constexpr std::uint32_t countedMagnitude(std::int32_t residual) {
-  const auto bits = static_cast<std::uint32_t>(residual);
-  return std::min(residual < 0 ? 0u - bits : bits, kMaxMagnitude);
+// As they count in a Node.
+inline Int32x4 countedMagnitudes(Int32x4 residuals) {
+  const Int32x4 m = residuals.magnitude(), most = Int32x4::all(kMaxMagnitude);
+  return select(m.bitsShiftedRight(5) == Int32x4::all(0), m, most);
 }
-constexpr std::uint32_t packMagnitudes(const std::uint32_t* m) {
-  return m[kAlongU] | m[kAlongV] << 8 | m[kAlongNormal] << 16;
+// Along u, v and n, as in a Node.
+inline Int32x4 packMagnitudes(Int32x4 u, Int32x4 v, Int32x4 n) {
+  return u | v.shiftedLeft(8) | n.shiftedLeft(16);
 }
 
 }  // namespace clothstream::codec::hierarchical

@@ -3,7 +3,6 @@
 #pragma once
 
 #include <array>
-#include <bit>
 #include <cstdint>
 
 #include "proto/codec/hierarchical/lanes.h"
@@ -28,83 +27,95 @@ struct SurfaceFrame {
   }
 };
 
-namespace detail {
+// The frames of four vertices.
+struct SurfaceFrames {
+  Vectors4 u, v, n;
 
-struct Vec3 {
-  std::int32_t x, y, z;
+  std::array<SurfaceFrame, 4> split() const {
+    const auto xyz = [](const Vectors4& a) {
+      const Int16x8 xy = pairs(a.x, a.y), z = pairs(a.z);
+      return std::array{interleave32Low(xy, z), interleave32High(xy, z)};
+    };
+    const auto us = xyz(u), vs = xyz(v), ns = xyz(n);
+    const Int16x8 zero = Int16x8::zero();
+    std::array<SurfaceFrame, 4> frames;
+    for (std::size_t i = 0; i < 2; ++i) {
+      frames[2 * i] = {interleave64Low(us[i], vs[i]), interleave64Low(ns[i], zero)};
+      frames[2 * i + 1] = {interleave64High(us[i], vs[i]), interleave64High(ns[i], zero)};
+    }
+    return frames;
+  }
 };
+
+namespace detail {
 
 // 2^28 / sqrt(n) for the n from 2^26 to below 2^28 that have these twelve highest of 28 bits, in their
 // middle: to about 2^-12.
 extern const std::array<std::uint16_t, 4096> kRoots;
 
-inline std::uint32_t magnitude(std::int32_t value) {
-  const auto bits = static_cast<std::uint32_t>(value);
-  return value < 0 ? 0u - bits : bits;
+// The largest component to 13 bits, so that the squared length has less than 28. All bits where a vector is
+// zero. Components are below 2^30.
+inline Int32x4 scale(Vectors4& a) {
+  const Int32x4 all = a.x.magnitude() | a.y.magnitude() | a.z.magnitude();
+  // Of two ones beside each other the lower goes, so that the float is not rounded to the next power of two.
+  const Int32x4 exponent =
+      Float32x4::of(Int32x4::without(all.shiftedRight(1), all)).bits().bitsShiftedRight(23);
+  const Float32x4 factor = Float32x4::ofBits((Int32x4::all(266) - exponent).shiftedLeft(23));
+  // Bits that the shift takes away, and a float has no room for.
+  const Int32x4 lost = (all > Int32x4::all((1 << 18) - 1)) & Int32x4::all(31);
+  const auto floor = [&](Int32x4 value) {
+    const Float32x4 scaled = Float32x4::of(Int32x4::without(lost, value)) * factor;
+    const Int32x4 truncated = scaled.truncated();
+    return truncated + (Float32x4::of(truncated) > scaled);
+  };
+  a = {floor(a.x), floor(a.y), floor(a.z)};
+  return all == Int32x4::all(0);
 }
 
-// The largest component to 13 bits, so that the squared length has less than 28. False for zero.
-inline bool scale(Vec3& v) {
-  const std::uint32_t all = magnitude(v.x) | magnitude(v.y) | magnitude(v.z);
-  const int surplus = static_cast<int>(std::bit_width(all)) - 13;
-  if (surplus > 0) {
-    v = {v.x >> surplus, v.y >> surplus, v.z >> surplus};
-  } else {
-    v = {v.x * (1 << -surplus), v.y * (1 << -surplus), v.z * (1 << -surplus)};
-  }
-  return all != 0;
+// To unit length; `a` is scaled.
+inline Vectors4 normalised(const Vectors4& a) {
+  const Int16x8 xy = pairs(a.x, a.y), z = pairs(a.z);
+  Int32x4 squared = dotPairs(xy, xy) + dotPairs(z, z);
+  // The table starts at 2^26.
+  const Int32x4 isLow = Int32x4::all(1 << 26) > squared;
+  squared = select(isLow, squared.shiftedLeft(2), squared);
+  alignas(16) std::int32_t places[4];
+  (squared.shiftedRight(16) & Int32x4::all(4095)).store(places);  // whatever `a` is
+  const Int16x8 root{
+      Int32x4::of(kRoots[static_cast<std::size_t>(places[0])], kRoots[static_cast<std::size_t>(places[1])],
+                  kRoots[static_cast<std::size_t>(places[2])], kRoots[static_cast<std::size_t>(places[3])])
+          .v};
+  const auto times = [&](Int32x4 value) {
+    const Int32x4 product = dotPairs(Int16x8{value.v}, root);
+    return (product + (product & isLow) + Int32x4::all(1 << 13)).shiftedRight(14);
+  };
+  return {times(a.x), times(a.y), times(a.z)};
 }
 
-// To unit length; `v` is scaled and not zero.
-inline Vec3 normalised(const Vec3& v) {
-  const auto squared = static_cast<std::uint32_t>(v.x * v.x + v.y * v.y + v.z * v.z);
-  // An even shift brings it to at least 2^26, where the table starts.
-  const int shift = (28 - static_cast<int>(std::bit_width(squared))) & ~1;
-  const std::int32_t root = kRoots[(squared << shift) >> 16];
-  const int down = 14 - shift / 2;
-  const std::int32_t half = 1 << (down - 1);
-  return {(v.x * root + half) >> down, (v.y * root + half) >> down, (v.z * root + half) >> down};
-}
-
-inline Vec3 cross(const Vec3& a, const Vec3& b) {
-  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
-}
-
-inline std::int32_t pair(std::int32_t low, std::int32_t high) {
-  return static_cast<std::int32_t>((static_cast<std::uint32_t>(low) & 0xffffu) |
-                                   static_cast<std::uint32_t>(high) << 16);
-}
-
-inline Vec3 load(Int32x4 lanes) {
-  alignas(16) std::int32_t v[4];
-  lanes.store(v);
-  return {v[0], v[1], v[2]};
+// Of components of 16 bits.
+inline Vectors4 cross(const Vectors4& a, const Vectors4& b) {
+  const Int16x8 x = pairs(b.x), y = pairs(b.y), z = pairs(b.z);
+  const auto times = [](Int32x4 value, Int16x8 other) { return dotPairs(Int16x8{value.v}, other); };
+  return {times(a.y, z) - times(a.z, y), times(a.z, x) - times(a.x, z), times(a.x, y) - times(a.y, x)};
 }
 
 }  // namespace detail
 
-// u along `first`, n across both; the axes x, y, z where the two span no plane. The fourth lanes are ignored.
-inline SurfaceFrame surfaceFrame(Int32x4 first, Int32x4 second) {
-  using namespace detail;
+// u along `first`, n across both; the axes x, y, z where the two span no plane.
+inline SurfaceFrames surfaceFrames(Vectors4 first, Vectors4 second) {
   constexpr std::int32_t kOne = 1 << kUnitBits;
-  Vec3 u = load(first), across = load(second), v{0, kOne, 0}, n{0, 0, kOne};
-  bool spansPlane = scale(u) && scale(across);
-  if (spansPlane) {
-    u = normalised(u);
-    n = cross(u, across);
-    spansPlane = scale(n);
-  }
-  if (spansPlane) {
-    n = normalised(n);
-    v = cross(n, u);
-    constexpr std::int32_t half = kOne / 2;
-    v = {(v.x + half) >> kUnitBits, (v.y + half) >> kUnitBits, (v.z + half) >> kUnitBits};
-  } else {
-    u = {kOne, 0, 0};
-    n = {0, 0, kOne};
-  }
-  return {Int16x8{Int32x4::of(pair(u.x, u.y), pair(u.z, 0), pair(v.x, v.y), pair(v.z, 0)).v},
-          Int16x8{Int32x4::of(pair(n.x, n.y), pair(n.z, 0), 0, 0).v}};
+  Int32x4 isNoPlane = detail::scale(first) | detail::scale(second);
+  Vectors4 u = detail::normalised(first), n = detail::cross(u, second);
+  isNoPlane = isNoPlane | detail::scale(n);
+  n = detail::normalised(n);
+  Vectors4 v = detail::cross(n, u);
+  const auto rounded = [](Int32x4 a) { return (a + Int32x4::all(kOne / 2)).shiftedRight(kUnitBits); };
+  v = {rounded(v.x), rounded(v.y), rounded(v.z)};
+  const Int32x4 one = isNoPlane & Int32x4::all(kOne);
+  const auto or0 = [&](Int32x4 a) { return Int32x4::without(isNoPlane, a); };
+  return {{or0(u.x) | one, or0(u.y), or0(u.z)},
+          {or0(v.x), or0(v.y) | one, or0(v.z)},
+          {or0(n.x), or0(n.y), or0(n.z) | one}};
 }
 
 }  // namespace clothstream::codec::hierarchical

@@ -44,6 +44,8 @@ void WeightFitter::add(std::size_t weightClass, const FeatureVectors& features, 
     values[2 * pair] = simde_mm_cvtepi32_ps(features[pair].even().v);
     values[2 * pair + 1] = simde_mm_cvtepi32_ps(features[pair].odd().v);
   }
+  for (std::size_t i = 2 * kPlainPairs; i < kFeatures; ++i)
+    values[i] = simde_mm_mul_ps(values[i], simde_mm_set1_ps(1.0f / (1 << kTurnedBits)));
   values[kFeatures] = simde_mm_cvtepi32_ps(goal.v);
   const simde__m128 scale = simde_mm_mul_ps(lanes, simde_mm_set1_ps(importance));
   auto& sums = classes_[weightClass].fresh;

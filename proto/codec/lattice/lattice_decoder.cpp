@@ -81,7 +81,7 @@ class LatticeDecoder final : public BodyDecoder {
     return allocated;
   }
 
-  bool decode(const ParsedPacket& packet) override;
+  bool decode(const ParsedPacket& packet, std::uint8_t referenceLayer) override;
   void writePositions(float* out) const override;
   void writeNormals(float* out) const override;
   std::uint64_t reconstructionHash() const override;
@@ -99,7 +99,7 @@ class LatticeDecoder final : public BodyDecoder {
   std::array<Array<std::byte>, kMaxPlanes> planes_;
 };
 
-bool LatticeDecoder::decode(const ParsedPacket& packet) {
+bool LatticeDecoder::decode(const ParsedPacket& packet, std::uint8_t) {
   const PacketHeader& header = packet.header;
   if (header.sectionCount == 0) return false;
   std::size_t start = 0, index = 0;

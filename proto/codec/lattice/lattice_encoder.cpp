@@ -42,8 +42,7 @@ class LatticeEncoder final : public BodyEncoder {
   }
 
   std::size_t packetBound() const override { return writer_.packetBound(); }
-  std::size_t encode(std::uint64_t tick, PacketKind kind, std::uint64_t referenceTick,
-                     std::span<const float> positions, std::span<const float> normals,
+  std::size_t encode(const FrameRole& role, std::span<const float> positions, std::span<const float> normals,
                      std::span<std::byte> out) override;
   std::uint64_t reconstructionHash() const override {
     return hashFrame(vertexCount_, present_.positions.data(),
@@ -86,18 +85,17 @@ class LatticeEncoder final : public BodyEncoder {
   std::vector<std::byte> normalPlane_;
 };
 
-std::size_t LatticeEncoder::encode(std::uint64_t tick, PacketKind kind, std::uint64_t referenceTick,
-                                   std::span<const float> positions, std::span<const float> normals,
-                                   std::span<std::byte> out) {
+std::size_t LatticeEncoder::encode(const FrameRole& role, std::span<const float> positions,
+                                   std::span<const float> normals, std::span<std::byte> out) {
   const std::size_t n = vertexCount_;
   std::swap(present_, reference_);
   quantiseFrame(positions, normals);
 
-  const bool predicted = kind == PacketKind::predicted;
+  const bool predicted = role.kind == PacketKind::predicted;
   FrameResiduals frame;
-  frame.kind = kind;
-  frame.tick = tick;
-  frame.referenceTick = referenceTick;
+  frame.kind = role.kind;
+  frame.tick = role.tick;
+  frame.referenceTick = role.referenceTick;
   frame.positionPrediction = choose(present_.positions, reference_.positions, predicted);
   std::uint32_t bits = 0;
   for (std::size_t start = 0; start < present_.positions.size(); start += n) {
