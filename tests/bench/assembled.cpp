@@ -11,6 +11,7 @@
 
 #include "server/scene/springs.h"
 #include "tests/bench/bytes_moved.h"
+#include "tests/bench/hung_cloth.h"
 #include "tests/bench/simulated.h"
 #include "tests/bench/strain.h"
 #include "tests/bench/suite.h"
@@ -25,24 +26,16 @@ constexpr ConstraintPath kPaths[] = {ConstraintPath::matrixFree, ConstraintPath:
 // What the sheet may be stretched by while it swings, and in the mean when it hangs; docs/simulation.md.
 constexpr double kMostStrain = 0.05, kMeanStrain = 0.001;
 
-// A square metre of 0.2 kg, hung by its upper edge. No solve ends before its last iteration.
-scene::Scene hungSheet(std::uint32_t size, bool bend, ConstraintPath path, std::uint32_t iterations) {
-  scene::Cloth cloth;
-  cloth.name = "sheet";
-  cloth.grid = {.rows = size, .columns = size, .width = 1, .height = 1, .pose = {}};
-  cloth.mass = 0.2f;
-  cloth.damping = 1;
-  cloth.pins = {{.firstRow = 0, .lastRow = 0, .firstColumn = 0, .lastColumn = size - 1}};
-  cloth.solver.kind = scene::SolverKind::constraint;
-  cloth.solver.path = path;
-  cloth.solver.bendConstraints = bend;
-  cloth.solver.iterations = iterations;
-  cloth.solver.tolerance = 0;
-  scene::Scene scene;
-  scene.name = "assembled";
-  scene.substeps = kSubsteps;
-  scene.cloths = {cloth};
-  return scene;
+// No solve ends before its last iteration.
+scene::Scene sheetOf(std::uint32_t size, bool bend, ConstraintPath path, std::uint32_t iterations) {
+  return bench::hungSheet(size,
+                          {.kind = scene::SolverKind::constraint,
+                           .bendConstraints = bend,
+                           .compliance = {},
+                           .iterations = iterations,
+                           .tolerance = 0,
+                           .path = path},
+                          kSubsteps);
 }
 
 // Bytes that an iteration reads and writes, each table and vector once.
@@ -109,10 +102,10 @@ Rows measureSize(vulkan::Device& device, const Settings& settings, std::uint32_t
   std::array<Contender, 2> contenders;
   std::vector<Simulated*> all;
   for (std::size_t i = 0; i < contenders.size(); ++i) {
-    const std::uint32_t iterations = check(device, settings, hungSheet(size, bend, kPaths[i], kFew));
+    const std::uint32_t iterations = check(device, settings, sheetOf(size, bend, kPaths[i], kFew));
     const auto make = [&](std::uint32_t most) {
       auto made = std::make_unique<Simulated>(
-          device, hungSheet(size, bend, kPaths[i], most),
+          device, sheetOf(size, bend, kPaths[i], most),
           simulation::SimulationOptions{.workgroupSize = settings.workgroupSize,
                                         .solveWholeNodes = settings.solveWholeNodes});
       made->tick(inputs);
@@ -130,7 +123,7 @@ Rows measureSize(vulkan::Device& device, const Settings& settings, std::uint32_t
   Rows rows;
   for (std::size_t i = 0; i < contenders.size(); ++i) {
     const Contender& contender = contenders[i];
-    const scene::Scene scene = hungSheet(size, bend, kPaths[i], kFew);
+    const scene::Scene scene = sheetOf(size, bend, kPaths[i], kFew);
     const scene::Cloth& cloth = scene.cloths.front();
     checkStrain(cloth, *contender.few, kFew);
     checkStrain(cloth, *contender.many, kMany);

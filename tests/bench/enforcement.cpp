@@ -10,6 +10,7 @@
 
 #include "server/scene/springs.h"
 #include "tests/bench/bytes_moved.h"
+#include "tests/bench/hung_cloth.h"
 #include "tests/bench/simulated.h"
 #include "tests/bench/strain.h"
 #include "tests/bench/suite.h"
@@ -23,25 +24,6 @@ constexpr std::uint32_t kSubsteps = 10, kIterations = 20;
 constexpr double kTexelsMoved = 5 + 9, kTexelsOfACopy = 2;
 // What the sheet may be stretched by while it swings, and in the mean when it hangs; docs/simulation.md.
 constexpr double kMostStrain = 0.05, kMeanStrain = 0.001;
-
-// A square metre of 0.2 kg, hung by its upper edge.
-scene::Scene hungSheet(std::uint32_t size) {
-  scene::Cloth cloth;
-  cloth.name = "sheet";
-  cloth.grid = {.rows = size, .columns = size, .width = 1, .height = 1, .pose = {}};
-  cloth.mass = 0.2f;
-  cloth.damping = 1;
-  cloth.pins = {{.firstRow = 0, .lastRow = 0, .firstColumn = 0, .lastColumn = size - 1}};
-  cloth.solver.kind = scene::SolverKind::constraint;
-  cloth.solver.bendConstraints = true;
-  cloth.solver.iterations = kIterations;
-  cloth.solver.tolerance = 0;
-  scene::Scene scene;
-  scene.name = "enforcement";
-  scene.substeps = kSubsteps;
-  scene.cloths = {cloth};
-  return scene;
-}
 
 simulation::SimulationOptions optionsOf(const Settings& settings, bool whole) {
   return {.rowsPerInvocation = settings.rowsPerInvocation,
@@ -65,7 +47,13 @@ void check(vulkan::Device& device, const Settings& settings, scene::Scene scene,
 }
 
 Rows measureSize(vulkan::Device& device, const Settings& settings, std::uint32_t size) {
-  const scene::Scene scene = hungSheet(size);
+  const scene::Scene scene = hungSheet(size,
+                                       {.kind = scene::SolverKind::constraint,
+                                        .bendConstraints = true,
+                                        .compliance = {},
+                                        .iterations = kIterations,
+                                        .tolerance = 0},
+                                       kSubsteps);
   const scene::Cloth& cloth = scene.cloths.front();
   const simulation::TickInputs inputs{scene.environment, {}};
   // By turns, so that what disturbs the machine disturbs both alike.

@@ -34,4 +34,19 @@ simulation::TickInputs hungClothInputs(const scene::Scene& scene, std::uint64_t 
   return {scene.environment, {{scene::Sphere{0.25f}, {centre(tick)}, {centre(tick + 1)}, 1}}};
 }
 
+scene::Scene hungSheet(std::uint32_t size, const scene::Solver& solver, std::uint32_t substeps) {
+  scene::Cloth cloth;
+  cloth.name = "sheet";
+  cloth.grid = {.rows = size, .columns = size, .width = 1, .height = 1, .pose = {}};
+  cloth.mass = 0.2f;
+  cloth.damping = 1;
+  cloth.pins = {{.firstRow = 0, .lastRow = 0, .firstColumn = 0, .lastColumn = size - 1}};
+  cloth.solver = solver;
+  scene::Scene scene;
+  scene.name = "hung_sheet";
+  scene.substeps = substeps;
+  scene.cloths = {cloth};
+  return scene;
+}
+
 }  // namespace clothstream::bench

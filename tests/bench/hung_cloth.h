@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The scene of the suites that need a cloth in motion at any size: hung at the top, in wind, a sphere swings
-// through it.
+// Scenes that several suites have.
 #pragma once
 
 #include <cstdint>
@@ -10,10 +9,15 @@
 
 namespace clothstream::bench {
 
+// A cloth in motion at any size: hung at the top, in wind, a sphere swings through it.
 // size x size nodes, 2 m x 2 m, ten substeps a tick, 72 ticks a second.
 scene::Scene hungCloth(std::uint32_t size);
 
 // The scene's environment, and the sphere as it moves during this tick.
 simulation::TickInputs hungClothInputs(const scene::Scene& scene, std::uint64_t tick);
+
+// A square metre of 0.2 kg, hung by its upper edge, without springs; what it is solved by is for the suite to
+// say.
+scene::Scene hungSheet(std::uint32_t size, const scene::Solver& solver, std::uint32_t substeps);
 
 }  // namespace clothstream::bench

@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "tests/bench/hung_cloth.h"
 #include "tests/bench/simulated.h"
 #include "tests/bench/strain.h"
 #include "tests/bench/suite.h"
@@ -38,18 +39,10 @@ constexpr Case kCases[] = {{"mass_spring", scene::SolverKind::massSpring},
 
 // A square metre of 0.2 kg, hung by its upper edge.
 scene::Scene sceneOf(const Case& experiment, std::uint32_t size) {
-  scene::Scene scene;
-  scene.name = "solvers";
-  scene.substeps = experiment.substeps;
-  scene::Cloth cloth;
-  cloth.name = "sheet";
-  cloth.grid = {.rows = size, .columns = size, .width = 1, .height = 1, .pose = {}};
-  cloth.mass = 0.2f;
-  cloth.damping = 1;
-  cloth.pins = {{.firstRow = 0, .lastRow = 0, .firstColumn = 0, .lastColumn = size - 1}};
-  cloth.solver.kind = experiment.kind;
-  if (experiment.kind == scene::SolverKind::xpbd) cloth.solver.iterations = experiment.sweeps;
-  cloth.solver.compliance = experiment.compliance;
+  scene::Solver solver{.kind = experiment.kind, .compliance = experiment.compliance};
+  if (experiment.kind == scene::SolverKind::xpbd) solver.iterations = experiment.sweeps;
+  scene::Scene scene = hungSheet(size, solver, experiment.substeps);
+  scene::Cloth& cloth = scene.cloths.front();
   // 2 (4 + 4 / 2 + 4 / 10) k h^2 / m = 3.2 of the 4 that a step bears.
   const double h = scene.substepSeconds();
   const auto bearable = static_cast<float>(0.25 * double{cloth.nodeMass()} / (h * h));
@@ -57,7 +50,6 @@ scene::Scene sceneOf(const Case& experiment, std::uint32_t size) {
   cloth.structural.stiffness = stiffness;
   cloth.shear.stiffness = stiffness / 2;
   cloth.bend.stiffness = bearable / 10;
-  scene.cloths = {cloth};
   return scene;
 }
 

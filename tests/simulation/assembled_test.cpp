@@ -266,50 +266,25 @@ scene::Scene systems() {
   return scene;
 }
 
-simulation::TickInputs inputsAt(const scene::Scene& scene, int tick) {
-  const auto place = [](int t) {
-    return scene::Pose{scene::Vec3(0.02f, -0.15f, 0.2f - 0.005f * static_cast<float>(t % 80))};
-  };
-  return inputsOf(scene, {{scene::Sphere{0.08f}, place(tick), place(tick + 1), 1}});
-}
-
 TEST_F(Assembled, giveTheSameBitsHoweverTheWorkIsCut) {
-  const scene::Scene scene = systems();
-  std::uint64_t first = 0;
-  for (const auto& [workgroup, wholeNodes] :
-       {std::pair{8u, 1'000'000u}, {8u, 0u}, {0u, 700u}, {16u, 700u}, {64u, 0u}, {100u, 1'000'000u}}) {
-    SCOPED_TRACE(::testing::Message() << workgroup << ", " << wholeNodes);
-    Running running(scene, {.workgroupSize = workgroup, .solveWholeNodes = wholeNodes});
-    simulation::TickStatus status;
-    for (int tick = 0; tick < 10; ++tick) status = running.tick(inputsAt(scene, tick));
-    EXPECT_TRUE(status.healthy);
-    if (first == 0) first = status.stateHash;
-    EXPECT_EQ(status.stateHash, first);
-  }
+  const simulation::SimulationOptions ways[] = {{.workgroupSize = 8, .solveWholeNodes = 1'000'000},
+                                                {.workgroupSize = 8, .solveWholeNodes = 0},
+                                                {.workgroupSize = 0, .solveWholeNodes = 700},
+                                                {.workgroupSize = 16, .solveWholeNodes = 700},
+                                                {.workgroupSize = 64, .solveWholeNodes = 0},
+                                                {.workgroupSize = 100, .solveWholeNodes = 1'000'000}};
+  expectSameBits(systems(), passingBall, 10, ways);
 }
 
 TEST_F(Assembled, reportTheSameWhoeverSolves) {
   const scene::Scene scene = systems();
-  Running whole(scene, {.solveWholeNodes = 1'000'000}), parts(scene, {.solveWholeNodes = 0});
-  for (int tick = 0; tick < 10; ++tick) {
-    const auto one = whole.tickAndReport(inputsAt(scene, tick)),
-               other = parts.tickAndReport(inputsAt(scene, tick));
-    for (std::size_t i = 0; i < one.size(); ++i) {
-      SCOPED_TRACE(::testing::Message() << scene.cloths[i].name << ", tick " << tick);
-      EXPECT_EQ(one[i].iterations, other[i].iterations);
-      EXPECT_EQ(one[i].residual, other[i].residual);
-      EXPECT_EQ(one[i].activeConstraints, other[i].activeConstraints);
-      EXPECT_LE(one[i].iterations, scene.cloths[i].solver.iterations);
-      if (one[i].iterations < scene.cloths[i].solver.iterations) {
-        EXPECT_LE(one[i].residual, scene.cloths[i].solver.tolerance);
-      }
+  for (const auto& reports :
+       expectSameReports(scene, passingBall, {.solveWholeNodes = 1'000'000}, {.solveWholeNodes = 0}))
+    for (std::size_t i = 0; i < reports.size(); ++i)
       if (scene::isAssembled(scene.cloths[i].solver)) {
-        EXPECT_EQ(one[i].activeConstraints, scene::systemLinks(scene.cloths[i]).size());
-        EXPECT_GT(one[i].iterations, 0u);
+        EXPECT_EQ(reports[i].activeConstraints, scene::systemLinks(scene.cloths[i]).size());
+        EXPECT_GT(reports[i].iterations, 0u);
       }
-    }
-  }
-  EXPECT_EQ(whole.solves().size(), 4u);
 }
 
 // More iterations than a dispatch may make where one workgroup solves.
@@ -331,25 +306,12 @@ TEST_F(Assembled, giveTheSameHashesInRunsOfAThousandTicks) {
   scene.substeps = 1;
   scene.simulationRate = 288;
   for (scene::Cloth& cloth : scene.cloths) cloth.solver.iterations = 4;
-  Running one(scene), again(scene), other(scene, {.workgroupSize = 16, .solveWholeNodes = 0});
-  for (int tick = 0; tick < 1000; ++tick) {
-    const simulation::TickInputs inputs = inputsAt(scene, tick);
-    const simulation::TickStatus status = one.tick(inputs);
-    ASSERT_TRUE(status.healthy) << tick;
-    ASSERT_EQ(again.tick(inputs).stateHash, status.stateHash) << tick;
-    if (tick < 100) {
-      ASSERT_EQ(other.tick(inputs).stateHash, status.stateHash) << tick;
-    }
-  }
+  expectSameThousandTicks(scene, passingBall, {.workgroupSize = 16, .solveWholeNodes = 0});
 }
 
 // The same number on every device.
 TEST_F(Assembled, reachTheHashOfEveryOtherDevice) {
-  const scene::Scene scene = systems();
-  Running running(scene, {.solveWholeNodes = 700});
-  simulation::TickStatus status;
-  for (int tick = 0; tick < 12; ++tick) status = running.tick(inputsAt(scene, tick));
-  EXPECT_EQ(status.stateHash, 0x2cdc132fea593d4cu);
+  EXPECT_EQ(hashAfter(systems(), passingBall, 12, {.solveWholeNodes = 700}), 0x2cdc132fea593d4cu);
 }
 
 // Back and forth: the state stays to the bit, and goes on to the bit as one that always had this path would
@@ -357,7 +319,7 @@ TEST_F(Assembled, reachTheHashOfEveryOtherDevice) {
 TEST_F(Assembled, takeOverFromTheMatrixFreePathWithoutAJump) {
   scene::Scene scene = sceneOf({assembled(calmCloth(14, 11)), disc(5)});
   scene.cloths[0].pins = {topRow(scene.cloths[0])};
-  const simulation::TickInputs inputs = inputsAt(scene, 30);
+  const simulation::TickInputs inputs = passingBall(scene, 30);
   scene = withPath(scene, ConstraintPath::matrixFree);
   Running changing(scene);
   for (int tick = 0; tick < 6; ++tick) changing.tick(inputs);

@@ -181,4 +181,64 @@ void Running::rollback() {
   run([&] { simulation_.recordRollback(recorder_); });
 }
 
+simulation::TickInputs passingBall(const scene::Scene& scene, int tick) {
+  const auto place = [](int t) {
+    return scene::Pose{scene::Vec3(0.02f, -0.15f, 0.2f - 0.005f * static_cast<float>(t % 80))};
+  };
+  return inputsOf(scene, {{scene::Sphere{0.08f}, place(tick), place(tick + 1), 1}});
+}
+
+std::uint64_t hashAfter(const scene::Scene& scene, InputsAt inputs, int ticks,
+                        const simulation::SimulationOptions& options) {
+  Running running(scene, options);
+  simulation::TickStatus status;
+  for (int tick = 0; tick < ticks; ++tick) status = running.tick(inputs(scene, tick));
+  EXPECT_TRUE(status.healthy);
+  return status.stateHash;
+}
+
+void expectSameBits(const scene::Scene& scene, InputsAt inputs, int ticks,
+                    std::span<const simulation::SimulationOptions> ways) {
+  const std::uint64_t first = hashAfter(scene, inputs, ticks, ways.front());
+  for (std::size_t i = 1; i < ways.size(); ++i)
+    EXPECT_EQ(hashAfter(scene, inputs, ticks, ways[i]), first) << "way " << i;
+}
+
+void expectSameThousandTicks(const scene::Scene& scene, InputsAt inputs,
+                             const simulation::SimulationOptions& other) {
+  Running one(scene), again(scene), differently(scene, other);
+  for (int tick = 0; tick < 1000; ++tick) {
+    const simulation::TickInputs now = inputs(scene, tick);
+    const simulation::TickStatus status = one.tick(now);
+    ASSERT_TRUE(status.healthy) << tick;
+    ASSERT_EQ(again.tick(now).stateHash, status.stateHash) << tick;
+    if (tick < 100) {
+      ASSERT_EQ(differently.tick(now).stateHash, status.stateHash) << tick;
+    }
+  }
+}
+
+Reports expectSameReports(const scene::Scene& scene, InputsAt inputs,
+                          const simulation::SimulationOptions& one,
+                          const simulation::SimulationOptions& other) {
+  Running first(scene, one), second(scene, other);
+  Reports reports;
+  for (int tick = 0; tick < 10; ++tick) {
+    reports.push_back(first.tickAndReport(inputs(scene, tick)));
+    const auto theirs = second.tickAndReport(inputs(scene, tick));
+    for (std::size_t i = 0; i < theirs.size(); ++i) {
+      SCOPED_TRACE(::testing::Message() << scene.cloths[i].name << ", tick " << tick);
+      const simulation::ClothReport& mine = reports.back()[i];
+      EXPECT_EQ(mine.iterations, theirs[i].iterations);
+      EXPECT_EQ(mine.residual, theirs[i].residual);
+      EXPECT_EQ(mine.activeConstraints, theirs[i].activeConstraints);
+      EXPECT_LE(mine.iterations, scene.cloths[i].solver.iterations);
+      if (mine.iterations < scene.cloths[i].solver.iterations) {
+        EXPECT_LE(mine.residual, scene.cloths[i].solver.tolerance);
+      }
+    }
+  }
+  return reports;
+}
+
 }  // namespace clothstream::tests

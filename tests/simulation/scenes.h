@@ -73,4 +73,23 @@ class Running {
   simulation::ClothSimulation simulation_;
 };
 
+// What determinism means for whatever a scene is solved by; `inputs` of a tick.
+using InputsAt = simulation::TickInputs (*)(const scene::Scene& scene, int tick);
+// A ball of 8 cm goes through where small cloths hang, again and again.
+simulation::TickInputs passingBall(const scene::Scene& scene, int tick);
+
+// The same bits after so many ticks with each of these ways to cut the work.
+void expectSameBits(const scene::Scene& scene, InputsAt inputs, int ticks,
+                    std::span<const simulation::SimulationOptions> ways);
+// In two runs of a thousand ticks, and for a hundred of them in a way of its own.
+void expectSameThousandTicks(const scene::Scene& scene, InputsAt inputs,
+                             const simulation::SimulationOptions& other);
+// The same reports of ten ticks from both; these are for what else holds of them.
+using Reports = std::vector<std::vector<simulation::ClothReport>>;
+Reports expectSameReports(const scene::Scene& scene, InputsAt inputs,
+                          const simulation::SimulationOptions& one,
+                          const simulation::SimulationOptions& other);
+std::uint64_t hashAfter(const scene::Scene& scene, InputsAt inputs, int ticks,
+                        const simulation::SimulationOptions& options = {});
+
 }  // namespace clothstream::tests

@@ -41,51 +41,22 @@ scene::Scene systems() {
   return scene;
 }
 
-simulation::TickInputs inputsAt(const scene::Scene& scene, int tick) {
-  const auto place = [](int t) {
-    return scene::Pose{scene::Vec3(0.02f, -0.15f, 0.2f - 0.005f * static_cast<float>(t % 80)), {}};
-  };
-  return inputsOf(scene, {{scene::Sphere{0.08f}, place(tick), place(tick + 1), 1}});
-}
-
 TEST_F(Solve, givesTheSameBitsHoweverTheWorkIsCut) {
-  const scene::Scene scene = systems();
-  std::uint64_t first = 0;
-  std::vector<shared::SolveRecord> solves;
-  for (const auto& [workgroup, wholeNodes] :
-       {std::pair{8u, 1'000'000u}, {8u, 0u}, {0u, 700u}, {16u, 700u}, {64u, 0u}, {100u, 1'000'000u}}) {
-    SCOPED_TRACE(::testing::Message() << workgroup << ", " << wholeNodes);
-    Running running(scene, {.workgroupSize = workgroup, .solveWholeNodes = wholeNodes});
-    simulation::TickStatus status;
-    for (int tick = 0; tick < 10; ++tick) status = running.tick(inputsAt(scene, tick));
-    EXPECT_TRUE(status.healthy);
-    if (first == 0) first = status.stateHash;
-    EXPECT_EQ(status.stateHash, first);
-  }
+  const simulation::SimulationOptions ways[] = {{.workgroupSize = 8, .solveWholeNodes = 1'000'000},
+                                                {.workgroupSize = 8, .solveWholeNodes = 0},
+                                                {.workgroupSize = 0, .solveWholeNodes = 700},
+                                                {.workgroupSize = 16, .solveWholeNodes = 700},
+                                                {.workgroupSize = 64, .solveWholeNodes = 0},
+                                                {.workgroupSize = 100, .solveWholeNodes = 1'000'000}};
+  expectSameBits(systems(), passingBall, 10, ways);
 }
 
 // What it says of itself too; the systems' order alone depends on who solves which.
 TEST_F(Solve, reportsTheSameWhoeverSolves) {
-  const scene::Scene scene = systems();
-  Running whole(scene, {.solveWholeNodes = 1'000'000}), parts(scene, {.solveWholeNodes = 0});
-  for (int tick = 0; tick < 10; ++tick) {
-    const auto one = whole.tickAndReport(inputsAt(scene, tick)),
-               other = parts.tickAndReport(inputsAt(scene, tick));
-    for (std::size_t i = 0; i < one.size(); ++i) {
-      SCOPED_TRACE(::testing::Message() << scene.cloths[i].name << ", tick " << tick);
-      EXPECT_EQ(one[i].iterations, other[i].iterations);
-      EXPECT_EQ(one[i].residual, other[i].residual);
-      EXPECT_EQ(one[i].activeConstraints, other[i].activeConstraints);
-      EXPECT_LE(one[i].iterations, scene.cloths[i].solver.iterations);
-      if (one[i].iterations < scene.cloths[i].solver.iterations) {
-        EXPECT_LE(one[i].residual, scene.cloths[i].solver.tolerance);
-      }
-      if (i == 1) {
-        EXPECT_LT(one[i].activeConstraints, 4u * 30 * 41 / 2);
-      }
-    }
-  }
-  EXPECT_GT(whole.tickAndReport(inputsAt(scene, 10))[1].activeConstraints, 0u);
+  const Reports reports =
+      expectSameReports(systems(), passingBall, {.solveWholeNodes = 1'000'000}, {.solveWholeNodes = 0});
+  for (const auto& tick : reports) EXPECT_LT(tick[1].activeConstraints, 4u * 30 * 41 / 2);
+  EXPECT_GT(reports.back()[1].activeConstraints, 0u);
 }
 
 TEST_F(Solve, givesTheSameHashesInRunsOfAThousandTicks) {
@@ -93,25 +64,12 @@ TEST_F(Solve, givesTheSameHashesInRunsOfAThousandTicks) {
   scene.substeps = 1;
   scene.simulationRate = 288;
   for (scene::Cloth& cloth : scene.cloths) cloth.solver.iterations = 4;
-  Running one(scene), again(scene), other(scene, {.workgroupSize = 16, .solveWholeNodes = 0});
-  for (int tick = 0; tick < 1000; ++tick) {
-    const simulation::TickInputs inputs = inputsAt(scene, tick);
-    const simulation::TickStatus status = one.tick(inputs);
-    ASSERT_TRUE(status.healthy) << tick;
-    ASSERT_EQ(again.tick(inputs).stateHash, status.stateHash) << tick;
-    if (tick < 100) {
-      ASSERT_EQ(other.tick(inputs).stateHash, status.stateHash) << tick;
-    }
-  }
+  expectSameThousandTicks(scene, passingBall, {.workgroupSize = 16, .solveWholeNodes = 0});
 }
 
 // The same number on every device.
 TEST_F(Solve, reachesTheHashOfEveryOtherDevice) {
-  const scene::Scene scene = systems();
-  Running running(scene, {.solveWholeNodes = 700});
-  simulation::TickStatus status;
-  for (int tick = 0; tick < 12; ++tick) status = running.tick(inputsAt(scene, tick));
-  EXPECT_EQ(status.stateHash, 0x8238f727263d17eau);
+  EXPECT_EQ(hashAfter(systems(), passingBall, 12, {.solveWholeNodes = 700}), 0x8238f727263d17eau);
 }
 
 }  // namespace

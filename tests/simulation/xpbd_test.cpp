@@ -302,26 +302,15 @@ void eraseSystems(scene::Scene& scene) {
   });
 }
 
-simulation::TickInputs mixedInputs(const scene::Scene& scene, int tick) {
-  const auto place = [](int t) {
-    return scene::Pose{scene::Vec3(0.02f, -0.15f, 0.2f - 0.005f * static_cast<float>(t % 80))};
-  };
-  return inputsOf(scene, {{scene::Sphere{0.08f}, place(tick), place(tick + 1), 1}});
-}
-
 TEST_F(Xpbd, givesTheSameBitsHoweverTheWorkIsCut) {
   scene::Scene scene = mixedScene();
   eraseSystems(scene);
-  std::vector<std::uint64_t> hashes;
-  for (const auto& [workgroup, wholeNodes] :
-       {std::pair{0u, 0u}, {0u, 150u}, {0u, 1'000'000u}, {32u, 0u}, {128u, 1'000'000u}}) {
-    Running running(scene, {.workgroupSize = workgroup, .xpbdWholeNodes = wholeNodes});
-    simulation::TickStatus status;
-    for (int tick = 0; tick < 12; ++tick) status = running.tick(mixedInputs(scene, tick));
-    EXPECT_TRUE(status.healthy);
-    hashes.push_back(status.stateHash);
-  }
-  for (const std::uint64_t hash : hashes) EXPECT_EQ(hash, hashes.front());
+  const simulation::SimulationOptions ways[] = {{.workgroupSize = 0, .xpbdWholeNodes = 0},
+                                                {.workgroupSize = 0, .xpbdWholeNodes = 150},
+                                                {.workgroupSize = 0, .xpbdWholeNodes = 1'000'000},
+                                                {.workgroupSize = 32, .xpbdWholeNodes = 0},
+                                                {.workgroupSize = 128, .xpbdWholeNodes = 1'000'000}};
+  expectSameBits(scene, passingBall, 12, ways);
 }
 
 TEST_F(Xpbd, givesTheSameHashesInRunsOfAThousandTicks) {
@@ -329,26 +318,14 @@ TEST_F(Xpbd, givesTheSameHashesInRunsOfAThousandTicks) {
   eraseSystems(scene);
   scene.substeps = 3;
   for (scene::Cloth& cloth : scene.cloths) cloth.structural.stiffness = cloth.shear.stiffness = 60;
-  Running one(scene), again(scene), other(scene, {.workgroupSize = 16, .xpbdWholeNodes = 0});
-  for (int tick = 0; tick < 1000; ++tick) {
-    const simulation::TickInputs inputs = mixedInputs(scene, tick);
-    const simulation::TickStatus status = one.tick(inputs);
-    ASSERT_TRUE(status.healthy) << tick;
-    ASSERT_EQ(again.tick(inputs).stateHash, status.stateHash) << tick;
-    if (tick < 100) {
-      ASSERT_EQ(other.tick(inputs).stateHash, status.stateHash) << tick;
-    }
-  }
+  expectSameThousandTicks(scene, passingBall, {.workgroupSize = 16, .xpbdWholeNodes = 0});
 }
 
 // The same number on every device.
 TEST_F(Xpbd, reachesTheHashOfEveryOtherDevice) {
   scene::Scene scene = mixedScene();
   eraseSystems(scene);
-  Running running(scene);
-  simulation::TickStatus status;
-  for (int tick = 0; tick < 60; ++tick) status = running.tick(mixedInputs(scene, tick));
-  EXPECT_EQ(status.stateHash, 0xb62da311813aa0f5u);
+  EXPECT_EQ(hashAfter(scene, passingBall, 60), 0xb62da311813aa0f5u);
 }
 
 TEST_F(Xpbd, leavesClothsOfOtherSolversAsTheyAreAlone) {
@@ -357,8 +334,8 @@ TEST_F(Xpbd, leavesClothsOfOtherSolversAsTheyAreAlone) {
   std::erase_if(alone.cloths, [](const scene::Cloth& c) { return c.solver.kind == scene::SolverKind::xpbd; });
   Running one(alone), both(together);
   for (int tick = 0; tick < 20; ++tick) {
-    one.tick(mixedInputs(alone, tick));
-    both.tick(mixedInputs(together, tick));
+    one.tick(passingBall(alone, tick));
+    both.tick(passingBall(together, tick));
   }
   const NodeState expected = one.state(), found = both.state();
   const std::vector<std::uint32_t> offsets = simulation::clothOffsets(together.cloths);
