@@ -19,6 +19,7 @@
 #include "server/program_options.h"
 #include "server/rpc/rpc_door.h"
 #include "server/scene/material.h"
+#include "server/simulation/software_threads.h"
 #include "server/stream/scene_server.h"
 #include "server/telemetry/log.h"
 #include "server/vulkan/device.h"
@@ -51,10 +52,11 @@ class Signals {
 
 constexpr const char* kServerName = "clothstream-server " CLOTHSTREAM_VERSION;
 
-vulkan::DeviceOptions deviceOptions(const ProgramOptions& options) {
-  return {.select = options.device,
-          .softwareThreads = options.softwareThreads,
-          .cacheDirectory = options.cacheDirectory};
+// For a scene of so many nodes.
+vulkan::DeviceOptions deviceOptions(const ProgramOptions& options, std::uint32_t nodes) {
+  return simulation::suitedTo(nodes, {.select = options.device,
+                                      .softwareThreads = options.softwareThreads,
+                                      .cacheDirectory = options.cacheDirectory});
 }
 
 std::string describe(const vulkan::DeviceInfo& device) {
@@ -158,7 +160,9 @@ void serve(const ProgramOptions& options, const Signals& signals) {
     sceneList +=
         fmt::format("{}{} ({} vertices)", sceneList.empty() ? "" : ", ", scene.name, scene.nodeCount());
 
-  stream::SceneServer server(std::move(scenes), {.device = deviceOptions(options),
+  const auto first = std::ranges::find(scenes, options.scene, &scene::Scene::name);
+  const std::uint32_t nodes = first == scenes.end() ? 0 : first->nodeCount();
+  stream::SceneServer server(std::move(scenes), {.device = deviceOptions(options, nodes),
                                                  .defaultScene = options.scene,
                                                  .serverName = kServerName,
                                                  .runAlways = options.alwaysRun,
@@ -186,7 +190,7 @@ void serve(const ProgramOptions& options, const Signals& signals) {
 
 int runSteps(const ProgramOptions& options, const Signals& signals) {
   const scene::Scene scene = adjusted(loaded(messages::loadScene(options.scene)), options);
-  vulkan::Device device(deviceOptions(options));
+  vulkan::Device device(deviceOptions(options, scene.nodeCount()));
   step::StepOptions stepOptions = *options.step;
   stepOptions.serverName = kServerName;
   const auto interrupted = [&] {

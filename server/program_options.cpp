@@ -23,8 +23,9 @@ constexpr const char* kDevice = "Device";
 void addDeviceOptions(CLI::App& app, ProgramOptions& options) {
   app.add_option("--device", options.device, "Index or part of the name of a Vulkan device; else the best")
       ->group(kDevice);
-  app.add_option("--software-threads", options.softwareThreads, "Threads of a software device")
-      ->check(CLI::Range(1, 64))
+  app.add_option("--software-threads", options.softwareThreads,
+                 "Threads of a software device beside the one that waits; else what suits --scene")
+      ->check(CLI::Range(0, 64))
       ->group(kDevice);
   app.add_option("--cache-dir", options.cacheDirectory, "Where compiled kernels are kept; '' for nowhere")
       ->type_name("DIR")

@@ -113,8 +113,8 @@ void writeCache(const std::filesystem::path& path, std::span<const std::uint8_t>
 
 }  // namespace
 
-Device::Device(const DeviceOptions& options)
-    : handles_(new Handles{.context = (setSoftwareThreads(options.softwareThreads), openLoader())}) {
+Device::Device(const DeviceOptions& options) : handles_(new Handles{.context = openLoader()}) {
+  const SoftwareThreads threads(options.softwareThreads);
   const bool validate = options.validation || validationByEnvironment();
   handles_->instance = makeInstance(handles_->context, validate);
   if (validate) handles_->messenger = makeMessenger(handles_->instance);

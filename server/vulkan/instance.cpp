@@ -117,6 +117,8 @@ std::string listText(const std::vector<Candidate>& candidates) {
   return text;
 }
 
+constexpr const char* kSoftwareThreads = "LP_NUM_THREADS";
+
 }  // namespace
 
 bool validationByEnvironment() {
@@ -124,9 +126,17 @@ bool validationByEnvironment() {
   return value != nullptr && *value != '\0' && std::string_view(value) != "0";
 }
 
-void setSoftwareThreads(std::optional<std::uint32_t> threads) {
+SoftwareThreads::SoftwareThreads(std::optional<std::uint32_t> threads) {
+  if (const char* given = std::getenv(kSoftwareThreads)) before_ = given;
   const std::string number = std::to_string(threads.value_or(defaultSoftwareThreads()));
-  setenv("LP_NUM_THREADS", number.c_str(), threads.has_value() ? 1 : 0);
+  setenv(kSoftwareThreads, number.c_str(), threads.has_value() ? 1 : 0);
+}
+
+SoftwareThreads::~SoftwareThreads() {
+  if (before_)
+    setenv(kSoftwareThreads, before_->c_str(), 1);
+  else
+    unsetenv(kSoftwareThreads);
 }
 
 vk::raii::Context openLoader() {
@@ -243,7 +253,7 @@ std::size_t select(const std::vector<Candidate>& candidates, std::string_view wa
 }
 
 std::vector<DeviceInfo> listDevices() {
-  setSoftwareThreads(std::nullopt);
+  const SoftwareThreads threads(std::nullopt);
   const vk::raii::Context context = openLoader();
   const vk::raii::Instance instance = makeInstance(context, false);
   std::vector<DeviceInfo> infos;

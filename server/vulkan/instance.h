@@ -3,6 +3,7 @@
 #pragma once
 
 #include <optional>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -15,10 +16,19 @@ namespace clothstream::vulkan {
 // Whether CLOTHSTREAM_VALIDATION in the environment asks for validation (anything but empty and 0).
 bool validationByEnvironment();
 
-// Puts the number of threads of software devices into the environment, where Mesa reads it as devices are
-// listed: the given one, else what is there already, else the default. The environment belongs to the whole
-// process: call before other threads run that read it.
-void setSoftwareThreads(std::optional<std::uint32_t> threads);
+// While it lives, the number of threads of software devices is in the environment, where Mesa reads it as
+// devices are listed: the given one, else what is there already, else the default. The environment belongs to
+// the whole process: no other thread may read it meanwhile.
+class SoftwareThreads {
+ public:
+  explicit SoftwareThreads(std::optional<std::uint32_t> threads);
+  ~SoftwareThreads();
+  SoftwareThreads(const SoftwareThreads&) = delete;
+  SoftwareThreads& operator=(const SoftwareThreads&) = delete;
+
+ private:
+  std::optional<std::string> before_;
+};
 
 // Throws DeviceError where the loader is not installed.
 vk::raii::Context openLoader();

@@ -24,7 +24,7 @@ int main(int argc, char** argv) {
   CLI11_PARSE(app, argc, argv);
   try {
     vulkan::Device device(options);
-    const bench::Rows rows = *massSpring ? bench::compareMassSpring(device) : bench::compareCodecs(device);
+    const bench::Rows rows = *massSpring ? bench::compareMassSpring(options) : bench::compareCodecs(device);
     if (json)
       fmt::print("{}\n", nlohmann::ordered_json(rows).dump(2));
     else

@@ -4,6 +4,7 @@
 #include <stdexcept>
 
 #include "server/scene/stability.h"
+#include "server/simulation/software_threads.h"
 #include "tests/bench/peers/bullet_cloth.h"
 #include "tests/bench/peers/peers.h"
 #include "tests/bench/samples.h"
@@ -73,11 +74,12 @@ nlohmann::ordered_json rowOf(const char* who, std::uint32_t size, const std::str
 
 }  // namespace
 
-Rows compareMassSpring(vulkan::Device& device) {
+Rows compareMassSpring(const vulkan::DeviceOptions& options) {
   Rows rows;
   // Bullet's search for bend springs takes the square of the nodes: 256 x 256 is beyond it.
   for (const std::uint32_t size : {32u, 64u, 128u}) {
     constexpr int kIterations = 10;
+    vulkan::Device device(simulation::suitedTo(size * size, options));
     const std::uint32_t substeps = size < 128 ? 24 : 32;
     BulletCloth bullet(size, kIterations);
     const scene::Scene scene = sheet(size, substeps);

@@ -6,7 +6,8 @@
 
 namespace clothstream::bench {
 
-Rows compareMassSpring(vulkan::Device& device);
+// Each size on a device as the server would make it.
+Rows compareMassSpring(const vulkan::DeviceOptions& options);
 Rows compareCodecs(vulkan::Device& device);
 
 }  // namespace clothstream::bench
