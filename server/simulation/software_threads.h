@@ -8,8 +8,8 @@
 
 namespace clothstream::simulation {
 
-// Cloth of at most so many nodes is simulated as fast or up to twice as fast by the thread that waits for it as
-// by one for each processor: these are woken for each dispatch, of which a substep has several
+// Cloth of at most so many nodes is simulated as fast or up to twice as fast by the thread that waits for it
+// as by one for each processor: these are woken for each dispatch, of which a substep has several
 // (docs/benchmarks.md).
 inline constexpr std::uint32_t kFewNodes = 4096;
 
