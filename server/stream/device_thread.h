@@ -42,7 +42,7 @@ class DeviceThread {
   void wake();
 
   // A scene from the next round on. The future throws what the device or the scene throws, and
-  // std::runtime_error where the thread ends before; nothing has changed then.
+  // std::future_error where the thread ends before; nothing has changed then.
   std::future<void> add(std::shared_ptr<LiveScene> scene);
   // The scene is held no more when the future is ready.
   std::future<void> remove(std::shared_ptr<LiveScene> scene);

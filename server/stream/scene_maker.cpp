@@ -34,8 +34,17 @@ tl::expected<scene::Scene, v1::Error> checked(messages::Result<scene::Scene> sce
 }  // namespace
 
 void SceneMaker::create(v1::CreateSceneRequest request, std::string uploaded, CreateDone done) {
-  boost::asio::post(thread_, [this, request = std::move(request), uploaded = std::move(uploaded),
-                              done = std::move(done)] { done(make(request, uploaded)); });
+  boost::asio::post(
+      thread_, [this, request = std::move(request), uploaded = std::move(uploaded), done = std::move(done)] {
+        try {
+          done(make(request, uploaded));
+        } catch (const std::exception& failure) {
+          // Such as a mesh that the server's memory is too small for.
+          spdlog::error("createScene: {}", failure.what());
+          done(refused(v1::ERROR_CODE_RESOURCE_EXHAUSTED,
+                       fmt::format("createScene: the server cannot make it: {}", failure.what())));
+        }
+      });
 }
 
 void SceneMaker::remove(v1::DeleteSceneRequest request, DeleteDone done) {

@@ -109,9 +109,8 @@ TEST_F(ServerProgram, NamesThePortAndTheOptionWhenAPortIsInUse) {
 TEST_F(ServerProgram, NamesTheScenesThereAre) {
   ServerProcess server({"--scene", "nowhere"});
   EXPECT_EQ(server.exitCode(), 1);
-  EXPECT_THAT(
-      server.said(),
-      HasSubstr("there is no scene 'nowhere'; there are curtain, flag, folds, obstacles, sphere_drop"));
+  EXPECT_THAT(server.said(),
+              HasSubstr("there is no scene 'nowhere'; there are curtain, figure_07, figure_09"));
 }
 
 TEST_F(ServerProgram, NamesTheSubstepsThatWouldDo) {

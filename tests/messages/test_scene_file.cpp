@@ -281,7 +281,7 @@ TEST_F(SceneFileOnDisk, IsFoundByNameOrPath) {
   const Result<scene::Scene> none = loadScene("no_such_scene");
   ASSERT_FALSE(none);
   EXPECT_EQ(none.error().code, v1::ERROR_CODE_NOT_FOUND);
-  EXPECT_THAT(none.error().text, HasSubstr("curtain, flag, folds, obstacles, sphere_drop"));
+  EXPECT_THAT(none.error().text, HasSubstr("curtain, figure_07, figure_09"));
 }
 
 }  // namespace
