@@ -114,7 +114,8 @@ namespace {
 
 std::vector<std::uint32_t> trianglesOf(const v1::ClothDescription& cloth) {
   std::vector<std::uint32_t> numbers(cloth.triangles().size() / sizeof(std::uint32_t));
-  std::memcpy(numbers.data(), cloth.triangles().data(), numbers.size() * sizeof(std::uint32_t));
+  if (!numbers.empty())
+    std::memcpy(numbers.data(), cloth.triangles().data(), numbers.size() * sizeof(std::uint32_t));
   return numbers;
 }
 
