@@ -5,8 +5,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <map>
-#include <utility>
+#include <unordered_map>
 
 #include "server/scene/mesh.h"
 
@@ -101,7 +100,8 @@ std::vector<Hinge> hinges(const Cloth& cloth) {
     found.push_back(hingeOf(rest, nodes));
     found.back().weight *= part;
   };
-  std::map<std::pair<std::uint32_t, std::uint32_t>, FaceSide> sides;  // of edges that one face has so far
+  std::unordered_map<std::uint64_t, FaceSide> sides;  // of edges that one face has so far
+  const auto edge = [](std::uint32_t from, std::uint32_t to) { return std::uint64_t{from} << 32 | to; };
   for (const Face& face : facesOf(cloth)) {
     if (face.size() == 4) {
       add({face[2], face[0], face[1], face[3]}, kDiagonalPart / 2);
@@ -110,9 +110,9 @@ std::vector<Hinge> hinges(const Cloth& cloth) {
     for (std::size_t i = 0; i < face.size(); ++i) {
       const std::uint32_t a = face[i], b = face[(i + 1) % face.size()];
       const FaceSide here{face[(i + face.size() - 1) % face.size()], face[(i + 2) % face.size()]};
-      const auto other = sides.find({b, a});
+      const auto other = sides.find(edge(b, a));
       if (other == sides.end()) {
-        sides[{a, b}] = here;
+        sides[edge(a, b)] = here;
         continue;
       }
       const FaceSide there = other->second;

@@ -115,15 +115,18 @@ std::uint64_t HoldStage::invocations() const {
 
 void HoldStage::setSlack(std::span<const scene::Cloth> cloths) {
   if (!hasTethers_) return;
+  std::vector<float> longer;
+  for (const scene::Cloth& cloth : cloths) longer.push_back(1 + (cloth.tethers ? cloth.tethers->slack : 0));
+  if (longer == longer_) return;
   std::vector<shared::TetherRecord> tethers = restTethers_;
   std::size_t node = 0;
-  for (const scene::Cloth& cloth : cloths)
-    for (std::uint32_t i = 0; i < cloth.nodeCount(); ++i, ++node) {
-      const float longer = 1 + (cloth.tethers ? cloth.tethers->slack : 0);
-      tethers[node].anchors.y *= longer;
-      tethers[node].anchors.w *= longer;
+  for (std::size_t cloth = 0; cloth < cloths.size(); ++cloth)
+    for (std::uint32_t i = 0; i < cloths[cloth].nodeCount(); ++i, ++node) {
+      tethers[node].anchors.y *= longer[cloth];
+      tethers[node].anchors.w *= longer[cloth];
     }
   tethers_.set(tethers);
+  longer_ = std::move(longer);
   slackened_ = false;
 }
 

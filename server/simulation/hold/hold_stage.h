@@ -62,6 +62,7 @@ class HoldStage {
 
   DeviceTable attached_, tethers_;
   std::vector<shared::TetherRecord> restTethers_;  // without slack
+  std::vector<float> longer_;                      // by which each cloth's are, as the table has them
   std::vector<shared::FrameRecord> startFrames_;
   vulkan::Buffer frames_, grips_, holds_, reports_;
   // By turns: a tick may be in flight while the next is recorded.
