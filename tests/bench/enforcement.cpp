@@ -31,19 +31,10 @@ simulation::SimulationOptions optionsOf(const Settings& settings, bool whole) {
           .solveWholeNodes = whole ? ~0u : 0u};
 }
 
-// One substep solved to the end against the reference. With A = c M + J^T J of what is solved, c M 0.01 of
-// it, and rho = A e what is left, nodes are off by |e| <= 100 |rho|; and |rho| is the tolerance times |J^T b|
-// <= 5 |b|, b being as long as nodes were displaced.
+// One substep solved to the end against the reference.
 void check(vulkan::Device& device, const Settings& settings, scene::Scene scene, bool whole) {
-  scene.substeps = 1;
-  scene.simulationRate = scene.streamRate = 720;
-  scene::Solver& solver = scene.cloths.front().solver;
-  solver.iterations = 2000;
-  solver.tolerance = 1e-5f;
-  const double links = static_cast<double>(scene::springLinks(scene.cloths.front()).size());
-  const double displaced = std::sqrt(links) * 0.4 * double{scene::spacing(scene.cloths.front().grid).column};
-  Simulated(device, scene, optionsOf(settings, whole))
-      .check({scene.environment, {}}, 500 * double{solver.tolerance} * displaced);
+  const double allowed = solveToTheEnd(scene);
+  Simulated(device, scene, optionsOf(settings, whole)).check({scene.environment, {}}, allowed);
 }
 
 Rows measureSize(vulkan::Device& device, const Settings& settings, std::uint32_t size) {

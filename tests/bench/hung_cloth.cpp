@@ -3,6 +3,8 @@
 
 #include <cmath>
 
+#include "server/scene/springs.h"
+
 namespace clothstream::bench {
 
 scene::Scene hungCloth(std::uint32_t size) {
@@ -47,6 +49,18 @@ scene::Scene hungSheet(std::uint32_t size, const scene::Solver& solver, std::uin
   scene.substeps = substeps;
   scene.cloths = {cloth};
   return scene;
+}
+
+double solveToTheEnd(scene::Scene& sheet) {
+  sheet.substeps = 1;
+  sheet.simulationRate = sheet.streamRate = 720;
+  const scene::Cloth& cloth = sheet.cloths.front();
+  scene::Solver& solver = sheet.cloths.front().solver;
+  solver.iterations = 2000;
+  solver.tolerance = 1e-5f;
+  const double links = static_cast<double>(scene::springLinks(cloth).size());
+  const double displaced = std::sqrt(links) * 0.4 * double{scene::spacing(cloth.grid).column};
+  return 500 * double{solver.tolerance} * displaced;
 }
 
 }  // namespace clothstream::bench
