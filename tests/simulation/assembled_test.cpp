@@ -327,27 +327,13 @@ TEST_F(Assembled, takeOverFromTheMatrixFreePathWithoutAJump) {
        {ConstraintPath::assembled, ConstraintPath::matrixFree, ConstraintPath::assembled}) {
     scene = withPath(scene, path);
     scene.cloths[0].solver.bendConstraints = !scene.cloths[0].solver.bendConstraints;
-    const StateSnapshot kept = changing.save();
-    changing.setCloths(scene.cloths);
-    EXPECT_EQ(changing.save().bytes, kept.bytes);
-    Running always(scene);
-    always.restore(kept);
-    for (int tick = 0; tick < 6; ++tick) {
-      const simulation::TickStatus status = changing.tick(inputs);
-      ASSERT_TRUE(status.healthy);
-      ASSERT_EQ(status.stateHash, always.tick(inputs).stateHash) << "tick " << tick;
-    }
+    expectGoesOnAsAlways(changing, scene, inputs, 6);
     EXPECT_EQ(changing.solves().size(), 2u);
   }
   // Another mass and compliance need no other tables.
   scene.cloths[0].mass *= 3;
   scene.cloths[1].solver.compliance = 1e-6f;
-  const StateSnapshot kept = changing.save();
-  changing.setCloths(scene.cloths);
-  Running always(scene);
-  always.restore(kept);
-  for (int tick = 0; tick < 3; ++tick)
-    ASSERT_EQ(changing.tick(inputs).stateHash, always.tick(inputs).stateHash) << "tick " << tick;
+  expectGoesOnAsAlways(changing, scene, inputs, 3);
 }
 
 }  // namespace

@@ -241,4 +241,19 @@ Reports expectSameReports(const scene::Scene& scene, InputsAt inputs,
   return reports;
 }
 
+void expectGoesOnAsAlways(Running& changing, const scene::Scene& changed,
+                          const simulation::TickInputs& inputs, int ticks) {
+  const simulation::StateSnapshot kept = changing.save();
+  changing.setCloths(changed.cloths);
+  EXPECT_EQ(changing.save().bytes, kept.bytes);
+  Running always(changed);
+  always.restore(kept);
+  for (int tick = 0; tick < ticks; ++tick) {
+    const simulation::TickStatus status = changing.tick(inputs);
+    ASSERT_TRUE(status.healthy);
+    ASSERT_EQ(status.stateHash, always.tick(inputs).stateHash) << "tick " << tick;
+  }
+  EXPECT_EQ(changing.solves().size(), always.solves().size());
+}
+
 }  // namespace clothstream::tests

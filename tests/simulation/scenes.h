@@ -92,4 +92,9 @@ Reports expectSameReports(const scene::Scene& scene, InputsAt inputs,
 std::uint64_t hashAfter(const scene::Scene& scene, InputsAt inputs, int ticks,
                         const simulation::SimulationOptions& options = {});
 
+// Gives a running scene the cloths of another: the state stays to the bit, and goes on to the bit as that of
+// one that always had them would from there.
+void expectGoesOnAsAlways(Running& changing, const scene::Scene& changed,
+                          const simulation::TickInputs& inputs, int ticks);
+
 }  // namespace clothstream::tests

@@ -69,17 +69,7 @@ TEST_F(SolverChange, goesOnAsAClothThatAlwaysHadTheSolver) {
     for (const SolverKind second : kKinds) {
       SCOPED_TRACE(::testing::Message() << static_cast<int>(first) << ", " << static_cast<int>(second));
       const scene::Scene changed = withSolvers(scene, first, second);
-      const StateSnapshot kept = changing.save();
-      changing.setCloths(changed.cloths);
-      EXPECT_EQ(changing.save().bytes, kept.bytes);
-      Running always(changed);
-      always.restore(kept);
-      for (int tick = 0; tick < 6; ++tick) {
-        const simulation::TickStatus status = changing.tick(inputs);
-        ASSERT_TRUE(status.healthy);
-        ASSERT_EQ(status.stateHash, always.tick(inputs).stateHash) << "tick " << tick;
-      }
-      EXPECT_EQ(changing.solves().size(), always.solves().size());
+      expectGoesOnAsAlways(changing, changed, inputs, 6);
     }
 }
 
@@ -178,13 +168,7 @@ TEST_F(SolverChange, ofSelfCollisionAndTethersGoesOnAsAClothThatAlwaysHadThem) {
     SCOPED_TRACE(round);
     if (round == 1) change(0, 0.006f, 1, 0.3f);
     if (round == 2) change(1, 0.006f, 1, 0);
-    const StateSnapshot kept = changing.save();
-    changing.setCloths(scene.cloths);
-    EXPECT_EQ(changing.save().bytes, kept.bytes);
-    Running always(scene);
-    always.restore(kept);
-    for (int tick = 0; tick < 6; ++tick)
-      ASSERT_EQ(changing.tick(inputs).stateHash, always.tick(inputs).stateHash) << "tick " << tick;
+    expectGoesOnAsAlways(changing, scene, inputs, 6);
   }
 }
 
