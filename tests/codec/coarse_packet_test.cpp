@@ -76,7 +76,7 @@ TEST_P(CoarsePacket, HoldsCoarseVerticesAsTheyAre) {
     for (std::size_t i = 0; i < 3 * kRows * kColumns; i += 3)
       ASSERT_LT(distance(&coarse->positions()[i], &full->positions()[i]), 0.005) << tick << ' ' << i;
   }
-  EXPECT_LT(4 * coarseBytes, fullBytes);
+  EXPECT_LT(2 * coarseBytes, fullBytes);
 }
 
 TEST(CoarsePacket, IsNoPacketForWhoWantsAll) {
