@@ -25,7 +25,8 @@ constexpr std::array<std::uint32_t, kWeightClasses> kFitStride{6, 6, 2, 2, 1, 1}
 constexpr std::uint32_t kFewVertices = 100;
 
 constexpr std::uint8_t kStillFrames = 3;
-constexpr std::uint32_t kMostRests = 64;
+// That start to rest in a frame, about: in turns, where there are more.
+constexpr std::uint32_t kRestsAtOnce = 64;
 
 constexpr std::size_t kMaxWeightBytes = kMaxTemporalLayers * kWeightClasses * kFeatures * 4;
 // Of an escape and what stands beside it, at most.
@@ -88,7 +89,9 @@ struct HierarchicalEncoder::State {
   void use(const Weights& chosen);
   void attempt();
   void encodePhases(BitWriter& bits);
-  bool startsToRest(std::uint32_t slot, const Prediction& prediction);
+  bool wantsToRest(std::uint32_t slot) const;
+  void countRests();
+  bool startsToRest(std::uint32_t slot) const;
   bool goesOnResting(std::uint32_t slot, const Prediction& prediction) const;
   void encodePhase(const Phase& phase, BitWriter& bits);
   // Returns whether a residual is not 0.
@@ -109,7 +112,7 @@ struct HierarchicalEncoder::State {
   // In coding order.
   std::vector<Node> wanted;
   std::vector<std::uint8_t> stillFrames;  // how long the same was wanted, up to kStillFrames
-  std::uint32_t restsLeft = 0;            // that may start in this frame
+  std::uint32_t restTurns = 0;            // of which one comes in this frame; 0: none rests anew
   RansWriter symbols;
   std::vector<std::byte> extra;
   std::vector<WeightFitter> fitters;                    // by layer
@@ -136,7 +139,7 @@ void HierarchicalEncoder::State::quantise(std::span<const float> positions) {
   constexpr std::int32_t kLimit = kMaxCoordinate - (4 << 8);
   constexpr double limit = kLimit;
   const Array<std::uint32_t>& vertexOf = predictor.hierarchy().vertexOf;
-  const double perUnit = 1 / static_cast<double>(unit.unit);
+  const double perUnit = quantisationScale(unit.unit);
   const auto coordinate = [&](float x) {
     const double q = static_cast<double>(x) * perUnit;
     if (!(q >= -limit)) return -kLimit;  // what is no number, too
@@ -317,11 +320,20 @@ void HierarchicalEncoder::State::encodePhases(BitWriter& bits) {
 
 // What is wanted in the same place for some frames is pinned, it seems: it is to stand still. To say so takes
 // two bytes.
-bool HierarchicalEncoder::State::startsToRest(std::uint32_t slot, const Prediction& prediction) {
-  if (restsLeft == 0 || stillFrames[slot] < kStillFrames || predictor.reference()[slot].rests()) return false;
-  if (squaredLength(wanted[slot].load() - prediction.last) > squaredPromise()) return false;
-  --restsLeft;
-  return true;
+bool HierarchicalEncoder::State::wantsToRest(std::uint32_t slot) const {
+  if (stillFrames[slot] < kStillFrames) return false;
+  const Node& former = predictor.reference()[slot];
+  return !former.rests() && squaredLength(wanted[slot].load() - former.load()) <= squaredPromise();
+}
+
+void HierarchicalEncoder::State::countRests() {
+  std::uint32_t wishes = 0;
+  for (std::uint32_t slot = 0; slot < vertices; ++slot) wishes += wantsToRest(slot) ? 1 : 0;
+  restTurns = (wishes + kRestsAtOnce - 1) / kRestsAtOnce;
+}
+
+bool HierarchicalEncoder::State::startsToRest(std::uint32_t slot) const {
+  return restTurns > 0 && wantsToRest(slot) && (slot + frame) % restTurns == 0;
 }
 
 bool HierarchicalEncoder::State::goesOnResting(std::uint32_t slot, const Prediction& prediction) const {
@@ -392,7 +404,7 @@ void HierarchicalEncoder::State::rest(std::uint32_t begin, std::size_t first, st
                                       std::array<Int32x4, 4>& positions) {
   for (std::size_t i = first; i < first + count; ++i) {
     const std::uint32_t slot = begin + static_cast<std::uint32_t>(i);
-    stays[i] = startsToRest(slot, predictions[i]);
+    stays[i] = startsToRest(slot);
     staying += stays[i] ? 1 : 0;
     if (!stays[i] && !goesOnResting(slot, predictions[i])) continue;
     positions[i - first] = predictions[i].last;
@@ -506,8 +518,9 @@ std::size_t HierarchicalEncoder::encode(const FrameRole& role, std::span<const f
   const std::size_t bodyStart = headerBound(header);
   s.predictor.begin(key, role.referenceLayer);
   s.weights = key ? LayerWeights{keyFrameWeights()} : s.kept[role.referenceLayer];
+  s.restTurns = 0;
   // Once in the base is enough: the others refer to it.
-  s.restsLeft = key || role.layer > 0 ? 0 : kMostRests;
+  if (!key && role.layer == 0) s.countRests();
   if (key) s.attempt();
   std::size_t end = bodyStart + s.writeWeights(role, out.data() + bodyStart);
   header.sectionBytes[0] = static_cast<std::uint32_t>(end - bodyStart);
