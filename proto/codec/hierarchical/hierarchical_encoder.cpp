@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
+#include <optional>
 #include <utility>
 
 #include "proto/codec/hierarchical/bits.h"
@@ -18,9 +19,6 @@ namespace {
 
 // The weights are fitted and sent once in so many frames, and in each of the first after a key frame.
 constexpr std::uint32_t kWeightInterval = 4, kEagerFrames = 3;
-// Vertices of each weight class that are fitted to: one in so many.
-constexpr std::array<std::uint32_t, kWeightClasses> kFitStride{6, 6, 2, 2, 1, 1};
-
 // What so few vertices would gain is less than what their weights take.
 constexpr std::uint32_t kFewVertices = 100;
 
@@ -65,6 +63,7 @@ struct HierarchicalEncoder::State {
         fitters(layers) {
     if (!predictor.allocate(layout, unit.stepBits))
       std::abort();  // memory is out, as of any other allocation here
+    fitted.emplace(predictor.hierarchy());
     for (const Phase& phase : predictor.hierarchy().phases)
       classSizes[phase.weightClass] += phase.end - phase.begin;
     header.codec = kCodecHierarchical;
@@ -115,6 +114,9 @@ struct HierarchicalEncoder::State {
   std::uint32_t restTurns = 0;            // of which one comes in this frame; 0: none rests anew
   RansWriter symbols;
   std::vector<std::byte> extra;
+  std::optional<FitSchedule> fitted;
+  std::array<std::uint32_t, kWeightClasses> chunks{};   // of each class that were coded
+  ProductSums products;                                 // of the chunk that is being encoded
   std::vector<WeightFitter> fitters;                    // by layer
   std::array<LayerWeights, kMaxTemporalLayers> kept{};  // that the newest frame of each layer left
   LayerWeights weights{};                               // that this one leaves
@@ -315,6 +317,7 @@ void HierarchicalEncoder::State::attempt() {
 void HierarchicalEncoder::State::encodePhases(BitWriter& bits) {
   symbols.shrink(0);
   quiet = true;
+  chunks.fill(0);
   for (const Phase& phase : predictor.hierarchy().phases) encodePhase(phase, bits);
 }
 
@@ -363,8 +366,8 @@ void HierarchicalEncoder::State::encodePhase(const Phase& phase, BitWriter& bits
 bool HierarchicalEncoder::State::encodeChunk(std::uint32_t begin, std::uint32_t count,
                                              std::uint32_t weightClass, BitWriter& bits) {
   const ScaleModel model(kScaleWeights[scaleClassOf(weightClass, frame == 0)]);
-  const bool fits = weightClass < kWeightClasses;
-  const std::uint32_t stride = fits ? kFitStride[weightClass] : 1;
+  const bool fits =
+      weightClass < kWeightClasses && fitted->isFitted(weightClass, chunks[weightClass]++, frame);
   bool any = false;
   staying = 0;
   predictor.predict(begin, count, vectors[weightClass], predictions.data(), frames.data());
@@ -389,10 +392,9 @@ bool HierarchicalEncoder::State::encodeChunk(std::uint32_t begin, std::uint32_t 
   codeChunk(count, model, bits);
   for (std::uint32_t i = 0; fits && i < count; ++i) {
     const std::uint32_t slot = begin + i;
-    // Others in each frame.
-    if ((slot + frame) % stride == 0)
-      fitTo(weightClass, predictor.features(slot, predictions[i]), predictions[i], wanted[slot].load(), i);
+    fitTo(weightClass, predictor.features(slot, predictions[i]), predictions[i], wanted[slot].load(), i);
   }
+  if (fits) fitters[layer].add(weightClass, products.take());
   if (recorded != nullptr) {
     for (std::size_t i = 0; i < count; ++i) note(predictions[i], weightClass, i);
   }
@@ -471,9 +473,9 @@ void HierarchicalEncoder::State::fitTo(std::uint32_t weightClass, const FeatureV
       (target - prediction.position).shiftedRight(unit.stepBits - 4) + predicted.shiftedRight(kWeightBits);
   // What is hard to predict here is not to spoil the weights for the rest.
   const std::uint32_t around = prediction.parentMagnitudes;
-  const auto near = static_cast<float>((around & 255u) + (around >> 8 & 255u) + (around >> 16 & 255u));
-  const auto own = static_cast<float>(magnitudes[0][i] + magnitudes[1][i] + magnitudes[2][i]);
-  fitters[layer].add(weightClass, features, goal, 1 / (0.15f + 0.1f * own * own + 0.025f * near));
+  const std::uint32_t near = (around & 255u) + (around >> 8 & 255u) + (around >> 16 & 255u);
+  const auto own = static_cast<std::uint32_t>(magnitudes[0][i] + magnitudes[1][i] + magnitudes[2][i]);
+  products.add(features, goal, roughReciprocal(6 + 4 * own * own + near));
 }
 
 void HierarchicalEncoder::State::note(const Prediction& prediction, std::uint32_t weightClass,
