@@ -8,27 +8,17 @@
 #include <optional>
 #include <utility>
 
-#include "proto/codec/hierarchical/bits.h"
 #include "proto/codec/hierarchical/frame_coder.h"
-#include "proto/codec/hierarchical/rans.h"
+#include "proto/codec/hierarchical/frame_writer.h"
 #include "proto/codec/hierarchical/weight_fitter.h"
-#include "proto/codec/zigzag.h"
+#include "proto/codec/hierarchical/weight_plan.h"
 
 namespace clothstream::codec::hierarchical {
 namespace {
 
-// The weights are fitted and sent once in so many frames, and in each of the first after a key frame.
-constexpr std::uint32_t kWeightInterval = 4, kEagerFrames = 3;
-// What so few vertices would gain is less than what their weights take.
-constexpr std::uint32_t kFewVertices = 100;
-
 constexpr std::uint8_t kStillFrames = 3;
 // That start to rest in a frame, about: in turns, where there are more.
 constexpr std::uint32_t kRestsAtOnce = 64;
-
-constexpr std::size_t kMaxWeightBytes = kMaxTemporalLayers * kWeightClasses * kFeatures * 4;
-// Of an escape and what stands beside it, at most.
-constexpr std::size_t kMaxExtraBytes = 8;
 
 // Along u, v and n, in steps: of one vertex, and of four.
 struct Local {
@@ -52,25 +42,16 @@ std::int32_t nearest(float value) {
 }  // namespace
 
 struct HierarchicalEncoder::State {
-  explicit State(const StreamLayout& layout)
+  State(const StreamLayout& layout, std::uint32_t weightLag)
       : vertices(layout.vertexCount()),
-        layers(layout.temporalLayers),
         unit(latticeUnit(layout.maxError)),
         wanted(vertices),
         stillFrames(vertices),
-        symbols(kComponents * vertices),
-        extra((kComponents * kMaxExtraBytes + 1) * vertices + kMaxExtraBytes),
-        fitters(layers) {
+        writer(layout) {
     if (!predictor.allocate(layout, unit.stepBits))
       std::abort();  // memory is out, as of any other allocation here
     fitted.emplace(predictor.hierarchy());
-    for (const Phase& phase : predictor.hierarchy().phases)
-      classSizes[phase.weightClass] += phase.end - phase.begin;
-    header.codec = kCodecHierarchical;
-    header.epoch = layout.epoch;
-    header.rangeCount = 1;
-    header.ranges[0] = {0, static_cast<std::uint32_t>(layout.cloths.size())};
-    header.sectionCount = kSections;
+    plan.emplace(predictor.hierarchy(), layout.temporalLayers, weightLag);
   }
 
   // Of the distance, in units: half a step along three axes, and a unit for roundings.
@@ -83,57 +64,45 @@ struct HierarchicalEncoder::State {
   void choose(std::uint32_t begin, std::size_t first, std::array<Int32x4, 4>& positions);
   Int32x4 chooseFar(const Prediction& prediction, Int32x4 target, std::int32_t* residual) const;
   bool isAtRest() const;
-  std::size_t writeWeights(const FrameRole& role, std::byte* out);
-  void writeChanges(bool key, std::size_t of, BitWriter& writer);
   void use(const Weights& chosen);
   void attempt();
-  void encodePhases(BitWriter& bits);
+  void encodePhases();
   bool wantsToRest(std::uint32_t slot) const;
   void countRests();
   bool startsToRest(std::uint32_t slot) const;
   bool goesOnResting(std::uint32_t slot, const Prediction& prediction) const;
-  void encodePhase(const Phase& phase, BitWriter& bits);
+  void encodePhase(const Phase& phase);
   // Returns whether a residual is not 0.
-  bool encodeChunk(std::uint32_t begin, std::uint32_t count, std::uint32_t weightClass, BitWriter& bits);
+  bool encodeChunk(std::uint32_t begin, std::uint32_t count, std::uint32_t weightClass);
   void rest(std::uint32_t begin, std::size_t first, std::size_t count, std::array<Int32x4, 4>& positions);
-  void codeChunk(std::size_t count, const ScaleModel& model, BitWriter& bits);
+  void scale(std::size_t count, const ScaleModel& model);
   void fitTo(std::uint32_t weightClass, const FeatureVectors& features, const Prediction& prediction,
              Int32x4 target, std::size_t i);
-  void code(Component component, std::uint32_t scale, std::size_t i, std::size_t coder, BitWriter& bits);
   void note(const Prediction& prediction, std::uint32_t weightClass, std::size_t i);
 
   std::size_t vertices;
-  std::uint8_t layers;
   LatticeUnit unit;
   Predictor predictor;
-  std::array<std::uint32_t, kWeightClasses + 1> classSizes{};
-  PacketHeader header;
   // In coding order.
   std::vector<Node> wanted;
   std::vector<std::uint8_t> stillFrames;  // how long the same was wanted, up to kStillFrames
   std::uint32_t restTurns = 0;            // of which one comes in this frame; 0: none rests anew
-  RansWriter symbols;
-  std::vector<std::byte> extra;
+  FrameWriter writer;
   std::optional<FitSchedule> fitted;
-  std::array<std::uint32_t, kWeightClasses> chunks{};   // of each class that were coded
-  ProductSums products;                                 // of the chunk that is being encoded
-  std::vector<WeightFitter> fitters;                    // by layer
-  std::array<LayerWeights, kMaxTemporalLayers> kept{};  // that the newest frame of each layer left
-  LayerWeights weights{};                               // that this one leaves
-  Weights used{};                                       // in this frame
+  std::array<std::uint32_t, kWeightClasses> chunks{};  // of each class that were coded
+  ProductSums products;                                // of the chunk that is being encoded
+  std::optional<WeightPlan> plan;
+  std::array<std::byte, WeightPlan::kMaxBytes> weightBytes{};
+  Weights used{};  // in this frame
   std::array<WeightVectors, kWeightClasses + 1> vectors{};
   std::uint32_t frame = 0;  // since the key frame
-  std::uint8_t layer = 0;
-  bool quiet = false;  // no residual in the newest frame
+  bool quiet = false;       // no residual in this frame
   std::vector<CodedResidual>* recorded = nullptr;
   // Of the chunk that is being encoded.
   std::array<Prediction, kChunk> predictions;
   std::array<SurfaceFrames, kChunk / 4> frames;
-  // By component.
-  alignas(16) std::int32_t residuals[kComponents][kChunk];
-  alignas(16) std::int32_t magnitudes[kComponents][kChunk];
-  std::array<bool, kChunk> stays{};
-  std::uint32_t staying = 0;  // how many
+  ChunkResiduals chunk;
+  alignas(16) std::int32_t magnitudes[kComponents][kChunk];  // by component
 };
 
 void HierarchicalEncoder::State::quantise(std::span<const float> positions) {
@@ -220,9 +189,9 @@ void HierarchicalEncoder::State::choose(std::uint32_t begin, std::size_t first,
     return Float32x4::of(e.x) * x + Float32x4::of(e.y) * y + Float32x4::of(e.z) * z;
   };
   const Vectors4 r = economise({dot(f.u), dot(f.v), dot(f.n)});
-  r.x.store(&residuals[kAlongU][first]);
-  r.y.store(&residuals[kAlongV][first]);
-  r.z.store(&residuals[kAlongNormal][first]);
+  r.x.store(&chunk.residuals[kAlongU][first]);
+  r.y.store(&chunk.residuals[kAlongV][first]);
+  r.z.store(&chunk.residuals[kAlongNormal][first]);
   const Vectors4 moved = predictor.moved(f, r);
   const auto squared = [](Int32x4 a) { return Float32x4::of(a) * Float32x4::of(a); };
   const Float32x4 distance = squared(d.x - moved.x) + squared(d.y - moved.y) + squared(d.z - moved.z);
@@ -233,10 +202,10 @@ void HierarchicalEncoder::State::choose(std::uint32_t begin, std::size_t first,
     positions[i] = positions[i] + predictions[first + i].position;
     if ((far >> i & 1) == 0) continue;
     std::int32_t residual[kComponents];
-    for (std::size_t c = 0; c < kComponents; ++c) residual[c] = residuals[c][first + i];
+    for (std::size_t c = 0; c < kComponents; ++c) residual[c] = chunk.residuals[c][first + i];
     positions[i] =
         chooseFar(predictions[first + i], predictions[first + i].position + differences[i], residual);
-    for (std::size_t c = 0; c < kComponents; ++c) residuals[c][first + i] = residual[c];
+    for (std::size_t c = 0; c < kComponents; ++c) chunk.residuals[c][first + i] = residual[c];
   }
 }
 
@@ -269,56 +238,19 @@ void HierarchicalEncoder::State::use(const Weights& chosen) {
   vectors = weightVectors(used);
 }
 
-std::size_t HierarchicalEncoder::State::writeWeights(const FrameRole& role, std::byte* out) {
-  const bool key = role.kind == PacketKind::key;
-  if (!key && isAtRest()) {
-    use(Weights{});
-    out[0] = std::byte{1};
-    return 1;
-  }
-  // With layers it is the base that sends the weights of all: it is never left out.
-  const bool eager = layers == 1 && frame <= kEagerFrames;
-  const bool due = key || (role.layer == 0 && !quiet && (eager || frame % kWeightInterval == 0));
-  std::size_t bytes = 0;
-  if (due) {
-    BitWriter writer(out);
-    writer.put(0, 1);
-    for (std::size_t of = 0; of < (key ? 1u : layers); ++of) writeChanges(key, of, writer);
-    bytes = static_cast<std::size_t>(writer.finish() - out);
-  }
-  use(weights[role.layer]);
-  return bytes;
-}
-
-void HierarchicalEncoder::State::writeChanges(bool key, std::size_t of, BitWriter& writer) {
-  Weights& current = weights[of];
-  Weights next = current;
-  fitters[of].fit(next);
-  for (std::size_t c = 0; c < kWeightClasses; ++c) {
-    const bool changes = classSizes[c] >= kFewVertices && next[c] != current[c];
-    writer.put(changes ? 1 : 0, 1);
-    if (!changes) continue;
-    for (std::size_t f = firstWeight(key); f < endWeight(key); ++f)
-      writer.putGamma(zigzag(next[c][f] - current[c][f]), kWeightGammaBits);
-    current[c] = next[c];
-  }
-}
-
-// What a key frame leaves out of account is the past: its weights are fitted to a first attempt at itself.
-void HierarchicalEncoder::State::attempt() {
-  for (WeightFitter& fitter : fitters) fitter.clear();
-  use(weights[0]);
-  BitWriter bits(extra.data());
-  std::vector<CodedResidual>* const record = std::exchange(recorded, nullptr);
-  encodePhases(bits);
-  recorded = record;
-}
-
-void HierarchicalEncoder::State::encodePhases(BitWriter& bits) {
-  symbols.shrink(0);
+void HierarchicalEncoder::State::encodePhases() {
+  writer.begin();
   quiet = true;
   chunks.fill(0);
-  for (const Phase& phase : predictor.hierarchy().phases) encodePhase(phase, bits);
+  for (const Phase& phase : predictor.hierarchy().phases) encodePhase(phase);
+}
+
+void HierarchicalEncoder::State::attempt() {
+  plan->retry();
+  use(plan->used());
+  std::vector<CodedResidual>* const record = std::exchange(recorded, nullptr);
+  encodePhases();
+  recorded = record;
 }
 
 // What is wanted in the same place for some frames is pinned, it seems: it is to stand still. To say so takes
@@ -344,32 +276,22 @@ bool HierarchicalEncoder::State::goesOnResting(std::uint32_t slot, const Predict
          squaredLength(wanted[slot].load() - prediction.last) <= squaredPromise();
 }
 
-// A phase without residuals is a bit that says so, in place of all that was written of it.
-void HierarchicalEncoder::State::encodePhase(const Phase& phase, BitWriter& bits) {
-  const BitWriter bitsBefore = bits;
-  const std::size_t symbolsBefore = symbols.count();
-  bits.put(0, 1);
+void HierarchicalEncoder::State::encodePhase(const Phase& phase) {
+  writer.beginPhase();
   bool any = false;
-  for (std::uint32_t begin = phase.begin; begin < phase.end; begin += kChunk) {
-    const std::uint32_t count = std::min(kChunk, phase.end - begin);
-    any = encodeChunk(begin, count, phase.weightClass, bits) || any;
-  }
-  if (any) {
-    quiet = false;
-    return;
-  }
-  bits = bitsBefore;
-  bits.put(1, 1);
-  symbols.shrink(symbolsBefore);
+  for (std::uint32_t begin = phase.begin; begin < phase.end; begin += kChunk)
+    any = encodeChunk(begin, std::min(kChunk, phase.end - begin), phase.weightClass) || any;
+  writer.endPhase(any);
+  quiet = quiet && !any;
 }
 
 bool HierarchicalEncoder::State::encodeChunk(std::uint32_t begin, std::uint32_t count,
-                                             std::uint32_t weightClass, BitWriter& bits) {
+                                             std::uint32_t weightClass) {
   const ScaleModel model(kScaleWeights[scaleClassOf(weightClass, frame == 0)]);
   const bool fits =
       weightClass < kWeightClasses && fitted->isFitted(weightClass, chunks[weightClass]++, frame);
   bool any = false;
-  staying = 0;
+  chunk.anyStays = false;
   predictor.predict(begin, count, vectors[weightClass], predictions.data(), frames.data());
   for (std::size_t first = 0; first < count; first += 4) {
     const std::size_t four = std::min<std::size_t>(count - first, 4);
@@ -378,7 +300,7 @@ bool HierarchicalEncoder::State::encodeChunk(std::uint32_t begin, std::uint32_t 
     rest(begin, first, four, positions);
     Int32x4 counted[kComponents];
     for (std::size_t c = 0; c < kComponents; ++c) {
-      counted[c] = countedMagnitudes(Int32x4::load(&residuals[c][first]));
+      counted[c] = countedMagnitudes(Int32x4::load(&chunk.residuals[c][first]));
       counted[c].store(&magnitudes[c][first]);
     }
     alignas(16) std::int32_t packed[4];
@@ -389,16 +311,17 @@ bool HierarchicalEncoder::State::encodeChunk(std::uint32_t begin, std::uint32_t 
                       static_cast<std::uint32_t>(packed[i]));
     }
   }
-  codeChunk(count, model, bits);
+  scale(count, model);
+  writer.add(chunk, count);
   for (std::uint32_t i = 0; fits && i < count; ++i) {
     const std::uint32_t slot = begin + i;
     fitTo(weightClass, predictor.features(slot, predictions[i]), predictions[i], wanted[slot].load(), i);
   }
-  if (fits) fitters[layer].add(weightClass, products.take());
+  if (fits) plan->add(weightClass, products.take());
   if (recorded != nullptr) {
     for (std::size_t i = 0; i < count; ++i) note(predictions[i], weightClass, i);
   }
-  return any || staying > 0;
+  return any || chunk.anyStays;
 }
 
 // Leaves out the residuals of what rests, or starts to.
@@ -406,58 +329,23 @@ void HierarchicalEncoder::State::rest(std::uint32_t begin, std::size_t first, st
                                       std::array<Int32x4, 4>& positions) {
   for (std::size_t i = first; i < first + count; ++i) {
     const std::uint32_t slot = begin + static_cast<std::uint32_t>(i);
-    stays[i] = startsToRest(slot);
-    staying += stays[i] ? 1 : 0;
-    if (!stays[i] && !goesOnResting(slot, predictions[i])) continue;
+    chunk.stays[i] = startsToRest(slot);
+    chunk.anyStays = chunk.anyStays || chunk.stays[i];
+    if (!chunk.stays[i] && !goesOnResting(slot, predictions[i])) continue;
     positions[i - first] = predictions[i].last;
-    for (auto& component : residuals) component[i] = 0;
+    for (auto& component : chunk.residuals) component[i] = 0;
   }
 }
 
-void HierarchicalEncoder::State::codeChunk(std::size_t count, const ScaleModel& model, BitWriter& bits) {
-  std::array<Vectors4, kChunk / 4> expected;
-  for (std::size_t i = 0; i < count; i += 4) expected[i / 4] = model.expect(&predictions[i]);
-  for (const Component component : kCodingOrder) {
-    for (std::size_t first = 0; first < count; first += 4) {
-      const Vectors4& e = expected[first / 4];
-      const Int32x4 byComponent[]{e.x, e.y, e.z};
-      const Int32x4 scales =
-          model.scales(component, byComponent[component], Int32x4::load(&magnitudes[kAlongNormal][first]),
-                       Int32x4::load(&magnitudes[kAlongU][first]));
-      const Int32x4 residual = Int32x4::load(&residuals[component][first]);
-      const Int32x4 number = residual.shiftedLeft(1) ^ residual.shiftedRight(31);
-      const Int32x4 isHard = (scales > Int32x4::all(15)) | (number > Int32x4::all(kEscape - 1)) | number;
-      const std::size_t coder = first % kCoders;
-      if (first + 4 <= count && isHard.signs() == 0 && staying == 0) {
-        symbols.addFour(coder, scales + Int32x4::all(static_cast<std::int32_t>(distributionOf(component, 0))),
-                        number);
-        continue;
-      }
-      alignas(16) std::int32_t scale[4];
-      scales.store(scale);
-      for (std::size_t i = 0; i < 4 && first + i < count; ++i)
-        code(component, static_cast<std::uint32_t>(scale[i]), first + i, coder + i, bits);
-    }
+void HierarchicalEncoder::State::scale(std::size_t count, const ScaleModel& model) {
+  for (std::size_t first = 0; first < count; first += 4) {
+    const Vectors4 e = model.expect(&predictions[first]);
+    const Int32x4 byComponent[]{e.x, e.y, e.z};
+    const Int32x4 n = Int32x4::load(&magnitudes[kAlongNormal][first]);
+    const Int32x4 u = Int32x4::load(&magnitudes[kAlongU][first]);
+    for (const Component c : kCodingOrder)
+      model.scales(c, byComponent[c], n, u).store(&chunk.scales[c][first]);
   }
-}
-
-void HierarchicalEncoder::State::code(Component component, std::uint32_t scale, std::size_t i,
-                                      std::size_t coder, BitWriter& bits) {
-  if (stays[i]) {
-    if (component != kAlongNormal) return;
-    bits.putGamma(kStays, kEscapeGammaBits);
-    symbols.add(coder, distributionOf(component, scale), kEscape);
-    return;
-  }
-  const unsigned raw = rawBits(scale);
-  const std::uint32_t number = zigzag(residuals[component][i]);
-  std::uint32_t symbol = number >> raw;
-  if (symbol >= kEscape) {
-    bits.putGamma(symbol - kEscape + (component == kAlongNormal ? kStays + 1 : 0), kEscapeGammaBits);
-    symbol = kEscape;
-  }
-  if (raw > 0) bits.put(number & ((1u << raw) - 1), raw);
-  symbols.add(coder, distributionOf(component, scale), symbol);
 }
 
 void HierarchicalEncoder::State::fitTo(std::uint32_t weightClass, const FeatureVectors& features,
@@ -486,20 +374,16 @@ void HierarchicalEncoder::State::note(const Prediction& prediction, std::uint32_
         {static_cast<std::uint8_t>(c), static_cast<std::uint8_t>(scaleClassOf(weightClass, frame == 0)),
          byte(prediction.parentMagnitudes), byte(prediction.ringMagnitudes), byte(prediction.lastMagnitudes),
          static_cast<std::uint8_t>(magnitudes[kAlongNormal][i]),
-         static_cast<std::uint8_t>(magnitudes[kAlongU][i]), residuals[c][i]});
+         static_cast<std::uint8_t>(magnitudes[kAlongU][i]), chunk.residuals[c][i]});
   }
 }
 
-HierarchicalEncoder::HierarchicalEncoder(const StreamLayout& layout)
-    : state_(std::make_unique<State>(layout)) {}
+HierarchicalEncoder::HierarchicalEncoder(const StreamLayout& layout, std::uint32_t weightLag)
+    : state_(std::make_unique<State>(layout, weightLag)) {}
 HierarchicalEncoder::~HierarchicalEncoder() = default;
 
 std::size_t HierarchicalEncoder::packetBound() const {
-  const State& s = *state_;
-  PacketHeader largest = s.header;
-  largest.kind = PacketKind::predicted;
-  largest.referenceCount = 1;
-  return headerBound(largest) + kMaxWeightBytes + s.symbols.bound() + s.extra.size();
+  return state_->writer.packetBound();
 }
 
 std::size_t HierarchicalEncoder::encode(const FrameRole& role, std::span<const float> positions,
@@ -507,41 +391,20 @@ std::size_t HierarchicalEncoder::encode(const FrameRole& role, std::span<const f
   State& s = *state_;
   const bool key = role.kind == PacketKind::key;
   s.frame = key ? 0 : s.frame + 1;
-  s.layer = role.layer;
   s.quantise(positions);
-  PacketHeader& header = s.header;
-  header.kind = role.kind;
-  header.temporalLayer = role.layer;
-  header.tick = role.tick;
-  header.referenceCount = key ? 0 : 1;
-  header.references[0] = role.referenceTick;
-
-  // The header's length depends on the sections' sizes: they are written behind its bound and moved up.
-  const std::size_t bodyStart = headerBound(header);
   s.predictor.begin(key, role.referenceLayer);
-  s.weights = key ? LayerWeights{keyFrameWeights()} : s.kept[role.referenceLayer];
+  s.plan->begin(role);
   s.restTurns = 0;
   // Once in the base is enough: the others refer to it.
   if (!key && role.layer == 0) s.countRests();
-  if (key) s.attempt();
-  std::size_t end = bodyStart + s.writeWeights(role, out.data() + bodyStart);
-  header.sectionBytes[0] = static_cast<std::uint32_t>(end - bodyStart);
-  BitWriter bits(s.extra.data());
-  s.encodePhases(bits);
+  // What a key frame leaves out of account is the past: its weights are fitted to a first attempt at itself.
+  if (key && s.plan->attempts()) s.attempt();
+  const std::size_t weightBytes = s.plan->write(!key && s.isAtRest(), s.weightBytes.data());
+  s.use(s.plan->used());
+  s.encodePhases();
   s.predictor.keep(role.layer);
-  if (key) {
-    s.weights.fill(startingWeights());
-    for (WeightFitter& fitter : s.fitters) fitter.clear();
-  }
-  s.kept[role.layer] = s.weights;
-  header.sectionBytes[1] = static_cast<std::uint32_t>(s.symbols.write(out.data() + end));
-  end += header.sectionBytes[1];
-  header.sectionBytes[2] = static_cast<std::uint32_t>(bits.finish() - s.extra.data());
-  std::memcpy(out.data() + end, s.extra.data(), header.sectionBytes[2]);
-  end += header.sectionBytes[2];
-  const std::size_t headerBytes = writeHeader(header, out);
-  std::memmove(out.data() + headerBytes, out.data() + bodyStart, end - bodyStart);
-  return headerBytes + (end - bodyStart);
+  s.plan->end(s.quiet);
+  return s.writer.write(role, std::span(s.weightBytes).first(weightBytes), out);
 }
 
 std::uint64_t HierarchicalEncoder::reconstructionHash() const {
@@ -556,8 +419,8 @@ void HierarchicalEncoder::record(std::vector<CodedResidual>* residuals) {
 
 namespace clothstream::codec {
 
-std::unique_ptr<BodyEncoder> makeHierarchicalEncoder(const StreamLayout& layout) {
-  return std::make_unique<hierarchical::HierarchicalEncoder>(layout);
+std::unique_ptr<BodyEncoder> makeHierarchicalEncoder(const StreamLayout& layout, std::uint32_t weightLag) {
+  return std::make_unique<hierarchical::HierarchicalEncoder>(layout, weightLag);
 }
 
 }  // namespace clothstream::codec
