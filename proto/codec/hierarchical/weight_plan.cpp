@@ -20,11 +20,13 @@ WeightPlan::WeightPlan(const Hierarchy& hierarchy, std::uint8_t layers, std::uin
     : lag_(lag), layers_(layers), fitters_(layers), keyWeights_(keyFrameWeights()) {
   assert(lag == 0 || layers == 1);
   for (const Phase& phase : hierarchy.phases) classSizes_[phase.weightClass] += phase.end - phase.begin;
+  kept_[0][0] = startingWeights();
   if (lag > 0) planned_.assign(lag + 1, {.weights = startingWeights(), .keyWeights = keyWeights_});
 }
 
 void WeightPlan::begin(const FrameRole& role) {
   key_ = role.kind == PacketKind::key;
+  if (key_) beforeKey_ = kept_[0][0];
   sinceKey_ = key_ ? 0 : sinceKey_ + 1;
   layer_ = role.layer;
   weights_ = key_ ? LayerWeights{keyFrameWeights()} : kept_[role.referenceLayer];
@@ -45,7 +47,7 @@ bool WeightPlan::isDue(std::uint32_t sinceKey, bool quiet) const {
 const Weights* WeightPlan::planned(std::uint64_t number, std::uint32_t sinceKey) const {
   const Planned& plan = planned_[number % planned_.size()];
   if (sinceKey == 0) return &plan.keyWeights;
-  return sinceKey > lag_ && plan.isDue ? &plan.weights : nullptr;
+  return sinceKey == 1 || (sinceKey > lag_ && plan.isDue) ? &plan.weights : nullptr;
 }
 
 std::size_t WeightPlan::write(bool atRest, std::byte* out) {
@@ -60,11 +62,16 @@ std::size_t WeightPlan::write(bool atRest, std::byte* out) {
     BitWriter writer(out);
     writer.put(0, 1);
     for (std::size_t of = 0; of < (key_ ? 1u : layers_); ++of)
-      writeChanges(of, lag_ > 0 ? *plan : fitted(of), writer);
+      writeChanges(of, lag_ > 0 ? *plan : next(of), writer);
     bytes = static_cast<std::size_t>(writer.finish() - out);
   }
   used_ = weights_[layer_];
   return bytes;
+}
+
+// The motion after a key frame is that before it.
+Weights WeightPlan::next(std::size_t of) {
+  return sinceKey_ == 1 && layers_ == 1 ? beforeKey_ : fitted(of);
 }
 
 Weights WeightPlan::fitted(std::size_t of) {
@@ -110,7 +117,7 @@ void WeightPlan::plan(bool quiet) {
   Planned& plan = planned_[(number_ + lag_) % planned_.size()];
   plan.keyWeights = keyWeights_;
   plan.isDue = !key_ && isDue(sinceKey_ + lag_, quiet);
-  if (plan.isDue) plan.weights = fitted(0);
+  plan.weights = plan.isDue ? fitted(0) : key_ ? beforeKey_ : weights_[0];
 }
 
 }  // namespace clothstream::codec::hierarchical

@@ -53,6 +53,7 @@ class WeightPlan {
 
   bool isDue(std::uint32_t sinceKey, bool quiet) const;
   void writeChanges(std::size_t of, const Weights& next, BitWriter& writer);
+  Weights next(std::size_t of);
   Weights fitted(std::size_t of);
   void plan(bool quiet);
 
@@ -61,6 +62,7 @@ class WeightPlan {
   std::array<std::uint32_t, kWeightClasses + 1> classSizes_{};
   std::vector<WeightFitter> fitters_;                    // by layer
   std::array<LayerWeights, kMaxTemporalLayers> kept_{};  // that the newest frame of each layer left
+  Weights beforeKey_{};                                  // that the frame before the key frame left
   LayerWeights weights_{};                               // that this one leaves
   Weights used_{};                                       // in this frame
   std::uint64_t number_ = 0;                             // of this frame
