@@ -47,14 +47,16 @@ std::vector<simulation::MovingCollider> sphereAt(std::uint64_t tick) {
 // A simulation whose frames are encoded on the device and on the CPU.
 class Encoding {
  public:
-  explicit Encoding(const scene::Scene& scene, std::optional<std::uint8_t> codec = {})
+  explicit Encoding(const scene::Scene& scene, std::optional<std::uint8_t> codec = {},
+                    encode::Prediction prediction = encode::Prediction::automatic)
       : scene_(scene),
         simulation(device(), scene),
         layout(layoutOf(scene, codec)),
-        encoder(device(), simulation, layout),
+        encoder(device(), simulation, layout, prediction),
         recorder_(device()),
         normals_(device(), vulkan::BufferPurpose::readback, simulation.normals().bytes()),
-        reference_(codec::Encoder::make(layout)),
+        reference_(codec::Encoder::make(
+            layout, {.weightLag = prediction == encode::Prediction::onDevice ? encode::kWeightLag : 0})),
         decoder_(codec::Decoder::make(layout)),
         packet_(encoder.packetBound()),
         expected_(reference_->packetBound()) {}
@@ -149,6 +151,7 @@ struct Sort {
   const char* name;
   std::uint8_t codec;
   scene::Normals normals;
+  encode::Prediction prediction = encode::Prediction::onHost;
 };
 
 class FrameEncoder : public GpuTest, public testing::WithParamInterface<Sort> {};
@@ -156,11 +159,13 @@ INSTANTIATE_TEST_SUITE_P(
     Sorts, FrameEncoder,
     testing::Values(Sort{"lattice", codec::kCodecLatticeZstd, scene::Normals::none},
                     Sort{"latticeWithNormals", codec::kCodecLatticeZstd, scene::Normals::octahedral},
-                    Sort{"hierarchical", codec::kCodecHierarchical, scene::Normals::none}),
+                    Sort{"hierarchical", codec::kCodecHierarchical, scene::Normals::none},
+                    Sort{"hierarchicalOnDevice", codec::kCodecHierarchical, scene::Normals::none,
+                         encode::Prediction::onDevice}),
     [](const auto& chosen) { return chosen.param.name; });
 
 TEST_P(FrameEncoder, MakesThePacketsOfTheReferenceEncoder) {
-  Encoding encoding(clothsOf(GetParam().normals), GetParam().codec);
+  Encoding encoding(clothsOf(GetParam().normals), GetParam().codec, GetParam().prediction);
   for (std::uint64_t tick = 1; tick <= 120; ++tick) {
     const encode::RecordedFrame frame = encoding.tick(tick, tick % 40 == 0);
     EXPECT_EQ(frame.kind == codec::PacketKind::key, tick == 1 || tick % 40 == 0) << tick;
@@ -171,7 +176,7 @@ TEST_P(FrameEncoder, MakesThePacketsOfTheReferenceEncoder) {
 }
 
 TEST_P(FrameEncoder, EqualsTheReferenceOnStatesOfAnySize) {
-  Encoding encoding(clothsOf(GetParam().normals), GetParam().codec);
+  Encoding encoding(clothsOf(GetParam().normals), GetParam().codec, GetParam().prediction);
   std::mt19937 random(1);
   for (std::uint64_t tick = 1; tick <= 12; ++tick) {
     const float extents[] = {1e-19f, 0.001f, 1, 32, 8000, 1e6f};
@@ -188,7 +193,7 @@ TEST_P(FrameEncoder, EqualsTheReferenceOnStatesOfAnySize) {
 TEST_P(FrameEncoder, KeepsTheErrorAtRoundingsEdges) {
   // Half way between lattice points, and the floats beside it: where a device that rounds otherwise would
   // differ.
-  Encoding encoding(clothsOf(GetParam().normals), GetParam().codec);
+  Encoding encoding(clothsOf(GetParam().normals), GetParam().codec, GetParam().prediction);
   const float step = 2 * encoding.layout.maxError - 0x1p-18f;
   std::mt19937 random(2);
   std::uniform_int_distribution<int> point(-30000, 30000), offset(-3, 3);
@@ -210,7 +215,7 @@ TEST_P(FrameEncoder, KeepsTheErrorAtRoundingsEdges) {
 TEST_P(FrameEncoder, MakesThoseOfMeshesToo) {
   scene::Scene scene = clothsOf(GetParam().normals);
   scene.cloths.insert(scene.cloths.begin() + 1, discCloth(9));
-  Encoding encoding(scene, GetParam().codec);
+  Encoding encoding(scene, GetParam().codec, GetParam().prediction);
   for (std::uint64_t tick = 1; tick <= 30 && !testing::Test::HasFailure(); ++tick)
     encoding.tick(tick, tick % 10 == 0);
 }

@@ -24,6 +24,11 @@ LatticeUnit latticeUnit(float maxError);
 inline constexpr int kScaleBits = 29;
 double quantisationScale(float unit);
 
+// An encoder lets a vertex rest that is wanted in the same place for so many frames; about so many start to
+// in a frame: in turns, where there are more.
+inline constexpr std::uint8_t kStillFrames = 3;
+inline constexpr std::uint32_t kRestsAtOnce = 64;
+
 // A packet's sections: changes of the weights (empty where there are none), symbols, bits beside them.
 inline constexpr std::size_t kSections = 3;
 inline constexpr unsigned kWeightGammaBits = 4, kEscapeGammaBits = 2;

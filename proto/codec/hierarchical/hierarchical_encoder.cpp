@@ -16,10 +16,6 @@
 namespace clothstream::codec::hierarchical {
 namespace {
 
-constexpr std::uint8_t kStillFrames = 3;
-// That start to rest in a frame, about: in turns, where there are more.
-constexpr std::uint32_t kRestsAtOnce = 64;
-
 // Along u, v and n, in steps: of one vertex, and of four.
 struct Local {
   float u, v, n;

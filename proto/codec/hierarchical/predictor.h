@@ -79,9 +79,6 @@ struct Prediction {
 
 // Vertices that are predicted before the first of them is coded: few enough to stay in the nearest cache.
 inline constexpr std::uint32_t kChunk = 64;
-constexpr std::uint32_t chunksOf(const Phase& phase) {
-  return (phase.end - phase.begin + kChunk - 1) / kChunk;
-}
 
 // A frame is begin(), then predict() and place() for all vertices in coding order, then keep(), or nothing
 // where the frame is given up.

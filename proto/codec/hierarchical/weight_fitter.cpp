@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 namespace clothstream::codec::hierarchical {
 namespace {
@@ -101,10 +102,26 @@ void WeightFitter::fit(Weights& weights) {
 }
 
 FitSchedule::FitSchedule(const Hierarchy& hierarchy) {
-  std::array<std::uint32_t, kWeightClasses + 1> chunks{};
-  for (const Phase& phase : hierarchy.phases) chunks[phase.weightClass] += chunksOf(phase);
-  for (std::size_t c = 0; c < kWeightClasses; ++c)
-    strides_[c] = std::max(1u, (chunks[c] + kFittedChunks[c] - 1) / kFittedChunks[c]);
+  for (const Phase& phase : hierarchy.phases) {
+    if (phase.weightClass == kWeightClasses) continue;
+    for (std::uint32_t begin = phase.begin; begin < phase.end; begin += kChunk)
+      chunks_[phase.weightClass].push_back({begin, std::min(begin + kChunk, phase.end), phase.weightClass});
+  }
+  for (std::size_t c = 0; c < kWeightClasses; ++c) {
+    const auto chunks = static_cast<std::uint32_t>(chunks_[c].size());
+    strides_[c] = std::max(1u, (chunks + kFittedChunks[c] - 1) / kFittedChunks[c]);
+  }
+}
+
+std::size_t FitSchedule::select(std::uint32_t frame, std::span<Phase> out) const {
+  static_assert(std::accumulate(kFittedChunks.begin(), kFittedChunks.end(), std::size_t{0}) == kMaxChunks);
+  std::size_t count = 0;
+  for (std::size_t c = 0; c < kWeightClasses; ++c) {
+    const std::uint32_t stride = strides_[c];
+    for (std::size_t i = (stride - frame % stride) % stride; i < chunks_[c].size(); i += stride)
+      out[count++] = chunks_[c][i];
+  }
+  return count;
 }
 
 }  // namespace clothstream::codec::hierarchical

@@ -7,6 +7,8 @@
 #include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <span>
+#include <vector>
 
 #include "proto/codec/hierarchical/predictor.h"
 
@@ -63,8 +65,13 @@ class FitSchedule {
   bool isFitted(std::uint32_t weightClass, std::uint32_t chunk, std::uint32_t frame) const {
     return (chunk + frame) % strides_[weightClass] == 0;
   }
+  // All of a frame, class after class; of a class in coding order. `out` has room for kMaxChunks.
+  std::size_t select(std::uint32_t frame, std::span<Phase> out) const;
+
+  static constexpr std::size_t kMaxChunks = 72;
 
  private:
+  std::array<std::vector<Phase>, kWeightClasses> chunks_;
   std::array<std::uint32_t, kWeightClasses> strides_{};
 };
 
