@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstring>
 #include <new>
+#include <stdexcept>
 
 #include "kernels/finish_records.h"
 #include "kernels/predict_phase.h"
@@ -47,6 +48,15 @@ vulkan::KernelDescription describe(const char* name, std::span<const std::uint32
           .workgroupSize = workgroupSize};
 }
 
+// Ten bits each: they are within twice a whole.
+constexpr std::uint32_t packed(const std::array<std::int16_t, 4>& parentWeights) {
+  std::uint32_t word = 0;
+  for (std::size_t i = 1; i < 4; ++i)
+    word |= (static_cast<std::uint32_t>(parentWeights[i]) & 1023u) << 10 * (i - 1);
+  return word;
+}
+static_assert(packed(codec::hierarchical::kEqualWeights) == shared::kEqualParentWeights);
+
 void store(const Weights& weights, std::span<std::int32_t> to) {
   auto next = to.begin();
   for (std::size_t c = 0; c < codec::hierarchical::kWeightClasses; ++c)
@@ -63,9 +73,10 @@ static_assert(shared::kClasses == codec::hierarchical::kWeightClasses &&
 
 }  // namespace
 
-bool DevicePredictor::fits(const vulkan::Device& device, const codec::StreamLayout& layout) {
+bool DevicePredictor::supports(const vulkan::Device& device, const codec::StreamLayout& layout) {
   const vulkan::Limits& limits = device.limits();
-  return momentBytes(layout.vertexCount()) <= limits.maxStorageRange &&
+  return layout.temporalLayers == 1 && layout.normals == codec::NormalMode::none &&
+         momentBytes(layout.vertexCount()) <= limits.maxStorageRange &&
          layout.vertexCount() <= std::uint64_t{limits.maxDispatchX} * kWorkgroupSize;
 }
 
@@ -75,11 +86,16 @@ DevicePredictor::DevicePredictor(const vulkan::Device& device, const simulation:
       vertices_(layout.vertexCount()),
       unit_(codec::hierarchical::latticeUnit(layout.maxError)),
       quantise_(device, describe("quantise_slots", kernels::quantise_slots, true, 5)),
-      predictPhase_(device, describe("predict_phase", kernels::predict_phase, false, 9)),
-      predictSmallPhases_(device, describe("predict_small_phases", kernels::predict_small_phases, false, 9,
+      predictPhase_(device, describe("predict_phase", kernels::predict_phase, false, 10)),
+      predictSmallPhases_(device, describe("predict_small_phases", kernels::predict_small_phases, false, 10,
                                            kSmallPhasesWorkgroupSize)),
-      sumProducts_(device, describe("sum_products", kernels::sum_products, false, 8)),
+      sumProducts_(device, describe("sum_products", kernels::sum_products, false, 9)),
       finish_(device, describe("finish_records", kernels::finish_records, false, 6)) {
+  if (!supports(device, layout))
+    throw std::runtime_error(
+        "codec 2 is predicted on the host where there are normals or temporal layers, or more vertices than "
+        "the "
+        "device's buffers hold");
   if (!hierarchy_.build(layout)) throw std::bad_alloc();
   const std::size_t n = vertices_, phases = hierarchy_.phases.size();
   const auto table = [&](Buffer& buffer, Buffer& upload, std::size_t bytes) {
@@ -87,7 +103,7 @@ DevicePredictor::DevicePredictor(const vulkan::Device& device, const simulation:
     upload = Buffer(device, BufferPurpose::upload, bytes);
   };
   table(links_, linksUpload_, shared::kLinkRows * n * sizeof(Row));
-  table(vertexOf_, vertexOfUpload_, n * sizeof(std::uint32_t));
+  table(slotTable_, slotTableUpload_, 2 * n * sizeof(std::uint32_t));
   table(model_, modelUpload_, sizeof codec::hierarchical::kScaleWeights / 2 * 4 + phases * sizeof(Row));
   for (Buffer& moment : moments_) moment = Buffer(device, BufferPurpose::state, momentBytes(n));
   wanted_ = Buffer(device, BufferPurpose::state, n * sizeof(Row));
@@ -131,8 +147,8 @@ void DevicePredictor::makeBindings(const vulkan::Device& device) {
     for (const Buffer& past : moments_) {
       quantiseBindings_.emplace_back(
           device, quantise_,
-          std::initializer_list<const Buffer*>{&simulation_.positions(positions), &vertexOf_, &past, &wanted_,
-                                               &status_});
+          std::initializer_list<const Buffer*>{&simulation_.positions(positions), &slotTable_, &past,
+                                               &wanted_, &status_});
     }
   }
   for (std::uint32_t turn = 0; turn < 2; ++turn) {
@@ -140,19 +156,19 @@ void DevicePredictor::makeBindings(const vulkan::Device& device) {
     for (const Slot& slot : slots_) {
       for (const bool isSmall : {false, true}) {
         (isSmall ? smallPhaseBindings_ : phaseBindings_)
-            .emplace_back(
-                device, isSmall ? predictSmallPhases_ : predictPhase_,
-                std::initializer_list<const Buffer*>{&links_, &past, &made, &wanted_, &status_, &weights_,
-                                                     &model_, &slot.residuals, &slot.wideResiduals});
+            .emplace_back(device, isSmall ? predictSmallPhases_ : predictPhase_,
+                          std::initializer_list<const Buffer*>{&links_, &past, &made, &wanted_, &status_,
+                                                               &weights_, &slotTable_, &model_,
+                                                               &slot.residuals, &slot.wideResiduals});
       }
       sumBindings_.emplace_back(
           device, sumProducts_,
           std::initializer_list<const Buffer*>{&links_, &past, &made, &wanted_, &status_, &weights_,
-                                               &slot.chunks, &slot.products});
+                                               &slotTable_, &slot.chunks, &slot.products});
     }
     finishBindings_.emplace_back(
         device, finish_,
-        std::initializer_list<const Buffer*>{&links_, &past, &made, &vertexOf_, &status_, &weights_});
+        std::initializer_list<const Buffer*>{&links_, &past, &made, &slotTable_, &status_, &weights_});
   }
 }
 
@@ -168,7 +184,10 @@ void DevicePredictor::uploadTables(vulkan::Recorder& recorder) {
     std::copy_n(neighbours.ring.begin() + 4, 4, row(shared::kLinkRing + 1));
     std::copy_n(hierarchy_.nearest[slot].begin(), 4, row(shared::kLinkNearest));
   }
-  std::copy_n(hierarchy_.vertexOf.data(), vertices_, vertexOfUpload_.mapped<std::uint32_t>().begin());
+  auto next =
+      std::copy_n(hierarchy_.vertexOf.data(), vertices_, slotTableUpload_.mapped<std::uint32_t>().begin());
+  for (const codec::hierarchical::Neighbours& neighbours : hierarchy_.neighbours)
+    *next++ = packed(neighbours.weights);
   auto model = modelUpload_.mapped<std::uint32_t>().begin();
   for (const auto& ofClass : codec::hierarchical::kScaleWeights) {
     for (const codec::hierarchical::ScaleWeights& w : ofClass) {
@@ -179,7 +198,7 @@ void DevicePredictor::uploadTables(vulkan::Recorder& recorder) {
   for (const Phase& phase : hierarchy_.phases)
     model = std::ranges::copy(Row{phase.begin, phase.end, phase.weightClass, 0}, model).out;
   recorder.copy(linksUpload_, links_, links_.bytes());
-  recorder.copy(vertexOfUpload_, vertexOf_, vertexOf_.bytes());
+  recorder.copy(slotTableUpload_, slotTable_, slotTable_.bytes());
   recorder.copy(modelUpload_, model_, model_.bytes());
   recorder.fill(wanted_, 0, wanted_.bytes());
   // The origin, after the last node.

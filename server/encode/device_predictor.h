@@ -21,12 +21,12 @@ namespace clothstream::encode {
 // Records on the device's thread; what is read back of a frame belongs to whoever entropy-codes it.
 class DevicePredictor {
  public:
-  // Throws std::runtime_error where the device cannot hold it.
+  // Throws std::runtime_error where it is not supported or memory runs out.
   DevicePredictor(const vulkan::Device& device, const simulation::ClothSimulation& simulation,
                   const codec::StreamLayout& layout);
 
-  // Whether the device's buffers can be so large.
-  static bool fits(const vulkan::Device& device, const codec::StreamLayout& layout);
+  // One temporal layer, no normals, no more than the device's buffers and dispatches hold.
+  static bool supports(const vulkan::Device& device, const codec::StreamLayout& layout);
 
   struct FrameWeights {
     const codec::hierarchical::Weights *used, *left;  // in the frame, if it is not at rest, and after it
@@ -68,7 +68,7 @@ class DevicePredictor {
   std::vector<Step> steps_;
 
   std::array<vulkan::Buffer, 2> moments_;  // of the reference and of the frame, by turns
-  vulkan::Buffer links_, linksUpload_, vertexOf_, vertexOfUpload_, model_, modelUpload_;
+  vulkan::Buffer links_, linksUpload_, slotTable_, slotTableUpload_, model_, modelUpload_;
   vulkan::Buffer wanted_, status_, weights_;
   std::array<Slot, kFrameSlots> slots_;
   vulkan::Kernel quantise_, predictPhase_, predictSmallPhases_, sumProducts_, finish_;

@@ -30,7 +30,7 @@ std::unique_ptr<EncodeStage> makeLatticeStage(const vulkan::Device& device,
 std::unique_ptr<EncodeStage> makeHierarchicalHostStage(const vulkan::Device& device,
                                                        const simulation::ClothSimulation& simulation,
                                                        const codec::StreamLayout& layout);
-// Throws std::runtime_error where there are temporal layers, or the device cannot hold it.
+// Throws std::runtime_error where DevicePredictor does not support it.
 std::unique_ptr<EncodeStage> makeHierarchicalDeviceStage(const vulkan::Device& device,
                                                          const simulation::ClothSimulation& simulation,
                                                          const codec::StreamLayout& layout);

@@ -21,6 +21,14 @@ std::vector<std::uint32_t> trianglesOf(const scene::Mesh& mesh) {
   return corners;
 }
 
+std::vector<float> coordinatesOf(const scene::Mesh& mesh) {
+  std::vector<float> coordinates;
+  coordinates.reserve(3 * mesh.shape.positions.size());
+  for (const scene::Vec3& position : mesh.shape.positions)
+    coordinates.insert(coordinates.end(), {position.x(), position.y(), position.z()});
+  return coordinates;
+}
+
 }  // namespace
 
 codec::StreamLayout streamLayout(const scene::Scene& scene, std::uint32_t epoch) {
@@ -32,7 +40,9 @@ codec::StreamLayout streamLayout(const scene::Scene& scene, std::uint32_t epoch)
                              .cloths = {}};
   for (const scene::Cloth& cloth : scene.cloths) {
     if (cloth.mesh)
-      layout.cloths.push_back({.vertexCount = cloth.nodeCount(), .triangles = trianglesOf(*cloth.mesh)});
+      layout.cloths.push_back({.vertexCount = cloth.nodeCount(),
+                               .triangles = trianglesOf(*cloth.mesh),
+                               .restPositions = coordinatesOf(*cloth.mesh)});
     else
       layout.cloths.push_back({cloth.nodeCount(), cloth.grid.rows, cloth.grid.columns});
   }
@@ -60,10 +70,9 @@ FrameEncoder::FrameEncoder(const vulkan::Device& device, const simulation::Cloth
                            const codec::StreamLayout& layout, Prediction prediction)
     : state_(std::make_unique<State>()) {
   assert(layout.vertexCount() == simulation.nodeCount());
-  const bool onDevice =
-      prediction == Prediction::automatic
-          ? !device.isSoftware() && layout.temporalLayers == 1 && DevicePredictor::fits(device, layout)
-          : prediction == Prediction::onDevice;
+  const bool onDevice = prediction == Prediction::automatic
+                            ? !device.isSoftware() && DevicePredictor::supports(device, layout)
+                            : prediction == Prediction::onDevice;
   const auto make = layout.codec == codec::kCodecLatticeZstd ? makeLatticeStage
                     : onDevice                               ? makeHierarchicalDeviceStage
                                                              : makeHierarchicalHostStage;

@@ -2,8 +2,6 @@
 // Codec 2 with its prediction on the device: the CPU entropy-codes and fits weights, to frames some frames
 // back.
 #include <array>
-#include <atomic>
-#include <stdexcept>
 
 #include "proto/codec/hierarchical/frame_writer.h"
 #include "proto/codec/hierarchical/weight_plan.h"
@@ -80,7 +78,11 @@ EncodedFrame HierarchicalDeviceStage::entropyCode(const RecordedFrame& frame, st
   const std::size_t weightBytes = plan_.write(!key && status.moved == 0, weightBytes_.data());
   bool any = false;
   writer_.begin();
-  for (const Phase& phase : predictor_.hierarchy().phases) any = writePhase(frame.slot, phase) || any;
+  const codec::hierarchical::Hierarchy& hierarchy = predictor_.hierarchy();
+  for (std::size_t i = 0; i < hierarchy.phases.size(); ++i) {
+    any = writePhase(frame.slot, hierarchy.phases[i]) || any;
+    if (i + 1 == hierarchy.coarsePhases) writer_.endCoarse();
+  }
   std::array<Phase, FitSchedule::kMaxChunks> chunks;
   const std::size_t count = fitted_.select(sinceKey_, chunks);
   for (std::size_t i = 0; i < count; ++i)
@@ -95,8 +97,6 @@ EncodedFrame HierarchicalDeviceStage::entropyCode(const RecordedFrame& frame, st
 std::unique_ptr<EncodeStage> makeHierarchicalDeviceStage(const vulkan::Device& device,
                                                          const simulation::ClothSimulation& simulation,
                                                          const codec::StreamLayout& layout) {
-  if (layout.temporalLayers > 1)
-    throw std::runtime_error("codec 2 with temporal layers is predicted on the host alone");
   return std::make_unique<HierarchicalDeviceStage>(device, simulation, layout);
 }
 

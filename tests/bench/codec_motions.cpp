@@ -14,9 +14,9 @@
 #include "proto/codec/encoder.h"
 #include "proto/codec/vertex_normals.h"
 #include "tests/bench/cloth_motion.h"
-#include "tests/bench/cut_grid.h"
 #include "tests/bench/samples.h"
 #include "tests/bench/suite.h"
+#include "tests/codec/cut_grid.h"
 
 namespace clothstream::bench {
 namespace {
@@ -141,7 +141,7 @@ Rows runCodecMotions(vulkan::Device&, const Settings& settings) {
          ++layout.temporalLayers)
       measurements.emplace_back(layout);
     layout.temporalLayers = 1;
-    CutGrid mesh(motion.size);
+    codec::CutGrid mesh(motion.size);
     layout.cloths = {mesh.cloth()};
     Measurement ofMesh(layout);
     playMotion(motion, [&](std::uint32_t frame, std::span<const float> positions) {

@@ -147,7 +147,7 @@ TEST_F(DevicePrediction, EqualsTheReferenceHoweverManyFramesWait) {
   }
 }
 
-TEST_F(DevicePrediction, RefusesTemporalLayers) {
+TEST_F(DevicePrediction, RefusesTemporalLayersAndNormals) {
   const scene::Scene scene = squareOf(4);
   const simulation::ClothSimulation simulation(device(), scene);
   codec::StreamLayout layout = Encoding::layoutOf(scene, {});
@@ -155,6 +155,10 @@ TEST_F(DevicePrediction, RefusesTemporalLayers) {
   EXPECT_THROW(encode::FrameEncoder(device(), simulation, layout, encode::Prediction::onDevice),
                std::runtime_error);
   EXPECT_NO_THROW(encode::FrameEncoder(device(), simulation, layout));
+  layout.temporalLayers = 1;
+  layout.normals = codec::NormalMode::octahedral;
+  EXPECT_THROW(encode::FrameEncoder(device(), simulation, layout, encode::Prediction::onDevice),
+               std::runtime_error);
 }
 
 }  // namespace

@@ -13,11 +13,15 @@ namespace {
 // Of an escape and what stands beside it, at most.
 constexpr std::size_t kMaxExtraBytes = 8;
 
+std::size_t componentsOf(const StreamLayout& layout) {
+  return kComponents + (layout.normals == NormalMode::octahedral ? 2 : 0);
+}
+
 }  // namespace
 
 FrameWriter::FrameWriter(const StreamLayout& layout)
-    : symbols_(kComponents * std::size_t{layout.vertexCount()}),
-      extra_((kComponents * kMaxExtraBytes + 1) * layout.vertexCount() + kMaxExtraBytes),
+    : symbols_(componentsOf(layout) * layout.vertexCount()),
+      extra_((componentsOf(layout) * kMaxExtraBytes + 1) * layout.vertexCount() + kMaxExtraBytes),
       bits_(extra_.data()),
       bitsBefore_(bits_) {
   header_.codec = kCodecHierarchical;
@@ -51,6 +55,11 @@ void FrameWriter::endPhase(bool any) {
   bits_ = bitsBefore_;
   bits_.put(1, 1);
   symbols_.shrink(symbolsBefore_);
+}
+
+void FrameWriter::endCoarse() {
+  coarseSymbols_ = symbols_.count();
+  coarseBytes_ = bits_.bytesSince(extra_.data());
 }
 
 void FrameWriter::add(const ChunkResiduals& chunk, std::size_t count) {
@@ -90,6 +99,25 @@ void FrameWriter::code(const ChunkResiduals& chunk, Component component, std::si
   symbols_.add(coder, distributionOf(component, scale), symbol);
 }
 
+void FrameWriter::addNormals(std::span<const FacedNormal> predicted, std::span<const FacedNormal> normals) {
+  std::array<NormalScale, 2> scales;
+  for (std::size_t vertex = 0; vertex < normals.size(); ++vertex) {
+    const Octahedral &expected = predicted[vertex].octahedral, &actual = normals[vertex].octahedral;
+    const std::array<int, 2> differences{actual.u - expected.u, actual.v - expected.v};
+    for (std::size_t c = 0; c < 2; ++c) {
+      const auto residual = static_cast<std::int8_t>(differences[c]);
+      const std::uint32_t scale = scales[c].scale();
+      const unsigned raw = rawBits(scale);
+      const std::uint32_t number = zigzag(residual);
+      const std::uint32_t symbol = std::min(number >> raw, kEscape);
+      if (symbol == kEscape) bits_.putGamma((number >> raw) - kEscape, kEscapeGammaBits);
+      if (raw > 0) bits_.put(number & ((1u << raw) - 1), raw);
+      symbols_.add((2 * vertex + c) % kCoders, distributionOf(kAlongU, scale), symbol);
+      scales[c].add(residual);
+    }
+  }
+}
+
 std::size_t FrameWriter::write(const FrameRole& role, std::span<const std::byte> weights,
                                std::span<std::byte> out) {
   const bool key = role.kind == PacketKind::key;
@@ -102,11 +130,15 @@ std::size_t FrameWriter::write(const FrameRole& role, std::span<const std::byte>
   const std::size_t bodyStart = headerBound(header_);
   std::byte* const body = out.data() + bodyStart;
   std::byte* end = std::copy(weights.begin(), weights.end(), body);
-  header_.sectionBytes[0] = static_cast<std::uint32_t>(weights.size());
-  header_.sectionBytes[1] = static_cast<std::uint32_t>(symbols_.write(end));
-  end += header_.sectionBytes[1];
-  header_.sectionBytes[2] = static_cast<std::uint32_t>(bits_.finish() - extra_.data());
-  end = std::copy_n(extra_.data(), header_.sectionBytes[2], end);
+  header_.sectionBytes[kWeightChanges] = static_cast<std::uint32_t>(weights.size());
+  const RansWriter::Written symbols = symbols_.write(end, coarseSymbols_);
+  header_.sectionBytes[kCoarseSymbols] = static_cast<std::uint32_t>(symbols.firstBytes);
+  header_.sectionBytes[kFineSymbols] = static_cast<std::uint32_t>(symbols.bytes - symbols.firstBytes);
+  end += symbols.bytes;
+  const auto extraBytes = static_cast<std::size_t>(bits_.finish() - extra_.data());
+  header_.sectionBytes[kCoarseBits] = static_cast<std::uint32_t>(coarseBytes_);
+  header_.sectionBytes[kFineBits] = static_cast<std::uint32_t>(extraBytes - coarseBytes_);
+  end = std::copy_n(extra_.data(), extraBytes, end);
   const std::size_t headerBytes = writeHeader(header_, out);
   std::copy(body, end, out.data() + headerBytes);
   return headerBytes + static_cast<std::size_t>(end - body);

@@ -29,7 +29,8 @@ struct ChunkResiduals {
   bool anyStays = false;
 };
 
-// A frame is begin(), then for each phase beginPhase(), add() for its chunks and endPhase(), then write().
+// A frame is begin(), then for each phase beginPhase(), add() for its chunks and endPhase(), addNormals()
+// where the stream has them, then write().
 class FrameWriter {
  public:
   explicit FrameWriter(const StreamLayout& layout);
@@ -41,6 +42,10 @@ class FrameWriter {
   void add(const ChunkResiduals& chunk, std::size_t count);
   // `any`: one of its vertices stays or has a residual that is not 0.
   void endPhase(bool any);
+  // That was the last phase of coarse vertices.
+  void endCoarse();
+  // By vertex, each two on the same octahedron.
+  void addNormals(std::span<const FacedNormal> predicted, std::span<const FacedNormal> normals);
   // The packet; `weights` is its first section.
   std::size_t write(const FrameRole& role, std::span<const std::byte> weights, std::span<std::byte> out);
 
@@ -52,6 +57,8 @@ class FrameWriter {
   std::vector<std::byte> extra_;
   BitWriter bits_, bitsBefore_;  // before the phase
   std::size_t symbolsBefore_ = 0;
+  // What coarse vertices take.
+  std::size_t coarseSymbols_ = 0, coarseBytes_ = 0;
 };
 
 }  // namespace clothstream::codec::hierarchical

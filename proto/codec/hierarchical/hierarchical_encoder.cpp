@@ -38,13 +38,16 @@ std::int32_t nearest(float value) {
 }  // namespace
 
 struct HierarchicalEncoder::State {
-  State(const StreamLayout& layout, std::uint32_t weightLag)
-      : vertices(layout.vertexCount()),
+  State(const StreamLayout& streamLayout, std::uint32_t weightLag)
+      : layout(streamLayout),
+        vertices(layout.vertexCount()),
+        hasNormals(layout.normals == NormalMode::octahedral),
         unit(latticeUnit(layout.maxError)),
         wanted(vertices),
         stillFrames(vertices),
-        writer(layout) {
-    if (!predictor.allocate(layout, unit.stepBits))
+        writer(layout),
+        sentNormals(hasNormals ? vertices : 0) {
+    if (!predictor.allocate(layout, unit.stepBits) || (hasNormals && !normalPrediction.allocate(layout)))
       std::abort();  // memory is out, as of any other allocation here
     fitted.emplace(predictor.hierarchy());
     plan.emplace(predictor.hierarchy(), layout.temporalLayers, weightLag);
@@ -74,9 +77,12 @@ struct HierarchicalEncoder::State {
   void scale(std::size_t count, const ScaleModel& model);
   void fitTo(std::uint32_t weightClass, const FeatureVectors& features, const Prediction& prediction,
              Int32x4 target, std::size_t i);
+  void encodeNormals(std::span<const float> normals);
   void note(const Prediction& prediction, std::uint32_t weightClass, std::size_t i);
 
+  StreamLayout layout;
   std::size_t vertices;
+  bool hasNormals;
   LatticeUnit unit;
   Predictor predictor;
   // In coding order.
@@ -93,6 +99,8 @@ struct HierarchicalEncoder::State {
   std::array<WeightVectors, kWeightClasses + 1> vectors{};
   std::uint32_t frame = 0;  // since the key frame
   bool quiet = false;       // no residual in this frame
+  NormalPrediction normalPrediction;
+  std::vector<FacedNormal> sentNormals;  // by vertex
   std::vector<CodedResidual>* recorded = nullptr;
   // Of the chunk that is being encoded.
   std::array<Prediction, kChunk> predictions;
@@ -238,7 +246,11 @@ void HierarchicalEncoder::State::encodePhases() {
   writer.begin();
   quiet = true;
   chunks.fill(0);
-  for (const Phase& phase : predictor.hierarchy().phases) encodePhase(phase);
+  const Hierarchy& hierarchy = predictor.hierarchy();
+  for (std::size_t i = 0; i < hierarchy.phases.size(); ++i) {
+    encodePhase(hierarchy.phases[i]);
+    if (i + 1 == hierarchy.coarsePhases) writer.endCoarse();
+  }
 }
 
 void HierarchicalEncoder::State::attempt() {
@@ -362,6 +374,13 @@ void HierarchicalEncoder::State::fitTo(std::uint32_t weightClass, const FeatureV
   products.add(features, goal, roughReciprocal(6 + 4 * own * own + near));
 }
 
+void HierarchicalEncoder::State::encodeNormals(std::span<const float> normals) {
+  const std::span<const FacedNormal> predicted = normalPrediction.predict(layout, predictor);
+  for (std::size_t vertex = 0; vertex < vertices; ++vertex)
+    sentNormals[vertex] = faceNormal(&normals[3 * vertex], predicted[vertex].top);
+  writer.addNormals(predicted, sentNormals);
+}
+
 void HierarchicalEncoder::State::note(const Prediction& prediction, std::uint32_t weightClass,
                                       std::size_t i) {
   for (std::size_t c = 0; c < kComponents; ++c) {
@@ -383,7 +402,7 @@ std::size_t HierarchicalEncoder::packetBound() const {
 }
 
 std::size_t HierarchicalEncoder::encode(const FrameRole& role, std::span<const float> positions,
-                                        std::span<const float>, std::span<std::byte> out) {
+                                        std::span<const float> normals, std::span<std::byte> out) {
   State& s = *state_;
   const bool key = role.kind == PacketKind::key;
   s.frame = key ? 0 : s.frame + 1;
@@ -398,13 +417,14 @@ std::size_t HierarchicalEncoder::encode(const FrameRole& role, std::span<const f
   const std::size_t weightBytes = s.plan->write(!key && s.isAtRest(), s.weightBytes.data());
   s.use(s.plan->used());
   s.encodePhases();
+  if (s.hasNormals) s.encodeNormals(normals);
   s.predictor.keep(role.layer);
   s.plan->end(s.quiet);
   return s.writer.write(role, std::span(s.weightBytes).first(weightBytes), out);
 }
 
 std::uint64_t HierarchicalEncoder::reconstructionHash() const {
-  return hashNodes(state_->predictor);
+  return hashNodes(state_->predictor, state_->sentNormals);
 }
 
 void HierarchicalEncoder::record(std::vector<CodedResidual>* residuals) {

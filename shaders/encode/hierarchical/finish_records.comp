@@ -16,8 +16,8 @@ layout(std430, binding = 1) readonly buffer Past {
 layout(std430, binding = 2) buffer Made {
   uvec4 made[];
 };
-layout(std430, binding = 3) readonly buffer VertexOf {
-  uint vertexOf[];
+layout(std430, binding = 3) readonly buffer SlotTable {
+  uint slotTable[];  // the vertex first
 };
 layout(std430, binding = 4) buffer Status {
   SlotStatus status;
@@ -50,8 +50,8 @@ void main() {
   if (slot < push.vertexCount) {
     finishRecord(slot);
     ivec3 position = ivec3(made[slot].xyz);
-    atomicAdd(hashLow, hashWord(vertexOf[slot], position, 0, kLowSeed));
-    atomicAdd(hashHigh, hashWord(vertexOf[slot], position, 0, kHighSeed));
+    atomicAdd(hashLow, hashWord(slotTable[slot], position, 0, kLowSeed));
+    atomicAdd(hashHigh, hashWord(slotTable[slot], position, 0, kHighSeed));
   }
   // At rest the frame leaves what it found.
   if (slot < kClassWeights && push.hasWeights != 0 && (isKey() || status.moved != 0)) {

@@ -14,6 +14,10 @@ const uint32_t kLinkRing = 1;  // and the row after it
 const uint32_t kLinkNearest = 3;
 const uint32_t kLinkRows = 4;
 
+// Beside them stand two words a slot, in two rows: its vertex, and the weights of its parents but the first,
+// ten bits each.
+const uint32_t kEqualParentWeights = 0x01004010u;
+
 // A moment has a node more than vertices, the origin, then these rows. Three words are two vectors of 16-bit
 // components, as in Record (proto/codec/hierarchical/predictor.h): the first in the low halves.
 const uint32_t kRowAverage = 0;       // 32-bit components; W0 - W1 (x y)

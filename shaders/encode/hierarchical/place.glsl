@@ -17,15 +17,15 @@ struct ScaleWeights {
   int u;
   int constant;
 };
-layout(std430, binding = 6) readonly buffer Model {
+layout(std430, binding = 7) readonly buffer Model {
   ScaleWeights scaleWeights[3 * kScaleClasses];
   uvec4 phases[];  // first slot, end, weight class
 };
 // kResidualRows words a slot, and where they say so three more.
-layout(std430, binding = 7) writeonly buffer Residuals {
+layout(std430, binding = 8) writeonly buffer Residuals {
   uint residuals[];
 };
-layout(std430, binding = 8) writeonly buffer WideResiduals {
+layout(std430, binding = 9) writeonly buffer WideResiduals {
   int wideResiduals[];
 };
 

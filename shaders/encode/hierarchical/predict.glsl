@@ -11,6 +11,7 @@
 
 const int kWeightBits = 10;
 const int kTurnedBits = 2;
+const int kParentBits = 6;
 
 layout(std430, binding = 0) readonly buffer Links {
   uvec4 links[];
@@ -30,6 +31,23 @@ layout(std430, binding = 4) readonly buffer Status {
 layout(std430, binding = 5) readonly buffer ClassWeights {
   int weights[kAllWeights];
 };
+
+layout(std430, binding = 6) readonly buffer SlotTable {
+  uint slotTable[];  // the vertex; three weights of parents
+};
+
+// Of the parents, in 2^-kParentBits; the first has the rest of a whole. Where all weigh the same, more than
+// 32 bits would be needed: nothing overflows in their sum.
+ivec3 averageOf(uint slot, ivec3 p0, ivec3 p1, ivec3 p2, ivec3 p3) {
+  uint packed_ = slotTable[push.vertexCount + slot];
+  if (packed_ == kEqualParentWeights) {
+    return (p0 + p1 + p2 + p3 + 2) >> 2;
+  }
+  ivec3 w = ivec3(bitfieldExtract(int(packed_), 0, 10), bitfieldExtract(int(packed_), 10, 10),
+                  bitfieldExtract(int(packed_), 20, 10));
+  ivec3 sum = (p1 - p0) * w.x + (p2 - p0) * w.y + (p3 - p0) * w.z;
+  return p0 + ((sum + (1 << (kParentBits - 1))) >> kParentBits);
+}
 
 int weightOf(uint weightClass, uint feature) {
   if (weightClass >= kClasses || (!isKey() && status.moved == 0)) {
@@ -112,7 +130,7 @@ Prediction predict(uint slot, uint weightClass, PastVertex before) {
   uvec4 ring = made[near.x] + made[near.y] + made[near.z] + made[near.w] + made[far.x] + made[far.y] +
                made[far.z] + made[far.w];
   Prediction p;
-  p.average = (ivec3(sum.xyz) + 2) >> 2;
+  p.average = averageOf(slot, ivec3(p0.xyz), ivec3(p1.xyz), ivec3(p2.xyz), ivec3(p3.xyz));
   p.parentMagnitudes = sum.w;
   p.ringMagnitudes = ring.w;
   p.frame = surfaceFrame(ivec3(p1.xyz - p0.xyz), ivec3(p3.xyz - p2.xyz));

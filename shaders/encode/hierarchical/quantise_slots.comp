@@ -6,8 +6,8 @@
 #include "shaders/encode/hierarchical/slots.glsl"
 
 layout(binding = 0) uniform samplerBuffer positions;
-layout(std430, binding = 1) readonly buffer VertexOf {
-  uint vertexOf[];  // by slot
+layout(std430, binding = 1) readonly buffer SlotTable {
+  uint slotTable[];  // the vertex first
 };
 layout(std430, binding = 2) readonly buffer Past {
   uvec4 past[];
@@ -66,7 +66,7 @@ void main() {
   barrier();
   uint slot = gl_GlobalInvocationID.x;
   if (slot < push.vertexCount) {
-    vec3 p = texelFetch(positions, int(vertexOf[slot])).xyz;
+    vec3 p = texelFetch(positions, int(slotTable[slot])).xyz;
     ivec3 q = ivec3(quantise(p.x), quantise(p.y), quantise(p.z));
     ivec4 before = wanted[slot];
     uint still = q == before.xyz ? min(uint(before.w) + 1, kMostStillFrames) : 0;

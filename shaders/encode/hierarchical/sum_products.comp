@@ -7,10 +7,10 @@
 #define MADE_QUALIFIERS readonly
 #include "shaders/encode/hierarchical/predict.glsl"
 
-layout(std430, binding = 6) readonly buffer FittedChunks {
+layout(std430, binding = 7) readonly buffer FittedChunks {
   uvec4 fittedChunks[];  // by workgroup: first slot, end, weight class
 };
-layout(std430, binding = 7) writeonly buffer Products {
+layout(std430, binding = 8) writeonly buffer Products {
   float products[];  // kFeatureProducts a workgroup
 };
 
