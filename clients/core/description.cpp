@@ -288,6 +288,7 @@ tl::expected<Description, std::string> readDescription(Bytes message) {
   for (ClothMessage& cloth : cloths) {
     if (!appendNumbers(cloth.triangles, cloth.layout.triangles))
       return tl::unexpected(quoted(cloth.name) + ": triangles are not whole numbers of 4 bytes");
+    if (!cloth.layout.triangles.empty()) appendNumbers(cloth.restPositions, cloth.layout.restPositions);
     description.layout.cloths.push_back(cloth.layout);
   }
   if (std::string problem = check(description, cloths); !problem.empty())

@@ -8,6 +8,7 @@
 #include <memory>
 #include <span>
 
+#include "proto/codec/coarse_packet.h"
 #include "proto/codec/packet_header.h"
 #include "proto/codec/stream_layout.h"
 
@@ -49,7 +50,7 @@ class BodyEncoder {
 
 // Those of each codec, for a layout that is possible; decoders are null if memory is out.
 std::unique_ptr<BodyDecoder> makeLatticeDecoder(const StreamLayout& layout);
-std::unique_ptr<BodyDecoder> makeHierarchicalDecoder(const StreamLayout& layout);
+std::unique_ptr<BodyDecoder> makeHierarchicalDecoder(const StreamLayout& layout, Detail detail);
 std::unique_ptr<BodyEncoder> makeLatticeEncoder(const StreamLayout& layout);
 std::unique_ptr<BodyEncoder> makeHierarchicalEncoder(const StreamLayout& layout);
 

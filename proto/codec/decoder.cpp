@@ -14,9 +14,12 @@
 namespace clothstream::codec {
 
 struct Decoder::State {
-  bool allocate(const StreamLayout& streamLayout) {
+  bool allocate(const StreamLayout& streamLayout, Detail detail) {
     layout = streamLayout;
-    body = layout.codec == kCodecLatticeZstd ? makeLatticeDecoder(layout) : makeHierarchicalDecoder(layout);
+    // The coarse vertices' normals alone are of no use.
+    sendsNormals = layout.normals == NormalMode::octahedral && detail == Detail::full;
+    body = layout.codec == kCodecLatticeZstd ? makeLatticeDecoder(layout)
+                                             : makeHierarchicalDecoder(layout, detail);
     const std::size_t floats = 3 * std::size_t{layout.vertexCount()};
     return body != nullptr && positions.allocate(floats) && normals.allocate(floats);
   }
@@ -52,12 +55,13 @@ struct Decoder::State {
   }
 
   void makeNormals() {
-    if (layout.normals == NormalMode::octahedral) return body->writeNormals(normals.data());
+    if (sendsNormals) return body->writeNormals(normals.data());
     computeVertexNormals(layout, positions.data(), normals.data());
   }
 
   StreamLayout layout;
   std::unique_ptr<BodyDecoder> body;
+  bool sendsNormals = false;
   Array<float> positions, normals;
   HeldFrames held;
   std::uint64_t tick = 0;
@@ -67,10 +71,10 @@ struct Decoder::State {
   bool hasHash = false, hasNormals = false;
 };
 
-std::unique_ptr<Decoder> Decoder::make(const StreamLayout& layout) {
-  if (!isPossible(layout)) return nullptr;
+std::unique_ptr<Decoder> Decoder::make(const StreamLayout& layout, Detail detail) {
+  if (!isPossible(layout) || (detail == Detail::coarse && layout.codec != kCodecHierarchical)) return nullptr;
   std::unique_ptr<State> state(new (std::nothrow) State);
-  if (state == nullptr || !state->allocate(layout)) return nullptr;
+  if (state == nullptr || !state->allocate(layout, detail)) return nullptr;
   return std::unique_ptr<Decoder>(new (std::nothrow) Decoder(std::move(state)));
 }
 

@@ -8,6 +8,7 @@
 #include <memory>
 #include <span>
 
+#include "proto/codec/coarse_packet.h"
 #include "proto/codec/packet_header.h"
 #include "proto/codec/stream_layout.h"
 
@@ -25,8 +26,9 @@ enum class DecodeResult : std::uint8_t {
 // One decoder a stream; not thread-safe. Memory is taken once, at construction.
 class Decoder {
  public:
-  // nullptr if the layout is impossible (stream_layout.h), or memory is out.
-  static std::unique_ptr<Decoder> make(const StreamLayout& layout);
+  // nullptr if the layout is impossible (stream_layout.h; of Detail::coarse only codec 2 knows), or memory is
+  // out.
+  static std::unique_ptr<Decoder> make(const StreamLayout& layout, Detail detail = Detail::full);
   ~Decoder();
   Decoder(const Decoder&) = delete;
   Decoder& operator=(const Decoder&) = delete;
@@ -37,12 +39,13 @@ class Decoder {
   std::uint64_t tick() const;
   bool hasFrame() const;
 
-  // 3 floats a vertex, metres, cloths one after the other; valid until the next decode.
+  // 3 floats a vertex, metres, cloths one after the other; valid until the next decode. With Detail::coarse
+  // those that are not coarse lie between the others, without a promise.
   std::span<const float> positions() const;
   // 3 floats a vertex, unit length: as sent, or computed from the positions where the stream sends none. The
   // first call after a decode does the work.
   std::span<const float> normals() const;
-  // 64-bit hash of the reconstruction; equal to the server's (FRAME_FORMAT.md).
+  // 64-bit hash of the reconstruction; equal to the server's (FRAME_FORMAT.md), but with Detail::coarse.
   std::uint64_t reconstructionHash() const;
 
  private:

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <vector>
 
@@ -16,6 +17,9 @@ struct ClothLayout {
   std::uint32_t rows = 0, columns = 0;
   // Of a cloth that is no grid, for its normals: three of the cloth's own vertices each, counter-clockwise.
   std::vector<std::uint32_t> triangles = {};
+  // Of a mesh, 3 floats a vertex, or nothing: they tell which vertices lie between which others. Without them
+  // it takes more bits.
+  std::vector<float> restPositions = {};
 };
 
 inline constexpr std::uint8_t kCodecLatticeZstd = 1, kCodecHierarchical = 2;
@@ -53,14 +57,13 @@ struct StreamLayout {
 inline constexpr std::uint32_t kMaxVertices = 1u << 26;
 inline constexpr float kSmallestMaxError = 5e-6f, kLargestMaxError = 1000;
 
-// Whether a stream can have this layout: a codec of ours (codec 2 sends no normals, codec 1 has one temporal
-// layer), 1 to kMaxTemporalLayers layers, one cloth or more, none empty, grids whose numbers agree, triangles
-// of vertices that there are, at most kMaxVertices, a max error within the two bounds above.
+// Whether a stream can have this layout: a codec of ours (codec 1 has one temporal layer), 1 to
+// kMaxTemporalLayers layers, one cloth or more, none empty, grids whose numbers agree, triangles of vertices
+// that there are and finite rest positions, at most kMaxVertices, a max error within the two bounds above.
 inline bool isPossible(const StreamLayout& layout) {
   if (!(layout.maxError >= kSmallestMaxError && layout.maxError <= kLargestMaxError)) return false;
   if (layout.normals != NormalMode::none && layout.normals != NormalMode::octahedral) return false;
   if (!isCodec(layout.codec)) return false;
-  if (layout.codec == kCodecHierarchical && layout.normals != NormalMode::none) return false;
   if (layout.temporalLayers < 1 || layout.temporalLayers > kMaxTemporalLayers) return false;
   if (layout.codec == kCodecLatticeZstd && layout.temporalLayers > 1) return false;
   std::uint64_t vertices = 0;
@@ -71,6 +74,10 @@ inline bool isPossible(const StreamLayout& layout) {
     if (cloth.triangles.size() % 3 != 0 || (!noGrid && !cloth.triangles.empty())) return false;
     for (const std::uint32_t vertex : cloth.triangles)
       if (vertex >= cloth.vertexCount) return false;
+    const std::size_t coordinates = cloth.restPositions.size();
+    if (coordinates != 0 && (!noGrid || coordinates != 3 * std::size_t{cloth.vertexCount})) return false;
+    for (const float coordinate : cloth.restPositions)
+      if (!std::isfinite(coordinate)) return false;
     vertices += cloth.vertexCount;
     if (vertices > kMaxVertices) return false;
   }

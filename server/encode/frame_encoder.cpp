@@ -20,6 +20,14 @@ std::vector<std::uint32_t> trianglesOf(const scene::Mesh& mesh) {
   return corners;
 }
 
+std::vector<float> coordinatesOf(const scene::Mesh& mesh) {
+  std::vector<float> coordinates;
+  coordinates.reserve(3 * mesh.shape.positions.size());
+  for (const scene::Vec3& position : mesh.shape.positions)
+    coordinates.insert(coordinates.end(), {position.x(), position.y(), position.z()});
+  return coordinates;
+}
+
 }  // namespace
 
 codec::StreamLayout streamLayout(const scene::Scene& scene, std::uint32_t epoch) {
@@ -31,7 +39,9 @@ codec::StreamLayout streamLayout(const scene::Scene& scene, std::uint32_t epoch)
                              .cloths = {}};
   for (const scene::Cloth& cloth : scene.cloths) {
     if (cloth.mesh)
-      layout.cloths.push_back({.vertexCount = cloth.nodeCount(), .triangles = trianglesOf(*cloth.mesh)});
+      layout.cloths.push_back({.vertexCount = cloth.nodeCount(),
+                               .triangles = trianglesOf(*cloth.mesh),
+                               .restPositions = coordinatesOf(*cloth.mesh)});
     else
       layout.cloths.push_back({cloth.nodeCount(), cloth.grid.rows, cloth.grid.columns});
   }

@@ -46,7 +46,9 @@ GoldenStream readStream(const nlohmann::json& json) {
   stream.layout.temporalLayers = json.value("temporalLayers", std::uint8_t{1});
   stream.layout.normals = json.at("normals") == "octahedral" ? NormalMode::octahedral : NormalMode::none;
   for (const nlohmann::json& cloth : json.at("cloths")) {
-    stream.layout.cloths.push_back({cloth.at("vertexCount"), cloth.at("rows"), cloth.at("columns")});
+    stream.layout.cloths.push_back({cloth.at("vertexCount"), cloth.at("rows"), cloth.at("columns"),
+                                    cloth.value("triangles", std::vector<std::uint32_t>{}),
+                                    cloth.value("restPositions", std::vector<float>{})});
   }
   for (const nlohmann::json& packet : json.at("packets")) {
     const std::string file = packet.at("file");
@@ -67,8 +69,10 @@ nlohmann::ordered_json describe(const GoldenStream& stream) {
       {"normals", stream.layout.normals == NormalMode::octahedral ? "octahedral" : "none"}};
   if (stream.layout.temporalLayers > 1) json["temporalLayers"] = stream.layout.temporalLayers;
   for (const ClothLayout& cloth : stream.layout.cloths) {
-    json["cloths"].push_back(
-        {{"vertexCount", cloth.vertexCount}, {"rows", cloth.rows}, {"columns", cloth.columns}});
+    nlohmann::ordered_json& described = json["cloths"].emplace_back();
+    described = {{"vertexCount", cloth.vertexCount}, {"rows", cloth.rows}, {"columns", cloth.columns}};
+    if (!cloth.triangles.empty()) described["triangles"] = cloth.triangles;
+    if (!cloth.restPositions.empty()) described["restPositions"] = cloth.restPositions;
   }
   for (const GoldenPacket& packet : stream.packets) {
     json["packets"].push_back({{"file", packet.file},

@@ -62,4 +62,16 @@ StreamLayout mixedLayout(NormalMode normals, std::uint8_t codec) {
                      {.vertexCount = 2 * 31, .rows = 2, .columns = 31}}};
 }
 
+double degreesBetween(const float* a, const float* b) {
+  double dot = 0, cross = 0;
+  for (int i = 0; i < 3; ++i) {
+    const int j = (i + 1) % 3, k = (i + 2) % 3;
+    dot += static_cast<double>(a[i]) * static_cast<double>(b[i]);
+    const double c = static_cast<double>(a[j]) * static_cast<double>(b[k]) -
+                     static_cast<double>(a[k]) * static_cast<double>(b[j]);
+    cross += c * c;
+  }
+  return std::atan2(std::sqrt(cross), dot) * 57.29577951308232;
+}
+
 }  // namespace clothstream::codec

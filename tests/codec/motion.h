@@ -24,4 +24,7 @@ MotionFrame scatter(const StreamLayout& layout, std::uint32_t seed, float extent
 // Odd-sized grids, a grid of one row, one of one vertex, a cloth that is no grid.
 StreamLayout mixedLayout(NormalMode normals, std::uint8_t codec = kCodecLatticeZstd);
 
+// Of vectors of any length.
+double degreesBetween(const float* a, const float* b);
+
 }  // namespace clothstream::codec

@@ -5,23 +5,12 @@
 
 #include <gtest/gtest.h>
 
-#include "proto/codec/lattice/octahedral.h"
+#include "proto/codec/octahedral.h"
 #include "proto/codec/vertex_normals.h"
+#include "tests/codec/motion.h"
 
 namespace clothstream::codec {
 namespace {
-
-double degreesBetween(const float* a, const float* b) {
-  double dot = 0, cross = 0;
-  for (int i = 0; i < 3; ++i) {
-    const int j = (i + 1) % 3, k = (i + 2) % 3;
-    dot += static_cast<double>(a[i]) * static_cast<double>(b[i]);
-    const double c = static_cast<double>(a[j]) * static_cast<double>(b[k]) -
-                     static_cast<double>(a[k]) * static_cast<double>(b[j]);
-    cross += c * c;
-  }
-  return std::atan2(std::sqrt(cross), dot) * 57.29577951308232;
-}
 
 TEST(Octahedral, ReturnsAnyDirectionWithinADegree) {
   // Half a step of 1/127 on either axis of the octahedron, whose face is at most sqrt(3) nearer than the

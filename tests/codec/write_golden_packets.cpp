@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: MIT
 // Writes tests/golden anew, from the project's root: only when the format changes, never to make a test pass.
+#include <algorithm>
 #include <cstdio>
 #include <exception>
 
 #include "proto/codec/decoder.h"
 #include "proto/codec/encoder.h"
+#include "tests/codec/cut_grid.h"
 #include "tests/codec/golden.h"
 #include "tests/codec/motion.h"
 
@@ -59,6 +61,22 @@ GoldenStream makeLongStream(const std::string& name, const StreamLayout& layout)
   return makeStream(name, layout, moments);
 }
 
+// A mesh beside a grid.
+GoldenStream makeMeshStream(const std::string& name) {
+  constexpr std::uint32_t kEdge = 14;
+  const ClothLayout grid{.vertexCount = kEdge * kEdge, .rows = kEdge, .columns = kEdge};
+  CutGrid mesh(kEdge);
+  const StreamLayout grids{.cloths = {grid, grid}};
+  std::vector<Moment> moments;
+  for (std::uint64_t tick = 1; tick <= 6; ++tick) {
+    MotionFrame frame = sampleMotion(grids, tick, 0.02f);
+    std::ranges::copy(mesh.renumbered(std::span(frame.positions).first(3 * grid.vertexCount)),
+                      frame.positions.begin());
+    moments.push_back({tick, tick == 1 ? PacketKind::key : PacketKind::predicted, frame});
+  }
+  return makeStream(name, {.epoch = 9, .codec = kCodecHierarchical, .cloths = {mesh.cloth(), grid}}, moments);
+}
+
 }  // namespace
 }  // namespace clothstream::codec
 
@@ -68,6 +86,8 @@ int main() try {
       {makeStream("mixed", mixedLayout(NormalMode::none)),
        makeStream("normals", mixedLayout(NormalMode::octahedral)),
        makeStream("hierarchical", mixedLayout(NormalMode::none, kCodecHierarchical)),
+       makeStream("hierarchical_normals", mixedLayout(NormalMode::octahedral, kCodecHierarchical)),
+       makeMeshStream("mesh"),
        makeStream("fine_hierarchical", {.epoch = 8,
                                         .codec = kCodecHierarchical,
                                         .maxError = 0.00002f,

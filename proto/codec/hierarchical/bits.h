@@ -29,6 +29,10 @@ class BitWriter {
     put(1, 1);
     put(shifted - std::bit_floor(shifted), width - 1);
   }
+  // How many bytes it takes up to here, the last of which may be shared with what follows.
+  std::size_t bytesSince(const std::byte* start) const {
+    return static_cast<std::size_t>(out_ - start) + (count_ > 0 ? 1 : 0);
+  }
   // Zeros up to a whole byte; where the next byte would stand.
   std::byte* finish() {
     if (count_ > 0) put(0, 8 - count_);
@@ -61,6 +65,8 @@ class BitReader {
     const unsigned width = k + extra;
     return (get(width) | 1u << width) - (1u << k);
   }
+  // The bytes that were taken from, if only in part.
+  std::size_t bytesTaken() const { return at_ - count_ / 8; }
   // All bytes were used, none was missing, and what is left of the last are zeros.
   bool atEnd() const {
     const std::size_t whole = count_ / 8;  // bytes that are pending and untouched

@@ -43,11 +43,15 @@ std::array<WeightVectors, kWeightClasses + 1> weightVectors(const Weights& weigh
   return vectors;
 }
 
-std::uint64_t hashNodes(const Predictor& predictor) {
+std::uint64_t hashNodes(const Predictor& predictor, std::span<const FacedNormal> normals) {
   ReconstructionHash hash;
   const std::span<const Node> nodes = predictor.nodes();
   for (std::size_t slot = 0; slot < nodes.size(); ++slot) {
-    hash.add(predictor.hierarchy().vertexOf[slot], nodes[slot].x, nodes[slot].y, nodes[slot].z, 0);
+    const std::uint32_t vertex = predictor.hierarchy().vertexOf[slot];
+    const Octahedral n = normals.empty() ? Octahedral{} : normals[vertex].octahedral;
+    const std::uint32_t normal =
+        static_cast<std::uint8_t>(n.u) | std::uint32_t{static_cast<std::uint8_t>(n.v)} << 8;
+    hash.add(vertex, nodes[slot].x, nodes[slot].y, nodes[slot].z, normal);
   }
   return hash.value();
 }

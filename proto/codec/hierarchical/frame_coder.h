@@ -5,6 +5,7 @@
 #include <array>
 #include <cstddef>
 
+#include "proto/codec/hierarchical/normal_prediction.h"
 #include "proto/codec/hierarchical/predictor.h"
 
 namespace clothstream::codec::hierarchical {
@@ -18,8 +19,10 @@ struct LatticeUnit {
 // as the floats that a decoder gives are off at 32 m. As many stepBits as leave room for that.
 LatticeUnit latticeUnit(float maxError);
 
-// A packet's sections: changes of the weights (empty where there are none), symbols, bits beside them.
-inline constexpr std::size_t kSections = 3;
+// A packet's sections: changes of the weights (empty where there are none), symbols, bits beside them; of the
+// latter two first what the coarse vertices take, to the byte or word that they end in, then the rest.
+inline constexpr std::size_t kSections = 5;
+enum Section : std::uint8_t { kWeightChanges, kCoarseSymbols, kFineSymbols, kCoarseBits, kFineBits };
 inline constexpr unsigned kWeightGammaBits = 4, kEscapeGammaBits = 2;
 // Stands for the first number beyond the symbols. Along the normal it is no residual: the vertex is where it
 // was in the frame before, and has no other residuals.
@@ -46,7 +49,7 @@ constexpr std::size_t endWeight(bool key) {
   return key ? kRingFeature + 1 : kFeatures;
 }
 
-// Of the newest frame; in the layout's order of vertices.
-std::uint64_t hashNodes(const Predictor& predictor);
+// Of the newest frame; in the layout's order of vertices. `normals` by vertex, or none.
+std::uint64_t hashNodes(const Predictor& predictor, std::span<const FacedNormal> normals);
 
 }  // namespace clothstream::codec::hierarchical

@@ -15,15 +15,20 @@ namespace {
 
 class HierarchicalDecoder final : public BodyDecoder {
  public:
-  bool allocate(const StreamLayout& layout) {
+  bool allocate(const StreamLayout& layout, Detail detail) {
+    layout_ = layout;
+    isCoarse_ = detail == Detail::coarse;
+    hasNormals_ = layout.normals == NormalMode::octahedral;
     unit_ = latticeUnit(layout.maxError);
-    layers_ = layout.temporalLayers;
+    if (hasNormals_ && !(normals_.allocate(layout.vertexCount()) &&
+                         newNormals_.allocate(layout.vertexCount()) && normalPrediction_.allocate(layout)))
+      return false;
     return predictor_.allocate(layout, unit_.stepBits);
   }
 
   bool decode(const ParsedPacket& packet, std::uint8_t referenceLayer) override;
   void writePositions(float* out) const override;
-  void writeNormals(float*) const override {}
+  void writeNormals(float* out) const override;
   std::uint64_t reconstructionHash() const override;
 
  private:
@@ -31,10 +36,13 @@ class HierarchicalDecoder final : public BodyDecoder {
     RansReader symbols;
     BitReader bits;
   };
+  using Vectors = std::array<WeightVectors, kWeightClasses + 1>;
 
   // Changes those of `weights` that a frame of this layer can.
   bool readWeights(std::span<const std::byte> section, bool key, std::uint8_t layer, LayerWeights& weights,
                    bool& atRest) const;
+  void decodePhases(std::size_t begin, std::size_t end, bool key, const Vectors& weights, Streams& streams);
+  void decodeNormals(Streams& streams);
   // Without a model there are no residuals.
   void decodeChunk(std::uint32_t begin, std::uint32_t count, const WeightVectors& weights,
                    const ScaleModel* model, Streams& streams);
@@ -46,9 +54,12 @@ class HierarchicalDecoder final : public BodyDecoder {
   void reconstruct(std::uint32_t begin, std::uint32_t count);
   void place(std::uint32_t slot, const Prediction& prediction, Int32x4 position, std::uint32_t magnitudes);
 
+  StreamLayout layout_;
+  bool isCoarse_ = false, hasNormals_ = false;
   LatticeUnit unit_{};
   Predictor predictor_;
-  std::uint8_t layers_ = 1;
+  NormalPrediction normalPrediction_;
+  Array<FacedNormal> normals_, newNormals_;                 // by vertex; of the frame that is being decoded
   std::array<LayerWeights, kMaxTemporalLayers> weights_{};  // that the newest frame of each layer left
   bool outside_ = false;  // a coordinate of the frame that is being decoded is beyond kMaxCoordinate
   // Of the chunk that is being decoded.
@@ -66,7 +77,7 @@ bool HierarchicalDecoder::readWeights(std::span<const std::byte> section, bool k
   if (section.empty()) return true;
   BitReader reader(section);
   atRest = reader.get(1) != 0;
-  const std::uint8_t layers = atRest ? layer : key ? 1 : layers_;
+  const std::uint8_t layers = atRest ? layer : key ? 1 : layout_.temporalLayers;
   for (; layer < layers; ++layer) {
     for (std::size_t c = 0; c < kWeightClasses; ++c) {
       if (reader.get(1) == 0) continue;
@@ -86,29 +97,75 @@ bool HierarchicalDecoder::decode(const ParsedPacket& packet, std::uint8_t refere
   if (header.sectionCount != kSections) return false;
   const bool key = header.kind == PacketKind::key;
   const std::uint8_t layer = header.temporalLayer;
-  const std::size_t weightBytes = header.sectionBytes[0], symbolBytes = header.sectionBytes[1];
+  const auto& bytes = header.sectionBytes;
+  const std::span<const std::byte> changes = packet.body.first(bytes[kWeightChanges]);
+  const std::span<const std::byte> symbols =
+      packet.body.subspan(changes.size(), std::size_t{bytes[kCoarseSymbols]} + bytes[kFineSymbols]);
+  const std::span<const std::byte> bits = packet.body.subspan(changes.size() + symbols.size());
   LayerWeights weights = weights_[referenceLayer];
   if (key) weights.fill(keyFrameWeights());
   bool atRest;
-  if (!readWeights(packet.body.first(weightBytes), key, layer, weights, atRest)) return false;
-  const auto vectors = weightVectors(atRest ? Weights{} : weights[layer]);
-  Streams streams{RansReader(packet.body.subspan(weightBytes, symbolBytes)),
-                  BitReader(packet.body.subspan(weightBytes + symbolBytes))};
+  if (!readWeights(changes, key, layer, weights, atRest)) return false;
+  const Vectors vectors = weightVectors(atRest ? Weights{} : weights[layer]);
+  Streams streams{RansReader(isCoarse_ ? symbols.first(bytes[kCoarseSymbols]) : symbols),
+                  BitReader(isCoarse_ ? bits.first(bytes[kCoarseBits]) : bits)};
   outside_ = false;
   predictor_.begin(key, referenceLayer);
-  for (const Phase& phase : predictor_.hierarchy().phases) {
-    const ScaleModel model(kScaleWeights[scaleClassOf(phase.weightClass, key)]);
-    const bool quiet = streams.bits.get(1) != 0;
-    for (std::uint32_t begin = phase.begin; begin < phase.end; begin += kChunk) {
-      decodeChunk(begin, std::min(kChunk, phase.end - begin), vectors[phase.weightClass],
-                  quiet ? nullptr : &model, streams);
-    }
+  const Hierarchy& hierarchy = predictor_.hierarchy();
+  decodePhases(0, hierarchy.coarsePhases, key, vectors, streams);
+  if (streams.symbols.bytesTaken() != bytes[kCoarseSymbols] ||
+      streams.bits.bytesTaken() != bytes[kCoarseBits])
+    return false;
+  if (isCoarse_) {
+    if (outside_) return false;
+    predictor_.interpolate(hierarchy.coarseVertices, static_cast<std::uint32_t>(hierarchy.vertexOf.size()));
+    predictor_.keep(layer, hierarchy.coarseVertices);
+  } else {
+    decodePhases(hierarchy.coarsePhases, hierarchy.phases.size(), key, vectors, streams);
+    if (outside_) return false;
+    if (hasNormals_) decodeNormals(streams);
+    if (!streams.symbols.atEnd() || !streams.bits.atEnd()) return false;
+    if (hasNormals_) std::swap(normals_, newNormals_);
+    predictor_.keep(layer);
   }
-  if (outside_ || !streams.symbols.atEnd() || !streams.bits.atEnd()) return false;
-  predictor_.keep(layer);
   if (key) weights.fill(startingWeights());
   weights_[layer] = weights;
   return true;
+}
+
+void HierarchicalDecoder::decodePhases(std::size_t begin, std::size_t end, bool key, const Vectors& weights,
+                                       Streams& streams) {
+  for (std::size_t i = begin; i < end; ++i) {
+    const Phase& phase = predictor_.hierarchy().phases[i];
+    const ScaleModel model(kScaleWeights[scaleClassOf(phase.weightClass, key)]);
+    const bool quiet = streams.bits.get(1) != 0;
+    for (std::uint32_t first = phase.begin; first < phase.end; first += kChunk) {
+      decodeChunk(first, std::min(kChunk, phase.end - first), weights[phase.weightClass],
+                  quiet ? nullptr : &model, streams);
+    }
+  }
+}
+
+// They are the last symbols and bits of a packet.
+void HierarchicalDecoder::decodeNormals(Streams& streams) {
+  const std::span<const FacedNormal> predicted = normalPrediction_.predict(layout_, predictor_);
+  std::array<NormalScale, 2> scales;
+  for (std::size_t vertex = 0; vertex < predicted.size(); ++vertex) {
+    std::array<std::int32_t, 2> residuals;
+    for (std::size_t c = 0; c < 2; ++c) {
+      const std::uint32_t scale = scales[c].scale();
+      std::uint32_t number = streams.symbols.read<false>((2 * vertex + c) % kCoders,
+                                                         symbolTables()[distributionOf(kAlongU, scale)]);
+      if (number == kEscape) number += streams.bits.getGamma(kEscapeGammaBits);
+      if (const unsigned raw = rawBits(scale); raw > 0) number = number << raw | streams.bits.get(raw);
+      residuals[c] = unzigzag(number);
+      scales[c].add(residuals[c]);
+    }
+    const FacedNormal& expected = predicted[vertex];
+    newNormals_[vertex] = {{static_cast<std::int8_t>(expected.octahedral.u + residuals[0]),
+                            static_cast<std::int8_t>(expected.octahedral.v + residuals[1])},
+                           expected.top};
+  }
 }
 
 void HierarchicalDecoder::decodeChunk(std::uint32_t begin, std::uint32_t count, const WeightVectors& weights,
@@ -229,7 +286,12 @@ void HierarchicalDecoder::writePositions(float* out) const {
 }
 
 std::uint64_t HierarchicalDecoder::reconstructionHash() const {
-  return hashNodes(predictor_);
+  return hashNodes(predictor_, {normals_.data(), normals_.size()});
+}
+
+void HierarchicalDecoder::writeNormals(float* out) const {
+  for (std::size_t vertex = 0; vertex < normals_.size(); ++vertex)
+    unfaceNormal(normals_[vertex], out + 3 * vertex);
 }
 
 }  // namespace
@@ -237,10 +299,10 @@ std::uint64_t HierarchicalDecoder::reconstructionHash() const {
 
 namespace clothstream::codec {
 
-std::unique_ptr<BodyDecoder> makeHierarchicalDecoder(const StreamLayout& layout) {
+std::unique_ptr<BodyDecoder> makeHierarchicalDecoder(const StreamLayout& layout, Detail detail) {
   using hierarchical::HierarchicalDecoder;
   std::unique_ptr<HierarchicalDecoder> decoder(new (std::nothrow) HierarchicalDecoder);
-  if (decoder == nullptr || !decoder->allocate(layout)) return nullptr;
+  if (decoder == nullptr || !decoder->allocate(layout, detail)) return nullptr;
   return decoder;
 }
 

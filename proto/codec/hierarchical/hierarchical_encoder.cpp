@@ -53,16 +53,19 @@ std::int32_t nearest(float value) {
 }  // namespace
 
 struct HierarchicalEncoder::State {
-  explicit State(const StreamLayout& layout)
-      : vertices(layout.vertexCount()),
+  explicit State(const StreamLayout& streamLayout)
+      : layout(streamLayout),
+        vertices(layout.vertexCount()),
         layers(layout.temporalLayers),
+        hasNormals(layout.normals == NormalMode::octahedral),
         unit(latticeUnit(layout.maxError)),
         wanted(vertices),
         stillFrames(vertices),
-        symbols(kComponents * vertices),
-        extra((kComponents * kMaxExtraBytes + 1) * vertices + kMaxExtraBytes),
-        fitters(layers) {
-    if (!predictor.allocate(layout, unit.stepBits))
+        symbols((kComponents + (hasNormals ? 2 : 0)) * vertices),
+        extra(((kComponents + (hasNormals ? 2 : 0)) * kMaxExtraBytes + 1) * vertices + kMaxExtraBytes),
+        fitters(layers),
+        sentNormals(hasNormals ? vertices : 0) {
+    if (!predictor.allocate(layout, unit.stepBits) || (hasNormals && !normalPrediction.allocate(layout)))
       std::abort();  // memory is out, as of any other allocation here
     for (const Phase& phase : predictor.hierarchy().phases)
       classSizes[phase.weightClass] += phase.end - phase.begin;
@@ -98,10 +101,13 @@ struct HierarchicalEncoder::State {
   void fitTo(std::uint32_t weightClass, const FeatureVectors& features, const Prediction& prediction,
              Int32x4 target, std::size_t i);
   void code(Component component, std::uint32_t scale, std::size_t i, std::size_t coder, BitWriter& bits);
+  void encodeNormals(std::span<const float> normals, BitWriter& bits);
   void note(const Prediction& prediction, std::uint32_t weightClass, std::size_t i);
 
+  StreamLayout layout;
   std::size_t vertices;
   std::uint8_t layers;
+  bool hasNormals;
   LatticeUnit unit;
   Predictor predictor;
   std::array<std::uint32_t, kWeightClasses + 1> classSizes{};
@@ -112,6 +118,8 @@ struct HierarchicalEncoder::State {
   std::uint32_t restsLeft = 0;            // that may start in this frame
   RansWriter symbols;
   std::vector<std::byte> extra;
+  // Of these, what coarse vertices take.
+  std::size_t coarseSymbols = 0, coarseBytes = 0;
   std::vector<WeightFitter> fitters;                    // by layer
   std::array<LayerWeights, kMaxTemporalLayers> kept{};  // that the newest frame of each layer left
   LayerWeights weights{};                               // that this one leaves
@@ -120,6 +128,8 @@ struct HierarchicalEncoder::State {
   std::uint32_t frame = 0;  // since the key frame
   std::uint8_t layer = 0;
   bool quiet = false;  // no residual in the newest frame
+  NormalPrediction normalPrediction;
+  std::vector<FacedNormal> sentNormals;  // by vertex
   std::vector<CodedResidual>* recorded = nullptr;
   // Of the chunk that is being encoded.
   std::array<Prediction, kChunk> predictions;
@@ -312,7 +322,13 @@ void HierarchicalEncoder::State::attempt() {
 void HierarchicalEncoder::State::encodePhases(BitWriter& bits) {
   symbols.shrink(0);
   quiet = true;
-  for (const Phase& phase : predictor.hierarchy().phases) encodePhase(phase, bits);
+  const Hierarchy& hierarchy = predictor.hierarchy();
+  for (std::size_t i = 0; i < hierarchy.phases.size(); ++i) {
+    encodePhase(hierarchy.phases[i], bits);
+    if (i + 1 != hierarchy.coarsePhases) continue;
+    coarseSymbols = symbols.count();
+    coarseBytes = bits.bytesSince(extra.data());
+  }
 }
 
 // What is wanted in the same place for some frames is pinned, it seems: it is to stand still. To say so takes
@@ -446,6 +462,29 @@ void HierarchicalEncoder::State::code(Component component, std::uint32_t scale, 
   symbols.add(coder, distributionOf(component, scale), symbol);
 }
 
+void HierarchicalEncoder::State::encodeNormals(std::span<const float> normals, BitWriter& bits) {
+  const std::span<const FacedNormal> predicted = normalPrediction.predict(layout, predictor);
+  std::array<NormalScale, 2> scales;
+  for (std::size_t vertex = 0; vertex < vertices; ++vertex) {
+    const FacedNormal& expected = predicted[vertex];
+    const FacedNormal actual = faceNormal(&normals[3 * vertex], expected.top);
+    sentNormals[vertex] = actual;
+    const std::array<int, 2> differences{actual.octahedral.u - expected.octahedral.u,
+                                         actual.octahedral.v - expected.octahedral.v};
+    for (std::size_t c = 0; c < 2; ++c) {
+      const auto residual = static_cast<std::int8_t>(differences[c]);
+      const std::uint32_t scale = scales[c].scale();
+      const unsigned raw = rawBits(scale);
+      const std::uint32_t number = zigzag(residual);
+      const std::uint32_t symbol = std::min(number >> raw, kEscape);
+      if (symbol == kEscape) bits.putGamma((number >> raw) - kEscape, kEscapeGammaBits);
+      if (raw > 0) bits.put(number & ((1u << raw) - 1), raw);
+      symbols.add((2 * vertex + c) % kCoders, distributionOf(kAlongU, scale), symbol);
+      scales[c].add(residual);
+    }
+  }
+}
+
 void HierarchicalEncoder::State::fitTo(std::uint32_t weightClass, const FeatureVectors& features,
                                        const Prediction& prediction, Int32x4 target, std::size_t i) {
   const auto& w = used[weightClass];
@@ -489,7 +528,7 @@ std::size_t HierarchicalEncoder::packetBound() const {
 }
 
 std::size_t HierarchicalEncoder::encode(const FrameRole& role, std::span<const float> positions,
-                                        std::span<const float>, std::span<std::byte> out) {
+                                        std::span<const float> normals, std::span<std::byte> out) {
   State& s = *state_;
   const bool key = role.kind == PacketKind::key;
   s.frame = key ? 0 : s.frame + 1;
@@ -510,27 +549,32 @@ std::size_t HierarchicalEncoder::encode(const FrameRole& role, std::span<const f
   s.restsLeft = key || role.layer > 0 ? 0 : kMostRests;
   if (key) s.attempt();
   std::size_t end = bodyStart + s.writeWeights(role, out.data() + bodyStart);
-  header.sectionBytes[0] = static_cast<std::uint32_t>(end - bodyStart);
+  header.sectionBytes[kWeightChanges] = static_cast<std::uint32_t>(end - bodyStart);
   BitWriter bits(s.extra.data());
   s.encodePhases(bits);
+  if (s.hasNormals) s.encodeNormals(normals, bits);
   s.predictor.keep(role.layer);
   if (key) {
     s.weights.fill(startingWeights());
     for (WeightFitter& fitter : s.fitters) fitter.clear();
   }
   s.kept[role.layer] = s.weights;
-  header.sectionBytes[1] = static_cast<std::uint32_t>(s.symbols.write(out.data() + end));
-  end += header.sectionBytes[1];
-  header.sectionBytes[2] = static_cast<std::uint32_t>(bits.finish() - s.extra.data());
-  std::memcpy(out.data() + end, s.extra.data(), header.sectionBytes[2]);
-  end += header.sectionBytes[2];
+  const RansWriter::Written symbols = s.symbols.write(out.data() + end, s.coarseSymbols);
+  header.sectionBytes[kCoarseSymbols] = static_cast<std::uint32_t>(symbols.firstBytes);
+  header.sectionBytes[kFineSymbols] = static_cast<std::uint32_t>(symbols.bytes - symbols.firstBytes);
+  end += symbols.bytes;
+  const auto extraBytes = static_cast<std::size_t>(bits.finish() - s.extra.data());
+  header.sectionBytes[kCoarseBits] = static_cast<std::uint32_t>(s.coarseBytes);
+  header.sectionBytes[kFineBits] = static_cast<std::uint32_t>(extraBytes - s.coarseBytes);
+  std::memcpy(out.data() + end, s.extra.data(), extraBytes);
+  end += extraBytes;
   const std::size_t headerBytes = writeHeader(header, out);
   std::memmove(out.data() + headerBytes, out.data() + bodyStart, end - bodyStart);
   return headerBytes + (end - bodyStart);
 }
 
 std::uint64_t HierarchicalEncoder::reconstructionHash() const {
-  return hashNodes(state_->predictor);
+  return hashNodes(state_->predictor, state_->sentNormals);
 }
 
 void HierarchicalEncoder::record(std::vector<CodedResidual>* residuals) {

@@ -6,7 +6,7 @@
 #include <bit>
 #include <cstdint>
 
-#include <simde/x86/sse2.h>
+#include <simde/x86/sse4.1.h>
 
 namespace clothstream::codec::hierarchical {
 
@@ -25,6 +25,9 @@ struct Int32x4 {
   static Int32x4 all(std::int32_t value) { return {simde_mm_set1_epi32(value)}; }
   friend Int32x4 operator+(Int32x4 a, Int32x4 b) { return {simde_mm_add_epi32(a.v, b.v)}; }
   friend Int32x4 operator-(Int32x4 a, Int32x4 b) { return {simde_mm_sub_epi32(a.v, b.v)}; }
+  friend Int32x4 operator*(Int32x4 a, std::int32_t b) {
+    return {simde_mm_mullo_epi32(a.v, simde_mm_set1_epi32(b))};
+  }
   // Keeps the sign.
   Int32x4 shiftedRight(int bits) const { return {simde_mm_sra_epi32(v, simde_mm_cvtsi32_si128(bits))}; }
   Int32x4 shiftedLeft(int bits) const { return {simde_mm_sll_epi32(v, simde_mm_cvtsi32_si128(bits))}; }

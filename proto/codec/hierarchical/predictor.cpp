@@ -76,9 +76,19 @@ Int32x4 Predictor::reconstruct(const Prediction& prediction, const std::int32_t*
   return Int32x4::load(position);
 }
 
-void Predictor::keep(std::uint8_t layer) {
+void Predictor::interpolate(std::uint32_t begin, std::uint32_t end) {
+  for (std::uint32_t slot = begin; slot < end; ++slot) {
+    const Surroundings around = surroundingsOf(slot);
+    const Int32x4 ring = (around.ringSum + Int32x4::all(4)).shiftedRight(3) - around.average;
+    const Int32x4 position = around.average - (ring + ring + ring).shiftedRight(4);
+    position.store(&nodes_[slot].x);
+    nodes_[slot].magnitudes = 0;
+  }
+}
+
+void Predictor::keep(std::uint8_t layer, std::size_t slots) {
   const Node* nodes = nodes_;
-  for (std::size_t slot = 0; slot < hierarchy_.vertexOf.size(); ++slot) {
+  for (std::size_t slot = 0; slot < slots; ++slot) {
     const Nearest& nearest = hierarchy_.nearest[slot];
     const Int32x4 sum = nodes[nearest[0]].load() + nodes[nearest[1]].load() + nodes[nearest[2]].load() +
                         nodes[nearest[3]].load();

@@ -102,16 +102,27 @@ class Predictor {
   // The position to which these residuals lead, whatever they are.
   Int32x4 reconstruct(const Prediction& prediction, const std::int32_t* residual) const;
   void place(std::uint32_t slot, const Prediction& prediction, Int32x4 position, std::uint32_t magnitudes);
-  // The frame is now the newest one of that layer.
-  void keep(std::uint8_t layer);
+  // In place of predict() and place(): to where the vertices lie between the others by this frame alone.
+  void interpolate(std::uint32_t begin, std::uint32_t end);
+  // The frame is now the newest one of that layer; of the first so many slots, if nothing refers to the
+  // others.
+  void keep(std::uint8_t layer, std::size_t slots);
+  void keep(std::uint8_t layer) { keep(layer, hierarchy_.vertexOf.size()); }
 
   // In coding order, of the newest frame that was kept, and of the one that this one refers to (of no meaning
   // in a key frame).
   std::span<const Node> nodes() const { return {moments_[newest_].nodes.data(), hierarchy_.vertexOf.size()}; }
+  // Of the frame that is being made.
+  std::span<const Node> made() const { return {nodes_, hierarchy_.vertexOf.size()}; }
   std::span<const Node> reference() const { return {pastNodes_, hierarchy_.vertexOf.size()}; }
 
  private:
   std::array<Int16x8, kPlainPairs> plainFeatures(const Record& past, const Prediction& prediction) const;
+  struct Surroundings {
+    std::array<Int32x4, 4> parents;
+    Int32x4 parentSum, average, ringSum;
+  };
+  Surroundings surroundingsOf(std::uint32_t slot) const;
   void look(std::uint32_t slot, Prediction& out, Int32x4& first, Int32x4& second) const;
 
   Hierarchy hierarchy_;
@@ -135,23 +146,40 @@ class Predictor {
   Record* records_ = nullptr;
 };
 
-// All but the frame and what follows from it. `first` and `second` span the surface.
-inline void Predictor::look(std::uint32_t slot, Prediction& out, Int32x4& first, Int32x4& second) const {
+// The same as of four equal weights, where they are equal.
+inline Int32x4 weightedAverage(const std::array<std::int16_t, 4>& weights, Int32x4 p0, Int32x4 p1, Int32x4 p2,
+                               Int32x4 p3) {
+  const Int32x4 sum = (p1 - p0) * weights[1] + (p2 - p0) * weights[2] + (p3 - p0) * weights[3];
+  return p0 + (sum + Int32x4::all(1 << (kParentBits - 1))).shiftedRight(kParentBits);
+}
+
+inline Predictor::Surroundings Predictor::surroundingsOf(std::uint32_t slot) const {
   const Neighbours& neighbours = hierarchy_.neighbours[slot];
   const Node* nodes = nodes_;
   const Int32x4 p0 = nodes[neighbours.parents[0]].load(), p1 = nodes[neighbours.parents[1]].load();
   const Int32x4 p2 = nodes[neighbours.parents[2]].load(), p3 = nodes[neighbours.parents[3]].load();
-  const Int32x4 pair = p0 + p1, otherPair = p2 + p3, sum = pair + otherPair;
+  const Int32x4 sum = (p0 + p1) + (p2 + p3);
   Int32x4 ringSum = nodes[neighbours.ring[0]].load();
   for (std::size_t i = 1; i < 8; ++i) ringSum = ringSum + nodes[neighbours.ring[i]].load();
-  const Int32x4 average = (sum + Int32x4::all(2)).shiftedRight(2);
+  // Of a grid all but borders.
+  const bool isEven = neighbours.weights == kEqualWeights;
+  const Int32x4 average =
+      isEven ? (sum + Int32x4::all(2)).shiftedRight(2) : weightedAverage(neighbours.weights, p0, p1, p2, p3);
+  return {{p0, p1, p2, p3}, sum, average, ringSum};
+}
+
+// All but the frame and what follows from it. `first` and `second` span the surface.
+inline void Predictor::look(std::uint32_t slot, Prediction& out, Int32x4& first, Int32x4& second) const {
+  const Surroundings around = surroundingsOf(slot);
+  const auto& [p0, p1, p2, p3] = around.parents;
+  const Int32x4 average = around.average;
   out.average = average;
-  out.parentMagnitudes = static_cast<std::uint32_t>(sum.fourth());
-  out.ringMagnitudes = static_cast<std::uint32_t>(ringSum.fourth());
+  out.parentMagnitudes = static_cast<std::uint32_t>(around.parentSum.fourth());
+  out.ringMagnitudes = static_cast<std::uint32_t>(around.ringSum.fourth());
   first = p1 - p0;
   second = p3 - p2;
-  const Int32x4 ring = ((ringSum + Int32x4::all(4)).shiftedRight(3) - average).shiftedRight(fineBits_);
-  const Int32x4 twist = (pair - otherPair).shiftedRight(2 + fineBits_);
+  const Int32x4 ring = ((around.ringSum + Int32x4::all(4)).shiftedRight(3) - average).shiftedRight(fineBits_);
+  const Int32x4 twist = ((p0 + p1) - (p2 + p3)).shiftedRight(2 + fineBits_);
   out.twistAndRing = narrow(twist, ring);
 
   const Record& past = pastRecords_[slot * stride_];

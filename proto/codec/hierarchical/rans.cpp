@@ -19,15 +19,16 @@ const std::array<SymbolTable, 2 * kScales>& symbolTables() {
   return tables;
 }
 
-std::size_t RansWriter::write(std::byte* out) {
-  if (count_ == 0) return 0;
+RansWriter::Written RansWriter::write(std::byte* out, std::size_t firstSymbols) {
+  if (count_ == 0) return {0, 0};
   const std::array<SymbolTable, 2 * kScales>& tables = symbolTables();
   std::array<std::uint32_t, kCoders> states;
   states.fill(kLowestState);
   std::uint16_t* const end = words_.data() + words_.size();
-  std::uint16_t* first = end;
+  std::uint16_t *first = end, *firstEnd = end;
   // The last symbol first: a reader takes them in the order of add().
   for (std::size_t i = count_; i-- > 0;) {
+    if (i + 1 == firstSymbols) firstEnd = first;
     const std::uint32_t entry = entries_[i], symbol = entry & (kSymbols - 1);
     std::uint32_t& state = states[entry >> kCoderShift];
     const SymbolTable& table = tables[entry >> kTableShift & ((1u << (kCoderShift - kTableShift)) - 1)];
@@ -48,8 +49,10 @@ std::size_t RansWriter::write(std::byte* out) {
     put(state);
     put(state >> 16);
   }
+  if (firstSymbols == 0) firstEnd = first;
+  const auto wordsOfFirst = static_cast<std::size_t>(firstEnd - first);
   for (; first != end; ++first) put(*first);
-  return static_cast<std::size_t>(to - out);
+  return {static_cast<std::size_t>(to - out), 4 * kCoders + 2 * wordsOfFirst};
 }
 
 }  // namespace clothstream::codec::hierarchical

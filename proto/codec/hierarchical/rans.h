@@ -76,6 +76,7 @@ class RansReader {
     return symbol;
   }
 
+  std::size_t bytesTaken() const { return at_; }
   // All of it was read, and nothing beyond.
   bool atEnd() const {
     bool end = at_ == bytes_.size();
@@ -127,7 +128,11 @@ class RansWriter {
 
   // Bytes that write() writes at most; it writes none where there is no symbol.
   std::size_t bound() const { return 4 * kCoders + 2 * words_.size(); }
-  std::size_t write(std::byte* out);
+  struct Written {
+    std::size_t bytes, firstBytes;
+  };
+  // All of them; and how many bytes a reader takes for the first `firstSymbols`.
+  Written write(std::byte* out, std::size_t firstSymbols);
 
  private:
   static constexpr int kTableShift = 4, kCoderShift = 10;

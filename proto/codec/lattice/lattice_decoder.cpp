@@ -10,9 +10,9 @@
 #include "proto/codec/array.h"
 #include "proto/codec/body.h"
 #include "proto/codec/lattice/lattice.h"
-#include "proto/codec/lattice/octahedral.h"
 #include "proto/codec/lattice/prediction.h"
 #include "proto/codec/lattice/residual_planes.h"
+#include "proto/codec/octahedral.h"
 #include "proto/codec/reconstruction_hash.h"
 
 namespace clothstream::codec {

@@ -97,6 +97,8 @@ BenchMotion simulated(vulkan::Device& device, const Named& named, const Settings
     layout.rows = layout.columns = 0;
     for (const scene::Triangle& triangle : cloth.mesh->shape.triangles)
       layout.triangles.insert(layout.triangles.end(), triangle.begin(), triangle.end());
+    for (const scene::Vec3& position : cloth.mesh->shape.positions)
+      layout.restPositions.insert(layout.restPositions.end(), {position.x(), position.y(), position.z()});
   }
   return {named.name, layout,
           [&device, scene, warmUp = named.warmUp, frames = settings.frames](const auto& use) {

@@ -4,7 +4,7 @@
 #include "tests/bench/codec/bench_motion.h"
 #include "tests/bench/codec/codec_measurement.h"
 #include "tests/bench/codec/our_codec.h"
-#include "tests/bench/cut_grid.h"
+#include "tests/codec/cut_grid.h"
 
 namespace clothstream::bench {
 namespace {
@@ -45,15 +45,16 @@ Rows runCodec(vulkan::Device& device, const Settings& settings) {
          ++layout.temporalLayers)
       asItIs.add(layout);
     layout.temporalLayers = 1;
-    layout.codec = codec::kCodecLatticeZstd;
-    asItIs.add(layout);
     layout.normals = codec::NormalMode::octahedral;
     asItIs.add(layout);
+    layout.codec = codec::kCodecLatticeZstd;
+    asItIs.add(layout);
     layout.normals = codec::NormalMode::none;
+    asItIs.add(layout);
     layout.codec = codec::kCodecHierarchical;
     // A grid that is square can be cut.
     const bool square = motion.cloth.rows > 0 && motion.cloth.rows == motion.cloth.columns;
-    CutGrid cut(square ? motion.cloth.rows : 1);
+    codec::CutGrid cut(square ? motion.cloth.rows : 1);
     Measured asAMesh(cut.cloth());
     layout.cloths = {cut.cloth()};
     if (square) asAMesh.add(layout);

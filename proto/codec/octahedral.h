@@ -13,8 +13,10 @@ struct Octahedral {
   std::int8_t u = 0, v = 0;
 };
 
-// `normal`: 3 floats, about unit length. Within 0.6 degrees.
+// `normal`: 3 floats, about unit length. Within a degree.
 Octahedral encodeOctahedral(const float* normal);
+// Of a vector of any length, each component 2^15 at most.
+Octahedral encodeOctahedral(std::int32_t x, std::int32_t y, std::int32_t z);
 
 // Unit length. Any bytes give a unit vector.
 void decodeOctahedral(Octahedral octahedral, float* normal);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Unit normals as two signed bytes on the unfolded octahedron.
-#include "proto/codec/lattice/octahedral.h"
+#include "proto/codec/octahedral.h"
 
 #include <cmath>
 #include <cstdlib>
@@ -27,7 +27,10 @@ std::int8_t component(std::int32_t magnitude, std::int32_t sum, std::int32_t sig
 }  // namespace
 
 Octahedral encodeOctahedral(const float* normal) {
-  const std::int32_t x = fixedPoint(normal[0]), y = fixedPoint(normal[1]), z = fixedPoint(normal[2]);
+  return encodeOctahedral(fixedPoint(normal[0]), fixedPoint(normal[1]), fixedPoint(normal[2]));
+}
+
+Octahedral encodeOctahedral(std::int32_t x, std::int32_t y, std::int32_t z) {
   const std::int32_t sum = std::abs(x) + std::abs(y) + std::abs(z);
   if (sum == 0) return {};
   if (z < 0) return {component(sum - std::abs(y), sum, x), component(sum - std::abs(x), sum, y)};

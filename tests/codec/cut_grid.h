@@ -8,7 +8,7 @@
 
 #include "proto/codec/stream_layout.h"
 
-namespace clothstream::bench {
+namespace clothstream::codec {
 
 // Each quad is cut one way or the other and the vertices are numbered in any order; a function of the size.
 class CutGrid {
@@ -25,4 +25,4 @@ class CutGrid {
   std::vector<float> positions_;
 };
 
-}  // namespace clothstream::bench
+}  // namespace clothstream::codec

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
 // A grid as a mesh.
-#include "tests/bench/cut_grid.h"
+#include "tests/codec/cut_grid.h"
 
 #include <algorithm>
 #include <numeric>
 #include <random>
 
-namespace clothstream::bench {
+namespace clothstream::codec {
 
 CutGrid::CutGrid(std::uint32_t edge)
     : cloth_{.vertexCount = edge * edge}, numbers_(edge * edge), positions_(3 * std::size_t{edge} * edge) {
@@ -25,6 +25,12 @@ CutGrid::CutGrid(std::uint32_t edge)
         triangles.insert(triangles.end(), {a, c, d, a, d, b});
     }
   }
+  cloth_.restPositions.resize(3 * numbers_.size());
+  for (std::uint32_t i = 0; i < numbers_.size(); ++i) {
+    float* place = &cloth_.restPositions[3 * std::size_t{numbers_[i]}];
+    place[0] = static_cast<float>(i % edge);
+    place[1] = static_cast<float>(i / edge);
+  }
 }
 
 std::span<const float> CutGrid::renumbered(std::span<const float> positions) {
@@ -33,4 +39,4 @@ std::span<const float> CutGrid::renumbered(std::span<const float> positions) {
   return positions_;
 }
 
-}  // namespace clothstream::bench
+}  // namespace clothstream::codec
