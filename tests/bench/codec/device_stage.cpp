@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Suite codec: size and cost of the frames of a curtain that a sphere swings through.
+// Suite codec_device: what the device's part of a frame costs, of a curtain that a sphere swings through.
 #include <algorithm>
 #include <stdexcept>
 #include <string>
@@ -66,7 +66,7 @@ nlohmann::ordered_json measure(vulkan::Device& device, const scene::Scene& scene
   }
   const double vertices = scene.nodeCount();
   nlohmann::ordered_json row{
-      {"suite", "codec"},
+      {"suite", "codec_device"},
       {"nodes", scene.nodeCount()},
       {"kind", kind == codec::PacketKind::key ? "key" : "predicted"},
       {"normals", layout.normals == codec::NormalMode::none ? "none" : "octahedral"},
@@ -83,7 +83,7 @@ nlohmann::ordered_json measure(vulkan::Device& device, const scene::Scene& scene
 
 }  // namespace
 
-Rows runCodec(vulkan::Device& device, const Settings& settings) {
+Rows runCodecDevice(vulkan::Device& device, const Settings& settings) {
   Rows rows;
   for (const scene::Normals normals : {scene::Normals::none, scene::Normals::octahedral}) {
     for (const codec::PacketKind kind : {codec::PacketKind::predicted, codec::PacketKind::key}) {
