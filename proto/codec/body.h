@@ -52,6 +52,6 @@ class BodyEncoder {
 std::unique_ptr<BodyDecoder> makeLatticeDecoder(const StreamLayout& layout);
 std::unique_ptr<BodyDecoder> makeHierarchicalDecoder(const StreamLayout& layout, Detail detail);
 std::unique_ptr<BodyEncoder> makeLatticeEncoder(const StreamLayout& layout);
-std::unique_ptr<BodyEncoder> makeHierarchicalEncoder(const StreamLayout& layout);
+std::unique_ptr<BodyEncoder> makeHierarchicalEncoder(const StreamLayout& layout, std::uint32_t weightLag);
 
 }  // namespace clothstream::codec

@@ -20,11 +20,12 @@ struct Encoder::State {
   std::uint64_t frame = 0;  // the next one's number since the key frame; 0: it is a key frame
 };
 
-std::unique_ptr<Encoder> Encoder::make(const StreamLayout& layout) {
+std::unique_ptr<Encoder> Encoder::make(const StreamLayout& layout, const EncoderOptions& options) {
   if (!isPossible(layout)) return nullptr;
+  assert(options.weightLag == 0 || layout.temporalLayers == 1);
   auto state = std::make_unique<State>();
-  state->body =
-      layout.codec == kCodecLatticeZstd ? makeLatticeEncoder(layout) : makeHierarchicalEncoder(layout);
+  state->body = layout.codec == kCodecLatticeZstd ? makeLatticeEncoder(layout)
+                                                  : makeHierarchicalEncoder(layout, options.weightLag);
   state->floats = 3 * std::size_t{layout.vertexCount()};
   state->layers = layout.temporalLayers;
   state->hasNormals = layout.normals == NormalMode::octahedral;

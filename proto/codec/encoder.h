@@ -12,11 +12,18 @@
 
 namespace clothstream::codec {
 
+struct EncoderOptions {
+  // Codec 2, one temporal layer: the weights of a frame are fitted to the frames that are so many or more
+  // before it, and a key frame's to an earlier one's, as they are where frames are prepared before those
+  // before them are coded. 0: all frames before it, and itself. For any of them a decoder is the same.
+  std::uint32_t weightLag = 0;
+};
+
 // One encoder a stream; not thread-safe. Memory is taken once, at construction.
 class Encoder {
  public:
   // nullptr if the layout is impossible (stream_layout.h).
-  static std::unique_ptr<Encoder> make(const StreamLayout& layout);
+  static std::unique_ptr<Encoder> make(const StreamLayout& layout, const EncoderOptions& options = {});
   ~Encoder();
   Encoder(const Encoder&) = delete;
   Encoder& operator=(const Encoder&) = delete;

@@ -27,8 +27,12 @@ class EncodeStage {
 std::unique_ptr<EncodeStage> makeLatticeStage(const vulkan::Device& device,
                                               const simulation::ClothSimulation& simulation,
                                               const codec::StreamLayout& layout);
-std::unique_ptr<EncodeStage> makeHierarchicalStage(const vulkan::Device& device,
-                                                   const simulation::ClothSimulation& simulation,
-                                                   const codec::StreamLayout& layout);
+std::unique_ptr<EncodeStage> makeHierarchicalHostStage(const vulkan::Device& device,
+                                                       const simulation::ClothSimulation& simulation,
+                                                       const codec::StreamLayout& layout);
+// Throws std::runtime_error where DevicePredictor does not support it.
+std::unique_ptr<EncodeStage> makeHierarchicalDeviceStage(const vulkan::Device& device,
+                                                         const simulation::ClothSimulation& simulation,
+                                                         const codec::StreamLayout& layout);
 
 }  // namespace clothstream::encode

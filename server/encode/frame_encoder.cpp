@@ -6,6 +6,7 @@
 #include <atomic>
 #include <cassert>
 
+#include "server/encode/device_predictor.h"
 #include "server/encode/encode_stage.h"
 #include "server/scene/mesh.h"
 
@@ -66,10 +67,15 @@ struct FrameEncoder::State {
 };
 
 FrameEncoder::FrameEncoder(const vulkan::Device& device, const simulation::ClothSimulation& simulation,
-                           const codec::StreamLayout& layout)
+                           const codec::StreamLayout& layout, Prediction prediction)
     : state_(std::make_unique<State>()) {
   assert(layout.vertexCount() == simulation.nodeCount());
-  const auto make = layout.codec == codec::kCodecLatticeZstd ? makeLatticeStage : makeHierarchicalStage;
+  const bool onDevice = prediction == Prediction::automatic
+                            ? !device.isSoftware() && DevicePredictor::supports(device, layout)
+                            : prediction == Prediction::onDevice;
+  const auto make = layout.codec == codec::kCodecLatticeZstd ? makeLatticeStage
+                    : onDevice                               ? makeHierarchicalDeviceStage
+                                                             : makeHierarchicalHostStage;
   state_->stage = make(device, simulation, layout);
 }
 

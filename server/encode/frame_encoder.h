@@ -18,6 +18,15 @@ namespace clothstream::encode {
 // The layout of a scene's stream. Codec 2, but where normals are sent, which only codec 1 does.
 codec::StreamLayout streamLayout(const scene::Scene& scene, std::uint32_t epoch);
 
+// Where codec 2 predicts: on GPUs on the device, on the host where the device is software (a dispatch costs
+// more there than the CPU's vectors do), where there are temporal layers, or where the device's buffers are
+// too small.
+enum class Prediction : std::uint8_t { automatic, onHost, onDevice };
+
+// The packets of codec 2 predicted on the device are those of a codec::Encoder of this lag: the weights of a
+// frame are known when it is recorded, whatever of the frames before it is still to be entropy-coded.
+inline constexpr std::uint32_t kWeightLag = 3;
+
 // The readback of one recorded frame, waiting to be entropy-coded.
 struct RecordedFrame {
   std::uint32_t slot = 0;
@@ -35,10 +44,11 @@ struct EncodedFrame {
 class FrameEncoder {
  public:
   // Frames that may be recorded and not yet entropy-coded.
-  static constexpr std::uint32_t kSlots = 3;
+  static constexpr std::uint32_t kSlots = kWeightLag;
 
+  // Throws std::runtime_error where `prediction` is asked for and cannot be.
   FrameEncoder(const vulkan::Device& device, const simulation::ClothSimulation& simulation,
-               const codec::StreamLayout& layout);
+               const codec::StreamLayout& layout, Prediction prediction = Prediction::automatic);
   ~FrameEncoder();
   FrameEncoder(const FrameEncoder&) = delete;
   FrameEncoder& operator=(const FrameEncoder&) = delete;

@@ -4,6 +4,7 @@
 #extension GL_GOOGLE_include_directive : require
 
 #include "shaders/encode/frame.h"
+#include "shaders/encode/reconstruction_hash.glsl"
 
 layout(local_size_x_id = 0) in;
 layout(constant_id = 1) const uint kHasNormals = 0;
@@ -64,20 +65,6 @@ ivec2 encodeOctahedral(vec3 normal) {
   return ivec2(octahedralComponent(magnitude.x, sum, n.x), octahedralComponent(magnitude.y, sum, n.y));
 }
 
-uint mixBits(uint h) {
-  h = (h ^ (h >> 16)) * 0x7FEB352Du;
-  h = (h ^ (h >> 15)) * 0x846CA68Bu;
-  return h ^ (h >> 16);
-}
-
-uint hashWord(uint vertex, ivec3 q, uint normal, uint seed) {
-  uint h = mixBits(vertex + seed);
-  h = mixBits(h ^ uint(q.x));
-  h = mixBits(h ^ uint(q.y));
-  h = mixBits(h ^ uint(q.z));
-  return mixBits(h ^ normal);
-}
-
 // Writes cannot race: each invocation takes every stride-th vertex. The workgroup adds up in shared memory
 // first.
 void main() {
@@ -102,8 +89,8 @@ void main() {
       lattice[4 * push.vertexCount + vertex] = uv.y;
       normal = (uint(uv.x) & 0xFFu) | ((uint(uv.y) & 0xFFu) << 8);
     }
-    low += hashWord(vertex, q, normal, 0x243F6A88u);
-    high += hashWord(vertex, q, normal, 0x85A308D3u);
+    low += hashWord(vertex, q, normal, kLowSeed);
+    high += hashWord(vertex, q, normal, kHighSeed);
   }
   atomicAdd(hashLow, low);
   atomicAdd(hashHigh, high);

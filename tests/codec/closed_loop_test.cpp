@@ -20,9 +20,9 @@ namespace {
 // Encoder and decoder of one stream.
 class Loop {
  public:
-  explicit Loop(const StreamLayout& layout)
+  explicit Loop(const StreamLayout& layout, const EncoderOptions& options = {})
       : layout_(layout),
-        encoder_(Encoder::make(layout)),
+        encoder_(Encoder::make(layout, options)),
         decoder_(Decoder::make(layout)),
         packet_(encoder_->packetBound()) {}
 
@@ -246,6 +246,31 @@ TEST(Hierarchical, LetsPinsStandStillInAMovingCloth) {
     }
     before = pins;
   }
+}
+
+TEST(Hierarchical, FitsItsWeightsToEarlierFramesForLittleMore) {
+  const StreamLayout layout = square(64, kCodecHierarchical);
+  std::vector<std::size_t> bytes;
+  for (const std::uint32_t lag : {0u, 1u, 3u}) {
+    Loop loop(layout, {.weightLag = lag});
+    bytes.push_back(0);
+    for (std::uint64_t tick = 1; tick <= 60; ++tick) {
+      // A key frame before the weights of the one before it are known, and one long after.
+      const bool key = tick == 3 || tick == 30;
+      const PacketHeader header =
+          loop.send(tick, key ? PacketKind::key : PacketKind::predicted, sampleMotion(layout, tick, 0.03f));
+      // The first has the weights from before the key frame; those of the next are not known yet.
+      const std::uint64_t sinceKey = tick < 3 ? tick - 1 : tick < 30 ? tick - 3 : tick - 30;
+      if (sinceKey <= lag + 1) {
+        EXPECT_EQ(header.sectionBytes[0] == 0, sinceKey > 1 && sinceKey <= lag) << tick;
+      }
+      for (std::size_t i = 0; i < header.sectionCount && tick > 10; ++i)
+        bytes.back() += header.sectionBytes[i];
+    }
+  }
+  EXPECT_NE(bytes[0], bytes[2]);
+  EXPECT_LT(bytes[1], bytes[0] * 105 / 100);
+  EXPECT_LT(bytes[2], bytes[0] * 110 / 100);
 }
 
 TEST(Hierarchical, TakesAThirdOfCodecOneOnAMotion) {

@@ -2,153 +2,23 @@
 // The encoder on the device against the reference encoder on the CPU: the same packets, to the bit.
 #include "server/encode/frame_encoder.h"
 
-#include <algorithm>
 #include <cmath>
-#include <optional>
 #include <random>
 #include <thread>
 #include <vector>
 
 #include <gtest/gtest.h>
 
-#include "proto/codec/decoder.h"
-#include "proto/codec/encoder.h"
-#include "shaders/shared/types.h"
-#include "tests/simulation/scenes.h"
+#include "tests/encode/encoding.h"
 
 namespace clothstream::tests {
 namespace {
-
-constexpr std::uint32_t kEpoch = 3;
-
-// Three cloths of odd sizes that hang by their top rows or fall.
-scene::Scene clothsOf(scene::Normals normals) {
-  scene::Cloth hanging = calmCloth(17, 23), strip = calmCloth(2, 5), falling = calmCloth(9, 8);
-  hanging.name = "hanging";
-  strip.name = "strip";
-  falling.name = "falling";
-  strip.grid.pose.position = {1, 0, 0};
-  falling.grid.pose.position = {0, 1, 0.3f};
-  hanging.pins = {topRow(hanging)};
-  scene::Scene scene = sceneOf({hanging, strip, falling});
-  scene.stream.normals = normals;
-  return scene;
-}
-
-std::vector<simulation::MovingCollider> sphereAt(std::uint64_t tick) {
-  const auto z = [](std::uint64_t t) { return -0.5f + 0.01f * static_cast<float>(t); };
-  simulation::MovingCollider sphere;
-  sphere.shape = scene::Sphere{0.08f};
-  sphere.start.position = {0, -0.15f, z(tick)};
-  sphere.end.position = {0, -0.15f, z(tick + 1)};
-  return {sphere};
-}
-
-// A simulation whose frames are encoded on the device and on the CPU.
-class Encoding {
- public:
-  explicit Encoding(const scene::Scene& scene, std::optional<std::uint8_t> codec = {})
-      : scene_(scene),
-        simulation(device(), scene),
-        layout(layoutOf(scene, codec)),
-        encoder(device(), simulation, layout),
-        recorder_(device()),
-        normals_(device(), vulkan::BufferPurpose::readback, simulation.normals().bytes()),
-        reference_(codec::Encoder::make(layout)),
-        decoder_(codec::Decoder::make(layout)),
-        packet_(encoder.packetBound()),
-        expected_(reference_->packetBound()) {}
-
-  // Advances, encodes both ways, decodes, and compares.
-  encode::RecordedFrame tick(std::uint64_t tick, bool forceKey) {
-    recorder_.begin();
-    simulation.recordTick(recorder_, inputsOf(scene_, sphereAt(tick)));
-    return encodeAndCompare(tick, forceKey);
-  }
-
-  encode::RecordedFrame encodeState(const simulation::NodeState& state, std::uint64_t tick, bool forceKey) {
-    recorder_.begin();
-    simulation.recordRestoreState(recorder_, simulation::pack(state, tick));
-    return encodeAndCompare(tick, forceKey);
-  }
-
-  static codec::StreamLayout layoutOf(const scene::Scene& scene, std::optional<std::uint8_t> codec) {
-    codec::StreamLayout layout = encode::streamLayout(scene, kEpoch);
-    layout.codec = codec.value_or(layout.codec);
-    return layout;
-  }
-
-  double kilobytes() const { return bytes_ / 1000; }
-
- private:
-  encode::RecordedFrame encodeAndCompare(std::uint64_t tick, bool forceKey) {
-    simulation.recordNormals(recorder_);
-    const encode::RecordedFrame frame = encoder.record(recorder_, tick, forceKey);
-    simulation.recordSaveState(recorder_);
-    recorder_.copy(simulation.normals(), normals_, normals_.bytes());
-    submitAndWait(device(), recorder_);
-    const encode::EncodedFrame encoded = encoder.entropyCode(frame, packet_);
-    compare(frame, encoded);
-    return frame;
-  }
-
-  void compare(const encode::RecordedFrame& frame, const encode::EncodedFrame& encoded) {
-    std::vector<float> positions, normals;
-    for (const scene::Vec3& p : simulation::unpack(simulation.collectState(frame.tick)).positions) {
-      positions.insert(positions.end(), {p.x(), p.y(), p.z()});
-    }
-    for (const shared::vec4& n : normals_.mapped<shared::vec4>())
-      normals.insert(normals.end(), {n.x, n.y, n.z});
-    const std::size_t expectedBytes =
-        reference_->encode(frame.tick, frame.kind, positions, normals, expected_);
-    const auto packet = std::span<const std::byte>(packet_).first(encoded.bytes);
-    EXPECT_TRUE(std::ranges::equal(packet, std::span<const std::byte>(expected_).first(expectedBytes)))
-        << "tick " << frame.tick;
-    EXPECT_EQ(encoded.reconstructionHash, reference_->reconstructionHash()) << "tick " << frame.tick;
-
-    ASSERT_EQ(decoder_->decode(packet), codec::DecodeResult::ok) << "tick " << frame.tick;
-    EXPECT_EQ(decoder_->reconstructionHash(), encoded.reconstructionHash);
-    bytes_ += static_cast<double>(encoded.bytes);
-    // Each coordinate is promised by codec 1, the distance by both.
-    const double maxError = static_cast<double>(layout.maxError);
-    for (std::size_t i = 0; i < positions.size(); i += 3) {
-      double squared = 0;
-      bool isNear = true;  // farther out the promise is another one
-      for (std::size_t c = i; c < i + 3; ++c) {
-        isNear = isNear && std::fabs(positions[c]) <= 32;
-        const double error =
-            static_cast<double>(positions[c]) - static_cast<double>(decoder_->positions()[c]);
-        squared += error * error;
-        if (layout.codec == codec::kCodecLatticeZstd && std::fabs(positions[c]) <= 32) {
-          ASSERT_LE(std::fabs(error), maxError) << "tick " << frame.tick;
-        }
-      }
-      if (isNear) {
-        ASSERT_LE(squared, 3 * maxError * maxError) << "tick " << frame.tick;
-      }
-    }
-  }
-
-  scene::Scene scene_;
-
- public:
-  simulation::ClothSimulation simulation;
-  codec::StreamLayout layout;
-  encode::FrameEncoder encoder;
-
- private:
-  vulkan::Recorder recorder_;
-  vulkan::Buffer normals_;
-  std::unique_ptr<codec::Encoder> reference_;
-  std::unique_ptr<codec::Decoder> decoder_;
-  std::vector<std::byte> packet_, expected_;
-  double bytes_ = 0;
-};
 
 struct Sort {
   const char* name;
   std::uint8_t codec;
   scene::Normals normals;
+  encode::Prediction prediction = encode::Prediction::onHost;
 };
 
 class FrameEncoder : public GpuTest, public testing::WithParamInterface<Sort> {};
@@ -156,11 +26,13 @@ INSTANTIATE_TEST_SUITE_P(
     Sorts, FrameEncoder,
     testing::Values(Sort{"lattice", codec::kCodecLatticeZstd, scene::Normals::none},
                     Sort{"latticeWithNormals", codec::kCodecLatticeZstd, scene::Normals::octahedral},
-                    Sort{"hierarchical", codec::kCodecHierarchical, scene::Normals::none}),
+                    Sort{"hierarchical", codec::kCodecHierarchical, scene::Normals::none},
+                    Sort{"hierarchicalOnDevice", codec::kCodecHierarchical, scene::Normals::none,
+                         encode::Prediction::onDevice}),
     [](const auto& chosen) { return chosen.param.name; });
 
 TEST_P(FrameEncoder, MakesThePacketsOfTheReferenceEncoder) {
-  Encoding encoding(clothsOf(GetParam().normals), GetParam().codec);
+  Encoding encoding(clothsOf(GetParam().normals), GetParam().codec, GetParam().prediction);
   for (std::uint64_t tick = 1; tick <= 120; ++tick) {
     const encode::RecordedFrame frame = encoding.tick(tick, tick % 40 == 0);
     EXPECT_EQ(frame.kind == codec::PacketKind::key, tick == 1 || tick % 40 == 0) << tick;
@@ -171,7 +43,7 @@ TEST_P(FrameEncoder, MakesThePacketsOfTheReferenceEncoder) {
 }
 
 TEST_P(FrameEncoder, EqualsTheReferenceOnStatesOfAnySize) {
-  Encoding encoding(clothsOf(GetParam().normals), GetParam().codec);
+  Encoding encoding(clothsOf(GetParam().normals), GetParam().codec, GetParam().prediction);
   std::mt19937 random(1);
   for (std::uint64_t tick = 1; tick <= 12; ++tick) {
     const float extents[] = {1e-19f, 0.001f, 1, 32, 8000, 1e6f};
@@ -188,7 +60,7 @@ TEST_P(FrameEncoder, EqualsTheReferenceOnStatesOfAnySize) {
 TEST_P(FrameEncoder, KeepsTheErrorAtRoundingsEdges) {
   // Half way between lattice points, and the floats beside it: where a device that rounds otherwise would
   // differ.
-  Encoding encoding(clothsOf(GetParam().normals), GetParam().codec);
+  Encoding encoding(clothsOf(GetParam().normals), GetParam().codec, GetParam().prediction);
   const float step = 2 * encoding.layout.maxError - 0x1p-18f;
   std::mt19937 random(2);
   std::uniform_int_distribution<int> point(-30000, 30000), offset(-3, 3);
@@ -210,7 +82,7 @@ TEST_P(FrameEncoder, KeepsTheErrorAtRoundingsEdges) {
 TEST_P(FrameEncoder, MakesThoseOfMeshesToo) {
   scene::Scene scene = clothsOf(GetParam().normals);
   scene.cloths.insert(scene.cloths.begin() + 1, discCloth(9));
-  Encoding encoding(scene, GetParam().codec);
+  Encoding encoding(scene, GetParam().codec, GetParam().prediction);
   for (std::uint64_t tick = 1; tick <= 30 && !testing::Test::HasFailure(); ++tick)
     encoding.tick(tick, tick % 10 == 0);
 }

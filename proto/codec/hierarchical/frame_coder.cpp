@@ -2,6 +2,8 @@
 // What encoder and decoder of codec 2 agree on beside the prediction.
 #include "proto/codec/hierarchical/frame_coder.h"
 
+#include <cmath>
+
 #include "proto/codec/reconstruction_hash.h"
 
 namespace clothstream::codec::hierarchical {
@@ -12,6 +14,12 @@ LatticeUnit latticeUnit(float maxError) {
   const auto unit = [&] { return error / ((1 << (stepBits - 1)) + 2); };
   while (stepBits > 4 && unit() * kMaxCoordinate < 40) --stepBits;
   return {stepBits, static_cast<float>(unit())};
+}
+
+double quantisationScale(float unit) {
+  int exponent;
+  const double mantissa = std::frexp(1 / static_cast<double>(unit), &exponent);
+  return std::ldexp(std::round(std::ldexp(mantissa, kScaleBits)), exponent - kScaleBits);
 }
 
 Weights keyFrameWeights() {

@@ -19,6 +19,17 @@ struct LatticeUnit {
 // as the floats that a decoder gives are off at 32 m. As many stepBits as leave room for that.
 LatticeUnit latticeUnit(float maxError);
 
+// What an encoder multiplies metres by, to round to the nearest unit and the even one of two: 1 / unit to so
+// few bits that the product with a float32 is exact in a float64, or in integers. It is off by an eighth of a
+// unit at most, where the constant two units above have half a one to spare.
+inline constexpr int kScaleBits = 29;
+double quantisationScale(float unit);
+
+// An encoder lets a vertex rest that is wanted in the same place for so many frames; about so many start to
+// in a frame: in turns, where there are more.
+inline constexpr std::uint8_t kStillFrames = 3;
+inline constexpr std::uint32_t kRestsAtOnce = 64;
+
 // A packet's sections: changes of the weights (empty where there are none), symbols, bits beside them; of the
 // latter two first what the coarse vertices take, to the byte or word that they end in, then the rest.
 inline constexpr std::size_t kSections = 5;

@@ -18,7 +18,7 @@ struct CodedResidual {
 
 class HierarchicalEncoder final : public BodyEncoder {
  public:
-  explicit HierarchicalEncoder(const StreamLayout& layout);
+  explicit HierarchicalEncoder(const StreamLayout& layout, std::uint32_t weightLag = 0);
   ~HierarchicalEncoder() override;
 
   std::size_t packetBound() const override;

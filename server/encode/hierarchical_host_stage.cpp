@@ -10,10 +10,10 @@
 namespace clothstream::encode {
 namespace {
 
-class HierarchicalStage final : public EncodeStage {
+class HierarchicalHostStage final : public EncodeStage {
  public:
-  HierarchicalStage(const vulkan::Device& device, const simulation::ClothSimulation& simulation,
-                    const codec::StreamLayout& layout)
+  HierarchicalHostStage(const vulkan::Device& device, const simulation::ClothSimulation& simulation,
+                        const codec::StreamLayout& layout)
       : simulation_(simulation),
         encoder_(codec::Encoder::make(layout)),
         positions_(3 * simulation.nodeCount()) {
@@ -51,10 +51,10 @@ class HierarchicalStage final : public EncodeStage {
 
 }  // namespace
 
-std::unique_ptr<EncodeStage> makeHierarchicalStage(const vulkan::Device& device,
-                                                   const simulation::ClothSimulation& simulation,
-                                                   const codec::StreamLayout& layout) {
-  return std::make_unique<HierarchicalStage>(device, simulation, layout);
+std::unique_ptr<EncodeStage> makeHierarchicalHostStage(const vulkan::Device& device,
+                                                       const simulation::ClothSimulation& simulation,
+                                                       const codec::StreamLayout& layout) {
+  return std::make_unique<HierarchicalHostStage>(device, simulation, layout);
 }
 
 }  // namespace clothstream::encode

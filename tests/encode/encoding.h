@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: MIT
+// A simulation whose frames are encoded by FrameEncoder and by the reference encoder, and compared.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "proto/codec/decoder.h"
+#include "proto/codec/encoder.h"
+#include "server/encode/frame_encoder.h"
+#include "shaders/shared/types.h"
+#include "tests/simulation/scenes.h"
+
+namespace clothstream::tests {
+
+inline constexpr std::uint32_t kEpoch = 3;
+
+// Three cloths of odd sizes that hang by their top rows or fall.
+inline scene::Scene clothsOf(scene::Normals normals) {
+  scene::Cloth hanging = calmCloth(17, 23), strip = calmCloth(2, 5), falling = calmCloth(9, 8);
+  hanging.name = "hanging";
+  strip.name = "strip";
+  falling.name = "falling";
+  strip.grid.pose.position = {1, 0, 0};
+  falling.grid.pose.position = {0, 1, 0.3f};
+  hanging.pins = {topRow(hanging)};
+  scene::Scene scene = sceneOf({hanging, strip, falling});
+  scene.stream.normals = normals;
+  return scene;
+}
+
+inline std::vector<simulation::MovingCollider> sphereAt(std::uint64_t tick) {
+  const auto z = [](std::uint64_t t) { return -0.5f + 0.01f * static_cast<float>(t); };
+  simulation::MovingCollider sphere;
+  sphere.shape = scene::Sphere{0.08f};
+  sphere.start.position = {0, -0.15f, z(tick)};
+  sphere.end.position = {0, -0.15f, z(tick + 1)};
+  return {sphere};
+}
+
+// A simulation whose frames are encoded on the device and on the CPU.
+class Encoding {
+ public:
+  explicit Encoding(const scene::Scene& scene, std::optional<std::uint8_t> codec = {},
+                    encode::Prediction prediction = encode::Prediction::automatic)
+      : scene_(scene),
+        simulation(device(), scene),
+        layout(layoutOf(scene, codec)),
+        encoder(device(), simulation, layout, prediction),
+        recorder_(device()),
+        normals_(device(), vulkan::BufferPurpose::readback, simulation.normals().bytes()),
+        reference_(codec::Encoder::make(
+            layout, {.weightLag = prediction == encode::Prediction::onDevice ? encode::kWeightLag : 0})),
+        decoder_(codec::Decoder::make(layout)),
+        packet_(encoder.packetBound()),
+        expected_(reference_->packetBound()) {}
+
+  // Advances, encodes both ways, decodes, and compares.
+  encode::RecordedFrame tick(std::uint64_t tick, bool forceKey) {
+    recorder_.begin();
+    simulation.recordTick(recorder_, inputsOf(scene_, sphereAt(tick)));
+    return encodeAndCompare(tick, forceKey);
+  }
+
+  encode::RecordedFrame encodeState(const simulation::NodeState& state, std::uint64_t tick, bool forceKey) {
+    recorder_.begin();
+    simulation.recordRestoreState(recorder_, simulation::pack(state, tick));
+    return encodeAndCompare(tick, forceKey);
+  }
+
+  static codec::StreamLayout layoutOf(const scene::Scene& scene, std::optional<std::uint8_t> codec) {
+    codec::StreamLayout layout = encode::streamLayout(scene, kEpoch);
+    layout.codec = codec.value_or(layout.codec);
+    return layout;
+  }
+
+  double kilobytes() const { return bytes_ / 1000; }
+
+ private:
+  encode::RecordedFrame encodeAndCompare(std::uint64_t tick, bool forceKey) {
+    simulation.recordNormals(recorder_);
+    const encode::RecordedFrame frame = encoder.record(recorder_, tick, forceKey);
+    simulation.recordSaveState(recorder_);
+    recorder_.copy(simulation.normals(), normals_, normals_.bytes());
+    submitAndWait(device(), recorder_);
+    const encode::EncodedFrame encoded = encoder.entropyCode(frame, packet_);
+    compare(frame, encoded);
+    return frame;
+  }
+
+  void compare(const encode::RecordedFrame& frame, const encode::EncodedFrame& encoded) {
+    std::vector<float> positions, normals;
+    for (const scene::Vec3& p : simulation::unpack(simulation.collectState(frame.tick)).positions) {
+      positions.insert(positions.end(), {p.x(), p.y(), p.z()});
+    }
+    for (const shared::vec4& n : normals_.mapped<shared::vec4>())
+      normals.insert(normals.end(), {n.x, n.y, n.z});
+    const std::size_t expectedBytes =
+        reference_->encode(frame.tick, frame.kind, positions, normals, expected_);
+    const auto packet = std::span<const std::byte>(packet_).first(encoded.bytes);
+    EXPECT_TRUE(std::ranges::equal(packet, std::span<const std::byte>(expected_).first(expectedBytes)))
+        << "tick " << frame.tick;
+    EXPECT_EQ(encoded.reconstructionHash, reference_->reconstructionHash()) << "tick " << frame.tick;
+
+    ASSERT_EQ(decoder_->decode(packet), codec::DecodeResult::ok) << "tick " << frame.tick;
+    EXPECT_EQ(decoder_->reconstructionHash(), encoded.reconstructionHash);
+    bytes_ += static_cast<double>(encoded.bytes);
+    // Each coordinate is promised by codec 1, the distance by both.
+    const double maxError = static_cast<double>(layout.maxError);
+    for (std::size_t i = 0; i < positions.size(); i += 3) {
+      double squared = 0;
+      bool isNear = true;  // farther out the promise is another one
+      for (std::size_t c = i; c < i + 3; ++c) {
+        isNear = isNear && std::fabs(positions[c]) <= 32;
+        const double error =
+            static_cast<double>(positions[c]) - static_cast<double>(decoder_->positions()[c]);
+        squared += error * error;
+        if (layout.codec == codec::kCodecLatticeZstd && std::fabs(positions[c]) <= 32) {
+          ASSERT_LE(std::fabs(error), maxError) << "tick " << frame.tick;
+        }
+      }
+      if (isNear) {
+        ASSERT_LE(squared, 3 * maxError * maxError) << "tick " << frame.tick;
+      }
+    }
+  }
+
+  scene::Scene scene_;
+
+ public:
+  simulation::ClothSimulation simulation;
+  codec::StreamLayout layout;
+  encode::FrameEncoder encoder;
+
+ private:
+  vulkan::Recorder recorder_;
+  vulkan::Buffer normals_;
+  std::unique_ptr<codec::Encoder> reference_;
+  std::unique_ptr<codec::Decoder> decoder_;
+  std::vector<std::byte> packet_, expected_;
+  double bytes_ = 0;
+};
+
+}  // namespace clothstream::tests
