@@ -98,7 +98,7 @@ nlohmann::ordered_json CodecMeasurement::row(const std::string& motion) const {
       {"cloth", cloth.rows > 0 ? fmt::format("{}x{}", cloth.columns, cloth.rows) : "mesh"},
       {"vertices", cloth.vertexCount},
       {"frames", frames_},
-      {"maxErrorMm", maxError_ * 1e3},
+      {"maxErrorMm", std::round(maxError_ * 1e9) / 1e6},
       {"bitsPerVertex", bytes_.mean() * bits},
       {"bitsPerVertexP50", bytes_.median() * bits},
       {"bitsPerVertexP95", bytes_.quantile(0.95) * bits},
