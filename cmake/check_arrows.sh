@@ -20,7 +20,8 @@ server/rpc         | server/stream server/telemetry clothstream
 server/web         | server/stream server/telemetry clothstream
 clients/core       | proto/codec
 clients/grpc       | clients/core clothstream
-clients/cli        | clients/core clients/grpc
+clients/files      | proto/codec clothstream
+clients/cli        | clients/core clients/grpc clients/files proto/codec
 '
 # rooms that may include these headers
 readonly OUTSIDE='

@@ -14,15 +14,20 @@ enum ExitCode : int {
   kRefused = 4,
   kLost = 5,
   kNotWritten = 6,
+  kUnreadable = 7,
 };
 
 inline constexpr const char* kExitCodes =
-    "Ends with 0 if all went well, 1 if --hash found a frame that is not the server's, 2 for wrong "
-    "arguments, 3 if no\n"
-    "server answers, 4 if the server refuses (an unknown scene, a value that is not allowed), 5 if the "
-    "stream is lost, 6 if "
-    "the --obj\n"
-    "file cannot be written.";
+    "Ends with 0 if all went well, 1 if --hash found a frame that is not the server's or encode one that is "
+    "not as "
+    "promised,\n"
+    "2 for wrong arguments, 3 if no server answers, 4 if the server refuses (an unknown scene, a value that "
+    "is not "
+    "allowed),\n"
+    "5 if the stream is lost, 6 if a file cannot be written or writing it was interrupted, 7 if a file "
+    "cannot be read "
+    "or is\n"
+    "not what it should be.";
 
 constexpr ExitCode exitCodeOf(Failure::Kind kind) {
   switch (kind) {

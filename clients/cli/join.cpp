@@ -3,15 +3,14 @@
 #include "clients/cli/join.h"
 
 #include <chrono>
-#include <csignal>
 #include <cstdio>
-#include <ctime>
 
 #include <fmt/format.h>
 #include <unistd.h>
 
 #include "clients/cli/obj_file.h"
 #include "clients/cli/report.h"
+#include "clients/cli/signals.h"
 #include "clients/grpc/grpc_client.h"
 
 namespace clothstream::cli {
@@ -47,16 +46,6 @@ class Listener {
   const StatusLine& line_;
   bool report_;
 };
-
-// True if a signal that ends the program came within the time.
-bool interrupted(std::chrono::milliseconds time) {
-  sigset_t signals;
-  sigemptyset(&signals);
-  sigaddset(&signals, SIGINT);
-  sigaddset(&signals, SIGTERM);
-  const timespec timeout{.tv_sec = 0, .tv_nsec = std::chrono::nanoseconds(time).count()};
-  return sigtimedwait(&signals, nullptr, &timeout) > 0;
-}
 
 void sendColliders(GrpcClient& client, const JoinOptions& options) {
   if (options.colliders.empty()) return;
@@ -98,9 +87,9 @@ ExitCode complain(ExitCode code, const std::string& text) {
 }  // namespace
 
 ExitCode join(const JoinOptions& options) {
-  std::optional<ObjFile> obj;
+  std::optional<files::NewFile> obj;
   if (!options.objPath.empty()) {
-    auto created = ObjFile::create(options.objPath);
+    auto created = files::NewFile::create(options.objPath);
     if (!created) return complain(kNotWritten, created.error());
     obj.emplace(std::move(*created));
   }
@@ -108,7 +97,7 @@ ExitCode join(const JoinOptions& options) {
   GrpcClientOptions clientOptions;
   clientOptions.scene = options.scene;
   clientOptions.clientName = "clothstream join";
-  clientOptions.cancelled = [] { return interrupted(std::chrono::milliseconds(0)); };
+  clientOptions.cancelled = [] { return interrupted(); };
   auto joined = GrpcClient::join(options.address, clientOptions, Listener(line, options.report));
   if (!joined) return complain(exitCodeOf(joined.error().kind), joined.error().text);
   GrpcClient& client = **joined;
@@ -126,7 +115,7 @@ ExitCode join(const JoinOptions& options) {
     code = complain(kNotWritten, fmt::format("{} is not written: no frame came", options.objPath));
   } else if (obj) {
     client.visit([&](cs_client* core) {
-      if (auto written = obj->write(core); !written) code = complain(kNotWritten, written.error());
+      if (auto written = writeObj(core, *obj); !written) code = complain(kNotWritten, written.error());
     });
   }
   fmt::print("{}\n", options.json ? report.json(options.hash) : report.text(options.hash));

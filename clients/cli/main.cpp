@@ -2,7 +2,6 @@
 // `clothstream`: what a user of a server needs, on the command line.
 #include <charconv>
 #include <cmath>
-#include <csignal>
 #include <cstdio>
 #include <exception>
 
@@ -11,9 +10,11 @@
 
 #include "clients/cli/join.h"
 #include "clients/cli/list.h"
+#include "clients/cli/motion_commands.h"
 #include "clients/cli/scene.h"
 #include "clients/cli/set.h"
 #include "clients/cli/set_options.h"
+#include "clients/cli/signals.h"
 #include "clients/core/core.h"
 #include "clients/grpc/address.h"
 
@@ -47,17 +48,9 @@ std::string addressOf(const std::string& text) {
   return *address;
 }
 
-// Before any thread starts, so that all inherit it: join() waits for them.
-void blockEndingSignals() {
-  sigset_t signals;
-  sigemptyset(&signals);
-  sigaddset(&signals, SIGINT);
-  sigaddset(&signals, SIGTERM);
-  pthread_sigmask(SIG_BLOCK, &signals, nullptr);
-}
-
 int run(int argc, char** argv) {
-  CLI::App app("Follows the cloth that a clothstream-server simulates.", "clothstream");
+  CLI::App app("Follows the cloth that a clothstream-server simulates; encodes motions in files.",
+               "clothstream");
   app.footer(kExitCodes);
   app.require_subcommand(1);
   app.set_version_flag("--version", CLOTHSTREAM_VERSION);
@@ -103,6 +96,9 @@ int run(int argc, char** argv) {
   SceneCommands sceneCommands;
   sceneCommands.add(app, address);
 
+  MotionCommands motionCommands;
+  motionCommands.add(app);
+
   try {
     app.parse(argc, argv);
     sceneCommands.check();
@@ -116,6 +112,7 @@ int run(int argc, char** argv) {
     return app.exit(error) == 0 ? kOk : kUsage;
   }
   blockEndingSignals();
+  if (motionCommands.parsed()) return motionCommands.run();
   if (sceneCommands.parsed()) return sceneCommands.run(joinOptions.address);
   if (setCommand.parsed()) return set(setOptions);
   return listCommand.parsed() ? list(listOptions) : join(joinOptions);

@@ -7,27 +7,12 @@
 #include <tl/expected.hpp>
 
 #include "clients/core/core.h"
+#include "clients/files/new_file.h"
 
 namespace clothstream::cli {
 
-// Written beside its place and then moved there: whoever reads the path sees a whole file or the former one.
-class ObjFile {
- public:
-  // Opens the file that is written; the error names the path and what the system said of it.
-  [[nodiscard]] static tl::expected<ObjFile, std::string> create(const std::string& path);
-  ~ObjFile();
-  ObjFile(ObjFile&& other) noexcept;
-  ObjFile& operator=(ObjFile&&) = delete;
-
-  // Positions and normals of the newest frame, a group for each cloth. Once.
-  [[nodiscard]] tl::expected<void, std::string> write(const cs_client* client);
-
- private:
-  ObjFile(std::string path, std::string temporary, int file)
-      : path_(std::move(path)), temporary_(std::move(temporary)), file_(file) {}
-
-  std::string path_, temporary_;
-  int file_ = -1;  // -1: moved into place, or to another ObjFile
-};
+// Positions and normals of the newest frame, a group for each cloth; finishes the file. The error is the
+// file's.
+[[nodiscard]] tl::expected<void, std::string> writeObj(const cs_client* client, files::NewFile& file);
 
 }  // namespace clothstream::cli

@@ -9,6 +9,7 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
+#include "tests/bench/codec/motion_options.h"
 #include "tests/bench/suite.h"
 #include "tests/bench/table.h"
 
@@ -42,10 +43,10 @@ constexpr std::array kSuites{
                  &bench::runColliders},
     bench::Suite{"self_collision", "a sheet that collides with itself or does not, flat and in folds",
                  &bench::runSelfCollision},
-    bench::Suite{"codec", "bits a vertex and milliseconds a frame, key and predicted, of a hung cloth",
+    bench::Suite{"codec", "both codecs on the CPU over motions: bits, errors, what the eye sees, times",
                  &bench::runCodec},
-    bench::Suite{"codec_motions", "both codecs on the CPU over four motions of a 100x100 cloth",
-                 &bench::runCodecMotions},
+    bench::Suite{"codec_device", "what frames of a hung cloth cost on the device, key and predicted",
+                 &bench::runCodecDevice},
 };
 
 }  // namespace
@@ -64,7 +65,7 @@ int main(int argc, char** argv) {
   std::uint32_t size = 0, softwareThreads = 0, xpbdWholeNodes = 0, solveWholeNodes = 0;
   app.add_option("suite", name, "Which suite to run:" + list)->required()->check(CLI::IsMember(suites));
   CLI::Option* sizeOption =
-      app.add_option("--size", size, "Rows and columns of the grid, instead of a ladder")
+      app.add_option("--size", size, "Rows and columns of the grid, instead of the suite's own")
           ->check(CLI::Range(2, 65536));
   app.add_flag("--json", json, "Print one JSON array of rows");
   app.add_option("--device", settings.device.select, "Index or part of the name of the Vulkan device");
@@ -80,6 +81,7 @@ int main(int argc, char** argv) {
                                             "Nodes of the largest cloth that one workgroup sweeps (xpbd)");
   CLI::Option* solveOption = app.add_option("--solve-whole", solveWholeNodes,
                                             "Nodes of the largest cloth that one workgroup solves");
+  bench::addMotionOptions(app, settings);
   CLI11_PARSE(app, argc, argv);
   if (*sizeOption) settings.size = size;
   if (*wholeOption) settings.xpbdWholeNodes = xpbdWholeNodes;

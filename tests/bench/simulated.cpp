@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "server/reference/reference_simulation.h"
+#include "server/scene/wind.h"
 
 namespace clothstream::bench {
 namespace {
@@ -37,6 +38,15 @@ reference::ReferenceCloth measuredCloth(const scene::Cloth& cloth, const simulat
     measured.velocities()[node] = state.velocities[node].cast<double>();
   }
   return measured;
+}
+
+simulation::TickInputs inputsAt(const scene::Scene& scene, std::uint64_t tick) {
+  simulation::TickInputs inputs{scene::environmentAt(scene, tick), {}};
+  const double from = static_cast<double>(tick) * scene.tickSeconds(), to = from + scene.tickSeconds();
+  for (const scene::Collider& collider : scene.colliders)
+    inputs.colliders.push_back(
+        {collider.shape, scene::poseAt(collider, from), scene::poseAt(collider, to), collider.friction});
+  return inputs;
 }
 
 Simulated::Simulated(vulkan::Device& device, const scene::Scene& scene,

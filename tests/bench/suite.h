@@ -23,6 +23,12 @@ struct Settings {
   std::optional<std::uint32_t> xpbdWholeNodes;  // likewise where it is absent
   std::optional<std::uint32_t> solveWholeNodes;
   std::filesystem::path pictures = ".";  // where suites that make some put them
+  // Of what codecs are measured on: named motions, or instead of them a file (bench_motion.h); how much of
+  // each; and the codecs' max error, m.
+  std::vector<std::string> motions;
+  std::optional<std::filesystem::path> input;
+  std::uint32_t frames = 600;
+  float maxError = 0.0005f;
 };
 
 // One JSON object a row; every row names its suite. A suite checks its results before it reports a time, and
@@ -48,6 +54,6 @@ Rows runCurtain(vulkan::Device& device, const Settings& settings);
 Rows runColliders(vulkan::Device& device, const Settings& settings);
 Rows runSelfCollision(vulkan::Device& device, const Settings& settings);
 Rows runCodec(vulkan::Device& device, const Settings& settings);
-Rows runCodecMotions(vulkan::Device& device, const Settings& settings);
+Rows runCodecDevice(vulkan::Device& device, const Settings& settings);
 
 }  // namespace clothstream::bench

@@ -10,7 +10,6 @@
 #include <fmt/format.h>
 
 #include "server/reference/reference_simulation.h"
-#include "server/scene/wind.h"
 #include "tests/bench/picture/log_plot.h"
 #include "tests/bench/simulated.h"
 #include "tests/bench/suite.h"
@@ -138,12 +137,7 @@ Measured measure(vulkan::Device& device, scene::Scene scene, const Method& metho
   Measured measured{};
   simulation::NodeState state;
   for (std::uint32_t frame = 0; frame < kFrames; ++frame) {
-    simulation::TickInputs inputs{scene::environmentAt(scene, frame), {}};
-    for (const scene::Collider& collider : scene.colliders)
-      inputs.colliders.push_back({collider.shape, scene::poseAt(collider, frame * scene.tickSeconds()),
-                                  scene::poseAt(collider, (frame + 1) * scene.tickSeconds()),
-                                  collider.friction});
-    simulated.tick(inputs);
+    simulated.tick(inputsAt(scene, frame));
     state = simulated.state();
     std::vector<reference::Vec3>& positions = measured.trajectory.frames.emplace_back();
     for (const scene::Vec3& position : state.positions) positions.push_back(position.cast<double>());

@@ -13,6 +13,7 @@
 #include <unistd.h>
 
 #include "tests/e2e/process.h"
+#include "tests/e2e/temporary_directory.h"
 
 namespace clothstream::e2e {
 namespace {
@@ -96,20 +97,6 @@ Obj readObj(const std::filesystem::path& path) {
   }
   return obj;
 }
-
-class TemporaryDirectory {
- public:
-  TemporaryDirectory() {
-    std::string pattern = (std::filesystem::temp_directory_path() / "clothstream.XXXXXX").string();
-    if (mkdtemp(pattern.data()) == nullptr) throw std::runtime_error("mkdtemp failed");
-    path_ = pattern;
-  }
-  ~TemporaryDirectory() { std::filesystem::remove_all(path_); }
-  const std::filesystem::path& path() const { return path_; }
-
- private:
-  std::filesystem::path path_;
-};
 
 TEST_F(JoinTest, DecodesWhatTheServerHoldsAndWritesItAsObj) {
   const TemporaryDirectory directory;

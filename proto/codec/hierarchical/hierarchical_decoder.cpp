@@ -162,9 +162,12 @@ void HierarchicalDecoder::decodeNormals(Streams& streams) {
       scales[c].add(residuals[c]);
     }
     const FacedNormal& expected = predicted[vertex];
-    newNormals_[vertex] = {{static_cast<std::int8_t>(expected.octahedral.u + residuals[0]),
-                            static_cast<std::int8_t>(expected.octahedral.v + residuals[1])},
-                           expected.top};
+    const auto moved = [](std::int8_t from, std::int32_t by) {
+      return static_cast<std::int8_t>(static_cast<std::uint32_t>(from) + static_cast<std::uint32_t>(by));
+    };
+    newNormals_[vertex] = {
+        {moved(expected.octahedral.u, residuals[0]), moved(expected.octahedral.v, residuals[1])},
+        expected.top};
   }
 }
 

@@ -2,8 +2,10 @@
 // Normals beside codec 2's positions: what they are off those that follow from the positions.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
+#include <cstdlib>
 #include <span>
 
 #include "proto/codec/array.h"
@@ -49,8 +51,8 @@ class NormalScale {
  public:
   std::uint32_t scale() const { return scaleOf(expected_); }
   void add(std::int32_t residual) {
-    const auto magnitude = std::min<std::uint32_t>(kMaxMagnitude, residual < 0 ? -residual : residual);
-    expected_ += (256 * static_cast<std::int32_t>(magnitude) - expected_) >> 5;
+    constexpr auto kMost = static_cast<std::int32_t>(kMaxMagnitude);
+    expected_ += (256 * std::abs(std::clamp(residual, -kMost, kMost)) - expected_) >> 5;
   }
 
  private:

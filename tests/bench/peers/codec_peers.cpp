@@ -1,117 +1,93 @@
 // SPDX-License-Identifier: MIT
-// Frames of the curtain at half a millimetre: Draco and meshoptimizer beside our codec's reference encoder.
-#include <algorithm>
-#include <cmath>
+// Our codecs beside raw floats, Draco, meshoptimizer and zstd, every frame of a motion by turns.
+#include <array>
+#include <optional>
 #include <stdexcept>
 
-#include <fmt/format.h>
-
-#include "proto/codec/decoder.h"
-#include "proto/codec/encoder.h"
-#include "server/scene/stability.h"
-#include "tests/bench/hung_cloth.h"
+#include "tests/bench/codec/bench_motion.h"
+#include "tests/bench/codec/codec_measurement.h"
+#include "tests/bench/codec/our_codec.h"
 #include "tests/bench/peers/peer_codecs.h"
 #include "tests/bench/peers/peers.h"
-#include "tests/bench/samples.h"
-#include "tests/bench/simulated.h"
+#include "tests/bench/picture/log_plot.h"
+#include "tests/bench/picture/rasterise.h"
 
 namespace clothstream::bench {
 namespace {
 
-constexpr std::uint32_t kFrames = 240;
-constexpr float kMaxError = 0.0005f;
+// Of the curves.
+constexpr std::array kErrors{0.0001, 0.0002, 0.0005, 0.001, 0.002};
 
-class OurCodec final : public PeerCodec {
- public:
-  explicit OurCodec(const codec::StreamLayout& layout)
-      : encoder_(codec::Encoder::make(layout)), decoder_(codec::Decoder::make(layout)) {}
+// Ours, then the others, all at this max error.
+std::vector<CodecMeasurement> measurements(const codec::ClothLayout& cloth, double maxError) {
+  std::vector<CodecMeasurement> all;
+  for (const std::uint8_t codec : {codec::kCodecHierarchical, codec::kCodecLatticeZstd})
+    all.emplace_back(
+        std::make_unique<OurCodec>(codec::StreamLayout{
+            .epoch = 1, .codec = codec, .maxError = static_cast<float>(maxError), .cloths = {cloth}}),
+        cloth, maxError);
+  for (std::unique_ptr<FrameCodec>& peer : peerCodecs(cloth, maxError))
+    all.emplace_back(std::move(peer), cloth, maxError);
+  return all;
+}
 
-  const char* name() const override { return "ClothStream codec 2"; }
+void play(const BenchMotion& motion, std::vector<CodecMeasurement>& all) {
+  Truth truth(motion.cloth);
+  motion.play([&](std::span<const float> positions) {
+    const TrueFrame frame = truth.next(positions);
+    for (CodecMeasurement& one : all) one.add(frame);
+  });
+}
 
-  std::vector<std::byte> encode(std::span<const float> positions) override {
-    std::vector<std::byte> packet(encoder_->packetBound());
-    packet.resize(encoder_->encode(tick_++, codec::PacketKind::predicted, positions, {}, packet));
-    return packet;
-  }
-
-  void decode(std::span<const std::byte> packet, std::span<float> positions) override {
-    if (decoder_->decode(packet) != codec::DecodeResult::ok)
-      throw std::runtime_error("our codec does not decode");
-    std::ranges::copy(decoder_->positions(), positions.begin());
-  }
-
- private:
-  std::unique_ptr<codec::Encoder> encoder_;
-  std::unique_ptr<codec::Decoder> decoder_;
-  std::uint64_t tick_ = 0;
+struct Figure {
+  const char *file, *up, *field;
 };
+constexpr std::array kFigures{
+    Figure{"codec_distance", "largest distance, mm", "measuredMaxErrorMm"},
+    Figure{"codec_normals", "error of normals, mean, degrees", "normalErrorDegMean"},
+    Figure{"codec_flicker", "flicker of normals, RMS, degrees", "normalFlickerDegRms"}};
 
-struct Measured {
-  std::unique_ptr<PeerCodec> codec;
-  bool keepsOrder;
-  Samples encode, decode;
-  double bytes = 0;
-};
-
-double largestError(std::span<const float> a, std::span<const float> b) {
-  double largest = 0;
-  for (std::size_t i = 0; i < a.size(); ++i)
-    largest = std::max(largest, std::abs(static_cast<double>(a[i]) - static_cast<double>(b[i])));
-  return largest;
+LogPlot plotOf(const std::string& motion, const Rows& rows, const Figure& figure) {
+  LogPlot plot{motion, "bits a vertex a frame", figure.up, {}};
+  for (const auto& row : rows) {
+    if (row.at("motion") != motion) continue;
+    const auto name = row.at("codec").get<std::string>();
+    auto curve = std::ranges::find(plot.curves, name, &LogPlot::Curve::name);
+    if (curve == plot.curves.end()) curve = plot.curves.insert(curve, LogPlot::Curve{name, {}});
+    curve->points.emplace_back(row.at("bitsPerVertex").get<double>(), row.at(figure.field).get<double>());
+  }
+  return plot;
 }
 
 }  // namespace
 
-Rows compareCodecs(vulkan::Device& device) {
-  scene::Scene scene = hungCloth(100);
-  scene.substeps = std::max(scene.substeps, scene::stableSubsteps(scene));
-  const scene::Grid& grid = scene.cloths.front().grid;
-  Simulated simulated(device, scene, {});
-
-  const PeerLattice lattice{{-4, -4, -4}, 2 * kMaxError, 13};
-  std::vector<Measured> all;
-  all.push_back({dracoMesh(grid.rows, grid.columns, lattice), false, {}, {}});
-  all.push_back({meshoptimizerDelta(grid.nodeCount(), lattice, false), true, {}, {}});
-  all.push_back({meshoptimizerDelta(grid.nodeCount(), lattice, true), true, {}, {}});
-  all.push_back({std::make_unique<OurCodec>(
-                     codec::StreamLayout{.epoch = 1,
-                                         .codec = codec::kCodecHierarchical,
-                                         .maxError = kMaxError,
-                                         .cloths = {{grid.nodeCount(), grid.rows, grid.columns}}}),
-                 true,
-                 {},
-                 {}});
-
-  std::vector<float> positions(3 * grid.nodeCount()), decoded(positions.size());
-  for (std::uint32_t frame = 0; frame < kFrames; ++frame) {
-    simulated.tick(hungClothInputs(scene, frame));
-    const simulation::NodeState state = simulated.state();
-    for (std::size_t i = 0; i < state.positions.size(); ++i)
-      for (int axis = 0; axis < 3; ++axis)
-        positions[3 * i + static_cast<std::size_t>(axis)] = state.positions[i][axis];
-    for (Measured& one : all) {
-      std::vector<std::byte> packet;
-      one.encode.add(secondsOf([&] { packet = one.codec->encode(positions); }));
-      one.decode.add(secondsOf([&] { one.codec->decode(packet, decoded); }));
-      one.bytes += static_cast<double>(packet.size());
-      // Half the diagonal of a cube of one step, and the rounding of coordinates of a few metres.
-      if (one.keepsOrder && largestError(positions, decoded) > std::sqrt(3.0) * kMaxError + 1e-6)
-        throw std::runtime_error(fmt::format("{} is off by {} m in frame {}", one.codec->name(),
-                                             largestError(positions, decoded), frame));
-    }
-  }
-
+Rows compareCodecs(vulkan::Device& device, const Settings& settings) {
   Rows rows;
-  for (const Measured& one : all)
-    rows.push_back({{"suite", "codec_peers"},
-                    {"who", one.codec->name()},
-                    {"vertices", grid.nodeCount()},
-                    {"frames", kFrames},
-                    {"bitsPerVertex", one.bytes * 8 / (static_cast<double>(grid.nodeCount()) * kFrames)},
-                    {"encodeMsMedian", one.encode.median() * 1e3},
-                    {"encodeMsP99", one.encode.p99() * 1e3},
-                    {"decodeMsMedian", one.decode.median() * 1e3},
-                    {"decodeMsP99", one.decode.p99() * 1e3}});
+  for (const BenchMotion& motion : chosenMotions(device, settings)) {
+    std::vector<CodecMeasurement> all = measurements(motion.cloth, double{settings.maxError});
+    all.emplace_back(rawFloats(), motion.cloth, 0);
+    play(motion, all);
+    for (const CodecMeasurement& one : all) rows.push_back(one.row(motion.name));
+  }
+  return rows;
+}
+
+Rows codecCurves(vulkan::Device& device, const Settings& settings) {
+  Rows rows;
+  std::vector<std::string> names;
+  for (const BenchMotion& motion : chosenMotions(device, settings)) {
+    std::vector<CodecMeasurement> all;
+    for (const double maxError : kErrors)
+      for (CodecMeasurement& one : measurements(motion.cloth, maxError)) all.push_back(std::move(one));
+    play(motion, all);
+    for (const CodecMeasurement& one : all) rows.push_back(one.row(motion.name));
+    names.push_back(motion.name);
+  }
+  for (const Figure& figure : kFigures) {
+    std::vector<LogPlot> plots;
+    for (const std::string& name : names) plots.push_back(plotOf(name, rows, figure));
+    writePng(svgOf(plots), settings.pictures / (std::string(figure.file) + ".png"));
+  }
   return rows;
 }
 

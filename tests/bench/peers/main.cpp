@@ -7,6 +7,7 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
+#include "tests/bench/codec/motion_options.h"
 #include "tests/bench/peers/peers.h"
 #include "tests/bench/table.h"
 
@@ -20,11 +21,27 @@ int main(int argc, char** argv) {
   app.add_option("--device", options.select, "Index or part of the name of the Vulkan device");
   CLI::App* massSpring =
       app.add_subcommand("mass_spring", "A frame of 1/60 s of a hung sheet: Bullet's soft body, and ours");
-  app.add_subcommand("codec", "Frames of the curtain at 0.5 mm: Draco, meshoptimizer, and ours");
+  bench::Settings settings;
+  std::uint32_t size = 0;
+  CLI::App* codec =
+      app.add_subcommand("codec", "Motions by raw floats, Draco, meshoptimizer, zstd, and ours");
+  CLI::App* curves = app.add_subcommand("codec_curves", "Bits against errors of the same, as pictures too");
+  for (CLI::App* one : {codec, curves}) {
+    bench::addMotionOptions(*one, settings);
+    one->add_option("--size", size, "Rows and columns of the grid, instead of 100")
+        ->check(CLI::Range(2, 4096));
+    one->add_flag("--json", json, "Print one JSON array of rows");
+  }
+  curves->add_option("--pictures", settings.pictures, "Directory that pictures go to")
+      ->check(CLI::ExistingDirectory)
+      ->capture_default_str();
   CLI11_PARSE(app, argc, argv);
+  if (size > 0) settings.size = size;
   try {
     vulkan::Device device(options);
-    const bench::Rows rows = *massSpring ? bench::compareMassSpring(options) : bench::compareCodecs(device);
+    const bench::Rows rows = *massSpring ? bench::compareMassSpring(options)
+                             : *codec    ? bench::compareCodecs(device, settings)
+                                         : bench::codecCurves(device, settings);
     if (json)
       fmt::print("{}\n", nlohmann::ordered_json(rows).dump(2));
     else

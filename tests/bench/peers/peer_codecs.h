@@ -2,32 +2,23 @@
 // Other libraries' codecs for the positions of a frame, at the same largest error.
 #pragma once
 
-#include <cstddef>
-#include <cstdint>
 #include <memory>
-#include <span>
 #include <vector>
+
+#include "proto/codec/stream_layout.h"
+#include "tests/bench/codec/frame_codec.h"
 
 namespace clothstream::bench {
 
-// A stream of frames of one grid, coded and decoded again.
-class PeerCodec {
- public:
-  virtual ~PeerCodec() = default;
-  virtual const char* name() const = 0;
-  virtual std::vector<std::byte> encode(std::span<const float> positions) = 0;
-  virtual void decode(std::span<const std::byte> packet, std::span<float> positions) = 0;
-};
+// Of the lattice that all but raw floats round to: its step is twice the max error, and it reaches 32,768
+// steps from the origin each way; whatever lies beyond ends the measurement.
+inline constexpr int kLatticeBits = 16;
 
-// step: distance of the lattice, m; it holds all positions from origin (3 floats) to origin + 2^bits steps.
-struct PeerLattice {
-  float origin[3];
-  float step;
-  int bits;
-};
+// Each knows the cloth beforehand, as ours do, but for Draco, which sends the triangles with each frame and
+// the vertices in an order of its own.
+std::vector<std::unique_ptr<FrameCodec>> peerCodecs(const codec::ClothLayout& cloth, double maxError);
 
-std::unique_ptr<PeerCodec> dracoMesh(std::uint32_t rows, std::uint32_t columns, const PeerLattice& lattice);
-// Differences to the frame before, in vertex codec version 0, alone or with zstd behind it.
-std::unique_ptr<PeerCodec> meshoptimizerDelta(std::uint32_t vertices, const PeerLattice& lattice, bool zstd);
+// 12 bytes a vertex; nothing is lost, whatever the max error.
+std::unique_ptr<FrameCodec> rawFloats();
 
 }  // namespace clothstream::bench

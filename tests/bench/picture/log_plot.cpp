@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
-// Curves over two logarithmic axes, as an SVG file.
+// Curves over two logarithmic axes, as SVG.
 #include "tests/bench/picture/log_plot.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <fstream>
@@ -13,19 +14,37 @@
 namespace clothstream::bench {
 namespace {
 
-constexpr int kWidth = 330, kHeight = 300, kLeft = 52, kBottom = 44, kTop = 28, kRight = 12, kLegend = 44;
+constexpr int kWidth = 330, kHeight = 300, kLeft = 52, kBottom = 44, kTop = 28, kRight = 12, kLegend = 44,
+              kLegendRow = 18;
 constexpr std::array kColours{"#1b6ca8", "#3aa6d0", "#7a4fa3", "#d1495b", "#2e8b57", "#c98a1b", "#666666"};
 
-// Whole decades about all values, and where a value lies between pixels.
+// Where a value lies between pixels, and where lines stand about all values: at whole decades, or, where
+// there are few of them, at 1, 2 and 5 of each.
 struct Axis {
-  int low = std::numeric_limits<int>::max(), high = std::numeric_limits<int>::min();
+  double least = std::numeric_limits<double>::max(), most = 0;
   double from = 0, to = 0;
 
   void include(double value) {
-    low = std::min(low, static_cast<int>(std::floor(std::log10(value))));
-    high = std::max(high, static_cast<int>(std::ceil(std::log10(value))));
+    least = std::min(least, value);
+    most = std::max(most, value);
   }
-  double at(double value) const { return from + (to - from) * (std::log10(value) - low) / (high - low); }
+  std::vector<double> lines() const {
+    const bool few = most < 100 * least;
+    std::vector<double> all;
+    for (int decade = static_cast<int>(std::floor(std::log10(least))); all.empty() || all.back() < most;
+         ++decade)
+      for (const int digit : {1, 2, 5}) {
+        const double value = digit * std::pow(10.0, decade);
+        if ((digit > 1 && !few) || (!all.empty() && all.back() >= most)) continue;
+        if (value <= least) all.clear();
+        all.push_back(value);
+      }
+    return all;
+  }
+  double at(double value) const {
+    const std::vector<double> all = lines();
+    return from + (to - from) * std::log(value / all.front()) / std::log(all.back() / all.front());
+  }
 };
 
 std::string text(double x, double y, std::string_view anchor, std::string_view what,
@@ -45,15 +64,14 @@ std::string panel(const LogPlot& plot, double offset, Axis across, Axis up) {
   up.from = kHeight - kBottom;
   up.to = kTop;
   std::string svg = text((across.from + across.to) / 2, 18, "middle", plot.title, " font-weight=\"bold\"");
-  for (int decade = across.low; decade <= across.high; ++decade) {
-    const double x = across.at(std::pow(10.0, decade));
-    svg += line(x, up.from, x, up.to) +
-           text(x, up.from + 15, "middle", fmt::format("{:g}", std::pow(10.0, decade)));
+  for (const double value : across.lines()) {
+    const double x = across.at(value);
+    svg += line(x, up.from, x, up.to) + text(x, up.from + 15, "middle", fmt::format("{:g}", value));
   }
-  for (int decade = up.low; decade <= up.high; ++decade) {
-    const double y = up.at(std::pow(10.0, decade));
-    svg += line(across.from, y, across.to, y) +
-           text(across.from - 5, y + 4, "end", fmt::format("{:g}", std::pow(10.0, decade)));
+  for (const double value : up.lines()) {
+    const double y = up.at(value);
+    svg +=
+        line(across.from, y, across.to, y) + text(across.from - 5, y + 4, "end", fmt::format("{:g}", value));
   }
   svg += text((across.from + across.to) / 2, up.from + 33, "middle", plot.across);
   svg += text(offset + 13, (up.from + up.to) / 2, "middle", plot.up,
@@ -73,7 +91,7 @@ std::string panel(const LogPlot& plot, double offset, Axis across, Axis up) {
 
 }  // namespace
 
-void writeSvg(std::span<const LogPlot> plots, const std::filesystem::path& file) {
+std::string svgOf(std::span<const LogPlot> plots) {
   Axis across, up;
   for (const LogPlot& plot : plots)
     for (const LogPlot::Curve& curve : plot.curves)
@@ -82,21 +100,31 @@ void writeSvg(std::span<const LogPlot> plots, const std::filesystem::path& file)
         up.include(y);
       }
   const int width = kWidth * static_cast<int>(plots.size());
+  const std::vector<LogPlot::Curve>& curves = plots.front().curves;
+  const auto longest =
+      std::ranges::max(curves, {}, [](const auto& curve) { return curve.name.size(); }).name.size();
+  const std::size_t perRow = std::clamp<std::size_t>(
+      (static_cast<std::size_t>(width) - kLeft) / (7 * longest + 24), 1, curves.size());
+  const int rows = static_cast<int>((curves.size() + perRow - 1) / perRow);
   std::string svg = fmt::format(
       "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {0} {1}\" width=\"{0}\" height=\"{1}\" "
       "font-family=\"sans-serif\" font-size=\"11\">\n<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n",
-      width, kHeight + kLegend);
+      width, kHeight + kLegend + (rows - 1) * kLegendRow);
   for (std::size_t i = 0; i < plots.size(); ++i)
     svg += panel(plots[i], kWidth * static_cast<double>(i), across, up);
-  const std::vector<LogPlot::Curve>& curves = plots.front().curves;
   for (std::size_t i = 0; i < curves.size(); ++i) {
-    const double x = kLeft + static_cast<double>(i) * (width - kLeft) / static_cast<double>(curves.size());
-    svg += fmt::format("<rect x=\"{:.1f}\" y=\"{}\" width=\"12\" height=\"4\" fill=\"{}\"/>\n", x,
-                       kHeight + 15, kColours[i % kColours.size()]) +
-           text(x + 16, kHeight + 21, "start", curves[i].name);
+    const double x = kLeft + static_cast<double>(i % perRow) * (width - kLeft) / static_cast<double>(perRow);
+    const double y = kHeight + 15 + static_cast<double>(i / perRow) * kLegendRow;
+    svg += fmt::format("<rect x=\"{:.1f}\" y=\"{}\" width=\"12\" height=\"4\" fill=\"{}\"/>\n", x, y,
+                       kColours[i % kColours.size()]) +
+           text(x + 16, y + 6, "start", curves[i].name);
   }
+  return svg + "</svg>\n";
+}
+
+void writeSvg(std::span<const LogPlot> plots, const std::filesystem::path& file) {
   std::ofstream out(file);
-  out << svg << "</svg>\n";
+  out << svgOf(plots);
   if (!out.flush()) throw std::runtime_error(fmt::format("{} cannot be written", file.string()));
 }
 

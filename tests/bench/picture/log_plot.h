@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Curves over two logarithmic axes, as an SVG file.
+// Curves over two logarithmic axes, as SVG.
 #pragma once
 
 #include <filesystem>
@@ -19,8 +19,10 @@ struct LogPlot {
   std::vector<Curve> curves;
 };
 
-// Side by side; all have the first one's names of curves, which stand below. Throws std::runtime_error where
-// it cannot be written.
+// Side by side; all have the first one's names of curves, which stand below.
+std::string svgOf(std::span<const LogPlot> plots);
+
+// Throws std::runtime_error where it cannot be written.
 void writeSvg(std::span<const LogPlot> plots, const std::filesystem::path& file);
 
 }  // namespace clothstream::bench

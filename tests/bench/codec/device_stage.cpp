@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Suite codec: size and cost of the frames of a curtain that a sphere swings through.
+// Suite codec_device: what the device's part of a frame costs, of a curtain that a sphere swings through.
 #include <algorithm>
 #include <stdexcept>
 #include <string>
@@ -68,7 +68,7 @@ nlohmann::ordered_json measure(vulkan::Device& device, const scene::Scene& scene
   }
   const double vertices = scene.nodeCount();
   nlohmann::ordered_json row{
-      {"suite", "codec"},
+      {"suite", "codec_device"},
       {"nodes", scene.nodeCount()},
       {"kind", kind == codec::PacketKind::key ? "key" : "predicted"},
       {"prediction", prediction == encode::Prediction::onHost ? "host" : "device"},
@@ -86,7 +86,7 @@ nlohmann::ordered_json measure(vulkan::Device& device, const scene::Scene& scene
 
 }  // namespace
 
-Rows runCodec(vulkan::Device& device, const Settings& settings) {
+Rows runCodecDevice(vulkan::Device& device, const Settings& settings) {
   Rows rows;
   // Codec 2 on the host and on the device, then codec 1.
   const std::pair<scene::Normals, encode::Prediction> ways[]{

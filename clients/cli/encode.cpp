@@ -1,0 +1,202 @@
+// SPDX-License-Identifier: MIT
+// Frame by frame: read, encode, decode, compare, write.
+#include "clients/cli/encode.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <numeric>
+#include <vector>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "clients/cli/complaint.h"
+#include "clients/cli/progress.h"
+#include "clients/cli/signals.h"
+#include "clients/files/motion_file.h"
+#include "clients/files/recording.h"
+#include "proto/codec/decoder.h"
+#include "proto/codec/encoder.h"
+#include "proto/codec/vertex_normals.h"
+
+namespace clothstream::cli {
+namespace {
+
+template <typename T>
+using Expected = tl::expected<T, Complaint>;
+
+// Coordinates as far from the origin as this have room in every codec, and floats that are fine enough.
+constexpr float kReach = 32, kReachInErrors = 65536;
+
+constexpr std::uint32_t kEpoch = 1;
+
+double millisecondsOf(const auto& work) {
+  const auto start = std::chrono::steady_clock::now();
+  work();
+  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+}
+
+Expected<float> maxErrorFor(const EncodeOptions& options, const files::MotionShape& shape,
+                            std::span<const float> first) {
+  const double edge = files::meanEdge(shape, first);
+  if (!options.maxError && !(edge > 0))
+    return complaint(
+        kUnreadable,
+        "{}: the first frame's edges have no length that a quality could be a part of; give --max-error",
+        options.motion);
+  const auto maxError = static_cast<float>(options.maxError.value_or(relativeError(options.quality) * edge));
+  if (!(maxError >= codec::kSmallestMaxError && maxError <= codec::kLargestMaxError))
+    return complaint(kUsage, "a max error of {} m is asked for; {} to {} m is allowed", maxError,
+                     codec::kSmallestMaxError, codec::kLargestMaxError);
+  return maxError;
+}
+
+// On which side of the cloth the motion's own normals of its first frame are.
+Expected<files::Side> sideOf(files::MotionReader& motion, const codec::StreamLayout& layout,
+                             std::span<const float> positions) {
+  const auto given = orComplaint(kUnreadable, motion.normals());
+  if (!given) return tl::unexpected(given.error());
+  std::vector<float> computed(positions.size());
+  codec::computeVertexNormals(layout, positions.data(), computed.data());
+  return std::inner_product(given->begin(), given->end(), computed.begin(), 0.0) < 0 ? files::Side::back
+                                                                                     : files::Side::front;
+}
+
+// What came of it.
+struct Figures {
+  files::MotionShape shape;
+  float maxError = 0;
+  std::uint64_t packetBytes = 0, keyBytes = 0, fileBytes = 0;
+  std::uint32_t keyFrames = 0;
+  double largestError = 0, encodeMs = 0, decodeMs = 0;
+
+  double promise() const { return std::sqrt(3.0) * double{maxError}; }
+  double bitsPerVertex(std::uint64_t bytes) const {
+    return 8 * static_cast<double>(bytes) / (1.0 * shape.frames * shape.vertexCount());
+  }
+
+  std::string text(const std::string& out) const {
+    const double seconds = 1.0 * shape.frames / files::kMotionRate;
+    return fmt::format(
+        "{}: {}x{} vertices, {} frames, {:.1f} s at {} Hz, max error {:.4g} mm\n"
+        "{:.3f} bits a vertex a frame, {:.3f} with all that the file has; {} bytes, {:.0f} kbit/s; {} key {} "
+        "of {} "
+        "bytes on average\n"
+        "no vertex farther than {:.4g} mm from where it should be, {:.4g} are promised\n"
+        "{:.3f} ms to encode a frame, {:.3f} ms to decode it",
+        out, shape.columns, shape.rows, shape.frames, seconds, files::kMotionRate, 1e3 * double{maxError},
+        bitsPerVertex(packetBytes), bitsPerVertex(fileBytes), fileBytes,
+        8e-3 * static_cast<double>(packetBytes) / seconds, keyFrames, keyFrames == 1 ? "frame" : "frames",
+        keyBytes / keyFrames, 1e3 * largestError, 1e3 * promise(), encodeMs / shape.frames,
+        decodeMs / shape.frames);
+  }
+
+  std::string json() const {
+    const nlohmann::ordered_json object{{"columns", shape.columns},
+                                        {"rows", shape.rows},
+                                        {"frames", shape.frames},
+                                        {"maxErrorMm", 1e3 * double{maxError}},
+                                        {"bitsPerVertex", bitsPerVertex(packetBytes)},
+                                        {"fileBytes", fileBytes},
+                                        {"keyFrames", keyFrames},
+                                        {"keyBytes", keyBytes / keyFrames},
+                                        {"measuredMaxErrorMm", 1e3 * largestError},
+                                        {"promisedMaxErrorMm", 1e3 * promise()},
+                                        {"encodeMs", encodeMs / shape.frames},
+                                        {"decodeMs", decodeMs / shape.frames}};
+    return object.dump(2);
+  }
+};
+
+double largestDistance(std::span<const float> a, std::span<const float> b) {
+  double largest = 0;
+  for (std::size_t i = 0; i < a.size(); i += 3) {
+    const auto off = [&](std::size_t c) { return double{a[i + c]} - double{b[i + c]}; };
+    largest = std::max(largest, off(0) * off(0) + off(1) * off(1) + off(2) * off(2));
+  }
+  return std::sqrt(largest);
+}
+
+Expected<void> encodeFrame(codec::Encoder& encoder, codec::Decoder& decoder, std::uint32_t frame,
+                           std::span<const float> positions, const EncodeOptions& options,
+                           std::span<std::byte> packet, files::RecordingWriter& out, Figures& figures) {
+  const float reach = std::max(kReach, kReachInErrors * figures.maxError);
+  const auto far = std::ranges::find_if(positions, [=](float x) { return std::abs(x) > reach; });
+  if (far != positions.end())
+    return complaint(
+        kUnreadable,
+        "{}: in frame {}, vertex {} has a coordinate of {} m; with this max error {} m are allowed",
+        options.motion, frame, (far - positions.begin()) / 3, *far, reach);
+  const bool key = frame == 0 || (options.keyEvery > 0 && frame % options.keyEvery == 0);
+  std::size_t bytes = 0;
+  figures.encodeMs += millisecondsOf([&] {
+    bytes = encoder.encode(frame + 1, key ? codec::PacketKind::key : codec::PacketKind::predicted, positions,
+                           {}, packet);
+  });
+  codec::DecodeResult result{};
+  figures.decodeMs += millisecondsOf([&] { result = decoder.decode(packet.first(bytes)); });
+  if (result != codec::DecodeResult::ok || decoder.reconstructionHash() != encoder.reconstructionHash())
+    return complaint(kHashMismatch, "frame {} is not decoded to what was encoded", frame);
+  figures.largestError = std::max(figures.largestError, largestDistance(positions, decoder.positions()));
+  if (figures.largestError > figures.promise())
+    return complaint(kHashMismatch, "in frame {} a vertex is {} m off; {} m are promised", frame,
+                     figures.largestError, figures.promise());
+  figures.packetBytes += bytes;
+  figures.keyFrames += key ? 1 : 0;
+  figures.keyBytes += key ? bytes : 0;
+  return orComplaint(kNotWritten, out.append(packet.first(bytes), encoder.reconstructionHash()));
+}
+
+Expected<Figures> encodeFile(const EncodeOptions& options) {
+  auto motion = orComplaint(kUnreadable, files::MotionReader::open(options.motion));
+  if (!motion) return tl::unexpected(motion.error());
+  auto positions = orComplaint(kUnreadable, motion->next());
+  if (!positions) return tl::unexpected(positions.error());
+  const auto maxError = maxErrorFor(options, motion->shape(), *positions);
+  if (!maxError) return tl::unexpected(maxError.error());
+  if (auto apart = areDifferent(options.motion, options.out); !apart) return tl::unexpected(apart.error());
+
+  Figures figures{.shape = motion->shape(), .maxError = *maxError};
+  const codec::StreamLayout layout{.epoch = kEpoch,
+                                   .codec = codec::kCodecHierarchical,
+                                   .maxError = *maxError,
+                                   .temporalLayers = options.layers,
+                                   .cloths = {figures.shape.cloth()}};
+  const auto side = sideOf(*motion, layout, *positions);
+  if (!side) return tl::unexpected(side.error());
+  auto out = orComplaint(
+      kNotWritten,
+      files::RecordingWriter::create(options.out, {layout, files::kMotionRate, figures.shape.frames, *side}));
+  if (!out) return tl::unexpected(out.error());
+  const auto encoder = codec::Encoder::make(layout);
+  const auto decoder = codec::Decoder::make(layout);
+  if (!encoder || !decoder)
+    return complaint(kLost, "there is no memory for {} vertices", figures.shape.vertexCount());
+  std::vector<std::byte> packet(encoder->packetBound());
+  Progress progress("encode", figures.shape.frames);
+  for (std::uint32_t frame = 0;;) {
+    if (auto done = encodeFrame(*encoder, *decoder, frame, *positions, options, packet, *out, figures); !done)
+      return tl::unexpected(done.error());
+    progress.show(++frame);
+    if (frame == figures.shape.frames) break;
+    if (interrupted())
+      return complaint(kNotWritten, "interrupted in frame {}; {} is not written", frame, options.out);
+    positions = orComplaint(kUnreadable, motion->next());
+    if (!positions) return tl::unexpected(positions.error());
+  }
+  if (auto done = orComplaint(kNotWritten, out->finish()); !done) return tl::unexpected(done.error());
+  figures.fileBytes = out->bytes();
+  return figures;
+}
+
+}  // namespace
+
+ExitCode encode(const EncodeOptions& options) {
+  const auto figures = encodeFile(options);
+  if (!figures) return say(figures.error());
+  fmt::print("{}\n", options.json ? figures->json() : figures->text(options.out));
+  return kOk;
+}
+
+}  // namespace clothstream::cli

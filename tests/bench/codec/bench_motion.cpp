@@ -1,0 +1,157 @@
+// SPDX-License-Identifier: MIT
+#include "tests/bench/codec/bench_motion.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <stdexcept>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "clients/files/motion_file.h"
+#include "server/messages/scene_file.h"
+#include "server/scene/mesh.h"
+#include "server/scene/stability.h"
+#include "tests/bench/cloth_motion.h"
+#include "tests/bench/simulated.h"
+
+namespace clothstream::bench {
+namespace {
+
+constexpr std::uint32_t kDefaultSize = 100;
+constexpr std::size_t kWithoutDevice = 4;
+
+struct Named {
+  const char* name;
+  const char* scene;  // of the server's; null: of cloth_motion.h
+  // Where a flag is in the air already.
+  std::uint32_t warmUp = 0;
+  float wind = 1, gust = 1;  // times that of the scene
+};
+
+constexpr std::array kMotions{Named{"drape", nullptr},
+                              Named{"curtain", nullptr},
+                              Named{"light_flag", nullptr},
+                              Named{"violent_flag", nullptr},
+                              Named{"simulated_drape", "sphere_drop"},
+                              Named{"simulated_curtain", "curtain"},
+                              Named{"simulated_light_flag", "flag", 72},
+                              Named{"simulated_violent_flag", "flag", 72, 2, 4},
+                              Named{"simulated_folds", "folds"},
+                              Named{"simulated_mesh", "tablecloth"}};
+
+BenchMotion played(const Named& named, const Settings& settings) {
+  MotionSettings motion{.name = named.name, .frames = settings.frames};
+  motion.size = settings.size.value_or(kDefaultSize);
+  const std::string_view name = named.name;
+  if (name == "curtain") motion.scene = MotionScene::curtain;
+  if (name.ends_with("flag")) motion.scene = MotionScene::flag;
+  if (name == "light_flag") motion.wind = 0.5;
+  return {named.name, {motion.size * motion.size, motion.size, motion.size, {}}, [motion](const auto& use) {
+            playMotion(motion, [&](std::uint32_t, std::span<const float> positions) { use(positions); });
+          }};
+}
+
+// The same cloth of size x size nodes: held at the same places, its balls as large beside its meshes.
+void resize(scene::Cloth& cloth, std::uint32_t size) {
+  const auto coarser = [&] {
+    return std::max(scene::spacing(cloth.grid).column, scene::spacing(cloth.grid).row);
+  };
+  const float before = coarser();
+  const auto scaled = [size](std::uint32_t place, std::uint32_t nodes) {
+    return static_cast<std::uint32_t>(std::lround(1.0 * place * (size - 1) / (nodes - 1)));
+  };
+  for (scene::GridRange& pins : cloth.pins) {
+    for (std::uint32_t* row : {&pins.firstRow, &pins.lastRow, &pins.rowStep})
+      *row = scaled(*row, cloth.grid.rows);
+    for (std::uint32_t* column : {&pins.firstColumn, &pins.lastColumn, &pins.columnStep})
+      *column = scaled(*column, cloth.grid.columns);
+    pins.rowStep = std::max(pins.rowStep, 1u);
+    pins.columnStep = std::max(pins.columnStep, 1u);
+  }
+  cloth.grid.rows = cloth.grid.columns = size;
+  if (cloth.selfCollision) cloth.selfCollision->radius *= coarser() / before;
+}
+
+scene::Scene sceneOf(const Named& named, const Settings& settings) {
+  auto loaded = messages::loadScene(named.scene);
+  if (!loaded) throw std::runtime_error(fmt::format("the scene {} is not there", named.scene));
+  scene::Scene scene = std::move(*loaded);
+  scene.environment.wind *= named.wind;
+  scene.environment.gust.strength *= named.gust;
+  scene::Cloth& cloth = scene.cloths.front();
+  if (!cloth.mesh) resize(cloth, settings.size.value_or(kDefaultSize));
+  const std::uint32_t substeps = scene::stableSubsteps(scene);
+  if (substeps == 0)
+    throw std::runtime_error(fmt::format("{} cannot be integrated at this size", named.name));
+  scene.substeps = std::max(scene.substeps, substeps);
+  return scene;
+}
+
+BenchMotion simulated(vulkan::Device& device, const Named& named, const Settings& settings) {
+  const scene::Scene scene = sceneOf(named, settings);
+  const scene::Cloth& cloth = scene.cloths.front();
+  codec::ClothLayout layout{cloth.nodeCount(), cloth.grid.rows, cloth.grid.columns, {}};
+  if (cloth.mesh) {
+    layout.rows = layout.columns = 0;
+    for (const scene::Triangle& triangle : cloth.mesh->shape.triangles)
+      layout.triangles.insert(layout.triangles.end(), triangle.begin(), triangle.end());
+    for (const scene::Vec3& position : cloth.mesh->shape.positions)
+      layout.restPositions.insert(layout.restPositions.end(), {position.x(), position.y(), position.z()});
+  }
+  return {named.name, layout,
+          [&device, scene, warmUp = named.warmUp, frames = settings.frames](const auto& use) {
+            Simulated simulated(device, scene, {});
+            std::vector<float> positions(3 * std::size_t{scene.nodeCount()});
+            for (std::uint32_t tick = 0; tick < warmUp + frames; ++tick) {
+              simulated.tick(inputsAt(scene, tick));
+              if (tick < warmUp) continue;
+              const simulation::NodeState state = simulated.state();
+              for (std::size_t node = 0; node < state.positions.size(); ++node)
+                for (int axis = 0; axis < 3; ++axis)
+                  positions[3 * node + static_cast<std::size_t>(axis)] = state.positions[node][axis];
+              use(positions);
+            }
+          }};
+}
+
+BenchMotion read(const std::filesystem::path& path, const Settings& settings) {
+  const auto open = [path] {
+    auto reader = files::MotionReader::open(path);
+    if (!reader) throw std::runtime_error(reader.error());
+    return std::move(*reader);
+  };
+  return {path.stem().string(), open().shape().cloth(), [open, most = settings.frames](const auto& use) {
+            files::MotionReader reader = open();
+            for (std::uint32_t frame = 0; frame < std::min(most, reader.shape().frames); ++frame) {
+              const auto positions = reader.next();
+              if (!positions) throw std::runtime_error(positions.error());
+              use(*positions);
+            }
+          }};
+}
+
+}  // namespace
+
+std::vector<std::string> motionNames() {
+  std::vector<std::string> names;
+  for (const Named& named : kMotions) names.emplace_back(named.name);
+  return names;
+}
+
+std::vector<BenchMotion> chosenMotions(vulkan::Device& device, const Settings& settings) {
+  if (settings.input) return {read(*settings.input, settings)};
+  std::vector<std::string> names = settings.motions;
+  if (names.empty()) names = motionNames(), names.resize(kWithoutDevice);
+  std::vector<BenchMotion> motions;
+  for (const std::string& name : names) {
+    const auto named = std::ranges::find(kMotions, name, &Named::name);
+    if (named == kMotions.end()) throw std::runtime_error(fmt::format("there is no motion {}", name));
+    motions.push_back(named->scene == nullptr ? played(*named, settings)
+                                              : simulated(device, *named, settings));
+  }
+  return motions;
+}
+
+}  // namespace clothstream::bench

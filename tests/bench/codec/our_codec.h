@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: MIT
+// Our codecs as they are measured.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "proto/codec/decoder.h"
+#include "proto/codec/encoder.h"
+#include "tests/bench/codec/frame_codec.h"
+
+namespace clothstream::bench {
+
+class OurCodec final : public FrameCodec {
+ public:
+  explicit OurCodec(const codec::StreamLayout& layout);
+
+  std::string name() const override;
+  double promise() const override;
+  std::span<const std::byte> encode(const TrueFrame& frame) override;
+  std::span<const float> decode(std::span<const std::byte> packet) override;
+  std::span<const float> normals() const override;
+  void check() const override;
+
+ private:
+  codec::StreamLayout layout_;
+  std::unique_ptr<codec::Encoder> encoder_;
+  std::unique_ptr<codec::Decoder> decoder_;
+  std::vector<std::byte> packet_;
+};
+
+}  // namespace clothstream::bench
