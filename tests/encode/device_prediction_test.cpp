@@ -94,6 +94,23 @@ TEST_F(DevicePrediction, EqualsTheReferenceAtAnyMaxErrorAndWhereResidualsAreWide
   }
 }
 
+TEST_F(DevicePrediction, EqualsTheReferenceHalfWayBetweenUnits) {
+  scene::Scene scene = squareOf(16);
+  // A unit is 2^-18 m then (codec::hierarchical::latticeUnit()): metres are exactly so many and a half.
+  scene.stream.maxError = 261 * 0x1p-19f;
+  Playing playing(scene);
+  std::mt19937 random(4);
+  std::uniform_int_distribution<int> halves(-400'000, 400'000), beyond(-3, 3);
+  for (std::uint64_t tick = 1; tick <= 8 && !HasFailure(); ++tick) {
+    std::vector<float> positions;
+    for (std::uint32_t i = 0; i < 3 * playing.layout.vertexCount(); ++i) {
+      const float x = static_cast<float>(halves(random)) * 0x1p-19f;
+      positions.push_back(tick % 2 == 0 ? x : std::nextafter(x, static_cast<float>(beyond(random))));
+    }
+    playing.show(positions, tick);
+  }
+}
+
 // Triangles that share no vertex: the first phase has one of each, more than a small phase.
 scene::Cloth confetti(std::uint32_t triangles) {
   scene::MeshShape shape;
