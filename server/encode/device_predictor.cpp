@@ -32,6 +32,9 @@ using Row = std::array<std::uint32_t, 4>;
 constexpr std::uint32_t kSmallPhase = 512;
 constexpr std::uint32_t kWorkgroupSize = 64, kSmallPhasesWorkgroupSize = 128;
 
+// A word for each number of the model.
+constexpr std::size_t kScaleWords = sizeof codec::hierarchical::kScaleWeights / sizeof(std::int16_t);
+
 constexpr std::size_t momentBytes(std::size_t vertices) {
   return (vertices + 1 + shared::kRecordRows * vertices) * sizeof(Row);
 }
@@ -93,9 +96,7 @@ DevicePredictor::DevicePredictor(const vulkan::Device& device, const simulation:
       finish_(device, describe("finish_records", kernels::finish_records, false, 6)) {
   if (!supports(device, layout))
     throw std::runtime_error(
-        "codec 2 is predicted on the host where there are normals or temporal layers, or more vertices than "
-        "the "
-        "device's buffers hold");
+        "codec 2 is predicted on the host where there are normals, temporal layers or very many vertices");
   if (!hierarchy_.build(layout)) throw std::bad_alloc();
   const std::size_t n = vertices_, phases = hierarchy_.phases.size();
   const auto table = [&](Buffer& buffer, Buffer& upload, std::size_t bytes) {
@@ -104,7 +105,7 @@ DevicePredictor::DevicePredictor(const vulkan::Device& device, const simulation:
   };
   table(links_, linksUpload_, shared::kLinkRows * n * sizeof(Row));
   table(slotTable_, slotTableUpload_, 2 * n * sizeof(std::uint32_t));
-  table(model_, modelUpload_, sizeof codec::hierarchical::kScaleWeights / 2 * 4 + phases * sizeof(Row));
+  table(model_, modelUpload_, kScaleWords * sizeof(std::uint32_t) + phases * sizeof(Row));
   for (Buffer& moment : moments_) moment = Buffer(device, BufferPurpose::state, momentBytes(n));
   wanted_ = Buffer(device, BufferPurpose::state, n * sizeof(Row));
   status_ = Buffer(device, BufferPurpose::state, sizeof(shared::SlotStatus));
