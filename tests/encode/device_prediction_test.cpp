@@ -219,7 +219,7 @@ TEST_F(DevicePrediction, EqualsTheReferenceWhereAnotherThreadCodes) {
   }
 }
 
-TEST_F(DevicePrediction, RefusesTemporalLayersAndNormals) {
+TEST_F(DevicePrediction, RefusesTemporalLayers) {
   const scene::Scene scene = squareOf(4);
   const simulation::ClothSimulation simulation(device(), scene);
   codec::StreamLayout layout = Encoding::layoutOf(scene, {});
@@ -227,10 +227,6 @@ TEST_F(DevicePrediction, RefusesTemporalLayersAndNormals) {
   EXPECT_THROW(encode::FrameEncoder(device(), simulation, layout, encode::Prediction::onDevice),
                std::runtime_error);
   EXPECT_NO_THROW(encode::FrameEncoder(device(), simulation, layout));
-  layout.temporalLayers = 1;
-  layout.normals = codec::NormalMode::octahedral;
-  EXPECT_THROW(encode::FrameEncoder(device(), simulation, layout, encode::Prediction::onDevice),
-               std::runtime_error);
 }
 
 }  // namespace

@@ -28,7 +28,9 @@ INSTANTIATE_TEST_SUITE_P(
                     Sort{"latticeWithNormals", codec::kCodecLatticeZstd, scene::Normals::octahedral},
                     Sort{"hierarchical", codec::kCodecHierarchical, scene::Normals::none},
                     Sort{"hierarchicalOnDevice", codec::kCodecHierarchical, scene::Normals::none,
-                         encode::Prediction::onDevice}),
+                         encode::Prediction::onDevice},
+                    Sort{"hierarchicalOnDeviceWithNormals", codec::kCodecHierarchical,
+                         scene::Normals::octahedral, encode::Prediction::onDevice}),
     [](const auto& chosen) { return chosen.param.name; });
 
 TEST_P(FrameEncoder, MakesThePacketsOfTheReferenceEncoder) {
