@@ -32,7 +32,13 @@ using Row = std::array<std::uint32_t, 4>;
 
 // What one workgroup takes at a time: larger phases are dispatches of their own.
 constexpr std::uint32_t kSmallPhase = 512;
-constexpr std::uint32_t kWorkgroupSize = 64, kSmallPhasesWorkgroupSize = 128;
+constexpr std::uint32_t kWorkgroupSize = 64;
+
+// Two turns for a small phase, where the device has so many invocations.
+std::uint32_t smallPhasesWorkgroupSize(const vulkan::Device& device) {
+  return std::min(
+      {kSmallPhase / 2, device.limits().maxWorkgroupInvocations, device.limits().maxWorkgroupSizeX});
+}
 
 // A word for each number of the model.
 constexpr std::size_t kScaleWords = sizeof codec::hierarchical::kScaleWeights / sizeof(std::int16_t);
@@ -92,7 +98,7 @@ DevicePredictor::DevicePredictor(const vulkan::Device& device, const simulation:
       quantise_(device, describe("quantise_slots", kernels::quantise_slots, true, 5)),
       predictPhase_(device, describe("predict_phase", kernels::predict_phase, false, 10)),
       predictSmallPhases_(device, describe("predict_small_phases", kernels::predict_small_phases, false, 10,
-                                           kSmallPhasesWorkgroupSize)),
+                                           smallPhasesWorkgroupSize(device))),
       sumProducts_(device, describe("sum_products", kernels::sum_products, false, 9)),
       predictNormals_(device, describe("predict_normals", kernels::predict_normals, true, 6)),
       finish_(device, describe("finish_records", kernels::finish_records, false, 7)) {
@@ -166,7 +172,7 @@ void DevicePredictor::makeSteps() {
     if (isSmall && !steps_.empty() && steps_.back().isSmall)
       steps_.back().endPhase = i + 1;
     else
-      steps_.push_back({i, i + 1, isSmall ? kSmallPhasesWorkgroupSize : size, isSmall});
+      steps_.push_back({i, i + 1, isSmall ? predictSmallPhases_.workgroupSize() : size, isSmall});
   }
 }
 
