@@ -44,7 +44,8 @@ NormalTables makeNormalTables(const codec::StreamLayout& layout,
   NormalTables tables{.faces = facesOf(layout), .facesOf = {}};
   const std::uint32_t vertices = layout.vertexCount();
   std::vector<std::uint32_t> next(vertices + 1, 0);
-  for (const Face& face : tables.faces) forEachCorner(face, [&](std::uint32_t vertex) { ++next[vertex + 1]; });
+  for (const Face& face : tables.faces)
+    forEachCorner(face, [&](std::uint32_t vertex) { ++next[vertex + 1]; });
   next[0] = vertices + 1;
   for (std::uint32_t v = 0; v < vertices; ++v) next[v + 1] += next[v];
   tables.facesOf = next;

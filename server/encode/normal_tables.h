@@ -13,7 +13,8 @@ namespace clothstream::encode {
 
 struct NormalTables {
   std::vector<std::array<std::uint32_t, 4>> faces;  // slots of the corners; shared::kNoCorner
-  // By vertex: where its faces start, and where those of the last end; then these, one vertex after the other.
+  // By vertex: where its faces start, and where those of the last end; then these, one vertex after the
+  // other.
   std::vector<std::uint32_t> facesOf;
 };
 
