@@ -10,11 +10,13 @@
 #include <stdexcept>
 
 #include "kernels/finish_records.h"
+#include "kernels/predict_normals.h"
 #include "kernels/predict_phase.h"
 #include "kernels/predict_small_phases.h"
 #include "kernels/quantise_slots.h"
 #include "kernels/sum_products.h"
 #include "proto/codec/hierarchical/residual_model.h"
+#include "server/encode/normal_tables.h"
 
 namespace clothstream::encode {
 namespace {
@@ -30,17 +32,25 @@ using Row = std::array<std::uint32_t, 4>;
 
 // What one workgroup takes at a time: larger phases are dispatches of their own.
 constexpr std::uint32_t kSmallPhase = 512;
-constexpr std::uint32_t kWorkgroupSize = 64, kSmallPhasesWorkgroupSize = 128;
+constexpr std::uint32_t kWorkgroupSize = 64;
+
+// Two turns for a small phase, where the device has so many invocations.
+std::uint32_t smallPhasesWorkgroupSize(const vulkan::Device& device) {
+  return std::min(
+      {kSmallPhase / 2, device.limits().maxWorkgroupInvocations, device.limits().maxWorkgroupSizeX});
+}
+
+// A word for each number of the model.
+constexpr std::size_t kScaleWords = sizeof codec::hierarchical::kScaleWeights / sizeof(std::int16_t);
 
 constexpr std::size_t momentBytes(std::size_t vertices) {
   return (vertices + 1 + shared::kRecordRows * vertices) * sizeof(Row);
 }
 
-vulkan::KernelDescription describe(const char* name, std::span<const std::uint32_t> spirv,
-                                   bool readsPositions, std::size_t bindings,
-                                   std::uint32_t workgroupSize = kWorkgroupSize) {
+vulkan::KernelDescription describe(const char* name, std::span<const std::uint32_t> spirv, bool readsTexels,
+                                   std::size_t bindings, std::uint32_t workgroupSize = kWorkgroupSize) {
   std::vector<BindingKind> kinds(bindings, BindingKind::storage);
-  if (readsPositions) kinds[0] = BindingKind::texels;
+  if (readsTexels) kinds[0] = BindingKind::texels;
   return {.name = name,
           .spirv = spirv,
           .bindings = std::move(kinds),
@@ -75,8 +85,7 @@ static_assert(shared::kClasses == codec::hierarchical::kWeightClasses &&
 
 bool DevicePredictor::supports(const vulkan::Device& device, const codec::StreamLayout& layout) {
   const vulkan::Limits& limits = device.limits();
-  return layout.temporalLayers == 1 && layout.normals == codec::NormalMode::none &&
-         momentBytes(layout.vertexCount()) <= limits.maxStorageRange &&
+  return layout.temporalLayers == 1 && momentBytes(layout.vertexCount()) <= limits.maxStorageRange &&
          layout.vertexCount() <= std::uint64_t{limits.maxDispatchX} * kWorkgroupSize;
 }
 
@@ -84,18 +93,18 @@ DevicePredictor::DevicePredictor(const vulkan::Device& device, const simulation:
                                  const codec::StreamLayout& layout)
     : simulation_(simulation),
       vertices_(layout.vertexCount()),
+      hasNormals_(layout.normals == codec::NormalMode::octahedral),
       unit_(codec::hierarchical::latticeUnit(layout.maxError)),
       quantise_(device, describe("quantise_slots", kernels::quantise_slots, true, 5)),
       predictPhase_(device, describe("predict_phase", kernels::predict_phase, false, 10)),
       predictSmallPhases_(device, describe("predict_small_phases", kernels::predict_small_phases, false, 10,
-                                           kSmallPhasesWorkgroupSize)),
+                                           smallPhasesWorkgroupSize(device))),
       sumProducts_(device, describe("sum_products", kernels::sum_products, false, 9)),
-      finish_(device, describe("finish_records", kernels::finish_records, false, 6)) {
+      predictNormals_(device, describe("predict_normals", kernels::predict_normals, true, 6)),
+      finish_(device, describe("finish_records", kernels::finish_records, false, 7)) {
   if (!supports(device, layout))
     throw std::runtime_error(
-        "codec 2 is predicted on the host where there are normals or temporal layers, or more vertices than "
-        "the "
-        "device's buffers hold");
+        "codec 2 is predicted on the host where there are temporal layers or very many vertices");
   if (!hierarchy_.build(layout)) throw std::bad_alloc();
   const std::size_t n = vertices_, phases = hierarchy_.phases.size();
   const auto table = [&](Buffer& buffer, Buffer& upload, std::size_t bytes) {
@@ -104,9 +113,10 @@ DevicePredictor::DevicePredictor(const vulkan::Device& device, const simulation:
   };
   table(links_, linksUpload_, shared::kLinkRows * n * sizeof(Row));
   table(slotTable_, slotTableUpload_, 2 * n * sizeof(std::uint32_t));
-  table(model_, modelUpload_, sizeof codec::hierarchical::kScaleWeights / 2 * 4 + phases * sizeof(Row));
+  table(model_, modelUpload_, kScaleWords * sizeof(std::uint32_t) + phases * sizeof(Row));
   for (Buffer& moment : moments_) moment = Buffer(device, BufferPurpose::state, momentBytes(n));
   wanted_ = Buffer(device, BufferPurpose::state, n * sizeof(Row));
+  sentNormals_ = Buffer(device, BufferPurpose::state, n * sizeof(std::uint32_t));
   status_ = Buffer(device, BufferPurpose::state, sizeof(shared::SlotStatus));
   weights_ = Buffer(device, BufferPurpose::state, shared::kAllWeights * sizeof(std::int32_t));
   for (Slot& slot : slots_) {
@@ -121,6 +131,7 @@ DevicePredictor::DevicePredictor(const vulkan::Device& device, const simulation:
   }
   makeSteps();
   makeBindings(device);
+  if (hasNormals_) makeNormals(device, layout);
 
   push_.vertexCount = vertices_;
   push_.stepBits = static_cast<std::uint32_t>(unit_.stepBits);
@@ -128,6 +139,29 @@ DevicePredictor::DevicePredictor(const vulkan::Device& device, const simulation:
   const double mantissa = std::frexp(codec::hierarchical::quantisationScale(unit_.unit), &exponent);
   push_.scale = static_cast<std::uint32_t>(std::ldexp(mantissa, codec::hierarchical::kScaleBits));
   push_.scaleShift = static_cast<std::uint32_t>(codec::hierarchical::kScaleBits - exponent);
+}
+
+void DevicePredictor::makeNormals(const vulkan::Device& device, const codec::StreamLayout& layout) {
+  const NormalTables tables = makeNormalTables(layout, hierarchy_);
+  const auto fill = [&](const auto& table, Buffer& buffer, Buffer& upload) {
+    // Never empty: there may be no face.
+    const std::size_t bytes = std::max(std::span(table).size_bytes(), sizeof(Row));
+    buffer = Buffer(device, BufferPurpose::state, bytes);
+    upload = Buffer(device, BufferPurpose::upload, bytes);
+    std::ranges::copy(std::as_bytes(std::span(table)), upload.mapped().begin());
+  };
+  fill(tables.faces, faces_, facesUpload_);
+  fill(tables.facesOf, facesOf_, facesOfUpload_);
+  for (Slot& slot : slots_)
+    slot.normalResiduals = Buffer(device, BufferPurpose::readback, vertices_ * sizeof(std::uint32_t));
+  for (std::uint32_t turn = 0; turn < 2; ++turn) {
+    for (const Slot& slot : slots_) {
+      normalBindings_.emplace_back(
+          device, predictNormals_,
+          std::initializer_list<const Buffer*>{&simulation_.normals(), &moments_[1 - turn], &faces_,
+                                               &facesOf_, &sentNormals_, &slot.normalResiduals});
+    }
+  }
 }
 
 void DevicePredictor::makeSteps() {
@@ -138,7 +172,7 @@ void DevicePredictor::makeSteps() {
     if (isSmall && !steps_.empty() && steps_.back().isSmall)
       steps_.back().endPhase = i + 1;
     else
-      steps_.push_back({i, i + 1, isSmall ? kSmallPhasesWorkgroupSize : size, isSmall});
+      steps_.push_back({i, i + 1, isSmall ? predictSmallPhases_.workgroupSize() : size, isSmall});
   }
 }
 
@@ -166,9 +200,9 @@ void DevicePredictor::makeBindings(const vulkan::Device& device) {
           std::initializer_list<const Buffer*>{&links_, &past, &made, &wanted_, &status_, &weights_,
                                                &slotTable_, &slot.chunks, &slot.products});
     }
-    finishBindings_.emplace_back(
-        device, finish_,
-        std::initializer_list<const Buffer*>{&links_, &past, &made, &slotTable_, &status_, &weights_});
+    finishBindings_.emplace_back(device, finish_,
+                                 std::initializer_list<const Buffer*>{&links_, &past, &made, &slotTable_,
+                                                                      &status_, &weights_, &sentNormals_});
   }
 }
 
@@ -201,6 +235,11 @@ void DevicePredictor::uploadTables(vulkan::Recorder& recorder) {
   recorder.copy(slotTableUpload_, slotTable_, slotTable_.bytes());
   recorder.copy(modelUpload_, model_, model_.bytes());
   recorder.fill(wanted_, 0, wanted_.bytes());
+  recorder.fill(sentNormals_, 0, sentNormals_.bytes());
+  if (hasNormals_) {
+    recorder.copy(facesUpload_, faces_, faces_.bytes());
+    recorder.copy(facesOfUpload_, facesOf_, facesOf_.bytes());
+  }
   // The origin, after the last node.
   for (const Buffer& moment : moments_) recorder.fill(moment, 0, sizeof(Row), vertices_ * sizeof(Row));
 }
@@ -234,7 +273,8 @@ void DevicePredictor::record(vulkan::Recorder& recorder, std::uint32_t slot, std
   }
   recorder.barrier();
   recorder.dispatch(sumBindings_[kFrameSlots * turn + slot], push_, kWorkgroupSize * chunks.size());
-  recorder.barrier();  // it changes the weights
+  if (hasNormals_) recorder.dispatch(normalBindings_[kFrameSlots * turn + slot], push_, vertices_);
+  recorder.barrier();  // what follows changes the weights
   recorder.dispatch(finishBindings_[turn], push_, std::max(vertices_, shared::kClassWeights));
   recorder.barrier();
   recorder.copy(status_, to.status, status_.bytes());
@@ -247,6 +287,10 @@ const shared::SlotStatus& DevicePredictor::status(std::uint32_t slot) const {
 
 codec::hierarchical::ChunkProducts DevicePredictor::products(std::uint32_t slot, std::size_t chunk) const {
   return slots_[slot].products.mapped<codec::hierarchical::ChunkProducts>()[chunk];
+}
+
+std::span<const std::uint32_t> DevicePredictor::normalResiduals(std::uint32_t slot) const {
+  return slots_[slot].normalResiduals.mapped<std::uint32_t>();
 }
 
 bool DevicePredictor::read(std::uint32_t slot, std::uint32_t begin, std::uint32_t count,

@@ -25,7 +25,7 @@ class DevicePredictor {
   DevicePredictor(const vulkan::Device& device, const simulation::ClothSimulation& simulation,
                   const codec::StreamLayout& layout);
 
-  // One temporal layer, no normals, no more than the device's buffers and dispatches hold.
+  // One temporal layer, no more than the device's buffers and dispatches hold.
   static bool supports(const vulkan::Device& device, const codec::StreamLayout& layout);
 
   struct FrameWeights {
@@ -39,6 +39,8 @@ class DevicePredictor {
   // Of a slot whose recording is complete.
   const shared::SlotStatus& status(std::uint32_t slot) const;
   codec::hierarchical::ChunkProducts products(std::uint32_t slot, std::size_t chunk) const;
+  // By vertex: what u and v of its normal are off the prediction, a byte each; empty where there are none.
+  std::span<const std::uint32_t> normalResiduals(std::uint32_t slot) const;
   // Returns whether one of them stays or has a residual that is not 0.
   bool read(std::uint32_t slot, std::uint32_t begin, std::uint32_t count,
             codec::hierarchical::ChunkResiduals& out) const;
@@ -48,7 +50,7 @@ class DevicePredictor {
  private:
   // Read back of a frame, and brought to it.
   struct Slot {
-    vulkan::Buffer status, residuals, wideResiduals, products;
+    vulkan::Buffer status, residuals, wideResiduals, normalResiduals, products;
     vulkan::Buffer weights, chunks;
   };
   // Phases that one dispatch takes: a large one, or several small ones in one workgroup.
@@ -58,23 +60,26 @@ class DevicePredictor {
   };
 
   void makeSteps();
+  void makeNormals(const vulkan::Device& device, const codec::StreamLayout& layout);
   void makeBindings(const vulkan::Device& device);
   void uploadTables(vulkan::Recorder& recorder);
 
   const simulation::ClothSimulation& simulation_;
   std::uint32_t vertices_;
+  bool hasNormals_;
   codec::hierarchical::LatticeUnit unit_;
   codec::hierarchical::Hierarchy hierarchy_;
   std::vector<Step> steps_;
 
   std::array<vulkan::Buffer, 2> moments_;  // of the reference and of the frame, by turns
   vulkan::Buffer links_, linksUpload_, slotTable_, slotTableUpload_, model_, modelUpload_;
-  vulkan::Buffer wanted_, status_, weights_;
+  vulkan::Buffer wanted_, status_, weights_, sentNormals_;
+  vulkan::Buffer faces_, facesUpload_, facesOf_, facesOfUpload_;  // where there are normals
   std::array<Slot, kFrameSlots> slots_;
-  vulkan::Kernel quantise_, predictPhase_, predictSmallPhases_, sumProducts_, finish_;
+  vulkan::Kernel quantise_, predictPhase_, predictSmallPhases_, sumProducts_, predictNormals_, finish_;
   // By the present positions, then the turn; by the turn, then the slot; by the turn.
   std::vector<vulkan::Bindings> quantiseBindings_, phaseBindings_, smallPhaseBindings_, sumBindings_,
-      finishBindings_;
+      normalBindings_, finishBindings_;
 
   shared::PredictPush push_{};
   std::uint32_t turn_ = 0;  // whose moment is the reference's

@@ -83,6 +83,8 @@ EncodedFrame HierarchicalDeviceStage::entropyCode(const RecordedFrame& frame, st
     any = writePhase(frame.slot, hierarchy.phases[i]) || any;
     if (i + 1 == hierarchy.coarsePhases) writer_.endCoarse();
   }
+  for (const std::uint32_t normal : predictor_.normalResiduals(frame.slot))
+    writer_.addNormal(static_cast<std::int8_t>(normal), static_cast<std::int8_t>(normal >> 8));
   std::array<Phase, FitSchedule::kMaxChunks> chunks;
   const std::size_t count = fitted_.select(sinceKey_, chunks);
   for (std::size_t i = 0; i < count; ++i)

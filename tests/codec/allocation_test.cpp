@@ -48,11 +48,11 @@ void operator delete(void* memory, std::size_t) noexcept {
 namespace clothstream::codec {
 namespace {
 
-void expectAllocationOnlyAtConstruction(const StreamLayout& layout) {
+void expectAllocationOnlyAtConstruction(const StreamLayout& layout, const EncoderOptions& options = {}) {
   const std::vector<MotionFrame> frames{sampleMotion(layout, 1, 0.1f), sampleMotion(layout, 2, 0.1f),
                                         scatter(layout, 1, 30.0f), sampleMotion(layout, 3, 0.1f)};
   const std::size_t before = allocations;
-  const auto encoder = Encoder::make(layout);
+  const auto encoder = Encoder::make(layout, options);
   const auto decoder = Decoder::make(layout);
   std::vector<std::byte> packet(encoder->packetBound());
   ASSERT_GT(allocations, before + 10);  // they are counted
@@ -84,6 +84,10 @@ TEST(Allocation, OfTemporalLayersHappensOnlyAtConstruction) {
   StreamLayout layout = mixedLayout(NormalMode::none, kCodecHierarchical);
   layout.temporalLayers = 3;
   expectAllocationOnlyAtConstruction(layout);
+}
+
+TEST(Allocation, WhereWeightsLagHappensOnlyAtConstruction) {
+  expectAllocationOnlyAtConstruction(mixedLayout(NormalMode::none, kCodecHierarchical), {.weightLag = 3});
 }
 
 }  // namespace

@@ -41,6 +41,8 @@ std::size_t FrameWriter::packetBound() const {
 void FrameWriter::begin() {
   symbols_.shrink(0);
   bits_ = BitWriter(extra_.data());
+  normalScales_ = {};
+  normals_ = 0;
 }
 
 void FrameWriter::beginPhase() {
@@ -99,23 +101,19 @@ void FrameWriter::code(const ChunkResiduals& chunk, Component component, std::si
   symbols_.add(coder, distributionOf(component, scale), symbol);
 }
 
-void FrameWriter::addNormals(std::span<const FacedNormal> predicted, std::span<const FacedNormal> normals) {
-  std::array<NormalScale, 2> scales;
-  for (std::size_t vertex = 0; vertex < normals.size(); ++vertex) {
-    const Octahedral &expected = predicted[vertex].octahedral, &actual = normals[vertex].octahedral;
-    const std::array<int, 2> differences{actual.u - expected.u, actual.v - expected.v};
-    for (std::size_t c = 0; c < 2; ++c) {
-      const auto residual = static_cast<std::int8_t>(differences[c]);
-      const std::uint32_t scale = scales[c].scale();
-      const unsigned raw = rawBits(scale);
-      const std::uint32_t number = zigzag(residual);
-      const std::uint32_t symbol = std::min(number >> raw, kEscape);
-      if (symbol == kEscape) bits_.putGamma((number >> raw) - kEscape, kEscapeGammaBits);
-      if (raw > 0) bits_.put(number & ((1u << raw) - 1), raw);
-      symbols_.add((2 * vertex + c) % kCoders, distributionOf(kAlongU, scale), symbol);
-      scales[c].add(residual);
-    }
+void FrameWriter::addNormal(std::int8_t u, std::int8_t v) {
+  const std::array<std::int8_t, 2> residuals{u, v};
+  for (std::size_t c = 0; c < 2; ++c) {
+    const std::uint32_t scale = normalScales_[c].scale();
+    const unsigned raw = rawBits(scale);
+    const std::uint32_t number = zigzag(residuals[c]);
+    const std::uint32_t symbol = std::min(number >> raw, kEscape);
+    if (symbol == kEscape) bits_.putGamma((number >> raw) - kEscape, kEscapeGammaBits);
+    if (raw > 0) bits_.put(number & ((1u << raw) - 1), raw);
+    symbols_.add((2 * normals_ + c) % kCoders, distributionOf(kAlongU, scale), symbol);
+    normalScales_[c].add(residuals[c]);
   }
+  ++normals_;
 }
 
 std::size_t FrameWriter::write(const FrameRole& role, std::span<const std::byte> weights,

@@ -29,7 +29,7 @@ struct ChunkResiduals {
   bool anyStays = false;
 };
 
-// A frame is begin(), then for each phase beginPhase(), add() for its chunks and endPhase(), addNormals()
+// A frame is begin(), then for each phase beginPhase(), add() for its chunks and endPhase(), addNormal()
 // where the stream has them, then write().
 class FrameWriter {
  public:
@@ -44,8 +44,8 @@ class FrameWriter {
   void endPhase(bool any);
   // That was the last phase of coarse vertices.
   void endCoarse();
-  // By vertex, each two on the same octahedron.
-  void addNormals(std::span<const FacedNormal> predicted, std::span<const FacedNormal> normals);
+  // In the order of vertices: what u and v are off the prediction, modulo 256.
+  void addNormal(std::int8_t u, std::int8_t v);
   // The packet; `weights` is its first section.
   std::size_t write(const FrameRole& role, std::span<const std::byte> weights, std::span<std::byte> out);
 
@@ -57,6 +57,8 @@ class FrameWriter {
   std::vector<std::byte> extra_;
   BitWriter bits_, bitsBefore_;  // before the phase
   std::size_t symbolsBefore_ = 0;
+  std::array<NormalScale, 2> normalScales_;
+  std::uint32_t normals_ = 0;  // that were added
   // What coarse vertices take.
   std::size_t coarseSymbols_ = 0, coarseBytes_ = 0;
 };

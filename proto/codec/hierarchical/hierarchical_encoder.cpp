@@ -376,9 +376,13 @@ void HierarchicalEncoder::State::fitTo(std::uint32_t weightClass, const FeatureV
 
 void HierarchicalEncoder::State::encodeNormals(std::span<const float> normals) {
   const std::span<const FacedNormal> predicted = normalPrediction.predict(layout, predictor);
-  for (std::size_t vertex = 0; vertex < vertices; ++vertex)
+  for (std::size_t vertex = 0; vertex < vertices; ++vertex) {
+    const Octahedral& expected = predicted[vertex].octahedral;
     sentNormals[vertex] = faceNormal(&normals[3 * vertex], predicted[vertex].top);
-  writer.addNormals(predicted, sentNormals);
+    const Octahedral& sent = sentNormals[vertex].octahedral;
+    writer.addNormal(static_cast<std::int8_t>(sent.u - expected.u),
+                     static_cast<std::int8_t>(sent.v - expected.v));
+  }
 }
 
 void HierarchicalEncoder::State::note(const Prediction& prediction, std::uint32_t weightClass,

@@ -26,6 +26,10 @@ layout(std430, binding = 5) buffer ClassWeights {
   int weights[kAllWeights];
 };
 
+layout(std430, binding = 6) readonly buffer SentNormals {
+  uint sentNormals[];  // by vertex; 0 where the stream has none
+};
+
 shared uint hashLow;
 shared uint hashHigh;
 
@@ -50,8 +54,10 @@ void main() {
   if (slot < push.vertexCount) {
     finishRecord(slot);
     ivec3 position = ivec3(made[slot].xyz);
-    atomicAdd(hashLow, hashWord(slotTable[slot], position, 0, kLowSeed));
-    atomicAdd(hashHigh, hashWord(slotTable[slot], position, 0, kHighSeed));
+    uint vertex = slotTable[slot];
+    uint normal = sentNormals[vertex];
+    atomicAdd(hashLow, hashWord(vertex, position, normal, kLowSeed));
+    atomicAdd(hashHigh, hashWord(vertex, position, normal, kHighSeed));
   }
   // At rest the frame leaves what it found.
   if (slot < kClassWeights && push.hasWeights != 0 && (isKey() || status.moved != 0)) {

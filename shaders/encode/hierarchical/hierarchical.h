@@ -73,6 +73,9 @@ const uint32_t kResidualRows = 2;
 // three words a slot, elsewhere.
 const uint32_t kSpecialWord = 0x80000000u;
 
+// In place of a triangle's fourth corner.
+const uint32_t kNoCorner = 0xFFFFFFFFu;
+
 CLOTHSTREAM_SHARED_END
 
 #ifdef __cplusplus

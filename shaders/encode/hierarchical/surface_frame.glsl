@@ -36,14 +36,17 @@ bool isNotAbove(uint root, uint factor) {
   return high < 512u || (high == 512u && low == 0u);  // 2^41
 }
 
-// The largest with root^2 (2 n + 1) <= 2^41; n is from 1024 to 4095. The estimate, however the device rounds
-// it, is less than one off.
+// The largest with root^2 (2 n + 1) <= 2^41; n is from 1024 to 4095. The estimate is the device's own, the
+// root is not: as a rule neither loop runs.
 uint rootOf(uint n) {
   uint root = uint(1048576.0 * inversesqrt(float(n) + 0.5));
-  if (isNotAbove(root + 1, 2 * n + 1)) {
-    return root + 1;
+  while (isNotAbove(root + 1, 2 * n + 1)) {
+    ++root;
   }
-  return isNotAbove(root, 2 * n + 1) ? root : root - 1;
+  while (!isNotAbove(root, 2 * n + 1)) {
+    --root;
+  }
+  return root;
 }
 
 // To unit length; `a` is scaled.

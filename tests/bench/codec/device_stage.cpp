@@ -4,6 +4,7 @@
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
@@ -30,10 +31,11 @@ void addTimes(nlohmann::ordered_json& row, const std::string& what, const Sample
   row[what + "MsP99"] = seconds.p99() * 1e3;
 }
 
-nlohmann::ordered_json measure(vulkan::Device& device, const scene::Scene& scene, codec::PacketKind kind) {
+nlohmann::ordered_json measure(vulkan::Device& device, const scene::Scene& scene, codec::PacketKind kind,
+                               encode::Prediction prediction) {
   simulation::ClothSimulation simulation(device, scene);
   const codec::StreamLayout layout = encode::streamLayout(scene, 1);
-  encode::FrameEncoder encoder(device, simulation, layout);
+  encode::FrameEncoder encoder(device, simulation, layout, prediction);
   const auto decoder = codec::Decoder::make(layout);
   vulkan::Recorder recorder(device);
   std::vector<std::byte> packet(encoder.packetBound());
@@ -69,6 +71,7 @@ nlohmann::ordered_json measure(vulkan::Device& device, const scene::Scene& scene
       {"suite", "codec_device"},
       {"nodes", scene.nodeCount()},
       {"kind", kind == codec::PacketKind::key ? "key" : "predicted"},
+      {"prediction", prediction == encode::Prediction::onHost ? "host" : "device"},
       {"normals", layout.normals == codec::NormalMode::none ? "none" : "octahedral"},
       {"maxErrorMm", layout.maxError * 1e3},
       {"bitsPerVertex", 8 * sum / static_cast<double>(kTicks) / vertices},
@@ -85,12 +88,17 @@ nlohmann::ordered_json measure(vulkan::Device& device, const scene::Scene& scene
 
 Rows runCodecDevice(vulkan::Device& device, const Settings& settings) {
   Rows rows;
-  for (const scene::Normals normals : {scene::Normals::none, scene::Normals::octahedral}) {
+  // Codec 2 on the host and on the device, then codec 1.
+  const std::pair<scene::Normals, encode::Prediction> ways[]{
+      {scene::Normals::none, encode::Prediction::onHost},
+      {scene::Normals::none, encode::Prediction::onDevice},
+      {scene::Normals::octahedral, encode::Prediction::onDevice}};
+  for (const auto& [normals, prediction] : ways) {
     for (const codec::PacketKind kind : {codec::PacketKind::predicted, codec::PacketKind::key}) {
       scene::Scene scene = hungCloth(settings.size.value_or(100));
       scene.substeps = std::max(scene.substeps, scene::stableSubsteps(scene));
       scene.stream.normals = normals;
-      rows.push_back(measure(device, scene, kind));
+      rows.push_back(measure(device, scene, kind, prediction));
       rows.back()["device"] = device.info().name;
     }
   }
