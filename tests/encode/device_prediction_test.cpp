@@ -169,7 +169,7 @@ TEST_F(DevicePrediction, EqualsTheReferenceHoweverManyFramesWait) {
 TEST_F(DevicePrediction, EqualsTheReferenceWhereAnotherThreadCodes) {
   const scene::Scene scene = squareOf(20);
   simulation::ClothSimulation simulation(device(), scene);
-  const codec::StreamLayout layout = Encoding::layoutOf(scene, {});
+  const codec::StreamLayout layout = encode::streamLayout(scene, kEpoch);
   encode::FrameEncoder encoder(device(), simulation, layout, encode::Prediction::onDevice);
   constexpr std::uint64_t kTicks = 80;
   // Complete recordings, in order.
