@@ -161,7 +161,7 @@ Expected<Figures> encodeFile(const EncodeOptions& options) {
   const codec::StreamLayout layout{.epoch = kEpoch,
                                    .codec = codec::kCodecHierarchical,
                                    .maxError = *maxError,
-                                   .temporalLayers = options.layers,
+                                   .temporalLayers = static_cast<std::uint8_t>(options.layers),
                                    .cloths = {figures.shape.cloth()}};
   const auto side = sideOf(*motion, layout, *positions);
   if (!side) return tl::unexpected(side.error());

@@ -29,7 +29,7 @@ struct EncodeOptions {
   std::string motion, out;
   Quality quality = Quality::standard;
   std::optional<double> maxError;  // m along each of three axes; instead of a quality
-  std::uint8_t layers = 1;         // temporal
+  std::uint32_t layers = 1;        // temporal
   std::uint32_t keyEvery = 0;      // frames; 0: the first alone
   bool json = false;
 };

@@ -39,7 +39,7 @@ void MotionCommands::add(CLI::App& app) {
   encode_
       ->add_option("--layers", encodeOptions_.layers,
                    "Temporal layers: with 2 or 3 every second frame, or three of four, can be left out")
-      ->check(CLI::Range(1, int{codec::kMaxTemporalLayers}))
+      ->check(CLI::Range(1u, std::uint32_t{codec::kMaxTemporalLayers}))
       ->capture_default_str();
   encode_
       ->add_option("--key-every", encodeOptions_.keyEvery,

@@ -182,6 +182,10 @@ bool readParts(Bytes message, Description& description, std::vector<ClothMessage
         description.layout.temporalLayers =
             static_cast<std::uint8_t>(std::clamp<std::uint32_t>(reader.get_uint32(), 1, 255));
         return true;
+      case varint(12):
+        description.layout.qualities =
+            static_cast<std::uint8_t>(std::clamp<std::uint32_t>(reader.get_uint32(), 1, 255));
+        return true;
       case bytes(40):
         return description.materials.size() < kMaxMaterials &&
                setText(description.materials.emplace_back(), reader);
@@ -233,8 +237,6 @@ std::string readDrawing(const ClothMessage& source, Cloth& cloth) {
 std::string check(const Description& description, const std::vector<ClothMessage>& cloths) {
   if (!codec::isCodec(description.codec))
     return "codec is " + std::to_string(description.codec) + "; this client decodes " + decodedCodecs();
-  if (description.codec == codec::kCodecHierarchical && description.layout.normals != codec::NormalMode::none)
-    return "normals is NORMALS_OCTAHEDRAL; codec " + std::to_string(description.codec) + " sends none";
   const std::uint32_t simulation = description.simulationRate, stream = description.streamRate;
   if (simulation == 0 || simulation > kMaxRate)
     return "simulation_rate is " + std::to_string(simulation) + "; 1 to " + std::to_string(kMaxRate) +
@@ -254,7 +256,8 @@ std::string check(const Description& description, const std::vector<ClothMessage
     return "a cloth's rows x columns is not its vertex_count, a triangle names a vertex that is not there, "
            "there are "
            "no vertices or more than " +
-           std::to_string(codec::kMaxVertices) + ", or max_error or temporal_layers is out of range";
+           std::to_string(codec::kMaxVertices) +
+           ", or max_error, temporal_layers or qualities is out of range";
   return {};
 }
 

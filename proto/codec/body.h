@@ -22,6 +22,7 @@ struct FrameRole {
   // Of no meaning for a key frame.
   std::uint8_t referenceLayer = 0;  // it refers to the newest frame of that layer,
   std::uint64_t referenceTick = 0;  // of this tick
+  std::uint8_t quality = 0;         // of this frame and its references
 };
 
 class BodyDecoder {
@@ -48,7 +49,8 @@ class BodyEncoder {
   virtual std::uint64_t reconstructionHash() const = 0;
 };
 
-// Those of each codec, for a layout that is possible; decoders are null if memory is out.
+// Those of each codec, for a layout that is possible; decoders are null if memory is out. An encoder's max
+// error is that of its quality.
 std::unique_ptr<BodyDecoder> makeLatticeDecoder(const StreamLayout& layout);
 std::unique_ptr<BodyDecoder> makeHierarchicalDecoder(const StreamLayout& layout, Detail detail);
 std::unique_ptr<BodyEncoder> makeLatticeEncoder(const StreamLayout& layout);

@@ -37,17 +37,19 @@ struct Decoder::State {
     if (header.referenceCount > 1) return DecodeResult::malformed;
     const bool key = header.kind == PacketKind::key;
     if (header.temporalLayer >= (key ? 1 : layout.temporalLayers)) return DecodeResult::malformed;
+    if (header.quality >= layout.qualities) return DecodeResult::malformed;
     std::uint8_t referenceLayer = 0;
     if (!key) {
       const std::optional<std::uint8_t> found = held.find(header.references[0]);
       if (!found) return DecodeResult::missingReference;
-      if (*found > header.temporalLayer) return DecodeResult::malformed;
+      if (*found > header.temporalLayer || header.quality != quality) return DecodeResult::malformed;
       referenceLayer = *found;
     }
     if (!body->decode(*packet, referenceLayer)) return DecodeResult::malformed;
     if (key) held.clear();
     held.hold(header.temporalLayer, header.tick);
     tick = header.tick;
+    quality = header.quality;
     hasFrame = true;
     hasHash = hasNormals = false;
     body->writePositions(positions.data());
@@ -65,6 +67,7 @@ struct Decoder::State {
   Array<float> positions, normals;
   HeldFrames held;
   std::uint64_t tick = 0;
+  std::uint8_t quality = 0;
   std::uint64_t hash = 0;
   bool hasFrame = false;
   // Of the newest frame; made when they are first asked for.

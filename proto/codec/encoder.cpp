@@ -14,16 +14,19 @@ struct Encoder::State {
   std::unique_ptr<BodyEncoder> body;
   std::size_t floats = 0;
   bool hasNormals = false;
-  std::uint8_t layers = 1;
+  std::uint8_t layers = 1, quality = 0;
   HeldFrames held;
   std::uint64_t tick = 0;
   std::uint64_t frame = 0;  // the next one's number since the key frame; 0: it is a key frame
 };
 
-std::unique_ptr<Encoder> Encoder::make(const StreamLayout& layout, const EncoderOptions& options) {
-  if (!isPossible(layout)) return nullptr;
+std::unique_ptr<Encoder> Encoder::make(const StreamLayout& stream, const EncoderOptions& options) {
+  if (!isPossible(stream) || options.quality >= stream.qualities) return nullptr;
+  StreamLayout layout = stream;
+  layout.maxError = maxErrorOf(stream, options.quality);
   assert(options.weightLag == 0 || layout.temporalLayers == 1);
   auto state = std::make_unique<State>();
+  state->quality = options.quality;
   state->body = layout.codec == kCodecLatticeZstd ? makeLatticeEncoder(layout)
                                                   : makeHierarchicalEncoder(layout, options.weightLag);
   state->floats = 3 * std::size_t{layout.vertexCount()};
@@ -46,7 +49,7 @@ std::size_t Encoder::encode(std::uint64_t tick, PacketKind kind, std::span<const
   assert(!s.hasNormals || normals.size() == s.floats);
   assert(s.frame == 0 || tick > s.tick);
   assert(out.size() >= packetBound());
-  FrameRole role{.tick = tick};
+  FrameRole role{.tick = tick, .quality = s.quality};
   if (kind == PacketKind::key || s.frame == 0) {
     s.frame = 0;
     s.held.clear();

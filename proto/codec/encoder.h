@@ -13,6 +13,8 @@
 namespace clothstream::codec {
 
 struct EncoderOptions {
+  // Of the layout's: a stream in another one is another encoder's.
+  std::uint8_t quality = 0;
   // Codec 2, one temporal layer: the weights of a frame are fitted to the frames that are so many or more
   // before it, and a key frame's to an earlier one's, as they are where frames are prepared before those
   // before them are coded. 0: all frames before it, and itself. For any of them a decoder is the same.
@@ -22,7 +24,7 @@ struct EncoderOptions {
 // One encoder a stream; not thread-safe. Memory is taken once, at construction.
 class Encoder {
  public:
-  // nullptr if the layout is impossible (stream_layout.h).
+  // nullptr if the layout is impossible (stream_layout.h), or has no such quality.
   static std::unique_ptr<Encoder> make(const StreamLayout& layout, const EncoderOptions& options = {});
   ~Encoder();
   Encoder(const Encoder&) = delete;

@@ -45,6 +45,9 @@ struct StreamLayout {
   // second frame can, or all but every fourth, layer by layer from the highest; it costs bits
   // (docs/codec.md).
   std::uint8_t temporalLayers = 1;
+  // Of codec 2 alone: in how many the stream can come. maxError is that of quality 0; each other has twice
+  // the max error of the one before. A stream goes from one to another at a key frame.
+  std::uint8_t qualities = 1;
   std::vector<ClothLayout> cloths;
 
   std::uint32_t vertexCount() const {
@@ -54,18 +57,22 @@ struct StreamLayout {
   }
 };
 
+inline constexpr std::uint8_t kMaxQualities = 4;
 inline constexpr std::uint32_t kMaxVertices = 1u << 26;
 inline constexpr float kSmallestMaxError = 5e-6f, kLargestMaxError = 1000;
 
-// Whether a stream can have this layout: a codec of ours (codec 1 has one temporal layer), 1 to
-// kMaxTemporalLayers layers, one cloth or more, none empty, grids whose numbers agree, triangles of vertices
-// that there are and finite rest positions, at most kMaxVertices, a max error within the two bounds above.
+// Whether a stream can have this layout: a codec of ours (codec 1 has one temporal layer and one quality), 1
+// to kMaxTemporalLayers layers, one cloth or more, none empty, grids whose numbers agree, triangles of
+// vertices that there are and finite rest positions, at most kMaxVertices, a max error within the two bounds
+// above.
 inline bool isPossible(const StreamLayout& layout) {
   if (!(layout.maxError >= kSmallestMaxError && layout.maxError <= kLargestMaxError)) return false;
   if (layout.normals != NormalMode::none && layout.normals != NormalMode::octahedral) return false;
   if (!isCodec(layout.codec)) return false;
   if (layout.temporalLayers < 1 || layout.temporalLayers > kMaxTemporalLayers) return false;
   if (layout.codec == kCodecLatticeZstd && layout.temporalLayers > 1) return false;
+  if (layout.qualities < 1 || layout.qualities > kMaxQualities) return false;
+  if (layout.codec == kCodecLatticeZstd && layout.qualities > 1) return false;
   std::uint64_t vertices = 0;
   for (const ClothLayout& cloth : layout.cloths) {
     const std::uint64_t nodes = std::uint64_t{cloth.rows} * cloth.columns;
@@ -82,6 +89,11 @@ inline bool isPossible(const StreamLayout& layout) {
     if (vertices > kMaxVertices) return false;
   }
   return vertices > 0;
+}
+
+// Of a quality that there is.
+constexpr float maxErrorOf(const StreamLayout& layout, std::uint8_t quality) {
+  return layout.maxError * static_cast<float>(1u << quality);
 }
 
 }  // namespace clothstream::codec

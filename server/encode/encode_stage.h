@@ -24,9 +24,6 @@ class EncodeStage {
   virtual EncodedFrame entropyCode(const RecordedFrame& frame, std::span<std::byte> out) = 0;
 };
 
-std::unique_ptr<EncodeStage> makeLatticeStage(const vulkan::Device& device,
-                                              const simulation::ClothSimulation& simulation,
-                                              const codec::StreamLayout& layout);
 std::unique_ptr<EncodeStage> makeHierarchicalHostStage(const vulkan::Device& device,
                                                        const simulation::ClothSimulation& simulation,
                                                        const codec::StreamLayout& layout);

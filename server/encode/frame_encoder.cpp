@@ -34,7 +34,7 @@ std::vector<float> coordinatesOf(const scene::Mesh& mesh) {
 codec::StreamLayout streamLayout(const scene::Scene& scene, std::uint32_t epoch) {
   const bool normals = scene.stream.normals == scene::Normals::octahedral;
   codec::StreamLayout layout{.epoch = epoch,
-                             .codec = normals ? codec::kCodecLatticeZstd : codec::kCodecHierarchical,
+                             .codec = codec::kCodecHierarchical,
                              .maxError = scene.stream.maxError,
                              .normals = normals ? codec::NormalMode::octahedral : codec::NormalMode::none,
                              .cloths = {}};
@@ -73,9 +73,7 @@ FrameEncoder::FrameEncoder(const vulkan::Device& device, const simulation::Cloth
   const bool onDevice = prediction == Prediction::automatic
                             ? !device.isSoftware() && DevicePredictor::supports(device, layout)
                             : prediction == Prediction::onDevice;
-  const auto make = layout.codec == codec::kCodecLatticeZstd ? makeLatticeStage
-                    : onDevice                               ? makeHierarchicalDeviceStage
-                                                             : makeHierarchicalHostStage;
+  const auto make = onDevice ? makeHierarchicalDeviceStage : makeHierarchicalHostStage;
   state_->stage = make(device, simulation, layout);
 }
 

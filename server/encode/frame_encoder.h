@@ -15,7 +15,7 @@
 
 namespace clothstream::encode {
 
-// The layout of a scene's stream. Codec 2, but where normals are sent, which only codec 1 does.
+// The layout of a scene's stream.
 codec::StreamLayout streamLayout(const scene::Scene& scene, std::uint32_t epoch);
 
 // Where codec 2 predicts: on GPUs on the device, on the host where the device is software (a dispatch costs

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Codec 2: positions are read back, all else is done on the CPU.
+// Codec 2: positions, and normals where they are sent, are read back, all else is done on the CPU.
 #include <array>
 #include <vector>
 
@@ -16,9 +16,13 @@ class HierarchicalHostStage final : public EncodeStage {
                         const codec::StreamLayout& layout)
       : simulation_(simulation),
         encoder_(codec::Encoder::make(layout)),
-        positions_(3 * simulation.nodeCount()) {
-    for (vulkan::Buffer& slot : slots_) {
-      slot = vulkan::Buffer(device, vulkan::BufferPurpose::readback, simulation.positions(0).bytes());
+        positions_(3 * simulation.nodeCount()),
+        normals_(layout.normals == codec::NormalMode::octahedral ? positions_.size() : 0) {
+    for (Slot& slot : slots_) {
+      slot.positions =
+          vulkan::Buffer(device, vulkan::BufferPurpose::readback, simulation.positions(0).bytes());
+      if (!normals_.empty())
+        slot.normals = vulkan::Buffer(device, vulkan::BufferPurpose::readback, simulation.normals().bytes());
     }
   }
 
@@ -26,27 +30,40 @@ class HierarchicalHostStage final : public EncodeStage {
 
   void record(vulkan::Recorder& recorder, std::uint32_t slot, bool) override {
     const vulkan::Buffer& present = simulation_.positions(simulation_.presentIndex());
-    recorder.copy(present, slots_[slot], present.bytes());
+    recorder.copy(present, slots_[slot].positions, present.bytes());
+    if (!normals_.empty())
+      recorder.copy(simulation_.normals(), slots_[slot].normals, simulation_.normals().bytes());
   }
 
   EncodedFrame entropyCode(const RecordedFrame& frame, std::span<std::byte> out) override {
-    float* position = positions_.data();
-    for (const shared::vec4& node : slots_[frame.slot].mapped<shared::vec4>().first(positions_.size() / 3)) {
-      *position++ = node.x;
-      *position++ = node.y;
-      *position++ = node.z;
-    }
+    const Slot& slot = slots_[frame.slot];
+    unpack(slot.positions, positions_);
+    if (!normals_.empty()) unpack(slot.normals, normals_);
     // The frames before it may be of a history that was given up, and of later ticks.
     if (frame.kind == codec::PacketKind::key) encoder_->forgetHistory();
-    const std::size_t bytes = encoder_->encode(frame.tick, frame.kind, positions_, {}, out);
+    const std::size_t bytes = encoder_->encode(frame.tick, frame.kind, positions_, normals_, out);
     return {.bytes = bytes, .reconstructionHash = encoder_->reconstructionHash()};
   }
 
  private:
+  struct Slot {
+    vulkan::Buffer positions, normals;
+  };
+
+  // Three of four components.
+  static void unpack(const vulkan::Buffer& buffer, std::vector<float>& out) {
+    float* component = out.data();
+    for (const shared::vec4& vector : buffer.mapped<shared::vec4>().first(out.size() / 3)) {
+      *component++ = vector.x;
+      *component++ = vector.y;
+      *component++ = vector.z;
+    }
+  }
+
   const simulation::ClothSimulation& simulation_;
   std::unique_ptr<codec::Encoder> encoder_;
-  std::vector<float> positions_;
-  std::array<vulkan::Buffer, kFrameSlots> slots_;
+  std::vector<float> positions_, normals_;
+  std::array<Slot, kFrameSlots> slots_;
 };
 
 }  // namespace

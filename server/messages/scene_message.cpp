@@ -512,6 +512,8 @@ Result<scene::Scene> toScene(const v1::Scene& message, const MeshReader& readMes
   for (int i = 0; i < message.colliders_size() && !checks.failed(); ++i)
     scene.colliders.push_back(toCollider(checks, root.at("colliders", i), message.colliders(i)));
   scene.stream = toStreamSettings(checks, root / "stream", message.stream());
+  if (!message.stream().has_max_error() && !checks.failed())
+    scene.stream.maxError = scene::suitedMaxError(scene);
   checkUnique(checks, "cloths", scene.cloths);
   checkUnique(checks, "colliders", scene.colliders);
   checkAttachments(checks, scene);

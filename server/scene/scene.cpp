@@ -9,6 +9,24 @@
 #include "server/scene/mesh.h"
 
 namespace clothstream::scene {
+namespace {
+
+// Between neighbours in a row or column of a grid; of a mesh's triangles.
+double meanEdge(const Cloth& cloth) {
+  if (!cloth.mesh) {
+    const GridSpacing s = spacing(cloth.grid);
+    return 0.5 * (double{s.column} + double{s.row});
+  }
+  const MeshShape& shape = cloth.mesh->shape;
+  double sum = 0;
+  for (const Triangle& t : shape.triangles) {
+    for (std::size_t i = 0; i < 3; ++i)
+      sum += double{(shape.positions[t[i]] - shape.positions[t[(i + 1) % 3]]).norm()};
+  }
+  return sum / (3 * static_cast<double>(shape.triangles.size()));
+}
+
+}  // namespace
 
 std::uint32_t Scene::nodeCount() const {
   std::uint32_t sum = 0;
@@ -119,6 +137,13 @@ GridSpacing spacing(const Grid& grid) {
   const double row = double{grid.height} / (grid.rows - 1);
   return {static_cast<float>(column), static_cast<float>(row),
           static_cast<float>(std::sqrt(column * column + row * row))};
+}
+
+float suitedMaxError(const Scene& scene) {
+  constexpr double kPartOfEdge = 1.0 / 40, kFinest = 0.00005, kCoarsest = 0.0005;
+  double error = kCoarsest;
+  for (const Cloth& cloth : scene.cloths) error = std::min(error, kPartOfEdge * meanEdge(cloth));
+  return static_cast<float>(std::max(error, kFinest));
 }
 
 }  // namespace clothstream::scene

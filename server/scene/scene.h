@@ -220,4 +220,8 @@ struct GridSpacing {
 };
 GridSpacing spacing(const Grid& grid);
 
+// How far streamed positions may be off for normals that are as good whatever the mesh: a part of the finest
+// cloth's mean edge, m.
+float suitedMaxError(const Scene& scene);
+
 }  // namespace clothstream::scene

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Fits the tables of codec 2 to cloth in motion and prints residual_tables.cpp: only when the format changes.
-// The motions are others than those of suite codec_motions.
+// The motions are others than those of suite codec.
 #include <algorithm>
 #include <array>
 #include <cmath>

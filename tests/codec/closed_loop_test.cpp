@@ -312,10 +312,58 @@ TEST(ClosedLoopKinds, PredictionPaysOnASlowMotion) {
   EXPECT_LT(predictedBytes, keyBytes);
 }
 
+// The same scene in three qualities; a reader goes from one to another at key frames alone.
+TEST(Quality, ChangesAtAKeyFrame) {
+  StreamLayout layout = square(24, kCodecHierarchical);
+  layout.qualities = 3;
+  const auto decoder = Decoder::make(layout);
+  std::vector<std::unique_ptr<Encoder>> encoders;
+  for (std::uint8_t quality = 0; quality < layout.qualities; ++quality)
+    encoders.push_back(Encoder::make(layout, {.quality = quality}));
+  EXPECT_EQ(Encoder::make(layout, {.quality = layout.qualities}), nullptr);
+  std::vector<std::byte> packet(encoders[0]->packetBound());
+  std::array<std::size_t, 3> bytes{};
+  double worst = 0;
+  for (std::uint64_t tick = 1; tick <= 36; ++tick) {
+    const MotionFrame frame = sampleMotion(layout, tick, 0.03f);
+    const std::size_t wanted = tick / 6 % 3;
+    for (std::size_t quality = 0; quality < 3; ++quality) {
+      const bool key = quality == wanted && tick % 6 == 0;
+      const std::size_t size = encoders[quality]->encode(tick, key ? PacketKind::key : PacketKind::predicted,
+                                                         frame.positions, {}, packet);
+      if (!key) bytes[quality] += size;
+      if (quality != wanted) {
+        // It refers to a frame of another quality, or comes too late; where the quality changes none is sent.
+        if (tick % 6 == 0) continue;
+        EXPECT_NE(decoder->decode(std::span(packet).first(size)), DecodeResult::ok);
+        continue;
+      }
+      const std::uint64_t hash = encoders[quality]->reconstructionHash();
+      ASSERT_EQ(decoder->decode(std::span(packet).first(size)), DecodeResult::ok) << tick;
+      EXPECT_EQ(decoder->reconstructionHash(), hash);
+      for (std::size_t i = 0; i < frame.positions.size(); i += 3) {
+        double squared = 0;
+        for (std::size_t c = i; c < i + 3; ++c) {
+          const double off =
+              static_cast<double>(frame.positions[c]) - static_cast<double>(decoder->positions()[c]);
+          squared += off * off;
+        }
+        const double promise =
+            std::sqrt(3.0) * static_cast<double>(maxErrorOf(layout, static_cast<std::uint8_t>(quality)));
+        ASSERT_LE(std::sqrt(squared), promise);
+        worst = std::max(worst, std::sqrt(squared) / promise);
+      }
+    }
+  }
+  EXPECT_GT(worst, 0.5);
+  EXPECT_GT(bytes[0], bytes[1]);
+  EXPECT_GT(bytes[1], bytes[2]);
+}
+
 TEST(Layout, ThatIsImpossibleMakesNoCodec) {
   const StreamLayout good = mixedLayout(NormalMode::none);
   ASSERT_NE(Decoder::make(good), nullptr);
-  std::vector<StreamLayout> bad(15, good);
+  std::vector<StreamLayout> bad(18, good);
   bad[0].cloths.clear();
   bad[1].cloths[0].rows = 8;
   bad[2].cloths[0].rows = 0;
@@ -332,6 +380,10 @@ TEST(Layout, ThatIsImpossibleMakesNoCodec) {
   bad[13].temporalLayers = 2;  // of codec 1
   bad[14] = mixedLayout(NormalMode::none, kCodecHierarchical);
   bad[14].temporalLayers = kMaxTemporalLayers + 1;
+  bad[15].qualities = 0;
+  bad[16].qualities = 2;  // of codec 1
+  bad[17] = mixedLayout(NormalMode::none, kCodecHierarchical);
+  bad[17].qualities = kMaxQualities + 1;
   for (std::size_t i = 0; i < bad.size(); ++i) {
     EXPECT_EQ(Decoder::make(bad[i]), nullptr) << i;
     EXPECT_EQ(Encoder::make(bad[i]), nullptr) << i;

@@ -5,6 +5,7 @@
 
 #include "clients/core/content_assembly.h"
 #include "tests/core/scripted_server.h"
+#include "tests/core/sessions.h"
 
 namespace clothstream::client {
 namespace {
@@ -74,11 +75,6 @@ TEST(Joining, GivesTrianglesOfEveryClothInItsPlace) {
   EXPECT_EQ(cloth.first_index, 12u);
   EXPECT_EQ(cloth.index_count, 6u);
   EXPECT_EQ(cs_get_cloth(client.get(), 2, &cloth), 0);
-}
-
-template <typename T>
-std::string littleEndian(const std::vector<T>& values) {
-  return std::string(reinterpret_cast<const char*>(values.data()), values.size() * sizeof(T));
 }
 
 // The first cloth is a grid of 2 x 2, the second a mesh of two triangles whose seam has two texture
@@ -275,9 +271,6 @@ INSTANTIATE_TEST_SUITE_P(
     ::testing::Values(
         WrongDescription{"no_cloth", [](v1::StreamDescription& d) { d.clear_cloths(); }, "0 cloths"},
         WrongDescription{"a_codec", [](v1::StreamDescription& d) { d.set_codec(3); }, "codec is 3"},
-        WrongDescription{"normals_of_codec_2",
-                         [](v1::StreamDescription& d) { d.set_normals(v1::NORMALS_OCTAHEDRAL); },
-                         "normals is NORMALS_OCTAHEDRAL"},
         WrongDescription{"no_rate", [](v1::StreamDescription& d) { d.set_simulation_rate(0); },
                          "simulation_rate is 0"},
         WrongDescription{"rate", [](v1::StreamDescription& d) { d.set_stream_rate(71); },
@@ -297,6 +290,7 @@ INSTANTIATE_TEST_SUITE_P(
         WrongDescription{"max_error", [](v1::StreamDescription& d) { d.set_max_error(0); }, "max_error"},
         WrongDescription{"temporal_layers", [](v1::StreamDescription& d) { d.set_temporal_layers(257); },
                          "temporal_layers"},
+        WrongDescription{"qualities", [](v1::StreamDescription& d) { d.set_qualities(257); }, "qualities"},
         WrongDescription{"not_finite",
                          [](v1::StreamDescription& d) {
                            v1::ClothDescription& cloth = *d.mutable_cloths(0);

@@ -20,8 +20,7 @@ std::string serialised(const v1::ServerMessage& message) {
 ScriptedServer::ScriptedServer(ScriptedStream stream) : stream_(std::move(stream)) {
   layout_.epoch = stream_.epoch;
   layout_.normals = stream_.normals;
-  layout_.codec =
-      stream_.normals == codec::NormalMode::none ? codec::kCodecHierarchical : codec::kCodecLatticeZstd;
+  layout_.codec = codec::kCodecHierarchical;
   for (const ClothSize& cloth : stream_.cloths)
     layout_.cloths.push_back({cloth.rows * cloth.columns, cloth.rows, cloth.columns});
   encoder_ = codec::Encoder::make(layout_);

@@ -82,6 +82,7 @@ Session goldenSession(const std::string& name) {
     description.set_stream_rate(72);
     description.set_max_error(stream.layout.maxError);
     description.set_temporal_layers(stream.layout.temporalLayers);
+    description.set_qualities(stream.layout.qualities);
     description.set_normals(stream.layout.normals == codec::NormalMode::none ? v1::NORMALS_NONE
                                                                              : v1::NORMALS_OCTAHEDRAL);
     for (const codec::ClothLayout& layout : stream.layout.cloths) {
@@ -89,7 +90,10 @@ Session goldenSession(const std::string& name) {
       cloth.set_vertex_count(layout.vertexCount);
       cloth.set_rows(layout.rows);
       cloth.set_columns(layout.columns);
-      cloth.set_rest_positions(std::string(std::size_t{layout.vertexCount} * 12, '\0'));
+      const bool known = !layout.restPositions.empty();
+      cloth.set_rest_positions(littleEndian(known ? layout.restPositions
+                                                  : std::vector<float>(3 * std::size_t{layout.vertexCount})));
+      cloth.set_triangles(littleEndian(layout.triangles));
     }
     Session session{"golden " + name, {ScriptedServer().welcome()}};
     for (std::string& chunk : chunksOf(description.SerializeAsString(), 256 * 1024, 1))

@@ -40,4 +40,10 @@ Session goldenSession(const std::string& stream);
 inline constexpr std::uint64_t kStepUs = 14'000;
 std::vector<Observation> replay(const Session& session);
 
+// Numbers as a description has them.
+template <typename T>
+std::string littleEndian(const std::vector<T>& values) {
+  return std::string(reinterpret_cast<const char*>(values.data()), values.size() * sizeof(T));
+}
+
 }  // namespace clothstream::client

@@ -22,8 +22,7 @@ class DevicePrediction : public GpuTest {};
 // Encodes states that are given.
 class Playing : public Encoding {
  public:
-  explicit Playing(const scene::Scene& scene)
-      : Encoding(scene, codec::kCodecHierarchical, encode::Prediction::onDevice) {}
+  explicit Playing(const scene::Scene& scene) : Encoding(scene, encode::Prediction::onDevice) {}
 
   encode::RecordedFrame show(const std::vector<float>& positions, std::uint64_t tick, bool key = false) {
     return encodeState(stateOf(positions), tick, key);
@@ -135,7 +134,7 @@ TEST_F(DevicePrediction, EqualsTheReferenceOnClothOfAnyShape) {
 TEST_F(DevicePrediction, EqualsTheReferenceHoweverManyFramesWait) {
   const scene::Scene scene = squareOf(30);
   simulation::ClothSimulation simulation(device(), scene);
-  const codec::StreamLayout layout = Encoding::layoutOf(scene, {});
+  const codec::StreamLayout layout = encode::streamLayout(scene, kEpoch);
   encode::FrameEncoder encoder(device(), simulation, layout, encode::Prediction::onDevice);
   const auto reference = codec::Encoder::make(layout, {.weightLag = encode::kWeightLag});
   vulkan::Recorder recorder(device());
@@ -170,7 +169,7 @@ TEST_F(DevicePrediction, EqualsTheReferenceHoweverManyFramesWait) {
 TEST_F(DevicePrediction, EqualsTheReferenceWhereAnotherThreadCodes) {
   const scene::Scene scene = squareOf(20);
   simulation::ClothSimulation simulation(device(), scene);
-  const codec::StreamLayout layout = Encoding::layoutOf(scene, {});
+  const codec::StreamLayout layout = encode::streamLayout(scene, kEpoch);
   encode::FrameEncoder encoder(device(), simulation, layout, encode::Prediction::onDevice);
   constexpr std::uint64_t kTicks = 80;
   // Complete recordings, in order.
@@ -222,7 +221,7 @@ TEST_F(DevicePrediction, EqualsTheReferenceWhereAnotherThreadCodes) {
 TEST_F(DevicePrediction, RefusesTemporalLayers) {
   const scene::Scene scene = squareOf(4);
   const simulation::ClothSimulation simulation(device(), scene);
-  codec::StreamLayout layout = Encoding::layoutOf(scene, {});
+  codec::StreamLayout layout = encode::streamLayout(scene, kEpoch);
   layout.temporalLayers = 2;
   EXPECT_THROW(encode::FrameEncoder(device(), simulation, layout, encode::Prediction::onDevice),
                std::runtime_error);

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
-#include <optional>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -46,11 +45,10 @@ inline std::vector<simulation::MovingCollider> sphereAt(std::uint64_t tick) {
 // A simulation whose frames are encoded on the device and on the CPU.
 class Encoding {
  public:
-  explicit Encoding(const scene::Scene& scene, std::optional<std::uint8_t> codec = {},
-                    encode::Prediction prediction = encode::Prediction::automatic)
+  explicit Encoding(const scene::Scene& scene, encode::Prediction prediction = encode::Prediction::automatic)
       : scene_(scene),
         simulation(device(), scene),
-        layout(layoutOf(scene, codec)),
+        layout(encode::streamLayout(scene, kEpoch)),
         encoder(device(), simulation, layout, prediction),
         recorder_(device()),
         normals_(device(), vulkan::BufferPurpose::readback, simulation.normals().bytes()),
@@ -71,12 +69,6 @@ class Encoding {
     recorder_.begin();
     simulation.recordRestoreState(recorder_, simulation::pack(state, tick));
     return encodeAndCompare(tick, forceKey);
-  }
-
-  static codec::StreamLayout layoutOf(const scene::Scene& scene, std::optional<std::uint8_t> codec) {
-    codec::StreamLayout layout = encode::streamLayout(scene, kEpoch);
-    layout.codec = codec.value_or(layout.codec);
-    return layout;
   }
 
   double kilobytes() const { return bytes_ / 1000; }
@@ -110,7 +102,6 @@ class Encoding {
     ASSERT_EQ(decoder_->decode(packet), codec::DecodeResult::ok) << "tick " << frame.tick;
     EXPECT_EQ(decoder_->reconstructionHash(), encoded.reconstructionHash);
     bytes_ += static_cast<double>(encoded.bytes);
-    // Each coordinate is promised by codec 1, the distance by both.
     const double maxError = static_cast<double>(layout.maxError);
     for (std::size_t i = 0; i < positions.size(); i += 3) {
       double squared = 0;
@@ -120,9 +111,6 @@ class Encoding {
         const double error =
             static_cast<double>(positions[c]) - static_cast<double>(decoder_->positions()[c]);
         squared += error * error;
-        if (layout.codec == codec::kCodecLatticeZstd && std::fabs(positions[c]) <= 32) {
-          ASSERT_LE(std::fabs(error), maxError) << "tick " << frame.tick;
-        }
       }
       if (isNear) {
         ASSERT_LE(squared, 3 * maxError * maxError) << "tick " << frame.tick;

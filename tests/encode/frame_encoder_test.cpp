@@ -16,25 +16,20 @@ namespace {
 
 struct Sort {
   const char* name;
-  std::uint8_t codec;
   scene::Normals normals;
   encode::Prediction prediction = encode::Prediction::onHost;
 };
 
 class FrameEncoder : public GpuTest, public testing::WithParamInterface<Sort> {};
-INSTANTIATE_TEST_SUITE_P(
-    Sorts, FrameEncoder,
-    testing::Values(Sort{"lattice", codec::kCodecLatticeZstd, scene::Normals::none},
-                    Sort{"latticeWithNormals", codec::kCodecLatticeZstd, scene::Normals::octahedral},
-                    Sort{"hierarchical", codec::kCodecHierarchical, scene::Normals::none},
-                    Sort{"hierarchicalOnDevice", codec::kCodecHierarchical, scene::Normals::none,
-                         encode::Prediction::onDevice},
-                    Sort{"hierarchicalOnDeviceWithNormals", codec::kCodecHierarchical,
-                         scene::Normals::octahedral, encode::Prediction::onDevice}),
-    [](const auto& chosen) { return chosen.param.name; });
+INSTANTIATE_TEST_SUITE_P(Sorts, FrameEncoder,
+                         testing::Values(Sort{"onHost", scene::Normals::none},
+                                         Sort{"onHostWithNormals", scene::Normals::octahedral},
+                                         Sort{"onDevice", scene::Normals::none,
+                                              encode::Prediction::onDevice}),
+                         [](const auto& chosen) { return chosen.param.name; });
 
 TEST_P(FrameEncoder, MakesThePacketsOfTheReferenceEncoder) {
-  Encoding encoding(clothsOf(GetParam().normals), GetParam().codec, GetParam().prediction);
+  Encoding encoding(clothsOf(GetParam().normals), GetParam().prediction);
   for (std::uint64_t tick = 1; tick <= 120; ++tick) {
     const encode::RecordedFrame frame = encoding.tick(tick, tick % 40 == 0);
     EXPECT_EQ(frame.kind == codec::PacketKind::key, tick == 1 || tick % 40 == 0) << tick;
@@ -45,7 +40,7 @@ TEST_P(FrameEncoder, MakesThePacketsOfTheReferenceEncoder) {
 }
 
 TEST_P(FrameEncoder, EqualsTheReferenceOnStatesOfAnySize) {
-  Encoding encoding(clothsOf(GetParam().normals), GetParam().codec, GetParam().prediction);
+  Encoding encoding(clothsOf(GetParam().normals), GetParam().prediction);
   std::mt19937 random(1);
   for (std::uint64_t tick = 1; tick <= 12; ++tick) {
     const float extents[] = {1e-19f, 0.001f, 1, 32, 8000, 1e6f};
@@ -62,7 +57,7 @@ TEST_P(FrameEncoder, EqualsTheReferenceOnStatesOfAnySize) {
 TEST_P(FrameEncoder, KeepsTheErrorAtRoundingsEdges) {
   // Half way between lattice points, and the floats beside it: where a device that rounds otherwise would
   // differ.
-  Encoding encoding(clothsOf(GetParam().normals), GetParam().codec, GetParam().prediction);
+  Encoding encoding(clothsOf(GetParam().normals), GetParam().prediction);
   const float step = 2 * encoding.layout.maxError - 0x1p-18f;
   std::mt19937 random(2);
   std::uniform_int_distribution<int> point(-30000, 30000), offset(-3, 3);
@@ -84,15 +79,9 @@ TEST_P(FrameEncoder, KeepsTheErrorAtRoundingsEdges) {
 TEST_P(FrameEncoder, MakesThoseOfMeshesToo) {
   scene::Scene scene = clothsOf(GetParam().normals);
   scene.cloths.insert(scene.cloths.begin() + 1, discCloth(9));
-  Encoding encoding(scene, GetParam().codec, GetParam().prediction);
+  Encoding encoding(scene, GetParam().prediction);
   for (std::uint64_t tick = 1; tick <= 30 && !testing::Test::HasFailure(); ++tick)
     encoding.tick(tick, tick % 10 == 0);
-}
-
-TEST(StreamLayout, IsCodecTwosButWhereNormalsAreSent) {
-  EXPECT_EQ(encode::streamLayout(clothsOf(scene::Normals::none), kEpoch).codec, codec::kCodecHierarchical);
-  EXPECT_EQ(encode::streamLayout(clothsOf(scene::Normals::octahedral), kEpoch).codec,
-            codec::kCodecLatticeZstd);
 }
 
 class FrameEncoderSlots : public GpuTest {};

@@ -18,6 +18,23 @@ namespace {
 using testing::HasSubstr;
 using testing::StartsWith;
 
+TEST(ToScene, StreamsFineClothAsFinelyAsItsEdgesAre) {
+  v1::Scene message = smallScene();
+  v1::Grid& grid = *message.mutable_cloths(0)->mutable_grid();
+  grid.set_width(0.6f);
+  grid.set_height(1.8f);
+  grid.set_columns(61);
+  grid.set_rows(181);
+  message.set_substeps(60);
+  Result<scene::Scene> scene = toScene(message);
+  ASSERT_TRUE(scene) << scene.error().text;
+  EXPECT_NEAR(scene->stream.maxError, 0.01 / 40, 1e-8);
+  message.mutable_stream()->set_max_error(0.0007f);
+  scene = toScene(message);
+  ASSERT_TRUE(scene) << scene.error().text;
+  EXPECT_EQ(scene->stream.maxError, 0.0007f);
+}
+
 TEST(ToScene, AppliesTheDefaultsOfTheProto) {
   const Result<scene::Scene> scene = toScene(smallScene());
   ASSERT_TRUE(scene) << scene.error().text;

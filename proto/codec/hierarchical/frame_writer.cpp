@@ -120,6 +120,7 @@ std::size_t FrameWriter::write(const FrameRole& role, std::span<const std::byte>
                                std::span<std::byte> out) {
   const bool key = role.kind == PacketKind::key;
   header_.kind = role.kind;
+  header_.quality = role.quality;
   header_.temporalLayer = role.layer;
   header_.tick = role.tick;
   header_.referenceCount = key ? 0 : 1;

@@ -38,6 +38,7 @@ class HierarchicalDecoder final : public BodyDecoder {
   };
   using Vectors = std::array<WeightVectors, kWeightClasses + 1>;
 
+  bool decodeFrame(const ParsedPacket& packet, std::uint8_t referenceLayer);
   // Changes those of `weights` that a frame of this layer can.
   bool readWeights(std::span<const std::byte> section, bool key, std::uint8_t layer, LayerWeights& weights,
                    bool& atRest) const;
@@ -93,6 +94,18 @@ bool HierarchicalDecoder::readWeights(std::span<const std::byte> section, bool k
 }
 
 bool HierarchicalDecoder::decode(const ParsedPacket& packet, std::uint8_t referenceLayer) {
+  // A quality comes with a key frame; one that is refused changes nothing.
+  const LatticeUnit unit = latticeUnit(maxErrorOf(layout_, packet.header.quality));
+  predictor_.setStepBits(unit.stepBits);
+  if (!decodeFrame(packet, referenceLayer)) {
+    predictor_.setStepBits(unit_.stepBits);
+    return false;
+  }
+  unit_ = unit;
+  return true;
+}
+
+bool HierarchicalDecoder::decodeFrame(const ParsedPacket& packet, std::uint8_t referenceLayer) {
   const PacketHeader& header = packet.header;
   if (header.sectionCount != kSections) return false;
   const bool key = header.kind == PacketKind::key;

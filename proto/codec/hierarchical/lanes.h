@@ -10,6 +10,30 @@
 
 namespace clothstream::codec::hierarchical {
 
+// SIMDe spells these out lane by lane for WebAssembly, which has an instruction for each.
+#ifdef __wasm_simd128__
+inline int highestBitsOf8(simde__m128i v) {
+  return static_cast<int>(wasm_i8x16_bitmask(simde__m128i_to_wasm_v128(v)));
+}
+inline int highestBitsOf32(simde__m128i v) {
+  return static_cast<int>(wasm_i32x4_bitmask(simde__m128i_to_wasm_v128(v)));
+}
+inline simde__m128i dotPairsOf16(simde__m128i a, simde__m128i b) {
+  return simde__m128i_from_wasm_v128(
+      wasm_i32x4_dot_i16x8(simde__m128i_to_wasm_v128(a), simde__m128i_to_wasm_v128(b)));
+}
+#else
+inline int highestBitsOf8(simde__m128i v) {
+  return simde_mm_movemask_epi8(v);
+}
+inline int highestBitsOf32(simde__m128i v) {
+  return simde_mm_movemask_ps(simde_mm_castsi128_ps(v));
+}
+inline simde__m128i dotPairsOf16(simde__m128i a, simde__m128i b) {
+  return simde_mm_madd_epi16(a, b);
+}
+#endif
+
 // Addresses of loads and stores are aligned to 16 bytes. Arithmetic is modulo the width unless said
 // otherwise.
 struct Int32x4 {
@@ -35,7 +59,7 @@ struct Int32x4 {
   Int32x4 bitsShiftedRight(int bits) const { return {simde_mm_srl_epi32(v, simde_mm_cvtsi32_si128(bits))}; }
   // Whether the first three are the same.
   bool sameThree(Int32x4 other) const {
-    return (simde_mm_movemask_epi8(simde_mm_cmpeq_epi32(v, other.v)) & 0xfff) == 0xfff;
+    return (highestBitsOf8(simde_mm_cmpeq_epi32(v, other.v)) & 0xfff) == 0xfff;
   }
   friend Int32x4 operator&(Int32x4 a, Int32x4 b) { return {simde_mm_and_si128(a.v, b.v)}; }
   friend Int32x4 operator|(Int32x4 a, Int32x4 b) { return {simde_mm_or_si128(a.v, b.v)}; }
@@ -50,7 +74,7 @@ struct Int32x4 {
     return (*this ^ sign) - sign;
   }
   // A bit a lane: its highest.
-  int signs() const { return simde_mm_movemask_ps(simde_mm_castsi128_ps(v)); }
+  int signs() const { return highestBitsOf32(v); }
   std::int32_t fourth() const { return simde_mm_cvtsi128_si32(simde_mm_shuffle_epi32(v, 0xff)); }
 };
 
@@ -208,7 +232,7 @@ inline Int16x8 interleave64High(Int16x8 a, Int16x8 b) {
 
 // a0 b0 + a1 b1, a2 b2 + a3 b3, ...
 inline Int32x4 dotPairs(Int16x8 a, Int16x8 b) {
-  return {simde_mm_madd_epi16(a.v, b.v)};
+  return {dotPairsOf16(a.v, b.v)};
 }
 
 // a0 + a1, a2 + a3, b0 + b1, b2 + b3.
@@ -223,7 +247,7 @@ inline std::uint32_t countNotAbove(Int16x8 low, Int16x8 high, Int16x8 wanted) {
   const simde__m128i above =
       simde_mm_packs_epi16(simde_mm_cmpgt_epi16(low.v, wanted.v), simde_mm_cmpgt_epi16(high.v, wanted.v));
   return static_cast<std::uint32_t>(
-      std::countr_zero(static_cast<std::uint32_t>(simde_mm_movemask_epi8(above)) | 1u << 15));
+      std::countr_zero(static_cast<std::uint32_t>(highestBitsOf8(above)) | 1u << 15));
 }
 
 }  // namespace clothstream::codec::hierarchical

@@ -8,8 +8,7 @@
 namespace clothstream::codec::hierarchical {
 
 bool Predictor::allocate(const StreamLayout& layout, int stepBits) {
-  stepBits_ = stepBits;
-  fineBits_ = stepBits - 4;
+  setStepBits(stepBits);
   const std::size_t vertices = layout.vertexCount();
   bool allocated = hierarchy_.build(layout);
   for (std::size_t i = 0; i <= layout.temporalLayers; ++i) {

@@ -87,6 +87,12 @@ class Predictor {
   // Residuals are in steps of 2^stepBits units, 4 to 8. False if memory is out.
   [[nodiscard]] bool allocate(const StreamLayout& layout, int stepBits);
 
+  // From the next key frame on.
+  void setStepBits(int stepBits) {
+    stepBits_ = stepBits;
+    fineBits_ = stepBits - 4;
+  }
+
   const Hierarchy& hierarchy() const { return hierarchy_; }
 
   // A predicted frame refers to the newest one of that layer.

@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: MIT
 // Suite codec: both codecs on the CPU over motions that they were not fitted to; codec 2 with temporal
-// layers, and of a grid as a mesh, too.
+// layers, and of a square grid as a mesh, too.
+#include <array>
+#include <functional>
+#include <vector>
+
 #include "tests/bench/codec/bench_motion.h"
 #include "tests/bench/codec/codec_measurement.h"
 #include "tests/bench/codec/our_codec.h"
@@ -9,61 +13,68 @@
 namespace clothstream::bench {
 namespace {
 
-// Measurements of one cloth.
-class Measured {
+// A motion's frames one after the other, in memory: each codec has them, and the caches, to itself.
+class Frames {
  public:
-  explicit Measured(const codec::ClothLayout& cloth) : cloth_(cloth), truth_(cloth) {}
-
-  void add(const codec::StreamLayout& layout) {
-    all_.emplace_back(std::make_unique<OurCodec>(layout), cloth_, double{layout.maxError});
+  explicit Frames(const BenchMotion& motion) : floats_(3 * std::size_t{motion.cloth.vertexCount}) {
+    motion.play([&](std::span<const float> positions) {
+      all_.insert(all_.end(), positions.begin(), positions.end());
+    });
   }
-  void next(std::span<const float> positions) {
-    const TrueFrame frame = truth_.next(positions);
-    for (CodecMeasurement& one : all_) one.add(frame);
-  }
-  void report(const std::string& motion, Rows& rows) const {
-    for (const CodecMeasurement& one : all_) rows.push_back(one.row(motion));
+  std::size_t count() const { return all_.size() / floats_; }
+  std::span<const float> operator[](std::size_t frame) const {
+    return std::span(all_).subspan(frame * floats_, floats_);
   }
 
  private:
-  codec::ClothLayout cloth_;
-  Truth truth_;
-  std::vector<CodecMeasurement> all_;
+  std::size_t floats_;
+  std::vector<float> all_;
 };
+
+// `positionsOf` gives a frame's in the order of the layout's vertices.
+nlohmann::ordered_json measure(const std::string& motion, const codec::StreamLayout& layout,
+                               std::size_t frames,
+                               const std::function<std::span<const float>(std::size_t)>& positionsOf) {
+  const codec::ClothLayout& cloth = layout.cloths.front();
+  CodecMeasurement measurement(std::make_unique<OurCodec>(layout), cloth, double{layout.maxError});
+  Truth truth(cloth);
+  for (std::size_t frame = 0; frame < frames; ++frame) measurement.add(truth.next(positionsOf(frame)));
+  return measurement.row(motion);
+}
+
+struct Variant {
+  std::uint8_t codec, temporalLayers;
+  codec::NormalMode normals;
+};
+constexpr std::array kVariants{Variant{codec::kCodecHierarchical, 1, codec::NormalMode::none},
+                               Variant{codec::kCodecHierarchical, 2, codec::NormalMode::none},
+                               Variant{codec::kCodecHierarchical, 3, codec::NormalMode::none},
+                               Variant{codec::kCodecHierarchical, 1, codec::NormalMode::octahedral},
+                               Variant{codec::kCodecLatticeZstd, 1, codec::NormalMode::none},
+                               Variant{codec::kCodecLatticeZstd, 1, codec::NormalMode::octahedral}};
 
 }  // namespace
 
 Rows runCodec(vulkan::Device& device, const Settings& settings) {
   Rows rows;
   for (const BenchMotion& motion : chosenMotions(device, settings)) {
-    codec::StreamLayout layout{.epoch = 1,
-                               .codec = codec::kCodecHierarchical,
-                               .maxError = settings.maxError,
-                               .cloths = {motion.cloth}};
-    Measured asItIs(motion.cloth);
-    for (layout.temporalLayers = 1; layout.temporalLayers <= codec::kMaxTemporalLayers;
-         ++layout.temporalLayers)
-      asItIs.add(layout);
-    layout.temporalLayers = 1;
-    layout.normals = codec::NormalMode::octahedral;
-    asItIs.add(layout);
-    layout.codec = codec::kCodecLatticeZstd;
-    asItIs.add(layout);
-    layout.normals = codec::NormalMode::none;
-    asItIs.add(layout);
-    layout.codec = codec::kCodecHierarchical;
-    // A grid that is square can be cut.
-    const bool square = motion.cloth.rows > 0 && motion.cloth.rows == motion.cloth.columns;
-    codec::CutGrid cut(square ? motion.cloth.rows : 1);
-    Measured asAMesh(cut.cloth());
-    layout.cloths = {cut.cloth()};
-    if (square) asAMesh.add(layout);
-    motion.play([&](std::span<const float> positions) {
-      asItIs.next(positions);
-      if (square) asAMesh.next(cut.renumbered(positions));
-    });
-    asItIs.report(motion.name, rows);
-    asAMesh.report(motion.name, rows);
+    const Frames frames(motion);
+    codec::StreamLayout layout{.epoch = 1, .maxError = settings.maxError, .cloths = {motion.cloth}};
+    for (const Variant& variant : kVariants) {
+      layout.codec = variant.codec;
+      layout.temporalLayers = variant.temporalLayers;
+      layout.normals = variant.normals;
+      rows.push_back(
+          measure(motion.name, layout, frames.count(), [&](std::size_t frame) { return frames[frame]; }));
+    }
+    if (motion.cloth.rows < 2 || motion.cloth.rows != motion.cloth.columns) continue;
+    codec::CutGrid cut(motion.cloth.rows);
+    const codec::StreamLayout ofAMesh{.epoch = 1,
+                                      .codec = codec::kCodecHierarchical,
+                                      .maxError = settings.maxError,
+                                      .cloths = {cut.cloth()}};
+    rows.push_back(measure(motion.name, ofAMesh, frames.count(),
+                           [&](std::size_t frame) { return cut.renumbered(frames[frame]); }));
   }
   return rows;
 }
