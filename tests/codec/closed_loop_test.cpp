@@ -314,7 +314,7 @@ TEST(ClosedLoopKinds, PredictionPaysOnASlowMotion) {
 
 // The same scene in three qualities; a reader goes from one to another at key frames alone.
 TEST(Quality, ChangesAtAKeyFrame) {
-  StreamLayout layout = square(24, kCodecHierarchical);
+  StreamLayout layout = square(60, kCodecHierarchical);
   layout.qualities = 3;
   const auto decoder = Decoder::make(layout);
   std::vector<std::unique_ptr<Encoder>> encoders;

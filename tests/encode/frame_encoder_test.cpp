@@ -24,7 +24,8 @@ class FrameEncoder : public GpuTest, public testing::WithParamInterface<Sort> {}
 INSTANTIATE_TEST_SUITE_P(Sorts, FrameEncoder,
                          testing::Values(Sort{"onHost", scene::Normals::none},
                                          Sort{"onHostWithNormals", scene::Normals::octahedral},
-                                         Sort{"onDevice", scene::Normals::none,
+                                         Sort{"onDevice", scene::Normals::none, encode::Prediction::onDevice},
+                                         Sort{"onDeviceWithNormals", scene::Normals::octahedral,
                                               encode::Prediction::onDevice}),
                          [](const auto& chosen) { return chosen.param.name; });
 
