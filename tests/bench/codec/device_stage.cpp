@@ -88,10 +88,10 @@ nlohmann::ordered_json measure(vulkan::Device& device, const scene::Scene& scene
 
 Rows runCodecDevice(vulkan::Device& device, const Settings& settings) {
   Rows rows;
-  // Codec 2 on the host and on the device, then codec 1.
   const std::pair<scene::Normals, encode::Prediction> ways[]{
       {scene::Normals::none, encode::Prediction::onHost},
       {scene::Normals::none, encode::Prediction::onDevice},
+      {scene::Normals::octahedral, encode::Prediction::onHost},
       {scene::Normals::octahedral, encode::Prediction::onDevice}};
   for (const auto& [normals, prediction] : ways) {
     for (const codec::PacketKind kind : {codec::PacketKind::predicted, codec::PacketKind::key}) {
