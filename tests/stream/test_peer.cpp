@@ -112,10 +112,10 @@ void TestPeer::see(const v1::ServerMessage& message, const stream::SharedBytes& 
 
 namespace {
 
-std::vector<std::uint32_t> trianglesOf(const v1::ClothDescription& cloth) {
-  std::vector<std::uint32_t> numbers(cloth.triangles().size() / sizeof(std::uint32_t));
-  if (!numbers.empty())
-    std::memcpy(numbers.data(), cloth.triangles().data(), numbers.size() * sizeof(std::uint32_t));
+template <typename Number>
+std::vector<Number> numbersOf(const std::string& bytes) {
+  std::vector<Number> numbers(bytes.size() / sizeof(Number));
+  if (!numbers.empty()) std::memcpy(numbers.data(), bytes.data(), numbers.size() * sizeof(Number));
   return numbers;
 }
 
@@ -135,7 +135,10 @@ void TestPeer::seeChunk(const v1::Chunk& chunk) {
   layout.maxError = description_.max_error();
   layout.normals = octahedral ? codec::NormalMode::octahedral : codec::NormalMode::none;
   for (const v1::ClothDescription& cloth : description_.cloths())
-    layout.cloths.push_back({cloth.vertex_count(), cloth.rows(), cloth.columns(), trianglesOf(cloth)});
+    layout.cloths.push_back({cloth.vertex_count(), cloth.rows(), cloth.columns(),
+                             numbersOf<std::uint32_t>(cloth.triangles()),
+                             cloth.triangles().empty() ? std::vector<float>{}
+                                                       : numbersOf<float>(cloth.rest_positions())});
   decoder_ = codec::Decoder::make(layout);
   ASSERT_TRUE(decoder_);
 }
