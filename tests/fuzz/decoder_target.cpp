@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <vector>
 
 #include "proto/codec/decoder.h"
 
@@ -21,6 +22,24 @@ void requireFinite(std::span<const float> values) {
   for (const float value : values) require(std::isfinite(value), "floats are finite");
 }
 
+// The same of a decoder of coarse vertices, after the packet was made smaller.
+void decodeHostileCoarse(const GoldenStream& stream, std::size_t place, std::span<const std::byte> bytes,
+                         bool isTakenWhole) {
+  const auto decoder = Decoder::make(stream.layout, Detail::coarse);
+  std::vector<std::byte> smaller(bytes.size());
+  const std::size_t size = makeCoarsePacket(bytes, smaller);
+  require(size <= bytes.size(), "a coarse packet is not larger");
+  if (decoder == nullptr) return;
+  for (std::size_t i = 0; i < place; ++i) {
+    require(decoder->decode(stream.packets[i].bytes) == DecodeResult::ok,
+            "golden packets hold coarse vertices");
+  }
+  if (decoder->decode(std::span(smaller).first(size)) == DecodeResult::ok)
+    requireFinite(decoder->positions());
+  else
+    require(!isTakenWhole, "what is decoded holds coarse vertices");
+}
+
 }  // namespace
 
 void decodeHostile(const GoldenStream& stream, std::size_t place, std::span<const std::byte> bytes) {
@@ -30,7 +49,8 @@ void decodeHostile(const GoldenStream& stream, std::size_t place, std::span<cons
   }
   const bool hadFrame = decoder->hasFrame();
   const std::uint64_t tick = decoder->tick(), hash = decoder->reconstructionHash();
-  if (decoder->decode(bytes) == DecodeResult::ok) {
+  const bool isTaken = decoder->decode(bytes) == DecodeResult::ok;
+  if (isTaken) {
     require(decoder->hasFrame() && (!hadFrame || decoder->tick() > tick), "a decoded frame is newer");
     requireFinite(decoder->positions());
     requireFinite(decoder->normals());
@@ -39,6 +59,7 @@ void decodeHostile(const GoldenStream& stream, std::size_t place, std::span<cons
         decoder->hasFrame() == hadFrame && decoder->tick() == tick && decoder->reconstructionHash() == hash,
         "a refused packet changes nothing");
   }
+  decodeHostileCoarse(stream, place, bytes, isTaken);
   for (std::size_t i = place; i < stream.packets.size(); ++i) {
     if (decoder->decode(stream.packets[i].bytes) == DecodeResult::ok) requireFinite(decoder->positions());
   }

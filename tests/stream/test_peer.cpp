@@ -135,10 +135,9 @@ void TestPeer::seeChunk(const v1::Chunk& chunk) {
   layout.maxError = description_.max_error();
   layout.normals = octahedral ? codec::NormalMode::octahedral : codec::NormalMode::none;
   for (const v1::ClothDescription& cloth : description_.cloths())
-    layout.cloths.push_back({cloth.vertex_count(), cloth.rows(), cloth.columns(),
-                             numbersOf<std::uint32_t>(cloth.triangles()),
-                             cloth.triangles().empty() ? std::vector<float>{}
-                                                       : numbersOf<float>(cloth.rest_positions())});
+    layout.cloths.push_back(
+        {cloth.vertex_count(), cloth.rows(), cloth.columns(), numbersOf<std::uint32_t>(cloth.triangles()),
+         cloth.triangles().empty() ? std::vector<float>{} : numbersOf<float>(cloth.rest_positions())});
   decoder_ = codec::Decoder::make(layout);
   ASSERT_TRUE(decoder_);
 }
