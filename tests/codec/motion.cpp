@@ -2,6 +2,7 @@
 // Cloth-like motions for tests of the codec.
 #include "tests/codec/motion.h"
 
+#include <array>
 #include <cmath>
 #include <random>
 
@@ -44,8 +45,11 @@ MotionFrame scatter(const StreamLayout& layout, std::uint32_t seed, float extent
   const auto uniform = [&] { return static_cast<double>(random()) / 2147483648.0 - 1.0; };
   for (std::uint32_t i = 0; i < layout.vertexCount(); ++i) {
     const double e = static_cast<double>(extent);
-    append(frame.positions, e * uniform(), e * uniform(), e * uniform());
-    appendUnit(frame.normals, uniform(), uniform(), uniform() + 1e-3);
+    // One after the other: compilers call a function's arguments in any order.
+    std::array<double, 6> any;
+    for (double& value : any) value = uniform();
+    append(frame.positions, e * any[0], e * any[1], e * any[2]);
+    appendUnit(frame.normals, any[3], any[4], any[5] + 1e-3);
   }
   return frame;
 }
