@@ -41,6 +41,9 @@ struct TickInputs {
   std::vector<Grip> grips = {};
 };
 
+// Of the scene by itself: its wind, its colliders and what is attached to them during this tick, from 0 on.
+TickInputs inputsAt(const scene::Scene& scene, std::uint64_t tick);
+
 struct SimulationOptions {
   // Rows of a grid that one invocation walks down. 0: the measured best for the device (more on software
   // devices).

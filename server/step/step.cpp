@@ -9,7 +9,6 @@
 #include <fmt/format.h>
 
 #include "server/messages/scene_file.h"
-#include "server/scene/wind.h"
 #include "server/simulation/cloth_simulation.h"
 #include "server/step/state_file.h"
 #include "server/vulkan/recorder.h"
@@ -19,19 +18,6 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 using Clock = std::chrono::steady_clock;
-
-simulation::TickInputs inputsAt(const scene::Scene& scene, std::uint64_t tick) {
-  simulation::TickInputs inputs{scene::environmentAt(scene, tick), {}};
-  const double start = static_cast<double>(tick) * scene.tickSeconds();
-  const double end = static_cast<double>(tick + 1) * scene.tickSeconds();
-  for (const scene::Collider& collider : scene.colliders)
-    inputs.colliders.push_back(
-        {collider.shape, scene::poseAt(collider, start), scene::poseAt(collider, end), collider.friction});
-  for (const scene::Cloth& cloth : scene.cloths)
-    for (const scene::Attachment& attachment : cloth.attachments)
-      inputs.attachments.push_back(scene::frameAt(scene, attachment, end));
-  return inputs;
-}
 
 Json describe(const scene::Scene& scene) {
   Json cloths = Json::array();
@@ -123,7 +109,7 @@ Outcome run(vulkan::Device& device, const scene::Scene& scene, const StepOptions
   Progress progress(options.ticks);
   for (std::uint64_t tick = 1; tick <= options.ticks && outcome == Outcome::complete; ++tick) {
     const bool wanted = tick % options.every == 0;
-    const simulation::TickInputs inputs = inputsAt(scene, tick - 1);
+    const simulation::TickInputs inputs = simulation::inputsAt(scene, tick - 1);
     submit([&] {
       simulation.recordTick(recorder, inputs);
       if (!wanted) return;

@@ -40,15 +40,6 @@ reference::ReferenceCloth measuredCloth(const scene::Cloth& cloth, const simulat
   return measured;
 }
 
-simulation::TickInputs inputsAt(const scene::Scene& scene, std::uint64_t tick) {
-  simulation::TickInputs inputs{scene::environmentAt(scene, tick), {}};
-  const double from = static_cast<double>(tick) * scene.tickSeconds(), to = from + scene.tickSeconds();
-  for (const scene::Collider& collider : scene.colliders)
-    inputs.colliders.push_back(
-        {collider.shape, scene::poseAt(collider, from), scene::poseAt(collider, to), collider.friction});
-  return inputs;
-}
-
 Simulated::Simulated(vulkan::Device& device, const scene::Scene& scene,
                      const simulation::SimulationOptions& options)
     : device_(device), scene_(scene), recorder_(device), simulation_(device, scene, options) {}

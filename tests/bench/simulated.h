@@ -58,9 +58,6 @@ class Simulated {
 // A scene's only cloth in this state, with its strain and energies.
 reference::ReferenceCloth measuredCloth(const scene::Cloth& cloth, const simulation::NodeState& state);
 
-// The scene's own environment and colliders as they are during this tick, from 0 on.
-simulation::TickInputs inputsAt(const scene::Scene& scene, std::uint64_t tick);
-
 // Records with `record`, submits, waits.
 void runOn(vulkan::Device& device, vulkan::Recorder& recorder, const auto& record) {
   recorder.begin();

@@ -137,7 +137,7 @@ Measured measure(vulkan::Device& device, scene::Scene scene, const Method& metho
   Measured measured{};
   simulation::NodeState state;
   for (std::uint32_t frame = 0; frame < kFrames; ++frame) {
-    simulated.tick(inputsAt(scene, frame));
+    simulated.tick(simulation::inputsAt(scene, frame));
     state = simulated.state();
     std::vector<reference::Vec3>& positions = measured.trajectory.frames.emplace_back();
     for (const scene::Vec3& position : state.positions) positions.push_back(position.cast<double>());

@@ -59,10 +59,13 @@ class Encoding {
         expected_(reference_->packetBound()) {}
 
   // Advances, encodes both ways, decodes, and compares.
-  encode::RecordedFrame tick(std::uint64_t tick, bool forceKey) {
+  encode::RecordedFrame tick(std::uint64_t tick, bool forceKey, const simulation::TickInputs& inputs) {
     recorder_.begin();
-    simulation.recordTick(recorder_, inputsOf(scene_, sphereAt(tick)));
+    simulation.recordTick(recorder_, inputs);
     return encodeAndCompare(tick, forceKey);
+  }
+  encode::RecordedFrame tick(std::uint64_t tick, bool forceKey) {
+    return this->tick(tick, forceKey, inputsOf(scene_, sphereAt(tick)));
   }
 
   encode::RecordedFrame encodeState(const simulation::NodeState& state, std::uint64_t tick, bool forceKey) {

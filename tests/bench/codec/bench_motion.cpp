@@ -105,7 +105,7 @@ BenchMotion simulated(vulkan::Device& device, const Named& named, const Settings
             Simulated simulated(device, scene, {});
             std::vector<float> positions(3 * std::size_t{scene.nodeCount()});
             for (std::uint32_t tick = 0; tick < warmUp + frames; ++tick) {
-              simulated.tick(inputsAt(scene, tick));
+              simulated.tick(simulation::inputsAt(scene, tick));
               if (tick < warmUp) continue;
               const simulation::NodeState state = simulated.state();
               for (std::size_t node = 0; node < state.positions.size(); ++node)

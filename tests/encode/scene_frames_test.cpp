@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: MIT
+// The promise of the max error, over the scenes that come with the program.
+#include "server/messages/scene_file.h"
+#include "tests/encode/encoding.h"
+
+namespace clothstream::tests {
+namespace {
+
+class NamedScene : public GpuTest, public testing::WithParamInterface<std::string> {};
+INSTANTIATE_TEST_SUITE_P(All, NamedScene, testing::ValuesIn(messages::namedScenes()),
+                         [](const auto& name) { return name.param; });
+
+// Encoding checks each frame, packet and vertex.
+TEST_P(NamedScene, KeepsItsMaxErrorForSixSeconds) {
+  const scene::Scene scene = *messages::loadScene(GetParam());
+  Encoding encoding(scene);
+  const std::uint64_t ticks = 6 * scene.simulationRate;
+  for (std::uint64_t tick = 1; tick <= ticks && !HasFailure(); ++tick)
+    encoding.tick(tick, tick % 100 == 0, simulation::inputsAt(scene, tick - 1));
+}
+
+}  // namespace
+}  // namespace clothstream::tests
