@@ -17,6 +17,16 @@
 namespace clothstream::codec {
 namespace {
 
+// Of the vertex whose first coordinate is number i.
+double squaredDistance(std::span<const float> a, std::span<const float> b, std::size_t i) {
+  double squared = 0;
+  for (std::size_t c = i; c < i + 3; ++c) {
+    const double off = static_cast<double>(a[c]) - static_cast<double>(b[c]);
+    squared += off * off;
+  }
+  return squared;
+}
+
 // Encoder and decoder of one stream.
 class Loop {
  public:
@@ -45,22 +55,17 @@ class Loop {
   // Codec 1 promises each coordinate, codec 2 the distance.
   void expectPositions(std::uint64_t tick, const MotionFrame& frame) {
     const double maxError = static_cast<double>(layout_.maxError);
-    const bool eachAxis = layout_.codec == kCodecLatticeZstd;
+    const std::span<const float> decoded = decoder_->positions();
+    for (std::size_t c = 0; layout_.codec == kCodecLatticeZstd && c < frame.positions.size(); ++c) {
+      const double error = static_cast<double>(frame.positions[c]) - static_cast<double>(decoded[c]);
+      EXPECT_LE(std::fabs(error), maxError) << "tick " << tick << " coordinate " << c;
+    }
     for (std::size_t i = 0; i < frame.positions.size(); i += 3) {
-      double squared = 0;
-      for (std::size_t c = i; c < i + 3; ++c) {
-        const double error =
-            static_cast<double>(frame.positions[c]) - static_cast<double>(decoder_->positions()[c]);
-        squared += error * error;
-        if (eachAxis) {
-          EXPECT_LE(std::fabs(error), maxError) << "tick " << tick << " coordinate " << c;
-        }
-      }
-      EXPECT_LE(squared, 3 * maxError * maxError) << "tick " << tick << " vertex " << i / 3;
+      EXPECT_LE(squaredDistance(frame.positions, decoded, i), 3 * maxError * maxError)
+          << "tick " << tick << " vertex " << i / 3;
     }
   }
 
-  // Codec 1's are those of one octahedron, codec 2's of the one whose top is near.
   void expectNormals(const MotionFrame& frame) {
     constexpr double kLargestAngle = 1;  // encodeOctahedral()
     for (std::size_t i = 0; i < frame.normals.size(); i += 3) {
@@ -342,16 +347,11 @@ TEST(Quality, ChangesAtAKeyFrame) {
       ASSERT_EQ(decoder->decode(std::span(packet).first(size)), DecodeResult::ok) << tick;
       EXPECT_EQ(decoder->reconstructionHash(), hash);
       for (std::size_t i = 0; i < frame.positions.size(); i += 3) {
-        double squared = 0;
-        for (std::size_t c = i; c < i + 3; ++c) {
-          const double off =
-              static_cast<double>(frame.positions[c]) - static_cast<double>(decoder->positions()[c]);
-          squared += off * off;
-        }
+        const double distance = std::sqrt(squaredDistance(frame.positions, decoder->positions(), i));
         const double promise =
             std::sqrt(3.0) * static_cast<double>(maxErrorOf(layout, static_cast<std::uint8_t>(quality)));
-        ASSERT_LE(std::sqrt(squared), promise);
-        worst = std::max(worst, std::sqrt(squared) / promise);
+        ASSERT_LE(distance, promise);
+        worst = std::max(worst, distance / promise);
       }
     }
   }

@@ -90,13 +90,15 @@ void FrameWriter::code(const ChunkResiduals& chunk, Component component, std::si
     symbols_.add(coder, distributionOf(component, scale), kEscape);
     return;
   }
+  put(chunk.residuals[component][i], component, scale, component == kAlongNormal ? kStays + 1 : 0, coder);
+}
+
+void FrameWriter::put(std::int32_t residual, Component component, std::uint32_t scale, std::uint32_t reserved,
+                      std::size_t coder) {
   const unsigned raw = rawBits(scale);
-  const std::uint32_t number = zigzag(chunk.residuals[component][i]);
-  std::uint32_t symbol = number >> raw;
-  if (symbol >= kEscape) {
-    bits_.putGamma(symbol - kEscape + (component == kAlongNormal ? kStays + 1 : 0), kEscapeGammaBits);
-    symbol = kEscape;
-  }
+  const std::uint32_t number = zigzag(residual);
+  const std::uint32_t symbol = std::min(number >> raw, kEscape);
+  if (symbol == kEscape) bits_.putGamma((number >> raw) - kEscape + reserved, kEscapeGammaBits);
   if (raw > 0) bits_.put(number & ((1u << raw) - 1), raw);
   symbols_.add(coder, distributionOf(component, scale), symbol);
 }
@@ -104,13 +106,7 @@ void FrameWriter::code(const ChunkResiduals& chunk, Component component, std::si
 void FrameWriter::addNormal(std::int8_t u, std::int8_t v) {
   const std::array<std::int8_t, 2> residuals{u, v};
   for (std::size_t c = 0; c < 2; ++c) {
-    const std::uint32_t scale = normalScales_[c].scale();
-    const unsigned raw = rawBits(scale);
-    const std::uint32_t number = zigzag(residuals[c]);
-    const std::uint32_t symbol = std::min(number >> raw, kEscape);
-    if (symbol == kEscape) bits_.putGamma((number >> raw) - kEscape, kEscapeGammaBits);
-    if (raw > 0) bits_.put(number & ((1u << raw) - 1), raw);
-    symbols_.add((2 * normals_ + c) % kCoders, distributionOf(kAlongU, scale), symbol);
+    put(residuals[c], kAlongU, normalScales_[c].scale(), 0, (2 * normals_ + c) % kCoders);
     normalScales_[c].add(residuals[c]);
   }
   ++normals_;

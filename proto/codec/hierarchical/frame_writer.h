@@ -51,6 +51,9 @@ class FrameWriter {
 
  private:
   void code(const ChunkResiduals& chunk, Component component, std::size_t i);
+  // `reserved`: how many of the escapes' numbers stand for something else.
+  void put(std::int32_t residual, Component component, std::uint32_t scale, std::uint32_t reserved,
+           std::size_t coder);
 
   PacketHeader header_;
   RansWriter symbols_;
