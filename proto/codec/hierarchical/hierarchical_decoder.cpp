@@ -13,6 +13,10 @@
 namespace clothstream::codec::hierarchical {
 namespace {
 
+Int32x4 unzigzag(Int32x4 numbers) {
+  return numbers.bitsShiftedRight(1) ^ (Int32x4::all(0) - (numbers & Int32x4::all(1)));
+}
+
 class HierarchicalDecoder final : public BodyDecoder {
  public:
   bool allocate(const StreamLayout& layout, Detail detail) {
@@ -49,11 +53,14 @@ class HierarchicalDecoder final : public BodyDecoder {
                    const ScaleModel* model, Streams& streams);
   void readResiduals(std::uint32_t count, const ScaleModel& model, Streams& streams);
   void readComponent(Component component, std::uint32_t count, Streams& streams);
+  bool isOutside() const { return (beyond_.signs() & 7) != 0; }
   template <bool within>
-  void readSymbols(Component component, std::uint32_t count, Streams& streams);
+  void readSymbols(Component component, std::uint32_t count, RansReader& reader);
+  void completeResiduals(Component component, std::uint32_t first, std::uint32_t count, BitReader& bits);
   std::uint32_t readEscaped(Component component, std::size_t i, BitReader& bits);
   void reconstruct(std::uint32_t begin, std::uint32_t count);
-  void place(std::uint32_t slot, const Prediction& prediction, Int32x4 position, std::uint32_t magnitudes);
+  void place(std::uint32_t begin, std::uint32_t count, const Prediction* predictions,
+             const std::array<Int32x4, 4>& positions, Int32x4 magnitudes);
 
   StreamLayout layout_;
   bool isCoarse_ = false, hasNormals_ = false;
@@ -62,7 +69,7 @@ class HierarchicalDecoder final : public BodyDecoder {
   NormalPrediction normalPrediction_;
   Array<FacedNormal> normals_, newNormals_;                 // by vertex; of the frame that is being decoded
   std::array<LayerWeights, kMaxTemporalLayers> weights_{};  // that the newest frame of each layer left
-  bool outside_ = false;  // a coordinate of the frame that is being decoded is beyond kMaxCoordinate
+  Int32x4 beyond_{};  // where a coordinate of this frame was beyond kMaxCoordinate
   // Of the chunk that is being decoded.
   std::array<Prediction, kChunk> predictions_{};
   std::array<SurfaceFrames, kChunk / 4> frames_;
@@ -84,7 +91,7 @@ bool HierarchicalDecoder::readWeights(std::span<const std::byte> section, bool k
       if (reader.get(1) == 0) continue;
       for (std::size_t f = firstWeight(key); f < endWeight(key); ++f) {
         std::int16_t& weight = weights[layer][c][f];
-        const std::int64_t value = std::int64_t{weight} + unzigzag(reader.getGamma(kWeightGammaBits));
+        const std::int64_t value = std::int64_t{weight} + codec::unzigzag(reader.getGamma(kWeightGammaBits));
         if (value < -kMaxWeight || value > kMaxWeight) return false;
         weight = static_cast<std::int16_t>(value);
       }
@@ -122,7 +129,7 @@ bool HierarchicalDecoder::decodeFrame(const ParsedPacket& packet, std::uint8_t r
   const Vectors vectors = weightVectors(atRest ? Weights{} : weights[layer]);
   Streams streams{RansReader(isCoarse_ ? symbols.first(bytes[kCoarseSymbols]) : symbols),
                   BitReader(isCoarse_ ? bits.first(bytes[kCoarseBits]) : bits)};
-  outside_ = false;
+  beyond_ = Int32x4::all(0);
   predictor_.begin(key, referenceLayer);
   const Hierarchy& hierarchy = predictor_.hierarchy();
   decodePhases(0, hierarchy.coarsePhases, key, vectors, streams);
@@ -130,12 +137,12 @@ bool HierarchicalDecoder::decodeFrame(const ParsedPacket& packet, std::uint8_t r
       streams.bits.bytesTaken() != bytes[kCoarseBits])
     return false;
   if (isCoarse_) {
-    if (outside_) return false;
+    if (isOutside()) return false;
     predictor_.interpolate(hierarchy.coarseVertices, static_cast<std::uint32_t>(hierarchy.vertexOf.size()));
     predictor_.keep(layer, hierarchy.coarseVertices);
   } else {
     decodePhases(hierarchy.coarsePhases, hierarchy.phases.size(), key, vectors, streams);
-    if (outside_) return false;
+    if (isOutside()) return false;
     if (hasNormals_) decodeNormals(streams);
     if (!streams.symbols.atEnd() || !streams.bits.atEnd()) return false;
     if (hasNormals_) std::swap(normals_, newNormals_);
@@ -171,7 +178,7 @@ void HierarchicalDecoder::decodeNormals(Streams& streams) {
                                                          symbolTables()[distributionOf(kAlongU, scale)]);
       if (number == kEscape) number += streams.bits.getGamma(kEscapeGammaBits);
       if (const unsigned raw = rawBits(scale); raw > 0) number = number << raw | streams.bits.get(raw);
-      residuals[c] = unzigzag(number);
+      residuals[c] = codec::unzigzag(number);
       scales[c].add(residuals[c]);
     }
     const FacedNormal& expected = predicted[vertex];
@@ -192,7 +199,11 @@ void HierarchicalDecoder::decodeChunk(std::uint32_t begin, std::uint32_t count, 
     reconstruct(begin, count);
     return;
   }
-  for (std::uint32_t i = 0; i < count; ++i) place(begin + i, predictions_[i], predictions_[i].position, 0);
+  for (std::uint32_t first = 0; first < count; first += 4) {
+    const Prediction* four = &predictions_[first];
+    place(begin + first, std::min(count - first, 4u), four,
+          {four[0].position, four[1].position, four[2].position, four[3].position}, Int32x4::all(0));
+  }
 }
 
 void HierarchicalDecoder::readResiduals(std::uint32_t count, const ScaleModel& model, Streams& streams) {
@@ -219,38 +230,60 @@ void HierarchicalDecoder::readResiduals(std::uint32_t count, const ScaleModel& m
 
 void HierarchicalDecoder::readComponent(Component component, std::uint32_t count, Streams& streams) {
   if (streams.symbols.hasRoomFor(count + 1))
-    readSymbols<true>(component, count, streams);
+    readSymbols<true>(component, count, streams.symbols);
   else
-    readSymbols<false>(component, count, streams);
+    readSymbols<false>(component, count, streams.symbols);
+  for (std::uint32_t first = 0; first < count; first += 4)
+    completeResiduals(component, first, std::min(count - first, 4u), streams.bits);
 }
 
+// What stays has no symbol.
 template <bool within>
-void HierarchicalDecoder::readSymbols(Component component, std::uint32_t count, Streams& streams) {
+void HierarchicalDecoder::readSymbols(Component component, std::uint32_t count, RansReader& reader) {
   const SymbolTable* tables = &symbolTables()[distributionOf(component, 0)];
-  RansReader symbols = streams.symbols;  // its states in registers
+  RansReader symbols = reader;  // its states in registers
+  std::int32_t* const out = residuals_[component];
   const auto read = [&](std::size_t i, std::size_t coder) {
-    std::int32_t& residual = residuals_[component][i];
-    if (anyStays_ && stays_[i]) {
-      residual = 0;
-      return;
-    }
-    const auto scale = static_cast<std::uint32_t>(scales_[i]);
-    std::uint32_t number = symbols.read<within>(coder, tables[scale]);
-    if (number == kEscape) number = readEscaped(component, i, streams.bits);
-    if (const unsigned raw = rawBits(scale); raw > 0 && !stays_[i])
-      number = number << raw | streams.bits.get(raw);
-    residual = unzigzag(number);
+    out[i] = static_cast<std::int32_t>(symbols.read<within>(coder, tables[scales_[i]]));
   };
-  std::size_t i = 0;
   static_assert(kCoders == 4);
-  for (; i + kCoders <= count; i += kCoders) {
-    read(i, 0);
-    read(i + 1, 1);
-    read(i + 2, 2);
-    read(i + 3, 3);
+  for (std::size_t i = 0; i < count; i += kCoders) {
+    if (i + kCoders <= count && !anyStays_) {
+      read(i, 0);
+      read(i + 1, 1);
+      read(i + 2, 2);
+      read(i + 3, 3);
+      continue;
+    }
+    for (std::size_t coder = 0; coder < kCoders && i + coder < count; ++coder)
+      if (!stays_[i + coder]) read(i + coder, coder);
   }
-  for (std::size_t coder = 0; i + coder < count; ++coder) read(i + coder, coder);
-  streams.symbols = symbols;
+  reader = symbols;
+}
+
+// From symbols, and what stands beside them among the bits.
+void HierarchicalDecoder::completeResiduals(Component component, std::uint32_t first, std::uint32_t count,
+                                            BitReader& bits) {
+  std::int32_t* const residuals = &residuals_[component][first];
+  const Int32x4 symbols = Int32x4::load(residuals);
+  const Int32x4 scales = Int32x4::load(&scales_[first]);
+  const Int32x4 isMore = (symbols == Int32x4::all(kEscape)) |
+                         (scales > Int32x4::all(static_cast<std::int32_t>(kFirstScaleWithRawBits) - 1));
+  if (isMore.signs() == 0 && !anyStays_) {
+    unzigzag(symbols).store(residuals);
+    return;
+  }
+  for (std::uint32_t i = 0; i < count; ++i) {
+    auto number = static_cast<std::uint32_t>(residuals[i]);
+    if (!stays_[first + i] && number == kEscape) number = readEscaped(component, first + i, bits);
+    if (stays_[first + i]) {
+      residuals[i] = 0;
+      continue;
+    }
+    if (const unsigned raw = rawBits(static_cast<std::uint32_t>(scales_[first + i])); raw > 0)
+      number = number << raw | bits.get(raw);
+    residuals[i] = codec::unzigzag(number);
+  }
 }
 
 std::uint32_t HierarchicalDecoder::readEscaped(Component component, std::size_t i, BitReader& bits) {
@@ -265,40 +298,36 @@ void HierarchicalDecoder::reconstruct(std::uint32_t begin, std::uint32_t count) 
   for (std::uint32_t first = 0; first < count; first += 4) {
     const Vectors4 r{Int32x4::load(&residuals_[kAlongU][first]), Int32x4::load(&residuals_[kAlongV][first]),
                      Int32x4::load(&residuals_[kAlongNormal][first])};
-    const std::array<Int32x4, 4> moved = transposed(predictor_.moved(frames_[first / 4], r));
+    const Prediction* four = &predictions_[first];
+    std::array<Int32x4, 4> positions = transposed(predictor_.moved(frames_[first / 4], r));
+    for (std::size_t i = 0; i < 4; ++i) positions[i] = positions[i] + four[i].position;
     const int far = beyond16Bits(r).signs();
-    alignas(16) std::int32_t magnitudes[4];
-    packMagnitudes(countedMagnitudes(r.x), countedMagnitudes(r.y), countedMagnitudes(r.z)).store(magnitudes);
-    for (std::uint32_t i = 0; i < std::min(count - first, 4u); ++i) {
-      const Prediction& prediction = predictions_[first + i];
-      Int32x4 position = prediction.position + moved[i];
-      if (anyStays_ && stays_[first + i]) position = prediction.last;
-      if ((far >> i & 1) != 0) {
-        const std::int32_t residual[]{residuals_[kAlongU][first + i], residuals_[kAlongV][first + i],
-                                      residuals_[kAlongNormal][first + i]};
-        position = predictor_.reconstruct(prediction, residual);
-      }
-      place(begin + first + i, prediction, position, static_cast<std::uint32_t>(magnitudes[i]));
+    const std::uint32_t those = std::min(count - first, 4u);
+    for (std::size_t i = 0; (far != 0 || anyStays_) && i < those; ++i) {
+      if (anyStays_ && stays_[first + i]) positions[i] = four[i].last;
+      if ((far >> i & 1) == 0) continue;
+      const std::int32_t residual[]{residuals_[kAlongU][first + i], residuals_[kAlongV][first + i],
+                                    residuals_[kAlongNormal][first + i]};
+      positions[i] = predictor_.reconstruct(four[i], residual);
     }
+    place(begin + first, those, four, positions,
+          packMagnitudes(countedMagnitudes(r.x), countedMagnitudes(r.y), countedMagnitudes(r.z)));
   }
 }
 
-void HierarchicalDecoder::place(std::uint32_t slot, const Prediction& prediction, Int32x4 position,
-                                std::uint32_t magnitudes) {
+void HierarchicalDecoder::place(std::uint32_t begin, std::uint32_t count, const Prediction* predictions,
+                                const std::array<Int32x4, 4>& positions, Int32x4 magnitudes) {
   const Int32x4 limit = Int32x4::all(kMaxCoordinate);
-  outside_ = outside_ || ((position.magnitude() > limit).signs() & 7) != 0;
-  predictor_.place(slot, prediction, position, magnitudes);
+  for (std::uint32_t i = 0; i < count; ++i) beyond_ = beyond_ | (positions[i].magnitude() > limit);
+  predictor_.place(begin, count, predictions, positions, magnitudes);
 }
 
 void HierarchicalDecoder::writePositions(float* out) const {
   const Array<std::uint32_t>& vertexOf = predictor_.hierarchy().vertexOf;
   const std::span<const Node> nodes = predictor_.nodes();
-  for (std::size_t slot = 0; slot < nodes.size(); ++slot) {
-    float* position = out + 3 * std::size_t{vertexOf[slot]};
-    position[0] = static_cast<float>(nodes[slot].x) * unit_.unit;
-    position[1] = static_cast<float>(nodes[slot].y) * unit_.unit;
-    position[2] = static_cast<float>(nodes[slot].z) * unit_.unit;
-  }
+  const Float32x4 unit = Float32x4::all(unit_.unit);
+  for (std::size_t slot = 0; slot < nodes.size(); ++slot)
+    (Float32x4::of(nodes[slot].load()) * unit).storeThree(out + 3 * std::size_t{vertexOf[slot]});
 }
 
 std::uint64_t HierarchicalDecoder::reconstructionHash() const {

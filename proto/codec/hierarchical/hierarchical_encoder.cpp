@@ -311,13 +311,10 @@ bool HierarchicalEncoder::State::encodeChunk(std::uint32_t begin, std::uint32_t 
       counted[c] = countedMagnitudes(Int32x4::load(&chunk.residuals[c][first]));
       counted[c].store(&magnitudes[c][first]);
     }
-    alignas(16) std::int32_t packed[4];
-    packMagnitudes(counted[kAlongU], counted[kAlongV], counted[kAlongNormal]).store(packed);
-    for (std::size_t i = 0; i < four; ++i) {
-      any = any || packed[i] != 0;
-      predictor.place(begin + static_cast<std::uint32_t>(first + i), predictions[first + i], positions[i],
-                      static_cast<std::uint32_t>(packed[i]));
-    }
+    const Int32x4 packed = packMagnitudes(counted[kAlongU], counted[kAlongV], counted[kAlongNormal]);
+    any = any || (~(packed == Int32x4::all(0)).signs() & ((1 << four) - 1)) != 0;
+    predictor.place(begin + static_cast<std::uint32_t>(first), static_cast<std::uint32_t>(four),
+                    &predictions[first], positions, packed);
   }
   scale(count, model);
   writer.add(chunk, count);

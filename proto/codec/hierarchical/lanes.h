@@ -89,6 +89,11 @@ struct Float32x4 {
   static Float32x4 of(Int32x4 a) { return {simde_mm_cvtepi32_ps(a.v)}; }
   static Float32x4 ofBits(Int32x4 a) { return {simde_mm_castsi128_ps(a.v)}; }
   static Float32x4 all(float value) { return {simde_mm_set1_ps(value)}; }
+  // The first three, to any address.
+  void storeThree(float* to) const {
+    simde_mm_storel_pi(reinterpret_cast<simde__m64*>(to), v);
+    simde_mm_store_ss(to + 2, simde_mm_movehl_ps(v, v));
+  }
   Int32x4 bits() const { return {simde_mm_castps_si128(v)}; }
   // To the nearest, the even one of two; towards zero. -2^31 where it is beyond 32 bits.
   Int32x4 rounded() const { return {simde_mm_cvtps_epi32(v)}; }
@@ -109,10 +114,12 @@ inline Float32x4 select(Int32x4 mask, Float32x4 yes, Float32x4 no) {
   return Float32x4::ofBits(select(mask, yes.bits(), no.bits()));
 }
 
-// The same of four vertices: lanes are vertices.
-struct Vectors4 {
-  Int32x4 x, y, z;
+// The same of as many vertices as there are lanes.
+template <class Lanes>
+struct VectorsOf {
+  Lanes x, y, z;
 };
+using Vectors4 = VectorsOf<Int32x4>;
 
 // Of four vertices x, y and z (the fourth lane of each, in `w`) to the x of all, and so on.
 inline Vectors4 transposed(const std::array<Int32x4, 4>& a) {
@@ -230,6 +237,11 @@ inline Int16x8 interleave64High(Int16x8 a, Int16x8 b) {
   return {simde_mm_unpackhi_epi64(a.v, b.v)};
 }
 
+// The same bits.
+inline Int16x8 asHalves(Int32x4 a) {
+  return {a.v};
+}
+
 // a0 b0 + a1 b1, a2 b2 + a3 b3, ...
 inline Int32x4 dotPairs(Int16x8 a, Int16x8 b) {
   return {dotPairsOf16(a.v, b.v)};
@@ -248,6 +260,77 @@ inline std::uint32_t countNotAbove(Int16x8 low, Int16x8 high, Int16x8 wanted) {
       simde_mm_packs_epi16(simde_mm_cmpgt_epi16(low.v, wanted.v), simde_mm_cmpgt_epi16(high.v, wanted.v));
   return static_cast<std::uint32_t>(
       std::countr_zero(static_cast<std::uint32_t>(highestBitsOf8(above)) | 1u << 15));
+}
+
+// Two of a kind, operation by operation: where each waits for the one before, a processor works on the other.
+template <class Lanes>
+struct Twice {
+  Lanes first, second;
+
+  static Twice all(auto value) { return {Lanes::all(value), Lanes::all(value)}; }
+  template <class Others>
+  static Twice of(const Twice<Others>& a) {
+    return {Lanes::of(a.first), Lanes::of(a.second)};
+  }
+  template <class Others>
+  static Twice ofBits(const Twice<Others>& a) {
+    return {Lanes::ofBits(a.first), Lanes::ofBits(a.second)};
+  }
+  static Twice without(const Twice& a, const Twice& b) {
+    return {Lanes::without(a.first, b.first), Lanes::without(a.second, b.second)};
+  }
+  Twice shiftedRight(int bits) const { return {first.shiftedRight(bits), second.shiftedRight(bits)}; }
+  Twice shiftedLeft(int bits) const { return {first.shiftedLeft(bits), second.shiftedLeft(bits)}; }
+  Twice bitsShiftedRight(int bits) const {
+    return {first.bitsShiftedRight(bits), second.bitsShiftedRight(bits)};
+  }
+  Twice magnitude() const { return {first.magnitude(), second.magnitude()}; }
+  auto bits() const { return Twice<decltype(first.bits())>{first.bits(), second.bits()}; }
+  auto truncated() const { return Twice<decltype(first.truncated())>{first.truncated(), second.truncated()}; }
+
+  friend Twice operator+(const Twice& a, const Twice& b) { return {a.first + b.first, a.second + b.second}; }
+  friend Twice operator-(const Twice& a, const Twice& b) { return {a.first - b.first, a.second - b.second}; }
+  friend Twice operator*(const Twice& a, const Twice& b) { return {a.first * b.first, a.second * b.second}; }
+  friend Twice operator&(const Twice& a, const Twice& b) { return {a.first & b.first, a.second & b.second}; }
+  friend Twice operator|(const Twice& a, const Twice& b) { return {a.first | b.first, a.second | b.second}; }
+  friend Twice<Int32x4> operator>(const Twice& a, const Twice& b) {
+    return {a.first > b.first, a.second > b.second};
+  }
+  friend Twice<Int32x4> operator==(const Twice& a, const Twice& b) {
+    return {a.first == b.first, a.second == b.second};
+  }
+};
+template <class Lanes>
+Twice<Lanes> select(const Twice<Int32x4>& mask, const Twice<Lanes>& yes, const Twice<Lanes>& no) {
+  return {select(mask.first, yes.first, no.first), select(mask.second, yes.second, no.second)};
+}
+template <class Lanes>
+Twice<Int16x8> pairs(const Twice<Lanes>& a, const Twice<Lanes>& b) {
+  return {pairs(a.first, b.first), pairs(a.second, b.second)};
+}
+template <class Lanes>
+Twice<Int16x8> pairs(const Twice<Lanes>& a) {
+  return {pairs(a.first), pairs(a.second)};
+}
+inline Twice<Int16x8> asHalves(const Twice<Int32x4>& a) {
+  return {asHalves(a.first), asHalves(a.second)};
+}
+inline Twice<Int32x4> dotPairs(const Twice<Int16x8>& a, const Twice<Int16x8>& b) {
+  return {dotPairs(a.first, b.first), dotPairs(a.second, b.second)};
+}
+
+using Int32x8 = Twice<Int32x4>;
+using Float32x8 = Twice<Float32x4>;
+using Vectors8 = VectorsOf<Int32x8>;
+
+inline Vectors4 firstOf(const Vectors8& a) {
+  return {a.x.first, a.y.first, a.z.first};
+}
+inline Vectors4 secondOf(const Vectors8& a) {
+  return {a.x.second, a.y.second, a.z.second};
+}
+inline Vectors8 both(const Vectors4& first, const Vectors4& second) {
+  return {{first.x, second.x}, {first.y, second.y}, {first.z, second.z}};
 }
 
 }  // namespace clothstream::codec::hierarchical

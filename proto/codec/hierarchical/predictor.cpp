@@ -25,16 +25,18 @@ void Predictor::begin(bool key, std::uint8_t referenceLayer) {
   static constexpr Node kNoNode{};
   static constexpr Record kNoRecord{};
   const Moment& past = moments_[ofLayer_[referenceLayer]];
-  key_ = key;
-  stride_ = key ? 0 : 1;
-  pastNodes_ = key ? &kNoNode : past.nodes.data();
-  pastRecords_ = key ? &kNoRecord : past.records.data();
-  nodes_ = moments_[made_].nodes.data();
-  records_ = moments_[made_].records.data();
+  work_ = {.key = key,
+           .fineBits = stepBits_ - 4,
+           .stride = key ? 0u : 1u,
+           .pastNodes = key ? &kNoNode : past.nodes.data(),
+           .pastRecords = key ? &kNoRecord : past.records.data(),
+           .neighbours = hierarchy_.neighbours.data(),
+           .nodes = moments_[made_].nodes.data(),
+           .records = moments_[made_].records.data()};
 }
 
 FeatureVectors Predictor::features(std::uint32_t slot, const Prediction& p) const {
-  const Record& past = pastRecords_[slot * stride_];
+  const Record& past = work_.pastRecords[slot * work_.stride];
   const std::array<Int16x8, kPlainPairs> plain = plainFeatures(past, p);
   const Int16x8 locals = Int16x8::load(past.local);
   const Int32x4 now32 = locals.even(), change32 = now32 - locals.odd();
@@ -76,28 +78,31 @@ Int32x4 Predictor::reconstruct(const Prediction& prediction, const std::int32_t*
 }
 
 void Predictor::interpolate(std::uint32_t begin, std::uint32_t end) {
+  const Work work = work_;
   for (std::uint32_t slot = begin; slot < end; ++slot) {
-    const Surroundings around = surroundingsOf(slot);
+    const Work::Surroundings around = work.surroundingsOf(slot);
     const Int32x4 ring = (around.ringSum + Int32x4::all(4)).shiftedRight(3) - around.average;
     const Int32x4 position = around.average - (ring + ring + ring).shiftedRight(4);
-    position.store(&nodes_[slot].x);
-    nodes_[slot].magnitudes = 0;
+    position.store(&work.nodes[slot].x);
+    work.nodes[slot].magnitudes = 0;
   }
 }
 
 void Predictor::keep(std::uint8_t layer, std::size_t slots) {
-  const Node* nodes = nodes_;
+  const Work work = work_;
+  const Node* nodes = work.nodes;
+  const Nearest* const allNearest = hierarchy_.nearest.data();
   for (std::size_t slot = 0; slot < slots; ++slot) {
-    const Nearest& nearest = hierarchy_.nearest[slot];
+    const Nearest& nearest = allNearest[slot];
     const Int32x4 sum = nodes[nearest[0]].load() + nodes[nearest[1]].load() + nodes[nearest[2]].load() +
                         nodes[nearest[3]].load();
     const Int32x4 own = nodes[slot].load().shiftedLeft(2);
-    Record& record = records_[slot];
+    Record& record = work.records[slot];
     record.magnitudes = static_cast<std::uint32_t>((sum + own).fourth());
-    const Int32x4 curvature = (sum - own).shiftedRight(fineBits_);
+    const Int32x4 curvature = (sum - own).shiftedRight(work.fineBits);
     const Int16x8 narrowed = narrow(curvature, curvature).withoutFourth();
     const Int16x8 present = interleave(narrowed, narrowed);
-    const Int16x8 past = key_ ? present : Int16x8::load(record.curvatures).pairsSwapped();
+    const Int16x8 past = work.key ? present : Int16x8::load(record.curvatures).pairsSwapped();
     evenAndOdd(present, past).store(record.curvatures);
   }
   newest_ = made_;

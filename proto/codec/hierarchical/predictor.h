@@ -88,10 +88,7 @@ class Predictor {
   [[nodiscard]] bool allocate(const StreamLayout& layout, int stepBits);
 
   // From the next key frame on.
-  void setStepBits(int stepBits) {
-    stepBits_ = stepBits;
-    fineBits_ = stepBits - 4;
-  }
+  void setStepBits(int stepBits) { stepBits_ = stepBits; }
 
   const Hierarchy& hierarchy() const { return hierarchy_; }
 
@@ -107,7 +104,9 @@ class Predictor {
   Vectors4 moved(const SurfaceFrames& frames, const Vectors4& residuals) const;
   // The position to which these residuals lead, whatever they are.
   Int32x4 reconstruct(const Prediction& prediction, const std::int32_t* residual) const;
-  void place(std::uint32_t slot, const Prediction& prediction, Int32x4 position, std::uint32_t magnitudes);
+  // Up to four vertices in a row.
+  void place(std::uint32_t begin, std::uint32_t count, const Prediction* predictions,
+             const std::array<Int32x4, 4>& positions, Int32x4 magnitudes);
   // In place of predict() and place(): to where the vertices lie between the others by this frame alone.
   void interpolate(std::uint32_t begin, std::uint32_t end);
   // The frame is now the newest one of that layer; of the first so many slots, if nothing refers to the
@@ -119,20 +118,36 @@ class Predictor {
   // in a key frame).
   std::span<const Node> nodes() const { return {moments_[newest_].nodes.data(), hierarchy_.vertexOf.size()}; }
   // Of the frame that is being made.
-  std::span<const Node> made() const { return {nodes_, hierarchy_.vertexOf.size()}; }
-  std::span<const Node> reference() const { return {pastNodes_, hierarchy_.vertexOf.size()}; }
+  std::span<const Node> made() const { return {work_.nodes, hierarchy_.vertexOf.size()}; }
+  std::span<const Node> reference() const { return {work_.pastNodes, hierarchy_.vertexOf.size()}; }
 
  private:
-  std::array<Int16x8, kPlainPairs> plainFeatures(const Record& past, const Prediction& prediction) const;
-  struct Surroundings {
-    std::array<Int32x4, 4> parents;
-    Int32x4 parentSum, average, ringSum;
+  // What a frame is made from and into. Whoever stores vectors works on a copy: they might lie anywhere, for
+  // all that a compiler knows, in members too.
+  struct Work {
+    bool key = true;
+    int fineBits = 0;  // a sixteenth of a step is 2^fineBits units
+    // What is read of the past: of a key frame one of each that is all zero, by a stride of 0.
+    std::size_t stride = 0;
+    const Node* pastNodes = nullptr;
+    const Record* pastRecords = nullptr;
+    const Neighbours* neighbours = nullptr;
+    Node* nodes = nullptr;
+    Record* records = nullptr;
+
+    struct Surroundings {
+      std::array<Int32x4, 4> parents;
+      Int32x4 parentSum, average, ringSum;
+    };
+    Surroundings surroundingsOf(std::uint32_t slot) const;
+    void look(std::uint32_t slot, Prediction& out, Int32x4& first, Int32x4& second) const;
+    void place(std::uint32_t slot, const Prediction& prediction, Int32x4 position,
+               std::uint32_t magnitudes) const;
   };
-  Surroundings surroundingsOf(std::uint32_t slot) const;
-  void look(std::uint32_t slot, Prediction& out, Int32x4& first, Int32x4& second) const;
+  static std::array<Int16x8, kPlainPairs> plainFeatures(const Record& past, const Prediction& prediction);
 
   Hierarchy hierarchy_;
-  int stepBits_ = 0, fineBits_ = 0;  // a sixteenth of a step is 2^fineBits_ units
+  int stepBits_ = 0;
   // What a frame leaves.
   struct Moment {
     Array<Node> nodes;
@@ -142,14 +157,7 @@ class Predictor {
   std::array<Moment, kMaxTemporalLayers + 1> moments_;
   std::array<std::size_t, kMaxTemporalLayers> ofLayer_{};
   std::size_t made_ = 0, newest_ = 0;
-
-  // What predict() reads of the past: of a key frame one of each that is all zero, by a stride of 0.
-  bool key_ = true;
-  std::size_t stride_ = 0;
-  const Node* pastNodes_ = nullptr;
-  const Record* pastRecords_ = nullptr;
-  Node* nodes_ = nullptr;  // of the frame that is being made
-  Record* records_ = nullptr;
+  Work work_;
 };
 
 // The same as of four equal weights, where they are equal.
@@ -159,23 +167,23 @@ inline Int32x4 weightedAverage(const std::array<std::int16_t, 4>& weights, Int32
   return p0 + (sum + Int32x4::all(1 << (kParentBits - 1))).shiftedRight(kParentBits);
 }
 
-inline Predictor::Surroundings Predictor::surroundingsOf(std::uint32_t slot) const {
-  const Neighbours& neighbours = hierarchy_.neighbours[slot];
-  const Node* nodes = nodes_;
-  const Int32x4 p0 = nodes[neighbours.parents[0]].load(), p1 = nodes[neighbours.parents[1]].load();
-  const Int32x4 p2 = nodes[neighbours.parents[2]].load(), p3 = nodes[neighbours.parents[3]].load();
+inline Predictor::Work::Surroundings Predictor::Work::surroundingsOf(std::uint32_t slot) const {
+  const auto& [parents, ring, weights] = neighbours[slot];
+  const Int32x4 p0 = nodes[parents[0]].load(), p1 = nodes[parents[1]].load();
+  const Int32x4 p2 = nodes[parents[2]].load(), p3 = nodes[parents[3]].load();
   const Int32x4 sum = (p0 + p1) + (p2 + p3);
-  Int32x4 ringSum = nodes[neighbours.ring[0]].load();
-  for (std::size_t i = 1; i < 8; ++i) ringSum = ringSum + nodes[neighbours.ring[i]].load();
+  Int32x4 ringSum = nodes[ring[0]].load();
+  for (std::size_t i = 1; i < 8; ++i) ringSum = ringSum + nodes[ring[i]].load();
   // Of a grid all but borders.
-  const bool isEven = neighbours.weights == kEqualWeights;
+  const bool isEven = weights == kEqualWeights;
   const Int32x4 average =
-      isEven ? (sum + Int32x4::all(2)).shiftedRight(2) : weightedAverage(neighbours.weights, p0, p1, p2, p3);
+      isEven ? (sum + Int32x4::all(2)).shiftedRight(2) : weightedAverage(weights, p0, p1, p2, p3);
   return {{p0, p1, p2, p3}, sum, average, ringSum};
 }
 
 // All but the frame and what follows from it. `first` and `second` span the surface.
-inline void Predictor::look(std::uint32_t slot, Prediction& out, Int32x4& first, Int32x4& second) const {
+inline void Predictor::Work::look(std::uint32_t slot, Prediction& out, Int32x4& first,
+                                  Int32x4& second) const {
   const Surroundings around = surroundingsOf(slot);
   const auto& [p0, p1, p2, p3] = around.parents;
   const Int32x4 average = around.average;
@@ -184,21 +192,20 @@ inline void Predictor::look(std::uint32_t slot, Prediction& out, Int32x4& first,
   out.ringMagnitudes = static_cast<std::uint32_t>(around.ringSum.fourth());
   first = p1 - p0;
   second = p3 - p2;
-  const Int32x4 ring = ((around.ringSum + Int32x4::all(4)).shiftedRight(3) - average).shiftedRight(fineBits_);
-  const Int32x4 twist = ((p0 + p1) - (p2 + p3)).shiftedRight(2 + fineBits_);
+  const Int32x4 ring = ((around.ringSum + Int32x4::all(4)).shiftedRight(3) - average).shiftedRight(fineBits);
+  const Int32x4 twist = ((p0 + p1) - (p2 + p3)).shiftedRight(2 + fineBits);
   out.twistAndRing = narrow(twist, ring);
 
-  const Record& past = pastRecords_[slot * stride_];
+  const Record& past = pastRecords[slot * stride];
   out.lastMagnitudes = past.magnitudes;
   // In a key frame nothing moves.
-  const Int32x4 before = key_ ? average : Int32x4::load(past.average);
-  const Int32x4 moved = (average - before).shiftedRight(fineBits_);
+  const Int32x4 before = key ? average : Int32x4::load(past.average);
+  const Int32x4 moved = (average - before).shiftedRight(fineBits);
   const Int16x8 narrowed = narrow(moved, moved);
   out.movedAndFaster = interleave64Low(narrowed, narrowed - Int16x8::load(past.movedAndFaster));
 }
 
-inline std::array<Int16x8, kPlainPairs> Predictor::plainFeatures(const Record& past,
-                                                                 const Prediction& p) const {
+inline std::array<Int16x8, kPlainPairs> Predictor::plainFeatures(const Record& past, const Prediction& p) {
   return {Int16x8::load(past.detailAndRing),
           Int16x8::load(past.change),
           Int16x8::load(past.changeBefore),
@@ -209,20 +216,26 @@ inline std::array<Int16x8, kPlainPairs> Predictor::plainFeatures(const Record& p
 
 inline void Predictor::predict(std::uint32_t begin, std::uint32_t count, const WeightVectors& weights,
                                Prediction* out, SurfaceFrames* frames) const {
+  const Work work = work_;
+  for (std::uint32_t eight = 0; eight < count; eight += 8) {
+    std::array<std::array<Int32x4, 4>, 2> first, second;
+    for (std::uint32_t i = 0; i < 8; ++i)
+      work.look(begin + std::min(eight + i, count - 1), out[eight + i], first[i / 4][i % 4],
+                second[i / 4][i % 4]);
+    const std::array<SurfaceFrames, 2> made = surfaceFrames(
+        both(transposed(first[0]), transposed(first[1])), both(transposed(second[0]), transposed(second[1])));
+    frames[eight / 4] = made[0];
+    frames[eight / 4 + 1] = made[1];
+  }
   // Sixteenths of a step in 2^-kWeightBits, to units; half a unit for the rounding.
-  const int down = kWeightBits - fineBits_;
+  const int down = kWeightBits - work.fineBits;
   for (std::uint32_t four = 0; four < count; four += 4) {
-    std::array<Int32x4, 4> first, second;
-    for (std::uint32_t i = 0; i < 4; ++i)
-      look(begin + std::min(four + i, count - 1), out[four + i], first[i], second[i]);
-    const SurfaceFrames made = surfaceFrames(transposed(first), transposed(second));
-    frames[four / 4] = made;
-    const std::array<SurfaceFrame, 4> split = made.split();
+    const std::array<SurfaceFrame, 4> split = frames[four / 4].split();
     for (std::uint32_t i = 0; i < 4; ++i) {
       Prediction& p = out[four + i];
       p.frame = split[i];
-      const std::size_t at = (begin + std::min(four + i, count - 1)) * stride_;
-      const Record& past = pastRecords_[at];
+      const std::size_t at = (begin + std::min(four + i, count - 1)) * work.stride;
+      const Record& past = work.pastRecords[at];
       const std::array<Int16x8, kPlainPairs> plain = plainFeatures(past, p);
       Int32x4 change = Int32x4::all(1 << (down - 1));
       for (std::size_t f = 0; f < kPlainPairs; ++f) change = change + dotPairs(plain[f], weights.plain[f]);
@@ -232,7 +245,7 @@ inline void Predictor::predict(std::uint32_t begin, std::uint32_t count, const W
       const Int16x8 wished = narrow(local, local);
       const Int32x4 turned = p.frame.combine(wished.broadcastPair<0>(), wished.broadcastPair<1>());
       change = change + turned.shiftedRight(kUnitBits + kTurnedBits - kWeightBits);
-      const Node& own = pastNodes_[at];
+      const Node& own = work.pastNodes[at];
       p.last = own.load();
       // What rests is expected to go on resting: pins do, in the middle of a moving cloth.
       p.position = own.rests()
@@ -258,27 +271,27 @@ inline Vectors4 Predictor::moved(const SurfaceFrames& f, const Vectors4& residua
   return {component(f.u.x, f.v.x, f.n.x), component(f.u.y, f.v.y, f.n.y), component(f.u.z, f.v.z, f.n.z)};
 }
 
-inline void Predictor::place(std::uint32_t slot, const Prediction& prediction, Int32x4 position,
-                             std::uint32_t magnitudes) {
-  Node& node = nodes_[slot];
+inline void Predictor::Work::place(std::uint32_t slot, const Prediction& prediction, Int32x4 position,
+                                   std::uint32_t magnitudes) const {
+  Node& node = nodes[slot];
   position.store(&node.x);
-  const bool rests = !key_ && position.sameThree(prediction.last);
+  const bool rests = !key && position.sameThree(prediction.last);
   node.magnitudes = magnitudes | (rests ? 1u << 24 : 0u);
-  const Int32x4 detail = (position - prediction.average).shiftedRight(fineBits_);
+  const Int32x4 detail = (position - prediction.average).shiftedRight(fineBits);
   const Int16x8 narrowed = narrow(detail, detail).withoutFourth();
   const Int32x4 local32 = prediction.frame.project(narrowed).shiftedRight(kUnitBits);
   const Int16x8 local = narrow(local32, local32);
   const Int16x8 detailAndRing =
       interleave(narrowed, interleave64High(prediction.twistAndRing, prediction.twistAndRing));
-  const Record& past = pastRecords_[slot * stride_];
-  Record& record = records_[slot];
+  const Record& past = pastRecords[slot * stride];
+  Record& record = records[slot];
   prediction.average.store(record.average);  // and what keep() puts beside it
   prediction.twistAndRing.store(record.twistAndRing);
   prediction.movedAndFaster.store(record.movedAndFaster);
   detailAndRing.store(record.detailAndRing);
   Int16x8::load(past.change).store(record.changeBefore);
   Int16x8::load(past.curvatures).store(record.curvatures);
-  if (key_) {
+  if (key) {
     // All was at rest before.
     Int16x8::zero().store(record.change);
     interleave(local, local).store(record.local);
@@ -286,6 +299,15 @@ inline void Predictor::place(std::uint32_t slot, const Prediction& prediction, I
     (detailAndRing - Int16x8::load(past.detailAndRing)).store(record.change);
     evenAndOdd(interleave(local, local), Int16x8::load(past.local).evenToOdd()).store(record.local);
   }
+}
+
+inline void Predictor::place(std::uint32_t begin, std::uint32_t count, const Prediction* predictions,
+                             const std::array<Int32x4, 4>& positions, Int32x4 magnitudes) {
+  const Work work = work_;
+  alignas(16) std::int32_t m[4];
+  magnitudes.store(m);
+  for (std::uint32_t i = 0; i < count; ++i)
+    work.place(begin + i, predictions[i], positions[i], static_cast<std::uint32_t>(m[i]));
 }
 
 }  // namespace clothstream::codec::hierarchical

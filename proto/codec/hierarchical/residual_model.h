@@ -50,8 +50,9 @@ constexpr std::uint32_t scaleOf(std::int32_t expected) {
 }
 
 // How many of the lowest bits of a residual's number stand beside its symbol.
+inline constexpr std::uint32_t kFirstScaleWithRawBits = 16;
 constexpr unsigned rawBits(std::uint32_t scale) {
-  return scale < 16 ? 0 : (scale - 14) / 2;
+  return scale < kFirstScaleWithRawBits ? 0 : (scale + 2 - kFirstScaleWithRawBits) / 2;
 }
 
 // The same of four.

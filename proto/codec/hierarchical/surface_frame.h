@@ -55,67 +55,73 @@ extern const std::array<std::uint16_t, 4096> kRoots;
 
 // The largest component to 13 bits, so that the squared length has less than 28. All bits where a vector is
 // zero. Components are below 2^30.
-inline Int32x4 scale(Vectors4& a) {
-  const Int32x4 all = a.x.magnitude() | a.y.magnitude() | a.z.magnitude();
+inline Int32x8 scale(Vectors8& a) {
+  const Int32x8 all = a.x.magnitude() | a.y.magnitude() | a.z.magnitude();
   // Of two ones beside each other the lower goes, so that the float is not rounded to the next power of two.
-  const Int32x4 exponent =
-      Float32x4::of(Int32x4::without(all.shiftedRight(1), all)).bits().bitsShiftedRight(23);
-  const Float32x4 factor = Float32x4::ofBits((Int32x4::all(266) - exponent).shiftedLeft(23));
+  const Int32x8 exponent =
+      Float32x8::of(Int32x8::without(all.shiftedRight(1), all)).bits().bitsShiftedRight(23);
+  const Float32x8 factor = Float32x8::ofBits((Int32x8::all(266) - exponent).shiftedLeft(23));
   // Bits that the shift takes away, and a float has no room for.
-  const Int32x4 lost = (all > Int32x4::all((1 << 18) - 1)) & Int32x4::all(31);
-  const auto floor = [&](Int32x4 value) {
-    const Float32x4 scaled = Float32x4::of(Int32x4::without(lost, value)) * factor;
-    const Int32x4 truncated = scaled.truncated();
-    return truncated + (Float32x4::of(truncated) > scaled);
+  const Int32x8 lost = (all > Int32x8::all((1 << 18) - 1)) & Int32x8::all(31);
+  const auto floor = [&](Int32x8 value) {
+    const Float32x8 scaled = Float32x8::of(Int32x8::without(lost, value)) * factor;
+    const Int32x8 truncated = scaled.truncated();
+    return truncated + (Float32x8::of(truncated) > scaled);
   };
   a = {floor(a.x), floor(a.y), floor(a.z)};
-  return all == Int32x4::all(0);
+  return all == Int32x8::all(0);
+}
+
+inline Int32x4 rootsAt(Int32x4 places) {
+  alignas(16) std::int32_t at[4];
+  places.store(at);
+  return Int32x4::of(kRoots[static_cast<std::size_t>(at[0])], kRoots[static_cast<std::size_t>(at[1])],
+                     kRoots[static_cast<std::size_t>(at[2])], kRoots[static_cast<std::size_t>(at[3])]);
+}
+inline Int32x8 rootsAt(const Int32x8& places) {
+  return {rootsAt(places.first), rootsAt(places.second)};
 }
 
 // To unit length; `a` is scaled.
-inline Vectors4 normalised(const Vectors4& a) {
-  const Int16x8 xy = pairs(a.x, a.y), z = pairs(a.z);
-  Int32x4 squared = dotPairs(xy, xy) + dotPairs(z, z);
+inline Vectors8 normalised(const Vectors8& a) {
+  const auto xy = pairs(a.x, a.y), z = pairs(a.z);
+  Int32x8 squared = dotPairs(xy, xy) + dotPairs(z, z);
   // The table starts at 2^26.
-  const Int32x4 isLow = Int32x4::all(1 << 26) > squared;
+  const Int32x8 isLow = Int32x8::all(1 << 26) > squared;
   squared = select(isLow, squared.shiftedLeft(2), squared);
-  alignas(16) std::int32_t places[4];
-  (squared.shiftedRight(16) & Int32x4::all(4095)).store(places);  // whatever `a` is
-  const Int16x8 root{
-      Int32x4::of(kRoots[static_cast<std::size_t>(places[0])], kRoots[static_cast<std::size_t>(places[1])],
-                  kRoots[static_cast<std::size_t>(places[2])], kRoots[static_cast<std::size_t>(places[3])])
-          .v};
-  const auto times = [&](Int32x4 value) {
-    const Int32x4 product = dotPairs(Int16x8{value.v}, root);
-    return (product + (product & isLow) + Int32x4::all(1 << 13)).shiftedRight(14);
+  const auto root = asHalves(rootsAt(squared.shiftedRight(16) & Int32x8::all(4095)));  // whatever `a` is
+  const auto times = [&](Int32x8 value) {
+    const Int32x8 product = dotPairs(asHalves(value), root);
+    return (product + (product & isLow) + Int32x8::all(1 << 13)).shiftedRight(14);
   };
   return {times(a.x), times(a.y), times(a.z)};
 }
 
 // Of components of 16 bits.
-inline Vectors4 cross(const Vectors4& a, const Vectors4& b) {
-  const Int16x8 x = pairs(b.x), y = pairs(b.y), z = pairs(b.z);
-  const auto times = [](Int32x4 value, Int16x8 other) { return dotPairs(Int16x8{value.v}, other); };
+inline Vectors8 cross(const Vectors8& a, const Vectors8& b) {
+  const auto x = pairs(b.x), y = pairs(b.y), z = pairs(b.z);
+  const auto times = [](Int32x8 value, const auto& other) { return dotPairs(asHalves(value), other); };
   return {times(a.y, z) - times(a.z, y), times(a.z, x) - times(a.x, z), times(a.x, y) - times(a.y, x)};
 }
 
 }  // namespace detail
 
 // u along `first`, n across both; the axes x, y, z where the two span no plane.
-inline SurfaceFrames surfaceFrames(Vectors4 first, Vectors4 second) {
+inline std::array<SurfaceFrames, 2> surfaceFrames(Vectors8 first, Vectors8 second) {
   constexpr std::int32_t kOne = 1 << kUnitBits;
-  Int32x4 isNoPlane = detail::scale(first) | detail::scale(second);
-  Vectors4 u = detail::normalised(first), n = detail::cross(u, second);
+  Int32x8 isNoPlane = detail::scale(first) | detail::scale(second);
+  Vectors8 u = detail::normalised(first), n = detail::cross(u, second);
   isNoPlane = isNoPlane | detail::scale(n);
   n = detail::normalised(n);
-  Vectors4 v = detail::cross(n, u);
-  const auto rounded = [](Int32x4 a) { return (a + Int32x4::all(kOne / 2)).shiftedRight(kUnitBits); };
+  Vectors8 v = detail::cross(n, u);
+  const auto rounded = [](Int32x8 a) { return (a + Int32x8::all(kOne / 2)).shiftedRight(kUnitBits); };
   v = {rounded(v.x), rounded(v.y), rounded(v.z)};
-  const Int32x4 one = isNoPlane & Int32x4::all(kOne);
-  const auto or0 = [&](Int32x4 a) { return Int32x4::without(isNoPlane, a); };
-  return {{or0(u.x) | one, or0(u.y), or0(u.z)},
-          {or0(v.x), or0(v.y) | one, or0(v.z)},
-          {or0(n.x), or0(n.y), or0(n.z) | one}};
+  const Int32x8 one = isNoPlane & Int32x8::all(kOne);
+  const auto or0 = [&](Int32x8 a) { return Int32x8::without(isNoPlane, a); };
+  u = {or0(u.x) | one, or0(u.y), or0(u.z)};
+  v = {or0(v.x), or0(v.y) | one, or0(v.z)};
+  n = {or0(n.x), or0(n.y), or0(n.z) | one};
+  return {{{firstOf(u), firstOf(v), firstOf(n)}, {secondOf(u), secondOf(v), secondOf(n)}}};
 }
 
 }  // namespace clothstream::codec::hierarchical
