@@ -18,8 +18,7 @@ struct Decoder::State {
     layout = streamLayout;
     // The coarse vertices' normals alone are of no use.
     sendsNormals = layout.normals == NormalMode::octahedral && detail == Detail::full;
-    body = layout.codec == kCodecLatticeZstd ? makeLatticeDecoder(layout)
-                                             : makeHierarchicalDecoder(layout, detail);
+    body = makeHierarchicalDecoder(layout, detail);
     const std::size_t floats = 3 * std::size_t{layout.vertexCount()};
     return body != nullptr && positions.allocate(floats) && normals.allocate(floats);
   }
@@ -30,7 +29,7 @@ struct Decoder::State {
     const PacketHeader& header = packet->header;
     if (header.epoch != layout.epoch) return DecodeResult::wrongEpoch;
     if (hasFrame && header.tick <= tick) return DecodeResult::stale;
-    // A packet of these codecs covers all cloths and refers to one frame.
+    // A packet of codec 2 covers all cloths and refers to one frame.
     const ClothRange& range = header.ranges[0];
     if (header.rangeCount != 1 || range.first != 0 || range.count != layout.cloths.size())
       return DecodeResult::malformed;
@@ -75,7 +74,7 @@ struct Decoder::State {
 };
 
 std::unique_ptr<Decoder> Decoder::make(const StreamLayout& layout, Detail detail) {
-  if (!isPossible(layout) || (detail == Detail::coarse && layout.codec != kCodecHierarchical)) return nullptr;
+  if (!isPossible(layout)) return nullptr;
   std::unique_ptr<State> state(new (std::nothrow) State);
   if (state == nullptr || !state->allocate(layout, detail)) return nullptr;
   return std::unique_ptr<Decoder>(new (std::nothrow) Decoder(std::move(state)));

@@ -83,9 +83,7 @@ GoldenStream makeMeshStream(const std::string& name) {
 int main() try {
   using namespace clothstream::codec;
   writeGoldenStreams(
-      {makeStream("mixed", mixedLayout(NormalMode::none)),
-       makeStream("normals", mixedLayout(NormalMode::octahedral)),
-       makeStream("hierarchical", mixedLayout(NormalMode::none, kCodecHierarchical)),
+      {makeStream("hierarchical", mixedLayout(NormalMode::none, kCodecHierarchical)),
        makeStream("hierarchical_normals", mixedLayout(NormalMode::octahedral, kCodecHierarchical)),
        makeMeshStream("mesh"),
        makeStream("fine_hierarchical", {.epoch = 8,
@@ -101,7 +99,7 @@ int main() try {
                                   .temporalLayers = 3,
                                   .cloths = {{.vertexCount = 400, .rows = 20, .columns = 20}}}),
        makeStream("vertex", {.epoch = 0xffffffffu,
-                             .codec = kCodecLatticeZstd,
+                             .codec = kCodecHierarchical,
                              .maxError = 0.01f,
                              .normals = NormalMode::none,
                              .cloths = {{.vertexCount = 1, .rows = 0, .columns = 0}}})});
