@@ -29,7 +29,7 @@ struct Decoder::State {
     const PacketHeader& header = packet->header;
     if (header.epoch != layout.epoch) return DecodeResult::wrongEpoch;
     if (hasFrame && header.tick <= tick) return DecodeResult::stale;
-    // A packet of codec 2 covers all cloths and refers to one frame.
+    // A packet of these codecs covers all cloths and refers to one frame.
     const ClothRange& range = header.ranges[0];
     if (header.rangeCount != 1 || range.first != 0 || range.count != layout.cloths.size())
       return DecodeResult::malformed;

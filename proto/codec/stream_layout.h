@@ -23,9 +23,10 @@ struct ClothLayout {
   std::vector<float> restPositions = {};
 };
 
-inline constexpr std::uint8_t kCodecHierarchical = 2;
+// The same but for how residuals are written: with the fewest bits, or so that a device does it.
+inline constexpr std::uint8_t kCodecHierarchical = 2, kCodecPacked = 3;
 // All there are, the best first.
-inline constexpr std::array<std::uint32_t, 1> kCodecs{kCodecHierarchical};
+inline constexpr std::array<std::uint32_t, 2> kCodecs{kCodecHierarchical, kCodecPacked};
 
 constexpr bool isCodec(std::uint32_t id) {
   return std::find(kCodecs.begin(), kCodecs.end(), id) != kCodecs.end();

@@ -3,7 +3,7 @@
 // back.
 #include <array>
 
-#include "proto/codec/hierarchical/frame_writer.h"
+#include "proto/codec/hierarchical/rans_frame_writer.h"
 #include "proto/codec/hierarchical/weight_plan.h"
 #include "server/encode/device_predictor.h"
 #include "server/encode/encode_stage.h"
@@ -50,7 +50,7 @@ class HierarchicalDeviceStage final : public EncodeStage {
   std::uint32_t recordedSinceKey_ = 0;
   // Of the thread that entropy-codes; but what is planned is read by the device's.
   WeightPlan plan_;
-  codec::hierarchical::FrameWriter writer_;
+  codec::hierarchical::RansFrameWriter writer_;
   std::uint32_t sinceKey_ = 0;
   std::array<std::byte, WeightPlan::kMaxBytes> weightBytes_{};
   codec::hierarchical::ChunkResiduals chunk_;

@@ -43,7 +43,7 @@ constexpr std::array kSuites{
                  &bench::runColliders},
     bench::Suite{"self_collision", "a sheet that collides with itself or does not, flat and in folds",
                  &bench::runSelfCollision},
-    bench::Suite{"codec", "the codec on the CPU over motions: bits, errors, what the eye sees, times",
+    bench::Suite{"codec", "both codecs on the CPU over motions: bits, errors, what the eye sees, times",
                  &bench::runCodec},
     bench::Suite{"codec_device", "what frames of a hung cloth cost on the device, key and predicted",
                  &bench::runCodecDevice},

@@ -80,6 +80,10 @@ TEST(Allocation, WhereNormalsAreSentHappensOnlyAtConstruction) {
   expectAllocationOnlyAtConstruction(mixedLayout(NormalMode::octahedral, kCodecHierarchical));
 }
 
+TEST(Allocation, OfThePackedCodecHappensOnlyAtConstruction) {
+  expectAllocationOnlyAtConstruction(mixedLayout(NormalMode::octahedral, kCodecPacked));
+}
+
 TEST(Allocation, OfTemporalLayersHappensOnlyAtConstruction) {
   StreamLayout layout = mixedLayout(NormalMode::none, kCodecHierarchical);
   layout.temporalLayers = 3;

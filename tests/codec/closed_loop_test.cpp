@@ -85,7 +85,9 @@ class ClosedLoop : public testing::TestWithParam<Sort> {
 INSTANTIATE_TEST_SUITE_P(Sorts, ClosedLoop,
                          testing::Values(Sort{"hierarchical", kCodecHierarchical, NormalMode::none},
                                          Sort{"hierarchicalWithNormals", kCodecHierarchical,
-                                              NormalMode::octahedral}),
+                                              NormalMode::octahedral},
+                                         Sort{"packed", kCodecPacked, NormalMode::none},
+                                         Sort{"packedWithNormals", kCodecPacked, NormalMode::octahedral}),
                          [](const auto& chosen) { return chosen.param.name; });
 
 TEST_P(ClosedLoop, KeepsTheMaxErrorOverAMotion) {
@@ -156,8 +158,11 @@ StreamLayout square(std::uint32_t edge, std::uint8_t codec) {
       .epoch = 1, .codec = codec, .cloths = {{.vertexCount = edge * edge, .rows = edge, .columns = edge}}};
 }
 
-TEST(Hierarchical, SendsAStillClothInATwentiethOfABitAVertex) {
-  const StreamLayout layout = square(100, kCodecHierarchical);
+class EachCodec : public testing::TestWithParam<std::uint8_t> {};
+INSTANTIATE_TEST_SUITE_P(Codecs, EachCodec, testing::Values(kCodecHierarchical, kCodecPacked));
+
+TEST_P(EachCodec, SendsAStillClothInATwentiethOfABitAVertex) {
+  const StreamLayout layout = square(100, GetParam());
   Loop loop(layout);
   PacketHeader last;
   for (std::uint64_t tick = 1; tick <= 40; ++tick) {
@@ -205,10 +210,10 @@ TEST(Hierarchical, FindsAMeshsOrderInItsTrianglesAndRestPositions) {
   EXPECT_LT(2 * bytes[1], bytes[2]);
 }
 
-TEST(Hierarchical, CodesMeshesOfAnyShape) {
+TEST_P(EachCodec, CodesMeshesOfAnyShape) {
   // A fan whose hub comes last, triangles that share no vertex, one that names a vertex thrice, lone
   // vertices.
-  StreamLayout layout{.epoch = 2, .codec = kCodecHierarchical, .cloths = {}};
+  StreamLayout layout{.epoch = 2, .codec = GetParam(), .cloths = {}};
   ClothLayout fan{.vertexCount = 3001}, apart{.vertexCount = 300}, odd{.vertexCount = 40};
   for (std::uint32_t i = 0; i + 1 < 3000; ++i) fan.triangles.insert(fan.triangles.end(), {i, i + 1, 3000});
   for (std::uint32_t i = 0; i < 300; ++i) apart.triangles.push_back(i);
@@ -220,8 +225,8 @@ TEST(Hierarchical, CodesMeshesOfAnyShape) {
   }
 }
 
-TEST(Hierarchical, LetsPinsStandStillInAMovingCloth) {
-  const StreamLayout layout = square(20, kCodecHierarchical);
+TEST_P(EachCodec, LetsPinsStandStillInAMovingCloth) {
+  const StreamLayout layout = square(20, GetParam());
   Loop loop(layout);
   std::vector<float> before;
   for (std::uint64_t tick = 1; tick <= 40; ++tick) {
@@ -263,15 +268,15 @@ TEST(Hierarchical, FitsItsWeightsToEarlierFramesForLittleMore) {
   EXPECT_LT(bytes[2], bytes[0] * 110 / 100);
 }
 
-TEST(Hierarchical, SendsTheNextFrameOfAStillClothInAFewBytes) {
-  const StreamLayout layout = mixedLayout(NormalMode::none);
+TEST_P(EachCodec, SendsTheNextFrameOfAStillClothInAFewBytes) {
+  const StreamLayout layout = mixedLayout(NormalMode::none, GetParam());
   Loop loop(layout);
   loop.send(1, PacketKind::key, sampleMotion(layout, 1, 0.1f));
   EXPECT_LT(bodyBytes(loop.send(2, PacketKind::predicted, sampleMotion(layout, 1, 0.1f))), 16u);
 }
 
-TEST(Hierarchical, PredictionPaysOnASlowMotion) {
-  const StreamLayout layout = square(64, kCodecHierarchical);
+TEST_P(EachCodec, PredictionPaysOnASlowMotion) {
+  const StreamLayout layout = square(64, GetParam());
   const auto predicted = Encoder::make(layout), keys = Encoder::make(layout);
   std::vector<std::byte> packet(keys->packetBound());
   std::size_t predictedBytes = 0, keyBytes = 0;
@@ -287,9 +292,34 @@ TEST(Hierarchical, PredictionPaysOnASlowMotion) {
   EXPECT_LT(predictedBytes, keyBytes);
 }
 
+TEST(Packed, TakesAQuarterMoreThanEntropyCodingAtMost) {
+  std::array<std::size_t, kCodecs.size()> bytes{};
+  for (std::size_t i = 0; i < kCodecs.size(); ++i) {
+    const StreamLayout layout = square(64, static_cast<std::uint8_t>(kCodecs[i]));
+    Loop loop(layout);
+    for (std::uint64_t tick = 1; tick <= 30; ++tick)
+      bytes[i] += bodyBytes(loop.send(tick, PacketKind::predicted, sampleMotion(layout, tick, 0.02f)));
+  }
+  EXPECT_GT(bytes[1], bytes[0]);
+  EXPECT_LT(4 * bytes[1], 5 * bytes[0]);
+}
+
+// Nothing but how residuals are written is another.
+TEST(Packed, LeadsToTheSamePositions) {
+  const StreamLayout entropy = square(50, kCodecHierarchical), packed = square(50, kCodecPacked);
+  Loop one(entropy), other(packed);
+  for (std::uint32_t tick = 1; tick <= 20; ++tick) {
+    const MotionFrame frame =
+        tick % 7 == 0 ? scatter(packed, tick, 31.0f) : sampleMotion(packed, tick, 0.02f);
+    one.send(tick, PacketKind::predicted, frame);
+    other.send(tick, PacketKind::predicted, frame);
+    EXPECT_EQ(one.decoder().reconstructionHash(), other.decoder().reconstructionHash()) << tick;
+  }
+}
+
 // The same scene in three qualities; a reader goes from one to another at key frames alone.
-TEST(Quality, ChangesAtAKeyFrame) {
-  StreamLayout layout = square(60, kCodecHierarchical);
+TEST_P(EachCodec, ChangesItsQualityAtAKeyFrame) {
+  StreamLayout layout = square(60, GetParam());
   layout.qualities = 3;
   const auto decoder = Decoder::make(layout);
   std::vector<std::unique_ptr<Encoder>> encoders;

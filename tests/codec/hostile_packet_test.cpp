@@ -116,7 +116,9 @@ TEST(HostilePacket, OfAnotherLayoutIsRefused) {
   larger.cloths[0] = {.vertexCount = 9 * 8, .rows = 9, .columns = 8};
   withNormals.normals = NormalMode::octahedral;
   fewer.cloths.pop_back();
-  for (const StreamLayout& layout : {larger, withNormals, fewer}) {
+  StreamLayout otherCodec = streams[0].layout;
+  otherCodec.codec = kCodecPacked;
+  for (const StreamLayout& layout : {larger, withNormals, fewer, otherCodec}) {
     EXPECT_EQ(Decoder::make(layout)->decode(streams[0].packets[0].bytes), DecodeResult::malformed);
   }
 }
@@ -147,7 +149,7 @@ TEST(HostilePacket, ThatIsNotNewerIsStale) {
 TEST(HostilePacket, OfAnotherCodecIsRefused) {
   const std::vector<GoldenStream> streams = readGoldenStreams();
   std::vector<std::byte> bytes = streams[0].packets[0].bytes;
-  for (const std::byte codec : {std::byte{0}, std::byte{1}, std::byte{200}}) {
+  for (const std::byte codec : {std::byte{0}, std::byte{1}, std::byte{kCodecPacked}, std::byte{200}}) {
     bytes[1] = codec;
     EXPECT_EQ(Decoder::make(streams[0].layout)->decode(bytes), DecodeResult::malformed);
   }

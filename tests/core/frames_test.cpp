@@ -48,7 +48,7 @@ TEST_P(DecodedFrames, AreWithinThePromisedErrorAndAcknowledged) {
     EXPECT_THAT(joined.acks(), ElementsAre(tick));
     const std::vector<float>& sent = joined.server.positions();
     const float* decoded = cs_positions(joined.client.get());
-    // What the codec promises, and the rounding of floats of about 2 m.
+    // What both codecs promise, and the rounding of floats of about 2 m.
     for (std::size_t i = 0; i < sent.size(); i += 3) {
       const float off =
           std::hypot(decoded[i] - sent[i], decoded[i + 1] - sent[i + 1], decoded[i + 2] - sent[i + 2]);

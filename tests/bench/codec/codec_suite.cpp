@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Suite codec: the codec on the CPU over motions that it was not fitted to; with temporal layers, with
-// normals, and of a square grid as a mesh, too.
+// Suite codec: both codecs on the CPU over motions that they were not fitted to; codec 2 with temporal
+// layers, and of a square grid as a mesh, too.
 #include <array>
 #include <functional>
 #include <vector>
@@ -43,12 +43,15 @@ nlohmann::ordered_json measure(const std::string& motion, const codec::StreamLay
 }
 
 struct Variant {
-  std::uint8_t temporalLayers;
+  std::uint8_t codec, temporalLayers;
   codec::NormalMode normals;
 };
-constexpr std::array kVariants{Variant{1, codec::NormalMode::none}, Variant{2, codec::NormalMode::none},
-                               Variant{3, codec::NormalMode::none},
-                               Variant{1, codec::NormalMode::octahedral}};
+constexpr std::array kVariants{Variant{codec::kCodecHierarchical, 1, codec::NormalMode::none},
+                               Variant{codec::kCodecHierarchical, 2, codec::NormalMode::none},
+                               Variant{codec::kCodecHierarchical, 3, codec::NormalMode::none},
+                               Variant{codec::kCodecHierarchical, 1, codec::NormalMode::octahedral},
+                               Variant{codec::kCodecPacked, 1, codec::NormalMode::none},
+                               Variant{codec::kCodecPacked, 1, codec::NormalMode::octahedral}};
 
 }  // namespace
 
@@ -58,6 +61,7 @@ Rows runCodec(vulkan::Device& device, const Settings& settings) {
     const Frames frames(motion);
     codec::StreamLayout layout{.epoch = 1, .maxError = settings.maxError, .cloths = {motion.cloth}};
     for (const Variant& variant : kVariants) {
+      layout.codec = variant.codec;
       layout.temporalLayers = variant.temporalLayers;
       layout.normals = variant.normals;
       rows.push_back(
