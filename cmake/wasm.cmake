@@ -1,30 +1,26 @@
 # clothstream_core_wasm: the client core as WebAssembly, built from the native core's sources with Debian's clang for
 # wasm32. The global property CLOTHSTREAM_CORE_WASM holds the module's path. It imports nothing and exports its memory,
 # _initialize, malloc, free and the functions of clients/core/core.h.
-find_program(WASM_CC NAMES clang clang-14 REQUIRED)
 find_program(WASM_CXX NAMES clang++ clang++-14 REQUIRED)
 find_program(WASM_LD NAMES wasm-ld wasm-ld-14 REQUIRED)
 
 set(wasmOut ${PROJECT_BINARY_DIR}/web-wasm)
-# Debian has no zstd for wasm32; this npm package carries zstd's own sources.
-set(wasmZstd ${PROJECT_SOURCE_DIR}/clients/web/node_modules/zstd-napi/deps/zstd/lib)
 set(wasmFlags --target=wasm32-wasi -O3 -DNDEBUG -ffp-contract=off -fvisibility=hidden)
-set(wasmCFlags ${wasmFlags} -DZSTD_DISABLE_ASM -DZSTD_LEGACY_SUPPORT=0 -DDEBUGLEVEL=0)
 # SIMDe alone of what Debian's include folder has: the rest is for the machine that builds.
 find_path(SIMDE_INCLUDE simde/x86/sse2.h REQUIRED)
 file(MAKE_DIRECTORY ${wasmOut}/include)
 file(CREATE_LINK ${SIMDE_INCLUDE}/simde ${wasmOut}/include/simde SYMBOLIC)
 set(wasmCxxFlags ${wasmFlags} -msimd128 -isystem ${wasmOut}/include -std=c++20 -fno-rtti -fno-exceptions -Wall -Wextra -Wconversion -Wshadow -Werror
-  -I${PROJECT_SOURCE_DIR} -isystem ${wasmZstd})
+  -I${PROJECT_SOURCE_DIR})
 
-# Appends the object of `source` to wasmObjects. Further arguments: the compiler and its flags.
+# Appends the object of `source` to wasmObjects.
 function(clothstream_wasm_object source)
   get_filename_component(name ${source} NAME)
   set(object ${wasmOut}/${name}.o)
   add_custom_command(OUTPUT ${object}
     COMMAND ${CMAKE_COMMAND} -E make_directory ${wasmOut}
-    COMMAND ${CMAKE_CXX_COMPILER_LAUNCHER} ${ARGN} -MMD -MF ${object}.d -c -o ${object} ${source}
-    DEPENDS clothstream_npm DEPFILE ${object}.d COMMENT "Compiling ${name} to WebAssembly" VERBATIM)
+    COMMAND ${CMAKE_CXX_COMPILER_LAUNCHER} ${WASM_CXX} ${wasmCxxFlags} -MMD -MF ${object}.d -c -o ${object} ${source}
+    DEPENDS ${source} DEPFILE ${object}.d COMMENT "Compiling ${name} to WebAssembly" VERBATIM)
   set(wasmObjects ${wasmObjects} ${object} PARENT_SCOPE)
 endfunction()
 
@@ -32,12 +28,7 @@ set(wasmObjects)
 get_property(decoderSources GLOBAL PROPERTY CLOTHSTREAM_DECODER_SOURCES)
 foreach(source IN LISTS CLOTHSTREAM_CLIENT_CORE_SOURCES decoderSources ITEMS
     ${PROJECT_SOURCE_DIR}/clients/core/wasm/runtime.cpp)
-  clothstream_wasm_object(${source} ${WASM_CXX} ${wasmCxxFlags})
-endforeach()
-foreach(source common/debug common/entropy_common common/error_private common/fse_decompress common/xxhash
-    common/zstd_common decompress/huf_decompress decompress/zstd_ddict decompress/zstd_decompress
-    decompress/zstd_decompress_block)
-  clothstream_wasm_object(${wasmZstd}/${source}.c ${WASM_CC} ${wasmCFlags})
+  clothstream_wasm_object(${source})
 endforeach()
 
 # All functions that core.h declares, but the one that takes a function of the caller's.

@@ -97,6 +97,7 @@ scene::Scene adjusted(scene::Scene scene, const ProgramOptions& options) {
   scene.substeps = options.substeps.value_or(scene.substeps);
   scene.stream.maxError = options.maxError.value_or(scene.stream.maxError);
   scene.stream.normals = options.normals.value_or(scene.stream.normals);
+  scene.stream.coding = options.coding.value_or(scene.stream.coding);
   auto checked = messages::toScene(messages::toMessage(scene));
   if (!checked)
     throw std::runtime_error(

@@ -67,6 +67,8 @@ std::variant<ProgramOptions, int> parseOptions(int argc, const char* const* argv
   double seconds = 0;
   const std::map<std::string, scene::Normals> normals{{"none", scene::Normals::none},
                                                       {"octahedral", scene::Normals::octahedral}};
+  const std::map<std::string, scene::Coding> codings{{"entropy", scene::Coding::entropy},
+                                                     {"packed", scene::Coding::packed}};
 
   CLI::App app{"Simulates cloth with Vulkan and streams it to browsers and gRPC clients.",
                "clothstream-server"};
@@ -92,6 +94,10 @@ std::variant<ProgramOptions, int> parseOptions(int argc, const char* const* argv
   app.add_option("--normals", options.normals,
                  "Normals of --scene: none (clients compute them) or octahedral")
       ->transform(CLI::CheckedTransformer(normals, CLI::ignore_case))
+      ->group(scenes);
+  app.add_option("--coding", options.coding,
+                 "How residuals of --scene are written: entropy (fewest bits) or packed (by the device)")
+      ->transform(CLI::CheckedTransformer(codings, CLI::ignore_case))
       ->group(scenes);
   app.add_flag("--always-run", options.alwaysRun,
                "Go on simulating while nobody is there: --scene from the start, others once somebody came")

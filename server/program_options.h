@@ -22,6 +22,7 @@ struct ProgramOptions {
   std::optional<std::uint32_t> rate, substeps;
   std::optional<float> maxError;
   std::optional<scene::Normals> normals;
+  std::optional<scene::Coding> coding;
   bool alwaysRun = false;
   double reportRate = 4;
   std::uint32_t maxCreatedScenes = 16;

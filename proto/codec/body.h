@@ -51,9 +51,7 @@ class BodyEncoder {
 
 // Those of each codec, for a layout that is possible; decoders are null if memory is out. An encoder's max
 // error is that of its quality.
-std::unique_ptr<BodyDecoder> makeLatticeDecoder(const StreamLayout& layout);
 std::unique_ptr<BodyDecoder> makeHierarchicalDecoder(const StreamLayout& layout, Detail detail);
-std::unique_ptr<BodyEncoder> makeLatticeEncoder(const StreamLayout& layout);
 std::unique_ptr<BodyEncoder> makeHierarchicalEncoder(const StreamLayout& layout, std::uint32_t weightLag);
 
 }  // namespace clothstream::codec

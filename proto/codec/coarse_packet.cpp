@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Packets of codec 2 without what the finest levels take.
+// Packets without what the finest levels take.
 #include "proto/codec/coarse_packet.h"
 
 #include <array>
@@ -16,27 +16,41 @@ namespace {
 // Of one range of cloths, kSections sections and kMaxReferences references: a varint takes ten bytes at most.
 constexpr std::size_t kLargestHeader = 256;
 
+// Which of a packet's sections have something of fine vertices.
+std::span<const std::uint8_t> fineSections(const PacketHeader& header) {
+  static constexpr std::array<std::uint8_t, 2> kOfSymbols{hierarchical::kFineSymbols,
+                                                          hierarchical::kFineBits};
+  static constexpr std::array<std::uint8_t, 1> kOfGroups{hierarchical::kFineGroups};
+  const bool isPacked = header.codec == kCodecPacked;
+  if (!isCodec(header.codec) ||
+      header.sectionCount != (isPacked ? hierarchical::kPackedSections : hierarchical::kSections))
+    return {};
+  if (isPacked) return kOfGroups;
+  return kOfSymbols;
+}
+
 }  // namespace
 
 std::size_t makeCoarsePacket(std::span<const std::byte> packet, std::span<std::byte> out) {
-  using namespace hierarchical;
   const std::optional<ParsedPacket> whole = parsePacket(packet);
-  if (!whole || whole->header.codec != kCodecHierarchical) return 0;
+  if (!whole || whole->header.rangeCount != 1) return 0;
+  const std::span<const std::uint8_t> fine = fineSections(whole->header);
+  if (fine.empty()) return 0;
   PacketHeader header = whole->header;
-  if (header.sectionCount != kSections || header.rangeCount != 1) return 0;
-  const std::size_t first =
-      header.sectionBytes[kWeightChanges] + std::size_t{header.sectionBytes[kCoarseSymbols]};
-  const std::byte* bits = whole->body.data() + first + header.sectionBytes[kFineSymbols];
-  header.sectionBytes[kFineSymbols] = header.sectionBytes[kFineBits] = 0;
+  for (const std::uint8_t section : fine) header.sectionBytes[section] = 0;
   // It is not longer than it was: nothing is written over that is still to be read.
   std::array<std::byte, kLargestHeader> small;
   assert(headerBound(header) <= small.size());
   const std::size_t headerBytes = writeHeader(header, small);
   std::memcpy(out.data(), small.data(), headerBytes);
   std::byte* to = out.data() + headerBytes;
-  std::memmove(to, whole->body.data(), first);
-  std::memmove(to + first, bits, header.sectionBytes[kCoarseBits]);
-  return static_cast<std::size_t>(to - out.data()) + first + header.sectionBytes[kCoarseBits];
+  const std::byte* from = whole->body.data();
+  for (std::size_t section = 0; section < header.sectionCount; ++section) {
+    std::memmove(to, from, header.sectionBytes[section]);
+    to += header.sectionBytes[section];
+    from += whole->header.sectionBytes[section];
+  }
+  return static_cast<std::size_t>(to - out.data());
 }
 
 }  // namespace clothstream::codec

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A sixteenth of the vertices, for who is far or weak: packets of codec 2 without what the finest levels
-// take.
+// A sixteenth of the vertices, for who is far or weak: packets without what the finest levels take.
 #pragma once
 
 #include <cstddef>
@@ -13,7 +12,7 @@ namespace clothstream::codec {
 enum class Detail : std::uint8_t { full, coarse };
 
 // Writes what Detail::coarse needs of a packet to `out` (at least as large; they may be the same memory) and
-// returns the number of bytes written; 0 where it is no packet of codec 2.
+// returns the number of bytes written; 0 where it is no packet.
 std::size_t makeCoarsePacket(std::span<const std::byte> packet, std::span<std::byte> out);
 
 }  // namespace clothstream::codec

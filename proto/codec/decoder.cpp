@@ -18,8 +18,7 @@ struct Decoder::State {
     layout = streamLayout;
     // The coarse vertices' normals alone are of no use.
     sendsNormals = layout.normals == NormalMode::octahedral && detail == Detail::full;
-    body = layout.codec == kCodecLatticeZstd ? makeLatticeDecoder(layout)
-                                             : makeHierarchicalDecoder(layout, detail);
+    body = makeHierarchicalDecoder(layout, detail);
     const std::size_t floats = 3 * std::size_t{layout.vertexCount()};
     return body != nullptr && positions.allocate(floats) && normals.allocate(floats);
   }
@@ -75,7 +74,7 @@ struct Decoder::State {
 };
 
 std::unique_ptr<Decoder> Decoder::make(const StreamLayout& layout, Detail detail) {
-  if (!isPossible(layout) || (detail == Detail::coarse && layout.codec != kCodecHierarchical)) return nullptr;
+  if (!isPossible(layout)) return nullptr;
   std::unique_ptr<State> state(new (std::nothrow) State);
   if (state == nullptr || !state->allocate(layout, detail)) return nullptr;
   return std::unique_ptr<Decoder>(new (std::nothrow) Decoder(std::move(state)));

@@ -26,8 +26,7 @@ enum class DecodeResult : std::uint8_t {
 // One decoder a stream; not thread-safe. Memory is taken once, at construction.
 class Decoder {
  public:
-  // nullptr if the layout is impossible (stream_layout.h; of Detail::coarse only codec 2 knows), or memory is
-  // out.
+  // nullptr if the layout is impossible (stream_layout.h), or memory is out.
   static std::unique_ptr<Decoder> make(const StreamLayout& layout, Detail detail = Detail::full);
   ~Decoder();
   Decoder(const Decoder&) = delete;

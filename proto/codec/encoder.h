@@ -15,7 +15,7 @@ namespace clothstream::codec {
 struct EncoderOptions {
   // Of the layout's: a stream in another one is another encoder's.
   std::uint8_t quality = 0;
-  // Codec 2, one temporal layer: the weights of a frame are fitted to the frames that are so many or more
+  // Of one temporal layer: the weights of a frame are fitted to the frames that are so many or more
   // before it, and a key frame's to an earlier one's, as they are where frames are prepared before those
   // before them are coded. 0: all frames before it, and itself. For any of them a decoder is the same.
   std::uint32_t weightLag = 0;
@@ -32,7 +32,7 @@ class Encoder {
 
   std::size_t packetBound() const;
 
-  // 3 floats a vertex, metres, within the lattice (32 m at any max error); normals of about unit length, or
+  // 3 floats a vertex, metres, within 2^27 units (32 m at any max error); normals of about unit length, or
   // nothing where the layout has none. `tick` must grow from call to call, but where history was forgotten. A
   // predicted frame refers to the frame encoded before, or with temporal layers to the newest of a lower
   // layer (of its own in the base), and the header says which; the first is always a key frame, whatever is

@@ -26,7 +26,7 @@ struct ClothRange {
 
 struct PacketHeader {
   std::uint8_t version = kPacketVersion;
-  std::uint8_t codec = kCodecLatticeZstd;
+  std::uint8_t codec = kCodecHierarchical;
   std::uint32_t epoch = 0;
   PacketKind kind = PacketKind::key;
   std::uint8_t quality = 0;

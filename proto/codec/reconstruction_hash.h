@@ -2,7 +2,6 @@
 // 64-bit hash of a reconstruction's integers: a sum over vertices, so that any order of work gives the same.
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
 
 namespace clothstream::codec {
@@ -11,7 +10,7 @@ namespace clothstream::codec {
 // same.
 class ReconstructionHash {
  public:
-  // x, y, z: lattice coordinates; normal: u and v as bytes, u | v << 8, 0 where the stream sends no normals.
+  // x, y, z: in units; normal: u and v as bytes, u | v << 8, 0 where the stream sends no normals.
   void add(std::uint32_t vertex, std::int32_t x, std::int32_t y, std::int32_t z, std::uint32_t normal) {
     low_ += word(vertex, x, y, z, normal, 0x243f6a88u);
     high_ += word(vertex, x, y, z, normal, 0x85a308d3u);
@@ -38,21 +37,5 @@ class ReconstructionHash {
 
   std::uint32_t low_ = 0, high_ = 0;
 };
-
-// Of a frame whose integers lie channel after channel; `normals` null where the stream sends none.
-inline std::uint64_t hashFrame(std::size_t vertices, const std::int32_t* positions,
-                               const std::int8_t* normals) {
-  ReconstructionHash hash;
-  for (std::size_t i = 0; i < vertices; ++i) {
-    std::uint32_t normal = 0;
-    if (normals != nullptr) {
-      normal = static_cast<std::uint8_t>(normals[i]) |
-               std::uint32_t{static_cast<std::uint8_t>(normals[vertices + i])} << 8;
-    }
-    hash.add(static_cast<std::uint32_t>(i), positions[i], positions[vertices + i],
-             positions[2 * vertices + i], normal);
-  }
-  return hash.value();
-}
 
 }  // namespace clothstream::codec

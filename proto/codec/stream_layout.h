@@ -2,6 +2,7 @@
 // What encoder and decoder know of a stream before its first packet.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -22,12 +23,13 @@ struct ClothLayout {
   std::vector<float> restPositions = {};
 };
 
-inline constexpr std::uint8_t kCodecLatticeZstd = 1, kCodecHierarchical = 2;
+// The same but for how residuals are written: with the fewest bits, or so that a device does it.
+inline constexpr std::uint8_t kCodecHierarchical = 2, kCodecPacked = 3;
 // All there are, the best first.
-inline constexpr std::array<std::uint32_t, 2> kCodecs{kCodecHierarchical, kCodecLatticeZstd};
+inline constexpr std::array<std::uint32_t, 2> kCodecs{kCodecHierarchical, kCodecPacked};
 
 constexpr bool isCodec(std::uint32_t id) {
-  return id == kCodecLatticeZstd || id == kCodecHierarchical;
+  return std::find(kCodecs.begin(), kCodecs.end(), id) != kCodecs.end();
 }
 
 // Frames at full, half and a quarter of the rate.
@@ -35,18 +37,17 @@ inline constexpr std::uint8_t kMaxTemporalLayers = 3;
 
 struct StreamLayout {
   std::uint32_t epoch = 0;
-  std::uint8_t codec = kCodecLatticeZstd;
+  std::uint8_t codec = kCodecHierarchical;
   // m along each of three axes: the promise the encoder keeps for whatever lies within 32 m of the origin.
-  // Farther out the spacing of floats there comes on top. The axes of codec 1 are x, y and z. Those of codec
-  // 2 turn with the surface, and what it promises is the distance that follows: sqrt(3) maxError at most.
+  // Farther out the spacing of floats there comes on top. The axes turn with the surface: what is promised is
+  // the distance that follows, sqrt(3) maxError at most.
   float maxError = 0.0005f;
   NormalMode normals = NormalMode::none;
-  // 1: each frame refers to the one before it, and none can be left out. 2 or 3, of codec 2 alone: every
-  // second frame can, or all but every fourth, layer by layer from the highest; it costs bits
-  // (docs/codec.md).
+  // 1: each frame refers to the one before it, and none can be left out. 2 or 3: every second
+  // frame can, or all but every fourth, layer by layer from the highest; it costs bits (docs/codec.md).
   std::uint8_t temporalLayers = 1;
-  // Of codec 2 alone: in how many the stream can come. maxError is that of quality 0; each other has twice
-  // the max error of the one before. A stream goes from one to another at a key frame.
+  // In how many the stream can come. maxError is that of quality 0; each other has twice the max error of the
+  // one before. A stream goes from one to another at a key frame.
   std::uint8_t qualities = 1;
   std::vector<ClothLayout> cloths;
 
@@ -61,18 +62,15 @@ inline constexpr std::uint8_t kMaxQualities = 4;
 inline constexpr std::uint32_t kMaxVertices = 1u << 26;
 inline constexpr float kSmallestMaxError = 5e-6f, kLargestMaxError = 1000;
 
-// Whether a stream can have this layout: a codec of ours (codec 1 has one temporal layer and one quality), 1
-// to kMaxTemporalLayers layers, one cloth or more, none empty, grids whose numbers agree, triangles of
-// vertices that there are and finite rest positions, at most kMaxVertices, a max error within the two bounds
-// above.
+// Whether a stream can have this layout: a codec of ours, 1 to kMaxTemporalLayers layers, one cloth or more,
+// none empty, grids whose numbers agree, triangles of vertices that there are and finite rest positions, at
+// most kMaxVertices, a max error within the two bounds above.
 inline bool isPossible(const StreamLayout& layout) {
   if (!(layout.maxError >= kSmallestMaxError && layout.maxError <= kLargestMaxError)) return false;
   if (layout.normals != NormalMode::none && layout.normals != NormalMode::octahedral) return false;
   if (!isCodec(layout.codec)) return false;
   if (layout.temporalLayers < 1 || layout.temporalLayers > kMaxTemporalLayers) return false;
-  if (layout.codec == kCodecLatticeZstd && layout.temporalLayers > 1) return false;
   if (layout.qualities < 1 || layout.qualities > kMaxQualities) return false;
-  if (layout.codec == kCodecLatticeZstd && layout.qualities > 1) return false;
   std::uint64_t vertices = 0;
   for (const ClothLayout& cloth : layout.cloths) {
     const std::uint64_t nodes = std::uint64_t{cloth.rows} * cloth.columns;

@@ -33,8 +33,9 @@ std::vector<float> coordinatesOf(const scene::Mesh& mesh) {
 
 codec::StreamLayout streamLayout(const scene::Scene& scene, std::uint32_t epoch) {
   const bool normals = scene.stream.normals == scene::Normals::octahedral;
+  const bool packed = scene.stream.coding == scene::Coding::packed;
   codec::StreamLayout layout{.epoch = epoch,
-                             .codec = codec::kCodecHierarchical,
+                             .codec = packed ? codec::kCodecPacked : codec::kCodecHierarchical,
                              .maxError = scene.stream.maxError,
                              .normals = normals ? codec::NormalMode::octahedral : codec::NormalMode::none,
                              .cloths = {}};

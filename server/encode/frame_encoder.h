@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Frames from simulation state: prepared on the device, entropy-coded on the CPU.
+// Frames from simulation state: prepared on the device, packets by the CPU.
 #pragma once
 
 #include <cstddef>
@@ -18,13 +18,14 @@ namespace clothstream::encode {
 // The layout of a scene's stream.
 codec::StreamLayout streamLayout(const scene::Scene& scene, std::uint32_t epoch);
 
-// Where codec 2 predicts: on GPUs on the device, on the host where the device is software (a dispatch costs
-// more there than the CPU's vectors do), where there are temporal layers, or where the device's buffers are
-// too small.
+// Where frames are predicted: on GPUs on the device, on the host where the device is software (a dispatch
+// costs more there than the CPU's vectors do), where there are temporal layers, or where the device's buffers
+// are too small.
 enum class Prediction : std::uint8_t { automatic, onHost, onDevice };
 
-// The packets of codec 2 predicted on the device are those of a codec::Encoder of this lag: the weights of a
-// frame are known when it is recorded, whatever of the frames before it is still to be entropy-coded.
+// The packets of frames that are predicted on the device are those of a codec::Encoder of this lag: the
+// weights of a frame are known when it is recorded, whatever of the frames before it is still to be
+// entropy-coded.
 inline constexpr std::uint32_t kWeightLag = 3;
 
 // The readback of one recorded frame, waiting to be entropy-coded.

@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: MIT
-// Codec 2 with its prediction on the device: the CPU entropy-codes and fits weights, to frames some frames
-// back.
+// Prediction on the device: the CPU fits weights, to frames some frames back, and makes packets.
 #include <array>
 
-#include "proto/codec/hierarchical/frame_writer.h"
 #include "proto/codec/hierarchical/weight_plan.h"
+#include "server/encode/device_output.h"
 #include "server/encode/device_predictor.h"
 #include "server/encode/encode_stage.h"
 
@@ -24,9 +23,10 @@ class HierarchicalDeviceStage final : public EncodeStage {
       : predictor_(device, simulation, layout),
         fitted_(predictor_.hierarchy()),
         plan_(predictor_.hierarchy(), 1, kWeightLag),
-        writer_(layout) {}
+        output_(layout.codec == codec::kCodecPacked ? makePackedOutput(device, predictor_, layout)
+                                                    : makeCodedOutput(predictor_, layout)) {}
 
-  std::size_t packetBound() const override { return writer_.packetBound(); }
+  std::size_t packetBound() const override { return output_->packetBound(); }
 
   void record(vulkan::Recorder& recorder, std::uint32_t slot, bool predicted) override {
     recordedSinceKey_ = predicted ? recordedSinceKey_ + 1 : 0;
@@ -36,13 +36,12 @@ class HierarchicalDeviceStage final : public EncodeStage {
     const std::size_t count = fitted_.select(recordedSinceKey_, chunks);
     predictor_.record(recorder, slot, recordedSinceKey_, planned != nullptr ? &weights : nullptr,
                       std::span(chunks).first(count));
+    output_->record(recorder, slot);
   }
 
   EncodedFrame entropyCode(const RecordedFrame& frame, std::span<std::byte> out) override;
 
  private:
-  bool writePhase(std::uint32_t slot, const Phase& phase);
-
   DevicePredictor predictor_;
   FitSchedule fitted_;
   // Of the device's thread.
@@ -50,24 +49,10 @@ class HierarchicalDeviceStage final : public EncodeStage {
   std::uint32_t recordedSinceKey_ = 0;
   // Of the thread that entropy-codes; but what is planned is read by the device's.
   WeightPlan plan_;
-  codec::hierarchical::FrameWriter writer_;
+  std::unique_ptr<DeviceOutput> output_;
   std::uint32_t sinceKey_ = 0;
   std::array<std::byte, WeightPlan::kMaxBytes> weightBytes_{};
-  codec::hierarchical::ChunkResiduals chunk_;
 };
-
-// Returns whether it has a residual.
-bool HierarchicalDeviceStage::writePhase(std::uint32_t slot, const Phase& phase) {
-  bool any = false;
-  writer_.beginPhase();
-  for (std::uint32_t begin = phase.begin; begin < phase.end; begin += codec::hierarchical::kChunk) {
-    const std::uint32_t count = std::min(codec::hierarchical::kChunk, phase.end - begin);
-    any = predictor_.read(slot, begin, count, chunk_) || any;
-    writer_.add(chunk_, count);
-  }
-  writer_.endPhase(any);
-  return any;
-}
 
 EncodedFrame HierarchicalDeviceStage::entropyCode(const RecordedFrame& frame, std::span<std::byte> out) {
   const bool key = frame.kind == codec::PacketKind::key;
@@ -76,21 +61,14 @@ EncodedFrame HierarchicalDeviceStage::entropyCode(const RecordedFrame& frame, st
   sinceKey_ = key ? 0 : sinceKey_ + 1;
   plan_.begin(role);
   const std::size_t weightBytes = plan_.write(!key && status.moved == 0, weightBytes_.data());
-  bool any = false;
-  writer_.begin();
-  const codec::hierarchical::Hierarchy& hierarchy = predictor_.hierarchy();
-  for (std::size_t i = 0; i < hierarchy.phases.size(); ++i) {
-    any = writePhase(frame.slot, hierarchy.phases[i]) || any;
-    if (i + 1 == hierarchy.coarsePhases) writer_.endCoarse();
-  }
-  for (const std::uint32_t normal : predictor_.normalResiduals(frame.slot))
-    writer_.addNormal(static_cast<std::int8_t>(normal), static_cast<std::int8_t>(normal >> 8));
+  const DeviceOutput::Written written =
+      output_->write(frame.slot, role, std::span(weightBytes_).first(weightBytes), out);
   std::array<Phase, FitSchedule::kMaxChunks> chunks;
   const std::size_t count = fitted_.select(sinceKey_, chunks);
   for (std::size_t i = 0; i < count; ++i)
     plan_.add(chunks[i].weightClass, predictor_.products(frame.slot, i));
-  plan_.end(!any);
-  return {.bytes = writer_.write(role, std::span(weightBytes_).first(weightBytes), out),
+  plan_.end(!written.any);
+  return {.bytes = written.bytes,
           .reconstructionHash = std::uint64_t{status.hashHigh} << 32 | status.hashLow};
 }
 

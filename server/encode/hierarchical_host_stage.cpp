@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Codec 2: positions, and normals where they are sent, are read back, all else is done on the CPU.
+// Prediction on the host: positions, and normals where they are sent, are read back, all else is done on the
+// CPU.
 #include <array>
 #include <vector>
 

@@ -38,6 +38,20 @@ scene::Integrator toIntegrator(Checks& checks, const Path& path, v1::Integrator 
   }
 }
 
+scene::Coding toCoding(Checks& checks, const Path& path, v1::Coding message) {
+  switch (message) {
+    case v1::CODING_UNSPECIFIED:
+    case v1::CODING_ENTROPY:
+      return scene::Coding::entropy;
+    case v1::CODING_PACKED:
+      return scene::Coding::packed;
+    default:
+      checks.fail(path, fmt::format("{}", static_cast<int>(message)),
+                  "must be CODING_ENTROPY or CODING_PACKED");
+      return {};
+  }
+}
+
 scene::Normals toNormals(Checks& checks, const Path& path, v1::Normals message) {
   switch (message) {
     case v1::NORMALS_UNSPECIFIED:
@@ -298,6 +312,7 @@ scene::StreamSettings toStreamSettings(Checks& checks, const Path& path, const v
   if (message.has_max_error())
     settings.maxError = checks.number(path / "maxError", message.max_error(), limits::kMaxError);
   settings.normals = toNormals(checks, path / "normals", message.normals());
+  settings.coding = toCoding(checks, path / "coding", message.coding());
   return settings;
 }
 

@@ -154,6 +154,8 @@ v1::Scene toMessage(const scene::Scene& scene) {
   for (const scene::Collider& collider : scene.colliders) writeCollider(collider, *message.add_colliders());
   message.mutable_stream()->set_max_error(scene.stream.maxError);
   message.mutable_stream()->set_normals(toMessage(scene.stream.normals));
+  const bool packed = scene.stream.coding == scene::Coding::packed;
+  message.mutable_stream()->set_coding(packed ? v1::CODING_PACKED : v1::CODING_ENTROPY);
   return message;
 }
 

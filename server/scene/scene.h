@@ -171,10 +171,12 @@ struct Environment {
 
 enum class Integrator : std::uint8_t { semiImplicitEuler, explicitEuler, rungeKutta4 };
 enum class Normals : std::uint8_t { none, octahedral };
+enum class Coding : std::uint8_t { entropy, packed };
 
 struct StreamSettings {
   float maxError = 0.0005f;  // m an axis
   Normals normals = Normals::none;
+  Coding coding = Coding::entropy;
 };
 
 struct Scene {

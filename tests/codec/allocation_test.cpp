@@ -72,12 +72,16 @@ void expectAllocationOnlyAtConstruction(const StreamLayout& layout, const Encode
   EXPECT_NE(sum, 0.0f);
 }
 
-TEST(Allocation, OfTheLatticeCodecHappensOnlyAtConstruction) {
-  expectAllocationOnlyAtConstruction(mixedLayout(NormalMode::octahedral, kCodecLatticeZstd));
-}
-
 TEST(Allocation, OfTheHierarchicalCodecHappensOnlyAtConstruction) {
   expectAllocationOnlyAtConstruction(mixedLayout(NormalMode::none, kCodecHierarchical));
+}
+
+TEST(Allocation, WhereNormalsAreSentHappensOnlyAtConstruction) {
+  expectAllocationOnlyAtConstruction(mixedLayout(NormalMode::octahedral, kCodecHierarchical));
+}
+
+TEST(Allocation, OfThePackedCodecHappensOnlyAtConstruction) {
+  expectAllocationOnlyAtConstruction(mixedLayout(NormalMode::octahedral, kCodecPacked));
 }
 
 TEST(Allocation, OfTemporalLayersHappensOnlyAtConstruction) {

@@ -117,7 +117,7 @@ TEST(HostilePacket, OfAnotherLayoutIsRefused) {
   withNormals.normals = NormalMode::octahedral;
   fewer.cloths.pop_back();
   StreamLayout otherCodec = streams[0].layout;
-  otherCodec.codec = kCodecHierarchical;
+  otherCodec.codec = kCodecPacked;
   for (const StreamLayout& layout : {larger, withNormals, fewer, otherCodec}) {
     EXPECT_EQ(Decoder::make(layout)->decode(streams[0].packets[0].bytes), DecodeResult::malformed);
   }
@@ -149,8 +149,10 @@ TEST(HostilePacket, ThatIsNotNewerIsStale) {
 TEST(HostilePacket, OfAnotherCodecIsRefused) {
   const std::vector<GoldenStream> streams = readGoldenStreams();
   std::vector<std::byte> bytes = streams[0].packets[0].bytes;
-  bytes[1] = std::byte{kCodecLatticeZstd + 1};
-  EXPECT_EQ(Decoder::make(streams[0].layout)->decode(bytes), DecodeResult::malformed);
+  for (const std::byte codec : {std::byte{0}, std::byte{1}, std::byte{kCodecPacked}, std::byte{200}}) {
+    bytes[1] = codec;
+    EXPECT_EQ(Decoder::make(streams[0].layout)->decode(bytes), DecodeResult::malformed);
+  }
 }
 
 }  // namespace

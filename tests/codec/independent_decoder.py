@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Codec 2 written from proto/FRAME_FORMAT.md alone: decodes the golden packets and compares the reconstruction hashes.
+"""A decoder written from proto/FRAME_FORMAT.md alone: decodes the golden packets and compares the reconstruction hashes.
 
 Run from the project's root. It is slow, simple, and checks little of what it reads.
 """
@@ -146,6 +146,54 @@ class Symbols:
 
 def unzigzag(z):
     return z >> 1 ^ -(z & 1)
+
+
+class Groups:
+    """Of codec 3: the residuals of vertices that follow each other, in components."""
+
+    def __init__(self, data):
+        self.bits = Bits(data)
+
+    def number(self, low, reserved=0):
+        """None where it stands for something else."""
+        q = 0
+        while q < 15 and self.bits.get(1):
+            q += 1
+        if q == 15:
+            beyond = self.bits.gamma(2)
+            if beyond < reserved:
+                return None
+            q += beyond - reserved
+        return q << low | self.bits.get(low)
+
+    def read(self, vertices, components):
+        """A list for each vertex; None in the place of one along n where the vertex stays."""
+        residuals = []
+        for start in range(0, vertices, 2048):
+            residuals += self.read_group(min(2048, vertices - start), components)
+        return residuals
+
+    def read_group(self, vertices, components):
+        residuals = [[0] * components for _ in range(vertices)]
+        modes = [0] * components
+        if not self.bits.get(1):
+            for start in range(0, vertices, 32):
+                for c in range(components):
+                    modes[c] += unzigzag(self.number(0))
+                    assert 0 <= modes[c] < 32
+                    self.read_block(residuals[start:start + 32], c, modes[c], 1 if components == 3 and c == 0 else 0)
+        while self.bits.at % 8:
+            assert self.bits.get(1) == 0
+        return residuals
+
+    def read_block(self, residuals, c, mode, reserved):
+        size = 4 if mode == 1 else 32
+        for start in range(0, len(residuals), size):
+            if mode == 0 or mode == 1 and self.bits.get(1):
+                continue
+            for residual in residuals[start:start + size]:
+                number = self.number(max(mode - 2, 0), reserved)
+                residual[c] = None if number is None else unzigzag(number)
 
 
 NO_VERTEX = None
@@ -443,6 +491,7 @@ class Decoder:
         while self.k > 4 and error / (2 ** (self.k - 1) + 2) * 2 ** 27 < 40:
             self.k -= 1
         self.layers = stream.get("temporalLayers", 1)
+        self.packed = stream["codec"] == 3
         self.has_normals = stream["normals"] == "octahedral"
         self.held = {}  # the newest frame of each layer, by layer
         self.history = []  # what the frame that is decoded refers to, what that one does, and so on
@@ -479,13 +528,16 @@ class Decoder:
             assert at["layer"] <= layer < self.layers
             self.history = [at, at["history"][0], at["history"][1]]
         weights, left = self.read_weights(sections[0], key, layer)
-        symbols, bits = Symbols(sections[1] + sections[2]), Bits(sections[3] + sections[4])
+        if self.packed:
+            symbols, bits = self.read_packed(sections), Bits(b"")
+        else:
+            symbols, bits = Symbols(sections[1] + sections[2]), Bits(sections[3] + sections[4])
         now = {name: [None] * self.count for name in "RSGQEDMW"}
         now["rests"] = [False] * self.count
         for number, (weight_class, phase) in enumerate(self.cloths.phases):
             if number == self.cloths.coarse_phases:
                 self.check_coarse(sections, symbols, bits)
-            quiet = bits.get(1)
+            quiet = not self.packed and bits.get(1)
             for start in range(0, len(phase), 64):
                 group = phase[start:start + 64]
                 predicted = [self.predict(now, v, weights[weight_class]) for v in group]
@@ -495,8 +547,9 @@ class Decoder:
         if len(self.cloths.phases) == self.cloths.coarse_phases:
             self.check_coarse(sections, symbols, bits)
         now["normals"] = self.read_normals(now, symbols, bits) if self.has_normals else None
-        symbols.check_end()
-        bits.check_end()
+        if not self.packed:
+            symbols.check_end()
+            bits.check_end()
         now["C"] = []
         for v in range(self.count):
             around = add(*(now["R"][n] for n in self.cloths.nearest[v]))
@@ -505,8 +558,20 @@ class Decoder:
         now["history"] = self.history[:2] or [now, now]
         self.newest = self.held[layer] = now
 
-    @staticmethod
-    def check_coarse(sections, symbols, bits):
+    def read_packed(self, sections):
+        """Residuals of all vertices along u, v, n, None for n where it stays; those of normals behind."""
+        order = [v for _, phase in self.cloths.phases for v in phase]
+        coarse = sum(len(phase) for _, phase in self.cloths.phases[:self.cloths.coarse_phases])
+        first, second = Groups(sections[1]), Groups(sections[2])
+        residuals = first.read(coarse, 3) + second.read(self.count - coarse, 3)
+        normals = second.read(self.count, 2) if self.has_normals else []
+        first.bits.check_end()
+        second.bits.check_end()
+        return {v: (u, w, n) for v, (n, u, w) in zip(order, residuals)}, normals
+
+    def check_coarse(self, sections, symbols, bits):
+        if self.packed:
+            return
         assert 2 * symbols.at == len(sections[1]) and (bits.at + 7) // 8 == len(sections[3])
 
     def read_normals(self, now, symbols, bits):
@@ -527,6 +592,9 @@ class Decoder:
             for c in 0, 1:
                 x = n[(top + 1 + c) % 3]
                 guess = (254 * abs(x) + size) // (2 * size) * (-1 if x < 0 else 1) if size else 0
+                if self.packed:
+                    octahedral.append((guess + symbols[1][v][c] + 128) % 256 - 128)
+                    continue
                 o = max(4, min(16383, expected[c])).bit_length() - 1
                 scale = 2 * (o - 2) + (max(4, min(16383, expected[c])) >> o - 1 & 1)
                 b = 0 if scale < 16 else (scale - 14) // 2
@@ -577,7 +645,12 @@ class Decoder:
     def read_residuals(self, now, group, scale_class, quiet, symbols, bits):
         residuals, stays = [[0, 0, 0] for _ in group], [False] * len(group)
         magnitude = lambda i, c: min(abs(residuals[i][c]), 31)
-        if not quiet:
+        if self.packed:
+            for i, v in enumerate(group):
+                stays[i] = symbols[0][v][2] is None
+                if not stays[i]:
+                    residuals[i] = list(symbols[0][v])
+        elif not quiet:
             for c in 2, 0, 1:
                 w = SCALE_WEIGHTS[scale_class][c]
                 for i, v in enumerate(group):
@@ -659,14 +732,14 @@ def parse(packet):
             if b < 128:
                 return value
 
-    assert packet[0] == 1 and packet[1] == 2
+    assert packet[0] == 1
     varint()  # epoch
     tick = varint()
     references = [tick - varint() for _ in range(byte())]
     for _ in range(varint()):
         varint(), varint()
     sizes = [varint() for _ in range(byte())]
-    assert at + sum(sizes) == len(packet) and len(sizes) == 5
+    assert at + sum(sizes) == len(packet) and len(sizes) == {2: 5, 3: 3}[packet[1]]
     sections = []
     for size in sizes:
         sections.append(packet[at:at + size])
@@ -677,8 +750,6 @@ def parse(packet):
 def main():
     packets = 0
     for stream in json.load(open(GOLDEN + "streams.json")):
-        if stream["codec"] != 2:
-            continue
         decoder = Decoder(stream)
         for packet in stream["packets"]:
             decoder.decode(parse(open(GOLDEN + packet["file"], "rb").read()))

@@ -22,7 +22,7 @@ MotionFrame sampleMotion(const StreamLayout& layout, std::uint64_t tick, float a
 MotionFrame scatter(const StreamLayout& layout, std::uint32_t seed, float extent);
 
 // Odd-sized grids, a grid of one row, one of one vertex, a cloth that is no grid.
-StreamLayout mixedLayout(NormalMode normals, std::uint8_t codec = kCodecLatticeZstd);
+StreamLayout mixedLayout(NormalMode normals, std::uint8_t codec = kCodecHierarchical);
 
 // Of vectors of any length.
 double degreesBetween(const float* a, const float* b);

@@ -19,9 +19,9 @@ struct Sent {
   std::uint64_t hash = 0;
 };
 
-StreamLayout layered(std::uint8_t layers) {
+StreamLayout layered(std::uint8_t layers, std::uint8_t codec = kCodecHierarchical) {
   return {.epoch = 3,
-          .codec = kCodecHierarchical,
+          .codec = codec,
           .temporalLayers = layers,
           .cloths = {{.vertexCount = 30 * 20, .rows = 30, .columns = 20}, {.vertexCount = 12}}};
 }
@@ -110,8 +110,11 @@ TEST(TemporalLayers, WithoutTheHighestAllIsDecoded) {
   }
 }
 
-TEST(TemporalLayers, AnyFramesLeaveTheOthersTheirBits) {
-  const StreamLayout layout = layered(3);
+class TemporalLayersOf : public testing::TestWithParam<std::uint8_t> {};
+INSTANTIATE_TEST_SUITE_P(Codecs, TemporalLayersOf, testing::Values(kCodecHierarchical, kCodecPacked));
+
+TEST_P(TemporalLayersOf, AnyFramesLeaveTheOthersTheirBits) {
+  const StreamLayout layout = layered(3, GetParam());
   const std::vector<Sent> sent = send(layout, {1, 27}, 60);
   std::uint32_t random = 1;
   for (int round = 0; round < 50; ++round) {

@@ -52,17 +52,31 @@ GoldenStream makeStream(const std::string& name, const StreamLayout& layout) {
 }
 
 // A motion that goes on until weights have come for each layer.
-GoldenStream makeLongStream(const std::string& name, const StreamLayout& layout) {
+GoldenStream makeLongStream(const std::string& name, const StreamLayout& layout, std::uint64_t frames = 12) {
   std::vector<Moment> moments;
-  for (std::uint64_t tick = 1; tick <= 12; ++tick) {
+  for (std::uint64_t tick = 1; tick <= frames; ++tick) {
     moments.push_back(
         {tick, tick == 1 ? PacketKind::key : PacketKind::predicted, sampleMotion(layout, tick, 0.02f)});
   }
   return makeStream(name, layout, moments);
 }
 
+// Half of it is held: it starts to rest.
+GoldenStream makeHeldStream(const std::string& name, std::uint8_t codec) {
+  const StreamLayout layout{
+      .epoch = 9, .codec = codec, .cloths = {{.vertexCount = 144, .rows = 12, .columns = 12}}};
+  const MotionFrame start = sampleMotion(layout, 1, 0.02f);
+  std::vector<Moment> moments;
+  for (std::uint64_t tick = 1; tick <= 8; ++tick) {
+    MotionFrame frame = sampleMotion(layout, tick, 0.02f);
+    std::copy_n(start.positions.begin(), frame.positions.size() / 2, frame.positions.begin());
+    moments.push_back({tick, tick == 1 ? PacketKind::key : PacketKind::predicted, frame});
+  }
+  return makeStream(name, layout, moments);
+}
+
 // A mesh beside a grid.
-GoldenStream makeMeshStream(const std::string& name) {
+GoldenStream makeMeshStream(const std::string& name, std::uint8_t codec) {
   constexpr std::uint32_t kEdge = 14;
   const ClothLayout grid{.vertexCount = kEdge * kEdge, .rows = kEdge, .columns = kEdge};
   CutGrid mesh(kEdge);
@@ -74,7 +88,7 @@ GoldenStream makeMeshStream(const std::string& name) {
                       frame.positions.begin());
     moments.push_back({tick, tick == 1 ? PacketKind::key : PacketKind::predicted, frame});
   }
-  return makeStream(name, {.epoch = 9, .codec = kCodecHierarchical, .cloths = {mesh.cloth(), grid}}, moments);
+  return makeStream(name, {.epoch = 9, .codec = codec, .cloths = {mesh.cloth(), grid}}, moments);
 }
 
 }  // namespace
@@ -83,11 +97,9 @@ GoldenStream makeMeshStream(const std::string& name) {
 int main() try {
   using namespace clothstream::codec;
   writeGoldenStreams(
-      {makeStream("mixed", mixedLayout(NormalMode::none)),
-       makeStream("normals", mixedLayout(NormalMode::octahedral)),
-       makeStream("hierarchical", mixedLayout(NormalMode::none, kCodecHierarchical)),
+      {makeStream("hierarchical", mixedLayout(NormalMode::none, kCodecHierarchical)),
        makeStream("hierarchical_normals", mixedLayout(NormalMode::octahedral, kCodecHierarchical)),
-       makeMeshStream("mesh"),
+       makeMeshStream("mesh", kCodecHierarchical),
        makeStream("fine_hierarchical", {.epoch = 8,
                                         .codec = kCodecHierarchical,
                                         .maxError = 0.00002f,
@@ -101,10 +113,25 @@ int main() try {
                                   .temporalLayers = 3,
                                   .cloths = {{.vertexCount = 400, .rows = 20, .columns = 20}}}),
        makeStream("vertex", {.epoch = 0xffffffffu,
-                             .codec = kCodecLatticeZstd,
+                             .codec = kCodecHierarchical,
                              .maxError = 0.01f,
                              .normals = NormalMode::none,
-                             .cloths = {{.vertexCount = 1, .rows = 0, .columns = 0}}})});
+                             .cloths = {{.vertexCount = 1, .rows = 0, .columns = 0}}}),
+       makeStream("packed", mixedLayout(NormalMode::none, kCodecPacked)),
+       makeStream("packed_normals", mixedLayout(NormalMode::octahedral, kCodecPacked)),
+       makeMeshStream("packed_mesh", kCodecPacked), makeHeldStream("held", kCodecHierarchical),
+       makeHeldStream("packed_held", kCodecPacked),
+       makeLongStream("packed_layered", {.epoch = 9,
+                                         .codec = kCodecPacked,
+                                         .temporalLayers = 3,
+                                         .cloths = {{.vertexCount = 400, .rows = 20, .columns = 20}}}),
+       // So many that they are in several groups.
+       makeLongStream("packed_large",
+                      {.epoch = 9,
+                       .codec = kCodecPacked,
+                       .maxError = 0.01f,
+                       .cloths = {{.vertexCount = 2400, .rows = 60, .columns = 40}}},
+                      3)});
   return 0;
 } catch (const std::exception& error) {
   std::fprintf(stderr, "%s\n", error.what());

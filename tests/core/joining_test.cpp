@@ -22,7 +22,7 @@ TEST(Joining, SaysHelloFirstAndOnlyThat) {
   ASSERT_THAT(messages, SizeIs(1));
   ASSERT_TRUE(messages[0].has_hello());
   EXPECT_EQ(messages[0].hello().protocol_version(), CS_PROTOCOL_VERSION);
-  EXPECT_THAT(messages[0].hello().codecs(), ElementsAre(2, 1));
+  EXPECT_THAT(messages[0].hello().codecs(), ElementsAre(2, 3));
   EXPECT_EQ(messages[0].hello().scene(), "flag");
   EXPECT_EQ(messages[0].hello().client_name(), "test");
   EXPECT_NE(messages[0].request_id(), 0u);
@@ -186,7 +186,7 @@ TEST(Joining, TakesANewDescriptionWhole) {
 TEST(Joining, RefusesAnotherProtocolVersionAndSaysWhichOnesThereAre) {
   v1::ServerMessage message;
   message.mutable_welcome()->set_protocol_version(9);
-  message.mutable_welcome()->set_codec(1);
+  message.mutable_welcome()->set_codec(2);
   ClientUnderTest client;
   EXPECT_EQ(client.receive(message.SerializeAsString()), static_cast<std::uint32_t>(CS_EVENT_ERROR));
   EXPECT_EQ(cs_get_state(client.get()), CS_STATE_FAILED);
@@ -270,7 +270,7 @@ INSTANTIATE_TEST_SUITE_P(
     Wrong, Descriptions,
     ::testing::Values(
         WrongDescription{"no_cloth", [](v1::StreamDescription& d) { d.clear_cloths(); }, "0 cloths"},
-        WrongDescription{"a_codec", [](v1::StreamDescription& d) { d.set_codec(3); }, "codec is 3"},
+        WrongDescription{"a_codec", [](v1::StreamDescription& d) { d.set_codec(1); }, "codec is 1"},
         WrongDescription{"no_rate", [](v1::StreamDescription& d) { d.set_simulation_rate(0); },
                          "simulation_rate is 0"},
         WrongDescription{"rate", [](v1::StreamDescription& d) { d.set_stream_rate(71); },

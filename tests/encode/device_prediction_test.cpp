@@ -17,7 +17,12 @@
 namespace clothstream::tests {
 namespace {
 
-class DevicePrediction : public GpuTest {};
+class DevicePrediction : public GpuTest, public testing::WithParamInterface<scene::Coding> {};
+INSTANTIATE_TEST_SUITE_P(Codings, DevicePrediction,
+                         testing::Values(scene::Coding::entropy, scene::Coding::packed),
+                         [](const auto& coding) {
+                           return coding.param == scene::Coding::packed ? "packed" : "entropy";
+                         });
 
 // Encodes states that are given.
 class Playing : public Encoding {
@@ -38,19 +43,24 @@ class Playing : public Encoding {
   }
 };
 
-scene::Scene squareOf(std::uint32_t edge) {
-  return sceneOf({calmCloth(edge, edge)});
+scene::Scene codedAs(scene::Coding coding, scene::Scene scene) {
+  scene.stream.coding = coding;
+  return scene;
 }
 
-TEST_F(DevicePrediction, EqualsTheReferenceWhereWeightsAreFittedToSomeChunksOnly) {
+scene::Scene squareOf(std::uint32_t edge, scene::Coding coding) {
+  return codedAs(coding, sceneOf({calmCloth(edge, edge)}));
+}
+
+TEST_P(DevicePrediction, EqualsTheReferenceWhereWeightsAreFittedToSomeChunksOnly) {
   // So many that each phase of the finest level is a dispatch of its own, and chunks take turns.
-  Playing playing(squareOf(100));
+  Playing playing(squareOf(100, GetParam()));
   for (std::uint64_t tick = 1; tick <= 24 && !HasFailure(); ++tick)
     playing.show(codec::sampleMotion(playing.layout, tick, 0.04f).positions, tick, tick == 16);
 }
 
-TEST_F(DevicePrediction, EqualsTheReferenceWhileMuchComesToRestAndMovesAgain) {
-  Playing playing(squareOf(40));
+TEST_P(DevicePrediction, EqualsTheReferenceWhileMuchComesToRestAndMovesAgain) {
+  Playing playing(squareOf(40, GetParam()));
   std::uint64_t moment = 1;
   for (std::uint64_t tick = 1; tick <= 60 && !HasFailure(); ++tick) {
     // All stand still from 20 to 29.
@@ -65,8 +75,8 @@ TEST_F(DevicePrediction, EqualsTheReferenceWhileMuchComesToRestAndMovesAgain) {
   }
 }
 
-TEST_F(DevicePrediction, EqualsTheReferenceWhereverKeyFramesAre) {
-  Playing playing(squareOf(24));
+TEST_P(DevicePrediction, EqualsTheReferenceWhereverKeyFramesAre) {
+  Playing playing(squareOf(24, GetParam()));
   const std::set<std::uint64_t> keys{1, 2, 3, 6, 10, 15, 21, 22, 40};
   for (std::uint64_t tick = 1; tick <= 50 && !HasFailure(); ++tick) {
     const bool forgets = tick == 30 || tick == 31;
@@ -77,9 +87,9 @@ TEST_F(DevicePrediction, EqualsTheReferenceWhereverKeyFramesAre) {
   }
 }
 
-TEST_F(DevicePrediction, EqualsTheReferenceAtAnyMaxErrorAndWhereResidualsAreWide) {
+TEST_P(DevicePrediction, EqualsTheReferenceAtAnyMaxErrorAndWhereResidualsAreWide) {
   for (const float maxError : {5e-6f, 1e-4f, 0.0005f, 0.01f, 1.0f}) {
-    scene::Scene scene = squareOf(16);
+    scene::Scene scene = squareOf(16, GetParam());
     scene.stream.maxError = maxError;
     Playing playing(scene);
     std::mt19937 random(3);
@@ -93,8 +103,8 @@ TEST_F(DevicePrediction, EqualsTheReferenceAtAnyMaxErrorAndWhereResidualsAreWide
   }
 }
 
-TEST_F(DevicePrediction, EqualsTheReferenceHalfWayBetweenUnits) {
-  scene::Scene scene = squareOf(16);
+TEST_P(DevicePrediction, EqualsTheReferenceHalfWayBetweenUnits) {
+  scene::Scene scene = squareOf(16, GetParam());
   // A unit is 2^-18 m then (codec::hierarchical::latticeUnit()): metres are exactly so many and a half.
   scene.stream.maxError = 261 * 0x1p-19f;
   Playing playing(scene);
@@ -125,14 +135,15 @@ scene::Cloth confetti(std::uint32_t triangles) {
   return cloth;
 }
 
-TEST_F(DevicePrediction, EqualsTheReferenceOnClothOfAnyShape) {
-  Playing playing(sceneOf({confetti(600), calmCloth(3, 2), discCloth(12), calmCloth(2, 31)}));
+TEST_P(DevicePrediction, EqualsTheReferenceOnClothOfAnyShape) {
+  Playing playing(
+      codedAs(GetParam(), sceneOf({confetti(600), calmCloth(3, 2), discCloth(12), calmCloth(2, 31)})));
   for (std::uint64_t tick = 1; tick <= 12 && !HasFailure(); ++tick)
     playing.show(codec::sampleMotion(playing.layout, tick, 0.05f).positions, tick);
 }
 
-TEST_F(DevicePrediction, EqualsTheReferenceHoweverManyFramesWait) {
-  const scene::Scene scene = squareOf(30);
+TEST_P(DevicePrediction, EqualsTheReferenceHoweverManyFramesWait) {
+  const scene::Scene scene = squareOf(30, GetParam());
   simulation::ClothSimulation simulation(device(), scene);
   const codec::StreamLayout layout = encode::streamLayout(scene, kEpoch);
   encode::FrameEncoder encoder(device(), simulation, layout, encode::Prediction::onDevice);
@@ -166,8 +177,8 @@ TEST_F(DevicePrediction, EqualsTheReferenceHoweverManyFramesWait) {
   }
 }
 
-TEST_F(DevicePrediction, EqualsTheReferenceWhereAnotherThreadCodes) {
-  const scene::Scene scene = squareOf(20);
+TEST_P(DevicePrediction, EqualsTheReferenceWhereAnotherThreadCodes) {
+  const scene::Scene scene = squareOf(20, GetParam());
   simulation::ClothSimulation simulation(device(), scene);
   const codec::StreamLayout layout = encode::streamLayout(scene, kEpoch);
   encode::FrameEncoder encoder(device(), simulation, layout, encode::Prediction::onDevice);
@@ -218,8 +229,8 @@ TEST_F(DevicePrediction, EqualsTheReferenceWhereAnotherThreadCodes) {
   }
 }
 
-TEST_F(DevicePrediction, RefusesTemporalLayers) {
-  const scene::Scene scene = squareOf(4);
+TEST_P(DevicePrediction, RefusesTemporalLayers) {
+  const scene::Scene scene = squareOf(4, GetParam());
   const simulation::ClothSimulation simulation(device(), scene);
   codec::StreamLayout layout = encode::streamLayout(scene, kEpoch);
   layout.temporalLayers = 2;

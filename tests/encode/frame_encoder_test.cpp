@@ -18,19 +18,30 @@ struct Sort {
   const char* name;
   scene::Normals normals;
   encode::Prediction prediction = encode::Prediction::onHost;
+  scene::Coding coding = scene::Coding::entropy;
+
+  scene::Scene cloths() const {
+    scene::Scene scene = clothsOf(normals);
+    scene.stream.coding = coding;
+    return scene;
+  }
 };
 
 class FrameEncoder : public GpuTest, public testing::WithParamInterface<Sort> {};
-INSTANTIATE_TEST_SUITE_P(Sorts, FrameEncoder,
-                         testing::Values(Sort{"onHost", scene::Normals::none},
-                                         Sort{"onHostWithNormals", scene::Normals::octahedral},
-                                         Sort{"onDevice", scene::Normals::none, encode::Prediction::onDevice},
-                                         Sort{"onDeviceWithNormals", scene::Normals::octahedral,
-                                              encode::Prediction::onDevice}),
-                         [](const auto& chosen) { return chosen.param.name; });
+INSTANTIATE_TEST_SUITE_P(
+    Sorts, FrameEncoder,
+    testing::Values(
+        Sort{"onHost", scene::Normals::none}, Sort{"onHostWithNormals", scene::Normals::octahedral},
+        Sort{"onDevice", scene::Normals::none, encode::Prediction::onDevice},
+        Sort{"onDeviceWithNormals", scene::Normals::octahedral, encode::Prediction::onDevice},
+        Sort{"packedOnHost", scene::Normals::octahedral, encode::Prediction::onHost, scene::Coding::packed},
+        Sort{"packedOnDevice", scene::Normals::none, encode::Prediction::onDevice, scene::Coding::packed},
+        Sort{"packedOnDeviceWithNormals", scene::Normals::octahedral, encode::Prediction::onDevice,
+             scene::Coding::packed}),
+    [](const auto& chosen) { return chosen.param.name; });
 
 TEST_P(FrameEncoder, MakesThePacketsOfTheReferenceEncoder) {
-  Encoding encoding(clothsOf(GetParam().normals), GetParam().prediction);
+  Encoding encoding(GetParam().cloths(), GetParam().prediction);
   for (std::uint64_t tick = 1; tick <= 120; ++tick) {
     const encode::RecordedFrame frame = encoding.tick(tick, tick % 40 == 0);
     EXPECT_EQ(frame.kind == codec::PacketKind::key, tick == 1 || tick % 40 == 0) << tick;
@@ -41,7 +52,7 @@ TEST_P(FrameEncoder, MakesThePacketsOfTheReferenceEncoder) {
 }
 
 TEST_P(FrameEncoder, EqualsTheReferenceOnStatesOfAnySize) {
-  Encoding encoding(clothsOf(GetParam().normals), GetParam().prediction);
+  Encoding encoding(GetParam().cloths(), GetParam().prediction);
   std::mt19937 random(1);
   for (std::uint64_t tick = 1; tick <= 12; ++tick) {
     const float extents[] = {1e-19f, 0.001f, 1, 32, 8000, 1e6f};
@@ -58,7 +69,7 @@ TEST_P(FrameEncoder, EqualsTheReferenceOnStatesOfAnySize) {
 TEST_P(FrameEncoder, KeepsTheErrorAtRoundingsEdges) {
   // Half way between lattice points, and the floats beside it: where a device that rounds otherwise would
   // differ.
-  Encoding encoding(clothsOf(GetParam().normals), GetParam().prediction);
+  Encoding encoding(GetParam().cloths(), GetParam().prediction);
   const float step = 2 * encoding.layout.maxError - 0x1p-18f;
   std::mt19937 random(2);
   std::uniform_int_distribution<int> point(-30000, 30000), offset(-3, 3);
@@ -78,7 +89,7 @@ TEST_P(FrameEncoder, KeepsTheErrorAtRoundingsEdges) {
 }
 
 TEST_P(FrameEncoder, MakesThoseOfMeshesToo) {
-  scene::Scene scene = clothsOf(GetParam().normals);
+  scene::Scene scene = GetParam().cloths();
   scene.cloths.insert(scene.cloths.begin() + 1, discCloth(9));
   Encoding encoding(scene, GetParam().prediction);
   for (std::uint64_t tick = 1; tick <= 30 && !testing::Test::HasFailure(); ++tick)

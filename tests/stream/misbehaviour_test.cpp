@@ -61,7 +61,7 @@ TEST_F(MisbehaviourTest, EveryTruncationOfAMessageIsHarmless) {
   v1::ClientMessage message;
   message.set_request_id(5);
   message.mutable_hello()->set_scene("small");
-  message.mutable_hello()->add_codecs(1);
+  message.mutable_hello()->add_codecs(2);
   const std::string bytes = message.SerializeAsString();
   for (std::size_t length = 0; length < bytes.size(); ++length) {
     TestPeer peer(server());
@@ -121,7 +121,7 @@ TEST_F(MisbehaviourTest, ASecondHelloIsOutOfOrder) {
 TEST_F(MisbehaviourTest, AVersionThatIsNotSpokenIsRefused) {
   v1::ClientMessage message;
   message.mutable_hello()->set_protocol_version(0);
-  message.mutable_hello()->add_codecs(1);
+  message.mutable_hello()->add_codecs(2);
   culprit->send(message);
   EXPECT_EQ(fatalError().code(), v1::ERROR_CODE_UNSUPPORTED_VERSION);
 }

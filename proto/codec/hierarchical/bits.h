@@ -2,12 +2,18 @@
 // Plain bits, and small numbers in few of them.
 #pragma once
 
+#include <algorithm>
 #include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <span>
 
 namespace clothstream::codec::hierarchical {
+
+// Of an Elias gamma of value + 2^k (BitWriter::putGamma()).
+constexpr unsigned gammaBits(std::uint32_t value, unsigned k) {
+  return 2 * static_cast<unsigned>(std::bit_width(value + (1u << k))) - 1 - k;
+}
 
 // Lowest bit first. The caller sees to it that `out` has room.
 class BitWriter {
@@ -65,6 +71,18 @@ class BitReader {
     const unsigned width = k + extra;
     return (get(width) | 1u << width) - (1u << k);
   }
+  // How many ones stand before the next zero, which is taken with them; of more than `most` (16 at most) so
+  // many, and no zero.
+  std::uint32_t getOnes(unsigned most) {
+    if (count_ <= most) refill();
+    const unsigned ones = std::min(static_cast<unsigned>(std::countr_one(pending_)), most);
+    const unsigned taken = ones < most ? ones + 1 : ones;
+    pending_ >>= taken;
+    count_ -= taken;
+    return ones;
+  }
+  // Goes on to a whole byte; false where something is left of the last one.
+  [[nodiscard]] bool endByte() { return get(count_ % 8) == 0 && !broken_; }
   // The bytes that were taken from, if only in part.
   std::size_t bytesTaken() const { return at_ - count_ / 8; }
   // All bytes were used, none was missing, and what is left of the last are zeros.

@@ -30,10 +30,14 @@ double quantisationScale(float unit);
 inline constexpr std::uint8_t kStillFrames = 3;
 inline constexpr std::uint32_t kRestsAtOnce = 64;
 
-// A packet's sections: changes of the weights (empty where there are none), symbols, bits beside them; of the
-// latter two first what the coarse vertices take, to the byte or word that they end in, then the rest.
+// The sections of a packet of codec 2: changes of the weights (empty where there are none), symbols, bits
+// beside them; of the latter two first what the coarse vertices take, to the byte or word that they end in,
+// then the rest.
 inline constexpr std::size_t kSections = 5;
 enum Section : std::uint8_t { kWeightChanges, kCoarseSymbols, kFineSymbols, kCoarseBits, kFineBits };
+// Of codec 3: the same changes, the groups of the coarse vertices (packed_blocks.h), those of the others.
+inline constexpr std::size_t kPackedSections = 3;
+enum PackedSection : std::uint8_t { kPackedWeightChanges, kCoarseGroups, kFineGroups };
 inline constexpr unsigned kWeightGammaBits = 4, kEscapeGammaBits = 2;
 // Stands for the first number beyond the symbols. Along the normal it is no residual: the vertex is where it
 // was in the frame before, and has no other residuals.

@@ -5,15 +5,12 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <span>
-#include <vector>
 
 #include "proto/codec/body.h"
-#include "proto/codec/hierarchical/bits.h"
-#include "proto/codec/hierarchical/frame_coder.h"
-#include "proto/codec/hierarchical/rans.h"
+#include "proto/codec/hierarchical/predictor.h"
 #include "proto/codec/hierarchical/residual_model.h"
-#include "proto/codec/packet_header.h"
 
 namespace clothstream::codec::hierarchical {
 
@@ -33,37 +30,27 @@ struct ChunkResiduals {
 // where the stream has them, then write().
 class FrameWriter {
  public:
-  explicit FrameWriter(const StreamLayout& layout);
+  virtual ~FrameWriter() = default;
 
-  std::size_t packetBound() const;
+  virtual std::size_t packetBound() const = 0;
+  // Whether add() reads the chunk's scales.
+  virtual bool needsScales() const = 0;
 
-  void begin();
-  void beginPhase();
-  void add(const ChunkResiduals& chunk, std::size_t count);
+  virtual void begin() = 0;
+  virtual void beginPhase() = 0;
+  virtual void add(const ChunkResiduals& chunk, std::size_t count) = 0;
   // `any`: one of its vertices stays or has a residual that is not 0.
-  void endPhase(bool any);
+  virtual void endPhase(bool any) = 0;
   // That was the last phase of coarse vertices.
-  void endCoarse();
+  virtual void endCoarse() = 0;
   // In the order of vertices: what u and v are off the prediction, modulo 256.
-  void addNormal(std::int8_t u, std::int8_t v);
+  virtual void addNormal(std::int8_t u, std::int8_t v) = 0;
   // The packet; `weights` is its first section.
-  std::size_t write(const FrameRole& role, std::span<const std::byte> weights, std::span<std::byte> out);
-
- private:
-  void code(const ChunkResiduals& chunk, Component component, std::size_t i);
-  // `reserved`: how many of the escapes' numbers stand for something else.
-  void put(std::int32_t residual, Component component, std::uint32_t scale, std::uint32_t reserved,
-           std::size_t coder);
-
-  PacketHeader header_;
-  RansWriter symbols_;
-  std::vector<std::byte> extra_;
-  BitWriter bits_, bitsBefore_;  // before the phase
-  std::size_t symbolsBefore_ = 0;
-  std::array<NormalScale, 2> normalScales_;
-  std::uint32_t normals_ = 0;  // that were added
-  // What coarse vertices take.
-  std::size_t coarseSymbols_ = 0, coarseBytes_ = 0;
+  virtual std::size_t write(const FrameRole& role, std::span<const std::byte> weights,
+                            std::span<std::byte> out) = 0;
 };
+
+// That of the layout's codec.
+std::unique_ptr<FrameWriter> makeFrameWriter(const StreamLayout& layout);
 
 }  // namespace clothstream::codec::hierarchical

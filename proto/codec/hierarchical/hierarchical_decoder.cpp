@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Codec 2: packets to vertices.
+// Codecs 2 and 3: packets to vertices.
 #include <algorithm>
 #include <cstring>
 #include <new>
@@ -7,6 +7,7 @@
 #include "proto/codec/body.h"
 #include "proto/codec/hierarchical/bits.h"
 #include "proto/codec/hierarchical/frame_coder.h"
+#include "proto/codec/hierarchical/packed_residuals.h"
 #include "proto/codec/hierarchical/rans.h"
 #include "proto/codec/zigzag.h"
 
@@ -22,12 +23,14 @@ class HierarchicalDecoder final : public BodyDecoder {
   bool allocate(const StreamLayout& layout, Detail detail) {
     layout_ = layout;
     isCoarse_ = detail == Detail::coarse;
+    isPacked_ = layout.codec == kCodecPacked;
     hasNormals_ = layout.normals == NormalMode::octahedral;
     unit_ = latticeUnit(layout.maxError);
     if (hasNormals_ && !(normals_.allocate(layout.vertexCount()) &&
                          newNormals_.allocate(layout.vertexCount()) && normalPrediction_.allocate(layout)))
       return false;
-    return predictor_.allocate(layout, unit_.stepBits);
+    return predictor_.allocate(layout, unit_.stepBits) &&
+           (!isPacked_ || packed_.allocate(layout, predictor_.hierarchy().coarseVertices));
   }
 
   bool decode(const ParsedPacket& packet, std::uint8_t referenceLayer) override;
@@ -36,18 +39,29 @@ class HierarchicalDecoder final : public BodyDecoder {
   std::uint64_t reconstructionHash() const override;
 
  private:
+  // Of codec 2; empty of codec 3, whose residuals are all read before.
   struct Streams {
     RansReader symbols;
     BitReader bits;
+    std::size_t coarseSymbols, coarseBits;  // bytes that coarse vertices take
+
+    bool isCoarseRead() const {
+      return symbols.bytesTaken() == coarseSymbols && bits.bytesTaken() == coarseBits;
+    }
   };
   using Vectors = std::array<WeightVectors, kWeightClasses + 1>;
 
   bool decodeFrame(const ParsedPacket& packet, std::uint8_t referenceLayer);
+  Streams openStreams(const ParsedPacket& packet) const;
+  bool readPacked(const ParsedPacket& packet);
   // Changes those of `weights` that a frame of this layer can.
   bool readWeights(std::span<const std::byte> section, bool key, std::uint8_t layer, LayerWeights& weights,
                    bool& atRest) const;
   void decodePhases(std::size_t begin, std::size_t end, bool key, const Vectors& weights, Streams& streams);
   void decodeNormals(Streams& streams);
+  // In place of readResiduals(); false where none stays or has a residual that is not 0.
+  bool loadPacked(std::uint32_t begin, std::uint32_t count);
+  std::int32_t readOfNormal(std::size_t component, std::size_t vertex, NormalScale& scale, Streams& streams);
   // Without a model there are no residuals.
   void decodeChunk(std::uint32_t begin, std::uint32_t count, const WeightVectors& weights,
                    const ScaleModel* model, Streams& streams);
@@ -63,9 +77,10 @@ class HierarchicalDecoder final : public BodyDecoder {
              const std::array<Int32x4, 4>& positions, Int32x4 magnitudes);
 
   StreamLayout layout_;
-  bool isCoarse_ = false, hasNormals_ = false;
+  bool isCoarse_ = false, isPacked_ = false, hasNormals_ = false;
   LatticeUnit unit_{};
   Predictor predictor_;
+  PackedResiduals packed_;  // of codec 3
   NormalPrediction normalPrediction_;
   Array<FacedNormal> normals_, newNormals_;                 // by vertex; of the frame that is being decoded
   std::array<LayerWeights, kMaxTemporalLayers> weights_{};  // that the newest frame of each layer left
@@ -114,28 +129,22 @@ bool HierarchicalDecoder::decode(const ParsedPacket& packet, std::uint8_t refere
 
 bool HierarchicalDecoder::decodeFrame(const ParsedPacket& packet, std::uint8_t referenceLayer) {
   const PacketHeader& header = packet.header;
-  if (header.sectionCount != kSections) return false;
+  if (header.sectionCount != (isPacked_ ? kPackedSections : kSections)) return false;
   const bool key = header.kind == PacketKind::key;
   const std::uint8_t layer = header.temporalLayer;
-  const auto& bytes = header.sectionBytes;
-  const std::span<const std::byte> changes = packet.body.first(bytes[kWeightChanges]);
-  const std::span<const std::byte> symbols =
-      packet.body.subspan(changes.size(), std::size_t{bytes[kCoarseSymbols]} + bytes[kFineSymbols]);
-  const std::span<const std::byte> bits = packet.body.subspan(changes.size() + symbols.size());
+  const std::span<const std::byte> changes = packet.body.first(header.sectionBytes[kWeightChanges]);
   LayerWeights weights = weights_[referenceLayer];
   if (key) weights.fill(keyFrameWeights());
   bool atRest;
   if (!readWeights(changes, key, layer, weights, atRest)) return false;
   const Vectors vectors = weightVectors(atRest ? Weights{} : weights[layer]);
-  Streams streams{RansReader(isCoarse_ ? symbols.first(bytes[kCoarseSymbols]) : symbols),
-                  BitReader(isCoarse_ ? bits.first(bytes[kCoarseBits]) : bits)};
+  if (isPacked_ && !readPacked(packet)) return false;
+  Streams streams = openStreams(packet);
   beyond_ = Int32x4::all(0);
   predictor_.begin(key, referenceLayer);
   const Hierarchy& hierarchy = predictor_.hierarchy();
   decodePhases(0, hierarchy.coarsePhases, key, vectors, streams);
-  if (streams.symbols.bytesTaken() != bytes[kCoarseSymbols] ||
-      streams.bits.bytesTaken() != bytes[kCoarseBits])
-    return false;
+  if (!streams.isCoarseRead()) return false;
   if (isCoarse_) {
     if (isOutside()) return false;
     predictor_.interpolate(hierarchy.coarseVertices, static_cast<std::uint32_t>(hierarchy.vertexOf.size()));
@@ -153,12 +162,30 @@ bool HierarchicalDecoder::decodeFrame(const ParsedPacket& packet, std::uint8_t r
   return true;
 }
 
+HierarchicalDecoder::Streams HierarchicalDecoder::openStreams(const ParsedPacket& packet) const {
+  if (isPacked_) return {RansReader({}), BitReader({}), 0, 0};
+  const auto& bytes = packet.header.sectionBytes;
+  const std::span<const std::byte> body = packet.body.subspan(bytes[kWeightChanges]);
+  const std::size_t coarseSymbols = bytes[kCoarseSymbols], coarseBits = bytes[kCoarseBits],
+                    symbols = coarseSymbols + bytes[kFineSymbols];
+  return {RansReader(body.first(isCoarse_ ? coarseSymbols : symbols)),
+          BitReader(isCoarse_ ? body.subspan(symbols, coarseBits) : body.subspan(symbols)), coarseSymbols,
+          coarseBits};
+}
+
+bool HierarchicalDecoder::readPacked(const ParsedPacket& packet) {
+  const auto& bytes = packet.header.sectionBytes;
+  const std::span<const std::byte> groups = packet.body.subspan(bytes[kPackedWeightChanges]);
+  return packed_.readCoarse(groups.first(bytes[kCoarseGroups])) &&
+         (isCoarse_ || packed_.readFine(groups.subspan(bytes[kCoarseGroups])));
+}
+
 void HierarchicalDecoder::decodePhases(std::size_t begin, std::size_t end, bool key, const Vectors& weights,
                                        Streams& streams) {
   for (std::size_t i = begin; i < end; ++i) {
     const Phase& phase = predictor_.hierarchy().phases[i];
     const ScaleModel model(kScaleWeights[scaleClassOf(phase.weightClass, key)]);
-    const bool quiet = streams.bits.get(1) != 0;
+    const bool quiet = !isPacked_ && streams.bits.get(1) != 0;
     for (std::uint32_t first = phase.begin; first < phase.end; first += kChunk) {
       decodeChunk(first, std::min(kChunk, phase.end - first), weights[phase.weightClass],
                   quiet ? nullptr : &model, streams);
@@ -172,15 +199,8 @@ void HierarchicalDecoder::decodeNormals(Streams& streams) {
   std::array<NormalScale, 2> scales;
   for (std::size_t vertex = 0; vertex < predicted.size(); ++vertex) {
     std::array<std::int32_t, 2> residuals;
-    for (std::size_t c = 0; c < 2; ++c) {
-      const std::uint32_t scale = scales[c].scale();
-      std::uint32_t number = streams.symbols.read<false>((2 * vertex + c) % kCoders,
-                                                         symbolTables()[distributionOf(kAlongU, scale)]);
-      if (number == kEscape) number += streams.bits.getGamma(kEscapeGammaBits);
-      if (const unsigned raw = rawBits(scale); raw > 0) number = number << raw | streams.bits.get(raw);
-      residuals[c] = codec::unzigzag(number);
-      scales[c].add(residuals[c]);
-    }
+    for (std::size_t c = 0; c < 2; ++c)
+      residuals[c] = isPacked_ ? packed_.ofNormal(c, vertex) : readOfNormal(c, vertex, scales[c], streams);
     const FacedNormal& expected = predicted[vertex];
     const auto moved = [](std::int8_t from, std::int32_t by) {
       return static_cast<std::int8_t>(static_cast<std::uint32_t>(from) + static_cast<std::uint32_t>(by));
@@ -191,19 +211,47 @@ void HierarchicalDecoder::decodeNormals(Streams& streams) {
   }
 }
 
+std::int32_t HierarchicalDecoder::readOfNormal(std::size_t component, std::size_t vertex, NormalScale& scale,
+                                               Streams& streams) {
+  const std::uint32_t s = scale.scale();
+  std::uint32_t number = streams.symbols.read<false>((2 * vertex + component) % kCoders,
+                                                     symbolTables()[distributionOf(kAlongU, s)]);
+  if (number == kEscape) number += streams.bits.getGamma(kEscapeGammaBits);
+  if (const unsigned raw = rawBits(s); raw > 0) number = number << raw | streams.bits.get(raw);
+  const std::int32_t residual = codec::unzigzag(number);
+  scale.add(residual);
+  return residual;
+}
+
 void HierarchicalDecoder::decodeChunk(std::uint32_t begin, std::uint32_t count, const WeightVectors& weights,
                                       const ScaleModel* model, Streams& streams) {
   predictor_.predict(begin, count, weights, predictions_.data(), frames_.data());
-  if (model != nullptr) {
+  bool any = model != nullptr;
+  if (isPacked_)
+    any = loadPacked(begin, count);
+  else if (any)
     readResiduals(count, *model, streams);
-    reconstruct(begin, count);
-    return;
-  }
+  if (any) return reconstruct(begin, count);
   for (std::uint32_t first = 0; first < count; first += 4) {
     const Prediction* four = &predictions_[first];
     place(begin + first, std::min(count - first, 4u), four,
           {four[0].position, four[1].position, four[2].position, four[3].position}, Int32x4::all(0));
   }
+}
+
+bool HierarchicalDecoder::loadPacked(std::uint32_t begin, std::uint32_t count) {
+  std::int32_t all = 0;
+  for (const Component component : kCodingOrder) {
+    const std::int32_t* from = packed_.residuals(component) + begin;
+    for (std::uint32_t i = 0; i < count; ++i) all |= residuals_[component][i] = from[i];
+  }
+  anyStays_ = false;
+  for (std::uint32_t i = 0; i < count; ++i) {
+    stays_[i] = packed_.stays()[begin + i] != 0;
+    anyStays_ = anyStays_ || stays_[i];
+    if (stays_[i]) residuals_[kAlongU][i] = residuals_[kAlongV][i] = 0;
+  }
+  return all != 0 || anyStays_;
 }
 
 void HierarchicalDecoder::readResiduals(std::uint32_t count, const ScaleModel& model, Streams& streams) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Codec 2: vertices to packets.
+// Codecs 2 and 3: vertices to packets.
 #include "proto/codec/hierarchical/hierarchical_encoder.h"
 
 #include <cmath>
@@ -45,7 +45,7 @@ struct HierarchicalEncoder::State {
         unit(latticeUnit(layout.maxError)),
         wanted(vertices),
         stillFrames(vertices),
-        writer(layout),
+        writer(makeFrameWriter(layout)),
         sentNormals(hasNormals ? vertices : 0) {
     if (!predictor.allocate(layout, unit.stepBits) || (hasNormals && !normalPrediction.allocate(layout)))
       std::abort();  // memory is out, as of any other allocation here
@@ -89,7 +89,7 @@ struct HierarchicalEncoder::State {
   std::vector<Node> wanted;
   std::vector<std::uint8_t> stillFrames;  // how long the same was wanted, up to kStillFrames
   std::uint32_t restTurns = 0;            // of which one comes in this frame; 0: none rests anew
-  FrameWriter writer;
+  std::unique_ptr<FrameWriter> writer;
   std::optional<FitSchedule> fitted;
   std::array<std::uint32_t, kWeightClasses> chunks{};  // of each class that were coded
   ProductSums products;                                // of the chunk that is being encoded
@@ -243,13 +243,13 @@ void HierarchicalEncoder::State::use(const Weights& chosen) {
 }
 
 void HierarchicalEncoder::State::encodePhases() {
-  writer.begin();
+  writer->begin();
   quiet = true;
   chunks.fill(0);
   const Hierarchy& hierarchy = predictor.hierarchy();
   for (std::size_t i = 0; i < hierarchy.phases.size(); ++i) {
     encodePhase(hierarchy.phases[i]);
-    if (i + 1 == hierarchy.coarsePhases) writer.endCoarse();
+    if (i + 1 == hierarchy.coarsePhases) writer->endCoarse();
   }
 }
 
@@ -285,11 +285,11 @@ bool HierarchicalEncoder::State::goesOnResting(std::uint32_t slot, const Predict
 }
 
 void HierarchicalEncoder::State::encodePhase(const Phase& phase) {
-  writer.beginPhase();
+  writer->beginPhase();
   bool any = false;
   for (std::uint32_t begin = phase.begin; begin < phase.end; begin += kChunk)
     any = encodeChunk(begin, std::min(kChunk, phase.end - begin), phase.weightClass) || any;
-  writer.endPhase(any);
+  writer->endPhase(any);
   quiet = quiet && !any;
 }
 
@@ -316,8 +316,8 @@ bool HierarchicalEncoder::State::encodeChunk(std::uint32_t begin, std::uint32_t 
     predictor.place(begin + static_cast<std::uint32_t>(first), static_cast<std::uint32_t>(four),
                     &predictions[first], positions, packed);
   }
-  scale(count, model);
-  writer.add(chunk, count);
+  if (writer->needsScales()) scale(count, model);
+  writer->add(chunk, count);
   for (std::uint32_t i = 0; fits && i < count; ++i) {
     const std::uint32_t slot = begin + i;
     fitTo(weightClass, predictor.features(slot, predictions[i]), predictions[i], wanted[slot].load(), i);
@@ -377,8 +377,8 @@ void HierarchicalEncoder::State::encodeNormals(std::span<const float> normals) {
     const Octahedral& expected = predicted[vertex].octahedral;
     sentNormals[vertex] = faceNormal(&normals[3 * vertex], predicted[vertex].top);
     const Octahedral& sent = sentNormals[vertex].octahedral;
-    writer.addNormal(static_cast<std::int8_t>(sent.u - expected.u),
-                     static_cast<std::int8_t>(sent.v - expected.v));
+    writer->addNormal(static_cast<std::int8_t>(sent.u - expected.u),
+                      static_cast<std::int8_t>(sent.v - expected.v));
   }
 }
 
@@ -399,7 +399,7 @@ HierarchicalEncoder::HierarchicalEncoder(const StreamLayout& layout, std::uint32
 HierarchicalEncoder::~HierarchicalEncoder() = default;
 
 std::size_t HierarchicalEncoder::packetBound() const {
-  return state_->writer.packetBound();
+  return state_->writer->packetBound();
 }
 
 std::size_t HierarchicalEncoder::encode(const FrameRole& role, std::span<const float> positions,
@@ -421,7 +421,7 @@ std::size_t HierarchicalEncoder::encode(const FrameRole& role, std::span<const f
   if (s.hasNormals) s.encodeNormals(normals);
   s.predictor.keep(role.layer);
   s.plan->end(s.quiet);
-  return s.writer.write(role, std::span(s.weightBytes).first(weightBytes), out);
+  return s.writer->write(role, std::span(s.weightBytes).first(weightBytes), out);
 }
 
 std::uint64_t HierarchicalEncoder::reconstructionHash() const {

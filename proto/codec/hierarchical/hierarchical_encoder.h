@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Codec 2: vertices to packets.
+// Codecs 2 and 3: vertices to packets.
 #pragma once
 
 #include <memory>

@@ -50,8 +50,8 @@ constexpr std::array kVariants{Variant{codec::kCodecHierarchical, 1, codec::Norm
                                Variant{codec::kCodecHierarchical, 2, codec::NormalMode::none},
                                Variant{codec::kCodecHierarchical, 3, codec::NormalMode::none},
                                Variant{codec::kCodecHierarchical, 1, codec::NormalMode::octahedral},
-                               Variant{codec::kCodecLatticeZstd, 1, codec::NormalMode::none},
-                               Variant{codec::kCodecLatticeZstd, 1, codec::NormalMode::octahedral}};
+                               Variant{codec::kCodecPacked, 1, codec::NormalMode::none},
+                               Variant{codec::kCodecPacked, 1, codec::NormalMode::octahedral}};
 
 }  // namespace
 

@@ -21,11 +21,9 @@ constexpr std::array kErrors{0.0001, 0.0002, 0.0005, 0.001, 0.002};
 // Ours, then the others, all at this max error.
 std::vector<CodecMeasurement> measurements(const codec::ClothLayout& cloth, double maxError) {
   std::vector<CodecMeasurement> all;
-  for (const std::uint8_t codec : {codec::kCodecHierarchical, codec::kCodecLatticeZstd})
-    all.emplace_back(
-        std::make_unique<OurCodec>(codec::StreamLayout{
-            .epoch = 1, .codec = codec, .maxError = static_cast<float>(maxError), .cloths = {cloth}}),
-        cloth, maxError);
+  all.emplace_back(std::make_unique<OurCodec>(codec::StreamLayout{
+                       .epoch = 1, .maxError = static_cast<float>(maxError), .cloths = {cloth}}),
+                   cloth, maxError);
   for (std::unique_ptr<FrameCodec>& peer : peerCodecs(cloth, maxError))
     all.emplace_back(std::move(peer), cloth, maxError);
   return all;

@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: MIT
+// Codec 3: what normals are off their prediction.
+#version 450
+#extension GL_GOOGLE_include_directive : require
+
+#define PACKED_COMPONENTS 2
+#define PACKED_WORDS kPackedNormalWords
+#include "shaders/encode/hierarchical/pack.glsl"
+
+layout(std430, binding = 3) readonly buffer NormalResiduals {
+  uint normalResiduals[];  // by vertex: of u and v, a byte each
+};
+
+uvec2 verticesOf(uint group) {
+  uint first = group * kPackedGroup;
+  return uvec2(first, min(first + kPackedGroup, push.vertexCount));
+}
+
+uint numberOf(uint vertex, uint component) {
+  return zigzag(bitfieldExtract(int(normalResiduals[vertex]), int(8 * component), 8));
+}
