@@ -8,6 +8,7 @@ readonly ARROWS='
 server/scene       |
 server/vulkan      |
 proto/codec        |
+proto/recording    | proto/codec clothstream
 server/reference   | server/scene
 server/telemetry   |
 server/simulation  | server/scene server/vulkan shaders
