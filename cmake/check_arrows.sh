@@ -23,7 +23,7 @@ server/web         | server/stream server/telemetry clothstream
 clients/core       | proto/codec
 clients/grpc       | clients/core clothstream
 clients/files      | proto/codec clothstream
-clients/cli        | clients/core clients/grpc clients/files proto/codec
+clients/cli        | clients/core clients/grpc clients/files proto/codec proto/recording clothstream
 '
 # rooms that may include these headers
 readonly OUTSIDE='

@@ -120,8 +120,8 @@ void Session::dispatch(const v1::ClientMessage& message, Clock::time_point now) 
                             message.frame_ack().tick())});
       return;
     case Body::kKeyFrameRequest:
-      if (allowed(keyFrameRate_, "key frame requests")) mailbox_->restart();
-      return;
+      if (!allowed(keyFrameRate_, "key frame requests")) return;
+      return message.key_frame_request().early() ? mailbox_->wantKeyFrame() : mailbox_->restart();
     default:
       return refuse({v1::ERROR_CODE_MALFORMED_MESSAGE, "the message has no body that this server knows"});
   }
