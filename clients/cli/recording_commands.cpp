@@ -28,10 +28,26 @@ void RecordingCommands::add(CLI::App& app, std::string& address) {
   recover_->add_option("FILE", recoverOptions_.recording, "The damaged recording, which stays as it is")
       ->required();
   recover_->add_option("OUT", recoverOptions_.out, "The whole one, which must not be there yet")->required();
+
+  export_ = app.add_subcommand("export", "Write a recording's frames as an animated glTF, or as OBJ files");
+  export_->footer(kExitCodes);
+  export_->add_option("FILE", exportOptions_.recording, "The recording")->required();
+  export_
+      ->add_option("OUT", exportOptions_.out,
+                   "OUT.glb for a glTF with a morph target a frame, or else a directory for an OBJ file a "
+                   "frame; there must be none yet")
+      ->required();
+  export_->add_option("--rate", exportOptions_.rate, "Frames a second, at most")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  export_->add_option("--from", exportOptions_.from, "Seconds of the recording to leave out")
+      ->check(CLI::NonNegativeNumber);
+  export_->add_option("--seconds", exportOptions_.seconds, "So many of the recording, at most")
+      ->check(CLI::PositiveNumber);
 }
 
 bool RecordingCommands::parsed() const {
-  return record_->parsed() || info_->parsed() || recover_->parsed();
+  return record_->parsed() || info_->parsed() || recover_->parsed() || export_->parsed();
 }
 
 ExitCode RecordingCommands::run(const std::string& address, const std::string& program) {
@@ -39,6 +55,7 @@ ExitCode RecordingCommands::run(const std::string& address, const std::string& p
   std::signal(SIGXFSZ, SIG_IGN);
   if (info_->parsed()) return info(infoOptions_);
   if (recover_->parsed()) return recover(recoverOptions_);
+  if (export_->parsed()) return exportFrames(exportOptions_);
   recordOptions_.address = address;
   recordOptions_.program = program;
   return record(recordOptions_);

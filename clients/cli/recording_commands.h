@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: MIT
-// `clothstream record`, `info` and `recover`.
+// `clothstream record`, `info`, `recover` and `export`.
 #pragma once
 
 #include <string>
 
 #include <CLI/CLI.hpp>
 
+#include "clients/cli/export.h"
 #include "clients/cli/info.h"
 #include "clients/cli/record.h"
 #include "clients/cli/recover.h"
@@ -24,7 +25,8 @@ class RecordingCommands {
   RecordOptions recordOptions_;
   InfoOptions infoOptions_;
   RecoverOptions recoverOptions_;
-  CLI::App *record_ = nullptr, *info_ = nullptr, *recover_ = nullptr;
+  ExportOptions exportOptions_;
+  CLI::App *record_ = nullptr, *info_ = nullptr, *recover_ = nullptr, *export_ = nullptr;
 };
 
 }  // namespace clothstream::cli

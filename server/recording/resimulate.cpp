@@ -194,18 +194,19 @@ tl::expected<Resimulation, std::string> resimulate(const ResimulateOptions& opti
 }
 
 std::string toText(const Resimulation& result) {
+  const std::string ticks =
+      fmt::format("{} ticks{}", result.ticks, result.interrupted ? " before it was interrupted" : "");
   std::string text = fmt::format("scene     {}\nrecorded  {}\nagain     {}\n", result.scene,
                                  result.recordedOn, result.device);
   for (const Difference& difference : result.differences)
     text += fmt::format("tick {}: nodes are {:.3g} m from where they were at most, {:.3g} m in the mean\n",
                         difference.tick, difference.largest, difference.mean);
-  if (!result.firstDifferent) return text + fmt::format("{} ticks, all the same to the bit\n", result.ticks);
+  if (!result.firstDifferent) return text + fmt::format("{}, all the same to the bit\n", ticks);
   if (result.differences.empty())
     text += "no state was recorded after the first difference to measure it by\n";
   return text +
-         fmt::format(
-             "{} of {} ticks are different, first tick {}: its state's hash is {:016x}, and was {:016x}\n",
-             result.different, result.ticks, *result.firstDifferent, result.hash, result.recordedHash);
+         fmt::format("{} of {} are different, first tick {}: its state's hash is {:016x}, and was {:016x}\n",
+                     result.different, ticks, *result.firstDifferent, result.hash, result.recordedHash);
 }
 
 }  // namespace clothstream::recording

@@ -37,6 +37,8 @@ v1::StreamDescription describe() {
   cloth.set_vertex_count(42);
   cloth.set_rows(6);
   cloth.set_columns(7);
+  const std::vector<float> rest = codec::sampleMotion(kLayout, 0, 0).positions;
+  cloth.set_rest_positions(rest.data(), rest.size() * sizeof(float));
   return description;
 }
 
