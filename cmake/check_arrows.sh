@@ -8,6 +8,7 @@ readonly ARROWS='
 server/scene       |
 server/vulkan      |
 proto/codec        |
+proto/recording    | proto/codec clothstream
 server/reference   | server/scene
 server/telemetry   |
 server/simulation  | server/scene server/vulkan shaders
@@ -15,13 +16,14 @@ server/meshes      | server/scene
 server/messages    | server/scene server/meshes clothstream
 server/encode      | server/scene server/simulation server/vulkan proto/codec shaders
 server/stream      | server/scene server/vulkan server/simulation server/encode server/messages server/telemetry proto/codec clothstream
+server/recording   | server/scene server/vulkan server/simulation server/messages server/stream proto/recording clothstream
 server/step        | server/scene server/vulkan server/simulation server/messages
 server/rpc         | server/stream server/telemetry clothstream
 server/web         | server/stream server/telemetry clothstream
 clients/core       | proto/codec
 clients/grpc       | clients/core clothstream
 clients/files      | proto/codec clothstream
-clients/cli        | clients/core clients/grpc clients/files proto/codec
+clients/cli        | clients/core clients/grpc clients/files proto/codec proto/recording clothstream
 '
 # rooms that may include these headers
 readonly OUTSIDE='

@@ -1,7 +1,7 @@
 # clothstream_protos: the messages as a library (C++ in <build>/proto). clothstream_protos_grpc: the service too.
 find_package(Protobuf REQUIRED)
 set(protoOut ${PROJECT_BINARY_DIR}/proto_generated)
-set(protoNames scene session)
+set(protoNames recording scene session)
 set(messageSources)
 foreach(name IN LISTS protoNames)
   set(source ${PROJECT_SOURCE_DIR}/proto/clothstream/v1/${name}.proto)

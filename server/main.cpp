@@ -6,6 +6,8 @@
 #include <cstdio>
 #include <exception>
 #include <filesystem>
+#include <functional>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <variant>
@@ -17,6 +19,8 @@
 #include "server/messages/scene_file.h"
 #include "server/messages/scene_message.h"
 #include "server/program_options.h"
+#include "server/recording/recordings.h"
+#include "server/recording/resimulate.h"
 #include "server/rpc/rpc_door.h"
 #include "server/scene/material.h"
 #include "server/simulation/software_threads.h"
@@ -36,6 +40,7 @@ class Signals {
     for (const int signal : {SIGINT, SIGTERM, SIGUSR1}) sigaddset(&set_, signal);
     pthread_sigmask(SIG_BLOCK, &set_, nullptr);
     std::signal(SIGPIPE, SIG_IGN);  // a peer that went away is an error of its socket
+    std::signal(SIGXFSZ, SIG_IGN);  // a file that may grow no more is an error like a full disk
   }
 
   // The next of them; 0 when the time is over.
@@ -136,7 +141,8 @@ std::string reachable(const std::string& host, std::uint16_t port) {
                                              : fmt::format("[{}]:{}", host, port);
 }
 
-void waitForStop(const Signals& signals, const ProgramOptions& options, const stream::SceneServer& server) {
+void waitForStop(const Signals& signals, const ProgramOptions& options,
+                 const std::function<std::string()>& report) {
   using Clock = std::chrono::steady_clock;
   constexpr std::chrono::hours kLong{24 * 365};
   const Clock::time_point end =
@@ -146,7 +152,7 @@ void waitForStop(const Signals& signals, const ProgramOptions& options, const st
     const Clock::duration left = end - Clock::now();
     const int signal = left > Clock::duration::zero() ? signals.wait(left) : 0;
     if (signal == SIGUSR1) {
-      fmt::print("{}", server.report());
+      fmt::print("{}", report());
       std::fflush(stdout);
     } else if (signal != 0 || Clock::now() >= end) {
       return;
@@ -161,6 +167,11 @@ void serve(const ProgramOptions& options, const Signals& signals) {
     sceneList +=
         fmt::format("{}{} ({} vertices)", sceneList.empty() ? "" : ", ", scene.name, scene.nodeCount());
 
+  // Outlives the scenes: it waits for what they told last.
+  std::optional<recording::Recordings> recordings;
+  if (!options.recordDirectory.empty())
+    recordings.emplace(
+        recording::RecorderOptions{.directory = options.recordDirectory, .serverName = kServerName});
   const auto first = std::ranges::find(scenes, options.scene, &scene::Scene::name);
   const std::uint32_t nodes = first == scenes.end() ? 0 : first->nodeCount();
   stream::SceneServer server(std::move(scenes), {.device = deviceOptions(options, nodes),
@@ -168,7 +179,11 @@ void serve(const ProgramOptions& options, const Signals& signals) {
                                                  .serverName = kServerName,
                                                  .runAlways = options.alwaysRun,
                                                  .reportRate = options.reportRate,
-                                                 .maxCreatedScenes = options.maxCreatedScenes});
+                                                 .maxCreatedScenes = options.maxCreatedScenes,
+                                                 .journals = [&](const scene::Scene&) {
+                                                   return recordings ? recordings->add() : nullptr;
+                                                 }});
+  const auto report = [&] { return server.report() + (recordings ? recordings->report() : ""); };
   {
     const std::filesystem::path page = options.page.empty() ? pageBesideProgram() : options.page;
     if (page.empty())
@@ -182,11 +197,46 @@ void serve(const ProgramOptions& options, const Signals& signals) {
     fmt::print("device  {}\nscenes  {}\npage    http://{}/\ngRPC    {}\n", describe(server.deviceInfo()),
                sceneList, reachable(options.host, web.port()), reachable(options.host, rpc.port()));
     std::fflush(stdout);
-    waitForStop(signals, options, server);
+    waitForStop(signals, options, report);
     spdlog::info("stopping");
     server.stop();
   }
-  fmt::print("{}", server.report());
+  fmt::print("{}", report());
+}
+
+constexpr int kInterrupted = 130;  // as shells have it
+
+bool isInterrupted(const Signals& signals) {
+  const int signal = signals.wait(std::chrono::nanoseconds(0));
+  return signal == SIGINT || signal == SIGTERM;
+}
+
+// A line on standard error once a second.
+class Progress {
+ public:
+  void show(double part) {
+    const Clock::time_point now = Clock::now();
+    if (now < next_) return;
+    next_ = now + std::chrono::seconds(1);
+    fmt::print(stderr, "{:.0f} %\n", 100 * part);
+  }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  Clock::time_point next_ = Clock::now() + std::chrono::seconds(1);
+};
+
+int runAgain(const ProgramOptions& options, const Signals& signals) {
+  Progress progress;
+  const auto result =
+      recording::resimulate({.path = options.resimulate,
+                             .device = [&](std::uint32_t nodes) { return deviceOptions(options, nodes); },
+                             .interrupted = [&] { return isInterrupted(signals); },
+                             .progress = [&](double part) { progress.show(part); }});
+  if (!result) throw std::runtime_error(result.error());
+  fmt::print("{}", recording::toText(*result));
+  if (result->interrupted) return kInterrupted;
+  return result->firstDifferent ? 1 : 0;
 }
 
 int runSteps(const ProgramOptions& options, const Signals& signals) {
@@ -194,12 +244,7 @@ int runSteps(const ProgramOptions& options, const Signals& signals) {
   vulkan::Device device(deviceOptions(options, scene.nodeCount()));
   step::StepOptions stepOptions = *options.step;
   stepOptions.serverName = kServerName;
-  const auto interrupted = [&] {
-    const int signal = signals.wait(std::chrono::nanoseconds(0));
-    return signal == SIGINT || signal == SIGTERM;
-  };
-  constexpr int kInterrupted = 130;  // as shells have it
-  switch (step::run(device, scene, stepOptions, interrupted)) {
+  switch (step::run(device, scene, stepOptions, [&] { return isInterrupted(signals); })) {
     case step::Outcome::complete:
       return 0;
     case step::Outcome::interrupted:
@@ -222,6 +267,7 @@ int main(int argc, char** argv) {
     const Signals signals;
     telemetry::setUpLog(options.logLevel);
     if (options.step) return runSteps(options, signals);
+    if (!options.resimulate.empty()) return runAgain(options, signals);
     if (!options.printScene.empty())
       fmt::print("{}\n", messages::toJson(loaded(messages::loadScene(options.printScene))));
     else if (options.listDevices)

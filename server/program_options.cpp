@@ -108,6 +108,10 @@ std::variant<ProgramOptions, int> parseOptions(int argc, const char* const* argv
       ->capture_default_str()
       ->group(scenes);
 
+  app.add_option("--record", options.recordDirectory,
+                 "Record every scene while it runs, each to a file of its own in this directory")
+      ->type_name("DIR")
+      ->group(scenes);
   app.add_option("--max-created-scenes", options.maxCreatedScenes,
                  "Scenes that clients may create beside these; 0: none")
       ->check(CLI::Range(0, 1000))
@@ -146,6 +150,14 @@ std::variant<ProgramOptions, int> parseOptions(int argc, const char* const* argv
   CLI::App& stepCommand =
       *app.add_subcommand("step", "Run a scene without clock or network, and write its states to a file");
   addStepOptions(stepCommand, options, stepOptions);
+
+  CLI::App& resimulateCommand = *app.add_subcommand(
+      "resimulate", "Simulate a recording's ticks once more, and compare each state with what it was");
+  resimulateCommand.add_option("FILE", options.resimulate, "What --record wrote")->required();
+  resimulateCommand.footer(
+      "Ends with 0 if every state is the same to the bit, 1 for an error or a difference, 130 if "
+      "interrupted.");
+  addDeviceOptions(resimulateCommand, options);
 
   app.add_option("--log-level", options.logLevel, "trace, debug, info, warning, error or off")
       ->capture_default_str();

@@ -27,6 +27,8 @@ struct ProgramOptions {
   double reportRate = 4;
   std::uint32_t maxCreatedScenes = 16;
   std::optional<step::StepOptions> step;  // instead of serving
+  std::string resimulate;                 // a recording, instead of serving; empty: none
+  std::filesystem::path recordDirectory;  // empty: nothing is recorded
 
   std::string host = "127.0.0.1";
   std::uint16_t port = 8080, grpcPort = 50051;

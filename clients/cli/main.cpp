@@ -11,6 +11,7 @@
 #include "clients/cli/join.h"
 #include "clients/cli/list.h"
 #include "clients/cli/motion_commands.h"
+#include "clients/cli/recording_commands.h"
 #include "clients/cli/scene.h"
 #include "clients/cli/set.h"
 #include "clients/cli/set_options.h"
@@ -49,7 +50,7 @@ std::string addressOf(const std::string& text) {
 }
 
 int run(int argc, char** argv) {
-  CLI::App app("Follows the cloth that a clothstream-server simulates; encodes motions in files.",
+  CLI::App app("Follows and records the cloth that a clothstream-server simulates; encodes motions in files.",
                "clothstream");
   app.footer(kExitCodes);
   app.require_subcommand(1);
@@ -99,6 +100,9 @@ int run(int argc, char** argv) {
   MotionCommands motionCommands;
   motionCommands.add(app);
 
+  RecordingCommands recordingCommands;
+  recordingCommands.add(app, address);
+
   try {
     app.parse(argc, argv);
     sceneCommands.check();
@@ -113,6 +117,7 @@ int run(int argc, char** argv) {
   }
   blockEndingSignals();
   if (motionCommands.parsed()) return motionCommands.run();
+  if (recordingCommands.parsed()) return recordingCommands.run(joinOptions.address, CLOTHSTREAM_VERSION);
   if (sceneCommands.parsed()) return sceneCommands.run(joinOptions.address);
   if (setCommand.parsed()) return set(setOptions);
   return listCommand.parsed() ? list(listOptions) : join(joinOptions);

@@ -148,10 +148,14 @@ codec::DecodeResult Client::decode(std::span<const std::byte> packet) {
   return result;
 }
 
-void Client::requestKeyFrame(std::uint64_t nowUs) {
+void Client::requestEarlyKeyFrame(std::uint64_t nowUs) {
+  if (state_ == CS_STATE_JOINED) requestKeyFrame(nowUs, true);
+}
+
+void Client::requestKeyFrame(std::uint64_t nowUs, bool early) {
   if (!keyFrameRequest_.wanted(nowUs)) return;
   std::string request;
-  writeKeyFrameRequest(request, description_.layout.epoch);
+  writeKeyFrameRequest(request, description_.layout.epoch, early);
   send(std::move(request));
 }
 

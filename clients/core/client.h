@@ -38,6 +38,7 @@ class Client {
   void change(const ParameterChange& change);
   void change(const ColliderChange& change);
   void listScenes();
+  void requestEarlyKeyFrame(std::uint64_t nowUs);
 
   cs_state state() const { return state_; }
   const std::string& errorText() const { return errorText_; }
@@ -72,7 +73,7 @@ class Client {
   std::uint32_t frameReceived(Bytes body, std::uint64_t nowUs);
   std::uint32_t packetReceived(std::uint64_t nowUs);
   codec::DecodeResult decode(std::span<const std::byte> packet);
-  void requestKeyFrame(std::uint64_t nowUs);
+  void requestKeyFrame(std::uint64_t nowUs, bool early = false);
   std::uint32_t pongReceived(Bytes body, std::uint64_t nowUs);
   std::uint32_t eventsReceived(Bytes body);
   std::uint32_t noticeReceived(Bytes body);

@@ -209,8 +209,11 @@ void writeFrameAck(std::string& out, std::uint64_t tick) {
   writeMessage(out, 0, kFrameAck, [&](Writer& ack) { ack.add_uint64(1, tick); });
 }
 
-void writeKeyFrameRequest(std::string& out, std::uint32_t epoch) {
-  writeMessage(out, 0, kKeyFrameRequest, [&](Writer& request) { request.add_uint32(1, epoch); });
+void writeKeyFrameRequest(std::string& out, std::uint32_t epoch, bool early) {
+  writeMessage(out, 0, kKeyFrameRequest, [&](Writer& request) {
+    request.add_uint32(1, epoch);
+    if (early) request.add_bool(2, true);
+  });
 }
 
 void writeListScenes(std::string& out, std::uint64_t requestId) {

@@ -40,7 +40,8 @@ void writeParameterChange(std::string& out, std::uint64_t requestId, const Param
 void writeColliderChange(std::string& out, std::uint64_t requestId, const ColliderChange& change);
 void writePing(std::string& out, std::uint64_t requestId, std::uint64_t clientTimeUs);
 void writeFrameAck(std::string& out, std::uint64_t tick);
-void writeKeyFrameRequest(std::string& out, std::uint32_t epoch);
+// `early`: what comes until then can be decoded.
+void writeKeyFrameRequest(std::string& out, std::uint32_t epoch, bool early);
 void writeListScenes(std::string& out, std::uint64_t requestId);
 
 }  // namespace clothstream::client

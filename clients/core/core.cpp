@@ -512,6 +512,10 @@ void cs_set_collider(cs_client* client, const char* collider, const float* posit
   client->client.change(ColliderChange{collider, position ? &*position : nullptr, radius});
 }
 
+void cs_request_key_frame(cs_client* client, uint64_t now_us) {
+  client->client.requestEarlyKeyFrame(now_us);
+}
+
 void cs_list_scenes(cs_client* client) {
   client->client.listScenes();
 }

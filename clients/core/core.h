@@ -304,6 +304,10 @@ int cs_change_cloth(cs_client* client, const char* cloth, const cs_cloth_setting
 void cs_set_material(cs_client* client, const char* cloth, const char* material);
 void cs_set_collider(cs_client* client, const char* collider, const float* position3, const float* radius);
 
+/* A key frame soon: who writes the stream down begins from it later. What comes until then is decoded as
+ * ever. */
+void cs_request_key_frame(cs_client* client, uint64_t now_us);
+
 /* Asks for the scenes; after CS_EVENT_SCENES cs_scene gives them. */
 void cs_list_scenes(cs_client* client);
 uint32_t cs_scene_count(const cs_client* client);

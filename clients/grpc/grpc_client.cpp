@@ -167,6 +167,7 @@ class GrpcClient::Stream {
     lastHeard_ = SteadyClock::now();
     grpc::Slice bytes;
     if (incoming_.DumpToSingleSlice(&bytes).ok()) {
+      if (options_.onMessage) options_.onMessage(std::as_bytes(std::span(bytes.begin(), bytes.size())));
       const std::uint32_t events = cs_receive(core_.get(), bytes.begin(), bytes.size(), GrpcClient::nowUs());
       if (events != 0) announce(events);
     }

@@ -3,10 +3,12 @@
 #pragma once
 
 #include <chrono>
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 
 #include <tl/expected.hpp>
@@ -23,6 +25,8 @@ struct GrpcClientOptions {
   std::chrono::milliseconds joinTimeout{10'000};
   // Asked ten times a second while joining: true gives up. May be empty.
   std::function<bool()> cancelled;
+  // Every message as it comes, before the cs_client gets it, on the thread that owns that. May be empty.
+  std::function<void(std::span<const std::byte>)> onMessage;
   // The server answers pings twice a second; when it has said nothing for this long, the stream is lost.
   std::chrono::milliseconds silenceTimeout{10'000};
 };

@@ -43,6 +43,7 @@ std::size_t Audience::size() const {
 }
 
 void Audience::publish(const PublishedFrame& frame) {
+  if (journal_) journal_->sent(frame.message);
   {
     const std::lock_guard lock(mutex_);
     receivers_.assign(members_.begin(), members_.end());
@@ -52,6 +53,7 @@ void Audience::publish(const PublishedFrame& frame) {
 }
 
 void Audience::announce(const SharedBytes& message) {
+  if (journal_) journal_->sent(message);
   std::vector<std::shared_ptr<Mailbox>> receivers;
   {
     const std::lock_guard lock(mutex_);

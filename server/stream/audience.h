@@ -7,8 +7,10 @@
 #include <cstdint>
 #include <memory>
 #include <mutex>
+#include <utility>
 #include <vector>
 
+#include "server/stream/journal.h"
 #include "server/stream/mailbox.h"
 
 namespace clothstream::stream {
@@ -16,6 +18,9 @@ namespace clothstream::stream {
 // Thread-safe; publish() belongs to one thread.
 class Audience {
  public:
+  // Where there is a journal, it is sent what everybody is.
+  explicit Audience(std::shared_ptr<Journal> journal = nullptr) : journal_(std::move(journal)) {}
+
   enum class Joining : std::uint8_t { joined, full, closed };
   // Full where there are `limit` members already.
   [[nodiscard]] Joining join(std::shared_ptr<Mailbox> mailbox, std::size_t limit);
@@ -33,6 +38,7 @@ class Audience {
   bool wantsKeyFrame() const;
 
  private:
+  const std::shared_ptr<Journal> journal_;
   mutable std::mutex mutex_;
   std::vector<std::shared_ptr<Mailbox>> members_;
   bool closed_ = false;

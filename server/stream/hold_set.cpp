@@ -95,6 +95,10 @@ void HoldSet::addEvents(std::span<const simulation::GripStatus> grips,
   }
 }
 
+bool HoldSet::holds() const {
+  return std::ranges::find(holders_, Holder::Phase::holds, &Holder::phase) != holders_.end();
+}
+
 void HoldSet::takeAnew() {
   for (Holder& holder : holders_)
     if (holder.phase == Holder::Phase::holds) {

@@ -36,6 +36,9 @@ class HoldSet {
   void addEvents(std::span<const simulation::GripStatus> grips,
                  google::protobuf::RepeatedPtrField<v1::GrabEvent>& events);
 
+  // Whether some grip holds cloth.
+  bool holds() const;
+
   // The device forgot what was held: every grip takes hold anew.
   void takeAnew();
 

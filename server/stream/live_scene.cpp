@@ -44,8 +44,12 @@ v1::ParameterChange allParameters(const scene::Scene& scene) {
 
 }  // namespace
 
-LiveScene::LiveScene(scene::Scene definition, bool wasCreated)
-    : created(wasCreated), start_(std::move(definition)), definition_(start_) {}
+LiveScene::LiveScene(scene::Scene definition, bool wasCreated, std::shared_ptr<Journal> kept)
+    : created(wasCreated),
+      journal(std::move(kept)),
+      audience(journal),
+      start_(std::move(definition)),
+      definition_(start_) {}
 
 scene::Scene LiveScene::definition() const {
   const std::lock_guard lock(mutex_);

@@ -13,6 +13,7 @@
 #include "server/scene/scene.h"
 #include "server/stream/audience.h"
 #include "server/stream/inbox.h"
+#include "server/stream/journal.h"
 #include "server/telemetry/metrics.h"
 
 namespace clothstream::stream {
@@ -20,8 +21,10 @@ namespace clothstream::stream {
 // Thread-safe.
 class LiveScene {
  public:
-  // Must be valid. `created`: while the server runs, by a peer.
-  explicit LiveScene(scene::Scene definition, bool created = false);
+  // Must be valid. `created`: while the server runs, by a peer. `journal`: of all that happens in it; may be
+  // null.
+  explicit LiveScene(scene::Scene definition, bool created = false,
+                     std::shared_ptr<Journal> journal = nullptr);
 
   const std::string& name() const { return start_.name; }
   // As it was at first.
@@ -47,8 +50,9 @@ class LiveScene {
   static constexpr std::uint32_t kEpoch = 1;
 
   const bool created;
-  std::atomic<bool> paused{false};       // its clock is stopped
-  std::atomic<bool> resetWanted{false};  // taken at the next tick
+  const std::shared_ptr<Journal> journal;  // null: none is kept
+  std::atomic<bool> paused{false};         // its clock is stopped
+  std::atomic<bool> resetWanted{false};    // taken at the next tick
 
   Inbox inbox;
   Audience audience;

@@ -64,7 +64,7 @@ void Mailbox::deliver(const PublishedFrame& frame) {
     if (frame.key) {
       drop(held_.size());
       held_.clear();
-      needsKey_ = false;
+      needsKey_ = wantsKey_ = false;
     } else if (needsKey_ || frame.referenceTick != chainTick_) {
       drop(1);
       needsKey_ = true;
@@ -85,7 +85,8 @@ void Mailbox::deliver(const PublishedFrame& frame) {
 
 bool Mailbox::wantsKeyFrame() const {
   const std::lock_guard lock(mutex_);
-  return streaming_ && !closed_ && needsKey_ && doorWaits_ && hasRoom();
+  if (!streaming_ || closed_) return false;
+  return wantsKey_ || (needsKey_ && doorWaits_ && hasRoom());
 }
 
 bool Mailbox::acknowledge(std::uint64_t tick, Clock::time_point now) {
@@ -114,6 +115,11 @@ void Mailbox::restart() {
   held_.clear();
   sent_.clear();
   needsKey_ = true;
+}
+
+void Mailbox::wantKeyFrame() {
+  const std::lock_guard lock(mutex_);
+  wantsKey_ = true;
 }
 
 void Mailbox::close(SharedBytes last) {

@@ -69,6 +69,8 @@ class Mailbox {
   [[nodiscard]] bool acknowledge(std::uint64_t tick, Clock::time_point now);
   // The peer cannot go on decoding: it starts anew with a key frame.
   void restart();
+  // It goes on, and wants a key frame soon.
+  void wantKeyFrame();
 
   // No frames, no announcements any more; what was not sent is dropped, then `last` is the last message (if
   // there is one).
@@ -110,6 +112,7 @@ class Mailbox {
   std::uint32_t streamRate_ = 0;
   bool streaming_ = false;  // the description is out
   bool needsKey_ = true;
+  bool wantsKey_ = false;        // and does without it until it comes
   std::uint64_t chainTick_ = 0;  // the newest frame held, or else sent
   std::deque<PublishedFrame> held_;
   std::deque<Sent> sent_;  // and not acknowledged

@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include "server/messages/description.h"
 #include "server/scene/wind.h"
 #include "server/stream/report_message.h"
 
@@ -68,9 +69,14 @@ SceneHost::SceneHost(vulkan::Device& device, LiveScene& scene, FramePacker& pack
       gentleUntil_(scene_.cloths.size(), 0),
       onDevice_(std::make_unique<OnDevice>(device, scene_)) {
   newestState_ = onDevice_->start;
+  if (live_.journal)
+    live_.journal->begin(device.info(), scene_,
+                         messages::toDescription(scene_, LiveScene::kEpoch, live_.codec(), 0), newestState_);
 }
 
-SceneHost::~SceneHost() = default;
+SceneHost::~SceneHost() {
+  if (live_.journal) live_.journal->end();
+}
 
 void SceneHost::begin(Clock::time_point now) {
   tickStart_ = now;
@@ -86,7 +92,8 @@ void SceneHost::begin(Clock::time_point now) {
   OnDevice& on = *onDevice_;
   on.recorder.begin();
   recordRecovery();
-  if (sinceHealthy_ > 0 && every(kCheckpointSeconds)) on.simulation.recordCheckpoint(on.recorder);
+  keepsState_ = sinceHealthy_ > 0 && every(kCheckpointSeconds);
+  if (keepsState_) on.simulation.recordCheckpoint(on.recorder);
   on.simulation.recordTick(on.recorder, tickInputs_);
   hasFrame_ = (tick_ + 1) % ticksAFrame_ == 0;
   if (hasFrame_) recordFrame(now);
@@ -130,7 +137,7 @@ bool SceneHost::apply(const scene::ParameterChange& change, std::string& problem
   changeGently(changed);
   if (!change.cloths.empty()) {
     try {
-      onDevice_->simulation.setCloths(changed.cloths);
+      setCloths(changed.cloths);
     } catch (const vulkan::DeviceLost&) {
       throw;
     } catch (const std::runtime_error& noRoom) {
@@ -159,7 +166,12 @@ void SceneHost::endGentleness() {
     scene_.cloths[i].solver.takenBack.reset();
     ended = true;
   }
-  if (ended) onDevice_->simulation.setCloths(scene_.cloths);
+  if (ended) setCloths(scene_.cloths);
+}
+
+void SceneHost::setCloths(const std::vector<scene::Cloth>& cloths) {
+  onDevice_->simulation.setCloths(cloths);
+  clothsChanged_ = true;
 }
 
 void SceneHost::takeBack(const std::string& reason) {
@@ -174,11 +186,17 @@ void SceneHost::takeBack(const std::string& reason) {
 
 void SceneHost::recordRecovery() {
   OnDevice& on = *onDevice_;
+  recovered_ = recovery_;
   if (recovery_ == Recovery::none) return;
   if (recovery_ == Recovery::rollback) on.simulation.recordRollback(on.recorder);
   if (recovery_ == Recovery::reset) on.simulation.recordRestoreState(on.recorder, on.start);
   on.encoder.forgetHistory();
   recovery_ = Recovery::none;
+}
+
+bool SceneHost::wantsKeyFrame(Clock::time_point now) const {
+  if (live_.journal && live_.journal->active() && sinceKeyFrame_ + 1 >= kFramesAKeyFrame) return true;
+  return now - lastKeyFrame_ >= kKeyFrameInterval && live_.audience.wantsKeyFrame();
 }
 
 void SceneHost::recordFrame(Clock::time_point now) {
@@ -194,9 +212,12 @@ void SceneHost::recordFrame(Clock::time_point now) {
     on.simulation.recordReport(on.recorder, tickInputs_);
     nextReport_ = tick_ + 1 + ticksAReport_;
   }
-  const bool key = now - lastKeyFrame_ >= kKeyFrameInterval && live_.audience.wantsKeyFrame();
-  frame_.recorded = on.encoder.record(on.recorder, tick_ + 1, key);
-  if (frame_.recorded.kind == codec::PacketKind::key) lastKeyFrame_ = now;
+  frame_.recorded = on.encoder.record(on.recorder, tick_ + 1, wantsKeyFrame(now));
+  ++sinceKeyFrame_;
+  if (frame_.recorded.kind == codec::PacketKind::key) {
+    lastKeyFrame_ = now;
+    sinceKeyFrame_ = 0;
+  }
   frame_.scene = &live_;
   frame_.encoder = &on.encoder;
   frame_.tickStart = tickStart_;
@@ -211,10 +232,21 @@ void SceneHost::finish() {
   const Clock::time_point done = Clock::now();
   status_ = on.simulation.status();
   ++tick_;
+  if (live_.journal)
+    live_.journal->ticked({.tick = tick_,
+                           .status = status_,
+                           .recovery = recovered_,
+                           .keepsState = keepsState_,
+                           .clothsChanged = clothsChanged_,
+                           .scene = scene_,
+                           .inputs = tickInputs_,
+                           .colliders = colliders_});
+  clothsChanged_ = false;
   if (status_.healthy) {
     ++sinceHealthy_;
     live_.tick = tick_;
     if (savesState_) newestState_ = on.simulation.collectState(tick_);
+    if (savesState_ && live_.journal) live_.journal->saved(newestState_, holds_.holds());
   }
   telemetry::SceneMetrics& metrics = live_.metrics;
   double total = 0, report = 0;
@@ -266,7 +298,7 @@ void SceneHost::recover() {
     message.mutable_parameter_changed()->set_tick(tick_ + 1);
     scene_.environment = live_.start().environment;
     scene_.cloths = live_.start().cloths;
-    onDevice_->simulation.setCloths(scene_.cloths);
+    setCloths(scene_.cloths);
     live_.audience.announce(serialise(message));
   } else {
     recovery_ = Recovery::rollback;
@@ -293,6 +325,7 @@ void SceneHost::rebuild(vulkan::Device& device) {
   holds_.takeAnew();
   recovery_ = Recovery::none;
   sinceHealthy_ = 0;
+  if (live_.journal) live_.journal->restored(tick_, newestState_);
   live_.audience.announce(notice(v1::NOTICE_KIND_DEVICE_REBUILT,
                                  fmt::format("the device was lost; the scene goes on from {:.1f} s before",
                                              static_cast<double>(tick_ - newestState_.tick) / rate_),

@@ -32,6 +32,9 @@ class SceneHost {
   // At most one key frame in this time, whoever asks: one serves all who wait.
   static constexpr std::chrono::milliseconds kKeyFrameInterval{100};
 
+  // With a journal, a key frame comes after at most so many that are not.
+  static constexpr std::uint32_t kFramesAKeyFrame = 24;
+
   // Of frames with a report, a second.
   static constexpr double kReportRate = 4;
 
@@ -70,8 +73,6 @@ class SceneHost {
     vulkan::Recorder recorder;
     simulation::StateSnapshot start;
   };
-  enum class Recovery : std::uint8_t { none, rollback, reset };
-
   // The cloths go back to where they start.
   void reset();
   void applyInputs();
@@ -82,7 +83,9 @@ class SceneHost {
   // Cloths that just got another solver are pulled to their springs' length over kGentleSeconds, not at once.
   void changeGently(scene::Scene& changed);
   void endGentleness();
+  void setCloths(const std::vector<scene::Cloth>& cloths);
   void recordRecovery();
+  bool wantsKeyFrame(Clock::time_point now) const;
   void recordFrame(Clock::time_point now);
   void announceEvents();
   void recover();
@@ -106,7 +109,10 @@ class SceneHost {
 
   std::uint64_t tick_ = 0;
   simulation::TickStatus status_;
-  Recovery recovery_ = Recovery::none;
+  Recovery recovery_ = Recovery::none;         // before the next tick
+  Recovery recovered_ = Recovery::none;        // before the tick in hand
+  bool keepsState_ = false;                    // the tick in hand, on the device
+  bool clothsChanged_ = false;                 // since the newest complete tick
   std::optional<std::uint64_t> lastRecovery_;  // tick
   std::uint64_t sinceHealthy_ = 0;             // healthy ticks since the start or the last recovery
   TokenBucket recoveryNotices_{1, 5};
@@ -115,6 +121,7 @@ class SceneHost {
   bool savesState_ = false;  // the tick in hand
 
   Clock::time_point tickStart_{}, lastKeyFrame_{};
+  std::uint32_t sinceKeyFrame_ = 0;  // frames
   vulkan::TimelineValue submitted_ = 0;
   bool hasFrame_ = false;         // the tick in hand
   std::uint64_t nextReport_ = 0;  // tick

@@ -96,7 +96,9 @@ tl::expected<v1::CreateSceneResponse, v1::Error> SceneMaker::make(const v1::Crea
     return refused(v1::ERROR_CODE_INVALID_ARGUMENT,
                    fmt::format("createScene: there is a scene '{}' already; give this one another name",
                                definition->name));
-  const auto scene = std::make_shared<LiveScene>(std::move(*definition), true);
+  std::shared_ptr<Journal> journal =
+      server_.options.journals ? server_.options.journals(*definition) : nullptr;
+  const auto scene = std::make_shared<LiveScene>(std::move(*definition), true, std::move(journal));
   try {
     server_.device.add(scene).get();
   } catch (const std::exception& failure) {

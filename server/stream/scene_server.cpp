@@ -19,11 +19,14 @@
 namespace clothstream::stream {
 namespace {
 
-std::vector<std::shared_ptr<LiveScene>> liveScenes(std::vector<scene::Scene> definitions) {
+std::vector<std::shared_ptr<LiveScene>> liveScenes(std::vector<scene::Scene> definitions,
+                                                   const ServerOptions& options) {
   std::vector<std::shared_ptr<LiveScene>> scenes;
   scenes.reserve(definitions.size());
-  for (scene::Scene& definition : definitions)
-    scenes.push_back(std::make_shared<LiveScene>(std::move(definition)));
+  for (scene::Scene& definition : definitions) {
+    std::shared_ptr<Journal> journal = options.journals ? options.journals(definition) : nullptr;
+    scenes.push_back(std::make_shared<LiveScene>(std::move(definition), false, std::move(journal)));
+  }
   return scenes;
 }
 
@@ -45,7 +48,7 @@ v1::SceneSummary summaryOf(const LiveScene& scene) {
 SceneServer::State::State(std::vector<scene::Scene> definitions, ServerOptions options_)
     : options(std::move(options_)),
       uploads(options.maxUploadBytes),
-      scenes(liveScenes(std::move(definitions))),
+      scenes(liveScenes(std::move(definitions), options)),
       packer((scenes.size() + options.maxCreatedScenes) * encode::FrameEncoder::kSlots,
              [this] {
                for (const auto& session : sessionsNow()) session->checkSilence(Clock::now());

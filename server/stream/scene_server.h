@@ -18,6 +18,8 @@
 
 namespace clothstream::stream {
 
+class Journal;
+
 struct ServerOptions {
   vulkan::DeviceOptions device;
   // Joined by whoever names no scene; must be one of the scenes.
@@ -36,6 +38,8 @@ struct ServerOptions {
   std::uint32_t maxCreatedScenes = 16;
   // Of what all peers upload at the same time.
   std::size_t maxUploadBytes = std::size_t{256} << 20;
+  // Gives each scene its journal, or null for none; may be empty.
+  std::function<std::shared_ptr<Journal>(const scene::Scene&)> journals;
   // A peer that sends nothing for this long is dropped.
   std::chrono::milliseconds silence{30'000};
 };

@@ -120,8 +120,8 @@ void Session::dispatch(const v1::ClientMessage& message, Clock::time_point now) 
                             message.frame_ack().tick())});
       return;
     case Body::kKeyFrameRequest:
-      if (allowed(keyFrameRate_, "key frame requests")) mailbox_->restart();
-      return;
+      if (!allowed(keyFrameRate_, "key frame requests")) return;
+      return message.key_frame_request().early() ? mailbox_->wantKeyFrame() : mailbox_->restart();
     default:
       return refuse({v1::ERROR_CODE_MALFORMED_MESSAGE, "the message has no body that this server knows"});
   }
@@ -153,6 +153,7 @@ void Session::hello(const v1::Hello& message) {
   scene_ = scene;
   participant_ = ++server_.participants;
   scene->metrics.joins.add();
+  if (scene->journal) scene->journal->joined(participant_, joining->clientName, joining->displayName);
   const std::shared_ptr<const Description> description = scene->description();
 
   v1::ServerMessage reply;
@@ -261,6 +262,7 @@ void Session::end() {
 void Session::leave() {
   if (scene_ == nullptr) return;
   scene_->audience.leave(*mailbox_);
+  if (scene_->journal) scene_->journal->left(participant_);
   if (posed_) scene_->inbox.postPoses(participant_, {}, now_);
   server_.device.wake();
   spdlog::info("{}: {} left; {} in it", scene_->name(), peer_, scene_->audience.size());

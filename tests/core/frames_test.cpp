@@ -149,6 +149,20 @@ TEST(Frames, AsksForAKeyFrameOnceWhenAReferenceIsMissing) {
   EXPECT_EQ(joined.client.receive(joined.server.frame(6), 530 * kMs), kFrame);
 }
 
+TEST(Frames, AsksForAnEarlyKeyFrameOnceUntilItComes) {
+  Joined joined;
+  cs_request_key_frame(joined.client.get(), 5 * kMs);
+  joined.client.receive(joined.server.frame(1), 10 * kMs);
+  cs_request_key_frame(joined.client.get(), 200 * kMs);
+  cs_request_key_frame(joined.client.get(), 210 * kMs);
+  EXPECT_EQ(joined.client.receive(joined.server.frame(2), 220 * kMs), kFrame);
+  const auto messages = joined.client.outgoing();
+  std::vector<bool> early;
+  for (const v1::ClientMessage& message : messages)
+    if (message.has_key_frame_request()) early.push_back(message.key_frame_request().early());
+  EXPECT_THAT(early, testing::ElementsAre(true, true)) << "the first was answered by the first frame";
+}
+
 TEST(Frames, AsksNotMoreOftenThanEvery100MsAndAgainAfterASecondWithoutAKeyFrame) {
   Joined joined;
   joined.client.receive(joined.server.frame(1), 0);

@@ -225,6 +225,22 @@ TEST_F(MailboxTest, WhoCannotDecodeStartsAnewWithAKeyFrame) {
   EXPECT_EQ(taken(frames), Ticks{5});
 }
 
+TEST_F(MailboxTest, WhoWantsAKeyFrameEarlyGetsWhatThereIsUntilThen) {
+  join();
+  std::vector<PublishedFrame> frames{frame(1, true), frame(2), frame(3)};
+  mailbox.deliver(frames[0]);
+  EXPECT_FALSE(mailbox.wantsKeyFrame());
+  mailbox.wantKeyFrame();
+  EXPECT_TRUE(mailbox.wantsKeyFrame());
+  mailbox.deliver(frames[1]);
+  EXPECT_TRUE(mailbox.wantsKeyFrame());
+  EXPECT_EQ(taken(frames), (Ticks{1, 2}));
+  ASSERT_TRUE(mailbox.acknowledge(2, now));
+  mailbox.deliver(frames.emplace_back(frame(4, true)));
+  EXPECT_FALSE(mailbox.wantsKeyFrame());
+  EXPECT_EQ(taken(frames), Ticks{4});
+}
+
 TEST_F(MailboxTest, HasRoomForABoundedAmountOfControl) {
   std::size_t accepted = 0;
   while (mailbox.reply(bytes(1024))) ++accepted;

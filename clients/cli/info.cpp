@@ -1,0 +1,182 @@
+// SPDX-License-Identifier: MIT
+// Index, then every chunk and every frame.
+#include "clients/cli/info.h"
+
+#include <array>
+#include <optional>
+#include <vector>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "clients/cli/complaint.h"
+#include "clients/cli/played_recording.h"
+#include "clients/cli/progress.h"
+#include "clients/cli/signals.h"
+
+namespace clothstream::cli {
+namespace {
+
+using recording::RecordingReader;
+using recording::Topic;
+
+struct ChannelFigures {
+  std::uint64_t messages = 0, bytes = 0;
+};
+
+struct Figures {
+  std::array<ChannelFigures, recording::kTopicNames.size()> channels{};
+  std::uint64_t chunksLost = 0;
+  std::string damage;  // the first; empty: none
+  std::optional<cs_statistics> stream;
+};
+
+double seconds(const RecordingReader& reader) {
+  return static_cast<double>(reader.end() - reader.start()) * 1e-9;
+}
+
+void countByIndex(const RecordingReader& reader, Figures& figures) {
+  if (!reader.mcap().statistics()) return;
+  for (const auto& [channel, count] : reader.mcap().statistics()->counts)
+    if (const auto topic = reader.topicOf(channel))
+      figures.channels[static_cast<std::size_t>(*topic)].messages = count;
+}
+
+// Chunk by chunk: one that is damaged does not hide the others.
+tl::expected<void, Complaint> countByReading(recording::McapReader& mcap, const RecordingReader& reader,
+                                             Figures& figures) {
+  Progress progress("read", static_cast<std::uint32_t>(mcap.chunks().size()));
+  for (std::size_t i = 0; i < mcap.chunks().size(); ++i) {
+    if (interrupted()) return complaint(kUnreadable, "interrupted");
+    progress.show(static_cast<std::uint32_t>(i));
+    const auto messages = mcap.read(i);
+    if (!messages) {
+      ++figures.chunksLost;
+      if (figures.damage.empty()) figures.damage = messages.error();
+      continue;
+    }
+    for (const recording::Message& message : *messages) {
+      const auto topic = reader.topicOf(message.channel);
+      if (!topic) continue;
+      ChannelFigures& channel = figures.channels[static_cast<std::size_t>(*topic)];
+      ++channel.messages;
+      channel.bytes += message.bytes.size();
+    }
+  }
+  return {};
+}
+
+tl::expected<void, Complaint> decode(PlayedRecording& played, Figures& figures) {
+  const auto all = figures.channels[static_cast<std::size_t>(Topic::frames)].messages;
+  Progress progress("decode", static_cast<std::uint32_t>(all));
+  for (std::uint32_t frame = 0;; ++frame) {
+    if (interrupted()) return complaint(kUnreadable, "interrupted");
+    progress.show(frame);
+    const auto more = played.next();
+    if (!more && figures.damage.empty()) figures.damage = more.error();
+    if (!more || !*more) break;
+  }
+  cs_get_statistics(played.client(), 0, &figures.stream.emplace());
+  return {};
+}
+
+std::string damageOf(const RecordingReader& reader, const Figures& figures, const InfoOptions& options) {
+  if (!reader.mcap().indexed())
+    return fmt::format("it was cut off, or is damaged at its end: run clothstream recover {} OUT",
+                       options.recording);
+  if (!figures.damage.empty()) return figures.damage;
+  if (figures.stream && figures.stream->hash_mismatches > 0)
+    return fmt::format("{} frames are not what the server held", figures.stream->hash_mismatches);
+  return {};
+}
+
+std::string mebibytes(std::uint64_t bytes) {
+  return fmt::format("{:.2f} MiB", static_cast<double>(bytes) / (1 << 20));
+}
+
+std::string toText(const RecordingReader& reader, const Figures& figures, const std::string& damage,
+                   const InfoOptions& options) {
+  const auto fact = [&](const char* name) { return reader.fact(name); };
+  std::string text = fmt::format(
+      "file      {}, {}, {} chunks\nscene     {}, begun {}, {:.1f} s, {} vertices\nserver    {}\ndevice    "
+      "{}; {}; "
+      "processor {}\nstream    {} ticks/s, {} frames/s, codec {}, max error {} m\n",
+      options.recording, mebibytes(reader.mcap().bytes()), reader.mcap().chunks().size(), fact("scene"),
+      fact("started"), seconds(reader), fact("vertices"), fact("server"), fact("device"), fact("driver"),
+      fact("processor"), fact("simulation_rate"), fact("stream_rate"), fact("codec"), fact("max_error"));
+  for (std::size_t i = 0; i < figures.channels.size(); ++i) {
+    const ChannelFigures& channel = figures.channels[i];
+    if (channel.messages == 0) continue;
+    text += fmt::format("{:<14}{:>10} messages", recording::kTopicNames[i], channel.messages);
+    if (!options.quick) text += fmt::format("{:>14}", mebibytes(channel.bytes));
+    text += '\n';
+  }
+  if (figures.stream)
+    text += fmt::format(
+        "frames    {} decoded, {} of them key frames, {:.2f} bits a vertex; {} not what the server held\n",
+        figures.stream->frames, figures.stream->key_frames, figures.stream->bits_per_vertex,
+        figures.stream->hash_mismatches);
+  if (!damage.empty()) return text + fmt::format("damaged   {}\n", damage);
+  return text +
+         (options.quick ? "index     whole; the rest was not read\n" : "whole     all checksums match\n");
+}
+
+std::string toJson(const RecordingReader& reader, const Figures& figures, const std::string& damage,
+                   const InfoOptions& options) {
+  nlohmann::ordered_json json{{"file", options.recording},
+                              {"bytes", reader.mcap().bytes()},
+                              {"chunks", reader.mcap().chunks().size()},
+                              {"seconds", seconds(reader)},
+                              {"facts", reader.facts()}};
+  for (std::size_t i = 0; i < figures.channels.size(); ++i) {
+    nlohmann::ordered_json channel{{"messages", figures.channels[i].messages}};
+    if (!options.quick) channel["bytes"] = figures.channels[i].bytes;
+    json["channels"][std::string(recording::kTopicNames[i])] = channel;
+  }
+  if (figures.stream)
+    json["frames"] = {{"decoded", figures.stream->frames},
+                      {"keyFrames", figures.stream->key_frames},
+                      {"bitsPerVertex", figures.stream->bits_per_vertex},
+                      {"hashMismatches", figures.stream->hash_mismatches}};
+  json["whole"] = damage.empty();
+  if (!damage.empty()) json["damage"] = damage;
+  return json.dump(1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + '\n';
+}
+
+tl::expected<ExitCode, Complaint> run(const InfoOptions& options) {
+  const auto open = [&] {
+    return orComplaint(kUnreadable, RecordingReader::open(options.recording, recording::CutFiles::read));
+  };
+  auto reader = open();
+  if (!reader) return tl::unexpected(reader.error());
+  Figures figures;
+  if (options.quick) {
+    countByIndex(*reader, figures);
+  } else {
+    auto file = orComplaint(kUnreadable, recording::openFile(options.recording));
+    if (!file) return tl::unexpected(file.error());
+    auto mcap = orComplaint(kUnreadable, recording::McapReader::open(std::move(*file)));
+    if (!mcap) return tl::unexpected(mcap.error());
+    if (auto counted = countByReading(*mcap, *reader, figures); !counted)
+      return tl::unexpected(counted.error());
+    if (auto checked = mcap->check(); !checked && figures.damage.empty()) figures.damage = checked.error();
+    auto toPlay = open();
+    if (!toPlay) return tl::unexpected(toPlay.error());
+    auto played = PlayedRecording::open(std::move(*toPlay));
+    if (!played && figures.damage.empty()) figures.damage = played.error();
+    if (played)
+      if (auto decoded = decode(*played, figures); !decoded) return tl::unexpected(decoded.error());
+  }
+  const std::string damage = damageOf(*reader, figures, options);
+  fmt::print("{}", (options.json ? toJson : toText)(*reader, figures, damage, options));
+  return damage.empty() ? kOk : kUnreadable;
+}
+
+}  // namespace
+
+ExitCode info(const InfoOptions& options) {
+  const auto code = run(options);
+  return code ? *code : say(code.error());
+}
+
+}  // namespace clothstream::cli

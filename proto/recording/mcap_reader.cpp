@@ -1,0 +1,443 @@
+// SPDX-License-Identifier: MIT
+// Index or scan, then chunk by chunk.
+#include "proto/recording/mcap_reader.h"
+
+#include <algorithm>
+#include <utility>
+
+#include <fmt/format.h>
+#include <zstd.h>
+
+#include "proto/recording/bytes.h"
+
+namespace clothstream::recording {
+namespace {
+
+template <typename... Arguments>
+tl::unexpected<std::string> broken(fmt::format_string<Arguments...> text, Arguments&&... arguments) {
+  return tl::unexpected(fmt::format(text, std::forward<Arguments>(arguments)...));
+}
+
+using Done = tl::expected<void, std::string>;
+
+// The record that ends the data, before the summary.
+constexpr std::uint64_t kDataEndBytes = kRecordHead + 4;
+
+struct Record {
+  Opcode opcode{};
+  std::uint64_t offset = 0;  // of its content
+  std::uint64_t length = 0;  // of its content
+  std::uint64_t end() const { return offset + length; }
+};
+
+// A chunk's record, but for what it holds.
+struct ChunkHead {
+  std::uint64_t start = 0, end = 0, size = 0;
+  std::uint32_t crc = 0;
+  std::string_view compression, records;
+};
+
+std::optional<ChunkHead> parseChunk(std::string_view content) {
+  ByteReader reader(content);
+  ChunkHead head;
+  head.start = reader.number<std::uint64_t>();
+  head.end = reader.number<std::uint64_t>();
+  head.size = reader.number<std::uint64_t>();
+  head.crc = reader.number<std::uint32_t>();
+  head.compression = reader.text();
+  head.records = reader.take(reader.number<std::uint64_t>());
+  if (!reader.ok()) return std::nullopt;
+  return head;
+}
+
+std::optional<Facts> parseMap(std::string_view entries) {
+  Facts facts;
+  ByteReader reader(entries);
+  while (reader.left() > 0) {
+    std::string key(reader.text());
+    facts[std::move(key)] = std::string(reader.text());
+  }
+  if (!reader.ok()) return std::nullopt;
+  return facts;
+}
+
+}  // namespace
+
+struct McapReader::State {
+  std::unique_ptr<ByteSource> source;
+  std::string library;
+  std::uint64_t firstRecord = 0;  // after the header
+  bool indexed = false;
+  std::map<std::uint16_t, Channel> channels;
+  std::map<std::uint16_t, ReadSchema> schemas;
+  std::vector<ChunkPlace> chunks;
+  std::optional<Statistics> statistics;
+  std::map<std::string, Facts> facts;
+  std::uint64_t dataEnd = 0;
+  std::uint64_t summaryStart = 0;  // where there is an index
+
+  // Used again from chunk to chunk.
+  std::string raw, records;
+  std::vector<Message> messages;
+
+  std::optional<Record> recordAt(std::uint64_t offset) const;
+  bool content(const Record& record, std::uint64_t most, std::string& out) const;
+  Done readStart();
+  bool readSummary();
+  bool takeSummaryRecord(Opcode opcode, std::string_view content);
+  bool takeChunkIndex(std::string_view content);
+  bool takeStatistics(std::string_view content);
+  bool takeFactIndex(std::string_view content);
+  bool takeSchema(std::string_view content);
+  bool takeChannel(std::string_view content);
+  bool takeFacts(std::string_view content);
+  void scan();
+  bool scanChunk(const Record& record);
+  Done parseMessages(const ChunkHead& head);
+};
+
+std::optional<Record> McapReader::State::recordAt(std::uint64_t offset) const {
+  const std::uint64_t size = source->size();
+  std::string head;
+  if (offset > size || size - offset < kRecordHead || !source->read(offset, kRecordHead, head))
+    return std::nullopt;
+  ByteReader reader(head);
+  Record record{static_cast<Opcode>(reader.number<std::uint8_t>()), offset + kRecordHead, 0};
+  record.length = reader.number<std::uint64_t>();
+  if (record.opcode == Opcode{} || record.length > size - record.offset) return std::nullopt;
+  return record;
+}
+
+bool McapReader::State::content(const Record& record, std::uint64_t most, std::string& out) const {
+  return record.length <= most && source->read(record.offset, record.length, out);
+}
+
+Done McapReader::State::readStart() {
+  std::string bytes;
+  if (source->size() < kMagic.size() || !source->read(0, kMagic.size(), bytes))
+    return broken("it is no MCAP file: it is too short");
+  if (bytes != kMagic) {
+    std::string otherVersion(kMagic);
+    otherVersion[kVersionByte] = bytes[kVersionByte];
+    if (bytes == otherVersion)
+      return broken("it is MCAP of version '{}', and version '0' is what can be read",
+                    bytes.substr(kVersionByte, 1));
+    return broken("it is no MCAP file: it begins with something else");
+  }
+  const std::optional<Record> header = recordAt(kMagic.size());
+  if (!header || header->opcode != Opcode::header || !content(*header, kMaxPlainRecordBytes, bytes))
+    return broken("it ends in its header, or has none");
+  ByteReader reader(bytes);
+  reader.text();
+  library = reader.text();
+  if (!reader.ok()) return broken("its header cannot be read");
+  firstRecord = dataEnd = header->end();
+  return {};
+}
+
+bool McapReader::State::takeSchema(std::string_view content) {
+  ByteReader reader(content);
+  const auto id = reader.number<std::uint16_t>();
+  ReadSchema schema;
+  schema.name = reader.text();
+  schema.encoding = reader.text();
+  schema.data = reader.text();
+  if (reader.ok() && id != 0) schemas.insert_or_assign(id, std::move(schema));
+  return reader.ok();
+}
+
+bool McapReader::State::takeChannel(std::string_view content) {
+  ByteReader reader(content);
+  Channel channel;
+  channel.id = reader.number<std::uint16_t>();
+  channel.schema = reader.number<std::uint16_t>();
+  channel.topic = reader.text();
+  channel.encoding = reader.text();
+  reader.text();  // its own metadata
+  if (reader.ok()) channels.insert_or_assign(channel.id, channel);
+  return reader.ok();
+}
+
+bool McapReader::State::takeFacts(std::string_view content) {
+  ByteReader reader(content);
+  std::string name(reader.text());
+  std::optional<Facts> map = parseMap(reader.text());
+  if (!reader.ok() || !map) return false;
+  facts.insert_or_assign(std::move(name), std::move(*map));
+  return true;
+}
+
+bool McapReader::State::takeChunkIndex(std::string_view content) {
+  ByteReader reader(content);
+  ChunkPlace place;
+  place.start = reader.number<std::uint64_t>();
+  place.end = reader.number<std::uint64_t>();
+  place.offset = reader.number<std::uint64_t>();
+  place.length = reader.number<std::uint64_t>();
+  const std::uint64_t size = source->size();
+  if (!reader.ok() || place.offset > size || place.length > size - place.offset || place.length < kRecordHead)
+    return false;
+  chunks.push_back(place);
+  return true;
+}
+
+bool McapReader::State::takeStatistics(std::string_view content) {
+  ByteReader reader(content);
+  Statistics& s = statistics.emplace();
+  s.messages = reader.number<std::uint64_t>();
+  reader.number<std::uint16_t>();  // schemas
+  reader.number<std::uint32_t>();  // channels
+  reader.number<std::uint32_t>();  // attachments
+  reader.number<std::uint32_t>();  // facts
+  s.chunks = reader.number<std::uint32_t>();
+  s.start = reader.number<std::uint64_t>();
+  s.end = reader.number<std::uint64_t>();
+  ByteReader counts(reader.text());
+  while (counts.left() > 0) {
+    const auto channel = counts.number<std::uint16_t>();
+    s.counts[channel] = counts.number<std::uint64_t>();
+  }
+  return reader.ok() && counts.ok();
+}
+
+bool McapReader::State::takeFactIndex(std::string_view content) {
+  ByteReader reader(content);
+  const auto offset = reader.number<std::uint64_t>();
+  const std::optional<Record> record = reader.ok() ? recordAt(offset) : std::nullopt;
+  std::string bytes;
+  return record && record->opcode == Opcode::metadata &&
+         this->content(*record, kMaxPlainRecordBytes, bytes) && takeFacts(bytes);
+}
+
+bool McapReader::State::takeSummaryRecord(Opcode opcode, std::string_view content) {
+  switch (opcode) {
+    case Opcode::schema:
+      return takeSchema(content);
+    case Opcode::channel:
+      return takeChannel(content);
+    case Opcode::chunkIndex:
+      return takeChunkIndex(content);
+    case Opcode::statistics:
+      return takeStatistics(content);
+    case Opcode::metadataIndex:
+      return takeFactIndex(content);
+    default:
+      return true;
+  }
+}
+
+// False where there is none, or one that is not whole.
+bool McapReader::State::readSummary() {
+  constexpr std::uint64_t kEnd = kRecordHead + kFooterBytes + kMagic.size();
+  const std::uint64_t size = source->size();
+  std::string bytes;
+  if (size < firstRecord + kEnd || !source->read(size - kMagic.size(), kMagic.size(), bytes) ||
+      bytes != kMagic)
+    return false;
+  const std::uint64_t footerAt = size - kEnd;
+  const std::optional<Record> footer = recordAt(footerAt);
+  if (!footer || footer->opcode != Opcode::footer || !content(*footer, kFooterBytes, bytes)) return false;
+  ByteReader reader(bytes);
+  const auto start = reader.number<std::uint64_t>();
+  reader.number<std::uint64_t>();  // of its own index
+  const auto crc = reader.number<std::uint32_t>();
+  if (!reader.ok() || start < firstRecord || start > footerAt || footerAt - start > kMaxSummaryBytes)
+    return false;
+  const std::uint64_t footerPart = kRecordHead + kFooterBytes - sizeof crc;
+  if (!source->read(start, footerAt - start + footerPart, bytes)) return false;
+  if (crc != 0 && crcOf(bytes) != crc) return false;
+  ByteReader summary(std::string_view(bytes).substr(0, footerAt - start));
+  while (summary.left() > 0) {
+    const auto opcode = static_cast<Opcode>(summary.number<std::uint8_t>());
+    const std::string_view record = summary.take(summary.number<std::uint64_t>());
+    if (!summary.ok() || !takeSummaryRecord(opcode, record)) return false;
+  }
+  summaryStart = start;
+  dataEnd = start - std::min(start, kDataEndBytes);
+  return true;
+}
+
+bool McapReader::State::scanChunk(const Record& record) {
+  // Its times and, before what it holds, at most the name of a compression: the rest is not read.
+  constexpr std::uint64_t kTimes = 16;
+  std::string bytes;
+  if (record.length < kTimes || !source->read(record.offset, kTimes, bytes)) return false;
+  ByteReader reader(bytes);
+  ChunkPlace place;
+  place.start = reader.number<std::uint64_t>();
+  place.end = reader.number<std::uint64_t>();
+  place.offset = record.offset - kRecordHead;
+  place.length = record.length + kRecordHead;
+  chunks.push_back(place);
+  return true;
+}
+
+void McapReader::State::scan() {
+  std::string bytes;
+  for (std::uint64_t offset = firstRecord;;) {
+    const std::optional<Record> record = recordAt(offset);
+    if (!record || record->opcode == Opcode::dataEnd || record->opcode == Opcode::footer) return;
+    bool taken = true;
+    if (record->opcode == Opcode::chunk) taken = scanChunk(*record);
+    const bool plain = record->opcode == Opcode::schema || record->opcode == Opcode::channel ||
+                       record->opcode == Opcode::metadata;
+    if (plain) {
+      taken = content(*record, kMaxPlainRecordBytes, bytes);
+      if (taken && record->opcode == Opcode::schema) taken = takeSchema(bytes);
+      if (taken && record->opcode == Opcode::channel) taken = takeChannel(bytes);
+      if (taken && record->opcode == Opcode::metadata) taken = takeFacts(bytes);
+    }
+    if (!taken) return;
+    dataEnd = offset = record->end();
+  }
+}
+
+McapReader::McapReader(std::unique_ptr<State> state) : state_(std::move(state)) {}
+McapReader::~McapReader() = default;
+McapReader::McapReader(McapReader&&) noexcept = default;
+
+tl::expected<McapReader, std::string> McapReader::open(std::unique_ptr<ByteSource> source) {
+  auto state = std::make_unique<State>();
+  state->source = std::move(source);
+  if (Done started = state->readStart(); !started) return tl::unexpected(started.error());
+  state->indexed = state->readSummary();
+  if (!state->indexed) {
+    auto scanned = std::make_unique<State>();
+    scanned->source = std::move(state->source);
+    scanned->library = state->library;
+    scanned->firstRecord = scanned->dataEnd = state->firstRecord;
+    scanned->scan();
+    state = std::move(scanned);
+  }
+  std::ranges::stable_sort(state->chunks, {}, &ChunkPlace::start);
+  return McapReader(std::move(state));
+}
+
+bool McapReader::indexed() const {
+  return state_->indexed;
+}
+const std::string& McapReader::library() const {
+  return state_->library;
+}
+const std::map<std::uint16_t, Channel>& McapReader::channels() const {
+  return state_->channels;
+}
+const std::map<std::uint16_t, ReadSchema>& McapReader::schemas() const {
+  return state_->schemas;
+}
+std::span<const ChunkPlace> McapReader::chunks() const {
+  return state_->chunks;
+}
+const std::optional<Statistics>& McapReader::statistics() const {
+  return state_->statistics;
+}
+std::uint64_t McapReader::bytes() const {
+  return state_->source->size();
+}
+std::uint64_t McapReader::dataEnd() const {
+  return state_->dataEnd;
+}
+
+const Facts* McapReader::facts(const std::string& name) const {
+  const auto found = state_->facts.find(name);
+  return found == state_->facts.end() ? nullptr : &found->second;
+}
+
+std::size_t McapReader::chunkAt(std::uint64_t time) const {
+  const auto after = std::ranges::upper_bound(state_->chunks, time, {}, &ChunkPlace::start);
+  const auto count = static_cast<std::size_t>(after - state_->chunks.begin());
+  return count == 0 ? 0 : count - 1;
+}
+
+Done McapReader::State::parseMessages(const ChunkHead& head) {
+  messages.clear();
+  ByteReader reader(records);
+  while (reader.left() > 0) {
+    const auto opcode = static_cast<Opcode>(reader.number<std::uint8_t>());
+    const std::string_view content = reader.take(reader.number<std::uint64_t>());
+    if (!reader.ok()) return broken("a record in it goes past its end");
+    if (opcode == Opcode::schema && !takeSchema(content)) return broken("a schema in it cannot be read");
+    if (opcode == Opcode::channel && !takeChannel(content)) return broken("a channel in it cannot be read");
+    if (opcode != Opcode::message) continue;
+    ByteReader fields(content);
+    Message& message = messages.emplace_back();
+    message.channel = fields.number<std::uint16_t>();
+    fields.number<std::uint32_t>();  // its number in the channel
+    message.time = fields.number<std::uint64_t>();
+    fields.number<std::uint64_t>();  // when it was published
+    if (!fields.ok()) return broken("a message in it is too short");
+    message.bytes = fields.rest();
+    if (!channels.contains(message.channel))
+      return broken("a message in it is of channel {}, which there is not", message.channel);
+    if (message.time < head.start || message.time > head.end)
+      return broken("a message in it is of another time");
+  }
+  return {};
+}
+
+tl::expected<std::span<const Message>, std::string> McapReader::read(std::size_t chunk) {
+  State& s = *state_;
+  const ChunkPlace& place = s.chunks[chunk];
+  const auto wrong = [&](std::string_view what) {
+    return broken("the chunk at byte {} cannot be read: {}", place.offset, what);
+  };
+  const std::optional<Record> record = s.recordAt(place.offset);
+  if (!record || record->opcode != Opcode::chunk || record->length != place.length - kRecordHead)
+    return wrong("there is none");
+  if (!s.content(*record, kMaxChunkBytes, s.raw))
+    return wrong("it is too large, or its bytes cannot be read");
+  const std::optional<ChunkHead> head = parseChunk(s.raw);
+  if (!head) return wrong("it is too short");
+  if (head->size > kMaxChunkBytes) return wrong("it is too large");
+  if (head->compression.empty()) {
+    if (head->records.size() != head->size) return wrong("it has another size than it says");
+    s.records = head->records;
+  } else if (head->compression == "zstd") {
+    // Both say it, and neither is believed beyond kMaxChunkBytes.
+    if (ZSTD_getFrameContentSize(head->records.data(), head->records.size()) != head->size)
+      return wrong("it has another size than it says");
+    s.records.resize(head->size);
+    if (ZSTD_decompress(s.records.data(), s.records.size(), head->records.data(), head->records.size()) !=
+        head->size)
+      return wrong("its compressed bytes are damaged");
+  } else {
+    return wrong(
+        fmt::format("it is compressed by '{:.16}', and zstd is what can be read", head->compression));
+  }
+  if (head->crc != 0 && crcOf(s.records) != head->crc) return wrong("its checksum does not match");
+  if (Done parsed = s.parseMessages(*head); !parsed) return wrong(parsed.error());
+  return std::span<const Message>(s.messages);
+}
+
+Done McapReader::check() {
+  State& s = *state_;
+  if (!s.indexed) return broken("it has no index: it was cut off, or is damaged at its end");
+  Statistics found;
+  for (std::size_t i = 0; i < s.chunks.size(); ++i) {
+    const auto messages = read(i);
+    if (!messages) return tl::unexpected(messages.error());
+    for (const Message& message : *messages) ++found.counts[message.channel];
+    found.messages += messages->size();
+  }
+  if (s.statistics && (s.statistics->messages != found.messages || s.statistics->chunks != s.chunks.size() ||
+                       s.statistics->counts != found.counts))
+    return broken("its statistics say {} messages in {} chunks, and there are {} in {}",
+                  s.statistics->messages, s.statistics->chunks, found.messages, s.chunks.size());
+  const std::optional<Record> end = s.recordAt(s.dataEnd);
+  std::string bytes;
+  if (!end || end->opcode != Opcode::dataEnd || end->end() != s.summaryStart ||
+      !s.content(*end, kDataEndBytes, bytes))
+    return broken("its data has no end");
+  const auto told = ByteReader(bytes).number<std::uint32_t>();
+  std::uint32_t crc = 0;
+  constexpr std::uint64_t kPiece = std::uint64_t{1} << 20;
+  for (std::uint64_t offset = 0; offset < s.dataEnd; offset += kPiece) {
+    if (!s.source->read(offset, std::min(kPiece, s.dataEnd - offset), bytes))
+      return broken("byte {} and what follows cannot be read", offset);
+    crc = crcOf(bytes, crc);
+  }
+  if (told != 0 && told != crc) return broken("the checksum of its data does not match");
+  return {};
+}
+
+}  // namespace clothstream::recording

@@ -1,0 +1,139 @@
+// SPDX-License-Identifier: MIT
+// Chunk by chunk.
+#include "proto/recording/recording_reader.h"
+
+#include <algorithm>
+#include <span>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "proto/codec/packet_header.h"
+
+namespace clothstream::recording {
+
+bool isKeyFrame(std::string_view bytes) {
+  v1::Frame frame;
+  if (!frame.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()))) return false;
+  const auto packet = codec::parsePacket(std::as_bytes(std::span(frame.packet())));
+  return packet && packet->header.kind == codec::PacketKind::key;
+}
+
+tl::unexpected<std::string> RecordingReader::broken(std::string_view what) const {
+  return tl::unexpected(fmt::format("{} is broken: {}", name_, what));
+}
+
+tl::expected<RecordingReader, std::string> RecordingReader::open(const std::string& path, CutFiles cutFiles) {
+  auto file = openFile(path);
+  if (!file) return tl::unexpected(file.error());
+  return open(std::move(*file), path, cutFiles);
+}
+
+tl::expected<RecordingReader, std::string> RecordingReader::open(std::unique_ptr<ByteSource> source,
+                                                                 std::string name, CutFiles cutFiles) {
+  auto mcap = McapReader::open(std::move(source));
+  if (!mcap) return tl::unexpected(fmt::format("{} cannot be read: {}", name, mcap.error()));
+  RecordingReader reader(std::move(*mcap), std::move(name));
+  for (const auto& [id, channel] : reader.mcap_.channels()) {
+    const auto known = std::ranges::find(kTopicNames, channel.topic);
+    if (known != kTopicNames.end()) reader.topics_[id] = static_cast<Topic>(known - kTopicNames.begin());
+  }
+  const Facts* facts = reader.mcap_.facts(std::string(kFactsName));
+  if (facts == nullptr || reader.topics_.empty())
+    return tl::unexpected(fmt::format(
+        "{} is an MCAP file, but no recording of clothstream: it has no facts of one", reader.name_));
+  reader.facts_ = *facts;
+  if (cutFiles == CutFiles::refused && !reader.mcap_.indexed())
+    return tl::unexpected(
+        fmt::format("{} was cut off, or is damaged at its end: `clothstream recover {} OUT` makes a whole "
+                    "recording of what there is",
+                    reader.name_, reader.name_));
+  return reader;
+}
+
+tl::expected<void, std::string> RecordingReader::check() {
+  loaded_.reset();
+  if (auto checked = mcap_.check(); !checked) return broken(checked.error());
+  return {};
+}
+
+const std::string& RecordingReader::fact(const std::string& name) const {
+  static const std::string kUnknown = "unknown";
+  const auto found = facts_.find(name);
+  return found == facts_.end() ? kUnknown : found->second;
+}
+
+std::optional<Topic> RecordingReader::topicOf(std::uint16_t channel) const {
+  const auto found = topics_.find(channel);
+  if (found == topics_.end()) return std::nullopt;
+  return found->second;
+}
+
+std::uint64_t RecordingReader::start() const {
+  return mcap_.chunks().empty() ? 0 : mcap_.chunks().front().start;
+}
+
+std::uint64_t RecordingReader::end() const {
+  return mcap_.chunks().empty() ? 0 : mcap_.chunks().back().end;
+}
+
+tl::expected<void, std::string> RecordingReader::load(std::size_t chunk) {
+  if (loaded_ == chunk) return {};
+  loaded_.reset();
+  const auto messages = mcap_.read(chunk);
+  if (!messages) return broken(messages.error());
+  messages_ = *messages;
+  loaded_ = chunk;
+  return {};
+}
+
+tl::expected<std::optional<RecordedMessage>, std::string> RecordingReader::next() {
+  for (; chunk_ < mcap_.chunks().size(); ++chunk_, message_ = 0) {
+    if (auto loaded = load(chunk_); !loaded) return tl::unexpected(loaded.error());
+    while (message_ < messages_.size()) {
+      const Message& message = messages_[message_++];
+      if (const auto topic = topicOf(message.channel))
+        return RecordedMessage{*topic, message.time, message.bytes};
+    }
+  }
+  return std::nullopt;
+}
+
+tl::expected<v1::StreamDescription, std::string> RecordingReader::description() {
+  rewind();
+  for (;;) {
+    const auto message = next();
+    if (!message) return tl::unexpected(message.error());
+    if (!*message) return broken("it has no description of its stream");
+    if ((*message)->topic != Topic::description) continue;
+    rewind();
+    v1::StreamDescription description;
+    const std::string_view bytes = (*message)->bytes;
+    if (!description.ParseFromArray(bytes.data(), static_cast<int>(bytes.size())))
+      return broken("its description of the stream cannot be read");
+    return description;
+  }
+}
+
+void RecordingReader::rewind() {
+  chunk_ = message_ = 0;
+}
+
+tl::expected<void, std::string> RecordingReader::seek(std::uint64_t time) {
+  rewind();
+  if (mcap_.chunks().empty()) return {};
+  for (std::size_t chunk = mcap_.chunkAt(time) + 1; chunk-- > 0;) {
+    if (auto loaded = load(chunk); !loaded) return loaded;
+    for (std::size_t i = messages_.size(); i-- > 0;) {
+      const Message& message = messages_[i];
+      if (message.time > time || topicOf(message.channel) != Topic::frames || !isKeyFrame(message.bytes))
+        continue;
+      chunk_ = chunk;
+      message_ = i;
+      return {};
+    }
+  }
+  return {};
+}
+
+}  // namespace clothstream::recording

@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: MIT
+// A channel for each topic, with the schema of its messages.
+#include "proto/recording/recording_writer.h"
+
+#include <set>
+
+#include <google/protobuf/descriptor.h>
+#include <google/protobuf/descriptor.pb.h>
+
+#include "clothstream/v1/recording.pb.h"
+
+namespace clothstream::recording {
+namespace {
+
+namespace protobuf = google::protobuf;
+
+const protobuf::Descriptor& typeOf(Topic topic) {
+  switch (topic) {
+    case Topic::description:
+      return *v1::StreamDescription::descriptor();
+    case Topic::frames:
+      return *v1::Frame::descriptor();
+    case Topic::reports:
+      return *v1::SimulationReport::descriptor();
+    case Topic::parameters:
+      return *v1::ParameterChanged::descriptor();
+    case Topic::events:
+      return *v1::TickEvents::descriptor();
+    case Topic::notices:
+      return *v1::Notice::descriptor();
+    case Topic::participants:
+      return *v1::ParticipantEvent::descriptor();
+    case Topic::scene:
+      return *v1::RecordedScene::descriptor();
+    case Topic::ticks:
+      return *v1::RecordedTick::descriptor();
+    case Topic::checkpoints:
+      break;
+  }
+  return *v1::Checkpoint::descriptor();
+}
+
+// What is imported comes first.
+void add(const protobuf::FileDescriptor& file, std::set<std::string>& known,
+         protobuf::FileDescriptorSet& files) {
+  if (!known.insert(file.name()).second) return;
+  for (int i = 0; i < file.dependency_count(); ++i) add(*file.dependency(i), known, files);
+  file.CopyTo(files.add_file());
+}
+
+Schema schemaOf(const protobuf::Descriptor& type) {
+  std::set<std::string> known;
+  protobuf::FileDescriptorSet files;
+  add(*type.file(), known, files);
+  return {type.full_name(), files.SerializeAsString()};
+}
+
+}  // namespace
+
+tl::expected<RecordingWriter, std::string> RecordingWriter::begin(Sink sink, std::string_view writer,
+                                                                  const Facts& facts) {
+  RecordingWriter recording(std::move(sink));
+  if (Written begun = recording.mcap_.begin(writer); !begun) return tl::unexpected(begun.error());
+  for (std::size_t i = 0; i < kTopicNames.size(); ++i) {
+    const auto channel = recording.mcap_.addChannel(kTopicNames[i], schemaOf(typeOf(static_cast<Topic>(i))));
+    if (!channel) return tl::unexpected(channel.error());
+    recording.channels_[i] = *channel;
+  }
+  if (Written added = recording.mcap_.addFacts(kFactsName, facts); !added)
+    return tl::unexpected(added.error());
+  return recording;
+}
+
+Written RecordingWriter::write(Topic topic, std::uint64_t time, std::string_view message) {
+  return mcap_.write(channels_[static_cast<std::size_t>(topic)], time, message);
+}
+
+Written RecordingWriter::write(std::uint64_t time, const v1::ServerMessage& message) {
+  const auto put = [&](Topic topic, const protobuf::MessageLite& body) {
+    body.SerializeToString(&bytes_);
+    return write(topic, time, bytes_);
+  };
+  switch (message.body_case()) {
+    case v1::ServerMessage::kFrame:
+      return put(Topic::frames, message.frame()).and_then([&]() -> Written {
+        if (!message.frame().has_report()) return {};
+        return put(Topic::reports, message.frame().report());
+      });
+    case v1::ServerMessage::kParameterChanged:
+      return put(Topic::parameters, message.parameter_changed());
+    case v1::ServerMessage::kTickEvents:
+      return put(Topic::events, message.tick_events());
+    case v1::ServerMessage::kNotice:
+      return put(Topic::notices, message.notice());
+    default:
+      return {};
+  }
+}
+
+}  // namespace clothstream::recording

@@ -1,0 +1,216 @@
+// SPDX-License-Identifier: MIT
+// A bounded queue, and the thread that empties it into a file.
+#include "server/recording/recorder.h"
+
+#include <chrono>
+#include <ctime>
+#include <utility>
+
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include "proto/recording/file.h"
+#include "server/messages/scene_message.h"
+#include "server/recording/facts.h"
+#include "server/recording/tick_message.h"
+
+namespace clothstream::recording {
+namespace {
+
+using SteadyClock = std::chrono::steady_clock;
+
+// So that what is lost when the program is killed is of a quarter of a second at most, with what writing
+// takes.
+constexpr std::chrono::nanoseconds kChunkTime{McapWriter::kChunkNs};
+constexpr int kMaxSameNames = 100;
+
+// What is there already stays: the next name is taken.
+tl::expected<std::pair<OutputFile, std::string>, std::string> create(const std::filesystem::path& directory,
+                                                                     const std::string& scene) {
+  const std::string stem = fmt::format("{}-{:%Y%m%dT%H%M%SZ}", scene, fmt::gmtime(std::time(nullptr)));
+  for (int i = 1;; ++i) {
+    const std::string path =
+        (directory / (i == 1 ? stem + ".mcap" : fmt::format("{}-{}.mcap", stem, i))).string();
+    auto file = OutputFile::create(path);
+    if (file) return std::pair(std::move(*file), path);
+    std::error_code none;
+    if (i == kMaxSameNames || !std::filesystem::exists(path, none)) return tl::unexpected(file.error());
+  }
+}
+
+}  // namespace
+
+Recorder::~Recorder() {
+  end();
+  if (thread_.joinable()) thread_.join();
+}
+
+std::string Recorder::path() const {
+  const std::lock_guard lock(mutex_);
+  return path_;
+}
+
+void Recorder::begin(const vulkan::DeviceInfo& device, const scene::Scene& scene,
+                     const v1::StreamDescription& description, const simulation::StateSnapshot& state) {
+  state_ = State::running;
+  put(Topic::description, description);
+  v1::RecordedScene recorded;
+  *recorded.mutable_scene() = messages::toMessage(scene);
+  put(Topic::scene, recorded);
+  saved(state, false);
+  thread_ =
+      std::thread([this, name = scene.name,
+                   facts = factsOf(options_.serverName, device, scene, description)] { run(name, facts); });
+}
+
+void Recorder::ticked(const stream::AppliedTick& tick) {
+  if (!active()) return;
+  write(tick, tick_);
+  put(Topic::ticks, tick_);
+}
+
+void Recorder::saved(const simulation::StateSnapshot& state, bool gripsHold) {
+  v1::Checkpoint checkpoint;
+  checkpoint.set_tick(state.tick);
+  checkpoint.set_state(state.bytes.data(), state.bytes.size());
+  checkpoint.set_grips_hold(gripsHold);
+  put(Topic::checkpoints, checkpoint);
+}
+
+void Recorder::restored(std::uint64_t tick, const simulation::StateSnapshot& state) {
+  v1::Checkpoint checkpoint;
+  checkpoint.set_tick(tick);
+  checkpoint.set_state(state.bytes.data(), state.bytes.size());
+  checkpoint.set_restored(true);
+  put(Topic::checkpoints, checkpoint);
+}
+
+void Recorder::end() {
+  {
+    const std::lock_guard lock(mutex_);
+    ended_ = true;
+  }
+  changed_.notify_all();
+}
+
+void Recorder::sent(const stream::SharedBytes& message) {
+  if (!active()) return;
+  push(message, message->size());
+}
+
+void Recorder::joined(std::uint64_t participant, const std::string& clientName,
+                      const std::string& displayName) {
+  tellParticipant(participant, v1::PARTICIPANT_EVENT_KIND_JOINED, clientName, displayName);
+}
+
+void Recorder::left(std::uint64_t participant) {
+  tellParticipant(participant, v1::PARTICIPANT_EVENT_KIND_LEFT, {}, {});
+}
+
+void Recorder::tellParticipant(std::uint64_t participant, v1::ParticipantEventKind kind,
+                               const std::string& clientName, const std::string& displayName) {
+  v1::ParticipantEvent event;
+  event.set_participant_id(participant);
+  event.set_kind(kind);
+  event.set_client_name(clientName);
+  event.set_display_name(displayName);
+  put(Topic::participants, event);
+}
+
+void Recorder::put(Topic topic, const google::protobuf::MessageLite& message) {
+  Own own{topic, message.SerializeAsString()};
+  const std::size_t bytes = own.bytes.size();
+  push(std::move(own), bytes);
+}
+
+void Recorder::push(std::variant<Own, stream::SharedBytes> what, std::size_t bytes) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (ended_ || overflowed_ || state_ == State::failed) return;
+    if (waitingBytes_ + bytes > options_.maxWaitingBytes) {
+      overflowed_ = true;
+    } else {
+      waiting_.push_back({clock_.now(), std::move(what)});
+      waitingBytes_ += bytes;
+    }
+  }
+  changed_.notify_all();
+}
+
+void Recorder::run(const std::string& sceneName, const Facts& facts) {
+  auto created = create(options_.directory, sceneName);
+  if (!created) return fail(created.error());
+  OutputFile file = std::move(created->first);
+  {
+    const std::lock_guard lock(mutex_);
+    path_ = created->second;
+  }
+  spdlog::info("{}: recorded to {}", sceneName, created->second);
+  auto writer = RecordingWriter::begin([&](std::string_view bytes) { return file.write(bytes); },
+                                       options_.serverName, facts);
+  if (!writer) return fail(writer.error());
+  const auto written = writeAll(*writer);
+  // Also after an error that is not the disk's: what there is is then whole.
+  const auto finished = writer->finish().and_then([&] { return file.sync(); });
+  bytes_ = writer->bytes();
+  if (!finished)
+    return fail(fmt::format("{}; what there is of it can be read after `clothstream recover {} OUT`",
+                            finished.error(), created->second));
+  if (!written) return fail(fmt::format("{}; {} ends there", written.error(), created->second));
+  spdlog::info("{}: the recording {} is complete, {:.1f} MiB", sceneName, created->second,
+               static_cast<double>(writer->bytes()) / (1 << 20));
+  state_ = State::complete;
+}
+
+Written Recorder::writeAll(RecordingWriter& writer) {
+  std::vector<Waiting> taken;
+  SteadyClock::time_point due = SteadyClock::time_point::max();  // of closing the chunk
+  v1::ServerMessage message;
+  for (;;) {
+    bool ends = false;
+    {
+      std::unique_lock lock(mutex_);
+      const auto something = [&] { return !waiting_.empty() || ended_ || overflowed_; };
+      if (due == SteadyClock::time_point::max())
+        changed_.wait(lock, something);
+      else
+        changed_.wait_until(lock, due, something);
+      taken.swap(waiting_);
+      waitingBytes_ = 0;
+      if (overflowed_)
+        return tl::unexpected(fmt::format("more than {} bytes waited to be written: the disk is too slow",
+                                          options_.maxWaitingBytes));
+      ends = ended_;
+    }
+    if (!taken.empty() && due == SteadyClock::time_point::max()) due = SteadyClock::now() + kChunkTime;
+    for (const Waiting& waiting : taken) {
+      Written written;
+      if (const auto* own = std::get_if<Own>(&waiting.what)) {
+        written = writer.write(own->topic, waiting.time, own->bytes);
+      } else {
+        const stream::SharedBytes& bytes = std::get<stream::SharedBytes>(waiting.what);
+        if (message.ParseFromArray(bytes->data(), static_cast<int>(bytes->size())))
+          written = writer.write(waiting.time, message);
+      }
+      if (!written) return written;
+    }
+    taken.clear();
+    if (ends) return {};
+    if (SteadyClock::now() >= due) {
+      if (auto closed = writer.closeChunk(); !closed) return closed;
+      due = SteadyClock::time_point::max();
+    }
+    bytes_ = writer.bytes();
+  }
+}
+
+void Recorder::fail(const std::string& reason) {
+  const std::lock_guard lock(mutex_);
+  state_ = State::failed;
+  waiting_.clear();
+  waiting_.shrink_to_fit();
+  spdlog::error("a recording stopped, its scene goes on: {}", reason);
+}
+
+}  // namespace clothstream::recording

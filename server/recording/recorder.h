@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: MIT
+// The journal of one scene, written to a file by a thread of its own.
+#pragma once
+
+#include <atomic>
+#include <condition_variable>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <variant>
+#include <vector>
+
+#include "clothstream/v1/recording.pb.h"
+#include "proto/recording/clock.h"
+#include "proto/recording/recording_writer.h"
+#include "server/stream/journal.h"
+
+namespace clothstream::recording {
+
+struct RecorderOptions {
+  std::filesystem::path directory;  // there must be one
+  std::string serverName;
+  // Of what waits to be written. When it is more, the recording ends: the scene does not wait for a disk.
+  std::size_t maxWaitingBytes = std::size_t{64} << 20;
+};
+
+// Thread-safe. The file is made when the scene begins to run: SCENE-TIME.mcap. An error ends the recording,
+// is logged, and leaves the scene alone.
+class Recorder : public stream::Journal {
+ public:
+  explicit Recorder(RecorderOptions options) : options_(std::move(options)) {}
+  // Everything that was told is written first.
+  ~Recorder() override;
+
+  enum class State : std::uint8_t { waiting, running, complete, failed };
+  State state() const { return state_; }
+  // Empty before it runs.
+  std::string path() const;
+  std::uint64_t bytes() const { return bytes_; }
+
+  bool active() const override { return state_ == State::running && !ended_; }
+  void begin(const vulkan::DeviceInfo& device, const scene::Scene& scene,
+             const v1::StreamDescription& description, const simulation::StateSnapshot& state) override;
+  void ticked(const stream::AppliedTick& tick) override;
+  void saved(const simulation::StateSnapshot& state, bool gripsHold) override;
+  void restored(std::uint64_t tick, const simulation::StateSnapshot& state) override;
+  void end() override;
+  void sent(const stream::SharedBytes& message) override;
+  void joined(std::uint64_t participant, const std::string& clientName,
+              const std::string& displayName) override;
+  void left(std::uint64_t participant) override;
+
+ private:
+  struct Own {
+    Topic topic{};
+    std::string bytes;
+  };
+  struct Waiting {
+    std::uint64_t time = 0;
+    std::variant<Own, stream::SharedBytes> what;
+  };
+
+  void put(Topic topic, const google::protobuf::MessageLite& message);
+  void push(std::variant<Own, stream::SharedBytes> what, std::size_t bytes);
+  void tellParticipant(std::uint64_t participant, v1::ParticipantEventKind kind,
+                       const std::string& clientName, const std::string& displayName);
+  void run(const std::string& sceneName, const Facts& facts);
+  // Until the end, or the error that it returns.
+  [[nodiscard]] Written writeAll(RecordingWriter& writer);
+  void fail(const std::string& reason);
+
+  const RecorderOptions options_;
+  const RecordingClock clock_;
+  std::atomic<State> state_ = State::waiting;
+  std::atomic<bool> ended_ = false;
+  std::atomic<std::uint64_t> bytes_ = 0;
+
+  mutable std::mutex mutex_;  // of all down to overflowed_
+  std::condition_variable changed_;
+  std::string path_;
+  std::vector<Waiting> waiting_;
+  std::size_t waitingBytes_ = 0;
+  bool overflowed_ = false;
+
+  v1::RecordedTick tick_;  // the device's thread's, used again
+  std::thread thread_;     // from begin() on
+};
+
+}  // namespace clothstream::recording

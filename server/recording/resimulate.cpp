@@ -1,0 +1,212 @@
+// SPDX-License-Identifier: MIT
+// From the start, tick by tick, with what the device was given then.
+#include "server/recording/resimulate.h"
+
+#include <algorithm>
+#include <memory>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "clothstream/v1/recording.pb.h"
+#include "proto/recording/recording_reader.h"
+#include "server/messages/scene_message.h"
+#include "server/recording/tick_message.h"
+#include "server/simulation/cloth_simulation.h"
+#include "server/vulkan/recorder.h"
+
+namespace clothstream::recording {
+namespace {
+
+using Done = tl::expected<void, std::string>;
+
+template <typename... Arguments>
+tl::unexpected<std::string> broken(fmt::format_string<Arguments...> text, Arguments&&... arguments) {
+  return tl::unexpected(fmt::format(text, std::forward<Arguments>(arguments)...));
+}
+
+template <typename MessageType>
+Done parse(std::string_view bytes, const char* what, MessageType& message) {
+  if (!message.ParseFromArray(bytes.data(), static_cast<int>(bytes.size())))
+    return broken("a {} in it cannot be read", what);
+  return {};
+}
+
+Difference differenceOf(const simulation::StateSnapshot& recorded, const simulation::StateSnapshot& now) {
+  const simulation::NodeState was = simulation::unpack(recorded), is = simulation::unpack(now);
+  Difference difference{.tick = recorded.tick};
+  for (std::size_t i = 0; i < was.positions.size(); ++i) {
+    const double distance = (is.positions[i].cast<double>() - was.positions[i].cast<double>()).norm();
+    // Written so that what is no number counts as far.
+    if (!(distance <= difference.largest)) difference.largest = distance;
+    difference.mean += distance / static_cast<double>(was.positions.size());
+  }
+  return difference;
+}
+
+// What a SceneHost does to the device, by what it wrote down.
+class Replay {
+ public:
+  Replay(const ResimulateOptions& options, Resimulation& result) : options_(options), result_(result) {}
+
+  bool started() const { return simulation_ != nullptr; }
+  Done take(const v1::RecordedScene& message);
+  Done take(v1::Checkpoint& message);
+  Done take(const v1::RecordedTick& message);
+
+ private:
+  template <typename Record>
+  void submit(const Record& record) {
+    recorder_->begin();
+    record();
+    device_->wait(device_->submit(*recorder_));
+  }
+  void makeSimulation(const simulation::StateSnapshot& state);
+  void compare(const v1::RecordedTick& message, const simulation::TickStatus& status);
+
+  const ResimulateOptions& options_;
+  Resimulation& result_;
+  v1::Scene definition_;
+  scene::Scene scene_;
+  simulation::StateSnapshot start_;
+  std::uint64_t tick_ = 0;
+  std::unique_ptr<vulkan::Device> device_;
+  std::unique_ptr<vulkan::Recorder> recorder_;
+  std::unique_ptr<simulation::ClothSimulation> simulation_;
+};
+
+Done Replay::take(const v1::RecordedScene& message) {
+  messages::Result<scene::Scene> scene = messages::toScene(message.scene());
+  if (!scene) return broken("its scene cannot be: {}", scene.error().text);
+  definition_ = message.scene();
+  scene_ = std::move(*scene);
+  return {};
+}
+
+Done Replay::take(v1::Checkpoint& message) {
+  if (scene_.cloths.empty()) return broken("it has a state before its scene");
+  const std::size_t bytes = std::size_t{scene_.nodeCount()} * simulation::kSnapshotBytesPerNode;
+  if (message.state().size() != bytes)
+    return broken("its state after tick {} is not of its scene's {} nodes", message.tick(),
+                  scene_.nodeCount());
+  const auto state = std::as_bytes(std::span(message.state()));
+  simulation::StateSnapshot snapshot{message.tick(), {state.begin(), state.end()}};
+  if (!started()) {
+    start_ = snapshot;
+    tick_ = message.tick();
+    device_ = std::make_unique<vulkan::Device>(options_.device(scene_.nodeCount()));
+    recorder_ = std::make_unique<vulkan::Recorder>(*device_);
+    result_.device = fmt::format("{} ({})", device_->info().name, device_->info().driver);
+    makeSimulation(snapshot);
+  } else if (message.restored()) {
+    makeSimulation(snapshot);
+  } else if (result_.firstDifferent) {
+    submit([&] { simulation_->recordSaveState(*recorder_); });
+    result_.differences.push_back(differenceOf(snapshot, simulation_->collectState(tick_)));
+  }
+  return {};
+}
+
+void Replay::makeSimulation(const simulation::StateSnapshot& state) {
+  simulation_.reset();
+  simulation_ = std::make_unique<simulation::ClothSimulation>(*device_, scene_);
+  submit([&] { simulation_->recordRestoreState(*recorder_, state); });
+}
+
+Done Replay::take(const v1::RecordedTick& message) {
+  if (!started()) return broken("it has a tick before its first state");
+  if (message.tick() != tick_ + 1) return broken("after tick {} comes tick {}", tick_, message.tick());
+  const auto inputs = toInputs(message, scene_);
+  if (!inputs) return tl::unexpected(inputs.error());
+  if (message.cloths_size() > 0) {
+    auto cloths = toCloths(message, definition_);
+    if (!cloths) return tl::unexpected(cloths.error());
+    scene_.cloths = std::move(*cloths);
+    simulation_->setCloths(scene_.cloths);
+  }
+  submit([&] {
+    if (message.recovery() == v1::RECOVERY_ROLLBACK) simulation_->recordRollback(*recorder_);
+    if (message.recovery() == v1::RECOVERY_RESET) simulation_->recordRestoreState(*recorder_, start_);
+    if (message.keeps_state()) simulation_->recordCheckpoint(*recorder_);
+    simulation_->recordTick(*recorder_, *inputs);
+  });
+  ++tick_;
+  compare(message, simulation_->status());
+  return {};
+}
+
+void Replay::compare(const v1::RecordedTick& message, const simulation::TickStatus& status) {
+  ++result_.ticks;
+  // Numbers that are none need not be the same ones.
+  const bool bothUnhealthy = message.unhealthy() && !status.healthy;
+  if (bothUnhealthy || (!message.unhealthy() && status.stateHash == message.state_hash())) return;
+  ++result_.different;
+  if (result_.firstDifferent) return;
+  result_.firstDifferent = message.tick();
+  result_.hash = status.stateHash;
+  result_.recordedHash = message.state_hash();
+}
+
+Done replay(RecordingReader& reader, const ResimulateOptions& options, Resimulation& result) {
+  Replay replay(options, result);
+  v1::RecordedTick tick;
+  const auto length = static_cast<double>(reader.end() - reader.start());
+  for (;;) {
+    const auto message = reader.next();
+    if (!message) return tl::unexpected(message.error());
+    if (!*message) break;
+    const std::string_view bytes = (*message)->bytes;
+    Done done;
+    if ((*message)->topic == Topic::scene) {
+      v1::RecordedScene scene;
+      done = parse(bytes, "scene", scene).and_then([&] { return replay.take(scene); });
+    } else if ((*message)->topic == Topic::checkpoints) {
+      v1::Checkpoint checkpoint;
+      done = parse(bytes, "state", checkpoint).and_then([&] { return replay.take(checkpoint); });
+    } else if ((*message)->topic == Topic::ticks) {
+      done = parse(bytes, "tick", tick).and_then([&] { return replay.take(tick); });
+      if (options.progress && length > 0)
+        options.progress(static_cast<double>((*message)->time - reader.start()) / length);
+      if (options.interrupted()) {
+        result.interrupted = true;
+        return done;
+      }
+    }
+    if (!done) return done;
+  }
+  if (!replay.started())
+    return broken(
+        "it holds no simulation: only recordings that a server made do (clothstream-server --record)");
+  return {};
+}
+
+}  // namespace
+
+tl::expected<Resimulation, std::string> resimulate(const ResimulateOptions& options) {
+  auto reader = RecordingReader::open(options.path);
+  if (!reader) return tl::unexpected(reader.error());
+  Resimulation result;
+  result.scene = reader->fact("scene");
+  result.recordedOn = fmt::format("{} ({})", reader->fact("device"), reader->fact("driver"));
+  if (Done done = replay(*reader, options, result); !done)
+    return broken("{} cannot be simulated again: {}", options.path, done.error());
+  return result;
+}
+
+std::string toText(const Resimulation& result) {
+  const std::string ticks =
+      fmt::format("{} ticks{}", result.ticks, result.interrupted ? " before it was interrupted" : "");
+  std::string text = fmt::format("scene     {}\nrecorded  {}\nagain     {}\n", result.scene,
+                                 result.recordedOn, result.device);
+  for (const Difference& difference : result.differences)
+    text += fmt::format("tick {}: nodes are {:.3g} m from where they were at most, {:.3g} m in the mean\n",
+                        difference.tick, difference.largest, difference.mean);
+  if (!result.firstDifferent) return text + fmt::format("{}, all the same to the bit\n", ticks);
+  if (result.differences.empty())
+    text += "no state was recorded after the first difference to measure it by\n";
+  return text +
+         fmt::format("{} of {} are different, first tick {}: its state's hash is {:016x}, and was {:016x}\n",
+                     result.different, ticks, *result.firstDifferent, result.hash, result.recordedHash);
+}
+
+}  // namespace clothstream::recording

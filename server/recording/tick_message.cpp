@@ -1,0 +1,225 @@
+// SPDX-License-Identifier: MIT
+// Inputs of a tick, written and read field by field.
+#include "server/recording/tick_message.h"
+
+#include <cmath>
+#include <variant>
+
+#include <fmt/format.h>
+
+#include "server/messages/limits.h"
+#include "server/messages/scene_message.h"
+#include "server/messages/vectors.h"
+
+namespace clothstream::recording {
+namespace {
+
+v1::Recovery toMessage(stream::Recovery recovery) {
+  switch (recovery) {
+    case stream::Recovery::rollback:
+      return v1::RECOVERY_ROLLBACK;
+    case stream::Recovery::reset:
+      return v1::RECOVERY_RESET;
+    case stream::Recovery::none:
+      break;
+  }
+  return v1::RECOVERY_NONE;
+}
+
+// But for their geometry.
+void writeCloths(const scene::Scene& scene, v1::RecordedTick& message) {
+  scene::Scene bare;
+  for (const scene::Cloth& cloth : scene.cloths) {
+    scene::Cloth& one = bare.cloths.emplace_back(cloth);
+    one.mesh.reset();
+    one.pins.clear();
+    one.pinnedVertices.clear();
+    one.pinnedRegions.clear();
+    one.attachments.clear();
+  }
+  v1::Scene parameters = messages::toMessage(bare);
+  for (std::size_t i = 0; i < bare.cloths.size(); ++i) {
+    v1::ClothParameters& to = *message.add_cloths();
+    to.mutable_cloth()->Swap(parameters.mutable_cloths(static_cast<int>(i)));
+    to.mutable_cloth()->clear_grid();
+    if (const auto& takenBack = bare.cloths[i].solver.takenBack) to.set_taken_back(*takenBack);
+  }
+}
+
+void writeShape(const scene::Shape& shape, v1::AppliedCollider& message) {
+  std::visit(
+      scene::ShapeVisitor{
+          [&](const scene::Sphere& sphere) { message.mutable_sphere()->set_radius(sphere.radius); },
+          [&](const scene::Capsule& capsule) {
+            message.mutable_capsule()->set_radius(capsule.radius);
+            message.mutable_capsule()->set_length(capsule.length);
+          },
+          [&](const scene::Plane&) { message.mutable_plane(); },
+          [&](const scene::Box& box) { messages::write(box.size, *message.mutable_box()->mutable_size()); },
+          [&](const scene::Hull&) {}},
+      shape);
+}
+
+void writeColliders(const stream::AppliedTick& tick, v1::RecordedTick& message) {
+  for (std::size_t i = 0; i < tick.inputs.colliders.size(); ++i) {
+    const simulation::MovingCollider& collider = tick.inputs.colliders[i];
+    v1::AppliedCollider& to = *message.add_colliders();
+    messages::write(collider.start, *to.mutable_start());
+    messages::write(collider.end, *to.mutable_end());
+    to.set_friction(collider.friction);
+    const stream::ColliderSet::Identity identity = tick.colliders.identity(i);
+    to.set_participant_id(identity.participant);
+    to.set_id(identity.id);
+    writeShape(collider.shape, to);
+  }
+}
+
+void writeGrip(const simulation::Grip& grip, v1::AppliedGrip& message) {
+  if (grip.state == simulation::Grip::State::free) return;
+  message.set_state(grip.state == simulation::Grip::State::takes ? v1::APPLIED_GRIP_STATE_TAKES
+                                                                 : v1::APPLIED_GRIP_STATE_HOLDS);
+  messages::write(grip.start, *message.mutable_start());
+  messages::write(grip.end, *message.mutable_end());
+  message.set_radius(grip.radius);
+  message.set_reach(grip.reach);
+  message.set_max_force(grip.maxForce);
+  message.set_slip_distance(grip.slipDistance);
+}
+
+// Numbers as they are: what was normalised once is not to be again. The first that no tick can have is kept.
+class Numbers {
+ public:
+  float number(float value, float least, float most) {
+    if (!(value >= least && value <= most)) good_ = false;
+    return value;
+  }
+  float number(float value) { return number(value, -kFar, kFar); }
+  scene::Vec3 vec3(const v1::Vec3& message) {
+    return {number(message.x()), number(message.y()), number(message.z())};
+  }
+  scene::Pose pose(const v1::Pose& message) {
+    const v1::Quaternion& q = message.orientation();
+    scene::Pose pose{vec3(message.position()), {number(q.w()), number(q.x()), number(q.y()), number(q.z())}};
+    if (std::abs(pose.orientation.norm() - 1) > messages::limits::kUnitTolerance) good_ = false;
+    return pose;
+  }
+  bool good() const { return good_; }
+
+ private:
+  static constexpr float kFar = 1e6f;
+  bool good_ = true;
+};
+
+constexpr float kMostSize = 1e4f;  // m
+
+scene::Shape shapeOf(Numbers& numbers, const v1::AppliedCollider& message, const scene::Scene& scene,
+                     bool& known) {
+  const auto size = [&](float value) { return numbers.number(value, 0, kMostSize); };
+  switch (message.shape_case()) {
+    case v1::AppliedCollider::kSphere:
+      return scene::Sphere{size(message.sphere().radius())};
+    case v1::AppliedCollider::kCapsule:
+      return scene::Capsule{size(message.capsule().radius()), size(message.capsule().length())};
+    case v1::AppliedCollider::kPlane:
+      return scene::Plane{};
+    case v1::AppliedCollider::kBox: {
+      const v1::Vec3& box = message.box().size();
+      return scene::Box{{size(box.x()), size(box.y()), size(box.z())}};
+    }
+    case v1::AppliedCollider::SHAPE_NOT_SET:
+      break;
+  }
+  known = message.participant_id() == 0 && message.id() < scene.colliders.size() &&
+          std::holds_alternative<scene::Hull>(scene.colliders[message.id()].shape);
+  return known ? scene.colliders[message.id()].shape : scene::Shape{};
+}
+
+simulation::Grip gripOf(Numbers& numbers, const v1::AppliedGrip& message) {
+  if (message.state() == v1::APPLIED_GRIP_STATE_FREE) return {};
+  return {.state = message.state() == v1::APPLIED_GRIP_STATE_TAKES ? simulation::Grip::State::takes
+                                                                   : simulation::Grip::State::holds,
+          .start = numbers.pose(message.start()),
+          .end = numbers.pose(message.end()),
+          .radius = numbers.number(message.radius(), 0, kMostSize),
+          .reach = numbers.number(message.reach(), 0, kMostSize),
+          .maxForce = numbers.number(message.max_force()),
+          .slipDistance = numbers.number(message.slip_distance())};
+}
+
+}  // namespace
+
+void write(const stream::AppliedTick& tick, v1::RecordedTick& message) {
+  message.Clear();
+  message.set_tick(tick.tick);
+  message.set_state_hash(tick.status.stateHash);
+  message.set_unhealthy(!tick.status.healthy);
+  message.set_recovery(toMessage(tick.recovery));
+  message.set_keeps_state(tick.keepsState);
+  if (tick.clothsChanged) writeCloths(tick.scene, message);
+  messages::write(tick.inputs.environment.gravity, *message.mutable_gravity());
+  messages::write(tick.inputs.environment.wind, *message.mutable_wind());
+  message.set_air_density(tick.inputs.environment.airDensity);
+  writeColliders(tick, message);
+  for (const scene::Pose& pose : tick.inputs.attachments) messages::write(pose, *message.add_attachments());
+  for (const simulation::Grip& grip : tick.inputs.grips) writeGrip(grip, *message.add_grips());
+}
+
+tl::expected<simulation::TickInputs, std::string> toInputs(const v1::RecordedTick& message,
+                                                           const scene::Scene& scene) {
+  const auto wrong = [&](const char* what) {
+    return tl::unexpected(fmt::format("tick {}: {}", message.tick(), what));
+  };
+  std::size_t attachments = 0;
+  for (const scene::Cloth& cloth : scene.cloths) attachments += cloth.attachments.size();
+  if (static_cast<std::size_t>(message.attachments_size()) != attachments)
+    return wrong("it has not the scene's attachments");
+  if (static_cast<std::size_t>(message.colliders_size()) > simulation::kMaxColliders ||
+      static_cast<std::size_t>(message.grips_size()) > simulation::kMaxGrips)
+    return wrong("it has more colliders or grips than there can be");
+  Numbers numbers;
+  simulation::TickInputs inputs;
+  inputs.environment.gravity = numbers.vec3(message.gravity());
+  inputs.environment.wind = numbers.vec3(message.wind());
+  inputs.environment.airDensity = numbers.number(message.air_density());
+  for (const v1::AppliedCollider& collider : message.colliders()) {
+    bool known = true;
+    const scene::Shape shape = shapeOf(numbers, collider, scene, known);
+    if (!known) return wrong("one of its colliders has no shape");
+    inputs.colliders.push_back({shape, numbers.pose(collider.start()), numbers.pose(collider.end()),
+                                numbers.number(collider.friction())});
+  }
+  for (const v1::Pose& pose : message.attachments()) inputs.attachments.push_back(numbers.pose(pose));
+  for (const v1::AppliedGrip& grip : message.grips()) inputs.grips.push_back(gripOf(numbers, grip));
+  if (!numbers.good()) return wrong("one of its numbers cannot be");
+  return inputs;
+}
+
+tl::expected<std::vector<scene::Cloth>, std::string> toCloths(const v1::RecordedTick& message,
+                                                              const v1::Scene& definition) {
+  if (message.cloths_size() != definition.cloths_size())
+    return tl::unexpected(fmt::format("tick {}: it has {} cloths, and the scene {}", message.tick(),
+                                      message.cloths_size(), definition.cloths_size()));
+  v1::Scene changed = definition;
+  for (int i = 0; i < message.cloths_size(); ++i) {
+    v1::Cloth cloth = message.cloths(i).cloth();
+    v1::Cloth& whole = *changed.mutable_cloths(i);
+    cloth.set_name(whole.name());
+    cloth.mutable_pins()->Swap(whole.mutable_pins());
+    cloth.mutable_pinned_vertices()->Swap(whole.mutable_pinned_vertices());
+    cloth.mutable_pinned_regions()->Swap(whole.mutable_pinned_regions());
+    cloth.mutable_attachments()->Swap(whole.mutable_attachments());
+    if (whole.has_mesh())
+      cloth.mutable_mesh()->Swap(whole.mutable_mesh());
+    else
+      cloth.mutable_grid()->Swap(whole.mutable_grid());
+    whole.Swap(&cloth);
+  }
+  messages::Result<scene::Scene> scene = messages::toScene(changed);
+  if (!scene) return tl::unexpected(fmt::format("tick {}: {}", message.tick(), scene.error().text));
+  for (int i = 0; i < message.cloths_size(); ++i)
+    if (message.cloths(i).has_taken_back())
+      scene->cloths[static_cast<std::size_t>(i)].solver.takenBack = message.cloths(i).taken_back();
+  return std::move(scene->cloths);
+}
+
+}  // namespace clothstream::recording

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: MIT
+// What a scene tells of itself as it happens, to whoever writes it down.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "clothstream/v1/session.pb.h"
+#include "server/scene/scene.h"
+#include "server/simulation/cloth_simulation.h"
+#include "server/stream/collider_set.h"
+#include "server/stream/envelope.h"
+#include "server/vulkan/device.h"
+
+namespace clothstream::stream {
+
+// What a tick does to the state before it: back to the newest that the device kept, or to the start.
+enum class Recovery : std::uint8_t { none, rollback, reset };
+
+// A complete tick: all that the device was given for it, and what it said of the outcome. Until the next.
+struct AppliedTick {
+  std::uint64_t tick = 0;
+  simulation::TickStatus status{};
+  Recovery recovery = Recovery::none;
+  bool keepsState = false;     // the device kept the state before it
+  bool clothsChanged = false;  // some parameter of a cloth is not as in the tick before
+  const scene::Scene& scene;   // with the parameters of this tick
+  const simulation::TickInputs& inputs;
+  const ColliderSet& colliders;  // of which the inputs' are
+};
+
+// No function of it waits, or throws.
+class Journal {
+ public:
+  virtual ~Journal() = default;
+
+  // Whether it goes on: then no frame is to be far from a key frame. Any thread.
+  virtual bool active() const = 0;
+
+  // The device's thread. Once, before the first tick: the scene as it starts, what describes its stream, and
+  // its state.
+  virtual void begin(const vulkan::DeviceInfo& device, const scene::Scene& scene,
+                     const v1::StreamDescription& description, const simulation::StateSnapshot& state) = 0;
+  virtual void ticked(const AppliedTick& tick) = 0;
+  // The state after the tick that was told last. `gripsHold`: some grip holds cloth, and the device alone
+  // knows which.
+  virtual void saved(const simulation::StateSnapshot& state, bool gripsHold) = 0;
+  // From here on the simulation is another one: it goes on after `tick` from this state.
+  virtual void restored(std::uint64_t tick, const simulation::StateSnapshot& state) = 0;
+  // Nothing follows.
+  virtual void end() = 0;
+
+  // Any thread. A serialised ServerMessage for everybody in the scene.
+  virtual void sent(const SharedBytes& message) = 0;
+  virtual void joined(std::uint64_t participant, const std::string& clientName,
+                      const std::string& displayName) = 0;
+  virtual void left(std::uint64_t participant) = 0;
+};
+
+}  // namespace clothstream::stream

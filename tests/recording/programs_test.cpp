@@ -1,0 +1,213 @@
+// SPDX-License-Identifier: MIT
+// `clothstream record`, `info`, `recover` and `clothstream-server --record`, `resimulate`, as programs.
+#include <chrono>
+#include <csignal>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/e2e/process.h"
+#include "tests/e2e/temporary_directory.h"
+#include "tests/recording/sample.h"
+
+namespace clothstream::recording {
+namespace {
+
+using namespace std::chrono_literals;
+using e2e::Process;
+using ::testing::HasSubstr;
+
+// Generous: sanitizers, validation and software Vulkan on a busy machine.
+constexpr auto kPatience = 60s;
+
+struct Ended {
+  int code = -1;
+  std::string output, errors;
+};
+
+Ended run(const std::vector<std::string>& command) {
+  Process process(command);
+  const std::optional<int> code = process.waitForEnd(kPatience);
+  return {code.value_or(-1), process.output(), process.errors()};
+}
+
+class RecordingPrograms : public ::testing::Test {
+ protected:
+  // With the scene "small".
+  void startServer(std::vector<std::string> options = {}) {
+    options.insert(options.begin(), {CLOTHSTREAM_SERVER, "--port", "0", "--grpc-port", "0", "--scene",
+                                     "small", "--scene-file", "tests/e2e/small.json"});
+    server_ = std::make_unique<Process>(options);
+    if (const auto line = server_->waitForLine("gRPC ", kPatience)) {
+      address_ = line->substr(line->find_first_not_of(' '));
+      return;
+    }
+    server_->waitForEnd(kPatience);
+    if (server_->errors().find("no Vulkan") != std::string::npos) GTEST_SKIP() << server_->errors();
+    FAIL() << "the server did not start: " << server_->errors();
+  }
+
+  std::string pathOf(const char* name) const { return (directory_.path() / name).string(); }
+  Ended clothstream(std::vector<std::string> arguments) const {
+    arguments.insert(arguments.begin(), CLOTHSTREAM);
+    return run(arguments);
+  }
+  std::string serversRecording() const {
+    for (const auto& entry : std::filesystem::directory_iterator(directory_.path() / "recordings"))
+      return entry.path().string();
+    return {};
+  }
+
+  e2e::TemporaryDirectory directory_;
+  std::unique_ptr<Process> server_;
+  std::string address_;
+};
+
+TEST_F(RecordingPrograms, AStreamIsRecordedWholeWithKeyFramesOnTheWay) {
+  startServer();
+  if (IsSkipped() || HasFatalFailure()) return;
+  const std::string path = pathOf("stream.mcap");
+  const Ended recorded = clothstream({"record", "small", "-o", path, "--server", address_, "--seconds", "3"});
+  ASSERT_EQ(recorded.code, 0) << recorded.errors;
+  const Ended info = clothstream({"info", path});
+  EXPECT_EQ(info.code, 0) << info.output << info.errors;
+  EXPECT_THAT(info.output, HasSubstr("; 0 not what the server held"));
+  EXPECT_THAT(info.output, HasSubstr("all checksums match"));
+  EXPECT_THAT(clothstream({"info", "--quick", path}).output, HasSubstr("index     whole"));
+  EXPECT_THAT(clothstream({"info", "--json", path}).output, HasSubstr("\"whole\": true"));
+
+  auto reader = RecordingReader::open(path);
+  ASSERT_TRUE(reader.has_value()) << reader.error();
+  std::size_t frames = 0, sinceKey = 0, farthest = 0;
+  for (auto message = reader->next(); *message; message = reader->next()) {
+    if ((*message)->topic != Topic::frames) continue;
+    sinceKey = isKeyFrame((*message)->bytes) ? 0 : sinceKey + 1;
+    farthest = std::max(farthest, sinceKey);
+    ++frames;
+  }
+  EXPECT_GT(frames, 30u);
+  EXPECT_LT(farthest, kFramesAKeyFrame);
+
+  const Ended again = clothstream({"record", "-o", path, "--server", address_, "--seconds", "1"});
+  EXPECT_EQ(again.code, 6);
+  EXPECT_THAT(again.errors, HasSubstr("File exists"));
+  const Ended unknown = clothstream({"record", "none", "-o", pathOf("none"), "--server", address_});
+  EXPECT_EQ(unknown.code, 4);
+  EXPECT_FALSE(std::filesystem::exists(pathOf("none")));
+  const Ended simulated = run({CLOTHSTREAM_SERVER, "resimulate", path});
+  EXPECT_EQ(simulated.code, 1);
+  EXPECT_THAT(simulated.errors, HasSubstr("it holds no simulation"));
+}
+
+TEST_F(RecordingPrograms, AnInterruptEndsRecordingsWhole) {
+  startServer({"--always-run", "--record", pathOf("recordings")});
+  if (IsSkipped() || HasFatalFailure()) return;
+  const std::string path = pathOf("stream.mcap");
+  Process record({CLOTHSTREAM, "record", "-o", path, "--server", address_});
+  const auto deadline = std::chrono::steady_clock::now() + kPatience;
+  std::error_code none;
+  while (std::filesystem::file_size(path, none) < 150'000 || none) {
+    ASSERT_LT(std::chrono::steady_clock::now(), deadline);
+    std::this_thread::sleep_for(20ms);
+  }
+  record.signal(SIGINT);
+  EXPECT_EQ(record.waitForEnd(kPatience), 0) << record.errors();
+  EXPECT_EQ(clothstream({"info", path}).code, 0);
+  server_->signal(SIGTERM);
+  EXPECT_EQ(server_->waitForEnd(kPatience), 0);
+  EXPECT_THAT(server_->output(), HasSubstr("recordings"));
+  const Ended info = clothstream({"info", serversRecording()});
+  EXPECT_EQ(info.code, 0) << info.output;
+  const Ended again = run({CLOTHSTREAM_SERVER, "resimulate", serversRecording()});
+  EXPECT_EQ(again.code, 0) << again.output << again.errors;
+  EXPECT_THAT(again.output, HasSubstr("all the same to the bit"));
+}
+
+TEST_F(RecordingPrograms, AKilledServerLosesAtMostItsLastChunk) {
+  startServer({"--always-run", "--record", pathOf("recordings")});
+  if (IsSkipped() || HasFatalFailure()) return;
+  const auto deadline = std::chrono::steady_clock::now() + kPatience;
+  std::error_code none;
+  while (serversRecording().empty() || std::filesystem::file_size(serversRecording(), none) < 150'000) {
+    ASSERT_LT(std::chrono::steady_clock::now(), deadline);
+    std::this_thread::sleep_for(20ms);
+  }
+  const auto killed = std::chrono::system_clock::now();
+  server_->signal(SIGKILL);
+  server_->waitForEnd(kPatience);
+
+  const std::string path = serversRecording(), whole = pathOf("whole.mcap");
+  auto cut = RecordingReader::open(path, CutFiles::read);
+  ASSERT_TRUE(cut.has_value()) << cut.error();
+  const double lost = std::chrono::duration<double>(killed.time_since_epoch()).count() -
+                      static_cast<double>(cut->end()) * 1e-9;
+  RecordProperty("lostSeconds", std::to_string(lost));
+  EXPECT_LT(lost, 0.5);  // a quarter of a second, and what a busy machine takes to get to it
+
+  const Ended damaged = clothstream({"info", path});
+  EXPECT_EQ(damaged.code, 7);
+  EXPECT_THAT(damaged.output, HasSubstr("run clothstream recover"));
+  EXPECT_THAT(run({CLOTHSTREAM_SERVER, "resimulate", path}).errors, HasSubstr("clothstream recover"));
+  const Ended recovered = clothstream({"recover", path, whole});
+  EXPECT_EQ(recovered.code, 0) << recovered.errors;
+  EXPECT_EQ(clothstream({"info", whole}).code, 0);
+  const Ended again = run({CLOTHSTREAM_SERVER, "resimulate", whole});
+  EXPECT_EQ(again.code, 0) << again.output << again.errors;
+}
+
+TEST_F(RecordingPrograms, RecoverSaysWhatIsLost) {
+  const std::string path = pathOf("damaged.mcap"), out = pathOf("out.mcap");
+  std::string bytes = sampleRecording(150);
+  const ChunkPlace fifth = readerOf(bytes).mcap().chunks()[5];
+  bytes[fifth.offset + fifth.length / 2] = static_cast<char>(bytes[fifth.offset + fifth.length / 2] ^ 1);
+  std::ofstream(path, std::ios::binary) << bytes;
+  const Ended info = clothstream({"info", path});
+  EXPECT_EQ(info.code, 7);
+  EXPECT_THAT(info.output, HasSubstr("damaged   the chunk at byte"));
+  const Ended recovered = clothstream({"recover", path, out});
+  EXPECT_EQ(recovered.code, 7);
+  EXPECT_THAT(recovered.errors, HasSubstr("1 damaged chunks"));
+  auto reader = RecordingReader::open(out);
+  ASSERT_TRUE(reader.has_value()) << reader.error();
+  EXPECT_TRUE(reader->check().has_value());
+  EXPECT_EQ(countMessages(*reader, Topic::frames), 138u);  // a fifth of a second is missing
+  EXPECT_EQ(clothstream({"recover", path, out}).code, 6);  // it is there already
+}
+
+TEST_F(RecordingPrograms, FilesThatAreNoRecordingsAreRefused) {
+  std::ofstream(pathOf("text")) << "This is a text.";
+  std::ofstream(pathOf("headers"), std::ios::binary) << sampleRecording(3).substr(0, 40'000);
+  for (const char* command : {"info", "recover"}) {
+    for (const char* file : {"missing", "text", "headers"}) {
+      std::vector<std::string> arguments{command, pathOf(file)};
+      if (arguments[0] == "recover") arguments.push_back(pathOf("out"));
+      const Ended ended = clothstream(arguments);
+      EXPECT_EQ(ended.code, 7) << command << ' ' << file;
+      EXPECT_THAT(ended.errors, HasSubstr(pathOf(file)));
+      EXPECT_FALSE(std::filesystem::exists(pathOf("out")));
+    }
+  }
+}
+
+TEST_F(RecordingPrograms, AFullDiskEndsTheClientsRecording) {
+  startServer();
+  if (IsSkipped() || HasFatalFailure()) return;
+  const std::string path = pathOf("stream.mcap");
+  // 150 KiB, in blocks of 1024 bytes.
+  const Ended recorded = run({"/bin/bash", "-c",
+                              "ulimit -f 150; exec " + std::string(CLOTHSTREAM) + " record -o " + path +
+                                  " --server " + address_ + " --seconds 50"});
+  EXPECT_EQ(recorded.code, 6);
+  EXPECT_THAT(recorded.errors, HasSubstr("File too large"));
+  EXPECT_EQ(clothstream({"recover", path, pathOf("whole")}).code, 0);
+}
+
+}  // namespace
+}  // namespace clothstream::recording

@@ -1,0 +1,357 @@
+// SPDX-License-Identifier: MIT
+// Scenes that are recorded while they run, and simulated again from what was recorded.
+#include "server/recording/recorder.h"
+
+#include <algorithm>
+#include <csignal>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+
+#include "proto/codec/packet_header.h"
+#include "proto/recording/file.h"
+#include "proto/recording/recording_reader.h"
+#include "server/messages/scene_file.h"
+#include "server/recording/recordings.h"
+#include "server/recording/resimulate.h"
+#include "server/stream/scene_host.h"
+#include "tests/e2e/temporary_directory.h"
+#include "tests/stream/small_scene.h"
+#include "tests/vulkan/gpu_test.h"
+
+namespace clothstream::recording {
+namespace {
+
+using stream::Clock;
+using ::testing::HasSubstr;
+using tests::gravity;
+using tests::handAt;
+using tests::smallScene;
+using tests::wind;
+
+// A scene on the shared device that is recorded.
+class RecordedScene {
+ public:
+  explicit RecordedScene(RecorderOptions options, scene::Scene scene = smallScene())
+      : recorder(std::make_shared<Recorder>(std::move(options))),
+        live(std::move(scene), false, recorder),
+        packer(encode::FrameEncoder::kSlots, [] {}),
+        host(std::make_unique<stream::SceneHost>(tests::device(), live, packer)) {}
+  ~RecordedScene() { packer.drain(); }
+
+  void ticks(int count) {
+    for (int i = 0; i < count; ++i) {
+      now += std::chrono::seconds(1);
+      host->begin(now);
+      host->finish();
+      packer.drain();
+      hashes.push_back(host->status().stateHash);
+    }
+  }
+  void change(scene::ParameterChange change) {
+    ASSERT_TRUE(live.inbox.postChange({.participant = 5, .change = std::move(change)}));
+  }
+  // The path of the recording, which is complete.
+  std::string finish() {
+    packer.drain();
+    host.reset();
+    const std::string path = recorder->path();
+    while (recorder->state() == Recorder::State::running) std::this_thread::yield();
+    return path;
+  }
+
+  std::shared_ptr<Recorder> recorder;
+  stream::LiveScene live;
+  stream::FramePacker packer;
+  std::unique_ptr<stream::SceneHost> host;
+  Clock::time_point now = Clock::now();
+  std::vector<std::uint64_t> hashes;
+};
+
+class RecorderTest : public tests::GpuTest {
+ protected:
+  RecorderOptions options() const { return {.directory = directory_.path(), .serverName = "test"}; }
+  Resimulation again(const std::string& path) const {
+    auto result = resimulate({.path = path,
+                              .device = [](std::uint32_t) { return vulkan::DeviceOptions{}; },
+                              .interrupted = [] { return false; },
+                              .progress = {}});
+    EXPECT_TRUE(result.has_value()) << result.error();
+    return result ? *result : Resimulation{};
+  }
+
+  e2e::TemporaryDirectory directory_;
+};
+
+// All that can happen to a scene.
+void happen(RecordedScene& recorded) {
+  recorded.ticks(3);
+  recorded.change(wind(3));
+  recorded.ticks(7);
+  for (int i = 0; i < 12; ++i) {
+    const float z = 0.02f * static_cast<float>(i) - 0.2f;
+    recorded.live.inbox.postPoses(
+        9,
+        {.colliders = {handAt(1, 0.1f, -0.6f, z), handAt(4, -0.1f, -0.2f, z)},
+         .grabs = {{.id = 1, .pose = {scene::Vec3(0, -0.4f, z), scene::Quaternion::Identity()}}}},
+        recorded.now);
+    recorded.ticks(1);
+  }
+  scene::Solver constraint;
+  constraint.kind = scene::SolverKind::constraint;
+  recorded.change({.cloths = {{.solver = constraint}}});
+  recorded.ticks(30);  // gently at first, then not
+  recorded.live.inbox.postPoses(9, {}, recorded.now);
+  scene::ParameterChange heavier;
+  heavier.cloths = {{.name = "sheet", .damping = 0.7f, .arealMass = 0.3f}};
+  heavier.colliders = {{.name = "ball", .position = scene::Vec3(0.2f, -0.4f, 0.1f)}};
+  recorded.change(heavier);
+  recorded.ticks(40);
+  recorded.live.resetWanted = true;
+  recorded.ticks(50);
+  recorded.change(gravity(-1e6f));
+  recorded.ticks(1);  // goes bad
+  recorded.change(gravity(-9.81f));
+  recorded.ticks(20);  // from the last good state
+  recorded.change(gravity(-1e6f));
+  recorded.ticks(2);  // goes bad again: from the start
+  recorded.change(gravity(-5));
+  recorded.ticks(60);
+}
+
+TEST_F(RecorderTest, WhatHappenedIsSimulatedAgainToTheBit) {
+  RecordedScene recorded(options());
+  happen(recorded);
+  const std::size_t ticks = recorded.hashes.size();
+  EXPECT_GT(recorded.live.metrics.rollbacks.value(), 0u);
+  EXPECT_GT(recorded.live.metrics.resets.value(), 0u);
+  const Resimulation result = again(recorded.finish());
+  EXPECT_EQ(result.ticks, ticks);
+  EXPECT_EQ(result.different, 0u) << toText(result);
+  EXPECT_THAT(toText(result), HasSubstr("all the same to the bit"));
+}
+
+TEST_F(RecorderTest, AScenePicksUpAfterItsDeviceWasLost) {
+  RecordedScene recorded(options());
+  recorded.ticks(30);
+  recorded.live.inbox.postPoses(
+      9, {.grabs = {{.id = 1, .pose = {scene::Vec3(0, -0.4f, 0), scene::Quaternion::Identity()}}}},
+      recorded.now);
+  recorded.ticks(10);
+  vulkan::Device another;
+  recorded.host->release();
+  recorded.host->rebuild(another);
+  recorded.change(wind(2));
+  recorded.ticks(30);
+  const Resimulation result = again(recorded.finish());
+  EXPECT_EQ(result.ticks, 70u);
+  EXPECT_EQ(result.different, 0u) << toText(result);
+}
+
+TEST_F(RecorderTest, ScenesOfMeshesHullsAndAttachmentsAreSimulatedAgainToTheBit) {
+  for (const char* name : {"swing", "obstacles", "tablecloth", "figure_15", "solver_xpbd"}) {
+    auto scene = messages::loadScene(name);
+    ASSERT_TRUE(scene.has_value());
+    RecordedScene recorded(options(), *scene);
+    recorded.ticks(8);
+    const Resimulation result = again(recorded.finish());
+    EXPECT_EQ(result.ticks, 8u);
+    EXPECT_EQ(result.different, 0u) << name << ": " << toText(result);
+  }
+}
+
+TEST_F(RecorderTest, HoldsWhatAStreamHoldsAndKeyFramesOftenEnough) {
+  RecordedScene recorded(options());
+  recorded.recorder->joined(3, "page", "Ada");
+  recorded.ticks(250);
+  recorded.recorder->left(3);
+  auto reader = RecordingReader::open(recorded.finish());
+  ASSERT_TRUE(reader.has_value()) << reader.error();
+  EXPECT_TRUE(reader->check().has_value());
+  EXPECT_EQ(reader->fact("scene"), "small");
+  EXPECT_EQ(reader->fact("server"), "test");
+  EXPECT_NE(reader->fact("driver"), "unknown");
+  EXPECT_EQ(reader->description()->scene(), "small");
+  std::array<std::size_t, kTopicNames.size()> counts{};
+  std::size_t sinceKey = 0, farthest = 0;
+  for (auto message = reader->next(); *message; message = reader->next()) {
+    ++counts[static_cast<std::size_t>((*message)->topic)];
+    if ((*message)->topic != Topic::frames) continue;
+    sinceKey = isKeyFrame((*message)->bytes) ? 0 : sinceKey + 1;
+    farthest = std::max(farthest, sinceKey);
+  }
+  const auto count = [&](Topic topic) { return counts[static_cast<std::size_t>(topic)]; };
+  EXPECT_EQ(count(Topic::frames), 250u);
+  EXPECT_EQ(count(Topic::ticks), 250u);
+  EXPECT_EQ(count(Topic::checkpoints), 2u);  // the start, and after five seconds
+  EXPECT_EQ(count(Topic::participants), 2u);
+  EXPECT_EQ(count(Topic::reports), 25u);
+  EXPECT_LT(farthest, kFramesAKeyFrame);
+}
+
+TEST_F(RecorderTest, ATickThatIsNotWhatItWasIsFoundAndMeasured) {
+  RecordedScene recorded(options());
+  recorded.ticks(210);
+  auto reader = RecordingReader::open(recorded.finish());
+  ASSERT_TRUE(reader.has_value());
+  const std::string path = (directory_.path() / "changed.mcap").string();
+  {
+    auto file = OutputFile::create(path);
+    auto writer = RecordingWriter::begin([&](std::string_view bytes) { return file->write(bytes); }, "test",
+                                         reader->facts());
+    ASSERT_TRUE(writer.has_value());
+    for (auto message = reader->next(); *message; message = reader->next()) {
+      std::string bytes((*message)->bytes);
+      v1::RecordedTick tick;
+      if ((*message)->topic == Topic::ticks && tick.ParseFromString(bytes) && tick.tick() == 100) {
+        tick.mutable_wind()->set_x(0.5f);
+        bytes = tick.SerializeAsString();
+      }
+      ASSERT_TRUE(writer->write((*message)->topic, (*message)->time, bytes));
+    }
+    ASSERT_TRUE(writer->finish());
+  }
+  const Resimulation result = again(path);
+  EXPECT_EQ(result.ticks, 210u);
+  EXPECT_EQ(result.firstDifferent, 100u);
+  EXPECT_EQ(result.different, 111u);
+  ASSERT_EQ(result.differences.size(), 1u);  // the state after five seconds
+  EXPECT_EQ(result.differences[0].tick, 201u);
+  EXPECT_GT(result.differences[0].largest, 1e-6);
+  EXPECT_LT(result.differences[0].largest, 0.1);
+  EXPECT_THAT(toText(result), HasSubstr("first tick 100"));
+}
+
+TEST_F(RecorderTest, BytesThatAreNoTickOfTheSceneAreRefused) {
+  RecordedScene recorded(options());
+  recorded.ticks(5);
+  auto reader = RecordingReader::open(recorded.finish());
+  ASSERT_TRUE(reader.has_value());
+  const auto errorWith = [&](const char* name, const std::function<void(v1::RecordedTick&)>& change) {
+    const std::string path = (directory_.path() / name).string();
+    auto file = OutputFile::create(path);
+    auto writer = RecordingWriter::begin([&](std::string_view bytes) { return file->write(bytes); }, "test",
+                                         reader->facts());
+    reader->rewind();
+    for (auto message = reader->next(); *message; message = reader->next()) {
+      std::string bytes((*message)->bytes);
+      v1::RecordedTick tick;
+      if ((*message)->topic == Topic::ticks && tick.ParseFromString(bytes) && tick.tick() == 3) {
+        change(tick);
+        bytes = tick.SerializeAsString();
+      }
+      EXPECT_TRUE(writer->write((*message)->topic, (*message)->time, bytes));
+    }
+    EXPECT_TRUE(writer->finish());
+    const auto result = resimulate({.path = path,
+                                    .device = [](std::uint32_t) { return vulkan::DeviceOptions{}; },
+                                    .interrupted = [] { return false; },
+                                    .progress = {}});
+    return result ? std::string("none") : result.error();
+  };
+  EXPECT_THAT(errorWith("missing", [](v1::RecordedTick& tick) { tick.set_tick(4); }),
+              HasSubstr("after tick 2 comes tick 4"));
+  EXPECT_THAT(errorWith("far", [](v1::RecordedTick& tick) { tick.mutable_wind()->set_x(1e30f); }),
+              HasSubstr("tick 3: one of its numbers cannot be"));
+  EXPECT_THAT(errorWith("turned",
+                        [](v1::RecordedTick& tick) {
+                          tick.mutable_colliders(0)->mutable_start()->mutable_orientation()->set_w(3);
+                        }),
+              HasSubstr("tick 3: one of its numbers cannot be"));
+  EXPECT_THAT(
+      errorWith("shapeless", [](v1::RecordedTick& tick) { tick.mutable_colliders(0)->clear_shape(); }),
+      HasSubstr("tick 3: one of its colliders has no shape"));
+  EXPECT_THAT(errorWith("attached", [](v1::RecordedTick& tick) { tick.add_attachments(); }),
+              HasSubstr("tick 3: it has not the scene's attachments"));
+  EXPECT_THAT(errorWith("cloths",
+                        [](v1::RecordedTick& tick) {
+                          tick.add_cloths();
+                          tick.add_cloths();
+                        }),
+              HasSubstr("tick 3: it has 2 cloths, and the scene 1"));
+}
+
+// As long as it lives, no file of this program grows beyond the limit.
+class FileSizeLimit {
+ public:
+  explicit FileSizeLimit(rlim_t bytes) {
+    std::signal(SIGXFSZ, SIG_IGN);
+    getrlimit(RLIMIT_FSIZE, &before_);
+    const rlimit limit{bytes, before_.rlim_max};
+    setrlimit(RLIMIT_FSIZE, &limit);
+  }
+  ~FileSizeLimit() { setrlimit(RLIMIT_FSIZE, &before_); }
+
+ private:
+  rlimit before_{};
+};
+
+TEST_F(RecorderTest, AFullDiskEndsTheRecordingAndNotTheScene) {
+  std::string path;
+  std::vector<std::uint64_t> hashes;
+  {
+    RecordedScene recorded(options());
+    {
+      const FileSizeLimit limit(200'000);
+      while (recorded.recorder->state() == Recorder::State::running) recorded.ticks(1);
+    }
+    EXPECT_EQ(recorded.recorder->state(), Recorder::State::failed);
+    EXPECT_FALSE(recorded.recorder->active());
+    recorded.ticks(10);
+    hashes = recorded.hashes;
+    path = recorded.recorder->path();
+  }
+  RecordedScene alone({.directory = directory_.path() / "none", .serverName = "test"});
+  alone.ticks(static_cast<int>(hashes.size()));
+  EXPECT_EQ(alone.recorder->state(), Recorder::State::failed);
+  EXPECT_EQ(alone.hashes, hashes);
+
+  auto reader = RecordingReader::open(path, CutFiles::read);
+  ASSERT_TRUE(reader.has_value()) << reader.error();
+  std::size_t frames = 0;
+  for (auto message = reader->next(); message && *message; message = reader->next())
+    if ((*message)->topic == Topic::frames) ++frames;
+  EXPECT_GT(frames, 0u);
+  EXPECT_LT(frames, hashes.size());
+}
+
+TEST_F(RecorderTest, ADiskThatIsTooSlowEndsTheRecordingWholeAndNotTheScene) {
+  RecorderOptions small = options();
+  small.maxWaitingBytes = 20'000;
+  RecordedScene recorded(small);
+  // No disk is as fast as this many states.
+  for (int i = 0; i < 200; ++i) recorded.recorder->saved({1, std::vector<std::byte>(10'000)}, false);
+  recorded.ticks(20);
+  const std::string path = recorded.finish();
+  EXPECT_EQ(recorded.recorder->state(), Recorder::State::failed);
+  EXPECT_EQ(recorded.hashes.size(), 20u);
+  auto reader = RecordingReader::open(path);
+  ASSERT_TRUE(reader.has_value()) << reader.error();
+  EXPECT_TRUE(reader->check().has_value());
+}
+
+TEST_F(RecorderTest, NoRecordingTakesTheNameOfAnother) {
+  std::vector<std::string> paths;
+  for (int i = 0; i < 3; ++i) {
+    RecordedScene recorded(options());
+    recorded.ticks(1);
+    paths.push_back(recorded.finish());
+  }
+  std::ranges::sort(paths);
+  EXPECT_EQ(std::ranges::unique(paths).size(), 0u);
+}
+
+TEST(Recordings, NeedADirectoryThatCanBeWrittenTo) {
+  const e2e::TemporaryDirectory directory;
+  const Recordings made({.directory = directory.path() / "a" / "b", .serverName = "test"});
+  EXPECT_TRUE(std::filesystem::is_directory(directory.path() / "a" / "b"));
+  EXPECT_THAT(made.report(), HasSubstr("running 0  complete 0  failed 0"));
+  EXPECT_THROW(Recordings({.directory = "/proc/none", .serverName = "test"}), std::runtime_error);
+}
+
+}  // namespace
+}  // namespace clothstream::recording

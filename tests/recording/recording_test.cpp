@@ -1,0 +1,250 @@
+// SPDX-License-Identifier: MIT
+// Written, read back, cut, damaged.
+#include <chrono>
+#include <fstream>
+#include <random>
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "clothstream/v1/recording.pb.h"
+#include "proto/codec/packet_header.h"
+#include "proto/recording/file.h"
+#include "proto/recording/mcap_reader.h"
+#include "proto/recording/recording_reader.h"
+#include "tests/e2e/temporary_directory.h"
+#include "tests/recording/sample.h"
+
+namespace clothstream::recording {
+namespace {
+
+using ::testing::HasSubstr;
+
+constexpr std::uint32_t kFrames = 150;  // 2.5 s, 13 chunks
+
+std::uint64_t tickOf(std::string_view bytes) {
+  v1::Frame frame;
+  EXPECT_TRUE(frame.ParseFromArray(bytes.data(), static_cast<int>(bytes.size())));
+  return codec::parsePacket(std::as_bytes(std::span(frame.packet())))->header.tick;
+}
+
+TEST(Recording, IsReadAsItWasWritten) {
+  RecordingReader reader = readerOf(sampleRecording(kFrames));
+  EXPECT_TRUE(reader.check().has_value());
+  EXPECT_EQ(reader.fact("scene"), "sample");
+  EXPECT_EQ(reader.fact("driver"), "unknown");
+  EXPECT_EQ(reader.description()->scene(), "sample");
+  EXPECT_EQ(reader.start(), sampleTime(0));
+  EXPECT_EQ(reader.end(), sampleTime(kFrames - 1));
+  std::uint64_t frames = 0, ticks = 0;
+  for (auto message = reader.next(); *message; message = reader.next()) {
+    if ((*message)->topic == Topic::frames) {
+      EXPECT_EQ((*message)->time, sampleTime(frames));
+      EXPECT_EQ(tickOf((*message)->bytes), ++frames);
+    }
+    if ((*message)->topic != Topic::ticks) continue;
+    v1::RecordedTick tick;
+    ASSERT_TRUE(tick.ParseFromArray((*message)->bytes.data(), static_cast<int>((*message)->bytes.size())));
+    EXPECT_EQ(tick.tick(), ++ticks);
+  }
+  EXPECT_EQ(frames, kFrames);
+  EXPECT_EQ(ticks, kFrames);
+}
+
+TEST(Recording, HasNoChunkOfMoreThanAFifthOfASecond) {
+  RecordingReader reader = readerOf(sampleRecording(kFrames));
+  EXPECT_EQ(reader.mcap().chunks().size(), 13u);
+  for (const ChunkPlace& chunk : reader.mcap().chunks())
+    EXPECT_LT(chunk.end - chunk.start, McapWriter::kChunkNs);
+}
+
+TEST(Recording, WithoutAMessageIsWholeToo) {
+  std::string bytes;
+  McapWriter writer([&](std::string_view more) {
+    bytes += more;
+    return Written();
+  });
+  ASSERT_TRUE(writer.begin("test"));
+  ASSERT_TRUE(writer.finish());
+  auto reader = McapReader::open(std::make_unique<MemorySource>(bytes));
+  ASSERT_TRUE(reader.has_value()) << reader.error();
+  EXPECT_TRUE(reader->indexed());
+  EXPECT_TRUE(reader->check().has_value());
+}
+
+TEST(Recording, SeekGoesToTheKeyFrameBefore) {
+  RecordingReader reader = readerOf(sampleRecording(kFrames));
+  for (const std::uint32_t frame : {149u, 0u, 23u, 24u, 25u, 71u, 72u, 130u}) {
+    ASSERT_TRUE(reader.seek(sampleTime(frame)));
+    const auto message = reader.next();
+    ASSERT_TRUE(message && *message);
+    EXPECT_EQ((*message)->topic, Topic::frames);
+    EXPECT_EQ(tickOf((*message)->bytes), frame / kFramesAKeyFrame * kFramesAKeyFrame + 1);
+  }
+  ASSERT_TRUE(reader.seek(0));
+  EXPECT_EQ((*reader.next())->topic, Topic::description);
+}
+
+TEST(Recording, CutAnywhereLosesAtMostTheChunkInWhichItIsCut) {
+  const std::string whole = sampleRecording(kFrames);
+  const RecordingReader reader = readerOf(whole);
+  const std::uint64_t dataStart = reader.mcap().chunks().front().offset;
+  for (std::uint64_t length = dataStart; length < whole.size(); length += 7) {
+    const std::string cut = whole.substr(0, length);
+    std::size_t wholeChunks = 0;
+    for (const ChunkPlace& chunk : reader.mcap().chunks())
+      if (chunk.offset + chunk.length <= length) ++wholeChunks;
+    RecordingReader cutReader = readerOf(cut, CutFiles::read);
+    EXPECT_FALSE(cutReader.mcap().indexed());
+    ASSERT_EQ(cutReader.mcap().chunks().size(), wholeChunks) << length;
+    EXPECT_FALSE(cutReader.check().has_value());
+  }
+  RecordingReader half = readerOf(whole.substr(0, whole.size() / 2), CutFiles::read);
+  const std::size_t frames = countMessages(half, Topic::frames);
+  EXPECT_GT(frames, kFrames / 4);
+  EXPECT_LT(frames, std::size_t{kFrames});
+}
+
+TEST(Recording, CutInItsHeadersIsSaidToBeSo) {
+  const std::string whole = sampleRecording(10);
+  const std::uint64_t dataStart = readerOf(whole).mcap().chunks().front().offset;
+  for (std::uint64_t length = 0; length < dataStart; ++length) {
+    const auto reader = RecordingReader::open(std::make_unique<MemorySource>(whole.substr(0, length)), "cut",
+                                              CutFiles::refused);
+    ASSERT_FALSE(reader.has_value()) << length;
+    EXPECT_THAT(reader.error(), HasSubstr("cut"));
+  }
+}
+
+TEST(Recording, NoFlippedBitGoesUnnoticed) {
+  const std::string whole = sampleRecording(30);
+  for (std::size_t bit = 0; bit < 8 * whole.size(); bit += 29) {
+    std::string damaged = whole;
+    damaged[bit / 8] = static_cast<char>(damaged[bit / 8] ^ (1 << bit % 8));
+    auto reader =
+        RecordingReader::open(std::make_unique<MemorySource>(std::move(damaged)), "sample", CutFiles::read);
+    EXPECT_FALSE(reader && reader->check()) << "bit " << bit;
+  }
+}
+
+TEST(Recording, AnyBytesAreReadSafely) {
+  const std::string whole = sampleRecording(40);
+  std::mt19937 random(1);
+  for (int round = 0; round < 4000; ++round) {
+    std::string bytes = whole;
+    for (unsigned i = 0, changes = 1 + random() % 8; i < changes; ++i) {
+      const std::size_t at = random() % bytes.size();
+      switch (random() % 4) {
+        case 0:
+          bytes[at] = static_cast<char>(random());
+          break;
+        case 1:  // a length or an offset that is huge
+          bytes.replace(at, std::min<std::size_t>(8, bytes.size() - at), 8, static_cast<char>(0xff));
+          break;
+        case 2:
+          bytes.erase(at, random() % 64);
+          break;
+        default:
+          bytes.insert(at, whole.substr(random() % whole.size(), random() % 64));
+      }
+    }
+    auto reader = RecordingReader::open(std::make_unique<MemorySource>(bytes), "hostile", CutFiles::read);
+    if (!reader) continue;
+    for (const Topic topic : {Topic::frames, Topic::ticks}) {
+      reader->rewind();
+      countMessages(*reader, topic);
+    }
+    (void)reader->seek(random());
+    (void)reader->description();
+    (void)reader->check();
+  }
+}
+
+TEST(Recording, OtherFilesAreSaidToBeWhatTheyAre) {
+  const e2e::TemporaryDirectory directory;
+  const auto errorOf = [&](const char* name, const std::string& content) {
+    const auto path = directory.path() / name;
+    std::ofstream(path, std::ios::binary) << content;
+    return RecordingReader::open(path.string()).error();
+  };
+  EXPECT_THAT(RecordingReader::open((directory.path() / "none").string()).error(),
+              HasSubstr("none: No such file or directory"));
+  EXPECT_THAT(RecordingReader::open(directory.path().string()).error(), HasSubstr("it is no regular file"));
+  EXPECT_THAT(errorOf("empty", ""), HasSubstr("it is no MCAP file: it is too short"));
+  EXPECT_THAT(errorOf("text", "This is a text."), HasSubstr("it is no MCAP file"));
+  std::string later = sampleRecording(3);
+  later[kVersionByte] = '1';
+  EXPECT_THAT(errorOf("later", later), HasSubstr("MCAP of version '1'"));
+  std::string cut = sampleRecording(40);
+  cut.resize(cut.size() / 2);
+  EXPECT_THAT(errorOf("cut", cut), HasSubstr("clothstream recover"));
+  std::string other;
+  McapWriter writer([&](std::string_view more) {
+    other += more;
+    return Written();
+  });
+  ASSERT_TRUE(writer.begin("another program") && writer.finish());
+  EXPECT_THAT(errorOf("other", other), HasSubstr("no recording of clothstream"));
+}
+
+TEST(Recording, SaysWhatItsSinkSaysAndWritesNothingAfterIt) {
+  std::size_t calls = 0;
+  McapWriter writer([&](std::string_view) -> Written {
+    if (++calls == 3) return tl::unexpected(std::string("no room"));
+    return {};
+  });
+  ASSERT_TRUE(writer.begin("test"));
+  EXPECT_EQ(writer.addFacts("a", {}).error(), "no room");
+  EXPECT_EQ(writer.write(1, 0, "x").error(), "no room");
+  EXPECT_EQ(writer.finish().error(), "no room");
+  EXPECT_EQ(calls, 3u);
+}
+
+TEST(OutputFile, ReplacesNothing) {
+  const e2e::TemporaryDirectory directory;
+  const std::string path = (directory.path() / "file").string();
+  std::ofstream(path) << "mine";
+  EXPECT_THAT(OutputFile::create(path).error(), HasSubstr("File exists"));
+}
+
+// An hour of 60 frames a second.
+TEST(Recording, OfAnHourIsSoughtThroughInTwentyMilliseconds) {
+  const e2e::TemporaryDirectory directory;
+  const std::string path = (directory.path() / "hour").string();
+  constexpr std::uint32_t kHour = 3600 * kSampleRate;
+  {
+    auto file = OutputFile::create(path);
+    ASSERT_TRUE(file.has_value());
+    writeSample([&](std::string_view bytes) { return file->write(bytes); }, kHour);
+  }
+  using SteadyClock = std::chrono::steady_clock;
+  const auto milliseconds = [](SteadyClock::time_point start) {
+    return std::chrono::duration<double, std::milli>(SteadyClock::now() - start).count();
+  };
+  const auto opening = SteadyClock::now();
+  auto reader = RecordingReader::open(path);
+  ASSERT_TRUE(reader.has_value()) << reader.error();
+  const double openMs = milliseconds(opening);
+  std::mt19937 random(2);
+  std::vector<double> seeks;
+  for (int i = 0; i < 200; ++i) {
+    const auto frame = static_cast<std::uint32_t>(random() % kHour);
+    const auto start = SteadyClock::now();
+    ASSERT_TRUE(reader->seek(sampleTime(frame)));
+    const auto message = reader->next();
+    seeks.push_back(milliseconds(start));
+    ASSERT_EQ(tickOf((*message)->bytes), frame / kFramesAKeyFrame * kFramesAKeyFrame + 1);
+  }
+  std::ranges::sort(seeks);
+  RecordProperty("openMs", std::to_string(openMs));
+  RecordProperty("seekMsMedian", std::to_string(seeks[seeks.size() / 2]));
+  RecordProperty("seekMsP99", std::to_string(seeks[seeks.size() * 99 / 100]));
+  std::printf("open %.1f ms, seek median %.2f ms, p99 %.2f ms, %.1f MiB, %zu chunks\n", openMs,
+              seeks[seeks.size() / 2], seeks[seeks.size() * 99 / 100],
+              static_cast<double>(reader->mcap().bytes()) / (1 << 20), reader->mcap().chunks().size());
+  EXPECT_LE(seeks[seeks.size() / 2], 20);
+}
+
+}  // namespace
+}  // namespace clothstream::recording

@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: MIT
+// A recording of a small cloth that waves.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+
+#include "proto/recording/mcap_writer.h"
+#include "proto/recording/recording_reader.h"
+
+namespace clothstream::recording {
+
+inline constexpr std::uint64_t kSampleStart = 1'700'000'000'000'000'000;  // ns
+inline constexpr std::uint32_t kSampleRate = 60;                          // frames/s
+constexpr std::uint64_t sampleTime(std::uint64_t frame) {
+  return kSampleStart + frame * 1'000'000'000 / kSampleRate;
+}
+
+// Of so many frames, with ticks beside them. As its sink got it.
+void writeSample(const Sink& sink, std::uint32_t frames);
+std::string sampleRecording(std::uint32_t frames);
+
+// Fails where the bytes cannot be opened.
+RecordingReader readerOf(std::string bytes, CutFiles cutFiles = CutFiles::refused);
+
+// What is read until the end or the first error: so many messages of this topic.
+std::size_t countMessages(RecordingReader& reader, Topic topic);
+
+}  // namespace clothstream::recording
