@@ -39,7 +39,7 @@ struct ServerOptions {
   // Of what all peers upload at the same time.
   std::size_t maxUploadBytes = std::size_t{256} << 20;
   // Gives each scene its journal, or null for none; may be empty.
-  std::function<std::shared_ptr<Journal>(const scene::Scene&)> journals;
+  std::function<std::shared_ptr<Journal>(const scene::Scene&)> journals{};
   // A peer that sends nothing for this long is dropped.
   std::chrono::milliseconds silence{30'000};
 };

@@ -79,6 +79,7 @@ struct Prediction {
 
 // Vertices that are predicted before the first of them is coded: few enough to stay in the nearest cache.
 inline constexpr std::uint32_t kChunk = 64;
+static_assert(kChunk % 8 == 0);  // as many are predicted at a time
 
 // A frame is begin(), then predict() and place() for all vertices in coding order, then keep(), or nothing
 // where the frame is given up.
@@ -95,7 +96,7 @@ class Predictor {
   // A predicted frame refers to the newest one of that layer.
   void begin(bool key, std::uint8_t referenceLayer);
   // Of up to kChunk vertices, none of which is a parent or of the ring of another; `out` and `frames` have
-  // room for whole fours of them.
+  // room for whole eights of them.
   void predict(std::uint32_t begin, std::uint32_t count, const WeightVectors& weights, Prediction* out,
                SurfaceFrames* frames) const;
   // What the weights multiplied; the turned ones in parts of 2^-kTurnedBits.
