@@ -12,6 +12,9 @@ if(CLOTHSTREAM_SANITIZE)
   if(CLOTHSTREAM_SANITIZE STREQUAL thread)
     # Asio's fences are not seen by the thread sanitizer; they order what its locks order already.
     target_compile_options(clothstream_options INTERFACE -Wno-tsan)
+  else()
+    add_library(clothstream_keep_loaded OBJECT ${PROJECT_SOURCE_DIR}/tests/keep_loaded.cpp)
+    target_link_libraries(clothstream_options INTERFACE $<TARGET_OBJECTS:clothstream_keep_loaded>)
   endif()
 endif()
 

@@ -6,14 +6,6 @@
 #include <memory>
 #include <stdexcept>
 
-#if defined(__SANITIZE_ADDRESS__)
-// What drivers allocate once, for as long as they are loaded, counts as leaked when they are unloaded; so
-// they are not.
-extern "C" int dlclose(void* /*library*/) {
-  return 0;
-}
-#endif
-
 namespace clothstream::tests {
 namespace {
 
