@@ -49,6 +49,9 @@ Expected<Figures> decodeFile(const DecodeOptions& options) {
   if (layout.cloths.size() != 1 || layout.cloths[0].rows == 0)
     return complaint(kUnreadable, "{} has {} cloths; a motion is of one grid", options.recording,
                      layout.cloths.size());
+  if (layout.cloths[0].vertexCount > options.maxVertices)
+    return complaint(kUnreadable, "{} is of {} vertices; {} are allowed (--max-vertices)", options.recording,
+                     layout.cloths[0].vertexCount, options.maxVertices);
   if (auto apart = areDifferent(options.recording, options.out); !apart) return tl::unexpected(apart.error());
   const codec::ClothLayout& cloth = layout.cloths[0];
   Figures figures{{cloth.columns, cloth.rows, recording->head().frames}};

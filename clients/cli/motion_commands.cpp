@@ -56,6 +56,11 @@ void MotionCommands::add(CLI::App& app) {
           "The file for the decoded motion, in the form that encode reads: positions, and the normals that "
           "follow from them")
       ->required();
+  decode_
+      ->add_option("--max-vertices", decodeOptions_.maxVertices,
+                   "More than that are refused: what a file says of itself decides how much memory it takes")
+      ->check(CLI::Range(1u, codec::kMaxVertices))
+      ->capture_default_str();
 }
 
 ExitCode MotionCommands::run() const {

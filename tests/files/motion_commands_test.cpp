@@ -257,6 +257,18 @@ TEST_F(MotionCommands, RefuseStreamsThatAreNone) {
   EXPECT_THAT(filesThere(), ::testing::ElementsAre("motion"));
 }
 
+TEST_F(MotionCommands, RefuseStreamsThatAskForMoreThanIsAllowed) {
+  ASSERT_EQ(clothstream({"encode", motion_, stream_}).code, 0);
+  const auto decoded = [&](std::uint32_t maxVertices) {
+    return clothstream({"decode", stream_, frames_, "--max-vertices", std::to_string(maxVertices)});
+  };
+  const Result refused = decoded(kShape.vertexCount() - 1);
+  EXPECT_EQ(refused.code, kUnreadable);
+  EXPECT_THAT(refused.errors, HasSubstr("is of 408 vertices; 407 are allowed (--max-vertices)"));
+  EXPECT_FALSE(std::filesystem::exists(frames_));
+  EXPECT_EQ(decoded(kShape.vertexCount()).code, 0);
+}
+
 TEST_F(MotionCommands, NoticeEveryPacketThatIsSpoilt) {
   ASSERT_EQ(clothstream({"encode", motion_, stream_}).code, 0);
   const std::string whole = streamBytes();

@@ -21,7 +21,9 @@ class Recording : public ::testing::Test {
     auto writer = RecordingWriter::create(path(), {.layout = {.epoch = 7,
                                                               .codec = codec::kCodecHierarchical,
                                                               .maxError = 0.002f,
+                                                              .normals = codec::NormalMode::octahedral,
                                                               .temporalLayers = 2,
+                                                              .qualities = 3,
                                                               .cloths = {{12, 3, 4, {}}}},
                                                    .rate = 72,
                                                    .frames = 2,
@@ -64,7 +66,9 @@ TEST_F(Recording, ComesBackAsItWasWritten) {
   EXPECT_EQ(head.layout.epoch, 7u);
   EXPECT_EQ(head.layout.codec, codec::kCodecHierarchical);
   EXPECT_EQ(head.layout.maxError, 0.002f);
+  EXPECT_EQ(head.layout.normals, codec::NormalMode::octahedral);
   EXPECT_EQ(head.layout.temporalLayers, 2);
+  EXPECT_EQ(head.layout.qualities, 3);
   ASSERT_EQ(head.layout.cloths.size(), 1u);
   EXPECT_EQ(head.layout.cloths[0].rows, 3u);
   EXPECT_EQ(head.layout.cloths[0].columns, 4u);

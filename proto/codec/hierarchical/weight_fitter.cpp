@@ -9,8 +9,8 @@
 namespace clothstream::codec::hierarchical {
 namespace {
 
-constexpr double kFade = 0.75;  // of what was known, at each fit
-constexpr double kStay = 0.01;  // how much the former weights count beside what was added
+constexpr double kFade = 0.75;                    // of what was known, at each fit
+constexpr double kStay = 0.01, kStayOfKey = 0.1;  // how much the former weights count beside what was added
 // By class, in a frame. More of a large cloth would say no more.
 constexpr std::array<std::uint32_t, kWeightClasses> kFittedChunks{8, 16, 6, 12, 10, 20};
 
@@ -73,7 +73,7 @@ void WeightFitter::add(std::size_t weightClass, const ChunkProducts& products) {
   for (std::size_t i = 0; i < kProducts; ++i) fresh[i] += static_cast<double>(products[i]);
 }
 
-void WeightFitter::fit(Weights& weights) {
+void WeightFitter::fit(Weights& weights, bool key) {
   for (std::size_t c = 0; c < kWeightClasses; ++c) {
     Sums& sums = classes_[c];
     for (std::size_t i = 0; i < kProducts; ++i) sums.all[i] = kFade * sums.all[i] + sums.fresh[i];
@@ -88,7 +88,7 @@ void WeightFitter::fit(Weights& weights) {
       x[i] = *product++;
     }
     for (std::size_t i = 0; i < kFeatures; ++i) {
-      const double stay = kStay * (m[i][i] + 1e-3 * trace / kFeatures) + 1e-9;
+      const double stay = (key ? kStayOfKey : kStay) * (m[i][i] + 1e-3 * trace / kFeatures) + 1e-9;
       m[i][i] += stay;
       x[i] += stay * weights[c][i] / (1 << kWeightBits);
     }

@@ -43,8 +43,9 @@ class WeightFitter {
  public:
   void add(std::size_t weightClass, const ChunkProducts& products);
 
-  // To all that was added, the older the less; stays near `weights` where that says little.
-  void fit(Weights& weights);
+  // To all that was added, the older the less; stays near `weights` where that says little, and nearer in a
+  // key frame, of which there is one alone.
+  void fit(Weights& weights, bool key);
 
   void clear() { classes_ = {}; }
 

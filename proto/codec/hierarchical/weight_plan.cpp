@@ -76,7 +76,7 @@ Weights WeightPlan::next(std::size_t of) {
 
 Weights WeightPlan::fitted(std::size_t of) {
   Weights next = weights_[of];
-  fitters_[of].fit(next);
+  fitters_[of].fit(next, key_);
   for (std::size_t c = 0; c < kWeightClasses; ++c) {
     for (std::size_t f = 0; f < kFeatures; ++f) {
       const bool isFixed = key_ && (f < firstWeight(true) || f >= endWeight(true));
