@@ -180,6 +180,7 @@ void serve(const ProgramOptions& options, const Signals& signals) {
                                                  .runAlways = options.alwaysRun,
                                                  .reportRate = options.reportRate,
                                                  .maxCreatedScenes = options.maxCreatedScenes,
+                                                 .encoderThreads = options.encoderThreads,
                                                  .journals = [&](const scene::Scene&) {
                                                    return recordings ? recordings->add() : nullptr;
                                                  }});

@@ -117,6 +117,12 @@ std::variant<ProgramOptions, int> parseOptions(int argc, const char* const* argv
       ->check(CLI::Range(0, 1000))
       ->capture_default_str()
       ->group(scenes);
+  app.add_option("--encoder-threads", options.encoderThreads,
+                 "Threads that predict large frames where the device does not; 0: a quarter of the "
+                 "processors, 8 at most")
+      ->check(CLI::Range(0, 64))
+      ->capture_default_str()
+      ->group(scenes);
   app.add_flag("--list-materials", options.listMaterials, "Show what cloths may be made of, and exit")
       ->group(scenes);
 

@@ -26,6 +26,7 @@ struct ProgramOptions {
   bool alwaysRun = false;
   double reportRate = 4;
   std::uint32_t maxCreatedScenes = 16;
+  std::uint32_t encoderThreads = 0;
   std::optional<step::StepOptions> step;  // instead of serving
   std::string resimulate;                 // a recording, instead of serving; empty: none
   std::filesystem::path recordDirectory;  // empty: nothing is recorded

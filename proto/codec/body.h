@@ -9,6 +9,7 @@
 #include <span>
 
 #include "proto/codec/coarse_packet.h"
+#include "proto/codec/encoder.h"
 #include "proto/codec/packet_header.h"
 #include "proto/codec/stream_layout.h"
 
@@ -49,9 +50,10 @@ class BodyEncoder {
   virtual std::uint64_t reconstructionHash() const = 0;
 };
 
-// Those of each codec, for a layout that is possible; decoders are null if memory is out. An encoder's max
-// error is that of its quality.
+// Those of each codec, for a layout that is possible; decoders are null if memory is out. An encoder's layout
+// has the max error of its quality.
 std::unique_ptr<BodyDecoder> makeHierarchicalDecoder(const StreamLayout& layout, Detail detail);
-std::unique_ptr<BodyEncoder> makeHierarchicalEncoder(const StreamLayout& layout, std::uint32_t weightLag);
+std::unique_ptr<BodyEncoder> makeHierarchicalEncoder(const StreamLayout& layout,
+                                                     const EncoderOptions& options);
 
 }  // namespace clothstream::codec

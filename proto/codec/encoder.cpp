@@ -27,7 +27,7 @@ std::unique_ptr<Encoder> Encoder::make(const StreamLayout& stream, const Encoder
   assert(options.weightLag == 0 || layout.temporalLayers == 1);
   auto state = std::make_unique<State>();
   state->quality = options.quality;
-  state->body = makeHierarchicalEncoder(layout, options.weightLag);
+  state->body = makeHierarchicalEncoder(layout, options);
   state->floats = 3 * std::size_t{layout.vertexCount()};
   state->layers = layout.temporalLayers;
   state->hasNormals = layout.normals == NormalMode::octahedral;

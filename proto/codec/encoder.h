@@ -9,6 +9,7 @@
 
 #include "proto/codec/packet_header.h"
 #include "proto/codec/stream_layout.h"
+#include "proto/codec/workers.h"
 
 namespace clothstream::codec {
 
@@ -19,6 +20,9 @@ struct EncoderOptions {
   // before it, and a key frame's to an earlier one's, as they are where frames are prepared before those
   // before them are coded. 0: all frames before it, and itself. For any of them a decoder is the same.
   std::uint32_t weightLag = 0;
+  // Large frames are predicted by all of them, to the same bits; they outlive the encoder. None: by the
+  // caller alone.
+  Workers* workers = nullptr;
 };
 
 // One encoder a stream; not thread-safe. Memory is taken once, at construction.

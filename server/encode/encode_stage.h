@@ -26,7 +26,8 @@ class EncodeStage {
 
 std::unique_ptr<EncodeStage> makeHierarchicalHostStage(const vulkan::Device& device,
                                                        const simulation::ClothSimulation& simulation,
-                                                       const codec::StreamLayout& layout);
+                                                       const codec::StreamLayout& layout,
+                                                       codec::Workers* workers);
 // Throws std::runtime_error where DevicePredictor does not support it.
 std::unique_ptr<EncodeStage> makeHierarchicalDeviceStage(const vulkan::Device& device,
                                                          const simulation::ClothSimulation& simulation,

@@ -68,14 +68,14 @@ struct FrameEncoder::State {
 };
 
 FrameEncoder::FrameEncoder(const vulkan::Device& device, const simulation::ClothSimulation& simulation,
-                           const codec::StreamLayout& layout, Prediction prediction)
+                           const codec::StreamLayout& layout, Prediction prediction, codec::Workers* workers)
     : state_(std::make_unique<State>()) {
   assert(layout.vertexCount() == simulation.nodeCount());
   const bool onDevice = prediction == Prediction::automatic
                             ? !device.isSoftware() && DevicePredictor::supports(device, layout)
                             : prediction == Prediction::onDevice;
-  const auto make = onDevice ? makeHierarchicalDeviceStage : makeHierarchicalHostStage;
-  state_->stage = make(device, simulation, layout);
+  state_->stage = onDevice ? makeHierarchicalDeviceStage(device, simulation, layout)
+                           : makeHierarchicalHostStage(device, simulation, layout, workers);
 }
 
 FrameEncoder::~FrameEncoder() = default;

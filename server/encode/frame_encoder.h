@@ -9,6 +9,7 @@
 
 #include "proto/codec/packet_header.h"
 #include "proto/codec/stream_layout.h"
+#include "proto/codec/workers.h"
 #include "server/simulation/cloth_simulation.h"
 #include "server/vulkan/device.h"
 #include "server/vulkan/recorder.h"
@@ -47,9 +48,11 @@ class FrameEncoder {
   // Frames that may be recorded and not yet entropy-coded.
   static constexpr std::uint32_t kSlots = kWeightLag;
 
-  // Throws std::runtime_error where `prediction` is asked for and cannot be.
+  // Throws std::runtime_error where `prediction` is asked for and cannot be. `workers`, if any, predict large
+  // frames on the host and outlive the encoder.
   FrameEncoder(const vulkan::Device& device, const simulation::ClothSimulation& simulation,
-               const codec::StreamLayout& layout, Prediction prediction = Prediction::automatic);
+               const codec::StreamLayout& layout, Prediction prediction = Prediction::automatic,
+               codec::Workers* workers = nullptr);
   ~FrameEncoder();
   FrameEncoder(const FrameEncoder&) = delete;
   FrameEncoder& operator=(const FrameEncoder&) = delete;

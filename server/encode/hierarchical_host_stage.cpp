@@ -14,9 +14,9 @@ namespace {
 class HierarchicalHostStage final : public EncodeStage {
  public:
   HierarchicalHostStage(const vulkan::Device& device, const simulation::ClothSimulation& simulation,
-                        const codec::StreamLayout& layout)
+                        const codec::StreamLayout& layout, codec::Workers* workers)
       : simulation_(simulation),
-        encoder_(codec::Encoder::make(layout)),
+        encoder_(codec::Encoder::make(layout, {.workers = workers})),
         positions_(3 * simulation.nodeCount()),
         normals_(layout.normals == codec::NormalMode::octahedral ? positions_.size() : 0) {
     for (Slot& slot : slots_) {
@@ -71,8 +71,9 @@ class HierarchicalHostStage final : public EncodeStage {
 
 std::unique_ptr<EncodeStage> makeHierarchicalHostStage(const vulkan::Device& device,
                                                        const simulation::ClothSimulation& simulation,
-                                                       const codec::StreamLayout& layout) {
-  return std::make_unique<HierarchicalHostStage>(device, simulation, layout);
+                                                       const codec::StreamLayout& layout,
+                                                       codec::Workers* workers) {
+  return std::make_unique<HierarchicalHostStage>(device, simulation, layout, workers);
 }
 
 }  // namespace clothstream::encode

@@ -7,8 +7,12 @@
 
 namespace clothstream::stream {
 
-FramePacker::FramePacker(std::size_t capacity, std::function<void()> everySecond)
-    : everySecond_(std::move(everySecond)), ring_(capacity), thread_([this] { run(); }) {}
+FramePacker::FramePacker(std::size_t capacity, std::function<void()> everySecond,
+                         std::uint32_t encoderThreads)
+    : everySecond_(std::move(everySecond)),
+      workers_(encoderThreads),
+      ring_(capacity),
+      thread_([this] { run(); }) {}
 
 FramePacker::~FramePacker() {
   {

@@ -13,6 +13,7 @@
 
 #include <google/protobuf/repeated_ptr_field.h>
 
+#include "server/encode/encoder_threads.h"
 #include "server/encode/frame_encoder.h"
 #include "server/stream/clock.h"
 #include "server/stream/live_scene.h"
@@ -38,8 +39,9 @@ struct CompleteFrame {
 // push() and drain() belong to the device's thread.
 class FramePacker {
  public:
-  // At most `capacity` frames wait. `everySecond` is called about once a second, on the packer's thread.
-  FramePacker(std::size_t capacity, std::function<void()> everySecond);
+  // At most `capacity` frames wait. `everySecond` is called about once a second, on the packer's thread,
+  // which predicts large frames together with others: so many in all.
+  FramePacker(std::size_t capacity, std::function<void()> everySecond, std::uint32_t encoderThreads = 1);
   // What was pushed is packed first.
   ~FramePacker();
   FramePacker(const FramePacker&) = delete;
@@ -49,12 +51,15 @@ class FramePacker {
   void push(CompleteFrame& frame);
   // Returns when everything is packed: no encoder that was pushed is used any more.
   void drain();
+  // For the encoders that will be pushed.
+  codec::Workers& workers() { return workers_; }
 
  private:
   void run();
   void pack();
 
   std::function<void()> everySecond_;
+  encode::EncoderThreads workers_;
   std::mutex mutex_;
   std::condition_variable changed_;
   std::vector<CompleteFrame> ring_;

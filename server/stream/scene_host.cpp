@@ -25,10 +25,11 @@ constexpr std::size_t kMaxPoseArrivals = 256;
 
 }  // namespace
 
-SceneHost::OnDevice::OnDevice(vulkan::Device& device_, const scene::Scene& scene)
+SceneHost::OnDevice::OnDevice(vulkan::Device& device_, const scene::Scene& scene, codec::Workers& workers)
     : device(device_),
       simulation(device_, scene),
-      encoder(device_, simulation, encode::streamLayout(scene, LiveScene::kEpoch)),
+      encoder(device_, simulation, encode::streamLayout(scene, LiveScene::kEpoch),
+              encode::Prediction::automatic, &workers),
       recorder(device_) {
   recorder.begin();
   simulation.recordSaveState(recorder);
@@ -67,7 +68,7 @@ SceneHost::SceneHost(vulkan::Device& device, LiveScene& scene, FramePacker& pack
       colliders_(scene_),
       holds_(scene_),
       gentleUntil_(scene_.cloths.size(), 0),
-      onDevice_(std::make_unique<OnDevice>(device, scene_)) {
+      onDevice_(std::make_unique<OnDevice>(device, scene_, packer.workers())) {
   newestState_ = onDevice_->start;
   if (live_.journal)
     live_.journal->begin(device.info(), scene_,
@@ -316,7 +317,7 @@ void SceneHost::release() {
 }
 
 void SceneHost::rebuild(vulkan::Device& device) {
-  auto fresh = std::make_unique<OnDevice>(device, live_.start());
+  auto fresh = std::make_unique<OnDevice>(device, live_.start(), packer_.workers());
   fresh->simulation.setCloths(scene_.cloths);
   fresh->recorder.begin();
   fresh->simulation.recordRestoreState(fresh->recorder, newestState_);

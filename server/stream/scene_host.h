@@ -62,7 +62,7 @@ class SceneHost {
  private:
   // What lives on the device. Made with its start complete there, and `start` that state.
   struct OnDevice {
-    OnDevice(vulkan::Device& device, const scene::Scene& scene);
+    OnDevice(vulkan::Device& device, const scene::Scene& scene, codec::Workers& workers);
     // A tick and a frame with all that they may need: software devices compile a kernel when it first runs,
     // which takes tenths of a second. Leaves the start state.
     void warmUp(const scene::Scene& scene);

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cassert>
 #include <stdexcept>
+#include <thread>
 #include <utility>
 
 #include <fmt/format.h>
@@ -52,7 +53,10 @@ SceneServer::State::State(std::vector<scene::Scene> definitions, ServerOptions o
       packer((scenes.size() + options.maxCreatedScenes) * encode::FrameEncoder::kSlots,
              [this] {
                for (const auto& session : sessionsNow()) session->checkSilence(Clock::now());
-             }),
+             },
+             options.encoderThreads > 0
+                 ? options.encoderThreads
+                 : encode::EncoderThreads::suitedTo(std::thread::hardware_concurrency())),
       device(options.device, scenes, packer, metrics, options.runAlways, options.reportRate),
       maker(*this) {}
 

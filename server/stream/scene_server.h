@@ -36,6 +36,8 @@ struct ServerOptions {
   std::uint32_t maxParticipants = 64;
   // Beside those that the server starts with; 0: peers make none.
   std::uint32_t maxCreatedScenes = 16;
+  // That predict large frames where the host does; 0: as many as suit the machine (EncoderThreads).
+  std::uint32_t encoderThreads = 0;
   // Of what all peers upload at the same time.
   std::size_t maxUploadBytes = std::size_t{256} << 20;
   // Gives each scene its journal, or null for none; may be empty.

@@ -29,6 +29,7 @@ struct Settings {
   std::optional<std::filesystem::path> input;
   std::uint32_t frames = 600;
   float maxError = 0.0005f;
+  std::uint32_t encoderThreads = 1;
 };
 
 // One JSON object a row; every row names its suite. A suite checks its results before it reports a time, and

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
+#include <functional>
 #include <optional>
 #include <utility>
 
@@ -35,11 +36,45 @@ std::int32_t nearest(float value) {
   return simde_mm_cvtss_si32(simde_mm_set_ss(value));
 }
 
+// What one thread needs for the chunk that it encodes.
+struct Desk {
+  std::array<Prediction, kChunk> predictions;
+  std::array<SurfaceFrames, kChunk / 4> frames;
+  alignas(16) std::int32_t magnitudes[kComponents][kChunk];  // by component
+  ProductSums products;
+};
+
+// What comes of a chunk, until it is its turn to be written.
+struct EncodedChunk {
+  ChunkResiduals residuals;
+  std::uint32_t count = 0;
+  bool any = false;   // something that is not a residual of 0
+  bool fits = false;  // the weights are fitted to it
+  ChunkProducts products{};
+};
+
+void scale(const Desk& desk, std::size_t count, const ScaleModel& model, ChunkResiduals& chunk) {
+  for (std::size_t first = 0; first < count; first += 4) {
+    const Vectors4 e = model.expect(&desk.predictions[first]);
+    const Int32x4 byComponent[]{e.x, e.y, e.z};
+    const Int32x4 n = Int32x4::load(&desk.magnitudes[kAlongNormal][first]);
+    const Int32x4 u = Int32x4::load(&desk.magnitudes[kAlongU][first]);
+    for (const Component c : kCodingOrder)
+      model.scales(c, byComponent[c], n, u).store(&chunk.scales[c][first]);
+  }
+}
+
+// Where there are workers, so many vertices are encoded before they are written, in so many pieces at most,
+// each of so many at least.
+constexpr std::uint32_t kBatch = 256 * kChunk, kMostPieces = 16, kLeastPiece = 8 * kChunk;
+
 }  // namespace
 
 struct HierarchicalEncoder::State {
-  State(const StreamLayout& streamLayout, std::uint32_t weightLag)
+  State(const StreamLayout& streamLayout, const EncoderOptions& options)
       : layout(streamLayout),
+        workers(options.workers),
+        batch(workers != nullptr ? kBatch : kChunk),
         vertices(layout.vertexCount()),
         hasNormals(layout.normals == NormalMode::octahedral),
         unit(latticeUnit(layout.maxError)),
@@ -50,7 +85,9 @@ struct HierarchicalEncoder::State {
     if (!predictor.allocate(layout, unit.stepBits) || (hasNormals && !normalPrediction.allocate(layout)))
       std::abort();  // memory is out, as of any other allocation here
     fitted.emplace(predictor.hierarchy());
-    plan.emplace(predictor.hierarchy(), layout.temporalLayers, weightLag);
+    plan.emplace(predictor.hierarchy(), layout.temporalLayers, options.weightLag);
+    desks.resize(workers != nullptr ? kMostPieces : 1);
+    encoded.resize(batch / kChunk);
   }
 
   // Of the distance, in units: half a step along three axes, and a unit for roundings.
@@ -60,7 +97,8 @@ struct HierarchicalEncoder::State {
   }
   void quantise(std::span<const float> positions);
   Local local(const SurfaceFrame& frame, Int32x4 difference) const;
-  void choose(std::uint32_t begin, std::size_t first, std::array<Int32x4, 4>& positions);
+  void choose(const Desk& desk, std::uint32_t begin, std::size_t first, ChunkResiduals& chunk,
+              std::array<Int32x4, 4>& positions) const;
   Int32x4 chooseFar(const Prediction& prediction, Int32x4 target, std::int32_t* residual) const;
   bool isAtRest() const;
   void use(const Weights& chosen);
@@ -71,16 +109,24 @@ struct HierarchicalEncoder::State {
   bool startsToRest(std::uint32_t slot) const;
   bool goesOnResting(std::uint32_t slot, const Prediction& prediction) const;
   void encodePhase(const Phase& phase);
-  // Returns whether a residual is not 0.
-  bool encodeChunk(std::uint32_t begin, std::uint32_t count, std::uint32_t weightClass);
-  void rest(std::uint32_t begin, std::size_t first, std::size_t count, std::array<Int32x4, 4>& positions);
-  void scale(std::size_t count, const ScaleModel& model);
-  void fitTo(std::uint32_t weightClass, const FeatureVectors& features, const Prediction& prediction,
-             Int32x4 target, std::size_t i);
+  // `piece` of each part of so many things, in parts of at least `least` where several threads do it.
+  template <typename Piece>
+  void share(std::uint32_t count, std::uint32_t least, const Piece& piece);
+  // Of the phase, what begins there; all are of one class, of which `number` chunks came before the phase.
+  void encodeChunk(const Phase& phase, std::uint32_t begin, std::uint32_t number, Desk& desk,
+                   EncodedChunk& out);
+  // Returns whether there was something that is not a residual of 0.
+  bool write(std::uint32_t weightClass, const EncodedChunk& encoded);
+  void rest(const Desk& desk, std::uint32_t begin, std::size_t first, std::size_t count,
+            ChunkResiduals& chunk, std::array<Int32x4, 4>& positions) const;
+  void fitTo(Desk& desk, std::uint32_t weightClass, const FeatureVectors& features, Int32x4 target,
+             std::size_t i) const;
   void encodeNormals(std::span<const float> normals);
-  void note(const Prediction& prediction, std::uint32_t weightClass, std::size_t i);
+  void note(const Desk& desk, std::uint32_t weightClass, const ChunkResiduals& chunk, std::size_t i);
 
   StreamLayout layout;
+  Workers* workers;
+  std::uint32_t batch;  // vertices that are encoded before they are written
   std::size_t vertices;
   bool hasNormals;
   LatticeUnit unit;
@@ -91,8 +137,7 @@ struct HierarchicalEncoder::State {
   std::uint32_t restTurns = 0;            // of which one comes in this frame; 0: none rests anew
   std::unique_ptr<FrameWriter> writer;
   std::optional<FitSchedule> fitted;
-  std::array<std::uint32_t, kWeightClasses> chunks{};  // of each class that were coded
-  ProductSums products;                                // of the chunk that is being encoded
+  std::array<std::uint32_t, kWeightClasses + 1> chunks{};  // of each class that were coded
   std::optional<WeightPlan> plan;
   std::array<std::byte, WeightPlan::kMaxBytes> weightBytes{};
   Weights used{};  // in this frame
@@ -102,11 +147,8 @@ struct HierarchicalEncoder::State {
   NormalPrediction normalPrediction;
   std::vector<FacedNormal> sentNormals;  // by vertex
   std::vector<CodedResidual>* recorded = nullptr;
-  // Of the chunk that is being encoded.
-  std::array<Prediction, kChunk> predictions;
-  std::array<SurfaceFrames, kChunk / 4> frames;
-  ChunkResiduals chunk;
-  alignas(16) std::int32_t magnitudes[kComponents][kChunk];  // by component
+  std::vector<Desk> desks;            // of each piece
+  std::vector<EncodedChunk> encoded;  // of a batch
 };
 
 void HierarchicalEncoder::State::quantise(std::span<const float> positions) {
@@ -120,14 +162,18 @@ void HierarchicalEncoder::State::quantise(std::span<const float> positions) {
     if (!(q >= -limit)) return -kLimit;  // what is no number, too
     return q > limit ? kLimit : simde_mm_cvtsd_si32(simde_mm_set_sd(q));
   };
-  for (std::size_t slot = 0; slot < vertices; ++slot) {
-    const float* p = &positions[3 * std::size_t{vertexOf[slot]}];
-    const Node next{coordinate(p[0]), coordinate(p[1]), coordinate(p[2]), 0};
-    const bool still = next.load().sameThree(wanted[slot].load());
-    stillFrames[slot] =
-        still ? static_cast<std::uint8_t>(std::min<std::uint32_t>(stillFrames[slot] + 1u, kStillFrames)) : 0;
-    wanted[slot] = next;
-  }
+  const auto quantiseSlots = [&](std::uint32_t, std::uint32_t begin, std::uint32_t end) {
+    for (std::size_t slot = begin; slot < end; ++slot) {
+      const float* p = &positions[3 * std::size_t{vertexOf[slot]}];
+      const Node next{coordinate(p[0]), coordinate(p[1]), coordinate(p[2]), 0};
+      const bool still = next.load().sameThree(wanted[slot].load());
+      stillFrames[slot] =
+          still ? static_cast<std::uint8_t>(std::min<std::uint32_t>(stillFrames[slot] + 1u, kStillFrames))
+                : 0;
+      wanted[slot] = next;
+    }
+  };
+  share(static_cast<std::uint32_t>(vertices), 4 * kLeastPiece, quantiseSlots);
 }
 
 // In steps.
@@ -178,14 +224,15 @@ Vectors4 economise(const Local4& wish) {
 }
 
 // The residuals of four vertices, and where they lead.
-void HierarchicalEncoder::State::choose(std::uint32_t begin, std::size_t first,
-                                        std::array<Int32x4, 4>& positions) {
+void HierarchicalEncoder::State::choose(const Desk& desk, std::uint32_t begin, std::size_t first,
+                                        ChunkResiduals& chunk, std::array<Int32x4, 4>& positions) const {
+  const auto& predictions = desk.predictions;
   std::array<Int32x4, 4> differences;
   for (std::size_t i = 0; i < 4; ++i)
     differences[i] =
         wanted[std::min(begin + first + i, vertices - 1)].load() - predictions[first + i].position;
   const Vectors4 d = transposed(differences);
-  const SurfaceFrames& f = frames[first / 4];
+  const SurfaceFrames& f = desk.frames[first / 4];
   const Float32x4 scale = Float32x4::all(1.0f / static_cast<float>(1 << (kUnitBits + unit.stepBits)));
   const Float32x4 x = scale * Float32x4::of(d.x), y = scale * Float32x4::of(d.y),
                   z = scale * Float32x4::of(d.z);
@@ -284,77 +331,93 @@ bool HierarchicalEncoder::State::goesOnResting(std::uint32_t slot, const Predict
          squaredLength(wanted[slot].load() - prediction.last) <= squaredPromise();
 }
 
+template <typename Piece>
+void HierarchicalEncoder::State::share(std::uint32_t count, std::uint32_t least, const Piece& piece) {
+  const std::uint32_t pieces = workers == nullptr ? 1 : std::clamp(count / least, 1u, kMostPieces);
+  if (pieces == 1) return piece(0, 0, count);
+  const auto at = [&](std::uint32_t i) {
+    return static_cast<std::uint32_t>(std::uint64_t{count} * i / pieces);
+  };
+  const auto part = [&](std::uint32_t i) { piece(i, at(i), at(i + 1)); };
+  workers->run(pieces, std::ref(part));
+}
+
 void HierarchicalEncoder::State::encodePhase(const Phase& phase) {
   writer->beginPhase();
   bool any = false;
-  for (std::uint32_t begin = phase.begin; begin < phase.end; begin += kChunk)
-    any = encodeChunk(begin, std::min(kChunk, phase.end - begin), phase.weightClass) || any;
+  std::uint32_t& number = chunks[phase.weightClass];
+  for (std::uint32_t first = phase.begin; first < phase.end; first += batch) {
+    const std::uint32_t count = (std::min(batch, phase.end - first) + kChunk - 1) / kChunk;
+    share(count, kLeastPiece / kChunk, [&](std::uint32_t piece, std::uint32_t begin, std::uint32_t end) {
+      for (std::uint32_t i = begin; i < end; ++i)
+        encodeChunk(phase, first + i * kChunk, number + i, desks[piece], encoded[i]);
+    });
+    number += count;
+    for (std::uint32_t i = 0; i < count; ++i) any = write(phase.weightClass, encoded[i]) || any;
+  }
   writer->endPhase(any);
   quiet = quiet && !any;
 }
 
-bool HierarchicalEncoder::State::encodeChunk(std::uint32_t begin, std::uint32_t count,
-                                             std::uint32_t weightClass) {
+void HierarchicalEncoder::State::encodeChunk(const Phase& phase, std::uint32_t begin, std::uint32_t number,
+                                             Desk& desk, EncodedChunk& out) {
+  const std::uint32_t weightClass = phase.weightClass, count = std::min(kChunk, phase.end - begin);
   const ScaleModel model(kScaleWeights[scaleClassOf(weightClass, frame == 0)]);
-  const bool fits =
-      weightClass < kWeightClasses && fitted->isFitted(weightClass, chunks[weightClass]++, frame);
-  bool any = false;
-  chunk.anyStays = false;
-  predictor.predict(begin, count, vectors[weightClass], predictions.data(), frames.data());
+  ChunkResiduals& chunk = out.residuals;
+  out.count = count;
+  out.fits = weightClass < kWeightClasses && fitted->isFitted(weightClass, number, frame);
+  out.any = chunk.anyStays = false;
+  predictor.predict(begin, count, vectors[weightClass], desk.predictions.data(), desk.frames.data());
   for (std::size_t first = 0; first < count; first += 4) {
     const std::size_t four = std::min<std::size_t>(count - first, 4);
     std::array<Int32x4, 4> positions;
-    choose(begin, first, positions);
-    rest(begin, first, four, positions);
+    choose(desk, begin, first, chunk, positions);
+    rest(desk, begin, first, four, chunk, positions);
     Int32x4 counted[kComponents];
     for (std::size_t c = 0; c < kComponents; ++c) {
       counted[c] = countedMagnitudes(Int32x4::load(&chunk.residuals[c][first]));
-      counted[c].store(&magnitudes[c][first]);
+      counted[c].store(&desk.magnitudes[c][first]);
     }
     const Int32x4 packed = packMagnitudes(counted[kAlongU], counted[kAlongV], counted[kAlongNormal]);
-    any = any || (~(packed == Int32x4::all(0)).signs() & ((1 << four) - 1)) != 0;
+    out.any = out.any || (~(packed == Int32x4::all(0)).signs() & ((1 << four) - 1)) != 0;
     predictor.place(begin + static_cast<std::uint32_t>(first), static_cast<std::uint32_t>(four),
-                    &predictions[first], positions, packed);
+                    &desk.predictions[first], positions, packed);
   }
-  if (writer->needsScales()) scale(count, model);
-  writer->add(chunk, count);
-  for (std::uint32_t i = 0; fits && i < count; ++i) {
+  out.any = out.any || chunk.anyStays;
+  if (writer->needsScales()) scale(desk, count, model, chunk);
+  for (std::uint32_t i = 0; out.fits && i < count; ++i) {
     const std::uint32_t slot = begin + i;
-    fitTo(weightClass, predictor.features(slot, predictions[i]), predictions[i], wanted[slot].load(), i);
+    fitTo(desk, weightClass, predictor.features(slot, desk.predictions[i]), wanted[slot].load(), i);
   }
-  if (fits) plan->add(weightClass, products.take());
+  if (out.fits) out.products = desk.products.take();
   if (recorded != nullptr) {
-    for (std::size_t i = 0; i < count; ++i) note(predictions[i], weightClass, i);
+    for (std::size_t i = 0; i < count; ++i) note(desk, weightClass, chunk, i);
   }
-  return any || chunk.anyStays;
+}
+
+bool HierarchicalEncoder::State::write(std::uint32_t weightClass, const EncodedChunk& chunk) {
+  writer->add(chunk.residuals, chunk.count);
+  if (chunk.fits) plan->add(weightClass, chunk.products);
+  return chunk.any;
 }
 
 // Leaves out the residuals of what rests, or starts to.
-void HierarchicalEncoder::State::rest(std::uint32_t begin, std::size_t first, std::size_t count,
-                                      std::array<Int32x4, 4>& positions) {
+void HierarchicalEncoder::State::rest(const Desk& desk, std::uint32_t begin, std::size_t first,
+                                      std::size_t count, ChunkResiduals& chunk,
+                                      std::array<Int32x4, 4>& positions) const {
   for (std::size_t i = first; i < first + count; ++i) {
     const std::uint32_t slot = begin + static_cast<std::uint32_t>(i);
     chunk.stays[i] = startsToRest(slot);
     chunk.anyStays = chunk.anyStays || chunk.stays[i];
-    if (!chunk.stays[i] && !goesOnResting(slot, predictions[i])) continue;
-    positions[i - first] = predictions[i].last;
+    if (!chunk.stays[i] && !goesOnResting(slot, desk.predictions[i])) continue;
+    positions[i - first] = desk.predictions[i].last;
     for (auto& component : chunk.residuals) component[i] = 0;
   }
 }
 
-void HierarchicalEncoder::State::scale(std::size_t count, const ScaleModel& model) {
-  for (std::size_t first = 0; first < count; first += 4) {
-    const Vectors4 e = model.expect(&predictions[first]);
-    const Int32x4 byComponent[]{e.x, e.y, e.z};
-    const Int32x4 n = Int32x4::load(&magnitudes[kAlongNormal][first]);
-    const Int32x4 u = Int32x4::load(&magnitudes[kAlongU][first]);
-    for (const Component c : kCodingOrder)
-      model.scales(c, byComponent[c], n, u).store(&chunk.scales[c][first]);
-  }
-}
-
-void HierarchicalEncoder::State::fitTo(std::uint32_t weightClass, const FeatureVectors& features,
-                                       const Prediction& prediction, Int32x4 target, std::size_t i) {
+void HierarchicalEncoder::State::fitTo(Desk& desk, std::uint32_t weightClass, const FeatureVectors& features,
+                                       Int32x4 target, std::size_t i) const {
+  const Prediction& prediction = desk.predictions[i];
   const auto& w = used[weightClass];
   Int32x4 predicted = Int32x4::all(0), turned = predicted;
   for (std::size_t f = 0; f < kFeaturePairs; ++f) {
@@ -367,8 +430,9 @@ void HierarchicalEncoder::State::fitTo(std::uint32_t weightClass, const FeatureV
   // What is hard to predict here is not to spoil the weights for the rest.
   const std::uint32_t around = prediction.parentMagnitudes;
   const std::uint32_t near = (around & 255u) + (around >> 8 & 255u) + (around >> 16 & 255u);
-  const auto own = static_cast<std::uint32_t>(magnitudes[0][i] + magnitudes[1][i] + magnitudes[2][i]);
-  products.add(features, goal, roughReciprocal(6 + 4 * own * own + near));
+  const auto own =
+      static_cast<std::uint32_t>(desk.magnitudes[0][i] + desk.magnitudes[1][i] + desk.magnitudes[2][i]);
+  desk.products.add(features, goal, roughReciprocal(6 + 4 * own * own + near));
 }
 
 void HierarchicalEncoder::State::encodeNormals(std::span<const float> normals) {
@@ -382,20 +446,21 @@ void HierarchicalEncoder::State::encodeNormals(std::span<const float> normals) {
   }
 }
 
-void HierarchicalEncoder::State::note(const Prediction& prediction, std::uint32_t weightClass,
-                                      std::size_t i) {
+void HierarchicalEncoder::State::note(const Desk& desk, std::uint32_t weightClass,
+                                      const ChunkResiduals& chunk, std::size_t i) {
+  const Prediction& prediction = desk.predictions[i];
   for (std::size_t c = 0; c < kComponents; ++c) {
     const auto byte = [c](std::uint32_t bytes) { return static_cast<std::uint8_t>(bytes >> 8 * c); };
     recorded->push_back(
         {static_cast<std::uint8_t>(c), static_cast<std::uint8_t>(scaleClassOf(weightClass, frame == 0)),
          byte(prediction.parentMagnitudes), byte(prediction.ringMagnitudes), byte(prediction.lastMagnitudes),
-         static_cast<std::uint8_t>(magnitudes[kAlongNormal][i]),
-         static_cast<std::uint8_t>(magnitudes[kAlongU][i]), chunk.residuals[c][i]});
+         static_cast<std::uint8_t>(desk.magnitudes[kAlongNormal][i]),
+         static_cast<std::uint8_t>(desk.magnitudes[kAlongU][i]), chunk.residuals[c][i]});
   }
 }
 
-HierarchicalEncoder::HierarchicalEncoder(const StreamLayout& layout, std::uint32_t weightLag)
-    : state_(std::make_unique<State>(layout, weightLag)) {}
+HierarchicalEncoder::HierarchicalEncoder(const StreamLayout& layout, const EncoderOptions& options)
+    : state_(std::make_unique<State>(layout, options)) {}
 HierarchicalEncoder::~HierarchicalEncoder() = default;
 
 std::size_t HierarchicalEncoder::packetBound() const {
@@ -436,8 +501,9 @@ void HierarchicalEncoder::record(std::vector<CodedResidual>* residuals) {
 
 namespace clothstream::codec {
 
-std::unique_ptr<BodyEncoder> makeHierarchicalEncoder(const StreamLayout& layout, std::uint32_t weightLag) {
-  return std::make_unique<hierarchical::HierarchicalEncoder>(layout, weightLag);
+std::unique_ptr<BodyEncoder> makeHierarchicalEncoder(const StreamLayout& layout,
+                                                     const EncoderOptions& options) {
+  return std::make_unique<hierarchical::HierarchicalEncoder>(layout, options);
 }
 
 }  // namespace clothstream::codec

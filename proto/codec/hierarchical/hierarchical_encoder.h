@@ -18,7 +18,7 @@ struct CodedResidual {
 
 class HierarchicalEncoder final : public BodyEncoder {
  public:
-  explicit HierarchicalEncoder(const StreamLayout& layout, std::uint32_t weightLag = 0);
+  explicit HierarchicalEncoder(const StreamLayout& layout, const EncoderOptions& options = {});
   ~HierarchicalEncoder() override;
 
   std::size_t packetBound() const override;
@@ -26,7 +26,7 @@ class HierarchicalEncoder final : public BodyEncoder {
                      std::span<std::byte> out) override;
   std::uint64_t reconstructionHash() const override;
 
-  // Appends to `residuals` what is coded from now on; null: no more.
+  // Appends to `residuals` what is coded from now on; null: no more. Without workers.
   void record(std::vector<CodedResidual>* residuals);
 
  private:

@@ -5,6 +5,7 @@
 #include <functional>
 #include <vector>
 
+#include "server/encode/encoder_threads.h"
 #include "tests/bench/codec/bench_motion.h"
 #include "tests/bench/codec/codec_measurement.h"
 #include "tests/bench/codec/our_codec.h"
@@ -34,9 +35,10 @@ class Frames {
 // `positionsOf` gives a frame's in the order of the layout's vertices.
 nlohmann::ordered_json measure(const std::string& motion, const codec::StreamLayout& layout,
                                std::size_t frames,
-                               const std::function<std::span<const float>(std::size_t)>& positionsOf) {
+                               const std::function<std::span<const float>(std::size_t)>& positionsOf,
+                               codec::Workers* workers = nullptr) {
   const codec::ClothLayout& cloth = layout.cloths.front();
-  CodecMeasurement measurement(std::make_unique<OurCodec>(layout), cloth, double{layout.maxError});
+  CodecMeasurement measurement(std::make_unique<OurCodec>(layout, workers), cloth, double{layout.maxError});
   Truth truth(cloth);
   for (std::size_t frame = 0; frame < frames; ++frame) measurement.add(truth.next(positionsOf(frame)));
   return measurement.row(motion);
@@ -59,13 +61,18 @@ Rows runCodec(vulkan::Device& device, const Settings& settings) {
   Rows rows;
   for (const BenchMotion& motion : chosenMotions(device, settings)) {
     const Frames frames(motion);
+    const auto ofTheGrid = [&](std::size_t frame) { return frames[frame]; };
     codec::StreamLayout layout{.epoch = 1, .maxError = settings.maxError, .cloths = {motion.cloth}};
     for (const Variant& variant : kVariants) {
       layout.codec = variant.codec;
       layout.temporalLayers = variant.temporalLayers;
       layout.normals = variant.normals;
-      rows.push_back(
-          measure(motion.name, layout, frames.count(), [&](std::size_t frame) { return frames[frame]; }));
+      rows.push_back(measure(motion.name, layout, frames.count(), ofTheGrid));
+    }
+    if (settings.encoderThreads > 1) {
+      encode::EncoderThreads threads(settings.encoderThreads);
+      const codec::StreamLayout plain{.epoch = 1, .maxError = settings.maxError, .cloths = {motion.cloth}};
+      rows.push_back(measure(motion.name, plain, frames.count(), ofTheGrid, &threads));
     }
     if (motion.cloth.rows < 2 || motion.cloth.rows != motion.cloth.columns) continue;
     codec::CutGrid cut(motion.cloth.rows);

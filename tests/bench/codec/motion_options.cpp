@@ -22,6 +22,9 @@ void addMotionOptions(CLI::App& app, Settings& settings) {
   app.add_option("--max-error", settings.maxError, "Of the codecs, m along each of three axes")
       ->check(CLI::Range(double{codec::kSmallestMaxError}, double{codec::kLargestMaxError}))
       ->capture_default_str();
+  app.add_option("--encoder-threads", settings.encoderThreads, "Measure codec 2 with so many threads, too")
+      ->check(CLI::Range(1u, 64u))
+      ->capture_default_str();
 }
 
 }  // namespace clothstream::bench

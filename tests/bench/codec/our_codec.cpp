@@ -8,15 +8,17 @@
 
 namespace clothstream::bench {
 
-OurCodec::OurCodec(const codec::StreamLayout& layout)
+OurCodec::OurCodec(const codec::StreamLayout& layout, codec::Workers* workers)
     : layout_(layout),
-      encoder_(codec::Encoder::make(layout)),
+      hasWorkers_(workers != nullptr),
+      encoder_(codec::Encoder::make(layout, {.workers = workers})),
       decoder_(codec::Decoder::make(layout)),
       packet_(encoder_->packetBound()) {}
 
 std::string OurCodec::name() const {
   std::string name = fmt::format("codec {}", layout_.codec);
   if (layout_.temporalLayers > 1) name += fmt::format(", {} layers", layout_.temporalLayers);
+  if (hasWorkers_) name += ", several threads";
   if (layout_.normals != codec::NormalMode::none) name += ", with normals";
   return name;
 }

@@ -13,7 +13,8 @@ namespace clothstream::bench {
 
 class OurCodec final : public FrameCodec {
  public:
-  explicit OurCodec(const codec::StreamLayout& layout);
+  // `workers`, if any, outlive it.
+  explicit OurCodec(const codec::StreamLayout& layout, codec::Workers* workers = nullptr);
 
   std::string name() const override;
   double promise() const override;
@@ -24,6 +25,7 @@ class OurCodec final : public FrameCodec {
 
  private:
   codec::StreamLayout layout_;
+  bool hasWorkers_;
   std::unique_ptr<codec::Encoder> encoder_;
   std::unique_ptr<codec::Decoder> decoder_;
   std::vector<std::byte> packet_;
