@@ -15,7 +15,7 @@ namespace clothstream::client {
 class Reconnection {
  public:
   static constexpr std::uint64_t kNever = std::numeric_limits<std::uint64_t>::max();
-  static constexpr std::uint64_t kShortestUs = 50'000, kLongestHeldUs = 200'000, kLongestUs = 5'000'000;
+  static constexpr std::uint64_t kShortestUs = 50'000, kLongestHeldUs = 120'000, kLongestUs = 5'000'000;
   // An attempt that has led to no Welcome by then is given up for another: soon while the participant is
   // held, for a link that returns may have swallowed its beginning; else slow links have their time.
   static constexpr std::uint64_t kHeldAttemptUs = 2'000'000, kAttemptUs = 10'000'000;
