@@ -174,16 +174,19 @@ void serve(const ProgramOptions& options, const Signals& signals) {
         recording::RecorderOptions{.directory = options.recordDirectory, .serverName = kServerName});
   const auto first = std::ranges::find(scenes, options.scene, &scene::Scene::name);
   const std::uint32_t nodes = first == scenes.end() ? 0 : first->nodeCount();
-  stream::SceneServer server(std::move(scenes), {.device = deviceOptions(options, nodes),
-                                                 .defaultScene = options.scene,
-                                                 .serverName = kServerName,
-                                                 .runAlways = options.alwaysRun,
-                                                 .reportRate = options.reportRate,
-                                                 .maxCreatedScenes = options.maxCreatedScenes,
-                                                 .encoderThreads = options.encoderThreads,
-                                                 .journals = [&](const scene::Scene&) {
-                                                   return recordings ? recordings->add() : nullptr;
-                                                 }});
+  stream::SceneServer server(
+      std::move(scenes),
+      {.device = deviceOptions(options, nodes),
+       .defaultScene = options.scene,
+       .serverName = kServerName,
+       .runAlways = options.alwaysRun,
+       .reportRate = options.reportRate,
+       .maxCreatedScenes = options.maxCreatedScenes,
+       .encoderThreads = options.encoderThreads,
+       .journals = [&](const scene::Scene&) { return recordings ? recordings->add() : nullptr; },
+       .holding = {.hold = std::chrono::duration_cast<stream::Clock::duration>(options.hold)},
+       .participantsMay = options.participantsMay,
+       .outsideControl = !options.ownersAlone});
   const auto report = [&] { return server.report() + (recordings ? recordings->report() : ""); };
   {
     const std::filesystem::path page = options.page.empty() ? pageBesideProgram() : options.page;

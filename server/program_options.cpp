@@ -2,10 +2,13 @@
 // Reads the command line.
 #include "server/program_options.h"
 
+#include <algorithm>
+#include <cstdio>
 #include <cstdlib>
 #include <map>
 
 #include <CLI/CLI.hpp>
+#include <fmt/format.h>
 
 namespace clothstream {
 namespace {
@@ -64,7 +67,8 @@ void addStepOptions(CLI::App& app, ProgramOptions& options, step::StepOptions& s
 std::variant<ProgramOptions, int> parseOptions(int argc, const char* const* argv) {
   ProgramOptions options;
   options.cacheDirectory = defaultCacheDirectory();
-  double seconds = 0;
+  double seconds = 0, hold = 60;
+  std::vector<std::string> changeable;
   const std::map<std::string, scene::Normals> normals{{"none", scene::Normals::none},
                                                       {"octahedral", scene::Normals::octahedral}};
   const std::map<std::string, scene::Coding> codings{{"entropy", scene::Coding::entropy},
@@ -123,6 +127,25 @@ std::variant<ProgramOptions, int> parseOptions(int argc, const char* const* argv
       ->check(CLI::Range(0, 64))
       ->capture_default_str()
       ->group(scenes);
+  const char* people = "People";
+  app.add_option("--hold", hold,
+                 "Seconds for which the place of somebody whose connection is lost is kept; 0: not at all")
+      ->check(CLI::Range(0.0, 3600.0))
+      ->capture_default_str()
+      ->group(people);
+  app.add_option("--participants-change", changeable,
+                 "Parameters that participants change of a scene that somebody else owns: a list of "
+                 "environment, cloths and colliders, or none")
+      ->delimiter(',')
+      ->type_name("LIST")
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll)
+      ->check(CLI::IsMember({"environment", "cloths", "colliders", "none"}))
+      ->default_str("environment,cloths,colliders")
+      ->group(people);
+  app.add_flag(
+         "--owners-alone", options.ownersAlone,
+         "A scene that somebody owns is paused, reset and deleted by its owners alone, not from outside")
+      ->group(people);
   app.add_flag("--list-materials", options.listMaterials, "Show what cloths may be made of, and exit")
       ->group(scenes);
 
@@ -174,6 +197,17 @@ std::variant<ProgramOptions, int> parseOptions(int argc, const char* const* argv
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : 1;
+  }
+  options.hold = std::chrono::duration<double>(hold);
+  if (!changeable.empty()) {
+    const auto given = [&](const char* what) {
+      return std::ranges::find(changeable, what) != changeable.end();
+    };
+    if (given("none") && changeable.size() > 1) {
+      fmt::print(stderr, "--participants-change: none stands alone\n");
+      return 1;
+    }
+    options.participantsMay = {given("environment"), given("cloths"), given("colliders")};
   }
   if (stepCommand.parsed()) options.step = stepOptions;
   if (stopAfter->count() > 0) options.stopAfter = std::chrono::duration<double>(seconds);

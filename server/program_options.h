@@ -12,6 +12,7 @@
 
 #include "server/scene/scene.h"
 #include "server/step/step.h"
+#include "server/stream/roles.h"
 
 namespace clothstream {
 
@@ -27,6 +28,10 @@ struct ProgramOptions {
   double reportRate = 4;
   std::uint32_t maxCreatedScenes = 16;
   std::uint32_t encoderThreads = 0;
+  std::chrono::duration<double> hold{60};  // of who is cut off
+  // What participants change of a scene that somebody else owns, and whether it is controlled from outside.
+  stream::Permissions participantsMay;
+  bool ownersAlone = false;
   std::optional<step::StepOptions> step;  // instead of serving
   std::string resimulate;                 // a recording, instead of serving; empty: none
   std::filesystem::path recordDirectory;  // empty: nothing is recorded

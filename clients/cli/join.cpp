@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #include "clients/cli/obj_file.h"
+#include "clients/cli/presence.h"
 #include "clients/cli/report.h"
 #include "clients/cli/signals.h"
 #include "clients/grpc/grpc_client.h"
@@ -26,9 +27,23 @@ class Listener {
   Listener(const StatusLine& line, bool report) : line_(line), report_(report) {}
 
   void operator()(cs_client* client, std::uint32_t events) const {
-    if ((events & CS_EVENT_NOTICE) != 0) say("notice", cs_notice_text(client));
+    if (events == 0 && cs_get_state(client) == CS_STATE_RECONNECTING)
+      say("the connection is lost; trying to come back");
+    if ((events & CS_EVENT_RETURNED) != 0)
+      say(cs_resumed(client) != 0 ? "back as the same participant" : "back, as a new participant");
+    if ((events & CS_EVENT_NOTICE) != 0) {
+      const std::uint64_t by = cs_notice_participant(client);
+      say(fmt::format("notice from the server: {}{}", cs_notice_text(client),
+                      by == 0 ? "" : fmt::format(" (by {})", nameOf(client, by))));
+    }
     if ((events & CS_EVENT_ERROR) != 0 && cs_get_state(client) != CS_STATE_FAILED)
-      say("error", cs_error_text(client));
+      say(fmt::format("error from the server: {}", cs_error_text(client)));
+    if ((events & CS_EVENT_PRESENCE) != 0) {
+      cs_presence presence;
+      if (cs_get_presence(client, &presence) != 0) say(text(client, presence));
+    } else if ((events & CS_EVENT_PARTICIPANTS) != 0) {
+      sayWhoIsThere(client);
+    }
     if (report_ && (events & CS_EVENT_REPORT) != 0) {
       line_.clear();
       for (const ClothFigures& figures : Report::of(client, GrpcClient::nowUs()).cloths)
@@ -38,9 +53,18 @@ class Listener {
   }
 
  private:
-  void say(const char* kind, const char* text) const {
+  void say(const std::string& text) const {
     line_.clear();
-    fmt::print(stderr, "clothstream: {} from the server: {}\n", kind, text);
+    fmt::print(stderr, "clothstream: {}\n", text);
+  }
+
+  void sayWhoIsThere(cs_client* client) const {
+    say(fmt::format("joined as {}", roleName(cs_get_role(client))));
+    cs_participant other;
+    for (std::uint32_t i = 0; cs_get_participant(client, i, &other) != 0; ++i)
+      if (other.id != cs_participant_id(client))
+        say(fmt::format("{} is here as {}{}", nameOf(other), roleName(other.role),
+                        other.away != 0 ? ", cut off at the moment" : ""));
   }
 
   const StatusLine& line_;
@@ -97,6 +121,9 @@ ExitCode join(const JoinOptions& options) {
   GrpcClientOptions clientOptions;
   clientOptions.scene = options.scene;
   clientOptions.clientName = "clothstream join";
+  clientOptions.displayName = options.name;
+  clientOptions.role = options.role;
+  if (!options.reconnects) clientOptions.reconnectFor = std::chrono::milliseconds(0);
   clientOptions.cancelled = [] { return interrupted(); };
   auto joined = GrpcClient::join(options.address, clientOptions, Listener(line, options.report));
   if (!joined) return complain(exitCodeOf(joined.error().kind), joined.error().text);

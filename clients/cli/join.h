@@ -8,12 +8,16 @@
 #include <vector>
 
 #include "clients/cli/exit_code.h"
+#include "clients/core/core.h"
 
 namespace clothstream::cli {
 
 struct JoinOptions {
   std::string address;  // as completeAddress gives it
   std::string scene;
+  std::string name;  // shown to others
+  cs_role role = CS_ROLE_UNSPECIFIED;
+  bool reconnects = true;
   std::optional<double> seconds;  // nothing: until a signal
   std::string objPath;            // empty: none
   bool json = false;

@@ -11,6 +11,7 @@
 #include "clients/cli/join.h"
 #include "clients/cli/list.h"
 #include "clients/cli/motion_commands.h"
+#include "clients/cli/presence.h"
 #include "clients/cli/recording_commands.h"
 #include "clients/cli/scene.h"
 #include "clients/cli/set.h"
@@ -63,6 +64,16 @@ int run(int argc, char** argv) {
   joinCommand.footer(kExitCodes);
   joinCommand.add_option("ADDRESS", address, "HOST or HOST:PORT of the server")->capture_default_str();
   joinCommand.add_option("--scene", joinOptions.scene, "The scene to join; the server's default if left out");
+  std::string role;
+  joinCommand.add_option("--name", joinOptions.name, "How others see who joins, at most 64 bytes");
+  joinCommand
+      .add_option(
+          "--role", role,
+          "viewer, participant or owner; who comes first owns the scene unless it is a viewer, and there "
+          "is one owner at first")
+      ->check(CLI::IsMember({"viewer", "participant", "owner"}));
+  joinCommand.add_flag("!--no-reconnect", joinOptions.reconnects,
+                       "End when the connection is lost, instead of trying for a minute to come back");
   joinCommand
       .add_option("--seconds", joinOptions.seconds,
                   "Leave after this time; otherwise at an interrupt (Ctrl-C)")
@@ -111,6 +122,7 @@ int run(int argc, char** argv) {
       throw CLI::ValidationError("set", "nothing to change is given; see clothstream set --help");
     if (colliders.size() > CS_MAX_COLLIDERS)
       throw CLI::ValidationError("--collider", fmt::format("at most {} are allowed", CS_MAX_COLLIDERS));
+    joinOptions.role = roleNamed(role).value_or(CS_ROLE_UNSPECIFIED);
     for (const std::string& collider : colliders) joinOptions.colliders.push_back(parseCollider(collider));
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? kOk : kUsage;

@@ -40,6 +40,9 @@ class StreamFile {
   void receive(std::span<const std::byte> bytes) {
     const std::lock_guard lock(mutex_);
     if (!written_ || !message_.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()))) return;
+    // What comes to somebody else than who began the file is of another stream, perhaps of another server.
+    if (message_.has_welcome() && writer_ && !message_.welcome().resumed()) broken_ = true;
+    if (broken_) return;
     if (message_.has_welcome()) welcome_ = message_.welcome();
     if (message_.has_chunk()) return take(message_.chunk());
     if (!writer_) return;
@@ -48,6 +51,12 @@ class StreamFile {
     if (!message_.has_frame()) return;
     ++frames_;
     sinceKey_ = isKey(message_.frame()) ? 0 : sinceKey_ + 1;
+  }
+
+  // The stream that the file holds is over, though another one comes.
+  bool broken() const {
+    const std::lock_guard lock(mutex_);
+    return broken_;
   }
 
   bool wantsKeyFrame() const {
@@ -130,6 +139,7 @@ class StreamFile {
   v1::Welcome welcome_;
   std::string content_;
   std::optional<SteadyClock::time_point> chunkStart_;
+  bool broken_ = false;
   std::uint64_t frames_ = 0;
   std::uint32_t sinceKey_ = 0;  // frames
 };
@@ -149,6 +159,10 @@ std::optional<Complaint> follow(GrpcClient& client, StreamFile& file, const Reco
     }
     if (interrupted(wait)) return std::nullopt;
     if (auto written = file.flush(); !written) return Complaint{kNotWritten, written.error()};
+    if (file.broken())
+      return Complaint{kLost,
+                       "The connection was lost for so long, or the server began anew, that the stream "
+                       "could not be taken up again: the recording ends there."};
     if (const auto failure = client.ended()) return Complaint{exitCodeOf(failure->kind), failure->text};
     if (terminal)
       fmt::print(stderr, "\r\033[K{:.0f} s, {} frames, {:.1f} MiB", passed.count(), file.frames(),
@@ -165,9 +179,16 @@ ExitCode record(const RecordOptions& options) {
   GrpcClientOptions clientOptions;
   clientOptions.scene = options.scene;
   clientOptions.clientName = "clothstream record";
+  clientOptions.role = CS_ROLE_VIEWER;
   clientOptions.cancelled = [] { return interrupted(); };
   clientOptions.onMessage = [&](std::span<const std::byte> bytes) { file.receive(bytes); };
   const auto onEvents = [&](cs_client* core, std::uint32_t events) {
+    if (events == 0 && cs_get_state(core) == CS_STATE_RECONNECTING)
+      fmt::print(stderr,
+                 "clothstream: the connection is lost; trying to come back. What is streamed meanwhile "
+                 "will be missing.\n");
+    if ((events & CS_EVENT_RETURNED) != 0 && cs_resumed(core) != 0)
+      fmt::print(stderr, "clothstream: back; the recording goes on.\n");
     if ((events & CS_EVENT_FRAME) != 0 && file.wantsKeyFrame())
       cs_request_key_frame(core, GrpcClient::nowUs());
   };

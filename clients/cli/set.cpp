@@ -82,6 +82,7 @@ ExitCode set(const SetOptions& options) {
   GrpcClientOptions clientOptions;
   clientOptions.scene = options.scene;
   clientOptions.clientName = "clothstream set";
+  clientOptions.reconnectFor = std::chrono::milliseconds(0);
   auto joined =
       GrpcClient::join(options.address, clientOptions,
                        [&](cs_client* client, std::uint32_t events) { answers.heard(client, events); });

@@ -10,19 +10,57 @@
 
 namespace clothstream::client {
 
-Client::Client(std::string_view scene, std::string_view clientName) {
+namespace {
+
+// ErrorCode of session.proto.
+constexpr std::uint32_t kResourceExhausted = 8, kCutOff = 31;
+
+}  // namespace
+
+Client::Client(Greeting greeting) : greeting_(std::move(greeting)) {
+  greet();
+}
+
+void Client::greet() {
   std::string hello;
-  writeHello(hello, ++lastRequestId_, scene, clientName);
-  send(std::move(hello));
+  writeHello(hello, ++lastRequestId_, greeting_);
+  // There is room: it is the first.
+  static_cast<void>(outbox_.addControl(std::move(hello)));
+}
+
+void Client::connecting(std::uint64_t nowUs) {
+  if (state_ == CS_STATE_FAILED) return;
+  if (welcomed_) disconnected(nowUs);
+  outbox_.clear();
+  assembly_ = {};
+  keyFrameRequest_ = {};
+  connectAtUs_ = reconnection_.attemptEnd(nowUs, std::uint64_t{1000} * welcome_.holdMs);
+  greet();
+}
+
+void Client::disconnected(std::uint64_t nowUs) {
+  if (state_ == CS_STATE_FAILED) return;
+  if (!greeting_.token.empty()) state_ = CS_STATE_RECONNECTING;
+  welcomed_ = false;
+  outbox_.clear();
+  std::uint64_t seed = 0;
+  for (const char byte : greeting_.token) seed = seed * 257 + static_cast<unsigned char>(byte);
+  connectAtUs_ = reconnection_.lost(nowUs, std::uint64_t{1000} * welcome_.holdMs, seed);
+}
+
+std::uint64_t Client::connectAtUs() const {
+  if (state_ == CS_STATE_FAILED) return Reconnection::kNever;
+  return welcomed_ ? lastHeardUs_ + Reconnection::kSilenceUs : connectAtUs_;
 }
 
 std::uint32_t Client::receive(Bytes bytes, std::uint64_t nowUs) {
   if (state_ == CS_STATE_FAILED) return 0;
   const std::optional<ServerMessage> message = readServerMessage(bytes);
   if (!message) return failMalformed("ServerMessage");
+  lastHeardUs_ = nowUs;
   switch (message->kind) {
     case Body::welcome:
-      return welcomed(message->body);
+      return welcomed(message->body, nowUs);
     case Body::chunk:
       return chunkReceived(message->body);
     case Body::frame:
@@ -37,6 +75,8 @@ std::uint32_t Client::receive(Bytes bytes, std::uint64_t nowUs) {
       return errorReceived(message->body);
     case Body::tickEvents:
       return eventsReceived(message->body);
+    case Body::presence:
+      return presenceReceived(message->body, nowUs);
     case Body::listScenes:
       return scenesReceived(message->body);
     case Body::none:
@@ -53,7 +93,7 @@ void Client::update(std::uint64_t nowUs) {
   clock_.pingSent(nowUs);
 }
 
-std::uint32_t Client::welcomed(Bytes body) {
+std::uint32_t Client::welcomed(Bytes body, std::uint64_t nowUs) {
   std::optional<Welcome> welcome = readWelcome(body);
   if (!welcome) return failMalformed("Welcome");
   if (welcomed_) return fail("The server said Welcome twice.");
@@ -64,9 +104,45 @@ std::uint32_t Client::welcomed(Bytes body) {
   if (!codec::isCodec(welcome->codec))
     return fail("The server chose codec " + std::to_string(welcome->codec) + "; this client decodes " +
                 decodedCodecs() + ".");
+  const bool again = state_ == CS_STATE_RECONNECTING;
+  // Said where the server said so before, and only then.
+  const bool known = again && welcome->resumed && decoder_ && greeting_.contentId != 0 &&
+                     welcome->contentId == greeting_.contentId;
   welcome_ = std::move(*welcome);
   welcomed_ = true;
-  return 0;
+  resumed_ = again && welcome_.resumed;
+  participants_ = std::move(welcome_.participants);
+  greeting_.token = welcome_.token;
+  greeting_.scene = welcome_.scene;
+  greeting_.contentId = known ? welcome_.contentId : 0;
+  reconnection_.joined(nowUs);
+  if (again && !resumed_) clock_ = {};
+  if (again && posed_) sendPoses(nowUs);
+  const std::uint32_t events = participants_.empty() ? 0 : CS_EVENT_PARTICIPANTS;
+  if (!known) return events;
+  state_ = CS_STATE_JOINED;
+  return events | CS_EVENT_RETURNED;
+}
+
+std::uint32_t Client::presenceReceived(Bytes body, std::uint64_t nowUs) {
+  std::optional<Presence> presence = readPresence(body);
+  if (!presence) return failMalformed("Presence");
+  presence_ = std::move(*presence);
+  const Participant& who = presence_.participant;
+  const auto known = std::find_if(participants_.begin(), participants_.end(),
+                                  [&](const Participant& one) { return one.id == who.id; });
+  if (presence_.kind == CS_PRESENCE_LEFT) {
+    if (known != participants_.end()) participants_.erase(known);
+  } else if (known != participants_.end()) {
+    *known = who;
+  } else if (participants_.size() < kMaxParticipants) {
+    participants_.push_back(who);
+  }
+  if (who.id == welcome_.participantId && who.role != welcome_.role) {
+    welcome_.role = who.role;
+    if (posed_) sendPoses(nowUs);
+  }
+  return CS_EVENT_PARTICIPANTS | CS_EVENT_PRESENCE;
 }
 
 std::uint32_t Client::chunkReceived(Bytes body) {
@@ -88,15 +164,18 @@ std::uint32_t Client::described(Bytes content) {
   description_ = std::move(*description);
   decoder_ = std::move(decoder);
   keyFrameRequest_.answered();
-  statistics_.forgetTicks();
+  // Of who came back they go on: what it missed was dropped.
+  if (!resumed_) statistics_.forgetTicks();
   report_ = {};
+  greeting_.contentId = welcome_.contentId;
+  const bool again = state_ == CS_STATE_RECONNECTING;
   state_ = CS_STATE_JOINED;
-  return CS_EVENT_DESCRIPTION;
+  return again ? CS_EVENT_DESCRIPTION | CS_EVENT_RETURNED : CS_EVENT_DESCRIPTION;
 }
 
 std::uint32_t Client::frameReceived(Bytes body, std::uint64_t nowUs) {
   if (!readFrame(body, frame_)) return failMalformed("Frame");
-  if (!decoder_) return fail("The server sent a frame before the description.");
+  if (state_ != CS_STATE_JOINED) return fail("The server sent a frame before the description.");
   description_.colliders.resize(frame_.colliders.size());
   for (std::size_t i = 0; i < frame_.colliders.size(); ++i) {
     if (!readCollider(frame_.colliders[i], description_.colliders[i])) return failMalformed("ColliderState");
@@ -182,9 +261,9 @@ std::uint32_t Client::eventsReceived(Bytes body) {
 }
 
 std::uint32_t Client::noticeReceived(Bytes body) {
-  std::optional<std::string> text = readNotice(body);
-  if (!text) return failMalformed("Notice");
-  noticeText_ = std::move(*text);
+  std::optional<Notice> notice = readNotice(body);
+  if (!notice) return failMalformed("Notice");
+  notice_ = std::move(*notice);
   return CS_EVENT_NOTICE;
 }
 
@@ -200,7 +279,10 @@ std::uint32_t Client::errorReceived(Bytes body) {
   std::optional<ServerError> error = readError(body);
   if (!error) return failMalformed("Error");
   errorCode_ = error->code;
-  if (error->fatal) return fail(std::move(error->text));
+  // A server that gave up on the connection alone, or has no room for who comes back: another time it may.
+  const bool passing = error->code == kCutOff ||
+                       (error->code == kResourceExhausted && state_ == CS_STATE_RECONNECTING && !welcomed_);
+  if (error->fatal && !passing) return fail(std::move(error->text));
   errorText_ = std::move(error->text);
   return CS_EVENT_ERROR;
 }
@@ -215,7 +297,7 @@ std::uint32_t Client::scenesReceived(Bytes body) {
 const std::string* Client::nextOutgoing() {
   const std::string* message = outbox_.next();
   // Attachments stay where they are put: it need not be said again.
-  if (outbox_.poses().empty()) poses_.attachments.clear();
+  if (outbox_.poses().empty() && isConnected() && mayCollide()) poses_.attachments.clear();
   return message;
 }
 
@@ -245,9 +327,29 @@ void Client::move(AttachmentPose attachment, std::uint64_t nowUs) {
   sendPoses(nowUs);
 }
 
+bool Client::mayCollide() const {
+  return (welcomed_ ? welcome_.role : greeting_.role) != CS_ROLE_VIEWER;
+}
+
 void Client::sendPoses(std::uint64_t nowUs) {
-  if (state_ == CS_STATE_FAILED) return;
-  writeColliderPoses(outbox_.poses(), poses_, nowUs);
+  posed_ = true;
+  if (state_ == CS_STATE_FAILED || !isConnected()) return;
+  if (mayCollide()) return writeColliderPoses(outbox_.poses(), poses_, nowUs);
+  Poses seen;
+  seen.wantsContacts = poses_.wantsContacts;
+  writeColliderPoses(outbox_.poses(), seen, nowUs);
+}
+
+void Client::setRole(std::uint64_t participant, std::uint32_t role) {
+  std::string message;
+  writeSetRole(message, ++lastRequestId_, participant, role);
+  send(std::move(message));
+}
+
+void Client::remove(std::uint64_t participant) {
+  std::string message;
+  writeRemoveParticipant(message, ++lastRequestId_, participant);
+  send(std::move(message));
 }
 
 void Client::change(const ParameterChange& change) {
@@ -295,7 +397,7 @@ std::uint32_t Client::failMalformed(const char* what) {
 }
 
 void Client::send(std::string message) {
-  if (state_ == CS_STATE_FAILED) return;
+  if (state_ == CS_STATE_FAILED || !isConnected()) return;
   if (!outbox_.addControl(std::move(message)))
     fail("The connection takes no messages: " + std::to_string(Outbox::kMaxControl) + " wait to be sent.");
 }

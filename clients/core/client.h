@@ -15,6 +15,7 @@
 #include "clients/core/frame_statistics.h"
 #include "clients/core/key_frame_request.h"
 #include "clients/core/outbox.h"
+#include "clients/core/reconnection.h"
 #include "clients/core/server_clock.h"
 #include "clients/core/server_message.h"
 #include "proto/codec/decoder.h"
@@ -23,11 +24,14 @@ namespace clothstream::client {
 
 class Client {
  public:
-  Client(std::string_view scene, std::string_view clientName);
+  explicit Client(Greeting greeting);
 
   // A set of CS_EVENT bits.
   std::uint32_t receive(Bytes message, std::uint64_t nowUs);
   void update(std::uint64_t nowUs);
+  void connecting(std::uint64_t nowUs);
+  void disconnected(std::uint64_t nowUs);
+  std::uint64_t connectAtUs() const;
   const std::string* nextOutgoing();
 
   void setClock(std::uint64_t (*nowUs)()) { nowUs_ = nowUs; }
@@ -38,12 +42,18 @@ class Client {
   void change(const ParameterChange& change);
   void change(const ColliderChange& change);
   void listScenes();
+  void setRole(std::uint64_t participant, std::uint32_t role);
+  void remove(std::uint64_t participant);
   void requestEarlyKeyFrame(std::uint64_t nowUs);
 
   cs_state state() const { return state_; }
   const std::string& errorText() const { return errorText_; }
   std::uint32_t errorCode() const { return errorCode_; }
-  const std::string& noticeText() const { return noticeText_; }
+  const Notice& notice() const { return notice_; }
+  bool resumed() const { return resumed_; }
+  const std::vector<Participant>& participants() const { return participants_; }
+  // The newest; of no kind before the first.
+  const Presence& presence() const { return presence_; }
   const Welcome& welcome() const { return welcome_; }
   // Before the first description: empty.
   const Description& description() const { return description_; }
@@ -67,7 +77,11 @@ class Client {
 
  private:
   void sendPoses(std::uint64_t nowUs);
-  std::uint32_t welcomed(Bytes body);
+  void greet();
+  bool isConnected() const { return state_ != CS_STATE_RECONNECTING || welcomed_; }
+  bool mayCollide() const;
+  std::uint32_t welcomed(Bytes body, std::uint64_t nowUs);
+  std::uint32_t presenceReceived(Bytes body, std::uint64_t nowUs);
   std::uint32_t chunkReceived(Bytes body);
   std::uint32_t described(Bytes content);
   std::uint32_t frameReceived(Bytes body, std::uint64_t nowUs);
@@ -86,10 +100,18 @@ class Client {
   void send(std::string message);
 
   cs_state state_ = CS_STATE_JOINING;
-  bool welcomed_ = false;
+  bool welcomed_ = false;  // on the connection that there is
+  bool resumed_ = false;
   std::uint32_t errorCode_ = 0;
-  std::string errorText_, noticeText_;
+  std::string errorText_;
+  Notice notice_;
+  Greeting greeting_;  // has a token from the first Welcome on
   Welcome welcome_;
+  std::vector<Participant> participants_;
+  Presence presence_;
+  Reconnection reconnection_;
+  std::uint64_t connectAtUs_ = Reconnection::kNever;  // unless welcomed
+  std::uint64_t lastHeardUs_ = 0;
   ContentAssembly assembly_;
   Description description_;
   std::unique_ptr<codec::Decoder> decoder_;
@@ -98,7 +120,8 @@ class Client {
   FrameStatistics statistics_;
   ServerClock clock_;
   Outbox outbox_;
-  Poses poses_;  // of this participant
+  Poses poses_;         // of this participant
+  bool posed_ = false;  // it has said something of them
   std::uint64_t lastRequestId_ = 0;
   std::uint64_t (*nowUs_)() = nullptr;
   double decodeMs_ = 0;

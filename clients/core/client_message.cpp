@@ -25,6 +25,8 @@ enum BodyField : std::uint32_t {
   kFrameAck = 6,
   kKeyFrameRequest = 7,
   kListScenes = 16,
+  kSetRole = 30,
+  kRemoveParticipant = 31,
 };
 
 template <typename Fill>
@@ -128,13 +130,17 @@ void addShape(Writer& parent, const cs_own_collider& collider) {
 
 }  // namespace
 
-void writeHello(std::string& out, std::uint64_t requestId, std::string_view scene,
-                std::string_view clientName) {
+void writeHello(std::string& out, std::uint64_t requestId, const Greeting& greeting) {
   writeMessage(out, requestId, kHello, [&](Writer& hello) {
     hello.add_uint32(1, CS_PROTOCOL_VERSION);
     hello.add_packed_uint32(2, codec::kCodecs.begin(), codec::kCodecs.end());
-    hello.add_string(3, scene.data(), scene.size());
-    hello.add_string(4, clientName.data(), clientName.size());
+    hello.add_string(3, greeting.scene);
+    hello.add_string(4, greeting.clientName);
+    hello.add_string(5, greeting.displayName);
+    hello.add_uint32(30, greeting.role);
+    if (greeting.token.empty()) return;
+    hello.add_bytes(31, greeting.token);
+    hello.add_uint64(32, greeting.contentId);
   });
 }
 
@@ -214,6 +220,18 @@ void writeKeyFrameRequest(std::string& out, std::uint32_t epoch, bool early) {
     request.add_uint32(1, epoch);
     if (early) request.add_bool(2, true);
   });
+}
+
+void writeSetRole(std::string& out, std::uint64_t requestId, std::uint64_t participant, std::uint32_t role) {
+  writeMessage(out, requestId, kSetRole, [&](Writer& message) {
+    message.add_uint64(1, participant);
+    message.add_uint32(2, role);
+  });
+}
+
+void writeRemoveParticipant(std::string& out, std::uint64_t requestId, std::uint64_t participant) {
+  writeMessage(out, requestId, kRemoveParticipant,
+               [&](Writer& message) { message.add_uint64(1, participant); });
 }
 
 void writeListScenes(std::string& out, std::uint64_t requestId) {

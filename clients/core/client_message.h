@@ -20,8 +20,16 @@ struct ColliderChange {
   const float* radius = nullptr;
 };
 
-void writeHello(std::string& out, std::uint64_t requestId, std::string_view scene,
-                std::string_view clientName);
+// Who joins what.
+struct Greeting {
+  std::string scene, clientName, displayName;
+  std::uint32_t role = 0;
+  // Of who comes back: what the Welcome before said. Empty and 0: it does not, or holds no description.
+  std::string token;
+  std::uint64_t contentId = 0;
+};
+
+void writeHello(std::string& out, std::uint64_t requestId, const Greeting& greeting);
 struct AttachmentPose {
   std::string name;
   std::array<float, 3> position{};
@@ -42,6 +50,8 @@ void writePing(std::string& out, std::uint64_t requestId, std::uint64_t clientTi
 void writeFrameAck(std::string& out, std::uint64_t tick);
 // `early`: what comes until then can be decoded.
 void writeKeyFrameRequest(std::string& out, std::uint32_t epoch, bool early);
+void writeSetRole(std::string& out, std::uint64_t requestId, std::uint64_t participant, std::uint32_t role);
+void writeRemoveParticipant(std::string& out, std::uint64_t requestId, std::uint64_t participant);
 void writeListScenes(std::string& out, std::uint64_t requestId);
 
 }  // namespace clothstream::client

@@ -95,6 +95,14 @@ void copy(const Values& values, float* out) {
   std::copy(values.begin(), values.end(), out);
 }
 
+cs_participant toC(const Participant& participant) {
+  return {.id = participant.id,
+          .name = participant.name.c_str(),
+          .client_name = participant.clientName.c_str(),
+          .role = participant.role,
+          .away = participant.away ? 1 : 0};
+}
+
 // The element, or nullptr where there is none.
 template <typename Element>
 const Element* at(const std::vector<Element>& elements, std::uint32_t index) {
@@ -104,8 +112,17 @@ const Element* at(const std::vector<Element>& elements, std::uint32_t index) {
 }  // namespace
 
 cs_client* cs_create(const char* scene, const char* client_name) {
-  assert(scene && client_name);
-  return new cs_client{Client(scene, client_name)};
+  return cs_create_as(scene, client_name, "", CS_ROLE_UNSPECIFIED);
+}
+
+cs_client* cs_create_as(const char* scene, const char* client_name, const char* display_name, uint32_t role) {
+  assert(scene && client_name && display_name);
+  return new cs_client{Client({.scene = scene,
+                               .clientName = client_name,
+                               .displayName = display_name,
+                               .role = role,
+                               .token = {},
+                               .contentId = 0})};
 }
 
 void cs_destroy(cs_client* client) {
@@ -130,6 +147,22 @@ const uint8_t* cs_next_outgoing(cs_client* client, size_t* bytes) {
   return message ? reinterpret_cast<const uint8_t*>(message->data()) : nullptr;
 }
 
+void cs_connecting(cs_client* client, uint64_t now_us) {
+  client->client.connecting(now_us);
+}
+
+void cs_disconnected(cs_client* client, uint64_t now_us) {
+  client->client.disconnected(now_us);
+}
+
+uint64_t cs_connect_at(const cs_client* client) {
+  return client->client.connectAtUs();
+}
+
+int cs_resumed(const cs_client* client) {
+  return client->client.resumed() ? 1 : 0;
+}
+
 cs_state cs_get_state(const cs_client* client) {
   return client->client.state();
 }
@@ -143,7 +176,11 @@ uint32_t cs_error_code(const cs_client* client) {
 }
 
 const char* cs_notice_text(const cs_client* client) {
-  return client->client.noticeText().c_str();
+  return client->client.notice().text.c_str();
+}
+
+uint64_t cs_notice_participant(const cs_client* client) {
+  return client->client.notice().participantId;
 }
 
 void cs_get_statistics(const cs_client* client, uint64_t now_us, cs_statistics* out) {
@@ -174,6 +211,39 @@ const char* cs_device_name(const cs_client* client) {
 
 const char* cs_scene_name(const cs_client* client) {
   return client->client.welcome().scene.c_str();
+}
+
+uint32_t cs_participant_count(const cs_client* client) {
+  return static_cast<std::uint32_t>(client->client.participants().size());
+}
+
+int cs_get_participant(const cs_client* client, uint32_t index, cs_participant* out) {
+  const Participant* participant = at(client->client.participants(), index);
+  if (!participant) return 0;
+  *out = toC(*participant);
+  return 1;
+}
+
+int cs_get_presence(const cs_client* client, cs_presence* out) {
+  const Presence& presence = client->client.presence();
+  if (presence.kind == 0) return 0;
+  *out = {.kind = presence.kind,
+          .reason = presence.reason,
+          .by = presence.by,
+          .participant = toC(presence.participant)};
+  return 1;
+}
+
+uint32_t cs_get_role(const cs_client* client) {
+  return client->client.welcome().role;
+}
+
+void cs_set_role(cs_client* client, uint64_t participant_id, uint32_t role) {
+  client->client.setRole(participant_id, role);
+}
+
+void cs_remove_participant(cs_client* client, uint64_t participant_id) {
+  client->client.remove(participant_id);
 }
 
 uint64_t cs_participant_id(const cs_client* client) {

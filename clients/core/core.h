@@ -3,7 +3,9 @@
  * as WebAssembly.
  *
  * A transport feeds every serialised ServerMessage to cs_receive and writes every message that
- * cs_next_outgoing gives as one ClientMessage. All times are microseconds of one steady clock of the
+ * cs_next_outgoing gives as one ClientMessage. It says when it opens a connection and when it has lost one,
+ * and opens another when cs_connect_at says so: whoever is cut off comes back as the same participant, with
+ * the colliders and grabs that it had. All times are microseconds of one steady clock of the
  * caller's. Not thread-safe: one thread a client at a time. No function throws or aborts on bytes from
  * outside, and what it holds is bounded: at most 256 MiB of content on its way, and geometry in proportion to
  * the description that arrived. Where memory runs out all the same, the native library ends the program and
@@ -30,20 +32,26 @@ typedef struct cs_client cs_client;
 typedef enum cs_state {
   CS_STATE_JOINING = 0, /* Hello is out, or waits to be taken */
   CS_STATE_JOINED = 1,  /* description complete, frames follow */
-  CS_STATE_FAILED = 2   /* cs_error_text says why; nothing more will come */
+  CS_STATE_FAILED = 2,  /* cs_error_text says why; nothing more will come */
+  /* Cut off: what was there before is still there to be read. Poses and grabs are kept, and sent upon return;
+   * what else is asked for meanwhile is dropped. */
+  CS_STATE_RECONNECTING = 3
 } cs_state;
 
 /* What cs_receive changed; a set of bits. */
 enum {
-  CS_EVENT_FRAME = 1,       /* new positions */
-  CS_EVENT_DESCRIPTION = 2, /* cloths, sizes, triangles changed */
-  CS_EVENT_NOTICE = 4,      /* cs_notice_text */
-  CS_EVENT_ERROR = 8,       /* cs_error_text; fatal if the state is CS_STATE_FAILED */
-  CS_EVENT_PARAMETERS = 16, /* somebody changed a parameter */
-  CS_EVENT_SCENES = 32,     /* answer to cs_list_scenes */
-  CS_EVENT_REPORT = 64,     /* cs_get_cloth_report */
-  CS_EVENT_GRABS = 128,     /* cs_grab_event_count */
-  CS_EVENT_CONTACTS = 256   /* cs_contact_event_count */
+  CS_EVENT_FRAME = 1,          /* new positions */
+  CS_EVENT_DESCRIPTION = 2,    /* cloths, sizes, triangles changed */
+  CS_EVENT_NOTICE = 4,         /* cs_notice_text */
+  CS_EVENT_ERROR = 8,          /* cs_error_text; fatal if the state is CS_STATE_FAILED */
+  CS_EVENT_PARAMETERS = 16,    /* somebody changed a parameter */
+  CS_EVENT_SCENES = 32,        /* answer to cs_list_scenes */
+  CS_EVENT_REPORT = 64,        /* cs_get_cloth_report */
+  CS_EVENT_GRABS = 128,        /* cs_grab_event_count */
+  CS_EVENT_CONTACTS = 256,     /* cs_contact_event_count */
+  CS_EVENT_PARTICIPANTS = 512, /* cs_participant_count */
+  CS_EVENT_PRESENCE = 1024,    /* cs_get_presence: why they changed */
+  CS_EVENT_RETURNED = 2048     /* joined again after it was cut off; cs_resumed says as whom */
 };
 
 typedef struct cs_statistics {
@@ -198,8 +206,49 @@ typedef struct cs_contact_event {
   float seconds; /* that it took; 0 where it began */
 } cs_contact_event;
 
+/* Role of session.proto. */
+typedef enum cs_role {
+  CS_ROLE_UNSPECIFIED = 0, /* not known, or as the server likes */
+  CS_ROLE_VIEWER = 1,
+  CS_ROLE_PARTICIPANT = 2,
+  CS_ROLE_OWNER = 3
+} cs_role;
+
+typedef struct cs_participant {
+  uint64_t id;
+  const char* name;        /* may be "" */
+  const char* client_name; /* may be "" */
+  uint32_t role;           /* cs_role, or one that this client does not know yet */
+  int32_t away;            /* its connection is lost, and it is held for a while */
+} cs_participant;
+
+/* PresenceKind of session.proto. */
+typedef enum cs_presence_kind {
+  CS_PRESENCE_JOINED = 1,
+  CS_PRESENCE_LEFT = 2,
+  CS_PRESENCE_ROLE_CHANGED = 3,
+  CS_PRESENCE_DISCONNECTED = 4,
+  CS_PRESENCE_RETURNED = 5
+} cs_presence_kind;
+
+/* LeaveReason of session.proto. */
+typedef enum cs_leave_reason {
+  CS_LEAVE_LEFT = 1,
+  CS_LEAVE_TIMED_OUT = 2,
+  CS_LEAVE_REMOVED = 3
+} cs_leave_reason;
+
+typedef struct cs_presence {
+  uint32_t kind;              /* cs_presence_kind, or one that this client does not know yet */
+  uint32_t reason;            /* cs_leave_reason of who left, else 0 */
+  uint64_t by;                /* the participant who did it; 0: it did so itself, or the server */
+  cs_participant participant; /* as it is now; of who left, as it was */
+} cs_presence;
+
 /* scene may be "" for the server's default; strings are copied. */
 cs_client* cs_create(const char* scene, const char* client_name);
+/* The same with a name for other people, which may be "", and the cs_role that is wanted. */
+cs_client* cs_create_as(const char* scene, const char* client_name, const char* display_name, uint32_t role);
 void cs_destroy(cs_client* client);
 /* For decode_ms: a steady clock in microseconds. Not exported by the WebAssembly module. */
 void cs_set_clock(cs_client* client, uint64_t (*now_us)(void));
@@ -211,15 +260,41 @@ void cs_update(cs_client* client, uint64_t now_us);
 /* The next ClientMessage to send, or NULL; valid until the next call of this function. */
 const uint8_t* cs_next_outgoing(cs_client* client, size_t* bytes);
 
+/* The transport begins to open a connection; what went through the one before it, if any, is over. The first
+ * outgoing message from here on is Hello. Need not be called for the first one. */
+void cs_connecting(cs_client* client, uint64_t now_us);
+/* The connection is lost, or could not be made. */
+void cs_disconnected(cs_client* client, uint64_t now_us);
+/* When the transport is to drop the connection that it has, if any, and open another: after a loss; where an
+ * attempt leads nowhere; where a connection has brought nothing for a while. UINT64_MAX: not as things are.
+ */
+uint64_t cs_connect_at(const cs_client* client);
+/* Whether the newest Welcome was to the participant that this client was before. */
+int cs_resumed(const cs_client* client);
+
 cs_state cs_get_state(const cs_client* client);
 const char* cs_error_text(const cs_client* client);
 /* The server's ErrorCode (session.proto) for the text above; 0 where the client itself found the error. */
 uint32_t cs_error_code(const cs_client* client);
 const char* cs_notice_text(const cs_client* client);
+/* Who did what the notice tells; 0: the server, or somebody who is not in the scene. */
+uint64_t cs_notice_participant(const cs_client* client);
 void cs_get_statistics(const cs_client* client, uint64_t now_us, cs_statistics* out);
 const char* cs_server_name(const cs_client* client);
 const char* cs_device_name(const cs_client* client);
 const char* cs_scene_name(const cs_client* client);
+/* All who are in the scene, this participant too, in the order in which they joined. 0 if there is no such
+ * one. */
+uint32_t cs_participant_count(const cs_client* client);
+int cs_get_participant(const cs_client* client, uint32_t index, cs_participant* out);
+/* What the newest CS_EVENT_PRESENCE told. 0 before the first. */
+int cs_get_presence(const cs_client* client, cs_presence* out);
+/* This participant's cs_role, as the server gave it. A viewer's colliders, grabs and attachments stay here:
+ * should it get another role, they are sent. */
+uint32_t cs_get_role(const cs_client* client);
+/* For owners. What becomes of it, everybody is told. */
+void cs_set_role(cs_client* client, uint64_t participant_id, uint32_t role);
+void cs_remove_participant(cs_client* client, uint64_t participant_id);
 /* This participant's id, the scene's rates a second; 0 before they are known. */
 uint64_t cs_participant_id(const cs_client* client);
 uint32_t cs_stream_rate(const cs_client* client);

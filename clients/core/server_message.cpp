@@ -225,6 +225,25 @@ bool readParameterChange(Bytes message, ParameterChange& change) {
   });
 }
 
+bool readParticipant(Bytes message, Participant& out) {
+  return readFields(message, [&](std::uint32_t field, Reader& reader) {
+    switch (field) {
+      case varint(1):
+        return set(out.id, reader.get_uint64());
+      case bytes(2):
+        return setText(out.name, reader);
+      case bytes(3):
+        return setText(out.clientName, reader);
+      case varint(4):
+        return set(out.role, reader.get_uint32());
+      case varint(5):
+        return set(out.away, reader.get_bool());
+      default:
+        return skip(reader);
+    }
+  });
+}
+
 // nullopt unless every field was read.
 template <typename Message, typename Visit>
 std::optional<Message> readMessage(Bytes bytes, Visit&& visit) {
@@ -235,9 +254,9 @@ std::optional<Message> readMessage(Bytes bytes, Visit&& visit) {
 }
 
 Body bodyOf(std::uint32_t field) {
-  constexpr std::array kKnown{Body::welcome, Body::chunk,      Body::frame,
-                              Body::pong,    Body::notice,     Body::parameterChanged,
-                              Body::error,   Body::tickEvents, Body::listScenes};
+  constexpr std::array kKnown{
+      Body::welcome,          Body::chunk, Body::frame,      Body::pong,       Body::notice,
+      Body::parameterChanged, Body::error, Body::tickEvents, Body::listScenes, Body::presence};
   for (const Body body : kKnown) {
     if (field == bytes(static_cast<std::uint32_t>(body))) return body;
   }
@@ -270,6 +289,19 @@ std::optional<Welcome> readWelcome(Bytes message) {
         return setText(welcome.serverName, reader);
       case bytes(6):
         return setText(welcome.deviceName, reader);
+      case varint(7):
+        return set(welcome.contentId, reader.get_uint64());
+      case varint(30):
+        return set(welcome.role, reader.get_uint32());
+      case bytes(31):
+        return setText(welcome.token, reader);
+      case varint(32):
+        return set(welcome.resumed, reader.get_bool());
+      case bytes(33):
+        return welcome.participants.size() < kMaxParticipants &&
+               readParticipant(reader.get_view(), welcome.participants.emplace_back());
+      case varint(34):
+        return set(welcome.holdMs, reader.get_uint32());
       default:
         return skip(reader);
     }
@@ -390,9 +422,27 @@ std::optional<Pong> readPong(Bytes message) {
   });
 }
 
-std::optional<std::string> readNotice(Bytes message) {
-  return readMessage<std::string>(message, [](std::string& text, std::uint32_t field, Reader& reader) {
-    return field == bytes(2) ? setText(text, reader) : skip(reader);
+std::optional<Notice> readNotice(Bytes message) {
+  return readMessage<Notice>(message, [](Notice& notice, std::uint32_t field, Reader& reader) {
+    if (field == varint(30)) return set(notice.participantId, reader.get_uint64());
+    return field == bytes(2) ? setText(notice.text, reader) : skip(reader);
+  });
+}
+
+std::optional<Presence> readPresence(Bytes message) {
+  return readMessage<Presence>(message, [](Presence& presence, std::uint32_t field, Reader& reader) {
+    switch (field) {
+      case varint(1):
+        return set(presence.kind, reader.get_uint32());
+      case bytes(2):
+        return readParticipant(reader.get_view(), presence.participant);
+      case varint(3):
+        return set(presence.reason, reader.get_uint32());
+      case varint(4):
+        return set(presence.by, reader.get_uint64());
+      default:
+        return skip(reader);
+    }
   });
 }
 

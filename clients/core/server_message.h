@@ -28,6 +28,7 @@ enum class Body : std::uint32_t {
   error = 8,
   tickEvents = 9,
   listScenes = 16,
+  presence = 30,
 };
 
 // A kind of body that this client does not know is `none`.
@@ -36,10 +37,34 @@ struct ServerMessage {
   Bytes body;
 };
 
+struct Participant {
+  std::uint64_t id = 0;
+  std::string name, clientName;
+  std::uint32_t role = 0;
+  bool away = false;
+};
+
 struct Welcome {
   std::uint32_t protocolVersion = 0, codec = 0;
   std::uint64_t participantId = 0;
   std::string scene, serverName, deviceName;
+  std::uint64_t contentId = 0;  // of the description
+  std::uint32_t role = 0;
+  std::string token;
+  bool resumed = false;
+  std::vector<Participant> participants;
+  std::uint32_t holdMs = 0;
+};
+
+struct Presence {
+  std::uint32_t kind = 0, reason = 0;
+  Participant participant;
+  std::uint64_t by = 0;
+};
+
+struct Notice {
+  std::string text;
+  std::uint64_t participantId = 0;
 };
 
 struct Chunk {
@@ -157,8 +182,8 @@ struct TickEvents {
 [[nodiscard]] bool readCollider(Bytes message, Collider& collider);
 [[nodiscard]] std::optional<Hull> readHull(Bytes message);
 [[nodiscard]] std::optional<Pong> readPong(Bytes message);
-// The text of a Notice.
-[[nodiscard]] std::optional<std::string> readNotice(Bytes message);
+[[nodiscard]] std::optional<Notice> readNotice(Bytes message);
+[[nodiscard]] std::optional<Presence> readPresence(Bytes message);
 [[nodiscard]] std::optional<ParameterChange> readParameterChanged(Bytes message);
 [[nodiscard]] std::optional<ServerError> readError(Bytes message);
 [[nodiscard]] bool readTickEvents(Bytes message, TickEvents& events);
@@ -179,6 +204,7 @@ inline constexpr std::size_t kMaxCloths = 256;
 // The scene's and all participants'.
 inline constexpr std::size_t kMaxSceneColliders = 4096;
 inline constexpr std::size_t kMaxHullParts = 128;  // vertices, faces
+inline constexpr std::size_t kMaxParticipants = 4096;
 inline constexpr std::size_t kMaxScenes = 65536;
 inline constexpr std::size_t kMaxEvents = 65536;  // of a kind
 

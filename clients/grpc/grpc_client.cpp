@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// One call, one completion queue, one thread that owns all of it.
+// One call at a time, one completion queue, one thread that owns all of it.
 #include "clients/grpc/grpc_client.h"
 
 #include <algorithm>
@@ -53,8 +53,9 @@ class GrpcClient::Stream {
       : address_(std::move(address)),
         options_(options),
         onEvents_(std::move(onEvents)),
-        core_(cs_create(options.scene.c_str(), options.clientName.c_str()), &cs_destroy),
-        stub_(makeChannel(address_)) {
+        core_(cs_create_as(options.scene.c_str(), options.clientName.c_str(), options.displayName.c_str(),
+                           options.role),
+              &cs_destroy) {
     cs_set_clock(core_.get(), &GrpcClient::nowUs);
     thread_ = std::thread([this] { run(); });
   }
@@ -114,20 +115,63 @@ class GrpcClient::Stream {
     alarm_.Set(&queue_, SystemClock::now(), tagOf(kWoken));
   }
 
+  // What belongs to one connection.
+  struct Call {
+    explicit Call(const std::string& address) : stub(makeChannel(address)) {}
+
+    grpc::GenericStub stub;
+    grpc::ClientContext context;
+    std::unique_ptr<grpc::GenericClientAsyncReaderWriter> stream;
+    grpc::ByteBuffer incoming;
+    grpc::Status status;
+    int underway = 0;  // operations
+    bool started = false, writing = false, broken = false, halfClosed = false, finishing = false;
+    bool silent = false;
+  };
+
   void run() {
-    lastHeard_ = SteadyClock::now();
-    call_ = stub_.PrepareCall(&context_, kJoinMethod, &queue_);
-    ++underway_;
-    call_->StartCall(tagOf(kStarted));
-    while (underway_ > 0) {
-      void* tag = nullptr;
-      bool ok = false;
-      const auto next = queue_.AsyncNext(&tag, &ok, SystemClock::now() + kUpdateInterval);
-      if (next == grpc::CompletionQueue::GOT_EVENT)
-        completed(static_cast<Operation>(reinterpret_cast<std::intptr_t>(tag)), ok);
-      update();
-    }
+    do {
+      connect();
+      while (call_->underway > 0) step(SystemClock::now() + kUpdateInterval);
+    } while (comesBack());
     end();
+  }
+
+  void step(SystemClock::time_point until) {
+    void* tag = nullptr;
+    bool ok = false;
+    const auto next = queue_.AsyncNext(&tag, &ok, until);
+    if (next == grpc::CompletionQueue::GOT_EVENT)
+      completed(static_cast<Operation>(reinterpret_cast<std::intptr_t>(tag)), ok);
+    update();
+  }
+
+  void connect() {
+    cs_connecting(core_.get(), GrpcClient::nowUs());
+    call_.emplace(address_);
+    lastHeard_ = SteadyClock::now();
+    call_->stream = call_->stub.PrepareCall(&call_->context, kJoinMethod, &queue_);
+    ++call_->underway;
+    call_->stream->StartCall(tagOf(kStarted));
+  }
+
+  // The call is over: waits until it is time for another one. False if there is to be none.
+  bool comesBack() {
+    if (!cutOffAt_) cutOffAt_ = SteadyClock::now();
+    const auto giveUpAt = *cutOffAt_ + options_.reconnectFor;
+    const bool tries = wasJoined_ && options_.reconnectFor.count() > 0;
+    if (!tries || leaving_ || cs_get_state(core_.get()) == CS_STATE_FAILED) return false;
+    triesToComeBack_ = true;
+    cs_disconnected(core_.get(), GrpcClient::nowUs());
+    onEvents_(core_.get(), 0);
+    for (;;) {
+      const std::uint64_t now = GrpcClient::nowUs(), at = cs_connect_at(core_.get());
+      if (leaving_ || SteadyClock::now() >= giveUpAt) return false;
+      if (now >= at) return true;
+      const auto wait = std::chrono::microseconds(
+          std::min<std::uint64_t>(at - now, std::chrono::microseconds(kUpdateInterval).count()));
+      step(SystemClock::now() + wait);
+    }
   }
 
   void completed(Operation operation, bool ok) {
@@ -138,18 +182,18 @@ class GrpcClient::Stream {
       }
       return takeTasks();
     }
-    --underway_;
+    --call_->underway;
     switch (operation) {
       case kStarted:
         if (!ok) return finish();
-        started_ = true;
+        call_->started = true;
         return read();
       case kRead:
         return ok ? received() : finish();
       case kWritten:
-        writing_ = false;
+        call_->writing = false;
         // A write that fails means that the stream has ended; the read says so too.
-        broken_ |= !ok;
+        call_->broken |= !ok;
         return;
       case kHalfClosed:
       case kFinished:
@@ -159,14 +203,14 @@ class GrpcClient::Stream {
   }
 
   void read() {
-    ++underway_;
-    call_->Read(&incoming_, tagOf(kRead));
+    ++call_->underway;
+    call_->stream->Read(&call_->incoming, tagOf(kRead));
   }
 
   void received() {
     lastHeard_ = SteadyClock::now();
     grpc::Slice bytes;
-    if (incoming_.DumpToSingleSlice(&bytes).ok()) {
+    if (call_->incoming.DumpToSingleSlice(&bytes).ok()) {
       if (options_.onMessage) options_.onMessage(std::as_bytes(std::span(bytes.begin(), bytes.size())));
       const std::uint32_t events = cs_receive(core_.get(), bytes.begin(), bytes.size(), GrpcClient::nowUs());
       if (events != 0) announce(events);
@@ -176,7 +220,9 @@ class GrpcClient::Stream {
 
   void announce(std::uint32_t events) {
     onEvents_(core_.get(), events);
+    if (cs_get_state(core_.get()) == CS_STATE_JOINED) cutOffAt_.reset();
     if ((events & CS_EVENT_DESCRIPTION) == 0) return;
+    wasJoined_ = true;
     const std::lock_guard lock(mutex_);
     joined_ = true;
     changed_.notify_all();
@@ -196,39 +242,43 @@ class GrpcClient::Stream {
     cs_update(core_.get(), GrpcClient::nowUs());
     const auto now = SteadyClock::now();
     const bool failed = cs_get_state(core_.get()) == CS_STATE_FAILED;
+    if (call_->underway == 0) return;
     if (leaving_ || failed) return leave(now);
-    if (now - lastHeard_ > options_.silenceTimeout && started_) {
-      silent_ = true;
-      context_.TryCancel();
+    const bool tooLong = now - lastHeard_ > options_.silenceTimeout && call_->started;
+    const bool givenUp =
+        wasJoined_ && options_.reconnectFor.count() > 0 && GrpcClient::nowUs() >= cs_connect_at(core_.get());
+    if (tooLong || givenUp) {
+      call_->silent = true;
+      call_->context.TryCancel();
     }
     write();
   }
 
   void write() {
-    if (!started_ || writing_ || broken_ || finishing_) return;
+    if (!call_->started || call_->writing || call_->broken || call_->finishing) return;
     std::size_t bytes = 0;
     const std::uint8_t* message = cs_next_outgoing(core_.get(), &bytes);
     if (!message) return;
     const grpc::Slice slice(message, bytes);
-    writing_ = true;
-    ++underway_;
-    call_->Write(grpc::ByteBuffer(&slice, 1), tagOf(kWritten));
+    call_->writing = true;
+    ++call_->underway;
+    call_->stream->Write(grpc::ByteBuffer(&slice, 1), tagOf(kWritten));
   }
 
   // Says that nothing more comes; the server then ends the stream. It has kClosingTime for that.
   void leave(SteadyClock::time_point now) {
     if (!cancelAt_) cancelAt_ = now + kClosingTime;
-    if (!started_ || now >= *cancelAt_) return context_.TryCancel();
-    if (halfClosed_ || writing_ || broken_ || finishing_) return;
-    halfClosed_ = true;
-    ++underway_;
-    call_->WritesDone(tagOf(kHalfClosed));
+    if (!call_->started || now >= *cancelAt_) return call_->context.TryCancel();
+    if (call_->halfClosed || call_->writing || call_->broken || call_->finishing) return;
+    call_->halfClosed = true;
+    ++call_->underway;
+    call_->stream->WritesDone(tagOf(kHalfClosed));
   }
 
   void finish() {
-    finishing_ = true;
-    ++underway_;
-    call_->Finish(&status_, tagOf(kFinished));
+    call_->finishing = true;
+    ++call_->underway;
+    call_->stream->Finish(&call_->status, tagOf(kFinished));
   }
 
   Failure reason() const {
@@ -239,11 +289,15 @@ class GrpcClient::Stream {
               saidByServer ? fmt::format("The server at {} refuses: {}", address_, text) : text};
     }
     if (leaving_) return {Failure::Kind::lost, "The stream was left."};
-    if (silent_)
+    if (call_->silent && !call_->status.ok() && !triesToComeBack_)
       return {Failure::Kind::lost,
               fmt::format("The server at {} has said nothing for {} s: the stream is lost.", address_,
                           seconds(options_.silenceTimeout))};
-    return joined_ ? lost(address_, status_) : notJoined(address_, status_);
+    if (!wasJoined_) return notJoined(address_, call_->status);
+    Failure failure = lost(address_, call_->status);
+    if (triesToComeBack_)
+      failure.text += fmt::format(" It could not be had back within {} s.", seconds(options_.reconnectFor));
+    return failure;
   }
 
   void end() {
@@ -280,14 +334,9 @@ class GrpcClient::Stream {
 
   // The thread's own.
   std::unique_ptr<cs_client, decltype(&cs_destroy)> core_;
-  grpc::GenericStub stub_;
-  grpc::ClientContext context_;
-  std::unique_ptr<grpc::GenericClientAsyncReaderWriter> call_;
-  grpc::ByteBuffer incoming_;
-  grpc::Status status_;
-  int underway_ = 0;  // operations on the call
-  bool started_ = false, writing_ = false, broken_ = false, halfClosed_ = false, finishing_ = false;
-  bool leaving_ = false, silent_ = false;
+  std::optional<Call> call_;
+  bool leaving_ = false, wasJoined_ = false, triesToComeBack_ = false;
+  std::optional<SteadyClock::time_point> cutOffAt_;  // since then it is, or tries to come back
   std::optional<SteadyClock::time_point> cancelAt_;
   SteadyClock::time_point lastHeard_;
   std::thread thread_;

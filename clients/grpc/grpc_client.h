@@ -21,21 +21,27 @@ namespace clothstream {
 struct GrpcClientOptions {
   std::string scene;  // empty: the server's default
   std::string clientName = "clothstream";
+  std::string displayName;  // shown to others; may be empty
+  cs_role role = CS_ROLE_UNSPECIFIED;
   // From the call of join() to the whole description.
   std::chrono::milliseconds joinTimeout{10'000};
   // Asked ten times a second while joining: true gives up. May be empty.
   std::function<bool()> cancelled;
   // Every message as it comes, before the cs_client gets it, on the thread that owns that. May be empty.
   std::function<void(std::span<const std::byte>)> onMessage;
-  // The server answers pings twice a second; when it has said nothing for this long, the stream is lost.
+  // Once joined, who is cut off tries for this long to come back; 0: the stream then ends with the
+  // connection.
+  std::chrono::milliseconds reconnectFor{60'000};
+  // The server answers pings twice a second; when it has said nothing for this long, the connection is lost
+  // (sooner where it tries to come back, as clients/core has it).
   std::chrono::milliseconds silenceTimeout{10'000};
 };
 
 // Owns a thread, and that thread owns the cs_client: `onEvents` and what visit() gets run there.
 class GrpcClient {
  public:
-  // After each message that changed something, with the bits of cs_receive: also before join() returns. Must
-  // not call visit().
+  // After each message that changed something, with the bits of cs_receive: also before join() returns. With
+  // none where the state of the client changed without a message: cut off. Must not call visit().
   using OnEvents = std::function<void(cs_client*, std::uint32_t events)>;
 
   // `address` as completeAddress gives it. Returns once the description is there.

@@ -107,11 +107,18 @@ Result<Joining> toJoining(const v1::Hello& message, std::span<const std::uint32_
                 fmt::format("must have one that this server encodes: {}", fmt::join(codecs, ", ")),
                 v1::ERROR_CODE_UNSUPPORTED_CODEC);
   if (!message.scene().empty()) checks.name(hello / "scene", message.scene());
-  checks.text(hello / "clientName", message.client_name());
-  checks.text(hello / "displayName", message.display_name());
+  checks.label(hello / "clientName", message.client_name());
+  checks.label(hello / "displayName", message.display_name());
+  if (message.role() < v1::ROLE_UNSPECIFIED || message.role() > v1::ROLE_OWNER)
+    checks.fail(hello / "role", fmt::format("{}", static_cast<int>(message.role())),
+                "must be ROLE_VIEWER, ROLE_PARTICIPANT, ROLE_OWNER or left out");
   if (checks.failed()) return std::move(checks).result(Joining{});
-  return Joining{std::min(message.protocol_version(), kProtocolVersion), *codec, message.scene(),
-                 message.client_name(), message.display_name()};
+  return Joining{std::min(message.protocol_version(), kProtocolVersion),
+                 *codec,
+                 message.scene(),
+                 message.client_name(),
+                 message.display_name(),
+                 message.role()};
 }
 
 Result<scene::ParticipantPoses> toPoses(const v1::ColliderPoses& message, const scene::Scene& scene) {

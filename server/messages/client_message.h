@@ -27,6 +27,7 @@ struct Joining {
   std::uint32_t codec = 0;
   std::string scene;  // empty: the server's default
   std::string clientName, displayName;
+  v1::Role role = v1::ROLE_UNSPECIFIED;
 };
 
 // `codecs` are the server's; the client's best that is among them is taken.

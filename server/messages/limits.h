@@ -30,6 +30,7 @@ inline constexpr std::uint32_t kMaxGridNodes = 8192;
 inline constexpr std::uint64_t kMaxNodes = 16'777'216;  // of a scene
 inline constexpr std::size_t kMaxNameLength = 64;
 inline constexpr std::size_t kMaxTextBytes = 1024;
+inline constexpr std::size_t kMaxLabelBytes = 64;
 
 inline constexpr Range kPosition{-1000, 1000};    // m
 inline constexpr Range kGravity{-1000, 1000};     // m/s^2

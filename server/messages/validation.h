@@ -48,6 +48,10 @@ class Checks {
   // For people: no control characters, at most kMaxTextBytes.
   const std::string& text(const Path& path, const std::string& value);
 
+  // What somebody is called, told to others: short, without control characters, also those of Unicode that
+  // turn or break lines.
+  const std::string& label(const Path& path, const std::string& value);
+
   // `value` is empty where there is none to show.
   void fail(const Path& path, std::string_view value, std::string_view allowed,
             v1::ErrorCode code = v1::ERROR_CODE_INVALID_ARGUMENT);

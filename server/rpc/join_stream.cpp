@@ -88,7 +88,11 @@ void JoinStream::cancelSoonLocked() {
 }
 
 void JoinStream::OnReadDone(bool ok) {
-  if (!ok) return finish(grpc::Status::OK);  // the client said that it has no more to say
+  if (!ok) {
+    const std::lock_guard lock(mutex_);
+    parting_ = connection_;
+    return finishLocked(grpc::Status::OK);
+  }
   std::shared_ptr<stream::Connection> connection;
   {
     const std::lock_guard lock(mutex_);
@@ -116,10 +120,16 @@ void JoinStream::OnWriteDone(bool ok) {
 }
 
 void JoinStream::OnCancel() {
-  finish(cancelled());
+  const std::lock_guard lock(mutex_);
+  cutOff_ = true;
+  finishLocked(cancelled());
 }
 
 void JoinStream::OnDone() {
+  {
+    const std::lock_guard lock(mutex_);
+    if (parting_ && !cutOff_) parting_->leave();
+  }
   onDone_(*this);
 }
 

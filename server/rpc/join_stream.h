@@ -30,8 +30,8 @@ class JoinStream final : public grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::
   // Writes the next message unless one is being written; ends the stream when there is none left to come.
   void pump();
 
-  // Leaves the scene now; gRPC hears of the end when the write in flight is done. The first one's status
-  // holds.
+  // Gives the connection up now; gRPC hears of the end when the write in flight is done. The first one's
+  // status holds.
   void finish(const grpc::Status& status);
 
  private:
@@ -48,6 +48,9 @@ class JoinStream final : public grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::
   std::mutex mutex_;
   grpc::CallbackServerContext* context_;            // nullptr when the call is done
   std::shared_ptr<stream::Connection> connection_;  // nullptr when the stream is ending
+  // Of a client that says no more. Whether it went or was cut off is known when the call is done.
+  std::shared_ptr<stream::Connection> parting_;
+  bool cutOff_ = false;
   grpc::ByteBuffer incoming_, outgoing_;
   stream::SharedBytes lastMessage_;
   grpc::Status status_;

@@ -19,6 +19,13 @@ grpc::StatusCode codeOf(v1::ErrorCode code) {
       return grpc::StatusCode::RESOURCE_EXHAUSTED;
     case v1::ERROR_CODE_OUT_OF_ORDER:
       return grpc::StatusCode::FAILED_PRECONDITION;
+    case v1::ERROR_CODE_PERMISSION_DENIED:
+    case v1::ERROR_CODE_REMOVED:
+      return grpc::StatusCode::PERMISSION_DENIED;
+    case v1::ERROR_CODE_CUT_OFF:
+      return grpc::StatusCode::UNAVAILABLE;
+    case v1::ERROR_CODE_TAKEN_OVER:
+      return grpc::StatusCode::ABORTED;
     default:
       return grpc::StatusCode::UNKNOWN;
   }

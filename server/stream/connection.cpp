@@ -22,6 +22,10 @@ void Connection::receive(std::span<const std::byte> message) {
   session_->receive(message, Clock::now());
 }
 
+void Connection::leave() {
+  session_->leave();
+}
+
 std::optional<SharedBytes> Connection::next() {
   return session_->next(Clock::now());
 }

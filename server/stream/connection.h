@@ -29,14 +29,17 @@ class Connection {
   // `wake` is called, from any thread, when next() may have something or finished() became true; it must only
   // pass the word on. `peer` names the other end for logs. The server must outlive the connection.
   Connection(SceneServer& server, std::string peer, std::function<void()> wake);
-  // Leaves the scene; `wake` is not called any more once this returns (so hold no lock here that `wake`
-  // takes).
+  // The peer is cut off, unless it has left: its participant is held for a while. `wake` is not called any
+  // more once this returns (so hold no lock here that `wake` takes).
   ~Connection();
   Connection(const Connection&) = delete;
   Connection& operator=(const Connection&) = delete;
 
   // One ClientMessage. Whatever is wrong with it is answered by an Error to this peer alone.
   void receive(std::span<const std::byte> message);
+
+  // The peer said, in its door's way, that it has no more to say: it leaves the scene for good.
+  void leave();
 
   // The next message to write: control first, then the newest frame that this peer can decode and has room
   // for (at most two unacknowledged, more on long round trips).

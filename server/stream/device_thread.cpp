@@ -152,7 +152,7 @@ bool DeviceThread::tryMakeHost(Run& run) {
     const std::string text =
         fmt::format("the device cannot run the scene '{}': {}", run.scene->name(), failure.what());
     spdlog::error("{}", text);
-    run.scene->audience.dismiss(error(v1::ERROR_CODE_RESOURCE_EXHAUSTED, text, true));
+    run.scene->roster.dismiss(error(v1::ERROR_CODE_RESOURCE_EXHAUSTED, text, true));
   }
   return run.host != nullptr;
 }

@@ -12,11 +12,12 @@ SharedBytes serialise(const v1::ServerMessage& message) {
   return bytes;
 }
 
-SharedBytes notice(v1::NoticeKind kind, std::string text, std::uint64_t tick) {
+SharedBytes notice(v1::NoticeKind kind, std::string text, std::uint64_t tick, std::uint64_t participant) {
   v1::ServerMessage message;
   message.mutable_notice()->set_kind(kind);
   message.mutable_notice()->set_text(std::move(text));
   message.mutable_notice()->set_tick(tick);
+  message.mutable_notice()->set_participant_id(participant);
   return serialise(message);
 }
 
@@ -30,7 +31,7 @@ SharedBytes error(v1::ErrorCode code, std::string text, bool fatal, std::uint64_
 }
 
 SharedBytes tooSlow() {
-  return error(v1::ERROR_CODE_RESOURCE_EXHAUSTED,
+  return error(v1::ERROR_CODE_CUT_OFF,
                "too much waits to be read: read what the server sends, or ask and change less", true);
 }
 

@@ -17,12 +17,13 @@ using SharedBytes = std::shared_ptr<const std::vector<std::byte>>;
 
 SharedBytes serialise(const v1::ServerMessage& message);
 
-SharedBytes notice(v1::NoticeKind kind, std::string text, std::uint64_t tick);
+// `participant`: who did it; 0: the server, or somebody who is not in the scene.
+SharedBytes notice(v1::NoticeKind kind, std::string text, std::uint64_t tick, std::uint64_t participant = 0);
 
 // `requestId` is that of the message which is answered.
 SharedBytes error(v1::ErrorCode code, std::string text, bool fatal, std::uint64_t requestId = 0);
 
-// The last word to a peer that does not read what it is sent.
+// The last word to a peer that does not read what it is sent: it may come back.
 SharedBytes tooSlow();
 
 }  // namespace clothstream::stream

@@ -48,6 +48,7 @@ LiveScene::LiveScene(scene::Scene definition, bool wasCreated, std::shared_ptr<J
     : created(wasCreated),
       journal(std::move(kept)),
       audience(journal),
+      roster(audience, inbox, journal.get()),
       start_(std::move(definition)),
       definition_(start_) {}
 
@@ -113,8 +114,8 @@ std::shared_ptr<const Description> LiveScene::description() {
   return description_ = std::move(description);
 }
 
-SharedBytes pausedNotice(const LiveScene& scene) {
-  return notice(v1::NOTICE_KIND_SCENE_PAUSED, "the scene is paused", scene.tick.load());
+SharedBytes pausedNotice(const LiveScene& scene, std::uint64_t participant) {
+  return notice(v1::NOTICE_KIND_SCENE_PAUSED, "the scene is paused", scene.tick.load(), participant);
 }
 
 }  // namespace clothstream::stream

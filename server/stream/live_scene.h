@@ -14,6 +14,7 @@
 #include "server/stream/audience.h"
 #include "server/stream/inbox.h"
 #include "server/stream/journal.h"
+#include "server/stream/roster.h"
 #include "server/telemetry/metrics.h"
 
 namespace clothstream::stream {
@@ -56,6 +57,7 @@ class LiveScene {
 
   Inbox inbox;
   Audience audience;
+  Roster roster;
   telemetry::SceneMetrics metrics;
 
   // Written by the device's thread.
@@ -71,7 +73,7 @@ class LiveScene {
   std::uint64_t contents_ = 0;                      // ids given
 };
 
-// Tells that a scene's clock is stopped.
-SharedBytes pausedNotice(const LiveScene& scene);
+// Tells that a scene's clock is stopped; by whom, see notice().
+SharedBytes pausedNotice(const LiveScene& scene, std::uint64_t participant = 0);
 
 }  // namespace clothstream::stream

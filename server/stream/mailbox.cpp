@@ -50,6 +50,7 @@ void Mailbox::subscribe(std::shared_ptr<const Description> description, std::uin
   {
     const std::lock_guard lock(mutex_);
     description_ = std::move(description);
+    streaming_ = !description_;
     streamRate_ = streamRate;
     metrics_ = &metrics;
     doorWaits_ = false;

@@ -59,7 +59,8 @@ class Mailbox {
   // What everybody in the scene is told; kept back until the description is out.
   [[nodiscard]] bool announce(SharedBytes message);
 
-  // From here on it is a subscriber of frames: description first. `metrics` outlives the mailbox.
+  // From here on it is a subscriber of frames: description first; null where it has it already. `metrics`
+  // outlives the mailbox.
   void subscribe(std::shared_ptr<const Description> description, std::uint32_t streamRate,
                  telemetry::SceneMetrics& metrics);
   void deliver(const PublishedFrame& frame);

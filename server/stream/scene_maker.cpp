@@ -123,8 +123,8 @@ tl::expected<v1::DeleteSceneResponse, v1::Error> SceneMaker::removeNow(
                     "with this one",
                     request.name()));
   server_.erase(*scene);
-  scene->audience.close(notice(v1::NOTICE_KIND_SCENE_DELETED,
-                               fmt::format("the scene '{}' was deleted", scene->name()), scene->tick.load()));
+  scene->roster.close(notice(v1::NOTICE_KIND_SCENE_DELETED,
+                             fmt::format("the scene '{}' was deleted", scene->name()), scene->tick.load()));
   server_.device.remove(scene).wait();
   spdlog::info("{}: deleted", scene->name());
   return v1::DeleteSceneResponse();

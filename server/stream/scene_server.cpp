@@ -31,6 +31,13 @@ std::vector<std::shared_ptr<LiveScene>> liveScenes(std::vector<scene::Scene> def
   return scenes;
 }
 
+v1::Error toMessage(const messages::FieldError& error) {
+  v1::Error message;
+  message.set_code(error.code);
+  message.set_text(error.text);
+  return message;
+}
+
 SharedBytes stoppingNotice() {
   return notice(v1::NOTICE_KIND_SERVER_STOPPING, "the server stops", 0);
 }
@@ -53,6 +60,7 @@ SceneServer::State::State(std::vector<scene::Scene> definitions, ServerOptions o
       packer((scenes.size() + options.maxCreatedScenes) * encode::FrameEncoder::kSlots,
              [this] {
                for (const auto& session : sessionsNow()) session->checkSilence(Clock::now());
+               for (const auto& scene : scenesNow()) scene->roster.expire(Clock::now());
              },
              options.encoderThreads > 0
                  ? options.encoderThreads
@@ -137,18 +145,26 @@ tl::expected<v1::GetSceneResponse, v1::Error> SceneServer::State::getScene(
   return response;
 }
 
+messages::Result<void> SceneServer::State::mayFromOutside(const std::string& name, Act act) const {
+  const std::shared_ptr<LiveScene> scene = find(name);
+  if (options.outsideControl || !scene || !scene->roster.owned()) return {};
+  messages::Result<void> permitted = permit(v1::ROLE_UNSPECIFIED, act, options.participantsMay);
+  if (!permitted) permitted.error().text += fmt::format(", for you are not in the scene '{}'", scene->name());
+  return permitted;
+}
+
 tl::expected<v1::ControlSceneResponse, v1::Error> SceneServer::State::controlScene(
-    const v1::ControlSceneRequest& request) {
+    const v1::ControlSceneRequest& request, std::uint64_t participant) {
   const std::shared_ptr<LiveScene> scene = find(request.name());
   if (!scene) return tl::unexpected(noSuchScene(request.name()));
   if (request.has_paused() && scene->paused.exchange(request.paused()) != request.paused())
-    scene->audience.announce(
-        request.paused() ? pausedNotice(*scene)
-                         : notice(v1::NOTICE_KIND_SCENE_RESUMED, "the scene goes on", scene->tick.load()));
+    scene->audience.announce(request.paused() ? pausedNotice(*scene, participant)
+                                              : notice(v1::NOTICE_KIND_SCENE_RESUMED, "the scene goes on",
+                                                       scene->tick.load(), participant));
   if (request.reset()) {
     scene->resetWanted = true;
     scene->audience.announce(
-        notice(v1::NOTICE_KIND_SCENE_RESET, "the scene begins anew", scene->tick.load()));
+        notice(v1::NOTICE_KIND_SCENE_RESET, "the scene begins anew", scene->tick.load(), participant));
   }
   device.wake();
   v1::ControlSceneResponse response;
@@ -199,12 +215,16 @@ void SceneServer::createScene(const v1::CreateSceneRequest& request, CreateDone 
 }
 
 void SceneServer::deleteScene(const v1::DeleteSceneRequest& request, DeleteDone done) {
+  if (const auto may = state_->mayFromOutside(request.name(), Act::deleteScene); !may)
+    return done(tl::unexpected(toMessage(may.error())));
   state_->maker.remove(request, std::move(done));
 }
 
 tl::expected<v1::ControlSceneResponse, v1::Error> SceneServer::controlScene(
     const v1::ControlSceneRequest& request) {
-  return state_->controlScene(request);
+  if (const auto may = state_->mayFromOutside(request.name(), Act::controlScene); !may)
+    return tl::unexpected(toMessage(may.error()));
+  return state_->controlScene(request, 0);
 }
 
 void SceneServer::stop() {

@@ -14,6 +14,7 @@
 
 #include "clothstream/v1/session.pb.h"
 #include "server/scene/scene.h"
+#include "server/stream/roster.h"
 #include "server/vulkan/device.h"
 
 namespace clothstream::stream {
@@ -32,7 +33,7 @@ struct ServerOptions {
   // Frames of a scene that tell how its simulation does, a second; 0: none.
   double reportRate = 4;
   std::uint32_t maxConnections = 1024;
-  // A scene; at most 250, for the simulation has room for so many colliders.
+  // A scene, those who are held included; at most 250, for the simulation has room for so many colliders.
   std::uint32_t maxParticipants = 64;
   // Beside those that the server starts with; 0: peers make none.
   std::uint32_t maxCreatedScenes = 16;
@@ -42,8 +43,13 @@ struct ServerOptions {
   std::size_t maxUploadBytes = std::size_t{256} << 20;
   // Gives each scene its journal, or null for none; may be empty.
   std::function<std::shared_ptr<Journal>(const scene::Scene&)> journals{};
-  // A peer that sends nothing for this long is dropped.
+  // A peer that sends nothing for this long is cut off.
   std::chrono::milliseconds silence{30'000};
+  // Of who is cut off.
+  Holding holding{};
+  Permissions participantsMay{};
+  // Who is not in a scene may pause, reset and delete it; else only where nobody owns it.
+  bool outsideControl = true;
 };
 
 // Called once, on any thread; must only pass the word on.

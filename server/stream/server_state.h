@@ -41,7 +41,11 @@ struct SceneServer::State {
   std::vector<std::shared_ptr<Session>> sessionsNow() const;
   v1::ListScenesResponse listScenes() const;
   tl::expected<v1::GetSceneResponse, v1::Error> getScene(const v1::GetSceneRequest& request) const;
-  tl::expected<v1::ControlSceneResponse, v1::Error> controlScene(const v1::ControlSceneRequest& request);
+  // `participant`: who asks; 0: somebody who is not in the scene.
+  tl::expected<v1::ControlSceneResponse, v1::Error> controlScene(const v1::ControlSceneRequest& request,
+                                                                 std::uint64_t participant);
+  // Whether somebody who is not in it may do so to the scene of this name.
+  messages::Result<void> mayFromOutside(const std::string& name, Act act) const;
   void stop();
 
   const ServerOptions options;

@@ -88,11 +88,14 @@ void Session::dispatch(const v1::ClientMessage& message, Clock::time_point now) 
       return create(message.create_scene());
     case Body::kDeleteScene:
       if (!allowed(controlRate_, "requests about scenes")) return;
+      if (!actor(message.delete_scene().name(), Act::deleteScene)) return;
       return server_.maker.remove(message.delete_scene(), answering<v1::DeleteSceneResponse>(
                                                               &v1::ServerMessage::mutable_delete_scene));
     case Body::kControlScene: {
       if (!allowed(controlRate_, "requests about scenes")) return;
-      auto controlled = server_.controlScene(message.control_scene());
+      const auto who = actor(message.control_scene().name(), Act::controlScene);
+      if (!who) return;
+      auto controlled = server_.controlScene(message.control_scene(), *who);
       if (!controlled) return refuse({controlled.error().code(), controlled.error().text()});
       v1::ServerMessage reply;
       *reply.mutable_control_scene() = std::move(*controlled);
@@ -110,9 +113,15 @@ void Session::dispatch(const v1::ClientMessage& message, Clock::time_point now) 
       return;
     case Body::kParameterChange:
       if (!allowed(changeRate_, "parameter changes")) return;
-      if (const auto changed = scene_->change(participant_, message.parameter_change()); !changed)
-        refuse(changed.error());
-      return;
+      return refuseUnless(
+          scene_->roster.permits(*mailbox_, message.parameter_change(), server_.options.participantsMay)
+              .and_then([&] { return scene_->change(participant_, message.parameter_change()); }));
+    case Body::kSetRole:
+      if (!allowed(controlRate_, "requests about participants")) return;
+      return refuseUnless(scene_->roster.setRole(*mailbox_, message.set_role(), now));
+    case Body::kRemoveParticipant:
+      if (!allowed(controlRate_, "requests about participants")) return;
+      return refuseUnless(scene_->roster.remove(*mailbox_, message.remove_participant(), now));
     case Body::kFrameAck:
       if (!mailbox_->acknowledge(message.frame_ack().tick(), now))
         refuse({v1::ERROR_CODE_INVALID_ARGUMENT,
@@ -143,18 +152,23 @@ void Session::hello(const v1::Hello& message) {
     return fail(
         v1::ERROR_CODE_UNSUPPORTED_CODEC,
         fmt::format("hello.codecs: must have {}, in which '{}' is sent", scene->codec(), scene->name()));
-  const Audience::Joining joined = scene->audience.join(mailbox_, server_.options.maxParticipants);
-  if (joined == Audience::Joining::closed)
+  auto admission = scene->roster.join({.clientName = joining->clientName,
+                                       .displayName = joining->displayName,
+                                       .role = joining->role,
+                                       .token = message.resume_token()},
+                                      mailbox_, server_.participants, server_.options.maxParticipants, now_);
+  if (!admission && admission.error() == Roster::Refusal::closed)
     return fail(v1::ERROR_CODE_NOT_FOUND, fmt::format("'{}' was just deleted", scene->name()));
-  if (joined == Audience::Joining::full)
+  if (!admission)
     return fail(v1::ERROR_CODE_RESOURCE_EXHAUSTED,
-                fmt::format("'{}' has {} participants, as many as it may have; try again later",
-                            scene->name(), server_.options.maxParticipants));
+                fmt::format("'{}' has {} participants ({} of them cut off, and held for a while), as many as "
+                            "it may have; try again later",
+                            scene->name(), server_.options.maxParticipants, scene->roster.away()));
   scene_ = scene;
-  participant_ = ++server_.participants;
+  participant_ = admission->id;
   scene->metrics.joins.add();
-  if (scene->journal) scene->journal->joined(participant_, joining->clientName, joining->displayName);
   const std::shared_ptr<const Description> description = scene->description();
+  const bool known = admission->resumed && message.description_content_id() == description->contentId;
 
   v1::ServerMessage reply;
   v1::Welcome& welcome = *reply.mutable_welcome();
@@ -165,11 +179,19 @@ void Session::hello(const v1::Hello& message) {
   welcome.set_server_name(server_.options.serverName);
   welcome.set_device_name(server_.device.info().name);
   welcome.set_description_content_id(description->contentId);
+  welcome.set_role(admission->role);
+  welcome.set_resume_token(admission->token);
+  welcome.set_resumed(admission->resumed);
+  welcome.mutable_participants()->Assign(admission->participants.begin(), admission->participants.end());
+  welcome.set_hold_ms(static_cast<std::uint32_t>(
+      std::chrono::duration_cast<std::chrono::milliseconds>(server_.options.holding.hold).count()));
   answer(reply);
-  mailbox_->subscribe(description, scene->start().streamRate, scene->metrics);
-  if (scene->paused && !mailbox_->announce(pausedNotice(*scene))) return closeLocked(tooSlow());
+  mailbox_->subscribe(known ? nullptr : description, scene->start().streamRate, scene->metrics);
+  if (scene->paused && !mailbox_->announce(pausedNotice(*scene)))
+    return closeLocked(tooSlow(), Parting::lost);
   server_.device.wake();
-  spdlog::info("{}: {} joined as participant {} ({}); {} in it", scene->name(), peer_, participant_,
+  spdlog::info("{}: {} {} as participant {}, {} ({}); {} in it", scene->name(), peer_,
+               admission->resumed ? "came back" : "joined", participant_, nameOf(admission->role),
                joining->clientName.empty() ? "unnamed client" : joining->clientName, scene->audience.size());
 }
 
@@ -192,8 +214,18 @@ void Session::create(const v1::CreateSceneRequest& request) {
 void Session::poses(const v1::ColliderPoses& message, Clock::time_point now) {
   auto poses = messages::toPoses(message, scene_->start());
   if (!poses) return refuse(poses.error());
-  scene_->inbox.postPoses(participant_, std::move(*poses), now);
-  posed_ = true;
+  refuseUnless(
+      scene_->roster.post(*mailbox_, message, std::move(*poses), server_.options.participantsMay, now));
+}
+
+std::optional<std::uint64_t> Session::actor(const std::string& name, Act act) {
+  const bool inside = scene_ != nullptr && server_.find(name) == scene_;
+  const messages::Result<void> may =
+      inside ? scene_->roster.permits(*mailbox_, act, server_.options.participantsMay)
+             : server_.mayFromOutside(name, act);
+  if (may) return inside ? participant_ : 0;
+  refuse(may.error());
+  return std::nullopt;
 }
 
 void Session::answer(v1::ServerMessage& message) {
@@ -201,7 +233,11 @@ void Session::answer(v1::ServerMessage& message) {
   if (mailbox_->reply(serialise(message))) return;
   server_.metrics.droppedConnections.add();
   spdlog::warn("{}: does not read what it asks for; cut off", peer_);
-  closeLocked(tooSlow());
+  closeLocked(tooSlow(), Parting::lost);
+}
+
+void Session::refuseUnless(const messages::Result<void>& done) {
+  if (!done) refuse(done.error());
 }
 
 void Session::refuse(const messages::FieldError& reason, double cost) {
@@ -220,7 +256,7 @@ void Session::refuse(const messages::FieldError& reason, double cost) {
 
 void Session::fail(v1::ErrorCode code, std::string text) {
   spdlog::info("{}: closed: {}", peer_, text);
-  closeLocked(error(code, std::move(text), true, requestId_));
+  closeLocked(error(code, std::move(text), true, requestId_), Parting::removed);
 }
 
 bool Session::allowed(TokenBucket& bucket, const char* what) {
@@ -231,12 +267,17 @@ bool Session::allowed(TokenBucket& bucket, const char* what) {
 
 void Session::close(SharedBytes last) {
   const std::lock_guard lock(mutex_);
-  closeLocked(std::move(last));
+  now_ = Clock::now();
+  closeLocked(std::move(last), Parting::left);
 }
 
-void Session::closeLocked(SharedBytes last) {
+void Session::closeLocked(SharedBytes last, Parting how) {
   mailbox_->close(std::move(last));
-  leave();
+  part(how);
+}
+
+void Session::leave() {
+  close(nullptr);
 }
 
 void Session::checkSilence(Clock::time_point now) {
@@ -244,28 +285,34 @@ void Session::checkSilence(Clock::time_point now) {
   const bool silent = now - lastHeard_.load() > server_.options.silence;
   if (!silent && !mailbox_->closed()) return;
   const std::lock_guard lock(mutex_);
+  now_ = now;
   if (!mailbox_->closed()) {
     server_.metrics.droppedConnections.add();
     const std::string text = fmt::format("nothing was heard for {} s: acknowledge frames, or send pings",
                                          seconds(server_.options.silence));
     spdlog::info("{}: cut off: {}", peer_, text);
-    mailbox_->close(error(v1::ERROR_CODE_RESOURCE_EXHAUSTED, text, true));
+    mailbox_->close(error(v1::ERROR_CODE_CUT_OFF, text, true));
   }
-  leave();
+  part(Parting::lost);
 }
 
 void Session::end() {
   mailbox_->silence();
-  close(nullptr);
+  const std::lock_guard lock(mutex_);
+  now_ = Clock::now();
+  closeLocked(nullptr, Parting::lost);
 }
 
-void Session::leave() {
+void Session::part(Parting how) {
   if (scene_ == nullptr) return;
-  scene_->audience.leave(*mailbox_);
-  if (scene_->journal) scene_->journal->left(participant_);
-  if (posed_) scene_->inbox.postPoses(participant_, {}, now_);
+  if (how == Parting::lost)
+    scene_->roster.lose(*mailbox_, server_.options.holding, now_);
+  else
+    scene_->roster.leave(*mailbox_, how == Parting::left ? v1::LEAVE_REASON_LEFT : v1::LEAVE_REASON_REMOVED,
+                         now_);
   server_.device.wake();
-  spdlog::info("{}: {} left; {} in it", scene_->name(), peer_, scene_->audience.size());
+  spdlog::info("{}: {} {}; {} in it", scene_->name(), peer_, how == Parting::lost ? "was cut off" : "left",
+               scene_->audience.size());
   scene_ = nullptr;
 }
 

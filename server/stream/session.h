@@ -33,11 +33,13 @@ class Session : public std::enable_shared_from_this<Session> {
   std::optional<SharedBytes> next(Clock::time_point now) { return mailbox_->next(now); }
   bool finished() const { return mailbox_->closed(); }
 
-  // Closes with this as the last message, and leaves the scene. The first call counts.
+  // Closes with this as the last message, and leaves the scene for good. The first call counts.
   void close(SharedBytes last);
-  // Closed where nothing was heard for too long. To be called now and then.
+  // The peer leaves for good.
+  void leave();
+  // Cut off where nothing was heard for too long. To be called now and then.
   void checkSilence(Clock::time_point now);
-  // The door is gone: leaves the scene and wakes nobody any more.
+  // The door is gone: the peer is cut off, and nobody is woken any more.
   void end();
 
  private:
@@ -53,8 +55,14 @@ class Session : public std::enable_shared_from_this<Session> {
   void refuse(const messages::FieldError& reason, double cost = 1);
   void fail(v1::ErrorCode code, std::string text);
   bool allowed(TokenBucket& bucket, const char* what);
-  void leave();
-  void closeLocked(SharedBytes last);
+  // Whether this peer may do so to the scene of this name, as somebody in it or from outside: who it is
+  // there, 0 from outside. Where not, that has been said.
+  std::optional<std::uint64_t> actor(const std::string& scene, Act act);
+  void refuseUnless(const messages::Result<void>& done);
+  // How the participant is out of the scene, if it is in one.
+  enum class Parting : std::uint8_t { left, removed, lost };
+  void part(Parting how);
+  void closeLocked(SharedBytes last, Parting how);
 
   SceneServer::State& server_;
   const std::string peer_;
@@ -64,7 +72,6 @@ class Session : public std::enable_shared_from_this<Session> {
   std::mutex mutex_;  // of all below
   std::shared_ptr<LiveScene> scene_;
   std::uint64_t participant_ = 0;
-  bool posed_ = false;
   Upload upload_;
   // Of the message in hand.
   std::uint64_t requestId_ = 0;

@@ -100,6 +100,8 @@ void StreamSession::read() {
 }
 
 void StreamSession::onRead(beast::error_code error) {
+  // A close frame is a goodbye; anything else is a connection that was lost.
+  if (error == ws::error::closed && connection_) connection_->leave();
   if (error) return end();
   if (closing_ || !connection_) return;
   if (socket_.got_text())
@@ -127,6 +129,8 @@ void StreamSession::pump() {
 
 void StreamSession::onWritten(beast::error_code error) {
   writing_ = false;
+  // A close frame that came, or a timeout, ended it: the read that is under way says which.
+  if (error == boost::asio::error::operation_aborted) return;
   if (error) return end();
   pump();
 }

@@ -30,7 +30,7 @@ class StreamSession : public std::enable_shared_from_this<StreamSession> {
   // The closing handshake, at most kClosingTimeout of it; then the session ends.
   void close(const boost::beast::websocket::close_reason& reason);
 
-  // Leaves the scene; the connection's `wake` is not called any more once this returns.
+  // Gives the connection up; its `wake` is not called any more once this returns.
   void leave() { connection_.reset(); }
 
  private:

@@ -231,7 +231,7 @@ TEST_F(JoinTest, ScenesAreCreatedPausedResetAndDeleted) {
 }
 
 TEST_F(JoinTest, AServerThatIsKilledIsNoticed) {
-  const auto client = clothstream({"join", address_}, Process::Output::terminal);
+  const auto client = clothstream({"join", address_, "--no-reconnect"}, Process::Output::terminal);
   ASSERT_TRUE(client->waitForOutput("fps", kStart)) << client->errors();
   server_->signal(SIGKILL);
   EXPECT_EQ(client->waitForEnd(kEnd), 5);
@@ -240,7 +240,7 @@ TEST_F(JoinTest, AServerThatIsKilledIsNoticed) {
 }
 
 TEST_F(JoinTest, AServerThatStopsSaysSo) {
-  const auto client = clothstream({"join", address_}, Process::Output::terminal);
+  const auto client = clothstream({"join", address_, "--no-reconnect"}, Process::Output::terminal);
   ASSERT_TRUE(client->waitForOutput("fps", kStart)) << client->errors();
   server_->signal(SIGTERM);
   EXPECT_EQ(client->waitForEnd(kEnd), 5);

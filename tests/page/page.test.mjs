@@ -6,6 +6,7 @@ import { existsSync } from "node:fs";
 import { readFile } from "node:fs/promises";
 import { after, before, test } from "node:test";
 import { kChromium, launchBrowser, luminance, openPage, takePicture, untilFrames, untilState } from "./browser.mjs";
+import { makeLink } from "./link.mjs";
 import { startServer } from "./server.mjs";
 
 const kSkipped = 77; // CMake's SKIP_RETURN_CODE for this test
@@ -374,13 +375,62 @@ test("a lost server is told, and the page comes back with it", () =>
     await untilState(page, "live");
     await server.stop();
     await untilState(page, "reconnecting");
-    await page.waitForFunction(() => /Trying again in \d+ s/.test(document.getElementById("banner-text").textContent));
+    await page.waitForFunction(() => /Trying (to come back|again in \d+ s)\./.test(document.getElementById("banner-text").textContent));
     await takePicture(page, "reconnecting");
     server = await startServer(server.port);
     await untilState(page, "live");
     await untilFrames(page, 10);
     await page.waitForSelector("#banner", { state: "hidden" });
   }));
+
+test("people see who is there, and who is cut off comes back as the same one", async () => {
+  const link = await makeLink(server.port);
+  const here = () => window.clothstream.participants.map(({ name, role, away }) => `${name} ${role}${away ? " away" : ""}`);
+  const ada = await openPage(browser, `${server.url}?name=Ada`);
+  try {
+    await untilState(ada, "live");
+    const ben = await openPage(browser, `${link.url}?name=Ben&role=viewer`);
+    try {
+      await untilState(ben, "live");
+      await untilFrames(ben, 5);
+      await ada.waitForFunction(() => window.clothstream.participants.length === 2);
+      assert.deepEqual(await ada.evaluate(here), ["Ada 3", "Ben 1"]);
+      assert.deepEqual(await ben.evaluate(here), ["Ada 3", "Ben 1"]);
+      assert.deepEqual(await ben.locator("#participants li").allInnerTexts(), ["Ada\nowner", "Ben (you)\nviewer"]);
+      await takePicture(ada, "participants");
+      const id = await ben.evaluate(() => String(window.clothstream.participants[1].id));
+
+      link.cut();
+      await untilState(ben, "reconnecting");
+      await ada.waitForFunction(() => window.clothstream.participants[1]?.away);
+      await takePicture(ada, "cut_off");
+      const frames = await ben.evaluate(() => {
+        window.returned = new Promise((resolve) => {
+          const { frames } = window.clothstream.statistics;
+          const wait = () => (window.clothstream.statistics.frames > frames ? resolve(Date.now()) : setTimeout(wait, 1));
+          wait();
+        });
+        return window.clothstream.statistics.frames;
+      });
+      await new Promise((resolve) => setTimeout(resolve, 1000));
+      const restored = Date.now();
+      link.restore();
+      const returned = await ben.evaluate(() => window.returned);
+      console.log(`the page's first frame came ${returned - restored} ms after the link's return`);
+      await untilState(ben, "live");
+      assert.ok((await ben.evaluate(() => window.clothstream.statistics.frames)) > frames);
+      assert.equal(await ben.evaluate(() => String(window.clothstream.participants[1].id)), id);
+      await ada.waitForFunction(() => !window.clothstream.participants[1].away);
+      assert.deepEqual(ben.errors, []);
+    } finally {
+      await ben.close();
+    }
+    await ada.waitForFunction(() => window.clothstream.participants.length === 1);
+  } finally {
+    await ada.close();
+    link.close();
+  }
+});
 
 test("a browser without WebGL is told what is missing", () =>
   withPage({ prepare: () => (HTMLCanvasElement.prototype.getContext = () => null) }, async (page) => {

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Whoever comes through one door shares the scene with those who came through the other.
+#include <functional>
 #include <memory>
+#include <string>
 
 #include <gmock/gmock.h>
 
@@ -61,6 +63,66 @@ TEST_F(BothDoors, APoseThroughWebSocketIsSeenThroughGrpc) {
   WebSocketClient mover(webDoor->port());
   RpcStream watcher(rpcDoor->port());
   expectColliderIsSeen(mover, watcher);
+}
+
+// Serialised; of who comes back, with the token of its Welcome.
+std::string helloWith(const std::string& token) {
+  v1::ClientMessage message;
+  message.ParseFromString(hello());
+  message.mutable_hello()->set_resume_token(token);
+  return message.SerializeAsString();
+}
+
+// Joins through `door`, and hears what becomes of whoever goes as `go` does.
+template <class Client>
+v1::Presence presenceAfter(std::uint16_t port, RpcStream& watcher, Viewer& watched,
+                           const std::function<void(Client&)>& go, Viewer& gone) {
+  Client client(port);
+  client.send(hello());
+  EXPECT_TRUE(client.watch(gone, [&] { return gone.frames > 0; }));
+  go(client);
+  EXPECT_TRUE(watcher.watch(watched, [&] {
+    const v1::Presence& told = watched.last.presence();
+    return told.participant().id() == gone.welcome.participant_id() &&
+           (told.kind() == v1::PRESENCE_KIND_LEFT || told.kind() == v1::PRESENCE_KIND_DISCONNECTED);
+  }));
+  return watched.last.presence();
+}
+
+// A goodbye in the door's way is one; anything else is a connection that was lost, and through either door
+// its participant comes back.
+TEST_F(BothDoors, WhoSaysGoodbyeHasLeftAndWhoIsCutOffComesBack) {
+  RpcStream watcher(rpcDoor->port());
+  Viewer watched;
+  watcher.send(hello());
+  ASSERT_TRUE(watcher.watch(watched, [&] { return watched.frames > 0; }));
+  Viewer left, closed, cancelled, reset;
+  EXPECT_EQ(presenceAfter<RpcStream>(
+                rpcDoor->port(), watcher, watched, [](RpcStream& client) { client.sendDone(); }, left)
+                .reason(),
+            v1::LEAVE_REASON_LEFT);
+  EXPECT_EQ(presenceAfter<WebSocketClient>(
+                webDoor->port(), watcher, watched, [](WebSocketClient& client) { client.close(); }, closed)
+                .reason(),
+            v1::LEAVE_REASON_LEFT);
+  EXPECT_EQ(presenceAfter<RpcStream>(
+                rpcDoor->port(), watcher, watched, [](RpcStream& client) { client.cancel(); }, cancelled)
+                .kind(),
+            v1::PRESENCE_KIND_DISCONNECTED);
+  EXPECT_EQ(presenceAfter<WebSocketClient>(
+                webDoor->port(), watcher, watched, [](WebSocketClient& client) { client.reset(); }, reset)
+                .kind(),
+            v1::PRESENCE_KIND_DISCONNECTED);
+  Viewer webViewer, rpcViewer;
+  WebSocketClient web(webDoor->port());
+  web.send(helloWith(cancelled.welcome.resume_token()));
+  ASSERT_TRUE(web.watch(webViewer, [&] { return webViewer.frames > 0; }));
+  EXPECT_TRUE(webViewer.welcome.resumed());
+  EXPECT_EQ(webViewer.welcome.participant_id(), cancelled.welcome.participant_id());
+  RpcStream rpc(rpcDoor->port());
+  rpc.send(helloWith(reset.welcome.resume_token()));
+  ASSERT_TRUE(rpc.watch(rpcViewer, [&] { return rpcViewer.frames > 0; }));
+  EXPECT_EQ(rpcViewer.welcome.participant_id(), reset.welcome.participant_id());
 }
 
 // The same tick is the same packet, whichever door it went through.

@@ -339,7 +339,7 @@ TEST_F(JoinTest, AFullSceneAndAFullServerSaySo) {
   second.hello();
   EXPECT_EQ(second.readToTheEnd().error().code(), v1::ERROR_CODE_RESOURCE_EXHAUSTED);
   third.join("other");
-  first.vanish();
+  first.leave();
   TestPeer fifth(server());
   fifth.join();
 }

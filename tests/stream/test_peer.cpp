@@ -28,11 +28,17 @@ void TestPeer::sendBytes(const std::string& bytes) {
 }
 
 void TestPeer::hello(const std::string& scene) {
+  v1::Hello hello;
+  hello.set_scene(scene);
+  this->hello(hello);
+}
+
+void TestPeer::hello(const v1::Hello& hello) {
   v1::ClientMessage message;
   message.set_request_id(1);
+  *message.mutable_hello() = hello;
   message.mutable_hello()->set_protocol_version(1);
   for (const std::uint32_t codec : codec::kCodecs) message.mutable_hello()->add_codecs(codec);
-  message.mutable_hello()->set_scene(scene);
   message.mutable_hello()->set_client_name("test");
   send(message);
 }

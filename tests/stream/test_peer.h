@@ -39,6 +39,7 @@ class TestPeer {
   void send(const v1::ClientMessage& message);
   void sendBytes(const std::string& bytes);
   void hello(const std::string& scene = "");
+  void hello(const v1::Hello& hello);
   void poses(const std::vector<std::pair<std::uint32_t, float>>& idsAndXs);
   void change(const v1::ParameterChange& change);
 
@@ -54,8 +55,18 @@ class TestPeer {
   v1::ServerMessage readToTheEnd();
 
   bool finished() const { return connection_->finished(); }
-  // As if the other end had vanished.
+  // As if the other end had vanished; it may be held.
   void vanish() { connection_.reset(); }
+  // Goes on with the description that the other holds, which can decode no more.
+  void inherit(TestPeer& other) {
+    description_ = other.description_;
+    decoder_ = std::move(other.decoder_);
+  }
+  // Says goodbye.
+  void leave() {
+    connection_->leave();
+    connection_.reset();
+  }
 
   const v1::Welcome& welcome() const { return welcome_; }
   const v1::StreamDescription& description() const { return description_; }

@@ -126,6 +126,10 @@ bool WebSocketClient::closesWithin(std::chrono::steady_clock::duration time) {
   return closed;
 }
 
+void WebSocketClient::close() {
+  await(io_, [&](auto handler) { stream_.async_close(websocket::close_code::normal, handler); });
+}
+
 void WebSocketClient::reset() {
   tcp::socket& socket = stream_.next_layer().socket();
   socket.set_option(net::socket_base::linger(true, 0));

@@ -79,6 +79,8 @@ class WebSocketClient {
   bool closesWithin(std::chrono::steady_clock::duration time);
   websocket::close_reason closeReason() const { return stream_.reason(); }
   const websocket::response_type& response() const { return response_; }
+  // Says goodbye with a close frame.
+  void close();
   // Goes away without a word.
   void reset();
   // Says at TCP's level that nothing more will come.

@@ -9,6 +9,7 @@ export enum ClientState {
   joining = 0,
   joined = 1,
   failed = 2,
+  reconnecting = 3,
 }
 
 export const ClientEvent = {
@@ -20,6 +21,8 @@ export const ClientEvent = {
   scenes: 32,
   report: 64,
   grabs: 128,
+  participants: 512,
+  returned: 2048,
 } as const;
 
 export interface Statistics {
@@ -80,6 +83,21 @@ export interface Hull {
   triangles: Uint32Array;
 }
 
+// cs_role; a server may have others.
+export const Roles: ReadonlyMap<number, string> = new Map([
+  [1, "viewer"],
+  [2, "participant"],
+  [3, "owner"],
+]);
+
+export interface Participant {
+  id: bigint;
+  name: string; // of who has none: its program's
+  role: number;
+  away: boolean; // cut off, and held for a while
+  self: boolean;
+}
+
 // {stiffness in N/m, damping in N s/m}
 export type Spring = readonly [number, number];
 
@@ -135,6 +153,7 @@ const kClothSettingsBytes = 92;
 const kClothSettingsVersion = 1;
 const kGrabBytes = 48;
 const kGrabEventBytes = 24;
+const kParticipantBytes = 24;
 const kSolverAt = 48; // in cs_cloth_settings
 const kScratchBytes = Math.max(
   kStatisticsBytes,
@@ -146,6 +165,7 @@ const kScratchBytes = Math.max(
   kClothSettingsBytes,
   kGrabBytes,
   kGrabEventBytes,
+  kParticipantBytes,
 );
 
 // Views that it gives (positions, normals, triangles) look into the core's memory: they are good until the next call.
@@ -155,9 +175,15 @@ export class Client {
   private inbox = 0;
   private inboxBytes = 0;
 
-  // `scene` may be "" for the server's default.
-  constructor(private readonly core: CoreModule, scene: string) {
-    this.handle = core.with([scene, "clothstream page"], core.exports.cs_create);
+  // `scene` may be "" for the server's default, `name` too; `role` is what is wanted of Roles, or 0.
+  constructor(
+    private readonly core: CoreModule,
+    scene: string,
+    { name, role }: { name: string; role: number },
+  ) {
+    this.handle = core.with([scene, "clothstream page", name], (where, what, who) =>
+      core.exports.cs_create_as(where!, what!, who!, role),
+    );
     if (this.handle === 0) throw new Error("The client core has no memory left for another client");
     this.scratch = core.allocate(kScratchBytes);
   }
@@ -177,6 +203,38 @@ export class Client {
     }
     this.core.bytes(this.inbox, message.byteLength).set(new Uint8Array(message));
     return this.core.exports.cs_receive(this.handle, this.inbox, message.byteLength, nowUs());
+  }
+
+  // A connection begins; the first message from here on is Hello.
+  connecting(): void {
+    this.core.exports.cs_connecting(this.handle, nowUs());
+  }
+
+  // The connection is lost, or could not be made.
+  disconnected(): void {
+    this.core.exports.cs_disconnected(this.handle, nowUs());
+  }
+
+  // When to drop the connection that there is, if any, and open another; on performance.now()'s clock.
+  get connectAtMs(): number {
+    return Number(BigInt.asUintN(64, this.core.exports.cs_connect_at(this.handle))) / 1000;
+  }
+
+  // All who are in the scene, in the order in which they joined.
+  participants(): Participant[] {
+    const own = this.core.exports.cs_participant_id(this.handle);
+    const count = this.core.exports.cs_participant_count(this.handle);
+    return this.list(count, this.core.exports.cs_get_participant, (view, at) => {
+      const id = view.getBigUint64(at, true);
+      const program = this.core.text(view.getUint32(at + 12, true));
+      return {
+        id,
+        name: this.core.text(view.getUint32(at + 8, true)) || program || "somebody",
+        role: view.getUint32(at + 16, true),
+        away: view.getInt32(at + 20, true) !== 0,
+        self: id === own,
+      };
+    });
   }
 
   // Pings; to be called ten times a second or more.

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // What the page says: where it is connected, how the stream does, and what went wrong.
 
-import type { Client } from "./client";
+import { Roles, type Client } from "./client";
 import type { SessionState } from "./session";
 
 const kNoticeMs = 6000;
@@ -33,8 +33,8 @@ export class Hud {
     let text = "";
     if (state.kind === "reconnecting") {
       const seconds = Math.max(0, Math.ceil((state.attemptAt - performance.now()) / 1000));
-      label = `reconnecting in ${seconds} s`;
-      text = `${state.reason} Trying again in ${seconds} s.`;
+      label = seconds > 1 ? `reconnecting in ${seconds} s` : "reconnecting";
+      text = `${state.reason} ${seconds > 1 ? `Trying again in ${seconds} s.` : "Trying to come back."}`;
     } else if (state.kind === "failed") {
       text = state.reason;
     }
@@ -65,6 +65,21 @@ export class Hud {
     write(element("scene-name"), client.sceneName);
     write(element("device"), client.deviceName);
     document.title = `${client.sceneName} - ClothStream`;
+  }
+
+  // Whoever is cut off stays in the list for as long as its place is kept.
+  showParticipants(client: Client): void {
+    const items = client.participants().map(({ name, role, away, self }) => {
+      const item = document.createElement("li");
+      const who = document.createElement("span");
+      who.textContent = self ? `${name} (you)` : name;
+      const what = document.createElement("span");
+      what.textContent = away ? "cut off" : (Roles.get(role) ?? `role ${role}`);
+      item.append(who, what);
+      item.classList.toggle("away", away);
+      return item;
+    });
+    element("participants").replaceChildren(...items);
   }
 
   showFigures(client: Client): void {

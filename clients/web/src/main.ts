@@ -2,6 +2,7 @@
 // Starts the page: core, view, session and panel, and the loop that draws.
 
 import { ClothReports } from "./cloth_reports";
+import { Roles } from "./client";
 import { Controls } from "./controls";
 import { Drag } from "./drag";
 import { element, Hud } from "./hud";
@@ -42,8 +43,14 @@ async function start(): Promise<void> {
   const address = new URL("stream", window.location.href);
   address.protocol = address.protocol === "https:" ? "wss:" : "ws:";
   address.search = "";
-  const scene = new URLSearchParams(window.location.search).get("scene") ?? "";
-  const session: Session = new Session(core, address.href, scene, {
+  const query = new URLSearchParams(window.location.search);
+  const scene = query.get("scene") ?? "";
+  const role = query.get("role");
+  const wanted = [...Roles].find(([, name]) => name === role)?.[0];
+  const identity = { name: query.get("name") ?? "", role: wanted ?? 0 };
+  if (role !== null && wanted === undefined)
+    hud.showNotice(`There is no role "${role}": there are ${[...Roles.values()].join(", ")}.`);
+  const session: Session = new Session(core, address.href, scene, identity, {
     stateChanged: () => hud.showState(session.state),
     described: (client) => {
       hud.showScene(client);
@@ -56,7 +63,8 @@ async function start(): Promise<void> {
       controls.show(client);
       reports.showSolvers(client);
     },
-    scenesListed: (scenes) => controls.listScenes(scenes, session.client?.sceneName ?? ""),
+    participantsChanged: (client) => hud.showParticipants(client),
+    scenesListed: (scenes) => controls.listScenes(scenes, session.client.sceneName),
     grabsLost: (client) => client.lostGrabs().forEach((grab) => drag.slipped(grab)),
     notice: (text) => hud.showNotice(text),
     refused: (client) => {

@@ -1,21 +1,22 @@
 // SPDX-License-Identifier: MIT
 // `window.clothstream`: lets tests and the curious look inside; it changes nothing.
 
-import type { Client, ClothLayout, ClothReport, Collider, Statistics, Vec3 } from "./client";
+import type { Client, ClothLayout, ClothReport, Collider, Participant, Statistics, Vec3 } from "./client";
 import type { Session, SessionState } from "./session";
 import type { View } from "./view";
 
 export interface Probe {
   readonly state: SessionState["kind"];
-  // Undefined before the first connection; arrays are copies, 3 floats a vertex.
-  readonly statistics: Statistics | undefined;
-  readonly positions: Float32Array | undefined;
+  // Arrays are copies, 3 floats a vertex.
+  readonly statistics: Statistics;
+  readonly positions: Float32Array;
   readonly restPositions: Float32Array | undefined;
-  readonly normals: Float32Array | undefined;
+  readonly normals: Float32Array;
   readonly cloths: ClothLayout[];
   // Of each cloth, once there is one.
   readonly reports: (ClothReport | undefined)[];
   readonly colliders: Collider[];
+  readonly participants: Participant[];
   readonly canvas: HTMLCanvasElement;
   // A point of the scene, in CSS pixels of the page.
   project(point: Vec3): [number, number];
@@ -37,26 +38,29 @@ export function expose(session: Session, view: View): { described(client: Client
       return session.state.kind;
     },
     get statistics() {
-      return session.client?.statistics();
+      return session.client.statistics();
     },
     get positions() {
-      return session.client?.positions().slice();
+      return session.client.positions().slice();
     },
     get restPositions() {
       return restPositions?.slice();
     },
     get normals() {
-      return session.client?.normals().slice();
+      return session.client.normals().slice();
     },
     get cloths() {
-      return session.client?.cloths() ?? [];
+      return session.client.cloths();
     },
     get reports() {
       const { client } = session;
-      return client?.cloths().map((_, index) => client.report(index)) ?? [];
+      return client.cloths().map((_, index) => client.report(index));
     },
     get colliders() {
-      return session.client?.colliders() ?? [];
+      return session.client.colliders();
+    },
+    get participants() {
+      return session.client.participants();
     },
     canvas: view.canvas,
     project: (point) => view.project(point),

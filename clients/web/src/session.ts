@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A stay in a scene, over however many connections it takes: each connection has a client of its own.
+// A stay in a scene, over however many connections it takes: the client core says when to connect, and as whom.
 
 import { Client, ClientEvent, ClientState } from "./client";
 import { StreamSocket } from "./socket";
@@ -15,6 +15,7 @@ export interface SessionListener {
   stateChanged(): void;
   described(client: Client): void;
   parametersChanged(client: Client): void;
+  participantsChanged(client: Client): void;
   scenesListed(scenes: string[]): void;
   grabsLost(client: Client): void;
   notice(text: string): void;
@@ -22,64 +23,85 @@ export interface SessionListener {
   refused(client: Client): void;
 }
 
-const kPingPeriodMs = 100;
+// Who joins: a name that others see, and the role that is wanted.
+export interface Identity {
+  name: string;
+  role: number;
+}
+
+const kPeriodMs = 50;
 
 export class Session {
   state: SessionState = { kind: "connecting" };
-  // Of the newest connection; there is one from the first connection on.
-  client: Client | undefined;
+  client: Client;
   private readonly socket: StreamSocket;
 
   constructor(
     private readonly core: CoreModule,
     url: string,
-    private scene: string,
+    scene: string,
+    private readonly identity: Identity,
     private readonly listener: SessionListener,
   ) {
+    this.client = new Client(core, scene, identity);
     this.socket = new StreamSocket(url, {
-      opened: () => this.begin(),
+      opened: () => this.flush(),
       message: (bytes) => this.receive(bytes),
-      lost: (reason, delayMs) => this.lose(reason, delayMs),
+      lost: (reason) => this.lose(reason),
     });
-    window.setInterval(() => {
-      if (this.state.kind !== "live" && this.state.kind !== "connecting") return;
-      this.client?.update();
-      this.flush();
-    }, kPingPeriodMs);
-    this.socket.open();
+    window.setInterval(() => this.tick(), kPeriodMs);
+    window.addEventListener("online", () => {
+      if (this.state.kind === "reconnecting") this.connect();
+    });
+    this.connect();
   }
 
+  // Another scene, or the same one anew.
   join(scene: string): void {
-    this.scene = scene;
-    this.reconnect();
+    this.client.destroy();
+    this.client = new Client(this.core, scene, this.identity);
+    this.enter({ kind: "connecting" });
+    this.connect();
   }
 
-  // At once, whatever the state.
+  // At once.
   reconnect(): void {
-    this.enter({ kind: "connecting" });
+    if (this.state.kind === "reconnecting") this.connect();
+  }
+
+  // Sends what the client has to say, as far as there is somebody to hear it.
+  flush(): void {
+    while (this.socket.isOpen) {
+      const message = this.client.nextOutgoing();
+      if (!message) return;
+      this.socket.send(message);
+    }
+  }
+
+  private connect(): void {
+    this.client.connecting();
+    this.client.listScenes();
     this.socket.open();
   }
 
-  // Sends what the client has to say.
-  flush(): void {
-    for (let message = this.client?.nextOutgoing(); message; message = this.client?.nextOutgoing()) this.socket.send(message);
-  }
-
-  private begin(): void {
-    this.client?.destroy();
-    this.client = new Client(this.core, this.scene);
-    this.enter({ kind: "connecting" });
-    this.client.listScenes();
+  private tick(): void {
+    if (this.state.kind === "failed") return;
+    this.client.update();
     this.flush();
+    if (performance.now() < this.client.connectAtMs) return;
+    if (!this.socket.inUse) return this.connect();
+    this.socket.close();
+    this.lose("The server does not answer.");
   }
 
   private receive(bytes: ArrayBuffer): void {
     const client = this.client;
-    if (!client) return;
     const events = client.receive(bytes);
+    if (events & ClientEvent.returned) client.listScenes();
     this.flush();
     if (events & ClientEvent.description) this.listener.described(client);
     if (events & (ClientEvent.description | ClientEvent.parameters)) this.listener.parametersChanged(client);
+    if (events & ClientEvent.participants) this.listener.participantsChanged(client);
     if (events & ClientEvent.scenes) this.listener.scenesListed(client.scenes());
     if (events & ClientEvent.grabs) this.listener.grabsLost(client);
     if (events & ClientEvent.notice) this.listener.notice(client.noticeText);
@@ -87,11 +109,13 @@ export class Session {
       if (client.state === ClientState.failed) this.fail(client.errorText);
       else this.listener.refused(client);
     }
-    if (this.state.kind === "connecting" && client.state === ClientState.joined) this.enter({ kind: "live" });
+    if (this.state.kind !== "live" && client.state === ClientState.joined) this.enter({ kind: "live" });
   }
 
-  private lose(reason: string, delayMs: number): void {
-    this.enter({ kind: "reconnecting", reason, attemptAt: performance.now() + delayMs });
+  private lose(reason: string): void {
+    this.client.disconnected();
+    this.enter({ kind: "reconnecting", reason, attemptAt: this.client.connectAtMs });
+    if (performance.now() >= this.client.connectAtMs) this.connect();
   }
 
   // Asking the same again would be refused again: it waits for somebody to choose.

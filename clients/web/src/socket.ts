@@ -1,37 +1,38 @@
 // SPDX-License-Identifier: MIT
-// The binary WebSocket to the server, opened again with back-off whenever it is lost.
-
-const kFirstDelayMs = 500;
-const kLongestDelayMs = 8000;
-// A connection that held this long was a good one: the next loss starts with the first delay again.
-const kStableMs = 5000;
+// The binary WebSocket to the server.
 
 export interface SocketListener {
-  // A new connection: the session starts from the beginning.
   opened(): void;
   message(bytes: ArrayBuffer): void;
-  // Lost, or never there: the next attempt comes in `delayMs`.
-  lost(reason: string, delayMs: number): void;
+  // Lost, or never there.
+  lost(reason: string): void;
 }
 
 export class StreamSocket {
   private socket: WebSocket | undefined;
-  private timer: number | undefined;
-  private delayMs = kFirstDelayMs;
 
   constructor(
     private readonly url: string,
     private readonly listener: SocketListener,
   ) {}
 
+  // Open, or being opened.
+  get inUse(): boolean {
+    return this.socket !== undefined;
+  }
+
+  get isOpen(): boolean {
+    return this.socket?.readyState === WebSocket.OPEN;
+  }
+
   // Drops what there is, if anything, and connects now.
   open(): void {
     this.close();
     const socket = new WebSocket(this.url);
-    let openedAt: number | undefined;
+    let wasOpen = false;
     socket.binaryType = "arraybuffer";
     socket.onopen = () => {
-      openedAt = performance.now();
+      wasOpen = true;
       this.listener.opened();
     };
     socket.onmessage = (event: MessageEvent) => {
@@ -39,18 +40,12 @@ export class StreamSocket {
     };
     socket.onclose = (event) => {
       this.socket = undefined;
-      if (openedAt !== undefined && performance.now() - openedAt > kStableMs) this.delayMs = kFirstDelayMs;
-      const delayMs = this.delayMs;
-      this.delayMs = Math.min(2 * delayMs, kLongestDelayMs);
-      this.timer = window.setTimeout(() => this.open(), delayMs);
-      this.listener.lost(explain(event, openedAt !== undefined), delayMs);
+      this.listener.lost(explain(event, wasOpen));
     };
     this.socket = socket;
   }
 
-  // No further attempts, until open().
   close(): void {
-    window.clearTimeout(this.timer);
     if (!this.socket) return;
     this.socket.onopen = this.socket.onmessage = this.socket.onclose = null;
     this.socket.close();
@@ -58,7 +53,7 @@ export class StreamSocket {
   }
 
   send(message: Uint8Array<ArrayBuffer>): void {
-    if (this.socket?.readyState === WebSocket.OPEN) this.socket.send(message);
+    if (this.isOpen) this.socket?.send(message);
   }
 }
 

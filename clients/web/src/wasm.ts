@@ -9,7 +9,12 @@ export interface CoreExports {
   _initialize(): void;
   malloc(bytes: number): Pointer;
   free(pointer: Pointer): void;
-  cs_create(scene: Pointer, clientName: Pointer): Pointer;
+  cs_create_as(scene: Pointer, clientName: Pointer, displayName: Pointer, role: number): Pointer;
+  cs_connecting(client: Pointer, nowUs: bigint): void;
+  cs_disconnected(client: Pointer, nowUs: bigint): void;
+  cs_connect_at(client: Pointer): bigint;
+  cs_participant_count(client: Pointer): number;
+  cs_get_participant(client: Pointer, index: number, out: Pointer): number;
   cs_destroy(client: Pointer): void;
   cs_receive(client: Pointer, message: Pointer, bytes: number, nowUs: bigint): number;
   cs_update(client: Pointer, nowUs: bigint): void;

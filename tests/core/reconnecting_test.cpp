@@ -1,0 +1,329 @@
+// SPDX-License-Identifier: MIT
+// Participants, and coming back after the connection was lost, with a clock of the test's own.
+#include <limits>
+#include <set>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "clients/core/reconnection.h"
+#include "tests/core/scripted_server.h"
+
+namespace clothstream::client {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::SizeIs;
+
+constexpr std::uint64_t kSecond = 1'000'000, kNever = std::numeric_limits<std::uint64_t>::max();
+
+// The server's Welcome with what belongs to participants.
+std::string welcome(const ScriptedServer& server, bool resumed = false, v1::Role role = v1::ROLE_OWNER) {
+  v1::ServerMessage message;
+  message.ParseFromString(server.welcome());
+  v1::Welcome& body = *message.mutable_welcome();
+  body.set_role(role);
+  body.set_resume_token("0123456789abcdef");
+  body.set_resumed(resumed);
+  body.set_hold_ms(60'000);
+  for (const std::uint64_t id : {7, 42}) {
+    v1::Participant& participant = *body.add_participants();
+    participant.set_id(id);
+    participant.set_display_name(id == 42 ? "Ada" : "Ben");
+    participant.set_client_name("test");
+    participant.set_role(id == 42 ? role : v1::ROLE_PARTICIPANT);
+  }
+  return message.SerializeAsString();
+}
+
+std::string presence(v1::PresenceKind kind, std::uint64_t id, v1::Role role = v1::ROLE_PARTICIPANT,
+                     v1::LeaveReason reason = v1::LEAVE_REASON_UNSPECIFIED, std::uint64_t by = 0) {
+  v1::ServerMessage message;
+  v1::Presence& body = *message.mutable_presence();
+  body.set_kind(kind);
+  body.set_reason(reason);
+  body.set_by_participant_id(by);
+  body.mutable_participant()->set_id(id);
+  body.mutable_participant()->set_display_name("Cy");
+  body.mutable_participant()->set_role(role);
+  body.mutable_participant()->set_away(kind == v1::PRESENCE_KIND_DISCONNECTED);
+  return message.SerializeAsString();
+}
+
+class Reconnecting : public ::testing::Test {
+ protected:
+  void join(v1::Role role = v1::ROLE_OWNER) {
+    client.receive(welcome(server, false, role), now);
+    client.receiveAll(server.chunks(), now);
+    client.receive(server.frame(1, codec::PacketKind::key), now);
+    client.outgoing();
+  }
+  void cutOff() {
+    cs_disconnected(client.get(), now);
+    ASSERT_EQ(cs_get_state(client.get()), CS_STATE_RECONNECTING);
+  }
+  v1::Hello connect() {
+    cs_connecting(client.get(), now);
+    const auto messages = client.outgoing();
+    EXPECT_EQ(messages.size(), 1u);
+    return messages.front().hello();
+  }
+  std::vector<std::string> names() const {
+    std::vector<std::string> all;
+    cs_participant participant;
+    for (std::uint32_t i = 0; cs_get_participant(client.get(), i, &participant) != 0; ++i)
+      all.emplace_back(participant.name);
+    return all;
+  }
+  void hold(float x) {
+    const float sphere[] = {x, 0, 0, 0.1f};
+    cs_set_colliders(client.get(), sphere, 1, now);
+    cs_grab grab{};
+    grab.id = 5;
+    cs_set_grabs(client.get(), &grab, 1, now);
+  }
+
+  std::uint64_t now = 100 * kSecond;
+  ScriptedServer server;
+  ClientUnderTest client;
+};
+
+TEST_F(Reconnecting, SaysWhoItIsAndWhatItWantsToBe) {
+  const std::unique_ptr<cs_client, decltype(&cs_destroy)> named(
+      cs_create_as("flag", "test", "Ada", CS_ROLE_VIEWER), &cs_destroy);
+  std::size_t bytes = 0;
+  const std::uint8_t* message = cs_next_outgoing(named.get(), &bytes);
+  v1::ClientMessage hello;
+  ASSERT_TRUE(hello.ParseFromArray(message, static_cast<int>(bytes)));
+  EXPECT_EQ(hello.hello().display_name(), "Ada");
+  EXPECT_EQ(hello.hello().role(), v1::ROLE_VIEWER);
+  EXPECT_THAT(hello.hello().resume_token(), IsEmpty());
+}
+
+TEST_F(Reconnecting, KnowsWhoIsThere) {
+  EXPECT_EQ(client.receive(welcome(server), now), static_cast<std::uint32_t>(CS_EVENT_PARTICIPANTS));
+  client.receiveAll(server.chunks(), now);
+  EXPECT_THAT(names(), ElementsAre("Ben", "Ada"));
+  EXPECT_EQ(cs_get_role(client.get()), static_cast<std::uint32_t>(CS_ROLE_OWNER));
+  cs_presence told;
+  EXPECT_EQ(cs_get_presence(client.get(), &told), 0);
+  constexpr auto kBoth = static_cast<std::uint32_t>(CS_EVENT_PARTICIPANTS | CS_EVENT_PRESENCE);
+  EXPECT_EQ(client.receive(presence(v1::PRESENCE_KIND_JOINED, 50)), kBoth);
+  EXPECT_THAT(names(), ElementsAre("Ben", "Ada", "Cy"));
+  client.receive(presence(v1::PRESENCE_KIND_DISCONNECTED, 50));
+  cs_participant participant;
+  ASSERT_EQ(cs_get_participant(client.get(), 2, &participant), 1);
+  EXPECT_EQ(participant.away, 1);
+  EXPECT_EQ(cs_get_participant(client.get(), 3, &participant), 0);
+  client.receive(presence(v1::PRESENCE_KIND_LEFT, 50, v1::ROLE_PARTICIPANT, v1::LEAVE_REASON_REMOVED, 42));
+  EXPECT_THAT(names(), ElementsAre("Ben", "Ada"));
+  ASSERT_EQ(cs_get_presence(client.get(), &told), 1);
+  EXPECT_EQ(told.kind, static_cast<std::uint32_t>(CS_PRESENCE_LEFT));
+  EXPECT_EQ(told.reason, static_cast<std::uint32_t>(CS_LEAVE_REMOVED));
+  EXPECT_EQ(told.by, 42u);
+  EXPECT_STREQ(told.participant.name, "Cy");
+}
+
+TEST_F(Reconnecting, GivesAndTakes) {
+  join();
+  cs_set_role(client.get(), 7, CS_ROLE_VIEWER);
+  cs_remove_participant(client.get(), 8);
+  const auto messages = client.outgoing();
+  ASSERT_EQ(messages.size(), 2u);
+  EXPECT_EQ(messages[0].set_role().participant_id(), 7u);
+  EXPECT_EQ(messages[0].set_role().role(), v1::ROLE_VIEWER);
+  EXPECT_EQ(messages[1].remove_participant().participant_id(), 8u);
+}
+
+TEST_F(Reconnecting, ComesBackWithItsTokenAndSendsItsPosesAgain) {
+  join();
+  hold(1);
+  client.outgoing();
+  cutOff();
+  hold(2);  // nobody hears it now
+  EXPECT_THAT(client.outgoing(), IsEmpty());
+  EXPECT_EQ(cs_vertex_count(client.get()), 63u);  // still there to be seen
+  const v1::Hello hello = connect();
+  EXPECT_EQ(hello.resume_token(), "0123456789abcdef");
+  EXPECT_EQ(hello.description_content_id(), 1u);
+  EXPECT_EQ(hello.scene(), "curtain");
+  EXPECT_EQ(cs_get_state(client.get()), CS_STATE_RECONNECTING);
+  EXPECT_EQ(client.receive(welcome(server, true), now),
+            static_cast<std::uint32_t>(CS_EVENT_PARTICIPANTS | CS_EVENT_RETURNED));
+  EXPECT_EQ(cs_get_state(client.get()), CS_STATE_JOINED);
+  EXPECT_EQ(cs_resumed(client.get()), 1);
+  const auto messages = client.outgoing();
+  ASSERT_EQ(messages.size(), 1u);
+  EXPECT_EQ(messages[0].collider_poses().colliders(0).pose().position().x(), 2);
+  EXPECT_EQ(messages[0].collider_poses().grabs(0).id(), 5u);
+  // No description came: the one before holds, and what was missed counts as dropped.
+  client.receive(server.frame(5, codec::PacketKind::key), now);
+  EXPECT_EQ(client.statistics(now).tick, 5u);
+  EXPECT_EQ(client.statistics(now).dropped, 3u);
+}
+
+TEST_F(Reconnecting, TakesANewDescriptionWhereTheServerSendsOne) {
+  join();
+  cutOff();
+  connect();
+  v1::ServerMessage other;
+  other.ParseFromString(welcome(server, true));
+  other.mutable_welcome()->set_description_content_id(9);
+  EXPECT_EQ(client.receive(other.SerializeAsString(), now),
+            static_cast<std::uint32_t>(CS_EVENT_PARTICIPANTS));
+  EXPECT_EQ(cs_get_state(client.get()), CS_STATE_RECONNECTING);
+  const auto chunks = server.chunks(256 * 1024, 9);
+  EXPECT_EQ(client.receive(chunks.back(), now),
+            static_cast<std::uint32_t>(CS_EVENT_DESCRIPTION | CS_EVENT_RETURNED));
+  EXPECT_EQ(cs_get_state(client.get()), CS_STATE_JOINED);
+  cutOff();
+  EXPECT_EQ(connect().description_content_id(), 9u);
+}
+
+TEST_F(Reconnecting, WhoIsCutOffBeforeTheNewDescriptionHoldsNone) {
+  join();
+  cutOff();
+  connect();
+  v1::ServerMessage other;
+  other.ParseFromString(welcome(server, true));
+  other.mutable_welcome()->set_description_content_id(9);
+  client.receive(other.SerializeAsString(), now);
+  cutOff();
+  EXPECT_EQ(connect().description_content_id(), 0u);
+}
+
+TEST_F(Reconnecting, ANewServerIsJoinedAnew) {
+  join();
+  hold(1);
+  client.outgoing();
+  cutOff();
+  connect();
+  client.receive(welcome(server, false), now);
+  // The same number, but of a server that never saw this client.
+  EXPECT_EQ(cs_get_state(client.get()), CS_STATE_RECONNECTING);
+  client.receiveAll(server.chunks(), now);
+  EXPECT_EQ(cs_get_state(client.get()), CS_STATE_JOINED);
+  EXPECT_EQ(cs_resumed(client.get()), 0);
+  EXPECT_THAT(client.outgoing(), SizeIs(1));  // its hands are there all the same
+}
+
+TEST_F(Reconnecting, AFrameBeforeTheDescriptionIsRefusedUponReturnToo) {
+  join();
+  cutOff();
+  connect();
+  client.receive(welcome(server, false), now);
+  client.receive(server.frame(6, codec::PacketKind::key), now);
+  EXPECT_EQ(cs_get_state(client.get()), CS_STATE_FAILED);
+  EXPECT_THAT(cs_error_text(client.get()), HasSubstr("before the description"));
+}
+
+TEST_F(Reconnecting, TriesAtOnceThenOftenThenSeldom) {
+  join();
+  EXPECT_EQ(cs_connect_at(client.get()), now + Reconnection::kSilenceUs);
+  now += 3 * kSecond;
+  const std::uint64_t lost = now;
+  std::uint64_t before = 0, longest = 0;
+  cs_disconnected(client.get(), now);
+  EXPECT_EQ(cs_connect_at(client.get()), now);
+  for (int attempts = 0; now < lost + 600 * kSecond; ++attempts) {
+    cs_connecting(client.get(), now);
+    EXPECT_EQ(cs_connect_at(client.get()), now + (now < lost + 60 * kSecond ? 2 : 10) * kSecond);
+    cs_disconnected(client.get(), now);
+    const std::uint64_t delay = cs_connect_at(client.get()) - now;
+    if (now < lost + 60 * kSecond) {
+      EXPECT_LE(delay, Reconnection::kLongestHeldUs);
+      longest = std::max(longest, delay);
+    } else {
+      EXPECT_LE(delay, Reconnection::kLongestUs);
+      EXPECT_GE(delay, Reconnection::kLongestHeldUs);
+    }
+    EXPECT_GE(delay, Reconnection::kShortestUs / 2);
+    if (attempts == 0) {
+      EXPECT_LE(delay, Reconnection::kShortestUs);
+    }
+    before = delay;
+    now += delay;
+  }
+  EXPECT_GT(longest, Reconnection::kLongestHeldUs * 3 / 4);
+  EXPECT_GE(before, Reconnection::kLongestUs / 2);
+}
+
+TEST_F(Reconnecting, ThoseWhoAreCutOffTogetherDoNotComeBackTogether) {
+  std::set<std::uint64_t> delays;
+  for (std::uint64_t seed = 0; seed < 20; ++seed) {
+    Reconnection reconnection;
+    for (int i = 0; i < 6; ++i) reconnection.lost(0, 60 * kSecond, seed);
+    delays.insert(reconnection.lost(0, 60 * kSecond, seed));
+  }
+  EXPECT_GT(delays.size(), 15u);
+}
+
+TEST_F(Reconnecting, AConnectionThatHeldIsTakenUpAtOnceAndOneThatDidNotIsNot) {
+  join();
+  now += kSecond;
+  cutOff();
+  EXPECT_EQ(cs_connect_at(client.get()), now);
+  connect();
+  client.receive(welcome(server, true), now);
+  now += kSecond;
+  cutOff();
+  EXPECT_GT(cs_connect_at(client.get()), now);
+  connect();
+  client.receive(welcome(server, true), now);
+  now += 3 * kSecond;
+  cutOff();
+  EXPECT_EQ(cs_connect_at(client.get()), now);
+}
+
+TEST_F(Reconnecting, WhatIsRefusedForGoodIsNotTriedAgain) {
+  join();
+  client.receive(ScriptedServer::error(v1::ERROR_CODE_REMOVED, "an owner removed this participant", true),
+                 now);
+  cs_disconnected(client.get(), now);
+  EXPECT_EQ(cs_get_state(client.get()), CS_STATE_FAILED);
+  EXPECT_EQ(cs_connect_at(client.get()), kNever);
+  cs_connecting(client.get(), now);
+  EXPECT_THAT(client.outgoing(), IsEmpty());
+}
+
+TEST_F(Reconnecting, AServerThatCutsOffOrIsFullForTheMomentIsTriedAgain) {
+  join();
+  client.receive(ScriptedServer::error(v1::ERROR_CODE_CUT_OFF, "too much waits to be read", true), now);
+  EXPECT_EQ(cs_get_state(client.get()), CS_STATE_JOINED);
+  cutOff();
+  connect();
+  client.receive(ScriptedServer::error(v1::ERROR_CODE_RESOURCE_EXHAUSTED, "full", true), now);
+  EXPECT_EQ(cs_get_state(client.get()), CS_STATE_RECONNECTING);
+  cutOff();
+  EXPECT_NE(cs_connect_at(client.get()), kNever);
+}
+
+TEST_F(Reconnecting, WhatIsAskedForMeanwhileIsDropped) {
+  join();
+  cutOff();
+  for (int i = 0; i < 1000; ++i) cs_set_gust(client.get(), 1, 1);
+  EXPECT_EQ(cs_get_state(client.get()), CS_STATE_RECONNECTING);
+  connect();
+}
+
+TEST_F(Reconnecting, AViewersHandsAreSentWhenItsRoleAllowsThem) {
+  join(v1::ROLE_VIEWER);
+  hold(1);
+  cs_want_contacts(client.get(), 1, now);
+  auto messages = client.outgoing();
+  ASSERT_EQ(messages.size(), 1u);
+  EXPECT_EQ(messages[0].collider_poses().colliders_size(), 0);
+  EXPECT_EQ(messages[0].collider_poses().grabs_size(), 0);
+  EXPECT_TRUE(messages[0].collider_poses().contact_events());
+  client.receive(presence(v1::PRESENCE_KIND_ROLE_CHANGED, 42, v1::ROLE_PARTICIPANT), now);
+  EXPECT_EQ(cs_get_role(client.get()), static_cast<std::uint32_t>(CS_ROLE_PARTICIPANT));
+  messages = client.outgoing();
+  ASSERT_EQ(messages.size(), 1u);
+  EXPECT_EQ(messages[0].collider_poses().colliders_size(), 1);
+  EXPECT_EQ(messages[0].collider_poses().grabs_size(), 1);
+}
+
+}  // namespace
+}  // namespace clothstream::client

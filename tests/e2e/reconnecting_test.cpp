@@ -1,0 +1,263 @@
+// SPDX-License-Identifier: MIT
+// The native client over a link that is cut and returns, against the real clothstream-server.
+#include <atomic>
+#include <chrono>
+#include <csignal>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "clients/grpc/grpc_client.h"
+#include "tests/e2e/link.h"
+#include "tests/e2e/process.h"
+#include "tests/e2e/temporary_directory.h"
+
+namespace clothstream::e2e {
+namespace {
+
+using namespace std::chrono_literals;
+using ::testing::HasSubstr;
+using Clock = std::chrono::steady_clock;
+
+constexpr auto kStart = 60s;
+constexpr auto kEnd = 30s;
+
+// What a client's thread saw.
+struct Seen {
+  std::atomic<std::uint64_t> id{0}, frames{0}, returns{0}, resumed{0}, cuts{0}, participants{0};
+  std::atomic<std::uint64_t> lastPresence{0};  // its kind
+  std::atomic<Clock::rep> firstFrameAfterReturn{0};
+
+  void operator()(cs_client* client, std::uint32_t events) {
+    if (events == 0) ++cuts;
+    if ((events & CS_EVENT_RETURNED) != 0) {
+      resumed = static_cast<std::uint64_t>(cs_resumed(client));
+      firstFrameAfterReturn = 0;
+      ++returns;
+    }
+    if ((events & CS_EVENT_PRESENCE) != 0) {
+      cs_presence presence;
+      cs_get_presence(client, &presence);
+      lastPresence = presence.kind;
+    }
+    participants = cs_participant_count(client);
+    id = cs_participant_id(client);
+    if ((events & CS_EVENT_FRAME) == 0) return;
+    if (firstFrameAfterReturn == 0) firstFrameAfterReturn = Clock::now().time_since_epoch().count();
+    ++frames;
+  }
+};
+
+bool eventually(const std::function<bool()>& holds) {
+  for (const auto end = Clock::now() + kStart; Clock::now() < end; std::this_thread::sleep_for(5ms))
+    if (holds()) return true;
+  return false;
+}
+
+class ReconnectingTest : public ::testing::Test {
+ protected:
+  void SetUp() override { startServer("0"); }
+  void startServer(const std::string& port, const std::vector<std::string>& more = {}) {
+    std::vector<std::string> command{
+        CLOTHSTREAM_SERVER,    "--port", "0", "--grpc-port", port, "--scene", "small", "--scene-file",
+        "tests/e2e/small.json"};
+    command.insert(command.end(), more.begin(), more.end());
+    server_ = std::make_unique<Process>(command);
+    if (const auto line = server_->waitForLine("gRPC ", kStart)) {
+      address_ = line->substr(line->find_first_not_of(' '));
+      return;
+    }
+    server_->waitForEnd(kEnd);
+    if (server_->errors().find("no Vulkan") != std::string::npos) GTEST_SKIP() << server_->errors();
+    FAIL() << "the server did not start: " << server_->errors();
+  }
+  void stopServer() {
+    server_->signal(SIGTERM);
+    server_->waitForEnd(kEnd);
+  }
+  void TearDown() override {
+    if (server_) stopServer();
+  }
+  std::uint16_t port() const {
+    return static_cast<std::uint16_t>(std::stoi(address_.substr(address_.rfind(':') + 1)));
+  }
+
+  static std::unique_ptr<GrpcClient> join(const std::string& address, const std::string& name, Seen& seen) {
+    GrpcClientOptions options;
+    options.displayName = name;
+    auto joined = GrpcClient::join(address, options, std::ref(seen));
+    if (!joined) throw std::runtime_error(joined.error().text);
+    return std::move(*joined);
+  }
+  static std::string through(const Link& link) { return "127.0.0.1:" + std::to_string(link.port()); }
+
+  std::unique_ptr<Process> server_;
+  std::string address_;
+};
+
+TEST_F(ReconnectingTest, WhoIsCutOffComesBackAsItWas) {
+  Link link(port());
+  Seen seen, watcherSeen;
+  const auto watcher = join(address_, "Ben", watcherSeen);
+  const auto client = join(through(link), "Ada", seen);
+  const float sphere[] = {0.4f, 1.7f, 0.3f, 0.1f};
+  client->visit([&](cs_client* core) { cs_set_colliders(core, sphere, 1, GrpcClient::nowUs()); });
+  const auto watcherSeesCollider = [&] {
+    bool sees = false;
+    watcher->visit([&](cs_client* core) {
+      cs_collider collider;
+      for (std::uint32_t i = 0; cs_get_collider(core, i, &collider) != 0; ++i)
+        sees |= collider.participant_id == seen.id;
+    });
+    return sees;
+  };
+  ASSERT_TRUE(eventually(watcherSeesCollider));
+  const std::uint64_t id = seen.id;
+  for (const auto outage : {100ms, 1000ms, 5000ms}) {
+    const std::uint64_t returns = seen.returns;
+    link.cut();
+    ASSERT_TRUE(eventually([&] { return watcherSeen.lastPresence == CS_PRESENCE_DISCONNECTED; }));
+    std::this_thread::sleep_for(outage);
+    if (outage > 3s) {
+      EXPECT_TRUE(eventually([&] { return !watcherSeesCollider(); }));
+    }
+    EXPECT_EQ(watcherSeen.participants, 2u);
+    const auto restored = Clock::now();
+    link.restore();
+    ASSERT_TRUE(eventually([&] { return seen.returns > returns && seen.firstFrameAfterReturn != 0; }));
+    const auto took = Clock::time_point(Clock::duration(seen.firstFrameAfterReturn)) - restored;
+    std::printf("cut off for %lld ms: the first frame came %lld ms after the link's return\n",
+                static_cast<long long>(outage.count()),
+                static_cast<long long>(std::chrono::duration_cast<std::chrono::milliseconds>(took).count()));
+    EXPECT_EQ(seen.resumed, 1u);
+    EXPECT_EQ(seen.id, id);
+    ASSERT_TRUE(eventually([&] { return watcherSeen.lastPresence == CS_PRESENCE_RETURNED; }));
+    EXPECT_TRUE(eventually(watcherSeesCollider));
+  }
+  EXPECT_FALSE(client->ended());
+  client->visit([](cs_client* core) {
+    cs_statistics statistics;
+    cs_get_statistics(core, GrpcClient::nowUs(), &statistics);
+    EXPECT_EQ(statistics.hash_mismatches, 0u);
+    EXPECT_GT(statistics.dropped, 0u);
+  });
+}
+
+TEST_F(ReconnectingTest, AServerThatBeganAnewIsJoinedAnew) {
+  Seen seen;
+  const std::string sameAddress = address_;
+  const auto client = join(address_, "Ada", seen);
+  stopServer();
+  startServer(std::to_string(port()));
+  ASSERT_EQ(address_, sameAddress);
+  ASSERT_TRUE(eventually([&] { return seen.returns == 1 && seen.firstFrameAfterReturn != 0; }));
+  EXPECT_EQ(seen.resumed, 0u);
+  EXPECT_FALSE(client->ended());
+}
+
+TEST_F(ReconnectingTest, WhoDoesNotWantToComeBackEnds) {
+  Link link(port());
+  Seen seen;
+  GrpcClientOptions options;
+  options.reconnectFor = 0ms;
+  auto joined = GrpcClient::join(through(link), options, std::ref(seen));
+  ASSERT_TRUE(joined.has_value()) << joined.error().text;
+  link.cut();
+  ASSERT_TRUE(eventually([&] { return (*joined)->ended().has_value(); }));
+  EXPECT_EQ((*joined)->ended()->kind, Failure::Kind::lost);
+  EXPECT_EQ(seen.cuts, 0u);
+}
+
+TEST_F(ReconnectingTest, WhoCannotComeBackInTimeEnds) {
+  Link link(port());
+  Seen seen;
+  GrpcClientOptions options;
+  options.reconnectFor = 500ms;
+  auto joined = GrpcClient::join(through(link), options, std::ref(seen));
+  ASSERT_TRUE(joined.has_value()) << joined.error().text;
+  link.cut();
+  ASSERT_TRUE(eventually([&] { return (*joined)->ended().has_value(); }));
+  EXPECT_THAT((*joined)->ended()->text, HasSubstr("could not be had back within 0.5 s"));
+  EXPECT_GE(seen.cuts, 1u);
+}
+
+TEST_F(ReconnectingTest, WhoGoesIsGoneAtOnce) {
+  Seen seen, watcherSeen;
+  const auto watcher = join(address_, "Ben", watcherSeen);
+  auto client = join(address_, "Ada", seen);
+  ASSERT_TRUE(eventually([&] { return watcherSeen.participants == 2; }));
+  client.reset();
+  ASSERT_TRUE(eventually([&] { return watcherSeen.participants == 1; }));
+  EXPECT_EQ(watcherSeen.lastPresence, static_cast<std::uint64_t>(CS_PRESENCE_LEFT));
+}
+
+TEST_F(ReconnectingTest, TheProgramSaysWhoIsThereAndComesBack) {
+  Link link(port());
+  Seen seen;
+  const auto watcher = join(address_, "Ben", seen);
+  Process program(
+      {CLOTHSTREAM, "join", through(link), "--name", "Ada", "--role", "viewer", "--json", "--hash"});
+  ASSERT_TRUE(eventually([&] { return seen.participants == 2; }));
+  link.cut();
+  ASSERT_TRUE(eventually([&] { return seen.lastPresence == CS_PRESENCE_DISCONNECTED; }));
+  link.restore();
+  ASSERT_TRUE(eventually([&] { return seen.lastPresence == CS_PRESENCE_RETURNED; }));
+  const auto late = [&] {
+    Seen other;
+    return join(address_, "Cy", other) != nullptr;
+  }();
+  EXPECT_TRUE(late);
+  program.signal(SIGINT);
+  EXPECT_EQ(program.waitForEnd(kEnd), 0) << program.errors();
+  for (const char* line : {"joined as viewer", "Ben is here as owner", "the connection is lost",
+                           "back as the same participant", "Cy joined as participant"})
+    EXPECT_THAT(program.errors(), HasSubstr(line));
+}
+
+TEST_F(ReconnectingTest, ARecordingGoesOnAndSaysWhatIsMissing) {
+  const TemporaryDirectory directory;
+  const std::filesystem::path file = directory.path() / "cut.mcap";
+  Link link(port());
+  Seen seen;
+  const auto watcher = join(address_, "Ben", seen);
+  Process program({CLOTHSTREAM, "record", "small", "-o", file, "--server", through(link)});
+  ASSERT_TRUE(eventually([&] { return seen.participants == 2; })) << program.errors();
+  std::this_thread::sleep_for(500ms);
+  link.cut();
+  ASSERT_TRUE(eventually([&] { return seen.lastPresence == CS_PRESENCE_DISCONNECTED; }));
+  link.restore();
+  ASSERT_TRUE(eventually([&] { return seen.lastPresence == CS_PRESENCE_RETURNED; }));
+  std::this_thread::sleep_for(500ms);
+  program.signal(SIGINT);
+  EXPECT_EQ(program.waitForEnd(kEnd), 0) << program.errors();
+  EXPECT_THAT(program.errors(), HasSubstr("back; the recording goes on"));
+  EXPECT_THAT(program.output(), ::testing::Not(HasSubstr("; 0 frames were lost")));
+  Process info({CLOTHSTREAM, "info", file});
+  EXPECT_EQ(info.waitForEnd(kEnd), 0) << info.output() << info.errors();
+}
+
+TEST_F(ReconnectingTest, ARecordingEndsWhereTheServerBeginsAnew) {
+  const TemporaryDirectory directory;
+  const std::filesystem::path file = directory.path() / "ended.mcap";
+  Process program({CLOTHSTREAM, "record", "small", "-o", file, "--server", address_});
+  const auto hasFrames = [&] {
+    return std::filesystem::exists(file) && std::filesystem::file_size(file) > 2000;
+  };
+  ASSERT_TRUE(eventually(hasFrames));
+  const std::string old = std::to_string(port());
+  stopServer();
+  startServer(old);
+  EXPECT_EQ(program.waitForEnd(kEnd), 5);
+  EXPECT_THAT(program.errors(), HasSubstr("the recording ends there"));
+  Process info({CLOTHSTREAM, "info", file});
+  EXPECT_EQ(info.waitForEnd(kEnd), 0) << info.output() << info.errors();
+}
+
+}  // namespace
+}  // namespace clothstream::e2e
