@@ -23,7 +23,6 @@ std::shared_ptr<grpc::Channel> makeChannel(const std::string& address) {
   arguments.SetMaxReceiveMessageSize(kMaxMessageBytes);
   // Each client has a connection of its own: two in a process do not share one's flow control.
   arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
-  // Who tries again makes another channel, when it is time to: this one need not.
   return grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments);
 }
 
