@@ -159,6 +159,20 @@ std::variant<ProgramOptions, int> parseOptions(int argc, const char* const* argv
       "interrupted.");
   addDeviceOptions(resimulateCommand, options);
 
+  CLI::App& playCommand = *app.add_subcommand(
+      "play", "Serve a recording as a scene: clients join it, and pause, seek, speed, loop it");
+  playCommand.add_option("FILE", options.play, "What --record or `clothstream record` wrote")->required();
+  playCommand.add_option("--from", options.playback.from, "Begin so many seconds after its start")
+      ->check(CLI::NonNegativeNumber);
+  playCommand.add_option("--speed", options.playback.speed, "Seconds of it that pass in one")
+      ->check(CLI::Range(recording::kMinSpeed, recording::kMaxSpeed))
+      ->capture_default_str();
+  playCommand.add_flag("--loop", options.playback.loop,
+                       "Go on from its start at its end, instead of pausing there");
+  playCommand.footer(
+      "Options of the network and the log are those of clothstream-server. No device is needed.");
+  playCommand.fallthrough();
+
   app.add_option("--log-level", options.logLevel, "trace, debug, info, warning, error or off")
       ->capture_default_str();
   const CLI::Option* stopAfter =

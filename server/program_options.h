@@ -10,6 +10,7 @@
 #include <variant>
 #include <vector>
 
+#include "server/recording/playback.h"
 #include "server/scene/scene.h"
 #include "server/step/step.h"
 
@@ -28,6 +29,8 @@ struct ProgramOptions {
   std::uint32_t maxCreatedScenes = 16;
   std::optional<step::StepOptions> step;  // instead of serving
   std::string resimulate;                 // a recording, instead of serving; empty: none
+  std::string play;                       // a recording, instead of scenes; empty: none
+  recording::PlaybackOptions playback;    // of it
   std::filesystem::path recordDirectory;  // empty: nothing is recorded
 
   std::string host = "127.0.0.1";

@@ -28,6 +28,7 @@ enum class Body : std::uint32_t {
   error = 8,
   tickEvents = 9,
   listScenes = 16,
+  playback = 40,
 };
 
 // A kind of body that this client does not know is `none`.
@@ -156,7 +157,10 @@ struct TickEvents {
 // Reuses the memory of `collider`.
 [[nodiscard]] bool readCollider(Bytes message, Collider& collider);
 [[nodiscard]] std::optional<Hull> readHull(Bytes message);
-[[nodiscard]] std::optional<Pong> readPong(Bytes message);
+[[nodiscard]]  // Of times that are no numbers, and lengths below 0, there is none.
+std::optional<cs_playback>
+readPlayback(Bytes message);
+std::optional<Pong> readPong(Bytes message);
 // The text of a Notice.
 [[nodiscard]] std::optional<std::string> readNotice(Bytes message);
 [[nodiscard]] std::optional<ParameterChange> readParameterChanged(Bytes message);

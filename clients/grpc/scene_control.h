@@ -10,7 +10,7 @@
 #include <tl/expected.hpp>
 
 #include "clients/grpc/failure.h"
-#include "clothstream/v1/scene.pb.h"
+#include "clothstream/v1/session.pb.h"
 
 namespace clothstream {
 
@@ -33,5 +33,9 @@ struct CreateSceneOptions {
 // scene.
 [[nodiscard]] tl::expected<void, Failure> controlScene(const std::string& address, const std::string& name,
                                                        std::optional<bool> paused, bool reset);
+
+// All that can be asked of a scene's clock; gives the scene as it is then.
+[[nodiscard]] tl::expected<v1::SceneSummary, Failure> controlScene(const std::string& address,
+                                                                   const v1::ControlSceneRequest& request);
 
 }  // namespace clothstream

@@ -30,14 +30,39 @@ std::vector<std::shared_ptr<LiveScene>> liveScenes(std::vector<scene::Scene> def
   return scenes;
 }
 
+// Participants of a recording and those who watch it are told apart by their numbers.
+constexpr std::uint64_t kViewers = std::uint64_t{1} << 32;
+
 SharedBytes stoppingNotice() {
   return notice(v1::NOTICE_KIND_SERVER_STOPPING, "the server stops", 0);
+}
+
+messages::Result<void> controlSource(LiveScene& scene, const v1::ControlSceneRequest& request) {
+  if (scene.source) return scene.source->control(request);
+  const char* what = request.has_seek()    ? "seek"
+                     : request.has_speed() ? "speed"
+                     : request.has_loop()  ? "loop"
+                                           : nullptr;
+  if (what == nullptr) return {};
+  return tl::unexpected(messages::FieldError{
+      v1::ERROR_CODE_INVALID_ARGUMENT,
+      fmt::format("controlScene.{}: only a recording that is played has it; '{}' is simulated", what,
+                  scene.name())});
 }
 
 }  // namespace
 
 v1::SceneSummary summaryOf(const LiveScene& scene) {
   v1::SceneSummary summary = messages::toSummary(scene.start());
+  if (scene.source) {
+    const v1::StreamDescription& played = scene.source->description();
+    std::uint32_t vertices = 0;
+    for (const v1::ClothDescription& cloth : played.cloths()) vertices += cloth.vertex_count();
+    summary.set_vertex_count(vertices);
+    summary.set_cloth_count(static_cast<std::uint32_t>(played.cloths_size()));
+    summary.set_description(played.definition().description());
+    *summary.mutable_playback() = scene.source->playback();
+  }
   summary.set_participants(static_cast<std::uint32_t>(scene.audience.size()));
   summary.set_running(scene.running);
   summary.set_paused(scene.paused);
@@ -55,6 +80,24 @@ SceneServer::State::State(std::vector<scene::Scene> definitions, ServerOptions o
              }),
       device(options.device, scenes, packer, metrics, options.runAlways, options.reportRate),
       maker(*this) {}
+
+SceneServer::State::State(std::shared_ptr<LiveScene> played, ServerOptions options_)
+    : State(std::vector<scene::Scene>{}, std::move(options_)) {
+  participants = kViewers;
+  played->source->begin(*played);
+  insert(std::move(played));
+}
+
+std::string SceneServer::State::deviceNameOf(const LiveScene& scene) const {
+  return scene.source ? scene.source->deviceName() : device.info().name;
+}
+
+void SceneServer::State::wake(const LiveScene& scene) {
+  if (scene.source)
+    scene.source->wake();
+  else
+    device.wake();
+}
 
 std::shared_ptr<LiveScene> SceneServer::State::find(const std::string& name) const {
   for (const auto& scene : scenesNow())
@@ -129,7 +172,8 @@ tl::expected<v1::GetSceneResponse, v1::Error> SceneServer::State::getScene(
   const std::shared_ptr<LiveScene> scene = find(request.name());
   if (!scene) return tl::unexpected(noSuchScene(request.name()));
   v1::GetSceneResponse response;
-  *response.mutable_scene() = messages::toMessage(scene->definition());
+  *response.mutable_scene() =
+      scene->source ? scene->source->description().definition() : messages::toMessage(scene->definition());
   return response;
 }
 
@@ -137,6 +181,12 @@ tl::expected<v1::ControlSceneResponse, v1::Error> SceneServer::State::controlSce
     const v1::ControlSceneRequest& request) {
   const std::shared_ptr<LiveScene> scene = find(request.name());
   if (!scene) return tl::unexpected(noSuchScene(request.name()));
+  if (const auto controlled = controlSource(*scene, request); !controlled) {
+    v1::Error error;
+    error.set_code(controlled.error().code);
+    error.set_text(controlled.error().text);
+    return tl::unexpected(std::move(error));
+  }
   if (request.has_paused() && scene->paused.exchange(request.paused()) != request.paused())
     scene->audience.announce(
         request.paused() ? pausedNotice(*scene)
@@ -146,7 +196,7 @@ tl::expected<v1::ControlSceneResponse, v1::Error> SceneServer::State::controlSce
     scene->audience.announce(
         notice(v1::NOTICE_KIND_SCENE_RESET, "the scene begins anew", scene->tick.load()));
   }
-  device.wake();
+  wake(*scene);
   v1::ControlSceneResponse response;
   *response.mutable_scene() = summaryOf(*scene);
   return response;
@@ -169,6 +219,12 @@ SceneServer::SceneServer(std::vector<scene::Scene> scenes, ServerOptions options
   std::ranges::stable_partition(
       scenes, [&](const scene::Scene& scene) { return scene.name == options.defaultScene; });
   state_ = std::make_unique<State>(std::move(scenes), std::move(options));
+}
+
+SceneServer::SceneServer(std::string name, std::shared_ptr<FrameSource> source, ServerOptions options) {
+  options.defaultScene = name;
+  state_ = std::make_unique<State>(std::make_shared<LiveScene>(std::move(name), std::move(source)),
+                                   std::move(options));
 }
 
 SceneServer::~SceneServer() {
@@ -218,7 +274,8 @@ const std::string& SceneServer::defaultScene() const {
 std::string SceneServer::report() const {
   std::string text;
   for (const auto& scene : state_->scenesNow())
-    if (scene->metrics.ticks.value() > 0) text += telemetry::table(scene->name(), scene->metrics);
+    if (scene->metrics.ticks.value() + scene->metrics.frames.value() > 0)
+      text += telemetry::table(scene->name(), scene->metrics);
   return text + telemetry::table(state_->metrics);
 }
 

@@ -18,6 +18,7 @@
 
 namespace clothstream::stream {
 
+class FrameSource;
 class Journal;
 
 struct ServerOptions {
@@ -56,6 +57,8 @@ class SceneServer {
   // std::runtime_error where the device has no room for the default scene or it is not among them (naming
   // those there are).
   SceneServer(std::vector<scene::Scene> scenes, ServerOptions options);
+  // Of one scene that is not simulated here, the default one; needs no device, and can make no others.
+  SceneServer(std::string name, std::shared_ptr<FrameSource> source, ServerOptions options);
   // Stops. Every Connection must be gone.
   ~SceneServer();
   SceneServer(const SceneServer&) = delete;

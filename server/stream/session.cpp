@@ -163,12 +163,13 @@ void Session::hello(const v1::Hello& message) {
   welcome.set_scene(scene->name());
   welcome.set_participant_id(participant_);
   welcome.set_server_name(server_.options.serverName);
-  welcome.set_device_name(server_.device.info().name);
+  welcome.set_device_name(server_.deviceNameOf(*scene));
   welcome.set_description_content_id(description->contentId);
   answer(reply);
   mailbox_->subscribe(description, scene->start().streamRate, scene->metrics);
   if (scene->paused && !mailbox_->announce(pausedNotice(*scene))) return closeLocked(tooSlow());
-  server_.device.wake();
+  if (scene->source && !mailbox_->announce(playbackMessage(*scene->source))) return closeLocked(tooSlow());
+  server_.wake(*scene);
   spdlog::info("{}: {} joined as participant {} ({}); {} in it", scene->name(), peer_, participant_,
                joining->clientName.empty() ? "unnamed client" : joining->clientName, scene->audience.size());
 }
@@ -190,6 +191,7 @@ void Session::create(const v1::CreateSceneRequest& request) {
 }
 
 void Session::poses(const v1::ColliderPoses& message, Clock::time_point now) {
+  if (scene_->source) return;  // nothing in it can be touched
   auto poses = messages::toPoses(message, scene_->start());
   if (!poses) return refuse(poses.error());
   scene_->inbox.postPoses(participant_, std::move(*poses), now);
@@ -264,7 +266,7 @@ void Session::leave() {
   scene_->audience.leave(*mailbox_);
   if (scene_->journal) scene_->journal->left(participant_);
   if (posed_) scene_->inbox.postPoses(participant_, {}, now_);
-  server_.device.wake();
+  server_.wake(*scene_);
   spdlog::info("{}: {} left; {} in it", scene_->name(), peer_, scene_->audience.size());
   scene_ = nullptr;
 }

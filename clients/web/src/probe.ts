@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // `window.clothstream`: lets tests and the curious look inside; it changes nothing.
 
-import type { Client, ClothLayout, ClothReport, Collider, Statistics, Vec3 } from "./client";
+import type { Client, ClothLayout, ClothReport, Collider, Playback, Statistics, Vec3 } from "./client";
 import type { Session, SessionState } from "./session";
 import type { View } from "./view";
 
@@ -16,6 +16,8 @@ export interface Probe {
   // Of each cloth, once there is one.
   readonly reports: (ClothReport | undefined)[];
   readonly colliders: Collider[];
+  // Of a scene that is a recording.
+  readonly playback: Playback | undefined;
   readonly canvas: HTMLCanvasElement;
   // A point of the scene, in CSS pixels of the page.
   project(point: Vec3): [number, number];
@@ -57,6 +59,9 @@ export function expose(session: Session, view: View): { described(client: Client
     },
     get colliders() {
       return session.client?.colliders() ?? [];
+    },
+    get playback() {
+      return session.client?.playback();
     },
     canvas: view.canvas,
     project: (point) => view.project(point),
