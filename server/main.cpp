@@ -261,7 +261,7 @@ int runAgain(const ProgramOptions& options, const Signals& signals) {
   if (!result) throw std::runtime_error(result.error());
   fmt::print("{}", recording::toText(*result));
   if (result->interrupted) return kInterrupted;
-  return result->firstDifferent ? 1 : 0;
+  return result->firstDifferent || !result->missing.empty() ? 1 : 0;
 }
 
 int runSteps(const ProgramOptions& options, const Signals& signals) {

@@ -155,8 +155,9 @@ std::variant<ProgramOptions, int> parseOptions(int argc, const char* const* argv
       "resimulate", "Simulate a recording's ticks once more, and compare each state with what it was");
   resimulateCommand.add_option("FILE", options.resimulate, "What --record wrote")->required();
   resimulateCommand.footer(
-      "Ends with 0 if every state is the same to the bit, 1 for an error or a difference, 130 if "
-      "interrupted.");
+      "Ends with 0 if every state is the same to the bit, 1 for an error, a difference or a part that is "
+      "missing, "
+      "130 if interrupted.");
   addDeviceOptions(resimulateCommand, options);
 
   CLI::App& playCommand = *app.add_subcommand(

@@ -66,7 +66,9 @@ void Recorder::begin(const vulkan::DeviceInfo& device, const scene::Scene& scene
 
 void Recorder::ticked(const stream::AppliedTick& tick) {
   if (!active()) return;
-  write(tick, tick_);
+  stream::AppliedTick told = tick;
+  told.clothsChanged |= std::exchange(tellsCloths_, false);
+  write(told, tick_);
   put(Topic::ticks, tick_);
 }
 
@@ -75,6 +77,7 @@ void Recorder::saved(const simulation::StateSnapshot& state, bool gripsHold) {
   checkpoint.set_tick(state.tick);
   checkpoint.set_state(state.bytes.data(), state.bytes.size());
   checkpoint.set_grips_hold(gripsHold);
+  tellsCloths_ = true;
   put(Topic::checkpoints, checkpoint);
 }
 

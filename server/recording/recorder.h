@@ -86,7 +86,9 @@ class Recorder : public stream::Journal {
   bool overflowed_ = false;
 
   v1::RecordedTick tick_;  // the device's thread's, used again
-  std::thread thread_;     // from begin() on
+  bool tellsCloths_ =
+      true;             // the same thread's: with the next tick, so that one can go on from the state before
+  std::thread thread_;  // from begin() on
 };
 
 }  // namespace clothstream::recording

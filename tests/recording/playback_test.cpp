@@ -201,7 +201,7 @@ TEST_F(PlaybackTest, ASeekGoesOnFromTheKeyFrameBeforeIt) {
   play();
   join();
   pass(0.5);
-  for (const double to : {1.3, 0.0, 2.0, playback->playback().length(), 0.41}) {
+  for (const double to : {1.3, 0.0, 2.0, 0.41, playback->playback().length()}) {
     const std::size_t before = viewer->frames.size();
     const std::uint64_t tick = viewer->frames.back().tick;
     seek(to);
