@@ -212,7 +212,10 @@ void serve(const ProgramOptions& options, const Signals& signals) {
   std::optional<recording::Recordings> recordings;
   if (!options.recordDirectory.empty())
     recordings.emplace(
-        recording::RecorderOptions{.directory = options.recordDirectory, .serverName = kServerName});
+        recording::RecorderOptions{.directory = options.recordDirectory,
+                                   .serverName = kServerName,
+                                   .maxBytes = static_cast<std::uint64_t>(options.recordLimitMb * 1e6)},
+        !options.recordsOnRequest);
   const auto first = std::ranges::find(scenes, options.scene, &scene::Scene::name);
   const std::uint32_t nodes = first == scenes.end() ? 0 : first->nodeCount();
   stream::SceneServer server(std::move(scenes), {.device = deviceOptions(options, nodes),
@@ -221,8 +224,8 @@ void serve(const ProgramOptions& options, const Signals& signals) {
                                                  .runAlways = options.alwaysRun,
                                                  .reportRate = options.reportRate,
                                                  .maxCreatedScenes = options.maxCreatedScenes,
-                                                 .journals = [&](const scene::Scene&) {
-                                                   return recordings ? recordings->add() : nullptr;
+                                                 .journals = [&](const scene::Scene& scene) {
+                                                   return recordings ? recordings->add(scene.name) : nullptr;
                                                  }});
   const auto report = [&] { return server.report() + (recordings ? recordings->report() : ""); };
   openDoors(server, options, signals,

@@ -108,9 +108,21 @@ std::variant<ProgramOptions, int> parseOptions(int argc, const char* const* argv
       ->capture_default_str()
       ->group(scenes);
 
-  app.add_option("--record", options.recordDirectory,
-                 "Record every scene while it runs, each to a file of its own in this directory")
-      ->type_name("DIR")
+  CLI::Option* record =
+      app.add_option("--record", options.recordDirectory,
+                     "Record every scene while it runs, each to a file of its own in this directory")
+          ->type_name("DIR")
+          ->group(scenes);
+  const CLI::Option* recordings =
+      app.add_option("--recordings", options.recordDirectory,
+                     "Record the scenes that clients ask to be recorded, to files in this directory")
+          ->type_name("DIR")
+          ->excludes(record)
+          ->group(scenes);
+  app.add_option("--record-limit", options.recordLimitMb,
+                 "Go on in another file when one has so many megabytes; 0: never")
+      ->check(CLI::Range(0.0, 1e9))
+      ->capture_default_str()
       ->group(scenes);
   app.add_option("--max-created-scenes", options.maxCreatedScenes,
                  "Scenes that clients may create beside these; 0: none")
@@ -184,6 +196,7 @@ std::variant<ProgramOptions, int> parseOptions(int argc, const char* const* argv
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : 1;
   }
+  options.recordsOnRequest = recordings->count() > 0;
   if (stepCommand.parsed()) options.step = stepOptions;
   if (stopAfter->count() > 0) options.stopAfter = std::chrono::duration<double>(seconds);
   return options;

@@ -32,6 +32,8 @@ struct ProgramOptions {
   std::string play;                       // a recording, instead of scenes; empty: none
   recording::PlaybackOptions playback;    // of it
   std::filesystem::path recordDirectory;  // empty: nothing is recorded
+  bool recordsOnRequest = false;          // and only then
+  double recordLimitMb = 0;               // of a file; 0: none
 
   std::string host = "127.0.0.1";
   std::uint16_t port = 8080, grpcPort = 50051;

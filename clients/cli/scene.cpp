@@ -63,7 +63,13 @@ void SceneCommands::add(CLI::App& app, std::string& address) {
   seek_ = command("seek", "Let a recording that is played go on from another time");
   speed_ = command("speed", "Play a recording slower or faster");
   loop_ = command("loop", "Whether a recording that is played begins anew at its end");
-  for (CLI::App* added : {delete_, pause_, resume_, reset_, seek_, speed_, loop_}) {
+  startRecording_ =
+      command("start-recording", "Let a server write down all that happens in a scene, on its own disk");
+  startRecording_->add_option("--name", options_.recording,
+                              "Of the file, without .mcap; else the server's choice");
+  stopRecording_ = command("stop-recording", "End the recording of a scene on its server");
+  for (CLI::App* added :
+       {delete_, pause_, resume_, reset_, seek_, speed_, loop_, startRecording_, stopRecording_}) {
     added->add_option("SCENE", options_.name, "Its name")->required();
     takesAddress(added);
   }
@@ -78,7 +84,8 @@ void SceneCommands::check() const {
 }
 
 bool SceneCommands::parsed() const {
-  for (const CLI::App* command : {create_, delete_, pause_, resume_, reset_, seek_, speed_, loop_})
+  for (const CLI::App* command :
+       {create_, delete_, pause_, resume_, reset_, seek_, speed_, loop_, startRecording_, stopRecording_})
     if (command->parsed()) return true;
   return false;
 }
@@ -121,10 +128,24 @@ ExitCode SceneCommands::control(const std::string& address) const {
   return kOk;
 }
 
+ExitCode SceneCommands::record(const std::string& address) const {
+  if (startRecording_->parsed()) {
+    const auto file = startRecording(address, options_.name, options_.recording);
+    if (!file) return complain(exitCodeOf(file.error().kind), file.error().text);
+    fmt::print("{}\n", *file);
+    return kOk;
+  }
+  const auto stopped = stopRecording(address, options_.name);
+  if (!stopped) return complain(exitCodeOf(stopped.error().kind), stopped.error().text);
+  fmt::print("{}: {:.1f} MiB\n", stopped->file(), static_cast<double>(stopped->bytes()) / (1 << 20));
+  return kOk;
+}
+
 ExitCode SceneCommands::run(const std::string& address) {
   options_.address = address;
   if (create_->parsed()) return create();
   if (delete_->parsed()) return done(deleteScene(address, options_.name));
+  if (startRecording_->parsed() || stopRecording_->parsed()) return record(address);
   return control(address);
 }
 

@@ -20,6 +20,7 @@ struct SceneOptions {
   double seek = 0;      // s
   double speed = 1;
   bool loop = false;
+  std::string recording;  // start-recording: the file's name; empty: the server's choice
 };
 
 // The commands, of which one may be parsed. Both outlive the parsing.
@@ -35,10 +36,12 @@ class SceneCommands {
  private:
   ExitCode create() const;
   ExitCode control(const std::string& address) const;
+  ExitCode record(const std::string& address) const;
 
   SceneOptions options_;
   CLI::App *create_ = nullptr, *delete_ = nullptr, *pause_ = nullptr, *resume_ = nullptr, *reset_ = nullptr;
   CLI::App *seek_ = nullptr, *speed_ = nullptr, *loop_ = nullptr;
+  CLI::App *startRecording_ = nullptr, *stopRecording_ = nullptr;
 };
 
 }  // namespace clothstream::cli

@@ -108,4 +108,21 @@ tl::expected<v1::SceneSummary, Failure> controlScene(const std::string& address,
   return std::move(*response->mutable_scene());
 }
 
+tl::expected<std::string, Failure> startRecording(const std::string& address, const std::string& scene,
+                                                  const std::string& file) {
+  v1::StartRecordingRequest request;
+  request.set_scene(scene);
+  request.set_name(file);
+  auto response = call<v1::StartRecordingResponse>(address, request, &v1::ClothStream::Stub::StartRecording);
+  if (!response) return tl::unexpected(std::move(response).error());
+  return response->file();
+}
+
+tl::expected<v1::StopRecordingResponse, Failure> stopRecording(const std::string& address,
+                                                               const std::string& scene) {
+  v1::StopRecordingRequest request;
+  request.set_scene(scene);
+  return call<v1::StopRecordingResponse>(address, request, &v1::ClothStream::Stub::StopRecording);
+}
+
 }  // namespace clothstream

@@ -111,11 +111,13 @@ Done Replay::take(v1::Checkpoint& message) {
     recorder_ = std::make_unique<vulkan::Recorder>(*device_);
     result_.device = fmt::format("{} ({})", device_->info().name, device_->info().driver);
     makeSimulation(snapshot);
+    keeps_ = tick_ == 0;
   } else if (lost_ && !message.grips_hold()) {
     lost_ = false;
     tick_ = message.tick();
     result_.missing.back().until = tick_;
     makeSimulation(snapshot);
+    keeps_ = message.restored();
   } else if (lost_) {
     return {};
   } else if (message.restored()) {
@@ -128,7 +130,8 @@ Done Replay::take(v1::Checkpoint& message) {
 }
 
 void Replay::makeSimulation(const simulation::StateSnapshot& state) {
-  keeps_ = false;
+  // Made anew, it goes back to its start, as the scene's host does.
+  keeps_ = true;
   simulation_.reset();
   simulation_ = std::make_unique<simulation::ClothSimulation>(*device_, scene_);
   submit([&] { simulation_->recordRestoreState(*recorder_, state); });

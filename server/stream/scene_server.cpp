@@ -67,6 +67,7 @@ v1::SceneSummary summaryOf(const LiveScene& scene) {
   summary.set_running(scene.running);
   summary.set_paused(scene.paused);
   summary.set_created(scene.created);
+  summary.set_recorded(scene.journal && scene.journal->active());
   return summary;
 }
 
@@ -252,6 +253,14 @@ void SceneServer::createScene(const v1::CreateSceneRequest& request, CreateDone 
 
 void SceneServer::deleteScene(const v1::DeleteSceneRequest& request, DeleteDone done) {
   state_->maker.remove(request, std::move(done));
+}
+
+void SceneServer::startRecording(const v1::StartRecordingRequest& request, StartRecordingDone done) {
+  state_->maker.startRecording(request, std::move(done));
+}
+
+void SceneServer::stopRecording(const v1::StopRecordingRequest& request, StopRecordingDone done) {
+  state_->maker.stopRecording(request, std::move(done));
 }
 
 tl::expected<v1::ControlSceneResponse, v1::Error> SceneServer::controlScene(

@@ -47,6 +47,8 @@ struct ServerOptions {
 
 // Called once, on any thread; must only pass the word on.
 using CreateDone = std::function<void(tl::expected<v1::CreateSceneResponse, v1::Error>)>;
+using StartRecordingDone = std::function<void(tl::expected<v1::StartRecordingResponse, v1::Error>)>;
+using StopRecordingDone = std::function<void(tl::expected<v1::StopRecordingResponse, v1::Error>)>;
 using DeleteDone = std::function<void(tl::expected<v1::DeleteSceneResponse, v1::Error>)>;
 
 // Thread-safe. Three threads of its own: one owns the device and runs every scene's ticks, one makes packets
@@ -70,6 +72,8 @@ class SceneServer {
   // Outside a stream nothing can have been uploaded.
   void createScene(const v1::CreateSceneRequest& request, CreateDone done);
   void deleteScene(const v1::DeleteSceneRequest& request, DeleteDone done);
+  void startRecording(const v1::StartRecordingRequest& request, StartRecordingDone done);
+  void stopRecording(const v1::StopRecordingRequest& request, StopRecordingDone done);
   tl::expected<v1::ControlSceneResponse, v1::Error> controlScene(const v1::ControlSceneRequest& request);
 
   // Tells everybody that the server stops, and finishes every connection, now and from here on.

@@ -98,6 +98,16 @@ void Session::dispatch(const v1::ClientMessage& message, Clock::time_point now) 
       *reply.mutable_control_scene() = std::move(*controlled);
       return answer(reply);
     }
+    case Body::kStartRecording:
+      if (!allowed(controlRate_, "requests about scenes")) return;
+      return server_.maker.startRecording(
+          message.start_recording(),
+          answering<v1::StartRecordingResponse>(&v1::ServerMessage::mutable_start_recording));
+    case Body::kStopRecording:
+      if (!allowed(controlRate_, "requests about scenes")) return;
+      return server_.maker.stopRecording(
+          message.stop_recording(),
+          answering<v1::StopRecordingResponse>(&v1::ServerMessage::mutable_stop_recording));
     default:
       break;
   }
@@ -169,6 +179,8 @@ void Session::hello(const v1::Hello& message) {
   mailbox_->subscribe(description, scene->start().streamRate, scene->metrics);
   if (scene->paused && !mailbox_->announce(pausedNotice(*scene))) return closeLocked(tooSlow());
   if (scene->source && !mailbox_->announce(playbackMessage(*scene->source))) return closeLocked(tooSlow());
+  if (scene->journal && scene->journal->active() && !mailbox_->announce(recordedNotice(scene->tick)))
+    return closeLocked(tooSlow());
   server_.wake(*scene);
   spdlog::info("{}: {} joined as participant {} ({}); {} in it", scene->name(), peer_, participant_,
                joining->clientName.empty() ? "unnamed client" : joining->clientName, scene->audience.size());

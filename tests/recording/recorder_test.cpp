@@ -393,10 +393,10 @@ TEST_F(RecorderTest, NoRecordingTakesTheNameOfAnother) {
 
 TEST(Recordings, NeedADirectoryThatCanBeWrittenTo) {
   const e2e::TemporaryDirectory directory;
-  const Recordings made({.directory = directory.path() / "a" / "b", .serverName = "test"});
+  const Recordings made({.directory = directory.path() / "a" / "b", .serverName = "test"}, true);
   EXPECT_TRUE(std::filesystem::is_directory(directory.path() / "a" / "b"));
   EXPECT_THAT(made.report(), HasSubstr("running 0  complete 0  failed 0"));
-  EXPECT_THROW(Recordings({.directory = "/proc/none", .serverName = "test"}), std::runtime_error);
+  EXPECT_THROW(Recordings({.directory = "/proc/none", .serverName = "test"}, true), std::runtime_error);
 }
 
 }  // namespace
