@@ -13,6 +13,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "proto/recording/recording_writer.h"
 #include "tests/e2e/process.h"
 #include "tests/e2e/temporary_directory.h"
 #include "tests/recording/sample.h"
@@ -179,6 +180,26 @@ TEST_F(RecordingPrograms, RecoverSaysWhatIsLost) {
   EXPECT_TRUE(reader->check().has_value());
   EXPECT_EQ(countMessages(*reader, Topic::frames), 138u);  // a fifth of a second is missing
   EXPECT_EQ(clothstream({"recover", path, out}).code, 6);  // it is there already
+}
+
+TEST_F(RecordingPrograms, WhatOthersWroteDoesNotSteerATerminal) {
+  const std::string path = pathOf("foreign.mcap");
+  std::string bytes;
+  auto writer = RecordingWriter::begin(
+      [&](std::string_view more) {
+        bytes += more;
+        return Written();
+      },
+      "test",
+      {{"scene",
+        "a\x1b[2J\xc2\x9b"
+        "1mb"},
+       {"device", "Gerät"}});
+  ASSERT_TRUE(writer && writer->finish());
+  std::ofstream(path, std::ios::binary) << bytes;
+  const Ended info = clothstream({"info", "--quick", path});
+  EXPECT_THAT(info.output, HasSubstr("scene     a\\x1b[2J\\x9b1mb, "));
+  EXPECT_THAT(info.output, HasSubstr("Gerät"));
 }
 
 // Without a device, for what is played is not simulated.
