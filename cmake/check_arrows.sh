@@ -16,7 +16,7 @@ server/meshes      | server/scene
 server/messages    | server/scene server/meshes clothstream
 server/encode      | server/scene server/simulation server/vulkan proto/codec shaders
 server/stream      | server/scene server/vulkan server/simulation server/encode server/messages server/telemetry proto/codec clothstream
-server/recording   | server/scene server/vulkan server/simulation server/messages server/stream proto/recording clothstream
+server/recording   | server/scene server/vulkan server/simulation server/messages server/stream proto/codec proto/recording clothstream
 server/step        | server/scene server/vulkan server/simulation server/messages
 server/rpc         | server/stream server/telemetry clothstream
 server/web         | server/stream server/telemetry clothstream

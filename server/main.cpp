@@ -19,6 +19,7 @@
 #include "server/messages/scene_file.h"
 #include "server/messages/scene_message.h"
 #include "server/program_options.h"
+#include "server/recording/playback.h"
 #include "server/recording/recordings.h"
 #include "server/recording/resimulate.h"
 #include "server/rpc/rpc_door.h"
@@ -160,6 +161,46 @@ void waitForStop(const Signals& signals, const ProgramOptions& options,
   }
 }
 
+// Through both doors, until a signal or the end of the time; `intro` is what to say of the scenes.
+void openDoors(stream::SceneServer& server, const ProgramOptions& options, const Signals& signals,
+               const std::string& intro, const std::function<std::string()>& report) {
+  {
+    const std::filesystem::path page = options.page.empty() ? pageBesideProgram() : options.page;
+    if (page.empty())
+      spdlog::warn("there is no page beside the program: build clothstream_page, or name one by --page");
+    const web::WebDoor web(server, {.host = options.host,
+                                    .port = options.port,
+                                    .pageDirectory = page,
+                                    .allowedOrigins = options.allowedOrigins});
+    const rpc::RpcDoor rpc(server, {.host = options.host, .port = options.grpcPort});
+
+    fmt::print("{}page    http://{}/\ngRPC    {}\n", intro, reachable(options.host, web.port()),
+               reachable(options.host, rpc.port()));
+    std::fflush(stdout);
+    waitForStop(signals, options, report);
+    spdlog::info("stopping");
+    server.stop();
+  }
+  fmt::print("{}", report());
+}
+
+void play(const ProgramOptions& options, const Signals& signals) {
+  auto recording = recording::RecordedStream::open(options.play);
+  if (!recording) throw std::runtime_error(recording.error());
+  if (options.playback.from > recording->length())
+    throw std::runtime_error(fmt::format("--from {}: {} is {:.3f} s long", options.playback.from,
+                                         options.play, recording->length()));
+  if (recording->cut())
+    spdlog::warn("{} was cut off, or is damaged at its end: what there is of it is played", options.play);
+  const std::string scene = recording->scene();
+  const std::string intro = fmt::format("plays   {}, {:.1f} s of {}, recorded on {}\n", options.play,
+                                        recording->length(), scene, recording->device());
+  stream::SceneServer server(scene,
+                             std::make_shared<recording::Playback>(std::move(*recording), options.playback),
+                             {.device = {}, .defaultScene = scene, .serverName = kServerName});
+  openDoors(server, options, signals, intro, [&] { return server.report(); });
+}
+
 void serve(const ProgramOptions& options, const Signals& signals) {
   std::vector<scene::Scene> scenes = loadScenes(options);
   std::string sceneList;
@@ -171,7 +212,10 @@ void serve(const ProgramOptions& options, const Signals& signals) {
   std::optional<recording::Recordings> recordings;
   if (!options.recordDirectory.empty())
     recordings.emplace(
-        recording::RecorderOptions{.directory = options.recordDirectory, .serverName = kServerName});
+        recording::RecorderOptions{.directory = options.recordDirectory,
+                                   .serverName = kServerName,
+                                   .maxBytes = static_cast<std::uint64_t>(options.recordLimitMb * 1e6)},
+        !options.recordsOnRequest);
   const auto first = std::ranges::find(scenes, options.scene, &scene::Scene::name);
   const std::uint32_t nodes = first == scenes.end() ? 0 : first->nodeCount();
   stream::SceneServer server(
@@ -183,29 +227,13 @@ void serve(const ProgramOptions& options, const Signals& signals) {
        .reportRate = options.reportRate,
        .maxCreatedScenes = options.maxCreatedScenes,
        .encoderThreads = options.encoderThreads,
-       .journals = [&](const scene::Scene&) { return recordings ? recordings->add() : nullptr; },
+       .journals = [&](const scene::Scene& scene) { return recordings ? recordings->add(scene.name) : nullptr; },
        .holding = {.hold = std::chrono::duration_cast<stream::Clock::duration>(options.hold)},
        .participantsMay = options.participantsMay,
        .outsideControl = !options.ownersAlone});
   const auto report = [&] { return server.report() + (recordings ? recordings->report() : ""); };
-  {
-    const std::filesystem::path page = options.page.empty() ? pageBesideProgram() : options.page;
-    if (page.empty())
-      spdlog::warn("there is no page beside the program: build clothstream_page, or name one by --page");
-    const web::WebDoor web(server, {.host = options.host,
-                                    .port = options.port,
-                                    .pageDirectory = page,
-                                    .allowedOrigins = options.allowedOrigins});
-    const rpc::RpcDoor rpc(server, {.host = options.host, .port = options.grpcPort});
-
-    fmt::print("device  {}\nscenes  {}\npage    http://{}/\ngRPC    {}\n", describe(server.deviceInfo()),
-               sceneList, reachable(options.host, web.port()), reachable(options.host, rpc.port()));
-    std::fflush(stdout);
-    waitForStop(signals, options, report);
-    spdlog::info("stopping");
-    server.stop();
-  }
-  fmt::print("{}", report());
+  openDoors(server, options, signals,
+            fmt::format("device  {}\nscenes  {}\n", describe(server.deviceInfo()), sceneList), report);
 }
 
 constexpr int kInterrupted = 130;  // as shells have it
@@ -240,7 +268,7 @@ int runAgain(const ProgramOptions& options, const Signals& signals) {
   if (!result) throw std::runtime_error(result.error());
   fmt::print("{}", recording::toText(*result));
   if (result->interrupted) return kInterrupted;
-  return result->firstDifferent ? 1 : 0;
+  return result->firstDifferent || !result->missing.empty() ? 1 : 0;
 }
 
 int runSteps(const ProgramOptions& options, const Signals& signals) {
@@ -271,6 +299,10 @@ int main(int argc, char** argv) {
     const Signals signals;
     telemetry::setUpLog(options.logLevel);
     if (options.step) return runSteps(options, signals);
+    if (!options.play.empty()) {
+      play(options, signals);
+      return 0;
+    }
     if (!options.resimulate.empty()) return runAgain(options, signals);
     if (!options.printScene.empty())
       fmt::print("{}\n", messages::toJson(loaded(messages::loadScene(options.printScene))));

@@ -112,9 +112,21 @@ std::variant<ProgramOptions, int> parseOptions(int argc, const char* const* argv
       ->capture_default_str()
       ->group(scenes);
 
-  app.add_option("--record", options.recordDirectory,
-                 "Record every scene while it runs, each to a file of its own in this directory")
-      ->type_name("DIR")
+  CLI::Option* record =
+      app.add_option("--record", options.recordDirectory,
+                     "Record every scene while it runs, each to a file of its own in this directory")
+          ->type_name("DIR")
+          ->group(scenes);
+  const CLI::Option* recordings =
+      app.add_option("--recordings", options.recordDirectory,
+                     "Record the scenes that clients ask to be recorded, to files in this directory")
+          ->type_name("DIR")
+          ->excludes(record)
+          ->group(scenes);
+  app.add_option("--record-limit", options.recordLimitMb,
+                 "Go on in another file when one has so many megabytes; 0: never")
+      ->check(CLI::Range(0.0, 1e9))
+      ->capture_default_str()
       ->group(scenes);
   app.add_option("--max-created-scenes", options.maxCreatedScenes,
                  "Scenes that clients may create beside these; 0: none")
@@ -184,9 +196,24 @@ std::variant<ProgramOptions, int> parseOptions(int argc, const char* const* argv
       "resimulate", "Simulate a recording's ticks once more, and compare each state with what it was");
   resimulateCommand.add_option("FILE", options.resimulate, "What --record wrote")->required();
   resimulateCommand.footer(
-      "Ends with 0 if every state is the same to the bit, 1 for an error or a difference, 130 if "
-      "interrupted.");
+      "Ends with 0 if every state is the same to the bit, 1 for an error, a difference or a part that is "
+      "missing, "
+      "130 if interrupted.");
   addDeviceOptions(resimulateCommand, options);
+
+  CLI::App& playCommand = *app.add_subcommand(
+      "play", "Serve a recording as a scene: clients join it, and pause, seek, speed, loop it");
+  playCommand.add_option("FILE", options.play, "What --record or `clothstream record` wrote")->required();
+  playCommand.add_option("--from", options.playback.from, "Begin so many seconds after its start")
+      ->check(CLI::NonNegativeNumber);
+  playCommand.add_option("--speed", options.playback.speed, "Seconds of it that pass in one")
+      ->check(CLI::Range(recording::kMinSpeed, recording::kMaxSpeed))
+      ->capture_default_str();
+  playCommand.add_flag("--loop", options.playback.loop,
+                       "Go on from its start at its end, instead of pausing there");
+  playCommand.footer(
+      "Options of the network and the log are those of clothstream-server. No device is needed.");
+  playCommand.fallthrough();
 
   app.add_option("--log-level", options.logLevel, "trace, debug, info, warning, error or off")
       ->capture_default_str();
@@ -198,6 +225,7 @@ std::variant<ProgramOptions, int> parseOptions(int argc, const char* const* argv
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : 1;
   }
+  options.recordsOnRequest = recordings->count() > 0;
   options.hold = std::chrono::duration<double>(hold);
   if (!changeable.empty()) {
     const auto given = [&](const char* what) {

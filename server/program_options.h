@@ -10,6 +10,7 @@
 #include <variant>
 #include <vector>
 
+#include "server/recording/playback.h"
 #include "server/scene/scene.h"
 #include "server/step/step.h"
 #include "server/stream/roles.h"
@@ -34,7 +35,11 @@ struct ProgramOptions {
   bool ownersAlone = false;
   std::optional<step::StepOptions> step;  // instead of serving
   std::string resimulate;                 // a recording, instead of serving; empty: none
+  std::string play;                       // a recording, instead of scenes; empty: none
+  recording::PlaybackOptions playback;    // of it
   std::filesystem::path recordDirectory;  // empty: nothing is recorded
+  bool recordsOnRequest = false;          // and only then
+  double recordLimitMb = 0;               // of a file; 0: none
 
   std::string host = "127.0.0.1";
   std::uint16_t port = 8080, grpcPort = 50051;

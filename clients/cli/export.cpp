@@ -65,11 +65,12 @@ tl::expected<std::uint32_t, Complaint> writeGltf(const ExportOptions& options) {
     return {};
   });
   if (!frames) return frames;
-  const std::string glb = animation.toGlb();
-  if (glb.empty()) return complaint(kUsage, "{} would have more than 4 GiB: take fewer frames", options.out);
+  const bool text = std::filesystem::path(options.out).extension() == ".gltf";
+  const std::string gltf = text ? animation.toGltf() : animation.toGlb();
+  if (gltf.empty()) return complaint(kUsage, "{} would have more than 4 GiB: take fewer frames", options.out);
   auto file = orComplaint(kNotWritten, recording::OutputFile::create(options.out));
   if (!file) return tl::unexpected(file.error());
-  if (auto written = orComplaint(kNotWritten, file->write(glb)); !written) {
+  if (auto written = orComplaint(kNotWritten, file->write(gltf)); !written) {
     std::filesystem::remove(options.out);
     return tl::unexpected(written.error());
   }
@@ -95,7 +96,8 @@ tl::expected<std::uint32_t, Complaint> writeObjs(const ExportOptions& options) {
 }  // namespace
 
 ExitCode exportFrames(const ExportOptions& options) {
-  const bool gltf = std::filesystem::path(options.out).extension() == ".glb";
+  const std::filesystem::path extension = std::filesystem::path(options.out).extension();
+  const bool gltf = extension == ".glb" || extension == ".gltf";
   if (std::filesystem::exists(options.out))
     return say({kNotWritten, fmt::format("cannot write {}: it is there already", options.out)});
   const auto frames = gltf ? writeGltf(options) : writeObjs(options);

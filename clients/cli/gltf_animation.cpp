@@ -62,6 +62,20 @@ void appendNumber(std::string& out, std::size_t number) {
   out.append(reinterpret_cast<const char*>(&value), sizeof value);
 }
 
+std::string base64(std::string_view bytes) {
+  constexpr std::string_view kDigits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string text;
+  text.reserve((bytes.size() + 2) / 3 * 4);
+  for (std::size_t i = 0; i < bytes.size(); i += 3) {
+    const std::size_t count = std::min<std::size_t>(3, bytes.size() - i);
+    std::uint32_t group = 0;
+    for (std::size_t k = 0; k < 3; ++k)
+      group = group << 8 | (k < count ? static_cast<unsigned char>(bytes[i + k]) : 0u);
+    for (std::size_t k = 0; k < 4; ++k) text += k <= count ? kDigits[group >> (18 - 6 * k) & 63] : '=';
+  }
+  return text;
+}
+
 void appendChunk(std::string& out, std::string_view name, std::string content, char filler) {
   content.resize((content.size() + 3) / 4 * 4, filler);
   appendNumber(out, content.size());
@@ -94,7 +108,7 @@ void GltfAnimation::add(const cs_client* client, double seconds) {
   seconds_.push_back(static_cast<float>(seconds));
 }
 
-std::string GltfAnimation::toGlb() const {
+GltfAnimation::Document GltfAnimation::toDocument(bool embedded) const {
   Buffer buffer;
   const auto frame = [&](const std::vector<float>& values, std::size_t i) {
     return std::span(values).subspan(i * numbers_, numbers_);
@@ -135,11 +149,21 @@ std::string GltfAnimation::toGlb() const {
   gltf["bufferViews"] = std::move(buffer.views);
   gltf["accessors"] = std::move(buffer.accessors);
   gltf["buffers"] = {{{"byteLength", buffer.bytes.size()}}};
-  const std::string text = gltf.dump(-1, ' ', false, Json::error_handler_t::replace);
-  if (text.size() + buffer.bytes.size() > std::numeric_limits<std::uint32_t>::max() - 64) return {};
+  if (embedded) gltf["buffers"][0]["uri"] = "data:application/octet-stream;base64," + base64(buffer.bytes);
+  return {gltf.dump(-1, ' ', false, Json::error_handler_t::replace), std::move(buffer.bytes)};
+}
+
+std::string GltfAnimation::toGltf() const {
+  return toDocument(true).json;
+}
+
+std::string GltfAnimation::toGlb() const {
+  Document document = toDocument(false);
+  if (document.json.size() + document.numbers.size() > std::numeric_limits<std::uint32_t>::max() - 64)
+    return {};
   std::string chunks;
-  appendChunk(chunks, "JSON", text, ' ');
-  appendChunk(chunks, std::string_view("BIN\0", 4), std::move(buffer.bytes), '\0');
+  appendChunk(chunks, "JSON", std::move(document.json), ' ');
+  appendChunk(chunks, std::string_view("BIN\0", 4), std::move(document.numbers), '\0');
   std::string out = "glTF";
   appendNumber(out, 2);
   appendNumber(out, 12 + chunks.size());

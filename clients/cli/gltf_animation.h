@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// An animated mesh as a binary glTF 2.0 file: a morph target a frame.
+// An animated mesh as a glTF 2.0 file, binary or text: a morph target a frame.
 #pragma once
 
 #include <cstdint>
@@ -18,8 +18,15 @@ class GltfAnimation {
   std::uint32_t frames() const { return static_cast<std::uint32_t>(seconds_.size()); }
   // At least one frame was added. Empty where the file would be larger than the format allows, 4 GiB.
   std::string toGlb() const;
+  // The same as text, with the numbers in it as base64.
+  std::string toGltf() const;
 
  private:
+  struct Document {
+    std::string json, numbers;
+  };
+  Document toDocument(bool embedded) const;
+
   struct Cloth {
     std::string name;
     std::uint32_t firstIndex = 0, indexCount = 0;

@@ -31,6 +31,23 @@ struct Figures {
   std::optional<cs_statistics> stream;
 };
 
+// What others wrote into a file must not steer a terminal: control characters as \\xNN. UTF-8 stays, but for
+// its own.
+std::string printable(const std::string& text) {
+  std::string shown;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const auto byte = static_cast<unsigned char>(text[i]);
+    const bool isC1 = byte == 0xc2 && i + 1 < text.size() && static_cast<unsigned char>(text[i + 1]) < 0xa0;
+    if (isC1)
+      shown += fmt::format("\\x{:02x}", static_cast<unsigned char>(text[++i]));
+    else if (byte < 0x20 || byte == 0x7f)
+      shown += fmt::format("\\x{:02x}", byte);
+    else
+      shown += text[i];
+  }
+  return shown;
+}
+
 double seconds(const RecordingReader& reader) {
   return static_cast<double>(reader.end() - reader.start()) * 1e-9;
 }
@@ -96,7 +113,7 @@ std::string mebibytes(std::uint64_t bytes) {
 
 std::string toText(const RecordingReader& reader, const Figures& figures, const std::string& damage,
                    const InfoOptions& options) {
-  const auto fact = [&](const char* name) { return reader.fact(name); };
+  const auto fact = [&](const char* name) { return printable(reader.fact(name)); };
   std::string text = fmt::format(
       "file      {}, {}, {} chunks\nscene     {}, begun {}, {:.1f} s, {} vertices\nserver    {}\ndevice    "
       "{}; {}; "

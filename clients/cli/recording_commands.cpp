@@ -34,7 +34,8 @@ void RecordingCommands::add(CLI::App& app, std::string& address) {
   export_->add_option("FILE", exportOptions_.recording, "The recording")->required();
   export_
       ->add_option("OUT", exportOptions_.out,
-                   "OUT.glb for a glTF with a morph target a frame, or else a directory for an OBJ file a "
+                   "OUT.glb, or OUT.gltf as text, for a glTF with a morph target a frame, or else a "
+                   "directory for an OBJ file a "
                    "frame; there must be none yet")
       ->required();
   export_->add_option("--rate", exportOptions_.rate, "Frames a second, at most")

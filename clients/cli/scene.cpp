@@ -60,10 +60,22 @@ void SceneCommands::add(CLI::App& app, std::string& address) {
   pause_ = command("pause", "Stop the clock of a scene");
   resume_ = command("resume", "Let a paused scene go on");
   reset_ = command("reset", "Put the cloths of a scene back to where they start");
-  for (CLI::App* added : {delete_, pause_, resume_, reset_}) {
+  seek_ = command("seek", "Let a recording that is played go on from another time");
+  speed_ = command("speed", "Play a recording slower or faster");
+  loop_ = command("loop", "Whether a recording that is played begins anew at its end");
+  startRecording_ =
+      command("start-recording", "Let a server write down all that happens in a scene, on its own disk");
+  startRecording_->add_option("--name", options_.recording,
+                              "Of the file, without .mcap; else the server's choice");
+  stopRecording_ = command("stop-recording", "End the recording of a scene on its server");
+  for (CLI::App* added :
+       {delete_, pause_, resume_, reset_, seek_, speed_, loop_, startRecording_, stopRecording_}) {
     added->add_option("SCENE", options_.name, "Its name")->required();
     takesAddress(added);
   }
+  seek_->add_option("SECONDS", options_.seek, "From its start")->required();
+  speed_->add_option("SPEED", options_.speed, "Seconds of it that pass in one; 1: as it was")->required();
+  loop_->add_option("ON", options_.loop, "on or off")->required();
 }
 
 void SceneCommands::check() const {
@@ -72,7 +84,8 @@ void SceneCommands::check() const {
 }
 
 bool SceneCommands::parsed() const {
-  for (const CLI::App* command : {create_, delete_, pause_, resume_, reset_})
+  for (const CLI::App* command :
+       {create_, delete_, pause_, resume_, reset_, seek_, speed_, loop_, startRecording_, stopRecording_})
     if (command->parsed()) return true;
   return false;
 }
@@ -97,12 +110,43 @@ ExitCode SceneCommands::create() const {
   return kOk;
 }
 
+ExitCode SceneCommands::control(const std::string& address) const {
+  v1::ControlSceneRequest request;
+  request.set_name(options_.name);
+  if (pause_->parsed() || resume_->parsed()) request.set_paused(pause_->parsed());
+  request.set_reset(reset_->parsed());
+  if (seek_->parsed()) request.set_seek(options_.seek);
+  if (speed_->parsed()) request.set_speed(options_.speed);
+  if (loop_->parsed()) request.set_loop(options_.loop);
+  const auto scene = controlScene(address, request);
+  if (!scene) return complain(exitCodeOf(scene.error().kind), scene.error().text);
+  if (!scene->has_playback()) return kOk;
+  const v1::Playback& playback = scene->playback();
+  fmt::print("{}: at {:.2f} s of {:.2f} s, speed {}{}{}\n", scene->name(), playback.position(),
+             playback.length(), playback.speed(), playback.loop() ? ", in a loop" : "",
+             scene->paused() ? ", paused" : "");
+  return kOk;
+}
+
+ExitCode SceneCommands::record(const std::string& address) const {
+  if (startRecording_->parsed()) {
+    const auto file = startRecording(address, options_.name, options_.recording);
+    if (!file) return complain(exitCodeOf(file.error().kind), file.error().text);
+    fmt::print("{}\n", *file);
+    return kOk;
+  }
+  const auto stopped = stopRecording(address, options_.name);
+  if (!stopped) return complain(exitCodeOf(stopped.error().kind), stopped.error().text);
+  fmt::print("{}: {:.1f} MiB\n", stopped->file(), static_cast<double>(stopped->bytes()) / (1 << 20));
+  return kOk;
+}
+
 ExitCode SceneCommands::run(const std::string& address) {
   options_.address = address;
   if (create_->parsed()) return create();
   if (delete_->parsed()) return done(deleteScene(address, options_.name));
-  if (reset_->parsed()) return done(controlScene(address, options_.name, std::nullopt, true));
-  return done(controlScene(address, options_.name, pause_->parsed(), false));
+  if (startRecording_->parsed() || stopRecording_->parsed()) return record(address);
+  return control(address);
 }
 
 }  // namespace clothstream::cli

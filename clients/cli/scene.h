@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// `clothstream create`, `delete`, `pause`, `resume` and `reset`: scenes of a server.
+// `clothstream create`, `delete`, `pause`, `resume`, `reset`: scenes of a server; `seek`, `speed` and `loop`:
+// those that are recordings.
 #pragma once
 
 #include <optional>
@@ -16,6 +17,10 @@ struct SceneOptions {
   std::string file;     // create: of a scene, in JSON
   std::string named;    // create: instead of a file, one that the server knows
   std::string name;     // of the scene; create: instead of its own
+  double seek = 0;      // s
+  double speed = 1;
+  bool loop = false;
+  std::string recording;  // start-recording: the file's name; empty: the server's choice
 };
 
 // The commands, of which one may be parsed. Both outlive the parsing.
@@ -30,9 +35,13 @@ class SceneCommands {
 
  private:
   ExitCode create() const;
+  ExitCode control(const std::string& address) const;
+  ExitCode record(const std::string& address) const;
 
   SceneOptions options_;
   CLI::App *create_ = nullptr, *delete_ = nullptr, *pause_ = nullptr, *resume_ = nullptr, *reset_ = nullptr;
+  CLI::App *seek_ = nullptr, *speed_ = nullptr, *loop_ = nullptr;
+  CLI::App *startRecording_ = nullptr, *stopRecording_ = nullptr;
 };
 
 }  // namespace clothstream::cli

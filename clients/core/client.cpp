@@ -79,6 +79,8 @@ std::uint32_t Client::receive(Bytes bytes, std::uint64_t nowUs) {
       return presenceReceived(message->body, nowUs);
     case Body::listScenes:
       return scenesReceived(message->body);
+    case Body::playback:
+      return playbackReceived(message->body, nowUs);
     case Body::none:
       return 0;
   }
@@ -292,6 +294,29 @@ std::uint32_t Client::scenesReceived(Bytes body) {
   if (!scenes) return failMalformed("ListScenesResponse");
   scenes_ = std::move(*scenes);
   return CS_EVENT_SCENES;
+}
+
+std::uint32_t Client::playbackReceived(Bytes body, std::uint64_t nowUs) {
+  const std::optional<cs_playback> playback = readPlayback(body);
+  if (!playback) return failMalformed("Playback");
+  playback_ = playback;
+  playbackUs_ = nowUs;
+  return CS_EVENT_PLAYBACK;
+}
+
+std::optional<cs_playback> Client::playback(std::uint64_t nowUs) const {
+  if (!playback_ || playback_->paused != 0 || nowUs < playbackUs_) return playback_;
+  cs_playback now = *playback_;
+  now.position =
+      std::min(now.length, now.position + static_cast<double>(nowUs - playbackUs_) * 1e-6 * now.speed);
+  return now;
+}
+
+void Client::control(const SceneControl& control) {
+  if (state_ != CS_STATE_JOINED) return;
+  std::string message;
+  writeControlScene(message, ++lastRequestId_, welcome_.scene, control);
+  send(std::move(message));
 }
 
 const std::string* Client::nextOutgoing() {

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "clients/core/client_message.h"
 #include "clients/core/content_assembly.h"
 #include "clients/core/core.h"
 #include "clients/core/description.h"
@@ -44,6 +45,7 @@ class Client {
   void listScenes();
   void setRole(std::uint64_t participant, std::uint32_t role);
   void remove(std::uint64_t participant);
+  void control(const SceneControl& control);
   void requestEarlyKeyFrame(std::uint64_t nowUs);
 
   cs_state state() const { return state_; }
@@ -60,6 +62,8 @@ class Client {
   bool described() const { return decoder_ != nullptr; }
   const FrameStatistics& statistics() const { return statistics_; }
   const ServerClock& clock() const { return clock_; }
+  // As it stands at this time.
+  std::optional<cs_playback> playback(std::uint64_t nowUs) const;
   double decodeMs() const { return decodeMs_; }
   const std::vector<std::string>& scenes() const { return scenes_; }
 
@@ -94,6 +98,7 @@ class Client {
   std::uint32_t parametersReceived(Bytes body);
   std::uint32_t errorReceived(Bytes body);
   std::uint32_t scenesReceived(Bytes body);
+  std::uint32_t playbackReceived(Bytes body, std::uint64_t nowUs);
 
   std::uint32_t fail(std::string text);
   std::uint32_t failMalformed(const char* what);
@@ -130,6 +135,8 @@ class Client {
   SimulationReport report_;
   std::uint64_t reportTick_ = 0;
   std::uint64_t parametersParticipant_ = 0;
+  std::optional<cs_playback> playback_;
+  std::uint64_t playbackUs_ = 0;  // when it was told
 };
 
 }  // namespace clothstream::client

@@ -25,6 +25,7 @@ enum BodyField : std::uint32_t {
   kFrameAck = 6,
   kKeyFrameRequest = 7,
   kListScenes = 16,
+  kControlScene = 20,
   kSetRole = 30,
   kRemoveParticipant = 31,
 };
@@ -240,6 +241,17 @@ void writeListScenes(std::string& out, std::uint64_t requestId) {
   message.add_uint64(1, requestId);
   // Said outright: a Writer leaves out a submessage that nothing was added to.
   message.add_message(kListScenes, std::string());
+}
+
+void writeControlScene(std::string& out, std::uint64_t requestId, std::string_view scene,
+                       const SceneControl& control) {
+  writeMessage(out, requestId, kControlScene, [&](Writer& request) {
+    request.add_bytes(1, scene.data(), scene.size());
+    if (control.paused) request.add_bool(2, *control.paused);
+    if (control.seek) request.add_double(50, *control.seek);
+    if (control.speed) request.add_double(51, *control.speed);
+    if (control.loop) request.add_bool(52, *control.loop);
+  });
 }
 
 }  // namespace clothstream::client

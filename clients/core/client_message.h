@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -53,5 +54,13 @@ void writeKeyFrameRequest(std::string& out, std::uint32_t epoch, bool early);
 void writeSetRole(std::string& out, std::uint64_t requestId, std::uint64_t participant, std::uint32_t role);
 void writeRemoveParticipant(std::string& out, std::uint64_t requestId, std::uint64_t participant);
 void writeListScenes(std::string& out, std::uint64_t requestId);
+// Of a scene's clock; what is not given stays.
+struct SceneControl {
+  std::optional<bool> paused{};
+  std::optional<double> seek{}, speed{};
+  std::optional<bool> loop{};
+};
+void writeControlScene(std::string& out, std::uint64_t requestId, std::string_view scene,
+                       const SceneControl& control);
 
 }  // namespace clothstream::client

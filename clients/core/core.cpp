@@ -586,6 +586,29 @@ void cs_request_key_frame(cs_client* client, uint64_t now_us) {
   client->client.requestEarlyKeyFrame(now_us);
 }
 
+int cs_get_playback(const cs_client* client, uint64_t now_us, cs_playback* out) {
+  const auto playback = client->client.playback(now_us);
+  if (!playback) return 0;
+  *out = *playback;
+  return 1;
+}
+
+void cs_pause(cs_client* client, int paused) {
+  client->client.control({.paused = paused != 0});
+}
+
+void cs_seek(cs_client* client, double seconds) {
+  client->client.control({.seek = seconds});
+}
+
+void cs_set_speed(cs_client* client, double speed) {
+  client->client.control({.speed = speed});
+}
+
+void cs_set_loop(cs_client* client, int loop) {
+  client->client.control({.loop = loop != 0});
+}
+
 void cs_list_scenes(cs_client* client) {
   client->client.listScenes();
 }

@@ -51,7 +51,8 @@ enum {
   CS_EVENT_CONTACTS = 256,     /* cs_contact_event_count */
   CS_EVENT_PARTICIPANTS = 512, /* cs_participant_count */
   CS_EVENT_PRESENCE = 1024,    /* cs_get_presence: why they changed */
-  CS_EVENT_RETURNED = 2048     /* joined again after it was cut off; cs_resumed says as whom */
+  CS_EVENT_RETURNED = 2048,    /* joined again after it was cut off; cs_resumed says as whom */
+  CS_EVENT_PLAYBACK = 4096     /* cs_get_playback */
 };
 
 typedef struct cs_statistics {
@@ -245,6 +246,14 @@ typedef struct cs_presence {
   cs_participant participant; /* as it is now; of who left, as it was */
 } cs_presence;
 
+/* Where a recording that is played stands. */
+typedef struct cs_playback {
+  double length;        /* s */
+  double position;      /* s from its start, now */
+  double speed;         /* seconds of it that pass in one */
+  int32_t loop, paused; /* 0 or 1 */
+} cs_playback;
+
 /* scene may be "" for the server's default; strings are copied. */
 cs_client* cs_create(const char* scene, const char* client_name);
 /* The same with a name for other people, which may be "", and the cs_role that is wanted. */
@@ -382,6 +391,16 @@ void cs_set_collider(cs_client* client, const char* collider, const float* posit
 /* A key frame soon: who writes the stream down begins from it later. What comes until then is decoded as
  * ever. */
 void cs_request_key_frame(cs_client* client, uint64_t now_us);
+
+/* 0 where the scene is none that is played, or where it stands is not known yet. */
+int cs_get_playback(const cs_client* client, uint64_t now_us, cs_playback* out);
+/* Stops the scene's clock, or lets it run again. What follows is of recordings: from where they go on (s from
+ * the start, at most the length), how fast (0.1 to 8), and whether they begin anew at their end. All of it is
+ * for everybody in the scene, and not before it has been joined. */
+void cs_pause(cs_client* client, int paused);
+void cs_seek(cs_client* client, double seconds);
+void cs_set_speed(cs_client* client, double speed);
+void cs_set_loop(cs_client* client, int loop);
 
 /* Asks for the scenes; after CS_EVENT_SCENES cs_scene gives them. */
 void cs_list_scenes(cs_client* client);

@@ -256,7 +256,8 @@ std::optional<Message> readMessage(Bytes bytes, Visit&& visit) {
 Body bodyOf(std::uint32_t field) {
   constexpr std::array kKnown{
       Body::welcome,          Body::chunk, Body::frame,      Body::pong,       Body::notice,
-      Body::parameterChanged, Body::error, Body::tickEvents, Body::listScenes, Body::presence};
+      Body::parameterChanged, Body::error,    Body::tickEvents, Body::listScenes,
+      Body::presence, Body::playback};
   for (const Body body : kKnown) {
     if (field == bytes(static_cast<std::uint32_t>(body))) return body;
   }
@@ -420,6 +421,28 @@ std::optional<Pong> readPong(Bytes message) {
         return skip(reader);
     }
   });
+}
+
+std::optional<cs_playback> readPlayback(Bytes message) {
+  std::optional<cs_playback> playback =
+      readMessage<cs_playback>(message, [](cs_playback& out, std::uint32_t field, Reader& reader) {
+        switch (field) {
+          case fixed64(1):
+            return std::isfinite(out.length = reader.get_double());
+          case fixed64(2):
+            return std::isfinite(out.position = reader.get_double());
+          case fixed64(3):
+            return std::isfinite(out.speed = reader.get_double());
+          case varint(4):
+            return set(out.loop, reader.get_bool() ? 1 : 0);
+          case varint(5):
+            return set(out.paused, reader.get_bool() ? 1 : 0);
+          default:
+            return skip(reader);
+        }
+      });
+  if (playback && !(playback->length >= 0)) playback.reset();
+  return playback;
 }
 
 std::optional<Notice> readNotice(Bytes message) {

@@ -29,6 +29,7 @@ enum class Body : std::uint32_t {
   tickEvents = 9,
   listScenes = 16,
   presence = 30,
+  playback = 40,
 };
 
 // A kind of body that this client does not know is `none`.
@@ -184,6 +185,8 @@ struct TickEvents {
 [[nodiscard]] std::optional<Pong> readPong(Bytes message);
 [[nodiscard]] std::optional<Notice> readNotice(Bytes message);
 [[nodiscard]] std::optional<Presence> readPresence(Bytes message);
+// Of times that are no numbers, and lengths below 0, there is none.
+[[nodiscard]] std::optional<cs_playback> readPlayback(Bytes message);
 [[nodiscard]] std::optional<ParameterChange> readParameterChanged(Bytes message);
 [[nodiscard]] std::optional<ServerError> readError(Bytes message);
 [[nodiscard]] bool readTickEvents(Bytes message, TickEvents& events);
@@ -193,10 +196,10 @@ struct TickEvents {
 [[nodiscard]] bool readVec3(Bytes message, Vec3& out);
 [[nodiscard]] bool readSpring(Bytes message, Spring& out);
 [[nodiscard]] bool readGust(Bytes message, Gust& out);
-[[nodiscard]] // Of a SelfCollision and of Tethers, in a Scene's Cloth and in a change.
-bool readSelfCollision(Bytes message, std::optional<float>& radius, std::optional<float>& friction);
-bool readTethers(Bytes message, std::optional<float>& slack);
-bool readSolver(Bytes message, Solver& out);
+// Of a SelfCollision and of Tethers, in a Scene's Cloth and in a change.
+[[nodiscard]] bool readSelfCollision(Bytes message, std::optional<float>& radius, std::optional<float>& friction);
+[[nodiscard]] bool readTethers(Bytes message, std::optional<float>& slack);
+[[nodiscard]] bool readSolver(Bytes message, Solver& out);
 // Reuses the memory of `out`.
 [[nodiscard]] bool readReport(Bytes message, SimulationReport& out);
 

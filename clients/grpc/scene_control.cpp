@@ -34,14 +34,19 @@ bool upload(Stream& stream, const std::string& bytes, const CreateSceneOptions& 
   return true;
 }
 
-template <typename Request, typename Response, typename Call>
-tl::expected<void, Failure> call(const std::string& address, const Request& request, const Call& method) {
+template <typename Response, typename Request, typename Call>
+tl::expected<Response, Failure> call(const std::string& address, const Request& request, const Call& method) {
   const auto stub = v1::ClothStream::NewStub(makeChannel(address));
   grpc::ClientContext context;
   context.set_deadline(std::chrono::system_clock::now() + kTimeout);
   Response response;
   const grpc::Status status = (*stub.*method)(&context, request, &response);
   if (!status.ok()) return tl::unexpected(notJoined(address, status));
+  return response;
+}
+
+tl::expected<void, Failure> nothingOf(tl::expected<v1::SceneSummary, Failure> scene) {
+  if (!scene) return tl::unexpected(std::move(scene).error());
   return {};
 }
 
@@ -82,8 +87,9 @@ tl::expected<std::string, Failure> createScene(const std::string& address,
 tl::expected<void, Failure> deleteScene(const std::string& address, const std::string& name) {
   v1::DeleteSceneRequest request;
   request.set_name(name);
-  return call<v1::DeleteSceneRequest, v1::DeleteSceneResponse>(address, request,
-                                                               &v1::ClothStream::Stub::DeleteScene);
+  const auto done = call<v1::DeleteSceneResponse>(address, request, &v1::ClothStream::Stub::DeleteScene);
+  if (!done) return tl::unexpected(done.error());
+  return {};
 }
 
 tl::expected<void, Failure> controlScene(const std::string& address, const std::string& name,
@@ -92,8 +98,31 @@ tl::expected<void, Failure> controlScene(const std::string& address, const std::
   request.set_name(name);
   if (paused) request.set_paused(*paused);
   request.set_reset(reset);
-  return call<v1::ControlSceneRequest, v1::ControlSceneResponse>(address, request,
-                                                                 &v1::ClothStream::Stub::ControlScene);
+  return nothingOf(controlScene(address, request));
+}
+
+tl::expected<v1::SceneSummary, Failure> controlScene(const std::string& address,
+                                                     const v1::ControlSceneRequest& request) {
+  auto response = call<v1::ControlSceneResponse>(address, request, &v1::ClothStream::Stub::ControlScene);
+  if (!response) return tl::unexpected(std::move(response).error());
+  return std::move(*response->mutable_scene());
+}
+
+tl::expected<std::string, Failure> startRecording(const std::string& address, const std::string& scene,
+                                                  const std::string& file) {
+  v1::StartRecordingRequest request;
+  request.set_scene(scene);
+  request.set_name(file);
+  auto response = call<v1::StartRecordingResponse>(address, request, &v1::ClothStream::Stub::StartRecording);
+  if (!response) return tl::unexpected(std::move(response).error());
+  return response->file();
+}
+
+tl::expected<v1::StopRecordingResponse, Failure> stopRecording(const std::string& address,
+                                                               const std::string& scene) {
+  v1::StopRecordingRequest request;
+  request.set_scene(scene);
+  return call<v1::StopRecordingResponse>(address, request, &v1::ClothStream::Stub::StopRecording);
 }
 
 }  // namespace clothstream

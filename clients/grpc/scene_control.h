@@ -10,7 +10,7 @@
 #include <tl/expected.hpp>
 
 #include "clients/grpc/failure.h"
-#include "clothstream/v1/scene.pb.h"
+#include "clothstream/v1/session.pb.h"
 
 namespace clothstream {
 
@@ -33,5 +33,17 @@ struct CreateSceneOptions {
 // scene.
 [[nodiscard]] tl::expected<void, Failure> controlScene(const std::string& address, const std::string& name,
                                                        std::optional<bool> paused, bool reset);
+
+// All that happens in the scene goes to a file on the server; gives its name there. `file` empty: the
+// server's choice.
+[[nodiscard]] tl::expected<std::string, Failure> startRecording(const std::string& address,
+                                                                const std::string& scene,
+                                                                const std::string& file);
+[[nodiscard]] tl::expected<v1::StopRecordingResponse, Failure> stopRecording(const std::string& address,
+                                                                             const std::string& scene);
+
+// All that can be asked of a scene's clock; gives the scene as it is then.
+[[nodiscard]] tl::expected<v1::SceneSummary, Failure> controlScene(const std::string& address,
+                                                                   const v1::ControlSceneRequest& request);
 
 }  // namespace clothstream

@@ -119,6 +119,12 @@ void RecordingReader::rewind() {
   chunk_ = message_ = 0;
 }
 
+ChunkPlace RecordingReader::passChunk() {
+  if (chunk_ >= mcap_.chunks().size()) return {.start = end(), .end = end()};
+  message_ = 0;
+  return mcap_.chunks()[chunk_++];
+}
+
 tl::expected<void, std::string> RecordingReader::seek(std::uint64_t time) {
   rewind();
   if (mcap_.chunks().empty()) return {};

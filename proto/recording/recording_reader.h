@@ -54,6 +54,8 @@ class RecordingReader {
   // The next message is then the newest key frame at this time or before, or else the first message.
   [[nodiscard]] tl::expected<void, std::string> seek(std::uint64_t time);
   void rewind();
+  // After an error of next(): the next message is then the first of the chunk that follows. What is left out.
+  ChunkPlace passChunk();
 
  private:
   RecordingReader(McapReader mcap, std::string name) : mcap_(std::move(mcap)), name_(std::move(name)) {}

@@ -26,8 +26,9 @@ constexpr std::chrono::nanoseconds kChunkTime{McapWriter::kChunkNs};
 constexpr int kMaxSameNames = 100;
 
 // What is there already stays: the next name is taken.
-tl::expected<std::pair<OutputFile, std::string>, std::string> create(const std::filesystem::path& directory,
-                                                                     const std::string& scene) {
+using Created = tl::expected<std::pair<OutputFile, std::string>, std::string>;
+
+Created createAnew(const std::filesystem::path& directory, const std::string& scene) {
   const std::string stem = fmt::format("{}-{:%Y%m%dT%H%M%SZ}", scene, fmt::gmtime(std::time(nullptr)));
   for (int i = 1;; ++i) {
     const std::string path =
@@ -39,11 +40,50 @@ tl::expected<std::pair<OutputFile, std::string>, std::string> create(const std::
   }
 }
 
+// The error does not name the directory: it is for whoever asked.
+Created createNamed(const std::filesystem::path& directory, const std::string& name) {
+  const std::string path = (directory / (name + ".mcap")).string();
+  auto file = OutputFile::create(path);
+  if (file) return std::pair(std::move(*file), path);
+  std::error_code none;
+  if (!std::filesystem::exists(path, none))
+    return tl::unexpected(fmt::format("{}.mcap cannot be made on the server", name));
+  return tl::unexpected(fmt::format("there is a recording {}.mcap already; choose another name", name));
+}
+
 }  // namespace
 
+tl::expected<std::shared_ptr<Recorder>, std::string> Recorder::create(RecorderOptions options,
+                                                                      const std::string& scene,
+                                                                      const std::string& name) {
+  Created created =
+      name.empty() ? createAnew(options.directory, scene) : createNamed(options.directory, name);
+  if (!created) {
+    spdlog::warn("{}: not recorded: {}", scene, created.error());
+    return tl::unexpected(name.empty() ? std::string("no file can be made on the server") : created.error());
+  }
+  auto recorder = std::make_shared<Recorder>(std::move(options));
+  recorder->file_ = std::make_unique<OutputFile>(std::move(created->first));
+  recorder->path_ = std::move(created->second);
+  return recorder;
+}
+
 Recorder::~Recorder() {
-  end();
+  finish();
+}
+
+Recorder::State Recorder::finish() {
+  {
+    const std::lock_guard lock(beginning_);
+    end();
+  }
   if (thread_.joinable()) thread_.join();
+  const std::lock_guard lock(mutex_);
+  if (std::exchange(file_, nullptr)) {
+    std::error_code none;
+    std::filesystem::remove(path_, none);
+  }
+  return state_;
 }
 
 std::string Recorder::path() const {
@@ -52,13 +92,17 @@ std::string Recorder::path() const {
 }
 
 void Recorder::begin(const vulkan::DeviceInfo& device, const scene::Scene& scene,
-                     const v1::StreamDescription& description, const simulation::StateSnapshot& state) {
+                     const v1::StreamDescription& description, const simulation::StateSnapshot& state,
+                     const simulation::StateSnapshot& start) {
+  const std::lock_guard lock(beginning_);
+  if (ended_) return;
   state_ = State::running;
   put(Topic::description, description);
   v1::RecordedScene recorded;
   *recorded.mutable_scene() = messages::toMessage(scene);
   put(Topic::scene, recorded);
   saved(state, false);
+  if (&start != &state) put(start, false, true);
   thread_ =
       std::thread([this, name = scene.name,
                    facts = factsOf(options_.serverName, device, scene, description)] { run(name, facts); });
@@ -66,12 +110,20 @@ void Recorder::begin(const vulkan::DeviceInfo& device, const scene::Scene& scene
 
 void Recorder::ticked(const stream::AppliedTick& tick) {
   if (!active()) return;
-  write(tick, tick_);
+  stream::AppliedTick told = tick;
+  told.clothsChanged |= std::exchange(tellsCloths_, false);
+  write(told, tick_);
   put(Topic::ticks, tick_);
 }
 
 void Recorder::saved(const simulation::StateSnapshot& state, bool gripsHold) {
+  put(state, gripsHold, false);
+  tellsCloths_ = true;
+}
+
+void Recorder::put(const simulation::StateSnapshot& state, bool gripsHold, bool start) {
   v1::Checkpoint checkpoint;
+  checkpoint.set_start(start);
   checkpoint.set_tick(state.tick);
   checkpoint.set_state(state.bytes.data(), state.bytes.size());
   checkpoint.set_grips_hold(gripsHold);
@@ -139,26 +191,32 @@ void Recorder::push(std::variant<Own, stream::SharedBytes> what, std::size_t byt
 }
 
 void Recorder::run(const std::string& sceneName, const Facts& facts) {
-  auto created = create(options_.directory, sceneName);
-  if (!created) return fail(created.error());
-  OutputFile file = std::move(created->first);
+  std::unique_ptr<OutputFile> file;
   {
+    const std::lock_guard lock(mutex_);
+    file = std::move(file_);
+  }
+  if (!file) {
+    Created created = createAnew(options_.directory, sceneName);
+    if (!created) return fail(created.error());
+    file = std::make_unique<OutputFile>(std::move(created->first));
     const std::lock_guard lock(mutex_);
     path_ = created->second;
   }
-  spdlog::info("{}: recorded to {}", sceneName, created->second);
-  auto writer = RecordingWriter::begin([&](std::string_view bytes) { return file.write(bytes); },
+  const std::string path = this->path();
+  spdlog::info("{}: recorded to {}", sceneName, path);
+  auto writer = RecordingWriter::begin([&](std::string_view bytes) { return file->write(bytes); },
                                        options_.serverName, facts);
   if (!writer) return fail(writer.error());
   const auto written = writeAll(*writer);
   // Also after an error that is not the disk's: what there is is then whole.
-  const auto finished = writer->finish().and_then([&] { return file.sync(); });
+  const auto finished = writer->finish().and_then([&] { return file->sync(); });
   bytes_ = writer->bytes();
   if (!finished)
     return fail(fmt::format("{}; what there is of it can be read after `clothstream recover {} OUT`",
-                            finished.error(), created->second));
-  if (!written) return fail(fmt::format("{}; {} ends there", written.error(), created->second));
-  spdlog::info("{}: the recording {} is complete, {:.1f} MiB", sceneName, created->second,
+                            finished.error(), path));
+  if (!written) return fail(fmt::format("{}; {} ends there", written.error(), path));
+  spdlog::info("{}: the recording {} is complete, {:.1f} MiB", sceneName, path,
                static_cast<double>(writer->bytes()) / (1 << 20));
   state_ = State::complete;
 }

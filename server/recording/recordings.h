@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The recordings of a server: one for each scene that ran.
+// The recordings of a server: of each scene while it runs, or when somebody asks.
 #pragma once
 
 #include <memory>
@@ -7,26 +7,28 @@
 #include <string>
 #include <vector>
 
-#include "server/recording/recorder.h"
+#include "server/recording/scene_journal.h"
 
 namespace clothstream::recording {
 
 // Thread-safe. Ends them all, and waits until they are on the disk.
 class Recordings {
  public:
-  // Makes the directory where there is none. Throws std::runtime_error with the reason where nothing can be
-  // written there.
-  explicit Recordings(RecorderOptions options);
+  // `always`: each scene is recorded from when it begins to run; else when somebody asks. Makes the directory
+  // where there is none. Throws std::runtime_error with the reason where nothing can be written there.
+  Recordings(RecorderOptions options, bool always);
 
-  std::shared_ptr<stream::Journal> add();
+  // Of the scene of this name.
+  std::shared_ptr<stream::Journal> add(const std::string& scene);
 
   // For people: how many run, are complete, and failed, and their bytes.
   std::string report() const;
 
  private:
   const RecorderOptions options_;
+  const bool always_;
   mutable std::mutex mutex_;
-  std::vector<std::shared_ptr<Recorder>> recorders_;
+  std::vector<std::shared_ptr<SceneJournal>> journals_;
 };
 
 }  // namespace clothstream::recording

@@ -53,6 +53,9 @@ class Replay {
   Done take(const v1::RecordedScene& message);
   Done take(v1::Checkpoint& message);
   Done take(const v1::RecordedTick& message);
+  // Something before the next message cannot be read: it goes on from the next state in which no grip holds,
+  // for which nodes one has is not in it.
+  void lose(std::string reason);
 
  private:
   template <typename Record>
@@ -70,10 +73,17 @@ class Replay {
   scene::Scene scene_;
   simulation::StateSnapshot start_;
   std::uint64_t tick_ = 0;
+  bool lost_ = false;   // until a state from which it can go on
+  bool keeps_ = false;  // the device has a state that a rollback goes back to
   std::unique_ptr<vulkan::Device> device_;
   std::unique_ptr<vulkan::Recorder> recorder_;
   std::unique_ptr<simulation::ClothSimulation> simulation_;
 };
+
+void Replay::lose(std::string reason) {
+  if (!lost_) result_.missing.push_back({.after = tick_, .until = {}, .reason = std::move(reason)});
+  lost_ = true;
+}
 
 Done Replay::take(const v1::RecordedScene& message) {
   messages::Result<scene::Scene> scene = messages::toScene(message.scene());
@@ -91,13 +101,25 @@ Done Replay::take(v1::Checkpoint& message) {
                   scene_.nodeCount());
   const auto state = std::as_bytes(std::span(message.state()));
   simulation::StateSnapshot snapshot{message.tick(), {state.begin(), state.end()}};
-  if (!started()) {
+  if (message.start()) {
+    start_ = snapshot;
+  } else if (!started()) {
+    if (std::exchange(lost_, false)) result_.missing.back().until = message.tick();
     start_ = snapshot;
     tick_ = message.tick();
     device_ = std::make_unique<vulkan::Device>(options_.device(scene_.nodeCount()));
     recorder_ = std::make_unique<vulkan::Recorder>(*device_);
     result_.device = fmt::format("{} ({})", device_->info().name, device_->info().driver);
     makeSimulation(snapshot);
+    keeps_ = tick_ == 0;
+  } else if (lost_ && !message.grips_hold()) {
+    lost_ = false;
+    tick_ = message.tick();
+    result_.missing.back().until = tick_;
+    makeSimulation(snapshot);
+    keeps_ = message.restored();
+  } else if (lost_) {
+    return {};
   } else if (message.restored()) {
     makeSimulation(snapshot);
   } else if (result_.firstDifferent) {
@@ -108,14 +130,25 @@ Done Replay::take(v1::Checkpoint& message) {
 }
 
 void Replay::makeSimulation(const simulation::StateSnapshot& state) {
+  // Made anew, it goes back to its start, as the scene's host does.
+  keeps_ = true;
   simulation_.reset();
   simulation_ = std::make_unique<simulation::ClothSimulation>(*device_, scene_);
   submit([&] { simulation_->recordRestoreState(*recorder_, state); });
 }
 
 Done Replay::take(const v1::RecordedTick& message) {
+  if (lost_) return {};
   if (!started()) return broken("it has a tick before its first state");
-  if (message.tick() != tick_ + 1) return broken("after tick {} comes tick {}", tick_, message.tick());
+  if (message.tick() != tick_ + 1) {
+    lose(fmt::format("after tick {} comes tick {}", tick_, message.tick()));
+    return {};
+  }
+  if (message.recovery() == v1::RECOVERY_ROLLBACK && !keeps_) {
+    lose("it went back to a state that is not in the recording");
+    return {};
+  }
+  keeps_ |= message.keeps_state();
   const auto inputs = toInputs(message, scene_);
   if (!inputs) return tl::unexpected(inputs.error());
   if (message.cloths_size() > 0) {
@@ -139,7 +172,12 @@ void Replay::compare(const v1::RecordedTick& message, const simulation::TickStat
   ++result_.ticks;
   // Numbers that are none need not be the same ones.
   const bool bothUnhealthy = message.unhealthy() && !status.healthy;
-  if (bothUnhealthy || (!message.unhealthy() && status.stateHash == message.state_hash())) return;
+  const bool same = bothUnhealthy || (!message.unhealthy() && status.stateHash == message.state_hash());
+  if (options_.states) {
+    submit([&] { simulation_->recordSaveState(*recorder_); });
+    options_.states(message.tick(), same, simulation::unpack(simulation_->collectState(message.tick())));
+  }
+  if (same) return;
   ++result_.different;
   if (result_.firstDifferent) return;
   result_.firstDifferent = message.tick();
@@ -153,7 +191,11 @@ Done replay(RecordingReader& reader, const ResimulateOptions& options, Resimulat
   const auto length = static_cast<double>(reader.end() - reader.start());
   for (;;) {
     const auto message = reader.next();
-    if (!message) return tl::unexpected(message.error());
+    if (!message) {
+      reader.passChunk();
+      replay.lose(message.error());
+      continue;
+    }
     if (!*message) break;
     const std::string_view bytes = (*message)->bytes;
     Done done;
@@ -174,6 +216,7 @@ Done replay(RecordingReader& reader, const ResimulateOptions& options, Resimulat
     }
     if (!done) return done;
   }
+  if (!replay.started() && !result.missing.empty()) return broken("{}", result.missing.front().reason);
   if (!replay.started())
     return broken(
         "it holds no simulation: only recordings that a server made do (clothstream-server --record)");
@@ -201,7 +244,12 @@ std::string toText(const Resimulation& result) {
   for (const Difference& difference : result.differences)
     text += fmt::format("tick {}: nodes are {:.3g} m from where they were at most, {:.3g} m in the mean\n",
                         difference.tick, difference.largest, difference.mean);
-  if (!result.firstDifferent) return text + fmt::format("{}, all the same to the bit\n", ticks);
+  for (const Missing& missing : result.missing)
+    text += fmt::format("after tick {} it is missing{}: {}\n", missing.after,
+                        missing.until ? fmt::format(" until tick {}", *missing.until) : " to the end",
+                        missing.reason);
+  const char* all = result.missing.empty() ? "all" : "all that there is";
+  if (!result.firstDifferent) return text + fmt::format("{}, {} the same to the bit\n", ticks, all);
   if (result.differences.empty())
     text += "no state was recorded after the first difference to measure it by\n";
   return text +

@@ -11,6 +11,7 @@
 #include <tl/expected.hpp>
 
 #include "server/scene/scene.h"
+#include "server/simulation/state_snapshot.h"
 #include "server/vulkan/device.h"
 
 namespace clothstream::recording {
@@ -21,10 +22,18 @@ struct Difference {
   double largest = 0, mean = 0;
 };
 
+// What could not be simulated again.
+struct Missing {
+  std::uint64_t after = 0;             // tick
+  std::optional<std::uint64_t> until;  // tick of the state from which it went on; nothing: there was none
+  std::string reason;
+};
+
 struct Resimulation {
   std::uint64_t ticks = 0;      // simulated again
   std::uint64_t different = 0;  // of these, with another state than recorded
   bool interrupted = false;
+  std::vector<Missing> missing;
   // Of the first that is different.
   std::optional<std::uint64_t> firstDifferent;
   std::uint64_t hash = 0, recordedHash = 0;
@@ -41,6 +50,8 @@ struct ResimulateOptions {
   std::function<bool()> interrupted;
   // Told after every tick: how much of the recording is done, from 0 to 1. May be empty.
   std::function<void(double)> progress;
+  // Told after every tick: whether the state is what it was, and the state. May be empty.
+  std::function<void(std::uint64_t tick, bool same, const simulation::NodeState& state)> states{};
 };
 
 // The error says what is wrong with the file. Throws what the device throws.

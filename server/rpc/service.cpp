@@ -59,6 +59,22 @@ grpc::ServerUnaryReactor* Service::ControlScene(grpc::CallbackServerContext* con
   return reactor;
 }
 
+grpc::ServerUnaryReactor* Service::StartRecording(grpc::CallbackServerContext* context,
+                                                  const v1::StartRecordingRequest* request,
+                                                  v1::StartRecordingResponse* response) {
+  grpc::ServerUnaryReactor* const reactor = context->DefaultReactor();
+  server_.startRecording(*request, [=](auto answer) { finish(reactor, response, std::move(answer)); });
+  return reactor;
+}
+
+grpc::ServerUnaryReactor* Service::StopRecording(grpc::CallbackServerContext* context,
+                                                 const v1::StopRecordingRequest* request,
+                                                 v1::StopRecordingResponse* response) {
+  grpc::ServerUnaryReactor* const reactor = context->DefaultReactor();
+  server_.stopRecording(*request, [=](auto answer) { finish(reactor, response, std::move(answer)); });
+  return reactor;
+}
+
 grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>* Service::Join(
     grpc::CallbackServerContext* context) {
   return streams_.open(*context);

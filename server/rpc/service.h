@@ -10,10 +10,12 @@
 namespace clothstream::rpc {
 
 // Join is raw: its messages are already serialised, once for all who get them.
-using ServiceBase = v1::ClothStream::WithRawCallbackMethod_Join<
-    v1::ClothStream::WithCallbackMethod_ListScenes<v1::ClothStream::WithCallbackMethod_GetScene<
-        v1::ClothStream::WithCallbackMethod_CreateScene<v1::ClothStream::WithCallbackMethod_DeleteScene<
-            v1::ClothStream::WithCallbackMethod_ControlScene<v1::ClothStream::Service>>>>>>;
+using ServiceBase =
+    v1::ClothStream::WithRawCallbackMethod_Join<v1::ClothStream::WithCallbackMethod_ListScenes<
+        v1::ClothStream::WithCallbackMethod_GetScene<v1::ClothStream::WithCallbackMethod_CreateScene<
+            v1::ClothStream::WithCallbackMethod_DeleteScene<v1::ClothStream::WithCallbackMethod_ControlScene<
+                v1::ClothStream::WithCallbackMethod_StartRecording<
+                    v1::ClothStream::WithCallbackMethod_StopRecording<v1::ClothStream::Service>>>>>>>>;
 
 class Service final : public ServiceBase {
  public:
@@ -33,6 +35,12 @@ class Service final : public ServiceBase {
   grpc::ServerUnaryReactor* ControlScene(grpc::CallbackServerContext* context,
                                          const v1::ControlSceneRequest* request,
                                          v1::ControlSceneResponse* response) override;
+  grpc::ServerUnaryReactor* StartRecording(grpc::CallbackServerContext* context,
+                                           const v1::StartRecordingRequest* request,
+                                           v1::StartRecordingResponse* response) override;
+  grpc::ServerUnaryReactor* StopRecording(grpc::CallbackServerContext* context,
+                                          const v1::StopRecordingRequest* request,
+                                          v1::StopRecordingResponse* response) override;
   grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>* Join(
       grpc::CallbackServerContext* context) override;
 

@@ -72,7 +72,7 @@ std::future<void> DeviceThread::post(std::function<void()> task) {
 
 std::future<void> DeviceThread::add(std::shared_ptr<LiveScene> scene) {
   return post([this, scene = std::move(scene)] {
-    if (!device_) throw std::runtime_error("there is no device at present");
+    if (!device_) throw std::runtime_error("there is no device");
     auto run = std::make_unique<Run>(scene);
     makeHost(*run);
     runs_.push_back(std::move(run));
@@ -98,10 +98,12 @@ void DeviceThread::runTasks() {
 
 void DeviceThread::run(const std::vector<std::shared_ptr<LiveScene>>& scenes, std::promise<void>& ready) {
   try {
-    device_ = std::make_unique<vulkan::Device>(options_);
-    for (const auto& scene : scenes) runs_.push_back(std::make_unique<Run>(scene));
-    makeHost(*runs_.front());
-    info_ = device_->info();
+    if (!scenes.empty()) {
+      device_ = std::make_unique<vulkan::Device>(options_);
+      for (const auto& scene : scenes) runs_.push_back(std::make_unique<Run>(scene));
+      makeHost(*runs_.front());
+      info_ = device_->info();
+    }
   } catch (...) {
     runs_.clear();
     device_.reset();

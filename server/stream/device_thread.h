@@ -29,7 +29,8 @@ namespace clothstream::stream {
 // second until it succeeds.
 class DeviceThread {
  public:
-  // Device and first scene are ready when it returns. All arguments outlive it. Throws what the device or the
+  // Device and first scene are ready when it returns; without scenes there is no device, and none can be
+  // added. All arguments outlive it. Throws what the device or the
   // first scene throws.
   DeviceThread(const vulkan::DeviceOptions& device, const std::vector<std::shared_ptr<LiveScene>>& scenes,
                FramePacker& packer, telemetry::ServerMetrics& metrics, bool runAlways, double reportRate);

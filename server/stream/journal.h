@@ -6,6 +6,7 @@
 #include <string>
 
 #include "clothstream/v1/session.pb.h"
+#include "server/messages/field_error.h"
 #include "server/scene/scene.h"
 #include "server/simulation/cloth_simulation.h"
 #include "server/stream/collider_set.h"
@@ -36,11 +37,18 @@ class Journal {
 
   // Whether it goes on: then no frame is to be far from a key frame. Any thread.
   virtual bool active() const = 0;
+  // Whether begin() is to be called before the next tick. Any thread.
+  virtual bool due() const = 0;
+  // Somebody asks for a recording under this name (empty: any), or that it ends; gives its file's name. Not
+  // of the device's thread, for it may wait for a disk. Where nobody can ask, both say so.
+  [[nodiscard]] virtual messages::Result<std::string> start(const std::string& name);
+  [[nodiscard]] virtual messages::Result<v1::StopRecordingResponse> stop();
 
-  // The device's thread. Once, before the first tick: the scene as it starts, what describes its stream, and
-  // its state.
+  // The device's thread. When it is due: the scene as it is before the next tick, what describes its stream,
+  // its state, and the state that a reset goes back to.
   virtual void begin(const vulkan::DeviceInfo& device, const scene::Scene& scene,
-                     const v1::StreamDescription& description, const simulation::StateSnapshot& state) = 0;
+                     const v1::StreamDescription& description, const simulation::StateSnapshot& state,
+                     const simulation::StateSnapshot& start) = 0;
   virtual void ticked(const AppliedTick& tick) = 0;
   // The state after the tick that was told last. `gripsHold`: some grip holds cloth, and the device alone
   // knows which.
@@ -56,5 +64,23 @@ class Journal {
                       const std::string& displayName) = 0;
   virtual void left(std::uint64_t participant) = 0;
 };
+
+// Why a scene that nothing keeps a journal of is not recorded.
+inline messages::FieldError recordsNothing() {
+  return {v1::ERROR_CODE_INVALID_ARGUMENT,
+          "startRecording: this server writes no recordings for who asks: it was not told where to "
+          "(clothstream-server --recordings DIR)"};
+}
+inline messages::Result<std::string> Journal::start(const std::string&) {
+  return tl::unexpected(recordsNothing());
+}
+inline messages::Result<v1::StopRecordingResponse> Journal::stop() {
+  return tl::unexpected(recordsNothing());
+}
+
+// Tells that a scene is recorded.
+inline SharedBytes recordedNotice(std::uint64_t tick) {
+  return notice(v1::NOTICE_KIND_RECORDING_STARTED, "the scene is being recorded", tick);
+}
 
 }  // namespace clothstream::stream

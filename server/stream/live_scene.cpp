@@ -42,6 +42,14 @@ v1::ParameterChange allParameters(const scene::Scene& scene) {
   return change;
 }
 
+scene::Scene nameAndRates(std::string name, const v1::StreamDescription& description) {
+  scene::Scene scene;
+  scene.name = std::move(name);
+  scene.simulationRate = description.simulation_rate();
+  scene.streamRate = description.stream_rate();
+  return scene;
+}
+
 }  // namespace
 
 LiveScene::LiveScene(scene::Scene definition, bool wasCreated, std::shared_ptr<Journal> kept)
@@ -52,12 +60,26 @@ LiveScene::LiveScene(scene::Scene definition, bool wasCreated, std::shared_ptr<J
       start_(std::move(definition)),
       definition_(start_) {}
 
+LiveScene::LiveScene(std::string name, std::shared_ptr<FrameSource> from)
+    : created(false),
+      source(std::move(from)),
+      start_(nameAndRates(std::move(name), source->description())),
+      definition_(start_) {}
+
+LiveScene::~LiveScene() {
+  if (source) source->end();
+}
+
 scene::Scene LiveScene::definition() const {
   const std::lock_guard lock(mutex_);
   return definition_;
 }
 
 messages::Result<void> LiveScene::change(std::uint64_t participant, const v1::ParameterChange& message) {
+  if (source)
+    return tl::unexpected(messages::FieldError{
+        v1::ERROR_CODE_INVALID_ARGUMENT,
+        "parameter_change: '" + name() + "' is a recording that is played: what it shows cannot be changed"});
   const std::lock_guard lock(mutex_);
   messages::Result<scene::ParameterChange> change = messages::toParameterChange(message, definition_);
   if (!change) return tl::unexpected(std::move(change).error());
@@ -77,7 +99,7 @@ messages::Result<void> LiveScene::change(std::uint64_t participant, const v1::Pa
 }
 
 std::uint32_t LiveScene::codec() const {
-  return encode::streamLayout(start_, kEpoch).codec;
+  return source ? source->description().codec() : encode::streamLayout(start_, kEpoch).codec;
 }
 
 v1::ParameterChange LiveScene::resetParameters() {
@@ -101,7 +123,9 @@ std::shared_ptr<const Description> LiveScene::description() {
   const std::lock_guard lock(mutex_);
   if (description_) return description_;
   const double seconds = static_cast<double>(tick.load()) * definition_.tickSeconds();
-  const v1::StreamDescription message = messages::toDescription(definition_, kEpoch, codec(), seconds);
+  v1::StreamDescription message =
+      source ? source->description() : messages::toDescription(definition_, kEpoch, codec(), seconds);
+  message.set_scene(name());
 
   auto description = std::make_shared<Description>();
   description->contentId = ++contents_;

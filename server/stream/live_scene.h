@@ -12,6 +12,7 @@
 #include "server/messages/field_error.h"
 #include "server/scene/scene.h"
 #include "server/stream/audience.h"
+#include "server/stream/frame_source.h"
 #include "server/stream/inbox.h"
 #include "server/stream/journal.h"
 #include "server/stream/roster.h"
@@ -26,6 +27,10 @@ class LiveScene {
   // null.
   explicit LiveScene(scene::Scene definition, bool created = false,
                      std::shared_ptr<Journal> journal = nullptr);
+  // One that is not simulated: the source is yet to begin. Its start() and definition() hold name and rates
+  // alone.
+  LiveScene(std::string name, std::shared_ptr<FrameSource> source);
+  ~LiveScene();
 
   const std::string& name() const { return start_.name; }
   // As it was at first.
@@ -51,9 +56,10 @@ class LiveScene {
   static constexpr std::uint32_t kEpoch = 1;
 
   const bool created;
-  const std::shared_ptr<Journal> journal;  // null: none is kept
-  std::atomic<bool> paused{false};         // its clock is stopped
-  std::atomic<bool> resetWanted{false};    // taken at the next tick
+  const std::shared_ptr<Journal> journal;     // null: none is kept
+  const std::shared_ptr<FrameSource> source;  // null: the device's thread
+  std::atomic<bool> paused{false};            // its clock is stopped
+  std::atomic<bool> resetWanted{false};       // taken at the next tick
 
   Inbox inbox;
   Audience audience;

@@ -26,6 +26,8 @@ const char* nameOf(Act act) {
       return "controlScene";
     case Act::deleteScene:
       return "deleteScene";
+    case Act::recordScene:
+      return "startRecording, stopRecording";
     case Act::setRole:
       return "setRole";
     case Act::removeParticipant:
@@ -53,6 +55,7 @@ v1::Role roleFor(Act act, const Permissions& participants) {
       return changed(participants.colliders);
     case Act::controlScene:
     case Act::deleteScene:
+    case Act::recordScene:
     case Act::setRole:
     case Act::removeParticipant:
       return v1::ROLE_OWNER;

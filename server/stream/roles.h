@@ -18,6 +18,7 @@ enum class Act : std::uint8_t {
   changeColliders,  // the scene's
   controlScene,
   deleteScene,
+  recordScene,
   setRole,
   removeParticipant,
 };

@@ -70,9 +70,10 @@ SceneHost::SceneHost(vulkan::Device& device, LiveScene& scene, FramePacker& pack
       gentleUntil_(scene_.cloths.size(), 0),
       onDevice_(std::make_unique<OnDevice>(device, scene_, packer.workers())) {
   newestState_ = onDevice_->start;
-  if (live_.journal)
+  if (live_.journal && live_.journal->due())
     live_.journal->begin(device.info(), scene_,
-                         messages::toDescription(scene_, LiveScene::kEpoch, live_.codec(), 0), newestState_);
+                         messages::toDescription(scene_, LiveScene::kEpoch, live_.codec(), 0),
+                         onDevice_->start, onDevice_->start);
 }
 
 SceneHost::~SceneHost() {
@@ -81,6 +82,7 @@ SceneHost::~SceneHost() {
 
 void SceneHost::begin(Clock::time_point now) {
   tickStart_ = now;
+  beginJournal();
   if (live_.resetWanted.exchange(false)) reset();
   endGentleness();
   applyInputs();
@@ -93,7 +95,8 @@ void SceneHost::begin(Clock::time_point now) {
   OnDevice& on = *onDevice_;
   on.recorder.begin();
   recordRecovery();
-  keepsState_ = sinceHealthy_ > 0 && every(kCheckpointSeconds);
+  // A rollback goes back to no state from before a recording.
+  keepsState_ = sinceHealthy_ > 0 && (journalBegan_ || every(kCheckpointSeconds));
   if (keepsState_) on.simulation.recordCheckpoint(on.recorder);
   on.simulation.recordTick(on.recorder, tickInputs_);
   hasFrame_ = (tick_ + 1) % ticksAFrame_ == 0;
@@ -101,6 +104,33 @@ void SceneHost::begin(Clock::time_point now) {
   savesState_ = sinceHealthy_ > 0 && every(kSnapshotSeconds);
   if (savesState_) on.simulation.recordSaveState(on.recorder);
   submitted_ = on.device.submit(on.recorder);
+}
+
+void SceneHost::beginJournal() {
+  journalBegan_ = false;
+  if (!live_.journal || !live_.journal->due() || recovery_ != Recovery::none || sinceHealthy_ == 0) return;
+  OnDevice& on = *onDevice_;
+  on.recorder.begin();
+  on.simulation.recordSaveState(on.recorder);
+  on.device.wait(on.device.submit(on.recorder));
+  // Frames of ticks before are none of it.
+  packer_.drain();
+  // Which nodes grips hold is not part of a state.
+  if (holds_.holds()) holds_.takeAnew();
+  const double seconds = static_cast<double>(tick_) * scene_.tickSeconds();
+  live_.journal->begin(on.device.info(), scene_,
+                       messages::toDescription(scene_, LiveScene::kEpoch, live_.codec(), seconds),
+                       on.simulation.collectState(tick_), on.start);
+  journalBegan_ = true;
+  sinceKeyFrame_ = kFramesAKeyFrame;
+}
+
+void SceneHost::watchJournal() {
+  if (!live_.journal || live_.journal->active() == recorded_) return;
+  recorded_ = !recorded_;
+  live_.audience.announce(
+      recorded_ ? recordedNotice(tick_)
+                : notice(v1::NOTICE_KIND_RECORDING_STOPPED, "the scene is not recorded any more", tick_));
 }
 
 void SceneHost::reset() {
@@ -264,6 +294,7 @@ void SceneHost::finish() {
     packer_.push(frame_);
   }
   announceEvents();
+  watchJournal();
   if (!status_.healthy) recover();
 
   metrics.ticks.add();

@@ -75,6 +75,11 @@ class SceneHost {
   };
   // The cloths go back to where they start.
   void reset();
+  // Where a journal is due, and the state can be told: it has the state before the next tick. Throws
+  // vulkan::DeviceLost.
+  void beginJournal();
+  // Tells everybody when the scene begins and ends to be recorded.
+  void watchJournal();
   void applyInputs();
   // False, and nothing changed, where the device has no room for what the change asks for: `problem` says
   // why.
@@ -112,6 +117,8 @@ class SceneHost {
   Recovery recovery_ = Recovery::none;         // before the next tick
   Recovery recovered_ = Recovery::none;        // before the tick in hand
   bool keepsState_ = false;                    // the tick in hand, on the device
+  bool journalBegan_ = false;                  // before the tick in hand
+  bool recorded_ = false;                      // and told so
   bool clothsChanged_ = false;                 // since the newest complete tick
   std::optional<std::uint64_t> lastRecovery_;  // tick
   std::uint64_t sinceHealthy_ = 0;             // healthy ticks since the start or the last recovery

@@ -52,6 +52,38 @@ void SceneMaker::remove(v1::DeleteSceneRequest request, DeleteDone done) {
       thread_, [this, request = std::move(request), done = std::move(done)] { done(removeNow(request)); });
 }
 
+tl::expected<std::shared_ptr<Journal>, v1::Error> SceneMaker::journalOf(const std::string& name) const {
+  const std::shared_ptr<LiveScene> scene = server_.find(name);
+  if (!scene) return tl::unexpected(server_.noSuchScene(name));
+  if (scene->source)
+    return refused(v1::ERROR_CODE_INVALID_ARGUMENT,
+                   fmt::format("startRecording: '{}' is a recording that is played", scene->name()));
+  if (!scene->journal) return refused(recordsNothing().code, recordsNothing().text);
+  return scene->journal;
+}
+
+void SceneMaker::startRecording(v1::StartRecordingRequest request, StartRecordingDone done) {
+  boost::asio::post(thread_, [this, request = std::move(request), done = std::move(done)] {
+    const auto journal = journalOf(request.scene());
+    if (!journal) return done(tl::unexpected(journal.error()));
+    auto file = (*journal)->start(request.name());
+    if (!file) return done(refused(file.error().code, std::move(file.error().text)));
+    v1::StartRecordingResponse response;
+    response.set_file(std::move(*file));
+    done(std::move(response));
+  });
+}
+
+void SceneMaker::stopRecording(v1::StopRecordingRequest request, StopRecordingDone done) {
+  boost::asio::post(thread_, [this, request = std::move(request), done = std::move(done)] {
+    const auto journal = journalOf(request.scene());
+    if (!journal) return done(tl::unexpected(journal.error()));
+    auto stopped = (*journal)->stop();
+    if (!stopped) return done(refused(stopped.error().code, std::move(stopped.error().text)));
+    done(std::move(*stopped));
+  });
+}
+
 tl::expected<scene::Scene, v1::Error> SceneMaker::definitionOf(const v1::CreateSceneRequest& request,
                                                                const std::string& uploaded) const {
   switch (request.source_case()) {

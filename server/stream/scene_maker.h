@@ -26,12 +26,18 @@ class SceneMaker {
   // `uploaded`: what `request` names as uploaded, if it does.
   void create(v1::CreateSceneRequest request, std::string uploaded, CreateDone done);
   void remove(v1::DeleteSceneRequest request, DeleteDone done);
+  // Both wait for the disk.
+  void startRecording(v1::StartRecordingRequest request, StartRecordingDone done);
+  void stopRecording(v1::StopRecordingRequest request, StopRecordingDone done);
 
  private:
   tl::expected<v1::CreateSceneResponse, v1::Error> make(const v1::CreateSceneRequest& request,
                                                         const std::string& uploaded);
   tl::expected<scene::Scene, v1::Error> definitionOf(const v1::CreateSceneRequest& request,
                                                      const std::string& uploaded) const;
+  // The journal of the scene. All that is asked of recordings goes through here: who may ask is to be checked
+  // in it.
+  tl::expected<std::shared_ptr<Journal>, v1::Error> journalOf(const std::string& scene) const;
   tl::expected<v1::DeleteSceneResponse, v1::Error> removeNow(const v1::DeleteSceneRequest& request);
 
   SceneServer::State& server_;

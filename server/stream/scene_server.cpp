@@ -38,18 +38,44 @@ v1::Error toMessage(const messages::FieldError& error) {
   return message;
 }
 
+// Participants of a recording and those who watch it are told apart by their numbers.
+constexpr std::uint64_t kViewers = std::uint64_t{1} << 32;
+
 SharedBytes stoppingNotice() {
   return notice(v1::NOTICE_KIND_SERVER_STOPPING, "the server stops", 0);
+}
+
+messages::Result<void> controlSource(LiveScene& scene, const v1::ControlSceneRequest& request) {
+  if (scene.source) return scene.source->control(request);
+  const char* what = request.has_seek()    ? "seek"
+                     : request.has_speed() ? "speed"
+                     : request.has_loop()  ? "loop"
+                                           : nullptr;
+  if (what == nullptr) return {};
+  return tl::unexpected(messages::FieldError{
+      v1::ERROR_CODE_INVALID_ARGUMENT,
+      fmt::format("controlScene.{}: only a recording that is played has it; '{}' is simulated", what,
+                  scene.name())});
 }
 
 }  // namespace
 
 v1::SceneSummary summaryOf(const LiveScene& scene) {
   v1::SceneSummary summary = messages::toSummary(scene.start());
+  if (scene.source) {
+    const v1::StreamDescription& played = scene.source->description();
+    std::uint32_t vertices = 0;
+    for (const v1::ClothDescription& cloth : played.cloths()) vertices += cloth.vertex_count();
+    summary.set_vertex_count(vertices);
+    summary.set_cloth_count(static_cast<std::uint32_t>(played.cloths_size()));
+    summary.set_description(played.definition().description());
+    *summary.mutable_playback() = scene.source->playback();
+  }
   summary.set_participants(static_cast<std::uint32_t>(scene.audience.size()));
   summary.set_running(scene.running);
   summary.set_paused(scene.paused);
   summary.set_created(scene.created);
+  summary.set_recorded(scene.journal && scene.journal->active());
   return summary;
 }
 
@@ -67,6 +93,24 @@ SceneServer::State::State(std::vector<scene::Scene> definitions, ServerOptions o
                  : encode::EncoderThreads::suitedTo(std::thread::hardware_concurrency())),
       device(options.device, scenes, packer, metrics, options.runAlways, options.reportRate),
       maker(*this) {}
+
+SceneServer::State::State(std::shared_ptr<LiveScene> played, ServerOptions options_)
+    : State(std::vector<scene::Scene>{}, std::move(options_)) {
+  participants = kViewers;
+  played->source->begin(*played);
+  insert(std::move(played));
+}
+
+std::string SceneServer::State::deviceNameOf(const LiveScene& scene) const {
+  return scene.source ? scene.source->deviceName() : device.info().name;
+}
+
+void SceneServer::State::wake(const LiveScene& scene) {
+  if (scene.source)
+    scene.source->wake();
+  else
+    device.wake();
+}
 
 std::shared_ptr<LiveScene> SceneServer::State::find(const std::string& name) const {
   for (const auto& scene : scenesNow())
@@ -141,7 +185,8 @@ tl::expected<v1::GetSceneResponse, v1::Error> SceneServer::State::getScene(
   const std::shared_ptr<LiveScene> scene = find(request.name());
   if (!scene) return tl::unexpected(noSuchScene(request.name()));
   v1::GetSceneResponse response;
-  *response.mutable_scene() = messages::toMessage(scene->definition());
+  *response.mutable_scene() =
+      scene->source ? scene->source->description().definition() : messages::toMessage(scene->definition());
   return response;
 }
 
@@ -157,6 +202,8 @@ tl::expected<v1::ControlSceneResponse, v1::Error> SceneServer::State::controlSce
     const v1::ControlSceneRequest& request, std::uint64_t participant) {
   const std::shared_ptr<LiveScene> scene = find(request.name());
   if (!scene) return tl::unexpected(noSuchScene(request.name()));
+  if (const auto controlled = controlSource(*scene, request); !controlled)
+    return tl::unexpected(toMessage(controlled.error()));
   if (request.has_paused() && scene->paused.exchange(request.paused()) != request.paused())
     scene->audience.announce(request.paused() ? pausedNotice(*scene, participant)
                                               : notice(v1::NOTICE_KIND_SCENE_RESUMED, "the scene goes on",
@@ -166,7 +213,7 @@ tl::expected<v1::ControlSceneResponse, v1::Error> SceneServer::State::controlSce
     scene->audience.announce(
         notice(v1::NOTICE_KIND_SCENE_RESET, "the scene begins anew", scene->tick.load(), participant));
   }
-  device.wake();
+  wake(*scene);
   v1::ControlSceneResponse response;
   *response.mutable_scene() = summaryOf(*scene);
   return response;
@@ -189,6 +236,12 @@ SceneServer::SceneServer(std::vector<scene::Scene> scenes, ServerOptions options
   std::ranges::stable_partition(
       scenes, [&](const scene::Scene& scene) { return scene.name == options.defaultScene; });
   state_ = std::make_unique<State>(std::move(scenes), std::move(options));
+}
+
+SceneServer::SceneServer(std::string name, std::shared_ptr<FrameSource> source, ServerOptions options) {
+  options.defaultScene = name;
+  state_ = std::make_unique<State>(std::make_shared<LiveScene>(std::move(name), std::move(source)),
+                                   std::move(options));
 }
 
 SceneServer::~SceneServer() {
@@ -220,6 +273,18 @@ void SceneServer::deleteScene(const v1::DeleteSceneRequest& request, DeleteDone 
   state_->maker.remove(request, std::move(done));
 }
 
+void SceneServer::startRecording(const v1::StartRecordingRequest& request, StartRecordingDone done) {
+  if (const auto may = state_->mayFromOutside(request.scene(), Act::recordScene); !may)
+    return done(tl::unexpected(toMessage(may.error())));
+  state_->maker.startRecording(request, std::move(done));
+}
+
+void SceneServer::stopRecording(const v1::StopRecordingRequest& request, StopRecordingDone done) {
+  if (const auto may = state_->mayFromOutside(request.scene(), Act::recordScene); !may)
+    return done(tl::unexpected(toMessage(may.error())));
+  state_->maker.stopRecording(request, std::move(done));
+}
+
 tl::expected<v1::ControlSceneResponse, v1::Error> SceneServer::controlScene(
     const v1::ControlSceneRequest& request) {
   if (const auto may = state_->mayFromOutside(request.name(), Act::controlScene); !may)
@@ -242,7 +307,8 @@ const std::string& SceneServer::defaultScene() const {
 std::string SceneServer::report() const {
   std::string text;
   for (const auto& scene : state_->scenesNow())
-    if (scene->metrics.ticks.value() > 0) text += telemetry::table(scene->name(), scene->metrics);
+    if (scene->metrics.ticks.value() + scene->metrics.frames.value() > 0)
+      text += telemetry::table(scene->name(), scene->metrics);
   return text + telemetry::table(state_->metrics);
 }
 

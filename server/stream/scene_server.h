@@ -19,6 +19,7 @@
 
 namespace clothstream::stream {
 
+class FrameSource;
 class Journal;
 
 struct ServerOptions {
@@ -54,6 +55,8 @@ struct ServerOptions {
 
 // Called once, on any thread; must only pass the word on.
 using CreateDone = std::function<void(tl::expected<v1::CreateSceneResponse, v1::Error>)>;
+using StartRecordingDone = std::function<void(tl::expected<v1::StartRecordingResponse, v1::Error>)>;
+using StopRecordingDone = std::function<void(tl::expected<v1::StopRecordingResponse, v1::Error>)>;
 using DeleteDone = std::function<void(tl::expected<v1::DeleteSceneResponse, v1::Error>)>;
 
 // Thread-safe. Three threads of its own: one owns the device and runs every scene's ticks, one makes packets
@@ -64,6 +67,8 @@ class SceneServer {
   // std::runtime_error where the device has no room for the default scene or it is not among them (naming
   // those there are).
   SceneServer(std::vector<scene::Scene> scenes, ServerOptions options);
+  // Of one scene that is not simulated here, the default one; needs no device, and can make no others.
+  SceneServer(std::string name, std::shared_ptr<FrameSource> source, ServerOptions options);
   // Stops. Every Connection must be gone.
   ~SceneServer();
   SceneServer(const SceneServer&) = delete;
@@ -75,6 +80,8 @@ class SceneServer {
   // Outside a stream nothing can have been uploaded.
   void createScene(const v1::CreateSceneRequest& request, CreateDone done);
   void deleteScene(const v1::DeleteSceneRequest& request, DeleteDone done);
+  void startRecording(const v1::StartRecordingRequest& request, StartRecordingDone done);
+  void stopRecording(const v1::StopRecordingRequest& request, StopRecordingDone done);
   tl::expected<v1::ControlSceneResponse, v1::Error> controlScene(const v1::ControlSceneRequest& request);
 
   // Tells everybody that the server stops, and finishes every connection, now and from here on.

@@ -27,6 +27,7 @@ v1::SceneSummary summaryOf(const LiveScene& scene);
 // Thread-safe. Members are declared in the order in which they need each other.
 struct SceneServer::State {
   State(std::vector<scene::Scene> definitions, ServerOptions options);
+  State(std::shared_ptr<LiveScene> played, ServerOptions options);
 
   // nullptr if there is none of that name; an empty one is the default scene's.
   std::shared_ptr<LiveScene> find(const std::string& name) const;
@@ -39,8 +40,13 @@ struct SceneServer::State {
   // nullptr, or the last word to a peer that is not let in: there are too many, or the server stops.
   SharedBytes add(const std::shared_ptr<Session>& session);
   std::vector<std::shared_ptr<Session>> sessionsNow() const;
+  // What the scene's frames are, or were, simulated on.
+  std::string deviceNameOf(const LiveScene& scene) const;
+  // Whoever makes its frames looks at the scene anew.
+  void wake(const LiveScene& scene);
   v1::ListScenesResponse listScenes() const;
   tl::expected<v1::GetSceneResponse, v1::Error> getScene(const v1::GetSceneRequest& request) const;
+  // All that is asked of a scene's clock goes through here.
   // `participant`: who asks; 0: somebody who is not in the scene.
   tl::expected<v1::ControlSceneResponse, v1::Error> controlScene(const v1::ControlSceneRequest& request,
                                                                  std::uint64_t participant);

@@ -101,6 +101,18 @@ void Session::dispatch(const v1::ClientMessage& message, Clock::time_point now) 
       *reply.mutable_control_scene() = std::move(*controlled);
       return answer(reply);
     }
+    case Body::kStartRecording:
+      if (!allowed(controlRate_, "requests about scenes")) return;
+      if (!actor(message.start_recording().scene(), Act::recordScene)) return;
+      return server_.maker.startRecording(
+          message.start_recording(),
+          answering<v1::StartRecordingResponse>(&v1::ServerMessage::mutable_start_recording));
+    case Body::kStopRecording:
+      if (!allowed(controlRate_, "requests about scenes")) return;
+      if (!actor(message.stop_recording().scene(), Act::recordScene)) return;
+      return server_.maker.stopRecording(
+          message.stop_recording(),
+          answering<v1::StopRecordingResponse>(&v1::ServerMessage::mutable_stop_recording));
     default:
       break;
   }
@@ -177,7 +189,7 @@ void Session::hello(const v1::Hello& message) {
   welcome.set_scene(scene->name());
   welcome.set_participant_id(participant_);
   welcome.set_server_name(server_.options.serverName);
-  welcome.set_device_name(server_.device.info().name);
+  welcome.set_device_name(server_.deviceNameOf(*scene));
   welcome.set_description_content_id(description->contentId);
   welcome.set_role(admission->role);
   welcome.set_resume_token(admission->token);
@@ -189,7 +201,11 @@ void Session::hello(const v1::Hello& message) {
   mailbox_->subscribe(known ? nullptr : description, scene->start().streamRate, scene->metrics);
   if (scene->paused && !mailbox_->announce(pausedNotice(*scene)))
     return closeLocked(tooSlow(), Parting::lost);
-  server_.device.wake();
+  if (scene->source && !mailbox_->announce(playbackMessage(*scene->source)))
+    return closeLocked(tooSlow(), Parting::lost);
+  if (scene->journal && scene->journal->active() && !mailbox_->announce(recordedNotice(scene->tick)))
+    return closeLocked(tooSlow(), Parting::lost);
+  server_.wake(*scene);
   spdlog::info("{}: {} {} as participant {}, {} ({}); {} in it", scene->name(), peer_,
                admission->resumed ? "came back" : "joined", participant_, nameOf(admission->role),
                joining->clientName.empty() ? "unnamed client" : joining->clientName, scene->audience.size());
@@ -212,6 +228,7 @@ void Session::create(const v1::CreateSceneRequest& request) {
 }
 
 void Session::poses(const v1::ColliderPoses& message, Clock::time_point now) {
+  if (scene_->source) return;  // nothing in it can be touched
   auto poses = messages::toPoses(message, scene_->start());
   if (!poses) return refuse(poses.error());
   refuseUnless(
@@ -310,7 +327,7 @@ void Session::part(Parting how) {
   else
     scene_->roster.leave(*mailbox_, how == Parting::left ? v1::LEAVE_REASON_LEFT : v1::LEAVE_REASON_REMOVED,
                          now_);
-  server_.device.wake();
+  server_.wake(*scene_);
   spdlog::info("{}: {} {}; {} in it", scene_->name(), peer_, how == Parting::lost ? "was cut off" : "left",
                scene_->audience.size());
   scene_ = nullptr;

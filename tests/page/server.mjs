@@ -10,9 +10,9 @@ const kStartMs = 60_000;
 for (const signal of ["SIGINT", "SIGTERM"]) process.once(signal, () => process.exit(1));
 
 // Starts the program named by CLOTHSTREAM_SERVER; resolves once it has said where its page is. `port` 0: any.
-export async function startServer(port = 0) {
+export async function startServer(port = 0, more = ["--scene", "curtain"]) {
   const program = process.env.CLOTHSTREAM_SERVER;
-  const options = ["--scene", "curtain", "--port", String(port), "--grpc-port", "0"];
+  const options = ["--port", String(port), "--grpc-port", "0", ...more];
   const child = spawn(program, options, { stdio: ["ignore", "pipe", "pipe"] });
   // Whatever ends the test, the server does not outlive it.
   process.once("exit", () => child.kill("SIGKILL"));

@@ -25,6 +25,17 @@ try {
 
   const bytes = readFileSync(glb);
   const gltf = await new GLTFLoader().parseAsync(bytes.buffer.slice(bytes.byteOffset, bytes.byteOffset + bytes.length), "");
+
+  // As text it is the same: its JSON but for where the numbers are, and the numbers.
+  const text = join(directory, "out.gltf");
+  execFileSync(clothstream, ["export", recording, text, "--rate", `${rate}`]);
+  const { buffers, ...embedded } = JSON.parse(readFileSync(text, "utf8"));
+  const jsonBytes = bytes.readUInt32LE(12);
+  const { buffers: binary, ...json } = JSON.parse(bytes.toString("utf8", 20, 20 + jsonBytes));
+  assert.deepEqual(embedded, json);
+  assert.equal(buffers[0].byteLength, binary[0].byteLength);
+  const numbers = Buffer.from(buffers[0].uri.replace("data:application/octet-stream;base64,", ""), "base64");
+  assert.ok(numbers.equals(bytes.subarray(28 + jsonBytes, 28 + jsonBytes + binary[0].byteLength)));
   const meshes = [];
   gltf.scene.traverse((object) => object.isMesh && meshes.push(object));
   assert.ok(meshes.length > 0);

@@ -13,6 +13,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "proto/recording/recording_writer.h"
 #include "tests/e2e/process.h"
 #include "tests/e2e/temporary_directory.h"
 #include "tests/recording/sample.h"
@@ -179,6 +180,92 @@ TEST_F(RecordingPrograms, RecoverSaysWhatIsLost) {
   EXPECT_TRUE(reader->check().has_value());
   EXPECT_EQ(countMessages(*reader, Topic::frames), 138u);  // a fifth of a second is missing
   EXPECT_EQ(clothstream({"recover", path, out}).code, 6);  // it is there already
+}
+
+TEST_F(RecordingPrograms, WhatOthersWroteDoesNotSteerATerminal) {
+  const std::string path = pathOf("foreign.mcap");
+  std::string bytes;
+  auto writer = RecordingWriter::begin(
+      [&](std::string_view more) {
+        bytes += more;
+        return Written();
+      },
+      "test",
+      {{"scene",
+        "a\x1b[2J\xc2\x9b"
+        "1mb"},
+       {"device", "Gerät"}});
+  ASSERT_TRUE(writer && writer->finish());
+  std::ofstream(path, std::ios::binary) << bytes;
+  const Ended info = clothstream({"info", "--quick", path});
+  EXPECT_THAT(info.output, HasSubstr("scene     a\\x1b[2J\\x9b1mb, "));
+  EXPECT_THAT(info.output, HasSubstr("Gerät"));
+}
+
+// Without a device, for what is played is not simulated.
+TEST_F(RecordingPrograms, ARecordingIsPlayedToClients) {
+  const std::string path = pathOf("sample.mcap"), again = pathOf("again.mcap");
+  std::ofstream(path, std::ios::binary) << sampleRecording(150);
+  server_ = std::make_unique<Process>(std::vector<std::string>{
+      "/usr/bin/env", "VK_ICD_FILENAMES=/none", "VK_DRIVER_FILES=/none", CLOTHSTREAM_SERVER, "--port", "0",
+      "--grpc-port", "0", "play", path, "--loop", "--from", "1"});
+  const auto line = server_->waitForLine("gRPC ", kPatience);
+  ASSERT_TRUE(line) << server_->errors();
+  address_ = line->substr(line->find_first_not_of(' '));
+  EXPECT_THAT(server_->output(), HasSubstr("2.5 s of sample, recorded on none"));
+
+  const Ended recorded = clothstream({"record", "-o", again, "--server", address_, "--seconds", "4"});
+  EXPECT_EQ(recorded.code, 0) << recorded.errors;
+  const Ended info = clothstream({"info", again});
+  EXPECT_EQ(info.code, 0) << info.output;
+  EXPECT_THAT(info.output, HasSubstr("; 0 not what the server held"));
+
+  const auto control = [&](std::vector<std::string> command) {
+    command.insert(command.end(), {"--server", address_});
+    return clothstream(command);
+  };
+  EXPECT_EQ(control({"pause", "sample"}).code, 0);
+  EXPECT_THAT(control({"seek", "sample", "0.5"}).output,
+              HasSubstr(" s of 2.48 s, speed 1, in a loop, paused"));
+  EXPECT_THAT(control({"speed", "sample", "2"}).output, HasSubstr("speed 2"));
+  EXPECT_THAT(control({"loop", "sample", "off"}).output, ::testing::Not(HasSubstr("in a loop")));
+  EXPECT_EQ(control({"resume", "sample"}).code, 0);
+  const Ended refused = control({"seek", "sample", "3"});
+  EXPECT_EQ(refused.code, 4);
+  EXPECT_THAT(refused.errors, HasSubstr("seek = 3: must be 0 to 2.483"));
+  EXPECT_THAT(clothstream({"set", address_, "--wind", "1,0,0"}).errors,
+              HasSubstr("a recording that is played"));
+  EXPECT_THAT(control({"create", "--named", "flag"}).errors, HasSubstr("there is no device"));
+  EXPECT_THAT(control({"start-recording", "sample"}).errors, HasSubstr("is a recording that is played"));
+  server_->signal(SIGTERM);
+  EXPECT_EQ(server_->waitForEnd(kPatience), 0);
+}
+
+TEST_F(RecordingPrograms, ClientsAskForRecordings) {
+  startServer({"--always-run", "--recordings", pathOf("recordings")});
+  if (IsSkipped() || HasFatalFailure()) return;
+  const auto ask = [&](std::vector<std::string> command) {
+    command.insert(command.end(), {"--server", address_});
+    return clothstream(command);
+  };
+  const Ended started = ask({"start-recording", "small", "--name", "mine"});
+  EXPECT_EQ(started.code, 0) << started.errors;
+  EXPECT_EQ(started.output, "mine.mcap\n");
+  EXPECT_THAT(ask({"start-recording", "small"}).errors, HasSubstr("is recorded already, to mine.mcap"));
+  EXPECT_THAT(ask({"start-recording", "small", "--name", "../mine"}).errors,
+              HasSubstr("must be 1 to 64 characters"));
+  EXPECT_THAT(ask({"start-recording", "none"}).errors, HasSubstr("there is no scene 'none'"));
+  EXPECT_EQ(clothstream({"join", address_, "--seconds", "1"}).code, 0);
+  const Ended stopped = ask({"stop-recording", "small"});
+  EXPECT_EQ(stopped.code, 0) << stopped.errors;
+  EXPECT_THAT(stopped.output, HasSubstr("mine.mcap: "));
+  EXPECT_THAT(ask({"start-recording", "small", "--name", "mine"}).errors,
+              HasSubstr("already; choose another name"));
+  const Ended again = run({CLOTHSTREAM_SERVER, "resimulate", serversRecording()});
+  EXPECT_EQ(again.code, 0) << again.output << again.errors;
+
+  startServer();
+  EXPECT_THAT(ask({"start-recording", "small"}).errors, HasSubstr("clothstream-server --recordings DIR"));
 }
 
 TEST_F(RecordingPrograms, FilesThatAreNoRecordingsAreRefused) {

@@ -251,7 +251,8 @@ TEST_F(RecorderTest, BytesThatAreNoTickOfTheSceneAreRefused) {
                                     .device = [](std::uint32_t) { return vulkan::DeviceOptions{}; },
                                     .interrupted = [] { return false; },
                                     .progress = {}});
-    return result ? std::string("none") : result.error();
+    if (!result) return result.error();
+    return result->missing.empty() ? std::string("none") : result->missing.front().reason;
   };
   EXPECT_THAT(errorWith("missing", [](v1::RecordedTick& tick) { tick.set_tick(4); }),
               HasSubstr("after tick 2 comes tick 4"));
@@ -273,6 +274,51 @@ TEST_F(RecorderTest, BytesThatAreNoTickOfTheSceneAreRefused) {
                           tick.add_cloths();
                         }),
               HasSubstr("tick 3: it has 2 cloths, and the scene 1"));
+}
+
+TEST_F(RecorderTest, AfterALostChunkItGoesOnFromTheNextState) {
+  RecordedScene recorded(options());
+  recorded.ticks(100);
+  // In what is going to be lost: the state after it does not tell of it.
+  scene::ParameterChange change;
+  change.cloths.push_back({.damping = 2.0f});
+  recorded.change(change);
+  recorded.ticks(150);
+  auto reader = RecordingReader::open(recorded.finish());
+  ASSERT_TRUE(reader.has_value());
+  std::string bytes;
+  {
+    auto writer = RecordingWriter::begin(
+        [&](std::string_view more) {
+          bytes += more;
+          return Written();
+        },
+        "test", reader->facts());
+    ASSERT_TRUE(writer.has_value());
+    std::uint64_t ticks = 0;
+    for (auto message = reader->next(); *message; message = reader->next()) {
+      if ((*message)->topic == Topic::ticks) ++ticks;
+      ASSERT_TRUE(writer->write((*message)->topic, ticks * 25'000'000, (*message)->bytes));
+    }
+    ASSERT_TRUE(writer->finish());
+  }
+  auto whole = McapReader::open(std::make_unique<MemorySource>(bytes));
+  ASSERT_TRUE(whole.has_value());
+  const ChunkPlace lost = whole->chunks()[whole->chunkAt(std::uint64_t{102} * 25'000'000)];
+  bytes[lost.offset + lost.length / 2] ^= 4;
+  const std::string path = (directory_.path() / "damaged.mcap").string();
+  {
+    auto file = OutputFile::create(path);
+    ASSERT_TRUE(file && file->write(bytes));
+  }
+  const Resimulation result = again(path);
+  ASSERT_EQ(result.missing.size(), 1u);
+  EXPECT_EQ(result.missing[0].after, lost.start / 25'000'000 - 1);
+  EXPECT_EQ(result.missing[0].until, 201u);
+  EXPECT_THAT(result.missing[0].reason, HasSubstr("checksum does not match"));
+  EXPECT_EQ(result.ticks, result.missing[0].after + 250 - 201);
+  EXPECT_EQ(result.different, 0u);
+  EXPECT_THAT(toText(result), HasSubstr("it is missing until tick 201"));
 }
 
 // As long as it lives, no file of this program grows beyond the limit.
@@ -347,10 +393,10 @@ TEST_F(RecorderTest, NoRecordingTakesTheNameOfAnother) {
 
 TEST(Recordings, NeedADirectoryThatCanBeWrittenTo) {
   const e2e::TemporaryDirectory directory;
-  const Recordings made({.directory = directory.path() / "a" / "b", .serverName = "test"});
+  const Recordings made({.directory = directory.path() / "a" / "b", .serverName = "test"}, true);
   EXPECT_TRUE(std::filesystem::is_directory(directory.path() / "a" / "b"));
   EXPECT_THAT(made.report(), HasSubstr("running 0  complete 0  failed 0"));
-  EXPECT_THROW(Recordings({.directory = "/proc/none", .serverName = "test"}), std::runtime_error);
+  EXPECT_THROW(Recordings({.directory = "/proc/none", .serverName = "test"}, true), std::runtime_error);
 }
 
 }  // namespace

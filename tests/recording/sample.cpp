@@ -24,7 +24,13 @@ void must(const Written& written) {
   if (!written) throw std::runtime_error(written.error());
 }
 
-v1::StreamDescription describe() {
+}  // namespace
+
+const codec::StreamLayout& sampleLayout() {
+  return kLayout;
+}
+
+v1::StreamDescription sampleDescription() {
   v1::StreamDescription description;
   description.set_epoch(kLayout.epoch);
   description.set_codec(kLayout.codec);
@@ -42,12 +48,10 @@ v1::StreamDescription describe() {
   return description;
 }
 
-}  // namespace
-
 void writeSample(const Sink& sink, std::uint32_t frames) {
   auto writer = RecordingWriter::begin(sink, "sample", {{"scene", "sample"}, {"device", "none"}});
   if (!writer) throw std::runtime_error(writer.error());
-  must(writer->write(Topic::description, sampleTime(0), describe().SerializeAsString()));
+  must(writer->write(Topic::description, sampleTime(0), sampleDescription().SerializeAsString()));
   const auto encoder = codec::Encoder::make(kLayout);
   std::vector<std::byte> packet(encoder->packetBound());
   v1::ServerMessage message;

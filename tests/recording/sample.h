@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <string>
 
+#include "proto/codec/stream_layout.h"
 #include "proto/recording/mcap_writer.h"
 #include "proto/recording/recording_reader.h"
 
@@ -16,6 +17,10 @@ inline constexpr std::uint32_t kSampleRate = 60;                          // fra
 constexpr std::uint64_t sampleTime(std::uint64_t frame) {
   return kSampleStart + frame * 1'000'000'000 / kSampleRate;
 }
+
+// Of its stream.
+const codec::StreamLayout& sampleLayout();
+v1::StreamDescription sampleDescription();
 
 // Of so many frames, with ticks beside them. As its sink got it.
 void writeSample(const Sink& sink, std::uint32_t frames);

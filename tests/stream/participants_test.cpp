@@ -106,7 +106,7 @@ TEST_F(ParticipantsTest, WhatARoleMayNotDoIsRefusedAndChangesNothing) {
     v1::ClientMessage message;
     const char* role;  // that it takes
   };
-  std::vector<Asked> asked(8);
+  std::vector<Asked> asked(10);
   asked[0] = {"colliderPoses.colliders", {}, "participant"};
   v1::ParticipantCollider& hand = *asked[0].message.mutable_collider_poses()->add_colliders();
   hand.mutable_sphere()->set_radius(0.1f);
@@ -125,6 +125,10 @@ TEST_F(ParticipantsTest, WhatARoleMayNotDoIsRefusedAndChangesNothing) {
   asked[6].message.mutable_set_role()->set_role(v1::ROLE_VIEWER);
   asked[7] = {"removeParticipant", {}, "owner"};
   asked[7].message.mutable_remove_participant()->set_participant_id(owner.welcome().participant_id());
+  asked[8] = {"startRecording", {}, "owner"};
+  asked[8].message.mutable_start_recording();
+  asked[9] = {"stopRecording", {}, "owner"};
+  asked[9].message.mutable_stop_recording();
   for (const Asked& tried : asked)
     for (TestPeer* peer : {&viewer, &participant}) {
       if (peer == &participant && std::string(tried.role) == "participant") continue;

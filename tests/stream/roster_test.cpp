@@ -40,6 +40,7 @@ TEST(Roles, EveryActTakesItsRole) {
       {Act::changeColliders, v1::ROLE_PARTICIPANT, v1::ROLE_OWNER},
       {Act::controlScene, v1::ROLE_OWNER, v1::ROLE_OWNER},
       {Act::deleteScene, v1::ROLE_OWNER, v1::ROLE_OWNER},
+      {Act::recordScene, v1::ROLE_OWNER, v1::ROLE_OWNER},
       {Act::setRole, v1::ROLE_OWNER, v1::ROLE_OWNER},
       {Act::removeParticipant, v1::ROLE_OWNER, v1::ROLE_OWNER},
   };

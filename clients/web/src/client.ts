@@ -141,6 +141,15 @@ export interface ClothReport {
   tick: number;
 }
 
+// Where a recording that is played stands.
+export interface Playback {
+  length: number; // s
+  position: number; // s from its start, now
+  speed: number;
+  loop: boolean;
+  paused: boolean;
+}
+
 // Sizes of the structs of core.h on a 32-bit machine.
 const kStatisticsBytes = 104;
 const kClothBytes = 28;
@@ -489,6 +498,33 @@ export class Client {
     this.core.with([collider, change.position, radius], (name, position, size) =>
       this.core.exports.cs_set_collider(this.handle, name!, position!, size!),
     );
+  }
+
+  // Undefined unless the scene is a recording.
+  playback(): Playback | undefined {
+    if (this.core.exports.cs_get_playback(this.handle, nowUs(), this.scratch) === 0) return undefined;
+    const view = this.core.view();
+    return {
+      length: view.getFloat64(this.scratch, true),
+      position: view.getFloat64(this.scratch + 8, true),
+      speed: view.getFloat64(this.scratch + 16, true),
+      loop: view.getInt32(this.scratch + 24, true) !== 0,
+      paused: view.getInt32(this.scratch + 28, true) !== 0,
+    };
+  }
+
+  // For everybody in the scene, all four.
+  pause(paused: boolean): void {
+    this.core.exports.cs_pause(this.handle, paused ? 1 : 0);
+  }
+  seek(seconds: number): void {
+    this.core.exports.cs_seek(this.handle, seconds);
+  }
+  setSpeed(speed: number): void {
+    this.core.exports.cs_set_speed(this.handle, speed);
+  }
+  setLoop(loop: boolean): void {
+    this.core.exports.cs_set_loop(this.handle, loop ? 1 : 0);
   }
 
   listScenes(): void {

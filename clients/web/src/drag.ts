@@ -13,6 +13,8 @@ export type DragTarget =
 type Held = { collider: string } | { grab: number };
 
 export class Drag {
+  // Whether anything can be taken.
+  enabled = true;
   private readonly raycaster = new THREE.Raycaster();
   private readonly plane = new THREE.Plane();
   private readonly grip = new THREE.Vector3();
@@ -58,7 +60,7 @@ export class Drag {
   // For keys: moves a collider in the camera-facing plane, metres.
   nudge(name: string, right: number, up: number): void {
     const collider = this.view.colliders.find((candidate) => candidate.name === name);
-    if (!collider || this.pointer !== undefined) return;
+    if (!this.enabled || !collider || this.pointer !== undefined) return;
     const isHeld = this.held && "collider" in this.held && this.held.collider === name;
     const from = isHeld && this.wanted ? this.wanted : collider.position;
     this.wanted = from.clone().add(this.view.inViewPlane(right, up));
@@ -115,6 +117,7 @@ export class Drag {
 
   // What lies foremost under the pointer and can be taken: a collider of the scene, or cloth.
   private pick(): { object: THREE.Object3D; point: THREE.Vector3; collider: string | undefined } | undefined {
+    if (!this.enabled) return undefined;
     const cloths = this.view.clothMeshes;
     const hit = this.raycaster
       .intersectObjects<THREE.Object3D>([...this.view.colliders, ...cloths], false)

@@ -7,6 +7,7 @@ import { Controls } from "./controls";
 import { Drag } from "./drag";
 import { element, Hud } from "./hud";
 import { listenToKeys } from "./keys";
+import { Player } from "./player";
 import { expose } from "./probe";
 import { Session } from "./session";
 import { View } from "./view";
@@ -39,6 +40,7 @@ async function start(): Promise<void> {
   const reports = new ClothReports();
   const drag = new Drag(view, (collider) => (controls.collider = collider));
   listenToKeys(view, drag, controls);
+  const player = new Player();
 
   const address = new URL("stream", window.location.href);
   address.protocol = address.protocol === "https:" ? "wss:" : "ws:";
@@ -86,6 +88,8 @@ async function start(): Promise<void> {
   let figuresAt = 0;
   function draw(now: number): void {
     const client = session.state.kind === "live" ? session.client : undefined;
+    player.draw(client);
+    drag.enabled = !player.plays;
     if (client) {
       controls.apply(client);
       reports.apply(client);

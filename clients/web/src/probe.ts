@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // `window.clothstream`: lets tests and the curious look inside; it changes nothing.
 
-import type { Client, ClothLayout, ClothReport, Collider, Participant, Statistics, Vec3 } from "./client";
+import type { Client, ClothLayout, ClothReport, Collider, Participant, Playback, Statistics, Vec3 } from "./client";
 import type { Session, SessionState } from "./session";
 import type { View } from "./view";
 
@@ -17,6 +17,8 @@ export interface Probe {
   readonly reports: (ClothReport | undefined)[];
   readonly colliders: Collider[];
   readonly participants: Participant[];
+  // Of a scene that is a recording.
+  readonly playback: Playback | undefined;
   readonly canvas: HTMLCanvasElement;
   // A point of the scene, in CSS pixels of the page.
   project(point: Vec3): [number, number];
@@ -61,6 +63,9 @@ export function expose(session: Session, view: View): { described(client: Client
     },
     get participants() {
       return session.client.participants();
+    },
+    get playback() {
+      return session.client?.playback();
     },
     canvas: view.canvas,
     project: (point) => view.project(point),

@@ -56,6 +56,11 @@ export interface CoreExports {
   cs_cloth_material(client: Pointer, cloth: number): Pointer;
   cs_set_cloth(client: Pointer, cloth: Pointer, structural2: Pointer, shear2: Pointer, bend2: Pointer, damping: Pointer): void;
   cs_set_collider(client: Pointer, collider: Pointer, position3: Pointer, radius: Pointer): void;
+  cs_get_playback(client: Pointer, nowUs: bigint, out: Pointer): number;
+  cs_pause(client: Pointer, paused: number): void;
+  cs_seek(client: Pointer, seconds: number): void;
+  cs_set_speed(client: Pointer, speed: number): void;
+  cs_set_loop(client: Pointer, loop: number): void;
   cs_list_scenes(client: Pointer): void;
   cs_scene_count(client: Pointer): number;
   cs_scene(client: Pointer, index: number): Pointer;

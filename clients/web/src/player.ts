@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: MIT
+// The timeline of a scene that is a recording: pause, seek, speed, loop, for everybody in it.
+
+import type { Client, Playback } from "./client";
+import { element, write } from "./hud";
+
+// While the hand moves the timeline; a server takes ten requests a second.
+const kSeekPeriodMs = 200;
+
+export class Player {
+  private readonly card = element("player");
+  private readonly pause = element<HTMLButtonElement>("player-pause");
+  private readonly timeline = element<HTMLInputElement>("player-position");
+  private readonly time = element("player-time");
+  private readonly speed = element<HTMLSelectElement>("player-speed");
+  private readonly loop = element<HTMLInputElement>("player-loop");
+  private client: Client | undefined;
+  private playback: Playback | undefined;
+  private seeks: number | undefined; // s, not sent yet
+  private soughtAt = -Infinity; // on performance.now()'s clock
+  private held = false;
+
+  constructor() {
+    this.pause.addEventListener("click", () => this.client?.pause(!this.playback?.paused));
+    this.timeline.addEventListener("input", () => {
+      this.held = true;
+      this.seeks = this.timeline.valueAsNumber;
+    });
+    this.timeline.addEventListener("change", () => {
+      this.held = false;
+      this.seek(this.timeline.valueAsNumber);
+    });
+    this.speed.addEventListener("change", () => this.client?.setSpeed(Number(this.speed.value)));
+    this.loop.addEventListener("change", () => this.client?.setLoop(this.loop.checked));
+  }
+
+  // Whether the scene is a recording.
+  get plays(): boolean {
+    return this.playback !== undefined;
+  }
+
+  // To be called once a drawn frame.
+  draw(client: Client | undefined): void {
+    this.client = client;
+    this.playback = client?.playback();
+    this.card.hidden = !this.playback;
+    document.body.toggleAttribute("data-recording", this.plays);
+    if (!this.playback) return;
+    if (this.seeks !== undefined && performance.now() - this.soughtAt >= kSeekPeriodMs) this.seek(this.seeks);
+    const { length, position, paused, loop, speed } = this.playback;
+    this.timeline.max = String(length);
+    if (!this.held) this.timeline.valueAsNumber = position;
+    const text = `${clock(this.timeline.valueAsNumber)} / ${clock(length)}`;
+    write(this.time, text);
+    if (this.timeline.getAttribute("aria-valuetext") !== text) this.timeline.setAttribute("aria-valuetext", text);
+    write(this.pause, paused ? "▶" : "❚❚");
+    this.pause.setAttribute("aria-label", paused ? "Play" : "Pause");
+    this.loop.checked = loop;
+    this.showSpeed(speed);
+  }
+
+  private seek(seconds: number): void {
+    this.seeks = undefined;
+    this.soughtAt = performance.now();
+    this.client?.seek(Math.min(seconds, this.playback?.length ?? 0));
+  }
+
+  // One that somebody else chose need not be in the list.
+  private showSpeed(speed: number): void {
+    const value = String(speed);
+    if (![...this.speed.options].some((option) => option.value === value)) this.speed.add(new Option(`× ${value}`, value));
+    this.speed.value = value;
+  }
+}
+
+// Such as 1:02.5
+function clock(seconds: number): string {
+  const tenths = Math.floor(10 * seconds);
+  const rest = ((tenths % 600) / 10).toFixed(1).padStart(4, "0");
+  return `${Math.floor(tenths / 600)}:${rest}`;
+}

@@ -1,0 +1,285 @@
+// SPDX-License-Identifier: MIT
+// A recording's frames when they are due.
+#include "server/recording/playback.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include "server/stream/live_scene.h"
+
+namespace clothstream::recording {
+namespace {
+
+using namespace std::chrono_literals;
+
+// How often it is asked whether somebody waits for a key frame while nothing flows.
+constexpr auto kLookAgain = 20ms;
+constexpr auto kTellPeriod = 1s;
+// What it is behind more than this, it does not catch up.
+constexpr auto kMaxLateness = 250ms;
+// Messages of one step, so that it hears of what is wanted meanwhile.
+constexpr int kMaxMessages = 256;
+// Recorded ticks beyond this begin anew: there is room for all that can follow.
+constexpr std::uint64_t kMaxFirstTick = std::uint64_t{1} << 62;
+
+messages::FieldError wrong(std::string text) {
+  return {v1::ERROR_CODE_INVALID_ARGUMENT, "controlScene." + std::move(text)};
+}
+
+}  // namespace
+
+Playback::Playback(RecordedStream recording, const PlaybackOptions& options)
+    : position_(options.from),
+      speed_(options.speed),
+      loop_(options.loop),
+      recording_(std::move(recording)),
+      ticksAFrame_(std::max(1u, description().simulation_rate() / description().stream_rate())) {}
+
+Playback::~Playback() {
+  end();
+}
+
+void Playback::begin(stream::LiveScene& scene) {
+  thread_ = std::thread([this, &scene] { run(scene); });
+}
+
+void Playback::end() {
+  {
+    const std::lock_guard lock(mutex_);
+    stopping_ = true;
+  }
+  changed_.notify_all();
+  if (thread_.joinable()) thread_.join();
+}
+
+void Playback::wake() {
+  {
+    const std::lock_guard lock(mutex_);
+    woken_ = true;
+  }
+  changed_.notify_all();
+}
+
+void Playback::run(stream::LiveScene& scene) {
+  for (;;) {
+    const std::optional<Clock::time_point> next = step(scene, Clock::now());
+    std::unique_lock lock(mutex_);
+    const auto something = [&] { return woken_ || stopping_; };
+    if (next)
+      changed_.wait_until(lock, *next, something);
+    else
+      changed_.wait(lock, something);
+    if (stopping_) return;
+    woken_ = false;
+  }
+}
+
+messages::Result<void> Playback::control(const v1::ControlSceneRequest& request) {
+  Wanted wanted;
+  if (request.has_seek()) {
+    if (!(request.seek() >= 0 && request.seek() <= recording_.length()))
+      return tl::unexpected(
+          wrong(fmt::format("seek = {}: must be 0 to {:.3f}, the recording's length in seconds",
+                            request.seek(), recording_.length())));
+    wanted.seek = request.seek();
+  } else if (request.reset()) {
+    wanted.seek = 0;
+  }
+  if (request.has_speed()) {
+    if (!(request.speed() >= kMinSpeed && request.speed() <= kMaxSpeed))
+      return tl::unexpected(
+          wrong(fmt::format("speed = {}: must be {} to {}", request.speed(), kMinSpeed, kMaxSpeed)));
+    wanted.speed = request.speed();
+  }
+  if (request.has_loop()) wanted.loop = request.loop();
+  const std::lock_guard lock(mutex_);
+  if (wanted.seek) wanted_.seek = wanted.seek;
+  if (wanted.speed) wanted_.speed = wanted.speed;
+  if (wanted.loop) wanted_.loop = wanted.loop;
+  return {};
+}
+
+v1::Playback Playback::playback() const {
+  const std::lock_guard lock(mutex_);
+  v1::Playback playback;
+  playback.set_length(recording_.length());
+  playback.set_position(wanted_.seek.value_or(position_));
+  playback.set_speed(wanted_.speed.value_or(speed_));
+  playback.set_loop(wanted_.loop.value_or(loop_));
+  playback.set_paused(paused_);
+  return playback;
+}
+
+std::optional<Playback::Clock::time_point> Playback::step(stream::LiveScene& scene, Clock::time_point now) {
+  takeWanted(scene, now);
+  const bool here = scene.audience.size() > 0;
+  if (!here) asleep_ = true;
+  if (here && (asleep_ || paused_) && scene.audience.wantsKeyFrame()) {
+    jump(scene, position_, now);
+    asleep_ = false;
+  }
+  const bool flows = here && !asleep_ && !paused_;
+  scene.running = flows;
+  if (flows) flow(scene, now);
+  if (here && (tells_ || (flows && now >= nextTold_))) {
+    nextTold_ = now + kTellPeriod;
+    tell(scene);
+  }
+  if (!here) return std::nullopt;
+  if (asleep_ || paused_ || !next_) return now + kLookAgain;
+  return due(timeOf(*next_));
+}
+
+void Playback::takeWanted(stream::LiveScene& scene, Clock::time_point now) {
+  Wanted wanted;
+  {
+    const std::lock_guard lock(mutex_);
+    wanted = std::exchange(wanted_, {});
+    if (paused_ != scene.paused || wanted.speed) {
+      paused_ = scene.paused;
+      origin_ = now;
+      originPosition_ = position_;
+      tells_ = true;
+    }
+    speed_ = wanted.speed.value_or(speed_);
+    loop_ = wanted.loop.value_or(loop_);
+  }
+  if (atEnd_ && !paused_ && !wanted.seek) wanted.seek = 0;
+  if (wanted.loop) tells_ = true;
+  if (wanted.seek) jump(scene, *wanted.seek, now);
+}
+
+void Playback::jump(stream::LiveScene& scene, double seconds, Clock::time_point now) {
+  recording_.seek(seconds);
+  next_.reset();
+  atEnd_ = false;
+  tells_ = true;
+  moveTo(seconds);
+  for (;;) {
+    RecordedStream::Next next = recording_.next();
+    if (auto* told = std::get_if<RecordedStream::Told>(&next); told != nullptr && told->isFrame()) {
+      const bool begins = newest_ == 0 && told->header.tick <= kMaxFirstTick;
+      shift_ = begins ? 0 : newest_ + ticksAFrame_ - told->header.tick;
+      publishFrame(scene, *told);
+      break;
+    }
+    if (std::holds_alternative<RecordedStream::End>(next)) {
+      next_ = std::move(next);
+      break;
+    }
+    publish(scene, next);
+  }
+  origin_ = now;
+  originPosition_ = position_;
+}
+
+Playback::Clock::time_point Playback::due(double seconds) const {
+  const std::chrono::duration<double> after((seconds - originPosition_) / speed_);
+  return origin_ + std::chrono::duration_cast<Clock::duration>(after);
+}
+
+double Playback::timeOf(const RecordedStream::Next& next) const {
+  if (const auto* told = std::get_if<RecordedStream::Told>(&next)) return told->time;
+  if (const auto* lost = std::get_if<RecordedStream::Lost>(&next)) return lost->start;
+  return recording_.length() + 1.0 / recording_.description().stream_rate();
+}
+
+void Playback::flow(stream::LiveScene& scene, Clock::time_point now) {
+  for (int i = 0; i < kMaxMessages; ++i) {
+    if (!next_) next_ = recording_.next();
+    const Clock::time_point dueAt = due(timeOf(*next_));
+    if (dueAt > now) return;
+    if (now - dueAt > kMaxLateness) origin_ += now - dueAt - kMaxLateness;
+    if (std::holds_alternative<RecordedStream::End>(*next_)) return reachEnd(scene, now);
+    publish(scene, *next_);
+    next_.reset();
+  }
+  next_ = recording_.next();
+}
+
+void Playback::reachEnd(stream::LiveScene& scene, Clock::time_point now) {
+  if (loop_) return jump(scene, 0, now);
+  scene.paused = true;
+  atEnd_ = true;
+  tells_ = true;
+  moveTo(recording_.length());
+  {
+    const std::lock_guard lock(mutex_);
+    paused_ = true;
+  }
+  scene.audience.announce(
+      stream::notice(v1::NOTICE_KIND_SCENE_PAUSED, "the recording is at its end", newest_));
+}
+
+void Playback::publish(stream::LiveScene& scene, RecordedStream::Next& next) {
+  if (const auto* lost = std::get_if<RecordedStream::Lost>(&next)) {
+    const std::string text = fmt::format(
+        "the recording is damaged: {:.2f} s to {:.2f} s of it cannot be shown", lost->start, lost->end);
+    if (lossesLogged_.insert(lost->start).second)
+      spdlog::warn("{}: {}: {}", scene.name(), text, lost->reason);
+    scene.audience.announce(stream::notice(v1::NOTICE_KIND_RECORDING_DAMAGED, text, newest_));
+    return;
+  }
+  auto& told = std::get<RecordedStream::Told>(next);
+  if (told.isFrame()) {
+    // What refers to the frame before comes after it; a key frame of a file that others wrote may not.
+    const std::uint64_t tick = told.header.tick + shift_;
+    if (tick <= newest_ || tick - newest_ > kMaxTickStep) shift_ += newest_ + ticksAFrame_ - tick;
+    return publishFrame(scene, told);
+  }
+  if (told.message.has_parameter_changed())
+    told.message.mutable_parameter_changed()->set_tick(told.message.parameter_changed().tick() + shift_);
+  if (told.message.has_tick_events())
+    told.message.mutable_tick_events()->set_tick(told.message.tick_events().tick() + shift_);
+  if (told.message.has_notice())
+    told.message.mutable_notice()->set_tick(told.message.notice().tick() + shift_);
+  scene.audience.announce(stream::serialise(told.message));
+}
+
+void Playback::publishFrame(stream::LiveScene& scene, RecordedStream::Told& told) {
+  v1::Frame& frame = *told.message.mutable_frame();
+  codec::PacketHeader& header = told.header;
+  header.tick += shift_;
+  for (std::size_t i = 0; i < header.referenceCount; ++i) header.references[i] += shift_;
+  const auto parsed = codec::parsePacket(std::as_bytes(std::span(frame.packet())));
+  std::vector<std::byte> packet(codec::headerBound(header) + parsed->body.size());
+  const std::size_t headerBytes = codec::writeHeader(header, packet);
+  std::ranges::copy(parsed->body, packet.begin() + static_cast<std::ptrdiff_t>(headerBytes));
+  frame.mutable_packet()->assign(reinterpret_cast<const char*>(packet.data()),
+                                 headerBytes + parsed->body.size());
+  const Clock::time_point now = Clock::now();
+  frame.set_tick_time_us(stream::microseconds(now));
+  frame.set_packet_time_us(stream::microseconds(now));
+
+  stream::PublishedFrame published{.message = stream::serialise(told.message),
+                                   .tick = header.tick,
+                                   .key = header.kind == codec::PacketKind::key,
+                                   .referenceTick = header.references[0],
+                                   .complete = now};
+  newest_ = header.tick;
+  scene.tick = header.tick;
+  scene.metrics.frames.add();
+  if (published.key) scene.metrics.keyFrames.add();
+  scene.metrics.packetBytes.add(frame.packet().size());
+  moveTo(told.time);
+  scene.audience.publish(published);
+}
+
+void Playback::tell(stream::LiveScene& scene) {
+  tells_ = false;
+  scene.audience.announce(stream::playbackMessage(*this));
+}
+
+void Playback::moveTo(double seconds) {
+  const std::lock_guard lock(mutex_);
+  position_ = seconds;
+}
+
+}  // namespace clothstream::recording

@@ -1,0 +1,151 @@
+// SPDX-License-Identifier: MIT
+// A recording's stream in the order in which it is played.
+#include "server/recording/recorded_stream.h"
+
+#include <algorithm>
+#include <cmath>
+#include <span>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "server/messages/limits.h"
+
+namespace clothstream::recording {
+namespace {
+
+bool isName(const std::string& text) {
+  return !text.empty() && text.size() <= messages::limits::kMaxNameLength &&
+         std::ranges::all_of(text, [](char c) {
+           return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '_' || c == '-';
+         });
+}
+
+// Those of what happened in the scene; others are of the server that it was on.
+bool isOfScene(v1::NoticeKind kind) {
+  return kind == v1::NOTICE_KIND_ROLLED_BACK || kind == v1::NOTICE_KIND_DEVICE_REBUILT ||
+         kind == v1::NOTICE_KIND_RUNNING_SLOW || kind == v1::NOTICE_KIND_CHANGE_UNDONE ||
+         kind == v1::NOTICE_KIND_SCENE_RESET;
+}
+
+template <typename MessageType>
+bool parse(std::string_view bytes, MessageType* message) {
+  return message->ParseFromArray(bytes.data(), static_cast<int>(bytes.size()));
+}
+
+}  // namespace
+
+tl::expected<RecordedStream, std::string> RecordedStream::open(const std::string& path) {
+  auto reader = RecordingReader::open(path, CutFiles::read);
+  if (!reader) return tl::unexpected(reader.error());
+  auto stream = of(std::move(*reader));
+  if (!stream) return tl::unexpected(fmt::format("{} cannot be played: {}", path, stream.error()));
+  return stream;
+}
+
+tl::expected<RecordedStream, std::string> RecordedStream::of(RecordingReader reader) {
+  auto description = reader.description();
+  if (!description) return tl::unexpected(description.error());
+  const auto isRate = [](std::uint32_t rate) { return rate >= 1 && rate <= 1000; };
+  if (!isRate(description->simulation_rate()) || !isRate(description->stream_rate()))
+    return tl::unexpected(fmt::format("its rates of {} and {} a second are none that a stream has",
+                                      description->simulation_rate(), description->stream_rate()));
+  if (description->temporal_layers() > 1)
+    return tl::unexpected(fmt::format("its stream has {} temporal layers; those of one can be played",
+                                      description->temporal_layers()));
+  RecordedStream stream(std::move(reader));
+  stream.scene_ = isName(description->scene()) ? description->scene() : "recording";
+  stream.description_ = std::move(*description);
+  return stream;
+}
+
+double RecordedStream::secondsAt(std::uint64_t time) const {
+  return time <= reader_.start() ? 0 : static_cast<double>(time - reader_.start()) * 1e-9;
+}
+
+void RecordedStream::lose(double from, std::string reason) {
+  newest_.reset();
+  if (!lost_) lost_ = Lost{.start = from, .end = from, .reason = std::move(reason)};
+}
+
+RecordedStream::Next RecordedStream::next() {
+  while (!held_) {
+    const auto message = reader_.next();
+    if (!message) {
+      const ChunkPlace passed = reader_.passChunk();
+      lose(secondsAt(passed.start), message.error());
+      lost_->end = std::max(lost_->end, secondsAt(passed.end));
+      continue;
+    }
+    if (!*message) break;
+    held_ = told(**message);
+  }
+  // What was lost ends where a frame can be decoded again.
+  if (lost_ && (!held_ || held_->isFrame())) {
+    if (held_) lost_->end = held_->time;
+    return *std::exchange(lost_, std::nullopt);
+  }
+  if (!held_) return End{};
+  return *std::exchange(held_, std::nullopt);
+}
+
+void RecordedStream::seek(double seconds) {
+  const double ns = std::clamp(seconds, 0.0, length()) * 1e9;
+  std::uint64_t time = reader_.start() + static_cast<std::uint64_t>(std::llround(ns));
+  newest_.reset();
+  lost_.reset();
+  held_.reset();
+  sought_ = true;
+  // Past what cannot be read, back to what can.
+  while (!reader_.seek(time)) {
+    const ChunkPlace place = reader_.mcap().chunks()[reader_.mcap().chunkAt(time)];
+    if (place.start <= reader_.start()) return reader_.rewind();
+    time = place.start - 1;
+  }
+}
+
+std::optional<RecordedStream::Told> RecordedStream::told(const RecordedMessage& message) {
+  Told told{.time = secondsAt(message.time)};
+  switch (message.topic) {
+    case Topic::frames:
+      return frame(message);
+    case Topic::parameters:
+      if (parse(message.bytes, told.message.mutable_parameter_changed())) return told;
+      break;
+    case Topic::events:
+      if (parse(message.bytes, told.message.mutable_tick_events())) return told;
+      break;
+    case Topic::notices:
+      if (!parse(message.bytes, told.message.mutable_notice())) break;
+      if (isOfScene(told.message.notice().kind())) return told;
+      return std::nullopt;
+    default:
+      return std::nullopt;
+  }
+  lose(told.time, "a message in it cannot be read");
+  return std::nullopt;
+}
+
+std::optional<RecordedStream::Told> RecordedStream::frame(const RecordedMessage& message) {
+  Told told{.time = secondsAt(message.time)};
+  const auto refuse = [&](const char* reason) {
+    lose(told.time, reason);
+    return std::nullopt;
+  };
+  if (!parse(message.bytes, told.message.mutable_frame())) return refuse("a frame in it cannot be read");
+  const auto packet = codec::parsePacket(std::as_bytes(std::span(told.message.frame().packet())));
+  if (!packet || packet->header.epoch != description_.epoch() || packet->header.codec != description_.codec())
+    return refuse("a frame in it is none of its stream");
+  told.header = packet->header;
+  const bool key = told.header.kind == codec::PacketKind::key;
+  if (!key && (!newest_ || told.header.referenceCount != 1 || told.header.references[0] != *newest_ ||
+               told.header.tick - *newest_ > kMaxTickStep)) {
+    if (sought_ && !lost_) return std::nullopt;
+    return refuse("a frame that others refer to is not in it");
+  }
+  newest_ = told.header.tick;
+  sought_ = false;
+  return told;
+}
+
+}  // namespace clothstream::recording

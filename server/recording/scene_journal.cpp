@@ -1,0 +1,181 @@
+// SPDX-License-Identifier: MIT
+// The journal of a scene over all of its recordings.
+#include "server/recording/scene_journal.h"
+
+#include <algorithm>
+#include <filesystem>
+
+#include <fmt/format.h>
+
+namespace clothstream::recording {
+namespace {
+
+constexpr std::size_t kMaxNameLength = 64;
+
+bool isFileName(const std::string& name) {
+  return !name.empty() && name.size() <= kMaxNameLength && std::ranges::all_of(name, [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' || c == '-';
+  });
+}
+
+tl::unexpected<messages::FieldError> refused(v1::ErrorCode code, std::string text) {
+  return tl::unexpected(messages::FieldError{code, std::move(text)});
+}
+
+std::string fileOf(const Recorder& recorder) {
+  return std::filesystem::path(recorder.path()).filename().string();
+}
+
+void add(RecordingCounts& counts, const Recorder& recorder) {
+  const Recorder::State state = recorder.state();
+  counts.running += state == Recorder::State::running ? 1 : 0;
+  counts.complete += state == Recorder::State::complete ? 1 : 0;
+  counts.failed += state == Recorder::State::failed ? 1 : 0;
+  counts.bytes += recorder.bytes();
+}
+
+}  // namespace
+
+SceneJournal::SceneJournal(std::string scene, RecorderOptions options, bool always)
+    : scene_(std::move(scene)), options_(std::move(options)), always_(always) {
+  if (always_) current_ = std::make_shared<Recorder>(options_);
+}
+
+std::shared_ptr<Recorder> SceneJournal::current() const {
+  const std::lock_guard lock(mutex_);
+  return current_;
+}
+
+RecordingCounts SceneJournal::counts() const {
+  const std::lock_guard lock(mutex_);
+  RecordingCounts counts = before_;
+  for (const auto& recorder : finishing_) add(counts, *recorder);
+  if (current_) add(counts, *current_);
+  return counts;
+}
+
+void SceneJournal::replace(std::shared_ptr<Recorder> next) {
+  std::erase_if(finishing_, [&](const auto& recorder) {
+    if (recorder->state() == Recorder::State::running) return false;
+    add(before_, *recorder);
+    return true;
+  });
+  if (current_) finishing_.push_back(std::move(current_));
+  current_ = std::move(next);
+  if (!current_) return;
+  for (const auto& [participant, names] : participants_)
+    current_->joined(participant, names.first, names.second);
+}
+
+messages::Result<std::string> SceneJournal::start(const std::string& name) {
+  if (!name.empty() && !isFileName(name))
+    return refused(
+        v1::ERROR_CODE_INVALID_ARGUMENT,
+        fmt::format("startRecording.name = \"{:.80}\": must be 1 to {} characters out of [A-Za-z0-9_-]", name,
+                    kMaxNameLength));
+  const std::lock_guard lock(mutex_);
+  if (current_ && current_->state() == Recorder::State::failed) replace(nullptr);
+  if (current_)
+    return refused(
+        v1::ERROR_CODE_INVALID_ARGUMENT,
+        always_ ? fmt::format("startRecording: '{}' is recorded by the server all the time", scene_)
+                : fmt::format("startRecording: '{}' is recorded already, to {}", scene_, fileOf(*current_)));
+  auto recorder = Recorder::create(options_, scene_, name);
+  if (!recorder) return refused(v1::ERROR_CODE_RESOURCE_EXHAUSTED, "startRecording: " + recorder.error());
+  replace(std::move(*recorder));
+  return fileOf(*current_);
+}
+
+messages::Result<v1::StopRecordingResponse> SceneJournal::stop() {
+  std::shared_ptr<Recorder> recorder;
+  {
+    const std::lock_guard lock(mutex_);
+    if (always_)
+      return refused(v1::ERROR_CODE_INVALID_ARGUMENT,
+                     fmt::format("stopRecording: '{}' is recorded by the server all the time", scene_));
+    if (!current_)
+      return refused(v1::ERROR_CODE_INVALID_ARGUMENT,
+                     fmt::format("stopRecording: '{}' is not recorded", scene_));
+    recorder = current_;
+    replace(nullptr);
+  }
+  const std::string file = fileOf(*recorder);
+  switch (recorder->finish()) {
+    case Recorder::State::waiting:
+      return refused(
+          v1::ERROR_CODE_INVALID_ARGUMENT,
+          fmt::format("stopRecording: '{}' did not run since the recording was asked for: there is none",
+                      scene_));
+    case Recorder::State::failed:
+      return refused(
+          v1::ERROR_CODE_RESOURCE_EXHAUSTED,
+          fmt::format("stopRecording: {} could not be written to its end; the server's log says why", file));
+    default:
+      break;
+  }
+  v1::StopRecordingResponse response;
+  response.set_file(file);
+  response.set_bytes(recorder->bytes());
+  return response;
+}
+
+bool SceneJournal::due() const {
+  const std::lock_guard lock(mutex_);
+  return !ended_ && current_ && current_->state() == Recorder::State::waiting;
+}
+
+bool SceneJournal::active() const {
+  const auto recorder = current();
+  return recorder && recorder->active();
+}
+
+void SceneJournal::begin(const vulkan::DeviceInfo& device, const scene::Scene& scene,
+                         const v1::StreamDescription& description, const simulation::StateSnapshot& state,
+                         const simulation::StateSnapshot& start) {
+  if (const auto recorder = current()) recorder->begin(device, scene, description, state, start);
+}
+
+void SceneJournal::ticked(const stream::AppliedTick& tick) {
+  const auto recorder = current();
+  if (!recorder) return;
+  recorder->ticked(tick);
+  if (options_.maxBytes == 0 || recorder->bytes() < options_.maxBytes || !recorder->active()) return;
+  // The next file begins with the next tick.
+  const std::lock_guard lock(mutex_);
+  if (current_ != recorder) return;
+  recorder->end();
+  replace(std::make_shared<Recorder>(options_));
+}
+
+void SceneJournal::saved(const simulation::StateSnapshot& state, bool gripsHold) {
+  if (const auto recorder = current()) recorder->saved(state, gripsHold);
+}
+
+void SceneJournal::restored(std::uint64_t tick, const simulation::StateSnapshot& state) {
+  if (const auto recorder = current()) recorder->restored(tick, state);
+}
+
+void SceneJournal::end() {
+  const std::lock_guard lock(mutex_);
+  ended_ = true;
+  if (current_) current_->end();
+}
+
+void SceneJournal::sent(const stream::SharedBytes& message) {
+  if (const auto recorder = current()) recorder->sent(message);
+}
+
+void SceneJournal::joined(std::uint64_t participant, const std::string& clientName,
+                          const std::string& displayName) {
+  const std::lock_guard lock(mutex_);
+  participants_[participant] = {clientName, displayName};
+  if (current_) current_->joined(participant, clientName, displayName);
+}
+
+void SceneJournal::left(std::uint64_t participant) {
+  const std::lock_guard lock(mutex_);
+  participants_.erase(participant);
+  if (current_) current_->left(participant);
+}
+
+}  // namespace clothstream::recording

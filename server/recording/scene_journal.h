@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: MIT
+// The journal of a scene over all of its recordings, of which one runs at a time.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "server/recording/recorder.h"
+#include "server/stream/journal.h"
+
+namespace clothstream::recording {
+
+// Of recordings.
+struct RecordingCounts {
+  std::uint64_t running = 0, complete = 0, failed = 0, bytes = 0;
+};
+
+// Thread-safe.
+class SceneJournal : public stream::Journal {
+ public:
+  // `always`: it is recorded from the start, and nobody can stop that.
+  SceneJournal(std::string scene, RecorderOptions options, bool always);
+
+  RecordingCounts counts() const;
+
+  messages::Result<std::string> start(const std::string& name) override;
+  messages::Result<v1::StopRecordingResponse> stop() override;
+  bool due() const override;
+  bool active() const override;
+  void begin(const vulkan::DeviceInfo& device, const scene::Scene& scene,
+             const v1::StreamDescription& description, const simulation::StateSnapshot& state,
+             const simulation::StateSnapshot& start) override;
+  void ticked(const stream::AppliedTick& tick) override;
+  void saved(const simulation::StateSnapshot& state, bool gripsHold) override;
+  void restored(std::uint64_t tick, const simulation::StateSnapshot& state) override;
+  void end() override;
+  void sent(const stream::SharedBytes& message) override;
+  void joined(std::uint64_t participant, const std::string& clientName,
+              const std::string& displayName) override;
+  void left(std::uint64_t participant) override;
+
+ private:
+  std::shared_ptr<Recorder> current() const;
+  // With the lock held.
+  void replace(std::shared_ptr<Recorder> next);
+
+  const std::string scene_;
+  const RecorderOptions options_;
+  const bool always_;
+
+  mutable std::mutex mutex_;                          // of what follows
+  std::shared_ptr<Recorder> current_;                 // null: none runs
+  std::vector<std::shared_ptr<Recorder>> finishing_;  // what they were told is still being written
+  RecordingCounts before_;                            // of those that are gone
+  bool ended_ = false;
+  std::map<std::uint64_t, std::pair<std::string, std::string>> participants_;  // client's and display name
+};
+
+}  // namespace clothstream::recording

@@ -1,0 +1,402 @@
+// SPDX-License-Identifier: MIT
+// Recordings as the source of a scene's frames: in order, on time, from any time on, and what is left of
+// damaged ones.
+#include "server/recording/playback.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <memory>
+#include <random>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "proto/codec/decoder.h"
+#include "proto/codec/encoder.h"
+#include "proto/recording/recording_writer.h"
+#include "server/stream/live_scene.h"
+#include "tests/codec/motion.h"
+#include "tests/recording/sample.h"
+
+namespace clothstream::recording {
+namespace {
+
+using stream::Clock;
+using ::testing::HasSubstr;
+
+constexpr std::uint32_t kFrames = 150;
+constexpr double kLength = (kFrames - 1) / double{kSampleRate};
+
+Clock::duration seconds(double value) {
+  return std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(value));
+}
+
+RecordedStream streamOf(std::string bytes) {
+  auto stream = RecordedStream::of(readerOf(std::move(bytes), CutFiles::read));
+  if (!stream) throw std::runtime_error(stream.error());
+  return std::move(*stream);
+}
+
+struct Seen {
+  std::uint64_t tick = 0;
+  bool key = false;
+  std::uint64_t hash = 0;  // of what was decoded
+};
+
+// Takes and acknowledges all that it is sent at once.
+class Viewer {
+ public:
+  explicit Viewer(stream::LiveScene& scene)
+      : scene_(scene), mailbox_(std::make_shared<stream::Mailbox>([] {})) {
+    EXPECT_EQ(scene.audience.join(mailbox_, 10), stream::Audience::Joining::joined);
+    mailbox_->subscribe(scene.description(), scene.start().streamRate, scene.metrics);
+    read(Clock::time_point{});
+  }
+  ~Viewer() { scene_.audience.leave(*mailbox_); }
+
+  void read(Clock::time_point now) {
+    while (const auto bytes = mailbox_->next(now)) {
+      v1::ServerMessage message;
+      ASSERT_TRUE(message.ParseFromArray((*bytes)->data(), static_cast<int>((*bytes)->size())));
+      if (message.has_frame())
+        take(message.frame(), now);
+      else if (message.has_notice())
+        notices.push_back(message.notice());
+      else if (message.has_playback())
+        playbacks.push_back(message.playback());
+    }
+  }
+
+  std::vector<Seen> frames;
+  std::vector<v1::Notice> notices;
+  std::vector<v1::Playback> playbacks;
+
+ private:
+  void take(const v1::Frame& frame, Clock::time_point now) {
+    const auto packet = std::as_bytes(std::span(frame.packet()));
+    ASSERT_EQ(decoder_->decode(packet), codec::DecodeResult::ok);
+    ASSERT_EQ(decoder_->reconstructionHash(), frame.reconstruction_hash());
+    frames.push_back({decoder_->tick(), codec::parsePacket(packet)->header.kind == codec::PacketKind::key,
+                      frame.reconstruction_hash()});
+    ASSERT_TRUE(mailbox_->acknowledge(decoder_->tick(), now));
+  }
+
+  stream::LiveScene& scene_;
+  std::shared_ptr<stream::Mailbox> mailbox_;
+  std::unique_ptr<codec::Decoder> decoder_ = codec::Decoder::make(sampleLayout());
+};
+
+class PlaybackTest : public ::testing::Test {
+ protected:
+  void play(std::string bytes, const PlaybackOptions& options = {}) {
+    playback = std::make_shared<Playback>(streamOf(std::move(bytes)), options);
+    scene = std::make_unique<stream::LiveScene>("sample", playback);
+  }
+  void play(const PlaybackOptions& options = {}) { play(sampleRecording(kFrames), options); }
+  void join() {
+    viewer = std::make_unique<Viewer>(*scene);
+    step(0);
+  }
+  // A step a millisecond, for so long.
+  void pass(double time) {
+    for (const Clock::time_point end = now + seconds(time); now < end;) step(0.001);
+  }
+  void step(double time) {
+    now += seconds(time);
+    playback->step(*scene, now);
+    if (viewer) viewer->read(now);
+  }
+  messages::Result<void> control(const std::function<void(v1::ControlSceneRequest&)>& fill) {
+    v1::ControlSceneRequest request;
+    fill(request);
+    auto controlled = playback->control(request);
+    step(0);
+    return controlled;
+  }
+  void seek(double to) {
+    ASSERT_TRUE(control([&](auto& request) { request.set_seek(to); }));
+  }
+  void pause(bool paused) {
+    scene->paused = paused;
+    step(0);
+  }
+  // The frame of the recording that holds what was decoded.
+  static std::size_t frameOf(const Seen& seen) {
+    static const std::vector<std::uint64_t> hashes = [] {
+      std::vector<std::uint64_t> all;
+      auto reader = readerOf(sampleRecording(kFrames));
+      for (auto message = reader.next(); *message; message = reader.next()) {
+        if ((*message)->topic != Topic::frames) continue;
+        v1::Frame frame;
+        frame.ParseFromArray((*message)->bytes.data(), static_cast<int>((*message)->bytes.size()));
+        all.push_back(frame.reconstruction_hash());
+      }
+      return all;
+    }();
+    return static_cast<std::size_t>(std::ranges::find(hashes, seen.hash) - hashes.begin());
+  }
+
+  std::shared_ptr<Playback> playback;
+  std::unique_ptr<stream::LiveScene> scene;
+  std::unique_ptr<Viewer> viewer;
+  Clock::time_point now = Clock::now();
+};
+
+TEST_F(PlaybackTest, EveryFrameComesWhenItIsDueAsItWasRecorded) {
+  play();
+  pass(1);
+  join();
+  ASSERT_EQ(viewer->frames.size(), 1u);
+  const Clock::time_point start = now;
+  for (std::size_t i = 1; i < kFrames; ++i) {
+    while (now < start + seconds(static_cast<double>(i) / kSampleRate)) step(0.001);
+    // Rounded to the steps of a millisecond.
+    ASSERT_NEAR(static_cast<double>(viewer->frames.size()), static_cast<double>(i + 1), 1) << i;
+  }
+  pass(0.01);
+  ASSERT_EQ(viewer->frames.size(), kFrames);
+  for (std::size_t i = 0; i < kFrames; ++i) {
+    EXPECT_EQ(frameOf(viewer->frames[i]), i);
+    EXPECT_EQ(viewer->frames[i].tick, i + 1);
+    EXPECT_EQ(viewer->frames[i].key, i % kFramesAKeyFrame == 0);
+  }
+  EXPECT_EQ(scene->metrics.framesDropped.value(), 0u);
+}
+
+TEST_F(PlaybackTest, AtItsEndItIsPausedAndGoesOnFromTheStart) {
+  play();
+  join();
+  pass(kLength + 0.1);
+  EXPECT_TRUE(scene->paused);
+  ASSERT_FALSE(viewer->notices.empty());
+  EXPECT_EQ(viewer->notices.back().kind(), v1::NOTICE_KIND_SCENE_PAUSED);
+  EXPECT_TRUE(viewer->playbacks.back().paused());
+  EXPECT_NEAR(viewer->playbacks.back().position(), kLength, 1e-6);
+  pass(0.1);
+  EXPECT_EQ(viewer->frames.size(), kFrames);
+  pause(false);
+  pass(0.1);
+  EXPECT_EQ(frameOf(viewer->frames[kFrames]), 0u);
+  EXPECT_TRUE(viewer->frames[kFrames].key);
+}
+
+TEST_F(PlaybackTest, ALoopGoesOnWithAKeyFrameAndLaterTicks) {
+  play({.loop = true});
+  join();
+  pass(2.5 * (kLength + 1.0 / kSampleRate));
+  ASSERT_GT(viewer->frames.size(), 2 * kFrames);
+  for (std::size_t i = 0; i < viewer->frames.size(); ++i) {
+    ASSERT_EQ(frameOf(viewer->frames[i]), i % kFrames);
+    ASSERT_EQ(viewer->frames[i].tick, i + 1);  // nothing seems to be missing
+  }
+  EXPECT_TRUE(viewer->frames[kFrames].key);
+  EXPECT_EQ(scene->metrics.framesDropped.value(), 0u);
+}
+
+TEST_F(PlaybackTest, ASeekGoesOnFromTheKeyFrameBeforeIt) {
+  play();
+  join();
+  pass(0.5);
+  for (const double to : {1.3, 0.0, 2.0, 0.41, playback->playback().length()}) {
+    const std::size_t before = viewer->frames.size();
+    const std::uint64_t tick = viewer->frames.back().tick;
+    seek(to);
+    ASSERT_GT(viewer->frames.size(), before) << to;
+    const Seen& first = viewer->frames[before];
+    const auto sought = static_cast<std::size_t>(std::floor(to * kSampleRate + 1e-6));
+    EXPECT_EQ(frameOf(first), sought / kFramesAKeyFrame * kFramesAKeyFrame) << to;
+    EXPECT_TRUE(first.key);
+    EXPECT_EQ(first.tick, tick + 1);
+    EXPECT_NEAR(playback->playback().position(), static_cast<double>(frameOf(first)) / kSampleRate, 1e-6);
+    pass(0.1);
+    EXPECT_GT(viewer->frames.size(), before + 3);
+  }
+}
+
+TEST_F(PlaybackTest, WhilePausedNothingFlowsButASeekIsShown) {
+  play({.from = 1});
+  join();
+  pass(0.2);
+  pause(true);
+  const std::size_t before = viewer->frames.size();
+  pass(1);
+  EXPECT_EQ(viewer->frames.size(), before);
+  seek(2);
+  pass(1);
+  ASSERT_EQ(viewer->frames.size(), before + 1);
+  EXPECT_EQ(frameOf(viewer->frames.back()), 120u);
+
+  // Who joins now is shown where it stands.
+  Viewer late(*scene);
+  step(0.1);
+  late.read(now);
+  ASSERT_EQ(late.frames.size(), 1u);
+  EXPECT_EQ(frameOf(late.frames.back()), 120u);
+  pass(0.5);
+  EXPECT_EQ(viewer->frames.size(), before + 2);
+
+  pause(false);
+  pass(0.1);
+  EXPECT_EQ(frameOf(viewer->frames[before + 2]), 121u);
+}
+
+TEST_F(PlaybackTest, SpeedStretchesTime) {
+  play({.speed = 2});
+  join();
+  pass(0.5);
+  EXPECT_NEAR(static_cast<double>(viewer->frames.size()), 61, 1.1);
+  ASSERT_TRUE(control([](auto& request) { request.set_speed(0.25); }));
+  const auto before = static_cast<double>(viewer->frames.size());
+  pass(1);
+  EXPECT_NEAR(static_cast<double>(viewer->frames.size()) - before, 15, 1.1);
+  EXPECT_EQ(viewer->playbacks.back().speed(), 0.25);
+}
+
+TEST_F(PlaybackTest, ItStandsStillWhileNobodyIsThere) {
+  play();
+  join();
+  pass(0.5);
+  viewer.reset();
+  pass(5);
+  const double position = playback->playback().position();
+  EXPECT_NEAR(position, 0.5, 0.02);
+  join();
+  ASSERT_EQ(viewer->frames.size(), 1u);
+  EXPECT_EQ(frameOf(viewer->frames.front()), 24u);
+}
+
+TEST_F(PlaybackTest, WhoComesLaterGoesOnFromTheNextKeyFrame) {
+  play();
+  join();
+  pass(0.2);
+  Viewer late(*scene);
+  for (int i = 0; i < 500; ++i) {
+    step(0.001);
+    late.read(now);
+  }
+  ASSERT_FALSE(late.frames.empty());
+  EXPECT_EQ(frameOf(late.frames.front()), 24u);
+  EXPECT_EQ(late.frames.front().tick, 25u);
+  for (std::size_t i = 1; i < viewer->frames.size(); ++i) ASSERT_EQ(frameOf(viewer->frames[i]), i);
+}
+
+TEST_F(PlaybackTest, WhatCannotBeAskedForIsRefused) {
+  play();
+  for (const double wrong : {-0.1, kLength + 0.1, std::nan("")}) {
+    const auto refused = control([&](auto& request) { request.set_seek(wrong); });
+    ASSERT_FALSE(refused) << wrong;
+    EXPECT_EQ(refused.error().code, v1::ERROR_CODE_INVALID_ARGUMENT);
+    EXPECT_THAT(refused.error().text, HasSubstr("must be 0 to 2.483, the recording's length"));
+  }
+  for (const double wrong : {0.0, 9.0, -1.0, std::nan("")})
+    EXPECT_FALSE(control([&](auto& request) { request.set_speed(wrong); })) << wrong;
+  v1::ParameterChange change;
+  change.set_air_density(1);
+  const auto refused = scene->change(1, change);
+  ASSERT_FALSE(refused);
+  EXPECT_THAT(refused.error().text, HasSubstr("a recording that is played"));
+}
+
+TEST_F(PlaybackTest, WhatIsLeftOfADamagedFileIsPlayedAndWhatIsLostIsSaid) {
+  std::string bytes = sampleRecording(kFrames);
+  const auto place = readerOf(bytes).mcap().chunks()[4];
+  bytes[place.offset + place.length / 2] ^= 0x10;
+  play(bytes);
+  join();
+  pass(kLength + 0.1);
+  ASSERT_EQ(viewer->notices.size(), 2u);
+  EXPECT_EQ(viewer->notices[0].kind(), v1::NOTICE_KIND_RECORDING_DAMAGED);
+  EXPECT_EQ(viewer->notices[1].kind(), v1::NOTICE_KIND_SCENE_PAUSED);
+  std::vector<std::size_t> missing;
+  for (std::size_t i = 0, next = 0; i < viewer->frames.size(); ++i, ++next)
+    for (const std::size_t at = frameOf(viewer->frames[i]); next < at; ++next) missing.push_back(next);
+  // From the chunk's first to the next key frame.
+  ASSERT_FALSE(missing.empty());
+  const auto first = static_cast<std::size_t>(
+      std::llround(1e-9 * static_cast<double>(place.start - kSampleStart) * kSampleRate));
+  EXPECT_EQ(missing.front(), first);
+  EXPECT_EQ((missing.back() + 1) % kFramesAKeyFrame, 0u);
+  EXPECT_EQ(missing.back() - missing.front() + 1, missing.size());
+  EXPECT_EQ(viewer->frames.size() + missing.size(), kFrames);
+  EXPECT_EQ(viewer->notices[0].text(),
+            fmt::format("the recording is damaged: {:.2f} s to {:.2f} s of it cannot be shown",
+                        static_cast<double>(missing.front()) / kSampleRate,
+                        static_cast<double>(missing.back() + 1) / kSampleRate));
+
+  // A seek into it shows what is before.
+  pause(false);
+  seek(static_cast<double>(first + 1) / kSampleRate);
+  EXPECT_LE(frameOf(viewer->frames.back()), first);
+}
+
+TEST_F(PlaybackTest, AFileThatWasCutOffIsPlayedAsFarAsItGoes) {
+  std::string bytes = sampleRecording(kFrames);
+  const auto place = readerOf(bytes).mcap().chunks()[8];
+  bytes.resize(place.offset + place.length / 2);
+  EXPECT_TRUE(streamOf(bytes).cut());
+  play(bytes);
+  join();
+  pass(kLength);
+  EXPECT_TRUE(scene->paused);
+  ASSERT_GT(viewer->frames.size(), 50u);
+  for (std::size_t i = 0; i < viewer->frames.size(); ++i) ASSERT_EQ(frameOf(viewer->frames[i]), i);
+}
+
+TEST_F(PlaybackTest, WhateverIsInAFileItIsPlayedToItsEndOrRefused) {
+  const std::string whole = sampleRecording(kFrames);
+  const std::size_t data = readerOf(whole).mcap().chunks().front().offset;
+  std::mt19937 random(7);
+  for (int round = 0; round < 60; ++round) {
+    std::string bytes = whole;
+    for (int i = 0; i < 3; ++i)
+      bytes[data + random() % (bytes.size() - data)] ^= static_cast<char>(1 << random() % 8);
+    auto reader = RecordingReader::open(std::make_unique<MemorySource>(bytes), "damaged", CutFiles::read);
+    if (!reader) continue;
+    auto stream = RecordedStream::of(std::move(*reader));
+    if (!stream) continue;
+    stream->seek(1);
+    std::size_t frames = 0;
+    for (;;) {
+      const RecordedStream::Next next = stream->next();
+      if (std::holds_alternative<RecordedStream::End>(next)) break;
+      ASSERT_LT(++frames, 10 * kFrames);
+    }
+  }
+}
+
+// A file that others wrote: a key frame whose tick is the largest there is, then one that is smaller.
+TEST_F(PlaybackTest, TicksGrowWhateverWasRecorded) {
+  std::string bytes;
+  auto writer = RecordingWriter::begin(
+      [&](std::string_view more) {
+        bytes += more;
+        return Written();
+      },
+      "test", {{"scene", "sample"}});
+  ASSERT_TRUE(writer);
+  ASSERT_TRUE(writer->write(Topic::description, sampleTime(0), sampleDescription().SerializeAsString()));
+  std::uint64_t time = 0;
+  for (const std::uint64_t tick : {~std::uint64_t{0} - 1, ~std::uint64_t{0}, std::uint64_t{1} << 63}) {
+    const auto encoder = codec::Encoder::make(sampleLayout());
+    std::vector<std::byte> packet(encoder->packetBound());
+    const codec::MotionFrame motion = codec::sampleMotion(sampleLayout(), 3, 0.05f);
+    const std::size_t size = encoder->encode(tick, codec::PacketKind::key, motion.positions, {}, packet);
+    v1::ServerMessage message;
+    message.mutable_frame()->set_packet(packet.data(), size);
+    message.mutable_frame()->set_reconstruction_hash(encoder->reconstructionHash());
+    ASSERT_TRUE(writer->write(sampleTime(++time), message));
+  }
+  ASSERT_TRUE(writer->finish());
+  play(bytes, {.loop = true});
+  join();
+  pass(0.2);
+  ASSERT_GT(viewer->frames.size(), 6u);
+  for (std::size_t i = 0; i < viewer->frames.size(); ++i) EXPECT_EQ(viewer->frames[i].tick, i + 1);
+}
+
+}  // namespace
+}  // namespace clothstream::recording

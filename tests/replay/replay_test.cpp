@@ -1,0 +1,155 @@
+// SPDX-License-Identifier: MIT
+// The recordings beside this file, one of each named scene, once more: through the decoder, and through the
+// simulation.
+//
+// Neither is allowed to differ at all. The decoder computes with integers. Kernels use only operations whose
+// result Vulkan fixes, in an order that nothing but the scene decides (docs/architecture.md), whichever
+// instructions a device makes of them; so a state that was recorded elsewhere has the same hash here. How far
+// off a state is that has not, is told by the frames: none of its vertices was farther than sqrt(3) max_error
+// from what its tick's frame shows, and the rounding of a coordinate to float32.
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include "clothstream/v1/recording.pb.h"
+#include "proto/codec/decoder.h"
+#include "proto/recording/recording_reader.h"
+#include "server/encode/frame_encoder.h"
+#include "server/messages/scene_file.h"
+#include "server/messages/scene_message.h"
+#include "server/recording/resimulate.h"
+#include "server/stream/live_scene.h"
+#include "tests/e2e/temporary_directory.h"
+#include "tests/replay/recorded_scene.h"
+#include "tests/vulkan/gpu_test.h"
+
+namespace clothstream::replay {
+namespace {
+
+using recording::Topic;
+
+std::string keptRecordingOf(const std::string& scene) {
+  return "tests/replay/" + scene + ".mcap.gz";
+}
+
+// Decoded positions by tick; every frame of the recording must decode to what its encoder held.
+struct DecodedFrames {
+  std::map<std::uint64_t, std::vector<float>> positions;
+  float maxError = 0;
+};
+
+DecodedFrames decode(const std::string& path) {
+  DecodedFrames decoded;
+  auto reader = recording::RecordingReader::open(path);
+  EXPECT_TRUE(reader) << reader.error();
+  if (!reader) return decoded;
+  std::unique_ptr<codec::Decoder> decoder;
+  std::size_t frames = 0;
+  for (auto message = reader->next();; message = reader->next()) {
+    EXPECT_TRUE(message) << message.error();
+    if (!message || !*message) break;
+    const std::string_view bytes = (*message)->bytes;
+    if ((*message)->topic == Topic::scene) {
+      v1::RecordedScene recorded;
+      EXPECT_TRUE(recorded.ParseFromArray(bytes.data(), static_cast<int>(bytes.size())));
+      const auto scene = messages::toScene(recorded.scene());
+      EXPECT_TRUE(scene) << scene.error().text;
+      if (!scene) return decoded;
+      decoded.maxError = scene->stream.maxError;
+      decoder = codec::Decoder::make(encode::streamLayout(*scene, stream::LiveScene::kEpoch));
+    }
+    if ((*message)->topic != Topic::frames) continue;
+    v1::Frame frame;
+    EXPECT_TRUE(decoder && frame.ParseFromArray(bytes.data(), static_cast<int>(bytes.size())));
+    if (!decoder) return decoded;
+    const auto result = decoder->decode(std::as_bytes(std::span(frame.packet())));
+    EXPECT_EQ(result, codec::DecodeResult::ok) << "frame " << frames;
+    EXPECT_EQ(decoder->reconstructionHash(), frame.reconstruction_hash()) << "tick " << decoder->tick();
+    const std::span<const float> positions = decoder->positions();
+    decoded.positions[decoder->tick()].assign(positions.begin(), positions.end());
+    ++frames;
+  }
+  EXPECT_GT(frames, 10u);
+  return decoded;
+}
+
+// The largest distance of a vertex from where the frame shows it, m.
+double distance(const std::vector<float>& shown, const simulation::NodeState& state) {
+  double largest = 0;
+  for (std::size_t i = 0; i < state.positions.size(); ++i) {
+    const scene::Vec3 vertex(shown[3 * i], shown[3 * i + 1], shown[3 * i + 2]);
+    const double away = (state.positions[i].cast<double>() - vertex.cast<double>()).norm();
+    if (!(away <= largest)) largest = away;
+  }
+  return largest;
+}
+
+void replay(const std::string& path, std::uint32_t ticks) {
+  const DecodedFrames frames = decode(path);
+  if (::testing::Test::HasFailure()) return;
+  // Half a unit in the last place of a coordinate within 4 m, along three axes.
+  const double promise = std::sqrt(3.0) * (double{frames.maxError} + 4 * std::ldexp(1.0, -24));
+  std::size_t compared = 0;
+  const auto result =
+      recording::resimulate({.path = path,
+                             .device = [](std::uint32_t) { return vulkan::DeviceOptions{}; },
+                             .interrupted = [] { return false; },
+                             .progress = {},
+                             .states =
+                                 [&](std::uint64_t tick, bool same, const simulation::NodeState& state) {
+                                   const auto frame = frames.positions.find(tick);
+                                   if (frame == frames.positions.end()) {
+                                     EXPECT_TRUE(same) << "tick " << tick << " is not what it was";
+                                     return;
+                                   }
+                                   ASSERT_EQ(frame->second.size(), 3 * state.positions.size());
+                                   const double away = distance(frame->second, state);
+                                   EXPECT_TRUE(same) << fmt::format(
+                                       "tick {} is not what it was: a node is {:.3g} m from where its frame "
+                                       "shows it, of which {:.3g} m "
+                                       "may be the codec's",
+                                       tick, away, promise);
+                                   EXPECT_LE(away, promise) << "tick " << tick;
+                                   ++compared;
+                                 }});
+  ASSERT_TRUE(result) << result.error();
+  EXPECT_EQ(result->ticks, ticks);
+  EXPECT_EQ(result->different, 0u) << recording::toText(*result);
+  EXPECT_GT(compared, 10u);
+}
+
+class Replay : public tests::GpuTest, public ::testing::WithParamInterface<std::string> {};
+
+TEST_P(Replay, OfAKeptRecordingHasTheSameFramesAndStates) {
+  auto scene = messages::loadScene(GetParam());
+  ASSERT_TRUE(scene);
+  const std::string kept = keptRecordingOf(GetParam());
+  ASSERT_TRUE(std::filesystem::exists(kept)) << "the scene has no recording: see docs/recording.md";
+  EXPECT_LE(std::filesystem::file_size(kept), 120'000u);
+  const e2e::TemporaryDirectory directory;
+  const std::string path = (directory.path() / "recording.mcap").string();
+  decompress(kept, path);
+  replay(path, ticksFor(*scene));
+}
+
+INSTANTIATE_TEST_SUITE_P(Scenes, Replay, ::testing::ValuesIn(messages::namedScenes()),
+                         [](const auto& scene) { return scene.param; });
+
+class ReplayHere : public tests::GpuTest {};
+
+TEST_F(ReplayHere, OfWhatWasJustRecordedHasTheSameFramesAndStates) {
+  const e2e::TemporaryDirectory directory;
+  const auto scene = messages::loadScene("folds");
+  ASSERT_TRUE(scene);
+  replay(recordScene(tests::device(), "folds", directory.path()), ticksFor(*scene));
+}
+
+}  // namespace
+}  // namespace clothstream::replay
