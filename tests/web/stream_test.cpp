@@ -187,8 +187,13 @@ TEST_F(StreamDoor, AVanishedPeerIsFoundWithinFiveSeconds) {
   vanished.socket.send(colliderPose(0.25f));
   ASSERT_TRUE(watcher.seeUntil([&] { return watcher.viewer.colliderOf(id).has_value(); }));
   const auto from = std::chrono::steady_clock::now();
-  EXPECT_TRUE(watcher.seeUntil([&] { return !watcher.viewer.colliderOf(id).has_value(); }));
+  EXPECT_TRUE(watcher.seeUntil([&] {
+    const v1::Presence& told = watcher.viewer.last.presence();
+    return told.kind() == v1::PRESENCE_KIND_DISCONNECTED && told.participant().id() == id;
+  }));
   EXPECT_LT(std::chrono::steady_clock::now() - from, std::chrono::seconds(5));
+  // Its place is held, but what it had vanishes.
+  EXPECT_TRUE(watcher.seeUntil([&] { return !watcher.viewer.colliderOf(id).has_value(); }));
 }
 
 TEST_F(StreamDoor, ASilentPeerThatAnswersPingsStays) {

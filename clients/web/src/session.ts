@@ -53,6 +53,8 @@ export class Session {
     window.addEventListener("online", () => {
       if (this.state.kind === "reconnecting") this.connect();
     });
+    // A goodbye: else the place of who closes or reloads the page would be held.
+    window.addEventListener("pagehide", () => this.socket.close());
     this.connect();
   }
 
