@@ -227,7 +227,8 @@ void serve(const ProgramOptions& options, const Signals& signals) {
        .reportRate = options.reportRate,
        .maxCreatedScenes = options.maxCreatedScenes,
        .encoderThreads = options.encoderThreads,
-       .journals = [&](const scene::Scene& scene) { return recordings ? recordings->add(scene.name) : nullptr; },
+       .journals =
+           [&](const scene::Scene& scene) { return recordings ? recordings->add(scene.name) : nullptr; },
        .holding = {.hold = std::chrono::duration_cast<stream::Clock::duration>(options.hold)},
        .participantsMay = options.participantsMay,
        .outsideControl = !options.ownersAlone});

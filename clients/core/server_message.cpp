@@ -254,10 +254,10 @@ std::optional<Message> readMessage(Bytes bytes, Visit&& visit) {
 }
 
 Body bodyOf(std::uint32_t field) {
-  constexpr std::array kKnown{
-      Body::welcome,          Body::chunk, Body::frame,      Body::pong,       Body::notice,
-      Body::parameterChanged, Body::error,    Body::tickEvents, Body::listScenes,
-      Body::presence, Body::playback};
+  constexpr std::array kKnown{Body::welcome,  Body::chunk,      Body::frame,
+                              Body::pong,     Body::notice,     Body::parameterChanged,
+                              Body::error,    Body::tickEvents, Body::listScenes,
+                              Body::presence, Body::playback};
   for (const Body body : kKnown) {
     if (field == bytes(static_cast<std::uint32_t>(body))) return body;
   }

@@ -197,7 +197,8 @@ struct TickEvents {
 [[nodiscard]] bool readSpring(Bytes message, Spring& out);
 [[nodiscard]] bool readGust(Bytes message, Gust& out);
 // Of a SelfCollision and of Tethers, in a Scene's Cloth and in a change.
-[[nodiscard]] bool readSelfCollision(Bytes message, std::optional<float>& radius, std::optional<float>& friction);
+[[nodiscard]] bool readSelfCollision(Bytes message, std::optional<float>& radius,
+                                     std::optional<float>& friction);
 [[nodiscard]] bool readTethers(Bytes message, std::optional<float>& slack);
 [[nodiscard]] bool readSolver(Bytes message, Solver& out);
 // Reuses the memory of `out`.
