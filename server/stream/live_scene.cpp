@@ -63,6 +63,7 @@ LiveScene::LiveScene(scene::Scene definition, bool wasCreated, std::shared_ptr<J
 LiveScene::LiveScene(std::string name, std::shared_ptr<FrameSource> from)
     : created(false),
       source(std::move(from)),
+      roster(audience, inbox, nullptr),
       start_(nameAndRates(std::move(name), source->description())),
       definition_(start_) {}
 
