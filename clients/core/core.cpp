@@ -197,7 +197,7 @@ void cs_get_statistics(const cs_client* client, uint64_t now_us, cs_statistics* 
   out->kbit_per_second = frames.kbitPerSecond(now_us);
   out->bits_per_vertex = frames.bitsPerVertex();
   out->round_trip_ms = client->client.clock().roundTripMs();
-  out->clock_offset_us = client->client.clock().offsetUs();
+  out->clock_offset_us = client->client.clock().offsetUs(now_us);
   out->decode_ms = client->client.decodeMs();
 }
 

@@ -66,7 +66,7 @@ typedef struct cs_statistics {
   double kbit_per_second;   /* over the last second */
   double bits_per_vertex;   /* packet bits a vertex a frame, over all frames */
   double round_trip_ms;     /* smallest of the last pings */
-  double clock_offset_us;   /* server clock - own clock */
+  double clock_offset_us;   /* server clock - own clock, at now_us; 0 before the first pong */
   double decode_ms;         /* of the newest frame; 0 where there is no clock (see cs_set_clock) */
 } cs_statistics;
 
