@@ -530,6 +530,13 @@ void cs_set_shapes(cs_client* client, const cs_own_collider* colliders, uint32_t
   client->client.setColliders(std::span(colliders, std::min(count, CS_MAX_COLLIDERS)), now_us);
 }
 
+int cs_set_hand(cs_client* client, uint32_t side, const float* joints, uint32_t count, uint64_t now_us) {
+  if (side != CS_HAND_LEFT && side != CS_HAND_RIGHT) return 0;
+  if (count != 0 && count != CS_HAND_JOINTS && count != CS_HAND_JOINTS - 1) return 0;
+  client->client.setHand(side, std::span(joints, std::size_t{4} * count), now_us);
+  return 1;
+}
+
 void cs_set_grabs(cs_client* client, const cs_grab* grabs, uint32_t count, uint64_t now_us) {
   client->client.setGrabs(std::span(grabs, std::min(count, CS_MAX_GRABS)), now_us);
 }

@@ -116,4 +116,9 @@ double ServerClock::offsetUs(std::uint64_t nowUs) const {
   return shownUs_ + std::clamp(line_.at(nowUs) - shownUs_, -most, most);
 }
 
+std::uint64_t ServerClock::serverTimeUs(std::uint64_t nowUs) const {
+  // Signed, since a clock may be behind; unsigned again, it is right all the same.
+  return known() ? nowUs + static_cast<std::uint64_t>(std::llround(offsetUs(nowUs))) : 0;
+}
+
 }  // namespace clothstream::client

@@ -36,6 +36,8 @@ class ServerClock {
   // comes nearer to what is known by kSlew of the time that passes, and jumps where more than kJumpUs are
   // missing.
   double offsetUs(std::uint64_t nowUs) const;
+  // The server's clock at this time of the own one; 0 before the first pong.
+  std::uint64_t serverTimeUs(std::uint64_t nowUs) const;
 
   static constexpr double kSlew = 0.02, kJumpUs = 50'000;
 
