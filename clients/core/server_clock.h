@@ -19,7 +19,7 @@ namespace clothstream::client {
 // is not among them. What differs between the two directions for good cannot be known: half of it stays as an
 // error.
 //
-// An exchange that the line is not within, by more than kTolerance, is set aside. Where kSuspects in a row
+// An exchange that the line is not within, by more than kToleranceUs, is set aside. Where kSuspects in a row
 // are, one of the clocks has stepped: what was known before is dropped.
 class ServerClock {
  public:
@@ -32,9 +32,9 @@ class ServerClock {
   bool known() const { return !exchanges_.empty(); }
   // The shortest of the last ones; 0 before the first pong.
   double roundTripMs() const;
-  // Server's - own, at this time; 0 before the first pong. What it maps own times to never steps back: it
-  // comes nearer to what is known by kSlew of the time that passes, and jumps where more than kJumpUs are
-  // missing.
+  // Server's - own, at this time; 0 before the first pong. It comes nearer to what is known by
+  // kSlew of the time that passes, so that what it maps own times to does not step back; but it jumps where
+  // more than kJumpUs are missing.
   double offsetUs(std::uint64_t nowUs) const;
   // The server's clock at this time of the own one; 0 before the first pong.
   std::uint64_t serverTimeUs(std::uint64_t nowUs) const;

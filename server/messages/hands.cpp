@@ -21,26 +21,11 @@ struct Bone {
   std::size_t from, to;
 };
 // Thumb; index, middle, ring and little finger; wrist.
-constexpr std::array<Bone, kHandBones> kBones{{{2, 3},
-                                               {3, 4},
-                                               {4, 5},
-                                               {6, 7},
-                                               {7, 8},
-                                               {8, 9},
-                                               {9, 10},
-                                               {11, 12},
-                                               {12, 13},
-                                               {13, 14},
-                                               {14, 15},
-                                               {16, 17},
-                                               {17, 18},
-                                               {18, 19},
-                                               {19, 20},
-                                               {21, 22},
-                                               {22, 23},
-                                               {23, 24},
-                                               {24, 25},
-                                               {kWrist, kMiddleMetacarpal}}};
+constexpr std::array<Bone, kHandBones> kBones{{{2, 3},   {3, 4},   {4, 5},   {6, 7},
+                                               {7, 8},   {8, 9},   {9, 10},  {11, 12},
+                                               {12, 13}, {13, 14}, {14, 15}, {16, 17},
+                                               {17, 18}, {18, 19}, {19, 20}, {21, 22},
+                                               {22, 23}, {23, 24}, {24, 25}, {kWrist, kMiddleMetacarpal}}};
 constexpr std::size_t kThumbBones = 3;
 
 struct Joints {
@@ -74,23 +59,26 @@ bool readJoints(Checks& checks, const Path& path, const v1::HandJoints& message,
   const std::size_t first = kJoints - count;
   for (std::size_t i = 0; i < count; ++i) {
     const auto element = static_cast<int>(i);
-    joints.radii[first + i] = checks.number(path.at("radii", element), message.radii(element), limits::kJointRadius);
+    joints.radii[first + i] =
+        checks.number(path.at("radii", element), message.radii(element), limits::kJointRadius);
     for (int axis = 0; axis < 3; ++axis)
-      joints.positions[first + i][axis] =
-          checks.number(path.at("positions", 3 * element + axis), message.positions(3 * element + axis), limits::kPosition);
+      joints.positions[first + i][axis] = checks.number(
+          path.at("positions", 3 * element + axis), message.positions(3 * element + axis), limits::kPosition);
   }
   for (std::size_t i = 0; i < count && !checks.failed(); ++i) {
     const float reach = (joints.positions[first + i] - joints.positions[kWrist]).norm();
     if (reach > limits::kMaxHandReach)
       checks.fail(path.at("positions", static_cast<int>(3 * i)), "",
-                  fmt::format("the joint is {:g} m from the wrist; must be within {:g} m", reach, limits::kMaxHandReach));
+                  fmt::format("the joint is {:g} m from the wrist; must be within {:g} m", reach,
+                              limits::kMaxHandReach));
   }
   return !checks.failed();
 }
 
 }  // namespace
 
-std::vector<scene::ParticipantCollider> toBones(Checks& checks, const Path& path, const v1::HandJoints& message) {
+std::vector<scene::ParticipantCollider> toBones(Checks& checks, const Path& path,
+                                                const v1::HandJoints& message) {
   if (message.side() != v1::HAND_SIDE_LEFT && message.side() != v1::HAND_SIDE_RIGHT)
     checks.fail(path / "side", fmt::format("{}", static_cast<int>(message.side())),
                 "must be HAND_SIDE_LEFT or HAND_SIDE_RIGHT");
@@ -108,7 +96,8 @@ std::vector<scene::ParticipantCollider> toBones(Checks& checks, const Path& path
     capsule.id = firstId + static_cast<std::uint32_t>(i);
     capsule.pose = {.position = (at[from] + at[to]) / 2,
                     .orientation = along(bone, i < kThumbBones ? outOfPalm : across)};
-    capsule.shape = scene::Capsule{.radius = (joints.radii[from] + joints.radii[to]) / 2, .length = bone.norm()};
+    capsule.shape =
+        scene::Capsule{.radius = (joints.radii[from] + joints.radii[to]) / 2, .length = bone.norm()};
   }
   return bones;
 }

@@ -18,9 +18,9 @@ inline constexpr std::size_t kHandBones = 20;
 // Ids of a hand's bones begin here, 32 apart for the second side.
 inline constexpr std::uint32_t kFirstBoneId = 0x80000000;
 
-// kHandBones capsules, each between two joints with the mean of their radii, in the order of docs/protocol.md.
-// Refuses what is no hand: another number of joints than 26 or 25, numbers out of range, joints too far from the
-// wrist. Empty if so.
+// kHandBones capsules, each between two joints with the mean of their radii, in the order of
+// docs/protocol.md. Refuses what is no hand: another number of joints than 26 or 25, numbers out of range,
+// joints too far from the wrist. Empty if so.
 [[nodiscard]] std::vector<scene::ParticipantCollider> toBones(Checks& checks, const Path& path,
                                                               const v1::HandJoints& message);
 

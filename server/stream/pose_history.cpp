@@ -20,7 +20,8 @@ scene::Pose onTheWay(const scene::Pose& from, const scene::Pose& to, float part,
   scene::Pose pose{.position = from.position + part * (to.position - from.position),
                    .orientation = to.orientation};
   if (std::abs(turn) < kMaxColliderTurn && part > 1) return pose;
-  const Eigen::Vector4f other = turn < 0 ? Eigen::Vector4f(-to.orientation.coeffs()) : to.orientation.coeffs();
+  const Eigen::Vector4f other =
+      turn < 0 ? Eigen::Vector4f(-to.orientation.coeffs()) : to.orientation.coeffs();
   const Eigen::Vector4f mean = (1 - part) * from.orientation.coeffs() + part * other;
   pose.orientation.coeffs() = mean.normalized();
   return pose;
@@ -73,8 +74,8 @@ void PoseHistory::add(Track& track, TimedPoses&& poses) {
 
 void PoseHistory::prune(Track& track, Clock::time_point time) {
   std::vector<Entry>& entries = track.entries;
-  const auto needed = std::ranges::find_if(
-      entries, [&](const Entry& entry) { return entry.trueAt > time - kGapTime; });
+  const auto needed =
+      std::ranges::find_if(entries, [&](const Entry& entry) { return entry.trueAt > time - kGapTime; });
   if (const auto past = needed - entries.begin(); past > 1)
     entries.erase(entries.begin(), entries.begin() + past - 1);
 }

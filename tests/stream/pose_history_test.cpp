@@ -56,9 +56,7 @@ class PoseHistoryTest : public ::testing::Test {
     }
     return x;
   }
-  Clock::time_point at(double ms) const {
-    return begin + std::chrono::microseconds(std::llround(ms * 1000));
-  }
+  Clock::time_point at(double ms) const { return begin + std::chrono::microseconds(std::llround(ms * 1000)); }
 
   const Clock::time_point begin = Clock::time_point{} + 1000s;
   Inbox inbox;
