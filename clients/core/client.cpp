@@ -331,6 +331,12 @@ void Client::setColliders(std::span<const cs_own_collider> colliders, std::uint6
   sendPoses(nowUs);
 }
 
+void Client::setHand(std::uint32_t side, std::span<const float> joints, std::uint64_t nowUs) {
+  std::vector<float>& hand = side == CS_HAND_LEFT ? poses_.leftHand : poses_.rightHand;
+  hand.assign(joints.begin(), joints.end());
+  sendPoses(nowUs);
+}
+
 void Client::setGrabs(std::span<const cs_grab> grabs, std::uint64_t nowUs) {
   poses_.grabs.assign(grabs.begin(), grabs.end());
   sendPoses(nowUs);
@@ -359,10 +365,11 @@ bool Client::mayCollide() const {
 void Client::sendPoses(std::uint64_t nowUs) {
   posed_ = true;
   if (state_ == CS_STATE_FAILED || !isConnected()) return;
-  if (mayCollide()) return writeColliderPoses(outbox_.poses(), poses_, nowUs);
+  const std::uint64_t serverUs = clock_.serverTimeUs(nowUs);
+  if (mayCollide()) return writeColliderPoses(outbox_.poses(), poses_, nowUs, serverUs);
   Poses seen;
   seen.wantsContacts = poses_.wantsContacts;
-  writeColliderPoses(outbox_.poses(), seen, nowUs);
+  writeColliderPoses(outbox_.poses(), seen, nowUs, serverUs);
 }
 
 void Client::setRole(std::uint64_t participant, std::uint32_t role) {

@@ -37,6 +37,8 @@ class Client {
 
   void setClock(std::uint64_t (*nowUs)()) { nowUs_ = nowUs; }
   void setColliders(std::span<const cs_own_collider> colliders, std::uint64_t nowUs);
+  // Four numbers for each joint; empty: there is none of this side.
+  void setHand(std::uint32_t side, std::span<const float> joints, std::uint64_t nowUs);
   void setGrabs(std::span<const cs_grab> grabs, std::uint64_t nowUs);
   void wantContacts(bool wants, std::uint64_t nowUs);
   void move(AttachmentPose attachment, std::uint64_t nowUs);

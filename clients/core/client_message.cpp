@@ -114,6 +114,19 @@ void addGrab(Writer& poses, const cs_grab& grab) {
     if (!std::isnan(settings[i])) message.add_float(3 + i, settings[i]);
 }
 
+void addHand(Writer& poses, std::uint32_t side, const std::vector<float>& joints) {
+  if (joints.empty()) return;
+  std::vector<float> positions, radii;
+  for (std::size_t i = 0; i < joints.size(); i += 4) {
+    positions.insert(positions.end(), {joints[i], joints[i + 1], joints[i + 2]});
+    radii.push_back(joints[i + 3]);
+  }
+  Writer hand(poses, 61);
+  hand.add_uint32(1, side);
+  hand.add_packed_float(2, positions.begin(), positions.end());
+  hand.add_packed_float(3, radii.begin(), radii.end());
+}
+
 // Of a ParticipantCollider. What is none of its shapes is left out, and refused by the server.
 void addShape(Writer& parent, const cs_own_collider& collider) {
   if (collider.shape == CS_SHAPE_SPHERE) {
@@ -145,7 +158,8 @@ void writeHello(std::string& out, std::uint64_t requestId, const Greeting& greet
   });
 }
 
-void writeColliderPoses(std::string& out, const Poses& poses, std::uint64_t clientTimeUs) {
+void writeColliderPoses(std::string& out, const Poses& poses, std::uint64_t clientTimeUs,
+                        std::uint64_t serverTimeUs) {
   writeMessage(out, 0, kColliderPoses, [&](Writer& message) {
     for (std::size_t i = 0; i < poses.colliders.size(); ++i) {
       const cs_own_collider& from = poses.colliders[i];
@@ -162,6 +176,9 @@ void writeColliderPoses(std::string& out, const Poses& poses, std::uint64_t clie
       addPose(attachment, 2, put.position, put.orientation);
     }
     if (poses.wantsContacts) message.add_bool(5, true);
+    if (serverTimeUs != 0) message.add_uint64(60, serverTimeUs);
+    addHand(message, CS_HAND_LEFT, poses.leftHand);
+    addHand(message, CS_HAND_RIGHT, poses.rightHand);
   });
 }
 

@@ -40,11 +40,14 @@ struct AttachmentPose {
 // What this participant does.
 struct Poses {
   std::vector<cs_own_collider> colliders;  // their ids are their places
+  std::vector<float> leftHand, rightHand;  // {x, y, z, radius} of each joint; empty: none
   std::vector<cs_grab> grabs;
   std::vector<AttachmentPose> attachments;
   bool wantsContacts = false;
 };
-void writeColliderPoses(std::string& out, const Poses& poses, std::uint64_t clientTimeUs);
+// `serverTimeUs`: the same time on the server's clock; 0: not known.
+void writeColliderPoses(std::string& out, const Poses& poses, std::uint64_t clientTimeUs,
+                        std::uint64_t serverTimeUs);
 void writeParameterChange(std::string& out, std::uint64_t requestId, const ParameterChange& change);
 void writeColliderChange(std::string& out, std::uint64_t requestId, const ColliderChange& change);
 void writePing(std::string& out, std::uint64_t requestId, std::uint64_t clientTimeUs);

@@ -197,7 +197,7 @@ void cs_get_statistics(const cs_client* client, uint64_t now_us, cs_statistics* 
   out->kbit_per_second = frames.kbitPerSecond(now_us);
   out->bits_per_vertex = frames.bitsPerVertex();
   out->round_trip_ms = client->client.clock().roundTripMs();
-  out->clock_offset_us = client->client.clock().offsetUs();
+  out->clock_offset_us = client->client.clock().offsetUs(now_us);
   out->decode_ms = client->client.decodeMs();
 }
 
@@ -528,6 +528,13 @@ void cs_set_colliders(cs_client* client, const float* spheres, uint32_t count, u
 
 void cs_set_shapes(cs_client* client, const cs_own_collider* colliders, uint32_t count, uint64_t now_us) {
   client->client.setColliders(std::span(colliders, std::min(count, CS_MAX_COLLIDERS)), now_us);
+}
+
+int cs_set_hand(cs_client* client, uint32_t side, const float* joints, uint32_t count, uint64_t now_us) {
+  if (side != CS_HAND_LEFT && side != CS_HAND_RIGHT) return 0;
+  if (count != 0 && count != CS_HAND_JOINTS && count != CS_HAND_JOINTS - 1) return 0;
+  client->client.setHand(side, std::span(joints, std::size_t{4} * count), now_us);
+  return 1;
 }
 
 void cs_set_grabs(cs_client* client, const cs_grab* grabs, uint32_t count, uint64_t now_us) {

@@ -25,6 +25,8 @@ extern "C" {
 #define CS_PROTOCOL_VERSION 1u
 #define CS_MAX_COLLIDERS 40u
 #define CS_MAX_GRABS 10u
+#define CS_HAND_JOINTS 26u
+#define CS_HAND_BONES 20u
 
 /* NOLINTBEGIN(modernize-use-using): C has no using. */
 typedef struct cs_client cs_client;
@@ -67,7 +69,7 @@ typedef struct cs_statistics {
   double kbit_per_second;   /* over the last second */
   double bits_per_vertex;   /* packet bits a vertex a frame, over all frames */
   double round_trip_ms;     /* smallest of the last pings */
-  double clock_offset_us;   /* server clock - own clock */
+  double clock_offset_us;   /* server clock - own clock, at now_us; 0 before the first pong */
   double decode_ms;         /* of the newest frame; 0 where there is no clock (see cs_set_clock) */
 } cs_statistics;
 
@@ -180,6 +182,9 @@ typedef struct cs_grab {
   float slip_distance;  /* m */
 } cs_grab;
 
+/* HandSide of session.proto. */
+typedef enum cs_hand_side { CS_HAND_LEFT = 1, CS_HAND_RIGHT = 2 } cs_hand_side;
+
 /* GrabEventKind of session.proto. */
 typedef enum cs_grab_event_kind {
   CS_GRAB_TAKEN = 1,   /* a grip began */
@@ -199,7 +204,7 @@ typedef enum cs_contact_event_kind { CS_CONTACT_BEGAN = 1, CS_CONTACT_ENDED = 2 
 
 typedef struct cs_contact_event {
   uint32_t kind;           /* cs_contact_event_kind, or one that this client does not know yet */
-  uint32_t collider_id;    /* of a participant's: its place in cs_set_shapes */
+  uint32_t collider_id;    /* of a participant's: its place in cs_set_shapes, or its bone */
   uint64_t participant_id; /* 0: the scene's */
   const char* collider;    /* of the scene's: its name */
   const char* cloth;
@@ -360,12 +365,20 @@ void cs_want_contacts(cs_client* client, int wants, uint64_t now_us);
 uint32_t cs_contact_event_count(const cs_client* client);
 int cs_get_contact_event(const cs_client* client, uint32_t index, cs_contact_event* out);
 
+/* What follows with a now_us is told with that time, by which the server places it among the ticks: it is
+ * when the poses are true, which may be a little ahead, such as when a headset predicts them for. */
 /* Sphere colliders of this participant: `count` of {x, y, z, radius}, at most CS_MAX_COLLIDERS (the rest is
  * left out); replaces all former ones; 0 takes them away. Only the newest call counts if the transport is
  * behind. */
 void cs_set_colliders(cs_client* client, const float* spheres, uint32_t count, uint64_t now_us);
 /* The same with other shapes and turned: the joints of a hand as capsules, say. */
 void cs_set_shapes(cs_client* client, const cs_own_collider* colliders, uint32_t count, uint64_t now_us);
+/* A tracked hand: `count` joints of {x, y, z, radius} in metres, CS_HAND_JOINTS in the order of OpenXR's
+ * XrHandJointEXT (palm first) or one less in that of WebXR's XRHand (which has no palm). The server makes
+ * CS_HAND_BONES capsules of it, which count as colliders of this participant: with other shapes, 60 in all.
+ * Replaces the former one of this side; 0 joints take it away. Returns 0, and changes nothing, for another
+ * side or number of joints. */
+int cs_set_hand(cs_client* client, uint32_t side, const float* joints, uint32_t count, uint64_t now_us);
 /* This participant's grips, at most CS_MAX_GRABS (the rest is left out); replaces all former ones. */
 void cs_set_grabs(cs_client* client, const cs_grab* grabs, uint32_t count, uint64_t now_us);
 /* Where an attachment of the scene is to go; orientation4 NULL: not turned. It stays there. */

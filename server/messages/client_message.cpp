@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "server/messages/hands.h"
 #include "server/messages/limits.h"
 #include "server/messages/shapes.h"
 #include "server/messages/validation.h"
@@ -27,8 +28,11 @@ void checkNew(Checks& checks, const Path& path, std::uint32_t id, std::unordered
 
 void readColliders(Checks& checks, const Path& poses, const v1::ColliderPoses& message,
                    scene::ParticipantPoses& to) {
+  checks.count(poses / "hands", static_cast<std::size_t>(message.hands_size()), 0, 2);
+  if (checks.failed()) return;
+  const std::size_t ofHands = kHandBones * static_cast<std::size_t>(message.hands_size());
   checks.count(poses / "colliders", static_cast<std::size_t>(message.colliders_size()), 0,
-               limits::kMaxParticipantColliders);
+               limits::kMaxParticipantColliders - ofHands);
   std::unordered_set<std::uint32_t> ids;
   for (int i = 0; i < message.colliders_size() && !checks.failed(); ++i) {
     const v1::ParticipantCollider& from = message.colliders(i);
@@ -37,6 +41,11 @@ void readColliders(Checks& checks, const Path& poses, const v1::ColliderPoses& m
     to.colliders.push_back(
         {from.id(), toPose(checks, path / "pose", from.pose()), toShape(checks, path, from)});
   }
+  for (int i = 0; i < message.hands_size() && !checks.failed(); ++i)
+    for (scene::ParticipantCollider& bone : toBones(checks, poses.at("hands", i), message.hands(i))) {
+      checkNew(checks, poses.at("hands", i), bone.id, ids);
+      to.colliders.push_back(std::move(bone));
+    }
 }
 
 void readGrabs(Checks& checks, const Path& poses, const v1::ColliderPoses& message,

@@ -33,8 +33,8 @@ struct Joining {
 // `codecs` are the server's; the client's best that is among them is taken.
 [[nodiscard]] Result<Joining> toJoining(const v1::Hello& message, std::span<const std::uint32_t> codecs);
 
-// At most limits::kMaxParticipantColliders and limits::kMaxParticipantGrabs, with unique ids; attachments
-// that this scene has, each once.
+// At most limits::kMaxParticipantColliders, those of hands after the others, and
+// limits::kMaxParticipantGrabs, with unique ids; attachments that this scene has, each once.
 [[nodiscard]] Result<scene::ParticipantPoses> toPoses(const v1::ColliderPoses& message,
                                                       const scene::Scene& scene);
 

@@ -58,6 +58,8 @@ inline constexpr Range kShapeSize{0.001, 1000};        // m
 inline constexpr Range kParticipantRadius{0.001, 10};  // m
 inline constexpr Range kParticipantLength{0, 10};      // m
 inline constexpr Range kParticipantSize{0.001, 10};    // m
+inline constexpr Range kJointRadius{0.001, 0.1};       // m
+inline constexpr double kMaxHandReach = 0.5;           // m, of a joint from its wrist
 inline constexpr Range kMotionTime{0, 86400};          // s
 inline constexpr Range kMaxError{0.00001, 0.1};        // m
 inline constexpr Range kCompliance{0, 1};              // m/N
@@ -84,7 +86,7 @@ inline constexpr std::uint32_t kDefaultStreamRate = 72;
 inline constexpr std::size_t kMaxSceneFileBytes = 4 * 1024 * 1024;
 inline constexpr std::size_t kMaxMeshFileBytes = 512 * 1024 * 1024;
 inline constexpr std::size_t kMaxClientMessageBytes = 64 * 1024;
-inline constexpr std::size_t kMaxParticipantColliders = 40;
+inline constexpr std::size_t kMaxParticipantColliders = 60;  // those of hands included
 inline constexpr std::size_t kMaxParticipantGrabs = 10;
 inline constexpr std::size_t kMaxChunkBytes = 256 * 1024;
 inline constexpr std::size_t kMaxContentBytes = 256 * 1024 * 1024;

@@ -7,20 +7,27 @@
 
 namespace clothstream::stream {
 
-void Inbox::postPoses(std::uint64_t participant, scene::ParticipantPoses poses, Clock::time_point arrival) {
+void Inbox::postPoses(std::uint64_t participant, scene::ParticipantPoses poses, Clock::time_point arrival,
+                      PoseTime time) {
   const std::lock_guard lock(mutex_);
   const auto last = std::ranges::find(inputs_.poses, participant, &Poses::participant);
   if (last == inputs_.poses.end()) {
-    inputs_.poses.push_back({participant, std::move(poses), arrival});
+    inputs_.poses.push_back({.participant = participant, .now = {std::move(poses), arrival, time}});
     return;
   }
   // Of two places for one attachment the later counts.
-  std::vector<scene::AttachmentPose>& before = last->now.attachments;
+  std::vector<scene::AttachmentPose>& before = last->now.poses.attachments;
   poses.attachments.insert(poses.attachments.begin(), before.begin(), before.end());
   if (poses.attachments.size() > kMaxAttachmentPoses)
     poses.attachments.erase(poses.attachments.begin(), poses.attachments.end() - kMaxAttachmentPoses);
-  last->now = std::move(poses);
-  last->arrival = arrival;
+  if (!time.trueAt) {
+    last->earlier.clear();
+  } else {
+    if (last->earlier.size() == kMaxEarlierPoses) last->earlier.erase(last->earlier.begin());
+    before.clear();
+    last->earlier.push_back(std::move(last->now));
+  }
+  last->now = {std::move(poses), arrival, time};
 }
 
 bool Inbox::postChange(AcceptedChange change) {

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <functional>
 #include <mutex>
+#include <optional>
 #include <vector>
 
 #include "clothstream/v1/session.pb.h"
@@ -14,11 +15,24 @@
 
 namespace clothstream::stream {
 
-// What one participant does, as of its newest message; nothing once it has left.
+// When poses were true.
+struct PoseTime {
+  std::optional<Clock::time_point> trueAt = {};  // none: not known
+  std::uint64_t clientTimeUs = 0;                // the client's own clock
+};
+
+struct TimedPoses {
+  scene::ParticipantPoses poses{};
+  Clock::time_point arrival{};
+  PoseTime time = {};
+};
+
+// What one participant does, as of its newest message; nothing once it has left. With times also what it said
+// since the last tick before that, oldest first, without attachments.
 struct Poses {
   std::uint64_t participant = 0;
-  scene::ParticipantPoses now{};
-  Clock::time_point arrival{};
+  TimedPoses now{};
+  std::vector<TimedPoses> earlier = {};
 };
 
 // A change that was checked against the scene as all changes before it leave it.
@@ -33,16 +47,19 @@ struct Inputs {
   std::vector<Poses> poses;
 };
 
-// Thread-safe. Bounded: one Poses a participant, kMaxChanges changes.
+// Thread-safe. Bounded: one Poses with kMaxEarlierPoses a participant, kMaxChanges changes.
 class Inbox {
  public:
   static constexpr std::size_t kMaxChanges = 64;
   // Of one participant in a tick; the oldest go.
   static constexpr std::ptrdiff_t kMaxAttachmentPoses = 256;
+  // The same.
+  static constexpr std::size_t kMaxEarlierPoses = 16;
 
   // Replaces what this participant posted since the last tick, but for where it put attachments that `poses`
-  // says nothing of.
-  void postPoses(std::uint64_t participant, scene::ParticipantPoses poses, Clock::time_point arrival);
+  // says nothing of, and what was true at other times.
+  void postPoses(std::uint64_t participant, scene::ParticipantPoses poses, Clock::time_point arrival,
+                 PoseTime time = {});
   // False if it is full.
   [[nodiscard]] bool postChange(AcceptedChange change);
   // Of the changes that wait, what they say of the scene's colliders; the rest is dropped.

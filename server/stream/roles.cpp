@@ -87,7 +87,8 @@ messages::Result<void> permit(v1::Role role, Act act, const Permissions& partici
 messages::Result<void> permit(v1::Role role, const v1::ColliderPoses& message,
                               const Permissions& participants) {
   messages::Result<void> permitted;
-  if (!message.colliders().empty()) permitted = permit(role, Act::collide, participants);
+  if (!message.colliders().empty() || !message.hands().empty())
+    permitted = permit(role, Act::collide, participants);
   if (permitted && !message.grabs().empty()) permitted = permit(role, Act::grab, participants);
   if (permitted && !message.attachments().empty())
     permitted = permit(role, Act::moveAttachments, participants);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cassert>
+#include <chrono>
 #include <limits>
 #include <random>
 #include <utility>
@@ -33,6 +34,18 @@ bool sameToken(const std::string& one, const std::string& other) {
   for (std::size_t i = 0; i < one.size(); ++i)
     different |= static_cast<unsigned char>(one[i]) ^ static_cast<unsigned char>(other[i]);
   return different == 0;
+}
+
+PoseTime poseTime(const v1::ColliderPoses& message, Clock::time_point arrival) {
+  PoseTime time{.clientTimeUs = message.client_time_us()};
+  if (message.server_time_us() == 0) return time;
+  if (time.clientTimeUs == 0) time.clientTimeUs = message.server_time_us();
+  // The difference of two unsigned clocks, read as signed, is right whichever is ahead.
+  const std::chrono::microseconds ahead(
+      static_cast<std::int64_t>(message.server_time_us() - microseconds(arrival)));
+  if (ahead > Roster::kMostAhead) return time;
+  time.trueAt = arrival + std::max<std::chrono::microseconds>(ahead, -Roster::kMostBehind);
+  return time;
 }
 
 }  // namespace
@@ -237,7 +250,7 @@ messages::Result<void> Roster::post(const Mailbox& mailbox, const v1::ColliderPo
   if (auto permitted = permit(entry->told.role(), message, permissions); !permitted) return permitted;
   entry->posed = true;
   entry->poses = {.colliders = poses.colliders, .grabs = poses.grabs, .wantsContacts = poses.wantsContacts};
-  inbox_.postPoses(entry->told.id(), std::move(poses), arrival);
+  inbox_.postPoses(entry->told.id(), std::move(poses), arrival, poseTime(message, arrival));
   return {};
 }
 

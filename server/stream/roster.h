@@ -39,6 +39,9 @@ struct Holding {
 class Roster {
  public:
   static constexpr std::size_t kTokenBytes = 16;
+  // Poses that say that they will be true later than this are taken to say no time; those from before are
+  // taken to be this old.
+  static constexpr std::chrono::milliseconds kMostAhead{100}, kMostBehind{10'000};
 
   // All outlive it; `journal` may be null.
   Roster(Audience& audience, Inbox& inbox, Journal* journal)

@@ -152,14 +152,17 @@ void SceneHost::applyInputs() {
     live_.audience.announce(serialise(message));
   }
   if (!problem.empty()) takeBack(problem);
-  for (const Poses& poses : inputs_.poses) {
-    colliders_.place(poses.participant, poses.now.colliders);
-    holds_.place(poses.participant, poses.now.grabs, poses.now.attachments);
-    contacts_.want(poses.participant, poses.now.wantsContacts);
-    const bool moves =
-        !poses.now.colliders.empty() || !poses.now.grabs.empty() || !poses.now.attachments.empty();
-    if (moves && poseArrivals_.size() < kMaxPoseArrivals) poseArrivals_.push_back(poses.arrival);
+  for (Poses& poses : inputs_.poses) {
+    const scene::ParticipantPoses& now = poses.now.poses;
+    const bool moves = !now.colliders.empty() || !now.grabs.empty() || !now.attachments.empty();
+    if (moves && poseArrivals_.size() < kMaxPoseArrivals) poseArrivals_.push_back(poses.now.arrival);
+    poses_.add(std::move(poses));
   }
+  poses_.place(tickStart_, [this](std::uint64_t participant, const scene::ParticipantPoses& poses) {
+    colliders_.place(participant, poses.colliders);
+    holds_.place(participant, poses.grabs, poses.attachments);
+    contacts_.want(participant, poses.wantsContacts);
+  });
 }
 
 bool SceneHost::apply(const scene::ParameterChange& change, std::string& problem) {

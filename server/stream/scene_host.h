@@ -15,6 +15,7 @@
 #include "server/stream/frame_packer.h"
 #include "server/stream/hold_set.h"
 #include "server/stream/live_scene.h"
+#include "server/stream/pose_history.h"
 #include "server/stream/token_bucket.h"
 #include "server/vulkan/device.h"
 #include "server/vulkan/recorder.h"
@@ -107,6 +108,7 @@ class SceneHost {
   HoldSet holds_;
   ContactLog contacts_;
   Inputs inputs_;
+  PoseHistory poses_;
   simulation::TickInputs tickInputs_;
   std::vector<Clock::time_point> poseArrivals_;  // that no frame has shown yet
 

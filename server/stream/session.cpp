@@ -62,20 +62,20 @@ void Session::dispatch(const v1::ClientMessage& message, Clock::time_point now) 
     case Body::kHello:
       return hello(message.hello());
     case Body::kPing: {
-      if (!allowed(queryRate_, "pings and questions")) return;
+      if (!allowed(pingRate_, "pings")) return;
       v1::ServerMessage pong;
       pong.mutable_pong()->set_client_time_us(message.ping().client_time_us());
       pong.mutable_pong()->set_server_time_us(microseconds(now));
       return answer(pong);
     }
     case Body::kListScenes: {
-      if (!allowed(queryRate_, "pings and questions")) return;
+      if (!allowed(queryRate_, "questions")) return;
       v1::ServerMessage list;
       *list.mutable_list_scenes() = server_.listScenes();
       return answer(list);
     }
     case Body::kGetScene: {
-      if (!allowed(queryRate_, "pings and questions")) return;
+      if (!allowed(queryRate_, "questions")) return;
       auto found = server_.getScene(message.get_scene());
       if (!found) return refuse({found.error().code(), found.error().text()});
       v1::ServerMessage scene;

@@ -80,6 +80,7 @@ class Session : public std::enable_shared_from_this<Session> {
   TokenBucket poseRate_{480, 120};
   TokenBucket changeRate_{60, 30};
   TokenBucket keyFrameRate_{10, 5};
+  TokenBucket pingRate_{20, 150};  // clients begin with many
   TokenBucket queryRate_{20, 20};
   TokenBucket controlRate_{10, 10};
   TokenBucket messageRate_{1000, 500};  // of all kinds

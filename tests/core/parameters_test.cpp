@@ -40,6 +40,44 @@ TEST(Colliders, TravelWithTheTimeTheyWereTrue) {
   EXPECT_EQ(poses.colliders(1).sphere().radius(), 0.2f);
 }
 
+TEST(Colliders, TravelWithTheServersTimeOnceItIsKnown) {
+  Joined joined;
+  const float sphere[] = {1, 2, 3, 0.1f};
+  cs_set_colliders(joined.client.get(), sphere, 1, 5000);
+  EXPECT_EQ(joined.sent().collider_poses().server_time_us(), 0u);
+  cs_update(joined.client.get(), 10'000);
+  ASSERT_TRUE(joined.sent().has_ping());
+  // 8 ms there and back: the server's clock was at 1'000'000 when the client's was at 14'000.
+  joined.client.receive(ScriptedServer::pong(10'000, 1'000'000), 18'000);
+  cs_set_colliders(joined.client.get(), sphere, 1, 24'000);
+  EXPECT_EQ(joined.sent().collider_poses().server_time_us(), 1'010'000u);
+  EXPECT_EQ(joined.client.statistics(24'000).clock_offset_us, 986'000);
+}
+
+TEST(Colliders, HandsTravelAsTheirJoints) {
+  Joined joined;
+  std::vector<float> joints(std::size_t{4} * CS_HAND_JOINTS);
+  for (std::size_t i = 0; i < joints.size(); ++i) joints[i] = static_cast<float>(i);
+  EXPECT_EQ(cs_set_hand(joined.client.get(), CS_HAND_RIGHT, joints.data(), CS_HAND_JOINTS, 5), 1);
+  const v1::ColliderPoses poses = joined.sent().collider_poses();
+  ASSERT_THAT(poses.hands(), SizeIs(1));
+  EXPECT_EQ(poses.hands(0).side(), v1::HAND_SIDE_RIGHT);
+  ASSERT_THAT(poses.hands(0).positions(), SizeIs(78));
+  ASSERT_THAT(poses.hands(0).radii(), SizeIs(26));
+  EXPECT_EQ(poses.hands(0).positions(4), 5);  // y of the wrist
+  EXPECT_EQ(poses.hands(0).radii(25), 103);
+  // As WebXR has them; the other hand stays.
+  EXPECT_EQ(cs_set_hand(joined.client.get(), CS_HAND_LEFT, joints.data(), CS_HAND_JOINTS - 1, 6), 1);
+  const v1::ColliderPoses both = joined.sent().collider_poses();
+  ASSERT_THAT(both.hands(), SizeIs(2));
+  EXPECT_EQ(both.hands(0).side(), v1::HAND_SIDE_LEFT);
+  EXPECT_THAT(both.hands(0).radii(), SizeIs(25));
+  EXPECT_EQ(cs_set_hand(joined.client.get(), CS_HAND_RIGHT, nullptr, 0, 7), 1);
+  EXPECT_THAT(joined.sent().collider_poses().hands(), SizeIs(1));
+  EXPECT_EQ(cs_set_hand(joined.client.get(), 3, joints.data(), CS_HAND_JOINTS, 8), 0);
+  EXPECT_EQ(cs_set_hand(joined.client.get(), CS_HAND_LEFT, joints.data(), 20, 8), 0);
+}
+
 TEST(Colliders, TravelWithTheirShapeAndTurn) {
   Joined joined;
   const cs_own_collider own[] = {{.shape = CS_SHAPE_CAPSULE,

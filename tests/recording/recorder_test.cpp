@@ -92,13 +92,19 @@ void happen(RecordedScene& recorded) {
   recorded.ticks(3);
   recorded.change(wind(3));
   recorded.ticks(7);
-  for (int i = 0; i < 12; ++i) {
-    const float z = 0.02f * static_cast<float>(i) - 0.2f;
+  const auto pose = [&](float z, int beyondTickMs) {
+    const Clock::time_point trueAt =
+        recorded.now + std::chrono::seconds(1) + std::chrono::milliseconds(beyondTickMs);
     recorded.live.inbox.postPoses(
         9,
         {.colliders = {handAt(1, 0.1f, -0.6f, z), handAt(4, -0.1f, -0.2f, z)},
          .grabs = {{.id = 1, .pose = {scene::Vec3(0, -0.4f, z), scene::Quaternion::Identity()}}}},
-        recorded.now);
+        recorded.now, {.trueAt = trueAt, .clientTimeUs = stream::microseconds(trueAt)});
+  };
+  for (int i = 0; i < 12; ++i) {
+    const float z = 0.02f * static_cast<float>(i) - 0.2f;
+    pose(z - 0.01f, -33);
+    pose(z, i < 6 ? 11 : -11);  // the tick is between the two, then after them
     recorded.ticks(1);
   }
   scene::Solver constraint;

@@ -163,7 +163,7 @@ TEST(Inbox, KeepsWhereAttachmentsWerePut) {
   ASSERT_EQ(inputs.poses.size(), 1u);
   const scene::Scene scene = sceneWithAttachments();
   HoldSet holds(scene);
-  holds.place(1, inputs.poses[0].now.grabs, inputs.poses[0].now.attachments);
+  holds.place(1, inputs.poses[0].now.poses.grabs, inputs.poses[0].now.poses.attachments);
   simulation::TickInputs tick;
   holds.advance(scene, 0.01, tick);
   ASSERT_EQ(tick.attachments.size(), 2u);
@@ -251,9 +251,9 @@ TEST(Inbox, KeepsOnlyTheNewestPosesOfAParticipant) {
   inbox.drain(inputs);
   ASSERT_EQ(inputs.poses.size(), 2u);
   EXPECT_EQ(inputs.poses[0].participant, 1u);
-  ASSERT_EQ(inputs.poses[0].now.colliders.size(), 1u);
-  EXPECT_EQ(inputs.poses[0].now.colliders[0].id, 3u);
-  EXPECT_EQ(inputs.poses[0].arrival, arrival + std::chrono::milliseconds(1));
+  ASSERT_EQ(inputs.poses[0].now.poses.colliders.size(), 1u);
+  EXPECT_EQ(inputs.poses[0].now.poses.colliders[0].id, 3u);
+  EXPECT_EQ(inputs.poses[0].now.arrival, arrival + std::chrono::milliseconds(1));
   inbox.drain(inputs);
   EXPECT_TRUE(inputs.poses.empty());
 }

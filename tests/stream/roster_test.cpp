@@ -170,8 +170,8 @@ class RosterTest : public ::testing::Test {
     inbox.drain(drained);
     std::vector<std::string> lines;
     for (const Poses& poses : drained.poses)
-      lines.push_back(fmt::format("{}: {} colliders, {} grabs", poses.participant, poses.now.colliders.size(),
-                                  poses.now.grabs.size()));
+      lines.push_back(fmt::format("{}: {} colliders, {} grabs", poses.participant,
+                                  poses.now.poses.colliders.size(), poses.now.poses.grabs.size()));
     return lines;
   }
   void pass(Clock::duration time) {
@@ -191,6 +191,27 @@ std::vector<std::uint64_t> idsOf(const Roster::Admission& admission) {
   std::vector<std::uint64_t> all;
   for (const v1::Participant& participant : admission.participants) all.push_back(participant.id());
   return all;
+}
+
+TEST_F(RosterTest, PosesAreTrueWhenTheySayUnlessThatCannotBe) {
+  const Member member = join();
+  const auto trueAt = [&](std::int64_t laterUs) {
+    v1::ColliderPoses message;
+    message.set_client_time_us(77);
+    message.set_server_time_us(microseconds(now) + static_cast<std::uint64_t>(laterUs));
+    EXPECT_TRUE(roster.post(*member.mailbox, message, {}, {}, now));
+    Inputs drained;
+    inbox.drain(drained);
+    EXPECT_EQ(drained.poses.at(0).now.time.clientTimeUs, 77u);
+    return drained.poses.at(0).now.time.trueAt;
+  };
+  EXPECT_EQ(trueAt(-30'000), now - 30ms);
+  EXPECT_EQ(trueAt(100'000), now + 100ms);
+  EXPECT_EQ(trueAt(100'001), std::nullopt);
+  EXPECT_EQ(trueAt(std::numeric_limits<std::int64_t>::max()), std::nullopt);
+  EXPECT_EQ(trueAt(-3'600'000'000), now - 10s);
+  EXPECT_EQ(trueAt(std::numeric_limits<std::int64_t>::min()), now - 10s);
+  EXPECT_EQ(trueAt(-static_cast<std::int64_t>(microseconds(now))), std::nullopt) << "0: not known";
 }
 
 TEST_F(RosterTest, WhoJoinsKnowsWhoIsThereAndEverybodyElseIsTold) {

@@ -172,6 +172,22 @@ TEST_F(SceneHostTest, SameInputsGiveTheSameStatesWhateverTheAudience) {
   EXPECT_EQ(simulate(4), alone);
 }
 
+TEST_F(SceneHostTest, AHandIsWhereItIsAtTheTicksTime) {
+  HostedScene hosted;
+  const auto pose = [&](std::chrono::milliseconds beyondTick, float x) {
+    const Clock::time_point trueAt = hosted.now + std::chrono::seconds(1) + beyondTick;
+    hosted.live.inbox.postPoses(9, {.colliders = {handAt(1, x, 5, 0)}}, hosted.now,
+                                {.trueAt = trueAt, .clientTimeUs = microseconds(trueAt)});
+  };
+  pose(std::chrono::milliseconds(-30), 1);
+  pose(std::chrono::milliseconds(10), 1.4f);
+  hosted.tick();
+  ASSERT_EQ(hosted.frames.back().colliders_size(), 2);
+  EXPECT_NEAR(hosted.frames.back().colliders(1).position().x(), 1.3f, 1e-5f);
+  hosted.tick();  // a second later
+  EXPECT_EQ(hosted.frames.back().colliders(1).position().x(), 1.4f);
+}
+
 TEST_F(SceneHostTest, AChangeTakesEffectAtTheNextTickAndIsAnnouncedForIt) {
   HostedScene changed, unchanged;
   changed.ticks(5);

@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: MIT
+// Joints to capsules.
+#include "server/messages/hands.h"
+
+#include <array>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "server/messages/limits.h"
+
+namespace clothstream::messages {
+namespace {
+
+// Joints in OpenXR's order; WebXR's begins with the wrist.
+constexpr std::size_t kJoints = 26, kJointsWithoutPalm = 25;
+constexpr std::size_t kWrist = 1, kIndexProximal = 7, kMiddleMetacarpal = 11, kMiddleProximal = 12,
+                      kLittleProximal = 22;
+
+struct Bone {
+  std::size_t from, to;
+};
+// Thumb; index, middle, ring and little finger; wrist.
+constexpr std::array<Bone, kHandBones> kBones{{{2, 3},   {3, 4},   {4, 5},   {6, 7},
+                                               {7, 8},   {8, 9},   {9, 10},  {11, 12},
+                                               {12, 13}, {13, 14}, {14, 15}, {16, 17},
+                                               {17, 18}, {18, 19}, {19, 20}, {21, 22},
+                                               {22, 23}, {23, 24}, {24, 25}, {kWrist, kMiddleMetacarpal}}};
+constexpr std::size_t kThumbBones = 3;
+
+struct Joints {
+  std::array<scene::Vec3, kJoints> positions;
+  std::array<float, kJoints> radii;
+};
+
+// From Y to the bone. X is kept in the plane of the bone and what lies across it, so that a capsule that
+// follows a hand does not spin about itself.
+scene::Quaternion along(const scene::Vec3& bone, const scene::Vec3& across) {
+  const float length = bone.norm();
+  if (!(length > 0)) return scene::Quaternion::Identity();
+  const scene::Vec3 y = bone / length;
+  scene::Vec3 x = across - across.dot(y) * y;
+  if (!(x.norm() > 0.01f * across.norm())) return scene::Quaternion::FromTwoVectors(scene::Vec3::UnitY(), y);
+  x.normalize();
+  Eigen::Matrix3f axes;
+  axes << x, y, x.cross(y);
+  return scene::Quaternion(axes).normalized();
+}
+
+bool readJoints(Checks& checks, const Path& path, const v1::HandJoints& message, Joints& joints) {
+  const auto count = static_cast<std::size_t>(message.radii_size());
+  if (count != kJoints && count != kJointsWithoutPalm)
+    checks.fail(path / "radii", "",
+                fmt::format("has {} elements; must have {} (OpenXR's joints) or {} (WebXR's)", count, kJoints,
+                            kJointsWithoutPalm));
+  checks.count(path / "positions", static_cast<std::size_t>(message.positions_size()), 3 * count, 3 * count);
+  if (checks.failed()) return false;
+  // Without a palm, of which no bone is.
+  const std::size_t first = kJoints - count;
+  for (std::size_t i = 0; i < count; ++i) {
+    const auto element = static_cast<int>(i);
+    joints.radii[first + i] =
+        checks.number(path.at("radii", element), message.radii(element), limits::kJointRadius);
+    for (int axis = 0; axis < 3; ++axis)
+      joints.positions[first + i][axis] = checks.number(
+          path.at("positions", 3 * element + axis), message.positions(3 * element + axis), limits::kPosition);
+  }
+  for (std::size_t i = 0; i < count && !checks.failed(); ++i) {
+    const float reach = (joints.positions[first + i] - joints.positions[kWrist]).norm();
+    if (reach > limits::kMaxHandReach)
+      checks.fail(path.at("positions", static_cast<int>(3 * i)), "",
+                  fmt::format("the joint is {:g} m from the wrist; must be within {:g} m", reach,
+                              limits::kMaxHandReach));
+  }
+  return !checks.failed();
+}
+
+}  // namespace
+
+std::vector<scene::ParticipantCollider> toBones(Checks& checks, const Path& path,
+                                                const v1::HandJoints& message) {
+  if (message.side() != v1::HAND_SIDE_LEFT && message.side() != v1::HAND_SIDE_RIGHT)
+    checks.fail(path / "side", fmt::format("{}", static_cast<int>(message.side())),
+                "must be HAND_SIDE_LEFT or HAND_SIDE_RIGHT");
+  Joints joints;
+  if (checks.failed() || !readJoints(checks, path, message, joints)) return {};
+  const auto& at = joints.positions;
+  const scene::Vec3 across = at[kLittleProximal] - at[kIndexProximal];
+  const scene::Vec3 outOfPalm = across.cross(at[kMiddleProximal] - at[kWrist]);
+  const std::uint32_t firstId = kFirstBoneId + (message.side() == v1::HAND_SIDE_RIGHT ? 32 : 0);
+  std::vector<scene::ParticipantCollider> bones;
+  for (std::size_t i = 0; i < kHandBones; ++i) {
+    const auto [from, to] = kBones[i];
+    const scene::Vec3 bone = at[to] - at[from];
+    scene::ParticipantCollider& capsule = bones.emplace_back();
+    capsule.id = firstId + static_cast<std::uint32_t>(i);
+    capsule.pose = {.position = (at[from] + at[to]) / 2,
+                    .orientation = along(bone, i < kThumbBones ? outOfPalm : across)};
+    capsule.shape =
+        scene::Capsule{.radius = (joints.radii[from] + joints.radii[to]) / 2, .length = bone.norm()};
+  }
+  return bones;
+}
+
+}  // namespace clothstream::messages
