@@ -284,7 +284,7 @@ TEST(ToColliders, MakesCapsulesOfHands) {
 
 // Whichever way a hand points, its capsules end at its joints, and do not spin about themselves as it turns.
 TEST(ToColliders, HandsMayPointAnywhere) {
-  scene::Quaternion before;
+  scene::Quaternion before = scene::Quaternion::Identity();
   for (int degrees = 0; degrees <= 360; degrees += 5) {
     const scene::Quaternion turn(
         Eigen::AngleAxisf(static_cast<float>(degrees) * std::acos(-1.0f) / 180, scene::Vec3::UnitX()));

@@ -100,8 +100,8 @@ TEST_F(PoseHistoryTest, TurnsTheShorterWay) {
   EXPECT_LT(degrees(30), 75);
 }
 
-// A hand at 1 m/s whose poses arrive 12 ms after they were true is where it really is, to a millimetre or
-// two; without times it would be 12 to 25 mm behind.
+// A hand at 1 m/s whose poses arrive 12 ms after they were true is within 8 mm of where it really is; without
+// times it would be 12 to 25 mm behind.
 TEST_F(PoseHistoryTest, LeadsOnOverTheTimeThatPosesTakeToArrive) {
   double next = 0;
   for (double now = 100; now < 500; now += 8) {
