@@ -169,6 +169,7 @@ std::uint32_t Client::described(Bytes content) {
   // Of who came back they go on: what it missed was dropped.
   if (!resumed_) statistics_.forgetTicks();
   report_ = {};
+  if (playOut_) playOut_->begin(description_);
   greeting_.contentId = welcome_.contentId;
   const bool again = state_ == CS_STATE_RECONNECTING;
   state_ = CS_STATE_JOINED;
@@ -218,7 +219,39 @@ std::uint32_t Client::packetReceived(std::uint64_t nowUs) {
   // A key frame is the way back to what the server holds.
   if (!decoded.hashMatches) requestKeyFrame(nowUs);
   outbox_.setAck(decoded.tick);
+  timeFrame(decoded.key, nowUs);
   return CS_EVENT_FRAME;
+}
+
+void Client::timeFrame(bool key, std::uint64_t nowUs) {
+  const std::uint64_t arrivedUs = clock_.serverTimeUs(nowUs);
+  stages_ = {};
+  if (clock_.known()) {
+    stages_.server_ms = since(frame_.tickTimeUs, frame_.packetTimeUs) / 1000;
+    stages_.network_ms = since(frame_.packetTimeUs, arrivedUs) / 1000;
+    stages_.displayable_ms = since(frame_.tickTimeUs, arrivedUs) / 1000 + decodeMs_;
+  }
+  if (!playOut_) return;
+  const bool sendsNormals = description_.layout.normals != codec::NormalMode::none;
+  const auto decodeUs = static_cast<std::uint64_t>(1000 * decodeMs_);
+  playOut_->add({.tick = decoder_->tick(),
+                 .timeUs = frame_.tickTimeUs,
+                 .key = key,
+                 .positions = decoder_->positions(),
+                 .normals = sendsNormals ? decoder_->normals() : std::span<const float>()},
+                clock_.known() ? arrivedUs + decodeUs : 0);
+}
+
+bool Client::setPlayOut(const cs_play_out_options* options) {
+  if (options && !isAllowed(*options)) return false;
+  playOut_ = options ? std::make_unique<PlayOut>(*options) : nullptr;
+  if (playOut_ && decoder_) playOut_->begin(description_);
+  return true;
+}
+
+std::optional<cs_played> Client::play(std::uint64_t nowUs, std::uint64_t displayUs) {
+  if (!playOut_) return std::nullopt;
+  return playOut_->play(clock_.serverTimeUs(nowUs), clock_.serverTimeUs(displayUs));
 }
 
 codec::DecodeResult Client::decode(std::span<const std::byte> packet) {
@@ -410,6 +443,22 @@ std::span<const float> Client::positions() const {
 std::span<const float> Client::normals() const {
   if (decoder_ && decoder_->hasFrame()) return decoder_->normals();
   return description_.restNormals;
+}
+
+std::span<const float> Client::playedPositions() const {
+  return playOut_ && playOut_->shows() ? playOut_->positions() : positions();
+}
+
+std::span<const float> Client::playedNormals() const {
+  return playOut_ && playOut_->shows() ? playOut_->normals(description_.layout) : normals();
+}
+
+cs_stage_statistics Client::stages() const {
+  cs_stage_statistics stages = stages_;
+  stages.version = CS_STAGE_STATISTICS_VERSION;
+  stages.decode_ms = decodeMs_;
+  if (playOut_) playOut_->report(stages);
+  return stages;
 }
 
 std::uint64_t Client::reconstructionHash() const {

@@ -16,6 +16,7 @@
 #include "clients/core/frame_statistics.h"
 #include "clients/core/key_frame_request.h"
 #include "clients/core/outbox.h"
+#include "clients/core/play_out.h"
 #include "clients/core/reconnection.h"
 #include "clients/core/server_clock.h"
 #include "clients/core/server_message.h"
@@ -49,6 +50,10 @@ class Client {
   void remove(std::uint64_t participant);
   void control(const SceneControl& control);
   void requestEarlyKeyFrame(std::uint64_t nowUs);
+  // nullptr: off. False where the options are not allowed.
+  bool setPlayOut(const cs_play_out_options* options);
+  // Nothing where it is off.
+  std::optional<cs_played> play(std::uint64_t nowUs, std::uint64_t displayUs);
 
   cs_state state() const { return state_; }
   const std::string& errorText() const { return errorText_; }
@@ -72,6 +77,10 @@ class Client {
   // Of the newest frame, or at rest.
   std::span<const float> positions() const;
   std::span<const float> normals() const;
+  // As play() chose; like those above before a frame came to it.
+  std::span<const float> playedPositions() const;
+  std::span<const float> playedNormals() const;
+  cs_stage_statistics stages() const;
   std::uint64_t reconstructionHash() const;
   std::uint64_t parametersParticipant() const { return parametersParticipant_; }
   // The newest, and its tick; no cloths before the first.
@@ -92,6 +101,7 @@ class Client {
   std::uint32_t described(Bytes content);
   std::uint32_t frameReceived(Bytes body, std::uint64_t nowUs);
   std::uint32_t packetReceived(std::uint64_t nowUs);
+  void timeFrame(bool key, std::uint64_t nowUs);
   codec::DecodeResult decode(std::span<const std::byte> packet);
   void requestKeyFrame(std::uint64_t nowUs, bool early = false);
   std::uint32_t pongReceived(Bytes body, std::uint64_t nowUs);
@@ -132,6 +142,8 @@ class Client {
   std::uint64_t lastRequestId_ = 0;
   std::uint64_t (*nowUs_)() = nullptr;
   double decodeMs_ = 0;
+  cs_stage_statistics stages_{};  // of the newest frame
+  std::unique_ptr<PlayOut> playOut_;
   std::vector<std::string> scenes_;
   TickEvents events_;
   SimulationReport report_;

@@ -111,11 +111,12 @@ const Element* at(const std::vector<Element>& elements, std::uint32_t index) {
 
 }  // namespace
 
-cs_client* cs_create(const char* scene, const char* client_name) {
+cs_client* cs_create(const char* scene, const char* client_name) noexcept {
   return cs_create_as(scene, client_name, "", CS_ROLE_UNSPECIFIED);
 }
 
-cs_client* cs_create_as(const char* scene, const char* client_name, const char* display_name, uint32_t role) {
+cs_client* cs_create_as(const char* scene, const char* client_name, const char* display_name,
+                        uint32_t role) noexcept {
   assert(scene && client_name && display_name);
   return new cs_client{Client({.scene = scene,
                                .clientName = client_name,
@@ -125,65 +126,65 @@ cs_client* cs_create_as(const char* scene, const char* client_name, const char* 
                                .contentId = 0})};
 }
 
-void cs_destroy(cs_client* client) {
+void cs_destroy(cs_client* client) noexcept {
   delete client;
 }
 
-void cs_set_clock(cs_client* client, uint64_t (*now_us)(void)) {
+void cs_set_clock(cs_client* client, uint64_t (*now_us)(void)) noexcept {
   client->client.setClock(now_us);
 }
 
-uint32_t cs_receive(cs_client* client, const uint8_t* message, size_t bytes, uint64_t now_us) {
+uint32_t cs_receive(cs_client* client, const uint8_t* message, size_t bytes, uint64_t now_us) noexcept {
   return client->client.receive(Bytes(reinterpret_cast<const char*>(message), bytes), now_us);
 }
 
-void cs_update(cs_client* client, uint64_t now_us) {
+void cs_update(cs_client* client, uint64_t now_us) noexcept {
   client->client.update(now_us);
 }
 
-const uint8_t* cs_next_outgoing(cs_client* client, size_t* bytes) {
+const uint8_t* cs_next_outgoing(cs_client* client, size_t* bytes) noexcept {
   const std::string* message = client->client.nextOutgoing();
   *bytes = message ? message->size() : 0;
   return message ? reinterpret_cast<const uint8_t*>(message->data()) : nullptr;
 }
 
-void cs_connecting(cs_client* client, uint64_t now_us) {
+void cs_connecting(cs_client* client, uint64_t now_us) noexcept {
   client->client.connecting(now_us);
 }
 
-void cs_disconnected(cs_client* client, uint64_t now_us) {
+void cs_disconnected(cs_client* client, uint64_t now_us) noexcept {
   client->client.disconnected(now_us);
 }
 
-uint64_t cs_connect_at(const cs_client* client) {
+uint64_t cs_connect_at(const cs_client* client) noexcept {
   return client->client.connectAtUs();
 }
 
-int cs_resumed(const cs_client* client) {
+int cs_resumed(const cs_client* client) noexcept {
   return client->client.resumed() ? 1 : 0;
 }
 
-cs_state cs_get_state(const cs_client* client) {
+cs_state cs_get_state(const cs_client* client) noexcept {
   return client->client.state();
 }
 
-const char* cs_error_text(const cs_client* client) {
+const char* cs_error_text(const cs_client* client) noexcept {
   return client->client.errorText().c_str();
 }
 
-uint32_t cs_error_code(const cs_client* client) {
+uint32_t cs_error_code(const cs_client* client) noexcept {
   return client->client.errorCode();
 }
 
-const char* cs_notice_text(const cs_client* client) {
+const char* cs_notice_text(const cs_client* client) noexcept {
   return client->client.notice().text.c_str();
 }
 
-uint64_t cs_notice_participant(const cs_client* client) {
+uint64_t cs_notice_participant(const cs_client* client) noexcept {
   return client->client.notice().participantId;
 }
 
-void cs_get_statistics(const cs_client* client, uint64_t now_us, cs_statistics* out) {
+void cs_get_statistics(const cs_client* client, uint64_t now_us, cs_statistics* out) noexcept {
   const FrameStatistics& frames = client->client.statistics();
   *out = {};
   out->tick = frames.tick();
@@ -201,30 +202,30 @@ void cs_get_statistics(const cs_client* client, uint64_t now_us, cs_statistics* 
   out->decode_ms = client->client.decodeMs();
 }
 
-const char* cs_server_name(const cs_client* client) {
+const char* cs_server_name(const cs_client* client) noexcept {
   return client->client.welcome().serverName.c_str();
 }
 
-const char* cs_device_name(const cs_client* client) {
+const char* cs_device_name(const cs_client* client) noexcept {
   return client->client.welcome().deviceName.c_str();
 }
 
-const char* cs_scene_name(const cs_client* client) {
+const char* cs_scene_name(const cs_client* client) noexcept {
   return client->client.welcome().scene.c_str();
 }
 
-uint32_t cs_participant_count(const cs_client* client) {
+uint32_t cs_participant_count(const cs_client* client) noexcept {
   return static_cast<std::uint32_t>(client->client.participants().size());
 }
 
-int cs_get_participant(const cs_client* client, uint32_t index, cs_participant* out) {
+int cs_get_participant(const cs_client* client, uint32_t index, cs_participant* out) noexcept {
   const Participant* participant = at(client->client.participants(), index);
   if (!participant) return 0;
   *out = toC(*participant);
   return 1;
 }
 
-int cs_get_presence(const cs_client* client, cs_presence* out) {
+int cs_get_presence(const cs_client* client, cs_presence* out) noexcept {
   const Presence& presence = client->client.presence();
   if (presence.kind == 0) return 0;
   *out = {.kind = presence.kind,
@@ -234,61 +235,61 @@ int cs_get_presence(const cs_client* client, cs_presence* out) {
   return 1;
 }
 
-uint32_t cs_get_role(const cs_client* client) {
+uint32_t cs_get_role(const cs_client* client) noexcept {
   return client->client.welcome().role;
 }
 
-void cs_set_role(cs_client* client, uint64_t participant_id, uint32_t role) {
+void cs_set_role(cs_client* client, uint64_t participant_id, uint32_t role) noexcept {
   client->client.setRole(participant_id, role);
 }
 
-void cs_remove_participant(cs_client* client, uint64_t participant_id) {
+void cs_remove_participant(cs_client* client, uint64_t participant_id) noexcept {
   client->client.remove(participant_id);
 }
 
-uint64_t cs_participant_id(const cs_client* client) {
+uint64_t cs_participant_id(const cs_client* client) noexcept {
   return client->client.welcome().participantId;
 }
 
-uint32_t cs_stream_rate(const cs_client* client) {
+uint32_t cs_stream_rate(const cs_client* client) noexcept {
   return client->client.description().streamRate;
 }
 
-uint32_t cs_simulation_rate(const cs_client* client) {
+uint32_t cs_simulation_rate(const cs_client* client) noexcept {
   return client->client.description().simulationRate;
 }
 
-double cs_stream_seconds(const cs_client* client) {
+double cs_stream_seconds(const cs_client* client) noexcept {
   return client->client.statistics().streamSeconds();
 }
 
-uint32_t cs_vertex_count(const cs_client* client) {
+uint32_t cs_vertex_count(const cs_client* client) noexcept {
   return client->client.description().layout.vertexCount();
 }
 
-const float* cs_positions(const cs_client* client) {
+const float* cs_positions(const cs_client* client) noexcept {
   return client->client.positions().data();
 }
 
-const float* cs_normals(const cs_client* client) {
+const float* cs_normals(const cs_client* client) noexcept {
   return client->client.normals().data();
 }
 
-uint64_t cs_reconstruction_hash(const cs_client* client) {
+uint64_t cs_reconstruction_hash(const cs_client* client) noexcept {
   return client->client.reconstructionHash();
 }
 
-const uint32_t* cs_triangles(const cs_client* client, uint32_t* index_count) {
+const uint32_t* cs_triangles(const cs_client* client, uint32_t* index_count) noexcept {
   const std::vector<std::uint32_t>& triangles = client->client.description().triangles;
   *index_count = static_cast<std::uint32_t>(triangles.size());
   return triangles.data();
 }
 
-uint32_t cs_cloth_count(const cs_client* client) {
+uint32_t cs_cloth_count(const cs_client* client) noexcept {
   return static_cast<std::uint32_t>(client->client.description().cloths.size());
 }
 
-int cs_get_cloth(const cs_client* client, uint32_t index, cs_cloth* out) {
+int cs_get_cloth(const cs_client* client, uint32_t index, cs_cloth* out) noexcept {
   const Description& description = client->client.description();
   const Cloth* cloth = at(description.cloths, index);
   if (!cloth) return 0;
@@ -303,24 +304,24 @@ int cs_get_cloth(const cs_client* client, uint32_t index, cs_cloth* out) {
   return 1;
 }
 
-const float* cs_uvs(const cs_client* client, uint32_t cloth, uint32_t* count) {
+const float* cs_uvs(const cs_client* client, uint32_t cloth, uint32_t* count) noexcept {
   const Cloth* found = at(client->client.description().cloths, cloth);
   *count = found ? static_cast<std::uint32_t>(found->uvs.size() / 2) : 0;
   return *count > 0 ? found->uvs.data() : nullptr;
 }
 
-const uint32_t* cs_uv_indices(const cs_client* client, uint32_t cloth, uint32_t* count) {
+const uint32_t* cs_uv_indices(const cs_client* client, uint32_t cloth, uint32_t* count) noexcept {
   const Cloth* found = at(client->client.description().cloths, cloth);
   *count = found ? static_cast<std::uint32_t>(found->uvIndices.size()) : 0;
   return *count > 0 ? found->uvIndices.data() : nullptr;
 }
 
-uint32_t cs_submesh_count(const cs_client* client, uint32_t cloth) {
+uint32_t cs_submesh_count(const cs_client* client, uint32_t cloth) noexcept {
   const Cloth* found = at(client->client.description().cloths, cloth);
   return found ? static_cast<std::uint32_t>(found->submeshes.size()) : 0;
 }
 
-int cs_get_submesh(const cs_client* client, uint32_t cloth, uint32_t index, cs_submesh* out) {
+int cs_get_submesh(const cs_client* client, uint32_t cloth, uint32_t index, cs_submesh* out) noexcept {
   const Cloth* found = at(client->client.description().cloths, cloth);
   const Submesh* submesh = found ? at(found->submeshes, index) : nullptr;
   if (!submesh) return 0;
@@ -329,11 +330,11 @@ int cs_get_submesh(const cs_client* client, uint32_t cloth, uint32_t index, cs_s
   return 1;
 }
 
-uint32_t cs_collider_count(const cs_client* client) {
+uint32_t cs_collider_count(const cs_client* client) noexcept {
   return static_cast<std::uint32_t>(client->client.colliders().size());
 }
 
-int cs_get_collider(const cs_client* client, uint32_t index, cs_collider* out) {
+int cs_get_collider(const cs_client* client, uint32_t index, cs_collider* out) noexcept {
   const Collider* collider = at(client->client.colliders(), index);
   if (!collider) return 0;
   *out = {};
@@ -349,7 +350,7 @@ int cs_get_collider(const cs_client* client, uint32_t index, cs_collider* out) {
 }
 
 const float* cs_get_hull(const cs_client* client, uint32_t index, uint32_t* vertex_count,
-                         const uint32_t** triangles, uint32_t* index_count) {
+                         const uint32_t** triangles, uint32_t* index_count) noexcept {
   const Collider* collider = at(client->client.colliders(), index);
   const Hull* hull = collider ? hullOf(*collider, client->client.description()) : nullptr;
   *vertex_count = hull ? static_cast<std::uint32_t>(hull->vertices.size() / 3) : 0;
@@ -358,7 +359,7 @@ const float* cs_get_hull(const cs_client* client, uint32_t index, uint32_t* vert
   return hull ? hull->vertices.data() : nullptr;
 }
 
-int cs_get_environment(const cs_client* client, cs_environment* out) {
+int cs_get_environment(const cs_client* client, cs_environment* out) noexcept {
   if (!client->client.described()) return 0;
   const Environment& environment = client->client.description().environment;
   copy(environment.gravity, out->gravity);
@@ -369,7 +370,7 @@ int cs_get_environment(const cs_client* client, cs_environment* out) {
   return 1;
 }
 
-int cs_get_cloth_parameters(const cs_client* client, uint32_t index, cs_cloth_parameters* out) {
+int cs_get_cloth_parameters(const cs_client* client, uint32_t index, cs_cloth_parameters* out) noexcept {
   const Cloth* cloth = at(client->client.description().cloths, index);
   if (!cloth) return 0;
   copy(cloth->parameters.structural, out->structural);
@@ -379,7 +380,7 @@ int cs_get_cloth_parameters(const cs_client* client, uint32_t index, cs_cloth_pa
   return 1;
 }
 
-int cs_get_cloth_settings(const cs_client* client, uint32_t index, cs_cloth_settings* out) {
+int cs_get_cloth_settings(const cs_client* client, uint32_t index, cs_cloth_settings* out) noexcept {
   const Cloth* cloth = at(client->client.description().cloths, index);
   if (!cloth || out->version != CS_CLOTH_SETTINGS_VERSION) return 0;
   const ClothParameters& parameters = cloth->parameters;
@@ -410,7 +411,7 @@ int cs_get_cloth_settings(const cs_client* client, uint32_t index, cs_cloth_sett
   return 1;
 }
 
-int cs_get_cloth_report(const cs_client* client, uint32_t index, cs_cloth_report* out) {
+int cs_get_cloth_report(const cs_client* client, uint32_t index, cs_cloth_report* out) noexcept {
   const SimulationReport& report = client->client.report();
   const ClothReport* cloth = at(report.cloths, index);
   if (!cloth || out->version != CS_CLOTH_REPORT_VERSION) return 0;
@@ -430,25 +431,25 @@ int cs_get_cloth_report(const cs_client* client, uint32_t index, cs_cloth_report
   return 1;
 }
 
-uint32_t cs_material_count(const cs_client* client) {
+uint32_t cs_material_count(const cs_client* client) noexcept {
   return static_cast<std::uint32_t>(client->client.description().materials.size());
 }
 
-const char* cs_material(const cs_client* client, uint32_t index) {
+const char* cs_material(const cs_client* client, uint32_t index) noexcept {
   const std::string* material = at(client->client.description().materials, index);
   return material ? material->c_str() : "";
 }
 
-const char* cs_cloth_material(const cs_client* client, uint32_t cloth) {
+const char* cs_cloth_material(const cs_client* client, uint32_t cloth) noexcept {
   const Cloth* found = at(client->client.description().cloths, cloth);
   return found ? found->parameters.material.c_str() : "";
 }
 
-uint64_t cs_parameters_participant(const cs_client* client) {
+uint64_t cs_parameters_participant(const cs_client* client) noexcept {
   return client->client.parametersParticipant();
 }
 
-void cs_keep_cloth_settings(cs_cloth_settings* out) {
+void cs_keep_cloth_settings(cs_cloth_settings* out) noexcept {
   *out = {.version = CS_CLOTH_SETTINGS_VERSION,
           .structural = {kAsIs, kAsIs},
           .shear = {kAsIs, kAsIs},
@@ -471,7 +472,7 @@ void cs_keep_cloth_settings(cs_cloth_settings* out) {
           .tether_slack = kAsIs};
 }
 
-int cs_change_cloth(cs_client* client, const char* cloth, const cs_cloth_settings* settings) {
+int cs_change_cloth(cs_client* client, const char* cloth, const cs_cloth_settings* settings) noexcept {
   if (settings->version != CS_CLOTH_SETTINGS_VERSION) return 0;
   ParameterChange change;
   const std::string_view name = cloth;
@@ -482,26 +483,26 @@ int cs_change_cloth(cs_client* client, const char* cloth, const cs_cloth_setting
   return 1;
 }
 
-uint32_t cs_grab_event_count(const cs_client* client) {
+uint32_t cs_grab_event_count(const cs_client* client) noexcept {
   return static_cast<std::uint32_t>(client->client.grabEvents().size());
 }
 
-int cs_get_grab_event(const cs_client* client, uint32_t index, cs_grab_event* out) {
+int cs_get_grab_event(const cs_client* client, uint32_t index, cs_grab_event* out) noexcept {
   const cs_grab_event* event = at(client->client.grabEvents(), index);
   if (!event) return 0;
   *out = *event;
   return 1;
 }
 
-void cs_want_contacts(cs_client* client, int wants, uint64_t now_us) {
+void cs_want_contacts(cs_client* client, int wants, uint64_t now_us) noexcept {
   client->client.wantContacts(wants != 0, now_us);
 }
 
-uint32_t cs_contact_event_count(const cs_client* client) {
+uint32_t cs_contact_event_count(const cs_client* client) noexcept {
   return static_cast<std::uint32_t>(client->client.contactEvents().size());
 }
 
-int cs_get_contact_event(const cs_client* client, uint32_t index, cs_contact_event* out) {
+int cs_get_contact_event(const cs_client* client, uint32_t index, cs_contact_event* out) noexcept {
   const ContactEvent* event = at(client->client.contactEvents(), index);
   if (!event) return 0;
   *out = {.kind = event->kind,
@@ -514,7 +515,7 @@ int cs_get_contact_event(const cs_client* client, uint32_t index, cs_contact_eve
   return 1;
 }
 
-void cs_set_colliders(cs_client* client, const float* spheres, uint32_t count, uint64_t now_us) {
+void cs_set_colliders(cs_client* client, const float* spheres, uint32_t count, uint64_t now_us) noexcept {
   std::array<cs_own_collider, CS_MAX_COLLIDERS> colliders{};
   count = std::min(count, CS_MAX_COLLIDERS);
   for (std::uint32_t i = 0; i < count; ++i) {
@@ -526,23 +527,25 @@ void cs_set_colliders(cs_client* client, const float* spheres, uint32_t count, u
   cs_set_shapes(client, colliders.data(), count, now_us);
 }
 
-void cs_set_shapes(cs_client* client, const cs_own_collider* colliders, uint32_t count, uint64_t now_us) {
+void cs_set_shapes(cs_client* client, const cs_own_collider* colliders, uint32_t count,
+                   uint64_t now_us) noexcept {
   client->client.setColliders(std::span(colliders, std::min(count, CS_MAX_COLLIDERS)), now_us);
 }
 
-int cs_set_hand(cs_client* client, uint32_t side, const float* joints, uint32_t count, uint64_t now_us) {
+int cs_set_hand(cs_client* client, uint32_t side, const float* joints, uint32_t count,
+                uint64_t now_us) noexcept {
   if (side != CS_HAND_LEFT && side != CS_HAND_RIGHT) return 0;
   if (count != 0 && count != CS_HAND_JOINTS && count != CS_HAND_JOINTS - 1) return 0;
   client->client.setHand(side, std::span(joints, std::size_t{4} * count), now_us);
   return 1;
 }
 
-void cs_set_grabs(cs_client* client, const cs_grab* grabs, uint32_t count, uint64_t now_us) {
+void cs_set_grabs(cs_client* client, const cs_grab* grabs, uint32_t count, uint64_t now_us) noexcept {
   client->client.setGrabs(std::span(grabs, std::min(count, CS_MAX_GRABS)), now_us);
 }
 
 void cs_move_attachment(cs_client* client, const char* attachment, const float* position3,
-                        const float* orientation4, uint64_t now_us) {
+                        const float* orientation4, uint64_t now_us) noexcept {
   AttachmentPose pose{.name = attachment};
   std::copy(position3, position3 + 3, pose.position.begin());
   if (orientation4 != nullptr) std::copy(orientation4, orientation4 + 4, pose.orientation.begin());
@@ -550,7 +553,7 @@ void cs_move_attachment(cs_client* client, const char* attachment, const float* 
 }
 
 void cs_set_environment(cs_client* client, const float* gravity3, const float* wind3,
-                        const float* air_density) {
+                        const float* air_density) noexcept {
   ParameterChange change;
   change.gravity = vec3(gravity3);
   change.wind = vec3(wind3);
@@ -558,13 +561,13 @@ void cs_set_environment(cs_client* client, const float* gravity3, const float* w
   client->client.change(change);
 }
 
-void cs_set_gust(cs_client* client, float strength, float seconds) {
+void cs_set_gust(cs_client* client, float strength, float seconds) noexcept {
   ParameterChange change;
   change.gust = Gust{strength, seconds};
   client->client.change(change);
 }
 
-void cs_set_material(cs_client* client, const char* cloth, const char* material) {
+void cs_set_material(cs_client* client, const char* cloth, const char* material) noexcept {
   ParameterChange change;
   ClothChange& clothChange = change.cloths.emplace_back();
   clothChange.name = cloth;
@@ -573,7 +576,7 @@ void cs_set_material(cs_client* client, const char* cloth, const char* material)
 }
 
 void cs_set_cloth(cs_client* client, const char* cloth, const float* structural2, const float* shear2,
-                  const float* bend2, const float* damping) {
+                  const float* bend2, const float* damping) noexcept {
   ParameterChange change;
   ClothChange& clothChange = change.cloths.emplace_back();
   clothChange.name = cloth;
@@ -584,47 +587,83 @@ void cs_set_cloth(cs_client* client, const char* cloth, const float* structural2
   client->client.change(change);
 }
 
-void cs_set_collider(cs_client* client, const char* collider, const float* position3, const float* radius) {
+void cs_set_collider(cs_client* client, const char* collider, const float* position3,
+                     const float* radius) noexcept {
   const std::optional<Vec3> position = vec3(position3);
   client->client.change(ColliderChange{collider, position ? &*position : nullptr, radius});
 }
 
-void cs_request_key_frame(cs_client* client, uint64_t now_us) {
+void cs_default_play_out(cs_play_out_options* out) noexcept {
+  *out = {.version = CS_PLAY_OUT_OPTIONS_VERSION,
+          .frames = 32,
+          .delay_ms = std::numeric_limits<double>::quiet_NaN(),
+          .least_delay_ms = 0,
+          .most_delay_ms = 250,
+          .lead_ms = 30};
+}
+
+int cs_set_play_out(cs_client* client, const cs_play_out_options* options) noexcept {
+  return client->client.setPlayOut(options) ? 1 : 0;
+}
+
+int cs_play_out(cs_client* client, uint64_t now_us, uint64_t display_time_us, cs_played* out) noexcept {
+  if (out && out->version != CS_PLAYED_VERSION) return 0;
+  const std::optional<cs_played> played = client->client.play(now_us, display_time_us);
+  if (!played) return 0;
+  if (out) *out = *played;
+  return 1;
+}
+
+const float* cs_played_positions(const cs_client* client) noexcept {
+  return client->client.playedPositions().data();
+}
+
+const float* cs_played_normals(const cs_client* client) noexcept {
+  return client->client.playedNormals().data();
+}
+
+int cs_get_stage_statistics(const cs_client* client, cs_stage_statistics* out) noexcept {
+  if (out->version != CS_STAGE_STATISTICS_VERSION) return 0;
+  *out = client->client.stages();
+  return 1;
+}
+
+void cs_request_key_frame(cs_client* client, uint64_t now_us) noexcept {
   client->client.requestEarlyKeyFrame(now_us);
 }
 
-int cs_get_playback(const cs_client* client, uint64_t now_us, cs_playback* out) {
+int cs_get_playback(const cs_client* client, uint64_t now_us, cs_playback* out) noexcept {
   const auto playback = client->client.playback(now_us);
   if (!playback) return 0;
   *out = *playback;
   return 1;
 }
 
-void cs_pause(cs_client* client, int paused) {
+void cs_pause(cs_client* client, int paused) noexcept {
   client->client.control({.paused = paused != 0});
 }
 
-void cs_seek(cs_client* client, double seconds) {
+void cs_seek(cs_client* client, double seconds) noexcept {
   client->client.control({.seek = seconds});
 }
 
-void cs_set_speed(cs_client* client, double speed) {
+void cs_set_speed(cs_client* client, double speed) noexcept {
   client->client.control({.speed = speed});
 }
 
-void cs_set_loop(cs_client* client, int loop) {
+void cs_set_loop(cs_client* client, int loop) noexcept {
   client->client.control({.loop = loop != 0});
 }
 
-void cs_list_scenes(cs_client* client) {
+void cs_list_scenes(cs_client* client) noexcept {
   client->client.listScenes();
 }
 
-uint32_t cs_scene_count(const cs_client* client) {
+uint32_t cs_scene_count(const cs_client* client) noexcept {
   return static_cast<std::uint32_t>(client->client.scenes().size());
 }
 
-const char* cs_scene(const cs_client* client, uint32_t index) {
+const char* cs_scene(const cs_client* client, uint32_t index) noexcept {
   const std::string* scene = at(client->client.scenes(), index);
   return scene ? scene->c_str() : "";
 }

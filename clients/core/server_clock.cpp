@@ -6,14 +6,6 @@
 #include <cmath>
 
 namespace clothstream::client {
-namespace {
-
-// The difference of two unsigned clocks, read as signed, is right whichever is ahead.
-double since(std::uint64_t before, std::uint64_t now) {
-  return static_cast<double>(static_cast<std::int64_t>(now - before));
-}
-
-}  // namespace
 
 bool ServerClock::pingDue(std::uint64_t nowUs) const {
   return !pinged_ || nowUs - lastPingUs_ >= (burst_ > 0 ? kFirstIntervalUs : kIntervalUs);

@@ -12,6 +12,11 @@
 
 namespace clothstream::client {
 
+// Of two times of an unsigned clock: read as signed, the difference is right whichever is ahead.
+constexpr double since(std::uint64_t before, std::uint64_t now) {
+  return static_cast<double>(static_cast<std::int64_t>(now - before));
+}
+
 // A ping's server time was true somewhere between its sending and its pong: the offset lies within half a
 // round trip of the middle. Queues only ever lengthen a round trip, so those exchanges are believed whose
 // round trips are among the shortest quarter of the last minutes; a line through their offsets says where the

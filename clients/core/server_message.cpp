@@ -332,6 +332,7 @@ std::optional<Chunk> readChunk(Bytes message) {
 
 bool readFrame(Bytes message, Frame& frame) {
   frame.packet = {};
+  frame.tickTimeUs = frame.packetTimeUs = 0;
   frame.reconstructionHash = 0;
   frame.colliders.clear();
   frame.report.reset();
@@ -339,6 +340,10 @@ bool readFrame(Bytes message, Frame& frame) {
     switch (field) {
       case bytes(1):
         return set(frame.packet, reader.get_view());
+      case varint(2):
+        return set(frame.tickTimeUs, reader.get_uint64());
+      case varint(3):
+        return set(frame.packetTimeUs, reader.get_uint64());
       case fixed64(4):
         return set(frame.reconstructionHash, reader.get_fixed64());
       case bytes(6):

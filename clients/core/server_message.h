@@ -106,6 +106,7 @@ struct SimulationReport {
 
 struct Frame {
   Bytes packet;
+  std::uint64_t tickTimeUs = 0, packetTimeUs = 0;  // on the server's clock
   std::uint64_t reconstructionHash = 0;
   std::vector<Bytes> colliders;  // serialised ColliderStates
   std::optional<Bytes> report;   // a serialised SimulationReport

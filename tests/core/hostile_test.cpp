@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: MIT
 // Bytes that no server would send: whatever comes, the client says so and lives.
+#include <csignal>
+#include <cstdlib>
 #include <random>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
 #include "clients/core/wire.h"
 #include "tests/core/scripted_server.h"
@@ -39,7 +42,8 @@ void readAll(ClientUnderTest& client) {
   const std::uint32_t vertices = cs_vertex_count(client.get());
   float sum = 0;
   for (std::uint32_t i = 0; i < 3 * vertices; ++i)
-    sum += cs_positions(client.get())[i] + cs_normals(client.get())[i];
+    sum += cs_positions(client.get())[i] + cs_normals(client.get())[i] +
+           cs_played_positions(client.get())[i] + cs_played_normals(client.get())[i];
   std::uint32_t indices = 0;
   const std::uint32_t* triangles = cs_triangles(client.get(), &indices);
   for (std::uint32_t i = 0; i < indices; ++i) ASSERT_LT(triangles[i], vertices);
@@ -58,9 +62,13 @@ void readAll(ClientUnderTest& client) {
 // Messages before `index` as they are, then `spoilt`, then the rest.
 void runSession(const std::vector<std::string>& messages, std::size_t index, const std::string& spoilt) {
   ClientUnderTest client;
+  cs_play_out_options options;
+  cs_default_play_out(&options);
+  cs_set_play_out(client.get(), &options);
   for (std::size_t i = 0; i < messages.size(); ++i) {
     client.receive(i == index ? spoilt : messages[i], i * 1000);
     cs_update(client.get(), i * 1000);
+    cs_play_out(client.get(), i * 1000, i * 1000, nullptr);
   }
   readAll(client);
 }
@@ -121,6 +129,23 @@ TEST(Hostile, FieldsAndBodiesThatAreNotKnownAreSkipped) {
   client.receive(server.welcome() + unknown);
   client.receive(server.chunks()[0] + unknown);
   EXPECT_EQ(client.receive(server.frame(1) + unknown), static_cast<std::uint32_t>(CS_EVENT_FRAME));
+}
+
+TEST(Interface, NoExceptionLeavesIt) {
+#ifdef __SANITIZE_ADDRESS__
+  GTEST_SKIP() << "the sanitizer's allocator ends the program itself";
+#endif
+  // Lack of memory is the only reason for one.
+  const auto runOutOfMemory = [] {
+    const rlimit none{};
+    setrlimit(RLIMIT_DATA, &none);
+    try {
+      for (;;) cs_create("curtain", "test");
+    } catch (...) {
+      std::_Exit(0);
+    }
+  };
+  EXPECT_EXIT(runOutOfMemory(), ::testing::KilledBySignal(SIGABRT), "");
 }
 
 TEST(Wire, RefusesWhatProtobufWouldRefuse) {

@@ -29,6 +29,8 @@ nlohmann::json json(const Observation& seen) {
           {"reconstructionHash", hash(seen.reconstructionHash)},
           {"positionsHash", hash(seen.positionsHash)},
           {"normalsHash", hash(seen.normalsHash)},
+          {"playedPositionsHash", hash(seen.playedPositionsHash)},
+          {"playedNormalsHash", hash(seen.playedNormalsHash)},
           {"triangleCount", seen.triangleCount},
           {"outgoingHash", hash(seen.outgoingHash)},
           // In hexadecimal: spoilt text need not be UTF-8.
@@ -50,7 +52,7 @@ int main(int argc, char** argv) {
     sessions.push_back({{"name", session.name}, {"messages", messages}, {"expected", expected}});
   }
   std::ofstream file(argv[1]);
-  file << nlohmann::json{{"stepUs", kStepUs}, {"sessions", sessions}};
+  file << nlohmann::json{{"stepUs", kStepUs}, {"playOutDelayMs", kPlayOutDelayMs}, {"sessions", sessions}};
   file.flush();
   return file ? 0 : 1;
 }

@@ -11,15 +11,21 @@
 namespace clothstream::client {
 namespace {
 
+constexpr std::uint64_t kServerAheadUs = 60'000'000, kTickUs = 13'889;
+
 Session streamOf(const std::string& name, ScriptedStream stream) {
   ScriptedServer server(std::move(stream));
   Session session{name, {server.welcome()}};
   for (std::string& chunk : server.chunks(400)) session.messages.push_back(std::move(chunk));
+  // To the ping that was sent at the message before.
+  const std::uint64_t pingUs = (session.messages.size() - 1) * kStepUs;
+  session.messages.push_back(ScriptedServer::pong(pingUs, pingUs + kServerAheadUs));
   for (std::uint64_t tick = 1; tick <= 12; ++tick) {
     // One frame is lost, and a key frame comes two frames later.
     const auto kind = tick == 8 ? codec::PacketKind::key : codec::PacketKind::predicted;
-    std::string frame = server.frame(tick, kind);
-    if (tick != 6) session.messages.push_back(std::move(frame));
+    v1::Frame frame = server.frameMessage(tick, kind);
+    frame.set_tick_time_us(pingUs + kServerAheadUs + tick * kTickUs);
+    if (tick != 6) session.messages.push_back(ScriptedServer::serialise(frame));
   }
   session.messages.push_back(
       ScriptedServer::error(v1::ERROR_CODE_INVALID_ARGUMENT, "wind: 1e9 is too much", false));
@@ -65,6 +71,8 @@ Observation observe(cs_client* client, std::uint32_t events) {
           .reconstructionHash = cs_reconstruction_hash(client),
           .positionsHash = hashOf(cs_positions(client), vertices),
           .normalsHash = hashOf(cs_normals(client), vertices),
+          .playedPositionsHash = hashOf(cs_played_positions(client), vertices),
+          .playedNormalsHash = hashOf(cs_played_normals(client), vertices),
           .triangleCount = indices / 3,
           .outgoingHash = hashOfOutgoing(client),
           .errorText = cs_error_text(client)};
@@ -127,10 +135,15 @@ std::vector<Session> recordedSessions() {
 
 std::vector<Observation> replay(const Session& session) {
   ClientUnderTest client;
+  cs_play_out_options options;
+  cs_default_play_out(&options);
+  options.delay_ms = kPlayOutDelayMs;
+  cs_set_play_out(client.get(), &options);
   std::vector<Observation> observations;
   for (std::size_t i = 0; i < session.messages.size(); ++i) {
     const std::uint32_t events = client.receive(session.messages[i], i * kStepUs);
     cs_update(client.get(), i * kStepUs);
+    cs_play_out(client.get(), i * kStepUs, i * kStepUs, nullptr);
     observations.push_back(observe(client.get(), events));
   }
   return observations;

@@ -22,7 +22,7 @@ struct Observation {
   std::uint64_t tick = 0, decodeErrors = 0, hashMismatches = 0;
   std::uint64_t reconstructionHash = 0;
   // hashFloats, zero where there are no vertices.
-  std::uint64_t positionsHash = 0, normalsHash = 0;
+  std::uint64_t positionsHash = 0, normalsHash = 0, playedPositionsHash = 0, playedNormalsHash = 0;
   std::uint32_t triangleCount = 0;
   std::uint64_t outgoingHash = 0;  // FNV-1a of all that the client wants to send
   std::string errorText;
@@ -38,6 +38,7 @@ Session goldenSession(const std::string& stream);
 
 // One after each message, message i arriving at i * kStepUs.
 inline constexpr std::uint64_t kStepUs = 14'000;
+inline constexpr double kPlayOutDelayMs = 45;
 std::vector<Observation> replay(const Session& session);
 
 // Numbers as a description has them.

@@ -6,7 +6,7 @@ import { readFileSync } from "node:fs";
 
 const [modulePath, sessionsPath, goldenPath] = process.argv.slice(2);
 const module = new WebAssembly.Module(readFileSync(modulePath));
-const { stepUs, sessions } = JSON.parse(readFileSync(sessionsPath));
+const { stepUs, playOutDelayMs, sessions } = JSON.parse(readFileSync(sessionsPath));
 const golden = JSON.parse(readFileSync(goldenPath));
 
 assert.deepEqual(WebAssembly.Module.imports(module), [], "the core does no input or output");
@@ -72,6 +72,8 @@ function observe(client, events) {
     reconstructionHash: hex64(core.cs_reconstruction_hash(client)),
     positionsHash: hex64(floatsHash(core.cs_positions(client), vertices)),
     normalsHash: hex64(floatsHash(core.cs_normals(client), vertices)),
+    playedPositionsHash: hex64(floatsHash(core.cs_played_positions(client), vertices)),
+    playedNormalsHash: hex64(floatsHash(core.cs_played_normals(client), vertices)),
     triangleCount: word(scratch) / 3,
     outgoingHash: hex64(outgoingHash(client)),
     errorText: Buffer.from(text(core.cs_error_text(client))).toString("hex"),
@@ -82,6 +84,9 @@ function replay(session) {
   const names = [copyIn(Buffer.from("curtain\0")), copyIn(Buffer.from("test\0"))];
   const client = core.cs_create(...names);
   names.forEach(core.free);
+  core.cs_default_play_out(scratch);
+  new DataView(core.memory.buffer, scratch).setFloat64(8, playOutDelayMs, true); // delay_ms
+  assert.equal(core.cs_set_play_out(client, scratch), 1);
   const observations = session.messages.map((message, index) => {
     const nowUs = BigInt(index * stepUs);
     const data = Buffer.from(message, "hex");
@@ -89,6 +94,7 @@ function replay(session) {
     const events = core.cs_receive(client, pointer, data.length, nowUs);
     core.free(pointer);
     core.cs_update(client, nowUs);
+    core.cs_play_out(client, nowUs, nowUs, 0);
     return observe(client, events);
   });
   core.cs_destroy(client);
@@ -115,6 +121,9 @@ for (const session of sessions) {
 }
 assert(golden.every(({ seen }) => seen), "every golden stream was replayed");
 assert(failed > 50, "spoilt bytes were noticed");
+const decodedPositions = new Set(sessions[0].expected.map(({ positionsHash }) => positionsHash));
+const blended = sessions[0].expected.filter(({ playedPositionsHash }) => !decodedPositions.has(playedPositionsHash));
+assert(blended.length > 3, "play-out showed what lies between frames");
 const growth = core.memory.buffer.byteLength;
 for (let run = 0; run < 200; ++run) replay(sessions[0]);
 assert.equal(core.memory.buffer.byteLength, growth, "a client that is gone leaves nothing behind");

@@ -1,0 +1,195 @@
+// SPDX-License-Identifier: MIT
+// A ring of frames, a delay that follows what is late, lines between two frames.
+#include "clients/core/play_out.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "clients/core/server_clock.h"
+#include "proto/codec/vertex_normals.h"
+
+namespace clothstream::client {
+namespace {
+
+constexpr double kMostDelayMs = 10'000, kMostLeadMs = 1000;
+constexpr std::uint32_t kMostFrames = 256;
+
+// Not of NaN.
+bool isWithin(double number, double most) {
+  return number >= 0 && number <= most;
+}
+
+bool isUnit(float squared) {
+  return squared >= 1e-30f && std::isfinite(squared);
+}
+
+}  // namespace
+
+bool isAllowed(const cs_play_out_options& options) {
+  return options.version == CS_PLAY_OUT_OPTIONS_VERSION && options.frames >= PlayOut::kFewestFrames &&
+         options.frames <= kMostFrames &&
+         (std::isnan(options.delay_ms) || isWithin(options.delay_ms, kMostDelayMs)) &&
+         isWithin(options.most_delay_ms, kMostDelayMs) &&
+         isWithin(options.least_delay_ms, options.most_delay_ms) && isWithin(options.lead_ms, kMostLeadMs);
+}
+
+void PlayOut::begin(const Description& description) {
+  const codec::StreamLayout& layout = description.layout;
+  sendsNormals_ = layout.normals != codec::NormalMode::none;
+  frameUs_ = 1e6 / description.streamRate;
+  const std::size_t frameBytes = layout.vertexCount() * (sendsNormals_ ? 6 : 3) * sizeof(float);
+  frames_.assign(std::clamp<std::size_t>(kMostBytes / frameBytes, kFewestFrames, options_.frames), {});
+  positions_ = {};
+  normals_ = {};
+  forget();
+}
+
+void PlayOut::forget() {
+  count_ = sampleCount_ = 0;
+  plays_ = false;
+  shown_ = {};
+}
+
+std::size_t PlayOut::held() const {
+  return std::min(count_, frames_.size());
+}
+
+const PlayOut::Frame& PlayOut::newest(std::size_t back) const {
+  return frames_[(count_ - 1 - back) % frames_.size()];
+}
+
+void PlayOut::add(const DisplayableFrame& frame, std::uint64_t displayableUs) {
+  if (count_ > 0 && since(newest(0).timeUs, frame.timeUs) <= 0) forget();
+  if (count_ > 0 && displayableUs != 0) sample(since(newest(0).timeUs, displayableUs));
+  if (plays_ && since(timeUs_, frame.timeUs) < 0) ++lateFrames_;
+  Frame& slot = frames_[count_++ % frames_.size()];
+  slot.tick = frame.tick;
+  slot.timeUs = frame.timeUs;
+  slot.key = frame.key;
+  slot.positions.assign(frame.positions.begin(), frame.positions.end());
+  slot.normals.assign(frame.normals.begin(), frame.normals.end());
+}
+
+void PlayOut::sample(double neededUs) {
+  samples_[sampleCount_++ % kSamples] = neededUs;
+  const std::size_t count = std::min(sampleCount_, kSamples);
+  const auto first = sorted_.begin(), last = first + static_cast<std::ptrdiff_t>(count);
+  std::copy_n(samples_.begin(), count, first);
+  const auto at = first + static_cast<std::ptrdiff_t>(kPercentile * static_cast<double>(count - 1));
+  std::nth_element(first, at, last);
+  neededUs_ = *at;
+}
+
+void PlayOut::moveDelay(double aheadUs, double elapsedUs) {
+  // What is displayed later is asked for before the frames that come meanwhile are here.
+  wantedUs_ = std::clamp(neededUs_ + aheadUs, 1000 * options_.least_delay_ms, 1000 * options_.most_delay_ms);
+  const double most = kSlew * elapsedUs;
+  delayUs_ = plays_ ? delayUs_ + std::clamp(wantedUs_ - delayUs_, -most, most) : wantedUs_;
+}
+
+cs_played PlayOut::play(std::uint64_t nowUs, std::uint64_t displayUs) {
+  cs_played played{};
+  played.version = CS_PLAYED_VERSION;
+  shown_ = {};
+  hasNormals_ = false;
+  if (count_ == 0) return played;
+  const bool adapts = std::isnan(options_.delay_ms);
+  if (displayUs == 0 || (adapts && sampleCount_ == 0)) {
+    shown_.base = &newest(0);
+    played.shown = CS_SHOWN_HELD;
+    played.tick = shown_.base->tick;
+    return played;
+  }
+  if (adapts) {
+    moveDelay(since(nowUs, displayUs), plays_ ? std::max(0.0, since(displayUs_, displayUs)) : 0);
+  } else {
+    delayUs_ = wantedUs_ = 1000 * options_.delay_ms;
+  }
+  const std::uint64_t timeUs = displayUs - static_cast<std::uint64_t>(std::llround(delayUs_));
+  played.shown = choose(timeUs);
+  if (plays_ && since(newest(0).timeUs, timeUs) > 0)
+    (played.shown == CS_SHOWN_LED_ON ? ledOnUs_ : heldUs_) += std::max(0.0, since(timeUs_, timeUs));
+  if (shown_.fraction != 0) blend(&Frame::positions, positions_);
+  displayUs_ = displayUs;
+  timeUs_ = played.server_time_us = timeUs;
+  plays_ = true;
+  played.tick = shown_.base->tick;
+  played.fraction = shown_.fraction;
+  return played;
+}
+
+cs_shown PlayOut::choose(std::uint64_t timeUs) {
+  std::size_t back = 0;
+  while (back + 1 < held() && since(newest(back).timeUs, timeUs) < 0) ++back;
+  const Frame& frame = newest(back);
+  const double past = since(frame.timeUs, timeUs);
+  shown_.base = &frame;
+  if (past == 0) return CS_SHOWN_FRAME;
+  if (past < 0) return CS_SHOWN_HELD;
+  if (back == 0) return chooseBeyond(frame, past);
+  const Frame& next = newest(back - 1);
+  shown_ = {&frame, &frame, &next, past / since(frame.timeUs, next.timeUs)};
+  return CS_SHOWN_BETWEEN;
+}
+
+cs_shown PlayOut::chooseBeyond(const Frame& frame, double pastUs) {
+  const double most = 1000 * options_.lead_ms;
+  const double lead = pastUs <= most ? pastUs : 2 * most - pastUs;
+  if (lead <= 0 || held() < 2 || frame.key) return CS_SHOWN_HELD;
+  const Frame& before = newest(1);
+  // Frames of a server that catches up are nearer in time than their motion.
+  const double step = std::max(frameUs_, since(before.timeUs, frame.timeUs));
+  shown_ = {&frame, &before, &frame, lead / step};
+  return CS_SHOWN_LED_ON;
+}
+
+void PlayOut::blend(std::vector<float> Frame::*values, std::vector<float>& out) const {
+  const float* base = (shown_.base->*values).data();
+  const float* from = (shown_.from->*values).data();
+  const float* to = (shown_.to->*values).data();
+  const auto fraction = static_cast<float>(shown_.fraction);
+  out.resize((shown_.base->*values).size());
+  for (std::size_t i = 0; i < out.size(); ++i) out[i] = base[i] + (to[i] - from[i]) * fraction;
+}
+
+std::span<const float> PlayOut::positions() const {
+  return shown_.fraction != 0 ? positions_ : shown_.base->positions;
+}
+
+std::span<const float> PlayOut::normals(const codec::StreamLayout& layout) {
+  const std::vector<float>& own = shown_.base->normals;
+  if (sendsNormals_ && shown_.fraction == 0) return own;
+  if (hasNormals_) return normals_;
+  hasNormals_ = true;
+  if (!sendsNormals_) {
+    normals_.resize(shown_.base->positions.size());
+    codec::computeVertexNormals(layout, positions().data(), normals_.data());
+    return normals_;
+  }
+  blend(&Frame::normals, normals_);
+  for (std::size_t i = 0; i < normals_.size(); i += 3) {
+    float* n = &normals_[i];
+    const float squared = n[0] * n[0] + n[1] * n[1] + n[2] * n[2];
+    // Opposite ones may cancel.
+    if (!isUnit(squared)) {
+      std::copy_n(&own[i], 3, n);
+      continue;
+    }
+    const float scale = 1.0f / std::sqrt(squared);
+    for (int axis = 0; axis < 3; ++axis) n[axis] *= scale;
+  }
+  return normals_;
+}
+
+void PlayOut::report(cs_stage_statistics& out) const {
+  out.frames_waiting = 0;
+  while (plays_ && out.frames_waiting < held() && since(timeUs_, newest(out.frames_waiting).timeUs) > 0)
+    ++out.frames_waiting;
+  out.late_frames = lateFrames_;
+  out.led_on_ms = ledOnUs_ / 1000;
+  out.held_ms = heldUs_ / 1000;
+  out.delay_ms = delayUs_ / 1000;
+  out.wanted_delay_ms = wantedUs_ / 1000;
+}
+
+}  // namespace clothstream::client
