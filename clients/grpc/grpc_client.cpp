@@ -1,15 +1,14 @@
 // SPDX-License-Identifier: MIT
-// One call at a time, one completion queue, one thread that owns all of it.
+// One call at a time, one completion queue, one thread for it; a mutex for all but its waiting.
 #include "clients/grpc/grpc_client.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cassert>
 #include <condition_variable>
-#include <future>
 #include <mutex>
 #include <thread>
 #include <utility>
-#include <vector>
 
 #include <fmt/format.h>
 #include <grpcpp/alarm.h>
@@ -63,8 +62,8 @@ class GrpcClient::Stream {
   ~Stream() {
     {
       const std::lock_guard lock(mutex_);
-      closing_ = true;
-      wakeLocked();
+      leaving_ = true;
+      wake();
     }
     thread_.join();
   }
@@ -74,8 +73,8 @@ class GrpcClient::Stream {
     const auto deadline = SteadyClock::now() + options_.joinTimeout;
     std::unique_lock lock(mutex_);
     while (SteadyClock::now() < deadline) {
-      const auto wake = std::min(deadline, SteadyClock::now() + kCancelInterval);
-      if (changed_.wait_until(lock, wake, [&] { return joined_ || ended_; })) return ended_;
+      const auto until = std::min(deadline, SteadyClock::now() + kCancelInterval);
+      if (changed_.wait_until(lock, until, [&] { return wasJoined_ || ended_; })) return ended_;
       if (options_.cancelled && options_.cancelled())
         return Failure{Failure::Kind::unreachable, fmt::format("Gave up before {} answered.", address_)};
     }
@@ -86,18 +85,25 @@ class GrpcClient::Stream {
                     address_, seconds(options_.joinTimeout))};
   }
 
-  void visit(const std::function<void(cs_client*)>& task) {
+  void lock() {
     assert(std::this_thread::get_id() != thread_.get_id());
-    Task packaged(task);
-    std::future<void> done = packaged.get_future();
-    {
-      const std::lock_guard lock(mutex_);
-      // Nobody else touches the client any more.
-      if (ended_) return task(core_.get());
-      tasks_.push_back(std::move(packaged));
-      wakeLocked();
-    }
-    done.get();
+    std::unique_lock lock(mutex_);
+    turn_.wait(lock, [&] { return !threadWaits_; });
+    lock.release();
+  }
+
+  void unlock() {
+    wake();
+    mutex_.unlock();
+  }
+
+  cs_client* core() const { return core_.get(); }
+
+  std::uint32_t wait(std::chrono::milliseconds timeout) {
+    std::unique_lock lock(mutex_);
+    changed_.wait_for(lock, timeout, [&] { return news_ || ended_; });
+    news_ = false;
+    return std::exchange(events_, 0);
   }
 
   std::optional<Failure> ended() const {
@@ -106,10 +112,8 @@ class GrpcClient::Stream {
   }
 
  private:
-  using Task = std::packaged_task<void(cs_client*)>;
-
-  // Only one alarm is on its way: the queue's owner takes all that waits.
-  void wakeLocked() {
+  // Has the thread look at what is to be sent. Only one alarm is on its way.
+  void wake() {
     if (wakeUnderway_ || ended_) return;
     wakeUnderway_ = true;
     alarm_.Set(&queue_, SystemClock::now(), tagOf(kWoken));
@@ -130,6 +134,7 @@ class GrpcClient::Stream {
   };
 
   void run() {
+    const std::lock_guard lock(mutex_);
     do {
       connect();
       while (call_->underway > 0) step(SystemClock::now() + kUpdateInterval);
@@ -140,7 +145,12 @@ class GrpcClient::Stream {
   void step(SystemClock::time_point until) {
     void* tag = nullptr;
     bool ok = false;
+    mutex_.unlock();
     const auto next = queue_.AsyncNext(&tag, &ok, until);
+    threadWaits_ = true;
+    mutex_.lock();
+    threadWaits_ = false;
+    turn_.notify_all();
     if (next == grpc::CompletionQueue::GOT_EVENT)
       completed(static_cast<Operation>(reinterpret_cast<std::intptr_t>(tag)), ok);
     update();
@@ -163,7 +173,7 @@ class GrpcClient::Stream {
     if (!tries || leaving_ || cs_get_state(core_.get()) == CS_STATE_FAILED) return false;
     triesToComeBack_ = true;
     cs_disconnected(core_.get(), GrpcClient::nowUs());
-    onEvents_(core_.get(), 0);
+    announce(0);
     for (;;) {
       const std::uint64_t now = GrpcClient::nowUs(), at = cs_connect_at(core_.get());
       if (leaving_ || SteadyClock::now() >= giveUpAt) return false;
@@ -176,11 +186,8 @@ class GrpcClient::Stream {
 
   void completed(Operation operation, bool ok) {
     if (operation == kWoken) {
-      {
-        const std::lock_guard lock(mutex_);
-        wakeUnderway_ = false;
-      }
-      return takeTasks();
+      wakeUnderway_ = false;
+      return;
     }
     --call_->underway;
     switch (operation) {
@@ -221,21 +228,10 @@ class GrpcClient::Stream {
   void announce(std::uint32_t events) {
     onEvents_(core_.get(), events);
     if (cs_get_state(core_.get()) == CS_STATE_JOINED) cutOffAt_.reset();
-    if ((events & CS_EVENT_DESCRIPTION) == 0) return;
-    wasJoined_ = true;
-    const std::lock_guard lock(mutex_);
-    joined_ = true;
+    if ((events & CS_EVENT_DESCRIPTION) != 0) wasJoined_ = true;
+    events_ |= events;
+    news_ = true;
     changed_.notify_all();
-  }
-
-  void takeTasks() {
-    std::vector<Task> tasks;
-    {
-      const std::lock_guard lock(mutex_);
-      tasks.swap(tasks_);
-      leaving_ |= closing_;
-    }
-    for (auto& task : tasks) task(core_.get());
   }
 
   void update() {
@@ -301,16 +297,7 @@ class GrpcClient::Stream {
   }
 
   void end() {
-    {
-      std::unique_lock lock(mutex_);
-      // From ended_ on, visitors run their tasks themselves: ours must be done.
-      while (!tasks_.empty()) {
-        lock.unlock();
-        takeTasks();
-        lock.lock();
-      }
-      ended_ = reason();
-    }
+    ended_ = reason();
     changed_.notify_all();
     alarm_.Cancel();
     queue_.Shutdown();
@@ -320,19 +307,20 @@ class GrpcClient::Stream {
     }
   }
 
-  // Before the thread starts, and shared.
   const std::string address_;
   const GrpcClientOptions options_;
   const OnEvents onEvents_;
-  mutable std::mutex mutex_;
-  std::condition_variable changed_;
-  std::vector<Task> tasks_;  // guarded by mutex_, as all down to alarm_
-  bool joined_ = false, closing_ = false, wakeUnderway_ = false;
-  std::optional<Failure> ended_;
   grpc::CompletionQueue queue_;
+  // The thread has its turn as soon as it wants it, however often others lock.
+  std::atomic<bool> threadWaits_{false};
+  std::condition_variable turn_;
+  mutable std::mutex mutex_;  // guards all that follows; the thread has it but while it waits for the queue
+  std::condition_variable changed_;
   grpc::Alarm alarm_;
-
-  // The thread's own.
+  bool wakeUnderway_ = false;
+  bool news_ = false;         // since the last wait(),
+  std::uint32_t events_ = 0;  // with these
+  std::optional<Failure> ended_;
   std::unique_ptr<cs_client, decltype(&cs_destroy)> core_;
   std::optional<Call> call_;
   bool leaving_ = false, wasJoined_ = false, triesToComeBack_ = false;
@@ -354,8 +342,22 @@ tl::expected<std::unique_ptr<GrpcClient>, Failure> GrpcClient::join(const std::s
   return std::unique_ptr<GrpcClient>(new GrpcClient(std::move(stream)));
 }
 
+cs_client* GrpcClient::lock() {
+  stream_->lock();
+  return stream_->core();
+}
+
+void GrpcClient::unlock() {
+  stream_->unlock();
+}
+
 void GrpcClient::visit(const std::function<void(cs_client*)>& task) {
-  stream_->visit(task);
+  const std::lock_guard lock(*stream_);
+  task(stream_->core());
+}
+
+std::uint32_t GrpcClient::wait(std::chrono::milliseconds timeout) {
+  return stream_->wait(timeout);
 }
 
 std::optional<Failure> GrpcClient::ended() const {

@@ -37,11 +37,12 @@ struct GrpcClientOptions {
   std::chrono::milliseconds silenceTimeout{10'000};
 };
 
-// Owns a thread, and that thread owns the cs_client: `onEvents` and what visit() gets run there.
+// Owns a thread, which moves the bytes of its cs_client. All functions are thread-safe.
 class GrpcClient {
  public:
-  // After each message that changed something, with the bits of cs_receive: also before join() returns. With
-  // none where the state of the client changed without a message: cut off. Must not call visit().
+  // On that thread, after each message that changed something, with the bits of cs_receive: also before
+  // join() returns. With none where the state of the client changed without a message: cut off. Must call
+  // nothing of the GrpcClient.
   using OnEvents = std::function<void(cs_client*, std::uint32_t events)>;
 
   // `address` as completeAddress gives it. Returns once the description is there.
@@ -52,11 +53,19 @@ class GrpcClient {
   GrpcClient(const GrpcClient&) = delete;
   GrpcClient& operator=(const GrpcClient&) = delete;
 
-  // Runs `task` between two messages and returns when it has run; thread-safe. What it sends travels at once.
-  // After the end of the stream the client is still there to be read.
+  // The caller's alone until unlock(), on the same thread, which must come soon: no message is taken
+  // meanwhile. What was sent with it travels then. After the end of the stream the client is still there to
+  // be read.
+  cs_client* lock();
+  void unlock();
+  // Runs `task` between lock() and unlock().
   void visit(const std::function<void(cs_client*)>& task);
 
-  // Why the stream ended; nothing while it runs. Thread-safe.
+  // Until something has changed since the last call, the stream has ended, or the time is over. The bits of
+  // cs_receive of all that came since then.
+  std::uint32_t wait(std::chrono::milliseconds timeout);
+
+  // Why the stream ended; nothing while it runs.
   std::optional<Failure> ended() const;
 
   // The clock that the cs_client is given, microseconds.
