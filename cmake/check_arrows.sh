@@ -22,6 +22,7 @@ server/rpc         | server/stream server/telemetry clothstream
 server/web         | server/stream server/telemetry clothstream
 clients/core       | proto/codec
 clients/grpc       | clients/core clothstream
+clients/library    | clients/core clients/grpc
 clients/files      | proto/codec clothstream
 clients/cli        | clients/core clients/grpc clients/files proto/codec proto/recording clothstream
 '

@@ -2,6 +2,7 @@
 // What play-out shows, through jitter, gaps, jumps in time and new descriptions.
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <cstring>
 #include <deque>
 #include <functional>
@@ -452,11 +453,13 @@ TEST(PlayOut, ShowsTheClothWhereItWasThroughJitter) {
       link.jitterMs = isUniform ? decltype(link.jitterMs)(uniform) : queues;
       const std::vector<JitteredRun::Shown> shown = link.run(20, seed);
       std::size_t inTime = 0, counted = 0;
+      double error = 0;
       for (std::size_t i = 1; i < shown.size(); ++i) {
         if (shown[i].ms < 4000) continue;
         ++counted;
         if (isInTime(shown[i])) {
           ++inTime;
+          error = std::max(error, shown[i].error);
           ASSERT_LE(shown[i].error, kMostError) << shown[i].ms;
         }
         const auto passed =
@@ -466,6 +469,10 @@ TEST(PlayOut, ShowsTheClothWhereItWasThroughJitter) {
       }
       // 98 % of frames come in time with the delay that is wanted; the delay follows what was seen.
       EXPECT_GE(static_cast<double>(inTime), 0.96 * static_cast<double>(counted)) << isUniform << seed;
+      std::printf("%s: %.1f %% in time, within %.2f mm of the truth; delay %.1f ms\n",
+                  isUniform ? "0 to 25 ms" : "queues of 5 ms",
+                  100 * static_cast<double>(inTime) / static_cast<double>(counted), 1000 * error,
+                  shown.back().delayMs);
       if (isUniform) {
         // A frame's time, the network, and 98 % of the jitter, which the order lengthens.
         EXPECT_GE(shown.back().delayMs, 10 + 30 + 0.9 * 25);

@@ -1,0 +1,272 @@
+// SPDX-License-Identifier: MIT
+// libclothstream.so as programs in C, Python, C# and Rust use it, against the real clothstream-server.
+#include <chrono>
+#include <csignal>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <regex>
+#include <set>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "clients/grpc/grpc_client.h"
+#include "tests/e2e/process.h"
+#include "tests/e2e/temporary_directory.h"
+
+namespace clothstream::e2e {
+namespace {
+
+using namespace std::chrono_literals;
+using ::testing::Contains;
+using ::testing::HasSubstr;
+
+// Generous: sanitizers, validation and software Vulkan on a busy machine.
+constexpr auto kStart = 60s, kEnd = 30s, kProgram = 120s;
+
+using Command = std::vector<std::string>;
+
+struct Ended {
+  int code = -1;
+  std::string output, errors;
+};
+
+// Programs are looked for in the path, and find the library.
+Ended run(const Command& command) {
+  Command all{"/usr/bin/env", std::string("LD_LIBRARY_PATH=") +
+                                  std::filesystem::path(CLOTHSTREAM_LIBRARY).parent_path().string()};
+  all.insert(all.end(), command.begin(), command.end());
+  Process process(all);
+  const std::optional<int> code = process.waitForEnd(kProgram);
+  return {code.value_or(-1), process.output(), process.errors()};
+}
+
+bool succeeds(const Command& command) {
+  return run(command).code == 0;
+}
+
+bool hasTool(const std::string& name) {
+  return succeeds({"sh", "-c", "command -v " + name});
+}
+
+std::uint64_t fnv1a(const float* values, std::size_t count) {
+  std::uint64_t hash = 0xcbf29ce484222325u;
+  const auto* bytes = reinterpret_cast<const unsigned char*>(values);
+  for (std::size_t i = 0; i < count * sizeof(float); ++i) hash = (hash ^ bytes[i]) * 0x100000001b3u;
+  return hash;
+}
+
+// Another client, with our own code, and what each frame was to it.
+class Watcher {
+ public:
+  explicit Watcher(const std::string& address) {
+    GrpcClientOptions options;
+    options.displayName = "watcher";
+    auto joined = GrpcClient::join(address, options, [this](cs_client* client, std::uint32_t events) {
+      if ((events & CS_EVENT_FRAME) == 0) return;
+      cs_statistics statistics;
+      cs_get_statistics(client, GrpcClient::nowUs(), &statistics);
+      const std::uint64_t hash = fnv1a(cs_positions(client), std::size_t{3} * cs_vertex_count(client));
+      const std::lock_guard lock(mutex_);
+      hashes_[statistics.tick] = hash;
+    });
+    if (!joined) throw std::runtime_error(joined.error().text);
+    client_ = std::move(*joined);
+  }
+
+  // Of the lines "frame TICK HASH" those whose tick was seen here; each must have the same hash.
+  std::size_t sameFrames(const std::string& output) const {
+    const std::lock_guard lock(mutex_);
+    std::istringstream lines(output);
+    std::size_t same = 0;
+    for (std::string word; lines >> word;) {
+      if (word != "frame") continue;
+      std::uint64_t tick = 0, hash = 0;
+      lines >> tick >> std::hex >> hash >> std::dec;
+      const auto seen = hashes_.find(tick);
+      if (seen == hashes_.end()) continue;
+      EXPECT_EQ(seen->second, hash) << "tick " << tick;
+      ++same;
+    }
+    return same;
+  }
+
+ private:
+  mutable std::mutex mutex_;
+  std::map<std::uint64_t, std::uint64_t> hashes_;
+  std::unique_ptr<GrpcClient> client_;
+};
+
+class LibraryTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    server_ = std::make_unique<Process>(Command{CLOTHSTREAM_SERVER, "--port", "0", "--grpc-port", "0",
+                                                "--scene", "small", "--scene-file", "tests/e2e/small.json"});
+    if (const auto line = server_->waitForLine("gRPC ", kStart)) {
+      address_ = line->substr(line->find_first_not_of(' '));
+      return;
+    }
+    server_->waitForEnd(kEnd);
+    if (server_->errors().find("no Vulkan") != std::string::npos) GTEST_SKIP() << server_->errors();
+    FAIL() << "the server did not start: " << server_->errors();
+  }
+  void TearDown() override {
+    if (!server_) return;
+    server_->signal(SIGTERM);
+    server_->waitForEnd(kEnd);
+  }
+
+  // Runs a program that follows the stream, and compares what it saw.
+  void expectSameFrames(const Command& command) {
+    const Watcher watcher(address_);
+    const Ended ended = run(command);
+    ASSERT_EQ(ended.code, 0) << ended.output << ended.errors;
+    const std::size_t same = watcher.sameFrames(ended.output);
+    std::printf("%zu frames were the same\n", same);
+    EXPECT_GE(same, 20u);
+    if (const auto stages = ended.output.find("stages: "); stages != std::string::npos)
+      std::printf("%s", ended.output.c_str() + stages);
+  }
+
+  std::unique_ptr<Process> server_;
+  std::string address_;
+};
+
+// What a program that was built without the sanitizer would have to load first.
+#define SKIP_IF_SANITIZED()  \
+  if (CLOTHSTREAM_SANITIZED) \
+  GTEST_SKIP() << "the library needs the sanitizer's own, which this program does not have; run without it"
+
+TEST_F(LibraryTest, ServesC) {
+  expectSameFrames({FOLLOW_C, address_});
+}
+
+TEST_F(LibraryTest, TellsOfTheEndOfTheStream) {
+  Process program({FOLLOW_C, address_, "lost"});
+  ASSERT_TRUE(program.waitForLine("joined", kStart)) << program.errors();
+  server_->signal(SIGTERM);
+  EXPECT_EQ(program.waitForEnd(kProgram), 0) << program.errors();
+}
+
+TEST_F(LibraryTest, ServesPythonWithoutACopy) {
+  SKIP_IF_SANITIZED();
+  if (!succeeds({CLOTHSTREAM_PYTHON, "-c", "import numpy"}))
+    GTEST_SKIP() << CLOTHSTREAM_PYTHON " has no numpy: ./dev test installs Debian's python3-numpy";
+  expectSameFrames({CLOTHSTREAM_PYTHON, "tests/library/follow.py", CLOTHSTREAM_LIBRARY, address_});
+}
+
+TEST_F(LibraryTest, ServesCSharp) {
+  SKIP_IF_SANITIZED();
+  if (!hasTool("mcs") || !hasTool("mono"))
+    GTEST_SKIP() << "there is no mono: ./dev test installs Debian's mono-mcs and mono-runtime";
+  const TemporaryDirectory directory;
+  const std::string program = directory.path() / "Follow.exe";
+  const Ended compiled =
+      run({"mcs", "-unsafe", "-warnaserror", "-out:" + program, "tests/library/Follow.cs"});
+  ASSERT_EQ(compiled.code, 0) << compiled.output << compiled.errors;
+  expectSameFrames({"mono", program, address_});
+}
+
+// ---- The page's examples
+
+struct Language {
+  const char* name;   // of the block in docs/client-library.md
+  const char* file;   // that it is written to
+  const char* tool;   // without which it is skipped
+  const char* toRun;  // a shell's line, with {file}, {program} and {address}
+};
+
+class Example : public LibraryTest, public ::testing::WithParamInterface<Language> {
+ protected:
+  // The first block of a language.
+  static std::string block(const std::string& language) {
+    std::ifstream page("docs/client-library.md");
+    std::string text, line;
+    bool inside = false;
+    while (std::getline(page, line)) {
+      if (inside && line == "```") break;
+      if (inside) text += line + "\n";
+      inside |= line == "```" + language;
+    }
+    return text;
+  }
+};
+
+TEST_P(Example, OfThePageRuns) {
+  SKIP_IF_SANITIZED();
+  const Language& language = GetParam();
+  if (!hasTool(language.tool)) GTEST_SKIP() << "there is no " << language.tool << " to run the example with";
+  if (std::string(language.name) == "python" && !succeeds({CLOTHSTREAM_PYTHON, "-c", "import numpy"}))
+    GTEST_SKIP() << CLOTHSTREAM_PYTHON " has no numpy: ./dev test installs Debian's python3-numpy";
+  const std::string text = block(language.name);
+  ASSERT_FALSE(text.empty());
+  const TemporaryDirectory directory;
+  const std::string file = directory.path() / language.file;
+  std::ofstream(file) << text;
+  std::string line = language.toRun;
+  const auto fill = [&](const std::string& what, const std::string& with) {
+    for (std::size_t at; (at = line.find(what)) != std::string::npos;) line.replace(at, what.size(), with);
+  };
+  fill("{file}", file);
+  fill("{program}", directory.path() / "program");
+  fill("{address}", address_);
+  fill("{python}", CLOTHSTREAM_PYTHON);
+  fill("{folder}", std::filesystem::path(CLOTHSTREAM_LIBRARY).parent_path());
+  const Ended ended = run({"sh", "-c", line});
+  ASSERT_EQ(ended.code, 0) << line << "\n" << ended.output << ended.errors;
+  EXPECT_THAT(ended.output, HasSubstr("320 vertices, the first at -0.80 "));
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Languages, Example,
+    ::testing::Values(
+        Language{"c", "example.c", "cc",
+                 "cc -std=c11 -Wall -Wextra -Wpedantic -Werror -I. -Iclients/library {file} -o {program} "
+                 "-L{folder} "
+                 "-lclothstream && {program} {address}"},
+        Language{"python", "example.py", CLOTHSTREAM_PYTHON, "{python} {file} {address}"},
+        Language{"csharp", "Example.cs", "mcs",
+                 "mcs -unsafe -out:{program} {file} && mono {program} {address}"},
+        Language{"rust", "example.rs", "/usr/bin/rustc",
+                 "/usr/bin/rustc -D warnings -L {folder} {file} -o {program} && {program} {address}"}),
+    [](const auto& language) { return std::string(language.param.name); });
+
+// ---- What it exports
+
+std::set<std::string> matches(const std::string& text, const char* pattern) {
+  std::set<std::string> found;
+  const std::regex expression(pattern);
+  for (std::sregex_iterator match(text.begin(), text.end(), expression), end; match != end; ++match)
+    found.insert((*match)[1]);
+  return found;
+}
+
+std::string contents(const char* path) {
+  std::ostringstream text;
+  text << std::ifstream(path).rdbuf();
+  return text.str();
+}
+
+TEST(Library, ExportsItsInterfaceAndNothingElse) {
+  if (!hasTool("nm")) GTEST_SKIP() << "there is no nm";
+  // A declaration begins its line, and its name is before the first parenthesis.
+  const char* declaration = R"((?:^|\n)[a-z][a-z0-9_ *]*[ *]((?:cs|clothstream)_[a-z_]+)\()";
+  std::set<std::string> declared = matches(contents("clients/core/core.h"), declaration);
+  EXPECT_GE(declared.size(), 80u);
+  declared.merge(matches(contents("clients/library/clothstream.h"), declaration));
+  EXPECT_THAT(declared, Contains("clothstream_open"));
+  const Ended symbols = run({"nm", "-D", "--defined-only", CLOTHSTREAM_LIBRARY});
+  ASSERT_EQ(symbols.code, 0) << symbols.errors;
+  EXPECT_EQ(matches(symbols.output, R"([0-9a-f]+ . ([^\n]+))"), declared);
+}
+
+}  // namespace
+}  // namespace clothstream::e2e
