@@ -175,6 +175,24 @@ TEST_F(LibraryTest, ServesCSharp) {
   expectSameFrames({"mono", program, address_});
 }
 
+// A game that draws all the time, say.
+TEST_F(LibraryTest, FramesComeHoweverOftenItIsAcquired) {
+  const auto client = GrpcClient::join(address_, {}, [](cs_client*, std::uint32_t) {});
+  ASSERT_TRUE(client.has_value()) << client.error().text;
+  const auto end = std::chrono::steady_clock::now() + 3s;
+  std::uint64_t frames = 0, acquired = 0;
+  for (; std::chrono::steady_clock::now() < end; ++acquired) {
+    cs_statistics statistics;
+    cs_get_statistics((*client)->lock(), GrpcClient::nowUs(), &statistics);
+    (*client)->unlock();
+    frames = statistics.frames;
+  }
+  std::printf("acquired %llu times, %llu frames\n", static_cast<unsigned long long>(acquired),
+              static_cast<unsigned long long>(frames));
+  // Of 180, on a machine that simulates as fast as it should.
+  EXPECT_GE(frames, 30u);
+}
+
 // ---- The page's examples
 
 struct Language {
