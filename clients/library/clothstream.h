@@ -51,8 +51,8 @@ typedef struct clothstream_options {
   uint32_t reconnect_for_ms;
 } clothstream_options;
 
-/* Empty strings, but "libclothstream" as client_name; CS_ROLE_UNSPECIFIED, 10 s to join, 60 s to come back.
- */
+/* client_name is "libclothstream", the other strings are empty; no role is asked for; 10 s to join, 60 s to
+ * come back. */
 void clothstream_default_options(clothstream_options* out) CS_NOEXCEPT;
 
 /* Joins; returns when the scene's description is there. `address`: HOST or HOST:PORT, port 50051 by default.

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: MIT
 // What play-out shows, through jitter, gaps, jumps in time and new descriptions.
+#include "clients/core/play_out.h"
+
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -173,6 +175,7 @@ TEST_P(PlayOutOf, ATimeBetweenTwoFramesShowsWhatLiesBetween) {
   const Floats before = viewer.positions(), normalsBefore = viewer.normals();
   viewer.receive(2, 110 * kMs, 120 * kMs);
   const Floats after = viewer.positions(), normalsAfter = viewer.normals();
+  ASSERT_FALSE(sameBits(normalsBefore, normalsAfter));
   const cs_played played = viewer.play(152'500);
   EXPECT_EQ(played.shown, CS_SHOWN_BETWEEN);
   EXPECT_EQ(played.tick, 1u);
@@ -292,6 +295,22 @@ TEST(PlayOut, ADelayThatReachesBackTooFarShowsTheOldestFrameThereIs) {
   EXPECT_EQ(places.size(), 4u) << "memory is taken once";
 }
 
+TEST(PlayOut, KeepsFewerOfLargeFrames) {
+  Description description;
+  description.streamRate = 100;
+  constexpr std::uint32_t kSide = 1500;
+  description.layout.cloths.push_back({kSide * kSide, kSide, kSide});
+  const Floats positions(3 * kSide * kSide);
+  const std::uint64_t fit = PlayOut::kMostBytes / (positions.size() * sizeof(float));
+  ASSERT_LT(fit, defaults().frames);
+  PlayOut playOut(chosenDelay(0));
+  playOut.begin(description);
+  for (std::uint64_t tick = 1; tick <= fit + 5; ++tick)
+    playOut.add(
+        {.tick = tick, .timeUs = tick * kFrameUs, .key = false, .positions = positions, .normals = {}}, 1);
+  EXPECT_EQ(playOut.play(1, 1).tick, 6u) << "the oldest one that is kept";
+}
+
 TEST(PlayOut, CountsWhatComesAfterItsTime) {
   Viewer viewer(chosenDelay(20));
   viewer.learnClock();
@@ -314,6 +333,7 @@ TEST(PlayOut, BeginsAnewWhereTheServersTimeGoesBack) {
   viewer.receive(3, 3000 * kMs, 5030 * kMs);
   EXPECT_EQ(viewer.play(5035 * kMs).shown, CS_SHOWN_HELD);
   EXPECT_TRUE(sameBits(viewer.playedPositions(), viewer.positions()));
+  EXPECT_EQ(viewer.play(5036 * kMs, 2990 * kMs).tick, 3u) << "those of the other time are gone";
   viewer.receive(4, 3010 * kMs, 5040 * kMs);
   const cs_played played = viewer.play(5045 * kMs);
   EXPECT_EQ(played.tick, 4u);

@@ -8,6 +8,8 @@
 #include <memory>
 #include <stdexcept>
 
+#include "proto/codec/vertex_normals.h"
+
 namespace clothstream::client {
 namespace {
 
@@ -30,7 +32,6 @@ ScriptedServer::ScriptedServer(ScriptedStream stream) : stream_(std::move(stream
 
 void ScriptedServer::pose(std::uint64_t tick) {
   positions_.clear();
-  normals_.clear();
   const float phase = static_cast<float>(tick) * 0.1f;
   for (std::size_t i = 0; i < stream_.cloths.size(); ++i) {
     for (std::uint32_t row = 0; row < stream_.cloths[i].rows; ++row) {
@@ -38,10 +39,11 @@ void ScriptedServer::pose(std::uint64_t tick) {
         const float x = 0.1f * static_cast<float>(column), y = -0.1f * static_cast<float>(row);
         positions_.insert(positions_.end(),
                           {x + 2 * static_cast<float>(i), y, 0.05f * std::sin(phase + 3 * x + 2 * y)});
-        normals_.insert(normals_.end(), {0, 0, 1});
       }
     }
   }
+  normals_.resize(positions_.size());
+  codec::computeVertexNormals(layout_, positions_.data(), normals_.data());
 }
 
 std::string ScriptedServer::welcome() const {
