@@ -37,8 +37,10 @@ void PlayOut::begin(const Description& description) {
   const codec::StreamLayout& layout = description.layout;
   sendsNormals_ = layout.normals != codec::NormalMode::none;
   frameUs_ = 1e6 / description.streamRate;
-  const std::size_t frameBytes = layout.vertexCount() * (sendsNormals_ ? 6 : 3) * sizeof(float);
-  frames_.assign(std::clamp<std::size_t>(kMostBytes / frameBytes, kFewestFrames, options_.frames), {});
+  const std::size_t vertexBytes = (sendsNormals_ ? 6 : 3) * sizeof(float);
+  const std::size_t vertices = std::max<std::size_t>(layout.vertexCount(), 1);
+  const std::size_t fit = kMostBytes / (vertices * vertexBytes);
+  frames_.assign(std::clamp<std::size_t>(fit, kFewestFrames, options_.frames), {});
   positions_ = {};
   normals_ = {};
   forget();

@@ -104,7 +104,7 @@ clothstream_result clothstream_open(const char* address, const clothstream_optio
     clientOptions.reconnectFor = std::chrono::milliseconds(wanted.reconnect_for_ms);
     auto joined = GrpcClient::join(*completed, clientOptions, [](cs_client*, std::uint32_t) {});
     if (!joined) return fail(joined.error());
-    *out = new clothstream_stream{std::move(*joined)};
+    *out = std::make_unique<clothstream_stream>(clothstream_stream{std::move(*joined)}).release();
     return CLOTHSTREAM_OK;
   });
 }
