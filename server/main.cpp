@@ -225,6 +225,7 @@ void serve(const ProgramOptions& options, const Signals& signals) {
        .serverName = kServerName,
        .runAlways = options.alwaysRun,
        .reportRate = options.reportRate,
+       .maxParticipants = options.maxParticipants,
        .maxCreatedScenes = options.maxCreatedScenes,
        .encoderThreads = options.encoderThreads,
        .journals =

@@ -10,6 +10,8 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
+#include "server/stream/scene_server.h"
+
 namespace clothstream {
 namespace {
 
@@ -143,6 +145,11 @@ std::variant<ProgramOptions, int> parseOptions(int argc, const char* const* argv
   app.add_option("--hold", hold,
                  "Seconds for which the place of somebody whose connection is lost is kept; 0: not at all")
       ->check(CLI::Range(0.0, 3600.0))
+      ->capture_default_str()
+      ->group(people);
+  app.add_option("--max-participants", options.maxParticipants,
+                 "People in a scene; who is cut off makes room for somebody who comes where it is full")
+      ->check(CLI::Range(1u, stream::kMostParticipants))
       ->capture_default_str()
       ->group(people);
   app.add_option("--participants-change", changeable,
