@@ -175,12 +175,13 @@ ExitCode LoadCommand::run() const {
   if (shows) fmt::print("\r\033[K");
   std::optional<double> serverCpu;
   if (before && after) serverCpu = *after - *before;
-  if (report.joined == 0)
-    return say({kUnreachable, fmt::format("nobody could join at {}: {}", address_, report.firstLoss)});
+  const ExitCode loss = exitCodeOf(report.firstLoss.kind);
+  if (report.joined == 0 && report.lost > 0)
+    return say({loss, fmt::format("nobody could join at {}: {}", address_, report.firstLoss.text)});
   fmt::print("{}\n", json_ ? json(report, serverCpu) : text(report, serverCpu));
   if (report.lost > 0)
-    return say({kLost, fmt::format("{} times somebody could not stay; at first: {}", report.lost,
-                                   report.firstLoss)});
+    return say({loss, fmt::format("{} times somebody could not stay; at first: {}", report.lost,
+                                  report.firstLoss.text)});
   if (report.figures.hashMismatches + report.slowFigures.hashMismatches > 0)
     return say({kHashMismatch, "decoded frames are not what the server holds"});
   return kOk;

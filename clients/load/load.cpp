@@ -84,7 +84,8 @@ class Load {
         return true;
     }
     report_.lost += 1;
-    report_.firstLoss = "not everybody could join within " + std::to_string(kJoinTime.count()) + " s";
+    report_.firstLoss = {Failure::Kind::lost,
+                         "not everybody could join within " + std::to_string(kJoinTime.count()) + " s"};
     return false;
   }
 

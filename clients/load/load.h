@@ -34,7 +34,7 @@ struct LoadReport {
   std::uint64_t joined = 0, left = 0, visits = 0;
   // Those who were refused or lost their connection, and what the first was told.
   std::uint64_t lost = 0;
-  std::string firstLoss;
+  Failure firstLoss;
 
   // Of all that took part at a time, a second and participant.
   double framesPerSecond() const;

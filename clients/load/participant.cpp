@@ -53,7 +53,7 @@ bool Participant::joined() const {
   return cs_get_state(core_.get()) == CS_STATE_JOINED;
 }
 
-std::optional<std::string> Participant::ended() const {
+std::optional<Failure> Participant::ended() const {
   const std::lock_guard lock(mutex_);
   return ended_;
 }
@@ -114,8 +114,11 @@ void Participant::received(std::span<const std::byte> message) {
 
 void Participant::closed(const std::string& why) {
   const std::lock_guard lock(mutex_);
-  const bool refused = cs_get_state(core_.get()) == CS_STATE_FAILED;
-  ended_ = refused ? cs_error_text(core_.get()) : why;
+  const cs_state state = cs_get_state(core_.get());
+  if (state == CS_STATE_FAILED)
+    ended_ = {Failure::Kind::refused, cs_error_text(core_.get())};
+  else
+    ended_ = {state == CS_STATE_JOINED ? Failure::Kind::lost : Failure::Kind::unreachable, why};
 }
 
 void Participant::frameReceived(const v1::Frame& frame, std::uint64_t nowUs) {

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "clients/core/core.h"
+#include "clients/grpc/failure.h"
 #include "clients/load/link.h"
 #include "clothstream/v1/session.pb.h"
 #include "proto/codec/packet_header.h"
@@ -55,7 +56,7 @@ class Participant final : private LinkListener {
 
   bool joined() const;
   // Why the link is gone, once it is.
-  std::optional<std::string> ended() const;
+  std::optional<Failure> ended() const;
   Figures take();
 
  private:
@@ -77,7 +78,7 @@ class Participant final : private LinkListener {
   std::uint64_t frames_ = 0;
   Clock::time_point readsAgainAt_{};
   bool readLater_ = false;
-  std::optional<std::string> ended_;
+  std::optional<Failure> ended_;
   std::unique_ptr<Link> link_;
 };
 

@@ -60,7 +60,7 @@ class WebLink final : public Link {
   void leave() override {
     post([this] {
       leaving_ = true;
-      waiting_.clear();
+      waiting_.resize(writing_ ? 1 : 0);
       writeNext();
     });
   }
