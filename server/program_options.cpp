@@ -219,7 +219,7 @@ std::variant<ProgramOptions, int> parseOptions(int argc, const char* const* argv
   playCommand.add_flag("--loop", options.playback.loop,
                        "Go on from its start at its end, instead of pausing there");
   playCommand.footer(
-      "Options of the network and the log are those of clothstream-server. No device is needed.");
+      "Options of people, the network and the log are those of clothstream-server. No device is needed.");
   playCommand.fallthrough();
 
   app.add_option("--log-level", options.logLevel, "trace, debug, info, warning, error or off")

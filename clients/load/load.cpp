@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <thread>
 
 #include "clients/load/intruder.h"
@@ -63,6 +64,7 @@ class Load {
                    .name = "load " + std::to_string(++names_),
                    .decodes = number < options_.decoders,
                    .moves = number + options_.viewers < options_.participants,
+                   .phase = number * std::numbers::phi,
                    .bytesPerSecond = number < options_.participants ? 0 : options_.slowBytesPerSecond});
   }
 

@@ -167,7 +167,8 @@ void Participant::move(std::uint64_t nowUs) {
   const std::uint32_t count = cs_vertex_count(core_.get());
   if (count == 0) return;
   const float* const middle = at + 3 * std::size_t{count / 2};
-  const double turn = 2 * std::numbers::pi * static_cast<double>(nowUs) / (1e6 * kOrbitSeconds);
+  const double turns = options_.phase + static_cast<double>(nowUs) / (1e6 * kOrbitSeconds);
+  const double turn = 2 * std::numbers::pi * turns;
   const float sphere[]{middle[0] + 0.5f * static_cast<float>(std::cos(turn)), middle[1],
                        middle[2] + 0.5f * static_cast<float>(std::sin(turn)), kHandRadius};
   cs_set_colliders(core_.get(), sphere, 1, nowUs);

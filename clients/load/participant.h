@@ -24,7 +24,8 @@ using Clock = std::chrono::steady_clock;
 struct ParticipantOptions {
   std::string scene, name;
   bool decodes = true;  // else frames are acknowledged unread, but for their headers
-  bool moves = true;    // a sphere, as told with each step()
+  bool moves = true;    // a sphere, as told with each step(); from here on its orbit:
+  double phase = 0;     // turns
   // Reads no faster than this; 0: as it comes.
   double bytesPerSecond = 0;
 };
