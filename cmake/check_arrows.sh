@@ -24,13 +24,14 @@ clients/core       | proto/codec
 clients/grpc       | clients/core clothstream
 clients/library    | clients/core clients/grpc
 clients/files      | proto/codec clothstream
-clients/cli        | clients/core clients/grpc clients/files proto/codec proto/recording clothstream
+clients/load       | clients/core clients/grpc proto/codec clothstream
+clients/cli        | clients/core clients/grpc clients/files clients/load proto/codec proto/recording clothstream
 '
 # rooms that may include these headers
 readonly OUTSIDE='
 <vulkan/           | server/vulkan server/simulation server/encode
-<grpcpp/           | server/rpc clients/grpc
-<boost/beast       | server/web
+<grpcpp/           | server/rpc clients/grpc clients/load
+<boost/beast       | server/web clients/load
 <Eigen/            | server/scene server/reference
 '
 

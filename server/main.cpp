@@ -184,6 +184,17 @@ void openDoors(stream::SceneServer& server, const ProgramOptions& options, const
   fmt::print("{}", report());
 }
 
+// What holds for scenes that are simulated and for one that is played.
+stream::ServerOptions shared(const ProgramOptions& options, const std::string& defaultScene) {
+  return {.device = {},
+          .defaultScene = defaultScene,
+          .serverName = kServerName,
+          .maxParticipants = options.maxParticipants,
+          .holding = {.hold = std::chrono::duration_cast<stream::Clock::duration>(options.hold)},
+          .participantsMay = options.participantsMay,
+          .outsideControl = !options.ownersAlone};
+}
+
 void play(const ProgramOptions& options, const Signals& signals) {
   auto recording = recording::RecordedStream::open(options.play);
   if (!recording) throw std::runtime_error(recording.error());
@@ -197,7 +208,7 @@ void play(const ProgramOptions& options, const Signals& signals) {
                                         recording->length(), scene, recording->device());
   stream::SceneServer server(scene,
                              std::make_shared<recording::Playback>(std::move(*recording), options.playback),
-                             {.device = {}, .defaultScene = scene, .serverName = kServerName});
+                             shared(options, scene));
   openDoors(server, options, signals, intro, [&] { return server.report(); });
 }
 
@@ -218,20 +229,16 @@ void serve(const ProgramOptions& options, const Signals& signals) {
         !options.recordsOnRequest);
   const auto first = std::ranges::find(scenes, options.scene, &scene::Scene::name);
   const std::uint32_t nodes = first == scenes.end() ? 0 : first->nodeCount();
-  stream::SceneServer server(
-      std::move(scenes),
-      {.device = deviceOptions(options, nodes),
-       .defaultScene = options.scene,
-       .serverName = kServerName,
-       .runAlways = options.alwaysRun,
-       .reportRate = options.reportRate,
-       .maxCreatedScenes = options.maxCreatedScenes,
-       .encoderThreads = options.encoderThreads,
-       .journals =
-           [&](const scene::Scene& scene) { return recordings ? recordings->add(scene.name) : nullptr; },
-       .holding = {.hold = std::chrono::duration_cast<stream::Clock::duration>(options.hold)},
-       .participantsMay = options.participantsMay,
-       .outsideControl = !options.ownersAlone});
+  stream::ServerOptions serverOptions = shared(options, options.scene);
+  serverOptions.device = deviceOptions(options, nodes);
+  serverOptions.runAlways = options.alwaysRun;
+  serverOptions.reportRate = options.reportRate;
+  serverOptions.maxCreatedScenes = options.maxCreatedScenes;
+  serverOptions.encoderThreads = options.encoderThreads;
+  serverOptions.journals = [&](const scene::Scene& scene) {
+    return recordings ? recordings->add(scene.name) : nullptr;
+  };
+  stream::SceneServer server(std::move(scenes), std::move(serverOptions));
   const auto report = [&] { return server.report() + (recordings ? recordings->report() : ""); };
   openDoors(server, options, signals,
             fmt::format("device  {}\nscenes  {}\n", describe(server.deviceInfo()), sceneList), report);

@@ -10,6 +10,8 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
+#include "server/stream/scene_server.h"
+
 namespace clothstream {
 namespace {
 
@@ -145,6 +147,11 @@ std::variant<ProgramOptions, int> parseOptions(int argc, const char* const* argv
       ->check(CLI::Range(0.0, 3600.0))
       ->capture_default_str()
       ->group(people);
+  app.add_option("--max-participants", options.maxParticipants,
+                 "People in a scene; who is cut off makes room for somebody who comes where it is full")
+      ->check(CLI::Range(1u, stream::kMostParticipants))
+      ->capture_default_str()
+      ->group(people);
   app.add_option("--participants-change", changeable,
                  "Parameters that participants change of a scene that somebody else owns: a list of "
                  "environment, cloths and colliders, or none")
@@ -212,7 +219,7 @@ std::variant<ProgramOptions, int> parseOptions(int argc, const char* const* argv
   playCommand.add_flag("--loop", options.playback.loop,
                        "Go on from its start at its end, instead of pausing there");
   playCommand.footer(
-      "Options of the network and the log are those of clothstream-server. No device is needed.");
+      "Options of people, the network and the log are those of clothstream-server. No device is needed.");
   playCommand.fallthrough();
 
   app.add_option("--log-level", options.logLevel, "trace, debug, info, warning, error or off")

@@ -31,6 +31,7 @@ struct ProgramOptions {
   std::uint32_t encoderThreads = 0;
   std::chrono::duration<double> hold{60};  // of who is cut off
   // What participants change of a scene that somebody else owns, and whether it is controlled from outside.
+  std::uint32_t maxParticipants = 64;
   stream::Permissions participantsMay;
   bool ownersAlone = false;
   std::optional<step::StepOptions> step;  // instead of serving

@@ -10,6 +10,7 @@
 
 #include "clients/cli/join.h"
 #include "clients/cli/list.h"
+#include "clients/cli/load_command.h"
 #include "clients/cli/motion_commands.h"
 #include "clients/cli/presence.h"
 #include "clients/cli/recording_commands.h"
@@ -114,9 +115,13 @@ int run(int argc, char** argv) {
   RecordingCommands recordingCommands;
   recordingCommands.add(app, address);
 
+  LoadCommand loadCommand;
+  loadCommand.add(app);
+
   try {
     app.parse(argc, argv);
     sceneCommands.check();
+    loadCommand.check();
     joinOptions.address = listOptions.address = setOptions.address = addressOf(address);
     if (setCommand.parsed() && !changesAnything(setOptions))
       throw CLI::ValidationError("set", "nothing to change is given; see clothstream set --help");
@@ -130,6 +135,7 @@ int run(int argc, char** argv) {
   blockEndingSignals();
   if (motionCommands.parsed()) return motionCommands.run();
   if (recordingCommands.parsed()) return recordingCommands.run(joinOptions.address, CLOTHSTREAM_VERSION);
+  if (loadCommand.parsed()) return loadCommand.run();
   if (sceneCommands.parsed()) return sceneCommands.run(joinOptions.address);
   if (setCommand.parsed()) return set(setOptions);
   return listCommand.parsed() ? list(listOptions) : join(joinOptions);

@@ -88,6 +88,10 @@ std::uint32_t Client::receive(Bytes bytes, std::uint64_t nowUs) {
 }
 
 void Client::update(std::uint64_t nowUs) {
+  // Who stood still has not listened: what came meanwhile still waits to be received.
+  const std::uint64_t stoodStill = nowUs - std::exchange(updatedUs_, nowUs);
+  if (stoodStill > Reconnection::kLongestStepUs)
+    lastHeardUs_ = std::min(nowUs, lastHeardUs_ + stoodStill - Reconnection::kLongestStepUs);
   if (!welcomed_ || state_ == CS_STATE_FAILED || !clock_.pingDue(nowUs)) return;
   std::string ping;
   writePing(ping, ++lastRequestId_, nowUs);

@@ -128,7 +128,7 @@ class Client {
   Presence presence_;
   Reconnection reconnection_;
   std::uint64_t connectAtUs_ = Reconnection::kNever;  // unless welcomed
-  std::uint64_t lastHeardUs_ = 0;
+  std::uint64_t lastHeardUs_ = 0, updatedUs_ = 0;
   ContentAssembly assembly_;
   Description description_;
   std::unique_ptr<codec::Decoder> decoder_;

@@ -324,7 +324,7 @@ void cs_set_clock(cs_client* client, uint64_t (*now_us)(void)) CS_NOEXCEPT;
 
 /* One ServerMessage. Returns a set of CS_EVENT bits. */
 uint32_t cs_receive(cs_client* client, const uint8_t* message, size_t bytes, uint64_t now_us) CS_NOEXCEPT;
-/* Pings; call at least ten times a second. */
+/* Pings; call at least ten times a second. Longer pauses are not taken for silence of the server. */
 void cs_update(cs_client* client, uint64_t now_us) CS_NOEXCEPT;
 /* The next ClientMessage to send, or NULL; valid until the next call of this function. */
 const uint8_t* cs_next_outgoing(cs_client* client, size_t* bytes) CS_NOEXCEPT;

@@ -19,8 +19,9 @@ class Reconnection {
   // An attempt that has led to no Welcome by then is given up for another: soon while the participant is
   // held, for a link that returns may have swallowed its beginning; else slow links have their time.
   static constexpr std::uint64_t kHeldAttemptUs = 2'000'000, kAttemptUs = 10'000'000;
-  // A connection that brings nothing for this long is given up: servers answer pings.
-  static constexpr std::uint64_t kSilenceUs = 4'000'000;
+  // A connection that brings nothing for this long is given up: servers answer pings. Of the time between two
+  // updates this much counts at most.
+  static constexpr std::uint64_t kSilenceUs = 4'000'000, kLongestStepUs = 500'000;
   // A connection that held this long was a good one: the first attempt after it comes at once.
   static constexpr std::uint64_t kStableUs = 2'000'000;
 

@@ -79,7 +79,7 @@ tl::expected<Roster::Admission, Roster::Refusal> Roster::join(const Newcomer& ne
   if (known != entries_.end() && (known->mailbox || now < known->expires)) {
     return resume(*known, mailbox, now);
   }
-  if (entries_.size() >= limit) return tl::unexpected(Refusal::full);
+  if (entries_.size() >= limit && !makeRoom(now)) return tl::unexpected(Refusal::full);
 
   const bool isOwned =
       std::ranges::any_of(entries_, [](const Entry& entry) { return entry.told.role() == v1::ROLE_OWNER; });
@@ -169,6 +169,15 @@ void Roster::expire(Clock::time_point now) {
 void Roster::vanish(Entry& entry, Clock::time_point now) {
   if (entry.posed) inbox_.postPoses(entry.told.id(), {}, now);
   entry.posed = false;
+}
+
+bool Roster::makeRoom(Clock::time_point now) {
+  const auto longestAway = std::ranges::min_element(entries_, {}, [](const Entry& entry) {
+    return entry.mailbox ? Clock::time_point::max() : entry.expires;
+  });
+  if (longestAway == entries_.end() || longestAway->mailbox) return false;
+  erase(longestAway, v1::LEAVE_REASON_TIMED_OUT, 0, now);
+  return true;
 }
 
 Roster::Entries::iterator Roster::erase(Entries::iterator entry, v1::LeaveReason reason, std::uint64_t by,

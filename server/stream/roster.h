@@ -62,8 +62,8 @@ class Roster {
   enum class Refusal : std::uint8_t { full, closed };
 
   // Who has the token of somebody here becomes that participant, and the connection that this one had ends.
-  // Others join anew, with the next of `ids`, unless `limit` are here, those who are away included. From here
-  // on the mailbox is told of every change.
+  // Others join anew, with the next of `ids`, unless `limit` are here; somebody who is away makes room. From
+  // here on the mailbox is told of every change.
   [[nodiscard]] tl::expected<Admission, Refusal> join(const Newcomer& newcomer,
                                                       const std::shared_ptr<Mailbox>& mailbox,
                                                       std::atomic<std::uint64_t>& ids, std::size_t limit,
@@ -121,6 +121,8 @@ class Roster {
   Admission resume(Entry& entry, const std::shared_ptr<Mailbox>& mailbox, Clock::time_point now);
   // Called when the others were told of it: its Welcome tells it itself.
   void listen(const std::shared_ptr<Mailbox>& mailbox);
+  // Whose time would be over first of those who are away leaves. False where nobody is away.
+  bool makeRoom(Clock::time_point now);
   // Gives the next one.
   Entries::iterator erase(Entries::iterator entry, v1::LeaveReason reason, std::uint64_t by,
                           Clock::time_point now);

@@ -220,9 +220,7 @@ tl::expected<v1::ControlSceneResponse, v1::Error> SceneServer::State::controlSce
 }
 
 SceneServer::SceneServer(std::vector<scene::Scene> scenes, ServerOptions options) {
-  assert(options.maxParticipants * messages::limits::kMaxParticipantColliders +
-             messages::limits::kMaxColliders <=
-         simulation::kMaxColliders);
+  assert(options.maxParticipants <= kMostParticipants);
   bool found = false;
   std::string known;
   for (const scene::Scene& scene : scenes) {

@@ -13,7 +13,9 @@
 #include <tl/expected.hpp>
 
 #include "clothstream/v1/session.pb.h"
+#include "server/messages/limits.h"
 #include "server/scene/scene.h"
+#include "server/simulation/collision/moving_collider.h"
 #include "server/stream/roster.h"
 #include "server/vulkan/device.h"
 
@@ -21,6 +23,11 @@ namespace clothstream::stream {
 
 class FrameSource;
 class Journal;
+
+// The simulation has room for the colliders of so many.
+inline constexpr std::uint32_t kMostParticipants =
+    (simulation::kMaxColliders - messages::limits::kMaxColliders) /
+    messages::limits::kMaxParticipantColliders;
 
 struct ServerOptions {
   vulkan::DeviceOptions device;
@@ -34,7 +41,7 @@ struct ServerOptions {
   // Frames of a scene that tell how its simulation does, a second; 0: none.
   double reportRate = 4;
   std::uint32_t maxConnections = 1024;
-  // A scene, those who are held included; at most 250, for the simulation has room for so many colliders.
+  // A scene, those who are held included; at most kMostParticipants.
   std::uint32_t maxParticipants = 64;
   // Beside those that the server starts with; 0: peers make none.
   std::uint32_t maxCreatedScenes = 16;

@@ -173,9 +173,8 @@ void Session::hello(const v1::Hello& message) {
     return fail(v1::ERROR_CODE_NOT_FOUND, fmt::format("'{}' was just deleted", scene->name()));
   if (!admission)
     return fail(v1::ERROR_CODE_RESOURCE_EXHAUSTED,
-                fmt::format("'{}' has {} participants ({} of them cut off, and held for a while), as many as "
-                            "it may have; try again later",
-                            scene->name(), server_.options.maxParticipants, scene->roster.away()));
+                fmt::format("'{}' has {} participants, as many as it may have; try again later",
+                            scene->name(), server_.options.maxParticipants));
   scene_ = scene;
   participant_ = admission->id;
   scene->metrics.joins.add();

@@ -250,6 +250,21 @@ TEST_F(Reconnecting, TriesAtOnceThenOftenThenSeldom) {
   EXPECT_GE(before, Reconnection::kLongestUs / 2);
 }
 
+TEST_F(Reconnecting, WhoStoodStillListensBeforeItGivesUp) {
+  join();
+  cs_update(client.get(), now);
+  const std::uint64_t heard = now;
+  for (; now < heard + kSecond; now += kSecond / 10) cs_update(client.get(), now);
+  EXPECT_EQ(cs_connect_at(client.get()), heard + Reconnection::kSilenceUs);
+  now += 60 * kSecond;
+  cs_update(client.get(), now);
+  EXPECT_GT(cs_connect_at(client.get()), now);
+  // Silence while it is awake is silence still.
+  for (const std::uint64_t woke = now; now < woke + 4 * kSecond; now += kSecond / 10)
+    cs_update(client.get(), now);
+  EXPECT_LE(cs_connect_at(client.get()), now);
+}
+
 TEST_F(Reconnecting, ThoseWhoAreCutOffTogetherDoNotComeBackTogether) {
   std::set<std::uint64_t> delays;
   for (std::uint64_t seed = 0; seed < 20; ++seed) {

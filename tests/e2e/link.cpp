@@ -1,107 +1,240 @@
 // SPDX-License-Identifier: MIT
-// A link to a server that can be cut.
+// All connections on one thread.
 #include "tests/e2e/link.h"
 
+#include <algorithm>
 #include <array>
-#include <cerrno>
-#include <system_error>
+#include <deque>
+#include <functional>
+#include <future>
+#include <memory>
+#include <random>
+#include <thread>
+#include <utility>
+#include <vector>
 
-#include <arpa/inet.h>
-#include <netinet/in.h>
-#include <poll.h>
-#include <sys/socket.h>
-#include <unistd.h>
+#include <boost/asio/executor_work_guard.hpp>
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/post.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <boost/asio/write.hpp>
 
 namespace clothstream::e2e {
 namespace {
 
-sockaddr_in loopback(std::uint16_t port) {
-  sockaddr_in address{};
-  address.sin_family = AF_INET;
-  address.sin_port = htons(port);
-  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  return address;
+namespace net = boost::asio;
+using boost::system::error_code;
+using net::ip::tcp;
+using Clock = std::chrono::steady_clock;
+
+// What a link does now, and how uneven it is: the same in every run.
+struct Weather {
+  Impairment impairment;
+  bool whole = true;
+  std::mt19937 random{1};
+};
+
+void reset(tcp::socket& socket) {
+  error_code ignored;
+  socket.set_option(net::socket_base::linger(true, 0), ignored);
+  socket.close(ignored);
 }
 
-// With a reset, as if the other end had never been.
-void reset(int socket) {
-  const linger now{.l_onoff = 1, .l_linger = 0};
-  setsockopt(socket, SOL_SOCKET, SO_LINGER, &now, sizeof now);
-  close(socket);
-}
+// A client's connection and the one that it became.
+class Pair : public std::enable_shared_from_this<Pair> {
+ public:
+  Pair(Weather& weather, tcp::socket client, net::io_context& io)
+      : weather_(weather),
+        client_(std::move(client)),
+        server_(io),
+        pipes_{Pipe(client_, server_, io), Pipe(server_, client_, io)} {}
 
-// What one end said, to the other. False where either is gone.
-bool pass(int from, int to) {
-  std::array<char, 65536> bytes;
-  const ssize_t count = recv(from, bytes.data(), bytes.size(), 0);
-  if (count <= 0) return false;
-  for (ssize_t sent = 0; sent < count;) {
-    const ssize_t now = send(to, bytes.data() + sent, static_cast<std::size_t>(count - sent), MSG_NOSIGNAL);
-    if (now <= 0) return false;
-    sent += now;
+  void open(std::uint16_t target) {
+    server_.async_connect({net::ip::address_v4::loopback(), target},
+                          [self = shared_from_this()](error_code error) {
+                            if (error || !self->isOpen_) return self->close();
+                            self->isConnected_ = true;
+                            for (Pipe& pipe : self->pipes_) {
+                              pipe.to.set_option(tcp::no_delay(true));
+                              self->read(pipe);
+                            }
+                          });
   }
-  return true;
-}
+  void close() {
+    isOpen_ = false;
+    reset(client_);
+    reset(server_);
+    for (Pipe& pipe : pipes_) pipe.timer.cancel();
+  }
+  bool isOpen() const { return isOpen_; }
+  // The weather has changed.
+  void goOn() {
+    for (Pipe& pipe : pipes_) {
+      read(pipe);
+      write(pipe);
+    }
+  }
+
+ private:
+  struct Pipe {
+    struct Chunk {
+      std::vector<char> bytes;
+      Clock::time_point due;
+    };
+
+    tcp::socket &from, &to;
+    net::steady_timer timer;
+    std::array<char, 16 * 1024> incoming{};
+    std::deque<Chunk> waiting{};
+    std::size_t bytes = 0;  // waiting
+    Clock::time_point free{}, lastDue{};
+    bool reading = false, writing = false, ended = false;
+
+    Pipe(tcp::socket& in, tcp::socket& out, net::io_context& io) : from(in), to(out), timer(io) {}
+  };
+
+  void read(Pipe& pipe) {
+    const Impairment& now = weather_.impairment;
+    if (!isOpen_ || pipe.reading || pipe.ended || now.stalled || !isConnected_) return;
+    if (pipe.bytes >= now.queueBytes) return;
+    pipe.reading = true;
+    pipe.from.async_read_some(net::buffer(pipe.incoming),
+                              [self = shared_from_this(), &pipe](error_code error, std::size_t count) {
+                                pipe.reading = false;
+                                if (error)
+                                  pipe.ended = true;
+                                else
+                                  self->queue(pipe, count);
+                                self->write(pipe);
+                                self->read(pipe);
+                              });
+  }
+
+  void queue(Pipe& pipe, std::size_t count) {
+    const Impairment& now = weather_.impairment;
+    pipe.free = std::max(pipe.free, Clock::now());
+    if (now.bytesPerSecond > 0) {
+      const std::chrono::duration<double> time(static_cast<double>(count) / now.bytesPerSecond);
+      pipe.free += std::chrono::duration_cast<Clock::duration>(time);
+    }
+    std::uniform_int_distribution<std::int64_t> jitter(0, now.jitter.count());
+    const auto due = pipe.free + now.delay + std::chrono::microseconds(jitter(weather_.random));
+    pipe.lastDue = std::max(pipe.lastDue, due);
+    pipe.waiting.push_back(
+        {{pipe.incoming.begin(), pipe.incoming.begin() + static_cast<std::ptrdiff_t>(count)}, pipe.lastDue});
+    pipe.bytes += count;
+  }
+
+  void write(Pipe& pipe) {
+    if (!isOpen_ || pipe.writing || weather_.impairment.stalled) return;
+    if (pipe.waiting.empty()) {
+      if (pipe.ended) close();
+      return;
+    }
+    pipe.writing = true;
+    pipe.timer.expires_at(pipe.waiting.front().due);
+    pipe.timer.async_wait([self = shared_from_this(), &pipe](error_code error) {
+      if (error || self->weather_.impairment.stalled) {
+        pipe.writing = false;
+        return;
+      }
+      net::async_write(pipe.to, net::buffer(pipe.waiting.front().bytes),
+                       [self, &pipe](error_code failed, std::size_t count) {
+                         pipe.writing = false;
+                         if (failed) return self->close();
+                         pipe.bytes -= count;
+                         pipe.waiting.pop_front();
+                         self->read(pipe);
+                         self->write(pipe);
+                       });
+    });
+  }
+
+  Weather& weather_;
+  tcp::socket client_, server_;
+  std::array<Pipe, 2> pipes_;
+  bool isOpen_ = true, isConnected_ = false;
+};
 
 }  // namespace
 
-Link::Link(std::uint16_t target) : target_(target), listener_(socket(AF_INET, SOCK_STREAM, 0)) {
-  sockaddr_in address = loopback(0);
-  socklen_t size = sizeof address;
-  auto* const generic = reinterpret_cast<sockaddr*>(&address);
-  if (listener_ < 0 || bind(listener_, generic, size) != 0 || listen(listener_, 16) != 0 ||
-      getsockname(listener_, generic, &size) != 0)
-    throw std::system_error(errno, std::generic_category(), "link");
-  port_ = ntohs(address.sin_port);
-  thread_ = std::thread([this] { run(); });
-}
-
-Link::~Link() {
-  stopping_ = true;
-  thread_.join();
-  close(listener_);
-}
-
-void Link::accept() {
-  const int client = ::accept(listener_, nullptr, nullptr);
-  if (client < 0) return;
-  const int server = whole_ ? socket(AF_INET, SOCK_STREAM, 0) : -1;
-  const sockaddr_in address = loopback(target_);
-  if (server < 0 || connect(server, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
-    reset(client);
-    if (server >= 0) close(server);
-    return;
+struct Link::State {
+  explicit State(std::uint16_t to)
+      : target(to),
+        acceptor(io, {net::ip::address_v4::loopback(), 0}),
+        port(acceptor.local_endpoint().port()),
+        work(net::make_work_guard(io)) {
+    accept();
+    thread = std::thread([this] { io.run(); });
   }
-  pairs_.push_back({client, server});
-}
+  ~State() {
+    net::post(io, [this] {
+      closeAll();
+      acceptor.close();
+    });
+    work.reset();
+    thread.join();
+  }
 
-void Link::run() {
-  while (!stopping_) {
-    std::vector<pollfd> polled{{listener_, POLLIN, 0}};
-    for (const Pair& pair : pairs_) {
-      polled.push_back({pair.client, POLLIN, 0});
-      polled.push_back({pair.server, POLLIN, 0});
-    }
-    poll(polled.data(), polled.size(), 5);
-    std::vector<Pair> left;
-    for (std::size_t i = 0; i < pairs_.size(); ++i) {
-      bool open = whole_;
-      if (open && polled[1 + 2 * i].revents != 0) open = pass(pairs_[i].client, pairs_[i].server);
-      if (open && polled[2 + 2 * i].revents != 0) open = pass(pairs_[i].server, pairs_[i].client);
-      if (open) {
-        left.push_back(pairs_[i]);
-        continue;
+  void accept() {
+    acceptor.async_accept([this](error_code error, tcp::socket client) {
+      if (error) return;
+      std::erase_if(pairs, [](const auto& pair) { return !pair->isOpen(); });
+      if (weather.whole) {
+        pairs.push_back(std::make_shared<Pair>(weather, std::move(client), io));
+        pairs.back()->open(target);
+      } else {
+        reset(client);
       }
-      reset(pairs_[i].client);
-      reset(pairs_[i].server);
-    }
-    pairs_ = std::move(left);
-    if (polled[0].revents != 0) accept();
+      accept();
+    });
   }
-  for (const Pair& pair : pairs_) {
-    reset(pair.client);
-    reset(pair.server);
+  void closeAll() {
+    for (const auto& pair : pairs) pair->close();
+    pairs.clear();
   }
+  // On the link's thread, and returns when it is done.
+  void change(const std::function<void()>& how) {
+    std::promise<void> done;
+    net::post(io, [&] {
+      how();
+      for (const auto& pair : pairs) pair->goOn();
+      done.set_value();
+    });
+    done.get_future().get();
+  }
+
+  const std::uint16_t target;
+  net::io_context io;
+  tcp::acceptor acceptor;
+  const std::uint16_t port;
+  net::executor_work_guard<net::io_context::executor_type> work;
+  Weather weather;
+  std::vector<std::shared_ptr<Pair>> pairs;
+  std::thread thread;
+};
+
+Link::Link(std::uint16_t target) : state_(std::make_unique<State>(target)) {}
+Link::~Link() = default;
+
+std::uint16_t Link::port() const {
+  return state_->port;
+}
+
+void Link::impair(const Impairment& impairment) {
+  state_->change([&] { state_->weather.impairment = impairment; });
+}
+
+void Link::cut() {
+  state_->change([&] {
+    state_->weather.whole = false;
+    state_->closeAll();
+  });
+}
+
+void Link::restore() {
+  state_->change([&] { state_->weather.whole = true; });
 }
 
 }  // namespace clothstream::e2e

@@ -1,42 +1,44 @@
 // SPDX-License-Identifier: MIT
-// A link to a server that can be cut, and returns.
+// A link to a server that is as bad as a test wants it.
 #pragma once
 
-#include <atomic>
+#include <chrono>
 #include <cstdint>
-#include <mutex>
-#include <thread>
-#include <vector>
+#include <memory>
 
 namespace clothstream::e2e {
 
-// Passes TCP connections on to a port of this machine.
+// Of each direction by itself. Bytes stay in order, as TCP's do.
+struct Impairment {
+  std::chrono::microseconds delay{0};
+  std::chrono::microseconds jitter{0};  // beside the delay, evenly from 0 to this
+  double bytesPerSecond = 0;            // 0: as fast as can be
+  // Waiting at the narrow place; who sends more is not read from.
+  std::size_t queueBytes = 64 * 1024;
+  // Nothing passes, the end of a connection neither: whoever goes meanwhile leaves the other end half open.
+  bool stalled = false;
+};
+
+// Passes TCP connections on to a port of this machine. Thread-safe.
 class Link {
  public:
-  // Throws std::system_error where there is no port.
+  // Throws std::exception where there is no port.
   explicit Link(std::uint16_t target);
+  // Resets every connection.
   ~Link();
   Link(const Link&) = delete;
   Link& operator=(const Link&) = delete;
 
-  std::uint16_t port() const { return port_; }
+  std::uint16_t port() const;
+  // From here on; what waits at the narrow place is older.
+  void impair(const Impairment& impairment);
   // Resets every connection, and those that come until it is restored.
-  void cut() { whole_ = false; }
-  void restore() { whole_ = true; }
+  void cut();
+  void restore();
 
  private:
-  struct Pair {
-    int client, server;
-  };
-  void run();
-  void accept();
-
-  const std::uint16_t target_;
-  int listener_ = -1;
-  std::uint16_t port_ = 0;
-  std::atomic<bool> whole_{true}, stopping_{false};
-  std::vector<Pair> pairs_;  // the thread's own
-  std::thread thread_;
+  struct State;
+  std::unique_ptr<State> state_;
 };
 
 }  // namespace clothstream::e2e

@@ -30,6 +30,7 @@ class Process {
   // Its exit code, or 128 + the signal that ended it; nothing if it still runs when the time is over.
   std::optional<int> waitForEnd(std::chrono::milliseconds timeout);
   void signal(int number) const;
+  pid_t id() const { return pid_; }
 
   const std::string& output() const { return output_.text; }
   const std::string& errors() const { return errors_.text; }

@@ -341,16 +341,22 @@ TEST_F(RosterTest, ASecondConnectionTakesOverAndTheFirstIsClosed) {
   EXPECT_THAT(inputs(), SizeIs(1));
 }
 
-TEST_F(RosterTest, WhoIsAwayTakesAPlace) {
-  limit = 2;
+TEST_F(RosterTest, WhoIsAwayMakesRoomForWhoComes) {
+  limit = 3;
+  Member watcher = join();
   const Member first = join(), second = join();
-  lose(first);
-  Member third;
+  Member third, fourth;
   ASSERT_FALSE(tryJoin(third).has_value());
   EXPECT_EQ(tryJoin(third).error(), Roster::Refusal::full);
-  EXPECT_TRUE(comeBack(first).admission.resumed);  // whose place it is
-  leave(second);
-  EXPECT_TRUE(tryJoin(third).has_value());
+  lose(first);
+  now += 1s;
+  lose(second);
+  EXPECT_TRUE(comeBack(second).admission.resumed);
+  watcher.heard();
+  ASSERT_TRUE(tryJoin(third).has_value());
+  EXPECT_THAT(watcher.heard(), ElementsAre("left 2 timed out", "joined 4"));
+  EXPECT_FALSE(tryJoin(fourth).has_value());
+  EXPECT_FALSE(tryJoin(fourth, {}, first.admission.token).has_value());
 }
 
 TEST_F(RosterTest, AServerThatHoldsNobodyLetsGoAtOnce) {

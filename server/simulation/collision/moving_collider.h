@@ -24,7 +24,7 @@ struct ContactStatus {
 };
 
 // At most so many in a tick, and so many planes of their hulls in all.
-inline constexpr std::size_t kMaxColliders = 4096;
+inline constexpr std::size_t kMaxColliders = 8192;
 inline constexpr std::size_t kMaxColliderPlanes = 16384;
 
 }  // namespace clothstream::simulation

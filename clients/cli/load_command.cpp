@@ -1,0 +1,190 @@
+// SPDX-License-Identifier: MIT
+// Options, progress and the report of a load.
+#include "clients/cli/load_command.h"
+
+#include <cstdio>
+#include <fstream>
+#include <sstream>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+#include <unistd.h>
+
+#include "clients/cli/complaint.h"
+#include "clients/cli/signals.h"
+#include "clients/grpc/address.h"
+
+namespace clothstream::cli {
+namespace {
+
+constexpr const char* kWebPort = ":8080";
+
+// Of a process so far, by the kernel; nothing where there is no such process.
+std::optional<double> cpuSeconds(std::uint32_t pid) {
+  std::ifstream file(fmt::format("/proc/{}/stat", pid));
+  std::string text;
+  if (!std::getline(file, text)) return std::nullopt;
+  // The name, in brackets, may hold anything.
+  std::istringstream rest(text.substr(text.rfind(')') + 1));
+  std::string skipped;
+  for (int i = 0; i < 11; ++i) rest >> skipped;
+  double user = 0, system = 0;
+  if (!(rest >> user >> system)) return std::nullopt;
+  return (user + system) / static_cast<double>(sysconf(_SC_CLK_TCK));
+}
+
+struct Ages {
+  double p50, p99;
+};
+Ages agesOf(std::vector<float>& samples) {
+  return {load::percentile(samples, 50), load::percentile(samples, 99)};
+}
+
+std::string json(load::LoadReport& report, std::optional<double> serverCpu) {
+  const Ages ages = agesOf(report.figures.ages), tickAges = agesOf(report.figures.tickAges);
+  nlohmann::ordered_json object{
+      {"participants", report.participants},
+      {"seconds", report.seconds},
+      {"framesPerSecond", report.framesPerSecond()},
+      {"frameAgeMsP50", ages.p50},
+      {"frameAgeMsP99", ages.p99},
+      {"tickAgeMsP50", tickAges.p50},
+      {"tickAgeMsP99", tickAges.p99},
+      {"dropped", report.figures.dropped},
+      {"decodeErrors", report.figures.decodeErrors + report.slowFigures.decodeErrors},
+      {"hashMismatches", report.figures.hashMismatches + report.slowFigures.hashMismatches},
+      {"mbitPerSecond", report.mbitPerSecond()},
+      {"serverCpuSeconds", nullptr},
+      {"joined", report.joined},
+      {"left", report.left},
+      {"lost", report.lost},
+      {"slow", report.slow},
+      {"slowFramesPerSecond", report.slowFramesPerSecond()},
+      {"slowDropped", report.slowFigures.dropped},
+      {"intruders", report.intruders},
+      {"intrusions", report.visits},
+  };
+  if (serverCpu) object["serverCpuSeconds"] = *serverCpu;
+  return object.dump(2);
+}
+
+std::string text(load::LoadReport& report, std::optional<double> serverCpu) {
+  const Ages ages = agesOf(report.figures.ages), tickAges = agesOf(report.figures.tickAges);
+  std::string text = fmt::format(
+      "{} participants for {:.1f} s: {:.1f} frames/s each, {:.1f} Mbit/s altogether, {} dropped, {} refused\n"
+      "age of a frame upon arrival: {:.2f} ms median, {:.2f} ms p99; since its tick began: {:.2f} and {:.2f} "
+      "ms",
+      report.participants, report.seconds, report.framesPerSecond(), report.mbitPerSecond(),
+      report.figures.dropped, report.figures.decodeErrors + report.slowFigures.decodeErrors, ages.p50,
+      ages.p99, tickAges.p50, tickAges.p99);
+  if (report.slow > 0)
+    text += fmt::format("\n{} slow: {:.1f} frames/s each, {} dropped", report.slow,
+                        report.slowFramesPerSecond(), report.slowFigures.dropped);
+  if (report.left > 0) text += fmt::format("\n{} left, and as many came", report.left);
+  if (report.intruders > 0)
+    text += fmt::format("\n{} intruders came {} times", report.intruders, report.visits);
+  if (serverCpu)
+    text += fmt::format("\n{:.2f} s of the server's processor time, {:.3f} ms a second and participant",
+                        *serverCpu, 1000 * *serverCpu / report.seconds / (report.participants + report.slow));
+  return text;
+}
+
+}  // namespace
+
+void LoadCommand::add(CLI::App& app) {
+  command_ = app.add_subcommand("load", "Be many participants at once, and say what they get");
+  command_->footer(kExitCodes);
+  command_->add_option(
+      "ADDRESS", address_,
+      "HOST or HOST:PORT of the server's gRPC, by default 127.0.0.1:50051; with --web of its "
+      "page, 127.0.0.1:8080");
+  command_->add_option("--scene", options_.scene, "The scene to join; the server's default if left out");
+  command_->add_option("--participants", options_.participants, "So many who read as fast as frames come")
+      ->check(CLI::Range(1u, 100'000u))
+      ->capture_default_str();
+  command_
+      ->add_option("--viewers", options_.viewers, "Of these, so many send no poses; the others move a sphere")
+      ->capture_default_str();
+  command_->add_option(
+      "--decoders", decoders_,
+      "Of these, so many decode what comes, and compare it with what the server holds (all); the "
+      "others acknowledge it");
+  command_->add_option("--slow", options_.slow, "Beside these, so many who read slowly")
+      ->check(CLI::Range(0u, 100'000u))
+      ->capture_default_str();
+  command_->add_option("--slow-rate", options_.slowBytesPerSecond, "Bytes a second that each of those reads")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  command_
+      ->add_option("--intruders", options_.intruders,
+                   "Beside these, so many who send what is no message, never read, vanish, and come again")
+      ->check(CLI::Range(0u, 10'000u))
+      ->capture_default_str();
+  command_
+      ->add_option("--joins", options_.joinsPerSecond,
+                   "Participants that join in a second, until all are there")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  command_
+      ->add_option("--leaves", options_.leavesPerSecond,
+                   "Participants that then leave in a second, for each of whom another comes")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  command_->add_option("--seconds", options_.seconds, "For how long, once all are there")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  command_->add_flag("--web", web_, "By WebSocket, as a page does, instead of gRPC");
+  command_->add_option("--server-pid", serverPid_,
+                       "Process of the server on this machine, for the processor time that it takes");
+  command_->add_flag("--json", json_, "Print one JSON object, and nothing else");
+}
+
+void LoadCommand::check() {
+  if (!parsed()) return;
+  if (address_.empty()) address_ = web_ ? std::string("127.0.0.1") : std::string(kDefaultAddress);
+  if (web_ && address_.find(':') == std::string::npos) address_ += kWebPort;
+  auto address = completeAddress(address_);
+  if (!address) throw CLI::ValidationError("ADDRESS", address.error());
+  address_ = *address;
+  if (options_.viewers > options_.participants)
+    throw CLI::ValidationError("--viewers", "there are no more of them than --participants");
+  options_.decoders = decoders_.value_or(options_.participants);
+  if (options_.decoders > options_.participants)
+    throw CLI::ValidationError("--decoders", "there are no more of them than --participants");
+  if (serverPid_ && !cpuSeconds(*serverPid_))
+    throw CLI::ValidationError("--server-pid", fmt::format("there is no process {} here", *serverPid_));
+}
+
+ExitCode LoadCommand::run() const {
+  const auto door = web_ ? load::makeWebDoor(address_) : load::makeGrpcDoor(address_);
+  const bool shows = !json_ && isatty(STDOUT_FILENO) != 0;
+  std::optional<double> before;
+  const auto serverCpuNow = [&] { return serverPid_ ? cpuSeconds(*serverPid_) : std::nullopt; };
+  load::LoadProgress progress{
+      .running = [] { return !interrupted(); }, .gathered = [&] { before = serverCpuNow(); }, .show = {}};
+  if (shows) {
+    progress.show = [](const load::LoadReport& last) {
+      std::vector<float> ages = last.figures.ages;
+      fmt::print("\r\033[K{} joined, {} left, {} lost  {:.1f} frames/s each  {:.2f} ms p99", last.joined,
+                 last.left, last.lost, last.framesPerSecond(), load::percentile(ages, 99));
+      std::fflush(stdout);
+    };
+  }
+  load::LoadReport report = load::runLoad(*door, options_, progress);
+  const auto after = serverCpuNow();
+  if (shows) fmt::print("\r\033[K");
+  std::optional<double> serverCpu;
+  if (before && after) serverCpu = *after - *before;
+  const ExitCode loss = exitCodeOf(report.firstLoss.kind);
+  if (report.joined == 0 && report.lost > 0)
+    return say({loss, fmt::format("nobody could join at {}: {}", address_, report.firstLoss.text)});
+  fmt::print("{}\n", json_ ? json(report, serverCpu) : text(report, serverCpu));
+  if (report.lost > 0)
+    return say({loss, fmt::format("{} times somebody could not stay; at first: {}", report.lost,
+                                  report.firstLoss.text)});
+  if (report.figures.hashMismatches + report.slowFigures.hashMismatches > 0)
+    return say({kHashMismatch, "decoded frames are not what the server holds"});
+  return kOk;
+}
+
+}  // namespace clothstream::cli

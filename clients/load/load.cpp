@@ -1,0 +1,195 @@
+// SPDX-License-Identifier: MIT
+// One thread steps everybody; the door's threads do what comes.
+#include "clients/load/load.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <thread>
+
+#include "clients/load/intruder.h"
+
+namespace clothstream::load {
+namespace {
+
+constexpr std::chrono::duration<double> kStep{1.0 / 72};
+// For everybody to be there once the last has knocked.
+constexpr std::chrono::seconds kJoinTime{30};
+// For those who said goodbye.
+constexpr std::chrono::seconds kLeaveTime{2};
+
+Clock::duration inSeconds(double seconds) {
+  return std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(seconds));
+}
+
+class Load {
+ public:
+  Load(Door& door, const LoadOptions& options, const LoadProgress& progress)
+      : door_(door), options_(options), progress_(progress) {
+    report_.participants = options.participants;
+    report_.slow = options.slow;
+    report_.intruders = options.intruders;
+    for (std::uint32_t i = 0; i < options.intruders; ++i)
+      intruders_.push_back(std::make_unique<Intruder>(door, options.scene, i));
+  }
+
+  LoadReport run() {
+    if (!gather()) return report_;
+    for (Seat& seat : seats_) seat.participant->take();
+    progress_.gathered();
+    measure();
+    for (Seat& seat : seats_) collect(seat);
+    for (const auto& intruder : intruders_) report_.visits += intruder->visits();
+    return report_;
+  }
+
+ private:
+  struct Seat {
+    std::uint32_t number;
+    std::unique_ptr<Participant> participant;
+    bool counted = false;  // among those who joined
+  };
+  struct Leaving {
+    std::unique_ptr<Participant> participant;
+    Clock::time_point until;
+  };
+
+  std::uint32_t seats() const { return options_.participants + options_.slow; }
+  bool isSlow(const Seat& seat) const { return seat.number >= options_.participants; }
+
+  std::unique_ptr<Participant> make(std::uint32_t number) {
+    return std::make_unique<Participant>(
+        door_, ParticipantOptions{
+                   .scene = options_.scene,
+                   .name = "load " + std::to_string(++names_),
+                   .decodes = number < options_.decoders,
+                   .moves = number + options_.viewers < options_.participants,
+                   .phase = number * std::numbers::phi,
+                   .bytesPerSecond = number < options_.participants ? 0 : options_.slowBytesPerSecond});
+  }
+
+  // False where it was ended early, or somebody could not stay.
+  bool gather() {
+    const auto start = Clock::now();
+    const auto end = start + inSeconds(seats() / options_.joinsPerSecond) + kJoinTime;
+    while (Clock::now() < end) {
+      const double due =
+          std::chrono::duration<double>(Clock::now() - start).count() * options_.joinsPerSecond;
+      while (seats_.size() < seats() && static_cast<double>(seats_.size()) <= due) {
+        const auto number = static_cast<std::uint32_t>(seats_.size());
+        seats_.push_back({number, make(number)});
+      }
+      if (!step()) return false;
+      if (report_.lost > 0) return false;
+      if (seats_.size() == seats() &&
+          std::all_of(seats_.begin(), seats_.end(), [](const Seat& seat) { return seat.counted; }))
+        return true;
+    }
+    report_.lost += 1;
+    report_.firstLoss = {Failure::Kind::lost,
+                         "not everybody could join within " + std::to_string(kJoinTime.count()) + " s"};
+    return false;
+  }
+
+  void measure() {
+    const auto start = Clock::now();
+    const auto end = start + inSeconds(options_.seconds);
+    auto shown = start;
+    std::uint64_t changes = 0;
+    while (Clock::now() < end && step()) {
+      const std::chrono::duration<double> passed = Clock::now() - start;
+      for (; static_cast<double>(changes) < passed.count() * options_.leavesPerSecond - 1; ++changes)
+        change(changes);
+      report_.seconds = passed.count();
+      if (!progress_.show || Clock::now() - shown < std::chrono::seconds(1)) continue;
+      shown = Clock::now();
+      LoadReport last = report_;
+      last.figures = {};
+      for (Seat& seat : seats_) {
+        const Figures figures = seat.participant->take();
+        (isSlow(seat) ? report_.slowFigures : report_.figures).add(figures);
+        if (!isSlow(seat)) last.figures.add(figures);
+      }
+      last.seconds = 1;
+      progress_.show(last);
+    }
+    report_.seconds = std::chrono::duration<double>(Clock::now() - start).count();
+  }
+
+  // One leaves, and another takes the seat.
+  void change(std::uint64_t turn) {
+    Seat& seat = seats_[turn % seats_.size()];
+    collect(seat);
+    seat.participant->leave();
+    leaving_.push_back({std::move(seat.participant), Clock::now() + kLeaveTime});
+    ++report_.left;
+    seat.counted = false;
+    seat.participant = make(seat.number);
+  }
+
+  void collect(Seat& seat) {
+    (isSlow(seat) ? report_.slowFigures : report_.figures).add(seat.participant->take());
+  }
+
+  bool step() {
+    next_ = std::max(next_ + std::chrono::duration_cast<Clock::duration>(kStep), Clock::now());
+    std::this_thread::sleep_until(next_);
+    const auto now = Clock::now();
+    for (Seat& seat : seats_) {
+      seat.participant->step(now);
+      if (!seat.counted && seat.participant->joined()) {
+        seat.counted = true;
+        ++report_.joined;
+      }
+      if (const auto why = seat.participant->ended()) {
+        if (report_.lost++ == 0) report_.firstLoss = *why;
+        collect(seat);
+        seat.counted = false;
+        seat.participant = make(seat.number);
+      }
+    }
+    for (const auto& intruder : intruders_) intruder->step(now);
+    std::erase_if(leaving_, [&](const Leaving& one) { return one.participant->ended() || now >= one.until; });
+    return progress_.running();
+  }
+
+  Door& door_;
+  const LoadOptions options_;
+  const LoadProgress progress_;
+  LoadReport report_;
+  std::vector<Seat> seats_;
+  std::vector<Leaving> leaving_;
+  std::vector<std::unique_ptr<Intruder>> intruders_;
+  std::uint64_t names_ = 0;
+  Clock::time_point next_ = Clock::now();
+};
+
+double rate(double amount, double seconds, std::uint32_t among) {
+  return seconds > 0 && among > 0 ? amount / seconds / among : 0;
+}
+
+}  // namespace
+
+double LoadReport::framesPerSecond() const {
+  return rate(static_cast<double>(figures.frames), seconds, participants);
+}
+double LoadReport::slowFramesPerSecond() const {
+  return rate(static_cast<double>(slowFigures.frames), seconds, slow);
+}
+double LoadReport::mbitPerSecond() const {
+  return rate(static_cast<double>(figures.bytes + slowFigures.bytes) * 8e-6, seconds, 1);
+}
+
+double percentile(std::vector<float>& samples, double percent) {
+  if (samples.empty()) return 0;
+  const auto rank = static_cast<std::size_t>(std::ceil(percent / 100 * static_cast<double>(samples.size())));
+  const auto at = samples.begin() + static_cast<std::ptrdiff_t>(std::max<std::size_t>(rank, 1) - 1);
+  std::nth_element(samples.begin(), at, samples.end());
+  return static_cast<double>(*at);
+}
+
+LoadReport runLoad(Door& door, const LoadOptions& options, const LoadProgress& progress) {
+  return Load(door, options, progress).run();
+}
+
+}  // namespace clothstream::load

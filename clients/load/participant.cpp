@@ -1,0 +1,183 @@
+// SPDX-License-Identifier: MIT
+// The protocol is the client core's; frames are looked at before it gets them.
+#include "clients/load/participant.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace clothstream::load {
+namespace {
+
+// How the hand moves: round the middle of the cloth, once in so many seconds.
+constexpr double kOrbitSeconds = 3;
+constexpr float kHandRadius = 0.05f;  // m
+
+std::uint64_t nowUs() {
+  return static_cast<std::uint64_t>(
+      std::chrono::duration_cast<std::chrono::microseconds>(Clock::now().time_since_epoch()).count());
+}
+
+std::span<const std::byte> bytesOf(const std::string& text) {
+  return std::as_bytes(std::span(text.data(), text.size()));
+}
+
+}  // namespace
+
+void Figures::add(const Figures& other) {
+  frames += other.frames;
+  bytes += other.bytes;
+  dropped += other.dropped;
+  decodeErrors += other.decodeErrors;
+  hashMismatches += other.hashMismatches;
+  ages.insert(ages.end(), other.ages.begin(), other.ages.end());
+  tickAges.insert(tickAges.end(), other.tickAges.begin(), other.tickAges.end());
+}
+
+Participant::Participant(Door& door, const ParticipantOptions& options)
+    : options_(options),
+      core_(cs_create_as(options.scene.c_str(), "clothstream load", options.name.c_str(),
+                         options.moves ? CS_ROLE_PARTICIPANT : CS_ROLE_VIEWER),
+            &cs_destroy) {
+  link_ = door.open(*this);
+  flush();
+  link_->read();
+}
+
+Participant::~Participant() {
+  link_->drop();
+}
+
+bool Participant::joined() const {
+  const std::lock_guard lock(mutex_);
+  return cs_get_state(core_.get()) == CS_STATE_JOINED;
+}
+
+std::optional<Failure> Participant::ended() const {
+  const std::lock_guard lock(mutex_);
+  return ended_;
+}
+
+void Participant::leave() {
+  link_->leave();
+}
+
+Figures Participant::take() {
+  const std::lock_guard lock(mutex_);
+  if (options_.decodes) {
+    cs_statistics statistics;
+    cs_get_statistics(core_.get(), nowUs(), &statistics);
+    figures_.decodeErrors =
+        statistics.decode_errors - std::exchange(decodeErrorsTaken_, statistics.decode_errors);
+    figures_.hashMismatches =
+        statistics.hash_mismatches - std::exchange(hashMismatchesTaken_, statistics.hash_mismatches);
+  }
+  return std::exchange(figures_, {});
+}
+
+void Participant::step(Clock::time_point now) {
+  bool reads = false;
+  {
+    const std::lock_guard lock(mutex_);
+    if (ended_) return;
+    cs_update(core_.get(), nowUs());
+    if (options_.moves && cs_get_state(core_.get()) == CS_STATE_JOINED) move(nowUs());
+    if (readLater_ && now >= readsAgainAt_) {
+      readLater_ = false;
+      reads = true;
+    }
+    flush();
+  }
+  if (reads) link_->read();
+}
+
+void Participant::received(std::span<const std::byte> message) {
+  {
+    const std::lock_guard lock(mutex_);
+    const std::uint64_t now = nowUs();
+    const bool isFrame =
+        message_.ParseFromArray(message.data(), static_cast<int>(message.size())) && message_.has_frame();
+    if (isFrame) frameReceived(message_.frame(), now);
+    if (!isFrame || options_.decodes)
+      cs_receive(core_.get(), reinterpret_cast<const std::uint8_t*>(message.data()), message.size(), now);
+    flush();
+    if (options_.bytesPerSecond > 0) {
+      const std::chrono::duration<double> time(static_cast<double>(message.size()) / options_.bytesPerSecond);
+      readsAgainAt_ =
+          std::max(readsAgainAt_, Clock::now()) + std::chrono::duration_cast<Clock::duration>(time);
+      readLater_ = true;
+      return;
+    }
+  }
+  link_->read();
+}
+
+void Participant::closed(const std::string& why) {
+  const std::lock_guard lock(mutex_);
+  const cs_state state = cs_get_state(core_.get());
+  if (state == CS_STATE_FAILED)
+    ended_ = {Failure::Kind::refused, cs_error_text(core_.get())};
+  else
+    ended_ = {state == CS_STATE_JOINED ? Failure::Kind::lost : Failure::Kind::unreachable, why};
+}
+
+void Participant::frameReceived(const v1::Frame& frame, std::uint64_t nowUs) {
+  const auto packet = codec::parsePacket(bytesOf(frame.packet()));
+  if (!packet) {
+    if (!options_.decodes) ++figures_.decodeErrors;
+    return;
+  }
+  count(packet->header);
+  figures_.bytes += frame.packet().size();
+  cs_statistics statistics;
+  cs_get_statistics(core_.get(), nowUs, &statistics);
+  if (statistics.clock_offset_us != 0) {
+    const double serverUs = static_cast<double>(nowUs) + statistics.clock_offset_us;
+    const auto age = [&](std::uint64_t sinceUs) {
+      return static_cast<float>((serverUs - static_cast<double>(sinceUs)) / 1000);
+    };
+    figures_.ages.push_back(age(frame.packet_time_us()));
+    figures_.tickAges.push_back(age(frame.tick_time_us()));
+  }
+  if (options_.decodes) return;
+  v1::ClientMessage acknowledgement;
+  acknowledgement.mutable_frame_ack()->set_tick(packet->header.tick);
+  link_->send(acknowledgement.SerializeAsString());
+}
+
+void Participant::count(const codec::PacketHeader& header) {
+  const std::uint64_t perFrame =
+      std::max(cs_simulation_rate(core_.get()) / std::max(cs_stream_rate(core_.get()), 1u), 1u);
+  if (frames_ > 0) {
+    const std::uint64_t before = ticks_[(frames_ - 1) % ticks_.size()];
+    if (header.tick > before)
+      figures_.dropped += std::max<std::uint64_t>((header.tick - before) / perFrame, 1) - 1;
+  }
+  if (!options_.decodes) {
+    for (std::size_t i = 0; i < header.referenceCount; ++i)
+      if (std::find(ticks_.begin(), ticks_.end(), header.references[i]) == ticks_.end())
+        ++figures_.decodeErrors;
+  }
+  ticks_[frames_++ % ticks_.size()] = header.tick;
+  ++figures_.frames;
+}
+
+void Participant::move(std::uint64_t nowUs) {
+  const float* const at = cs_positions(core_.get());
+  const std::uint32_t count = cs_vertex_count(core_.get());
+  if (count == 0) return;
+  const float* const middle = at + 3 * std::size_t{count / 2};
+  const double turns = options_.phase + static_cast<double>(nowUs) / (1e6 * kOrbitSeconds);
+  const double turn = 2 * std::numbers::pi * turns;
+  const float sphere[]{middle[0] + 0.5f * static_cast<float>(std::cos(turn)), middle[1],
+                       middle[2] + 0.5f * static_cast<float>(std::sin(turn)), kHandRadius};
+  cs_set_colliders(core_.get(), sphere, 1, nowUs);
+}
+
+void Participant::flush() {
+  std::size_t bytes = 0;
+  while (const std::uint8_t* message = cs_next_outgoing(core_.get(), &bytes))
+    link_->send(std::string(reinterpret_cast<const char*>(message), bytes));
+}
+
+}  // namespace clothstream::load

@@ -1,0 +1,167 @@
+// SPDX-License-Identifier: MIT
+// The native client over a link that is slow, uneven, narrow or stands still, against the real
+// clothstream-server.
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <csignal>
+#include <cstdio>
+#include <functional>
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "clients/grpc/grpc_client.h"
+#include "tests/e2e/link.h"
+#include "tests/e2e/process.h"
+
+namespace clothstream::e2e {
+namespace {
+
+using namespace std::chrono_literals;
+using Clock = std::chrono::steady_clock;
+
+constexpr auto kPatience = 60s;
+
+bool eventually(const std::function<bool()>& holds) {
+  for (const auto end = Clock::now() + kPatience; Clock::now() < end; std::this_thread::sleep_for(5ms))
+    if (holds()) return true;
+  return false;
+}
+
+class ImpairedLinkTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    server_ = std::make_unique<Process>(std::vector<std::string>{CLOTHSTREAM_SERVER, "--port", "0",
+                                                                 "--grpc-port", "0", "--scene", "small",
+                                                                 "--scene-file", "tests/e2e/small.json"});
+    if (const auto line = server_->waitForLine("gRPC ", kPatience)) {
+      address_ = line->substr(line->find_first_not_of(' '));
+      link_ = std::make_unique<Link>(
+          static_cast<std::uint16_t>(std::stoi(address_.substr(address_.rfind(':') + 1))));
+      return;
+    }
+    server_->waitForEnd(kPatience);
+    if (server_->errors().find("no Vulkan") != std::string::npos) GTEST_SKIP() << server_->errors();
+    FAIL() << "the server did not start: " << server_->errors();
+  }
+  void TearDown() override {
+    if (!server_) return;
+    server_->signal(SIGTERM);
+    EXPECT_EQ(server_->waitForEnd(kPatience), 0);
+    EXPECT_THAT(server_->errors(), ::testing::Not(::testing::HasSubstr("Validation")));
+  }
+
+  std::unique_ptr<GrpcClient> join(const std::string& address) {
+    auto joined = GrpcClient::join(address, {}, [this](cs_client*, std::uint32_t events) {
+      if (events == 0) ++cuts_;
+    });
+    if (!joined) throw std::runtime_error(joined.error().text);
+    return std::move(*joined);
+  }
+  std::unique_ptr<GrpcClient> joinThroughLink() { return join("127.0.0.1:" + std::to_string(link_->port())); }
+
+  static cs_statistics statisticsOf(GrpcClient& client) {
+    cs_statistics statistics;
+    client.visit([&](cs_client* core) { cs_get_statistics(core, GrpcClient::nowUs(), &statistics); });
+    return statistics;
+  }
+  static void expectNothingWrong(const cs_statistics& statistics) {
+    EXPECT_EQ(statistics.decode_errors, 0u);
+    EXPECT_EQ(statistics.hash_mismatches, 0u);
+  }
+  static bool streams(GrpcClient& client, std::uint64_t frames) {
+    const std::uint64_t before = statisticsOf(client).frames;
+    return eventually([&] { return statisticsOf(client).frames >= before + frames; });
+  }
+
+  std::unique_ptr<Process> server_;
+  std::string address_;
+  std::unique_ptr<Link> link_;
+  std::atomic<int> cuts_{0};
+};
+
+TEST_F(ImpairedLinkTest, AFarServerIsKnownToBeFarAndItsClockIsKnown) {
+  constexpr auto kDelay = 40ms, kJitter = 20ms;
+  link_->impair({.delay = kDelay, .jitter = kJitter});
+  const auto client = joinThroughLink();
+  ASSERT_TRUE(streams(*client, 120));
+  const cs_statistics statistics = statisticsOf(*client);
+  expectNothingWrong(statistics);
+  EXPECT_GE(statistics.round_trip_ms, 2 * 40);
+  // Both ends have one clock. The exchanges that are believed lie within half of what their two ways differ
+  // by.
+  EXPECT_LE(std::abs(statistics.clock_offset_us), 1000 * 20 / 2 + 5000.0);
+  std::printf("round trip %.1f ms, clock off by %.2f ms\n", statistics.round_trip_ms,
+              statistics.clock_offset_us / 1000);
+  EXPECT_EQ(cuts_, 0);
+}
+
+TEST_F(ImpairedLinkTest, ALinkThatStandsStillForASecondCutsNobodyOff) {
+  const auto client = joinThroughLink();
+  ASSERT_TRUE(streams(*client, 10));
+  link_->impair({.stalled = true});
+  std::this_thread::sleep_for(1s);
+  const std::uint64_t before = statisticsOf(*client).frames;
+  link_->impair({});
+  const auto restored = Clock::now();
+  ASSERT_TRUE(eventually([&] { return statisticsOf(*client).frames > before; }));
+  std::printf("first frame %.0f ms after the link goes on\n",
+              std::chrono::duration<double, std::milli>(Clock::now() - restored).count());
+  ASSERT_TRUE(streams(*client, 60));
+  expectNothingWrong(statisticsOf(*client));
+  EXPECT_EQ(cuts_, 0);
+}
+
+TEST_F(ImpairedLinkTest, ANarrowLinkGetsFewerFramesAndNoWrongOnes) {
+  const auto client = joinThroughLink();
+  ASSERT_TRUE(streams(*client, 60));
+  const cs_statistics wide = statisticsOf(*client);
+  link_->impair({.bytesPerSecond = 1000 * wide.kbit_per_second / 8 / 4, .queueBytes = 2048});
+  std::this_thread::sleep_for(3s);
+  const double narrow = statisticsOf(*client).frames_per_second;
+  EXPECT_LT(narrow, 0.8 * wide.frames_per_second);
+  EXPECT_GT(narrow, 0);
+  expectNothingWrong(statisticsOf(*client));
+  link_->impair({});
+  const auto restored = Clock::now();
+  ASSERT_TRUE(
+      eventually([&] { return statisticsOf(*client).frames_per_second > 0.9 * wide.frames_per_second; }));
+  std::printf("%.1f of %.1f frames/s on a quarter of the rate; nine tenths again after %.1f s\n", narrow,
+              wide.frames_per_second, std::chrono::duration<double>(Clock::now() - restored).count());
+  expectNothingWrong(statisticsOf(*client));
+}
+
+TEST_F(ImpairedLinkTest, WhoVanishesWithoutAWordIsNoticed) {
+  const auto watcher = join(address_);
+  {
+    auto doomed = joinThroughLink();
+    const float sphere[] = {0.4f, 1.7f, 0.3f, 0.1f};
+    doomed->visit([&](cs_client* core) { cs_set_colliders(core, sphere, 1, GrpcClient::nowUs()); });
+    const auto ofOthers = [&] {
+      bool there = false;
+      watcher->visit([&](cs_client* core) {
+        cs_collider collider;
+        for (std::uint32_t i = 0; cs_get_collider(core, i, &collider) != 0; ++i)
+          there |= collider.participant_id != 0;
+      });
+      return there;
+    };
+    ASSERT_TRUE(eventually(ofOthers));
+    link_->impair({.stalled = true});
+    const auto gone = Clock::now();
+    doomed.reset();  // its goodbye does not arrive, nor does the end of its connection
+    ASSERT_TRUE(eventually([&] { return !ofOthers(); }));
+    std::printf("colliders gone %.1f s after their owner\n",
+                std::chrono::duration<double>(Clock::now() - gone).count());
+  }
+  ASSERT_TRUE(streams(*watcher, 60));
+  expectNothingWrong(statisticsOf(*watcher));
+}
+
+}  // namespace
+}  // namespace clothstream::e2e

@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: MIT
+// `clothstream load` against the real clothstream-server, by both doors.
+#include <csignal>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "tests/e2e/process.h"
+
+namespace clothstream::e2e {
+namespace {
+
+using namespace std::chrono_literals;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+constexpr auto kStart = 60s;
+constexpr auto kEnd = 120s;
+
+class LoadTest : public ::testing::Test {
+ protected:
+  void startServer(const std::vector<std::string>& more = {}) {
+    std::vector<std::string> command{
+        CLOTHSTREAM_SERVER,    "--port", "0", "--grpc-port", "0", "--scene", "small", "--scene-file",
+        "tests/e2e/small.json"};
+    command.insert(command.end(), more.begin(), more.end());
+    server_ = std::make_unique<Process>(command);
+    const auto page = server_->waitForLine("page ", kStart), grpc = server_->waitForLine("gRPC ", kStart);
+    if (page && grpc) {
+      const std::size_t host = page->find("//") + 2;
+      web_ = page->substr(host, page->find('/', host) - host);
+      grpc_ = grpc->substr(grpc->find_first_not_of(' '));
+      return;
+    }
+    server_->waitForEnd(kStart);
+    if (server_->errors().find("no Vulkan") != std::string::npos) GTEST_SKIP() << server_->errors();
+    FAIL() << "the server did not start: " << server_->errors();
+  }
+  void TearDown() override {
+    if (!server_) return;
+    server_->signal(SIGTERM);
+    EXPECT_EQ(server_->waitForEnd(kEnd), 0);
+    EXPECT_THAT(server_->errors(), Not(HasSubstr("Validation"))) << server_->errors();
+  }
+
+  static std::unique_ptr<Process> load(std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), {CLOTHSTREAM, "load"});
+    return std::make_unique<Process>(arguments);
+  }
+  // Some of everybody.
+  void expectAllAreServed(const std::vector<std::string>& door) {
+    std::vector<std::string> arguments{
+        "--participants", "6", "--viewers",   "2",    "--decoders",   "3",
+        "--slow",         "1", "--slow-rate", "2000", "--intruders",  "5",
+        "--leaves",       "2", "--seconds",   "4",    "--server-pid", std::to_string(server_->id()),
+        "--json"};
+    arguments.insert(arguments.end(), door.begin(), door.end());
+    const auto program = load(arguments);
+    ASSERT_EQ(program->waitForEnd(kEnd), 0) << program->errors();
+    const auto report = nlohmann::json::parse(program->output());
+    EXPECT_EQ(report.at("participants"), 6);
+    EXPECT_GE(report.at("seconds").get<double>(), 4);
+    EXPECT_GT(report.at("framesPerSecond").get<double>(), 1);
+    EXPECT_LT(report.at("framesPerSecond").get<double>(), 2 * 60);
+    // Clocks are of the same machine: an age below 0 by more than their estimate's error is a lie.
+    EXPECT_GT(report.at("frameAgeMsP50").get<double>(), -5);
+    EXPECT_GE(report.at("frameAgeMsP99"), report.at("frameAgeMsP50"));
+    EXPECT_GT(report.at("tickAgeMsP50"), report.at("frameAgeMsP50"));
+    EXPECT_EQ(report.at("decodeErrors"), 0);
+    EXPECT_EQ(report.at("hashMismatches"), 0);
+    EXPECT_GT(report.at("mbitPerSecond").get<double>(), 0);
+    EXPECT_GT(report.at("serverCpuSeconds").get<double>(), 0);
+    EXPECT_EQ(report.at("lost"), 0);
+    EXPECT_GE(report.at("left").get<int>(), 2);
+    EXPECT_GE(report.at("joined").get<int>(), 7);
+    EXPECT_LT(report.at("slowFramesPerSecond"), report.at("framesPerSecond"));
+    EXPECT_GE(report.at("intrusions").get<int>(), 5);
+  }
+
+  std::unique_ptr<Process> server_;
+  std::string grpc_, web_;
+};
+
+TEST_F(LoadTest, GrpcServesAllAmongIntruders) {
+  startServer();
+  if (!grpc_.empty()) expectAllAreServed({grpc_});
+}
+
+TEST_F(LoadTest, WebSocketsServeAllAmongIntruders) {
+  startServer();
+  if (!web_.empty()) expectAllAreServed({"--web", web_});
+}
+
+TEST_F(LoadTest, SaysWhatNobodyWasTold) {
+  startServer({"--max-participants", "3"});
+  if (grpc_.empty()) return;
+  const auto crowd = load({grpc_, "--participants", "4"});
+  EXPECT_EQ(crowd->waitForEnd(kEnd), 4);
+  EXPECT_THAT(crowd->errors(), HasSubstr("1 times somebody could not stay"));
+  EXPECT_THAT(crowd->errors(), HasSubstr("has 3 participants"));
+
+  const auto elsewhere = load({grpc_, "--scene", "nowhere"});
+  EXPECT_EQ(elsewhere->waitForEnd(kEnd), 4);
+  EXPECT_THAT(elsewhere->errors(), HasSubstr("nobody could join"));
+  EXPECT_THAT(elsewhere->errors(), HasSubstr("nowhere"));
+}
+
+TEST_F(LoadTest, NobodyAnswers) {
+  for (const std::vector<std::string>& door :
+       {std::vector<std::string>{"127.0.0.1:9"}, {"--web", "127.0.0.1:9"}}) {
+    const auto program = load(door);
+    EXPECT_EQ(program->waitForEnd(kEnd), 3);
+    EXPECT_THAT(program->errors(), HasSubstr("nobody could join at 127.0.0.1:9"));
+  }
+}
+
+TEST_F(LoadTest, RefusesWhatMakesNoSense) {
+  for (const std::vector<std::string>& arguments : {std::vector<std::string>{"--viewers", "11"},
+                                                    {"--decoders", "11"},
+                                                    {"--participants", "0"},
+                                                    {"--seconds", "0"},
+                                                    {"--server-pid", "4000000000"},
+                                                    {"--web", "host:port"}}) {
+    const auto program = load(arguments);
+    EXPECT_EQ(program->waitForEnd(kEnd), 2) << arguments[0];
+    EXPECT_THAT(program->errors(), HasSubstr(arguments[0] == "--web" ? "ADDRESS" : arguments[0]));
+  }
+}
+
+TEST_F(LoadTest, AnInterruptEndsItWithItsReport) {
+  startServer();
+  if (grpc_.empty()) return;
+  const auto program = load({grpc_, "--participants", "2", "--seconds", "3600"});
+  const auto watcher =
+      std::make_unique<Process>(std::vector<std::string>{CLOTHSTREAM, "join", grpc_, "--seconds", "2"});
+  EXPECT_EQ(watcher->waitForEnd(kEnd), 0);
+  program->signal(SIGINT);
+  EXPECT_EQ(program->waitForEnd(kEnd), 0);
+  EXPECT_THAT(program->output(), HasSubstr("2 participants for"));
+}
+
+}  // namespace
+}  // namespace clothstream::e2e
