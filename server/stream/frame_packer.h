@@ -20,11 +20,17 @@
 
 namespace clothstream::stream {
 
-// One recorded frame that is complete on the device, and what travels with it.
+// One frame that is complete on the device, and what travels with it.
 struct CompleteFrame {
+  // As it was recorded for one quality.
+  struct Recorded {
+    encode::FrameEncoder* encoder = nullptr;
+    std::uint8_t quality = 0;
+    bool key = false;  // wanted
+    encode::RecordedFrame frame{};
+  };
   LiveScene* scene = nullptr;
-  encode::FrameEncoder* encoder = nullptr;
-  encode::RecordedFrame recorded;
+  std::vector<Recorded> recorded;  // one or more
   // Of a state that must not be shown: only its slot is freed.
   bool discarded = false;
   std::uint64_t stateHash = 0;
@@ -47,7 +53,7 @@ class FramePacker {
   FramePacker(const FramePacker&) = delete;
   FramePacker& operator=(const FramePacker&) = delete;
 
-  // `frame` gets the contents of an older one, for its memory.
+  // `frame` gets the contents of an older one, for its memory. The scene counts it until it is packed.
   void push(CompleteFrame& frame);
   // Returns when everything is packed: no encoder that was pushed is used any more.
   void drain();
@@ -57,6 +63,7 @@ class FramePacker {
  private:
   void run();
   void pack();
+  void publish(std::size_t bytes, std::uint64_t reconstructionHash);
 
   std::function<void()> everySecond_;
   encode::EncoderThreads workers_;

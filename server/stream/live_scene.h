@@ -37,6 +37,7 @@ class LiveScene {
   const scene::Scene& start() const { return start_; }
   // Of its stream.
   std::uint32_t codec() const;
+  StreamShape shape() const;
   // With all accepted changes, those of the next tick included.
   scene::Scene definition() const;
 
@@ -70,11 +71,14 @@ class LiveScene {
   std::atomic<bool> running{false};
   std::atomic<std::uint64_t> tick{0};  // newest complete one
 
+  std::atomic<std::uint32_t> framesWaiting{0};  // to be packed
+
  private:
   const scene::Scene start_;
 
   mutable std::mutex mutex_;
   scene::Scene definition_;
+  std::shared_ptr<const std::string> geometry_;     // of all descriptions; null before the first
   std::shared_ptr<const Description> description_;  // null when the definition has changed since
   std::uint64_t contents_ = 0;                      // ids given
 };

@@ -53,7 +53,7 @@ class Viewer {
   explicit Viewer(stream::LiveScene& scene)
       : scene_(scene), mailbox_(std::make_shared<stream::Mailbox>([] {})) {
     EXPECT_EQ(scene.audience.join(mailbox_, 10), stream::Audience::Joining::joined);
-    mailbox_->subscribe(scene.description(), scene.start().streamRate, scene.metrics);
+    mailbox_->subscribe(scene.description(), scene.shape(), scene.metrics);
     read(Clock::time_point{});
   }
   ~Viewer() { scene_.audience.leave(*mailbox_); }
