@@ -77,8 +77,7 @@ void LinkAdaptation::stepDown(Clock::time_point now) {
   ++step_;
   const double carried =
       kPartUsed * static_cast<double>(delivered_) / std::max(seconds(now - strainedSince_), 1e-3);
-  while (!failed && step_ < last && bytesPerSecond(points_[step_]) > carried) ++step_;
-  steppedUp_.reset();
+  while (step_ < last && bytesPerSecond(points_[step_]) > carried) ++step_;
   strain_ = Clock::duration::zero();
 }
 

@@ -25,14 +25,13 @@ struct OperatingPoint {
 // is not takes half as much away: a single hiccup counts for little.
 //
 // Down: when kPatience has added up, to the best point that what was delivered meanwhile would have carried.
-// Up: a step at a time, after a time in which it was hardly behind. A step up that fails within kTrial is taken
-// back, and the next one waits twice as long, but never longer than that from the lowest step to the top takes
-// 3 s. With one point alone nothing ever changes. Not thread-safe; knows no clock but what it is told.
+// Up: a step at a time, after a time in which it was hardly behind. After one that fails within kTrial
+// the next waits twice as long, but never longer than that from the lowest point to the best takes 3 s. With one point alone nothing ever changes. Not thread-safe; knows no clock but what it is told.
 class LinkAdaptation {
  public:
   static constexpr std::chrono::milliseconds kPatience{200}, kTrial{1000};
   // Before the first step up after one down; after one up that went well.
-  static constexpr std::chrono::milliseconds kShortestWait{500}, kLongestWait{1600}, kClimb{200};
+  static constexpr std::chrono::milliseconds kShortestWait{500}, kLongestWait{1600}, kClimb{250};
   // What frames that were dropped count for, however many at a time.
   static constexpr std::chrono::milliseconds kOfDrop{100};
   // Of the bits of a quality the next coarser one takes about this part.
@@ -73,7 +72,7 @@ class LinkAdaptation {
   Clock::time_point strainedSince_{};
   std::size_t delivered_ = 0;  // since then
   Clock::duration wait_ = kShortestWait, backOff_ = kShortestWait;
-  std::optional<Clock::time_point> steppedUp_;  // unless it stepped down since
+  std::optional<Clock::time_point> steppedUp_;  // last
 };
 
 }  // namespace clothstream::stream

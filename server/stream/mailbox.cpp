@@ -275,7 +275,8 @@ std::optional<SharedBytes> Mailbox::take(Clock::time_point now) {
 }
 
 std::size_t Mailbox::window() const {
-  const double inFlight = std::ceil(roundTrip_.value_or(0) * shape_.rate);
+  const int leftOut = shape_.layers - adaptation_.point().layers;
+  const double inFlight = std::ceil(roundTrip_.value_or(0) * (shape_.rate >> leftOut));
   return kMinWindow + static_cast<std::size_t>(std::min(inFlight, double{kMaxWindow - kMinWindow}));
 }
 

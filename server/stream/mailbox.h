@@ -60,7 +60,7 @@ struct FrameWishes {
 // the latter two shared with the other subscribers.
 //
 // Room for frames: at most window() of them are out and not acknowledged. It is two, and on long round trips
-// as many more as the scene streams in one; the round trip is the shortest of late from a frame's leaving to
+// as many more as it is sent in one; the round trip is the shortest of late from a frame's leaving to
 // its acknowledgement, so that a queue on the way, which makes it longer, does not feed itself.
 //
 // A predicted frame is given only where the frame that it refers to was. A subscriber without room has up to

@@ -24,8 +24,10 @@ class SimulatedLink {
  public:
   static constexpr std::chrono::milliseconds kLatency{10};
 
-  SimulatedLink(const StreamShape& shape, OperatingPoint wanted) : shape_(shape) {
+  SimulatedLink(const StreamShape& shape, OperatingPoint wanted, Clock::time_point now)
+      : given{0, shape.layers}, arrived_(given) {
     mailbox->subscribe(nullptr, shape, metrics, wanted);
+    EXPECT_FALSE(mailbox->next(now));
   }
 
   void deliver(const PublishedFrame& frame) {
@@ -35,7 +37,10 @@ class SimulatedLink {
   void pass(Clock::duration time, Clock::time_point now) {
     const double carried = bytesPerSecond * seconds(time);
     budget_ = std::min(budget_ + carried, carried + kBurst);
-    while (const auto message = mailbox->next(now)) queue_.push_back(*message);
+    while (const auto message = mailbox->next(now)) {
+      if (const auto told = pointIn(*message)) given = *told;
+      queue_.push_back(*message);
+    }
     while (!queue_.empty() && static_cast<double>(queue_.front()->size()) <= budget_) {
       budget_ -= static_cast<double>(queue_.front()->size());
       arriving_.push_back({now + kLatency, queue_.front()});
@@ -57,7 +62,7 @@ class SimulatedLink {
   telemetry::SceneMetrics metrics;
   const std::shared_ptr<Mailbox> mailbox = std::make_shared<Mailbox>([] {});
   std::vector<Arrived> arrived;
-  std::optional<OperatingPoint> told;  // newest; nothing before the first
+  OperatingPoint given;  // that the mailbox told last; it need not have arrived
 
  private:
   static constexpr double kBurst = 2000;  // bytes that an idle link takes at once
@@ -70,33 +75,37 @@ class SimulatedLink {
     std::uint64_t tick;
   };
 
+  // Nothing where it is a frame.
+  std::optional<OperatingPoint> pointIn(const SharedBytes& message) const {
+    if (published_.contains(message.get())) return std::nullopt;
+    v1::ServerMessage parsed;
+    EXPECT_TRUE(parsed.ParseFromArray(message->data(), static_cast<int>(message->size())));
+    EXPECT_TRUE(parsed.has_operating_point());
+    return OperatingPoint{static_cast<std::uint8_t>(parsed.operating_point().quality()),
+                          static_cast<std::uint8_t>(parsed.operating_point().temporal_layers())};
+  }
+
   void arrive(const SharedBytes& message, Clock::time_point now) {
-    const auto known = published_.find(message.get());
-    if (known == published_.end()) {
-      v1::ServerMessage parsed;
-      ASSERT_TRUE(parsed.ParseFromArray(message->data(), static_cast<int>(message->size())));
-      ASSERT_TRUE(parsed.has_operating_point());
-      told = {static_cast<std::uint8_t>(parsed.operating_point().quality()),
-              static_cast<std::uint8_t>(parsed.operating_point().temporal_layers())};
+    if (const auto told = pointIn(message)) {
+      arrived_ = *told;
       return;
     }
-    const PublishedFrame& frame = known->second;
+    const PublishedFrame& frame = published_.at(message.get());
     if (frame.key) {
       decoded_.clear();
     } else {
       ASSERT_EQ(frame.quality, quality_) << "tick " << frame.tick;
       ASSERT_TRUE(decoded_.find(frame.referenceTick)) << "tick " << frame.tick;
     }
-    const OperatingPoint point = told.value_or(OperatingPoint{0, shape_.layers});
-    ASSERT_EQ(frame.quality, point.quality) << "tick " << frame.tick;
-    ASSERT_LT(frame.layer, point.layers) << "tick " << frame.tick;
+    ASSERT_EQ(frame.quality, arrived_.quality) << "tick " << frame.tick;
+    ASSERT_LT(frame.layer, arrived_.layers) << "tick " << frame.tick;
     quality_ = frame.quality;
     decoded_.hold(frame.layer, frame.tick);
     arrived.push_back({frame.tick, frame.quality, frame.layer, now - frame.complete});
     acks_.push_back({now + kLatency, frame.tick});
   }
 
-  const StreamShape shape_;
+  OperatingPoint arrived_;
   double budget_ = 0;
   std::deque<SharedBytes> queue_;
   std::deque<Arriving> arriving_;
@@ -116,7 +125,7 @@ class SimulatedScene {
   explicit SimulatedScene(const StreamShape& shape) : shape_(shape) {}
 
   SimulatedLink& join(OperatingPoint wanted = {0, codec::kMaxTemporalLayers}) {
-    return *links_.emplace_back(std::make_unique<SimulatedLink>(shape_, wanted));
+    return *links_.emplace_back(std::make_unique<SimulatedLink>(shape_, wanted, now));
   }
   // Of all frames of the finest quality.
   double fullRate() const { return static_cast<double>(kFrameBytes) * shape_.rate; }
