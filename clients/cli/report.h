@@ -28,7 +28,7 @@ struct Report {
   double seconds = 0;  // from the first frame to the newest
   cs_statistics statistics{};
   std::uint32_t quality = 0, temporalLayers = 0;  // of what is sent now
-  std::vector<ClothFigures> cloths;  // none before the first report
+  std::vector<ClothFigures> cloths;               // none before the first report
 
   static Report of(const cs_client* client, std::uint64_t nowUs);
 

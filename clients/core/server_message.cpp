@@ -446,11 +446,10 @@ std::optional<cs_playback> readPlayback(Bytes message) {
 }
 
 std::optional<OperatingPoint> readOperatingPoint(Bytes message) {
-  return readMessage<OperatingPoint>(
-      message, [](OperatingPoint& point, std::uint32_t field, Reader& reader) {
-        if (field == varint(1)) return set(point.quality, reader.get_uint32());
-        return field == varint(2) ? set(point.temporalLayers, reader.get_uint32()) : skip(reader);
-      });
+  return readMessage<OperatingPoint>(message, [](OperatingPoint& point, std::uint32_t field, Reader& reader) {
+    if (field == varint(1)) return set(point.quality, reader.get_uint32());
+    return field == varint(2) ? set(point.temporalLayers, reader.get_uint32()) : skip(reader);
+  });
 }
 
 std::optional<Notice> readNotice(Bytes message) {

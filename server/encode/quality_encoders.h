@@ -12,9 +12,9 @@
 
 namespace clothstream::encode {
 
-// The finest quality's is always there. That of another is made when it is first wanted, on a thread of its own,
-// for that of a large cloth takes long, and is gone some time after it was wanted last. Belongs to the device's
-// thread.
+// The finest quality's is always there. That of another is made when it is first wanted, on a thread of its
+// own, for that of a large cloth takes long, and is gone some time after it was wanted last. Belongs to the
+// device's thread.
 class QualityEncoders {
  public:
   using Clock = std::chrono::steady_clock;

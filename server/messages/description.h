@@ -29,8 +29,8 @@ v1::StreamDescription toDescription(const scene::Scene& scene, std::uint32_t epo
 // A scene as a list shows it; who is in it, and whether it runs, only the caller knows.
 v1::SceneSummary toSummary(const scene::Scene& scene);
 
-// How many pieces a content of so many bytes has: of limits::kMaxChunkBytes, the last may be shorter; one empty
-// piece for empty content.
+// How many pieces a content of so many bytes has: of limits::kMaxChunkBytes, the last may be shorter; one
+// empty piece for empty content.
 std::size_t chunkCount(std::size_t contentBytes);
 // One of them, of the content that these parts are one after the other; it has at most
 // limits::kMaxContentBytes.

@@ -16,8 +16,7 @@ std::size_t Description::chunks() const {
 SharedBytes Description::chunk(std::size_t index) const {
   const std::array<std::string_view, 2> parts{*geometry_, rest_};
   v1::ServerMessage message;
-  *message.mutable_chunk() =
-      messages::toChunk(contentId_, v1::CONTENT_KIND_STREAM_DESCRIPTION, parts, index);
+  *message.mutable_chunk() = messages::toChunk(contentId_, v1::CONTENT_KIND_STREAM_DESCRIPTION, parts, index);
   return serialise(message);
 }
 

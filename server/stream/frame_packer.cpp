@@ -28,7 +28,6 @@ void FramePacker::push(CompleteFrame& frame) {
   {
     const std::lock_guard lock(mutex_);
     assert(waiting_ < ring_.size());
-    ++frame.scene->framesWaiting;
     std::swap(ring_[(first_ + waiting_++) % ring_.size()], frame);
   }
   changed_.notify_all();
@@ -55,7 +54,6 @@ void FramePacker::run() {
     }
     if (busy_) {
       pack();
-      --frame_.scene->framesWaiting;
       const std::lock_guard lock(mutex_);
       busy_ = false;
       changed_.notify_all();

@@ -45,15 +45,15 @@ struct CompleteFrame {
 // push() and drain() belong to the device's thread.
 class FramePacker {
  public:
-  // At most `capacity` frames wait. `everySecond` is called about once a second, on the packer's thread,
-  // which predicts large frames together with others: so many in all.
+  // At most `capacity` frames wait: as many as there are slots in encoders. `everySecond` is called about
+  // once a second, on the packer's thread, which predicts large frames together with others: so many in all.
   FramePacker(std::size_t capacity, std::function<void()> everySecond, std::uint32_t encoderThreads = 1);
   // What was pushed is packed first.
   ~FramePacker();
   FramePacker(const FramePacker&) = delete;
   FramePacker& operator=(const FramePacker&) = delete;
 
-  // `frame` gets the contents of an older one, for its memory. The scene counts it until it is packed.
+  // `frame` gets the contents of an older one, for its memory.
   void push(CompleteFrame& frame);
   // Returns when everything is packed: no encoder that was pushed is used any more.
   void drain();

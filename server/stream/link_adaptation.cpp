@@ -48,7 +48,8 @@ bool LinkAdaptation::look(bool behind, Clock::time_point now) {
     strain(passed, now - passed);
   else
     strain_ = std::max(strain_ - passed / 2, Clock::duration::zero());
-  calm_ = strain_ == Clock::duration::zero() ? calm_ + passed : std::max(calm_ - passed, Clock::duration::zero());
+  calm_ =
+      strain_ == Clock::duration::zero() ? calm_ + passed : std::max(calm_ - passed, Clock::duration::zero());
   const std::size_t before = step_;
   if (strain_ >= kPatience) stepDown(now);
   if (step_ > 0 && calm_ >= wait_) stepUp(now);

@@ -20,13 +20,14 @@ struct OperatingPoint {
   bool operator==(const OperatingPoint&) const = default;
 };
 
-// Steps from all that a subscriber wants down to the base layer of the coarsest quality: layers go first, then
-// quality. It is told with every frame whether the subscriber is behind. What it is behind adds up, and what it
-// is not takes half as much away: a single hiccup counts for little.
+// Steps from all that a subscriber wants down to the base layer of the coarsest quality: layers go first,
+// then quality. It is told with every frame whether the subscriber is behind. What it is behind adds up, and
+// what it is not takes half as much away: a single hiccup counts for little.
 //
 // Down: when kPatience has added up, to the best point that what was delivered meanwhile would have carried.
 // Up: a step at a time, after a time in which it was hardly behind. After one that fails within kTrial
-// the next waits twice as long, but never longer than that from the lowest point to the best takes 3 s. With one point alone nothing ever changes. Not thread-safe; knows no clock but what it is told.
+// the next waits twice as long, but never longer than that from the lowest point to the best takes 3 s. With
+// one point alone nothing ever changes. Not thread-safe; knows no clock but what it is told.
 class LinkAdaptation {
  public:
   static constexpr std::chrono::milliseconds kPatience{200}, kTrial{1000};
@@ -48,8 +49,8 @@ class LinkAdaptation {
   void delivered(std::size_t bytes) { delivered_ += bytes; }
   // Frames that it was to get were dropped, for they waited too long.
   void dropped(Clock::time_point now) { strain(kOfDrop, now); }
-  // At least with each frame that is made: whether something waits for the subscriber. Returns whether the point
-  // is another one now.
+  // At least with each frame that is made: whether something waits for the subscriber. Returns whether the
+  // point is another one now.
   bool look(bool behind, Clock::time_point now);
 
  private:

@@ -144,7 +144,8 @@ std::shared_ptr<const Description> LiveScene::description() {
   v1::StreamDescription geometry;
   geometry.mutable_cloths()->Swap(message.mutable_cloths());
   if (!geometry_) geometry_ = std::make_shared<const std::string>(geometry.SerializeAsString());
-  return description_ = std::make_shared<const Description>(++contents_, geometry_, message.SerializeAsString());
+  return description_ =
+             std::make_shared<const Description>(++contents_, geometry_, message.SerializeAsString());
 }
 
 SharedBytes pausedNotice(const LiveScene& scene, std::uint64_t participant) {

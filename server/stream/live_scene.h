@@ -71,8 +71,6 @@ class LiveScene {
   std::atomic<bool> running{false};
   std::atomic<std::uint64_t> tick{0};  // newest complete one
 
-  std::atomic<std::uint32_t> framesWaiting{0};  // to be packed
-
  private:
   const scene::Scene start_;
 

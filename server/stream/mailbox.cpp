@@ -78,8 +78,8 @@ void Mailbox::subscribe(std::shared_ptr<const Description> description, const St
     streaming_ = !description_;
     shape_ = shape;
     const auto coarsest = static_cast<std::uint8_t>(shape.qualities - 1);
-    adaptation_ = LinkAdaptation(
-        {std::min(wanted.quality, coarsest), std::min(wanted.layers, shape.layers)}, shape.qualities);
+    adaptation_ = LinkAdaptation({std::min(wanted.quality, coarsest), std::min(wanted.layers, shape.layers)},
+                                 shape.qualities);
     told_ = {0, shape.layers};
     quality_ = adaptation_.point().quality;
     metrics_ = &metrics;
@@ -142,8 +142,7 @@ bool Mailbox::hold(const PublishedFrame& frame) {
 
 bool Mailbox::makeRoom(const PublishedFrame& frame) {
   const auto fits = [&] {
-    return held_.empty() ||
-           (held_.size() < kMaxHeld && heldBytes_ + frame.message->size() <= kMaxHeldBytes);
+    return held_.empty() || (held_.size() < kMaxHeld && heldBytes_ + frame.message->size() <= kMaxHeldBytes);
   };
   if (fits()) return true;
   adaptation_.dropped(frame.complete);

@@ -55,9 +55,9 @@ struct FrameWishes {
   }
 };
 
-// Thread-safe. Memory of one subscriber: of answers and of announcements kMaxControlBytes each at most (or one
-// message that is larger), kMaxHeld frames of kMaxHeldBytes in all (or one that is larger) and one description,
-// the latter two shared with the other subscribers.
+// Thread-safe. Memory of one subscriber: of answers and of announcements kMaxControlBytes each at most (or
+// one message that is larger), kMaxHeld frames of kMaxHeldBytes in all (or one that is larger) and one
+// description, the latter two shared with the other subscribers.
 //
 // Room for frames: at most window() of them are out and not acknowledged. It is two, and on long round trips
 // as many more as it is sent in one; the round trip is the shortest of late from a frame's leaving to
@@ -65,8 +65,8 @@ struct FrameWishes {
 //
 // A predicted frame is given only where the frame that it refers to was. A subscriber without room has up to
 // kMaxHeld frames held back; if it falls behind more, those of the highest layer go first, for no other layer
-// needs them. If the base alone is too much, all go, and it goes on with the next key frame, for which it asks
-// when it has room and its door waits for something to write: who does not read asks for nothing.
+// needs them. If the base alone is too much, all go, and it goes on with the next key frame, for which it
+// asks when it has room and its door waits for something to write: who does not read asks for nothing.
 //
 // How many layers, and which quality, LinkAdaptation says; the subscriber is told when it changes. Another
 // quality begins with a key frame of it; until that comes it goes on with the former one.
@@ -136,7 +136,8 @@ class Mailbox {
   void adapt(Clock::time_point now);
   // False where it is left out, could not be decoded, or has no room.
   bool hold(const PublishedFrame& frame);
-  // Drops what is held, from the highest layer on, until the frame fits; false where it is to be dropped itself.
+  // Drops what is held, from the highest layer on, until the frame fits; false where it is to be dropped
+  // itself.
   bool makeRoom(const PublishedFrame& frame);
   // Those of this layer and above.
   void dropHeld(std::uint8_t layer);

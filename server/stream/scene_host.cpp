@@ -241,9 +241,12 @@ void SceneHost::chooseEncoders(Clock::time_point now) {
     }
     encode::FrameEncoder* const encoder = encoders.wanted(quality, now);
     if (encoder == nullptr) continue;
+    if (!encoder->canRecord()) {
+      live_.metrics.skippedFrames.add();
+      continue;
+    }
     const bool due = isRecorded && quality == 0 && sinceKeyFrame_ + 1 >= kFramesAKeyFrame;
-    const bool asked =
-        (wishes.keys >> quality & 1) != 0 && now - lastKeyFrame_[quality] >= kKeyFrameInterval;
+    const bool asked = (wishes.keys >> quality & 1) != 0 && now - lastKeyFrame_[quality] >= kKeyFrameInterval;
     frame_.recorded.push_back({.encoder = encoder, .quality = quality, .key = due || asked});
   }
 }
@@ -252,11 +255,6 @@ void SceneHost::recordFrame(Clock::time_point now) {
   chooseEncoders(now);
   hasFrame_ = !frame_.recorded.empty();
   if (!hasFrame_) return;
-  if (live_.framesWaiting == encode::FrameEncoder::kSlots) {
-    live_.metrics.skippedFrames.add();
-    hasFrame_ = false;
-    return;
-  }
   OnDevice& on = *onDevice_;
   if (scene_.stream.normals == scene::Normals::octahedral) on.simulation.recordNormals(on.recorder);
   frame_.hasReport = ticksAReport_ > 0 && tick_ + 1 >= nextReport_;

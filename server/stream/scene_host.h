@@ -31,7 +31,8 @@ namespace clothstream::stream {
 // goes bad twice within a second goes back to the start, parameters included.
 class SceneHost {
  public:
-  // At most one key frame of a quality in this time, whoever asks: one serves all who wait.
+  // Who goes on decoding a quality gets at most one key frame of it in this time, whoever asks: one serves all
+  // who wait.
   static constexpr std::chrono::milliseconds kKeyFrameInterval{100};
 
   // With a journal, a key frame comes after at most so many that are not.
@@ -52,7 +53,7 @@ class SceneHost {
   // Waits for it, and hands its frame on. Throws vulkan::DeviceLost.
   void finish();
 
-  // Nobody is in the scene, or its clock stands: what a frame may need again is made again then.
+  // Nobody is in the scene, or its clock stands: coarser qualities' encoders go.
   void rest();
 
   // The device is gone, or about to be: nothing of it is held any more.
@@ -95,7 +96,7 @@ class SceneHost {
   void endGentleness();
   void setCloths(const std::vector<scene::Cloth>& cloths);
   void recordRecovery();
-  // Those whose quality somebody wants, and can be made.
+  // For the frame in hand: those of qualities that somebody wants, which have room for it.
   void chooseEncoders(Clock::time_point now);
   void recordFrame(Clock::time_point now);
   void announceEvents();

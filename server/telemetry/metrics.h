@@ -38,7 +38,7 @@ struct SceneMetrics {
   Counter frames;            // packets made
   Counter keyFrames;         // of these
   Counter packetBytes;       // of these, counted once whoever listens
-  Counter skippedFrames;     // not recorded: the encoder was behind
+  Counter skippedFrames;     // not recorded, each quality's: the encoder was behind
   Counter framesTaken;       // by doors, each subscriber's
   Counter framesDropped;     // not sent to a subscriber that was behind, each subscriber's
   Counter framesThinned;     // of temporal layers that a subscriber is not sent, each subscriber's

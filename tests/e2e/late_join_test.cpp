@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Who joins a running scene late: what its first frame holds, and how soon it is there. The real server, the real
-// client, gRPC over the loopback.
+// Who joins a running scene late: what its first frame holds, and how soon it is there. The real server, the
+// real client, gRPC over the loopback.
 #include <algorithm>
 #include <chrono>
 #include <csignal>
@@ -27,8 +27,8 @@ using Clock = std::chrono::steady_clock;
 
 constexpr auto kStart = 60s, kEnd = 30s;
 constexpr int kQualities = 3;
-// Promised for 10,000 nodes on a local network. A machine that does much else, with a device made of software,
-// may take longer by far.
+// Promised for 10,000 nodes on a local network. A machine that does much else, with a device made of
+// software, may take longer by far.
 constexpr auto kPromised = 150ms, kTolerated = 20 * kPromised;
 
 constexpr const char* kScene = R"({
@@ -65,9 +65,9 @@ class LateJoinTest : public ::testing::Test {
  protected:
   void SetUp() override {
     std::ofstream(directory_.path() / "late.json") << kScene;
-    server_ = std::make_unique<Process>(std::vector<std::string>{
-        CLOTHSTREAM_SERVER, "--port", "0", "--grpc-port", "0", "--scene", "late", "--scene-file",
-        (directory_.path() / "late.json").string()});
+    server_ = std::make_unique<Process>(
+        std::vector<std::string>{CLOTHSTREAM_SERVER, "--port", "0", "--grpc-port", "0", "--scene", "late",
+                                 "--scene-file", (directory_.path() / "late.json").string()});
     if (const auto line = server_->waitForLine("gRPC ", kStart)) {
       address_ = line->substr(line->find_first_not_of(' '));
       return;
@@ -119,10 +119,14 @@ TEST_F(LateJoinTest, ItsFirstFrameIsWhatTheServerHoldsAndComesSoon) {
       times.push_back(seen.first - start);
     }
     std::ranges::sort(times);
-    const auto ms = [](Clock::duration time) { return std::chrono::duration<double, std::milli>(time).count(); };
-    std::printf("quality %u: first correct frame after %.0f ms (median of %zu; least %.0f, most %.0f); promised %.0f\n",
-                quality, ms(times[times.size() / 2]), times.size(), ms(times.front()), ms(times.back()),
-                ms(kPromised));
+    const auto ms = [](Clock::duration time) {
+      return std::chrono::duration<double, std::milli>(time).count();
+    };
+    std::printf(
+        "quality %u: first correct frame after %.0f ms (median of %zu; least %.0f, most %.0f); promised "
+        "%.0f\n",
+        quality, ms(times[times.size() / 2]), times.size(), ms(times.front()), ms(times.back()),
+        ms(kPromised));
     EXPECT_LT(times[times.size() / 2], kTolerated);
   }
 }

@@ -104,7 +104,8 @@ TEST(ToChunk, CutsContentThatCanBePutTogetherAgain) {
       const std::string_view whole = content;
       const std::array parts{whole.substr(0, cut), whole.substr(cut)};
       const std::size_t count = chunkCount(size);
-      EXPECT_EQ(count, std::max<std::size_t>(1, (size + limits::kMaxChunkBytes - 1) / limits::kMaxChunkBytes));
+      EXPECT_EQ(count,
+                std::max<std::size_t>(1, (size + limits::kMaxChunkBytes - 1) / limits::kMaxChunkBytes));
       std::string together;
       for (std::size_t i = 0; i < count; ++i) {
         const v1::Chunk chunk = toChunk(9, v1::CONTENT_KIND_STREAM_DESCRIPTION, parts, i);

@@ -53,8 +53,7 @@ class Viewer {
   explicit Viewer(stream::LiveScene& scene, std::uint8_t layers = codec::kMaxTemporalLayers)
       : scene_(scene), mailbox_(std::make_shared<stream::Mailbox>([] {})) {
     EXPECT_EQ(scene.audience.join(mailbox_, 10), stream::Audience::Joining::joined);
-    mailbox_->subscribe(scene.description(), scene.shape(), scene.metrics,
-                        {.quality = 0, .layers = layers});
+    mailbox_->subscribe(scene.description(), scene.shape(), scene.metrics, {.quality = 0, .layers = layers});
     read(Clock::time_point{});
   }
   ~Viewer() { scene_.audience.leave(*mailbox_); }

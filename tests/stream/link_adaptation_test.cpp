@@ -65,11 +65,15 @@ TEST_P(SlowLink, GetsWhatItCarriesWithinHalfASecondAndAllAgainWithinThree) {
     scene.pass(slow - down);
 
     link.bytesPerSecond = 1e9;
-    const Clock::duration up =
-        timeUntil(scene, [&] { return link.given == OperatingPoint{0, 3}; }, 3s);
+    const Clock::duration up = timeUntil(
+        scene,
+        [&] {
+          return link.given == OperatingPoint{0, 3};
+        },
+        3s);
     EXPECT_LE(up, 3s);
-    std::printf("to %.0f %% for %.0f s: down within %.0f ms, up again within %.0f ms\n", 100 * GetParam(), seconds(slow),
-                1000 * seconds(down), 1000 * seconds(up));
+    std::printf("to %.0f %% for %.0f s: down within %.0f ms, up again within %.0f ms\n", 100 * GetParam(),
+                seconds(slow), 1000 * seconds(down), 1000 * seconds(up));
     scene.pass(1s);  // what waited has arrived
     const std::size_t before = link.arrived.size();
     scene.pass(2s);
@@ -95,9 +99,10 @@ TEST_P(SlowLink, DoesNotOscillate) {
     bytes += SimulatedScene::kFrameBytes * std::pow(SimulatedScene::kPartOfFiner, link.arrived[i].quality);
     oldest = std::max(oldest, link.arrived[i].age);
   }
-  std::printf("of a link of %.0f %%: %.0f %% used, %.1f frames/s, the oldest %.0f ms, %llu attempts\n", 100 * GetParam(),
-              100 * bytes / 60 / link.bytesPerSecond, static_cast<double>(link.arrived.size() - arrivedBefore) / 60,
-              1000 * seconds(oldest), static_cast<unsigned long long>(link.metrics.stepsDown.value() - before));
+  std::printf("of a link of %.0f %%: %.0f %% used, %.1f frames/s, the oldest %.0f ms, %llu attempts\n",
+              100 * GetParam(), 100 * bytes / 60 / link.bytesPerSecond,
+              static_cast<double>(link.arrived.size() - arrivedBefore) / 60, 1000 * seconds(oldest),
+              static_cast<unsigned long long>(link.metrics.stepsDown.value() - before));
 }
 
 TEST(LinkAdaptation, ADeadLinkIsAtTheLowestPointWhenItReturns) {

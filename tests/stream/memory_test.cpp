@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: MIT
 // What a client that never reads can cost the server.
-#include <malloc.h>
-
 #include <cstdio>
 #include <memory>
 #include <vector>
 
 #include <gtest/gtest.h>
+#include <malloc.h>
 
 #include "server/messages/limits.h"
 #include "tests/stream/server_test.h"
