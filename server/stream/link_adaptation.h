@@ -32,7 +32,7 @@ class LinkAdaptation {
  public:
   static constexpr std::chrono::milliseconds kPatience{200}, kTrial{1000};
   // Before the first step up after one down; after one up that went well.
-  static constexpr std::chrono::milliseconds kShortestWait{500}, kLongestWait{1600}, kClimb{250};
+  static constexpr std::chrono::milliseconds kShortestWait{500}, kLongestWait{1500}, kClimb{250};
   // What frames that were dropped count for, however many at a time.
   static constexpr std::chrono::milliseconds kOfDrop{100};
   // Of the bits of a quality the next coarser one takes about this part.

@@ -122,6 +122,19 @@ TEST(LinkAdaptation, ADeadLinkIsAtTheLowestPointWhenItReturns) {
   EXPECT_EQ(link.given, (OperatingPoint{0, 3}));
 }
 
+TEST(LinkAdaptation, ComesBackWithinThreeSecondsOverAsManyPointsAsThereMayBe) {
+  SimulatedScene scene({.rate = 72, .layers = codec::kMaxTemporalLayers, .qualities = codec::kMaxQualities});
+  SimulatedLink& link = scene.join();
+  for (const double part : {0.02, 0.07, 0.12, 0.2}) {
+    scene.pass(2s);
+    link.bytesPerSecond = part * scene.fullRate();
+    scene.pass(20s);
+    EXPECT_EQ(link.given.layers, 1) << part;
+    link.bytesPerSecond = 1e9;
+    EXPECT_LE(timeUntil(scene, [&] { return link.given == OperatingPoint{0, 3}; }, 3s), 3s) << part;
+  }
+}
+
 TEST(LinkAdaptation, AHiccupChangesNothing) {
   SimulatedScene scene({.rate = 72, .layers = 1, .qualities = 3});
   SimulatedLink& link = scene.join();
