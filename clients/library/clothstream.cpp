@@ -63,6 +63,11 @@ std::string complaint(const clothstream_options& options) {
   if (options.role > CS_ROLE_OWNER)
     return "options->role is " + std::to_string(options.role) + "; a cs_role is allowed, 0 to " +
            std::to_string(CS_ROLE_OWNER) + ".";
+  constexpr std::uint32_t kMost = 3;
+  if (options.quality > kMost || options.temporal_layers > kMost)
+    return "options->quality is " + std::to_string(options.quality) + " and temporal_layers " +
+           std::to_string(options.temporal_layers) + "; 0 to " + std::to_string(kMost) +
+           " is allowed of each.";
   if (!options.scene || !options.client_name || !options.display_name)
     return "options->scene, client_name or display_name is NULL; \"\" is allowed.";
   if (options.join_timeout_ms == 0) return "options->join_timeout_ms is 0; at least 1 is allowed.";
@@ -74,6 +79,8 @@ std::string complaint(const clothstream_options& options) {
 void clothstream_default_options(clothstream_options* out) noexcept {
   *out = {.version = CLOTHSTREAM_OPTIONS_VERSION,
           .role = CS_ROLE_UNSPECIFIED,
+          .quality = 0,
+          .temporal_layers = 0,
           .scene = "",
           .client_name = "libclothstream",
           .display_name = "",
@@ -100,6 +107,8 @@ clothstream_result clothstream_open(const char* address, const clothstream_optio
     clientOptions.clientName = wanted.client_name;
     clientOptions.displayName = wanted.display_name;
     clientOptions.role = static_cast<cs_role>(wanted.role);
+    clientOptions.quality = wanted.quality;
+    clientOptions.temporalLayers = wanted.temporal_layers;
     clientOptions.joinTimeout = std::chrono::milliseconds(wanted.join_timeout_ms);
     clientOptions.reconnectFor = std::chrono::milliseconds(wanted.reconnect_for_ms);
     auto joined = GrpcClient::join(*completed, clientOptions, [](cs_client*, std::uint32_t) {});

@@ -5,9 +5,9 @@
  * clock, and comes back where the connection is lost. Between clothstream_acquire and clothstream_release
  * that thread rests, and the cs_client is the caller's: every function of core.h may be called, and what they
  * point to stays as it is, so that positions, normals and triangles are read without a copy. Of core.h only
- * those are not for it that open and move a connection themselves: cs_create, cs_create_as, cs_destroy,
- * cs_set_clock, cs_receive, cs_update, cs_next_outgoing, cs_connecting, cs_disconnected (they serve who has a
- * connection of another kind).
+ * those are not for it that open and move a connection themselves: cs_create, cs_create_as, cs_want,
+ * cs_destroy, cs_set_clock, cs_receive, cs_update, cs_next_outgoing, cs_connecting, cs_disconnected (they
+ * serve who has a connection of another kind).
  *
  * Threads: all functions may be called from any thread; on one stream, clothstream_close is the last call,
  * and clothstream_release comes from the thread that acquired. Acquire for as long as it takes to copy or
@@ -41,8 +41,11 @@ typedef enum clothstream_result {
 
 #define CLOTHSTREAM_OPTIONS_VERSION 1u
 typedef struct clothstream_options {
-  uint32_t version;         /* CLOTHSTREAM_OPTIONS_VERSION; later ones add fields at the end */
-  uint32_t role;            /* cs_role that is wanted */
+  uint32_t version; /* CLOTHSTREAM_OPTIONS_VERSION; later ones add fields at the end */
+  uint32_t role;    /* cs_role that is wanted */
+  /* The most that is wanted of the stream, as cs_want has it: the finest quality, 0 to 3; temporal layers, 1
+   * to 3, or 0: all. What is sent, cs_get_operating_point says. */
+  uint32_t quality, temporal_layers;
   const char* scene;        /* "": the server's default */
   const char* client_name;  /* of the program */
   const char* display_name; /* for other people; may be "" */
@@ -51,8 +54,8 @@ typedef struct clothstream_options {
   uint32_t reconnect_for_ms;
 } clothstream_options;
 
-/* client_name is "libclothstream", the other strings are empty; no role is asked for; 10 s to join, 60 s to
- * come back. */
+/* client_name is "libclothstream", the other strings are empty; no role is asked for; all of the stream; 10 s
+ * to join, 60 s to come back. */
 void clothstream_default_options(clothstream_options* out) CS_NOEXCEPT;
 
 /* Joins; returns when the scene's description is there. `address`: HOST or HOST:PORT, port 50051 by default.

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT
- * libclothstream from C against a server. Usage: follow_c ADDRESS, and follow_c ADDRESS lost to wait for the
- * end. Says "frame TICK HASH" of what it decodes; what is not as it should be, and 1, if something is not. */
+ * libclothstream from C against a server. Usage: follow_c ADDRESS; follow_c ADDRESS lost to wait for the end;
+ * follow_c ADDRESS wants to have a part of a stream of several qualities and temporal layers.
+ * Says "frame TICK HASH" of what it decodes; what is not as it should be, and 1, if something is not. */
 #define _POSIX_C_SOURCE 200809L
 #include <math.h>
 #include <stdint.h>
@@ -220,8 +221,39 @@ static int is_told_of_the_end(const char* address) {
   return 0;
 }
 
+static int has_what_it_wants(const char* address) {
+  clothstream_stream* stream = NULL;
+  clothstream_options options;
+  clothstream_default_options(&options);
+  options.quality = 4;
+  CHECK(clothstream_open(address, &options, &stream) == CLOTHSTREAM_INVALID);
+  options.quality = 1;
+  options.temporal_layers = 1;
+  CHECK(clothstream_open(address, &options, &stream) == CLOTHSTREAM_OK);
+  uint64_t tick = 0;
+  const uint64_t end_us = clothstream_now_us() + 60 * kSecond;
+  for (unsigned frames = 0; frames < 20;) {
+    uint32_t events = 0, quality = 0, layers = 0;
+    CHECK(clothstream_now_us() < end_us);
+    CHECK(clothstream_wait(stream, 1000, &events) == CLOTHSTREAM_OK);
+    cs_client* client = clothstream_acquire(stream);
+    cs_statistics statistics;
+    cs_get_statistics(client, clothstream_now_us(), &statistics);
+    CHECK(cs_get_operating_point(client, &quality, &layers) == 1);
+    clothstream_release(stream);
+    if (statistics.frames == 0 || statistics.tick == tick) continue;
+    CHECK(quality >= 1 && layers == 1);
+    CHECK(tick == 0 || statistics.tick >= tick + 4); /* of 120 ticks a second, every second has a frame */
+    tick = statistics.tick;
+    ++frames;
+  }
+  clothstream_close(stream);
+  return 0;
+}
+
 int main(int argc, char** argv) {
   if (argc < 2) return 2;
-  if (argc > 2) return is_told_of_the_end(argv[1]);
+  if (argc > 2)
+    return strcmp(argv[2], "lost") == 0 ? is_told_of_the_end(argv[1]) : has_what_it_wants(argv[1]);
   return says_what_is_wrong() || refuses_an_unknown_scene(argv[1]) || follows(argv[1]);
 }

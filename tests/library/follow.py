@@ -13,7 +13,8 @@ EVENT_FRAME = 1
 
 
 class Options(c.Structure):
-    _fields_ = [("version", c.c_uint32), ("role", c.c_uint32), ("scene", c.c_char_p), ("client_name", c.c_char_p),
+    _fields_ = [("version", c.c_uint32), ("role", c.c_uint32), ("quality", c.c_uint32),
+                ("temporal_layers", c.c_uint32), ("scene", c.c_char_p), ("client_name", c.c_char_p),
                 ("display_name", c.c_char_p), ("join_timeout_ms", c.c_uint32), ("reconnect_for_ms", c.c_uint32)]
 
 

@@ -64,6 +64,12 @@ std::uint64_t fnv1a(const float* values, std::size_t count) {
   return hash;
 }
 
+std::string contents(const char* path) {
+  std::ostringstream text;
+  text << std::ifstream(path).rdbuf();
+  return text.str();
+}
+
 // Another client, with our own code, and what each frame was to it.
 class Watcher {
  public:
@@ -107,9 +113,10 @@ class Watcher {
 
 class LibraryTest : public ::testing::Test {
  protected:
-  void SetUp() override {
+  void SetUp() override { startServer("tests/e2e/small.json"); }
+  void startServer(const std::string& sceneFile) {
     server_ = std::make_unique<Process>(Command{CLOTHSTREAM_SERVER, "--port", "0", "--grpc-port", "0",
-                                                "--scene", "small", "--scene-file", "tests/e2e/small.json"});
+                                                "--scene", "small", "--scene-file", sceneFile});
     if (const auto line = server_->waitForLine("gRPC ", kStart)) {
       address_ = line->substr(line->find_first_not_of(' '));
       return;
@@ -153,6 +160,18 @@ TEST_F(LibraryTest, TellsOfTheEndOfTheStream) {
   ASSERT_TRUE(program.waitForLine("joined", kStart)) << program.errors();
   server_->signal(SIGTERM);
   EXPECT_EQ(program.waitForEnd(kProgram), 0) << program.errors();
+}
+
+TEST_F(LibraryTest, GivesCThePartOfTheStreamThatItWants) {
+  const TemporaryDirectory directory;
+  const std::string sceneFile = directory.path() / "layered.json";
+  std::string scene = contents("tests/e2e/small.json");
+  scene.insert(scene.find('{') + 1, R"("stream": {"temporalLayers": 2, "qualities": 3},)");
+  std::ofstream(sceneFile) << scene;
+  TearDown();
+  startServer(sceneFile);
+  const Ended ended = run({FOLLOW_C, address_, "wants"});
+  EXPECT_EQ(ended.code, 0) << ended.output << ended.errors;
 }
 
 TEST_F(LibraryTest, ServesPythonWithoutACopy) {
@@ -264,12 +283,6 @@ std::set<std::string> matches(const std::string& text, const char* pattern) {
   for (std::sregex_iterator match(text.begin(), text.end(), expression), end; match != end; ++match)
     found.insert((*match)[1]);
   return found;
-}
-
-std::string contents(const char* path) {
-  std::ostringstream text;
-  text << std::ifstream(path).rdbuf();
-  return text.str();
 }
 
 TEST(Library, ExportsItsInterfaceAndNothingElse) {
