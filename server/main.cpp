@@ -104,6 +104,9 @@ scene::Scene adjusted(scene::Scene scene, const ProgramOptions& options) {
   scene.stream.maxError = options.maxError.value_or(scene.stream.maxError);
   scene.stream.normals = options.normals.value_or(scene.stream.normals);
   scene.stream.coding = options.coding.value_or(scene.stream.coding);
+  if (options.temporalLayers)
+    scene.stream.temporalLayers = static_cast<std::uint8_t>(*options.temporalLayers);
+  if (options.qualities) scene.stream.qualities = static_cast<std::uint8_t>(*options.qualities);
   auto checked = messages::toScene(messages::toMessage(scene));
   if (!checked)
     throw std::runtime_error(

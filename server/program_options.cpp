@@ -105,6 +105,14 @@ std::variant<ProgramOptions, int> parseOptions(int argc, const char* const* argv
                  "How residuals of --scene are written: entropy (fewest bits) or packed (by the device)")
       ->transform(CLI::CheckedTransformer(codings, CLI::ignore_case))
       ->group(scenes);
+  app.add_option("--temporal-layers", options.temporalLayers,
+                 "Temporal layers of --scene: those above the first are left out for clients with slow links")
+      ->check(CLI::Range(1, 3))
+      ->group(scenes);
+  app.add_option("--qualities", options.qualities,
+                 "Qualities in which --scene can come: the coarser ones are for clients with slow links")
+      ->check(CLI::Range(1, 4))
+      ->group(scenes);
   app.add_flag("--always-run", options.alwaysRun,
                "Go on simulating while nobody is there: --scene from the start, others once somebody came")
       ->group(scenes);

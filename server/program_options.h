@@ -25,6 +25,7 @@ struct ProgramOptions {
   std::optional<float> maxError;
   std::optional<scene::Normals> normals;
   std::optional<scene::Coding> coding;
+  std::optional<std::uint32_t> temporalLayers, qualities;
   bool alwaysRun = false;
   double reportRate = 4;
   std::uint32_t maxCreatedScenes = 16;

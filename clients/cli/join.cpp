@@ -123,6 +123,8 @@ ExitCode join(const JoinOptions& options) {
   clientOptions.clientName = "clothstream join";
   clientOptions.displayName = options.name;
   clientOptions.role = options.role;
+  clientOptions.quality = options.quality;
+  clientOptions.temporalLayers = options.temporalLayers;
   if (!options.reconnects) clientOptions.reconnectFor = std::chrono::milliseconds(0);
   clientOptions.cancelled = [] { return interrupted(); };
   auto joined = GrpcClient::join(options.address, clientOptions, Listener(line, options.report));

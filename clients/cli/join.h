@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -17,6 +18,7 @@ struct JoinOptions {
   std::string scene;
   std::string name;  // shown to others
   cs_role role = CS_ROLE_UNSPECIFIED;
+  std::uint32_t quality = 0, temporalLayers = 0;  // the most that is wanted, as cs_want has it
   bool reconnects = true;
   std::optional<double> seconds;  // nothing: until a signal
   std::string objPath;            // empty: none

@@ -73,6 +73,14 @@ int run(int argc, char** argv) {
           "viewer, participant or owner; who comes first owns the scene unless it is a viewer, and there "
           "is one owner at first")
       ->check(CLI::IsMember({"viewer", "participant", "owner"}));
+  joinCommand
+      .add_option("--quality", joinOptions.quality,
+                  "The finest quality wanted: 0 is the finest there is, each other has twice the error")
+      ->check(CLI::Range(0, 3));
+  joinCommand
+      .add_option("--layers", joinOptions.temporalLayers,
+                  "So many temporal layers at most: fewer make fewer frames a second; all if left out")
+      ->check(CLI::Range(1, 3));
   joinCommand.add_flag("!--no-reconnect", joinOptions.reconnects,
                        "End when the connection is lost, instead of trying for a minute to come back");
   joinCommand

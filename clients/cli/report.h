@@ -27,7 +27,8 @@ struct Report {
   std::uint32_t vertices = 0, streamRate = 0;
   double seconds = 0;  // from the first frame to the newest
   cs_statistics statistics{};
-  std::vector<ClothFigures> cloths;  // none before the first report
+  std::uint32_t quality = 0, temporalLayers = 0;  // of what is sent now
+  std::vector<ClothFigures> cloths;               // none before the first report
 
   static Report of(const cs_client* client, std::uint64_t nowUs);
 

@@ -28,6 +28,12 @@ void Client::greet() {
   static_cast<void>(outbox_.addControl(std::move(hello)));
 }
 
+void Client::want(const OperatingPoint& atMost) {
+  greeting_.wanted = atMost;
+  outbox_.clear();
+  greet();
+}
+
 void Client::connecting(std::uint64_t nowUs) {
   if (state_ == CS_STATE_FAILED) return;
   if (welcomed_) disconnected(nowUs);
@@ -81,6 +87,8 @@ std::uint32_t Client::receive(Bytes bytes, std::uint64_t nowUs) {
       return scenesReceived(message->body);
     case Body::playback:
       return playbackReceived(message->body, nowUs);
+    case Body::operatingPoint:
+      return operatingPointReceived(message->body);
     case Body::none:
       return 0;
   }
@@ -122,6 +130,7 @@ std::uint32_t Client::welcomed(Bytes body, std::uint64_t nowUs) {
   greeting_.scene = welcome_.scene;
   greeting_.contentId = known ? welcome_.contentId : 0;
   reconnection_.joined(nowUs);
+  point_ = formerPoint_ = {};
   if (again && !resumed_) clock_ = {};
   if (again && posed_) sendPoses(nowUs);
   const std::uint32_t events = participants_.empty() ? 0 : CS_EVENT_PARTICIPANTS;
@@ -196,8 +205,10 @@ std::uint32_t Client::frameReceived(Bytes body, std::uint64_t nowUs) {
 std::uint32_t Client::packetReceived(std::uint64_t nowUs) {
   const auto packet = std::as_bytes(std::span(frame_.packet.data(), frame_.packet.size()));
   const auto parsed = codec::parsePacket(packet);
+  // What the server left out, where fewer layers came until now or come from now on, is not lost.
   statistics_.arrived(parsed ? std::optional(parsed->header.tick) : std::nullopt, packet.size(),
-                      description_.ticksPerFrame(), nowUs);
+                      std::max(ticksPerFrame(point_), ticksPerFrame(formerPoint_)), nowUs);
+  formerPoint_ = point_;
   switch (decode(packet)) {
     case codec::DecodeResult::ok:
       break;
@@ -298,6 +309,25 @@ std::uint32_t Client::scenesReceived(Bytes body) {
   if (!scenes) return failMalformed("ListScenesResponse");
   scenes_ = std::move(*scenes);
   return CS_EVENT_SCENES;
+}
+
+std::uint32_t Client::operatingPointReceived(Bytes body) {
+  const std::optional<OperatingPoint> point = readOperatingPoint(body);
+  if (!point) return failMalformed("OperatingPoint");
+  point_ = *point;
+  return 0;
+}
+
+OperatingPoint Client::operatingPoint() const {
+  if (!described()) return {};
+  const std::uint32_t all = description_.layout.temporalLayers;
+  return {point_.quality, point_.temporalLayers == 0 ? all : std::min(point_.temporalLayers, all)};
+}
+
+std::uint32_t Client::ticksPerFrame(const OperatingPoint& point) const {
+  const std::uint32_t all = description_.layout.temporalLayers;
+  const std::uint32_t leftOut = point.temporalLayers == 0 ? 0 : all - std::min(point.temporalLayers, all);
+  return description_.ticksPerFrame() << leftOut;
 }
 
 std::uint32_t Client::playbackReceived(Bytes body, std::uint64_t nowUs) {

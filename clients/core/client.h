@@ -35,6 +35,9 @@ class Client {
   std::uint64_t connectAtUs() const;
   const std::string* nextOutgoing();
 
+  // Said before anything is sent.
+  void want(const OperatingPoint& atMost);
+
   void setClock(std::uint64_t (*nowUs)()) { nowUs_ = nowUs; }
   void setColliders(std::span<const cs_own_collider> colliders, std::uint64_t nowUs);
   // Four numbers for each joint; empty: there is none of this side.
@@ -64,6 +67,8 @@ class Client {
   bool described() const { return decoder_ != nullptr; }
   const FrameStatistics& statistics() const { return statistics_; }
   const ServerClock& clock() const { return clock_; }
+  // What is sent now; of no layers before the description.
+  OperatingPoint operatingPoint() const;
   // As it stands at this time.
   std::optional<cs_playback> playback(std::uint64_t nowUs) const;
   double decodeMs() const { return decodeMs_; }
@@ -100,6 +105,9 @@ class Client {
   std::uint32_t parametersReceived(Bytes body);
   std::uint32_t errorReceived(Bytes body);
   std::uint32_t scenesReceived(Bytes body);
+  std::uint32_t operatingPointReceived(Bytes body);
+  // From one frame to the next, where so many layers come.
+  std::uint32_t ticksPerFrame(const OperatingPoint& point) const;
   std::uint32_t playbackReceived(Bytes body, std::uint64_t nowUs);
 
   std::uint32_t fail(std::string text);
@@ -123,6 +131,7 @@ class Client {
   Description description_;
   std::unique_ptr<codec::Decoder> decoder_;
   Frame frame_;
+  OperatingPoint point_, formerPoint_;  // now, and when the newest frame came
   KeyFrameRequest keyFrameRequest_;
   FrameStatistics statistics_;
   ServerClock clock_;

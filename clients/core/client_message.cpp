@@ -151,6 +151,8 @@ void writeHello(std::string& out, std::uint64_t requestId, const Greeting& greet
     hello.add_string(3, greeting.scene);
     hello.add_string(4, greeting.clientName);
     hello.add_string(5, greeting.displayName);
+    if (greeting.wanted.quality > 0) hello.add_uint32(6, greeting.wanted.quality);
+    if (greeting.wanted.temporalLayers > 0) hello.add_uint32(7, greeting.wanted.temporalLayers - 1);
     hello.add_uint32(30, greeting.role);
     if (greeting.token.empty()) return;
     hello.add_bytes(31, greeting.token);

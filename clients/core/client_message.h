@@ -25,6 +25,7 @@ struct ColliderChange {
 struct Greeting {
   std::string scene, clientName, displayName;
   std::uint32_t role = 0;
+  OperatingPoint wanted = {};  // at most
   // Of who comes back: what the Welcome before said. Empty and 0: it does not, or holds no description.
   std::string token;
   std::uint64_t contentId = 0;

@@ -121,12 +121,17 @@ cs_client* cs_create_as(const char* scene, const char* client_name, const char* 
                                .clientName = client_name,
                                .displayName = display_name,
                                .role = role,
+                               .wanted = {},
                                .token = {},
                                .contentId = 0})};
 }
 
 void cs_destroy(cs_client* client) {
   delete client;
+}
+
+void cs_want(cs_client* client, uint32_t quality, uint32_t temporal_layers) {
+  client->client.want({quality, temporal_layers});
 }
 
 void cs_set_clock(cs_client* client, uint64_t (*now_us)(void)) {
@@ -199,6 +204,13 @@ void cs_get_statistics(const cs_client* client, uint64_t now_us, cs_statistics* 
   out->round_trip_ms = client->client.clock().roundTripMs();
   out->clock_offset_us = client->client.clock().offsetUs(now_us);
   out->decode_ms = client->client.decodeMs();
+}
+
+int cs_get_operating_point(const cs_client* client, uint32_t* quality, uint32_t* temporal_layers) {
+  const OperatingPoint point = client->client.operatingPoint();
+  *quality = point.quality;
+  *temporal_layers = point.temporalLayers;
+  return client->client.described() ? 1 : 0;
 }
 
 const char* cs_server_name(const cs_client* client) {

@@ -61,7 +61,8 @@ typedef struct cs_statistics {
   uint64_t tick;            /* of the newest decoded frame */
   uint64_t frames;          /* decoded */
   uint64_t key_frames;      /* of these */
-  uint64_t dropped;         /* frames of the stream that never came, by the gaps in their ticks */
+  uint64_t dropped;         /* frames of the stream that never came, by the gaps in their ticks; of those
+                             * temporal layers that the server sends */
   uint64_t decode_errors;   /* packets that were refused */
   uint64_t bytes;           /* of packets received */
   uint64_t hash_mismatches; /* decoded frames whose hash is not the server's */
@@ -264,6 +265,9 @@ cs_client* cs_create(const char* scene, const char* client_name);
 /* The same with a name for other people, which may be "", and the cs_role that is wanted. */
 cs_client* cs_create_as(const char* scene, const char* client_name, const char* display_name, uint32_t role);
 void cs_destroy(cs_client* client);
+/* The most that it wants of the stream, before anything is sent: the finest quality (0 to 3, 0 is the finest
+ * there is) and how many temporal layers (1 to 3; 0: all, whatever there are). */
+void cs_want(cs_client* client, uint32_t quality, uint32_t temporal_layers);
 /* For decode_ms: a steady clock in microseconds. Not exported by the WebAssembly module. */
 void cs_set_clock(cs_client* client, uint64_t (*now_us)(void));
 
@@ -294,6 +298,9 @@ const char* cs_notice_text(const cs_client* client);
 /* Who did what the notice tells; 0: the server, or somebody who is not in the scene. */
 uint64_t cs_notice_participant(const cs_client* client);
 void cs_get_statistics(const cs_client* client, uint64_t now_us, cs_statistics* out);
+/* How much of the stream the server sends, by what this client wants and its link carries: a quality, and so
+ * many temporal layers. 0 before the description. */
+int cs_get_operating_point(const cs_client* client, uint32_t* quality, uint32_t* temporal_layers);
 const char* cs_server_name(const cs_client* client);
 const char* cs_device_name(const cs_client* client);
 const char* cs_scene_name(const cs_client* client);

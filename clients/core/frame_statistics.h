@@ -19,7 +19,8 @@ struct DecodedFrame {
 
 class FrameStatistics {
  public:
-  // Every packet that came, whatever becomes of it. `tick` is what its header says, if it has one.
+  // Every packet that came, whatever becomes of it. `tick` is what its header says, if it has one; from the
+  // one before so many ticks should have passed.
   void arrived(std::optional<std::uint64_t> tick, std::size_t packetBytes, std::uint32_t ticksPerFrame,
                std::uint64_t nowUs);
   void refused() { ++decodeErrors_; }

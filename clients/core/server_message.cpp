@@ -257,7 +257,7 @@ Body bodyOf(std::uint32_t field) {
   constexpr std::array kKnown{Body::welcome,  Body::chunk,      Body::frame,
                               Body::pong,     Body::notice,     Body::parameterChanged,
                               Body::error,    Body::tickEvents, Body::listScenes,
-                              Body::presence, Body::playback};
+                              Body::presence, Body::playback,   Body::operatingPoint};
   for (const Body body : kKnown) {
     if (field == bytes(static_cast<std::uint32_t>(body))) return body;
   }
@@ -443,6 +443,13 @@ std::optional<cs_playback> readPlayback(Bytes message) {
       });
   if (playback && !(playback->length >= 0)) playback.reset();
   return playback;
+}
+
+std::optional<OperatingPoint> readOperatingPoint(Bytes message) {
+  return readMessage<OperatingPoint>(message, [](OperatingPoint& point, std::uint32_t field, Reader& reader) {
+    if (field == varint(1)) return set(point.quality, reader.get_uint32());
+    return field == varint(2) ? set(point.temporalLayers, reader.get_uint32()) : skip(reader);
+  });
 }
 
 std::optional<Notice> readNotice(Bytes message) {

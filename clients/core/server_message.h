@@ -30,6 +30,7 @@ enum class Body : std::uint32_t {
   listScenes = 16,
   presence = 30,
   playback = 40,
+  operatingPoint = 50,
 };
 
 // A kind of body that this client does not know is `none`.
@@ -115,6 +116,12 @@ struct Pong {
   std::uint64_t clientTimeUs = 0, serverTimeUs = 0;
 };
 
+// How much of the stream comes.
+struct OperatingPoint {
+  std::uint32_t quality = 0;
+  std::uint32_t temporalLayers = 0;  // 0: all
+};
+
 struct ServerError {
   std::uint32_t code = 0;
   std::string text;
@@ -187,6 +194,7 @@ struct TickEvents {
 [[nodiscard]] std::optional<Presence> readPresence(Bytes message);
 // Of times that are no numbers, and lengths below 0, there is none.
 [[nodiscard]] std::optional<cs_playback> readPlayback(Bytes message);
+[[nodiscard]] std::optional<OperatingPoint> readOperatingPoint(Bytes message);
 [[nodiscard]] std::optional<ParameterChange> readParameterChanged(Bytes message);
 [[nodiscard]] std::optional<ServerError> readError(Bytes message);
 [[nodiscard]] bool readTickEvents(Bytes message, TickEvents& events);

@@ -56,6 +56,7 @@ class GrpcClient::Stream {
         core_(cs_create_as(options.scene.c_str(), options.clientName.c_str(), options.displayName.c_str(),
                            options.role),
               &cs_destroy) {
+    cs_want(core_.get(), options.quality, options.temporalLayers);
     cs_set_clock(core_.get(), &GrpcClient::nowUs);
     thread_ = std::thread([this] { run(); });
   }

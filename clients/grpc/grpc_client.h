@@ -23,6 +23,8 @@ struct GrpcClientOptions {
   std::string clientName = "clothstream";
   std::string displayName;  // shown to others; may be empty
   cs_role role = CS_ROLE_UNSPECIFIED;
+  // The most that it wants of the stream, as cs_want has it.
+  std::uint32_t quality = 0, temporalLayers = 0;
   // From the call of join() to the whole description.
   std::chrono::milliseconds joinTimeout{10'000};
   // Asked ten times a second while joining: true gives up. May be empty.

@@ -27,7 +27,7 @@ class EncodeStage {
 std::unique_ptr<EncodeStage> makeHierarchicalHostStage(const vulkan::Device& device,
                                                        const simulation::ClothSimulation& simulation,
                                                        const codec::StreamLayout& layout,
-                                                       codec::Workers* workers);
+                                                       std::unique_ptr<codec::Encoder> encoder);
 // Throws std::runtime_error where DevicePredictor does not support it.
 std::unique_ptr<EncodeStage> makeHierarchicalDeviceStage(const vulkan::Device& device,
                                                          const simulation::ClothSimulation& simulation,

@@ -2,9 +2,11 @@
 // Frames from simulation state: what all codecs have in common.
 #include "server/encode/frame_encoder.h"
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cassert>
+#include <utility>
 
 #include "server/encode/device_predictor.h"
 #include "server/encode/encode_stage.h"
@@ -38,6 +40,8 @@ codec::StreamLayout streamLayout(const scene::Scene& scene, std::uint32_t epoch)
                              .codec = packed ? codec::kCodecPacked : codec::kCodecHierarchical,
                              .maxError = scene.stream.maxError,
                              .normals = normals ? codec::NormalMode::octahedral : codec::NormalMode::none,
+                             .temporalLayers = scene.stream.temporalLayers,
+                             .qualities = scene.stream.qualities,
                              .cloths = {}};
   for (const scene::Cloth& cloth : scene.cloths) {
     if (cloth.mesh)
@@ -75,7 +79,14 @@ FrameEncoder::FrameEncoder(const vulkan::Device& device, const simulation::Cloth
                             ? !device.isSoftware() && DevicePredictor::supports(device, layout)
                             : prediction == Prediction::onDevice;
   state_->stage = onDevice ? makeHierarchicalDeviceStage(device, simulation, layout)
-                           : makeHierarchicalHostStage(device, simulation, layout, workers);
+                           : makeHierarchicalHostStage(device, simulation, layout,
+                                                       codec::Encoder::make(layout, {.workers = workers}));
+}
+
+FrameEncoder::FrameEncoder(const vulkan::Device& device, const simulation::ClothSimulation& simulation,
+                           const codec::StreamLayout& layout, std::unique_ptr<codec::Encoder> encoder)
+    : state_(std::make_unique<State>()) {
+  state_->stage = makeHierarchicalHostStage(device, simulation, layout, std::move(encoder));
 }
 
 FrameEncoder::~FrameEncoder() = default;
@@ -85,6 +96,11 @@ bool FrameEncoder::canRecord() const {
     if (!taken.load(std::memory_order_acquire)) return true;
   }
   return false;
+}
+
+bool FrameEncoder::isIdle() const {
+  return std::ranges::none_of(
+      state_->taken, [](const std::atomic<bool>& taken) { return taken.load(std::memory_order_acquire); });
 }
 
 RecordedFrame FrameEncoder::record(vulkan::Recorder& recorder, std::uint64_t tick, bool forceKey) {

@@ -7,6 +7,7 @@
 #include <memory>
 #include <span>
 
+#include "proto/codec/encoder.h"
 #include "proto/codec/packet_header.h"
 #include "proto/codec/stream_layout.h"
 #include "proto/codec/workers.h"
@@ -34,7 +35,7 @@ struct RecordedFrame {
   std::uint32_t slot = 0;
   std::uint64_t tick = 0;
   codec::PacketKind kind = codec::PacketKind::key;
-  std::uint64_t referenceTick = 0;  // of a predicted frame
+  std::uint64_t referenceTick = 0;  // of a predicted frame of a stream of one temporal layer
 };
 
 struct EncodedFrame {
@@ -53,16 +54,22 @@ class FrameEncoder {
   FrameEncoder(const vulkan::Device& device, const simulation::ClothSimulation& simulation,
                const codec::StreamLayout& layout, Prediction prediction = Prediction::automatic,
                codec::Workers* workers = nullptr);
+  // Predicted on the host by this encoder, which is of that layout.
+  FrameEncoder(const vulkan::Device& device, const simulation::ClothSimulation& simulation,
+               const codec::StreamLayout& layout, std::unique_ptr<codec::Encoder> encoder);
   ~FrameEncoder();
   FrameEncoder(const FrameEncoder&) = delete;
   FrameEncoder& operator=(const FrameEncoder&) = delete;
 
   // Whether a slot is free.
   bool canRecord() const;
+  // Whether all are: no frame waits to be entropy-coded.
+  bool isIdle() const;
 
   // Takes the simulation's present positions (and normals, which must have been recorded,
   // where the layout has them). `tick` must grow from call to call. A predicted frame refers to the frame
-  // recorded before; the first is always a key frame, whatever is asked.
+  // recorded before, or with temporal layers as codec::Encoder has it; the first is always a key frame,
+  // whatever is asked.
   RecordedFrame record(vulkan::Recorder& recorder, std::uint64_t tick, bool forceKey);
 
   // After a rollback or restore: the next frame is a key frame.

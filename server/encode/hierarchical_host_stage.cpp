@@ -2,6 +2,7 @@
 // Prediction on the host: positions, and normals where they are sent, are read back, all else is done on the
 // CPU.
 #include <array>
+#include <utility>
 #include <vector>
 
 #include "proto/codec/encoder.h"
@@ -14,9 +15,9 @@ namespace {
 class HierarchicalHostStage final : public EncodeStage {
  public:
   HierarchicalHostStage(const vulkan::Device& device, const simulation::ClothSimulation& simulation,
-                        const codec::StreamLayout& layout, codec::Workers* workers)
+                        const codec::StreamLayout& layout, std::unique_ptr<codec::Encoder> encoder)
       : simulation_(simulation),
-        encoder_(codec::Encoder::make(layout, {.workers = workers})),
+        encoder_(std::move(encoder)),
         positions_(3 * simulation.nodeCount()),
         normals_(layout.normals == codec::NormalMode::octahedral ? positions_.size() : 0) {
     for (Slot& slot : slots_) {
@@ -72,8 +73,8 @@ class HierarchicalHostStage final : public EncodeStage {
 std::unique_ptr<EncodeStage> makeHierarchicalHostStage(const vulkan::Device& device,
                                                        const simulation::ClothSimulation& simulation,
                                                        const codec::StreamLayout& layout,
-                                                       codec::Workers* workers) {
-  return std::make_unique<HierarchicalHostStage>(device, simulation, layout, workers);
+                                                       std::unique_ptr<codec::Encoder> encoder) {
+  return std::make_unique<HierarchicalHostStage>(device, simulation, layout, std::move(encoder));
 }
 
 }  // namespace clothstream::encode

@@ -28,6 +28,9 @@ struct Joining {
   std::string scene;  // empty: the server's default
   std::string clientName, displayName;
   v1::Role role = v1::ROLE_UNSPECIFIED;
+  // The most that it wants of the stream.
+  std::uint8_t quality = 0;         // the finest
+  std::uint8_t temporalLayers = 1;  // so many
 };
 
 // `codecs` are the server's; the client's best that is among them is taken.

@@ -81,6 +81,8 @@ v1::StreamDescription toDescription(const scene::Scene& scene, std::uint32_t epo
   description.set_stream_rate(scene.streamRate);
   description.set_max_error(scene.stream.maxError);
   description.set_normals(toMessage(scene.stream.normals));
+  description.set_temporal_layers(scene.stream.temporalLayers);
+  description.set_qualities(scene.stream.qualities);
   for (const scene::Cloth& cloth : scene.cloths) {
     v1::ClothDescription& message = *description.add_cloths();
     message.set_name(cloth.name);
@@ -109,21 +111,31 @@ v1::SceneSummary toSummary(const scene::Scene& scene) {
   return summary;
 }
 
-std::vector<v1::Chunk> toChunks(std::uint64_t contentId, v1::ContentKind kind, std::string_view content) {
-  assert(content.size() <= limits::kMaxContentBytes);
-  const std::size_t count =
-      std::max<std::size_t>(1, (content.size() + limits::kMaxChunkBytes - 1) / limits::kMaxChunkBytes);
-  std::vector<v1::Chunk> chunks(count);
-  for (std::size_t i = 0; i < count; ++i) {
-    chunks[i].set_content_id(contentId);
-    chunks[i].set_kind(kind);
-    chunks[i].set_index(static_cast<std::uint32_t>(i));
-    chunks[i].set_count(static_cast<std::uint32_t>(count));
-    chunks[i].set_total_bytes(content.size());
-    const std::string_view piece = content.substr(i * limits::kMaxChunkBytes, limits::kMaxChunkBytes);
-    chunks[i].set_data(piece.data(), piece.size());
+std::size_t chunkCount(std::size_t contentBytes) {
+  return std::max<std::size_t>(1, (contentBytes + limits::kMaxChunkBytes - 1) / limits::kMaxChunkBytes);
+}
+
+v1::Chunk toChunk(std::uint64_t contentId, v1::ContentKind kind, std::span<const std::string_view> parts,
+                  std::size_t index) {
+  std::size_t total = 0;
+  for (const std::string_view part : parts) total += part.size();
+  assert(total <= limits::kMaxContentBytes && index < chunkCount(total));
+  const std::size_t begin = index * limits::kMaxChunkBytes;
+  const std::size_t end = std::min(begin + limits::kMaxChunkBytes, total);
+  v1::Chunk chunk;
+  chunk.set_content_id(contentId);
+  chunk.set_kind(kind);
+  chunk.set_index(static_cast<std::uint32_t>(index));
+  chunk.set_count(static_cast<std::uint32_t>(chunkCount(total)));
+  chunk.set_total_bytes(total);
+  chunk.mutable_data()->reserve(end - begin);
+  std::size_t start = 0;  // of the part
+  for (const std::string_view part : parts) {
+    const std::size_t from = std::max(begin, start), to = std::min(end, start + part.size());
+    if (from < to) chunk.mutable_data()->append(part.substr(from - start, to - from));
+    start += part.size();
   }
-  return chunks;
+  return chunk;
 }
 
 }  // namespace clothstream::messages

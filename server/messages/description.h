@@ -4,8 +4,8 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <string_view>
-#include <vector>
 
 #include "clothstream/v1/session.pb.h"
 #include "server/scene/input.h"
@@ -29,8 +29,12 @@ v1::StreamDescription toDescription(const scene::Scene& scene, std::uint32_t epo
 // A scene as a list shows it; who is in it, and whether it runs, only the caller knows.
 v1::SceneSummary toSummary(const scene::Scene& scene);
 
-// Pieces of limits::kMaxChunkBytes (the last may be shorter), in order; one empty piece for empty content.
-// Content has at most limits::kMaxContentBytes.
-std::vector<v1::Chunk> toChunks(std::uint64_t contentId, v1::ContentKind kind, std::string_view content);
+// How many pieces a content of so many bytes has: of limits::kMaxChunkBytes, the last may be shorter; one
+// empty piece for empty content.
+std::size_t chunkCount(std::size_t contentBytes);
+// One of them, of the content that these parts are one after the other; it has at most
+// limits::kMaxContentBytes.
+v1::Chunk toChunk(std::uint64_t contentId, v1::ContentKind kind, std::span<const std::string_view> parts,
+                  std::size_t index);
 
 }  // namespace clothstream::messages

@@ -62,7 +62,9 @@ inline constexpr Range kJointRadius{0.001, 0.1};       // m
 inline constexpr double kMaxHandReach = 0.5;           // m, of a joint from its wrist
 inline constexpr Range kMotionTime{0, 86400};          // s
 inline constexpr Range kMaxError{0.00001, 0.1};        // m
-inline constexpr Range kCompliance{0, 1};              // m/N
+inline constexpr std::uint32_t kMaxTemporalLayers = 3;
+inline constexpr std::uint32_t kMaxQualities = 4;
+inline constexpr Range kCompliance{0, 1};  // m/N
 inline constexpr Range kTolerance{0, 1};
 inline constexpr Range kActivation{0, 10};        // part of a length
 inline constexpr Range kSlack{0, 1};              // part of a length

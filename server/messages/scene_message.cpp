@@ -313,6 +313,12 @@ scene::StreamSettings toStreamSettings(Checks& checks, const Path& path, const v
     settings.maxError = checks.number(path / "maxError", message.max_error(), limits::kMaxError);
   settings.normals = toNormals(checks, path / "normals", message.normals());
   settings.coding = toCoding(checks, path / "coding", message.coding());
+  if (message.has_temporal_layers())
+    settings.temporalLayers = static_cast<std::uint8_t>(
+        checks.integer(path / "temporalLayers", message.temporal_layers(), 1, limits::kMaxTemporalLayers));
+  if (message.has_qualities())
+    settings.qualities = static_cast<std::uint8_t>(
+        checks.integer(path / "qualities", message.qualities(), 1, limits::kMaxQualities));
   return settings;
 }
 

@@ -156,6 +156,8 @@ v1::Scene toMessage(const scene::Scene& scene) {
   message.mutable_stream()->set_normals(toMessage(scene.stream.normals));
   const bool packed = scene.stream.coding == scene::Coding::packed;
   message.mutable_stream()->set_coding(packed ? v1::CODING_PACKED : v1::CODING_ENTROPY);
+  message.mutable_stream()->set_temporal_layers(scene.stream.temporalLayers);
+  message.mutable_stream()->set_qualities(scene.stream.qualities);
   return message;
 }
 

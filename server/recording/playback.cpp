@@ -121,7 +121,7 @@ std::optional<Playback::Clock::time_point> Playback::step(stream::LiveScene& sce
   takeWanted(scene, now);
   const bool here = scene.audience.size() > 0;
   if (!here) asleep_ = true;
-  if (here && (asleep_ || paused_) && scene.audience.wantsKeyFrame()) {
+  if (here && (asleep_ || paused_) && scene.audience.wishes(now).keys != 0) {
     jump(scene, position_, now);
     asleep_ = false;
   }
@@ -258,11 +258,8 @@ void Playback::publishFrame(stream::LiveScene& scene, RecordedStream::Told& told
   frame.set_tick_time_us(stream::microseconds(now));
   frame.set_packet_time_us(stream::microseconds(now));
 
-  stream::PublishedFrame published{.message = stream::serialise(told.message),
-                                   .tick = header.tick,
-                                   .key = header.kind == codec::PacketKind::key,
-                                   .referenceTick = header.references[0],
-                                   .complete = now};
+  const stream::PublishedFrame published =
+      stream::publishedFrame(header, stream::serialise(told.message), now);
   newest_ = header.tick;
   scene.tick = header.tick;
   scene.metrics.frames.add();

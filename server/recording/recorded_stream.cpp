@@ -50,9 +50,9 @@ tl::expected<RecordedStream, std::string> RecordedStream::of(RecordingReader rea
   if (!isRate(description->simulation_rate()) || !isRate(description->stream_rate()))
     return tl::unexpected(fmt::format("its rates of {} and {} a second are none that a stream has",
                                       description->simulation_rate(), description->stream_rate()));
-  if (description->temporal_layers() > 1)
-    return tl::unexpected(fmt::format("its stream has {} temporal layers; those of one can be played",
-                                      description->temporal_layers()));
+  if (description->temporal_layers() > codec::kMaxTemporalLayers)
+    return tl::unexpected(fmt::format("its stream has {} temporal layers; a stream has at most {}",
+                                      description->temporal_layers(), codec::kMaxTemporalLayers));
   RecordedStream stream(std::move(reader));
   stream.scene_ = isName(description->scene()) ? description->scene() : "recording";
   stream.description_ = std::move(*description);
@@ -134,15 +134,19 @@ std::optional<RecordedStream::Told> RecordedStream::frame(const RecordedMessage&
   };
   if (!parse(message.bytes, told.message.mutable_frame())) return refuse("a frame in it cannot be read");
   const auto packet = codec::parsePacket(std::as_bytes(std::span(told.message.frame().packet())));
-  if (!packet || packet->header.epoch != description_.epoch() || packet->header.codec != description_.codec())
+  if (!packet || packet->header.epoch != description_.epoch() ||
+      packet->header.codec != description_.codec() ||
+      packet->header.temporalLayer >= std::max(description_.temporal_layers(), 1u))
     return refuse("a frame in it is none of its stream");
   told.header = packet->header;
   const bool key = told.header.kind == codec::PacketKind::key;
-  if (!key && (!newest_ || told.header.referenceCount != 1 || told.header.references[0] != *newest_ ||
+  if (!key && (!newest_ || told.header.referenceCount != 1 || !decoded_.find(told.header.references[0]) ||
                told.header.tick - *newest_ > kMaxTickStep)) {
     if (sought_ && !lost_) return std::nullopt;
     return refuse("a frame that others refer to is not in it");
   }
+  if (key) decoded_.clear();
+  decoded_.hold(told.header.temporalLayer, told.header.tick);
   newest_ = told.header.tick;
   sought_ = false;
   return told;

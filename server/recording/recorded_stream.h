@@ -11,6 +11,7 @@
 
 #include "clothstream/v1/session.pb.h"
 #include "proto/codec/packet_header.h"
+#include "proto/codec/temporal_layers.h"
 #include "proto/recording/recording_reader.h"
 
 namespace clothstream::recording {
@@ -66,6 +67,7 @@ class RecordedStream {
   v1::StreamDescription description_;
   std::string scene_;
   std::optional<std::uint64_t> newest_;  // tick of the frame before; nothing: only a key frame can follow
+  codec::HeldFrames decoded_;            // while there is a newest one
   bool sought_ = true;                   // and no frame since: what cannot be decoded is not lost
   std::optional<Lost> lost_;             // and not said yet
   std::optional<Told> held_;             // comes after what was lost

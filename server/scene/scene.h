@@ -177,6 +177,8 @@ struct StreamSettings {
   float maxError = 0.0005f;  // m an axis
   Normals normals = Normals::none;
   Coding coding = Coding::entropy;
+  std::uint8_t temporalLayers = 1;  // 1 to 3
+  std::uint8_t qualities = 3;       // 1 to 4, each with twice the max error of the one before
 };
 
 struct Scene {

@@ -43,7 +43,7 @@ std::size_t Audience::size() const {
 }
 
 void Audience::publish(const PublishedFrame& frame) {
-  if (journal_) journal_->sent(frame.message);
+  if (journal_ && frame.quality == 0) journal_->sent(frame.message);
   {
     const std::lock_guard lock(mutex_);
     receivers_.assign(members_.begin(), members_.end());
@@ -63,9 +63,11 @@ void Audience::announce(const SharedBytes& message) {
     if (!receiver->announce(message)) receiver->close(tooSlow());
 }
 
-bool Audience::wantsKeyFrame() const {
+FrameWishes Audience::wishes(Clock::time_point now) const {
   const std::lock_guard lock(mutex_);
-  return std::ranges::any_of(members_, [](const auto& member) { return member->wantsKeyFrame(); });
+  FrameWishes wishes;
+  for (const auto& member : members_) wishes |= member->wishes(now);
+  return wishes;
 }
 
 }  // namespace clothstream::stream

@@ -18,7 +18,7 @@ namespace clothstream::stream {
 // Thread-safe; publish() belongs to one thread.
 class Audience {
  public:
-  // Where there is a journal, it is sent what everybody is.
+  // Where there is a journal, it is sent what everybody is, of frames those of the finest quality.
   explicit Audience(std::shared_ptr<Journal> journal = nullptr) : journal_(std::move(journal)) {}
 
   enum class Joining : std::uint8_t { joined, full, closed };
@@ -34,8 +34,8 @@ class Audience {
   void dismiss(const SharedBytes& last);
   // The same, and nobody joins from here on.
   void close(const SharedBytes& last);
-  // Whether somebody can go on only from a key frame, and has room for one.
-  bool wantsKeyFrame() const;
+  // Of all members, which are to be asked whenever a frame is made.
+  FrameWishes wishes(Clock::time_point now) const;
 
  private:
   const std::shared_ptr<Journal> journal_;

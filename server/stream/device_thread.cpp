@@ -168,6 +168,7 @@ void DeviceThread::startAndStopScenes() {
       run->pacer.start(Clock::now());
       run->slow.restart();
     }
+    if (run->running && !wanted) run->host->rest();
     run->running = wanted;
     run->scene->running = wanted;
   }

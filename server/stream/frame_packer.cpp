@@ -3,6 +3,7 @@
 #include "server/stream/frame_packer.h"
 
 #include <cassert>
+#include <span>
 #include <utility>
 
 namespace clothstream::stream {
@@ -65,36 +66,39 @@ void FramePacker::run() {
 }
 
 void FramePacker::pack() {
-  packet_.resize(frame_.encoder->packetBound());
-  const encode::EncodedFrame encoded = frame_.encoder->entropyCode(frame_.recorded, packet_);
-  if (frame_.discarded) return;
-
   v1::Frame& frame = *message_.mutable_frame();
-  frame.mutable_packet()->assign(reinterpret_cast<const char*>(packet_.data()), encoded.bytes);
   frame.set_tick_time_us(microseconds(frame_.tickStart));
-  frame.set_reconstruction_hash(encoded.reconstructionHash);
   frame.set_state_hash(frame_.stateHash);
   frame.mutable_colliders()->Swap(&frame_.colliders);
   if (frame_.hasReport)
     frame.mutable_report()->Swap(&frame_.report);
   else
     frame.clear_report();
+  for (const CompleteFrame::Recorded& recorded : frame_.recorded) {
+    packet_.resize(recorded.encoder->packetBound());
+    const encode::EncodedFrame encoded = recorded.encoder->entropyCode(recorded.frame, packet_);
+    if (!frame_.discarded) publish(encoded.bytes, encoded.reconstructionHash);
+  }
+}
+
+void FramePacker::publish(std::size_t bytes, std::uint64_t reconstructionHash) {
+  v1::Frame& frame = *message_.mutable_frame();
+  frame.mutable_packet()->assign(reinterpret_cast<const char*>(packet_.data()), bytes);
+  frame.set_reconstruction_hash(reconstructionHash);
   const Clock::time_point complete = Clock::now();
   frame.set_packet_time_us(microseconds(complete));
+  const auto packet = codec::parsePacket(std::span(packet_).first(bytes));
+  const PublishedFrame published = publishedFrame(packet->header, serialise(message_), complete);
 
-  PublishedFrame published{.message = serialise(message_),
-                           .tick = frame_.recorded.tick,
-                           .key = frame_.recorded.kind == codec::PacketKind::key,
-                           .referenceTick = frame_.recorded.referenceTick,
-                           .complete = complete};
   // Counted before anybody can have it, so that who holds a frame finds it counted.
   telemetry::SceneMetrics& metrics = frame_.scene->metrics;
   metrics.encode.record(seconds(complete - frame_.deviceDone));
   for (const Clock::time_point arrival : frame_.poseArrivals)
     metrics.inputToPacket.record(seconds(complete - arrival));
+  frame_.poseArrivals.clear();  // other qualities show them later
   metrics.frames.add();
   if (published.key) metrics.keyFrames.add();
-  metrics.packetBytes.add(encoded.bytes);
+  metrics.packetBytes.add(bytes);
 
   frame_.scene->audience.publish(published);
 }

@@ -20,11 +20,17 @@
 
 namespace clothstream::stream {
 
-// One recorded frame that is complete on the device, and what travels with it.
+// One frame that is complete on the device, and what travels with it.
 struct CompleteFrame {
+  // As it was recorded for one quality.
+  struct Recorded {
+    encode::FrameEncoder* encoder = nullptr;
+    std::uint8_t quality = 0;
+    bool key = false;  // wanted
+    encode::RecordedFrame frame{};
+  };
   LiveScene* scene = nullptr;
-  encode::FrameEncoder* encoder = nullptr;
-  encode::RecordedFrame recorded;
+  std::vector<Recorded> recorded;  // one or more
   // Of a state that must not be shown: only its slot is freed.
   bool discarded = false;
   std::uint64_t stateHash = 0;
@@ -39,8 +45,8 @@ struct CompleteFrame {
 // push() and drain() belong to the device's thread.
 class FramePacker {
  public:
-  // At most `capacity` frames wait. `everySecond` is called about once a second, on the packer's thread,
-  // which predicts large frames together with others: so many in all.
+  // At most `capacity` frames wait: as many as there are slots in encoders. `everySecond` is called about
+  // once a second, on the packer's thread, which predicts large frames together with others: so many in all.
   FramePacker(std::size_t capacity, std::function<void()> everySecond, std::uint32_t encoderThreads = 1);
   // What was pushed is packed first.
   ~FramePacker();
@@ -57,6 +63,7 @@ class FramePacker {
  private:
   void run();
   void pack();
+  void publish(std::size_t bytes, std::uint64_t reconstructionHash);
 
   std::function<void()> everySecond_;
   encode::EncoderThreads workers_;

@@ -8,10 +8,14 @@
 #include "server/encode/frame_encoder.h"
 #include "server/messages/client_message.h"
 #include "server/messages/description.h"
+#include "server/messages/limits.h"
 #include "server/messages/scene_message.h"
 
 namespace clothstream::stream {
 namespace {
+
+static_assert(messages::limits::kMaxTemporalLayers == codec::kMaxTemporalLayers &&
+              messages::limits::kMaxQualities == codec::kMaxQualities);
 
 v1::ParameterChange allParameters(const scene::Scene& scene) {
   const v1::Scene message = messages::toMessage(scene);
@@ -103,6 +107,15 @@ std::uint32_t LiveScene::codec() const {
   return source ? source->description().codec() : encode::streamLayout(start_, kEpoch).codec;
 }
 
+StreamShape LiveScene::shape() const {
+  if (!source)
+    return {.rate = start_.streamRate,
+            .layers = start_.stream.temporalLayers,
+            .qualities = start_.stream.qualities};
+  const std::uint32_t layers = source->description().temporal_layers();
+  return {.rate = start_.streamRate, .layers = static_cast<std::uint8_t>(std::max(layers, 1u))};
+}
+
 v1::ParameterChange LiveScene::resetParameters() {
   const std::lock_guard lock(mutex_);
   inbox.keepColliderChanges();
@@ -128,15 +141,11 @@ std::shared_ptr<const Description> LiveScene::description() {
       source ? source->description() : messages::toDescription(definition_, kEpoch, codec(), seconds);
   message.set_scene(name());
 
-  auto description = std::make_shared<Description>();
-  description->contentId = ++contents_;
-  for (v1::Chunk& chunk : messages::toChunks(description->contentId, v1::CONTENT_KIND_STREAM_DESCRIPTION,
-                                             message.SerializeAsString())) {
-    v1::ServerMessage envelope;
-    *envelope.mutable_chunk() = std::move(chunk);
-    description->chunks.push_back(serialise(envelope));
-  }
-  return description_ = std::move(description);
+  v1::StreamDescription geometry;
+  geometry.mutable_cloths()->Swap(message.mutable_cloths());
+  if (!geometry_) geometry_ = std::make_shared<const std::string>(geometry.SerializeAsString());
+  return description_ =
+             std::make_shared<const Description>(++contents_, geometry_, message.SerializeAsString());
 }
 
 SharedBytes pausedNotice(const LiveScene& scene, std::uint64_t participant) {

@@ -37,6 +37,7 @@ class LiveScene {
   const scene::Scene& start() const { return start_; }
   // Of its stream.
   std::uint32_t codec() const;
+  StreamShape shape() const;
   // With all accepted changes, those of the next tick included.
   scene::Scene definition() const;
 
@@ -75,6 +76,7 @@ class LiveScene {
 
   mutable std::mutex mutex_;
   scene::Scene definition_;
+  std::shared_ptr<const std::string> geometry_;     // of all descriptions; null before the first
   std::shared_ptr<const Description> description_;  // null when the definition has changed since
   std::uint64_t contents_ = 0;                      // ids given
 };

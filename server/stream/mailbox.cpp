@@ -7,11 +7,36 @@
 #include <utility>
 
 namespace clothstream::stream {
+namespace {
+
+std::size_t costOf(const std::vector<std::byte>& message) {
+  return message.size() + Mailbox::kMessageOverhead;
+}
+
+SharedBytes messageOf(const OperatingPoint& point) {
+  v1::ServerMessage message;
+  message.mutable_operating_point()->set_quality(point.quality);
+  message.mutable_operating_point()->set_temporal_layers(point.layers);
+  return serialise(message);
+}
+
+}  // namespace
+
+PublishedFrame publishedFrame(const codec::PacketHeader& header, SharedBytes message,
+                              Clock::time_point complete) {
+  return {.message = std::move(message),
+          .tick = header.tick,
+          .key = header.kind == codec::PacketKind::key,
+          .referenceTick = header.references[0],
+          .quality = header.quality,
+          .layer = header.temporalLayer,
+          .complete = complete};
+}
 
 bool Mailbox::push(Control& control, SharedBytes message) {
   if (closed_) return true;
-  if (!control.messages.empty() && control.bytes + message->size() > kMaxControlBytes) return false;
-  control.bytes += message->size();
+  if (!control.messages.empty() && control.bytes + costOf(*message) > kMaxControlBytes) return false;
+  control.bytes += costOf(*message);
   control.messages.push_back(std::move(message));
   return true;
 }
@@ -19,7 +44,7 @@ bool Mailbox::push(Control& control, SharedBytes message) {
 SharedBytes Mailbox::pop(Control& control) {
   SharedBytes message = std::move(control.messages.front());
   control.messages.pop_front();
-  control.bytes -= message->size();
+  control.bytes -= costOf(*message);
   return message;
 }
 
@@ -45,13 +70,18 @@ bool Mailbox::announce(SharedBytes message) {
   return true;
 }
 
-void Mailbox::subscribe(std::shared_ptr<const Description> description, std::uint32_t streamRate,
-                        telemetry::SceneMetrics& metrics) {
+void Mailbox::subscribe(std::shared_ptr<const Description> description, const StreamShape& shape,
+                        telemetry::SceneMetrics& metrics, OperatingPoint wanted) {
   {
     const std::lock_guard lock(mutex_);
     description_ = std::move(description);
     streaming_ = !description_;
-    streamRate_ = streamRate;
+    shape_ = shape;
+    const auto coarsest = static_cast<std::uint8_t>(shape.qualities - 1);
+    adaptation_ = LinkAdaptation({std::min(wanted.quality, coarsest), std::min(wanted.layers, shape.layers)},
+                                 shape.qualities);
+    told_ = {0, shape.layers};
+    quality_ = adaptation_.point().quality;
     metrics_ = &metrics;
     doorWaits_ = false;
   }
@@ -62,32 +92,91 @@ void Mailbox::deliver(const PublishedFrame& frame) {
   {
     const std::lock_guard lock(mutex_);
     if (!streaming_ || closed_) return;
-    if (frame.key) {
-      drop(held_.size());
-      held_.clear();
-      needsKey_ = wantsKey_ = false;
-    } else if (needsKey_ || frame.referenceTick != chainTick_) {
-      drop(1);
-      needsKey_ = true;
+    adapt(frame.complete);
+    if (frame.quality == quality_)
+      adaptation_.made(frame.quality, frame.layer, frame.message->size(), frame.complete);
+    else if (!frame.key || (shape_.qualities > 1 && frame.quality != wantedQuality()))
       return;
-    } else if (held_.size() == kMaxHeld) {
-      drop(held_.size() + 1);
-      held_.clear();
-      needsKey_ = true;
-      return;
-    }
-    held_.push_back(frame);
-    chainTick_ = frame.tick;
-    if (!hasRoom()) return;
+    if (!hold(frame) || !hasRoom()) return;
     doorWaits_ = false;
   }
   wake();
 }
 
-bool Mailbox::wantsKeyFrame() const {
+std::uint8_t Mailbox::wantedQuality() const {
+  return shape_.qualities > 1 ? adaptation_.point().quality : quality_;
+}
+
+void Mailbox::adapt(Clock::time_point now) {
+  const bool behind = !held_.empty() || (needsKey_ && !(doorWaits_ && hasRoom()));
+  const OperatingPoint before = adaptation_.point();
+  if (!adaptation_.look(behind, now)) return;
+  const OperatingPoint after = adaptation_.point();
+  const bool up = after.quality < before.quality || after.layers > before.layers;
+  (up ? metrics_->stepsUp : metrics_->stepsDown).add();
+  if (after.layers < before.layers) dropHeld(after.layers);
+}
+
+bool Mailbox::hold(const PublishedFrame& frame) {
+  if (frame.key) {
+    dropHeld(0);
+    chain_ = {};
+    quality_ = frame.quality;
+    needsKey_ = wantsKey_ = false;
+  } else if (frame.layer >= adaptation_.point().layers) {
+    metrics_->framesThinned.add();
+    return false;
+  } else if (needsKey_ || std::ranges::find(chain_, frame.referenceTick) == chain_.end()) {
+    needsKey_ = needsKey_ || frame.layer == 0;
+    dropped(1);
+    return false;
+  } else if (!makeRoom(frame)) {
+    dropped(1);
+    return false;
+  }
+  held_.push_back(frame);
+  heldBytes_ += frame.message->size();
+  chain_[frame.layer] = frame.tick;
+  return true;
+}
+
+bool Mailbox::makeRoom(const PublishedFrame& frame) {
+  const auto fits = [&] {
+    return held_.empty() || (held_.size() < kMaxHeld && heldBytes_ + frame.message->size() <= kMaxHeldBytes);
+  };
+  if (fits()) return true;
+  adaptation_.dropped(frame.complete);
+  for (std::uint8_t layer = shape_.layers; --layer > 0;) {
+    if (layer == frame.layer) return false;
+    dropHeld(layer);
+    if (fits()) return true;
+  }
+  dropHeld(0);
+  needsKey_ = true;
+  return false;
+}
+
+void Mailbox::dropHeld(std::uint8_t layer) {
+  dropped(std::erase_if(held_, [&](const PublishedFrame& frame) {
+    if (frame.layer < layer) return false;
+    heldBytes_ -= frame.message->size();
+    chain_[frame.layer].reset();
+    return true;
+  }));
+}
+
+FrameWishes Mailbox::wishes(Clock::time_point now) {
   const std::lock_guard lock(mutex_);
-  if (!streaming_ || closed_) return false;
-  return wantsKey_ || (needsKey_ && doorWaits_ && hasRoom());
+  FrameWishes wishes;
+  if (!streaming_ || closed_) return wishes;
+  adapt(now);
+  const auto add = [&](std::uint8_t quality, bool key) {
+    const auto bit = static_cast<std::uint8_t>(1u << quality);
+    wishes |= {.qualities = bit, .keys = key ? bit : std::uint8_t{0}};
+  };
+  if (!needsKey_) add(quality_, wantsKey_);
+  if (needsKey_ ? doorWaits_ && hasRoom() : wantedQuality() != quality_) add(wantedQuality(), true);
+  return wishes;
 }
 
 bool Mailbox::acknowledge(std::uint64_t tick, Clock::time_point now) {
@@ -95,6 +184,7 @@ bool Mailbox::acknowledge(std::uint64_t tick, Clock::time_point now) {
     const std::lock_guard lock(mutex_);
     if (tick > newestSent_) return false;
     while (!sent_.empty() && sent_.front().tick <= tick) {
+      adaptation_.delivered(sent_.front().bytes);
       if (sent_.front().tick == tick) {
         const double sample = seconds(now - sent_.front().time);
         // The shortest, but it creeps up (by half in some 200 frames) so that a route that became longer is
@@ -112,8 +202,7 @@ bool Mailbox::acknowledge(std::uint64_t tick, Clock::time_point now) {
 
 void Mailbox::restart() {
   const std::lock_guard lock(mutex_);
-  drop(held_.size());
-  held_.clear();
+  dropHeld(0);
   sent_.clear();
   needsKey_ = true;
 }
@@ -129,12 +218,13 @@ void Mailbox::close(SharedBytes last) {
     if (closed_) return;
     closed_ = true;
     held_.clear();
+    heldBytes_ = 0;
     description_.reset();
     announcements_ = {};
     // Answers that were on their way are worth having; a peer that does not read them only holds what it
     // held.
     if (last) {
-      replies_.bytes += last->size();
+      replies_.bytes += costOf(*last);
       replies_.messages.push_back(std::move(last));
     }
   }
@@ -157,8 +247,8 @@ std::optional<SharedBytes> Mailbox::take(Clock::time_point now) {
   if (!replies_.messages.empty()) return pop(replies_);
   if (closed_) return std::nullopt;
   if (description_) {
-    SharedBytes chunk = description_->chunks[nextChunk_++];
-    if (nextChunk_ == description_->chunks.size()) {
+    SharedBytes chunk = description_->chunk(nextChunk_++);
+    if (nextChunk_ == description_->chunks()) {
       description_.reset();
       streaming_ = true;
     }
@@ -167,10 +257,16 @@ std::optional<SharedBytes> Mailbox::take(Clock::time_point now) {
   if (!streaming_) return std::nullopt;
   if (!announcements_.messages.empty()) return pop(announcements_);
   if (held_.empty() || !hasRoom()) return std::nullopt;
+  const OperatingPoint point{held_.front().quality, adaptation_.point().layers};
+  if (point != told_) {
+    told_ = point;
+    return messageOf(point);
+  }
 
   const PublishedFrame frame = std::move(held_.front());
   held_.pop_front();
-  sent_.push_back({frame.tick, now});
+  heldBytes_ -= frame.message->size();
+  sent_.push_back({frame.tick, frame.message->size(), now});
   newestSent_ = frame.tick;
   metrics_->framesTaken.add();
   metrics_->send.record(seconds(now - frame.complete));
@@ -178,11 +274,12 @@ std::optional<SharedBytes> Mailbox::take(Clock::time_point now) {
 }
 
 std::size_t Mailbox::window() const {
-  const double inFlight = std::ceil(roundTrip_.value_or(0) * streamRate_);
+  const int leftOut = shape_.layers - adaptation_.point().layers;
+  const double inFlight = std::ceil(roundTrip_.value_or(0) * (shape_.rate >> leftOut));
   return kMinWindow + static_cast<std::size_t>(std::min(inFlight, double{kMaxWindow - kMinWindow}));
 }
 
-void Mailbox::drop(std::size_t frames) {
+void Mailbox::dropped(std::size_t frames) {
   if (metrics_ != nullptr) metrics_->framesDropped.add(frames);
 }
 

@@ -3,6 +3,7 @@
 // for.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <deque>
@@ -10,44 +11,72 @@
 #include <memory>
 #include <mutex>
 #include <optional>
-#include <vector>
 
+#include "proto/codec/packet_header.h"
 #include "server/stream/clock.h"
+#include "server/stream/description.h"
 #include "server/stream/envelope.h"
+#include "server/stream/link_adaptation.h"
 #include "server/telemetry/metrics.h"
 
 namespace clothstream::stream {
 
-// A packet on its way to everybody in a scene. Immutable once published.
+// A packet on its way to everybody in a scene who gets its quality. Immutable once published.
 struct PublishedFrame {
   SharedBytes message;
   std::uint64_t tick = 0;
   bool key = false;
   std::uint64_t referenceTick = 0;  // of a predicted frame
+  std::uint8_t quality = 0, layer = 0;
   Clock::time_point complete{};
 };
 
-// Everything that a decoder needs before its first frame, as messages; shared by all who join while it holds.
-struct Description {
-  std::uint64_t contentId = 0;
-  std::vector<SharedBytes> chunks;
+// Of the packet with this header, in this message.
+PublishedFrame publishedFrame(const codec::PacketHeader& header, SharedBytes message,
+                              Clock::time_point complete);
+
+// What a scene's frames are.
+struct StreamShape {
+  std::uint32_t rate = 0;  // frames/s, with all layers
+  std::uint8_t layers = 1;
+  // That there are of every frame, for who wants them. 1: each frame is of one, whatever it is.
+  std::uint8_t qualities = 1;
 };
 
-// Thread-safe. Memory of one subscriber: at most kMaxControlBytes of control (or one message that is larger),
-// kMaxHeld frames and one description, the latter two shared with the other subscribers.
+// Sets of qualities, bit by bit.
+struct FrameWishes {
+  std::uint8_t qualities = 0;  // somebody gets frames of it, or waits for one
+  std::uint8_t keys = 0;       // of these, one of them waits for a key frame
+
+  FrameWishes& operator|=(const FrameWishes& other) {
+    qualities |= other.qualities;
+    keys |= other.keys;
+    return *this;
+  }
+};
+
+// Thread-safe. Memory of one subscriber: of answers and of announcements kMaxControlBytes each at most (or
+// one message that is larger), kMaxHeld frames of kMaxHeldBytes in all (or one that is larger) and one
+// description, the latter two shared with the other subscribers.
 //
 // Room for frames: at most window() of them are out and not acknowledged. It is two, and on long round trips
-// as many more as the scene streams in one; the round trip is the shortest of late from a frame's leaving to
+// as many more as it is sent in one; the round trip is the shortest of late from a frame's leaving to
 // its acknowledgement, so that a queue on the way, which makes it longer, does not feed itself.
 //
-// Frames form a chain: a predicted one needs the one before. A subscriber without room has up to kMaxHeld
-// frames held back; if it falls behind more, they are dropped and it goes on with the next key frame, for
-// which it asks (wantsKeyFrame) when it has room and its door waits for something to write: who does not read
-// asks for nothing.
+// A predicted frame is given only where the frame that it refers to was. A subscriber without room has up to
+// kMaxHeld frames held back; if it falls behind more, those of the highest layer go first, for no other layer
+// needs them. If the base alone is too much, all go, and it goes on with the next key frame, for which it
+// asks when it has room and its door waits for something to write: who does not read asks for nothing.
+//
+// How many layers, and which quality, LinkAdaptation says; the subscriber is told when it changes. Another
+// quality begins with a key frame of it; until that comes it goes on with the former one.
 class Mailbox {
  public:
   static constexpr std::size_t kMaxControlBytes = 256 * 1024;
+  // What a message takes beside its bytes.
+  static constexpr std::size_t kMessageOverhead = 128;
   static constexpr std::size_t kMaxHeld = 3;
+  static constexpr std::size_t kMaxHeldBytes = 1024 * 1024;
   static constexpr std::size_t kMinWindow = 2;
   static constexpr std::size_t kMaxWindow = 24;
 
@@ -59,12 +88,14 @@ class Mailbox {
   // What everybody in the scene is told; kept back until the description is out.
   [[nodiscard]] bool announce(SharedBytes message);
 
-  // From here on it is a subscriber of frames: description first; null where it has it already. `metrics`
-  // outlives the mailbox.
-  void subscribe(std::shared_ptr<const Description> description, std::uint32_t streamRate,
-                 telemetry::SceneMetrics& metrics);
+  // From here on it is a subscriber of frames: description first; null where it has it already. `wanted` at
+  // most, as far as the stream has it. `metrics` outlives the mailbox.
+  void subscribe(std::shared_ptr<const Description> description, const StreamShape& shape,
+                 telemetry::SceneMetrics& metrics, OperatingPoint wanted = {0, codec::kMaxTemporalLayers});
   void deliver(const PublishedFrame& frame);
-  bool wantsKeyFrame() const;
+  // What it wants of the next frame. To be asked whenever one is made: so it knows how time passes while it
+  // gets none.
+  FrameWishes wishes(Clock::time_point now);
 
   // The peer has decoded this tick. False if it never was sent.
   [[nodiscard]] bool acknowledge(std::uint64_t tick, Clock::time_point now);
@@ -87,6 +118,7 @@ class Mailbox {
  private:
   struct Sent {
     std::uint64_t tick;
+    std::size_t bytes;
     Clock::time_point time;
   };
   struct Control {
@@ -99,7 +131,17 @@ class Mailbox {
   static SharedBytes pop(Control& control);
   bool hasRoom() const { return sent_.size() < window(); }
   std::size_t window() const;
-  void drop(std::size_t frames);
+  // That the adaptation has it at; any where frames are of one.
+  std::uint8_t wantedQuality() const;
+  void adapt(Clock::time_point now);
+  // False where it is left out, could not be decoded, or has no room.
+  bool hold(const PublishedFrame& frame);
+  // Drops what is held, from the highest layer on, until the frame fits; false where it is to be dropped
+  // itself.
+  bool makeRoom(const PublishedFrame& frame);
+  // Those of this layer and above.
+  void dropHeld(std::uint8_t layer);
+  void dropped(std::size_t frames);
 
   mutable std::mutex mutex_;
   bool closed_ = false;
@@ -110,12 +152,17 @@ class Mailbox {
   std::size_t nextChunk_ = 0;
 
   telemetry::SceneMetrics* metrics_ = nullptr;
-  std::uint32_t streamRate_ = 0;
+  StreamShape shape_;
+  LinkAdaptation adaptation_{{}, 1};
+  OperatingPoint told_;     // of what the newest frame that was sent is
   bool streaming_ = false;  // the description is out
   bool needsKey_ = true;
-  bool wantsKey_ = false;        // and does without it until it comes
-  std::uint64_t chainTick_ = 0;  // the newest frame held, or else sent
+  bool wantsKey_ = false;  // and does without it until it comes
+  std::uint8_t quality_ = 0;
+  // Of each layer the newest frame that is held, or else was sent.
+  std::array<std::optional<std::uint64_t>, codec::kMaxTemporalLayers> chain_;
   std::deque<PublishedFrame> held_;
+  std::size_t heldBytes_ = 0;
   std::deque<Sent> sent_;  // and not acknowledged
   std::uint64_t newestSent_ = 0;
   std::optional<double> roundTrip_;  // s

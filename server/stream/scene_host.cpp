@@ -28,8 +28,7 @@ constexpr std::size_t kMaxPoseArrivals = 256;
 SceneHost::OnDevice::OnDevice(vulkan::Device& device_, const scene::Scene& scene, codec::Workers& workers)
     : device(device_),
       simulation(device_, scene),
-      encoder(device_, simulation, encode::streamLayout(scene, LiveScene::kEpoch),
-              encode::Prediction::automatic, &workers),
+      encoders(device_, simulation, encode::streamLayout(scene, LiveScene::kEpoch), &workers),
       recorder(device_) {
   recorder.begin();
   simulation.recordSaveState(recorder);
@@ -40,6 +39,7 @@ SceneHost::OnDevice::OnDevice(vulkan::Device& device_, const scene::Scene& scene
 
 void SceneHost::OnDevice::warmUp(const scene::Scene& scene) {
   simulation::TickInputs inputs{scene.environment, {}};
+  encode::FrameEncoder& encoder = encoders.finest();
   std::vector<std::byte> packet(encoder.packetBound());
   for (std::uint64_t tick = 1; tick <= 2; ++tick) {
     recorder.begin();
@@ -224,36 +224,52 @@ void SceneHost::recordRecovery() {
   if (recovery_ == Recovery::none) return;
   if (recovery_ == Recovery::rollback) on.simulation.recordRollback(on.recorder);
   if (recovery_ == Recovery::reset) on.simulation.recordRestoreState(on.recorder, on.start);
-  on.encoder.forgetHistory();
+  on.encoders.forgetHistory();
   recovery_ = Recovery::none;
 }
 
-bool SceneHost::wantsKeyFrame(Clock::time_point now) const {
-  if (live_.journal && live_.journal->active() && sinceKeyFrame_ + 1 >= kFramesAKeyFrame) return true;
-  return now - lastKeyFrame_ >= kKeyFrameInterval && live_.audience.wantsKeyFrame();
+void SceneHost::chooseEncoders(Clock::time_point now) {
+  frame_.recorded.clear();
+  FrameWishes wishes = live_.audience.wishes(now);
+  const bool isRecorded = live_.journal && live_.journal->active();
+  if (isRecorded) wishes.qualities |= 1;
+  encode::QualityEncoders& encoders = onDevice_->encoders;
+  for (std::uint8_t quality = 0; quality < encoders.count(); ++quality) {
+    if ((wishes.qualities >> quality & 1) == 0) {
+      encoders.unwanted(quality, now);
+      continue;
+    }
+    encode::FrameEncoder* const encoder = encoders.wanted(quality, now);
+    if (encoder == nullptr) continue;
+    if (!encoder->canRecord()) {
+      live_.metrics.skippedFrames.add();
+      continue;
+    }
+    const bool due = isRecorded && quality == 0 && sinceKeyFrame_ + 1 >= kFramesAKeyFrame;
+    const bool asked = (wishes.keys >> quality & 1) != 0 && now - lastKeyFrame_[quality] >= kKeyFrameInterval;
+    frame_.recorded.push_back({.encoder = encoder, .quality = quality, .key = due || asked});
+  }
 }
 
 void SceneHost::recordFrame(Clock::time_point now) {
+  chooseEncoders(now);
+  hasFrame_ = !frame_.recorded.empty();
+  if (!hasFrame_) return;
   OnDevice& on = *onDevice_;
-  if (!on.encoder.canRecord()) {
-    live_.metrics.skippedFrames.add();
-    hasFrame_ = false;
-    return;
-  }
   if (scene_.stream.normals == scene::Normals::octahedral) on.simulation.recordNormals(on.recorder);
   frame_.hasReport = ticksAReport_ > 0 && tick_ + 1 >= nextReport_;
   if (frame_.hasReport) {
     on.simulation.recordReport(on.recorder, tickInputs_);
     nextReport_ = tick_ + 1 + ticksAReport_;
   }
-  frame_.recorded = on.encoder.record(on.recorder, tick_ + 1, wantsKeyFrame(now));
   ++sinceKeyFrame_;
-  if (frame_.recorded.kind == codec::PacketKind::key) {
-    lastKeyFrame_ = now;
-    sinceKeyFrame_ = 0;
+  for (CompleteFrame::Recorded& recorded : frame_.recorded) {
+    recorded.frame = recorded.encoder->record(on.recorder, tick_ + 1, recorded.key);
+    if (recorded.frame.kind != codec::PacketKind::key) continue;
+    lastKeyFrame_[recorded.quality] = now;
+    if (recorded.quality == 0) sinceKeyFrame_ = 0;
   }
   frame_.scene = &live_;
-  frame_.encoder = &on.encoder;
   frame_.tickStart = tickStart_;
   colliders_.write(scene_, frame_.colliders);
   std::swap(frame_.poseArrivals, poseArrivals_);
@@ -344,6 +360,11 @@ void SceneHost::recover() {
   if (!recoveryNotices_.take(Clock::now())) return;
   spdlog::warn("{}: tick {}: {}", live_.name(), tick_, text);
   live_.audience.announce(notice(v1::NOTICE_KIND_ROLLED_BACK, text, tick_));
+}
+
+void SceneHost::rest() {
+  packer_.drain();
+  onDevice_->encoders.drop();
 }
 
 void SceneHost::release() {

@@ -2,13 +2,14 @@
 // One scene on the device: its ticks, frames, checkpoints, and the ways back when something went wrong.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "server/encode/frame_encoder.h"
+#include "server/encode/quality_encoders.h"
 #include "server/simulation/cloth_simulation.h"
 #include "server/stream/collider_set.h"
 #include "server/stream/contact_log.h"
@@ -30,7 +31,8 @@ namespace clothstream::stream {
 // goes bad twice within a second goes back to the start, parameters included.
 class SceneHost {
  public:
-  // At most one key frame in this time, whoever asks: one serves all who wait.
+  // Who goes on decoding a quality gets at most one key frame of it in this time, whoever asks: one serves all
+  // who wait.
   static constexpr std::chrono::milliseconds kKeyFrameInterval{100};
 
   // With a journal, a key frame comes after at most so many that are not.
@@ -51,6 +53,9 @@ class SceneHost {
   // Waits for it, and hands its frame on. Throws vulkan::DeviceLost.
   void finish();
 
+  // Nobody is in the scene, or its clock stands: coarser qualities' encoders go.
+  void rest();
+
   // The device is gone, or about to be: nothing of it is held any more.
   void release();
   // Everything anew on this device, from the newest state that the CPU has.
@@ -70,7 +75,7 @@ class SceneHost {
 
     vulkan::Device& device;
     simulation::ClothSimulation simulation;
-    encode::FrameEncoder encoder;
+    encode::QualityEncoders encoders;
     vulkan::Recorder recorder;
     simulation::StateSnapshot start;
   };
@@ -91,7 +96,8 @@ class SceneHost {
   void endGentleness();
   void setCloths(const std::vector<scene::Cloth>& cloths);
   void recordRecovery();
-  bool wantsKeyFrame(Clock::time_point now) const;
+  // For the frame in hand: those of qualities that somebody wants, which have room for it.
+  void chooseEncoders(Clock::time_point now);
   void recordFrame(Clock::time_point now);
   void announceEvents();
   void recover();
@@ -129,8 +135,9 @@ class SceneHost {
   simulation::StateSnapshot newestState_;
   bool savesState_ = false;  // the tick in hand
 
-  Clock::time_point tickStart_{}, lastKeyFrame_{};
-  std::uint32_t sinceKeyFrame_ = 0;  // frames
+  Clock::time_point tickStart_{};
+  std::array<Clock::time_point, codec::kMaxQualities> lastKeyFrame_{};
+  std::uint32_t sinceKeyFrame_ = 0;  // frames of the finest quality
   vulkan::TimelineValue submitted_ = 0;
   bool hasFrame_ = false;         // the tick in hand
   std::uint64_t nextReport_ = 0;  // tick

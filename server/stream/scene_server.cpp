@@ -83,7 +83,7 @@ SceneServer::State::State(std::vector<scene::Scene> definitions, ServerOptions o
     : options(std::move(options_)),
       uploads(options.maxUploadBytes),
       scenes(liveScenes(std::move(definitions), options)),
-      packer((scenes.size() + options.maxCreatedScenes) * encode::FrameEncoder::kSlots,
+      packer((scenes.size() + options.maxCreatedScenes) * codec::kMaxQualities * encode::FrameEncoder::kSlots,
              [this] {
                for (const auto& session : sessionsNow()) session->checkSilence(Clock::now());
                for (const auto& scene : scenesNow()) scene->roster.expire(Clock::now());

@@ -16,6 +16,8 @@ namespace clothstream::stream {
 namespace {
 
 constexpr double kMalformedCost = 60;
+// Who does not read holds one of these at most: scenes with large meshes take more.
+constexpr std::size_t kMaxAnswerBytes = 1024 * 1024;
 
 }  // namespace
 
@@ -80,6 +82,11 @@ void Session::dispatch(const v1::ClientMessage& message, Clock::time_point now) 
       if (!found) return refuse({found.error().code(), found.error().text()});
       v1::ServerMessage scene;
       *scene.mutable_get_scene() = std::move(*found);
+      if (const std::size_t bytes = scene.ByteSizeLong(); bytes > kMaxAnswerBytes)
+        return refuse({v1::ERROR_CODE_RESOURCE_EXHAUSTED,
+                       fmt::format("getScene: '{}' takes {} bytes, and a stream answers with {} at most: use "
+                                   "the unary call",
+                                   message.get_scene().name(), bytes, kMaxAnswerBytes)});
       return answer(scene);
     }
     case Body::kUpload:
@@ -179,7 +186,7 @@ void Session::hello(const v1::Hello& message) {
   participant_ = admission->id;
   scene->metrics.joins.add();
   const std::shared_ptr<const Description> description = scene->description();
-  const bool known = admission->resumed && message.description_content_id() == description->contentId;
+  const bool known = admission->resumed && message.description_content_id() == description->contentId();
 
   v1::ServerMessage reply;
   v1::Welcome& welcome = *reply.mutable_welcome();
@@ -189,7 +196,7 @@ void Session::hello(const v1::Hello& message) {
   welcome.set_participant_id(participant_);
   welcome.set_server_name(server_.options.serverName);
   welcome.set_device_name(server_.deviceNameOf(*scene));
-  welcome.set_description_content_id(description->contentId);
+  welcome.set_description_content_id(description->contentId());
   welcome.set_role(admission->role);
   welcome.set_resume_token(admission->token);
   welcome.set_resumed(admission->resumed);
@@ -197,7 +204,8 @@ void Session::hello(const v1::Hello& message) {
   welcome.set_hold_ms(static_cast<std::uint32_t>(
       std::chrono::duration_cast<std::chrono::milliseconds>(server_.options.holding.hold).count()));
   answer(reply);
-  mailbox_->subscribe(known ? nullptr : description, scene->start().streamRate, scene->metrics);
+  mailbox_->subscribe(known ? nullptr : description, scene->shape(), scene->metrics,
+                      {joining->quality, joining->temporalLayers});
   if (scene->paused && !mailbox_->announce(pausedNotice(*scene)))
     return closeLocked(tooSlow(), Parting::lost);
   if (scene->source && !mailbox_->announce(playbackMessage(*scene->source)))

@@ -49,7 +49,9 @@ std::string table(const std::string& scene, const SceneMetrics& m) {
                      {"bytes", m.packetBytes.value()},
                      {"skipped", m.skippedFrames.value()},
                      {"taken", m.framesTaken.value()},
-                     {"dropped", m.framesDropped.value()}});
+                     {"dropped", m.framesDropped.value()},
+                     {"thinned", m.framesThinned.value()}});
+  addCounters(text, {{"steps down", m.stepsDown.value()}, {"steps up", m.stepsUp.value()}});
   addCounters(text, {{"joins", m.joins.value()}, {"rejected messages", m.rejectedMessages.value()}});
   return text;
 }

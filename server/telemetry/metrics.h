@@ -38,9 +38,12 @@ struct SceneMetrics {
   Counter frames;            // packets made
   Counter keyFrames;         // of these
   Counter packetBytes;       // of these, counted once whoever listens
-  Counter skippedFrames;     // not recorded: the encoder was behind
+  Counter skippedFrames;     // not recorded, each quality's: the encoder was behind
   Counter framesTaken;       // by doors, each subscriber's
   Counter framesDropped;     // not sent to a subscriber that was behind, each subscriber's
+  Counter framesThinned;     // of temporal layers that a subscriber is not sent, each subscriber's
+  Counter stepsDown;         // of subscribers to fewer layers or a coarser quality
+  Counter stepsUp;           // and back
   Counter rollbacks;         // to the last good state
   Counter resets;            // to the start
   Counter crowdedBalls;      // of self-collision: lists too long, and balls that touch too many others

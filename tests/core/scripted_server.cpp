@@ -23,9 +23,15 @@ ScriptedServer::ScriptedServer(ScriptedStream stream) : stream_(std::move(stream
   layout_.codec = codec::kCodecHierarchical;
   for (const ClothSize& cloth : stream_.cloths)
     layout_.cloths.push_back({cloth.rows * cloth.columns, cloth.rows, cloth.columns});
-  encoder_ = codec::Encoder::make(layout_);
-  if (!encoder_) throw std::invalid_argument("no stream can have this layout");
+  layout_.temporalLayers = stream_.temporalLayers;
+  layout_.qualities = stream_.qualities;
+  goTo(0);
   pose(0);
+}
+
+void ScriptedServer::goTo(std::uint8_t quality) {
+  encoder_ = codec::Encoder::make(layout_, {.quality = quality});
+  if (!encoder_) throw std::invalid_argument("no stream can have this layout");
 }
 
 void ScriptedServer::pose(std::uint64_t tick) {
@@ -67,6 +73,8 @@ v1::StreamDescription ScriptedServer::description() const {
   description.set_max_error(layout_.maxError);
   description.set_normals(stream_.normals == codec::NormalMode::none ? v1::NORMALS_NONE
                                                                      : v1::NORMALS_OCTAHEDRAL);
+  description.set_temporal_layers(stream_.temporalLayers);
+  description.set_qualities(stream_.qualities);
   std::size_t first = 0;
   for (const ClothSize& size : stream_.cloths) {
     v1::ClothDescription& cloth = *description.add_cloths();
@@ -150,6 +158,13 @@ std::string ScriptedServer::frame(std::uint64_t tick, codec::PacketKind kind) {
 std::string ScriptedServer::serialise(const v1::Frame& frame) {
   v1::ServerMessage message;
   *message.mutable_frame() = frame;
+  return serialised(message);
+}
+
+std::string ScriptedServer::operatingPoint(std::uint32_t quality, std::uint32_t temporalLayers) {
+  v1::ServerMessage message;
+  message.mutable_operating_point()->set_quality(quality);
+  message.mutable_operating_point()->set_temporal_layers(temporalLayers);
   return serialised(message);
 }
 

@@ -24,6 +24,7 @@ struct ScriptedStream {
   std::uint32_t simulationRate = 72, streamRate = 72;
   codec::NormalMode normals = codec::NormalMode::none;
   std::vector<ClothSize> cloths{{"curtain", 9, 7}};
+  std::uint8_t temporalLayers = 1, qualities = 1;
 };
 
 // Bytes are serialised ServerMessages.
@@ -37,12 +38,15 @@ class ScriptedServer {
   std::vector<std::string> chunks(std::size_t pieceBytes = 256 * 1024, std::uint64_t contentId = 1) const;
   // Of one tick, which must grow from call to call.
   std::string frame(std::uint64_t tick, codec::PacketKind kind = codec::PacketKind::predicted);
+  // Frames of this quality from now on; the next is to be a key frame.
+  void goTo(std::uint8_t quality);
   v1::Frame frameMessage(std::uint64_t tick, codec::PacketKind kind);
 
   // What was encoded last.
   const std::vector<float>& positions() const { return positions_; }
 
   static std::string serialise(const v1::Frame& frame);
+  static std::string operatingPoint(std::uint32_t quality, std::uint32_t temporalLayers);
   static std::string pong(std::uint64_t clientTimeUs, std::uint64_t serverTimeUs);
   static std::string error(v1::ErrorCode code, const std::string& text, bool fatal);
 

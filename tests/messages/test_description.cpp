@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: MIT
 // Descriptions, collider states, chunks.
+#include <algorithm>
+#include <array>
 #include <cstring>
+#include <string_view>
 
 #include <gtest/gtest.h>
 
@@ -92,25 +95,30 @@ TEST(ToDescription, HasTheCollidersHullsTooAsTheyAreAtThatTime) {
   EXPECT_EQ(description.colliders(0).hull().faces(2).vertices_size(), 3);
 }
 
-TEST(ToChunks, CutContentThatCanBePutTogetherAgain) {
+TEST(ToChunk, CutsContentThatCanBePutTogetherAgain) {
   for (const std::size_t size : {std::size_t{0}, std::size_t{1}, limits::kMaxChunkBytes,
                                  limits::kMaxChunkBytes + 1, 3 * limits::kMaxChunkBytes - 5}) {
     std::string content(size, '\0');
     for (std::size_t i = 0; i < size; ++i) content[i] = static_cast<char>(i * 31 >> 3);
-    const std::vector<v1::Chunk> chunks = toChunks(9, v1::CONTENT_KIND_STREAM_DESCRIPTION, content);
-    EXPECT_EQ(chunks.size(),
-              std::max<std::size_t>(1, (size + limits::kMaxChunkBytes - 1) / limits::kMaxChunkBytes));
-    std::string together;
-    for (std::size_t i = 0; i < chunks.size(); ++i) {
-      EXPECT_EQ(chunks[i].content_id(), 9u);
-      EXPECT_EQ(chunks[i].kind(), v1::CONTENT_KIND_STREAM_DESCRIPTION);
-      EXPECT_EQ(chunks[i].index(), i);
-      EXPECT_EQ(chunks[i].count(), chunks.size());
-      EXPECT_EQ(chunks[i].total_bytes(), size);
-      EXPECT_LE(chunks[i].data().size(), limits::kMaxChunkBytes);
-      together += chunks[i].data();
+    for (const std::size_t cut : {std::size_t{0}, size / 3, size}) {
+      const std::string_view whole = content;
+      const std::array parts{whole.substr(0, cut), whole.substr(cut)};
+      const std::size_t count = chunkCount(size);
+      EXPECT_EQ(count,
+                std::max<std::size_t>(1, (size + limits::kMaxChunkBytes - 1) / limits::kMaxChunkBytes));
+      std::string together;
+      for (std::size_t i = 0; i < count; ++i) {
+        const v1::Chunk chunk = toChunk(9, v1::CONTENT_KIND_STREAM_DESCRIPTION, parts, i);
+        EXPECT_EQ(chunk.content_id(), 9u);
+        EXPECT_EQ(chunk.kind(), v1::CONTENT_KIND_STREAM_DESCRIPTION);
+        EXPECT_EQ(chunk.index(), i);
+        EXPECT_EQ(chunk.count(), count);
+        EXPECT_EQ(chunk.total_bytes(), size);
+        EXPECT_LE(chunk.data().size(), limits::kMaxChunkBytes);
+        together += chunk.data();
+      }
+      EXPECT_EQ(together, content);
     }
-    EXPECT_EQ(together, content);
   }
 }
 

@@ -110,7 +110,8 @@ constexpr const char* kEveryField = R"json({
                          "orientation": {"x": 0.5, "y": 0.5, "z": -0.5, "w": 0.5}}],
                "steady": true}
   }],
-  "stream": {"maxError": 0.001, "normals": "NORMALS_OCTAHEDRAL", "coding": "CODING_PACKED"}
+  "stream": {"maxError": 0.001, "normals": "NORMALS_OCTAHEDRAL", "coding": "CODING_PACKED",
+             "temporalLayers": 2, "qualities": 4}
 })json";
 
 using Names = std::set<std::string>;

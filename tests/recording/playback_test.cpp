@@ -50,10 +50,10 @@ struct Seen {
 // Takes and acknowledges all that it is sent at once.
 class Viewer {
  public:
-  explicit Viewer(stream::LiveScene& scene)
+  explicit Viewer(stream::LiveScene& scene, std::uint8_t layers = codec::kMaxTemporalLayers)
       : scene_(scene), mailbox_(std::make_shared<stream::Mailbox>([] {})) {
     EXPECT_EQ(scene.audience.join(mailbox_, 10), stream::Audience::Joining::joined);
-    mailbox_->subscribe(scene.description(), scene.start().streamRate, scene.metrics);
+    mailbox_->subscribe(scene.description(), scene.shape(), scene.metrics, {.quality = 0, .layers = layers});
     read(Clock::time_point{});
   }
   ~Viewer() { scene_.audience.leave(*mailbox_); }
@@ -87,7 +87,11 @@ class Viewer {
 
   stream::LiveScene& scene_;
   std::shared_ptr<stream::Mailbox> mailbox_;
-  std::unique_ptr<codec::Decoder> decoder_ = codec::Decoder::make(sampleLayout());
+  std::unique_ptr<codec::Decoder> decoder_ = [] {
+    codec::StreamLayout layout = sampleLayout();
+    layout.temporalLayers = codec::kMaxTemporalLayers;
+    return codec::Decoder::make(layout);
+  }();
 };
 
 class PlaybackTest : public ::testing::Test {
@@ -145,6 +149,20 @@ class PlaybackTest : public ::testing::Test {
   std::unique_ptr<Viewer> viewer;
   Clock::time_point now = Clock::now();
 };
+
+TEST_F(PlaybackTest, LayersAreLeftOutForWhoWantsFewer) {
+  play(sampleRecording(kFrames, 3));
+  Viewer base(*scene, 1);
+  join();
+  for (double time = 0; time < 1; time += 0.001) {
+    step(0.001);
+    viewer->read(now);
+    base.read(now);
+  }
+  EXPECT_GT(viewer->frames.size(), 55u);
+  EXPECT_GT(base.frames.size(), viewer->frames.size() / 5);
+  EXPECT_LT(base.frames.size(), viewer->frames.size() / 3);
+}
 
 TEST_F(PlaybackTest, EveryFrameComesWhenItIsDueAsItWasRecorded) {
   play();

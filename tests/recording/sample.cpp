@@ -30,7 +30,7 @@ const codec::StreamLayout& sampleLayout() {
   return kLayout;
 }
 
-v1::StreamDescription sampleDescription() {
+v1::StreamDescription sampleDescription(std::uint8_t layers) {
   v1::StreamDescription description;
   description.set_epoch(kLayout.epoch);
   description.set_codec(kLayout.codec);
@@ -38,6 +38,7 @@ v1::StreamDescription sampleDescription() {
   description.set_simulation_rate(kSampleRate);
   description.set_stream_rate(kSampleRate);
   description.set_max_error(kLayout.maxError);
+  description.set_temporal_layers(layers);
   v1::ClothDescription& cloth = *description.add_cloths();
   cloth.set_name("sheet");
   cloth.set_vertex_count(42);
@@ -48,11 +49,13 @@ v1::StreamDescription sampleDescription() {
   return description;
 }
 
-void writeSample(const Sink& sink, std::uint32_t frames) {
+void writeSample(const Sink& sink, std::uint32_t frames, std::uint8_t layers) {
   auto writer = RecordingWriter::begin(sink, "sample", {{"scene", "sample"}, {"device", "none"}});
   if (!writer) throw std::runtime_error(writer.error());
-  must(writer->write(Topic::description, sampleTime(0), sampleDescription().SerializeAsString()));
-  const auto encoder = codec::Encoder::make(kLayout);
+  must(writer->write(Topic::description, sampleTime(0), sampleDescription(layers).SerializeAsString()));
+  codec::StreamLayout layout = kLayout;
+  layout.temporalLayers = layers;
+  const auto encoder = codec::Encoder::make(layout);
   std::vector<std::byte> packet(encoder->packetBound());
   v1::ServerMessage message;
   v1::RecordedTick tick;
@@ -72,14 +75,14 @@ void writeSample(const Sink& sink, std::uint32_t frames) {
   must(writer->finish());
 }
 
-std::string sampleRecording(std::uint32_t frames) {
+std::string sampleRecording(std::uint32_t frames, std::uint8_t layers) {
   std::string bytes;
   writeSample(
       [&](std::string_view more) {
         bytes += more;
         return Written();
       },
-      frames);
+      frames, layers);
   return bytes;
 }
 

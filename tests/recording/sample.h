@@ -18,13 +18,13 @@ constexpr std::uint64_t sampleTime(std::uint64_t frame) {
   return kSampleStart + frame * 1'000'000'000 / kSampleRate;
 }
 
-// Of its stream.
+// Of its stream, but that its description says how many temporal layers there are.
 const codec::StreamLayout& sampleLayout();
-v1::StreamDescription sampleDescription();
+v1::StreamDescription sampleDescription(std::uint8_t layers = 1);
 
 // Of so many frames, with ticks beside them. As its sink got it.
-void writeSample(const Sink& sink, std::uint32_t frames);
-std::string sampleRecording(std::uint32_t frames);
+void writeSample(const Sink& sink, std::uint32_t frames, std::uint8_t layers = 1);
+std::string sampleRecording(std::uint32_t frames, std::uint8_t layers = 1);
 
 // Fails where the bytes cannot be opened.
 RecordingReader readerOf(std::string bytes, CutFiles cutFiles = CutFiles::refused);

@@ -155,7 +155,7 @@ TEST_F(SceneJournalTest, EverybodyIsToldWhenItBeginsAndEnds) {
   std::vector<v1::NoticeKind> kinds;
   const auto mailbox = std::make_shared<stream::Mailbox>([] {});
   ASSERT_EQ(live->audience.join(mailbox, 5), stream::Audience::Joining::joined);
-  mailbox->subscribe(live->description(), 40, live->metrics);
+  mailbox->subscribe(live->description(), live->shape(), live->metrics);
   const auto read = [&] {
     while (const auto bytes = mailbox->next(now)) {
       v1::ServerMessage message;

@@ -344,6 +344,87 @@ TEST_F(JoinTest, AFullSceneAndAFullServerSaySo) {
   fifth.join();
 }
 
+// Of a scene whose stream has layers and qualities.
+class QualityTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    scene::Scene scene = tests::smallScene();
+    scene.stream.temporalLayers = 2;
+    scene.stream.qualities = 3;
+    ServerOptions options;
+    options.defaultScene = "small";
+    try {
+      server = std::make_unique<SceneServer>(std::vector{scene}, options);
+    } catch (const vulkan::DeviceError& error) {
+      GTEST_SKIP() << error.what();
+    }
+  }
+  static v1::Hello wanting(std::uint32_t quality, std::optional<std::uint32_t> layer = {}) {
+    v1::Hello hello;
+    hello.set_quality(quality);
+    if (layer) hello.set_temporal_layer(*layer);
+    return hello;
+  }
+  telemetry::SceneMetrics& metrics() { return server->state().scenes.front()->metrics; }
+
+  std::unique_ptr<SceneServer> server;
+};
+
+TEST_F(QualityTest, EverybodyGetsTheQualityThatTheyAskFor) {
+  TestPeer fine(*server), coarse(*server), coarser(*server);
+  fine.hello(wanting(0));
+  coarse.hello(wanting(1));
+  coarser.hello(wanting(3));  // more than there is
+  for (int i = 0; i < 10; ++i)
+    for (TestPeer* peer : {&fine, &coarse, &coarser}) peer->readFrames(1);
+  EXPECT_EQ(fine.description().qualities(), 3u);
+  EXPECT_EQ(fine.description().temporal_layers(), 2u);
+  std::uint8_t quality = 0;
+  for (const TestPeer* peer : {&fine, &coarse, &coarser}) {
+    EXPECT_EQ(peer->frames().front().quality, quality);
+    // A test on a busy machine may be a slow link.
+    for (const SeenFrame& frame : peer->frames()) EXPECT_GE(frame.quality, quality);
+    ++quality;
+  }
+}
+
+TEST_F(QualityTest, LayersThatAreNotWantedAreLeftOut) {
+  TestPeer peer(*server);
+  peer.hello(wanting(0, 0));
+  peer.readFrames(10);
+  for (const SeenFrame& frame : peer.frames()) EXPECT_EQ(frame.layer, 0);
+  EXPECT_GE(metrics().framesThinned.value(), 5u);
+}
+
+TEST_F(QualityTest, WhatNoStreamHasIsRefused) {
+  TestPeer quality(*server), layer(*server);
+  quality.hello(wanting(4));
+  const v1::Error error = quality.readToTheEnd().error();
+  EXPECT_EQ(error.code(), v1::ERROR_CODE_INVALID_ARGUMENT);
+  EXPECT_THAT(error.text(), HasSubstr("hello.quality = 4"));
+  layer.hello(wanting(0, 3));
+  EXPECT_THAT(layer.readToTheEnd().error().text(), HasSubstr("hello.temporalLayer = 3"));
+}
+
+TEST_F(QualityTest, WhoDoesNotAcknowledgeGetsACoarserQualityAndTheFinestAgain) {
+  TestPeer other(*server), slow(*server);
+  other.hello(wanting(0));
+  slow.hello(wanting(0));
+  other.readFrames(1);
+  slow.readFrames(1);
+  slow.acknowledges = false;
+  other.readFrames(60);
+  slow.acknowledges = true;
+  v1::ClientMessage ack;
+  ack.mutable_frame_ack()->set_tick(slow.frames().back().tick);
+  slow.send(ack);
+  slow.readUntil([&](const v1::ServerMessage&) { return slow.frames().back().quality == 2; });
+  slow.readUntil([&](const v1::ServerMessage&) { return slow.frames().back().quality == 0; });
+  slow.readUntil([&](const v1::ServerMessage&) { return slow.frames().back().layer == 1; });
+  EXPECT_GE(metrics().stepsDown.value(), 1u);
+  EXPECT_GE(metrics().stepsUp.value(), 3u);
+}
+
 TEST_F(JoinTest, AServerThatStopsSaysSoToEverybody) {
   START();
   TestPeer joined(server()), stranger(server());

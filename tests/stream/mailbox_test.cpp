@@ -8,6 +8,8 @@
 
 #include <gtest/gtest.h>
 
+#include "proto/codec/temporal_layers.h"
+
 namespace clothstream::stream {
 namespace {
 
@@ -23,12 +25,14 @@ class MailboxTest : public ::testing::Test {
 
   // Description of one chunk, which is taken at once.
   void join() {
-    auto description = std::make_shared<Description>();
-    description->chunks.push_back(bytes(1));
-    mailbox.subscribe(description, 72, metrics);
+    mailbox.subscribe(description(1), shape, metrics);
     ASSERT_TRUE(mailbox.next(now));
     ASSERT_FALSE(mailbox.next(now));
   }
+  static std::shared_ptr<const Description> description(std::size_t bytes) {
+    return std::make_shared<const Description>(1, std::make_shared<const std::string>(bytes, 'g'), "rest");
+  }
+  bool wantsKeyFrame() { return mailbox.wishes(now).keys != 0; }
   PublishedFrame frame(std::uint64_t tick, bool key = false) {
     return {.message = bytes(100), .tick = tick, .key = key, .referenceTick = tick - 1, .complete = now};
   }
@@ -41,6 +45,7 @@ class MailboxTest : public ::testing::Test {
     return ticks;
   }
 
+  StreamShape shape{.rate = 72};
   Clock::time_point now = Clock::time_point(std::chrono::hours(1));
   telemetry::SceneMetrics metrics;
   int wakes = 0;
@@ -50,22 +55,22 @@ class MailboxTest : public ::testing::Test {
 using Ticks = std::vector<std::uint64_t>;
 
 TEST_F(MailboxTest, GivesAnswersThenTheDescriptionThenAnnouncementsThenFrames) {
-  const SharedBytes welcome = bytes(1), chunk = bytes(2), second = bytes(3), told = bytes(4), pong = bytes(5);
+  const SharedBytes welcome = bytes(1), told = bytes(4), pong = bytes(5);
   ASSERT_TRUE(mailbox.reply(welcome));
-  auto description = std::make_shared<Description>();
-  description->chunks = {chunk, second};
-  mailbox.subscribe(description, 72, metrics);
+  const auto content = description(256 * 1024);
+  ASSERT_EQ(content->chunks(), 2u);
+  mailbox.subscribe(content, shape, metrics);
   ASSERT_TRUE(mailbox.announce(told));
-  EXPECT_FALSE(mailbox.wantsKeyFrame());
+  EXPECT_FALSE(wantsKeyFrame());
   mailbox.deliver(frame(1, true));  // before the description is out, a frame would be of no use
   EXPECT_EQ(mailbox.next(now), welcome);
-  EXPECT_EQ(mailbox.next(now), chunk);
+  EXPECT_EQ(**mailbox.next(now), *content->chunk(0));
   ASSERT_TRUE(mailbox.reply(pong));
   EXPECT_EQ(mailbox.next(now), pong);
-  EXPECT_EQ(mailbox.next(now), second);
+  EXPECT_EQ(**mailbox.next(now), *content->chunk(1));
   EXPECT_EQ(mailbox.next(now), told);
   EXPECT_FALSE(mailbox.next(now));
-  EXPECT_TRUE(mailbox.wantsKeyFrame());
+  EXPECT_TRUE(wantsKeyFrame());
   const PublishedFrame key = frame(2, true);
   mailbox.deliver(key);
   EXPECT_EQ(mailbox.next(now), key.message);
@@ -75,9 +80,9 @@ TEST_F(MailboxTest, StartsWithAKeyFrame) {
   join();
   mailbox.deliver(frame(5));
   EXPECT_FALSE(mailbox.next(now));
-  EXPECT_TRUE(mailbox.wantsKeyFrame());
+  EXPECT_TRUE(wantsKeyFrame());
   mailbox.deliver(frame(6, true));
-  EXPECT_FALSE(mailbox.wantsKeyFrame());
+  EXPECT_FALSE(wantsKeyFrame());
   EXPECT_TRUE(mailbox.next(now));
 }
 
@@ -154,12 +159,12 @@ TEST_F(MailboxTest, WhoDoesNotReadHoldsNothingAndAsksForNothing) {
   for (std::uint64_t tick = 1; tick <= 20; ++tick) {
     mailbox.deliver(frames.emplace_back(frame(tick, tick == 1)));
     // There is room, and three frames were held at most: but the door has not come to ask since it was woken.
-    EXPECT_FALSE(mailbox.wantsKeyFrame());
+    EXPECT_FALSE(wantsKeyFrame());
   }
   EXPECT_EQ(metrics.framesDropped.value(), 20u);
   for (const PublishedFrame& each : frames) EXPECT_EQ(each.message.use_count(), 1) << each.tick;
   EXPECT_FALSE(mailbox.next(now));
-  EXPECT_TRUE(mailbox.wantsKeyFrame());
+  EXPECT_TRUE(wantsKeyFrame());
 }
 
 TEST_F(MailboxTest, HoldsBackAsManyFramesAsItSaysAndNoMore) {
@@ -175,9 +180,9 @@ TEST_F(MailboxTest, HoldsBackAsManyFramesAsItSaysAndNoMore) {
   mailbox.deliver(frames.emplace_back(frame(6)));
   for (const PublishedFrame& each : frames) EXPECT_EQ(each.message.use_count(), 1) << each.tick;
   EXPECT_EQ(metrics.framesDropped.value(), 4u);
-  EXPECT_FALSE(mailbox.wantsKeyFrame());
+  EXPECT_FALSE(wantsKeyFrame());
   ASSERT_TRUE(mailbox.acknowledge(2, now));
-  EXPECT_TRUE(mailbox.wantsKeyFrame());
+  EXPECT_TRUE(wantsKeyFrame());
   EXPECT_EQ(taken(frames), Ticks{});
   mailbox.deliver(frames.emplace_back(frame(7, true)));
   EXPECT_EQ(taken(frames), Ticks{7});
@@ -196,7 +201,7 @@ TEST_F(MailboxTest, GivesOnlyFramesWhoseReferenceItGaveBefore) {
     (void)mailbox.acknowledge(each.tick, now);
   }
   EXPECT_EQ(taken(frames), Ticks{});
-  EXPECT_TRUE(mailbox.wantsKeyFrame());
+  EXPECT_TRUE(wantsKeyFrame());
 }
 
 TEST_F(MailboxTest, AKeyFrameReplacesWhatIsHeld) {
@@ -218,7 +223,7 @@ TEST_F(MailboxTest, WhoCannotDecodeStartsAnewWithAKeyFrame) {
   for (const PublishedFrame& each : frames) mailbox.deliver(each);
   EXPECT_EQ(taken(frames), (Ticks{1, 2}));
   mailbox.restart();
-  EXPECT_TRUE(mailbox.wantsKeyFrame());
+  EXPECT_TRUE(wantsKeyFrame());
   EXPECT_EQ(taken(frames), Ticks{});
   mailbox.deliver(frames.emplace_back(frame(4)));
   mailbox.deliver(frames.emplace_back(frame(5, true)));
@@ -229,22 +234,22 @@ TEST_F(MailboxTest, WhoWantsAKeyFrameEarlyGetsWhatThereIsUntilThen) {
   join();
   std::vector<PublishedFrame> frames{frame(1, true), frame(2), frame(3)};
   mailbox.deliver(frames[0]);
-  EXPECT_FALSE(mailbox.wantsKeyFrame());
+  EXPECT_FALSE(wantsKeyFrame());
   mailbox.wantKeyFrame();
-  EXPECT_TRUE(mailbox.wantsKeyFrame());
+  EXPECT_TRUE(wantsKeyFrame());
   mailbox.deliver(frames[1]);
-  EXPECT_TRUE(mailbox.wantsKeyFrame());
+  EXPECT_TRUE(wantsKeyFrame());
   EXPECT_EQ(taken(frames), (Ticks{1, 2}));
   ASSERT_TRUE(mailbox.acknowledge(2, now));
   mailbox.deliver(frames.emplace_back(frame(4, true)));
-  EXPECT_FALSE(mailbox.wantsKeyFrame());
+  EXPECT_FALSE(wantsKeyFrame());
   EXPECT_EQ(taken(frames), Ticks{4});
 }
 
 TEST_F(MailboxTest, HasRoomForABoundedAmountOfControl) {
   std::size_t accepted = 0;
   while (mailbox.reply(bytes(1024))) ++accepted;
-  EXPECT_EQ(accepted, Mailbox::kMaxControlBytes / 1024);
+  EXPECT_EQ(accepted, Mailbox::kMaxControlBytes / (1024 + Mailbox::kMessageOverhead));
   ASSERT_TRUE(mailbox.next(now));
   EXPECT_TRUE(mailbox.reply(bytes(1024)));
 }
@@ -252,6 +257,71 @@ TEST_F(MailboxTest, HasRoomForABoundedAmountOfControl) {
 TEST_F(MailboxTest, TakesOneMessageLargerThanItsBound) {
   EXPECT_TRUE(mailbox.reply(bytes(Mailbox::kMaxControlBytes * 2)));
   EXPECT_FALSE(mailbox.reply(bytes(1)));
+}
+
+TEST_F(MailboxTest, HoldsABoundedAmountOfBytes) {
+  join();
+  const auto large = [&](std::uint64_t tick, std::size_t size) {
+    PublishedFrame made = frame(tick, tick == 1);
+    made.message = bytes(size);
+    return made;
+  };
+  // One alone may be larger than the bound.
+  std::vector<PublishedFrame> frames{large(1, 2 * Mailbox::kMaxHeldBytes), large(2, 1)};
+  for (const PublishedFrame& each : frames) mailbox.deliver(each);
+  EXPECT_EQ(frames[0].message.use_count(), 1);
+  EXPECT_EQ(metrics.framesDropped.value(), 2u);
+  frames = {large(1, Mailbox::kMaxHeldBytes / 2), large(2, Mailbox::kMaxHeldBytes / 2), large(3, 1)};
+  for (const PublishedFrame& each : frames) mailbox.deliver(each);
+  for (const PublishedFrame& each : frames) EXPECT_EQ(each.message.use_count(), 1) << each.tick;
+  EXPECT_EQ(metrics.framesDropped.value(), 5u);
+}
+
+TEST_F(MailboxTest, OfLayersTheHighestGoFirstAndNoReferenceIsBroken) {
+  shape.layers = 3;
+  join();
+  // Ticks from 1 on, of layers 0 2 1 2; who reads nothing holds three.
+  const auto layered = [&](std::uint64_t tick) {
+    PublishedFrame made = frame(tick, tick == 1);
+    made.layer = codec::layerOf(tick - 1, 3);
+    made.referenceTick = made.layer == 0 ? tick - 4 : made.layer == 1 ? tick - 2 : tick - 1;
+    return made;
+  };
+  std::vector<PublishedFrame> frames;
+  for (std::uint64_t tick = 1; tick <= 4; ++tick) mailbox.deliver(frames.emplace_back(layered(tick)));
+  // 4 is itself of the highest layer; 5, of the base, makes 2 go.
+  mailbox.deliver(frames.emplace_back(layered(5)));
+  EXPECT_EQ(metrics.framesDropped.value(), 2u);
+  EXPECT_EQ(taken(frames), (Ticks{1, 3}));
+  ASSERT_TRUE(mailbox.acknowledge(3, now));
+  EXPECT_EQ(taken(frames), Ticks{5});
+  EXPECT_FALSE(wantsKeyFrame());
+}
+
+TEST_F(MailboxTest, GivesTheLayersAndTheQualityThatAreWantedAndSaysSo) {
+  shape = {.rate = 72, .layers = 3, .qualities = 2};
+  mailbox.subscribe(nullptr, shape, metrics, {.quality = 1, .layers = 1});
+  EXPECT_FALSE(mailbox.next(now));
+  EXPECT_EQ(mailbox.wishes(now).keys, 0b10);
+  mailbox.deliver(frame(1, true));  // of quality 0
+  EXPECT_FALSE(mailbox.next(now));
+  PublishedFrame wanted = frame(2, true);
+  wanted.quality = 1;
+  mailbox.deliver(wanted);
+  v1::ServerMessage told;
+  const auto first = mailbox.next(now);
+  ASSERT_TRUE(first && told.ParseFromArray((*first)->data(), static_cast<int>((*first)->size())));
+  EXPECT_EQ(told.operating_point().quality(), 1u);
+  EXPECT_EQ(told.operating_point().temporal_layers(), 1u);
+  EXPECT_EQ(mailbox.next(now), wanted.message);
+  PublishedFrame upper = frame(3);
+  upper.quality = upper.layer = 1;
+  mailbox.deliver(upper);
+  EXPECT_FALSE(mailbox.next(now));
+  EXPECT_EQ(metrics.framesThinned.value(), 1u);
+  const FrameWishes wishes = mailbox.wishes(now);
+  EXPECT_EQ(wishes.qualities, 0b10);
+  EXPECT_EQ(wishes.keys, 0);
 }
 
 TEST_F(MailboxTest, ClosedItGivesItsLastWordAndTakesNothingMore) {

@@ -97,7 +97,7 @@ TEST(Roles, AViewerMayAskToBeToldOfContacts) {
 // ---- The roster
 
 struct Member {
-  Member() { mailbox->subscribe(nullptr, 40, *metrics); }
+  Member() { mailbox->subscribe(nullptr, {.rate = 40}, *metrics); }
 
   std::vector<v1::ServerMessage> read() {
     std::vector<v1::ServerMessage> messages;

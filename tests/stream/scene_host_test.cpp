@@ -40,7 +40,7 @@ class HostedScene {
     for (std::size_t i = 0; i < subscribers; ++i) {
       mailboxes.push_back(std::make_shared<Mailbox>([] {}));
       EXPECT_EQ(live.audience.join(mailboxes.back(), 100), Audience::Joining::joined);
-      mailboxes.back()->subscribe(live.description(), live.start().streamRate, live.metrics);
+      mailboxes.back()->subscribe(live.description(), live.shape(), live.metrics);
       while (mailboxes.back()->next(now)) {
       }
     }
@@ -112,6 +112,88 @@ TEST_F(SceneHostTest, StreamsAFrameATickBeginningWithAKeyFrame) {
   EXPECT_EQ(hosted.live.metrics.frames.value(), 20u);
   EXPECT_EQ(hosted.live.metrics.keyFrames.value(), 1u);
   EXPECT_EQ(hosted.live.metrics.ticks.value(), 20u);
+}
+
+// Another subscriber of a hosted scene, which wants a quality of its own.
+class QualitySubscriber {
+ public:
+  QualitySubscriber(HostedScene& hosted, std::uint8_t quality)
+      : hosted_(hosted),
+        decoder_(codec::Decoder::make(encode::streamLayout(hosted.live.start(), LiveScene::kEpoch))) {
+    EXPECT_EQ(hosted.live.audience.join(mailbox_, 100), Audience::Joining::joined);
+    mailbox_->subscribe(nullptr, hosted.live.shape(), hosted.live.metrics, {quality, 1});
+    read();
+  }
+  ~QualitySubscriber() { hosted_.live.audience.leave(*mailbox_); }
+
+  // Decodes what came, and compares it with what the server holds.
+  void read() {
+    while (const auto message = mailbox_->next(hosted_.now)) {
+      v1::ServerMessage parsed;
+      ASSERT_TRUE(parsed.ParseFromArray((*message)->data(), static_cast<int>((*message)->size())));
+      if (!parsed.has_frame()) continue;
+      const auto packet = std::as_bytes(std::span(parsed.frame().packet()));
+      ASSERT_EQ(decoder_->decode(packet), codec::DecodeResult::ok);
+      EXPECT_EQ(decoder_->reconstructionHash(), parsed.frame().reconstruction_hash());
+      qualities.push_back(codec::parsePacket(packet)->header.quality);
+      ASSERT_TRUE(mailbox_->acknowledge(decoder_->tick(), hosted_.now));
+    }
+  }
+
+  std::vector<std::uint8_t> qualities;  // of the frames that came
+
+ private:
+  HostedScene& hosted_;
+  std::shared_ptr<Mailbox> mailbox_ = std::make_shared<Mailbox>([] {});
+  std::unique_ptr<codec::Decoder> decoder_;
+};
+
+TEST_F(SceneHostTest, EncodesEachQualityThatSomebodyGetsOnce) {
+  scene::Scene scene = smallScene();
+  scene.stream.qualities = 3;
+  HostedScene hosted(std::move(scene));
+  const auto packets = [&] { return hosted.live.metrics.frames.value(); };
+  hosted.ticks(5);
+  EXPECT_EQ(packets(), 5u);
+  {
+    QualitySubscriber first(hosted, 1), second(hosted, 1);
+    // Its encoder is made meanwhile.
+    for (const auto end = Clock::now() + std::chrono::seconds(60);
+         first.qualities.empty() && Clock::now() < end;) {
+      hosted.tick();
+      first.read();
+      second.read();
+    }
+    const std::uint64_t before = packets();
+    const std::size_t seen = first.qualities.size();
+    for (int i = 0; i < 10; ++i) {
+      hosted.tick();
+      first.read();
+      second.read();
+    }
+    EXPECT_EQ(packets() - before, 20u);
+    EXPECT_EQ(first.qualities.size() - seen, 10u);
+    EXPECT_EQ(second.qualities, first.qualities);
+    EXPECT_EQ(std::ranges::count(first.qualities, 1), static_cast<std::ptrdiff_t>(first.qualities.size()));
+  }
+  const std::uint64_t before = packets();
+  hosted.ticks(5);
+  EXPECT_EQ(packets() - before, 5u);
+  EXPECT_EQ(std::count(hosted.keys.begin(), hosted.keys.end(), true), 1);
+}
+
+TEST_F(SceneHostTest, WhereNobodyGetsTheFinestQualityItIsNotEncoded) {
+  scene::Scene scene = smallScene();
+  scene.stream.qualities = 2;
+  HostedScene hosted(std::move(scene), 0);
+  QualitySubscriber only(hosted, 1);
+  for (const auto end = Clock::now() + std::chrono::seconds(60);
+       only.qualities.size() < 10 && Clock::now() < end;) {
+    hosted.tick();
+    only.read();
+  }
+  EXPECT_EQ(hosted.live.metrics.frames.value(), only.qualities.size());
+  EXPECT_EQ(only.qualities, std::vector<std::uint8_t>(10, 1));
 }
 
 TEST_F(SceneHostTest, StreamsAtItsOwnRate) {

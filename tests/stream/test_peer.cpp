@@ -140,6 +140,8 @@ void TestPeer::seeChunk(const v1::Chunk& chunk) {
   layout.codec = static_cast<std::uint8_t>(description_.codec());
   layout.maxError = description_.max_error();
   layout.normals = octahedral ? codec::NormalMode::octahedral : codec::NormalMode::none;
+  layout.temporalLayers = static_cast<std::uint8_t>(description_.temporal_layers());
+  layout.qualities = static_cast<std::uint8_t>(description_.qualities());
   for (const v1::ClothDescription& cloth : description_.cloths())
     layout.cloths.push_back(
         {cloth.vertex_count(), cloth.rows(), cloth.columns(), numbersOf<std::uint32_t>(cloth.triangles()),
@@ -155,8 +157,11 @@ void TestPeer::seeFrame(const v1::Frame& frame, const stream::SharedBytes& bytes
   ASSERT_EQ(decoder_->decode(packet), codec::DecodeResult::ok);
   ASSERT_EQ(decoder_->reconstructionHash(), frame.reconstruction_hash());
   EXPECT_LE(frame.tick_time_us(), frame.packet_time_us());
+  const codec::PacketHeader header = codec::parsePacket(packet)->header;
   frames_.push_back({.tick = decoder_->tick(),
-                     .key = codec::parsePacket(packet)->header.kind == codec::PacketKind::key,
+                     .key = header.kind == codec::PacketKind::key,
+                     .quality = header.quality,
+                     .layer = header.temporalLayer,
                      .stateHash = frame.state_hash(),
                      .message = bytes,
                      .colliders = {frame.colliders().begin(), frame.colliders().end()}});

@@ -24,6 +24,7 @@ scene::Scene sheet(std::string name, std::uint32_t side) {
   scene::Scene scene;
   scene.name = std::move(name);
   scene.simulationRate = scene.streamRate = 30;
+  scene.stream.qualities = 1;  // so that who reads slowly gets what others get
   scene.cloths = {cloth};
   return scene;
 }

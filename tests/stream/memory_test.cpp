@@ -1,0 +1,143 @@
+// SPDX-License-Identifier: MIT
+// What a client that never reads can cost the server.
+#include <cstdio>
+#include <memory>
+#include <vector>
+
+#include <gtest/gtest.h>
+#include <malloc.h>
+
+#include "server/messages/limits.h"
+#include "tests/stream/server_test.h"
+
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#include <sanitizer/allocator_interface.h>
+#endif
+
+namespace clothstream::stream {
+namespace {
+
+using tests::TestPeer;
+
+// Promised a client, beside what it uploads.
+constexpr double kPromised = 4 << 20;
+
+double bytesAllocated() {
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+  return static_cast<double>(__sanitizer_get_current_allocated_bytes());
+#else
+  const struct mallinfo2 info = mallinfo2();
+  return static_cast<double>(info.uordblks + info.hblkhd);
+#endif
+}
+
+// A square of so many nodes an edge, which falls.
+scene::Scene squareOf(std::uint32_t edge) {
+  scene::Scene scene = tests::smallScene("large");
+  scene::Cloth& cloth = scene.cloths.front();
+  cloth.grid.rows = cloth.grid.columns = edge;
+  cloth.mass = 1e-4f * static_cast<float>(cloth.nodeCount());
+  cloth.pins.clear();
+  scene.streamRate = scene.simulationRate = 20;
+  scene.substeps = 1;
+  scene.stream.temporalLayers = 3;
+  scene.stream.qualities = 3;
+  return scene;
+}
+
+// All that a client may have the server keep for it.
+void sendAllThereIs(TestPeer& peer, int round) {
+  v1::ClientMessage ping;
+  ping.mutable_ping()->set_client_time_us(1);
+  v1::ClientMessage poses;
+  v1::ColliderPoses& moved = *poses.mutable_collider_poses();
+  moved.set_client_time_us(static_cast<std::uint64_t>(round) + 1);
+  for (std::uint32_t i = 0; i < messages::limits::kMaxParticipantColliders; ++i) {
+    v1::ParticipantCollider& collider = *moved.add_colliders();
+    collider.set_id(i);
+    collider.mutable_pose()->mutable_position()->set_x(100);
+    collider.mutable_sphere()->set_radius(0.1f);
+  }
+  moved.set_server_time_us(microseconds(Clock::now()));
+  v1::ClientMessage wind;
+  wind.mutable_parameter_change()->mutable_wind()->mutable_value()->set_x(0.001f * static_cast<float>(round));
+  v1::ClientMessage question;
+  question.mutable_get_scene()->set_name("large");
+  for (const v1::ClientMessage& message : {ping, poses, wind, question}) peer.send(message);
+}
+
+// Of clients that read nothing at all, or nothing any more after their first frame: what each then adds.
+class ClientThatDoesNotRead : public testing::TestWithParam<bool> {};
+INSTANTIATE_TEST_SUITE_P(Memory, ClientThatDoesNotRead, testing::Bool(),
+                         [](const auto& reads) { return reads.param ? "AnyMore" : "AtAll"; });
+
+TEST_P(ClientThatDoesNotRead, CostsAtMostWhatIsPromised) {
+  ServerOptions options;
+  options.defaultScene = "large";
+  std::unique_ptr<SceneServer> server;
+  try {
+    server = std::make_unique<SceneServer>(std::vector{squareOf(200)}, options);
+  } catch (const vulkan::DeviceError& error) {
+    GTEST_SKIP() << error.what();
+  }
+  TestPeer polite(*server);
+  polite.join();
+  polite.readFrames(20);
+
+  constexpr int kClients = 16, kRounds = 60;
+  std::vector<std::unique_ptr<TestPeer>> clients;
+  const auto add = [&] {
+    TestPeer& client = *clients.emplace_back(std::make_unique<TestPeer>(*server, "does not read"));
+    client.acknowledges = false;
+    return &client;
+  };
+  if (GetParam())
+    for (int i = 0; i < kClients; ++i) add()->join();
+  const double before = bytesAllocated();
+  // Each is promised another description, since the parameters are others.
+  if (!GetParam())
+    for (int i = 0; i < kClients; ++i) {
+      TestPeer& client = *add();
+      client.hello("large");
+      sendAllThereIs(client, 0);
+      polite.readFrames(1);
+    }
+  for (int round = 1; round < kRounds; ++round) {
+    for (const auto& client : clients) sendAllThereIs(*client, round);
+    polite.readFrames(1);
+  }
+  const double each = (bytesAllocated() - before) / kClients;
+  std::printf("a client that does not read: %.0f KiB\n", each / 1024);
+  EXPECT_LT(each, kPromised);
+}
+
+// The sum of the bounds, of frames and answers as large as they may be: nothing that a client sends or leaves
+// unread adds to it.
+TEST(Memory, AMailboxHoldsAtMostWhatItsBoundsSay) {
+  telemetry::SceneMetrics metrics;
+  constexpr int kMailboxes = 4;
+  std::vector<std::shared_ptr<Mailbox>> mailboxes;
+  const double before = bytesAllocated();
+  for (int i = 0; i < kMailboxes; ++i) {
+    const auto& mailbox = mailboxes.emplace_back(std::make_shared<Mailbox>([] {}));
+    mailbox->subscribe(nullptr, {.rate = 72}, metrics);
+    const auto message = [](std::size_t bytes) { return std::make_shared<std::vector<std::byte>>(bytes); };
+    // Small ones, which cost more than their bytes.
+    while (mailbox->reply(message(8))) {
+    }
+    while (mailbox->announce(message(8))) {
+    }
+    for (std::uint64_t tick = 1; tick < 100; ++tick)
+      mailbox->deliver({.message = message(Mailbox::kMaxHeldBytes / Mailbox::kMaxHeld),
+                        .tick = tick,
+                        .key = tick == 1 || tick % 10 == 0,
+                        .referenceTick = tick - 1,
+                        .complete = Clock::now()});
+  }
+  const double each = (bytesAllocated() - before) / kMailboxes;
+  std::printf("a full mailbox: %.0f KiB\n", each / 1024);
+  EXPECT_LE(each, 2.0 * Mailbox::kMaxControlBytes + Mailbox::kMaxHeldBytes + (64 << 10));
+}
+
+}  // namespace
+}  // namespace clothstream::stream
