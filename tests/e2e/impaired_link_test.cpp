@@ -6,7 +6,9 @@
 #include <cmath>
 #include <csignal>
 #include <cstdio>
+#include <filesystem>
 #include <functional>
+#include <iterator>
 #include <memory>
 #include <string>
 #include <thread>
@@ -14,6 +16,9 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <unistd.h>
 
 #include "clients/grpc/grpc_client.h"
 #include "tests/e2e/link.h"
@@ -39,10 +44,13 @@ class ImpairedLinkTest : public ::testing::Test {
     server_ = std::make_unique<Process>(std::vector<std::string>{CLOTHSTREAM_SERVER, "--port", "0",
                                                                  "--grpc-port", "0", "--scene", "small",
                                                                  "--scene-file", "tests/e2e/small.json"});
-    if (const auto line = server_->waitForLine("gRPC ", kPatience)) {
+    const auto page = server_->waitForLine("page ", kPatience),
+               line = server_->waitForLine("gRPC ", kPatience);
+    if (page && line) {
       address_ = line->substr(line->find_first_not_of(' '));
-      link_ = std::make_unique<Link>(
-          static_cast<std::uint16_t>(std::stoi(address_.substr(address_.rfind(':') + 1))));
+      port_ = portIn(address_);
+      webPort_ = portIn(page->substr(0, page->rfind('/')));
+      link_ = std::make_unique<Link>(port_);
       return;
     }
     server_->waitForEnd(kPatience);
@@ -56,6 +64,9 @@ class ImpairedLinkTest : public ::testing::Test {
     EXPECT_THAT(server_->errors(), ::testing::Not(::testing::HasSubstr("Validation")));
   }
 
+  static std::uint16_t portIn(const std::string& address) {
+    return static_cast<std::uint16_t>(std::stoi(address.substr(address.rfind(':') + 1)));
+  }
   std::unique_ptr<GrpcClient> join(const std::string& address) {
     auto joined = GrpcClient::join(address, {}, [this](cs_client*, std::uint32_t events) {
       if (events == 0) ++cuts_;
@@ -81,6 +92,7 @@ class ImpairedLinkTest : public ::testing::Test {
 
   std::unique_ptr<Process> server_;
   std::string address_;
+  std::uint16_t port_ = 0, webPort_ = 0;
   std::unique_ptr<Link> link_;
   std::atomic<int> cuts_{0};
 };
@@ -161,6 +173,46 @@ TEST_F(ImpairedLinkTest, WhoVanishesWithoutAWordIsNoticed) {
   }
   ASSERT_TRUE(streams(*watcher, 60));
   expectNothingWrong(statisticsOf(*watcher));
+}
+
+// A connection that is reset as soon as it stands.
+void knock(std::uint16_t port) {
+  const int knocking = socket(AF_INET, SOCK_STREAM, 0);
+  ASSERT_GE(knocking, 0);
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_port = htons(port);
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  EXPECT_EQ(connect(knocking, reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
+  const linger now{.l_onoff = 1, .l_linger = 0};
+  setsockopt(knocking, SOL_SOCKET, SO_LINGER, &now, sizeof now);
+  close(knocking);
+}
+
+TEST_F(ImpairedLinkTest, AThousandConnectionsASecondHarmNobody) {
+  constexpr int kKnocks = 3000;
+  const auto client = join(address_);
+  ASSERT_TRUE(streams(*client, 10));
+  const auto openFiles = [&] {
+    const std::filesystem::path files = "/proc/" + std::to_string(server_->id()) + "/fd";
+    return std::distance(std::filesystem::directory_iterator(files), {});
+  };
+  const auto before = openFiles();
+  for (const std::uint16_t port : {port_, webPort_}) {
+    const std::uint64_t frames = statisticsOf(*client).frames;
+    const auto start = Clock::now();
+    for (int i = 0; i < kKnocks; ++i) {
+      knock(port);
+      std::this_thread::sleep_until(start + i * 1ms);
+    }
+    const double seconds = std::chrono::duration<double>(Clock::now() - start).count();
+    std::printf("%.0f connections and resets a second; %.1f frames/s beside them\n", kKnocks / seconds,
+                static_cast<double>(statisticsOf(*client).frames - frames) / seconds);
+    ASSERT_TRUE(streams(*client, 10));
+  }
+  EXPECT_TRUE(eventually([&] { return openFiles() <= before; }));
+  expectNothingWrong(statisticsOf(*client));
+  EXPECT_EQ(cuts_, 0);
 }
 
 }  // namespace
