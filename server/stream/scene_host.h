@@ -31,8 +31,8 @@ namespace clothstream::stream {
 // goes bad twice within a second goes back to the start, parameters included.
 class SceneHost {
  public:
-  // Who goes on decoding a quality gets at most one key frame of it in this time, whoever asks: one serves all
-  // who wait.
+  // Who goes on decoding a quality gets at most one key frame of it in this time, whoever asks: one serves
+  // all who wait.
   static constexpr std::chrono::milliseconds kKeyFrameInterval{100};
 
   // With a journal, a key frame comes after at most so many that are not.

@@ -131,7 +131,14 @@ TEST(LinkAdaptation, ComesBackWithinThreeSecondsOverAsManyPointsAsThereMayBe) {
     scene.pass(20s);
     EXPECT_EQ(link.given.layers, 1) << part;
     link.bytesPerSecond = 1e9;
-    EXPECT_LE(timeUntil(scene, [&] { return link.given == OperatingPoint{0, 3}; }, 3s), 3s) << part;
+    EXPECT_LE(timeUntil(
+                  scene,
+                  [&] {
+                    return link.given == OperatingPoint{0, 3};
+                  },
+                  3s),
+              3s)
+        << part;
   }
 }
 

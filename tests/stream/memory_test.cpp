@@ -31,15 +31,15 @@ double bytesAllocated() {
 #endif
 }
 
-// A square of so many nodes an edge, which falls.
-scene::Scene squareOf(std::uint32_t edge) {
+// 10,000 nodes that fall, so soft that a tick takes little.
+scene::Scene largeScene() {
   scene::Scene scene = tests::smallScene("large");
   scene::Cloth& cloth = scene.cloths.front();
-  cloth.grid.rows = cloth.grid.columns = edge;
-  cloth.mass = 1e-4f * static_cast<float>(cloth.nodeCount());
+  cloth.grid.rows = cloth.grid.columns = 100;
+  cloth.mass = 10;
+  cloth.structural = cloth.shear = cloth.bend = {0.05f, 0};
   cloth.pins.clear();
-  scene.streamRate = scene.simulationRate = 20;
-  scene.substeps = 1;
+  scene.substeps = 2;
   scene.stream.temporalLayers = 3;
   scene.stream.qualities = 3;
   return scene;
@@ -76,7 +76,7 @@ TEST_P(ClientThatDoesNotRead, CostsAtMostWhatIsPromised) {
   options.defaultScene = "large";
   std::unique_ptr<SceneServer> server;
   try {
-    server = std::make_unique<SceneServer>(std::vector{squareOf(200)}, options);
+    server = std::make_unique<SceneServer>(std::vector{largeScene()}, options);
   } catch (const vulkan::DeviceError& error) {
     GTEST_SKIP() << error.what();
   }
@@ -84,7 +84,7 @@ TEST_P(ClientThatDoesNotRead, CostsAtMostWhatIsPromised) {
   polite.join();
   polite.readFrames(20);
 
-  constexpr int kClients = 16, kRounds = 60;
+  constexpr int kClients = 6, kRounds = 60;
   std::vector<std::unique_ptr<TestPeer>> clients;
   const auto add = [&] {
     TestPeer& client = *clients.emplace_back(std::make_unique<TestPeer>(*server, "does not read"));
