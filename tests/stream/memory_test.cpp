@@ -2,6 +2,7 @@
 // What a client that never reads can cost the server.
 #include <cstdio>
 #include <memory>
+#include <thread>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -41,7 +42,8 @@ scene::Scene largeScene() {
   cloth.pins.clear();
   scene.substeps = 2;
   scene.stream.temporalLayers = 3;
-  scene.stream.qualities = 3;
+  // What an encoder of another quality takes, all who get that share.
+  scene.stream.qualities = 1;
   return scene;
 }
 
@@ -80,9 +82,9 @@ TEST_P(ClientThatDoesNotRead, CostsAtMostWhatIsPromised) {
   } catch (const vulkan::DeviceError& error) {
     GTEST_SKIP() << error.what();
   }
-  TestPeer polite(*server);
-  polite.join();
-  polite.readFrames(20);
+  const auto wait = [] { std::this_thread::sleep_for(std::chrono::milliseconds(50)); };  // two ticks
+  TestPeer first(*server);
+  first.join();  // so that what the scene takes is there
 
   constexpr int kClients = 6, kRounds = 60;
   std::vector<std::unique_ptr<TestPeer>> clients;
@@ -100,11 +102,11 @@ TEST_P(ClientThatDoesNotRead, CostsAtMostWhatIsPromised) {
       TestPeer& client = *add();
       client.hello("large");
       sendAllThereIs(client, 0);
-      polite.readFrames(1);
+      wait();
     }
   for (int round = 1; round < kRounds; ++round) {
     for (const auto& client : clients) sendAllThereIs(*client, round);
-    polite.readFrames(1);
+    wait();
   }
   const double each = (bytesAllocated() - before) / kClients;
   std::printf("a client that does not read: %.0f KiB\n", each / 1024);
@@ -127,7 +129,7 @@ TEST(Memory, AMailboxHoldsAtMostWhatItsBoundsSay) {
     }
     while (mailbox->announce(message(8))) {
     }
-    for (std::uint64_t tick = 1; tick < 100; ++tick)
+    for (std::uint64_t tick = 1; tick < 100 + Mailbox::kMaxHeld; ++tick)
       mailbox->deliver({.message = message(Mailbox::kMaxHeldBytes / Mailbox::kMaxHeld),
                         .tick = tick,
                         .key = tick == 1 || tick % 10 == 0,
