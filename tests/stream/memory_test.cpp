@@ -6,31 +6,17 @@
 #include <vector>
 
 #include <gtest/gtest.h>
-#include <malloc.h>
 
 #include "server/messages/limits.h"
+#include "tests/stream/allocated_bytes.h"
 #include "tests/stream/server_test.h"
-
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-#include <sanitizer/allocator_interface.h>
-#endif
 
 namespace clothstream::stream {
 namespace {
 
+using tests::allocatedBytes;
+using tests::kMostBytesAClient;
 using tests::TestPeer;
-
-// Promised a client, beside what it uploads.
-constexpr double kPromised = 4 << 20;
-
-double bytesAllocated() {
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-  return static_cast<double>(__sanitizer_get_current_allocated_bytes());
-#else
-  const struct mallinfo2 info = mallinfo2();
-  return static_cast<double>(info.uordblks + info.hblkhd);
-#endif
-}
 
 // 10,000 nodes that fall, so soft that a tick takes little.
 scene::Scene largeScene() {
@@ -95,7 +81,7 @@ TEST_P(ClientThatDoesNotRead, CostsAtMostWhatIsPromised) {
   };
   if (GetParam())
     for (int i = 0; i < kClients; ++i) add()->join();
-  const double before = bytesAllocated();
+  const double before = allocatedBytes();
   // Each is promised another description, since the parameters are others.
   if (!GetParam())
     for (int i = 0; i < kClients; ++i) {
@@ -108,9 +94,9 @@ TEST_P(ClientThatDoesNotRead, CostsAtMostWhatIsPromised) {
     for (const auto& client : clients) sendAllThereIs(*client, round);
     wait();
   }
-  const double each = (bytesAllocated() - before) / kClients;
+  const double each = (allocatedBytes() - before) / kClients;
   std::printf("a client that does not read: %.0f KiB\n", each / 1024);
-  EXPECT_LT(each, kPromised);
+  EXPECT_LT(each, kMostBytesAClient);
 }
 
 // The sum of the bounds, of frames and answers as large as they may be: nothing that a client sends or leaves
@@ -119,7 +105,7 @@ TEST(Memory, AMailboxHoldsAtMostWhatItsBoundsSay) {
   telemetry::SceneMetrics metrics;
   constexpr int kMailboxes = 4;
   std::vector<std::shared_ptr<Mailbox>> mailboxes;
-  const double before = bytesAllocated();
+  const double before = allocatedBytes();
   for (int i = 0; i < kMailboxes; ++i) {
     const auto& mailbox = mailboxes.emplace_back(std::make_shared<Mailbox>([] {}));
     mailbox->subscribe(nullptr, {.rate = 72}, metrics);
@@ -136,7 +122,7 @@ TEST(Memory, AMailboxHoldsAtMostWhatItsBoundsSay) {
                         .referenceTick = tick - 1,
                         .complete = Clock::now()});
   }
-  const double each = (bytesAllocated() - before) / kMailboxes;
+  const double each = (allocatedBytes() - before) / kMailboxes;
   std::printf("a full mailbox: %.0f KiB\n", each / 1024);
   EXPECT_LE(each, 2.0 * Mailbox::kMaxControlBytes + Mailbox::kMaxHeldBytes + (64 << 10));
 }
