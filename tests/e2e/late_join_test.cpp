@@ -32,10 +32,10 @@ constexpr int kQualities = 3;
 constexpr auto kPromised = 150ms, kTolerated = 20 * kPromised;
 
 constexpr const char* kScene = R"({
-  "name": "late", "simulationRate": 60, "streamRate": 60, "substeps": 2,
+  "name": "late", "simulationRate": 60, "streamRate": 60, "substeps": 4,
   "cloths": [{
-    "name": "sheet", "grid": {"rows": 100, "columns": 100, "width": 2, "height": 2}, "mass": 0.8,
-    "structural": {"stiffness": 20, "damping": 0.01}, "shear": {"stiffness": 5, "damping": 0.01},
+    "name": "sheet", "grid": {"rows": 100, "columns": 100, "width": 2, "height": 2}, "mass": 8,
+    "structural": {"stiffness": 2}, "shear": {"stiffness": 0.5},
     "pins": [{"columnStep": 99, "lastColumn": 99}]
   }],
   "stream": {"temporalLayers": 2, "qualities": 3}

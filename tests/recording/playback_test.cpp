@@ -53,6 +53,9 @@ class Viewer {
   explicit Viewer(stream::LiveScene& scene, std::uint8_t layers = codec::kMaxTemporalLayers)
       : scene_(scene), mailbox_(std::make_shared<stream::Mailbox>([] {})) {
     EXPECT_EQ(scene.audience.join(mailbox_, 10), stream::Audience::Joining::joined);
+    codec::StreamLayout layout = sampleLayout();
+    layout.temporalLayers = scene.shape().layers;
+    decoder_ = codec::Decoder::make(layout);
     mailbox_->subscribe(scene.description(), scene.shape(), scene.metrics, {.quality = 0, .layers = layers});
     read(Clock::time_point{});
   }
@@ -87,11 +90,7 @@ class Viewer {
 
   stream::LiveScene& scene_;
   std::shared_ptr<stream::Mailbox> mailbox_;
-  std::unique_ptr<codec::Decoder> decoder_ = [] {
-    codec::StreamLayout layout = sampleLayout();
-    layout.temporalLayers = codec::kMaxTemporalLayers;
-    return codec::Decoder::make(layout);
-  }();
+  std::unique_ptr<codec::Decoder> decoder_;
 };
 
 class PlaybackTest : public ::testing::Test {

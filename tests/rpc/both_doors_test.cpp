@@ -1,14 +1,19 @@
 // SPDX-License-Identifier: MIT
 // Whoever comes through one door shares the scene with those who came through the other.
+#include <chrono>
+#include <cstdio>
 #include <functional>
 #include <memory>
 #include <string>
+#include <thread>
+#include <vector>
 
 #include <gmock/gmock.h>
 
 #include "server/rpc/rpc_door.h"
 #include "server/web/web_door.h"
 #include "tests/rpc/rpc_client.h"
+#include "tests/stream/allocated_bytes.h"
 #include "tests/web/small_server.h"
 #include "tests/web/web_client.h"
 
@@ -63,6 +68,40 @@ TEST_F(BothDoors, APoseThroughWebSocketIsSeenThroughGrpc) {
   WebSocketClient mover(webDoor->port());
   RpcStream watcher(rpcDoor->port());
   expectColliderIsSeen(mover, watcher);
+}
+
+// Of who joins, says much, and never reads: its own part of what is measured included.
+template <class Client>
+double costOfNotReading(std::uint16_t port) {
+  constexpr int kClients = 4, kRounds = 60;
+  const double before = allocatedBytes();
+  std::vector<std::unique_ptr<Client>> clients;
+  for (int i = 0; i < kClients; ++i) {
+    clients.push_back(std::make_unique<Client>(port));
+    clients.back()->send(hello("large"));
+  }
+  for (int round = 0; round < kRounds; ++round) {
+    for (const auto& client : clients) {
+      client->send(ping());
+      client->send(colliderPose(0.01f * static_cast<float>(round)));
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(35));  // a tick
+  }
+  return (allocatedBytes() - before) / kClients;
+}
+
+TEST_F(BothDoors, WhoDoesNotReadCostsAtMostWhatIsPromised) {
+  // So that what the scene takes is there.
+  Viewer seen;
+  RpcStream first(rpcDoor->port());
+  first.send(hello("large"));
+  ASSERT_TRUE(first.watch(seen, [&] { return seen.frames > 0; }));
+  const double rpc = costOfNotReading<RpcStream>(rpcDoor->port());
+  const double web = costOfNotReading<WebSocketClient>(webDoor->port());
+  std::printf("a client that does not read: %.0f KiB over gRPC, %.0f KiB over WebSocket\n", rpc / 1024,
+              web / 1024);
+  EXPECT_LT(rpc, kMostBytesAClient);
+  EXPECT_LT(web, kMostBytesAClient);
 }
 
 // Serialised; of who comes back, with the token of its Welcome.
