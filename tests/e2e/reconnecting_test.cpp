@@ -202,8 +202,9 @@ TEST_F(ReconnectingTest, TheProgramSaysWhoIsThereAndComesBack) {
   Seen seen;
   const auto watcher = join(address_, "Ben", seen);
   Process program(
-      {CLOTHSTREAM, "join", through(link), "--name", "Ada", "--role", "viewer", "--json", "--hash"});
-  ASSERT_TRUE(eventually([&] { return seen.participants == 2; }));
+      {CLOTHSTREAM, "join", through(link), "--name", "Ada", "--role", "viewer", "--hash", "--report"});
+  // Who has not been joined yet does not come back: with a report it has.
+  ASSERT_TRUE(program.waitForOutput("left", kStart)) << program.errors();
   link.cut();
   ASSERT_TRUE(eventually([&] { return seen.lastPresence == CS_PRESENCE_DISCONNECTED; }));
   link.restore();
@@ -231,6 +232,8 @@ TEST_F(ReconnectingTest, ARecordingGoesOnAndSaysWhatIsMissing) {
   std::this_thread::sleep_for(500ms);
   link.cut();
   ASSERT_TRUE(eventually([&] { return seen.lastPresence == CS_PRESENCE_DISCONNECTED; }));
+  const std::uint64_t frames = seen.frames;
+  ASSERT_TRUE(eventually([&] { return seen.frames >= frames + 5; })) << "that the program does not get";
   link.restore();
   ASSERT_TRUE(eventually([&] { return seen.lastPresence == CS_PRESENCE_RETURNED; }));
   std::this_thread::sleep_for(500ms);
