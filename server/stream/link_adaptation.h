@@ -35,8 +35,8 @@ class LinkAdaptation {
   static constexpr std::chrono::milliseconds kShortestWait{500}, kLongestWait{1500}, kClimb{250};
   // What frames that were dropped count for, however many at a time.
   static constexpr std::chrono::milliseconds kOfDrop{100};
-  // Of the bits of a quality the next coarser one takes about this part.
-  static constexpr double kPartOfFiner = 0.6;
+  // Of the bits of a quality the next coarser one takes about this part: less of calm cloth, more of a flag.
+  static constexpr double kPartOfFiner = 0.7;
 
   // Of a stream in `qualities`, of which `best` is wanted at most.
   LinkAdaptation(OperatingPoint best, std::uint8_t qualities);
