@@ -179,17 +179,21 @@ void DeviceThread::runDueTicks() {
     const std::lock_guard lock(mutex_);
     if (std::exchange(loseDevice_, false)) throw vulkan::DeviceLost("the device's loss was simulated");
   }
-  due_.clear();
-  const Clock::time_point now = Clock::now();
-  for (const auto& run : runs_)
-    if (run->running && run->pacer.due() <= now) due_.push_back(run.get());
-  std::ranges::sort(due_, {}, [](const Run* run) { return run->pacer.due(); });
-  for (Run* run : due_) begin(*run, Clock::now());
-  for (Run* run : due_) run->host->finish();
+  turns_.clear();
+  for (const auto& run : runs_) turns_.push_back(run.get());
+  Clock::time_point before = Clock::now();
+  chooseTurns(turns_, before, chosen_);
+  for (Turn* turn : chosen_) begin(static_cast<Run&>(*turn), Clock::now());
+  for (Turn* turn : chosen_) {
+    static_cast<Run*>(turn)->host->finish();
+    const Clock::time_point after = Clock::now();
+    turn->took(after - before, after);
+    before = after;
+  }
 }
 
 void DeviceThread::begin(Run& run, Clock::time_point now) {
-  const Pacer::Start start = run.pacer.begin(now);
+  const Pacer::Start start = run.pacer.begin(now, run.spare);
   LiveScene& scene = *run.scene;
   scene.metrics.lateness.record(seconds(start.lateness));
   if (start.late) scene.metrics.lateTicks.add();

@@ -15,9 +15,9 @@
 
 #include "server/stream/frame_packer.h"
 #include "server/stream/live_scene.h"
-#include "server/stream/pacer.h"
 #include "server/stream/scene_host.h"
 #include "server/stream/slow_watch.h"
+#include "server/stream/turns.h"
 #include "server/telemetry/metrics.h"
 #include "server/vulkan/device.h"
 
@@ -54,9 +54,9 @@ class DeviceThread {
   void simulateDeviceLoss();
 
  private:
-  struct Run {
+  struct Run : Turn {
     explicit Run(std::shared_ptr<LiveScene> live)
-        : scene(std::move(live)), pacer(scene->start().simulationRate) {}
+        : Turn(live->start().simulationRate), scene(std::move(live)) {}
     // Of what was given up so far, the whole ticks that are not counted yet.
     std::uint64_t wholeSlippedTicks(double given) {
       slipped += given;
@@ -67,10 +67,8 @@ class DeviceThread {
 
     std::shared_ptr<LiveScene> scene;
     std::unique_ptr<SceneHost> host;  // once somebody joined
-    Pacer pacer;
     SlowWatch slow;
     double slipped = 0;
-    bool running = false;
   };
 
   void run(const std::vector<std::shared_ptr<LiveScene>>& scenes, std::promise<void>& ready);
@@ -103,8 +101,8 @@ class DeviceThread {
   // The thread's own.
   std::unique_ptr<vulkan::Device> device_;
   std::vector<std::unique_ptr<Run>> runs_;
-  std::vector<Run*> due_;
-  Clock::time_point nextRebuild_{};  // not before
+  std::vector<Turn*> turns_, chosen_;  // of runs_
+  Clock::time_point nextRebuild_{};    // not before
 
   std::thread thread_;
 };

@@ -9,8 +9,8 @@
 namespace clothstream::stream {
 
 // Tick n after start() is due n periods later, counted in whole ticks so that no rounding adds up. A scene
-// that is behind catches up at most one tick: what it is behind more than that is given up, and simulated
-// time falls behind real time. Not thread-safe.
+// that is behind catches up at most one tick, and what it is given to spare: what it is behind more than that
+// is given up, and simulated time falls behind real time. Not thread-safe.
 class Pacer {
  public:
   explicit Pacer(std::uint32_t ticksPerSecond) : ticksPerSecond_(ticksPerSecond) {}
@@ -31,10 +31,10 @@ class Pacer {
   };
 
   // A tick starts; not before it is due.
-  Start begin(Clock::time_point now) {
+  Start begin(Clock::time_point now, Clock::duration spare = {}) {
     Start start{.lateness = now - due()};
     start.late = start.lateness > period() / 4;
-    const Clock::duration given = start.lateness - period();
+    const Clock::duration given = start.lateness - period() - spare;
     if (given > Clock::duration::zero()) {
       start.slippedTicks = seconds(given) * static_cast<double>(ticksPerSecond_);
       origin_ += given;
