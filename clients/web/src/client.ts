@@ -177,10 +177,18 @@ const kScratchBytes = Math.max(
   kParticipantBytes,
 );
 
+// Who joins: a name that others see, the role that is wanted, and whether frames are to be shown evenly, a little later.
+export interface Identity {
+  name: string;
+  role: number;
+  smooth: boolean;
+}
+
 // Views that it gives (positions, normals, triangles) look into the core's memory: they are good until the next call.
 export class Client {
   private readonly handle: number;
   private readonly scratch: number;
+  private readonly playsOut: boolean;
   private inbox = 0;
   private inboxBytes = 0;
 
@@ -188,13 +196,18 @@ export class Client {
   constructor(
     private readonly core: CoreModule,
     scene: string,
-    { name, role }: { name: string; role: number },
+    { name, role, smooth }: Identity,
   ) {
     this.handle = core.with([scene, "clothstream page", name], (where, what, who) =>
       core.exports.cs_create_as(where!, what!, who!, role),
     );
     if (this.handle === 0) throw new Error("The client core has no memory left for another client");
     this.scratch = core.allocate(kScratchBytes);
+    this.playsOut = smooth;
+    if (!smooth) return;
+    core.exports.cs_default_play_out(this.scratch);
+    if (core.exports.cs_set_play_out(this.handle, this.scratch) === 0)
+      throw new Error("The client core is of another release than the page");
   }
 
   destroy(): void {
@@ -304,6 +317,20 @@ export class Client {
 
   normals(): Float32Array {
     return this.core.floats(this.core.exports.cs_normals(this.handle), 3 * this.vertexCount);
+  }
+
+  // What is to be drawn at a time of performance.now(): the newest frame, or what play-out makes of the last ones.
+  shownAt(displayMs: number): { positions: Float32Array; normals: Float32Array } {
+    if (!this.playsOut) return { positions: this.positions(), normals: this.normals() };
+    const { exports } = this.core;
+    exports.cs_play_out(this.handle, nowUs(), BigInt(Math.round(1000 * displayMs)), 0);
+    // The first call may take memory, which detaches views.
+    const normals = exports.cs_played_normals(this.handle);
+    const positions = exports.cs_played_positions(this.handle);
+    return {
+      positions: this.core.floats(positions, 3 * this.vertexCount),
+      normals: this.core.floats(normals, 3 * this.vertexCount),
+    };
   }
 
   triangles(): Uint32Array {

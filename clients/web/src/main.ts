@@ -49,7 +49,7 @@ async function start(): Promise<void> {
   const scene = query.get("scene") ?? "";
   const role = query.get("role");
   const wanted = [...Roles].find(([, name]) => name === role)?.[0];
-  const identity = { name: query.get("name") ?? "", role: wanted ?? 0 };
+  const identity = { name: query.get("name") ?? "", role: wanted ?? 0, smooth: query.has("smooth") };
   if (role !== null && wanted === undefined)
     hud.showNotice(`There is no role "${role}": there are ${[...Roles.values()].join(", ")}.`);
   const session: Session = new Session(core, address.href, scene, identity, {
@@ -106,7 +106,7 @@ async function start(): Promise<void> {
       }
       hud.showState(session.state);
     }
-    view.draw(session.client);
+    view.draw(session.client, now);
     requestAnimationFrame(draw);
   }
   requestAnimationFrame(draw);

@@ -12,6 +12,8 @@ export interface Probe {
   readonly positions: Float32Array;
   readonly restPositions: Float32Array | undefined;
   readonly normals: Float32Array;
+  // Positions as they are drawn, of each cloth; beside seams more often than once.
+  readonly drawn: Float32Array[];
   readonly cloths: ClothLayout[];
   // Of each cloth, once there is one.
   readonly reports: (ClothReport | undefined)[];
@@ -50,6 +52,9 @@ export function expose(session: Session, view: View): { described(client: Client
     },
     get normals() {
       return session.client.normals().slice();
+    },
+    get drawn() {
+      return view.clothMeshes.map((mesh) => new Float32Array(mesh.geometry.getAttribute("position").array));
     },
     get cloths() {
       return session.client.cloths();

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // A stay in a scene, over however many connections it takes: the client core says when to connect, and as whom.
 
-import { Client, ClientEvent, ClientState } from "./client";
+import { Client, ClientEvent, ClientState, type Identity } from "./client";
 import { StreamSocket } from "./socket";
 import type { CoreModule } from "./wasm";
 
@@ -21,12 +21,6 @@ export interface SessionListener {
   notice(text: string): void;
   // The server refused something, and goes on.
   refused(client: Client): void;
-}
-
-// Who joins: a name that others see, and the role that is wanted.
-export interface Identity {
-  name: string;
-  role: number;
 }
 
 const kPeriodMs = 50;

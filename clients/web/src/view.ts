@@ -75,12 +75,11 @@ export class View {
     this.fit();
   }
 
-  // Draws the newest frame. The core's memory is read before this returns.
-  draw(client: Client | undefined): void {
+  // Draws the frame of this time of performance.now(). The core's memory is read before this returns.
+  draw(client: Client | undefined, now: number): void {
     // A client that joins has no vertices yet: until it has, the last frame of the former one stays.
     if (client && client.vertexCount === this.vertexCount) {
-      const positions = client.positions();
-      const normals = client.normals();
+      const { positions, normals } = client.shownAt(now);
       for (const cloth of this.cloths) cloth.update(positions, normals);
       this.colliderMeshes.place(client);
     }

@@ -28,6 +28,11 @@ export interface CoreExports {
   cs_vertex_count(client: Pointer): number;
   cs_positions(client: Pointer): Pointer;
   cs_normals(client: Pointer): Pointer;
+  cs_default_play_out(out: Pointer): void;
+  cs_set_play_out(client: Pointer, options: Pointer): number;
+  cs_play_out(client: Pointer, nowUs: bigint, displayUs: bigint, out: Pointer): number;
+  cs_played_positions(client: Pointer): Pointer;
+  cs_played_normals(client: Pointer): Pointer;
   cs_triangles(client: Pointer, indexCount: Pointer): Pointer;
   cs_cloth_count(client: Pointer): number;
   cs_get_cloth(client: Pointer, index: number, out: Pointer): number;
