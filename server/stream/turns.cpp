@@ -39,8 +39,9 @@ void chooseTurns(std::span<Turn* const> turns, Clock::time_point now, std::vecto
     if (due && (nextLong == nullptr || turn->pacer.due() < nextLong->pacer.due())) nextLong = turn;
   }
   std::ranges::sort(chosen, {}, [](const Turn* turn) { return turn->pacer.due(); });
+  // Twice, for one may take longer than they did of late.
   for (Turn* turn : turns)
-    if (!isLong(*turn, turns)) turn->spare = std::min<Clock::duration>(longest, kMostSpare);
+    if (!isLong(*turn, turns)) turn->spare = std::min<Clock::duration>(2 * longest, kMostSpare);
   if (nextLong != nullptr && (chosen.empty() || now - nextLong->ended >= count * nextLong->cost))
     chosen.push_back(nextLong);
 }
