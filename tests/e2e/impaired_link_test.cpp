@@ -22,7 +22,7 @@
 
 #include "clients/grpc/grpc_client.h"
 #include "tests/e2e/link.h"
-#include "tests/e2e/process.h"
+#include "tests/e2e/server_test.h"
 
 namespace clothstream::e2e {
 namespace {
@@ -30,43 +30,15 @@ namespace {
 using namespace std::chrono_literals;
 using Clock = std::chrono::steady_clock;
 
-constexpr auto kPatience = 60s;
-
-bool eventually(const std::function<bool()>& holds) {
-  for (const auto end = Clock::now() + kPatience; Clock::now() < end; std::this_thread::sleep_for(5ms))
-    if (holds()) return true;
-  return false;
-}
-
-class ImpairedLinkTest : public ::testing::Test {
+class ImpairedLinkTest : public ServerTest {
  protected:
   void SetUp() override {
-    server_ = std::make_unique<Process>(
-        std::vector<std::string>{CLOTHSTREAM_SERVER, "--port", "0", "--grpc-port", "0", "--scene", "small",
-                                 "--scene-file", "tests/e2e/small.json", "--temporal-layers", "3"});
-    const auto page = server_->waitForLine("page ", kPatience),
-               line = server_->waitForLine("gRPC ", kPatience);
-    if (page && line) {
-      address_ = line->substr(line->find_first_not_of(' '));
-      port_ = portIn(address_);
-      webPort_ = portIn(page->substr(0, page->rfind('/')));
-      link_ = std::make_unique<Link>(port_);
-      return;
-    }
-    server_->waitForEnd(kPatience);
-    if (server_->errors().find("no Vulkan") != std::string::npos) GTEST_SKIP() << server_->errors();
-    FAIL() << "the server did not start: " << server_->errors();
-  }
-  void TearDown() override {
-    if (!server_) return;
-    server_->signal(SIGTERM);
-    EXPECT_EQ(server_->waitForEnd(kPatience), 0);
-    EXPECT_THAT(server_->errors(), ::testing::Not(::testing::HasSubstr("Validation")));
+    Arguments arguments = kSmallScene;
+    arguments.insert(arguments.end(), {"--temporal-layers", "3"});
+    startServer(arguments);
+    if (!address_.empty()) link_ = std::make_unique<Link>(portIn(address_));
   }
 
-  static std::uint16_t portIn(const std::string& address) {
-    return static_cast<std::uint16_t>(std::stoi(address.substr(address.rfind(':') + 1)));
-  }
   std::unique_ptr<GrpcClient> join(const std::string& address) {
     auto joined = GrpcClient::join(address, {}, [this](cs_client*, std::uint32_t events) {
       if (events == 0) ++cuts_;
@@ -90,9 +62,6 @@ class ImpairedLinkTest : public ::testing::Test {
     return eventually([&] { return statisticsOf(client).frames >= before + frames; });
   }
 
-  std::unique_ptr<Process> server_;
-  std::string address_;
-  std::uint16_t port_ = 0, webPort_ = 0;
   std::unique_ptr<Link> link_;
   std::atomic<int> cuts_{0};
 };
@@ -212,7 +181,7 @@ TEST_F(ImpairedLinkTest, AThousandConnectionsASecondHarmNobody) {
     return std::distance(std::filesystem::directory_iterator(files), {});
   };
   const auto before = openFiles();
-  for (const std::uint16_t port : {port_, webPort_}) {
+  for (const std::uint16_t port : {portIn(address_), portIn(web_)}) {
     const std::uint64_t frames = statisticsOf(*client).frames;
     const auto start = Clock::now();
     for (int i = 0; i < kKnocks; ++i) {

@@ -12,7 +12,7 @@
 #include <nlohmann/json.hpp>
 #include <unistd.h>
 
-#include "tests/e2e/process.h"
+#include "tests/e2e/server_test.h"
 #include "tests/e2e/temporary_directory.h"
 
 namespace clothstream::e2e {
@@ -24,33 +24,15 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::Not;
 
-// Generous: sanitizers, validation and software Vulkan on a busy machine.
-constexpr auto kStart = 60s;
-constexpr auto kEnd = 30s;
-
 constexpr std::uint32_t kVertices = 17 * 13 + 9 * 11;
 constexpr std::uint32_t kTriangles = 2 * (16 * 12 + 8 * 10);
 
-class JoinTest : public ::testing::Test {
+class JoinTest : public ServerTest {
  protected:
   void SetUp() override {
-    server_ = std::make_unique<Process>(std::vector<std::string>{
-        CLOTHSTREAM_SERVER, "--port", "0", "--grpc-port", "0", "--scene", "small", "--scene-file",
-        "tests/e2e/small.json", "--scene-file", "tests/e2e/small_with_normals.json"});
-    if (const auto line = server_->waitForLine("gRPC ", kStart)) {
-      address_ = line->substr(line->find_first_not_of(' '));
-      return;
-    }
-    server_->waitForEnd(kEnd);
-    if (server_->errors().find("no Vulkan") != std::string::npos) GTEST_SKIP() << server_->errors();
-    FAIL() << "the server did not start: " << server_->errors();
-  }
-
-  void TearDown() override {
-    if (!server_) return;
-    server_->signal(SIGTERM);
-    server_->waitForEnd(kEnd);
-    EXPECT_THAT(server_->errors(), Not(HasSubstr("Validation"))) << server_->errors();
+    Arguments arguments = kSmallScene;
+    arguments.insert(arguments.end(), {"--scene-file", "tests/e2e/small_with_normals.json"});
+    startServer(arguments);
   }
 
   std::unique_ptr<Process> clothstream(std::vector<std::string> arguments,
@@ -58,9 +40,6 @@ class JoinTest : public ::testing::Test {
     arguments.insert(arguments.begin(), CLOTHSTREAM);
     return std::make_unique<Process>(arguments, output);
   }
-
-  std::unique_ptr<Process> server_;
-  std::string address_;
 };
 
 struct Obj {
@@ -102,7 +81,7 @@ TEST_F(JoinTest, DecodesWhatTheServerHoldsAndWritesItAsObj) {
   const TemporaryDirectory directory;
   const std::filesystem::path obj = directory.path() / "last.obj";
   const auto client = clothstream({"join", address_, "--json", "--hash", "--seconds", "2", "--obj", obj});
-  ASSERT_EQ(client->waitForEnd(kEnd), 0) << client->errors();
+  ASSERT_EQ(client->waitForEnd(kPatience), 0) << client->errors();
 
   const auto report = nlohmann::json::parse(client->output());
   EXPECT_EQ(report.at("scene"), "small");
@@ -140,7 +119,7 @@ TEST_F(JoinTest, DecodesWhatTheServerHoldsAndWritesItAsObj) {
 TEST_F(JoinTest, TakesNormalsFromTheStreamWhereItHasThem) {
   const auto client =
       clothstream({"join", address_, "--scene", "small_with_normals", "--json", "--hash", "--seconds", "1"});
-  ASSERT_EQ(client->waitForEnd(kEnd), 0) << client->errors();
+  ASSERT_EQ(client->waitForEnd(kPatience), 0) << client->errors();
   const auto report = nlohmann::json::parse(client->output());
   EXPECT_EQ(report.at("scene"), "small_with_normals");
   EXPECT_EQ(report.at("vertices"), 144);
@@ -152,7 +131,7 @@ TEST_F(JoinTest, TwoClientsAtOnceSeeTheSameScene) {
   const std::vector<std::string> arguments{"join", address_, "--json", "--hash", "--seconds", "2"};
   const auto first = clothstream(arguments), second = clothstream(arguments);
   for (const auto& client : {first.get(), second.get()}) {
-    ASSERT_EQ(client->waitForEnd(kEnd), 0) << client->errors();
+    ASSERT_EQ(client->waitForEnd(kPatience), 0) << client->errors();
     const auto report = nlohmann::json::parse(client->output());
     EXPECT_GE(report.at("frames").get<int>(), 2);
     EXPECT_EQ(report.at("hashMismatches"), 0);
@@ -166,7 +145,7 @@ TEST_F(JoinTest, ItsColliderPushesTheCloth) {
   // In the right sheet's middle, from behind.
   const auto client =
       clothstream({"join", address_, "--seconds", "3", "--collider", "0.5,1.8,-0.05,0.15", "--obj", obj});
-  ASSERT_EQ(client->waitForEnd(kEnd), 0) << client->errors();
+  ASSERT_EQ(client->waitForEnd(kPatience), 0) << client->errors();
   const Obj written = readObj(obj);
   ASSERT_EQ(written.positions.size(), kVertices);
   for (const auto& p : written.positions) {
@@ -177,7 +156,7 @@ TEST_F(JoinTest, ItsColliderPushesTheCloth) {
 
 TEST_F(JoinTest, AnUnknownSceneIsRefusedWithTheNamesThereAre) {
   const auto client = clothstream({"join", address_, "--scene", "nowhere", "--seconds", "1"});
-  EXPECT_EQ(client->waitForEnd(kEnd), 4);
+  EXPECT_EQ(client->waitForEnd(kPatience), 4);
   EXPECT_THAT(client->errors(), HasSubstr("nowhere"));
   EXPECT_THAT(client->errors(), HasSubstr("small_with_normals"));
   EXPECT_THAT(client->output(), IsEmpty());
@@ -187,12 +166,12 @@ TEST_F(JoinTest, ScenesAreCreatedPausedResetAndDeleted) {
   const auto run = [&](std::vector<std::string> arguments) {
     arguments.insert(arguments.end(), {"--server", address_});
     const auto client = clothstream(arguments);
-    const int code = client->waitForEnd(kEnd).value_or(-1);
+    const int code = client->waitForEnd(kPatience).value_or(-1);
     return std::pair(code, client->output() + client->errors());
   };
   const auto stateOf = [&](const std::string& name) {
     const auto list = clothstream({"list", address_, "--json"});
-    EXPECT_EQ(list->waitForEnd(kEnd), 0);
+    EXPECT_EQ(list->waitForEnd(kPatience), 0);
     for (const auto& scene : nlohmann::json::parse(list->output()))
       if (scene.at("name") == name) return scene;
     return nlohmann::json();
@@ -204,7 +183,7 @@ TEST_F(JoinTest, ScenesAreCreatedPausedResetAndDeleted) {
             std::pair(0, std::string("cloth-2\n")));
   const auto client =
       clothstream({"join", address_, "--scene", "mine", "--json", "--hash", "--seconds", "1"});
-  ASSERT_EQ(client->waitForEnd(kEnd), 0) << client->errors();
+  ASSERT_EQ(client->waitForEnd(kPatience), 0) << client->errors();
   EXPECT_EQ(nlohmann::json::parse(client->output()).at("hashMismatches"), 0);
 
   EXPECT_EQ(run({"pause", "mine"}).first, 0);
@@ -232,38 +211,38 @@ TEST_F(JoinTest, ScenesAreCreatedPausedResetAndDeleted) {
 
 TEST_F(JoinTest, AServerThatIsKilledIsNoticed) {
   const auto client = clothstream({"join", address_, "--no-reconnect"}, Process::Output::terminal);
-  ASSERT_TRUE(client->waitForOutput("fps", kStart)) << client->errors();
+  ASSERT_TRUE(client->waitForOutput("fps", kPatience)) << client->errors();
   server_->signal(SIGKILL);
-  EXPECT_EQ(client->waitForEnd(kEnd), 5);
+  EXPECT_EQ(client->waitForEnd(kPatience), 5);
   EXPECT_THAT(client->errors(), ContainsRegex("The (stream|server).*" + address_));
   EXPECT_THAT(client->output(), HasSubstr("bits a vertex")) << "the summary comes all the same";
 }
 
 TEST_F(JoinTest, AServerThatStopsSaysSo) {
   const auto client = clothstream({"join", address_, "--no-reconnect"}, Process::Output::terminal);
-  ASSERT_TRUE(client->waitForOutput("fps", kStart)) << client->errors();
+  ASSERT_TRUE(client->waitForOutput("fps", kPatience)) << client->errors();
   server_->signal(SIGTERM);
-  EXPECT_EQ(client->waitForEnd(kEnd), 5);
+  EXPECT_EQ(client->waitForEnd(kPatience), 5);
   EXPECT_THAT(client->errors(), HasSubstr("stop"));
 }
 
 TEST_F(JoinTest, AnInterruptEndsItWithTheSummary) {
   const auto client = clothstream({"join", address_}, Process::Output::terminal);
   // The live line, on a terminal.
-  ASSERT_TRUE(client->waitForOutput("ms round trip", kStart)) << client->errors();
+  ASSERT_TRUE(client->waitForOutput("ms round trip", kPatience)) << client->errors();
   EXPECT_THAT(client->output(), ContainsRegex("small  tick [0-9]+  [0-9]+ fps  [0-9]+ kbit/s"));
   client->signal(SIGINT);
-  EXPECT_EQ(client->waitForEnd(kEnd), 0) << client->errors();
+  EXPECT_EQ(client->waitForEnd(kPatience), 0) << client->errors();
   EXPECT_THAT(client->output(), HasSubstr("bits a vertex"));
 }
 
 TEST_F(JoinTest, ListsTheScenes) {
   const auto table = clothstream({"list", address_});
-  ASSERT_EQ(table->waitForEnd(kEnd), 0) << table->errors();
+  ASSERT_EQ(table->waitForEnd(kPatience), 0) << table->errors();
   EXPECT_THAT(table->output(), HasSubstr("small_with_normals"));
   EXPECT_THAT(table->output(), HasSubstr("curtain"));
   const auto list = clothstream({"list", address_, "--json"});
-  ASSERT_EQ(list->waitForEnd(kEnd), 0) << list->errors();
+  ASSERT_EQ(list->waitForEnd(kPatience), 0) << list->errors();
   bool found = false;
   for (const auto& scene : nlohmann::json::parse(list->output())) {
     if (scene.at("name") != "small") continue;
@@ -279,7 +258,7 @@ TEST_F(JoinTest, ListsTheScenes) {
 int run(std::vector<std::string> arguments, std::string& errors) {
   arguments.insert(arguments.begin(), CLOTHSTREAM);
   Process client(arguments);
-  const int code = client.waitForEnd(kEnd).value_or(-1);
+  const int code = client.waitForEnd(kPatience).value_or(-1);
   errors = client.errors();
   EXPECT_THAT(client.output(), IsEmpty());
   return code;
@@ -311,7 +290,7 @@ TEST(JoinWithoutServer, LeavesNoFileBehind) {
 
 TEST_F(JoinTest, SaysHowTheSimulationDoes) {
   const auto client = clothstream({"join", address_, "--json", "--seconds", "2"});
-  ASSERT_EQ(client->waitForEnd(kEnd), 0) << client->errors();
+  ASSERT_EQ(client->waitForEnd(kPatience), 0) << client->errors();
   const auto cloths = nlohmann::json::parse(client->output())["cloths"];
   ASSERT_EQ(cloths.size(), 2u);
   for (const auto& cloth : cloths) {
@@ -324,39 +303,39 @@ TEST_F(JoinTest, SaysHowTheSimulationDoes) {
     EXPECT_GE(cloth["penetration"], 0);
   }
   const auto talking = clothstream({"join", address_, "--report"});
-  EXPECT_TRUE(talking->waitForOutput("% mean; energy", kStart)) << talking->errors();
+  EXPECT_TRUE(talking->waitForOutput("% mean; energy", kPatience)) << talking->errors();
   talking->signal(SIGINT);
-  EXPECT_EQ(talking->waitForEnd(kEnd), 0);
+  EXPECT_EQ(talking->waitForEnd(kPatience), 0);
 }
 
 TEST_F(JoinTest, SetsParametersForEverybody) {
   const std::string cloth = [&] {
     const auto client = clothstream({"join", address_, "--json", "--seconds", "1"});
-    EXPECT_EQ(client->waitForEnd(kEnd), 0) << client->errors();
+    EXPECT_EQ(client->waitForEnd(kPatience), 0) << client->errors();
     return nlohmann::json::parse(client->output())["cloths"][0]["name"].get<std::string>();
   }();
   const auto set = clothstream({"set", address_, "--cloth", cloth, "--solver", "acad", "--activation", "0.02",
                                 "--thickness", "0.02", "--wind", "0,0,-2"});
-  ASSERT_EQ(set->waitForEnd(kEnd), 0) << set->errors();
+  ASSERT_EQ(set->waitForEnd(kPatience), 0) << set->errors();
   EXPECT_THAT(set->errors(), IsEmpty());
   const auto client = clothstream({"join", address_, "--json", "--seconds", "2"});
-  ASSERT_EQ(client->waitForEnd(kEnd), 0) << client->errors();
+  ASSERT_EQ(client->waitForEnd(kPatience), 0) << client->errors();
   const auto cloths = nlohmann::json::parse(client->output())["cloths"];
   EXPECT_EQ(cloths[0]["solver"], "acad");
   EXPECT_EQ(cloths[1]["solver"], "massSpring");
 
   const auto made = clothstream(
       {"set", address_, "--cloth", cloth, "--material", "silk", "--friction", "0.9", "--gust", "2,0.5"});
-  ASSERT_EQ(made->waitForEnd(kEnd), 0) << made->errors();
+  ASSERT_EQ(made->waitForEnd(kPatience), 0) << made->errors();
   const auto none = clothstream({"set", address_, "--material", "velvet"});
-  EXPECT_EQ(none->waitForEnd(kEnd), 4);
+  EXPECT_EQ(none->waitForEnd(kPatience), 4);
   EXPECT_THAT(none->errors(), HasSubstr("must be one of cotton, denim"));
 
   const auto refused = clothstream({"set", address_, "--stiffness", "1e5"});
-  EXPECT_EQ(refused->waitForEnd(kEnd), 4);
+  EXPECT_EQ(refused->waitForEnd(kPatience), 4);
   EXPECT_THAT(refused->errors(), HasSubstr("substeps"));
   const auto unknown = clothstream({"set", address_, "--cloth", "rug", "--damping", "1"});
-  EXPECT_EQ(unknown->waitForEnd(kEnd), 4);
+  EXPECT_EQ(unknown->waitForEnd(kPatience), 4);
   EXPECT_THAT(unknown->errors(), HasSubstr("there is no cloth 'rug'"));
 }
 

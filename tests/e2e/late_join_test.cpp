@@ -15,7 +15,7 @@
 #include <gtest/gtest.h>
 
 #include "clients/grpc/grpc_client.h"
-#include "tests/e2e/process.h"
+#include "tests/e2e/server_test.h"
 #include "tests/e2e/temporary_directory.h"
 
 namespace clothstream::e2e {
@@ -25,7 +25,6 @@ using namespace std::chrono_literals;
 using ::testing::HasSubstr;
 using Clock = std::chrono::steady_clock;
 
-constexpr auto kStart = 60s, kEnd = 30s;
 constexpr int kQualities = 3;
 // Promised for 10,000 nodes on a local network. A machine that does much else, with a device made of
 // software, may take longer by far.
@@ -61,36 +60,22 @@ struct Seen {
   }
 };
 
-class LateJoinTest : public ::testing::Test {
+class LateJoinTest : public ServerTest {
  protected:
   void SetUp() override {
     std::ofstream(directory_.path() / "late.json") << kScene;
-    server_ = std::make_unique<Process>(
-        std::vector<std::string>{CLOTHSTREAM_SERVER, "--port", "0", "--grpc-port", "0", "--scene", "late",
-                                 "--scene-file", (directory_.path() / "late.json").string()});
-    if (const auto line = server_->waitForLine("gRPC ", kStart)) {
-      address_ = line->substr(line->find_first_not_of(' '));
-      return;
-    }
-    server_->waitForEnd(kEnd);
-    if (server_->errors().find("no Vulkan") != std::string::npos) GTEST_SKIP() << server_->errors();
-    FAIL() << "the server did not start: " << server_->errors();
-  }
-  void TearDown() override {
-    if (!server_) return;
-    server_->signal(SIGTERM);
-    server_->waitForEnd(kEnd);
+    startServer({"--scene", "late", "--scene-file", (directory_.path() / "late.json").string()});
   }
   std::unique_ptr<GrpcClient> join(std::uint32_t quality, Seen& seen) {
     GrpcClientOptions options;
     options.quality = quality;
-    options.joinTimeout = kStart;
+    options.joinTimeout = kPatience;
     auto joined = GrpcClient::join(address_, options, std::ref(seen));
     if (!joined) throw std::runtime_error(joined.error().text);
     return std::move(*joined);
   }
   static void waitForFrames(Seen& seen, std::uint64_t count) {
-    for (const auto end = Clock::now() + kStart; Clock::now() < end; std::this_thread::sleep_for(2ms)) {
+    for (const auto end = Clock::now() + kPatience; Clock::now() < end; std::this_thread::sleep_for(2ms)) {
       const std::lock_guard lock(seen.mutex);
       if (seen.frames >= count) return;
     }
@@ -98,8 +83,6 @@ class LateJoinTest : public ::testing::Test {
   }
 
   TemporaryDirectory directory_;
-  std::unique_ptr<Process> server_;
-  std::string address_;
 };
 
 TEST_F(LateJoinTest, ItsFirstFrameIsWhatTheServerHoldsAndComesSoon) {

@@ -9,44 +9,18 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "tests/e2e/process.h"
+#include "tests/e2e/server_test.h"
 
 namespace clothstream::e2e {
 namespace {
 
 using namespace std::chrono_literals;
 using ::testing::HasSubstr;
-using ::testing::Not;
 
-constexpr auto kStart = 60s;
 constexpr auto kEnd = 120s;
 
-class LoadTest : public ::testing::Test {
+class LoadTest : public ServerTest {
  protected:
-  void startServer(const std::vector<std::string>& more = {}) {
-    std::vector<std::string> command{
-        CLOTHSTREAM_SERVER,    "--port", "0", "--grpc-port", "0", "--scene", "small", "--scene-file",
-        "tests/e2e/small.json"};
-    command.insert(command.end(), more.begin(), more.end());
-    server_ = std::make_unique<Process>(command);
-    const auto page = server_->waitForLine("page ", kStart), grpc = server_->waitForLine("gRPC ", kStart);
-    if (page && grpc) {
-      const std::size_t host = page->find("//") + 2;
-      web_ = page->substr(host, page->find('/', host) - host);
-      grpc_ = grpc->substr(grpc->find_first_not_of(' '));
-      return;
-    }
-    server_->waitForEnd(kStart);
-    if (server_->errors().find("no Vulkan") != std::string::npos) GTEST_SKIP() << server_->errors();
-    FAIL() << "the server did not start: " << server_->errors();
-  }
-  void TearDown() override {
-    if (!server_) return;
-    server_->signal(SIGTERM);
-    EXPECT_EQ(server_->waitForEnd(kEnd), 0);
-    EXPECT_THAT(server_->errors(), Not(HasSubstr("Validation"))) << server_->errors();
-  }
-
   static std::unique_ptr<Process> load(std::vector<std::string> arguments) {
     arguments.insert(arguments.begin(), {CLOTHSTREAM, "load"});
     return std::make_unique<Process>(arguments);
@@ -80,14 +54,11 @@ class LoadTest : public ::testing::Test {
     EXPECT_LT(report.at("slowFramesPerSecond"), report.at("framesPerSecond"));
     EXPECT_GE(report.at("intrusions").get<int>(), 5);
   }
-
-  std::unique_ptr<Process> server_;
-  std::string grpc_, web_;
 };
 
 TEST_F(LoadTest, GrpcServesAllAmongIntruders) {
   startServer();
-  if (!grpc_.empty()) expectAllAreServed({grpc_});
+  if (!address_.empty()) expectAllAreServed({address_});
 }
 
 TEST_F(LoadTest, WebSocketsServeAllAmongIntruders) {
@@ -96,14 +67,14 @@ TEST_F(LoadTest, WebSocketsServeAllAmongIntruders) {
 }
 
 TEST_F(LoadTest, SaysWhatNobodyWasTold) {
-  startServer({"--max-participants", "3"});
-  if (grpc_.empty()) return;
-  const auto crowd = load({grpc_, "--participants", "4"});
+  startServer({"--scene", "small", "--scene-file", "tests/e2e/small.json", "--max-participants", "3"});
+  if (address_.empty()) return;
+  const auto crowd = load({address_, "--participants", "4"});
   EXPECT_EQ(crowd->waitForEnd(kEnd), 4);
   EXPECT_THAT(crowd->errors(), HasSubstr("1 times somebody could not stay"));
   EXPECT_THAT(crowd->errors(), HasSubstr("has 3 participants"));
 
-  const auto elsewhere = load({grpc_, "--scene", "nowhere"});
+  const auto elsewhere = load({address_, "--scene", "nowhere"});
   EXPECT_EQ(elsewhere->waitForEnd(kEnd), 4);
   EXPECT_THAT(elsewhere->errors(), HasSubstr("nobody could join"));
   EXPECT_THAT(elsewhere->errors(), HasSubstr("nowhere"));
@@ -133,10 +104,10 @@ TEST_F(LoadTest, RefusesWhatMakesNoSense) {
 
 TEST_F(LoadTest, AnInterruptEndsItWithItsReport) {
   startServer();
-  if (grpc_.empty()) return;
-  const auto program = load({grpc_, "--participants", "2", "--seconds", "3600"});
+  if (address_.empty()) return;
+  const auto program = load({address_, "--participants", "2", "--seconds", "3600"});
   const auto watcher =
-      std::make_unique<Process>(std::vector<std::string>{CLOTHSTREAM, "join", grpc_, "--seconds", "2"});
+      std::make_unique<Process>(std::vector<std::string>{CLOTHSTREAM, "join", address_, "--seconds", "2"});
   EXPECT_EQ(watcher->waitForEnd(kEnd), 0);
   program->signal(SIGINT);
   EXPECT_EQ(program->waitForEnd(kEnd), 0);

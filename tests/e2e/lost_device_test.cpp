@@ -16,7 +16,7 @@
 #include <gtest/gtest.h>
 
 #include "clients/grpc/grpc_client.h"
-#include "tests/e2e/process.h"
+#include "tests/e2e/server_test.h"
 #include "tests/e2e/temporary_directory.h"
 
 namespace clothstream::e2e {
@@ -24,48 +24,34 @@ namespace {
 
 using namespace std::chrono_literals;
 using ::testing::HasSubstr;
-using ::testing::Not;
 using Clock = std::chrono::steady_clock;
 
-constexpr auto kPatience = 60s;
+using LostDevice = ServerTest;
 
-bool eventually(const std::function<bool()>& holds) {
-  for (const auto end = Clock::now() + kPatience; Clock::now() < end; std::this_thread::sleep_for(2ms))
-    if (holds()) return true;
-  return false;
-}
-
-TEST(LostDevice, TheStreamGoesOnFromTheLastCheckpoint) {
+TEST_F(LostDevice, TheStreamGoesOnFromTheLastCheckpoint) {
   const TemporaryDirectory directory;
   const std::filesystem::path file = directory.path() / "lose";
   setenv("VK_ADD_LAYER_PATH", CLOTHSTREAM_LAYERS, 1);
   setenv("VK_INSTANCE_LAYERS", "VK_LAYER_CLOTHSTREAM_lost_device", 1);
   setenv("CLOTHSTREAM_LOSE_DEVICE", file.c_str(), 1);
-  Process server({CLOTHSTREAM_SERVER, "--port", "0", "--grpc-port", "0", "--scene", "small", "--scene-file",
-                  "tests/e2e/small.json"});
+  startServer();
   for (const char* name : {"VK_ADD_LAYER_PATH", "VK_INSTANCE_LAYERS", "CLOTHSTREAM_LOSE_DEVICE"})
     unsetenv(name);
-  const auto line = server.waitForLine("gRPC ", kPatience);
-  if (!line) {
-    server.waitForEnd(kPatience);
-    if (server.errors().find("no Vulkan") != std::string::npos) GTEST_SKIP() << server.errors();
-    FAIL() << "the server did not start: " << server.errors();
-  }
+  if (address_.empty()) return;
 
   std::atomic<std::uint64_t> tick{0}, frames{0}, mismatches{0};
   std::atomic<int> cuts{0}, notices{0}, stepsBack{0};
-  auto joined = GrpcClient::join(line->substr(line->find_first_not_of(' ')), {},
-                                 [&](cs_client* client, std::uint32_t events) {
-                                   if (events == 0) ++cuts;
-                                   if ((events & CS_EVENT_NOTICE) != 0) ++notices;
-                                   if ((events & CS_EVENT_FRAME) == 0) return;
-                                   cs_statistics now;
-                                   cs_get_statistics(client, GrpcClient::nowUs(), &now);
-                                   if (now.tick <= tick) ++stepsBack;
-                                   tick = now.tick;
-                                   mismatches = now.hash_mismatches;
-                                   frames = now.frames;
-                                 });
+  auto joined = GrpcClient::join(address_, {}, [&](cs_client* client, std::uint32_t events) {
+    if (events == 0) ++cuts;
+    if ((events & CS_EVENT_NOTICE) != 0) ++notices;
+    if ((events & CS_EVENT_FRAME) == 0) return;
+    cs_statistics now;
+    cs_get_statistics(client, GrpcClient::nowUs(), &now);
+    if (now.tick <= tick) ++stepsBack;
+    tick = now.tick;
+    mismatches = now.hash_mismatches;
+    frames = now.frames;
+  });
   ASSERT_TRUE(joined.has_value()) << joined.error().text;
   // More than once: what is made anew can be lost, too.
   for (int loss = 1; loss <= 2; ++loss) {
@@ -83,11 +69,9 @@ TEST(LostDevice, TheStreamGoesOnFromTheLastCheckpoint) {
   EXPECT_EQ(stepsBack, 0);
   EXPECT_EQ(cuts, 0);
   joined->reset();
-  server.signal(SIGTERM);
-  EXPECT_EQ(server.waitForEnd(kPatience), 0);
-  EXPECT_THAT(server.errors() + server.output(), HasSubstr("VK_ERROR_DEVICE_LOST"));
-  EXPECT_THAT(server.errors(), Not(HasSubstr("Validation")));
-  EXPECT_THAT(server.output(), ::testing::ContainsRegex("device rebuilds 2"));
+  stopServer();
+  EXPECT_THAT(server_->errors() + server_->output(), HasSubstr("VK_ERROR_DEVICE_LOST"));
+  EXPECT_THAT(server_->output(), ::testing::ContainsRegex("device rebuilds 2"));
 }
 
 }  // namespace

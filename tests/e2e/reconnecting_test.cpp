@@ -15,7 +15,7 @@
 
 #include "clients/grpc/grpc_client.h"
 #include "tests/e2e/link.h"
-#include "tests/e2e/process.h"
+#include "tests/e2e/server_test.h"
 #include "tests/e2e/temporary_directory.h"
 
 namespace clothstream::e2e {
@@ -24,9 +24,6 @@ namespace {
 using namespace std::chrono_literals;
 using ::testing::HasSubstr;
 using Clock = std::chrono::steady_clock;
-
-constexpr auto kStart = 60s;
-constexpr auto kEnd = 30s;
 
 // What a client's thread saw.
 struct Seen {
@@ -54,39 +51,9 @@ struct Seen {
   }
 };
 
-bool eventually(const std::function<bool()>& holds) {
-  for (const auto end = Clock::now() + kStart; Clock::now() < end; std::this_thread::sleep_for(5ms))
-    if (holds()) return true;
-  return false;
-}
-
-class ReconnectingTest : public ::testing::Test {
+class ReconnectingTest : public ServerTest {
  protected:
-  void SetUp() override { startServer("0"); }
-  void startServer(const std::string& port, const std::vector<std::string>& more = {}) {
-    std::vector<std::string> command{
-        CLOTHSTREAM_SERVER,    "--port", "0", "--grpc-port", port, "--scene", "small", "--scene-file",
-        "tests/e2e/small.json"};
-    command.insert(command.end(), more.begin(), more.end());
-    server_ = std::make_unique<Process>(command);
-    if (const auto line = server_->waitForLine("gRPC ", kStart)) {
-      address_ = line->substr(line->find_first_not_of(' '));
-      return;
-    }
-    server_->waitForEnd(kEnd);
-    if (server_->errors().find("no Vulkan") != std::string::npos) GTEST_SKIP() << server_->errors();
-    FAIL() << "the server did not start: " << server_->errors();
-  }
-  void stopServer() {
-    server_->signal(SIGTERM);
-    server_->waitForEnd(kEnd);
-  }
-  void TearDown() override {
-    if (server_) stopServer();
-  }
-  std::uint16_t port() const {
-    return static_cast<std::uint16_t>(std::stoi(address_.substr(address_.rfind(':') + 1)));
-  }
+  void SetUp() override { startServer(); }
 
   static std::unique_ptr<GrpcClient> join(const std::string& address, const std::string& name, Seen& seen) {
     GrpcClientOptions options;
@@ -96,13 +63,10 @@ class ReconnectingTest : public ::testing::Test {
     return std::move(*joined);
   }
   static std::string through(const Link& link) { return "127.0.0.1:" + std::to_string(link.port()); }
-
-  std::unique_ptr<Process> server_;
-  std::string address_;
 };
 
 TEST_F(ReconnectingTest, WhoIsCutOffComesBackAsItWas) {
-  Link link(port());
+  Link link(portIn(address_));
   Seen seen, watcherSeen;
   const auto watcher = join(address_, "Ben", watcherSeen);
   const auto client = join(through(link), "Ada", seen);
@@ -154,15 +118,15 @@ TEST_F(ReconnectingTest, AServerThatBeganAnewIsJoinedAnew) {
   const std::string sameAddress = address_;
   const auto client = join(address_, "Ada", seen);
   stopServer();
-  startServer(std::to_string(port()));
+  startServer(kSmallScene, std::to_string(portIn(address_)));
   ASSERT_EQ(address_, sameAddress);
   ASSERT_TRUE(eventually([&] { return seen.returns == 1 && seen.firstFrameAfterReturn != 0; }));
   EXPECT_EQ(seen.resumed, 0u);
   EXPECT_FALSE(client->ended());
 }
 
-TEST_F(ReconnectingTest, WhoDoesNotWantToComeBackEnds) {
-  Link link(port());
+TEST_F(ReconnectingTest, WhoDoesNotWantToComeBackPatiences) {
+  Link link(portIn(address_));
   Seen seen;
   GrpcClientOptions options;
   options.reconnectFor = 0ms;
@@ -175,7 +139,7 @@ TEST_F(ReconnectingTest, WhoDoesNotWantToComeBackEnds) {
 }
 
 TEST_F(ReconnectingTest, WhoCannotComeBackInTimeEnds) {
-  Link link(port());
+  Link link(portIn(address_));
   Seen seen;
   GrpcClientOptions options;
   options.reconnectFor = 500ms;
@@ -198,13 +162,13 @@ TEST_F(ReconnectingTest, WhoGoesIsGoneAtOnce) {
 }
 
 TEST_F(ReconnectingTest, TheProgramSaysWhoIsThereAndComesBack) {
-  Link link(port());
+  Link link(portIn(address_));
   Seen seen;
   const auto watcher = join(address_, "Ben", seen);
   Process program(
       {CLOTHSTREAM, "join", through(link), "--name", "Ada", "--role", "viewer", "--hash", "--report"});
   // Who has not been joined yet does not come back: with a report it has.
-  ASSERT_TRUE(program.waitForOutput("left", kStart)) << program.errors();
+  ASSERT_TRUE(program.waitForOutput("left", kPatience)) << program.errors();
   link.cut();
   ASSERT_TRUE(eventually([&] { return seen.lastPresence == CS_PRESENCE_DISCONNECTED; }));
   link.restore();
@@ -215,7 +179,7 @@ TEST_F(ReconnectingTest, TheProgramSaysWhoIsThereAndComesBack) {
   }();
   EXPECT_TRUE(late);
   program.signal(SIGINT);
-  EXPECT_EQ(program.waitForEnd(kEnd), 0) << program.errors();
+  EXPECT_EQ(program.waitForEnd(kPatience), 0) << program.errors();
   for (const char* line : {"joined as viewer", "Ben is here as owner", "the connection is lost",
                            "back as the same participant", "Cy joined as participant"})
     EXPECT_THAT(program.errors(), HasSubstr(line));
@@ -224,7 +188,7 @@ TEST_F(ReconnectingTest, TheProgramSaysWhoIsThereAndComesBack) {
 TEST_F(ReconnectingTest, ARecordingGoesOnAndSaysWhatIsMissing) {
   const TemporaryDirectory directory;
   const std::filesystem::path file = directory.path() / "cut.mcap";
-  Link link(port());
+  Link link(portIn(address_));
   Seen seen;
   const auto watcher = join(address_, "Ben", seen);
   Process program({CLOTHSTREAM, "record", "small", "-o", file, "--server", through(link)});
@@ -238,11 +202,11 @@ TEST_F(ReconnectingTest, ARecordingGoesOnAndSaysWhatIsMissing) {
   ASSERT_TRUE(eventually([&] { return seen.lastPresence == CS_PRESENCE_RETURNED; }));
   std::this_thread::sleep_for(500ms);
   program.signal(SIGINT);
-  EXPECT_EQ(program.waitForEnd(kEnd), 0) << program.errors();
+  EXPECT_EQ(program.waitForEnd(kPatience), 0) << program.errors();
   EXPECT_THAT(program.errors(), HasSubstr("back; the recording goes on"));
   EXPECT_THAT(program.output(), ::testing::Not(HasSubstr("; 0 frames were lost")));
   Process info({CLOTHSTREAM, "info", file});
-  EXPECT_EQ(info.waitForEnd(kEnd), 0) << info.output() << info.errors();
+  EXPECT_EQ(info.waitForEnd(kPatience), 0) << info.output() << info.errors();
 }
 
 TEST_F(ReconnectingTest, ARecordingEndsWhereTheServerBeginsAnew) {
@@ -253,13 +217,13 @@ TEST_F(ReconnectingTest, ARecordingEndsWhereTheServerBeginsAnew) {
     return std::filesystem::exists(file) && std::filesystem::file_size(file) > 2000;
   };
   ASSERT_TRUE(eventually(hasFrames));
-  const std::string old = std::to_string(port());
+  const std::string old = std::to_string(portIn(address_));
   stopServer();
-  startServer(old);
-  EXPECT_EQ(program.waitForEnd(kEnd), 5);
+  startServer(kSmallScene, old);
+  EXPECT_EQ(program.waitForEnd(kPatience), 5);
   EXPECT_THAT(program.errors(), HasSubstr("the recording ends there"));
   Process info({CLOTHSTREAM, "info", file});
-  EXPECT_EQ(info.waitForEnd(kEnd), 0) << info.output() << info.errors();
+  EXPECT_EQ(info.waitForEnd(kPatience), 0) << info.output() << info.errors();
 }
 
 }  // namespace

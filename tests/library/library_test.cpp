@@ -19,7 +19,7 @@
 #include <gtest/gtest.h>
 
 #include "clients/grpc/grpc_client.h"
-#include "tests/e2e/process.h"
+#include "tests/e2e/server_test.h"
 #include "tests/e2e/temporary_directory.h"
 
 namespace clothstream::e2e {
@@ -30,7 +30,7 @@ using ::testing::Contains;
 using ::testing::HasSubstr;
 
 // Generous: sanitizers, validation and software Vulkan on a busy machine.
-constexpr auto kStart = 60s, kEnd = 30s, kProgram = 120s;
+constexpr auto kProgram = 120s;
 
 using Command = std::vector<std::string>;
 
@@ -111,25 +111,9 @@ class Watcher {
   std::unique_ptr<GrpcClient> client_;
 };
 
-class LibraryTest : public ::testing::Test {
+class LibraryTest : public ServerTest {
  protected:
-  void SetUp() override { startServer("tests/e2e/small.json"); }
-  void startServer(const std::string& sceneFile) {
-    server_ = std::make_unique<Process>(Command{CLOTHSTREAM_SERVER, "--port", "0", "--grpc-port", "0",
-                                                "--scene", "small", "--scene-file", sceneFile});
-    if (const auto line = server_->waitForLine("gRPC ", kStart)) {
-      address_ = line->substr(line->find_first_not_of(' '));
-      return;
-    }
-    server_->waitForEnd(kEnd);
-    if (server_->errors().find("no Vulkan") != std::string::npos) GTEST_SKIP() << server_->errors();
-    FAIL() << "the server did not start: " << server_->errors();
-  }
-  void TearDown() override {
-    if (!server_) return;
-    server_->signal(SIGTERM);
-    server_->waitForEnd(kEnd);
-  }
+  void SetUp() override { startServer(); }
 
   // Runs a program that follows the stream, and compares what it saw.
   void expectSameFrames(const Command& command) {
@@ -142,9 +126,6 @@ class LibraryTest : public ::testing::Test {
     if (const auto stages = ended.output.find("stages: "); stages != std::string::npos)
       std::printf("%s", ended.output.c_str() + stages);
   }
-
-  std::unique_ptr<Process> server_;
-  std::string address_;
 };
 
 // A program that was built without the sanitizer cannot load what was built with it.
@@ -157,7 +138,7 @@ TEST_F(LibraryTest, ServesC) {
 
 TEST_F(LibraryTest, TellsOfTheEndOfTheStream) {
   Process program({FOLLOW_C, address_, "lost"});
-  ASSERT_TRUE(program.waitForLine("joined", kStart)) << program.errors();
+  ASSERT_TRUE(program.waitForLine("joined", kPatience)) << program.errors();
   server_->signal(SIGTERM);
   EXPECT_EQ(program.waitForEnd(kProgram), 0) << program.errors();
 }
@@ -169,7 +150,7 @@ TEST_F(LibraryTest, GivesCThePartOfTheStreamThatItWants) {
   scene.insert(scene.find('{') + 1, R"("stream": {"temporalLayers": 2, "qualities": 3},)");
   std::ofstream(sceneFile) << scene;
   TearDown();
-  startServer(sceneFile);
+  startServer({"--scene", "small", "--scene-file", sceneFile});
   const Ended ended = run({FOLLOW_C, address_, "wants"});
   EXPECT_EQ(ended.code, 0) << ended.output << ended.errors;
 }
