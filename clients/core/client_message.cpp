@@ -162,8 +162,12 @@ void writeHello(std::string& out, std::uint64_t requestId, const Greeting& greet
 
 void writeColliderPoses(std::string& out, const Poses& poses, std::uint64_t clientTimeUs,
                         std::uint64_t serverTimeUs) {
+  // The server takes so many, with what it makes of hands.
+  constexpr std::size_t kMost = CS_MAX_COLLIDERS + CS_HAND_BONES;
+  const std::size_t ofHands =
+      CS_HAND_BONES * ((poses.leftHand.empty() ? 0u : 1u) + (poses.rightHand.empty() ? 0u : 1u));
   writeMessage(out, 0, kColliderPoses, [&](Writer& message) {
-    for (std::size_t i = 0; i < poses.colliders.size(); ++i) {
+    for (std::size_t i = 0; i < std::min(poses.colliders.size(), kMost - ofHands); ++i) {
       const cs_own_collider& from = poses.colliders[i];
       Writer collider(message, 1);
       collider.add_uint32(1, static_cast<std::uint32_t>(i));

@@ -72,8 +72,14 @@ TEST(Colliders, HandsTravelAsTheirJoints) {
   ASSERT_THAT(both.hands(), SizeIs(2));
   EXPECT_EQ(both.hands(0).side(), v1::HAND_SIDE_LEFT);
   EXPECT_THAT(both.hands(0).radii(), SizeIs(25));
+  // Sixty colliders are what a server takes: forty of them are these hands'.
+  const std::vector<float> spheres(4 * CS_MAX_COLLIDERS, 0.5f);
+  cs_set_colliders(joined.client.get(), spheres.data(), CS_MAX_COLLIDERS, 6);
+  EXPECT_THAT(joined.sent().collider_poses().colliders(), SizeIs(20));
   EXPECT_EQ(cs_set_hand(joined.client.get(), CS_HAND_RIGHT, nullptr, 0, 7), 1);
-  EXPECT_THAT(joined.sent().collider_poses().hands(), SizeIs(1));
+  const v1::ColliderPoses one = joined.sent().collider_poses();
+  EXPECT_THAT(one.hands(), SizeIs(1));
+  EXPECT_THAT(one.colliders(), SizeIs(CS_MAX_COLLIDERS));
   EXPECT_EQ(cs_set_hand(joined.client.get(), 3, joints.data(), CS_HAND_JOINTS, 8), 0);
   EXPECT_EQ(cs_set_hand(joined.client.get(), CS_HAND_LEFT, joints.data(), 20, 8), 0);
 }

@@ -2,10 +2,13 @@
 // How much memory this process holds.
 #pragma once
 
+#include <cstddef>
+
 #include <malloc.h>
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-#include <sanitizer/allocator_interface.h>
+// gcc has no header for it.
+extern "C" std::size_t __sanitizer_get_current_allocated_bytes();
 #endif
 
 namespace clothstream::tests {
