@@ -449,8 +449,8 @@ int cs_get_contact_event(const cs_client* client, uint32_t index, cs_contact_eve
 /* What follows with a now_us is told with that time, by which the server places it among the ticks: it is
  * when the poses are true, which may be a little ahead, such as when a headset predicts them for. */
 /* Sphere colliders of this participant: `count` of {x, y, z, radius}, at most CS_MAX_COLLIDERS, of which
- * the first 20 count beside two hands (the rest is left out); replaces all former ones; 0 takes them away. Only the newest call counts if the transport is
- * behind. */
+ * the first 20 count beside two hands (the rest is left out); replaces all former ones; 0 takes them away.
+ * Only the newest call counts if the transport is behind. */
 void cs_set_colliders(cs_client* client, const float* spheres, uint32_t count, uint64_t now_us) CS_NOEXCEPT;
 /* The same with other shapes and turned: the joints of a hand as capsules, say. */
 void cs_set_shapes(cs_client* client, const cs_own_collider* colliders, uint32_t count,

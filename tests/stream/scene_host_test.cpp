@@ -381,9 +381,12 @@ TEST_F(SceneHostTest, ChangesOfSpringsReachTheDevice) {
   HostedScene changed, unchanged;
   scene::ParameterChange softer;
   softer.cloths.emplace_back().structural = scene::Spring{1, 0.001f};
+  changed.tick();
   changed.change(softer);
-  changed.ticks(3);
+  changed.ticks(2);
   unchanged.ticks(3);
+  ASSERT_EQ(changed.frames.size(), 3u);
+  ASSERT_EQ(unchanged.frames.size(), 3u);
   EXPECT_NE(changed.frames[2].state_hash(), unchanged.frames[2].state_hash());
 }
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// A Vulkan layer whose devices are lost as soon as a file is there: the one that CLOTHSTREAM_LOSE_DEVICE
-// names, which it removes. From then on the device says VK_ERROR_DEVICE_LOST to whatever is asked of its
-// queues and semaphores; another device is whole.
+// A Vulkan layer whose devices are lost at the first submission after a file is there: the one that
+// CLOTHSTREAM_LOSE_DEVICE names, which it removes. From then on the device says VK_ERROR_DEVICE_LOST to
+// whatever is asked of its queues and semaphores; another device is whole.
 #include <atomic>
 #include <cstdlib>
 #include <cstring>
@@ -35,10 +35,10 @@ struct Device {
   PFN_vkGetSemaphoreCounterValue counter;
   std::atomic<bool> lost{false};
 
-  bool isLost() {
+  // Nothing is underway then that would have to be waited for.
+  void loseIfWanted() {
     const char* const file = std::getenv("CLOTHSTREAM_LOSE_DEVICE");
     if (file != nullptr && unlink(file) == 0) lost = true;
-    return lost;
   }
 };
 
@@ -122,24 +122,25 @@ VKAPI_ATTR void VKAPI_CALL destroyDevice(VkDevice handle, const VkAllocationCall
 VKAPI_ATTR VkResult VKAPI_CALL queueSubmit(VkQueue queue, std::uint32_t count, const VkSubmitInfo* submits,
                                            VkFence fence) {
   const std::shared_ptr<Device> device = deviceOf(queue);
-  return device->isLost() ? VK_ERROR_DEVICE_LOST : device->submit(queue, count, submits, fence);
+  device->loseIfWanted();
+  return device->lost ? VK_ERROR_DEVICE_LOST : device->submit(queue, count, submits, fence);
 }
 VKAPI_ATTR VkResult VKAPI_CALL queueWaitIdle(VkQueue queue) {
   const std::shared_ptr<Device> device = deviceOf(queue);
-  return device->isLost() ? VK_ERROR_DEVICE_LOST : device->queueWaitIdle(queue);
+  return device->lost ? VK_ERROR_DEVICE_LOST : device->queueWaitIdle(queue);
 }
 VKAPI_ATTR VkResult VKAPI_CALL deviceWaitIdle(VkDevice handle) {
   const std::shared_ptr<Device> device = deviceOf(handle);
-  return device->isLost() ? VK_ERROR_DEVICE_LOST : device->waitIdle(handle);
+  return device->lost ? VK_ERROR_DEVICE_LOST : device->waitIdle(handle);
 }
 VKAPI_ATTR VkResult VKAPI_CALL waitSemaphores(VkDevice handle, const VkSemaphoreWaitInfo* info,
                                               std::uint64_t timeout) {
   const std::shared_ptr<Device> device = deviceOf(handle);
-  return device->isLost() ? VK_ERROR_DEVICE_LOST : device->waitSemaphores(handle, info, timeout);
+  return device->lost ? VK_ERROR_DEVICE_LOST : device->waitSemaphores(handle, info, timeout);
 }
 VKAPI_ATTR VkResult VKAPI_CALL counterValue(VkDevice handle, VkSemaphore semaphore, std::uint64_t* value) {
   const std::shared_ptr<Device> device = deviceOf(handle);
-  return device->isLost() ? VK_ERROR_DEVICE_LOST : device->counter(handle, semaphore, value);
+  return device->lost ? VK_ERROR_DEVICE_LOST : device->counter(handle, semaphore, value);
 }
 
 PFN_vkVoidFunction ours(const char* name) {
