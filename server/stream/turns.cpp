@@ -2,6 +2,7 @@
 #include "server/stream/turns.h"
 
 #include <algorithm>
+#include <utility>
 
 namespace clothstream::stream {
 namespace {
@@ -9,11 +10,27 @@ namespace {
 // Ticks over which a cost is averaged.
 constexpr int kAverage = 8;
 
-bool isLong(const Turn& turn, std::span<Turn* const> turns) {
-  return std::ranges::any_of(turns, [&](const Turn* other) {
-    return other != &turn && other->running && turn.cost > other->pacer.period();
-  });
-}
+// What others have between two of their ticks, at the least.
+class Periods {
+ public:
+  explicit Periods(std::span<Turn* const> turns) {
+    for (const Turn* turn : turns) {
+      if (!turn->running) continue;
+      const Clock::duration period = turn->pacer.period();
+      if (period < shortest_) {
+        next_ = std::exchange(shortest_, period);
+        quickest_ = turn;
+      } else {
+        next_ = std::min(next_, period);
+      }
+    }
+  }
+  bool isLong(const Turn& turn) const { return turn.cost > (&turn == quickest_ ? next_ : shortest_); }
+
+ private:
+  Clock::duration shortest_ = Clock::duration::max(), next_ = Clock::duration::max();
+  const Turn* quickest_ = nullptr;
+};
 
 }  // namespace
 
@@ -24,6 +41,7 @@ void Turn::took(Clock::duration time, Clock::time_point now) {
 
 void chooseTurns(std::span<Turn* const> turns, Clock::time_point now, std::vector<Turn*>& chosen) {
   chosen.clear();
+  const Periods periods(turns);
   Turn* nextLong = nullptr;
   Clock::duration longest{};
   const auto count = std::ranges::count_if(turns, &Turn::running);
@@ -31,7 +49,7 @@ void chooseTurns(std::span<Turn* const> turns, Clock::time_point now, std::vecto
     turn->spare = {};
     if (!turn->running) continue;
     const bool due = turn->pacer.due() <= now;
-    if (!isLong(*turn, turns)) {
+    if (!periods.isLong(*turn)) {
       if (due) chosen.push_back(turn);
       continue;
     }
@@ -41,7 +59,7 @@ void chooseTurns(std::span<Turn* const> turns, Clock::time_point now, std::vecto
   std::ranges::sort(chosen, {}, [](const Turn* turn) { return turn->pacer.due(); });
   // Twice, for one may take longer than they did of late.
   for (Turn* turn : turns)
-    if (!isLong(*turn, turns)) turn->spare = std::min<Clock::duration>(2 * longest, kMostSpare);
+    if (!periods.isLong(*turn)) turn->spare = std::min<Clock::duration>(2 * longest, kMostSpare);
   if (nextLong != nullptr && (chosen.empty() || now - nextLong->ended >= count * nextLong->cost))
     chosen.push_back(nextLong);
 }
