@@ -13,6 +13,7 @@ foreach(name IN LISTS protoNames)
   list(APPEND messageSources ${stem}.pb.cc ${stem}.pb.h)
 endforeach()
 add_library(clothstream_protos STATIC ${messageSources})
+set_target_properties(clothstream_protos PROPERTIES UNITY_BUILD OFF) # generated files repeat names
 target_include_directories(clothstream_protos SYSTEM PUBLIC ${protoOut})
 # Programs with the property CLOTHSTREAM_STATIC_PROTOBUF carry it; they cannot have gRPC, which needs the shared one.
 find_library(CLOTHSTREAM_PROTOBUF_ARCHIVE libprotobuf.a REQUIRED)

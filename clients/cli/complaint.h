@@ -40,9 +40,12 @@ inline tl::expected<void, Complaint> areDifferent(const std::string& in, const s
 }
 
 // On standard error; returns the code.
+inline ExitCode complain(ExitCode code, const std::string& text) {
+  fmt::print(stderr, "clothstream: {}\n", text);
+  return code;
+}
 inline ExitCode say(const Complaint& complaint) {
-  fmt::print(stderr, "clothstream: {}\n", complaint.text);
-  return complaint.code;
+  return complain(complaint.code, complaint.text);
 }
 
 }  // namespace clothstream::cli

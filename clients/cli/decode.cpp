@@ -21,7 +21,7 @@ namespace {
 template <typename T>
 using Expected = tl::expected<T, Complaint>;
 
-const char* text(codec::DecodeResult result) {
+const char* problem(codec::DecodeResult result) {
   switch (result) {
     case codec::DecodeResult::ok:
       return "is not decoded to what was encoded";
@@ -37,12 +37,12 @@ const char* text(codec::DecodeResult result) {
   return "is not decoded";
 }
 
-struct Figures {
+struct DecodeFigures {
   files::MotionShape shape;
   double milliseconds = 0;  // of decoding, normals included
 };
 
-Expected<Figures> decodeFile(const DecodeOptions& options) {
+Expected<DecodeFigures> decodeFile(const DecodeOptions& options) {
   auto recording = orComplaint(kUnreadable, files::RecordingReader::open(options.recording));
   if (!recording) return tl::unexpected(recording.error());
   const codec::StreamLayout& layout = recording->head().layout;
@@ -54,7 +54,7 @@ Expected<Figures> decodeFile(const DecodeOptions& options) {
                      layout.cloths[0].vertexCount, options.maxVertices);
   if (auto apart = areDifferent(options.recording, options.out); !apart) return tl::unexpected(apart.error());
   const codec::ClothLayout& cloth = layout.cloths[0];
-  Figures figures{{cloth.columns, cloth.rows, recording->head().frames}};
+  DecodeFigures figures{{cloth.columns, cloth.rows, recording->head().frames}};
   const auto decoder = codec::Decoder::make(layout);
   if (!decoder) return complaint(kLost, "there is no memory for {} vertices", cloth.vertexCount);
   auto out = orComplaint(kNotWritten, files::MotionWriter::create(options.out, figures.shape));
@@ -70,7 +70,7 @@ Expected<Figures> decodeFile(const DecodeOptions& options) {
     const auto start = std::chrono::steady_clock::now();
     const codec::DecodeResult result = decoder->decode(packet->packet());
     if (result != codec::DecodeResult::ok || decoder->reconstructionHash() != packet->reconstructionHash)
-      return complaint(kUnreadable, "{} is broken: frame {} {}", options.recording, frame, text(result));
+      return complaint(kUnreadable, "{} is broken: frame {} {}", options.recording, frame, problem(result));
     std::ranges::transform(decoder->normals(), normals.begin(), [=](float x) { return sign * x; });
     figures.milliseconds +=
         std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();

@@ -64,7 +64,7 @@ Expected<files::Side> sideOf(files::MotionReader& motion, const codec::StreamLay
 }
 
 // What came of it.
-struct Figures {
+struct EncodeFigures {
   files::MotionShape shape;
   float maxError = 0;
   std::uint64_t packetBytes = 0, keyBytes = 0, fileBytes = 0;
@@ -120,7 +120,7 @@ double largestDistance(std::span<const float> a, std::span<const float> b) {
 
 Expected<void> encodeFrame(codec::Encoder& encoder, codec::Decoder& decoder, std::uint32_t frame,
                            std::span<const float> positions, const EncodeOptions& options,
-                           std::span<std::byte> packet, files::RecordingWriter& out, Figures& figures) {
+                           std::span<std::byte> packet, files::RecordingWriter& out, EncodeFigures& figures) {
   const float reach = std::max(kReach, kReachInErrors * figures.maxError);
   const auto far = std::ranges::find_if(positions, [=](float x) { return std::abs(x) > reach; });
   if (far != positions.end())
@@ -148,7 +148,7 @@ Expected<void> encodeFrame(codec::Encoder& encoder, codec::Decoder& decoder, std
   return orComplaint(kNotWritten, out.append(packet.first(bytes), encoder.reconstructionHash()));
 }
 
-Expected<Figures> encodeFile(const EncodeOptions& options) {
+Expected<EncodeFigures> encodeFile(const EncodeOptions& options) {
   auto motion = orComplaint(kUnreadable, files::MotionReader::open(options.motion));
   if (!motion) return tl::unexpected(motion.error());
   auto positions = orComplaint(kUnreadable, motion->next());
@@ -157,7 +157,7 @@ Expected<Figures> encodeFile(const EncodeOptions& options) {
   if (!maxError) return tl::unexpected(maxError.error());
   if (auto apart = areDifferent(options.motion, options.out); !apart) return tl::unexpected(apart.error());
 
-  Figures figures{.shape = motion->shape(), .maxError = *maxError};
+  EncodeFigures figures{.shape = motion->shape(), .maxError = *maxError};
   const codec::StreamLayout layout{.epoch = kEpoch,
                                    .codec = codec::kCodecHierarchical,
                                    .maxError = *maxError,

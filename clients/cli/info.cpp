@@ -24,7 +24,7 @@ struct ChannelFigures {
   std::uint64_t messages = 0, bytes = 0;
 };
 
-struct Figures {
+struct RecordingFigures {
   std::array<ChannelFigures, recording::kTopicNames.size()> channels{};
   std::uint64_t chunksLost = 0;
   std::string damage;  // the first; empty: none
@@ -52,7 +52,7 @@ double seconds(const RecordingReader& reader) {
   return static_cast<double>(reader.end() - reader.start()) * 1e-9;
 }
 
-void countByIndex(const RecordingReader& reader, Figures& figures) {
+void countByIndex(const RecordingReader& reader, RecordingFigures& figures) {
   if (!reader.mcap().statistics()) return;
   for (const auto& [channel, count] : reader.mcap().statistics()->counts)
     if (const auto topic = reader.topicOf(channel))
@@ -61,7 +61,7 @@ void countByIndex(const RecordingReader& reader, Figures& figures) {
 
 // Chunk by chunk: one that is damaged does not hide the others.
 tl::expected<void, Complaint> countByReading(recording::McapReader& mcap, const RecordingReader& reader,
-                                             Figures& figures) {
+                                             RecordingFigures& figures) {
   Progress progress("read", static_cast<std::uint32_t>(mcap.chunks().size()));
   for (std::size_t i = 0; i < mcap.chunks().size(); ++i) {
     if (interrupted()) return complaint(kUnreadable, "interrupted");
@@ -83,7 +83,7 @@ tl::expected<void, Complaint> countByReading(recording::McapReader& mcap, const 
   return {};
 }
 
-tl::expected<void, Complaint> decode(PlayedRecording& played, Figures& figures) {
+tl::expected<void, Complaint> decode(PlayedRecording& played, RecordingFigures& figures) {
   const auto all = figures.channels[static_cast<std::size_t>(Topic::frames)].messages;
   Progress progress("decode", static_cast<std::uint32_t>(all));
   for (std::uint32_t frame = 0;; ++frame) {
@@ -97,7 +97,8 @@ tl::expected<void, Complaint> decode(PlayedRecording& played, Figures& figures) 
   return {};
 }
 
-std::string damageOf(const RecordingReader& reader, const Figures& figures, const InfoOptions& options) {
+std::string damageOf(const RecordingReader& reader, const RecordingFigures& figures,
+                     const InfoOptions& options) {
   if (!reader.mcap().indexed())
     return fmt::format("it was cut off, or is damaged at its end: run clothstream recover {} OUT",
                        options.recording);
@@ -111,7 +112,7 @@ std::string mebibytes(std::uint64_t bytes) {
   return fmt::format("{:.2f} MiB", static_cast<double>(bytes) / (1 << 20));
 }
 
-std::string toText(const RecordingReader& reader, const Figures& figures, const std::string& damage,
+std::string toText(const RecordingReader& reader, const RecordingFigures& figures, const std::string& damage,
                    const InfoOptions& options) {
   const auto fact = [&](const char* name) { return printable(reader.fact(name)); };
   std::string text = fmt::format(
@@ -138,7 +139,7 @@ std::string toText(const RecordingReader& reader, const Figures& figures, const 
          (options.quick ? "index     whole; the rest was not read\n" : "whole     all checksums match\n");
 }
 
-std::string toJson(const RecordingReader& reader, const Figures& figures, const std::string& damage,
+std::string toJson(const RecordingReader& reader, const RecordingFigures& figures, const std::string& damage,
                    const InfoOptions& options) {
   nlohmann::ordered_json json{{"file", options.recording},
                               {"bytes", reader.mcap().bytes()},
@@ -166,7 +167,7 @@ tl::expected<ExitCode, Complaint> run(const InfoOptions& options) {
   };
   auto reader = open();
   if (!reader) return tl::unexpected(reader.error());
-  Figures figures;
+  RecordingFigures figures;
   if (options.quick) {
     countByIndex(*reader, figures);
   } else {

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include "clients/cli/complaint.h"
 #include "clients/cli/obj_file.h"
 #include "clients/cli/presence.h"
 #include "clients/cli/report.h"
@@ -101,11 +102,6 @@ std::optional<Failure> follow(GrpcClient& client, const JoinOptions& options, co
     if (std::optional<Failure> failure = client.ended()) return failure;
     if (line.shown()) line.show(reportOf(client));
   }
-}
-
-ExitCode complain(ExitCode code, const std::string& text) {
-  fmt::print(stderr, "clothstream: {}\n", text);
-  return code;
 }
 
 }  // namespace

@@ -9,15 +9,11 @@
 #include <google/protobuf/util/json_util.h>
 #include <unistd.h>
 
+#include "clients/cli/complaint.h"
 #include "clients/grpc/scene_control.h"
 
 namespace clothstream::cli {
 namespace {
-
-ExitCode complain(ExitCode code, const std::string& text) {
-  fmt::print(stderr, "clothstream: {}\n", text);
-  return code;
-}
 
 tl::expected<v1::Scene, std::string> readScene(const std::string& path) {
   std::ifstream file(path, std::ios::binary);

@@ -10,6 +10,7 @@
 
 #include <fmt/format.h>
 
+#include "clients/cli/complaint.h"
 #include "clients/grpc/grpc_client.h"
 
 namespace clothstream::cli {
@@ -55,11 +56,6 @@ class Answers {
   int held_ = 0;
   std::string refusal_;
 };
-
-ExitCode complain(ExitCode code, const std::string& text) {
-  fmt::print(stderr, "clothstream: {}\n", text);
-  return code;
-}
 
 std::string noSuchCloth(const cs_client* client, const std::string& name) {
   std::string known;

@@ -33,12 +33,6 @@ constexpr std::size_t kMaxSubmeshes = 65536;
 constexpr std::size_t kMaxMaterials = 1024;
 constexpr std::size_t kMaxSolvers = 32;  // kinds that are remembered of a cloth
 
-bool setText(std::string& target, Reader& reader) {
-  const Bytes view = reader.get_view();
-  target.assign(view.data(), view.size());
-  return true;
-}
-
 bool readSubmesh(Bytes message, Submesh& submesh) {
   return readFields(message, [&](std::uint32_t field, Reader& reader) {
     if (field == bytes(1)) return setText(submesh.name, reader);

@@ -16,12 +16,6 @@ bool set(Value& target, Value value) {
   return true;
 }
 
-bool setText(std::string& target, Reader& reader) {
-  const Bytes view = reader.get_view();
-  target.assign(view.data(), view.size());
-  return true;
-}
-
 bool setFinite(float& target, Reader& reader) {
   target = reader.get_float();
   return std::isfinite(target);

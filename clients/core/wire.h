@@ -5,6 +5,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include <protozero/pbf_reader.hpp>
@@ -47,6 +48,12 @@ template <typename Visit>
 // Appends the varints of a packed field, each to its lower 32 bits. False where the bytes are no whole
 // varints, or `out` would hold more than `max`.
 [[nodiscard]] bool readPackedVarints(Bytes packed, std::size_t max, std::vector<std::uint32_t>& out);
+
+inline bool setText(std::string& target, protozero::pbf_reader& reader) {
+  const Bytes view = reader.get_view();
+  target.assign(view.data(), view.size());
+  return true;
+}
 
 inline bool skip(protozero::pbf_reader& reader) {
   reader.skip();

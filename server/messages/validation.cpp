@@ -13,7 +13,7 @@ namespace {
 // Values in error texts are cut to this, so that an answer stays smaller than a question.
 constexpr std::size_t kMaxShown = 80;
 
-std::string quoted(std::string_view value) {
+std::string inQuotes(std::string_view value) {
   std::string shown = "\"";
   for (const char c : value.substr(0, kMaxShown)) shown += c >= 0x20 && c < 0x7f ? c : '?';
   return shown + (value.size() > kMaxShown ? "...\"" : "\"");
@@ -51,7 +51,7 @@ const std::string& Checks::name(const Path& path, const std::string& value) {
     return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '_' || c == '-';
   };
   if (value.empty() || value.size() > limits::kMaxNameLength || !std::ranges::all_of(value, allowed))
-    fail(path, quoted(value),
+    fail(path, inQuotes(value),
          fmt::format("must be 1 to {} characters out of [a-z0-9_-]", limits::kMaxNameLength));
   return value;
 }
@@ -59,7 +59,7 @@ const std::string& Checks::name(const Path& path, const std::string& value) {
 const std::string& Checks::text(const Path& path, const std::string& value) {
   const auto control = [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; };
   if (value.size() > limits::kMaxTextBytes || std::ranges::any_of(value, control))
-    fail(path, quoted(value),
+    fail(path, inQuotes(value),
          fmt::format("must be one line of at most {} bytes without control characters",
                      limits::kMaxTextBytes));
   return value;
@@ -78,14 +78,14 @@ const std::string& Checks::label(const Path& path, const std::string& value) {
     control |= second == 0x81 && third >= 0xa6 && third <= 0xa9;
   }
   if (control || value.size() > limits::kMaxLabelBytes)
-    fail(path, quoted(value),
+    fail(path, inQuotes(value),
          fmt::format("must be at most {} bytes of UTF-8 without control characters", limits::kMaxLabelBytes));
   return value;
 }
 
 void Checks::failNamed(const Path& path, std::string_view name, std::string_view allowed,
                        v1::ErrorCode code) {
-  fail(path, quoted(name), allowed, code);
+  fail(path, inQuotes(name), allowed, code);
 }
 
 void Checks::fail(const Path& path, std::string_view value, std::string_view allowed, v1::ErrorCode code) {

@@ -12,7 +12,7 @@ namespace {
 using Face = std::vector<std::uint32_t>;
 using Vec3d = Eigen::Vector3d;
 
-struct Plane {
+struct FacePlane {
   Vec3d normal = Vec3d::Zero();
   double offset = 0;
 };
@@ -48,7 +48,7 @@ std::optional<HullProblem> opening(const std::vector<Face>& faces) {
 }
 
 // Newell's: twice the area times the normal, whichever corner one starts at.
-Plane planeOf(const Face& face, const std::vector<Vec3>& vertices) {
+FacePlane planeOf(const Face& face, const std::vector<Vec3>& vertices) {
   Vec3d normal = Vec3d::Zero(), centre = Vec3d::Zero();
   const Vec3d origin = vertices[face[0]].cast<double>();
   for (std::size_t i = 0; i < face.size(); ++i) {
@@ -78,7 +78,7 @@ std::variant<ConvexHull, HullProblem> makeConvexHull(std::vector<Vec3> vertices,
   const Eigen::AlignedBox3d box = boxOf(vertices);
   const double tolerance = box.isEmpty() ? 0 : kHullTolerance * box.diagonal().norm();
   std::vector<HalfSpace> planes;
-  const auto add = [&](const Plane& plane) {
+  const auto add = [&](const FacePlane& plane) {
     const auto same = [&](const HalfSpace& other) {
       return (other.normal.cast<double>() - plane.normal).norm() < kHullTolerance &&
              std::abs(double{other.offset} - plane.offset) < tolerance;
@@ -88,7 +88,7 @@ std::variant<ConvexHull, HullProblem> makeConvexHull(std::vector<Vec3> vertices,
   };
   double deepest = 0;
   for (std::size_t f = 0; f < faces.size(); ++f) {
-    const Plane plane = planeOf(faces[f], vertices);
+    const FacePlane plane = planeOf(faces[f], vertices);
     if (plane.normal.isZero()) return HullProblem{f, "has no area"};
     for (const std::uint32_t corner : faces[f])
       if (std::abs(plane.normal.dot(vertices[corner].cast<double>()) - plane.offset) > tolerance)

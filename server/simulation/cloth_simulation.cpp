@@ -28,6 +28,7 @@
 #include "server/simulation/solve_stage.h"
 #include "server/simulation/stage.h"
 #include "server/simulation/state_memory.h"
+#include "server/simulation/texel.h"
 #include "server/simulation/xpbd_stage.h"
 #include "server/vulkan/kernel.h"
 
@@ -37,8 +38,6 @@ namespace {
 using vulkan::BindingKind;
 using vulkan::Buffer;
 using vulkan::BufferPurpose;
-
-constexpr std::size_t kTexelBytes = sizeof(shared::vec4);
 
 // How the work is cut; the results do not depend on it.
 struct Cut {
@@ -65,10 +64,6 @@ Cut cutScene(const vulkan::Device& device, const scene::Scene& scene, const Simu
 std::uint64_t hashInvocations(const vulkan::Device& device, std::uint32_t nodes) {
   const std::uint64_t nodesPerInvocation = device.isSoftware() ? 64 : 8;
   return (nodes + nodesPerInvocation - 1) / nodesPerInvocation;
-}
-
-shared::vec4 texel(const scene::Vec3& v, float w) {
-  return {v.x(), v.y(), v.z(), w};
 }
 
 bool isDamped(const shared::ClothRecord& cloth) {

@@ -17,13 +17,11 @@
 namespace clothstream::simulation {
 namespace {
 
-using vulkan::BindingKind;
 using vulkan::Bindings;
 using vulkan::Buffer;
 using vulkan::BufferPurpose;
-
-constexpr auto kTexels = BindingKind::texels;
-constexpr auto kStorage = BindingKind::storage;
+using vulkan::kStorage;
+using vulkan::kTexels;
 
 ReportBlocks blocksOf(std::span<const shared::ClothRecord> cloths) {
   ReportBlocks blocks;

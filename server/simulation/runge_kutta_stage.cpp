@@ -7,14 +7,12 @@
 namespace clothstream::simulation {
 namespace {
 
-using vulkan::BindingKind;
 using vulkan::Bindings;
 using vulkan::Buffer;
 using vulkan::BufferPurpose;
 using vulkan::Kernel;
-
-constexpr auto kTexels = BindingKind::texels;
-constexpr auto kStorage = BindingKind::storage;
+using vulkan::kStorage;
+using vulkan::kTexels;
 
 // Of a substep, of explicit Euler's steps.
 constexpr std::array<float, 4> kParts{0.5f, 0.5f, 1.0f, 1.0f / 6};

@@ -25,11 +25,11 @@ using vulkan::Bindings;
 using vulkan::Buffer;
 using vulkan::BufferPurpose;
 using vulkan::Kernel;
+using vulkan::kImages;
+using vulkan::kStorage;
+using vulkan::kTexels;
 
-constexpr auto kTexels = BindingKind::texels;
-constexpr auto kImages = BindingKind::images;
-constexpr auto kStorage = BindingKind::storage;
-constexpr std::uint32_t kLanes = CLOTHSTREAM_SOLVE_LANES;
+constexpr std::uint32_t kSolveLanes = CLOTHSTREAM_SOLVE_LANES;
 constexpr std::uint32_t kVectors = 5;  // shaders/solve/system.glsl
 // Sizes of dispatches, x, y, z each: of a group's chunks, of its small systems, of the large ones'
 // iterations.
@@ -51,16 +51,16 @@ bool isImplicit(const SolveGroup& group) {
 // device these cost nothing as long as it is no wider than the CPU's vectors, for it then runs without
 // switching between invocations. Loops over the lanes count on a divisor of their number.
 std::uint32_t solveWorkgroup(const vulkan::Device& device, std::uint32_t wanted) {
-  if (wanted == 0) wanted = device.isSoftware() ? 8 : kLanes;
-  return std::bit_floor(std::min({wanted, kLanes, device.limits().maxWorkgroupInvocations}));
+  if (wanted == 0) wanted = device.isSoftware() ? 8 : kSolveLanes;
+  return std::bit_floor(std::min({wanted, kSolveLanes, device.limits().maxWorkgroupInvocations}));
 }
 
 // lavapipe lets an invocation make 65,535 rounds of loops, all loops together, and then ends each after one.
 std::uint32_t iterationsPerDispatch(const vulkan::Device& device, const SolveGroup& group,
                                     std::uint32_t listed, std::uint32_t workgroup) {
   if (!device.isSoftware()) return ~0u;
-  const std::uint32_t tree = 2 * kLanes / workgroup + 16;
-  const std::uint32_t walks = kLanes / workgroup;
+  const std::uint32_t tree = 2 * kSolveLanes / workgroup + 16;
+  const std::uint32_t walks = kSolveLanes / workgroup;
   const std::uint32_t walk = group.mesh ? CLOTHSTREAM_SOLVE_WALK * (listed + 2) + 2 : 1;
   const std::uint32_t chunk = walks * (walk + 2) + tree;
   const std::uint32_t iteration = group.smallChunks * (chunk + 2) + tree + group.smallChunks;

@@ -4,17 +4,13 @@
 
 #include <cassert>
 
-#include "shaders/shared/types.h"
+#include "server/simulation/texel.h"
 
 namespace clothstream::simulation {
 namespace {
 
 using vulkan::Buffer;
 using vulkan::BufferPurpose;
-
-shared::vec4 texel(const scene::Vec3& v, float w) {
-  return {v.x(), v.y(), v.z(), w};
-}
 
 }  // namespace
 

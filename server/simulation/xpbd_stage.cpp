@@ -11,13 +11,11 @@
 namespace clothstream::simulation {
 namespace {
 
-using vulkan::BindingKind;
 using vulkan::Bindings;
 using vulkan::Buffer;
 using vulkan::BufferPurpose;
-
-constexpr auto kTexels = BindingKind::texels;
-constexpr auto kStorage = BindingKind::storage;
+using vulkan::kStorage;
+using vulkan::kTexels;
 
 constexpr std::uint32_t kAllPasses = 7;
 

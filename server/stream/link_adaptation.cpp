@@ -9,7 +9,7 @@ namespace clothstream::stream {
 namespace {
 
 // Over which rates are averaged, s.
-constexpr double kAverage = 0.5;
+constexpr double kAverageSeconds = 0.5;
 // A scene that stood still, or streams slowly, says no more of a link than this in one look.
 constexpr std::chrono::milliseconds kLongestLook{250};
 // Of what arrived while the link was too slow; the rest is left for what else travels.
@@ -24,10 +24,10 @@ LinkAdaptation::LinkAdaptation(OperatingPoint best, std::uint8_t qualities) {
 
 void LinkAdaptation::made(std::uint8_t quality, std::uint8_t layer, std::size_t bytes,
                           Clock::time_point now) {
-  double kept = newestMade_ ? std::exp(-seconds(now - *newestMade_) / kAverage) : 1;
+  double kept = newestMade_ ? std::exp(-seconds(now - *newestMade_) / kAverageSeconds) : 1;
   if (quality != ratesQuality_) kept *= std::pow(kPartOfFiner, quality - ratesQuality_);
   for (double& rate : rates_) rate *= kept;
-  rates_[layer] += static_cast<double>(bytes) / kAverage;
+  rates_[layer] += static_cast<double>(bytes) / kAverageSeconds;
   ratesQuality_ = quality;
   newestMade_ = now;
 }

@@ -8,7 +8,7 @@ namespace clothstream::stream {
 namespace {
 
 // Ticks over which a cost is averaged.
-constexpr int kAverage = 8;
+constexpr int kAveragedTicks = 8;
 
 // What others have between two of their ticks, at the least.
 class Periods {
@@ -35,7 +35,7 @@ class Periods {
 }  // namespace
 
 void Turn::took(Clock::duration time, Clock::time_point now) {
-  cost = cost == Clock::duration::zero() ? time : cost + (time - cost) / kAverage;
+  cost = cost == Clock::duration::zero() ? time : cost + (time - cost) / kAveragedTicks;
   ended = now;
 }
 

@@ -19,6 +19,9 @@ enum class BindingKind : std::uint8_t {
   texels,  // read only
   images,  // RGBA32F texels that the kernel also writes
 };
+inline constexpr auto kStorage = BindingKind::storage;
+inline constexpr auto kTexels = BindingKind::texels;
+inline constexpr auto kImages = BindingKind::images;
 
 struct KernelDescription {
   const char* name = "";                      // for errors, validation and timings

@@ -14,8 +14,6 @@
 namespace clothstream::client {
 namespace {
 
-constexpr std::uint64_t kMs = 1000;
-
 std::vector<std::uint64_t> pings(ClientUnderTest& client) {
   std::vector<std::uint64_t> times;
   for (const v1::ClientMessage& message : client.outgoing()) {

@@ -17,7 +17,6 @@ using ::testing::IsEmpty;
 using ::testing::SizeIs;
 
 constexpr auto kFrame = static_cast<std::uint32_t>(CS_EVENT_FRAME);
-constexpr std::uint64_t kMs = 1000;
 
 struct Joined {
   explicit Joined(ScriptedStream stream = {}) : server(std::move(stream)) { client.join(server); }

@@ -18,8 +18,8 @@ constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 using ::testing::HasSubstr;
 using ::testing::SizeIs;
 
-struct Joined {
-  Joined() { client.join(ScriptedServer()); }
+struct JoinedClient {
+  JoinedClient() { client.join(ScriptedServer()); }
   v1::ClientMessage sent() {
     const auto messages = client.outgoing();
     EXPECT_THAT(messages, SizeIs(1));
@@ -29,7 +29,7 @@ struct Joined {
 };
 
 TEST(Colliders, TravelWithTheTimeTheyWereTrue) {
-  Joined joined;
+  JoinedClient joined;
   const float spheres[] = {1, 2, 3, 0.1f, 4, 5, 6, 0.2f};
   cs_set_colliders(joined.client.get(), spheres, 2, 777);
   const v1::ColliderPoses poses = joined.sent().collider_poses();
@@ -41,7 +41,7 @@ TEST(Colliders, TravelWithTheTimeTheyWereTrue) {
 }
 
 TEST(Colliders, TravelWithTheServersTimeOnceItIsKnown) {
-  Joined joined;
+  JoinedClient joined;
   const float sphere[] = {1, 2, 3, 0.1f};
   cs_set_colliders(joined.client.get(), sphere, 1, 5000);
   EXPECT_EQ(joined.sent().collider_poses().server_time_us(), 0u);
@@ -55,7 +55,7 @@ TEST(Colliders, TravelWithTheServersTimeOnceItIsKnown) {
 }
 
 TEST(Colliders, HandsTravelAsTheirJoints) {
-  Joined joined;
+  JoinedClient joined;
   std::vector<float> joints(std::size_t{4} * CS_HAND_JOINTS);
   for (std::size_t i = 0; i < joints.size(); ++i) joints[i] = static_cast<float>(i);
   EXPECT_EQ(cs_set_hand(joined.client.get(), CS_HAND_RIGHT, joints.data(), CS_HAND_JOINTS, 5), 1);
@@ -85,7 +85,7 @@ TEST(Colliders, HandsTravelAsTheirJoints) {
 }
 
 TEST(Colliders, TravelWithTheirShapeAndTurn) {
-  Joined joined;
+  JoinedClient joined;
   const cs_own_collider own[] = {{.shape = CS_SHAPE_CAPSULE,
                                   .position = {1, 2, 3},
                                   .orientation = {0, 0.6f, 0, 0.8f},
@@ -109,7 +109,7 @@ TEST(Colliders, TravelWithTheirShapeAndTurn) {
 }
 
 TEST(Colliders, OnlyTheNewestTravelWhereTheTransportIsBehindAndNoneMeansNone) {
-  Joined joined;
+  JoinedClient joined;
   const float sphere[] = {1, 2, 3, 0.1f};
   cs_set_colliders(joined.client.get(), sphere, 1, 1);
   cs_set_colliders(joined.client.get(), nullptr, 0, 2);
@@ -120,7 +120,7 @@ TEST(Colliders, OnlyTheNewestTravelWhereTheTransportIsBehindAndNoneMeansNone) {
 }
 
 TEST(Grabs, TravelBesideTheCollidersWithWhatIsNotTheDefault) {
-  Joined joined;
+  JoinedClient joined;
   const float sphere[] = {1, 2, 3, 0.1f};
   cs_set_colliders(joined.client.get(), sphere, 1, 1);
   cs_grab grab{.id = 7,
@@ -149,7 +149,7 @@ TEST(Grabs, TravelBesideTheCollidersWithWhatIsNotTheDefault) {
 }
 
 TEST(Grabs, WhatBecomesOfThemIsTold) {
-  Joined joined;
+  JoinedClient joined;
   v1::ServerMessage message;
   message.mutable_tick_events()->set_tick(9);
   v1::GrabEvent& event = *message.mutable_tick_events()->add_grabs();
@@ -169,7 +169,7 @@ TEST(Grabs, WhatBecomesOfThemIsTold) {
 }
 
 TEST(Contacts, AreWantedAndTold) {
-  Joined joined;
+  JoinedClient joined;
   cs_want_contacts(joined.client.get(), 1, 1);
   EXPECT_TRUE(joined.sent().collider_poses().contact_events());
   v1::ServerMessage message;
@@ -199,7 +199,7 @@ TEST(Contacts, AreWantedAndTold) {
 }
 
 TEST(Attachments, AreMovedOnceEachToWhereTheyWereLastPut) {
-  Joined joined;
+  JoinedClient joined;
   const float first[] = {1, 0, 0}, second[] = {2, 0, 0}, turned[] = {0, 0, 0, 1};
   cs_move_attachment(joined.client.get(), "rod", first, nullptr, 1);
   cs_move_attachment(joined.client.get(), "knot", first, nullptr, 1);
@@ -215,14 +215,14 @@ TEST(Attachments, AreMovedOnceEachToWhereTheyWereLastPut) {
 }
 
 TEST(Colliders, MoreThanAllowedAreLeftOut) {
-  Joined joined;
+  JoinedClient joined;
   const std::vector<float> spheres(4 * 50, 1.0f);
   cs_set_colliders(joined.client.get(), spheres.data(), 50, 1);
   EXPECT_THAT(joined.sent().collider_poses().colliders(), SizeIs(CS_MAX_COLLIDERS));
 }
 
 TEST(Parameters, OnlyWhatIsGivenIsChanged) {
-  Joined joined;
+  JoinedClient joined;
   const float wind[] = {1, 0, -2};
   cs_set_environment(joined.client.get(), nullptr, wind, nullptr);
   const v1::ClientMessage message = joined.sent();
@@ -253,7 +253,7 @@ TEST(Parameters, OnlyWhatIsGivenIsChanged) {
 }
 
 TEST(Parameters, AreThoseOfTheDescriptionUntilSomebodyChangesThem) {
-  Joined joined;
+  JoinedClient joined;
   cs_environment environment;
   ASSERT_EQ(cs_get_environment(joined.client.get(), &environment), 1);
   EXPECT_EQ(environment.gravity[1], -9.81f);  // the default: the definition is silent
@@ -473,7 +473,7 @@ TEST(ClothSettings, OfImplicitEulerAreItsIterationsAndTolerance) {
 // A solver that is left and chosen again has the settings that it had; one that this client does not know
 // too.
 TEST(ClothSettings, OfASolverAreKeptForItsReturn) {
-  Joined joined;
+  JoinedClient joined;
   const auto told = [&](const v1::Solver& solver, std::uint64_t participant) {
     v1::ServerMessage message;
     message.mutable_parameter_changed()->set_participant_id(participant);
@@ -565,7 +565,7 @@ TEST(Reports, ThatAreNoneEndTheClient) {
 }
 
 TEST(Notices, AreHandedOn) {
-  Joined joined;
+  JoinedClient joined;
   v1::ServerMessage message;
   message.mutable_notice()->set_text("simulated time runs slow");
   EXPECT_EQ(joined.client.receive(message.SerializeAsString()), static_cast<std::uint32_t>(CS_EVENT_NOTICE));
@@ -573,7 +573,7 @@ TEST(Notices, AreHandedOn) {
 }
 
 TEST(Scenes, CanBeAskedForInsideTheStream) {
-  Joined joined;
+  JoinedClient joined;
   cs_list_scenes(joined.client.get());
   EXPECT_TRUE(joined.sent().has_list_scenes());
   v1::ServerMessage message;

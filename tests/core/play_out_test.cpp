@@ -21,7 +21,6 @@
 namespace clothstream::client {
 namespace {
 
-constexpr std::uint64_t kMs = 1000;
 constexpr std::uint64_t kServerAhead = 5'000'000'000;  // us, of the own clock
 constexpr std::uint64_t kFrameUs = 10 * kMs;
 

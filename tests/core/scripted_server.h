@@ -14,6 +14,8 @@
 
 namespace clothstream::client {
 
+inline constexpr std::uint64_t kMs = 1000;  // us
+
 struct ClothSize {
   std::string name;
   std::uint32_t rows, columns;

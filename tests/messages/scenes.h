@@ -3,10 +3,13 @@
 #pragma once
 
 #include <array>
+#include <limits>
 
 #include "clothstream/v1/scene.pb.h"
 
 namespace clothstream::messages {
+
+inline constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 
 // Only what has no default.
 inline v1::Scene smallScene() {

@@ -18,8 +18,6 @@ namespace {
 using testing::HasSubstr;
 using testing::StartsWith;
 
-constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
-
 std::span<const std::byte> bytesOf(const std::string& text) {
   return std::as_bytes(std::span(text));
 }

@@ -215,7 +215,6 @@ v1::Attachment& attachment(v1::Scene& scene, const char* name) {
   return added;
 }
 
-constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
 struct BadScene {

@@ -9,7 +9,7 @@ namespace clothstream::tests {
 namespace {
 
 // Far beyond what any answer takes, so that a test that hangs ends.
-constexpr std::chrono::seconds kPatience{20};
+constexpr std::chrono::seconds kLongestWait{20};
 
 grpc::ByteBuffer bufferOf(const std::string& bytes) {
   const grpc::Slice slice(bytes);
@@ -50,10 +50,10 @@ RpcStream::~RpcStream() {
 bool RpcStream::await(const char* what) {
   void* tag = nullptr;
   bool ok = false;
-  if (queue_.AsyncNext(&tag, &ok, std::chrono::system_clock::now() + kPatience) !=
+  if (queue_.AsyncNext(&tag, &ok, std::chrono::system_clock::now() + kLongestWait) !=
       grpc::CompletionQueue::GOT_EVENT)
     throw std::runtime_error(std::string(what) + ": nothing happened for " +
-                             std::to_string(kPatience.count()) + " s");
+                             std::to_string(kLongestWait.count()) + " s");
   return ok;
 }
 

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cstdint>
 #include <memory>
 #include <utility>
 
@@ -10,6 +11,14 @@
 #include "server/scene/scene.h"
 
 namespace clothstream::scene {
+
+// rows x columns nodes of a rectangle of 3 x 2 m and 1.5 kg.
+inline Cloth grid(std::uint32_t rows, std::uint32_t columns) {
+  Cloth cloth;
+  cloth.grid = {.rows = rows, .columns = columns, .width = 3, .height = 2, .pose = {}};
+  cloth.mass = 1.5f;
+  return cloth;
+}
 
 // The grid's nodes, triangles and quads.
 inline MeshShape shapeOf(const Cloth& grid) {

@@ -12,13 +12,6 @@
 namespace clothstream::scene {
 namespace {
 
-Cloth grid(std::uint32_t rows, std::uint32_t columns) {
-  Cloth cloth;
-  cloth.grid = {.rows = rows, .columns = columns, .width = 3, .height = 2, .pose = {}};
-  cloth.mass = 1.5f;
-  return cloth;
-}
-
 MeshShape triangles(std::vector<Vec3> positions, std::vector<Triangle> corners) {
   MeshShape shape;
   shape.positions = std::move(positions);

@@ -13,12 +13,6 @@
 namespace clothstream::scene {
 namespace {
 
-Cloth grid(std::uint32_t rows, std::uint32_t columns) {
-  Cloth cloth;
-  cloth.grid = {.rows = rows, .columns = columns, .width = 3, .height = 2, .pose = {}};
-  return cloth;
-}
-
 Cloth discCloth(std::uint32_t rings) {
   Cloth cloth;
   cloth.mesh = std::make_shared<const Mesh>(makeMesh(scene::disc(rings, 0.1f)));

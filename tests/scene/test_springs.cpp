@@ -6,15 +6,10 @@
 #include <gtest/gtest.h>
 
 #include "server/scene/springs.h"
+#include "tests/scene/meshes.h"
 
 namespace clothstream::scene {
 namespace {
-
-Cloth grid(std::uint32_t rows, std::uint32_t columns) {
-  Cloth cloth;
-  cloth.grid = {.rows = rows, .columns = columns, .width = 3, .height = 2, .pose = {}};
-  return cloth;
-}
 
 std::size_t countOf(const std::vector<SpringLink>& links, SpringKind kind) {
   return static_cast<std::size_t>(std::ranges::count(links, kind, &SpringLink::kind));

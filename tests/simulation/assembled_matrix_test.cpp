@@ -24,20 +24,14 @@ using simulation::NodeState;
 using vulkan::BindingKind;
 using vulkan::Buffer;
 using vulkan::BufferPurpose;
+using vulkan::kImages;
+using vulkan::kStorage;
+using vulkan::kTexels;
 
-constexpr auto kTexels = BindingKind::texels;
-constexpr auto kStorage = BindingKind::storage;
 constexpr std::uint32_t kWorkgroup = 8;
 constexpr double kSubstepSeconds = 1.0 / 720;
 
 class AssembledMatrix : public GpuTest {};
-
-scene::Cloth assembled(scene::Cloth cloth, bool bendConstraints) {
-  cloth.solver.kind = scene::SolverKind::constraint;
-  cloth.solver.path = scene::ConstraintPath::assembled;
-  cloth.solver.bendConstraints = bendConstraints;
-  return cloth;
-}
 
 // Two grids and a mesh, of which some have neighbours that are both pinned; one is not assembled.
 scene::Scene variedScene() {
@@ -172,10 +166,10 @@ Products productsOf(const scene::Scene& scene, const AssembledTables& tables, co
   const vulkan::Kernel assemble =
       kernel("multiply_jacobians", kernels::multiply_jacobians,
              {kTexels, kTexels, kTexels, kTexels, kTexels, kTexels, kTexels, kStorage}, 0);
-  const vulkan::Kernel multiply = kernel("multiply_system", kernels::multiply_system,
-                                         {kTexels, kTexels, kTexels, kTexels, kTexels, kTexels,
-                                          BindingKind::images, kStorage, kStorage, kStorage},
-                                         sizeof(shared::MultiplierPush));
+  const vulkan::Kernel multiply =
+      kernel("multiply_system", kernels::multiply_system,
+             {kTexels, kTexels, kTexels, kTexels, kTexels, kTexels, kImages, kStorage, kStorage, kStorage},
+             sizeof(shared::MultiplierPush));
   const vulkan::Bindings filling(device(), fill,
                                  {&cloths.texels(), &systems.texels(), &chunks.texels(), &rows.texels(),
                                   &positions, &velocities, &blocks, &vectors, &solves});

@@ -16,17 +16,7 @@ using scene::SolverKind;
 using simulation::NodeState;
 using simulation::StateSnapshot;
 
-constexpr double kRounding = 1.0 / (1 << 24);
-constexpr double kExtent = 4;  // m, further than any state here
-
 class Assembled : public GpuTest {};
-
-scene::Cloth assembled(scene::Cloth cloth, bool bendConstraints = false) {
-  cloth.solver.kind = SolverKind::constraint;
-  cloth.solver.path = ConstraintPath::assembled;
-  cloth.solver.bendConstraints = bendConstraints;
-  return cloth;
-}
 
 scene::Scene withPath(scene::Scene scene, ConstraintPath path) {
   for (scene::Cloth& cloth : scene.cloths) cloth.solver.path = path;
@@ -40,31 +30,27 @@ double rowsOf(const scene::Scene& scene) {
   return rows;
 }
 
-// Of a solve that is to be compared.
-constexpr float kTolerance = 1e-6f;
-constexpr std::uint32_t kIterations = 2000;
-
 // Off the solution by what the solve may leave, m. With w the largest inverse mass, c >= 0.01 w and rho what
 // is left of b - A lambda, nodes are off by |M^-1 J^T A^-1 rho| <= |rho| sqrt(w) / (2 sqrt(c)) = 5 |rho|. Of
 // b, as long as `side`, rho is the tolerance, and the rounding of A lambda: entries are good to 1e-6, |A| <=
 // 24 w (J^T J is at most twice the springs of a node), and |lambda| <= 5 |b| / w, as b is as good as all J
 // times something. And b is rounded in two positions of each row.
 double errorOfSolve(double rows, double side) {
-  return 5 * (double{kTolerance} + 1e-6 * 24 * 5) * std::sqrt(rows) * side +
+  return 5 * (double{kSolveTolerance} + 1e-6 * 24 * 5) * std::sqrt(rows) * side +
          5 * std::sqrt(rows) * 2 * kRounding * kExtent;
 }
 
 constexpr double kDisplaced = 0.007;  // of a length, two ends of which are off by up to 2 mm an axis
 
 struct Compared {
-  std::uint32_t iterations = kIterations;
-  float tolerance = kTolerance;
+  std::uint32_t iterations = kSolveIterations;
+  float tolerance = kSolveTolerance;
   std::vector<scene::Pose> attachments = {};
 };
 
 // One substep from a random state.
-void expectLikeReference(scene::Scene scene, unsigned seed, simulation::SimulationOptions options = {},
-                         Compared compared = {}) {
+void expectLikeSolution(scene::Scene scene, unsigned seed, simulation::SimulationOptions options = {},
+                        Compared compared = {}) {
   scene.substeps = 1;
   scene.simulationRate = 720;
   for (scene::Cloth& cloth : scene.cloths) {
@@ -98,7 +84,7 @@ void expectLikeReference(scene::Scene scene, unsigned seed, simulation::Simulati
   // Without the solve, or with an iteration less where few are made, it would be elsewhere: the comparison
   // can fail.
   for (scene::Cloth& cloth : scene.cloths)
-    if (compared.iterations < kIterations)
+    if (compared.iterations < kSolveIterations)
       --cloth.solver.iterations;
     else
       cloth.solver.compliance = 1;
@@ -120,22 +106,22 @@ TEST_F(Assembled, moveNodesAsTheReferenceOnEveryShapeOfGrid) {
     SCOPED_TRACE(::testing::Message() << rows << " x " << columns);
     scene::Cloth cloth = assembled(calmCloth(rows, columns));
     cloth.pins = {topRow(cloth)};
-    expectLikeReference(sceneOf({cloth}), seed++);
+    expectLikeSolution(sceneOf({cloth}), seed++);
   }
 }
 
 TEST_F(Assembled, thatArePulledGentlyMoveNodesAsTheReference) {
   scene::Cloth cloth = assembled(calmCloth(9, 8));
   cloth.solver.takenBack = 0.125f;
-  expectLikeReference(sceneOf({cloth}), 8);
+  expectLikeSolution(sceneOf({cloth}), 8);
 }
 
 TEST_F(Assembled, ofBendSpringsMoveNodesAsTheReference) {
-  expectLikeReference(sceneOf({assembled(calmCloth(12, 11), true)}), 5);
+  expectLikeSolution(sceneOf({assembled(calmCloth(12, 11), true)}), 5);
 }
 
 TEST_F(Assembled, ofMeshesMoveNodesAsTheReference) {
-  expectLikeReference(sceneOf({assembled(calmCloth(6, 9)), disc(7)}), 7);
+  expectLikeSolution(sceneOf({assembled(calmCloth(6, 9)), disc(7)}), 7);
 }
 
 // Attached nodes move at a speed of their own, which is part of b.
@@ -147,11 +133,11 @@ TEST_F(Assembled, followAttachmentsAsTheReferenceDoes) {
   cloth.attachments = {rod};
   Compared compared;
   compared.attachments = {{scene::Vec3(0.0006f, 0.0008f, -0.0003f)}};
-  expectLikeReference(sceneOf({cloth}), 11, {}, compared);
+  expectLikeSolution(sceneOf({cloth}), 11, {}, compared);
 }
 
 TEST_F(Assembled, thatSeveralWorkgroupsSolveMoveNodesAsTheReference) {
-  expectLikeReference(sceneOf({assembled(calmCloth(21, 26)), disc(7)}), 9, {.solveWholeNodes = 0});
+  expectLikeSolution(sceneOf({assembled(calmCloth(21, 26)), disc(7)}), 9, {.solveWholeNodes = 0});
 }
 
 // The same iterates, not just the same limit: [Va21] Eq. 12-17. Few enough that rounding has not grown.
@@ -159,8 +145,8 @@ TEST_F(Assembled, goAsFarInFewIterationsAsTheReference) {
   for (const std::uint32_t wholeNodes : {1'000'000u, 0u})
     for (const std::uint32_t iterations : {1u, 2u, 4u}) {
       SCOPED_TRACE(::testing::Message() << iterations << " iterations, " << wholeNodes);
-      expectLikeReference(sceneOf({assembled(calmCloth(13, 9), true)}), 10, {.solveWholeNodes = wholeNodes},
-                          {.iterations = iterations, .tolerance = 0});
+      expectLikeSolution(sceneOf({assembled(calmCloth(13, 9), true)}), 10, {.solveWholeNodes = wholeNodes},
+                         {.iterations = iterations, .tolerance = 0});
     }
 }
 
@@ -173,8 +159,8 @@ TEST_F(Assembled, moveAsTheMatrixFreePathDoes) {
   scene.simulationRate = 240;
   scene.substeps = 3;
   for (scene::Cloth& one : scene.cloths) {
-    one.solver.iterations = kIterations;
-    one.solver.tolerance = kTolerance;
+    one.solver.iterations = kSolveIterations;
+    one.solver.tolerance = kSolveTolerance;
   }
   std::mt19937 random(12);
   const NodeState start = randomState(scene, random, 0.002f, 0.5f);

@@ -13,8 +13,6 @@ namespace {
 using simulation::NodeState;
 using simulation::TickInputs;
 
-constexpr double kRounding = 1.0 / (1 << 24);
-
 class Behaviour : public GpuTest {};
 
 // Semi-implicit Euler falls g h^2 n (n + 1) / 2 in n steps. The sum of n rounded steps errs by at most half

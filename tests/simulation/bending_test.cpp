@@ -16,8 +16,6 @@ namespace {
 using scene::SolverKind;
 using simulation::NodeState;
 
-constexpr double kRounding = 1.0 / (1 << 24);
-
 class DihedralBending : public GpuTest {};
 
 // Bent at rest, without springs: only gravity and hinges move it.

@@ -13,9 +13,6 @@ namespace {
 
 using simulation::NodeState;
 
-constexpr double kRounding = 1.0 / (1 << 24);
-constexpr double kExtent = 4;  // m, further than any state here
-
 class Constraints : public GpuTest {};
 
 scene::Cloth constrained(std::uint32_t rows, std::uint32_t columns, bool bendConstraints = false) {
@@ -48,10 +45,6 @@ double norm(const std::vector<scene::Vec3>& vectors) {
   return std::sqrt(sum);
 }
 
-// Of a solve that is to be compared.
-constexpr float kTolerance = 1e-6f;
-constexpr std::uint32_t kIterations = 2000;
-
 // Off the reference by what the solve may leave, m. It solves A e = side with A = c M + J^T J and c M = 0.01
 // (times one), of a side J^T b. With rho = A e what is left, |e| <= 100 |rho|; |rho| is the tolerance times
 // |J^T b|, plus the rounding of rows, 1e-6 of it; |J^T b| <= 5 |b|, as |J^T J| is at most twice the springs
@@ -59,15 +52,15 @@ constexpr std::uint32_t kIterations = 2000;
 // kExtent), of which the solution makes at most |b| / (2 sqrt(0.01)).
 double errorOfSolve(double rows) {
   const double side = std::sqrt(rows) * 0.007;  // two ends off by up to 2 mm an axis
-  return 100 * (double{kTolerance} + 1e-6) * 5 * side + 5 * std::sqrt(rows) * 2 * kRounding * kExtent;
+  return 100 * (double{kSolveTolerance} + 1e-6) * 5 * side + 5 * std::sqrt(rows) * 2 * kRounding * kExtent;
 }
 
 void expectLikeReference(scene::Scene scene, unsigned seed, simulation::SimulationOptions options = {}) {
   scene.substeps = 1;
   scene.simulationRate = 720;
   for (scene::Cloth& cloth : scene.cloths) {
-    cloth.solver.iterations = kIterations;
-    cloth.solver.tolerance = kTolerance;
+    cloth.solver.iterations = kSolveIterations;
+    cloth.solver.tolerance = kSolveTolerance;
   }
   std::mt19937 random(seed);
   const NodeState start = randomState(scene, random, 0.002f, 0.5f);
@@ -86,9 +79,9 @@ void expectLikeReference(scene::Scene scene, unsigned seed, simulation::Simulati
   EXPECT_LT(largestDistance(state, reference), tolerance);
   EXPECT_LT(largestSpeedDifference(state, reference), 720 * tolerance);
   for (const shared::SolveRecord& solve : running.solves()) {
-    EXPECT_LE(solve.residual, kTolerance) << solve.iterations;
+    EXPECT_LE(solve.residual, kSolveTolerance) << solve.iterations;
     EXPECT_GT(solve.iterations, 1u);
-    EXPECT_LT(solve.iterations, kIterations);
+    EXPECT_LT(solve.iterations, kSolveIterations);
   }
   // Without the solve it would be elsewhere: the comparison can fail.
   for (scene::Cloth& cloth : scene.cloths) cloth.solver.compliance = 1;
@@ -176,12 +169,6 @@ TEST_F(Constraints, keepAFreeClothsMomentum) {
   for (int tick = 0; tick < 20; ++tick) running.tick(inputsOf(scene));
   const double flow = norm(start.velocities) * 20;  // sum of speeds, at most sqrt(400) times the norm
   EXPECT_LT((momentum(running.state()) - momentum(start)).norm(), 1e-6 * flow * 200);
-}
-
-reference::Strain strainOf(const scene::Scene& scene, const NodeState& state) {
-  reference::ReferenceSimulation reference(scene);
-  setState(reference, state);
-  return reference.cloths().front().strain();
 }
 
 // The sheet swings down from horizontal, the hardest part of its life; 0.8 s.
@@ -275,8 +262,8 @@ TEST_F(Adaptive, moveNodesAsTheReference) {
   scene::Scene scene = sceneOf({adaptive(9, 14)});
   scene.substeps = 1;
   scene.simulationRate = 720;
-  scene.cloths.front().solver.iterations = kIterations;
-  scene.cloths.front().solver.tolerance = kTolerance;
+  scene.cloths.front().solver.iterations = kSolveIterations;
+  scene.cloths.front().solver.tolerance = kSolveTolerance;
   std::mt19937 random(4);
   const NodeState start = randomState(scene, random, 0.0025f, 0.5f);
   Running running(scene);

@@ -18,8 +18,6 @@ using simulation::NodeState;
 
 class Hold : public GpuTest {};
 
-constexpr double kRounding = 1.0 / (1 << 24);
-
 scene::Attachment leftColumn(const scene::Cloth& cloth) {
   scene::Attachment attachment;
   attachment.name = "rod";

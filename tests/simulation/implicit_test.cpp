@@ -13,10 +13,7 @@
 namespace clothstream::tests {
 namespace {
 
-using reference::Vec3;
 using simulation::NodeState;
-
-constexpr double kRounding = 1.0 / (1 << 24);
 
 class ImplicitEuler : public GpuTest {};
 
@@ -71,12 +68,12 @@ StartedSystem systemOf(const scene::Scene& scene, const NodeState& start) {
   free.cloths.front().solver.kind = scene::SolverKind::massSpring;
   reference::ReferenceSimulation simulation(free);
   setState(simulation, start);
-  const std::vector<Vec3> positions(simulation.cloths().front().positions().begin(),
-                                    simulation.cloths().front().positions().end());
-  const std::vector<Vec3> velocities(simulation.cloths().front().velocities().begin(),
-                                     simulation.cloths().front().velocities().end());
+  const std::vector<reference::Vec3> positions(simulation.cloths().front().positions().begin(),
+                                               simulation.cloths().front().positions().end());
+  const std::vector<reference::Vec3> velocities(simulation.cloths().front().velocities().begin(),
+                                                simulation.cloths().front().velocities().end());
   simulation.tick(reference::inputsAt(free, 0));
-  const std::span<const Vec3> freely = simulation.cloths().front().velocities();
+  const std::span<const reference::Vec3> freely = simulation.cloths().front().velocities();
   reference::ImplicitSystem system(springs, positions, velocities, freely,
                                    simulation.cloths().front().inverseMasses(), scene.substepSeconds());
   Eigen::VectorXd back(system.side().size());
@@ -87,16 +84,16 @@ StartedSystem systemOf(const scene::Scene& scene, const NodeState& start) {
 }
 
 void expectLikeReference(scene::Cloth cloth, std::uint32_t rate, unsigned seed) {
-  constexpr float kTolerance = 1e-5f;
+  constexpr float tolerance = 1e-5f;
   cloth.solver.iterations = 500;
-  cloth.solver.tolerance = kTolerance;
+  cloth.solver.tolerance = tolerance;
   const scene::Scene scene = steps({cloth}, rate);
   std::mt19937 random(seed);
   const NodeState start = randomState(scene, random, 0.002f, 0.3f);
   Running running(scene);
   running.restore(start);
   const simulation::ClothReport report = running.tickAndReport(inputsOf(scene)).front();
-  EXPECT_LE(report.residual, kTolerance);
+  EXPECT_LE(report.residual, tolerance);
   EXPECT_GT(report.iterations, 1u);
 
   reference::ReferenceSimulation reference(scene);
@@ -105,7 +102,7 @@ void expectLikeReference(scene::Cloth cloth, std::uint32_t rate, unsigned seed) 
   double lightest = 1;
   for (const double mass : reference.cloths().front().masses()) lightest = std::min(lightest, mass);
   const StartedSystem started = systemOf(scene, start);
-  const double error = errorOfSolve(started.system, started.residual, lightest, double{kTolerance});
+  const double error = errorOfSolve(started.system, started.residual, lightest, double{tolerance});
   const double h = scene.substepSeconds();
   const NodeState state = running.state();
   EXPECT_LT(largestSpeedDifference(state, reference), error);
@@ -185,12 +182,12 @@ TEST_F(ImplicitEuler, hangsWhereForcesBalance) {
   reference::ReferenceSimulation reference(scene);
   setState(reference, running.state());
   reference::ReferenceCloth& hung = reference.cloths().front();
-  std::vector<Vec3> forces(hung.nodeCount(), Vec3::Zero());
+  std::vector<reference::Vec3> forces(hung.nodeCount(), reference::Vec3::Zero());
   hung.accumulateSpringForces(forces);
   double most = 0;
   for (std::uint32_t i = 0; i < hung.nodeCount(); ++i)
     if (hung.inverseMasses()[i] > 0)
-      most = std::max(most, (forces[i] * hung.inverseMasses()[i] + Vec3(0, -9.81, 0)).norm());
+      most = std::max(most, (forces[i] * hung.inverseMasses()[i] + reference::Vec3(0, -9.81, 0)).norm());
   EXPECT_LT(most, 0.01 * 9.81);
   EXPECT_GT(hung.strain().max, 0.001);  // they do carry it
 }
@@ -207,7 +204,7 @@ TEST_F(ImplicitEuler, keepsAFreeClothsMomentum) {
   std::mt19937 random(7);
   const NodeState start = randomState(scene, random, 0.001f, 0.5f);
   const auto momentum = [](const NodeState& state) {
-    Vec3 sum = Vec3::Zero();
+    reference::Vec3 sum = reference::Vec3::Zero();
     for (const scene::Vec3& v : state.velocities) sum += v.cast<double>();
     return sum;
   };

@@ -11,10 +11,8 @@ namespace {
 
 using simulation::NodeState;
 
-// Half a unit in the last place, relative.
-constexpr double kRounding = 1.0 / (1 << 24);
-// Every test state lies within this of the origin, and moves slower than kSpeed.
-constexpr double kExtent = 4, kSpeed = 3;
+// m/s; every state here moves slower.
+constexpr double kSpeed = 3;
 // How far from 1 a normal's length may be: the error of reciprocalSquareRoot, and three roundings.
 constexpr double kUnitLength = 7e-7 + 3 * kRounding;
 

@@ -16,8 +16,6 @@ namespace {
 using simulation::ClothReport;
 using simulation::NodeState;
 
-constexpr double kRounding = 1.0 / (1 << 24);
-
 class Report : public GpuTest {};
 
 std::vector<std::byte> bitsOf(const std::vector<ClothReport>& reports) {
@@ -63,7 +61,7 @@ void expectAsReference(const ClothReport& report, const reference::ReferenceClot
 }
 
 // More nodes than a block, and fewer than a run has; meshes between grids; pinned ones.
-scene::Scene variedScene() {
+scene::Scene reportedScene() {
   scene::Cloth large = calmCloth(71, 67);
   large.pins = {topRow(large)};
   large.grid.pose.position = scene::Vec3(0.3f, 0.2f, -0.4f);
@@ -79,7 +77,7 @@ scene::Scene variedScene() {
 }
 
 TEST_F(Report, saysOfRandomStatesWhatTheReferenceDoes) {
-  const scene::Scene scene = variedScene();
+  const scene::Scene scene = reportedScene();
   Running running(scene);
   std::mt19937 random(11);
   for (const float displacement : {0.004f, 0.0002f, 0.0f}) {
@@ -99,7 +97,7 @@ TEST_F(Report, saysOfRandomStatesWhatTheReferenceDoes) {
 
 // Stiffness counts whether a spring is a force or a constraint; what a solve says belongs to its cloth.
 TEST_F(Report, saysWhatEachClothsSolverDid) {
-  scene::Scene scene = variedScene();
+  scene::Scene scene = reportedScene();
   scene.cloths[1].solver.kind = scene::SolverKind::acad;
   scene.cloths[1].solver.activation = 0.01f;
   scene.cloths[3].solver.kind = scene::SolverKind::constraint;
@@ -168,7 +166,7 @@ TEST_F(Report, findsNoPenetrationWhereClothLiesOnACollider) {
 }
 
 TEST_F(Report, hasTheSameBitsWhateverTheWorkgroupsAndChangesNothing) {
-  scene::Scene scene = variedScene();
+  scene::Scene scene = reportedScene();
   scene.cloths[1].solver.kind = scene::SolverKind::acad;
   scene.cloths[3].solver.kind = scene::SolverKind::constraint;
   const scene::Pose place{scene::Vec3(0.2f, -0.3f, -0.35f), turned(20, scene::Vec3::UnitX())};

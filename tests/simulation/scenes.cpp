@@ -24,6 +24,13 @@ scene::Cloth calmCloth(std::uint32_t rows, std::uint32_t columns) {
   return cloth;
 }
 
+scene::Cloth assembled(scene::Cloth cloth, bool bendConstraints) {
+  cloth.solver.kind = scene::SolverKind::constraint;
+  cloth.solver.path = scene::ConstraintPath::assembled;
+  cloth.solver.bendConstraints = bendConstraints;
+  return cloth;
+}
+
 scene::Cloth discCloth(std::uint32_t rings) {
   scene::Cloth cloth = calmCloth(2, 2);
   cloth.mesh = std::make_shared<const scene::Mesh>(
@@ -122,6 +129,12 @@ double largestSpeedDifference(const simulation::NodeState& state,
     for (const reference::Vec3& velocity : cloth.velocities())
       largest = std::max(largest, (state.velocities[node++].cast<double>() - velocity).norm());
   return largest;
+}
+
+reference::Strain strainOf(const scene::Scene& scene, const simulation::NodeState& state) {
+  reference::ReferenceSimulation reference(scene);
+  setState(reference, state);
+  return reference.cloths().front().strain();
 }
 
 Running::Running(const scene::Scene& scene, simulation::SimulationOptions options, vulkan::Device& device)

@@ -16,9 +16,20 @@
 
 namespace clothstream::tests {
 
+// Half a unit in the last place, relative.
+inline constexpr double kRounding = 1.0 / (1 << 24);
+// m; further from the origin than any node of these tests.
+inline constexpr double kExtent = 4;
+
+// Of an enforcement that is to be compared.
+inline constexpr float kSolveTolerance = 1e-6f;
+inline constexpr std::uint32_t kSolveIterations = 2000;
+
 // rows x columns nodes with 2 cm between them, 10 g a node, springs and damping far inside the stability
 // bound.
 scene::Cloth calmCloth(std::uint32_t rows, std::uint32_t columns);
+// Enforced by constraints, with the matrices assembled.
+scene::Cloth assembled(scene::Cloth cloth, bool bendConstraints = false);
 // A disc of rings 2 cm apart with the springs of a calm cloth; its lightest node has more than 10 g.
 scene::Cloth discCloth(std::uint32_t rings);
 scene::GridRange topRow(const scene::Cloth& cloth);
@@ -42,6 +53,9 @@ void setState(reference::ReferenceSimulation& reference, const simulation::NodeS
 double largestDistance(const simulation::NodeState& state, const reference::ReferenceSimulation& reference);
 double largestSpeedDifference(const simulation::NodeState& state,
                               const reference::ReferenceSimulation& reference);
+
+// Of the first cloth.
+reference::Strain strainOf(const scene::Scene& scene, const simulation::NodeState& state);
 
 // A simulation and what it takes to run it.
 class Running {

@@ -19,7 +19,7 @@ scene::Cloth named(const char* name, scene::Cloth cloth, scene::SolverKind kind)
 }
 
 // A grid and a mesh of each kind, so soft that ACAD has something to hold; and a ball.
-scene::Scene systems() {
+scene::Scene solvedScene() {
   using enum scene::SolverKind;
   scene::Scene scene = sceneOf(
       {named("held", calmCloth(37, 29), constraint), named("adaptive", calmCloth(30, 41), acad),
@@ -48,19 +48,19 @@ TEST_F(Solve, givesTheSameBitsHoweverTheWorkIsCut) {
                                                 {.workgroupSize = 16, .solveWholeNodes = 700},
                                                 {.workgroupSize = 64, .solveWholeNodes = 0},
                                                 {.workgroupSize = 100, .solveWholeNodes = 1'000'000}};
-  expectSameBits(systems(), passingBall, 10, ways);
+  expectSameBits(solvedScene(), passingBall, 10, ways);
 }
 
 // What it says of itself too; the systems' order alone depends on who solves which.
 TEST_F(Solve, reportsTheSameWhoeverSolves) {
   const Reports reports =
-      expectSameReports(systems(), passingBall, {.solveWholeNodes = 1'000'000}, {.solveWholeNodes = 0});
+      expectSameReports(solvedScene(), passingBall, {.solveWholeNodes = 1'000'000}, {.solveWholeNodes = 0});
   for (const auto& tick : reports) EXPECT_LT(tick[1].activeConstraints, 4u * 30 * 41 / 2);
   EXPECT_GT(reports.back()[1].activeConstraints, 0u);
 }
 
 TEST_F(Solve, givesTheSameHashesInRunsOfAThousandTicks) {
-  scene::Scene scene = systems();
+  scene::Scene scene = solvedScene();
   scene.substeps = 1;
   scene.simulationRate = 288;
   for (scene::Cloth& cloth : scene.cloths) cloth.solver.iterations = 4;
@@ -69,7 +69,7 @@ TEST_F(Solve, givesTheSameHashesInRunsOfAThousandTicks) {
 
 // The same number on every device.
 TEST_F(Solve, reachesTheHashOfEveryOtherDevice) {
-  EXPECT_EQ(hashAfter(systems(), passingBall, 12, {.solveWholeNodes = 700}), 0x8238f727263d17eau);
+  EXPECT_EQ(hashAfter(solvedScene(), passingBall, 12, {.solveWholeNodes = 700}), 0x8238f727263d17eau);
 }
 
 }  // namespace

@@ -14,7 +14,7 @@
 namespace clothstream::codec::hierarchical {
 namespace {
 
-Int32x4 unzigzag(Int32x4 numbers) {
+Int32x4 unzigzagLanes(Int32x4 numbers) {
   return numbers.bitsShiftedRight(1) ^ (Int32x4::all(0) - (numbers & Int32x4::all(1)));
 }
 
@@ -318,7 +318,7 @@ void HierarchicalDecoder::completeResiduals(Component component, std::uint32_t f
   const Int32x4 isMore = (symbols == Int32x4::all(kEscape)) |
                          (scales > Int32x4::all(static_cast<std::int32_t>(kFirstScaleWithRawBits) - 1));
   if (isMore.signs() == 0 && !anyStays_) {
-    unzigzag(symbols).store(residuals);
+    unzigzagLanes(symbols).store(residuals);
     return;
   }
   for (std::uint32_t i = 0; i < count; ++i) {

@@ -15,10 +15,10 @@ constexpr double kStay = 0.01, kStayOfKey = 0.1;  // how much the former weights
 constexpr std::array<std::uint32_t, kWeightClasses> kFittedChunks{8, 16, 6, 12, 10, 20};
 
 using Matrix = std::array<std::array<double, kFeatures>, kFeatures>;
-using Vector = std::array<double, kFeatures>;
+using SystemVector = std::array<double, kFeatures>;
 
 // x with m x = x as it was; m is symmetric and positive definite, and overwritten (Cholesky).
-void solve(Matrix& m, Vector& x) {
+void solve(Matrix& m, SystemVector& x) {
   for (std::size_t j = 0; j < kFeatures; ++j) {
     for (std::size_t k = 0; k < j; ++k) m[j][j] -= m[j][k] * m[j][k];
     m[j][j] = std::sqrt(std::max(m[j][j], 1e-12));
@@ -79,7 +79,7 @@ void WeightFitter::fit(Weights& weights, bool key) {
     for (std::size_t i = 0; i < kProducts; ++i) sums.all[i] = kFade * sums.all[i] + sums.fresh[i];
     sums.fresh = {};
     Matrix m;
-    Vector x;
+    SystemVector x;
     double trace = 0;
     auto product = sums.all.begin();
     for (std::size_t i = 0; i < kFeatures; ++i) {

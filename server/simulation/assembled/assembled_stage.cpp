@@ -18,10 +18,9 @@ namespace {
 
 using vulkan::BindingKind;
 using vulkan::BufferPurpose;
-
-constexpr auto kTexels = BindingKind::texels;
-constexpr auto kImages = BindingKind::images;
-constexpr auto kStorage = BindingKind::storage;
+using vulkan::kImages;
+using vulkan::kStorage;
+using vulkan::kTexels;
 
 // As SolveStage: a workgroup on a software device is no wider than the CPU's vectors, and an invocation makes
 // 65,535 rounds of loops at most.

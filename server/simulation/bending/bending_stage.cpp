@@ -10,8 +10,8 @@
 namespace clothstream::simulation {
 namespace {
 
-constexpr auto kTexels = vulkan::BindingKind::texels;
-constexpr auto kStorage = vulkan::BindingKind::storage;
+using vulkan::kStorage;
+using vulkan::kTexels;
 
 std::vector<bool> bending(std::span<const scene::Cloth> cloths) {
   std::vector<bool> bends;

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cassert>
 
+#include "server/simulation/texel.h"
+
 namespace clothstream::simulation {
 namespace {
 
@@ -13,10 +15,6 @@ using shared::vec4;
 constexpr std::size_t kRecordTexels = sizeof(shared::ColliderRecord) / sizeof(vec4);
 // Instead of infinity, whose square kernels would have to avoid.
 constexpr float kFar = 1e15f;
-
-vec4 texel(const scene::Vec3& v, float w) {
-  return {v.x(), v.y(), v.z(), w};
-}
 
 // Appends the planes that the shape needs; `firstPlane` is the texel of the first of all.
 vec4 shapeTexel(const scene::Shape& shape, std::size_t firstPlane, std::vector<vec4>& planes) {

@@ -17,9 +17,9 @@ namespace {
 
 using vulkan::Buffer;
 using vulkan::BufferPurpose;
+using vulkan::kStorage;
+using vulkan::kTexels;
 
-constexpr auto kTexels = vulkan::BindingKind::texels;
-constexpr auto kStorage = vulkan::BindingKind::storage;
 constexpr std::size_t kGripBytes = kMaxGrips * sizeof(shared::GripRecord);
 constexpr std::size_t kReportBytes = kMaxGrips * sizeof(shared::GripReport);
 

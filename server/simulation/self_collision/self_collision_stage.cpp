@@ -16,16 +16,15 @@
 #include "kernels/sort_cells.h"
 #include "kernels/start_cells.h"
 #include "server/simulation/scene_tables.h"
+#include "server/simulation/texel.h"
 
 namespace clothstream::simulation {
 namespace {
 
 using vulkan::Bindings;
 using vulkan::BufferPurpose;
-
-constexpr auto kTexels = vulkan::BindingKind::texels;
-constexpr auto kStorage = vulkan::BindingKind::storage;
-constexpr std::size_t kTexelBytes = sizeof(shared::vec4);
+using vulkan::kStorage;
+using vulkan::kTexels;
 
 constexpr std::uint32_t kListsATick = 3;
 // Of the time that lists are for: velocities change in it.
