@@ -40,6 +40,33 @@ Ages agesOf(std::vector<float>& samples) {
   return {load::percentile(samples, 50), load::percentile(samples, 99)};
 }
 
+struct Stage {
+  const char* key;
+  std::vector<float> load::PoseTimes::*samples;
+};
+constexpr Stage kStages[]{{"poseToDisplayable", &load::PoseTimes::whole},
+                          {"poseToTick", &load::PoseTimes::toTick},
+                          {"tickToPacket", &load::PoseTimes::tickToPacket},
+                          {"packetToDecoded", &load::PoseTimes::packetToDecoded},
+                          {"decodedToDisplayable", &load::PoseTimes::decodedToDisplayable}};
+
+// Of no pose, null.
+void addPoses(nlohmann::ordered_json& object, load::PoseTimes& poses) {
+  const bool some = !poses.whole.empty();
+  object["poses"] = poses.whole.size();
+  for (const Stage& stage : kStages) {
+    std::vector<float>& samples = poses.*stage.samples;
+    const Ages ages = agesOf(samples);
+    const auto set = [&](const char* what, double ms) {
+      nlohmann::ordered_json& value = object[fmt::format("{}Ms{}", stage.key, what)];
+      if (some) value = ms;
+    };
+    set("P50", ages.p50);
+    set("P99", ages.p99);
+    set("Mean", load::mean(samples));
+  }
+}
+
 std::string json(load::LoadReport& report, std::optional<double> serverCpu) {
   const Ages ages = agesOf(report.figures.ages), tickAges = agesOf(report.figures.tickAges);
   nlohmann::ordered_json object{
@@ -65,6 +92,7 @@ std::string json(load::LoadReport& report, std::optional<double> serverCpu) {
       {"intrusions", report.visits},
   };
   if (serverCpu) object["serverCpuSeconds"] = *serverCpu;
+  addPoses(object, report.figures.poses);
   return object.dump(2);
 }
 
@@ -77,6 +105,16 @@ std::string text(load::LoadReport& report, std::optional<double> serverCpu) {
       report.participants, report.seconds, report.framesPerSecond(), report.mbitPerSecond(),
       report.figures.dropped, report.figures.decodeErrors + report.slowFigures.decodeErrors, ages.p50,
       ages.p99, tickAges.p50, tickAges.p99);
+  if (!report.figures.poses.whole.empty()) {
+    const auto of = [&](const Stage& stage) {
+      const Ages times = agesOf(report.figures.poses.*stage.samples);
+      return fmt::format("{:.2f} / {:.2f}", times.p50, times.p99);
+    };
+    text += fmt::format(
+        "\nfrom a pose to its effect first displayable, ms median / p99: {}; of it until its tick begins {}, "
+        "until the packet {}, until decoded {}, in play-out {}",
+        of(kStages[0]), of(kStages[1]), of(kStages[2]), of(kStages[3]), of(kStages[4]));
+  }
   if (report.slow > 0)
     text += fmt::format("\n{} slow: {:.1f} frames/s each, {} dropped", report.slow,
                         report.slowFramesPerSecond(), report.slowFigures.dropped);

@@ -253,7 +253,8 @@ void Client::timeFrame(bool key, std::uint64_t nowUs) {
                  .timeUs = frame_.tickTimeUs,
                  .key = key,
                  .positions = decoder_->positions(),
-                 .normals = sendsNormals ? decoder_->normals() : std::span<const float>()},
+                 .normals = sendsNormals ? decoder_->normals() : std::span<const float>(),
+                 .colliders = description_.colliders},
                 clock_.known() ? arrivedUs + decodeUs : 0);
 }
 
@@ -485,6 +486,10 @@ std::span<const float> Client::playedPositions() const {
 
 std::span<const float> Client::playedNormals() const {
   return playOut_ && playOut_->shows() ? playOut_->normals(description_.layout) : normals();
+}
+
+const std::vector<Collider>& Client::playedColliders() const {
+  return playOut_ && playOut_->shows() ? playOut_->colliders() : colliders();
 }
 
 cs_stage_statistics Client::stages() const {

@@ -85,6 +85,7 @@ class Client {
   // As play() chose; like those above before a frame came to it.
   std::span<const float> playedPositions() const;
   std::span<const float> playedNormals() const;
+  const std::vector<Collider>& playedColliders() const;
   cs_stage_statistics stages() const;
   std::uint64_t reconstructionHash() const;
   std::uint64_t parametersParticipant() const { return parametersParticipant_; }

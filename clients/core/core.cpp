@@ -109,6 +109,20 @@ const Element* at(const std::vector<Element>& elements, std::uint32_t index) {
   return index < elements.size() ? &elements[index] : nullptr;
 }
 
+int writeCollider(const Collider* collider, cs_collider* out) {
+  if (!collider) return 0;
+  *out = {};
+  out->name = collider->name.c_str();
+  copy(collider->position, out->position);
+  copy(collider->orientation, out->orientation);
+  out->shape = collider->shape;
+  out->radius = collider->radius;
+  out->length = collider->length;
+  copy(collider->size, out->size);
+  out->participant_id = collider->participantId;
+  return 1;
+}
+
 }  // namespace
 
 cs_client* cs_create(const char* scene, const char* client_name) noexcept {
@@ -348,18 +362,7 @@ uint32_t cs_collider_count(const cs_client* client) noexcept {
 }
 
 int cs_get_collider(const cs_client* client, uint32_t index, cs_collider* out) noexcept {
-  const Collider* collider = at(client->client.colliders(), index);
-  if (!collider) return 0;
-  *out = {};
-  out->name = collider->name.c_str();
-  copy(collider->position, out->position);
-  copy(collider->orientation, out->orientation);
-  out->shape = collider->shape;
-  out->radius = collider->radius;
-  out->length = collider->length;
-  copy(collider->size, out->size);
-  out->participant_id = collider->participantId;
-  return 1;
+  return writeCollider(at(client->client.colliders(), index), out);
 }
 
 const float* cs_get_hull(const cs_client* client, uint32_t index, uint32_t* vertex_count,
@@ -633,6 +636,14 @@ const float* cs_played_positions(const cs_client* client) noexcept {
 
 const float* cs_played_normals(const cs_client* client) noexcept {
   return client->client.playedNormals().data();
+}
+
+uint32_t cs_played_collider_count(const cs_client* client) noexcept {
+  return static_cast<std::uint32_t>(client->client.playedColliders().size());
+}
+
+int cs_get_played_collider(const cs_client* client, uint32_t index, cs_collider* out) noexcept {
+  return writeCollider(at(client->client.playedColliders(), index), out);
 }
 
 int cs_get_stage_statistics(const cs_client* client, cs_stage_statistics* out) noexcept {

@@ -386,7 +386,8 @@ uint64_t cs_reconstruction_hash(const cs_client* client) CS_NOEXCEPT;
 
 /* Play-out; off at first, and with NULL again. While it is on, the newest frames are kept: 12 bytes a vertex
  * each, 24 where normals are sent, and as much as two more for what is shown; at most 256 MiB, which may make
- * them fewer, but not fewer than 3. 0 where a version or a number is not allowed: then nothing changes. */
+ * them fewer, but not fewer than 3; beside these some 120 bytes for each collider and frame. 0 where a
+ * version or a number is not allowed: then nothing changes. */
 int cs_set_play_out(cs_client* client, const cs_play_out_options* options) CS_NOEXCEPT;
 /* 32 frames; the delay adapts, 0 to 250 ms; motion is led on for 30 ms. */
 void cs_default_play_out(cs_play_out_options* out) CS_NOEXCEPT;
@@ -399,6 +400,13 @@ int cs_play_out(cs_client* client, uint64_t now_us, uint64_t display_time_us, cs
  * work. */
 const float* cs_played_positions(const cs_client* client) CS_NOEXCEPT;
 const float* cs_played_normals(const cs_client* client) CS_NOEXCEPT;
+/* Likewise colliders, everybody's, at the time that is shown, as they touch the cloth there; cs_get_collider
+ * has the newest frame's. There are those of the frame that it begins from; between two frames they move in a
+ * straight line and turn the shorter way, but for those that jump: by more than 30 m/s or 120 degrees. The
+ * scene's have the same index as there. Names are good until the next cs_play_out, or cs_receive. 0 if there
+ * is no such one. */
+uint32_t cs_played_collider_count(const cs_client* client) CS_NOEXCEPT;
+int cs_get_played_collider(const cs_client* client, uint32_t index, cs_collider* out) CS_NOEXCEPT;
 /* `out->version` is to be set; 0 where it is not known. */
 int cs_get_stage_statistics(const cs_client* client, cs_stage_statistics* out) CS_NOEXCEPT;
 

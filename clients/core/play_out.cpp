@@ -23,6 +23,41 @@ bool isUnit(float squared) {
   return squared >= 1e-30f && std::isfinite(squared);
 }
 
+// What moves or turns more between two frames has jumped, as the server sees it (docs/protocol.md): it is at
+// the one until it is at the other.
+constexpr float kMostSpeed = 30;      // m/s
+constexpr float kLeastCosine = 0.5f;  // of half the turn
+
+bool isSame(const Collider& a, const Collider& b) {
+  return a.participantId == b.participantId && a.name == b.name;
+}
+
+// `moved` is `from` or, where motion is led on, `to`; so far along, or beyond it.
+void move(Collider& moved, const Collider& from, const Collider& to, bool isAtTo, float fraction,
+          float seconds) {
+  Vec3 way{};
+  float squared = 0, cosine = 0;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    way[axis] = to.position[axis] - from.position[axis];
+    squared += way[axis] * way[axis];
+  }
+  // Not of infinity.
+  if (!(squared <= kMostSpeed * kMostSpeed * seconds * seconds)) return;
+  for (std::size_t axis = 0; axis < 3; ++axis) moved.position[axis] += way[axis] * fraction;
+
+  for (std::size_t i = 0; i < 4; ++i) cosine += from.orientation[i] * to.orientation[i];
+  if (std::abs(cosine) < kLeastCosine) return;
+  const float part = isAtTo ? 1 + fraction : fraction, sign = cosine < 0 ? -1.0f : 1.0f;
+  std::array<float, 4> turned{};
+  float length = 0;
+  for (std::size_t i = 0; i < 4; ++i) {
+    turned[i] = (1 - part) * from.orientation[i] + sign * part * to.orientation[i];
+    length += turned[i] * turned[i];
+  }
+  if (!isUnit(length)) return;
+  for (std::size_t i = 0; i < 4; ++i) moved.orientation[i] = turned[i] / std::sqrt(length);
+}
+
 }  // namespace
 
 bool isAllowed(const cs_play_out_options& options) {
@@ -43,6 +78,7 @@ void PlayOut::begin(const Description& description) {
   frames_.assign(std::clamp<std::size_t>(fit, kFewestFrames, options_.frames), {});
   positions_ = {};
   normals_ = {};
+  colliders_ = {};
   forget();
 }
 
@@ -70,6 +106,7 @@ void PlayOut::add(const DisplayableFrame& frame, std::uint64_t displayableUs) {
   slot.key = frame.key;
   slot.positions.assign(frame.positions.begin(), frame.positions.end());
   slot.normals.assign(frame.normals.begin(), frame.normals.end());
+  slot.colliders.assign(frame.colliders.begin(), frame.colliders.end());
 }
 
 void PlayOut::sample(double neededUs) {
@@ -93,7 +130,7 @@ cs_played PlayOut::play(std::uint64_t nowUs, std::uint64_t displayUs) {
   cs_played played{};
   played.version = CS_PLAYED_VERSION;
   shown_ = {};
-  hasNormals_ = false;
+  hasNormals_ = hasColliders_ = false;
   if (count_ == 0) return played;
   const bool adapts = std::isnan(options_.delay_ms);
   if (displayUs == 0 || (adapts && sampleCount_ == 0)) {
@@ -181,6 +218,33 @@ std::span<const float> PlayOut::normals(const codec::StreamLayout& layout) {
     for (int axis = 0; axis < 3; ++axis) n[axis] *= scale;
   }
   return normals_;
+}
+
+const std::vector<Collider>& PlayOut::colliders() {
+  if (shown_.fraction == 0) return shown_.base->colliders;
+  if (!hasColliders_) moveColliders();
+  return colliders_;
+}
+
+void PlayOut::moveColliders() {
+  hasColliders_ = true;
+  const std::vector<Collider>& bases = shown_.base->colliders;
+  colliders_.assign(bases.begin(), bases.end());
+  const bool isAtTo = shown_.base == shown_.to;
+  const auto fraction = static_cast<float>(shown_.fraction);
+  const double stepUs = std::max(frameUs_, since(shown_.from->timeUs, shown_.to->timeUs));
+  const std::vector<Collider>& others = (isAtTo ? shown_.from : shown_.to)->colliders;
+  // All frames have them in the same order.
+  auto next = others.begin();
+  for (std::size_t i = 0; i < bases.size(); ++i) {
+    const Collider& base = bases[i];
+    const auto other =
+        std::find_if(next, others.end(), [&](const Collider& one) { return isSame(one, base); });
+    if (other == others.end()) continue;
+    next = other + 1;
+    move(colliders_[i], isAtTo ? *other : base, isAtTo ? base : *other, isAtTo, fraction,
+         static_cast<float>(stepUs * 1e-6));
+  }
 }
 
 void PlayOut::report(cs_stage_statistics& out) const {

@@ -21,6 +21,7 @@ struct DisplayableFrame {
   std::uint64_t timeUs = 0;  // when the tick began
   bool key = false;
   std::span<const float> positions, normals;  // 3 a vertex; normals where the stream sends them
+  std::span<const Collider> colliders = {};
 };
 
 // All times are microseconds of the server's clock; those of frames may be any numbers. It takes memory for a
@@ -43,6 +44,7 @@ class PlayOut {
   bool shows() const { return shown_.base != nullptr; }
   std::span<const float> positions() const;
   std::span<const float> normals(const codec::StreamLayout& layout);
+  const std::vector<Collider>& colliders();
 
   // Fills in what is of play-out.
   void report(cs_stage_statistics& out) const;
@@ -55,6 +57,7 @@ class PlayOut {
     std::uint64_t tick = 0, timeUs = 0;
     bool key = false;
     std::vector<float> positions, normals;
+    std::vector<Collider> colliders;
   };
   // base + fraction * (to - from); with a fraction of 0 the base itself.
   struct Shown {
@@ -70,6 +73,7 @@ class PlayOut {
   cs_shown choose(std::uint64_t timeUs);
   cs_shown chooseBeyond(const Frame& frame, double pastUs);
   void blend(std::vector<float> Frame::*values, std::vector<float>& out) const;
+  void moveColliders();
 
   cs_play_out_options options_;
   double frameUs_ = 0;  // between frames of the stream where none is missing
@@ -88,7 +92,9 @@ class PlayOut {
 
   Shown shown_;
   std::vector<float> positions_, normals_;  // of what is no frame's own
-  bool hasNormals_ = false;                 // in normals_, of what is shown
+  std::vector<Collider> colliders_;
+  // In normals_ and colliders_, of what is shown.
+  bool hasNormals_ = false, hasColliders_ = false;
 
   std::uint64_t lateFrames_ = 0;
   double ledOnUs_ = 0, heldUs_ = 0;

@@ -4,6 +4,7 @@
 #include <deque>
 #include <mutex>
 
+#include <absl/synchronization/mutex.h>
 #include <grpcpp/client_context.h>
 #include <grpcpp/generic/generic_stub.h>
 #include <grpcpp/support/byte_buffer.h>
@@ -115,7 +116,10 @@ class GrpcLink final : public Link, private grpc::ClientBidiReactor<grpc::ByteBu
 
 class GrpcDoor final : public Door {
  public:
-  explicit GrpcDoor(std::string address) : address_(std::move(address)) {}
+  explicit GrpcDoor(std::string address) : address_(std::move(address)) {
+    // As the server does (server/rpc/rpc_door.cpp).
+    absl::SetMutexDeadlockDetectionMode(absl::OnDeadlockCycle::kIgnore);
+  }
   std::unique_ptr<Link> open(LinkListener& listener) override {
     return std::make_unique<GrpcLink>(address_, listener);
   }

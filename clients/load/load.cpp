@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 #include <thread>
 
 #include "clients/load/intruder.h"
@@ -12,7 +13,8 @@
 namespace clothstream::load {
 namespace {
 
-constexpr std::chrono::duration<double> kStep{1.0 / 72};
+// Not 72 a second: against ticks at that rate, a second's poses fall on all moments between two ticks alike.
+constexpr std::chrono::duration<double> kStep{1.0 / 71};
 // For everybody to be there once the last has knocked.
 constexpr std::chrono::seconds kJoinTime{30};
 // For those who said goodbye.
@@ -178,6 +180,11 @@ double LoadReport::slowFramesPerSecond() const {
 }
 double LoadReport::mbitPerSecond() const {
   return rate(static_cast<double>(figures.bytes + slowFigures.bytes) * 8e-6, seconds, 1);
+}
+
+double mean(const std::vector<float>& samples) {
+  if (samples.empty()) return 0;
+  return std::accumulate(samples.begin(), samples.end(), 0.0) / static_cast<double>(samples.size());
 }
 
 double percentile(std::vector<float>& samples, double percent) {

@@ -42,11 +42,13 @@ struct LoadReport {
   double mbitPerSecond() const;
 };
 
+// 0 of none.
+double mean(const std::vector<float>& samples);
 // Nearest rank; 0 of none. `samples` is put in order.
 double percentile(std::vector<float>& samples, double percent);
 
 struct LoadProgress {
-  std::function<bool()> running;                // asked 72 times a second; false ends the load early
+  std::function<bool()> running;                // asked 71 times a second; false ends the load early
   std::function<void()> gathered;               // all are there
   std::function<void(const LoadReport&)> show;  // once a second, of the last one; may be empty
 };

@@ -5,13 +5,13 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 namespace clothstream::load {
 namespace {
 
 // How the hand moves: round the middle of the cloth, once in so many seconds.
 constexpr double kOrbitSeconds = 3;
-constexpr float kHandRadius = 0.05f;  // m
 
 std::uint64_t nowUs() {
   return static_cast<std::uint64_t>(
@@ -32,6 +32,7 @@ void Figures::add(const Figures& other) {
   hashMismatches += other.hashMismatches;
   ages.insert(ages.end(), other.ages.begin(), other.ages.end());
   tickAges.insert(tickAges.end(), other.tickAges.begin(), other.tickAges.end());
+  poses.add(other.poses);
 }
 
 Participant::Participant(Door& door, const ParticipantOptions& options)
@@ -39,6 +40,12 @@ Participant::Participant(Door& door, const ParticipantOptions& options)
       core_(cs_create_as(options.scene.c_str(), "clothstream load", options.name.c_str(),
                          options.moves ? CS_ROLE_PARTICIPANT : CS_ROLE_VIEWER),
             &cs_destroy) {
+  cs_set_clock(core_.get(), &nowUs);
+  if (timesPoses()) {
+    cs_play_out_options playOut;
+    cs_default_play_out(&playOut);
+    cs_set_play_out(core_.get(), &playOut);
+  }
   link_ = door.open(*this);
   flush();
   link_->read();
@@ -98,8 +105,11 @@ void Participant::received(std::span<const std::byte> message) {
     const bool isFrame =
         message_.ParseFromArray(message.data(), static_cast<int>(message.size())) && message_.has_frame();
     if (isFrame) frameReceived(message_.frame(), now);
+    std::uint32_t events = 0;
     if (!isFrame || options_.decodes)
-      cs_receive(core_.get(), reinterpret_cast<const std::uint8_t*>(message.data()), message.size(), now);
+      events =
+          cs_receive(core_.get(), reinterpret_cast<const std::uint8_t*>(message.data()), message.size(), now);
+    if (isFrame && timesPoses() && (events & CS_EVENT_FRAME) != 0) frameDecoded(message_.frame());
     flush();
     if (options_.bytesPerSecond > 0) {
       const std::chrono::duration<double> time(static_cast<double>(message.size()) / options_.bytesPerSecond);
@@ -145,6 +155,31 @@ void Participant::frameReceived(const v1::Frame& frame, std::uint64_t nowUs) {
   link_->send(acknowledgement.SerializeAsString());
 }
 
+void Participant::frameDecoded(const v1::Frame& frame) {
+  const std::uint64_t decodedUs = nowUs();
+  const std::uint64_t beforeUs = std::exchange(decodedTickUs_, frame.tick_time_us());
+  cs_play_out(core_.get(), decodedUs, decodedUs, nullptr);
+  cs_stage_statistics stages{};
+  stages.version = CS_STAGE_STATISTICS_VERSION;
+  cs_get_stage_statistics(core_.get(), &stages);
+  cs_statistics statistics;
+  cs_get_statistics(core_.get(), decodedUs, &statistics);
+  const auto own = [&](std::uint64_t serverUs) {
+    return static_cast<double>(serverUs) - statistics.clock_offset_us;
+  };
+  const auto decoded = static_cast<double>(decodedUs);
+  // Something of it shows once what is shown is past the frame before it.
+  const FrameTimes times{.tick = own(frame.tick_time_us()),
+                         .packet = own(frame.packet_time_us()),
+                         .decoded = decoded,
+                         .displayable = std::max(decoded, own(beforeUs) + 1000 * stages.delay_ms)};
+  PoseTimes notMeasured;
+  PoseTimes& out = statistics.clock_offset_us != 0 && beforeUs != 0 ? figures_.poses : notMeasured;
+  const std::uint64_t me = cs_participant_id(core_.get());
+  for (const v1::ColliderState& collider : frame.colliders())
+    if (collider.participant_id() == me) poseTiming_.shown(collider.sphere().radius(), times, out);
+}
+
 void Participant::count(const codec::PacketHeader& header) {
   const std::uint64_t perFrame =
       std::max(cs_simulation_rate(core_.get()) / std::max(cs_stream_rate(core_.get()), 1u), 1u);
@@ -170,7 +205,7 @@ void Participant::move(std::uint64_t nowUs) {
   const double turns = options_.phase + static_cast<double>(nowUs) / (1e6 * kOrbitSeconds);
   const double turn = 2 * std::numbers::pi * turns;
   const float sphere[]{middle[0] + 0.5f * static_cast<float>(std::cos(turn)), middle[1],
-                       middle[2] + 0.5f * static_cast<float>(std::sin(turn)), kHandRadius};
+                       middle[2] + 0.5f * static_cast<float>(std::sin(turn)), poseTiming_.nextRadius(nowUs)};
   cs_set_colliders(core_.get(), sphere, 1, nowUs);
 }
 

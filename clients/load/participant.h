@@ -14,6 +14,7 @@
 #include "clients/core/core.h"
 #include "clients/grpc/failure.h"
 #include "clients/load/link.h"
+#include "clients/load/pose_timing.h"
 #include "clothstream/v1/session.pb.h"
 #include "proto/codec/packet_header.h"
 
@@ -40,6 +41,8 @@ struct Figures {
   // ms of each frame, on the server's clock: from the packet's completion, and from the start of its tick's
   // simulation, to its arrival here.
   std::vector<float> ages, tickAges;
+  // Of who moves and decodes.
+  PoseTimes poses;
 
   void add(const Figures& other);
 };
@@ -63,7 +66,10 @@ class Participant final : private LinkListener {
  private:
   void received(std::span<const std::byte> message) override;
   void closed(const std::string& why) override;
+  bool timesPoses() const { return options_.moves && options_.decodes; }
   void frameReceived(const v1::Frame& frame, std::uint64_t nowUs);
+  // The core has just decoded it.
+  void frameDecoded(const v1::Frame& frame);
   void count(const codec::PacketHeader& header);
   void move(std::uint64_t nowUs);
   void flush();
@@ -74,6 +80,8 @@ class Participant final : private LinkListener {
   v1::ServerMessage message_;
   Figures figures_;
   std::uint64_t decodeErrorsTaken_ = 0, hashMismatchesTaken_ = 0;
+  PoseTiming poseTiming_;
+  std::uint64_t decodedTickUs_ = 0;  // when the newest decoded frame's began, on the server's clock; 0: none
   // The newest, by number: what frames can refer to.
   std::array<std::uint64_t, 64> ticks_{};
   std::uint64_t frames_ = 0;

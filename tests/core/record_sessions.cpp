@@ -31,6 +31,7 @@ nlohmann::json json(const Observation& seen) {
           {"normalsHash", hash(seen.normalsHash)},
           {"playedPositionsHash", hash(seen.playedPositionsHash)},
           {"playedNormalsHash", hash(seen.playedNormalsHash)},
+          {"playedCollidersHash", hash(seen.playedCollidersHash)},
           {"triangleCount", seen.triangleCount},
           {"outgoingHash", hash(seen.outgoingHash)},
           // In hexadecimal: spoilt text need not be UTF-8.

@@ -146,6 +146,10 @@ v1::Frame ScriptedServer::frameMessage(std::uint64_t tick, codec::PacketKind kin
   frame.add_colliders()->set_name("stone");
   v1::ColliderState& finger = *frame.add_colliders();
   finger.set_participant_id(7);
+  const double turn = 0.05 * static_cast<double>(tick);
+  finger.mutable_position()->set_y(0.02f * static_cast<float>(tick));
+  finger.mutable_orientation()->set_z(static_cast<float>(std::sin(turn)));
+  finger.mutable_orientation()->set_w(static_cast<float>(std::cos(turn)));
   finger.mutable_capsule()->set_radius(0.01f);
   finger.mutable_capsule()->set_length(0.03f);
   frame.add_colliders()->mutable_plane();

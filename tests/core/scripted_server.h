@@ -42,6 +42,8 @@ class ScriptedServer {
   std::string frame(std::uint64_t tick, codec::PacketKind kind = codec::PacketKind::predicted);
   // Frames of this quality from now on; the next is to be a key frame.
   void goTo(std::uint8_t quality);
+  // A ball that jumps by 1 m a tick, a finger of participant 7 that moves by 2 cm and turns by 0.1, and
+  // others that stay.
   v1::Frame frameMessage(std::uint64_t tick, codec::PacketKind kind);
 
   // What was encoded last.

@@ -48,6 +48,16 @@ std::uint64_t hashOf(const float* values, std::uint32_t vertices) {
   return vertices == 0 ? 0 : codec::hashFloats(std::span(values, std::size_t{3} * vertices));
 }
 
+std::uint64_t hashOfPlayedColliders(cs_client* client) {
+  std::vector<float> poses;
+  cs_collider collider;
+  for (std::uint32_t i = 0; cs_get_played_collider(client, i, &collider) != 0; ++i) {
+    poses.insert(poses.end(), std::begin(collider.position), std::end(collider.position));
+    poses.insert(poses.end(), std::begin(collider.orientation), std::end(collider.orientation));
+  }
+  return codec::hashFloats(poses);
+}
+
 std::uint64_t hashOfOutgoing(cs_client* client) {
   std::uint64_t hash = 0xcbf29ce484222325;
   std::size_t bytes = 0;
@@ -73,6 +83,7 @@ Observation observe(cs_client* client, std::uint32_t events) {
           .normalsHash = hashOf(cs_normals(client), vertices),
           .playedPositionsHash = hashOf(cs_played_positions(client), vertices),
           .playedNormalsHash = hashOf(cs_played_normals(client), vertices),
+          .playedCollidersHash = hashOfPlayedColliders(client),
           .triangleCount = indices / 3,
           .outgoingHash = hashOfOutgoing(client),
           .errorText = cs_error_text(client)};

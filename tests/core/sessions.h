@@ -23,6 +23,7 @@ struct Observation {
   std::uint64_t reconstructionHash = 0;
   // hashFloats, zero where there are no vertices.
   std::uint64_t positionsHash = 0, normalsHash = 0, playedPositionsHash = 0, playedNormalsHash = 0;
+  std::uint64_t playedCollidersHash = 0;  // of position and orientation
   std::uint32_t triangleCount = 0;
   std::uint64_t outgoingHash = 0;  // FNV-1a of all that the client wants to send
   std::string errorText;

@@ -57,11 +57,19 @@ function floatsHash(pointer, vertices) {
   return vertices === 0 ? 0n : fnv1a(bytes(pointer, 12 * vertices));
 }
 
+// Of position and orientation.
+function playedCollidersHash(client) {
+  let hash = kBasis;
+  for (let index = 0; core.cs_get_played_collider(client, index, scratch) !== 0; ++index) hash = fnv1a(bytes(scratch + 8, 28), hash);
+  return hash;
+}
+
 function observe(client, events) {
   core.cs_get_statistics(client, 0n, scratch);
   const view = new DataView(core.memory.buffer, scratch);
   const [tick, decodeErrors, hashMismatches] = [0, 32, 48].map((offset) => view.getBigUint64(offset, true));
   const vertices = core.cs_vertex_count(client);
+  const colliders = hex64(playedCollidersHash(client));
   core.cs_triangles(client, scratch);
   return {
     events,
@@ -74,6 +82,7 @@ function observe(client, events) {
     normalsHash: hex64(floatsHash(core.cs_normals(client), vertices)),
     playedPositionsHash: hex64(floatsHash(core.cs_played_positions(client), vertices)),
     playedNormalsHash: hex64(floatsHash(core.cs_played_normals(client), vertices)),
+    playedCollidersHash: colliders,
     triangleCount: word(scratch) / 3,
     outgoingHash: hex64(outgoingHash(client)),
     errorText: Buffer.from(text(core.cs_error_text(client))).toString("hex"),

@@ -25,6 +25,25 @@ class LoadTest : public ServerTest {
     arguments.insert(arguments.begin(), {CLOTHSTREAM, "load"});
     return std::make_unique<Process>(arguments);
   }
+  // Two of those who move decode. Their stages follow each other, and together are the whole.
+  static void expectPosesAreTimed(const nlohmann::json& report) {
+    ASSERT_GT(report.at("poses").get<int>(), 10);
+    double sum = 0;
+    for (const char* stage : {"poseToTick", "tickToPacket", "packetToDecoded", "decodedToDisplayable"}) {
+      const auto ms = [&](const char* what) {
+        return report.at(std::string(stage) + "Ms" + what).get<double>();
+      };
+      // As well as the clock of a server on this machine is known.
+      EXPECT_GT(ms("P50"), -5) << stage;
+      EXPECT_GE(ms("P99"), ms("P50")) << stage;
+      sum += ms("Mean");
+    }
+    EXPECT_GT(report.at("tickToPacketMsP50").get<double>(), 0);
+    EXPECT_GE(report.at("decodedToDisplayableMsP50").get<double>(), 0);
+    EXPECT_GE(report.at("poseToDisplayableMsP99"), report.at("poseToDisplayableMsP50"));
+    // Of floats of at most some seconds.
+    EXPECT_NEAR(report.at("poseToDisplayableMsMean").get<double>(), sum, 0.01);
+  }
   // Some of everybody.
   void expectAllAreServed(const std::vector<std::string>& door) {
     std::vector<std::string> arguments{
@@ -53,6 +72,7 @@ class LoadTest : public ServerTest {
     EXPECT_GE(report.at("joined").get<int>(), 7);
     EXPECT_LT(report.at("slowFramesPerSecond"), report.at("framesPerSecond"));
     EXPECT_GE(report.at("intrusions").get<int>(), 5);
+    expectPosesAreTimed(report);
   }
 };
 
@@ -64,6 +84,17 @@ TEST_F(LoadTest, GrpcServesAllAmongIntruders) {
 TEST_F(LoadTest, WebSocketsServeAllAmongIntruders) {
   startServer();
   if (!web_.empty()) expectAllAreServed({"--web", web_});
+}
+
+TEST_F(LoadTest, OfWhoSendsNoPosesThereIsNoTime) {
+  startServer();
+  if (address_.empty()) return;
+  const auto program = load({address_, "--participants", "2", "--viewers", "2", "--seconds", "1", "--json"});
+  ASSERT_EQ(program->waitForEnd(kEnd), 0) << program->errors();
+  const auto report = nlohmann::json::parse(program->output());
+  EXPECT_EQ(report.at("poses"), 0);
+  EXPECT_TRUE(report.at("poseToDisplayableMsP50").is_null());
+  EXPECT_TRUE(report.at("decodedToDisplayableMsP99").is_null());
 }
 
 TEST_F(LoadTest, SaysWhatNobodyWasTold) {
@@ -112,6 +143,7 @@ TEST_F(LoadTest, AnInterruptEndsItWithItsReport) {
   program->signal(SIGINT);
   EXPECT_EQ(program->waitForEnd(kEnd), 0);
   EXPECT_THAT(program->output(), HasSubstr("2 participants for"));
+  EXPECT_THAT(program->output(), HasSubstr("from a pose to its effect first displayable"));
 }
 
 }  // namespace

@@ -81,9 +81,11 @@ static int has_unit_vectors(const float* normals, uint32_t count) {
   return 0;
 }
 
-static int has_own_collider(const cs_client* client, const float* sphere) {
+typedef int get_collider(const cs_client* client, uint32_t index, cs_collider* out);
+
+static int has_own_collider(const cs_client* client, const float* sphere, get_collider* get) {
   cs_collider collider;
-  for (uint32_t i = 0; cs_get_collider(client, i, &collider) != 0; ++i) {
+  for (uint32_t i = 0; get(client, i, &collider) != 0; ++i) {
     if (collider.participant_id != cs_participant_id(client)) continue;
     if (collider.shape != CS_SHAPE_SPHERE || fabsf(collider.radius - sphere[3]) > 1e-6f) continue;
     if (fabsf(collider.position[0] - sphere[0]) < 1e-4f && fabsf(collider.position[1] - sphere[1]) < 1e-4f &&
@@ -96,7 +98,7 @@ static int has_own_collider(const cs_client* client, const float* sphere) {
 struct seen {
   unsigned frames, moved, in_time;
   uint64_t tick, hash, shown_us;
-  int own_collider, gravity, grip, others;
+  int own_collider, played_collider, gravity, grip, others;
 };
 
 static int look(cs_client* client, const float* sphere, struct seen* seen) {
@@ -125,7 +127,8 @@ static int look(cs_client* client, const float* sphere, struct seen* seen) {
   positions = cs_played_positions(client);
   for (uint32_t i = 0; i < 3 * count; ++i) CHECK(positions[i] > -6 && positions[i] < 6);
   CHECK(has_unit_vectors(cs_played_normals(client), count) == 0);
-  seen->own_collider |= has_own_collider(client, sphere);
+  seen->own_collider |= has_own_collider(client, sphere, cs_get_collider);
+  seen->played_collider |= has_own_collider(client, sphere, cs_get_played_collider);
   return 0;
 }
 
@@ -152,7 +155,8 @@ static int follows(const char* address) {
   struct seen seen;
   memset(&seen, 0, sizeof seen);
   const uint64_t end_us = clothstream_now_us() + 60 * kSecond;
-  while (seen.frames < 100 || !seen.own_collider || !seen.gravity || !seen.grip || !seen.others) {
+  while (seen.frames < 100 || !seen.own_collider || !seen.played_collider || !seen.gravity || !seen.grip ||
+         !seen.others) {
     uint32_t events = 0;
     CHECK(clothstream_now_us() < end_us);
     CHECK(clothstream_wait(stream, 1000, &events) == CLOTHSTREAM_OK);

@@ -112,14 +112,19 @@ test("frames can be shown evenly, a little later", () =>
   withPage({ query: "?smooth" }, async (page) => {
     await untilState(page, "live");
     await untilFrames(page, 60);
-    // The last vertex, as it is drawn and in the newest frame, display frame by display frame.
+    // The last vertex and the ball, as they are drawn and in the newest frame, display frame by display frame.
     const seen = await page.evaluate(
       () =>
         new Promise((done) => {
           const seen = [];
           const look = () => {
-            const { drawn, positions } = window.clothstream;
-            seen.push({ drawn: [...drawn[0].slice(-3)], newest: [...positions.slice(-3)] });
+            const { drawn, positions, drawnColliders, colliders } = window.clothstream;
+            seen.push({
+              drawn: [...drawn[0].slice(-3)],
+              newest: [...positions.slice(-3)],
+              drawnBall: drawnColliders[0],
+              newestBall: colliders[0].position,
+            });
             if (seen.length < 40) requestAnimationFrame(look);
             else done(seen);
           };
@@ -131,6 +136,9 @@ test("frames can be shown evenly, a little later", () =>
     const between = seen.filter(({ drawn }) => !frames.has(drawn.join()));
     assert.ok(between.length > seen.length / 2, `${between.length} of ${seen.length} lie between frames`);
     assert.ok(seen.every(({ drawn }) => drawn.every(Number.isFinite)));
+    const balls = new Set(seen.map(({ newestBall }) => newestBall.join()));
+    const ballsBetween = seen.filter(({ drawnBall }) => !balls.has(drawnBall.join()));
+    assert.ok(ballsBetween.length > seen.length / 2, `${ballsBetween.length} of ${seen.length} balls lie between frames`);
     assert.ok(new Set(between.map(({ drawn }) => drawn.join())).size > 5);
     await takePicture(page, "smooth");
   }));

@@ -369,9 +369,24 @@ export class Client {
     };
   }
 
+  // Of the newest frame.
   colliders(): Collider[] {
-    const count = this.core.exports.cs_collider_count(this.handle);
-    return this.list(count, this.core.exports.cs_get_collider, (view, at, index) => ({
+    const { cs_collider_count, cs_get_collider } = this.core.exports;
+    return this.readColliders(cs_collider_count(this.handle), cs_get_collider);
+  }
+
+  // Where they are in what the newest shownAt() gave.
+  shownColliders(): Collider[] {
+    if (!this.playsOut) return this.colliders();
+    const { cs_played_collider_count, cs_get_played_collider } = this.core.exports;
+    return this.readColliders(cs_played_collider_count(this.handle), cs_get_played_collider);
+  }
+
+  private readColliders(
+    count: number,
+    get: (client: number, index: number, out: number) => number,
+  ): Collider[] {
+    return this.list(count, get, (view, at, index) => ({
       index,
       name: this.core.text(view.getUint32(at, true)),
       shape: view.getUint32(at + 4, true),

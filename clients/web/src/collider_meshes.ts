@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The colliders as three.js meshes: one for each, in the order of the newest frame.
+// The colliders as three.js meshes: one for each, in the order of what is shown.
 
 import * as THREE from "three";
 import { Shape, type Client, type Collider } from "./client";
@@ -22,7 +22,7 @@ export class ColliderMeshes {
   }
 
   place(client: Client): void {
-    const colliders = client.colliders();
+    const colliders = client.shownColliders();
     while (this.meshes.length > colliders.length) this.remove(this.meshes.pop()!);
     colliders.forEach((collider, index) => {
       const look = lookOf(collider);

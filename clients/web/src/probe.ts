@@ -18,6 +18,8 @@ export interface Probe {
   // Of each cloth, once there is one.
   readonly reports: (ClothReport | undefined)[];
   readonly colliders: Collider[];
+  // Where these are drawn.
+  readonly drawnColliders: Vec3[];
   readonly participants: Participant[];
   // Of a scene that is a recording.
   readonly playback: Playback | undefined;
@@ -65,6 +67,9 @@ export function expose(session: Session, view: View): { described(client: Client
     },
     get colliders() {
       return session.client.colliders();
+    },
+    get drawnColliders() {
+      return view.colliders.map(({ position }) => position.toArray());
     },
     get participants() {
       return session.client.participants();

@@ -33,6 +33,8 @@ export interface CoreExports {
   cs_play_out(client: Pointer, nowUs: bigint, displayUs: bigint, out: Pointer): number;
   cs_played_positions(client: Pointer): Pointer;
   cs_played_normals(client: Pointer): Pointer;
+  cs_played_collider_count(client: Pointer): number;
+  cs_get_played_collider(client: Pointer, index: number, out: Pointer): number;
   cs_triangles(client: Pointer, indexCount: Pointer): Pointer;
   cs_cloth_count(client: Pointer): number;
   cs_get_cloth(client: Pointer, index: number, out: Pointer): number;
