@@ -156,6 +156,7 @@ Device::~Device() {
 TimelineValue Device::submit(Recorder& recorder) {
   recorder.finish();
   const vk::CommandBuffer commands = *recorder.handles().commands;
+  const std::lock_guard lock(submitting_);
   const TimelineValue value = submitted_ + 1;
   const vk::TimelineSemaphoreSubmitInfo timeline{.signalSemaphoreValueCount = 1,
                                                  .pSignalSemaphoreValues = &value};
