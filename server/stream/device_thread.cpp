@@ -159,33 +159,44 @@ void DeviceThread::takeReadyScenes() {
 
 void DeviceThread::take(Run& run) {
   try {
-    run.host = std::make_unique<SceneHost>(run.coming.get(), *run.scene, packer_, reportRate_);
+    if (run.host)
+      run.host->rebuild(run.coming.get(), "a tick failed");
+    else
+      run.host = std::make_unique<SceneHost>(run.coming.get(), *run.scene, packer_, reportRate_);
     if (run.whenAdded) run.whenAdded->set_value();
     run.whenAdded.reset();
   } catch (const vulkan::DeviceLost&) {
     throw;
   } catch (const std::exception& failure) {
     run.refused = run.whenAdded.has_value();
-    if (run.refused) return run.whenAdded->set_exception(std::current_exception());
-    const std::string text =
-        fmt::format("the device cannot run the scene '{}': {}", run.scene->name(), failure.what());
-    spdlog::error("{}", text);
-    run.scene->roster.dismiss(error(v1::ERROR_CODE_RESOURCE_EXHAUSTED, text, true));
+    if (run.refused)
+      run.whenAdded->set_exception(std::current_exception());
+    else
+      dismiss(run, failure.what());
   }
+}
+
+void DeviceThread::dismiss(Run& run, const std::string& why) {
+  const std::string text = fmt::format("the device cannot run the scene '{}': {}", run.scene->name(), why);
+  spdlog::error("{}", text);
+  run.host.reset();
+  run.failed.reset();
+  run.scene->roster.dismiss(error(v1::ERROR_CODE_RESOURCE_EXHAUSTED, text, true));
 }
 
 void DeviceThread::startAndStopScenes() {
   for (const auto& run : runs_) {
     const LiveScene& scene = *run->scene;
     const bool inUse = scene.audience.size() > 0;
-    if ((inUse || run->whenAdded) && !run->host && !run->coming.valid())
+    const bool ready = run->host && run->host->isReady();
+    if ((inUse || run->host || run->whenAdded) && !ready && !run->coming.valid())
       run->coming = preparer_.prepare(*device_, scene.start());
-    const bool wanted = run->host && !scene.paused && (runAlways_ || inUse);
+    const bool wanted = ready && !scene.paused && (runAlways_ || inUse);
     if (wanted && !run->running) {
       run->pacer.start(Clock::now());
       run->slow.restart();
     }
-    if (run->running && !wanted) run->host->rest();
+    if (run->running && ready && !wanted) run->host->rest();
     run->running = wanted;
     run->scene->running = wanted;
   }
@@ -200,13 +211,40 @@ void DeviceThread::runDueTicks() {
   for (const auto& run : runs_) turns_.push_back(run.get());
   Clock::time_point before = Clock::now();
   chooseTurns(turns_, before, chosen_);
-  for (Turn* turn : chosen_) begin(static_cast<Run&>(*turn), Clock::now());
   for (Turn* turn : chosen_) {
-    static_cast<Run*>(turn)->host->finish();
+    Run& run = static_cast<Run&>(*turn);
+    run.begun = survives(run, [&] { begin(run, Clock::now()); });
+  }
+  for (Turn* turn : chosen_) {
+    Run& run = static_cast<Run&>(*turn);
+    if (!run.begun || !survives(run, [&] { run.host->finish(); })) continue;
     const Clock::time_point after = Clock::now();
     turn->took(after - before, after);
     before = after;
   }
+}
+
+bool DeviceThread::survives(Run& run, const std::function<void()>& partOfTick) {
+  try {
+    partOfTick();
+    return true;
+  } catch (const vulkan::DeviceLost&) {
+    throw;
+  } catch (const std::exception& failure) {
+    makeAnew(run, failure.what());
+    return false;
+  }
+}
+
+void DeviceThread::makeAnew(Run& run, const std::string& reason) {
+  spdlog::error("{}: a tick failed: {}", run.scene->name(), reason);
+  packer_.drain();
+  device_->drain();
+  const Clock::time_point now = Clock::now();
+  if (run.failed && now - *run.failed < std::chrono::seconds(1)) return dismiss(run, reason);
+  run.failed = now;
+  run.host->release();
+  wake();
 }
 
 void DeviceThread::begin(Run& run, Clock::time_point now) {
@@ -246,7 +284,10 @@ bool DeviceThread::tryRebuild() {
   try {
     device_ = std::make_unique<vulkan::Device>(options_);
     for (const auto& run : runs_)
-      if (run->host) run->host->rebuild(*device_);
+      if (run->host)
+        run->host->rebuild(
+            std::make_unique<SceneOnDevice>(*device_, run->scene->start(), packer_.workers()),
+            "the device was lost");
   } catch (const std::exception& failure) {
     spdlog::error("device: {}; trying again", failure.what());
     return false;

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <condition_variable>
 #include <cstdint>
+#include <functional>
 #include <future>
 #include <memory>
 #include <mutex>
@@ -28,7 +29,8 @@ namespace clothstream::stream {
 // room on the device from when somebody first joins it, and sleeps while nobody is in it; it is made ready on
 // another thread, while the others run. When the device is
 // lost, another is made and every scene goes on from the newest state that the CPU has; this is tried once a
-// second until it succeeds.
+// second until it succeeds. Where a tick fails otherwise, its scene alone is made anew so, and given up if it
+// fails again within a second.
 class DeviceThread {
  public:
   // Device and first scene are ready when it returns; without scenes there is no device, and none can be
@@ -72,6 +74,8 @@ class DeviceThread {
     std::unique_ptr<SceneHost> host;              // once it is
     std::optional<std::promise<void>> whenAdded;  // until then, where it was added
     bool refused = false;                         // it was added, and cannot run
+    bool begun = false;                           // the tick in hand
+    std::optional<Clock::time_point> failed;      // when a tick last did
     SlowWatch slow;
     double slipped = 0;
   };
@@ -86,7 +90,11 @@ class DeviceThread {
   void takeReadyScenes();
   // Or who asked for it is told that the device cannot run it. Throws vulkan::DeviceLost.
   void take(Run& run);
+  void dismiss(Run& run, const std::string& why);
   void runDueTicks();
+  // False where it failed: its scene is made anew then. Throws vulkan::DeviceLost.
+  bool survives(Run& run, const std::function<void()>& partOfTick);
+  void makeAnew(Run& run, const std::string& reason);
   void begin(Run& run, Clock::time_point now);
   void rebuild(const std::string& reason);
   bool tryRebuild();

@@ -343,19 +343,19 @@ void SceneHost::release() {
   onDevice_.reset();
 }
 
-void SceneHost::rebuild(vulkan::Device& device) {
-  auto fresh = std::make_unique<SceneOnDevice>(device, live_.start(), packer_.workers());
-  fresh->simulation.setCloths(scene_.cloths);
-  fresh->recorder.begin();
-  fresh->simulation.recordRestoreState(fresh->recorder, newestState_);
-  device.wait(device.submit(fresh->recorder));
-  onDevice_ = std::move(fresh);
+void SceneHost::rebuild(std::unique_ptr<SceneOnDevice> ready, std::string_view why) {
+  SceneOnDevice& fresh = *ready;
+  fresh.simulation.setCloths(scene_.cloths);
+  fresh.recorder.begin();
+  fresh.simulation.recordRestoreState(fresh.recorder, newestState_);
+  fresh.device.wait(fresh.device.submit(fresh.recorder));
+  onDevice_ = std::move(ready);
   holds_.takeAnew();
   recovery_ = Recovery::none;
   sinceHealthy_ = 0;
   if (live_.journal) live_.journal->restored(tick_, newestState_);
   live_.audience.announce(notice(v1::NOTICE_KIND_DEVICE_REBUILT,
-                                 fmt::format("the device was lost; the scene goes on from {:.1f} s before",
+                                 fmt::format("{}; the scene goes on from {:.1f} s before", why,
                                              static_cast<double>(tick_ - newestState_.tick) / rate_),
                                  tick_));
 }

@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "server/simulation/cloth_simulation.h"
@@ -57,10 +58,12 @@ class SceneHost {
   // Nobody is in the scene, or its clock stands: coarser qualities' encoders go.
   void rest();
 
-  // The device is gone, or about to be: nothing of it is held any more.
+  // Nothing of the device is held any more; nothing but rebuild() may follow, and isReady().
   void release();
-  // Everything anew on this device, from the newest state that the CPU has.
-  void rebuild(vulkan::Device& device);
+  bool isReady() const { return onDevice_ != nullptr; }
+  // Goes on there from the newest state that the CPU has. `ready`: the scene's start. `why`: such as "the
+  // device was lost".
+  void rebuild(std::unique_ptr<SceneOnDevice> ready, std::string_view why);
 
   // Of the newest complete tick.
   std::uint64_t tick() const { return tick_; }

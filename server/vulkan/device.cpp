@@ -183,6 +183,15 @@ bool Device::wait(TimelineValue value, std::chrono::nanoseconds timeout) const {
   }
 }
 
+void Device::drain() {
+  TimelineValue last = 0;
+  {
+    const std::lock_guard lock(submitting_);
+    last = submitted_;
+  }
+  wait(last);
+}
+
 TimelineValue Device::completed() const {
   try {
     return handles_->timeline.getCounterValue();

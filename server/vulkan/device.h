@@ -91,6 +91,8 @@ class Device {
   // False on time-out. Throws DeviceLost.
   bool wait(TimelineValue value, std::chrono::nanoseconds timeout = std::chrono::nanoseconds::max()) const;
   TimelineValue completed() const;
+  // Returns when all that was submitted is complete. Throws DeviceLost.
+  void drain();
 
   // Messages of the validation layer so far, in this process; text of the newest few.
   static std::uint64_t validationMessages();
