@@ -285,9 +285,8 @@ bool DeviceThread::tryRebuild() {
     device_ = std::make_unique<vulkan::Device>(options_);
     for (const auto& run : runs_)
       if (run->host)
-        run->host->rebuild(
-            std::make_unique<SceneOnDevice>(*device_, run->scene->start(), packer_.workers()),
-            "the device was lost");
+        run->host->rebuild(std::make_unique<SceneOnDevice>(*device_, run->scene->start(), packer_.workers()),
+                           "the device was lost");
   } catch (const std::exception& failure) {
     spdlog::error("device: {}; trying again", failure.what());
     return false;

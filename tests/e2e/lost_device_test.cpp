@@ -50,7 +50,7 @@ class LostDevice : public ServerTest {
 // Somebody in a scene, and all that must not happen to them.
 struct Watcher {
   std::unique_ptr<GrpcClient> join(const std::string& address, const std::string& scene = "") {
-    GrpcClient::Options options;
+    GrpcClientOptions options;
     options.scene = scene;
     auto joined = GrpcClient::join(address, options, [this](cs_client* client, std::uint32_t events) {
       if (events == 0) ++cuts;

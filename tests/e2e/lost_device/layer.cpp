@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // A Vulkan layer whose devices are lost at the first submission after a file is there: the one that
 // CLOTHSTREAM_LOSE_DEVICE names, which it removes. From then on the device says VK_ERROR_DEVICE_LOST to
-// whatever is asked of its queues and semaphores; another device is whole. Where "memory" is in the file, only
-// that submission fails, with VK_ERROR_OUT_OF_HOST_MEMORY.
+// whatever is asked of its queues and semaphores; another device is whole. Where "memory" is in the file,
+// only that submission fails, with VK_ERROR_OUT_OF_HOST_MEMORY.
 #include <atomic>
 #include <cstdlib>
 #include <cstring>
