@@ -159,7 +159,7 @@ TEST_F(RecordingPrograms, AKilledServerLosesAtMostItsLastChunk) {
     std::this_thread::sleep_for(20ms);
   }
   // A chunk was just closed: at its worst when the next one is nearly due.
-  std::this_thread::sleep_for(200ms);
+  std::this_thread::sleep_for(170ms);
   server_->signal(SIGKILL);
   server_->waitForEnd(kPatience);
   while (!(*client)->ended()) {
