@@ -2,7 +2,6 @@
 // The parameters that hold at some time of a recorded stream.
 #include "server/recording/parameters_in_force.h"
 
-#include <Eigen/Geometry>
 #include <cstdint>
 #include <cstring>
 #include <string>
@@ -10,6 +9,8 @@
 
 #include <google/protobuf/descriptor.h>
 #include <google/protobuf/message.h>
+
+#include "server/scene/scene.h"
 
 namespace clothstream::recording {
 namespace {
@@ -23,14 +24,14 @@ double areaOf(const v1::Cloth& cloth, const v1::ClothDescription& described) {
   const auto corner = [&](std::size_t i) {
     std::uint32_t vertex = 0;
     std::memcpy(&vertex, triangles.data() + i * sizeof vertex, sizeof vertex);
-    Eigen::Vector3f at = Eigen::Vector3f::Zero();
+    scene::Vec3 at(0, 0, 0);
     if (vertex < positions.size() / sizeof at)
       std::memcpy(at.data(), positions.data() + vertex * sizeof at, sizeof at);
-    return Eigen::Vector3d(at.cast<double>());
+    return at;
   };
   double area = 0;
   for (std::size_t i = 0; i + 3 <= triangles.size() / sizeof(std::uint32_t); i += 3)
-    area += 0.5 * (corner(i + 1) - corner(i)).cross(corner(i + 2) - corner(i)).norm();
+    area += 0.5 * double{(corner(i + 1) - corner(i)).cross(corner(i + 2) - corner(i)).norm()};
   return area;
 }
 
