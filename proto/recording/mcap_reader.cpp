@@ -174,10 +174,17 @@ bool McapReader::State::takeChunkIndex(std::string_view content) {
   place.end = reader.number<std::uint64_t>();
   place.offset = reader.number<std::uint64_t>();
   place.length = reader.number<std::uint64_t>();
+  ByteReader indexes(reader.text());
+  place.channels.emplace();
+  while (indexes.left() > 0 && indexes.ok()) {
+    place.channels->push_back(indexes.number<std::uint16_t>());
+    indexes.number<std::uint64_t>();  // where its messages are
+  }
   const std::uint64_t size = source->size();
-  if (!reader.ok() || place.offset > size || place.length > size - place.offset || place.length < kRecordHead)
+  if (!reader.ok() || !indexes.ok() || place.offset > size || place.length > size - place.offset ||
+      place.length < kRecordHead)
     return false;
-  chunks.push_back(place);
+  chunks.push_back(std::move(place));
   return true;
 }
 
@@ -268,7 +275,7 @@ bool McapReader::State::scanChunk(const Record& record) {
   place.end = reader.number<std::uint64_t>();
   place.offset = record.offset - kRecordHead;
   place.length = record.length + kRecordHead;
-  chunks.push_back(place);
+  chunks.push_back(std::move(place));
   return true;
 }
 

@@ -32,6 +32,8 @@ struct ReadSchema {
 struct ChunkPlace {
   std::uint64_t start = 0, end = 0;
   std::uint64_t offset = 0, length = 0;  // of the record in the file
+  // Of its messages, as the index says; nothing where there is none.
+  std::optional<std::vector<std::uint16_t>> channels = {};
 };
 
 struct Statistics {

@@ -119,6 +119,18 @@ void RecordingReader::rewind() {
   chunk_ = message_ = 0;
 }
 
+tl::expected<std::vector<RecordedMessage>, std::string> RecordingReader::messages(std::size_t chunk,
+                                                                                  Topic topic) {
+  std::vector<RecordedMessage> found;
+  const auto& channels = mcap_.chunks()[chunk].channels;
+  const auto isOfTopic = [&](std::uint16_t channel) { return topicOf(channel) == topic; };
+  if (channels && std::ranges::none_of(*channels, isOfTopic)) return found;
+  if (auto loaded = load(chunk); !loaded) return tl::unexpected(loaded.error());
+  for (const Message& message : messages_)
+    if (isOfTopic(message.channel)) found.push_back({topic, message.time, message.bytes});
+  return found;
+}
+
 ChunkPlace RecordingReader::passChunk() {
   if (chunk_ >= mcap_.chunks().size()) return {.start = end(), .end = end()};
   message_ = 0;

@@ -9,6 +9,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include <tl/expected.hpp>
 
@@ -54,6 +55,9 @@ class RecordingReader {
   // The next message is then the newest key frame at this time or before, or else the first message.
   [[nodiscard]] tl::expected<void, std::string> seek(std::uint64_t time);
   void rewind();
+  // All of this topic in a chunk; until the next call of anything. What comes next stays what it was.
+  [[nodiscard]] tl::expected<std::vector<RecordedMessage>, std::string> messages(std::size_t chunk,
+                                                                                 Topic topic);
   // After an error of next(): the next message is then the first of the chunk that follows. What is left out.
   ChunkPlace passChunk();
 

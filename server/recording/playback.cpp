@@ -167,6 +167,7 @@ void Playback::jump(stream::LiveScene& scene, double seconds, Clock::time_point 
     if (auto* told = std::get_if<RecordedStream::Told>(&next); told != nullptr && told->isFrame()) {
       const bool begins = newest_ == 0 && told->header.tick <= kMaxFirstTick;
       shift_ = begins ? 0 : newest_ + ticksAFrame_ - told->header.tick;
+      tellParameters(scene, *told);
       publishFrame(scene, *told);
       break;
     }
@@ -272,6 +273,15 @@ void Playback::publishFrame(stream::LiveScene& scene, RecordedStream::Told& told
 void Playback::tell(stream::LiveScene& scene) {
   tells_ = false;
   scene.audience.announce(stream::playbackMessage(*this));
+}
+
+void Playback::tellParameters(stream::LiveScene& scene, const RecordedStream::Told& frame) {
+  v1::ServerMessage message;
+  v1::ParameterChanged& changed = *message.mutable_parameter_changed();
+  *changed.mutable_change() = recording_.parametersAt(frame.time);
+  if (changed.change().ByteSizeLong() == 0) return;
+  changed.set_tick(frame.header.tick + shift_);
+  scene.audience.announce(stream::serialise(message));
 }
 
 void Playback::moveTo(double seconds) {

@@ -66,6 +66,8 @@ class Playback : public stream::FrameSource {
   void publishFrame(stream::LiveScene& scene, RecordedStream::Told& frame);
   void reachEnd(stream::LiveScene& scene, Clock::time_point now);
   void tell(stream::LiveScene& scene);
+  // Those that hold with this frame.
+  void tellParameters(stream::LiveScene& scene, const RecordedStream::Told& frame);
   void moveTo(double seconds);
 
   mutable std::mutex mutex_;  // of what follows

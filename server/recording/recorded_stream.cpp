@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 
 #include "server/messages/limits.h"
+#include "server/recording/parameters_in_force.h"
 
 namespace clothstream::recording {
 namespace {
@@ -102,6 +103,26 @@ void RecordedStream::seek(double seconds) {
     if (place.start <= reader_.start()) return reader_.rewind();
     time = place.start - 1;
   }
+}
+
+void RecordedStream::collectChanges(double until) {
+  const auto chunks = reader_.mcap().chunks();
+  v1::ParameterChanged message;
+  for (; collectedChunks_ < chunks.size() && secondsAt(chunks[collectedChunks_].start) <= until;
+       ++collectedChunks_) {
+    const auto messages = reader_.messages(collectedChunks_, Topic::parameters);
+    if (!messages) continue;  // who plays it says that it is damaged
+    for (const RecordedMessage& told : *messages)
+      if (parse(told.bytes, &message)) changes_.push_back({secondsAt(told.time), message.change()});
+  }
+}
+
+v1::ParameterChange RecordedStream::parametersAt(double seconds) {
+  collectChanges(seconds);
+  ParametersInForce parameters(description_);
+  for (const Change& change : changes_)
+    if (change.time <= seconds) parameters.apply(change.change);
+  return parameters.now();
 }
 
 std::optional<RecordedStream::Told> RecordedStream::told(const RecordedMessage& message) {

@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 #include <variant>
+#include <vector>
 
 #include <tl/expected.hpp>
 
@@ -54,10 +55,13 @@ class RecordedStream {
   [[nodiscard]] Next next();
   // What comes next is then the newest key frame at this time or before, or else the first message.
   void seek(double seconds);
+  // All parameters as they are known to whoever saw everything up to then; nothing where none are.
+  v1::ParameterChange parametersAt(double seconds);
 
  private:
   explicit RecordedStream(RecordingReader reader) : reader_(std::move(reader)) {}
   double secondsAt(std::uint64_t time) const;
+  void collectChanges(double until);
   void lose(double from, std::string reason);
   // Nothing where it is not to be played.
   std::optional<Told> told(const RecordedMessage& message);
@@ -71,6 +75,13 @@ class RecordedStream {
   bool sought_ = true;                   // and no frame since: what cannot be decoded is not lost
   std::optional<Lost> lost_;             // and not said yet
   std::optional<Told> held_;             // comes after what was lost
+
+  struct Change {
+    double time = 0;  // s from the start of the recording
+    v1::ParameterChange change;
+  };
+  std::vector<Change> changes_;  // of the first chunks
+  std::size_t collectedChunks_ = 0;
 };
 
 }  // namespace clothstream::recording

@@ -17,7 +17,12 @@ namespace clothstream::stream {
 DeviceThread::DeviceThread(const vulkan::DeviceOptions& device,
                            const std::vector<std::shared_ptr<LiveScene>>& scenes, FramePacker& packer,
                            telemetry::ServerMetrics& metrics, bool runAlways, double reportRate)
-    : options_(device), packer_(packer), metrics_(metrics), runAlways_(runAlways), reportRate_(reportRate) {
+    : options_(device),
+      packer_(packer),
+      metrics_(metrics),
+      runAlways_(runAlways),
+      reportRate_(reportRate),
+      preparer_(packer.workers(), [this] { wake(); }) {
   std::promise<void> ready;
   std::future<void> isReady = ready.get_future();
   thread_ = std::thread([this, &scenes, ready = std::move(ready)]() mutable { run(scenes, ready); });
@@ -59,32 +64,34 @@ vulkan::DeviceInfo DeviceThread::info() const {
   return info_;
 }
 
-std::future<void> DeviceThread::post(std::function<void()> task) {
-  std::packaged_task<void()> packaged(std::move(task));
-  std::future<void> done = packaged.get_future();
+std::future<void> DeviceThread::post(std::packaged_task<void()> task) {
+  std::future<void> done = task.get_future();
   {
     const std::lock_guard lock(mutex_);
-    tasks_.push_back(std::move(packaged));
+    tasks_.push_back(std::move(task));
   }
   wake();
   return done;
 }
 
 std::future<void> DeviceThread::add(std::shared_ptr<LiveScene> scene) {
-  return post([this, scene = std::move(scene)] {
-    if (!device_) throw std::runtime_error("there is no device");
-    auto run = std::make_unique<Run>(scene);
-    makeHost(*run);
-    runs_.push_back(std::move(run));
-  });
+  std::promise<void> added;
+  std::future<void> whenAdded = added.get_future();
+  post(std::packaged_task<void()>([this, scene = std::move(scene), added = std::move(added)]() mutable {
+    if (!device_)
+      return added.set_exception(std::make_exception_ptr(std::runtime_error("there is no device")));
+    runs_.push_back(std::make_unique<Run>(std::move(scene)));
+    runs_.back()->whenAdded = std::move(added);
+  }));
+  return whenAdded;
 }
 
 std::future<void> DeviceThread::remove(std::shared_ptr<LiveScene> scene) {
-  return post([this, scene = std::move(scene)] {
+  return post(std::packaged_task<void()>([this, scene = std::move(scene)] {
     // Frames that wait point to what goes now.
     packer_.drain();
     std::erase_if(runs_, [&](const auto& run) { return run->scene == scene; });
-  });
+  }));
 }
 
 void DeviceThread::runTasks() {
@@ -101,7 +108,8 @@ void DeviceThread::run(const std::vector<std::shared_ptr<LiveScene>>& scenes, st
     if (!scenes.empty()) {
       device_ = std::make_unique<vulkan::Device>(options_);
       for (const auto& scene : scenes) runs_.push_back(std::make_unique<Run>(scene));
-      makeHost(*runs_.front());
+      LiveScene& first = *runs_.front()->scene;
+      runs_.front()->host = std::make_unique<SceneHost>(*device_, first, packer_, reportRate_);
       info_ = device_->info();
     }
   } catch (...) {
@@ -115,6 +123,7 @@ void DeviceThread::run(const std::vector<std::shared_ptr<LiveScene>>& scenes, st
   while (waitForWork()) {
     try {
       runTasks();
+      takeReadyScenes();
       startAndStopScenes();
       runDueTicks();
     } catch (const std::exception& failure) {
@@ -122,6 +131,7 @@ void DeviceThread::run(const std::vector<std::shared_ptr<LiveScene>>& scenes, st
     }
   }
   packer_.drain();
+  preparer_.abandon();
   runs_.clear();
   device_.reset();
 }
@@ -140,35 +150,53 @@ bool DeviceThread::waitForWork() {
   return !stopping_;
 }
 
-void DeviceThread::makeHost(Run& run) {
-  run.host = std::make_unique<SceneHost>(*device_, *run.scene, packer_, reportRate_);
+void DeviceThread::takeReadyScenes() {
+  for (const auto& run : runs_)
+    if (run->coming.valid() && run->coming.wait_for(std::chrono::seconds(0)) == std::future_status::ready)
+      take(*run);
+  std::erase_if(runs_, [](const auto& run) { return run->refused; });
 }
 
-bool DeviceThread::tryMakeHost(Run& run) {
-  if (run.host) return true;
+void DeviceThread::take(Run& run) {
   try {
-    makeHost(run);
+    if (run.host)
+      run.host->rebuild(run.coming.get(), "a tick failed");
+    else
+      run.host = std::make_unique<SceneHost>(run.coming.get(), *run.scene, packer_, reportRate_);
+    if (run.whenAdded) run.whenAdded->set_value();
+    run.whenAdded.reset();
   } catch (const vulkan::DeviceLost&) {
     throw;
   } catch (const std::exception& failure) {
-    const std::string text =
-        fmt::format("the device cannot run the scene '{}': {}", run.scene->name(), failure.what());
-    spdlog::error("{}", text);
-    run.scene->roster.dismiss(error(v1::ERROR_CODE_RESOURCE_EXHAUSTED, text, true));
+    run.refused = run.whenAdded.has_value();
+    if (run.refused)
+      run.whenAdded->set_exception(std::current_exception());
+    else
+      dismiss(run, failure.what());
   }
-  return run.host != nullptr;
+}
+
+void DeviceThread::dismiss(Run& run, const std::string& why) {
+  const std::string text = fmt::format("the device cannot run the scene '{}': {}", run.scene->name(), why);
+  spdlog::error("{}", text);
+  run.host.reset();
+  run.failed.reset();
+  run.scene->roster.dismiss(error(v1::ERROR_CODE_RESOURCE_EXHAUSTED, text, true));
 }
 
 void DeviceThread::startAndStopScenes() {
   for (const auto& run : runs_) {
     const LiveScene& scene = *run->scene;
-    const bool wanted =
-        !scene.paused && ((runAlways_ && run->host) || (scene.audience.size() > 0 && tryMakeHost(*run)));
+    const bool inUse = scene.audience.size() > 0;
+    const bool ready = run->host && run->host->isReady();
+    if ((inUse || run->host || run->whenAdded) && !ready && !run->coming.valid())
+      run->coming = preparer_.prepare(*device_, scene.start());
+    const bool wanted = ready && !scene.paused && (runAlways_ || inUse);
     if (wanted && !run->running) {
       run->pacer.start(Clock::now());
       run->slow.restart();
     }
-    if (run->running && !wanted) run->host->rest();
+    if (run->running && ready && !wanted) run->host->rest();
     run->running = wanted;
     run->scene->running = wanted;
   }
@@ -183,13 +211,40 @@ void DeviceThread::runDueTicks() {
   for (const auto& run : runs_) turns_.push_back(run.get());
   Clock::time_point before = Clock::now();
   chooseTurns(turns_, before, chosen_);
-  for (Turn* turn : chosen_) begin(static_cast<Run&>(*turn), Clock::now());
   for (Turn* turn : chosen_) {
-    static_cast<Run*>(turn)->host->finish();
+    Run& run = static_cast<Run&>(*turn);
+    run.begun = survives(run, [&] { begin(run, Clock::now()); });
+  }
+  for (Turn* turn : chosen_) {
+    Run& run = static_cast<Run&>(*turn);
+    if (!run.begun || !survives(run, [&] { run.host->finish(); })) continue;
     const Clock::time_point after = Clock::now();
     turn->took(after - before, after);
     before = after;
   }
+}
+
+bool DeviceThread::survives(Run& run, const std::function<void()>& partOfTick) {
+  try {
+    partOfTick();
+    return true;
+  } catch (const vulkan::DeviceLost&) {
+    throw;
+  } catch (const std::exception& failure) {
+    makeAnew(run, failure.what());
+    return false;
+  }
+}
+
+void DeviceThread::makeAnew(Run& run, const std::string& reason) {
+  spdlog::error("{}: a tick failed: {}", run.scene->name(), reason);
+  packer_.drain();
+  device_->drain();
+  const Clock::time_point now = Clock::now();
+  if (run.failed && now - *run.failed < std::chrono::seconds(1)) return dismiss(run, reason);
+  run.failed = now;
+  run.host->release();
+  wake();
 }
 
 void DeviceThread::begin(Run& run, Clock::time_point now) {
@@ -212,6 +267,8 @@ void DeviceThread::rebuild(const std::string& reason) {
   spdlog::error("device: {}; making everything anew", reason);
   // Whoever waits for a frame of the old device gets it first: its memory goes with it.
   packer_.drain();
+  preparer_.abandon();
+  for (const auto& run : runs_) run->coming = {};
   do {
     runTasks();
     std::unique_lock lock(mutex_);
@@ -227,7 +284,9 @@ bool DeviceThread::tryRebuild() {
   try {
     device_ = std::make_unique<vulkan::Device>(options_);
     for (const auto& run : runs_)
-      if (run->host) run->host->rebuild(*device_);
+      if (run->host)
+        run->host->rebuild(std::make_unique<SceneOnDevice>(*device_, run->scene->start(), packer_.workers()),
+                           "the device was lost");
   } catch (const std::exception& failure) {
     spdlog::error("device: {}; trying again", failure.what());
     return false;

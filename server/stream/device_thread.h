@@ -9,6 +9,7 @@
 #include <future>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
@@ -16,6 +17,7 @@
 #include "server/stream/frame_packer.h"
 #include "server/stream/live_scene.h"
 #include "server/stream/scene_host.h"
+#include "server/stream/scene_preparer.h"
 #include "server/stream/slow_watch.h"
 #include "server/stream/turns.h"
 #include "server/telemetry/metrics.h"
@@ -24,9 +26,11 @@
 namespace clothstream::stream {
 
 // Thread-safe. Scenes that are due together are all submitted before the first is waited for. A scene takes
-// room on the device from when somebody first joins it, and sleeps while nobody is in it. When the device is
+// room on the device from when somebody first joins it, and sleeps while nobody is in it; it is made ready on
+// another thread, while the others run. When the device is
 // lost, another is made and every scene goes on from the newest state that the CPU has; this is tried once a
-// second until it succeeds.
+// second until it succeeds. Where a tick fails otherwise, its scene alone is made anew so, and given up if it
+// fails again within a second.
 class DeviceThread {
  public:
   // Device and first scene are ready when it returns; without scenes there is no device, and none can be
@@ -42,8 +46,8 @@ class DeviceThread {
   // Somebody joined or left, or a scene is to be paused, go on or begin anew.
   void wake();
 
-  // A scene from the next round on. The future throws what the device or the scene throws, and
-  // std::future_error where the thread ends before; nothing has changed then.
+  // A scene, once it is ready. The future throws what the device or the scene throws, and std::future_error
+  // where the thread ends before; nothing has changed then.
   std::future<void> add(std::shared_ptr<LiveScene> scene);
   // The scene is held no more when the future is ready.
   std::future<void> remove(std::shared_ptr<LiveScene> scene);
@@ -66,21 +70,31 @@ class DeviceThread {
     }
 
     std::shared_ptr<LiveScene> scene;
-    std::unique_ptr<SceneHost> host;  // once somebody joined
+    ScenePreparer::Coming coming;                 // while it is made ready
+    std::unique_ptr<SceneHost> host;              // once it is
+    std::optional<std::promise<void>> whenAdded;  // until then, where it was added
+    bool refused = false;                         // it was added, and cannot run
+    bool begun = false;                           // the tick in hand
+    std::optional<Clock::time_point> failed;      // when a tick last did
     SlowWatch slow;
     double slipped = 0;
   };
 
   void run(const std::vector<std::shared_ptr<LiveScene>>& scenes, std::promise<void>& ready);
-  std::future<void> post(std::function<void()> task);
+  std::future<void> post(std::packaged_task<void()> task);
   void runTasks();
   // False when it is time to end.
   bool waitForWork();
   void startAndStopScenes();
-  void makeHost(Run& run);
-  // False, and who is in the scene is told, where the device has no room for it.
-  bool tryMakeHost(Run& run);
+  // What was made ready meanwhile gets its host.
+  void takeReadyScenes();
+  // Or who asked for it is told that the device cannot run it. Throws vulkan::DeviceLost.
+  void take(Run& run);
+  void dismiss(Run& run, const std::string& why);
   void runDueTicks();
+  // False where it failed: its scene is made anew then. Throws vulkan::DeviceLost.
+  bool survives(Run& run, const std::function<void()>& partOfTick);
+  void makeAnew(Run& run, const std::string& reason);
   void begin(Run& run, Clock::time_point now);
   void rebuild(const std::string& reason);
   bool tryRebuild();
@@ -102,6 +116,7 @@ class DeviceThread {
   std::unique_ptr<vulkan::Device> device_;
   std::vector<std::unique_ptr<Run>> runs_;
   std::vector<Turn*> turns_, chosen_;  // of runs_
+  ScenePreparer preparer_;             // for device_
   Clock::time_point nextRebuild_{};    // not before
 
   std::thread thread_;

@@ -25,40 +25,12 @@ constexpr std::size_t kMaxPoseArrivals = 256;
 
 }  // namespace
 
-SceneHost::OnDevice::OnDevice(vulkan::Device& device_, const scene::Scene& scene, codec::Workers& workers)
-    : device(device_),
-      simulation(device_, scene),
-      encoders(device_, simulation, encode::streamLayout(scene, LiveScene::kEpoch), &workers),
-      recorder(device_) {
-  recorder.begin();
-  simulation.recordSaveState(recorder);
-  device.wait(device.submit(recorder));
-  start = simulation.collectState(0);
-  warmUp(scene);
-}
-
-void SceneHost::OnDevice::warmUp(const scene::Scene& scene) {
-  simulation::TickInputs inputs{scene.environment, {}};
-  encode::FrameEncoder& encoder = encoders.finest();
-  std::vector<std::byte> packet(encoder.packetBound());
-  for (std::uint64_t tick = 1; tick <= 2; ++tick) {
-    recorder.begin();
-    simulation.recordTick(recorder, inputs);
-    simulation.recordReport(recorder, inputs);
-    if (scene.stream.normals == scene::Normals::octahedral) simulation.recordNormals(recorder);
-    const encode::RecordedFrame frame = encoder.record(recorder, tick, false);
-    device.wait(device.submit(recorder));
-    encoder.entropyCode(frame, packet);
-    inputs.colliders.emplace_back();
-    inputs.grips.emplace_back();
-  }
-  encoder.forgetHistory();
-  recorder.begin();
-  simulation.recordRestoreState(recorder, start);
-  device.wait(device.submit(recorder));
-}
-
 SceneHost::SceneHost(vulkan::Device& device, LiveScene& scene, FramePacker& packer, double reportRate)
+    : SceneHost(std::make_unique<SceneOnDevice>(device, scene.start(), packer.workers()), scene, packer,
+                reportRate) {}
+
+SceneHost::SceneHost(std::unique_ptr<SceneOnDevice> ready, LiveScene& scene, FramePacker& packer,
+                     double reportRate)
     : live_(scene),
       packer_(packer),
       rate_(scene.start().simulationRate),
@@ -68,10 +40,10 @@ SceneHost::SceneHost(vulkan::Device& device, LiveScene& scene, FramePacker& pack
       colliders_(scene_),
       holds_(scene_),
       gentleUntil_(scene_.cloths.size(), 0),
-      onDevice_(std::make_unique<OnDevice>(device, scene_, packer.workers())) {
+      onDevice_(std::move(ready)) {
   newestState_ = onDevice_->start;
   if (live_.journal && live_.journal->due())
-    live_.journal->begin(device.info(), scene_,
+    live_.journal->begin(onDevice_->device.info(), scene_,
                          messages::toDescription(scene_, LiveScene::kEpoch, live_.codec(), 0),
                          onDevice_->start, onDevice_->start);
 }
@@ -92,7 +64,7 @@ void SceneHost::begin(Clock::time_point now) {
   tickInputs_.tellsContacts = contacts_.wanted();
   tickInputs_.environment = scene::environmentAt(scene_, tick_);
 
-  OnDevice& on = *onDevice_;
+  SceneOnDevice& on = *onDevice_;
   on.recorder.begin();
   recordRecovery();
   // A rollback goes back to no state from before a recording.
@@ -109,7 +81,7 @@ void SceneHost::begin(Clock::time_point now) {
 void SceneHost::beginJournal() {
   journalBegan_ = false;
   if (!live_.journal || !live_.journal->due() || recovery_ != Recovery::none || sinceHealthy_ == 0) return;
-  OnDevice& on = *onDevice_;
+  SceneOnDevice& on = *onDevice_;
   on.recorder.begin();
   on.simulation.recordSaveState(on.recorder);
   on.device.wait(on.device.submit(on.recorder));
@@ -219,7 +191,7 @@ void SceneHost::takeBack(const std::string& reason) {
 }
 
 void SceneHost::recordRecovery() {
-  OnDevice& on = *onDevice_;
+  SceneOnDevice& on = *onDevice_;
   recovered_ = recovery_;
   if (recovery_ == Recovery::none) return;
   if (recovery_ == Recovery::rollback) on.simulation.recordRollback(on.recorder);
@@ -255,7 +227,7 @@ void SceneHost::recordFrame(Clock::time_point now) {
   chooseEncoders(now);
   hasFrame_ = !frame_.recorded.empty();
   if (!hasFrame_) return;
-  OnDevice& on = *onDevice_;
+  SceneOnDevice& on = *onDevice_;
   if (scene_.stream.normals == scene::Normals::octahedral) on.simulation.recordNormals(on.recorder);
   frame_.hasReport = ticksAReport_ > 0 && tick_ + 1 >= nextReport_;
   if (frame_.hasReport) {
@@ -277,7 +249,7 @@ void SceneHost::recordFrame(Clock::time_point now) {
 }
 
 void SceneHost::finish() {
-  OnDevice& on = *onDevice_;
+  SceneOnDevice& on = *onDevice_;
   on.device.wait(submitted_);
   const Clock::time_point done = Clock::now();
   status_ = on.simulation.status();
@@ -371,19 +343,19 @@ void SceneHost::release() {
   onDevice_.reset();
 }
 
-void SceneHost::rebuild(vulkan::Device& device) {
-  auto fresh = std::make_unique<OnDevice>(device, live_.start(), packer_.workers());
-  fresh->simulation.setCloths(scene_.cloths);
-  fresh->recorder.begin();
-  fresh->simulation.recordRestoreState(fresh->recorder, newestState_);
-  device.wait(device.submit(fresh->recorder));
-  onDevice_ = std::move(fresh);
+void SceneHost::rebuild(std::unique_ptr<SceneOnDevice> ready, std::string_view why) {
+  SceneOnDevice& fresh = *ready;
+  fresh.simulation.setCloths(scene_.cloths);
+  fresh.recorder.begin();
+  fresh.simulation.recordRestoreState(fresh.recorder, newestState_);
+  fresh.device.wait(fresh.device.submit(fresh.recorder));
+  onDevice_ = std::move(ready);
   holds_.takeAnew();
   recovery_ = Recovery::none;
   sinceHealthy_ = 0;
   if (live_.journal) live_.journal->restored(tick_, newestState_);
   live_.audience.announce(notice(v1::NOTICE_KIND_DEVICE_REBUILT,
-                                 fmt::format("the device was lost; the scene goes on from {:.1f} s before",
+                                 fmt::format("{}; the scene goes on from {:.1f} s before", why,
                                              static_cast<double>(tick_ - newestState_.tick) / rate_),
                                  tick_));
 }

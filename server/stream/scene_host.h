@@ -7,9 +7,9 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
-#include "server/encode/quality_encoders.h"
 #include "server/simulation/cloth_simulation.h"
 #include "server/stream/collider_set.h"
 #include "server/stream/contact_log.h"
@@ -17,9 +17,9 @@
 #include "server/stream/hold_set.h"
 #include "server/stream/live_scene.h"
 #include "server/stream/pose_history.h"
+#include "server/stream/scene_on_device.h"
 #include "server/stream/token_bucket.h"
 #include "server/vulkan/device.h"
-#include "server/vulkan/recorder.h"
 
 namespace clothstream::stream {
 
@@ -44,6 +44,8 @@ class SceneHost {
   // All outlive it. `reportRate` 0: no frame has one. Throws std::runtime_error where the device has no room
   // for the scene.
   SceneHost(vulkan::Device& device, LiveScene& scene, FramePacker& packer, double reportRate = kReportRate);
+  // `ready`: the scene's start.
+  SceneHost(std::unique_ptr<SceneOnDevice> ready, LiveScene& scene, FramePacker& packer, double reportRate);
   ~SceneHost();
 
   LiveScene& scene() { return live_; }
@@ -56,29 +58,18 @@ class SceneHost {
   // Nobody is in the scene, or its clock stands: coarser qualities' encoders go.
   void rest();
 
-  // The device is gone, or about to be: nothing of it is held any more.
+  // Nothing of the device is held any more; nothing but rebuild() may follow, and isReady().
   void release();
-  // Everything anew on this device, from the newest state that the CPU has.
-  void rebuild(vulkan::Device& device);
+  bool isReady() const { return onDevice_ != nullptr; }
+  // Goes on there from the newest state that the CPU has. `ready`: the scene's start. `why`: such as "the
+  // device was lost".
+  void rebuild(std::unique_ptr<SceneOnDevice> ready, std::string_view why);
 
   // Of the newest complete tick.
   std::uint64_t tick() const { return tick_; }
   simulation::TickStatus status() const { return status_; }
 
  private:
-  // What lives on the device. Made with its start complete there, and `start` that state.
-  struct OnDevice {
-    OnDevice(vulkan::Device& device, const scene::Scene& scene, codec::Workers& workers);
-    // A tick and a frame with all that they may need: software devices compile a kernel when it first runs,
-    // which takes tenths of a second. Leaves the start state.
-    void warmUp(const scene::Scene& scene);
-
-    vulkan::Device& device;
-    simulation::ClothSimulation simulation;
-    encode::QualityEncoders encoders;
-    vulkan::Recorder recorder;
-    simulation::StateSnapshot start;
-  };
   // The cloths go back to where they start.
   void reset();
   // Where a journal is due, and the state can be told: it has the state before the next tick. Throws
@@ -143,7 +134,7 @@ class SceneHost {
   std::uint64_t nextReport_ = 0;  // tick
   CompleteFrame frame_;
 
-  std::unique_ptr<OnDevice> onDevice_;
+  std::unique_ptr<SceneOnDevice> onDevice_;
 };
 
 }  // namespace clothstream::stream

@@ -13,8 +13,8 @@
 
 namespace clothstream::stream {
 
-// One after the other, on a thread of its own: checking a large mesh takes seconds, and the device makes the
-// scene between two of its ticks. Thread-safe.
+// One after the other, on a thread of its own: checking a large mesh takes seconds, and so does making a
+// scene ready. Thread-safe.
 class SceneMaker {
  public:
   explicit SceneMaker(SceneServer::State& server) : server_(server), thread_(1) {}

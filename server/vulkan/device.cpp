@@ -156,6 +156,7 @@ Device::~Device() {
 TimelineValue Device::submit(Recorder& recorder) {
   recorder.finish();
   const vk::CommandBuffer commands = *recorder.handles().commands;
+  const std::lock_guard lock(submitting_);
   const TimelineValue value = submitted_ + 1;
   const vk::TimelineSemaphoreSubmitInfo timeline{.signalSemaphoreValueCount = 1,
                                                  .pSignalSemaphoreValues = &value};
@@ -180,6 +181,15 @@ bool Device::wait(TimelineValue value, std::chrono::nanoseconds timeout) const {
   } catch (const vk::DeviceLostError&) {
     throw DeviceLost(kLost);
   }
+}
+
+void Device::drain() {
+  TimelineValue last = 0;
+  {
+    const std::lock_guard lock(submitting_);
+    last = submitted_;
+  }
+  wait(last);
 }
 
 TimelineValue Device::completed() const {

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -69,7 +70,7 @@ class DeviceLost : public std::runtime_error {
 
 std::vector<DeviceInfo> listDevices();
 
-// Everything but wait() and completed() belongs to the one thread that owns the device.
+// Thread-safe but for its end. What is made on it belongs to one thread at a time, whichever.
 class Device {
  public:
   // Throws DeviceError.
@@ -83,12 +84,15 @@ class Device {
   bool isSoftware() const { return info_.kind == DeviceKind::software; }
 
   // Hands a finished recording to the queue and returns the value that the timeline reaches when it is done.
-  // The recorder must not be begun again before that. Throws DeviceLost.
+  // The recorder must not be begun again before that. What one thread submits is done in its order. Throws
+  // DeviceLost.
   TimelineValue submit(Recorder& recorder);
 
-  // False on time-out. Any thread. Throws DeviceLost.
+  // False on time-out. Throws DeviceLost.
   bool wait(TimelineValue value, std::chrono::nanoseconds timeout = std::chrono::nanoseconds::max()) const;
   TimelineValue completed() const;
+  // Returns when all that was submitted is complete. Throws DeviceLost.
+  void drain();
 
   // Messages of the validation layer so far, in this process; text of the newest few.
   static std::uint64_t validationMessages();
@@ -104,6 +108,7 @@ class Device {
  private:
   std::unique_ptr<Handles> handles_;
   std::size_t pipelineCacheLoaded_ = 0;
+  std::mutex submitting_;  // guards the queue and:
   TimelineValue submitted_ = 0;
   DeviceInfo info_;
   Limits limits_;

@@ -52,6 +52,18 @@ void Recorder::begin() {
   if (*handles_->timestamps) handles_->commands.resetQueryPool(*handles_->timestamps, 0, kMaxMarks + 1);
   marks_.clear();
   open_ = true;
+  rehearses_ = false;
+}
+
+void Recorder::beginRehearsal() {
+  begin();
+  rehearsed_.clear();
+  rehearses_ = true;
+}
+
+void Recorder::note(const Bindings& bindings) {
+  const auto same = [&](const Bindings* known) { return &known->kernel() == &bindings.kernel(); };
+  if (std::ranges::none_of(rehearsed_, same)) rehearsed_.push_back(&bindings);
 }
 
 void Recorder::beginStage(std::string_view stage) {
@@ -69,6 +81,7 @@ void Recorder::mark() {
 void Recorder::dispatchBytes(const Bindings& bindings, const void* push, std::uint32_t pushBytes,
                              std::uint64_t threads) {
   if (threads == 0) return;
+  if (rehearses_) return note(bindings);
   const Kernel& kernel = bindings.kernel();
   const std::uint64_t groups = (threads + kernel.workgroupSize() - 1) / kernel.workgroupSize();
   const std::uint32_t most = device_->limits().maxDispatchX;
@@ -84,8 +97,15 @@ void Recorder::dispatchBytes(const Bindings& bindings, const void* push, std::ui
 void Recorder::dispatchIndirectBytes(const Bindings& bindings, const void* push, std::uint32_t pushBytes,
                                      const Buffer& groups, std::size_t offset) {
   assert(offset % 4 == 0 && offset + sizeof(VkDispatchIndirectCommand) <= groups.bytes());
+  if (rehearses_) return note(bindings);
   bind(bindings, push, pushBytes);
   handles_->commands.dispatchIndirect(*groups.handles().buffer, offset);
+}
+
+void Recorder::touch(const Bindings& bindings) {
+  const std::vector<std::byte> push(bindings.kernel().pushConstantBytes());
+  bind(bindings, push.data(), bindings.kernel().pushConstantBytes());
+  handles_->commands.dispatch(0, 1, 1);
 }
 
 void Recorder::bind(const Bindings& bindings, const void* push, std::uint32_t pushBytes) {

@@ -20,7 +20,7 @@ struct StageTime {
   double seconds = 0;
 };
 
-// One command buffer and its timestamps, used again and again. Belongs to the device's thread. Allocates
+// One command buffer and its timestamps, used again and again. Belongs to one thread at a time. Allocates
 // nothing once it has recorded its longest recording.
 class Recorder {
  public:
@@ -31,6 +31,14 @@ class Recorder {
 
   // Forgets what was recorded; what was submitted must be complete.
   void begin();
+
+  // As begin(), but what follows runs no kernels: they are noted.
+  void beginRehearsal();
+  // Of each kernel that the last rehearsal noted, what it was bound to first. Good until the next rehearsal.
+  std::span<const Bindings* const> rehearsed() const { return rehearsed_; }
+  // Runs a kernel on nothing: what a device does when one first runs, it does then. Software devices compile
+  // it, which takes up to tenths of a second.
+  void touch(const Bindings& bindings);
 
   // Until the next beginStage or the end, work counts to this stage (names in static storage; at most
   // kMaxStages names and kMaxMarks calls a recording; the same name may come again and is added up).
@@ -83,6 +91,7 @@ class Recorder {
                      std::uint64_t threads);
   void dispatchIndirectBytes(const Bindings& bindings, const void* push, std::uint32_t pushBytes,
                              const Buffer& groups, std::size_t offset);
+  void note(const Bindings& bindings);
   void bind(const Bindings& bindings, const void* push, std::uint32_t pushBytes);
   void mark();
 
@@ -92,7 +101,8 @@ class Recorder {
   std::vector<std::string_view> marks_;
   std::vector<std::uint64_t> ticks_;
   std::vector<StageTime> times_;
-  bool open_ = false;
+  std::vector<const Bindings*> rehearsed_;
+  bool open_ = false, rehearses_ = false;
 };
 
 }  // namespace clothstream::vulkan

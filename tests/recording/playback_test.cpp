@@ -71,12 +71,15 @@ class Viewer {
         notices.push_back(message.notice());
       else if (message.has_playback())
         playbacks.push_back(message.playback());
+      else if (message.has_parameter_changed())
+        changes.push_back(message.parameter_changed());
     }
   }
 
   std::vector<Seen> frames;
   std::vector<v1::Notice> notices;
   std::vector<v1::Playback> playbacks;
+  std::vector<v1::ParameterChanged> changes;
 
  private:
   void take(const v1::Frame& frame, Clock::time_point now) {
@@ -231,6 +234,89 @@ TEST_F(PlaybackTest, ASeekGoesOnFromTheKeyFrameBeforeIt) {
     EXPECT_NEAR(playback->playback().position(), static_cast<double>(frameOf(first)) / kSampleRate, 1e-6);
     pass(0.1);
     EXPECT_GT(viewer->frames.size(), before + 3);
+  }
+}
+
+// The sample, and in it changes: after half a second the wind and the structural springs, after a second and
+// a half the wind again, and the mass.
+std::string sampleWithChanges() {
+  std::string bytes;
+  auto writer = RecordingWriter::begin(
+      [&](std::string_view more) {
+        bytes += more;
+        return Written();
+      },
+      "sample", {{"scene", "sample"}, {"device", "none"}});
+  v1::StreamDescription description = sampleDescription();
+  v1::Environment& environment = *description.mutable_definition()->mutable_environment();
+  environment.mutable_gravity()->set_y(-9.81f);
+  environment.mutable_wind()->set_z(3);
+  v1::Cloth& cloth = *description.mutable_definition()->add_cloths();
+  cloth.set_name("sheet");
+  cloth.mutable_grid()->set_width(2);
+  cloth.mutable_grid()->set_height(0.5f);
+  cloth.set_mass(0.25f);
+  cloth.mutable_structural()->set_stiffness(20);
+  cloth.mutable_self_collision()->set_radius(0.01f);
+  cloth.mutable_self_collision()->set_friction(0.3f);
+  EXPECT_TRUE(writer->write(Topic::description, sampleTime(0), description.SerializeAsString()));
+
+  v1::ParameterChanged early, late;
+  early.mutable_change()->mutable_wind()->mutable_value()->set_x(1);
+  v1::ClothChange& everyCloth = *early.mutable_change()->add_cloths();
+  everyCloth.mutable_structural()->set_stiffness(40);
+  everyCloth.mutable_self_collision()->set_friction(0.5f);
+  late.mutable_change()->mutable_wind()->mutable_value();  // none
+  v1::ClothChange& sheet = *late.mutable_change()->add_cloths();
+  sheet.set_name("sheet");
+  sheet.set_areal_mass(0.5f);
+  late.mutable_change()->add_cloths()->set_name("none such");
+
+  auto sample = readerOf(sampleRecording(kFrames));
+  std::uint32_t frame = 0;
+  for (auto message = sample.next(); *message; message = sample.next()) {
+    if ((*message)->topic != Topic::frames) continue;
+    EXPECT_TRUE(writer->write(Topic::frames, (*message)->time, (*message)->bytes));
+    ++frame;
+    if (frame != 30 && frame != 90) continue;
+    const v1::ParameterChanged& told = frame == 30 ? early : late;
+    EXPECT_TRUE(writer->write(Topic::parameters, sampleTime(frame), told.SerializeAsString()));
+  }
+  EXPECT_TRUE(writer->finish());
+  return bytes;
+}
+
+TEST_F(PlaybackTest, ASeekTellsTheParametersThatHoldThere) {
+  for (const bool cut : {false, true}) {
+    // Without its index, too: then it is not known where the changes are.
+    std::string bytes = sampleWithChanges();
+    if (cut) bytes.resize(bytes.size() - 100);
+    play(std::move(bytes));
+    join();
+    const auto last = [&]() -> const v1::ParameterChange& { return viewer->changes.back().change(); };
+    const auto expect = [&](float windX, float windZ, float stiffness, float friction, float arealMass) {
+      EXPECT_EQ(last().gravity().value().y(), -9.81f);
+      EXPECT_EQ(last().wind().value().x(), windX);
+      EXPECT_EQ(last().wind().value().z(), windZ);
+      ASSERT_EQ(last().cloths_size(), 1);
+      EXPECT_EQ(last().cloths(0).name(), "sheet");
+      EXPECT_EQ(last().cloths(0).structural().stiffness(), stiffness);
+      EXPECT_EQ(last().cloths(0).self_collision().radius(), 0.01f);
+      EXPECT_EQ(last().cloths(0).self_collision().friction(), friction);
+      EXPECT_EQ(last().cloths(0).areal_mass(), arealMass);
+      // With the frame that it is told before.
+      EXPECT_EQ(viewer->changes.back().tick(), viewer->frames.back().tick);
+    };
+    ASSERT_EQ(viewer->changes.size(), 1u);
+    expect(0, 3, 20, 0.3f, 0.25f);
+    pause(true);
+    seek(2.2);
+    expect(0, 0, 40, 0.5f, 0.5f);
+    seek(0.1);
+    expect(0, 3, 20, 0.3f, 0.25f);
+    seek(1.0);
+    expect(1, 0, 40, 0.5f, 0.25f);
+    viewer.reset();
   }
 }
 

@@ -150,7 +150,9 @@ TEST_F(RecorderTest, AScenePicksUpAfterItsDeviceWasLost) {
   recorded.ticks(10);
   vulkan::Device another;
   recorded.host->release();
-  recorded.host->rebuild(another);
+  recorded.host->rebuild(
+      std::make_unique<stream::SceneOnDevice>(another, recorded.live.start(), recorded.packer.workers()),
+      "the device was lost");
   recorded.change(wind(2));
   recorded.ticks(30);
   const Resimulation result = again(recorded.finish());

@@ -219,6 +219,37 @@ TEST_F(JoinTest, AKeyFrameIsToBeHadOnDemand) {
   EXPECT_TRUE(peer.frames().back().key);
 }
 
+// Its core tells times of the server's clock by its own: after a step of that both are off until it notices.
+TEST_F(JoinTest, AnHourThatAClientsClockJumpsCostsItNoCollider) {
+  START();
+  TestPeer peer(server());
+  peer.join();
+  v1::ClientMessage message;
+  v1::ParticipantCollider& hand = *message.mutable_collider_poses()->add_colliders();
+  hand.set_id(1);
+  hand.mutable_sphere()->set_radius(0.1f);
+  const auto shownAt = [&] {
+    const v1::ColliderState* state = colliderOf(peer.frames().back(), peer.welcome().participant_id());
+    return state == nullptr ? -1 : state->position().x();
+  };
+  constexpr std::int64_t kHour = 3'600'000'000;  // us
+  float x = 0;
+  for (const std::int64_t off : {std::int64_t{0}, kHour, -kHour, std::int64_t{0}}) {
+    x += 5;  // a jump, which is not led on
+    hand.mutable_pose()->mutable_position()->set_x(x);
+    const auto now = static_cast<std::int64_t>(microseconds(Clock::now()));
+    message.mutable_collider_poses()->set_client_time_us(static_cast<std::uint64_t>(now + 2 * kHour + off));
+    message.mutable_collider_poses()->set_server_time_us(
+        static_cast<std::uint64_t>(std::max<std::int64_t>(1, now + off)));
+    peer.send(message);
+    // At once: with what is on its way, and the tick that takes it.
+    for (int frames = 0; frames < 8 && shownAt() != x; ++frames) peer.readFrames(1);
+    EXPECT_EQ(shownAt(), x) << off;
+  }
+  EXPECT_FALSE(peer.finished());
+  EXPECT_EQ(server().listScenes().scenes(0).participants(), 1u);
+}
+
 TEST_F(JoinTest, PosesMoveACollidersForEverybodyAndVanishWithTheirParticipant) {
   START();
   TestPeer watcher(server());

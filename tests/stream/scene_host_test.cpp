@@ -437,7 +437,8 @@ TEST_F(SceneHostTest, GoesOnOnAnotherDeviceFromTheNewestStateThatTheCpuHas) {
   hosted.ticks(210);  // 40 ticks/s: saved with tick 201
   hosted.host.release();
   vulkan::Device another(vulkan::DeviceOptions{.validation = true});
-  hosted.host.rebuild(another);
+  hosted.host.rebuild(std::make_unique<SceneOnDevice>(another, hosted.live.start(), hosted.packer.workers()),
+                      "the device was lost");
   hosted.tick();
   ASSERT_EQ(hosted.told.size(), 1u);
   EXPECT_EQ(hosted.told[0].notice().kind(), v1::NOTICE_KIND_DEVICE_REBUILT);

@@ -1,8 +1,12 @@
 // SPDX-License-Identifier: MIT
 // Scenes that peers create, delete, pause and put back to their start.
+#include <algorithm>
 #include <chrono>
+#include <future>
 #include <thread>
+#include <utility>
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -239,9 +243,8 @@ TEST_F(ScenesTest, APausedSceneStandsStillAndGoesOnWhereItWas) {
   ASSERT_FALSE(control(other, "small", false, false).control_scene().scene().paused());
   peer.readUntil(
       [](const v1::ServerMessage& m) { return m.notice().kind() == v1::NOTICE_KIND_SCENE_RESUMED; });
-  const std::uint64_t before = peer.frames().back().tick;
   peer.readFrames(5);
-  EXPECT_LT(peer.frames().back().tick, before + 20);
+  EXPECT_LT(peer.frames().back().tick, ticks + 20);
   EXPECT_EQ(control(other, "nowhere", true, false).error().code(), v1::ERROR_CODE_NOT_FOUND);
 }
 
@@ -266,6 +269,82 @@ TEST_F(ScenesTest, AResetSceneBeginsAnewWithItsParametersAsTheyAre) {
   EXPECT_NEAR(lowest(), -1.1f, 0.02f);
   EXPECT_EQ(peer.description().definition().name(), "small");
   EXPECT_EQ(server().getScene({}).value().scene().environment().gravity().y(), 0);
+}
+
+// What it takes to be made ready is many times what a tick of the others takes: tables of 590,000
+// constraints.
+scene::Scene heavyScene() {
+  scene::Scene heavy = tests::smallScene("heavy");
+  scene::Cloth& cloth = heavy.cloths[0];
+  cloth.grid.rows = cloth.grid.columns = 256;
+  cloth.pins[0].lastColumn = 255;
+  cloth.solver.kind = scene::SolverKind::constraint;
+  heavy.substeps = 1;
+  return heavy;
+}
+
+// Quick, so that it has many ticks even in what a fast machine takes.
+scene::Scene lightScene() {
+  scene::Scene light = tests::smallScene("light");
+  light.simulationRate = light.streamRate = 200;
+  light.substeps = 3;
+  return light;
+}
+
+class HeavySceneTest : public tests::ServerTest {
+ protected:
+  bool heavyRuns() { return server().state().find("heavy")->running; }
+};
+
+TEST_F(HeavySceneTest, OthersGoOnWhileItIsMadeReady) {
+  START({}, {heavyScene(), lightScene()});
+  TestPeer light(server()), heavy(server());
+  light.join("light");
+  heavy.hello("heavy");
+  const Clock::time_point asked = Clock::now();
+  Clock::time_point last = asked;
+  Clock::duration longest{};
+  int frames = 0;
+  for (; !heavyRuns(); ++frames) {
+    light.readFrames(1);
+    const Clock::time_point now = Clock::now();
+    longest = std::max(longest, now - std::exchange(last, now));
+  }
+  fmt::print("made ready in {:.0f} ms; another scene's {} frames meanwhile at most {:.0f} ms apart\n",
+             1e3 * seconds(last - asked), frames, 1e3 * seconds(longest));
+  // Two can be on their way, and one tick in flight, when it begins.
+  EXPECT_GE(frames, 8);
+  heavy.readFrames(1);
+}
+
+TEST_F(HeavySceneTest, IsMadeReadyAnewWhereTheDeviceIsLostMeanwhile) {
+  START({}, {heavyScene(), lightScene()});
+  TestPeer light(server()), heavy(server());
+  light.join("light");
+  heavy.hello("heavy");
+  light.readFrames(2);
+  server().state().device.simulateDeviceLoss();
+  light.readUntil(
+      [](const v1::ServerMessage& m) { return m.notice().kind() == v1::NOTICE_KIND_DEVICE_REBUILT; });
+  heavy.readFrames(1);
+  light.readFrames(3);
+}
+
+TEST_F(HeavySceneTest, AServerStopsWhileItIsMadeReady) {
+  START({}, {heavyScene(), lightScene()});
+  TestPeer light(server()), heavy(server());
+  light.join("light");
+  heavy.hello("heavy");
+  light.readFrames(2);
+  v1::CreateSceneRequest request;
+  request.set_named("heavy");
+  request.set_name("heavier");
+  std::promise<void> answered;
+  server().createScene(request, [&](const auto&) { answered.set_value(); });
+  light.vanish();
+  heavy.vanish();
+  stop();
+  answered.get_future().get();
 }
 
 }  // namespace

@@ -19,18 +19,20 @@ namespace clothstream::tests {
 // Skips its tests, with the reason, where there is no device.
 class ServerTest : public ::testing::Test {
  protected:
-  // The scenes "small", which is the default, and "other". Once a test.
-  void start(stream::ServerOptions options = {}) {
+  // The scenes "small", which is the default, "other", and these. Once a test.
+  void start(stream::ServerOptions options = {}, const std::vector<scene::Scene>& more = {}) {
     options.defaultScene = "small";
+    std::vector scenes{smallScene("small"), smallScene("other")};
+    scenes.insert(scenes.end(), more.begin(), more.end());
     try {
-      server_ = std::make_unique<stream::SceneServer>(std::vector{smallScene("small"), smallScene("other")},
-                                                      std::move(options));
+      server_ = std::make_unique<stream::SceneServer>(std::move(scenes), std::move(options));
     } catch (const vulkan::DeviceError& error) {
       GTEST_SKIP() << error.what();
     }
   }
 
   stream::SceneServer& server() { return *server_; }
+  void stop() { server_.reset(); }
   telemetry::SceneMetrics& metrics() { return server_->state().scenes.front()->metrics; }
 
  private:

@@ -200,6 +200,31 @@ TEST_F(ComputeTest, recordingRunsAgainWhenItIsSubmittedAgain) {
   EXPECT_THAT(contents<std::uint32_t>(b), Each(42u));
 }
 
+TEST_F(ComputeTest, aRehearsalRunsNoKernelAndNotesEachOnce) {
+  constexpr std::uint32_t kCount = 64;
+  const Buffer a = uploadOf(countedFrom(0, kCount));
+  const Buffer b(tests::device(), BufferPurpose::readback, a.bytes());
+  const Kernel kernel = countUp(), other = countUp(32);
+  const Bindings bindings(tests::device(), kernel, {&a, &b}), same(tests::device(), kernel, {&a, &b}),
+      others(tests::device(), other, {&a, &b});
+  Recorder recorder(tests::device());
+  recorder.beginRehearsal();
+  recorder.fill(b, 7, b.bytes());
+  for (const Bindings* one : {&bindings, &same, &others}) recorder.dispatch(*one, kCount, kCount);
+  tests::submitAndWait(tests::device(), recorder);
+  EXPECT_THAT(recorder.rehearsed(), ::testing::ElementsAre(&bindings, &others));
+  for (const Bindings* one : recorder.rehearsed()) {
+    recorder.begin();
+    recorder.touch(*one);
+    tests::submitAndWait(tests::device(), recorder);
+  }
+  EXPECT_THAT(contents<std::uint32_t>(b), Each(7u));
+  recorder.begin();
+  recorder.dispatch(bindings, kCount, kCount);
+  tests::submitAndWait(tests::device(), recorder);
+  EXPECT_EQ(contents<std::uint32_t>(b), countedUp(kCount, 1));
+}
+
 TEST_F(ComputeTest, deviceDecidesTheSizeOfAnIndirectDispatch) {
   constexpr std::uint32_t kCount = 256;
   const Buffer groups(tests::device(), BufferPurpose::indirect, 4 * sizeof(std::uint32_t));

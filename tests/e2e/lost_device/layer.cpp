@@ -1,13 +1,16 @@
 // SPDX-License-Identifier: MIT
 // A Vulkan layer whose devices are lost at the first submission after a file is there: the one that
 // CLOTHSTREAM_LOSE_DEVICE names, which it removes. From then on the device says VK_ERROR_DEVICE_LOST to
-// whatever is asked of its queues and semaphores; another device is whole.
+// whatever is asked of its queues and semaphores; another device is whole. Where "memory" is in the file,
+// only that submission fails, with VK_ERROR_OUT_OF_HOST_MEMORY.
 #include <atomic>
 #include <cstdlib>
 #include <cstring>
+#include <fstream>
 #include <map>
 #include <memory>
 #include <mutex>
+#include <string>
 
 #include <unistd.h>
 #include <vulkan/vk_layer.h>
@@ -35,10 +38,16 @@ struct Device {
   PFN_vkGetSemaphoreCounterValue counter;
   std::atomic<bool> lost{false};
 
-  // Nothing is underway then that would have to be waited for.
-  void loseIfWanted() {
-    const char* const file = std::getenv("CLOTHSTREAM_LOSE_DEVICE");
-    if (file != nullptr && unlink(file) == 0) lost = true;
+  // What becomes of the next submission.
+  VkResult fate() {
+    const char* const name = std::getenv("CLOTHSTREAM_LOSE_DEVICE");
+    std::string word;
+    if (name != nullptr) std::ifstream(name) >> word;
+    if (name != nullptr && unlink(name) == 0) {
+      if (word == "memory") return VK_ERROR_OUT_OF_HOST_MEMORY;
+      lost = true;
+    }
+    return lost ? VK_ERROR_DEVICE_LOST : VK_SUCCESS;
   }
 };
 
@@ -122,8 +131,8 @@ VKAPI_ATTR void VKAPI_CALL destroyDevice(VkDevice handle, const VkAllocationCall
 VKAPI_ATTR VkResult VKAPI_CALL queueSubmit(VkQueue queue, std::uint32_t count, const VkSubmitInfo* submits,
                                            VkFence fence) {
   const std::shared_ptr<Device> device = deviceOf(queue);
-  device->loseIfWanted();
-  return device->lost ? VK_ERROR_DEVICE_LOST : device->submit(queue, count, submits, fence);
+  const VkResult fate = device->fate();
+  return fate == VK_SUCCESS ? device->submit(queue, count, submits, fence) : fate;
 }
 VKAPI_ATTR VkResult VKAPI_CALL queueWaitIdle(VkQueue queue) {
   const std::shared_ptr<Device> device = deviceOf(queue);
