@@ -27,10 +27,9 @@ namespace clothstream::stream {
 
 // Thread-safe. Scenes that are due together are all submitted before the first is waited for. A scene takes
 // room on the device from when somebody first joins it, and sleeps while nobody is in it; it is made ready on
-// another thread, while the others run. When the device is
-// lost, another is made and every scene goes on from the newest state that the CPU has; this is tried once a
-// second until it succeeds. Where a tick fails otherwise, its scene alone is made anew so, and given up if it
-// fails again within a second.
+// another thread, while the others run. When the device is lost, another is made and every scene goes on from
+// the newest state that the CPU has; this is tried once a second until it succeeds. Where a tick fails
+// otherwise, its scene alone is made anew so, and given up if it fails again within a second.
 class DeviceThread {
  public:
   // Device and first scene are ready when it returns; without scenes there is no device, and none can be

@@ -12,7 +12,6 @@ namespace {
 using std::chrono::hours;
 using std::chrono::milliseconds;
 using std::chrono::nanoseconds;
-using std::chrono::seconds;
 
 const Clock::time_point kStart = Clock::time_point(hours(5));
 
