@@ -6,6 +6,7 @@
 #include <string>
 
 #include "clothstream/v1/scene.pb.h"
+#include "clothstream/v1/session.pb.h"
 #include "server/messages/field_error.h"
 #include "server/messages/mesh_message.h"
 #include "server/messages/validation.h"
@@ -22,6 +23,9 @@ namespace clothstream::messages {
 // Every field set, defaults too, meshes in full. toScene() of it gives the scene back.
 v1::Scene toMessage(const scene::Scene& scene);
 v1::Normals toMessage(scene::Normals normals);
+// What can be changed of environment and cloths, as the message has it. `areas`: m², a cloth; of those that
+// it has no area of, or 0, the areal mass is left out.
+v1::ParameterChange allParameters(const v1::Scene& scene, std::span<const double> areas);
 
 // The solver that a cloth names; what a cloth of this scene must be for it, unfitSolver() says.
 scene::Solver toSolver(Checks& checks, const Path& path, const v1::Solver& message);

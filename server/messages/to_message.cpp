@@ -161,4 +161,33 @@ v1::Scene toMessage(const scene::Scene& scene) {
   return message;
 }
 
+v1::ParameterChange allParameters(const v1::Scene& scene, std::span<const double> areas) {
+  v1::ParameterChange change;
+  *change.mutable_gravity()->mutable_value() = scene.environment().gravity();
+  *change.mutable_wind()->mutable_value() = scene.environment().wind();
+  change.set_air_density(scene.environment().air_density());
+  *change.mutable_gust() = scene.environment().gust();
+  for (std::size_t i = 0; i < static_cast<std::size_t>(scene.cloths_size()); ++i) {
+    const v1::Cloth& cloth = scene.cloths(static_cast<int>(i));
+    v1::ClothChange& all = *change.add_cloths();
+    all.set_name(cloth.name());
+    if (i < areas.size() && areas[i] > 0)
+      all.set_areal_mass(static_cast<float>(double{cloth.mass()} / areas[i]));
+    if (!cloth.material().empty()) all.set_material(cloth.material());
+    *all.mutable_structural() = cloth.structural();
+    *all.mutable_shear() = cloth.shear();
+    *all.mutable_bend() = cloth.bend();
+    all.set_damping(cloth.damping());
+    all.set_drag(cloth.drag());
+    all.set_lift(cloth.lift());
+    all.set_friction(cloth.friction());
+    all.set_thickness(cloth.thickness());
+    *all.mutable_solver() = cloth.solver();
+    all.set_dihedral_bending(cloth.dihedral_bending());
+    if (cloth.has_self_collision()) *all.mutable_self_collision() = cloth.self_collision();
+    if (cloth.has_tethers()) *all.mutable_tethers() = cloth.tethers();
+  }
+  return change;
+}
+
 }  // namespace clothstream::messages

@@ -2,6 +2,7 @@
 // The parameters that hold at some time of a recorded stream.
 #include "server/recording/parameters_in_force.h"
 
+#include <algorithm>
 #include <cstdint>
 #include <cstring>
 #include <string>
@@ -10,6 +11,7 @@
 #include <google/protobuf/descriptor.h>
 #include <google/protobuf/message.h>
 
+#include "server/messages/scene_message.h"
 #include "server/scene/scene.h"
 
 namespace clothstream::recording {
@@ -54,31 +56,10 @@ void overwrite(const google::protobuf::Message& with, google::protobuf::Message&
 ParametersInForce::ParametersInForce(const v1::StreamDescription& description) {
   if (!description.has_definition()) return;
   const v1::Scene& scene = description.definition();
-  const v1::Environment& environment = scene.environment();
-  *now_.mutable_gravity()->mutable_value() = environment.gravity();
-  *now_.mutable_wind()->mutable_value() = environment.wind();
-  now_.set_air_density(environment.air_density());
-  *now_.mutable_gust() = environment.gust();
-  for (int i = 0; i < scene.cloths_size() && i < description.cloths_size(); ++i) {
-    const v1::Cloth& cloth = scene.cloths(i);
-    v1::ClothChange& all = *now_.add_cloths();
-    all.set_name(cloth.name());
-    if (const double area = areaOf(cloth, description.cloths(i)); area > 0)
-      all.set_areal_mass(static_cast<float>(double{cloth.mass()} / area));
-    if (!cloth.material().empty()) all.set_material(cloth.material());
-    *all.mutable_structural() = cloth.structural();
-    *all.mutable_shear() = cloth.shear();
-    *all.mutable_bend() = cloth.bend();
-    all.set_damping(cloth.damping());
-    all.set_drag(cloth.drag());
-    all.set_lift(cloth.lift());
-    all.set_friction(cloth.friction());
-    all.set_thickness(cloth.thickness());
-    *all.mutable_solver() = cloth.solver();
-    all.set_dihedral_bending(cloth.dihedral_bending());
-    if (cloth.has_self_collision()) *all.mutable_self_collision() = cloth.self_collision();
-    if (cloth.has_tethers()) *all.mutable_tethers() = cloth.tethers();
-  }
+  std::vector<double> areas;
+  for (int i = 0; i < std::min(scene.cloths_size(), description.cloths_size()); ++i)
+    areas.push_back(areaOf(scene.cloths(i), description.cloths(i)));
+  now_ = messages::allParameters(scene, areas);
 }
 
 void ParametersInForce::apply(const v1::ParameterChange& change) {

@@ -39,6 +39,7 @@ Playback::Playback(RecordedStream recording, const PlaybackOptions& options)
     : position_(options.from),
       speed_(options.speed),
       loop_(options.loop),
+      parameters_(recording.description()),
       recording_(std::move(recording)),
       ticksAFrame_(std::max(1u, description().simulation_rate() / description().stream_rate())) {}
 
@@ -65,6 +66,11 @@ void Playback::wake() {
     woken_ = true;
   }
   changed_.notify_all();
+}
+
+v1::ParameterChange Playback::parameters() const {
+  const std::lock_guard lock(mutex_);
+  return parameters_.now();
 }
 
 void Playback::run(stream::LiveScene& scene) {
@@ -235,8 +241,12 @@ void Playback::publish(stream::LiveScene& scene, RecordedStream::Next& next) {
     if (tick <= newest_ || tick - newest_ > kMaxTickStep) shift_ += newest_ + ticksAFrame_ - tick;
     return publishFrame(scene, told);
   }
-  if (told.message.has_parameter_changed())
-    told.message.mutable_parameter_changed()->set_tick(told.message.parameter_changed().tick() + shift_);
+  if (told.message.has_parameter_changed()) {
+    v1::ParameterChanged& changed = *told.message.mutable_parameter_changed();
+    changed.set_tick(changed.tick() + shift_);
+    const std::lock_guard lock(mutex_);
+    parameters_.apply(changed.change());
+  }
   if (told.message.has_tick_events())
     told.message.mutable_tick_events()->set_tick(told.message.tick_events().tick() + shift_);
   if (told.message.has_notice())
@@ -276,12 +286,12 @@ void Playback::tell(stream::LiveScene& scene) {
 }
 
 void Playback::tellParameters(stream::LiveScene& scene, const RecordedStream::Told& frame) {
-  v1::ServerMessage message;
-  v1::ParameterChanged& changed = *message.mutable_parameter_changed();
-  *changed.mutable_change() = recording_.parametersAt(frame.time);
-  if (changed.change().ByteSizeLong() == 0) return;
-  changed.set_tick(frame.header.tick + shift_);
-  scene.audience.announce(stream::serialise(message));
+  {
+    const std::lock_guard lock(mutex_);
+    parameters_ = recording_.parametersAt(frame.time);
+  }
+  if (const auto message = stream::parametersMessage(*this, frame.header.tick + shift_))
+    scene.audience.announce(message);
 }
 
 void Playback::moveTo(double seconds) {

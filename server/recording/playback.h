@@ -43,6 +43,7 @@ class Playback : public stream::FrameSource {
   void wake() override;
   messages::Result<void> control(const v1::ControlSceneRequest& request) override;
   v1::Playback playback() const override;
+  v1::ParameterChange parameters() const override;
 
   // Publishes what is due by `now`; gives when to call it again, or nothing: after a wake(). Of one thread,
   // which begin() starts; a test may call it in its place.
@@ -76,6 +77,7 @@ class Playback : public stream::FrameSource {
   Wanted wanted_;
   double position_ = 0, speed_ = 1;  // s; written by step() alone
   bool loop_ = false, paused_ = false;
+  ParametersInForce parameters_;
 
   // step()'s own.
   RecordedStream recording_;

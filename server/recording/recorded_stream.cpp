@@ -10,7 +10,6 @@
 #include <fmt/format.h>
 
 #include "server/messages/limits.h"
-#include "server/recording/parameters_in_force.h"
 
 namespace clothstream::recording {
 namespace {
@@ -117,12 +116,12 @@ void RecordedStream::collectChanges(double until) {
   }
 }
 
-v1::ParameterChange RecordedStream::parametersAt(double seconds) {
+ParametersInForce RecordedStream::parametersAt(double seconds) {
   collectChanges(seconds);
   ParametersInForce parameters(description_);
   for (const Change& change : changes_)
     if (change.time <= seconds) parameters.apply(change.change);
-  return parameters.now();
+  return parameters;
 }
 
 std::optional<RecordedStream::Told> RecordedStream::told(const RecordedMessage& message) {

@@ -14,6 +14,7 @@
 #include "proto/codec/packet_header.h"
 #include "proto/codec/temporal_layers.h"
 #include "proto/recording/recording_reader.h"
+#include "server/recording/parameters_in_force.h"
 
 namespace clothstream::recording {
 
@@ -55,8 +56,8 @@ class RecordedStream {
   [[nodiscard]] Next next();
   // What comes next is then the newest key frame at this time or before, or else the first message.
   void seek(double seconds);
-  // All parameters as they are known to whoever saw everything up to then; nothing where none are.
-  v1::ParameterChange parametersAt(double seconds);
+  // All parameters as they are known to whoever saw everything up to then.
+  ParametersInForce parametersAt(double seconds);
 
  private:
   explicit RecordedStream(RecordingReader reader) : reader_(std::move(reader)) {}

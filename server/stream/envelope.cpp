@@ -21,6 +21,14 @@ SharedBytes notice(v1::NoticeKind kind, std::string text, std::uint64_t tick, st
   return serialise(message);
 }
 
+SharedBytes parametersChanged(v1::ParameterChange change, std::uint64_t tick, std::uint64_t participant) {
+  v1::ServerMessage message;
+  *message.mutable_parameter_changed()->mutable_change() = std::move(change);
+  message.mutable_parameter_changed()->set_participant_id(participant);
+  message.mutable_parameter_changed()->set_tick(tick);
+  return serialise(message);
+}
+
 SharedBytes error(v1::ErrorCode code, std::string text, bool fatal, std::uint64_t requestId) {
   v1::ServerMessage message;
   message.set_request_id(requestId);

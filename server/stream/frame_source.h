@@ -32,6 +32,8 @@ class FrameSource {
   [[nodiscard]] virtual messages::Result<void> control(const v1::ControlSceneRequest& request) = 0;
   // Where it stands.
   virtual v1::Playback playback() const = 0;
+  // Those that hold there; nothing where none are known.
+  virtual v1::ParameterChange parameters() const = 0;
 };
 
 // Tells where it stands.
@@ -39,6 +41,12 @@ inline SharedBytes playbackMessage(const FrameSource& source) {
   v1::ServerMessage message;
   *message.mutable_playback() = source.playback();
   return serialise(message);
+}
+
+// Tells the parameters that hold there; nullptr where none are known.
+inline SharedBytes parametersMessage(const FrameSource& source, std::uint64_t tick) {
+  v1::ParameterChange parameters = source.parameters();
+  return parameters.ByteSizeLong() == 0 ? nullptr : parametersChanged(std::move(parameters), tick);
 }
 
 }  // namespace clothstream::stream

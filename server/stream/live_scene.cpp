@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <utility>
+#include <vector>
 
 #include "server/encode/frame_encoder.h"
 #include "server/messages/client_message.h"
@@ -18,32 +19,9 @@ static_assert(messages::limits::kMaxTemporalLayers == codec::kMaxTemporalLayers 
               messages::limits::kMaxQualities == codec::kMaxQualities);
 
 v1::ParameterChange allParameters(const scene::Scene& scene) {
-  const v1::Scene message = messages::toMessage(scene);
-  v1::ParameterChange change;
-  *change.mutable_gravity()->mutable_value() = message.environment().gravity();
-  *change.mutable_wind()->mutable_value() = message.environment().wind();
-  change.set_air_density(message.environment().air_density());
-  *change.mutable_gust() = message.environment().gust();
-  for (std::size_t i = 0; i < scene.cloths.size(); ++i) {
-    const v1::Cloth& cloth = message.cloths(static_cast<int>(i));
-    v1::ClothChange& all = *change.add_cloths();
-    all.set_areal_mass(static_cast<float>(double{cloth.mass()} / scene::areaOf(scene.cloths[i])));
-    if (!cloth.material().empty()) all.set_material(cloth.material());
-    all.set_name(cloth.name());
-    *all.mutable_structural() = cloth.structural();
-    *all.mutable_shear() = cloth.shear();
-    *all.mutable_bend() = cloth.bend();
-    all.set_damping(cloth.damping());
-    all.set_drag(cloth.drag());
-    all.set_lift(cloth.lift());
-    all.set_friction(cloth.friction());
-    all.set_thickness(cloth.thickness());
-    *all.mutable_solver() = cloth.solver();
-    all.set_dihedral_bending(cloth.dihedral_bending());
-    if (cloth.has_self_collision()) *all.mutable_self_collision() = cloth.self_collision();
-    if (cloth.has_tethers()) *all.mutable_tethers() = cloth.tethers();
-  }
-  return change;
+  std::vector<double> areas;
+  for (const scene::Cloth& cloth : scene.cloths) areas.push_back(scene::areaOf(cloth));
+  return messages::allParameters(messages::toMessage(scene), areas);
 }
 
 scene::Scene nameAndRates(std::string name, const v1::StreamDescription& description) {

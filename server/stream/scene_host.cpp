@@ -117,11 +117,7 @@ void SceneHost::applyInputs() {
   std::string problem;
   for (const AcceptedChange& accepted : inputs_.changes) {
     if (!apply(accepted.change, problem)) continue;
-    v1::ServerMessage message;
-    *message.mutable_parameter_changed()->mutable_change() = accepted.message;
-    message.mutable_parameter_changed()->set_participant_id(accepted.participant);
-    message.mutable_parameter_changed()->set_tick(tick_ + 1);
-    live_.audience.announce(serialise(message));
+    live_.audience.announce(parametersChanged(accepted.message, tick_ + 1, accepted.participant));
   }
   if (!problem.empty()) takeBack(problem);
   for (Poses& poses : inputs_.poses) {
@@ -183,10 +179,7 @@ void SceneHost::setCloths(const std::vector<scene::Cloth>& cloths) {
 void SceneHost::takeBack(const std::string& reason) {
   const std::string text = fmt::format("a change of parameters was taken back: {}", reason);
   spdlog::warn("{}: tick {}: {}", live_.name(), tick_, text);
-  v1::ServerMessage message;
-  *message.mutable_parameter_changed()->mutable_change() = live_.correct(scene_);
-  message.mutable_parameter_changed()->set_tick(tick_ + 1);
-  live_.audience.announce(serialise(message));
+  live_.audience.announce(parametersChanged(live_.correct(scene_), tick_ + 1));
   live_.audience.announce(notice(v1::NOTICE_KIND_CHANGE_UNDONE, text, tick_));
 }
 
@@ -316,13 +309,11 @@ void SceneHost::recover() {
     text =
         "the simulation left the range of numbers twice within a second: it goes on from its start, with the "
         "parameters it had then";
-    v1::ServerMessage message;
-    *message.mutable_parameter_changed()->mutable_change() = live_.resetParameters();
-    message.mutable_parameter_changed()->set_tick(tick_ + 1);
+    const v1::ParameterChange start = live_.resetParameters();
     scene_.environment = live_.start().environment;
     scene_.cloths = live_.start().cloths;
     setCloths(scene_.cloths);
-    live_.audience.announce(serialise(message));
+    live_.audience.announce(parametersChanged(start, tick_ + 1));
   } else {
     recovery_ = Recovery::rollback;
     live_.metrics.rollbacks.add();

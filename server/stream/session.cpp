@@ -208,8 +208,12 @@ void Session::hello(const v1::Hello& message) {
                       {joining->quality, joining->temporalLayers});
   if (scene->paused && !mailbox_->announce(pausedNotice(*scene)))
     return closeLocked(tooSlow(), Parting::lost);
-  if (scene->source && !mailbox_->announce(playbackMessage(*scene->source)))
-    return closeLocked(tooSlow(), Parting::lost);
+  if (scene->source) {
+    const SharedBytes parameters = parametersMessage(*scene->source, scene->tick);
+    if (!mailbox_->announce(playbackMessage(*scene->source)) ||
+        (parameters && !mailbox_->announce(parameters)))
+      return closeLocked(tooSlow(), Parting::lost);
+  }
   if (scene->journal && scene->journal->active() && !mailbox_->announce(recordedNotice(scene->tick)))
     return closeLocked(tooSlow(), Parting::lost);
   server_.wake(*scene);

@@ -309,6 +309,12 @@ TEST_F(PlaybackTest, ASeekTellsTheParametersThatHoldThere) {
     };
     ASSERT_EQ(viewer->changes.size(), 1u);
     expect(0, 3, 20, 0.3f, 0.25f);
+    // Who joins later is told what holds by then.
+    EXPECT_EQ(playback->parameters().SerializeAsString(), last().SerializeAsString());
+    pass(1);
+    ASSERT_EQ(viewer->changes.size(), 2u);
+    EXPECT_EQ(playback->parameters().wind().value().x(), 1);
+    EXPECT_EQ(playback->parameters().gravity().value().y(), -9.81f);
     pause(true);
     seek(2.2);
     expect(0, 0, 40, 0.5f, 0.5f);
