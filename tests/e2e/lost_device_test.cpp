@@ -54,7 +54,10 @@ struct Watcher {
     options.scene = scene;
     auto joined = GrpcClient::join(address, options, [this](cs_client* client, std::uint32_t events) {
       if (events == 0) ++cuts;
-      if ((events & CS_EVENT_NOTICE) != 0) ++notices;
+      // Others come too: a busy machine cannot keep the rate.
+      if ((events & CS_EVENT_NOTICE) != 0 &&
+          std::string(cs_notice_text(client)).find("the scene goes on from") != std::string::npos)
+        ++restarts;
       if ((events & CS_EVENT_FRAME) == 0) return;
       cs_statistics now;
       cs_get_statistics(client, GrpcClient::nowUs(), &now);
@@ -76,7 +79,7 @@ struct Watcher {
   }
 
   std::atomic<std::uint64_t> tick{0}, frames{0}, mismatches{0};
-  std::atomic<int> cuts{0}, notices{0}, stepsBack{0};
+  std::atomic<int> cuts{0}, restarts{0}, stepsBack{0};
 };
 
 double milliseconds(Clock::duration time) {
@@ -93,7 +96,7 @@ TEST_F(LostDevice, TheStreamGoesOnFromTheLastCheckpoint) {
     ASSERT_TRUE(watcher.seesMore(90));
     fail("device");
     const auto lost = Clock::now();
-    ASSERT_TRUE(eventually([&] { return watcher.notices >= loss; }));
+    ASSERT_TRUE(eventually([&] { return watcher.restarts >= loss; }));
     ASSERT_TRUE(watcher.seesMore(1));
     std::printf("device lost: the stream goes on after %.0f ms\n", milliseconds(Clock::now() - lost));
   }
@@ -111,14 +114,14 @@ TEST_F(LostDevice, ATickThatFailsOtherwiseIsItsScenesAlone) {
   if (address_.empty()) return;
   Watcher one, other;
   auto first = one.join(address_, "small"), second = other.join(address_, "small_with_normals");
-  const auto notices = [&] { return one.notices + other.notices; };
+  const auto restarts = [&] { return one.restarts + other.restarts; };
   for (int failure = 1; failure <= 2; ++failure) {
     // More than a second: one that fails again at once is given up.
     ASSERT_TRUE(one.seesMore(90));
     ASSERT_TRUE(other.seesMore(90));
     fail("memory");
     const auto failed = Clock::now();
-    ASSERT_TRUE(eventually([&] { return notices() >= failure; }));
+    ASSERT_TRUE(eventually([&] { return restarts() >= failure; }));
     ASSERT_TRUE(one.seesMore(1));
     ASSERT_TRUE(other.seesMore(1));
     std::printf("a tick failed: the stream goes on after %.0f ms\n", milliseconds(Clock::now() - failed));
@@ -126,7 +129,7 @@ TEST_F(LostDevice, ATickThatFailsOtherwiseIsItsScenesAlone) {
   // Of each failure one of the two was told, and the other went on.
   ASSERT_TRUE(one.seesMore(30));
   ASSERT_TRUE(other.seesMore(30));
-  EXPECT_EQ(notices(), 2);
+  EXPECT_EQ(restarts(), 2);
   one.expectNothingWrong();
   other.expectNothingWrong();
   first.reset();
