@@ -3,7 +3,7 @@ add_library(clothstream_options INTERFACE)
 target_include_directories(clothstream_options INTERFACE ${PROJECT_SOURCE_DIR})
 target_compile_options(clothstream_options INTERFACE
   -Wall -Wextra -Wpedantic -Wconversion -Wshadow -Wnon-virtual-dtor -Wold-style-cast -Werror
-  $<$<CXX_COMPILER_ID:GNU>:-Wno-subobject-linkage> # several sources are compiled as one
+  $<$<AND:$<BOOL:${CMAKE_UNITY_BUILD}>,$<CXX_COMPILER_ID:GNU>>:-Wno-subobject-linkage> # sources are compiled as one
   -ffp-contract=off)
 target_compile_definitions(clothstream_options INTERFACE SPDLOG_HEADER_ONLY SPDLOG_FMT_EXTERNAL FMT_HEADER_ONLY)
 if(CLOTHSTREAM_SANITIZE)
