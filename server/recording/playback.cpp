@@ -286,9 +286,10 @@ void Playback::tell(stream::LiveScene& scene) {
 }
 
 void Playback::tellParameters(stream::LiveScene& scene, const RecordedStream::Told& frame) {
+  ParametersInForce there = recording_.parametersAt(frame.time);  // which may read the file
   {
     const std::lock_guard lock(mutex_);
-    parameters_ = recording_.parametersAt(frame.time);
+    parameters_ = std::move(there);
   }
   if (const auto message = stream::parametersMessage(*this, frame.header.tick + shift_))
     scene.audience.announce(message);
