@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: MIT
 // WebSockets, all of them on one thread.
+#include <atomic>
 #include <condition_variable>
 #include <deque>
 #include <mutex>
 #include <thread>
+#include <utility>
 
 #include <boost/asio/connect.hpp>
 #include <boost/asio/executor_work_guard.hpp>
@@ -36,7 +38,7 @@ struct Address {
   }
 };
 
-// All but its queue of what others want belongs to the door's thread.
+// All but the count of what is underway belongs to the door's thread.
 class WebLink final : public Link {
  public:
   WebLink(net::io_context& io, const Address& address, LinkListener& listener)
@@ -67,31 +69,31 @@ class WebLink final : public Link {
   void drop() override {
     post([this] {
       end(net::error::operation_aborted);
-      finishIfIdle();
-      const std::lock_guard lock(mutex_);
       dropped_ = true;
-      changed_.notify_all();
     });
     std::unique_lock lock(mutex_);
-    changed_.wait(lock, [&] { return dropped_ && gone_; });
+    changed_.wait(lock, [&] { return gone_; });
   }
 
  private:
+  // Tasks and handlers count as underway until they have run: the link is there for them.
   template <class Task>
   void post(Task task) {
-    net::post(io_, std::move(task));
+    ++underway_;
+    net::post(io_, [this, task = std::move(task)]() mutable {
+      task();
+      finished();
+    });
   }
-  // A handler that counts as underway until it has run.
   template <class Handler>
   auto tracked(Handler handler) {
     ++underway_;
     return [this, handler](error_code error, auto&&... rest) {
-      --underway_;
       if (error)
         end(error);
       else if (!ended_)
         handler(rest...);
-      if (ended_) finishIfIdle();
+      finished();
     };
   }
 
@@ -148,9 +150,10 @@ class WebLink final : public Link {
     resolver_.cancel();
     stream_.next_layer().close();
   }
-  void finishIfIdle() {
-    if (underway_ > 0 || gone_) return;
-    listener_.closed(why_);
+  void finished() {
+    if (--underway_ > 0 || !ended_) return;
+    if (!std::exchange(toldClosed_, true)) listener_.closed(why_);
+    if (!dropped_) return;
     const std::lock_guard lock(mutex_);
     gone_ = true;
     changed_.notify_all();
@@ -164,13 +167,14 @@ class WebLink final : public Link {
   beast::flat_buffer incoming_;
   std::deque<std::string> waiting_;
   std::string why_;
-  int underway_ = 0;
+  std::atomic<int> underway_ = 0;
   bool open_ = false, reading_ = false, writing_ = false, wantsRead_ = false;
-  bool leaving_ = false, closing_ = false, ended_ = false;
+  bool leaving_ = false, closing_ = false;
+  bool ended_ = false, toldClosed_ = false, dropped_ = false;
 
   std::mutex mutex_;
   std::condition_variable changed_;
-  bool gone_ = false, dropped_ = false;  // written by the door's thread under the mutex
+  bool gone_ = false;  // guarded by the mutex
 };
 
 class WebDoor final : public Door {
