@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: MIT
 // Scenes that peers create, delete, pause and put back to their start.
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <future>
+#include <latch>
 #include <thread>
 #include <utility>
 
@@ -218,6 +220,73 @@ TEST_F(ScenesTest, PiecesThatDoNotFitAreRefusedAndForgotten) {
   maker.vanish();
   other.send(piece(content, 0, 1, 600));
   EXPECT_EQ(createUploaded(other).error().code(), v1::ERROR_CODE_MALFORMED_MESSAGE);
+}
+
+TEST_F(ScenesTest, WhatWasUploadedTakesItsRoomUntilItIsAnswered) {
+  ServerOptions options;
+  const v1::Scene scene = discScene(40);
+  const std::string content = scene.SerializeAsString();
+  options.maxUploadBytes = content.size() + content.size() / 2;
+  START(options);
+  TestPeer maker(server());
+  upload(maker, content);
+  v1::ClientMessage create;
+  create.set_request_id(77);
+  create.mutable_create_scene()->set_uploaded_content_id(9);
+  maker.send(create);
+  // It is being made now, which takes far longer than this.
+  upload(maker, content);
+  EXPECT_EQ(maker.readUntil(Body::kError).error().code(), v1::ERROR_CODE_RESOURCE_EXHAUSTED);
+  const v1::ServerMessage made =
+      maker.readUntil([](const v1::ServerMessage& answer) { return answer.request_id() == 77; });
+  EXPECT_TRUE(made.has_create_scene()) << made.DebugString();
+  upload(maker, content);
+  EXPECT_TRUE(createUploaded(maker, "again").has_create_scene());
+}
+
+TEST_F(ScenesTest, OnlySoManyWaitToBeMade) {
+  ServerOptions options;
+  options.maxCreatedScenes = 1;
+  START(options);
+  constexpr int kAsked = 200;
+  std::latch answered(kAsked);
+  std::atomic<int> refused = 0;
+  v1::CreateSceneRequest request;
+  *request.mutable_scene() = discScene(60);
+  for (int i = 0; i < kAsked; ++i) {
+    server().createScene(request, [&](const auto& answer) {
+      if (!answer && answer.error().text().find("wait to be made") != std::string::npos) {
+        EXPECT_EQ(answer.error().code(), v1::ERROR_CODE_RESOURCE_EXHAUSTED);
+        ++refused;
+      }
+      answered.count_down();
+    });
+  }
+  answered.wait();
+  EXPECT_GT(refused, 0);
+}
+
+TEST_F(ScenesTest, ASceneHasItsOwnLimitOfParticipants) {
+  ServerOptions options;
+  options.maxParticipants = 5;
+  START(options);
+  TestPeer maker(server());
+  v1::ClientMessage message;
+  v1::CreateSceneRequest& create = *message.mutable_create_scene();
+  create.set_named("small");
+  create.set_name("duet");
+  create.set_max_participants(6);
+  EXPECT_THAT(ask(maker, message).error().text(),
+              StartsWith("createScene.maxParticipants = 6: must be at most 5"));
+  create.set_max_participants(2);
+  EXPECT_EQ(ask(maker, message).create_scene().scene().max_participants(), 2u);
+  EXPECT_EQ(createNamed(maker, "small", "usual").create_scene().scene().max_participants(), 5u);
+
+  TestPeer first(server()), second(server()), third(server());
+  first.join("duet");
+  second.join("duet");
+  third.hello("duet");
+  EXPECT_THAT(third.readToTheEnd().error().text(), HasSubstr("'duet' has 2 participants"));
 }
 
 TEST_F(ScenesTest, APausedSceneStandsStillAndGoesOnWhereItWas) {
