@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "clients/core/core.h"
+#include "clients/core/parameter_change.h"
 #include "clients/core/server_message.h"
 
 namespace clothstream::client {

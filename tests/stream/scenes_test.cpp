@@ -5,6 +5,7 @@
 #include <chrono>
 #include <future>
 #include <latch>
+#include <memory>
 #include <thread>
 #include <utility>
 
@@ -360,22 +361,28 @@ scene::Scene lightScene() {
   return light;
 }
 
+// The light one runs, and somebody asks for the heavy one.
 class HeavySceneTest : public tests::ServerTest {
  protected:
+  void SetUp() override {
+    START({}, {heavyScene(), lightScene()});
+    light = std::make_unique<TestPeer>(server());
+    heavy = std::make_unique<TestPeer>(server());
+    light->join("light");
+    heavy->hello("heavy");
+  }
   bool heavyRuns() { return server().state().find("heavy")->running; }
+
+  std::unique_ptr<TestPeer> light, heavy;
 };
 
 TEST_F(HeavySceneTest, OthersGoOnWhileItIsMadeReady) {
-  START({}, {heavyScene(), lightScene()});
-  TestPeer light(server()), heavy(server());
-  light.join("light");
-  heavy.hello("heavy");
   const Clock::time_point asked = Clock::now();
   Clock::time_point last = asked;
   Clock::duration longest{};
   int frames = 0;
   for (; !heavyRuns(); ++frames) {
-    light.readFrames(1);
+    light->readFrames(1);
     const Clock::time_point now = Clock::now();
     longest = std::max(longest, now - std::exchange(last, now));
   }
@@ -383,35 +390,27 @@ TEST_F(HeavySceneTest, OthersGoOnWhileItIsMadeReady) {
              1e3 * seconds(last - asked), frames, 1e3 * seconds(longest));
   // Two can be on their way, and one tick in flight, when it begins.
   EXPECT_GE(frames, 8);
-  heavy.readFrames(1);
+  heavy->readFrames(1);
 }
 
 TEST_F(HeavySceneTest, IsMadeReadyAnewWhereTheDeviceIsLostMeanwhile) {
-  START({}, {heavyScene(), lightScene()});
-  TestPeer light(server()), heavy(server());
-  light.join("light");
-  heavy.hello("heavy");
-  light.readFrames(2);
+  light->readFrames(2);
   server().state().device.simulateDeviceLoss();
-  light.readUntil(
+  light->readUntil(
       [](const v1::ServerMessage& m) { return m.notice().kind() == v1::NOTICE_KIND_DEVICE_REBUILT; });
-  heavy.readFrames(1);
-  light.readFrames(3);
+  heavy->readFrames(1);
+  light->readFrames(3);
 }
 
 TEST_F(HeavySceneTest, AServerStopsWhileItIsMadeReady) {
-  START({}, {heavyScene(), lightScene()});
-  TestPeer light(server()), heavy(server());
-  light.join("light");
-  heavy.hello("heavy");
-  light.readFrames(2);
+  light->readFrames(2);
   v1::CreateSceneRequest request;
   request.set_named("heavy");
   request.set_name("heavier");
   std::promise<void> answered;
   server().createScene(request, [&](const auto&) { answered.set_value(); });
-  light.vanish();
-  heavy.vanish();
+  light->vanish();
+  heavy->vanish();
   stop();
   answered.get_future().get();
 }
