@@ -194,6 +194,26 @@ struct Link::State {
     for (const auto& pair : pairs) pair->close();
     pairs.clear();
   }
+  // Connections that nobody takes fill the queue of those to be taken: the kernel drops what else comes.
+  void fillQueue() {
+    acceptor.cancel();
+    acceptor.listen(0);
+    for (int i = 0; i < kFilling; ++i) {
+      filling.emplace_back(io, tcp::v4());
+      filling.back().async_connect({net::ip::address_v4::loopback(), port}, [](error_code) {});
+    }
+  }
+  void emptyQueue() {
+    filling.clear();
+    acceptor.listen(net::socket_base::max_listen_connections);
+    acceptor.non_blocking(true);
+    error_code none;
+    while (!none) {
+      tcp::socket filled = acceptor.accept(none);
+      if (!none) reset(filled);
+    }
+    accept();
+  }
   // On the link's thread, and returns when it is done.
   void change(const std::function<void()>& how) {
     std::promise<void> done;
@@ -212,6 +232,9 @@ struct Link::State {
   net::executor_work_guard<net::io_context::executor_type> work;
   Weather weather;
   std::vector<std::shared_ptr<Pair>> pairs;
+  // One is taken to the queue, however short; the others see that it is full.
+  static constexpr int kFilling = 3;
+  std::vector<tcp::socket> filling;
   std::thread thread;
 };
 
@@ -233,8 +256,18 @@ void Link::cut() {
   });
 }
 
+void Link::swallow() {
+  state_->change([&] {
+    state_->closeAll();
+    state_->fillQueue();
+  });
+}
+
 void Link::restore() {
-  state_->change([&] { state_->weather.whole = true; });
+  state_->change([&] {
+    state_->weather.whole = true;
+    if (!state_->filling.empty()) state_->emptyQueue();
+  });
 }
 
 }  // namespace clothstream::e2e

@@ -34,6 +34,8 @@ class Link {
   void impair(const Impairment& impairment);
   // Resets every connection, and those that come until it is restored.
   void cut();
+  // The same, but those that come get no answer at all, until it is restored.
+  void swallow();
   void restore();
 
  private:
