@@ -18,11 +18,10 @@ class Reconnection {
   static constexpr std::uint64_t kShortestUs = 50'000, kLongestHeldUs = 120'000, kLongestUs = 5'000'000;
   // An attempt that has led to no Welcome by then is given up for another. Soon while the participant is
   // held, for a link that returns may have swallowed its beginning: after kTimesJoining times what joining
-  // took last, but not before kHeldAttemptUs, and a little later with each attempt, for it may take longer
-  // now. Else slow links have their time.
-  static constexpr std::uint64_t kTimesJoining = 3, kHeldAttemptUs = 150'000, kAttemptUs = 10'000'000;
-  // What joining took where that is not known.
-  static constexpr std::uint64_t kJoiningUs = 700'000;
+  // took last, if that is known and within these bounds, and a little later with each attempt, for it may
+  // take longer now. Else slow links have their time.
+  static constexpr std::uint64_t kTimesJoining = 3, kShortestHeldAttemptUs = 150'000,
+                                 kLongestHeldAttemptUs = 2'000'000, kAttemptUs = 10'000'000;
   // A connection that brings nothing for this long is given up: servers answer pings. Of the time between two
   // updates this much counts at most.
   static constexpr std::uint64_t kSilenceUs = 4'000'000, kLongestStepUs = 500'000;
@@ -45,8 +44,9 @@ class Reconnection {
   std::uint64_t began(std::uint64_t nowUs, std::uint64_t holdUs) {
     begunUs_ = nowUs;
     if (!isHeld(nowUs, holdUs)) return nowUs + kAttemptUs;
-    const std::uint64_t shortest = std::max(kHeldAttemptUs, kTimesJoining * joiningUs_);
-    return nowUs + std::min(shortest + shortest * attempts_ / 64, kAttemptUs);
+    const std::uint64_t first =
+        std::clamp(kTimesJoining * joiningUs_, kShortestHeldAttemptUs, kLongestHeldAttemptUs);
+    return nowUs + std::min(first + first * attempts_ / 64, kAttemptUs);
   }
   void joined(std::uint64_t nowUs) {
     joinedUs_ = std::max<std::uint64_t>(nowUs, 1);
@@ -69,7 +69,8 @@ class Reconnection {
   std::uint32_t attempts_ = 0;
   std::uint64_t lostUs_ = 0, joinedUs_ = 0;  // 0: not
   std::uint64_t begunUs_ = 0;                // the newest attempt; 0: never
-  std::uint64_t joiningUs_ = kJoiningUs;     // from there to its Welcome, of the newest that had one
+  // From there to its Welcome, of the newest that had one.
+  std::uint64_t joiningUs_ = kLongestHeldAttemptUs;
 };
 
 }  // namespace clothstream::client
