@@ -326,6 +326,67 @@ TEST_F(PlaybackTest, ASeekTellsTheParametersThatHoldThere) {
   }
 }
 
+std::string sampleWithSliders() {
+  std::string bytes;
+  writeSampleWithSliders(
+      [&](std::string_view more) {
+        bytes += more;
+        return Written();
+      },
+      kFrames);
+  return bytes;
+}
+
+TEST_F(PlaybackTest, AfterASeekParametersAreThoseOfPlayingThrough) {
+  for (const bool cut : {false, true}) {
+    std::string bytes = sampleWithSliders();
+    const std::size_t lastChunk = readerOf(bytes).mcap().chunks().back().offset;
+    if (cut) bytes.resize(lastChunk + 100);
+    play(std::move(bytes));
+    join();
+    std::vector<std::string> played;  // with each frame
+    while (!scene->paused) {
+      played.resize(viewer->frames.size(), playback->parameters().SerializeAsString());
+      step(0.001);
+    }
+    ASSERT_EQ(played.size(), viewer->frames.size());
+    ASSERT_GT(played.size(), kFrames - 13);
+    pause(true);
+    std::mt19937 random(5);
+    for (int i = 0; i < 100; ++i) {
+      seek(playback->playback().length() * static_cast<double>(random() % 1001) / 1000);
+      const std::size_t frame = frameOf(viewer->frames.back());
+      ASSERT_LT(frame, played.size());
+      EXPECT_EQ(playback->parameters().SerializeAsString(), played[frame]) << frame;
+      const v1::ParameterChange& told = viewer->changes.back().change();
+      EXPECT_EQ(told.SerializeAsString(), played[frame]) << frame;
+      const SampleSliders sliders = sampleSliders(static_cast<std::uint32_t>(frame));
+      EXPECT_EQ(told.wind().value().x(), sliders.wind) << frame;
+      EXPECT_EQ(told.cloths(0).structural().stiffness(), sliders.stiffness) << frame;
+    }
+    viewer.reset();
+  }
+}
+
+TEST(ParameterHistory, WithFewerKeptItSaysTheSame) {
+  RecordingReader reader = readerOf(sampleWithSliders());
+  const v1::StreamDescription description = reader.description().value();
+  const ParameterHistory all(reader, description);
+  EXPECT_EQ(all.stride(), 1u);
+  const std::size_t one = ParametersInForce(description).now().ByteSizeLong();
+  for (const std::size_t most : {std::size_t{0}, 3 * one, 6 * one}) {
+    const ParameterHistory few(reader, description, most);
+    EXPECT_GT(few.stride(), 1u);
+    for (std::uint32_t frame = 0; frame < kFrames; ++frame) {
+      const v1::ParameterChange there = few.at(sampleTime(frame), reader).now();
+      EXPECT_EQ(there.SerializeAsString(), all.at(sampleTime(frame), reader).now().SerializeAsString());
+      EXPECT_EQ(there.wind().value().x(), sampleSliders(frame).wind) << frame;
+      EXPECT_EQ(there.cloths(0).structural().stiffness(), sampleSliders(frame).stiffness) << frame;
+    }
+    EXPECT_EQ(few.at(0, reader).now().SerializeAsString(), all.at(0, reader).now().SerializeAsString());
+  }
+}
+
 TEST_F(PlaybackTest, WhilePausedNothingFlowsButASeekIsShown) {
   play({.from = 1});
   join();
