@@ -238,7 +238,7 @@ TEST_F(PlaybackTest, ASeekGoesOnFromTheKeyFrameBeforeIt) {
 }
 
 // The sample, and in it changes: after half a second the wind and the structural springs, after a second and
-// a half the wind again, and the mass.
+// a half the wind again, mass and material.
 std::string sampleWithChanges() {
   std::string bytes;
   auto writer = RecordingWriter::begin(
@@ -270,6 +270,7 @@ std::string sampleWithChanges() {
   v1::ClothChange& sheet = *late.mutable_change()->add_cloths();
   sheet.set_name("sheet");
   sheet.set_areal_mass(0.5f);
+  sheet.set_material("denim");
   late.mutable_change()->add_cloths()->set_name("none such");
 
   auto sample = readerOf(sampleRecording(kFrames));
@@ -294,7 +295,8 @@ TEST_F(PlaybackTest, ASeekTellsTheParametersThatHoldThere) {
     play(std::move(bytes));
     join();
     const auto last = [&]() -> const v1::ParameterChange& { return viewer->changes.back().change(); };
-    const auto expect = [&](float windX, float windZ, float stiffness, float friction, float arealMass) {
+    const auto expect = [&](float windX, float windZ, float stiffness, float friction, float arealMass,
+                            const char* material) {
       EXPECT_EQ(last().gravity().value().y(), -9.81f);
       EXPECT_EQ(last().wind().value().x(), windX);
       EXPECT_EQ(last().wind().value().z(), windZ);
@@ -304,11 +306,14 @@ TEST_F(PlaybackTest, ASeekTellsTheParametersThatHoldThere) {
       EXPECT_EQ(last().cloths(0).self_collision().radius(), 0.01f);
       EXPECT_EQ(last().cloths(0).self_collision().friction(), friction);
       EXPECT_EQ(last().cloths(0).areal_mass(), arealMass);
+      // Told where there is none, too: whoever was told of one forgets it.
+      EXPECT_TRUE(last().cloths(0).has_material());
+      EXPECT_EQ(last().cloths(0).material(), material);
       // With the frame that it is told before.
       EXPECT_EQ(viewer->changes.back().tick(), viewer->frames.back().tick);
     };
     ASSERT_EQ(viewer->changes.size(), 1u);
-    expect(0, 3, 20, 0.3f, 0.25f);
+    expect(0, 3, 20, 0.3f, 0.25f, "");
     // Who joins later is told what holds by then.
     EXPECT_EQ(playback->parameters().SerializeAsString(), last().SerializeAsString());
     pass(1);
@@ -317,11 +322,11 @@ TEST_F(PlaybackTest, ASeekTellsTheParametersThatHoldThere) {
     EXPECT_EQ(playback->parameters().gravity().value().y(), -9.81f);
     pause(true);
     seek(2.2);
-    expect(0, 0, 40, 0.5f, 0.5f);
+    expect(0, 0, 40, 0.5f, 0.5f, "denim");
     seek(0.1);
-    expect(0, 3, 20, 0.3f, 0.25f);
+    expect(0, 3, 20, 0.3f, 0.25f, "");
     seek(1.0);
-    expect(1, 0, 40, 0.5f, 0.25f);
+    expect(1, 0, 40, 0.5f, 0.25f, "");
     viewer.reset();
   }
 }
