@@ -281,10 +281,21 @@ bool McapReader::State::scanChunk(const Record& record) {
 
 void McapReader::State::scan() {
   std::string bytes;
+  std::vector<std::uint16_t> named;  // by the message indexes that follow the last chunk
   for (std::uint64_t offset = firstRecord;;) {
     const std::optional<Record> record = recordAt(offset);
-    if (!record || record->opcode == Opcode::dataEnd || record->opcode == Opcode::footer) return;
+    if (!record) return;
     bool taken = true;
+    if (record->opcode == Opcode::messageIndex) {
+      taken = record->length >= sizeof(std::uint16_t) &&
+              source->read(record->offset, sizeof(std::uint16_t), bytes);
+      if (taken) named.push_back(ByteReader(bytes).number<std::uint16_t>());
+    } else if (!named.empty()) {
+      // Another record follows: these were all.
+      if (!chunks.empty()) chunks.back().channels = named;
+      named.clear();
+    }
+    if (record->opcode == Opcode::dataEnd || record->opcode == Opcode::footer) return;
     if (record->opcode == Opcode::chunk) taken = scanChunk(*record);
     const bool plain = record->opcode == Opcode::schema || record->opcode == Opcode::channel ||
                        record->opcode == Opcode::metadata;

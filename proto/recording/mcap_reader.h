@@ -32,7 +32,8 @@ struct ReadSchema {
 struct ChunkPlace {
   std::uint64_t start = 0, end = 0;
   std::uint64_t offset = 0, length = 0;  // of the record in the file
-  // Of its messages, as the index says; nothing where there is none.
+  // Of its messages, as the index says, or in a file without one the message indexes behind the chunk;
+  // nothing where there are none, or the file ends in them.
   std::optional<std::vector<std::uint16_t>> channels = {};
 };
 

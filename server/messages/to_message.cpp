@@ -173,7 +173,7 @@ v1::ParameterChange allParameters(const v1::Scene& scene, std::span<const double
     all.set_name(cloth.name());
     if (i < areas.size() && areas[i] > 0)
       all.set_areal_mass(static_cast<float>(double{cloth.mass()} / areas[i]));
-    if (!cloth.material().empty()) all.set_material(cloth.material());
+    all.set_material(cloth.material());  // "": of none, whatever was told before
     *all.mutable_structural() = cloth.structural();
     *all.mutable_shear() = cloth.shear();
     *all.mutable_bend() = cloth.bend();

@@ -2,6 +2,8 @@
 // The parameters that hold at some time of a recorded stream.
 #pragma once
 
+#include <utility>
+
 #include "clothstream/v1/session.pb.h"
 
 namespace clothstream::recording {
@@ -12,6 +14,8 @@ class ParametersInForce {
  public:
   // As when the stream began: of nothing that its definition does not tell.
   explicit ParametersInForce(const v1::StreamDescription& description);
+  // These, which are all.
+  explicit ParametersInForce(v1::ParameterChange all) : now_(std::move(all)) {}
 
   // Those told later come later.
   void apply(const v1::ParameterChange& change);

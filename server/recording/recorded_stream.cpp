@@ -53,14 +53,21 @@ tl::expected<RecordedStream, std::string> RecordedStream::of(RecordingReader rea
   if (description->temporal_layers() > codec::kMaxTemporalLayers)
     return tl::unexpected(fmt::format("its stream has {} temporal layers; a stream has at most {}",
                                       description->temporal_layers(), codec::kMaxTemporalLayers));
-  RecordedStream stream(std::move(reader));
-  stream.scene_ = isName(description->scene()) ? description->scene() : "recording";
-  stream.description_ = std::move(*description);
-  return stream;
+  return RecordedStream(std::move(reader), std::move(*description));
 }
+
+RecordedStream::RecordedStream(RecordingReader reader, v1::StreamDescription description)
+    : reader_(std::move(reader)),
+      description_(std::move(description)),
+      parameters_(reader_, description_),
+      scene_(isName(description_.scene()) ? description_.scene() : "recording") {}
 
 double RecordedStream::secondsAt(std::uint64_t time) const {
   return time <= reader_.start() ? 0 : static_cast<double>(time - reader_.start()) * 1e-9;
+}
+
+std::uint64_t RecordedStream::timeAt(double seconds) const {
+  return reader_.start() + static_cast<std::uint64_t>(std::llround(std::clamp(seconds, 0.0, length()) * 1e9));
 }
 
 void RecordedStream::lose(double from, std::string reason) {
@@ -90,8 +97,7 @@ RecordedStream::Next RecordedStream::next() {
 }
 
 void RecordedStream::seek(double seconds) {
-  const double ns = std::clamp(seconds, 0.0, length()) * 1e9;
-  std::uint64_t time = reader_.start() + static_cast<std::uint64_t>(std::llround(ns));
+  std::uint64_t time = timeAt(seconds);
   newest_.reset();
   lost_.reset();
   held_.reset();
@@ -104,24 +110,8 @@ void RecordedStream::seek(double seconds) {
   }
 }
 
-void RecordedStream::collectChanges(double until) {
-  const auto chunks = reader_.mcap().chunks();
-  v1::ParameterChanged message;
-  for (; collectedChunks_ < chunks.size() && secondsAt(chunks[collectedChunks_].start) <= until;
-       ++collectedChunks_) {
-    const auto messages = reader_.messages(collectedChunks_, Topic::parameters);
-    if (!messages) continue;  // who plays it says that it is damaged
-    for (const RecordedMessage& told : *messages)
-      if (parse(told.bytes, &message)) changes_.push_back({secondsAt(told.time), message.change()});
-  }
-}
-
 ParametersInForce RecordedStream::parametersAt(double seconds) {
-  collectChanges(seconds);
-  ParametersInForce parameters(description_);
-  for (const Change& change : changes_)
-    if (change.time <= seconds) parameters.apply(change.change);
-  return parameters;
+  return parameters_.at(timeAt(seconds), reader_);
 }
 
 std::optional<RecordedStream::Told> RecordedStream::told(const RecordedMessage& message) {

@@ -14,6 +14,7 @@
 #include "proto/codec/packet_header.h"
 #include "proto/codec/temporal_layers.h"
 #include "proto/recording/recording_reader.h"
+#include "server/recording/parameter_history.h"
 #include "server/recording/parameters_in_force.h"
 
 namespace clothstream::recording {
@@ -26,6 +27,7 @@ inline constexpr std::uint64_t kMaxTickStep = std::uint64_t{1} << 32;
 class RecordedStream {
  public:
   // The error names the path and what is wrong with it. Files that were cut off are taken as far as they go.
+  // Reads what holds a change of parameters, so that no seek has to.
   [[nodiscard]] static tl::expected<RecordedStream, std::string> open(const std::string& path);
   [[nodiscard]] static tl::expected<RecordedStream, std::string> of(RecordingReader reader);
 
@@ -60,9 +62,9 @@ class RecordedStream {
   ParametersInForce parametersAt(double seconds);
 
  private:
-  explicit RecordedStream(RecordingReader reader) : reader_(std::move(reader)) {}
+  RecordedStream(RecordingReader reader, v1::StreamDescription description);
   double secondsAt(std::uint64_t time) const;
-  void collectChanges(double until);
+  std::uint64_t timeAt(double seconds) const;
   void lose(double from, std::string reason);
   // Nothing where it is not to be played.
   std::optional<Told> told(const RecordedMessage& message);
@@ -70,19 +72,13 @@ class RecordedStream {
 
   RecordingReader reader_;
   v1::StreamDescription description_;
+  ParameterHistory parameters_;
   std::string scene_;
   std::optional<std::uint64_t> newest_;  // tick of the frame before; nothing: only a key frame can follow
   codec::HeldFrames decoded_;            // while there is a newest one
   bool sought_ = true;                   // and no frame since: what cannot be decoded is not lost
   std::optional<Lost> lost_;             // and not said yet
   std::optional<Told> held_;             // comes after what was lost
-
-  struct Change {
-    double time = 0;  // s from the start of the recording
-    v1::ParameterChange change;
-  };
-  std::vector<Change> changes_;  // of the first chunks
-  std::size_t collectedChunks_ = 0;
 };
 
 }  // namespace clothstream::recording

@@ -1,12 +1,18 @@
 // SPDX-License-Identifier: MIT
-// clothstream-bench-recording: what opening a recording of an hour takes, and going to any time in it. Ends
-// with 1 where a seek does not lead to the key frame that it should.
+// clothstream-bench-recording: what opening a recording of an hour to play it takes, and going to any time in
+// it until who watches has the key frame and the parameters that hold with it; also where these changed all
+// the time, and of files that were cut. Ends with 1 where a seek does not lead to what it should.
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <cstdint>
 #include <cstdio>
+#include <ctime>
 #include <exception>
+#include <filesystem>
+#include <memory>
 #include <random>
+#include <span>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -17,6 +23,9 @@
 #include "proto/codec/packet_header.h"
 #include "proto/recording/file.h"
 #include "proto/recording/recording_reader.h"
+#include "server/recording/playback.h"
+#include "server/recording/recorded_stream.h"
+#include "server/stream/live_scene.h"
 #include "tests/e2e/temporary_directory.h"
 #include "tests/recording/sample.h"
 
@@ -35,45 +44,130 @@ Value got(tl::expected<Value, std::string> value) {
   if constexpr (!std::is_void_v<Value>) return std::move(*value);
 }
 
+// Of this thread, ms: what a seek takes where nothing else runs.
+double processorMs() {
+  timespec now{};
+  ::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return 1e3 * static_cast<double>(now.tv_sec) + 1e-6 * static_cast<double>(now.tv_nsec);
+}
+
 double millisecondsSince(Clock::time_point start) {
   return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
 }
 
-void checkTick(std::string_view bytes, std::uint64_t wanted) {
-  v1::Frame frame;
-  const bool parsed = frame.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()));
-  const auto packet = codec::parsePacket(std::as_bytes(std::span(frame.packet())));
-  if (!parsed || !packet || packet->header.tick != wanted || packet->header.kind != codec::PacketKind::key)
-    throw std::runtime_error(fmt::format("a seek did not lead to the key frame of tick {}", wanted));
+// What is sent to somebody who watches, of which each frame is acknowledged at once.
+class Viewer {
+ public:
+  explicit Viewer(stream::LiveScene& scene) : scene_(scene) {
+    if (scene.audience.join(mailbox_, 10) != stream::Audience::Joining::joined)
+      throw std::runtime_error("nobody can join");
+    mailbox_->subscribe(scene.description(), scene.shape(), scene.metrics, {});
+  }
+  ~Viewer() { scene_.audience.leave(*mailbox_); }
+  Viewer(const Viewer&) = delete;
+  Viewer& operator=(const Viewer&) = delete;
+
+  // All that waits; gives whether a frame was among it.
+  bool read(Clock::time_point now) {
+    bool framed = false;
+    while (const auto bytes = mailbox_->next(now)) {
+      if (!message_.ParseFromArray((*bytes)->data(), static_cast<int>((*bytes)->size())))
+        throw std::runtime_error("what was sent cannot be read");
+      if (message_.has_parameter_changed()) parameters.Swap(message_.mutable_parameter_changed());
+      if (!message_.has_frame()) continue;
+      const auto packet = codec::parsePacket(std::as_bytes(std::span(message_.frame().packet())));
+      framed = packet && packet->header.kind == codec::PacketKind::key &&
+               mailbox_->acknowledge(packet->header.tick, now);
+    }
+    return framed;
+  }
+
+  v1::ParameterChanged parameters;  // told last
+
+ private:
+  stream::LiveScene& scene_;
+  std::shared_ptr<stream::Mailbox> mailbox_ = std::make_shared<stream::Mailbox>([] {});
+  v1::ServerMessage message_;
+};
+
+// Whether the sliders' last places are known to who watches, and it stands where it should.
+void check(std::uint32_t frame, const v1::Playback& playback, const v1::ParameterChange& told, bool sliders) {
+  const std::uint32_t key = frame / kFramesAKeyFrame * kFramesAKeyFrame;
+  if (std::abs(playback.position() * kSampleRate - key) > 0.01)
+    throw std::runtime_error(fmt::format("a seek to frame {} led to {} s", frame, playback.position()));
+  if (!sliders) return;
+  const SampleSliders wanted = sampleSliders(key);
+  if (told.wind().value().x() != wanted.wind || told.cloths_size() != 1 ||
+      told.cloths(0).structural().stiffness() != wanted.stiffness)
+    throw std::runtime_error(
+        fmt::format("a seek to frame {} told other parameters: {}", frame, told.ShortDebugString()));
+}
+
+// Of a recording of so many frames that is played to one who watches.
+void measure(const std::string& name, const std::string& path, std::uint32_t frames, bool sliders) {
+  const auto opening = Clock::now();
+  RecordedStream recording = got(RecordedStream::open(path));
+  const double openMs = millisecondsSince(opening);
+  const auto playback = std::make_shared<Playback>(std::move(recording), PlaybackOptions{});
+  stream::LiveScene scene("sample", playback);
+  Viewer viewer(scene);
+  playback->step(scene, Clock::now());
+  viewer.read(Clock::now());
+  std::mt19937 random(2);
+  std::vector<double> seeks;
+  double mostProcessorMs = 0;
+  for (int i = 0; i < kSeeks; ++i) {
+    const auto frame = static_cast<std::uint32_t>(random() % frames);
+    v1::ControlSceneRequest request;
+    // Not before the frame, however it is rounded.
+    request.set_seek((frame + 1e-3) / kSampleRate);
+    viewer.parameters.Clear();
+    const double processorStart = processorMs();
+    const auto start = Clock::now();
+    if (!playback->control(request)) throw std::runtime_error("a seek was refused");
+    playback->step(scene, start);
+    const bool framed = viewer.read(Clock::now());
+    seeks.push_back(millisecondsSince(start));
+    mostProcessorMs = std::max(mostProcessorMs, processorMs() - processorStart);
+    if (!framed) throw std::runtime_error("a seek showed no key frame");
+    check(frame, playback->playback(), viewer.parameters.change(), sliders);
+  }
+  std::ranges::sort(seeks);
+  fmt::print("{:<32}{:>8.1f}{:>10.1f}{:>10.3f}{:>10.3f}{:>10.3f}{:>10.3f}\n", name,
+             static_cast<double>(std::filesystem::file_size(path)) / (1 << 20), openMs,
+             seeks[seeks.size() / 2], seeks[seeks.size() * 99 / 100], seeks.back(), mostProcessorMs);
+}
+
+// The file as it is left by who is killed: without an index, and its last chunk cut.
+std::uint32_t cut(const std::string& path) {
+  RecordingReader reader = got(RecordingReader::open(path));
+  const ChunkPlace last = reader.mcap().chunks().back();
+  std::filesystem::resize_file(path, last.offset + last.length / 2);
+  // The frames before it; times are rounded to ns.
+  return static_cast<std::uint32_t>(
+      std::llround(1e-9 * static_cast<double>(last.start - kSampleStart) * kSampleRate));
 }
 
 void measure() {
+  fmt::print("{:<32}{:>8}{:>10}{:>10}{:>10}{:>10}{:>10}\n", fmt::format("an hour; {} seeks each, ms", kSeeks),
+             "MiB", "open", "median", "p99", "most", "processor");
   const e2e::TemporaryDirectory directory;
-  const std::string path = (directory.path() / "hour.mcap").string();
-  {
-    OutputFile file = got(OutputFile::create(path));
-    writeSample([&](std::string_view bytes) { return file.write(bytes); }, kHour);
-  }
-  const auto opening = Clock::now();
-  RecordingReader reader = got(RecordingReader::open(path));
-  const double openMs = millisecondsSince(opening);
-  std::mt19937 random(2);
-  std::vector<double> seeks;
-  for (int i = 0; i < kSeeks; ++i) {
-    const auto frame = static_cast<std::uint32_t>(random() % kHour);
-    const auto start = Clock::now();
-    got(reader.seek(sampleTime(frame)));
-    const auto message = got(reader.next());
-    seeks.push_back(millisecondsSince(start));
-    if (!message) throw std::runtime_error("a seek led to the end");
-    checkTick(message->bytes, frame / kFramesAKeyFrame * kFramesAKeyFrame + 1);
-  }
-  std::ranges::sort(seeks);
-  fmt::print(
-      "{} frames, {:.1f} MiB, {} chunks\nopen  {:.2f} ms\nseek  {:.3f} ms median, {:.3f} ms p99, {:.3f} ms "
-      "at most\n",
-      kHour, static_cast<double>(reader.mcap().bytes()) / (1 << 20), reader.mcap().chunks().size(), openMs,
-      seeks[seeks.size() / 2], seeks[seeks.size() * 99 / 100], seeks.back());
+  const auto measureOne = [&](const std::string& name, bool sliders, const auto& write) {
+    const std::string path = (directory.path() / "hour.mcap").string();
+    {
+      OutputFile file = got(OutputFile::create(path));
+      write([&](std::string_view bytes) { return file.write(bytes); });
+    }
+    measure(name, path, kHour, sliders);
+    measure(name + ", cut", path, cut(path), sliders);
+    std::filesystem::remove(path);
+  };
+  measureOne("42 vertices", false, [](const Sink& sink) { writeSample(sink, kHour); });
+  measureOne("42 vertices, sliders", true, [](const Sink& sink) { writeSampleWithSliders(sink, kHour); });
+  codec::StreamLayout large = sampleLayout();
+  large.cloths = {{.vertexCount = 4096, .rows = 64, .columns = 64}};
+  measureOne("4,096 vertices, sliders", true,
+             [&](const Sink& sink) { writeSampleWithSliders(sink, kHour, large); });
 }
 
 }  // namespace

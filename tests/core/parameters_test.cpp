@@ -321,6 +321,11 @@ TEST(Parameters, GustsAndMaterialsAreToldAndChanged) {
   cs_get_environment(client.get(), &environment);
   EXPECT_EQ(environment.gust_strength, 3);
   EXPECT_STREQ(cs_cloth_material(client.get(), 0), "cotton");
+
+  // None, as is told where there is none, is not nothing told.
+  change.mutable_cloths(0)->set_material("");
+  client.receive(message.SerializeAsString());
+  EXPECT_STREQ(cs_cloth_material(client.get(), 0), "");
 }
 
 TEST(Parameters, ThereAreNoneBeforeTheDescription) {

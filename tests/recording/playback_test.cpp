@@ -238,7 +238,7 @@ TEST_F(PlaybackTest, ASeekGoesOnFromTheKeyFrameBeforeIt) {
 }
 
 // The sample, and in it changes: after half a second the wind and the structural springs, after a second and
-// a half the wind again, and the mass.
+// a half the wind again, mass and material.
 std::string sampleWithChanges() {
   std::string bytes;
   auto writer = RecordingWriter::begin(
@@ -270,6 +270,7 @@ std::string sampleWithChanges() {
   v1::ClothChange& sheet = *late.mutable_change()->add_cloths();
   sheet.set_name("sheet");
   sheet.set_areal_mass(0.5f);
+  sheet.set_material("denim");
   late.mutable_change()->add_cloths()->set_name("none such");
 
   auto sample = readerOf(sampleRecording(kFrames));
@@ -294,7 +295,8 @@ TEST_F(PlaybackTest, ASeekTellsTheParametersThatHoldThere) {
     play(std::move(bytes));
     join();
     const auto last = [&]() -> const v1::ParameterChange& { return viewer->changes.back().change(); };
-    const auto expect = [&](float windX, float windZ, float stiffness, float friction, float arealMass) {
+    const auto expect = [&](float windX, float windZ, float stiffness, float friction, float arealMass,
+                            const char* material) {
       EXPECT_EQ(last().gravity().value().y(), -9.81f);
       EXPECT_EQ(last().wind().value().x(), windX);
       EXPECT_EQ(last().wind().value().z(), windZ);
@@ -304,11 +306,14 @@ TEST_F(PlaybackTest, ASeekTellsTheParametersThatHoldThere) {
       EXPECT_EQ(last().cloths(0).self_collision().radius(), 0.01f);
       EXPECT_EQ(last().cloths(0).self_collision().friction(), friction);
       EXPECT_EQ(last().cloths(0).areal_mass(), arealMass);
+      // Told where there is none, too: whoever was told of one forgets it.
+      EXPECT_TRUE(last().cloths(0).has_material());
+      EXPECT_EQ(last().cloths(0).material(), material);
       // With the frame that it is told before.
       EXPECT_EQ(viewer->changes.back().tick(), viewer->frames.back().tick);
     };
     ASSERT_EQ(viewer->changes.size(), 1u);
-    expect(0, 3, 20, 0.3f, 0.25f);
+    expect(0, 3, 20, 0.3f, 0.25f, "");
     // Who joins later is told what holds by then.
     EXPECT_EQ(playback->parameters().SerializeAsString(), last().SerializeAsString());
     pass(1);
@@ -317,12 +322,73 @@ TEST_F(PlaybackTest, ASeekTellsTheParametersThatHoldThere) {
     EXPECT_EQ(playback->parameters().gravity().value().y(), -9.81f);
     pause(true);
     seek(2.2);
-    expect(0, 0, 40, 0.5f, 0.5f);
+    expect(0, 0, 40, 0.5f, 0.5f, "denim");
     seek(0.1);
-    expect(0, 3, 20, 0.3f, 0.25f);
+    expect(0, 3, 20, 0.3f, 0.25f, "");
     seek(1.0);
-    expect(1, 0, 40, 0.5f, 0.25f);
+    expect(1, 0, 40, 0.5f, 0.25f, "");
     viewer.reset();
+  }
+}
+
+std::string sampleWithSliders() {
+  std::string bytes;
+  writeSampleWithSliders(
+      [&](std::string_view more) {
+        bytes += more;
+        return Written();
+      },
+      kFrames);
+  return bytes;
+}
+
+TEST_F(PlaybackTest, AfterASeekParametersAreThoseOfPlayingThrough) {
+  for (const bool cut : {false, true}) {
+    std::string bytes = sampleWithSliders();
+    const std::size_t lastChunk = readerOf(bytes).mcap().chunks().back().offset;
+    if (cut) bytes.resize(lastChunk + 100);
+    play(std::move(bytes));
+    join();
+    std::vector<std::string> played;  // with each frame
+    while (!scene->paused) {
+      played.resize(viewer->frames.size(), playback->parameters().SerializeAsString());
+      step(0.001);
+    }
+    ASSERT_EQ(played.size(), viewer->frames.size());
+    ASSERT_GT(played.size(), kFrames - 13);
+    pause(true);
+    std::mt19937 random(5);
+    for (int i = 0; i < 100; ++i) {
+      seek(playback->playback().length() * static_cast<double>(random() % 1001) / 1000);
+      const std::size_t frame = frameOf(viewer->frames.back());
+      ASSERT_LT(frame, played.size());
+      EXPECT_EQ(playback->parameters().SerializeAsString(), played[frame]) << frame;
+      const v1::ParameterChange& told = viewer->changes.back().change();
+      EXPECT_EQ(told.SerializeAsString(), played[frame]) << frame;
+      const SampleSliders sliders = sampleSliders(static_cast<std::uint32_t>(frame));
+      EXPECT_EQ(told.wind().value().x(), sliders.wind) << frame;
+      EXPECT_EQ(told.cloths(0).structural().stiffness(), sliders.stiffness) << frame;
+    }
+    viewer.reset();
+  }
+}
+
+TEST(ParameterHistory, WithFewerKeptItSaysTheSame) {
+  RecordingReader reader = readerOf(sampleWithSliders());
+  const v1::StreamDescription description = reader.description().value();
+  const ParameterHistory all(reader, description);
+  EXPECT_EQ(all.stride(), 1u);
+  const std::size_t one = ParametersInForce(description).now().ByteSizeLong();
+  for (const std::size_t most : {std::size_t{0}, 3 * one, 6 * one}) {
+    const ParameterHistory few(reader, description, most);
+    EXPECT_GT(few.stride(), 1u);
+    for (std::uint32_t frame = 0; frame < kFrames; ++frame) {
+      const v1::ParameterChange there = few.at(sampleTime(frame), reader).now();
+      EXPECT_EQ(there.SerializeAsString(), all.at(sampleTime(frame), reader).now().SerializeAsString());
+      EXPECT_EQ(there.wind().value().x(), sampleSliders(frame).wind) << frame;
+      EXPECT_EQ(there.cloths(0).structural().stiffness(), sampleSliders(frame).stiffness) << frame;
+    }
+    EXPECT_EQ(few.at(0, reader).now().SerializeAsString(), all.at(0, reader).now().SerializeAsString());
   }
 }
 

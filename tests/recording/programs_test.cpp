@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: MIT
 // `clothstream record`, `info`, `recover` and `clothstream-server --record`, `resimulate`, as programs.
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <csignal>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -64,10 +66,40 @@ class RecordingPrograms : public ::testing::Test {
     arguments.insert(arguments.begin(), CLOTHSTREAM);
     return run(arguments);
   }
-  std::string serversRecording() const {
-    for (const auto& entry : std::filesystem::directory_iterator(directory_.path() / "recordings"))
+  std::string serversRecording(const char* directory = "recordings") const {
+    for (const auto& entry : std::filesystem::directory_iterator(directory_.path() / directory))
       return entry.path().string();
     return {};
+  }
+  // The server, which records to this directory, when its next chunk is nearly due; gives the tick of the
+  // last frame that somebody saw of it.
+  void killAfterAChunk(const char* directory, std::uint64_t& tick) {
+    std::atomic<std::uint64_t> seen = 0;
+    GrpcClientOptions options;
+    options.reconnectFor = 0ms;
+    const auto client = GrpcClient::join(address_, options, [&](cs_client* joined, std::uint32_t events) {
+      if ((events & CS_EVENT_FRAME) == 0) return;
+      cs_statistics now;
+      cs_get_statistics(joined, GrpcClient::nowUs(), &now);
+      seen = now.tick;
+    });
+    ASSERT_TRUE(client.has_value()) << client.error().text;
+    const auto deadline = std::chrono::steady_clock::now() + kPatience;
+    std::error_code none;
+    while (serversRecording(directory).empty() ||
+           std::filesystem::file_size(serversRecording(directory), none) < 150'000) {
+      ASSERT_LT(std::chrono::steady_clock::now(), deadline);
+      std::this_thread::sleep_for(20ms);
+    }
+    // A chunk was just closed.
+    std::this_thread::sleep_for(170ms);
+    server_->signal(SIGKILL);
+    server_->waitForEnd(kPatience);
+    while (!(*client)->ended()) {
+      ASSERT_LT(std::chrono::steady_clock::now(), deadline);
+      (*client)->wait(100ms);
+    }
+    tick = seen;
   }
 
   e2e::TemporaryDirectory directory_;
@@ -137,53 +169,44 @@ TEST_F(RecordingPrograms, AnInterruptEndsRecordingsWhole) {
 
 // What is in a chunk that is not closed is what can be lost: no chunk may be longer than is promised,
 // whatever its writer's thread had to wait for. That it is closed on time is measured by the ticks that a
-// client saw.
+// client saw, of as many seconds as the recorded ones took. The writer's thread may be kept waiting once, but
+// not each time, by as much again as is promised.
 TEST_F(RecordingPrograms, AKilledServerLosesAtMostItsLastChunk) {
-  constexpr double kPromised = 0.25, kBusy = 1;  // s; kBusy: on a machine that lets the writer's thread wait
-  startServer({"--always-run", "--record", pathOf("recordings")});
-  if (IsSkipped() || HasFatalFailure()) return;
-  std::atomic<std::uint64_t> seen = 0;  // tick
-  GrpcClientOptions options;
-  options.reconnectFor = 0ms;
-  const auto client = GrpcClient::join(address_, options, [&](cs_client* joined, std::uint32_t events) {
-    if ((events & CS_EVENT_FRAME) == 0) return;
-    cs_statistics now;
-    cs_get_statistics(joined, GrpcClient::nowUs(), &now);
-    seen = now.tick;
-  });
-  ASSERT_TRUE(client.has_value()) << client.error().text;
-  const auto deadline = std::chrono::steady_clock::now() + kPatience;
-  std::error_code none;
-  while (serversRecording().empty() || std::filesystem::file_size(serversRecording(), none) < 150'000) {
-    ASSERT_LT(std::chrono::steady_clock::now(), deadline);
-    std::this_thread::sleep_for(20ms);
+  constexpr double kPromised = 0.25;  // s
+  double least = std::numeric_limits<double>::infinity();
+  std::string path;
+  for (const char* name : {"first", "second", "third"}) {
+    startServer({"--always-run", "--record", pathOf(name)});
+    if (IsSkipped() || HasFatalFailure()) return;
+    std::uint64_t seen = 0;
+    ASSERT_NO_FATAL_FAILURE(killAfterAChunk(name, seen));
+    path = serversRecording(name);
+    auto cut = RecordingReader::open(path, CutFiles::read);
+    ASSERT_TRUE(cut.has_value()) << cut.error();
+    for (const ChunkPlace& chunk : cut->mcap().chunks())
+      EXPECT_LE(static_cast<double>(chunk.end - chunk.start) * 1e-9, kPromised);
+    struct Ticked {
+      std::uint64_t tick = 0, time = 0;  // ns
+    };
+    std::optional<Ticked> first;
+    Ticked last;
+    v1::RecordedTick tick;
+    for (auto message = cut->next(); message && *message; message = cut->next()) {
+      if ((*message)->topic != Topic::ticks) continue;
+      ASSERT_TRUE(tick.ParseFromArray((*message)->bytes.data(), static_cast<int>((*message)->bytes.size())));
+      last = {tick.tick(), (*message)->time};
+      if (!first) first = last;
+    }
+    ASSERT_TRUE(first && last.tick > first->tick);
+    const double secondsATick =
+        static_cast<double>(last.time - first->time) * 1e-9 / static_cast<double>(last.tick - first->tick);
+    const double lost = (static_cast<double>(seen) - static_cast<double>(last.tick)) * secondsATick;
+    std::printf("killed: the last tick of a client is %.3f s after the last that was recorded\n", lost);
+    least = std::min(least, lost);
   }
-  // A chunk was just closed: at its worst when the next one is nearly due.
-  std::this_thread::sleep_for(170ms);
-  server_->signal(SIGKILL);
-  server_->waitForEnd(kPatience);
-  while (!(*client)->ended()) {
-    ASSERT_LT(std::chrono::steady_clock::now(), deadline);
-    (*client)->wait(100ms);
-  }
+  EXPECT_LT(least, 2 * kPromised);
 
-  const std::string path = serversRecording(), whole = pathOf("whole.mcap");
-  auto cut = RecordingReader::open(path, CutFiles::read);
-  ASSERT_TRUE(cut.has_value()) << cut.error();
-  for (const ChunkPlace& chunk : cut->mcap().chunks())
-    EXPECT_LE(static_cast<double>(chunk.end - chunk.start) * 1e-9, kPromised);
-  const double tickRate = cut->description().value().simulation_rate();
-  std::uint64_t recorded = 0;
-  v1::RecordedTick tick;
-  for (auto message = cut->next(); message && *message; message = cut->next()) {
-    if ((*message)->topic != Topic::ticks) continue;
-    ASSERT_TRUE(tick.ParseFromArray((*message)->bytes.data(), static_cast<int>((*message)->bytes.size())));
-    recorded = tick.tick();
-  }
-  const double lost = (static_cast<double>(seen) - static_cast<double>(recorded)) / tickRate;
-  std::printf("killed: the last tick of a client is %.3f s after the last that was recorded\n", lost);
-  EXPECT_LT(lost, kPromised + kBusy);
-
+  const std::string whole = pathOf("whole.mcap");
   const Ended damaged = clothstream({"info", path});
   EXPECT_EQ(damaged.code, 7);
   EXPECT_THAT(damaged.output, HasSubstr("run clothstream recover"));

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "tests/recording/sample.h"
 
+#include <algorithm>
 #include <memory>
 #include <stdexcept>
 #include <utility>
@@ -20,50 +21,64 @@ const codec::StreamLayout kLayout{.epoch = 1,
                                   .normals = codec::NormalMode::none,
                                   .cloths = {{.vertexCount = 42, .rows = 6, .columns = 7}}};
 
+constexpr float kStiffness = 20;  // at the start
+
 void must(const Written& written) {
   if (!written) throw std::runtime_error(written.error());
 }
 
-}  // namespace
-
-const codec::StreamLayout& sampleLayout() {
-  return kLayout;
-}
-
-v1::StreamDescription sampleDescription(std::uint8_t layers) {
+v1::StreamDescription descriptionOf(const codec::StreamLayout& layout) {
   v1::StreamDescription description;
-  description.set_epoch(kLayout.epoch);
-  description.set_codec(kLayout.codec);
+  description.set_epoch(layout.epoch);
+  description.set_codec(layout.codec);
   description.set_scene("sample");
   description.set_simulation_rate(kSampleRate);
   description.set_stream_rate(kSampleRate);
-  description.set_max_error(kLayout.maxError);
-  description.set_temporal_layers(layers);
+  description.set_max_error(layout.maxError);
+  description.set_temporal_layers(1);
   v1::ClothDescription& cloth = *description.add_cloths();
   cloth.set_name("sheet");
-  cloth.set_vertex_count(42);
-  cloth.set_rows(6);
-  cloth.set_columns(7);
-  const std::vector<float> rest = codec::sampleMotion(kLayout, 0, 0).positions;
+  cloth.set_vertex_count(layout.cloths[0].vertexCount);
+  cloth.set_rows(layout.cloths[0].rows);
+  cloth.set_columns(layout.cloths[0].columns);
+  const std::vector<float> rest = codec::sampleMotion(layout, 0, 0).positions;
   cloth.set_rest_positions(rest.data(), rest.size() * sizeof(float));
   return description;
 }
 
-void writeSample(const Sink& sink, std::uint32_t frames, std::uint8_t layers) {
+v1::ParameterChanged sliderMoved(std::uint32_t frame) {
+  v1::ParameterChanged changed;
+  changed.set_tick(frame + 1);
+  const auto value = static_cast<float>(frame);
+  if (frame / kFramesAChange % 2 == 0) {
+    changed.mutable_change()->mutable_wind()->mutable_value()->set_x(value);
+  } else {
+    v1::ClothChange& cloth = *changed.mutable_change()->add_cloths();
+    cloth.set_name("sheet");
+    cloth.mutable_structural()->set_stiffness(value);
+  }
+  return changed;
+}
+
+void write(const Sink& sink, std::uint32_t frames, const codec::StreamLayout& layout,
+           const v1::StreamDescription& description, bool sliders) {
   auto writer = RecordingWriter::begin(sink, "sample", {{"scene", "sample"}, {"device", "none"}});
   if (!writer) throw std::runtime_error(writer.error());
-  must(writer->write(Topic::description, sampleTime(0), sampleDescription(layers).SerializeAsString()));
-  codec::StreamLayout layout = kLayout;
-  layout.temporalLayers = layers;
+  must(writer->write(Topic::description, sampleTime(0), description.SerializeAsString()));
   const auto encoder = codec::Encoder::make(layout);
+  std::vector<codec::MotionFrame> motion;  // which begins anew after as many frames
+  for (std::uint32_t i = 0; i < std::min(frames, 600u); ++i)
+    motion.push_back(codec::sampleMotion(layout, i, 0.05f));
   std::vector<std::byte> packet(encoder->packetBound());
   v1::ServerMessage message;
   v1::RecordedTick tick;
   for (std::uint32_t i = 0; i < frames; ++i) {
+    if (sliders && i > 0 && i % kFramesAChange == 0)
+      must(writer->write(Topic::parameters, sampleTime(i), sliderMoved(i).SerializeAsString()));
     const bool key = i % kFramesAKeyFrame == 0;
-    const codec::MotionFrame motion = codec::sampleMotion(kLayout, i % 600, 0.05f);
-    const std::size_t bytes = encoder->encode(
-        i + 1, key ? codec::PacketKind::key : codec::PacketKind::predicted, motion.positions, {}, packet);
+    const std::size_t bytes =
+        encoder->encode(i + 1, key ? codec::PacketKind::key : codec::PacketKind::predicted,
+                        motion[i % motion.size()].positions, {}, packet);
     v1::Frame& frame = *message.mutable_frame();
     frame.set_packet(packet.data(), bytes);
     frame.set_reconstruction_hash(encoder->reconstructionHash());
@@ -73,6 +88,39 @@ void writeSample(const Sink& sink, std::uint32_t frames, std::uint8_t layers) {
     must(writer->write(Topic::ticks, sampleTime(i), tick.SerializeAsString()));
   }
   must(writer->finish());
+}
+
+}  // namespace
+
+const codec::StreamLayout& sampleLayout() {
+  return kLayout;
+}
+
+v1::StreamDescription sampleDescription(std::uint8_t layers) {
+  v1::StreamDescription description = descriptionOf(kLayout);
+  description.set_temporal_layers(layers);
+  return description;
+}
+
+void writeSample(const Sink& sink, std::uint32_t frames, std::uint8_t layers) {
+  codec::StreamLayout layout = kLayout;
+  layout.temporalLayers = layers;
+  write(sink, frames, layout, sampleDescription(layers), false);
+}
+
+void writeSampleWithSliders(const Sink& sink, std::uint32_t frames, const codec::StreamLayout& layout) {
+  v1::StreamDescription description = descriptionOf(layout);
+  v1::Cloth& cloth = *description.mutable_definition()->add_cloths();
+  cloth.set_name("sheet");
+  cloth.mutable_structural()->set_stiffness(kStiffness);
+  write(sink, frames, layout, description, true);
+}
+
+SampleSliders sampleSliders(std::uint32_t frame) {
+  const std::uint32_t last = frame / kFramesAChange, wind = last / 2 * 2;
+  const std::uint32_t stiffness = last == 0 ? 0 : (last - 1) / 2 * 2 + 1;
+  return {.wind = static_cast<float>(wind * kFramesAChange),
+          .stiffness = stiffness == 0 ? kStiffness : static_cast<float>(stiffness * kFramesAChange)};
 }
 
 std::string sampleRecording(std::uint32_t frames, std::uint8_t layers) {

@@ -26,6 +26,17 @@ v1::StreamDescription sampleDescription(std::uint8_t layers = 1);
 void writeSample(const Sink& sink, std::uint32_t frames, std::uint8_t layers = 1);
 std::string sampleRecording(std::uint32_t frames, std::uint8_t layers = 1);
 
+// Before each frame of a number that this divides, but the first, sliders were moved: with each second of
+// these the wind's x became that frame's number, with the others the stiffness of the structural springs.
+inline constexpr std::uint32_t kFramesAChange = 6;
+void writeSampleWithSliders(const Sink& sink, std::uint32_t frames,
+                            const codec::StreamLayout& layout = sampleLayout());
+// Of the wind and the stiffness, as they are with this frame.
+struct SampleSliders {
+  float wind = 0, stiffness = 0;
+};
+SampleSliders sampleSliders(std::uint32_t frame);
+
 // Fails where the bytes cannot be opened.
 RecordingReader readerOf(std::string bytes, CutFiles cutFiles = CutFiles::refused);
 
