@@ -171,6 +171,8 @@ void DeviceThread::take(Run& run) {
     run.refused = run.whenAdded.has_value();
     if (run.refused)
       run.whenAdded->set_exception(std::current_exception());
+    else if (run.host && !std::exchange(run.triedAnew, true))
+      spdlog::error("{}: cannot be made anew: {}; trying again", run.scene->name(), failure.what());
     else
       dismiss(run, failure.what());
   }
@@ -181,7 +183,10 @@ void DeviceThread::dismiss(Run& run, const std::string& why) {
   spdlog::error("{}", text);
   run.host.reset();
   run.failed.reset();
-  run.scene->roster.dismiss(error(v1::ERROR_CODE_RESOURCE_EXHAUSTED, text, true));
+  LiveScene& scene = *run.scene;
+  scene.roster.dismiss(error(v1::ERROR_CODE_RESOURCE_EXHAUSTED, text, true));
+  // For who is back already.
+  scene.audience.announce(parametersChanged(scene.beginAnew(), 1));
 }
 
 void DeviceThread::startAndStopScenes() {
@@ -240,9 +245,10 @@ void DeviceThread::makeAnew(Run& run, const std::string& reason) {
   spdlog::error("{}: a tick failed: {}", run.scene->name(), reason);
   packer_.drain();
   device_->drain();
-  const Clock::time_point now = Clock::now();
-  if (run.failed && now - *run.failed < std::chrono::seconds(1)) return dismiss(run, reason);
-  run.failed = now;
+  const std::uint64_t ticks = run.host->tick();
+  if (run.failed && ticks - *run.failed < run.scene->start().simulationRate) return dismiss(run, reason);
+  run.failed = ticks;
+  run.triedAnew = false;
   run.host->release();
   wake();
 }
