@@ -18,6 +18,7 @@ std::string json(const std::vector<SceneSummary>& scenes) {
                      {"vertices", scene.vertexCount},
                      {"cloths", scene.clothCount},
                      {"participants", scene.participants},
+                     {"maxParticipants", scene.maxParticipants},
                      {"running", scene.running},
                      {"paused", scene.paused},
                      {"created", scene.created}});
@@ -29,7 +30,7 @@ void printTable(const std::vector<SceneSummary>& scenes) {
   fmt::print("{:<20} {:>9} {:>7} {:>13}  {}\n", "SCENE", "VERTICES", "CLOTHS", "PARTICIPANTS", "DESCRIPTION");
   for (const SceneSummary& scene : scenes)
     fmt::print("{:<20} {:>9} {:>7} {:>13}  {}\n", scene.name, scene.vertexCount, scene.clothCount,
-               scene.participants, scene.description);
+               fmt::format("{} of {}", scene.participants, scene.maxParticipants), scene.description);
 }
 
 }  // namespace

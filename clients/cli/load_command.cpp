@@ -196,10 +196,12 @@ void LoadCommand::check() {
 ExitCode LoadCommand::run() const {
   const auto door = web_ ? load::makeWebDoor(address_) : load::makeGrpcDoor(address_);
   const bool shows = !json_ && isatty(STDOUT_FILENO) != 0;
-  std::optional<double> before;
+  std::optional<double> before, after;
   const auto serverCpuNow = [&] { return serverPid_ ? cpuSeconds(*serverPid_) : std::nullopt; };
-  load::LoadProgress progress{
-      .running = [] { return !interrupted(); }, .gathered = [&] { before = serverCpuNow(); }, .show = {}};
+  load::LoadProgress progress{.running = [] { return !interrupted(); },
+                              .gathered = [&] { before = serverCpuNow(); },
+                              .measured = [&] { after = serverCpuNow(); },
+                              .show = {}};
   if (shows) {
     progress.show = [](const load::LoadReport& last) {
       std::vector<float> ages = last.figures.ages;
@@ -209,7 +211,6 @@ ExitCode LoadCommand::run() const {
     };
   }
   load::LoadReport report = load::runLoad(*door, options_, progress);
-  const auto after = serverCpuNow();
   if (shows) fmt::print("\r\033[K");
   std::optional<double> serverCpu;
   if (before && after) serverCpu = *after - *before;

@@ -51,6 +51,8 @@ void SceneCommands::add(CLI::App& app, std::string& address) {
   create_->add_option("--named", options_.named, "A copy of this scene of the server's instead of a file")
       ->excludes(file);
   create_->add_option("--name", options_.name, "The new scene's name, instead of its own");
+  create_->add_option("--max-participants", options_.maxParticipants,
+                      "Who may be in it at once, instead of as many as the server lets into a scene");
   takesAddress(create_);
   delete_ = command("delete", "End a scene that was created; who is in it is told");
   pause_ = command("pause", "Stop the clock of a scene");
@@ -90,6 +92,7 @@ ExitCode SceneCommands::create() const {
   CreateSceneOptions create;
   create.named = options_.named;
   create.name = options_.name;
+  create.maxParticipants = options_.maxParticipants;
   if (options_.named.empty()) {
     auto scene = readScene(options_.file);
     if (!scene) return complain(kUsage, scene.error());

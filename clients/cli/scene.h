@@ -3,6 +3,7 @@
 // those that are recordings.
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <string>
 
@@ -13,11 +14,12 @@
 namespace clothstream::cli {
 
 struct SceneOptions {
-  std::string address;  // as completeAddress gives it
-  std::string file;     // create: of a scene, in JSON
-  std::string named;    // create: instead of a file, one that the server knows
-  std::string name;     // of the scene; create: instead of its own
-  double seek = 0;      // s
+  std::string address;                // as completeAddress gives it
+  std::string file;                   // create: of a scene, in JSON
+  std::string named;                  // create: instead of a file, one that the server knows
+  std::string name;                   // of the scene; create: instead of its own
+  std::uint32_t maxParticipants = 0;  // create; 0: the server's limit
+  double seek = 0;                    // s
   double speed = 1;
   bool loop = false;
   std::string recording;  // start-recording: the file's name; empty: the server's choice

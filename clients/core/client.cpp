@@ -40,7 +40,8 @@ void Client::connecting(std::uint64_t nowUs) {
   outbox_.clear();
   assembly_ = {};
   keyFrameRequest_ = {};
-  connectAtUs_ = reconnection_.attemptEnd(nowUs, std::uint64_t{1000} * welcome_.holdMs);
+  ++greeting_.attempt;
+  connectAtUs_ = reconnection_.began(nowUs, std::uint64_t{1000} * welcome_.holdMs);
   greet();
 }
 

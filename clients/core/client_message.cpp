@@ -157,6 +157,7 @@ void writeHello(std::string& out, std::uint64_t requestId, const Greeting& greet
     if (greeting.token.empty()) return;
     hello.add_bytes(31, greeting.token);
     hello.add_uint64(32, greeting.contentId);
+    hello.add_uint32(60, greeting.attempt);
   });
 }
 

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "clients/core/core.h"
+#include "clients/core/parameter_change.h"
 #include "clients/core/server_message.h"
 
 namespace clothstream::client {
@@ -29,6 +30,7 @@ struct Greeting {
   // Of who comes back: what the Welcome before said. Empty and 0: it does not, or holds no description.
   std::string token;
   std::uint64_t contentId = 0;
+  std::uint32_t attempt = 1;  // counts connections
 };
 
 void writeHello(std::string& out, std::uint64_t requestId, const Greeting& greeting);

@@ -14,8 +14,6 @@
 namespace clothstream::client {
 namespace {
 
-using Reader = protozero::pbf_reader;
-
 constexpr std::uint32_t kMaxRate = 1000;  // per second, scene.proto
 
 bool isFinite(float number) {

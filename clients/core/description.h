@@ -9,7 +9,8 @@
 
 #include <tl/expected.hpp>
 
-#include "clients/core/server_message.h"
+#include "clients/core/collider.h"
+#include "clients/core/parameter_change.h"
 #include "proto/codec/stream_layout.h"
 
 namespace clothstream::client {

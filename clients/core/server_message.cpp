@@ -2,173 +2,13 @@
 // Field by field through the messages of session.proto that a client gets.
 #include "clients/core/server_message.h"
 
-#include <algorithm>
+#include <array>
 #include <cmath>
+
+#include "clients/core/collider.h"
 
 namespace clothstream::client {
 namespace {
-
-using Reader = protozero::pbf_reader;
-
-template <typename Value>
-bool set(Value& target, Value value) {
-  target = value;
-  return true;
-}
-
-bool setFinite(float& target, Reader& reader) {
-  target = reader.get_float();
-  return std::isfinite(target);
-}
-
-bool setFinite(std::optional<float>& target, Reader& reader) {
-  return setFinite(target.emplace(), reader);
-}
-
-bool setSpring(std::optional<Spring>& target, Reader& reader) {
-  return readSpring(reader.get_view(), target.emplace());
-}
-
-// Vec3Value { Vec3 value = 1; }
-bool setVec3Value(std::optional<Vec3>& target, Reader& reader) {
-  Vec3& value = target.emplace();
-  return readFields(reader.get_view(), [&](std::uint32_t field, Reader& wrapped) {
-    return field == bytes(1) ? readVec3(wrapped.get_view(), value) : skip(wrapped);
-  });
-}
-
-template <std::size_t N>
-bool readFloats(Bytes message, std::array<float, N>& out) {
-  out = {};
-  return readFields(message, [&](std::uint32_t field, Reader& reader) {
-    for (std::uint32_t i = 0; i < N; ++i) {
-      if (field == fixed32(i + 1)) return setFinite(out[i], reader);
-    }
-    return skip(reader);
-  });
-}
-
-// Of a sphere, which has one number, and of a capsule.
-bool readRound(Bytes message, Collider& collider) {
-  return readFields(message, [&](std::uint32_t field, Reader& reader) {
-    if (field == fixed32(1)) return setFinite(collider.radius, reader);
-    return field == fixed32(2) ? setFinite(collider.length, reader) : skip(reader);
-  });
-}
-
-bool readBox(Bytes message, Vec3& size) {
-  return readFields(message, [&](std::uint32_t field, Reader& reader) {
-    return field == bytes(1) ? readVec3(reader.get_view(), size) : skip(reader);
-  });
-}
-
-// Appends a face's triangles, a fan about its first corner.
-bool readFace(Bytes message, std::vector<std::uint32_t>& triangles) {
-  std::vector<std::uint32_t> corners;
-  const bool read = readFields(message, [&](std::uint32_t field, Reader& reader) {
-    if (field == bytes(1)) return readPackedVarints(reader.get_view(), kMaxHullParts, corners);
-    if (field != varint(1)) return skip(reader);
-    corners.push_back(reader.get_uint32());
-    return corners.size() <= kMaxHullParts;
-  });
-  for (std::size_t i = 2; i < corners.size(); ++i)
-    triangles.insert(triangles.end(), {corners[0], corners[i - 1], corners[i]});
-  return read;
-}
-
-}  // namespace
-
-bool readSelfCollision(Bytes message, std::optional<float>& radius, std::optional<float>& friction) {
-  return readFields(message, [&](std::uint32_t field, Reader& reader) {
-    if (field == fixed32(1)) return setFinite(radius, reader);
-    return field == fixed32(2) ? setFinite(friction, reader) : skip(reader);
-  });
-}
-
-bool readTethers(Bytes message, std::optional<float>& slack) {
-  return readFields(message, [&](std::uint32_t field, Reader& reader) {
-    return field == fixed32(1) ? setFinite(slack, reader) : skip(reader);
-  });
-}
-
-namespace {
-
-bool readClothChange(Bytes message, ClothChange& change) {
-  return readFields(message, [&](std::uint32_t field, Reader& reader) {
-    switch (field) {
-      case bytes(1):
-        return setText(change.name, reader);
-      case bytes(2):
-        return setSpring(change.structural, reader);
-      case bytes(3):
-        return setSpring(change.shear, reader);
-      case bytes(4):
-        return setSpring(change.bend, reader);
-      case fixed32(5):
-        return setFinite(change.damping, reader);
-      case fixed32(6):
-        return setFinite(change.drag, reader);
-      case fixed32(7):
-        return setFinite(change.lift, reader);
-      case fixed32(8):
-        return setFinite(change.friction, reader);
-      case fixed32(9):
-        return setFinite(change.thickness, reader);
-      case bytes(20):
-        return readSolver(reader.get_view(), change.solver.emplace());
-      case bytes(21):
-        return readSelfCollision(reader.get_view(), change.ballRadius, change.ballFriction);
-      case bytes(23):
-        return readTethers(reader.get_view(), change.tetherSlack);
-      case fixed32(24):
-        return setFinite(change.dihedralBending, reader);
-      case bytes(40):
-        return setText(change.material.emplace(), reader);
-      default:
-        return skip(reader);
-    }
-  });
-}
-
-bool readConstraintSolver(Bytes message, Solver& solver) {
-  return readFields(message, [&](std::uint32_t field, Reader& reader) {
-    switch (field) {
-      case varint(1):
-        return set(solver.bendConstraints, reader.get_bool());
-      case fixed32(2):
-        return setFinite(solver.compliance, reader);
-      case varint(3):
-        return set(solver.iterations, reader.get_uint32());
-      case fixed32(4):
-        return setFinite(solver.tolerance, reader);
-      case varint(5):
-        return solver.path = reader.get_uint32(), true;
-      default:
-        return skip(reader);
-    }
-  });
-}
-
-bool readAcadSolver(Bytes message, Solver& solver) {
-  return readFields(message, [&](std::uint32_t field, Reader& reader) {
-    if (field == fixed32(1)) return setFinite(solver.activation, reader);
-    return field == bytes(2) ? readConstraintSolver(reader.get_view(), solver) : skip(reader);
-  });
-}
-
-bool readXpbdSolver(Bytes message, Solver& solver) {
-  return readFields(message, [&](std::uint32_t field, Reader& reader) {
-    if (field == varint(1)) return set(solver.iterations, reader.get_uint32());
-    return field == fixed32(2) ? setFinite(solver.compliance, reader) : skip(reader);
-  });
-}
-
-bool readImplicitEulerSolver(Bytes message, Solver& solver) {
-  return readFields(message, [&](std::uint32_t field, Reader& reader) {
-    if (field == varint(1)) return set(solver.iterations, reader.get_uint32());
-    return field == fixed32(2) ? setFinite(solver.tolerance, reader) : skip(reader);
-  });
-}
 
 bool readClothReport(Bytes message, ClothReport& report) {
   return readFields(message, [&](std::uint32_t field, Reader& reader) {
@@ -199,26 +39,6 @@ bool readClothReport(Bytes message, ClothReport& report) {
   });
 }
 
-bool readParameterChange(Bytes message, ParameterChange& change) {
-  return readFields(message, [&](std::uint32_t field, Reader& reader) {
-    switch (field) {
-      case bytes(1):
-        return setVec3Value(change.gravity, reader);
-      case bytes(2):
-        return setVec3Value(change.wind, reader);
-      case fixed32(3):
-        return setFinite(change.airDensity, reader);
-      case bytes(4):
-        return change.cloths.size() < kMaxCloths &&
-               readClothChange(reader.get_view(), change.cloths.emplace_back());
-      case bytes(40):
-        return readGust(reader.get_view(), change.gust.emplace());
-      default:
-        return skip(reader);
-    }
-  });
-}
-
 bool readParticipant(Bytes message, Participant& out) {
   return readFields(message, [&](std::uint32_t field, Reader& reader) {
     switch (field) {
@@ -236,15 +56,6 @@ bool readParticipant(Bytes message, Participant& out) {
         return skip(reader);
     }
   });
-}
-
-// nullopt unless every field was read.
-template <typename Message, typename Visit>
-std::optional<Message> readMessage(Bytes bytes, Visit&& visit) {
-  std::optional<Message> message(std::in_place);
-  const auto visitField = [&](std::uint32_t field, Reader& reader) { return visit(*message, field, reader); };
-  if (!readFields(bytes, visitField)) message.reset();
-  return message;
 }
 
 Body bodyOf(std::uint32_t field) {
@@ -351,62 +162,6 @@ bool readFrame(Bytes message, Frame& frame) {
         return skip(reader);
     }
   });
-}
-
-bool readCollider(Bytes message, Collider& collider) {
-  collider.name.clear();
-  collider.position = {};
-  collider.orientation = {0, 0, 0, 1};
-  collider.shape = CS_SHAPE_HULL;
-  collider.radius = collider.length = 0;
-  collider.size = {};
-  collider.hull = {};
-  collider.participantId = 0;
-  return readFields(message, [&](std::uint32_t field, Reader& reader) {
-    switch (field) {
-      case bytes(1):
-        return setText(collider.name, reader);
-      case bytes(2):
-        return readVec3(reader.get_view(), collider.position);
-      case bytes(3): {
-        if (!readFloats(reader.get_view(), collider.orientation)) return false;
-        // All zero means no rotation (scene.proto).
-        if (collider.orientation == std::array<float, 4>{}) collider.orientation[3] = 1;
-        return true;
-      }
-      case varint(4):
-        return set(collider.participantId, reader.get_uint64());
-      case bytes(5):
-        return set(collider.shape, CS_SHAPE_SPHERE) && readRound(reader.get_view(), collider);
-      case bytes(6):
-        return set(collider.shape, CS_SHAPE_CAPSULE) && readRound(reader.get_view(), collider);
-      case bytes(7):
-        reader.skip();
-        return set(collider.shape, CS_SHAPE_PLANE);
-      case bytes(8):
-        return set(collider.shape, CS_SHAPE_BOX) && readBox(reader.get_view(), collider.size);
-      case bytes(9):
-        return set(collider.shape, CS_SHAPE_HULL) && set(collider.hull, reader.get_view());
-      default:
-        return skip(reader);
-    }
-  });
-}
-
-std::optional<Hull> readHull(Bytes message) {
-  std::size_t faces = 0;
-  std::optional<Hull> hull = readMessage<Hull>(message, [&](Hull& out, std::uint32_t field, Reader& reader) {
-    if (field == bytes(2)) return ++faces <= kMaxHullParts && readFace(reader.get_view(), out.triangles);
-    if (field != bytes(1)) return skip(reader);
-    Vec3 vertex{};
-    if (!readVec3(reader.get_view(), vertex)) return false;
-    out.vertices.insert(out.vertices.end(), vertex.begin(), vertex.end());
-    return out.vertices.size() <= 3 * kMaxHullParts;
-  });
-  if (hull && std::any_of(hull->triangles.begin(), hull->triangles.end(),
-                          [&](std::uint32_t corner) { return corner >= hull->vertices.size() / 3; }))
-    hull.reset();
-  return hull;
 }
 
 std::optional<Pong> readPong(Bytes message) {
@@ -567,41 +322,6 @@ std::optional<std::vector<std::string>> readScenes(Bytes message) {
   });
 }
 
-bool readVec3(Bytes message, Vec3& out) {
-  return readFloats(message, out);
-}
-
-// A kind that this client does not know keeps its number and its settings.
-bool readGust(Bytes message, Gust& out) {
-  out = {};
-  return readFields(message, [&](std::uint32_t field, Reader& reader) {
-    if (field == fixed32(1)) return setFinite(out.strength, reader);
-    return field == fixed32(2) ? setFinite(out.seconds, reader) : skip(reader);
-  });
-}
-
-bool readSolver(Bytes message, Solver& out) {
-  out = {};
-  return readFields(message, [&](std::uint32_t field, Reader& reader) {
-    if (field % 8 != bytes(0) % 8) return skip(reader);
-    const Bytes settings = reader.get_view();
-    out.kind = field / 8;
-    out.settings.assign(settings.data(), settings.size());
-    switch (out.kind) {
-      case CS_SOLVER_CONSTRAINT:
-        return readConstraintSolver(settings, out);
-      case CS_SOLVER_ACAD:
-        return readAcadSolver(settings, out);
-      case CS_SOLVER_XPBD:
-        return readXpbdSolver(settings, out);
-      case CS_SOLVER_IMPLICIT_EULER:
-        return readImplicitEulerSolver(settings, out);
-      default:
-        return true;
-    }
-  });
-}
-
 bool readReport(Bytes message, SimulationReport& out) {
   out.cloths.clear();
   out.deviceSeconds = 0;
@@ -610,10 +330,6 @@ bool readReport(Bytes message, SimulationReport& out) {
     if (field != bytes(1)) return skip(reader);
     return out.cloths.size() < kMaxCloths && readClothReport(reader.get_view(), out.cloths.emplace_back());
   });
-}
-
-bool readSpring(Bytes message, Spring& out) {
-  return readFloats(message, out);
 }
 
 }  // namespace clothstream::client

@@ -3,18 +3,16 @@
 // bytes.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "clients/core/core.h"
+#include "clients/core/parameter_change.h"
 #include "clients/core/wire.h"
 
 namespace clothstream::client {
-
-using Vec3 = std::array<float, 3>;
 
 // Field numbers of ServerMessage's bodies.
 enum class Body : std::uint32_t {
@@ -76,23 +74,6 @@ struct Chunk {
   Bytes data;
 };
 
-struct Collider {
-  std::string name;
-  Vec3 position{};
-  std::array<float, 4> orientation{0, 0, 0, 1};  // x y z w
-  cs_shape shape = CS_SHAPE_HULL;
-  float radius = 0, length = 0;
-  Vec3 size{};
-  Bytes hull;  // a serialised ConvexHull, good as long as the message; frames have none
-  std::uint64_t participantId = 0;
-};
-
-// Of a hull, in its own frame.
-struct Hull {
-  std::vector<float> vertices;  // 3 each
-  std::vector<std::uint32_t> triangles;
-};
-
 struct ClothReport {
   float strainMax = 0, strainP99 = 0, strainMean = 0;
   float kineticEnergy = 0, elasticEnergy = 0, gravityEnergy = 0;
@@ -129,45 +110,6 @@ struct ServerError {
   bool fatal = false;
 };
 
-// {stiffness, damping}
-using Spring = std::array<float, 2>;
-
-// ConstraintPath in scene.proto.
-inline constexpr std::uint32_t kMatrixFree = 1, kAssembled = 2;
-
-struct Solver {
-  std::uint32_t kind = CS_SOLVER_MASS_SPRING;  // the field that Solver.kind is
-  bool bendConstraints = false;
-  std::uint32_t iterations = 20;
-  float tolerance = 0.001f;
-  std::optional<float> compliance;
-  float activation = 0.1f;
-  std::uint32_t path = kMatrixFree;
-  std::string settings;  // the kind's own message as it came
-};
-
-struct Gust {
-  float strength = 0;  // m/s
-  float seconds = 2;
-};
-
-struct ClothChange {
-  std::string name;
-  std::optional<Spring> structural, shear, bend;
-  std::optional<float> damping, drag, lift, friction, thickness;
-  std::optional<Solver> solver;
-  std::optional<std::string> material = {};
-  std::optional<float> ballRadius = {}, ballFriction = {}, tetherSlack = {}, dihedralBending = {};
-};
-
-struct ParameterChange {
-  std::optional<Vec3> gravity, wind;
-  std::optional<float> airDensity;
-  std::optional<Gust> gust;
-  std::vector<ClothChange> cloths;
-  std::uint64_t participantId = 0;  // who made it
-};
-
 struct ContactEvent {
   std::uint32_t kind = 0, colliderId = 0;
   std::uint64_t participantId = 0;
@@ -187,9 +129,6 @@ struct TickEvents {
 [[nodiscard]] std::optional<Chunk> readChunk(Bytes message);
 // Reuses the memory of `frame`.
 [[nodiscard]] bool readFrame(Bytes message, Frame& frame);
-// Reuses the memory of `collider`.
-[[nodiscard]] bool readCollider(Bytes message, Collider& collider);
-[[nodiscard]] std::optional<Hull> readHull(Bytes message);
 [[nodiscard]] std::optional<Pong> readPong(Bytes message);
 [[nodiscard]] std::optional<Notice> readNotice(Bytes message);
 [[nodiscard]] std::optional<Presence> readPresence(Bytes message);
@@ -201,22 +140,9 @@ struct TickEvents {
 [[nodiscard]] bool readTickEvents(Bytes message, TickEvents& events);
 // The names of the scenes.
 [[nodiscard]] std::optional<std::vector<std::string>> readScenes(Bytes message);
-
-[[nodiscard]] bool readVec3(Bytes message, Vec3& out);
-[[nodiscard]] bool readSpring(Bytes message, Spring& out);
-[[nodiscard]] bool readGust(Bytes message, Gust& out);
-// Of a SelfCollision and of Tethers, in a Scene's Cloth and in a change.
-[[nodiscard]] bool readSelfCollision(Bytes message, std::optional<float>& radius,
-                                     std::optional<float>& friction);
-[[nodiscard]] bool readTethers(Bytes message, std::optional<float>& slack);
-[[nodiscard]] bool readSolver(Bytes message, Solver& out);
 // Reuses the memory of `out`.
 [[nodiscard]] bool readReport(Bytes message, SimulationReport& out);
 
-inline constexpr std::size_t kMaxCloths = 256;
-// The scene's and all participants'.
-inline constexpr std::size_t kMaxSceneColliders = 4096;
-inline constexpr std::size_t kMaxHullParts = 128;  // vertices, faces
 inline constexpr std::size_t kMaxParticipants = 4096;
 inline constexpr std::size_t kMaxScenes = 65536;
 inline constexpr std::size_t kMaxEvents = 65536;  // of a kind

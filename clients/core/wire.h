@@ -3,9 +3,12 @@
 // throw.
 #pragma once
 
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <protozero/pbf_reader.hpp>
@@ -13,6 +16,7 @@
 namespace clothstream::client {
 
 using Bytes = protozero::data_view;
+using Reader = protozero::pbf_reader;
 
 // Whether the bytes are a row of fields, each whole: a tag with a valid number and a wire type of proto3,
 // varints of at most ten bytes, lengths within the message. Submessages are not looked into.
@@ -38,7 +42,7 @@ constexpr std::uint32_t bytes(std::uint32_t field) {
 template <typename Visit>
 [[nodiscard]] bool readFields(Bytes message, Visit&& visit) {
   if (!wellFormed(message)) return false;
-  protozero::pbf_reader reader(message);
+  Reader reader(message);
   while (reader.next()) {
     if (!visit(reader.tag_and_type(), reader)) return false;
   }
@@ -49,13 +53,38 @@ template <typename Visit>
 // varints, or `out` would hold more than `max`.
 [[nodiscard]] bool readPackedVarints(Bytes packed, std::size_t max, std::vector<std::uint32_t>& out);
 
-inline bool setText(std::string& target, protozero::pbf_reader& reader) {
+// nullopt unless every field was read.
+template <typename Message, typename Visit>
+[[nodiscard]] std::optional<Message> readMessage(Bytes bytes, Visit&& visit) {
+  std::optional<Message> message(std::in_place);
+  const auto visitField = [&](std::uint32_t field, Reader& reader) { return visit(*message, field, reader); };
+  if (!readFields(bytes, visitField)) message.reset();
+  return message;
+}
+
+template <typename Value>
+bool set(Value& target, Value value) {
+  target = value;
+  return true;
+}
+
+// False of what is not finite.
+inline bool setFinite(float& target, Reader& reader) {
+  target = reader.get_float();
+  return std::isfinite(target);
+}
+
+inline bool setFinite(std::optional<float>& target, Reader& reader) {
+  return setFinite(target.emplace(), reader);
+}
+
+inline bool setText(std::string& target, Reader& reader) {
   const Bytes view = reader.get_view();
   target.assign(view.data(), view.size());
   return true;
 }
 
-inline bool skip(protozero::pbf_reader& reader) {
+inline bool skip(Reader& reader) {
   reader.skip();
   return true;
 }

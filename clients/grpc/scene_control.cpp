@@ -62,6 +62,7 @@ tl::expected<std::string, Failure> createScene(const std::string& address,
   message.set_request_id(1);
   v1::CreateSceneRequest& request = *message.mutable_create_scene();
   request.set_name(options.name);
+  request.set_max_participants(options.maxParticipants);
   bool sent = true;
   if (options.named.empty()) {
     sent = upload(*stream, options.scene.SerializeAsString(), options);

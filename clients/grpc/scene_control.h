@@ -3,6 +3,7 @@
 #pragma once
 
 #include <chrono>
+#include <cstdint>
 #include <functional>
 #include <optional>
 #include <string>
@@ -15,9 +16,10 @@
 namespace clothstream {
 
 struct CreateSceneOptions {
-  std::string named;  // one that the server knows how to make; empty: `scene`
-  v1::Scene scene;    // its meshes with their geometry
-  std::string name;   // instead of the scene's own; empty: that
+  std::string named;                  // one that the server knows how to make; empty: `scene`
+  v1::Scene scene;                    // its meshes with their geometry
+  std::string name;                   // instead of the scene's own; empty: that
+  std::uint32_t maxParticipants = 0;  // 0: the server's limit
   std::chrono::milliseconds timeout{120'000};
   // Bytes sent so far, and in all. May be empty.
   std::function<void(std::size_t, std::size_t)> progress;

@@ -22,6 +22,7 @@ tl::expected<std::vector<SceneSummary>, Failure> listScenes(const std::string& a
                       .vertexCount = scene.vertex_count(),
                       .clothCount = scene.cloth_count(),
                       .participants = scene.participants(),
+                      .maxParticipants = scene.max_participants(),
                       .running = scene.running(),
                       .paused = scene.paused(),
                       .created = scene.created()});

@@ -15,7 +15,7 @@ namespace clothstream {
 
 struct SceneSummary {
   std::string name, description;
-  std::uint32_t vertexCount = 0, clothCount = 0, participants = 0;
+  std::uint32_t vertexCount = 0, clothCount = 0, participants = 0, maxParticipants = 0;
   bool running = false, paused = false, created = false;
 };
 

@@ -54,6 +54,10 @@ class GrpcLink final : public Link, private grpc::ClientBidiReactor<grpc::ByteBu
 
   void drop() override {
     context_.TryCancel();
+    {
+      const std::lock_guard lock(mutex_);
+      dropped_ = true;
+    }
     read();
     std::unique_lock lock(mutex_);
     changed_.wait(lock, [&] { return done_; });
@@ -77,10 +81,14 @@ class GrpcLink final : public Link, private grpc::ClientBidiReactor<grpc::ByteBu
 
   void OnReadDone(bool ok) override {
     if (!ok) return release();
+    bool dropped = false;
     {
       const std::lock_guard lock(mutex_);
       reading_ = false;
+      dropped = dropped_;
     }
+    // Nobody asks for the last one, which ends the stream.
+    if (dropped) return read();
     grpc::Slice bytes;
     if (incoming_.DumpToSingleSlice(&bytes).ok())
       listener_.received(std::as_bytes(std::span(bytes.begin(), bytes.size())));
@@ -111,7 +119,8 @@ class GrpcLink final : public Link, private grpc::ClientBidiReactor<grpc::ByteBu
   std::mutex mutex_;
   std::condition_variable changed_;
   std::deque<std::string> waiting_;
-  bool held_ = true, reading_ = false, writing_ = false, leaving_ = false, halfClosed_ = false, done_ = false;
+  bool held_ = true, reading_ = false, writing_ = false, leaving_ = false, halfClosed_ = false;
+  bool dropped_ = false, done_ = false;
 };
 
 class GrpcDoor final : public Door {

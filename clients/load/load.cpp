@@ -40,6 +40,7 @@ class Load {
     for (Seat& seat : seats_) seat.participant->take();
     progress_.gathered();
     measure();
+    progress_.measured();
     for (Seat& seat : seats_) collect(seat);
     for (const auto& intruder : intruders_) report_.visits += intruder->visits();
     return report_;

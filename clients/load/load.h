@@ -50,6 +50,7 @@ double percentile(std::vector<float>& samples, double percent);
 struct LoadProgress {
   std::function<bool()> running;                // asked 71 times a second; false ends the load early
   std::function<void()> gathered;               // all are there
+  std::function<void()> measured;               // and still are: the time is over
   std::function<void(const LoadReport&)> show;  // once a second, of the last one; may be empty
 };
 LoadReport runLoad(Door& door, const LoadOptions& options, const LoadProgress& progress);

@@ -61,7 +61,11 @@ void JoinStream::pumpLocked() {
 
 void JoinStream::finish(const grpc::Status& status) {
   const std::lock_guard lock(mutex_);
-  finishLocked(status);
+  // Of one that is finished the last message may still be to be written, and says more.
+  if (connection_ && connection_->finished())
+    pumpLocked();
+  else
+    finishLocked(status);
 }
 
 void JoinStream::finishLocked(const grpc::Status& status) {
@@ -83,7 +87,7 @@ void JoinStream::cancelSoonLocked() {
                        const auto self = weak.lock();
                        if (!expired || !self) return;
                        const std::lock_guard lock(self->mutex_);
-                       if (self->context_ != nullptr && self->writing_) self->context_->TryCancel();
+                       if (self->writing_) self->context_->TryCancel();
                      });
 }
 

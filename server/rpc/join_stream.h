@@ -30,8 +30,8 @@ class JoinStream final : public grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::
   // Writes the next message unless one is being written; ends the stream when there is none left to come.
   void pump();
 
-  // Gives the connection up now; gRPC hears of the end when the write in flight is done. The first one's
-  // status holds.
+  // Gives the connection up now, unless it is finished by itself; gRPC hears of the end when what is to be
+  // written is. The first one's status holds.
   void finish(const grpc::Status& status);
 
  private:
@@ -46,7 +46,7 @@ class JoinStream final : public grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::
 
   const std::function<void(JoinStream&)> onDone_;
   std::mutex mutex_;
-  grpc::CallbackServerContext* context_;            // nullptr when the call is done
+  grpc::CallbackServerContext* const context_;
   std::shared_ptr<stream::Connection> connection_;  // nullptr when the stream is ending
   // Of a client that says no more. Whether it went or was cut off is known when the call is done.
   std::shared_ptr<stream::Connection> parting_;

@@ -39,9 +39,11 @@ grpc::Status statusOf(const v1::Error& error) {
 
 grpc::Status closingStatus(const stream::SharedBytes& lastMessage) {
   v1::ServerMessage message;
-  if (lastMessage && message.ParseFromArray(lastMessage->data(), static_cast<int>(lastMessage->size())) &&
-      message.error().fatal())
-    return statusOf(message.error());
+  if (lastMessage && message.ParseFromArray(lastMessage->data(), static_cast<int>(lastMessage->size()))) {
+    if (message.error().fatal()) return statusOf(message.error());
+    if (message.notice().kind() == v1::NOTICE_KIND_SCENE_DELETED)
+      return {grpc::StatusCode::NOT_FOUND, message.notice().text()};
+  }
   return {grpc::StatusCode::UNAVAILABLE, "the server is stopping"};
 }
 

@@ -11,7 +11,8 @@ namespace clothstream::rpc {
 
 grpc::Status statusOf(const v1::Error& error);
 
-// Why a finished connection ends is what was said last: a fatal Error, or else that the server stops.
+// Why a finished connection ends is what was said last: a fatal Error, that the scene was deleted, or else
+// that the server stops.
 grpc::Status closingStatus(const stream::SharedBytes& lastMessage);
 
 }  // namespace clothstream::rpc

@@ -12,13 +12,12 @@
 
 #include <fmt/format.h>
 
-#include "kernels/advance_mass_spring.h"
-#include "kernels/compute_normals.h"
 #include "kernels/hash_state.h"
 #include "server/simulation/advance_variant.h"
 #include "server/simulation/assembled/assembled_stage.h"
 #include "server/simulation/bending/bending_stage.h"
 #include "server/simulation/collision/collision_stage.h"
+#include "server/simulation/grid_stage.h"
 #include "server/simulation/hold/hold_stage.h"
 #include "server/simulation/mass_stage.h"
 #include "server/simulation/mesh_stage.h"
@@ -39,25 +38,9 @@ using vulkan::BindingKind;
 using vulkan::Buffer;
 using vulkan::BufferPurpose;
 
-// How the work is cut; the results do not depend on it.
-struct Cut {
-  std::uint32_t rowsPerInvocation;
-  std::uint32_t workgroupSize;
-  Tiles tiles;
-};
-
-// Software devices pay for every load, so that an invocation does several rows; GPUs pay for every idle lane.
-Cut cutScene(const vulkan::Device& device, const scene::Scene& scene, const SimulationOptions& options) {
-  Cut cut{options.rowsPerInvocation, options.workgroupSize, {}};
-  if (cut.rowsPerInvocation == 0) cut.rowsPerInvocation = device.isSoftware() ? 4 : 1;
-  if (cut.workgroupSize == 0) cut.workgroupSize = 64;
-  cut.workgroupSize = std::min(cut.workgroupSize, device.limits().maxWorkgroupInvocations);
-  cut.tiles = makeTiles(scene.cloths, cut.rowsPerInvocation, cut.workgroupSize);
-  while (cut.tiles.records.size() > device.limits().maxDispatchX) {
-    cut.rowsPerInvocation *= 2;
-    cut.tiles = makeTiles(scene.cloths, cut.rowsPerInvocation, cut.workgroupSize);
-  }
-  return cut;
+std::uint32_t workgroupSizeOn(const vulkan::Device& device, const SimulationOptions& options) {
+  const std::uint32_t wanted = options.workgroupSize == 0 ? 64 : options.workgroupSize;
+  return std::min(wanted, device.limits().maxWorkgroupInvocations);
 }
 
 // Invocations that hash a state share its nodes, enough of them to fill the device.
@@ -76,27 +59,23 @@ bool isBlown(const shared::ClothRecord& cloth) {
 
 // All memory of a scene on the device.
 struct Buffers {
-  Buffers(const vulkan::Device& device, std::uint32_t nodes, std::size_t clothCount, std::size_t tileCount);
+  Buffers(const vulkan::Device& device, std::uint32_t nodes, std::size_t clothCount);
 
   StateMemory state;
   Buffer normals;
-  Buffer cloths, tiles, status;
+  Buffer cloths, status;
   // What the CPU writes and reads. Inputs and status by turns: a tick may be in flight while the next is
   // recorded.
   std::array<Buffer, 2> inputs;  // cloths
   Buffer statusReadback;
-  Buffer tileUpload;
 };
 
-Buffers::Buffers(const vulkan::Device& device, std::uint32_t nodes, std::size_t clothCount,
-                 std::size_t tileCount)
+Buffers::Buffers(const vulkan::Device& device, std::uint32_t nodes, std::size_t clothCount)
     : state(device, nodes),
       normals(device, BufferPurpose::texels, nodes * kTexelBytes),
       cloths(device, BufferPurpose::texels, clothCount * sizeof(shared::ClothRecord)),
-      tiles(device, BufferPurpose::texels, std::max<std::size_t>(1, tileCount) * sizeof(shared::TileRecord)),
       status(device, BufferPurpose::state, sizeof(shared::StatusRecord)),
-      statusReadback(device, BufferPurpose::readback, 2 * sizeof(shared::StatusRecord)),
-      tileUpload(device, BufferPurpose::upload, tiles.bytes()) {
+      statusReadback(device, BufferPurpose::readback, 2 * sizeof(shared::StatusRecord)) {
   for (Buffer& buffer : inputs) buffer = Buffer(device, BufferPurpose::upload, cloths.bytes());
 }
 
@@ -136,46 +115,13 @@ AdvanceVariant variantOf(std::span<const shared::ClothRecord> cloths, float airD
           colliders && follow == Follow::nothing, springs};
 }
 
-std::unique_ptr<Stage> makeAdvance(const vulkan::Device& device, const Buffers& b, const CollisionStage& c,
-                                   const Cut& cut, std::span<const std::uint32_t> spirv,
-                                   scene::Integrator integrator, const AdvanceVariant& variant) {
-  return std::make_unique<Stage>(
-      device,
-      vulkan::KernelDescription{.name = "advance_mass_spring",
-                                .spirv = spirv,
-                                .bindings = {BindingKind::texels, BindingKind::texels, BindingKind::texels,
-                                             BindingKind::texels, BindingKind::storage, BindingKind::storage,
-                                             BindingKind::texels, BindingKind::texels, BindingKind::storage},
-                                .pushConstantBytes = sizeof(shared::AdvancePush),
-                                .workgroupSize = cut.workgroupSize,
-                                .specialisation = variant.specialisation(cut.rowsPerInvocation, integrator)},
-      std::initializer_list<const Buffer*>{&b.cloths, &b.tiles, &b.state.positions[0], &b.state.velocities[0],
-                                           &b.state.positions[1], &b.state.velocities[1], &c.colliders(),
-                                           &c.nearLists(), &c.toldContacts()},
-      std::initializer_list<const Buffer*>{&b.cloths, &b.tiles, &b.state.positions[1], &b.state.velocities[1],
-                                           &b.state.positions[0], &b.state.velocities[0], &c.colliders(),
-                                           &c.nearLists(), &c.toldContacts()});
-}
-
-Stage makeNormals(const vulkan::Device& device, const Buffers& b, const Cut& cut) {
-  return Stage(
-      device,
-      {.name = "compute_normals",
-       .spirv = kernels::compute_normals,
-       .bindings = {BindingKind::texels, BindingKind::texels, BindingKind::texels, BindingKind::storage},
-       .workgroupSize = cut.workgroupSize,
-       .specialisation = {cut.rowsPerInvocation}},
-      {&b.cloths, &b.tiles, &b.state.positions[0], &b.normals},
-      {&b.cloths, &b.tiles, &b.state.positions[1], &b.normals});
-}
-
-Stage makeHash(const vulkan::Device& device, const Buffers& b, const Cut& cut) {
+Stage makeHash(const vulkan::Device& device, const Buffers& b, std::uint32_t workgroupSize) {
   return Stage(device,
                {.name = "hash_state",
                 .spirv = kernels::hash_state,
                 .bindings = {BindingKind::texels, BindingKind::texels, BindingKind::storage},
                 .pushConstantBytes = sizeof(shared::HashPush),
-                .workgroupSize = cut.workgroupSize,
+                .workgroupSize = workgroupSize,
                 .specialisation = {}},
                {&b.state.positions[0], &b.state.velocities[0], &b.status},
                {&b.state.positions[1], &b.state.velocities[1], &b.status});
@@ -186,7 +132,6 @@ Stage makeHash(const vulkan::Device& device, const Buffers& b, const Cut& cut) {
 struct ClothSimulation::Pipeline {
   Pipeline(const vulkan::Device& on, const scene::Scene& scene, const SimulationOptions& options);
 
-  const Stage& advance(const AdvanceVariant& variant);
   void prepare(float airDensity);
   std::unique_ptr<XpbdStage> makeXpbd(std::span<const scene::Cloth> cloths);
   std::unique_ptr<AssembledStage> makeAssembled(std::span<const scene::Cloth> cloths);
@@ -199,12 +144,11 @@ struct ClothSimulation::Pipeline {
   void recordInputs(vulkan::Recorder& recorder, const TickInputs& inputs);
   void recordSubsteps(vulkan::Recorder& recorder, const TickInputs& inputs);
   void recordAdvance(vulkan::Recorder& recorder, std::uint32_t from, const AdvanceVariant& variant,
-                     Follow follow, shared::AdvancePush push);
+                     Follow follow, const shared::AdvancePush& push);
   void recordRungeKutta(vulkan::Recorder& recorder, const TickInputs& inputs, shared::AdvancePush push);
   void recordStatus(vulkan::Recorder& recorder);
 
   const vulkan::Device& device;
-  std::span<const std::uint32_t> advanceSpirv;
   scene::Integrator integrator;
   std::uint32_t substeps;
   double substepSeconds;
@@ -214,11 +158,11 @@ struct ClothSimulation::Pipeline {
   std::vector<shared::ClothRecord> records;
   std::vector<float> masses;       // inverse, of nodes
   std::vector<float> clothMasses;  // kg
-  Cut cut;
+  std::uint32_t workgroupSize;
   Buffers buffers;
   CollisionStage collision;
-  std::array<std::unique_ptr<Stage>, AdvanceVariant::kCount> advances;  // made when they are first needed
-  Stage normals, hash;
+  GridStage grids;
+  Stage hash;
   std::unique_ptr<MeshStage> meshes;            // where there are any
   std::unique_ptr<RungeKuttaStage> rungeKutta;  // where that is the integrator
   SolveStage solves;
@@ -244,9 +188,6 @@ struct ClothSimulation::Pipeline {
 ClothSimulation::Pipeline::Pipeline(const vulkan::Device& on, const scene::Scene& scene,
                                     const SimulationOptions& options)
     : device(on),
-      advanceSpirv(options.advanceKernel.empty()
-                       ? std::span<const std::uint32_t>(kernels::advance_mass_spring)
-                       : options.advanceKernel),
       integrator(scene.integrator),
       substeps(scene.substeps),
       substepSeconds(scene.substepSeconds()),
@@ -256,24 +197,26 @@ ClothSimulation::Pipeline::Pipeline(const vulkan::Device& on, const scene::Scene
       records(clothRecords(scene.cloths, substepSeconds)),
       masses(inverseMasses(scene.cloths)),
       clothMasses(massesOf(scene.cloths)),
-      cut(cutScene(on, scene, options)),
-      buffers(on, nodes, records.size(), cut.tiles.records.size()),
+      workgroupSize(workgroupSizeOn(on, options)),
+      buffers(on, nodes, records.size()),
       collision(on, nodes, static_cast<std::uint32_t>(records.size()),
                 {&buffers.state.positions[0], &buffers.state.positions[1]},
                 {&buffers.state.velocities[0], &buffers.state.velocities[1]}),
-      normals(makeNormals(on, buffers, cut)),
-      hash(makeHash(on, buffers, cut)),
+      grids(on, scene.cloths, stateOf(buffers, collision), buffers.normals, integrator,
+            {.rowsPerInvocation = options.rowsPerInvocation,
+             .workgroupSize = workgroupSize,
+             .advanceKernel = options.advanceKernel}),
+      hash(makeHash(on, buffers, workgroupSize)),
       solves(on, scene.cloths, stateOf(buffers, collision), options.workgroupSize, options.solveWholeNodes),
       solvers(solversOf(scene.cloths)),
       stiffness(springStiffness(scene.cloths)),
       asked(options) {
-  std::ranges::copy(cut.tiles.records, buffers.tileUpload.mapped<shared::TileRecord>().begin());
   std::memcpy(buffers.inputs[slot].mapped().data(), records.data(), buffers.cloths.bytes());
   buffers.state.write(restState(scene.cloths), masses);
-  const MeshTables meshTables = simulation::meshTables(scene.cloths, cut.workgroupSize);
+  const MeshTables meshTables = simulation::meshTables(scene.cloths, workgroupSize);
   if (!meshTables.nodes.empty())
     meshes = std::make_unique<MeshStage>(on, meshTables, stateOf(buffers, collision), buffers.normals,
-                                         integrator, cut.workgroupSize);
+                                         integrator, workgroupSize);
   if (integrator == scene::Integrator::rungeKutta4)
     rungeKutta = std::make_unique<RungeKuttaStage>(on, stateOf(buffers, collision), offsets);
   xpbd = makeXpbd(scene.cloths);
@@ -281,7 +224,7 @@ ClothSimulation::Pipeline::Pipeline(const vulkan::Device& on, const scene::Scene
   makeBending(scene.cloths);
   if (SelfCollisionStage::isIn(scene))
     selfCollision =
-        std::make_unique<SelfCollisionStage>(on, scene, stateOf(buffers, collision), cut.workgroupSize);
+        std::make_unique<SelfCollisionStage>(on, scene, stateOf(buffers, collision), workgroupSize);
   if (const HoldTables tables = holdTables(scene); !tables.empty()) {
     makeHolds(tables);
     holds->setSlack(scene.cloths);
@@ -290,7 +233,7 @@ ClothSimulation::Pipeline::Pipeline(const vulkan::Device& on, const scene::Scene
 }
 
 void ClothSimulation::Pipeline::makeHolds(const HoldTables& tables) {
-  holds = std::make_unique<HoldStage>(device, tables, stateOf(buffers, collision), nodes, cut.workgroupSize);
+  holds = std::make_unique<HoldStage>(device, tables, stateOf(buffers, collision), nodes, workgroupSize);
 }
 
 // The kernels that the scene starts with, and those that it needs as soon as somebody brings a collider.
@@ -298,7 +241,7 @@ void ClothSimulation::Pipeline::prepare(float airDensity) {
   for (const bool colliders : {false, true}) {
     for (const Follow follow : kFollows) {
       const AdvanceVariant variant = variantOf(records, airDensity, colliders, follow);
-      if (cut.tiles.ranges.of(follow).count > 0) advance(variant);
+      grids.prepare(variant, follow);
       if (meshes) meshes->prepare(variant, follow);
     }
     if (xpbd) xpbd->prepare(xpbdVariantOf(records, colliders));
@@ -323,16 +266,10 @@ std::unique_ptr<AssembledStage> ClothSimulation::Pipeline::makeAssembled(
 void ClothSimulation::Pipeline::makeBending(std::span<const scene::Cloth> cloths) {
   const bool wanted = BendingStage::isIn(cloths);
   if (wanted && !(bending && bending->serves(cloths))) {
-    bending = std::make_unique<BendingStage>(device, cloths, stateOf(buffers, collision), cut.workgroupSize);
+    bending = std::make_unique<BendingStage>(device, cloths, stateOf(buffers, collision), workgroupSize);
     tabled = false;
   }
   bends = wanted;
-}
-
-const Stage& ClothSimulation::Pipeline::advance(const AdvanceVariant& variant) {
-  std::unique_ptr<Stage>& stage = advances[variant.index()];
-  if (!stage) stage = makeAdvance(device, buffers, collision, cut, advanceSpirv, integrator, variant);
-  return *stage;
 }
 
 void ClothSimulation::Pipeline::setSolvers(std::span<const scene::Cloth> cloths) {
@@ -345,9 +282,8 @@ void ClothSimulation::Pipeline::setSolvers(std::span<const scene::Cloth> cloths)
   solves.takeTables();
   xpbd = std::move(otherXpbd);
   assembled = std::move(otherAssembled);
-  cut.tiles = makeTiles(cloths, cut.rowsPerInvocation, cut.workgroupSize);
-  std::ranges::copy(cut.tiles.records, buffers.tileUpload.mapped<shared::TileRecord>().begin());
-  if (meshes) meshes->setTiles(meshTiles(cloths, cut.workgroupSize));
+  grids.setTiles(cloths);
+  if (meshes) meshes->setTiles(meshTiles(cloths, workgroupSize));
   solvers = std::move(wanted);
   tabled = false;
 }
@@ -373,7 +309,7 @@ void ClothSimulation::Pipeline::start(vulkan::Recorder& recorder) {
     recorder.copy(buffers.inputs[slot], buffers.cloths, buffers.cloths.bytes());
     buffers.state.recordUpload(recorder, present);
   }
-  recorder.copy(buffers.tileUpload, buffers.tiles, buffers.tiles.bytes());
+  grids.recordTables(recorder);
   if (meshes) meshes->recordTables(recorder);
   if (solves.active()) solves.recordTables(recorder);
   if (xpbd) xpbd->recordTables(recorder);
@@ -404,11 +340,8 @@ void ClothSimulation::Pipeline::recordInputs(vulkan::Recorder& recorder, const T
 
 void ClothSimulation::Pipeline::recordAdvance(vulkan::Recorder& recorder, std::uint32_t from,
                                               const AdvanceVariant& variant, Follow follow,
-                                              shared::AdvancePush push) {
-  const TileRange tiles = cut.tiles.ranges.of(follow);
-  push.firstTile = tiles.first;
-  if (tiles.count > 0)
-    recorder.dispatch(advance(variant).from[from], push, std::uint64_t{tiles.count} * cut.workgroupSize);
+                                              const shared::AdvancePush& push) {
+  grids.recordAdvance(recorder, from, variant, follow, push);
   if (meshes) meshes->recordAdvance(recorder, from, variant, follow, push);
 }
 
@@ -523,9 +456,7 @@ void ClothSimulation::recordTick(vulkan::Recorder& recorder, const TickInputs& i
 void ClothSimulation::recordNormals(vulkan::Recorder& recorder) {
   pipeline_->start(recorder);
   recorder.beginStage("normals");
-  const std::uint64_t tiles = pipeline_->cut.tiles.records.size();
-  if (tiles > 0)
-    recorder.dispatch(pipeline_->normals.from[pipeline_->present], tiles * pipeline_->cut.workgroupSize);
+  pipeline_->grids.recordNormals(recorder, pipeline_->present);
   if (pipeline_->meshes) pipeline_->meshes->recordNormals(recorder, pipeline_->present);
 }
 

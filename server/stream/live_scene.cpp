@@ -34,16 +34,19 @@ scene::Scene nameAndRates(std::string name, const v1::StreamDescription& descrip
 
 }  // namespace
 
-LiveScene::LiveScene(scene::Scene definition, bool wasCreated, std::shared_ptr<Journal> kept)
+LiveScene::LiveScene(scene::Scene definition, bool wasCreated, std::shared_ptr<Journal> kept,
+                     std::uint32_t most)
     : created(wasCreated),
+      maxParticipants(most),
       journal(std::move(kept)),
       audience(journal),
       roster(audience, inbox, journal.get()),
       start_(std::move(definition)),
       definition_(start_) {}
 
-LiveScene::LiveScene(std::string name, std::shared_ptr<FrameSource> from)
+LiveScene::LiveScene(std::string name, std::shared_ptr<FrameSource> from, std::uint32_t most)
     : created(false),
+      maxParticipants(most),
       source(std::move(from)),
       roster(audience, inbox, nullptr),
       start_(nameAndRates(std::move(name), source->description())),

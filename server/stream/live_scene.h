@@ -24,12 +24,14 @@ namespace clothstream::stream {
 class LiveScene {
  public:
   // Must be valid. `created`: while the server runs, by a peer. `journal`: of all that happens in it; may be
-  // null.
+  // null. `maxParticipants`: those who are held included.
   explicit LiveScene(scene::Scene definition, bool created = false,
-                     std::shared_ptr<Journal> journal = nullptr);
+                     std::shared_ptr<Journal> journal = nullptr,
+                     std::uint32_t maxParticipants = kDefaultMaxParticipants);
   // One that is not simulated: the source is yet to begin. Its start() and definition() hold name and rates
   // alone.
-  LiveScene(std::string name, std::shared_ptr<FrameSource> source);
+  LiveScene(std::string name, std::shared_ptr<FrameSource> source,
+            std::uint32_t maxParticipants = kDefaultMaxParticipants);
   ~LiveScene();
 
   const std::string& name() const { return start_.name; }
@@ -61,6 +63,7 @@ class LiveScene {
   static constexpr std::uint32_t kEpoch = 1;
 
   const bool created;
+  const std::uint32_t maxParticipants;
   const std::shared_ptr<Journal> journal;     // null: none is kept
   const std::shared_ptr<FrameSource> source;  // null: the device's thread
   std::atomic<bool> paused{false};            // its clock is stopped

@@ -77,6 +77,8 @@ tl::expected<Roster::Admission, Roster::Refusal> Roster::join(const Newcomer& ne
   // Whose time is over has no place any more, also where nobody has noticed yet.
   const auto known = find(newcomer.token);
   if (known != entries_.end() && (known->mailbox || now < known->expires)) {
+    if (newcomer.attempt < known->attempt) return tl::unexpected(Refusal::late);
+    known->attempt = newcomer.attempt;
     return resume(*known, mailbox, now);
   }
   if (entries_.size() >= limit && !makeRoom(now)) return tl::unexpected(Refusal::full);
@@ -85,6 +87,7 @@ tl::expected<Roster::Admission, Roster::Refusal> Roster::join(const Newcomer& ne
       std::ranges::any_of(entries_, [](const Entry& entry) { return entry.told.role() == v1::ROLE_OWNER; });
   Entry entry;
   entry.token = makeToken();
+  entry.attempt = newcomer.attempt;
   entry.mailbox = mailbox;
   entry.told.set_id(++ids);
   entry.told.set_client_name(newcomer.clientName);

@@ -30,6 +30,9 @@ struct Holding {
   Clock::duration still = std::chrono::seconds(2);
 };
 
+// Of a scene, those who are held included, unless the server or who creates the scene says otherwise.
+inline constexpr std::uint32_t kDefaultMaxParticipants = 64;
+
 // Thread-safe. Whoever is in the audience is in here too, but the audience has no mailbox of who is away. A
 // participant's connection is known by its mailbox; one that has lost its participant, by whatever happened
 // meanwhile, changes nothing.
@@ -51,6 +54,7 @@ class Roster {
     std::string clientName, displayName;
     v1::Role role = v1::ROLE_UNSPECIFIED;  // wanted
     std::string token;                     // of who comes back; else empty
+    std::uint32_t attempt = 0;             // grows with its connections
   };
   struct Admission {
     std::uint64_t id = 0;
@@ -59,11 +63,11 @@ class Roster {
     bool resumed = false;
     std::vector<v1::Participant> participants;  // all, in the order in which they joined
   };
-  enum class Refusal : std::uint8_t { full, closed };
+  enum class Refusal : std::uint8_t { full, closed, late };
 
-  // Who has the token of somebody here becomes that participant, and the connection that this one had ends.
-  // Others join anew, with the next of `ids`, unless `limit` are here; somebody who is away makes room. From
-  // here on the mailbox is told of every change.
+  // Who has the token of somebody here becomes that participant, and the connection that this one had ends;
+  // unless that is of a later attempt. Others join anew, with the next of `ids`, unless `limit` are here;
+  // somebody who is away makes room. From here on the mailbox is told of every change.
   [[nodiscard]] tl::expected<Admission, Refusal> join(const Newcomer& newcomer,
                                                       const std::shared_ptr<Mailbox>& mailbox,
                                                       std::atomic<std::uint64_t>& ids, std::size_t limit,
@@ -106,6 +110,7 @@ class Roster {
   struct Entry {
     v1::Participant told;
     std::string token;
+    std::uint32_t attempt = 0;                // of its newest connection
     std::shared_ptr<Mailbox> mailbox;         // null: it is away
     scene::ParticipantPoses poses;            // the newest, without attachments
     bool posed = false;                       // the scene has colliders or grips of it, perhaps

@@ -33,11 +33,20 @@ tl::expected<scene::Scene, v1::Error> checked(messages::Result<scene::Scene> sce
 
 }  // namespace
 
-void SceneMaker::create(v1::CreateSceneRequest request, std::string uploaded, CreateDone done) {
+void SceneMaker::create(v1::CreateSceneRequest request, std::optional<UploadedContent> uploaded,
+                        CreateDone done) {
+  if (++waiting_ > kMostWaiting) {
+    --waiting_;
+    return done(
+        refused(v1::ERROR_CODE_RESOURCE_EXHAUSTED,
+                fmt::format("createScene: {} scenes wait to be made; try again later", kMostWaiting)));
+  }
   boost::asio::post(
       thread_, [this, request = std::move(request), uploaded = std::move(uploaded), done = std::move(done)] {
+        --waiting_;
         try {
-          done(make(request, uploaded));
+          static const std::string nothing;
+          done(make(request, uploaded ? uploaded->bytes : nothing));
         } catch (const std::exception& failure) {
           // Such as a mesh that the server's memory is too small for.
           spdlog::error("createScene: {}", failure.what());
@@ -117,6 +126,13 @@ tl::expected<v1::CreateSceneResponse, v1::Error> SceneMaker::make(const v1::Crea
     if (auto named = std::move(checks).result(true); !named)
       return refused(named.error().code, named.error().text);
   }
+  const std::uint32_t most = server_.options.maxParticipants;
+  if (request.max_participants() > most)
+    return refused(
+        v1::ERROR_CODE_INVALID_ARGUMENT,
+        fmt::format("createScene.maxParticipants = {}: must be at most {}, as many as this server lets "
+                    "into a scene",
+                    request.max_participants(), most));
   const std::vector<std::shared_ptr<LiveScene>> scenes = server_.scenesNow();
   const auto created = static_cast<std::uint32_t>(
       std::ranges::count_if(scenes, [](const auto& scene) { return scene->created; }));
@@ -130,7 +146,9 @@ tl::expected<v1::CreateSceneResponse, v1::Error> SceneMaker::make(const v1::Crea
                                definition->name));
   std::shared_ptr<Journal> journal =
       server_.options.journals ? server_.options.journals(*definition) : nullptr;
-  const auto scene = std::make_shared<LiveScene>(std::move(*definition), true, std::move(journal));
+  const auto scene =
+      std::make_shared<LiveScene>(std::move(*definition), true, std::move(journal),
+                                  request.max_participants() > 0 ? request.max_participants() : most);
   try {
     server_.device.add(scene).get();
   } catch (const std::exception& failure) {

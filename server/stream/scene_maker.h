@@ -2,14 +2,17 @@
 // Scenes that come and go while the server runs.
 #pragma once
 
-#include <cstddef>
+#include <atomic>
+#include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
 
 #include <boost/asio/thread_pool.hpp>
 #include <tl/expected.hpp>
 
 #include "server/stream/scene_server.h"
+#include "server/stream/upload.h"
 
 namespace clothstream::stream {
 
@@ -23,8 +26,11 @@ class SceneMaker {
   SceneMaker(const SceneMaker&) = delete;
   SceneMaker& operator=(const SceneMaker&) = delete;
 
-  // `uploaded`: what `request` names as uploaded, if it does.
-  void create(v1::CreateSceneRequest request, std::string uploaded, CreateDone done);
+  // How many may wait to be created.
+  static constexpr std::uint32_t kMostWaiting = 64;
+
+  // `uploaded`: what `request` names as uploaded, if it does; its room is taken until it is answered.
+  void create(v1::CreateSceneRequest request, std::optional<UploadedContent> uploaded, CreateDone done);
   void remove(v1::DeleteSceneRequest request, DeleteDone done);
   // Both wait for the disk.
   void startRecording(v1::StartRecordingRequest request, StartRecordingDone done);
@@ -41,6 +47,7 @@ class SceneMaker {
   tl::expected<v1::DeleteSceneResponse, v1::Error> removeNow(const v1::DeleteSceneRequest& request);
 
   SceneServer::State& server_;
+  std::atomic<std::uint32_t> waiting_ = 0;  // to be created
   boost::asio::thread_pool thread_;
 };
 

@@ -26,7 +26,8 @@ std::vector<std::shared_ptr<LiveScene>> liveScenes(std::vector<scene::Scene> def
   scenes.reserve(definitions.size());
   for (scene::Scene& definition : definitions) {
     std::shared_ptr<Journal> journal = options.journals ? options.journals(definition) : nullptr;
-    scenes.push_back(std::make_shared<LiveScene>(std::move(definition), false, std::move(journal)));
+    scenes.push_back(std::make_shared<LiveScene>(std::move(definition), false, std::move(journal),
+                                                 options.maxParticipants));
   }
   return scenes;
 }
@@ -72,6 +73,7 @@ v1::SceneSummary summaryOf(const LiveScene& scene) {
     *summary.mutable_playback() = scene.source->playback();
   }
   summary.set_participants(static_cast<std::uint32_t>(scene.audience.size()));
+  summary.set_max_participants(scene.maxParticipants);
   summary.set_running(scene.running);
   summary.set_paused(scene.paused);
   summary.set_created(scene.created);
@@ -238,8 +240,8 @@ SceneServer::SceneServer(std::vector<scene::Scene> scenes, ServerOptions options
 
 SceneServer::SceneServer(std::string name, std::shared_ptr<FrameSource> source, ServerOptions options) {
   options.defaultScene = name;
-  state_ = std::make_unique<State>(std::make_shared<LiveScene>(std::move(name), std::move(source)),
-                                   std::move(options));
+  auto played = std::make_shared<LiveScene>(std::move(name), std::move(source), options.maxParticipants);
+  state_ = std::make_unique<State>(std::move(played), std::move(options));
 }
 
 SceneServer::~SceneServer() {

@@ -41,8 +41,8 @@ struct ServerOptions {
   // Frames of a scene that tell how its simulation does, a second; 0: none.
   double reportRate = 4;
   std::uint32_t maxConnections = 1024;
-  // A scene, those who are held included; at most kMostParticipants.
-  std::uint32_t maxParticipants = 64;
+  // Of a scene, those who are held included; who creates one may ask for less. At most kMostParticipants.
+  std::uint32_t maxParticipants = kDefaultMaxParticipants;
   // Beside those that the server starts with; 0: peers make none.
   std::uint32_t maxCreatedScenes = 16;
   // That predict large frames where the host does; 0: as many as suit the machine (EncoderThreads).

@@ -174,14 +174,17 @@ void Session::hello(const v1::Hello& message) {
   auto admission = scene->roster.join({.clientName = joining->clientName,
                                        .displayName = joining->displayName,
                                        .role = joining->role,
-                                       .token = message.resume_token()},
-                                      mailbox_, server_.participants, server_.options.maxParticipants, now_);
+                                       .token = message.resume_token(),
+                                       .attempt = message.attempt()},
+                                      mailbox_, server_.participants, scene->maxParticipants, now_);
   if (!admission && admission.error() == Roster::Refusal::closed)
     return fail(v1::ERROR_CODE_NOT_FOUND, fmt::format("'{}' was just deleted", scene->name()));
+  if (!admission && admission.error() == Roster::Refusal::late)
+    return fail(v1::ERROR_CODE_TAKEN_OVER, "a later connection of this participant was here before");
   if (!admission)
     return fail(v1::ERROR_CODE_RESOURCE_EXHAUSTED,
                 fmt::format("'{}' has {} participants, as many as it may have; try again later",
-                            scene->name(), server_.options.maxParticipants));
+                            scene->name(), scene->maxParticipants));
   scene_ = scene;
   participant_ = admission->id;
   scene->metrics.joins.add();
@@ -228,9 +231,9 @@ void Session::upload(const v1::Chunk& chunk) {
 
 void Session::create(const v1::CreateSceneRequest& request) {
   if (!allowed(controlRate_, "requests about scenes")) return;
-  std::string uploaded;
+  std::optional<UploadedContent> uploaded;
   if (request.source_case() == v1::CreateSceneRequest::kUploadedContentId) {
-    messages::Result<std::string> taken = upload_.take(request.uploaded_content_id());
+    messages::Result<UploadedContent> taken = upload_.take(request.uploaded_content_id());
     if (!taken) return refuse(taken.error());
     uploaded = std::move(*taken);
   }

@@ -51,12 +51,11 @@ messages::Result<void> Upload::add(const v1::Chunk& chunk) {
     drop();
     return checked;
   }
-  if (!room_.take(chunk.data().size())) {
+  if (!room_.grow(chunk.data().size())) {
     drop();
     return tl::unexpected(messages::FieldError{v1::ERROR_CODE_RESOURCE_EXHAUSTED,
                                                "upload: the server has no room for it now; try again later"});
   }
-  taken_ += chunk.data().size();
   contentId_ = chunk.content_id();
   totalBytes_ = chunk.total_bytes();
   count_ = chunk.count();
@@ -65,19 +64,19 @@ messages::Result<void> Upload::add(const v1::Chunk& chunk) {
   return {};
 }
 
-messages::Result<std::string> Upload::take(std::uint64_t contentId) {
+messages::Result<UploadedContent> Upload::take(std::uint64_t contentId) {
   if (next_ == 0 || contentId != contentId_ || next_ != count_)
     return tl::unexpected(messages::FieldError{
         v1::ERROR_CODE_NOT_FOUND,
         fmt::format("createScene.uploadedContentId = {}: this stream has not uploaded all of it",
                     contentId)});
-  std::string bytes = std::move(bytes_);
+  UploadedContent content{std::move(bytes_), std::move(room_)};
   drop();
-  return bytes;
+  return content;
 }
 
 void Upload::drop() {
-  room_.giveBack(std::exchange(taken_, 0));
+  room_.giveBack();
   bytes_ = {};
   next_ = count_ = 0;
 }

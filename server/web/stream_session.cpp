@@ -44,11 +44,15 @@ std::string_view closeText(std::string_view text) {
 
 // Why a finished connection ends is what was said last.
 ws::close_reason reasonOf(const stream::SharedBytes& last) {
+  const auto reason = [](ws::close_code code, const std::string& why) {
+    const std::string_view text = closeText(why);
+    return ws::close_reason(code, beast::string_view(text.data(), text.size()));
+  };
   v1::ServerMessage message;
-  if (last && message.ParseFromArray(last->data(), static_cast<int>(last->size())) &&
-      message.error().fatal()) {
-    const std::string_view text = closeText(message.error().text());
-    return {ws::close_code::policy_error, beast::string_view(text.data(), text.size())};
+  if (last && message.ParseFromArray(last->data(), static_cast<int>(last->size()))) {
+    if (message.error().fatal()) return reason(ws::close_code::policy_error, message.error().text());
+    if (message.notice().kind() == v1::NOTICE_KIND_SCENE_DELETED)
+      return reason(ws::close_code::going_away, message.notice().text());
   }
   return {ws::close_code::going_away, "the server is stopping"};
 }

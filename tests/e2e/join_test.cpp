@@ -179,8 +179,9 @@ TEST_F(JoinTest, ScenesAreCreatedPausedResetAndDeleted) {
   EXPECT_EQ(run({"create", "tests/e2e/small.json", "--name", "mine"}), std::pair(0, std::string("mine\n")));
   EXPECT_EQ(stateOf("mine").at("vertices"), kVertices);
   EXPECT_EQ(stateOf("mine").at("created"), true);
-  EXPECT_EQ(run({"create", "--named", "tablecloth", "--name", "cloth-2"}),
+  EXPECT_EQ(run({"create", "--named", "tablecloth", "--name", "cloth-2", "--max-participants", "3"}),
             std::pair(0, std::string("cloth-2\n")));
+  EXPECT_EQ(stateOf("cloth-2").at("maxParticipants"), 3);
   const auto client =
       clothstream({"join", address_, "--scene", "mine", "--json", "--hash", "--seconds", "1"});
   ASSERT_EQ(client->waitForEnd(kPatience), 0) << client->errors();

@@ -113,6 +113,32 @@ TEST_F(ReconnectingTest, WhoIsCutOffComesBackAsItWas) {
   });
 }
 
+// A link that swallows what it is given: nothing is refused, so that an attempt to come back just waits.
+TEST_F(ReconnectingTest, WhoseLinkSwallowsEverythingComesBackSoonAfterIt) {
+  Link link(portIn(address_));
+  Seen seen;
+  const auto client = join(through(link), "Ada", seen);
+  const std::uint64_t id = seen.id;
+  std::vector<Clock::duration> took;
+  for (int i = 0; i < 3; ++i) {
+    const std::uint64_t returns = seen.returns, cuts = seen.cuts;
+    ASSERT_TRUE(eventually([&] { return seen.frames > 30; }));
+    link.impair({.stalled = true});
+    ASSERT_TRUE(eventually([&] { return seen.cuts > cuts; }));
+    std::this_thread::sleep_for(1s);  // the attempts of this time are swallowed
+    const auto restored = Clock::now();
+    link.impair({});
+    ASSERT_TRUE(eventually([&] { return seen.returns > returns && seen.firstFrameAfterReturn != 0; }));
+    took.push_back(Clock::time_point(Clock::duration(seen.firstFrameAfterReturn)) - restored);
+    std::printf(
+        "swallowed: the first frame came %lld ms after the link's return\n",
+        static_cast<long long>(std::chrono::duration_cast<std::chrono::milliseconds>(took.back()).count()));
+    EXPECT_EQ(seen.resumed, 1u);
+    EXPECT_EQ(seen.id, id);
+  }
+  EXPECT_FALSE(client->ended());
+}
+
 TEST_F(ReconnectingTest, AServerThatBeganAnewIsJoinedAnew) {
   Seen seen;
   const std::string sameAddress = address_;

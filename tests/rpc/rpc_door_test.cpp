@@ -337,6 +337,37 @@ TEST_F(RpcDoorTest, ClosingTheDoorEndsStreamsWithUnavailable) {
   EXPECT_EQ(second.seeTheEnd().error_code(), grpc::StatusCode::UNAVAILABLE);
 }
 
+// As a program does when it ends: what is to be said last is not lost to the door that closes behind it.
+TEST_F(RpcDoorTest, WhoIsThereWhenTheServerStopsAndTheDoorClosesHearsOfIt) {
+  std::vector<std::unique_ptr<Joined>> clients;
+  for (int i = 0; i < 8; ++i) clients.push_back(std::make_unique<Joined>(port()));
+  server().stop();
+  door.reset();
+  for (const auto& client : clients) {
+    EXPECT_EQ(client->seeTheEnd().error_code(), grpc::StatusCode::UNAVAILABLE);
+    ASSERT_FALSE(client->viewer.notices.empty());
+    EXPECT_EQ(client->viewer.notices.back().kind(), v1::NOTICE_KIND_SERVER_STOPPING);
+  }
+}
+
+TEST_F(RpcDoorTest, ADeletedScenesStreamsEndWithNotFound) {
+  const auto stub = v1::ClothStream::NewStub(channelTo(port()));
+  v1::CreateSceneRequest request;
+  request.set_named("other");
+  request.set_name("passing");
+  v1::CreateSceneResponse created;
+  grpc::ClientContext creating, deleting;
+  ASSERT_TRUE(stub->CreateScene(&creating, request, &created).ok());
+  Joined client(port(), "passing");
+  v1::DeleteSceneRequest deletion;
+  deletion.set_name("passing");
+  v1::DeleteSceneResponse deleted;
+  ASSERT_TRUE(stub->DeleteScene(&deleting, deletion, &deleted).ok());
+  const grpc::Status status = client.seeTheEnd();
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::NOT_FOUND);
+  EXPECT_THAT(status.error_message(), HasSubstr("'passing' was deleted"));
+}
+
 TEST_F(RpcDoorTest, StoppingTheServerSaysSoAndEndsStreamsWithUnavailable) {
   Joined client(port());
   server().stop();

@@ -141,8 +141,9 @@ class RosterTest : public ::testing::Test {
     return member;
   }
   tl::expected<Roster::Admission, Roster::Refusal> tryJoin(Member& member, v1::Role wanted = {},
-                                                           const std::string& token = {}) {
-    return roster.join({"test", "Ada", wanted, token}, member.mailbox, ids, limit, now);
+                                                           const std::string& token = {},
+                                                           std::uint32_t attempt = 0) {
+    return roster.join({"test", "Ada", wanted, token, attempt}, member.mailbox, ids, limit, now);
   }
   Member comeBack(const Member& lost) { return join({}, lost.admission.token); }
   void lose(const Member& member) { roster.lose(*member.mailbox, {60s, 2s}, now); }
@@ -318,6 +319,17 @@ TEST_F(RosterTest, WhoComesBackTooLateJoinsAnew) {
   EXPECT_FALSE(late.admission.resumed);
   EXPECT_EQ(late.admission.id, 2u);
   EXPECT_NE(late.admission.token, lost.admission.token);
+}
+
+TEST_F(RosterTest, AnAttemptThatWasLateOnItsWayTakesNothing) {
+  const Member lost = join();
+  lose(lost);
+  Member third, second, fourth;
+  ASSERT_TRUE(tryJoin(third, {}, lost.admission.token, 3).has_value());
+  EXPECT_EQ(tryJoin(second, {}, lost.admission.token, 2).error(), Roster::Refusal::late);
+  EXPECT_FALSE(third.mailbox->closed());
+  EXPECT_TRUE(tryJoin(fourth, {}, lost.admission.token, 4).has_value());
+  EXPECT_TRUE(third.mailbox->closed());
 }
 
 TEST_F(RosterTest, WhoLeftDoesNotComeBackAndNobodyGuessesAToken) {

@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: MIT
 // Scenes that peers create, delete, pause and put back to their start.
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <future>
+#include <latch>
+#include <memory>
 #include <thread>
 #include <utility>
 
@@ -220,6 +223,73 @@ TEST_F(ScenesTest, PiecesThatDoNotFitAreRefusedAndForgotten) {
   EXPECT_EQ(createUploaded(other).error().code(), v1::ERROR_CODE_MALFORMED_MESSAGE);
 }
 
+TEST_F(ScenesTest, WhatWasUploadedTakesItsRoomUntilItIsAnswered) {
+  ServerOptions options;
+  const v1::Scene scene = discScene(40);
+  const std::string content = scene.SerializeAsString();
+  options.maxUploadBytes = content.size() + content.size() / 2;
+  START(options);
+  TestPeer maker(server());
+  upload(maker, content);
+  v1::ClientMessage create;
+  create.set_request_id(77);
+  create.mutable_create_scene()->set_uploaded_content_id(9);
+  maker.send(create);
+  // It is being made now, which takes far longer than this.
+  upload(maker, content);
+  EXPECT_EQ(maker.readUntil(Body::kError).error().code(), v1::ERROR_CODE_RESOURCE_EXHAUSTED);
+  const v1::ServerMessage made =
+      maker.readUntil([](const v1::ServerMessage& answer) { return answer.request_id() == 77; });
+  EXPECT_TRUE(made.has_create_scene()) << made.DebugString();
+  upload(maker, content);
+  EXPECT_TRUE(createUploaded(maker, "again").has_create_scene());
+}
+
+TEST_F(ScenesTest, OnlySoManyWaitToBeMade) {
+  ServerOptions options;
+  options.maxCreatedScenes = 1;
+  START(options);
+  constexpr int kAsked = 200;
+  std::latch answered(kAsked);
+  std::atomic<int> refused = 0;
+  v1::CreateSceneRequest request;
+  *request.mutable_scene() = discScene(60);
+  for (int i = 0; i < kAsked; ++i) {
+    server().createScene(request, [&](const auto& answer) {
+      if (!answer && answer.error().text().find("wait to be made") != std::string::npos) {
+        EXPECT_EQ(answer.error().code(), v1::ERROR_CODE_RESOURCE_EXHAUSTED);
+        ++refused;
+      }
+      answered.count_down();
+    });
+  }
+  answered.wait();
+  EXPECT_GT(refused, 0);
+}
+
+TEST_F(ScenesTest, ASceneHasItsOwnLimitOfParticipants) {
+  ServerOptions options;
+  options.maxParticipants = 5;
+  START(options);
+  TestPeer maker(server());
+  v1::ClientMessage message;
+  v1::CreateSceneRequest& create = *message.mutable_create_scene();
+  create.set_named("small");
+  create.set_name("duet");
+  create.set_max_participants(6);
+  EXPECT_THAT(ask(maker, message).error().text(),
+              StartsWith("createScene.maxParticipants = 6: must be at most 5"));
+  create.set_max_participants(2);
+  EXPECT_EQ(ask(maker, message).create_scene().scene().max_participants(), 2u);
+  EXPECT_EQ(createNamed(maker, "small", "usual").create_scene().scene().max_participants(), 5u);
+
+  TestPeer first(server()), second(server()), third(server());
+  first.join("duet");
+  second.join("duet");
+  third.hello("duet");
+  EXPECT_THAT(third.readToTheEnd().error().text(), HasSubstr("'duet' has 2 participants"));
+}
+
 TEST_F(ScenesTest, APausedSceneStandsStillAndGoesOnWhereItWas) {
   START();
   TestPeer peer(server()), other(server());
@@ -291,22 +361,28 @@ scene::Scene lightScene() {
   return light;
 }
 
+// The light one runs, and somebody asks for the heavy one.
 class HeavySceneTest : public tests::ServerTest {
  protected:
+  void SetUp() override {
+    START({}, {heavyScene(), lightScene()});
+    light = std::make_unique<TestPeer>(server());
+    heavy = std::make_unique<TestPeer>(server());
+    light->join("light");
+    heavy->hello("heavy");
+  }
   bool heavyRuns() { return server().state().find("heavy")->running; }
+
+  std::unique_ptr<TestPeer> light, heavy;
 };
 
 TEST_F(HeavySceneTest, OthersGoOnWhileItIsMadeReady) {
-  START({}, {heavyScene(), lightScene()});
-  TestPeer light(server()), heavy(server());
-  light.join("light");
-  heavy.hello("heavy");
   const Clock::time_point asked = Clock::now();
   Clock::time_point last = asked;
   Clock::duration longest{};
   int frames = 0;
   for (; !heavyRuns(); ++frames) {
-    light.readFrames(1);
+    light->readFrames(1);
     const Clock::time_point now = Clock::now();
     longest = std::max(longest, now - std::exchange(last, now));
   }
@@ -314,35 +390,27 @@ TEST_F(HeavySceneTest, OthersGoOnWhileItIsMadeReady) {
              1e3 * seconds(last - asked), frames, 1e3 * seconds(longest));
   // Two can be on their way, and one tick in flight, when it begins.
   EXPECT_GE(frames, 8);
-  heavy.readFrames(1);
+  heavy->readFrames(1);
 }
 
 TEST_F(HeavySceneTest, IsMadeReadyAnewWhereTheDeviceIsLostMeanwhile) {
-  START({}, {heavyScene(), lightScene()});
-  TestPeer light(server()), heavy(server());
-  light.join("light");
-  heavy.hello("heavy");
-  light.readFrames(2);
+  light->readFrames(2);
   server().state().device.simulateDeviceLoss();
-  light.readUntil(
+  light->readUntil(
       [](const v1::ServerMessage& m) { return m.notice().kind() == v1::NOTICE_KIND_DEVICE_REBUILT; });
-  heavy.readFrames(1);
-  light.readFrames(3);
+  heavy->readFrames(1);
+  light->readFrames(3);
 }
 
 TEST_F(HeavySceneTest, AServerStopsWhileItIsMadeReady) {
-  START({}, {heavyScene(), lightScene()});
-  TestPeer light(server()), heavy(server());
-  light.join("light");
-  heavy.hello("heavy");
-  light.readFrames(2);
+  light->readFrames(2);
   v1::CreateSceneRequest request;
   request.set_named("heavy");
   request.set_name("heavier");
   std::promise<void> answered;
   server().createScene(request, [&](const auto&) { answered.set_value(); });
-  light.vanish();
-  heavy.vanish();
+  light->vanish();
+  heavy->vanish();
   stop();
   answered.get_future().get();
 }

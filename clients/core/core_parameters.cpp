@@ -1,0 +1,231 @@
+// SPDX-License-Identifier: MIT
+// The C interface over Client: parameters, as they stand and as they are changed.
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <string_view>
+
+#include "clients/core/core.h"
+#include "clients/core/core_handle.h"
+
+using namespace clothstream::client;
+
+namespace {
+
+std::optional<Vec3> vec3(const float* values) {
+  if (!values) return std::nullopt;
+  return Vec3{values[0], values[1], values[2]};
+}
+
+std::optional<Spring> spring(const float* values) {
+  if (!values) return std::nullopt;
+  return Spring{values[0], values[1]};
+}
+
+std::optional<float> scalar(const float* value) {
+  return value ? std::optional(*value) : std::nullopt;
+}
+
+constexpr float kAsIs = std::numeric_limits<float>::quiet_NaN();
+
+std::optional<float> given(float value) {
+  return std::isnan(value) ? std::nullopt : std::optional(value);
+}
+
+// What is not given of a spring is as it is now.
+std::optional<Spring> changed(const float* values, const Spring& now) {
+  if (std::isnan(values[0]) && std::isnan(values[1])) return std::nullopt;
+  return Spring{given(values[0]).value_or(now[0]), given(values[1]).value_or(now[1])};
+}
+
+// What the server takes for what is not said (scene.proto).
+Solver defaultSolver(std::uint32_t kind) {
+  Solver solver;
+  solver.kind = kind;
+  if (kind == CS_SOLVER_XPBD) solver.iterations = 1;
+  return solver;
+}
+
+std::optional<Solver> changed(const cs_cloth_settings& settings, const ClothParameters& now) {
+  const bool any = settings.solver != CS_SOLVER_AS_IS || settings.bend_constraints >= 0 ||
+                   settings.assembled >= 0 || settings.iterations != 0 || given(settings.tolerance) ||
+                   given(settings.compliance) || given(settings.activation);
+  if (!any) return std::nullopt;
+  Solver solver = now.solver;
+  if (settings.solver != CS_SOLVER_AS_IS && settings.solver != solver.kind) {
+    const auto known = now.solvers.find(settings.solver);
+    solver = known == now.solvers.end() ? defaultSolver(settings.solver) : known->second;
+  }
+  if (settings.bend_constraints >= 0) solver.bendConstraints = settings.bend_constraints != 0;
+  if (settings.assembled >= 0) solver.path = settings.assembled != 0 ? kAssembled : kMatrixFree;
+  if (settings.iterations != 0) solver.iterations = settings.iterations;
+  solver.tolerance = given(settings.tolerance).value_or(solver.tolerance);
+  if (given(settings.compliance)) solver.compliance = settings.compliance;
+  solver.activation = given(settings.activation).value_or(solver.activation);
+  return solver;
+}
+
+ClothChange changeOf(const Cloth& cloth, const cs_cloth_settings& settings) {
+  const ClothParameters& now = cloth.parameters;
+  return {.name = cloth.name,
+          .structural = changed(settings.structural, now.structural),
+          .shear = changed(settings.shear, now.shear),
+          .bend = changed(settings.bend, now.bend),
+          .damping = given(settings.damping),
+          .drag = given(settings.drag),
+          .lift = given(settings.lift),
+          .friction = given(settings.friction),
+          .thickness = given(settings.thickness),
+          .solver = changed(settings, now),
+          .ballRadius = given(settings.ball_radius),
+          .ballFriction = given(settings.ball_friction),
+          .tetherSlack = given(settings.tether_slack),
+          .dihedralBending = given(settings.dihedral_bending)};
+}
+
+}  // namespace
+
+int cs_get_environment(const cs_client* client, cs_environment* out) noexcept {
+  if (!client->client.described()) return 0;
+  const Environment& environment = client->client.description().environment;
+  copy(environment.gravity, out->gravity);
+  copy(environment.wind, out->wind);
+  out->air_density = environment.airDensity;
+  out->gust_strength = environment.gust.strength;
+  out->gust_seconds = environment.gust.seconds;
+  return 1;
+}
+
+int cs_get_cloth_parameters(const cs_client* client, uint32_t index, cs_cloth_parameters* out) noexcept {
+  const Cloth* cloth = at(client->client.description().cloths, index);
+  if (!cloth) return 0;
+  copy(cloth->parameters.structural, out->structural);
+  copy(cloth->parameters.shear, out->shear);
+  copy(cloth->parameters.bend, out->bend);
+  out->damping = cloth->parameters.damping;
+  return 1;
+}
+
+int cs_get_cloth_settings(const cs_client* client, uint32_t index, cs_cloth_settings* out) noexcept {
+  const Cloth* cloth = at(client->client.description().cloths, index);
+  if (!cloth || out->version != CS_CLOTH_SETTINGS_VERSION) return 0;
+  const ClothParameters& parameters = cloth->parameters;
+  cs_keep_cloth_settings(out);
+  copy(parameters.structural, out->structural);
+  copy(parameters.shear, out->shear);
+  copy(parameters.bend, out->bend);
+  out->damping = parameters.damping;
+  out->drag = parameters.drag;
+  out->lift = parameters.lift;
+  out->friction = parameters.friction;
+  out->thickness = parameters.thickness;
+  out->dihedral_bending = parameters.dihedralBending;
+  out->ball_radius = parameters.ballRadius.value_or(kAsIs);
+  out->ball_friction = parameters.ballFriction.value_or(kAsIs);
+  out->tether_slack = parameters.tetherSlack.value_or(kAsIs);
+  out->solver = parameters.solver.kind;
+  const bool constrained = out->solver == CS_SOLVER_CONSTRAINT || out->solver == CS_SOLVER_ACAD;
+  if (constrained || out->solver == CS_SOLVER_XPBD || out->solver == CS_SOLVER_IMPLICIT_EULER)
+    out->iterations = parameters.solver.iterations;
+  if (constrained || out->solver == CS_SOLVER_IMPLICIT_EULER) out->tolerance = parameters.solver.tolerance;
+  if (constrained || out->solver == CS_SOLVER_XPBD)
+    out->compliance = parameters.solver.compliance.value_or(kAsIs);
+  if (!constrained) return 1;
+  out->bend_constraints = parameters.solver.bendConstraints ? 1 : 0;
+  if (out->solver == CS_SOLVER_CONSTRAINT) out->assembled = parameters.solver.path == kAssembled ? 1 : 0;
+  out->activation = parameters.solver.activation;
+  return 1;
+}
+
+uint32_t cs_material_count(const cs_client* client) noexcept {
+  return static_cast<std::uint32_t>(client->client.description().materials.size());
+}
+
+const char* cs_material(const cs_client* client, uint32_t index) noexcept {
+  const std::string* material = at(client->client.description().materials, index);
+  return material ? material->c_str() : "";
+}
+
+const char* cs_cloth_material(const cs_client* client, uint32_t cloth) noexcept {
+  const Cloth* found = at(client->client.description().cloths, cloth);
+  return found ? found->parameters.material.c_str() : "";
+}
+
+uint64_t cs_parameters_participant(const cs_client* client) noexcept {
+  return client->client.parametersParticipant();
+}
+
+void cs_set_environment(cs_client* client, const float* gravity3, const float* wind3,
+                        const float* air_density) noexcept {
+  ParameterChange change;
+  change.gravity = vec3(gravity3);
+  change.wind = vec3(wind3);
+  change.airDensity = scalar(air_density);
+  client->client.change(change);
+}
+
+void cs_set_gust(cs_client* client, float strength, float seconds) noexcept {
+  ParameterChange change;
+  change.gust = Gust{strength, seconds};
+  client->client.change(change);
+}
+
+void cs_set_cloth(cs_client* client, const char* cloth, const float* structural2, const float* shear2,
+                  const float* bend2, const float* damping) noexcept {
+  ParameterChange change;
+  ClothChange& clothChange = change.cloths.emplace_back();
+  clothChange.name = cloth;
+  clothChange.structural = spring(structural2);
+  clothChange.shear = spring(shear2);
+  clothChange.bend = spring(bend2);
+  clothChange.damping = scalar(damping);
+  client->client.change(change);
+}
+
+void cs_keep_cloth_settings(cs_cloth_settings* out) noexcept {
+  *out = {.version = CS_CLOTH_SETTINGS_VERSION,
+          .structural = {kAsIs, kAsIs},
+          .shear = {kAsIs, kAsIs},
+          .bend = {kAsIs, kAsIs},
+          .damping = kAsIs,
+          .drag = kAsIs,
+          .lift = kAsIs,
+          .friction = kAsIs,
+          .thickness = kAsIs,
+          .solver = CS_SOLVER_AS_IS,
+          .bend_constraints = -1,
+          .iterations = 0,
+          .tolerance = kAsIs,
+          .compliance = kAsIs,
+          .activation = kAsIs,
+          .assembled = -1,
+          .dihedral_bending = kAsIs,
+          .ball_radius = kAsIs,
+          .ball_friction = kAsIs,
+          .tether_slack = kAsIs};
+}
+
+int cs_change_cloth(cs_client* client, const char* cloth, const cs_cloth_settings* settings) noexcept {
+  if (settings->version != CS_CLOTH_SETTINGS_VERSION) return 0;
+  ParameterChange change;
+  const std::string_view name = cloth;
+  for (const Cloth& present : client->client.description().cloths)
+    if (name.empty() || name == present.name) change.cloths.push_back(changeOf(present, *settings));
+  if (change.cloths.empty()) return 0;
+  client->client.change(change);
+  return 1;
+}
+
+void cs_set_material(cs_client* client, const char* cloth, const char* material) noexcept {
+  ParameterChange change;
+  ClothChange& clothChange = change.cloths.emplace_back();
+  clothChange.name = cloth;
+  clothChange.material = material;
+  client->client.change(change);
+}
+
+void cs_set_collider(cs_client* client, const char* collider, const float* position3,
+                     const float* radius) noexcept {
+  const std::optional<Vec3> position = vec3(position3);
+  client->client.change(ColliderChange{collider, position ? &*position : nullptr, radius});
+}
