@@ -13,6 +13,11 @@
 #include "server/stream/envelope.h"
 
 namespace clothstream::stream {
+namespace {
+
+constexpr std::chrono::milliseconds kLookPeriod{50};
+
+}  // namespace
 
 DeviceThread::DeviceThread(const vulkan::DeviceOptions& device,
                            const std::vector<std::shared_ptr<LiveScene>>& scenes, FramePacker& packer,
@@ -125,6 +130,7 @@ void DeviceThread::run(const std::vector<std::shared_ptr<LiveScene>>& scenes, st
       runTasks();
       takeReadyScenes();
       startAndStopScenes();
+      showScenes();
       runDueTicks();
     } catch (const std::exception& failure) {
       rebuild(failure.what());
@@ -137,13 +143,13 @@ void DeviceThread::run(const std::vector<std::shared_ptr<LiveScene>>& scenes, st
 }
 
 bool DeviceThread::waitForWork() {
-  const auto earliest = std::ranges::min_element(
-      runs_, {}, [](const auto& run) { return run->running ? run->pacer.due() : Clock::time_point::max(); });
+  Clock::time_point due = Clock::time_point::max();
+  for (const auto& run : runs_) due = std::min(due, run->due());
   const auto something = [&] { return stopping_ || woken_ || loseDevice_; };
 
   std::unique_lock lock(mutex_);
-  if (earliest != runs_.end() && (*earliest)->running)
-    changed_.wait_until(lock, (*earliest)->pacer.due(), something);
+  if (due != Clock::time_point::max())
+    changed_.wait_until(lock, due, something);
   else
     changed_.wait(lock, something);
   woken_ = false;
@@ -201,9 +207,20 @@ void DeviceThread::startAndStopScenes() {
       run->pacer.start(Clock::now());
       run->slow.restart();
     }
-    if (run->running && ready && !wanted) run->host->rest();
+    const bool stands = ready && inUse && !wanted;
+    if (ready && !wanted && (run->running || (run->stands && !stands))) run->host->rest();
     run->running = wanted;
+    run->stands = stands;
     run->scene->running = wanted;
+  }
+}
+
+void DeviceThread::showScenes() {
+  const Clock::time_point now = Clock::now();
+  for (const auto& run : runs_) {
+    if (!run->stands || now < run->nextLook) continue;
+    run->nextLook = now + kLookPeriod;
+    survives(*run, [&] { run->host->show(now); });
   }
 }
 

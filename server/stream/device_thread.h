@@ -70,12 +70,20 @@ class DeviceThread {
       return static_cast<std::uint64_t>(whole);
     }
 
+    // When something may be to be done for it.
+    Clock::time_point due() const {
+      if (running) return pacer.due();
+      return stands ? nextLook : Clock::time_point::max();
+    }
+
     std::shared_ptr<LiveScene> scene;
     ScenePreparer::Coming coming;                 // while it is made ready
     std::unique_ptr<SceneHost> host;              // once it is
     std::optional<std::promise<void>> whenAdded;  // until then, where it was added
     bool refused = false;                         // it was added, and cannot run
     bool begun = false;                           // the tick in hand
+    bool stands = false;                          // its clock, while somebody is in it
+    Clock::time_point nextLook{};                 // whether one of them sees nothing
     std::optional<std::uint64_t> failed;          // of its ticks, after how many one last did
     bool triedAnew = false;                       // since then it could not be made anew
     SlowWatch slow;
@@ -94,6 +102,8 @@ class DeviceThread {
   void take(Run& run);
   // Gives it up.
   void dismiss(Run& run, const std::string& why);
+  // Where their clocks stand, for who sees nothing yet.
+  void showScenes();
   void runDueTicks();
   // False where it failed: its scene is made anew then. Throws vulkan::DeviceLost.
   bool survives(Run& run, const std::function<void()>& partOfTick);

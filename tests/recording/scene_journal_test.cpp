@@ -141,6 +141,33 @@ TEST_F(SceneJournalTest, WhatBeginsInTheMiddleIsSimulatedAgainToTheBit) {
   EXPECT_EQ(journal->counts().complete, 2u);
 }
 
+TEST_F(SceneJournalTest, WhatIsShownWhileTheClockStandsIsNoneOfIt) {
+  ticks(1);
+  ASSERT_TRUE(journal->start("paused"));
+  ticks(10);
+  const std::uint64_t frames = live->metrics.frames.value();
+  const auto late = listen();
+  while (late->next(now)) {
+  }
+  now += std::chrono::seconds(1);
+  host->show(now);
+  packer->drain();
+  EXPECT_EQ(live->metrics.frames.value(), frames + 1);
+  EXPECT_TRUE(late->next(now));
+  ticks(10);
+  ASSERT_TRUE(journal->stop());
+  live->audience.leave(*late);
+  EXPECT_EQ(again("paused.mcap").ticks, 20u);
+  EXPECT_EQ(again("paused.mcap").different, 0u);
+  auto reader = RecordingReader::open(pathOf("paused.mcap"));
+  ASSERT_TRUE(reader);
+  EXPECT_TRUE(reader->check());
+  std::size_t recorded = 0;
+  for (auto message = reader->next(); *message; message = reader->next())
+    recorded += (*message)->topic == Topic::frames ? 1 : 0;
+  EXPECT_EQ(recorded, 20u);
+}
+
 TEST_F(SceneJournalTest, WhatCannotBeIsRefused) {
   for (const char* name : {"../up", "a/b", ".", "a.mcap", "a b", "\n"}) {
     const auto refused = journal->start(name);

@@ -344,12 +344,18 @@ TEST_F(ScenesTest, APausedSceneStandsStillAndGoesOnWhereItWas) {
   late.hello();
   late.readUntil(
       [](const v1::ServerMessage& m) { return m.notice().kind() == v1::NOTICE_KIND_SCENE_PAUSED; });
+  // And what the cloth is like.
+  late.readFrames(1);
+  EXPECT_EQ(late.frames().back().tick, ticks);
+  EXPECT_EQ(metrics().ticks.value(), ticks);
 
   ASSERT_FALSE(control(other, "small", false, false).control_scene().scene().paused());
   peer.readUntil(
       [](const v1::ServerMessage& m) { return m.notice().kind() == v1::NOTICE_KIND_SCENE_RESUMED; });
   peer.readFrames(5);
   EXPECT_LT(peer.frames().back().tick, ticks + 20);
+  late.readFrames(5);
+  EXPECT_LT(late.frames().back().tick, ticks + 20);
   EXPECT_EQ(control(other, "nowhere", true, false).error().code(), v1::ERROR_CODE_NOT_FOUND);
 }
 
