@@ -211,7 +211,8 @@ TEST_F(SceneHostTest, WhoJoinsWhileTheClockStandsIsShownTheNewestTickAndNothingE
     hosted.host.show(hosted.now);
     hosted.packer.drain();
   };
-  show();  // nobody lacks anything
+  hosted.mailboxes[0]->wantKeyFrame();  // and does without it: nobody lacks anything
+  show();
   EXPECT_EQ(hosted.live.metrics.frames.value(), 20u);
   {
     QualitySubscriber late(hosted, 0), coarse(hosted, 1);
