@@ -67,9 +67,9 @@ class FrameEncoder {
   bool isIdle() const;
 
   // Takes the simulation's present positions (and normals, which must have been recorded,
-  // where the layout has them). `tick` must grow from call to call. A predicted frame refers to the frame
-  // recorded before, or with temporal layers as codec::Encoder has it; the first is always a key frame,
-  // whatever is asked.
+  // where the layout has them). `tick` must grow from call to call, but where history was forgotten. A
+  // predicted frame refers to the frame recorded before, or with temporal layers as codec::Encoder has it;
+  // the first is always a key frame, whatever is asked.
   RecordedFrame record(vulkan::Recorder& recorder, std::uint64_t tick, bool forceKey);
 
   // After a rollback or restore: the next frame is a key frame.

@@ -264,11 +264,11 @@ Written Recorder::writeAll(RecordingWriter& writer) {
 }
 
 void Recorder::fail(const std::string& reason) {
+  spdlog::error("a recording stopped, its scene goes on: {}", reason);
   const std::lock_guard lock(mutex_);
   state_ = State::failed;
   waiting_.clear();
   waiting_.shrink_to_fit();
-  spdlog::error("a recording stopped, its scene goes on: {}", reason);
 }
 
 }  // namespace clothstream::recording

@@ -25,7 +25,7 @@ namespace clothstream::recording {
 struct RecorderOptions {
   std::filesystem::path directory;  // there must be one
   std::string serverName;
-  // After which a recording goes on in another file; 0: never.
+  // After which a recording goes on in another file, where grips hold cloth up to an eighth later; 0: never.
   std::uint64_t maxBytes = 0;
   // Of what waits to be written. When it is more, the recording ends: the scene does not wait for a disk.
   std::size_t maxWaitingBytes = std::size_t{64} << 20;

@@ -21,19 +21,20 @@ Recordings::Recordings(RecorderOptions options, bool always) : options_(std::mov
 
 std::shared_ptr<stream::Journal> Recordings::add(const std::string& scene) {
   const std::lock_guard lock(mutex_);
+  std::erase_if(journals_, [&](const auto& journal) {
+    if (journal.use_count() > 1) return false;
+    const RecordingCounts counts = journal->counts();
+    if (counts.running > 0) return false;
+    before_ += counts;
+    return true;
+  });
   return journals_.emplace_back(std::make_shared<SceneJournal>(scene, options_, always_));
 }
 
 std::string Recordings::report() const {
   const std::lock_guard lock(mutex_);
-  RecordingCounts all;
-  for (const auto& journal : journals_) {
-    const RecordingCounts counts = journal->counts();
-    all.running += counts.running;
-    all.complete += counts.complete;
-    all.failed += counts.failed;
-    all.bytes += counts.bytes;
-  }
+  RecordingCounts all = before_;
+  for (const auto& journal : journals_) all += journal->counts();
   return fmt::format("recordings\n  running {}  complete {}  failed {}  bytes {}\n", all.running,
                      all.complete, all.failed, all.bytes);
 }

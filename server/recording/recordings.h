@@ -18,7 +18,7 @@ class Recordings {
   // where there is none. Throws std::runtime_error with the reason where nothing can be written there.
   Recordings(RecorderOptions options, bool always);
 
-  // Of the scene of this name.
+  // Of the scene of this name. Those of scenes that are gone go as well, once they are written.
   std::shared_ptr<stream::Journal> add(const std::string& scene);
 
   // For people: how many run, are complete, and failed, and their bytes.
@@ -29,6 +29,7 @@ class Recordings {
   const bool always_;
   mutable std::mutex mutex_;
   std::vector<std::shared_ptr<SceneJournal>> journals_;
+  RecordingCounts before_;  // of those that are gone
 };
 
 }  // namespace clothstream::recording

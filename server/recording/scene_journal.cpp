@@ -54,7 +54,7 @@ RecordingCounts SceneJournal::counts() const {
   return counts;
 }
 
-void SceneJournal::replace(std::shared_ptr<Recorder> next) {
+void SceneJournal::replace(std::shared_ptr<Recorder> next, bool continues) {
   std::erase_if(finishing_, [&](const auto& recorder) {
     if (recorder->state() == Recorder::State::running) return false;
     add(before_, *recorder);
@@ -62,9 +62,19 @@ void SceneJournal::replace(std::shared_ptr<Recorder> next) {
   });
   if (current_) finishing_.push_back(std::move(current_));
   current_ = std::move(next);
+  continues_ = continues;
   if (!current_) return;
   for (const auto& [participant, names] : participants_)
     current_->joined(participant, names.first, names.second);
+}
+
+messages::Result<void> SceneJournal::isFree() {
+  if (current_ && current_->state() == Recorder::State::failed) replace(nullptr);
+  if (!current_) return {};
+  return refused(
+      v1::ERROR_CODE_INVALID_ARGUMENT,
+      always_ ? fmt::format("startRecording: '{}' is recorded by the server all the time", scene_)
+              : fmt::format("startRecording: '{}' is recorded already, to {}", scene_, fileOf(*current_)));
 }
 
 messages::Result<std::string> SceneJournal::start(const std::string& name) {
@@ -73,17 +83,19 @@ messages::Result<std::string> SceneJournal::start(const std::string& name) {
         v1::ERROR_CODE_INVALID_ARGUMENT,
         fmt::format("startRecording.name = \"{:.80}\": must be 1 to {} characters out of [A-Za-z0-9_-]", name,
                     kMaxNameLength));
-  const std::lock_guard lock(mutex_);
-  if (current_ && current_->state() == Recorder::State::failed) replace(nullptr);
-  if (current_)
-    return refused(
-        v1::ERROR_CODE_INVALID_ARGUMENT,
-        always_ ? fmt::format("startRecording: '{}' is recorded by the server all the time", scene_)
-                : fmt::format("startRecording: '{}' is recorded already, to {}", scene_, fileOf(*current_)));
+  {
+    const std::lock_guard lock(mutex_);
+    if (auto free = isFree(); !free) return tl::unexpected(std::move(free).error());
+  }
+  // The device's thread takes the lock, and must not wait for a disk. Where somebody else was faster, its
+  // file goes.
   auto recorder = Recorder::create(options_, scene_, name);
   if (!recorder) return refused(v1::ERROR_CODE_RESOURCE_EXHAUSTED, "startRecording: " + recorder.error());
+  const std::lock_guard lock(mutex_);
+  if (auto free = isFree(); !free) return tl::unexpected(std::move(free).error());
+  std::string file = fileOf(**recorder);
   replace(std::move(*recorder));
-  return fileOf(*current_);
+  return file;
 }
 
 messages::Result<v1::StopRecordingResponse> SceneJournal::stop() {
@@ -121,12 +133,12 @@ messages::Result<v1::StopRecordingResponse> SceneJournal::stop() {
 
 bool SceneJournal::due() const {
   const std::lock_guard lock(mutex_);
-  return !ended_ && current_ && current_->state() == Recorder::State::waiting;
+  return current_ && current_->due();
 }
 
 bool SceneJournal::active() const {
-  const auto recorder = current();
-  return recorder && recorder->active();
+  const std::lock_guard lock(mutex_);
+  return current_ && (current_->active() || (continues_ && current_->due()));
 }
 
 void SceneJournal::begin(const vulkan::DeviceInfo& device, const scene::Scene& scene,
@@ -139,12 +151,15 @@ void SceneJournal::ticked(const stream::AppliedTick& tick) {
   const auto recorder = current();
   if (!recorder) return;
   recorder->ticked(tick);
-  if (options_.maxBytes == 0 || recorder->bytes() < options_.maxBytes || !recorder->active()) return;
+  if (options_.maxBytes == 0 || !recorder->active()) return;
+  // Grips take hold anew where a file begins: that is put off, but not for ever.
+  const std::uint64_t most = options_.maxBytes + (tick.inputs.grips.empty() ? 0 : options_.maxBytes / 8);
+  if (recorder->bytes() < most) return;
   // The next file begins with the next tick.
   const std::lock_guard lock(mutex_);
   if (current_ != recorder) return;
   recorder->end();
-  replace(std::make_shared<Recorder>(options_));
+  replace(std::make_shared<Recorder>(options_), true);
 }
 
 void SceneJournal::saved(const simulation::StateSnapshot& state, bool gripsHold) {
@@ -157,8 +172,9 @@ void SceneJournal::restored(std::uint64_t tick, const simulation::StateSnapshot&
 
 void SceneJournal::end() {
   const std::lock_guard lock(mutex_);
-  ended_ = true;
-  if (current_) current_->end();
+  if (!current_ || current_->due()) return;
+  current_->end();
+  replace(always_ ? std::make_shared<Recorder>(options_) : nullptr);
 }
 
 void SceneJournal::sent(const stream::SharedBytes& message) {

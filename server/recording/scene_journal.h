@@ -18,6 +18,14 @@ namespace clothstream::recording {
 // Of recordings.
 struct RecordingCounts {
   std::uint64_t running = 0, complete = 0, failed = 0, bytes = 0;
+
+  RecordingCounts& operator+=(const RecordingCounts& more) {
+    running += more.running;
+    complete += more.complete;
+    failed += more.failed;
+    bytes += more.bytes;
+    return *this;
+  }
 };
 
 // Thread-safe.
@@ -46,8 +54,10 @@ class SceneJournal : public stream::Journal {
 
  private:
   std::shared_ptr<Recorder> current() const;
-  // With the lock held.
-  void replace(std::shared_ptr<Recorder> next);
+  // All with the lock held. Whether none can begin now.
+  [[nodiscard]] messages::Result<void> isFree();
+  // `continues`: from one file to another.
+  void replace(std::shared_ptr<Recorder> next, bool continues = false);
 
   const std::string scene_;
   const RecorderOptions options_;
@@ -55,9 +65,9 @@ class SceneJournal : public stream::Journal {
 
   mutable std::mutex mutex_;                          // of what follows
   std::shared_ptr<Recorder> current_;                 // null: none runs
+  bool continues_ = false;                            // it goes on where another one ended
   std::vector<std::shared_ptr<Recorder>> finishing_;  // what they were told is still being written
   RecordingCounts before_;                            // of those that are gone
-  bool ended_ = false;
   std::map<std::uint64_t, std::pair<std::string, std::string>> participants_;  // client's and display name
 };
 

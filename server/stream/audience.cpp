@@ -43,7 +43,7 @@ std::size_t Audience::size() const {
 }
 
 void Audience::publish(const PublishedFrame& frame) {
-  if (journal_ && frame.quality == 0) journal_->sent(frame.message);
+  if (journal_ && frame.quality == 0 && !frame.again) journal_->sent(frame.message);
   {
     const std::lock_guard lock(mutex_);
     receivers_.assign(members_.begin(), members_.end());
@@ -68,6 +68,13 @@ FrameWishes Audience::wishes(Clock::time_point now) const {
   FrameWishes wishes;
   for (const auto& member : members_) wishes |= member->wishes(now);
   return wishes;
+}
+
+std::uint8_t Audience::lacks() const {
+  const std::lock_guard lock(mutex_);
+  std::uint8_t lacks = 0;
+  for (const auto& member : members_) lacks |= member->lacks();
+  return lacks;
 }
 
 }  // namespace clothstream::stream

@@ -18,7 +18,8 @@ namespace clothstream::stream {
 // Thread-safe; publish() belongs to one thread.
 class Audience {
  public:
-  // Where there is a journal, it is sent what everybody is, of frames those of the finest quality.
+  // Where there is a journal, it is sent what everybody is, of frames those of the finest quality that are
+  // the first of their tick.
   explicit Audience(std::shared_ptr<Journal> journal = nullptr) : journal_(std::move(journal)) {}
 
   enum class Joining : std::uint8_t { joined, full, closed };
@@ -36,6 +37,8 @@ class Audience {
   void close(const SharedBytes& last);
   // Of all members, which are to be asked whenever a frame is made.
   FrameWishes wishes(Clock::time_point now) const;
+  // The qualities of which some member lacks a key frame, see Mailbox::lacks().
+  std::uint8_t lacks() const;
 
  private:
   const std::shared_ptr<Journal> journal_;

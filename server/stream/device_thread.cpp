@@ -13,6 +13,11 @@
 #include "server/stream/envelope.h"
 
 namespace clothstream::stream {
+namespace {
+
+constexpr std::chrono::milliseconds kLookPeriod{50};
+
+}  // namespace
 
 DeviceThread::DeviceThread(const vulkan::DeviceOptions& device,
                            const std::vector<std::shared_ptr<LiveScene>>& scenes, FramePacker& packer,
@@ -125,6 +130,7 @@ void DeviceThread::run(const std::vector<std::shared_ptr<LiveScene>>& scenes, st
       runTasks();
       takeReadyScenes();
       startAndStopScenes();
+      showScenes();
       runDueTicks();
     } catch (const std::exception& failure) {
       rebuild(failure.what());
@@ -137,13 +143,13 @@ void DeviceThread::run(const std::vector<std::shared_ptr<LiveScene>>& scenes, st
 }
 
 bool DeviceThread::waitForWork() {
-  const auto earliest = std::ranges::min_element(
-      runs_, {}, [](const auto& run) { return run->running ? run->pacer.due() : Clock::time_point::max(); });
+  Clock::time_point due = Clock::time_point::max();
+  for (const auto& run : runs_) due = std::min(due, run->due());
   const auto something = [&] { return stopping_ || woken_ || loseDevice_; };
 
   std::unique_lock lock(mutex_);
-  if (earliest != runs_.end() && (*earliest)->running)
-    changed_.wait_until(lock, (*earliest)->pacer.due(), something);
+  if (due != Clock::time_point::max())
+    changed_.wait_until(lock, due, something);
   else
     changed_.wait(lock, something);
   woken_ = false;
@@ -171,6 +177,8 @@ void DeviceThread::take(Run& run) {
     run.refused = run.whenAdded.has_value();
     if (run.refused)
       run.whenAdded->set_exception(std::current_exception());
+    else if (run.host && !std::exchange(run.triedAnew, true))
+      spdlog::error("{}: cannot be made anew: {}; trying again", run.scene->name(), failure.what());
     else
       dismiss(run, failure.what());
   }
@@ -181,7 +189,10 @@ void DeviceThread::dismiss(Run& run, const std::string& why) {
   spdlog::error("{}", text);
   run.host.reset();
   run.failed.reset();
-  run.scene->roster.dismiss(error(v1::ERROR_CODE_RESOURCE_EXHAUSTED, text, true));
+  LiveScene& scene = *run.scene;
+  scene.roster.dismiss(error(v1::ERROR_CODE_RESOURCE_EXHAUSTED, text, true));
+  // For who is back already.
+  scene.audience.announce(parametersChanged(scene.beginAnew(), 1));
 }
 
 void DeviceThread::startAndStopScenes() {
@@ -196,9 +207,20 @@ void DeviceThread::startAndStopScenes() {
       run->pacer.start(Clock::now());
       run->slow.restart();
     }
-    if (run->running && ready && !wanted) run->host->rest();
+    const bool stands = ready && inUse && !wanted;
+    if (ready && !wanted && (run->running || (run->stands && !stands))) run->host->rest();
     run->running = wanted;
+    run->stands = stands;
     run->scene->running = wanted;
+  }
+}
+
+void DeviceThread::showScenes() {
+  const Clock::time_point now = Clock::now();
+  for (const auto& run : runs_) {
+    if (!run->stands || now < run->nextLook) continue;
+    run->nextLook = now + kLookPeriod;
+    survives(*run, [&] { run->host->show(now); });
   }
 }
 
@@ -240,9 +262,10 @@ void DeviceThread::makeAnew(Run& run, const std::string& reason) {
   spdlog::error("{}: a tick failed: {}", run.scene->name(), reason);
   packer_.drain();
   device_->drain();
-  const Clock::time_point now = Clock::now();
-  if (run.failed && now - *run.failed < std::chrono::seconds(1)) return dismiss(run, reason);
-  run.failed = now;
+  const std::uint64_t ticks = run.host->tick();
+  if (run.failed && ticks - *run.failed < run.scene->start().simulationRate) return dismiss(run, reason);
+  run.failed = ticks;
+  run.triedAnew = false;
   run.host->release();
   wake();
 }

@@ -29,7 +29,9 @@ namespace clothstream::stream {
 // room on the device from when somebody first joins it, and sleeps while nobody is in it; it is made ready on
 // another thread, while the others run. When the device is lost, another is made and every scene goes on from
 // the newest state that the CPU has; this is tried once a second until it succeeds. Where a tick fails
-// otherwise, its scene alone is made anew so, and given up if it fails again within a second.
+// otherwise, its scene alone is made anew so. It is given up where a tick fails again within a simulated
+// second, or where making it anew fails twice: everybody in it leaves, and who joins it later has it from its
+// start.
 class DeviceThread {
  public:
   // Device and first scene are ready when it returns; without scenes there is no device, and none can be
@@ -68,13 +70,22 @@ class DeviceThread {
       return static_cast<std::uint64_t>(whole);
     }
 
+    // When something may be to be done for it.
+    Clock::time_point due() const {
+      if (running) return pacer.due();
+      return stands ? nextLook : Clock::time_point::max();
+    }
+
     std::shared_ptr<LiveScene> scene;
     ScenePreparer::Coming coming;                 // while it is made ready
     std::unique_ptr<SceneHost> host;              // once it is
     std::optional<std::promise<void>> whenAdded;  // until then, where it was added
     bool refused = false;                         // it was added, and cannot run
     bool begun = false;                           // the tick in hand
-    std::optional<Clock::time_point> failed;      // when a tick last did
+    bool stands = false;                          // its clock, while somebody is in it
+    Clock::time_point nextLook{};                 // whether one of them sees nothing
+    std::optional<std::uint64_t> failed;          // of its ticks, after how many one last did
+    bool triedAnew = false;                       // since then it could not be made anew
     SlowWatch slow;
     double slipped = 0;
   };
@@ -89,7 +100,10 @@ class DeviceThread {
   void takeReadyScenes();
   // Or who asked for it is told that the device cannot run it. Throws vulkan::DeviceLost.
   void take(Run& run);
+  // Gives it up.
   void dismiss(Run& run, const std::string& why);
+  // Where their clocks stand, for who sees nothing yet.
+  void showScenes();
   void runDueTicks();
   // False where it failed: its scene is made anew then. Throws vulkan::DeviceLost.
   bool survives(Run& run, const std::function<void()>& partOfTick);

@@ -88,7 +88,8 @@ void FramePacker::publish(std::size_t bytes, std::uint64_t reconstructionHash) {
   const Clock::time_point complete = Clock::now();
   frame.set_packet_time_us(microseconds(complete));
   const auto packet = codec::parsePacket(std::span(packet_).first(bytes));
-  const PublishedFrame published = publishedFrame(packet->header, serialise(message_), complete);
+  PublishedFrame published = publishedFrame(packet->header, serialise(message_), complete);
+  published.again = frame_.again;
 
   // Counted before anybody can have it, so that who holds a frame finds it counted.
   telemetry::SceneMetrics& metrics = frame_.scene->metrics;

@@ -33,6 +33,7 @@ struct CompleteFrame {
   std::vector<Recorded> recorded;  // one or more
   // Of a state that must not be shown: only its slot is freed.
   bool discarded = false;
+  bool again = false;  // of a tick that had one
   std::uint64_t stateHash = 0;
   Clock::time_point tickStart{}, deviceDone{};
   google::protobuf::RepeatedPtrField<v1::ColliderState> colliders;

@@ -37,6 +37,16 @@ bool Inbox::postChange(AcceptedChange change) {
   return true;
 }
 
+void Inbox::dropChanges() {
+  const std::lock_guard lock(mutex_);
+  inputs_.changes.clear();
+}
+
+void Inbox::dropPoses() {
+  const std::lock_guard lock(mutex_);
+  inputs_.poses.clear();
+}
+
 void Inbox::keepColliderChanges() {
   const std::lock_guard lock(mutex_);
   for (AcceptedChange& accepted : inputs_.changes) {

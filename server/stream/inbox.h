@@ -62,6 +62,8 @@ class Inbox {
                  PoseTime time = {});
   // False if it is full.
   [[nodiscard]] bool postChange(AcceptedChange change);
+  void dropChanges();
+  void dropPoses();
   // Of the changes that wait, what they say of the scene's colliders; the rest is dropped.
   void keepColliderChanges();
 

@@ -55,7 +55,7 @@ class Journal {
   virtual void saved(const simulation::StateSnapshot& state, bool gripsHold) = 0;
   // From here on the simulation is another one: it goes on after `tick` from this state.
   virtual void restored(std::uint64_t tick, const simulation::StateSnapshot& state) = 0;
-  // Nothing follows.
+  // The simulation is gone. Another one may begin at the scene's start.
   virtual void end() = 0;
 
   // Any thread. A serialised ServerMessage for everybody in the scene.

@@ -106,6 +106,16 @@ v1::ParameterChange LiveScene::resetParameters() {
   return allParameters(start_);
 }
 
+v1::ParameterChange LiveScene::beginAnew() {
+  const std::lock_guard lock(mutex_);
+  inbox.dropChanges();
+  definition_ = start_;
+  description_.reset();
+  tick = 0;
+  resetWanted = false;
+  return allParameters(start_);
+}
+
 v1::ParameterChange LiveScene::correct(const scene::Scene& now) {
   const std::lock_guard lock(mutex_);
   definition_ = now;

@@ -49,6 +49,10 @@ class LiveScene {
   // change that says so.
   v1::ParameterChange resetParameters();
 
+  // Its simulation is gone, and the next one begins as the first did: all is as at first, and all changes
+  // that were on their way are dropped; returns the change that says so.
+  v1::ParameterChange beginAnew();
+
   // The definition becomes what holds now and the changes that wait; returns the change that says what holds.
   v1::ParameterChange correct(const scene::Scene& now);
 

@@ -91,7 +91,7 @@ void Mailbox::subscribe(std::shared_ptr<const Description> description, const St
 void Mailbox::deliver(const PublishedFrame& frame) {
   {
     const std::lock_guard lock(mutex_);
-    if (!streaming_ || closed_) return;
+    if (!streaming_ || closed_ || (frame.again && !needsKey_)) return;
     adapt(frame.complete);
     if (frame.quality == quality_)
       adaptation_.made(frame.quality, frame.layer, frame.message->size(), frame.complete);
@@ -177,6 +177,12 @@ FrameWishes Mailbox::wishes(Clock::time_point now) {
   if (!needsKey_) add(quality_, wantsKey_);
   if (needsKey_ ? doorWaits_ && hasRoom() : wantedQuality() != quality_) add(wantedQuality(), true);
   return wishes;
+}
+
+std::uint8_t Mailbox::lacks() const {
+  const std::lock_guard lock(mutex_);
+  if (!streaming_ || closed_ || !needsKey_ || !doorWaits_ || !hasRoom()) return 0;
+  return static_cast<std::uint8_t>(1u << wantedQuality());
 }
 
 bool Mailbox::acknowledge(std::uint64_t tick, Clock::time_point now) {

@@ -29,6 +29,8 @@ struct PublishedFrame {
   std::uint64_t referenceTick = 0;  // of a predicted frame
   std::uint8_t quality = 0, layer = 0;
   Clock::time_point complete{};
+  // Of a tick whose frame has been made before: for who cannot go on without a key frame, and nobody else.
+  bool again = false;
 };
 
 // Of the packet with this header, in this message.
@@ -96,6 +98,9 @@ class Mailbox {
   // What it wants of the next frame. To be asked whenever one is made: so it knows how time passes while it
   // gets none.
   FrameWishes wishes(Clock::time_point now);
+  // The quality, as a bit, of which it has room for a key frame and cannot go on without one; 0: none. May be
+  // asked while no frames are made.
+  std::uint8_t lacks() const;
 
   // The peer has decoded this tick. False if it never was sent.
   [[nodiscard]] bool acknowledge(std::uint64_t tick, Clock::time_point now);

@@ -221,6 +221,7 @@ void Roster::clear() {
   if (journal_)
     for (const Entry& entry : entries_) journal_->left(entry.told.id());
   entries_.clear();
+  inbox_.dropPoses();
 }
 
 void Roster::dismiss(const SharedBytes& last) {

@@ -78,7 +78,8 @@ class Roster {
   void lose(const Mailbox& mailbox, const Holding& holding, Clock::time_point now);
   // Those whose time is over leave, and lose their colliders and grips before. To be called now and then.
   void expire(Clock::time_point now);
-  // Everybody leaves with this as the last message; close(): and nobody joins from here on.
+  // Everybody leaves with this as the last message, and what they did and no tick has seen yet is dropped.
+  // close(): and nobody joins from here on.
   void dismiss(const SharedBytes& last);
   void close(const SharedBytes& last);
 

@@ -234,11 +234,52 @@ void SceneHost::recordFrame(Clock::time_point now) {
     lastKeyFrame_[recorded.quality] = now;
     if (recorded.quality == 0) sinceKeyFrame_ = 0;
   }
-  frame_.scene = &live_;
-  frame_.tickStart = tickStart_;
-  colliders_.write(scene_, frame_.colliders);
+  describeFrame(tickStart_);
   std::swap(frame_.poseArrivals, poseArrivals_);
   poseArrivals_.clear();
+}
+
+void SceneHost::describeFrame(Clock::time_point start) {
+  frame_.scene = &live_;
+  frame_.again = false;
+  frame_.tickStart = start;
+  colliders_.write(scene_, frame_.colliders);
+}
+
+void SceneHost::show(Clock::time_point now) {
+  // The next tick goes back to another state.
+  if (recovery_ != Recovery::none) return;
+  SceneOnDevice& on = *onDevice_;
+  const std::uint8_t lacks = live_.audience.lacks();
+  frame_.recorded.clear();
+  for (std::uint8_t quality = 0; quality < on.encoders.count(); ++quality) {
+    if ((lacks >> quality & 1) == 0 || now - lastKeyFrame_[quality] < kKeyFrameInterval) continue;
+    encode::FrameEncoder* const encoder = on.encoders.wanted(quality, now);
+    if (encoder == nullptr || !encoder->canRecord()) continue;
+    frame_.recorded.push_back({.encoder = encoder, .quality = quality, .key = true});
+  }
+  if (frame_.recorded.empty()) return;
+  on.recorder.begin();
+  if (scene_.stream.normals == scene::Normals::octahedral) on.simulation.recordNormals(on.recorder);
+  for (CompleteFrame::Recorded& recorded : frame_.recorded) {
+    // What others have refers to the frame before, what this one's receivers have to this one: the next is a
+    // key frame.
+    recorded.encoder->forgetHistory();
+    recorded.frame = recorded.encoder->record(on.recorder, tick_, true);
+    recorded.encoder->forgetHistory();
+    lastKeyFrame_[recorded.quality] = now;
+  }
+  on.simulation.recordSaveState(on.recorder);
+  on.device.wait(on.device.submit(on.recorder));
+  const simulation::TickStatus status = simulation::statusOf(on.simulation.collectState(tick_));
+  describeFrame(now);
+  frame_.again = true;
+  frame_.hasReport = false;
+  frame_.poseArrivals.clear();
+  frame_.discarded = !status.healthy;
+  frame_.stateHash = status.stateHash;
+  frame_.deviceDone = Clock::now();
+  packer_.push(frame_);
 }
 
 void SceneHost::finish() {

@@ -55,6 +55,10 @@ class SceneHost {
   // Waits for it, and hands its frame on. Throws vulkan::DeviceLost.
   void finish();
 
+  // The scene's clock stands: who cannot go on without a key frame gets one of the newest tick's state. There
+  // is no tick, and nobody else notices. To be called now and then. Throws vulkan::DeviceLost.
+  void show(Clock::time_point now);
+
   // Nobody is in the scene, or its clock stands: coarser qualities' encoders go.
   void rest();
 
@@ -90,6 +94,8 @@ class SceneHost {
   // For the frame in hand: those of qualities that somebody wants, which have room for it.
   void chooseEncoders(Clock::time_point now);
   void recordFrame(Clock::time_point now);
+  // What goes with the frame in hand, but for its report.
+  void describeFrame(Clock::time_point start);
   void announceEvents();
   void recover();
   bool every(std::uint32_t seconds) const { return sinceHealthy_ % (std::uint64_t{seconds} * rate_) == 0; }

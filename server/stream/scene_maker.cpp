@@ -31,6 +31,19 @@ tl::expected<scene::Scene, v1::Error> checked(messages::Result<scene::Scene> sce
   return std::move(*scene);
 }
 
+// What `work` gives. What it throws, such as for a mesh that the server's memory is too small for, is told to
+// who asked, and ends nothing else.
+template <class Work>
+auto attempt(const char* call, const Work& work) -> decltype(work()) {
+  try {
+    return work();
+  } catch (const std::exception& failure) {
+    spdlog::error("{}: {}", call, failure.what());
+    return refused(v1::ERROR_CODE_RESOURCE_EXHAUSTED,
+                   fmt::format("{}: the server cannot do it: {}", call, failure.what()));
+  }
+}
+
 }  // namespace
 
 void SceneMaker::create(v1::CreateSceneRequest request, std::optional<UploadedContent> uploaded,
@@ -44,21 +57,15 @@ void SceneMaker::create(v1::CreateSceneRequest request, std::optional<UploadedCo
   boost::asio::post(
       thread_, [this, request = std::move(request), uploaded = std::move(uploaded), done = std::move(done)] {
         --waiting_;
-        try {
-          static const std::string nothing;
-          done(make(request, uploaded ? uploaded->bytes : nothing));
-        } catch (const std::exception& failure) {
-          // Such as a mesh that the server's memory is too small for.
-          spdlog::error("createScene: {}", failure.what());
-          done(refused(v1::ERROR_CODE_RESOURCE_EXHAUSTED,
-                       fmt::format("createScene: the server cannot make it: {}", failure.what())));
-        }
+        static const std::string nothing;
+        done(attempt("createScene", [&] { return make(request, uploaded ? uploaded->bytes : nothing); }));
       });
 }
 
 void SceneMaker::remove(v1::DeleteSceneRequest request, DeleteDone done) {
-  boost::asio::post(
-      thread_, [this, request = std::move(request), done = std::move(done)] { done(removeNow(request)); });
+  boost::asio::post(thread_, [this, request = std::move(request), done = std::move(done)] {
+    done(attempt("deleteScene", [&] { return removeNow(request); }));
+  });
 }
 
 tl::expected<std::shared_ptr<Journal>, v1::Error> SceneMaker::journalOf(const std::string& name) const {
@@ -73,24 +80,34 @@ tl::expected<std::shared_ptr<Journal>, v1::Error> SceneMaker::journalOf(const st
 
 void SceneMaker::startRecording(v1::StartRecordingRequest request, StartRecordingDone done) {
   boost::asio::post(thread_, [this, request = std::move(request), done = std::move(done)] {
-    const auto journal = journalOf(request.scene());
-    if (!journal) return done(tl::unexpected(journal.error()));
-    auto file = (*journal)->start(request.name());
-    if (!file) return done(refused(file.error().code, std::move(file.error().text)));
-    v1::StartRecordingResponse response;
-    response.set_file(std::move(*file));
-    done(std::move(response));
+    done(attempt("startRecording", [&] { return startNow(request); }));
   });
 }
 
 void SceneMaker::stopRecording(v1::StopRecordingRequest request, StopRecordingDone done) {
   boost::asio::post(thread_, [this, request = std::move(request), done = std::move(done)] {
-    const auto journal = journalOf(request.scene());
-    if (!journal) return done(tl::unexpected(journal.error()));
-    auto stopped = (*journal)->stop();
-    if (!stopped) return done(refused(stopped.error().code, std::move(stopped.error().text)));
-    done(std::move(*stopped));
+    done(attempt("stopRecording", [&] { return stopNow(request); }));
   });
+}
+
+tl::expected<v1::StartRecordingResponse, v1::Error> SceneMaker::startNow(
+    const v1::StartRecordingRequest& request) const {
+  const auto journal = journalOf(request.scene());
+  if (!journal) return tl::unexpected(journal.error());
+  auto file = (*journal)->start(request.name());
+  if (!file) return refused(file.error().code, std::move(file.error().text));
+  v1::StartRecordingResponse response;
+  response.set_file(std::move(*file));
+  return response;
+}
+
+tl::expected<v1::StopRecordingResponse, v1::Error> SceneMaker::stopNow(
+    const v1::StopRecordingRequest& request) const {
+  const auto journal = journalOf(request.scene());
+  if (!journal) return tl::unexpected(journal.error());
+  auto stopped = (*journal)->stop();
+  if (!stopped) return refused(stopped.error().code, std::move(stopped.error().text));
+  return std::move(*stopped);
 }
 
 tl::expected<scene::Scene, v1::Error> SceneMaker::definitionOf(const v1::CreateSceneRequest& request,

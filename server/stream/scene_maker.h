@@ -45,6 +45,9 @@ class SceneMaker {
   // in it.
   tl::expected<std::shared_ptr<Journal>, v1::Error> journalOf(const std::string& scene) const;
   tl::expected<v1::DeleteSceneResponse, v1::Error> removeNow(const v1::DeleteSceneRequest& request);
+  tl::expected<v1::StartRecordingResponse, v1::Error> startNow(
+      const v1::StartRecordingRequest& request) const;
+  tl::expected<v1::StopRecordingResponse, v1::Error> stopNow(const v1::StopRecordingRequest& request) const;
 
   SceneServer::State& server_;
   std::atomic<std::uint32_t> waiting_ = 0;  // to be created

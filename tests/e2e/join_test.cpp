@@ -189,6 +189,17 @@ TEST_F(JoinTest, ScenesAreCreatedPausedResetAndDeleted) {
 
   EXPECT_EQ(run({"pause", "mine"}).first, 0);
   EXPECT_EQ(stateOf("mine").at("paused"), true);
+  // Who comes now sees the cloth as it stands, moved by the wind.
+  const TemporaryDirectory shown;
+  const std::filesystem::path obj = shown.path() / "paused.obj";
+  const auto late = clothstream(
+      {"join", address_, "--scene", "mine", "--json", "--hash", "--seconds", "1", "--obj", obj.string()});
+  ASSERT_EQ(late->waitForEnd(kPatience), 0) << late->errors();
+  EXPECT_EQ(nlohmann::json::parse(late->output()).at("frames"), 1);
+  EXPECT_EQ(nlohmann::json::parse(late->output()).at("hashMismatches"), 0);
+  const Obj written = readObj(obj);
+  ASSERT_EQ(written.positions.size(), kVertices);
+  EXPECT_GT(written.positions[16 * 13 + 6][2], 0.001);
   EXPECT_EQ(run({"resume", "mine"}).first, 0);
   EXPECT_EQ(stateOf("mine").at("paused"), false);
   EXPECT_EQ(run({"reset", "mine"}).first, 0);

@@ -16,6 +16,9 @@
 #include <gtest/gtest.h>
 
 #include "clients/grpc/grpc_client.h"
+#include "clients/grpc/scene_control.h"
+#include "clothstream/v1/recording.pb.h"
+#include "proto/recording/recording_reader.h"
 #include "tests/e2e/server_test.h"
 #include "tests/e2e/temporary_directory.h"
 
@@ -36,15 +39,20 @@ class LostDevice : public ServerTest {
     for (const char* name : {"VK_ADD_LAYER_PATH", "VK_INSTANCE_LAYERS", "CLOTHSTREAM_LOSE_DEVICE"})
       unsetenv(name);
   }
-  // Of the next submission: by a word, see lost_device/layer.cpp. The layer finds it whole.
+  // Of the next submission: by what lost_device/layer.cpp says. The layer finds it whole.
   void fail(const std::string& word) {
     std::ofstream(file().string() + ".draft") << word;
     std::filesystem::rename(file().string() + ".draft", file());
   }
 
+  bool hasFailed() const {
+    return eventually([&] { return !std::filesystem::exists(file()); });
+  }
+
+  TemporaryDirectory directory_;
+
  private:
   std::filesystem::path file() const { return directory_.path() / "lose"; }
-  TemporaryDirectory directory_;
 };
 
 // Somebody in a scene, and all that must not happen to them.
@@ -81,6 +89,30 @@ struct Watcher {
   std::atomic<std::uint64_t> tick{0}, frames{0}, mismatches{0};
   std::atomic<int> cuts{0}, restarts{0}, stepsBack{0};
 };
+
+float gravityOf(GrpcClient& client) {
+  cs_environment environment{};
+  client.visit([&](cs_client* core) { cs_get_environment(core, &environment); });
+  return environment.gravity[1];
+}
+// As the simulation that was recorded there began with, and how many of its ticks are there.
+struct Simulated {
+  double gravity = 0;
+  std::size_t ticks = 0;
+};
+Simulated simulatedIn(const std::filesystem::path& path) {
+  Simulated simulated;
+  auto reader = recording::RecordingReader::open(path.string());
+  EXPECT_TRUE(reader) << reader.error();
+  for (auto message = reader->next(); message && *message; message = reader->next()) {
+    simulated.ticks += (*message)->topic == recording::Topic::ticks ? 1 : 0;
+    if ((*message)->topic != recording::Topic::scene) continue;
+    v1::RecordedScene recorded;
+    EXPECT_TRUE(recorded.ParseFromString(std::string((*message)->bytes)));
+    simulated.gravity = recorded.scene().environment().gravity().y();
+  }
+  return simulated;
+}
 
 double milliseconds(Clock::duration time) {
   return std::chrono::duration<double, std::milli>(time).count();
@@ -137,6 +169,88 @@ TEST_F(LostDevice, ATickThatFailsOtherwiseIsItsScenesAlone) {
   stopServer();
   EXPECT_THAT(server_->errors() + server_->output(), HasSubstr("a tick failed: "));
   EXPECT_THAT(server_->output(), HasSubstr("device rebuilds 0"));
+}
+
+TEST_F(LostDevice, ASceneThatFailsAgainAtOnceIsGivenUpAndBeginsAsAtFirstForWhoJoinsLater) {
+  const std::filesystem::path recordings = directory_.path() / "recordings";
+  Arguments arguments = kSmallScene;
+  arguments.insert(arguments.end(), {"--recordings", recordings.string()});
+  startServer(arguments);
+  if (address_.empty()) return;
+  Watcher watcher;
+  auto client = watcher.join(address_);
+  const float gravity = gravityOf(*client);
+  client->visit([](cs_client* core) {
+    const float less[]{0, -3, 0};
+    cs_set_environment(core, less, nullptr, nullptr);
+  });
+  ASSERT_TRUE(eventually([&] { return gravityOf(*client) == -3; }));
+  ASSERT_TRUE(startRecording(address_, "small", "before"));
+  ASSERT_TRUE(watcher.seesMore(60));
+  fail("memory");
+  ASSERT_TRUE(hasFailed());
+  // So that no tick comes between it and the next failure, however long the scene takes to be ready.
+  ASSERT_TRUE(controlScene(address_, "small", true, false));
+  ASSERT_TRUE(eventually([&] { return watcher.restarts >= 1; }));
+  // What waits for the next tick does not reach the scene that begins anew.
+  client->visit([](cs_client* core) {
+    const float sphere[]{0, 1, 0, 0.1f};
+    cs_set_colliders(core, sphere, 1, GrpcClient::nowUs());
+  });
+  fail("memory");
+  ASSERT_TRUE(controlScene(address_, "small", false, false));
+  ASSERT_TRUE(eventually([&] { return client->ended().has_value(); }));
+  EXPECT_THAT(client->ended()->text, HasSubstr("the device cannot run the scene 'small'"));
+  EXPECT_EQ(watcher.mismatches, 0u);
+  EXPECT_EQ(watcher.restarts, 1);
+
+  Watcher later;
+  auto another = later.join(address_);
+  EXPECT_EQ(gravityOf(*another), gravity);
+  ASSERT_TRUE(later.seesMore(1));
+  const auto file = startRecording(address_, "small", "after");
+  ASSERT_TRUE(file) << file.error().text;
+  ASSERT_TRUE(later.seesMore(60));
+  another->visit([&](cs_client* core) {
+    for (std::uint32_t i = 0; i < cs_collider_count(core); ++i) {
+      cs_collider collider;
+      EXPECT_EQ(cs_get_collider(core, i, &collider), 1);
+      EXPECT_EQ(collider.participant_id, 0u);
+    }
+  });
+  const auto stopped = stopRecording(address_, "small");
+  ASSERT_TRUE(stopped) << stopped.error().text;
+  later.expectNothingWrong();
+  EXPECT_EQ(gravityOf(*another), gravity);
+  another.reset();
+  stopServer();
+  EXPECT_FLOAT_EQ(static_cast<float>(simulatedIn(recordings / "before.mcap").gravity), -3);
+  EXPECT_FLOAT_EQ(static_cast<float>(simulatedIn(recordings / "after.mcap").gravity), gravity);
+  EXPECT_GE(simulatedIn(recordings / "after.mcap").ticks, 60u);
+  for (const char* name : {"before.mcap", "after.mcap"}) {
+    Process again({CLOTHSTREAM_SERVER, "resimulate", (recordings / name).string()});
+    EXPECT_EQ(again.waitForEnd(kPatience), 0) << again.output() << again.errors();
+  }
+}
+
+TEST_F(LostDevice, OneThatCannotBeMadeAnewAtOnceIsTriedOnceMore) {
+  startServer();
+  if (address_.empty()) return;
+  Watcher watcher;
+  auto client = watcher.join(address_);
+  ASSERT_TRUE(watcher.seesMore(90));
+  fail("memory 2");  // a tick's, and the first of making it anew
+  ASSERT_TRUE(eventually([&] { return watcher.restarts >= 1; }));
+  ASSERT_TRUE(watcher.seesMore(90));
+  watcher.expectNothingWrong();
+  fail("memory 3");
+  ASSERT_TRUE(eventually([&] { return client->ended().has_value(); }));
+  EXPECT_THAT(client->ended()->text, HasSubstr("the device cannot run the scene 'small'"));
+  EXPECT_EQ(watcher.restarts, 1);
+  Watcher later;
+  auto another = later.join(address_);
+  ASSERT_TRUE(later.seesMore(30));
+  later.expectNothingWrong();
 }
 
 }  // namespace

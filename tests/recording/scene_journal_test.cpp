@@ -2,19 +2,21 @@
 // Recordings that begin and end while the scene runs.
 #include "server/recording/scene_journal.h"
 
+#include <atomic>
 #include <filesystem>
-#include <functional>
+#include <iterator>
 #include <memory>
-#include <set>
 #include <string>
 #include <thread>
 #include <vector>
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "clothstream/v1/recording.pb.h"
 #include "proto/recording/recording_reader.h"
+#include "server/recording/recordings.h"
 #include "server/recording/resimulate.h"
 #include "server/stream/scene_host.h"
 #include "tests/e2e/temporary_directory.h"
@@ -60,6 +62,20 @@ class SceneJournalTest : public tests::GpuTest {
     if (holds)
       poses.grabs.push_back({.id = 1, .pose = {.position = {0, -0.5f, 0}}, .radius = 0.2f, .reach = 0.5f});
     live->inbox.postPoses(3, poses, now);
+  }
+  // The kinds of all notices from here on, as somebody in the scene is told them.
+  std::shared_ptr<stream::Mailbox> listen() {
+    auto mailbox = std::make_shared<stream::Mailbox>([] {});
+    EXPECT_EQ(live->audience.join(mailbox, 5), stream::Audience::Joining::joined);
+    mailbox->subscribe(live->description(), live->shape(), live->metrics);
+    return mailbox;
+  }
+  void read(stream::Mailbox& mailbox, std::vector<v1::NoticeKind>& kinds) const {
+    while (const auto bytes = mailbox.next(now)) {
+      v1::ServerMessage message;
+      ASSERT_TRUE(message.ParseFromArray((*bytes)->data(), static_cast<int>((*bytes)->size())));
+      if (message.has_notice()) kinds.push_back(message.notice().kind());
+    }
   }
   std::string pathOf(const std::string& file) const { return (directory.path() / file).string(); }
   Resimulation again(const std::string& file) const {
@@ -125,6 +141,33 @@ TEST_F(SceneJournalTest, WhatBeginsInTheMiddleIsSimulatedAgainToTheBit) {
   EXPECT_EQ(journal->counts().complete, 2u);
 }
 
+TEST_F(SceneJournalTest, WhatIsShownWhileTheClockStandsIsNoneOfIt) {
+  ticks(1);
+  ASSERT_TRUE(journal->start("paused"));
+  ticks(10);
+  const std::uint64_t frames = live->metrics.frames.value();
+  const auto late = listen();
+  while (late->next(now)) {
+  }
+  now += std::chrono::seconds(1);
+  host->show(now);
+  packer->drain();
+  EXPECT_EQ(live->metrics.frames.value(), frames + 1);
+  EXPECT_TRUE(late->next(now));
+  ticks(10);
+  ASSERT_TRUE(journal->stop());
+  live->audience.leave(*late);
+  EXPECT_EQ(again("paused.mcap").ticks, 20u);
+  EXPECT_EQ(again("paused.mcap").different, 0u);
+  auto reader = RecordingReader::open(pathOf("paused.mcap"));
+  ASSERT_TRUE(reader);
+  EXPECT_TRUE(reader->check());
+  std::size_t recorded = 0;
+  for (auto message = reader->next(); *message; message = reader->next())
+    recorded += (*message)->topic == Topic::frames ? 1 : 0;
+  EXPECT_EQ(recorded, 20u);
+}
+
 TEST_F(SceneJournalTest, WhatCannotBeIsRefused) {
   for (const char* name : {"../up", "a/b", ".", "a.mcap", "a b", "\n"}) {
     const auto refused = journal->start(name);
@@ -153,24 +196,15 @@ TEST_F(SceneJournalTest, WhatCannotBeIsRefused) {
 
 TEST_F(SceneJournalTest, EverybodyIsToldWhenItBeginsAndEnds) {
   std::vector<v1::NoticeKind> kinds;
-  const auto mailbox = std::make_shared<stream::Mailbox>([] {});
-  ASSERT_EQ(live->audience.join(mailbox, 5), stream::Audience::Joining::joined);
-  mailbox->subscribe(live->description(), live->shape(), live->metrics);
-  const auto read = [&] {
-    while (const auto bytes = mailbox->next(now)) {
-      v1::ServerMessage message;
-      ASSERT_TRUE(message.ParseFromArray((*bytes)->data(), static_cast<int>((*bytes)->size())));
-      if (message.has_notice()) kinds.push_back(message.notice().kind());
-    }
-  };
+  const auto mailbox = listen();
   ticks(2);
   ASSERT_TRUE(journal->start(""));
   ticks(2);
-  read();
+  read(*mailbox, kinds);
   EXPECT_THAT(kinds, ::testing::ElementsAre(v1::NOTICE_KIND_RECORDING_STARTED));
   ASSERT_TRUE(journal->stop());
   ticks(2);
-  read();
+  read(*mailbox, kinds);
   EXPECT_THAT(kinds,
               ::testing::ElementsAre(v1::NOTICE_KIND_RECORDING_STARTED, v1::NOTICE_KIND_RECORDING_STOPPED));
   live->audience.leave(*mailbox);
@@ -180,12 +214,19 @@ TEST_F(SceneJournalTest, AtTheLimitItGoesOnInAnotherFile) {
   RecorderOptions limited;
   limited.maxBytes = 260'000;
   make(limited, true);
+  std::vector<v1::NoticeKind> kinds;
+  const auto mailbox = listen();
   int run = 0;
   while (journal->counts().complete < 2) {
-    ticks(20);
-    run += 20;
+    ticks(1);
+    ++run;
+    EXPECT_TRUE(journal->active());
+    read(*mailbox, kinds);
     ASSERT_LT(run, 20'000);
   }
+  // Of the files in between nobody is told.
+  EXPECT_THAT(kinds, ::testing::ElementsAre(v1::NOTICE_KIND_RECORDING_STARTED));
+  live->audience.leave(*mailbox);
   packer->drain();
   host.reset();
   while (journal->counts().running > 0) std::this_thread::yield();
@@ -197,6 +238,114 @@ TEST_F(SceneJournalTest, AtTheLimitItGoesOnInAnotherFile) {
     all += result.ticks;
   }
   EXPECT_EQ(all, static_cast<std::uint64_t>(run));
+}
+
+TEST_F(SceneJournalTest, NoGripTakesHoldAnewForAnotherFileUnlessItHoldsOn) {
+  RecorderOptions limited;
+  limited.maxBytes = 240'000;
+  make(limited, true);
+  grab(true);
+  const auto files = [&] {
+    const RecordingCounts counts = journal->counts();
+    return counts.running + counts.complete;
+  };
+  // So few at a time that what is written at once is less than an eighth of the limit.
+  while (journal->counts().bytes < limited.maxBytes) {
+    const std::uint64_t before = journal->counts().bytes;
+    ticks(20);
+    ASSERT_EQ(files(), 1u);
+    while (journal->counts().bytes == before) std::this_thread::yield();
+  }
+  ASSERT_LT(journal->counts().bytes, limited.maxBytes + limited.maxBytes / 8);
+  ticks(1);
+  EXPECT_EQ(files(), 1u);
+  grab(false);
+  ticks(3);  // lets go, then the file is ended, then another one begins
+  EXPECT_EQ(files(), 2u);
+  grab(true);
+  for (int run = 0; files() < 3; ++run) {
+    ticks(1);
+    ASSERT_LT(run, 20'000);
+  }
+}
+
+// Such as the device's thread gives up a scene whose ticks fail; who joins it later has another host.
+TEST_F(SceneJournalTest, AfterItsHostIsGoneAnotherOneIsRecorded) {
+  const auto another = [&] {
+    packer->drain();
+    host.reset();
+    EXPECT_FALSE(journal->active());
+    host = std::make_unique<stream::SceneHost>(tests::device(), *live, *packer);
+  };
+  ticks(1);
+  ASSERT_TRUE(journal->start("before"));
+  ticks(3);
+  another();
+  const auto stopped = journal->stop();
+  ASSERT_FALSE(stopped);
+  EXPECT_THAT(stopped.error().text, HasSubstr("'small' is not recorded"));
+  ticks(1);
+  ASSERT_TRUE(journal->start("after"));
+  ticks(4);
+  ASSERT_TRUE(journal->stop());
+  // What was asked for and has not begun waits for the other one.
+  ASSERT_TRUE(journal->start("waits"));
+  another();
+  ticks(5);
+  ASSERT_TRUE(journal->stop());
+  while (journal->counts().running > 0) std::this_thread::yield();
+  EXPECT_EQ(again("before.mcap").ticks, 3u);
+  EXPECT_EQ(again("after.mcap").ticks, 4u);
+  EXPECT_EQ(again("waits.mcap").ticks, 5u);
+
+  make({}, true);
+  ticks(6);
+  another();
+  ticks(7);
+  EXPECT_TRUE(journal->active());
+  packer->drain();
+  host.reset();
+  while (journal->counts().running > 0) std::this_thread::yield();
+  EXPECT_EQ(journal->counts().complete, 2u);
+}
+
+TEST_F(SceneJournalTest, OfManyWhoAskAtOnceOneGetsARecording) {
+  ticks(1);
+  for (int round = 0; round < 20; ++round) {
+    std::atomic<int> got{0};
+    std::vector<std::thread> askers;
+    for (int i = 0; i < 4; ++i)
+      askers.emplace_back([&, i] { got += journal->start(fmt::format("{}_{}", round, i)) ? 1 : 0; });
+    for (std::thread& asker : askers) asker.join();
+    EXPECT_EQ(got, 1);
+    ticks(1);
+    ASSERT_TRUE(journal->stop());
+  }
+  const auto files = std::filesystem::directory_iterator(directory.path());
+  EXPECT_EQ(std::distance(begin(files), end(files)), 20);
+}
+
+TEST_F(SceneJournalTest, WhatIsRecordedOfScenesThatAreGoneIsCountedAndNoMoreKept) {
+  Recordings recordings({.directory = directory.path(), .serverName = "test"}, true);
+  std::weak_ptr<stream::Journal> gone;
+  for (int scene = 1; scene <= 3; ++scene) {
+    packer->drain();
+    host.reset();
+    live.reset();
+    auto added = recordings.add("small");
+    EXPECT_TRUE(gone.expired());
+    gone = added;
+    live = std::make_unique<stream::LiveScene>(tests::smallScene(), true, std::move(added));
+    host = std::make_unique<stream::SceneHost>(tests::device(), *live, *packer);
+    ticks(3);
+    packer->drain();
+    host.reset();
+    const auto complete = fmt::format("running 0  complete {}  failed 0", scene);
+    while (recordings.report().find(complete) == std::string::npos) std::this_thread::yield();
+  }
+  std::uintmax_t bytes = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(directory.path())) bytes += entry.file_size();
+  EXPECT_THAT(recordings.report(), HasSubstr(fmt::format("complete 3  failed 0  bytes {}\n", bytes)));
 }
 
 }  // namespace

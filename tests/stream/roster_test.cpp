@@ -215,6 +215,18 @@ TEST_F(RosterTest, PosesAreTrueWhenTheySayUnlessThatCannotBe) {
   EXPECT_EQ(trueAt(-static_cast<std::int64_t>(microseconds(now))), std::nullopt) << "0: not known";
 }
 
+TEST_F(RosterTest, WhatThoseDidWhoAreDismissedIsDropped) {
+  const Member member = join();
+  scene::ParticipantPoses poses;
+  poses.attachments.push_back({});
+  EXPECT_TRUE(roster.post(*member.mailbox, {}, poses, {}, now));
+  roster.dismiss(nullptr);
+  EXPECT_TRUE(roster.post(*member.mailbox, {}, poses, {}, now));  // was on its way
+  Inputs drained;
+  inbox.drain(drained);
+  EXPECT_TRUE(drained.poses.empty());
+}
+
 TEST_F(RosterTest, WhoJoinsKnowsWhoIsThereAndEverybodyElseIsTold) {
   Member first = join(), second = join(), third = join(v1::ROLE_VIEWER);
   EXPECT_THAT(idsOf(first.admission), ElementsAre(1));

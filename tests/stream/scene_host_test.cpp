@@ -136,11 +136,15 @@ class QualitySubscriber {
       ASSERT_EQ(decoder_->decode(packet), codec::DecodeResult::ok);
       EXPECT_EQ(decoder_->reconstructionHash(), parsed.frame().reconstruction_hash());
       qualities.push_back(codec::parsePacket(packet)->header.quality);
+      stateHashes.push_back(parsed.frame().state_hash());
       ASSERT_TRUE(mailbox_->acknowledge(decoder_->tick(), hosted_.now));
     }
   }
 
+  std::uint64_t tick() const { return decoder_->tick(); }
+
   std::vector<std::uint8_t> qualities;  // of the frames that came
+  std::vector<std::uint64_t> stateHashes;
 
  private:
   HostedScene& hosted_;
@@ -194,6 +198,66 @@ TEST_F(SceneHostTest, WhereNobodyGetsTheFinestQualityItIsNotEncoded) {
   }
   EXPECT_EQ(hosted.live.metrics.frames.value(), only.qualities.size());
   EXPECT_EQ(only.qualities, std::vector<std::uint8_t>(10, 1));
+}
+
+TEST_F(SceneHostTest, WhoJoinsWhileTheClockStandsIsShownTheNewestTickAndNothingElseChanges) {
+  scene::Scene scene = smallScene();
+  scene.stream.qualities = 2;
+  HostedScene through(scene), hosted(scene);
+  through.ticks(30);
+  hosted.ticks(20);
+  const auto show = [&] {
+    hosted.now += std::chrono::seconds(1);
+    hosted.host.show(hosted.now);
+    hosted.packer.drain();
+  };
+  hosted.mailboxes[0]->wantKeyFrame();  // and does without it: nobody lacks anything
+  show();
+  EXPECT_EQ(hosted.live.metrics.frames.value(), 20u);
+  {
+    QualitySubscriber late(hosted, 0), coarse(hosted, 1);
+    for (const auto end = Clock::now() + std::chrono::seconds(60);
+         coarse.qualities.empty() && Clock::now() < end;) {
+      show();  // the coarser quality's encoder is made meanwhile
+      late.read();
+      coarse.read();
+    }
+    for (const QualitySubscriber* one : {&late, &coarse}) {
+      EXPECT_EQ(one->tick(), 20u);
+      EXPECT_EQ(one->stateHashes, std::vector{through.frames[19].state_hash()});
+    }
+    EXPECT_EQ(coarse.qualities, std::vector<std::uint8_t>{1});
+    show();
+    EXPECT_EQ(hosted.live.metrics.frames.value(), 22u);
+    EXPECT_EQ(hosted.live.metrics.ticks.value(), 20u);
+    EXPECT_EQ(hosted.mailboxes[0]->next(hosted.now), std::nullopt);
+    for (int i = 0; i < 10; ++i) {
+      hosted.tick();
+      late.read();
+      coarse.read();
+    }
+    EXPECT_EQ(late.tick(), 30u);
+    EXPECT_EQ(late.stateHashes.size(), 11u);
+    EXPECT_EQ(coarse.stateHashes, late.stateHashes);
+  }
+  EXPECT_EQ(stateHashes(hosted), stateHashes(through));
+}
+
+TEST_F(SceneHostTest, WhatStandsBeforeItsFirstTickIsShownFromItsStart) {
+  HostedScene hosted(smallScene());
+  hosted.host.show(hosted.now);
+  hosted.packer.drain();
+  const auto message = hosted.mailboxes[0]->next(hosted.now);
+  ASSERT_TRUE(message);
+  v1::ServerMessage parsed;
+  ASSERT_TRUE(parsed.ParseFromArray((*message)->data(), static_cast<int>((*message)->size())));
+  ASSERT_EQ(hosted.decoder->decode(std::as_bytes(std::span(parsed.frame().packet()))),
+            codec::DecodeResult::ok);
+  EXPECT_EQ(hosted.decoder->tick(), 0u);
+  EXPECT_EQ(hosted.decoder->reconstructionHash(), parsed.frame().reconstruction_hash());
+  ASSERT_TRUE(hosted.mailboxes[0]->acknowledge(0, hosted.now));
+  hosted.ticks(3);
+  EXPECT_EQ(hosted.decoder->tick(), 3u);
 }
 
 TEST_F(SceneHostTest, StreamsAtItsOwnRate) {
@@ -588,6 +652,28 @@ TEST_F(SceneHostTest, HasTheStatesThatAStepWithoutAServerHas) {
   for (std::size_t i = 0; i < 30; ++i)
     EXPECT_EQ(said["hashes"][i + 1], fmt::format("{:016x}", hosted.frames[i].state_hash()))
         << "tick " << i + 1;
+}
+
+TEST(LiveScene, ThatBeginsAnewIsAsAtFirst) {
+  scene::Scene scene = smallScene();
+  scene.colliders[0].motion.keys.clear();
+  LiveScene live(std::move(scene));
+  v1::ParameterChange change;
+  change.mutable_wind()->mutable_value()->set_x(3);
+  v1::ColliderChange& ball = *change.add_colliders();
+  ball.set_name("ball");
+  ball.mutable_position()->set_y(7);
+  ASSERT_TRUE(live.change(1, change));
+  live.tick = 50;
+  live.resetWanted = true;
+  EXPECT_EQ(live.beginAnew().wind().value().x(), 0);
+  EXPECT_EQ(live.definition().environment.wind, live.start().environment.wind);
+  EXPECT_EQ(live.definition().colliders[0].pose.position, live.start().colliders[0].pose.position);
+  Inputs waiting;
+  live.inbox.drain(waiting);
+  EXPECT_TRUE(waiting.changes.empty());
+  EXPECT_EQ(live.tick, 0u);
+  EXPECT_FALSE(live.resetWanted);
 }
 
 TEST(LiveScene, ThatIsCorrectedHasWhatHoldsAndTheChangesThatWait) {

@@ -6,6 +6,8 @@
 #include <future>
 #include <latch>
 #include <memory>
+#include <stdexcept>
+#include <string>
 #include <thread>
 #include <utility>
 
@@ -290,6 +292,39 @@ TEST_F(ScenesTest, ASceneHasItsOwnLimitOfParticipants) {
   EXPECT_THAT(third.readToTheEnd().error().text(), HasSubstr("'duet' has 2 participants"));
 }
 
+// One whose files make trouble that nobody has thought of.
+class TroubledJournal : public Journal {
+ public:
+  messages::Result<std::string> start(const std::string&) override { throw std::runtime_error("no start"); }
+  messages::Result<v1::StopRecordingResponse> stop() override { throw std::runtime_error("no stop"); }
+  bool active() const override { return false; }
+  bool due() const override { return false; }
+  void begin(const vulkan::DeviceInfo&, const scene::Scene&, const v1::StreamDescription&,
+             const simulation::StateSnapshot&, const simulation::StateSnapshot&) override {}
+  void ticked(const AppliedTick&) override {}
+  void saved(const simulation::StateSnapshot&, bool) override {}
+  void restored(std::uint64_t, const simulation::StateSnapshot&) override {}
+  void end() override {}
+  void sent(const SharedBytes&) override {}
+  void joined(std::uint64_t, const std::string&, const std::string&) override {}
+  void left(std::uint64_t) override {}
+};
+
+TEST_F(ScenesTest, WhatRecordingsThrowIsToldToWhoAskedForThem) {
+  ServerOptions options;
+  options.journals = [](const scene::Scene&) { return std::make_shared<TroubledJournal>(); };
+  START(std::move(options));
+  TestPeer peer(server());
+  peer.join();
+  v1::ClientMessage message;
+  message.mutable_start_recording();
+  EXPECT_EQ(ask(peer, message).error().text(), "startRecording: the server cannot do it: no start");
+  message.mutable_stop_recording();
+  EXPECT_EQ(ask(peer, message).error().text(), "stopRecording: the server cannot do it: no stop");
+  ASSERT_TRUE(createNamed(peer, "small", "mine").has_create_scene());
+  EXPECT_TRUE(deleteScene(peer, "mine").has_delete_scene());
+}
+
 TEST_F(ScenesTest, APausedSceneStandsStillAndGoesOnWhereItWas) {
   START();
   TestPeer peer(server()), other(server());
@@ -309,12 +344,18 @@ TEST_F(ScenesTest, APausedSceneStandsStillAndGoesOnWhereItWas) {
   late.hello();
   late.readUntil(
       [](const v1::ServerMessage& m) { return m.notice().kind() == v1::NOTICE_KIND_SCENE_PAUSED; });
+  // And what the cloth is like.
+  late.readFrames(1);
+  EXPECT_EQ(late.frames().back().tick, ticks);
+  EXPECT_EQ(metrics().ticks.value(), ticks);
 
   ASSERT_FALSE(control(other, "small", false, false).control_scene().scene().paused());
   peer.readUntil(
       [](const v1::ServerMessage& m) { return m.notice().kind() == v1::NOTICE_KIND_SCENE_RESUMED; });
   peer.readFrames(5);
   EXPECT_LT(peer.frames().back().tick, ticks + 20);
+  late.readFrames(5);
+  EXPECT_LT(late.frames().back().tick, ticks + 20);
   EXPECT_EQ(control(other, "nowhere", true, false).error().code(), v1::ERROR_CODE_NOT_FOUND);
 }
 

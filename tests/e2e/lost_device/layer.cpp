@@ -2,7 +2,7 @@
 // A Vulkan layer whose devices are lost at the first submission after a file is there: the one that
 // CLOTHSTREAM_LOSE_DEVICE names, which it removes. From then on the device says VK_ERROR_DEVICE_LOST to
 // whatever is asked of its queues and semaphores; another device is whole. Where "memory" is in the file,
-// only that submission fails, with VK_ERROR_OUT_OF_HOST_MEMORY.
+// only that submission fails, with VK_ERROR_OUT_OF_HOST_MEMORY; where "memory N", so many in a row.
 #include <atomic>
 #include <cstdlib>
 #include <cstring>
@@ -37,15 +37,27 @@ struct Device {
   PFN_vkWaitSemaphores waitSemaphores;
   PFN_vkGetSemaphoreCounterValue counter;
   std::atomic<bool> lost{false};
+  std::atomic<int> failing{0};  // submissions, from the next on
 
   // What becomes of the next submission.
   VkResult fate() {
     const char* const name = std::getenv("CLOTHSTREAM_LOSE_DEVICE");
     std::string word;
-    if (name != nullptr) std::ifstream(name) >> word;
+    int count = 1;
+    if (name != nullptr) {
+      std::ifstream file(name);
+      file >> word;
+      if (int said = 0; file >> said) count = said;
+    }
     if (name != nullptr && unlink(name) == 0) {
-      if (word == "memory") return VK_ERROR_OUT_OF_HOST_MEMORY;
-      lost = true;
+      if (word == "memory")
+        failing = count;
+      else
+        lost = true;
+    }
+    if (failing > 0) {
+      --failing;
+      return VK_ERROR_OUT_OF_HOST_MEMORY;
     }
     return lost ? VK_ERROR_DEVICE_LOST : VK_SUCCESS;
   }
