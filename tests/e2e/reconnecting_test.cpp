@@ -63,6 +63,19 @@ class ReconnectingTest : public ServerTest {
     return std::move(*joined);
   }
   static std::string through(const Link& link) { return "127.0.0.1:" + std::to_string(link.port()); }
+  // Who is cut off comes back as who it was; prints how soon.
+  static void restore(Link& link, const Seen& seen, const char* what, std::chrono::milliseconds outage) {
+    const std::uint64_t id = seen.id, returns = seen.returns;
+    const auto restored = Clock::now();
+    link.restore();
+    ASSERT_TRUE(eventually([&] { return seen.returns > returns && seen.firstFrameAfterReturn != 0; }));
+    const auto took = Clock::time_point(Clock::duration(seen.firstFrameAfterReturn)) - restored;
+    std::printf("%s for %lld ms: the first frame came %lld ms after the link's return\n", what,
+                static_cast<long long>(outage.count()),
+                static_cast<long long>(std::chrono::duration_cast<std::chrono::milliseconds>(took).count()));
+    EXPECT_EQ(seen.resumed, 1u);
+    EXPECT_EQ(seen.id, id);
+  }
 };
 
 TEST_F(ReconnectingTest, WhoIsCutOffComesBackAsItWas) {
@@ -82,9 +95,7 @@ TEST_F(ReconnectingTest, WhoIsCutOffComesBackAsItWas) {
     return sees;
   };
   ASSERT_TRUE(eventually(watcherSeesCollider));
-  const std::uint64_t id = seen.id;
   for (const auto outage : {100ms, 1000ms, 5000ms}) {
-    const std::uint64_t returns = seen.returns;
     link.cut();
     ASSERT_TRUE(eventually([&] { return watcherSeen.lastPresence == CS_PRESENCE_DISCONNECTED; }));
     std::this_thread::sleep_for(outage);
@@ -92,15 +103,7 @@ TEST_F(ReconnectingTest, WhoIsCutOffComesBackAsItWas) {
       EXPECT_TRUE(eventually([&] { return !watcherSeesCollider(); }));
     }
     EXPECT_EQ(watcherSeen.participants, 2u);
-    const auto restored = Clock::now();
-    link.restore();
-    ASSERT_TRUE(eventually([&] { return seen.returns > returns && seen.firstFrameAfterReturn != 0; }));
-    const auto took = Clock::time_point(Clock::duration(seen.firstFrameAfterReturn)) - restored;
-    std::printf("cut off for %lld ms: the first frame came %lld ms after the link's return\n",
-                static_cast<long long>(outage.count()),
-                static_cast<long long>(std::chrono::duration_cast<std::chrono::milliseconds>(took).count()));
-    EXPECT_EQ(seen.resumed, 1u);
-    EXPECT_EQ(seen.id, id);
+    ASSERT_NO_FATAL_FAILURE(restore(link, seen, "cut off", outage));
     ASSERT_TRUE(eventually([&] { return watcherSeen.lastPresence == CS_PRESENCE_RETURNED; }));
     EXPECT_TRUE(eventually(watcherSeesCollider));
   }
@@ -118,22 +121,13 @@ TEST_F(ReconnectingTest, WhoseLinkSwallowsEverythingComesBackSoonAfterIt) {
   Link link(portIn(address_));
   Seen seen;
   const auto client = join(through(link), "Ada", seen);
-  const std::uint64_t id = seen.id;
   for (const auto outage : {1000ms, 3000ms, 5000ms}) {
     const std::uint64_t returns = seen.returns, cuts = seen.cuts;
     link.swallow();
     ASSERT_TRUE(eventually([&] { return seen.cuts > cuts; }));
     std::this_thread::sleep_for(outage);
     EXPECT_EQ(seen.returns, returns);
-    const auto restored = Clock::now();
-    link.restore();
-    ASSERT_TRUE(eventually([&] { return seen.returns > returns && seen.firstFrameAfterReturn != 0; }));
-    const auto took = Clock::time_point(Clock::duration(seen.firstFrameAfterReturn)) - restored;
-    std::printf("swallowed for %lld ms: the first frame came %lld ms after the link's return\n",
-                static_cast<long long>(outage.count()),
-                static_cast<long long>(std::chrono::duration_cast<std::chrono::milliseconds>(took).count()));
-    EXPECT_EQ(seen.resumed, 1u);
-    EXPECT_EQ(seen.id, id);
+    ASSERT_NO_FATAL_FAILURE(restore(link, seen, "swallowed", outage));
   }
   EXPECT_FALSE(client->ended());
 }
