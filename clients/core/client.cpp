@@ -41,7 +41,7 @@ void Client::connecting(std::uint64_t nowUs) {
   assembly_ = {};
   keyFrameRequest_ = {};
   ++greeting_.attempt;
-  connectAtUs_ = reconnection_.began(nowUs, std::uint64_t{1000} * welcome_.holdMs);
+  connectAtUs_ = reconnection_.attemptEnd(nowUs, std::uint64_t{1000} * welcome_.holdMs);
   greet();
 }
 

@@ -334,8 +334,7 @@ void cs_update(cs_client* client, uint64_t now_us) CS_NOEXCEPT;
 const uint8_t* cs_next_outgoing(cs_client* client, size_t* bytes) CS_NOEXCEPT;
 
 /* The transport begins to open a connection; what went through the one before it, if any, is over. The first
- * outgoing message from here on is Hello. Need not be called for the first one; how long the attempts to come
- * back are waited for follows from how long joining takes after it. */
+ * outgoing message from here on is Hello. Need not be called for the first one. */
 void cs_connecting(cs_client* client, uint64_t now_us) CS_NOEXCEPT;
 /* The connection is lost, or could not be made. */
 void cs_disconnected(cs_client* client, uint64_t now_us) CS_NOEXCEPT;

@@ -9,19 +9,16 @@
 namespace clothstream::client {
 
 // A link that returns is to be noticed at once, for as long as the server may hold the participant: attempts
-// begin at most kLongestHeldUs apart, or as soon as the one before is given up. After that a server is not to
-// be hurried: at most kLongestUs. Delays grow from kShortestUs, and are jittered by up to a half, so that
-// those who were cut off together do not come back together. All times are microseconds.
+// are at most kLongestHeldUs apart. After that a server is not to be hurried: at most kLongestUs. Delays grow
+// from kShortestUs, and are jittered by up to a half, so that those who were cut off together do not come
+// back together. All times are microseconds.
 class Reconnection {
  public:
   static constexpr std::uint64_t kNever = std::numeric_limits<std::uint64_t>::max();
   static constexpr std::uint64_t kShortestUs = 50'000, kLongestHeldUs = 120'000, kLongestUs = 5'000'000;
-  // An attempt that has led to no Welcome by then is given up for another. Soon while the participant is
-  // held, for a link that returns may have swallowed its beginning: after kTimesJoining times what joining
-  // took last, if that is known and within these bounds, and a little later with each attempt, for it may
-  // take longer now. Else slow links have their time.
-  static constexpr std::uint64_t kTimesJoining = 3, kShortestHeldAttemptUs = 150'000,
-                                 kLongestHeldAttemptUs = 2'000'000, kAttemptUs = 10'000'000;
+  // An attempt that has led to no Welcome by then is given up for another: soon while the participant is
+  // held, for a link that returns may have swallowed its beginning; else slow links have their time.
+  static constexpr std::uint64_t kHeldAttemptUs = 2'000'000, kAttemptUs = 10'000'000;
   // A connection that brings nothing for this long is given up: servers answer pings. Of the time between two
   // updates this much counts at most.
   static constexpr std::uint64_t kSilenceUs = 4'000'000, kLongestStepUs = 500'000;
@@ -32,26 +29,18 @@ class Reconnection {
   std::uint64_t lost(std::uint64_t nowUs, std::uint64_t holdUs, std::uint64_t seed) {
     if (joinedUs_ && nowUs - joinedUs_ >= kStableUs) attempts_ = 0;
     if (attempts_ == 0) lostUs_ = nowUs;
-    const std::uint64_t since = joinedUs_ || !begunUs_ ? nowUs : begunUs_;
     joinedUs_ = 0;
     ++attempts_;
-    if (attempts_ == 1) return nowUs;
     const std::uint64_t longest = isHeld(nowUs, holdUs) ? kLongestHeldUs : kLongestUs;
-    const std::uint64_t delay = std::min(longest, kShortestUs << std::min(attempts_ - 2, 20u));
-    return std::max(nowUs, since + delay - jitter(delay / 2, seed + attempts_));
+    const std::uint64_t delay =
+        attempts_ == 1 ? 0 : std::min(longest, kShortestUs << std::min(attempts_ - 2, 20u));
+    return nowUs + delay - jitter(delay / 2, seed + attempts_);
   }
-  // An attempt begins; returns until when it is waited for.
-  std::uint64_t began(std::uint64_t nowUs, std::uint64_t holdUs) {
-    begunUs_ = nowUs;
-    if (!isHeld(nowUs, holdUs)) return nowUs + kAttemptUs;
-    const std::uint64_t first =
-        std::clamp(kTimesJoining * joiningUs_, kShortestHeldAttemptUs, kLongestHeldAttemptUs);
-    return nowUs + std::min(first + first * attempts_ / 64, kAttemptUs);
+  // Until when an attempt that begins now is waited for.
+  std::uint64_t attemptEnd(std::uint64_t nowUs, std::uint64_t holdUs) const {
+    return nowUs + (isHeld(nowUs, holdUs) ? kHeldAttemptUs : kAttemptUs);
   }
-  void joined(std::uint64_t nowUs) {
-    joinedUs_ = std::max<std::uint64_t>(nowUs, 1);
-    if (begunUs_ != 0) joiningUs_ = nowUs - begunUs_;
-  }
+  void joined(std::uint64_t nowUs) { joinedUs_ = std::max<std::uint64_t>(nowUs, 1); }
 
  private:
   bool isHeld(std::uint64_t nowUs, std::uint64_t holdUs) const {
@@ -68,9 +57,6 @@ class Reconnection {
 
   std::uint32_t attempts_ = 0;
   std::uint64_t lostUs_ = 0, joinedUs_ = 0;  // 0: not
-  std::uint64_t begunUs_ = 0;                // the newest attempt; 0: never
-  // From there to its Welcome, of the newest that had one.
-  std::uint64_t joiningUs_ = kLongestHeldAttemptUs;
 };
 
 }  // namespace clothstream::client

@@ -29,6 +29,9 @@ constexpr std::chrono::milliseconds kUpdateInterval{50};
 // For the server to end a stream that we have ended.
 constexpr std::chrono::milliseconds kClosingTime{500};
 
+// Bounds of what is waited for a connection to open, see openingPatience().
+constexpr std::chrono::milliseconds kShortestOpening{150}, kLongestOpening{2000};
+
 // How often a caller who waits to be joined may give up.
 constexpr std::chrono::milliseconds kCancelInterval{100};
 
@@ -129,9 +132,10 @@ class GrpcClient::Stream {
     std::unique_ptr<grpc::GenericClientAsyncReaderWriter> stream;
     grpc::ByteBuffer incoming;
     grpc::Status status;
+    const SteadyClock::time_point begun = SteadyClock::now();
     int underway = 0;  // operations
     bool started = false, writing = false, broken = false, halfClosed = false, finishing = false;
-    bool silent = false;
+    bool silent = false, swallowed = false;
   };
 
   void run() {
@@ -159,6 +163,7 @@ class GrpcClient::Stream {
 
   void connect() {
     cs_connecting(core_.get(), GrpcClient::nowUs());
+    ++attempts_;
     call_.emplace(address_);
     lastHeard_ = SteadyClock::now();
     call_->stream = call_->stub.PrepareCall(&call_->context, kJoinMethod, &queue_);
@@ -178,7 +183,7 @@ class GrpcClient::Stream {
     for (;;) {
       const std::uint64_t now = GrpcClient::nowUs(), at = cs_connect_at(core_.get());
       if (leaving_ || SteadyClock::now() >= giveUpAt) return false;
-      if (now >= at) return true;
+      if (now >= at || call_->swallowed) return true;
       const auto wait = std::chrono::microseconds(
           std::min<std::uint64_t>(at - now, std::chrono::microseconds(kUpdateInterval).count()));
       step(SystemClock::now() + wait);
@@ -195,6 +200,8 @@ class GrpcClient::Stream {
       case kStarted:
         if (!ok) return finish();
         call_->started = true;
+        openingTook_ = SteadyClock::now() - call_->begun;
+        attempts_ = 0;
         return read();
       case kRead:
         return ok ? received() : finish();
@@ -244,11 +251,19 @@ class GrpcClient::Stream {
     const bool tooLong = now - lastHeard_ > options_.silenceTimeout && call_->started;
     const bool givenUp =
         wasJoined_ && options_.reconnectFor.count() > 0 && GrpcClient::nowUs() >= cs_connect_at(core_.get());
-    if (tooLong || givenUp) {
+    call_->swallowed = triesToComeBack_ && !call_->started && now - call_->begun > openingPatience();
+    if (tooLong || givenUp || call_->swallowed) {
       call_->silent = true;
       call_->context.TryCancel();
     }
     write();
+  }
+
+  // How long a connection that is to bring the client back may take to open: a link that returned may have
+  // swallowed its beginning. A little longer each time, for it may take longer than it did.
+  SteadyClock::duration openingPatience() const {
+    const auto first = std::clamp<SteadyClock::duration>(3 * openingTook_, kShortestOpening, kLongestOpening);
+    return first + first * attempts_ / 64;
   }
 
   void write() {
@@ -325,7 +340,9 @@ class GrpcClient::Stream {
   std::unique_ptr<cs_client, decltype(&cs_destroy)> core_;
   std::optional<Call> call_;
   bool leaving_ = false, wasJoined_ = false, triesToComeBack_ = false;
-  std::optional<SteadyClock::time_point> cutOffAt_;  // since then it is, or tries to come back
+  SteadyClock::duration openingTook_ = kLongestOpening;  // last
+  int attempts_ = 0;                                     // since then
+  std::optional<SteadyClock::time_point> cutOffAt_;      // since then it is, or tries to come back
   std::optional<SteadyClock::time_point> cancelAt_;
   SteadyClock::time_point lastHeard_;
   std::thread thread_;
