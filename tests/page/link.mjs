@@ -18,7 +18,8 @@ export async function makeLink(target) {
       from.on("error", () => {});
       from.on("close", () => {
         sockets.delete(from);
-        to.destroy();
+        // What was said last still goes through.
+        to.destroySoon();
       });
       from.pipe(to);
     }

@@ -12,7 +12,8 @@ for (const signal of ["SIGINT", "SIGTERM"]) process.once(signal, () => process.e
 // Starts the program named by CLOTHSTREAM_SERVER; resolves once it has said where its page is. `port` 0: any.
 export async function startServer(port = 0, more = ["--scene", "curtain"]) {
   const program = process.env.CLOTHSTREAM_SERVER;
-  const options = ["--port", String(port), "--grpc-port", "0", ...more];
+  // Whoever goes without being heard is held for less than a test waits for anything.
+  const options = ["--port", String(port), "--grpc-port", "0", "--hold", "30", ...more];
   const child = spawn(program, options, { stdio: ["ignore", "pipe", "pipe"] });
   // Whatever ends the test, the server does not outlive it.
   process.once("exit", () => child.kill("SIGKILL"));
