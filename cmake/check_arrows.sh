@@ -18,7 +18,7 @@ server/encode      | server/scene server/simulation server/vulkan proto/codec sh
 server/stream      | server/scene server/vulkan server/simulation server/encode server/messages server/telemetry proto/codec clothstream
 server/recording   | server/scene server/vulkan server/simulation server/messages server/stream proto/codec proto/recording clothstream
 server/step        | server/scene server/vulkan server/simulation server/messages
-server/rpc         | server/stream server/telemetry clothstream
+server/rpc         | server/stream server/telemetry clothstream grpc/health
 server/web         | server/stream server/telemetry clothstream
 clients/core       | proto/codec
 clients/grpc       | clients/core clothstream

@@ -1,4 +1,5 @@
 # clothstream_protos: the messages as a library (C++ in <build>/proto). clothstream_protos_grpc: the service too.
+# clothstream_protos_health: gRPC's service of health checks.
 find_package(Protobuf REQUIRED)
 set(protoOut ${PROJECT_BINARY_DIR}/proto_generated)
 set(protoNames recording scene session)
@@ -22,13 +23,23 @@ target_link_libraries(clothstream_protos PUBLIC
 
 if(CLOTHSTREAM_RPC)
   find_package(gRPC CONFIG REQUIRED)
+  set(generateService --grpc_out=${protoOut} --plugin=protoc-gen-grpc=$<TARGET_FILE:gRPC::grpc_cpp_plugin>)
   set(stem ${protoOut}/clothstream/v1/session)
   add_custom_command(OUTPUT ${stem}.grpc.pb.cc ${stem}.grpc.pb.h
-    COMMAND protobuf::protoc -I${PROJECT_SOURCE_DIR}/proto --grpc_out=${protoOut}
-      --plugin=protoc-gen-grpc=$<TARGET_FILE:gRPC::grpc_cpp_plugin>
+    COMMAND protobuf::protoc -I${PROJECT_SOURCE_DIR}/proto ${generateService}
       ${PROJECT_SOURCE_DIR}/proto/clothstream/v1/session.proto
     DEPENDS ${PROJECT_SOURCE_DIR}/proto/clothstream/v1/session.proto
       ${PROJECT_SOURCE_DIR}/proto/clothstream/v1/scene.proto VERBATIM)
   add_library(clothstream_protos_grpc STATIC ${stem}.grpc.pb.cc ${stem}.grpc.pb.h)
   target_link_libraries(clothstream_protos_grpc PUBLIC clothstream_protos gRPC::grpc++)
+
+  set(stem ${protoOut}/grpc/health/v1/health)
+  set(source ${PROJECT_SOURCE_DIR}/proto/grpc/health/v1/health.proto)
+  add_custom_command(OUTPUT ${stem}.pb.cc ${stem}.pb.h ${stem}.grpc.pb.cc ${stem}.grpc.pb.h
+    COMMAND protobuf::protoc -I${PROJECT_SOURCE_DIR}/proto --cpp_out=${protoOut} ${generateService} ${source}
+    DEPENDS ${source} VERBATIM)
+  add_library(clothstream_protos_health STATIC ${stem}.pb.cc ${stem}.pb.h ${stem}.grpc.pb.cc ${stem}.grpc.pb.h)
+  set_target_properties(clothstream_protos_health PROPERTIES UNITY_BUILD OFF)
+  target_include_directories(clothstream_protos_health SYSTEM PUBLIC ${protoOut})
+  target_link_libraries(clothstream_protos_health PUBLIC protobuf::libprotobuf gRPC::grpc++)
 endif()

@@ -132,6 +132,7 @@ std::uint32_t Client::welcomed(Bytes body, std::uint64_t nowUs) {
   greeting_.contentId = known ? welcome_.contentId : 0;
   reconnection_.joined(nowUs);
   point_ = formerPoint_ = {};
+  acknowledgement_ = {};
   if (again && !resumed_) clock_ = {};
   if (again && posed_) sendPoses(nowUs);
   const std::uint32_t events = participants_.empty() ? 0 : CS_EVENT_PARTICIPANTS;
@@ -234,7 +235,7 @@ std::uint32_t Client::packetReceived(std::uint64_t nowUs) {
   if (decoded.key) keyFrameRequest_.answered();
   // A key frame is the way back to what the server holds.
   if (!decoded.hashMatches) requestKeyFrame(nowUs);
-  outbox_.setAck(decoded.tick);
+  if (acknowledgement_.due(nowUs)) outbox_.setAck(decoded.tick);
   timeFrame(decoded.key, nowUs);
   return CS_EVENT_FRAME;
 }

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "clients/core/acknowledgement.h"
 #include "clients/core/client_message.h"
 #include "clients/core/content_assembly.h"
 #include "clients/core/core.h"
@@ -143,6 +144,7 @@ class Client {
   std::unique_ptr<codec::Decoder> decoder_;
   Frame frame_;
   OperatingPoint point_, formerPoint_;  // now, and when the newest frame came
+  Acknowledgement acknowledgement_;
   KeyFrameRequest keyFrameRequest_;
   FrameStatistics statistics_;
   ServerClock clock_;

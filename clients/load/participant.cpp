@@ -149,7 +149,7 @@ void Participant::frameReceived(const v1::Frame& frame, std::uint64_t nowUs) {
     figures_.ages.push_back(age(frame.packet_time_us()));
     figures_.tickAges.push_back(age(frame.tick_time_us()));
   }
-  if (options_.decodes) return;
+  if (options_.decodes || !acknowledgement_.due(nowUs)) return;
   v1::ClientMessage acknowledgement;
   acknowledgement.mutable_frame_ack()->set_tick(packet->header.tick);
   link_->send(acknowledgement.SerializeAsString());

@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "clients/core/acknowledgement.h"
 #include "clients/core/core.h"
 #include "clients/grpc/failure.h"
 #include "clients/load/link.h"
@@ -78,6 +79,7 @@ class Participant final : private LinkListener {
   mutable std::mutex mutex_;
   std::unique_ptr<cs_client, void (*)(cs_client*)> core_;
   v1::ServerMessage message_;
+  client::Acknowledgement acknowledgement_;  // of who does not decode
   Figures figures_;
   std::uint64_t decodeErrorsTaken_ = 0, hashMismatchesTaken_ = 0;
   PoseTiming poseTiming_;

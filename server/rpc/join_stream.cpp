@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "server/rpc/join_stream.h"
 
+#include <atomic>
 #include <chrono>
 #include <span>
 #include <utility>
@@ -20,7 +21,7 @@ grpc::ByteBuffer sharedBuffer(const stream::SharedBytes& message) {
   return grpc::ByteBuffer(&slice, 1);
 }
 
-// A peer that does not read keeps a write in flight for ever.
+// A peer that does not read keeps a write under way for ever.
 constexpr std::chrono::seconds kLastWriteTimeout{1};
 
 grpc::Status cancelled() {
@@ -29,112 +30,118 @@ grpc::Status cancelled() {
 
 }  // namespace
 
-JoinStream::JoinStream(grpc::CallbackServerContext& context, std::function<void(JoinStream&)> onDone)
-    : onDone_(std::move(onDone)), context_(&context) {}
-
-void JoinStream::open(stream::SceneServer& server, std::function<void()> wake) {
-  const std::lock_guard lock(mutex_);
-  connection_ = std::make_shared<stream::Connection>(server, "grpc " + context_->peer(), std::move(wake));
-  StartRead(&incoming_);
-  pumpLocked();
+void JoinStream::await() {
+  context_.AsyncNotifyWhenDone(&ended_);
+  service_.RequestJoin(&context_, &io_, &door_.loop->queue(), &door_.loop->queue(), begin(begun_));
 }
 
-void JoinStream::pump() {
-  const std::lock_guard lock(mutex_);
-  pumpLocked();
+void JoinStream::onBegun(bool ok) {
+  if (!ok) return over();
+  made();
+  begin(ended_);
+  rpc::await<JoinStream>(door_, service_);
+  if (!door_.refusal.ok()) return finish(door_.refusal);
+  if (door_.streams >= door_.maxStreams)
+    return finish(
+        {grpc::StatusCode::RESOURCE_EXHAUSTED, "the server has all the streams it takes; try again later"});
+  ++door_.streams;
+  isCounted_ = true;
+  // Called from any thread, so it must not own the stream: whoever drops the last owner inside a wake would
+  // wait in the connection's destructor for that wake to return.
+  std::weak_ptr<JoinStream> weak = std::static_pointer_cast<JoinStream>(shared_from_this());
+  auto wake = [&loop = *door_.loop, weak, posted = std::make_shared<std::atomic<bool>>(false)] {
+    if (posted->exchange(true)) return;
+    loop.post([weak, posted] {
+      posted->store(false);
+      if (const auto self = weak.lock()) self->pump();
+    });
+  };
+  connection_ =
+      std::make_unique<stream::Connection>(door_.server, "grpc " + context_.peer(), std::move(wake));
+  read();
+  pump();
 }
 
-void JoinStream::pumpLocked() {
+void JoinStream::read() {
+  io_.Read(&incoming_, begin(read_));
+}
+
+void JoinStream::onRead(bool ok) {
   if (!connection_) return;
-  const bool finished = connection_->finished();  // asked first: what came before it is still to be written
-  if (writing_) {
-    if (finished) cancelSoonLocked();
-  } else if (std::optional<stream::SharedBytes> message = connection_->next()) {
-    lastMessage_ = std::move(*message);
-    outgoing_ = sharedBuffer(lastMessage_);
-    writing_ = true;
-    StartWrite(&outgoing_);
-  } else if (finished) {
-    finishLocked(closingStatus(lastMessage_));
-  }
-}
-
-void JoinStream::finish(const grpc::Status& status) {
-  const std::lock_guard lock(mutex_);
-  // Of one that is finished the last message may still be to be written, and says more.
-  if (connection_ && connection_->finished())
-    pumpLocked();
-  else
-    finishLocked(status);
-}
-
-void JoinStream::finishLocked(const grpc::Status& status) {
-  if (!connection_) return;
-  connection_.reset();
-  status_ = status;
-  if (writing_) {
-    cancelSoonLocked();
-  } else {
-    Finish(status_);
-  }
-}
-
-void JoinStream::cancelSoonLocked() {
-  if (cancellation_) return;
-  cancellation_.emplace();
-  cancellation_->Set(std::chrono::system_clock::now() + kLastWriteTimeout,
-                     [weak = weak_from_this()](bool expired) {
-                       const auto self = weak.lock();
-                       if (!expired || !self) return;
-                       const std::lock_guard lock(self->mutex_);
-                       if (self->writing_) self->context_->TryCancel();
-                     });
-}
-
-void JoinStream::OnReadDone(bool ok) {
   if (!ok) {
-    const std::lock_guard lock(mutex_);
-    parting_ = connection_;
-    return finishLocked(grpc::Status::OK);
+    parting_ = std::move(connection_);
+    return finish(grpc::Status::OK);
   }
-  std::shared_ptr<stream::Connection> connection;
-  {
-    const std::lock_guard lock(mutex_);
-    connection = connection_;
-  }
-  if (!connection) return;
   grpc::Slice bytes;
   if (!incoming_.DumpToSingleSlice(&bytes).ok())
     return finish({grpc::StatusCode::INTERNAL, "the message could not be read"});
-  connection->receive(std::as_bytes(std::span(bytes.begin(), bytes.size())));
-  const std::lock_guard lock(mutex_);
-  if (connection_) StartRead(&incoming_);
+  connection_->receive(std::as_bytes(std::span(bytes.begin(), bytes.size())));
+  read();
 }
 
-void JoinStream::OnWriteDone(bool ok) {
-  const std::lock_guard lock(mutex_);
-  writing_ = false;
-  if (!connection_) {
-    Finish(status_);
-  } else if (!ok) {
-    finishLocked(cancelled());
-  } else {
-    pumpLocked();
+void JoinStream::pump() {
+  if (!connection_) return;
+  const bool finished = connection_->finished();  // asked first: what came before it is still to be written
+  if (isWriting_) {
+    if (finished) cancelSoon();
+  } else if (std::optional<stream::SharedBytes> message = connection_->next()) {
+    lastMessage_ = std::move(*message);
+    isWriting_ = true;
+    io_.Write(sharedBuffer(lastMessage_), begin(written_));
+  } else if (finished) {
+    finish(closingStatus(lastMessage_));
   }
 }
 
-void JoinStream::OnCancel() {
-  const std::lock_guard lock(mutex_);
-  cutOff_ = true;
-  finishLocked(cancelled());
+void JoinStream::onWritten(bool ok) {
+  isWriting_ = false;
+  if (hasEnded_) return;
+  if (closing_)
+    io_.Finish(*closing_, begin(finished_));
+  else if (ok)
+    pump();
+  else
+    finish(cancelled());
 }
 
-void JoinStream::OnDone() {
-  {
-    const std::lock_guard lock(mutex_);
-    if (parting_ && !cutOff_) parting_->leave();
-  }
-  onDone_(*this);
+void JoinStream::finish(const grpc::Status& status) {
+  if (closing_) return;
+  closing_ = status;
+  connection_.reset();
+  if (hasEnded_) return;
+  if (isWriting_)
+    cancelSoon();
+  else
+    io_.Finish(status, begin(finished_));
+}
+
+void JoinStream::cancelSoon() {
+  if (cancellation_) return;
+  cancellation_.emplace();
+  cancellation_->Set(&door_.loop->queue(), std::chrono::system_clock::now() + kLastWriteTimeout,
+                     begin(lateForEnd_));
+}
+
+void JoinStream::onLateForEnd(bool expired) {
+  if (expired && isWriting_) context_.TryCancel();
+}
+
+void JoinStream::onEnded(bool) {
+  hasEnded_ = true;
+  if (isCounted_) --door_.streams;
+  if (cancellation_) cancellation_->Cancel();
+  if (parting_ && !context_.IsCancelled()) parting_->leave();
+  parting_.reset();
+  finish(cancelled());
+  over();
+}
+
+void JoinStream::close(const grpc::Status& status) {
+  // Of one that is finished the last message may still be to be written, and says more.
+  if (connection_ && connection_->finished())
+    pump();
+  else
+    finish(status);
 }
 
 }  // namespace clothstream::rpc

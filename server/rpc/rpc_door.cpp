@@ -4,13 +4,16 @@
 #include <cerrno>
 #include <chrono>
 #include <cstring>
+#include <future>
+#include <memory>
+#include <optional>
 #include <stdexcept>
 
 #include <absl/synchronization/mutex.h>
+#include <boost/asio/thread_pool.hpp>
 #include <fmt/format.h>
 #include <grpc/compression.h>
 #include <grpcpp/ext/proto_server_reflection_plugin.h>
-#include <grpcpp/health_check_service_interface.h>
 #include <grpcpp/resource_quota.h>
 #include <grpcpp/security/server_credentials.h>
 #include <grpcpp/server.h>
@@ -19,8 +22,10 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-#include "server/rpc/join_streams.h"
+#include "server/rpc/call.h"
+#include "server/rpc/health.h"
 #include "server/rpc/service.h"
+#include "server/stream/connection.h"
 
 namespace clothstream::rpc {
 namespace {
@@ -86,30 +91,48 @@ std::string addressOf(const std::string& host, std::uint16_t port) {
 }  // namespace
 
 struct RpcDoor::State {
-  JoinStreams streams;
   Service service;
+  HealthService health;
   int port = 0;
   std::unique_ptr<grpc::Server> server;
+  std::optional<DoorContext> context;
+  boost::asio::thread_pool questions{1};  // those that take longer than a frame may wait
 
-  State(stream::SceneServer& scenes, const RpcDoorOptions& options)
-      : streams(scenes, options.maxStreams), service(scenes, streams) {
-    grpc::EnableDefaultHealthCheckService(true);
+  State(stream::SceneServer& scenes, const RpcDoorOptions& options) {
     grpc::reflection::InitProtoReflectionServerBuilderPlugin();
     grpc::ServerBuilder builder;
     configure(builder);
     builder.AddListeningPort(addressOf(options.host, options.port), grpc::InsecureServerCredentials(), &port);
     builder.RegisterService(&service);
+    builder.RegisterService(&health);
+    const auto loop = std::make_shared<CompletionLoop>(builder.AddCompletionQueue());
     server = builder.BuildAndStart();
     if (!server || port == 0) throw std::runtime_error(whyNotListening(options.host, options.port));
-    server->GetHealthCheckService()->SetServingStatus(v1::ClothStream::service_full_name(), true);
+    context.emplace(DoorContext{scenes, loop, options.maxStreams});
+    offerService(*context, service, questions);
+    offerHealth(*context, health);
+    loop->start();
   }
 
   ~State() {
-    if (!server) return;
-    server->GetHealthCheckService()->SetServingStatus(false);
-    streams.finishAll({grpc::StatusCode::UNAVAILABLE, "the server is stopping"});
+    if (!context) return;
+    context->loop->post([this] { stopCalls(); });
     server->Shutdown(std::chrono::system_clock::now() + kStopTimeout);
     server->Wait();
+    // The connections are gone; of the calls the loop may still have to hear.
+    std::promise<void> idle;
+    context->loop->post([&] {
+      if (context->calls.empty()) return idle.set_value();
+      context->onLastCall = [&] { idle.set_value(); };
+    });
+    idle.get_future().wait();
+    context->loop->stop();
+    questions.join();
+  }
+
+  void stopCalls() {
+    context->refusal = {grpc::StatusCode::UNAVAILABLE, "the server is stopping"};
+    for (const auto& call : context->calls) call->stop(context->refusal);
   }
 };
 

@@ -24,7 +24,8 @@ struct RpcDoorOptions {
 // connection finishes, its stream ends with the status that fits the last Error; a peer that vanishes is
 // found within 5 s.
 //
-// Runs on gRPC's threads and one of its own. Construction and destruction belong to the caller's thread.
+// All calls are served by one thread of the door's own, but for reflection, which is gRPC's. Construction and
+// destruction belong to the caller's thread.
 class RpcDoor {
  public:
   // Listens when it returns. `server` must outlive the door. Throws std::runtime_error that says what to do

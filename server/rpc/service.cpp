@@ -3,81 +3,34 @@
 
 #include <utility>
 
-#include "server/rpc/status.h"
+#include <boost/asio/post.hpp>
+
+#include "server/rpc/join_stream.h"
+#include "server/rpc/unary_call.h"
 #include "server/stream/scene_server.h"
 
 namespace clothstream::rpc {
-namespace {
 
-// Ends a call with what the server answered.
-template <typename Response>
-void finish(grpc::ServerUnaryReactor* reactor, Response* response, tl::expected<Response, v1::Error> answer) {
-  if (answer) *response = std::move(*answer);
-  reactor->Finish(answer ? grpc::Status::OK : statusOf(answer.error()));
-}
-
-}  // namespace
-
-grpc::ServerUnaryReactor* Service::ListScenes(grpc::CallbackServerContext* context,
-                                              const v1::ListScenesRequest*,
-                                              v1::ListScenesResponse* response) {
-  grpc::ServerUnaryReactor* const reactor = context->DefaultReactor();
-  *response = server_.listScenes();
-  reactor->Finish(grpc::Status::OK);
-  return reactor;
-}
-
-grpc::ServerUnaryReactor* Service::GetScene(grpc::CallbackServerContext* context,
-                                            const v1::GetSceneRequest* request,
-                                            v1::GetSceneResponse* response) {
-  grpc::ServerUnaryReactor* const reactor = context->DefaultReactor();
-  finish(reactor, response, server_.getScene(*request));
-  return reactor;
-}
-
-grpc::ServerUnaryReactor* Service::CreateScene(grpc::CallbackServerContext* context,
-                                               const v1::CreateSceneRequest* request,
-                                               v1::CreateSceneResponse* response) {
-  grpc::ServerUnaryReactor* const reactor = context->DefaultReactor();
-  server_.createScene(*request, [=](auto answer) { finish(reactor, response, std::move(answer)); });
-  return reactor;
-}
-
-grpc::ServerUnaryReactor* Service::DeleteScene(grpc::CallbackServerContext* context,
-                                               const v1::DeleteSceneRequest* request,
-                                               v1::DeleteSceneResponse* response) {
-  grpc::ServerUnaryReactor* const reactor = context->DefaultReactor();
-  server_.deleteScene(*request, [=](auto answer) { finish(reactor, response, std::move(answer)); });
-  return reactor;
-}
-
-grpc::ServerUnaryReactor* Service::ControlScene(grpc::CallbackServerContext* context,
-                                                const v1::ControlSceneRequest* request,
-                                                v1::ControlSceneResponse* response) {
-  grpc::ServerUnaryReactor* const reactor = context->DefaultReactor();
-  finish(reactor, response, server_.controlScene(*request));
-  return reactor;
-}
-
-grpc::ServerUnaryReactor* Service::StartRecording(grpc::CallbackServerContext* context,
-                                                  const v1::StartRecordingRequest* request,
-                                                  v1::StartRecordingResponse* response) {
-  grpc::ServerUnaryReactor* const reactor = context->DefaultReactor();
-  server_.startRecording(*request, [=](auto answer) { finish(reactor, response, std::move(answer)); });
-  return reactor;
-}
-
-grpc::ServerUnaryReactor* Service::StopRecording(grpc::CallbackServerContext* context,
-                                                 const v1::StopRecordingRequest* request,
-                                                 v1::StopRecordingResponse* response) {
-  grpc::ServerUnaryReactor* const reactor = context->DefaultReactor();
-  server_.stopRecording(*request, [=](auto answer) { finish(reactor, response, std::move(answer)); });
-  return reactor;
-}
-
-grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>* Service::Join(
-    grpc::CallbackServerContext* context) {
-  return streams_.open(*context);
+void offerService(DoorContext& door, Service& service, boost::asio::thread_pool& questions) {
+  stream::SceneServer& server = door.server;
+  offer(door, service, &Service::RequestListScenes,
+        [&server](const auto&, auto answer) { answer(server.listScenes()); });
+  // A scene may have a mesh of millions of vertices in it.
+  offer(door, service, &Service::RequestGetScene, [&server, &questions](const auto& request, auto answer) {
+    boost::asio::post(questions,
+                      [&server, request, answer = std::move(answer)] { answer(server.getScene(request)); });
+  });
+  offer(door, service, &Service::RequestCreateScene,
+        [&server](const auto& request, auto answer) { server.createScene(request, std::move(answer)); });
+  offer(door, service, &Service::RequestDeleteScene,
+        [&server](const auto& request, auto answer) { server.deleteScene(request, std::move(answer)); });
+  offer(door, service, &Service::RequestControlScene,
+        [&server](const auto& request, auto answer) { answer(server.controlScene(request)); });
+  offer(door, service, &Service::RequestStartRecording,
+        [&server](const auto& request, auto answer) { server.startRecording(request, std::move(answer)); });
+  offer(door, service, &Service::RequestStopRecording,
+        [&server](const auto& request, auto answer) { server.stopRecording(request, std::move(answer)); });
+  await<JoinStream>(door, service);
 }
 
 }  // namespace clothstream::rpc

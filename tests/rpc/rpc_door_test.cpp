@@ -3,21 +3,28 @@
 #include "server/rpc/rpc_door.h"
 
 #include <chrono>
+#include <cstddef>
 #include <memory>
+#include <vector>
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
+#include <grpcpp/support/async_unary_call.h>
 #include <netinet/in.h>
 #include <poll.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
 #include "clothstream/v1/session.grpc.pb.h"
+#include "grpc/health/v1/health.pb.h"
 #include "tests/rpc/rpc_client.h"
 #include "tests/web/small_server.h"
 
 namespace clothstream::tests {
 namespace {
 
+using namespace std::chrono_literals;
+using testing::AnyOf;
 using testing::ElementsAre;
 using testing::HasSubstr;
 
@@ -89,15 +96,21 @@ TEST_F(RpcDoorTest, GetsASceneAndRefusesAnUnknownOne) {
   EXPECT_THAT(status.error_message(), HasSubstr("nowhere"));
 }
 
-TEST_F(RpcDoorTest, CreatesASceneAndRefusesWhatIsWrongWithIt) {
-  const auto stub = v1::ClothStream::NewStub(channelTo(port()));
+// A scene as `other` is, without a name of its own.
+v1::CreateSceneRequest likeOther(v1::ClothStream::Stub& stub) {
   v1::GetSceneRequest get;
   get.set_name("other");
   v1::GetSceneResponse other;
   grpc::ClientContext getting;
-  ASSERT_TRUE(stub->GetScene(&getting, get, &other).ok());
+  EXPECT_TRUE(stub.GetScene(&getting, get, &other).ok());
   v1::CreateSceneRequest request;
   *request.mutable_scene() = other.scene();
+  return request;
+}
+
+TEST_F(RpcDoorTest, CreatesASceneAndRefusesWhatIsWrongWithIt) {
+  const auto stub = v1::ClothStream::NewStub(channelTo(port()));
+  v1::CreateSceneRequest request = likeOther(*stub);
   request.set_name("another");
   v1::CreateSceneResponse response;
   grpc::ClientContext creating;
@@ -119,6 +132,37 @@ TEST_F(RpcDoorTest, CreatesASceneAndRefusesWhatIsWrongWithIt) {
   EXPECT_TRUE(stub->DeleteScene(&deleting, deletion, &deleted).ok());
 }
 
+TEST_F(RpcDoorTest, WhoAsksForScenesWhileTheDoorClosesIsAnswered) {
+  constexpr std::size_t kCalls = 40;
+  const auto stub = v1::ClothStream::NewStub(channelTo(port()));
+  struct Call {
+    grpc::ClientContext context;
+    std::unique_ptr<grpc::ClientAsyncResponseReader<v1::CreateSceneResponse>> reader;
+    v1::CreateSceneResponse response;
+    grpc::Status status;
+  };
+  grpc::CompletionQueue queue;
+  std::vector<Call> calls(kCalls);
+  v1::CreateSceneRequest request = likeOther(*stub);
+  for (Call& call : calls) {
+    request.set_name(fmt::format("made-{}", &call - calls.data()));
+    call.reader = stub->AsyncCreateScene(&call.context, request, &queue);
+    call.reader->Finish(&call.response, &call.status, &call);
+  }
+  void* tag = nullptr;
+  bool ok = false;
+  const auto nextIsAnswered = [&] {
+    return queue.AsyncNext(&tag, &ok, std::chrono::system_clock::now() + 10s) ==
+           grpc::CompletionQueue::GOT_EVENT;
+  };
+  ASSERT_TRUE(nextIsAnswered());
+  EXPECT_TRUE(static_cast<Call*>(tag)->status.ok());
+  door.reset();
+  for (std::size_t i = 1; i < kCalls; ++i) ASSERT_TRUE(nextIsAnswered()) << i;
+  for (const Call& call : calls)
+    EXPECT_THAT(call.status.error_code(), AnyOf(grpc::StatusCode::OK, grpc::StatusCode::UNAVAILABLE));
+}
+
 TEST_F(RpcDoorTest, JoinsAndDecodesFrames) {
   Joined client(port());
   EXPECT_EQ(client.viewer.welcome.scene(), "small");
@@ -129,17 +173,53 @@ TEST_F(RpcDoorTest, JoinsAndDecodesFrames) {
   EXPECT_TRUE(client.viewer.errors.empty());
 }
 
+using grpc::health::v1::HealthCheckResponse;
+
+std::string healthRequest(const std::string& service) {
+  grpc::health::v1::HealthCheckRequest request;
+  request.set_service(service);
+  return request.SerializeAsString();
+}
+
+// The next answer of a stream about health; UNKNOWN where there is none.
+HealthCheckResponse::ServingStatus nextStatus(RpcStream& call) {
+  HealthCheckResponse response;
+  const std::optional<std::string> message = call.receive();
+  return message && response.ParseFromString(*message) ? response.status() : HealthCheckResponse::UNKNOWN;
+}
+
 TEST_F(RpcDoorTest, IsHealthy) {
   for (const char* service : {"", "clothstream.v1.ClothStream"}) {
     RpcStream call(port(), {.method = "/grpc.health.v1.Health/Check"});
-    const std::string name(service);
-    // HealthCheckRequest { string service = 1; }
-    ASSERT_TRUE(
-        call.send(name.empty() ? "" : "\x0a" + std::string(1, static_cast<char>(name.size())) + name));
+    ASSERT_TRUE(call.send(healthRequest(service)));
     call.sendDone();
-    EXPECT_EQ(call.receive(), std::string("\x08\x01")) << service;  // status = 1: SERVING
+    EXPECT_EQ(nextStatus(call), HealthCheckResponse::SERVING) << service;
     EXPECT_TRUE(call.finish().ok());
   }
+}
+
+TEST_F(RpcDoorTest, TheHealthOfAnotherServiceIsNotFound) {
+  RpcStream call(port(), {.method = "/grpc.health.v1.Health/Check"});
+  ASSERT_TRUE(call.send(healthRequest("some.Other")));
+  call.sendDone();
+  EXPECT_EQ(call.receive(), std::nullopt);
+  const grpc::Status status = call.finish();
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::NOT_FOUND);
+  EXPECT_THAT(status.error_message(), HasSubstr("some.Other"));
+}
+
+TEST_F(RpcDoorTest, WhoWatchesItsHealthHearsThatTheDoorCloses) {
+  RpcStream call(port(), {.method = "/grpc.health.v1.Health/Watch"});
+  RpcStream other(port(), {.method = "/grpc.health.v1.Health/Watch"});
+  ASSERT_TRUE(call.send(healthRequest("clothstream.v1.ClothStream")));
+  ASSERT_TRUE(other.send(healthRequest("some.Other")));
+  call.sendDone();
+  other.sendDone();
+  EXPECT_EQ(nextStatus(call), HealthCheckResponse::SERVING);
+  EXPECT_EQ(nextStatus(other), HealthCheckResponse::SERVICE_UNKNOWN);
+  door.reset();
+  EXPECT_EQ(nextStatus(call), HealthCheckResponse::NOT_SERVING);
+  EXPECT_EQ(call.finish().error_code(), grpc::StatusCode::UNAVAILABLE);
 }
 
 TEST_F(RpcDoorTest, ListsItsServicesByReflection) {
@@ -310,6 +390,23 @@ TEST_F(RpcDoorTest, ManyClientsComeAndGo) {
   }
   EXPECT_TRUE(watcher.see(5));
   EXPECT_TRUE(watcher.viewer.errors.empty());
+}
+
+// What gRPC says of calls when the door closes may come when their connections are gone.
+TEST_F(RpcDoorTest, ClosesWhileManyComeAndGoAndSomeDoNotRead) {
+  for (int round = 0; round < 5; ++round) {
+    open({});
+    std::vector<std::unique_ptr<RpcStream>> crowd;
+    for (int i = 0; i < 12; ++i) {
+      crowd.push_back(std::make_unique<RpcStream>(port(), RpcOptions{.smallWindow = i % 3 == 0}));
+      crowd.back()->send(hello());
+    }
+    Joined reader(port());
+    EXPECT_TRUE(reader.see(2));
+    for (std::size_t i = 1; i < crowd.size(); i += 3) crowd[i]->cancel();
+    door.reset();
+    EXPECT_EQ(reader.seeTheEnd().error_code(), grpc::StatusCode::UNAVAILABLE);
+  }
 }
 
 TEST_F(RpcDoorTest, APortInUseSaysWhatToDo) {

@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: MIT
+// A call that a client makes, and what the calls of one door share.
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <memory>
+#include <unordered_set>
+#include <utility>
+
+#include <grpcpp/server_context.h>
+#include <grpcpp/support/status.h>
+
+#include "server/rpc/completion_loop.h"
+
+namespace clothstream::stream {
+class SceneServer;
+}
+
+namespace clothstream::rpc {
+
+class Call;
+
+// The loop's thread alone touches it, but for the loop.
+struct DoorContext {
+  stream::SceneServer& server;
+  const std::shared_ptr<CompletionLoop> loop;
+  const std::size_t maxStreams;
+  std::size_t streams = 0;  // joined, but for those that were refused
+  std::size_t watches = 0;  // of health
+  std::unordered_set<std::shared_ptr<Call>> calls = {};
+  grpc::Status refusal = {};              // of new calls, unless it is OK
+  std::function<void()> onLastCall = {};  // when `calls` has become empty, if set
+
+  void forget(const std::shared_ptr<Call>& call) {
+    calls.erase(call);
+    if (calls.empty() && onLastCall) onLastCall();
+  }
+};
+
+// There is from before a client makes it, so that gRPC has where to put it, until all its operations are
+// done. The loop's thread alone uses it.
+class Call : public std::enable_shared_from_this<Call> {
+ public:
+  virtual ~Call() = default;
+  Call(const Call&) = delete;
+  Call& operator=(const Call&) = delete;
+
+  // The door closes: one that was made ends with this, unless it says more itself.
+  void stop(const grpc::Status& status) {
+    if (isMade_) close(status);
+  }
+
+ protected:
+  explicit Call(DoorContext& door) : door_(door) {}
+
+  // An operation of a call, and what the call does next.
+  template <typename Derived>
+  class Step final : public Operation {
+   public:
+    Step(Derived& call, void (Derived::*next)(bool ok)) : call_(call), next_(next) {}
+    void done(bool ok) override {
+      const std::shared_ptr<Call> self = call_.shared_from_this();
+      --self->underway_;
+      (call_.*next_)(ok);
+      if (self->isOver_ && self->underway_ == 0) self->door_.forget(self);
+    }
+
+   private:
+    Derived& call_;
+    void (Derived::*const next_)(bool ok);
+  };
+
+  virtual void close(const grpc::Status& status) = 0;
+
+  // The tag of an operation that is being begun: `operation` is a member, and lives until it is done.
+  void* begin(Operation& operation) {
+    ++underway_;
+    return &operation;
+  }
+  // A client has made it.
+  void made() { isMade_ = true; }
+  // Nothing will be begun any more.
+  void over() { isOver_ = true; }
+
+  DoorContext& door_;
+  grpc::ServerContext context_;
+
+ private:
+  std::size_t underway_ = 0;
+  bool isMade_ = false, isOver_ = false;
+};
+
+// Waits for the next call of a kind.
+template <typename Kind, typename... Arguments>
+void await(DoorContext& door, Arguments&&... arguments) {
+  const auto call = std::make_shared<Kind>(door, std::forward<Arguments>(arguments)...);
+  door.calls.insert(call);
+  call->await();
+}
+
+}  // namespace clothstream::rpc
