@@ -33,11 +33,14 @@ std::vector<float> coordinatesOf(const scene::Mesh& mesh) {
 
 }  // namespace
 
+std::uint8_t codecOf(const scene::Scene& scene) {
+  return scene.stream.coding == scene::Coding::packed ? codec::kCodecPacked : codec::kCodecHierarchical;
+}
+
 codec::StreamLayout streamLayout(const scene::Scene& scene, std::uint32_t epoch) {
   const bool normals = scene.stream.normals == scene::Normals::octahedral;
-  const bool packed = scene.stream.coding == scene::Coding::packed;
   codec::StreamLayout layout{.epoch = epoch,
-                             .codec = packed ? codec::kCodecPacked : codec::kCodecHierarchical,
+                             .codec = codecOf(scene),
                              .maxError = scene.stream.maxError,
                              .normals = normals ? codec::NormalMode::octahedral : codec::NormalMode::none,
                              .temporalLayers = scene.stream.temporalLayers,

@@ -17,6 +17,9 @@
 
 namespace clothstream::encode {
 
+// Which of codec::kCodecs a scene's stream is in.
+std::uint8_t codecOf(const scene::Scene& scene);
+
 // The layout of a scene's stream.
 codec::StreamLayout streamLayout(const scene::Scene& scene, std::uint32_t epoch);
 

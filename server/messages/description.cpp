@@ -73,6 +73,23 @@ std::size_t geometryBytes(const scene::Cloth& cloth) {
 
 v1::StreamDescription toDescription(const scene::Scene& scene, std::uint32_t epoch, std::uint32_t codec,
                                     double seconds) {
+  v1::StreamDescription description = descriptionWithoutCloths(scene, epoch, codec, seconds);
+  description.mutable_cloths()->Swap(clothsOfDescription(scene).mutable_cloths());
+  return description;
+}
+
+v1::StreamDescription clothsOfDescription(const scene::Scene& scene) {
+  v1::StreamDescription description;
+  for (const scene::Cloth& cloth : scene.cloths) {
+    v1::ClothDescription& message = *description.add_cloths();
+    message.set_name(cloth.name);
+    writeShape(cloth, message);
+  }
+  return description;
+}
+
+v1::StreamDescription descriptionWithoutCloths(const scene::Scene& scene, std::uint32_t epoch,
+                                               std::uint32_t codec, double seconds) {
   v1::StreamDescription description;
   description.set_epoch(epoch);
   description.set_codec(codec);
@@ -83,20 +100,13 @@ v1::StreamDescription toDescription(const scene::Scene& scene, std::uint32_t epo
   description.set_normals(toMessage(scene.stream.normals));
   description.set_temporal_layers(scene.stream.temporalLayers);
   description.set_qualities(scene.stream.qualities);
-  for (const scene::Cloth& cloth : scene.cloths) {
-    v1::ClothDescription& message = *description.add_cloths();
-    message.set_name(cloth.name);
-    writeShape(cloth, message);
-  }
   for (const scene::Collider& collider : scene.colliders) {
     v1::ColliderState& state = *description.add_colliders();
     write(collider, scene::poseAt(collider, seconds), state);
     if (const auto* hull = std::get_if<scene::Hull>(&collider.shape))
       writeHull(**hull, *state.mutable_hull());
   }
-  *description.mutable_definition() = toMessage(scene);
-  for (v1::Cloth& cloth : *description.mutable_definition()->mutable_cloths())
-    if (cloth.has_mesh()) cloth.mutable_mesh()->Clear();
+  *description.mutable_definition() = toMessageWithoutMeshes(scene);
   for (const scene::Material& material : scene::materials())
     description.add_materials(std::string(material.name));
   return description;

@@ -25,6 +25,11 @@ std::size_t geometryBytes(const scene::Cloth& cloth);
 // valid.
 v1::StreamDescription toDescription(const scene::Scene& scene, std::uint32_t epoch, std::uint32_t codec,
                                     double seconds);
+// Its two parts, which one after the other on the wire are the whole: `cloths`, most of its bytes, which stay
+// as they are while the scene runs, and all else.
+v1::StreamDescription clothsOfDescription(const scene::Scene& scene);
+v1::StreamDescription descriptionWithoutCloths(const scene::Scene& scene, std::uint32_t epoch,
+                                               std::uint32_t codec, double seconds);
 
 // A scene as a list shows it; who is in it, and whether it runs, only the caller knows.
 v1::SceneSummary toSummary(const scene::Scene& scene);

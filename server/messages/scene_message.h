@@ -22,6 +22,8 @@ namespace clothstream::messages {
 
 // Every field set, defaults too, meshes in full. toScene() of it gives the scene back.
 v1::Scene toMessage(const scene::Scene& scene);
+// But for the meshes, which are there and empty.
+v1::Scene toMessageWithoutMeshes(const scene::Scene& scene);
 v1::Normals toMessage(scene::Normals normals);
 // What can be changed of environment and cloths, as the message has it. `areas`: m², a cloth; of those that
 // it has no area of, or 0, the areal mass is left out.

@@ -59,7 +59,7 @@ void writeAttachment(const scene::Attachment& attachment, v1::Attachment& messag
 void writeCloth(const scene::Cloth& cloth, v1::Cloth& message) {
   message.set_name(cloth.name);
   if (cloth.mesh)
-    write(*cloth.mesh, *message.mutable_mesh());
+    message.mutable_mesh();
   else
     writeGrid(cloth.grid, *message.mutable_grid());
   message.set_mass(cloth.mass);
@@ -142,6 +142,14 @@ v1::Solver toMessage(const scene::Solver& solver) {
 }
 
 v1::Scene toMessage(const scene::Scene& scene) {
+  v1::Scene message = toMessageWithoutMeshes(scene);
+  for (std::size_t i = 0; i < scene.cloths.size(); ++i)
+    if (const scene::Cloth& cloth = scene.cloths[i]; cloth.mesh)
+      write(*cloth.mesh, *message.mutable_cloths(static_cast<int>(i))->mutable_mesh());
+  return message;
+}
+
+v1::Scene toMessageWithoutMeshes(const scene::Scene& scene) {
   v1::Scene message;
   message.set_name(scene.name);
   message.set_description(scene.description);

@@ -202,7 +202,8 @@ void DeviceThread::startAndStopScenes() {
     const bool ready = run->host && run->host->isReady();
     if ((inUse || run->host || run->whenAdded) && !ready && !run->coming.valid())
       run->coming = preparer_.prepare(*device_, scene.start());
-    const bool wanted = ready && !scene.paused && (runAlways_ || inUse);
+    const bool stopped = scene.paused && !scene.resetWanted && !(ready && run->host->owesFrame());
+    const bool wanted = ready && !stopped && (runAlways_ || inUse);
     if (wanted && !run->running) {
       run->pacer.start(Clock::now());
       run->slow.restart();

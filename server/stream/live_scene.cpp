@@ -21,7 +21,7 @@ static_assert(messages::limits::kMaxTemporalLayers == codec::kMaxTemporalLayers 
 v1::ParameterChange allParameters(const scene::Scene& scene) {
   std::vector<double> areas;
   for (const scene::Cloth& cloth : scene.cloths) areas.push_back(scene::areaOf(cloth));
-  return messages::allParameters(messages::toMessage(scene), areas);
+  return messages::allParameters(messages::toMessageWithoutMeshes(scene), areas);
 }
 
 scene::Scene nameAndRates(std::string name, const v1::StreamDescription& description) {
@@ -30,6 +30,12 @@ scene::Scene nameAndRates(std::string name, const v1::StreamDescription& descrip
   scene.simulationRate = description.simulation_rate();
   scene.streamRate = description.stream_rate();
   return scene;
+}
+
+std::shared_ptr<const std::string> clothsOf(const v1::StreamDescription& description) {
+  v1::StreamDescription cloths;
+  *cloths.mutable_cloths() = description.cloths();
+  return std::make_shared<const std::string>(cloths.SerializeAsString());
 }
 
 }  // namespace
@@ -42,6 +48,7 @@ LiveScene::LiveScene(scene::Scene definition, bool wasCreated, std::shared_ptr<J
       audience(journal),
       roster(audience, inbox, journal.get()),
       start_(std::move(definition)),
+      cloths_(std::make_shared<const std::string>(messages::clothsOfDescription(start_).SerializeAsString())),
       definition_(start_) {}
 
 LiveScene::LiveScene(std::string name, std::shared_ptr<FrameSource> from, std::uint32_t most)
@@ -50,6 +57,7 @@ LiveScene::LiveScene(std::string name, std::shared_ptr<FrameSource> from, std::u
       source(std::move(from)),
       roster(audience, inbox, nullptr),
       start_(nameAndRates(std::move(name), source->description())),
+      cloths_(clothsOf(source->description())),
       definition_(start_) {}
 
 LiveScene::~LiveScene() {
@@ -85,7 +93,7 @@ messages::Result<void> LiveScene::change(std::uint64_t participant, const v1::Pa
 }
 
 std::uint32_t LiveScene::codec() const {
-  return source ? source->description().codec() : encode::streamLayout(start_, kEpoch).codec;
+  return source ? source->description().codec() : encode::codecOf(start_);
 }
 
 StreamShape LiveScene::shape() const {
@@ -129,14 +137,12 @@ std::shared_ptr<const Description> LiveScene::description() {
   if (description_) return description_;
   const double seconds = static_cast<double>(tick.load()) * definition_.tickSeconds();
   v1::StreamDescription message =
-      source ? source->description() : messages::toDescription(definition_, kEpoch, codec(), seconds);
+      source ? source->description()
+             : messages::descriptionWithoutCloths(definition_, kEpoch, codec(), seconds);
   message.set_scene(name());
-
-  v1::StreamDescription geometry;
-  geometry.mutable_cloths()->Swap(message.mutable_cloths());
-  if (!geometry_) geometry_ = std::make_shared<const std::string>(geometry.SerializeAsString());
+  message.clear_cloths();
   return description_ =
-             std::make_shared<const Description>(++contents_, geometry_, message.SerializeAsString());
+             std::make_shared<const Description>(++contents_, cloths_, message.SerializeAsString());
 }
 
 SharedBytes pausedNotice(const LiveScene& scene, std::uint64_t participant) {

@@ -66,7 +66,7 @@ class LiveScene {
   const std::uint32_t maxParticipants;
   const std::shared_ptr<Journal> journal;     // null: none is kept
   const std::shared_ptr<FrameSource> source;  // null: the device's thread
-  std::atomic<bool> paused{false};            // its clock is stopped
+  std::atomic<bool> paused{false};            // its clock is stopped, but for a reset's first frame
   std::atomic<bool> resetWanted{false};       // taken at the next tick
 
   Inbox inbox;
@@ -80,10 +80,10 @@ class LiveScene {
 
  private:
   const scene::Scene start_;
+  const std::shared_ptr<const std::string> cloths_;  // of all descriptions
 
   mutable std::mutex mutex_;
   scene::Scene definition_;
-  std::shared_ptr<const std::string> geometry_;     // of all descriptions; null before the first
   std::shared_ptr<const Description> description_;  // null when the definition has changed since
   std::uint64_t contents_ = 0;                      // ids given
 };

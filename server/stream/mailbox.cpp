@@ -189,13 +189,15 @@ bool Mailbox::acknowledge(std::uint64_t tick, Clock::time_point now) {
   {
     const std::lock_guard lock(mutex_);
     if (tick > newestSent_) return false;
+    if (!sent_.empty() && sent_.front().tick <= tick) leavesOut_ = sent_.front().tick < tick;
     while (!sent_.empty() && sent_.front().tick <= tick) {
       adaptation_.delivered(sent_.front().bytes);
+      // The shortest, but it creeps up (by half in some 200 frames) so that a route that became longer is
+      // noticed.
+      if (roundTrip_) *roundTrip_ *= 1.002;
       if (sent_.front().tick == tick) {
         const double sample = seconds(now - sent_.front().time);
-        // The shortest, but it creeps up (by half in some 200 frames) so that a route that became longer is
-        // noticed.
-        roundTrip_ = roundTrip_ ? std::min(sample, *roundTrip_ * 1.002) : sample;
+        roundTrip_ = roundTrip_ ? std::min(sample, *roundTrip_) : sample;
       }
       sent_.pop_front();
     }
@@ -210,6 +212,7 @@ void Mailbox::restart() {
   const std::lock_guard lock(mutex_);
   dropHeld(0);
   sent_.clear();
+  leavesOut_ = false;
   needsKey_ = true;
 }
 
@@ -281,7 +284,7 @@ std::optional<SharedBytes> Mailbox::take(Clock::time_point now) {
 
 std::size_t Mailbox::window() const {
   const int leftOut = shape_.layers - adaptation_.point().layers;
-  const double inFlight = std::ceil(roundTrip_.value_or(0) * (shape_.rate >> leftOut));
+  const double inFlight = std::ceil(roundTrip_.value_or(0) * (shape_.rate >> leftOut)) + (leavesOut_ ? 1 : 0);
   return kMinWindow + static_cast<std::size_t>(std::min(inFlight, double{kMaxWindow - kMinWindow}));
 }
 

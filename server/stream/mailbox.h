@@ -61,9 +61,10 @@ struct FrameWishes {
 // one message that is larger), kMaxHeld frames of kMaxHeldBytes in all (or one that is larger) and one
 // description, the latter two shared with the other subscribers.
 //
-// Room for frames: at most window() of them are out and not acknowledged. It is two, and on long round trips
-// as many more as it is sent in one; the round trip is the shortest of late from a frame's leaving to
-// its acknowledgement, so that a queue on the way, which makes it longer, does not feed itself.
+// Room for frames: at most window() of them are out and not acknowledged. It is two, one more for a
+// subscriber that acknowledges several at once, and on long round trips as many more as it is sent in one;
+// the round trip is the shortest of late from a frame's leaving to its acknowledgement, so that a queue on
+// the way, which makes it longer, does not feed itself.
 //
 // A predicted frame is given only where the frame that it refers to was. A subscriber without room has up to
 // kMaxHeld frames held back; if it falls behind more, those of the highest layer go first, for no other layer
@@ -170,6 +171,7 @@ class Mailbox {
   std::size_t heldBytes_ = 0;
   std::deque<Sent> sent_;  // and not acknowledged
   std::uint64_t newestSent_ = 0;
+  bool leavesOut_ = false;           // the newest acknowledgement was of more than one frame
   std::optional<double> roundTrip_;  // s
 
   std::mutex wakeMutex_;

@@ -72,7 +72,10 @@ void SceneHost::begin(Clock::time_point now) {
   if (keepsState_) on.simulation.recordCheckpoint(on.recorder);
   on.simulation.recordTick(on.recorder, tickInputs_);
   hasFrame_ = (tick_ + 1) % ticksAFrame_ == 0;
-  if (hasFrame_) recordFrame(now);
+  if (hasFrame_) {
+    owesFrame_ = false;
+    recordFrame(now);
+  }
   savesState_ = sinceHealthy_ > 0 && every(kSnapshotSeconds);
   if (savesState_) on.simulation.recordSaveState(on.recorder);
   submitted_ = on.device.submit(on.recorder);
@@ -107,6 +110,7 @@ void SceneHost::watchJournal() {
 
 void SceneHost::reset() {
   recovery_ = Recovery::reset;
+  owesFrame_ = true;
   sinceHealthy_ = 0;
   newestState_ = onDevice_->start;
   newestState_.tick = tick_;

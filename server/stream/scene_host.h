@@ -72,6 +72,8 @@ class SceneHost {
   // Of the newest complete tick.
   std::uint64_t tick() const { return tick_; }
   simulation::TickStatus status() const { return status_; }
+  // The cloths went back to where they start, and no frame was due since.
+  bool owesFrame() const { return owesFrame_; }
 
  private:
   // The cloths go back to where they start.
@@ -136,7 +138,8 @@ class SceneHost {
   std::array<Clock::time_point, codec::kMaxQualities> lastKeyFrame_{};
   std::uint32_t sinceKeyFrame_ = 0;  // frames of the finest quality
   vulkan::TimelineValue submitted_ = 0;
-  bool hasFrame_ = false;         // the tick in hand
+  bool hasFrame_ = false;  // the tick in hand
+  bool owesFrame_ = false;
   std::uint64_t nextReport_ = 0;  // tick
   CompleteFrame frame_;
 

@@ -54,12 +54,14 @@ void SceneMaker::create(v1::CreateSceneRequest request, std::optional<UploadedCo
         refused(v1::ERROR_CODE_RESOURCE_EXHAUSTED,
                 fmt::format("createScene: {} scenes wait to be made; try again later", kMostWaiting)));
   }
-  boost::asio::post(
-      thread_, [this, request = std::move(request), uploaded = std::move(uploaded), done = std::move(done)] {
-        --waiting_;
-        static const std::string nothing;
-        done(attempt("createScene", [&] { return make(request, uploaded ? uploaded->bytes : nothing); }));
-      });
+  boost::asio::post(thread_, [this, request = std::move(request), uploaded = std::move(uploaded),
+                              done = std::move(done)]() mutable {
+    --waiting_;
+    static const std::string nothing;
+    auto made = attempt("createScene", [&] { return make(request, uploaded ? uploaded->bytes : nothing); });
+    uploaded.reset();  // who hears the answer may upload again at once
+    done(std::move(made));
+  });
 }
 
 void SceneMaker::remove(v1::DeleteSceneRequest request, DeleteDone done) {
