@@ -44,7 +44,7 @@ class DecodedFrames : public ::testing::TestWithParam<codec::NormalMode> {};
 TEST_P(DecodedFrames, AreWithinThePromisedErrorAndAcknowledged) {
   Joined joined({.normals = GetParam(), .cloths = {{"a", 9, 7}, {"b", 4, 5}}});
   for (std::uint64_t tick = 1; tick <= 20; ++tick) {
-    ASSERT_EQ(joined.client.receive(joined.server.frame(tick), tick * 14 * kMs), kFrame);
+    ASSERT_EQ(joined.client.receive(joined.server.frame(tick), tick * 28 * kMs), kFrame);
     EXPECT_THAT(joined.acks(), ElementsAre(tick));
     const std::vector<float>& sent = joined.server.positions();
     const float* decoded = cs_positions(joined.client.get());
@@ -115,6 +115,35 @@ TEST(Frames, KeepTheHullsOfTheDescription) {
             (std::vector<std::uint32_t>{0, 1, 2, 0, 2, 3, 3, 2, 1, 3, 1, 0}));
   EXPECT_EQ(cs_get_hull(joined.client.get(), 0, &vertices, &triangles, &indices), nullptr);
   EXPECT_EQ(vertices, 0u);
+}
+
+TEST(Frames, OfAFastStreamEverySecondIsAcknowledged) {
+  Joined joined;
+  std::vector<std::uint64_t> ticks;
+  for (std::uint64_t tick = 1; tick <= 6; ++tick) {
+    joined.client.receive(joined.server.frame(tick), tick * 14 * kMs);
+    for (const std::uint64_t acknowledged : joined.acks()) ticks.push_back(acknowledged);
+  }
+  EXPECT_THAT(ticks, ElementsAre(1, 3, 5));
+}
+
+TEST(Frames, OfASlowStreamEachIsAcknowledged) {
+  Joined joined;
+  for (std::uint64_t tick = 1; tick <= 4; ++tick) {
+    joined.client.receive(joined.server.frame(tick), tick * 28 * kMs);
+    EXPECT_THAT(joined.acks(), ElementsAre(tick));
+  }
+}
+
+// Else a server with room for two would wait for an acknowledgement, and the client for a frame.
+TEST(Frames, OfManyThatComeAtOnceNoTwoInARowAreLeftOut) {
+  Joined joined;
+  std::vector<std::uint64_t> ticks;
+  for (std::uint64_t tick = 1; tick <= 6; ++tick) {
+    joined.client.receive(joined.server.frame(tick), kMs);
+    for (const std::uint64_t acknowledged : joined.acks()) ticks.push_back(acknowledged);
+  }
+  EXPECT_THAT(ticks, ElementsAre(1, 3, 5));
 }
 
 TEST(Frames, OnlyTheNewestIsAcknowledgedWhereTheTransportIsBehind) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Colliders and parameters on their way to the server, and changes, notices and scenes on their way back.
+// Parameters and settings on their way to the server; changes, reports, notices and scenes on their way back.
 #include <cmath>
 #include <limits>
 
@@ -7,219 +7,13 @@
 #include <google/protobuf/unknown_field_set.h>
 #include <gtest/gtest.h>
 
-#include "clients/core/outbox.h"
 #include "tests/core/scripted_server.h"
 
 namespace clothstream::client {
 namespace {
 
-constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
-
 using ::testing::HasSubstr;
 using ::testing::SizeIs;
-
-struct JoinedClient {
-  JoinedClient() { client.join(ScriptedServer()); }
-  v1::ClientMessage sent() {
-    const auto messages = client.outgoing();
-    EXPECT_THAT(messages, SizeIs(1));
-    return messages.empty() ? v1::ClientMessage() : messages[0];
-  }
-  ClientUnderTest client;
-};
-
-TEST(Colliders, TravelWithTheTimeTheyWereTrue) {
-  JoinedClient joined;
-  const float spheres[] = {1, 2, 3, 0.1f, 4, 5, 6, 0.2f};
-  cs_set_colliders(joined.client.get(), spheres, 2, 777);
-  const v1::ColliderPoses poses = joined.sent().collider_poses();
-  EXPECT_EQ(poses.client_time_us(), 777u);
-  ASSERT_THAT(poses.colliders(), SizeIs(2));
-  EXPECT_NE(poses.colliders(0).id(), poses.colliders(1).id());
-  EXPECT_EQ(poses.colliders(1).pose().position().y(), 5);
-  EXPECT_EQ(poses.colliders(1).sphere().radius(), 0.2f);
-}
-
-TEST(Colliders, TravelWithTheServersTimeOnceItIsKnown) {
-  JoinedClient joined;
-  const float sphere[] = {1, 2, 3, 0.1f};
-  cs_set_colliders(joined.client.get(), sphere, 1, 5000);
-  EXPECT_EQ(joined.sent().collider_poses().server_time_us(), 0u);
-  cs_update(joined.client.get(), 10'000);
-  ASSERT_TRUE(joined.sent().has_ping());
-  // 8 ms there and back: the server's clock was at 1'000'000 when the client's was at 14'000.
-  joined.client.receive(ScriptedServer::pong(10'000, 1'000'000), 18'000);
-  cs_set_colliders(joined.client.get(), sphere, 1, 24'000);
-  EXPECT_EQ(joined.sent().collider_poses().server_time_us(), 1'010'000u);
-  EXPECT_EQ(joined.client.statistics(24'000).clock_offset_us, 986'000);
-}
-
-TEST(Colliders, HandsTravelAsTheirJoints) {
-  JoinedClient joined;
-  std::vector<float> joints(std::size_t{4} * CS_HAND_JOINTS);
-  for (std::size_t i = 0; i < joints.size(); ++i) joints[i] = static_cast<float>(i);
-  EXPECT_EQ(cs_set_hand(joined.client.get(), CS_HAND_RIGHT, joints.data(), CS_HAND_JOINTS, 5), 1);
-  const v1::ColliderPoses poses = joined.sent().collider_poses();
-  ASSERT_THAT(poses.hands(), SizeIs(1));
-  EXPECT_EQ(poses.hands(0).side(), v1::HAND_SIDE_RIGHT);
-  ASSERT_THAT(poses.hands(0).positions(), SizeIs(78));
-  ASSERT_THAT(poses.hands(0).radii(), SizeIs(26));
-  EXPECT_EQ(poses.hands(0).positions(4), 5);  // y of the wrist
-  EXPECT_EQ(poses.hands(0).radii(25), 103);
-  // As WebXR has them; the other hand stays.
-  EXPECT_EQ(cs_set_hand(joined.client.get(), CS_HAND_LEFT, joints.data(), CS_HAND_JOINTS - 1, 6), 1);
-  const v1::ColliderPoses both = joined.sent().collider_poses();
-  ASSERT_THAT(both.hands(), SizeIs(2));
-  EXPECT_EQ(both.hands(0).side(), v1::HAND_SIDE_LEFT);
-  EXPECT_THAT(both.hands(0).radii(), SizeIs(25));
-  // Sixty colliders are what a server takes: forty of them are these hands'.
-  const std::vector<float> spheres(4 * CS_MAX_COLLIDERS, 0.5f);
-  cs_set_colliders(joined.client.get(), spheres.data(), CS_MAX_COLLIDERS, 6);
-  EXPECT_THAT(joined.sent().collider_poses().colliders(), SizeIs(20));
-  EXPECT_EQ(cs_set_hand(joined.client.get(), CS_HAND_RIGHT, nullptr, 0, 7), 1);
-  const v1::ColliderPoses one = joined.sent().collider_poses();
-  EXPECT_THAT(one.hands(), SizeIs(1));
-  EXPECT_THAT(one.colliders(), SizeIs(CS_MAX_COLLIDERS));
-  EXPECT_EQ(cs_set_hand(joined.client.get(), 3, joints.data(), CS_HAND_JOINTS, 8), 0);
-  EXPECT_EQ(cs_set_hand(joined.client.get(), CS_HAND_LEFT, joints.data(), 20, 8), 0);
-}
-
-TEST(Colliders, TravelWithTheirShapeAndTurn) {
-  JoinedClient joined;
-  const cs_own_collider own[] = {{.shape = CS_SHAPE_CAPSULE,
-                                  .position = {1, 2, 3},
-                                  .orientation = {0, 0.6f, 0, 0.8f},
-                                  .radius = 0.01f,
-                                  .length = 0.03f,
-                                  .size = {}},
-                                 {.shape = CS_SHAPE_BOX,
-                                  .position = {},
-                                  .orientation = {},
-                                  .radius = 0,
-                                  .length = 0,
-                                  .size = {0.1f, 0.2f, 0.3f}}};
-  cs_set_shapes(joined.client.get(), own, 2, 5);
-  const v1::ColliderPoses poses = joined.sent().collider_poses();
-  ASSERT_THAT(poses.colliders(), SizeIs(2));
-  EXPECT_EQ(poses.colliders(0).capsule().radius(), 0.01f);
-  EXPECT_EQ(poses.colliders(0).capsule().length(), 0.03f);
-  EXPECT_EQ(poses.colliders(0).pose().orientation().w(), 0.8f);
-  EXPECT_EQ(poses.colliders(1).box().size().z(), 0.3f);
-  EXPECT_FALSE(poses.colliders(1).pose().has_orientation());
-}
-
-TEST(Colliders, OnlyTheNewestTravelWhereTheTransportIsBehindAndNoneMeansNone) {
-  JoinedClient joined;
-  const float sphere[] = {1, 2, 3, 0.1f};
-  cs_set_colliders(joined.client.get(), sphere, 1, 1);
-  cs_set_colliders(joined.client.get(), nullptr, 0, 2);
-  const v1::ClientMessage message = joined.sent();
-  ASSERT_TRUE(message.has_collider_poses());
-  EXPECT_EQ(message.collider_poses().client_time_us(), 2u);
-  EXPECT_THAT(message.collider_poses().colliders(), SizeIs(0));
-}
-
-TEST(Grabs, TravelBesideTheCollidersWithWhatIsNotTheDefault) {
-  JoinedClient joined;
-  const float sphere[] = {1, 2, 3, 0.1f};
-  cs_set_colliders(joined.client.get(), sphere, 1, 1);
-  cs_grab grab{.id = 7,
-               .position = {1, 2, 3},
-               .orientation = {},
-               .radius = kNan,
-               .reach = 0.5f,
-               .max_force = kNan,
-               .slip_distance = kNan};
-  cs_set_grabs(joined.client.get(), &grab, 1, 2);
-  const v1::ColliderPoses both = joined.sent().collider_poses();
-  EXPECT_THAT(both.colliders(), SizeIs(1));
-  ASSERT_THAT(both.grabs(), SizeIs(1));
-  EXPECT_EQ(both.grabs(0).id(), 7u);
-  EXPECT_EQ(both.grabs(0).pose().position().z(), 3);
-  EXPECT_FALSE(both.grabs(0).pose().has_orientation());
-  EXPECT_FALSE(both.grabs(0).has_radius());
-  EXPECT_EQ(both.grabs(0).reach(), 0.5f);
-  EXPECT_FALSE(both.grabs(0).has_max_force());
-  EXPECT_FALSE(both.grabs(0).has_slip_distance());
-  // Colliders that move do not let go.
-  cs_set_colliders(joined.client.get(), sphere, 1, 3);
-  EXPECT_THAT(joined.sent().collider_poses().grabs(), SizeIs(1));
-  cs_set_grabs(joined.client.get(), nullptr, 0, 4);
-  EXPECT_THAT(joined.sent().collider_poses().grabs(), SizeIs(0));
-}
-
-TEST(Grabs, WhatBecomesOfThemIsTold) {
-  JoinedClient joined;
-  v1::ServerMessage message;
-  message.mutable_tick_events()->set_tick(9);
-  v1::GrabEvent& event = *message.mutable_tick_events()->add_grabs();
-  event.set_participant_id(5);
-  event.set_grab_id(2);
-  event.set_kind(v1::GRAB_EVENT_KIND_SLIPPED);
-  event.set_vertices(11);
-  EXPECT_EQ(joined.client.receive(message.SerializeAsString()), static_cast<std::uint32_t>(CS_EVENT_GRABS));
-  ASSERT_EQ(cs_grab_event_count(joined.client.get()), 1u);
-  cs_grab_event told;
-  ASSERT_EQ(cs_get_grab_event(joined.client.get(), 0, &told), 1);
-  EXPECT_EQ(told.participant_id, 5u);
-  EXPECT_EQ(told.grab_id, 2u);
-  EXPECT_EQ(told.kind, static_cast<std::uint32_t>(CS_GRAB_SLIPPED));
-  EXPECT_EQ(told.vertices, 11u);
-  EXPECT_EQ(cs_get_grab_event(joined.client.get(), 1, &told), 0);
-}
-
-TEST(Contacts, AreWantedAndTold) {
-  JoinedClient joined;
-  cs_want_contacts(joined.client.get(), 1, 1);
-  EXPECT_TRUE(joined.sent().collider_poses().contact_events());
-  v1::ServerMessage message;
-  v1::ContactEvent& event = *message.mutable_tick_events()->add_contacts();
-  event.set_kind(v1::CONTACT_EVENT_KIND_ENDED);
-  event.set_participant_id(5);
-  event.set_collider_id(2);
-  event.set_cloth("sheet");
-  event.set_impulse(0.25f);
-  event.set_seconds(1.5f);
-  EXPECT_EQ(joined.client.receive(message.SerializeAsString()),
-            static_cast<std::uint32_t>(CS_EVENT_CONTACTS));
-  ASSERT_EQ(cs_contact_event_count(joined.client.get()), 1u);
-  cs_contact_event told;
-  ASSERT_EQ(cs_get_contact_event(joined.client.get(), 0, &told), 1);
-  EXPECT_EQ(told.kind, static_cast<std::uint32_t>(CS_CONTACT_ENDED));
-  EXPECT_EQ(told.participant_id, 5u);
-  EXPECT_EQ(told.collider_id, 2u);
-  EXPECT_STREQ(told.collider, "");
-  EXPECT_STREQ(told.cloth, "sheet");
-  EXPECT_EQ(told.impulse, 0.25f);
-  EXPECT_EQ(told.seconds, 1.5f);
-  EXPECT_EQ(cs_get_contact_event(joined.client.get(), 1, &told), 0);
-  event.set_impulse(kNan);
-  joined.client.receive(message.SerializeAsString());
-  EXPECT_EQ(cs_get_state(joined.client.get()), CS_STATE_FAILED);
-}
-
-TEST(Attachments, AreMovedOnceEachToWhereTheyWereLastPut) {
-  JoinedClient joined;
-  const float first[] = {1, 0, 0}, second[] = {2, 0, 0}, turned[] = {0, 0, 0, 1};
-  cs_move_attachment(joined.client.get(), "rod", first, nullptr, 1);
-  cs_move_attachment(joined.client.get(), "knot", first, nullptr, 1);
-  cs_move_attachment(joined.client.get(), "rod", second, turned, 1);
-  const v1::ColliderPoses poses = joined.sent().collider_poses();
-  ASSERT_THAT(poses.attachments(), SizeIs(2));
-  EXPECT_EQ(poses.attachments(0).name(), "rod");
-  EXPECT_EQ(poses.attachments(0).pose().position().x(), 2);
-  EXPECT_EQ(poses.attachments(0).pose().orientation().w(), 1);
-  EXPECT_EQ(poses.attachments(1).name(), "knot");
-  cs_set_colliders(joined.client.get(), nullptr, 0, 2);
-  EXPECT_THAT(joined.sent().collider_poses().attachments(), SizeIs(0));
-}
-
-TEST(Colliders, MoreThanAllowedAreLeftOut) {
-  JoinedClient joined;
-  const std::vector<float> spheres(4 * 50, 1.0f);
-  cs_set_colliders(joined.client.get(), spheres.data(), 50, 1);
-  EXPECT_THAT(joined.sent().collider_poses().colliders(), SizeIs(CS_MAX_COLLIDERS));
-}
 
 TEST(Parameters, OnlyWhatIsGivenIsChanged) {
   JoinedClient joined;
@@ -588,17 +382,6 @@ TEST(Scenes, CanBeAskedForInsideTheStream) {
   ASSERT_EQ(cs_scene_count(joined.client.get()), 2u);
   EXPECT_STREQ(cs_scene(joined.client.get(), 1), "flag");
   EXPECT_STREQ(cs_scene(joined.client.get(), 2), "");
-}
-
-TEST(Outgoing, ATransportThatTakesNothingEndsTheClientInsteadOfItsMemory) {
-  ClientUnderTest client;
-  client.join(ScriptedServer());
-  for (std::size_t i = 0; i <= Outbox::kMaxControl; ++i) cs_list_scenes(client.get());
-  EXPECT_EQ(cs_get_state(client.get()), CS_STATE_FAILED);
-  EXPECT_THAT(cs_error_text(client.get()), HasSubstr("takes no messages"));
-  std::size_t bytes = 1;
-  EXPECT_EQ(cs_next_outgoing(client.get(), &bytes), nullptr);
-  EXPECT_EQ(bytes, 0u);
 }
 
 }  // namespace

@@ -8,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include <gtest/gtest.h>
+
 #include "clients/core/core.h"
 #include "clothstream/v1/session.pb.h"
 #include "proto/codec/encoder.h"
@@ -83,6 +85,18 @@ class ClientUnderTest {
 
  private:
   std::unique_ptr<cs_client, decltype(&cs_destroy)> client_;
+};
+
+// One that joined, and has nothing more to say.
+struct JoinedClient {
+  JoinedClient() { client.join(ScriptedServer()); }
+  // The one message that it has to say now.
+  v1::ClientMessage sent() {
+    const auto messages = client.outgoing();
+    EXPECT_EQ(messages.size(), 1u);
+    return messages.empty() ? v1::ClientMessage() : messages[0];
+  }
+  ClientUnderTest client;
 };
 
 }  // namespace clothstream::client

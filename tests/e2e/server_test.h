@@ -5,6 +5,7 @@
 #include <chrono>
 #include <csignal>
 #include <functional>
+#include <iostream>
 #include <memory>
 #include <string>
 #include <thread>
@@ -57,7 +58,9 @@ class ServerTest : public ::testing::Test {
     EXPECT_THAT(server_->errors(), ::testing::Not(::testing::HasSubstr("Validation")));
   }
   void TearDown() override {
-    if (server_) stopServer();
+    if (!server_) return;
+    stopServer();
+    if (HasFailure()) std::cerr << "The server said:\n" << server_->output() << server_->errors();
   }
 
   static std::uint16_t portIn(const std::string& address) {

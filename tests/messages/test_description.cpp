@@ -41,6 +41,15 @@ TEST(ToDescription, TellsAllThatADecoderNeeds) {
   EXPECT_TRUE(toScene(description.definition()));
 }
 
+TEST(ToDescription, IsItsTwoPartsOneAfterTheOther) {
+  const scene::Scene scene = *toScene(sceneWithHull());
+  v1::StreamDescription parsed;
+  ASSERT_TRUE(parsed.ParseFromString(clothsOfDescription(scene).SerializeAsString() +
+                                     descriptionWithoutCloths(scene, 3, 2, 0.5).SerializeAsString()));
+  EXPECT_EQ(parsed.SerializeAsString(), toDescription(scene, 3, 2, 0.5).SerializeAsString());
+  EXPECT_EQ(parsed.cloths_size(), 1);
+}
+
 TEST(ToSummary, CountsVerticesAndCloths) {
   const v1::SceneSummary summary = toSummary(*toScene(smallScene()));
   EXPECT_EQ(summary.name(), "small");

@@ -139,6 +139,35 @@ TEST_F(MailboxTest, WidensItsWindowByTheRoundTripAndNoFarther) {
   EXPECT_EQ(inFlight().size(), Mailbox::kMinWindow + 4);
 }
 
+// Its acknowledgements come a frame later than those of who acknowledges each.
+TEST_F(MailboxTest, HasRoomForOneMoreOfWhoAcknowledgesEverySecond) {
+  join();
+  std::uint64_t tick = 0;
+  const auto inFlight = [&] {
+    std::size_t sent = 0;
+    for (int i = 0; i < 10; ++i) {
+      mailbox.deliver(frame(++tick, i == 0));
+      if (mailbox.next(now)) ++sent;
+    }
+    return sent;
+  };
+  const auto afterRoundTrips = [&](std::uint64_t framesEach) {
+    mailbox.restart();
+    for (int i = 0; i < 4; ++i) {
+      for (std::uint64_t frames = 0; frames < framesEach; ++frames) {
+        mailbox.deliver(frame(++tick, i == 0 && frames == 0));
+        EXPECT_TRUE(mailbox.next(now));
+      }
+      now += milliseconds(1);
+      EXPECT_TRUE(mailbox.acknowledge(tick, now));
+    }
+    return inFlight();
+  };
+  EXPECT_EQ(afterRoundTrips(1), Mailbox::kMinWindow + 1);  // 1 ms is less than a frame
+  EXPECT_EQ(afterRoundTrips(2), Mailbox::kMinWindow + 2);
+  EXPECT_EQ(afterRoundTrips(1), Mailbox::kMinWindow + 1);
+}
+
 TEST_F(MailboxTest, NeverHasMoreThanTheLargestWindowInFlight) {
   join();
   mailbox.deliver(frame(1, true));

@@ -6,7 +6,6 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
-#include <memory>
 #include <string>
 #include <vector>
 
@@ -15,11 +14,8 @@
 #include <nlohmann/json.hpp>
 #include <unistd.h>
 
-#include "proto/codec/decoder.h"
-#include "server/messages/scene_message.h"
 #include "server/step/step.h"
-#include "tests/stream/small_scene.h"
-#include "tests/vulkan/gpu_test.h"
+#include "tests/stream/hosted_scene.h"
 
 namespace clothstream::stream {
 namespace {
@@ -27,274 +23,11 @@ namespace {
 using scene::Vec3;
 using tests::gravity;
 using tests::handAt;
+using tests::HostedScene;
 using tests::smallScene;
 using tests::wind;
 
-// One scene on the shared device, with a subscriber that reads everything.
-class HostedScene {
- public:
-  explicit HostedScene(scene::Scene scene = smallScene(), std::size_t subscribers = 1)
-      : live(std::move(scene)),
-        packer(encode::FrameEncoder::kSlots, [] {}),
-        host(tests::device(), live, packer) {
-    for (std::size_t i = 0; i < subscribers; ++i) {
-      mailboxes.push_back(std::make_shared<Mailbox>([] {}));
-      EXPECT_EQ(live.audience.join(mailboxes.back(), 100), Audience::Joining::joined);
-      mailboxes.back()->subscribe(live.description(), live.shape(), live.metrics);
-      while (mailboxes.back()->next(now)) {
-      }
-    }
-    decoder = codec::Decoder::make(encode::streamLayout(live.start(), LiveScene::kEpoch));
-  }
-  ~HostedScene() { packer.drain(); }
-
-  // One tick, its frame packed and read by all.
-  void tick() {
-    now += std::chrono::seconds(1);  // so that no key frame has to wait
-    host.begin(now);
-    host.finish();
-    packer.drain();
-    for (const auto& mailbox : mailboxes)
-      while (const auto message = mailbox->next(now)) {
-        v1::ServerMessage parsed;
-        ASSERT_TRUE(parsed.ParseFromArray((*message)->data(), static_cast<int>((*message)->size())));
-        if (parsed.has_frame()) {
-          if (mailbox == mailboxes.front()) see(parsed.frame());
-          ASSERT_TRUE(mailbox->acknowledge(host.tick(), now));
-        } else if (mailbox == mailboxes.front()) {
-          told.push_back(parsed);
-        }
-      }
-  }
-  void ticks(int count) {
-    for (int i = 0; i < count; ++i) tick();
-  }
-
-  void change(scene::ParameterChange change) {
-    ASSERT_TRUE(live.inbox.postChange({.participant = 5, .change = std::move(change)}));
-  }
-
-  LiveScene live;
-  FramePacker packer;
-  SceneHost host;
-  std::vector<std::shared_ptr<Mailbox>> mailboxes;
-  std::unique_ptr<codec::Decoder> decoder;
-  Clock::time_point now = Clock::now();
-  std::vector<v1::Frame> frames;
-  std::vector<bool> keys;
-  std::vector<v1::ServerMessage> told;
-
- private:
-  void see(const v1::Frame& frame) {
-    const auto packet = std::as_bytes(std::span(frame.packet()));
-    ASSERT_EQ(decoder->decode(packet), codec::DecodeResult::ok);
-    EXPECT_EQ(decoder->reconstructionHash(), frame.reconstruction_hash());
-    frames.push_back(frame);
-    keys.push_back(codec::parsePacket(packet)->header.kind == codec::PacketKind::key);
-  }
-};
-
 class SceneHostTest : public tests::GpuTest {};
-
-std::vector<std::uint64_t> stateHashes(const HostedScene& hosted) {
-  std::vector<std::uint64_t> hashes;
-  for (const v1::Frame& frame : hosted.frames) hashes.push_back(frame.state_hash());
-  return hashes;
-}
-
-TEST_F(SceneHostTest, StreamsAFrameATickBeginningWithAKeyFrame) {
-  HostedScene hosted;
-  hosted.ticks(20);
-  ASSERT_EQ(hosted.frames.size(), 20u);
-  EXPECT_TRUE(hosted.keys.front());
-  EXPECT_EQ(std::count(hosted.keys.begin(), hosted.keys.end(), true), 1);
-  EXPECT_EQ(hosted.decoder->tick(), 20u);
-  EXPECT_EQ(hosted.live.metrics.frames.value(), 20u);
-  EXPECT_EQ(hosted.live.metrics.keyFrames.value(), 1u);
-  EXPECT_EQ(hosted.live.metrics.ticks.value(), 20u);
-}
-
-// Another subscriber of a hosted scene, which wants a quality of its own.
-class QualitySubscriber {
- public:
-  QualitySubscriber(HostedScene& hosted, std::uint8_t quality)
-      : hosted_(hosted),
-        decoder_(codec::Decoder::make(encode::streamLayout(hosted.live.start(), LiveScene::kEpoch))) {
-    EXPECT_EQ(hosted.live.audience.join(mailbox_, 100), Audience::Joining::joined);
-    mailbox_->subscribe(nullptr, hosted.live.shape(), hosted.live.metrics, {quality, 1});
-    read();
-  }
-  ~QualitySubscriber() { hosted_.live.audience.leave(*mailbox_); }
-
-  // Decodes what came, and compares it with what the server holds.
-  void read() {
-    while (const auto message = mailbox_->next(hosted_.now)) {
-      v1::ServerMessage parsed;
-      ASSERT_TRUE(parsed.ParseFromArray((*message)->data(), static_cast<int>((*message)->size())));
-      if (!parsed.has_frame()) continue;
-      const auto packet = std::as_bytes(std::span(parsed.frame().packet()));
-      ASSERT_EQ(decoder_->decode(packet), codec::DecodeResult::ok);
-      EXPECT_EQ(decoder_->reconstructionHash(), parsed.frame().reconstruction_hash());
-      qualities.push_back(codec::parsePacket(packet)->header.quality);
-      stateHashes.push_back(parsed.frame().state_hash());
-      ASSERT_TRUE(mailbox_->acknowledge(decoder_->tick(), hosted_.now));
-    }
-  }
-
-  std::uint64_t tick() const { return decoder_->tick(); }
-
-  std::vector<std::uint8_t> qualities;  // of the frames that came
-  std::vector<std::uint64_t> stateHashes;
-
- private:
-  HostedScene& hosted_;
-  std::shared_ptr<Mailbox> mailbox_ = std::make_shared<Mailbox>([] {});
-  std::unique_ptr<codec::Decoder> decoder_;
-};
-
-TEST_F(SceneHostTest, EncodesEachQualityThatSomebodyGetsOnce) {
-  scene::Scene scene = smallScene();
-  scene.stream.qualities = 3;
-  HostedScene hosted(std::move(scene));
-  const auto packets = [&] { return hosted.live.metrics.frames.value(); };
-  hosted.ticks(5);
-  EXPECT_EQ(packets(), 5u);
-  {
-    QualitySubscriber first(hosted, 1), second(hosted, 1);
-    // Its encoder is made meanwhile.
-    for (const auto end = Clock::now() + std::chrono::seconds(60);
-         first.qualities.empty() && Clock::now() < end;) {
-      hosted.tick();
-      first.read();
-      second.read();
-    }
-    const std::uint64_t before = packets();
-    const std::size_t seen = first.qualities.size();
-    for (int i = 0; i < 10; ++i) {
-      hosted.tick();
-      first.read();
-      second.read();
-    }
-    EXPECT_EQ(packets() - before, 20u);
-    EXPECT_EQ(first.qualities.size() - seen, 10u);
-    EXPECT_EQ(second.qualities, first.qualities);
-    EXPECT_EQ(std::ranges::count(first.qualities, 1), static_cast<std::ptrdiff_t>(first.qualities.size()));
-  }
-  const std::uint64_t before = packets();
-  hosted.ticks(5);
-  EXPECT_EQ(packets() - before, 5u);
-  EXPECT_EQ(std::count(hosted.keys.begin(), hosted.keys.end(), true), 1);
-}
-
-TEST_F(SceneHostTest, WhereNobodyGetsTheFinestQualityItIsNotEncoded) {
-  scene::Scene scene = smallScene();
-  scene.stream.qualities = 2;
-  HostedScene hosted(std::move(scene), 0);
-  QualitySubscriber only(hosted, 1);
-  for (const auto end = Clock::now() + std::chrono::seconds(60);
-       only.qualities.size() < 10 && Clock::now() < end;) {
-    hosted.tick();
-    only.read();
-  }
-  EXPECT_EQ(hosted.live.metrics.frames.value(), only.qualities.size());
-  EXPECT_EQ(only.qualities, std::vector<std::uint8_t>(10, 1));
-}
-
-TEST_F(SceneHostTest, WhoJoinsWhileTheClockStandsIsShownTheNewestTickAndNothingElseChanges) {
-  scene::Scene scene = smallScene();
-  scene.stream.qualities = 2;
-  HostedScene through(scene), hosted(scene);
-  through.ticks(30);
-  hosted.ticks(20);
-  const auto show = [&] {
-    hosted.now += std::chrono::seconds(1);
-    hosted.host.show(hosted.now);
-    hosted.packer.drain();
-  };
-  hosted.mailboxes[0]->wantKeyFrame();  // and does without it: nobody lacks anything
-  show();
-  EXPECT_EQ(hosted.live.metrics.frames.value(), 20u);
-  {
-    QualitySubscriber late(hosted, 0), coarse(hosted, 1);
-    for (const auto end = Clock::now() + std::chrono::seconds(60);
-         coarse.qualities.empty() && Clock::now() < end;) {
-      show();  // the coarser quality's encoder is made meanwhile
-      late.read();
-      coarse.read();
-    }
-    for (const QualitySubscriber* one : {&late, &coarse}) {
-      EXPECT_EQ(one->tick(), 20u);
-      EXPECT_EQ(one->stateHashes, std::vector{through.frames[19].state_hash()});
-    }
-    EXPECT_EQ(coarse.qualities, std::vector<std::uint8_t>{1});
-    show();
-    EXPECT_EQ(hosted.live.metrics.frames.value(), 22u);
-    EXPECT_EQ(hosted.live.metrics.ticks.value(), 20u);
-    EXPECT_EQ(hosted.mailboxes[0]->next(hosted.now), std::nullopt);
-    for (int i = 0; i < 10; ++i) {
-      hosted.tick();
-      late.read();
-      coarse.read();
-    }
-    EXPECT_EQ(late.tick(), 30u);
-    EXPECT_EQ(late.stateHashes.size(), 11u);
-    EXPECT_EQ(coarse.stateHashes, late.stateHashes);
-  }
-  EXPECT_EQ(stateHashes(hosted), stateHashes(through));
-}
-
-TEST_F(SceneHostTest, WhatStandsBeforeItsFirstTickIsShownFromItsStart) {
-  HostedScene hosted(smallScene());
-  hosted.host.show(hosted.now);
-  hosted.packer.drain();
-  const auto message = hosted.mailboxes[0]->next(hosted.now);
-  ASSERT_TRUE(message);
-  v1::ServerMessage parsed;
-  ASSERT_TRUE(parsed.ParseFromArray((*message)->data(), static_cast<int>((*message)->size())));
-  ASSERT_EQ(hosted.decoder->decode(std::as_bytes(std::span(parsed.frame().packet()))),
-            codec::DecodeResult::ok);
-  EXPECT_EQ(hosted.decoder->tick(), 0u);
-  EXPECT_EQ(hosted.decoder->reconstructionHash(), parsed.frame().reconstruction_hash());
-  ASSERT_TRUE(hosted.mailboxes[0]->acknowledge(0, hosted.now));
-  hosted.ticks(3);
-  EXPECT_EQ(hosted.decoder->tick(), 3u);
-}
-
-TEST_F(SceneHostTest, StreamsAtItsOwnRate) {
-  scene::Scene scene = smallScene();
-  scene.streamRate = 10;
-  HostedScene hosted(scene);
-  hosted.ticks(12);
-  EXPECT_EQ(hosted.frames.size(), 3u);
-  EXPECT_EQ(hosted.decoder->tick(), 12u);
-}
-
-TEST_F(SceneHostTest, WhatIsDecodedIsWithinTheMaxErrorOfTheState) {
-  HostedScene hosted;
-  hosted.ticks(10);
-  vulkan::Recorder recorder(tests::device());
-  // Same scene, same ticks, straight on the simulation.
-  simulation::ClothSimulation simulation(tests::device(), hosted.live.start());
-  ColliderSet colliders(hosted.live.start());
-  simulation::TickInputs inputs{.environment = hosted.live.start().environment, .colliders = {}};
-  for (int tick = 1; tick <= 10; ++tick) {
-    colliders.advance(hosted.live.start(), tick * hosted.live.start().tickSeconds(), inputs.colliders);
-    recorder.begin();
-    simulation.recordTick(recorder, inputs);
-    simulation.recordSaveState(recorder);
-    tests::submitAndWait(tests::device(), recorder);
-  }
-  EXPECT_EQ(simulation.status().stateHash, hosted.frames.back().state_hash());
-  const simulation::NodeState state = simulation::unpack(simulation.collectState(10));
-  const std::span<const float> decoded = hosted.decoder->positions();
-  ASSERT_EQ(decoded.size(), 3 * state.positions.size());
-  for (std::size_t node = 0; node < state.positions.size(); ++node) {
-    const scene::Vec3 position(decoded[3 * node], decoded[3 * node + 1], decoded[3 * node + 2]);
-    EXPECT_LE((position - state.positions[node]).norm(),
-              std::sqrt(3.0f) * hosted.live.start().stream.maxError)
-        << node;
-  }
-}
 
 TEST_F(SceneHostTest, SameInputsGiveTheSameStatesWhateverTheAudience) {
   const auto simulate = [](std::size_t subscribers) {
@@ -311,7 +44,7 @@ TEST_F(SceneHostTest, SameInputsGiveTheSameStatesWhateverTheAudience) {
       if (tick % 7 == 0) hosted.mailboxes.back()->restart();
       hosted.tick();
     }
-    return stateHashes(hosted);
+    return hosted.stateHashes();
   };
   const std::vector<std::uint64_t> alone = simulate(1);
   EXPECT_EQ(alone.size(), 60u);
@@ -363,7 +96,7 @@ TEST_F(SceneHostTest, WhatBecomesOfGripsIsTold) {
     hosted.tick();
   };
   const auto newest = [&] {
-    const v1::TickEvents events = hosted.told.empty() ? v1::TickEvents() : hosted.told.back().tick_events();
+    v1::TickEvents events = hosted.told.empty() ? v1::TickEvents() : hosted.told.back().tick_events();
     hosted.told.clear();
     return events;
   };
@@ -535,26 +268,6 @@ TEST_F(SceneHostTest, GoesOnOnAnotherDeviceFromTheNewestStateThatTheCpuHas) {
   hosted.host.release();  // before its device
 }
 
-TEST_F(SceneHostTest, OneKeyFrameServesAllWhoWaitAndNoneComesTooSoon) {
-  HostedScene hosted(smallScene(), 5);
-  hosted.ticks(3);
-  for (const auto& mailbox : hosted.mailboxes) mailbox->restart();
-  hosted.tick();
-  EXPECT_TRUE(hosted.keys.back());
-  EXPECT_EQ(hosted.live.metrics.keyFrames.value(), 2u);
-
-  // Asked again within the interval: the frames until its end are predicted.
-  hosted.mailboxes.back()->restart();
-  for (int millisecondsLater = 25; millisecondsLater < 100; millisecondsLater += 25) {
-    hosted.host.begin(hosted.now + std::chrono::milliseconds(millisecondsLater));
-    hosted.host.finish();
-  }
-  hosted.packer.drain();
-  EXPECT_EQ(hosted.live.metrics.keyFrames.value(), 2u);
-  hosted.tick();
-  EXPECT_EQ(hosted.live.metrics.keyFrames.value(), 3u);
-}
-
 // How far the lowest node of any column hangs below where it would if no spring were stretched, and where all
 // are.
 double stretchedBy(const std::vector<float>& positions, std::vector<float>* heights = nullptr) {
@@ -613,31 +326,6 @@ TEST_F(SceneHostTest, AnotherSolverActsFromTheNextTickOnAndWithoutAJump) {
   EXPECT_EQ(hosted.told.back().parameter_changed().participant_id(), 5u);
 }
 
-// What it says is what can be seen of the frame: two ends of a spring of 0.1 m, each off by the codec's error
-// along three axes.
-TEST_F(SceneHostTest, TellsFourTimesASecondHowTheSimulationDoes) {
-  HostedScene hosted;
-  hosted.ticks(21);
-  ASSERT_EQ(hosted.frames.size(), 21u);
-  for (std::size_t i = 0; i < 21; ++i) EXPECT_EQ(hosted.frames[i].has_report(), i % 10 == 0) << "frame " << i;
-  const auto positions = hosted.decoder->positions();
-  double largest = -1;
-  for (std::size_t row = 0; row < 12; ++row)
-    for (std::size_t column = 0; column < 10; ++column)
-      for (const std::size_t next : {1, 10}) {
-        if ((next == 1 && column == 9) || (next == 10 && row == 11)) continue;
-        const float* a = positions.data() + 3 * (10 * row + column);
-        const float* b = a + 3 * next;
-        largest = std::max(
-            largest, std::hypot(double{b[0]} - a[0], double{b[1]} - a[1], double{b[2]} - a[2]) / 0.1 - 1);
-      }
-  const v1::SimulationReport& report = hosted.frames.back().report();
-  ASSERT_EQ(report.cloths_size(), 1);
-  EXPECT_NEAR(report.cloths(0).strain_max(), largest, 2 * std::sqrt(3.0) * 0.0005 / 0.1 + 1e-5);
-  EXPECT_GT(report.cloths(0).kinetic_energy(), 0);
-  EXPECT_GE(report.device_seconds(), 0);
-}
-
 TEST_F(SceneHostTest, HasTheStatesThatAStepWithoutAServerHas) {
   const std::filesystem::path out =
       std::filesystem::temp_directory_path() / ("clothstream-stepped-" + std::to_string(getpid()) + ".f32");
@@ -652,43 +340,6 @@ TEST_F(SceneHostTest, HasTheStatesThatAStepWithoutAServerHas) {
   for (std::size_t i = 0; i < 30; ++i)
     EXPECT_EQ(said["hashes"][i + 1], fmt::format("{:016x}", hosted.frames[i].state_hash()))
         << "tick " << i + 1;
-}
-
-TEST(LiveScene, ThatBeginsAnewIsAsAtFirst) {
-  scene::Scene scene = smallScene();
-  scene.colliders[0].motion.keys.clear();
-  LiveScene live(std::move(scene));
-  v1::ParameterChange change;
-  change.mutable_wind()->mutable_value()->set_x(3);
-  v1::ColliderChange& ball = *change.add_colliders();
-  ball.set_name("ball");
-  ball.mutable_position()->set_y(7);
-  ASSERT_TRUE(live.change(1, change));
-  live.tick = 50;
-  live.resetWanted = true;
-  EXPECT_EQ(live.beginAnew().wind().value().x(), 0);
-  EXPECT_EQ(live.definition().environment.wind, live.start().environment.wind);
-  EXPECT_EQ(live.definition().colliders[0].pose.position, live.start().colliders[0].pose.position);
-  Inputs waiting;
-  live.inbox.drain(waiting);
-  EXPECT_TRUE(waiting.changes.empty());
-  EXPECT_EQ(live.tick, 0u);
-  EXPECT_FALSE(live.resetWanted);
-}
-
-TEST(LiveScene, ThatIsCorrectedHasWhatHoldsAndTheChangesThatWait) {
-  LiveScene live(smallScene());
-  v1::ParameterChange waiting;
-  waiting.mutable_wind()->mutable_value()->set_x(3);
-  ASSERT_TRUE(live.change(1, waiting));
-  scene::Scene now = smallScene();
-  now.cloths[0].thickness = 0.02f;
-  const v1::ParameterChange said = live.correct(now);
-  EXPECT_EQ(said.cloths(0).thickness(), 0.02f);
-  EXPECT_TRUE(said.cloths(0).solver().has_mass_spring());
-  EXPECT_EQ(said.wind().value().x(), 0);
-  EXPECT_EQ(live.definition().cloths[0].thickness, 0.02f);
-  EXPECT_EQ(live.definition().environment.wind.x(), 3);
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <cmath>
 #include <future>
 #include <latch>
 #include <memory>
@@ -230,6 +231,11 @@ TEST_F(ScenesTest, WhatWasUploadedTakesItsRoomUntilItIsAnswered) {
   const v1::Scene scene = discScene(40);
   const std::string content = scene.SerializeAsString();
   options.maxUploadBytes = content.size() + content.size() / 2;
+  std::latch refused(1);
+  options.journals = [&](const scene::Scene& made) {
+    if (made.name == scene.name()) refused.wait();
+    return nullptr;
+  };
   START(options);
   TestPeer maker(server());
   upload(maker, content);
@@ -237,9 +243,10 @@ TEST_F(ScenesTest, WhatWasUploadedTakesItsRoomUntilItIsAnswered) {
   create.set_request_id(77);
   create.mutable_create_scene()->set_uploaded_content_id(9);
   maker.send(create);
-  // It is being made now, which takes far longer than this.
+  // It is being made now, and is not done before this is refused.
   upload(maker, content);
   EXPECT_EQ(maker.readUntil(Body::kError).error().code(), v1::ERROR_CODE_RESOURCE_EXHAUSTED);
+  refused.count_down();
   const v1::ServerMessage made =
       maker.readUntil([](const v1::ServerMessage& answer) { return answer.request_id() == 77; });
   EXPECT_TRUE(made.has_create_scene()) << made.DebugString();
@@ -380,6 +387,45 @@ TEST_F(ScenesTest, AResetSceneBeginsAnewWithItsParametersAsTheyAre) {
   EXPECT_NEAR(lowest(), -1.1f, 0.02f);
   EXPECT_EQ(peer.description().definition().name(), "small");
   EXPECT_EQ(server().getScene({}).value().scene().environment().gravity().y(), 0);
+}
+
+TEST_F(ScenesTest, AResetOfAPausedSceneIsShown) {
+  scene::Scene sparse = tests::smallScene("sparse");  // of frames
+  sparse.simulationRate = 60;
+  sparse.streamRate = 20;
+  sparse.colliders.clear();
+  sparse.environment.wind = scene::Vec3(0, 0, 5);
+  START({}, {sparse});
+  TestPeer peer(server()), other(server());
+  peer.join("sparse");
+  const auto farthest = [&] {  // from the plane in which it starts
+    float z = 0;
+    for (std::size_t i = 2; i < peer.decoder().positions().size(); i += 3)
+      z = std::max(z, std::abs(peer.decoder().positions()[i]));
+    return z;
+  };
+  other.join("other");
+  peer.readFrames(20);
+  control(other, "sparse", true, false);
+  peer.readUntil(
+      [](const v1::ServerMessage& m) { return m.notice().kind() == v1::NOTICE_KIND_SCENE_PAUSED; });
+  // Whatever was on its way when the pause began is there after a few ticks of another scene.
+  other.readFrames(4);
+  const telemetry::SceneMetrics& metrics = server().state().find("sparse")->metrics;
+  const std::uint64_t ticks = metrics.ticks.value();
+  const float before = farthest();
+
+  control(other, "sparse", std::nullopt, true);
+  peer.readUntil([](const v1::ServerMessage& m) { return m.notice().kind() == v1::NOTICE_KIND_SCENE_RESET; });
+  while (peer.frames().back().tick <= ticks) peer.readFrames(1);
+  const std::uint64_t shown = peer.frames().back().tick;
+  EXPECT_EQ(shown % 3, 0u);
+  EXPECT_LE(shown, ticks + 3);
+  // At most three ticks of wind, after a second of it before.
+  EXPECT_LT(farthest(), before / 10);
+  other.readFrames(4);
+  EXPECT_EQ(metrics.ticks.value(), shown);
+  EXPECT_FALSE(server().state().find("sparse")->running);
 }
 
 // What it takes to be made ready is many times what a tick of the others takes: tables of 590,000

@@ -13,17 +13,17 @@
 
 #include <gtest/gtest.h>
 
+#include "clients/core/acknowledgement.h"
 #include "proto/codec/temporal_layers.h"
 #include "server/stream/mailbox.h"
 
 namespace clothstream::stream {
 
-// One subscriber behind a link that carries so many bytes/s, each message `latency` late. Its door writes
-// without ever waiting, as into a large buffer. It fails the test when it gets a frame that it cannot decode.
+// One subscriber behind a link that carries so many bytes/s, each message `latency` late, but none before one
+// that went before it. Its door writes without ever waiting, as into a large buffer. It acknowledges as
+// clients do, and fails the test when it gets a frame that it cannot decode.
 class SimulatedLink {
  public:
-  static constexpr std::chrono::milliseconds kLatency{10};
-
   SimulatedLink(const StreamShape& shape, OperatingPoint wanted, Clock::time_point now)
       : given{0, shape.layers}, arrived_(given) {
     mailbox->subscribe(nullptr, shape, metrics, wanted);
@@ -43,7 +43,7 @@ class SimulatedLink {
     }
     while (!queue_.empty() && static_cast<double>(queue_.front()->size()) <= budget_) {
       budget_ -= static_cast<double>(queue_.front()->size());
-      arriving_.push_back({now + kLatency, queue_.front()});
+      arriving_.push_back({now + latency, queue_.front()});
       queue_.pop_front();
     }
     for (; !arriving_.empty() && arriving_.front().time <= now; arriving_.pop_front())
@@ -59,6 +59,7 @@ class SimulatedLink {
   };
 
   double bytesPerSecond = 1e9;
+  Clock::duration latency = std::chrono::milliseconds(10);
   telemetry::SceneMetrics metrics;
   const std::shared_ptr<Mailbox> mailbox = std::make_shared<Mailbox>([] {});
   std::vector<Arrived> arrived;
@@ -102,7 +103,8 @@ class SimulatedLink {
     quality_ = frame.quality;
     decoded_.hold(frame.layer, frame.tick);
     arrived.push_back({frame.tick, frame.quality, frame.layer, now - frame.complete});
-    acks_.push_back({now + kLatency, frame.tick});
+    if (acknowledgement_.due(static_cast<std::uint64_t>(1e6 * seconds(now.time_since_epoch()))))
+      acks_.push_back({now + latency, frame.tick});
   }
 
   OperatingPoint arrived_;
@@ -113,6 +115,7 @@ class SimulatedLink {
   // By message, which is kept: no other has its place in memory.
   std::map<const void*, PublishedFrame> published_;
   codec::HeldFrames decoded_;
+  client::Acknowledgement acknowledgement_;
   std::uint8_t quality_ = 0;
 };
 

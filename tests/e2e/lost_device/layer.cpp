@@ -42,14 +42,12 @@ struct Device {
   // What becomes of the next submission.
   VkResult fate() {
     const char* const name = std::getenv("CLOTHSTREAM_LOSE_DEVICE");
-    std::string word;
-    int count = 1;
-    if (name != nullptr) {
-      std::ifstream file(name);
+    // One that appears after this is for the next submission.
+    if (std::ifstream file(name != nullptr ? name : ""); file && unlink(name) == 0) {
+      std::string word;
+      int count = 1;
       file >> word;
       if (int said = 0; file >> said) count = said;
-    }
-    if (name != nullptr && unlink(name) == 0) {
       if (word == "memory")
         failing = count;
       else

@@ -1,0 +1,270 @@
+# SPDX-License-Identifier: MIT
+"""Packets to lattice positions and normals."""
+from arithmetic import add, cross, dot, frame, sat, sat16, shift, sub, subs, times
+from entropy import Bits, DISTRIBUTIONS, Groups, SCALE_WEIGHTS, Symbols, unzigzag
+from order import Cloths
+
+
+class Decoder:
+    def __init__(self, stream):
+        self.cloths = Cloths(stream["cloths"])
+        self.count = sum(cloth["vertexCount"] for cloth in stream["cloths"])
+        error = stream["maxError"] - 2.0 ** -19
+        self.k = 8
+        while self.k > 4 and error / (2 ** (self.k - 1) + 2) * 2 ** 27 < 40:
+            self.k -= 1
+        self.layers = stream.get("temporalLayers", 1)
+        self.packed = stream["codec"] == 3
+        self.has_normals = stream["normals"] == "octahedral"
+        self.held = {}  # the newest frame of each layer, by layer
+        self.history = []  # what the frame that is decoded refers to, what that one does, and so on
+
+    def read_weights(self, section, key, layer):
+        """The weights that the frame uses; those that it leaves, by layer."""
+        alone = lambda f, w: [[w if i == f and c < 6 else 0 for i in range(16)] for c in range(7)]
+        if key:
+            left = [alone(7, -192)] * 3
+        else:
+            left = self.history[0]["weights"]
+        left = [[row[:] for row in weights] for weights in left]
+        used = left[layer]
+        if section:
+            bits = Bits(section)
+            if bits.get(1):
+                used = [[0] * 16] * 7
+            else:
+                for weights in left[layer:1 if key else self.layers]:
+                    for c in range(6):
+                        if bits.get(1):
+                            for f in (6, 7) if key else range(16):
+                                weights[c][f] += unzigzag(bits.gamma(4))
+            bits.check_end()
+        return used, [alone(2, 700)] * 3 if key else left
+
+    def decode(self, packet):
+        key, layer, tick, reference, sections = packet
+        self.history = []
+        if key:
+            self.held = {}
+        else:
+            at = next(frame for frame in self.held.values() if frame["tick"] == reference)
+            assert at["layer"] <= layer < self.layers
+            self.history = [at, at["history"][0], at["history"][1]]
+        weights, left = self.read_weights(sections[0], key, layer)
+        if self.packed:
+            symbols, bits = self.read_packed(sections), Bits(b"")
+        else:
+            symbols, bits = Symbols(sections[1] + sections[2]), Bits(sections[3] + sections[4])
+        now = {name: [None] * self.count for name in "RSGQEDMW"}
+        now["rests"] = [False] * self.count
+        for number, (weight_class, phase) in enumerate(self.cloths.phases):
+            if number == self.cloths.coarse_phases:
+                self.check_coarse(sections, symbols, bits)
+            quiet = not self.packed and bits.get(1)
+            for start in range(0, len(phase), 64):
+                group = phase[start:start + 64]
+                predicted = [self.predict(now, v, weights[weight_class]) for v in group]
+                residuals, stays = self.read_residuals(now, group, weight_class // 2 + (4 if key else 0), quiet, symbols, bits)
+                for i, v in enumerate(group):
+                    self.place(now, v, predicted[i], residuals[i], stays[i])
+        if len(self.cloths.phases) == self.cloths.coarse_phases:
+            self.check_coarse(sections, symbols, bits)
+        now["normals"] = self.read_normals(now, symbols, bits) if self.has_normals else None
+        if not self.packed:
+            symbols.check_end()
+            bits.check_end()
+        now["C"] = []
+        for v in range(self.count):
+            around = add(*(now["R"][n] for n in self.cloths.nearest[v]))
+            now["C"].append(sat(shift(sub(around, times(now["R"][v], 4)), self.k - 4)))
+        now.update(tick=tick, layer=layer, weights=left)
+        now["history"] = self.history[:2] or [now, now]
+        self.newest = self.held[layer] = now
+
+    def read_packed(self, sections):
+        """Residuals of all vertices along u, v, n, None for n where it stays; those of normals behind."""
+        order = [v for _, phase in self.cloths.phases for v in phase]
+        coarse = sum(len(phase) for _, phase in self.cloths.phases[:self.cloths.coarse_phases])
+        first, second = Groups(sections[1]), Groups(sections[2])
+        residuals = first.read(coarse, 3) + second.read(self.count - coarse, 3)
+        normals = second.read(self.count, 2) if self.has_normals else []
+        first.bits.check_end()
+        second.bits.check_end()
+        return {v: (u, w, n) for v, (n, u, w) in zip(order, residuals)}, normals
+
+    def check_coarse(self, sections, symbols, bits):
+        if self.packed:
+            return
+        assert 2 * symbols.at == len(sections[1]) and (bits.at + 7) // 8 == len(sections[3])
+
+    def read_normals(self, now, symbols, bits):
+        sums = [(0, 0, 0)] * self.count
+        for face in self.cloths.faces:
+            p = [now["R"][v] for v in face]
+            area = cross(sub(p[2], p[0]), sub(p[3], p[1])) if len(p) == 4 else cross(sub(p[1], p[0]), sub(p[2], p[0]))
+            for v in face:
+                sums[v] = add(sums[v], area)
+        expected = [256, 256]
+        normals = []
+        for v, n in enumerate(sums):
+            top = max((2, 0, 1), key=lambda c: abs(n[c]))
+            down = abs(n[top]).bit_length() - 15
+            n = shift(n, down) if down > 0 else times(n, 1 << -down)
+            octahedral = []
+            size = sum(map(abs, n))
+            for c in 0, 1:
+                x = n[(top + 1 + c) % 3]
+                guess = (254 * abs(x) + size) // (2 * size) * (-1 if x < 0 else 1) if size else 0
+                if self.packed:
+                    octahedral.append((guess + symbols[1][v][c] + 128) % 256 - 128)
+                    continue
+                o = max(4, min(16383, expected[c])).bit_length() - 1
+                scale = 2 * (o - 2) + (max(4, min(16383, expected[c])) >> o - 1 & 1)
+                b = 0 if scale < 16 else (scale - 14) // 2
+                number = symbols.get((2 * v + c) % 4, DISTRIBUTIONS[scale])
+                if number == 15:
+                    number += bits.gamma(2)
+                r = unzigzag(number << b | bits.get(b))
+                expected[c] += 256 * min(abs(r), 31) - expected[c] >> 5
+                octahedral.append((guess + r + 128) % 256 - 128)
+            normals.append(octahedral)
+        return normals
+
+    def past(self, name, i, v):
+        if not self.history:
+            return (0, 0, 0)
+        return self.history[i - 1][name][v]
+
+    def predict(self, now, v, w):
+        f = self.k - 4
+        at = lambda n: (0, 0, 0) if n is None else now["R"][n]
+        p = [at(n) for n in self.cloths.parents[v]]
+        w1, w2, w3 = self.cloths.weights[v][1:]
+        off = add(times(sub(p[1], p[0]), w1), times(sub(p[2], p[0]), w2), times(sub(p[3], p[0]), w3), (32, 32, 32))
+        s = add(p[0], shift(off, 6))
+        ring = shift(add(*(at(n) for n in self.cloths.ring[v]), (4, 4, 4)), 3)
+        g = sat(shift(sub(ring, s), f))
+        q = sat(shift(sub(add(p[0], p[1]), add(p[2], p[3])), 2 + f))
+        u, v_, n = axes = frame(sub(p[1], p[0]), sub(p[3], p[2]))
+        past = lambda name, i: self.past(name, i, v)
+        e1, e2, e3 = (past("E", i) for i in (1, 2, 3))
+        g1, g2, g3 = (past("G", i) for i in (1, 2, 3))
+        s1 = past("S", 1)
+        moved = sat(shift(sub(s, s1), f)) if self.history else (0, 0, 0)
+        d1, d2 = past("D", 1), past("D", 2)
+        pairs = (w[12], w[14]), (w[12], w[14]), (w[13], w[15])
+        turned = [sat16(a * x + b * (x - y) + 128 >> 8) for (a, b), x, y in zip(pairs, d1, d2)]
+        features = [e1, g1, subs(e1, e2), subs(g1, g2), subs(e2, e3), subs(g2, g3), subs(q, past("Q", 1)), subs(g, g1),
+                    past("C", 1), past("C", 2), subs(moved, past("W", 1)), subs(past("W", 1), past("W", 2))]
+        total = add(*(times(feature, weight) for feature, weight in zip(features, w)), (1 << 9 - f,) * 3,
+                    shift(add(*map(times, axes, turned)), 6))
+        r1 = past("R", 1)
+        prediction = add(s, r1, times(s1, -1), shift(total, 10 - f))
+        if self.history and self.history[0]["rests"][v]:
+            prediction = r1
+        now["S"][v], now["G"][v], now["Q"][v], now["W"][v] = s, g, q, moved
+        return prediction, axes
+
+    def read_residuals(self, now, group, scale_class, quiet, symbols, bits):
+        residuals, stays = [[0, 0, 0] for _ in group], [False] * len(group)
+        magnitude = lambda i, c: min(abs(residuals[i][c]), 31)
+        if self.packed:
+            for i, v in enumerate(group):
+                stays[i] = symbols[0][v][2] is None
+                if not stays[i]:
+                    residuals[i] = list(symbols[0][v])
+        elif not quiet:
+            for c in 2, 0, 1:
+                w = SCALE_WEIGHTS[scale_class][c]
+                for i, v in enumerate(group):
+                    if stays[i]:
+                        continue
+                    m = lambda n: 0 if n is None else now["M"][n][c]
+                    m1 = lambda n: self.history[0]["M"][n][c] if self.history else 0
+                    e = w[0] * sum(map(m, self.cloths.parents[v])) + w[1] * sum(map(m, self.cloths.ring[v]))
+                    e += w[2] * (4 * m1(v) + sum(map(m1, self.cloths.nearest[v]))) + w[5]
+                    if c != 2:
+                        e += w[3] * magnitude(i, 2)
+                    if c == 1:
+                        e += w[4] * magnitude(i, 0)
+                    e = max(4, min(16383, e))
+                    o = e.bit_length() - 1
+                    scale = 2 * (o - 2) + (e >> o - 1 & 1)
+                    b = 0 if scale < 16 else (scale - 14) // 2
+                    number = symbols.get(i % 4, DISTRIBUTIONS[scale + (24 if c == 2 else 0)])
+                    if number == 15:
+                        beyond = bits.gamma(2)
+                        if c == 2:
+                            if beyond == 0:
+                                stays[i] = True
+                                continue
+                            beyond -= 1
+                        number += beyond
+                    residuals[i][c] = unzigzag(number << b | bits.get(b))
+        return residuals, stays
+
+    def place(self, now, v, predicted, r, stays):
+        position, (u, v_, n) = predicted
+        r1 = self.past("R", 1, v)
+        if stays:
+            position = r1
+        else:
+            moved = add(times(u, r[0]), times(v_, r[1]), times(n, r[2]), (1 << 13 - self.k,) * 3)
+            position = add(position, shift(moved, 14 - self.k))
+        now["R"][v] = position
+        now["rests"][v] = bool(self.history) and position == r1
+        now["M"][v] = tuple(min(abs(x), 31) for x in r)
+        e = now["E"][v] = sat(shift(sub(position, now["S"][v]), self.k - 4))
+        now["D"][v] = tuple(sat16(dot(axis, e) >> 14) for axis in (u, v_, n))
+
+    def hash(self):
+        mask = 0xffffffff
+
+        def mix(h):
+            h = (h ^ h >> 16) * 0x7feb352d & mask
+            h = (h ^ h >> 15) * 0x846ca68b & mask
+            return h ^ h >> 16
+
+        halves = []
+        for seed in 0x85a308d3, 0x243f6a88:
+            total = 0
+            for i, position in enumerate(self.newest["R"]):
+                h = mix(i + seed & mask)
+                for x in position:
+                    h = mix(h ^ x & mask)
+                u, v = self.newest["normals"][i] if self.has_normals else (0, 0)
+                total += mix(h ^ (u & 255 | (v & 255) << 8))
+            halves.append(total & mask)
+        return "%08x%08x" % tuple(halves)
+
+
+def parse(packet):
+    at = 5
+
+    def byte():
+        nonlocal at
+        at += 1
+        return packet[at - 1]
+
+    def varint():
+        value = shift_ = 0
+        while True:
+            b = byte()
+            value |= (b & 127) << shift_
+            shift_ += 7
+            if b < 128:
+                return value
+
+    assert packet[0] == 1
+    varint()  # epoch
+    tick = varint()
+    references = [tick - varint() for _ in range(byte())]
+    for _ in range(varint()):
+        varint(), varint()
+    sizes = [varint() for _ in range(byte())]
+    assert at + sum(sizes) == len(packet) and len(sizes) == {2: 5, 3: 3}[packet[1]]
+    sections = []
+    for size in sizes:
+        sections.append(packet[at:at + size])
+        at += size
+    return packet[2] == 0, packet[4], tick, references[0] if references else None, sections

@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: MIT
+"""What the sections of a packet hold: bits, symbols, residuals."""
+import re
+import struct
+
+TABLES = "proto/codec/hierarchical/residual_tables.cpp"
+
+
+def read_tables():
+    text = open(TABLES).read()
+    rows = lambda part, n: [tuple(map(int, re.findall(r"-?\d+", row)))
+                            for row in re.findall(r"\{(-?\d+(?:, -?\d+){%d})\}" % (n - 1), part)]
+    scales, distributions = text.split("kDistributions{{")
+    weights = rows(scales, 6)
+    return [weights[3 * i:3 * i + 3] for i in range(8)], rows(distributions, 16)
+
+
+SCALE_WEIGHTS, DISTRIBUTIONS = read_tables()
+
+
+class Bits:
+    def __init__(self, data):
+        self.value, self.at, self.size = int.from_bytes(data, "little"), 0, 8 * len(data)
+
+    def get(self, n):
+        self.at += n
+        return self.value >> self.at - n & (1 << n) - 1
+
+    def gamma(self, j):
+        z = 0
+        while not self.get(1):
+            z += 1
+            assert z + j <= 30
+        return self.get(z + j) + (1 << z + j) - (1 << j)
+
+    def check_end(self):
+        assert 0 <= self.size - self.at < 8 and self.value >> self.at == 0
+
+
+class Symbols:
+    def __init__(self, data):
+        self.words = struct.unpack("<%dH" % (len(data) // 2), data)
+        self.states = [self.words[2 * i] | self.words[2 * i + 1] << 16 for i in range(4)] if data else [1 << 16] * 4
+        self.at = 8 if data else 0
+
+    def get(self, coder, frequencies):
+        state = self.states[coder]
+        x, start, symbol = state & 4095, 0, 0
+        while start + frequencies[symbol] <= x:
+            start += frequencies[symbol]
+            symbol += 1
+        state = frequencies[symbol] * (state >> 12) + x - start
+        if state < 1 << 16:
+            state = state << 16 | self.words[self.at]
+            self.at += 1
+        self.states[coder] = state
+        return symbol
+
+    def check_end(self):
+        assert self.at == len(self.words) and self.states == [1 << 16] * 4
+
+
+def unzigzag(z):
+    return z >> 1 ^ -(z & 1)
+
+
+class Groups:
+    """Of codec 3: the residuals of vertices that follow each other, in components."""
+
+    def __init__(self, data):
+        self.bits = Bits(data)
+
+    def number(self, low, reserved=0):
+        """None where it stands for something else."""
+        q = 0
+        while q < 15 and self.bits.get(1):
+            q += 1
+        if q == 15:
+            beyond = self.bits.gamma(2)
+            if beyond < reserved:
+                return None
+            q += beyond - reserved
+        return q << low | self.bits.get(low)
+
+    def read(self, vertices, components):
+        """A list for each vertex; None in the place of one along n where the vertex stays."""
+        residuals = []
+        for start in range(0, vertices, 2048):
+            residuals += self.read_group(min(2048, vertices - start), components)
+        return residuals
+
+    def read_group(self, vertices, components):
+        residuals = [[0] * components for _ in range(vertices)]
+        modes = [0] * components
+        if not self.bits.get(1):
+            for start in range(0, vertices, 32):
+                for c in range(components):
+                    modes[c] += unzigzag(self.number(0))
+                    assert 0 <= modes[c] < 32
+                    self.read_block(residuals[start:start + 32], c, modes[c], 1 if components == 3 and c == 0 else 0)
+        while self.bits.at % 8:
+            assert self.bits.get(1) == 0
+        return residuals
+
+    def read_block(self, residuals, c, mode, reserved):
+        size = 4 if mode == 1 else 32
+        for start in range(0, len(residuals), size):
+            if mode == 0 or mode == 1 and self.bits.get(1):
+                continue
+            for residual in residuals[start:start + size]:
+                number = self.number(max(mode - 2, 0), reserved)
+                residual[c] = None if number is None else unzigzag(number)
