@@ -29,12 +29,13 @@ struct DoorContext {
   std::size_t streams = 0;  // joined, but for those that were refused
   std::size_t watches = 0;  // of health
   std::unordered_set<std::shared_ptr<Call>> calls = {};
-  grpc::Status refusal = {};              // of new calls, unless it is OK
-  std::function<void()> onLastCall = {};  // when `calls` has become empty, if set
+  std::size_t callsMade = 0;               // of them, those that a client made
+  grpc::Status refusal = {};               // of new calls, unless it is OK
+  std::function<void()> onForgotten = {};  // when there is one call fewer, if set
 
   void forget(const std::shared_ptr<Call>& call) {
     calls.erase(call);
-    if (calls.empty() && onLastCall) onLastCall();
+    if (onForgotten) onForgotten();
   }
 };
 
@@ -63,7 +64,7 @@ class Call : public std::enable_shared_from_this<Call> {
       const std::shared_ptr<Call> self = call_.shared_from_this();
       --self->underway_;
       (call_.*next_)(ok);
-      if (self->isOver_ && self->underway_ == 0) self->door_.forget(self);
+      if (self->isOver_ && self->underway_ == 0) self->leave();
     }
 
    private:
@@ -79,7 +80,10 @@ class Call : public std::enable_shared_from_this<Call> {
     return &operation;
   }
   // A client has made it.
-  void made() { isMade_ = true; }
+  void made() {
+    isMade_ = true;
+    ++door_.callsMade;
+  }
   // Nothing will be begun any more.
   void over() { isOver_ = true; }
 
@@ -87,6 +91,11 @@ class Call : public std::enable_shared_from_this<Call> {
   grpc::ServerContext context_;
 
  private:
+  void leave() {
+    if (isMade_) --door_.callsMade;
+    door_.forget(shared_from_this());
+  }
+
   std::size_t underway_ = 0;
   bool isMade_ = false, isOver_ = false;
 };

@@ -4,10 +4,12 @@
 #include <cerrno>
 #include <chrono>
 #include <cstring>
+#include <functional>
 #include <future>
 #include <memory>
 #include <optional>
 #include <stdexcept>
+#include <utility>
 
 #include <absl/synchronization/mutex.h>
 #include <boost/asio/thread_pool.hpp>
@@ -116,18 +118,31 @@ struct RpcDoor::State {
 
   ~State() {
     if (!context) return;
+    const auto deadline = std::chrono::system_clock::now() + kStopTimeout;
     context->loop->post([this] { stopCalls(); });
-    server->Shutdown(std::chrono::system_clock::now() + kStopTimeout);
+    // gRPC closes a connection when its client has answered a ping and no call is left on it. Only a ping
+    // that comes after the calls' last bytes keeps the connection until the client has them.
+    when([this] { return context->callsMade == 0; }).wait_until(deadline);
+    server->Shutdown(deadline + kStopTimeout);
     server->Wait();
     // The connections are gone; of the calls the loop may still have to hear.
-    std::promise<void> idle;
-    context->loop->post([&] {
-      if (context->calls.empty()) return idle.set_value();
-      context->onLastCall = [&] { idle.set_value(); };
-    });
-    idle.get_future().wait();
+    when([this] { return context->calls.empty(); }).wait();
     context->loop->stop();
     questions.join();
+  }
+
+  // Ready when it holds. Asked on the loop's thread, at once and after each call; the next one takes its
+  // place.
+  std::future<void> when(std::function<bool()> holds) {
+    auto reached = std::make_shared<std::promise<void>>();
+    std::future<void> future = reached->get_future();
+    context->loop->post([this, reached = std::move(reached), holds = std::move(holds)]() mutable {
+      context->onForgotten = [reached = std::move(reached), holds = std::move(holds)]() mutable {
+        if (reached && holds()) std::exchange(reached, nullptr)->set_value();
+      };
+      context->onForgotten();
+    });
+    return future;
   }
 
   void stopCalls() {

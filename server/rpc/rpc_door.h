@@ -31,7 +31,7 @@ class RpcDoor {
   // Listens when it returns. `server` must outlive the door. Throws std::runtime_error that says what to do
   // when the port is in use or the host is none of this machine's.
   RpcDoor(stream::SceneServer& server, const RpcDoorOptions& options);
-  // Ends every stream with UNAVAILABLE; takes at most about a second.
+  // Ends every stream with UNAVAILABLE and waits until the clients have it; takes at most about two seconds.
   ~RpcDoor();
   RpcDoor(const RpcDoor&) = delete;
   RpcDoor& operator=(const RpcDoor&) = delete;
