@@ -9,6 +9,7 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <ostream>
 #include <regex>
 #include <set>
 #include <sstream>
@@ -199,6 +200,10 @@ struct Language {
   const char* file;   // that it is written to
   const char* tool;   // without which it is skipped
   const char* toRun;  // a shell's line, with {file}, {program} and {address}
+
+  friend std::ostream& operator<<(std::ostream& out, const Language& language) {
+    return out << language.name;
+  }
 };
 
 class Example : public LibraryTest, public ::testing::WithParamInterface<Language> {
