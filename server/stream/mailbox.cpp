@@ -118,6 +118,7 @@ void Mailbox::adapt(Clock::time_point now) {
 }
 
 bool Mailbox::hold(const PublishedFrame& frame) {
+  if (decodable_ && frame.tick <= *decodable_) return false;
   if (frame.key) {
     dropHeld(0);
     chain_ = {};
@@ -212,6 +213,7 @@ void Mailbox::restart() {
   const std::lock_guard lock(mutex_);
   dropHeld(0);
   sent_.clear();
+  decodable_.reset();
   leavesOut_ = false;
   needsKey_ = true;
 }
@@ -276,7 +278,7 @@ std::optional<SharedBytes> Mailbox::take(Clock::time_point now) {
   held_.pop_front();
   heldBytes_ -= frame.message->size();
   sent_.push_back({frame.tick, frame.message->size(), now});
-  newestSent_ = frame.tick;
+  decodable_ = newestSent_ = frame.tick;
   metrics_->framesTaken.add();
   metrics_->send.record(seconds(now - frame.complete));
   return frame.message;

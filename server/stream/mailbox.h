@@ -72,7 +72,8 @@ struct FrameWishes {
 // asks when it has room and its door waits for something to write: who does not read asks for nothing.
 //
 // How many layers, and which quality, LinkAdaptation says; the subscriber is told when it changes. Another
-// quality begins with a key frame of it; until that comes it goes on with the former one.
+// quality begins with a key frame of it; until that comes it goes on with the former one. Who was sent a tick
+// in one quality gets no key frame of the same tick in another, which is stale to a decoder, but the next.
 class Mailbox {
  public:
   static constexpr std::size_t kMaxControlBytes = 256 * 1024;
@@ -171,8 +172,9 @@ class Mailbox {
   std::size_t heldBytes_ = 0;
   std::deque<Sent> sent_;  // and not acknowledged
   std::uint64_t newestSent_ = 0;
-  bool leavesOut_ = false;           // the newest acknowledgement was of more than one frame
-  std::optional<double> roundTrip_;  // s
+  std::optional<std::uint64_t> decodable_;  // newest that was sent, unless the peer began anew since
+  bool leavesOut_ = false;                  // the newest acknowledgement was of more than one frame
+  std::optional<double> roundTrip_;         // s
 
   std::mutex wakeMutex_;
   std::function<void()> wake_;

@@ -238,6 +238,10 @@ void SceneHost::recordFrame(Clock::time_point now) {
     lastKeyFrame_[recorded.quality] = now;
     if (recorded.quality == 0) sinceKeyFrame_ = 0;
   }
+  // Who changes to another quality is to have its key frame before the former quality's frame of this tick.
+  std::ranges::partition(frame_.recorded, [](const CompleteFrame::Recorded& recorded) {
+    return recorded.frame.kind == codec::PacketKind::key;
+  });
   describeFrame(tickStart_);
   std::swap(frame_.poseArrivals, poseArrivals_);
   poseArrivals_.clear();

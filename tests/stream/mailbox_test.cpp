@@ -353,6 +353,42 @@ TEST_F(MailboxTest, GivesTheLayersAndTheQualityThatAreWantedAndSaysSo) {
   EXPECT_EQ(wishes.keys, 0);
 }
 
+TEST_F(MailboxTest, GivesNoTickInASecondQuality) {
+  shape = {.rate = 72, .layers = 1, .qualities = 2};
+  mailbox.subscribe(nullptr, shape, metrics);
+  EXPECT_FALSE(mailbox.next(now));
+  const std::vector<PublishedFrame> fine{frame(1, true), frame(2), frame(3), frame(4)};
+  for (std::size_t i = 0; i < 3; ++i) mailbox.deliver(fine[i]);
+  EXPECT_EQ(taken(fine), (Ticks{1, 2}));
+  now += LinkAdaptation::kPatience;
+  EXPECT_EQ(mailbox.wishes(now).keys, 0b10);  // it is behind
+  ASSERT_TRUE(mailbox.acknowledge(2, now));
+  EXPECT_EQ(taken(fine), Ticks{3});
+  mailbox.deliver(fine[3]);
+  EXPECT_EQ(taken(fine), Ticks{4});
+
+  PublishedFrame same = frame(4, true), next = frame(5, true);
+  same.quality = next.quality = 1;
+  ASSERT_TRUE(mailbox.acknowledge(4, now));
+  mailbox.deliver(same);
+  EXPECT_FALSE(mailbox.next(now));
+  EXPECT_EQ(mailbox.wishes(now).keys, 0b10);
+  mailbox.deliver(next);
+  EXPECT_EQ(taken({same, next}), Ticks{5});
+}
+
+TEST_F(MailboxTest, WhoBeginsAnewMayHaveATickAgain) {
+  join();
+  const PublishedFrame first = frame(1, true);
+  PublishedFrame again = frame(1, true);
+  again.again = true;
+  mailbox.deliver(first);
+  EXPECT_EQ(taken({first}), Ticks{1});
+  mailbox.restart();
+  mailbox.deliver(again);
+  EXPECT_EQ(taken({again}), Ticks{1});
+}
+
 TEST_F(MailboxTest, ClosedItGivesItsLastWordAndTakesNothingMore) {
   join();
   mailbox.deliver(frame(1, true));

@@ -31,29 +31,35 @@ TEST_F(SceneFramesTest, StreamsAFrameATickBeginningWithAKeyFrame) {
   EXPECT_EQ(hosted.live.metrics.ticks.value(), 20u);
 }
 
+// When a subscriber takes what there is for it.
+enum class Door : std::uint8_t { asked, quick };  // when it is asked to; as soon as there is something
+
 // Another subscriber of a hosted scene, which wants a quality of its own.
 class QualitySubscriber {
  public:
-  QualitySubscriber(HostedScene& hosted, std::uint8_t quality)
+  QualitySubscriber(HostedScene& hosted, std::uint8_t quality, Door door = Door::asked)
       : hosted_(hosted),
+        mailbox_(std::make_shared<Mailbox>([this, door] {
+          if (door == Door::quick) take();
+        })),
         decoder_(codec::Decoder::make(encode::streamLayout(hosted.live.start(), LiveScene::kEpoch))) {
     EXPECT_EQ(hosted.live.audience.join(mailbox_, 100), Audience::Joining::joined);
     mailbox_->subscribe(nullptr, hosted.live.shape(), hosted.live.metrics, {quality, 1});
-    read();
+    take();
   }
   ~QualitySubscriber() { hosted_.live.audience.leave(*mailbox_); }
 
-  // Decodes what came, and compares it with what the server holds.
+  // Takes and acknowledges all that there is.
   void read() {
-    while (const auto message = mailbox_->next(hosted_.now)) {
-      v1::ServerMessage parsed;
-      ASSERT_TRUE(parsed.ParseFromArray((*message)->data(), static_cast<int>((*message)->size())));
-      if (!parsed.has_frame()) continue;
-      const auto packet = std::as_bytes(std::span(parsed.frame().packet()));
-      ASSERT_EQ(decoder_->decode(packet), codec::DecodeResult::ok);
-      EXPECT_EQ(decoder_->reconstructionHash(), parsed.frame().reconstruction_hash());
-      qualities.push_back(codec::parsePacket(packet)->header.quality);
-      stateHashes.push_back(parsed.frame().state_hash());
+    std::size_t before = 0;
+    do {
+      before = qualities.size();
+      take();
+      acknowledge();
+    } while (qualities.size() > before);
+  }
+  void acknowledge() {
+    if (decoder_->hasFrame()) {
       ASSERT_TRUE(mailbox_->acknowledge(decoder_->tick(), hosted_.now));
     }
   }
@@ -64,8 +70,22 @@ class QualitySubscriber {
   std::vector<std::uint64_t> stateHashes;
 
  private:
+  // Decodes what comes, and compares it with what the server holds.
+  void take() {
+    while (const auto message = mailbox_->next(hosted_.now)) {
+      v1::ServerMessage parsed;
+      ASSERT_TRUE(parsed.ParseFromArray((*message)->data(), static_cast<int>((*message)->size())));
+      if (!parsed.has_frame()) continue;
+      const auto packet = std::as_bytes(std::span(parsed.frame().packet()));
+      ASSERT_EQ(decoder_->decode(packet), codec::DecodeResult::ok);
+      EXPECT_EQ(decoder_->reconstructionHash(), parsed.frame().reconstruction_hash());
+      qualities.push_back(codec::parsePacket(packet)->header.quality);
+      stateHashes.push_back(parsed.frame().state_hash());
+    }
+  }
+
   HostedScene& hosted_;
-  std::shared_ptr<Mailbox> mailbox_ = std::make_shared<Mailbox>([] {});
+  std::shared_ptr<Mailbox> mailbox_;
   std::unique_ptr<codec::Decoder> decoder_;
 };
 
@@ -115,6 +135,26 @@ TEST_F(SceneFramesTest, WhereNobodyGetsTheFinestQualityItIsNotEncoded) {
   }
   EXPECT_EQ(hosted.live.metrics.frames.value(), only.qualities.size());
   EXPECT_EQ(only.qualities, std::vector<std::uint8_t>(10, 1));
+}
+
+TEST_F(SceneFramesTest, WhoTakesFramesAtOnceGetsEachTickInOneQualityWhereItChanges) {
+  scene::Scene scene = smallScene();
+  scene.stream.qualities = 2;
+  HostedScene hosted(std::move(scene), 0);
+  QualitySubscriber coarse(hosted, 1);  // for whom its encoder is made
+  for (const auto end = Clock::now() + std::chrono::seconds(60);
+       coarse.qualities.empty() && Clock::now() < end;) {
+    hosted.tick();
+    coarse.read();
+  }
+  QualitySubscriber quick(hosted, 0, Door::quick);
+  hosted.ticks(3);
+  EXPECT_EQ(quick.qualities, (std::vector<std::uint8_t>{0, 0}));  // the third waits
+  EXPECT_NE(hosted.live.audience.wishes(hosted.now + LinkAdaptation::kPatience).keys & 0b10, 0);
+  quick.acknowledge();
+  quick.acknowledge();
+  hosted.tick();
+  EXPECT_EQ(quick.qualities, (std::vector<std::uint8_t>{0, 0, 0, 1}));
 }
 
 TEST_F(SceneFramesTest, WhoJoinsWhileTheClockStandsIsShownTheNewestTickAndNothingElseChanges) {
