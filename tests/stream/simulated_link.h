@@ -92,6 +92,10 @@ class SimulatedLink {
       return;
     }
     const PublishedFrame& frame = published_.at(message.get());
+    // What is not newer is stale to a decoder.
+    if (!arrived.empty()) {
+      ASSERT_GT(frame.tick, arrived.back().tick);
+    }
     if (frame.key) {
       decoded_.clear();
     } else {
