@@ -5,21 +5,21 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
 # room | the rooms of ours that it sees, beside itself
 readonly ARROWS='
-server/scene       |
+server/model       |
 server/vulkan      |
 proto/codec        |
 proto/recording    | proto/codec clothstream
-server/reference   | server/scene
+server/reference   | server/model
 server/telemetry   |
-server/simulation  | server/scene server/vulkan shaders
-server/meshes      | server/scene
-server/messages    | server/scene server/meshes clothstream
-server/encode      | server/scene server/simulation server/vulkan proto/codec shaders
-server/stream      | server/scene server/vulkan server/simulation server/encode server/messages server/telemetry proto/codec clothstream
-server/recording   | server/scene server/vulkan server/simulation server/messages server/stream proto/codec proto/recording clothstream
-server/step        | server/scene server/vulkan server/simulation server/messages
-server/rpc         | server/stream server/telemetry clothstream grpc/health
-server/web         | server/stream server/telemetry clothstream
+server/simulation  | server/model server/vulkan shaders
+server/meshes      | server/model
+server/messages    | server/model server/meshes clothstream
+server/encode      | server/model server/simulation server/vulkan proto/codec shaders
+server/stream      | server/model server/vulkan server/simulation server/encode server/messages server/telemetry proto/codec clothstream
+server/recording   | server/model server/vulkan server/simulation server/messages server/stream proto/codec proto/recording clothstream
+server/step        | server/model server/vulkan server/simulation server/messages
+server/endpoint/grpc         | server/stream server/telemetry clothstream grpc/health
+server/endpoint/web         | server/stream server/telemetry clothstream
 clients/core       | proto/codec
 clients/grpc       | clients/core clothstream
 clients/library    | clients/core clients/grpc
@@ -30,9 +30,9 @@ clients/cli        | clients/core clients/grpc clients/files clients/load proto/
 # rooms that may include these headers
 readonly OUTSIDE='
 <vulkan/           | server/vulkan server/simulation server/encode
-<grpcpp/           | server/rpc clients/grpc clients/load
-<boost/beast       | server/web clients/load
-<Eigen/            | server/scene server/reference
+<grpcpp/           | server/endpoint/grpc clients/grpc clients/load
+<boost/beast       | server/endpoint/web clients/load
+<Eigen/            | server/model server/reference
 '
 
 failed=0

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// clothstream-server: scenes on a device, and two doors to them.
+// clothstream-server: scenes on a device, and two endpoints to them.
 #include <algorithm>
 #include <csignal>
 #include <cstdint>
@@ -16,19 +16,19 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include "server/endpoint/grpc/grpc_endpoint.h"
+#include "server/endpoint/web/web_endpoint.h"
 #include "server/messages/scene_file.h"
 #include "server/messages/scene_message.h"
+#include "server/model/material.h"
 #include "server/program_options.h"
 #include "server/recording/playback.h"
 #include "server/recording/recordings.h"
 #include "server/recording/resimulate.h"
-#include "server/rpc/rpc_door.h"
-#include "server/scene/material.h"
 #include "server/simulation/software_threads.h"
 #include "server/stream/scene_server.h"
 #include "server/telemetry/log.h"
 #include "server/vulkan/device.h"
-#include "server/web/web_door.h"
 
 namespace clothstream {
 namespace {
@@ -78,24 +78,24 @@ void listDevices() {
 
 void listMaterials() {
   fmt::print("{:<12}{:>8}{:>10}{:>8}{:>10}  {}\n", "", "kg/m^2", "N/m", "shear", "uN m", "");
-  for (const scene::Material& material : scene::materials())
+  for (const model::Material& material : model::materials())
     fmt::print("{:<12}{:>8}{:>10}{:>8}{:>10.3g}  {}\n", material.name, material.arealMass, material.tension,
                material.shear, 1e6 * double{material.rigidity}, material.description);
 }
 
-scene::Scene loaded(messages::Result<scene::Scene> scene) {
+model::Scene loaded(messages::Result<model::Scene> scene) {
   if (!scene) throw std::runtime_error(scene.error().text);
   return std::move(*scene);
 }
 
 // The largest stream rate that divides the new simulation rate and is not above the scene's own.
-std::uint32_t streamRateFor(const scene::Scene& scene, std::uint32_t rate) {
+std::uint32_t streamRateFor(const model::Scene& scene, std::uint32_t rate) {
   std::uint32_t streamRate = std::min(scene.streamRate, rate);
   while (rate % streamRate != 0) --streamRate;
   return streamRate;
 }
 
-scene::Scene adjusted(scene::Scene scene, const ProgramOptions& options) {
+model::Scene adjusted(model::Scene scene, const ProgramOptions& options) {
   if (options.rate) {
     scene.streamRate = streamRateFor(scene, *options.rate);
     scene.simulationRate = *options.rate;
@@ -115,15 +115,15 @@ scene::Scene adjusted(scene::Scene scene, const ProgramOptions& options) {
 }
 
 // The named ones and those from files; a file's takes the place of a named one with its name.
-std::vector<scene::Scene> loadScenes(const ProgramOptions& options) {
-  std::vector<scene::Scene> scenes;
+std::vector<model::Scene> loadScenes(const ProgramOptions& options) {
+  std::vector<model::Scene> scenes;
   for (const std::string& name : messages::namedScenes()) scenes.push_back(loaded(messages::loadScene(name)));
   for (const std::filesystem::path& file : options.sceneFiles) {
-    scene::Scene scene = loaded(messages::readSceneFile(file));
-    std::erase_if(scenes, [&](const scene::Scene& other) { return other.name == scene.name; });
+    model::Scene scene = loaded(messages::readSceneFile(file));
+    std::erase_if(scenes, [&](const model::Scene& other) { return other.name == scene.name; });
     scenes.push_back(std::move(scene));
   }
-  for (scene::Scene& scene : scenes)
+  for (model::Scene& scene : scenes)
     if (scene.name == options.scene) scene = adjusted(std::move(scene), options);
   return scenes;
 }
@@ -164,18 +164,18 @@ void waitForStop(const Signals& signals, const ProgramOptions& options,
   }
 }
 
-// Through both doors, until a signal or the end of the time; `intro` is what to say of the scenes.
-void openDoors(stream::SceneServer& server, const ProgramOptions& options, const Signals& signals,
-               const std::string& intro, const std::function<std::string()>& report) {
+// Through both endpoints, until a signal or the end of the time; `intro` is what to say of the scenes.
+void openEndpoints(stream::SceneServer& server, const ProgramOptions& options, const Signals& signals,
+                   const std::string& intro, const std::function<std::string()>& report) {
   {
     const std::filesystem::path page = options.page.empty() ? pageBesideProgram() : options.page;
     if (page.empty())
       spdlog::warn("there is no page beside the program: build clothstream_page, or name one by --page");
-    const web::WebDoor web(server, {.host = options.host,
-                                    .port = options.port,
-                                    .pageDirectory = page,
-                                    .allowedOrigins = options.allowedOrigins});
-    const rpc::RpcDoor rpc(server, {.host = options.host, .port = options.grpcPort});
+    const endpoint::WebEndpoint web(server, {.host = options.host,
+                                             .port = options.port,
+                                             .pageDirectory = page,
+                                             .allowedOrigins = options.allowedOrigins});
+    const endpoint::GrpcEndpoint rpc(server, {.host = options.host, .port = options.grpcPort});
 
     fmt::print("{}page    http://{}/\ngRPC    {}\n", intro, reachable(options.host, web.port()),
                reachable(options.host, rpc.port()));
@@ -212,13 +212,13 @@ void play(const ProgramOptions& options, const Signals& signals) {
   stream::SceneServer server(scene,
                              std::make_shared<recording::Playback>(std::move(*recording), options.playback),
                              shared(options, scene));
-  openDoors(server, options, signals, intro, [&] { return server.report(); });
+  openEndpoints(server, options, signals, intro, [&] { return server.report(); });
 }
 
 void serve(const ProgramOptions& options, const Signals& signals) {
-  std::vector<scene::Scene> scenes = loadScenes(options);
+  std::vector<model::Scene> scenes = loadScenes(options);
   std::string sceneList;
-  for (const scene::Scene& scene : scenes)
+  for (const model::Scene& scene : scenes)
     sceneList +=
         fmt::format("{}{} ({} vertices)", sceneList.empty() ? "" : ", ", scene.name, scene.nodeCount());
 
@@ -230,7 +230,7 @@ void serve(const ProgramOptions& options, const Signals& signals) {
                                    .serverName = kServerName,
                                    .maxBytes = static_cast<std::uint64_t>(options.recordLimitMb * 1e6)},
         !options.recordsOnRequest);
-  const auto first = std::ranges::find(scenes, options.scene, &scene::Scene::name);
+  const auto first = std::ranges::find(scenes, options.scene, &model::Scene::name);
   const std::uint32_t nodes = first == scenes.end() ? 0 : first->nodeCount();
   stream::ServerOptions serverOptions = shared(options, options.scene);
   serverOptions.device = deviceOptions(options, nodes);
@@ -238,13 +238,13 @@ void serve(const ProgramOptions& options, const Signals& signals) {
   serverOptions.reportRate = options.reportRate;
   serverOptions.maxCreatedScenes = options.maxCreatedScenes;
   serverOptions.encoderThreads = options.encoderThreads;
-  serverOptions.journals = [&](const scene::Scene& scene) {
+  serverOptions.journals = [&](const model::Scene& scene) {
     return recordings ? recordings->add(scene.name) : nullptr;
   };
   stream::SceneServer server(std::move(scenes), std::move(serverOptions));
   const auto report = [&] { return server.report() + (recordings ? recordings->report() : ""); };
-  openDoors(server, options, signals,
-            fmt::format("device  {}\nscenes  {}\n", describe(server.deviceInfo()), sceneList), report);
+  openEndpoints(server, options, signals,
+                fmt::format("device  {}\nscenes  {}\n", describe(server.deviceInfo()), sceneList), report);
 }
 
 constexpr int kInterrupted = 130;  // as shells have it
@@ -283,7 +283,7 @@ int runAgain(const ProgramOptions& options, const Signals& signals) {
 }
 
 int runSteps(const ProgramOptions& options, const Signals& signals) {
-  const scene::Scene scene = adjusted(loaded(messages::loadScene(options.scene)), options);
+  const model::Scene scene = adjusted(loaded(messages::loadScene(options.scene)), options);
   vulkan::Device device(deviceOptions(options, scene.nodeCount()));
   step::StepOptions stepOptions = *options.step;
   stepOptions.serverName = kServerName;

@@ -71,10 +71,10 @@ std::variant<ProgramOptions, int> parseOptions(int argc, const char* const* argv
   options.cacheDirectory = defaultCacheDirectory();
   double seconds = 0, hold = 60;
   std::vector<std::string> changeable;
-  const std::map<std::string, scene::Normals> normals{{"none", scene::Normals::none},
-                                                      {"octahedral", scene::Normals::octahedral}};
-  const std::map<std::string, scene::Coding> codings{{"entropy", scene::Coding::entropy},
-                                                     {"packed", scene::Coding::packed}};
+  const std::map<std::string, model::Normals> normals{{"none", model::Normals::none},
+                                                      {"octahedral", model::Normals::octahedral}};
+  const std::map<std::string, model::Coding> codings{{"entropy", model::Coding::entropy},
+                                                     {"packed", model::Coding::packed}};
 
   CLI::App app{"Simulates cloth with Vulkan and streams it to browsers and gRPC clients.",
                "clothstream-server"};

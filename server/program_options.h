@@ -10,8 +10,8 @@
 #include <variant>
 #include <vector>
 
+#include "server/model/scene.h"
 #include "server/recording/playback.h"
-#include "server/scene/scene.h"
 #include "server/step/step.h"
 #include "server/stream/roles.h"
 
@@ -23,8 +23,8 @@ struct ProgramOptions {
   // Of the scene above, instead of its own.
   std::optional<std::uint32_t> rate, substeps;
   std::optional<float> maxError;
-  std::optional<scene::Normals> normals;
-  std::optional<scene::Coding> coding;
+  std::optional<model::Normals> normals;
+  std::optional<model::Coding> coding;
   std::optional<std::uint32_t> temporalLayers, qualities;
   bool alwaysRun = false;
   double reportRate = 4;

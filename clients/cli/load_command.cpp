@@ -194,7 +194,7 @@ void LoadCommand::check() {
 }
 
 ExitCode LoadCommand::run() const {
-  const auto door = web_ ? load::makeWebDoor(address_) : load::makeGrpcDoor(address_);
+  const auto links = web_ ? load::makeWebLinks(address_) : load::makeGrpcLinks(address_);
   const bool shows = !json_ && isatty(STDOUT_FILENO) != 0;
   std::optional<double> before, after;
   const auto serverCpuNow = [&] { return serverPid_ ? cpuSeconds(*serverPid_) : std::nullopt; };
@@ -210,7 +210,7 @@ ExitCode LoadCommand::run() const {
       std::fflush(stdout);
     };
   }
-  load::LoadReport report = load::runLoad(*door, options_, progress);
+  load::LoadReport report = load::runLoad(*links, options_, progress);
   if (shows) fmt::print("\r\033[K");
   std::optional<double> serverCpu;
   if (before && after) serverCpu = *after - *before;

@@ -177,7 +177,7 @@ typedef struct cs_own_collider {
   float radius, length, size[3];
 } cs_own_collider;
 
-/* A grip on cloth, as Grab in session.proto says. NaN: the server's default. */
+/* A grab on cloth, as Grab in session.proto says. NaN: the server's default. */
 typedef struct cs_grab {
   uint32_t id; /* one that was not in use begins to hold; one that is missing lets go */
   float position[3];
@@ -192,7 +192,7 @@ typedef enum cs_hand_side { CS_HAND_LEFT = 1, CS_HAND_RIGHT = 2 } cs_hand_side;
 
 /* GrabEventKind of session.proto. */
 typedef enum cs_grab_event_kind {
-  CS_GRAB_TAKEN = 1,   /* a grip began */
+  CS_GRAB_TAKEN = 1,   /* a grab began */
   CS_GRAB_SLIPPED = 2, /* it lost some of its vertices, or the last */
   CS_GRAB_RELEASED = 3 /* its participant let go, or left */
 } cs_grab_event_kind;
@@ -201,7 +201,7 @@ typedef struct cs_grab_event {
   uint64_t participant_id;
   uint32_t grab_id;
   uint32_t kind;     /* cs_grab_event_kind, or one that this client does not know yet */
-  uint32_t vertices; /* that the grip holds now */
+  uint32_t vertices; /* that the grab holds now */
 } cs_grab_event;
 
 /* ContactEventKind of session.proto. */
@@ -444,7 +444,7 @@ const char* cs_cloth_material(const cs_client* client, uint32_t cloth) CS_NOEXCE
 /* Who made the newest change that CS_EVENT_PARAMETERS told of; 0: the server. */
 uint64_t cs_parameters_participant(const cs_client* client) CS_NOEXCEPT;
 
-/* What became of everybody's grips, as the newest CS_EVENT_GRABS told. 0 if there is no such event. */
+/* What became of everybody's grabs, as the newest CS_EVENT_GRABS told. 0 if there is no such event. */
 uint32_t cs_grab_event_count(const cs_client* client) CS_NOEXCEPT;
 int cs_get_grab_event(const cs_client* client, uint32_t index, cs_grab_event* out) CS_NOEXCEPT;
 
@@ -470,7 +470,7 @@ void cs_set_shapes(cs_client* client, const cs_own_collider* colliders, uint32_t
  * side or number of joints. */
 int cs_set_hand(cs_client* client, uint32_t side, const float* joints, uint32_t count,
                 uint64_t now_us) CS_NOEXCEPT;
-/* This participant's grips, at most CS_MAX_GRABS (the rest is left out); replaces all former ones. */
+/* This participant's grabs, at most CS_MAX_GRABS (the rest is left out); replaces all former ones. */
 void cs_set_grabs(cs_client* client, const cs_grab* grabs, uint32_t count, uint64_t now_us) CS_NOEXCEPT;
 /* Where an attachment of the scene is to go; orientation4 NULL: not turned. It stays there. */
 void cs_move_attachment(cs_client* client, const char* attachment, const float* position3,

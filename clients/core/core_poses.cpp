@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The C interface over Client: this participant's poses and grips, and what came of everybody's.
+// The C interface over Client: this participant's poses and grabs, and what came of everybody's.
 #include <algorithm>
 #include <array>
 #include <cstddef>

@@ -21,8 +21,8 @@ constexpr int kRequestsAStep = 100;
 
 }  // namespace
 
-Intruder::Intruder(Door& door, std::string scene, std::size_t first)
-    : door_(door), scene_(std::move(scene)), kind_(first % kKinds) {}
+Intruder::Intruder(Links& links, std::string scene, std::size_t first)
+    : endpoint_(links), scene_(std::move(scene)), kind_(first % kKinds) {}
 
 Intruder::~Intruder() {
   drop();
@@ -48,7 +48,7 @@ std::string Intruder::hello() const {
 void Intruder::visit() {
   gone_ = joined_ = false;
   ++visits_;
-  link_ = door_.open(*this);
+  link_ = endpoint_.open(*this);
   if (kind_ == kNoise) {
     std::string noise(200, '\0');
     for (std::size_t i = 0; i < noise.size(); ++i) noise[i] = static_cast<char>(i * i + 7 * visits_);

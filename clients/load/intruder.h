@@ -19,7 +19,7 @@ namespace clothstream::load {
 class Intruder final : private LinkListener {
  public:
   // `first`: of those kinds, the one to begin with.
-  Intruder(Door& door, std::string scene, std::size_t first);
+  Intruder(Links& links, std::string scene, std::size_t first);
   ~Intruder();
   Intruder(const Intruder&) = delete;
   Intruder& operator=(const Intruder&) = delete;
@@ -35,7 +35,7 @@ class Intruder final : private LinkListener {
   void drop();
   std::string hello() const;
 
-  Door& door_;
+  Links& endpoint_;
   const std::string scene_;
   std::size_t kind_;
   std::uint64_t visits_ = 0;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// One connection to a server by either of its doors, many of which share few threads.
+// One connection to a server by either of its endpoints, many of which share few threads.
 #pragma once
 
 #include <cstddef>
@@ -9,7 +9,7 @@
 
 namespace clothstream::load {
 
-// What a link tells, from a thread of its door, one call at a time; closed() is the last.
+// What a link tells, from a thread of its links, one call at a time; closed() is the last.
 class LinkListener {
  public:
   // One message, for which Link::read() asked; the bytes are gone when it returns.
@@ -36,15 +36,15 @@ class Link {
   virtual void drop() = 0;
 };
 
-class Door {
+class Links {
  public:
-  virtual ~Door() = default;
-  // Begins to connect. The listener outlives the link, which must not outlive the door.
+  virtual ~Links() = default;
+  // Begins to connect. The listener outlives the link, which must not outlive the links.
   virtual std::unique_ptr<Link> open(LinkListener& listener) = 0;
 };
 
 // `address` is HOST:PORT.
-std::unique_ptr<Door> makeGrpcDoor(const std::string& address);
-std::unique_ptr<Door> makeWebDoor(const std::string& address);
+std::unique_ptr<Links> makeGrpcLinks(const std::string& address);
+std::unique_ptr<Links> makeWebLinks(const std::string& address);
 
 }  // namespace clothstream::load

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// One thread steps everybody; the door's threads do what comes.
+// One thread steps everybody; the links's threads do what comes.
 #include "clients/load/load.h"
 
 #include <algorithm>
@@ -26,13 +26,13 @@ Clock::duration inSeconds(double seconds) {
 
 class Load {
  public:
-  Load(Door& door, const LoadOptions& options, const LoadProgress& progress)
-      : door_(door), options_(options), progress_(progress) {
+  Load(Links& links, const LoadOptions& options, const LoadProgress& progress)
+      : endpoint_(links), options_(options), progress_(progress) {
     report_.participants = options.participants;
     report_.slow = options.slow;
     report_.intruders = options.intruders;
     for (std::uint32_t i = 0; i < options.intruders; ++i)
-      intruders_.push_back(std::make_unique<Intruder>(door, options.scene, i));
+      intruders_.push_back(std::make_unique<Intruder>(links, options.scene, i));
   }
 
   LoadReport run() {
@@ -62,13 +62,13 @@ class Load {
 
   std::unique_ptr<Participant> make(std::uint32_t number) {
     return std::make_unique<Participant>(
-        door_, ParticipantOptions{
-                   .scene = options_.scene,
-                   .name = "load " + std::to_string(++names_),
-                   .decodes = number < options_.decoders,
-                   .moves = number + options_.viewers < options_.participants,
-                   .phase = number * std::numbers::phi,
-                   .bytesPerSecond = number < options_.participants ? 0 : options_.slowBytesPerSecond});
+        endpoint_, ParticipantOptions{
+                       .scene = options_.scene,
+                       .name = "load " + std::to_string(++names_),
+                       .decodes = number < options_.decoders,
+                       .moves = number + options_.viewers < options_.participants,
+                       .phase = number * std::numbers::phi,
+                       .bytesPerSecond = number < options_.participants ? 0 : options_.slowBytesPerSecond});
   }
 
   // False where it was ended early, or somebody could not stay.
@@ -156,7 +156,7 @@ class Load {
     return progress_.running();
   }
 
-  Door& door_;
+  Links& endpoint_;
   const LoadOptions options_;
   const LoadProgress progress_;
   LoadReport report_;
@@ -196,8 +196,8 @@ double percentile(std::vector<float>& samples, double percent) {
   return static_cast<double>(*at);
 }
 
-LoadReport runLoad(Door& door, const LoadOptions& options, const LoadProgress& progress) {
-  return Load(door, options, progress).run();
+LoadReport runLoad(Links& links, const LoadOptions& options, const LoadProgress& progress) {
+  return Load(links, options, progress).run();
 }
 
 }  // namespace clothstream::load

@@ -53,6 +53,6 @@ struct LoadProgress {
   std::function<void()> measured;               // and still are: the time is over
   std::function<void(const LoadReport&)> show;  // once a second, of the last one; may be empty
 };
-LoadReport runLoad(Door& door, const LoadOptions& options, const LoadProgress& progress);
+LoadReport runLoad(Links& links, const LoadOptions& options, const LoadProgress& progress);
 
 }  // namespace clothstream::load

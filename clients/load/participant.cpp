@@ -35,7 +35,7 @@ void Figures::add(const Figures& other) {
   poses.add(other.poses);
 }
 
-Participant::Participant(Door& door, const ParticipantOptions& options)
+Participant::Participant(Links& links, const ParticipantOptions& options)
     : options_(options),
       core_(cs_create_as(options.scene.c_str(), "clothstream load", options.name.c_str(),
                          options.moves ? CS_ROLE_PARTICIPANT : CS_ROLE_VIEWER),
@@ -46,7 +46,7 @@ Participant::Participant(Door& door, const ParticipantOptions& options)
     cs_default_play_out(&playOut);
     cs_set_play_out(core_.get(), &playOut);
   }
-  link_ = door.open(*this);
+  link_ = links.open(*this);
   flush();
   link_->read();
 }

@@ -50,7 +50,7 @@ struct Figures {
 
 class Participant final : private LinkListener {
  public:
-  Participant(Door& door, const ParticipantOptions& options);
+  Participant(Links& links, const ParticipantOptions& options);
   ~Participant();
   Participant(const Participant&) = delete;
   Participant& operator=(const Participant&) = delete;

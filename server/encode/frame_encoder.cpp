@@ -10,35 +10,35 @@
 
 #include "server/encode/device_predictor.h"
 #include "server/encode/encode_stage.h"
-#include "server/scene/mesh.h"
+#include "server/model/mesh.h"
 
 namespace clothstream::encode {
 namespace {
 
-std::vector<std::uint32_t> trianglesOf(const scene::Mesh& mesh) {
+std::vector<std::uint32_t> trianglesOf(const model::Mesh& mesh) {
   std::vector<std::uint32_t> corners;
   corners.reserve(3 * mesh.shape.triangles.size());
-  for (const scene::Triangle& triangle : mesh.shape.triangles)
+  for (const model::Triangle& triangle : mesh.shape.triangles)
     corners.insert(corners.end(), triangle.begin(), triangle.end());
   return corners;
 }
 
-std::vector<float> coordinatesOf(const scene::Mesh& mesh) {
+std::vector<float> coordinatesOf(const model::Mesh& mesh) {
   std::vector<float> coordinates;
   coordinates.reserve(3 * mesh.shape.positions.size());
-  for (const scene::Vec3& position : mesh.shape.positions)
+  for (const model::Vec3& position : mesh.shape.positions)
     coordinates.insert(coordinates.end(), {position.x(), position.y(), position.z()});
   return coordinates;
 }
 
 }  // namespace
 
-std::uint8_t codecOf(const scene::Scene& scene) {
-  return scene.stream.coding == scene::Coding::packed ? codec::kCodecPacked : codec::kCodecHierarchical;
+std::uint8_t codecOf(const model::Scene& scene) {
+  return scene.stream.coding == model::Coding::packed ? codec::kCodecPacked : codec::kCodecHierarchical;
 }
 
-codec::StreamLayout streamLayout(const scene::Scene& scene, std::uint32_t epoch) {
-  const bool normals = scene.stream.normals == scene::Normals::octahedral;
+codec::StreamLayout streamLayout(const model::Scene& scene, std::uint32_t epoch) {
+  const bool normals = scene.stream.normals == model::Normals::octahedral;
   codec::StreamLayout layout{.epoch = epoch,
                              .codec = codecOf(scene),
                              .maxError = scene.stream.maxError,
@@ -46,7 +46,7 @@ codec::StreamLayout streamLayout(const scene::Scene& scene, std::uint32_t epoch)
                              .temporalLayers = scene.stream.temporalLayers,
                              .qualities = scene.stream.qualities,
                              .cloths = {}};
-  for (const scene::Cloth& cloth : scene.cloths) {
+  for (const model::Cloth& cloth : scene.cloths) {
     if (cloth.mesh)
       layout.cloths.push_back({.vertexCount = cloth.nodeCount(),
                                .triangles = trianglesOf(*cloth.mesh),

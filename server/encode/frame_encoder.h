@@ -18,10 +18,10 @@
 namespace clothstream::encode {
 
 // Which of codec::kCodecs a scene's stream is in.
-std::uint8_t codecOf(const scene::Scene& scene);
+std::uint8_t codecOf(const model::Scene& scene);
 
 // The layout of a scene's stream.
-codec::StreamLayout streamLayout(const scene::Scene& scene, std::uint32_t epoch);
+codec::StreamLayout streamLayout(const model::Scene& scene, std::uint32_t epoch);
 
 // Where frames are predicted: on GPUs on the device, on the host where the device is software (a dispatch
 // costs more there than the CPU's vectors do), where there are temporal layers, or where the device's buffers

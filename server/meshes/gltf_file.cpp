@@ -95,14 +95,14 @@ Expected<std::vector<std::uint32_t>> readIndices(const tinygltf::Model& model,
   return indices;
 }
 
-std::optional<scene::Uv> readUv(const Elements& elements, std::size_t i) {
+std::optional<model::Uv> readUv(const Elements& elements, std::size_t i) {
   switch (elements.componentType) {
     case TINYGLTF_COMPONENT_TYPE_FLOAT:
-      return scene::Uv(elements.at<float>(i, 0), elements.at<float>(i, 1));
+      return model::Uv(elements.at<float>(i, 0), elements.at<float>(i, 1));
     case TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE:
-      return scene::Uv(elements.at<std::uint8_t>(i, 0), elements.at<std::uint8_t>(i, 1)) / 255.0f;
+      return model::Uv(elements.at<std::uint8_t>(i, 0), elements.at<std::uint8_t>(i, 1)) / 255.0f;
     case TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT:
-      return scene::Uv(elements.at<std::uint16_t>(i, 0), elements.at<std::uint16_t>(i, 1)) / 65535.0f;
+      return model::Uv(elements.at<std::uint16_t>(i, 0), elements.at<std::uint16_t>(i, 1)) / 65535.0f;
     default:
       return std::nullopt;
   }

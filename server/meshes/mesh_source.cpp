@@ -14,8 +14,8 @@
 namespace clothstream::meshes {
 namespace {
 
-using scene::Triangle;
-using scene::Vec3;
+using model::Triangle;
+using model::Vec3;
 using Problem = std::optional<std::string>;
 
 std::string shown(const Vec3& p) {
@@ -195,7 +195,7 @@ bool isFlat(const Vec3& a, const Vec3& b, const Vec3& c) {
 
 // Appends the face's triangles, and says which face each is of.
 Problem appendFace(const MeshSource& source, std::size_t f, const Numbering& numbering,
-                   scene::MeshShape& shape, std::vector<std::size_t>& faceOfTriangle) {
+                   model::MeshShape& shape, std::vector<std::size_t>& faceOfTriangle) {
   const SourceFace& face = source.faces[f];
   const auto node = [&](std::size_t corner) { return numbering.nodeOfVertex[face.vertices[corner]]; };
   const auto at = [&](std::size_t corner) -> const Vec3& { return shape.positions[node(corner)]; };
@@ -220,7 +220,7 @@ Problem appendFace(const MeshSource& source, std::size_t f, const Numbering& num
 
 // Those of the source that come as two triangles.
 Problem addQuads(const MeshSource& source, const std::vector<std::size_t>& faceOfTriangle,
-                 scene::MeshShape& shape) {
+                 model::MeshShape& shape) {
   std::size_t free = 0;
   for (const std::size_t f : source.halves) {
     const auto refuse = [&](std::string_view why) {
@@ -243,7 +243,7 @@ Problem addQuads(const MeshSource& source, const std::vector<std::size_t>& faceO
   return std::nullopt;
 }
 
-Problem checkEdges(const scene::MeshShape& shape, const std::vector<std::size_t>& faceOfTriangle,
+Problem checkEdges(const model::MeshShape& shape, const std::vector<std::size_t>& faceOfTriangle,
                    const std::vector<std::uint32_t>& vertexOfNode) {
   struct Side {
     std::uint32_t low, high, triangle;
@@ -277,9 +277,9 @@ Problem checkEdges(const scene::MeshShape& shape, const std::vector<std::size_t>
   return std::nullopt;
 }
 
-std::vector<scene::Submesh> submeshes(const MeshSource& source,
+std::vector<model::Submesh> submeshes(const MeshSource& source,
                                       const std::vector<std::size_t>& faceOfTriangle) {
-  std::vector<scene::Submesh> found;
+  std::vector<model::Submesh> found;
   const auto triangleOfFace = [&](std::size_t face) {
     return static_cast<std::uint32_t>(std::ranges::lower_bound(faceOfTriangle, face) -
                                       faceOfTriangle.begin());
@@ -304,7 +304,7 @@ tl::expected<BuiltMesh, std::string> buildMesh(const MeshSource& source, const M
   if (Problem problem = place(source, options, limits, placed)) return tl::unexpected(std::move(*problem));
   Numbering numbering = numberNodes(source, placed, options.weldDistance);
 
-  scene::MeshShape shape;
+  model::MeshShape shape;
   shape.positions.reserve(numbering.vertexOfNode.size());
   for (const std::uint32_t vertex : numbering.vertexOfNode) shape.positions.push_back(placed[vertex]);
   shape.uvs = source.uvs;
@@ -318,7 +318,7 @@ tl::expected<BuiltMesh, std::string> buildMesh(const MeshSource& source, const M
   if (Problem problem = checkEdges(shape, faceOfTriangle, numbering.vertexOfNode))
     return tl::unexpected(std::move(*problem));
   shape.submeshes = submeshes(source, faceOfTriangle);
-  return BuiltMesh{scene::makeMesh(std::move(shape)), std::move(numbering.nodeOfVertex)};
+  return BuiltMesh{model::makeMesh(std::move(shape)), std::move(numbering.nodeOfVertex)};
 }
 
 }  // namespace clothstream::meshes

@@ -8,7 +8,7 @@
 
 #include <tl/expected.hpp>
 
-#include "server/scene/mesh.h"
+#include "server/model/mesh.h"
 
 namespace clothstream::meshes {
 
@@ -21,8 +21,8 @@ struct SourceFace {
 
 // In the numbers of whoever made it.
 struct MeshSource {
-  std::vector<scene::Vec3> vertices;
-  std::vector<scene::Uv> uvs;  // empty: none, and none in the faces
+  std::vector<model::Vec3> vertices;
+  std::vector<model::Uv> uvs;  // empty: none, and none in the faces
   std::vector<SourceFace> faces;
   // Triangles that with the face after them are the halves of a quad, ascending.
   std::vector<std::size_t> halves;
@@ -40,13 +40,13 @@ struct MeshLimits {
 };
 
 struct MeshOptions {
-  scene::Pose pose = {};
+  model::Pose pose = {};
   float scale = 1;         // of the source's units to metres, before the pose
   float weldDistance = 0;  // m; vertices nearer than this become one node; 0: none do
 };
 
 struct BuiltMesh {
-  scene::Mesh mesh;
+  model::Mesh mesh;
   // Of each of the source's vertices its node; kNoNode where it has no face.
   std::vector<std::uint32_t> nodeOfVertex;
 };

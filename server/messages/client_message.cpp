@@ -27,7 +27,7 @@ void checkNew(Checks& checks, const Path& path, std::uint32_t id, std::unordered
 }
 
 void readColliders(Checks& checks, const Path& poses, const v1::ColliderPoses& message,
-                   scene::ParticipantPoses& to) {
+                   model::ParticipantPoses& to) {
   checks.count(poses / "hands", static_cast<std::size_t>(message.hands_size()), 0, 2);
   if (checks.failed()) return;
   const std::size_t ofHands = kHandBones * static_cast<std::size_t>(message.hands_size());
@@ -42,14 +42,14 @@ void readColliders(Checks& checks, const Path& poses, const v1::ColliderPoses& m
         {from.id(), toPose(checks, path / "pose", from.pose()), toShape(checks, path, from)});
   }
   for (int i = 0; i < message.hands_size() && !checks.failed(); ++i)
-    for (scene::ParticipantCollider& bone : toBones(checks, poses.at("hands", i), message.hands(i))) {
+    for (model::ParticipantCollider& bone : toBones(checks, poses.at("hands", i), message.hands(i))) {
       checkNew(checks, poses.at("hands", i), bone.id, ids);
       to.colliders.push_back(std::move(bone));
     }
 }
 
 void readGrabs(Checks& checks, const Path& poses, const v1::ColliderPoses& message,
-               scene::ParticipantPoses& to) {
+               model::ParticipantPoses& to) {
   checks.count(poses / "grabs", static_cast<std::size_t>(message.grabs_size()), 0,
                limits::kMaxParticipantGrabs);
   std::unordered_set<std::uint32_t> ids;
@@ -57,7 +57,7 @@ void readGrabs(Checks& checks, const Path& poses, const v1::ColliderPoses& messa
     const v1::Grab& from = message.grabs(i);
     const Path path = poses.at("grabs", i);
     checkNew(checks, path, from.id(), ids);
-    scene::Grab grab{.id = from.id(), .pose = toPose(checks, path / "pose", from.pose())};
+    model::Grab grab{.id = from.id(), .pose = toPose(checks, path / "pose", from.pose())};
     if (from.has_radius()) grab.radius = checks.number(path / "radius", from.radius(), limits::kGrabRadius);
     if (from.has_reach()) grab.reach = checks.number(path / "reach", from.reach(), limits::kGrabReach);
     if (from.has_max_force())
@@ -69,18 +69,18 @@ void readGrabs(Checks& checks, const Path& poses, const v1::ColliderPoses& messa
 }
 
 void readAttachments(Checks& checks, const Path& poses, const v1::ColliderPoses& message,
-                     const scene::Scene& scene, scene::ParticipantPoses& to) {
+                     const model::Scene& scene, model::ParticipantPoses& to) {
   checks.count(poses / "attachments", static_cast<std::size_t>(message.attachments_size()), 0,
                limits::kMaxAttachments);
   if (message.attachments_size() == 0 || checks.failed()) return;
-  std::vector<scene::Attachment> known;
-  for (const scene::Cloth& cloth : scene.cloths)
+  std::vector<model::Attachment> known;
+  for (const model::Cloth& cloth : scene.cloths)
     known.insert(known.end(), cloth.attachments.begin(), cloth.attachments.end());
   for (int i = 0; i < message.attachments_size() && !checks.failed(); ++i) {
     const v1::AttachmentPose& from = message.attachments(i);
     const Path path = poses.at("attachments", i);
     checkKnown(checks, path / "name", from.name(), known);
-    const auto found = std::ranges::find(known, from.name(), &scene::Attachment::name);
+    const auto found = std::ranges::find(known, from.name(), &model::Attachment::name);
     to.attachments.push_back(
         {static_cast<std::size_t>(found - known.begin()), toPose(checks, path / "pose", from.pose())});
   }
@@ -136,10 +136,10 @@ Result<Joining> toJoining(const v1::Hello& message, std::span<const std::uint32_
                  static_cast<std::uint8_t>(layer + 1)};
 }
 
-Result<scene::ParticipantPoses> toPoses(const v1::ColliderPoses& message, const scene::Scene& scene) {
+Result<model::ParticipantPoses> toPoses(const v1::ColliderPoses& message, const model::Scene& scene) {
   Checks checks;
   const Path path("colliderPoses");
-  scene::ParticipantPoses poses;
+  model::ParticipantPoses poses;
   readColliders(checks, path, message, poses);
   readGrabs(checks, path, message, poses);
   readAttachments(checks, path, message, scene, poses);

@@ -10,7 +10,7 @@
 
 #include "clothstream/v1/session.pb.h"
 #include "server/messages/field_error.h"
-#include "server/scene/input.h"
+#include "server/model/input.h"
 
 namespace clothstream::messages {
 
@@ -38,12 +38,12 @@ struct Joining {
 
 // At most limits::kMaxParticipantColliders, those of hands after the others, and
 // limits::kMaxParticipantGrabs, with unique ids; attachments that this scene has, each once.
-[[nodiscard]] Result<scene::ParticipantPoses> toPoses(const v1::ColliderPoses& message,
-                                                      const scene::Scene& scene);
+[[nodiscard]] Result<model::ParticipantPoses> toPoses(const v1::ColliderPoses& message,
+                                                      const model::Scene& scene);
 
 // A change that may be applied to this scene as a whole: names exist in it, values are in range, and it stays
 // stable with its substeps.
-[[nodiscard]] Result<scene::ParameterChange> toParameterChange(const v1::ParameterChange& message,
-                                                               const scene::Scene& scene);
+[[nodiscard]] Result<model::ParameterChange> toParameterChange(const v1::ParameterChange& message,
+                                                               const model::Scene& scene);
 
 }  // namespace clothstream::messages

@@ -11,12 +11,12 @@
 #include "server/messages/scene_message.h"
 #include "server/messages/shapes.h"
 #include "server/messages/vectors.h"
-#include "server/scene/mesh.h"
+#include "server/model/mesh.h"
 
 namespace clothstream::messages {
 namespace {
 
-static_assert(sizeof(scene::Vec3) == 12 && sizeof(scene::Uv) == 8 && sizeof(scene::Triangle) == 12);
+static_assert(sizeof(model::Vec3) == 12 && sizeof(model::Uv) == 8 && sizeof(model::Triangle) == 12);
 
 // Of elements that are floats or numbers side by side.
 template <typename Element>
@@ -25,19 +25,19 @@ std::string littleEndian(const std::vector<Element>& elements) {
   return {reinterpret_cast<const char*>(elements.data()), elements.size() * sizeof(Element)};
 }
 
-void writeShape(const scene::Cloth& cloth, v1::ClothDescription& message) {
+void writeShape(const model::Cloth& cloth, v1::ClothDescription& message) {
   message.set_vertex_count(cloth.nodeCount());
-  message.set_rest_positions(littleEndian(scene::restPositions(cloth)));
+  message.set_rest_positions(littleEndian(model::restPositions(cloth)));
   if (!cloth.mesh) {
     message.set_rows(cloth.grid.rows);
     message.set_columns(cloth.grid.columns);
     return;
   }
-  const scene::MeshShape& shape = cloth.mesh->shape;
+  const model::MeshShape& shape = cloth.mesh->shape;
   message.set_triangles(littleEndian(shape.triangles));
   message.set_uvs(littleEndian(shape.uvs));
   message.set_uv_triangles(littleEndian(shape.uvTriangles));
-  for (const scene::Submesh& part : shape.submeshes) {
+  for (const model::Submesh& part : shape.submeshes) {
     v1::Submesh& partMessage = *message.add_submeshes();
     partMessage.set_name(part.name);
     partMessage.set_triangle_count(part.triangleCount);
@@ -46,7 +46,7 @@ void writeShape(const scene::Cloth& cloth, v1::ClothDescription& message) {
 
 }  // namespace
 
-void write(const scene::Collider& collider, const scene::Pose& pose, v1::ColliderState& state) {
+void write(const model::Collider& collider, const model::Pose& pose, v1::ColliderState& state) {
   state.set_name(collider.name);
   write(pose.position, *state.mutable_position());
   write(pose.orientation, *state.mutable_orientation());
@@ -54,7 +54,7 @@ void write(const scene::Collider& collider, const scene::Pose& pose, v1::Collide
   write(collider.shape, state);
 }
 
-void write(const scene::ParticipantCollider& collider, std::uint64_t participantId,
+void write(const model::ParticipantCollider& collider, std::uint64_t participantId,
            v1::ColliderState& state) {
   state.set_name(std::to_string(collider.id));
   write(collider.pose.position, *state.mutable_position());
@@ -63,24 +63,24 @@ void write(const scene::ParticipantCollider& collider, std::uint64_t participant
   write(collider.shape, state);
 }
 
-std::size_t geometryBytes(const scene::Cloth& cloth) {
-  std::size_t bytes = sizeof(scene::Vec3) * cloth.nodeCount();
+std::size_t geometryBytes(const model::Cloth& cloth) {
+  std::size_t bytes = sizeof(model::Vec3) * cloth.nodeCount();
   if (!cloth.mesh) return bytes;
-  const scene::MeshShape& shape = cloth.mesh->shape;
-  return bytes + sizeof(scene::Triangle) * (shape.triangles.size() + shape.uvTriangles.size()) +
-         sizeof(scene::Uv) * shape.uvs.size();
+  const model::MeshShape& shape = cloth.mesh->shape;
+  return bytes + sizeof(model::Triangle) * (shape.triangles.size() + shape.uvTriangles.size()) +
+         sizeof(model::Uv) * shape.uvs.size();
 }
 
-v1::StreamDescription toDescription(const scene::Scene& scene, std::uint32_t epoch, std::uint32_t codec,
+v1::StreamDescription toDescription(const model::Scene& scene, std::uint32_t epoch, std::uint32_t codec,
                                     double seconds) {
   v1::StreamDescription description = descriptionWithoutCloths(scene, epoch, codec, seconds);
   description.mutable_cloths()->Swap(clothsOfDescription(scene).mutable_cloths());
   return description;
 }
 
-v1::StreamDescription clothsOfDescription(const scene::Scene& scene) {
+v1::StreamDescription clothsOfDescription(const model::Scene& scene) {
   v1::StreamDescription description;
-  for (const scene::Cloth& cloth : scene.cloths) {
+  for (const model::Cloth& cloth : scene.cloths) {
     v1::ClothDescription& message = *description.add_cloths();
     message.set_name(cloth.name);
     writeShape(cloth, message);
@@ -88,7 +88,7 @@ v1::StreamDescription clothsOfDescription(const scene::Scene& scene) {
   return description;
 }
 
-v1::StreamDescription descriptionWithoutCloths(const scene::Scene& scene, std::uint32_t epoch,
+v1::StreamDescription descriptionWithoutCloths(const model::Scene& scene, std::uint32_t epoch,
                                                std::uint32_t codec, double seconds) {
   v1::StreamDescription description;
   description.set_epoch(epoch);
@@ -100,19 +100,19 @@ v1::StreamDescription descriptionWithoutCloths(const scene::Scene& scene, std::u
   description.set_normals(toMessage(scene.stream.normals));
   description.set_temporal_layers(scene.stream.temporalLayers);
   description.set_qualities(scene.stream.qualities);
-  for (const scene::Collider& collider : scene.colliders) {
+  for (const model::Collider& collider : scene.colliders) {
     v1::ColliderState& state = *description.add_colliders();
-    write(collider, scene::poseAt(collider, seconds), state);
-    if (const auto* hull = std::get_if<scene::Hull>(&collider.shape))
+    write(collider, model::poseAt(collider, seconds), state);
+    if (const auto* hull = std::get_if<model::Hull>(&collider.shape))
       writeHull(**hull, *state.mutable_hull());
   }
   *description.mutable_definition() = toMessageWithoutMeshes(scene);
-  for (const scene::Material& material : scene::materials())
+  for (const model::Material& material : model::materials())
     description.add_materials(std::string(material.name));
   return description;
 }
 
-v1::SceneSummary toSummary(const scene::Scene& scene) {
+v1::SceneSummary toSummary(const model::Scene& scene) {
   v1::SceneSummary summary;
   summary.set_name(scene.name);
   summary.set_description(scene.description);

@@ -8,31 +8,31 @@
 #include <string_view>
 
 #include "clothstream/v1/session.pb.h"
-#include "server/scene/input.h"
-#include "server/scene/scene.h"
+#include "server/model/input.h"
+#include "server/model/scene.h"
 
 namespace clothstream::messages {
 
 // Overwrites every field of `state`, so that one message can be filled again each tick. A participant's
 // collider is named by its id. A hull's shape is left out.
-void write(const scene::Collider& collider, const scene::Pose& pose, v1::ColliderState& state);
-void write(const scene::ParticipantCollider& collider, std::uint64_t participantId, v1::ColliderState& state);
+void write(const model::Collider& collider, const model::Pose& pose, v1::ColliderState& state);
+void write(const model::ParticipantCollider& collider, std::uint64_t participantId, v1::ColliderState& state);
 
 // What a cloth's vertices, triangles and texture coordinates take in a description.
-std::size_t geometryBytes(const scene::Cloth& cloth);
+std::size_t geometryBytes(const model::Cloth& cloth);
 
 // With the scene's own colliders, hulls too, as they are at `seconds` of simulated time. The scene must be
 // valid.
-v1::StreamDescription toDescription(const scene::Scene& scene, std::uint32_t epoch, std::uint32_t codec,
+v1::StreamDescription toDescription(const model::Scene& scene, std::uint32_t epoch, std::uint32_t codec,
                                     double seconds);
 // Its two parts, which one after the other on the wire are the whole: `cloths`, most of its bytes, which stay
 // as they are while the scene runs, and all else.
-v1::StreamDescription clothsOfDescription(const scene::Scene& scene);
-v1::StreamDescription descriptionWithoutCloths(const scene::Scene& scene, std::uint32_t epoch,
+v1::StreamDescription clothsOfDescription(const model::Scene& scene);
+v1::StreamDescription descriptionWithoutCloths(const model::Scene& scene, std::uint32_t epoch,
                                                std::uint32_t codec, double seconds);
 
 // A scene as a list shows it; who is in it, and whether it runs, only the caller knows.
-v1::SceneSummary toSummary(const scene::Scene& scene);
+v1::SceneSummary toSummary(const model::Scene& scene);
 
 // How many pieces a content of so many bytes has: of limits::kMaxChunkBytes, the last may be shorter; one
 // empty piece for empty content.

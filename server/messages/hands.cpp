@@ -29,22 +29,22 @@ constexpr std::array<Bone, kHandBones> kBones{{{2, 3},   {3, 4},   {4, 5},   {6,
 constexpr std::size_t kThumbBones = 3;
 
 struct Joints {
-  std::array<scene::Vec3, kJoints> positions;
+  std::array<model::Vec3, kJoints> positions;
   std::array<float, kJoints> radii;
 };
 
 // From Y to the bone. X is kept in the plane of the bone and what lies across it, so that a capsule that
 // follows a hand does not spin about itself.
-scene::Quaternion along(const scene::Vec3& bone, const scene::Vec3& across) {
+model::Quaternion along(const model::Vec3& bone, const model::Vec3& across) {
   const float length = bone.norm();
-  if (!(length > 0)) return scene::Quaternion::Identity();
-  const scene::Vec3 y = bone / length;
-  scene::Vec3 x = across - across.dot(y) * y;
-  if (!(x.norm() > 0.01f * across.norm())) return scene::Quaternion::FromTwoVectors(scene::Vec3::UnitY(), y);
+  if (!(length > 0)) return model::Quaternion::Identity();
+  const model::Vec3 y = bone / length;
+  model::Vec3 x = across - across.dot(y) * y;
+  if (!(x.norm() > 0.01f * across.norm())) return model::Quaternion::FromTwoVectors(model::Vec3::UnitY(), y);
   x.normalize();
   Eigen::Matrix3f axes;
   axes << x, y, x.cross(y);
-  return scene::Quaternion(axes).normalized();
+  return model::Quaternion(axes).normalized();
 }
 
 bool readJoints(Checks& checks, const Path& path, const v1::HandJoints& message, Joints& joints) {
@@ -77,7 +77,7 @@ bool readJoints(Checks& checks, const Path& path, const v1::HandJoints& message,
 
 }  // namespace
 
-std::vector<scene::ParticipantCollider> toBones(Checks& checks, const Path& path,
+std::vector<model::ParticipantCollider> toBones(Checks& checks, const Path& path,
                                                 const v1::HandJoints& message) {
   if (message.side() != v1::HAND_SIDE_LEFT && message.side() != v1::HAND_SIDE_RIGHT)
     checks.fail(path / "side", fmt::format("{}", static_cast<int>(message.side())),
@@ -85,19 +85,19 @@ std::vector<scene::ParticipantCollider> toBones(Checks& checks, const Path& path
   Joints joints;
   if (checks.failed() || !readJoints(checks, path, message, joints)) return {};
   const auto& at = joints.positions;
-  const scene::Vec3 across = at[kLittleProximal] - at[kIndexProximal];
-  const scene::Vec3 outOfPalm = across.cross(at[kMiddleProximal] - at[kWrist]);
+  const model::Vec3 across = at[kLittleProximal] - at[kIndexProximal];
+  const model::Vec3 outOfPalm = across.cross(at[kMiddleProximal] - at[kWrist]);
   const std::uint32_t firstId = kFirstBoneId + (message.side() == v1::HAND_SIDE_RIGHT ? 32 : 0);
-  std::vector<scene::ParticipantCollider> bones;
+  std::vector<model::ParticipantCollider> bones;
   for (std::size_t i = 0; i < kHandBones; ++i) {
     const auto [from, to] = kBones[i];
-    const scene::Vec3 bone = at[to] - at[from];
-    scene::ParticipantCollider& capsule = bones.emplace_back();
+    const model::Vec3 bone = at[to] - at[from];
+    model::ParticipantCollider& capsule = bones.emplace_back();
     capsule.id = firstId + static_cast<std::uint32_t>(i);
     capsule.pose = {.position = (at[from] + at[to]) / 2,
                     .orientation = along(bone, i < kThumbBones ? outOfPalm : across)};
     capsule.shape =
-        scene::Capsule{.radius = (joints.radii[from] + joints.radii[to]) / 2, .length = bone.norm()};
+        model::Capsule{.radius = (joints.radii[from] + joints.radii[to]) / 2, .length = bone.norm()};
   }
   return bones;
 }

@@ -8,7 +8,7 @@
 
 #include "clothstream/v1/session.pb.h"
 #include "server/messages/validation.h"
-#include "server/scene/input.h"
+#include "server/model/input.h"
 
 namespace clothstream::messages {
 
@@ -21,7 +21,7 @@ inline constexpr std::uint32_t kFirstBoneId = 0x80000000;
 // kHandBones capsules, each between two joints with the mean of their radii, in the order of
 // docs/protocol.md. Refuses what is no hand: another number of joints than 26 or 25, numbers out of range,
 // joints too far from the wrist. Empty if so.
-[[nodiscard]] std::vector<scene::ParticipantCollider> toBones(Checks& checks, const Path& path,
+[[nodiscard]] std::vector<model::ParticipantCollider> toBones(Checks& checks, const Path& path,
                                                               const v1::HandJoints& message);
 
 }  // namespace clothstream::messages

@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "server/scene/stability.h"
+#include "server/model/stability.h"
 
 namespace clothstream::messages {
 
@@ -17,7 +17,7 @@ struct Range {
 namespace limits {
 
 inline constexpr std::uint32_t kMaxRate = 1000;  // ticks/s
-inline constexpr std::uint32_t kMaxSubsteps = scene::kMaxSubsteps;
+inline constexpr std::uint32_t kMaxSubsteps = model::kMaxSubsteps;
 inline constexpr std::size_t kMaxCloths = 256;
 inline constexpr std::size_t kMaxColliders = 64;
 inline constexpr std::size_t kMaxPins = 4096;        // ranges a cloth

@@ -90,7 +90,7 @@ meshes::MeshSource readSource(Checks& checks, const Path& path, const v1::Mesh& 
 }  // namespace
 
 std::vector<std::uint32_t> toMeshCloth(Checks& checks, const Path& path, const v1::Cloth& message,
-                                       const MeshReader& readMesh, scene::Cloth& cloth) {
+                                       const MeshReader& readMesh, model::Cloth& cloth) {
   const v1::Mesh& mesh = message.mesh();
   const Path at = path / "mesh";
   meshes::MeshOptions options{.pose = toPose(checks, at / "pose", mesh.pose()),
@@ -108,18 +108,18 @@ std::vector<std::uint32_t> toMeshCloth(Checks& checks, const Path& path, const v
     checks.fail(at, mesh.file().empty() ? "" : '"' + mesh.file() + '"', built.error());
     return {};
   }
-  cloth.mesh = std::make_shared<const scene::Mesh>(std::move(built->mesh));
+  cloth.mesh = std::make_shared<const model::Mesh>(std::move(built->mesh));
   return std::move(built->nodeOfVertex);
 }
 
-void write(const scene::Mesh& mesh, v1::Mesh& message) {
-  const scene::MeshShape& shape = mesh.shape;
-  for (const scene::Vec3& p : shape.positions) message.mutable_positions()->Add(p.data(), p.data() + 3);
-  for (const scene::Triangle& t : shape.triangles) message.mutable_triangles()->Add(t.begin(), t.end());
+void write(const model::Mesh& mesh, v1::Mesh& message) {
+  const model::MeshShape& shape = mesh.shape;
+  for (const model::Vec3& p : shape.positions) message.mutable_positions()->Add(p.data(), p.data() + 3);
+  for (const model::Triangle& t : shape.triangles) message.mutable_triangles()->Add(t.begin(), t.end());
   message.mutable_quads()->Add(shape.quads.begin(), shape.quads.end());
-  for (const scene::Uv& uv : shape.uvs) message.mutable_uvs()->Add(uv.data(), uv.data() + 2);
-  for (const scene::Triangle& t : shape.uvTriangles) message.mutable_uv_triangles()->Add(t.begin(), t.end());
-  for (const scene::Submesh& part : shape.submeshes) {
+  for (const model::Uv& uv : shape.uvs) message.mutable_uvs()->Add(uv.data(), uv.data() + 2);
+  for (const model::Triangle& t : shape.uvTriangles) message.mutable_uv_triangles()->Add(t.begin(), t.end());
+  for (const model::Submesh& part : shape.submeshes) {
     v1::Submesh& partMessage = *message.add_submeshes();
     partMessage.set_name(part.name);
     partMessage.set_triangle_count(part.triangleCount);

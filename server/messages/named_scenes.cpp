@@ -28,7 +28,7 @@ std::vector<std::string> namedScenes() {
   return names;
 }
 
-Result<scene::Scene> loadScene(const std::string& nameOrPath) {
+Result<model::Scene> loadScene(const std::string& nameOrPath) {
   const auto scenes = embeddedScenes();
   const auto scene = std::ranges::find(scenes, nameOrPath, &EmbeddedScene::name);
   if (scene != scenes.end())

@@ -11,9 +11,9 @@
 namespace clothstream::messages {
 namespace {
 
-scene::GridRange toRange(Checks& checks, const Path& path, const v1::GridRange& message,
-                         const scene::Grid& grid) {
-  scene::GridRange range;
+model::GridRange toRange(Checks& checks, const Path& path, const v1::GridRange& message,
+                         const model::Grid& grid) {
+  model::GridRange range;
   range.firstRow = checks.integer(path / "firstRow", message.first_row(), 0, grid.rows - 1);
   range.firstColumn = checks.integer(path / "firstColumn", message.first_column(), 0, grid.columns - 1);
   range.lastRow = message.has_last_row()
@@ -29,8 +29,8 @@ scene::GridRange toRange(Checks& checks, const Path& path, const v1::GridRange& 
   return range;
 }
 
-scene::Region toRegion(Checks& checks, const Path& path, const v1::Region& message) {
-  scene::Region region;
+model::Region toRegion(Checks& checks, const Path& path, const v1::Region& message) {
+  model::Region region;
   region.centre = toVec3(checks, path / "centre", message.centre(), limits::kPosition);
   switch (message.shape_case()) {
     case v1::Region::kRadius:
@@ -45,7 +45,7 @@ scene::Region toRegion(Checks& checks, const Path& path, const v1::Region& messa
   return region;
 }
 
-std::uint32_t toNode(Checks& checks, const Path& path, std::uint32_t vertex, const scene::Cloth& cloth,
+std::uint32_t toNode(Checks& checks, const Path& path, std::uint32_t vertex, const model::Cloth& cloth,
                      std::span<const std::uint32_t> nodeOfVertex) {
   if (!cloth.mesh) return checks.integer(path, vertex, 0, cloth.grid.nodeCount() - 1);
   checks.integer(path, vertex, 0, static_cast<std::uint32_t>(nodeOfVertex.size()) - 1);
@@ -58,7 +58,7 @@ std::uint32_t toNode(Checks& checks, const Path& path, std::uint32_t vertex, con
 }  // namespace
 
 NodeSelection toSelection(Checks& checks, const Path& path, const NamedNodes& named,
-                          const scene::Cloth& cloth, std::span<const std::uint32_t> nodeOfVertex) {
+                          const model::Cloth& cloth, std::span<const std::uint32_t> nodeOfVertex) {
   NodeSelection selection;
   checks.count(path / named.rangesField, static_cast<std::size_t>(named.ranges.size()), 0, limits::kMaxPins);
   checks.count(path / named.regionsField, static_cast<std::size_t>(named.regions.size()), 0,
@@ -77,7 +77,7 @@ NodeSelection toSelection(Checks& checks, const Path& path, const NamedNodes& na
   return selection;
 }
 
-void write(const scene::GridRange& range, v1::GridRange& message) {
+void write(const model::GridRange& range, v1::GridRange& message) {
   message.set_first_row(range.firstRow);
   message.set_last_row(range.lastRow);
   message.set_row_step(range.rowStep);
@@ -86,7 +86,7 @@ void write(const scene::GridRange& range, v1::GridRange& message) {
   message.set_column_step(range.columnStep);
 }
 
-void write(const scene::Region& region, v1::Region& message) {
+void write(const model::Region& region, v1::Region& message) {
   write(region.centre, *message.mutable_centre());
   if (region.radius)
     message.set_radius(*region.radius);

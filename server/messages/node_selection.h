@@ -9,14 +9,14 @@
 
 #include "clothstream/v1/scene.pb.h"
 #include "server/messages/validation.h"
-#include "server/scene/scene.h"
+#include "server/model/scene.h"
 
 namespace clothstream::messages {
 
 struct NodeSelection {
-  std::vector<scene::GridRange> ranges;
+  std::vector<model::GridRange> ranges;
   std::vector<std::uint32_t> vertices;  // nodes
-  std::vector<scene::Region> regions;
+  std::vector<model::Region> regions;
 };
 
 // The fields of a message that name nodes, and what they are called.
@@ -29,9 +29,9 @@ struct NamedNodes {
 
 // Of a cloth whose shape is read already; `nodeOfVertex` as toMeshCloth() gives it, empty for grids.
 NodeSelection toSelection(Checks& checks, const Path& path, const NamedNodes& named,
-                          const scene::Cloth& cloth, std::span<const std::uint32_t> nodeOfVertex);
+                          const model::Cloth& cloth, std::span<const std::uint32_t> nodeOfVertex);
 
-void write(const scene::GridRange& range, v1::GridRange& message);
-void write(const scene::Region& region, v1::Region& message);
+void write(const model::GridRange& range, v1::GridRange& message);
+void write(const model::Region& region, v1::Region& message);
 
 }  // namespace clothstream::messages

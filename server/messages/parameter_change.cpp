@@ -15,16 +15,16 @@ namespace {
 
 // Those that the change is for.
 template <typename Check>
-void forEachCloth(const scene::Scene& scene, const std::string& name, const Check& check) {
-  for (const scene::Cloth& cloth : scene.cloths)
+void forEachCloth(const model::Scene& scene, const std::string& name, const Check& check) {
+  for (const model::Cloth& cloth : scene.cloths)
     if (name.empty() || name == cloth.name) check(cloth);
 }
 
 void readSelfCollision(Checks& checks, const Path& path, const v1::SelfCollision& message,
-                       const scene::Scene& scene, scene::ClothChange& change) {
+                       const model::Scene& scene, model::ClothChange& change) {
   if (message.has_friction())
     change.ballFriction = checks.number(path / "friction", message.friction(), limits::kFriction);
-  forEachCloth(scene, change.name, [&](const scene::Cloth& cloth) {
+  forEachCloth(scene, change.name, [&](const model::Cloth& cloth) {
     if (!cloth.selfCollision)
       checks.fail(path, "", fmt::format("must be absent: \"{}\" has none from its start", cloth.name));
     if (message.has_radius())
@@ -32,19 +32,19 @@ void readSelfCollision(Checks& checks, const Path& path, const v1::SelfCollision
   });
 }
 
-void readTethers(Checks& checks, const Path& path, const v1::Tethers& message, const scene::Scene& scene,
-                 scene::ClothChange& change) {
+void readTethers(Checks& checks, const Path& path, const v1::Tethers& message, const model::Scene& scene,
+                 model::ClothChange& change) {
   if (message.has_slack())
     change.tetherSlack = checks.number(path / "slack", message.slack(), limits::kSlack);
-  forEachCloth(scene, change.name, [&](const scene::Cloth& cloth) {
+  forEachCloth(scene, change.name, [&](const model::Cloth& cloth) {
     if (!cloth.tethers)
       checks.fail(path, "", fmt::format("must be absent: \"{}\" has none from its start", cloth.name));
   });
 }
 
-scene::ClothChange toClothChange(Checks& checks, const Path& path, const v1::ClothChange& message,
-                                 const scene::Scene& scene) {
-  scene::ClothChange change;
+model::ClothChange toClothChange(Checks& checks, const Path& path, const v1::ClothChange& message,
+                                 const model::Scene& scene) {
+  model::ClothChange change;
   change.name = message.name();
   if (!change.name.empty()) checkKnown(checks, path / "name", change.name, scene.cloths);
   if (message.has_structural())
@@ -74,12 +74,12 @@ scene::ClothChange toClothChange(Checks& checks, const Path& path, const v1::Clo
 }
 
 // Those that the change chooses, for the cloths that get them.
-void checkSolvers(Checks& checks, const Path& path, const scene::Scene& changed,
-                  const scene::ParameterChange& change) {
+void checkSolvers(Checks& checks, const Path& path, const model::Scene& changed,
+                  const model::ParameterChange& change) {
   for (std::size_t i = 0; i < change.cloths.size(); ++i) {
-    const scene::ClothChange& chosen = change.cloths[i];
+    const model::ClothChange& chosen = change.cloths[i];
     if (!chosen.solver && !chosen.material) continue;
-    forEachCloth(changed, chosen.name, [&](const scene::Cloth& cloth) {
+    forEachCloth(changed, chosen.name, [&](const model::Cloth& cloth) {
       const Path element = path.at("cloths", static_cast<int>(i));
       if (const auto complaint = unfitSolver(changed, cloth))
         checks.fail(element / (chosen.solver ? "solver" : "material"), "",
@@ -88,9 +88,9 @@ void checkSolvers(Checks& checks, const Path& path, const scene::Scene& changed,
   }
 }
 
-scene::ColliderChange toColliderChange(Checks& checks, const Path& path, const v1::ColliderChange& message,
-                                       const scene::Scene& scene) {
-  scene::ColliderChange change;
+model::ColliderChange toColliderChange(Checks& checks, const Path& path, const v1::ColliderChange& message,
+                                       const model::Scene& scene) {
+  model::ColliderChange change;
   change.name = message.name();
   checkKnown(checks, path / "name", change.name, scene.colliders);
   if (message.has_position())
@@ -100,35 +100,35 @@ scene::ColliderChange toColliderChange(Checks& checks, const Path& path, const v
   if (message.has_friction())
     change.friction = checks.number(path / "friction", message.friction(), limits::kFriction);
   if (checks.failed()) return change;
-  scene::Shape shape = std::ranges::find(scene.colliders, change.name, &scene::Collider::name)->shape;
+  model::Shape shape = std::ranges::find(scene.colliders, change.name, &model::Collider::name)->shape;
   const auto needs = [&](const char* field, const std::string& value, bool has, const char* what) {
     if (!has)
       checks.fail(path / field, value, fmt::format("must be absent: \"{}\" is {}", change.name, what));
   };
   if (message.has_radius()) {
     change.radius = checks.number(path / "radius", message.radius(), limits::kRadius);
-    needs("radius", fmt::format("{}", *change.radius), scene::radiusOf(shape) != nullptr,
+    needs("radius", fmt::format("{}", *change.radius), model::radiusOf(shape) != nullptr,
           "neither sphere nor capsule");
   }
   if (message.has_length()) {
     change.length = checks.number(path / "length", message.length(), limits::kShapeLength);
-    needs("length", fmt::format("{}", *change.length), std::holds_alternative<scene::Capsule>(shape),
+    needs("length", fmt::format("{}", *change.length), std::holds_alternative<model::Capsule>(shape),
           "no capsule");
   }
   if (message.has_size()) {
     change.size = toVec3(checks, path / "size", message.size(), limits::kShapeSize);
-    needs("size", "", std::holds_alternative<scene::Box>(shape), "no box");
+    needs("size", "", std::holds_alternative<model::Box>(shape), "no box");
   }
   return change;
 }
 
 }  // namespace
 
-Result<scene::ParameterChange> toParameterChange(const v1::ParameterChange& message,
-                                                 const scene::Scene& scene) {
+Result<model::ParameterChange> toParameterChange(const v1::ParameterChange& message,
+                                                 const model::Scene& scene) {
   Checks checks;
   const Path path("parameterChange");
-  scene::ParameterChange change;
+  model::ParameterChange change;
   if (message.has_gravity())
     change.gravity = toVec3(checks, path / "gravity" / "value", message.gravity().value(), limits::kGravity);
   if (message.has_wind())
@@ -145,8 +145,8 @@ Result<scene::ParameterChange> toParameterChange(const v1::ParameterChange& mess
     change.colliders.push_back(
         toColliderChange(checks, path.at("colliders", i), message.colliders(i), scene));
   if (!checks.failed()) {
-    scene::Scene changed = scene;
-    scene::applyChange(changed, change);
+    model::Scene changed = scene;
+    model::applyChange(changed, change);
     checkSolvers(checks, path, changed, change);
     if (const auto complaint = unfitBending(changed))
       checks.fail(path / "cloths[].dihedralBending", "", *complaint);

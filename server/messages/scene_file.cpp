@@ -36,7 +36,7 @@ std::optional<std::string> syntaxError(std::string_view json) {
 
 }  // namespace
 
-Result<scene::Scene> parseScene(std::string_view json, std::string_view source, const MeshReader& readMesh) {
+Result<model::Scene> parseScene(std::string_view json, std::string_view source, const MeshReader& readMesh) {
   if (const auto error = syntaxError(json)) return refuse(v1::ERROR_CODE_MALFORMED_MESSAGE, source, *error);
   v1::Scene message;
   const auto status = google::protobuf::util::JsonStringToMessage({json.data(), json.size()}, &message);
@@ -49,7 +49,7 @@ Result<scene::Scene> parseScene(std::string_view json, std::string_view source, 
   });
 }
 
-Result<scene::Scene> readSceneFile(const std::filesystem::path& path) {
+Result<model::Scene> readSceneFile(const std::filesystem::path& path) {
   const std::string source = path.string();
   std::error_code error;
   const auto kind = std::filesystem::status(path, error).type();
@@ -74,7 +74,7 @@ Result<scene::Scene> readSceneFile(const std::filesystem::path& path) {
   });
 }
 
-std::string toJson(const scene::Scene& scene) {
+std::string toJson(const model::Scene& scene) {
   google::protobuf::util::JsonPrintOptions options;
   options.add_whitespace = true;
   options.always_print_primitive_fields = true;

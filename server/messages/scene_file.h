@@ -9,25 +9,25 @@
 
 #include "server/messages/field_error.h"
 #include "server/messages/mesh_message.h"
-#include "server/scene/scene.h"
+#include "server/model/scene.h"
 
 namespace clothstream::messages {
 
 // `source` (a file's name) opens the text of an error. Unknown fields are errors. Meshes may be named as
 // files only where there is a reader.
-[[nodiscard]] Result<scene::Scene> parseScene(std::string_view json, std::string_view source,
+[[nodiscard]] Result<model::Scene> parseScene(std::string_view json, std::string_view source,
                                               const MeshReader& readMesh = {});
 
 // A file of at most limits::kMaxSceneFileBytes; the meshes that it names lie relative to it.
-[[nodiscard]] Result<scene::Scene> readSceneFile(const std::filesystem::path& path);
+[[nodiscard]] Result<model::Scene> readSceneFile(const std::filesystem::path& path);
 
 // With every field; parseScene() of it gives the scene back.
-std::string toJson(const scene::Scene& scene);
+std::string toJson(const model::Scene& scene);
 
 // Names of the scenes that are built into the program (server/scenes/), sorted.
 std::vector<std::string> namedScenes();
 
 // The named scene of that name, else the file of that path.
-[[nodiscard]] Result<scene::Scene> loadScene(const std::string& nameOrPath);
+[[nodiscard]] Result<model::Scene> loadScene(const std::string& nameOrPath);
 
 }  // namespace clothstream::messages

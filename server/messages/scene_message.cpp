@@ -13,23 +13,23 @@
 #include "server/messages/shapes.h"
 #include "server/messages/validation.h"
 #include "server/messages/vectors.h"
-#include "server/scene/material.h"
-#include "server/scene/mesh.h"
-#include "server/scene/springs.h"
-#include "server/scene/stability.h"
+#include "server/model/material.h"
+#include "server/model/mesh.h"
+#include "server/model/springs.h"
+#include "server/model/stability.h"
 
 namespace clothstream::messages {
 namespace {
 
-scene::Integrator toIntegrator(Checks& checks, const Path& path, v1::Integrator message) {
+model::Integrator toIntegrator(Checks& checks, const Path& path, v1::Integrator message) {
   switch (message) {
     case v1::INTEGRATOR_UNSPECIFIED:
     case v1::INTEGRATOR_SEMI_IMPLICIT_EULER:
-      return scene::Integrator::semiImplicitEuler;
+      return model::Integrator::semiImplicitEuler;
     case v1::INTEGRATOR_EXPLICIT_EULER:
-      return scene::Integrator::explicitEuler;
+      return model::Integrator::explicitEuler;
     case v1::INTEGRATOR_RUNGE_KUTTA_4:
-      return scene::Integrator::rungeKutta4;
+      return model::Integrator::rungeKutta4;
     default:
       checks.fail(
           path, fmt::format("{}", static_cast<int>(message)),
@@ -38,13 +38,13 @@ scene::Integrator toIntegrator(Checks& checks, const Path& path, v1::Integrator 
   }
 }
 
-scene::Coding toCoding(Checks& checks, const Path& path, v1::Coding message) {
+model::Coding toCoding(Checks& checks, const Path& path, v1::Coding message) {
   switch (message) {
     case v1::CODING_UNSPECIFIED:
     case v1::CODING_ENTROPY:
-      return scene::Coding::entropy;
+      return model::Coding::entropy;
     case v1::CODING_PACKED:
-      return scene::Coding::packed;
+      return model::Coding::packed;
     default:
       checks.fail(path, fmt::format("{}", static_cast<int>(message)),
                   "must be CODING_ENTROPY or CODING_PACKED");
@@ -52,13 +52,13 @@ scene::Coding toCoding(Checks& checks, const Path& path, v1::Coding message) {
   }
 }
 
-scene::Normals toNormals(Checks& checks, const Path& path, v1::Normals message) {
+model::Normals toNormals(Checks& checks, const Path& path, v1::Normals message) {
   switch (message) {
     case v1::NORMALS_UNSPECIFIED:
     case v1::NORMALS_NONE:
-      return scene::Normals::none;
+      return model::Normals::none;
     case v1::NORMALS_OCTAHEDRAL:
-      return scene::Normals::octahedral;
+      return model::Normals::octahedral;
     default:
       checks.fail(path, fmt::format("{}", static_cast<int>(message)),
                   "must be NORMALS_NONE or NORMALS_OCTAHEDRAL");
@@ -66,8 +66,8 @@ scene::Normals toNormals(Checks& checks, const Path& path, v1::Normals message) 
   }
 }
 
-scene::Environment toEnvironment(Checks& checks, const Path& path, const v1::Environment& message) {
-  scene::Environment environment;
+model::Environment toEnvironment(Checks& checks, const Path& path, const v1::Environment& message) {
+  model::Environment environment;
   if (message.has_gravity())
     environment.gravity = toVec3(checks, path / "gravity", message.gravity(), limits::kGravity);
   environment.wind = toVec3(checks, path / "wind", message.wind(), limits::kWind);
@@ -77,8 +77,8 @@ scene::Environment toEnvironment(Checks& checks, const Path& path, const v1::Env
   return environment;
 }
 
-scene::Grid toGrid(Checks& checks, const Path& path, const v1::Grid& message) {
-  scene::Grid grid;
+model::Grid toGrid(Checks& checks, const Path& path, const v1::Grid& message) {
+  model::Grid grid;
   grid.rows = checks.integer(path / "rows", message.rows(), limits::kMinGridNodes, limits::kMaxGridNodes);
   grid.columns =
       checks.integer(path / "columns", message.columns(), limits::kMinGridNodes, limits::kMaxGridNodes);
@@ -100,7 +100,7 @@ scene::Grid toGrid(Checks& checks, const Path& path, const v1::Grid& message) {
 
 // What all messages of solvers that iterate have.
 template <typename Message>
-void readIterations(Checks& checks, const Path& path, const Message& message, scene::Solver& solver) {
+void readIterations(Checks& checks, const Path& path, const Message& message, model::Solver& solver) {
   if (message.has_iterations())
     solver.iterations = checks.integer(path / "iterations", message.iterations(), 1, limits::kMaxIterations);
   if (message.has_tolerance())
@@ -108,7 +108,7 @@ void readIterations(Checks& checks, const Path& path, const Message& message, sc
 }
 
 void readConstraint(Checks& checks, const Path& path, const v1::ConstraintSolver& message,
-                    scene::Solver& solver) {
+                    model::Solver& solver) {
   solver.bendConstraints = message.bend_constraints();
   if (message.has_compliance())
     solver.compliance = checks.number(path / "compliance", message.compliance(), limits::kCompliance);
@@ -118,8 +118,8 @@ void readConstraint(Checks& checks, const Path& path, const v1::ConstraintSolver
     case v1::CONSTRAINT_PATH_MATRIX_FREE:
       break;
     case v1::CONSTRAINT_PATH_ASSEMBLED:
-      solver.path = scene::ConstraintPath::assembled;
-      if (solver.kind == scene::SolverKind::acad)
+      solver.path = model::ConstraintPath::assembled;
+      if (solver.kind == model::SolverKind::acad)
         checks.fail(path / "path", "CONSTRAINT_PATH_ASSEMBLED",
                     "must be CONSTRAINT_PATH_MATRIX_FREE for acad, whose constraints change every substep");
       break;
@@ -129,9 +129,9 @@ void readConstraint(Checks& checks, const Path& path, const v1::ConstraintSolver
   }
 }
 
-scene::SelfCollision toSelfCollision(Checks& checks, const Path& path, const v1::SelfCollision& message,
-                                     const scene::Cloth& cloth) {
-  scene::SelfCollision collision{.radius = scene::shortestSpring(cloth) / 2};
+model::SelfCollision toSelfCollision(Checks& checks, const Path& path, const v1::SelfCollision& message,
+                                     const model::Cloth& cloth) {
+  model::SelfCollision collision{.radius = model::shortestSpring(cloth) / 2};
   if (message.has_radius()) collision.radius = toBallRadius(checks, path / "radius", message.radius(), cloth);
   if (message.has_friction())
     collision.friction = checks.number(path / "friction", message.friction(), limits::kFriction);
@@ -140,7 +140,7 @@ scene::SelfCollision toSelfCollision(Checks& checks, const Path& path, const v1:
 
 // Returns what toMeshCloth() does; nothing for a grid.
 std::vector<std::uint32_t> toShape(Checks& checks, const Path& path, const v1::Cloth& message,
-                                   const MeshReader& readMesh, scene::Cloth& cloth) {
+                                   const MeshReader& readMesh, model::Cloth& cloth) {
   switch (message.shape_case()) {
     case v1::Cloth::kGrid:
       cloth.grid = toGrid(checks, path / "grid", message.grid());
@@ -154,7 +154,7 @@ std::vector<std::uint32_t> toShape(Checks& checks, const Path& path, const v1::C
 }
 
 void readPins(Checks& checks, const Path& path, const v1::Cloth& message,
-              std::span<const std::uint32_t> nodeOfVertex, scene::Cloth& cloth) {
+              std::span<const std::uint32_t> nodeOfVertex, model::Cloth& cloth) {
   NodeSelection pins = toSelection(checks, path,
                                    {"pins", "pinnedVertices", "pinnedRegions", message.pins(),
                                     message.pinned_vertices(), message.pinned_regions()},
@@ -164,9 +164,9 @@ void readPins(Checks& checks, const Path& path, const v1::Cloth& message,
   cloth.pinnedRegions = std::move(pins.regions);
 }
 
-scene::Motion toMotion(Checks& checks, const Path& path, const v1::Motion& message,
-                       const scene::Quaternion& orientation) {
-  scene::Motion motion{{}, message.steady()};
+model::Motion toMotion(Checks& checks, const Path& path, const v1::Motion& message,
+                       const model::Quaternion& orientation) {
+  model::Motion motion{{}, message.steady()};
   checks.count(path / "keys", static_cast<std::size_t>(message.keys_size()), 2, limits::kMaxMotionKeys);
   for (int i = 0; i < message.keys_size() && !checks.failed(); ++i) {
     const v1::MotionKey& from = message.keys(i);
@@ -186,9 +186,9 @@ scene::Motion toMotion(Checks& checks, const Path& path, const v1::Motion& messa
   return motion;
 }
 
-scene::Attachment toAttachment(Checks& checks, const Path& path, const v1::Attachment& message,
-                               const scene::Cloth& cloth, std::span<const std::uint32_t> nodeOfVertex) {
-  scene::Attachment attachment;
+model::Attachment toAttachment(Checks& checks, const Path& path, const v1::Attachment& message,
+                               const model::Cloth& cloth, std::span<const std::uint32_t> nodeOfVertex) {
+  model::Attachment attachment;
   attachment.name = checks.name(path / "name", message.name());
   NodeSelection nodes =
       toSelection(checks, path,
@@ -208,13 +208,13 @@ scene::Attachment toAttachment(Checks& checks, const Path& path, const v1::Attac
 }
 
 // No node is held twice.
-void checkAttached(Checks& checks, const Path& path, const scene::Cloth& cloth) {
-  scene::Cloth pinnedOnly = cloth;
+void checkAttached(Checks& checks, const Path& path, const model::Cloth& cloth) {
+  model::Cloth pinnedOnly = cloth;
   pinnedOnly.attachments.clear();
-  std::vector<std::uint8_t> held = scene::pinnedNodes(pinnedOnly);
+  std::vector<std::uint8_t> held = model::pinnedNodes(pinnedOnly);
   for (std::size_t i = 0; i < cloth.attachments.size(); ++i) {
     const Path element = path.at("attachments", static_cast<int>(i));
-    const std::vector<std::uint8_t> attached = scene::attachedNodes(cloth, cloth.attachments[i]);
+    const std::vector<std::uint8_t> attached = model::attachedNodes(cloth, cloth.attachments[i]);
     if (std::ranges::find(attached, 1) == attached.end())
       checks.fail(element, "",
                   "has no node; must have one at least of \"ranges\", \"vertices\" and \"regions\"");
@@ -228,7 +228,7 @@ void checkAttached(Checks& checks, const Path& path, const scene::Cloth& cloth) 
 }
 
 void readAttachments(Checks& checks, const Path& path, const v1::Cloth& message,
-                     std::span<const std::uint32_t> nodeOfVertex, scene::Cloth& cloth) {
+                     std::span<const std::uint32_t> nodeOfVertex, model::Cloth& cloth) {
   checks.count(path / "attachments", static_cast<std::size_t>(message.attachments_size()), 0,
                limits::kMaxAttachments);
   for (int i = 0; i < message.attachments_size() && !checks.failed(); ++i)
@@ -237,9 +237,9 @@ void readAttachments(Checks& checks, const Path& path, const v1::Cloth& message,
   if (!checks.failed() && !cloth.attachments.empty()) checkAttached(checks, path, cloth);
 }
 
-scene::Tethers toTethers(Checks& checks, const Path& path, const v1::Tethers& message,
-                         const scene::Cloth& cloth) {
-  scene::Tethers tethers;
+model::Tethers toTethers(Checks& checks, const Path& path, const v1::Tethers& message,
+                         const model::Cloth& cloth) {
+  model::Tethers tethers;
   if (message.has_slack()) tethers.slack = checks.number(path / "slack", message.slack(), limits::kSlack);
   if (cloth.nodeCount() > limits::kMaxSolverNodes)
     checks.fail(path, "",
@@ -249,7 +249,7 @@ scene::Tethers toTethers(Checks& checks, const Path& path, const v1::Tethers& me
 }
 
 // kg; what the material says is there already.
-void readMass(Checks& checks, const Path& path, const v1::Cloth& message, scene::Cloth& cloth) {
+void readMass(Checks& checks, const Path& path, const v1::Cloth& message, model::Cloth& cloth) {
   if (message.has_mass() && message.has_areal_mass())
     checks.fail(path / "arealMass", fmt::format("{}", message.areal_mass()),
                 "must be absent where \"mass\" is given: it says the same");
@@ -257,11 +257,11 @@ void readMass(Checks& checks, const Path& path, const v1::Cloth& message, scene:
   if (message.has_areal_mass())
     cloth.mass = static_cast<float>(
         double{checks.number(path / "arealMass", message.areal_mass(), limits::kArealMass)} *
-        scene::areaOf(cloth));
+        model::areaOf(cloth));
 }
 
-scene::Cloth toCloth(Checks& checks, const Path& path, const v1::Cloth& message, const MeshReader& readMesh) {
-  scene::Cloth cloth;
+model::Cloth toCloth(Checks& checks, const Path& path, const v1::Cloth& message, const MeshReader& readMesh) {
+  model::Cloth cloth;
   cloth.name = checks.name(path / "name", message.name());
   const std::vector<std::uint32_t> nodeOfVertex = toShape(checks, path, message, readMesh, cloth);
   if (checks.failed()) return cloth;
@@ -269,10 +269,10 @@ scene::Cloth toCloth(Checks& checks, const Path& path, const v1::Cloth& message,
   readAttachments(checks, path, message, nodeOfVertex, cloth);
   if (message.has_tethers() && !checks.failed())
     cloth.tethers = toTethers(checks, path / "tethers", message.tethers(), cloth);
-  cloth.mass = static_cast<float>(double{limits::kDefaultArealMass} * scene::areaOf(cloth));
+  cloth.mass = static_cast<float>(double{limits::kDefaultArealMass} * model::areaOf(cloth));
   if (!message.material().empty())
-    if (const scene::Material* material = toMaterial(checks, path / "material", message.material()))
-      scene::makeOf(*material, cloth);
+    if (const model::Material* material = toMaterial(checks, path / "material", message.material()))
+      model::makeOf(*material, cloth);
   readMass(checks, path, message, cloth);
   if (message.has_structural())
     cloth.structural = toSpring(checks, path / "structural", message.structural());
@@ -295,8 +295,8 @@ scene::Cloth toCloth(Checks& checks, const Path& path, const v1::Cloth& message,
   return cloth;
 }
 
-scene::Collider toCollider(Checks& checks, const Path& path, const v1::Collider& message) {
-  scene::Collider collider;
+model::Collider toCollider(Checks& checks, const Path& path, const v1::Collider& message) {
+  model::Collider collider;
   collider.name = checks.name(path / "name", message.name());
   collider.shape = toShape(checks, path, message);
   collider.pose = toPose(checks, path / "pose", message.pose());
@@ -307,8 +307,8 @@ scene::Collider toCollider(Checks& checks, const Path& path, const v1::Collider&
   return collider;
 }
 
-scene::StreamSettings toStreamSettings(Checks& checks, const Path& path, const v1::StreamSettings& message) {
-  scene::StreamSettings settings;
+model::StreamSettings toStreamSettings(Checks& checks, const Path& path, const v1::StreamSettings& message) {
+  model::StreamSettings settings;
   if (message.has_max_error())
     settings.maxError = checks.number(path / "maxError", message.max_error(), limits::kMaxError);
   settings.normals = toNormals(checks, path / "normals", message.normals());
@@ -322,7 +322,7 @@ scene::StreamSettings toStreamSettings(Checks& checks, const Path& path, const v
   return settings;
 }
 
-void checkRates(Checks& checks, const scene::Scene& scene) {
+void checkRates(Checks& checks, const model::Scene& scene) {
   const Path root;
   checks.integer(root / "simulationRate", scene.simulationRate, 1, limits::kMaxRate);
   checks.integer(root / "substeps", scene.substeps, 1, limits::kMaxSubsteps);
@@ -343,7 +343,7 @@ void checkUnique(Checks& checks, std::string_view field, const std::vector<Named
     }
 }
 
-void checkSolvers(Checks& checks, const scene::Scene& scene) {
+void checkSolvers(Checks& checks, const model::Scene& scene) {
   const Path root;
   for (std::size_t i = 0; i < scene.cloths.size(); ++i)
     if (const auto complaint = unfitSolver(scene, scene.cloths[i])) {
@@ -352,8 +352,8 @@ void checkSolvers(Checks& checks, const scene::Scene& scene) {
     }
 }
 
-void checkSelfCollision(Checks& checks, const scene::Scene& scene) {
-  const auto has = [](const scene::Cloth& cloth) { return cloth.selfCollision.has_value(); };
+void checkSelfCollision(Checks& checks, const model::Scene& scene) {
+  const auto has = [](const model::Cloth& cloth) { return cloth.selfCollision.has_value(); };
   const auto first = std::ranges::find_if(scene.cloths, has);
   if (first == scene.cloths.end() || scene.nodeCount() <= limits::kMaxSelfCollisionNodes) return;
   const Path root;
@@ -364,11 +364,11 @@ void checkSelfCollision(Checks& checks, const scene::Scene& scene) {
 }
 
 // Of all cloths together: names, number, and the colliders that they follow.
-void checkAttachments(Checks& checks, const scene::Scene& scene) {
+void checkAttachments(Checks& checks, const model::Scene& scene) {
   std::unordered_set<std::string_view> names;
   for (std::size_t i = 0; i < scene.cloths.size(); ++i)
     for (std::size_t k = 0; k < scene.cloths[i].attachments.size(); ++k) {
-      const scene::Attachment& attachment = scene.cloths[i].attachments[k];
+      const model::Attachment& attachment = scene.cloths[i].attachments[k];
       const Path root;
       const Path cloth = root.at("cloths", static_cast<int>(i));
       const Path element = cloth.at("attachments", static_cast<int>(k));
@@ -382,14 +382,14 @@ void checkAttachments(Checks& checks, const scene::Scene& scene) {
   checks.count(Path("attachments"), names.size(), 0, limits::kMaxAttachments);
 }
 
-void checkSize(Checks& checks, const scene::Scene& scene) {
+void checkSize(Checks& checks, const model::Scene& scene) {
   std::uint64_t nodes = 0;
-  for (const scene::Cloth& cloth : scene.cloths) nodes += cloth.nodeCount();
+  for (const model::Cloth& cloth : scene.cloths) nodes += cloth.nodeCount();
   if (nodes > limits::kMaxNodes)
     checks.fail(Path("cloths"), "",
                 fmt::format("have {} nodes in all; must have at most {}", nodes, limits::kMaxNodes));
   std::size_t bytes = 0;
-  for (const scene::Cloth& cloth : scene.cloths) bytes += geometryBytes(cloth);
+  for (const model::Cloth& cloth : scene.cloths) bytes += geometryBytes(cloth);
   if (bytes > limits::kMaxGeometryBytes)
     checks.fail(
         Path("cloths"), "",
@@ -400,52 +400,52 @@ void checkSize(Checks& checks, const scene::Scene& scene) {
 
 }  // namespace
 
-float toBallRadius(Checks& checks, const Path& path, float value, const scene::Cloth& cloth) {
-  return checks.number(path, value, {limits::kMinBallRadius, double{scene::shortestSpring(cloth)}});
+float toBallRadius(Checks& checks, const Path& path, float value, const model::Cloth& cloth) {
+  return checks.number(path, value, {limits::kMinBallRadius, double{model::shortestSpring(cloth)}});
 }
 
-scene::Gust toGust(Checks& checks, const Path& path, const v1::Gust& message) {
-  scene::Gust gust;
+model::Gust toGust(Checks& checks, const Path& path, const v1::Gust& message) {
+  model::Gust gust;
   gust.strength = checks.number(path / "strength", message.strength(), limits::kGustStrength);
   if (message.has_seconds())
     gust.seconds = checks.number(path / "seconds", message.seconds(), limits::kGustSeconds);
   return gust;
 }
 
-const scene::Material* toMaterial(Checks& checks, const Path& path, const std::string& name) {
-  const scene::Material* material = scene::findMaterial(name);
+const model::Material* toMaterial(Checks& checks, const Path& path, const std::string& name) {
+  const model::Material* material = model::findMaterial(name);
   if (material == nullptr) {
     std::string known;
-    for (const scene::Material& one : scene::materials())
+    for (const model::Material& one : model::materials())
       known += fmt::format("{}{}", known.empty() ? "" : ", ", one.name);
     checks.failNamed(path, name, fmt::format("must be one of {}", known));
   }
   return material;
 }
 
-scene::Solver toSolver(Checks& checks, const Path& path, const v1::Solver& message) {
-  scene::Solver solver;
+model::Solver toSolver(Checks& checks, const Path& path, const v1::Solver& message) {
+  model::Solver solver;
   if (message.has_constraint()) {
-    solver.kind = scene::SolverKind::constraint;
+    solver.kind = model::SolverKind::constraint;
     readConstraint(checks, path / "constraint", message.constraint(), solver);
   } else if (message.has_acad()) {
     const v1::AcadSolver& acad = message.acad();
     const Path at = path / "acad";
-    solver.kind = scene::SolverKind::acad;
+    solver.kind = model::SolverKind::acad;
     if (acad.has_activation())
       solver.activation = checks.number(at / "activation", acad.activation(), limits::kActivation);
     readConstraint(checks, at / "constraint", acad.constraint(), solver);
   } else if (message.has_xpbd()) {
     const v1::XpbdSolver& xpbd = message.xpbd();
     const Path at = path / "xpbd";
-    solver.kind = scene::SolverKind::xpbd;
+    solver.kind = model::SolverKind::xpbd;
     solver.iterations = xpbd.has_iterations() ? checks.integer(at / "iterations", xpbd.iterations(), 1,
                                                                limits::kMaxXpbdIterations)
                                               : 1;
     if (xpbd.has_compliance())
       solver.compliance = checks.number(at / "compliance", xpbd.compliance(), limits::kCompliance);
   } else if (message.has_implicit_euler()) {
-    solver.kind = scene::SolverKind::implicitEuler;
+    solver.kind = model::SolverKind::implicitEuler;
     readIterations(checks, path / "implicitEuler", message.implicit_euler(), solver);
   }
   return solver;
@@ -453,15 +453,15 @@ scene::Solver toSolver(Checks& checks, const Path& path, const v1::Solver& messa
 
 namespace {
 
-std::optional<std::string> unfitAssembly(const scene::Scene& scene, const scene::Cloth& cloth) {
+std::optional<std::string> unfitAssembly(const model::Scene& scene, const model::Cloth& cloth) {
   std::uint64_t nodes = 0;
-  for (const scene::Cloth& one : scene.cloths) nodes += scene::isAssembled(one.solver) ? one.nodeCount() : 0;
+  for (const model::Cloth& one : scene.cloths) nodes += model::isAssembled(one.solver) ? one.nodeCount() : 0;
   if (nodes > limits::kMaxAssembledNodes)
     return fmt::format(
         "assembles its system (CONSTRAINT_PATH_ASSEMBLED), for cloths of at most {} nodes in all; here they "
         "have {}",
         limits::kMaxAssembledNodes, nodes);
-  const std::uint64_t entries = scene::systemEntries(cloth);
+  const std::uint64_t entries = model::systemEntries(cloth);
   if (entries > limits::kMaxAssembledEntries * cloth.nodeCount())
     return fmt::format(
         "assembles its system (CONSTRAINT_PATH_ASSEMBLED), for matrices of at most {} entries a node; this "
@@ -472,21 +472,21 @@ std::optional<std::string> unfitAssembly(const scene::Scene& scene, const scene:
 
 }  // namespace
 
-std::optional<std::string> unfitSolver(const scene::Scene& scene, const scene::Cloth& cloth) {
-  if (cloth.solver.kind == scene::SolverKind::massSpring) return std::nullopt;
-  if (scene.integrator != scene::Integrator::semiImplicitEuler)
+std::optional<std::string> unfitSolver(const model::Scene& scene, const model::Cloth& cloth) {
+  if (cloth.solver.kind == model::SolverKind::massSpring) return std::nullopt;
+  if (scene.integrator != model::Integrator::semiImplicitEuler)
     return "solves a system, which needs INTEGRATOR_SEMI_IMPLICIT_EULER";
   if (cloth.nodeCount() > limits::kMaxSolverNodes)
     return fmt::format("solves a system, for at most {} nodes; this cloth has {}", limits::kMaxSolverNodes,
                        cloth.nodeCount());
-  return scene::isAssembled(cloth.solver) ? unfitAssembly(scene, cloth) : std::nullopt;
+  return model::isAssembled(cloth.solver) ? unfitAssembly(scene, cloth) : std::nullopt;
 }
 
-std::optional<std::string> unfitBending(const scene::Scene& scene) {
+std::optional<std::string> unfitBending(const model::Scene& scene) {
   std::uint64_t nodes = 0;
-  for (const scene::Cloth& cloth : scene.cloths) nodes += cloth.dihedralBending > 0 ? cloth.nodeCount() : 0;
+  for (const model::Cloth& cloth : scene.cloths) nodes += cloth.dihedralBending > 0 ? cloth.nodeCount() : 0;
   if (nodes == 0) return std::nullopt;
-  if (scene.integrator != scene::Integrator::semiImplicitEuler)
+  if (scene.integrator != model::Integrator::semiImplicitEuler)
     return "must be 0: other values need INTEGRATOR_SEMI_IMPLICIT_EULER";
   if (nodes > limits::kMaxSolverNodes)
     return fmt::format("must be 0 but for cloths of at most {} nodes in all; here they have {}",
@@ -494,12 +494,12 @@ std::optional<std::string> unfitBending(const scene::Scene& scene) {
   return std::nullopt;
 }
 
-std::optional<std::string> instability(const scene::Scene& scene) {
-  const std::uint32_t needed = scene::stableSubsteps(scene);
+std::optional<std::string> instability(const model::Scene& scene) {
+  const std::uint32_t needed = model::stableSubsteps(scene);
   if (needed != 0 && needed <= scene.substeps) return std::nullopt;
   if (needed != 0)
     return fmt::format("this scene needs at least {} with its springs, masses and rate", needed);
-  if (scene.integrator == scene::Integrator::explicitEuler)
+  if (scene.integrator == model::Integrator::explicitEuler)
     return fmt::format(
         "no number up to {} keeps this scene stable: INTEGRATOR_EXPLICIT_EULER needs springs with a damping "
         "of at least "
@@ -511,10 +511,10 @@ std::optional<std::string> instability(const scene::Scene& scene) {
       limits::kMaxSubsteps);
 }
 
-Result<scene::Scene> toScene(const v1::Scene& message, const MeshReader& readMesh) {
+Result<model::Scene> toScene(const v1::Scene& message, const MeshReader& readMesh) {
   Checks checks;
   const Path root;
-  scene::Scene scene;
+  model::Scene scene;
   scene.name = checks.name(root / "name", message.name());
   scene.description = checks.text(root / "description", message.description());
   if (message.has_simulation_rate()) scene.simulationRate = message.simulation_rate();
@@ -534,7 +534,7 @@ Result<scene::Scene> toScene(const v1::Scene& message, const MeshReader& readMes
     scene.colliders.push_back(toCollider(checks, root.at("colliders", i), message.colliders(i)));
   scene.stream = toStreamSettings(checks, root / "stream", message.stream());
   if (!message.stream().has_max_error() && !checks.failed())
-    scene.stream.maxError = scene::suitedMaxError(scene);
+    scene.stream.maxError = model::suitedMaxError(scene);
   checkUnique(checks, "cloths", scene.cloths);
   checkUnique(checks, "colliders", scene.colliders);
   checkAttachments(checks, scene);

@@ -22,20 +22,20 @@ constexpr Sizes kOfScene{limits::kRadius, limits::kShapeLength, limits::kShapeSi
 constexpr Sizes kOfParticipant{limits::kParticipantRadius, limits::kParticipantLength,
                                limits::kParticipantSize};
 
-scene::Shape toSphere(Checks& checks, const Path& path, const v1::Sphere& message, const Sizes& sizes) {
-  return scene::Sphere{checks.number(path / "radius", message.radius(), sizes.radius)};
+model::Shape toSphere(Checks& checks, const Path& path, const v1::Sphere& message, const Sizes& sizes) {
+  return model::Sphere{checks.number(path / "radius", message.radius(), sizes.radius)};
 }
 
-scene::Shape toCapsule(Checks& checks, const Path& path, const v1::Capsule& message, const Sizes& sizes) {
-  return scene::Capsule{checks.number(path / "radius", message.radius(), sizes.radius),
+model::Shape toCapsule(Checks& checks, const Path& path, const v1::Capsule& message, const Sizes& sizes) {
+  return model::Capsule{checks.number(path / "radius", message.radius(), sizes.radius),
                         checks.number(path / "length", message.length(), sizes.length)};
 }
 
-scene::Shape toBox(Checks& checks, const Path& path, const v1::Box& message, const Sizes& sizes) {
-  return scene::Box{toVec3(checks, path / "size", message.size(), sizes.size)};
+model::Shape toBox(Checks& checks, const Path& path, const v1::Box& message, const Sizes& sizes) {
+  return model::Box{toVec3(checks, path / "size", message.size(), sizes.size)};
 }
 
-scene::Shape toHull(Checks& checks, const Path& path, const v1::ConvexHull& message) {
+model::Shape toHull(Checks& checks, const Path& path, const v1::ConvexHull& message) {
   const auto count = [&](std::string_view field, int elements) {
     checks.count(path / field, static_cast<std::size_t>(elements), limits::kMinHullParts,
                  limits::kMaxHullParts);
@@ -43,7 +43,7 @@ scene::Shape toHull(Checks& checks, const Path& path, const v1::ConvexHull& mess
   count("vertices", message.vertices_size());
   count("faces", message.faces_size());
   if (checks.failed()) return {};
-  std::vector<scene::Vec3> vertices;
+  std::vector<model::Vec3> vertices;
   vertices.reserve(static_cast<std::size_t>(message.vertices_size()));
   for (int i = 0; i < message.vertices_size(); ++i)
     vertices.push_back(toVec3(checks, path.at("vertices", i), message.vertices(i), limits::kPosition));
@@ -56,42 +56,42 @@ scene::Shape toHull(Checks& checks, const Path& path, const v1::ConvexHull& mess
     faces.emplace_back(face.vertices().begin(), face.vertices().end());
   }
   if (checks.failed()) return {};
-  auto made = scene::makeConvexHull(std::move(vertices), std::move(faces));
-  if (const auto* problem = std::get_if<scene::HullProblem>(&made)) {
+  auto made = model::makeConvexHull(std::move(vertices), std::move(faces));
+  if (const auto* problem = std::get_if<model::HullProblem>(&made)) {
     if (problem->face)
       checks.fail(path.at("faces", static_cast<int>(*problem->face)), "", problem->text);
     else
       checks.fail(path, "", problem->text);
     return {};
   }
-  return std::make_shared<const scene::ConvexHull>(std::get<scene::ConvexHull>(std::move(made)));
+  return std::make_shared<const model::ConvexHull>(std::get<model::ConvexHull>(std::move(made)));
 }
 
 // What all messages that have a shape have in common.
 template <typename Message>
-void writeSimple(const scene::Shape& shape, Message& message) {
-  std::visit(scene::ShapeVisitor{
-                 [&](const scene::Sphere& sphere) { message.mutable_sphere()->set_radius(sphere.radius); },
-                 [&](const scene::Capsule& capsule) {
+void writeSimple(const model::Shape& shape, Message& message) {
+  std::visit(model::ShapeVisitor{
+                 [&](const model::Sphere& sphere) { message.mutable_sphere()->set_radius(sphere.radius); },
+                 [&](const model::Capsule& capsule) {
                    message.mutable_capsule()->set_radius(capsule.radius);
                    message.mutable_capsule()->set_length(capsule.length);
                  },
-                 [&](const scene::Plane&) { message.mutable_plane(); },
-                 [&](const scene::Box& box) { write(box.size, *message.mutable_box()->mutable_size()); },
-                 [&](const scene::Hull&) { message.clear_shape(); }},
+                 [&](const model::Plane&) { message.mutable_plane(); },
+                 [&](const model::Box& box) { write(box.size, *message.mutable_box()->mutable_size()); },
+                 [&](const model::Hull&) { message.clear_shape(); }},
              shape);
 }
 
 }  // namespace
 
-scene::Shape toShape(Checks& checks, const Path& path, const v1::Collider& message) {
+model::Shape toShape(Checks& checks, const Path& path, const v1::Collider& message) {
   switch (message.shape_case()) {
     case v1::Collider::kSphere:
       return toSphere(checks, path / "sphere", message.sphere(), kOfScene);
     case v1::Collider::kCapsule:
       return toCapsule(checks, path / "capsule", message.capsule(), kOfScene);
     case v1::Collider::kPlane:
-      return scene::Plane{};
+      return model::Plane{};
     case v1::Collider::kBox:
       return toBox(checks, path / "box", message.box(), kOfScene);
     case v1::Collider::kHull:
@@ -103,7 +103,7 @@ scene::Shape toShape(Checks& checks, const Path& path, const v1::Collider& messa
   return {};
 }
 
-scene::Shape toShape(Checks& checks, const Path& path, const v1::ParticipantCollider& message) {
+model::Shape toShape(Checks& checks, const Path& path, const v1::ParticipantCollider& message) {
   switch (message.shape_case()) {
     case v1::ParticipantCollider::kSphere:
       return toSphere(checks, path / "sphere", message.sphere(), kOfParticipant);
@@ -118,18 +118,18 @@ scene::Shape toShape(Checks& checks, const Path& path, const v1::ParticipantColl
   return {};
 }
 
-void write(const scene::Shape& shape, v1::Collider& message) {
+void write(const model::Shape& shape, v1::Collider& message) {
   writeSimple(shape, message);
-  if (const auto* hull = std::get_if<scene::Hull>(&shape)) writeHull(**hull, *message.mutable_hull());
+  if (const auto* hull = std::get_if<model::Hull>(&shape)) writeHull(**hull, *message.mutable_hull());
 }
 
-void write(const scene::Shape& shape, v1::ColliderState& message) {
+void write(const model::Shape& shape, v1::ColliderState& message) {
   writeSimple(shape, message);
 }
 
-void writeHull(const scene::ConvexHull& hull, v1::ConvexHull& message) {
+void writeHull(const model::ConvexHull& hull, v1::ConvexHull& message) {
   message.Clear();
-  for (const scene::Vec3& vertex : hull.vertices) write(vertex, *message.add_vertices());
+  for (const model::Vec3& vertex : hull.vertices) write(vertex, *message.add_vertices());
   for (const std::vector<std::uint32_t>& face : hull.faces)
     message.add_faces()->mutable_vertices()->Assign(face.begin(), face.end());
 }

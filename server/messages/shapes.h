@@ -5,17 +5,17 @@
 #include "clothstream/v1/scene.pb.h"
 #include "clothstream/v1/session.pb.h"
 #include "server/messages/validation.h"
-#include "server/scene/collider.h"
+#include "server/model/collider.h"
 
 namespace clothstream::messages {
 
-scene::Shape toShape(Checks& checks, const Path& path, const v1::Collider& message);
-scene::Shape toShape(Checks& checks, const Path& path, const v1::ParticipantCollider& message);
+model::Shape toShape(Checks& checks, const Path& path, const v1::Collider& message);
+model::Shape toShape(Checks& checks, const Path& path, const v1::ParticipantCollider& message);
 
 // Replaces the message's shape.
-void write(const scene::Shape& shape, v1::Collider& message);
+void write(const model::Shape& shape, v1::Collider& message);
 // The same, but for a hull, of which a state has at most the mention: hulls are part of the description.
-void write(const scene::Shape& shape, v1::ColliderState& message);
-void writeHull(const scene::ConvexHull& hull, v1::ConvexHull& message);
+void write(const model::Shape& shape, v1::ColliderState& message);
+void writeHull(const model::ConvexHull& hull, v1::ConvexHull& message);
 
 }  // namespace clothstream::messages

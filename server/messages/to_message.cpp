@@ -4,28 +4,28 @@
 #include "server/messages/scene_message.h"
 #include "server/messages/shapes.h"
 #include "server/messages/vectors.h"
-#include "server/scene/mesh.h"
+#include "server/model/mesh.h"
 
 namespace clothstream::messages {
 namespace {
 
-void writeEnvironment(const scene::Environment& environment, v1::Environment& message) {
+void writeEnvironment(const model::Environment& environment, v1::Environment& message) {
   write(environment.gravity, *message.mutable_gravity());
   write(environment.wind, *message.mutable_wind());
   message.set_air_density(environment.airDensity);
   write(environment.gust, *message.mutable_gust());
 }
 
-void writeConstraint(const scene::Solver& solver, v1::ConstraintSolver& message) {
+void writeConstraint(const model::Solver& solver, v1::ConstraintSolver& message) {
   message.set_bend_constraints(solver.bendConstraints);
   if (solver.compliance) message.set_compliance(*solver.compliance);
   message.set_iterations(solver.iterations);
   message.set_tolerance(solver.tolerance);
-  message.set_path(solver.path == scene::ConstraintPath::assembled ? v1::CONSTRAINT_PATH_ASSEMBLED
+  message.set_path(solver.path == model::ConstraintPath::assembled ? v1::CONSTRAINT_PATH_ASSEMBLED
                                                                    : v1::CONSTRAINT_PATH_MATRIX_FREE);
 }
 
-void writeGrid(const scene::Grid& grid, v1::Grid& message) {
+void writeGrid(const model::Grid& grid, v1::Grid& message) {
   message.set_rows(grid.rows);
   message.set_columns(grid.columns);
   message.set_width(grid.width);
@@ -33,9 +33,9 @@ void writeGrid(const scene::Grid& grid, v1::Grid& message) {
   write(grid.pose, *message.mutable_pose());
 }
 
-void writeMotion(const scene::Motion& motion, v1::Motion& message) {
+void writeMotion(const model::Motion& motion, v1::Motion& message) {
   message.set_steady(motion.steady);
-  for (const scene::MotionKey& key : motion.keys) {
+  for (const model::MotionKey& key : motion.keys) {
     v1::MotionKey& keyMessage = *message.add_keys();
     keyMessage.set_time(key.time);
     write(key.position, *keyMessage.mutable_position());
@@ -43,11 +43,11 @@ void writeMotion(const scene::Motion& motion, v1::Motion& message) {
   }
 }
 
-void writeAttachment(const scene::Attachment& attachment, v1::Attachment& message) {
+void writeAttachment(const model::Attachment& attachment, v1::Attachment& message) {
   message.set_name(attachment.name);
-  for (const scene::GridRange& range : attachment.ranges) write(range, *message.add_ranges());
+  for (const model::GridRange& range : attachment.ranges) write(range, *message.add_ranges());
   message.mutable_vertices()->Add(attachment.vertices.begin(), attachment.vertices.end());
-  for (const scene::Region& region : attachment.regions) write(region, *message.add_regions());
+  for (const model::Region& region : attachment.regions) write(region, *message.add_regions());
   if (!attachment.collider.empty()) {
     message.set_collider(attachment.collider);
     return;
@@ -56,7 +56,7 @@ void writeAttachment(const scene::Attachment& attachment, v1::Attachment& messag
   if (!attachment.motion.keys.empty()) writeMotion(attachment.motion, *message.mutable_motion());
 }
 
-void writeCloth(const scene::Cloth& cloth, v1::Cloth& message) {
+void writeCloth(const model::Cloth& cloth, v1::Cloth& message) {
   message.set_name(cloth.name);
   if (cloth.mesh)
     message.mutable_mesh();
@@ -73,20 +73,20 @@ void writeCloth(const scene::Cloth& cloth, v1::Cloth& message) {
   message.set_lift(cloth.lift);
   message.set_friction(cloth.friction);
   message.set_thickness(cloth.thickness);
-  for (const scene::GridRange& range : cloth.pins) write(range, *message.add_pins());
+  for (const model::GridRange& range : cloth.pins) write(range, *message.add_pins());
   *message.mutable_solver() = toMessage(cloth.solver);
   if (cloth.selfCollision) {
     message.mutable_self_collision()->set_radius(cloth.selfCollision->radius);
     message.mutable_self_collision()->set_friction(cloth.selfCollision->friction);
   }
   message.mutable_pinned_vertices()->Add(cloth.pinnedVertices.begin(), cloth.pinnedVertices.end());
-  for (const scene::Region& region : cloth.pinnedRegions) write(region, *message.add_pinned_regions());
-  for (const scene::Attachment& attachment : cloth.attachments)
+  for (const model::Region& region : cloth.pinnedRegions) write(region, *message.add_pinned_regions());
+  for (const model::Attachment& attachment : cloth.attachments)
     writeAttachment(attachment, *message.add_attachments());
   if (cloth.tethers) message.mutable_tethers()->set_slack(cloth.tethers->slack);
 }
 
-void writeCollider(const scene::Collider& collider, v1::Collider& message) {
+void writeCollider(const model::Collider& collider, v1::Collider& message) {
   message.set_name(collider.name);
   write(collider.shape, message);
   write(collider.pose, *message.mutable_pose());
@@ -94,11 +94,11 @@ void writeCollider(const scene::Collider& collider, v1::Collider& message) {
   if (!collider.motion.keys.empty()) writeMotion(collider.motion, *message.mutable_motion());
 }
 
-v1::Integrator toMessage(scene::Integrator integrator) {
+v1::Integrator toMessage(model::Integrator integrator) {
   switch (integrator) {
-    case scene::Integrator::explicitEuler:
+    case model::Integrator::explicitEuler:
       return v1::INTEGRATOR_EXPLICIT_EULER;
-    case scene::Integrator::rungeKutta4:
+    case model::Integrator::rungeKutta4:
       return v1::INTEGRATOR_RUNGE_KUTTA_4;
     default:
       return v1::INTEGRATOR_SEMI_IMPLICIT_EULER;
@@ -107,33 +107,33 @@ v1::Integrator toMessage(scene::Integrator integrator) {
 
 }  // namespace
 
-v1::Normals toMessage(scene::Normals normals) {
-  return normals == scene::Normals::octahedral ? v1::NORMALS_OCTAHEDRAL : v1::NORMALS_NONE;
+v1::Normals toMessage(model::Normals normals) {
+  return normals == model::Normals::octahedral ? v1::NORMALS_OCTAHEDRAL : v1::NORMALS_NONE;
 }
 
-void write(const scene::Gust& gust, v1::Gust& message) {
+void write(const model::Gust& gust, v1::Gust& message) {
   message.set_strength(gust.strength);
   message.set_seconds(gust.seconds);
 }
 
-v1::Solver toMessage(const scene::Solver& solver) {
+v1::Solver toMessage(const model::Solver& solver) {
   v1::Solver message;
   switch (solver.kind) {
-    case scene::SolverKind::massSpring:
+    case model::SolverKind::massSpring:
       message.mutable_mass_spring();
       break;
-    case scene::SolverKind::constraint:
+    case model::SolverKind::constraint:
       writeConstraint(solver, *message.mutable_constraint());
       break;
-    case scene::SolverKind::acad:
+    case model::SolverKind::acad:
       message.mutable_acad()->set_activation(solver.activation);
       writeConstraint(solver, *message.mutable_acad()->mutable_constraint());
       break;
-    case scene::SolverKind::xpbd:
+    case model::SolverKind::xpbd:
       message.mutable_xpbd()->set_iterations(solver.iterations);
       if (solver.compliance) message.mutable_xpbd()->set_compliance(*solver.compliance);
       break;
-    case scene::SolverKind::implicitEuler:
+    case model::SolverKind::implicitEuler:
       message.mutable_implicit_euler()->set_iterations(solver.iterations);
       message.mutable_implicit_euler()->set_tolerance(solver.tolerance);
       break;
@@ -141,15 +141,15 @@ v1::Solver toMessage(const scene::Solver& solver) {
   return message;
 }
 
-v1::Scene toMessage(const scene::Scene& scene) {
+v1::Scene toMessage(const model::Scene& scene) {
   v1::Scene message = toMessageWithoutMeshes(scene);
   for (std::size_t i = 0; i < scene.cloths.size(); ++i)
-    if (const scene::Cloth& cloth = scene.cloths[i]; cloth.mesh)
+    if (const model::Cloth& cloth = scene.cloths[i]; cloth.mesh)
       write(*cloth.mesh, *message.mutable_cloths(static_cast<int>(i))->mutable_mesh());
   return message;
 }
 
-v1::Scene toMessageWithoutMeshes(const scene::Scene& scene) {
+v1::Scene toMessageWithoutMeshes(const model::Scene& scene) {
   v1::Scene message;
   message.set_name(scene.name);
   message.set_description(scene.description);
@@ -158,11 +158,11 @@ v1::Scene toMessageWithoutMeshes(const scene::Scene& scene) {
   message.set_substeps(scene.substeps);
   message.set_integrator(toMessage(scene.integrator));
   writeEnvironment(scene.environment, *message.mutable_environment());
-  for (const scene::Cloth& cloth : scene.cloths) writeCloth(cloth, *message.add_cloths());
-  for (const scene::Collider& collider : scene.colliders) writeCollider(collider, *message.add_colliders());
+  for (const model::Cloth& cloth : scene.cloths) writeCloth(cloth, *message.add_cloths());
+  for (const model::Collider& collider : scene.colliders) writeCollider(collider, *message.add_colliders());
   message.mutable_stream()->set_max_error(scene.stream.maxError);
   message.mutable_stream()->set_normals(toMessage(scene.stream.normals));
-  const bool packed = scene.stream.coding == scene::Coding::packed;
+  const bool packed = scene.stream.coding == model::Coding::packed;
   message.mutable_stream()->set_coding(packed ? v1::CODING_PACKED : v1::CODING_ENTROPY);
   message.mutable_stream()->set_temporal_layers(scene.stream.temporalLayers);
   message.mutable_stream()->set_qualities(scene.stream.qualities);

@@ -8,53 +8,53 @@
 
 namespace clothstream::messages {
 
-scene::Vec3 toVec3(Checks& checks, const Path& path, const v1::Vec3& message, Range allowed) {
+model::Vec3 toVec3(Checks& checks, const Path& path, const v1::Vec3& message, Range allowed) {
   return {checks.number(path / "x", message.x(), allowed), checks.number(path / "y", message.y(), allowed),
           checks.number(path / "z", message.z(), allowed)};
 }
 
-scene::Quaternion toQuaternion(Checks& checks, const Path& path, const v1::Quaternion& message) {
+model::Quaternion toQuaternion(Checks& checks, const Path& path, const v1::Quaternion& message) {
   const Eigen::Quaterniond q(message.w(), message.x(), message.y(), message.z());
   const double length = q.norm();
-  if (length == 0) return scene::Quaternion::Identity();
+  if (length == 0) return model::Quaternion::Identity();
   if (!(std::abs(length - 1) <= limits::kUnitTolerance)) {
     checks.fail(path, fmt::format("({}, {}, {}, {})", message.x(), message.y(), message.z(), message.w()),
                 fmt::format("must be a unit quaternion (x, y, z, w), of length 1 within {:g}, or absent",
                             limits::kUnitTolerance));
-    return scene::Quaternion::Identity();
+    return model::Quaternion::Identity();
   }
   return q.normalized().cast<float>();
 }
 
-scene::Pose toPose(Checks& checks, const Path& path, const v1::Pose& message) {
+model::Pose toPose(Checks& checks, const Path& path, const v1::Pose& message) {
   return {toVec3(checks, path / "position", message.position(), limits::kPosition),
           toQuaternion(checks, path / "orientation", message.orientation())};
 }
 
-scene::Spring toSpring(Checks& checks, const Path& path, const v1::Spring& message) {
+model::Spring toSpring(Checks& checks, const Path& path, const v1::Spring& message) {
   return {checks.number(path / "stiffness", message.stiffness(), limits::kStiffness),
           checks.number(path / "damping", message.damping(), limits::kSpringDamping)};
 }
 
-void write(const scene::Vec3& value, v1::Vec3& message) {
+void write(const model::Vec3& value, v1::Vec3& message) {
   message.set_x(value.x());
   message.set_y(value.y());
   message.set_z(value.z());
 }
 
-void write(const scene::Quaternion& value, v1::Quaternion& message) {
+void write(const model::Quaternion& value, v1::Quaternion& message) {
   message.set_x(value.x());
   message.set_y(value.y());
   message.set_z(value.z());
   message.set_w(value.w());
 }
 
-void write(const scene::Pose& value, v1::Pose& message) {
+void write(const model::Pose& value, v1::Pose& message) {
   write(value.position, *message.mutable_position());
   write(value.orientation, *message.mutable_orientation());
 }
 
-void write(const scene::Spring& value, v1::Spring& message) {
+void write(const model::Spring& value, v1::Spring& message) {
   message.set_stiffness(value.stiffness);
   message.set_damping(value.damping);
 }

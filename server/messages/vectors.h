@@ -4,19 +4,19 @@
 
 #include "clothstream/v1/scene.pb.h"
 #include "server/messages/validation.h"
-#include "server/scene/scene.h"
+#include "server/model/scene.h"
 
 namespace clothstream::messages {
 
-scene::Vec3 toVec3(Checks& checks, const Path& path, const v1::Vec3& message, Range allowed);
+model::Vec3 toVec3(Checks& checks, const Path& path, const v1::Vec3& message, Range allowed);
 // Absent or all zero: no rotation. Otherwise of length 1 within kUnitTolerance; normalised.
-scene::Quaternion toQuaternion(Checks& checks, const Path& path, const v1::Quaternion& message);
-scene::Pose toPose(Checks& checks, const Path& path, const v1::Pose& message);
-scene::Spring toSpring(Checks& checks, const Path& path, const v1::Spring& message);
+model::Quaternion toQuaternion(Checks& checks, const Path& path, const v1::Quaternion& message);
+model::Pose toPose(Checks& checks, const Path& path, const v1::Pose& message);
+model::Spring toSpring(Checks& checks, const Path& path, const v1::Spring& message);
 
-void write(const scene::Vec3& value, v1::Vec3& message);
-void write(const scene::Quaternion& value, v1::Quaternion& message);
-void write(const scene::Pose& value, v1::Pose& message);
-void write(const scene::Spring& value, v1::Spring& message);
+void write(const model::Vec3& value, v1::Vec3& message);
+void write(const model::Quaternion& value, v1::Quaternion& message);
+void write(const model::Pose& value, v1::Pose& message);
+void write(const model::Spring& value, v1::Spring& message);
 
 }  // namespace clothstream::messages

@@ -42,7 +42,7 @@ std::string shaderHash() {
   return CLOTHSTREAM_SHADER_HASH;
 }
 
-Facts factsOf(const std::string& serverName, const vulkan::DeviceInfo& device, const scene::Scene& scene,
+Facts factsOf(const std::string& serverName, const vulkan::DeviceInfo& device, const model::Scene& scene,
               const v1::StreamDescription& description) {
   return {{"server", serverName},
           {"scene", scene.name},

@@ -6,13 +6,13 @@
 
 #include "clothstream/v1/session.pb.h"
 #include "proto/recording/mcap_format.h"
-#include "server/scene/scene.h"
+#include "server/model/scene.h"
 #include "server/vulkan/device.h"
 
 namespace clothstream::recording {
 
 // Names as in docs/recording.md.
-Facts factsOf(const std::string& serverName, const vulkan::DeviceInfo& device, const scene::Scene& scene,
+Facts factsOf(const std::string& serverName, const vulkan::DeviceInfo& device, const model::Scene& scene,
               const v1::StreamDescription& description);
 
 // Of this machine's processor, those that software devices choose their code by; space-separated.

@@ -12,7 +12,7 @@
 #include <google/protobuf/message.h>
 
 #include "server/messages/scene_message.h"
-#include "server/scene/scene.h"
+#include "server/model/scene.h"
 
 namespace clothstream::recording {
 namespace {
@@ -26,7 +26,7 @@ double areaOf(const v1::Cloth& cloth, const v1::ClothDescription& described) {
   const auto corner = [&](std::size_t i) {
     std::uint32_t vertex = 0;
     std::memcpy(&vertex, triangles.data() + i * sizeof vertex, sizeof vertex);
-    scene::Vec3 at(0, 0, 0);
+    model::Vec3 at(0, 0, 0);
     if (vertex < positions.size() / sizeof at)
       std::memcpy(at.data(), positions.data() + vertex * sizeof at, sizeof at);
     return at;

@@ -91,7 +91,7 @@ std::string Recorder::path() const {
   return path_;
 }
 
-void Recorder::begin(const vulkan::DeviceInfo& device, const scene::Scene& scene,
+void Recorder::begin(const vulkan::DeviceInfo& device, const model::Scene& scene,
                      const v1::StreamDescription& description, const simulation::StateSnapshot& state,
                      const simulation::StateSnapshot& start) {
   const std::lock_guard lock(beginning_);
@@ -116,17 +116,17 @@ void Recorder::ticked(const stream::AppliedTick& tick) {
   put(Topic::ticks, tick_);
 }
 
-void Recorder::saved(const simulation::StateSnapshot& state, bool gripsHold) {
-  put(state, gripsHold, false);
+void Recorder::saved(const simulation::StateSnapshot& state, bool grabsHold) {
+  put(state, grabsHold, false);
   tellsCloths_ = true;
 }
 
-void Recorder::put(const simulation::StateSnapshot& state, bool gripsHold, bool start) {
+void Recorder::put(const simulation::StateSnapshot& state, bool grabsHold, bool start) {
   v1::Checkpoint checkpoint;
   checkpoint.set_start(start);
   checkpoint.set_tick(state.tick);
   checkpoint.set_state(state.bytes.data(), state.bytes.size());
-  checkpoint.set_grips_hold(gripsHold);
+  checkpoint.set_grips_hold(grabsHold);
   put(Topic::checkpoints, checkpoint);
 }
 

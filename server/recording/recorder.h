@@ -25,7 +25,7 @@ namespace clothstream::recording {
 struct RecorderOptions {
   std::filesystem::path directory;  // there must be one
   std::string serverName;
-  // After which a recording goes on in another file, where grips hold cloth up to an eighth later; 0: never.
+  // After which a recording goes on in another file, where grabs hold cloth up to an eighth later; 0: never.
   std::uint64_t maxBytes = 0;
   // Of what waits to be written. When it is more, the recording ends: the scene does not wait for a disk.
   std::size_t maxWaitingBytes = std::size_t{64} << 20;
@@ -55,11 +55,11 @@ class Recorder : public stream::Journal {
 
   bool active() const override { return state_ == State::running && !ended_; }
   bool due() const override { return state_ == State::waiting && !ended_; }
-  void begin(const vulkan::DeviceInfo& device, const scene::Scene& scene,
+  void begin(const vulkan::DeviceInfo& device, const model::Scene& scene,
              const v1::StreamDescription& description, const simulation::StateSnapshot& state,
              const simulation::StateSnapshot& start) override;
   void ticked(const stream::AppliedTick& tick) override;
-  void saved(const simulation::StateSnapshot& state, bool gripsHold) override;
+  void saved(const simulation::StateSnapshot& state, bool grabsHold) override;
   void restored(std::uint64_t tick, const simulation::StateSnapshot& state) override;
   void end() override;
   void sent(const stream::SharedBytes& message) override;
@@ -81,7 +81,7 @@ class Recorder : public stream::Journal {
   void push(std::variant<Own, stream::SharedBytes> what, std::size_t bytes);
   void tellParticipant(std::uint64_t participant, v1::ParticipantEventKind kind,
                        const std::string& clientName, const std::string& displayName);
-  void put(const simulation::StateSnapshot& state, bool gripsHold, bool start);
+  void put(const simulation::StateSnapshot& state, bool grabsHold, bool start);
   void run(const std::string& sceneName, const Facts& facts);
   // Until the end, or the error that it returns.
   [[nodiscard]] Written writeAll(RecordingWriter& writer);

@@ -53,7 +53,7 @@ class Replay {
   Done take(const v1::RecordedScene& message);
   Done take(v1::Checkpoint& message);
   Done take(const v1::RecordedTick& message);
-  // Something before the next message cannot be read: it goes on from the next state in which no grip holds,
+  // Something before the next message cannot be read: it goes on from the next state in which no grab holds,
   // for which nodes one has is not in it.
   void lose(std::string reason);
 
@@ -70,7 +70,7 @@ class Replay {
   const ResimulateOptions& options_;
   Resimulation& result_;
   v1::Scene definition_;
-  scene::Scene scene_;
+  model::Scene scene_;
   simulation::StateSnapshot start_;
   std::uint64_t tick_ = 0;
   bool lost_ = false;   // until a state from which it can go on
@@ -86,7 +86,7 @@ void Replay::lose(std::string reason) {
 }
 
 Done Replay::take(const v1::RecordedScene& message) {
-  messages::Result<scene::Scene> scene = messages::toScene(message.scene());
+  messages::Result<model::Scene> scene = messages::toScene(message.scene());
   if (!scene) return broken("its scene cannot be: {}", scene.error().text);
   definition_ = message.scene();
   scene_ = std::move(*scene);

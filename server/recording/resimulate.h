@@ -10,7 +10,7 @@
 
 #include <tl/expected.hpp>
 
-#include "server/scene/scene.h"
+#include "server/model/scene.h"
 #include "server/simulation/state_snapshot.h"
 #include "server/vulkan/device.h"
 

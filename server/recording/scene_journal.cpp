@@ -141,7 +141,7 @@ bool SceneJournal::active() const {
   return current_ && (current_->active() || (continues_ && current_->due()));
 }
 
-void SceneJournal::begin(const vulkan::DeviceInfo& device, const scene::Scene& scene,
+void SceneJournal::begin(const vulkan::DeviceInfo& device, const model::Scene& scene,
                          const v1::StreamDescription& description, const simulation::StateSnapshot& state,
                          const simulation::StateSnapshot& start) {
   if (const auto recorder = current()) recorder->begin(device, scene, description, state, start);
@@ -152,8 +152,8 @@ void SceneJournal::ticked(const stream::AppliedTick& tick) {
   if (!recorder) return;
   recorder->ticked(tick);
   if (options_.maxBytes == 0 || !recorder->active()) return;
-  // Grips take hold anew where a file begins: that is put off, but not for ever.
-  const std::uint64_t most = options_.maxBytes + (tick.inputs.grips.empty() ? 0 : options_.maxBytes / 8);
+  // Grabs take hold anew where a file begins: that is put off, but not for ever.
+  const std::uint64_t most = options_.maxBytes + (tick.inputs.grabs.empty() ? 0 : options_.maxBytes / 8);
   if (recorder->bytes() < most) return;
   // The next file begins with the next tick.
   const std::lock_guard lock(mutex_);
@@ -162,8 +162,8 @@ void SceneJournal::ticked(const stream::AppliedTick& tick) {
   replace(std::make_shared<Recorder>(options_), true);
 }
 
-void SceneJournal::saved(const simulation::StateSnapshot& state, bool gripsHold) {
-  if (const auto recorder = current()) recorder->saved(state, gripsHold);
+void SceneJournal::saved(const simulation::StateSnapshot& state, bool grabsHold) {
+  if (const auto recorder = current()) recorder->saved(state, grabsHold);
 }
 
 void SceneJournal::restored(std::uint64_t tick, const simulation::StateSnapshot& state) {

@@ -40,11 +40,11 @@ class SceneJournal : public stream::Journal {
   messages::Result<v1::StopRecordingResponse> stop() override;
   bool due() const override;
   bool active() const override;
-  void begin(const vulkan::DeviceInfo& device, const scene::Scene& scene,
+  void begin(const vulkan::DeviceInfo& device, const model::Scene& scene,
              const v1::StreamDescription& description, const simulation::StateSnapshot& state,
              const simulation::StateSnapshot& start) override;
   void ticked(const stream::AppliedTick& tick) override;
-  void saved(const simulation::StateSnapshot& state, bool gripsHold) override;
+  void saved(const simulation::StateSnapshot& state, bool grabsHold) override;
   void restored(std::uint64_t tick, const simulation::StateSnapshot& state) override;
   void end() override;
   void sent(const stream::SharedBytes& message) override;

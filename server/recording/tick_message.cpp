@@ -27,10 +27,10 @@ v1::Recovery toMessage(stream::Recovery recovery) {
 }
 
 // But for their geometry.
-void writeCloths(const scene::Scene& scene, v1::RecordedTick& message) {
-  scene::Scene bare;
-  for (const scene::Cloth& cloth : scene.cloths) {
-    scene::Cloth& one = bare.cloths.emplace_back(cloth);
+void writeCloths(const model::Scene& scene, v1::RecordedTick& message) {
+  model::Scene bare;
+  for (const model::Cloth& cloth : scene.cloths) {
+    model::Cloth& one = bare.cloths.emplace_back(cloth);
     one.mesh.reset();
     one.pins.clear();
     one.pinnedVertices.clear();
@@ -46,17 +46,17 @@ void writeCloths(const scene::Scene& scene, v1::RecordedTick& message) {
   }
 }
 
-void writeShape(const scene::Shape& shape, v1::AppliedCollider& message) {
+void writeShape(const model::Shape& shape, v1::AppliedCollider& message) {
   std::visit(
-      scene::ShapeVisitor{
-          [&](const scene::Sphere& sphere) { message.mutable_sphere()->set_radius(sphere.radius); },
-          [&](const scene::Capsule& capsule) {
+      model::ShapeVisitor{
+          [&](const model::Sphere& sphere) { message.mutable_sphere()->set_radius(sphere.radius); },
+          [&](const model::Capsule& capsule) {
             message.mutable_capsule()->set_radius(capsule.radius);
             message.mutable_capsule()->set_length(capsule.length);
           },
-          [&](const scene::Plane&) { message.mutable_plane(); },
-          [&](const scene::Box& box) { messages::write(box.size, *message.mutable_box()->mutable_size()); },
-          [&](const scene::Hull&) {}},
+          [&](const model::Plane&) { message.mutable_plane(); },
+          [&](const model::Box& box) { messages::write(box.size, *message.mutable_box()->mutable_size()); },
+          [&](const model::Hull&) {}},
       shape);
 }
 
@@ -74,16 +74,16 @@ void writeColliders(const stream::AppliedTick& tick, v1::RecordedTick& message) 
   }
 }
 
-void writeGrip(const simulation::Grip& grip, v1::AppliedGrip& message) {
-  if (grip.state == simulation::Grip::State::free) return;
-  message.set_state(grip.state == simulation::Grip::State::takes ? v1::APPLIED_GRIP_STATE_TAKES
+void writeGrab(const simulation::Grab& grab, v1::AppliedGrip& message) {
+  if (grab.state == simulation::Grab::State::free) return;
+  message.set_state(grab.state == simulation::Grab::State::takes ? v1::APPLIED_GRIP_STATE_TAKES
                                                                  : v1::APPLIED_GRIP_STATE_HOLDS);
-  messages::write(grip.start, *message.mutable_start());
-  messages::write(grip.end, *message.mutable_end());
-  message.set_radius(grip.radius);
-  message.set_reach(grip.reach);
-  message.set_max_force(grip.maxForce);
-  message.set_slip_distance(grip.slipDistance);
+  messages::write(grab.start, *message.mutable_start());
+  messages::write(grab.end, *message.mutable_end());
+  message.set_radius(grab.radius);
+  message.set_reach(grab.reach);
+  message.set_max_force(grab.maxForce);
+  message.set_slip_distance(grab.slipDistance);
 }
 
 // Numbers as they are: what was normalised once is not to be again. The first that no tick can have is kept.
@@ -94,12 +94,12 @@ class Numbers {
     return value;
   }
   float number(float value) { return number(value, -kFar, kFar); }
-  scene::Vec3 vec3(const v1::Vec3& message) {
+  model::Vec3 vec3(const v1::Vec3& message) {
     return {number(message.x()), number(message.y()), number(message.z())};
   }
-  scene::Pose pose(const v1::Pose& message) {
+  model::Pose pose(const v1::Pose& message) {
     const v1::Quaternion& q = message.orientation();
-    scene::Pose pose{vec3(message.position()), {number(q.w()), number(q.x()), number(q.y()), number(q.z())}};
+    model::Pose pose{vec3(message.position()), {number(q.w()), number(q.x()), number(q.y()), number(q.z())}};
     if (std::abs(pose.orientation.norm() - 1) > messages::limits::kUnitTolerance) good_ = false;
     return pose;
   }
@@ -112,32 +112,32 @@ class Numbers {
 
 constexpr float kMostSize = 1e4f;  // m
 
-scene::Shape shapeOf(Numbers& numbers, const v1::AppliedCollider& message, const scene::Scene& scene,
+model::Shape shapeOf(Numbers& numbers, const v1::AppliedCollider& message, const model::Scene& scene,
                      bool& known) {
   const auto size = [&](float value) { return numbers.number(value, 0, kMostSize); };
   switch (message.shape_case()) {
     case v1::AppliedCollider::kSphere:
-      return scene::Sphere{size(message.sphere().radius())};
+      return model::Sphere{size(message.sphere().radius())};
     case v1::AppliedCollider::kCapsule:
-      return scene::Capsule{size(message.capsule().radius()), size(message.capsule().length())};
+      return model::Capsule{size(message.capsule().radius()), size(message.capsule().length())};
     case v1::AppliedCollider::kPlane:
-      return scene::Plane{};
+      return model::Plane{};
     case v1::AppliedCollider::kBox: {
       const v1::Vec3& box = message.box().size();
-      return scene::Box{{size(box.x()), size(box.y()), size(box.z())}};
+      return model::Box{{size(box.x()), size(box.y()), size(box.z())}};
     }
     case v1::AppliedCollider::SHAPE_NOT_SET:
       break;
   }
   known = message.participant_id() == 0 && message.id() < scene.colliders.size() &&
-          std::holds_alternative<scene::Hull>(scene.colliders[message.id()].shape);
-  return known ? scene.colliders[message.id()].shape : scene::Shape{};
+          std::holds_alternative<model::Hull>(scene.colliders[message.id()].shape);
+  return known ? scene.colliders[message.id()].shape : model::Shape{};
 }
 
-simulation::Grip gripOf(Numbers& numbers, const v1::AppliedGrip& message) {
+simulation::Grab grabOf(Numbers& numbers, const v1::AppliedGrip& message) {
   if (message.state() == v1::APPLIED_GRIP_STATE_FREE) return {};
-  return {.state = message.state() == v1::APPLIED_GRIP_STATE_TAKES ? simulation::Grip::State::takes
-                                                                   : simulation::Grip::State::holds,
+  return {.state = message.state() == v1::APPLIED_GRIP_STATE_TAKES ? simulation::Grab::State::takes
+                                                                   : simulation::Grab::State::holds,
           .start = numbers.pose(message.start()),
           .end = numbers.pose(message.end()),
           .radius = numbers.number(message.radius(), 0, kMostSize),
@@ -160,22 +160,22 @@ void write(const stream::AppliedTick& tick, v1::RecordedTick& message) {
   messages::write(tick.inputs.environment.wind, *message.mutable_wind());
   message.set_air_density(tick.inputs.environment.airDensity);
   writeColliders(tick, message);
-  for (const scene::Pose& pose : tick.inputs.attachments) messages::write(pose, *message.add_attachments());
-  for (const simulation::Grip& grip : tick.inputs.grips) writeGrip(grip, *message.add_grips());
+  for (const model::Pose& pose : tick.inputs.attachments) messages::write(pose, *message.add_attachments());
+  for (const simulation::Grab& grab : tick.inputs.grabs) writeGrab(grab, *message.add_grips());
 }
 
 tl::expected<simulation::TickInputs, std::string> toInputs(const v1::RecordedTick& message,
-                                                           const scene::Scene& scene) {
+                                                           const model::Scene& scene) {
   const auto wrong = [&](const char* what) {
     return tl::unexpected(fmt::format("tick {}: {}", message.tick(), what));
   };
   std::size_t attachments = 0;
-  for (const scene::Cloth& cloth : scene.cloths) attachments += cloth.attachments.size();
+  for (const model::Cloth& cloth : scene.cloths) attachments += cloth.attachments.size();
   if (static_cast<std::size_t>(message.attachments_size()) != attachments)
     return wrong("it has not the scene's attachments");
   if (static_cast<std::size_t>(message.colliders_size()) > simulation::kMaxColliders ||
-      static_cast<std::size_t>(message.grips_size()) > simulation::kMaxGrips)
-    return wrong("it has more colliders or grips than there can be");
+      static_cast<std::size_t>(message.grips_size()) > simulation::kMaxGrabs)
+    return wrong("it has more colliders or grabs than there can be");
   Numbers numbers;
   simulation::TickInputs inputs;
   inputs.environment.gravity = numbers.vec3(message.gravity());
@@ -183,18 +183,18 @@ tl::expected<simulation::TickInputs, std::string> toInputs(const v1::RecordedTic
   inputs.environment.airDensity = numbers.number(message.air_density());
   for (const v1::AppliedCollider& collider : message.colliders()) {
     bool known = true;
-    const scene::Shape shape = shapeOf(numbers, collider, scene, known);
+    const model::Shape shape = shapeOf(numbers, collider, scene, known);
     if (!known) return wrong("one of its colliders has no shape");
     inputs.colliders.push_back({shape, numbers.pose(collider.start()), numbers.pose(collider.end()),
                                 numbers.number(collider.friction())});
   }
   for (const v1::Pose& pose : message.attachments()) inputs.attachments.push_back(numbers.pose(pose));
-  for (const v1::AppliedGrip& grip : message.grips()) inputs.grips.push_back(gripOf(numbers, grip));
+  for (const v1::AppliedGrip& grab : message.grips()) inputs.grabs.push_back(grabOf(numbers, grab));
   if (!numbers.good()) return wrong("one of its numbers cannot be");
   return inputs;
 }
 
-tl::expected<std::vector<scene::Cloth>, std::string> toCloths(const v1::RecordedTick& message,
+tl::expected<std::vector<model::Cloth>, std::string> toCloths(const v1::RecordedTick& message,
                                                               const v1::Scene& definition) {
   if (message.cloths_size() != definition.cloths_size())
     return tl::unexpected(fmt::format("tick {}: it has {} cloths, and the scene {}", message.tick(),
@@ -214,7 +214,7 @@ tl::expected<std::vector<scene::Cloth>, std::string> toCloths(const v1::Recorded
       cloth.mutable_grid()->Swap(whole.mutable_grid());
     whole.Swap(&cloth);
   }
-  messages::Result<scene::Scene> scene = messages::toScene(changed);
+  messages::Result<model::Scene> scene = messages::toScene(changed);
   if (!scene) return tl::unexpected(fmt::format("tick {}: {}", message.tick(), scene.error().text));
   for (int i = 0; i < message.cloths_size(); ++i)
     if (message.cloths(i).has_taken_back())

@@ -35,32 +35,32 @@ Surface overBox(const Vec3& p, const Vec3& size, double thickness) {
   return surface;
 }
 
-Surface overHull(const Vec3& p, const scene::ConvexHull& hull, double thickness) {
+Surface overHull(const Vec3& p, const model::ConvexHull& hull, double thickness) {
   Surface surface{-INFINITY, Vec3::UnitY()};
-  for (const scene::HalfSpace& plane : hull.planes) {
+  for (const model::HalfSpace& plane : hull.planes) {
     const Vec3 normal = plane.normal.cast<double>();
     raise(surface, normal, normal.dot(p) - plane.offset - thickness);
   }
   return surface;
 }
 
-Surface over(const scene::Shape& shape, double thickness, const Vec3& p) {
-  if (const auto* sphere = std::get_if<scene::Sphere>(&shape))
+Surface over(const model::Shape& shape, double thickness, const Vec3& p) {
+  if (const auto* sphere = std::get_if<model::Sphere>(&shape))
     return overRound(p, sphere->radius + thickness, 0);
-  if (const auto* capsule = std::get_if<scene::Capsule>(&shape))
+  if (const auto* capsule = std::get_if<model::Capsule>(&shape))
     return overRound(p, capsule->radius + thickness, capsule->length);
-  if (const auto* box = std::get_if<scene::Box>(&shape))
+  if (const auto* box = std::get_if<model::Box>(&shape))
     return overBox(p, box->size.cast<double>(), thickness);
-  if (const auto* hull = std::get_if<scene::Hull>(&shape)) return overHull(p, **hull, thickness);
+  if (const auto* hull = std::get_if<model::Hull>(&shape)) return overHull(p, **hull, thickness);
   return {p.y() - thickness, Vec3::UnitY()};
 }
 
-bool isRound(const scene::Shape& shape) {
-  return std::holds_alternative<scene::Sphere>(shape) || std::holds_alternative<scene::Capsule>(shape);
+bool isRound(const model::Shape& shape) {
+  return std::holds_alternative<model::Sphere>(shape) || std::holds_alternative<model::Capsule>(shape);
 }
 
 // Where between from, outside, and to the height first is zero.
-std::optional<Vec3> entry(const scene::Shape& shape, double thickness, const Vec3& from, const Vec3& to) {
+std::optional<Vec3> entry(const model::Shape& shape, double thickness, const Vec3& from, const Vec3& to) {
   const auto height = [&](double t) { return over(shape, thickness, from + t * (to - from)).height; };
   // The lowest point, by thirds.
   double low = 0, high = 1;
@@ -80,7 +80,7 @@ std::optional<Vec3> entry(const scene::Shape& shape, double thickness, const Vec
 }
 
 // Both in the shape's frame.
-std::optional<Contact> contactOf(const scene::Shape& shape, double thickness, const Vec3& from,
+std::optional<Contact> contactOf(const model::Shape& shape, double thickness, const Vec3& from,
                                  const Vec3& to) {
   const bool begunInside = over(shape, thickness, from).height <= 0;
   const std::optional<Vec3> entered = begunInside ? from : entry(shape, thickness, from, to);
@@ -102,7 +102,7 @@ std::optional<Contact> contactOf(const scene::Shape& shape, double thickness, co
 
 }  // namespace
 
-double heightOver(const scene::Shape& shape, const Pose& pose, const Vec3& point) {
+double heightOver(const model::Shape& shape, const Pose& pose, const Vec3& point) {
   return over(shape, 0, pose.orientation.conjugate() * (point - pose.position)).height;
 }
 
@@ -124,10 +124,10 @@ ColliderStep stepOf(const Pose& start, const Pose& end, std::uint32_t index, std
   return step;
 }
 
-std::optional<Contact> contactOf(const scene::Shape& shape, double thickness, const ColliderStep& step,
+std::optional<Contact> contactOf(const model::Shape& shape, double thickness, const ColliderStep& step,
                                  const Vec3& from, const Vec3& to) {
   const Vec3 after = to - step.after.position;
-  const double reach = scene::reachOf(shape) + 2 * thickness;
+  const double reach = model::reachOf(shape) + 2 * thickness;
   const Vec3 before = from - step.before.position;
   if (after.norm() > reach + (after - before).norm()) return std::nullopt;
   std::optional<Contact> contact = contactOf(shape, thickness, step.before.orientation.conjugate() * before,

@@ -6,7 +6,7 @@
 #include <Eigen/Geometry>
 #include <optional>
 
-#include "server/scene/collider.h"
+#include "server/model/collider.h"
 
 namespace clothstream::reference {
 
@@ -18,7 +18,7 @@ struct Pose {
   Quaternion orientation = Quaternion::Identity();
 };
 
-inline Pose toPose(const scene::Pose& pose) {
+inline Pose toPose(const model::Pose& pose) {
   return {pose.position.cast<double>(), pose.orientation.cast<double>()};
 }
 
@@ -37,7 +37,7 @@ ColliderStep stepOf(const Pose& start, const Pose& end, std::uint32_t index, std
                     double tickSeconds);
 
 // Metres from the point to the shape's surface (to the highest plane of what has planes); negative inside.
-double heightOver(const scene::Shape& shape, const Pose& pose, const Vec3& point);
+double heightOver(const model::Shape& shape, const Pose& pose, const Vec3& point);
 
 struct Contact {
   Vec3 normal;   // out of the shape
@@ -46,7 +46,7 @@ struct Contact {
 
 // Cloth keeps `thickness` from the surface (from the planes of what has planes). A way that begins outside
 // meets the shape where it first enters; one that begins inside leaves by the nearest way at its beginning.
-std::optional<Contact> contactOf(const scene::Shape& shape, double thickness, const ColliderStep& step,
+std::optional<Contact> contactOf(const model::Shape& shape, double thickness, const ColliderStep& step,
                                  const Vec3& from, const Vec3& to);
 
 }  // namespace clothstream::reference

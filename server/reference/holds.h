@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What holds cloth, in double precision: attachments, tethers, grips.
+// What holds cloth, in double precision: attachments, tethers, grabs.
 #pragma once
 
 #include <cstdint>
@@ -7,15 +7,15 @@
 #include <span>
 #include <vector>
 
+#include "server/model/scene.h"
+#include "server/model/tethers.h"
 #include "server/reference/contact.h"
 #include "server/reference/reference_cloth.h"
-#include "server/scene/scene.h"
-#include "server/scene/tethers.h"
 
 namespace clothstream::reference {
 
-// Moves from start to end over a tick's substeps; as simulation::Grip says.
-struct Grip {
+// Moves from start to end over a tick's substeps; as simulation::Grab says.
+struct Grab {
   enum class State : std::uint8_t { free, holds, takes };
   State state = State::free;
   Pose start = {}, end = {};
@@ -26,17 +26,17 @@ struct Grip {
 
 class Holds {
  public:
-  explicit Holds(const scene::Scene& scene);
+  explicit Holds(const model::Scene& scene);
 
   // A tick's start: attached nodes get the velocity that takes them to their frames' places at its end, at
-  // most scene::kMaxAttachmentSpeed; no frames: where they start. Grips that begin take hold.
-  void begin(std::vector<ReferenceCloth>& cloths, std::span<const Pose> frames, std::span<const Grip> grips,
+  // most model::kMaxAttachmentSpeed; no frames: where they start. Grabs that begin take hold.
+  void begin(std::vector<ReferenceCloth>& cloths, std::span<const Pose> frames, std::span<const Grab> grabs,
              double tickSeconds);
   // The end of a substep.
-  void apply(std::vector<ReferenceCloth>& cloths, std::span<const Grip> grips, std::uint32_t substep,
+  void apply(std::vector<ReferenceCloth>& cloths, std::span<const Grab> grabs, std::uint32_t substep,
              std::uint32_t substeps, double tickSeconds);
 
-  // Of each grip: nodes that it took hold of, and those that slipped away since.
+  // Of each grab: nodes that it took hold of, and those that slipped away since.
   struct Status {
     std::uint32_t taken = 0, slipped = 0;
   };
@@ -48,13 +48,13 @@ class Holds {
     Vec3 place;  // in the frame
   };
   struct Held {
-    std::size_t grip;
-    Vec3 place;  // in the grip
+    std::size_t grab;
+    Vec3 place;  // in the grab
   };
 
   std::vector<Pose> start_;
   std::vector<Attached> attached_;
-  std::vector<std::vector<scene::NodeTethers>> tethers_;  // of each cloth; empty: it has none
+  std::vector<std::vector<model::NodeTethers>> tethers_;  // of each cloth; empty: it has none
   std::vector<double> slack_;
   std::vector<std::vector<std::optional<Held>>> held_;  // of each cloth's nodes
   std::vector<Status> status_;

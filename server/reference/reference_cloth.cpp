@@ -34,36 +34,36 @@ Vec3 unitNormal(const Vec3& sum) {
 
 }  // namespace
 
-ReferenceCloth::ReferenceCloth(const scene::Cloth& cloth)
+ReferenceCloth::ReferenceCloth(const model::Cloth& cloth)
     : cloth_(cloth),
-      links_(scene::springLinks(cloth)),
-      triangles_(scene::clothTriangles(cloth)),
+      links_(model::springLinks(cloth)),
+      triangles_(model::clothTriangles(cloth)),
       velocities_(cloth.nodeCount(), Vec3::Zero()),
       forces_(cloth.nodeCount(), Vec3::Zero()),
-      masses_(scene::nodeMasses(cloth)) {
-  for (const scene::Vec3& position : scene::restPositions(cloth))
+      masses_(model::nodeMasses(cloth)) {
+  for (const model::Vec3& position : model::restPositions(cloth))
     positions_.push_back(position.cast<double>());
   for (const double mass : masses_) inverseMasses_.push_back(1 / mass);
-  const std::vector<std::uint8_t> pinned = scene::pinnedNodes(cloth);
+  const std::vector<std::uint8_t> pinned = model::pinnedNodes(cloth);
   for (std::size_t i = 0; i < pinned.size(); ++i)
     if (pinned[i]) inverseMasses_[i] = 0;
-  if (cloth_.dihedralBending > 0) hinges_ = scene::hinges(cloth_);
+  if (cloth_.dihedralBending > 0) hinges_ = model::hinges(cloth_);
 }
 
 void ReferenceCloth::setMass(float mass) {
   cloth_.mass = mass;
-  masses_ = scene::nodeMasses(cloth_);
+  masses_ = model::nodeMasses(cloth_);
   for (std::size_t i = 0; i < masses_.size(); ++i)
     if (inverseMasses_[i] > 0) inverseMasses_[i] = 1 / masses_[i];
 }
 
-void ReferenceCloth::setParameters(const scene::Cloth& cloth) {
+void ReferenceCloth::setParameters(const model::Cloth& cloth) {
   assert(cloth.nodeCount() == cloth_.nodeCount() && cloth.mesh == cloth_.mesh);
   cloth_.structural = cloth.structural;
   cloth_.shear = cloth.shear;
   cloth_.bend = cloth.bend;
   cloth_.dihedralBending = cloth.dihedralBending;
-  if (cloth_.dihedralBending > 0 && hinges_.empty()) hinges_ = scene::hinges(cloth_);
+  if (cloth_.dihedralBending > 0 && hinges_.empty()) hinges_ = model::hinges(cloth_);
   cloth_.damping = cloth.damping;
   cloth_.drag = cloth.drag;
   cloth_.lift = cloth.lift;
@@ -74,8 +74,8 @@ void ReferenceCloth::setParameters(const scene::Cloth& cloth) {
 }
 
 void ReferenceCloth::accumulateSpringForces(std::span<Vec3> forces) const {
-  for (const scene::SpringLink& link : links_) {
-    const scene::Spring spring = scene::forceOf(cloth_, link.kind);
+  for (const model::SpringLink& link : links_) {
+    const model::Spring spring = model::forceOf(cloth_, link.kind);
     const Vec3 d = positions_[link.b] - positions_[link.a];
     const double square = std::max(d.squaredNorm(), kTinyLengthSquared);
     const double elastic = spring.stiffness * (1 - double{link.restLength} / std::sqrt(square));
@@ -88,7 +88,7 @@ void ReferenceCloth::accumulateSpringForces(std::span<Vec3> forces) const {
 
 namespace {
 
-std::array<Vec3, 4> cornersOf(const scene::Hinge& hinge, std::span<const Vec3> positions) {
+std::array<Vec3, 4> cornersOf(const model::Hinge& hinge, std::span<const Vec3> positions) {
   std::array<Vec3, 4> corners;
   for (std::size_t i = 0; i < corners.size(); ++i) corners[i] = positions[hinge.nodes[i]];
   return corners;
@@ -97,8 +97,8 @@ std::array<Vec3, 4> cornersOf(const scene::Hinge& hinge, std::span<const Vec3> p
 }  // namespace
 
 void ReferenceCloth::accumulateBendingForces(std::span<Vec3> forces) const {
-  for (const scene::Hinge& hinge : hinges_) {
-    const scene::HingeShape shape = scene::hingeShape(cornersOf(hinge, positions_), hinge.leastSquare);
+  for (const model::Hinge& hinge : hinges_) {
+    const model::HingeShape shape = model::hingeShape(cornersOf(hinge, positions_), hinge.leastSquare);
     const double strength = double{cloth_.dihedralBending} * hinge.weight * (hinge.bent - shape.bent);
     for (std::size_t i = 0; i < hinge.nodes.size(); ++i)
       forces[hinge.nodes[i]] += strength * shape.gradients[i];
@@ -108,8 +108,8 @@ void ReferenceCloth::accumulateBendingForces(std::span<Vec3> forces) const {
 // The integral of 2 sin(theta / 2) - bent from the shape at rest on.
 double ReferenceCloth::bendingEnergy() const {
   double sum = 0;
-  for (const scene::Hinge& hinge : hinges_) {
-    const double now = scene::hingeShape(cornersOf(hinge, positions_), hinge.leastSquare).bent;
+  for (const model::Hinge& hinge : hinges_) {
+    const double now = model::hingeShape(cornersOf(hinge, positions_), hinge.leastSquare).bent;
     const auto integral = [&](double bent) {
       const double half = std::asin(std::clamp(bent / 2, -1.0, 1.0));
       return -4 * std::cos(half) - 2 * hinge.bent * half;
@@ -126,12 +126,12 @@ void ReferenceCloth::bend(double h) {
   for (std::size_t i = 0; i < forces_.size(); ++i) velocities_[i] += h * inverseMasses_[i] * forces_[i];
 }
 
-void ReferenceCloth::accumulateAirForces(const scene::Environment& environment,
+void ReferenceCloth::accumulateAirForces(const model::Environment& environment,
                                          std::span<Vec3> forces) const {
   const double density = environment.airDensity, drag = cloth_.drag, lift = cloth_.lift;
   if (density * drag == 0 && density * lift == 0) return;
   const Vec3 wind = environment.wind.cast<double>();
-  for (const scene::Triangle& triangle : triangles_) {
+  for (const model::Triangle& triangle : triangles_) {
     const auto [p0, p1, p2] = triangle;
     const Vec3 velocity = (velocities_[p0] + velocities_[p1] + velocities_[p2]) / 3;
     const Vec3 N = (positions_[p1] - positions_[p0]).cross(positions_[p2] - positions_[p0]) / 2;
@@ -140,7 +140,7 @@ void ReferenceCloth::accumulateAirForces(const scene::Environment& environment,
   }
 }
 
-const std::vector<Vec3>& ReferenceCloth::accelerations(const scene::Environment& environment) {
+const std::vector<Vec3>& ReferenceCloth::accelerations(const model::Environment& environment) {
   std::ranges::fill(forces_, Vec3::Zero());
   accumulateSpringForces(forces_);
   accumulateAirForces(environment, forces_);
@@ -153,7 +153,7 @@ const std::vector<Vec3>& ReferenceCloth::accelerations(const scene::Environment&
   return forces_;
 }
 
-void ReferenceCloth::integrateRungeKutta(const scene::Environment& environment, double h) {
+void ReferenceCloth::integrateRungeKutta(const model::Environment& environment, double h) {
   const std::vector<Vec3> start = positions_, startVelocities = velocities_;
   std::vector<Vec3> moves(start.size(), Vec3::Zero()), changes(start.size(), Vec3::Zero());
   constexpr double kNext[] = {0.5, 0.5, 1, 0}, kWeight[] = {1.0 / 6, 1.0 / 3, 1.0 / 3, 1.0 / 6};
@@ -173,16 +173,16 @@ void ReferenceCloth::integrateRungeKutta(const scene::Environment& environment, 
   }
 }
 
-void ReferenceCloth::integrate(const scene::Environment& environment, scene::Integrator integrator,
+void ReferenceCloth::integrate(const model::Environment& environment, model::Integrator integrator,
                                double h) {
-  if (integrator == scene::Integrator::rungeKutta4) return integrateRungeKutta(environment, h);
+  if (integrator == model::Integrator::rungeKutta4) return integrateRungeKutta(environment, h);
   bend(h);
   const std::vector<Vec3>& rates = accelerations(environment);
-  const scene::SolverKind solver = cloth_.solver.kind;
-  if (solver != scene::SolverKind::massSpring) start_ = positions_;
-  if (solver == scene::SolverKind::implicitEuler) startVelocities_ = velocities_;
+  const model::SolverKind solver = cloth_.solver.kind;
+  if (solver != model::SolverKind::massSpring) start_ = positions_;
+  if (solver == model::SolverKind::implicitEuler) startVelocities_ = velocities_;
   for (std::size_t i = 0; i < positions_.size(); ++i) {
-    if (integrator == scene::Integrator::explicitEuler) {
+    if (integrator == model::Integrator::explicitEuler) {
       positions_[i] += h * velocities_[i];
       velocities_[i] += h * rates[i];
     } else {
@@ -190,15 +190,15 @@ void ReferenceCloth::integrate(const scene::Environment& environment, scene::Int
       positions_[i] += h * velocities_[i];
     }
   }
-  if (solver == scene::SolverKind::constraint || solver == scene::SolverKind::acad) enforceConstraints(h);
-  if (solver == scene::SolverKind::implicitEuler) takeImplicitVelocities(h);
-  if (solver == scene::SolverKind::xpbd) correctSprings(h);
+  if (solver == model::SolverKind::constraint || solver == model::SolverKind::acad) enforceConstraints(h);
+  if (solver == model::SolverKind::implicitEuler) takeImplicitVelocities(h);
+  if (solver == model::SolverKind::xpbd) correctSprings(h);
 }
 
 void ReferenceCloth::takeImplicitVelocities(double h) {
   std::vector<ImplicitSpring> springs;
-  for (const scene::SpringLink& link : links_) {
-    const scene::Spring& spring = scene::springOf(cloth_, link.kind);
+  for (const model::SpringLink& link : links_) {
+    const model::Spring& spring = model::springOf(cloth_, link.kind);
     springs.push_back({link.a, link.b, spring.stiffness, spring.damping, link.restLength});
   }
   const std::vector<Vec3> changes =
@@ -212,14 +212,14 @@ void ReferenceCloth::takeImplicitVelocities(double h) {
 // [MMC16] Alg. 1, Eq. 18 and 26, with C the length's excess, the gradient a unit vector at b and its negative
 // at a.
 void ReferenceCloth::correctSprings(double h) {
-  if (colours_.links.empty()) colours_ = scene::springColours(cloth_);
+  if (colours_.links.empty()) colours_ = model::springColours(cloth_);
   std::vector<double> multipliers(colours_.links.size(), 0);
   for (std::uint32_t iteration = 0; iteration < cloth_.solver.iterations; ++iteration)
     for (std::size_t i = 0; i < colours_.links.size(); ++i) {
-      const scene::SpringLink& link = colours_.links[i];
+      const model::SpringLink& link = colours_.links[i];
       const double weight = inverseMasses_[link.a] + inverseMasses_[link.b];
-      const scene::Spring& spring = scene::springOf(cloth_, link.kind);
-      const bool overridden = cloth_.solver.compliance && link.kind != scene::SpringKind::bend;
+      const model::Spring& spring = model::springOf(cloth_, link.kind);
+      const bool overridden = cloth_.solver.compliance && link.kind != model::SpringKind::bend;
       if (weight == 0 || (!overridden && spring.stiffness == 0)) continue;
       const double compliance = overridden ? double{*cloth_.solver.compliance} : 1 / double{spring.stiffness};
       const double scaled = compliance / (h * h), gamma = compliance * spring.damping / h;
@@ -239,14 +239,14 @@ void ReferenceCloth::correctSprings(double h) {
 }
 
 void ReferenceCloth::enforceConstraints(double h) {
-  const scene::Solver& solver = cloth_.solver;
-  const double takenBack = scene::takenBack(solver);
+  const model::Solver& solver = cloth_.solver;
+  const double takenBack = model::takenBack(solver);
   std::vector<Constraint> constraints;
-  for (const scene::SpringLink& link : links_) {
-    if (!scene::isConstraint(solver, link.kind)) continue;
+  for (const model::SpringLink& link : links_) {
+    if (!model::isConstraint(solver, link.kind)) continue;
     const double rest = link.restLength, longest = rest * (1 + double{solver.activation});
     const Vec3 d = start_[link.b] - start_[link.a];
-    if (solver.kind == scene::SolverKind::constraint) {
+    if (solver.kind == model::SolverKind::constraint) {
       constraints.push_back({link.a, link.b, takenBack * (d.norm() - rest)});
     } else if ((d + h * (velocities_[link.b] - velocities_[link.a])).norm() > longest) {
       const double excess = d.norm() - longest;
@@ -254,7 +254,7 @@ void ReferenceCloth::enforceConstraints(double h) {
     }
   }
   const ConstraintSystem system(constraints, start_, velocities_, inverseMasses_,
-                                scene::scaledCompliance(cloth_, h), h);
+                                model::scaledCompliance(cloth_, h), h);
   const std::vector<Vec3> moves =
       system.moves(system.conjugateGradients(solver.iterations, double{solver.tolerance}).multipliers);
   for (std::size_t i = 0; i < positions_.size(); ++i) {
@@ -263,7 +263,7 @@ void ReferenceCloth::enforceConstraints(double h) {
   }
 }
 
-void ReferenceCloth::collide(const scene::Shape& shape, const ColliderStep& step, double friction,
+void ReferenceCloth::collide(const model::Shape& shape, const ColliderStep& step, double friction,
                              std::span<const Vec3> from, std::span<const std::uint8_t> only) {
   const double mu = cloth_.friction * friction;
   for (std::size_t i = 0; i < positions_.size(); ++i) {
@@ -288,7 +288,7 @@ std::vector<Vec3> ReferenceCloth::normals() const {
 
 std::vector<Vec3> ReferenceCloth::meshNormals() const {
   std::vector<Vec3> normals(positions_.size(), Vec3::Zero());
-  for (const scene::Triangle& triangle : triangles_) {
+  for (const model::Triangle& triangle : triangles_) {
     const auto [p0, p1, p2] = triangle;
     const Vec3 N = (positions_[p1] - positions_[p0]).cross(positions_[p2] - positions_[p0]);
     for (const std::uint32_t node : triangle) normals[node] += N;
@@ -334,9 +334,9 @@ double ReferenceCloth::kineticEnergy() const {
 
 double ReferenceCloth::elasticEnergy() const {
   double sum = 0;
-  for (const scene::SpringLink& link : links_) {
+  for (const model::SpringLink& link : links_) {
     const double extension = (positions_[link.b] - positions_[link.a]).norm() - double{link.restLength};
-    sum += 0.5 * scene::springOf(cloth_, link.kind).stiffness * extension * extension;
+    sum += 0.5 * model::springOf(cloth_, link.kind).stiffness * extension * extension;
   }
   return sum;
 }
@@ -348,7 +348,7 @@ double ReferenceCloth::gravityEnergy(const Vec3& gravity) const {
   return sum;
 }
 
-double ReferenceCloth::penetration(const scene::Shape& shape, const Pose& pose) const {
+double ReferenceCloth::penetration(const model::Shape& shape, const Pose& pose) const {
   double deepest = 0;
   for (std::size_t i = 0; i < positions_.size(); ++i)
     if (inverseMasses_[i] > 0) deepest = std::max(deepest, -heightOver(shape, pose, positions_[i]));
@@ -358,8 +358,8 @@ double ReferenceCloth::penetration(const scene::Shape& shape, const Pose& pose) 
 Strain ReferenceCloth::strain() const {
   Strain strain{.max = -1};
   std::vector<double> stretches;
-  for (const scene::SpringLink& link : links_) {
-    if (link.kind != scene::SpringKind::structural) continue;
+  for (const model::SpringLink& link : links_) {
+    if (link.kind != model::SpringKind::structural) continue;
     const double stretch = (positions_[link.b] - positions_[link.a]).norm() / double{link.restLength} - 1;
     strain.max = std::max(strain.max, stretch);
     strain.mean += std::abs(stretch);

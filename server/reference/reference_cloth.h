@@ -7,12 +7,12 @@
 #include <span>
 #include <vector>
 
+#include "server/model/hinges.h"
+#include "server/model/mesh.h"
+#include "server/model/scene.h"
+#include "server/model/spring_colours.h"
+#include "server/model/springs.h"
 #include "server/reference/contact.h"
-#include "server/scene/hinges.h"
-#include "server/scene/mesh.h"
-#include "server/scene/scene.h"
-#include "server/scene/spring_colours.h"
-#include "server/scene/springs.h"
 
 namespace clothstream::reference {
 
@@ -27,12 +27,12 @@ struct Strain {
 // solvers that solve a system.
 class ReferenceCloth {
  public:
-  // At rest in its start pose. Springs are those of scene::springLinks().
-  explicit ReferenceCloth(const scene::Cloth& cloth);
+  // At rest in its start pose. Springs are those of model::springLinks().
+  explicit ReferenceCloth(const model::Cloth& cloth);
 
   // Springs, bending, damping, drag, lift, friction, thickness, mass, solver from now on; same shape, same
   // pins.
-  void setParameters(const scene::Cloth& cloth);
+  void setParameters(const model::Cloth& cloth);
 
   std::span<Vec3> positions() { return positions_; }
   std::span<const Vec3> positions() const { return positions_; }
@@ -46,19 +46,19 @@ class ReferenceCloth {
 
   // Both add to one force a node, N. [Va21] Eq. 1; air with drag and lift a triangle.
   void accumulateSpringForces(std::span<Vec3> forces) const;
-  void accumulateAirForces(const scene::Environment& environment, std::span<Vec3> forces) const;
+  void accumulateAirForces(const model::Environment& environment, std::span<Vec3> forces) const;
 
   // J of dihedral bending, and what it pulls at nodes with, N: scene/hinges.h.
   double bendingEnergy() const;
   void accumulateBendingForces(std::span<Vec3> forces) const;
 
   // Forces, one step of h seconds, and the cloth's constraints; colliders apart.
-  void integrate(const scene::Environment& environment, scene::Integrator integrator, double h);
+  void integrate(const model::Environment& environment, model::Integrator integrator, double h);
 
   // Nodes on their way from `from`, one place a node, to where they are go out of the shape; their velocity
   // relative to its surface loses what goes into it, and the rest meets Coulomb friction ([Va21] 3.4, Alg.
   // 4). `only`: one byte a node, which of them; empty: all.
-  void collide(const scene::Shape& shape, const ColliderStep& step, double friction,
+  void collide(const model::Shape& shape, const ColliderStep& step, double friction,
                std::span<const Vec3> from, std::span<const std::uint8_t> only = {});
 
   // Unit normals; (0,0,1) where they vanish. A grid's from up to eight triangles round a node ([Va21] 3.5,
@@ -71,13 +71,13 @@ class ReferenceCloth {
   double gravityEnergy(const Vec3& gravity) const;
   Strain strain() const;
   // How deep the deepest node that can move lies below the shape's surface, m; 0 where none does.
-  double penetration(const scene::Shape& shape, const Pose& pose) const;
+  double penetration(const model::Shape& shape, const Pose& pose) const;
 
  private:
   void setMass(float mass);
   // m/s^2; 0 of pinned nodes. Until the next call.
-  const std::vector<Vec3>& accelerations(const scene::Environment& environment);
-  void integrateRungeKutta(const scene::Environment& environment, double h);
+  const std::vector<Vec3>& accelerations(const model::Environment& environment);
+  void integrateRungeKutta(const model::Environment& environment, double h);
   void bend(double h);
   void enforceConstraints(double h);
   void takeImplicitVelocities(double h);
@@ -85,13 +85,13 @@ class ReferenceCloth {
   std::vector<Vec3> gridNormals() const;
   std::vector<Vec3> meshNormals() const;
 
-  scene::Cloth cloth_;
-  std::vector<scene::SpringLink> links_;
-  std::vector<scene::Triangle> triangles_;
-  std::vector<scene::Hinge> hinges_;  // once they are needed
+  model::Cloth cloth_;
+  std::vector<model::SpringLink> links_;
+  std::vector<model::Triangle> triangles_;
+  std::vector<model::Hinge> hinges_;  // once they are needed
   std::vector<Vec3> positions_, velocities_, forces_;
   std::vector<Vec3> start_, startVelocities_;  // of the substep, where a system is solved
-  scene::SpringColours colours_;               // of xpbd, once they are needed
+  model::SpringColours colours_;               // of xpbd, once they are needed
   std::vector<double> masses_, inverseMasses_;
 };
 

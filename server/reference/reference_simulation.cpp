@@ -4,24 +4,24 @@
 
 #include <algorithm>
 
-#include "server/scene/wind.h"
+#include "server/model/wind.h"
 
 namespace clothstream::reference {
 
-TickInputs inputsAt(const scene::Scene& scene, std::uint64_t tick) {
-  TickInputs inputs{scene::environmentAt(scene, tick), {}};
+TickInputs inputsAt(const model::Scene& scene, std::uint64_t tick) {
+  TickInputs inputs{model::environmentAt(scene, tick), {}};
   const double start = static_cast<double>(tick) * scene.tickSeconds();
   const double end = static_cast<double>(tick + 1) * scene.tickSeconds();
-  for (const scene::Collider& collider : scene.colliders)
-    inputs.colliders.push_back({collider.shape, toPose(scene::poseAt(collider, start)),
-                                toPose(scene::poseAt(collider, end)), collider.friction});
-  for (const scene::Cloth& cloth : scene.cloths)
-    for (const scene::Attachment& attachment : cloth.attachments)
-      inputs.attachments.push_back(toPose(scene::frameAt(scene, attachment, end)));
+  for (const model::Collider& collider : scene.colliders)
+    inputs.colliders.push_back({collider.shape, toPose(model::poseAt(collider, start)),
+                                toPose(model::poseAt(collider, end)), collider.friction});
+  for (const model::Cloth& cloth : scene.cloths)
+    for (const model::Attachment& attachment : cloth.attachments)
+      inputs.attachments.push_back(toPose(model::frameAt(scene, attachment, end)));
   return inputs;
 }
 
-ReferenceSimulation::ReferenceSimulation(const scene::Scene& scene)
+ReferenceSimulation::ReferenceSimulation(const model::Scene& scene)
     : scene_(scene),
       cloths_(scene.cloths.begin(), scene.cloths.end()),
       holds_(scene),
@@ -38,7 +38,7 @@ void ReferenceSimulation::tick() {
 }
 
 void ReferenceSimulation::substep(const TickInputs& inputs, std::uint32_t index) {
-  if (index == 0) holds_.begin(cloths_, inputs.attachments, inputs.grips, scene_.tickSeconds());
+  if (index == 0) holds_.begin(cloths_, inputs.attachments, inputs.grabs, scene_.tickSeconds());
   for (std::size_t i = 0; i < cloths_.size(); ++i) {
     ReferenceCloth& cloth = cloths_[i];
     before_[i].assign(cloth.positions().begin(), cloth.positions().end());
@@ -48,9 +48,9 @@ void ReferenceSimulation::substep(const TickInputs& inputs, std::uint32_t index)
                     stepOf(collider.start, collider.end, index, scene_.substeps, scene_.tickSeconds()),
                     collider.friction, before_[i]);
   }
-  holds_.apply(cloths_, inputs.grips, index, scene_.substeps, scene_.tickSeconds());
+  holds_.apply(cloths_, inputs.grabs, index, scene_.substeps, scene_.tickSeconds());
   if (!selfCollision_.exists()) return;
-  for (int i = 0; i < scene::kContactIterations; ++i) collideWithCloth(inputs, index);
+  for (int i = 0; i < model::kContactIterations; ++i) collideWithCloth(inputs, index);
 }
 
 void ReferenceSimulation::collideWithCloth(const TickInputs& inputs, std::uint32_t index) {

@@ -5,35 +5,35 @@
 #include <cstdint>
 #include <vector>
 
+#include "server/model/scene.h"
 #include "server/reference/holds.h"
 #include "server/reference/reference_cloth.h"
 #include "server/reference/self_collision.h"
-#include "server/scene/scene.h"
 
 namespace clothstream::reference {
 
 // Moves from start to end over a tick's substeps.
 struct MovingCollider {
-  scene::Shape shape = scene::Sphere{};
+  model::Shape shape = model::Sphere{};
   Pose start = {}, end = {};
   double friction = 1;  // multiplied with the cloth's
 };
 
 struct TickInputs {
-  scene::Environment environment;
+  model::Environment environment;
   std::vector<MovingCollider> colliders;
   std::vector<Pose> attachments =
       {};  // at the tick's end, in the order of the cloths; none: where they start
-  std::vector<Grip> grips = {};
+  std::vector<Grab> grabs = {};
 };
 
 // The scene's own environment, colliders and attachments over the given tick: from tick * dt to (tick + 1) *
 // dt.
-TickInputs inputsAt(const scene::Scene& scene, std::uint64_t tick);
+TickInputs inputsAt(const model::Scene& scene, std::uint64_t tick);
 
 class ReferenceSimulation {
  public:
-  explicit ReferenceSimulation(const scene::Scene& scene);
+  explicit ReferenceSimulation(const model::Scene& scene);
 
   // One tick.
   void tick(const TickInputs& inputs);
@@ -53,7 +53,7 @@ class ReferenceSimulation {
  private:
   void collideWithCloth(const TickInputs& inputs, std::uint32_t index);
 
-  scene::Scene scene_;
+  model::Scene scene_;
   std::vector<ReferenceCloth> cloths_;
   Holds holds_;
   SelfCollision selfCollision_;

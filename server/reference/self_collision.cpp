@@ -7,10 +7,10 @@
 
 namespace clothstream::reference {
 
-SelfCollision::SelfCollision(const scene::Scene& scene) {
+SelfCollision::SelfCollision(const model::Scene& scene) {
   for (std::uint32_t cloth = 0; cloth < scene.cloths.size(); ++cloth) {
     const auto& collision = scene.cloths[cloth].selfCollision;
-    for (const scene::Vec3& rest : scene::restPositions(scene.cloths[cloth])) {
+    for (const model::Vec3& rest : model::restPositions(scene.cloths[cloth])) {
       ball_.push_back(static_cast<std::uint32_t>(balls_.size()));
       if (collision)
         balls_.push_back({nodeCount_, cloth, collision->radius, collision->friction, rest.cast<double>()});
@@ -42,7 +42,7 @@ std::vector<SelfCollision::Pair> SelfCollision::pairs(std::span<const Vec3> posi
       const Ball &a = balls_[first], &b = balls_[second];
       const double sum = a.radius + b.radius;
       if ((positions[a.node] - positions[b.node]).squaredNorm() >= reach * sum * reach * sum) continue;
-      if (a.cloth == b.cloth && (a.rest - b.rest).norm() < double{scene::kNeighbours} * sum) continue;
+      if (a.cloth == b.cloth && (a.rest - b.rest).norm() < double{model::kNeighbours} * sum) continue;
       pairs.push_back({a.node, b.node, sum});
     }
   std::ranges::sort(pairs, {}, [](const Pair& pair) { return std::tuple(pair.a, pair.b); });
@@ -67,8 +67,8 @@ std::vector<std::uint8_t> SelfCollision::resolve(std::span<Vec3> positions, std:
     const Vec3 normal = length < 1e-8 ? Vec3(-Vec3::UnitY()) : Vec3(apart / length);
     const Vec3 relative = velocities[pair.a] - velocities[pair.b];
     const double separation = relative.dot(normal);
-    const double wanted = std::min(double{scene::kOverlapTakenBack} / h * (pair.distance - length),
-                                   double{scene::kPushOutSpeed});
+    const double wanted = std::min(double{model::kOverlapTakenBack} / h * (pair.distance - length),
+                                   double{model::kPushOutSpeed});
     const double pressed = std::max(0.0, wanted - separation);
     const Vec3 slip = relative - separation * normal;
     const double friction = (balls_[ball_[pair.a]].friction + balls_[ball_[pair.b]].friction) / 2;

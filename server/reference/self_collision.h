@@ -6,15 +6,15 @@
 #include <span>
 #include <vector>
 
+#include "server/model/scene.h"
 #include "server/reference/contact.h"
-#include "server/scene/scene.h"
 
 namespace clothstream::reference {
 
 // Of a whole scene; nodes are numbered as its cloths follow each other.
 class SelfCollision {
  public:
-  explicit SelfCollision(const scene::Scene& scene);
+  explicit SelfCollision(const model::Scene& scene);
 
   // Whether any cloth has it.
   bool exists() const { return !balls_.empty(); }

@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "server/scene/scene.h"
+#include "server/model/scene.h"
 
 namespace clothstream::simulation {
 
@@ -21,12 +21,12 @@ struct AdvanceVariant {
 
   // constant_id 1 and on. The Runge-Kutta method is made of steps of explicit Euler.
   std::vector<std::uint32_t> specialisation(std::uint32_t rowsPerInvocation,
-                                            scene::Integrator integrator) const {
+                                            model::Integrator integrator) const {
     return {rowsPerInvocation,
             springDamping ? 1u : 0u,
             air ? 1u : 0u,
             colliders ? 1u : 0u,
-            integrator == scene::Integrator::semiImplicitEuler ? 0u : 1u,
+            integrator == model::Integrator::semiImplicitEuler ? 0u : 1u,
             springForces ? 1u : 0u};
   }
 };

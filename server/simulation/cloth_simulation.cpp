@@ -88,22 +88,22 @@ StateBuffers stateOf(const Buffers& b, const CollisionStage& collision) {
           .velocities = {&b.state.velocities[0], &b.state.velocities[1]}};
 }
 
-std::vector<scene::Solver> solversOf(std::span<const scene::Cloth> cloths) {
-  std::vector<scene::Solver> solvers;
-  for (const scene::Cloth& cloth : cloths) solvers.push_back(cloth.solver);
+std::vector<model::Solver> solversOf(std::span<const model::Cloth> cloths) {
+  std::vector<model::Solver> solvers;
+  for (const model::Cloth& cloth : cloths) solvers.push_back(cloth.solver);
   return solvers;
 }
 
-std::vector<float> massesOf(std::span<const scene::Cloth> cloths) {
+std::vector<float> massesOf(std::span<const model::Cloth> cloths) {
   std::vector<float> masses;
-  for (const scene::Cloth& cloth : cloths) masses.push_back(cloth.mass);
+  for (const model::Cloth& cloth : cloths) masses.push_back(cloth.mass);
   return masses;
 }
 
 // Whether they make the same tables; how systems are solved may differ.
-bool sameTables(const scene::Solver& a, const scene::Solver& b) {
+bool sameTables(const model::Solver& a, const model::Solver& b) {
   return a.kind == b.kind && a.bendConstraints == b.bendConstraints && a.path == b.path &&
-         (a.kind == scene::SolverKind::massSpring || a.iterations == b.iterations);
+         (a.kind == model::SolverKind::massSpring || a.iterations == b.iterations);
 }
 
 // Cloths collide at once where nothing follows.
@@ -130,16 +130,16 @@ Stage makeHash(const vulkan::Device& device, const Buffers& b, std::uint32_t wor
 }  // namespace
 
 struct ClothSimulation::Pipeline {
-  Pipeline(const vulkan::Device& on, const scene::Scene& scene, const SimulationOptions& options);
+  Pipeline(const vulkan::Device& on, const model::Scene& scene, const SimulationOptions& options);
 
   void prepare(float airDensity);
-  std::unique_ptr<XpbdStage> makeXpbd(std::span<const scene::Cloth> cloths);
-  std::unique_ptr<AssembledStage> makeAssembled(std::span<const scene::Cloth> cloths);
-  void makeBending(std::span<const scene::Cloth> cloths);
+  std::unique_ptr<XpbdStage> makeXpbd(std::span<const model::Cloth> cloths);
+  std::unique_ptr<AssembledStage> makeAssembled(std::span<const model::Cloth> cloths);
+  void makeBending(std::span<const model::Cloth> cloths);
   void makeHolds(const HoldTables& tables);
-  void setSolvers(std::span<const scene::Cloth> cloths);
+  void setSolvers(std::span<const model::Cloth> cloths);
   void makeMassStage();
-  void setMasses(std::span<const scene::Cloth> cloths);
+  void setMasses(std::span<const model::Cloth> cloths);
   void start(vulkan::Recorder& recorder);
   void recordInputs(vulkan::Recorder& recorder, const TickInputs& inputs);
   void recordSubsteps(vulkan::Recorder& recorder, const TickInputs& inputs);
@@ -149,7 +149,7 @@ struct ClothSimulation::Pipeline {
   void recordStatus(vulkan::Recorder& recorder);
 
   const vulkan::Device& device;
-  scene::Integrator integrator;
+  model::Integrator integrator;
   std::uint32_t substeps;
   double substepSeconds;
   float tickRate;
@@ -171,7 +171,7 @@ struct ClothSimulation::Pipeline {
   std::unique_ptr<BendingStage> bending;              // where a cloth has it, or had
   bool bends = false;                                 // some has it now
   std::unique_ptr<SelfCollisionStage> selfCollision;  // where a cloth has it
-  std::vector<scene::Solver> solvers;                 // of the cloths, as the tables have them
+  std::vector<model::Solver> solvers;                 // of the cloths, as the tables have them
   std::vector<shared::vec4> stiffness;                // of their springs
   std::unique_ptr<HoldStage> holds;                   // where something holds cloth, or did
   std::unique_ptr<ReportStage> report;                // made when it is first wanted
@@ -185,7 +185,7 @@ struct ClothSimulation::Pipeline {
   std::uint32_t slot = 0;     // of inputs and status, of the tick recorded last
 };
 
-ClothSimulation::Pipeline::Pipeline(const vulkan::Device& on, const scene::Scene& scene,
+ClothSimulation::Pipeline::Pipeline(const vulkan::Device& on, const model::Scene& scene,
                                     const SimulationOptions& options)
     : device(on),
       integrator(scene.integrator),
@@ -217,7 +217,7 @@ ClothSimulation::Pipeline::Pipeline(const vulkan::Device& on, const scene::Scene
   if (!meshTables.nodes.empty())
     meshes = std::make_unique<MeshStage>(on, meshTables, stateOf(buffers, collision), buffers.normals,
                                          integrator, workgroupSize);
-  if (integrator == scene::Integrator::rungeKutta4)
+  if (integrator == model::Integrator::rungeKutta4)
     rungeKutta = std::make_unique<RungeKuttaStage>(on, stateOf(buffers, collision), offsets);
   xpbd = makeXpbd(scene.cloths);
   assembled = makeAssembled(scene.cloths);
@@ -248,22 +248,22 @@ void ClothSimulation::Pipeline::prepare(float airDensity) {
   }
 }
 
-std::unique_ptr<XpbdStage> ClothSimulation::Pipeline::makeXpbd(std::span<const scene::Cloth> cloths) {
+std::unique_ptr<XpbdStage> ClothSimulation::Pipeline::makeXpbd(std::span<const model::Cloth> cloths) {
   const bool any = std::ranges::any_of(
-      cloths, [](const scene::Cloth& cloth) { return cloth.solver.kind == scene::SolverKind::xpbd; });
+      cloths, [](const model::Cloth& cloth) { return cloth.solver.kind == model::SolverKind::xpbd; });
   return any ? std::make_unique<XpbdStage>(device, cloths, stateOf(buffers, collision), asked.workgroupSize,
                                            asked.xpbdWholeNodes)
              : nullptr;
 }
 
 std::unique_ptr<AssembledStage> ClothSimulation::Pipeline::makeAssembled(
-    std::span<const scene::Cloth> cloths) {
+    std::span<const model::Cloth> cloths) {
   if (!AssembledStage::isIn(cloths)) return nullptr;
   return std::make_unique<AssembledStage>(device, cloths, stateOf(buffers, collision), asked.workgroupSize,
                                           asked.solveWholeNodes);
 }
 
-void ClothSimulation::Pipeline::makeBending(std::span<const scene::Cloth> cloths) {
+void ClothSimulation::Pipeline::makeBending(std::span<const model::Cloth> cloths) {
   const bool wanted = BendingStage::isIn(cloths);
   if (wanted && !(bending && bending->serves(cloths))) {
     bending = std::make_unique<BendingStage>(device, cloths, stateOf(buffers, collision), workgroupSize);
@@ -272,8 +272,8 @@ void ClothSimulation::Pipeline::makeBending(std::span<const scene::Cloth> cloths
   bends = wanted;
 }
 
-void ClothSimulation::Pipeline::setSolvers(std::span<const scene::Cloth> cloths) {
-  std::vector<scene::Solver> wanted = solversOf(cloths);
+void ClothSimulation::Pipeline::setSolvers(std::span<const model::Cloth> cloths) {
+  std::vector<model::Solver> wanted = solversOf(cloths);
   if (std::ranges::equal(wanted, solvers, sameTables)) return;
   // Whatever the device has no room for is found before anything changes.
   solves.makeTables(cloths);
@@ -295,7 +295,7 @@ void ClothSimulation::Pipeline::makeMassStage() {
       device, nodes, std::array{&b.state.positions[0], &b.state.positions[1], &b.state.checkpointPositions});
 }
 
-void ClothSimulation::Pipeline::setMasses(std::span<const scene::Cloth> cloths) {
+void ClothSimulation::Pipeline::setMasses(std::span<const model::Cloth> cloths) {
   masses = inverseMasses(cloths);
   massChange->set(masses);
   clothMasses = massesOf(cloths);
@@ -332,8 +332,8 @@ void ClothSimulation::Pipeline::recordInputs(vulkan::Recorder& recorder, const T
   recorder.beginStage("inputs");
   recorder.copy(from, buffers.cloths, clothBytes);
   collision.recordInputs(recorder, inputs.colliders, inputs.tellsContacts);
-  if (!holds && !inputs.grips.empty()) makeHolds({});
-  if (holds) holds->recordInputs(recorder, inputs.attachments, inputs.grips);
+  if (!holds && !inputs.grabs.empty()) makeHolds({});
+  if (holds) holds->recordInputs(recorder, inputs.attachments, inputs.grabs);
   recorder.fill(buffers.status, 0, buffers.status.bytes());
   if (selfCollision) selfCollision->recordClear(recorder);
 }
@@ -355,7 +355,7 @@ void ClothSimulation::Pipeline::recordRungeKutta(vulkan::Recorder& recorder, con
 }
 
 void ClothSimulation::Pipeline::recordSubsteps(vulkan::Recorder& recorder, const TickInputs& inputs) {
-  const scene::Environment& environment = inputs.environment;
+  const model::Environment& environment = inputs.environment;
   shared::AdvancePush push{.gravityStep = texel(environment.gravity, static_cast<float>(substepSeconds)),
                            .windAir = texel(environment.wind, environment.airDensity / 6),
                            .collision = {},
@@ -421,13 +421,13 @@ void ClothSimulation::Pipeline::recordStatus(vulkan::Recorder& recorder) {
   collision.recordTold(recorder);
 }
 
-ClothSimulation::ClothSimulation(const vulkan::Device& device, const scene::Scene& scene,
+ClothSimulation::ClothSimulation(const vulkan::Device& device, const model::Scene& scene,
                                  SimulationOptions options)
     : pipeline_(std::make_unique<Pipeline>(device, scene, options)) {}
 
 ClothSimulation::~ClothSimulation() = default;
 
-void ClothSimulation::setCloths(std::span<const scene::Cloth> cloths) {
+void ClothSimulation::setCloths(std::span<const model::Cloth> cloths) {
   std::vector<shared::ClothRecord> records = clothRecords(cloths, pipeline_->substepSeconds);
   assert(records.size() == pipeline_->records.size());
   assert(std::equal(records.begin(), records.end(), pipeline_->records.begin(),
@@ -475,12 +475,12 @@ std::vector<ContactStatus> ClothSimulation::contacts() const {
   return pipeline_->collision.told();
 }
 
-std::vector<GripStatus> ClothSimulation::grips() const {
-  std::vector<GripStatus> grips;
+std::vector<GrabStatus> ClothSimulation::grabs() const {
+  std::vector<GrabStatus> grabs;
   if (pipeline_->holds)
-    for (const shared::GripReport& report : pipeline_->holds->report())
-      grips.push_back({report.held, report.slipped});
-  return grips;
+    for (const shared::GrabReport& report : pipeline_->holds->report())
+      grabs.push_back({report.held, report.slipped});
+  return grabs;
 }
 
 std::vector<ClothReport> ClothSimulation::report() const {

@@ -8,10 +8,10 @@
 #include <span>
 #include <vector>
 
-#include "server/scene/scene.h"
+#include "server/model/scene.h"
 #include "server/simulation/cloth_report.h"
 #include "server/simulation/collision/moving_collider.h"
-#include "server/simulation/hold/grip.h"
+#include "server/simulation/hold/grab.h"
 #include "server/simulation/scene_tables.h"
 #include "server/simulation/state_snapshot.h"
 #include "server/vulkan/buffer.h"
@@ -30,19 +30,19 @@ namespace clothstream::simulation {
 
 // What may change from tick to tick. All values validated before.
 struct TickInputs {
-  scene::Environment environment;
+  model::Environment environment;
   std::vector<MovingCollider> colliders;  // at most kMaxColliders, in the order in which they act
   bool tellsContacts = false;             // whether contacts() has something to say after this tick
   // Where each attachment of the scene is at the tick's end, in the order of its cloths; none: where they
   // start.
-  std::vector<scene::Pose> attachments = {};
-  // At most kMaxGrips. One that holds has the place of the one that took hold; before a place is another's,
+  std::vector<model::Pose> attachments = {};
+  // At most kMaxGrabs. One that holds has the place of the one that took hold; before a place is another's,
   // it is free for a tick.
-  std::vector<Grip> grips = {};
+  std::vector<Grab> grabs = {};
 };
 
 // Of the scene by itself: its wind, its colliders and what is attached to them during this tick, from 0 on.
-TickInputs inputsAt(const scene::Scene& scene, std::uint64_t tick);
+TickInputs inputsAt(const model::Scene& scene, std::uint64_t tick);
 
 struct SimulationOptions {
   // Rows of a grid that one invocation walks down. 0: the measured best for the device (more on software
@@ -63,7 +63,7 @@ class ClothSimulation {
  public:
   // The scene must be valid (messages/validate). Throws std::runtime_error where the device has no room for
   // it.
-  ClothSimulation(const vulkan::Device& device, const scene::Scene& scene, SimulationOptions options = {});
+  ClothSimulation(const vulkan::Device& device, const model::Scene& scene, SimulationOptions options = {});
   ~ClothSimulation();
   ClothSimulation(const ClothSimulation&) = delete;
   ClothSimulation& operator=(const ClothSimulation&) = delete;
@@ -72,7 +72,7 @@ class ClothSimulation {
   // as at construction, self-collision and tethers of the same cloths; the state stays. No tick may be in
   // flight. Throws std::runtime_error where the device has no room for what is asked for, and changes nothing
   // then. Kernels are made when a cloth first needs them, and kept.
-  void setCloths(std::span<const scene::Cloth> cloths);
+  void setCloths(std::span<const model::Cloth> cloths);
 
   // All substeps of one tick, and its status. At most one tick may be in flight when it is called.
   // Stages: "inputs", "hold" (where something holds cloth), "near" (where there are colliders), "advance",
@@ -93,8 +93,8 @@ class ClothSimulation {
   // have none.
   std::vector<ContactStatus> contacts() const;
 
-  // Of the last recorded tick's grips, once it is complete.
-  std::vector<GripStatus> grips() const;
+  // Of the last recorded tick's grabs, once it is complete.
+  std::vector<GrabStatus> grabs() const;
 
   // What the cloths are like, each of them: recorded after a tick in the same recording, and read when that
   // is complete. Only when somebody wants it: other ticks cost nothing. Stage "report".

@@ -12,7 +12,7 @@ namespace clothstream::simulation {
 using vulkan::BindingKind;
 
 // Software devices pay for every load, so that an invocation does several rows; GPUs pay for every idle lane.
-GridStage::Cut GridStage::cutGrids(const vulkan::Device& device, std::span<const scene::Cloth> cloths,
+GridStage::Cut GridStage::cutGrids(const vulkan::Device& device, std::span<const model::Cloth> cloths,
                                    const GridOptions& options) {
   Cut cut{options.rowsPerInvocation, options.workgroupSize, {}};
   if (cut.rowsPerInvocation == 0) cut.rowsPerInvocation = device.isSoftware() ? 4 : 1;
@@ -24,8 +24,8 @@ GridStage::Cut GridStage::cutGrids(const vulkan::Device& device, std::span<const
   return cut;
 }
 
-GridStage::GridStage(const vulkan::Device& device, std::span<const scene::Cloth> cloths,
-                     const StateBuffers& state, const vulkan::Buffer& normals, scene::Integrator integrator,
+GridStage::GridStage(const vulkan::Device& device, std::span<const model::Cloth> cloths,
+                     const StateBuffers& state, const vulkan::Buffer& normals, model::Integrator integrator,
                      const GridOptions& options)
     : device_(device),
       state_(state),
@@ -67,7 +67,7 @@ const Stage& GridStage::advance(const AdvanceVariant& variant) {
   return *made;
 }
 
-void GridStage::setTiles(std::span<const scene::Cloth> cloths) {
+void GridStage::setTiles(std::span<const model::Cloth> cloths) {
   cut_.tiles = makeTiles(cloths, cut_.rowsPerInvocation, cut_.workgroupSize);
   if (!cut_.tiles.records.empty()) tiles_.set(cut_.tiles.records);
 }

@@ -29,11 +29,11 @@ struct GridOptions {
 class GridStage {
  public:
   // Throws std::runtime_error where the device has no room for its table.
-  GridStage(const vulkan::Device& device, std::span<const scene::Cloth> cloths, const StateBuffers& state,
-            const vulkan::Buffer& normals, scene::Integrator integrator, const GridOptions& options);
+  GridStage(const vulkan::Device& device, std::span<const model::Cloth> cloths, const StateBuffers& state,
+            const vulkan::Buffer& normals, model::Integrator integrator, const GridOptions& options);
 
   // Of the same grids, other solvers' order of them; nothing of this stage may be in flight.
-  void setTiles(std::span<const scene::Cloth> cloths);
+  void setTiles(std::span<const model::Cloth> cloths);
   // Its table, before anything else that is with it.
   void recordTables(vulkan::Recorder& recorder) const;
   // One substep from state `from` to the other, of the grids whose forces are followed by this.
@@ -51,13 +51,13 @@ class GridStage {
     std::uint32_t rowsPerInvocation, workgroupSize;
     Tiles tiles;
   };
-  static Cut cutGrids(const vulkan::Device& device, std::span<const scene::Cloth> cloths,
+  static Cut cutGrids(const vulkan::Device& device, std::span<const model::Cloth> cloths,
                       const GridOptions& options);
   const Stage& advance(const AdvanceVariant& variant);
 
   const vulkan::Device& device_;
   StateBuffers state_;
-  scene::Integrator integrator_;
+  model::Integrator integrator_;
   std::span<const std::uint32_t> advanceSpirv_;
   Cut cut_;
   DeviceTable tiles_;

@@ -12,7 +12,7 @@ using vulkan::Bindings;
 using vulkan::Kernel;
 
 MeshStage::MeshStage(const vulkan::Device& device, const MeshTables& tables, const StateBuffers& state,
-                     const vulkan::Buffer& normals, scene::Integrator integrator, std::uint32_t workgroupSize)
+                     const vulkan::Buffer& normals, model::Integrator integrator, std::uint32_t workgroupSize)
     : device_(device),
       state_(state),
       integrator_(integrator),

@@ -25,7 +25,7 @@ class MeshStage {
  public:
   // There must be a mesh. Throws std::runtime_error where the device has no room for a table.
   MeshStage(const vulkan::Device& device, const MeshTables& tables, const StateBuffers& state,
-            const vulkan::Buffer& normals, scene::Integrator integrator, std::uint32_t workgroupSize);
+            const vulkan::Buffer& normals, model::Integrator integrator, std::uint32_t workgroupSize);
 
   // Of the same meshes, other solvers' order of them; nothing of this stage may be in flight.
   void setTiles(const Tiles& tiles);
@@ -56,7 +56,7 @@ class MeshStage {
 
   const vulkan::Device& device_;
   StateBuffers state_;
-  scene::Integrator integrator_;
+  model::Integrator integrator_;
   std::uint32_t workgroupSize_;
   TileRanges tileRanges_;
   DeviceTable tiles_, nodes_, springEnds_, corners_;

@@ -2,7 +2,7 @@
 // Springs and triangles by the nodes at which they meet.
 #include "server/simulation/mesh_tables.h"
 
-#include "server/scene/mesh.h"
+#include "server/model/mesh.h"
 
 namespace clothstream::simulation {
 namespace {
@@ -20,18 +20,18 @@ shared::vec4 listFrom(std::size_t first, std::size_t end) {
           static_cast<float>(end - first), 0};
 }
 
-void appendSprings(const scene::Mesh& mesh, std::uint32_t firstNode, std::span<shared::MeshNodeRecord> nodes,
+void appendSprings(const model::Mesh& mesh, std::uint32_t firstNode, std::span<shared::MeshNodeRecord> nodes,
                    std::vector<shared::SpringPairRecord>& pairs) {
-  const scene::SpringAdjacency adjacency = scene::springAdjacency(mesh.links, mesh.nodeCount());
+  const model::SpringAdjacency adjacency = model::springAdjacency(mesh.links, mesh.nodeCount());
   const auto numberOf = [&](std::uint32_t node) { return static_cast<float>(firstNode + node + 1); };
   for (std::uint32_t node = 0; node < mesh.nodeCount(); ++node) {
     const std::size_t first = pairs.size();
     bool full = true;
     for (const std::uint32_t spring : adjacency.of(node)) {
-      const scene::SpringLink& link = mesh.links[spring];
+      const model::SpringLink& link = mesh.links[spring];
       const float other = numberOf(link.a == node ? link.b : link.a);
-      const float signedOther = link.kind == scene::SpringKind::shear ? -other : other;
-      const float signedLength = link.kind == scene::SpringKind::bend ? -link.restLength : link.restLength;
+      const float signedOther = link.kind == model::SpringKind::shear ? -other : other;
+      const float signedLength = link.kind == model::SpringKind::bend ? -link.restLength : link.restLength;
       if (full)
         pairs.push_back({{signedOther, signedLength, numberOf(node), 1}});
       else
@@ -43,10 +43,10 @@ void appendSprings(const scene::Mesh& mesh, std::uint32_t firstNode, std::span<s
 }
 
 // In the order of the triangles.
-void appendCorners(const scene::Mesh& mesh, std::uint32_t firstNode, std::span<shared::MeshNodeRecord> nodes,
+void appendCorners(const model::Mesh& mesh, std::uint32_t firstNode, std::span<shared::MeshNodeRecord> nodes,
                    std::vector<shared::CornerPairRecord>& pairs) {
   std::vector<std::uint32_t> counts(mesh.nodeCount(), 0);
-  for (const scene::Triangle& triangle : mesh.shape.triangles)
+  for (const model::Triangle& triangle : mesh.shape.triangles)
     for (const std::uint32_t node : triangle) ++counts[node];
   for (std::uint32_t node = 0; node < mesh.nodeCount(); ++node) {
     const std::uint32_t texels = (counts[node] + 1) / 2;
@@ -55,7 +55,7 @@ void appendCorners(const scene::Mesh& mesh, std::uint32_t firstNode, std::span<s
     pairs.resize(pairs.size() + texels, {{self, self, self, self}});
     counts[node] = 0;  // now how many are written
   }
-  for (const scene::Triangle& triangle : mesh.shape.triangles)
+  for (const model::Triangle& triangle : mesh.shape.triangles)
     for (std::size_t i = 0; i < 3; ++i) {
       const std::uint32_t node = triangle[i], written = counts[node]++;
       const shared::vec4& list = nodes[node].triangles;
@@ -72,7 +72,7 @@ void appendCorners(const scene::Mesh& mesh, std::uint32_t firstNode, std::span<s
 
 }  // namespace
 
-Tiles meshTiles(std::span<const scene::Cloth> cloths, std::uint32_t workgroupSize) {
+Tiles meshTiles(std::span<const model::Cloth> cloths, std::uint32_t workgroupSize) {
   Tiles tiles;
   for (const Follow follow : kFollows) {
     std::size_t nodes = 0;
@@ -87,14 +87,14 @@ Tiles meshTiles(std::span<const scene::Cloth> cloths, std::uint32_t workgroupSiz
   return tiles;
 }
 
-MeshTables meshTables(std::span<const scene::Cloth> cloths, std::uint32_t workgroupSize) {
+MeshTables meshTables(std::span<const model::Cloth> cloths, std::uint32_t workgroupSize) {
   MeshTables tables;
   tables.tiles = meshTiles(cloths, workgroupSize);
 
   std::uint32_t firstNode = 0;
   for (std::uint32_t i = 0; i < cloths.size(); firstNode += cloths[i++].nodeCount()) {
     if (!cloths[i].mesh) continue;
-    const scene::Mesh& mesh = *cloths[i].mesh;
+    const model::Mesh& mesh = *cloths[i].mesh;
     const std::size_t before = tables.nodes.size();
     tables.nodes.resize(before + mesh.nodeCount());
     const std::span<shared::MeshNodeRecord> nodes = std::span(tables.nodes).subspan(before);

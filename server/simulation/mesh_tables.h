@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "server/scene/scene.h"
+#include "server/model/scene.h"
 #include "server/simulation/scene_tables.h"
 #include "shaders/shared/mesh.h"
 
@@ -21,9 +21,9 @@ struct MeshTables {
 };
 
 // Of the meshes; MeshTables has them.
-Tiles meshTiles(std::span<const scene::Cloth> cloths, std::uint32_t workgroupSize);
+Tiles meshTiles(std::span<const model::Cloth> cloths, std::uint32_t workgroupSize);
 
 // Empty where no cloth is a mesh.
-MeshTables meshTables(std::span<const scene::Cloth> cloths, std::uint32_t workgroupSize);
+MeshTables meshTables(std::span<const model::Cloth> cloths, std::uint32_t workgroupSize);
 
 }  // namespace clothstream::simulation

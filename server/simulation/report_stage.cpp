@@ -62,9 +62,9 @@ float p99Of(std::span<const std::uint32_t> bins, std::uint64_t all) {
 
 }  // namespace
 
-std::vector<shared::vec4> springStiffness(std::span<const scene::Cloth> cloths) {
+std::vector<shared::vec4> springStiffness(std::span<const model::Cloth> cloths) {
   std::vector<shared::vec4> all;
-  for (const scene::Cloth& cloth : cloths)
+  for (const model::Cloth& cloth : cloths)
     all.push_back({cloth.structural.stiffness, cloth.shear.stiffness, cloth.bend.stiffness, 0});
   return all;
 }
@@ -127,7 +127,7 @@ Bindings ReportStage::penetrationsIn(const vulkan::Device& device, const StateBu
 }
 
 void ReportStage::record(vulkan::Recorder& recorder, std::uint32_t present,
-                         std::span<const shared::vec4> stiffness, const scene::Vec3& gravity,
+                         std::span<const shared::vec4> stiffness, const model::Vec3& gravity,
                          const shared::CollisionPush& collision) {
   assert(stiffness.size() == of_.cloths.size());
   for (std::size_t i = 0; i < stiffness.size(); ++i) of_.cloths[i].stiffness = stiffness[i];

@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "server/scene/scene.h"
+#include "server/model/scene.h"
 #include "server/simulation/cloth_report.h"
 #include "server/simulation/state_buffers.h"
 #include "server/vulkan/buffer.h"
@@ -27,7 +27,7 @@ struct MeshSprings {
 };
 
 // Stiffness of each kind of spring, whether it is a force or a constraint.
-std::vector<shared::vec4> springStiffness(std::span<const scene::Cloth> cloths);
+std::vector<shared::vec4> springStiffness(std::span<const model::Cloth> cloths);
 
 // How cloths are cut into blocks.
 struct ReportBlocks {
@@ -46,7 +46,7 @@ class ReportStage {
   // Of the state in the buffers `present`, against colliders as they are at the end of `collision`. Begins
   // with a barrier. At most one recording of it may be in flight.
   void record(vulkan::Recorder& recorder, std::uint32_t present, std::span<const shared::vec4> stiffness,
-              const scene::Vec3& gravity, const shared::CollisionPush& collision);
+              const model::Vec3& gravity, const shared::CollisionPush& collision);
   // Of a complete recording, without what a solve says: a cloth each.
   std::vector<ClothReport> collect() const;
 

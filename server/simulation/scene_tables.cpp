@@ -7,7 +7,7 @@
 #include <cmath>
 #include <cstddef>
 
-#include "server/scene/springs.h"
+#include "server/model/springs.h"
 
 namespace clothstream::simulation {
 namespace {
@@ -19,57 +19,57 @@ float snapTiny(float x) {
 
 // Where springs become constraints, how much of what is too much is taken back; the third tells from those
 // that always are.
-shared::vec4 limitsOf(const scene::Cloth& cloth) {
-  const scene::Solver& solver = cloth.solver;
-  const bool adaptive = solver.kind == scene::SolverKind::acad;
-  return {adaptive ? solver.activation : 0, scene::takenBack(solver), adaptive ? 1.0f : 0.0f,
+shared::vec4 limitsOf(const model::Cloth& cloth) {
+  const model::Solver& solver = cloth.solver;
+  const bool adaptive = solver.kind == model::SolverKind::acad;
+  return {adaptive ? solver.activation : 0, model::takenBack(solver), adaptive ? 1.0f : 0.0f,
           cloth.dihedralBending};
 }
 
 // Compliance over h^2, iterations and tolerance of conjugate gradients; whether it has bend springs.
-shared::vec4 solverOf(const scene::Cloth& cloth, double substepSeconds) {
+shared::vec4 solverOf(const model::Cloth& cloth, double substepSeconds) {
   if (followOf(cloth.solver.kind) != Follow::solve) return {0, 0, 0, 0};
-  const bool bend = cloth.solver.kind == scene::SolverKind::implicitEuler || cloth.solver.bendConstraints;
-  return {static_cast<float>(scene::scaledCompliance(cloth, substepSeconds)),
+  const bool bend = cloth.solver.kind == model::SolverKind::implicitEuler || cloth.solver.bendConstraints;
+  return {static_cast<float>(model::scaledCompliance(cloth, substepSeconds)),
           static_cast<float>(cloth.solver.iterations), cloth.solver.tolerance * cloth.solver.tolerance,
           bend ? 1.0f : 0.0f};
 }
 
-shared::vec4 xpbdSpringOf(const scene::Cloth& cloth, scene::SpringKind kind, double substepSeconds, float w) {
-  if (cloth.solver.kind != scene::SolverKind::xpbd) return {0, 0, 0, 0};
-  const scene::XpbdSpring spring = scene::xpbdSpring(cloth, kind, substepSeconds);
+shared::vec4 xpbdSpringOf(const model::Cloth& cloth, model::SpringKind kind, double substepSeconds, float w) {
+  if (cloth.solver.kind != model::SolverKind::xpbd) return {0, 0, 0, 0};
+  const model::XpbdSpring spring = model::xpbdSpring(cloth, kind, substepSeconds);
   return {static_cast<float>(spring.stretch), static_cast<float>(spring.damping),
           static_cast<float>(spring.memory), w};
 }
 
 }  // namespace
 
-Follow followOf(scene::SolverKind kind) {
-  if (kind == scene::SolverKind::massSpring) return Follow::nothing;
-  return kind == scene::SolverKind::xpbd ? Follow::corrections : Follow::solve;
+Follow followOf(model::SolverKind kind) {
+  if (kind == model::SolverKind::massSpring) return Follow::nothing;
+  return kind == model::SolverKind::xpbd ? Follow::corrections : Follow::solve;
 }
 
-std::vector<std::uint32_t> clothOffsets(std::span<const scene::Cloth> cloths) {
+std::vector<std::uint32_t> clothOffsets(std::span<const model::Cloth> cloths) {
   std::vector<std::uint32_t> offsets{0};
-  for (const scene::Cloth& cloth : cloths) offsets.push_back(offsets.back() + cloth.nodeCount());
+  for (const model::Cloth& cloth : cloths) offsets.push_back(offsets.back() + cloth.nodeCount());
   return offsets;
 }
 
-std::vector<shared::ClothRecord> clothRecords(std::span<const scene::Cloth> cloths, double substepSeconds) {
+std::vector<shared::ClothRecord> clothRecords(std::span<const model::Cloth> cloths, double substepSeconds) {
   std::vector<shared::ClothRecord> records;
   std::uint32_t firstNode = 0;
-  for (const scene::Cloth& cloth : cloths) {
-    const scene::GridSpacing spacing = scene::spacing(cloth.grid);
+  for (const model::Cloth& cloth : cloths) {
+    const model::GridSpacing spacing = model::spacing(cloth.grid);
     const auto whole = [](std::uint32_t number) {
       assert(number < 1u << 24);
       return static_cast<float>(number);
     };
-    const auto force = [&](scene::SpringKind kind) { return scene::forceOf(cloth, kind); };
-    const auto xpbd = [&](scene::SpringKind kind, float w) {
+    const auto force = [&](model::SpringKind kind) { return model::forceOf(cloth, kind); };
+    const auto xpbd = [&](model::SpringKind kind, float w) {
       return xpbdSpringOf(cloth, kind, substepSeconds, w);
     };
     const auto inverseMass = static_cast<float>(cloth.nodeCount() / double{cloth.mass});
-    using enum scene::SpringKind;
+    using enum model::SpringKind;
     records.push_back(
         {.place = {whole(firstNode & 0xFFFF), whole(firstNode >> 16), cloth.mesh ? 0 : whole(cloth.grid.rows),
                    whole(cloth.mesh ? cloth.nodeCount() : cloth.grid.columns)},
@@ -88,14 +88,14 @@ std::vector<shared::ClothRecord> clothRecords(std::span<const scene::Cloth> clot
   return records;
 }
 
-Tiles makeTiles(std::span<const scene::Cloth> cloths, std::uint32_t rowsPerInvocation,
+Tiles makeTiles(std::span<const model::Cloth> cloths, std::uint32_t rowsPerInvocation,
                 std::uint32_t workgroupSize) {
   assert(rowsPerInvocation > 0 && workgroupSize > 0);
   Tiles tiles;
   for (const Follow follow : kFollows) {
     for (std::uint32_t cloth = 0; cloth < cloths.size(); ++cloth) {
       if (cloths[cloth].mesh || followOf(cloths[cloth].solver.kind) != follow) continue;
-      const scene::Grid& grid = cloths[cloth].grid;
+      const model::Grid& grid = cloths[cloth].grid;
       const std::uint32_t strips = (grid.rows + rowsPerInvocation - 1) / rowsPerInvocation;
       const std::uint64_t invocations = std::uint64_t{strips} * grid.columns;
       for (std::uint64_t first = 0; first < invocations; first += workgroupSize)
@@ -109,25 +109,25 @@ Tiles makeTiles(std::span<const scene::Cloth> cloths, std::uint32_t rowsPerInvoc
   return tiles;
 }
 
-std::vector<float> inverseMasses(std::span<const scene::Cloth> cloths) {
+std::vector<float> inverseMasses(std::span<const model::Cloth> cloths) {
   std::vector<float> all;
-  for (const scene::Cloth& cloth : cloths) {
-    const std::vector<double> masses = scene::nodeMasses(cloth);
-    const std::vector<std::uint8_t> pinned = scene::pinnedNodes(cloth);
+  for (const model::Cloth& cloth : cloths) {
+    const std::vector<double> masses = model::nodeMasses(cloth);
+    const std::vector<std::uint8_t> pinned = model::pinnedNodes(cloth);
     for (std::size_t i = 0; i < masses.size(); ++i)
       all.push_back(pinned[i] != 0 ? 0.0f : static_cast<float>(1 / masses[i]));
   }
   return all;
 }
 
-NodeState restState(std::span<const scene::Cloth> cloths) {
+NodeState restState(std::span<const model::Cloth> cloths) {
   NodeState state;
-  for (const scene::Cloth& cloth : cloths) {
-    const std::vector<scene::Vec3> positions = scene::restPositions(cloth);
+  for (const model::Cloth& cloth : cloths) {
+    const std::vector<model::Vec3> positions = model::restPositions(cloth);
     std::transform(positions.begin(), positions.end(), std::back_inserter(state.positions),
-                   [](const scene::Vec3& p) { return scene::Vec3(p.unaryExpr(&snapTiny)); });
+                   [](const model::Vec3& p) { return model::Vec3(p.unaryExpr(&snapTiny)); });
   }
-  state.velocities.assign(state.positions.size(), scene::Vec3::Zero());
+  state.velocities.assign(state.positions.size(), model::Vec3::Zero());
   return state;
 }
 

@@ -7,16 +7,16 @@
 #include <span>
 #include <vector>
 
-#include "server/scene/scene.h"
+#include "server/model/scene.h"
 #include "server/simulation/state_snapshot.h"
 #include "shaders/shared/simulation.h"
 
 namespace clothstream::simulation {
 
 // First node of each cloth, and at the end the number of nodes: clothCount + 1 numbers.
-std::vector<std::uint32_t> clothOffsets(std::span<const scene::Cloth> cloths);
+std::vector<std::uint32_t> clothOffsets(std::span<const model::Cloth> cloths);
 
-std::vector<shared::ClothRecord> clothRecords(std::span<const scene::Cloth> cloths, double substepSeconds);
+std::vector<shared::ClothRecord> clothRecords(std::span<const model::Cloth> cloths, double substepSeconds);
 
 struct TileRange {
   std::uint32_t first, count;
@@ -29,7 +29,7 @@ enum class Follow : std::uint8_t {
   corrections,  // XpbdStage; of springs there are no forces
 };
 inline constexpr std::array kFollows{Follow::nothing, Follow::solve, Follow::corrections};
-Follow followOf(scene::SolverKind kind);
+Follow followOf(model::SolverKind kind);
 
 // Tiles in the order of kFollows.
 struct TileRanges {
@@ -50,13 +50,13 @@ struct Tiles {
 
 // One tile a workgroup: together they cover every node of the grids once, `rowsPerInvocation` rows an
 // invocation.
-Tiles makeTiles(std::span<const scene::Cloth> cloths, std::uint32_t rowsPerInvocation,
+Tiles makeTiles(std::span<const model::Cloth> cloths, std::uint32_t rowsPerInvocation,
                 std::uint32_t workgroupSize);
 
 // 1/kg a node; 0 for pinned nodes.
-std::vector<float> inverseMasses(std::span<const scene::Cloth> cloths);
+std::vector<float> inverseMasses(std::span<const model::Cloth> cloths);
 
 // Every node where it starts, at rest.
-NodeState restState(std::span<const scene::Cloth> cloths);
+NodeState restState(std::span<const model::Cloth> cloths);
 
 }  // namespace clothstream::simulation

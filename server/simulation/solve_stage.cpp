@@ -40,11 +40,11 @@ std::uint32_t sizesOf(const SolveGroup& group) {
 }
 
 bool isAdaptive(const SolveGroup& group) {
-  return group.kind == scene::SolverKind::acad;
+  return group.kind == model::SolverKind::acad;
 }
 
 bool isImplicit(const SolveGroup& group) {
-  return group.kind == scene::SolverKind::implicitEuler;
+  return group.kind == model::SolverKind::implicitEuler;
 }
 
 // A workgroup is a chunk, or solves a system chunk by chunk, with barriers between its passes: on a software
@@ -264,7 +264,7 @@ struct SolveStage::Systems {
   std::vector<Group> groups;
 };
 
-SolveStage::SolveStage(const vulkan::Device& device, std::span<const scene::Cloth> cloths,
+SolveStage::SolveStage(const vulkan::Device& device, std::span<const model::Cloth> cloths,
                        const StateBuffers& state, std::uint32_t workgroupSize,
                        std::optional<std::uint32_t> wholeNodes)
     : device_(device),
@@ -278,7 +278,7 @@ SolveStage::SolveStage(const vulkan::Device& device, std::span<const scene::Clot
 
 SolveStage::~SolveStage() = default;
 
-void SolveStage::makeTables(std::span<const scene::Cloth> cloths) {
+void SolveStage::makeTables(std::span<const model::Cloth> cloths) {
   nextSystems_.reset();
   const SolveTables tables = solveTables(cloths, wholeNodes_);
   if (!tables.systems.empty()) nextSystems_ = std::make_unique<Systems>(device_, tables, state_, *kernels_);

@@ -8,7 +8,7 @@
 #include <optional>
 #include <span>
 
-#include "server/scene/scene.h"
+#include "server/model/scene.h"
 #include "server/simulation/solve_tables.h"
 #include "server/simulation/state_buffers.h"
 #include "server/vulkan/device.h"
@@ -24,13 +24,13 @@ class SolveStage {
  public:
   // `workgroupSize` 0, and `wholeNodes` (of the largest cloth that one workgroup solves) absent: the measured
   // best for the device. Throws std::runtime_error where the device cannot take the systems.
-  SolveStage(const vulkan::Device& device, std::span<const scene::Cloth> cloths, const StateBuffers& state,
+  SolveStage(const vulkan::Device& device, std::span<const model::Cloth> cloths, const StateBuffers& state,
              std::uint32_t workgroupSize, std::optional<std::uint32_t> wholeNodes);
   ~SolveStage();
 
   // Other cloths, or none, are made ready; then they are taken from now on, with nothing of this stage in
   // flight. Kernels that were made are kept. Where the former throws, all is as before.
-  void makeTables(std::span<const scene::Cloth> cloths);
+  void makeTables(std::span<const model::Cloth> cloths);
   void takeTables();
   // Whether there is a system; nothing below may be called where there is none.
   bool active() const { return systems_ != nullptr; }

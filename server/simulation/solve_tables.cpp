@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "server/scene/springs.h"
+#include "server/model/springs.h"
 #include "server/simulation/halves.h"
 #include "server/simulation/scene_tables.h"
 
@@ -12,11 +12,11 @@ namespace clothstream::simulation {
 namespace {
 
 // The springs that meet at a node of the cloth, two a record.
-void appendList(std::span<const std::uint32_t> springs, std::span<const scene::SpringLink> links,
+void appendList(std::span<const std::uint32_t> springs, std::span<const model::SpringLink> links,
                 std::uint32_t node, std::uint32_t firstNode, std::vector<shared::SpringEndsRecord>& lists) {
   const auto self = static_cast<float>(firstNode + node);
   for (std::size_t i = 0; i < springs.size(); ++i) {
-    const scene::SpringLink& link = links[springs[i]];
+    const model::SpringLink& link = links[springs[i]];
     const bool isFirstEnd = link.a == node;
     const float number = static_cast<float>(springs[i] + 1) * (isFirstEnd ? 1.0f : -1.0f);
     const auto other = static_cast<float>(firstNode + (isFirstEnd ? link.b : link.a));
@@ -27,13 +27,13 @@ void appendList(std::span<const std::uint32_t> springs, std::span<const scene::S
   }
 }
 
-void appendMesh(const scene::Cloth& cloth, std::size_t number, std::uint32_t firstNode, SolveTables& tables) {
-  const std::vector<scene::SpringLink> links = scene::systemLinks(cloth);
-  for (const scene::SpringLink& link : links)
+void appendMesh(const model::Cloth& cloth, std::size_t number, std::uint32_t firstNode, SolveTables& tables) {
+  const std::vector<model::SpringLink> links = model::systemLinks(cloth);
+  for (const model::SpringLink& link : links)
     tables.springs.push_back(
         {{static_cast<float>(firstNode + link.a), static_cast<float>(firstNode + link.b), link.restLength,
           static_cast<float>(CLOTHSTREAM_SPRING_KINDS * number + static_cast<std::size_t>(link.kind))}});
-  const scene::SpringAdjacency adjacency = scene::springAdjacency(links, cloth.nodeCount());
+  const model::SpringAdjacency adjacency = model::springAdjacency(links, cloth.nodeCount());
   for (std::uint32_t node = 0; node < cloth.nodeCount(); ++node) {
     const std::size_t first = tables.lists.size();
     appendList(adjacency.of(node), links, node, firstNode, tables.lists);
@@ -43,7 +43,7 @@ void appendMesh(const scene::Cloth& cloth, std::size_t number, std::uint32_t fir
   }
 }
 
-std::uint32_t chunksOf(const scene::Cloth& cloth) {
+std::uint32_t chunksOf(const model::Cloth& cloth) {
   constexpr std::uint32_t kWalk = CLOTHSTREAM_SOLVE_WALK, kLanes = CLOTHSTREAM_SOLVE_LANES;
   const auto walks = [](std::uint32_t nodes) { return (nodes + kWalk - 1) / kWalk; };
   const std::uint32_t all =
@@ -51,7 +51,7 @@ std::uint32_t chunksOf(const scene::Cloth& cloth) {
   return (all + kLanes - 1) / kLanes;
 }
 
-void appendSystem(const scene::Cloth& cloth, std::size_t number, std::uint32_t firstNode,
+void appendSystem(const model::Cloth& cloth, std::size_t number, std::uint32_t firstNode,
                   SolveTables& tables) {
   const std::size_t firstSpring = tables.springs.size();
   if (cloth.mesh) appendMesh(cloth, number, firstNode, tables);
@@ -68,16 +68,16 @@ void appendSystem(const scene::Cloth& cloth, std::size_t number, std::uint32_t f
 }
 
 // All cloths of a group: the small ones or the large ones.
-void appendCloths(std::span<const scene::Cloth> cloths, SolveGroup& group, bool large,
+void appendCloths(std::span<const model::Cloth> cloths, SolveGroup& group, bool large,
                   std::uint32_t wholeNodes, SolveTables& tables) {
   std::uint32_t firstNode = 0;
   for (std::size_t i = 0; i < cloths.size(); firstNode += cloths[i++].nodeCount()) {
-    const scene::Cloth& cloth = cloths[i];
-    if (cloth.solver.kind != group.kind || scene::isAssembled(cloth.solver) ||
+    const model::Cloth& cloth = cloths[i];
+    if (cloth.solver.kind != group.kind || model::isAssembled(cloth.solver) ||
         (cloth.mesh != nullptr) != group.mesh || (cloth.nodeCount() > wholeNodes) != large)
       continue;
     appendSystem(cloth, i, firstNode, tables);
-    group.bend = group.bend || group.kind == scene::SolverKind::implicitEuler || cloth.solver.bendConstraints;
+    group.bend = group.bend || group.kind == model::SolverKind::implicitEuler || cloth.solver.bendConstraints;
     group.iterations = std::max(group.iterations, cloth.solver.iterations);
     if (large) continue;
     ++group.smallSystems;
@@ -87,13 +87,13 @@ void appendCloths(std::span<const scene::Cloth> cloths, SolveGroup& group, bool 
 
 }  // namespace
 
-SolveTables solveTables(std::span<const scene::Cloth> cloths, std::uint32_t wholeNodes) {
+SolveTables solveTables(std::span<const model::Cloth> cloths, std::uint32_t wholeNodes) {
   SolveTables tables;
-  for (const scene::Cloth& cloth : cloths) tables.nodes += cloth.nodeCount();
+  for (const model::Cloth& cloth : cloths) tables.nodes += cloth.nodeCount();
   tables.incidences.resize(tables.nodes, {{0, 0, 0, 0}});
   const auto count = [](const auto& table) { return static_cast<std::uint32_t>(table.size()); };
-  using enum scene::SolverKind;
-  for (const scene::SolverKind kind : {constraint, acad, implicitEuler})
+  using enum model::SolverKind;
+  for (const model::SolverKind kind : {constraint, acad, implicitEuler})
     for (const bool mesh : {false, true}) {
       SolveGroup group{.kind = kind, .mesh = mesh};
       group.firstSystem = count(tables.systems);

@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "server/scene/scene.h"
+#include "server/model/scene.h"
 #include "shaders/shared/simulation.h"
 
 namespace clothstream::simulation {
@@ -14,7 +14,7 @@ namespace clothstream::simulation {
 // Systems that the same kernels solve, one after the other in the tables: first those that one workgroup
 // solves each, then the large ones.
 struct SolveGroup {
-  scene::SolverKind kind = scene::SolverKind::constraint;
+  model::SolverKind kind = model::SolverKind::constraint;
   bool mesh = false;
   bool bend = false;  // some grid has bend springs in its system
   std::uint32_t firstSystem = 0, smallSystems = 0;
@@ -30,7 +30,7 @@ struct SolveTables {
   std::vector<SolveGroup> groups;  // those that there are
   std::vector<shared::SystemRecord> systems;
   std::vector<shared::ChunkRecord> chunks;
-  std::vector<shared::LinkRecord> springs;          // of meshes, in the order of scene::springLinks()
+  std::vector<shared::LinkRecord> springs;          // of meshes, in the order of model::springLinks()
   std::vector<shared::IncidenceRecord> incidences;  // a node of the scene
   std::vector<shared::SpringEndsRecord> lists;
   std::uint32_t nodes = 0;   // of the scene
@@ -39,6 +39,6 @@ struct SolveTables {
 
 // `wholeNodes`: of the largest cloth that one workgroup solves. Cloths whose systems are assembled are left
 // out (AssembledStage); of meshes, springs between two pinned nodes, where nothing can move.
-SolveTables solveTables(std::span<const scene::Cloth> cloths, std::uint32_t wholeNodes);
+SolveTables solveTables(std::span<const model::Cloth> cloths, std::uint32_t wholeNodes);
 
 }  // namespace clothstream::simulation

@@ -12,12 +12,12 @@
 namespace clothstream::simulation {
 
 static_assert(std::endian::native == std::endian::little);
-static_assert(sizeof(scene::Vec3) == 12);
+static_assert(sizeof(model::Vec3) == 12);
 
 NodeState unpack(const StateSnapshot& snapshot) {
   assert(snapshot.bytes.size() % kSnapshotBytesPerNode == 0);
   const std::size_t nodes = snapshot.bytes.size() / kSnapshotBytesPerNode;
-  NodeState state{std::vector<scene::Vec3>(nodes), std::vector<scene::Vec3>(nodes)};
+  NodeState state{std::vector<model::Vec3>(nodes), std::vector<model::Vec3>(nodes)};
   const std::byte* from = snapshot.bytes.data();
   for (std::size_t i = 0; i < nodes; ++i, from += kSnapshotBytesPerNode) {
     std::memcpy(state.positions[i].data(), from, 12);

@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "server/scene/scene.h"
+#include "server/model/scene.h"
 
 namespace clothstream::simulation {
 
@@ -20,7 +20,7 @@ inline constexpr std::size_t kSnapshotBytesPerNode = 24;
 
 // The same as numbers.
 struct NodeState {
-  std::vector<scene::Vec3> positions, velocities;
+  std::vector<model::Vec3> positions, velocities;
 };
 // The snapshot must hold whole nodes, the state as many velocities as positions.
 NodeState unpack(const StateSnapshot& snapshot);

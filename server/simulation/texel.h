@@ -4,14 +4,14 @@
 
 #include <cstddef>
 
-#include "server/scene/scene.h"
+#include "server/model/scene.h"
 #include "shaders/shared/types.h"
 
 namespace clothstream::simulation {
 
 inline constexpr std::size_t kTexelBytes = sizeof(shared::vec4);
 
-inline shared::vec4 texel(const scene::Vec3& v, float w) {
+inline shared::vec4 texel(const model::Vec3& v, float w) {
   return {v.x(), v.y(), v.z(), w};
 }
 

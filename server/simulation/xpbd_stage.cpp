@@ -59,7 +59,7 @@ XpbdVariant xpbdVariantOf(std::span<const shared::ClothRecord> cloths, bool coll
   return variant;
 }
 
-XpbdStage::XpbdStage(const vulkan::Device& device, std::span<const scene::Cloth> cloths,
+XpbdStage::XpbdStage(const vulkan::Device& device, std::span<const model::Cloth> cloths,
                      const StateBuffers& state, std::uint32_t workgroupSize,
                      std::optional<std::uint32_t> wholeNodes)
     : device_(device),

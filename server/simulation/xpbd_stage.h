@@ -9,7 +9,7 @@
 #include <optional>
 #include <span>
 
-#include "server/scene/scene.h"
+#include "server/model/scene.h"
 #include "server/simulation/device_table.h"
 #include "server/simulation/stage.h"
 #include "server/simulation/state_buffers.h"
@@ -29,7 +29,7 @@ struct XpbdVariant {
 XpbdVariant xpbdVariantOf(std::span<const shared::ClothRecord> cloths, bool colliders);
 
 // Belongs to the device's thread. A substep of [MMC16]: from where the forces alone would take the nodes, one
-// or more Gauss-Seidel sweeps over the springs in the order of scene::springColours(), whose multipliers
+// or more Gauss-Seidel sweeps over the springs in the order of model::springColours(), whose multipliers
 // start from zero; then velocities from how far the nodes have come, and collisions. It has no state of its
 // own.
 class XpbdStage {
@@ -37,7 +37,7 @@ class XpbdStage {
   // Some cloth's solver must be xpbd. `workgroupSize` 0, and `wholeNodes` (the largest cloth that one
   // workgroup corrects) absent: the measured best for the device. Throws std::runtime_error where there is no
   // room.
-  XpbdStage(const vulkan::Device& device, std::span<const scene::Cloth> cloths, const StateBuffers& state,
+  XpbdStage(const vulkan::Device& device, std::span<const model::Cloth> cloths, const StateBuffers& state,
             std::uint32_t workgroupSize, std::optional<std::uint32_t> wholeNodes);
 
   // Its tables, once, before the first substep.

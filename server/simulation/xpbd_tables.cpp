@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cassert>
 
-#include "server/scene/spring_colours.h"
+#include "server/model/spring_colours.h"
 
 namespace clothstream::simulation {
 namespace {
@@ -18,33 +18,33 @@ struct Parts {
 };
 
 std::uint32_t blocksAlong(std::uint32_t nodes) {
-  return (nodes + scene::kBlock - 1) / scene::kBlock;
+  return (nodes + model::kBlock - 1) / model::kBlock;
 }
 
 // Blocks of each pass over a grid.
-std::array<std::uint32_t, kGridPasses> blocksOf(const scene::Grid& grid) {
-  constexpr std::uint32_t kShift = scene::kBlock / 2;
+std::array<std::uint32_t, kGridPasses> blocksOf(const model::Grid& grid) {
+  constexpr std::uint32_t kShift = model::kBlock / 2;
   const std::uint32_t unshifted = blocksAlong(grid.rows) * blocksAlong(grid.columns);
   return {unshifted, blocksAlong(grid.rows + kShift) * blocksAlong(grid.columns + kShift), unshifted};
 }
 
-std::uint32_t multipliersOf(const scene::Grid& grid) {
+std::uint32_t multipliersOf(const model::Grid& grid) {
   const auto blocks = blocksOf(grid);
-  return blocks[0] * scene::kCornerColours + blocks[1] * scene::kSeamColours +
-         blocks[2] * scene::kInsideColours;
+  return blocks[0] * model::kCornerColours + blocks[1] * model::kSeamColours +
+         blocks[2] * model::kInsideColours;
 }
 
 class XpbdTablesMaker {
  public:
-  XpbdTablesMaker(std::span<const scene::Cloth> cloths, const XpbdCut& cut) : cloths_(cloths), cut_(cut) {}
+  XpbdTablesMaker(std::span<const model::Cloth> cloths, const XpbdCut& cut) : cloths_(cloths), cut_(cut) {}
 
   XpbdTables make() {
     const std::vector<std::uint32_t> offsets = clothOffsets(cloths_);
     std::vector<Grid> whole, parts;
     std::vector<shared::XpbdTile> meshTiles;
     for (std::uint32_t i = 0; i < cloths_.size(); ++i) {
-      const scene::Cloth& cloth = cloths_[i];
-      if (cloth.solver.kind != scene::SolverKind::xpbd) continue;
+      const model::Cloth& cloth = cloths_[i];
+      if (cloth.solver.kind != model::SolverKind::xpbd) continue;
       tables_.iterated = tables_.iterated || cloth.solver.iterations > 1;
       if (cloth.mesh)
         addMesh(i, offsets[i], meshTiles);
@@ -68,7 +68,7 @@ class XpbdTablesMaker {
     tables_.wholeMeshes = rangeFrom(first);
     first = tables_.tiles.size();
     for (std::uint32_t i = 0; i < cloths_.size(); ++i)
-      if (cloths_[i].solver.kind == scene::SolverKind::xpbd)
+      if (cloths_[i].solver.kind == model::SolverKind::xpbd)
         for (std::uint32_t node = 0; node < cloths_[i].nodeCount(); node += cut_.partWorkgroup)
           tables_.tiles.push_back({{static_cast<float>(i), static_cast<float>(node), 0, 0}});
     tables_.nodes = rangeFrom(first);
@@ -94,14 +94,14 @@ class XpbdTablesMaker {
   std::uint32_t roundsOf(std::uint32_t elements) const { return elements / cut_.wholeWorkgroup + 2; }
 
   // Whether one workgroup can correct a cloth that takes so many rounds an iteration.
-  bool takeWhole(const scene::Cloth& cloth, std::uint32_t limit, std::uint32_t rounds) {
+  bool takeWhole(const model::Cloth& cloth, std::uint32_t limit, std::uint32_t rounds) {
     if (cloth.nodeCount() > limit || rounds > cut_.rounds) return false;
     tables_.roundsPerIteration = std::max(tables_.roundsPerIteration, rounds);
     tables_.wholeIterations = std::max(tables_.wholeIterations, cloth.solver.iterations);
     return true;
   }
 
-  bool addGrid(const scene::Cloth& cloth) {
+  bool addGrid(const model::Cloth& cloth) {
     std::uint32_t rounds = 2;
     for (const std::uint32_t blocks : blocksOf(cloth.grid)) rounds += roundsOf(blocks);
     if (takeWhole(cloth, cut_.wholeGridNodes, rounds)) return true;
@@ -110,14 +110,14 @@ class XpbdTablesMaker {
   }
 
   void addMesh(std::uint32_t number, std::uint32_t firstNode, std::vector<shared::XpbdTile>& tiles) {
-    const scene::Cloth& cloth = cloths_[number];
-    const scene::SpringColours colours = scene::springColours(cloth);
-    const std::vector<std::uint8_t> pinned = scene::pinnedNodes(cloth);
+    const model::Cloth& cloth = cloths_[number];
+    const model::SpringColours colours = model::springColours(cloth);
+    const std::vector<std::uint8_t> pinned = model::pinnedNodes(cloth);
     XpbdTables::PartMesh mesh{number, cloth.solver.iterations, {}};
     std::uint32_t rounds = 2;
     for (std::size_t colour = 0; colour < colours.count(); ++colour) {
       const std::size_t first = tables_.links.size();
-      for (const scene::SpringLink& link : colours.of(colour))
+      for (const model::SpringLink& link : colours.of(colour))
         if (pinned[link.a] == 0 || pinned[link.b] == 0)
           tables_.links.push_back(
               {{static_cast<float>(firstNode + link.a), static_cast<float>(firstNode + link.b),
@@ -140,7 +140,7 @@ class XpbdTablesMaker {
     }
   }
 
-  std::span<const scene::Cloth> cloths_;
+  std::span<const model::Cloth> cloths_;
   const XpbdCut& cut_;
   XpbdTables tables_;
   std::uint32_t multipliers_ = 0;
@@ -148,7 +148,7 @@ class XpbdTablesMaker {
 
 }  // namespace
 
-XpbdTables xpbdTables(std::span<const scene::Cloth> cloths, const XpbdCut& cut) {
+XpbdTables xpbdTables(std::span<const model::Cloth> cloths, const XpbdCut& cut) {
   return XpbdTablesMaker(cloths, cut).make();
 }
 

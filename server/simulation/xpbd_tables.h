@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "server/scene/scene.h"
+#include "server/model/scene.h"
 #include "server/simulation/scene_tables.h"
 #include "shaders/shared/simulation.h"
 
@@ -49,6 +49,6 @@ struct XpbdTables {
 };
 
 // Springs between two pinned nodes of a mesh are left out: nothing can move there.
-XpbdTables xpbdTables(std::span<const scene::Cloth> cloths, const XpbdCut& cut);
+XpbdTables xpbdTables(std::span<const model::Cloth> cloths, const XpbdCut& cut);
 
 }  // namespace clothstream::simulation

@@ -19,10 +19,10 @@ namespace {
 using Json = nlohmann::ordered_json;
 using Clock = std::chrono::steady_clock;
 
-Json describe(const scene::Scene& scene) {
+Json describe(const model::Scene& scene) {
   Json cloths = Json::array();
   std::uint32_t first = 0;
-  for (const scene::Cloth& cloth : scene.cloths) {
+  for (const model::Cloth& cloth : scene.cloths) {
     Json& entry =
         cloths.emplace_back(Json{{"name", cloth.name}, {"firstNode", first}, {"nodes", cloth.nodeCount()}});
     if (!cloth.mesh) {
@@ -89,7 +89,7 @@ struct Frames {
 
 }  // namespace
 
-Outcome run(vulkan::Device& device, const scene::Scene& scene, const StepOptions& options,
+Outcome run(vulkan::Device& device, const model::Scene& scene, const StepOptions& options,
             const std::function<bool()>& interrupted) {
   StateFile file(options.out);
   simulation::ClothSimulation simulation(device, scene);

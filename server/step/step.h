@@ -7,7 +7,7 @@
 #include <functional>
 #include <string>
 
-#include "server/scene/scene.h"
+#include "server/model/scene.h"
 #include "server/vulkan/device.h"
 
 namespace clothstream::step {
@@ -24,7 +24,7 @@ enum class Outcome : std::uint8_t { complete, interrupted, unhealthy };
 // The scene by itself, as a server runs it with nobody in it: the same states, to the bit. Says on standard
 // error once a second how far it is. `interrupted` is asked after every tick. However it ends but by an
 // exception, the file and what stands beside it are valid, with the frames so far. Throws std::runtime_error.
-Outcome run(vulkan::Device& device, const scene::Scene& scene, const StepOptions& options,
+Outcome run(vulkan::Device& device, const model::Scene& scene, const StepOptions& options,
             const std::function<bool()>& interrupted);
 
 }  // namespace clothstream::step

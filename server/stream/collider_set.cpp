@@ -13,7 +13,7 @@ namespace {
 
 // Where a collider that somebody moved starts: where it was, or there already if that is too far for one
 // tick.
-scene::Pose startOf(const scene::Pose& before, const scene::Pose& now, double tickSeconds) {
+model::Pose startOf(const model::Pose& before, const model::Pose& now, double tickSeconds) {
   const float reach = kMaxColliderSpeed * static_cast<float>(tickSeconds);
   const bool jumped = (now.position - before.position).squaredNorm() > reach * reach ||
                       std::abs(now.orientation.dot(before.orientation)) < kMaxColliderTurn;
@@ -22,16 +22,16 @@ scene::Pose startOf(const scene::Pose& before, const scene::Pose& now, double ti
 
 }  // namespace
 
-ColliderSet::ColliderSet(const scene::Scene& scene) {
-  for (const scene::Collider& collider : scene.colliders) scenePoses_.push_back(scene::poseAt(collider, 0));
+ColliderSet::ColliderSet(const model::Scene& scene) {
+  for (const model::Collider& collider : scene.colliders) scenePoses_.push_back(model::poseAt(collider, 0));
 }
 
-void ColliderSet::place(std::uint64_t participant, std::span<const scene::ParticipantCollider> colliders) {
+void ColliderSet::place(std::uint64_t participant, std::span<const model::ParticipantCollider> colliders) {
   std::erase_if(colliders_, [&](const Held& held) {
     return held.participant == participant &&
-           std::ranges::find(colliders, held.now.id, &scene::ParticipantCollider::id) == colliders.end();
+           std::ranges::find(colliders, held.now.id, &model::ParticipantCollider::id) == colliders.end();
   });
-  for (const scene::ParticipantCollider& collider : colliders) {
+  for (const model::ParticipantCollider& collider : colliders) {
     const auto key = [](const Held& held) { return std::tuple(held.participant, held.now.id); };
     const auto place = std::ranges::lower_bound(colliders_, std::tuple(participant, collider.id), {}, key);
     if (place != colliders_.end() && key(*place) == std::tuple(participant, collider.id))
@@ -41,12 +41,12 @@ void ColliderSet::place(std::uint64_t participant, std::span<const scene::Partic
   }
 }
 
-void ColliderSet::advance(const scene::Scene& scene, double endSeconds,
+void ColliderSet::advance(const model::Scene& scene, double endSeconds,
                           std::vector<simulation::MovingCollider>& colliders) {
   colliders.clear();
   for (std::size_t i = 0; i < scene.colliders.size(); ++i) {
-    const scene::Collider& collider = scene.colliders[i];
-    const scene::Pose end = scene::poseAt(collider, endSeconds);
+    const model::Collider& collider = scene.colliders[i];
+    const model::Pose end = model::poseAt(collider, endSeconds);
     const bool byItself = !collider.motion.keys.empty();
     colliders.push_back({collider.shape,
                          byItself ? scenePoses_[i] : startOf(scenePoses_[i], end, scene.tickSeconds()), end,
@@ -54,7 +54,7 @@ void ColliderSet::advance(const scene::Scene& scene, double endSeconds,
     scenePoses_[i] = end;
   }
   for (Held& collider : colliders_) {
-    const scene::Pose& end = collider.now.pose;
+    const model::Pose& end = collider.now.pose;
     colliders.push_back({collider.now.shape, startOf(collider.before, end, scene.tickSeconds()), end, 1});
     collider.before = end;
   }
@@ -66,7 +66,7 @@ ColliderSet::Identity ColliderSet::identity(std::size_t index) const {
   return {held.participant, held.now.id};
 }
 
-void ColliderSet::write(const scene::Scene& scene,
+void ColliderSet::write(const model::Scene& scene,
                         google::protobuf::RepeatedPtrField<v1::ColliderState>& states) const {
   states.Clear();
   for (std::size_t i = 0; i < scene.colliders.size(); ++i)

@@ -10,8 +10,8 @@
 #include <google/protobuf/repeated_ptr_field.h>
 
 #include "clothstream/v1/session.pb.h"
-#include "server/scene/input.h"
-#include "server/scene/scene.h"
+#include "server/model/input.h"
+#include "server/model/scene.h"
 #include "server/simulation/collision/moving_collider.h"
 
 namespace clothstream::stream {
@@ -26,15 +26,15 @@ inline constexpr float kMaxColliderTurn = 0.5f;
 class ColliderSet {
  public:
   // At the start: simulated time 0.
-  explicit ColliderSet(const scene::Scene& scene);
+  explicit ColliderSet(const model::Scene& scene);
 
   // All colliders of this participant. A known id moves there over the next tick, a new one appears at rest,
   // one that is missing vanishes.
-  void place(std::uint64_t participant, std::span<const scene::ParticipantCollider> colliders);
+  void place(std::uint64_t participant, std::span<const model::ParticipantCollider> colliders);
 
   // The next tick, which ends at this simulated time: all colliders, each from where it was to where it is
   // then.
-  void advance(const scene::Scene& scene, double endSeconds,
+  void advance(const model::Scene& scene, double endSeconds,
                std::vector<simulation::MovingCollider>& colliders);
 
   // Which collider is the index-th of the last advance(). Of the scene's the participant is 0 and the id
@@ -49,16 +49,16 @@ class ColliderSet {
   Identity identity(std::size_t index) const;
 
   // Where they are now. `scene` as of the last advance().
-  void write(const scene::Scene& scene, google::protobuf::RepeatedPtrField<v1::ColliderState>& states) const;
+  void write(const model::Scene& scene, google::protobuf::RepeatedPtrField<v1::ColliderState>& states) const;
 
  private:
   struct Held {
     std::uint64_t participant;
-    scene::ParticipantCollider now;
-    scene::Pose before;
+    model::ParticipantCollider now;
+    model::Pose before;
   };
 
-  std::vector<scene::Pose> scenePoses_;
+  std::vector<model::Pose> scenePoses_;
   std::vector<Held> colliders_;
 };
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What a door sees of a session.
+// What a endpoint sees of a session.
 #include "server/stream/connection.h"
 
 #include <utility>

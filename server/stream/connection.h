@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// One peer of the server, whichever door it came through: serialised ClientMessages in, serialised
+// One peer of the server, whichever endpoint it came through: serialised ClientMessages in, serialised
 // ServerMessages out.
 #pragma once
 
@@ -19,11 +19,11 @@ namespace clothstream::stream {
 class SceneServer;
 class Session;
 
-// Largest serialised ClientMessage; doors refuse larger ones before they hold them.
+// Largest serialised ClientMessage; endpoints refuse larger ones before they hold them.
 inline constexpr std::size_t kMaxClientMessageBytes = messages::limits::kMaxClientMessageBytes;
 
-// Thread-safe. A door makes one for each peer, feeds it what arrives, and writes what next() gives, one write
-// in flight: when the write is done it asks again; when there is nothing it waits for `wake`.
+// Thread-safe. A endpoint makes one for each peer, feeds it what arrives, and writes what next() gives, one
+// write in flight: when the write is done it asks again; when there is nothing it waits for `wake`.
 class Connection {
  public:
   // `wake` is called, from any thread, when next() may have something or finished() became true; it must only
@@ -38,7 +38,7 @@ class Connection {
   // One ClientMessage. Whatever is wrong with it is answered by an Error to this peer alone.
   void receive(std::span<const std::byte> message);
 
-  // The peer said, in its door's way, that it has no more to say: it leaves the scene for good.
+  // The peer said, in its endpoint's way, that it has no more to say: it leaves the scene for good.
   void leave();
 
   // The next message to write: control first, then the newest frame that this peer can decode and has room
@@ -46,8 +46,8 @@ class Connection {
   std::optional<SharedBytes> next();
 
   // The peer is to be closed (after a fatal error, or when the server stops), once next() has nothing more. A
-  // peer that does not read is finished too: a door gives its last writes a second or so, then cuts. The last
-  // message says why: a fatal Error, or the Notice that the server stops.
+  // peer that does not read is finished too: a endpoint gives its last writes a second or so, then cuts. The
+  // last message says why: a fatal Error, or the Notice that the server stops.
   bool finished() const;
 
  private:

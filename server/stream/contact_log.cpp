@@ -13,7 +13,7 @@ void ContactLog::want(std::uint64_t participant, bool wants) {
     wanting_.erase(participant);
 }
 
-void ContactLog::addEvents(std::uint64_t tick, const scene::Scene& scene, const ColliderSet& colliders,
+void ContactLog::addEvents(std::uint64_t tick, const model::Scene& scene, const ColliderSet& colliders,
                            std::span<const simulation::ContactStatus> contacts,
                            google::protobuf::RepeatedPtrField<v1::ContactEvent>& events) {
   const auto add = [&](v1::ContactEventKind kind, const Pair& pair, double impulse, double seconds) {

@@ -11,7 +11,7 @@
 #include <google/protobuf/repeated_ptr_field.h>
 
 #include "clothstream/v1/session.pb.h"
-#include "server/scene/scene.h"
+#include "server/model/scene.h"
 #include "server/simulation/collision/moving_collider.h"
 #include "server/stream/collider_set.h"
 
@@ -29,7 +29,7 @@ class ContactLog {
   bool wanted() const { return !wanting_.empty(); }
 
   // `contacts` of the tick that is complete, whose colliders are those of `colliders`.
-  void addEvents(std::uint64_t tick, const scene::Scene& scene, const ColliderSet& colliders,
+  void addEvents(std::uint64_t tick, const model::Scene& scene, const ColliderSet& colliders,
                  std::span<const simulation::ContactStatus> contacts,
                  google::protobuf::RepeatedPtrField<v1::ContactEvent>& events);
 

@@ -6,9 +6,9 @@
 
 namespace clothstream::stream {
 
-HoldSet::HoldSet(const scene::Scene& scene) {
+HoldSet::HoldSet(const model::Scene& scene) {
   std::size_t attachments = 0;
-  for (const scene::Cloth& cloth : scene.cloths) attachments += cloth.attachments.size();
+  for (const model::Cloth& cloth : scene.cloths) attachments += cloth.attachments.size();
   moved_.resize(attachments);
 }
 
@@ -20,48 +20,48 @@ HoldSet::Holder* HoldSet::find(std::uint64_t participant, std::uint32_t id) {
   return found == holders_.end() ? nullptr : &*found;
 }
 
-void HoldSet::place(std::uint64_t participant, std::span<const scene::Grab> grabs,
-                    std::span<const scene::AttachmentPose> attachments) {
-  for (const scene::AttachmentPose& put : attachments) moved_[put.attachment] = put.pose;
+void HoldSet::place(std::uint64_t participant, std::span<const model::Grab> grabs,
+                    std::span<const model::AttachmentPose> attachments) {
+  for (const model::AttachmentPose& put : attachments) moved_[put.attachment] = put.pose;
   for (Holder& holder : holders_) {
-    const bool wanted = std::ranges::find(grabs, holder.now.id, &scene::Grab::id) != grabs.end();
+    const bool wanted = std::ranges::find(grabs, holder.now.id, &model::Grab::id) != grabs.end();
     if (holder.phase == Holder::Phase::empty || holder.participant != participant || wanted) continue;
     // The device never heard of one that has not begun.
     holder.phase = holder.phase == Holder::Phase::takes ? Holder::Phase::empty : Holder::Phase::ends;
   }
-  for (const scene::Grab& grab : grabs) {
+  for (const model::Grab& grab : grabs) {
     if (Holder* known = find(participant, grab.id)) {
       known->now = grab;
       continue;
     }
     auto place = std::ranges::find(holders_, Holder::Phase::empty, &Holder::phase);
     if (place == holders_.end()) {
-      if (holders_.size() == simulation::kMaxGrips) return;
+      if (holders_.size() == simulation::kMaxGrabs) return;
       place = holders_.emplace(place);
     }
     *place = {participant, grab, grab.pose, Holder::Phase::takes};
   }
 }
 
-void HoldSet::advance(const scene::Scene& scene, double endSeconds, simulation::TickInputs& inputs) {
+void HoldSet::advance(const model::Scene& scene, double endSeconds, simulation::TickInputs& inputs) {
   inputs.attachments.clear();
-  for (const scene::Cloth& cloth : scene.cloths)
-    for (const scene::Attachment& attachment : cloth.attachments) {
-      const std::optional<scene::Pose>& moved = moved_[inputs.attachments.size()];
-      inputs.attachments.push_back(moved ? *moved : scene::frameAt(scene, attachment, endSeconds));
+  for (const model::Cloth& cloth : scene.cloths)
+    for (const model::Attachment& attachment : cloth.attachments) {
+      const std::optional<model::Pose>& moved = moved_[inputs.attachments.size()];
+      inputs.attachments.push_back(moved ? *moved : model::frameAt(scene, attachment, endSeconds));
     }
   while (!holders_.empty() && holders_.back().phase == Holder::Phase::empty) holders_.pop_back();
-  inputs.grips.clear();
+  inputs.grabs.clear();
   released_.clear();
   for (Holder& holder : holders_) {
-    simulation::Grip& grip = inputs.grips.emplace_back();
+    simulation::Grab& grab = inputs.grabs.emplace_back();
     if (holder.phase == Holder::Phase::ends) released_.emplace_back(holder.participant, holder.now.id);
     if (holder.phase == Holder::Phase::empty || holder.phase == Holder::Phase::ends) {
       holder.phase = Holder::Phase::empty;
       continue;
     }
     const bool takes = holder.phase == Holder::Phase::takes;
-    grip = {.state = takes ? simulation::Grip::State::takes : simulation::Grip::State::holds,
+    grab = {.state = takes ? simulation::Grab::State::takes : simulation::Grab::State::holds,
             .start = takes ? holder.now.pose : holder.before,
             .end = holder.now.pose,
             .radius = holder.now.radius,
@@ -73,7 +73,7 @@ void HoldSet::advance(const scene::Scene& scene, double endSeconds, simulation::
   }
 }
 
-void HoldSet::addEvents(std::span<const simulation::GripStatus> grips,
+void HoldSet::addEvents(std::span<const simulation::GrabStatus> grabs,
                         google::protobuf::RepeatedPtrField<v1::GrabEvent>& events) {
   const auto add = [&](std::uint64_t participant, std::uint32_t id, v1::GrabEventKind kind,
                        std::uint32_t vertices) {
@@ -84,10 +84,10 @@ void HoldSet::addEvents(std::span<const simulation::GripStatus> grips,
     event.set_vertices(vertices);
   };
   for (const auto& [participant, id] : released_) add(participant, id, v1::GRAB_EVENT_KIND_RELEASED, 0);
-  for (std::size_t i = 0; i < grips.size(); ++i) {
+  for (std::size_t i = 0; i < grabs.size(); ++i) {
     Holder& holder = holders_[i];
     if (holder.phase != Holder::Phase::holds) continue;
-    const std::uint32_t vertices = grips[i].taken - grips[i].slipped;
+    const std::uint32_t vertices = grabs[i].taken - grabs[i].slipped;
     if (holder.vertices == vertices) continue;
     add(holder.participant, holder.now.id,
         holder.vertices ? v1::GRAB_EVENT_KIND_SLIPPED : v1::GRAB_EVENT_KIND_TAKEN, vertices);

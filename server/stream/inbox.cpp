@@ -7,7 +7,7 @@
 
 namespace clothstream::stream {
 
-void Inbox::postPoses(std::uint64_t participant, scene::ParticipantPoses poses, Clock::time_point arrival,
+void Inbox::postPoses(std::uint64_t participant, model::ParticipantPoses poses, Clock::time_point arrival,
                       PoseTime time) {
   const std::lock_guard lock(mutex_);
   const auto last = std::ranges::find(inputs_.poses, participant, &Poses::participant);
@@ -16,7 +16,7 @@ void Inbox::postPoses(std::uint64_t participant, scene::ParticipantPoses poses, 
     return;
   }
   // Of two places for one attachment the later counts.
-  std::vector<scene::AttachmentPose>& before = last->now.poses.attachments;
+  std::vector<model::AttachmentPose>& before = last->now.poses.attachments;
   poses.attachments.insert(poses.attachments.begin(), before.begin(), before.end());
   if (poses.attachments.size() > kMaxAttachmentPoses)
     poses.attachments.erase(poses.attachments.begin(), poses.attachments.end() - kMaxAttachmentPoses);
@@ -59,7 +59,7 @@ void Inbox::keepColliderChanges() {
                 [](const AcceptedChange& accepted) { return accepted.change.colliders.empty(); });
 }
 
-void Inbox::forEachChange(const std::function<void(const scene::ParameterChange&)>& visit) {
+void Inbox::forEachChange(const std::function<void(const model::ParameterChange&)>& visit) {
   const std::lock_guard lock(mutex_);
   for (const AcceptedChange& accepted : inputs_.changes) visit(accepted.change);
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What participants put into a scene, on its way from the doors' threads to the scene's next tick.
+// What participants put into a scene, on its way from the endpoints' threads to the scene's next tick.
 #pragma once
 
 #include <cstddef>
@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "clothstream/v1/session.pb.h"
-#include "server/scene/input.h"
+#include "server/model/input.h"
 #include "server/stream/clock.h"
 
 namespace clothstream::stream {
@@ -22,7 +22,7 @@ struct PoseTime {
 };
 
 struct TimedPoses {
-  scene::ParticipantPoses poses{};
+  model::ParticipantPoses poses{};
   Clock::time_point arrival{};
   PoseTime time = {};
 };
@@ -38,7 +38,7 @@ struct Poses {
 // A change that was checked against the scene as all changes before it leave it.
 struct AcceptedChange {
   std::uint64_t participant = 0;
-  scene::ParameterChange change{};
+  model::ParameterChange change{};
   v1::ParameterChange message{};
 };
 
@@ -58,7 +58,7 @@ class Inbox {
 
   // Replaces what this participant posted since the last tick, but for where it put attachments that `poses`
   // says nothing of, and what was true at other times.
-  void postPoses(std::uint64_t participant, scene::ParticipantPoses poses, Clock::time_point arrival,
+  void postPoses(std::uint64_t participant, model::ParticipantPoses poses, Clock::time_point arrival,
                  PoseTime time = {});
   // False if it is full.
   [[nodiscard]] bool postChange(AcceptedChange change);
@@ -68,7 +68,7 @@ class Inbox {
   void keepColliderChanges();
 
   // Those that wait, oldest first. `visit` must not call this inbox.
-  void forEachChange(const std::function<void(const scene::ParameterChange&)>& visit);
+  void forEachChange(const std::function<void(const model::ParameterChange&)>& visit);
 
   // Moves everything to `out`, whose former contents go; the two keep swapping their memory.
   void drain(Inputs& out);

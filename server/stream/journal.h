@@ -7,7 +7,7 @@
 
 #include "clothstream/v1/session.pb.h"
 #include "server/messages/field_error.h"
-#include "server/scene/scene.h"
+#include "server/model/scene.h"
 #include "server/simulation/cloth_simulation.h"
 #include "server/stream/collider_set.h"
 #include "server/stream/envelope.h"
@@ -25,7 +25,7 @@ struct AppliedTick {
   Recovery recovery = Recovery::none;
   bool keepsState = false;     // the device kept the state before it
   bool clothsChanged = false;  // some parameter of a cloth is not as in the tick before
-  const scene::Scene& scene;   // with the parameters of this tick
+  const model::Scene& scene;   // with the parameters of this tick
   const simulation::TickInputs& inputs;
   const ColliderSet& colliders;  // of which the inputs' are
 };
@@ -46,13 +46,13 @@ class Journal {
 
   // The device's thread. When it is due: the scene as it is before the next tick, what describes its stream,
   // its state, and the state that a reset goes back to.
-  virtual void begin(const vulkan::DeviceInfo& device, const scene::Scene& scene,
+  virtual void begin(const vulkan::DeviceInfo& device, const model::Scene& scene,
                      const v1::StreamDescription& description, const simulation::StateSnapshot& state,
                      const simulation::StateSnapshot& start) = 0;
   virtual void ticked(const AppliedTick& tick) = 0;
-  // The state after the tick that was told last. `gripsHold`: some grip holds cloth, and the device alone
+  // The state after the tick that was told last. `grabsHold`: some grab holds cloth, and the device alone
   // knows which.
-  virtual void saved(const simulation::StateSnapshot& state, bool gripsHold) = 0;
+  virtual void saved(const simulation::StateSnapshot& state, bool grabsHold) = 0;
   // From here on the simulation is another one: it goes on after `tick` from this state.
   virtual void restored(std::uint64_t tick, const simulation::StateSnapshot& state) = 0;
   // The simulation is gone. Another one may begin at the scene's start.

@@ -18,14 +18,14 @@ namespace {
 static_assert(messages::limits::kMaxTemporalLayers == codec::kMaxTemporalLayers &&
               messages::limits::kMaxQualities == codec::kMaxQualities);
 
-v1::ParameterChange allParameters(const scene::Scene& scene) {
+v1::ParameterChange allParameters(const model::Scene& scene) {
   std::vector<double> areas;
-  for (const scene::Cloth& cloth : scene.cloths) areas.push_back(scene::areaOf(cloth));
+  for (const model::Cloth& cloth : scene.cloths) areas.push_back(model::areaOf(cloth));
   return messages::allParameters(messages::toMessageWithoutMeshes(scene), areas);
 }
 
-scene::Scene nameAndRates(std::string name, const v1::StreamDescription& description) {
-  scene::Scene scene;
+model::Scene nameAndRates(std::string name, const v1::StreamDescription& description) {
+  model::Scene scene;
   scene.name = std::move(name);
   scene.simulationRate = description.simulation_rate();
   scene.streamRate = description.stream_rate();
@@ -40,7 +40,7 @@ std::shared_ptr<const std::string> clothsOf(const v1::StreamDescription& descrip
 
 }  // namespace
 
-LiveScene::LiveScene(scene::Scene definition, bool wasCreated, std::shared_ptr<Journal> kept,
+LiveScene::LiveScene(model::Scene definition, bool wasCreated, std::shared_ptr<Journal> kept,
                      std::uint32_t most)
     : created(wasCreated),
       maxParticipants(most),
@@ -64,7 +64,7 @@ LiveScene::~LiveScene() {
   if (source) source->end();
 }
 
-scene::Scene LiveScene::definition() const {
+model::Scene LiveScene::definition() const {
   const std::lock_guard lock(mutex_);
   return definition_;
 }
@@ -75,13 +75,13 @@ messages::Result<void> LiveScene::change(std::uint64_t participant, const v1::Pa
         v1::ERROR_CODE_INVALID_ARGUMENT,
         "parameter_change: '" + name() + "' is a recording that is played: what it shows cannot be changed"});
   const std::lock_guard lock(mutex_);
-  messages::Result<scene::ParameterChange> change = messages::toParameterChange(message, definition_);
+  messages::Result<model::ParameterChange> change = messages::toParameterChange(message, definition_);
   if (!change) return tl::unexpected(std::move(change).error());
-  scene::Scene changed = definition_;
-  scene::applyChange(changed, *change);
+  model::Scene changed = definition_;
+  model::applyChange(changed, *change);
   v1::ParameterChange told = message;
   if (std::ranges::any_of(change->cloths,
-                          [](const scene::ClothChange& cloth) { return cloth.material.has_value(); }))
+                          [](const model::ClothChange& cloth) { return cloth.material.has_value(); }))
     *told.mutable_cloths() = allParameters(changed).cloths();
   if (!inbox.postChange({participant, *change, std::move(told)}))
     return tl::unexpected(
@@ -124,10 +124,10 @@ v1::ParameterChange LiveScene::beginAnew() {
   return allParameters(start_);
 }
 
-v1::ParameterChange LiveScene::correct(const scene::Scene& now) {
+v1::ParameterChange LiveScene::correct(const model::Scene& now) {
   const std::lock_guard lock(mutex_);
   definition_ = now;
-  inbox.forEachChange([&](const scene::ParameterChange& change) { scene::applyChange(definition_, change); });
+  inbox.forEachChange([&](const model::ParameterChange& change) { model::applyChange(definition_, change); });
   description_.reset();
   return allParameters(now);
 }

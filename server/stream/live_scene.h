@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A scene as its participants share it: definition, inbox, audience, metrics. Where doors and the device's
-// thread meet.
+// A scene as its participants share it: definition, inbox, audience, metrics. Where endpoints and the
+// device's thread meet.
 #pragma once
 
 #include <atomic>
@@ -10,7 +10,7 @@
 #include <string>
 
 #include "server/messages/field_error.h"
-#include "server/scene/scene.h"
+#include "server/model/scene.h"
 #include "server/stream/audience.h"
 #include "server/stream/frame_source.h"
 #include "server/stream/inbox.h"
@@ -25,7 +25,7 @@ class LiveScene {
  public:
   // Must be valid. `created`: while the server runs, by a peer. `journal`: of all that happens in it; may be
   // null. `maxParticipants`: those who are held included.
-  explicit LiveScene(scene::Scene definition, bool created = false,
+  explicit LiveScene(model::Scene definition, bool created = false,
                      std::shared_ptr<Journal> journal = nullptr,
                      std::uint32_t maxParticipants = kDefaultMaxParticipants);
   // One that is not simulated: the source is yet to begin. Its start() and definition() hold name and rates
@@ -36,12 +36,12 @@ class LiveScene {
 
   const std::string& name() const { return start_.name; }
   // As it was at first.
-  const scene::Scene& start() const { return start_; }
+  const model::Scene& start() const { return start_; }
   // Of its stream.
   std::uint32_t codec() const;
   StreamShape shape() const;
   // With all accepted changes, those of the next tick included.
-  scene::Scene definition() const;
+  model::Scene definition() const;
 
   // Checks the change against the definition and puts it into the inbox, or says what is wrong with it.
   messages::Result<void> change(std::uint64_t participant, const v1::ParameterChange& message);
@@ -54,7 +54,7 @@ class LiveScene {
   v1::ParameterChange beginAnew();
 
   // The definition becomes what holds now and the changes that wait; returns the change that says what holds.
-  v1::ParameterChange correct(const scene::Scene& now);
+  v1::ParameterChange correct(const model::Scene& now);
 
   // For who joins now; must have joined the audience before, so as to miss no change.
   std::shared_ptr<const Description> description();
@@ -79,11 +79,11 @@ class LiveScene {
   std::atomic<std::uint64_t> tick{0};  // newest complete one
 
  private:
-  const scene::Scene start_;
+  const model::Scene start_;
   const std::shared_ptr<const std::string> cloths_;  // of all descriptions
 
   mutable std::mutex mutex_;
-  scene::Scene definition_;
+  model::Scene definition_;
   std::shared_ptr<const Description> description_;  // null when the definition has changed since
   std::uint64_t contents_ = 0;                      // ids given
 };

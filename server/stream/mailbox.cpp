@@ -52,7 +52,7 @@ bool Mailbox::reply(SharedBytes message) {
   {
     const std::lock_guard lock(mutex_);
     if (!push(replies_, std::move(message))) return false;
-    doorWaits_ = false;
+    endpointWaits_ = false;
   }
   wake();
   return true;
@@ -64,7 +64,7 @@ bool Mailbox::announce(SharedBytes message) {
     const std::lock_guard lock(mutex_);
     if (!push(announcements_, std::move(message))) return false;
     ready = streaming_;
-    if (ready) doorWaits_ = false;
+    if (ready) endpointWaits_ = false;
   }
   if (ready) wake();
   return true;
@@ -83,7 +83,7 @@ void Mailbox::subscribe(std::shared_ptr<const Description> description, const St
     told_ = {0, shape.layers};
     quality_ = adaptation_.point().quality;
     metrics_ = &metrics;
-    doorWaits_ = false;
+    endpointWaits_ = false;
   }
   wake();
 }
@@ -98,7 +98,7 @@ void Mailbox::deliver(const PublishedFrame& frame) {
     else if (!frame.key || (shape_.qualities > 1 && frame.quality != wantedQuality()))
       return;
     if (!hold(frame) || !hasRoom()) return;
-    doorWaits_ = false;
+    endpointWaits_ = false;
   }
   wake();
 }
@@ -108,7 +108,7 @@ std::uint8_t Mailbox::wantedQuality() const {
 }
 
 void Mailbox::adapt(Clock::time_point now) {
-  const bool behind = !held_.empty() || (needsKey_ && !(doorWaits_ && hasRoom()));
+  const bool behind = !held_.empty() || (needsKey_ && !(endpointWaits_ && hasRoom()));
   const OperatingPoint before = adaptation_.point();
   if (!adaptation_.look(behind, now)) return;
   const OperatingPoint after = adaptation_.point();
@@ -176,13 +176,13 @@ FrameWishes Mailbox::wishes(Clock::time_point now) {
     wishes |= {.qualities = bit, .keys = key ? bit : std::uint8_t{0}};
   };
   if (!needsKey_) add(quality_, wantsKey_);
-  if (needsKey_ ? doorWaits_ && hasRoom() : wantedQuality() != quality_) add(wantedQuality(), true);
+  if (needsKey_ ? endpointWaits_ && hasRoom() : wantedQuality() != quality_) add(wantedQuality(), true);
   return wishes;
 }
 
 std::uint8_t Mailbox::lacks() const {
   const std::lock_guard lock(mutex_);
-  if (!streaming_ || closed_ || !needsKey_ || !doorWaits_ || !hasRoom()) return 0;
+  if (!streaming_ || closed_ || !needsKey_ || !endpointWaits_ || !hasRoom()) return 0;
   return static_cast<std::uint8_t>(1u << wantedQuality());
 }
 
@@ -203,7 +203,7 @@ bool Mailbox::acknowledge(std::uint64_t tick, Clock::time_point now) {
       sent_.pop_front();
     }
     if (held_.empty() || !hasRoom()) return true;
-    doorWaits_ = false;
+    endpointWaits_ = false;
   }
   wake();
   return true;
@@ -250,7 +250,7 @@ bool Mailbox::closed() const {
 std::optional<SharedBytes> Mailbox::next(Clock::time_point now) {
   const std::lock_guard lock(mutex_);
   std::optional<SharedBytes> message = take(now);
-  doorWaits_ = !message;
+  endpointWaits_ = !message;
   return message;
 }
 

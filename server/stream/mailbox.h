@@ -69,7 +69,7 @@ struct FrameWishes {
 // A predicted frame is given only where the frame that it refers to was. A subscriber without room has up to
 // kMaxHeld frames held back; if it falls behind more, those of the highest layer go first, for no other layer
 // needs them. If the base alone is too much, all go, and it goes on with the next key frame, for which it
-// asks when it has room and its door waits for something to write: who does not read asks for nothing.
+// asks when it has room and its endpoint waits for something to write: who does not read asks for nothing.
 //
 // How many layers, and which quality, LinkAdaptation says; the subscriber is told when it changes. Another
 // quality begins with a key frame of it; until that comes it goes on with the former one. Who was sent a tick
@@ -152,7 +152,7 @@ class Mailbox {
 
   mutable std::mutex mutex_;
   bool closed_ = false;
-  bool doorWaits_ = false;  // it asked, there was nothing, and there is nothing for it since
+  bool endpointWaits_ = false;  // it asked, there was nothing, and there is nothing for it since
   Control replies_, announcements_;
 
   std::shared_ptr<const Description> description_;

@@ -13,11 +13,11 @@ namespace {
 
 // On the way from one pose to another: 0 is the one, 1 the other, more is beyond it. What jumps is at the one
 // until it is at the other.
-scene::Pose onTheWay(const scene::Pose& from, const scene::Pose& to, float part, double stepSeconds) {
+model::Pose onTheWay(const model::Pose& from, const model::Pose& to, float part, double stepSeconds) {
   const float reach = kMaxColliderSpeed * static_cast<float>(stepSeconds);
   if ((to.position - from.position).squaredNorm() > reach * reach) return part < 1 ? from : to;
   const float turn = from.orientation.dot(to.orientation);
-  scene::Pose pose{.position = from.position + part * (to.position - from.position),
+  model::Pose pose{.position = from.position + part * (to.position - from.position),
                    .orientation = to.orientation};
   if (std::abs(turn) < kMaxColliderTurn && part > 1) return pose;
   const Eigen::Vector4f other =
@@ -111,7 +111,7 @@ void PoseHistory::placeAt(Track& track, Clock::time_point time) {
 
 void PoseHistory::place(
     Clock::time_point time,
-    const std::function<void(std::uint64_t participant, const scene::ParticipantPoses&)>& place) {
+    const std::function<void(std::uint64_t participant, const model::ParticipantPoses&)>& place) {
   for (Track& track : tracks_) {
     if (track.settled) continue;
     prune(track, time);

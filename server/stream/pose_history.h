@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Where participants' colliders and grips are at a tick's time, from poses that say when they were true.
+// Where participants' colliders and grabs are at a tick's time, from poses that say when they were true.
 #pragma once
 
 #include <cstddef>
@@ -7,7 +7,7 @@
 #include <functional>
 #include <vector>
 
-#include "server/scene/input.h"
+#include "server/model/input.h"
 #include "server/stream/clock.h"
 #include "server/stream/inbox.h"
 
@@ -34,23 +34,23 @@ class PoseHistory {
   // What arrived of a participant since the last tick.
   void add(Poses&& poses);
 
-  // For each participant whose colliders or grips may be others than the last time: what holds at this time.
+  // For each participant whose colliders or grabs may be others than the last time: what holds at this time.
   // Attachments: those that were put somewhere since.
   void place(Clock::time_point time,
-             const std::function<void(std::uint64_t participant, const scene::ParticipantPoses&)>& place);
+             const std::function<void(std::uint64_t participant, const model::ParticipantPoses&)>& place);
 
  private:
   struct Entry {
     Clock::time_point trueAt{};
     std::uint64_t clientTimeUs = 0;
     bool timed = false;
-    std::vector<scene::ParticipantCollider> colliders = {};
-    std::vector<scene::Grab> grabs = {};
+    std::vector<model::ParticipantCollider> colliders = {};
+    std::vector<model::Grab> grabs = {};
   };
   struct Track {
     std::uint64_t participant = 0;
     std::vector<Entry> entries = {};  // never empty; times ascend
-    std::vector<scene::AttachmentPose> attachments = {};
+    std::vector<model::AttachmentPose> attachments = {};
     bool wantsContacts = false;
     bool settled = false;  // nothing changes until more arrives
   };
@@ -62,7 +62,7 @@ class PoseHistory {
   void placeAt(Track& track, Clock::time_point time);
 
   std::vector<Track> tracks_;
-  scene::ParticipantPoses placed_;
+  model::ParticipantPoses placed_;
 };
 
 }  // namespace clothstream::stream

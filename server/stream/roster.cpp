@@ -255,7 +255,7 @@ bool Roster::owned() const {
 }
 
 messages::Result<void> Roster::post(const Mailbox& mailbox, const v1::ColliderPoses& message,
-                                    scene::ParticipantPoses poses, const Permissions& permissions,
+                                    model::ParticipantPoses poses, const Permissions& permissions,
                                     Clock::time_point arrival) {
   const std::lock_guard lock(mutex_);
   const auto entry = find(mailbox);

@@ -14,7 +14,7 @@
 
 #include "clothstream/v1/session.pb.h"
 #include "server/messages/field_error.h"
-#include "server/scene/input.h"
+#include "server/model/input.h"
 #include "server/stream/audience.h"
 #include "server/stream/clock.h"
 #include "server/stream/inbox.h"
@@ -23,7 +23,7 @@
 
 namespace clothstream::stream {
 
-// What becomes of a participant whose connection is lost: its colliders and grips stay where they are for
+// What becomes of a participant whose connection is lost: its colliders and grabs stay where they are for
 // `still`, and vanish then; its place is kept for `hold`.
 struct Holding {
   Clock::duration hold = std::chrono::seconds(60);
@@ -76,7 +76,7 @@ class Roster {
   void leave(const Mailbox& mailbox, v1::LeaveReason reason, Clock::time_point now);
   // It may come back.
   void lose(const Mailbox& mailbox, const Holding& holding, Clock::time_point now);
-  // Those whose time is over leave, and lose their colliders and grips before. To be called now and then.
+  // Those whose time is over leave, and lose their colliders and grabs before. To be called now and then.
   void expire(Clock::time_point now);
   // Everybody leaves with this as the last message, and what they did and no tick has seen yet is dropped.
   // close(): and nobody joins from here on.
@@ -91,7 +91,7 @@ class Roster {
 
   // Puts what the participant does into the inbox, `message` as `poses`; or says which role it takes.
   [[nodiscard]] messages::Result<void> post(const Mailbox& mailbox, const v1::ColliderPoses& message,
-                                            scene::ParticipantPoses poses, const Permissions& permissions,
+                                            model::ParticipantPoses poses, const Permissions& permissions,
                                             Clock::time_point arrival);
   // Whether the participant may do that: an Act, or a message of which permit() tells.
   template <typename What>
@@ -112,8 +112,8 @@ class Roster {
     std::string token;
     std::uint32_t attempt = 0;                // of its newest connection
     std::shared_ptr<Mailbox> mailbox;         // null: it is away
-    scene::ParticipantPoses poses;            // the newest, without attachments
-    bool posed = false;                       // the scene has colliders or grips of it, perhaps
+    model::ParticipantPoses poses;            // the newest, without attachments
+    bool posed = false;                       // the scene has colliders or grabs of it, perhaps
     Clock::time_point vanishes{}, expires{};  // of who is away
   };
   using Entries = std::vector<Entry>;

@@ -11,7 +11,7 @@
 #include <spdlog/spdlog.h>
 
 #include "server/messages/description.h"
-#include "server/scene/wind.h"
+#include "server/model/wind.h"
 #include "server/stream/report_message.h"
 
 namespace clothstream::stream {
@@ -62,7 +62,7 @@ void SceneHost::begin(Clock::time_point now) {
   colliders_.advance(scene_, endSeconds, tickInputs_.colliders);
   holds_.advance(scene_, endSeconds, tickInputs_);
   tickInputs_.tellsContacts = contacts_.wanted();
-  tickInputs_.environment = scene::environmentAt(scene_, tick_);
+  tickInputs_.environment = model::environmentAt(scene_, tick_);
 
   SceneOnDevice& on = *onDevice_;
   on.recorder.begin();
@@ -90,7 +90,7 @@ void SceneHost::beginJournal() {
   on.device.wait(on.device.submit(on.recorder));
   // Frames of ticks before are none of it.
   packer_.drain();
-  // Which nodes grips hold is not part of a state.
+  // Which nodes grabs hold is not part of a state.
   if (holds_.holds()) holds_.takeAnew();
   const double seconds = static_cast<double>(tick_) * scene_.tickSeconds();
   live_.journal->begin(on.device.info(), scene_,
@@ -125,21 +125,21 @@ void SceneHost::applyInputs() {
   }
   if (!problem.empty()) takeBack(problem);
   for (Poses& poses : inputs_.poses) {
-    const scene::ParticipantPoses& now = poses.now.poses;
+    const model::ParticipantPoses& now = poses.now.poses;
     const bool moves = !now.colliders.empty() || !now.grabs.empty() || !now.attachments.empty();
     if (moves && poseArrivals_.size() < kMaxPoseArrivals) poseArrivals_.push_back(poses.now.arrival);
     poses_.add(std::move(poses));
   }
-  poses_.place(tickStart_, [this](std::uint64_t participant, const scene::ParticipantPoses& poses) {
+  poses_.place(tickStart_, [this](std::uint64_t participant, const model::ParticipantPoses& poses) {
     colliders_.place(participant, poses.colliders);
     holds_.place(participant, poses.grabs, poses.attachments);
     contacts_.want(participant, poses.wantsContacts);
   });
 }
 
-bool SceneHost::apply(const scene::ParameterChange& change, std::string& problem) {
-  scene::Scene changed = scene_;
-  scene::applyChange(changed, change);
+bool SceneHost::apply(const model::ParameterChange& change, std::string& problem) {
+  model::Scene changed = scene_;
+  model::applyChange(changed, change);
   changeGently(changed);
   if (!change.cloths.empty()) {
     try {
@@ -155,13 +155,13 @@ bool SceneHost::apply(const scene::ParameterChange& change, std::string& problem
   return true;
 }
 
-void SceneHost::changeGently(scene::Scene& changed) {
+void SceneHost::changeGently(model::Scene& changed) {
   const auto part = static_cast<float>(changed.substepSeconds() / kGentleTime);
   for (std::size_t i = 0; i < changed.cloths.size(); ++i) {
-    scene::Solver& solver = changed.cloths[i].solver;
+    model::Solver& solver = changed.cloths[i].solver;
     if (solver.kind != scene_.cloths[i].solver.kind)
       gentleUntil_[i] = tick_ + static_cast<std::uint64_t>(std::ceil(kGentleSeconds * rate_));
-    if (gentleUntil_[i] > tick_) solver.takenBack = std::min(part, scene::takenBack(solver));
+    if (gentleUntil_[i] > tick_) solver.takenBack = std::min(part, model::takenBack(solver));
   }
 }
 
@@ -175,7 +175,7 @@ void SceneHost::endGentleness() {
   if (ended) setCloths(scene_.cloths);
 }
 
-void SceneHost::setCloths(const std::vector<scene::Cloth>& cloths) {
+void SceneHost::setCloths(const std::vector<model::Cloth>& cloths) {
   onDevice_->simulation.setCloths(cloths);
   clothsChanged_ = true;
 }
@@ -225,7 +225,7 @@ void SceneHost::recordFrame(Clock::time_point now) {
   hasFrame_ = !frame_.recorded.empty();
   if (!hasFrame_) return;
   SceneOnDevice& on = *onDevice_;
-  if (scene_.stream.normals == scene::Normals::octahedral) on.simulation.recordNormals(on.recorder);
+  if (scene_.stream.normals == model::Normals::octahedral) on.simulation.recordNormals(on.recorder);
   frame_.hasReport = ticksAReport_ > 0 && tick_ + 1 >= nextReport_;
   if (frame_.hasReport) {
     on.simulation.recordReport(on.recorder, tickInputs_);
@@ -268,7 +268,7 @@ void SceneHost::show(Clock::time_point now) {
   }
   if (frame_.recorded.empty()) return;
   on.recorder.begin();
-  if (scene_.stream.normals == scene::Normals::octahedral) on.simulation.recordNormals(on.recorder);
+  if (scene_.stream.normals == model::Normals::octahedral) on.simulation.recordNormals(on.recorder);
   for (CompleteFrame::Recorded& recorded : frame_.recorded) {
     // What others have refers to the frame before, what this one's receivers have to this one: the next is a
     // key frame.
@@ -339,7 +339,7 @@ void SceneHost::finish() {
 void SceneHost::announceEvents() {
   v1::ServerMessage message;
   v1::TickEvents& events = *message.mutable_tick_events();
-  holds_.addEvents(onDevice_->simulation.grips(), *events.mutable_grabs());
+  holds_.addEvents(onDevice_->simulation.grabs(), *events.mutable_grabs());
   contacts_.addEvents(tick_, scene_, colliders_, onDevice_->simulation.contacts(),
                       *events.mutable_contacts());
   if (events.grabs().empty() && events.contacts().empty()) return;

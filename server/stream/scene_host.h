@@ -86,12 +86,12 @@ class SceneHost {
   void applyInputs();
   // False, and nothing changed, where the device has no room for what the change asks for: `problem` says
   // why.
-  bool apply(const scene::ParameterChange& change, std::string& problem);
+  bool apply(const model::ParameterChange& change, std::string& problem);
   void takeBack(const std::string& reason);
   // Cloths that just got another solver are pulled to their springs' length over kGentleSeconds, not at once.
-  void changeGently(scene::Scene& changed);
+  void changeGently(model::Scene& changed);
   void endGentleness();
-  void setCloths(const std::vector<scene::Cloth>& cloths);
+  void setCloths(const std::vector<model::Cloth>& cloths);
   void recordRecovery();
   // For the frame in hand: those of qualities that somebody wants, which have room for it.
   void chooseEncoders(Clock::time_point now);
@@ -108,7 +108,7 @@ class SceneHost {
   const std::uint32_t ticksAFrame_;   // simulation rate / stream rate
   const std::uint64_t ticksAReport_;  // at least; 0: none
 
-  scene::Scene scene_;  // as of the tick in hand
+  model::Scene scene_;  // as of the tick in hand
   ColliderSet colliders_;
   HoldSet holds_;
   ContactLog contacts_;

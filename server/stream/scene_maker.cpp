@@ -26,7 +26,7 @@ tl::unexpected<v1::Error> refused(v1::ErrorCode code, std::string text) {
   return tl::unexpected(std::move(error));
 }
 
-tl::expected<scene::Scene, v1::Error> checked(messages::Result<scene::Scene> scene) {
+tl::expected<model::Scene, v1::Error> checked(messages::Result<model::Scene> scene) {
   if (!scene) return refused(scene.error().code, "createScene.scene: " + scene.error().text);
   return std::move(*scene);
 }
@@ -112,7 +112,7 @@ tl::expected<v1::StopRecordingResponse, v1::Error> SceneMaker::stopNow(
   return std::move(*stopped);
 }
 
-tl::expected<scene::Scene, v1::Error> SceneMaker::definitionOf(const v1::CreateSceneRequest& request,
+tl::expected<model::Scene, v1::Error> SceneMaker::definitionOf(const v1::CreateSceneRequest& request,
                                                                const std::string& uploaded) const {
   switch (request.source_case()) {
     case v1::CreateSceneRequest::kScene:

@@ -39,7 +39,7 @@ class SceneMaker {
  private:
   tl::expected<v1::CreateSceneResponse, v1::Error> make(const v1::CreateSceneRequest& request,
                                                         const std::string& uploaded);
-  tl::expected<scene::Scene, v1::Error> definitionOf(const v1::CreateSceneRequest& request,
+  tl::expected<model::Scene, v1::Error> definitionOf(const v1::CreateSceneRequest& request,
                                                      const std::string& uploaded) const;
   // The journal of the scene. All that is asked of recordings goes through here: who may ask is to be checked
   // in it.

@@ -11,7 +11,7 @@
 
 namespace clothstream::stream {
 
-SceneOnDevice::SceneOnDevice(vulkan::Device& device_, const scene::Scene& scene, codec::Workers& workers,
+SceneOnDevice::SceneOnDevice(vulkan::Device& device_, const model::Scene& scene, codec::Workers& workers,
                              const std::stop_token& stop)
     : device(device_),
       simulation(device_, scene),
@@ -28,15 +28,15 @@ void SceneOnDevice::submitAndWait() {
   device.wait(device.submit(recorder));
 }
 
-void SceneOnDevice::warmUp(const scene::Scene& scene, const std::stop_token& stop) {
+void SceneOnDevice::warmUp(const model::Scene& scene, const std::stop_token& stop) {
   simulation::TickInputs inputs{scene.environment, {}};
   recorder.beginRehearsal();
   for (int tick = 0; tick < 2; ++tick) {
     simulation.recordTick(recorder, inputs);
     simulation.recordReport(recorder, inputs);
-    if (scene.stream.normals == scene::Normals::octahedral) simulation.recordNormals(recorder);
+    if (scene.stream.normals == model::Normals::octahedral) simulation.recordNormals(recorder);
     inputs.colliders.emplace_back();
-    inputs.grips.emplace_back();
+    inputs.grabs.emplace_back();
   }
   submitAndWait();
   // One by one: whatever else waits for the device has its turn between two of them.

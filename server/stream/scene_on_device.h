@@ -5,7 +5,7 @@
 #include <stop_token>
 
 #include "server/encode/quality_encoders.h"
-#include "server/scene/scene.h"
+#include "server/model/scene.h"
 #include "server/simulation/cloth_simulation.h"
 #include "server/simulation/state_snapshot.h"
 #include "server/vulkan/device.h"
@@ -18,7 +18,7 @@ struct SceneOnDevice {
   // Its start is complete there, every kernel has run, and `start` is that state. The device and `workers`
   // outlive it. Takes up to seconds, the device never much longer than the compiling of a kernel. Throws
   // std::runtime_error where the device has no room for the scene, and soon after a stop was asked for.
-  SceneOnDevice(vulkan::Device& device, const scene::Scene& scene, codec::Workers& workers,
+  SceneOnDevice(vulkan::Device& device, const model::Scene& scene, codec::Workers& workers,
                 const std::stop_token& stop = {});
 
   vulkan::Device& device;
@@ -31,7 +31,7 @@ struct SceneOnDevice {
   void submitAndWait();
   // All that a tick and a frame may need: software devices compile a kernel when it first runs, which takes
   // up to tenths of a second. Leaves the start state.
-  void warmUp(const scene::Scene& scene, const std::stop_token& stop);
+  void warmUp(const model::Scene& scene, const std::stop_token& stop);
 };
 
 }  // namespace clothstream::stream

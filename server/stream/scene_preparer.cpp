@@ -20,7 +20,7 @@ ScenePreparer::~ScenePreparer() {
   abandon();
 }
 
-ScenePreparer::Coming ScenePreparer::prepare(vulkan::Device& device, const scene::Scene& scene) {
+ScenePreparer::Coming ScenePreparer::prepare(vulkan::Device& device, const model::Scene& scene) {
   std::packaged_task<std::unique_ptr<SceneOnDevice>()> task([this, &device, scene, stop = stop_.get_token()] {
     if (stop.stop_requested()) throw std::runtime_error("the scene is not needed any more");
     const Clock::time_point before = Clock::now();

@@ -9,7 +9,7 @@
 
 #include <boost/asio/thread_pool.hpp>
 
-#include "server/scene/scene.h"
+#include "server/model/scene.h"
 #include "server/stream/scene_on_device.h"
 #include "server/vulkan/device.h"
 
@@ -28,7 +28,7 @@ class ScenePreparer {
 
   // The device must live until that is ready, or abandon() returns. The future throws what SceneOnDevice
   // throws.
-  Coming prepare(vulkan::Device& device, const scene::Scene& scene);
+  Coming prepare(vulkan::Device& device, const model::Scene& scene);
 
   // Whatever is not ready yet never will be. Returns when nothing is at work any more.
   void abandon();

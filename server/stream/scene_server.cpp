@@ -20,11 +20,11 @@
 namespace clothstream::stream {
 namespace {
 
-std::vector<std::shared_ptr<LiveScene>> liveScenes(std::vector<scene::Scene> definitions,
+std::vector<std::shared_ptr<LiveScene>> liveScenes(std::vector<model::Scene> definitions,
                                                    const ServerOptions& options) {
   std::vector<std::shared_ptr<LiveScene>> scenes;
   scenes.reserve(definitions.size());
-  for (scene::Scene& definition : definitions) {
+  for (model::Scene& definition : definitions) {
     std::shared_ptr<Journal> journal = options.journals ? options.journals(definition) : nullptr;
     scenes.push_back(std::make_shared<LiveScene>(std::move(definition), false, std::move(journal),
                                                  options.maxParticipants));
@@ -81,7 +81,7 @@ v1::SceneSummary summaryOf(const LiveScene& scene) {
   return summary;
 }
 
-SceneServer::State::State(std::vector<scene::Scene> definitions, ServerOptions options_)
+SceneServer::State::State(std::vector<model::Scene> definitions, ServerOptions options_)
     : options(std::move(options_)),
       uploads(options.maxUploadBytes),
       scenes(liveScenes(std::move(definitions), options)),
@@ -97,7 +97,7 @@ SceneServer::State::State(std::vector<scene::Scene> definitions, ServerOptions o
       maker(*this) {}
 
 SceneServer::State::State(std::shared_ptr<LiveScene> played, ServerOptions options_)
-    : State(std::vector<scene::Scene>{}, std::move(options_)) {
+    : State(std::vector<model::Scene>{}, std::move(options_)) {
   participants = kViewers;
   played->source->begin(*played);
   insert(std::move(played));
@@ -221,11 +221,11 @@ tl::expected<v1::ControlSceneResponse, v1::Error> SceneServer::State::controlSce
   return response;
 }
 
-SceneServer::SceneServer(std::vector<scene::Scene> scenes, ServerOptions options) {
+SceneServer::SceneServer(std::vector<model::Scene> scenes, ServerOptions options) {
   assert(options.maxParticipants <= kMostParticipants);
   bool found = false;
   std::string known;
-  for (const scene::Scene& scene : scenes) {
+  for (const model::Scene& scene : scenes) {
     found |= scene.name == options.defaultScene;
     known += (known.empty() ? "" : ", ") + scene.name;
   }
@@ -234,7 +234,7 @@ SceneServer::SceneServer(std::vector<scene::Scene> scenes, ServerOptions options
         fmt::format("there is no scene '{}'; there are {}", options.defaultScene, known));
   // The first is ready when the server is.
   std::ranges::stable_partition(
-      scenes, [&](const scene::Scene& scene) { return scene.name == options.defaultScene; });
+      scenes, [&](const model::Scene& scene) { return scene.name == options.defaultScene; });
   state_ = std::make_unique<State>(std::move(scenes), std::move(options));
 }
 

@@ -14,7 +14,7 @@
 
 #include "clothstream/v1/session.pb.h"
 #include "server/messages/limits.h"
-#include "server/scene/scene.h"
+#include "server/model/scene.h"
 #include "server/simulation/collision/moving_collider.h"
 #include "server/stream/roster.h"
 #include "server/vulkan/device.h"
@@ -50,7 +50,7 @@ struct ServerOptions {
   // Of what all peers upload at the same time.
   std::size_t maxUploadBytes = std::size_t{256} << 20;
   // Gives each scene its journal, or null for none; may be empty.
-  std::function<std::shared_ptr<Journal>(const scene::Scene&)> journals{};
+  std::function<std::shared_ptr<Journal>(const model::Scene&)> journals{};
   // A peer that sends nothing for this long is cut off.
   std::chrono::milliseconds silence{30'000};
   // Of who is cut off.
@@ -73,7 +73,7 @@ class SceneServer {
   // The scenes must be valid (server/messages) and their names unique. Throws vulkan::DeviceError, or
   // std::runtime_error where the device has no room for the default scene or it is not among them (naming
   // those there are).
-  SceneServer(std::vector<scene::Scene> scenes, ServerOptions options);
+  SceneServer(std::vector<model::Scene> scenes, ServerOptions options);
   // Of one scene that is not simulated here, the default one; needs no device, and can make no others.
   SceneServer(std::string name, std::shared_ptr<FrameSource> source, ServerOptions options);
   // Stops. Every Connection must be gone.

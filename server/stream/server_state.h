@@ -26,7 +26,7 @@ v1::SceneSummary summaryOf(const LiveScene& scene);
 
 // Thread-safe. Members are declared in the order in which they need each other.
 struct SceneServer::State {
-  State(std::vector<scene::Scene> definitions, ServerOptions options);
+  State(std::vector<model::Scene> definitions, ServerOptions options);
   State(std::shared_ptr<LiveScene> played, ServerOptions options);
 
   // nullptr if there is none of that name; an empty one is the default scene's.

@@ -39,7 +39,7 @@ class Session : public std::enable_shared_from_this<Session> {
   void leave();
   // Cut off where nothing was heard for too long. To be called now and then.
   void checkSilence(Clock::time_point now);
-  // The door is gone: the peer is cut off, and nobody is woken any more.
+  // The endpoint is gone: the peer is cut off, and nobody is woken any more.
   void end();
 
  private:

@@ -29,7 +29,7 @@ struct SceneMetrics {
   StageHistograms device;  // on the device, each stage
   Histogram
       encode;  // from the tick's completion on the device to the packet, entropy coding and waiting for it
-  Histogram send;           // from the packet to a door taking it
+  Histogram send;           // from the packet to a endpoint taking it
   Histogram inputToPacket;  // from a pose's arrival to the packet that shows its effect
 
   Counter ticks;
@@ -39,7 +39,7 @@ struct SceneMetrics {
   Counter keyFrames;         // of these
   Counter packetBytes;       // of these, counted once whoever listens
   Counter skippedFrames;     // not recorded, each quality's: the encoder was behind
-  Counter framesTaken;       // by doors, each subscriber's
+  Counter framesTaken;       // by endpoints, each subscriber's
   Counter framesDropped;     // not sent to a subscriber that was behind, each subscriber's
   Counter framesThinned;     // of temporal layers that a subscriber is not sent, each subscriber's
   Counter stepsDown;         // of subscribers to fewer layers or a coarser quality

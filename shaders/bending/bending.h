@@ -12,7 +12,7 @@ CLOTHSTREAM_SHARED_BEGIN
 #define CLOTHSTREAM_HINGE_TEXELS 2
 struct HingeRecord {
   vec4 nodes;  // of the scene: the edge's two, then those opposite of it
-  vec4 rest;   // weight, bent, least square of a normal as scene::Hinge has them; the cloth
+  vec4 rest;   // weight, bent, least square of a normal as model::Hinge has them; the cloth
 };
 
 // Of a node: the texels that name its hinges' forces. Each has up to four numbers: four times a hinge plus

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: MIT
-// How far the nearest node is that a grip could take hold of.
+// How far the nearest node is that a grab could take hold of.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 
-#include "shaders/hold/grip.glsl"
+#include "shaders/hold/grab.glsl"
 
 layout(binding = 2) uniform samplerBuffer positions;  // w: inverse mass
 
 layout(push_constant) uniform Push {
-  GripPush push;
+  GrabPush push;
 };
 
 // The bits of floats from 0 on are in the order of the floats: their least does not depend on who comes
@@ -18,12 +18,12 @@ void measure(uint node) {
   if (position.w == 0.0) {
     return;
   }
-  for (uint grip = 0; grip < push.gripCount; ++grip) {
-    vec4 state = gripTexel(grip, 4);
-    vec3 away = fromGrip(grip, position.xyz);
+  for (uint grab = 0; grab < push.grabCount; ++grab) {
+    vec4 state = grabTexel(grab, 4);
+    vec3 away = fromGrab(grab, position.xyz);
     float squared = dotProduct(away, away);
-    if (state.x == kTakingGrip && squared <= max(state.y, state.z)) {
-      atomicMin(reports[grip].nearest, floatBitsToUint(squared));
+    if (state.x == kTakingGrab && squared <= max(state.y, state.z)) {
+      atomicMin(reports[grab].nearest, floatBitsToUint(squared));
     }
   }
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Tables and push constants of what holds cloth: attachments, grips, tethers. Alike in C++ and in GLSL's
+// Tables and push constants of what holds cloth: attachments, grabs, tethers. Alike in C++ and in GLSL's
 // std430.
 #ifndef CLOTHSTREAM_SHADERS_HOLD_HOLD_H
 #define CLOTHSTREAM_SHADERS_HOLD_HOLD_H
@@ -25,22 +25,22 @@ struct TetherRecord {
   vec4 anchors;  // number + 1, or 0 where there is none, and metres; of another one likewise
 };
 
-// What GripRecord::state is.
-const float kFreeGrip = 0;  // whatever it held it lets go
-const float kHoldingGrip = 1;
-const float kTakingGrip = 2;  // from this tick's start on
+// What GrabRecord::state is.
+const float kFreeGrab = 0;  // whatever it held it lets go
+const float kHoldingGrab = 1;
+const float kTakingGrab = 2;  // from this tick's start on
 
-// A grip over one tick, five texels.
-struct GripRecord {
+// A grab over one tick, five texels.
+struct GrabRecord {
   vec4 start;   // where it is; w: square of the distance beyond which a node slips away
   vec4 motion;  // how far it goes until the tick's end; w: force, N
   vec4 turned;  // unit quaternion
   vec4 turn;    // what is added until the tick's end
-  vec4 state;   // kFreeGrip ...; squares of radius and reach
+  vec4 state;   // kFreeGrab ...; squares of radius and reach
 };
 
-// What becomes of a grip.
-struct GripReport {
+// What becomes of a grab.
+struct GrabReport {
   uint32_t nearest;  // bits of the square of the distance of the node nearest to it when it took hold
   uint32_t held;     // nodes that it took hold of
   uint32_t slipped;  // those of them that slipped away
@@ -53,9 +53,9 @@ struct AimPush {
   float maxSpeed;  // m/s
 };
 
-struct GripPush {
+struct GrabPush {
   uint32_t nodeCount;
-  uint32_t gripCount;
+  uint32_t grabCount;
 };
 
 struct HoldPush {
@@ -64,7 +64,7 @@ struct HoldPush {
   float progressAfter;
   float substepSeconds;
   float substepRate;  // 1/s
-  float caughtUp;     // scene::kCaughtUp
+  float caughtUp;     // model::kCaughtUp
 };
 
 CLOTHSTREAM_SHARED_END
@@ -72,7 +72,7 @@ CLOTHSTREAM_SHARED_END
 #ifdef __cplusplus
 namespace clothstream::shared {
 static_assert(sizeof(AttachedRecord) == 32 && sizeof(FrameRecord) == 32 && sizeof(TetherRecord) == 16);
-static_assert(sizeof(GripRecord) == 80 && sizeof(GripReport) == 16);
+static_assert(sizeof(GrabRecord) == 80 && sizeof(GrabReport) == 16);
 }  // namespace clothstream::shared
 #endif
 

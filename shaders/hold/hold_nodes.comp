@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT
-// What tethers and grips do to a node at a substep's end, after its solver and its collisions.
+// What tethers and grabs do to a node at a substep's end, after its solver and its collisions.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 
-#include "shaders/hold/grip.glsl"
+#include "shaders/hold/grab.glsl"
 
 // What there is none of is left out.
 layout(constant_id = 1) const bool kTethers = true;
-layout(constant_id = 2) const bool kGrips = true;
+layout(constant_id = 2) const bool kGrabs = true;
 
 layout(binding = 2) uniform samplerBuffer tethers;  // TetherRecord, a node
 layout(std430, binding = 3) buffer Positions {
@@ -54,16 +54,16 @@ State tie(State node, float anchor, float length_) {
   return State(position, velocity);
 }
 
-// The velocity of its place in the grip, and what takes the node there, as far as the grip's force does.
-State pull(State node, float inverseMass, uint grip, vec3 inGrip, vec3 after) {
-  vec4 start = gripTexel(grip, 0);
-  vec4 motion = gripTexel(grip, 1);
-  vec4 turned = turnedAt(gripTexel(grip, 2), gripTexel(grip, 3), push.progressBefore);
-  precise vec3 before = start.xyz + push.progressBefore * motion.xyz + rotate(turned, inGrip);
+// The velocity of its place in the grab, and what takes the node there, as far as the grab's force does.
+State pull(State node, float inverseMass, uint grab, vec3 inGrab, vec3 after) {
+  vec4 start = grabTexel(grab, 0);
+  vec4 motion = grabTexel(grab, 1);
+  vec4 turned = turnedAt(grabTexel(grab, 2), grabTexel(grab, 3), push.progressBefore);
+  precise vec3 before = start.xyz + push.progressBefore * motion.xyz + rotate(turned, inGrab);
   precise vec3 carried = push.substepRate * (after - before);
   precise vec3 lag = push.substepRate * (after - node.position);
   precise vec3 wanted = (1.0 - push.caughtUp) * (carried - node.velocity) + push.caughtUp * lag;
-  precise float share = motion.w * reciprocal(float(reports[grip].held));
+  precise float share = motion.w * reciprocal(float(reports[grab].held));
   precise float most = (share * inverseMass) * push.substepSeconds;
   precise float squared = dotProduct(wanted, wanted);
   precise vec3 gained = wanted;
@@ -75,17 +75,17 @@ State pull(State node, float inverseMass, uint grip, vec3 inGrip, vec3 after) {
   return State(position, velocity);
 }
 
-vec3 placeAtEnd(uint grip, vec3 inGrip) {
-  vec4 start = gripTexel(grip, 0);
-  vec4 motion = gripTexel(grip, 1);
-  vec4 turned = turnedAt(gripTexel(grip, 2), gripTexel(grip, 3), push.progressAfter);
-  precise vec3 place = start.xyz + push.progressAfter * motion.xyz + rotate(turned, inGrip);
+vec3 placeAtEnd(uint grab, vec3 inGrab) {
+  vec4 start = grabTexel(grab, 0);
+  vec4 motion = grabTexel(grab, 1);
+  vec4 turned = turnedAt(grabTexel(grab, 2), grabTexel(grab, 3), push.progressAfter);
+  precise vec3 place = start.xyz + push.progressAfter * motion.xyz + rotate(turned, inGrab);
   return place;
 }
 
 void hold(uint index) {
   vec4 tether = kTethers ? texelFetch(tethers, int(index)) : vec4(0.0);
-  vec4 hold = kGrips ? holds[index] : vec4(0.0);
+  vec4 hold = kGrabs ? holds[index] : vec4(0.0);
   if (tether.x == 0.0 && hold.w == 0.0) {
     return;
   }
@@ -102,19 +102,19 @@ void hold(uint index) {
     node = tie(node, tether.z, tether.w);
     node = tie(node, tether.x, tether.y);
   }
-  if (kGrips && hold.w > 0.0) {
-    uint grip = uint(hold.w) - 1;
-    vec3 place = placeAtEnd(grip, hold.xyz);
+  if (kGrabs && hold.w > 0.0) {
+    uint grab = uint(hold.w) - 1;
+    vec3 place = placeAtEnd(grab, hold.xyz);
     precise vec3 out_ = place - node.position;
-    bool lets = gripTexel(grip, 4).x == kFreeGrip;
-    bool slips = dotProduct(out_, out_) > gripTexel(grip, 0).w;
+    bool lets = grabTexel(grab, 4).x == kFreeGrab;
+    bool slips = dotProduct(out_, out_) > grabTexel(grab, 0).w;
     if (lets || slips) {
       holds[index] = vec4(0.0);
       if (!lets) {
-        atomicAdd(reports[grip].slipped, 1);
+        atomicAdd(reports[grab].slipped, 1);
       }
     } else {
-      node = pull(node, inverseMass, grip, hold.xyz, place);
+      node = pull(node, inverseMass, grab, hold.xyz, place);
     }
   }
   positions[index].xyz = snapTiny(node.position);

@@ -16,7 +16,7 @@ struct MeshNodeRecord {
   vec4 triangles;  // likewise
 };
 
-// Two springs as one of their nodes sees them, in the order of scene::springAdjacency(): the other node's
+// Two springs as one of their nodes sees them, in the order of model::springAdjacency(): the other node's
 // number in the scene plus one, negative of a shear spring; the rest length, negative of a bend spring. The
 // last texel is filled with a spring from the node to itself, which pulls with exactly zero.
 struct SpringPairRecord {

@@ -23,7 +23,7 @@ struct ClothRecord {
   vec4 solver;  // compliance / h^2, iterations, square of the tolerance; whether bend springs are solved for
   vec4 limits;  // stretch that springs are held at; part of more that is taken back; 0: always; flexural
                 // rigidity
-  // Of xpbd: structural, shear, bend as scene::XpbdSpring; of their w the first is the number of iterations,
+  // Of xpbd: structural, shear, bend as model::XpbdSpring; of their w the first is the number of iterations,
   // the second the inverse mass of a grid's nodes.
   vec4 springs[3];
 };

@@ -9,7 +9,7 @@
 
 #include <fmt/format.h>
 
-#include "server/scene/springs.h"
+#include "server/model/springs.h"
 #include "tests/bench/bytes_moved.h"
 #include "tests/bench/simulated.h"
 #include "tests/bench/suite.h"
@@ -28,14 +28,14 @@ constexpr std::uint32_t kTicks = 40;
 // are stretched.
 struct Case {
   std::string method;
-  scene::SolverKind kind;
+  model::SolverKind kind;
   double active = 0;  // part of the springs
 };
 
 constexpr float kMass = 0.2f, kActivation = 0.1f;
 
-scene::Scene sceneOf(const Case& experiment, std::uint32_t size) {
-  scene::Cloth cloth;
+model::Scene sceneOf(const Case& experiment, std::uint32_t size) {
+  model::Cloth cloth;
   cloth.name = "sheet";
   cloth.grid = {.rows = size, .columns = size, .width = 1, .height = 1, .pose = {}};
   cloth.mass = kMass;
@@ -43,14 +43,14 @@ scene::Scene sceneOf(const Case& experiment, std::uint32_t size) {
   cloth.pins = {{.firstRow = 0, .lastRow = 0, .firstColumn = 0, .lastColumn = size - 1}};
   cloth.solver.kind = experiment.kind;
   cloth.solver.activation = kActivation;
-  scene::Scene scene;
+  model::Scene scene;
   const double h = scene.substepSeconds();
   cloth.structural.stiffness = static_cast<float>(0.25 * double{cloth.nodeMass()} / (h * h));
   cloth.shear.stiffness = 0.01f * cloth.structural.stiffness;
   // Below row i of N hang (N - i) nodes a column: k strain L = (N - i) m g.
   const double rows = 4 * experiment.active, length = 1.0 / (size - 1);
   const double most = experiment.active == 0 ? 0.5 * double{kActivation} : double{kActivation} / (1 - rows);
-  scene.environment.gravity = scene::Vec3(
+  scene.environment.gravity = model::Vec3(
       0, -static_cast<float>(most * double{cloth.structural.stiffness} * length * size / double{kMass}), 0);
   scene.name = "acad";
   scene.cloths = {cloth};
@@ -58,17 +58,17 @@ scene::Scene sceneOf(const Case& experiment, std::uint32_t size) {
 }
 
 // Where its rows hang at rest, none beyond the bound; a little beyond it where constraints hold it.
-simulation::NodeState hanging(const scene::Scene& scene) {
-  const scene::Cloth& cloth = scene.cloths.front();
-  const scene::Grid& grid = cloth.grid;
+simulation::NodeState hanging(const model::Scene& scene) {
+  const model::Cloth& cloth = scene.cloths.front();
+  const model::Grid& grid = cloth.grid;
   simulation::NodeState state = simulation::restState(scene.cloths);
-  const double length = double{scene::spacing(grid).row};
+  const double length = double{model::spacing(grid).row};
   const double weight = -double{cloth.nodeMass()} * double{scene.environment.gravity.y()};
   double y = 0;
   for (std::uint32_t row = 1; row < grid.rows; ++row) {
     const double strain = (grid.rows - row) * weight / (double{cloth.structural.stiffness} * length);
     y += length *
-         (1 + std::min(strain, cloth.solver.kind == scene::SolverKind::acad ? double{kActivation} : strain));
+         (1 + std::min(strain, cloth.solver.kind == model::SolverKind::acad ? double{kActivation} : strain));
     for (std::uint32_t column = 0; column < grid.columns; ++column)
       state.positions[row * grid.columns + column].y() = static_cast<float>(-y);
   }
@@ -77,13 +77,13 @@ simulation::NodeState hanging(const scene::Scene& scene) {
 
 struct Candidate {
   Case experiment;
-  scene::Scene scene;
+  model::Scene scene;
   std::unique_ptr<Simulated> simulated;
   Samples constraints = {}, iterations = {};
 };
 
 Rows measureSize(vulkan::Device& device, const Settings& settings, std::uint32_t size) {
-  using enum scene::SolverKind;
+  using enum model::SolverKind;
   std::vector<Candidate> candidates;
   for (const Case& experiment :
        {Case{"mass_spring", massSpring}, Case{"acad", acad, 0}, Case{"acad", acad, 0.01},
@@ -111,7 +111,7 @@ Rows measureSize(vulkan::Device& device, const Settings& settings, std::uint32_t
   const double full = candidates.back().simulated->wall().median();
   Rows rows;
   for (const Candidate& candidate : candidates) {
-    const scene::Scene& scene = candidate.scene;
+    const model::Scene& scene = candidate.scene;
     const double substeps = static_cast<double>(std::uint64_t{scene.nodeCount()} * scene.substeps);
     const double seconds = candidate.simulated->wall().median();
     nlohmann::ordered_json row{{"suite", "acad"},
@@ -122,8 +122,8 @@ Rows measureSize(vulkan::Device& device, const Settings& settings, std::uint32_t
                                {"timesFasterThanConstraint", full / seconds}};
     if (candidate.experiment.kind == acad) {
       double springs = 0;
-      for (const scene::SpringLink& link : scene::springLinks(scene.cloths.front()))
-        springs += scene::isConstraint(scene.cloths.front().solver, link.kind) ? 1 : 0;
+      for (const model::SpringLink& link : model::springLinks(scene.cloths.front()))
+        springs += model::isConstraint(scene.cloths.front().solver, link.kind) ? 1 : 0;
       const double active = candidate.constraints.mean() / springs, wanted = candidate.experiment.active;
       if (!(active >= 0.5 * wanted && active <= 2 * wanted))
         throw std::runtime_error(

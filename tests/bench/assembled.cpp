@@ -9,7 +9,7 @@
 
 #include <fmt/format.h>
 
-#include "server/scene/springs.h"
+#include "server/model/springs.h"
 #include "tests/bench/bytes_moved.h"
 #include "tests/bench/hung_cloth.h"
 #include "tests/bench/simulated.h"
@@ -19,7 +19,7 @@
 namespace clothstream::bench {
 namespace {
 
-using scene::ConstraintPath;
+using model::ConstraintPath;
 
 constexpr std::uint32_t kSubsteps = 10, kFew = 20, kMany = 40;
 constexpr ConstraintPath kPaths[] = {ConstraintPath::matrixFree, ConstraintPath::assembled};
@@ -27,9 +27,9 @@ constexpr ConstraintPath kPaths[] = {ConstraintPath::matrixFree, ConstraintPath:
 constexpr double kMostStrain = 0.05, kMeanStrain = 0.001;
 
 // No solve ends before its last iteration.
-scene::Scene sheetOf(std::uint32_t size, bool bend, ConstraintPath path, std::uint32_t iterations) {
+model::Scene sheetOf(std::uint32_t size, bool bend, ConstraintPath path, std::uint32_t iterations) {
   return bench::hungSheet(size,
-                          {.kind = scene::SolverKind::constraint,
+                          {.kind = model::SolverKind::constraint,
                            .bendConstraints = bend,
                            .compliance = {},
                            .iterations = iterations,
@@ -39,30 +39,30 @@ scene::Scene sheetOf(std::uint32_t size, bool bend, ConstraintPath path, std::ui
 }
 
 // Bytes that an iteration reads and writes, each table and vector once.
-double bytesOfIteration(const scene::Cloth& cloth) {
+double bytesOfIteration(const model::Cloth& cloth) {
   constexpr double kTexel = sizeof(shared::vec4);
-  if (!scene::isAssembled(cloth.solver)) {
+  if (!model::isAssembled(cloth.solver)) {
     // A node: positions, residuals and two texels of weights are read, a product is written (12 of 16 bytes);
     // then five vectors are read and four written.
     return cloth.nodeCount() * (4 * kTexel + 12 + 5 * kTexel + 4 * 12);
   }
   // An entry: its column and its value, in fours. A row: where it is listed, its state, and its product; then
   // both are read, and the state is written.
-  const double rows = static_cast<double>(scene::systemLinks(cloth).size());
-  return static_cast<double>(scene::systemEntries(cloth)) * 8 + rows * (2 * kTexel + 4 + 2 * kTexel + kTexel);
+  const double rows = static_cast<double>(model::systemLinks(cloth).size());
+  return static_cast<double>(model::systemEntries(cloth)) * 8 + rows * (2 * kTexel + 4 + 2 * kTexel + kTexel);
 }
 
 // Bytes that a substep moves to fill J and to multiply it into the matrix: links, positions, velocities;
 // blocks written and read again; columns, sources and values.
-double bytesOfAssembly(const scene::Cloth& cloth) {
+double bytesOfAssembly(const model::Cloth& cloth) {
   constexpr double kTexel = sizeof(shared::vec4);
-  const double rows = static_cast<double>(scene::systemLinks(cloth).size());
+  const double rows = static_cast<double>(model::systemLinks(cloth).size());
   return rows * (kTexel + 2 * kTexel + kTexel) + cloth.nodeCount() * 2 * kTexel + rows * 3 * kTexel +
-         static_cast<double>(scene::systemEntries(cloth)) * 12;
+         static_cast<double>(model::systemEntries(cloth)) * 12;
 }
 
 // As suite enforcement: one substep solved to the end against the reference. Returns the iterations it took.
-std::uint32_t check(vulkan::Device& device, const Settings& settings, scene::Scene scene) {
+std::uint32_t check(vulkan::Device& device, const Settings& settings, model::Scene scene) {
   const double allowed = solveToTheEnd(scene);
   Simulated simulated(device, scene,
                       {.workgroupSize = settings.workgroupSize, .solveWholeNodes = settings.solveWholeNodes});
@@ -81,7 +81,7 @@ struct Contender {
   }
 };
 
-void checkStrain(const scene::Cloth& cloth, Simulated& simulated, std::uint32_t iterations) {
+void checkStrain(const model::Cloth& cloth, Simulated& simulated, std::uint32_t iterations) {
   for (const shared::SolveRecord& solve : simulated.solves())
     if (solve.iterations != iterations)
       throw std::runtime_error(fmt::format("a solve took {} iterations", solve.iterations));
@@ -92,7 +92,7 @@ void checkStrain(const scene::Cloth& cloth, Simulated& simulated, std::uint32_t 
 }
 
 Rows measureSize(vulkan::Device& device, const Settings& settings, std::uint32_t size, bool bend) {
-  const simulation::TickInputs inputs{scene::Scene{}.environment, {}};
+  const simulation::TickInputs inputs{model::Scene{}.environment, {}};
   std::array<Contender, 2> contenders;
   std::vector<Simulated*> all;
   for (std::size_t i = 0; i < contenders.size(); ++i) {
@@ -117,11 +117,11 @@ Rows measureSize(vulkan::Device& device, const Settings& settings, std::uint32_t
   Rows rows;
   for (std::size_t i = 0; i < contenders.size(); ++i) {
     const Contender& contender = contenders[i];
-    const scene::Scene scene = sheetOf(size, bend, kPaths[i], kFew);
-    const scene::Cloth& cloth = scene.cloths.front();
+    const model::Scene scene = sheetOf(size, bend, kPaths[i], kFew);
+    const model::Cloth& cloth = scene.cloths.front();
     checkStrain(cloth, *contender.few, kFew);
     checkStrain(cloth, *contender.many, kMany);
-    const bool assembled = scene::isAssembled(cloth.solver);
+    const bool assembled = model::isAssembled(cloth.solver);
     const double bytes = bytesOfIteration(cloth), iteration = contender.secondsOfIteration(),
                  substep = contender.few->wall().min() / kSubsteps;
     const auto texels = static_cast<std::size_t>(bytes / (2 * sizeof(shared::vec4)));
@@ -129,7 +129,7 @@ Rows measureSize(vulkan::Device& device, const Settings& settings, std::uint32_t
         {{"suite", "assembled"},
          {"path", assembled ? "assembled" : "matrix-free"},
          {"nodes", cloth.nodeCount()},
-         {"springs", scene::systemLinks(cloth).size()},
+         {"springs", model::systemLinks(cloth).size()},
          {"bend", bend},
          {"usPerIteration", iteration * 1e6},
          {"usPerIterationWithAll", substep / kFew * 1e6},

@@ -30,12 +30,12 @@ constexpr std::uint32_t kSeconds = 6;
 constexpr double kTorn = 6;
 
 constexpr float kBallRadius = 2.5f;
-const scene::Vec3 kBall(0, 3.3f, 0);
+const model::Vec3 kBall(0, 3.3f, 0);
 
 struct Panel {
   const char* method;
   float stiffness;  // N/m
-  scene::Solver solver = {};
+  model::Solver solver = {};
 };
 
 struct Outcome {
@@ -113,8 +113,8 @@ void checkBlowUp(std::span<const Outcome> outcomes) {
                      outcomes[1].strains.p99()));
 }
 
-scene::Solver solverOf(scene::SolverKind kind, bool bend) {
-  scene::Solver solver;
+model::Solver solverOf(model::SolverKind kind, bool bend) {
+  model::Solver solver;
   solver.kind = kind;
   solver.bendConstraints = bend;
   solver.iterations = 60;
@@ -122,10 +122,10 @@ scene::Solver solverOf(scene::SolverKind kind, bool bend) {
 }
 
 std::vector<Figure> figures() {
-  const scene::Solver acad = solverOf(scene::SolverKind::acad, true);
+  const model::Solver acad = solverOf(model::SolverKind::acad, true);
   const std::vector<Panel> bend{
-      {"constraint, without bend", 200, solverOf(scene::SolverKind::constraint, false)},
-      {"constraint, with bend", 200, solverOf(scene::SolverKind::constraint, true)}};
+      {"constraint, without bend", 200, solverOf(model::SolverKind::constraint, false)},
+      {"constraint, with bend", 200, solverOf(model::SolverKind::constraint, true)}};
   return {{11,
            kShortSteps,
            {{"mass_spring", 100}, {"mass_spring", 200}, {"mass_spring", 600}},
@@ -136,37 +136,37 @@ std::vector<Figure> figures() {
           {15, kLongSteps, {{"mass_spring", 200}, {"acad", 200, acad}}, &checkBlowUp}};
 }
 
-scene::Scene sceneOf(const Figure& figure, const Panel& panel) {
-  scene::Cloth cloth;
+model::Scene sceneOf(const Figure& figure, const Panel& panel) {
+  model::Cloth cloth;
   cloth.name = "sheet";
   cloth.grid = {.rows = kNodes, .columns = kNodes, .width = kWidth, .height = kWidth, .pose = {}};
   cloth.grid.pose.position = {0, kBall.y() + kBallRadius + 0.5f, -kWidth / 2};
-  cloth.grid.pose.orientation = scene::Quaternion(std::sqrt(0.5f), -std::sqrt(0.5f), 0, 0);
+  cloth.grid.pose.orientation = model::Quaternion(std::sqrt(0.5f), -std::sqrt(0.5f), 0, 0);
   cloth.mass = kNodeMass * static_cast<float>(kNodes * kNodes);
   cloth.structural = cloth.shear = cloth.bend = {panel.stiffness, kSpringDamping};
-  if (panel.solver.kind == scene::SolverKind::constraint && !panel.solver.bendConstraints) cloth.bend = {};
+  if (panel.solver.kind == model::SolverKind::constraint && !panel.solver.bendConstraints) cloth.bend = {};
   cloth.damping = 0.5f;
   cloth.friction = 0.8f;
   cloth.thickness = 0.1f;
   cloth.solver = panel.solver;
-  scene::Scene scene;
+  model::Scene scene;
   scene.name = "behaviour";
   scene.simulationRate = scene.streamRate = figure.stepsASecond;
   scene.substeps = 1;
   scene.cloths = {cloth};
   scene.colliders.resize(2);
   scene.colliders[0].name = "ball";
-  scene.colliders[0].shape = scene::Sphere{kBallRadius};
+  scene.colliders[0].shape = model::Sphere{kBallRadius};
   scene.colliders[0].pose.position = kBall;
   scene.colliders[1].name = "floor";
-  scene.colliders[1].shape = scene::Plane{};
+  scene.colliders[1].shape = model::Plane{};
   return scene;
 }
 
-Picture pictureOf(const scene::Scene& scene, const simulation::NodeState& state) {
-  const scene::Grid& grid = scene.cloths.front().grid;
+Picture pictureOf(const model::Scene& scene, const simulation::NodeState& state) {
+  const model::Grid& grid = scene.cloths.front().grid;
   Surface cloth{state.positions,
-                scene::clothTriangles(scene.cloths.front()),
+                model::clothTriangles(scene.cloths.front()),
                 {0.72f, 0.12f, 0.13f},
                 {0.85f, 0.55f, 0.20f},
                 {}};
@@ -183,10 +183,10 @@ Picture pictureOf(const scene::Scene& scene, const simulation::NodeState& state)
 // All of its seconds, or until it leaves the range of numbers: then what it was like when a spring was first
 // torn.
 Outcome run(vulkan::Device& device, const Figure& figure, const Panel& panel) {
-  const scene::Scene scene = sceneOf(figure, panel);
-  const scene::Cloth& cloth = scene.cloths.front();
+  const model::Scene scene = sceneOf(figure, panel);
+  const model::Cloth& cloth = scene.cloths.front();
   simulation::TickInputs inputs{scene.environment, {}};
-  for (const scene::Collider& collider : scene.colliders)
+  for (const model::Collider& collider : scene.colliders)
     inputs.colliders.push_back({collider.shape, collider.pose, collider.pose, collider.friction});
   Simulated simulated(device, scene, {});
   Outcome outcome{panel};
@@ -204,7 +204,7 @@ Outcome run(vulkan::Device& device, const Figure& figure, const Panel& panel) {
   }
   const simulation::NodeState state = outcome.healthy || !torn ? simulated.state() : *torn;
   outcome.strains = structuralStrains(cloth, state);
-  for (const scene::Vec3& position : state.positions) {
+  for (const model::Vec3& position : state.positions) {
     outcome.lowest = std::min(outcome.lowest, double{position.y()});
     outcome.depth = std::max(outcome.depth, double{kBallRadius - (position - kBall).norm()});
   }

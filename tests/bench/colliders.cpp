@@ -13,8 +13,8 @@ namespace {
 constexpr std::size_t kHand = 40;  // capsules of one person's two hands
 
 // 2 cm and 10 g a node, hung by its upper edge.
-scene::Scene curtain(std::uint32_t size) {
-  scene::Cloth cloth;
+model::Scene curtain(std::uint32_t size) {
+  model::Cloth cloth;
   cloth.name = "curtain";
   cloth.grid.rows = cloth.grid.columns = size;
   cloth.grid.width = cloth.grid.height = 0.02f * static_cast<float>(size - 1);
@@ -25,7 +25,7 @@ scene::Scene curtain(std::uint32_t size) {
   cloth.damping = 0.5f;
   cloth.pins = {
       {.firstRow = 0, .lastRow = 0, .rowStep = 1, .firstColumn = 0, .lastColumn = size - 1, .columnStep = 1}};
-  scene::Scene scene;
+  model::Scene scene;
   scene.name = "curtain";
   scene.cloths = {cloth};
   return scene;
@@ -36,18 +36,18 @@ scene::Scene curtain(std::uint32_t size) {
 std::vector<simulation::MovingCollider> hands(std::size_t count) {
   std::mt19937 random(4);
   std::uniform_real_distribution<float> unit(-1, 1);
-  const auto vector = [&] { return scene::Vec3(unit(random), unit(random), unit(random)); };
+  const auto vector = [&] { return model::Vec3(unit(random), unit(random), unit(random)); };
   std::vector<simulation::MovingCollider> colliders;
-  scene::Vec3 palm = scene::Vec3::Zero(), way = scene::Vec3::Zero();
+  model::Vec3 palm = model::Vec3::Zero(), way = model::Vec3::Zero();
   for (std::size_t i = 0; i < count; ++i) {
     if (i % kHand == 0) {
-      palm = vector().cwiseProduct(scene::Vec3(3, 1.25f, 3)) - scene::Vec3(0, 1, 0);
+      palm = vector().cwiseProduct(model::Vec3(3, 1.25f, 3)) - model::Vec3(0, 1, 0);
       way = 0.014f * vector();  // in a tick: 1 m/s
     }
-    const scene::Quaternion turn(Eigen::AngleAxisf(3 * unit(random), vector().normalized()));
-    const scene::Vec3 place = palm + 0.1f * vector();
+    const model::Quaternion turn(Eigen::AngleAxisf(3 * unit(random), vector().normalized()));
+    const model::Vec3 place = palm + 0.1f * vector();
     colliders.push_back(
-        {scene::Capsule{.radius = 0.008f, .length = 0.025f}, {place, turn}, {place + way, turn}, 1});
+        {model::Capsule{.radius = 0.008f, .length = 0.025f}, {place, turn}, {place + way, turn}, 1});
   }
   return colliders;
 }
@@ -56,7 +56,7 @@ std::vector<simulation::MovingCollider> hands(std::size_t count) {
 
 Rows runColliders(vulkan::Device& device, const Settings& settings) {
   const std::uint32_t size = settings.size.value_or(128);
-  const scene::Scene scene = curtain(size);
+  const model::Scene scene = curtain(size);
   Rows rows;
   for (const std::size_t count : {std::size_t{0}, std::size_t{1}, std::size_t{100}, std::size_t{4000}}) {
     const simulation::TickInputs inputs{scene.environment, hands(count)};

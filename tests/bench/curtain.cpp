@@ -100,7 +100,7 @@ void checkFrames(const cs_statistics& seen) {
 
 Rows runCurtain(vulkan::Device& device, const Settings& settings) {
   if (settings.size) throw std::runtime_error("the scene has a size of its own: leave out --size");
-  const scene::Scene scene = *messages::loadScene("curtain");
+  const model::Scene scene = *messages::loadScene("curtain");
   stream::SceneServer server({scene}, {.device = settings.device, .defaultScene = scene.name});
   const telemetry::SceneMetrics& metrics = server.state().scenes.front()->metrics;
   const double seconds = std::max(settings.seconds, kLeastSeconds);

@@ -8,7 +8,7 @@
 
 #include <fmt/format.h>
 
-#include "server/scene/springs.h"
+#include "server/model/springs.h"
 #include "tests/bench/bytes_moved.h"
 #include "tests/bench/hung_cloth.h"
 #include "tests/bench/simulated.h"
@@ -32,20 +32,20 @@ simulation::SimulationOptions optionsOf(const Settings& settings, bool whole) {
 }
 
 // One substep solved to the end against the reference.
-void check(vulkan::Device& device, const Settings& settings, scene::Scene scene, bool whole) {
+void check(vulkan::Device& device, const Settings& settings, model::Scene scene, bool whole) {
   const double allowed = solveToTheEnd(scene);
   Simulated(device, scene, optionsOf(settings, whole)).check({scene.environment, {}}, allowed);
 }
 
 Rows measureSize(vulkan::Device& device, const Settings& settings, std::uint32_t size) {
-  const scene::Scene scene = hungSheet(size,
-                                       {.kind = scene::SolverKind::constraint,
+  const model::Scene scene = hungSheet(size,
+                                       {.kind = model::SolverKind::constraint,
                                         .bendConstraints = true,
                                         .compliance = {},
                                         .iterations = kIterations,
                                         .tolerance = 0},
                                        kSubsteps);
-  const scene::Cloth& cloth = scene.cloths.front();
+  const model::Cloth& cloth = scene.cloths.front();
   const simulation::TickInputs inputs{scene.environment, {}};
   // By turns, so that what disturbs the machine disturbs both alike.
   std::vector<std::unique_ptr<Simulated>> both;
@@ -74,7 +74,7 @@ Rows measureSize(vulkan::Device& device, const Settings& settings, std::uint32_t
     constexpr double kRounds = kSubsteps * kIterations;
     rows.push_back({{"suite", "enforcement"},
                     {"nodes", cloth.nodeCount()},
-                    {"springs", scene::springLinks(cloth).size()},
+                    {"springs", model::springLinks(cloth).size()},
                     {"workgroups", one == both.front() ? "one" : "several"},
                     {"framesPerSecond", 1 / one->wall().median()},
                     {"framesPerSecondBest", 1 / one->wall().min()},

@@ -38,14 +38,14 @@ struct Setting {
 // From cheap to dear.
 struct Ladder {
   const char* method;
-  scene::SolverKind kind;
+  model::SolverKind kind;
   std::uint32_t largest;  // rows; where one workgroup solves a cloth, software devices take minutes beyond
   std::vector<Setting> settings;
   bool tethers = false;
 };
 
 std::vector<Ladder> ladders() {
-  using enum scene::SolverKind;
+  using enum model::SolverKind;
   return {
       {"mass_spring",
        massSpring,
@@ -77,27 +77,27 @@ std::vector<Ladder> ladders() {
 }
 
 // A square metre of 0.2 kg that starts level and swings down from two corners.
-scene::Scene sceneOf(const Ladder& ladder, const Setting& setting, std::uint32_t size) {
-  scene::Scene scene;
+model::Scene sceneOf(const Ladder& ladder, const Setting& setting, std::uint32_t size) {
+  model::Scene scene;
   scene.name = "equal_strain";
   scene.simulationRate = scene.streamRate = kFramesPerSecond;
   scene.substeps = setting.substeps;
-  scene::Cloth cloth;
+  model::Cloth cloth;
   cloth.name = "sheet";
   cloth.grid = {.rows = size, .columns = size, .width = 1, .height = 1, .pose = {}};
-  cloth.grid.pose.orientation = scene::Quaternion(std::sqrt(0.5f), -std::sqrt(0.5f), 0, 0);
+  cloth.grid.pose.orientation = model::Quaternion(std::sqrt(0.5f), -std::sqrt(0.5f), 0, 0);
   cloth.mass = kMass;
   cloth.damping = 1;
   cloth.pins = {
       {.firstRow = 0, .lastRow = 0, .firstColumn = 0, .lastColumn = size - 1, .columnStep = size - 1}};
-  if (ladder.tethers) cloth.tethers = scene::Tethers{};
+  if (ladder.tethers) cloth.tethers = model::Tethers{};
   cloth.solver.kind = ladder.kind;
   cloth.solver.iterations = std::max(1u, setting.iterations);
   // Forces as stiff as the step bears: 8 (0.36 + 0.08 + 0.04) k h^2 / m are 3.84 of 4, k being m / h^2. The
   // others as stiff as cloth is.
   const double h = scene.substepSeconds();
   const double bearable = double{cloth.nodeMass()} / (h * h);
-  const bool forces = ladder.kind == scene::SolverKind::massSpring;
+  const bool forces = ladder.kind == model::SolverKind::massSpring;
   cloth.structural.stiffness = forces ? static_cast<float>(0.36 * bearable) : 1500.0f;
   cloth.shear.stiffness = forces ? static_cast<float>(0.08 * bearable) : 60.0f;
   cloth.bend.stiffness = static_cast<float>(0.04 * bearable);
@@ -106,14 +106,14 @@ scene::Scene sceneOf(const Ladder& ladder, const Setting& setting, std::uint32_t
 }
 
 // J since the start.
-double gravityEnergyLost(const scene::Scene& scene, const reference::ReferenceCloth& measured) {
+double gravityEnergyLost(const model::Scene& scene, const reference::ReferenceCloth& measured) {
   const reference::Vec3 gravity = scene.environment.gravity.cast<double>();
   return reference::ReferenceCloth(scene.cloths.front()).gravityEnergy(gravity) -
          measured.gravityEnergy(gravity);
 }
 
 Rows::value_type rowOf(const Ladder& ladder, const Setting& setting, const Bound& bound,
-                       const scene::Scene& scene, const reference::ReferenceCloth& measured,
+                       const model::Scene& scene, const reference::ReferenceCloth& measured,
                        const Simulated& simulated) {
   const double nodes = scene.nodeCount();
   return {{"suite", "equal_strain"},
@@ -136,7 +136,7 @@ Rows::value_type rowOf(const Ladder& ladder, const Setting& setting, const Bound
 std::optional<Rows::value_type> cheapest(vulkan::Device& device, const Settings& settings,
                                          const Ladder& ladder, const Bound& bound) {
   for (const Setting& setting : ladder.settings) {
-    const scene::Scene scene = sceneOf(ladder, setting, bound.size);
+    const model::Scene scene = sceneOf(ladder, setting, bound.size);
     const simulation::TickInputs inputs{scene.environment, {}};
     Simulated simulated(device, scene,
                         {.rowsPerInvocation = settings.rowsPerInvocation,

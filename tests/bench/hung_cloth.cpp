@@ -3,12 +3,12 @@
 
 #include <cmath>
 
-#include "server/scene/springs.h"
+#include "server/model/springs.h"
 
 namespace clothstream::bench {
 
-scene::Scene hungCloth(std::uint32_t size) {
-  scene::Cloth cloth;
+model::Scene hungCloth(std::uint32_t size) {
+  model::Cloth cloth;
   cloth.name = "hung";
   cloth.grid.rows = cloth.grid.columns = size;
   cloth.grid.width = cloth.grid.height = 2;
@@ -21,45 +21,45 @@ scene::Scene hungCloth(std::uint32_t size) {
   cloth.lift = 0.3f;
   cloth.pins = {
       {.firstRow = 0, .lastRow = 0, .rowStep = 1, .firstColumn = 0, .lastColumn = size - 1, .columnStep = 3}};
-  scene::Scene scene;
+  model::Scene scene;
   scene.name = "hung_cloth";
-  scene.environment.wind = scene::Vec3(0, 0, 2);
+  scene.environment.wind = model::Vec3(0, 0, 2);
   scene.cloths = {cloth};
   return scene;
 }
 
-simulation::TickInputs hungClothInputs(const scene::Scene& scene, std::uint64_t tick) {
+simulation::TickInputs hungClothInputs(const model::Scene& scene, std::uint64_t tick) {
   const auto centre = [&](std::uint64_t at) {
     const double seconds = static_cast<double>(at) * scene.tickSeconds();
-    return scene::Vec3(0, -1.2f, static_cast<float>(0.6 * std::cos(2 * seconds)));
+    return model::Vec3(0, -1.2f, static_cast<float>(0.6 * std::cos(2 * seconds)));
   };
-  return {scene.environment, {{scene::Sphere{0.25f}, {centre(tick)}, {centre(tick + 1)}, 1}}};
+  return {scene.environment, {{model::Sphere{0.25f}, {centre(tick)}, {centre(tick + 1)}, 1}}};
 }
 
-scene::Scene hungSheet(std::uint32_t size, const scene::Solver& solver, std::uint32_t substeps) {
-  scene::Cloth cloth;
+model::Scene hungSheet(std::uint32_t size, const model::Solver& solver, std::uint32_t substeps) {
+  model::Cloth cloth;
   cloth.name = "sheet";
   cloth.grid = {.rows = size, .columns = size, .width = 1, .height = 1, .pose = {}};
   cloth.mass = 0.2f;
   cloth.damping = 1;
   cloth.pins = {{.firstRow = 0, .lastRow = 0, .firstColumn = 0, .lastColumn = size - 1}};
   cloth.solver = solver;
-  scene::Scene scene;
+  model::Scene scene;
   scene.name = "hung_sheet";
   scene.substeps = substeps;
   scene.cloths = {cloth};
   return scene;
 }
 
-double solveToTheEnd(scene::Scene& sheet) {
+double solveToTheEnd(model::Scene& sheet) {
   sheet.substeps = 1;
   sheet.simulationRate = sheet.streamRate = 720;
-  const scene::Cloth& cloth = sheet.cloths.front();
-  scene::Solver& solver = sheet.cloths.front().solver;
+  const model::Cloth& cloth = sheet.cloths.front();
+  model::Solver& solver = sheet.cloths.front().solver;
   solver.iterations = 2000;
   solver.tolerance = 1e-5f;
-  const double links = static_cast<double>(scene::springLinks(cloth).size());
-  const double displaced = std::sqrt(links) * 0.4 * double{scene::spacing(cloth.grid).column};
+  const double links = static_cast<double>(model::springLinks(cloth).size());
+  const double displaced = std::sqrt(links) * 0.4 * double{model::spacing(cloth.grid).column};
   return 500 * double{solver.tolerance} * displaced;
 }
 

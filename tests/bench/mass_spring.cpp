@@ -10,7 +10,7 @@
 #include "tests/bench/bytes_moved.h"
 #include "tests/bench/simulated.h"
 #include "tests/bench/suite.h"
-#include "tests/scene/meshes.h"
+#include "tests/model/meshes.h"
 
 namespace clothstream::bench {
 namespace {
@@ -30,8 +30,8 @@ struct Variant {
   bool mesh = false;  // the same cloth, given as a mesh
 };
 
-scene::Scene squareCloth(std::uint32_t size, const Variant& variant) {
-  scene::Cloth cloth;
+model::Scene squareCloth(std::uint32_t size, const Variant& variant) {
+  model::Cloth cloth;
   cloth.name = "square";
   cloth.grid.rows = cloth.grid.columns = size;
   cloth.grid.width = cloth.grid.height = kSpacing * static_cast<float>(size - 1);
@@ -48,18 +48,18 @@ scene::Scene squareCloth(std::uint32_t size, const Variant& variant) {
                  .firstColumn = 0,
                  .lastColumn = size - 1,
                  .columnStep = size - 1}};
-  scene::Scene scene;
+  model::Scene scene;
   scene.name = "square";
-  scene.cloths = {variant.mesh ? scene::asMesh(cloth) : cloth};
+  scene.cloths = {variant.mesh ? model::asMesh(cloth) : cloth};
   return scene;
 }
 
-simulation::TickInputs inputsOf(const scene::Scene& scene, const Variant& variant) {
+simulation::TickInputs inputsOf(const model::Scene& scene, const Variant& variant) {
   simulation::TickInputs inputs{scene.environment, {}};
   // Out of the cloth's way: what is measured is the search, and the check stays the same.
   for (std::uint32_t i = 0; i < variant.spheres; ++i) {
-    const scene::Vec3 place(static_cast<float>(i), 5, 0);
-    inputs.colliders.push_back({scene::Sphere{0.1f}, {place}, {place}, 1});
+    const model::Vec3 place(static_cast<float>(i), 5, 0);
+    inputs.colliders.push_back({model::Sphere{0.1f}, {place}, {place}, 1});
   }
   return inputs;
 }
@@ -79,7 +79,7 @@ bool fits(const vulkan::Device& device, std::uint64_t size) {
 
 struct Candidate {
   Variant variant;
-  scene::Scene scene;
+  model::Scene scene;
   simulation::TickInputs inputs;
   std::unique_ptr<Simulated> simulated;
   double referenceSeconds = 0;

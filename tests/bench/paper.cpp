@@ -6,7 +6,7 @@
 #include <stdexcept>
 #include <vector>
 
-#include "server/scene/springs.h"
+#include "server/model/springs.h"
 #include "tests/bench/simulated.h"
 #include "tests/bench/strain.h"
 #include "tests/bench/suite.h"
@@ -28,11 +28,11 @@ struct Case {
   const char* method;
   std::uint32_t rows, columns;
   double paperFramesPerSecond;
-  scene::Solver solver = {};
+  model::Solver solver = {};
 };
 
-scene::Solver constraints(bool bend, std::optional<float> compliance) {
-  return {.kind = scene::SolverKind::constraint,
+model::Solver constraints(bool bend, std::optional<float> compliance) {
+  return {.kind = model::SolverKind::constraint,
           .bendConstraints = bend,
           .compliance = compliance,
           .iterations = 1000,
@@ -40,8 +40,8 @@ scene::Solver constraints(bool bend, std::optional<float> compliance) {
 }
 
 std::vector<Case> cases() {
-  scene::Solver acad = constraints(true, {});
-  acad.kind = scene::SolverKind::acad;
+  model::Solver acad = constraints(true, {});
+  acad.kind = model::SolverKind::acad;
   acad.iterations = 100;
   return {{7, "mass_spring", 96, 96, 200},
           {7, "mass_spring", 256, 256, 200},
@@ -56,8 +56,8 @@ std::vector<Case> cases() {
           {10, "acad", 32, 32, 206.44, acad}};
 }
 
-scene::Scene sceneOf(const Case& experiment) {
-  scene::Cloth cloth;
+model::Scene sceneOf(const Case& experiment) {
+  model::Cloth cloth;
   cloth.name = "sheet";
   cloth.grid = {.rows = experiment.rows,
                 .columns = experiment.columns,
@@ -73,7 +73,7 @@ scene::Scene sceneOf(const Case& experiment) {
                  .lastColumn = experiment.columns - 1,
                  .columnStep = experiment.columns - 1}};
   cloth.solver = experiment.solver;
-  scene::Scene scene;
+  model::Scene scene;
   scene.name = "paper";
   scene.simulationRate = scene.streamRate = kStepsPerSecond;
   scene.substeps = 1;
@@ -83,10 +83,10 @@ scene::Scene sceneOf(const Case& experiment) {
 
 // Against the reference, with a solve tight enough to compare: with the default compliance nodes are off by
 // at most 500 times the tolerance of what is demanded of the constraints (tests/simulation derives it).
-void check(vulkan::Device& device, scene::Scene scene, std::size_t links,
+void check(vulkan::Device& device, model::Scene scene, std::size_t links,
            const simulation::TickInputs& inputs) {
-  scene::Solver& solver = scene.cloths.front().solver;
-  if (solver.kind == scene::SolverKind::massSpring) {
+  model::Solver& solver = scene.cloths.front().solver;
+  if (solver.kind == model::SolverKind::massSpring) {
     Simulated(device, scene, {}).check(inputs);
     return;
   }
@@ -98,9 +98,9 @@ void check(vulkan::Device& device, scene::Scene scene, std::size_t links,
 }
 
 Rows::value_type measure(vulkan::Device& device, const Settings& settings, const Case& experiment) {
-  const scene::Scene scene = sceneOf(experiment);
-  const scene::Cloth& cloth = scene.cloths.front();
-  const std::vector<scene::SpringLink> links = scene::springLinks(cloth);
+  const model::Scene scene = sceneOf(experiment);
+  const model::Cloth& cloth = scene.cloths.front();
+  const std::vector<model::SpringLink> links = model::springLinks(cloth);
   const simulation::TickInputs inputs{scene.environment, {}};
   check(device, scene, links.size(), inputs);
 
@@ -127,9 +127,9 @@ Rows::value_type measure(vulkan::Device& device, const Settings& settings, const
       {"method", experiment.method},
       {"nodes", cloth.grid.nodeCount()},
       {"springs", std::ranges::count_if(links,
-                                        [&](const scene::SpringLink& link) {
-                                          return cloth.solver.kind != scene::SolverKind::constraint ||
-                                                 scene::isConstraint(cloth.solver, link.kind);
+                                        [&](const model::SpringLink& link) {
+                                          return cloth.solver.kind != model::SolverKind::constraint ||
+                                                 model::isConstraint(cloth.solver, link.kind);
                                         })},
       {"framesPerSecond", 1 / seconds},
       {"paperFramesPerSecond", experiment.paperFramesPerSecond}};

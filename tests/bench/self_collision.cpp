@@ -21,8 +21,8 @@ constexpr float kSpacing = 0.02f;     // m
 constexpr std::uint32_t kPanel = 12;  // rows from fold to fold
 constexpr int kSettling = 144;        // ticks
 
-scene::Scene sheetOnFloor(std::uint32_t size, bool balls) {
-  scene::Cloth cloth;
+model::Scene sheetOnFloor(std::uint32_t size, bool balls) {
+  model::Cloth cloth;
   cloth.name = "sheet";
   cloth.grid.rows = cloth.grid.columns = size;
   cloth.grid.width = cloth.grid.height = kSpacing * static_cast<float>(size - 1);
@@ -31,8 +31,8 @@ scene::Scene sheetOnFloor(std::uint32_t size, bool balls) {
   cloth.shear = {50, 0.05f};
   cloth.bend = {2, 0.01f};
   cloth.damping = 0.5f;
-  if (balls) cloth.selfCollision = scene::SelfCollision{.radius = kSpacing / 2};
-  scene::Scene scene;
+  if (balls) cloth.selfCollision = model::SelfCollision{.radius = kSpacing / 2};
+  model::Scene scene;
   scene.name = "sheet";
   scene.cloths = {cloth};
   return scene;
@@ -40,7 +40,7 @@ scene::Scene sheetOnFloor(std::uint32_t size, bool balls) {
 
 // On the floor in one layer, or to and fro in layers that touch; a little off its place, so that nothing is
 // even.
-simulation::NodeState lying(const scene::Scene& scene, bool folds) {
+simulation::NodeState lying(const model::Scene& scene, bool folds) {
   simulation::NodeState state = simulation::restState(scene.cloths);
   std::mt19937 random(1);
   std::uniform_real_distribution<float> unit(-1, 1);
@@ -48,22 +48,22 @@ simulation::NodeState lying(const scene::Scene& scene, bool folds) {
   const std::uint32_t panel = folds ? kPanel : scene.cloths[0].grid.rows;
   for (std::uint32_t i = 0; i < state.positions.size(); ++i) {
     const std::uint32_t row = i / columns, fold = row / panel, along = row % panel;
-    scene::Vec3& p = state.positions[i];
+    model::Vec3& p = state.positions[i];
     p.y() = 0.01f + kSpacing * static_cast<float>(fold);
     p.z() = kSpacing * static_cast<float>(fold % 2 == 0 ? along : panel - 1 - along);
-    p += 0.1f * kSpacing * scene::Vec3(unit(random), unit(random), unit(random));
+    p += 0.1f * kSpacing * model::Vec3(unit(random), unit(random), unit(random));
   }
   return state;
 }
 
-std::size_t touching(const scene::Scene& scene, const simulation::NodeState& state) {
+std::size_t touching(const model::Scene& scene, const simulation::NodeState& state) {
   std::vector<reference::Vec3> positions;
-  for (const scene::Vec3& p : state.positions) positions.push_back(p.cast<double>());
+  for (const model::Vec3& p : state.positions) positions.push_back(p.cast<double>());
   return reference::SelfCollision(scene).pairs(positions).size();
 }
 
 // Where the cloth passes through itself; a sheet that does not collide does so thousands of times.
-std::size_t crossingsIn(const scene::Scene& scene, const simulation::NodeState& state) {
+std::size_t crossingsIn(const model::Scene& scene, const simulation::NodeState& state) {
   const std::size_t crossings = tests::intersections(scene, state.positions);
   if (crossings > scene.nodeCount() / 100)
     throw std::runtime_error(fmt::format("{} of {} nodes passes through itself {} times", scene.name,
@@ -83,7 +83,7 @@ std::uint64_t measure(Simulated& simulated, const simulation::TickInputs& inputs
   return crowded;
 }
 
-void addTimes(nlohmann::ordered_json& row, const Simulated& simulated, const scene::Scene& scene,
+void addTimes(nlohmann::ordered_json& row, const Simulated& simulated, const model::Scene& scene,
               const vulkan::Device& device) {
   const double nodeSteps = static_cast<double>(scene.nodeCount()) * scene.substeps;
   row["tickMsMedian"] = simulated.wall().median() * 1e3;
@@ -96,9 +96,9 @@ void addTimes(nlohmann::ordered_json& row, const Simulated& simulated, const sce
 
 nlohmann::ordered_json sheet(vulkan::Device& device, const Settings& settings, std::uint32_t size, bool folds,
                              bool balls) {
-  const scene::Scene scene = sheetOnFloor(size, balls);
-  const scene::Pose floor{};
-  const simulation::TickInputs inputs{scene.environment, {{scene::Plane{}, floor, floor, 1}}};
+  const model::Scene scene = sheetOnFloor(size, balls);
+  const model::Pose floor{};
+  const simulation::TickInputs inputs{scene.environment, {{model::Plane{}, floor, floor, 1}}};
   Simulated simulated(device, scene, {settings.rowsPerInvocation, settings.workgroupSize, {}});
   const simulation::NodeState start = lying(scene, folds);
   // A pair that just touches in one and just not in the other gets a contact's impulse a substep earlier, and
@@ -126,7 +126,7 @@ nlohmann::ordered_json foldsScene(vulkan::Device& device, const Settings& settin
   const auto scene = messages::loadScene("folds");
   if (!scene) throw std::runtime_error(scene.error().text);
   simulation::TickInputs inputs{scene->environment, {}};
-  for (const scene::Collider& collider : scene->colliders)
+  for (const model::Collider& collider : scene->colliders)
     inputs.colliders.push_back({collider.shape, collider.pose, collider.pose, collider.friction});
   Simulated simulated(device, *scene, {settings.rowsPerInvocation, settings.workgroupSize, {}});
   const std::uint64_t crowded = measure(simulated, inputs, std::max(settings.seconds, 3.0));

@@ -8,30 +8,30 @@
 
 #include <fmt/format.h>
 
+#include "server/model/wind.h"
 #include "server/reference/reference_simulation.h"
-#include "server/scene/wind.h"
 
 namespace clothstream::bench {
 namespace {
 
 // Every free node off its place by up to a fifth of the nodes' distance, and moving: no spring is idle.
-simulation::NodeState displacedState(const scene::Scene& scene) {
+simulation::NodeState displacedState(const model::Scene& scene) {
   simulation::NodeState state = simulation::restState(scene.cloths);
   const std::vector<float> masses = simulation::inverseMasses(scene.cloths);
-  const float reach = 0.2f * scene::spacing(scene.cloths.front().grid).column;
+  const float reach = 0.2f * model::spacing(scene.cloths.front().grid).column;
   std::mt19937 random(1);
   std::uniform_real_distribution<float> unit(-1, 1);
   for (std::size_t i = 0; i < masses.size(); ++i) {
     if (masses[i] == 0) continue;
-    state.positions[i] += reach * scene::Vec3(unit(random), unit(random), unit(random));
-    state.velocities[i] = 0.1f * scene::Vec3(unit(random), unit(random), unit(random));
+    state.positions[i] += reach * model::Vec3(unit(random), unit(random), unit(random));
+    state.velocities[i] = 0.1f * model::Vec3(unit(random), unit(random), unit(random));
   }
   return state;
 }
 
 }  // namespace
 
-reference::ReferenceCloth measuredCloth(const scene::Cloth& cloth, const simulation::NodeState& state) {
+reference::ReferenceCloth measuredCloth(const model::Cloth& cloth, const simulation::NodeState& state) {
   reference::ReferenceCloth measured(cloth);
   for (std::uint32_t node = 0; node < cloth.nodeCount(); ++node) {
     measured.positions()[node] = state.positions[node].cast<double>();
@@ -40,7 +40,7 @@ reference::ReferenceCloth measuredCloth(const scene::Cloth& cloth, const simulat
   return measured;
 }
 
-Simulated::Simulated(vulkan::Device& device, const scene::Scene& scene,
+Simulated::Simulated(vulkan::Device& device, const model::Scene& scene,
                      const simulation::SimulationOptions& options)
     : device_(device), scene_(scene), recorder_(device), simulation_(device, scene, options) {}
 
@@ -48,9 +48,9 @@ double Simulated::check(const simulation::TickInputs& inputs) {
   // A tick moves a position by sums of rounded terms; each substep rounds it once, to 2^-24 of the cloth's
   // extent, and twelve spring forces carry the rounding of their ends on. An eighth of a thousandth of the
   // nodes' distance is far above that and far below what any missing term does.
-  const scene::Grid& grid = scene_.cloths.front().grid;
+  const model::Grid& grid = scene_.cloths.front().grid;
   const double extent = std::max(double{grid.width}, double{grid.height});
-  const double tolerance = scene_.substeps * 20 * extent / (1 << 24) + scene::spacing(grid).column / 8000.0;
+  const double tolerance = scene_.substeps * 20 * extent / (1 << 24) + model::spacing(grid).column / 8000.0;
   return check(inputs, tolerance);
 }
 

@@ -5,8 +5,8 @@
 #include <span>
 #include <string>
 
+#include "server/model/scene.h"
 #include "server/reference/reference_cloth.h"
-#include "server/scene/scene.h"
 #include "server/simulation/cloth_simulation.h"
 #include "server/vulkan/device.h"
 #include "server/vulkan/recorder.h"
@@ -16,7 +16,7 @@ namespace clothstream::bench {
 
 class Simulated {
  public:
-  Simulated(vulkan::Device& device, const scene::Scene& scene, const simulation::SimulationOptions& options);
+  Simulated(vulkan::Device& device, const model::Scene& scene, const simulation::SimulationOptions& options);
 
   // One tick from a displaced state on the device and in the reference; throws std::runtime_error where
   // they differ by more than float rounding explains. Leaves the state it reached. Returns the reference's
@@ -49,14 +49,14 @@ class Simulated {
 
  private:
   vulkan::Device& device_;
-  scene::Scene scene_;
+  model::Scene scene_;
   vulkan::Recorder recorder_;
   simulation::ClothSimulation simulation_;
   Samples wall_, advance_, near_;
 };
 
 // A scene's only cloth in this state, with its strain and energies.
-reference::ReferenceCloth measuredCloth(const scene::Cloth& cloth, const simulation::NodeState& state);
+reference::ReferenceCloth measuredCloth(const model::Cloth& cloth, const simulation::NodeState& state);
 
 // Records with `record`, submits, waits.
 void runOn(vulkan::Device& device, vulkan::Recorder& recorder, const auto& record) {

@@ -19,7 +19,7 @@ constexpr std::uint32_t kTicks = 72;  // a second
 
 struct Case {
   const char* method;
-  scene::SolverKind kind;
+  model::SolverKind kind;
   std::uint32_t substeps = 10;
   float stiffness = 0;  // N/m; 0: as stiff as a force may be
   std::uint32_t sweeps = 1;
@@ -27,22 +27,22 @@ struct Case {
 };
 
 // The stiffness of XPBD and of implicit Euler is that of cloth which hardly stretches under its own weight.
-constexpr Case kCases[] = {{"mass_spring", scene::SolverKind::massSpring},
-                           {"acad", scene::SolverKind::acad},
-                           {"constraint", scene::SolverKind::constraint},
-                           {"implicit_euler", scene::SolverKind::implicitEuler, 10, 1000},
-                           {"implicit_euler", scene::SolverKind::implicitEuler, 2, 1000},
-                           {"xpbd", scene::SolverKind::xpbd, 10, 1000},
-                           {"xpbd, 4 sweeps", scene::SolverKind::xpbd, 10, 1000, 4},
-                           {"xpbd", scene::SolverKind::xpbd, 40, 1000},
-                           {"xpbd, compliance 0", scene::SolverKind::xpbd, 40, 0, 1, 0.0f}};
+constexpr Case kCases[] = {{"mass_spring", model::SolverKind::massSpring},
+                           {"acad", model::SolverKind::acad},
+                           {"constraint", model::SolverKind::constraint},
+                           {"implicit_euler", model::SolverKind::implicitEuler, 10, 1000},
+                           {"implicit_euler", model::SolverKind::implicitEuler, 2, 1000},
+                           {"xpbd", model::SolverKind::xpbd, 10, 1000},
+                           {"xpbd, 4 sweeps", model::SolverKind::xpbd, 10, 1000, 4},
+                           {"xpbd", model::SolverKind::xpbd, 40, 1000},
+                           {"xpbd, compliance 0", model::SolverKind::xpbd, 40, 0, 1, 0.0f}};
 
 // A square metre of 0.2 kg, hung by its upper edge.
-scene::Scene sceneOf(const Case& experiment, std::uint32_t size) {
-  scene::Solver solver{.kind = experiment.kind, .compliance = experiment.compliance};
-  if (experiment.kind == scene::SolverKind::xpbd) solver.iterations = experiment.sweeps;
-  scene::Scene scene = hungSheet(size, solver, experiment.substeps);
-  scene::Cloth& cloth = scene.cloths.front();
+model::Scene sceneOf(const Case& experiment, std::uint32_t size) {
+  model::Solver solver{.kind = experiment.kind, .compliance = experiment.compliance};
+  if (experiment.kind == model::SolverKind::xpbd) solver.iterations = experiment.sweeps;
+  model::Scene scene = hungSheet(size, solver, experiment.substeps);
+  model::Cloth& cloth = scene.cloths.front();
   // 2 (4 + 4 / 2 + 4 / 10) k h^2 / m = 3.2 of the 4 that a step bears.
   const double h = scene.substepSeconds();
   const auto bearable = static_cast<float>(0.25 * double{cloth.nodeMass()} / (h * h));
@@ -57,10 +57,10 @@ scene::Scene sceneOf(const Case& experiment, std::uint32_t size) {
 // substep allow (docs/simulation.md), twice over for the fall. Constraints, and forces of
 // the substep's end: that they hold at all. Of forces of its start none: how much they stretch is what the
 // row is to show.
-double mostStrain(const scene::Scene& scene) {
-  const scene::Cloth& cloth = scene.cloths.front();
-  if (cloth.solver.kind == scene::SolverKind::massSpring) return std::numeric_limits<double>::max();
-  if (cloth.solver.kind != scene::SolverKind::xpbd) return 1;
+double mostStrain(const model::Scene& scene) {
+  const model::Cloth& cloth = scene.cloths.front();
+  if (cloth.solver.kind == model::SolverKind::massSpring) return std::numeric_limits<double>::max();
+  if (cloth.solver.kind != model::SolverKind::xpbd) return 1;
   const double rows = cloth.grid.rows, length = double{cloth.grid.height} / (rows - 1),
                h = scene.substepSeconds();
   const double compliance =
@@ -70,7 +70,7 @@ double mostStrain(const scene::Scene& scene) {
 
 Rows::value_type measure(vulkan::Device& device, const Settings& settings, const Case& experiment,
                          std::uint32_t size) {
-  const scene::Scene scene = sceneOf(experiment, size);
+  const model::Scene scene = sceneOf(experiment, size);
   const simulation::TickInputs inputs{scene.environment, {}};
   Simulated simulated(device, scene,
                       {.rowsPerInvocation = settings.rowsPerInvocation,

@@ -24,16 +24,16 @@ constexpr std::uint32_t kReferenceSubsteps = 1024, kCoarserSubsteps = 512;
 
 struct Method {
   const char* name;
-  scene::SolverKind kind;
-  scene::Integrator integrator;
+  model::SolverKind kind;
+  model::Integrator integrator;
   std::uint32_t iterations;
   std::vector<std::uint32_t> substeps;
 };
 
 // Forces from the fewest substeps on that they bear.
 std::vector<Method> methods() {
-  using enum scene::SolverKind;
-  using enum scene::Integrator;
+  using enum model::SolverKind;
+  using enum model::Integrator;
   return {{"mass_spring", massSpring, semiImplicitEuler, 1, {32, 64, 128, 256}},
           {"Runge-Kutta", massSpring, rungeKutta4, 1, {32, 64}},
           {"acad", acad, semiImplicitEuler, 40, {32, 64}},
@@ -43,8 +43,8 @@ std::vector<Method> methods() {
 }
 
 // A square metre of 0.2 kg, whose springs of 200 N/m give way by a few percent.
-scene::Cloth sheet() {
-  scene::Cloth cloth;
+model::Cloth sheet() {
+  model::Cloth cloth;
   cloth.name = "sheet";
   cloth.grid = {.rows = kSize, .columns = kSize, .width = 1, .height = 1, .pose = {}};
   cloth.mass = 0.2f;
@@ -57,8 +57,8 @@ scene::Cloth sheet() {
   return cloth;
 }
 
-scene::Scene sceneOf(const char* name, scene::Cloth cloth) {
-  scene::Scene scene;
+model::Scene sceneOf(const char* name, model::Cloth cloth) {
+  model::Scene scene;
   scene.name = name;
   scene.simulationRate = scene.streamRate = kFramesPerSecond;
   scene.cloths = {std::move(cloth)};
@@ -66,26 +66,26 @@ scene::Scene sceneOf(const char* name, scene::Cloth cloth) {
 }
 
 // Half a second each, of motions that springs decide: what folds by itself does so at random.
-std::vector<scene::Scene> scenes() {
-  const scene::GridRange upperEdge{.lastColumn = kSize - 1};
-  scene::Cloth swinging = sheet();
-  swinging.grid.pose.orientation = scene::Quaternion(Eigen::AngleAxisf(-1, scene::Vec3::UnitX()));
+std::vector<model::Scene> scenes() {
+  const model::GridRange upperEdge{.lastColumn = kSize - 1};
+  model::Cloth swinging = sheet();
+  swinging.grid.pose.orientation = model::Quaternion(Eigen::AngleAxisf(-1, model::Vec3::UnitX()));
   swinging.pins = {upperEdge};
 
-  scene::Cloth pushed = sheet();
+  model::Cloth pushed = sheet();
   pushed.pins = {upperEdge};
-  scene::Scene push = sceneOf("push", pushed);
+  model::Scene push = sceneOf("push", pushed);
   push.colliders.resize(1);
   push.colliders[0].name = "ball";
-  push.colliders[0].shape = scene::Sphere{0.2f};
-  push.colliders[0].motion.keys = {{0, scene::Vec3(0.05f, -0.6f, 0.25f)},
-                                   {0.5f, scene::Vec3(0.05f, -0.6f, -0.1f)}};
+  push.colliders[0].shape = model::Sphere{0.2f};
+  push.colliders[0].motion.keys = {{0, model::Vec3(0.05f, -0.6f, 0.25f)},
+                                   {0.5f, model::Vec3(0.05f, -0.6f, -0.1f)}};
 
-  scene::Cloth flying = sheet();
+  model::Cloth flying = sheet();
   flying.pins = {{.lastRow = kSize - 1}};
   flying.drag = flying.lift = 0.5f;
-  scene::Scene flag = sceneOf("flag", flying);
-  flag.environment.wind = scene::Vec3(4, 0, 1.5f);
+  model::Scene flag = sceneOf("flag", flying);
+  flag.environment.wind = model::Vec3(4, 0, 1.5f);
   flag.environment.gust = {.strength = 1, .seconds = 1};
   return {sceneOf("swing", swinging), push, flag};
 }
@@ -96,12 +96,12 @@ struct Trajectory {
   double energy = 0;
 };
 
-double energyOf(const reference::ReferenceCloth& cloth, const scene::Scene& scene) {
+double energyOf(const reference::ReferenceCloth& cloth, const model::Scene& scene) {
   return cloth.kineticEnergy() + cloth.elasticEnergy() +
          cloth.gravityEnergy(scene.environment.gravity.cast<double>());
 }
 
-Trajectory referenceTrajectory(scene::Scene scene, std::uint32_t substeps) {
+Trajectory referenceTrajectory(model::Scene scene, std::uint32_t substeps) {
   scene.substeps = substeps;
   reference::ReferenceSimulation simulation(scene);
   const reference::ReferenceCloth& cloth = simulation.cloths().front();
@@ -128,7 +128,7 @@ struct Measured {
   double seconds;  // a simulated one
 };
 
-Measured measure(vulkan::Device& device, scene::Scene scene, const Method& method, std::uint32_t substeps) {
+Measured measure(vulkan::Device& device, model::Scene scene, const Method& method, std::uint32_t substeps) {
   scene.substeps = substeps;
   scene.integrator = method.integrator;
   scene.cloths.front().solver.kind = method.kind;
@@ -140,7 +140,7 @@ Measured measure(vulkan::Device& device, scene::Scene scene, const Method& metho
     simulated.tick(simulation::inputsAt(scene, frame));
     state = simulated.state();
     std::vector<reference::Vec3>& positions = measured.trajectory.frames.emplace_back();
-    for (const scene::Vec3& position : state.positions) positions.push_back(position.cast<double>());
+    for (const model::Vec3& position : state.positions) positions.push_back(position.cast<double>());
   }
   measured.trajectory.energy = energyOf(measuredCloth(scene.cloths.front(), state), scene);
   measured.seconds = simulated.wall().median() * kFramesPerSecond;
@@ -153,7 +153,7 @@ Rows runWorkPrecision(vulkan::Device& device, const Settings& settings) {
   if (settings.size) throw std::runtime_error("the sheet has 32x32 nodes: leave out --size");
   Rows rows;
   std::vector<LogPlot> plots;
-  for (const scene::Scene& scene : scenes()) {
+  for (const model::Scene& scene : scenes()) {
     const Trajectory truth = referenceTrajectory(scene, kReferenceSubsteps);
     const double floor = distance(referenceTrajectory(scene, kCoarserSubsteps), truth);
     LogPlot& plot =
@@ -164,7 +164,7 @@ Rows runWorkPrecision(vulkan::Device& device, const Settings& settings) {
       for (const std::uint32_t substeps : method.substeps) {
         const Measured measured = measure(device, scene, method, substeps);
         const double error = distance(measured.trajectory, truth);
-        if (method.kind == scene::SolverKind::massSpring) worst = error;
+        if (method.kind == model::SolverKind::massSpring) worst = error;
         curve.points.push_back({measured.seconds, error});
         rows.push_back({{"suite", "work_precision"},
                         {"scene", scene.name},

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// `clothstream load` against the real clothstream-server, by both doors.
+// `clothstream load` against the real clothstream-server, by both endpoints.
 #include <csignal>
 #include <memory>
 #include <string>
@@ -45,13 +45,13 @@ class LoadTest : public ServerTest {
     EXPECT_NEAR(report.at("poseToDisplayableMsMean").get<double>(), sum, 0.01);
   }
   // Some of everybody.
-  void expectAllAreServed(const std::vector<std::string>& door) {
+  void expectAllAreServed(const std::vector<std::string>& endpoint) {
     std::vector<std::string> arguments{
         "--participants", "6", "--viewers",   "2",    "--decoders",   "3",
         "--slow",         "1", "--slow-rate", "2000", "--intruders",  "5",
         "--leaves",       "2", "--seconds",   "4",    "--server-pid", std::to_string(server_->id()),
         "--json"};
-    arguments.insert(arguments.end(), door.begin(), door.end());
+    arguments.insert(arguments.end(), endpoint.begin(), endpoint.end());
     const auto program = load(arguments);
     ASSERT_EQ(program->waitForEnd(kEnd), 0) << program->errors();
     const auto report = nlohmann::json::parse(program->output());
@@ -112,9 +112,9 @@ TEST_F(LoadTest, SaysWhatNobodyWasTold) {
 }
 
 TEST_F(LoadTest, NobodyAnswers) {
-  for (const std::vector<std::string>& door :
+  for (const std::vector<std::string>& endpoint :
        {std::vector<std::string>{"127.0.0.1:9"}, {"--web", "127.0.0.1:9"}}) {
-    const auto program = load(door);
+    const auto program = load(endpoint);
     EXPECT_EQ(program->waitForEnd(kEnd), 3);
     EXPECT_THAT(program->errors(), HasSubstr("nobody could join at 127.0.0.1:9"));
   }

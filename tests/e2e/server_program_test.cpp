@@ -12,8 +12,8 @@
 
 #include "server/messages/scene_file.h"
 #include "tests/e2e/server_process.h"
+#include "tests/endpoint/web_client.h"
 #include "tests/stream/small_scene.h"
-#include "tests/web/web_client.h"
 
 namespace clothstream::tests {
 namespace {
@@ -147,7 +147,7 @@ TEST_F(ServerProgram, StepsASceneIntoAFileThatOthersCanRead) {
   ServerProcess fifth({"step", "--scene", sceneFile(), "--ticks", "20", "--out", some, "--every", "5"});
   EXPECT_EQ(fifth.exitCode(), 0) << fifth.said();
 
-  const scene::Scene scene = smallScene("small");
+  const model::Scene scene = smallScene("small");
   const std::size_t frame = std::size_t{scene.nodeCount()} * 6;
   const std::vector<float> all = numbersIn(whole), few = numbersIn(some);
   ASSERT_EQ(all.size(), 21 * frame);

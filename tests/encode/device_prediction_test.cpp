@@ -17,17 +17,17 @@
 namespace clothstream::tests {
 namespace {
 
-class DevicePrediction : public GpuTest, public testing::WithParamInterface<scene::Coding> {};
+class DevicePrediction : public GpuTest, public testing::WithParamInterface<model::Coding> {};
 INSTANTIATE_TEST_SUITE_P(Codings, DevicePrediction,
-                         testing::Values(scene::Coding::entropy, scene::Coding::packed),
+                         testing::Values(model::Coding::entropy, model::Coding::packed),
                          [](const auto& coding) {
-                           return coding.param == scene::Coding::packed ? "packed" : "entropy";
+                           return coding.param == model::Coding::packed ? "packed" : "entropy";
                          });
 
 // Encodes states that are given.
 class Playing : public Encoding {
  public:
-  explicit Playing(const scene::Scene& scene) : Encoding(scene, encode::Prediction::onDevice) {}
+  explicit Playing(const model::Scene& scene) : Encoding(scene, encode::Prediction::onDevice) {}
 
   encode::RecordedFrame show(const std::vector<float>& positions, std::uint64_t tick, bool key = false) {
     return encodeState(stateOf(positions), tick, key);
@@ -43,12 +43,12 @@ class Playing : public Encoding {
   }
 };
 
-scene::Scene codedAs(scene::Coding coding, scene::Scene scene) {
+model::Scene codedAs(model::Coding coding, model::Scene scene) {
   scene.stream.coding = coding;
   return scene;
 }
 
-scene::Scene squareOf(std::uint32_t edge, scene::Coding coding) {
+model::Scene squareOf(std::uint32_t edge, model::Coding coding) {
   return codedAs(coding, sceneOf({calmCloth(edge, edge)}));
 }
 
@@ -89,7 +89,7 @@ TEST_P(DevicePrediction, EqualsTheReferenceWhereverKeyFramesAre) {
 
 TEST_P(DevicePrediction, EqualsTheReferenceAtAnyMaxErrorAndWhereResidualsAreWide) {
   for (const float maxError : {5e-6f, 1e-4f, 0.0005f, 0.01f, 1.0f}) {
-    scene::Scene scene = squareOf(16, GetParam());
+    model::Scene scene = squareOf(16, GetParam());
     scene.stream.maxError = maxError;
     Playing playing(scene);
     std::mt19937 random(3);
@@ -104,7 +104,7 @@ TEST_P(DevicePrediction, EqualsTheReferenceAtAnyMaxErrorAndWhereResidualsAreWide
 }
 
 TEST_P(DevicePrediction, EqualsTheReferenceHalfWayBetweenUnits) {
-  scene::Scene scene = squareOf(16, GetParam());
+  model::Scene scene = squareOf(16, GetParam());
   // A unit is 2^-18 m then (codec::hierarchical::latticeUnit()): metres are exactly so many and a half.
   scene.stream.maxError = 261 * 0x1p-19f;
   Playing playing(scene);
@@ -121,16 +121,16 @@ TEST_P(DevicePrediction, EqualsTheReferenceHalfWayBetweenUnits) {
 }
 
 // Triangles that share no vertex: the first phase has one of each, more than a small phase.
-scene::Cloth confetti(std::uint32_t triangles) {
-  scene::MeshShape shape;
+model::Cloth confetti(std::uint32_t triangles) {
+  model::MeshShape shape;
   for (std::uint32_t t = 0; t < triangles; ++t) {
     const auto x = 0.1f * static_cast<float>(t % 30), y = 0.1f * static_cast<float>(t / 30);
     shape.positions.insert(shape.positions.end(), {{x, y, 0}, {x + 0.05f, y, 0}, {x, y + 0.05f, 0}});
     shape.triangles.push_back({3 * t, 3 * t + 1, 3 * t + 2});
   }
   shape.submeshes = {{"", 0, triangles}};
-  scene::Cloth cloth = calmCloth(2, 2);
-  cloth.mesh = std::make_shared<const scene::Mesh>(scene::makeMesh(std::move(shape)));
+  model::Cloth cloth = calmCloth(2, 2);
+  cloth.mesh = std::make_shared<const model::Mesh>(model::makeMesh(std::move(shape)));
   cloth.mass = 0.02f * static_cast<float>(cloth.nodeCount());
   return cloth;
 }
@@ -143,7 +143,7 @@ TEST_P(DevicePrediction, EqualsTheReferenceOnClothOfAnyShape) {
 }
 
 TEST_P(DevicePrediction, EqualsTheReferenceHoweverManyFramesWait) {
-  const scene::Scene scene = squareOf(30, GetParam());
+  const model::Scene scene = squareOf(30, GetParam());
   simulation::ClothSimulation simulation(device(), scene);
   const codec::StreamLayout layout = encode::streamLayout(scene, kEpoch);
   encode::FrameEncoder encoder(device(), simulation, layout, encode::Prediction::onDevice);
@@ -178,7 +178,7 @@ TEST_P(DevicePrediction, EqualsTheReferenceHoweverManyFramesWait) {
 }
 
 TEST_P(DevicePrediction, EqualsTheReferenceWhereAnotherThreadCodes) {
-  const scene::Scene scene = squareOf(20, GetParam());
+  const model::Scene scene = squareOf(20, GetParam());
   simulation::ClothSimulation simulation(device(), scene);
   const codec::StreamLayout layout = encode::streamLayout(scene, kEpoch);
   encode::FrameEncoder encoder(device(), simulation, layout, encode::Prediction::onDevice);
@@ -230,7 +230,7 @@ TEST_P(DevicePrediction, EqualsTheReferenceWhereAnotherThreadCodes) {
 }
 
 TEST_P(DevicePrediction, RefusesTemporalLayers) {
-  const scene::Scene scene = squareOf(4, GetParam());
+  const model::Scene scene = squareOf(4, GetParam());
   const simulation::ClothSimulation simulation(device(), scene);
   codec::StreamLayout layout = encode::streamLayout(scene, kEpoch);
   layout.temporalLayers = 2;

@@ -20,15 +20,15 @@ namespace clothstream::tests {
 inline constexpr std::uint32_t kEpoch = 3;
 
 // Three cloths of odd sizes that hang by their top rows or fall.
-inline scene::Scene clothsOf(scene::Normals normals) {
-  scene::Cloth hanging = calmCloth(17, 23), strip = calmCloth(2, 5), falling = calmCloth(9, 8);
+inline model::Scene clothsOf(model::Normals normals) {
+  model::Cloth hanging = calmCloth(17, 23), strip = calmCloth(2, 5), falling = calmCloth(9, 8);
   hanging.name = "hanging";
   strip.name = "strip";
   falling.name = "falling";
   strip.grid.pose.position = {1, 0, 0};
   falling.grid.pose.position = {0, 1, 0.3f};
   hanging.pins = {topRow(hanging)};
-  scene::Scene scene = sceneOf({hanging, strip, falling});
+  model::Scene scene = sceneOf({hanging, strip, falling});
   scene.stream.normals = normals;
   return scene;
 }
@@ -36,7 +36,7 @@ inline scene::Scene clothsOf(scene::Normals normals) {
 inline std::vector<simulation::MovingCollider> sphereAt(std::uint64_t tick) {
   const auto z = [](std::uint64_t t) { return -0.5f + 0.01f * static_cast<float>(t); };
   simulation::MovingCollider sphere;
-  sphere.shape = scene::Sphere{0.08f};
+  sphere.shape = model::Sphere{0.08f};
   sphere.start.position = {0, -0.15f, z(tick)};
   sphere.end.position = {0, -0.15f, z(tick + 1)};
   return {sphere};
@@ -45,7 +45,7 @@ inline std::vector<simulation::MovingCollider> sphereAt(std::uint64_t tick) {
 // A simulation whose frames are encoded on the device and on the CPU.
 class Encoding {
  public:
-  explicit Encoding(const scene::Scene& scene, encode::Prediction prediction = encode::Prediction::automatic)
+  explicit Encoding(const model::Scene& scene, encode::Prediction prediction = encode::Prediction::automatic)
       : scene_(scene),
         simulation(device(), scene),
         layout(encode::streamLayout(scene, kEpoch)),
@@ -90,7 +90,7 @@ class Encoding {
 
   void compare(const encode::RecordedFrame& frame, const encode::EncodedFrame& encoded) {
     std::vector<float> positions, normals;
-    for (const scene::Vec3& p : simulation::unpack(simulation.collectState(frame.tick)).positions) {
+    for (const model::Vec3& p : simulation::unpack(simulation.collectState(frame.tick)).positions) {
       positions.insert(positions.end(), {p.x(), p.y(), p.z()});
     }
     for (const shared::vec4& n : normals_.mapped<shared::vec4>())
@@ -121,7 +121,7 @@ class Encoding {
     }
   }
 
-  scene::Scene scene_;
+  model::Scene scene_;
 
  public:
   simulation::ClothSimulation simulation;

@@ -16,12 +16,12 @@ namespace {
 
 struct Sort {
   const char* name;
-  scene::Normals normals;
+  model::Normals normals;
   encode::Prediction prediction = encode::Prediction::onHost;
-  scene::Coding coding = scene::Coding::entropy;
+  model::Coding coding = model::Coding::entropy;
 
-  scene::Scene cloths() const {
-    scene::Scene scene = clothsOf(normals);
+  model::Scene cloths() const {
+    model::Scene scene = clothsOf(normals);
     scene.stream.coding = coding;
     return scene;
   }
@@ -31,13 +31,13 @@ class FrameEncoder : public GpuTest, public testing::WithParamInterface<Sort> {}
 INSTANTIATE_TEST_SUITE_P(
     Sorts, FrameEncoder,
     testing::Values(
-        Sort{"onHost", scene::Normals::none}, Sort{"onHostWithNormals", scene::Normals::octahedral},
-        Sort{"onDevice", scene::Normals::none, encode::Prediction::onDevice},
-        Sort{"onDeviceWithNormals", scene::Normals::octahedral, encode::Prediction::onDevice},
-        Sort{"packedOnHost", scene::Normals::octahedral, encode::Prediction::onHost, scene::Coding::packed},
-        Sort{"packedOnDevice", scene::Normals::none, encode::Prediction::onDevice, scene::Coding::packed},
-        Sort{"packedOnDeviceWithNormals", scene::Normals::octahedral, encode::Prediction::onDevice,
-             scene::Coding::packed}),
+        Sort{"onHost", model::Normals::none}, Sort{"onHostWithNormals", model::Normals::octahedral},
+        Sort{"onDevice", model::Normals::none, encode::Prediction::onDevice},
+        Sort{"onDeviceWithNormals", model::Normals::octahedral, encode::Prediction::onDevice},
+        Sort{"packedOnHost", model::Normals::octahedral, encode::Prediction::onHost, model::Coding::packed},
+        Sort{"packedOnDevice", model::Normals::none, encode::Prediction::onDevice, model::Coding::packed},
+        Sort{"packedOnDeviceWithNormals", model::Normals::octahedral, encode::Prediction::onDevice,
+             model::Coding::packed}),
     [](const auto& chosen) { return chosen.param.name; });
 
 TEST_P(FrameEncoder, MakesThePacketsOfTheReferenceEncoder) {
@@ -89,7 +89,7 @@ TEST_P(FrameEncoder, KeepsTheErrorAtRoundingsEdges) {
 }
 
 TEST_P(FrameEncoder, MakesThoseOfMeshesToo) {
-  scene::Scene scene = GetParam().cloths();
+  model::Scene scene = GetParam().cloths();
   scene.cloths.insert(scene.cloths.begin() + 1, discCloth(9));
   Encoding encoding(scene, GetParam().prediction);
   for (std::uint64_t tick = 1; tick <= 30 && !testing::Test::HasFailure(); ++tick)
@@ -99,7 +99,7 @@ TEST_P(FrameEncoder, MakesThoseOfMeshesToo) {
 class FrameEncoderSlots : public GpuTest {};
 
 TEST_F(FrameEncoderSlots, AreFreedByEntropyCodingOnAnotherThread) {
-  const scene::Scene scene = clothsOf(scene::Normals::none);
+  const model::Scene scene = clothsOf(model::Normals::none);
   Encoding encoding(scene);
   vulkan::Recorder recorder(device());
   std::vector<encode::RecordedFrame> frames;
@@ -129,7 +129,7 @@ TEST_F(FrameEncoderSlots, AreFreedByEntropyCodingOnAnotherThread) {
 }
 
 TEST_F(FrameEncoderSlots, AFrameAfterForgettingIsAKeyFrame) {
-  Encoding encoding(clothsOf(scene::Normals::none));
+  Encoding encoding(clothsOf(model::Normals::none));
   EXPECT_EQ(encoding.tick(1, false).kind, codec::PacketKind::key);
   EXPECT_EQ(encoding.tick(2, false).kind, codec::PacketKind::predicted);
   encoding.encoder.forgetHistory();

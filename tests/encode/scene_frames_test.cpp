@@ -12,7 +12,7 @@ INSTANTIATE_TEST_SUITE_P(All, NamedScene, testing::ValuesIn(messages::namedScene
 
 // Encoding checks each frame, packet and vertex.
 TEST_P(NamedScene, KeepsItsMaxErrorForSixSeconds) {
-  const scene::Scene scene = *messages::loadScene(GetParam());
+  const model::Scene scene = *messages::loadScene(GetParam());
   Encoding encoding(scene);
   const std::uint64_t ticks = 6 * scene.simulationRate;
   for (std::uint64_t tick = 1; tick <= ticks && !HasFailure(); ++tick)

@@ -98,7 +98,7 @@ static int has_own_collider(const cs_client* client, const float* sphere, get_co
 struct seen {
   unsigned frames, moved, in_time;
   uint64_t tick, hash, shown_us;
-  int own_collider, played_collider, gravity, grip, others;
+  int own_collider, played_collider, gravity, grab, others;
 };
 
 static int look(cs_client* client, const float* sphere, struct seen* seen) {
@@ -155,7 +155,7 @@ static int follows(const char* address) {
   struct seen seen;
   memset(&seen, 0, sizeof seen);
   const uint64_t end_us = clothstream_now_us() + 60 * kSecond;
-  while (seen.frames < 100 || !seen.own_collider || !seen.played_collider || !seen.gravity || !seen.grip ||
+  while (seen.frames < 100 || !seen.own_collider || !seen.played_collider || !seen.gravity || !seen.grab ||
          !seen.others) {
     uint32_t events = 0;
     CHECK(clothstream_now_us() < end_us);
@@ -173,7 +173,7 @@ static int follows(const char* address) {
     if (events & CS_EVENT_GRABS) {
       cs_grab_event event;
       for (uint32_t i = 0; cs_get_grab_event(client, i, &event) != 0; ++i)
-        seen.grip |= event.participant_id == cs_participant_id(client) && event.grab_id == 5 &&
+        seen.grab |= event.participant_id == cs_participant_id(client) && event.grab_id == 5 &&
                      event.kind == CS_GRAB_TAKEN && event.vertices > 0;
     }
     if (events & CS_EVENT_PARAMETERS) {

@@ -290,19 +290,19 @@ test("the sphere can be dragged through the cloth", () =>
     for (let i = 0; i < 13; ++i) await page.keyboard.press("ArrowRight");
     const project = (point) => page.evaluate((at) => window.clothstream.project(at), point);
     // The ball swings on while the mouse comes: it is taken near its turning point, at the second try if need be.
-    let grip;
+    let grab;
     for (let grabbed = false; !grabbed; grabbed = await page.evaluate(() => window.clothstream.canvas.style.cursor === "grabbing")) {
       await page.mouse.up();
       await page.waitForFunction(() => window.clothstream.colliders[0].position[2] > 0.65);
-      grip = await project((await look(page)).spheres[0].position);
-      await page.mouse.move(...grip);
+      grab = await project((await look(page)).spheres[0].position);
+      await page.mouse.move(...grab);
       await page.mouse.down();
     }
     await untilHeld(page);
     const held = (await look(page)).spheres[0].position;
     const [heldX, heldY] = await project(held);
     const [goalX, goalY] = await project([held[0], held[1], kGoal]);
-    await page.mouse.move(grip[0] + goalX - heldX, grip[1] + goalY - heldY, { steps: 20 });
+    await page.mouse.move(grab[0] + goalX - heldX, grab[1] + goalY - heldY, { steps: 20 });
     await page.waitForFunction((goal) => Math.abs(window.clothstream.colliders[0].position[2] - goal) < 0.05, kGoal);
     await untilHeld(page);
     await untilFrames(page, 20);

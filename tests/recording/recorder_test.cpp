@@ -36,7 +36,7 @@ using tests::wind;
 // A scene on the shared device that is recorded.
 class RecordedScene {
  public:
-  explicit RecordedScene(RecorderOptions options, scene::Scene scene = smallScene())
+  explicit RecordedScene(RecorderOptions options, model::Scene scene = smallScene())
       : recorder(std::make_shared<Recorder>(std::move(options))),
         live(std::move(scene), false, recorder),
         packer(encode::FrameEncoder::kSlots, [] {}),
@@ -52,7 +52,7 @@ class RecordedScene {
       hashes.push_back(host->status().stateHash);
     }
   }
-  void change(scene::ParameterChange change) {
+  void change(model::ParameterChange change) {
     ASSERT_TRUE(live.inbox.postChange({.participant = 5, .change = std::move(change)}));
   }
   // The path of the recording, which is complete.
@@ -98,7 +98,7 @@ void happen(RecordedScene& recorded) {
     recorded.live.inbox.postPoses(
         9,
         {.colliders = {handAt(1, 0.1f, -0.6f, z), handAt(4, -0.1f, -0.2f, z)},
-         .grabs = {{.id = 1, .pose = {scene::Vec3(0, -0.4f, z), scene::Quaternion::Identity()}}}},
+         .grabs = {{.id = 1, .pose = {model::Vec3(0, -0.4f, z), model::Quaternion::Identity()}}}},
         recorded.now, {.trueAt = trueAt, .clientTimeUs = stream::microseconds(trueAt)});
   };
   for (int i = 0; i < 12; ++i) {
@@ -107,14 +107,14 @@ void happen(RecordedScene& recorded) {
     pose(z, i < 6 ? 11 : -11);  // the tick is between the two, then after them
     recorded.ticks(1);
   }
-  scene::Solver constraint;
-  constraint.kind = scene::SolverKind::constraint;
+  model::Solver constraint;
+  constraint.kind = model::SolverKind::constraint;
   recorded.change({.cloths = {{.solver = constraint}}});
   recorded.ticks(30);  // gently at first, then not
   recorded.live.inbox.postPoses(9, {}, recorded.now);
-  scene::ParameterChange heavier;
+  model::ParameterChange heavier;
   heavier.cloths = {{.name = "sheet", .damping = 0.7f, .arealMass = 0.3f}};
-  heavier.colliders = {{.name = "ball", .position = scene::Vec3(0.2f, -0.4f, 0.1f)}};
+  heavier.colliders = {{.name = "ball", .position = model::Vec3(0.2f, -0.4f, 0.1f)}};
   recorded.change(heavier);
   recorded.ticks(40);
   recorded.live.resetWanted = true;
@@ -145,7 +145,7 @@ TEST_F(RecorderTest, AScenePicksUpAfterItsDeviceWasLost) {
   RecordedScene recorded(options());
   recorded.ticks(30);
   recorded.live.inbox.postPoses(
-      9, {.grabs = {{.id = 1, .pose = {scene::Vec3(0, -0.4f, 0), scene::Quaternion::Identity()}}}},
+      9, {.grabs = {{.id = 1, .pose = {model::Vec3(0, -0.4f, 0), model::Quaternion::Identity()}}}},
       recorded.now);
   recorded.ticks(10);
   vulkan::Device another;
@@ -288,7 +288,7 @@ TEST_F(RecorderTest, AfterALostChunkItGoesOnFromTheNextState) {
   RecordedScene recorded(options());
   recorded.ticks(100);
   // In what is going to be lost: the state after it does not tell of it.
-  scene::ParameterChange change;
+  model::ParameterChange change;
   change.cloths.push_back({.damping = 2.0f});
   recorded.change(change);
   recorded.ticks(150);

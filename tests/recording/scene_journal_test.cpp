@@ -58,7 +58,7 @@ class SceneJournalTest : public tests::GpuTest {
     }
   }
   void grab(bool holds) {
-    scene::ParticipantPoses poses;
+    model::ParticipantPoses poses;
     if (holds)
       poses.grabs.push_back({.id = 1, .pose = {.position = {0, -0.5f, 0}}, .radius = 0.2f, .reach = 0.5f});
     live->inbox.postPoses(3, poses, now);
@@ -98,7 +98,7 @@ class SceneJournalTest : public tests::GpuTest {
 TEST_F(SceneJournalTest, WhatBeginsInTheMiddleIsSimulatedAgainToTheBit) {
   grab(true);
   ticks(30);
-  scene::ParameterChange change = tests::wind(2);
+  model::ParameterChange change = tests::wind(2);
   change.cloths.push_back({.damping = 1.5f});
   ASSERT_TRUE(live->inbox.postChange({.participant = 3, .change = change}));
   ticks(5);
@@ -240,7 +240,7 @@ TEST_F(SceneJournalTest, AtTheLimitItGoesOnInAnotherFile) {
   EXPECT_EQ(all, static_cast<std::uint64_t>(run));
 }
 
-TEST_F(SceneJournalTest, NoGripTakesHoldAnewForAnotherFileUnlessItHoldsOn) {
+TEST_F(SceneJournalTest, NoGrabTakesHoldAnewForAnotherFileUnlessItHoldsOn) {
   RecorderOptions limited;
   limited.maxBytes = 240'000;
   make(limited, true);

@@ -4,17 +4,17 @@
 
 #include <random>
 
+#include "server/model/scene.h"
 #include "server/reference/reference_cloth.h"
-#include "server/scene/scene.h"
 
 namespace clothstream::reference {
 
-inline const scene::Environment kWeightless{
-    .gravity = scene::Vec3::Zero(), .wind = scene::Vec3::Zero(), .airDensity = 0};
+inline const model::Environment kWeightless{
+    .gravity = model::Vec3::Zero(), .wind = model::Vec3::Zero(), .airDensity = 0};
 
 // Nodes 0.1 m apart and of 0.01 kg, with structural springs alone.
-inline scene::Cloth sheet(std::uint32_t rows, std::uint32_t columns) {
-  scene::Cloth cloth;
+inline model::Cloth sheet(std::uint32_t rows, std::uint32_t columns) {
+  model::Cloth cloth;
   cloth.name = "sheet";
   cloth.grid.rows = rows;
   cloth.grid.columns = columns;
@@ -25,8 +25,8 @@ inline scene::Cloth sheet(std::uint32_t rows, std::uint32_t columns) {
   return cloth;
 }
 
-inline scene::Cloth sheetWithAllSprings(std::uint32_t rows, std::uint32_t columns) {
-  scene::Cloth cloth = sheet(rows, columns);
+inline model::Cloth sheetWithAllSprings(std::uint32_t rows, std::uint32_t columns) {
+  model::Cloth cloth = sheet(rows, columns);
   cloth.structural = {100, 0.01f};
   cloth.shear = {60, 0.02f};
   cloth.bend = {30, 0.03f};

@@ -26,27 +26,27 @@ constexpr std::uint64_t kParticipant = 7;
 
 // What the participant does at a tick, 0 being the first, of so many. `centre` is the first cloth's at the
 // start.
-scene::ParticipantPoses posesAt(std::uint32_t tick, std::uint32_t ticks, const scene::Vec3& centre) {
-  scene::ParticipantPoses poses;
+model::ParticipantPoses posesAt(std::uint32_t tick, std::uint32_t ticks, const model::Vec3& centre) {
+  model::ParticipantPoses poses;
   const float part = static_cast<float>(tick) / static_cast<float>(ticks);
-  scene::ParticipantCollider ball;
+  model::ParticipantCollider ball;
   ball.id = 1;
-  ball.shape = scene::Sphere{0.1f};
-  ball.pose.position = centre + scene::Vec3(0.1f, 0.05f, 0.4f - 0.6f * part);
+  ball.shape = model::Sphere{0.1f};
+  ball.pose.position = centre + model::Vec3(0.1f, 0.05f, 0.4f - 0.6f * part);
   poses.colliders.push_back(ball);
   if (part < 0.3f || part > 0.8f) return poses;
-  scene::Grab grab;
+  model::Grab grab;
   grab.id = 1;
   grab.radius = 0.1f;
   grab.reach = 0.5f;
-  grab.pose.position = centre + scene::Vec3(-0.2f, 0, 0.3f * (part - 0.3f));
+  grab.pose.position = centre + model::Vec3(-0.2f, 0, 0.3f * (part - 0.3f));
   poses.grabs.push_back(grab);
   return poses;
 }
 
 }  // namespace
 
-std::uint32_t ticksFor(const scene::Scene& scene) {
+std::uint32_t ticksFor(const model::Scene& scene) {
   constexpr std::uint32_t kNodeFrames = 60'000, kMinFrames = 12, kMaxFrames = 40;
   // A mesh's geometry takes as much as its frames.
   const bool mesh = scene.cloths.front().mesh != nullptr;
@@ -61,22 +61,22 @@ std::string recordScene(vulkan::Device& device, const std::string& name,
   if (!scene) throw std::runtime_error(scene.error().text);
   const std::uint32_t ticks = ticksFor(*scene);
   const std::uint32_t rate = scene->simulationRate;
-  const scene::Vec3 wind = scene->environment.wind;
+  const model::Vec3 wind = scene->environment.wind;
   const auto recorder = std::make_shared<recording::Recorder>(
       recording::RecorderOptions{.directory = directory, .serverName = "clothstream replay"});
   stream::FramePacker packer(encode::FrameEncoder::kSlots, [] {});
   stream::LiveScene live(std::move(*scene), false, recorder);
   auto host = std::make_unique<stream::SceneHost>(device, live, packer);
-  scene::Vec3 centre = scene::Vec3::Zero();
-  const std::vector<scene::Vec3> rest = scene::restPositions(live.start().cloths.front());
-  for (const scene::Vec3& node : rest) centre += node / static_cast<float>(rest.size());
+  model::Vec3 centre = model::Vec3::Zero();
+  const std::vector<model::Vec3> rest = model::restPositions(live.start().cloths.front());
+  for (const model::Vec3& node : rest) centre += node / static_cast<float>(rest.size());
   Clock::time_point now = Clock::now();
   for (std::uint32_t tick = 0; tick < ticks; ++tick) {
     live.inbox.postPoses(kParticipant, posesAt(tick, ticks, centre), now);
     if (tick == ticks / 2) {
-      scene::ParameterChange change;
-      change.wind = wind + scene::Vec3(1, 0, -2);
-      change.gust = scene::Gust{.strength = 1, .seconds = 0.2f};
+      model::ParameterChange change;
+      change.wind = wind + model::Vec3(1, 0, -2);
+      change.gust = model::Gust{.strength = 1, .seconds = 0.2f};
       if (!live.inbox.postChange({.participant = kParticipant, .change = change}))
         throw std::runtime_error(name + ": the scene takes no change");
     }

@@ -6,13 +6,13 @@
 #include <filesystem>
 #include <string>
 
-#include "server/scene/scene.h"
+#include "server/model/scene.h"
 #include "server/vulkan/device.h"
 
 namespace clothstream::replay {
 
 // How long recordings of this scene are: so that they stay small, and have some frames.
-std::uint32_t ticksFor(const scene::Scene& scene);
+std::uint32_t ticksFor(const model::Scene& scene);
 
 // Runs a named scene while a ball goes through it, a hand pulls at it and the wind changes. Gives the path of
 // the recording, in the directory. Throws std::runtime_error where it cannot be.

@@ -84,7 +84,7 @@ DecodedFrames decode(const std::string& path) {
 double distance(const std::vector<float>& shown, const simulation::NodeState& state) {
   double largest = 0;
   for (std::size_t i = 0; i < state.positions.size(); ++i) {
-    const scene::Vec3 vertex(shown[3 * i], shown[3 * i + 1], shown[3 * i + 2]);
+    const model::Vec3 vertex(shown[3 * i], shown[3 * i + 1], shown[3 * i + 2]);
     const double away = (state.positions[i].cast<double>() - vertex.cast<double>()).norm();
     if (!(away <= largest)) largest = away;
   }

@@ -54,11 +54,11 @@ class Arithmetic : public GpuTest {
 };
 
 // The exponent is halved exactly, so that the error repeats every two binades: these are all there are.
-TEST_F(Arithmetic, reciprocalSquareRootKeepsItsErrorBoundForEveryFloatFromOneToFour) {
+TEST_F(Arithmetic, ReciprocalSquareRootKeepsItsErrorBoundForEveryFloatFromOneToFour) {
   EXPECT_LT(largestError(std::bit_cast<std::uint32_t>(1.0f), 1, 1u << 24), kReciprocalSquareRootError);
 }
 
-TEST_F(Arithmetic, reciprocalSquareRootKeepsItsErrorBoundAtEveryMagnitude) {
+TEST_F(Arithmetic, ReciprocalSquareRootKeepsItsErrorBoundAtEveryMagnitude) {
   const std::uint32_t smallest = 0x00800000, largest = 0x7F7FFFFF, stride = 997;
   EXPECT_LT(largestError(smallest, stride, (largest - smallest) / stride), kReciprocalSquareRootError);
 }
@@ -116,15 +116,15 @@ void expectExact(std::span<const std::uint32_t> spirv) {
         << "GLSL.std.450 instruction " << instruction;
 }
 
-TEST(KernelArithmetic, advanceAddsSubtractsAndMultipliesWithoutContraction) {
+TEST(KernelArithmetic, AdvanceAddsSubtractsAndMultipliesWithoutContraction) {
   expectExact(kernels::advance_mass_spring);
 }
 
-TEST(KernelArithmetic, normalsAddSubtractAndMultiplyWithoutContraction) {
+TEST(KernelArithmetic, NormalsAddSubtractAndMultiplyWithoutContraction) {
   expectExact(kernels::compute_normals);
 }
 
-TEST(KernelArithmetic, assemblyAddsSubtractsAndMultipliesWithoutContraction) {
+TEST(KernelArithmetic, AssemblyAddsSubtractsAndMultipliesWithoutContraction) {
   expectExact(kernels::fill_jacobian);
   expectExact(kernels::multiply_jacobians);
   expectExact(kernels::solve_multipliers);

@@ -8,8 +8,8 @@
 #include "kernels/fill_jacobian.h"
 #include "kernels/multiply_jacobians.h"
 #include "kernels/multiply_system.h"
+#include "server/model/springs.h"
 #include "server/reference/constraint_system.h"
-#include "server/scene/springs.h"
 #include "server/simulation/assembled/assembled_tables.h"
 #include "server/simulation/device_table.h"
 #include "server/vulkan/kernel.h"
@@ -34,23 +34,23 @@ constexpr double kSubstepSeconds = 1.0 / 720;
 class AssembledMatrix : public GpuTest {};
 
 // Two grids and a mesh, of which some have neighbours that are both pinned; one is not assembled.
-scene::Scene variedScene() {
-  scene::Cloth sheet = assembled(calmCloth(9, 14), true);
+model::Scene variedScene() {
+  model::Cloth sheet = assembled(calmCloth(9, 14), true);
   sheet.pins = {topRow(sheet), {.firstRow = 4, .lastRow = 6, .firstColumn = 3, .lastColumn = 3}};
-  scene::Cloth disc = assembled(discCloth(5), true);
+  model::Cloth disc = assembled(discCloth(5), true);
   disc.name = "disc";
   disc.pinnedVertices = {0, 1, 2, 40};
-  scene::Cloth other = assembled(calmCloth(6, 7), true);
+  model::Cloth other = assembled(calmCloth(6, 7), true);
   other.name = "other";
-  other.solver.path = scene::ConstraintPath::matrixFree;
-  scene::Cloth small = assembled(calmCloth(17, 23), false);
+  other.solver.path = model::ConstraintPath::matrixFree;
+  model::Cloth small = assembled(calmCloth(17, 23), false);
   small.name = "small";
   return sceneOf({sheet, other, disc, small});
 }
 
 // What the reference says of one cloth.
-reference::ConstraintSystem systemOf(const scene::Scene& scene, std::size_t number, const NodeState& state) {
-  const scene::Cloth& cloth = scene.cloths[number];
+reference::ConstraintSystem systemOf(const model::Scene& scene, std::size_t number, const NodeState& state) {
+  const model::Cloth& cloth = scene.cloths[number];
   const std::uint32_t first = simulation::clothOffsets(scene.cloths)[number];
   const std::vector<float> masses = simulation::inverseMasses(scene.cloths);
   std::vector<reference::Vec3> positions, velocities;
@@ -61,10 +61,10 @@ reference::ConstraintSystem systemOf(const scene::Scene& scene, std::size_t numb
     inverseMasses.push_back(masses[i]);
   }
   std::vector<reference::Constraint> constraints;
-  for (const scene::SpringLink& link : scene::systemLinks(cloth))
+  for (const model::SpringLink& link : model::systemLinks(cloth))
     constraints.push_back({link.a, link.b, (positions[link.b] - positions[link.a]).norm() - link.restLength});
   return {
-      constraints,    positions, velocities, inverseMasses, scene::scaledCompliance(cloth, kSubstepSeconds),
+      constraints,    positions, velocities, inverseMasses, model::scaledCompliance(cloth, kSubstepSeconds),
       kSubstepSeconds};
 }
 
@@ -79,8 +79,8 @@ std::vector<float> listOf(const shared::EntriesRecord& range,
   return list;
 }
 
-TEST(AssembledTables, haveAnEntryWhereTheMatrixHas) {
-  const scene::Scene scene = variedScene();
+TEST(AssembledTables, HaveAnEntryWhereTheMatrixHas) {
+  const model::Scene scene = variedScene();
   std::mt19937 random(2);
   const NodeState state = randomState(scene, random, 0.003f, 1);
   const AssembledTables tables = simulation::assembledTables(scene.cloths, {kWorkgroup, 1'000'000, 65'000});
@@ -108,7 +108,7 @@ TEST(AssembledTables, haveAnEntryWhereTheMatrixHas) {
       }
       for (++found; found < A.cols(); ++found) ASSERT_EQ(A(row, found), 0) << row << ", " << found;
     }
-    EXPECT_EQ(all, scene::systemEntries(scene.cloths[tables.cloths[i]]));
+    EXPECT_EQ(all, model::systemEntries(scene.cloths[tables.cloths[i]]));
   }
 }
 
@@ -119,7 +119,7 @@ Buffer texelsOf(const std::vector<shared::vec4>& values, std::vector<Buffer>& up
   return {device(), BufferPurpose::texels, bytes};
 }
 
-std::vector<shared::vec4> vectorsOf(const std::vector<scene::Vec3>& vectors, const std::vector<float>& w) {
+std::vector<shared::vec4> vectorsOf(const std::vector<model::Vec3>& vectors, const std::vector<float>& w) {
   std::vector<shared::vec4> texels;
   for (std::size_t i = 0; i < vectors.size(); ++i)
     texels.push_back({vectors[i].x(), vectors[i].y(), vectors[i].z(), w[i]});
@@ -131,7 +131,7 @@ struct Products {
   std::vector<float> sides, products;
 };
 
-Products productsOf(const scene::Scene& scene, const AssembledTables& tables, const NodeState& state,
+Products productsOf(const model::Scene& scene, const AssembledTables& tables, const NodeState& state,
                     const std::vector<float>& vector) {
   const std::vector<float> masses = simulation::inverseMasses(scene.cloths);
   const DeviceTable cloths(device(), simulation::clothRecords(scene.cloths, kSubstepSeconds)),
@@ -211,8 +211,8 @@ Products productsOf(const scene::Scene& scene, const AssembledTables& tables, co
 // 3e-6 of an inverse mass, with its own rounding, and on the diagonal by twice that. A product adds at most a
 // rounding of what is summed so far for each of its entries. A length is wrong by 1e-6 of itself, a speed by
 // that and its own rounding.
-TEST_F(AssembledMatrix, timesAVectorIsTheDenseProduct) {
-  const scene::Scene scene = variedScene();
+TEST_F(AssembledMatrix, TimesAVectorIsTheDenseProduct) {
+  const model::Scene scene = variedScene();
   std::mt19937 random(3);
   const NodeState state = randomState(scene, random, 0.003f, 1);
   const AssembledTables tables = simulation::assembledTables(scene.cloths, {kWorkgroup, 1'000'000, 65'000});

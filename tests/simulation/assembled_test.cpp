@@ -5,28 +5,28 @@
 
 #include <gtest/gtest.h>
 
-#include "server/scene/springs.h"
+#include "server/model/springs.h"
 #include "tests/simulation/scenes.h"
 
 namespace clothstream::tests {
 namespace {
 
-using scene::ConstraintPath;
-using scene::SolverKind;
+using model::ConstraintPath;
+using model::SolverKind;
 using simulation::NodeState;
 using simulation::StateSnapshot;
 
 class Assembled : public GpuTest {};
 
-scene::Scene withPath(scene::Scene scene, ConstraintPath path) {
-  for (scene::Cloth& cloth : scene.cloths) cloth.solver.path = path;
+model::Scene withPath(model::Scene scene, ConstraintPath path) {
+  for (model::Cloth& cloth : scene.cloths) cloth.solver.path = path;
   return scene;
 }
 
-double rowsOf(const scene::Scene& scene) {
+double rowsOf(const model::Scene& scene) {
   double rows = 0;
-  for (const scene::Cloth& cloth : scene.cloths)
-    rows += static_cast<double>(scene::systemLinks(cloth).size());
+  for (const model::Cloth& cloth : scene.cloths)
+    rows += static_cast<double>(model::systemLinks(cloth).size());
   return rows;
 }
 
@@ -45,15 +45,15 @@ constexpr double kDisplaced = 0.007;  // of a length, two ends of which are off 
 struct Compared {
   std::uint32_t iterations = kSolveIterations;
   float tolerance = kSolveTolerance;
-  std::vector<scene::Pose> attachments = {};
+  std::vector<model::Pose> attachments = {};
 };
 
 // One substep from a random state.
-void expectLikeSolution(scene::Scene scene, unsigned seed, simulation::SimulationOptions options = {},
+void expectLikeSolution(model::Scene scene, unsigned seed, simulation::SimulationOptions options = {},
                         Compared compared = {}) {
   scene.substeps = 1;
   scene.simulationRate = 720;
-  for (scene::Cloth& cloth : scene.cloths) {
+  for (model::Cloth& cloth : scene.cloths) {
     cloth.solver.iterations = compared.iterations;
     cloth.solver.tolerance = compared.tolerance;
   }
@@ -61,7 +61,7 @@ void expectLikeSolution(scene::Scene scene, unsigned seed, simulation::Simulatio
   const NodeState start = randomState(scene, random, 0.002f, 0.5f);
   simulation::TickInputs inputs = inputsOf(scene);
   inputs.attachments = compared.attachments;
-  const auto referenceAfter = [&](const scene::Scene& of) {
+  const auto referenceAfter = [&](const model::Scene& of) {
     reference::ReferenceSimulation reference(of);
     setState(reference, start);
     reference.tick(referenceInputs(inputs));
@@ -83,7 +83,7 @@ void expectLikeSolution(scene::Scene scene, unsigned seed, simulation::Simulatio
   }
   // Without the solve, or with an iteration less where few are made, it would be elsewhere: the comparison
   // can fail.
-  for (scene::Cloth& cloth : scene.cloths)
+  for (model::Cloth& cloth : scene.cloths)
     if (compared.iterations < kSolveIterations)
       --cloth.solver.iterations;
     else
@@ -91,57 +91,57 @@ void expectLikeSolution(scene::Scene scene, unsigned seed, simulation::Simulatio
   EXPECT_GT(largestDistance(state, referenceAfter(scene)), 2 * tolerance);
 }
 
-scene::Cloth disc(std::uint32_t rings) {
-  scene::Cloth cloth = assembled(discCloth(rings));
+model::Cloth disc(std::uint32_t rings) {
+  model::Cloth cloth = assembled(discCloth(rings));
   cloth.name = "disc";
   cloth.mass = 0.01f * static_cast<float>(cloth.nodeCount());
   cloth.pinnedVertices = {0, 1};
   return cloth;
 }
 
-TEST_F(Assembled, moveNodesAsTheReferenceOnEveryShapeOfGrid) {
+TEST_F(Assembled, MoveNodesAsTheReferenceOnEveryShapeOfGrid) {
   const std::pair<std::uint32_t, std::uint32_t> shapes[] = {{2, 2}, {2, 7}, {9, 3}, {17, 23}};
   unsigned seed = 1;
   for (const auto& [rows, columns] : shapes) {
     SCOPED_TRACE(::testing::Message() << rows << " x " << columns);
-    scene::Cloth cloth = assembled(calmCloth(rows, columns));
+    model::Cloth cloth = assembled(calmCloth(rows, columns));
     cloth.pins = {topRow(cloth)};
     expectLikeSolution(sceneOf({cloth}), seed++);
   }
 }
 
-TEST_F(Assembled, thatArePulledGentlyMoveNodesAsTheReference) {
-  scene::Cloth cloth = assembled(calmCloth(9, 8));
+TEST_F(Assembled, ThatArePulledGentlyMoveNodesAsTheReference) {
+  model::Cloth cloth = assembled(calmCloth(9, 8));
   cloth.solver.takenBack = 0.125f;
   expectLikeSolution(sceneOf({cloth}), 8);
 }
 
-TEST_F(Assembled, ofBendSpringsMoveNodesAsTheReference) {
+TEST_F(Assembled, OfBendSpringsMoveNodesAsTheReference) {
   expectLikeSolution(sceneOf({assembled(calmCloth(12, 11), true)}), 5);
 }
 
-TEST_F(Assembled, ofMeshesMoveNodesAsTheReference) {
+TEST_F(Assembled, OfMeshesMoveNodesAsTheReference) {
   expectLikeSolution(sceneOf({assembled(calmCloth(6, 9)), disc(7)}), 7);
 }
 
 // Attached nodes move at a speed of their own, which is part of b.
-TEST_F(Assembled, followAttachmentsAsTheReferenceDoes) {
-  scene::Cloth cloth = assembled(calmCloth(8, 7));
-  scene::Attachment rod;
+TEST_F(Assembled, FollowAttachmentsAsTheReferenceDoes) {
+  model::Cloth cloth = assembled(calmCloth(8, 7));
+  model::Attachment rod;
   rod.name = "rod";
   rod.ranges = {topRow(cloth)};
   cloth.attachments = {rod};
   Compared compared;
-  compared.attachments = {{scene::Vec3(0.0006f, 0.0008f, -0.0003f)}};
+  compared.attachments = {{model::Vec3(0.0006f, 0.0008f, -0.0003f)}};
   expectLikeSolution(sceneOf({cloth}), 11, {}, compared);
 }
 
-TEST_F(Assembled, thatSeveralWorkgroupsSolveMoveNodesAsTheReference) {
+TEST_F(Assembled, ThatSeveralWorkgroupsSolveMoveNodesAsTheReference) {
   expectLikeSolution(sceneOf({assembled(calmCloth(21, 26)), disc(7)}), 9, {.solveWholeNodes = 0});
 }
 
 // The same iterates, not just the same limit: [Va21] Eq. 12-17. Few enough that rounding has not grown.
-TEST_F(Assembled, goAsFarInFewIterationsAsTheReference) {
+TEST_F(Assembled, GoAsFarInFewIterationsAsTheReference) {
   for (const std::uint32_t wholeNodes : {1'000'000u, 0u})
     for (const std::uint32_t iterations : {1u, 2u, 4u}) {
       SCOPED_TRACE(::testing::Message() << iterations << " iterations, " << wholeNodes);
@@ -152,19 +152,19 @@ TEST_F(Assembled, goAsFarInFewIterationsAsTheReference) {
 
 // From a random state, three substeps. What one is off by stays in the velocity: n^2 / 2 times as much after
 // n, of two paths twice that.
-TEST_F(Assembled, moveAsTheMatrixFreePathDoes) {
-  scene::Cloth cloth = assembled(calmCloth(8, 7));
+TEST_F(Assembled, MoveAsTheMatrixFreePathDoes) {
+  model::Cloth cloth = assembled(calmCloth(8, 7));
   cloth.pins = {{.firstRow = 0, .lastRow = 2, .firstColumn = 0, .lastColumn = 6}};
-  scene::Scene scene = sceneOf({cloth, disc(3)});
+  model::Scene scene = sceneOf({cloth, disc(3)});
   scene.simulationRate = 240;
   scene.substeps = 3;
-  for (scene::Cloth& one : scene.cloths) {
+  for (model::Cloth& one : scene.cloths) {
     one.solver.iterations = kSolveIterations;
     one.solver.tolerance = kSolveTolerance;
   }
   std::mt19937 random(12);
   const NodeState start = randomState(scene, random, 0.002f, 0.5f);
-  const auto after = [&](const scene::Scene& of) {
+  const auto after = [&](const model::Scene& of) {
     Running running(of);
     running.restore(start);
     EXPECT_TRUE(running.tick(inputsOf(of)).healthy);
@@ -179,25 +179,25 @@ TEST_F(Assembled, moveAsTheMatrixFreePathDoes) {
   const double tolerance = 3 * 3 * errorOfSolve(rowsOf(scene), kDisplaced);
   const NodeState state = after(scene);
   EXPECT_LT(apart(state, after(withPath(scene, ConstraintPath::matrixFree))), tolerance);
-  for (scene::Cloth& one : scene.cloths) one.solver.compliance = 1;
+  for (model::Cloth& one : scene.cloths) one.solver.compliance = 1;
   EXPECT_GT(apart(state, after(scene)), 2 * tolerance);
 }
 
 // Of pinned nodes alone there is nothing to solve, and beside others they are no row.
-TEST_F(Assembled, leavePinnedNodesWhereTheyAre) {
-  scene::Cloth stiff = assembled(calmCloth(5, 4), true);
+TEST_F(Assembled, LeavePinnedNodesWhereTheyAre) {
+  model::Cloth stiff = assembled(calmCloth(5, 4), true);
   stiff.pins = {{.firstRow = 0, .lastRow = 4, .firstColumn = 0, .lastColumn = 3}};
-  scene::Cloth half = assembled(calmCloth(8, 9), true);
+  model::Cloth half = assembled(calmCloth(8, 9), true);
   half.name = "half";
   half.pins = {{.firstRow = 0, .lastRow = 4, .firstColumn = 0, .lastColumn = 8}};
   for (const std::uint32_t wholeNodes : {1'000'000u, 0u}) {
-    const scene::Scene scene = sceneOf({stiff, half});
+    const model::Scene scene = sceneOf({stiff, half});
     Running running(scene, {.solveWholeNodes = wholeNodes});
     std::vector<simulation::ClothReport> reports;
     for (int tick = 0; tick < 10; ++tick) reports = running.tickAndReport(inputsOf(scene));
     EXPECT_EQ(reports[0].activeConstraints, 0u);
     EXPECT_EQ(reports[0].iterations, 0u);
-    EXPECT_EQ(reports[1].activeConstraints, scene::systemLinks(half).size());
+    EXPECT_EQ(reports[1].activeConstraints, model::systemLinks(half).size());
     EXPECT_GT(reports[1].iterations, 0u);
     const NodeState state = running.state(), start = simulation::restState(scene.cloths);
     const std::vector<float> masses = simulation::inverseMasses(scene.cloths);
@@ -210,12 +210,12 @@ TEST_F(Assembled, leavePinnedNodesWhereTheyAre) {
 
 // [Va21]'s system, singular, and in general without a solution: few iterations hold a sheet. More of them
 // throw its nodes about, in double precision too.
-TEST_F(Assembled, withoutComplianceHoldASheetInFewIterations) {
-  scene::Cloth cloth = assembled(calmCloth(20, 20), true);
+TEST_F(Assembled, WithoutComplianceHoldASheetInFewIterations) {
+  model::Cloth cloth = assembled(calmCloth(20, 20), true);
   cloth.pins = {topRow(cloth)};
   cloth.damping = 2;
   cloth.solver.compliance = 0;
-  scene::Scene scene = sceneOf({cloth});
+  model::Scene scene = sceneOf({cloth});
   std::mt19937 random(4);
   const NodeState start = randomState(scene, random, 0.002f, 0.5f);
   Running running(scene);
@@ -232,27 +232,27 @@ TEST_F(Assembled, withoutComplianceHoldASheetInFewIterations) {
 }
 
 // Grids and meshes, large and small, beside cloths of other solvers; and a ball.
-scene::Scene systems() {
-  scene::Cloth held = assembled(calmCloth(37, 29), true);
+model::Scene systems() {
+  model::Cloth held = assembled(calmCloth(37, 29), true);
   held.pins = {topRow(held)};
   held.name = "held";
-  scene::Cloth free = calmCloth(9, 14);
+  model::Cloth free = calmCloth(9, 14);
   free.name = "free";
   free.pins = {topRow(free)};
-  scene::Cloth small = assembled(calmCloth(5, 3));
+  model::Cloth small = assembled(calmCloth(5, 3));
   small.name = "small";
   small.solver.tolerance = 0.1f;
-  scene::Cloth other = small;
+  model::Cloth other = small;
   other.name = "other";
   other.solver.path = ConstraintPath::matrixFree;
-  scene::Cloth round = disc(10);
+  model::Cloth round = disc(10);
   round.solver.iterations = 7;
-  scene::Scene scene = sceneOf({held, free, round, other, small});
+  model::Scene scene = sceneOf({held, free, round, other, small});
   scene.substeps = 4;
   return scene;
 }
 
-TEST_F(Assembled, giveTheSameBitsHoweverTheWorkIsCut) {
+TEST_F(Assembled, GiveTheSameBitsHoweverTheWorkIsCut) {
   const simulation::SimulationOptions ways[] = {{.workgroupSize = 8, .solveWholeNodes = 1'000'000},
                                                 {.workgroupSize = 8, .solveWholeNodes = 0},
                                                 {.workgroupSize = 0, .solveWholeNodes = 700},
@@ -262,24 +262,24 @@ TEST_F(Assembled, giveTheSameBitsHoweverTheWorkIsCut) {
   expectSameBits(systems(), passingBall, 10, ways);
 }
 
-TEST_F(Assembled, reportTheSameWhoeverSolves) {
-  const scene::Scene scene = systems();
+TEST_F(Assembled, ReportTheSameWhoeverSolves) {
+  const model::Scene scene = systems();
   for (const auto& reports :
        expectSameReports(scene, passingBall, {.solveWholeNodes = 1'000'000}, {.solveWholeNodes = 0}))
     for (std::size_t i = 0; i < reports.size(); ++i)
-      if (scene::isAssembled(scene.cloths[i].solver)) {
-        EXPECT_EQ(reports[i].activeConstraints, scene::systemLinks(scene.cloths[i]).size());
+      if (model::isAssembled(scene.cloths[i].solver)) {
+        EXPECT_EQ(reports[i].activeConstraints, model::systemLinks(scene.cloths[i]).size());
         EXPECT_GT(reports[i].iterations, 0u);
       }
 }
 
 // More iterations than a dispatch may make where one workgroup solves.
-TEST_F(Assembled, giveTheSameBitsInSeveralDispatches) {
-  scene::Cloth cloth = assembled(calmCloth(37, 29), true);
+TEST_F(Assembled, GiveTheSameBitsInSeveralDispatches) {
+  model::Cloth cloth = assembled(calmCloth(37, 29), true);
   cloth.pins = {topRow(cloth)};
   cloth.solver.iterations = 150;
   cloth.solver.tolerance = 0;
-  const scene::Scene scene = sceneOf({cloth});
+  const model::Scene scene = sceneOf({cloth});
   Running whole(scene, {.solveWholeNodes = 1'000'000}), parts(scene, {.solveWholeNodes = 0});
   for (int tick = 0; tick < 3; ++tick)
     ASSERT_EQ(whole.tick(inputsOf(scene)).stateHash, parts.tick(inputsOf(scene)).stateHash);
@@ -287,23 +287,23 @@ TEST_F(Assembled, giveTheSameBitsInSeveralDispatches) {
   EXPECT_EQ(whole.solves().front().residual, parts.solves().front().residual);
 }
 
-TEST_F(Assembled, giveTheSameHashesInRunsOfAThousandTicks) {
-  scene::Scene scene = systems();
+TEST_F(Assembled, GiveTheSameHashesInRunsOfAThousandTicks) {
+  model::Scene scene = systems();
   scene.substeps = 1;
   scene.simulationRate = 288;
-  for (scene::Cloth& cloth : scene.cloths) cloth.solver.iterations = 4;
+  for (model::Cloth& cloth : scene.cloths) cloth.solver.iterations = 4;
   expectSameThousandTicks(scene, passingBall, {.workgroupSize = 16, .solveWholeNodes = 0});
 }
 
 // The same number on every device.
-TEST_F(Assembled, reachTheHashOfEveryOtherDevice) {
+TEST_F(Assembled, ReachTheHashOfEveryOtherDevice) {
   EXPECT_EQ(hashAfter(systems(), passingBall, 12, {.solveWholeNodes = 700}), 0x2cdc132fea593d4cu);
 }
 
 // Back and forth: the state stays to the bit, and goes on to the bit as one that always had this path would
 // from the same state.
-TEST_F(Assembled, takeOverFromTheMatrixFreePathWithoutAJump) {
-  scene::Scene scene = sceneOf({assembled(calmCloth(14, 11)), disc(5)});
+TEST_F(Assembled, TakeOverFromTheMatrixFreePathWithoutAJump) {
+  model::Scene scene = sceneOf({assembled(calmCloth(14, 11)), disc(5)});
   scene.cloths[0].pins = {topRow(scene.cloths[0])};
   const simulation::TickInputs inputs = passingBall(scene, 30);
   scene = withPath(scene, ConstraintPath::matrixFree);

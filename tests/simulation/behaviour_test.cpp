@@ -17,16 +17,16 @@ class Behaviour : public GpuTest {};
 
 // Semi-implicit Euler falls g h^2 n (n + 1) / 2 in n steps. The sum of n rounded steps errs by at most half
 // an ulp of the distance each, and the cloth stays as it is: forces of a cloth at rest are of rounding.
-TEST_F(Behaviour, aFreeClothFallsAsTheFormulaSays) {
-  scene::Cloth cloth = calmCloth(12, 15);
+TEST_F(Behaviour, AFreeClothFallsAsTheFormulaSays) {
+  model::Cloth cloth = calmCloth(12, 15);
   cloth.damping = 0;
-  const scene::Scene scene = sceneOf({cloth});
+  const model::Scene scene = sceneOf({cloth});
   Running running(scene);
-  const std::vector<scene::Vec3> start = running.state().positions;
+  const std::vector<model::Vec3> start = running.state().positions;
   for (int tick = 0; tick < 72; ++tick) running.tick(inputsOf(scene));
   const double n = 720, h = scene.substepSeconds();
   const double fall = 9.81 * h * h * n * (n + 1) / 2;
-  const std::vector<scene::Vec3> end = running.state().positions;
+  const std::vector<model::Vec3> end = running.state().positions;
   for (std::size_t i = 0; i < start.size(); ++i) {
     const reference::Vec3 moved = end[i].cast<double>() - start[i].cast<double>();
     EXPECT_NEAR(-moved.y(), fall, 1e-5 * fall);
@@ -34,13 +34,13 @@ TEST_F(Behaviour, aFreeClothFallsAsTheFormulaSays) {
   }
 }
 
-TEST_F(Behaviour, explicitEulerFallsOneStepBehind) {
-  scene::Cloth cloth = calmCloth(4, 4);
+TEST_F(Behaviour, ExplicitEulerFallsOneStepBehind) {
+  model::Cloth cloth = calmCloth(4, 4);
   cloth.damping = 0;
-  scene::Scene scene = sceneOf({cloth});
-  scene.integrator = scene::Integrator::explicitEuler;
+  model::Scene scene = sceneOf({cloth});
+  scene.integrator = model::Integrator::explicitEuler;
   Running running(scene);
-  const scene::Vec3 start = running.state().positions[5];
+  const model::Vec3 start = running.state().positions[5];
   for (int tick = 0; tick < 36; ++tick) running.tick(inputsOf(scene));
   const double n = 360, h = scene.substepSeconds();
   const double fall = 9.81 * h * h * n * (n - 1) / 2;
@@ -50,11 +50,11 @@ TEST_F(Behaviour, explicitEulerFallsOneStepBehind) {
 // Springs pull both ends alike to the bit; only the rounding of each node's own sums is left. Over a second
 // the sum of 2,000 nodes' momenta, each rounded some tens of times a substep, stays within a millionth of
 // what flows about.
-TEST_F(Behaviour, aFreeClothKeepsItsMomentum) {
-  scene::Cloth cloth = calmCloth(40, 50);
+TEST_F(Behaviour, AFreeClothKeepsItsMomentum) {
+  model::Cloth cloth = calmCloth(40, 50);
   cloth.damping = 0;
-  scene::Scene scene = sceneOf({cloth});
-  scene.environment.gravity = scene::Vec3::Zero();
+  model::Scene scene = sceneOf({cloth});
+  scene.environment.gravity = model::Vec3::Zero();
   std::mt19937 random(11);
   const NodeState start = randomState(scene, random, 0.004f, 0.5f);
   Running running(scene);
@@ -79,29 +79,29 @@ TEST_F(Behaviour, aFreeClothKeepsItsMomentum) {
   EXPECT_LT(angular.norm(), 1e-5 * turning);
 }
 
-TEST_F(Behaviour, pinnedNodesKeepEveryBit) {
-  scene::Cloth cloth = calmCloth(20, 20);
-  cloth.grid.pose.position = scene::Vec3(0.123f, 1.7f, -0.3f);
+TEST_F(Behaviour, PinnedNodesKeepEveryBit) {
+  model::Cloth cloth = calmCloth(20, 20);
+  cloth.grid.pose.position = model::Vec3(0.123f, 1.7f, -0.3f);
   cloth.pins = {
       topRow(cloth),
       {.firstRow = 7, .lastRow = 19, .rowStep = 4, .firstColumn = 1, .lastColumn = 18, .columnStep = 5}};
   cloth.drag = 1;
-  scene::Scene scene = sceneOf({cloth});
-  scene.environment.wind = scene::Vec3(2, 1, 5);
+  model::Scene scene = sceneOf({cloth});
+  scene.environment.wind = model::Vec3(2, 1, 5);
   Running running(scene);
   const NodeState start = running.state();
   // The sphere goes through pinned nodes too.
   for (int tick = 0; tick < 50; ++tick)
     running.tick(inputsOf(
         scene,
-        {{scene::Sphere{0.2f}, {scene::Vec3(0.1f, 1.7f, -0.3f)}, {scene::Vec3(0.1f, 1.6f, -0.3f)}, 1}}));
+        {{model::Sphere{0.2f}, {model::Vec3(0.1f, 1.7f, -0.3f)}, {model::Vec3(0.1f, 1.6f, -0.3f)}, 1}}));
   const NodeState end = running.state();
-  const std::vector<std::uint8_t> pinned = scene::pinnedNodes(cloth);
+  const std::vector<std::uint8_t> pinned = model::pinnedNodes(cloth);
   int moved = 0;
   for (std::size_t i = 0; i < pinned.size(); ++i) {
     if (pinned[i] != 0) {
       EXPECT_EQ(end.positions[i], start.positions[i]) << i;
-      EXPECT_EQ(end.velocities[i], scene::Vec3::Zero()) << i;
+      EXPECT_EQ(end.velocities[i], model::Vec3::Zero()) << i;
     } else {
       moved += end.positions[i] != start.positions[i] ? 1 : 0;
     }
@@ -114,14 +114,14 @@ TEST_F(Behaviour, pinnedNodesKeepEveryBit) {
 // of that position with it, which moves the velocity by h k / m of it over a period of the springs, sqrt(m /
 // k), some tenfold: independent errors that add up as a random walk does, of which three standard deviations
 // are allowed. What the float time step errs by, 2^-25, is far less.
-TEST_F(Behaviour, aCalmClothStaysWithTheReferenceFor200Ticks) {
-  scene::Cloth cloth = calmCloth(24, 24);
+TEST_F(Behaviour, ACalmClothStaysWithTheReferenceFor200Ticks) {
+  model::Cloth cloth = calmCloth(24, 24);
   cloth.pins = {topRow(cloth)};
   cloth.damping = 20;
   cloth.shear.stiffness = 20;
   cloth.drag = 0.4f;
-  scene::Scene scene = sceneOf({cloth});
-  scene.environment.wind = scene::Vec3(0.5f, 0, 1);
+  model::Scene scene = sceneOf({cloth});
+  scene.environment.wind = model::Vec3(0.5f, 0, 1);
   Running running(scene);
   reference::ReferenceSimulation reference(scene);
   setState(reference, running.state());
@@ -142,22 +142,22 @@ TEST_F(Behaviour, aCalmClothStaysWithTheReferenceFor200Ticks) {
 
 // Nodes never end a tick inside the sphere: the collision comes last in a substep. What is left is the
 // rounding of the centre, the normal and their sum, each within an ulp of the 0.5 m that they measure.
-TEST_F(Behaviour, aClothDroppedOnASphereRestsOnItsSurface) {
-  scene::Cloth cloth = calmCloth(33, 33);
+TEST_F(Behaviour, AClothDroppedOnASphereRestsOnItsSurface) {
+  model::Cloth cloth = calmCloth(33, 33);
   cloth.grid.pose.orientation =
-      scene::Quaternion(Eigen::AngleAxisf(std::acos(-1.0f) / 2, scene::Vec3::UnitX()));
-  cloth.grid.pose.position = scene::Vec3(0, 0.26f, 0.32f);
+      model::Quaternion(Eigen::AngleAxisf(std::acos(-1.0f) / 2, model::Vec3::UnitX()));
+  cloth.grid.pose.position = model::Vec3(0, 0.26f, 0.32f);
   cloth.thickness = 0.005f;
   cloth.damping = 1;
-  const scene::Scene scene = sceneOf({cloth});
-  const scene::Vec3 centre = scene::Vec3(0, 0, 0);
+  const model::Scene scene = sceneOf({cloth});
+  const model::Vec3 centre = model::Vec3(0, 0, 0);
   const double radius = 0.2;
   Running running(scene);
   double deepest = 0;
   bool touched = false;
   for (int tick = 0; tick < 144; ++tick) {
-    running.tick(inputsOf(scene, {{scene::Sphere{static_cast<float>(radius)}, {centre}, {centre}, 1}}));
-    for (const scene::Vec3& position : running.state().positions) {
+    running.tick(inputsOf(scene, {{model::Sphere{static_cast<float>(radius)}, {centre}, {centre}, 1}}));
+    for (const model::Vec3& position : running.state().positions) {
       const double distance = position.cast<double>().norm();
       deepest = std::max(deepest, radius + 0.005 - distance);
       touched = touched || distance < radius + 0.0051;
@@ -169,21 +169,21 @@ TEST_F(Behaviour, aClothDroppedOnASphereRestsOnItsSurface) {
 }
 
 // A node that rests on a huge sphere that moves sideways: with friction it goes along, without it stays.
-TEST_F(Behaviour, frictionCarriesAClothAlongWithASphere) {
+TEST_F(Behaviour, FrictionCarriesAClothAlongWithASphere) {
   const float radius = 100;
   const auto carried = [&](float friction) {
-    scene::Cloth cloth = calmCloth(5, 5);
+    model::Cloth cloth = calmCloth(5, 5);
     cloth.grid.pose.orientation =
-        scene::Quaternion(Eigen::AngleAxisf(std::acos(-1.0f) / 2, scene::Vec3::UnitX()));
+        model::Quaternion(Eigen::AngleAxisf(std::acos(-1.0f) / 2, model::Vec3::UnitX()));
     cloth.damping = 0;
     cloth.friction = friction;
     cloth.thickness = 0;
-    const scene::Scene scene = sceneOf({cloth});
+    const model::Scene scene = sceneOf({cloth});
     Running running(scene);
     const float speed = 0.2f;
     for (int tick = 0; tick < 72; ++tick) {
-      const auto at = [&](int t) { return scene::Vec3(speed / 72 * static_cast<float>(t), -radius, 0); };
-      running.tick(inputsOf(scene, {{scene::Sphere{radius}, {at(tick)}, {at(tick + 1)}, 1}}));
+      const auto at = [&](int t) { return model::Vec3(speed / 72 * static_cast<float>(t), -radius, 0); };
+      running.tick(inputsOf(scene, {{model::Sphere{radius}, {at(tick)}, {at(tick + 1)}, 1}}));
     }
     return running.state().velocities[12].x();
   };
@@ -193,24 +193,24 @@ TEST_F(Behaviour, frictionCarriesAClothAlongWithASphere) {
 }
 
 // Coulomb: a sheet sliding with v loses mu g a second. On a sphere of 100 m it is flat to 1e-3.
-TEST_F(Behaviour, frictionSlowsByItsCoefficientTimesTheLoad) {
-  scene::Cloth cloth = calmCloth(5, 5);
+TEST_F(Behaviour, FrictionSlowsByItsCoefficientTimesTheLoad) {
+  model::Cloth cloth = calmCloth(5, 5);
   cloth.grid.pose.orientation =
-      scene::Quaternion(Eigen::AngleAxisf(std::acos(-1.0f) / 2, scene::Vec3::UnitX()));
+      model::Quaternion(Eigen::AngleAxisf(std::acos(-1.0f) / 2, model::Vec3::UnitX()));
   cloth.damping = 0;
   cloth.friction = 0.25f;
   cloth.thickness = 0;
-  const scene::Scene scene = sceneOf({cloth});
+  const model::Scene scene = sceneOf({cloth});
   NodeState state = simulation::restState(scene.cloths);
-  for (scene::Vec3& velocity : state.velocities) velocity.x() = 1.0f;
+  for (model::Vec3& velocity : state.velocities) velocity.x() = 1.0f;
   Running running(scene);
   running.restore(state);
-  const scene::Vec3 centre(0, -100, 0);
+  const model::Vec3 centre(0, -100, 0);
   const int ticks = 18;
   for (int tick = 0; tick < ticks; ++tick)
-    running.tick(inputsOf(scene, {{scene::Sphere{100}, {centre}, {centre}, 1}}));
+    running.tick(inputsOf(scene, {{model::Sphere{100}, {centre}, {centre}, 1}}));
   double mean = 0;
-  for (const scene::Vec3& velocity : running.state().velocities) mean += double{velocity.x()} / 25;
+  for (const model::Vec3& velocity : running.state().velocities) mean += double{velocity.x()} / 25;
   const double seconds = ticks / 72.0;
   EXPECT_NEAR(mean, 1 - 0.25 * 9.81 * seconds, 0.02);
 }

@@ -6,33 +6,33 @@
 
 #include <gtest/gtest.h>
 
-#include "server/scene/hinges.h"
-#include "server/scene/stability.h"
+#include "server/model/hinges.h"
+#include "server/model/stability.h"
 #include "tests/simulation/scenes.h"
 
 namespace clothstream::tests {
 namespace {
 
-using scene::SolverKind;
+using model::SolverKind;
 using simulation::NodeState;
 
 class DihedralBending : public GpuTest {};
 
 // Bent at rest, without springs: only gravity and hinges move it.
-scene::Cloth bowl(float rigidity) {
-  scene::MeshShape shape = scene::disc(6, 0.12f);
-  for (scene::Vec3& node : shape.positions) node.y() = 2 * (node.x() * node.x() + node.z() * node.z());
-  scene::Cloth cloth;
+model::Cloth bowl(float rigidity) {
+  model::MeshShape shape = model::disc(6, 0.12f);
+  for (model::Vec3& node : shape.positions) node.y() = 2 * (node.x() * node.x() + node.z() * node.z());
+  model::Cloth cloth;
   cloth.name = "bowl";
-  cloth.mesh = std::make_shared<const scene::Mesh>(scene::makeMesh(shape));
+  cloth.mesh = std::make_shared<const model::Mesh>(model::makeMesh(shape));
   cloth.mass = 0.01f;
   cloth.dihedralBending = rigidity;
   cloth.pinnedVertices = {3, 7};
   return cloth;
 }
 
-scene::Cloth looseGrid(float rigidity) {
-  scene::Cloth cloth = calmCloth(13, 9);
+model::Cloth looseGrid(float rigidity) {
+  model::Cloth cloth = calmCloth(13, 9);
   cloth.name = "grid";
   cloth.structural = cloth.shear = cloth.bend = {};
   cloth.dihedralBending = rigidity;
@@ -44,13 +44,13 @@ scene::Cloth looseGrid(float rigidity) {
 // hinge by so much over the least height; unit normals and what follows from them err by five reciprocal
 // roots of 7e-7. What hinges pull with then errs by that part of the most they could pull with, and the sum
 // is rounded to velocities of up to 1 m/s.
-double errorOf(const scene::Cloth& cloth, const NodeState& state, std::uint32_t first, double h) {
-  const std::vector<double> masses = scene::nodeMasses(cloth);
+double errorOf(const model::Cloth& cloth, const NodeState& state, std::uint32_t first, double h) {
+  const std::vector<double> masses = model::nodeMasses(cloth);
   std::vector<double> errors(cloth.nodeCount(), 0);
-  for (const scene::Hinge& hinge : scene::hinges(cloth)) {
+  for (const model::Hinge& hinge : model::hinges(cloth)) {
     std::array<Eigen::Vector3d, 4> at;
     for (std::size_t i = 0; i < 4; ++i) at[i] = state.positions[first + hinge.nodes[i]].cast<double>();
-    const scene::HingeShape shape = scene::hingeShape(at, hinge.leastSquare);
+    const model::HingeShape shape = model::hingeShape(at, hinge.leastSquare);
     double steepest = 0;
     for (const Eigen::Vector3d& gradient : shape.gradients) steepest = std::max(steepest, gradient.norm());
     const double placed = 4 * steepest * 0.5 * kRounding + 5 * 7e-7 * (1 + std::abs(shape.bent));
@@ -63,11 +63,11 @@ double errorOf(const scene::Cloth& cloth, const NodeState& state, std::uint32_t 
   return most + 4 * kRounding;
 }
 
-TEST_F(DihedralBending, movesGridsAndMeshesAsTheReference) {
-  scene::Scene scene = sceneOf({looseGrid(2e-4f), bowl(1e-5f)});
+TEST_F(DihedralBending, MovesGridsAndMeshesAsTheReference) {
+  model::Scene scene = sceneOf({looseGrid(2e-4f), bowl(1e-5f)});
   scene.substeps = 1;
   scene.simulationRate = scene.streamRate = 720;
-  ASSERT_EQ(scene::stableSubsteps(scene), 1u);
+  ASSERT_EQ(model::stableSubsteps(scene), 1u);
   std::mt19937 random(3);
   const NodeState start = randomState(scene, random, 0.005f, 0.3f);
   Running running(scene);
@@ -83,8 +83,8 @@ TEST_F(DihedralBending, movesGridsAndMeshesAsTheReference) {
   EXPECT_LT(largestDistance(running.state(), reference), h * error + kRounding);
 
   // Without hinges it would be elsewhere: the comparison can fail.
-  scene::Scene limp = scene;
-  for (scene::Cloth& cloth : limp.cloths) cloth.dihedralBending = 0;
+  model::Scene limp = scene;
+  for (model::Cloth& cloth : limp.cloths) cloth.dihedralBending = 0;
   reference::ReferenceSimulation other(limp);
   setState(other, start);
   other.tick(referenceInputs(inputsOf(limp)));
@@ -93,12 +93,12 @@ TEST_F(DihedralBending, movesGridsAndMeshesAsTheReference) {
 
 // A strip held by its first two columns bends under its weight by what the moments at its hinges say. Turned
 // by at most delta / L = 5 %, it errs from this linear theory by about the square of that.
-TEST_F(DihedralBending, bendsACantileverAsBeamsBend) {
+TEST_F(DihedralBending, BendsACantileverAsBeamsBend) {
   constexpr std::uint32_t kColumns = 21, kRows = 3;
-  scene::Cloth strip = calmCloth(kRows, kColumns);
+  model::Cloth strip = calmCloth(kRows, kColumns);
   strip.grid.width = 0.2f;
   strip.grid.height = 0.02f;
-  strip.grid.pose.orientation = turned(-90, scene::Vec3::UnitX());
+  strip.grid.pose.orientation = turned(-90, model::Vec3::UnitX());
   strip.mass = 0.0008f;
   strip.structural = {200, 0};
   strip.shear = {100, 0};
@@ -106,9 +106,9 @@ TEST_F(DihedralBending, bendsACantileverAsBeamsBend) {
   strip.damping = 40;
   strip.dihedralBending = 0.04f;
   strip.pins = {{.firstRow = 0, .lastRow = kRows - 1, .firstColumn = 0, .lastColumn = 1}};
-  scene::Scene scene = sceneOf({strip});
+  model::Scene scene = sceneOf({strip});
   scene.simulationRate = scene.streamRate = 360;
-  scene.substeps = scene::stableSubsteps(scene);
+  scene.substeps = model::stableSubsteps(scene);
   ASSERT_GT(scene.substeps, 0u);
   Running running(scene);
   for (int tick = 0; tick < 180; ++tick) ASSERT_TRUE(running.tick(inputsOf(scene)).healthy);
@@ -129,13 +129,13 @@ TEST_F(DihedralBending, bendsACantileverAsBeamsBend) {
 }
 
 // As large as the bound allows: what goes in does not grow.
-TEST_F(DihedralBending, isStableAtItsBound) {
-  scene::Cloth sheet = looseGrid(0.05f);
+TEST_F(DihedralBending, IsStableAtItsBound) {
+  model::Cloth sheet = looseGrid(0.05f);
   sheet.damping = 0;
-  scene::Scene scene = sceneOf({sheet});
-  scene.substeps = scene::stableSubsteps(scene);
+  model::Scene scene = sceneOf({sheet});
+  scene.substeps = model::stableSubsteps(scene);
   ASSERT_GT(scene.substeps, 1u);
-  scene.environment.gravity = scene::Vec3::Zero();
+  scene.environment.gravity = model::Vec3::Zero();
   std::mt19937 random(5);
   const NodeState start = randomState(scene, random, 1e-4f, 0);
   Running running(scene);
@@ -156,15 +156,15 @@ TEST_F(DihedralBending, isStableAtItsBound) {
 }
 
 // With every solver, switched on while it runs: the state stays, and goes on as one that always had it.
-TEST_F(DihedralBending, canComeAndGoWhileItRuns) {
+TEST_F(DihedralBending, CanComeAndGoWhileItRuns) {
   for (const SolverKind kind : {SolverKind::massSpring, SolverKind::constraint, SolverKind::acad,
                                 SolverKind::xpbd, SolverKind::implicitEuler}) {
     SCOPED_TRACE(static_cast<int>(kind));
-    scene::Cloth sheet = calmCloth(9, 8), disc = discCloth(4);
+    model::Cloth sheet = calmCloth(9, 8), disc = discCloth(4);
     sheet.pins = {topRow(sheet)};
     disc.name = "disc";
     sheet.solver.kind = disc.solver.kind = kind;
-    scene::Scene scene = sceneOf({sheet, disc});
+    model::Scene scene = sceneOf({sheet, disc});
     Running changing(scene);
     for (const float rigidity : {0.0f, 1e-4f, 3e-4f, 0.0f}) {
       scene.cloths[1].dihedralBending = rigidity;

@@ -15,43 +15,43 @@ using simulation::NodeState;
 
 class Collision : public GpuTest {};
 
-MovingCollider resting(const scene::Shape& shape, const scene::Pose& pose) {
+MovingCollider resting(const model::Shape& shape, const model::Pose& pose) {
   return {shape, pose, pose, 1};
 }
 
 // Lies flat, at this height.
-scene::Cloth lyingCloth(std::uint32_t rows, std::uint32_t columns, float height) {
-  scene::Cloth cloth = calmCloth(rows, columns);
-  cloth.grid.pose = {scene::Vec3(0, height, -cloth.grid.height / 2), turned(-90, scene::Vec3::UnitX())};
+model::Cloth lyingCloth(std::uint32_t rows, std::uint32_t columns, float height) {
+  model::Cloth cloth = calmCloth(rows, columns);
+  cloth.grid.pose = {model::Vec3(0, height, -cloth.grid.height / 2), turned(-90, model::Vec3::UnitX())};
   cloth.damping = 0;
   cloth.thickness = 0;
   return cloth;
 }
 
-double meanAlong(const std::vector<scene::Vec3>& vectors, const scene::Vec3& direction) {
+double meanAlong(const std::vector<model::Vec3>& vectors, const model::Vec3& direction) {
   double sum = 0;
-  for (const scene::Vec3& v : vectors) sum += v.cast<double>().dot(direction.cast<double>());
+  for (const model::Vec3& v : vectors) sum += v.cast<double>().dot(direction.cast<double>());
   return sum / static_cast<double>(vectors.size());
 }
 
 // A sheet on a slope of 30 degrees, tan 0.577: its speed after half a second.
-double speedOnASlope(const scene::Shape& shape, float friction) {
-  scene::Cloth cloth = lyingCloth(4, 4, 0);
-  const scene::Quaternion tilt = turned(-30, scene::Vec3::UnitZ());  // down towards +X
+double speedOnASlope(const model::Shape& shape, float friction) {
+  model::Cloth cloth = lyingCloth(4, 4, 0);
+  const model::Quaternion tilt = turned(-30, model::Vec3::UnitZ());  // down towards +X
   cloth.grid.pose = {tilt * cloth.grid.pose.position, tilt * cloth.grid.pose.orientation};
   cloth.friction = friction;
-  const scene::Scene scene = sceneOf({cloth});
-  scene::Pose pose{scene::Vec3::Zero(), tilt};
-  if (const auto* box = std::get_if<scene::Box>(&shape))
-    pose.position = tilt * scene::Vec3(0, -box->size.y() / 2, 0);
+  const model::Scene scene = sceneOf({cloth});
+  model::Pose pose{model::Vec3::Zero(), tilt};
+  if (const auto* box = std::get_if<model::Box>(&shape))
+    pose.position = tilt * model::Vec3(0, -box->size.y() / 2, 0);
   Running running(scene);
   for (int tick = 0; tick < 36; ++tick) running.tick(inputsOf(scene, {resting(shape, pose)}));
-  return meanAlong(running.state().velocities, tilt * scene::Vec3::UnitX());
+  return meanAlong(running.state().velocities, tilt * model::Vec3::UnitX());
 }
 
-TEST_F(Collision, aSheetOnASlopeSticksIfFrictionReachesItsTangent) {
-  for (const scene::Shape& shape :
-       {scene::Shape(scene::Plane{}), scene::Shape(scene::Box{scene::Vec3(8, 1, 8)})}) {
+TEST_F(Collision, ASheetOnASlopeSticksIfFrictionReachesItsTangent) {
+  for (const model::Shape& shape :
+       {model::Shape(model::Plane{}), model::Shape(model::Box{model::Vec3(8, 1, 8)})}) {
     EXPECT_NEAR(speedOnASlope(shape, 0.6f), 0, 1e-4);
     const double sliding = 9.81 * (std::sin(std::acos(-1.0) / 6) - 0.3 * std::cos(std::acos(-1.0) / 6)) * 0.5;
     EXPECT_NEAR(speedOnASlope(shape, 0.3f), sliding, 0.01 * sliding);
@@ -60,28 +60,28 @@ TEST_F(Collision, aSheetOnASlopeSticksIfFrictionReachesItsTangent) {
 }
 
 // What lies on a shape that spins about Y goes round with it: friction carries it, springs hold it together.
-TEST_F(Collision, spinCarriesTheCloth) {
+TEST_F(Collision, SpinCarriesTheCloth) {
   const float radius = 0.3f, rate = 1;  // rad/s
-  const scene::Shape shapes[] = {scene::Sphere{radius},
-                                 scene::Capsule{.radius = 0.1f, .length = 2 * radius - 0.2f},
-                                 scene::Box{scene::Vec3(0.5f, 2 * radius, 0.5f)}};
-  for (const scene::Shape& shape : shapes) {
-    scene::Cloth cloth = lyingCloth(5, 5, radius);
+  const model::Shape shapes[] = {model::Sphere{radius},
+                                 model::Capsule{.radius = 0.1f, .length = 2 * radius - 0.2f},
+                                 model::Box{model::Vec3(0.5f, 2 * radius, 0.5f)}};
+  for (const model::Shape& shape : shapes) {
+    model::Cloth cloth = lyingCloth(5, 5, radius);
     cloth.damping = 1;
     cloth.friction = 1;
-    const scene::Scene scene = sceneOf({cloth});
+    const model::Scene scene = sceneOf({cloth});
     Running running(scene);
     const auto at = [&](int tick) {
-      return scene::Pose{
-          scene::Vec3::Zero(),
-          turned(static_cast<float>(tick) / 72 * rate * 180 / std::acos(-1.0f), scene::Vec3::UnitY())};
+      return model::Pose{
+          model::Vec3::Zero(),
+          turned(static_cast<float>(tick) / 72 * rate * 180 / std::acos(-1.0f), model::Vec3::UnitY())};
     };
     for (int tick = 0; tick < 144; ++tick)
       running.tick(inputsOf(scene, {{shape, at(tick), at(tick + 1), 1}}));
     const NodeState state = running.state();
     double spin = 0;
     for (const std::size_t corner : {0u, 4u, 20u, 24u}) {
-      const scene::Vec3 arm = state.positions[corner], velocity = state.velocities[corner];
+      const model::Vec3 arm = state.positions[corner], velocity = state.velocities[corner];
       spin += double{(arm.z() * velocity.x() - arm.x() * velocity.z()) /
                      (arm.x() * arm.x() + arm.z() * arm.z())} /
               4;
@@ -92,21 +92,21 @@ TEST_F(Collision, spinCarriesTheCloth) {
 
 // 25 m/s are 35 mm in a substep: several times the thickness of what flies here. Whatever is hit is carried
 // in front of it, and nothing is passed through.
-TEST_F(Collision, nothingFastAndThinPassesThroughTheCloth) {
-  scene::Scene scene = sceneOf({calmCloth(33, 33)});
-  scene::Cloth& cloth = scene.cloths[0];
+TEST_F(Collision, NothingFastAndThinPassesThroughTheCloth) {
+  model::Scene scene = sceneOf({calmCloth(33, 33)});
+  model::Cloth& cloth = scene.cloths[0];
   cloth.structural = cloth.shear = cloth.bend = {};  // dust: nothing pulls a node along but what hits it
-  scene.environment.gravity = scene::Vec3::Zero();
-  const scene::Shape shapes[] = {scene::Sphere{0.01f}, scene::Capsule{.radius = 0.005f, .length = 0.3f},
-                                 scene::Box{scene::Vec3(0.3f, 0.3f, 0.01f)}, octahedron()};
+  scene.environment.gravity = model::Vec3::Zero();
+  const model::Shape shapes[] = {model::Sphere{0.01f}, model::Capsule{.radius = 0.005f, .length = 0.3f},
+                                 model::Box{model::Vec3(0.3f, 0.3f, 0.01f)}, octahedron()};
   const float speed = 25, step = speed / 72;
-  for (const scene::Shape& shape : shapes) {
+  for (const model::Shape& shape : shapes) {
     Running running(scene);
     const auto at = [&](int tick) {
-      return scene::Pose{scene::Vec3(0.002f, -0.317f, 0.61f - step * static_cast<float>(tick)),
-                         scene::Quaternion::Identity()};
+      return model::Pose{model::Vec3(0.002f, -0.317f, 0.61f - step * static_cast<float>(tick)),
+                         model::Quaternion::Identity()};
     };
-    const std::vector<scene::Vec3> before = running.state().positions;
+    const std::vector<model::Vec3> before = running.state().positions;
     for (int tick = 0; tick < 4; ++tick) running.tick(inputsOf(scene, {{shape, at(tick), at(tick + 1), 1}}));
     const NodeState after = running.state();
     const reference::Pose start = reference::toPose(at(0)), end = reference::toPose(at(4));
@@ -131,19 +131,19 @@ TEST_F(Collision, nothingFastAndThinPassesThroughTheCloth) {
   }
 }
 
-TEST_F(Collision, aFastClothDoesNotPassThroughAThinShape) {
-  scene::Scene scene = sceneOf({calmCloth(9, 9)});
+TEST_F(Collision, AFastClothDoesNotPassThroughAThinShape) {
+  model::Scene scene = sceneOf({calmCloth(9, 9)});
   scene.cloths[0].structural = scene.cloths[0].shear = scene.cloths[0].bend = {};
   scene.cloths[0].damping = 0;
-  scene.environment.gravity = scene::Vec3::Zero();
-  const scene::Shape shapes[] = {scene::Box{scene::Vec3(1, 1, 0.002f)},
-                                 scene::Capsule{.radius = 0.002f, .length = 1}};
-  for (const scene::Shape& shape : shapes) {
+  scene.environment.gravity = model::Vec3::Zero();
+  const model::Shape shapes[] = {model::Box{model::Vec3(1, 1, 0.002f)},
+                                 model::Capsule{.radius = 0.002f, .length = 1}};
+  for (const model::Shape& shape : shapes) {
     NodeState state = simulation::restState(scene.cloths);
-    for (scene::Vec3& velocity : state.velocities) velocity.z() = 30;
+    for (model::Vec3& velocity : state.velocities) velocity.z() = 30;
     Running running(scene);
     running.restore(state);
-    const scene::Pose pose{scene::Vec3(0, -0.08f, 0.1f), scene::Quaternion::Identity()};
+    const model::Pose pose{model::Vec3(0, -0.08f, 0.1f), model::Quaternion::Identity()};
     for (int tick = 0; tick < 2; ++tick) running.tick(inputsOf(scene, {resting(shape, pose)}));
     const NodeState after = running.state();
     // The middle column meets either; the first passes by the rod.
@@ -151,26 +151,26 @@ TEST_F(Collision, aFastClothDoesNotPassThroughAThinShape) {
       EXPECT_LT(after.positions[9 * row + 4].z(), 0.1f) << "shape " << shape.index();
       EXPECT_NEAR(after.velocities[9 * row + 4].z(), 0, 1e-4);
     }
-    EXPECT_EQ(after.positions[0].z() > 0.5f, std::holds_alternative<scene::Capsule>(shape));
+    EXPECT_EQ(after.positions[0].z() > 0.5f, std::holds_alternative<model::Capsule>(shape));
   }
 }
 
-TEST_F(Collision, nodesStayOutsideOfEveryShapeAndComeToRest) {
-  const scene::Shape shapes[] = {scene::Capsule{.radius = 0.08f, .length = 0.2f},
-                                 scene::Box{scene::Vec3(0.2f, 0.2f, 0.2f)}, octahedron()};
-  for (const scene::Shape& shape : shapes) {
-    scene::Cloth cloth = lyingCloth(21, 21, 0.3f);
+TEST_F(Collision, NodesStayOutsideOfEveryShapeAndComeToRest) {
+  const model::Shape shapes[] = {model::Capsule{.radius = 0.08f, .length = 0.2f},
+                                 model::Box{model::Vec3(0.2f, 0.2f, 0.2f)}, octahedron()};
+  for (const model::Shape& shape : shapes) {
+    model::Cloth cloth = lyingCloth(21, 21, 0.3f);
     cloth.thickness = 0.004f;
     cloth.damping = 3;
     cloth.friction = 0.6f;
-    const scene::Scene scene = sceneOf({cloth});
-    const scene::Pose pose{scene::Vec3(0.01f, 0.05f, 0), turned(25, scene::Vec3(1, 0.3f, 0.2f))};
-    const scene::Pose floor{scene::Vec3(0, -0.2f, 0), scene::Quaternion::Identity()};
+    const model::Scene scene = sceneOf({cloth});
+    const model::Pose pose{model::Vec3(0.01f, 0.05f, 0), turned(25, model::Vec3(1, 0.3f, 0.2f))};
+    const model::Pose floor{model::Vec3(0, -0.2f, 0), model::Quaternion::Identity()};
     Running running(scene);
     double deepest = 0;
     for (int tick = 0; tick < 360; ++tick) {
-      running.tick(inputsOf(scene, {resting(shape, pose), resting(scene::Plane{}, floor)}));
-      for (const scene::Vec3& position : running.state().positions) {
+      running.tick(inputsOf(scene, {resting(shape, pose), resting(model::Plane{}, floor)}));
+      for (const model::Vec3& position : running.state().positions) {
         deepest =
             std::max(deepest, double{cloth.thickness} - reference::heightOver(shape, reference::toPose(pose),
                                                                               position.cast<double>()));
@@ -178,11 +178,11 @@ TEST_F(Collision, nodesStayOutsideOfEveryShapeAndComeToRest) {
       }
     }
     double fastest = 0;
-    for (const scene::Vec3& velocity : running.state().velocities)
+    for (const model::Vec3& velocity : running.state().velocities)
       fastest = std::max(fastest, double{velocity.norm()});
     EXPECT_LT(deepest, 2e-6) << "shape " << shape.index();
     // From the capsule the sheet slides to the floor.
-    if (!std::holds_alternative<scene::Capsule>(shape)) {
+    if (!std::holds_alternative<model::Capsule>(shape)) {
       EXPECT_LT(fastest, 0.005) << "shape " << shape.index();
     }
   }
@@ -194,21 +194,21 @@ TEST_F(Collision, nodesStayOutsideOfEveryShapeAndComeToRest) {
 std::vector<MovingCollider> cloud(std::size_t count, float size, unsigned seed) {
   std::mt19937 random(seed);
   std::uniform_real_distribution<float> unit(-1, 1);
-  const auto vector = [&] { return scene::Vec3(unit(random), unit(random), unit(random)); };
+  const auto vector = [&] { return model::Vec3(unit(random), unit(random), unit(random)); };
   std::vector<MovingCollider> colliders;
   for (std::size_t i = 0; i < count; ++i) {
-    const scene::Shape shapes[] = {scene::Sphere{0.02f}, scene::Capsule{.radius = 0.01f, .length = 0.05f},
-                                   scene::Box{scene::Vec3(0.03f, 0.02f, 0.04f)}, octahedron()};
-    const scene::Pose start{size * vector(), turned(170 * unit(random), vector())};
-    const scene::Pose end{start.position + 0.05f * vector(),
+    const model::Shape shapes[] = {model::Sphere{0.02f}, model::Capsule{.radius = 0.01f, .length = 0.05f},
+                                   model::Box{model::Vec3(0.03f, 0.02f, 0.04f)}, octahedron()};
+    const model::Pose start{size * vector(), turned(170 * unit(random), vector())};
+    const model::Pose end{start.position + 0.05f * vector(),
                           turned(60 * unit(random), vector()) * start.orientation};
     colliders.push_back({shapes[i % (i < 64 ? 4 : 3)], start, end, 1});
   }
   return colliders;
 }
 
-TEST_F(Collision, collidersThatAreFarAwayChangeNoBit) {
-  const scene::Scene scene = sceneOf({calmCloth(40, 50)});
+TEST_F(Collision, CollidersThatAreFarAwayChangeNoBit) {
+  const model::Scene scene = sceneOf({calmCloth(40, 50)});
   std::vector<MovingCollider> near = cloud(40, 0.5f, 5), mixed;
   for (const MovingCollider& collider : near) {
     MovingCollider far = collider;
@@ -228,12 +228,12 @@ TEST_F(Collision, collidersThatAreFarAwayChangeNoBit) {
 // Lists are made for runs of 64 nodes. With a rag of 21 before it, a cloth's nodes fall into other runs, one
 // of which reaches from the rag to the cloth: lists that run over, nodes that leave the box that their list
 // is good for, lists that serve, all give the same.
-TEST_F(Collision, theRunsThatListsAreMadeForChangeNoBitHoweverMuchIsNear) {
-  const scene::Cloth cloth = calmCloth(37, 29);
-  scene::Cloth rag = calmCloth(3, 7);
+TEST_F(Collision, TheRunsThatListsAreMadeForChangeNoBitHoweverMuchIsNear) {
+  const model::Cloth cloth = calmCloth(37, 29);
+  model::Cloth rag = calmCloth(3, 7);
   rag.name = "rag";
-  rag.grid.pose.position = scene::Vec3(0.5f, 0.4f, 0.2f);
-  const scene::Scene one = sceneOf({cloth}), two = sceneOf({rag, cloth});
+  rag.grid.pose.position = model::Vec3(0.5f, 0.4f, 0.2f);
+  const model::Scene one = sceneOf({cloth}), two = sceneOf({rag, cloth});
   std::mt19937 random(9);
   const NodeState start = randomState(one, random, 0.004f, 8);
   NodeState both = simulation::restState(two.cloths);
@@ -258,8 +258,8 @@ TEST_F(Collision, theRunsThatListsAreMadeForChangeNoBitHoweverMuchIsNear) {
   }
 }
 
-TEST_F(Collision, asManyCollidersAsThereMayBeActAsInTheReference) {
-  scene::Scene scene = sceneOf({calmCloth(12, 12)});
+TEST_F(Collision, AsManyCollidersAsThereMayBeActAsInTheReference) {
+  model::Scene scene = sceneOf({calmCloth(12, 12)});
   scene.cloths[0].structural = scene.cloths[0].shear = scene.cloths[0].bend = {};
   scene.substeps = 1;
   scene.simulationRate = 720;
@@ -276,38 +276,38 @@ TEST_F(Collision, asManyCollidersAsThereMayBeActAsInTheReference) {
 
 // What falls on the ground and comes to rest has got back what gravity gave it: M g t. With every kernel that
 // collides.
-TEST_F(Collision, whatCollidersGiveToTheClothIsTold) {
-  using enum scene::SolverKind;
+TEST_F(Collision, WhatCollidersGiveToTheClothIsTold) {
+  using enum model::SolverKind;
   struct Kernel {
-    scene::SolverKind solver = massSpring;
-    scene::Integrator integrator = scene::Integrator::semiImplicitEuler;
+    model::SolverKind solver = massSpring;
+    model::Integrator integrator = model::Integrator::semiImplicitEuler;
     bool isMesh = false, selfCollides = false;
   };
   const Kernel kernels[] = {{},
                             {.isMesh = true},
-                            {.integrator = scene::Integrator::rungeKutta4},
+                            {.integrator = model::Integrator::rungeKutta4},
                             {.solver = constraint},
                             {.solver = acad, .isMesh = true},
                             {.solver = xpbd},
                             {.solver = implicitEuler},
                             {.selfCollides = true}};
   for (const Kernel& kernel : kernels) {
-    scene::Cloth cloth = lyingCloth(5, 7, 0.02f);
+    model::Cloth cloth = lyingCloth(5, 7, 0.02f);
     cloth.friction = 0;
     cloth.solver.kind = kernel.solver;
     if (kernel.solver == xpbd) cloth.solver.iterations = 1;
-    if (kernel.isMesh) cloth = scene::asMesh(cloth);
-    if (kernel.selfCollides) cloth.selfCollision = scene::SelfCollision{.radius = 0.008f};
+    if (kernel.isMesh) cloth = model::asMesh(cloth);
+    if (kernel.selfCollides) cloth.selfCollision = model::SelfCollision{.radius = 0.008f};
     // Another, far above, that touches nothing.
-    scene::Cloth above = lyingCloth(3, 3, 50);
+    model::Cloth above = lyingCloth(3, 3, 50);
     above.name = "above";
-    scene::Scene scene = sceneOf({above, cloth});
+    model::Scene scene = sceneOf({above, cloth});
     scene.integrator = kernel.integrator;
     Running running(scene), untold(scene);
     // Far below, and never touched.
     simulation::TickInputs inputs =
-        inputsOf(scene, {resting(scene::Sphere{0.1f}, {scene::Vec3(0, -9, 0), scene::Quaternion::Identity()}),
-                         resting(scene::Plane{}, {})});
+        inputsOf(scene, {resting(model::Sphere{0.1f}, {model::Vec3(0, -9, 0), model::Quaternion::Identity()}),
+                         resting(model::Plane{}, {})});
     double impulse = 0;
     for (int tick = 0; tick < 36; ++tick) {
       inputs.tellsContacts = false;

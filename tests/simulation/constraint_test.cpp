@@ -4,8 +4,8 @@
 
 #include <gtest/gtest.h>
 
+#include "server/model/springs.h"
 #include "server/reference/constraint_system.h"
-#include "server/scene/springs.h"
 #include "tests/simulation/scenes.h"
 
 namespace clothstream::tests {
@@ -15,33 +15,33 @@ using simulation::NodeState;
 
 class Constraints : public GpuTest {};
 
-scene::Cloth constrained(std::uint32_t rows, std::uint32_t columns, bool bendConstraints = false) {
-  scene::Cloth cloth = calmCloth(rows, columns);
-  cloth.solver.kind = scene::SolverKind::constraint;
+model::Cloth constrained(std::uint32_t rows, std::uint32_t columns, bool bendConstraints = false) {
+  model::Cloth cloth = calmCloth(rows, columns);
+  cloth.solver.kind = model::SolverKind::constraint;
   cloth.solver.bendConstraints = bendConstraints;
   return cloth;
 }
 
 // size x size nodes, a metre of cloth of 0.2 kg, horizontal, hung by one edge.
-scene::Scene swing(std::uint32_t size, std::uint32_t substeps, std::uint32_t iterations) {
-  scene::Cloth cloth;
+model::Scene swing(std::uint32_t size, std::uint32_t substeps, std::uint32_t iterations) {
+  model::Cloth cloth;
   cloth.name = "sheet";
   cloth.grid = {.rows = size, .columns = size, .width = 1, .height = 1, .pose = {}};
   cloth.grid.pose.orientation =
-      scene::Quaternion(Eigen::AngleAxisf(static_cast<float>(M_PI / 2), scene::Vec3::UnitX()));
+      model::Quaternion(Eigen::AngleAxisf(static_cast<float>(M_PI / 2), model::Vec3::UnitX()));
   cloth.mass = 0.2f;
   cloth.pins = {topRow(cloth)};
-  cloth.solver.kind = scene::SolverKind::constraint;
+  cloth.solver.kind = model::SolverKind::constraint;
   cloth.solver.iterations = iterations;
   cloth.solver.tolerance = 0;
-  scene::Scene scene = sceneOf({cloth});
+  model::Scene scene = sceneOf({cloth});
   scene.substeps = substeps;
   return scene;
 }
 
-double norm(const std::vector<scene::Vec3>& vectors) {
+double norm(const std::vector<model::Vec3>& vectors) {
   double sum = 0;
-  for (const scene::Vec3& v : vectors) sum += v.cast<double>().squaredNorm();
+  for (const model::Vec3& v : vectors) sum += v.cast<double>().squaredNorm();
   return std::sqrt(sum);
 }
 
@@ -55,10 +55,10 @@ double errorOfSolve(double rows) {
   return 100 * (double{kSolveTolerance} + 1e-6) * 5 * side + 5 * std::sqrt(rows) * 2 * kRounding * kExtent;
 }
 
-void expectLikeReference(scene::Scene scene, unsigned seed, simulation::SimulationOptions options = {}) {
+void expectLikeReference(model::Scene scene, unsigned seed, simulation::SimulationOptions options = {}) {
   scene.substeps = 1;
   scene.simulationRate = 720;
-  for (scene::Cloth& cloth : scene.cloths) {
+  for (model::Cloth& cloth : scene.cloths) {
     cloth.solver.iterations = kSolveIterations;
     cloth.solver.tolerance = kSolveTolerance;
   }
@@ -72,8 +72,8 @@ void expectLikeReference(scene::Scene scene, unsigned seed, simulation::Simulati
   reference.tick(referenceInputs(inputsOf(scene)));
 
   double rows = 0;
-  for (const scene::Cloth& cloth : scene.cloths)
-    rows += static_cast<double>(scene::springLinks(cloth).size());
+  for (const model::Cloth& cloth : scene.cloths)
+    rows += static_cast<double>(model::springLinks(cloth).size());
   const double tolerance = errorOfSolve(rows);
   const NodeState state = running.state();
   EXPECT_LT(largestDistance(state, reference), tolerance);
@@ -84,57 +84,57 @@ void expectLikeReference(scene::Scene scene, unsigned seed, simulation::Simulati
     EXPECT_LT(solve.iterations, kSolveIterations);
   }
   // Without the solve it would be elsewhere: the comparison can fail.
-  for (scene::Cloth& cloth : scene.cloths) cloth.solver.compliance = 1;
+  for (model::Cloth& cloth : scene.cloths) cloth.solver.compliance = 1;
   reference::ReferenceSimulation soft(scene);
   setState(soft, start);
   soft.tick(referenceInputs(inputsOf(scene)));
   EXPECT_GT(largestDistance(state, soft), 4 * tolerance);
 }
 
-TEST_F(Constraints, moveNodesAsTheReferenceOnEveryShapeOfGrid) {
+TEST_F(Constraints, MoveNodesAsTheReferenceOnEveryShapeOfGrid) {
   const std::pair<std::uint32_t, std::uint32_t> shapes[] = {{2, 2}, {2, 7}, {9, 3}, {17, 23}};
   unsigned seed = 1;
   for (const auto& [rows, columns] : shapes) {
     SCOPED_TRACE(::testing::Message() << rows << " x " << columns);
-    scene::Cloth cloth = constrained(rows, columns);
+    model::Cloth cloth = constrained(rows, columns);
     cloth.pins = {{.firstRow = 0, .lastRow = 0, .firstColumn = 0, .lastColumn = columns - 1}};
     expectLikeReference(sceneOf({cloth}), seed++);
   }
 }
 
 // As after a change of solver.
-TEST_F(Constraints, thatArePulledGentlyMoveNodesAsTheReference) {
-  scene::Cloth cloth = constrained(9, 8);
+TEST_F(Constraints, ThatArePulledGentlyMoveNodesAsTheReference) {
+  model::Cloth cloth = constrained(9, 8);
   cloth.solver.takenBack = 0.125f;
   expectLikeReference(sceneOf({cloth}), 8);
 }
 
-TEST_F(Constraints, ofBendSpringsMoveNodesAsTheReference) {
+TEST_F(Constraints, OfBendSpringsMoveNodesAsTheReference) {
   expectLikeReference(sceneOf({constrained(12, 11, true)}), 5);
 }
 
-TEST_F(Constraints, ofMeshesMoveNodesAsTheReference) {
-  scene::Cloth disc = discCloth(7);
+TEST_F(Constraints, OfMeshesMoveNodesAsTheReference) {
+  model::Cloth disc = discCloth(7);
   disc.mass = 0.01f * static_cast<float>(disc.nodeCount());
-  disc.solver.kind = scene::SolverKind::constraint;
+  disc.solver.kind = model::SolverKind::constraint;
   disc.pinnedVertices = {0};
   expectLikeReference(sceneOf({constrained(6, 9), disc}), 7);
 }
 
 // Of cloths that several workgroups solve, some of them with empty lanes.
-TEST_F(Constraints, thatSeveralWorkgroupsSolveMoveNodesAsTheReference) {
-  scene::Cloth disc = discCloth(7);
+TEST_F(Constraints, ThatSeveralWorkgroupsSolveMoveNodesAsTheReference) {
+  model::Cloth disc = discCloth(7);
   disc.mass = 0.01f * static_cast<float>(disc.nodeCount());
-  disc.solver.kind = scene::SolverKind::constraint;
+  disc.solver.kind = model::SolverKind::constraint;
   disc.pinnedVertices = {0};
   expectLikeReference(sceneOf({constrained(21, 26, true), disc}), 9, {.solveWholeNodes = 0});
 }
 
 // [Va21]'s system, which is singular, and more equations than unknowns: in this form least squares, which
 // have a solution.
-TEST_F(Constraints, withoutComplianceConverge) {
-  scene::Scene scene = swing(20, 10, 200);
-  scene::Solver& solver = scene.cloths.front().solver;
+TEST_F(Constraints, WithoutComplianceConverge) {
+  model::Scene scene = swing(20, 10, 200);
+  model::Solver& solver = scene.cloths.front().solver;
   solver.bendConstraints = true;
   solver.compliance = 0;
   solver.tolerance = 0.01f;
@@ -145,23 +145,23 @@ TEST_F(Constraints, withoutComplianceConverge) {
   }
 }
 
-TEST_F(Constraints, ofSeveralClothsAreSolvedApart) {
-  scene::Cloth second = constrained(8, 5, true);
+TEST_F(Constraints, OfSeveralClothsAreSolvedApart) {
+  model::Cloth second = constrained(8, 5, true);
   second.name = "second";
   expectLikeReference(sceneOf({constrained(6, 9), second}), 6);
 }
 
 // Multipliers act on both ends alike, to the bit but for the sums' rounding.
-TEST_F(Constraints, keepAFreeClothsMomentum) {
-  scene::Cloth cloth = constrained(20, 20);
+TEST_F(Constraints, KeepAFreeClothsMomentum) {
+  model::Cloth cloth = constrained(20, 20);
   cloth.damping = 0;
-  scene::Scene scene = sceneOf({cloth});
-  scene.environment.gravity = scene::Vec3::Zero();
+  model::Scene scene = sceneOf({cloth});
+  scene.environment.gravity = model::Vec3::Zero();
   std::mt19937 random(7);
   const NodeState start = randomState(scene, random, 0.001f, 0.5f);
   const auto momentum = [](const NodeState& state) {
     reference::Vec3 sum = reference::Vec3::Zero();
-    for (const scene::Vec3& v : state.velocities) sum += v.cast<double>();
+    for (const model::Vec3& v : state.velocities) sum += v.cast<double>();
     return sum;
   };
   Running running(scene);
@@ -172,8 +172,8 @@ TEST_F(Constraints, keepAFreeClothsMomentum) {
 }
 
 // The sheet swings down from horizontal, the hardest part of its life; 0.8 s.
-TEST_F(Constraints, holdASwingingSheet) {
-  const scene::Scene scene = swing(32, 10, 20);
+TEST_F(Constraints, HoldASwingingSheet) {
+  const model::Scene scene = swing(32, 10, 20);
   Running running(scene);
   double most = 0, mean = 0;
   const int ticks = 58;
@@ -189,18 +189,18 @@ TEST_F(Constraints, holdASwingingSheet) {
   EXPECT_LT(mean, 0.0005);
 }
 
-TEST_F(Constraints, letASheetHangWithinOnePercent) {
-  scene::Scene scene = swing(32, 10, 20);
+TEST_F(Constraints, LetASheetHangWithinOnePercent) {
+  model::Scene scene = swing(32, 10, 20);
   scene.cloths.front().damping = 4;
   Running running(scene);
   for (int tick = 0; tick < 360; ++tick) running.tick(inputsOf(scene));
   EXPECT_LT(strainOf(scene, running.state()).max, 0.01);
 }
 
-TEST_F(Constraints, leaveNothingInsideASphere) {
-  scene::Scene scene = swing(24, 10, 20);
+TEST_F(Constraints, LeaveNothingInsideASphere) {
+  model::Scene scene = swing(24, 10, 20);
   const simulation::MovingCollider ball{
-      scene::Sphere{0.2f}, {scene::Vec3(0, -0.3f, -0.3f)}, {scene::Vec3(0, -0.3f, -0.3f)}, 1};
+      model::Sphere{0.2f}, {model::Vec3(0, -0.3f, -0.3f)}, {model::Vec3(0, -0.3f, -0.3f)}, 1};
   Running running(scene);
   for (int tick = 0; tick < 72; ++tick) running.tick(inputsOf(scene, {ball}));
   const double distance = 0.2 + double{scene.cloths.front().thickness};
@@ -214,12 +214,12 @@ TEST_F(Constraints, leaveNothingInsideASphere) {
   EXPECT_LT(nearest, distance * 1.01);  // and it does touch it
 }
 
-TEST_F(Constraints, leaveAMassSpringClothBesideThemAsItIsAlone) {
-  scene::Cloth free = calmCloth(9, 14);
+TEST_F(Constraints, LeaveAMassSpringClothBesideThemAsItIsAlone) {
+  model::Cloth free = calmCloth(9, 14);
   free.pins = {topRow(free)};
-  scene::Cloth held = constrained(7, 8);
+  model::Cloth held = constrained(7, 8);
   held.name = "held";
-  const scene::Scene alone = sceneOf({free}), together = sceneOf({held, free});
+  const model::Scene alone = sceneOf({free}), together = sceneOf({held, free});
   Running one(alone), both(together);
   for (int tick = 0; tick < 20; ++tick) {
     one.tick(inputsOf(alone));
@@ -232,17 +232,17 @@ TEST_F(Constraints, leaveAMassSpringClothBesideThemAsItIsAlone) {
 
 class Adaptive : public GpuTest {};
 
-scene::Cloth adaptive(std::uint32_t rows, std::uint32_t columns) {
-  scene::Cloth cloth = constrained(rows, columns);
-  cloth.solver.kind = scene::SolverKind::acad;
+model::Cloth adaptive(std::uint32_t rows, std::uint32_t columns) {
+  model::Cloth cloth = constrained(rows, columns);
+  cloth.solver.kind = model::SolverKind::acad;
   return cloth;
 }
 
 // [Va21] Fig. 15: steps of 0.016 s and springs of 200 N/m; the paper gives no node's mass: 0.05 kg here, with
 // which 2 (4 + 4 + 4) ks h^2 / m = 24.6 where explicit springs bear 4. A sheet hung by two corners, and a
 // ball under it.
-scene::Scene figure15(scene::SolverKind solver) {
-  scene::Cloth cloth;
+model::Scene figure15(model::SolverKind solver) {
+  model::Cloth cloth;
   cloth.name = "sheet";
   cloth.grid = {.rows = 32, .columns = 32, .width = 3.1f, .height = 3.1f, .pose = {}};
   cloth.mass = 0.05f * 1024;
@@ -251,15 +251,15 @@ scene::Scene figure15(scene::SolverKind solver) {
   cloth.damping = 0.5f;
   cloth.pins = {{.firstRow = 0, .lastRow = 0, .firstColumn = 0, .lastColumn = 31, .columnStep = 31}};
   cloth.solver.kind = solver;
-  scene::Scene scene = sceneOf({cloth});
+  model::Scene scene = sceneOf({cloth});
   scene.simulationRate = 62;
   scene.streamRate = 62;
   scene.substeps = 1;
   return scene;
 }
 
-TEST_F(Adaptive, moveNodesAsTheReference) {
-  scene::Scene scene = sceneOf({adaptive(9, 14)});
+TEST_F(Adaptive, MoveNodesAsTheReference) {
+  model::Scene scene = sceneOf({adaptive(9, 14)});
   scene.substeps = 1;
   scene.simulationRate = 720;
   scene.cloths.front().solver.iterations = kSolveIterations;
@@ -282,15 +282,15 @@ TEST_F(Adaptive, moveNodesAsTheReference) {
   EXPECT_LT(largestDistance(running.state(), reference), tolerance);
 }
 
-TEST_F(Adaptive, areMassSpringClothToTheBitWhereNothingIsStretched) {
-  scene::Cloth cloth = adaptive(13, 12);
+TEST_F(Adaptive, AreMassSpringClothToTheBitWhereNothingIsStretched) {
+  model::Cloth cloth = adaptive(13, 12);
   cloth.pins = {topRow(cloth)};
-  scene::Scene held = sceneOf({cloth});
-  held.environment.gravity = scene::Vec3(0, -1, 0);  // under which it stretches by 3 %
-  scene::Scene free = held;
-  free.cloths.front().solver.kind = scene::SolverKind::massSpring;
+  model::Scene held = sceneOf({cloth});
+  held.environment.gravity = model::Vec3(0, -1, 0);  // under which it stretches by 3 %
+  model::Scene free = held;
+  free.cloths.front().solver.kind = model::SolverKind::massSpring;
   const simulation::MovingCollider ball{
-      scene::Sphere{0.094f}, {scene::Vec3(0, -0.12f, 0.1f)}, {scene::Vec3(0, -0.12f, 0.1f)}, 1};
+      model::Sphere{0.094f}, {model::Vec3(0, -0.12f, 0.1f)}, {model::Vec3(0, -0.12f, 0.1f)}, 1};
   Running one(held), other(free);
   for (int tick = 0; tick < 30; ++tick) {
     EXPECT_EQ(one.tick(inputsOf(held, {ball})).stateHash, other.tick(inputsOf(free, {ball})).stateHash);
@@ -298,33 +298,33 @@ TEST_F(Adaptive, areMassSpringClothToTheBitWhereNothingIsStretched) {
   }
 }
 
-TEST_F(Adaptive, holdASheetWhereMassSpringBlowsUp) {
-  const scene::Scene free = figure15(scene::SolverKind::massSpring);
+TEST_F(Adaptive, HoldASheetWhereMassSpringBlowsUp) {
+  const model::Scene free = figure15(model::SolverKind::massSpring);
   Running blown(free);
   bool healthy = true;
   for (int tick = 0; tick < 186 && healthy; ++tick) healthy = blown.tick(inputsOf(free)).healthy;
   EXPECT_FALSE(healthy);
 
-  const scene::Scene scene = figure15(scene::SolverKind::acad);
+  const model::Scene scene = figure15(model::SolverKind::acad);
   const simulation::MovingCollider ball{
-      scene::Sphere{0.5f}, {scene::Vec3(0, -1.5f, 0.4f)}, {scene::Vec3(0, -1.5f, 0.4f)}, 1};
+      model::Sphere{0.5f}, {model::Vec3(0, -1.5f, 0.4f)}, {model::Vec3(0, -1.5f, 0.4f)}, 1};
   Running running(scene);
   for (int tick = 0; tick < 186; ++tick) ASSERT_TRUE(running.tick(inputsOf(scene, {ball})).healthy) << tick;
   // It is far from calm, as in the paper, but it is a cloth still: half as long again at most.
   const NodeState state = running.state();
   EXPECT_LT(strainOf(scene, state).mean, 0.5);
-  for (const scene::Vec3& p : state.positions) EXPECT_LT(p.norm(), 1.5f * 4.7f);
+  for (const model::Vec3& p : state.positions) EXPECT_LT(p.norm(), 1.5f * 4.7f);
 }
 
 // Hung by its corners it would stretch by more than half. While it falls into its constraints, springs beside
 // those that are held go beyond for a few substeps.
-TEST_F(Adaptive, keepEverySpringWithinItsBound) {
-  scene::Cloth cloth = adaptive(24, 24);
+TEST_F(Adaptive, KeepEverySpringWithinItsBound) {
+  model::Cloth cloth = adaptive(24, 24);
   cloth.structural.stiffness = 60;
   cloth.shear.stiffness = 20;
   cloth.damping = 2;
   cloth.pins = {{.firstRow = 0, .lastRow = 0, .firstColumn = 0, .lastColumn = 23, .columnStep = 23}};
-  const scene::Scene scene = sceneOf({cloth});
+  const model::Scene scene = sceneOf({cloth});
   Running running(scene);
   double falling = 0, hanging = 0;
   for (int tick = 0; tick < 216; ++tick) {
@@ -338,23 +338,23 @@ TEST_F(Adaptive, keepEverySpringWithinItsBound) {
   EXPECT_LT(falling, 0.15);
   EXPECT_LT(hanging, 0.12);
 
-  scene::Scene free = scene;
-  free.cloths.front().solver.kind = scene::SolverKind::massSpring;
+  model::Scene free = scene;
+  free.cloths.front().solver.kind = model::SolverKind::massSpring;
   Running loose(free);
   for (int tick = 0; tick < 144; ++tick) loose.tick(inputsOf(free));
   EXPECT_GT(strainOf(free, loose.state()).max, 0.3);
 }
 
-TEST(ConstraintSystem, conjugateGradientsReachTheDirectSolution) {
-  const scene::Cloth cloth = constrained(6, 7);
+TEST(ConstraintSystem, ConjugateGradientsReachTheDirectSolution) {
+  const model::Cloth cloth = constrained(6, 7);
   std::mt19937 random(3);
   const NodeState state = randomState(sceneOf({cloth}), random, 0.003f, 1);
   std::vector<reference::Vec3> positions, velocities;
-  for (const scene::Vec3& p : state.positions) positions.push_back(p.cast<double>());
-  for (const scene::Vec3& v : state.velocities) velocities.push_back(v.cast<double>());
+  for (const model::Vec3& p : state.positions) positions.push_back(p.cast<double>());
+  for (const model::Vec3& v : state.velocities) velocities.push_back(v.cast<double>());
   const std::vector<double> inverseMasses(positions.size(), 100);
   std::vector<reference::Constraint> constraints;
-  for (const scene::SpringLink& link : scene::springLinks(cloth))
+  for (const model::SpringLink& link : model::springLinks(cloth))
     constraints.push_back({link.a, link.b, (positions[link.b] - positions[link.a]).norm() - link.restLength});
   const reference::ConstraintSystem system(constraints, positions, velocities, inverseMasses, 1, 0.001);
   const Eigen::MatrixXd A = system.matrix();

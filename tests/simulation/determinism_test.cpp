@@ -17,43 +17,43 @@ using simulation::TickStatus;
 
 // Everything at once: two sizes, wind, friction, damping, pins, a sphere that comes through, and one of every
 // other shape, of which some turn.
-scene::Scene busyScene() {
-  scene::Cloth curtain = calmCloth(37, 29);
+model::Scene busyScene() {
+  model::Cloth curtain = calmCloth(37, 29);
   curtain.pins = {topRow(curtain)};
   curtain.drag = 0.6f;
   curtain.lift = 0.4f;
-  scene::Cloth rag = calmCloth(13, 70);
-  rag.grid.pose.position = scene::Vec3(0.1f, 0.3f, 0.2f);
+  model::Cloth rag = calmCloth(13, 70);
+  rag.grid.pose.position = model::Vec3(0.1f, 0.3f, 0.2f);
   rag.friction = 0.8f;
-  scene::Scene scene = sceneOf({curtain, rag});
-  scene.environment.wind = scene::Vec3(1, 0, 3);
+  model::Scene scene = sceneOf({curtain, rag});
+  scene.environment.wind = model::Vec3(1, 0, 3);
   return scene;
 }
 
-TickInputs busyInputs(const scene::Scene& scene, int tick) {
+TickInputs busyInputs(const model::Scene& scene, int tick) {
   const auto z = [](int t) { return 0.4f - 0.01f * static_cast<float>(t % 80); };
-  const auto turn = [](int t) { return turned(3 * static_cast<float>(t % 120), scene::Vec3(1, 2, 0.5f)); };
-  const scene::Pose floor{scene::Vec3(0, -0.7f, 0), turned(5, scene::Vec3::UnitX())};
-  const scene::Pose stone{scene::Vec3(-0.2f, -0.5f, 0.05f), turned(40, scene::Vec3(1, 1, 0))};
+  const auto turn = [](int t) { return turned(3 * static_cast<float>(t % 120), model::Vec3(1, 2, 0.5f)); };
+  const model::Pose floor{model::Vec3(0, -0.7f, 0), turned(5, model::Vec3::UnitX())};
+  const model::Pose stone{model::Vec3(-0.2f, -0.5f, 0.05f), turned(40, model::Vec3(1, 1, 0))};
   return inputsOf(
       scene,
-      {{scene::Sphere{0.12f}, {scene::Vec3(0, -0.4f, z(tick))}, {scene::Vec3(0, -0.4f, z(tick) - 0.01f)}, 1},
-       {scene::Box{scene::Vec3(0.1f, 0.3f, 0.1f)},
-        {scene::Vec3(0.2f, -0.2f, z(tick + 40)), turn(tick)},
-        {scene::Vec3(0.2f, -0.2f, z(tick + 40) - 0.01f), turn(tick + 1)},
+      {{model::Sphere{0.12f}, {model::Vec3(0, -0.4f, z(tick))}, {model::Vec3(0, -0.4f, z(tick) - 0.01f)}, 1},
+       {model::Box{model::Vec3(0.1f, 0.3f, 0.1f)},
+        {model::Vec3(0.2f, -0.2f, z(tick + 40)), turn(tick)},
+        {model::Vec3(0.2f, -0.2f, z(tick + 40) - 0.01f), turn(tick + 1)},
         1},
-       {scene::Capsule{.radius = 0.04f, .length = 0.2f},
-        {scene::Vec3(-0.1f, -0.1f, 0.02f), turn(2 * tick)},
-        {scene::Vec3(-0.1f, -0.1f, 0.02f), turn(2 * tick + 2)},
+       {model::Capsule{.radius = 0.04f, .length = 0.2f},
+        {model::Vec3(-0.1f, -0.1f, 0.02f), turn(2 * tick)},
+        {model::Vec3(-0.1f, -0.1f, 0.02f), turn(2 * tick + 2)},
         0.5f},
        {octahedron(), stone, stone, 1},
-       {scene::Plane{}, floor, floor, 1}});
+       {model::Plane{}, floor, floor, 1}});
 }
 
 class Determinism : public GpuTest {};
 
-TEST_F(Determinism, oneThousandTicksGiveTheSameHashesInTwoRunsHoweverTheWorkIsCut) {
-  const scene::Scene scene = busyScene();
+TEST_F(Determinism, OneThousandTicksGiveTheSameHashesInTwoRunsHoweverTheWorkIsCut) {
+  const model::Scene scene = busyScene();
   Running narrow(scene, {.rowsPerInvocation = 1, .workgroupSize = 32, .advanceKernel = {}});
   Running wide(scene, {.rowsPerInvocation = 7, .workgroupSize = 128, .advanceKernel = {}});
   Running usual(scene), again(scene);
@@ -70,19 +70,19 @@ TEST_F(Determinism, oneThousandTicksGiveTheSameHashesInTwoRunsHoweverTheWorkIsCu
 
 // The same number on every device: one that fails here cannot take over another's scene, nor replay its
 // recordings.
-TEST_F(Determinism, theHashAfterOneHundredTicksIsThatOfEveryOtherDevice) {
-  const scene::Scene scene = busyScene();
+TEST_F(Determinism, TheHashAfterOneHundredTicksIsThatOfEveryOtherDevice) {
+  const model::Scene scene = busyScene();
   Running running(scene);
   TickStatus status;
   for (int tick = 0; tick < 100; ++tick) status = running.tick(busyInputs(scene, tick));
   EXPECT_EQ(status.stateHash, 0x2ce58a10eb2b6767u);
 }
 
-TEST_F(Determinism, clothsInOneSceneMoveAsEachAlone) {
+TEST_F(Determinism, ClothsInOneSceneMoveAsEachAlone) {
   const std::pair<std::uint32_t, std::uint32_t> shapes[] = {{2, 2}, {3, 65}, {65, 3}, {31, 33}, {64, 64}};
-  std::vector<scene::Cloth> cloths;
+  std::vector<model::Cloth> cloths;
   for (const auto& [rows, columns] : shapes) {
-    scene::Cloth cloth = calmCloth(rows, columns);
+    model::Cloth cloth = calmCloth(rows, columns);
     // Each of its own material: the first has neither air nor damped springs, which must not change when
     // others do.
     const auto i = static_cast<float>(cloths.size());
@@ -91,7 +91,7 @@ TEST_F(Determinism, clothsInOneSceneMoveAsEachAlone) {
     cloth.damping = 0.2f * i;
     cloths.push_back(cloth);
   }
-  const scene::Scene together = sceneOf(cloths);
+  const model::Scene together = sceneOf(cloths);
   std::mt19937 random(3);
   const NodeState start = randomState(together, random, 0.004f, 0.5f);
   Running all(together);
@@ -103,8 +103,8 @@ TEST_F(Determinism, clothsInOneSceneMoveAsEachAlone) {
 
   const std::vector<std::uint32_t> offsets = simulation::clothOffsets(cloths);
   for (std::size_t i = 0; i < cloths.size(); ++i) {
-    const auto part = [&](const std::vector<scene::Vec3>& whole) {
-      return std::vector<scene::Vec3>(whole.begin() + offsets[i], whole.begin() + offsets[i + 1]);
+    const auto part = [&](const std::vector<model::Vec3>& whole) {
+      return std::vector<model::Vec3>(whole.begin() + offsets[i], whole.begin() + offsets[i + 1]);
     };
     Running alone(sceneOf({cloths[i]}));
     alone.restore(NodeState{part(start.positions), part(start.velocities)});
@@ -115,8 +115,8 @@ TEST_F(Determinism, clothsInOneSceneMoveAsEachAlone) {
   }
 }
 
-TEST_F(Determinism, theDevicesHashIsTheOneComputedOnTheCpu) {
-  const scene::Scene scene = busyScene();
+TEST_F(Determinism, TheDevicesHashIsTheOneComputedOnTheCpu) {
+  const model::Scene scene = busyScene();
   Running running(scene);
   for (int tick = 0; tick < 3; ++tick) {
     const TickStatus status = running.tick(busyInputs(scene, tick));
@@ -124,24 +124,24 @@ TEST_F(Determinism, theDevicesHashIsTheOneComputedOnTheCpu) {
   }
 }
 
-TEST_F(Determinism, noStoredComponentIsTinierThanTheSmallest) {
+TEST_F(Determinism, NoStoredComponentIsTinierThanTheSmallest) {
   // A cloth at rest in its plane: everything sideways is zero or decays towards it.
-  scene::Scene scene = sceneOf({calmCloth(8, 8)});
+  model::Scene scene = sceneOf({calmCloth(8, 8)});
   NodeState state = simulation::restState(scene.cloths);
-  for (scene::Vec3& velocity : state.velocities) velocity.z() = 3e-20f;
+  for (model::Vec3& velocity : state.velocities) velocity.z() = 3e-20f;
   Running running(scene);
   running.restore(state);
   for (int tick = 0; tick < 100; ++tick) {
     running.tick(inputsOf(scene));
     const NodeState now = running.state();
     for (const auto* vectors : {&now.positions, &now.velocities})
-      for (const scene::Vec3& v : *vectors)
+      for (const model::Vec3& v : *vectors)
         for (const float component : v)
           ASSERT_TRUE(component == 0 || std::abs(component) >= 1e-20f) << component;
   }
 }
 
-TEST(StateHash, changesWithAnyBitAndWithAnyNodesPlace) {
+TEST(StateHash, ChangesWithAnyBitAndWithAnyNodesPlace) {
   NodeState state{{{1, 2, 3}, {4, 5, 6}}, {{0, 0, 0}, {7, 8, 9}}};
   const auto hash = [](const NodeState& s) { return simulation::statusOf(simulation::pack(s, 0)).stateHash; };
   const std::uint64_t original = hash(state);

@@ -5,9 +5,9 @@
 
 #include <gtest/gtest.h>
 
+#include "server/model/springs.h"
+#include "server/model/stability.h"
 #include "server/reference/implicit_system.h"
-#include "server/scene/springs.h"
-#include "server/scene/stability.h"
 #include "tests/simulation/scenes.h"
 
 namespace clothstream::tests {
@@ -17,21 +17,21 @@ using simulation::NodeState;
 
 class ImplicitEuler : public GpuTest {};
 
-scene::Cloth implicitCloth(scene::Cloth cloth) {
-  cloth.solver.kind = scene::SolverKind::implicitEuler;
+model::Cloth implicitCloth(model::Cloth cloth) {
+  cloth.solver.kind = model::SolverKind::implicitEuler;
   return cloth;
 }
 
 // Far beyond what explicit springs bear: h^2 k / m = 7.7 a structural spring.
-scene::Cloth stiffCloth(std::uint32_t rows, std::uint32_t columns) {
-  scene::Cloth cloth = implicitCloth(calmCloth(rows, columns));
+model::Cloth stiffCloth(std::uint32_t rows, std::uint32_t columns) {
+  model::Cloth cloth = implicitCloth(calmCloth(rows, columns));
   cloth.structural = {400, 0.5f};
   cloth.shear = {200, 0.1f};
   return cloth;
 }
 
-scene::Scene steps(std::vector<scene::Cloth> cloths, std::uint32_t rate) {
-  scene::Scene scene = sceneOf(std::move(cloths));
+model::Scene steps(std::vector<model::Cloth> cloths, std::uint32_t rate) {
+  model::Scene scene = sceneOf(std::move(cloths));
   scene.simulationRate = rate;
   scene.streamRate = rate;
   scene.substeps = 1;
@@ -57,15 +57,15 @@ struct StartedSystem {
   double residual;  // its norm, of the velocities at the substep's start
 };
 
-StartedSystem systemOf(const scene::Scene& scene, const NodeState& start) {
-  const scene::Cloth& cloth = scene.cloths.front();
+StartedSystem systemOf(const model::Scene& scene, const NodeState& start) {
+  const model::Cloth& cloth = scene.cloths.front();
   std::vector<reference::ImplicitSpring> springs;
-  for (const scene::SpringLink& link : scene::springLinks(cloth)) {
-    const scene::Spring& spring = scene::springOf(cloth, link.kind);
+  for (const model::SpringLink& link : model::springLinks(cloth)) {
+    const model::Spring& spring = model::springOf(cloth, link.kind);
     springs.push_back({link.a, link.b, spring.stiffness, spring.damping, link.restLength});
   }
-  scene::Scene free = scene;
-  free.cloths.front().solver.kind = scene::SolverKind::massSpring;
+  model::Scene free = scene;
+  free.cloths.front().solver.kind = model::SolverKind::massSpring;
   reference::ReferenceSimulation simulation(free);
   setState(simulation, start);
   const std::vector<reference::Vec3> positions(simulation.cloths().front().positions().begin(),
@@ -83,11 +83,11 @@ StartedSystem systemOf(const scene::Scene& scene, const NodeState& start) {
   return {std::move(system), residual};
 }
 
-void expectLikeReference(scene::Cloth cloth, std::uint32_t rate, unsigned seed) {
+void expectLikeReference(model::Cloth cloth, std::uint32_t rate, unsigned seed) {
   constexpr float tolerance = 1e-5f;
   cloth.solver.iterations = 500;
   cloth.solver.tolerance = tolerance;
-  const scene::Scene scene = steps({cloth}, rate);
+  const model::Scene scene = steps({cloth}, rate);
   std::mt19937 random(seed);
   const NodeState start = randomState(scene, random, 0.002f, 0.3f);
   Running running(scene);
@@ -109,31 +109,31 @@ void expectLikeReference(scene::Cloth cloth, std::uint32_t rate, unsigned seed) 
   EXPECT_LT(largestDistance(state, reference), h * error + kRounding * 2);
 
   // The forces' own step would be elsewhere: the comparison can fail.
-  scene::Scene explicitly = scene;
-  explicitly.cloths.front().solver.kind = scene::SolverKind::massSpring;
+  model::Scene explicitly = scene;
+  explicitly.cloths.front().solver.kind = model::SolverKind::massSpring;
   reference::ReferenceSimulation other(explicitly);
   setState(other, start);
   other.tick(referenceInputs(inputsOf(scene)));
   EXPECT_GT(largestSpeedDifference(state, other), 4 * error);
 }
 
-TEST_F(ImplicitEuler, movesNodesAsTheReferenceOnEveryShapeOfGrid) {
+TEST_F(ImplicitEuler, MovesNodesAsTheReferenceOnEveryShapeOfGrid) {
   const std::pair<std::uint32_t, std::uint32_t> shapes[] = {{2, 2}, {2, 7}, {9, 3}, {17, 23}};
   unsigned seed = 1;
   for (const auto& [rows, columns] : shapes) {
     SCOPED_TRACE(::testing::Message() << rows << " x " << columns);
-    scene::Cloth cloth = implicitCloth(calmCloth(rows, columns));
+    model::Cloth cloth = implicitCloth(calmCloth(rows, columns));
     cloth.pins = {topRow(cloth)};
     expectLikeReference(cloth, 720, seed++);
   }
 }
 
-TEST_F(ImplicitEuler, movesStiffClothsAsTheReference) {
+TEST_F(ImplicitEuler, MovesStiffClothsAsTheReference) {
   expectLikeReference(stiffCloth(11, 8), 72, 5);
 }
 
-TEST_F(ImplicitEuler, movesMeshesAsTheReference) {
-  scene::Cloth disc = implicitCloth(discCloth(6));
+TEST_F(ImplicitEuler, MovesMeshesAsTheReference) {
+  model::Cloth disc = implicitCloth(discCloth(6));
   disc.pinnedVertices = {0};
   expectLikeReference(disc, 72, 6);
 }
@@ -141,16 +141,16 @@ TEST_F(ImplicitEuler, movesMeshesAsTheReference) {
 // Two nodes that hang from two pinned ones by springs along y alone: x'' = -omega^2 x for their stretch, for
 // which implicit Euler is  v' = (v - h omega^2 x) / (1 + h^2 omega^2),  x' = x + h v'. omega h = 3; explicit
 // springs bear 2.
-TEST_F(ImplicitEuler, swingsASpringAsTheFormulaDoes) {
-  scene::Cloth cloth = implicitCloth(calmCloth(2, 2));
+TEST_F(ImplicitEuler, SwingsASpringAsTheFormulaDoes) {
+  model::Cloth cloth = implicitCloth(calmCloth(2, 2));
   const double h = 1.0 / 72, omega = 3 / h;
   cloth.structural = {static_cast<float>(0.01 * omega * omega), 0};
   cloth.shear = cloth.bend = {};
   cloth.damping = 0;
   cloth.pins = {topRow(cloth)};
   cloth.solver.tolerance = 1e-6f;
-  scene::Scene scene = steps({cloth}, 72);
-  scene.environment.gravity = scene::Vec3::Zero();
+  model::Scene scene = steps({cloth}, 72);
+  scene.environment.gravity = model::Vec3::Zero();
   Running running(scene);
   NodeState state = simulation::restState(scene.cloths);
   double x = 0.005, v = 0;
@@ -171,12 +171,12 @@ TEST_F(ImplicitEuler, swingsASpringAsTheFormulaDoes) {
 }
 
 // However long the step: where it comes to rest, the springs carry the weight.
-TEST_F(ImplicitEuler, hangsWhereForcesBalance) {
-  scene::Cloth cloth = stiffCloth(12, 12);
+TEST_F(ImplicitEuler, HangsWhereForcesBalance) {
+  model::Cloth cloth = stiffCloth(12, 12);
   cloth.pins = {topRow(cloth)};
   cloth.damping = 2;
-  const scene::Scene scene = steps({cloth}, 30);
-  EXPECT_EQ(scene::stableSubsteps(scene), 1u);
+  const model::Scene scene = steps({cloth}, 30);
+  EXPECT_EQ(model::stableSubsteps(scene), 1u);
   Running running(scene);
   for (int tick = 0; tick < 300; ++tick) ASSERT_TRUE(running.tick(inputsOf(scene)).healthy) << tick;
   reference::ReferenceSimulation reference(scene);
@@ -194,57 +194,57 @@ TEST_F(ImplicitEuler, hangsWhereForcesBalance) {
 
 // Corrections are exchanged between a spring's ends, to the bit but for the sums' rounding and what the solve
 // leaves.
-TEST_F(ImplicitEuler, keepsAFreeClothsMomentum) {
-  scene::Cloth cloth = stiffCloth(20, 20);
+TEST_F(ImplicitEuler, KeepsAFreeClothsMomentum) {
+  model::Cloth cloth = stiffCloth(20, 20);
   cloth.damping = 0;
   cloth.solver.tolerance = 1e-6f;
   cloth.solver.iterations = 500;
-  scene::Scene scene = steps({cloth}, 72);
-  scene.environment.gravity = scene::Vec3::Zero();
+  model::Scene scene = steps({cloth}, 72);
+  scene.environment.gravity = model::Vec3::Zero();
   std::mt19937 random(7);
   const NodeState start = randomState(scene, random, 0.001f, 0.5f);
   const auto momentum = [](const NodeState& state) {
     reference::Vec3 sum = reference::Vec3::Zero();
-    for (const scene::Vec3& v : state.velocities) sum += v.cast<double>();
+    for (const model::Vec3& v : state.velocities) sum += v.cast<double>();
     return sum;
   };
   Running running(scene);
   running.restore(start);
   for (int tick = 0; tick < 20; ++tick) running.tick(inputsOf(scene));
   double flow = 0;
-  for (const scene::Vec3& v : start.velocities) flow += v.norm();
+  for (const model::Vec3& v : start.velocities) flow += v.norm();
   // A free velocity is (h^2 k / m) times the springs' stretch over h, a hundred times what comes of it, and a
   // sum of twelve forces, each of which rounds it once.
   EXPECT_LT((momentum(running.state()) - momentum(start)).norm(), 20 * 12 * 100 * kRounding * flow);
 }
 
-TEST_F(ImplicitEuler, holdsASheetWhereMassSpringBlowsUp) {
-  for (const scene::SolverKind solver : {scene::SolverKind::massSpring, scene::SolverKind::implicitEuler}) {
-    scene::Cloth cloth = stiffCloth(16, 16);
+TEST_F(ImplicitEuler, HoldsASheetWhereMassSpringBlowsUp) {
+  for (const model::SolverKind solver : {model::SolverKind::massSpring, model::SolverKind::implicitEuler}) {
+    model::Cloth cloth = stiffCloth(16, 16);
     cloth.solver.kind = solver;
     cloth.pins = {{.firstRow = 0, .lastRow = 0, .firstColumn = 0, .lastColumn = 15, .columnStep = 15}};
-    const scene::Scene scene = steps({cloth}, 60);
+    const model::Scene scene = steps({cloth}, 60);
     const simulation::MovingCollider ball{
-        scene::Sphere{0.06f}, {scene::Vec3(0, -0.2f, 0.05f)}, {scene::Vec3(0, -0.2f, 0.05f)}, 1};
+        model::Sphere{0.06f}, {model::Vec3(0, -0.2f, 0.05f)}, {model::Vec3(0, -0.2f, 0.05f)}, 1};
     Running running(scene);
     bool healthy = true;
     for (int tick = 0; tick < 180 && healthy; ++tick) healthy = running.tick(inputsOf(scene, {ball})).healthy;
-    EXPECT_EQ(healthy, solver == scene::SolverKind::implicitEuler);
+    EXPECT_EQ(healthy, solver == model::SolverKind::implicitEuler);
     if (!healthy) continue;
     const double distance = 0.06 + double{cloth.thickness};
-    for (const scene::Vec3& p : running.state().positions)
+    for (const model::Vec3& p : running.state().positions)
       EXPECT_GT((p - ball.start.position).cast<double>().norm(), distance * (1 - 1e-5));
   }
 }
 
 // Far stiffer than so few iterations solve: it lags, and does not blow up.
-TEST_F(ImplicitEuler, staysCalmWhereTheSolveEndsEarly) {
-  scene::Cloth cloth = stiffCloth(24, 24);
+TEST_F(ImplicitEuler, StaysCalmWhereTheSolveEndsEarly) {
+  model::Cloth cloth = stiffCloth(24, 24);
   cloth.structural.stiffness = 4000;
   cloth.pins = {topRow(cloth)};
   cloth.solver.iterations = 4;
   cloth.solver.tolerance = 0;
-  const scene::Scene scene = steps({cloth}, 72);
+  const model::Scene scene = steps({cloth}, 72);
   Running running(scene);
   for (int tick = 0; tick < 216; ++tick) ASSERT_TRUE(running.tick(inputsOf(scene)).healthy) << tick;
   reference::ReferenceSimulation reference(scene);
@@ -254,22 +254,22 @@ TEST_F(ImplicitEuler, staysCalmWhereTheSolveEndsEarly) {
   EXPECT_LT(hung.kineticEnergy(), 0.01 * 576 * 9.81 * 0.46);
 }
 
-TEST_F(ImplicitEuler, livesBesideEveryOtherSolver) {
-  scene::Cloth free = calmCloth(9, 14), held = calmCloth(7, 8), implicit = stiffCloth(8, 6);
-  scene::Cloth disc = implicitCloth(discCloth(4));
+TEST_F(ImplicitEuler, LivesBesideEveryOtherSolver) {
+  model::Cloth free = calmCloth(9, 14), held = calmCloth(7, 8), implicit = stiffCloth(8, 6);
+  model::Cloth disc = implicitCloth(discCloth(4));
   free.pins = {topRow(free)};
-  held.solver.kind = scene::SolverKind::constraint;
+  held.solver.kind = model::SolverKind::constraint;
   held.name = "held";
   implicit.name = "implicit";
   disc.name = "disc";
-  const scene::Scene together = sceneOf({held, implicit, free, disc});
+  const model::Scene together = sceneOf({held, implicit, free, disc});
   Running all(together);
   for (int tick = 0; tick < 20; ++tick) EXPECT_TRUE(all.tick(inputsOf(together)).healthy);
   std::size_t first = 0;
   const NodeState found = all.state();
-  for (const scene::Cloth& cloth : together.cloths) {
+  for (const model::Cloth& cloth : together.cloths) {
     SCOPED_TRACE(cloth.name);
-    const scene::Scene alone = sceneOf({cloth});
+    const model::Scene alone = sceneOf({cloth});
     Running one(alone);
     for (int tick = 0; tick < 20; ++tick) one.tick(inputsOf(alone));
     const NodeState expected = one.state();

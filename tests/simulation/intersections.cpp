@@ -9,7 +9,7 @@
 #include <set>
 #include <vector>
 
-#include "server/scene/mesh.h"
+#include "server/model/mesh.h"
 
 namespace clothstream::tests {
 namespace {
@@ -31,12 +31,12 @@ bool pierces(const std::array<Point, 2>& edge, const std::array<Point, 3>& corne
 
 }  // namespace
 
-std::size_t intersections(const scene::Scene& scene, std::span<const scene::Vec3> positions) {
-  std::vector<scene::Triangle> triangles;
+std::size_t intersections(const model::Scene& scene, std::span<const model::Vec3> positions) {
+  std::vector<model::Triangle> triangles;
   std::set<std::array<std::uint32_t, 2>> edges;
   std::uint32_t first = 0;
-  for (const scene::Cloth& cloth : scene.cloths) {
-    for (scene::Triangle triangle : scene::clothTriangles(cloth)) {
+  for (const model::Cloth& cloth : scene.cloths) {
+    for (model::Triangle triangle : model::clothTriangles(cloth)) {
       for (std::uint32_t& node : triangle) node += first;
       triangles.push_back(triangle);
       for (std::size_t i = 0; i < 3; ++i) {
@@ -47,7 +47,7 @@ std::size_t intersections(const scene::Scene& scene, std::span<const scene::Vec3
     first += cloth.nodeCount();
   }
   std::size_t count = 0;
-  for (const scene::Triangle& triangle : triangles) {
+  for (const model::Triangle& triangle : triangles) {
     const auto at = [&](std::size_t i) { return positions[triangle[i]].cast<double>().eval(); };
     const std::array<Point, 3> corners{at(0), at(1), at(2)};
     const Point low = corners[0].cwiseMin(corners[1]).cwiseMin(corners[2]);

@@ -30,7 +30,7 @@ class Kernels : public GpuTest {
   // are) times its stiffness, and by some ten roundings of its own size; its damping by as many of its own; a
   // node has twelve springs. That moves a velocity by h / m as much, and a position by h more. Velocity and
   // position are rounded a few times themselves.
-  static void expectLikeReference(scene::Scene scene, std::vector<simulation::MovingCollider> colliders,
+  static void expectLikeReference(model::Scene scene, std::vector<simulation::MovingCollider> colliders,
                                   unsigned seed, const Expectation& expectation = {}) {
     scene.substeps = 1;
     scene.simulationRate = 720;
@@ -44,7 +44,7 @@ class Kernels : public GpuTest {
     setState(reference, start);
     reference.tick(referenceInputs(inputs));
 
-    const scene::Spring& spring = scene.cloths.front().structural;  // the stiffest
+    const model::Spring& spring = scene.cloths.front().structural;  // the stiffest
     const double longest = 0.06, nodeMass = 0.01, h = scene.substepSeconds();
     const double force =
         12 * kRounding * (spring.stiffness * (2 * kExtent + 10 * longest) + spring.damping * 20 * kSpeed) +
@@ -60,7 +60,7 @@ class Kernels : public GpuTest {
   }
 };
 
-TEST_F(Kernels, springsPullAsInTheReferenceOnEveryShapeOfGrid) {
+TEST_F(Kernels, SpringsPullAsInTheReferenceOnEveryShapeOfGrid) {
   const std::pair<std::uint32_t, std::uint32_t> shapes[] = {{2, 2},  {2, 3},   {3, 2},  {3, 65},
                                                             {65, 3}, {17, 23}, {33, 64}};
   unsigned seed = 1;
@@ -72,58 +72,58 @@ TEST_F(Kernels, springsPullAsInTheReferenceOnEveryShapeOfGrid) {
 
 // A grid given as a mesh, and a disc whose lightest node is no lighter than a grid's; grids before and
 // between.
-TEST_F(Kernels, meshesPullAsInTheReference) {
-  expectLikeReference(sceneOf({scene::asMesh(calmCloth(17, 23))}), {}, 21);
+TEST_F(Kernels, MeshesPullAsInTheReference) {
+  expectLikeReference(sceneOf({model::asMesh(calmCloth(17, 23))}), {}, 21);
   expectLikeReference(sceneOf({discCloth(11)}), {}, 22);
-  scene::Cloth pinned = discCloth(5);
+  model::Cloth pinned = discCloth(5);
   pinned.pinnedVertices = {0, 3, 60};
   expectLikeReference(sceneOf({calmCloth(5, 7), discCloth(6), calmCloth(9, 4), pinned}), {}, 23);
 }
 
-TEST_F(Kernels, undampedMeshesPullAsInTheReference) {
-  scene::Cloth cloth = discCloth(9);
+TEST_F(Kernels, UndampedMeshesPullAsInTheReference) {
+  model::Cloth cloth = discCloth(9);
   cloth.structural.damping = cloth.bend.damping = 0;
   expectLikeReference(sceneOf({cloth}), {}, 24);
 }
 
-TEST_F(Kernels, undampedSpringsPullAsInTheReference) {
-  scene::Cloth cloth = calmCloth(17, 23);
+TEST_F(Kernels, UndampedSpringsPullAsInTheReference) {
+  model::Cloth cloth = calmCloth(17, 23);
   cloth.structural.damping = cloth.shear.damping = cloth.bend.damping = 0;
   expectLikeReference(sceneOf({cloth}), {}, 2);
 }
 
-TEST_F(Kernels, gridsLongerOneWayPullAsInTheReference) {
-  scene::Cloth cloth = calmCloth(20, 21);
+TEST_F(Kernels, GridsLongerOneWayPullAsInTheReference) {
+  model::Cloth cloth = calmCloth(20, 21);
   cloth.grid.height *= 1.5f;
   cloth.pins = {topRow(cloth)};
   expectLikeReference(sceneOf({cloth}), {}, 3);
 }
 
-TEST_F(Kernels, explicitEulerStepsAsTheReference) {
-  scene::Scene scene = sceneOf({calmCloth(17, 23)});
-  scene.integrator = scene::Integrator::explicitEuler;
+TEST_F(Kernels, ExplicitEulerStepsAsTheReference) {
+  model::Scene scene = sceneOf({calmCloth(17, 23)});
+  scene.integrator = model::Integrator::explicitEuler;
   expectLikeReference(scene, {}, 4);
 }
 
-TEST_F(Kernels, rungeKuttaStepsAsTheReference) {
-  scene::Scene scene = sceneOf({calmCloth(17, 23), discCloth(6), calmCloth(2, 3)});
-  scene.integrator = scene::Integrator::rungeKutta4;
+TEST_F(Kernels, RungeKuttaStepsAsTheReference) {
+  model::Scene scene = sceneOf({calmCloth(17, 23), discCloth(6), calmCloth(2, 3)});
+  scene.integrator = model::Integrator::rungeKutta4;
   scene.cloths.front().pins = {topRow(scene.cloths.front())};
   expectLikeReference(scene, {}, 31, {.steps = 4});
   scene.environment.gravity =
-      scene::Vec3(0, 0, -100);  // far from the plane's edge between the two arithmetics
-  const scene::Quaternion up = turned(90, scene::Vec3::UnitX());
+      model::Vec3(0, 0, -100);  // far from the plane's edge between the two arithmetics
+  const model::Quaternion up = turned(90, model::Vec3::UnitX());
   expectLikeReference(scene,
-                      {{scene::Plane{}, {scene::Vec3(0, 0, 0.02f), up}, {scene::Vec3(0, 0, 0.02f), up}, 1}},
+                      {{model::Plane{}, {model::Vec3(0, 0, 0.02f), up}, {model::Vec3(0, 0, 0.02f), up}, 1}},
                       32, {.steps = 4});
 }
 
-TEST_F(Kernels, airDragsAndLiftsAsInTheReference) {
-  scene::Cloth cloth = calmCloth(17, 23);
+TEST_F(Kernels, AirDragsAndLiftsAsInTheReference) {
+  model::Cloth cloth = calmCloth(17, 23);
   cloth.drag = 0.8f;
   cloth.lift = 0.6f;
-  scene::Scene scene = sceneOf({cloth});
-  scene.environment.wind = scene::Vec3(3, -1, 8);
+  model::Scene scene = sceneOf({cloth});
+  scene.environment.wind = model::Vec3(3, -1, 8);
   // A triangle's area (2e-4 m^2) is wrong by two roundings of its corners' places times its sides (0.03 m),
   // and its force, density / 6 |u|^2 (drag + 2 lift) times the area, by some twenty roundings more; six
   // triangles.
@@ -132,37 +132,37 @@ TEST_F(Kernels, airDragsAndLiftsAsInTheReference) {
   expectLikeReference(scene, {}, 5, {.extraForce = air});
 }
 
-TEST_F(Kernels, airDragsAndLiftsMeshesAsInTheReference) {
-  scene::Cloth cloth = discCloth(9);
+TEST_F(Kernels, AirDragsAndLiftsMeshesAsInTheReference) {
+  model::Cloth cloth = discCloth(9);
   cloth.drag = 0.8f;
   cloth.lift = 0.6f;
-  scene::Scene scene = sceneOf({cloth});
-  scene.environment.wind = scene::Vec3(3, -1, 8);
+  model::Scene scene = sceneOf({cloth});
+  scene.environment.wind = model::Vec3(3, -1, 8);
   const double pressure = 1.2 / 6 * 15 * 15 * (0.8 + 2 * 0.6);
   const double air = 6 * kRounding * pressure * (2 * kExtent * 2 * 0.03 + 20 * 2e-4);
   expectLikeReference(scene, {}, 25, {.extraForce = air});
 }
 
-TEST_F(Kernels, airPushesStillClothWithoutSpringDamping) {
-  scene::Cloth cloth = calmCloth(12, 9);
+TEST_F(Kernels, AirPushesStillClothWithoutSpringDamping) {
+  model::Cloth cloth = calmCloth(12, 9);
   cloth.structural.damping = cloth.shear.damping = cloth.bend.damping = 0;
   cloth.drag = 1;
-  scene::Scene scene = sceneOf({cloth});
-  scene.environment.wind = scene::Vec3(0, 0, 10);
+  model::Scene scene = sceneOf({cloth});
+  scene.environment.wind = model::Vec3(0, 0, 10);
   const double air = 6 * kRounding * 1.2 / 6 * 110 * (2 * kExtent * 2 * 0.03 + 20 * 2e-4);
   expectLikeReference(scene, {}, 6, {.extraForce = air});
 }
 
-TEST_F(Kernels, movingSpheresCollideAsInTheReference) {
-  scene::Cloth cloth = calmCloth(30, 30);
+TEST_F(Kernels, MovingSpheresCollideAsInTheReference) {
+  model::Cloth cloth = calmCloth(30, 30);
   cloth.friction = 0.4f;
   // Two that overlap in the middle of the cloth, one that touches a corner; friction that stops and friction
   // that slows. Where a node lies at a sphere's surface to within rounding, inside for one of the two, no
   // velocity changes unless it moves inwards; these seeds have none there.
   const std::vector<simulation::MovingCollider> spheres{
-      {scene::Sphere{0.1f}, {scene::Vec3(0, -0.25f, 0.06f)}, {scene::Vec3(0.001f, -0.25f, 0.055f)}, 1},
-      {scene::Sphere{0.1f}, {scene::Vec3(0.08f, -0.3f, -0.06f)}, {scene::Vec3(0.08f, -0.3f, -0.05f)}, 5},
-      {scene::Sphere{0.05f}, {scene::Vec3(0.29f, 0, 0)}, {scene::Vec3(0.29f, 0, 0)}, 0}};
+      {model::Sphere{0.1f}, {model::Vec3(0, -0.25f, 0.06f)}, {model::Vec3(0.001f, -0.25f, 0.055f)}, 1},
+      {model::Sphere{0.1f}, {model::Vec3(0.08f, -0.3f, -0.06f)}, {model::Vec3(0.08f, -0.3f, -0.05f)}, 5},
+      {model::Sphere{0.05f}, {model::Vec3(0.29f, 0, 0)}, {model::Vec3(0.29f, 0, 0)}, 0}};
   // Out of a sphere, a velocity turns by the rounding of the normal, two roundings of places over the radius.
   const double h = 1.0 / 720, nodeMass = 0.01;
   const double turned = 10 * kSpeed * 2 * kRounding * kExtent / 0.05 * nodeMass / h;
@@ -170,12 +170,12 @@ TEST_F(Kernels, movingSpheresCollideAsInTheReference) {
                       {.displacement = 0.005f, .speed = 1, .extraForce = turned});
 }
 
-TEST_F(Kernels, movingSpheresCollideWithMeshesAsInTheReference) {
-  scene::Cloth cloth = discCloth(12);
+TEST_F(Kernels, MovingSpheresCollideWithMeshesAsInTheReference) {
+  model::Cloth cloth = discCloth(12);
   cloth.friction = 0.4f;
   const std::vector<simulation::MovingCollider> spheres{
-      {scene::Sphere{0.1f}, {scene::Vec3(0.05f, 0.08f, 0)}, {scene::Vec3(0.051f, 0.075f, 0)}, 1},
-      {scene::Sphere{0.1f}, {scene::Vec3(-0.1f, -0.06f, 0.02f)}, {scene::Vec3(-0.1f, -0.05f, 0.02f)}, 5}};
+      {model::Sphere{0.1f}, {model::Vec3(0.05f, 0.08f, 0)}, {model::Vec3(0.051f, 0.075f, 0)}, 1},
+      {model::Sphere{0.1f}, {model::Vec3(-0.1f, -0.06f, 0.02f)}, {model::Vec3(-0.1f, -0.05f, 0.02f)}, 5}};
   const double h = 1.0 / 720, nodeMass = 0.01;
   const double turned = 10 * kSpeed * 2 * kRounding * kExtent / 0.05 * nodeMass / h;
   expectLikeReference(sceneOf({cloth}), spheres, 26,
@@ -185,15 +185,15 @@ TEST_F(Kernels, movingSpheresCollideWithMeshesAsInTheReference) {
 // Each shape moves and turns through the middle of the cloth, which comes from both sides; some nodes start
 // inside. A contact errs by roundings of places in the shape's frame (ten of kExtent), in position and, over
 // a substep, in velocity. Seeds have no node within rounding of two faces at once.
-TEST_F(Kernels, turningShapesCollideAsInTheReference) {
-  const scene::Pose from{scene::Vec3(0.01f, -0.25f, 0.02f), turned(20, scene::Vec3(1, 2, 3))};
-  const scene::Pose to{scene::Vec3(0.013f, -0.26f, 0.012f), turned(22, scene::Vec3(1, 2.2f, 3))};
-  const scene::Shape shapes[] = {scene::Capsule{.radius = 0.05f, .length = 0.3f}, scene::Plane{},
-                                 scene::Box{scene::Vec3(0.2f, 0.1f, 0.3f)}, octahedron()};
+TEST_F(Kernels, TurningShapesCollideAsInTheReference) {
+  const model::Pose from{model::Vec3(0.01f, -0.25f, 0.02f), turned(20, model::Vec3(1, 2, 3))};
+  const model::Pose to{model::Vec3(0.013f, -0.26f, 0.012f), turned(22, model::Vec3(1, 2.2f, 3))};
+  const model::Shape shapes[] = {model::Capsule{.radius = 0.05f, .length = 0.3f}, model::Plane{},
+                                 model::Box{model::Vec3(0.2f, 0.1f, 0.3f)}, octahedron()};
   unsigned seed = 20;
-  for (const scene::Shape& shape : shapes) {
+  for (const model::Shape& shape : shapes) {
     SCOPED_TRACE(::testing::Message() << "shape " << shape.index());
-    scene::Cloth cloth = calmCloth(30, 30);
+    model::Cloth cloth = calmCloth(30, 30);
     cloth.friction = 0.4f;
     const double h = 1.0 / 720, nodeMass = 0.01;
     const double turnedBy = 10 * kSpeed * 2 * kRounding * kExtent / 0.05 * nodeMass / h;
@@ -203,14 +203,14 @@ TEST_F(Kernels, turningShapesCollideAsInTheReference) {
   }
 }
 
-TEST_F(Kernels, normalsPointAsInTheReference) {
-  scene::Scene scene = sceneOf({calmCloth(19, 33), calmCloth(2, 2), discCloth(8)});
-  scene.cloths[1].grid.pose.position = scene::Vec3(0, 1, 0);
+TEST_F(Kernels, NormalsPointAsInTheReference) {
+  model::Scene scene = sceneOf({calmCloth(19, 33), calmCloth(2, 2), discCloth(8)});
+  scene.cloths[1].grid.pose.position = model::Vec3(0, 1, 0);
   std::mt19937 random(8);
   const NodeState state = randomState(scene, random, 0.006f, 0);
   Running running(scene);
   running.restore(state);
-  const std::vector<scene::Vec3> normals = running.normals();
+  const std::vector<model::Vec3> normals = running.normals();
   reference::ReferenceSimulation reference(scene);
   setState(reference, state);
   std::size_t node = 0;
@@ -223,22 +223,22 @@ TEST_F(Kernels, normalsPointAsInTheReference) {
     }
 }
 
-TEST_F(Kernels, normalsOfAFlatClothFaceTheViewerToTheBit) {
+TEST_F(Kernels, NormalsOfAFlatClothFaceTheViewerToTheBit) {
   Running running(sceneOf({calmCloth(9, 9)}));
-  for (const scene::Vec3& normal : running.normals()) {
+  for (const model::Vec3& normal : running.normals()) {
     EXPECT_EQ(normal.x(), 0);
     EXPECT_EQ(normal.y(), 0);
     EXPECT_NEAR(normal.z(), 1, kUnitLength);
   }
 }
 
-TEST_F(Kernels, aClothCollapsedToAPointHasTheDefaultNormal) {
-  const scene::Scene scene = sceneOf({calmCloth(3, 3)});
+TEST_F(Kernels, AClothCollapsedToAPointHasTheDefaultNormal) {
+  const model::Scene scene = sceneOf({calmCloth(3, 3)});
   NodeState state = simulation::restState(scene.cloths);
-  for (scene::Vec3& position : state.positions) position = scene::Vec3(1, 2, 3);
+  for (model::Vec3& position : state.positions) position = model::Vec3(1, 2, 3);
   Running running(scene);
   running.restore(state);
-  for (const scene::Vec3& normal : running.normals()) EXPECT_EQ(normal, scene::Vec3(0, 0, 1));
+  for (const model::Vec3& normal : running.normals()) EXPECT_EQ(normal, model::Vec3(0, 0, 1));
 }
 
 }  // namespace

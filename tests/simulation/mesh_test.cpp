@@ -17,12 +17,12 @@ class Meshes : public GpuTest {};
 // stiffness times the rounding of its rest length (four roundings of where the nodes are, scene/mesh.h), of
 // its ends' difference in both (twice two), and some ten roundings of its own length; the dashpots' is far
 // less.
-TEST_F(Meshes, moveAsTheGridThatTheyAre) {
-  scene::Cloth cloth = calmCloth(24, 20);
+TEST_F(Meshes, MoveAsTheGridThatTheyAre) {
+  model::Cloth cloth = calmCloth(24, 20);
   cloth.structural.stiffness = 50;
   cloth.shear.stiffness = cloth.bend.stiffness = 25;
   cloth.pins = {topRow(cloth)};
-  const scene::Scene grid = sceneOf({cloth}), mesh = sceneOf({scene::asMesh(cloth)});
+  const model::Scene grid = sceneOf({cloth}), mesh = sceneOf({model::asMesh(cloth)});
   Running ofGrid(grid), ofMesh(mesh);
   const int ticks = 36;
   for (int tick = 0; tick < ticks; ++tick) {
@@ -44,24 +44,24 @@ TEST_F(Meshes, moveAsTheGridThatTheyAre) {
   EXPECT_GT(std::sqrt(motion / nodes), 10 * bound);  // it moved by far more: the comparison can fail
 }
 
-scene::Scene discs() {
-  scene::Cloth low = discCloth(14), high = discCloth(9);
+model::Scene discs() {
+  model::Cloth low = discCloth(14), high = discCloth(9);
   low.drag = high.drag = 0.5f;
   high.lift = 0.2f;
   low.pinnedVertices = {0};
-  scene::Scene scene = sceneOf({low, calmCloth(8, 9), high});
-  scene.environment.wind = scene::Vec3(2, 1, -1);
+  model::Scene scene = sceneOf({low, calmCloth(8, 9), high});
+  scene.environment.wind = model::Vec3(2, 1, -1);
   return scene;
 }
 
-simulation::TickInputs discInputs(const scene::Scene& scene) {
+simulation::TickInputs discInputs(const model::Scene& scene) {
   return inputsOf(
       scene,
-      {{scene::Sphere{0.15f}, {scene::Vec3(0.1f, -0.2f, 0)}, {scene::Vec3(0.1f, -0.19f, 0.01f)}, 0.5f}});
+      {{model::Sphere{0.15f}, {model::Vec3(0.1f, -0.2f, 0)}, {model::Vec3(0.1f, -0.19f, 0.01f)}, 0.5f}});
 }
 
-TEST_F(Meshes, haveTheSameBitsWhateverTheWorkgroup) {
-  const scene::Scene scene = discs();
+TEST_F(Meshes, HaveTheSameBitsWhateverTheWorkgroup) {
+  const model::Scene scene = discs();
   std::vector<std::uint64_t> hashes;
   for (const std::uint32_t workgroup : {64u, 8u, 32u, 128u}) {
     Running running(scene, {.rowsPerInvocation = 0, .workgroupSize = workgroup});
@@ -73,8 +73,8 @@ TEST_F(Meshes, haveTheSameBitsWhateverTheWorkgroup) {
   EXPECT_EQ(std::vector<std::uint64_t>(hashes.size(), hashes.front()), hashes);
 }
 
-TEST_F(Meshes, keepPinnedNodesWhereTheyStart) {
-  const scene::Scene scene = discs();
+TEST_F(Meshes, KeepPinnedNodesWhereTheyStart) {
+  const model::Scene scene = discs();
   Running running(scene);
   for (int tick = 0; tick < 20; ++tick) running.tick(discInputs(scene));
   const simulation::NodeState start = simulation::restState(scene.cloths), state = running.state();
@@ -82,8 +82,8 @@ TEST_F(Meshes, keepPinnedNodesWhereTheyStart) {
   EXPECT_GT((state.positions[5] - start.positions[5]).norm(), 0.001f);
 }
 
-TEST_F(Meshes, takeParametersWhileTheyRun) {
-  scene::Scene scene = sceneOf({discCloth(6)});
+TEST_F(Meshes, TakeParametersWhileTheyRun) {
+  model::Scene scene = sceneOf({discCloth(6)});
   Running soft(scene), stiff(scene);
   scene.cloths[0].structural.stiffness = 400;
   stiff.setCloths(scene.cloths);

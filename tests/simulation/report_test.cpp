@@ -7,7 +7,7 @@
 
 #include <gtest/gtest.h>
 
-#include "server/scene/springs.h"
+#include "server/model/springs.h"
 #include "tests/simulation/scenes.h"
 
 namespace clothstream::tests {
@@ -32,7 +32,7 @@ std::vector<std::byte> bitsOf(const std::vector<ClothReport>& reports) {
 // to 1e-5 of itself (products, a reciprocal of the mass), an elastic one to twice the error of its extension
 // besides. 64 nodes of a run have at most 6 springs each, other runs and lanes follow: 400 adds.
 void expectAsReference(const ClothReport& report, const reference::ReferenceCloth& cloth,
-                       const scene::Cloth& definition, const scene::Vec3& gravity) {
+                       const model::Cloth& definition, const model::Vec3& gravity) {
   const reference::Strain strain = cloth.strain();
   constexpr double kStretch = 6 * kRounding;
   constexpr double kAdds = 400 * kRounding, kTerm = 1e-5;
@@ -50,10 +50,10 @@ void expectAsReference(const ClothReport& report, const reference::ReferenceClot
       heights += cloth.masses()[i] * gravity.cast<double>().cwiseAbs().dot(cloth.positions()[i].cwiseAbs());
   EXPECT_NEAR(report.gravityEnergy, cloth.gravityEnergy(gravity.cast<double>()), (kAdds + kTerm) * heights);
   double extensions = 0;  // what an error of kStretch in each does: k e de
-  for (const scene::SpringLink& link : scene::springLinks(definition)) {
+  for (const model::SpringLink& link : model::springLinks(definition)) {
     const double length = (cloth.positions()[link.b] - cloth.positions()[link.a]).norm();
     const double error = kStretch * link.restLength;
-    extensions += scene::springOf(definition, link.kind).stiffness * error *
+    extensions += model::springOf(definition, link.kind).stiffness * error *
                   (std::abs(length - double{link.restLength}) + error);
   }
   EXPECT_NEAR(report.elasticEnergy, cloth.elasticEnergy(),
@@ -61,23 +61,23 @@ void expectAsReference(const ClothReport& report, const reference::ReferenceClot
 }
 
 // More nodes than a block, and fewer than a run has; meshes between grids; pinned ones.
-scene::Scene reportedScene() {
-  scene::Cloth large = calmCloth(71, 67);
+model::Scene reportedScene() {
+  model::Cloth large = calmCloth(71, 67);
   large.pins = {topRow(large)};
-  large.grid.pose.position = scene::Vec3(0.3f, 0.2f, -0.4f);
-  scene::Cloth disc = discCloth(12);
+  large.grid.pose.position = model::Vec3(0.3f, 0.2f, -0.4f);
+  model::Cloth disc = discCloth(12);
   disc.pinnedVertices = {3, 4};
-  scene::Cloth small = calmCloth(2, 2);
-  scene::Cloth wide = calmCloth(2, 90);
+  model::Cloth small = calmCloth(2, 2);
+  model::Cloth wide = calmCloth(2, 90);
   wide.structural.stiffness = 150;
-  scene::Cloth dish = discCloth(3);
-  scene::Scene scene = sceneOf({large, disc, small, wide, dish});
-  scene.environment.gravity = scene::Vec3(1, -9.81f, 0.5f);
+  model::Cloth dish = discCloth(3);
+  model::Scene scene = sceneOf({large, disc, small, wide, dish});
+  scene.environment.gravity = model::Vec3(1, -9.81f, 0.5f);
   return scene;
 }
 
-TEST_F(Report, saysOfRandomStatesWhatTheReferenceDoes) {
-  const scene::Scene scene = reportedScene();
+TEST_F(Report, SaysOfRandomStatesWhatTheReferenceDoes) {
+  const model::Scene scene = reportedScene();
   Running running(scene);
   std::mt19937 random(11);
   for (const float displacement : {0.004f, 0.0002f, 0.0f}) {
@@ -96,11 +96,11 @@ TEST_F(Report, saysOfRandomStatesWhatTheReferenceDoes) {
 }
 
 // Stiffness counts whether a spring is a force or a constraint; what a solve says belongs to its cloth.
-TEST_F(Report, saysWhatEachClothsSolverDid) {
-  scene::Scene scene = reportedScene();
-  scene.cloths[1].solver.kind = scene::SolverKind::acad;
+TEST_F(Report, SaysWhatEachClothsSolverDid) {
+  model::Scene scene = reportedScene();
+  scene.cloths[1].solver.kind = model::SolverKind::acad;
   scene.cloths[1].solver.activation = 0.01f;
-  scene.cloths[3].solver.kind = scene::SolverKind::constraint;
+  scene.cloths[3].solver.kind = model::SolverKind::constraint;
   scene.cloths[3].solver.iterations = 7;
   Running running(scene);
   std::mt19937 random(12);
@@ -111,10 +111,10 @@ TEST_F(Report, saysWhatEachClothsSolverDid) {
   for (std::size_t i = 0; i < reports.size(); ++i)
     expectAsReference(reports[i], reference.cloths()[i], scene.cloths[i], scene.environment.gravity);
   std::uint32_t links = 0, structuralAndShear = 0;
-  for (const scene::SpringLink& link : scene::springLinks(scene.cloths[3]))
-    structuralAndShear += link.kind != scene::SpringKind::bend ? 1 : 0;
-  for (const scene::SpringLink& link : scene::springLinks(scene.cloths[1]))
-    links += link.kind != scene::SpringKind::bend ? 1 : 0;
+  for (const model::SpringLink& link : model::springLinks(scene.cloths[3]))
+    structuralAndShear += link.kind != model::SpringKind::bend ? 1 : 0;
+  for (const model::SpringLink& link : model::springLinks(scene.cloths[1]))
+    links += link.kind != model::SpringKind::bend ? 1 : 0;
   EXPECT_EQ(reports[3].activeConstraints, structuralAndShear);
   EXPECT_EQ(reports[3].iterations, 7u);
   EXPECT_GT(reports[3].residual, 0);
@@ -125,23 +125,23 @@ TEST_F(Report, saysWhatEachClothsSolverDid) {
 
 // A plane through the shape comes after it, and puts nodes where they lie deep in the shape. More colliders
 // than a list of what is near holds say the same.
-TEST_F(Report, findsTheDeepestPenetrationIntoEveryShape) {
-  const scene::Shape shapes[] = {scene::Sphere{0.1f}, scene::Capsule{.radius = 0.06f, .length = 0.2f},
-                                 scene::Box{scene::Vec3(0.2f, 0.15f, 0.1f)}, octahedron(), scene::Plane{}};
-  scene::Cloth cloth = calmCloth(20, 20);
+TEST_F(Report, FindsTheDeepestPenetrationIntoEveryShape) {
+  const model::Shape shapes[] = {model::Sphere{0.1f}, model::Capsule{.radius = 0.06f, .length = 0.2f},
+                                 model::Box{model::Vec3(0.2f, 0.15f, 0.1f)}, octahedron(), model::Plane{}};
+  model::Cloth cloth = calmCloth(20, 20);
   cloth.thickness = 0;
   cloth.pins = {topRow(cloth)};
-  scene::Scene scene = sceneOf({cloth});
+  model::Scene scene = sceneOf({cloth});
   scene.substeps = 1;
   scene.simulationRate = 720;
   std::mt19937 random(13);
-  const scene::Pose place{scene::Vec3(0.02f, -0.2f, 0.03f), turned(-30, scene::Vec3(1, 2, 3))};
-  const scene::Pose through{scene::Vec3(0.02f, -0.2f, 0.04f), turned(95, scene::Vec3::UnitX())};
-  for (const scene::Shape& shape : shapes)
+  const model::Pose place{model::Vec3(0.02f, -0.2f, 0.03f), turned(-30, model::Vec3(1, 2, 3))};
+  const model::Pose through{model::Vec3(0.02f, -0.2f, 0.04f), turned(95, model::Vec3::UnitX())};
+  for (const model::Shape& shape : shapes)
     for (const std::size_t copies : {1, 150}) {
       SCOPED_TRACE(::testing::Message() << "shape " << shape.index() << ", " << copies << " times");
       std::vector<simulation::MovingCollider> colliders(copies, {shape, place, place, 1});
-      colliders.push_back({scene::Plane{}, through, through, 1});
+      colliders.push_back({model::Plane{}, through, through, 1});
       Running running(scene);
       running.restore(randomState(scene, random, 0.004f, 0.1f));
       const std::vector<ClothReport> reports = running.tickAndReport(inputsOf(scene, colliders));
@@ -149,30 +149,30 @@ TEST_F(Report, findsTheDeepestPenetrationIntoEveryShape) {
       setState(reference, running.state());
       const double expected =
           std::max(reference.cloths()[0].penetration(shape, reference::toPose(place)),
-                   reference.cloths()[0].penetration(scene::Plane{}, reference::toPose(through)));
+                   reference.cloths()[0].penetration(model::Plane{}, reference::toPose(through)));
       EXPECT_GT(expected, 0.001);
       // Into the shape's frame, and less its size: some ten roundings of half a metre; a length to 1e-6.
       EXPECT_NEAR(reports[0].penetration, expected, 20 * kRounding + 2e-7);
     }
 }
 
-TEST_F(Report, findsNoPenetrationWhereClothLiesOnACollider) {
-  scene::Scene scene = sceneOf({calmCloth(12, 12)});
-  const scene::Pose below{scene::Vec3(0, -0.1f, -0.101f), scene::Quaternion::Identity()};
-  const simulation::TickInputs inputs = inputsOf(scene, {{scene::Sphere{0.1f}, below, below, 1}});
+TEST_F(Report, FindsNoPenetrationWhereClothLiesOnACollider) {
+  model::Scene scene = sceneOf({calmCloth(12, 12)});
+  const model::Pose below{model::Vec3(0, -0.1f, -0.101f), model::Quaternion::Identity()};
+  const simulation::TickInputs inputs = inputsOf(scene, {{model::Sphere{0.1f}, below, below, 1}});
   Running running(scene);
   for (int tick = 0; tick < 20; ++tick)
     ASSERT_EQ(running.tickAndReport(inputs)[0].penetration, 0) << "tick " << tick;
 }
 
-TEST_F(Report, hasTheSameBitsWhateverTheWorkgroupsAndChangesNothing) {
-  scene::Scene scene = reportedScene();
-  scene.cloths[1].solver.kind = scene::SolverKind::acad;
-  scene.cloths[3].solver.kind = scene::SolverKind::constraint;
-  const scene::Pose place{scene::Vec3(0.2f, -0.3f, -0.35f), turned(20, scene::Vec3::UnitX())};
+TEST_F(Report, HasTheSameBitsWhateverTheWorkgroupsAndChangesNothing) {
+  model::Scene scene = reportedScene();
+  scene.cloths[1].solver.kind = model::SolverKind::acad;
+  scene.cloths[3].solver.kind = model::SolverKind::constraint;
+  const model::Pose place{model::Vec3(0.2f, -0.3f, -0.35f), turned(20, model::Vec3::UnitX())};
   const simulation::TickInputs inputs = inputsOf(
       scene,
-      {{scene::Sphere{0.1f}, place, place, 1}, {scene::Box{scene::Vec3(0.1f, 0.1f, 0.1f)}, place, place, 1}});
+      {{model::Sphere{0.1f}, place, place, 1}, {model::Box{model::Vec3(0.1f, 0.1f, 0.1f)}, place, place, 1}});
   Running usual(scene), narrow(scene, {.rowsPerInvocation = 1, .workgroupSize = 32, .advanceKernel = {}}),
       wide(scene, {.rowsPerInvocation = 5, .workgroupSize = 256, .advanceKernel = {}}), silent(scene);
   std::mt19937 random(14);

@@ -11,7 +11,7 @@ namespace clothstream::tests {
 namespace {
 
 // What locateStrip() does with a tile, for each of its invocations.
-std::vector<int> visitsOf(const std::vector<scene::Cloth>& cloths, std::uint32_t rowsPerInvocation,
+std::vector<int> visitsOf(const std::vector<model::Cloth>& cloths, std::uint32_t rowsPerInvocation,
                           std::uint32_t workgroupSize) {
   const std::vector<std::uint32_t> offsets = simulation::clothOffsets(cloths);
   std::vector<int> visits(offsets.back());
@@ -19,7 +19,7 @@ std::vector<int> visitsOf(const std::vector<scene::Cloth>& cloths, std::uint32_t
        simulation::makeTiles(cloths, rowsPerInvocation, workgroupSize).records)
     for (std::uint32_t lane = 0; lane < workgroupSize; ++lane) {
       const auto cloth = static_cast<std::uint32_t>(tile.start.x);
-      const scene::Grid& grid = cloths[cloth].grid;
+      const model::Grid& grid = cloths[cloth].grid;
       const std::uint32_t along = static_cast<std::uint32_t>(tile.start.z) + lane;
       const std::uint32_t row =
           static_cast<std::uint32_t>(tile.start.y) + along / grid.columns * rowsPerInvocation;
@@ -29,16 +29,16 @@ std::vector<int> visitsOf(const std::vector<scene::Cloth>& cloths, std::uint32_t
   return visits;
 }
 
-TEST(SceneTables, tilesCoverEveryNodeOnce) {
-  const std::vector<scene::Cloth> cloths{calmCloth(2, 2), calmCloth(3, 65), calmCloth(65, 3),
+TEST(SceneTables, TilesCoverEveryNodeOnce) {
+  const std::vector<model::Cloth> cloths{calmCloth(2, 2), calmCloth(3, 65), calmCloth(65, 3),
                                          calmCloth(64, 64), calmCloth(17, 130)};
   for (const std::uint32_t rows : {1u, 3u, 8u, 32u})
     for (const std::uint32_t workgroup : {8u, 64u, 100u})
       EXPECT_THAT(visitsOf(cloths, rows, workgroup), ::testing::Each(1)) << rows << " rows, " << workgroup;
 }
 
-TEST(SceneTables, pinnedNodesHaveNoInverseMass) {
-  scene::Cloth cloth = calmCloth(3, 4);
+TEST(SceneTables, PinnedNodesHaveNoInverseMass) {
+  model::Cloth cloth = calmCloth(3, 4);
   cloth.pins = {topRow(cloth)};
   const std::vector<float> masses = simulation::inverseMasses(std::vector{cloth, calmCloth(2, 2)});
   ASSERT_EQ(masses.size(), 16u);
@@ -46,8 +46,8 @@ TEST(SceneTables, pinnedNodesHaveNoInverseMass) {
   for (std::size_t i = 4; i < 16; ++i) EXPECT_NEAR(masses[i], 100, 1e-4);
 }
 
-TEST(SceneTables, firstNodesOfLargeScenesAreExact) {
-  const std::vector<scene::Cloth> cloths{calmCloth(5000, 5003), calmCloth(2, 2)};
+TEST(SceneTables, FirstNodesOfLargeScenesAreExact) {
+  const std::vector<model::Cloth> cloths{calmCloth(5000, 5003), calmCloth(2, 2)};
   const shared::ClothRecord record = simulation::clothRecords(cloths, 0.001).back();
   EXPECT_EQ(static_cast<std::uint32_t>(record.place.x) + (static_cast<std::uint32_t>(record.place.y) << 16),
             5000u * 5003u);

@@ -8,8 +8,8 @@
 
 namespace clothstream::tests {
 
-scene::Cloth calmCloth(std::uint32_t rows, std::uint32_t columns) {
-  scene::Cloth cloth;
+model::Cloth calmCloth(std::uint32_t rows, std::uint32_t columns) {
+  model::Cloth cloth;
   cloth.name = "cloth";
   cloth.grid = {.rows = rows,
                 .columns = columns,
@@ -24,22 +24,22 @@ scene::Cloth calmCloth(std::uint32_t rows, std::uint32_t columns) {
   return cloth;
 }
 
-scene::Cloth assembled(scene::Cloth cloth, bool bendConstraints) {
-  cloth.solver.kind = scene::SolverKind::constraint;
-  cloth.solver.path = scene::ConstraintPath::assembled;
+model::Cloth assembled(model::Cloth cloth, bool bendConstraints) {
+  cloth.solver.kind = model::SolverKind::constraint;
+  cloth.solver.path = model::ConstraintPath::assembled;
   cloth.solver.bendConstraints = bendConstraints;
   return cloth;
 }
 
-scene::Cloth discCloth(std::uint32_t rings) {
-  scene::Cloth cloth = calmCloth(2, 2);
-  cloth.mesh = std::make_shared<const scene::Mesh>(
-      scene::makeMesh(scene::disc(rings, 0.02f * static_cast<float>(rings))));
+model::Cloth discCloth(std::uint32_t rings) {
+  model::Cloth cloth = calmCloth(2, 2);
+  cloth.mesh = std::make_shared<const model::Mesh>(
+      model::makeMesh(model::disc(rings, 0.02f * static_cast<float>(rings))));
   cloth.mass = 0.02f * static_cast<float>(cloth.nodeCount());
   return cloth;
 }
 
-scene::GridRange topRow(const scene::Cloth& cloth) {
+model::GridRange topRow(const model::Cloth& cloth) {
   return {.firstRow = 0,
           .lastRow = 0,
           .rowStep = 1,
@@ -48,18 +48,18 @@ scene::GridRange topRow(const scene::Cloth& cloth) {
           .columnStep = 1};
 }
 
-scene::Scene sceneOf(std::vector<scene::Cloth> cloths) {
-  scene::Scene scene;
+model::Scene sceneOf(std::vector<model::Cloth> cloths) {
+  model::Scene scene;
   scene.cloths = std::move(cloths);
   return scene;
 }
 
-simulation::NodeState randomState(const scene::Scene& scene, std::mt19937& random, float displacement,
+simulation::NodeState randomState(const model::Scene& scene, std::mt19937& random, float displacement,
                                   float speed) {
   simulation::NodeState state = simulation::restState(scene.cloths);
   const std::vector<float> masses = simulation::inverseMasses(scene.cloths);
   std::uniform_real_distribution<float> unit(-1, 1);
-  const auto vector = [&] { return scene::Vec3(unit(random), unit(random), unit(random)); };
+  const auto vector = [&] { return model::Vec3(unit(random), unit(random), unit(random)); };
   for (std::size_t i = 0; i < masses.size(); ++i) {
     if (masses[i] == 0) continue;
     state.positions[i] += displacement * vector();
@@ -68,7 +68,7 @@ simulation::NodeState randomState(const scene::Scene& scene, std::mt19937& rando
   return state;
 }
 
-simulation::TickInputs inputsOf(const scene::Scene& scene,
+simulation::TickInputs inputsOf(const model::Scene& scene,
                                 std::vector<simulation::MovingCollider> colliders) {
   return {scene.environment, std::move(colliders)};
 }
@@ -78,29 +78,29 @@ reference::TickInputs referenceInputs(const simulation::TickInputs& inputs) {
   for (const simulation::MovingCollider& collider : inputs.colliders)
     result.colliders.push_back({collider.shape, reference::toPose(collider.start),
                                 reference::toPose(collider.end), double{collider.friction}});
-  for (const scene::Pose& pose : inputs.attachments) result.attachments.push_back(reference::toPose(pose));
-  for (const simulation::Grip& grip : inputs.grips)
-    result.grips.push_back({.state = static_cast<reference::Grip::State>(grip.state),
-                            .start = reference::toPose(grip.start),
-                            .end = reference::toPose(grip.end),
-                            .radius = double{grip.radius},
-                            .reach = double{grip.reach},
-                            .maxForce = double{grip.maxForce},
-                            .slipDistance = double{grip.slipDistance}});
+  for (const model::Pose& pose : inputs.attachments) result.attachments.push_back(reference::toPose(pose));
+  for (const simulation::Grab& grab : inputs.grabs)
+    result.grabs.push_back({.state = static_cast<reference::Grab::State>(grab.state),
+                            .start = reference::toPose(grab.start),
+                            .end = reference::toPose(grab.end),
+                            .radius = double{grab.radius},
+                            .reach = double{grab.reach},
+                            .maxForce = double{grab.maxForce},
+                            .slipDistance = double{grab.slipDistance}});
   return result;
 }
 
-scene::Hull octahedron() {
-  std::vector<scene::Vec3> corners;
+model::Hull octahedron() {
+  std::vector<model::Vec3> corners;
   for (int axis = 0; axis < 3; ++axis)
-    for (const float side : {0.1f, -0.1f}) corners.push_back(side * scene::Vec3::Unit(axis));
-  auto made = scene::makeConvexHull(
+    for (const float side : {0.1f, -0.1f}) corners.push_back(side * model::Vec3::Unit(axis));
+  auto made = model::makeConvexHull(
       corners, {{0, 2, 4}, {2, 1, 4}, {1, 3, 4}, {3, 0, 4}, {2, 0, 5}, {1, 2, 5}, {3, 1, 5}, {0, 3, 5}});
-  return std::make_shared<const scene::ConvexHull>(std::get<scene::ConvexHull>(std::move(made)));
+  return std::make_shared<const model::ConvexHull>(std::get<model::ConvexHull>(std::move(made)));
 }
 
-scene::Quaternion turned(float degrees, const scene::Vec3& axis) {
-  return scene::Quaternion(Eigen::AngleAxisf(degrees * std::acos(-1.0f) / 180, axis.normalized()));
+model::Quaternion turned(float degrees, const model::Vec3& axis) {
+  return model::Quaternion(Eigen::AngleAxisf(degrees * std::acos(-1.0f) / 180, axis.normalized()));
 }
 
 void setState(reference::ReferenceSimulation& reference, const simulation::NodeState& state) {
@@ -131,13 +131,13 @@ double largestSpeedDifference(const simulation::NodeState& state,
   return largest;
 }
 
-reference::Strain strainOf(const scene::Scene& scene, const simulation::NodeState& state) {
+reference::Strain strainOf(const model::Scene& scene, const simulation::NodeState& state) {
   reference::ReferenceSimulation reference(scene);
   setState(reference, state);
   return reference.cloths().front().strain();
 }
 
-Running::Running(const scene::Scene& scene, simulation::SimulationOptions options, vulkan::Device& device)
+Running::Running(const model::Scene& scene, simulation::SimulationOptions options, vulkan::Device& device)
     : device_(device), recorder_(device), simulation_(device, scene, options) {}
 
 template <typename Record>
@@ -173,7 +173,7 @@ simulation::StateSnapshot Running::save() {
   return simulation_.collectState(0);
 }
 
-std::vector<scene::Vec3> Running::normals() {
+std::vector<model::Vec3> Running::normals() {
   const std::size_t bytes = simulation_.normals().bytes();
   const vulkan::Buffer readback(device_, vulkan::BufferPurpose::readback, bytes);
   run([&] {
@@ -181,7 +181,7 @@ std::vector<scene::Vec3> Running::normals() {
     recorder_.barrier();
     recorder_.copy(simulation_.normals(), readback, bytes);
   });
-  std::vector<scene::Vec3> normals;
+  std::vector<model::Vec3> normals;
   for (const shared::vec4& n : readback.mapped<const shared::vec4>()) normals.emplace_back(n.x, n.y, n.z);
   return normals;
 }
@@ -194,14 +194,14 @@ void Running::rollback() {
   run([&] { simulation_.recordRollback(recorder_); });
 }
 
-simulation::TickInputs passingBall(const scene::Scene& scene, int tick) {
+simulation::TickInputs passingBall(const model::Scene& scene, int tick) {
   const auto place = [](int t) {
-    return scene::Pose{scene::Vec3(0.02f, -0.15f, 0.2f - 0.005f * static_cast<float>(t % 80))};
+    return model::Pose{model::Vec3(0.02f, -0.15f, 0.2f - 0.005f * static_cast<float>(t % 80))};
   };
-  return inputsOf(scene, {{scene::Sphere{0.08f}, place(tick), place(tick + 1), 1}});
+  return inputsOf(scene, {{model::Sphere{0.08f}, place(tick), place(tick + 1), 1}});
 }
 
-std::uint64_t hashAfter(const scene::Scene& scene, InputsAt inputs, int ticks,
+std::uint64_t hashAfter(const model::Scene& scene, InputsAt inputs, int ticks,
                         const simulation::SimulationOptions& options) {
   Running running(scene, options);
   simulation::TickStatus status;
@@ -210,14 +210,14 @@ std::uint64_t hashAfter(const scene::Scene& scene, InputsAt inputs, int ticks,
   return status.stateHash;
 }
 
-void expectSameBits(const scene::Scene& scene, InputsAt inputs, int ticks,
+void expectSameBits(const model::Scene& scene, InputsAt inputs, int ticks,
                     std::span<const simulation::SimulationOptions> ways) {
   const std::uint64_t first = hashAfter(scene, inputs, ticks, ways.front());
   for (std::size_t i = 1; i < ways.size(); ++i)
     EXPECT_EQ(hashAfter(scene, inputs, ticks, ways[i]), first) << "way " << i;
 }
 
-void expectSameThousandTicks(const scene::Scene& scene, InputsAt inputs,
+void expectSameThousandTicks(const model::Scene& scene, InputsAt inputs,
                              const simulation::SimulationOptions& other) {
   Running one(scene), again(scene), differently(scene, other);
   for (int tick = 0; tick < 1000; ++tick) {
@@ -231,7 +231,7 @@ void expectSameThousandTicks(const scene::Scene& scene, InputsAt inputs,
   }
 }
 
-Reports expectSameReports(const scene::Scene& scene, InputsAt inputs,
+Reports expectSameReports(const model::Scene& scene, InputsAt inputs,
                           const simulation::SimulationOptions& one,
                           const simulation::SimulationOptions& other) {
   Running first(scene, one), second(scene, other);
@@ -254,7 +254,7 @@ Reports expectSameReports(const scene::Scene& scene, InputsAt inputs,
   return reports;
 }
 
-void expectGoesOnAsAlways(Running& changing, const scene::Scene& changed,
+void expectGoesOnAsAlways(Running& changing, const model::Scene& changed,
                           const simulation::TickInputs& inputs, int ticks) {
   const simulation::StateSnapshot kept = changing.save();
   changing.setCloths(changed.cloths);

@@ -8,10 +8,10 @@
 #include <string>
 #include <vector>
 
+#include "server/model/scene.h"
 #include "server/reference/reference_simulation.h"
-#include "server/scene/scene.h"
 #include "server/simulation/cloth_simulation.h"
-#include "tests/scene/meshes.h"
+#include "tests/model/meshes.h"
 #include "tests/vulkan/gpu_test.h"
 
 namespace clothstream::tests {
@@ -27,26 +27,26 @@ inline constexpr std::uint32_t kSolveIterations = 2000;
 
 // rows x columns nodes with 2 cm between them, 10 g a node, springs and damping far inside the stability
 // bound.
-scene::Cloth calmCloth(std::uint32_t rows, std::uint32_t columns);
+model::Cloth calmCloth(std::uint32_t rows, std::uint32_t columns);
 // Enforced by constraints, with the matrices assembled.
-scene::Cloth assembled(scene::Cloth cloth, bool bendConstraints = false);
+model::Cloth assembled(model::Cloth cloth, bool bendConstraints = false);
 // A disc of rings 2 cm apart with the springs of a calm cloth; its lightest node has more than 10 g.
-scene::Cloth discCloth(std::uint32_t rings);
-scene::GridRange topRow(const scene::Cloth& cloth);
+model::Cloth discCloth(std::uint32_t rings);
+model::GridRange topRow(const model::Cloth& cloth);
 // 72 ticks a second of ten substeps.
-scene::Scene sceneOf(std::vector<scene::Cloth> cloths);
+model::Scene sceneOf(std::vector<model::Cloth> cloths);
 
 // Each component off its place at rest, and each velocity off zero, by up to these; pinned nodes as they are.
-simulation::NodeState randomState(const scene::Scene& scene, std::mt19937& random, float displacement,
+simulation::NodeState randomState(const model::Scene& scene, std::mt19937& random, float displacement,
                                   float speed);
 
-simulation::TickInputs inputsOf(const scene::Scene& scene,
+simulation::TickInputs inputsOf(const model::Scene& scene,
                                 std::vector<simulation::MovingCollider> colliders = {});
 reference::TickInputs referenceInputs(const simulation::TickInputs& inputs);
 
 // An octahedron of 20 cm, its corners on the axes.
-scene::Hull octahedron();
-scene::Quaternion turned(float degrees, const scene::Vec3& axis);
+model::Hull octahedron();
+model::Quaternion turned(float degrees, const model::Vec3& axis);
 
 void setState(reference::ReferenceSimulation& reference, const simulation::NodeState& state);
 // Largest distance between corresponding nodes.
@@ -55,12 +55,12 @@ double largestSpeedDifference(const simulation::NodeState& state,
                               const reference::ReferenceSimulation& reference);
 
 // Of the first cloth.
-reference::Strain strainOf(const scene::Scene& scene, const simulation::NodeState& state);
+reference::Strain strainOf(const model::Scene& scene, const simulation::NodeState& state);
 
 // A simulation and what it takes to run it.
 class Running {
  public:
-  explicit Running(const scene::Scene& scene, simulation::SimulationOptions options = {},
+  explicit Running(const model::Scene& scene, simulation::SimulationOptions options = {},
                    vulkan::Device& device = tests::device());
 
   simulation::TickStatus tick(const simulation::TickInputs& inputs);
@@ -68,13 +68,13 @@ class Running {
   void restore(const simulation::StateSnapshot& snapshot);
   simulation::StateSnapshot save();
   simulation::NodeState state() { return simulation::unpack(save()); }
-  std::vector<scene::Vec3> normals();
+  std::vector<model::Vec3> normals();
   std::vector<shared::SolveRecord> solves() const { return simulation_.solves(); }
   std::vector<simulation::ContactStatus> contacts() const { return simulation_.contacts(); }
-  std::vector<simulation::GripStatus> grips() const { return simulation_.grips(); }
+  std::vector<simulation::GrabStatus> grabs() const { return simulation_.grabs(); }
   // A tick, and what its end is like.
   std::vector<simulation::ClothReport> tickAndReport(const simulation::TickInputs& inputs);
-  void setCloths(std::span<const scene::Cloth> cloths) { simulation_.setCloths(cloths); }
+  void setCloths(std::span<const model::Cloth> cloths) { simulation_.setCloths(cloths); }
   void checkpoint();
   void rollback();
 
@@ -88,27 +88,27 @@ class Running {
 };
 
 // What determinism means for whatever a scene is solved by; `inputs` of a tick.
-using InputsAt = simulation::TickInputs (*)(const scene::Scene& scene, int tick);
+using InputsAt = simulation::TickInputs (*)(const model::Scene& scene, int tick);
 // A ball of 8 cm goes through where small cloths hang, again and again.
-simulation::TickInputs passingBall(const scene::Scene& scene, int tick);
+simulation::TickInputs passingBall(const model::Scene& scene, int tick);
 
 // The same bits after so many ticks with each of these ways to cut the work.
-void expectSameBits(const scene::Scene& scene, InputsAt inputs, int ticks,
+void expectSameBits(const model::Scene& scene, InputsAt inputs, int ticks,
                     std::span<const simulation::SimulationOptions> ways);
 // In two runs of a thousand ticks, and for a hundred of them in a way of its own.
-void expectSameThousandTicks(const scene::Scene& scene, InputsAt inputs,
+void expectSameThousandTicks(const model::Scene& scene, InputsAt inputs,
                              const simulation::SimulationOptions& other);
 // The same reports of ten ticks from both; these are for what else holds of them.
 using Reports = std::vector<std::vector<simulation::ClothReport>>;
-Reports expectSameReports(const scene::Scene& scene, InputsAt inputs,
+Reports expectSameReports(const model::Scene& scene, InputsAt inputs,
                           const simulation::SimulationOptions& one,
                           const simulation::SimulationOptions& other);
-std::uint64_t hashAfter(const scene::Scene& scene, InputsAt inputs, int ticks,
+std::uint64_t hashAfter(const model::Scene& scene, InputsAt inputs, int ticks,
                         const simulation::SimulationOptions& options = {});
 
 // Gives a running scene the cloths of another: the state stays to the bit, and goes on to the bit as that of
 // one that always had them would from there.
-void expectGoesOnAsAlways(Running& changing, const scene::Scene& changed,
+void expectGoesOnAsAlways(Running& changing, const model::Scene& changed,
                           const simulation::TickInputs& inputs, int ticks);
 
 }  // namespace clothstream::tests

@@ -28,37 +28,37 @@ constexpr float kDistance = 0.02f;  // m, of two balls of 1 cm that touch
 
 class SelfCollision : public GpuTest {};
 
-scene::Cloth withBalls(scene::Cloth cloth, float radius = kDistance / 2, float friction = 0.3f) {
-  cloth.selfCollision = scene::SelfCollision{.radius = radius, .friction = friction};
+model::Cloth withBalls(model::Cloth cloth, float radius = kDistance / 2, float friction = 0.3f) {
+  cloth.selfCollision = model::SelfCollision{.radius = radius, .friction = friction};
   return cloth;
 }
 
 // Lies in the XZ plane, turned about Y.
-scene::Cloth flat(scene::Cloth cloth, float y, float degrees = 0) {
-  const scene::Quaternion turn = turned(degrees, scene::Vec3::UnitY()) * turned(-90, scene::Vec3::UnitX());
-  const scene::Vec3 middle = turn * scene::Vec3(0, -cloth.grid.height / 2, 0);
-  cloth.grid.pose = {scene::Vec3(0, y, 0) - middle, turn};
+model::Cloth flat(model::Cloth cloth, float y, float degrees = 0) {
+  const model::Quaternion turn = turned(degrees, model::Vec3::UnitY()) * turned(-90, model::Vec3::UnitX());
+  const model::Vec3 middle = turn * model::Vec3(0, -cloth.grid.height / 2, 0);
+  cloth.grid.pose = {model::Vec3(0, y, 0) - middle, turn};
   return cloth;
 }
 
-scene::Scene withoutGravity(scene::Scene scene) {
-  scene.environment.gravity = scene::Vec3::Zero();
+model::Scene withoutGravity(model::Scene scene) {
+  scene.environment.gravity = model::Vec3::Zero();
   return scene;
 }
 
 simulation::MovingCollider floorAt(float y) {
-  const scene::Pose pose{scene::Vec3(0, y, 0), scene::Quaternion::Identity()};
-  return {scene::Plane{}, pose, pose, 1};
+  const model::Pose pose{model::Vec3(0, y, 0), model::Quaternion::Identity()};
+  return {model::Plane{}, pose, pose, 1};
 }
 
-std::vector<reference::Vec3> inDouble(std::span<const scene::Vec3> vectors) {
+std::vector<reference::Vec3> inDouble(std::span<const model::Vec3> vectors) {
   std::vector<reference::Vec3> result;
-  for (const scene::Vec3& v : vectors) result.push_back(v.cast<double>());
+  for (const model::Vec3& v : vectors) result.push_back(v.cast<double>());
   return result;
 }
 
 // Of the pairs that collide, the smallest distance, as a part of that at which they touch; at most 1.
-double nearest(const scene::Scene& scene, const NodeState& state) {
+double nearest(const model::Scene& scene, const NodeState& state) {
   const std::vector<reference::Vec3> positions = inDouble(state.positions);
   double least = 1;
   for (const auto& pair : reference::SelfCollision(scene).pairs(positions))
@@ -68,18 +68,18 @@ double nearest(const scene::Scene& scene, const NodeState& state) {
 
 double speedOf(const NodeState& state) {
   double sum = 0;
-  for (const scene::Vec3& v : state.velocities) sum += v.squaredNorm();
+  for (const model::Vec3& v : state.velocities) sum += v.squaredNorm();
   return std::sqrt(sum / static_cast<double>(state.velocities.size()));
 }
 
 // In panels of so many rows that lie above each other to and fro, the first at height y.
-NodeState folded(const scene::Scene& scene, std::uint32_t panel, float gap, float y) {
+NodeState folded(const model::Scene& scene, std::uint32_t panel, float gap, float y) {
   NodeState state = simulation::restState(scene.cloths);
-  const scene::Grid& grid = scene.cloths[0].grid;
+  const model::Grid& grid = scene.cloths[0].grid;
   for (std::uint32_t row = 0; row < grid.rows; ++row)
     for (std::uint32_t column = 0; column < grid.columns; ++column) {
       const std::uint32_t fold = row / panel, along = row % panel;
-      scene::Vec3& p = state.positions[row * grid.columns + column];
+      model::Vec3& p = state.positions[row * grid.columns + column];
       p.y() = y + gap * static_cast<float>(fold);
       p.z() = kSpacing * static_cast<float>(fold % 2 == 0 ? along : panel - 1 - along);
     }
@@ -91,7 +91,7 @@ NodeState folded(const scene::Scene& scene, std::uint32_t panel, float gap, floa
 // The stage alone, on a state as it is.
 class Lists {
  public:
-  Lists(const scene::Scene& scene, const NodeState& state, std::uint32_t workgroupSize = 64)
+  Lists(const model::Scene& scene, const NodeState& state, std::uint32_t workgroupSize = 64)
       : nodes_(scene.nodeCount()),
         cloths_(upload(simulation::clothRecords(scene.cloths, scene.substepSeconds()))),
         positions_(upload(texels(state.positions))),
@@ -123,9 +123,9 @@ class Lists {
   shared::CrowdReport report() const { return stage_.report(0); }
 
  private:
-  static std::vector<shared::vec4> texels(const std::vector<scene::Vec3>& vectors) {
+  static std::vector<shared::vec4> texels(const std::vector<model::Vec3>& vectors) {
     std::vector<shared::vec4> result;
-    for (const scene::Vec3& v : vectors) result.push_back({v.x(), v.y(), v.z(), 1});
+    for (const model::Vec3& v : vectors) result.push_back({v.x(), v.y(), v.z(), 1});
     return result;
   }
   template <typename Record>
@@ -149,7 +149,7 @@ class Lists {
 };
 
 // What a list is to hold, by its rule, every pair looked at: nodes plus one, negative of another cloth.
-std::vector<std::set<float>> expectedLists(const scene::Scene& scene, const NodeState& state) {
+std::vector<std::set<float>> expectedLists(const model::Scene& scene, const NodeState& state) {
   const double ahead = 1.25 * 3 * scene.substepSeconds();  // three substeps follow the one that makes them
   const std::vector<reference::Vec3> positions = inDouble(state.positions);
   const std::vector<std::uint32_t> offsets = simulation::clothOffsets(scene.cloths);
@@ -173,27 +173,27 @@ std::vector<std::set<float>> expectedLists(const scene::Scene& scene, const Node
   return lists;
 }
 
-scene::Scene twoCrumpled() {
+model::Scene twoCrumpled() {
   return sceneOf({withBalls(calmCloth(20, 31)), calmCloth(3, 3), withBalls(discCloth(9), 0.008f)});
 }
 
 // Every node anywhere in a box of this size.
-NodeState scattered(const scene::Scene& scene, std::uint32_t seed, const scene::Vec3& box, float speed) {
+NodeState scattered(const model::Scene& scene, std::uint32_t seed, const model::Vec3& box, float speed) {
   std::mt19937 random(seed);
   std::uniform_real_distribution<float> unit(-1, 1);
-  const auto vector = [&] { return scene::Vec3(unit(random), unit(random), unit(random)); };
+  const auto vector = [&] { return model::Vec3(unit(random), unit(random), unit(random)); };
   NodeState state = simulation::restState(scene.cloths);
-  for (scene::Vec3& position : state.positions) position = box.cwiseProduct(vector()) / 2;
-  for (scene::Vec3& velocity : state.velocities) velocity = speed * vector();
+  for (model::Vec3& position : state.positions) position = box.cwiseProduct(vector()) / 2;
+  for (model::Vec3& velocity : state.velocities) velocity = speed * vector();
   return state;
 }
 
-TEST_F(SelfCollision, listsAreThoseOfBruteForceInAFixedOrder) {
-  const scene::Scene scene = twoCrumpled();
+TEST_F(SelfCollision, ListsAreThoseOfBruteForceInAFixedOrder) {
+  const model::Scene scene = twoCrumpled();
   // Dense; spread so far that cells share entries of the table; and fast.
-  const std::pair<scene::Vec3, float> cases[] = {{scene::Vec3(0.3f, 0.2f, 0.3f), 0.1f},
-                                                 {scene::Vec3(60, 0.05f, 0.1f), 0.1f},
-                                                 {scene::Vec3(0.5f, 0.5f, 0.5f), 2}};
+  const std::pair<model::Vec3, float> cases[] = {{model::Vec3(0.3f, 0.2f, 0.3f), 0.1f},
+                                                 {model::Vec3(60, 0.05f, 0.1f), 0.1f},
+                                                 {model::Vec3(0.5f, 0.5f, 0.5f), 2}};
   for (const auto& [box, speed] : cases) {
     const NodeState state = scattered(scene, 11, box, speed);
     const std::vector<std::set<float>> expected = expectedLists(scene, state);
@@ -212,9 +212,9 @@ TEST_F(SelfCollision, listsAreThoseOfBruteForceInAFixedOrder) {
   }
 }
 
-TEST_F(SelfCollision, listsThatAreFullAreCountedAndStillInAFixedOrder) {
-  const scene::Scene scene = sceneOf({withBalls(calmCloth(30, 31))});
-  const NodeState state = scattered(scene, 12, scene::Vec3(0.1f, 0.1f, 0.1f), 0);
+TEST_F(SelfCollision, ListsThatAreFullAreCountedAndStillInAFixedOrder) {
+  const model::Scene scene = sceneOf({withBalls(calmCloth(30, 31))});
+  const NodeState state = scattered(scene, 12, model::Vec3(0.1f, 0.1f, 0.1f), 0);
   std::uint32_t full = 0;
   for (const std::set<float>& list : expectedLists(scene, state))
     full += list.size() > shared::kMaxNeighbours ? 1 : 0;
@@ -227,9 +227,9 @@ TEST_F(SelfCollision, listsThatAreFullAreCountedAndStillInAFixedOrder) {
   for (std::uint32_t node = 0; node < scene.nodeCount(); ++node) EXPECT_EQ(lists.of(node), narrow.of(node));
 }
 
-TEST_F(SelfCollision, crowdsThatNobodyLooksIntoAreReportedAndHarmless) {
-  const scene::Scene scene = sceneOf({withBalls(calmCloth(40, 40))});
-  NodeState state = scattered(scene, 13, scene::Vec3(1e-3f, 1e-3f, 1e-3f), 0);
+TEST_F(SelfCollision, CrowdsThatNobodyLooksIntoAreReportedAndHarmless) {
+  const model::Scene scene = sceneOf({withBalls(calmCloth(40, 40))});
+  NodeState state = scattered(scene, 13, model::Vec3(1e-3f, 1e-3f, 1e-3f), 0);
   Running running(scene);
   running.restore(state);
   const TickStatus status = running.tick(inputsOf(scene));
@@ -246,7 +246,7 @@ TEST_F(SelfCollision, crowdsThatNobodyLooksIntoAreReportedAndHarmless) {
 // ---- What they do
 
 // From a random state on the device and in the reference; farther apart than the tolerance without contacts.
-void expectLikeReference(const scene::Scene& scene, double tolerance) {
+void expectLikeReference(const model::Scene& scene, double tolerance) {
   std::mt19937 random(5);
   const NodeState start = randomState(scene, random, 0.004f, 0.5f);
   const TickInputs inputs = inputsOf(scene, {floorAt(-0.008f)});
@@ -259,8 +259,8 @@ void expectLikeReference(const scene::Scene& scene, double tolerance) {
   EXPECT_LT(largestDistance(running.state(), reference), tolerance);
   EXPECT_LT(largestSpeedDifference(running.state(), reference), 720 * tolerance);
 
-  scene::Scene through = scene;
-  for (scene::Cloth& cloth : through.cloths) cloth.selfCollision.reset();
+  model::Scene through = scene;
+  for (model::Cloth& cloth : through.cloths) cloth.selfCollision.reset();
   Running without(through);
   without.restore(start);
   without.tick(inputs);
@@ -268,10 +268,10 @@ void expectLikeReference(const scene::Scene& scene, double tolerance) {
 }
 
 // Three cloths in one heap, of several radii and frictions.
-scene::Scene heap(scene::SolverKind kind) {
-  scene::Cloth lower = withBalls(flat(calmCloth(14, 17), 0), 0.01f, 0.5f);
-  scene::Cloth upper = withBalls(flat(calmCloth(13, 12), 0.012f, 20), 0.007f, 0.1f);
-  scene::Cloth disc = withBalls(discCloth(6), 0.009f);
+model::Scene heap(model::SolverKind kind) {
+  model::Cloth lower = withBalls(flat(calmCloth(14, 17), 0), 0.01f, 0.5f);
+  model::Cloth upper = withBalls(flat(calmCloth(13, 12), 0.012f, 20), 0.007f, 0.1f);
+  model::Cloth disc = withBalls(discCloth(6), 0.009f);
   lower.solver.kind = disc.solver.kind = kind;
   lower.pins = {topRow(lower)};
   return sceneOf({lower, upper, disc});
@@ -279,14 +279,14 @@ scene::Scene heap(scene::SolverKind kind) {
 
 // Twenty iterations, each of which adds the rounding of a position (2^-25 of 0.3 m) to an overlap, half of
 // which comes out as speed, 360 1/s times as large; what speeds differ by, friction and springs carry on.
-TEST_F(SelfCollision, ofForcesMovesNodesAsTheReference) {
-  expectLikeReference(heap(scene::SolverKind::massSpring), 5e-6);
+TEST_F(SelfCollision, OfForcesMovesNodesAsTheReference) {
+  expectLikeReference(heap(model::SolverKind::massSpring), 5e-6);
 }
 
 // Solved as far as floats go: what a solve leaves, a tick of contacts makes a hundred times as large.
-TEST_F(SelfCollision, ofAdaptiveConstraintsMovesNodesAsTheReference) {
-  scene::Scene scene = heap(scene::SolverKind::acad);
-  for (scene::Cloth& cloth : scene.cloths) {
+TEST_F(SelfCollision, OfAdaptiveConstraintsMovesNodesAsTheReference) {
+  model::Scene scene = heap(model::SolverKind::acad);
+  for (model::Cloth& cloth : scene.cloths) {
     cloth.solver.iterations = 2000;
     cloth.solver.tolerance = 1e-6f;
   }
@@ -295,20 +295,20 @@ TEST_F(SelfCollision, ofAdaptiveConstraintsMovesNodesAsTheReference) {
 
 // One substep: from here springs throw nodes about, and what a solve leaves grows fast. It leaves 1e-5 of
 // some thousand springs' errors of 0.014 m: 5e-6 m, and more of it at a single node.
-TEST_F(SelfCollision, ofConstraintsMovesNodesAsTheReference) {
-  scene::Scene scene = heap(scene::SolverKind::constraint);
+TEST_F(SelfCollision, OfConstraintsMovesNodesAsTheReference) {
+  model::Scene scene = heap(model::SolverKind::constraint);
   scene.simulationRate = 720;
   scene.substeps = 1;
-  for (scene::Cloth& cloth : scene.cloths) {
+  for (model::Cloth& cloth : scene.cloths) {
     cloth.solver.iterations = 2000;
     cloth.solver.tolerance = 1e-5f;
   }
   expectLikeReference(scene, 2e-5);
 }
 
-TEST_F(SelfCollision, aSheetAtRestIsNoNeighbourOfItself) {
+TEST_F(SelfCollision, ASheetAtRestIsNoNeighbourOfItself) {
   // As large as balls may be: their neighbours reach two nodes far.
-  scene::Scene scene = withoutGravity(sceneOf({calmCloth(9, 9)}));
+  model::Scene scene = withoutGravity(sceneOf({calmCloth(9, 9)}));
   Running without(scene);
   scene.cloths[0] = withBalls(scene.cloths[0], kSpacing);
   Running with(scene);
@@ -320,10 +320,10 @@ TEST_F(SelfCollision, aSheetAtRestIsNoNeighbourOfItself) {
     EXPECT_EQ(with.tick(inputsOf(scene)).stateHash, without.tick(inputsOf(scene)).stateHash);
 }
 
-TEST_F(SelfCollision, clothWithoutItMovesAsIfAlone) {
-  const scene::Cloth other = flat(calmCloth(12, 12), 0.005f, 30);
-  const scene::Scene alone = sceneOf({other});
-  const scene::Scene both = sceneOf({withBalls(flat(calmCloth(12, 12), 0)), other});
+TEST_F(SelfCollision, ClothWithoutItMovesAsIfAlone) {
+  const model::Cloth other = flat(calmCloth(12, 12), 0.005f, 30);
+  const model::Scene alone = sceneOf({other});
+  const model::Scene both = sceneOf({withBalls(flat(calmCloth(12, 12), 0)), other});
   Running one(alone), two(both);
   for (int tick = 0; tick < 20; ++tick) {
     one.tick(inputsOf(alone, {floorAt(-0.1f)}));
@@ -333,16 +333,16 @@ TEST_F(SelfCollision, clothWithoutItMovesAsIfAlone) {
   EXPECT_TRUE(std::equal(expected.positions.begin(), expected.positions.end(), state.positions.end() - 144));
 }
 
-TEST_F(SelfCollision, momentumStays) {
+TEST_F(SelfCollision, MomentumStays) {
   // A small sheet flies into a larger, heavier one, with friction between them.
-  scene::Cloth large = withBalls(flat(calmCloth(20, 20), 0)),
+  model::Cloth large = withBalls(flat(calmCloth(20, 20), 0)),
                small = withBalls(flat(calmCloth(9, 9), 0.05f, 35));
   large.damping = small.damping = 0;
   large.mass *= 3;
-  const scene::Scene scene = withoutGravity(sceneOf({large, small}));
+  const model::Scene scene = withoutGravity(sceneOf({large, small}));
   NodeState state = simulation::restState(scene.cloths);
   for (std::size_t i = 400; i < state.velocities.size(); ++i)
-    state.velocities[i] = scene::Vec3(0.5f, -2, 0.2f);
+    state.velocities[i] = model::Vec3(0.5f, -2, 0.2f);
   const std::vector<float> inverse = simulation::inverseMasses(scene.cloths);
   const auto momentum = [&](const NodeState& s, std::size_t first, std::size_t end) {
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
@@ -361,10 +361,10 @@ TEST_F(SelfCollision, momentumStays) {
   EXPECT_EQ(intersections(scene, after.positions), 0u);
 }
 
-TEST_F(SelfCollision, aSheetThatFallsOnASheetComesToRestOnIt) {
-  scene::Cloth lower = withBalls(flat(calmCloth(30, 30), 0.03f));
-  scene::Cloth upper = withBalls(flat(calmCloth(20, 20), 0.3f, 20));
-  const scene::Scene scene = sceneOf({lower, upper});
+TEST_F(SelfCollision, ASheetThatFallsOnASheetComesToRestOnIt) {
+  model::Cloth lower = withBalls(flat(calmCloth(30, 30), 0.03f));
+  model::Cloth upper = withBalls(flat(calmCloth(20, 20), 0.3f, 20));
+  const model::Scene scene = sceneOf({lower, upper});
   Running running(scene);
   for (int tick = 0; tick < 216; ++tick) {
     const TickStatus status = running.tick(inputsOf(scene, {floorAt(0)}));
@@ -393,11 +393,11 @@ TEST_F(SelfCollision, aSheetThatFallsOnASheetComesToRestOnIt) {
   EXPECT_LT(speedOf(state), 0.005);
 }
 
-TEST_F(SelfCollision, foldsThatFallOnTheFloorStayAStack) {
-  scene::Cloth cloth = calmCloth(60, 20);
+TEST_F(SelfCollision, FoldsThatFallOnTheFloorStayAStack) {
+  model::Cloth cloth = calmCloth(60, 20);
   cloth.bend = {2, 0.01f};
   for (const bool balls : {true, false}) {
-    const scene::Scene scene = sceneOf({balls ? withBalls(cloth) : cloth});
+    const model::Scene scene = sceneOf({balls ? withBalls(cloth) : cloth});
     Running running(scene);
     running.restore(folded(scene, 12, kDistance, 0.2f));
     for (int tick = 0; tick < 216; ++tick) {
@@ -425,25 +425,25 @@ TEST_F(SelfCollision, foldsThatFallOnTheFloorStayAStack) {
 }
 
 // Boxes push it together from both sides.
-TEST_F(SelfCollision, aCurtainThatIsPushedTogetherFoldsAndDoesNotPassThroughItself) {
-  scene::Cloth cloth = calmCloth(24, 60);
+TEST_F(SelfCollision, ACurtainThatIsPushedTogetherFoldsAndDoesNotPassThroughItself) {
+  model::Cloth cloth = calmCloth(24, 60);
   cloth.structural = {100, 0.05f};
   cloth.shear = {20, 0.02f};
   cloth.bend = {1, 0.01f};
   cloth.pins = {
       {.firstRow = 0, .lastRow = 0, .rowStep = 1, .firstColumn = 29, .lastColumn = 30, .columnStep = 1}};
-  cloth.grid.pose.orientation = turned(4, scene::Vec3::UnitY());
+  cloth.grid.pose.orientation = turned(4, model::Vec3::UnitY());
   for (const bool balls : {true, false}) {
-    scene::Scene scene = sceneOf({balls ? withBalls(cloth) : cloth});
-    scene.environment.gravity = scene::Vec3(0, -2, 0);
+    model::Scene scene = sceneOf({balls ? withBalls(cloth) : cloth});
+    scene.environment.gravity = model::Vec3(0, -2, 0);
     Running running(scene);
     const auto boxes = [&](int tick) {
       const auto at = [](int t) { return 0.75f - std::min(0.003f * static_cast<float>(t), 0.55f); };
       std::vector<simulation::MovingCollider> both;
       for (const float side : {-1.0f, 1.0f})
-        both.push_back({scene::Box{scene::Vec3(0.2f, 2, 2)},
-                        {scene::Vec3(side * at(tick), 0, 0), scene::Quaternion::Identity()},
-                        {scene::Vec3(side * at(tick + 1), 0, 0), scene::Quaternion::Identity()},
+        both.push_back({model::Box{model::Vec3(0.2f, 2, 2)},
+                        {model::Vec3(side * at(tick), 0, 0), model::Quaternion::Identity()},
+                        {model::Vec3(side * at(tick + 1), 0, 0), model::Quaternion::Identity()},
                         0.2f});
       return both;
     };
@@ -460,15 +460,15 @@ TEST_F(SelfCollision, aCurtainThatIsPushedTogetherFoldsAndDoesNotPassThroughItse
 
 // A small sheet on one that is pinned everywhere, gravity leaning over: as on a slope of that angle.
 double slideOn(double slope, float friction, int ticks) {
-  scene::Cloth lower = withBalls(flat(calmCloth(40, 80), 0), kSpacing, friction);
+  model::Cloth lower = withBalls(flat(calmCloth(40, 80), 0), kSpacing, friction);
   lower.pins = {
       {.firstRow = 0, .lastRow = 39, .rowStep = 1, .firstColumn = 0, .lastColumn = 79, .columnStep = 1}};
-  scene::Cloth upper = withBalls(flat(calmCloth(12, 12), 2 * kSpacing, 27), kSpacing, friction);
+  model::Cloth upper = withBalls(flat(calmCloth(12, 12), 2 * kSpacing, 27), kSpacing, friction);
   upper.grid.pose.position.x() -= 0.6f;
   upper.damping = 0;
-  scene::Scene scene = sceneOf({lower, upper});
+  model::Scene scene = sceneOf({lower, upper});
   scene.environment.gravity =
-      9.81f * scene::Vec3(static_cast<float>(std::sin(slope)), static_cast<float>(-std::cos(slope)), 0);
+      9.81f * model::Vec3(static_cast<float>(std::sin(slope)), static_cast<float>(-std::cos(slope)), 0);
   Running running(scene);
   const auto middle = [&] {
     const NodeState state = running.state();
@@ -484,7 +484,7 @@ double slideOn(double slope, float friction, int ticks) {
 
 // Coulomb: it sticks where friction is at least the slope's tangent; else it slides no faster than with
 // g (sin a - mu cos a), for the hollows between balls can only hold it back.
-TEST_F(SelfCollision, frictionHoldsASheetOnASheetUpToItsAngle) {
+TEST_F(SelfCollision, FrictionHoldsASheetOnASheetUpToItsAngle) {
   const double slope = std::atan(0.45);
   // It creeps while it rocks in its hollows; no ball leaves its own in half a second.
   EXPECT_LT(std::abs(slideOn(slope, 0.5f, 36)), kSpacing / 4);
@@ -497,12 +497,12 @@ TEST_F(SelfCollision, frictionHoldsASheetOnASheetUpToItsAngle) {
 
 // ---- The same bits
 
-TEST_F(SelfCollision, oneThousandTicksGiveTheSameHashesInTwoRunsHoweverTheWorkIsCut) {
-  scene::Cloth sheet = withBalls(calmCloth(30, 20));
+TEST_F(SelfCollision, OneThousandTicksGiveTheSameHashesInTwoRunsHoweverTheWorkIsCut) {
+  model::Cloth sheet = withBalls(calmCloth(30, 20));
   sheet.bend = {1, 0.01f};
-  sheet.grid.pose = {scene::Vec3(0, 0.7f, 0), turned(4, scene::Vec3::UnitX())};
-  scene::Cloth rag = withBalls(discCloth(6), 0.008f);
-  const scene::Scene scene = sceneOf({sheet, rag});
+  sheet.grid.pose = {model::Vec3(0, 0.7f, 0), turned(4, model::Vec3::UnitX())};
+  model::Cloth rag = withBalls(discCloth(6), 0.008f);
+  const model::Scene scene = sceneOf({sheet, rag});
   const TickInputs inputs = inputsOf(scene, {floorAt(-0.05f)});
   Running narrow(scene, {.rowsPerInvocation = 1, .workgroupSize = 32, .advanceKernel = {}});
   Running wide(scene, {.rowsPerInvocation = 7, .workgroupSize = 128, .advanceKernel = {}});

@@ -12,7 +12,7 @@ namespace {
 
 constexpr const char* kVariable = "LP_NUM_THREADS";
 
-TEST(SoftwareThreads, areNoneForFewNodesUnlessSomebodySaysOtherwise) {
+TEST(SoftwareThreads, AreNoneForFewNodesUnlessSomebodySaysOtherwise) {
   const char* given = std::getenv(kVariable);
   const std::string before = given != nullptr ? given : "";
   unsetenv(kVariable);

@@ -11,7 +11,7 @@ namespace {
 
 class Solve : public GpuTest {};
 
-scene::Cloth named(const char* name, scene::Cloth cloth, scene::SolverKind kind) {
+model::Cloth named(const char* name, model::Cloth cloth, model::SolverKind kind) {
   cloth.name = name;
   cloth.solver.kind = kind;
   if (!cloth.mesh) cloth.pins = {topRow(cloth)};
@@ -19,14 +19,14 @@ scene::Cloth named(const char* name, scene::Cloth cloth, scene::SolverKind kind)
 }
 
 // A grid and a mesh of each kind, so soft that ACAD has something to hold; and a ball.
-scene::Scene solvedScene() {
-  using enum scene::SolverKind;
-  scene::Scene scene = sceneOf(
+model::Scene solvedScene() {
+  using enum model::SolverKind;
+  model::Scene scene = sceneOf(
       {named("held", calmCloth(37, 29), constraint), named("adaptive", calmCloth(30, 41), acad),
        named("implicit", calmCloth(33, 18), implicitEuler), named("disc", discCloth(10), constraint),
        named("adaptive disc", discCloth(5), acad), named("implicit disc", discCloth(8), implicitEuler),
        named("small", calmCloth(5, 3), constraint)});
-  for (scene::Cloth& cloth : scene.cloths) {
+  for (model::Cloth& cloth : scene.cloths) {
     if (cloth.mesh) cloth.pinnedVertices = {0, 1};
     if (cloth.solver.kind == acad) {
       cloth.structural = {8, 0.01f};
@@ -41,7 +41,7 @@ scene::Scene solvedScene() {
   return scene;
 }
 
-TEST_F(Solve, givesTheSameBitsHoweverTheWorkIsCut) {
+TEST_F(Solve, GivesTheSameBitsHoweverTheWorkIsCut) {
   const simulation::SimulationOptions ways[] = {{.workgroupSize = 8, .solveWholeNodes = 1'000'000},
                                                 {.workgroupSize = 8, .solveWholeNodes = 0},
                                                 {.workgroupSize = 0, .solveWholeNodes = 700},
@@ -52,23 +52,23 @@ TEST_F(Solve, givesTheSameBitsHoweverTheWorkIsCut) {
 }
 
 // What it says of itself too; the systems' order alone depends on who solves which.
-TEST_F(Solve, reportsTheSameWhoeverSolves) {
+TEST_F(Solve, ReportsTheSameWhoeverSolves) {
   const Reports reports =
       expectSameReports(solvedScene(), passingBall, {.solveWholeNodes = 1'000'000}, {.solveWholeNodes = 0});
   for (const auto& tick : reports) EXPECT_LT(tick[1].activeConstraints, 4u * 30 * 41 / 2);
   EXPECT_GT(reports.back()[1].activeConstraints, 0u);
 }
 
-TEST_F(Solve, givesTheSameHashesInRunsOfAThousandTicks) {
-  scene::Scene scene = solvedScene();
+TEST_F(Solve, GivesTheSameHashesInRunsOfAThousandTicks) {
+  model::Scene scene = solvedScene();
   scene.substeps = 1;
   scene.simulationRate = 288;
-  for (scene::Cloth& cloth : scene.cloths) cloth.solver.iterations = 4;
+  for (model::Cloth& cloth : scene.cloths) cloth.solver.iterations = 4;
   expectSameThousandTicks(scene, passingBall, {.workgroupSize = 16, .solveWholeNodes = 0});
 }
 
 // The same number on every device.
-TEST_F(Solve, reachesTheHashOfEveryOtherDevice) {
+TEST_F(Solve, ReachesTheHashOfEveryOtherDevice) {
   EXPECT_EQ(hashAfter(solvedScene(), passingBall, 12, {.solveWholeNodes = 700}), 0x8238f727263d17eau);
 }
 

@@ -7,13 +7,13 @@
 
 #include <gtest/gtest.h>
 
-#include "server/scene/springs.h"
+#include "server/model/springs.h"
 #include "tests/simulation/scenes.h"
 
 namespace clothstream::tests {
 namespace {
 
-using scene::SolverKind;
+using model::SolverKind;
 using simulation::NodeState;
 using simulation::StateSnapshot;
 
@@ -23,13 +23,13 @@ constexpr SolverKind kKinds[] = {SolverKind::massSpring, SolverKind::constraint,
 class SolverChange : public GpuTest {};
 
 // A grid and a mesh, so soft that they stretch far under their own weight as forces.
-scene::Scene softScene() {
-  scene::Cloth sheet = calmCloth(14, 11);
+model::Scene softScene() {
+  model::Cloth sheet = calmCloth(14, 11);
   sheet.structural = {12, 0.01f};
   sheet.shear = {6, 0.01f};
   sheet.bend = {1, 0.01f};
   sheet.pins = {topRow(sheet)};
-  scene::Cloth disc = discCloth(5);
+  model::Cloth disc = discCloth(5);
   disc.name = "disc";
   disc.structural = {12, 0.01f};
   disc.shear = {6, 0.01f};
@@ -38,21 +38,21 @@ scene::Scene softScene() {
   return sceneOf({sheet, disc});
 }
 
-scene::Scene withSolvers(scene::Scene scene, SolverKind first, SolverKind second) {
+model::Scene withSolvers(model::Scene scene, SolverKind first, SolverKind second) {
   scene.cloths[0].solver.kind = first;
   scene.cloths[1].solver.kind = second;
   return scene;
 }
 
-simulation::TickInputs inputsWithBall(const scene::Scene& scene) {
-  const scene::Pose place{scene::Vec3(0, -0.15f, 0.03f), scene::Quaternion::Identity()};
-  return inputsOf(scene, {{scene::Sphere{0.04f}, place, place, 1}});
+simulation::TickInputs inputsWithBall(const model::Scene& scene) {
+  const model::Pose place{model::Vec3(0, -0.15f, 0.03f), model::Quaternion::Identity()};
+  return inputsOf(scene, {{model::Sphere{0.04f}, place, place, 1}});
 }
 
-float largestStrain(const scene::Cloth& cloth, const NodeState& state) {
+float largestStrain(const model::Cloth& cloth, const NodeState& state) {
   float largest = -1;
-  for (const scene::SpringLink& link : scene::springLinks(cloth))
-    if (link.kind == scene::SpringKind::structural)
+  for (const model::SpringLink& link : model::springLinks(cloth))
+    if (link.kind == model::SpringKind::structural)
       largest =
           std::max(largest, (state.positions[link.b] - state.positions[link.a]).norm() / link.restLength - 1);
   return largest;
@@ -60,23 +60,23 @@ float largestStrain(const scene::Cloth& cloth, const NodeState& state) {
 
 // Every solver after every other, and back: the state stays to the bit, and goes on to the bit as one that
 // had this solver from its start would from the same state.
-TEST_F(SolverChange, goesOnAsAClothThatAlwaysHadTheSolver) {
-  const scene::Scene scene = softScene();
+TEST_F(SolverChange, GoesOnAsAClothThatAlwaysHadTheSolver) {
+  const model::Scene scene = softScene();
   const simulation::TickInputs inputs = inputsWithBall(scene);
   Running changing(scene);
   std::optional<SolverKind> before;
   for (const SolverKind first : kKinds)
     for (const SolverKind second : kKinds) {
       SCOPED_TRACE(::testing::Message() << static_cast<int>(first) << ", " << static_cast<int>(second));
-      const scene::Scene changed = withSolvers(scene, first, second);
+      const model::Scene changed = withSolvers(scene, first, second);
       expectGoesOnAsAlways(changing, changed, inputs, 6);
     }
 }
 
 // As forces the sheet hangs stretched by tens of percents. ACAD lets go of 15 % of what is beyond 10 % a
 // substep, constraints of all of it: both are there within a second, and no node is thrown.
-TEST_F(SolverChange, changesTheStrainAsTheSolverPromises) {
-  scene::Scene scene = softScene();
+TEST_F(SolverChange, ChangesTheStrainAsTheSolverPromises) {
+  model::Scene scene = softScene();
   scene.cloths.pop_back();
   scene.cloths[0].damping = 2;
   const simulation::TickInputs inputs = inputsOf(scene);
@@ -103,8 +103,8 @@ TEST_F(SolverChange, changesTheStrainAsTheSolverPromises) {
   EXPECT_NEAR(largestStrain(scene.cloths[0], running.state()), asForces, 0.2f * asForces);
 }
 
-TEST_F(SolverChange, ofOtherSettingsOrAnotherThicknessKeepsTheStateToo) {
-  scene::Scene scene = withSolvers(softScene(), SolverKind::constraint, SolverKind::acad);
+TEST_F(SolverChange, OfOtherSettingsOrAnotherThicknessKeepsTheStateToo) {
+  model::Scene scene = withSolvers(softScene(), SolverKind::constraint, SolverKind::acad);
   Running running(scene);
   const simulation::TickInputs inputs = inputsWithBall(scene);
   for (int tick = 0; tick < 10; ++tick) running.tick(inputs);
@@ -121,21 +121,21 @@ TEST_F(SolverChange, ofOtherSettingsOrAnotherThicknessKeepsTheStateToo) {
   // The ball's surface and the thickness on it; the last rounding is that of 0.2 m.
   const NodeState state = running.state();
   for (std::size_t i = 0; i < scene.cloths[0].nodeCount(); ++i)
-    EXPECT_GT((state.positions[i] - scene::Vec3(0, -0.15f, 0.03f)).norm(), 0.06f - 1e-6f);
+    EXPECT_GT((state.positions[i] - model::Vec3(0, -0.15f, 0.03f)).norm(), 0.06f - 1e-6f);
 }
 
 // Whichever buffer holds the state, in the checkpoint too, under every solver: it goes on to the bit as one
 // that always had these masses would.
-TEST_F(SolverChange, ofMassesGoesOnAsAClothThatAlwaysHadThem) {
-  const scene::Scene light = softScene();
+TEST_F(SolverChange, OfMassesGoesOnAsAClothThatAlwaysHadThem) {
+  const model::Scene light = softScene();
   const simulation::TickInputs inputs = inputsWithBall(light);
   for (const SolverKind kind : kKinds) {
     SCOPED_TRACE(static_cast<int>(kind));
-    scene::Scene scene = withSolvers(light, kind, kind);
+    model::Scene scene = withSolvers(light, kind, kind);
     Running changing(scene);
     for (int tick = 0; tick < 5; ++tick) changing.tick(inputs);
     changing.checkpoint();
-    for (scene::Cloth& cloth : scene.cloths) cloth.mass *= 3;
+    for (model::Cloth& cloth : scene.cloths) cloth.mass *= 3;
     const StateSnapshot kept = changing.save();
     changing.setCloths(scene.cloths);
     EXPECT_EQ(changing.save().bytes, kept.bytes);
@@ -152,16 +152,16 @@ TEST_F(SolverChange, ofMassesGoesOnAsAClothThatAlwaysHadThem) {
 }
 
 // Balls of another size and friction, alike and not; tethers of another length.
-TEST_F(SolverChange, ofSelfCollisionAndTethersGoesOnAsAClothThatAlwaysHadThem) {
-  scene::Scene scene = softScene();
-  for (scene::Cloth& cloth : scene.cloths) {
-    cloth.selfCollision = scene::SelfCollision{.radius = 0.01f, .friction = 0.3f};
-    cloth.tethers = scene::Tethers{.slack = 0.02f};
+TEST_F(SolverChange, OfSelfCollisionAndTethersGoesOnAsAClothThatAlwaysHadThem) {
+  model::Scene scene = softScene();
+  for (model::Cloth& cloth : scene.cloths) {
+    cloth.selfCollision = model::SelfCollision{.radius = 0.01f, .friction = 0.3f};
+    cloth.tethers = model::Tethers{.slack = 0.02f};
   }
   const simulation::TickInputs inputs = inputsWithBall(scene);
   Running changing(scene);
   const auto change = [&](std::size_t cloth, float radius, float friction, float slack) {
-    scene.cloths[cloth].selfCollision = scene::SelfCollision{.radius = radius, .friction = friction};
+    scene.cloths[cloth].selfCollision = model::SelfCollision{.radius = radius, .friction = friction};
     scene.cloths[cloth].tethers->slack = slack;
   };
   for (int round = 0; round < 3; ++round) {

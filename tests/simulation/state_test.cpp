@@ -19,8 +19,8 @@ class State : public GpuTest {
  protected:
   State() : scene(sceneOf({hung(19, 21), hung(5, 8)})) {}
 
-  static scene::Cloth hung(std::uint32_t rows, std::uint32_t columns) {
-    scene::Cloth cloth = calmCloth(rows, columns);
+  static model::Cloth hung(std::uint32_t rows, std::uint32_t columns) {
+    model::Cloth cloth = calmCloth(rows, columns);
     cloth.pins = {topRow(cloth)};
     cloth.drag = 0.5f;
     return cloth;
@@ -28,7 +28,7 @@ class State : public GpuTest {
 
   TickInputs inputs(int tick) const {
     TickInputs inputs = inputsOf(scene);
-    inputs.environment.wind = scene::Vec3(0, 0, static_cast<float>(tick % 7));
+    inputs.environment.wind = model::Vec3(0, 0, static_cast<float>(tick % 7));
     return inputs;
   }
 
@@ -36,17 +36,17 @@ class State : public GpuTest {
     for (int tick = from; tick < to; ++tick) running.tick(inputs(tick));
   }
 
-  const scene::Scene scene;
+  const model::Scene scene;
 };
 
-TEST_F(State, startsAtRestWhereTheScenePutsIt) {
+TEST_F(State, StartsAtRestWhereTheScenePutsIt) {
   Running running(scene);
   const NodeState state = running.state();
   EXPECT_EQ(state.positions, simulation::restState(scene.cloths).positions);
-  for (const scene::Vec3& velocity : state.velocities) EXPECT_EQ(velocity, scene::Vec3::Zero());
+  for (const model::Vec3& velocity : state.velocities) EXPECT_EQ(velocity, model::Vec3::Zero());
 }
 
-TEST_F(State, isRestoredToTheBitAndGoesOnAsIfNothingHappened) {
+TEST_F(State, IsRestoredToTheBitAndGoesOnAsIfNothingHappened) {
   Running running(scene);
   run(running, 0, 7);  // an odd number of ticks of an even number of substeps, and the other way round below
   const StateSnapshot saved = running.save();
@@ -60,8 +60,8 @@ TEST_F(State, isRestoredToTheBitAndGoesOnAsIfNothingHappened) {
   EXPECT_EQ(running.save().bytes, later.bytes);
 }
 
-TEST_F(State, savedAfterAnOddNumberOfSubstepsIsThePresentOne) {
-  scene::Scene odd = scene;
+TEST_F(State, SavedAfterAnOddNumberOfSubstepsIsThePresentOne) {
+  model::Scene odd = scene;
   odd.substeps = 3;
   Running running(odd);
   running.tick(inputs(1));
@@ -71,7 +71,7 @@ TEST_F(State, savedAfterAnOddNumberOfSubstepsIsThePresentOne) {
   }
 }
 
-TEST_F(State, continuesOnAnotherDeviceWithTheSameHashes) {
+TEST_F(State, ContinuesOnAnotherDeviceWithTheSameHashes) {
   Running here(scene);
   run(here, 0, 10);
   const StateSnapshot moved = here.save();
@@ -82,12 +82,12 @@ TEST_F(State, continuesOnAnotherDeviceWithTheSameHashes) {
     ASSERT_EQ(there.tick(inputs(tick)).stateHash, here.tick(inputs(tick)).stateHash) << "tick " << tick;
 }
 
-TEST_F(State, snapshotOfAnotherSceneIsRefused) {
+TEST_F(State, SnapshotOfAnotherSceneIsRefused) {
   Running running(scene), other(sceneOf({hung(3, 3)}));
   EXPECT_THROW(running.restore(other.save()), std::invalid_argument);
 }
 
-TEST_F(State, rollsBackToTheCheckpointAndWithoutOneToTheStart) {
+TEST_F(State, RollsBackToTheCheckpointAndWithoutOneToTheStart) {
   Running running(scene);
   const StateSnapshot start = running.save();
   run(running, 0, 3);
@@ -102,7 +102,7 @@ TEST_F(State, rollsBackToTheCheckpointAndWithoutOneToTheStart) {
   EXPECT_EQ(running.save().bytes, kept.bytes);
 }
 
-TEST_F(State, badNumbersAreNoticedInTheSameTickAndRolledBack) {
+TEST_F(State, BadNumbersAreNoticedInTheSameTickAndRolledBack) {
   const float bad[] = {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity(),
                        -std::numeric_limits<float>::infinity(), 2 * simulation::kWorldExtent};
   Running running(scene);
@@ -122,9 +122,9 @@ TEST_F(State, badNumbersAreNoticedInTheSameTickAndRolledBack) {
   }
 }
 
-TEST_F(State, aStateThatGoesBadByItselfReturnsToTheCheckpoint) {
+TEST_F(State, AStateThatGoesBadByItselfReturnsToTheCheckpoint) {
   // Far beyond the stability bound: it explodes within some ticks.
-  scene::Scene stiff = sceneOf({calmCloth(16, 16)});
+  model::Scene stiff = sceneOf({calmCloth(16, 16)});
   stiff.cloths[0].structural.stiffness = 1e5f;
   std::mt19937 random(1);
   Running running(stiff);
@@ -137,10 +137,10 @@ TEST_F(State, aStateThatGoesBadByItselfReturnsToTheCheckpoint) {
   EXPECT_EQ(running.save().bytes, good.bytes);
 }
 
-TEST_F(State, parametersChangeFromTheNextTickOn) {
+TEST_F(State, ParametersChangeFromTheNextTickOn) {
   Running changed(scene), fromTheStart(scene);
-  std::vector<scene::Cloth> softer = scene.cloths;
-  for (scene::Cloth& cloth : softer) {
+  std::vector<model::Cloth> softer = scene.cloths;
+  for (model::Cloth& cloth : softer) {
     cloth.structural.stiffness *= 0.5f;
     cloth.damping = 2;
   }
@@ -153,7 +153,7 @@ TEST_F(State, parametersChangeFromTheNextTickOn) {
   run(fromTheStart, 3, 6);
   EXPECT_NE(changed.save().bytes, fromTheStart.save().bytes);
 
-  scene::Scene softScene = scene;
+  model::Scene softScene = scene;
   softScene.cloths = softer;
   Running soft(softScene);
   soft.restore(before);
@@ -161,9 +161,9 @@ TEST_F(State, parametersChangeFromTheNextTickOn) {
   EXPECT_EQ(changed.save().bytes, soft.save().bytes);
 }
 
-TEST_F(State, parametersMayChangeWhileATickIsInFlight) {
-  std::vector<scene::Cloth> softer = scene.cloths;
-  for (scene::Cloth& cloth : softer) cloth.structural.stiffness *= 0.5f;
+TEST_F(State, ParametersMayChangeWhileATickIsInFlight) {
+  std::vector<model::Cloth> softer = scene.cloths;
+  for (model::Cloth& cloth : softer) cloth.structural.stiffness *= 0.5f;
   simulation::ClothSimulation overlapped(device(), scene);
   vulkan::Recorder first(device()), second(device());
   first.begin();
@@ -180,7 +180,7 @@ TEST_F(State, parametersMayChangeWhileATickIsInFlight) {
   EXPECT_EQ(overlapped.status().stateHash, oneByOne.tick(inputs(2)).stateHash);
 }
 
-TEST(StateSnapshots, packAndUnpackKeepEveryBit) {
+TEST(StateSnapshots, PackAndUnpackKeepEveryBit) {
   const NodeState state{{{1, -0.0f, 3e-30f}, {4, 5, 6}}, {{0, 1e30f, 0}, {7, 8, 9}}};
   const StateSnapshot snapshot = simulation::pack(state, 12);
   EXPECT_EQ(snapshot.tick, 12u);

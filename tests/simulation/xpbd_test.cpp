@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-#include "server/scene/springs.h"
+#include "server/model/springs.h"
 #include "tests/simulation/scenes.h"
 
 namespace clothstream::tests {
@@ -15,49 +15,49 @@ using simulation::NodeState;
 
 class Xpbd : public GpuTest {};
 
-scene::Cloth corrected(scene::Cloth cloth, std::uint32_t iterations = 1) {
-  cloth.solver.kind = scene::SolverKind::xpbd;
+model::Cloth corrected(model::Cloth cloth, std::uint32_t iterations = 1) {
+  cloth.solver.kind = model::SolverKind::xpbd;
   cloth.solver.iterations = iterations;
   return cloth;
 }
 
-scene::Cloth grid(std::uint32_t rows, std::uint32_t columns, std::uint32_t iterations = 1) {
-  scene::Cloth cloth = corrected(calmCloth(rows, columns), iterations);
+model::Cloth grid(std::uint32_t rows, std::uint32_t columns, std::uint32_t iterations = 1) {
+  model::Cloth cloth = corrected(calmCloth(rows, columns), iterations);
   cloth.pins = {{.firstRow = 0, .lastRow = 0, .firstColumn = 0, .lastColumn = columns - 1, .columnStep = 2}};
   return cloth;
 }
 
-scene::Cloth mesh(std::uint32_t rings, std::uint32_t iterations = 1) {
-  scene::Cloth cloth = corrected(discCloth(rings), iterations);
+model::Cloth mesh(std::uint32_t rings, std::uint32_t iterations = 1) {
+  model::Cloth cloth = corrected(discCloth(rings), iterations);
   cloth.name = "mesh";
   cloth.pinnedVertices = {0, 1};
   return cloth;
 }
 
 // size x size nodes, a metre of cloth of 0.2 kg, hung by one edge; upright, or swinging down from horizontal.
-scene::Scene sheet(std::uint32_t size, std::uint32_t substeps, bool upright) {
-  scene::Cloth cloth;
+model::Scene sheet(std::uint32_t size, std::uint32_t substeps, bool upright) {
+  model::Cloth cloth;
   cloth.name = "sheet";
   cloth.grid = {.rows = size, .columns = size, .width = 1, .height = 1, .pose = {}};
-  if (!upright) cloth.grid.pose.orientation = turned(90, scene::Vec3::UnitX());
+  if (!upright) cloth.grid.pose.orientation = turned(90, model::Vec3::UnitX());
   cloth.mass = 0.2f;
   cloth.pins = {topRow(cloth)};
   cloth.solver.compliance = 0.0f;
-  scene::Scene scene = sceneOf({corrected(cloth)});
+  model::Scene scene = sceneOf({corrected(cloth)});
   scene.substeps = substeps;
   return scene;
 }
 
-void expectCorrectedLikeReference(scene::Scene scene, unsigned seed,
+void expectCorrectedLikeReference(model::Scene scene, unsigned seed,
                                   simulation::SimulationOptions options = {}) {
   scene.substeps = 1;
   scene.simulationRate = 720;
   // Far beyond what springs as forces bear: a sweep then moves nodes by much of what they are off.
-  for (scene::Cloth& cloth : scene.cloths)
-    for (scene::Spring* spring : {&cloth.structural, &cloth.shear, &cloth.bend}) spring->stiffness *= 30;
+  for (model::Cloth& cloth : scene.cloths)
+    for (model::Spring* spring : {&cloth.structural, &cloth.shear, &cloth.bend}) spring->stiffness *= 30;
   std::mt19937 random(seed);
   const NodeState start = randomState(scene, random, 0.002f, 0.5f);
-  const auto referenceAfter = [&](const scene::Scene& of) {
+  const auto referenceAfter = [&](const model::Scene& of) {
     reference::ReferenceSimulation reference(of);
     setState(reference, start);
     reference.tick(referenceInputs(inputsOf(of)));
@@ -74,24 +74,24 @@ void expectCorrectedLikeReference(scene::Scene scene, unsigned seed,
   // A sweep corrects a node twelve times, of the disc fifteen; what errors it finds at its neighbours it
   // makes smaller.
   std::uint32_t iterations = 0;
-  for (const scene::Cloth& cloth : scene.cloths) iterations = std::max(iterations, cloth.solver.iterations);
+  for (const model::Cloth& cloth : scene.cloths) iterations = std::max(iterations, cloth.solver.iterations);
   const double tolerance = iterations * 15 * 1e-7;
   EXPECT_LT(largestDistance(state, expected), tolerance);
   EXPECT_LT(largestSpeedDifference(state, expected), 720 * tolerance);
 
   // It would see a sweep too many, and a little less stiffness.
-  scene::Scene other = scene;
-  for (scene::Cloth& cloth : other.cloths) ++cloth.solver.iterations;
+  model::Scene other = scene;
+  for (model::Cloth& cloth : other.cloths) ++cloth.solver.iterations;
   EXPECT_GT(largestDistance(state, referenceAfter(other)), 2 * tolerance);
   other = scene;
-  for (scene::Cloth& cloth : other.cloths) {
+  for (model::Cloth& cloth : other.cloths) {
     cloth.structural.stiffness *= 0.8f;
     if (cloth.solver.compliance) *cloth.solver.compliance += 0.002f;
   }
   EXPECT_GT(largestDistance(state, referenceAfter(other)), 2 * tolerance);
 }
 
-TEST_F(Xpbd, movesNodesAsTheReferenceOnEveryShapeOfGrid) {
+TEST_F(Xpbd, MovesNodesAsTheReferenceOnEveryShapeOfGrid) {
   unsigned seed = 1;
   for (const auto& [rows, columns] :
        {std::pair{2u, 2u}, {2u, 7u}, {9u, 3u}, {4u, 4u}, {5u, 6u}, {7u, 8u}, {17u, 23u}}) {
@@ -100,42 +100,42 @@ TEST_F(Xpbd, movesNodesAsTheReferenceOnEveryShapeOfGrid) {
   }
 }
 
-TEST_F(Xpbd, movesNodesAsTheReferenceInParts) {
+TEST_F(Xpbd, MovesNodesAsTheReferenceInParts) {
   expectCorrectedLikeReference(sceneOf({grid(17, 23)}), 8, {.xpbdWholeNodes = 0});
   expectCorrectedLikeReference(sceneOf({mesh(7)}), 9, {.xpbdWholeNodes = 0});
 }
 
-TEST_F(Xpbd, movesNodesAsTheReferenceInSeveralSweeps) {
+TEST_F(Xpbd, MovesNodesAsTheReferenceInSeveralSweeps) {
   expectCorrectedLikeReference(sceneOf({grid(9, 14, 3)}), 10);
   expectCorrectedLikeReference(sceneOf({mesh(5, 3)}), 11);
 }
 
-TEST_F(Xpbd, movesMeshesAsTheReference) {
+TEST_F(Xpbd, MovesMeshesAsTheReference) {
   expectCorrectedLikeReference(sceneOf({mesh(7), grid(6, 9)}), 12);
 }
 
-TEST_F(Xpbd, movesNodesAsTheReferenceWithoutDashpotsOrBendSprings) {
-  scene::Cloth cloth = grid(11, 9);
+TEST_F(Xpbd, MovesNodesAsTheReferenceWithoutDashpotsOrBendSprings) {
+  model::Cloth cloth = grid(11, 9);
   cloth.structural.damping = cloth.shear.damping = cloth.bend.damping = 0;
   expectCorrectedLikeReference(sceneOf({cloth}), 13);
   cloth.bend.stiffness = 0;
   expectCorrectedLikeReference(sceneOf({cloth}), 14);
 }
 
-TEST_F(Xpbd, movesNodesAsTheReferenceWithACompliance) {
+TEST_F(Xpbd, MovesNodesAsTheReferenceWithACompliance) {
   for (const float compliance : {0.0f, 0.001f}) {
-    scene::Cloth cloth = grid(11, 9, 2);
+    model::Cloth cloth = grid(11, 9, 2);
     cloth.solver.compliance = compliance;
     expectCorrectedLikeReference(sceneOf({cloth}), 15);
   }
 }
 
-TEST_F(Xpbd, feelsTheAirAsTheReferenceDoes) {
-  scene::Cloth cloth = grid(9, 10);
+TEST_F(Xpbd, FeelsTheAirAsTheReferenceDoes) {
+  model::Cloth cloth = grid(9, 10);
   cloth.drag = 0.8f;
   cloth.lift = 0.5f;
-  scene::Scene scene = sceneOf({cloth});
-  scene.environment.wind = scene::Vec3(2, 0, 5);
+  model::Scene scene = sceneOf({cloth});
+  scene.environment.wind = model::Vec3(2, 0, 5);
   expectCorrectedLikeReference(scene, 16);
 }
 
@@ -143,14 +143,14 @@ TEST_F(Xpbd, feelsTheAirAsTheReferenceDoes) {
 // below n nodes then gives is h^2 times its force n m g, whatever the sweep's order: right after it was
 // corrected it is n m g / k too long, and what is corrected after it moves each of its ends by at most h^2 /
 // m times the largest force.
-TEST_F(Xpbd, letsAColumnHangAsItsStiffnessSays) {
+TEST_F(Xpbd, LetsAColumnHangAsItsStiffnessSays) {
   constexpr std::uint32_t kNodes = 12;
-  scene::Cloth cloth = corrected(calmCloth(kNodes, 2));
+  model::Cloth cloth = corrected(calmCloth(kNodes, 2));
   cloth.structural = {200, 0};
   cloth.shear = cloth.bend = {};
   cloth.damping = 20;
   cloth.pins = {topRow(cloth)};
-  scene::Scene scene = sceneOf({cloth});
+  model::Scene scene = sceneOf({cloth});
   scene.substeps = 40;
   Running running(scene);
   for (const float stiffness : {200.0f, 400.0f}) {
@@ -168,20 +168,20 @@ TEST_F(Xpbd, letsAColumnHangAsItsStiffnessSays) {
   }
 }
 
-reference::Vec3 sumOf(const std::vector<scene::Vec3>& vectors) {
+reference::Vec3 sumOf(const std::vector<model::Vec3>& vectors) {
   reference::Vec3 sum = reference::Vec3::Zero();
-  for (const scene::Vec3& v : vectors) sum += v.cast<double>();
+  for (const model::Vec3& v : vectors) sum += v.cast<double>();
   return sum;
 }
 
 // A correction gives both ends the same momentum, but for the rounding of their positions: each to within
 // half of 2^-24 of the cloth's 0.4 m, which h makes a speed. Roundings are independent; six of their standard
 // deviations.
-TEST_F(Xpbd, keepsAFreeClothsMomentum) {
-  scene::Cloth cloth = corrected(calmCloth(20, 20));
+TEST_F(Xpbd, KeepsAFreeClothsMomentum) {
+  model::Cloth cloth = corrected(calmCloth(20, 20));
   cloth.damping = 0;
-  scene::Scene scene = sceneOf({cloth});
-  scene.environment.gravity = scene::Vec3::Zero();
+  model::Scene scene = sceneOf({cloth});
+  scene.environment.gravity = model::Vec3::Zero();
   std::mt19937 random(7);
   const NodeState start = randomState(scene, random, 0.001f, 0.5f);
   Running running(scene);
@@ -202,11 +202,11 @@ TEST_F(Xpbd, keepsAFreeClothsMomentum) {
 
 // Velocities are not taken from rounded places: what nothing corrects falls as gravity says, however short
 // the substep.
-TEST_F(Xpbd, fallsExactlyWhereNothingIsStretched) {
-  scene::Cloth cloth = corrected(calmCloth(8, 8));
+TEST_F(Xpbd, FallsExactlyWhereNothingIsStretched) {
+  model::Cloth cloth = corrected(calmCloth(8, 8));
   cloth.damping = 0;
-  cloth.grid.pose.position = scene::Vec3(3, 5, 1);
-  scene::Scene scene = sceneOf({cloth});
+  cloth.grid.pose.position = model::Vec3(3, 5, 1);
+  model::Scene scene = sceneOf({cloth});
   scene.substeps = 200;
   Running running(scene);
   for (int tick = 0; tick < 36; ++tick) running.tick(inputsOf(scene));
@@ -216,10 +216,10 @@ TEST_F(Xpbd, fallsExactlyWhereNothingIsStretched) {
   EXPECT_NEAR(mean.y(), -9.81 * 0.5, 0.001 * 9.81 * 0.5);
 }
 
-TEST_F(Xpbd, leavesPinnedNodesWhereTheyAre) {
-  const scene::Scene scene = sceneOf({grid(9, 14), mesh(4)});
+TEST_F(Xpbd, LeavesPinnedNodesWhereTheyAre) {
+  const model::Scene scene = sceneOf({grid(9, 14), mesh(4)});
   const simulation::MovingCollider ball{
-      scene::Sphere{0.1f}, {scene::Vec3(0, -0.05f, 0)}, {scene::Vec3(0, -0.05f, 0)}, 1};
+      model::Sphere{0.1f}, {model::Vec3(0, -0.05f, 0)}, {model::Vec3(0, -0.05f, 0)}, 1};
   Running running(scene);
   for (int tick = 0; tick < 30; ++tick) running.tick(inputsOf(scene, {ball}));
   const NodeState rest = simulation::restState(scene.cloths), state = running.state();
@@ -227,7 +227,7 @@ TEST_F(Xpbd, leavesPinnedNodesWhereTheyAre) {
   for (std::size_t i = 0; i < masses.size(); ++i) {
     if (masses[i] > 0) continue;
     EXPECT_EQ(state.positions[i], rest.positions[i]) << i;
-    EXPECT_EQ(state.velocities[i], scene::Vec3(0, 0, 0)) << i;
+    EXPECT_EQ(state.velocities[i], model::Vec3(0, 0, 0)) << i;
   }
 }
 
@@ -235,10 +235,10 @@ TEST_F(Xpbd, leavesPinnedNodesWhereTheyAre) {
 // forces. A row carries at most 32 m g a column, so that with h = 1/720 s one such pull is 6e-4 m of 0.032
 // m, 1.9 %; at the ends of the two springs of a column that is two of them. Short substeps are what counts:
 // four times as many leave a sixteenth.
-TEST_F(Xpbd, letsHardSpringsStretchAsLittleAsTheSubstepIsShort) {
+TEST_F(Xpbd, LetsHardSpringsStretchAsLittleAsTheSubstepIsShort) {
   std::vector<double> strains;
   for (const std::uint32_t substeps : {10u, 40u}) {
-    scene::Scene scene = sheet(32, substeps, true);
+    model::Scene scene = sheet(32, substeps, true);
     scene.cloths.front().damping = 4;
     scene.cloths.front().structural = scene.cloths.front().shear = {100, 0};
     Running running(scene);
@@ -251,10 +251,10 @@ TEST_F(Xpbd, letsHardSpringsStretchAsLittleAsTheSubstepIsShort) {
   EXPECT_LT(strains[1], strains[0] / 10);
 }
 
-TEST_F(Xpbd, leavesNothingInsideASphere) {
-  const scene::Scene scene = sheet(24, 20, false);
-  const scene::Pose place{scene::Vec3(0, -0.3f, -0.3f)};
-  const simulation::MovingCollider ball{scene::Sphere{0.2f}, place, place, 1};
+TEST_F(Xpbd, LeavesNothingInsideASphere) {
+  const model::Scene scene = sheet(24, 20, false);
+  const model::Pose place{model::Vec3(0, -0.3f, -0.3f)};
+  const simulation::MovingCollider ball{model::Sphere{0.2f}, place, place, 1};
   Running running(scene);
   for (int tick = 0; tick < 72; ++tick) ASSERT_TRUE(running.tick(inputsOf(scene, {ball})).healthy);
   const double distance = 0.2 + double{scene.cloths.front().thickness};
@@ -269,34 +269,34 @@ TEST_F(Xpbd, leavesNothingInsideASphere) {
 }
 
 // A cloth of each solver, a mesh, several sweeps, a ball.
-scene::Scene mixedScene() {
-  scene::Cloth free = calmCloth(9, 14);
+model::Scene mixedScene() {
+  model::Cloth free = calmCloth(9, 14);
   free.name = "free";
   free.pins = {topRow(free)};
-  scene::Cloth held = free, adaptive = free;
+  model::Cloth held = free, adaptive = free;
   held.name = "held";
-  held.solver.kind = scene::SolverKind::constraint;
+  held.solver.kind = model::SolverKind::constraint;
   adaptive.name = "adaptive";
-  adaptive.solver.kind = scene::SolverKind::acad;
-  scene::Cloth swept = grid(13, 11, 3);
+  adaptive.solver.kind = model::SolverKind::acad;
+  model::Cloth swept = grid(13, 11, 3);
   swept.name = "swept";
   swept.drag = 0.5f;
-  scene::Scene scene = sceneOf({held, grid(19, 16), free, mesh(6), adaptive, swept, mesh(3, 2)});
+  model::Scene scene = sceneOf({held, grid(19, 16), free, mesh(6), adaptive, swept, mesh(3, 2)});
   scene.cloths[1].solver.compliance = 0.0f;
   scene.cloths.back().name = "small";
-  scene.environment.wind = scene::Vec3(0, 0, 2);
+  scene.environment.wind = model::Vec3(0, 0, 2);
   return scene;
 }
 
 // Leaves out those that conjugate gradients solve: their own tests have them.
-void eraseSystems(scene::Scene& scene) {
-  std::erase_if(scene.cloths, [](const scene::Cloth& cloth) {
-    return cloth.solver.kind == scene::SolverKind::constraint || cloth.solver.kind == scene::SolverKind::acad;
+void eraseSystems(model::Scene& scene) {
+  std::erase_if(scene.cloths, [](const model::Cloth& cloth) {
+    return cloth.solver.kind == model::SolverKind::constraint || cloth.solver.kind == model::SolverKind::acad;
   });
 }
 
-TEST_F(Xpbd, givesTheSameBitsHoweverTheWorkIsCut) {
-  scene::Scene scene = mixedScene();
+TEST_F(Xpbd, GivesTheSameBitsHoweverTheWorkIsCut) {
+  model::Scene scene = mixedScene();
   eraseSystems(scene);
   const simulation::SimulationOptions ways[] = {{.workgroupSize = 0, .xpbdWholeNodes = 0},
                                                 {.workgroupSize = 0, .xpbdWholeNodes = 150},
@@ -306,25 +306,25 @@ TEST_F(Xpbd, givesTheSameBitsHoweverTheWorkIsCut) {
   expectSameBits(scene, passingBall, 12, ways);
 }
 
-TEST_F(Xpbd, givesTheSameHashesInRunsOfAThousandTicks) {
-  scene::Scene scene = mixedScene();
+TEST_F(Xpbd, GivesTheSameHashesInRunsOfAThousandTicks) {
+  model::Scene scene = mixedScene();
   eraseSystems(scene);
   scene.substeps = 3;
-  for (scene::Cloth& cloth : scene.cloths) cloth.structural.stiffness = cloth.shear.stiffness = 60;
+  for (model::Cloth& cloth : scene.cloths) cloth.structural.stiffness = cloth.shear.stiffness = 60;
   expectSameThousandTicks(scene, passingBall, {.workgroupSize = 16, .xpbdWholeNodes = 0});
 }
 
 // The same number on every device.
-TEST_F(Xpbd, reachesTheHashOfEveryOtherDevice) {
-  scene::Scene scene = mixedScene();
+TEST_F(Xpbd, ReachesTheHashOfEveryOtherDevice) {
+  model::Scene scene = mixedScene();
   eraseSystems(scene);
   EXPECT_EQ(hashAfter(scene, passingBall, 60), 0xb62da311813aa0f5u);
 }
 
-TEST_F(Xpbd, leavesClothsOfOtherSolversAsTheyAreAlone) {
-  const scene::Scene together = mixedScene();
-  scene::Scene alone = together;
-  std::erase_if(alone.cloths, [](const scene::Cloth& c) { return c.solver.kind == scene::SolverKind::xpbd; });
+TEST_F(Xpbd, LeavesClothsOfOtherSolversAsTheyAreAlone) {
+  const model::Scene together = mixedScene();
+  model::Scene alone = together;
+  std::erase_if(alone.cloths, [](const model::Cloth& c) { return c.solver.kind == model::SolverKind::xpbd; });
   Running one(alone), both(together);
   for (int tick = 0; tick < 20; ++tick) {
     one.tick(passingBall(alone, tick));
@@ -334,7 +334,7 @@ TEST_F(Xpbd, leavesClothsOfOtherSolversAsTheyAreAlone) {
   const std::vector<std::uint32_t> offsets = simulation::clothOffsets(together.cloths);
   std::size_t node = 0;
   for (std::size_t i = 0; i < together.cloths.size(); ++i) {
-    if (together.cloths[i].solver.kind == scene::SolverKind::xpbd) continue;
+    if (together.cloths[i].solver.kind == model::SolverKind::xpbd) continue;
     for (std::uint32_t k = offsets[i]; k < offsets[i + 1]; ++k, ++node)
       ASSERT_EQ(expected.positions[node], found.positions[k]) << together.cloths[i].name << " " << k;
   }

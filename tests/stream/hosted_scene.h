@@ -26,7 +26,7 @@ namespace clothstream::tests {
 // One scene on the shared device, with a subscriber that reads everything.
 class HostedScene {
  public:
-  explicit HostedScene(scene::Scene scene = smallScene(), std::size_t subscribers = 1)
+  explicit HostedScene(model::Scene scene = smallScene(), std::size_t subscribers = 1)
       : live(std::move(scene)), packer(encode::FrameEncoder::kSlots, [] {}), host(device(), live, packer) {
     for (std::size_t i = 0; i < subscribers; ++i) {
       mailboxes.push_back(std::make_shared<stream::Mailbox>([] {}));
@@ -61,7 +61,7 @@ class HostedScene {
     for (int i = 0; i < count; ++i) tick();
   }
 
-  void change(scene::ParameterChange change) {
+  void change(model::ParameterChange change) {
     ASSERT_TRUE(live.inbox.postChange({.participant = 5, .change = std::move(change)}));
   }
 

@@ -13,32 +13,32 @@
 namespace clothstream::stream {
 namespace {
 
-using scene::Vec3;
+using model::Vec3;
 using simulation::MovingCollider;
 using tests::gravity;
 using tests::handAt;
 
-scene::Scene sceneWithBall() {
-  scene::Scene scene;
+model::Scene sceneWithBall() {
+  model::Scene scene;
   scene.simulationRate = scene.streamRate = 100;
-  scene::Collider ball;
+  model::Collider ball;
   ball.name = "ball";
-  ball.shape = scene::Sphere{0.3f};
+  ball.shape = model::Sphere{0.3f};
   ball.pose.position = Vec3(0, 1, 0);
   scene.colliders = {ball};
   return scene;
 }
 
 // A rod that moves by itself and one that goes with the ball.
-scene::Scene sceneWithAttachments() {
-  scene::Scene scene = sceneWithBall();
-  scene::Cloth& cloth = scene.cloths.emplace_back();
+model::Scene sceneWithAttachments() {
+  model::Scene scene = sceneWithBall();
+  model::Cloth& cloth = scene.cloths.emplace_back();
   cloth.grid.rows = cloth.grid.columns = 3;
-  scene::Attachment rod;
+  model::Attachment rod;
   rod.name = "rod";
   rod.ranges = {{}};
   rod.motion = {.keys = {{.time = 0}, {.time = 1, .position = Vec3(1, 0, 0)}}, .steady = true};
-  scene::Attachment knot;
+  model::Attachment knot;
   knot.name = "knot";
   knot.vertices = {8};
   knot.collider = "ball";
@@ -52,7 +52,7 @@ class ColliderSetTest : public ::testing::Test {
     colliders.advance(scene, ++tick * scene.tickSeconds(), moving);
     return moving;
   }
-  scene::Scene scene = sceneWithBall();
+  model::Scene scene = sceneWithBall();
   ColliderSet colliders{scene};
   std::vector<MovingCollider> moving;
   int tick = 0;
@@ -83,19 +83,19 @@ TEST_F(ColliderSetTest, AJumpIsNoMotion) {
 }
 
 TEST_F(ColliderSetTest, ATurnIsMadeOverATickUnlessItIsAJump) {
-  scene::ParticipantCollider finger = handAt(1, 0);
-  finger.shape = scene::Capsule{.radius = 0.01f, .length = 0.03f};
+  model::ParticipantCollider finger = handAt(1, 0);
+  finger.shape = model::Capsule{.radius = 0.01f, .length = 0.03f};
   colliders.place(7, std::vector{finger});
   advance();
   const auto turned = [&](float degrees) {
     finger.pose.orientation =
-        scene::Quaternion(Eigen::AngleAxisf(degrees * std::acos(-1.0f) / 180, Vec3::UnitZ()));
+        model::Quaternion(Eigen::AngleAxisf(degrees * std::acos(-1.0f) / 180, Vec3::UnitZ()));
     colliders.place(7, std::vector{finger});
     return advance()[1];
   };
   const MovingCollider some = turned(100);
-  EXPECT_EQ(std::get<scene::Capsule>(some.shape).length, 0.03f);
-  EXPECT_EQ(some.start.orientation.coeffs(), scene::Quaternion::Identity().coeffs());
+  EXPECT_EQ(std::get<model::Capsule>(some.shape).length, 0.03f);
+  EXPECT_EQ(some.start.orientation.coeffs(), model::Quaternion::Identity().coeffs());
   EXPECT_EQ(some.end.orientation.coeffs(), finger.pose.orientation.coeffs());
   const MovingCollider jump = turned(-130);
   EXPECT_EQ(jump.start.orientation.coeffs(), finger.pose.orientation.coeffs());
@@ -127,13 +127,13 @@ TEST_F(ColliderSetTest, TheScenesOwnFollowTheirMotionUntilSomebodyMovesThem) {
   for (int i = 0; i < 100; ++i) advance();
   EXPECT_EQ(moving[0].end.position, Vec3(0, 1, 2));
   EXPECT_LT(moving[0].start.position.z(), 2);
-  scene::ParameterChange change;
+  model::ParameterChange change;
   change.colliders = {{.name = "ball", .position = Vec3(0, 1, 1.9f), .radius = 0.5f}};
-  scene::applyChange(scene, change);
+  model::applyChange(scene, change);
   advance();
   EXPECT_EQ(moving[0].start.position, Vec3(0, 1, 2));
   EXPECT_EQ(moving[0].end.position, Vec3(0, 1, 1.9f));
-  EXPECT_EQ(std::get<scene::Sphere>(moving[0].shape).radius, 0.5f);
+  EXPECT_EQ(std::get<model::Sphere>(moving[0].shape).radius, 0.5f);
 }
 
 TEST_F(ColliderSetTest, SaysWhereAllAreAndWhose) {
@@ -154,14 +154,14 @@ TEST_F(ColliderSetTest, SaysWhereAllAreAndWhose) {
 TEST(Inbox, KeepsWhereAttachmentsWerePut) {
   Inbox inbox;
   const auto put = [](std::size_t attachment, float x) {
-    return scene::AttachmentPose{attachment, {Vec3(x, 0, 0), scene::Quaternion::Identity()}};
+    return model::AttachmentPose{attachment, {Vec3(x, 0, 0), model::Quaternion::Identity()}};
   };
   inbox.postPoses(1, {.attachments = {put(0, 1), put(1, 2)}}, Clock::now());
   inbox.postPoses(1, {.colliders = {handAt(1, 0)}, .attachments = {put(0, 3)}}, Clock::now());
   Inputs inputs;
   inbox.drain(inputs);
   ASSERT_EQ(inputs.poses.size(), 1u);
-  const scene::Scene scene = sceneWithAttachments();
+  const model::Scene scene = sceneWithAttachments();
   HoldSet holds(scene);
   holds.place(1, inputs.poses[0].now.poses.grabs, inputs.poses[0].now.poses.attachments);
   simulation::TickInputs tick;
@@ -172,14 +172,14 @@ TEST(Inbox, KeepsWhereAttachmentsWerePut) {
 }
 
 TEST(HoldSet, AttachmentsGoByThemselvesUntilSomebodyMovesThem) {
-  scene::Scene scene = sceneWithAttachments();
+  model::Scene scene = sceneWithAttachments();
   HoldSet holds(scene);
   simulation::TickInputs tick;
   holds.advance(scene, 0.25, tick);
   EXPECT_EQ(tick.attachments[0].position, Vec3(0.25f, 0, 0));
   EXPECT_EQ(tick.attachments[1].position, Vec3(0, 1, 0));
   scene.colliders[0].pose.position = Vec3(0, 2, 0);
-  holds.place(7, {}, std::vector{scene::AttachmentPose{0, {Vec3(5, 5, 5), scene::Quaternion::Identity()}}});
+  holds.place(7, {}, std::vector{model::AttachmentPose{0, {Vec3(5, 5, 5), model::Quaternion::Identity()}}});
   for (const double seconds : {0.5, 0.75}) {
     holds.advance(scene, seconds, tick);
     EXPECT_EQ(tick.attachments[0].position, Vec3(5, 5, 5));
@@ -187,58 +187,58 @@ TEST(HoldSet, AttachmentsGoByThemselvesUntilSomebodyMovesThem) {
   }
 }
 
-TEST(HoldSet, AGripTakesHoldsAndLetsGo) {
-  using State = simulation::Grip::State;
-  const scene::Scene scene = sceneWithBall();
+TEST(HoldSet, AGrabTakesHoldsAndLetsGo) {
+  using State = simulation::Grab::State;
+  const model::Scene scene = sceneWithBall();
   HoldSet holds(scene);
   simulation::TickInputs tick;
   const auto grabAt = [](std::uint32_t id, float x) {
-    return scene::Grab{.id = id, .pose = {Vec3(x, 0, 0), scene::Quaternion::Identity()}};
+    return model::Grab{.id = id, .pose = {Vec3(x, 0, 0), model::Quaternion::Identity()}};
   };
   holds.place(7, std::vector{grabAt(1, 0)}, {});
   holds.place(8, std::vector{grabAt(1, 9)}, {});
   holds.advance(scene, 0.01, tick);
-  ASSERT_EQ(tick.grips.size(), 2u);
-  EXPECT_EQ(tick.grips[0].state, State::takes);
+  ASSERT_EQ(tick.grabs.size(), 2u);
+  EXPECT_EQ(tick.grabs[0].state, State::takes);
   holds.place(7, std::vector{grabAt(1, 0.1f)}, {});
   holds.advance(scene, 0.02, tick);
-  EXPECT_EQ(tick.grips[0].state, State::holds);
-  EXPECT_EQ(tick.grips[0].start.position.x(), 0);
-  EXPECT_EQ(tick.grips[0].end.position.x(), 0.1f);
+  EXPECT_EQ(tick.grabs[0].state, State::holds);
+  EXPECT_EQ(tick.grabs[0].start.position.x(), 0);
+  EXPECT_EQ(tick.grabs[0].end.position.x(), 0.1f);
   holds.advance(scene, 0.03, tick);  // no news: at rest
-  EXPECT_EQ(tick.grips[0].start.position.x(), 0.1f);
+  EXPECT_EQ(tick.grabs[0].start.position.x(), 0.1f);
   // The device forgot; what was held before is held again.
   holds.takeAnew();
   holds.advance(scene, 0.04, tick);
-  EXPECT_EQ(tick.grips[0].state, State::takes);
-  EXPECT_EQ(tick.grips[1].state, State::takes);
+  EXPECT_EQ(tick.grabs[0].state, State::takes);
+  EXPECT_EQ(tick.grabs[1].state, State::takes);
   // Its place is free for a tick before it is another's.
   holds.place(7, {}, {});
   holds.place(9, std::vector{grabAt(5, 3)}, {});
   holds.advance(scene, 0.05, tick);
-  ASSERT_EQ(tick.grips.size(), 3u);
-  EXPECT_EQ(tick.grips[0].state, State::free);
-  EXPECT_EQ(tick.grips[2].state, State::takes);
+  ASSERT_EQ(tick.grabs.size(), 3u);
+  EXPECT_EQ(tick.grabs[0].state, State::free);
+  EXPECT_EQ(tick.grabs[2].state, State::takes);
   holds.place(10, std::vector{grabAt(5, 4)}, {});
   holds.advance(scene, 0.06, tick);
-  ASSERT_EQ(tick.grips.size(), 3u);
-  EXPECT_EQ(tick.grips[0].state, State::takes);
-  EXPECT_EQ(tick.grips[0].end.position.x(), 4);
+  ASSERT_EQ(tick.grabs.size(), 3u);
+  EXPECT_EQ(tick.grabs[0].state, State::takes);
+  EXPECT_EQ(tick.grabs[0].end.position.x(), 4);
   for (const std::uint64_t participant : {8u, 9u, 10u}) holds.place(participant, {}, {});
   holds.advance(scene, 0.07, tick);
-  EXPECT_EQ(tick.grips.size(), 3u);
+  EXPECT_EQ(tick.grabs.size(), 3u);
   holds.advance(scene, 0.08, tick);
-  EXPECT_TRUE(tick.grips.empty());
+  EXPECT_TRUE(tick.grabs.empty());
 }
 
-TEST(HoldSet, NoMoreGripsThanTheDeviceHasRoomFor) {
-  const scene::Scene scene = sceneWithBall();
+TEST(HoldSet, NoMoreGrabsThanTheDeviceHasRoomFor) {
+  const model::Scene scene = sceneWithBall();
   HoldSet holds(scene);
-  for (std::uint64_t participant = 1; participant <= simulation::kMaxGrips + 5; ++participant)
-    holds.place(participant, std::vector{scene::Grab{.id = 1}}, {});
+  for (std::uint64_t participant = 1; participant <= simulation::kMaxGrabs + 5; ++participant)
+    holds.place(participant, std::vector{model::Grab{.id = 1}}, {});
   simulation::TickInputs tick;
   holds.advance(scene, 0.01, tick);
-  EXPECT_EQ(tick.grips.size(), simulation::kMaxGrips);
+  EXPECT_EQ(tick.grabs.size(), simulation::kMaxGrabs);
 }
 
 TEST(Inbox, KeepsOnlyTheNewestPosesOfAParticipant) {
@@ -274,7 +274,7 @@ TEST(Inbox, ForgetsChangesOfAllButColliders) {
   v1::ParameterChange message;
   message.set_air_density(2);
   message.add_colliders()->set_name("ball");
-  scene::ParameterChange both = gravity(-1);
+  model::ParameterChange both = gravity(-1);
   both.colliders.emplace_back().name = "ball";
   ASSERT_TRUE(inbox.postChange({.change = both, .message = message}));
   ASSERT_TRUE(inbox.postChange({.change = gravity(-3)}));

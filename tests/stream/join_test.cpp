@@ -8,7 +8,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "server/scene/material.h"
+#include "server/model/material.h"
 #include "tests/stream/server_test.h"
 
 namespace clothstream::stream {
@@ -157,7 +157,7 @@ TEST_F(JoinTest, WhoNeverReadsCostsNobodyAnything) {
   TestPeer reader(server()), dead(server());
   reader.join();
   dead.hello();
-  // Its door writes what there is for a while, and then no more.
+  // Its endpoint writes what there is for a while, and then no more.
   dead.readFrames(1);
   dead.acknowledges = false;
   const std::uint64_t keys = metrics().keyFrames.value();
@@ -304,7 +304,7 @@ TEST_F(JoinTest, AMaterialIsToldWithAllThatItMakesOfTheCloth) {
   changer.change(change);
   const v1::ParameterChanged told = changer.readUntil(Body::kParameterChanged).parameter_changed();
   const v1::ClothChange& cloth = told.change().cloths(0);
-  const scene::Material& wool = *scene::findMaterial("wool");
+  const model::Material& wool = *model::findMaterial("wool");
   EXPECT_EQ(cloth.material(), "wool");
   EXPECT_EQ(cloth.structural().stiffness(), wool.tension);
   EXPECT_EQ(cloth.friction(), wool.friction);
@@ -379,7 +379,7 @@ TEST_F(JoinTest, AFullSceneAndAFullServerSaySo) {
 class QualityTest : public ::testing::Test {
  protected:
   void SetUp() override {
-    scene::Scene scene = tests::smallScene();
+    model::Scene scene = tests::smallScene();
     scene.stream.temporalLayers = 2;
     scene.stream.qualities = 3;
     ServerOptions options;

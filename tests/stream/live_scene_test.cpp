@@ -14,7 +14,7 @@ namespace {
 using tests::smallScene;
 
 TEST(LiveScene, ThatBeginsAnewIsAsAtFirst) {
-  scene::Scene scene = smallScene();
+  model::Scene scene = smallScene();
   scene.colliders[0].motion.keys.clear();
   LiveScene live(std::move(scene));
   v1::ParameterChange change;
@@ -40,7 +40,7 @@ TEST(LiveScene, ThatIsCorrectedHasWhatHoldsAndTheChangesThatWait) {
   v1::ParameterChange waiting;
   waiting.mutable_wind()->mutable_value()->set_x(3);
   ASSERT_TRUE(live.change(1, waiting));
-  scene::Scene now = smallScene();
+  model::Scene now = smallScene();
   now.cloths[0].thickness = 0.02f;
   const v1::ParameterChange said = live.correct(now);
   EXPECT_EQ(said.cloths(0).thickness(), 0.02f);

@@ -187,7 +187,8 @@ TEST_F(MailboxTest, WhoDoesNotReadHoldsNothingAndAsksForNothing) {
   std::vector<PublishedFrame> frames;
   for (std::uint64_t tick = 1; tick <= 20; ++tick) {
     mailbox.deliver(frames.emplace_back(frame(tick, tick == 1)));
-    // There is room, and three frames were held at most: but the door has not come to ask since it was woken.
+    // There is room, and three frames were held at most: but the endpoint has not come to ask since it was
+    // woken.
     EXPECT_FALSE(wantsKeyFrame());
   }
   EXPECT_EQ(metrics.framesDropped.value(), 20u);

@@ -19,9 +19,9 @@ using tests::kMostBytesAClient;
 using tests::TestPeer;
 
 // 10,000 nodes that fall, so soft that a tick takes little.
-scene::Scene largeScene() {
-  scene::Scene scene = tests::smallScene("large");
-  scene::Cloth& cloth = scene.cloths.front();
+model::Scene largeScene() {
+  model::Scene scene = tests::smallScene("large");
+  model::Cloth& cloth = scene.cloths.front();
   cloth.grid.rows = cloth.grid.columns = 100;
   cloth.mass = 10;
   cloth.structural = cloth.shear = cloth.bend = {0.05f, 0};

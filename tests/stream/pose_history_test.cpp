@@ -14,7 +14,7 @@
 namespace clothstream::stream {
 namespace {
 
-using scene::Vec3;
+using model::Vec3;
 using tests::handAt;
 using namespace std::chrono_literals;
 
@@ -22,14 +22,14 @@ constexpr std::uint64_t kAda = 7;
 
 class PoseHistoryTest : public ::testing::Test {
  protected:
-  // Says that hand 1 is at x, and a grip with it, `ms` after the test began.
+  // Says that hand 1 is at x, and a grab with it, `ms` after the test began.
   void say(double ms, float place, std::uint64_t participant = kAda) {
     say(ms, handAt(1, place), participant);
   }
-  void say(double ms, const scene::ParticipantCollider& hand, std::uint64_t participant = kAda) {
+  void say(double ms, const model::ParticipantCollider& hand, std::uint64_t participant = kAda) {
     post(ms, {.colliders = {hand}, .grabs = {{.id = 4, .pose = hand.pose}}}, participant);
   }
-  void post(double ms, scene::ParticipantPoses poses, std::uint64_t participant = kAda) {
+  void post(double ms, model::ParticipantPoses poses, std::uint64_t participant = kAda) {
     inbox.postPoses(participant, std::move(poses), at(ms),
                     {.trueAt = at(ms), .clientTimeUs = static_cast<std::uint64_t>(1e6 + ms * 1000)});
   }
@@ -41,11 +41,11 @@ class PoseHistoryTest : public ::testing::Test {
     placed.clear();
     inbox.drain(inputs);
     for (Poses& poses : inputs.poses) history.add(std::move(poses));
-    history.place(at(ms), [&](std::uint64_t participant, const scene::ParticipantPoses& poses) {
+    history.place(at(ms), [&](std::uint64_t participant, const model::ParticipantPoses& poses) {
       placed[participant] = poses;
     });
   }
-  // Where that has the hand; the grip goes with it.
+  // Where that has the hand; the grab goes with it.
   float xAt(double ms) {
     tick(ms);
     if (placed.contains(kAda) && !placed[kAda].colliders.empty()) {
@@ -62,7 +62,7 @@ class PoseHistoryTest : public ::testing::Test {
   Inbox inbox;
   Inputs inputs;
   PoseHistory history;
-  std::map<std::uint64_t, scene::ParticipantPoses> placed;
+  std::map<std::uint64_t, model::ParticipantPoses> placed;
   float x = std::nanf("");  // of the tick last asked
 };
 
@@ -79,18 +79,18 @@ TEST_F(PoseHistoryTest, BetweenPosesThatItHasItInterpolates) {
 
 TEST_F(PoseHistoryTest, TurnsTheShorterWay) {
   const auto turned = [](float degrees) {
-    scene::ParticipantCollider hand = handAt(1, 0);
+    model::ParticipantCollider hand = handAt(1, 0);
     hand.pose.orientation =
-        scene::Quaternion(Eigen::AngleAxisf(degrees * std::numbers::pi_v<float> / 180, Vec3::UnitY()));
+        model::Quaternion(Eigen::AngleAxisf(degrees * std::numbers::pi_v<float> / 180, Vec3::UnitY()));
     return hand;
   };
   say(0, turned(20));
-  scene::ParticipantCollider other = turned(40);
+  model::ParticipantCollider other = turned(40);
   other.pose.orientation.coeffs() *= -1;  // the same turn
   say(10, other);
   const auto degrees = [&](double ms) {
     tick(ms);
-    const scene::Quaternion q = placed[kAda].colliders.front().pose.orientation;
+    const model::Quaternion q = placed[kAda].colliders.front().pose.orientation;
     EXPECT_NEAR(q.norm(), 1, 1e-6f);
     return 2 * std::atan2(std::abs(q.y()), std::abs(q.w())) * 180 / std::numbers::pi_v<float>;
   };
@@ -190,15 +190,15 @@ TEST_F(PoseHistoryTest, WhatBeginsAndEndsDoesSoAtItsTime) {
   post(0, {.grabs = {{.id = 1}}});
   post(10, {.grabs = {{.id = 1}, {.id = 2}}});
   post(20, {});
-  const auto grips = [&](double ms) {
+  const auto grabs = [&](double ms) {
     tick(ms);
     std::vector<std::uint32_t> ids;
-    for (const scene::Grab& grab : placed[kAda].grabs) ids.push_back(grab.id);
+    for (const model::Grab& grab : placed[kAda].grabs) ids.push_back(grab.id);
     return ids;
   };
-  EXPECT_THAT(grips(9), testing::ElementsAre(1));
-  EXPECT_THAT(grips(10), testing::ElementsAre(1, 2));
-  EXPECT_THAT(grips(20), testing::ElementsAre());
+  EXPECT_THAT(grabs(9), testing::ElementsAre(1));
+  EXPECT_THAT(grabs(10), testing::ElementsAre(1, 2));
+  EXPECT_THAT(grabs(20), testing::ElementsAre());
 }
 
 TEST_F(PoseHistoryTest, AttachmentsAndWishesHoldAtOnce) {

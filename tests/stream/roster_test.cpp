@@ -82,13 +82,13 @@ TEST(Roles, AChangeTakesTheRoleOfWhatItChanges) {
 }
 
 TEST(Roles, AViewerMayAskToBeToldOfContacts) {
-  v1::ColliderPoses wish, hand, grip, knot;
+  v1::ColliderPoses wish, hand, grab, knot;
   wish.set_contact_events(true);
   hand.add_colliders();
-  grip.add_grabs();
+  grab.add_grabs();
   knot.add_attachments();
   EXPECT_TRUE(permit(v1::ROLE_VIEWER, wish, {}).has_value());
-  for (const v1::ColliderPoses* act : {&hand, &grip, &knot}) {
+  for (const v1::ColliderPoses* act : {&hand, &grab, &knot}) {
     EXPECT_FALSE(permit(v1::ROLE_VIEWER, *act, {}).has_value());
     EXPECT_TRUE(permit(v1::ROLE_PARTICIPANT, *act, {}).has_value());
   }
@@ -162,7 +162,7 @@ class RosterTest : public ::testing::Test {
   messages::Result<void> pose(const Member& member, float x) {
     v1::ColliderPoses message;
     message.add_colliders();
-    scene::ParticipantPoses poses{.colliders = {tests::handAt(1, x)}, .grabs = {{.id = 4}}};
+    model::ParticipantPoses poses{.colliders = {tests::handAt(1, x)}, .grabs = {{.id = 4}}};
     return roster.post(*member.mailbox, message, poses, {}, now);
   }
   // What the next tick gets, such as "1: 1 colliders, 1 grabs".
@@ -217,7 +217,7 @@ TEST_F(RosterTest, PosesAreTrueWhenTheySayUnlessThatCannotBe) {
 
 TEST_F(RosterTest, WhatThoseDidWhoAreDismissedIsDropped) {
   const Member member = join();
-  scene::ParticipantPoses poses;
+  model::ParticipantPoses poses;
   poses.attachments.push_back({});
   EXPECT_TRUE(roster.post(*member.mailbox, {}, poses, {}, now));
   roster.dismiss(nullptr);

@@ -32,15 +32,15 @@ TEST_F(SceneFramesTest, StreamsAFrameATickBeginningWithAKeyFrame) {
 }
 
 // When a subscriber takes what there is for it.
-enum class Door : std::uint8_t { asked, quick };  // when it is asked to; as soon as there is something
+enum class Endpoint : std::uint8_t { asked, quick };  // when it is asked to; as soon as there is something
 
 // Another subscriber of a hosted scene, which wants a quality of its own.
 class QualitySubscriber {
  public:
-  QualitySubscriber(HostedScene& hosted, std::uint8_t quality, Door door = Door::asked)
+  QualitySubscriber(HostedScene& hosted, std::uint8_t quality, Endpoint endpoint = Endpoint::asked)
       : hosted_(hosted),
-        mailbox_(std::make_shared<Mailbox>([this, door] {
-          if (door == Door::quick) take();
+        mailbox_(std::make_shared<Mailbox>([this, endpoint] {
+          if (endpoint == Endpoint::quick) take();
         })),
         decoder_(codec::Decoder::make(encode::streamLayout(hosted.live.start(), LiveScene::kEpoch))) {
     EXPECT_EQ(hosted.live.audience.join(mailbox_, 100), Audience::Joining::joined);
@@ -90,7 +90,7 @@ class QualitySubscriber {
 };
 
 TEST_F(SceneFramesTest, EncodesEachQualityThatSomebodyGetsOnce) {
-  scene::Scene scene = smallScene();
+  model::Scene scene = smallScene();
   scene.stream.qualities = 3;
   HostedScene hosted(std::move(scene));
   const auto packets = [&] { return hosted.live.metrics.frames.value(); };
@@ -124,7 +124,7 @@ TEST_F(SceneFramesTest, EncodesEachQualityThatSomebodyGetsOnce) {
 }
 
 TEST_F(SceneFramesTest, WhereNobodyGetsTheFinestQualityItIsNotEncoded) {
-  scene::Scene scene = smallScene();
+  model::Scene scene = smallScene();
   scene.stream.qualities = 2;
   HostedScene hosted(std::move(scene), 0);
   QualitySubscriber only(hosted, 1);
@@ -138,7 +138,7 @@ TEST_F(SceneFramesTest, WhereNobodyGetsTheFinestQualityItIsNotEncoded) {
 }
 
 TEST_F(SceneFramesTest, WhoTakesFramesAtOnceGetsEachTickInOneQualityWhereItChanges) {
-  scene::Scene scene = smallScene();
+  model::Scene scene = smallScene();
   scene.stream.qualities = 2;
   HostedScene hosted(std::move(scene), 0);
   QualitySubscriber coarse(hosted, 1);  // for whom its encoder is made
@@ -147,7 +147,7 @@ TEST_F(SceneFramesTest, WhoTakesFramesAtOnceGetsEachTickInOneQualityWhereItChang
     hosted.tick();
     coarse.read();
   }
-  QualitySubscriber quick(hosted, 0, Door::quick);
+  QualitySubscriber quick(hosted, 0, Endpoint::quick);
   hosted.ticks(3);
   EXPECT_EQ(quick.qualities, (std::vector<std::uint8_t>{0, 0}));  // the third waits
   EXPECT_NE(hosted.live.audience.wishes(hosted.now + LinkAdaptation::kPatience).keys & 0b10, 0);
@@ -158,7 +158,7 @@ TEST_F(SceneFramesTest, WhoTakesFramesAtOnceGetsEachTickInOneQualityWhereItChang
 }
 
 TEST_F(SceneFramesTest, WhoJoinsWhileTheClockStandsIsShownTheNewestTickAndNothingElseChanges) {
-  scene::Scene scene = smallScene();
+  model::Scene scene = smallScene();
   scene.stream.qualities = 2;
   HostedScene through(scene), hosted(scene);
   through.ticks(30);
@@ -218,7 +218,7 @@ TEST_F(SceneFramesTest, WhatStandsBeforeItsFirstTickIsShownFromItsStart) {
 }
 
 TEST_F(SceneFramesTest, StreamsAtItsOwnRate) {
-  scene::Scene scene = smallScene();
+  model::Scene scene = smallScene();
   scene.streamRate = 10;
   HostedScene hosted(scene);
   hosted.ticks(12);
@@ -246,7 +246,7 @@ TEST_F(SceneFramesTest, WhatIsDecodedIsWithinTheMaxErrorOfTheState) {
   const std::span<const float> decoded = hosted.decoder->positions();
   ASSERT_EQ(decoded.size(), 3 * state.positions.size());
   for (std::size_t node = 0; node < state.positions.size(); ++node) {
-    const scene::Vec3 position(decoded[3 * node], decoded[3 * node + 1], decoded[3 * node + 2]);
+    const model::Vec3 position(decoded[3 * node], decoded[3 * node + 1], decoded[3 * node + 2]);
     EXPECT_LE((position - state.positions[node]).norm(),
               std::sqrt(3.0f) * hosted.live.start().stream.maxError)
         << node;

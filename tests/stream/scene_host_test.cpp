@@ -20,7 +20,7 @@
 namespace clothstream::stream {
 namespace {
 
-using scene::Vec3;
+using model::Vec3;
 using tests::gravity;
 using tests::handAt;
 using tests::HostedScene;
@@ -38,7 +38,7 @@ TEST_F(SceneHostTest, SameInputsGiveTheSameStatesWhateverTheAudience) {
       hosted.live.inbox.postPoses(
           9,
           {.colliders = {handAt(1, 0.1f, -0.6f, z)},
-           .grabs = {{.id = 1, .pose = {scene::Vec3(0, -0.4f, z), scene::Quaternion::Identity()}}}},
+           .grabs = {{.id = 1, .pose = {model::Vec3(0, -0.4f, z), model::Quaternion::Identity()}}}},
           hosted.now);
       // Who asks for key frames changes what is sent, not what is simulated.
       if (tick % 7 == 0) hosted.mailboxes.back()->restart();
@@ -86,12 +86,12 @@ TEST_F(SceneHostTest, AChangeTakesEffectAtTheNextTickAndIsAnnouncedForIt) {
   EXPECT_EQ(changed.told[0].parameter_changed().change().gravity().value().y(), -2);
 }
 
-// A grip at the middle of the lower edge is told of when it takes hold, when it slips and when it lets go.
-TEST_F(SceneHostTest, WhatBecomesOfGripsIsTold) {
+// A grab at the middle of the lower edge is told of when it takes hold, when it slips and when it lets go.
+TEST_F(SceneHostTest, WhatBecomesOfGrabsIsTold) {
   HostedScene hosted;
   const auto grabAt = [&](Vec3 place) {
     hosted.live.inbox.postPoses(
-        7, {.grabs = {{.id = 3, .pose = {place, scene::Quaternion::Identity()}, .radius = 0.06f}}},
+        7, {.grabs = {{.id = 3, .pose = {place, model::Quaternion::Identity()}, .radius = 0.06f}}},
         hosted.now);
     hosted.tick();
   };
@@ -131,7 +131,7 @@ TEST_F(SceneHostTest, WhatBecomesOfGripsIsTold) {
 
 // A hand in the sheet for ten ticks, then gone. The scene's ball swings through it too.
 TEST_F(SceneHostTest, ContactsAreToldToWhoWantsThem) {
-  scene::Scene scene = smallScene();
+  model::Scene scene = smallScene();
   scene.colliders[0].motion.keys.clear();
   scene.colliders[0].pose.position = Vec3(0, -0.5f, 3);
   HostedScene hosted(scene);
@@ -176,8 +176,8 @@ TEST_F(SceneHostTest, ContactsAreToldToWhoWantsThem) {
 
 TEST_F(SceneHostTest, ChangesOfSpringsReachTheDevice) {
   HostedScene changed, unchanged;
-  scene::ParameterChange softer;
-  softer.cloths.emplace_back().structural = scene::Spring{1, 0.001f};
+  model::ParameterChange softer;
+  softer.cloths.emplace_back().structural = model::Spring{1, 0.001f};
   changed.tick();
   changed.change(softer);
   changed.ticks(2);
@@ -288,7 +288,7 @@ double stretchedBy(const std::vector<float>& positions, std::vector<float>* heig
 // Soft springs hang stretched by S of a metre. At once, that would be gone within a tick; gently it fades
 // as exp(-t / 0.1 s), which is at most a quarter of it in a tick of 25 ms, besides what moves anyway.
 TEST_F(SceneHostTest, AnotherSolverActsFromTheNextTickOnAndWithoutAJump) {
-  scene::Scene scene = smallScene();
+  model::Scene scene = smallScene();
   scene.colliders.clear();
   scene.cloths[0].damping = 3;
   scene.cloths[0].structural.stiffness = 0.7f;
@@ -307,9 +307,9 @@ TEST_F(SceneHostTest, AnotherSolverActsFromTheNextTickOnAndWithoutAJump) {
   };
   const double before = stretch();
   ASSERT_GT(before, 0.2);
-  scene::ParameterChange change;
-  scene::Solver constraint;
-  constraint.kind = scene::SolverKind::constraint;
+  model::ParameterChange change;
+  model::Solver constraint;
+  constraint.kind = model::SolverKind::constraint;
   change.cloths = {{.name = "sheet", .solver = constraint}};
   hosted.change(change);
   std::vector<float> was = lowest();

@@ -17,7 +17,7 @@
 #include <gtest/gtest.h>
 
 #include "server/messages/scene_message.h"
-#include "tests/scene/meshes.h"
+#include "tests/model/meshes.h"
 #include "tests/stream/server_test.h"
 
 namespace clothstream::stream {
@@ -36,8 +36,8 @@ using ScenesTest = tests::ServerTest;
 
 // A cloth of any triangles, as a client would describe it.
 v1::Scene discScene(std::uint32_t rings) {
-  scene::Scene scene = tests::smallScene("disc");
-  scene.cloths[0].mesh = std::make_shared<const scene::Mesh>(scene::makeMesh(scene::disc(rings, 0.5f)));
+  model::Scene scene = tests::smallScene("disc");
+  scene.cloths[0].mesh = std::make_shared<const model::Mesh>(model::makeMesh(model::disc(rings, 0.5f)));
   scene.cloths[0].mass = 0.2f;
   scene.cloths[0].pins.clear();
   scene.cloths[0].pinnedVertices = {0};
@@ -232,7 +232,7 @@ TEST_F(ScenesTest, WhatWasUploadedTakesItsRoomUntilItIsAnswered) {
   const std::string content = scene.SerializeAsString();
   options.maxUploadBytes = content.size() + content.size() / 2;
   std::latch refused(1);
-  options.journals = [&](const scene::Scene& made) {
+  options.journals = [&](const model::Scene& made) {
     if (made.name == scene.name()) refused.wait();
     return nullptr;
   };
@@ -306,7 +306,7 @@ class TroubledJournal : public Journal {
   messages::Result<v1::StopRecordingResponse> stop() override { throw std::runtime_error("no stop"); }
   bool active() const override { return false; }
   bool due() const override { return false; }
-  void begin(const vulkan::DeviceInfo&, const scene::Scene&, const v1::StreamDescription&,
+  void begin(const vulkan::DeviceInfo&, const model::Scene&, const v1::StreamDescription&,
              const simulation::StateSnapshot&, const simulation::StateSnapshot&) override {}
   void ticked(const AppliedTick&) override {}
   void saved(const simulation::StateSnapshot&, bool) override {}
@@ -319,7 +319,7 @@ class TroubledJournal : public Journal {
 
 TEST_F(ScenesTest, WhatRecordingsThrowIsToldToWhoAskedForThem) {
   ServerOptions options;
-  options.journals = [](const scene::Scene&) { return std::make_shared<TroubledJournal>(); };
+  options.journals = [](const model::Scene&) { return std::make_shared<TroubledJournal>(); };
   START(std::move(options));
   TestPeer peer(server());
   peer.join();
@@ -390,11 +390,11 @@ TEST_F(ScenesTest, AResetSceneBeginsAnewWithItsParametersAsTheyAre) {
 }
 
 TEST_F(ScenesTest, AResetOfAPausedSceneIsShown) {
-  scene::Scene sparse = tests::smallScene("sparse");  // of frames
+  model::Scene sparse = tests::smallScene("sparse");  // of frames
   sparse.simulationRate = 60;
   sparse.streamRate = 20;
   sparse.colliders.clear();
-  sparse.environment.wind = scene::Vec3(0, 0, 5);
+  sparse.environment.wind = model::Vec3(0, 0, 5);
   START({}, {sparse});
   TestPeer peer(server()), other(server());
   peer.join("sparse");
@@ -430,19 +430,19 @@ TEST_F(ScenesTest, AResetOfAPausedSceneIsShown) {
 
 // What it takes to be made ready is many times what a tick of the others takes: tables of 590,000
 // constraints.
-scene::Scene heavyScene() {
-  scene::Scene heavy = tests::smallScene("heavy");
-  scene::Cloth& cloth = heavy.cloths[0];
+model::Scene heavyScene() {
+  model::Scene heavy = tests::smallScene("heavy");
+  model::Cloth& cloth = heavy.cloths[0];
   cloth.grid.rows = cloth.grid.columns = 256;
   cloth.pins[0].lastColumn = 255;
-  cloth.solver.kind = scene::SolverKind::constraint;
+  cloth.solver.kind = model::SolverKind::constraint;
   heavy.substeps = 1;
   return heavy;
 }
 
 // Quick, so that it has many ticks even in what a fast machine takes.
-scene::Scene lightScene() {
-  scene::Scene light = tests::smallScene("light");
+model::Scene lightScene() {
+  model::Scene light = tests::smallScene("light");
   light.simulationRate = light.streamRate = 200;
   light.substeps = 3;
   return light;

@@ -20,7 +20,7 @@ namespace clothstream::tests {
 class ServerTest : public ::testing::Test {
  protected:
   // The scenes "small", which is the default, "other", and these. Once a test.
-  void start(stream::ServerOptions options = {}, const std::vector<scene::Scene>& more = {}) {
+  void start(stream::ServerOptions options = {}, const std::vector<model::Scene>& more = {}) {
     options.defaultScene = "small";
     std::vector scenes{smallScene("small"), smallScene("other")};
     scenes.insert(scenes.end(), more.begin(), more.end());

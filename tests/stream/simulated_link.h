@@ -20,7 +20,7 @@
 namespace clothstream::stream {
 
 // One subscriber behind a link that carries so many bytes/s, each message `latency` late, but none before one
-// that went before it. Its door writes without ever waiting, as into a large buffer. It acknowledges as
+// that went before it. Its endpoint writes without ever waiting, as into a large buffer. It acknowledges as
 // clients do, and fails the test when it gets a frame that it cannot decode.
 class SimulatedLink {
  public:

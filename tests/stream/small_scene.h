@@ -6,15 +6,15 @@
 #include <string>
 #include <utility>
 
-#include "server/scene/input.h"
-#include "server/scene/scene.h"
+#include "server/model/input.h"
+#include "server/model/scene.h"
 
 namespace clothstream::tests {
 
 // 12 x 10 nodes hung by their first row, a ball beside them that moves by itself. 40 ticks and frames a
 // second.
-inline scene::Scene smallScene(std::string name = "small") {
-  scene::Cloth cloth;
+inline model::Scene smallScene(std::string name = "small") {
+  model::Cloth cloth;
   cloth.name = "sheet";
   cloth.grid = {.rows = 12, .columns = 10, .width = 0.9f, .height = 1.1f, .pose = {}};
   cloth.mass = 0.12f;
@@ -27,12 +27,12 @@ inline scene::Scene smallScene(std::string name = "small") {
   cloth.pins = {
       {.firstRow = 0, .lastRow = 0, .rowStep = 1, .firstColumn = 0, .lastColumn = 9, .columnStep = 1}};
 
-  scene::Collider ball;
+  model::Collider ball;
   ball.name = "ball";
-  ball.shape = scene::Sphere{0.2f};
+  ball.shape = model::Sphere{0.2f};
   ball.motion.keys = {{0, {0, -0.5f, 0.5f}}, {1, {0, -0.5f, -0.5f}}, {2, {0, -0.5f, 0.5f}}};
 
-  scene::Scene scene;
+  model::Scene scene;
   scene.name = std::move(name);
   scene.simulationRate = scene.streamRate = 40;
   scene.substeps = 12;
@@ -42,22 +42,22 @@ inline scene::Scene smallScene(std::string name = "small") {
   return scene;
 }
 
-inline scene::ParameterChange gravity(float y) {
-  scene::ParameterChange change;
-  change.gravity = scene::Vec3(0, y, 0);
+inline model::ParameterChange gravity(float y) {
+  model::ParameterChange change;
+  change.gravity = model::Vec3(0, y, 0);
   return change;
 }
 
-inline scene::ParameterChange wind(float x) {
-  scene::ParameterChange change;
-  change.wind = scene::Vec3(x, 0, 0);
+inline model::ParameterChange wind(float x) {
+  model::ParameterChange change;
+  change.wind = model::Vec3(x, 0, 0);
   return change;
 }
 
-inline scene::ParticipantCollider handAt(std::uint32_t id, float x, float y = 0, float z = 0) {
-  scene::ParticipantCollider hand;
+inline model::ParticipantCollider handAt(std::uint32_t id, float x, float y = 0, float z = 0) {
+  model::ParticipantCollider hand;
   hand.id = id;
-  hand.pose.position = scene::Vec3(x, y, z);
+  hand.pose.position = model::Vec3(x, y, z);
   return hand;
 }
 

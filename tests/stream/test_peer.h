@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A client inside the process, as a door would hold it: serialised messages through a Connection, frames
+// A client inside the process, as a endpoint would hold it: serialised messages through a Connection, frames
 // decoded.
 #pragma once
 

@@ -51,7 +51,7 @@ Kernel countUp(std::uint32_t workgroupSize = 64) {
            .workgroupSize = workgroupSize}};
 }
 
-TEST_F(ComputeTest, bufferContentsSurviveTheRoundTrip) {
+TEST_F(ComputeTest, BufferContentsSurviveTheRoundTrip) {
   constexpr std::size_t kCount = 1000;
   constexpr std::size_t kBytes = kCount * sizeof(std::uint32_t);
   for (const BufferPurpose purpose : {BufferPurpose::state, BufferPurpose::texels, BufferPurpose::indirect}) {
@@ -68,7 +68,7 @@ TEST_F(ComputeTest, bufferContentsSurviveTheRoundTrip) {
   }
 }
 
-TEST_F(ComputeTest, copiesAndFillsTouchOnlyTheirRange) {
+TEST_F(ComputeTest, CopiesAndFillsTouchOnlyTheirRange) {
   const Buffer upload = uploadOf({1, 2, 3, 4});
   const Buffer readback(tests::device(), BufferPurpose::readback, 6 * sizeof(std::uint32_t));
   tests::run([&](Recorder& recorder) {
@@ -81,7 +81,7 @@ TEST_F(ComputeTest, copiesAndFillsTouchOnlyTheirRange) {
   EXPECT_EQ(contents<std::uint32_t>(readback), (std::vector<std::uint32_t>{9, 9, 2, 3, 9, 5}));
 }
 
-TEST_F(ComputeTest, movedBufferKeepsItsContentsAndLeavesAnEmptyOne) {
+TEST_F(ComputeTest, MovedBufferKeepsItsContentsAndLeavesAnEmptyOne) {
   Buffer from = uploadOf({1, 2, 3});
   const Buffer to = std::move(from);
   EXPECT_EQ(contents<std::uint32_t>(to), (std::vector<std::uint32_t>{1, 2, 3}));
@@ -89,7 +89,7 @@ TEST_F(ComputeTest, movedBufferKeepsItsContentsAndLeavesAnEmptyOne) {
   EXPECT_THAT(Buffer().mapped(), IsEmpty());
 }
 
-TEST_F(ComputeTest, kernelGetsSpecialisationPushConstantsAndWorkgroupSize) {
+TEST_F(ComputeTest, KernelGetsSpecialisationPushConstantsAndWorkgroupSize) {
   struct Push {
     std::uint32_t count;
     float factor;
@@ -113,7 +113,7 @@ TEST_F(ComputeTest, kernelGetsSpecialisationPushConstantsAndWorkgroupSize) {
   }
 }
 
-TEST_F(ComputeTest, kernelReadsTexelsThatCopiesWrote) {
+TEST_F(ComputeTest, KernelReadsTexelsThatCopiesWrote) {
   constexpr std::uint32_t kCount = 300;
   const Buffer upload(tests::device(), BufferPurpose::upload, kCount * 16);
   for (std::uint32_t i = 0; i < kCount * 4; ++i) upload.mapped<float>()[i] = static_cast<float>(i);
@@ -143,7 +143,7 @@ std::vector<std::uint32_t> countedUp(std::uint32_t count, std::uint32_t steps) {
   return values;
 }
 
-TEST_F(ComputeTest, barriersOrderDependentDispatches) {
+TEST_F(ComputeTest, BarriersOrderDependentDispatches) {
   constexpr std::uint32_t kCount = 4096;
   constexpr std::uint32_t kSteps = 100;
   const Buffer upload = uploadOf(countedFrom(0, kCount));
@@ -165,7 +165,7 @@ TEST_F(ComputeTest, barriersOrderDependentDispatches) {
   EXPECT_EQ(contents<std::uint32_t>(readback), countedUp(kCount, kSteps));
 }
 
-TEST_F(ComputeTest, recordingsSeeTheWorkOfEarlierOnesWithoutWaiting) {
+TEST_F(ComputeTest, RecordingsSeeTheWorkOfEarlierOnesWithoutWaiting) {
   constexpr std::uint32_t kCount = 4096;
   const Buffer upload = uploadOf(countedFrom(0, kCount));
   const Buffer a(tests::device(), BufferPurpose::state, upload.bytes());
@@ -184,7 +184,7 @@ TEST_F(ComputeTest, recordingsSeeTheWorkOfEarlierOnesWithoutWaiting) {
   EXPECT_EQ(contents<std::uint32_t>(readback), countedUp(kCount, 2));
 }
 
-TEST_F(ComputeTest, recordingRunsAgainWhenItIsSubmittedAgain) {
+TEST_F(ComputeTest, RecordingRunsAgainWhenItIsSubmittedAgain) {
   constexpr std::uint32_t kCount = 64;
   const Buffer a = uploadOf(countedFrom(0, kCount));
   const Buffer b(tests::device(), BufferPurpose::readback, a.bytes());
@@ -200,7 +200,7 @@ TEST_F(ComputeTest, recordingRunsAgainWhenItIsSubmittedAgain) {
   EXPECT_THAT(contents<std::uint32_t>(b), Each(42u));
 }
 
-TEST_F(ComputeTest, aRehearsalRunsNoKernelAndNotesEachOnce) {
+TEST_F(ComputeTest, ARehearsalRunsNoKernelAndNotesEachOnce) {
   constexpr std::uint32_t kCount = 64;
   const Buffer a = uploadOf(countedFrom(0, kCount));
   const Buffer b(tests::device(), BufferPurpose::readback, a.bytes());
@@ -225,7 +225,7 @@ TEST_F(ComputeTest, aRehearsalRunsNoKernelAndNotesEachOnce) {
   EXPECT_EQ(contents<std::uint32_t>(b), countedUp(kCount, 1));
 }
 
-TEST_F(ComputeTest, deviceDecidesTheSizeOfAnIndirectDispatch) {
+TEST_F(ComputeTest, DeviceDecidesTheSizeOfAnIndirectDispatch) {
   constexpr std::uint32_t kCount = 256;
   const Buffer groups(tests::device(), BufferPurpose::indirect, 4 * sizeof(std::uint32_t));
   const Buffer a = uploadOf(countedFrom(0, kCount));
@@ -245,7 +245,7 @@ TEST_F(ComputeTest, deviceDecidesTheSizeOfAnIndirectDispatch) {
   EXPECT_EQ(contents<std::uint32_t>(b), expected);
 }
 
-TEST_F(ComputeTest, stageTimesAddUpByNameAndFitIntoTheWaiting) {
+TEST_F(ComputeTest, StageTimesAddUpByNameAndFitIntoTheWaiting) {
   constexpr std::size_t kHeavyBytes = 64u << 20;
   constexpr std::size_t kLightBytes = 4u << 10;
   const Buffer buffer(tests::device(), BufferPurpose::state, kHeavyBytes);
@@ -273,7 +273,7 @@ TEST_F(ComputeTest, stageTimesAddUpByNameAndFitIntoTheWaiting) {
   EXPECT_LE(times[0].seconds + times[1].seconds, waited.count() * 1.001);
 }
 
-TEST_F(ComputeTest, recordingWithoutStagesHasNoTimes) {
+TEST_F(ComputeTest, RecordingWithoutStagesHasNoTimes) {
   Recorder recorder(tests::device());
   recorder.begin();
   tests::submitAndWait(tests::device(), recorder);
@@ -290,7 +290,7 @@ std::string runtimeErrorOf(Act act) {
   return {};
 }
 
-TEST_F(ComputeTest, tooLargeABufferIsRefusedWithItsSizeAndTheLimit) {
+TEST_F(ComputeTest, TooLargeABufferIsRefusedWithItsSizeAndTheLimit) {
   const Limits& limits = tests::device().limits();
   const std::size_t tooLarge = limits.maxStorageRange + 16;
   const std::string error =
@@ -303,7 +303,7 @@ TEST_F(ComputeTest, tooLargeABufferIsRefusedWithItsSizeAndTheLimit) {
               HasSubstr(std::to_string(std::size_t{1} << 60)));
 }
 
-TEST_F(ComputeTest, tooLargeADispatchIsRefusedNamingTheKernel) {
+TEST_F(ComputeTest, TooLargeADispatchIsRefusedNamingTheKernel) {
   const std::uint64_t limit = tests::device().limits().maxDispatchX;
   const Buffer a = uploadOf({0});
   const Kernel kernel = countUp(1);
@@ -314,7 +314,7 @@ TEST_F(ComputeTest, tooLargeADispatchIsRefusedNamingTheKernel) {
               AllOf(HasSubstr("count_up"), HasSubstr(std::to_string(limit + 1))));
 }
 
-TEST_F(ComputeTest, tooLargeAWorkgroupIsRefusedNamingTheKernel) {
+TEST_F(ComputeTest, TooLargeAWorkgroupIsRefusedNamingTheKernel) {
   const std::uint32_t tooLarge = tests::device().limits().maxWorkgroupInvocations + 1;
   EXPECT_THAT(runtimeErrorOf([&] { countUp(tooLarge); }),
               AllOf(HasSubstr("count_up"), HasSubstr(std::to_string(tooLarge))));

@@ -84,7 +84,7 @@ std::size_t threadsAddedBy(const DeviceOptions& options) {
 
 using DeviceTest = tests::GpuTest;
 
-TEST_F(DeviceTest, listedDevicesAreNumberedFromTheBestOn) {
+TEST_F(DeviceTest, ListedDevicesAreNumberedFromTheBestOn) {
   const std::vector<DeviceInfo> devices = listDevices();
   ASSERT_THAT(devices, Not(IsEmpty()));
   for (std::uint32_t i = 0; i < devices.size(); ++i) {
@@ -96,7 +96,7 @@ TEST_F(DeviceTest, listedDevicesAreNumberedFromTheBestOn) {
   }
 }
 
-TEST_F(DeviceTest, opensTheBestDeviceUnlessToldOtherwise) {
+TEST_F(DeviceTest, OpensTheBestDeviceUnlessToldOtherwise) {
   const std::vector<DeviceInfo> devices = listDevices();
   EXPECT_EQ(Device().info().name, devices.front().name);
   EXPECT_EQ(Device({.select = "0"}).info().name, devices.front().name);
@@ -104,7 +104,7 @@ TEST_F(DeviceTest, opensTheBestDeviceUnlessToldOtherwise) {
   EXPECT_EQ(Device({.select = std::to_string(last)}).info().index, last);
 }
 
-TEST_F(DeviceTest, reportsLimitsAtLeastAsLargeAsVulkanDemands) {
+TEST_F(DeviceTest, ReportsLimitsAtLeastAsLargeAsVulkanDemands) {
   const Limits& limits = tests::device().limits();
   EXPECT_GE(limits.maxWorkgroupInvocations, 128u);
   EXPECT_GE(limits.maxWorkgroupSizeX, 128u);
@@ -117,7 +117,7 @@ TEST_F(DeviceTest, reportsLimitsAtLeastAsLargeAsVulkanDemands) {
   EXPECT_GT(limits.deviceMemoryBytes, 0u);
 }
 
-TEST(DeviceSelection, ranksDiscreteBeforeIntegratedBeforeVirtualBeforeSoftware) {
+TEST(DeviceSelection, RanksDiscreteBeforeIntegratedBeforeVirtualBeforeSoftware) {
   std::vector<Candidate> all;
   all.push_back(candidate("other", DeviceKind::other));
   all.push_back(candidate("software", DeviceKind::software));
@@ -133,7 +133,7 @@ TEST(DeviceSelection, ranksDiscreteBeforeIntegratedBeforeVirtualBeforeSoftware) 
   EXPECT_EQ(all.back().info.index, 5u);
 }
 
-TEST(DeviceSelection, takesAnIndexOrAPartOfANameInAnyCase) {
+TEST(DeviceSelection, TakesAnIndexOrAPartOfANameInAnyCase) {
   std::vector<Candidate> all;
   all.push_back(candidate("GeForce RTX 4090", DeviceKind::discrete));
   all.push_back(candidate("AMD Radeon", DeviceKind::integrated));
@@ -144,7 +144,7 @@ TEST(DeviceSelection, takesAnIndexOrAPartOfANameInAnyCase) {
   EXPECT_EQ(select(all, "rtx 40"), 0u);
 }
 
-TEST_F(DeviceTest, refusesAnUnknownSelectionAndListsWhatThereIs) {
+TEST_F(DeviceTest, RefusesAnUnknownSelectionAndListsWhatThereIs) {
   const std::string there = tests::device().info().name;
   EXPECT_THAT(errorOf({.select = "no such device"}),
               AllOf(HasSubstr("\"no such device\""), HasSubstr("0: " + there)));
@@ -152,7 +152,7 @@ TEST_F(DeviceTest, refusesAnUnknownSelectionAndListsWhatThereIs) {
   EXPECT_THAT(errorOf({.select = "99999999999999999999999"}), HasSubstr("0: " + there));
 }
 
-TEST(DeviceSelection, refusesANameThatFitsSeveralAndListsThem) {
+TEST(DeviceSelection, RefusesANameThatFitsSeveralAndListsThem) {
   std::vector<Candidate> all;
   all.push_back(candidate("Twin", DeviceKind::discrete));
   all.push_back(candidate("twin", DeviceKind::discrete));
@@ -165,14 +165,14 @@ TEST(DeviceSelection, refusesANameThatFitsSeveralAndListsThem) {
   }
 }
 
-TEST(DeviceErrors, nameWhatToInstallWhereThereIsNoDriver) {
+TEST(DeviceErrors, NameWhatToInstallWhereThereIsNoDriver) {
   const Environment drivers("VK_DRIVER_FILES", "/nonexistent.json");
   const Environment formerName("VK_ICD_FILENAMES", "/nonexistent.json");
   EXPECT_THAT(errorOf({}), AllOf(HasSubstr("mesa-vulkan-drivers"), HasSubstr("nvidia")));
   EXPECT_THROW(listDevices(), DeviceError);
 }
 
-TEST(DeviceErrors, nameWhatToInstallWhereThereIsNoLoader) {
+TEST(DeviceErrors, NameWhatToInstallWhereThereIsNoLoader) {
   // A program's library path is read when it starts: the child starts with files in the way of the real
   // loader.
   const std::filesystem::path directory =
@@ -191,12 +191,12 @@ TEST(DeviceErrors, nameWhatToInstallWhereThereIsNoLoader) {
   std::filesystem::remove_all(directory);
 }
 
-TEST(DeviceErrors, sayWhereValidationIsAskedForAndNotInstalled) {
+TEST(DeviceErrors, SayWhereValidationIsAskedForAndNotInstalled) {
   const Environment layers("VK_LAYER_PATH", "/nonexistent");
   EXPECT_THAT(errorOf({.validation = true}), HasSubstr("vulkan-validationlayers"));
 }
 
-TEST_F(DeviceTest, environmentSwitchesValidationOn) {
+TEST_F(DeviceTest, EnvironmentSwitchesValidationOn) {
   {
     const Environment on("CLOTHSTREAM_VALIDATION", "1");
     EXPECT_TRUE(Device().handles().validates());
@@ -208,7 +208,7 @@ TEST_F(DeviceTest, environmentSwitchesValidationOn) {
   }
 }
 
-TEST_F(DeviceTest, softwareDeviceRunsAsManyThreadsAsAsked) {
+TEST_F(DeviceTest, SoftwareDeviceRunsAsManyThreadsAsAsked) {
   if (!tests::device().isSoftware()) GTEST_SKIP() << "threads are chosen on software devices alone";
   const Environment overruled("LP_NUM_THREADS", "2");
   const std::size_t inlineOnly = threadsAddedBy({.softwareThreads = 0});
@@ -217,7 +217,7 @@ TEST_F(DeviceTest, softwareDeviceRunsAsManyThreadsAsAsked) {
   EXPECT_EQ(threadsAddedBy({.softwareThreads = 3}), inlineOnly + 3 * one);
 }
 
-TEST_F(DeviceTest, softwareDeviceTakesItsThreadsFromTheEnvironmentOrElseOneAProcessor) {
+TEST_F(DeviceTest, SoftwareDeviceTakesItsThreadsFromTheEnvironmentOrElseOneAProcessor) {
   if (!tests::device().isSoftware()) GTEST_SKIP() << "threads are chosen on software devices alone";
   const Environment given("LP_NUM_THREADS", "3");
   const std::size_t three = threadsAddedBy({.softwareThreads = 3});
@@ -228,14 +228,14 @@ TEST_F(DeviceTest, softwareDeviceTakesItsThreadsFromTheEnvironmentOrElseOneAProc
   EXPECT_EQ(threadsAddedBy({}), all);
 }
 
-TEST_F(DeviceTest, waitingTimesOutWhileTheValueIsNotReached) {
+TEST_F(DeviceTest, WaitingTimesOutWhileTheValueIsNotReached) {
   const Device device;
   EXPECT_EQ(device.completed(), 0u);
   EXPECT_TRUE(device.wait(0, std::chrono::nanoseconds(0)));
   EXPECT_FALSE(device.wait(1, std::chrono::milliseconds(1)));
 }
 
-TEST_F(DeviceTest, timelineCountsSubmissions) {
+TEST_F(DeviceTest, TimelineCountsSubmissions) {
   Device device;
   Recorder recorder(device);
   for (TimelineValue value = 1; value <= 3; ++value) {

@@ -71,13 +71,13 @@ class PipelineCacheTest : public tests::GpuTest {
                                            "made if missing";
 };
 
-TEST_F(PipelineCacheTest, isWrittenAndUsedAgain) {
+TEST_F(PipelineCacheTest, IsWrittenAndUsedAgain) {
   EXPECT_EQ(useCache(), 0u);
   const std::size_t kept = read().size();
   EXPECT_EQ(useCache(), kept - kFileHeaderBytes);
 }
 
-TEST_F(PipelineCacheTest, isReplacedWhenDamaged) {
+TEST_F(PipelineCacheTest, IsReplacedWhenDamaged) {
   useCache();
   const std::vector<char> good = read();
   for (std::size_t i = 0; i < good.size(); i += std::max<std::size_t>(good.size() / 8, 1)) {
@@ -92,7 +92,7 @@ TEST_F(PipelineCacheTest, isReplacedWhenDamaged) {
   }
 }
 
-TEST_F(PipelineCacheTest, isReplacedWhenOfAnotherDriver) {
+TEST_F(PipelineCacheTest, IsReplacedWhenOfAnotherDriver) {
   useCache();
   std::vector<char> foreign = read();
   foreign[kUuidOffset] = static_cast<char>(foreign[kUuidOffset] ^ 1);
@@ -104,7 +104,7 @@ TEST_F(PipelineCacheTest, isReplacedWhenOfAnotherDriver) {
   expectReplaced();
 }
 
-TEST_F(PipelineCacheTest, thatCannotBeWrittenDisturbsNobody) {
+TEST_F(PipelineCacheTest, ThatCannotBeWrittenDisturbsNobody) {
   std::filesystem::create_directories(directory_.parent_path());
   std::ofstream(directory_) << "a file where the directory should be";
   EXPECT_EQ(useCache(), 0u);

@@ -66,7 +66,7 @@ class ValidationTest : public tests::GpuTest {
   std::unique_ptr<Bindings> first_, second_;
 };
 
-TEST_F(ValidationTest, isSilentAboutCorrectBarriers) {
+TEST_F(ValidationTest, IsSilentAboutCorrectBarriers) {
   Recorder recorder(*device_);
   recorder.begin();
   recorder.fill(buffers_[0], 1, buffers_[0].bytes());
@@ -78,7 +78,7 @@ TEST_F(ValidationTest, isSilentAboutCorrectBarriers) {
   EXPECT_THAT(tests::takeValidationTexts(), IsEmpty());
 }
 
-TEST_F(ValidationTest, reportsAMissingBarrierWithinARecording) {
+TEST_F(ValidationTest, ReportsAMissingBarrierWithinARecording) {
   const std::uint64_t before = Device::validationMessages();
   Recorder recorder(*device_);
   recorder.begin();
@@ -89,7 +89,7 @@ TEST_F(ValidationTest, reportsAMissingBarrierWithinARecording) {
   EXPECT_THAT(tests::takeValidationTexts(), Contains(HasSubstr("SYNC-HAZARD-READ-AFTER-WRITE")));
 }
 
-TEST_F(ValidationTest, reportsAMissingBarrierBetweenSubmissions) {
+TEST_F(ValidationTest, ReportsAMissingBarrierBetweenSubmissions) {
   const vk::raii::CommandPool pool(
       device_->handles().device,
       vk::CommandPoolCreateInfo{.queueFamilyIndex = device_->handles().queueFamily});

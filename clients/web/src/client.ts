@@ -508,7 +508,7 @@ export class Client {
     );
   }
 
-  // Those of this participant's grips that hold nothing any more, as the newest ClientEvent.grabs told.
+  // Those of this participant's grabs that hold nothing any more, as the newest ClientEvent.grabs told.
   lostGrabs(): number[] {
     const own = this.core.exports.cs_participant_id(this.handle);
     const events = this.list(
@@ -523,7 +523,7 @@ export class Client {
     return events.filter(({ participant, vertices }) => participant === own && vertices === 0).map(({ grab }) => grab);
   }
 
-  // This participant's grip on cloth; none: it lets go. Another id takes hold anew.
+  // This participant's grab on cloth; none: it lets go. Another id takes hold anew.
   setGrab(grab: { id: number; position: Vec3 } | undefined): void {
     const view = this.core.view();
     if (grab) {

@@ -5,7 +5,7 @@ import * as THREE from "three";
 import type { Vec3 } from "./client";
 import type { View } from "./view";
 
-// Of a collider its place; of a grip on the cloth its place too, or nothing when it lets go.
+// Of a collider its place; of a grab on the cloth its place too, or nothing when it lets go.
 export type DragTarget =
   | { kind: "collider"; collider: string; position: Vec3 }
   | { kind: "grab"; grab: { id: number; position: Vec3 } | undefined };
@@ -17,7 +17,7 @@ export class Drag {
   enabled = true;
   private readonly raycaster = new THREE.Raycaster();
   private readonly plane = new THREE.Plane();
-  private readonly grip = new THREE.Vector3();
+  private readonly grab = new THREE.Vector3();
   private held: Held | undefined;
   private wanted: THREE.Vector3 | undefined;
   private lets = false;
@@ -49,7 +49,7 @@ export class Drag {
     return { kind: "grab", grab: { id: this.held.grab, position } };
   }
 
-  // That grip holds nothing any more.
+  // That grab holds nothing any more.
   slipped(grab: number): void {
     if (!this.held || !("grab" in this.held) || this.held.grab !== grab) return;
     this.held = undefined;
@@ -82,7 +82,7 @@ export class Drag {
     this.plane.setFromNormalAndCoplanarPoint(facing, centre);
     // The pointer stays where it took hold.
     const start = this.raycaster.ray.intersectPlane(this.plane, new THREE.Vector3());
-    this.grip.copy(centre).sub(start ?? centre);
+    this.grab.copy(centre).sub(start ?? centre);
     this.pointer = event.pointerId;
     this.lets = false;
     this.wanted = centre.clone();
@@ -99,7 +99,7 @@ export class Drag {
     if (event.pointerId === this.pointer) {
       if (!this.held) return;
       const point = this.raycaster.ray.intersectPlane(this.plane, new THREE.Vector3());
-      if (point) this.wanted = point.add(this.grip);
+      if (point) this.wanted = point.add(this.grab);
     } else if (event.pointerType === "mouse" && event.buttons === 0) {
       this.view.canvas.style.cursor = this.pick() ? "grab" : "";
     }

@@ -53,11 +53,11 @@ vulkan::KernelDescription kernel(const char* name, std::span<const std::uint32_t
 
 }  // namespace
 
-bool AssembledStage::isIn(std::span<const scene::Cloth> cloths) {
-  return std::ranges::any_of(cloths, [](const scene::Cloth& cloth) { return isAssembled(cloth.solver); });
+bool AssembledStage::isIn(std::span<const model::Cloth> cloths) {
+  return std::ranges::any_of(cloths, [](const model::Cloth& cloth) { return isAssembled(cloth.solver); });
 }
 
-AssembledStage::AssembledStage(const vulkan::Device& device, std::span<const scene::Cloth> cloths,
+AssembledStage::AssembledStage(const vulkan::Device& device, std::span<const model::Cloth> cloths,
                                const StateBuffers& state, std::uint32_t workgroupSize,
                                std::optional<std::uint32_t> wholeNodes)
     : cut_(cutAssembled(device, workgroupSize, wholeNodes)),

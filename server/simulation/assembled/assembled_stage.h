@@ -7,7 +7,7 @@
 #include <optional>
 #include <span>
 
-#include "server/scene/scene.h"
+#include "server/model/scene.h"
 #include "server/simulation/assembled/assembled_tables.h"
 #include "server/simulation/device_table.h"
 #include "server/simulation/stage.h"
@@ -18,7 +18,7 @@
 
 namespace clothstream::simulation {
 
-// The baseline beside SolveStage, of cloths with scene::isAssembled(): same constraints, same settings, same
+// The baseline beside SolveStage, of cloths with model::isAssembled(): same constraints, same settings, same
 // report, and the same motion as far as both converge and but for rounding. Belongs to the device's thread.
 //
 // A substep: J in CSR from where the nodes are; the matrix  J M^-1 J^T + c I,  whose entries' places follow
@@ -31,11 +31,11 @@ class AssembledStage {
   // Some cloth's system must be assembled. `workgroupSize` 0, and `wholeNodes` (of the largest cloth that one
   // workgroup solves) absent: the measured best for the device. Throws std::runtime_error where there is no
   // room.
-  AssembledStage(const vulkan::Device& device, std::span<const scene::Cloth> cloths,
+  AssembledStage(const vulkan::Device& device, std::span<const model::Cloth> cloths,
                  const StateBuffers& state, std::uint32_t workgroupSize,
                  std::optional<std::uint32_t> wholeNodes);
 
-  static bool isIn(std::span<const scene::Cloth> cloths);
+  static bool isIn(std::span<const model::Cloth> cloths);
 
   // Its tables, once, before the first substep.
   void recordTables(vulkan::Recorder& recorder) const;

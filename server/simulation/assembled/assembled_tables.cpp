@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cassert>
 
-#include "server/scene/springs.h"
+#include "server/model/springs.h"
 
 namespace clothstream::simulation {
 namespace {
@@ -44,10 +44,10 @@ class List {
 
 // A cloth, and what it adds to the tables.
 struct Source {
-  const scene::Cloth& cloth;
+  const model::Cloth& cloth;
   std::uint32_t number, firstNode;
-  std::vector<scene::SpringLink> links;
-  scene::SpringAdjacency adjacency;
+  std::vector<model::SpringLink> links;
+  model::SpringAdjacency adjacency;
   std::vector<std::uint8_t> pinned;
 
   std::uint32_t chunks() const { return std::max(1u, (count(links) + kChunkRows - 1) / kChunkRows); }
@@ -56,7 +56,7 @@ struct Source {
 // Of the matrix, in texels.
 std::uint32_t longestRow(const Source& source) {
   std::uint32_t longest = 0;
-  for (const scene::SpringLink& link : source.links) {
+  for (const model::SpringLink& link : source.links) {
     std::size_t entries = 1;
     for (const std::uint32_t node : {link.a, link.b})
       if (source.pinned[node] == 0) entries += source.adjacency.of(node).size() - 1;
@@ -79,7 +79,7 @@ struct Entry {
 };
 
 std::vector<Entry> entriesOf(const Source& from, std::uint32_t row) {
-  const scene::SpringLink& own = from.links[row];
+  const model::SpringLink& own = from.links[row];
   std::vector<Entry> entries{{row, CLOTHSTREAM_DIAGONAL}};
   for (const std::uint32_t p : {0u, 1u}) {
     const std::uint32_t node = p == 0 ? own.a : own.b;
@@ -94,7 +94,7 @@ std::vector<Entry> entriesOf(const Source& from, std::uint32_t row) {
 void appendRows(const Source& from, AssembledTables& tables) {
   const std::uint32_t firstRow = count(tables.rows);
   for (std::uint32_t i = 0; i < from.links.size(); ++i) {
-    const scene::SpringLink& link = from.links[i];
+    const model::SpringLink& link = from.links[i];
     List columns(tables.columns, whole(firstRow + i)), sources(tables.sources, CLOTHSTREAM_NO_ENTRY);
     for (const Entry& entry : entriesOf(from, i)) {
       columns.push(whole(firstRow + entry.column));
@@ -132,17 +132,17 @@ void appendSystem(const Source& from, AssembledTables& tables) {
 
 }  // namespace
 
-AssembledTables assembledTables(std::span<const scene::Cloth> cloths, const AssembledCut& cut) {
+AssembledTables assembledTables(std::span<const model::Cloth> cloths, const AssembledCut& cut) {
   AssembledTables tables;
   std::vector<Source> parts;
   std::uint32_t firstNode = 0;
   tables.nodeEntries.resize(clothOffsets(cloths).back(), {{0, 0, 0, 0}});
   for (std::uint32_t i = 0; i < cloths.size(); firstNode += cloths[i++].nodeCount()) {
-    if (!scene::isAssembled(cloths[i].solver)) continue;
-    std::vector<scene::SpringLink> links = scene::systemLinks(cloths[i]);
-    scene::SpringAdjacency adjacency = scene::springAdjacency(links, cloths[i].nodeCount());
+    if (!model::isAssembled(cloths[i].solver)) continue;
+    std::vector<model::SpringLink> links = model::systemLinks(cloths[i]);
+    model::SpringAdjacency adjacency = model::springAdjacency(links, cloths[i].nodeCount());
     Source source{
-        cloths[i], i, firstNode, std::move(links), std::move(adjacency), scene::pinnedNodes(cloths[i])};
+        cloths[i], i, firstNode, std::move(links), std::move(adjacency), model::pinnedNodes(cloths[i])};
     // A dispatch must bear an iteration, and what measures its end.
     const std::uint64_t rounds = roundsOf(source, cut);
     if (source.cloth.nodeCount() > cut.wholeNodes || 2 * rounds > cut.rounds) {

@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "server/scene/scene.h"
+#include "server/model/scene.h"
 #include "server/simulation/scene_tables.h"
 #include "shaders/assembled/assembled.h"
 #include "shaders/shared/simulation.h"
@@ -26,7 +26,7 @@ struct AssembledTables {
   std::vector<std::uint32_t> cloths;  // of each system
   std::vector<shared::AssembledSystemRecord> systems;
   std::vector<shared::AssembledChunkRecord> chunks;
-  // A row a spring, in the order of scene::systemLinks(): a row of J, whose two columns are the nodes.
+  // A row a spring, in the order of model::systemLinks(): a row of J, whose two columns are the nodes.
   std::vector<shared::LinkRecord> rows;
   // The system matrix by rows, columns in ascending order: where a row lies, its columns, and of which blocks
   // of J its entries are made.
@@ -41,7 +41,7 @@ struct AssembledTables {
   std::uint32_t wholeRounds = 0;  // of loops, of one iteration of the largest that one workgroup solves
 };
 
-// Of the cloths with scene::isAssembled(). Springs between two pinned nodes are left out.
-AssembledTables assembledTables(std::span<const scene::Cloth> cloths, const AssembledCut& cut);
+// Of the cloths with model::isAssembled(). Springs between two pinned nodes are left out.
+AssembledTables assembledTables(std::span<const model::Cloth> cloths, const AssembledCut& cut);
 
 }  // namespace clothstream::simulation

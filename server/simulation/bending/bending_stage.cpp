@@ -13,20 +13,20 @@ namespace {
 using vulkan::kStorage;
 using vulkan::kTexels;
 
-std::vector<bool> bending(std::span<const scene::Cloth> cloths) {
+std::vector<bool> bending(std::span<const model::Cloth> cloths) {
   std::vector<bool> bends;
-  for (const scene::Cloth& cloth : cloths) bends.push_back(cloth.dihedralBending > 0);
+  for (const model::Cloth& cloth : cloths) bends.push_back(cloth.dihedralBending > 0);
   return bends;
 }
 
 }  // namespace
 
-BendingStage::BendingStage(const vulkan::Device& device, std::span<const scene::Cloth> cloths,
+BendingStage::BendingStage(const vulkan::Device& device, std::span<const model::Cloth> cloths,
                            const StateBuffers& state, std::uint32_t workgroupSize)
     : BendingStage(device, bendingTables(cloths), cloths, state, workgroupSize) {}
 
 BendingStage::BendingStage(const vulkan::Device& device, const BendingTables& tables,
-                           std::span<const scene::Cloth> cloths, const StateBuffers& state,
+                           std::span<const model::Cloth> cloths, const StateBuffers& state,
                            std::uint32_t workgroupSize)
     : bends_(bending(cloths)),
       hingeCount_(static_cast<std::uint32_t>(tables.hinges.size())),
@@ -53,11 +53,11 @@ BendingStage::BendingStage(const vulkan::Device& device, const BendingTables& ta
             {&incidences_.texels(), &lists_.texels(), &forces_, state.positions[0], state.velocities[0]},
             {&incidences_.texels(), &lists_.texels(), &forces_, state.positions[1], state.velocities[1]}) {}
 
-bool BendingStage::isIn(std::span<const scene::Cloth> cloths) {
-  return std::ranges::any_of(cloths, [](const scene::Cloth& cloth) { return cloth.dihedralBending > 0; });
+bool BendingStage::isIn(std::span<const model::Cloth> cloths) {
+  return std::ranges::any_of(cloths, [](const model::Cloth& cloth) { return cloth.dihedralBending > 0; });
 }
 
-bool BendingStage::serves(std::span<const scene::Cloth> cloths) const {
+bool BendingStage::serves(std::span<const model::Cloth> cloths) const {
   for (std::size_t i = 0; i < cloths.size(); ++i)
     if (cloths[i].dihedralBending > 0 && !bends_[i]) return false;
   return true;

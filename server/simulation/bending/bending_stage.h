@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "server/scene/scene.h"
+#include "server/model/scene.h"
 #include "server/simulation/bending/bending_tables.h"
 #include "server/simulation/device_table.h"
 #include "server/simulation/stage.h"
@@ -22,12 +22,12 @@ namespace clothstream::simulation {
 class BendingStage {
  public:
   // Throws std::runtime_error where the device has no room.
-  BendingStage(const vulkan::Device& device, std::span<const scene::Cloth> cloths, const StateBuffers& state,
+  BendingStage(const vulkan::Device& device, std::span<const model::Cloth> cloths, const StateBuffers& state,
                std::uint32_t workgroupSize);
 
-  static bool isIn(std::span<const scene::Cloth> cloths);
+  static bool isIn(std::span<const model::Cloth> cloths);
   // Whether it has the hinges of all that bend now.
-  bool serves(std::span<const scene::Cloth> cloths) const;
+  bool serves(std::span<const model::Cloth> cloths) const;
 
   // Its tables, before the next substep.
   void recordTables(vulkan::Recorder& recorder) const;
@@ -36,7 +36,7 @@ class BendingStage {
 
  private:
   BendingStage(const vulkan::Device& device, const BendingTables& tables,
-               std::span<const scene::Cloth> cloths, const StateBuffers& state, std::uint32_t workgroupSize);
+               std::span<const model::Cloth> cloths, const StateBuffers& state, std::uint32_t workgroupSize);
 
   std::vector<bool> bends_;  // cloths in the tables
   std::uint32_t hingeCount_, nodeCount_;

@@ -2,7 +2,7 @@
 // Hinges of a scene as the kernels read them.
 #include "server/simulation/bending/bending_tables.h"
 
-#include "server/scene/hinges.h"
+#include "server/model/hinges.h"
 
 namespace clothstream::simulation {
 namespace {
@@ -21,14 +21,14 @@ void addLists(const std::vector<std::vector<std::uint32_t>>& numbers, BendingTab
 
 }  // namespace
 
-BendingTables bendingTables(std::span<const scene::Cloth> cloths) {
+BendingTables bendingTables(std::span<const model::Cloth> cloths) {
   BendingTables tables;
   std::uint32_t firstNode = 0;
   for (std::size_t i = 0; i < cloths.size(); ++i) {
-    const scene::Cloth& cloth = cloths[i];
+    const model::Cloth& cloth = cloths[i];
     std::vector<std::vector<std::uint32_t>> numbers(cloth.nodeCount());
-    for (const scene::Hinge& hinge :
-         cloth.dihedralBending > 0 ? scene::hinges(cloth) : std::vector<scene::Hinge>()) {
+    for (const model::Hinge& hinge :
+         cloth.dihedralBending > 0 ? model::hinges(cloth) : std::vector<model::Hinge>()) {
       const auto slot = static_cast<std::uint32_t>(4 * tables.hinges.size());
       const auto node = [&](std::size_t place) { return static_cast<float>(firstNode + hinge.nodes[place]); };
       tables.hinges.push_back({{node(0), node(1), node(2), node(3)},

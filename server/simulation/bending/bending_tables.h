@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "server/scene/scene.h"
+#include "server/model/scene.h"
 #include "shaders/bending/bending.h"
 #include "shaders/shared/types.h"
 
@@ -19,6 +19,6 @@ struct BendingTables {
 };
 
 // Of the cloths with dihedral bending.
-BendingTables bendingTables(std::span<const scene::Cloth> cloths);
+BendingTables bendingTables(std::span<const model::Cloth> cloths);
 
 }  // namespace clothstream::simulation

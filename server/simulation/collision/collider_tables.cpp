@@ -17,24 +17,24 @@ constexpr std::size_t kRecordTexels = sizeof(shared::ColliderRecord) / sizeof(ve
 constexpr float kFar = 1e15f;
 
 // Appends the planes that the shape needs; `firstPlane` is the texel of the first of all.
-vec4 shapeTexel(const scene::Shape& shape, std::size_t firstPlane, std::vector<vec4>& planes) {
+vec4 shapeTexel(const model::Shape& shape, std::size_t firstPlane, std::vector<vec4>& planes) {
   const auto first = static_cast<float>(firstPlane + planes.size());
   return std::visit(
-      scene::ShapeVisitor{[](const scene::Sphere& sphere) -> vec4 {
+      model::ShapeVisitor{[](const model::Sphere& sphere) -> vec4 {
                             return {shared::kRoundShape, sphere.radius, 0, 0};
                           },
-                          [](const scene::Capsule& capsule) -> vec4 {
+                          [](const model::Capsule& capsule) -> vec4 {
                             return {shared::kRoundShape, capsule.radius, capsule.length / 2, 0};
                           },
-                          [&](const scene::Plane&) -> vec4 {
+                          [&](const model::Plane&) -> vec4 {
                             planes.push_back({0, 1, 0, 0});
                             return {shared::kPlanesShape, first, 1, 0};
                           },
-                          [](const scene::Box& box) -> vec4 {
+                          [](const model::Box& box) -> vec4 {
                             return {shared::kBoxShape, box.size.x() / 2, box.size.y() / 2, box.size.z() / 2};
                           },
-                          [&](const scene::Hull& hull) -> vec4 {
-                            for (const scene::HalfSpace& plane : hull->planes)
+                          [&](const model::Hull& hull) -> vec4 {
+                            for (const model::HalfSpace& plane : hull->planes)
                               planes.push_back(texel(plane.normal, plane.offset));
                             return {shared::kPlanesShape, first, static_cast<float>(hull->planes.size()), 0};
                           }},
@@ -43,10 +43,10 @@ vec4 shapeTexel(const scene::Shape& shape, std::size_t firstPlane, std::vector<v
 
 shared::ColliderRecord recordOf(const MovingCollider& collider, std::size_t firstPlane,
                                 std::vector<vec4>& planes) {
-  const scene::Quaternion& from = collider.start.orientation;
-  const scene::Quaternion& to = collider.end.orientation;
+  const model::Quaternion& from = collider.start.orientation;
+  const model::Quaternion& to = collider.end.orientation;
   const float sign = from.dot(to) < 0 ? -1.0f : 1.0f;
-  return {.start = texel(collider.start.position, std::min(scene::reachOf(collider.shape), kFar)),
+  return {.start = texel(collider.start.position, std::min(model::reachOf(collider.shape), kFar)),
           .motion = texel(collider.end.position - collider.start.position, collider.friction),
           .turned = {from.x(), from.y(), from.z(), from.w()},
           .turn = {sign * to.x() - from.x(), sign * to.y() - from.y(), sign * to.z() - from.z(),
@@ -55,9 +55,9 @@ shared::ColliderRecord recordOf(const MovingCollider& collider, std::size_t firs
 }
 
 shared::ColliderBounds boundsOf(const MovingCollider& collider, float reach) {
-  const scene::Vec3& a = collider.start.position;
-  const scene::Vec3& b = collider.end.position;
-  const scene::Vec3 reaches = scene::Vec3::Constant(reach);
+  const model::Vec3& a = collider.start.position;
+  const model::Vec3& b = collider.end.position;
+  const model::Vec3 reaches = model::Vec3::Constant(reach);
   return {texel(a.cwiseMin(b) - reaches, (b - a).norm()), texel(a.cwiseMax(b) + reaches, 0)};
 }
 

@@ -5,15 +5,15 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "server/scene/collider.h"
+#include "server/model/collider.h"
 
 namespace clothstream::simulation {
 
 // It moves in a straight line from start to end over the tick's substeps, and turns the shorter way, by the
 // normalised mean of the two quaternions.
 struct MovingCollider {
-  scene::Shape shape = scene::Sphere{};
-  scene::Pose start = {}, end = {};
+  model::Shape shape = model::Sphere{};
+  model::Pose start = {}, end = {};
   float friction = 1;  // Coulomb; multiplied with the cloth's
 };
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Kernels of attachments, tethers and grips.
+// Kernels of attachments, tethers and grabs.
 #include "server/simulation/hold/hold_stage.h"
 
 #include <algorithm>
@@ -20,32 +20,32 @@ using vulkan::BufferPurpose;
 using vulkan::kStorage;
 using vulkan::kTexels;
 
-constexpr std::size_t kGripBytes = kMaxGrips * sizeof(shared::GripRecord);
-constexpr std::size_t kReportBytes = kMaxGrips * sizeof(shared::GripReport);
+constexpr std::size_t kGrabBytes = kMaxGrabs * sizeof(shared::GrabRecord);
+constexpr std::size_t kReportBytes = kMaxGrabs * sizeof(shared::GrabReport);
 
-float stateOf(Grip::State state) {
+float stateOf(Grab::State state) {
   switch (state) {
-    case Grip::State::holds:
-      return shared::kHoldingGrip;
-    case Grip::State::takes:
-      return shared::kTakingGrip;
+    case Grab::State::holds:
+      return shared::kHoldingGrab;
+    case Grab::State::takes:
+      return shared::kTakingGrab;
     default:
-      return shared::kFreeGrip;
+      return shared::kFreeGrab;
   }
 }
 
 // Turns the shorter way.
-shared::GripRecord recordOf(const Grip& grip) {
-  const scene::Vec3& start = grip.start.position;
-  const scene::Vec3 motion = grip.end.position - start;
-  const Eigen::Vector4f from = grip.start.orientation.coeffs();
-  const Eigen::Vector4f to = grip.end.orientation.coeffs();
+shared::GrabRecord recordOf(const Grab& grab) {
+  const model::Vec3& start = grab.start.position;
+  const model::Vec3 motion = grab.end.position - start;
+  const Eigen::Vector4f from = grab.start.orientation.coeffs();
+  const Eigen::Vector4f to = grab.end.orientation.coeffs();
   const Eigen::Vector4f turn = (from.dot(to) < 0 ? Eigen::Vector4f(-to) : to) - from;
-  return {.start = {start.x(), start.y(), start.z(), grip.slipDistance * grip.slipDistance},
-          .motion = {motion.x(), motion.y(), motion.z(), grip.maxForce},
+  return {.start = {start.x(), start.y(), start.z(), grab.slipDistance * grab.slipDistance},
+          .motion = {motion.x(), motion.y(), motion.z(), grab.maxForce},
           .turned = {from.x(), from.y(), from.z(), from.w()},
           .turn = {turn.x(), turn.y(), turn.z(), turn.w()},
-          .state = {stateOf(grip.state), grip.radius * grip.radius, grip.reach * grip.reach, 0}};
+          .state = {stateOf(grab.state), grab.radius * grab.radius, grab.reach * grab.reach, 0}};
 }
 
 }  // namespace
@@ -62,11 +62,11 @@ HoldStage::HoldStage(const vulkan::Device& device, const HoldTables& tables, con
       startFrames_(tables.frames),
       frames_(device, BufferPurpose::texels,
               std::max<std::size_t>(1, tables.frames.size()) * sizeof(shared::FrameRecord)),
-      grips_(device, BufferPurpose::texels, kGripBytes),
+      grabs_(device, BufferPurpose::texels, kGrabBytes),
       holds_(device, BufferPurpose::state, nodeCount * sizeof(shared::vec4)),
       reports_(device, BufferPurpose::state, kReportBytes),
-      uploads_{Buffer(device, BufferPurpose::upload, frames_.bytes() + kGripBytes),
-               Buffer(device, BufferPurpose::upload, frames_.bytes() + kGripBytes)},
+      uploads_{Buffer(device, BufferPurpose::upload, frames_.bytes() + kGrabBytes),
+               Buffer(device, BufferPurpose::upload, frames_.bytes() + kGrabBytes)},
       readbacks_{Buffer(device, BufferPurpose::readback, kReportBytes),
                  Buffer(device, BufferPurpose::readback, kReportBytes)},
       aim_(device,
@@ -81,31 +81,31 @@ HoldStage::HoldStage(const vulkan::Device& device, const HoldTables& tables, con
                    {.name = "find_nearest",
                     .spirv = kernels::find_nearest,
                     .bindings = {kTexels, kStorage, kTexels},
-                    .pushConstantBytes = sizeof(shared::GripPush),
+                    .pushConstantBytes = sizeof(shared::GrabPush),
                     .workgroupSize = workgroupSize},
-                   {&grips_, &reports_, state.positions[0]}, {&grips_, &reports_, state.positions[1]}),
+                   {&grabs_, &reports_, state.positions[0]}, {&grabs_, &reports_, state.positions[1]}),
       takeHold_(device,
                 {.name = "take_hold",
                  .spirv = kernels::take_hold,
                  .bindings = {kTexels, kStorage, kTexels, kStorage},
-                 .pushConstantBytes = sizeof(shared::GripPush),
+                 .pushConstantBytes = sizeof(shared::GrabPush),
                  .workgroupSize = workgroupSize},
-                {&grips_, &reports_, state.positions[0], &holds_},
-                {&grips_, &reports_, state.positions[1], &holds_}),
+                {&grabs_, &reports_, state.positions[0], &holds_},
+                {&grabs_, &reports_, state.positions[1], &holds_}),
       tie_(makeHold(device, state, false)),
       hold_(makeHold(device, state, true)) {}
 
 // From the substep's start it is the other buffers that hold its result.
-Stage HoldStage::makeHold(const vulkan::Device& device, const StateBuffers& state, bool grips) const {
+Stage HoldStage::makeHold(const vulkan::Device& device, const StateBuffers& state, bool grabs) const {
   return Stage(device,
                {.name = "hold_nodes",
                 .spirv = kernels::hold_nodes,
                 .bindings = {kTexels, kStorage, kTexels, kStorage, kStorage, kStorage},
                 .pushConstantBytes = sizeof(shared::HoldPush),
                 .workgroupSize = workgroupSize_,
-                .specialisation = {hasTethers_ ? 1u : 0u, grips ? 1u : 0u}},
-               {&grips_, &reports_, &tethers_.texels(), state.positions[1], state.velocities[1], &holds_},
-               {&grips_, &reports_, &tethers_.texels(), state.positions[0], state.velocities[0], &holds_});
+                .specialisation = {hasTethers_ ? 1u : 0u, grabs ? 1u : 0u}},
+               {&grabs_, &reports_, &tethers_.texels(), state.positions[1], state.velocities[1], &holds_},
+               {&grabs_, &reports_, &tethers_.texels(), state.positions[0], state.velocities[0], &holds_});
 }
 
 std::uint64_t HoldStage::invocations() const {
@@ -113,10 +113,10 @@ std::uint64_t HoldStage::invocations() const {
   return std::min<std::uint64_t>(nodeCount_, kMost);
 }
 
-void HoldStage::setSlack(std::span<const scene::Cloth> cloths) {
+void HoldStage::setSlack(std::span<const model::Cloth> cloths) {
   if (!hasTethers_) return;
   std::vector<float> longer;
-  for (const scene::Cloth& cloth : cloths) longer.push_back(1 + (cloth.tethers ? cloth.tethers->slack : 0));
+  for (const model::Cloth& cloth : cloths) longer.push_back(1 + (cloth.tethers ? cloth.tethers->slack : 0));
   if (longer == longer_) return;
   std::vector<shared::TetherRecord> tethers = restTethers_;
   std::size_t node = 0;
@@ -130,10 +130,10 @@ void HoldStage::setSlack(std::span<const scene::Cloth> cloths) {
   slackened_ = false;
 }
 
-void HoldStage::recordInputs(vulkan::Recorder& recorder, std::span<const scene::Pose> frames,
-                             std::span<const Grip> grips) {
+void HoldStage::recordInputs(vulkan::Recorder& recorder, std::span<const model::Pose> frames,
+                             std::span<const Grab> grabs) {
   assert(frames.empty() || frames.size() == startFrames_.size());
-  assert(grips.size() <= kMaxGrips);
+  assert(grabs.size() <= kMaxGrabs);
   if (!std::exchange(tabled_, true)) {
     attached_.recordUpload(recorder);
     recorder.fill(holds_, 0, holds_.bytes());
@@ -147,54 +147,54 @@ void HoldStage::recordInputs(vulkan::Recorder& recorder, std::span<const scene::
   for (std::size_t i = 0; i < startFrames_.size(); ++i)
     frameRecords[i] = frames.empty() ? startFrames_[i] : frameRecord(frames[i]);
   if (!startFrames_.empty()) recorder.copy(through, frames_, frames_.bytes());
-  gripCount_ = static_cast<std::uint32_t>(grips.size());
+  grabCount_ = static_cast<std::uint32_t>(grabs.size());
   takes_ = false;
-  if (grips.empty()) return;
-  for (std::size_t i = 0; i < grips.size(); ++i) {
-    const shared::GripRecord record = recordOf(grips[i]);
+  if (grabs.empty()) return;
+  for (std::size_t i = 0; i < grabs.size(); ++i) {
+    const shared::GrabRecord record = recordOf(grabs[i]);
     std::memcpy(through.mapped().data() + frames_.bytes() + i * sizeof(record), &record, sizeof(record));
-    if (grips[i].state != Grip::State::takes) continue;
+    if (grabs[i].state != Grab::State::takes) continue;
     takes_ = true;
-    const std::size_t report = i * sizeof(shared::GripReport);
-    recorder.fill(reports_, ~0u, sizeof(shared::uint32_t), report + offsetof(shared::GripReport, nearest));
-    recorder.fill(reports_, 0, sizeof(shared::GripReport) - offsetof(shared::GripReport, held),
-                  report + offsetof(shared::GripReport, held));
+    const std::size_t report = i * sizeof(shared::GrabReport);
+    recorder.fill(reports_, ~0u, sizeof(shared::uint32_t), report + offsetof(shared::GrabReport, nearest));
+    recorder.fill(reports_, 0, sizeof(shared::GrabReport) - offsetof(shared::GrabReport, held),
+                  report + offsetof(shared::GrabReport, held));
   }
-  recorder.copy(through, grips_, grips.size() * sizeof(shared::GripRecord), frames_.bytes());
+  recorder.copy(through, grabs_, grabs.size() * sizeof(shared::GrabRecord), frames_.bytes());
 }
 
 void HoldStage::recordAim(vulkan::Recorder& recorder, std::uint32_t present, float tickRate) {
   if (attachedCount_ > 0)
     recorder.dispatch(aim_.from[present],
-                      shared::AimPush{attachedCount_, tickRate, scene::kMaxAttachmentSpeed}, attachedCount_);
+                      shared::AimPush{attachedCount_, tickRate, model::kMaxAttachmentSpeed}, attachedCount_);
   if (!takes_) return;
-  recorder.dispatch(findNearest_.from[present], shared::GripPush{nodeCount_, gripCount_}, invocations());
+  recorder.dispatch(findNearest_.from[present], shared::GrabPush{nodeCount_, grabCount_}, invocations());
   recorder.barrier();
-  recorder.dispatch(takeHold_.from[present], shared::GripPush{nodeCount_, gripCount_}, invocations());
+  recorder.dispatch(takeHold_.from[present], shared::GrabPush{nodeCount_, grabCount_}, invocations());
 }
 
 void HoldStage::recordSubstep(vulkan::Recorder& recorder, std::uint32_t present, std::uint32_t substep,
                               std::uint32_t substeps, float tickRate) {
-  if (!hasTethers_ && gripCount_ == 0) return;
+  if (!hasTethers_ && grabCount_ == 0) return;
   const float rate = tickRate * static_cast<float>(substeps);
   recorder.barrier();
   recorder.dispatch(
-      (gripCount_ > 0 ? hold_ : tie_).from[present],
+      (grabCount_ > 0 ? hold_ : tie_).from[present],
       shared::HoldPush{.nodeCount = nodeCount_,
                        .progressBefore = static_cast<float>(substep) / static_cast<float>(substeps),
                        .progressAfter = static_cast<float>(substep + 1) / static_cast<float>(substeps),
                        .substepSeconds = 1 / rate,
                        .substepRate = rate,
-                       .caughtUp = scene::kCaughtUp},
+                       .caughtUp = model::kCaughtUp},
       invocations());
 }
 
 void HoldStage::recordReport(vulkan::Recorder& recorder) {
-  if (gripCount_ > 0) recorder.copy(reports_, readbacks_[slot_], gripCount_ * sizeof(shared::GripReport));
+  if (grabCount_ > 0) recorder.copy(reports_, readbacks_[slot_], grabCount_ * sizeof(shared::GrabReport));
 }
 
-std::span<const shared::GripReport> HoldStage::report() const {
-  return readbacks_[slot_].mapped<const shared::GripReport>().first(gripCount_);
+std::span<const shared::GrabReport> HoldStage::report() const {
+  return readbacks_[slot_].mapped<const shared::GrabReport>().first(grabCount_);
 }
 
 }  // namespace clothstream::simulation

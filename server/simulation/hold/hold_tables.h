@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include "server/scene/scene.h"
+#include "server/model/scene.h"
 #include "shaders/hold/hold.h"
 
 namespace clothstream::simulation {
@@ -18,8 +18,8 @@ struct HoldTables {
   bool empty() const { return attached.empty() && tethers.empty(); }
 };
 
-HoldTables holdTables(const scene::Scene& scene);
+HoldTables holdTables(const model::Scene& scene);
 
-shared::FrameRecord frameRecord(const scene::Pose& pose);
+shared::FrameRecord frameRecord(const model::Pose& pose);
 
 }  // namespace clothstream::simulation

@@ -39,16 +39,16 @@ std::size_t tableBytes(std::uint32_t cells) {
   return (std::size_t{cells} + cells / shared::kCellBlock + shared::kTableWords) * sizeof(std::uint32_t);
 }
 
-float reachOf(std::span<const scene::Cloth> cloths) {
+float reachOf(std::span<const model::Cloth> cloths) {
   float radius = 0;
-  for (const scene::Cloth& cloth : cloths)
+  for (const model::Cloth& cloth : cloths)
     if (cloth.selfCollision) radius = std::max(radius, cloth.selfCollision->radius);
   return 2 * radius;
 }
 
-bool hasSeveralMaterials(std::span<const scene::Cloth> cloths) {
-  const scene::SelfCollision* first = nullptr;
-  for (const scene::Cloth& cloth : cloths) {
+bool hasSeveralMaterials(std::span<const model::Cloth> cloths) {
+  const model::SelfCollision* first = nullptr;
+  for (const model::Cloth& cloth : cloths) {
     if (!cloth.selfCollision) continue;
     if (first == nullptr) first = &*cloth.selfCollision;
     if (first->radius != cloth.selfCollision->radius || first->friction != cloth.selfCollision->friction)
@@ -58,12 +58,12 @@ bool hasSeveralMaterials(std::span<const scene::Cloth> cloths) {
 }
 
 // Where each node is at rest, and cloth + 1; 0 of cloths without self-collision.
-void fillRests(const scene::Scene& scene, std::span<shared::vec4> rests) {
+void fillRests(const model::Scene& scene, std::span<shared::vec4> rests) {
   const NodeState state = restState(scene.cloths);
   std::size_t node = 0;
   for (std::size_t cloth = 0; cloth < scene.cloths.size(); ++cloth)
     for (std::uint32_t i = 0; i < scene.cloths[cloth].nodeCount(); ++i, ++node) {
-      const scene::Vec3& rest = state.positions[node];
+      const model::Vec3& rest = state.positions[node];
       const bool balls = scene.cloths[cloth].selfCollision.has_value();
       rests[node] = {rest.x(), rest.y(), rest.z(), balls ? static_cast<float>(cloth + 1) : 0.0f};
     }
@@ -71,11 +71,11 @@ void fillRests(const scene::Scene& scene, std::span<shared::vec4> rests) {
 
 }  // namespace
 
-bool SelfCollisionStage::isIn(const scene::Scene& scene) {
+bool SelfCollisionStage::isIn(const model::Scene& scene) {
   return std::ranges::any_of(scene.cloths, [](const auto& cloth) { return cloth.selfCollision.has_value(); });
 }
 
-SelfCollisionStage::SelfCollisionStage(const vulkan::Device& device, const scene::Scene& scene,
+SelfCollisionStage::SelfCollisionStage(const vulkan::Device& device, const model::Scene& scene,
                                        const StateBuffers& state, std::uint32_t workgroupSize)
     : device_(device),
       state_(state),
@@ -197,14 +197,14 @@ SelfCollisionStage::Contacts::Contacts(const vulkan::Device& device, const State
                                  state.positions[of], state.velocities[of], &state.toldContacts});
               }) {}
 
-void SelfCollisionStage::makeContacts(std::span<const scene::Cloth> cloths) {
+void SelfCollisionStage::makeContacts(std::span<const model::Cloth> cloths) {
   const bool several = hasSeveralMaterials(cloths);
   std::unique_ptr<Contacts>& kernels = contactKernels_[several ? 1 : 0];
   if (!kernels) kernels = std::make_unique<Contacts>(device_, state_, *this, several);
   several_ = several ? 1 : 0;
 }
 
-void SelfCollisionStage::setCloths(std::span<const scene::Cloth> cloths) {
+void SelfCollisionStage::setCloths(std::span<const model::Cloth> cloths) {
   makeContacts(cloths);
   reach_ = reachOf(cloths);
 }
@@ -221,7 +221,7 @@ void SelfCollisionStage::recordClear(vulkan::Recorder& recorder) const {
 void SelfCollisionStage::recordSubstep(vulkan::Recorder& recorder, std::uint32_t from, std::uint32_t index,
                                        const shared::CollisionPush& collision) const {
   if (index % interval_ == 0) recordNeighbours(recorder, 1 - from);
-  for (int i = 0; i < scene::kContactIterations; ++i) recordContacts(recorder, 1 - from, collision);
+  for (int i = 0; i < model::kContactIterations; ++i) recordContacts(recorder, 1 - from, collision);
 }
 
 void SelfCollisionStage::recordNeighbours(vulkan::Recorder& recorder, std::uint32_t state) const {
@@ -230,7 +230,7 @@ void SelfCollisionStage::recordNeighbours(vulkan::Recorder& recorder, std::uint3
       .cellCount = cellCount_,
       .aheadSeconds = kAhead * substepSeconds_ * static_cast<float>(interval_ - 1),
       .reach = reach_,
-      .restFactor = scene::kNeighbours};
+      .restFactor = model::kNeighbours};
   const auto dispatch = [&](const Kernel& kernel, std::uint64_t invocations) {
     recorder.barrier();
     recorder.dispatch(kernel.on[state], push, invocations);
@@ -250,8 +250,8 @@ void SelfCollisionStage::recordContacts(vulkan::Recorder& recorder, std::uint32_
   const shared::ContactPush push{.collision = collision,
                                  .nodeCount = nodeCount_,
                                  .substepSeconds = substepSeconds_,
-                                 .takenBack = scene::kOverlapTakenBack / substepSeconds_,
-                                 .pushOutSpeed = scene::kPushOutSpeed};
+                                 .takenBack = model::kOverlapTakenBack / substepSeconds_,
+                                 .pushOutSpeed = model::kPushOutSpeed};
   recorder.barrier();
   recorder.fill(groups_, 0, sizeof(std::uint32_t), offsetof(shared::ContactGroups, x));
   recorder.fill(groups_, 0, sizeof(std::uint32_t), offsetof(shared::ContactGroups, touching));

@@ -7,7 +7,7 @@
 #include <memory>
 #include <span>
 
-#include "server/scene/scene.h"
+#include "server/model/scene.h"
 #include "server/simulation/state_buffers.h"
 #include "server/vulkan/buffer.h"
 #include "server/vulkan/device.h"
@@ -27,13 +27,13 @@ class SelfCollisionStage {
  public:
   // Some cloth must have self-collision. `workgroupSize`: 0 for the measured best; the results do not depend
   // on it.
-  SelfCollisionStage(const vulkan::Device& device, const scene::Scene& scene, const StateBuffers& state,
+  SelfCollisionStage(const vulkan::Device& device, const model::Scene& scene, const StateBuffers& state,
                      std::uint32_t workgroupSize);
 
-  static bool isIn(const scene::Scene& scene);
+  static bool isIn(const model::Scene& scene);
 
   // Other radii and frictions for the cloths that have self-collision. No tick may be in flight.
-  void setCloths(std::span<const scene::Cloth> cloths);
+  void setCloths(std::span<const model::Cloth> cloths);
 
   // Its tables, once, before the first tick.
   void recordTables(vulkan::Recorder& recorder) const;
@@ -69,7 +69,7 @@ class SelfCollisionStage {
              bool several);
     Kernel count, resolve;
   };
-  void makeContacts(std::span<const scene::Cloth> cloths);
+  void makeContacts(std::span<const model::Cloth> cloths);
 
   void recordNeighbours(vulkan::Recorder& recorder, std::uint32_t state) const;
   void recordContacts(vulkan::Recorder& recorder, std::uint32_t state,

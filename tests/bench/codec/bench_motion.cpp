@@ -11,8 +11,8 @@
 
 #include "clients/files/motion_file.h"
 #include "server/messages/scene_file.h"
-#include "server/scene/mesh.h"
-#include "server/scene/stability.h"
+#include "server/model/mesh.h"
+#include "server/model/stability.h"
 #include "tests/bench/cloth_motion.h"
 #include "tests/bench/simulated.h"
 
@@ -54,15 +54,15 @@ BenchMotion played(const Named& named, const Settings& settings) {
 }
 
 // The same cloth of size x size nodes: held at the same places, its balls as large beside its meshes.
-void resize(scene::Cloth& cloth, std::uint32_t size) {
+void resize(model::Cloth& cloth, std::uint32_t size) {
   const auto coarser = [&] {
-    return std::max(scene::spacing(cloth.grid).column, scene::spacing(cloth.grid).row);
+    return std::max(model::spacing(cloth.grid).column, model::spacing(cloth.grid).row);
   };
   const float before = coarser();
   const auto scaled = [size](std::uint32_t place, std::uint32_t nodes) {
     return static_cast<std::uint32_t>(std::lround(1.0 * place * (size - 1) / (nodes - 1)));
   };
-  for (scene::GridRange& pins : cloth.pins) {
+  for (model::GridRange& pins : cloth.pins) {
     for (std::uint32_t* row : {&pins.firstRow, &pins.lastRow, &pins.rowStep})
       *row = scaled(*row, cloth.grid.rows);
     for (std::uint32_t* column : {&pins.firstColumn, &pins.lastColumn, &pins.columnStep})
@@ -74,15 +74,15 @@ void resize(scene::Cloth& cloth, std::uint32_t size) {
   if (cloth.selfCollision) cloth.selfCollision->radius *= coarser() / before;
 }
 
-scene::Scene sceneOf(const Named& named, const Settings& settings) {
+model::Scene sceneOf(const Named& named, const Settings& settings) {
   auto loaded = messages::loadScene(named.scene);
   if (!loaded) throw std::runtime_error(fmt::format("the scene {} is not there", named.scene));
-  scene::Scene scene = std::move(*loaded);
+  model::Scene scene = std::move(*loaded);
   scene.environment.wind *= named.wind;
   scene.environment.gust.strength *= named.gust;
-  scene::Cloth& cloth = scene.cloths.front();
+  model::Cloth& cloth = scene.cloths.front();
   if (!cloth.mesh) resize(cloth, settings.size.value_or(kDefaultSize));
-  const std::uint32_t substeps = scene::stableSubsteps(scene);
+  const std::uint32_t substeps = model::stableSubsteps(scene);
   if (substeps == 0)
     throw std::runtime_error(fmt::format("{} cannot be integrated at this size", named.name));
   scene.substeps = std::max(scene.substeps, substeps);
@@ -90,14 +90,14 @@ scene::Scene sceneOf(const Named& named, const Settings& settings) {
 }
 
 BenchMotion simulated(vulkan::Device& device, const Named& named, const Settings& settings) {
-  const scene::Scene scene = sceneOf(named, settings);
-  const scene::Cloth& cloth = scene.cloths.front();
+  const model::Scene scene = sceneOf(named, settings);
+  const model::Cloth& cloth = scene.cloths.front();
   codec::ClothLayout layout{cloth.nodeCount(), cloth.grid.rows, cloth.grid.columns, {}};
   if (cloth.mesh) {
     layout.rows = layout.columns = 0;
-    for (const scene::Triangle& triangle : cloth.mesh->shape.triangles)
+    for (const model::Triangle& triangle : cloth.mesh->shape.triangles)
       layout.triangles.insert(layout.triangles.end(), triangle.begin(), triangle.end());
-    for (const scene::Vec3& position : cloth.mesh->shape.positions)
+    for (const model::Vec3& position : cloth.mesh->shape.positions)
       layout.restPositions.insert(layout.restPositions.end(), {position.x(), position.y(), position.z()});
   }
   return {named.name, layout,

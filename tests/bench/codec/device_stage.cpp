@@ -11,7 +11,7 @@
 
 #include "proto/codec/decoder.h"
 #include "server/encode/frame_encoder.h"
-#include "server/scene/stability.h"
+#include "server/model/stability.h"
 #include "tests/bench/hung_cloth.h"
 #include "tests/bench/simulated.h"
 #include "tests/bench/suite.h"
@@ -31,7 +31,7 @@ void addTimes(nlohmann::ordered_json& row, const std::string& what, const Sample
   row[what + "MsP99"] = seconds.p99() * 1e3;
 }
 
-nlohmann::ordered_json measure(vulkan::Device& device, const scene::Scene& scene, codec::PacketKind kind,
+nlohmann::ordered_json measure(vulkan::Device& device, const model::Scene& scene, codec::PacketKind kind,
                                encode::Prediction prediction) {
   simulation::ClothSimulation simulation(device, scene);
   const codec::StreamLayout layout = encode::streamLayout(scene, 1);
@@ -88,15 +88,15 @@ nlohmann::ordered_json measure(vulkan::Device& device, const scene::Scene& scene
 
 Rows runCodecDevice(vulkan::Device& device, const Settings& settings) {
   Rows rows;
-  const std::pair<scene::Normals, encode::Prediction> ways[]{
-      {scene::Normals::none, encode::Prediction::onHost},
-      {scene::Normals::none, encode::Prediction::onDevice},
-      {scene::Normals::octahedral, encode::Prediction::onHost},
-      {scene::Normals::octahedral, encode::Prediction::onDevice}};
+  const std::pair<model::Normals, encode::Prediction> ways[]{
+      {model::Normals::none, encode::Prediction::onHost},
+      {model::Normals::none, encode::Prediction::onDevice},
+      {model::Normals::octahedral, encode::Prediction::onHost},
+      {model::Normals::octahedral, encode::Prediction::onDevice}};
   for (const auto& [normals, prediction] : ways) {
     for (const codec::PacketKind kind : {codec::PacketKind::predicted, codec::PacketKind::key}) {
-      scene::Scene scene = hungCloth(settings.size.value_or(100));
-      scene.substeps = std::max(scene.substeps, scene::stableSubsteps(scene));
+      model::Scene scene = hungCloth(settings.size.value_or(100));
+      scene.substeps = std::max(scene.substeps, model::stableSubsteps(scene));
       scene.stream.normals = normals;
       rows.push_back(measure(device, scene, kind, prediction));
       rows.back()["device"] = device.info().name;

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "server/scene/stability.h"
+#include "server/model/stability.h"
 #include "server/simulation/software_threads.h"
 #include "tests/bench/peers/bullet_cloth.h"
 #include "tests/bench/peers/peers.h"
@@ -17,11 +17,11 @@ constexpr std::uint32_t kFrames = 180;  // 3 s
 constexpr std::uint32_t kRate = 60;
 
 // The stiffest sheet that this many substeps carry: twelve equal springs a node.
-scene::Scene sheet(std::uint32_t size, std::uint32_t substeps) {
-  scene::Cloth cloth;
+model::Scene sheet(std::uint32_t size, std::uint32_t substeps) {
+  model::Cloth cloth;
   cloth.name = "sheet";
   cloth.grid = {.rows = size, .columns = size, .width = 1, .height = 1, .pose = {}};
-  cloth.grid.pose.orientation = scene::Quaternion(Eigen::AngleAxisf(-1.5707964f, scene::Vec3::UnitX()));
+  cloth.grid.pose.orientation = model::Quaternion(Eigen::AngleAxisf(-1.5707964f, model::Vec3::UnitX()));
   cloth.mass = 1;
   cloth.damping = 0.5f;
   cloth.pins = {{.firstRow = 0,
@@ -30,7 +30,7 @@ scene::Scene sheet(std::uint32_t size, std::uint32_t substeps) {
                  .firstColumn = 0,
                  .lastColumn = size - 1,
                  .columnStep = size - 1}};
-  scene::Scene scene;
+  model::Scene scene;
   scene.name = "sheet";
   scene.simulationRate = scene.streamRate = kRate;
   scene.substeps = substeps;
@@ -40,12 +40,12 @@ scene::Scene sheet(std::uint32_t size, std::uint32_t substeps) {
   const auto stiffness = static_cast<float>(0.16 * nodeMass / (h * h));
   cloth.structural = cloth.shear = cloth.bend = {stiffness, 0};
   scene.cloths = {cloth};
-  if (scene::stableSubsteps(scene) > substeps)
+  if (model::stableSubsteps(scene) > substeps)
     throw std::runtime_error("the sheet is too stiff for its substeps");
   return scene;
 }
 
-double meanStrain(const std::vector<scene::Vec3>& positions, std::uint32_t size) {
+double meanStrain(const std::vector<model::Vec3>& positions, std::uint32_t size) {
   const double rest = 1.0 / (size - 1);
   double sum = 0;
   const auto strain = [&](std::uint32_t a, std::uint32_t b) {
@@ -82,7 +82,7 @@ Rows compareMassSpring(const vulkan::DeviceOptions& options) {
     vulkan::Device device(simulation::suitedTo(size * size, options));
     const std::uint32_t substeps = size < 128 ? 24 : 32;
     BulletCloth bullet(size, kIterations);
-    const scene::Scene scene = sheet(size, substeps);
+    const model::Scene scene = sheet(size, substeps);
     Simulated ours(device, scene, {});
     const simulation::TickInputs inputs{scene.environment, {}};
     ours.check(inputs);

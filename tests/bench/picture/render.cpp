@@ -11,7 +11,7 @@
 namespace clothstream::bench {
 namespace {
 
-using scene::Vec3;
+using model::Vec3;
 
 constexpr std::uint32_t kSamples = 3;  // a pixel, each way
 constexpr int kShadowSize = 2048;

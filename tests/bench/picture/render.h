@@ -6,28 +6,28 @@
 #include <span>
 #include <vector>
 
-#include "server/scene/mesh.h"
-#include "server/scene/pose.h"
+#include "server/model/mesh.h"
+#include "server/model/pose.h"
 #include "tests/bench/picture/picture.h"
 
 namespace clothstream::bench {
 
 struct View {
-  scene::Vec3 eye, target;
+  model::Vec3 eye, target;
   float height;               // m that the picture shows at the target
   std::uint32_t width, rows;  // pixels
 };
 
 // Smooth, both sides drawn.
 struct Surface {
-  std::vector<scene::Vec3> positions;
-  std::vector<scene::Triangle> triangles;
-  scene::Vec3 front, back;  // colours, 0 to 1; front where triangles are counter-clockwise
+  std::vector<model::Vec3> positions;
+  std::vector<model::Triangle> triangles;
+  model::Vec3 front, back;  // colours, 0 to 1; front where triangles are counter-clockwise
   // One (u, v) a position; where there are any, a thin line is drawn at every whole number.
   std::vector<Eigen::Vector2f> lines;
 };
 
-Surface sphereSurface(const scene::Vec3& centre, float radius, const scene::Vec3& colour);
+Surface sphereSurface(const model::Vec3& centre, float radius, const model::Vec3& colour);
 
 Picture render(const View& view, std::span<const Surface> surfaces);
 

@@ -1,0 +1,205 @@
+// SPDX-License-Identifier: MIT
+// WebSockets, all of them on one thread.
+#include <atomic>
+#include <condition_variable>
+#include <deque>
+#include <mutex>
+#include <thread>
+#include <utility>
+
+#include <boost/asio/connect.hpp>
+#include <boost/asio/executor_work_guard.hpp>
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/post.hpp>
+#include <boost/beast/core/flat_buffer.hpp>
+#include <boost/beast/core/tcp_stream.hpp>
+#include <boost/beast/websocket/stream.hpp>
+
+#include "clients/load/link.h"
+
+namespace clothstream::load {
+namespace {
+
+namespace net = boost::asio;
+namespace beast = boost::beast;
+namespace websocket = beast::websocket;
+using beast::error_code;
+using net::ip::tcp;
+
+struct Address {
+  std::string host, port;
+
+  explicit Address(const std::string& text) {
+    const std::size_t colon = text.rfind(':');
+    host = text.substr(0, colon);
+    port = text.substr(colon + 1);
+    if (host.starts_with('[')) host = host.substr(1, host.size() - 2);
+  }
+};
+
+// All but the count of what is underway belongs to the links's thread.
+class WebLink final : public Link {
+ public:
+  WebLink(net::io_context& io, const Address& address, LinkListener& listener)
+      : io_(io), address_(address), listener_(listener), resolver_(io), stream_(io) {
+    post([this] { resolve(); });
+  }
+
+  void read() override {
+    post([this] {
+      wantsRead_ = true;
+      readNext();
+    });
+  }
+  void send(std::string message) override {
+    post([this, message = std::move(message)]() mutable {
+      if (leaving_ || ended_) return;
+      waiting_.push_back(std::move(message));
+      writeNext();
+    });
+  }
+  void leave() override {
+    post([this] {
+      leaving_ = true;
+      waiting_.resize(writing_ ? 1 : 0);
+      writeNext();
+    });
+  }
+  void drop() override {
+    post([this] {
+      end(net::error::operation_aborted);
+      dropped_ = true;
+    });
+    std::unique_lock lock(mutex_);
+    changed_.wait(lock, [&] { return gone_; });
+  }
+
+ private:
+  // Tasks and handlers count as underway until they have run: the link is there for them.
+  template <class Task>
+  void post(Task task) {
+    ++underway_;
+    net::post(io_, [this, task = std::move(task)]() mutable {
+      task();
+      finished();
+    });
+  }
+  template <class Handler>
+  auto tracked(Handler handler) {
+    ++underway_;
+    return [this, handler](error_code error, auto&&... rest) {
+      if (error)
+        end(error);
+      else if (!ended_)
+        handler(rest...);
+      finished();
+    };
+  }
+
+  void resolve() {
+    if (ended_) return;
+    resolver_.async_resolve(address_.host, address_.port,
+                            tracked([this](const tcp::resolver::results_type& found) { connect(found); }));
+  }
+  void connect(const tcp::resolver::results_type& found) {
+    stream_.next_layer().async_connect(found, tracked([this](auto&&...) { shakeHands(); }));
+  }
+  void shakeHands() {
+    stream_.next_layer().socket().set_option(tcp::no_delay(true));
+    stream_.binary(true);
+    stream_.read_message_max(0);
+    stream_.async_handshake(address_.host + ":" + address_.port, "/stream", tracked([this] {
+                              open_ = true;
+                              readNext();
+                              writeNext();
+                            }));
+  }
+  void readNext() {
+    if (!open_ || ended_ || reading_ || !wantsRead_) return;
+    reading_ = true;
+    wantsRead_ = false;
+    stream_.async_read(incoming_, tracked([this](std::size_t) {
+                         reading_ = false;
+                         const auto bytes = incoming_.cdata();
+                         listener_.received({static_cast<const std::byte*>(bytes.data()), bytes.size()});
+                         incoming_.clear();
+                       }));
+  }
+  void writeNext() {
+    if (!open_ || ended_ || writing_ || closing_) return;
+    if (waiting_.empty()) {
+      if (!leaving_) return;
+      closing_ = true;
+      // Reads go on until the server's own goodbye, which this waits for.
+      stream_.async_close(websocket::close_code::normal, tracked([this] { end({}); }));
+      return;
+    }
+    writing_ = true;
+    stream_.async_write(net::buffer(waiting_.front()), tracked([this](std::size_t) {
+                          writing_ = false;
+                          waiting_.pop_front();
+                          writeNext();
+                        }));
+  }
+
+  void end(error_code error) {
+    if (ended_) return;
+    ended_ = true;
+    why_ = error == websocket::error::closed ? std::string(stream_.reason().reason.c_str()) : error.message();
+    resolver_.cancel();
+    stream_.next_layer().close();
+  }
+  void finished() {
+    if (--underway_ > 0 || !ended_) return;
+    if (!std::exchange(toldClosed_, true)) listener_.closed(why_);
+    if (!dropped_) return;
+    const std::lock_guard lock(mutex_);
+    gone_ = true;
+    changed_.notify_all();
+  }
+
+  net::io_context& io_;
+  const Address address_;
+  LinkListener& listener_;
+  tcp::resolver resolver_;
+  websocket::stream<beast::tcp_stream> stream_;
+  beast::flat_buffer incoming_;
+  std::deque<std::string> waiting_;
+  std::string why_;
+  std::atomic<int> underway_ = 0;
+  bool open_ = false, reading_ = false, writing_ = false, wantsRead_ = false;
+  bool leaving_ = false, closing_ = false;
+  bool ended_ = false, toldClosed_ = false, dropped_ = false;
+
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  bool gone_ = false;  // guarded by the mutex
+};
+
+class WebLinks final : public Links {
+ public:
+  explicit WebLinks(const std::string& address)
+      : address_(address), work_(net::make_work_guard(io_)), thread_([this] { io_.run(); }) {}
+  ~WebLinks() override {
+    work_.reset();
+    thread_.join();
+  }
+  std::unique_ptr<Link> open(LinkListener& listener) override {
+    return std::make_unique<WebLink>(io_, address_, listener);
+  }
+
+ private:
+  const Address address_;
+  net::io_context io_;
+  net::executor_work_guard<net::io_context::executor_type> work_;
+  std::thread thread_;
+};
+
+}  // namespace
+
+std::unique_ptr<Links> makeWebLinks(const std::string& address) {
+  return std::make_unique<WebLinks>(address);
+}
+
+}  // namespace clothstream::load

@@ -1,0 +1,163 @@
+// SPDX-License-Identifier: MIT
+#include "server/endpoint/grpc/grpc_endpoint.h"
+
+#include <cerrno>
+#include <chrono>
+#include <cstring>
+#include <functional>
+#include <future>
+#include <memory>
+#include <optional>
+#include <stdexcept>
+#include <utility>
+
+#include <absl/synchronization/mutex.h>
+#include <boost/asio/thread_pool.hpp>
+#include <fmt/format.h>
+#include <grpc/compression.h>
+#include <grpcpp/ext/proto_server_reflection_plugin.h>
+#include <grpcpp/resource_quota.h>
+#include <grpcpp/security/server_credentials.h>
+#include <grpcpp/server.h>
+#include <grpcpp/server_builder.h>
+#include <netdb.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include "server/endpoint/grpc/call.h"
+#include "server/endpoint/grpc/health.h"
+#include "server/endpoint/grpc/service.h"
+#include "server/stream/connection.h"
+
+namespace clothstream::endpoint {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr auto kStopTimeout = 1s;
+// A ping after 2 s without a byte, 2 s for its answer: a peer that vanished is found within 5 s.
+constexpr int kPingAfterMs = 2000;
+constexpr int kPingTimeoutMs = 2000;
+constexpr int kClientPingsAtMostEveryMs = 1000;
+constexpr int kUnusedConnectionMs = 300'000;
+constexpr std::size_t kMemory = std::size_t{256} << 20;
+constexpr int kMaxThreads = 16;
+constexpr int kStreamsAConnection = 64;
+
+void configure(grpc::ServerBuilder& builder) {
+  // Debian's library is built to look for deadlocks of gRPC's own locks, which takes some 4 % of a busy
+  // process.
+  absl::SetMutexDeadlockDetectionMode(absl::OnDeadlockCycle::kIgnore);
+  // Otherwise a second server would share the port, and each would get half of the clients.
+  builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
+  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, kPingAfterMs);
+  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, kPingTimeoutMs);
+  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_PERMIT_WITHOUT_CALLS, 1);
+  builder.AddChannelArgument(GRPC_ARG_HTTP2_MAX_PINGS_WITHOUT_DATA, 0);
+  builder.AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS,
+                             kClientPingsAtMostEveryMs);
+  builder.AddChannelArgument(GRPC_ARG_MAX_CONNECTION_IDLE_MS, kUnusedConnectionMs);
+  builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS, kStreamsAConnection);
+  // A write counts as done when the transport has passed it on, not when it lies in a buffer in front of it.
+  builder.AddChannelArgument(GRPC_ARG_HTTP2_WRITE_BUFFER_SIZE, 1);
+  builder.SetMaxReceiveMessageSize(static_cast<int>(stream::kMaxClientMessageBytes));
+  builder.SetMaxSendMessageSize(-1);
+  // Frames are compressed already, and a small compressed message could stand for a large one.
+  builder.SetCompressionAlgorithmSupportStatus(GRPC_COMPRESS_DEFLATE, false);
+  builder.SetCompressionAlgorithmSupportStatus(GRPC_COMPRESS_GZIP, false);
+  grpc::ResourceQuota quota("clothstream");
+  quota.Resize(kMemory).SetMaxThreads(kMaxThreads);
+  builder.SetResourceQuota(quota);
+}
+
+// gRPC says only that it does not listen; binding once more says why.
+std::string whyNotListening(const std::string& host, std::uint16_t port) {
+  const addrinfo hints{AI_PASSIVE, AF_UNSPEC, SOCK_STREAM, 0, 0, nullptr, nullptr, nullptr};
+  addrinfo* found = nullptr;
+  if (const int error = ::getaddrinfo(host.c_str(), std::to_string(port).c_str(), &hints, &found); error != 0)
+    return fmt::format("cannot listen on host '{}': {}", host, ::gai_strerror(error));
+  const int probe = ::socket(found->ai_family, found->ai_socktype, found->ai_protocol);
+  const int error = ::bind(probe, found->ai_addr, found->ai_addrlen) == 0 ? EADDRINUSE : errno;
+  ::close(probe);
+  ::freeaddrinfo(found);
+  if (error == EADDRINUSE)
+    return fmt::format("port {} on {} is already in use: choose another with --grpc-port", port, host);
+  return fmt::format("cannot listen on port {} of {}: {}", port, host, std::strerror(error));
+}
+
+std::string addressOf(const std::string& host, std::uint16_t port) {
+  const bool isIpv6 = host.find(':') != std::string::npos;
+  return isIpv6 ? fmt::format("[{}]:{}", host, port) : fmt::format("{}:{}", host, port);
+}
+
+}  // namespace
+
+struct GrpcEndpoint::State {
+  Service service;
+  HealthService health;
+  int port = 0;
+  std::unique_ptr<grpc::Server> server;
+  std::optional<EndpointContext> context;
+  boost::asio::thread_pool questions{1};  // those that take longer than a frame may wait
+
+  State(stream::SceneServer& scenes, const GrpcEndpointOptions& options) {
+    grpc::reflection::InitProtoReflectionServerBuilderPlugin();
+    grpc::ServerBuilder builder;
+    configure(builder);
+    builder.AddListeningPort(addressOf(options.host, options.port), grpc::InsecureServerCredentials(), &port);
+    builder.RegisterService(&service);
+    builder.RegisterService(&health);
+    const auto loop = std::make_shared<CompletionLoop>(builder.AddCompletionQueue());
+    server = builder.BuildAndStart();
+    if (!server || port == 0) throw std::runtime_error(whyNotListening(options.host, options.port));
+    context.emplace(EndpointContext{scenes, loop, options.maxStreams});
+    offerService(*context, service, questions);
+    offerHealth(*context, health);
+    loop->start();
+  }
+
+  ~State() {
+    if (!context) return;
+    const auto deadline = std::chrono::system_clock::now() + kStopTimeout;
+    context->loop->post([this] { stopCalls(); });
+    // gRPC closes a connection when its client has answered a ping and no call is left on it. Only a ping
+    // that comes after the calls' last bytes keeps the connection until the client has them.
+    when([this] { return context->callsMade == 0; }).wait_until(deadline);
+    server->Shutdown(deadline + kStopTimeout);
+    server->Wait();
+    // The connections are gone; of the calls the loop may still have to hear.
+    when([this] { return context->calls.empty(); }).wait();
+    context->loop->stop();
+    questions.join();
+  }
+
+  // Ready when it holds. Asked on the loop's thread, at once and after each call; the next one takes its
+  // place.
+  std::future<void> when(std::function<bool()> holds) {
+    auto reached = std::make_shared<std::promise<void>>();
+    std::future<void> future = reached->get_future();
+    context->loop->post([this, reached = std::move(reached), holds = std::move(holds)]() mutable {
+      context->onForgotten = [reached = std::move(reached), holds = std::move(holds)]() mutable {
+        if (reached && holds()) std::exchange(reached, nullptr)->set_value();
+      };
+      context->onForgotten();
+    });
+    return future;
+  }
+
+  void stopCalls() {
+    context->refusal = {grpc::StatusCode::UNAVAILABLE, "the server is stopping"};
+    for (const auto& call : context->calls) call->stop(context->refusal);
+  }
+};
+
+GrpcEndpoint::GrpcEndpoint(stream::SceneServer& server, const GrpcEndpointOptions& options)
+    : state_(std::make_unique<State>(server, options)) {}
+
+GrpcEndpoint::~GrpcEndpoint() = default;
+
+std::uint16_t GrpcEndpoint::port() const {
+  return static_cast<std::uint16_t>(state_->port);
+}
+
+}  // namespace clothstream::endpoint

@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: MIT
+#include "server/endpoint/grpc/join_stream.h"
+
+#include <atomic>
+#include <chrono>
+#include <span>
+#include <utility>
+
+#include "server/endpoint/grpc/status.h"
+
+namespace clothstream::endpoint {
+namespace {
+
+// A view of the message that keeps it alive for as long as gRPC holds the slice.
+grpc::ByteBuffer sharedBuffer(const stream::SharedBytes& message) {
+  // gRPC takes bytes as mutable, and never writes to them.
+  void* const bytes = const_cast<std::byte*>(message->data());
+  const grpc::Slice slice(
+      bytes, message->size(), [](void* owner) { delete static_cast<stream::SharedBytes*>(owner); },
+      new stream::SharedBytes(message));
+  return grpc::ByteBuffer(&slice, 1);
+}
+
+// A peer that does not read keeps a write under way for ever.
+constexpr std::chrono::seconds kLastWriteTimeout{1};
+
+grpc::Status cancelled() {
+  return {grpc::StatusCode::CANCELLED, "the client went away"};
+}
+
+}  // namespace
+
+void JoinStream::await() {
+  context_.AsyncNotifyWhenDone(&ended_);
+  service_.RequestJoin(&context_, &io_, &endpoint_.loop->queue(), &endpoint_.loop->queue(), begin(begun_));
+}
+
+void JoinStream::onBegun(bool ok) {
+  if (!ok) return over();
+  made();
+  begin(ended_);
+  endpoint::await<JoinStream>(endpoint_, service_);
+  if (!endpoint_.refusal.ok()) return finish(endpoint_.refusal);
+  if (endpoint_.streams >= endpoint_.maxStreams)
+    return finish(
+        {grpc::StatusCode::RESOURCE_EXHAUSTED, "the server has all the streams it takes; try again later"});
+  ++endpoint_.streams;
+  isCounted_ = true;
+  // Called from any thread, so it must not own the stream: whoever drops the last owner inside a wake would
+  // wait in the connection's destructor for that wake to return.
+  std::weak_ptr<JoinStream> weak = std::static_pointer_cast<JoinStream>(shared_from_this());
+  auto wake = [&loop = *endpoint_.loop, weak, posted = std::make_shared<std::atomic<bool>>(false)] {
+    if (posted->exchange(true)) return;
+    loop.post([weak, posted] {
+      posted->store(false);
+      if (const auto self = weak.lock()) self->pump();
+    });
+  };
+  connection_ =
+      std::make_unique<stream::Connection>(endpoint_.server, "grpc " + context_.peer(), std::move(wake));
+  read();
+  pump();
+}
+
+void JoinStream::read() {
+  io_.Read(&incoming_, begin(read_));
+}
+
+void JoinStream::onRead(bool ok) {
+  if (!connection_) return;
+  if (!ok) {
+    parting_ = std::move(connection_);
+    return finish(grpc::Status::OK);
+  }
+  grpc::Slice bytes;
+  if (!incoming_.DumpToSingleSlice(&bytes).ok())
+    return finish({grpc::StatusCode::INTERNAL, "the message could not be read"});
+  connection_->receive(std::as_bytes(std::span(bytes.begin(), bytes.size())));
+  read();
+}
+
+void JoinStream::pump() {
+  if (!connection_) return;
+  const bool finished = connection_->finished();  // asked first: what came before it is still to be written
+  if (isWriting_) {
+    if (finished) cancelSoon();
+  } else if (std::optional<stream::SharedBytes> message = connection_->next()) {
+    lastMessage_ = std::move(*message);
+    isWriting_ = true;
+    io_.Write(sharedBuffer(lastMessage_), begin(written_));
+  } else if (finished) {
+    finish(closingStatus(lastMessage_));
+  }
+}
+
+void JoinStream::onWritten(bool ok) {
+  isWriting_ = false;
+  if (hasEnded_) return;
+  if (closing_)
+    io_.Finish(*closing_, begin(finished_));
+  else if (ok)
+    pump();
+  else
+    finish(cancelled());
+}
+
+void JoinStream::finish(const grpc::Status& status) {
+  if (closing_) return;
+  closing_ = status;
+  connection_.reset();
+  if (hasEnded_) return;
+  if (isWriting_)
+    cancelSoon();
+  else
+    io_.Finish(status, begin(finished_));
+}
+
+void JoinStream::cancelSoon() {
+  if (cancellation_) return;
+  cancellation_.emplace();
+  cancellation_->Set(&endpoint_.loop->queue(), std::chrono::system_clock::now() + kLastWriteTimeout,
+                     begin(lateForEnd_));
+}
+
+void JoinStream::onLateForEnd(bool expired) {
+  if (expired && isWriting_) context_.TryCancel();
+}
+
+void JoinStream::onEnded(bool) {
+  hasEnded_ = true;
+  if (isCounted_) --endpoint_.streams;
+  if (cancellation_) cancellation_->Cancel();
+  if (parting_ && !context_.IsCancelled()) parting_->leave();
+  parting_.reset();
+  finish(cancelled());
+  over();
+}
+
+void JoinStream::close(const grpc::Status& status) {
+  // Of one that is finished the last message may still be to be written, and says more.
+  if (connection_ && connection_->finished())
+    pump();
+  else
+    finish(status);
+}
+
+}  // namespace clothstream::endpoint

@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: MIT
+#include "server/endpoint/grpc/status.h"
+
+namespace clothstream::endpoint {
+namespace {
+
+grpc::StatusCode codeOf(v1::ErrorCode code) {
+  switch (code) {
+    case v1::ERROR_CODE_MALFORMED_MESSAGE:
+    case v1::ERROR_CODE_INVALID_ARGUMENT:
+      return grpc::StatusCode::INVALID_ARGUMENT;
+    case v1::ERROR_CODE_NOT_FOUND:
+      return grpc::StatusCode::NOT_FOUND;
+    case v1::ERROR_CODE_UNSUPPORTED_VERSION:
+    case v1::ERROR_CODE_UNSUPPORTED_CODEC:
+      return grpc::StatusCode::UNIMPLEMENTED;
+    case v1::ERROR_CODE_RATE_LIMITED:
+    case v1::ERROR_CODE_RESOURCE_EXHAUSTED:
+      return grpc::StatusCode::RESOURCE_EXHAUSTED;
+    case v1::ERROR_CODE_OUT_OF_ORDER:
+      return grpc::StatusCode::FAILED_PRECONDITION;
+    case v1::ERROR_CODE_PERMISSION_DENIED:
+    case v1::ERROR_CODE_REMOVED:
+      return grpc::StatusCode::PERMISSION_DENIED;
+    case v1::ERROR_CODE_CUT_OFF:
+      return grpc::StatusCode::UNAVAILABLE;
+    case v1::ERROR_CODE_TAKEN_OVER:
+      return grpc::StatusCode::ABORTED;
+    default:
+      return grpc::StatusCode::UNKNOWN;
+  }
+}
+
+}  // namespace
+
+grpc::Status statusOf(const v1::Error& error) {
+  return {codeOf(error.code()), error.text()};
+}
+
+grpc::Status closingStatus(const stream::SharedBytes& lastMessage) {
+  v1::ServerMessage message;
+  if (lastMessage && message.ParseFromArray(lastMessage->data(), static_cast<int>(lastMessage->size()))) {
+    if (message.error().fatal()) return statusOf(message.error());
+    if (message.notice().kind() == v1::NOTICE_KIND_SCENE_DELETED)
+      return {grpc::StatusCode::NOT_FOUND, message.notice().text()};
+  }
+  return {grpc::StatusCode::UNAVAILABLE, "the server is stopping"};
+}
+
+}  // namespace clothstream::endpoint

@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: MIT
+// The protocol's errors as gRPC statuses.
+#pragma once
+
+#include <grpcpp/support/status.h>
+
+#include "clothstream/v1/session.pb.h"
+#include "server/stream/connection.h"
+
+namespace clothstream::endpoint {
+
+grpc::Status statusOf(const v1::Error& error);
+
+// Why a finished connection ends is what was said last: a fatal Error, that the scene was deleted, or else
+// that the server stops.
+grpc::Status closingStatus(const stream::SharedBytes& lastMessage);
+
+}  // namespace clothstream::endpoint

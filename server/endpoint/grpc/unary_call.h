@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: MIT
+// A call with one question and one answer.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <optional>
+#include <utility>
+
+#include <grpcpp/support/async_unary_call.h>
+#include <tl/expected.hpp>
+
+#include "clothstream/v1/session.pb.h"
+#include "server/endpoint/grpc/call.h"
+#include "server/endpoint/grpc/status.h"
+
+namespace clothstream::endpoint {
+
+template <typename Request, typename Response>
+class UnaryCall final : public Call {
+ public:
+  using Writer = grpc::ServerAsyncResponseWriter<Response>;
+  // gRPC's way to ask for the next call of this method.
+  using Take = std::function<void(grpc::ServerContext*, Request*, Writer*, grpc::CompletionQueue*,
+                                  grpc::ServerCompletionQueue*, void*)>;
+  // May be called from any thread, once, whenever it suits.
+  using Answer = std::function<void(tl::expected<Response, v1::Error>)>;
+  using Handler = std::function<void(const Request&, Answer)>;
+
+  UnaryCall(EndpointContext& endpoint, Take take, Handler handler)
+      : Call(endpoint), take_(std::move(take)), handler_(std::move(handler)) {}
+
+  void await() {
+    take_(&context_, &request_, &writer_, &endpoint_.loop->queue(), &endpoint_.loop->queue(), begin(begun_));
+  }
+
+ private:
+  void onBegun(bool ok) {
+    if (!ok) return over();
+    endpoint::await<UnaryCall>(endpoint_, take_, handler_);
+    made();
+    if (!endpoint_.refusal.ok()) return finish(endpoint_.refusal);
+    std::weak_ptr<UnaryCall> weak = std::static_pointer_cast<UnaryCall>(shared_from_this());
+    handler_(request_,
+             [weak = std::move(weak), loop = endpoint_.loop](tl::expected<Response, v1::Error> answer) {
+               loop->post([weak, answer = std::move(answer)]() mutable {
+                 const auto self = weak.lock();
+                 if (!self) return;
+                 if (answer) self->response_ = std::move(*answer);
+                 self->finish(answer ? grpc::Status::OK : statusOf(answer.error()));
+               });
+             });
+  }
+  void onFinished(bool) { over(); }
+  void close(const grpc::Status& status) override { finish(status); }
+
+  void finish(const grpc::Status& status) {
+    if (std::exchange(isFinishing_, true)) return;
+    if (status.ok())
+      writer_.Finish(response_, status, begin(finished_));
+    else
+      writer_.FinishWithError(status, begin(finished_));
+  }
+
+  const Take take_;
+  const Handler handler_;
+  Request request_;
+  Response response_;
+  Writer writer_{&context_};
+  bool isFinishing_ = false;
+  Step<UnaryCall> begun_{*this, &UnaryCall::onBegun}, finished_{*this, &UnaryCall::onFinished};
+};
+
+// Waits for calls of a method of `service`, for as long as the endpoint is open: `take` is its Request... .
+template <typename Service, typename Method, typename Request, typename Response, typename Handler>
+void offer(EndpointContext& endpoint, Service& service,
+           void (Method::*take)(grpc::ServerContext*, Request*, grpc::ServerAsyncResponseWriter<Response>*,
+                                grpc::CompletionQueue*, grpc::ServerCompletionQueue*, void*),
+           Handler handler) {
+  await<UnaryCall<Request, Response>>(endpoint, std::bind_front(take, &service), std::move(handler));
+}
+
+}  // namespace clothstream::endpoint

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: MIT
+// What the sessions of one endpoint share; the endpoint's io thread alone touches it.
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <string>
+#include <unordered_set>
+#include <vector>
+
+#include <boost/asio/io_context.hpp>
+
+#include "server/endpoint/web/page.h"
+
+namespace clothstream::stream {
+class SceneServer;
+}
+
+namespace clothstream::endpoint {
+
+class StreamSession;
+
+struct EndpointContext {
+  stream::SceneServer& server;
+  boost::asio::io_context& io;
+  const Page page;
+  const std::vector<std::string> allowedOrigins;
+  const std::size_t maxConnections;
+  std::size_t connections = 0;
+  std::unordered_set<std::shared_ptr<StreamSession>> streams;
+  bool stopping = false;
+};
+
+// Counts one connection as long as it lives; handed on when HTTP becomes WebSocket.
+class ConnectionSlot {
+ public:
+  explicit ConnectionSlot(EndpointContext& endpoint) : endpoint_(endpoint) { ++endpoint_.connections; }
+  ~ConnectionSlot() { --endpoint_.connections; }
+  ConnectionSlot(const ConnectionSlot&) = delete;
+  ConnectionSlot& operator=(const ConnectionSlot&) = delete;
+
+ private:
+  EndpointContext& endpoint_;
+};
+
+}  // namespace clothstream::endpoint

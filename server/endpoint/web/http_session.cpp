@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: MIT
+#include "server/endpoint/web/http_session.h"
+
+#include <algorithm>
+#include <chrono>
+#include <utility>
+
+#include <boost/beast/http/read.hpp>
+#include <boost/beast/http/write.hpp>
+#include <boost/beast/websocket/rfc6455.hpp>
+
+#include "server/endpoint/web/stream_session.h"
+
+namespace clothstream::endpoint {
+namespace {
+
+namespace beast = boost::beast;
+namespace http = beast::http;
+using namespace std::chrono_literals;
+
+constexpr auto kRequestTimeout = 5s;    // for a whole header, and between requests
+constexpr auto kResponseTimeout = 30s;  // for a file over a thin line
+constexpr auto kDrainTimeout = 1s;
+
+std::string_view view(beast::string_view text) {
+  return {text.data(), text.size()};
+}
+
+template <class Request>
+auto plainAnswer(const Request& request, http::status status, std::string_view text) {
+  http::response<http::span_body<const char>> response{status, request.version()};
+  response.set(http::field::content_type, "text/plain; charset=utf-8");
+  response.set(http::field::cache_control, "no-store");
+  response.keep_alive(request.keep_alive());
+  response.body() = {text.data(), text.size()};
+  return response;
+}
+
+// Browsers name the page that opens a WebSocket; whoever does not is no browser, and could claim anything.
+template <class Request>
+bool originAllowed(const Request& request, const std::vector<std::string>& allowed) {
+  const auto field = request.find(http::field::origin);
+  if (field == request.end()) return true;
+  const std::string_view origin = view(field->value());
+  const auto matches = [&](const std::string& entry) {
+    return entry == "*" || beast::iequals(entry, field->value());
+  };
+  if (std::any_of(allowed.begin(), allowed.end(), matches)) return true;
+  const std::size_t scheme = origin.find("://");
+  if (scheme == std::string_view::npos) return false;
+  const std::string_view authority = origin.substr(scheme + 3);
+  return beast::iequals({authority.data(), authority.size()}, request[http::field::host]);
+}
+
+}  // namespace
+
+HttpSession::HttpSession(boost::asio::ip::tcp::socket&& socket, EndpointContext& endpoint)
+    : endpoint_(endpoint),
+      slot_(std::make_unique<ConnectionSlot>(endpoint)),
+      beyondLimit_(endpoint.connections > endpoint.maxConnections),
+      socket_(std::move(socket)) {}
+
+void HttpSession::read() {
+  parser_.emplace();
+  parser_->header_limit(kMaxHeaderBytes);
+  socket_.expires_after(kRequestTimeout);
+  http::async_read_header(
+      socket_, buffer_, *parser_,
+      [self = shared_from_this()](beast::error_code error, std::size_t) { self->onHeader(error); });
+}
+
+void HttpSession::onHeader(beast::error_code error) {
+  const auto refuse = [this](http::status status, std::string_view text) {
+    Response response = plainAnswer(parser_->get(), status, text);
+    response.keep_alive(false);
+    write(std::move(response));
+  };
+  if (error == http::error::header_limit || error == http::error::buffer_overflow)
+    return refuse(http::status::request_header_fields_too_large, "The header is larger than 16 KiB.\n");
+  // Everything else that http::error names is a malformed request, save a connection that ends between two of
+  // them.
+  if (error.category() == http::make_error_code(http::error::end_of_stream).category() &&
+      error != http::error::end_of_stream && error != http::error::partial_message)
+    return refuse(http::status::bad_request, "This is no HTTP request.\n");
+  if (error) return;
+  if (beyondLimit_)
+    return refuse(http::status::service_unavailable,
+                  "The server has all the connections it takes; try again later.\n");
+  if (parser_->chunked() || parser_->content_length().value_or(0) > 0)
+    return refuse(http::status::payload_too_large, "Requests have no body here.\n");
+  const std::string_view target = view(parser_->get().target());
+  if (target.substr(0, target.find('?')) == "/stream") return answerStream(parser_->get());
+  write(answer(parser_->get()));
+}
+
+void HttpSession::answerStream(const Request& request) {
+  if (!beast::websocket::is_upgrade(request)) {
+    Response response = plainAnswer(request, http::status::upgrade_required, "/stream is a WebSocket.\n");
+    response.set(http::field::upgrade, "websocket");
+    return write(std::move(response));
+  }
+  if (!originAllowed(request, endpoint_.allowedOrigins)) {
+    return write(plainAnswer(request, http::status::forbidden,
+                             "Pages of this origin may not open /stream; --allow-origin lets them.\n"));
+  }
+  socket_.expires_never();  // the WebSocket has time-outs of its own
+  std::make_shared<StreamSession>(std::move(socket_), endpoint_, std::move(slot_))
+      ->accept(parser_->release());
+}
+
+HttpSession::Response HttpSession::answer(const Request& request) const {
+  if (request.method() != http::verb::get && request.method() != http::verb::head) {
+    Response response =
+        plainAnswer(request, http::status::method_not_allowed, "GET and HEAD are what there is.\n");
+    response.set(http::field::allow, "GET, HEAD");
+    return response;
+  }
+  const std::string_view target = view(request.target());
+  if (target == "/healthz") return plainAnswer(request, http::status::ok, "ok");
+  if (const PageFile* file = endpoint_.page.find(target)) return answerFile(request, *file);
+  return plainAnswer(request, http::status::not_found,
+                     endpoint_.page.empty() ? "This server was started without a page; /stream is open.\n"
+                                            : "There is no such page here.\n");
+}
+
+HttpSession::Response HttpSession::answerFile(const Request& request, const PageFile& file) const {
+  const bool known = view(request[http::field::if_none_match]).find(file.entityTag) != std::string_view::npos;
+  Response response{known ? http::status::not_modified : http::status::ok, request.version()};
+  // Names of files stay the same from build to build: a browser may keep a file, but asks whether it is still
+  // right.
+  response.set(http::field::cache_control, "no-cache");
+  response.set(http::field::etag, file.entityTag);
+  response.set(http::field::content_type,
+               beast::string_view(file.contentType.data(), file.contentType.size()));
+  response.set("X-Content-Type-Options", "nosniff");
+  response.keep_alive(request.keep_alive());
+  if (!known) response.body() = {file.content.data(), file.content.size()};
+  return response;
+}
+
+void HttpSession::write(Response&& response) {
+  response_ = std::move(response);
+  response_.set(http::field::server, "clothstream");
+  if (response_.result() != http::status::not_modified) response_.content_length(response_.body().size());
+  if (parser_->get().method() == http::verb::head) response_.body() = {};
+  socket_.expires_after(kResponseTimeout);
+  http::async_write(socket_, response_, [self = shared_from_this()](beast::error_code error, std::size_t) {
+    self->onWritten(error);
+  });
+}
+
+void HttpSession::onWritten(beast::error_code error) {
+  if (error) return;
+  if (response_.keep_alive()) return read();
+  socket_.socket().shutdown(boost::asio::ip::tcp::socket::shutdown_send, error);
+  socket_.expires_after(kDrainTimeout);
+  drain();
+}
+
+// A socket that is closed with bytes unread is reset, and the reset may overtake the answer.
+void HttpSession::drain() {
+  buffer_.clear();
+  socket_.async_read_some(buffer_.prepare(kMaxHeaderBytes),
+                          [self = shared_from_this()](beast::error_code error, std::size_t) {
+                            if (!error) self->drain();
+                          });
+}
+
+}  // namespace clothstream::endpoint

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: MIT
+// One HTTP connection: answers requests for the page until it closes, idles, or becomes a WebSocket.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string_view>
+
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/beast/core/flat_buffer.hpp>
+#include <boost/beast/core/tcp_stream.hpp>
+#include <boost/beast/http/empty_body.hpp>
+#include <boost/beast/http/message.hpp>
+#include <boost/beast/http/parser.hpp>
+#include <boost/beast/http/span_body.hpp>
+
+#include "server/endpoint/web/endpoint_context.h"
+
+namespace clothstream::endpoint {
+
+inline constexpr std::size_t kMaxHeaderBytes = 16 * 1024;
+
+// Lives as long as an operation of its socket is pending. All on the io thread.
+class HttpSession : public std::enable_shared_from_this<HttpSession> {
+ public:
+  HttpSession(boost::asio::ip::tcp::socket&& socket, EndpointContext& endpoint);
+
+  void read();
+
+ private:
+  using Request = boost::beast::http::request<boost::beast::http::empty_body>;
+  using Response = boost::beast::http::response<boost::beast::http::span_body<const char>>;
+
+  void onHeader(boost::beast::error_code error);
+  void answerStream(const Request& request);
+  Response answer(const Request& request) const;
+  Response answerFile(const Request& request, const PageFile& file) const;
+  void write(Response&& response);
+  void onWritten(boost::beast::error_code error);
+  void drain();
+
+  EndpointContext& endpoint_;
+  std::unique_ptr<ConnectionSlot> slot_;
+  const bool beyondLimit_;
+  boost::beast::tcp_stream socket_;
+  boost::beast::flat_buffer buffer_{kMaxHeaderBytes};
+  std::optional<boost::beast::http::request_parser<boost::beast::http::empty_body>> parser_;
+  Response response_;
+};
+
+}  // namespace clothstream::endpoint

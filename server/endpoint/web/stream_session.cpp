@@ -1,0 +1,167 @@
+// SPDX-License-Identifier: MIT
+#include "server/endpoint/web/stream_session.h"
+
+#include <algorithm>
+#include <chrono>
+#include <string_view>
+#include <utility>
+
+#include <boost/asio/buffer.hpp>
+#include <boost/asio/post.hpp>
+#include <boost/beast/http/rfc7230.hpp>
+#include <fmt/format.h>
+
+#include "clothstream/v1/session.pb.h"
+
+namespace clothstream::endpoint {
+namespace {
+
+namespace beast = boost::beast;
+namespace http = beast::http;
+namespace ws = beast::websocket;
+using namespace std::chrono_literals;
+
+constexpr const char* kSubprotocol = "clothstream.v1";
+constexpr auto kHandshakeTimeout = 2s;
+constexpr auto kClosingTimeout = 2s;
+// Without a byte from the peer for half of it a ping goes out, after the whole of it the peer counts as gone.
+constexpr auto kIdleTimeout = 4s;
+// RFC 6455 5.5: 125 bytes a control frame, of which the code takes two.
+constexpr std::size_t kMaxCloseText = 123;
+
+std::string peerOf(const beast::tcp_stream& socket) {
+  beast::error_code error;
+  const auto endpoint = socket.socket().remote_endpoint(error);
+  return error ? "web" : fmt::format("web {}:{}", endpoint.address().to_string(), endpoint.port());
+}
+
+// The longest start of `text` that a close frame holds and that does not cut a UTF-8 sequence.
+std::string_view closeText(std::string_view text) {
+  std::size_t size = std::min(text.size(), kMaxCloseText);
+  while (size < text.size() && size > 0 && (static_cast<unsigned char>(text[size]) & 0xC0) == 0x80) --size;
+  return text.substr(0, size);
+}
+
+// Why a finished connection ends is what was said last.
+ws::close_reason reasonOf(const stream::SharedBytes& last) {
+  const auto reason = [](ws::close_code code, const std::string& why) {
+    const std::string_view text = closeText(why);
+    return ws::close_reason(code, beast::string_view(text.data(), text.size()));
+  };
+  v1::ServerMessage message;
+  if (last && message.ParseFromArray(last->data(), static_cast<int>(last->size()))) {
+    if (message.error().fatal()) return reason(ws::close_code::policy_error, message.error().text());
+    if (message.notice().kind() == v1::NOTICE_KIND_SCENE_DELETED)
+      return reason(ws::close_code::going_away, message.notice().text());
+  }
+  return {ws::close_code::going_away, "the server is stopping"};
+}
+
+}  // namespace
+
+StreamSession::StreamSession(beast::tcp_stream&& socket, EndpointContext& endpoint,
+                             std::unique_ptr<ConnectionSlot> slot)
+    : endpoint_(endpoint), slot_(std::move(slot)), socket_(std::move(socket)), closingTimer_(endpoint.io) {
+  socket_.binary(true);
+  socket_.auto_fragment(false);
+  socket_.read_message_max(stream::kMaxClientMessageBytes);
+  socket_.set_option(ws::stream_base::timeout{kHandshakeTimeout, kIdleTimeout, true});
+}
+
+void StreamSession::accept(http::request<http::empty_body>&& request) {
+  request_ = std::move(request);
+  const bool speaksOurs =
+      http::token_list(request_[http::field::sec_websocket_protocol]).exists(kSubprotocol);
+  socket_.set_option(ws::stream_base::decorator([speaksOurs](ws::response_type& response) {
+    response.set(http::field::server, "clothstream");
+    if (speaksOurs) response.set(http::field::sec_websocket_protocol, kSubprotocol);
+  }));
+  socket_.async_accept(request_, [self = shared_from_this()](beast::error_code error) {
+    if (!error) self->open();
+  });
+}
+
+void StreamSession::open() {
+  if (endpoint_.stopping) return;
+  endpoint_.streams.insert(shared_from_this());
+  // Called from any thread, so it must not own the session: whoever drops the last owner inside a wake would
+  // wait in the connection's destructor for that wake to return.
+  auto wake = [&io = endpoint_.io, weak = weak_from_this(),
+               posted = std::make_shared<std::atomic<bool>>(false)] {
+    if (posted->exchange(true)) return;
+    boost::asio::post(io, [weak, posted] {
+      posted->store(false);
+      if (const auto self = weak.lock()) self->pump();
+    });
+  };
+  connection_.emplace(endpoint_.server, peerOf(socket_.next_layer()), std::move(wake));
+  read();
+  pump();
+}
+
+void StreamSession::read() {
+  socket_.async_read(
+      incoming_, [self = shared_from_this()](beast::error_code error, std::size_t) { self->onRead(error); });
+}
+
+void StreamSession::onRead(beast::error_code error) {
+  // A close frame is a goodbye; anything else is a connection that was lost.
+  if (error == ws::error::closed && connection_) connection_->leave();
+  if (error) return end();
+  if (closing_ || !connection_) return;
+  if (socket_.got_text())
+    return close({ws::close_code::unknown_data, "messages are binary: one ClientMessage each"});
+  connection_->receive({static_cast<const std::byte*>(incoming_.cdata().data()), incoming_.size()});
+  incoming_.consume(incoming_.size());
+  read();
+}
+
+void StreamSession::pump() {
+  if (closing_ || !connection_) return;
+  const bool finished = connection_->finished();  // asked first: what came before it is still to be written
+  if (writing_) {
+    if (finished) endSoon();
+  } else if (std::optional<stream::SharedBytes> message = connection_->next()) {
+    outgoing_ = std::move(*message);
+    writing_ = true;
+    socket_.async_write(
+        boost::asio::buffer(outgoing_->data(), outgoing_->size()),
+        [self = shared_from_this()](beast::error_code error, std::size_t) { self->onWritten(error); });
+  } else if (finished) {
+    close(reasonOf(outgoing_));
+  }
+}
+
+void StreamSession::onWritten(beast::error_code error) {
+  writing_ = false;
+  // A close frame that came, or a timeout, ended it: the read that is under way says which.
+  if (error == boost::asio::error::operation_aborted) return;
+  if (error) return end();
+  pump();
+}
+
+void StreamSession::close(const ws::close_reason& reason) {
+  if (std::exchange(closing_, true)) return;
+  leave();
+  endSoon();
+  socket_.async_close(reason, [self = shared_from_this()](beast::error_code) { self->end(); });
+}
+
+void StreamSession::endSoon() {
+  if (std::exchange(ending_, true)) return;
+  closingTimer_.expires_after(kClosingTimeout);
+  closingTimer_.async_wait([self = shared_from_this()](beast::error_code error) {
+    if (!error) self->end();
+  });
+}
+
+void StreamSession::end() {
+  closing_ = true;
+  leave();
+  closingTimer_.cancel();
+  socket_.next_layer().close();
+  endpoint_.streams.erase(shared_from_this());
+  if (endpoint_.stopping && endpoint_.streams.empty()) endpoint_.io.stop();
+}
+
+}  // namespace clothstream::endpoint

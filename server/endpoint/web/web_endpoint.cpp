@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: MIT
+#include "server/endpoint/web/web_endpoint.h"
+
+#include <chrono>
+#include <stdexcept>
+#include <thread>
+#include <utility>
+
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/ip/v6_only.hpp>
+#include <boost/asio/post.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <fmt/format.h>
+#include <netinet/tcp.h>
+#include <sys/socket.h>
+
+#include "server/endpoint/web/endpoint_context.h"
+#include "server/endpoint/web/http_session.h"
+#include "server/endpoint/web/stream_session.h"
+
+namespace clothstream::endpoint {
+namespace {
+
+namespace net = boost::asio;
+using net::ip::tcp;
+using namespace std::chrono_literals;
+
+// More connections than the limit are answered, so that they learn why, but not without end.
+constexpr std::size_t kAnsweredBeyondLimit = 64;
+// What waits unsent in the kernel is stale by the time it goes out.
+constexpr int kUnsentBytes = 16 * 1024;
+constexpr auto kStopTimeout = 1s;
+constexpr auto kAcceptPause = 100ms;
+
+tcp::acceptor listen(net::io_context& io, const std::string& host, std::uint16_t port) {
+  boost::system::error_code error;
+  const auto refuse = [&](const std::string& what) -> std::runtime_error { return std::runtime_error(what); };
+  const auto found = tcp::resolver(io).resolve(host, std::to_string(port), tcp::resolver::passive, error);
+  if (error) throw refuse(fmt::format("cannot listen on host '{}': {}", host, error.message()));
+  const tcp::endpoint endpoint = *found.begin();
+  tcp::acceptor acceptor(io);
+  acceptor.open(endpoint.protocol(), error);
+  if (!error) acceptor.set_option(tcp::acceptor::reuse_address(true), error);
+  if (!error && endpoint.address().is_v6()) acceptor.set_option(net::ip::v6_only(false), error);
+  if (!error) acceptor.bind(endpoint, error);
+  if (!error) acceptor.listen(net::socket_base::max_listen_connections, error);
+  if (error == net::error::address_in_use)
+    throw refuse(fmt::format("port {} on {} is already in use: choose another with --port", port, host));
+  if (error) throw refuse(fmt::format("cannot listen on port {} of {}: {}", port, host, error.message()));
+  return acceptor;
+}
+
+void sendFresh(tcp::socket& socket) {
+  boost::system::error_code ignored;  // a socket that died already is found by its first read
+  socket.set_option(tcp::no_delay(true), ignored);
+  ::setsockopt(socket.native_handle(), IPPROTO_TCP, TCP_NOTSENT_LOWAT, &kUnsentBytes, sizeof kUnsentBytes);
+}
+
+}  // namespace
+
+struct WebEndpoint::State {
+  EndpointContext context;  // outlives the sessions, which die with the io context
+  net::io_context io{1};
+  tcp::acceptor acceptor;
+  net::steady_timer timer{io};
+  std::uint16_t port;
+  std::thread thread;
+
+  State(stream::SceneServer& server, const WebEndpointOptions& options)
+      : context{server, io,   Page(options.pageDirectory), options.allowedOrigins, options.maxConnections, 0,
+                {},     false},
+        acceptor(listen(io, options.host, options.port)),
+        port(acceptor.local_endpoint().port()) {
+    accept();
+    thread = std::thread([this] { io.run(); });
+  }
+
+  ~State() {
+    net::post(io, [this] { stop(); });
+    thread.join();
+    // No wake may reach an io context that is being destroyed.
+    for (const auto& session : context.streams) session->leave();
+    context.streams.clear();
+  }
+
+  void accept() {
+    acceptor.async_accept([this](boost::system::error_code error, tcp::socket socket) {
+      if (context.stopping) return;
+      if (error) {  // such as no descriptor left: asking at once again would only spin
+        timer.expires_after(kAcceptPause);
+        timer.async_wait([this](boost::system::error_code cancelled) {
+          if (!cancelled) accept();
+        });
+        return;
+      }
+      if (context.connections < context.maxConnections + kAnsweredBeyondLimit) {
+        sendFresh(socket);
+        std::make_shared<HttpSession>(std::move(socket), context)->read();
+      }
+      accept();
+    });
+  }
+
+  void stop() {
+    context.stopping = true;
+    acceptor.close();
+    if (context.streams.empty()) return io.stop();
+    timer.expires_after(kStopTimeout);
+    timer.async_wait([this](boost::system::error_code cancelled) {
+      if (!cancelled) io.stop();
+    });
+    const auto open = context.streams;  // closing may end one at once
+    for (const auto& session : open)
+      session->close({boost::beast::websocket::close_code::going_away, "the server is stopping"});
+  }
+};
+
+WebEndpoint::WebEndpoint(stream::SceneServer& server, const WebEndpointOptions& options)
+    : state_(std::make_unique<State>(server, options)) {}
+
+WebEndpoint::~WebEndpoint() = default;
+
+std::uint16_t WebEndpoint::port() const {
+  return state_->port;
+}
+
+}  // namespace clothstream::endpoint

@@ -1,0 +1,156 @@
+// SPDX-License-Identifier: MIT
+// Springs, areas and mass shares of a triangle mesh.
+#include "server/model/mesh.h"
+
+#include <algorithm>
+#include <cassert>
+#include <numeric>
+#include <tuple>
+#include <utility>
+
+namespace clothstream::model {
+namespace {
+
+constexpr std::uint32_t kNone = ~0u;
+
+// One side of one triangle.
+struct Side {
+  std::uint32_t low, high;  // its ends, low < high
+  std::uint32_t triangle;
+  std::uint32_t apex;  // the triangle's third corner
+};
+
+std::vector<Side> sidesOf(const std::vector<Triangle>& triangles) {
+  std::vector<Side> sides;
+  sides.reserve(3 * triangles.size());
+  for (std::uint32_t t = 0; t < triangles.size(); ++t)
+    for (std::size_t i = 0; i < 3; ++i) {
+      const auto [low, high] = std::minmax(triangles[t][i], triangles[t][(i + 1) % 3]);
+      sides.push_back({low, high, t, triangles[t][(i + 2) % 3]});
+    }
+  std::ranges::sort(sides, {}, [](const Side& s) { return std::tuple(s.low, s.high, s.triangle); });
+  return sides;
+}
+
+// What a quad's corners are, seen from one of its halves.
+struct Half {
+  std::uint32_t diagonal[2] = {kNone, kNone};
+  std::uint32_t otherApex = kNone;
+};
+
+class LinkFinder {
+ public:
+  explicit LinkFinder(const MeshShape& shape)
+      : shape_(shape), partner_(shape.triangles.size(), kNone), halves_(shape.triangles.size()) {
+    for (const std::uint32_t t : shape.quads) {
+      partner_[t] = t + 1;
+      partner_[t + 1] = t;
+    }
+  }
+
+  std::vector<SpringLink> find() {
+    const std::vector<Side> sides = sidesOf(shape_.triangles);
+    forEachEdge(sides, [&](const Side& first, const Side* second) {
+      if (second != nullptr && partner_[first.triangle] == second->triangle) addDiagonals(first, *second);
+    });
+    forEachEdge(sides, [&](const Side& first, const Side* second) {
+      if (second != nullptr && partner_[first.triangle] == second->triangle) return;
+      add(first.low, first.high, SpringKind::structural);
+      if (second == nullptr) return;
+      add(across(first, first.low), across(*second, first.low), SpringKind::bend);
+      add(across(first, first.high), across(*second, first.high), SpringKind::bend);
+    });
+    return ordered();
+  }
+
+ private:
+  template <typename Visit>
+  static void forEachEdge(const std::vector<Side>& sides, Visit&& visit) {
+    for (std::size_t i = 0; i < sides.size();) {
+      const bool shared =
+          i + 1 < sides.size() && sides[i].low == sides[i + 1].low && sides[i].high == sides[i + 1].high;
+      visit(sides[i], shared ? &sides[i + 1] : nullptr);
+      i += shared ? 2 : 1;
+    }
+  }
+
+  void add(std::uint32_t a, std::uint32_t b, SpringKind kind) {
+    if (a == b) return;
+    const float length = (shape_.positions[a] - shape_.positions[b]).norm();
+    links_.push_back({std::min(a, b), std::max(a, b), kind, length});
+  }
+
+  void addDiagonals(const Side& first, const Side& second) {
+    add(first.low, first.high, SpringKind::shear);
+    add(first.apex, second.apex, SpringKind::shear);
+    halves_[first.triangle] = {{first.low, first.high}, second.apex};
+    halves_[second.triangle] = {{first.low, first.high}, first.apex};
+  }
+
+  // Where the face that a side belongs to ends on the way from `end`, one of the side's ends, away from it.
+  std::uint32_t across(const Side& side, std::uint32_t end) const {
+    const Half& half = halves_[side.triangle];
+    if (half.otherApex == kNone) return side.apex;
+    if (end == half.diagonal[0] || end == half.diagonal[1]) return half.otherApex;
+    // The side runs from this half's own apex to one end of the diagonal: it goes on to the other.
+    const std::uint32_t taken = side.low == end ? side.high : side.low;
+    return half.diagonal[taken == half.diagonal[0] ? 1 : 0];
+  }
+
+  std::vector<SpringLink> ordered() {
+    std::ranges::sort(links_, {}, [](const SpringLink& l) { return std::tuple(l.a, l.b, l.kind); });
+    links_.erase(
+        std::unique(links_.begin(), links_.end(),
+                    [](const SpringLink& x, const SpringLink& y) { return x.a == y.a && x.b == y.b; }),
+        links_.end());
+    std::ranges::sort(links_, {}, [](const SpringLink& l) { return std::tuple(l.a, l.kind, l.b); });
+    return std::move(links_);
+  }
+
+  const MeshShape& shape_;
+  std::vector<std::uint32_t> partner_;  // a triangle's other half, where it is one of a quad
+  std::vector<Half> halves_;
+  std::vector<SpringLink> links_;
+};
+
+std::vector<double> lumpedAreas(const MeshShape& shape) {
+  std::vector<double> areas(shape.positions.size(), 0);
+  for (const Triangle& triangle : shape.triangles) {
+    const auto at = [&](std::size_t i) { return shape.positions[triangle[i]].cast<double>().eval(); };
+    const double area = 0.5 * (at(1) - at(0)).cross(at(2) - at(0)).norm();
+    for (const std::uint32_t node : triangle) areas[node] += area / 3;
+  }
+  return areas;
+}
+
+}  // namespace
+
+double Mesh::area() const {
+  return std::accumulate(areas.begin(), areas.end(), 0.0);
+}
+
+Mesh makeMesh(MeshShape shape) {
+  Mesh mesh;
+  mesh.shape = std::move(shape);
+  mesh.areas = lumpedAreas(mesh.shape);
+  mesh.links = LinkFinder(mesh.shape).find();
+  const double whole = mesh.area();
+  for (const double area : mesh.areas) mesh.shares.push_back(area / whole);
+  return mesh;
+}
+
+std::vector<Triangle> clothTriangles(const Cloth& cloth) {
+  if (cloth.mesh) return cloth.mesh->shape.triangles;
+  const std::uint32_t columns = cloth.grid.columns;
+  std::vector<Triangle> triangles;
+  triangles.reserve(std::size_t{2} * (cloth.grid.rows - 1) * (columns - 1));
+  for (std::uint32_t row = 0; row + 1 < cloth.grid.rows; ++row)
+    for (std::uint32_t column = 0; column + 1 < columns; ++column) {
+      const std::uint32_t a = row * columns + column, b = a + 1, e = a + columns, f = e + 1;
+      triangles.push_back({a, e, b});
+      triangles.push_back({b, e, f});
+    }
+  return triangles;
+}
+
+}  // namespace clothstream::model

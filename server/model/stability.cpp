@@ -1,0 +1,201 @@
+// SPDX-License-Identifier: MIT
+// Stability bound of explicit integration, by Gershgorin's circles.
+//
+// Small motions about any shape obey M x'' = -K x - C x'. A spring with direction e and length |d| adds to K
+// the graph Laplacian of its two nodes times  k (e e^T + (1 - L/|d|)(I - e e^T)) <= k I,  and to C the same
+// Laplacian times kd e e^T <= kd I. (Under compression the second part of K is negative: that is buckling,
+// which belongs to the cloth and not to the integrator.) Damping adds `damping` M to C, and the air what
+// airDamping() says.
+//
+// A mode's growth z in a step h satisfies, with the Rayleigh quotients s = h^2 x*Kx / x*Mx and c = h x*Cx /
+// x*Mx,
+//   semi-implicit Euler:  z^2 + (s + c - 2) z + 1 - c = 0,      |z| <= 1  if  s + 2c < 4  (Jury's criterion),
+//   Runge-Kutta of 4th order: |z| <= 1 if h |w| <= kRungeKuttaRadius for the mode's rate w, Re w <= 0, with
+//   h^2 |w|^2 = s or h |w| <= c  (underdamped or not),
+//   explicit Euler:       z^2 + (c - 2) z + 1 - c + s = 0,      |z| <= 1  if  s <= c  and  2c - s < 4.
+//
+// A Laplacian with weights w_ij has, in the row of a node of mass m, the diagonal sum_j w_ij and as much
+// beside it, so no Rayleigh quotient exceeds  max_i 2 sum_j w_ij / m.  Dihedral bending, which only
+// semi-implicit Euler has, adds h^2 times bendingRate() to s. Pinned nodes have no row; their
+// springs stay on the diagonals of others. With w = h^2 k + 2 h kd that bounds s + 2c at once. For explicit
+// Euler, s <= c holds spring by spring as far as its dashpot reaches, and mass-proportional damping has to
+// carry the rest.
+#include "server/model/stability.h"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "server/model/hinges.h"
+#include "server/model/mesh.h"
+
+namespace clothstream::model {
+namespace {
+
+// Springs of each kind at one node, and one over its mass.
+struct NodeSprings {
+  std::uint32_t structural, shear, bend;
+  double perMass;
+
+  bool sameCounts(const NodeSprings& other) const {
+    return structural == other.structural && shear == other.shear && bend == other.bend;
+  }
+};
+
+// Neighbours at a distance of `step` before and after an index.
+std::uint32_t neighbours(std::uint32_t index, std::uint32_t count, std::uint32_t step) {
+  return (index >= step ? 1u : 0u) + (index + step < count ? 1u : 0u);
+}
+
+// Every combination at nodes that are not pinned; of those the one that exceeds all others, if there is such
+// a node.
+std::vector<NodeSprings> gridSprings(const Cloth& cloth) {
+  const std::uint32_t rows = cloth.grid.rows, columns = cloth.grid.columns;
+  const double perMass = cloth.grid.nodeCount() / double{cloth.mass};
+  const auto at = [&](std::uint32_t row, std::uint32_t column) -> NodeSprings {
+    return {neighbours(row, rows, 1) + neighbours(column, columns, 1),
+            neighbours(row, rows, 1) * neighbours(column, columns, 1),
+            neighbours(row, rows, 2) + neighbours(column, columns, 2), perMass};
+  };
+  const auto atMost = [](std::uint32_t count, std::uint32_t step) {
+    return std::min(2u, (count - 1) / step);
+  };
+  const NodeSprings most{atMost(rows, 1) + atMost(columns, 1), atMost(rows, 1) * atMost(columns, 1),
+                         atMost(rows, 2) + atMost(columns, 2), perMass};
+  const bool pinnedSingly =
+      !cloth.pinnedVertices.empty() || !cloth.pinnedRegions.empty() || !cloth.attachments.empty();
+  const std::vector<std::uint8_t> pinned = pinnedSingly ? pinnedNodes(cloth) : std::vector<std::uint8_t>();
+  std::vector<NodeSprings> found;
+  for (std::uint32_t row = 0; row < rows; ++row)
+    for (std::uint32_t column = 0; column < columns; ++column) {
+      const NodeSprings node = at(row, column);
+      if (std::ranges::any_of(found, [&](const NodeSprings& f) { return f.sameCounts(node); })) continue;
+      if (std::ranges::any_of(cloth.pins, [&](const GridRange& pins) { return pins.contains(row, column); }))
+        continue;
+      if (pinnedSingly && pinned[row * columns + column] != 0) continue;
+      if (node.sameCounts(most)) return {most};
+      found.push_back(node);
+    }
+  return found;
+}
+
+// Every combination of springs at nodes that are not pinned, with the lightest such node's mass.
+std::vector<NodeSprings> meshSprings(const Cloth& cloth) {
+  std::vector<NodeSprings> nodes;
+  nodes.reserve(cloth.nodeCount());
+  for (const double mass : nodeMasses(cloth)) nodes.push_back({0, 0, 0, 1 / mass});
+  for (const SpringLink& link : cloth.mesh->links)
+    for (const std::uint32_t node : {link.a, link.b})
+      ++(link.kind == SpringKind::structural ? nodes[node].structural
+         : link.kind == SpringKind::shear    ? nodes[node].shear
+                                             : nodes[node].bend);
+  const std::vector<std::uint8_t> pinned = pinnedNodes(cloth);
+  std::vector<NodeSprings> found;
+  for (std::size_t i = 0; i < nodes.size(); ++i) {
+    if (pinned[i] != 0) continue;
+    const auto same =
+        std::ranges::find_if(found, [&](const NodeSprings& f) { return f.sameCounts(nodes[i]); });
+    if (same == found.end())
+      found.push_back(nodes[i]);
+    else
+      same->perMass = std::max(same->perMass, nodes[i].perMass);
+  }
+  return found;
+}
+
+// The largest area round a node over its mass, m^2/kg. A node of a grid has at most six triangles, of half a
+// cell each, and a third of each node.
+double areaPerMass(const Cloth& cloth) {
+  if (!cloth.mesh) {
+    const GridSpacing lengths = spacing(cloth.grid);
+    return double{lengths.column} * lengths.row * cloth.grid.nodeCount() / cloth.mass;
+  }
+  double most = 0;
+  for (std::size_t i = 0; i < cloth.mesh->areas.size(); ++i)
+    most = std::max(most, cloth.mesh->areas[i] / cloth.mesh->shares[i]);
+  return most / cloth.mass;
+}
+
+// Largest rate in 1/s at which the air can brake a node. A triangle's force is 0.5 rho (C_D |N.u| u + C_L
+// ...), a function of the mean velocity of its three nodes; the symmetric part of its derivative is at most
+// 0.5 rho (2 C_D + C_L) |N| |u|. A third of that goes to each node, so a row sums to
+// 0.5 rho (2 C_D + C_L) |u| area / m.
+double airDamping(const Cloth& cloth, const Environment& environment) {
+  const double gust = std::sqrt(3.0) * environment.gust.strength;
+  const double speed = environment.wind.cast<double>().norm() + gust + kAirSpeed;
+  return 0.5 * environment.airDensity * (2.0 * cloth.drag + cloth.lift) * speed * areaPerMass(cloth);
+}
+
+// Whether semi-implicit Euler with step h is stable: s + 2c < 4.
+bool semiImplicitStable(const Cloth& cloth, const NodeSprings& node, double air, double bending, double h) {
+  const auto weight = [&](const Spring& spring) { return h * h * spring.stiffness + 2 * h * spring.damping; };
+  const double springs = node.structural * weight(cloth.structural) + node.shear * weight(cloth.shear) +
+                         node.bend * weight(cloth.bend);
+  return 2 * springs * node.perMass + h * h * bending + 2 * h * (cloth.damping + air) < 4;
+}
+
+// Whether the Runge-Kutta method with step h is stable: s <= r^2 and c <= r.
+bool rungeKuttaStable(const Cloth& cloth, const NodeSprings& node, double air, double, double h) {
+  // Of the largest half disc round 0 within |1 + z + z^2/2 + z^3/6 + z^4/24| <= 1, rounded down.
+  constexpr double kRungeKuttaRadius = 2.61;
+  const auto sum = [&](auto&& of) {
+    return node.structural * of(cloth.structural) + node.shear * of(cloth.shear) + node.bend * of(cloth.bend);
+  };
+  const double stiffness = sum([](const Spring& spring) { return double{spring.stiffness}; });
+  const double damping = sum([](const Spring& spring) { return double{spring.damping}; });
+  return h * h * 2 * stiffness * node.perMass <= kRungeKuttaRadius * kRungeKuttaRadius &&
+         h * (2 * damping * node.perMass + cloth.damping + air) <= kRungeKuttaRadius;
+}
+
+// Whether explicit Euler with step h is stable: s <= c, and c < 2, from which 2c - s < 4 follows.
+bool explicitStable(const Cloth& cloth, const NodeSprings& node, double air, double, double h) {
+  const double tension = 1 - 1 / (1 + double{kTensionStrain});
+  // What damping has to carry of one spring: along it, what the dashpot does not; across it, all of its
+  // tension.
+  const auto deficit = [&](const Spring& spring) {
+    return std::max(h * spring.stiffness - spring.damping, h * spring.stiffness * tension);
+  };
+  const double deficits = node.structural * deficit(cloth.structural) + node.shear * deficit(cloth.shear) +
+                          node.bend * deficit(cloth.bend);
+  const double dashpots = node.structural * double{cloth.structural.damping} +
+                          node.shear * double{cloth.shear.damping} + node.bend * double{cloth.bend.damping};
+  return 2 * deficits * node.perMass <= cloth.damping &&
+         h * (2 * dashpots * node.perMass + cloth.damping + air) < 2;
+}
+
+// Fewest substeps from `atLeast` on; both criteria only get easier with smaller steps. 0: none. Constraints,
+// and the springs of implicit Euler, are solved for: they set no bound, and hold those springs that become
+// constraints when they stretch too far. Those of xpbd are damped implicitly, too.
+std::uint32_t stableSubsteps(const Scene& scene, Cloth cloth, std::uint32_t atLeast) {
+  if (isConstraint(cloth.solver, SpringKind::structural))
+    cloth.structural.stiffness = cloth.shear.stiffness = 0;
+  if (isConstraint(cloth.solver, SpringKind::bend)) cloth.bend.stiffness = 0;
+  if (cloth.solver.kind == SolverKind::implicitEuler || cloth.solver.kind == SolverKind::xpbd)
+    cloth.structural = cloth.shear = cloth.bend = {};
+  const double air = airDamping(cloth, scene.environment);
+  const double bending = cloth.dihedralBending > 0 ? cloth.dihedralBending * bendingRate(cloth) : 0;
+  const std::vector<NodeSprings> combinations = cloth.mesh ? meshSprings(cloth) : gridSprings(cloth);
+  const auto stable = scene.integrator == Integrator::semiImplicitEuler ? semiImplicitStable
+                      : scene.integrator == Integrator::rungeKutta4     ? rungeKuttaStable
+                                                                        : explicitStable;
+  for (std::uint32_t substeps = atLeast; substeps <= kMaxSubsteps; ++substeps) {
+    const double h = scene.tickSeconds() / substeps;
+    if (std::ranges::all_of(combinations,
+                            [&](const NodeSprings& node) { return stable(cloth, node, air, bending, h); }))
+      return substeps;
+  }
+  return 0;
+}
+
+}  // namespace
+
+std::uint32_t stableSubsteps(const Scene& scene) {
+  std::uint32_t substeps = 1;
+  for (const Cloth& cloth : scene.cloths) {
+    substeps = stableSubsteps(scene, cloth, substeps);
+    if (substeps == 0) return 0;
+  }
+  return substeps;
+}
+
+}  // namespace clothstream::model

@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: MIT
+#include "tests/endpoint/rpc_client.h"
+
+#include <grpcpp/create_channel.h>
+#include <grpcpp/security/credentials.h>
+#include <grpcpp/support/byte_buffer.h>
+
+namespace clothstream::tests {
+namespace {
+
+// Far beyond what any answer takes, so that a test that hangs ends.
+constexpr std::chrono::seconds kLongestWait{20};
+
+grpc::ByteBuffer bufferOf(const std::string& bytes) {
+  const grpc::Slice slice(bytes);
+  return grpc::ByteBuffer(&slice, 1);
+}
+
+}  // namespace
+
+std::shared_ptr<grpc::Channel> channelTo(std::uint16_t port, const RpcOptions& options) {
+  grpc::ChannelArguments arguments;
+  arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
+  arguments.SetMaxReceiveMessageSize(-1);
+  if (options.smallWindow) {
+    arguments.SetInt(GRPC_ARG_HTTP2_BDP_PROBE, 0);
+    arguments.SetInt(GRPC_ARG_HTTP2_STREAM_LOOKAHEAD_BYTES, 64 * 1024);
+  }
+  return grpc::CreateCustomChannel("127.0.0.1:" + std::to_string(port), grpc::InsecureChannelCredentials(),
+                                   arguments);
+}
+
+RpcStream::RpcStream(std::uint16_t port, const RpcOptions& options) : channel_(channelTo(port, options)) {
+  context_.set_wait_for_ready(true);
+  if (options.compressed) context_.set_compression_algorithm(GRPC_COMPRESS_GZIP);
+  call_ = grpc::GenericStub(channel_).PrepareCall(&context_, options.method, &queue_);
+  call_->StartCall(this);
+  await("start");
+}
+
+RpcStream::~RpcStream() {
+  context_.TryCancel();
+  queue_.Shutdown();
+  void* tag = nullptr;
+  bool ok = false;
+  while (queue_.Next(&tag, &ok)) {
+  }
+}
+
+bool RpcStream::await(const char* what) {
+  void* tag = nullptr;
+  bool ok = false;
+  if (queue_.AsyncNext(&tag, &ok, std::chrono::system_clock::now() + kLongestWait) !=
+      grpc::CompletionQueue::GOT_EVENT)
+    throw std::runtime_error(std::string(what) + ": nothing happened for " +
+                             std::to_string(kLongestWait.count()) + " s");
+  return ok;
+}
+
+bool RpcStream::send(const std::string& message) {
+  call_->Write(bufferOf(message), this);
+  return await("send");
+}
+
+std::optional<std::string> RpcStream::receive() {
+  grpc::ByteBuffer buffer;
+  call_->Read(&buffer, this);
+  if (!await("receive")) return std::nullopt;
+  grpc::Slice bytes;
+  if (!buffer.DumpToSingleSlice(&bytes).ok()) return std::nullopt;
+  return std::string(reinterpret_cast<const char*>(bytes.begin()), bytes.size());
+}
+
+bool RpcStream::watch(Viewer& viewer, const std::function<bool()>& done) {
+  while (!done()) {
+    const std::optional<std::string> message = receive();
+    if (!message) return false;
+    if (const std::optional<std::string> answer = viewer.hear(*message)) send(*answer);
+  }
+  return true;
+}
+
+void RpcStream::sendDone() {
+  call_->WritesDone(this);
+  await("end of sending");
+}
+
+grpc::Status RpcStream::finish() {
+  grpc::Status status;
+  call_->Finish(&status, this);
+  await("finish");
+  return status;
+}
+
+}  // namespace clothstream::tests

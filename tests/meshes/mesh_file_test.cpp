@@ -1,0 +1,206 @@
+// SPDX-License-Identifier: MIT
+// OBJ and glTF files, good and bad.
+#include "server/meshes/mesh_file.h"
+
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace clothstream::meshes {
+namespace {
+
+using model::Vec3;
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::StartsWith;
+
+constexpr std::uint64_t kMaxBytes = 1'000'000;
+
+class MeshFile : public testing::Test {
+ protected:
+  MeshFile() {
+    folder_ =
+        std::filesystem::temp_directory_path() /
+        (std::string("clothstream_mesh_") + testing::UnitTest::GetInstance()->current_test_info()->name());
+    std::filesystem::create_directories(folder_);
+  }
+  ~MeshFile() override { std::filesystem::remove_all(folder_); }
+
+  std::filesystem::path write(const char* name, std::string_view bytes) {
+    std::ofstream(folder_ / name, std::ios::binary) << bytes;
+    return folder_ / name;
+  }
+
+  std::filesystem::path folder_;
+};
+
+TEST_F(MeshFile, ObjGivesVerticesFacesCoordinatesAndParts) {
+  const auto source = readMeshFile(write("cloth.obj", R"(# a comment
+o sheet
+v 0 0 0
+v 1 0 0
+v 1 1 0.5
+v 0 1 0
+vt 0 0
+vt 1 0
+vt 1 1
+vt 0 1
+vn 0 0 1
+usemtl cotton
+f 1/1/1 2/2/1 3/3/1 4/4/1
+v 2 0 0
+usemtl silk
+f 2/1 -1/2 3/3
+)"),
+                                   kMaxBytes);
+  ASSERT_TRUE(source) << source.error();
+  ASSERT_EQ(source->vertices.size(), 5u);
+  EXPECT_EQ(source->vertices[2], Vec3(1, 1, 0.5f));
+  ASSERT_EQ(source->faces.size(), 2u);
+  EXPECT_EQ(source->faces[0].cornerCount, 4u);
+  EXPECT_THAT(source->faces[0].vertices, testing::ElementsAre(0, 1, 2, 3));
+  EXPECT_EQ(source->faces[1].cornerCount, 3u);
+  EXPECT_EQ(source->faces[1].vertices[1], 4u);  // -1 is the newest
+  EXPECT_EQ(source->faces[1].uvs[1], 1u);
+  EXPECT_EQ(source->uvs[2], model::Uv(1, 1));
+  ASSERT_EQ(source->parts.size(), 2u);
+  EXPECT_EQ(source->parts[0].name, "cotton");
+  EXPECT_EQ(source->parts[1].name, "silk");
+  EXPECT_EQ(source->parts[1].firstFace, 1u);
+}
+
+TEST_F(MeshFile, ObjWithoutCoordinatesAtSomeCornerHasNone) {
+  const auto source = parseObj("v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nf 1/1 2/1 3\n");
+  ASSERT_TRUE(source) << source.error();
+  EXPECT_TRUE(source->uvs.empty());
+}
+
+TEST_F(MeshFile, BadObjIsRefusedOrHasIndicesThatBuildMeshRefuses) {
+  for (const auto& [text, says] :
+       {std::pair("v 0 0 0\nv 1 nan 0\n", "line 2 is \"v 1 nan 0\""), std::pair("v 0 0 inf\n", "line 1"),
+        std::pair("  v nan 0 0\n", "line 1"), std::pair("v\t0 nan 0\n", "line 1"),
+        std::pair("v 0 0 0\nv 1 0 0\nf 1 2\n", "face 0 has 2 corners"),
+        std::pair("v 0 0 0\nf 1 1 1 1 1\n", "face 0 has 5 corners; faces must have 3 or 4")}) {
+    const auto source = parseObj(text);
+    ASSERT_FALSE(source) << text;
+    EXPECT_THAT(source.error(), HasSubstr(says));
+  }
+  for (const char* text : {"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 0 1 2\n",
+                           "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 -9\n", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf a b c\n"}) {
+    const auto source = parseObj(text);
+    ASSERT_TRUE(source) << text;
+    const auto built = buildMesh(*source, {}, {.maxVertices = 10, .maxCoordinate = 10, .minEdge = 0.001f});
+    ASSERT_FALSE(built) << text;
+    EXPECT_THAT(built.error(), HasSubstr("face 0 names vertex")) << text;
+  }
+}
+
+// A quad as two triangles: floats, then 16-bit indices, in a buffer of its own; moved and mirrored by nodes.
+constexpr const char* kGltf = R"({
+  "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}],
+  "nodes": [{"translation": [1, 2, 3], "children": [1]}, {"scale": [-2, 1, 1], "mesh": 0}],
+  "materials": [{"name": "linen"}],
+  "meshes": [{"name": "sheet", "primitives": [{"attributes": {"POSITION": 0, "TEXCOORD_0": 1}, "indices": 2, "material": 0}]}],
+  "buffers": [{"uri": "sheet.bin", "byteLength": 92}],
+  "bufferViews": [{"buffer": 0, "byteOffset": 0, "byteLength": 80, "byteStride": 20}, {"buffer": 0, "byteOffset": 80, "byteLength": 12}],
+  "accessors": [
+    {"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 0]},
+    {"bufferView": 0, "byteOffset": 12, "componentType": 5126, "count": 4, "type": "VEC2"},
+    {"bufferView": 1, "componentType": 5123, "count": 6, "type": "SCALAR"}]
+})";
+
+std::string sheetBuffer() {
+  std::string bytes;
+  const auto append = [&](const auto& value) {
+    bytes.append(reinterpret_cast<const char*>(&value), sizeof(value));
+  };
+  for (const auto& [x, y] :
+       {std::pair(0.0f, 0.0f), std::pair(1.0f, 0.0f), std::pair(1.0f, 1.0f), std::pair(0.0f, 1.0f)})
+    for (const float value : {x, y, 0.0f, x, y}) append(value);
+  for (const int index : {0, 1, 2, 0, 2, 3}) append(static_cast<std::uint16_t>(index));
+  return bytes;
+}
+
+std::string replaced(std::string text, std::string_view from, std::string_view to) {
+  const std::size_t at = text.find(from);
+  EXPECT_NE(at, text.npos) << from;
+  return text.replace(at, from.size(), to);
+}
+
+void expectSheet(const tl::expected<MeshSource, std::string>& source) {
+  ASSERT_TRUE(source) << source.error();
+  ASSERT_EQ(source->vertices.size(), 4u);
+  EXPECT_EQ(source->vertices[2], Vec3(-1, 3, 3));  // (1, 1, 0) mirrored, doubled, moved
+  ASSERT_EQ(source->faces.size(), 2u);
+  EXPECT_THAT(source->faces[0].vertices,
+              testing::ElementsAre(2, 1, 0, 0));  // turned, for the mirror turns it
+  EXPECT_EQ(source->uvs[2], model::Uv(1, 0));     // glTF's v runs down
+  ASSERT_EQ(source->parts.size(), 1u);
+  EXPECT_EQ(source->parts[0].name, "linen");
+}
+
+TEST_F(MeshFile, GltfGivesTheTrianglesOfItsSceneWhereItsNodesPutThem) {
+  write("sheet.bin", sheetBuffer());
+  expectSheet(readMeshFile(write("sheet.gltf", kGltf), kMaxBytes));
+}
+
+TEST_F(MeshFile, GlbIsReadToo) {
+  std::string json = replaced(kGltf, "\"uri\": \"sheet.bin\", ", "");
+  json.resize((json.size() + 3) / 4 * 4, ' ');
+  const std::string buffer = sheetBuffer();
+  std::string bytes;
+  const auto word = [&](std::size_t value) {
+    const auto number = static_cast<std::uint32_t>(value);
+    bytes.append(reinterpret_cast<const char*>(&number), 4);
+  };
+  word(0x46546C67), word(2), word(12 + 8 + json.size() + 8 + buffer.size());
+  word(json.size()), word(0x4E4F534A), bytes += json;
+  word(buffer.size()), word(0x004E4942), bytes += buffer;
+  expectSheet(readMeshFile(write("sheet.glb", bytes), kMaxBytes));
+  for (const std::size_t kept : {0ul, 11ul, 40ul, bytes.size() - 50}) {
+    const auto cut = readMeshFile(write("cut.glb", bytes.substr(0, kept)), kMaxBytes);
+    EXPECT_FALSE(cut) << kept;
+  }
+}
+
+TEST_F(MeshFile, BadGltfIsRefused) {
+  write("sheet.bin", sheetBuffer());
+  for (const auto& [from, to, says] : {
+           std::tuple("\"version\": \"2.0\"", "\"version\": ", "is no glTF 2.0"),
+           std::tuple("\"sheet.bin\"", "\"missing.bin\"", "missing.bin"),
+           std::tuple("\"indices\": 2", "\"indices\": 9", "accessor out of bounds"),
+           std::tuple("\"count\": 6", "\"count\": 7", "accessor 2 has 7 elements"),
+           std::tuple("\"count\": 4, \"type\": \"VEC3\"", "\"count\": 4000000000, \"type\": \"VEC3\"",
+                      "accessor 0 has 4000000000 elements"),
+           std::tuple("\"byteOffset\": 80,", "\"byteOffset\": 90,", "accessor 2"),
+           std::tuple("\"children\": [1]", "\"children\": [0, 1]", "node 0 has two parents"),
+           std::tuple("\"children\": [1]", "\"children\": [7]", "node 7 is not there"),
+           std::tuple("\"indices\": 2,", "\"indices\": 2, \"mode\": 1,", "not made of triangles"),
+           std::tuple("\"count\": 6", "\"count\": 5", "no whole triangles"),
+           std::tuple("\"POSITION\": 0", "\"NORMAL\": 0", "has no POSITION"),
+           std::tuple("\"asset\"", "\"extensionsRequired\": [\"KHR_draco_mesh_compression\"], \"asset\"",
+                      "KHR_draco_mesh_compression"),
+       }) {
+    const auto source = readMeshFile(write("bad.gltf", replaced(kGltf, from, to)), kMaxBytes);
+    ASSERT_FALSE(source) << to;
+    EXPECT_THAT(source.error(), AllOf(StartsWith(folder_.string()), HasSubstr(says))) << to;
+  }
+}
+
+TEST_F(MeshFile, WhatIsNoMeshFileIsNamedInTheError) {
+  const auto expectRefused = [&](const std::filesystem::path& path, const char* says) {
+    const auto source = readMeshFile(path, 100);
+    ASSERT_FALSE(source) << path;
+    EXPECT_THAT(source.error(), AllOf(StartsWith(path.string()), HasSubstr(says)));
+  };
+  expectRefused(folder_ / "none.obj", "there is no such file");
+  expectRefused(folder_, "is not a file");
+  expectRefused(write("cloth.fbx", "x"), ".obj, .gltf and .glb are");
+  expectRefused(write("large.obj", std::string(101, ' ')), "has 101 bytes; at most 100");
+}
+
+}  // namespace
+}  // namespace clothstream::meshes

@@ -1,0 +1,145 @@
+// SPDX-License-Identifier: MIT
+// What clients send: garbage, envelopes, greetings.
+#include "server/messages/client_message.h"
+
+#include <cstddef>
+#include <cstdint>
+#include <random>
+#include <span>
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "server/messages/limits.h"
+
+namespace clothstream::messages {
+namespace {
+
+using testing::HasSubstr;
+using testing::StartsWith;
+
+std::span<const std::byte> bytesOf(const std::string& text) {
+  return std::as_bytes(std::span(text));
+}
+
+TEST(ParseClientMessage, GivesTheEnvelope) {
+  v1::ClientMessage message;
+  message.set_request_id(7);
+  message.mutable_ping()->set_client_time_us(123);
+  const auto parsed = parseClientMessage(bytesOf(message.SerializeAsString()));
+  ASSERT_TRUE(parsed) << parsed.error().text;
+  EXPECT_EQ(parsed->request_id(), 7u);
+  EXPECT_EQ(parsed->ping().client_time_us(), 123u);
+}
+
+TEST(ParseClientMessage, RefusesNothingAndAnEmptyEnvelope) {
+  EXPECT_EQ(parseClientMessage({}).error().code, v1::ERROR_CODE_MALFORMED_MESSAGE);
+  v1::ClientMessage message;
+  message.set_request_id(7);
+  EXPECT_EQ(parseClientMessage(bytesOf(message.SerializeAsString())).error().code,
+            v1::ERROR_CODE_MALFORMED_MESSAGE);
+}
+
+TEST(ParseClientMessage, RefusesTooManyBytesWithTheLimit) {
+  const auto parsed = parseClientMessage(bytesOf(std::string(limits::kMaxClientMessageBytes + 1, 'x')));
+  ASSERT_FALSE(parsed);
+  EXPECT_EQ(parsed.error().code, v1::ERROR_CODE_RESOURCE_EXHAUSTED);
+  EXPECT_THAT(parsed.error().text, HasSubstr("at most 65536"));
+}
+
+TEST(ParseClientMessage, RefusesTruncatedMessages) {
+  v1::ClientMessage message;
+  message.mutable_hello()->set_scene("curtain");
+  const std::string whole = message.SerializeAsString();
+  for (std::size_t length = 1; length < whole.size(); ++length) {
+    const auto parsed = parseClientMessage(bytesOf(whole.substr(0, length)));
+    ASSERT_FALSE(parsed) << length;
+    EXPECT_EQ(parsed.error().code, v1::ERROR_CODE_MALFORMED_MESSAGE);
+  }
+}
+
+TEST(ParseClientMessage, SurvivesGarbage) {
+  std::mt19937 random(1);
+  int refused = 0;
+  for (int i = 0; i < 10000; ++i) {
+    std::string garbage(random() % 200, '\0');
+    for (char& c : garbage) c = static_cast<char>(random());
+    const auto parsed = parseClientMessage(bytesOf(garbage));
+    if (!parsed) ++refused;
+  }
+  EXPECT_GT(refused, 9000);
+}
+
+const std::uint32_t kCodecs[] = {1, 5};
+
+v1::Hello hello() {
+  v1::Hello message;
+  message.set_protocol_version(1);
+  message.add_codecs(1);
+  return message;
+}
+
+TEST(ToJoining, KnowsHowMuchOfTheStreamIsWanted) {
+  v1::Hello message = hello();
+  auto joining = toJoining(message, kCodecs);
+  ASSERT_TRUE(joining);
+  EXPECT_EQ(joining->quality, 0);
+  EXPECT_EQ(joining->temporalLayers, 3);
+  message.set_quality(3);
+  message.set_temporal_layer(0);
+  joining = toJoining(message, kCodecs);
+  ASSERT_TRUE(joining);
+  EXPECT_EQ(joining->quality, 3);
+  EXPECT_EQ(joining->temporalLayers, 1);
+  message.set_quality(4);
+  EXPECT_THAT(toJoining(message, kCodecs).error().text, StartsWith("hello.quality = 4: must be"));
+  message.set_quality(0);
+  message.set_temporal_layer(3);
+  EXPECT_THAT(toJoining(message, kCodecs).error().text, StartsWith("hello.temporalLayer = 3: must be"));
+}
+
+TEST(ToJoining, AgreesOnVersionAndTheClientsBestCodec) {
+  v1::Hello message = hello();
+  message.set_protocol_version(9);
+  message.clear_codecs();
+  for (const std::uint32_t codec : {8u, 5u, 1u}) message.add_codecs(codec);
+  message.set_scene("flag");
+  message.set_client_name("test 1");
+  message.set_display_name("Ann");
+  const auto joining = toJoining(message, kCodecs);
+  ASSERT_TRUE(joining) << joining.error().text;
+  EXPECT_EQ(joining->protocolVersion, kProtocolVersion);
+  EXPECT_EQ(joining->codec, 5u);
+  EXPECT_EQ(joining->scene, "flag");
+  EXPECT_EQ(joining->clientName, "test 1");
+  EXPECT_EQ(joining->displayName, "Ann");
+}
+
+TEST(ToJoining, RefusesWhatItCannotAgreeOn) {
+  v1::Hello message = hello();
+  message.set_protocol_version(0);
+  EXPECT_EQ(toJoining(message, kCodecs).error().code, v1::ERROR_CODE_UNSUPPORTED_VERSION);
+  message = hello();
+  message.set_codecs(0, 77);
+  const auto joining = toJoining(message, kCodecs);
+  EXPECT_EQ(joining.error().code, v1::ERROR_CODE_UNSUPPORTED_CODEC);
+  EXPECT_THAT(joining.error().text, HasSubstr("1, 5"));
+  message.clear_codecs();
+  EXPECT_EQ(toJoining(message, kCodecs).error().code, v1::ERROR_CODE_UNSUPPORTED_CODEC);
+}
+
+TEST(ToJoining, RefusesNamesThatWouldSpoilALog) {
+  v1::Hello message = hello();
+  message.set_client_name("a\nb");
+  EXPECT_THAT(toJoining(message, kCodecs).error().text, StartsWith("hello.clientName = \"a?b\":"));
+  message = hello();
+  message.set_display_name(std::string(2000, 'x'));
+  EXPECT_THAT(toJoining(message, kCodecs).error().text, StartsWith("hello.displayName"));
+  message = hello();
+  message.set_scene("../etc");
+  EXPECT_THAT(toJoining(message, kCodecs).error().text, StartsWith("hello.scene = \"../etc\":"));
+}
+
+}  // namespace
+}  // namespace clothstream::messages

@@ -1,0 +1,215 @@
+// SPDX-License-Identifier: MIT
+// Meshes in messages: there and back, pins, and every refusal.
+#include <cmath>
+#include <functional>
+#include <numbers>
+
+#include <gmock/gmock.h>
+#include <google/protobuf/util/message_differencer.h>
+#include <gtest/gtest.h>
+
+#include "server/messages/description.h"
+#include "server/messages/limits.h"
+#include "server/messages/scene_message.h"
+#include "server/model/mesh.h"
+#include "tests/messages/scenes.h"
+
+namespace clothstream::messages {
+namespace {
+
+using testing::HasSubstr;
+
+// A quad and a triangle beside it, two parts, a vertex without a face.
+v1::Scene meshScene() {
+  v1::Scene message = smallScene();
+  v1::Cloth& cloth = *message.mutable_cloths(0);
+  cloth.clear_pins();
+  v1::Mesh& mesh = *cloth.mutable_mesh();
+  for (const float x :
+       {0.f, 0.f, 0.f, 1.f, 0.f, 0.f, 1.f, 1.f, 0.f, 0.f, 1.f, 0.f, 9.f, 9.f, 9.f, 2.f, 0.f, 0.f})
+    mesh.add_positions(x);
+  for (const std::uint32_t i : {0u, 1u, 3u, 1u, 2u, 3u, 1u, 5u, 2u}) mesh.add_triangles(i);
+  mesh.add_quads(0);
+  for (int i = 0; i < 12; ++i) mesh.add_uvs(0.125f * static_cast<float>(i));
+  for (const auto& [name, count] : {std::pair("cotton", 2u), std::pair("silk", 1u)}) {
+    v1::Submesh& part = *mesh.add_submeshes();
+    part.set_name(name);
+    part.set_triangle_count(count);
+  }
+  mesh.mutable_pose()->mutable_position()->set_y(2);
+  mesh.set_scale(0.5f);
+  return message;
+}
+
+TEST(MeshMessage, BecomesAMesh) {
+  const Result<model::Scene> scene = toScene(meshScene());
+  ASSERT_TRUE(scene) << scene.error().text;
+  const model::Cloth& cloth = scene->cloths[0];
+  ASSERT_TRUE(cloth.mesh);
+  EXPECT_EQ(cloth.nodeCount(), 5u);
+  EXPECT_EQ(cloth.mesh->shape.quads.size(), 1u);
+  EXPECT_EQ(cloth.mesh->shape.submeshes[1].name, "silk");
+  EXPECT_EQ(cloth.mesh->shape.uvs.size(), 6u);
+  EXPECT_NEAR(cloth.mesh->area(), 1.5 * 0.25, 1e-6);
+  for (const model::Vec3& p : cloth.mesh->shape.positions) EXPECT_GE(p.y(), 2);
+}
+
+TEST(MeshMessage, ComesBackAsTheSameMesh) {
+  v1::Scene message = meshScene();
+  message.mutable_cloths(0)->add_pinned_vertices(5);
+  message.mutable_cloths(0)->add_pinned_regions()->set_radius(0.5f);
+  const Result<model::Scene> scene = toScene(message);
+  ASSERT_TRUE(scene) << scene.error().text;
+  const v1::Scene once = toMessage(*scene);
+  const Result<model::Scene> again = toScene(once);
+  ASSERT_TRUE(again) << again.error().text;
+  EXPECT_EQ(again->cloths[0].mesh->shape.positions, scene->cloths[0].mesh->shape.positions);
+  EXPECT_EQ(pinnedNodes(again->cloths[0]), pinnedNodes(scene->cloths[0]));
+  EXPECT_TRUE(google::protobuf::util::MessageDifferencer::Equals(toMessage(*again), once));
+}
+
+TEST(MeshMessage, PinsVerticesByTheMessagesNumbersAndWhatStartsInARegion) {
+  v1::Scene message = meshScene();
+  v1::Cloth& cloth = *message.mutable_cloths(0);
+  const auto pinned = [&] {
+    const Result<model::Scene> scene = toScene(message);
+    EXPECT_TRUE(scene) << scene.error().text;
+    std::vector<std::pair<float, float>> places;
+    const std::vector<std::uint8_t> flags = pinnedNodes(scene->cloths[0]);
+    for (std::size_t i = 0; i < flags.size(); ++i) {
+      const model::Vec3& p = scene->cloths[0].mesh->shape.positions[i];
+      if (flags[i] != 0) places.emplace_back(p.x(), p.y());
+    }
+    std::ranges::sort(places);
+    return places;
+  };
+  using Places = std::vector<std::pair<float, float>>;
+  cloth.add_pinned_vertices(5);
+  EXPECT_EQ(pinned(), (Places{{1, 2}}));
+  v1::Region& region = *cloth.add_pinned_regions();
+  region.mutable_centre()->set_y(2.5f);
+  region.set_radius(0.1f);
+  EXPECT_EQ(pinned(), (Places{{0, 2.5f}, {1, 2}}));
+  region.mutable_size()->set_x(1);  // from -0.5 to 0.5
+  EXPECT_EQ(pinned(), (Places{{0, 2.5f}, {0.5f, 2.5f}, {1, 2}}));
+}
+
+TEST(MeshMessage, GridsAreAlsoPinnedByVertexAndRegion) {
+  v1::Scene message = smallScene();
+  v1::Cloth& cloth = *message.mutable_cloths(0);
+  cloth.clear_pins();
+  cloth.add_pinned_vertices(1);
+  const Result<model::Scene> scene = toScene(message);
+  ASSERT_TRUE(scene) << scene.error().text;
+  EXPECT_EQ(pinnedNodes(scene->cloths[0])[1], 1);
+  cloth.add_pinned_vertices(100'000);
+  const Result<model::Scene> bad = toScene(message);
+  ASSERT_FALSE(bad);
+  EXPECT_THAT(bad.error().text,
+              HasSubstr("cloths[0].pinnedVertices[1] = 100000: must be a whole number from 0 to"));
+}
+
+// A fan: one node where all triangles meet.
+TEST(MeshMessage, WhoseMatrixWouldBeTooLargeIsNotAssembled) {
+  v1::Scene message = smallScene();
+  v1::Cloth& cloth = *message.mutable_cloths(0);
+  cloth.clear_pins();
+  v1::Mesh& mesh = *cloth.mutable_mesh();
+  constexpr std::uint32_t kSpokes = 400;
+  for (std::uint32_t i = 0; i <= kSpokes; ++i) {
+    const float angle = 2 * std::numbers::pi_v<float> * static_cast<float>(i) / kSpokes;
+    for (const float x : {std::cos(angle), std::sin(angle), 0.0f}) mesh.add_positions(i < kSpokes ? x : 0);
+    if (i < kSpokes)
+      for (const std::uint32_t corner : {i, (i + 1) % kSpokes, kSpokes}) mesh.add_triangles(corner);
+  }
+  v1::ConstraintSolver& solver = *cloth.mutable_solver()->mutable_constraint();
+  EXPECT_TRUE(toScene(message));
+  solver.set_path(v1::CONSTRAINT_PATH_ASSEMBLED);
+  const Result<model::Scene> bad = toScene(message);
+  ASSERT_FALSE(bad);
+  EXPECT_THAT(bad.error().text, HasSubstr("matrices of at most 256 entries a node; this one's has"));
+}
+
+TEST(MeshMessage, IsDescribedToClientsOnce) {
+  const Result<model::Scene> scene = toScene(meshScene());
+  ASSERT_TRUE(scene) << scene.error().text;
+  const v1::StreamDescription description = toDescription(*scene, 1, 1, 0);
+  const v1::ClothDescription& cloth = description.cloths(0);
+  EXPECT_EQ(cloth.vertex_count(), 5u);
+  EXPECT_EQ(cloth.rows(), 0u);
+  EXPECT_EQ(cloth.rest_positions().size(), 5u * 12);
+  EXPECT_EQ(cloth.triangles().size(), 3u * 12);
+  EXPECT_EQ(cloth.uvs().size(), 6u * 8);
+  EXPECT_EQ(cloth.uv_triangles().size(), 3u * 12);
+  EXPECT_EQ(cloth.submeshes(0).triangle_count(), 2u);
+  EXPECT_EQ(geometryBytes(scene->cloths[0]), cloth.rest_positions().size() + cloth.triangles().size() +
+                                                 cloth.uvs().size() + cloth.uv_triangles().size());
+  EXPECT_TRUE(description.definition().cloths(0).has_mesh());
+  EXPECT_EQ(description.definition().cloths(0).mesh().positions_size(), 0);
+}
+
+// Texture coordinates alone are too many, used or not.
+TEST(MeshMessage, FitsIntoADescription) {
+  v1::Scene message = meshScene();
+  v1::Mesh& mesh = *message.mutable_cloths(0)->mutable_mesh();
+  for (const std::uint32_t i : {0u, 1u, 3u, 1u, 2u, 3u, 1u, 5u, 2u}) mesh.add_uv_triangles(i);
+  mesh.mutable_uvs()->Resize(2 * (limits::kMaxGeometryBytes / 8), 0);
+  const Result<model::Scene> scene = toScene(message);
+  ASSERT_FALSE(scene);
+  EXPECT_THAT(scene.error().text,
+              HasSubstr("bytes of positions, triangles and texture coordinates; a client"));
+}
+
+struct BadCase {
+  const char* says;
+  std::function<void(v1::Cloth&, v1::Mesh&)> spoil;
+};
+
+TEST(MeshMessage, SaysWhatIsWrong) {
+  const BadCase cases[] = {
+      {"cloths[0].mesh.positions: has 19 numbers; must have 3 for each",
+       [](auto&, auto& m) { m.add_positions(0); }},
+      {"cloths[0].mesh.triangles: has 10 numbers", [](auto&, auto& m) { m.add_triangles(0); }},
+      {"cloths[0].mesh.uvs: has 13 numbers", [](auto&, auto& m) { m.add_uvs(0); }},
+      {"cloths[0].mesh.uvs: has 14 numbers for 6 vertices",
+       [](auto&, auto& m) { m.add_uvs(0), m.add_uvs(0); }},
+      {"cloths[0].mesh.uvTriangles: has 1 numbers; must have as many as triangles, 9",
+       [](auto&, auto& m) { m.add_uv_triangles(0); }},
+      {"cloths[0].mesh: face 2 names vertex 6; there are 6", [](auto&, auto& m) { m.set_triangles(7, 6); }},
+      {"cloths[0].mesh: vertex 0 is at (nan, 0, 0)", [](auto&, auto& m) { m.set_positions(0, NAN); }},
+      {"cloths[0].mesh: faces 1 and 2 are no quad: they share no edge",
+       [](auto&, auto& m) {
+         m.set_quads(0, 1);
+         m.set_triangles(6, 4), m.set_triangles(8, 5), m.set_triangles(7, 0);
+       }},
+      {"cloths[0].mesh: faces 7 and 8 are no quad", [](auto&, auto& m) { m.set_quads(0, 7); }},
+      {"cloths[0].mesh.submeshes[1].triangleCount = 2: must be 1 or more, and there are 1",
+       [](auto&, auto& m) { m.mutable_submeshes(1)->set_triangle_count(2); }},
+      {"cloths[0].mesh.submeshes: have 2 triangles of 3",
+       [](auto&, auto& m) { m.mutable_submeshes()->RemoveLast(); }},
+      {"cloths[0].mesh.scale = 0:", [](auto&, auto& m) { m.set_scale(0); }},
+      {"cloths[0].mesh.weldDistance = 1:", [](auto&, auto& m) { m.set_weld_distance(1); }},
+      {"cloths[0].mesh.file = \"x.obj\": stands beside positions",
+       [](auto&, auto& m) { m.set_file("x.obj"); }},
+      {"cloths[0].mesh: has no vertices", [](auto&, auto& m) { m.Clear(); }},
+      {"cloths[0].pins: are of grids", [](auto& c, auto&) { c.add_pins(); }},
+      {"cloths[0].pinnedVertices[0] = 6: must be a whole number from 0 to 5",
+       [](auto& c, auto&) { c.add_pinned_vertices(6); }},
+      {"cloths[0].pinnedVertices[0] = 4: is a vertex without a face",
+       [](auto& c, auto&) { c.add_pinned_vertices(4); }},
+      {"cloths[0].pinnedRegions[0]: has no shape", [](auto& c, auto&) { c.add_pinned_regions(); }},
+      {"cloths[0].pinnedRegions[0].radius = -1:",
+       [](auto& c, auto&) { c.add_pinned_regions()->set_radius(-1); }},
+  };
+  for (const BadCase& bad : cases) {
+    v1::Scene message = meshScene();
+    v1::Cloth& cloth = *message.mutable_cloths(0);
+    bad.spoil(cloth, *cloth.mutable_mesh());
+    const Result<model::Scene> scene = toScene(message);
+    ASSERT_FALSE(scene) << bad.says;
+    EXPECT_THAT(scene.error().text, HasSubstr(bad.says));
+  }
+}
+
+}  // namespace
+}  // namespace clothstream::messages

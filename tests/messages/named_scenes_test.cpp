@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: MIT
+// The scenes that come with the program load, and the reference simulates them as they are meant.
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "server/messages/scene_file.h"
+#include "server/reference/reference_simulation.h"
+
+namespace clothstream::messages {
+namespace {
+
+class NamedScene : public testing::TestWithParam<std::string> {};
+
+TEST_P(NamedScene, LoadsUnderItsName) {
+  const Result<model::Scene> scene = loadScene(GetParam());
+  ASSERT_TRUE(scene) << scene.error().text;
+  EXPECT_EQ(scene->name, GetParam());
+  EXPECT_FALSE(scene->description.empty());
+}
+
+// Through the ball's first push of the curtain, the sheet's fall, and the flag's unfurling.
+TEST_P(NamedScene, StaysAClothThatNothingIsIn) {
+  const model::Scene scene = *loadScene(GetParam());
+  reference::ReferenceSimulation simulation(scene);
+  double worstMeanStrain = 0;
+  while (simulation.ticks() < scene.simulationRate * 3 / 2) {
+    const reference::TickInputs inputs = reference::inputsAt(scene, simulation.ticks());
+    simulation.tick(inputs);
+    for (const reference::ReferenceCloth& cloth : simulation.cloths()) {
+      const reference::Strain strain = cloth.strain();
+      ASSERT_LT(strain.max, 1) << "tick " << simulation.ticks();  // also fails when it is not a number
+      worstMeanStrain = std::max(worstMeanStrain, strain.mean);
+      for (const reference::MovingCollider& collider : inputs.colliders)
+        for (const reference::Vec3& position : cloth.positions())
+          ASSERT_GE(reference::heightOver(collider.shape, collider.end, position), 0)
+              << "tick " << simulation.ticks();
+    }
+  }
+  // Those of the paper's figures show how soft springs of 100 N/m are, while they fall on the ball too.
+  EXPECT_LT(worstMeanStrain, GetParam().starts_with("figure_") ? 0.15 : 0.1);
+}
+
+INSTANTIATE_TEST_SUITE_P(All, NamedScene, testing::ValuesIn(namedScenes()),
+                         [](const auto& name) { return name.param; });
+
+TEST(NamedScenes, AreThoseOfTheHouse) {
+  EXPECT_EQ(namedScenes(), (std::vector<std::string>{"curtain",
+                                                     "figure_07",
+                                                     "figure_09",
+                                                     "figure_10",
+                                                     "figure_11",
+                                                     "figure_12",
+                                                     "figure_13",
+                                                     "figure_14",
+                                                     "figure_15",
+                                                     "flag",
+                                                     "folds",
+                                                     "obstacles",
+                                                     "solver_acad",
+                                                     "solver_constraint",
+                                                     "solver_implicit_euler",
+                                                     "solver_mass_spring",
+                                                     "solver_xpbd",
+                                                     "sphere_drop",
+                                                     "swing",
+                                                     "tablecloth"}));
+}
+
+TEST(NamedScenes, SphereDropComesToRestOnTheSphere) {
+  const model::Scene scene = *loadScene("sphere_drop");
+  reference::ReferenceSimulation simulation(scene);
+  while (simulation.ticks() < 5 * scene.simulationRate) simulation.tick();
+  const reference::ReferenceCloth& sheet = simulation.cloths()[0];
+  const double mass = scene.cloths[0].mass;
+  EXPECT_LT(std::sqrt(2 * sheet.kineticEnergy() / mass), 0.01);  // m/s, root mean square
+  double highest = -1e9;
+  for (const reference::Vec3& position : sheet.positions()) highest = std::max(highest, position.y());
+  const model::Collider& ball = scene.colliders[0];
+  EXPECT_NEAR(highest,
+              ball.pose.position.y() + std::get<model::Sphere>(ball.shape).radius + scene.cloths[0].thickness,
+              0.002);
+}
+
+TEST(NamedScenes, FlagStreamsInTheWindAndKeepsMoving) {
+  const model::Scene scene = *loadScene("flag");
+  reference::ReferenceSimulation simulation(scene);
+  double leastEnergy = 1e9;
+  while (simulation.ticks() < 3 * scene.simulationRate) {
+    simulation.tick();
+    if (simulation.ticks() > 2 * scene.simulationRate)
+      leastEnergy = std::min(leastEnergy, simulation.cloths()[0].kineticEnergy());
+  }
+  reference::Vec3 mean = reference::Vec3::Zero();
+  for (const reference::Vec3& position : simulation.cloths()[0].positions())
+    mean += position / simulation.cloths()[0].nodeCount();
+  EXPECT_GT(mean.x(), -0.75 + 0.3);  // downwind of its held edge
+  EXPECT_GT(leastEnergy, 0.02);      // J: 0.3 m/s
+}
+
+}  // namespace
+}  // namespace clothstream::messages

@@ -1,0 +1,267 @@
+// SPDX-License-Identifier: MIT
+// What clients change of a scene that runs.
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "server/messages/client_message.h"
+#include "server/messages/scene_message.h"
+#include "tests/messages/scenes.h"
+
+namespace clothstream::messages {
+namespace {
+
+using testing::StartsWith;
+
+class ToParameterChange : public testing::Test {
+ protected:
+  std::string error() const {
+    const auto change = toParameterChange(message_, scene_);
+    return change ? "no error" : change.error().text;
+  }
+
+  model::Scene scene_ = *toScene(smallScene());
+  v1::ParameterChange message_;
+};
+
+TEST_F(ToParameterChange, RefusesWhatAColliderDoesNotHave) {
+  v1::ColliderChange& change = *message_.add_colliders();
+  change.set_name("ball");
+  change.set_length(0.2f);
+  EXPECT_EQ(error(), "parameterChange.colliders[0].length = 0.2: must be absent: \"ball\" is no capsule");
+  change.clear_length();
+  change.mutable_size()->set_x(1);
+  change.mutable_size()->set_y(1);
+  change.mutable_size()->set_z(1);
+  EXPECT_EQ(error(), "parameterChange.colliders[0].size: must be absent: \"ball\" is no box");
+  change.clear_size();
+  change.set_friction(11);
+  EXPECT_EQ(error(), "parameterChange.colliders[0].friction = 11: must be a finite number from 0 to 10");
+}
+
+TEST_F(ToParameterChange, TakesSizesOfTheShape) {
+  scene_.colliders[0].shape = model::Box{};
+  v1::ColliderChange& change = *message_.add_colliders();
+  change.set_name("ball");
+  change.mutable_size()->set_x(1);
+  change.mutable_size()->set_y(2);
+  change.mutable_size()->set_z(3);
+  change.set_friction(2);
+  model::applyChange(scene_, toParameterChange(message_, scene_).value());
+  EXPECT_EQ(std::get<model::Box>(scene_.colliders[0].shape).size, model::Vec3(1, 2, 3));
+  EXPECT_EQ(scene_.colliders[0].friction, 2);
+  scene_.colliders[0].shape = model::Capsule{};
+  change.clear_size();
+  change.set_length(0.7f);
+  change.set_radius(0.2f);
+  model::applyChange(scene_, toParameterChange(message_, scene_).value());
+  EXPECT_EQ(std::get<model::Capsule>(scene_.colliders[0].shape).length, 0.7f);
+  EXPECT_EQ(std::get<model::Capsule>(scene_.colliders[0].shape).radius, 0.2f);
+}
+
+TEST_F(ToParameterChange, ChangesSelfCollisionAndTethersWhereTheyAre) {
+  v1::ClothChange& change = *message_.add_cloths();
+  change.mutable_self_collision()->set_friction(1);
+  EXPECT_EQ(error(), "parameterChange.cloths[0].selfCollision: must be absent: \"" + scene_.cloths[0].name +
+                         "\" has none from its start");
+  change.clear_self_collision();
+  change.mutable_tethers()->set_slack(0.5f);
+  EXPECT_EQ(error(), "parameterChange.cloths[0].tethers: must be absent: \"" + scene_.cloths[0].name +
+                         "\" has none from its start");
+  scene_.cloths[0].tethers.emplace();
+  scene_.cloths[0].selfCollision = model::SelfCollision{.radius = 0.01f};
+  change.mutable_self_collision()->set_friction(1);
+  change.mutable_self_collision()->set_radius(10);
+  EXPECT_THAT(error(), StartsWith("parameterChange.cloths[0].selfCollision.radius = 10: must be"));
+  change.mutable_self_collision()->clear_radius();
+  model::applyChange(scene_, toParameterChange(message_, scene_).value());
+  EXPECT_EQ(scene_.cloths[0].selfCollision->radius, 0.01f);
+  EXPECT_EQ(scene_.cloths[0].selfCollision->friction, 1);
+  EXPECT_EQ(scene_.cloths[0].tethers->slack, 0.5f);
+}
+
+TEST_F(ToParameterChange, RefusesDihedralBendingThatCannotBe) {
+  v1::ClothChange& change = *message_.add_cloths();
+  change.set_dihedral_bending(2);
+  EXPECT_EQ(error(), "parameterChange.cloths[0].dihedralBending = 2: must be a finite number from 0 to 1");
+  scene_.cloths[0].structural = scene_.cloths[0].shear = scene_.cloths[0].bend = {};
+  scene_.cloths[0].mass = 1e-5f;
+  change.set_dihedral_bending(1);
+  EXPECT_THAT(error(), StartsWith("parameterChange: with substeps = "));
+  change.set_dihedral_bending(1e-9f);
+  EXPECT_EQ(error(), "no error");
+  scene_.integrator = model::Integrator::rungeKutta4;
+  EXPECT_EQ(error(),
+            "parameterChange.cloths[].dihedralBending: must be 0: other values need "
+            "INTEGRATOR_SEMI_IMPLICIT_EULER");
+}
+
+TEST_F(ToParameterChange, RefusesARadiusForWhatHasNone) {
+  scene_ = *toScene(sceneWithHull());
+  message_.add_colliders()->set_name("ball");
+  message_.mutable_colliders(0)->set_radius(0.5f);
+  EXPECT_THAT(error(),
+              StartsWith("parameterChange.colliders[0].radius = 0.5: must be absent: \"ball\" is neither"));
+}
+
+TEST_F(ToParameterChange, CarriesEveryField) {
+  message_.mutable_gravity()->mutable_value()->set_y(-1.5f);
+  message_.mutable_wind()->mutable_value()->set_z(4);
+  message_.set_air_density(0.5f);
+  message_.mutable_gust()->set_strength(1.5f);
+  message_.mutable_gust()->set_seconds(4);
+  v1::ClothChange& cloth = *message_.add_cloths();
+  cloth.set_name("sheet");
+  cloth.mutable_structural()->set_stiffness(11);
+  cloth.mutable_shear()->set_stiffness(12);
+  cloth.mutable_bend()->set_damping(0.01f);
+  cloth.set_damping(0.5f);
+  cloth.set_drag(0.6f);
+  cloth.set_lift(0.7f);
+  cloth.set_friction(0.8f);
+  cloth.set_thickness(0.02f);
+  cloth.mutable_solver()->mutable_acad()->set_activation(0.25f);
+  cloth.mutable_solver()->mutable_acad()->mutable_constraint()->set_iterations(7);
+  v1::ColliderChange& collider = *message_.add_colliders();
+  collider.set_name("ball");
+  collider.mutable_position()->set_x(3);
+  collider.mutable_orientation()->set_y(1);
+  collider.set_radius(0.5f);
+  const auto change = toParameterChange(message_, scene_);
+  ASSERT_TRUE(change) << change.error().text;
+  applyChange(scene_, *change);
+  EXPECT_EQ(scene_.environment.gravity, model::Vec3(0, -1.5f, 0));
+  EXPECT_EQ(scene_.environment.wind, model::Vec3(0, 0, 4));
+  EXPECT_EQ(scene_.environment.airDensity, 0.5f);
+  EXPECT_EQ(scene_.environment.gust.strength, 1.5f);
+  EXPECT_EQ(scene_.environment.gust.seconds, 4);
+  EXPECT_EQ(scene_.cloths[0].structural.stiffness, 11);
+  EXPECT_EQ(scene_.cloths[0].shear.stiffness, 12);
+  EXPECT_EQ(scene_.cloths[0].bend.damping, 0.01f);
+  EXPECT_EQ(scene_.cloths[0].damping, 0.5f);
+  EXPECT_EQ(scene_.cloths[0].drag, 0.6f);
+  EXPECT_EQ(scene_.cloths[0].lift, 0.7f);
+  EXPECT_EQ(scene_.cloths[0].friction, 0.8f);
+  EXPECT_EQ(scene_.cloths[0].thickness, 0.02f);
+  EXPECT_EQ(scene_.cloths[0].solver.kind, model::SolverKind::acad);
+  EXPECT_EQ(scene_.cloths[0].solver.activation, 0.25f);
+  EXPECT_EQ(scene_.cloths[0].solver.iterations, 7u);
+  EXPECT_EQ(scene_.colliders[0].pose.position, model::Vec3(3, 0, 0));
+  EXPECT_EQ(scene_.colliders[0].pose.orientation.y(), 1);
+  EXPECT_EQ(std::get<model::Sphere>(scene_.colliders[0].shape).radius, 0.5f);
+}
+
+TEST_F(ToParameterChange, LeavesOutWhatIsAbsent) {
+  message_.add_cloths();
+  const auto change = toParameterChange(message_, scene_);
+  ASSERT_TRUE(change) << change.error().text;
+  EXPECT_FALSE(change->gravity || change->wind || change->airDensity);
+  EXPECT_FALSE(change->cloths[0].structural || change->cloths[0].drag);
+}
+
+TEST_F(ToParameterChange, NamesWhatTheSceneHas) {
+  message_.add_cloths()->set_name("rug");
+  EXPECT_THAT(error(), StartsWith("parameterChange.cloths[0].name = \"rug\": must be one of sheet"));
+  EXPECT_EQ(toParameterChange(message_, scene_).error().code, v1::ERROR_CODE_NOT_FOUND);
+  message_.clear_cloths();
+  message_.add_colliders();
+  EXPECT_THAT(error(), StartsWith("parameterChange.colliders[0].name = \"\": must be one of ball"));
+}
+
+TEST_F(ToParameterChange, RefusesValuesWithTheirPath) {
+  message_.mutable_gravity()->mutable_value()->set_x(kNan);
+  EXPECT_THAT(error(), StartsWith("parameterChange.gravity.value.x = nan:"));
+  message_.Clear();
+  message_.set_air_density(-1);
+  EXPECT_THAT(error(), StartsWith("parameterChange.airDensity = -1:"));
+  message_.Clear();
+  message_.add_cloths()->mutable_shear()->set_stiffness(-3);
+  EXPECT_THAT(error(), StartsWith("parameterChange.cloths[0].shear.stiffness = -3:"));
+  message_.Clear();
+  message_.add_colliders()->set_name("ball");
+  message_.mutable_colliders(0)->mutable_position()->set_y(5000);
+  EXPECT_THAT(error(), StartsWith("parameterChange.colliders[0].position.y = 5000:"));
+}
+
+TEST_F(ToParameterChange, RefusesWhatWouldMakeTheSceneUnstableNamingTheSubsteps) {
+  message_.add_cloths()->mutable_structural()->set_stiffness(20000);
+  // 4 springs of 20000 N/m at nodes of 0.03 kg: h < 2 / sqrt(2 * 4 * 20000 / 0.03) s = 1 / 1154.7, 16.04 a
+  // tick.
+  EXPECT_THAT(error(), StartsWith("parameterChange: with substeps = 10, this scene needs at least 17"));
+}
+
+// Constraints set no bound on the step; going back to forces meets it again.
+TEST_F(ToParameterChange, RefusesASolverThatTheSceneCannotHave) {
+  v1::ClothChange& cloth = *message_.add_cloths();
+  cloth.mutable_structural()->set_stiffness(20000);
+  cloth.mutable_solver()->mutable_constraint();
+  const auto change = toParameterChange(message_, scene_);
+  ASSERT_TRUE(change) << change.error().text;
+  applyChange(scene_, *change);
+  message_.Clear();
+  message_.add_cloths()->mutable_solver()->mutable_mass_spring();
+  EXPECT_THAT(error(), StartsWith("parameterChange: with substeps = 10, this scene needs at least 17"));
+
+  message_.mutable_cloths(0)->mutable_solver()->mutable_constraint()->set_iterations(0);
+  EXPECT_THAT(error(), StartsWith("parameterChange.cloths[0].solver.constraint.iterations = 0:"));
+  message_.mutable_cloths(0)->mutable_solver()->mutable_acad()->set_activation(-1);
+  EXPECT_THAT(error(), StartsWith("parameterChange.cloths[0].solver.acad.activation = -1:"));
+  message_.mutable_cloths(0)->mutable_solver()->mutable_acad()->set_activation(0.1f);
+  scene_.integrator = model::Integrator::explicitEuler;
+  EXPECT_THAT(error(), StartsWith("parameterChange.cloths[0].solver: \"sheet\" solves a system, which needs "
+                                  "INTEGRATOR_SEMI_IMPLICIT_EULER"));
+  message_.mutable_cloths(0)->clear_solver();
+  message_.mutable_cloths(0)->set_thickness(2);
+  EXPECT_THAT(error(), StartsWith("parameterChange.cloths[0].thickness = 2:"));
+}
+
+TEST_F(ToParameterChange, MakesClothsOfAMaterial) {
+  v1::ClothChange& cloth = *message_.add_cloths();
+  cloth.set_material("denim");
+  cloth.set_areal_mass(0.5f);
+  cloth.mutable_bend()->set_stiffness(7);
+  const auto change = toParameterChange(message_, scene_);
+  ASSERT_TRUE(change) << change.error().text;
+  applyChange(scene_, *change);
+  EXPECT_EQ(scene_.cloths[0].material, "denim");
+  EXPECT_EQ(scene_.cloths[0].structural.stiffness, model::findMaterial("denim")->tension);
+  EXPECT_EQ(scene_.cloths[0].bend.stiffness, 7);
+  EXPECT_FLOAT_EQ(scene_.cloths[0].mass, 1.5f);
+  EXPECT_EQ(scene_.cloths[0].solver.kind, model::SolverKind::xpbd);
+}
+
+TEST_F(ToParameterChange, RefusesMaterialsThatThereAreNotAndThoseThatTheSceneCannotHave) {
+  v1::ClothChange& cloth = *message_.add_cloths();
+  cloth.set_material("velvet");
+  EXPECT_THAT(error(),
+              StartsWith("parameterChange.cloths[0].material = \"velvet\": must be one of cotton, denim, "));
+  cloth.set_material("");
+  EXPECT_THAT(error(), StartsWith("parameterChange.cloths[0].material = \"\": must be one of cotton, "));
+  cloth.set_material("denim");
+  scene_.integrator = model::Integrator::explicitEuler;
+  EXPECT_THAT(error(),
+              StartsWith("parameterChange.cloths[0].material: \"sheet\" solves a system, which needs"));
+  scene_.integrator = model::Integrator::semiImplicitEuler;
+  cloth.mutable_solver()->mutable_mass_spring();
+  cloth.mutable_structural()->set_stiffness(20000);
+  EXPECT_THAT(error(), StartsWith("parameterChange: with substeps = 10, this scene needs at least"));
+  message_.Clear();
+  message_.add_cloths()->set_areal_mass(0);
+  EXPECT_THAT(error(), StartsWith("parameterChange.cloths[0].arealMass = 0:"));
+  message_.Clear();
+  message_.mutable_gust()->set_strength(-1);
+  EXPECT_THAT(error(), StartsWith("parameterChange.gust.strength = -1:"));
+  message_.mutable_gust()->set_strength(1);
+  message_.mutable_gust()->set_seconds(0);
+  EXPECT_THAT(error(), StartsWith("parameterChange.gust.seconds = 0:"));
+}
+
+TEST_F(ToParameterChange, JudgesAChangeAsAWhole) {
+  message_.add_cloths()->mutable_structural()->set_stiffness(20000);
+  message_.add_cloths()->mutable_structural()->set_stiffness(10);
+  EXPECT_EQ(error(), "no error");
+}
+
+}  // namespace
+}  // namespace clothstream::messages

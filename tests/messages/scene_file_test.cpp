@@ -1,0 +1,290 @@
+// SPDX-License-Identifier: MIT
+// Scene files: every field survives, and what is wrong is said with the file's name.
+#include "server/messages/scene_file.h"
+
+#include <filesystem>
+#include <fstream>
+#include <set>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <google/protobuf/descriptor.h>
+#include <google/protobuf/message.h>
+#include <google/protobuf/util/json_util.h>
+#include <google/protobuf/util/message_differencer.h>
+#include <gtest/gtest.h>
+
+#include "server/messages/limits.h"
+#include "server/messages/scene_message.h"
+
+namespace clothstream::messages {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::StartsWith;
+
+constexpr const char* kEveryField = R"json({
+  "name": "every_field", "description": "All of it", "simulationRate": 240, "streamRate": 120, "substeps": 40,
+  "integrator": "INTEGRATOR_SEMI_IMPLICIT_EULER",
+  "environment": {"gravity": {"x": 0.5, "y": -9.5, "z": 0.25}, "wind": {"x": 1, "y": 2, "z": 3}, "airDensity": 1.25,
+                  "gust": {"strength": 0.5, "seconds": 4}},
+  "cloths": [{
+    "name": "sheet",
+    "grid": {"rows": 6, "columns": 7, "width": 1.5, "height": 1.25,
+             "pose": {"position": {"x": 1, "y": 2, "z": 3}, "orientation": {"x": 0.5, "y": 0.5, "z": 0.5, "w": 0.5}}},
+    "mass": 4, "material": "wool",
+    "structural": {"stiffness": 20, "damping": 0.5}, "shear": {"stiffness": 10, "damping": 0.25},
+    "bend": {"stiffness": 5, "damping": 0.125}, "dihedralBending": 0,
+    "damping": 3, "drag": 0.5, "lift": 0.25, "friction": 0.75, "thickness": 0.0625,
+    "pins": [{"firstRow": 1, "lastRow": 5, "rowStep": 2, "firstColumn": 1, "lastColumn": 4, "columnStep": 3}],
+    "pinnedVertices": [3, 41],
+    "pinnedRegions": [{"centre": {"x": 1, "y": 2, "z": 3}, "size": {"x": 0.5, "y": 0.25, "z": 1}},
+                      {"centre": {"x": 1, "y": 0, "z": 0}, "radius": 2}],
+    "solver": {"massSpring": {}}, "selfCollision": {"radius": 0.125, "friction": 0.5}
+  }, {
+    "name": "mesh", "mesh": {"positions": [0, 0, 0, 1, 0, 0, 0, 1, 0, 1, 1, 0], "triangles": [0, 1, 2, 1, 3, 2],
+      "quads": [0], "uvs": [0, 0, 1, 0, 0, 1, 1, 1], "uvTriangles": [0, 1, 2, 1, 3, 2],
+      "submeshes": [{"name": "all", "triangleCount": 2}], "weldDistance": 0},
+    "mass": 1, "structural": {}, "shear": {}, "bend": {}, "dihedralBending": 0, "damping": 0, "drag": 0, "lift": 0, "friction": 0.5,
+    "thickness": 0.25, "solver": {"massSpring": {}}
+  }, {
+    "name": "held", "grid": {"rows": 2, "columns": 2, "width": 1, "height": 1,
+                             "pose": {"position": {}, "orientation": {"w": 1}}},
+    "mass": 1, "structural": {}, "shear": {}, "bend": {}, "dihedralBending": 0, "damping": 0, "drag": 0, "lift": 0, "friction": 0.5, "thickness": 0.25,
+    "solver": {"constraint": {"bendConstraints": true, "compliance": 0.0625, "iterations": 30, "tolerance": 0.25,
+                              "path": "CONSTRAINT_PATH_ASSEMBLED"}}
+  }, {
+    "name": "adaptive", "grid": {"rows": 2, "columns": 2, "width": 1, "height": 1,
+                                 "pose": {"position": {}, "orientation": {"w": 1}}},
+    "mass": 1, "structural": {}, "shear": {}, "bend": {}, "dihedralBending": 0, "damping": 0, "drag": 0, "lift": 0, "friction": 0.5,
+    "thickness": 0.25,
+    "solver": {"acad": {"activation": 0.25,
+                        "constraint": {"bendConstraints": true, "compliance": 0, "iterations": 30, "tolerance": 0,
+                                       "path": "CONSTRAINT_PATH_MATRIX_FREE"}}}
+  }, {
+    "name": "corrected", "grid": {"rows": 2, "columns": 2, "width": 1, "height": 1,
+                                  "pose": {"position": {}, "orientation": {"w": 1}}},
+    "mass": 1, "structural": {}, "shear": {}, "bend": {}, "dihedralBending": 0, "damping": 0, "drag": 0, "lift": 0, "friction": 0.5,
+    "thickness": 0.25, "solver": {"xpbd": {"iterations": 3, "compliance": 0}}
+  }, {
+    "name": "implicit", "grid": {"rows": 2, "columns": 2, "width": 1, "height": 1,
+                                 "pose": {"position": {}, "orientation": {"w": 1}}},
+    "mass": 1, "structural": {}, "shear": {}, "bend": {}, "dihedralBending": 0, "damping": 0, "drag": 0, "lift": 0, "friction": 0.5,
+    "thickness": 0.25, "solver": {"implicitEuler": {"iterations": 3, "tolerance": 0.25}},
+    "tethers": {"slack": 0.25},
+    "attachments": [{
+      "name": "knot", "vertices": [2], "collider": "table"
+    }, {
+      "name": "rod",
+      "ranges": [{"firstRow": 0, "lastRow": 0, "rowStep": 1, "firstColumn": 1, "lastColumn": 1, "columnStep": 1}],
+      "regions": [{"centre": {"x": 9, "y": 9, "z": 9}, "radius": 0.25}],
+      "pose": {"position": {"x": 1, "y": 2, "z": 3}, "orientation": {"x": 0, "y": 0, "z": 0, "w": 1}},
+      "motion": {"keys": [{"time": 0, "position": {"x": 1, "y": 2, "z": 3}, "orientation": {"x": 0, "y": 0, "z": 0, "w": 1}},
+                          {"time": 1, "position": {"x": 3, "y": 2, "z": 1}, "orientation": {"x": 0, "y": 0, "z": 0, "w": 1}}],
+                 "steady": false}
+    }]
+  }],
+  "colliders": [{
+    "name": "finger", "capsule": {"radius": 0.25, "length": 0.5}, "pose": {"position": {"x": 1, "y": 0, "z": 0},
+    "orientation": {"x": 0, "y": 0, "z": 0, "w": 1}}, "friction": 1
+  }, {
+    "name": "floor", "plane": {}, "pose": {"position": {"x": 1, "y": 0, "z": 0},
+    "orientation": {"x": 0, "y": 0, "z": 0, "w": 1}}, "friction": 1
+  }, {
+    "name": "table", "box": {"size": {"x": 1, "y": 2, "z": 3}}, "pose": {"position": {"x": 1, "y": 0, "z": 0},
+    "orientation": {"x": 0, "y": 0, "z": 0, "w": 1}}, "friction": 1
+  }, {
+    "name": "stone", "hull": {
+      "vertices": [{"x": 0, "y": 0, "z": 0}, {"x": 1, "y": 0, "z": 0}, {"x": 0, "y": 1, "z": 0},
+                   {"x": 0.25, "y": 0.25, "z": 1}],
+      "faces": [{"vertices": [0, 2, 1]}, {"vertices": [0, 1, 3]}, {"vertices": [0, 3, 2]}, {"vertices": [1, 2, 3]}]
+    }, "pose": {"position": {"x": 1, "y": 0, "z": 0},
+    "orientation": {"x": 0, "y": 0, "z": 0, "w": 1}}, "friction": 1
+  }, {
+    "name": "ball", "sphere": {"radius": 0.5},
+    "pose": {"position": {"x": 4, "y": 5, "z": 6}, "orientation": {"x": -0.5, "y": 0.5, "z": -0.5, "w": 0.5}},
+    "friction": 0.25,
+    "motion": {"keys": [{"time": 0, "position": {"x": 1, "y": 1, "z": 1}, "orientation": {"w": 1}},
+                        {"time": 2.5, "position": {"x": 2, "y": 3, "z": 4},
+                         "orientation": {"x": 0.5, "y": 0.5, "z": -0.5, "w": 0.5}}],
+               "steady": true}
+  }],
+  "stream": {"maxError": 0.001, "normals": "NORMALS_OCTAHEDRAL", "coding": "CODING_PACKED",
+             "temporalLayers": 2, "qualities": 4}
+})json";
+
+using Names = std::set<std::string>;
+
+// Of every field of a message of this kind, and of the messages in it.
+void addFields(const google::protobuf::Descriptor* descriptor, Names& names) {
+  for (int i = 0; i < descriptor->field_count(); ++i) {
+    const auto* field = descriptor->field(i);
+    names.insert(field->full_name());
+    if (field->message_type() != nullptr) addFields(field->message_type(), names);
+  }
+}
+
+// Of those that are set.
+void addSetFields(const google::protobuf::Message& message, Names& names) {
+  const auto* reflection = message.GetReflection();
+  std::vector<const google::protobuf::FieldDescriptor*> fields;
+  reflection->ListFields(message, &fields);
+  for (const auto* field : fields) {
+    names.insert(field->full_name());
+    if (field->message_type() == nullptr) continue;
+    if (field->is_repeated())
+      for (int i = 0; i < reflection->FieldSize(message, field); ++i)
+        addSetFields(reflection->GetRepeatedMessage(message, field, i), names);
+    else
+      addSetFields(reflection->GetMessage(message, field), names);
+  }
+}
+
+// So that a field that is added to the proto cannot be forgotten above.
+void expectEveryFieldSet(const v1::Scene& message) {
+  Names all, set;
+  addFields(message.GetDescriptor(), all);
+  addSetFields(message, set);
+  // A mesh comes back as it lies in the scene, whatever file it came from (test_mesh_message.cpp).
+  for (const char* field : {"file", "pose", "scale"}) all.erase(std::string("clothstream.v1.Mesh.") + field);
+  all.erase("clothstream.v1.Cloth.areal_mass");  // comes back as `mass`
+  EXPECT_THAT(set, testing::ContainerEq(all));
+}
+
+v1::Scene messageOf(const char* json) {
+  v1::Scene message;
+  EXPECT_TRUE(google::protobuf::util::JsonStringToMessage(json, &message).ok());
+  return message;
+}
+
+TEST(SceneFile, KeepsEveryFieldThroughTheDomainAndBack) {
+  const v1::Scene message = messageOf(kEveryField);
+  expectEveryFieldSet(message);
+  const Result<model::Scene> scene = parseScene(kEveryField, "test");
+  ASSERT_TRUE(scene) << scene.error().text;
+  std::string difference;
+  google::protobuf::util::MessageDifferencer differencer;
+  differencer.ReportDifferencesToString(&difference);
+  EXPECT_TRUE(differencer.Compare(message, toMessage(*scene))) << difference;
+}
+
+TEST(SceneFile, KeepsEveryFieldThroughJsonAndBack) {
+  const Result<model::Scene> scene = parseScene(kEveryField, "test");
+  const Result<model::Scene> again = parseScene(toJson(*scene), "again");
+  ASSERT_TRUE(again) << again.error().text;
+  EXPECT_TRUE(google::protobuf::util::MessageDifferencer::Equals(toMessage(*scene), toMessage(*again)));
+}
+
+std::string errorOf(const char* json) {
+  const Result<model::Scene> scene = parseScene(json, "my.json");
+  return scene ? "no error" : scene.error().text;
+}
+
+TEST(SceneFile, SaysLineAndColumnOfMalformedJson) {
+  EXPECT_THAT(errorOf("{\n  \"name\": \"a\"\n  \"substeps\": 3}"),
+              AllOf(StartsWith("my.json: "), HasSubstr("line 3, column 12")));
+  EXPECT_THAT(errorOf(""), AllOf(StartsWith("my.json: "), HasSubstr("line 1, column 1")));
+  EXPECT_THAT(errorOf("{\"name\": \"a\"} {}"), HasSubstr("line 1, column 15"));
+  EXPECT_THAT(errorOf("{\"name\": \"\xff\"}"), HasSubstr("UTF-8"));
+}
+
+TEST(SceneFile, NamesUnknownFieldsAndWrongTypes) {
+  EXPECT_THAT(errorOf("{\"subteps\": 3}"), AllOf(StartsWith("my.json: "), HasSubstr("subteps")));
+  EXPECT_THAT(errorOf("{\"cloths\": [{\"mas\": 1}]}"), AllOf(HasSubstr("cloths[0]"), HasSubstr("mas")));
+  EXPECT_THAT(errorOf("{\"cloths\": [{\"mass\": \"heavy\"}]}"),
+              AllOf(HasSubstr("cloths[0].mass"), HasSubstr("heavy")));
+  EXPECT_THAT(errorOf("{\"substeps\": -1}"), AllOf(HasSubstr("substeps"), HasSubstr("-1")));
+  EXPECT_THAT(errorOf("{\"integrator\": \"MAGIC\"}"), AllOf(HasSubstr("integrator"), HasSubstr("MAGIC")));
+  EXPECT_THAT(errorOf("[]"), StartsWith("my.json: not a scene"));
+}
+
+TEST(SceneFile, RefusesNestingWithoutEnd) {
+  const std::string deep = "{\"cloths\":" + std::string(200'000, '[') + std::string(200'000, ']') + "}";
+  EXPECT_THAT(errorOf(deep.c_str()), StartsWith("my.json: "));
+}
+
+TEST(SceneFile, NamesTheFieldOfABadValue) {
+  EXPECT_THAT(errorOf("{\"name\": \"a\", \"substeps\": 300}"),
+              StartsWith("my.json: substeps = 300: must be a whole number from 1 to 256"));
+}
+
+class SceneFileOnDisk : public testing::Test {
+ protected:
+  void SetUp() override { std::filesystem::create_directory(directory_); }
+  void TearDown() override { std::filesystem::remove_all(directory_); }
+
+  std::filesystem::path write(const char* name, std::string_view text) const {
+    std::ofstream(directory_ / name, std::ios::binary) << text;
+    return directory_ / name;
+  }
+
+  std::filesystem::path directory_ =
+      std::filesystem::path(testing::TempDir()) /
+      ("scene_file_" + std::string(testing::UnitTest::GetInstance()->current_test_info()->name()));
+};
+
+TEST_F(SceneFileOnDisk, NamesAMeshBesideItself) {
+  std::filesystem::create_directory(directory_ / "meshes");
+  write("meshes/rag.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n");
+  constexpr const char* kScene = R"json({"name": "a", "cloths": [{
+    "name": "rag", "mesh": {"file": "meshes/rag.obj", "scale": 0.5}}]})json";
+  const Result<model::Scene> scene = readSceneFile(write("scene.json", kScene));
+  ASSERT_TRUE(scene) << scene.error().text;
+  EXPECT_EQ(scene->cloths[0].nodeCount(), 4u);
+  EXPECT_FLOAT_EQ(scene->cloths[0].mass, 0.2f * 0.25f);
+  const Result<model::Scene> elsewhere = parseScene(kScene, "message");
+  ASSERT_FALSE(elsewhere);
+  EXPECT_THAT(elsewhere.error().text,
+              HasSubstr("cloths[0].mesh.file = \"meshes/rag.obj\": files are read for scene"));
+  write("meshes/rag.obj", "v 0 0 0\nv 1 0 0\nf 1 2 3\n");
+  const Result<model::Scene> bad = readSceneFile(directory_ / "scene.json");
+  ASSERT_FALSE(bad);
+  EXPECT_THAT(bad.error().text,
+              HasSubstr("cloths[0].mesh = \"meshes/rag.obj\": face 0 names vertex 2; there are 2"));
+  std::filesystem::remove(directory_ / "meshes/rag.obj");
+  const Result<model::Scene> missing = readSceneFile(directory_ / "scene.json");
+  ASSERT_FALSE(missing);
+  EXPECT_THAT(missing.error().text,
+              AllOf(HasSubstr("cloths[0].mesh.file"), HasSubstr("there is no such file")));
+}
+
+TEST_F(SceneFileOnDisk, IsRead) {
+  const Result<model::Scene> scene = readSceneFile(write("scene.json", kEveryField));
+  ASSERT_TRUE(scene) << scene.error().text;
+  EXPECT_EQ(scene->name, "every_field");
+}
+
+TEST_F(SceneFileOnDisk, IsNotFound) {
+  const Result<model::Scene> scene = readSceneFile(directory_ / "none.json");
+  ASSERT_FALSE(scene);
+  EXPECT_EQ(scene.error().code, v1::ERROR_CODE_NOT_FOUND);
+  EXPECT_THAT(scene.error().text, AllOf(HasSubstr("none.json"), HasSubstr("no such file")));
+}
+
+TEST_F(SceneFileOnDisk, IsADirectory) {
+  const Result<model::Scene> scene = readSceneFile(directory_);
+  ASSERT_FALSE(scene);
+  EXPECT_THAT(scene.error().text, HasSubstr("is a directory"));
+}
+
+TEST_F(SceneFileOnDisk, IsTooLarge) {
+  const Result<model::Scene> scene =
+      readSceneFile(write("large.json", std::string(limits::kMaxSceneFileBytes + 1, ' ')));
+  ASSERT_FALSE(scene);
+  EXPECT_EQ(scene.error().code, v1::ERROR_CODE_RESOURCE_EXHAUSTED);
+  EXPECT_THAT(scene.error().text, AllOf(HasSubstr("large.json"), HasSubstr("too large")));
+}
+
+TEST_F(SceneFileOnDisk, IsFoundByNameOrPath) {
+  EXPECT_EQ(loadScene("flag")->name, "flag");
+  EXPECT_EQ(loadScene(write("flag.json", kEveryField).string())->name, "every_field");
+  const Result<model::Scene> none = loadScene("no_such_scene");
+  ASSERT_FALSE(none);
+  EXPECT_EQ(none.error().code, v1::ERROR_CODE_NOT_FOUND);
+  EXPECT_THAT(none.error().text, HasSubstr("curtain, figure_07, figure_09"));
+}
+
+}  // namespace
+}  // namespace clothstream::messages
