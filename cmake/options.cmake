@@ -28,31 +28,3 @@ function(clothstream_library name)
   add_library(${name} STATIC ${ARGN})
   target_link_libraries(${name} PUBLIC clothstream_options)
 endfunction()
-
-# What drivers and layers do is not ours to mend.
-set(CLOTHSTREAM_SANITIZER_ENVIRONMENT "")
-if(CLOTHSTREAM_SANITIZE STREQUAL thread)
-  set(CLOTHSTREAM_SANITIZER_ENVIRONMENT "TSAN_OPTIONS=suppressions=${PROJECT_SOURCE_DIR}/tests/tsan.supp")
-elseif(CLOTHSTREAM_SANITIZE)
-  set(CLOTHSTREAM_SANITIZER_ENVIRONMENT "LSAN_OPTIONS=suppressions=${PROJECT_SOURCE_DIR}/tests/lsan.supp")
-endif()
-
-# clothstream_test(NAME LABELS label... SOURCES file... LIBRARIES target...): a GoogleTest program whose every
-# test is one ctest with those labels.
-function(clothstream_test name)
-  cmake_parse_arguments(ARG "" "" "LABELS;SOURCES;LIBRARIES" ${ARGN})
-  add_executable(${name} ${ARG_SOURCES})
-  target_link_libraries(${name} PRIVATE clothstream_options ${ARG_LIBRARIES} GTest::gtest GTest::gmock GTest::gtest_main)
-  # Lists do not survive as PROPERTIES of gtest_discover_tests: what it found gets them in a file of its own.
-  set(properties ${CMAKE_CURRENT_BINARY_DIR}/${name}_properties.cmake)
-  set(environment ${CLOTHSTREAM_SANITIZER_ENVIRONMENT})
-  if("gpu" IN_LIST ARG_LABELS)
-    list(APPEND environment "CLOTHSTREAM_VALIDATION=1")
-  endif()
-  gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST DISCOVERY_TIMEOUT 60 WORKING_DIRECTORY ${PROJECT_SOURCE_DIR})
-  file(WRITE ${properties} "foreach(test IN LISTS ${name}_TESTS)
-  set_tests_properties(\${test} PROPERTIES LABELS \"${ARG_LABELS}\" ENVIRONMENT \"${environment}\" TIMEOUT 300)
-endforeach()
-")
-  set_property(DIRECTORY APPEND PROPERTY TEST_INCLUDE_FILES ${properties})
-endfunction()
