@@ -14,7 +14,7 @@ set(leftOut "")
 if(DEFINED ENV{CLOTHSTREAM_LEAVE_OUT})
   set(leftOut "-$ENV{CLOTHSTREAM_LEAVE_OUT}")
 endif()
-# A suite's line begins with its name and ends with a dot, before the comment of parametrised and typed suites.
+# A suite's line is its name and a dot; a comment follows for parametrised and typed suites.
 string(REGEX MATCHALL "(^|\n)[A-Za-z0-9_/]+\\." suites "${listing}")
 foreach(suite IN LISTS suites)
   string(STRIP "${suite}" suite)

@@ -6,16 +6,16 @@ target_link_libraries(clothstream_options INTERFACE clothstream_flags clothstrea
 target_include_directories(clothstream_flags INTERFACE ${PROJECT_SOURCE_DIR})
 target_compile_options(clothstream_flags INTERFACE
   -Wall -Wextra -Wpedantic -Wconversion -Wshadow -Wnon-virtual-dtor -Wold-style-cast -Werror
-  $<$<AND:$<BOOL:${CMAKE_UNITY_BUILD}>,$<CXX_COMPILER_ID:GNU>>:-Wno-subobject-linkage> # sources are compiled as one
+  $<$<AND:$<BOOL:${CMAKE_UNITY_BUILD}>,$<CXX_COMPILER_ID:GNU>>:-Wno-subobject-linkage> # unity sources
   -ffp-contract=off)
 if(CLOTHSTREAM_SANITIZE)
   target_compile_options(clothstream_flags INTERFACE -fsanitize=${CLOTHSTREAM_SANITIZE}
-    -fno-sanitize=null,vptr,object-size # a third of the compiler's time, for what the address sanitizer finds
+    -fno-sanitize=null,vptr,object-size # they take a third of the compile time, and the address sanitizer finds the same
     -fno-sanitize-recover=all -fno-omit-frame-pointer
-    -Wno-error) # gcc sees what is not there in what sanitizers add
+    -Wno-error) # gcc gives false warnings in instrumented code
   target_link_options(clothstream_flags INTERFACE -fsanitize=${CLOTHSTREAM_SANITIZE})
   if(CLOTHSTREAM_SANITIZE STREQUAL thread)
-    # Asio's fences are not seen by the thread sanitizer; they order what its locks order already.
+    # The thread sanitizer ignores Asio's fences, which only order what Asio's locks already order.
     target_compile_options(clothstream_flags INTERFACE -Wno-tsan)
   else()
     add_library(clothstream_keep_loaded OBJECT ${PROJECT_SOURCE_DIR}/tests/keep_loaded.cpp)
