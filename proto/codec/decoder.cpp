@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "proto/codec/array.h"
-#include "proto/codec/body.h"
+#include "proto/codec/hierarchical/hierarchical_decoder.h"
 #include "proto/codec/temporal_layers.h"
 #include "proto/codec/vertex_normals.h"
 
@@ -18,9 +18,8 @@ struct Decoder::State {
     layout = streamLayout;
     // The coarse vertices' normals alone are of no use.
     sendsNormals = layout.normals == NormalMode::octahedral && detail == Detail::full;
-    body = makeHierarchicalDecoder(layout, detail);
     const std::size_t floats = 3 * std::size_t{layout.vertexCount()};
-    return body != nullptr && positions.allocate(floats) && normals.allocate(floats);
+    return body.allocate(layout, detail) && positions.allocate(floats) && normals.allocate(floats);
   }
 
   DecodeResult decode(std::span<const std::byte> bytes) {
@@ -44,24 +43,24 @@ struct Decoder::State {
       if (*found > header.temporalLayer || header.quality != quality) return DecodeResult::malformed;
       referenceLayer = *found;
     }
-    if (!body->decode(*packet, referenceLayer)) return DecodeResult::malformed;
+    if (!body.decode(*packet, referenceLayer)) return DecodeResult::malformed;
     if (key) held.clear();
     held.hold(header.temporalLayer, header.tick);
     tick = header.tick;
     quality = header.quality;
     hasFrame = true;
     hasHash = hasNormals = false;
-    body->writePositions(positions.data());
+    body.writePositions(positions.data());
     return DecodeResult::ok;
   }
 
   void makeNormals() {
-    if (sendsNormals) return body->writeNormals(normals.data());
+    if (sendsNormals) return body.writeNormals(normals.data());
     computeVertexNormals(layout, positions.data(), normals.data());
   }
 
   StreamLayout layout;
-  std::unique_ptr<BodyDecoder> body;
+  hierarchical::HierarchicalDecoder body;
   bool sendsNormals = false;
   Array<float> positions, normals;
   HeldFrames held;
@@ -106,7 +105,7 @@ std::span<const float> Decoder::normals() const {
 
 std::uint64_t Decoder::reconstructionHash() const {
   State& s = *state_;
-  if (s.hasFrame && !s.hasHash) s.hash = s.body->reconstructionHash();
+  if (s.hasFrame && !s.hasHash) s.hash = s.body.reconstructionHash();
   s.hasHash = true;
   return s.hash;
 }

@@ -5,13 +5,13 @@
 #include <cassert>
 #include <utility>
 
-#include "proto/codec/body.h"
+#include "proto/codec/hierarchical/hierarchical_encoder.h"
 #include "proto/codec/temporal_layers.h"
 
 namespace clothstream::codec {
 
 struct Encoder::State {
-  std::unique_ptr<BodyEncoder> body;
+  std::unique_ptr<hierarchical::HierarchicalEncoder> body;
   std::size_t floats = 0;
   bool hasNormals = false;
   std::uint8_t layers = 1, quality = 0;
@@ -27,7 +27,7 @@ std::unique_ptr<Encoder> Encoder::make(const StreamLayout& stream, const Encoder
   assert(options.weightLag == 0 || layout.temporalLayers == 1);
   auto state = std::make_unique<State>();
   state->quality = options.quality;
-  state->body = makeHierarchicalEncoder(layout, options);
+  state->body = std::make_unique<hierarchical::HierarchicalEncoder>(layout, options);
   state->floats = 3 * std::size_t{layout.vertexCount()};
   state->layers = layout.temporalLayers;
   state->hasNormals = layout.normals == NormalMode::octahedral;

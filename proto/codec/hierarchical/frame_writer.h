@@ -8,7 +8,7 @@
 #include <memory>
 #include <span>
 
-#include "proto/codec/body.h"
+#include "proto/codec/frame_role.h"
 #include "proto/codec/hierarchical/predictor.h"
 #include "proto/codec/hierarchical/residual_model.h"
 

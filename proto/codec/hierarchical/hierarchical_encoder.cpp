@@ -498,12 +498,3 @@ void HierarchicalEncoder::record(std::vector<CodedResidual>* residuals) {
 }
 
 }  // namespace clothstream::codec::hierarchical
-
-namespace clothstream::codec {
-
-std::unique_ptr<BodyEncoder> makeHierarchicalEncoder(const StreamLayout& layout,
-                                                     const EncoderOptions& options) {
-  return std::make_unique<hierarchical::HierarchicalEncoder>(layout, options);
-}
-
-}  // namespace clothstream::codec

@@ -2,10 +2,14 @@
 // Codecs 2 and 3: vertices to packets.
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
 #include <memory>
+#include <span>
 #include <vector>
 
-#include "proto/codec/body.h"
+#include "proto/codec/encoder.h"
+#include "proto/codec/frame_role.h"
 
 namespace clothstream::codec::hierarchical {
 
@@ -16,15 +20,18 @@ struct CodedResidual {
   std::int32_t residual;
 };
 
-class HierarchicalEncoder final : public BodyEncoder {
+class HierarchicalEncoder {
  public:
+  // `layout` has the max error of the quality that is encoded.
   explicit HierarchicalEncoder(const StreamLayout& layout, const EncoderOptions& options = {});
-  ~HierarchicalEncoder() override;
+  ~HierarchicalEncoder();
 
-  std::size_t packetBound() const override;
+  std::size_t packetBound() const;
+  // Writes a whole packet, header included; see Encoder::encode().
   std::size_t encode(const FrameRole& role, std::span<const float> positions, std::span<const float> normals,
-                     std::span<std::byte> out) override;
-  std::uint64_t reconstructionHash() const override;
+                     std::span<std::byte> out);
+  // Hash of the newest frame.
+  std::uint64_t reconstructionHash() const;
 
   // Appends to `residuals` what is coded from now on; null: no more. Without workers.
   void record(std::vector<CodedResidual>* residuals);

@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <span>
 
-#include "proto/codec/body.h"
+#include "proto/codec/frame_role.h"
 #include "proto/codec/packet_header.h"
 #include "proto/codec/stream_layout.h"
 

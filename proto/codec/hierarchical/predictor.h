@@ -9,7 +9,7 @@
 #include <span>
 
 #include "proto/codec/hierarchical/hierarchy.h"
-#include "proto/codec/hierarchical/lanes.h"
+#include "proto/codec/hierarchical/simd.h"
 #include "proto/codec/hierarchical/surface_frame.h"
 
 namespace clothstream::codec::hierarchical {

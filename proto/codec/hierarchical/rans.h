@@ -11,8 +11,8 @@
 #include <span>
 #include <vector>
 
-#include "proto/codec/hierarchical/lanes.h"
 #include "proto/codec/hierarchical/residual_model.h"
+#include "proto/codec/hierarchical/simd.h"
 
 namespace clothstream::codec::hierarchical {
 

@@ -7,8 +7,8 @@
 #include <bit>
 #include <cstdint>
 
-#include "proto/codec/hierarchical/lanes.h"
 #include "proto/codec/hierarchical/predictor.h"
+#include "proto/codec/hierarchical/simd.h"
 
 namespace clothstream::codec::hierarchical {
 

@@ -5,7 +5,7 @@
 #include <array>
 #include <cstdint>
 
-#include "proto/codec/hierarchical/lanes.h"
+#include "proto/codec/hierarchical/simd.h"
 
 namespace clothstream::codec::hierarchical {
 

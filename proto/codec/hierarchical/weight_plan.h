@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "proto/codec/body.h"
+#include "proto/codec/frame_role.h"
 #include "proto/codec/hierarchical/bits.h"
 #include "proto/codec/hierarchical/frame_coder.h"
 #include "proto/codec/hierarchical/weight_fitter.h"
