@@ -17,27 +17,36 @@ struct Moment {
   std::uint64_t tick;
   PacketKind kind;
   MotionFrame frame;
+  std::uint8_t quality = 0;
 };
 
 GoldenStream makeStream(const std::string& name, const StreamLayout& layout,
                         const std::vector<Moment>& moments) {
-  GoldenStream stream{.name = name, .layout = layout, .packets = {}};
-  const auto encoder = Encoder::make(layout);
-  const auto decoder = Decoder::make(layout);
-  std::vector<std::byte> packet(encoder->packetBound());
-  for (const auto& [tick, kind, frame] : moments) {
+  GoldenStream stream{.name = name, .layout = layout, .packets = {}, .normals = {}};
+  std::vector<std::unique_ptr<Encoder>> encoders;  // by quality
+  for (std::uint8_t quality = 0; quality < layout.qualities; ++quality)
+    encoders.push_back(Encoder::make(layout, {.quality = quality}));
+  const auto decoder = Decoder::make(layout), coarse = Decoder::make(layout, Detail::coarse);
+  std::vector<std::byte> packet(encoders[0]->packetBound()), smaller(packet.size());
+  for (const auto& [tick, kind, frame, quality] : moments) {
+    Encoder* const encoder = encoders[quality].get();
     const std::size_t bytes = encoder->encode(tick, kind, frame.positions, frame.normals, packet);
     GoldenPacket golden{.file = name + "_" + std::to_string(tick) + ".bin",
                         .bytes = {packet.begin(), packet.begin() + static_cast<std::ptrdiff_t>(bytes)},
                         .tick = tick,
                         .kind = kind,
                         .reconstructionHash = encoder->reconstructionHash(),
-                        .positionsHash = 0};
-    if (decoder->decode(golden.bytes) != DecodeResult::ok)
-      throw std::runtime_error("a packet is not decoded");
+                        .positionsHash = 0,
+                        .coarsePositionsHash = 0};
+    const std::size_t coarseBytes = makeCoarsePacket(golden.bytes, smaller);
+    if (decoder->decode(golden.bytes) != DecodeResult::ok ||
+        coarse->decode(std::span(smaller).first(coarseBytes)) != DecodeResult::ok)
+      throw std::runtime_error(golden.file + " cannot be decoded");
     golden.positionsHash = hashFloats(decoder->positions());
+    golden.coarsePositionsHash = hashFloats(coarse->positions());
     stream.packets.push_back(std::move(golden));
   }
+  stream.normals = sampleNormals(decoder->normals());
   return stream;
 }
 
@@ -57,6 +66,19 @@ GoldenStream makeLongStream(const std::string& name, const StreamLayout& layout,
   for (std::uint64_t tick = 1; tick <= frames; ++tick) {
     moments.push_back(
         {tick, tick == 1 ? PacketKind::key : PacketKind::predicted, sampleMotion(layout, tick, 0.02f)});
+  }
+  return makeStream(name, layout, moments);
+}
+
+// Three qualities. The stream changes to the next one at each key frame.
+GoldenStream makeQualityStream(const std::string& name, std::uint8_t codec) {
+  StreamLayout layout = mixedLayout(NormalMode::octahedral, codec);
+  layout.qualities = 3;
+  std::vector<Moment> moments;
+  for (std::uint64_t tick = 1; tick <= 9; ++tick) {
+    const std::uint64_t sinceKey = (tick - 1) % 3;
+    moments.push_back({tick, sinceKey == 0 ? PacketKind::key : PacketKind::predicted,
+                       sampleMotion(layout, tick, 0.03f), static_cast<std::uint8_t>((tick - 1) / 3)});
   }
   return makeStream(name, layout, moments);
 }
@@ -131,7 +153,9 @@ int main() try {
                        .codec = kCodecPacked,
                        .maxError = 0.01f,
                        .cloths = {{.vertexCount = 2400, .rows = 60, .columns = 40}}},
-                      3)});
+                      3),
+       makeQualityStream("qualities", kCodecHierarchical),
+       makeQualityStream("packed_qualities", kCodecPacked)});
   return 0;
 } catch (const std::exception& error) {
   std::fprintf(stderr, "%s\n", error.what());
