@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Packets to vertices: what all codecs have in common.
+// Decoder: checks that apply to both codecs, and results that are computed on demand.
 #include "proto/codec/decoder.h"
 
 #include <new>
@@ -16,7 +16,7 @@ namespace clothstream::codec {
 struct Decoder::State {
   bool allocate(const StreamLayout& streamLayout, Detail detail) {
     layout = streamLayout;
-    // The coarse vertices' normals alone are of no use.
+    // Sent normals predict one another, so those of the coarse vertices alone cannot be decoded.
     sendsNormals = layout.normals == NormalMode::octahedral && detail == Detail::full;
     const std::size_t floats = 3 * std::size_t{layout.vertexCount()};
     return body.allocate(layout, detail) && positions.allocate(floats) && normals.allocate(floats);
@@ -28,7 +28,7 @@ struct Decoder::State {
     const PacketHeader& header = packet->header;
     if (header.epoch != layout.epoch) return DecodeResult::wrongEpoch;
     if (hasFrame && header.tick <= tick) return DecodeResult::stale;
-    // A packet of these codecs covers all cloths and refers to one frame.
+    // Packets of both codecs cover all cloths and refer to one frame.
     const ClothRange& range = header.ranges[0];
     if (header.rangeCount != 1 || range.first != 0 || range.count != layout.cloths.size())
       return DecodeResult::malformed;
@@ -68,7 +68,7 @@ struct Decoder::State {
   std::uint8_t quality = 0;
   std::uint64_t hash = 0;
   bool hasFrame = false;
-  // Of the newest frame; made when they are first asked for.
+  // Results for the newest frame, computed when they are first requested.
   bool hasHash = false, hasNormals = false;
 };
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Vertices to packets: what all codecs have in common.
+// Encoder: frame numbers, layers and references, which are the same in both codecs.
 #include "proto/codec/encoder.h"
 
 #include <cassert>
@@ -17,7 +17,7 @@ struct Encoder::State {
   std::uint8_t layers = 1, quality = 0;
   HeldFrames held;
   std::uint64_t tick = 0;
-  std::uint64_t frame = 0;  // the next one's number since the key frame; 0: it is a key frame
+  std::uint64_t frame = 0;  // number of the next frame since the key frame; 0 is a key frame
 };
 
 std::unique_ptr<Encoder> Encoder::make(const StreamLayout& stream, const EncoderOptions& options) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The place of one frame in its stream: what the packet header says about it and its reference.
+// Place of a frame in its stream: what the packet header says about the frame and its reference.
 #pragma once
 
 #include <cstdint>

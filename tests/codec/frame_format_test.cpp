@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The tables of FRAME_FORMAT.md are those of residual_tables.cpp.
+// Compares the tables of FRAME_FORMAT.md with residual_tables.cpp.
 #include <charconv>
 #include <fstream>
 #include <map>
@@ -36,8 +36,7 @@ bool isNumber(const std::string& cell, int& number) {
   return error == std::errc{} && end == cell.data() + cell.size();
 }
 
-// Numbers from the third cell on, by the first two cells. Takes all rows of this many cells that hold
-// numbers.
+// Reads all rows of `width` cells that hold numbers from the third cell on. The first two cells are the key.
 std::map<std::pair<std::string, std::string>, Numbers> readTable(std::size_t width) {
   std::map<std::pair<std::string, std::string>, Numbers> table;
   std::ifstream page("proto/FRAME_FORMAT.md");
@@ -55,7 +54,7 @@ std::map<std::pair<std::string, std::string>, Numbers> readTable(std::size_t wid
   return table;
 }
 
-TEST(FrameFormat, TableOfScaleWeightsIsThatOfTheCodec) {
+TEST(FrameFormat, ScaleWeightsEqualResidualTables) {
   const auto table = readTable(8);
   ASSERT_EQ(table.size(), kScaleClasses * kComponents);
   const std::map<std::string, Component> components{{"u", kAlongU}, {"v", kAlongV}, {"n", kAlongNormal}};
@@ -66,7 +65,7 @@ TEST(FrameFormat, TableOfScaleWeightsIsThatOfTheCodec) {
   }
 }
 
-TEST(FrameFormat, TableOfDistributionsIsThatOfTheCodec) {
+TEST(FrameFormat, DistributionsEqualResidualTables) {
   const auto table = readTable(2 + kSymbols);
   ASSERT_EQ(table.size(), kDistributions.size());
   const std::map<std::string, Component> components{{"u, v", kAlongU}, {"n", kAlongNormal}};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The golden packets of tests/golden.
+// Golden packets of tests/golden.
 #include "tests/codec/golden.h"
 
 #include <algorithm>
@@ -17,7 +17,7 @@ namespace {
 
 const std::string kFolder = "tests/golden/";
 
-// 64-bit numbers are hexadecimal strings: JSON's numbers are doubles to many readers.
+// 64-bit numbers are hexadecimal strings, because many JSON readers turn numbers into doubles.
 std::string hexadecimal(std::uint64_t value) {
   return fmt::format("{:016x}", value);
 }

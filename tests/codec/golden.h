@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The golden packets of tests/golden: bytes, and what every build of every decoder must decode from them.
+// Golden packets of tests/golden: bytes, and the results that every build of every decoder must give.
 #pragma once
 
 #include <array>
@@ -24,7 +24,7 @@ struct GoldenPacket {
   std::uint64_t coarsePositionsHash = 0;  // the same for a decoder of coarse vertices and the coarse packet
 };
 
-// A decoded unit normal; coordinates are rounded to kNormalSteps steps.
+// Decoded unit normal with coordinates rounded to multiples of 1 / kNormalSteps.
 struct GoldenNormal {
   std::uint32_t vertex = 0;
   std::array<double, 3> xyz{};
@@ -34,19 +34,19 @@ inline constexpr double kNormalSteps = 1e6;
 struct GoldenStream {
   std::string name;
   StreamLayout layout;
-  std::vector<GoldenPacket> packets;  // in order; the first is a key frame
-  std::vector<GoldenNormal> normals;  // some vertices' normals after the last packet
+  std::vector<GoldenPacket> packets;  // in order of decoding; the first is a key frame
+  std::vector<GoldenNormal> normals;  // normals of some vertices after the last packet
 };
 
-// Reads tests/golden/streams.json and the packets it names; the working directory is the project's root.
+// Reads tests/golden/streams.json and its packets. The working directory is the project's root.
 std::vector<GoldenStream> readGoldenStreams();
 void writeGoldenStreams(const std::vector<GoldenStream>& streams);
 
-// Rounded normals of at most kGoldenNormals vertices, spread evenly over all.
+// Rounded normals of at most kGoldenNormals evenly spread vertices.
 inline constexpr std::size_t kGoldenNormals = 6;
 std::vector<GoldenNormal> sampleNormals(std::span<const float> normals);
 
-// FNV-1a of 64 bits over the little-endian bytes of the floats.
+// 64-bit FNV-1a of the floats' little-endian bytes.
 std::uint64_t hashFloats(std::span<const float> values);
 
 }  // namespace clothstream::codec

@@ -10,8 +10,8 @@
 namespace clothstream::codec {
 namespace {
 
-// Normals are exact where the compiler keeps to float32; half of the last decimal is left for those that do
-// not.
+// Normals are exact with float32 arithmetic. The tolerance allows for compilers that compute with more
+// precision.
 constexpr double kNormalTolerance = 2 / kNormalSteps;
 
 TEST(GoldenPackets, DecodeToTheSameBitsForever) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Writes tests/golden anew, from the project's root: only when the format changes, never to make a test pass.
+// Rewrites tests/golden; run it from the project's root. Only for changes of the format, never to make a test
+// pass.
 #include <algorithm>
 #include <cstdio>
 #include <exception>
@@ -23,7 +24,7 @@ struct Moment {
 GoldenStream makeStream(const std::string& name, const StreamLayout& layout,
                         const std::vector<Moment>& moments) {
   GoldenStream stream{.name = name, .layout = layout, .packets = {}, .normals = {}};
-  std::vector<std::unique_ptr<Encoder>> encoders;  // by quality
+  std::vector<std::unique_ptr<Encoder>> encoders;  // indexed by quality
   for (std::uint8_t quality = 0; quality < layout.qualities; ++quality)
     encoders.push_back(Encoder::make(layout, {.quality = quality}));
   const auto decoder = Decoder::make(layout), coarse = Decoder::make(layout, Detail::coarse);
@@ -50,7 +51,7 @@ GoldenStream makeStream(const std::string& name, const StreamLayout& layout,
   return stream;
 }
 
-// A motion, a still moment, and a jump, so that each prediction has its turn.
+// A motion, a still moment and a jump, so that every prediction is used.
 GoldenStream makeStream(const std::string& name, const StreamLayout& layout) {
   return makeStream(name, layout,
                     {{1, PacketKind::key, sampleMotion(layout, 1, 0.05f)},
@@ -60,7 +61,7 @@ GoldenStream makeStream(const std::string& name, const StreamLayout& layout) {
                      {132, PacketKind::predicted, sampleMotion(layout, 4, 0.05f)}});
 }
 
-// A motion that goes on until weights have come for each layer.
+// A motion that lasts until weights have been sent for each layer.
 GoldenStream makeLongStream(const std::string& name, const StreamLayout& layout, std::uint64_t frames = 12) {
   std::vector<Moment> moments;
   for (std::uint64_t tick = 1; tick <= frames; ++tick) {
@@ -83,7 +84,7 @@ GoldenStream makeQualityStream(const std::string& name, std::uint8_t codec) {
   return makeStream(name, layout, moments);
 }
 
-// Half of it is held: it starts to rest.
+// Half of the cloth is held still and starts to rest.
 GoldenStream makeHeldStream(const std::string& name, std::uint8_t codec) {
   const StreamLayout layout{
       .epoch = 9, .codec = codec, .cloths = {{.vertexCount = 144, .rows = 12, .columns = 12}}};
@@ -97,7 +98,7 @@ GoldenStream makeHeldStream(const std::string& name, std::uint8_t codec) {
   return makeStream(name, layout, moments);
 }
 
-// A mesh beside a grid.
+// A mesh and a grid.
 GoldenStream makeMeshStream(const std::string& name, std::uint8_t codec) {
   constexpr std::uint32_t kEdge = 14;
   const ClothLayout grid{.vertexCount = kEdge * kEdge, .rows = kEdge, .columns = kEdge};
@@ -147,7 +148,7 @@ int main() try {
                                          .codec = kCodecPacked,
                                          .temporalLayers = 3,
                                          .cloths = {{.vertexCount = 400, .rows = 20, .columns = 20}}}),
-       // So many that they are in several groups.
+       // Enough vertices for several groups.
        makeLongStream("packed_large",
                       {.epoch = 9,
                        .codec = kCodecPacked,

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Codecs 2 and 3: packets to vertices.
+// Decoder of codecs 2 and 3.
 #include "proto/codec/hierarchical/hierarchical_decoder.h"
 
 #include <algorithm>
@@ -51,7 +51,7 @@ bool HierarchicalDecoder::readWeights(std::span<const std::byte> section, bool k
 }
 
 bool HierarchicalDecoder::decode(const ParsedPacket& packet, std::uint8_t referenceLayer) {
-  // A quality comes with a key frame; one that is refused changes nothing.
+  // A quality starts with a key frame. A refused key frame changes nothing.
   const LatticeUnit unit = latticeUnit(maxErrorOf(layout_, packet.header.quality));
   predictor_.setStepBits(unit.stepBits);
   if (!decodeFrame(packet, referenceLayer)) {
@@ -128,7 +128,7 @@ void HierarchicalDecoder::decodePhases(std::size_t begin, std::size_t end, bool 
   }
 }
 
-// They are the last symbols and bits of a packet.
+// Normals are the last symbols and bits of a packet.
 void HierarchicalDecoder::decodeNormals(Streams& streams) {
   const std::span<const FacedNormal> predicted = normalPrediction_.predict(layout_, predictor_);
   std::array<NormalScale, 2> scales;
@@ -220,11 +220,11 @@ void HierarchicalDecoder::readComponent(Component component, std::uint32_t count
     completeResiduals(component, first, std::min(count - first, 4u), streams.bits);
 }
 
-// What stays has no symbol.
+// A vertex that stays has no symbol.
 template <bool within>
 void HierarchicalDecoder::readSymbols(Component component, std::uint32_t count, RansReader& reader) {
   const SymbolTable* tables = &symbolTables()[distributionOf(component, 0)];
-  RansReader symbols = reader;  // its states in registers
+  RansReader symbols = reader;  // keeps the states in registers
   std::int32_t* const out = residuals_[component];
   const auto read = [&](std::size_t i, std::size_t coder) {
     out[i] = static_cast<std::int32_t>(symbols.read<within>(coder, tables[scales_[i]]));
@@ -244,7 +244,7 @@ void HierarchicalDecoder::readSymbols(Component component, std::uint32_t count, 
   reader = symbols;
 }
 
-// From symbols, and what stands beside them among the bits.
+// Completes residuals from their symbols and from the bits next to these.
 void HierarchicalDecoder::completeResiduals(Component component, std::uint32_t first, std::uint32_t count,
                                             BitReader& bits) {
   std::int32_t* const residuals = &residuals_[component][first];

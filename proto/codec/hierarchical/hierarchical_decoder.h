@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Decoder of codecs 2 and 3: the part of a packet after the header to vertices. Decoder
-// (proto/codec/decoder.h) has checked before that the packet belongs to the stream and that its reference is
+// Decoder of codecs 2 and 3: turns the part of a packet after the header into vertices. Decoder
+// (proto/codec/decoder.h) has already checked that the packet belongs to the stream and that its reference is
 // held.
 #pragma once
 
@@ -27,18 +27,18 @@ class HierarchicalDecoder {
   // Takes the newest frame of `referenceLayer` as the reference of a predicted frame. False if the sections
   // are no frame of this layout; the decoder is then as it was before.
   [[nodiscard]] bool decode(const ParsedPacket& packet, std::uint8_t referenceLayer);
-  // These are about the newest frame; 3 floats a vertex.
+  // Positions and normals of the newest frame, 3 floats a vertex.
   void writePositions(float* out) const;
   // Only if the stream sends normals.
   void writeNormals(float* out) const;
   std::uint64_t reconstructionHash() const;
 
  private:
-  // Of codec 2; empty of codec 3, whose residuals are all read before.
+  // Symbols and bits of codec 2. Empty in codec 3, whose residuals are read before.
   struct Streams {
     RansReader symbols;
     BitReader bits;
-    std::size_t coarseSymbols, coarseBits;  // bytes that coarse vertices take
+    std::size_t coarseSymbols, coarseBits;  // bytes that the coarse vertices take
 
     bool isCoarseRead() const {
       return symbols.bytesTaken() == coarseSymbols && bits.bytesTaken() == coarseBits;
@@ -49,15 +49,15 @@ class HierarchicalDecoder {
   bool decodeFrame(const ParsedPacket& packet, std::uint8_t referenceLayer);
   Streams openStreams(const ParsedPacket& packet) const;
   bool readPacked(const ParsedPacket& packet);
-  // Changes those of `weights` that a frame of this layer can.
+  // Applies the changes that a frame of this layer carries to `weights`.
   bool readWeights(std::span<const std::byte> section, bool key, std::uint8_t layer, LayerWeights& weights,
                    bool& atRest) const;
   void decodePhases(std::size_t begin, std::size_t end, bool key, const Vectors& weights, Streams& streams);
   void decodeNormals(Streams& streams);
-  // In place of readResiduals(); false where none stays or has a residual that is not 0.
+  // Replaces readResiduals() in codec 3. False if no vertex stays or has a residual that is not 0.
   bool loadPacked(std::uint32_t begin, std::uint32_t count);
   std::int32_t readOfNormal(std::size_t component, std::size_t vertex, NormalScale& scale, Streams& streams);
-  // Without a model there are no residuals.
+  // A null model means that the chunk has no residuals.
   void decodeChunk(std::uint32_t begin, std::uint32_t count, const WeightVectors& weights,
                    const ScaleModel* model, Streams& streams);
   void readResiduals(std::uint32_t count, const ScaleModel& model, Streams& streams);
@@ -75,12 +75,13 @@ class HierarchicalDecoder {
   bool isCoarse_ = false, isPacked_ = false, hasNormals_ = false;
   LatticeUnit unit_{};
   Predictor predictor_;
-  PackedResiduals packed_;  // of codec 3
+  PackedResiduals packed_;  // used by codec 3 only
   NormalPrediction normalPrediction_;
-  Array<FacedNormal> normals_, newNormals_;                 // by vertex; of the frame that is being decoded
-  std::array<LayerWeights, kMaxTemporalLayers> weights_{};  // that the newest frame of each layer left
-  Int32x4 beyond_{};  // where a coordinate of this frame was beyond kMaxCoordinate
-  // Of the chunk that is being decoded.
+  // by vertex; the second are those of the frame that is being decoded
+  Array<FacedNormal> normals_, newNormals_;
+  std::array<LayerWeights, kMaxTemporalLayers> weights_{};  // left by the newest frame of each layer
+  Int32x4 beyond_{};  // set where a coordinate of this frame exceeds kMaxCoordinate
+  // State of the chunk that is being decoded.
   std::array<Prediction, kChunk> predictions_{};
   std::array<SurfaceFrames, kChunk / 4> frames_;
   alignas(16) std::int32_t residuals_[kComponents][kChunk] = {};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Codecs 2 and 3: vertices to packets.
+// Encoder of codecs 2 and 3: vertices to packets.
 #pragma once
 
 #include <cstddef>
@@ -13,10 +13,10 @@
 
 namespace clothstream::codec::hierarchical {
 
-// A residual and what was known when it was coded: what the tables of residual_tables.cpp are fitted to.
+// A residual with the values that were known when it was coded. residual_tables.cpp is fitted to these.
 struct CodedResidual {
   std::uint8_t component, scaleClass;
-  std::uint8_t parents, ring, last, normal, u;  // the magnitudes that ScaleWeights multiplies
+  std::uint8_t parents, ring, last, normal, u;  // magnitudes that ScaleWeights multiplies
   std::int32_t residual;
 };
 
@@ -33,7 +33,8 @@ class HierarchicalEncoder {
   // Hash of the newest frame.
   std::uint64_t reconstructionHash() const;
 
-  // Appends to `residuals` what is coded from now on; null: no more. Without workers.
+  // Appends every residual that is coded from now on to `residuals`; null stops it. Requires an encoder
+  // without workers.
   void record(std::vector<CodedResidual>* residuals);
 
  private:

@@ -82,7 +82,7 @@ TEST(CodecMeasurement, CountsEveryByteOfEveryFrame) {
     EXPECT_EQ(value(row, field), 0) << field;
 }
 
-TEST(CodecMeasurement, SaysHowFarVerticesAre) {
+TEST(CodecMeasurement, ReportsDistancesOfVertices) {
   const auto row = measured({.spoil = [](std::uint32_t frame, std::vector<float>& positions) {
     positions[2] += frame == 1 ? 0.0015f : 0.0005f;
   }});
@@ -90,7 +90,7 @@ TEST(CodecMeasurement, SaysHowFarVerticesAre) {
   EXPECT_NEAR(value(row, "meanErrorMm"), (1.5 + 3 * 0.5) / (4 * kVertices), 1e-6);
 }
 
-TEST(CodecMeasurement, EndsWhereAPromiseIsBroken) {
+TEST(CodecMeasurement, FailsIfAPromiseIsBroken) {
   EXPECT_THROW(
       measured({.spoil = [](std::uint32_t, std::vector<float>& positions) { positions[4] += 0.0021f; }}),
       std::runtime_error);
@@ -98,7 +98,7 @@ TEST(CodecMeasurement, EndsWhereAPromiseIsBroken) {
                std::runtime_error);
 }
 
-TEST(CodecMeasurement, TakesNormalsThatAreSentElseThoseOfTheDecodedPositions) {
+TEST(CodecMeasurement, UsesSentNormalsIfThereAreAny) {
   const auto sent = measured({.normal = [](std::uint32_t) { return tilted(3); }});
   EXPECT_NEAR(value(sent, "normalErrorDegMean"), 3, 1e-4);
   EXPECT_NEAR(value(sent, "normalErrorDegP99"), 3, 1e-4);
@@ -110,7 +110,7 @@ TEST(CodecMeasurement, TakesNormalsThatAreSentElseThoseOfTheDecodedPositions) {
   EXPECT_NEAR(value(computed, "normalErrorDegMean"), std::atan(0.0009) * 180 / std::numbers::pi, 1e-5);
 }
 
-TEST(CodecMeasurement, CallsFlickerHowMuchTheErrorOfNormalsChanges) {
+TEST(CodecMeasurement, MeasuresFlickerAsChangeOfNormalErrors) {
   // From one side to the other each time: twice the error.
   const auto row = measured({.normal = [](std::uint32_t frame) { return tilted(frame % 2 == 0 ? 1 : -1); }});
   EXPECT_NEAR(value(row, "normalErrorDegMean"), 1, 1e-4);
@@ -122,7 +122,7 @@ TEST(CodecMeasurement, CallsFlickerHowMuchTheErrorOfNormalsChanges) {
   EXPECT_NEAR(value(once, "normalFlickerDegRms"), std::sqrt(1.0 / 3), 1e-3);
 }
 
-TEST(CodecMeasurement, CallsVerticesCalmThatHardlyMove) {
+TEST(CodecMeasurement, TreatsSlowVerticesAsCalm) {
   EXPECT_DOUBLE_EQ(value(measured({}, 3, 0.9f * static_cast<float>(kCalmMetres)), "calmPart"), 1);
   EXPECT_NEAR(value(measured({}, 3, 1.1f * static_cast<float>(kCalmMetres)), "calmPart"), 5.0 / 6, 1e-9);
 }
