@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// That the figures of codecs are what they are said to be: codecs whose errors are known.
+// Checks the measurement with codecs whose errors are known.
 #include "tests/bench/codec/codec_measurement.h"
 
 #include <cmath>
@@ -14,11 +14,11 @@ namespace {
 constexpr std::uint32_t kVertices = 6;
 const codec::ClothLayout kCloth{kVertices, 2, 3, {}, {}};
 
-// Decodes to what the functions make of a frame, from packets of that many bytes.
+// Decodes to what the functions make of a frame, from packets of a given size.
 struct Behaviour {
   std::function<void(std::uint32_t frame, std::vector<float>& positions)> spoil = [](auto, auto&) {};
   std::function<std::array<float, 3>(std::uint32_t frame)> normal =
-      {};  // of all vertices; none: it sends none
+      {};  // for all vertices; none: it sends no normals
   std::function<std::size_t(std::uint32_t frame)> bytes = [](auto) { return 3; };
 };
 
@@ -51,7 +51,7 @@ class FakeCodec final : public FrameCodec {
   std::vector<float> positions_, normals_;
 };
 
-// Flat, facing +Z; the last vertex moves on by `step` each frame.
+// A flat cloth that faces +Z. Its last vertex moves by `step` each frame.
 nlohmann::ordered_json measured(Behaviour behaviour, std::uint32_t frames = 4, float step = 0) {
   CodecMeasurement measurement(std::make_unique<FakeCodec>(std::move(behaviour)), kCloth, 0.001);
   Truth truth(kCloth);
@@ -103,7 +103,7 @@ TEST(CodecMeasurement, UsesSentNormalsIfThereAreAny) {
   EXPECT_NEAR(value(sent, "normalErrorDegMean"), 3, 1e-4);
   EXPECT_NEAR(value(sent, "normalErrorDegP99"), 3, 1e-4);
   EXPECT_EQ(value(sent, "normalFlickerDegRms"), 0) << "what stays wrong does not flicker";
-  // The whole cloth turned: 1.8 mm at 2 m.
+  // The whole cloth is turned: 1.8 mm at 2 m.
   const auto computed = measured({.spoil = [](std::uint32_t, std::vector<float>& positions) {
     for (std::size_t i = 0; i < positions.size(); i += 3) positions[i + 2] += 0.0009f * positions[i];
   }});
