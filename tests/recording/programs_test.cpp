@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// `clothstream record`, `info`, `recover` and `clothstream-server --record`, `resimulate`, as programs.
+// Tests of the programs: `clothstream record`, `info` and `recover`, `clothstream-server --record` and
+// `resimulate`.
 #include <algorithm>
 #include <atomic>
 #include <chrono>
@@ -31,7 +32,7 @@ using namespace std::chrono_literals;
 using e2e::Process;
 using ::testing::HasSubstr;
 
-// Generous: sanitizers, validation and software Vulkan on a busy machine.
+// Long enough for sanitizers, validation and software Vulkan on a busy machine.
 constexpr auto kPatience = 60s;
 
 struct Ended {
@@ -47,7 +48,7 @@ Ended run(const std::vector<std::string>& command) {
 
 class RecordingPrograms : public ::testing::Test {
  protected:
-  // With the scene "small".
+  // Starts a server with the scene "small".
   void startServer(std::vector<std::string> options = {}) {
     options.insert(options.begin(), {CLOTHSTREAM_SERVER, "--port", "0", "--grpc-port", "0", "--scene",
                                      "small", "--scene-file", "tests/e2e/small.json"});
@@ -71,8 +72,8 @@ class RecordingPrograms : public ::testing::Test {
       return entry.path().string();
     return {};
   }
-  // The server, which records to this directory, when its next chunk is nearly due; gives the tick of the
-  // last frame that somebody saw of it.
+  // Kills a server that records to `directory` shortly before its next chunk is due. Returns the tick of the
+  // last frame that a client got.
   void killAfterAChunk(const char* directory, std::uint64_t& tick) {
     std::atomic<std::uint64_t> seen = 0;
     GrpcClientOptions options;
@@ -91,7 +92,7 @@ class RecordingPrograms : public ::testing::Test {
       ASSERT_LT(std::chrono::steady_clock::now(), deadline);
       std::this_thread::sleep_for(20ms);
     }
-    // A chunk was just closed.
+    // A chunk was closed just before.
     std::this_thread::sleep_for(170ms);
     server_->signal(SIGKILL);
     server_->waitForEnd(kPatience);
@@ -107,7 +108,7 @@ class RecordingPrograms : public ::testing::Test {
   std::string address_;
 };
 
-TEST_F(RecordingPrograms, AStreamIsRecordedWholeWithKeyFramesOnTheWay) {
+TEST_F(RecordingPrograms, RecordAStreamCompletelyWithKeyFrames) {
   startServer();
   if (IsSkipped() || HasFatalFailure()) return;
   const std::string path = pathOf("stream.mcap");
@@ -143,7 +144,7 @@ TEST_F(RecordingPrograms, AStreamIsRecordedWholeWithKeyFramesOnTheWay) {
   EXPECT_THAT(simulated.errors, HasSubstr("it holds no simulation"));
 }
 
-TEST_F(RecordingPrograms, AnInterruptEndsRecordingsWhole) {
+TEST_F(RecordingPrograms, InterruptCompletesRecordings) {
   startServer({"--always-run", "--record", pathOf("recordings")});
   if (IsSkipped() || HasFatalFailure()) return;
   const std::string path = pathOf("stream.mcap");
@@ -167,11 +168,10 @@ TEST_F(RecordingPrograms, AnInterruptEndsRecordingsWhole) {
   EXPECT_THAT(again.output, HasSubstr("all the same to the bit"));
 }
 
-// What is in a chunk that is not closed is what can be lost: no chunk may be longer than is promised,
-// whatever its writer's thread had to wait for. That it is closed on time is measured by the ticks that a
-// client saw, of as many seconds as the recorded ones took. The writer's thread may be kept waiting once, but
-// not each time, by as much again as is promised.
-TEST_F(RecordingPrograms, AKilledServerLosesAtMostItsLastChunk) {
+// An open chunk is lost, so no chunk may be longer than the promise, however long its writer's thread had to
+// wait. Timely closing is measured by the ticks that a client got, over as many seconds as the recorded ones
+// took. The writer's thread may once be delayed by as much again as is promised, but not every time.
+TEST_F(RecordingPrograms, KilledServerLosesAtMostItsLastChunk) {
   constexpr double kPromised = 0.25;  // s
   double least = std::numeric_limits<double>::infinity();
   std::string path;
@@ -218,7 +218,7 @@ TEST_F(RecordingPrograms, AKilledServerLosesAtMostItsLastChunk) {
   EXPECT_EQ(again.code, 0) << again.output << again.errors;
 }
 
-TEST_F(RecordingPrograms, RecoverSaysWhatIsLost) {
+TEST_F(RecordingPrograms, RecoverReportsTheLoss) {
   const std::string path = pathOf("damaged.mcap"), out = pathOf("out.mcap");
   std::string bytes = sampleRecording(150);
   const ChunkPlace fifth = readerOf(bytes).mcap().chunks()[5];
@@ -234,10 +234,10 @@ TEST_F(RecordingPrograms, RecoverSaysWhatIsLost) {
   ASSERT_TRUE(reader.has_value()) << reader.error();
   EXPECT_TRUE(reader->check().has_value());
   EXPECT_EQ(countMessages(*reader, Topic::frames), 138u);  // a fifth of a second is missing
-  EXPECT_EQ(clothstream({"recover", path, out}).code, 6);  // it is there already
+  EXPECT_EQ(clothstream({"recover", path, out}).code, 6);  // the file exists already
 }
 
-TEST_F(RecordingPrograms, WhatOthersWroteDoesNotSteerATerminal) {
+TEST_F(RecordingPrograms, EscapeControlCharactersOfOtherPrograms) {
   const std::string path = pathOf("foreign.mcap");
   std::string bytes;
   auto writer = RecordingWriter::begin(
@@ -257,8 +257,8 @@ TEST_F(RecordingPrograms, WhatOthersWroteDoesNotSteerATerminal) {
   EXPECT_THAT(info.output, HasSubstr("Gerät"));
 }
 
-// Without a device, for what is played is not simulated.
-TEST_F(RecordingPrograms, ARecordingIsPlayedToClients) {
+// Without a device, since playing does not simulate.
+TEST_F(RecordingPrograms, PlayARecordingToClients) {
   const std::string path = pathOf("sample.mcap"), again = pathOf("again.mcap");
   std::ofstream(path, std::ios::binary) << sampleRecording(150);
   server_ = std::make_unique<Process>(std::vector<std::string>{
@@ -296,7 +296,7 @@ TEST_F(RecordingPrograms, ARecordingIsPlayedToClients) {
   EXPECT_EQ(server_->waitForEnd(kPatience), 0);
 }
 
-TEST_F(RecordingPrograms, ClientsAskForRecordings) {
+TEST_F(RecordingPrograms, StartAndStopRecordingsForClients) {
   startServer({"--always-run", "--recordings", pathOf("recordings")});
   if (IsSkipped() || HasFatalFailure()) return;
   const auto ask = [&](std::vector<std::string> command) {
@@ -323,7 +323,7 @@ TEST_F(RecordingPrograms, ClientsAskForRecordings) {
   EXPECT_THAT(ask({"start-recording", "small"}).errors, HasSubstr("clothstream-server --recordings DIR"));
 }
 
-TEST_F(RecordingPrograms, FilesThatAreNoRecordingsAreRefused) {
+TEST_F(RecordingPrograms, RefuseFilesThatAreNoRecordings) {
   std::ofstream(pathOf("text")) << "This is a text.";
   std::ofstream(pathOf("headers"), std::ios::binary) << sampleRecording(3).substr(0, 40'000);
   for (const char* command : {"info", "recover"}) {
@@ -338,7 +338,7 @@ TEST_F(RecordingPrograms, FilesThatAreNoRecordingsAreRefused) {
   }
 }
 
-TEST_F(RecordingPrograms, AFullDiskEndsTheClientsRecording) {
+TEST_F(RecordingPrograms, FullDiskEndsTheClientsRecording) {
   startServer();
   if (IsSkipped() || HasFatalFailure()) return;
   const std::string path = pathOf("stream.mcap");

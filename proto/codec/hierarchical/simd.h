@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Vectors of 128 bits: SSE2's, NEON's and WebAssembly's, whatever the target has (SIMDe).
+// Vectors of 128 bits for SSE2, NEON and WebAssembly, from one source (SIMDe).
 #pragma once
 
 #include <array>
@@ -10,7 +10,7 @@
 
 namespace clothstream::codec::hierarchical {
 
-// SIMDe spells these out lane by lane for WebAssembly, which has an instruction for each.
+// SIMDe writes these lane by lane for WebAssembly, which has an instruction for each.
 #ifdef __wasm_simd128__
 inline int highestBitsOf8(simde__m128i v) {
   return static_cast<int>(wasm_i8x16_bitmask(simde__m128i_to_wasm_v128(v)));
@@ -34,8 +34,8 @@ inline simde__m128i dotPairsOf16(simde__m128i a, simde__m128i b) {
 }
 #endif
 
-// Addresses of loads and stores are aligned to 16 bytes. Arithmetic is modulo the width unless said
-// otherwise.
+// Addresses of loads and stores are aligned to 16 bytes. Arithmetic is modulo the lane's width unless a
+// comment says otherwise.
 struct Int32x4 {
   simde__m128i v;
 
@@ -52,33 +52,33 @@ struct Int32x4 {
   friend Int32x4 operator*(Int32x4 a, std::int32_t b) {
     return {simde_mm_mullo_epi32(a.v, simde_mm_set1_epi32(b))};
   }
-  // Keeps the sign.
+  // Arithmetic shift: keeps the sign.
   Int32x4 shiftedRight(int bits) const { return {simde_mm_sra_epi32(v, simde_mm_cvtsi32_si128(bits))}; }
   Int32x4 shiftedLeft(int bits) const { return {simde_mm_sll_epi32(v, simde_mm_cvtsi32_si128(bits))}; }
-  // Brings in zeros.
+  // Logical shift: brings in zeros.
   Int32x4 bitsShiftedRight(int bits) const { return {simde_mm_srl_epi32(v, simde_mm_cvtsi32_si128(bits))}; }
-  // Whether the first three are the same.
+  // True if the first three lanes are equal.
   bool sameThree(Int32x4 other) const {
     return (highestBitsOf8(simde_mm_cmpeq_epi32(v, other.v)) & 0xfff) == 0xfff;
   }
   friend Int32x4 operator&(Int32x4 a, Int32x4 b) { return {simde_mm_and_si128(a.v, b.v)}; }
   friend Int32x4 operator|(Int32x4 a, Int32x4 b) { return {simde_mm_or_si128(a.v, b.v)}; }
   friend Int32x4 operator^(Int32x4 a, Int32x4 b) { return {simde_mm_xor_si128(a.v, b.v)}; }
-  // The bits of b that are not a's.
+  // Bits of b that are not set in a.
   static Int32x4 without(Int32x4 a, Int32x4 b) { return {simde_mm_andnot_si128(a.v, b.v)}; }
-  // All bits where it is so, else none.
+  // All bits of a lane if the comparison holds, otherwise none.
   friend Int32x4 operator>(Int32x4 a, Int32x4 b) { return {simde_mm_cmpgt_epi32(a.v, b.v)}; }
   friend Int32x4 operator==(Int32x4 a, Int32x4 b) { return {simde_mm_cmpeq_epi32(a.v, b.v)}; }
   Int32x4 magnitude() const {
     const Int32x4 sign = shiftedRight(31);
     return (*this ^ sign) - sign;
   }
-  // A bit a lane: its highest.
+  // Highest bit of each lane, as a number of four bits.
   int signs() const { return highestBitsOf32(v); }
   std::int32_t fourth() const { return simde_mm_cvtsi128_si32(simde_mm_shuffle_epi32(v, 0xff)); }
 };
 
-// Where `mask` has all bits `yes`, where it has none `no`.
+// Lanes of `yes` where `mask` has all bits set, lanes of `no` where it has none.
 inline Int32x4 select(Int32x4 mask, Int32x4 yes, Int32x4 no) {
   return (mask & yes) | Int32x4::without(mask, no);
 }
@@ -89,20 +89,20 @@ struct Float32x4 {
   static Float32x4 of(Int32x4 a) { return {simde_mm_cvtepi32_ps(a.v)}; }
   static Float32x4 ofBits(Int32x4 a) { return {simde_mm_castsi128_ps(a.v)}; }
   static Float32x4 all(float value) { return {simde_mm_set1_ps(value)}; }
-  // The first three, to any address.
+  // Stores the first three lanes to any address.
   void storeThree(float* to) const {
     simde_mm_storel_pi(reinterpret_cast<simde__m64*>(to), v);
     simde_mm_store_ss(to + 2, simde_mm_movehl_ps(v, v));
   }
   Int32x4 bits() const { return {simde_mm_castps_si128(v)}; }
-  // To the nearest, the even one of two; towards zero. -2^31 where it is beyond 32 bits.
+  // Rounds to nearest even; truncates towards zero. Gives -2^31 for values beyond 32 bits.
   Int32x4 rounded() const { return {simde_mm_cvtps_epi32(v)}; }
   Int32x4 truncated() const { return {simde_mm_cvttps_epi32(v)}; }
   Float32x4 magnitude() const { return {simde_mm_andnot_ps(simde_mm_set1_ps(-0.0f), v)}; }
   friend Float32x4 operator+(Float32x4 a, Float32x4 b) { return {simde_mm_add_ps(a.v, b.v)}; }
   friend Float32x4 operator-(Float32x4 a, Float32x4 b) { return {simde_mm_sub_ps(a.v, b.v)}; }
   friend Float32x4 operator*(Float32x4 a, Float32x4 b) { return {simde_mm_mul_ps(a.v, b.v)}; }
-  // All bits where it is so, else none.
+  // All bits of a lane if the comparison holds, otherwise none.
   friend Int32x4 operator>(Float32x4 a, Float32x4 b) {
     return {simde_mm_castps_si128(simde_mm_cmpgt_ps(a.v, b.v))};
   }
@@ -114,14 +114,14 @@ inline Float32x4 select(Int32x4 mask, Float32x4 yes, Float32x4 no) {
   return Float32x4::ofBits(select(mask, yes.bits(), no.bits()));
 }
 
-// The same of as many vertices as there are lanes.
+// Vectors of as many vertices as there are lanes.
 template <class Lanes>
 struct VectorsOf {
   Lanes x, y, z;
 };
 using Vectors4 = VectorsOf<Int32x4>;
 
-// Of four vertices x, y and z (the fourth lane of each, in `w`) to the x of all, and so on.
+// From x, y, z of each of four vertices to all x, all y, all z. The fourth lane of each vertex becomes `w`.
 inline Vectors4 transposed(const std::array<Int32x4, 4>& a) {
   const simde__m128i low01 = simde_mm_unpacklo_epi32(a[0].v, a[1].v),
                      low23 = simde_mm_unpacklo_epi32(a[2].v, a[3].v);
@@ -131,7 +131,7 @@ inline Vectors4 transposed(const std::array<Int32x4, 4>& a) {
           {simde_mm_unpackhi_epi64(low01, low23)},
           {simde_mm_unpacklo_epi64(high01, high23)}};
 }
-// And back; the fourth lanes are zero.
+// The inverse; fourth lanes are zero.
 inline std::array<Int32x4, 4> transposed(const Vectors4& a) {
   const simde__m128i zero = simde_mm_setzero_si128();
   const simde__m128i lowXy = simde_mm_unpacklo_epi32(a.x.v, a.y.v),
@@ -151,7 +151,7 @@ struct Int16x8 {
     return {simde_mm_load_si128(reinterpret_cast<const simde__m128i*>(from))};
   }
   void store(std::int16_t* to) const { simde_mm_store_si128(reinterpret_cast<simde__m128i*>(to), v); }
-  // The first four, to any address.
+  // Stores the first four lanes to any address.
   void storeFour(std::uint16_t* to) const { simde_mm_storel_epi64(reinterpret_cast<simde__m128i*>(to), v); }
   static Int16x8 zero() { return {simde_mm_setzero_si128()}; }
   static Int16x8 all(std::int16_t value) { return {simde_mm_set1_epi16(value)}; }
@@ -159,7 +159,7 @@ struct Int16x8 {
                     std::int16_t a5) {
     return {simde_mm_setr_epi16(a0, a1, a2, a3, a4, a5, 0, 0)};
   }
-  // a0 a1 four times.
+  // a0 a1, four times.
   static Int16x8 allPairs(std::int16_t a0, std::int16_t a1) {
     return {simde_mm_setr_epi16(a0, a1, a0, a1, a0, a1, a0, a1)};
   }
@@ -173,19 +173,19 @@ struct Int16x8 {
   }
   // 0 a0 0 a2 0 a4 0 a6.
   Int16x8 evenToOdd() const { return {simde_mm_slli_epi32(v, 16)}; }
-  // The pair of these lanes four times.
+  // One pair of lanes, four times.
   template <int pair>
   Int16x8 broadcastPair() const {
     return {simde_mm_shuffle_epi32(v, pair * 0x55)};
   }
-  // The even or the odd lanes, each with its sign.
+  // Even or odd lanes, sign-extended.
   Int32x4 even() const { return {simde_mm_srai_epi32(simde_mm_slli_epi32(v, 16), 16)}; }
   Int32x4 odd() const { return {simde_mm_srai_epi32(v, 16)}; }
-  // Saturates.
+  // Saturating subtraction.
   friend Int16x8 operator-(Int16x8 a, Int16x8 b) { return {simde_mm_subs_epi16(a.v, b.v)}; }
 };
 
-// a's lanes, then b's; saturates.
+// Lanes of a, then of b, saturated.
 inline Int16x8 narrow(Int32x4 a, Int32x4 b) {
   return {simde_mm_packs_epi32(a.v, b.v)};
 }
@@ -208,13 +208,13 @@ inline Int16x8 evenAndOdd(Int16x8 a, Int16x8 b) {
   return {simde_mm_or_si128(simde_mm_and_si128(a.v, mask), simde_mm_andnot_si128(mask, b.v))};
 }
 
-// The four bytes, from the lowest, to the first four lanes; the others 0.
+// The four bytes, lowest first, in the first four lanes; the other lanes are 0.
 inline Int16x8 widenBytes(std::uint32_t bytes) {
   const simde__m128i all = simde_mm_cvtsi32_si128(static_cast<std::int32_t>(bytes));
   return {simde_mm_unpacklo_epi8(all, simde_mm_setzero_si128())};
 }
 
-// From 32 bits each, whose lowest 16 count: a0 b0 a1 b1 a2 b2 a3 b3.
+// From the low 16 bits of 32-bit lanes: a0 b0 a1 b1 a2 b2 a3 b3.
 inline Int16x8 pairs(Int32x4 a, Int32x4 b) {
   return {
       simde_mm_or_si128(simde_mm_and_si128(a.v, simde_mm_set1_epi32(0xffff)), simde_mm_slli_epi32(b.v, 16))};
@@ -223,7 +223,7 @@ inline Int16x8 pairs(Int32x4 a, Int32x4 b) {
 inline Int16x8 pairs(Int32x4 a) {
   return {simde_mm_and_si128(a.v, simde_mm_set1_epi32(0xffff))};
 }
-// Their 32-bit lanes by turns: a0 b0 a1 b1, a2 b2 a3 b3; and 64-bit lanes: a0 b0, a1 b1.
+// Alternates 32-bit lanes (a0 b0 a1 b1, a2 b2 a3 b3) and 64-bit lanes (a0 b0, a1 b1).
 inline Int16x8 interleave32Low(Int16x8 a, Int16x8 b) {
   return {simde_mm_unpacklo_epi32(a.v, b.v)};
 }
@@ -237,7 +237,7 @@ inline Int16x8 interleave64High(Int16x8 a, Int16x8 b) {
   return {simde_mm_unpackhi_epi64(a.v, b.v)};
 }
 
-// The same bits.
+// Reinterprets the bits.
 inline Int16x8 asHalves(Int32x4 a) {
   return {a.v};
 }
@@ -254,7 +254,7 @@ inline Int32x4 addNeighbours(Int32x4 a, Int32x4 b) {
                              simde_mm_castps_si128(simde_mm_shuffle_ps(low, high, 0xdd)))};
 }
 
-// Of sixteen ascending values, the last of which is above `wanted`: how many are not above it.
+// Number of sixteen ascending values that are not above `wanted`. The last value is above it.
 inline std::uint32_t countNotAbove(Int16x8 low, Int16x8 high, Int16x8 wanted) {
   const simde__m128i above =
       simde_mm_packs_epi16(simde_mm_cmpgt_epi16(low.v, wanted.v), simde_mm_cmpgt_epi16(high.v, wanted.v));
@@ -262,7 +262,8 @@ inline std::uint32_t countNotAbove(Int16x8 low, Int16x8 high, Int16x8 wanted) {
       std::countr_zero(static_cast<std::uint32_t>(highestBitsOf8(above)) | 1u << 15));
 }
 
-// Two of a kind, operation by operation: where each waits for the one before, a processor works on the other.
+// Two vectors, processed operation by operation: while one waits for a result, the processor works on the
+// other.
 template <class Lanes>
 struct Twice {
   Lanes first, second;
