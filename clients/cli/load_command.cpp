@@ -159,7 +159,7 @@ void LoadCommand::add(CLI::App& app) {
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
   command_
-      ->add_option("--intruders", options_.intruders,
+      ->add_option("--intruders", options_.hostileClients,
                    "Number of additional hostile clients, which send invalid messages, never read, "
                    "disconnect and reconnect")
       ->check(CLI::Range(0u, 10'000u))
