@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What both endpoints promise, tested with well-behaved and misbehaving clients.
+// Tests of both endpoints with well-behaved and misbehaving clients.
 #include <chrono>
 #include <cstdio>
 #include <functional>
@@ -82,7 +82,7 @@ TEST_P(Endpoint, NamesUnknownSceneInErrorAndAtEndOfStream) {
   EXPECT_EQ(end.text, viewer.errors[0].text().substr(0, transport_->maxEndText()));
 }
 
-TEST_P(Endpoint, EndsStreamOfMessageBeforeHello) {
+TEST_P(Endpoint, EndsStreamAfterMessageBeforeHello) {
   const auto client = transport_->connect();
   client->send(colliderPose(0.25f));
   Viewer viewer;
@@ -99,7 +99,7 @@ TEST_P(Endpoint, ReportsGarbageToItsSenderOnly) {
   EXPECT_TRUE(other.viewer.errors.empty());
 }
 
-TEST_P(Endpoint, EndsStreamOfRepeatedGarbage) {
+TEST_P(Endpoint, EndsStreamAfterRepeatedGarbage) {
   Joined other = join(), client = join();
   for (int i = 0; i < 100 && client.client->send(garbage(50)); ++i) {
   }
@@ -107,7 +107,7 @@ TEST_P(Endpoint, EndsStreamOfRepeatedGarbage) {
   EXPECT_TRUE(other.see(5));
 }
 
-TEST_P(Endpoint, EndsStreamOfTooLargeMessage) {
+TEST_P(Endpoint, EndsStreamAfterTooLargeMessage) {
   Joined other = join(), client = join();
   client.client->send(garbage(64 * 1024 + 1));
   EXPECT_EQ(client.seeEnd().code, transport_->codeOf(EndCause::tooLarge));

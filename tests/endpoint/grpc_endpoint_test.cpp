@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What only the gRPC endpoint does: unary calls, health checks, reflection, statuses.
+// Tests of the gRPC endpoint only: unary calls, health checks, reflection, statuses.
 #include "server/endpoint/grpc/grpc_endpoint.h"
 
 #include <chrono>

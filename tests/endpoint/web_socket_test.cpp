@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What only the WebSocket endpoint does: handshake, close frames, detection of clients that vanish.
+// Tests of the WebSocket endpoint only: handshake, close frames, detection of clients that vanish.
 #include <chrono>
 #include <memory>
 
