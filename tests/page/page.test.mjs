@@ -7,7 +7,7 @@ import { mkdtemp, readFile, rm, writeFile } from "node:fs/promises";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { after, before, test } from "node:test";
-import { kChromium, launchBrowser, luminance, openPage, takePicture, untilFrames, untilState } from "./browser.mjs";
+import { kChromium, launchBrowser, kPicture, luminance, openPage, takePicture, takePixels, untilFrames, untilState } from "./browser.mjs";
 import { makeLink } from "./link.mjs";
 import { startServer } from "./server.mjs";
 
@@ -187,7 +187,7 @@ test("the cloth hangs from its pins, which stay where they start", () =>
 
 // In the scene whose cloth comes to rest, so that the picture shows what the points say.
 test("the cloth is lit and casts a shadow", () =>
-  withPage({ query: "?scene=sphere_drop" }, async (page) => {
+  withPage({ query: "?scene=sphere_drop", viewport: kPicture }, async (page) => {
     await untilState(page, "live");
     for (let before, after; furthest(before, after) > 2 * kMaxError; ) {
       before = (await look(page)).positions;
@@ -204,7 +204,7 @@ test("the cloth is lit and casts a shadow", () =>
       const pairs = shades.filter(([x]) => -x > end).map(([x, y, z]) => [project([x, y, z]), project([-x, y, z])]);
       return { cloth: vertices.map(project).filter(open), floor: pairs.filter((pair) => pair.every(open)) };
     });
-    const picture = await takePicture(page, "sphere_drop");
+    const picture = await takePixels(page, "sphere_drop");
 
     // Red outweighs blue on the cloth, not on the floor.
     const isCloth = ([red, , blue]) => red > blue + 20;
@@ -224,7 +224,7 @@ test("the cloth is lit and casts a shadow", () =>
 
 // The hem of the round cloth is a part of its own, in a colour with more green. Seen from the front, cloth hides its back.
 test("a mesh falls and is drawn in the colours of its parts", () =>
-  withPage({ query: "?scene=tablecloth" }, async (page) => {
+  withPage({ query: "?scene=tablecloth", viewport: kPicture }, async (page) => {
     await untilState(page, "live");
     await untilFrames(page, 60);
     const seen = await look(page);
@@ -253,7 +253,7 @@ test("a mesh falls and is drawn in the colours of its parts", () =>
     do {
       assert.ok(++pictures < 100, "the cloth comes to rest");
       const first = await placesNow();
-      picture = await takePicture(page, "tablecloth");
+      picture = await takePixels(page, "tablecloth");
       const second = await placesNow();
       points = { linen: still(first.linen, second.linen), hem: still(first.hem, second.hem) };
     } while (points.linen.length < 100 || points.hem.length < 20);
@@ -283,7 +283,7 @@ test("a sheet falls into folds and lies on itself", () =>
   }));
 
 test("the sphere can be dragged through the cloth", () =>
-  withPage({}, async (page) => {
+  withPage({ viewport: kPicture }, async (page) => {
     await untilState(page, "live");
     // From the side, so that the drag goes across the cloth: 90 degrees less those of the default view, 5 a key.
     await page.focus("#canvas");
@@ -331,7 +331,7 @@ test("the sphere can be dragged through the cloth", () =>
 
 // The middle of the lower edge goes where the mouse does, and falls back when it lets go.
 test("the cloth can be taken hold of", () =>
-  withPage({ query: "?scene=hanging" }, async (page) => {
+  withPage({ query: "?scene=hanging", viewport: kPicture }, async (page) => {
     await untilState(page, "live");
     await untilFrames(page, 60);
     const corner = 39 * 32 + 16;
@@ -377,7 +377,7 @@ test("a slider works by keyboard, and others in the scene see it", () =>
 
 // The flag pulls at its pole; as constraints its springs keep their length, and the server's report says so.
 test("each cloth's solver can be chosen, and the panel says how its simulation does", () =>
-  withPage({ query: "?scene=flag", viewport: { width: 1000, height: 900 } }, (first) =>
+  withPage({ query: "?scene=flag", viewport: { width: 660, height: 600 } }, (first) =>
     withPage({ query: "?scene=flag" }, async (second) => {
       await untilState(first, "live");
       await untilState(second, "live");
