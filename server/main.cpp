@@ -131,7 +131,7 @@ std::vector<model::Scene> loadScenes(const ProgramOptions& options) {
   return scenes;
 }
 
-// Directory of the page in a build or an installation, relative to the program. Empty if there is none.
+// Directory of the page in a build or an installation, relative to the program. Empty if it does not exist.
 std::filesystem::path pageNextToProgram() {
   const std::filesystem::path programs = std::filesystem::read_symlink("/proc/self/exe").parent_path();
   for (const char* place : {"../web", "../share/clothstream/web"})

@@ -97,7 +97,7 @@ class OptionTable {
   // Effective values as an option file.
   std::string toToml() const;
   std::string toMarkdown() const;
-  // What to say about a word of the command line that nothing expects.
+  // Error for an unknown word of the command line.
   std::string unexpected(const std::string& word) const;
 
  private:

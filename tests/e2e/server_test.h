@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What tests of programs and clients against the real clothstream-server have in common.
+// Fixture for tests of clients against a real clothstream-server.
 #pragma once
 
 #include <chrono>
@@ -18,7 +18,7 @@
 
 namespace clothstream::e2e {
 
-// Generous: sanitizers, validation and software Vulkan on a busy machine.
+// Long enough for sanitizers, validation and software Vulkan on a busy machine.
 inline constexpr std::chrono::seconds kPatience{60};
 
 inline bool eventually(const std::function<bool()>& holds) {
@@ -34,8 +34,8 @@ class ServerTest : public ::testing::Test {
   using Arguments = std::vector<std::string>;
   static inline const Arguments kSmallScene{"--scene", "small", "--scene-file", "tests/e2e/small.json"};
 
-  // At ports that are free, unless there is one for gRPC. Skips the test where there is no Vulkan; it fails,
-  // or is skipped, when this returns without an address.
+  // Starts a server on free ports; `grpcPort` may name another port. Skips the test if Vulkan is missing. If
+  // the address is empty afterwards, the test has failed or is skipped.
   void startServer(const Arguments& more = kSmallScene, const std::string& grpcPort = "0") {
     Arguments command{CLOTHSTREAM_SERVER, "--port", "0", "--grpc-port", grpcPort};
     command.insert(command.end(), more.begin(), more.end());
@@ -60,7 +60,7 @@ class ServerTest : public ::testing::Test {
   void TearDown() override {
     if (!server_) return;
     stopServer();
-    if (HasFailure()) std::cerr << "The server said:\n" << server_->output() << server_->errors();
+    if (HasFailure()) std::cerr << "Output of the server:\n" << server_->output() << server_->errors();
   }
 
   static std::uint16_t portIn(const std::string& address) {
@@ -68,7 +68,7 @@ class ServerTest : public ::testing::Test {
   }
 
   std::unique_ptr<Process> server_;
-  std::string address_, web_;  // of gRPC and of the page, HOST:PORT
+  std::string address_, web_;  // HOST:PORT of gRPC and of the page
 };
 
 }  // namespace clothstream::e2e
