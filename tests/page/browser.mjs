@@ -16,6 +16,9 @@ export const kPicture = { width: 800, height: 450 };
 // Size of pages between screenshots. Software rendering takes most of the tests' time, in proportion to the pixels.
 // The width keeps the layout of wide screens.
 const kQuick = { width: 656, height: 200 };
+// Milliseconds between drawn frames, at least. Without a pause, software rendering would take the processors from the
+// server.
+const kDrawPeriodMs = 50;
 
 export function launchBrowser() {
   return chromium.launch({
@@ -40,6 +43,10 @@ export async function openPage(browser, url, { prepare, viewport } = {}) {
   page.setDefaultTimeout(kWaitMs);
   page.errors = [];
   page.on("pageerror", (error) => page.errors.push(String(error)));
+  await page.addInitScript((period) => {
+    const draw = window.requestAnimationFrame.bind(window);
+    window.requestAnimationFrame = (callback) => setTimeout(() => draw(callback), period);
+  }, kDrawPeriodMs);
   if (prepare) await page.addInitScript(prepare);
   await page.goto(url);
   return page;
