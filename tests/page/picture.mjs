@@ -8,7 +8,7 @@ import { mkdtemp, readdir, rm, writeFile } from "node:fs/promises";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { fileURLToPath } from "node:url";
-import { launchBrowser, openPage, untilFrames, untilState } from "./browser.mjs";
+import { launchBrowser, openPage, untilState } from "./browser.mjs";
 import { startServer } from "./server.mjs";
 
 const kDocs = fileURLToPath(new URL("../../docs/", import.meta.url));
@@ -19,6 +19,12 @@ const kStart = 6.25; // s, after the first swing
 const kFramesPerSecond = 12;
 const kSlow = 0.1; // speed of the playback while frames are taken
 
+// Turns the view around the curtain, so that the push is visible.
+async function turnView(page) {
+  await page.focus("#canvas");
+  for (let i = 0; i < 4; ++i) await page.keyboard.press("ArrowRight");
+}
+
 const folder = await mkdtemp(join(tmpdir(), "clothstream-picture-"));
 const browser = await launchBrowser();
 let server;
@@ -26,10 +32,15 @@ try {
   server = await startServer(0, ["--scene", "curtain", "--record", folder]);
   const page = await openPage(browser, server.url, { viewport: kDesktop });
   await untilState(page, "live");
-  await page.waitForFunction(() => window.clothstream.statistics.tick / 240 > 3 && window.clothstream.colliders[0].position[2] < -0.25);
-  await untilFrames(page, 2);
+  await turnView(page);
+  await page.waitForFunction(
+    () =>
+      window.clothstream.statistics.tick / 72 > 5 &&
+      window.clothstream.colliders[0].position[2] < -0.5 &&
+      document.getElementById("notice").hidden,
+  );
   await page.screenshot({ path: join(kDocs, "picture.png") });
-  await page.waitForFunction((end) => window.clothstream.statistics.tick / 240 > end, kStart + kSwing + 1);
+  await page.waitForFunction((end) => window.clothstream.statistics.tick / 72 > end, kStart + kSwing + 1);
   await page.close();
   await server.stop();
 
@@ -38,6 +49,7 @@ try {
   const player = await openPage(browser, server.url, { viewport: kMoving });
   await untilState(player, "live");
   await player.addStyleTag({ content: ".card { display: none !important; }" });
+  await turnView(player);
   const frames = [];
   for (let frame = 0; frame < kSwing * kFramesPerSecond; ++frame) {
     await player.waitForFunction((time) => window.clothstream.playback.position >= time, kStart + frame / kFramesPerSecond);
@@ -45,7 +57,7 @@ try {
     await writeFile(file, await player.screenshot());
     frames.push(file);
   }
-  const options = ["-loop", "0", "-lossy", "-q", "60", "-m", "4", "-d", String(Math.round(1000 / kFramesPerSecond))];
+  const options = ["-loop", "0", "-lossy", "-q", "75", "-m", "4", "-d", String(Math.round(1000 / kFramesPerSecond))];
   execFileSync("img2webp", [...options, ...frames, "-o", join(kDocs, "cloth.webp")]);
 } finally {
   await browser.close();
