@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// One client of the core, typed: messages in and out, and what the newest frame holds.
+// Typed interface to one client of the core: messages in and out, and the contents of the newest frame.
 
 import type { CoreModule } from "./wasm";
 
@@ -49,11 +49,11 @@ export interface ClothLayout {
   indexCount: number;
 }
 
-// What a mesh is drawn with; nothing of it is there for a grid.
+// Texture coordinates and submeshes of a mesh. Empty for a grid.
 export interface Drawing {
-  uvs: Float32Array; // (u, v) each, v upwards; empty where there are none
-  uvIndices: Uint32Array; // one a corner of the cloth's triangles
-  submeshes: { name: string; firstIndex: number; indexCount: number }[]; // of the scene's triangles
+  uvs: Float32Array; // (u, v) pairs, v upwards; may be empty
+  uvIndices: Uint32Array; // one per corner of the cloth's triangles
+  submeshes: { name: string; firstIndex: number; indexCount: number }[]; // indices count in the scene's triangles
 }
 
 export enum Shape {
@@ -64,26 +64,26 @@ export enum Shape {
   hull = 4,
 }
 
-// Sizes are those of its shape, in its own frame (core.h); metres.
+// Lengths in metres, in the collider's own frame (core.h).
 export interface Collider {
   index: number;
   name: string;
   shape: Shape;
   position: Vec3;
-  orientation: readonly [number, number, number, number]; // x y z w
+  orientation: readonly [number, number, number, number]; // quaternion x, y, z, w
   radius: number;
   length: number;
   size: Vec3;
-  participantId: bigint; // 0: the scene's
+  participantId: bigint; // 0 for a collider of the scene
 }
 
-// Corners, 3 floats each, and triangles.
+// Vertices (3 floats each) and triangles (3 indices each).
 export interface Hull {
   vertices: Float32Array;
   triangles: Uint32Array;
 }
 
-// cs_role; a server may have others.
+// Names of cs_role. A newer server may have more roles.
 export const Roles: ReadonlyMap<number, string> = new Map([
   [1, "viewer"],
   [2, "participant"],
@@ -92,13 +92,13 @@ export const Roles: ReadonlyMap<number, string> = new Map([
 
 export interface Participant {
   id: bigint;
-  name: string; // of who has none: its program's
+  name: string; // the program's name if the participant has none
   role: number;
-  away: boolean; // cut off, and held for a while
+  away: boolean; // disconnected, within the reconnect grace
   self: boolean;
 }
 
-// {stiffness in N/m, damping in N s/m}
+// Stiffness in N/m and damping in N s/m.
 export type Spring = readonly [number, number];
 
 export interface Environment {
@@ -116,7 +116,7 @@ export interface ClothParameters {
   damping: number; // 1/s
 }
 
-// cs_solver; a server may have others.
+// Names of cs_solver. A newer server may have more solvers.
 export const Solvers: ReadonlyMap<number, string> = new Map([
   [1, "mass-spring"],
   [2, "constraint"],
@@ -125,7 +125,7 @@ export const Solvers: ReadonlyMap<number, string> = new Map([
   [5, "implicit Euler"],
 ]);
 
-// How the simulation of a cloth does (cs_cloth_report); SI units, strains as parts of a length.
+// Health of one cloth's simulation (cs_cloth_report). SI units; strains are fractions of a length.
 export interface ClothReport {
   activeConstraints: number;
   iterations: number;
@@ -141,10 +141,10 @@ export interface ClothReport {
   tick: number;
 }
 
-// Where a recording that is played stands.
+// State of a recording that is played.
 export interface Playback {
   length: number; // s
-  position: number; // s from its start, now
+  position: number; // current time in the recording, s
   speed: number;
   loop: boolean;
   paused: boolean;
@@ -177,14 +177,14 @@ const kScratchBytes = Math.max(
   kParticipantBytes,
 );
 
-// Who joins: a name that others see, the role that is wanted, and whether frames are to be shown evenly, a little later.
+// A joining participant: displayed name, requested role, and whether frames are played out smoothly with a delay.
 export interface Identity {
   name: string;
   role: number;
   smooth: boolean;
 }
 
-// Views that it gives (positions, normals, triangles) look into the core's memory: they are good until the next call.
+// Returned views (positions, normals, triangles) point into the core's memory. They are valid until the next call.
 export class Client {
   private readonly handle: number;
   private readonly scratch: number;
@@ -192,7 +192,7 @@ export class Client {
   private inbox = 0;
   private inboxBytes = 0;
 
-  // `scene` may be "" for the server's default, `name` too; `role` is what is wanted of Roles, or 0.
+  // An empty `scene` means the server's default scene; `name` may be empty. `role` is a key of Roles, or 0 for any.
   constructor(
     private readonly core: CoreModule,
     scene: string,
@@ -216,7 +216,7 @@ export class Client {
     this.core.exports.free(this.inbox);
   }
 
-  // One ServerMessage; gives a set of ClientEvent bits.
+  // Handles one ServerMessage. Returns ClientEvent bits.
   receive(message: ArrayBuffer): number {
     if (message.byteLength > this.inboxBytes) {
       this.core.exports.free(this.inbox);
@@ -227,22 +227,22 @@ export class Client {
     return this.core.exports.cs_receive(this.handle, this.inbox, message.byteLength, nowUs());
   }
 
-  // A connection begins; the first message from here on is Hello.
+  // Starts a connection. The next outgoing message is Hello.
   connecting(): void {
     this.core.exports.cs_connecting(this.handle, nowUs());
   }
 
-  // The connection is lost, or could not be made.
+  // Ends a connection that was lost or could not be opened.
   disconnected(): void {
     this.core.exports.cs_disconnected(this.handle, nowUs());
   }
 
-  // When to drop the connection that there is, if any, and open another; on performance.now()'s clock.
+  // Time to drop the current connection, if any, and to open a new one; on the clock of performance.now().
   get connectAtMs(): number {
     return Number(BigInt.asUintN(64, this.core.exports.cs_connect_at(this.handle))) / 1000;
   }
 
-  // All who are in the scene, in the order in which they joined.
+  // Participants of the scene, in the order in which they joined.
   participants(): Participant[] {
     const own = this.core.exports.cs_participant_id(this.handle);
     const count = this.core.exports.cs_participant_count(this.handle);
@@ -251,7 +251,7 @@ export class Client {
       const program = this.core.text(view.getUint32(at + 12, true));
       return {
         id,
-        name: this.core.text(view.getUint32(at + 8, true)) || program || "somebody",
+        name: this.core.text(view.getUint32(at + 8, true)) || program || "unnamed",
         role: view.getUint32(at + 16, true),
         away: view.getInt32(at + 20, true) !== 0,
         self: id === own,
@@ -259,12 +259,12 @@ export class Client {
     });
   }
 
-  // Pings; to be called ten times a second or more.
+  // Sends pings and runs timers. Call at least ten times per second.
   update(): void {
     this.core.exports.cs_update(this.handle, nowUs());
   }
 
-  // The next ClientMessage to send: a copy.
+  // Copy of the next ClientMessage to send.
   nextOutgoing(): Uint8Array<ArrayBuffer> | undefined {
     const message = this.core.exports.cs_next_outgoing(this.handle, this.scratch);
     if (message === 0) return undefined;
@@ -310,7 +310,7 @@ export class Client {
     };
   }
 
-  // 3 floats a vertex; rest positions before the first frame.
+  // 3 floats per vertex. Rest positions before the first frame.
   positions(): Float32Array {
     return this.core.floats(this.core.exports.cs_positions(this.handle), 3 * this.vertexCount);
   }
@@ -319,12 +319,12 @@ export class Client {
     return this.core.floats(this.core.exports.cs_normals(this.handle), 3 * this.vertexCount);
   }
 
-  // What is to be drawn at a time of performance.now(): the newest frame, or what play-out makes of the last ones.
+  // Vertices to draw at a time of performance.now(): the newest frame, or the result of play-out.
   shownAt(displayMs: number): { positions: Float32Array; normals: Float32Array } {
     if (!this.playsOut) return { positions: this.positions(), normals: this.normals() };
     const { exports } = this.core;
     exports.cs_play_out(this.handle, nowUs(), BigInt(Math.round(1000 * displayMs)), 0);
-    // The first call may take memory, which detaches views.
+    // The first call may grow the memory, which detaches views.
     const normals = exports.cs_played_normals(this.handle);
     const positions = exports.cs_played_positions(this.handle);
     return {
@@ -350,7 +350,7 @@ export class Client {
     }));
   }
 
-  // Of the cloth of that number: copies.
+  // Copies the texture coordinates and submeshes of a cloth.
   drawing(cloth: number): Drawing {
     const { exports } = this.core;
     const uvs = exports.cs_uvs(this.handle, cloth, this.scratch);
@@ -369,13 +369,13 @@ export class Client {
     };
   }
 
-  // Of the newest frame.
+  // Colliders of the newest frame.
   colliders(): Collider[] {
     const { cs_collider_count, cs_get_collider } = this.core.exports;
     return this.readColliders(cs_collider_count(this.handle), cs_get_collider);
   }
 
-  // Where they are in what the newest shownAt() gave.
+  // Colliders at the time of the last shownAt().
   shownColliders(): Collider[] {
     if (!this.playsOut) return this.colliders();
     const { cs_played_collider_count, cs_get_played_collider } = this.core.exports;
@@ -399,7 +399,7 @@ export class Client {
     }));
   }
 
-  // Of a collider that is a hull: copies.
+  // Copies the geometry of a hull collider.
   hull(collider: Collider): Hull {
     const { cs_get_hull } = this.core.exports;
     const [vertexCount, triangles, indexCount] = [this.scratch, this.scratch + 4, this.scratch + 8];
@@ -416,7 +416,7 @@ export class Client {
     return Array.from({ length: count }, (_, index) => this.core.text(this.core.exports.cs_scene(this.handle, index)));
   }
 
-  // As it stands now; undefined before the description.
+  // Current environment; undefined before the description.
   environment(): Environment | undefined {
     if (this.core.exports.cs_get_environment(this.handle, this.scratch) === 0) return undefined;
     const view = this.core.view();
@@ -429,7 +429,7 @@ export class Client {
     };
   }
 
-  // Of each cloth, as they stand now.
+  // Current parameters of each cloth.
   clothParameters(): ClothParameters[] {
     const count = this.core.exports.cs_cloth_count(this.handle);
     return this.list(count, this.core.exports.cs_get_cloth_parameters, (view, at) => ({
@@ -440,21 +440,21 @@ export class Client {
     }));
   }
 
-  // cs_solver of a cloth.
+  // Solver of a cloth as a cs_solver.
   solver(cloth: number): number {
     this.core.view().setUint32(this.scratch, kClothSettingsVersion, true);
     if (this.core.exports.cs_get_cloth_settings(this.handle, cloth, this.scratch) === 0) return 0;
     return this.core.view().getUint32(this.scratch + kSolverAt, true);
   }
 
-  // The cloth goes on with what it last had for this solver, else with the defaults.
+  // Selects a solver. The cloth keeps the settings that it last had for this solver, or the defaults.
   setSolver(cloth: string, solver: number): void {
     this.core.exports.cs_keep_cloth_settings(this.scratch);
     this.core.view().setUint32(this.scratch + kSolverAt, solver, true);
     this.core.with([cloth], (name) => this.core.exports.cs_change_cloth(this.handle, name!, this.scratch));
   }
 
-  // What a cloth may be made of, and what it was made of last; "" for nothing.
+  // Names of the available materials. material() is the material of a cloth, or "".
   materials(): string[] {
     const count = this.core.exports.cs_material_count(this.handle);
     return Array.from({ length: count }, (_, index) => this.core.text(this.core.exports.cs_material(this.handle, index)));
@@ -472,7 +472,7 @@ export class Client {
     this.core.exports.cs_set_gust(this.handle, strength, seconds);
   }
 
-  // The newest; undefined before the first.
+  // Newest report of a cloth; undefined before the first.
   report(cloth: number): ClothReport | undefined {
     this.core.view().setUint32(this.scratch, kClothReportVersion, true);
     if (this.core.exports.cs_get_cloth_report(this.handle, cloth, this.scratch) === 0) return undefined;
@@ -500,7 +500,7 @@ export class Client {
     );
   }
 
-  // An empty name means every cloth.
+  // Changes a cloth. An empty name means every cloth.
   setCloth(cloth: string, change: Partial<ClothParameters>): void {
     const damping = change.damping === undefined ? undefined : [change.damping];
     this.core.with([cloth, change.structural, change.shear, change.bend, damping], (name, structural, shear, bend, rate) =>
@@ -508,7 +508,7 @@ export class Client {
     );
   }
 
-  // Those of this participant's grabs that hold nothing any more, as the newest ClientEvent.grabs told.
+  // Ids of this participant's grabs that slipped off the cloth, according to the newest ClientEvent.grabs.
   lostGrabs(): number[] {
     const own = this.core.exports.cs_participant_id(this.handle);
     const events = this.list(
@@ -523,7 +523,7 @@ export class Client {
     return events.filter(({ participant, vertices }) => participant === own && vertices === 0).map(({ grab }) => grab);
   }
 
-  // This participant's grab on cloth; none: it lets go. Another id takes hold anew.
+  // Sets this participant's grab on the cloth; undefined releases it. A new id starts a new grab.
   setGrab(grab: { id: number; position: Vec3 } | undefined): void {
     const view = this.core.view();
     if (grab) {
@@ -542,7 +542,7 @@ export class Client {
     );
   }
 
-  // Undefined unless the scene is a recording.
+  // State of the playback; undefined unless the scene is a recording.
   playback(): Playback | undefined {
     if (this.core.exports.cs_get_playback(this.handle, nowUs(), this.scratch) === 0) return undefined;
     const view = this.core.view();
@@ -555,7 +555,7 @@ export class Client {
     };
   }
 
-  // For everybody in the scene, all four.
+  // The four functions below act for every participant of the scene.
   pause(paused: boolean): void {
     this.core.exports.cs_pause(this.handle, paused ? 1 : 0);
   }
