@@ -18,7 +18,7 @@
 #include "server/simulation/bending/bending_stage.h"
 #include "server/simulation/collision/collision_stage.h"
 #include "server/simulation/grid_stage.h"
-#include "server/simulation/hold/hold_stage.h"
+#include "server/simulation/attachment/attachment_stage.h"
 #include "server/simulation/mass_stage.h"
 #include "server/simulation/mesh_stage.h"
 #include "server/simulation/report_stage.h"
@@ -83,7 +83,7 @@ StateBuffers stateOf(const Buffers& b, const CollisionStage& collision) {
   return {.cloths = b.cloths,
           .colliders = collision.colliders(),
           .nearColliders = collision.nearLists(),
-          .toldContacts = collision.toldContacts(),
+          .contactImpulses = collision.contactImpulses(),
           .positions = {&b.state.positions[0], &b.state.positions[1]},
           .velocities = {&b.state.velocities[0], &b.state.velocities[1]}};
 }
@@ -136,7 +136,7 @@ struct ClothSimulation::Pipeline {
   std::unique_ptr<XpbdStage> makeXpbd(std::span<const model::Cloth> cloths);
   std::unique_ptr<AssembledStage> makeAssembled(std::span<const model::Cloth> cloths);
   void makeBending(std::span<const model::Cloth> cloths);
-  void makeHolds(const HoldTables& tables);
+  void makeAttachments(const AttachmentTables& tables);
   void setSolvers(std::span<const model::Cloth> cloths);
   void makeMassStage();
   void setMasses(std::span<const model::Cloth> cloths);
@@ -173,7 +173,7 @@ struct ClothSimulation::Pipeline {
   std::unique_ptr<SelfCollisionStage> selfCollision;  // where a cloth has it
   std::vector<model::Solver> solvers;                 // of the cloths, as the tables have them
   std::vector<shared::vec4> stiffness;                // of their springs
-  std::unique_ptr<HoldStage> holds;                   // where something holds cloth, or did
+  std::unique_ptr<AttachmentStage> attachments;                   // where something holds cloth, or did
   std::unique_ptr<ReportStage> report;                // made when it is first wanted
   std::unique_ptr<MassStage> massChange;              // made when one first changes
   SimulationOptions asked;
@@ -225,15 +225,15 @@ ClothSimulation::Pipeline::Pipeline(const vulkan::Device& on, const model::Scene
   if (SelfCollisionStage::isIn(scene))
     selfCollision =
         std::make_unique<SelfCollisionStage>(on, scene, stateOf(buffers, collision), workgroupSize);
-  if (const HoldTables tables = holdTables(scene); !tables.empty()) {
-    makeHolds(tables);
-    holds->setSlack(scene.cloths);
+  if (const AttachmentTables tables = attachmentTables(scene); !tables.empty()) {
+    makeAttachments(tables);
+    attachments->setSlack(scene.cloths);
   }
   prepare(scene.environment.airDensity);
 }
 
-void ClothSimulation::Pipeline::makeHolds(const HoldTables& tables) {
-  holds = std::make_unique<HoldStage>(device, tables, stateOf(buffers, collision), nodes, workgroupSize);
+void ClothSimulation::Pipeline::makeAttachments(const AttachmentTables& tables) {
+  attachments = std::make_unique<AttachmentStage>(device, tables, stateOf(buffers, collision), nodes, workgroupSize);
 }
 
 // The kernels that the scene starts with, and those that it needs as soon as somebody brings a collider.
@@ -331,9 +331,9 @@ void ClothSimulation::Pipeline::recordInputs(vulkan::Recorder& recorder, const T
   std::memcpy(from.mapped().data(), records.data(), clothBytes);
   recorder.beginStage("inputs");
   recorder.copy(from, buffers.cloths, clothBytes);
-  collision.recordInputs(recorder, inputs.colliders, inputs.tellsContacts);
-  if (!holds && !inputs.grabs.empty()) makeHolds({});
-  if (holds) holds->recordInputs(recorder, inputs.attachments, inputs.grabs);
+  collision.recordInputs(recorder, inputs.colliders, inputs.reportsContacts);
+  if (!attachments && !inputs.grabs.empty()) makeAttachments({});
+  if (attachments) attachments->recordInputs(recorder, inputs.attachments, inputs.grabs);
   recorder.fill(buffers.status, 0, buffers.status.bytes());
   if (selfCollision) selfCollision->recordClear(recorder);
 }
@@ -363,10 +363,10 @@ void ClothSimulation::Pipeline::recordSubsteps(vulkan::Recorder& recorder, const
                            .reserved0 = 0,
                            .reserved1 = 0,
                            .reserved2 = 0};
-  if (holds && holds->aims()) {
+  if (attachments && attachments->aims()) {
     recorder.beginStage("hold");
     recorder.barrier();
-    holds->recordAim(recorder, present, tickRate);
+    attachments->recordAim(recorder, present, tickRate);
   }
   if (collision.active()) {
     float thickness = 0;
@@ -401,7 +401,7 @@ void ClothSimulation::Pipeline::recordSubsteps(vulkan::Recorder& recorder, const
                     .substepRate = tickRate * static_cast<float>(substeps),
                     .firstTile = 0,
                     .reserved = 0});
-    if (holds) holds->recordSubstep(recorder, present, substep, substeps, tickRate);
+    if (attachments) attachments->recordSubstep(recorder, present, substep, substeps, tickRate);
     if (selfCollision) selfCollision->recordSubstep(recorder, present, substep, push.collision);
     present = 1 - present;
   }
@@ -417,8 +417,8 @@ void ClothSimulation::Pipeline::recordStatus(vulkan::Recorder& recorder) {
   if (solves.active()) solves.recordReport(recorder);
   if (assembled) assembled->recordReport(recorder);
   if (selfCollision) selfCollision->recordReport(recorder, slot);
-  if (holds) holds->recordReport(recorder);
-  collision.recordTold(recorder);
+  if (attachments) attachments->recordReport(recorder);
+  collision.recordContacts(recorder);
 }
 
 ClothSimulation::ClothSimulation(const vulkan::Device& device, const model::Scene& scene,
@@ -440,7 +440,7 @@ void ClothSimulation::setCloths(std::span<const model::Cloth> cloths) {
   pipeline_->setSolvers(cloths);
   if (heavier) pipeline_->setMasses(cloths);
   if (pipeline_->selfCollision) pipeline_->selfCollision->setCloths(cloths);
-  if (pipeline_->holds) pipeline_->holds->setSlack(cloths);
+  if (pipeline_->attachments) pipeline_->attachments->setSlack(cloths);
   pipeline_->stiffness = springStiffness(cloths);
   pipeline_->records = std::move(records);
 }
@@ -472,13 +472,13 @@ void ClothSimulation::recordReport(vulkan::Recorder& recorder, const TickInputs&
 }
 
 std::vector<ContactStatus> ClothSimulation::contacts() const {
-  return pipeline_->collision.told();
+  return pipeline_->collision.contacts();
 }
 
 std::vector<GrabStatus> ClothSimulation::grabs() const {
   std::vector<GrabStatus> grabs;
-  if (pipeline_->holds)
-    for (const shared::GrabReport& report : pipeline_->holds->report())
+  if (pipeline_->attachments)
+    for (const shared::GrabReport& report : pipeline_->attachments->report())
       grabs.push_back({report.held, report.slipped});
   return grabs;
 }

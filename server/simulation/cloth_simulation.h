@@ -11,7 +11,7 @@
 #include "server/model/scene.h"
 #include "server/simulation/cloth_report.h"
 #include "server/simulation/collision/moving_collider.h"
-#include "server/simulation/hold/grab.h"
+#include "server/simulation/attachment/grab.h"
 #include "server/simulation/scene_tables.h"
 #include "server/simulation/state_snapshot.h"
 #include "server/vulkan/buffer.h"
@@ -32,7 +32,7 @@ namespace clothstream::simulation {
 struct TickInputs {
   model::Environment environment;
   std::vector<MovingCollider> colliders;  // at most kMaxColliders, in the order in which they act
-  bool tellsContacts = false;             // whether contacts() has something to say after this tick
+  bool reportsContacts = false;             // whether contacts() has something to say after this tick
   // Where each attachment of the scene is at the tick's end, in the order of its cloths; none: where they
   // start.
   std::vector<model::Pose> attachments = {};

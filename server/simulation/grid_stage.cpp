@@ -61,9 +61,9 @@ const Stage& GridStage::advance(const AdvanceVariant& variant) {
           .workgroupSize = cut_.workgroupSize,
           .specialisation = variant.specialisation(cut_.rowsPerInvocation, integrator_)},
       Stage::Buffers{&s.cloths, &tiles_.texels(), s.positions[0], s.velocities[0], s.positions[1],
-                     s.velocities[1], &s.colliders, &s.nearColliders, &s.toldContacts},
+                     s.velocities[1], &s.colliders, &s.nearColliders, &s.contactImpulses},
       Stage::Buffers{&s.cloths, &tiles_.texels(), s.positions[1], s.velocities[1], s.positions[0],
-                     s.velocities[0], &s.colliders, &s.nearColliders, &s.toldContacts});
+                     s.velocities[0], &s.colliders, &s.nearColliders, &s.contactImpulses});
   return *made;
 }
 

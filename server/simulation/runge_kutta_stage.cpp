@@ -53,7 +53,7 @@ Bindings RungeKuttaStage::combineFrom(const vulkan::Device& device, const StateB
   return Bindings(device, combine_[stage],
                   {&state.cloths, &state.colliders, &state.nearColliders, &start_, state.positions[from],
                    state.velocities[from], state.positions[to], state.velocities[to], &start_,
-                   &startVelocities_, &sums_, &velocitySums_, &state.toldContacts});
+                   &startVelocities_, &sums_, &velocitySums_, &state.contactImpulses});
 }
 
 void RungeKuttaStage::record(vulkan::Recorder& recorder, std::uint32_t from,

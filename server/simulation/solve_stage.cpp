@@ -30,7 +30,7 @@ using vulkan::kStorage;
 using vulkan::kTexels;
 
 constexpr std::uint32_t kSolveLanes = CLOTHSTREAM_SOLVE_LANES;
-constexpr std::uint32_t kVectors = 5;  // shaders/solve/system.glsl
+constexpr std::uint32_t kVectors = 5;  // shaders/solve/linear_system.glsl
 // Sizes of dispatches, x, y, z each: of a group's chunks, of its small systems, of the large ones'
 // iterations.
 constexpr std::uint32_t kSize = 3, kSmallSystems = kSize, kIteration = 2 * kSize;
@@ -249,7 +249,7 @@ struct SolveStage::Systems {
         device, kernels.apply(group.on),
         std::initializer_list<const Buffer*>{&state.cloths, &systems.texels(), &chunks.texels(), &vectors,
                                              &state.colliders, &state.nearColliders, &position, &freePosition,
-                                             &freeVelocity, &actives, &state.toldContacts});
+                                             &freeVelocity, &actives, &state.contactImpulses});
   }
 
   void recordPrepare(vulkan::Recorder& recorder, const Group& group, std::uint32_t from, double h) const;

@@ -17,7 +17,7 @@
 namespace clothstream::simulation {
 
 // Belongs to the device's thread. After the forces have given every node a free velocity and position, it
-// solves for what the velocities change by (shaders/solve/weigh.glsl has the systems), moves the nodes by as
+// solves for what the velocities change by (shaders/solve/spring_terms.glsl has the systems), moves the nodes by as
 // much times h, and lets them collide. Large cloths are solved by several workgroups in a dispatch or two an
 // iteration, which are empty once all have converged; the bits are those of one workgroup.
 class SolveStage {

@@ -5,7 +5,7 @@
 #include <algorithm>
 
 #include "server/model/springs.h"
-#include "server/simulation/halves.h"
+#include "server/simulation/whole_number.h"
 #include "server/simulation/scene_tables.h"
 
 namespace clothstream::simulation {

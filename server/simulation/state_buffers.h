@@ -13,7 +13,7 @@ struct StateBuffers {
   const vulkan::Buffer& cloths;
   const vulkan::Buffer& colliders;      // CollisionStage::colliders()
   const vulkan::Buffer& nearColliders;  // CollisionStage::nearLists()
-  const vulkan::Buffer& toldContacts;   // CollisionStage::toldContacts()
+  const vulkan::Buffer& contactImpulses;   // CollisionStage::contactImpulses()
   std::array<const vulkan::Buffer*, 2> positions, velocities;
 };
 

@@ -134,9 +134,9 @@ const Stage& XpbdStage::finish(const XpbdVariant& variant) {
                                 .workgroupSize = cut_.partWorkgroup,
                                 .specialisation = {variant.colliders ? 1u : 0u}},
       Stage::Buffers{&state_.cloths, &tiles_.texels(), one, other, colliders, near, other, otherVelocity,
-                     otherVelocity, &state_.toldContacts},
+                     otherVelocity, &state_.contactImpulses},
       Stage::Buffers{&state_.cloths, &tiles_.texels(), other, one, colliders, near, one, oneVelocity,
-                     oneVelocity, &state_.toldContacts});
+                     oneVelocity, &state_.contactImpulses});
   return *stage;
 }
 

@@ -7,7 +7,7 @@
 
 const int kColliderBinding = 4;
 const int kStateBinding = 6;
-const int kToldBinding = 10;
+const int kContactImpulseBinding = 10;
 
 #include "shaders/assembled/assembled.h"
 

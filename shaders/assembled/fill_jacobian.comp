@@ -23,7 +23,7 @@ layout(push_constant) uniform Push {
   AssemblePush push;
 };
 
-void fillRow(uint row, float takenBack) {
+void fillRow(uint row, float correctionFraction) {
   vec4 link = texelFetch(links, int(row));
   vec4 a = texelFetch(positions, int(link.x));
   vec4 b = texelFetch(positions, int(link.y));
@@ -32,7 +32,7 @@ void fillRow(uint row, float takenBack) {
   float inverseLength = reciprocalSquareRoot(squared);
   precise vec3 direction = inverseLength * d;
   precise vec3 relative = texelFetch(velocities, int(link.y)).xyz - texelFetch(velocities, int(link.x)).xyz;
-  precise float excess = takenBack * (squared * inverseLength - link.z);
+  precise float excess = correctionFraction * (squared * inverseLength - link.z);
   precise float side = push.substepRate * excess + dotProduct(direction, relative);
   blocks[2 * row] = vec4(-direction, a.w);
   blocks[2 * row + 1] = vec4(direction, b.w);
@@ -43,14 +43,14 @@ void main() {
   vec4 part = texelFetch(chunks, int(gl_WorkGroupID.x));
   System system = systemAt(uint(part.x));
   uint chunk = uint(part.y);
-  float takenBack = texelFetch(cloths, system.cloth + 6).y;
+  float correctionFraction = texelFetch(cloths, system.cloth + 6).y;
   uint lane = self();
   do {
     uint k = 0;
     do {
       uint row = rowAt(system, chunk, k, lane);
       if (row < system.endRow) {
-        fillRow(row, takenBack);
+        fillRow(row, correctionFraction);
       }
       ++k;
     } while (k < kLaneRows);

@@ -6,7 +6,7 @@
 #define CLOTHSTREAM_SHADERS_ASSEMBLED_MULTIPLIERS_GLSL
 
 #include "shaders/assembled/rows.glsl"
-#include "shaders/shared/conjugate_gradients.glsl"
+#include "shaders/shared/conjugate_gradient_step.glsl"
 
 layout(binding = 3) uniform samplerBuffer entries;  // EntriesRecord, a row
 layout(binding = 4) uniform samplerBuffer columns;  // NumbersRecord

@@ -2,7 +2,7 @@
 // Collision of a node with moving shapes over a substep, with Coulomb friction: [Va21] 3.4, Alg. 4, and more
 // shapes.
 //
-// The kernel that includes this defines kColliderBinding, the first of two bindings, and kToldBinding, and
+// The kernel that includes this defines kColliderBinding, the first of two bindings, and kContactImpulseBinding, and
 // calls collideWithAll() with a node's index in the scene.
 #ifndef CLOTHSTREAM_SHADERS_COLLISION_COLLIDE_GLSL
 #define CLOTHSTREAM_SHADERS_COLLISION_COLLIDE_GLSL
@@ -14,12 +14,12 @@ layout(binding = kColliderBinding) uniform samplerBuffer colliders;  // Collider
 layout(binding = kColliderBinding +
                  1) uniform samplerBuffer nearColliders;  // a list for each kNearNodes nodes
 
-layout(std430, binding = kToldBinding) buffer ToldContacts {
-  uint toldContacts[];  // a collider, a cloth: kImpulseUnits
+layout(std430, binding = kContactImpulseBinding) buffer ContactImpulses {
+  uint contactImpulses[];  // a collider, a cloth: kImpulseUnits
 };
 
 // Who collides: its cloth's number; 0 where its contacts are not to be told.
-struct Toucher {
+struct CollidingNode {
   uint cloth;
   float inverseMass;
 };
@@ -143,12 +143,12 @@ void tell(uint contact, vec3 gained, float inverseMass) {
   precise float squared = max(dotProduct(gained, gained), 1e-30);
   precise float impulse = (squared * reciprocalSquareRoot(squared)) * reciprocal(inverseMass);
   precise float units = (impulse < kMostImpulse ? impulse : kMostImpulse) * kImpulseUnits;
-  atomicAdd(toldContacts[contact], uint(units) + 1);
+  atomicAdd(contactImpulses[contact], uint(units) + 1);
 }
 
 // Puts a node that comes from `from` out of the collider. Its velocity relative to the surface loses what
 // goes into it, and, of what goes along it, at most friction times that. For nodes that can move.
-void collide(uint index, Collider collider, ColliderFrame frame, CollisionPush push, Toucher who, vec3 from,
+void collide(uint index, Collider collider, ColliderFrame frame, CollisionPush push, CollidingNode who, vec3 from,
              inout vec3 position, inout vec3 velocity) {
   Contact contact = findContact(collider, frame, from, position);
   if (contact.depth <= 0.0) {
@@ -170,14 +170,14 @@ void collide(uint index, Collider collider, ColliderFrame frame, CollisionPush p
     gained = difference;
     velocity = after;
   }
-  if (push.toldCloths > 0 && who.inverseMass > 0.0) {
-    tell(index * push.toldCloths + who.cloth, gained, who.inverseMass);
+  if (push.contactClothCount > 0 && who.inverseMass > 0.0) {
+    tell(index * push.contactClothCount + who.cloth, gained, who.inverseMass);
   }
 }
 
 // Every collider that the node may touch, in ascending order. One that is pushed out of what the list covers
 // goes on with the collider that comes next of all.
-void collideWithAll(uint node, Toucher who, CollisionPush push, float thickness, float friction, vec3 from,
+void collideWithAll(uint node, CollidingNode who, CollisionPush push, float thickness, float friction, vec3 from,
                     inout vec3 position, inout vec3 velocity) {
   NearList list = fetchNearList(node);
   uint i = 0;

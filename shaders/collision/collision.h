@@ -45,7 +45,7 @@ struct CollisionPush {
   float progressAfter;
   float tickRate;  // 1/s
   float substepRate;
-  uint32_t toldCloths;  // cloths of the scene, where contacts are to be told of; else 0
+  uint32_t contactClothCount;  // cloths of the scene, where contacts are to be told of; else 0
   uint32_t reserved0, reserved1;
 };
 

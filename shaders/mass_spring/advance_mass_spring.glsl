@@ -155,8 +155,8 @@ void main() {
       if (!idle) {
         if (node.inverseMass > 0.0) {
           bool exists = strip.row + k <= lastRow;
-          Toucher who =
-              Toucher(uint(strip.cloth) / CLOTHSTREAM_CLOTH_TEXELS, exists ? node.inverseMass : 0.0);
+          CollidingNode who =
+              CollidingNode(uint(strip.cloth) / CLOTHSTREAM_CLOTH_TEXELS, exists ? node.inverseMass : 0.0);
           collideWithAll(start + min(strip.row + k, lastRow) * columns, who, push.collision, thickness,
                          friction, from, node.position, node.velocity);
         }

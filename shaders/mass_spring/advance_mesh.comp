@@ -66,7 +66,7 @@ void main() {
   }
   Node moved = moveNode(here, force, texelFetch(cloths, self.cloth + 1).w);
   if (kColliders && moved.inverseMass > 0.0) {
-    Toucher who = Toucher(uint(self.cloth) / CLOTHSTREAM_CLOTH_TEXELS, moved.inverseMass);
+    CollidingNode who = CollidingNode(uint(self.cloth) / CLOTHSTREAM_CLOTH_TEXELS, moved.inverseMass);
     collideWithAll(self.index, who, push.collision, damping.w, stiffness.w, here.position, moved.position,
                    moved.velocity);
   }

@@ -9,7 +9,7 @@
 
 const int kColliderBinding = 1;
 const int kStateBinding = 3;
-const int kToldBinding = 12;
+const int kContactImpulseBinding = 12;
 
 #include "shaders/shared/simulation.h"
 

@@ -4,7 +4,7 @@
 #define CLOTHSTREAM_SHADERS_MASS_SPRING_STATE_GLSL
 
 const int kColliderBinding = 6;
-const int kToldBinding = 8;
+const int kContactImpulseBinding = 8;
 
 #include "shaders/collision/collide.glsl"
 #include "shaders/mass_spring/air.glsl"

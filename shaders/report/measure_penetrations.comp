@@ -6,7 +6,7 @@
 #extension GL_GOOGLE_include_directive : require
 
 const int kColliderBinding = 4;
-const int kToldBinding = 6;  // nobody collides here
+const int kContactImpulseBinding = 6;  // nobody collides here
 
 #include "shaders/collision/collide.glsl"
 #include "shaders/report/report.h"

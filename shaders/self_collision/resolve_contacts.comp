@@ -12,7 +12,7 @@
 
 const int kMaterialBinding = 0;
 const int kColliderBinding = 2;
-const int kToldBinding = 12;
+const int kContactImpulseBinding = 12;
 
 #include "shaders/collision/collide.glsl"
 #include "shaders/self_collision/neighbours.glsl"
@@ -46,7 +46,7 @@ vec3 contactImpulse(vec3 apart, float squared, vec3 relative, float touching, fl
   precise vec3 direction = apart * inverse;
   vec3 normal = squared < 1e-16 ? vec3(0.0, above ? 1.0 : -1.0, 0.0) : direction;
   precise float overlap = touching - squared * inverse;
-  precise float wanted = push.takenBack * overlap;
+  precise float wanted = push.correctionFraction * overlap;
   float separation = dotProduct(relative, normal);
   precise float along = (wanted < push.pushOutSpeed ? wanted : push.pushOutSpeed) - separation;
   float pressed = max(along, 0.0);
@@ -93,7 +93,7 @@ void main() {
   precise vec3 position = here.xyz + push.substepSeconds * change;
   if (push.collision.colliderCount > 0) {
     // With the cloth's friction and thickness against colliders.
-    Toucher who = Toucher(uint(record) / CLOTHSTREAM_CLOTH_TEXELS, here.w);
+    CollidingNode who = CollidingNode(uint(record) / CLOTHSTREAM_CLOTH_TEXELS, here.w);
     collideWithAll(node, who, push.collision, texelFetch(cloths, record + 3).w,
                    texelFetch(cloths, record + 2).w, texelFetch(startPositions, int(node)).xyz, position,
                    velocity);

@@ -51,7 +51,7 @@ struct ContactPush {
   CollisionPush collision;
   uint32_t nodeCount;
   float substepSeconds;
-  float takenBack;     // of an overlap, 1/s
+  float correctionFraction;     // of an overlap, 1/s
   float pushOutSpeed;  // m/s
 };
 

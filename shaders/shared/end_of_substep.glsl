@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The end of a node's substep where a solver has taken it: there it collides.
 //
-// The kernel that includes this defines kColliderBinding, kToldBinding and, from kStateBinding on, binds the
+// The kernel that includes this defines kColliderBinding, kContactImpulseBinding and, from kStateBinding on, binds the
 // positions at the substep's start, then the positions and velocities that it ends with. `cloths` are its
 // ClothRecords.
 #ifndef CLOTHSTREAM_SHADERS_SHARED_END_OF_SUBSTEP_GLSL
@@ -22,7 +22,7 @@ layout(std430, binding = kStateBinding + 2) buffer Velocities {
 // `record`: the first texel of its cloth.
 void endSubstep(uint index, vec3 position, vec3 velocity, float inverseMass, int record, CollisionPush push) {
   if (inverseMass > 0.0 && push.colliderCount > 0) {
-    Toucher who = Toucher(uint(record) / CLOTHSTREAM_CLOTH_TEXELS, inverseMass);
+    CollidingNode who = CollidingNode(uint(record) / CLOTHSTREAM_CLOTH_TEXELS, inverseMass);
     collideWithAll(index, who, push, texelFetch(cloths, record + 3).w, texelFetch(cloths, record + 2).w,
                    texelFetch(startPositions, int(index)).xyz, position, velocity);
   }

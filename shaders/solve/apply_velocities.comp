@@ -6,9 +6,9 @@
 
 const int kColliderBinding = 4;
 const int kStateBinding = 6;
-const int kToldBinding = 10;
+const int kContactImpulseBinding = 10;
 
-#include "shaders/solve/system.glsl"
+#include "shaders/solve/linear_system.glsl"
 // Reads `cloths`.
 #include "shaders/shared/end_of_substep.glsl"
 

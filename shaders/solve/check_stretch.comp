@@ -4,7 +4,7 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
 
-#include "shaders/solve/weigh.glsl"
+#include "shaders/solve/spring_terms.glsl"
 
 // Whether a spring between here and there is to be a constraint; `longest`: below 0 where there is none.
 bool isStretched(vec4 here, vec4 there, float longest) {

@@ -4,7 +4,7 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
 
-#include "shaders/solve/vectors.glsl"
+#include "shaders/solve/conjugate_gradient.glsl"
 
 // Only the residual's norm, for the report.
 layout(constant_id = 5) const bool kMeasure = false;

@@ -4,7 +4,7 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
 
-#include "shaders/solve/weigh.glsl"
+#include "shaders/solve/spring_terms.glsl"
 
 layout(std430, binding = 10) writeonly buffer Along {
   vec4 along[];  // vectors.glsl

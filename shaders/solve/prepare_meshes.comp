@@ -4,7 +4,7 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
 
-#include "shaders/solve/weigh.glsl"
+#include "shaders/solve/spring_terms.glsl"
 
 layout(binding = 10) uniform samplerBuffer incidences;  // IncidenceRecord, a node
 layout(binding = 11) uniform samplerBuffer lists;       // SpringEndsRecord

@@ -4,7 +4,7 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
 
-#include "shaders/solve/weigh.glsl"
+#include "shaders/solve/spring_terms.glsl"
 
 layout(binding = 10) uniform samplerBuffer springs;  // LinkRecord
 layout(std430, binding = 11) writeonly buffer Rows {

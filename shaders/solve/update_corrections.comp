@@ -3,7 +3,7 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
 
-#include "shaders/solve/vectors.glsl"
+#include "shaders/solve/conjugate_gradient.glsl"
 
 void main() {
   vec4 part = ownChunk();

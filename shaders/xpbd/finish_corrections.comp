@@ -4,7 +4,7 @@
 #extension GL_GOOGLE_include_directive : require
 
 const int kColliderBinding = 4;
-const int kToldBinding = 9;
+const int kContactImpulseBinding = 9;
 
 #include "shaders/collision/collide.glsl"
 #include "shaders/shared/arithmetic.glsl"
@@ -53,7 +53,7 @@ void main() {
   precise vec3 velocity = free + push.substepRate * (node.xyz - snapTiny(expected));
   vec3 position = node.xyz;
   if (kColliders) {
-    collideWithAll(index, Toucher(uint(tile.x), node.w), push.collision, texelFetch(cloths, cloth + 3).w,
+    collideWithAll(index, CollidingNode(uint(tile.x), node.w), push.collision, texelFetch(cloths, cloth + 3).w,
                    texelFetch(cloths, cloth + 2).w, from, position, velocity);
   }
   if (kColliders) {

@@ -98,10 +98,10 @@ AssembledStage::AssembledStage(const vulkan::Device& device, std::span<const mod
                     sizeof(shared::ApplyMultiplierPush), cut_),
              {&state.cloths, &nodeRanges_.texels(), &nodeEntries_.texels(), &nodeRows_.texels(),
               &state.colliders, &state.nearColliders, state.positions[0], state.positions[1],
-              state.velocities[1], &blocks_, &state.toldContacts, &vectors_},
+              state.velocities[1], &blocks_, &state.contactImpulses, &vectors_},
              {&state.cloths, &nodeRanges_.texels(), &nodeEntries_.texels(), &nodeRows_.texels(),
               &state.colliders, &state.nearColliders, state.positions[1], state.positions[0],
-              state.velocities[0], &blocks_, &state.toldContacts, &vectors_}) {
+              state.velocities[0], &blocks_, &state.contactImpulses, &vectors_}) {
   const auto make = [&](const char* name, std::span<const std::uint32_t> spirv) {
     return std::make_unique<Pass>(
         device,

@@ -41,27 +41,27 @@ class CollisionStage {
   shared::CollisionPush push(std::uint32_t substep, std::uint32_t substeps, float tickRate) const;
 
   // After the tick's substeps, with a barrier before.
-  void recordTold(vulkan::Recorder& recorder);
+  void recordContacts(vulkan::Recorder& recorder);
   // Of the last recorded tick, once it is complete.
-  std::vector<ContactStatus> told() const;
+  std::vector<ContactStatus> contacts() const;
 
   const vulkan::Buffer& colliders() const { return colliders_; }
   const vulkan::Buffer& nearLists() const { return nearLists_; }
-  const vulkan::Buffer& toldContacts() const { return toldContacts_; }
+  const vulkan::Buffer& contactImpulses() const { return contactImpulses_; }
 
  private:
-  std::size_t toldBytes() const {
-    return tells_ ? std::size_t{count_} * clothCount_ * sizeof(std::uint32_t) : 0;
+  std::size_t contactBytes() const {
+    return reportsContacts_ ? std::size_t{count_} * clothCount_ * sizeof(std::uint32_t) : 0;
   }
 
   std::uint32_t nodeCount_, clothCount_;
-  bool tells_ = false;
+  bool reportsContacts_ = false;
   std::uint32_t count_ = 0;
   std::uint32_t slot_ = 0;
   ColliderTables tables_;
-  vulkan::Buffer colliders_, bounds_, nearLists_, toldContacts_;
+  vulkan::Buffer colliders_, bounds_, nearLists_, contactImpulses_;
   std::array<vulkan::Buffer, 2> uploads_;  // by turns: a tick may be in flight while the next is recorded
-  std::array<vulkan::Buffer, 2> toldReadbacks_;  // likewise; made when they are first wanted
+  std::array<vulkan::Buffer, 2> contactReadbacks_;  // likewise; made when they are first wanted
   const vulkan::Device& device_;
   vulkan::Kernel kernel_;
   std::array<vulkan::Bindings, 2> from_;

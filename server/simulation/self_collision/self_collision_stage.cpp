@@ -194,7 +194,7 @@ SelfCollisionStage::Contacts::Contacts(const vulkan::Device& device, const State
                                 {&state.cloths, &stage.rests_, &state.colliders, &state.nearColliders,
                                  &stage.contacts_, &stage.contactPositions_, &stage.contactVelocities_,
                                  state.positions[1 - of], &stage.touching_, &stage.groups_,
-                                 state.positions[of], state.velocities[of], &state.toldContacts});
+                                 state.positions[of], state.velocities[of], &state.contactImpulses});
               }) {}
 
 void SelfCollisionStage::makeContacts(std::span<const model::Cloth> cloths) {
@@ -250,7 +250,7 @@ void SelfCollisionStage::recordContacts(vulkan::Recorder& recorder, std::uint32_
   const shared::ContactPush push{.collision = collision,
                                  .nodeCount = nodeCount_,
                                  .substepSeconds = substepSeconds_,
-                                 .takenBack = model::kOverlapTakenBack / substepSeconds_,
+                                 .correctionFraction = model::kOverlapCorrectionFraction / substepSeconds_,
                                  .pushOutSpeed = model::kPushOutSpeed};
   recorder.barrier();
   recorder.fill(groups_, 0, sizeof(std::uint32_t), offsetof(shared::ContactGroups, x));

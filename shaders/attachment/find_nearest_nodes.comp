@@ -3,7 +3,7 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
 
-#include "shaders/hold/grab.glsl"
+#include "shaders/attachment/grab.glsl"
 
 layout(binding = 2) uniform samplerBuffer positions;  // w: inverse mass
 
@@ -22,7 +22,7 @@ void measure(uint node) {
     vec4 state = grabTexel(grab, 4);
     vec3 away = fromGrab(grab, position.xyz);
     float squared = dotProduct(away, away);
-    if (state.x == kTakingGrab && squared <= max(state.y, state.z)) {
+    if (state.x == kBeginningGrab && squared <= max(state.y, state.z)) {
       atomicMin(reports[grab].nearest, floatBitsToUint(squared));
     }
   }

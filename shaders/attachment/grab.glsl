@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 // What kernels of grabs share: the first two bindings, and how nodes are spread over invocations.
-#ifndef CLOTHSTREAM_SHADERS_HOLD_GRAB_GLSL
-#define CLOTHSTREAM_SHADERS_HOLD_GRAB_GLSL
+#ifndef CLOTHSTREAM_SHADERS_ATTACHMENT_GRAB_GLSL
+#define CLOTHSTREAM_SHADERS_ATTACHMENT_GRAB_GLSL
 
-#include "shaders/hold/hold.h"
+#include "shaders/attachment/attachment.h"
 #include "shaders/shared/rotation.glsl"
 
 layout(local_size_x_id = 0) in;

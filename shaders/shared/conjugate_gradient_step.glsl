@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // How far an iteration of conjugate gradients goes ([Va21] Eq. 12-17), in the form that needs all its sums at
 // once (Chronopoulos and Gear, "s-step iterative methods for symmetric linear systems", 1989, with s = 1).
-#ifndef CLOTHSTREAM_SHADERS_SHARED_CONJUGATE_GRADIENTS_GLSL
-#define CLOTHSTREAM_SHADERS_SHARED_CONJUGATE_GRADIENTS_GLSL
+#ifndef CLOTHSTREAM_SHADERS_SHARED_CONJUGATE_GRADIENT_STEP_GLSL
+#define CLOTHSTREAM_SHADERS_SHARED_CONJUGATE_GRADIENT_STEP_GLSL
 
 #include "shaders/shared/arithmetic.glsl"
 #include "shaders/shared/simulation.h"

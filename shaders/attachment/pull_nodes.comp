@@ -3,7 +3,7 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
 
-#include "shaders/hold/grab.glsl"
+#include "shaders/attachment/grab.glsl"
 
 // What there is none of is left out.
 layout(constant_id = 1) const bool kTethers = true;
@@ -16,12 +16,12 @@ layout(std430, binding = 3) buffer Positions {
 layout(std430, binding = 4) buffer Velocities {
   vec4 velocities[];
 };
-layout(std430, binding = 5) buffer Holds {
-  vec4 holds[];  // as in take_hold.comp
+layout(std430, binding = 5) buffer Grabbed {
+  vec4 grabbed[];  // as in begin_grabs.comp
 };
 
 layout(push_constant) uniform Push {
-  HoldPush push;
+  PullPush push;
 };
 
 struct State {
@@ -85,7 +85,7 @@ vec3 placeAtEnd(uint grab, vec3 inGrab) {
 
 void hold(uint index) {
   vec4 tether = kTethers ? texelFetch(tethers, int(index)) : vec4(0.0);
-  vec4 hold = kGrabs ? holds[index] : vec4(0.0);
+  vec4 hold = kGrabs ? grabbed[index] : vec4(0.0);
   if (tether.x == 0.0 && hold.w == 0.0) {
     return;
   }
@@ -106,10 +106,10 @@ void hold(uint index) {
     uint grab = uint(hold.w) - 1;
     vec3 place = placeAtEnd(grab, hold.xyz);
     precise vec3 out_ = place - node.position;
-    bool lets = grabTexel(grab, 4).x == kFreeGrab;
+    bool lets = grabTexel(grab, 4).x == kReleasedGrab;
     bool slips = dotProduct(out_, out_) > grabTexel(grab, 0).w;
     if (lets || slips) {
-      holds[index] = vec4(0.0);
+      grabbed[index] = vec4(0.0);
       if (!lets) {
         atomicAdd(reports[grab].slipped, 1);
       }

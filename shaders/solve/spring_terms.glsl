@@ -12,10 +12,10 @@
 // coordinates, one gather a product, the same eigenvalues, and a solution where c is 0. b = C + h J v_free, C
 // the length less r; a spring that may still be a force has no part unless v_free would stretch it too far
 // ([Va21] 3.3). Solved for the velocity move / h.
-#ifndef CLOTHSTREAM_SHADERS_SOLVE_WEIGH_GLSL
-#define CLOTHSTREAM_SHADERS_SOLVE_WEIGH_GLSL
+#ifndef CLOTHSTREAM_SHADERS_SOLVE_SPRING_TERMS_GLSL
+#define CLOTHSTREAM_SHADERS_SOLVE_SPRING_TERMS_GLSL
 
-#include "shaders/solve/system.glsl"
+#include "shaders/solve/linear_system.glsl"
 
 layout(binding = 3) uniform samplerBuffer positions;   // at the substep's start; w: inverse mass
 layout(binding = 4) uniform samplerBuffer velocities;  // then
@@ -91,8 +91,8 @@ Weight weigh(End here, End other, Kind kind, vec4 limits, bool exists) {
   bool isActive = exists && here.inverseMass + other.inverseMass > 0.0 &&
                   (!kAdaptive || isTooLong(here.freePlace, other.freePlace, longest));
   precise float excess = squared * inverseLength - longest;
-  precise float takenBack = excess > 0.0 || !kAdaptive ? limits.y * excess : excess;
-  precise float side = push.substepRate * takenBack + inverseLength * dotProduct(d, relative);
+  precise float correctionFraction = excess > 0.0 || !kAdaptive ? limits.y * excess : excess;
+  precise float side = push.substepRate * correctionFraction + inverseLength * dotProduct(d, relative);
   precise vec3 impulse = (side * inverseLength) * d;
   return Weight(isActive ? inverseSquared : 0.0, 0.0, isActive ? impulse : vec3(0.0), 0.0);
 }

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Tables and push constants of what holds cloth: attachments, grabs, tethers. Alike in C++ and in GLSL's
 // std430.
-#ifndef CLOTHSTREAM_SHADERS_HOLD_HOLD_H
-#define CLOTHSTREAM_SHADERS_HOLD_HOLD_H
+#ifndef CLOTHSTREAM_SHADERS_ATTACHMENT_ATTACHMENT_H
+#define CLOTHSTREAM_SHADERS_ATTACHMENT_ATTACHMENT_H
 
 #include "shaders/shared/types.h"
 
@@ -26,9 +26,9 @@ struct TetherRecord {
 };
 
 // What GrabRecord::state is.
-const float kFreeGrab = 0;  // whatever it held it lets go
-const float kHoldingGrab = 1;
-const float kTakingGrab = 2;  // from this tick's start on
+const float kReleasedGrab = 0;  // whatever it held it lets go
+const float kActiveGrab = 1;
+const float kBeginningGrab = 2;  // from this tick's start on
 
 // A grab over one tick, five texels.
 struct GrabRecord {
@@ -36,7 +36,7 @@ struct GrabRecord {
   vec4 motion;  // how far it goes until the tick's end; w: force, N
   vec4 turned;  // unit quaternion
   vec4 turn;    // what is added until the tick's end
-  vec4 state;   // kFreeGrab ...; squares of radius and reach
+  vec4 state;   // kReleasedGrab ...; squares of radius and reach
 };
 
 // What becomes of a grab.
@@ -58,7 +58,7 @@ struct GrabPush {
   uint32_t grabCount;
 };
 
-struct HoldPush {
+struct PullPush {
   uint32_t nodeCount;
   float progressBefore;  // of the tick's motion, at the substep's start
   float progressAfter;

@@ -8,8 +8,8 @@
 // Nodes are cut into walks of kWalk (rows of a column, or numbers in a row), and those into chunks of kLanes
 // walks. Dot products add up along the walk, then the lanes of a chunk in a tree, then the chunks in lanes
 // and a tree: nothing of that depends on the device, on the workgroup's size, or on who does which chunk.
-#ifndef CLOTHSTREAM_SHADERS_SOLVE_SYSTEM_GLSL
-#define CLOTHSTREAM_SHADERS_SOLVE_SYSTEM_GLSL
+#ifndef CLOTHSTREAM_SHADERS_SOLVE_LINEAR_SYSTEM_GLSL
+#define CLOTHSTREAM_SHADERS_SOLVE_LINEAR_SYSTEM_GLSL
 
 #extension GL_EXT_control_flow_attributes : require
 

@@ -3,11 +3,11 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
 
-#include "shaders/hold/grab.glsl"
+#include "shaders/attachment/grab.glsl"
 
 layout(binding = 2) uniform samplerBuffer positions;  // w: inverse mass
-layout(std430, binding = 3) buffer Holds {
-  vec4 holds[];  // place in the grab; its number + 1, 0: nobody's
+layout(std430, binding = 3) buffer Grabbed {
+  vec4 grabbed[];  // place in the grab; its number + 1, 0: nobody's
 };
 
 layout(push_constant) uniform Push {
@@ -17,8 +17,8 @@ layout(push_constant) uniform Push {
 // A node is of the grab that has it first; of those that begin together, of the first in their order.
 void take(uint node) {
   vec4 position = texelFetch(positions, int(node));
-  float holder = holds[node].w;
-  bool isFree = holder == 0.0 || grabTexel(uint(holder) - 1, 4).x != kHoldingGrab;
+  float holder = grabbed[node].w;
+  bool isFree = holder == 0.0 || grabTexel(uint(holder) - 1, 4).x != kActiveGrab;
   if (position.w == 0.0 || !isFree) {
     return;
   }
@@ -29,12 +29,12 @@ void take(uint node) {
     float squared = dotProduct(away, away);
     float nearest = uintBitsToFloat(reports[grab].nearest);
     bool isNear = squared <= state.y || (nearest > state.y && squared == nearest);
-    if (state.x == kTakingGrab && isNear) {
+    if (state.x == kBeginningGrab && isNear) {
       hold = vec4(rotateBack(grabTexel(grab, 2), away), float(grab + 1));
       atomicAdd(reports[grab].held, 1);
     }
   }
-  holds[node] = hold;
+  grabbed[node] = hold;
 }
 
 void main() {

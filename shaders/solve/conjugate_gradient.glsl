@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
 // The vectors of conjugate gradients, and its two halves: the matrix times the residuals with the dot
 // products of that, and the step that they give. The preconditioner is a number a node.
-#ifndef CLOTHSTREAM_SHADERS_SOLVE_VECTORS_GLSL
-#define CLOTHSTREAM_SHADERS_SOLVE_VECTORS_GLSL
+#ifndef CLOTHSTREAM_SHADERS_SOLVE_CONJUGATE_GRADIENT_GLSL
+#define CLOTHSTREAM_SHADERS_SOLVE_CONJUGATE_GRADIENT_GLSL
 
-#include "shaders/shared/conjugate_gradients.glsl"
-#include "shaders/solve/system.glsl"
+#include "shaders/shared/conjugate_gradient_step.glsl"
+#include "shaders/solve/linear_system.glsl"
 
 layout(binding = 3) uniform samplerBuffer positions;   // at the substep's start; w: inverse mass
 layout(binding = 4) uniform samplerBuffer incidences;  // IncidenceRecord, a node of a mesh

@@ -9,8 +9,8 @@
 #include "server/model/pose.h"
 #include "server/model/scene.h"
 #include "server/simulation/device_table.h"
-#include "server/simulation/hold/grab.h"
-#include "server/simulation/hold/hold_tables.h"
+#include "server/simulation/attachment/grab.h"
+#include "server/simulation/attachment/attachment_tables.h"
 #include "server/simulation/stage.h"
 #include "server/simulation/state_buffers.h"
 #include "server/vulkan/buffer.h"
@@ -23,10 +23,10 @@ namespace clothstream::simulation {
 //
 // A tick:   recordInputs -> barrier -> recordAim -> substeps, each with recordSubstep at its end ->
 // recordReport
-class HoldStage {
+class AttachmentStage {
  public:
   // Throws std::runtime_error where the device has no room.
-  HoldStage(const vulkan::Device& device, const HoldTables& tables, const StateBuffers& state,
+  AttachmentStage(const vulkan::Device& device, const AttachmentTables& tables, const StateBuffers& state,
             std::uint32_t nodeCount, std::uint32_t workgroupSize);
 
   // Of the tethers of these cloths, from the next tick on: to be called before the first.
@@ -49,7 +49,7 @@ class HoldStage {
   std::span<const shared::GrabReport> report() const;
 
  private:
-  Stage makeHold(const vulkan::Device& device, const StateBuffers& state, bool grabs) const;
+  Stage makePull(const vulkan::Device& device, const StateBuffers& state, bool grabs) const;
   // They share the nodes.
   std::uint64_t invocations() const;
 
@@ -64,11 +64,11 @@ class HoldStage {
   std::vector<shared::TetherRecord> restTethers_;  // without slack
   std::vector<float> longer_;                      // by which each cloth's are, as the table has them
   std::vector<shared::FrameRecord> startFrames_;
-  vulkan::Buffer frames_, grabs_, holds_, reports_;
+  vulkan::Buffer frames_, grabs_, grabbed_, reports_;
   // By turns: a tick may be in flight while the next is recorded.
   std::array<vulkan::Buffer, 2> uploads_;  // frames, then grabs
   std::array<vulkan::Buffer, 2> readbacks_;
-  Stage aim_, findNearest_, takeHold_, tie_, hold_;
+  Stage aim_, findNearest_, beginGrabs_, tie_, pull_;
 };
 
 }  // namespace clothstream::simulation

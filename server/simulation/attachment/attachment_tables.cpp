@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Attached nodes and tethers of a scene.
-#include "server/simulation/hold/hold_tables.h"
+#include "server/simulation/attachment/attachment_tables.h"
 
 #include <algorithm>
 #include <array>
@@ -12,7 +12,7 @@ namespace {
 
 // `first`: the cloth's first node.
 void addAttached(const model::Scene& scene, const model::Cloth& cloth, std::uint32_t first,
-                 HoldTables& tables) {
+                 AttachmentTables& tables) {
   const std::vector<model::Vec3> rest = model::restPositions(cloth);
   for (const model::Attachment& attachment : cloth.attachments) {
     const model::Pose start = model::frameAt(scene, attachment, 0);
@@ -45,8 +45,8 @@ shared::FrameRecord frameRecord(const model::Pose& pose) {
   return {{pose.position.x(), pose.position.y(), pose.position.z(), 0}, {q.x(), q.y(), q.z(), q.w()}};
 }
 
-HoldTables holdTables(const model::Scene& scene) {
-  HoldTables tables;
+AttachmentTables attachmentTables(const model::Scene& scene) {
+  AttachmentTables tables;
   const bool anyTethers =
       std::ranges::any_of(scene.cloths, [](const model::Cloth& cloth) { return cloth.tethers.has_value(); });
   std::uint32_t first = 0;

@@ -3,7 +3,7 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
 
-#include "shaders/hold/hold.h"
+#include "shaders/attachment/attachment.h"
 #include "shaders/shared/rotation.glsl"
 
 layout(local_size_x_id = 0) in;

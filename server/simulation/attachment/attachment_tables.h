@@ -5,11 +5,11 @@
 #include <vector>
 
 #include "server/model/scene.h"
-#include "shaders/hold/hold.h"
+#include "shaders/attachment/attachment.h"
 
 namespace clothstream::simulation {
 
-struct HoldTables {
+struct AttachmentTables {
   std::vector<shared::AttachedRecord> attached;
   std::vector<shared::FrameRecord> frames;  // of the attachments, in the order of the cloths, at the start
   // A node of the scene, without slack; none where no cloth has tethers.
@@ -18,7 +18,7 @@ struct HoldTables {
   bool empty() const { return attached.empty() && tethers.empty(); }
 };
 
-HoldTables holdTables(const model::Scene& scene);
+AttachmentTables attachmentTables(const model::Scene& scene);
 
 shared::FrameRecord frameRecord(const model::Pose& pose);
 
