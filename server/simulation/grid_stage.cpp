@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Kernels of grids, and how their work is cut.
+// Kernels of grids, and the partition of their work.
 #include "server/simulation/grid_stage.h"
 
 #include <initializer_list>
@@ -11,7 +11,8 @@ namespace clothstream::simulation {
 
 using vulkan::BindingKind;
 
-// Software devices pay for every load, so that an invocation does several rows; GPUs pay for every idle lane.
+// On software devices every load costs time, so that an invocation handles several rows. On GPUs every idle
+// lane costs time.
 GridStage::Cut GridStage::cutGrids(const vulkan::Device& device, std::span<const model::Cloth> cloths,
                                    const GridOptions& options) {
   Cut cut{options.rowsPerInvocation, options.workgroupSize, {}};

@@ -60,7 +60,7 @@ const MeshStage::Advance& MeshStage::advance(const AdvanceVariant& variant) {
   return *made;
 }
 
-void MeshStage::setTiles(const Tiles& tiles) {
+void MeshStage::setTiles(const MeshTiles& tiles) {
   tiles_.set(tiles.records);
   tileRanges_ = tiles.ranges;
 }

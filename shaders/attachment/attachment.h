@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Tables and push constants of what holds cloth: attachments, grabs, tethers. Alike in C++ and in GLSL's
-// std430.
+// Tables and push constants of attachments, tethers and grabs. C++ and GLSL use the same layout.
 #ifndef CLOTHSTREAM_SHADERS_ATTACHMENT_ATTACHMENT_H
 #define CLOTHSTREAM_SHADERS_ATTACHMENT_ATTACHMENT_H
 
@@ -8,42 +7,66 @@
 
 CLOTHSTREAM_SHARED_BEGIN
 
-// A node that goes with a frame, two texels.
+// A node that follows a frame.
+#define CLOTHSTREAM_ATTACHED_TEXELS 2
 struct AttachedRecord {
-  vec4 node;   // its number, the frame's
-  vec4 place;  // in the frame, m
+  float node;  // in the scene
+  float frame;
+  float reserved0, reserved1;
+  vec3 place;  // in the frame, m
+  float reserved2;
 };
 
-// Where a frame is at the tick's end, two texels.
+// The pose of a frame at the tick's end.
+#define CLOTHSTREAM_FRAME_TEXELS 2
 struct FrameRecord {
-  vec4 position;
+  vec3 position;  // m
+  float reserved;
   vec4 orientation;  // unit quaternion
 };
 
-// How far a node may get from two nodes that forces do not move, a texel.
+// A limit on the distance of a node from a node that forces do not move.
+struct TetherEnd {
+  float anchor;    // node in the scene plus one; 0: no tether
+  float distance;  // m
+};
+
+// The tethers of a node; the shorter one first.
 struct TetherRecord {
-  vec4 anchors;  // number + 1, or 0 where there is none, and metres; of another one likewise
+  TetherEnd ends[2];
 };
 
-// What GrabRecord::state is.
-const float kReleasedGrab = 0;  // whatever it held it lets go
+// Values of GrabRecord::state.
+const float kReleasedGrab = 0;  // releases all of its nodes
 const float kActiveGrab = 1;
-const float kBeginningGrab = 2;  // from this tick's start on
+const float kBeginningGrab = 2;  // grabs nodes at this tick's start
 
-// A grab over one tick, five texels.
+// A grab during one tick.
+#define CLOTHSTREAM_GRAB_TEXELS 5
 struct GrabRecord {
-  vec4 start;   // where it is; w: square of the distance beyond which a node slips away
-  vec4 motion;  // how far it goes until the tick's end; w: force, N
-  vec4 turned;  // unit quaternion
-  vec4 turn;    // what is added until the tick's end
-  vec4 state;   // kReleasedGrab ...; squares of radius and reach
+  vec3 position;           // at the tick's start
+  float squaredSlip;       // m^2; a node slips away beyond this squared distance
+  vec3 motion;             // displacement during the tick
+  float force;             // N, at most
+  vec4 orientation;        // unit quaternion at the tick's start
+  vec4 orientationChange;  // difference of the quaternions during the tick
+  float state;             // kReleasedGrab, kActiveGrab or kBeginningGrab
+  float squaredRadius;     // m^2
+  float squaredReach;      // m^2
+  float reserved;
 };
 
-// What becomes of a grab.
+// A node's place in the grab that has it.
+struct GrabbedNode {
+  vec3 place;     // in the grab, m
+  float grabber;  // number of the grab plus one; 0: no grab has the node
+};
+
+// Result of a grab.
 struct GrabReport {
-  uint32_t nearest;  // bits of the square of the distance of the node nearest to it when it took hold
-  uint32_t held;     // nodes that it took hold of
-  uint32_t slipped;  // those of them that slipped away
+  uint32_t nearest;  // bits of the squared distance of the nearest node when the grab began
+  uint32_t grabbed;  // nodes that it grabbed
+  uint32_t slipped;  // grabbed nodes that slipped away
   uint32_t reserved;
 };
 
@@ -60,7 +83,7 @@ struct GrabPush {
 
 struct PullPush {
   uint32_t nodeCount;
-  float progressBefore;  // of the tick's motion, at the substep's start
+  float progressBefore;  // share of the tick's motion at the substep's start
   float progressAfter;
   float substepSeconds;
   float substepRate;  // 1/s
@@ -71,9 +94,42 @@ CLOTHSTREAM_SHARED_END
 
 #ifdef __cplusplus
 namespace clothstream::shared {
-static_assert(sizeof(AttachedRecord) == 32 && sizeof(FrameRecord) == 32 && sizeof(TetherRecord) == 16);
-static_assert(sizeof(GrabRecord) == 80 && sizeof(GrabReport) == 16);
+static_assert(sizeof(AttachedRecord) == CLOTHSTREAM_ATTACHED_TEXELS * sizeof(vec4) &&
+              offsetof(AttachedRecord, place) == 16);
+static_assert(sizeof(FrameRecord) == CLOTHSTREAM_FRAME_TEXELS * sizeof(vec4) && sizeof(TetherRecord) == 16);
+static_assert(sizeof(GrabRecord) == CLOTHSTREAM_GRAB_TEXELS * sizeof(vec4) &&
+              offsetof(GrabRecord, orientation) == 32 && offsetof(GrabRecord, state) == 64);
+static_assert(sizeof(GrabbedNode) == 16 && sizeof(GrabReport) == 16);
 }  // namespace clothstream::shared
+#else
+
+AttachedRecord attachedAt(samplerBuffer table, uint number) {
+  int first = CLOTHSTREAM_ATTACHED_TEXELS * int(number);
+  vec4 node = texelFetch(table, first);
+  vec4 place = texelFetch(table, first + 1);
+  return AttachedRecord(CLOTHSTREAM_FLOATS(node), CLOTHSTREAM_VECTOR(place));
+}
+
+FrameRecord frameAt(samplerBuffer table, uint number) {
+  int first = CLOTHSTREAM_FRAME_TEXELS * int(number);
+  vec4 position = texelFetch(table, first);
+  return FrameRecord(CLOTHSTREAM_VECTOR(position), texelFetch(table, first + 1));
+}
+
+TetherRecord tetherAt(samplerBuffer table, uint node) {
+  vec4 texel = texelFetch(table, int(node));
+  return TetherRecord(TetherEnd[2](TetherEnd(texel.x, texel.y), TetherEnd(texel.z, texel.w)));
+}
+
+GrabRecord grabAt(samplerBuffer table, uint number) {
+  int first = CLOTHSTREAM_GRAB_TEXELS * int(number);
+  vec4 start = texelFetch(table, first);
+  vec4 motion = texelFetch(table, first + 1);
+  vec4 state = texelFetch(table, first + 4);
+  return GrabRecord(CLOTHSTREAM_VECTOR(start), CLOTHSTREAM_VECTOR(motion), texelFetch(table, first + 2),
+                    texelFetch(table, first + 3), CLOTHSTREAM_FLOATS(state));
+}
+
 #endif
 
 #endif

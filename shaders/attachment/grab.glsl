@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What kernels of grabs share: the first two bindings, and how nodes are spread over invocations.
+// The first two bindings of the kernels of grabs, and the distribution of nodes over invocations.
 #ifndef CLOTHSTREAM_SHADERS_ATTACHMENT_GRAB_GLSL
 #define CLOTHSTREAM_SHADERS_ATTACHMENT_GRAB_GLSL
 
@@ -13,18 +13,14 @@ layout(std430, binding = 1) buffer Reports {
   GrabReport reports[];
 };
 
-// In all; they share the nodes.
+// Number of all invocations, which share the nodes.
 uint invocations() {
   return gl_NumWorkGroups.x * gl_WorkGroupSize.x;
 }
 
-vec4 grabTexel(uint grab, int texel) {
-  return texelFetch(grabs, 5 * int(grab) + texel);
-}
-
-// From where a grab begins to take hold to a node.
-vec3 fromGrab(uint grab, vec3 position) {
-  precise vec3 away = position - grabTexel(grab, 0).xyz;
+// Vector from the place where a grab begins to a node.
+vec3 fromGrab(GrabRecord grab, vec3 position) {
+  precise vec3 away = position - grab.position;
   return away;
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// The vectors of conjugate gradients, and its two halves: the matrix times the residuals with the dot
-// products of that, and the step that they give. The preconditioner is a number a node.
+// The two halves of an iteration of conjugate gradients. The first half multiplies the matrix by the
+// preconditioned residuals and computes the dot products. The second half takes the step. The preconditioner
+// is one number per node.
 #ifndef CLOTHSTREAM_SHADERS_SOLVE_CONJUGATE_GRADIENT_GLSL
 #define CLOTHSTREAM_SHADERS_SOLVE_CONJUGATE_GRADIENT_GLSL
 
@@ -8,27 +9,24 @@
 #include "shaders/solve/linear_system.glsl"
 
 layout(binding = 3) uniform samplerBuffer positions;   // at the substep's start; w: inverse mass
-layout(binding = 4) uniform samplerBuffer incidences;  // IncidenceRecord, a node of a mesh
+layout(binding = 4) uniform samplerBuffer incidences;  // ListRecord by node of a mesh
 layout(binding = 5) uniform samplerBuffer lists;       // SpringEndsRecord
-// Of a grid two texels a node, its springs to the right, below, right below, and from its right to below it;
-// then to the second on the right, to the second below; what the preconditioner makes of c M. Of a mesh a
-// texel a spring: prepare_springs.comp.
-layout(binding = 6) uniform samplerBuffer along;
-layout(binding = 7) uniform samplerBuffer across;  // the same, of an implicit grid
-// Vectors lie one after the other. A software device reads texels three times as fast as storage, and writes
-// storage five times as fast as texels: so one memory is bound as both.
+layout(binding = 6) uniform samplerBuffer along;       // SpringWeights of a grid, WeightedSprings of a mesh
+layout(binding = 7) uniform samplerBuffer across;      // SpringWeights of an implicit grid
+// The same memory twice: a software device reads texels three times as fast as storage and writes storage
+// five times as fast as texels.
 layout(binding = 8, rgba32f) uniform coherent readonly imageBuffer texels;
 layout(std430, binding = 9) coherent buffer Vectors {
   vec4 vectors[];
 };
 layout(std430, binding = 10) coherent buffer Sums {
-  vec2 chunkSums[];  // a chunk: residual . z, z . A z,  with z the preconditioned residual
+  vec2 chunkSums[];  // by chunk: residual . z, z . A z,  with z the preconditioned residual
 };
 layout(std430, binding = 11) coherent buffer Solves {
   SolveRecord solves[];
 };
 layout(std430, binding = 12) readonly buffer Actives {
-  uint actives[];  // a chunk: kActive, kPrepared; then those that are, a group after the other
+  uint actives[];  // by chunk: kActive, kPrepared; then the numbers of the active chunks, group by group
 };
 
 layout(push_constant) uniform Push {
@@ -42,19 +40,23 @@ vec4 fetch(uint which, uint node) {
   return imageLoad(texels, int(vectorAt(which, node)));
 }
 
+ResidualRecord residualAt(uint node) {
+  return residualFrom(fetch(kResiduals, node));
+}
+
 struct Point {
   vec3 place;
-  vec3 z;
-  vec4 residual;
+  vec3 z;  // preconditioned residual
+  ResidualRecord own;
 };
 
 Point pointAt(uint node) {
-  vec4 residual = fetch(kResiduals, node);
-  precise vec3 z = residual.w * residual.xyz;
-  return Point(texelFetch(positions, int(node)).xyz, z, residual);
+  ResidualRecord own = residualAt(node);
+  precise vec3 z = own.preconditioner * own.residual;
+  return Point(texelFetch(positions, int(node)).xyz, z, own);
 }
 
-// Of a spring on `here`; on `other` it is the exact negative.
+// Term of a spring at `here`; at `other` it is the exact negative.
 vec3 pull(Point here, Point other, float along, float across) {
   precise vec3 d = other.place - here.place;
   precise vec3 relative = here.z - other.z;
@@ -65,30 +67,36 @@ vec3 pull(Point here, Point other, float along, float across) {
   return force;
 }
 
-// A z at a node, kept; what the node adds to the sums.
+// Stores A z of a node. Returns what the node adds to the sums.
 vec2 keepProduct(uint node, Point here, vec3 product) {
-  precise vec3 kept = here.residual.w > 0.0 ? product : vec3(0.0);
+  precise vec3 kept = here.own.preconditioner > 0.0 ? product : vec3(0.0);
   vectors[vectorAt(kProducts, node)].xyz = kept;
-  precise vec2 sums = vec2(dotProduct(here.residual.xyz, here.z), dotProduct(here.z, kept));
+  precise vec2 sums = vec2(dotProduct(here.own.residual, here.z), dotProduct(here.z, kept));
   return sums;
 }
 
-struct Weights {
-  vec4 near;
-  vec4 far;
-};
+const SpringWeights kNoWeights = SpringWeights(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
 
-Weights weightsAt(samplerBuffer table, bool exists, uint node) {
-  vec4 near = texelFetch(table, 2 * int(node));
-  vec4 far = texelFetch(table, 2 * int(node) + 1);
-  return Weights(exists ? near : vec4(0.0), exists ? far : vec4(0.0));
+SpringWeights weightsAt(samplerBuffer table, bool exists, uint node) {
+  SpringWeights weights = springWeightsAt(table, node);
+  return SpringWeights(exists ? weights.right : 0.0, exists ? weights.below : 0.0,
+                       exists ? weights.rightBelow : 0.0, exists ? weights.rightToBelow : 0.0,
+                       exists ? weights.secondRight : 0.0, exists ? weights.secondBelow : 0.0,
+                       exists ? weights.mass : 0.0, 0.0);
 }
 
-#define ALONG(exists, node) weightsAt(along, exists, node)
-#define ACROSS(exists, node) (kImplicit ? weightsAt(across, exists, node) : Weights(vec4(0.0), vec4(0.0)))
+SpringWeights alongAt(bool exists, uint node) {
+  return weightsAt(along, exists, node);
+}
+SpringWeights acrossAt(bool exists, uint node) {
+  if (kImplicit) {
+    return weightsAt(across, exists, node);
+  }
+  return kNoWeights;
+}
 
-// Down a column, with a window of registers as in shaders/mass_spring. Springs beyond an edge have no weight,
-// and loads beyond it stay on it.
+// Walks down a column with a window of registers, as in shaders/mass_spring. Springs beyond an edge have no
+// weight, and loads beyond an edge read the edge instead.
 vec2 multiplyGrid(System system, Walk walk) {
   uint columns = system.columns;
   uint lastRow = system.rows - 1;
@@ -113,17 +121,17 @@ vec2 multiplyGrid(System system, Walk walk) {
   Point here = pointAt(index);
   Point right = pointAt(index + toRight);
   Point below = pointAt(belowIndex);
-  Weights aboveAlong = ALONG(hasAbove, aboveIndex);
-  Weights aboveAcross = ACROSS(hasAbove, aboveIndex);
-  Weights leftAboveAlong = ALONG(hasAbove && hasLeft, aboveIndex - toLeft);
-  Weights leftAboveAcross = ACROSS(hasAbove && hasLeft, aboveIndex - toLeft);
-  Weights above2Along = ALONG(row > 1, above2Index);
-  Weights above2Across = ACROSS(row > 1, above2Index);
-  vec3 aboveForce = pull(here, above, aboveAlong.near.y, aboveAcross.near.y);
+  SpringWeights aboveAlong = alongAt(hasAbove, aboveIndex);
+  SpringWeights aboveAcross = acrossAt(hasAbove, aboveIndex);
+  SpringWeights leftAboveAlong = alongAt(hasAbove && hasLeft, aboveIndex - toLeft);
+  SpringWeights leftAboveAcross = acrossAt(hasAbove && hasLeft, aboveIndex - toLeft);
+  SpringWeights above2Along = alongAt(row > 1, above2Index);
+  SpringWeights above2Across = acrossAt(row > 1, above2Index);
+  vec3 aboveForce = pull(here, above, aboveAlong.below, aboveAcross.below);
   vec3 above2Force, nextAbove2Force;
   if (kBend) {
-    above2Force = pull(here, pointAt(above2Index), above2Along.far.y, above2Across.far.y);
-    nextAbove2Force = pull(below, above, aboveAlong.far.y, aboveAcross.far.y);
+    above2Force = pull(here, pointAt(above2Index), above2Along.secondBelow, above2Across.secondBelow);
+    nextAbove2Force = pull(below, above, aboveAlong.secondBelow, aboveAcross.secondBelow);
   }
 
   precise vec2 sums = vec2(0.0);
@@ -133,27 +141,27 @@ vec2 multiplyGrid(System system, Walk walk) {
     Point below2 = pointAt(start + min(row + 2, lastRow) * columns);
     Point leftBelow = pointAt(belowIndex - toLeft);
     Point rightBelow = pointAt(belowIndex + toRight);
-    Weights own = ALONG(true, index);
-    Weights ownAcross = ACROSS(true, index);
-    Weights ofLeft = ALONG(hasLeft, index - toLeft);
-    Weights ofLeftAcross = ACROSS(hasLeft, index - toLeft);
+    SpringWeights own = alongAt(true, index);
+    SpringWeights ownAcross = acrossAt(true, index);
+    SpringWeights ofLeft = alongAt(hasLeft, index - toLeft);
+    SpringWeights ofLeftAcross = acrossAt(hasLeft, index - toLeft);
 
-    vec3 belowForce = pull(here, below, own.near.y, ownAcross.near.y);
-    precise vec3 sum = own.far.z * here.residual.xyz;
-    sum = sum + pull(here, left, ofLeft.near.x, ofLeftAcross.near.x);
-    sum = sum + pull(here, right, own.near.x, ownAcross.near.x);
+    vec3 belowForce = pull(here, below, own.below, ownAcross.below);
+    precise vec3 sum = own.mass * here.own.residual;
+    sum = sum + pull(here, left, ofLeft.right, ofLeftAcross.right);
+    sum = sum + pull(here, right, own.right, ownAcross.right);
     sum = sum + aboveForce;
     sum = sum + belowForce;
-    sum = sum + pull(here, leftAbove, leftAboveAlong.near.z, leftAboveAcross.near.z);
-    sum = sum + pull(here, rightAbove, aboveAlong.near.w, aboveAcross.near.w);
-    sum = sum + pull(here, leftBelow, ofLeft.near.w, ofLeftAcross.near.w);
-    sum = sum + pull(here, rightBelow, own.near.z, ownAcross.near.z);
+    sum = sum + pull(here, leftAbove, leftAboveAlong.rightBelow, leftAboveAcross.rightBelow);
+    sum = sum + pull(here, rightAbove, aboveAlong.rightToBelow, aboveAcross.rightToBelow);
+    sum = sum + pull(here, leftBelow, ofLeft.rightToBelow, ofLeftAcross.rightToBelow);
+    sum = sum + pull(here, rightBelow, own.rightBelow, ownAcross.rightBelow);
     if (kBend) {
-      float left2Along = ALONG(hasLeft2, index - toLeft2).far.x;
-      float left2Across = ACROSS(hasLeft2, index - toLeft2).far.x;
-      vec3 below2Force = pull(here, below2, own.far.y, ownAcross.far.y);
+      float left2Along = alongAt(hasLeft2, index - toLeft2).secondRight;
+      float left2Across = acrossAt(hasLeft2, index - toLeft2).secondRight;
+      vec3 below2Force = pull(here, below2, own.secondBelow, ownAcross.secondBelow);
       sum = sum + pull(here, pointAt(index - toLeft2), left2Along, left2Across);
-      sum = sum + pull(here, pointAt(index + toRight2), own.far.x, ownAcross.far.x);
+      sum = sum + pull(here, pointAt(index + toRight2), own.secondRight, ownAcross.secondRight);
       sum = sum + above2Force;
       sum = sum + below2Force;
       above2Force = nextAbove2Force;
@@ -179,33 +187,32 @@ vec2 multiplyGrid(System system, Walk walk) {
   return sums;
 }
 
-// Over the springs that meet at each node.
+// Multiplies the matrix of a mesh by gathering the springs that meet at each node.
 vec2 multiplyMesh(System system, Walk walk) {
-  float compliance = texelFetch(cloths, system.cloth + 5).x;
+  float compliance = clothAt(cloths, system.cloth).scaledCompliance;
   precise vec2 sums = vec2(0.0);
   for (uint k = 0; k < kWalk; ++k) {
     uint node = walk.first + min(k, max(walk.count, 1) - 1);
     Point here = pointAt(node);
     float inverseMass = texelFetch(positions, int(node)).w;
     precise vec3 sum =
-        kImplicit ? reciprocal(max(inverseMass, 1e-30)) * here.z : compliance * here.residual.xyz;
-    vec4 list = texelFetch(incidences, int(node));
-    int texel = int(wholeNumber(list.x, list.y));
-    int end = texel + int(list.z);
-    while (texel < end) {
-      vec4 two = texelFetch(lists, texel);
-      [[unroll]] for (int i = 0; i < 4; i += 2) {
-        int spring = int(system.firstSpring + uint(max(abs(two[i]), 1.0)) - 1);
-        vec4 other = fetch(kResiduals, uint(two[i + 1]));
-        vec4 row = texelFetch(along, spring);
-        precise vec3 relative = here.z - other.w * other.xyz;
-        precise vec3 part = dotProduct(row.xyz, relative) * row.xyz;
+        kImplicit ? reciprocal(max(inverseMass, 1e-30)) * here.z : compliance * here.own.residual;
+    TexelRange list = rangeOf(listAt(incidences, node));
+    while (list.first < list.end) {
+      SpringEndsRecord two = springEndsAt(lists, list.first);
+      [[unroll]] for (int i = 0; i < 2; ++i) {
+        float number = two.ends[i].signedSpring;
+        uint spring = system.firstSpring + uint(max(abs(number), 1.0)) - 1;
+        ResidualRecord other = residualAt(uint(two.ends[i].other));
+        WeightedSpring weighted = weightedSpringAt(along, spring);
+        precise vec3 relative = here.z - other.preconditioner * other.residual;
+        precise vec3 part = dotProduct(weighted.row, relative) * weighted.row;
         if (kImplicit) {
-          part = part + row.w * relative;
+          part = part + weighted.across * relative;
         }
-        sum = sum + (two[i] == 0.0 ? vec3(0.0) : part);
+        sum = sum + (number == 0.0 ? vec3(0.0) : part);
       }
-      ++texel;
+      ++list.first;
     }
     if (k < walk.count) {
       sums = sums + keepProduct(node, here, sum);
@@ -225,7 +232,7 @@ void keepSums(System system, uint chunk) {
   }
 }
 
-// A chunk's part of A z, and of the sums.
+// Computes a chunk's part of A z and of the sums.
 void multiplyChunk(System system, uint chunk) {
   uint end = lanesOf(system, chunk);
   uint lane = self();
@@ -241,7 +248,7 @@ void multiplyChunk(System system, uint chunk) {
   keepSums(system, chunk);
 }
 
-// The residual's norm alone.
+// Measures only the residual's norm.
 void measureChunk(System system, uint chunk) {
   uint end = lanesOf(system, chunk);
   uint lane = self();
@@ -250,9 +257,9 @@ void measureChunk(System system, uint chunk) {
     precise vec2 sums = vec2(0.0);
     [[unroll]] for (uint k = 0; k < kWalk; ++k) {
       if (k < walk.count && lane < end) {
-        vec4 residual = fetch(kResiduals, walk.first + k * walk.step);
-        precise vec3 z = residual.w * residual.xyz;
-        sums.x = sums.x + dotProduct(residual.xyz, z);
+        ResidualRecord own = residualAt(walk.first + k * walk.step);
+        precise vec3 z = own.preconditioner * own.residual;
+        sums.x = sums.x + dotProduct(own.residual, z);
       }
     }
     lanes[lane] = sums;
@@ -261,13 +268,13 @@ void measureChunk(System system, uint chunk) {
   keepSums(system, chunk);
 }
 
-// The chunk that a workgroup has where several solve a system.
-vec4 ownChunk() {
-  return texelFetch(chunks, int(actives[actives.length() / 2 + push.firstChunk + gl_WorkGroupID.x]));
+// The chunk of a workgroup if several workgroups solve a system.
+ChunkRecord ownChunk() {
+  return chunkAt(chunks, actives[actives.length() / 2 + push.firstChunk + gl_WorkGroupID.x]);
 }
 
-// Once all chunks have their sums: whether to go on, and how far. By one workgroup.
-void takeSums(System system, bool norm) {
+// Decides whether to continue, and by which step, after all chunks have their sums. One workgroup calls this.
+void takeSums(System system, bool normOnly) {
   for (uint lane = self(); lane < kLanes; lane += width()) {
     precise vec2 sum = vec2(0.0);
     for (uint chunk = system.firstChunk + lane; chunk < system.firstChunk + system.chunks; chunk += kLanes) {
@@ -279,15 +286,14 @@ void takeSums(System system, bool norm) {
   if (self() != 0) {
     return;
   }
-  vec4 solver = texelFetch(cloths, system.cloth + 5);
-  SolveRecord solve = measured(solves[system.number], sums.x, solver, norm);
+  SolveRecord solve = measured(solves[system.number], sums.x, clothAt(cloths, system.cloth), normOnly);
   if (solve.running != 0) {
     solve = stepped(solve, sums);
   }
   solves[system.number] = solve;
 }
 
-// What a chunk's nodes gain by the step.
+// Takes the step at the nodes of a chunk.
 void updateChunk(System system, uint chunk, SolveRecord solve) {
   uint end = solve.running == 0 ? 0 : lanesOf(system, chunk);
   bool first = solve.iterations == 1;
@@ -296,12 +302,12 @@ void updateChunk(System system, uint chunk, SolveRecord solve) {
     Walk walk = walkAt(system, chunk * kLanes + lane);
     [[unroll]] for (uint k = 0; k < kWalk; ++k) {
       uint node = walk.first + min(k, max(walk.count, 1) - 1) * walk.step;
-      vec4 before = fetch(kResiduals, node);
+      ResidualRecord before = residualAt(node);
       vec3 oldDirection = first ? vec3(0.0) : fetch(kDirections, node).xyz;
       vec3 oldImage = first ? vec3(0.0) : fetch(kImages, node).xyz;
-      precise vec3 direction = before.w * before.xyz + solve.turn * oldDirection;
-      precise vec3 image = fetch(kProducts, node).xyz + solve.turn * oldImage;
-      precise vec3 residual = before.xyz - solve.stepLength * image;
+      precise vec3 direction = before.preconditioner * before.residual + solve.directionShare * oldDirection;
+      precise vec3 image = fetch(kProducts, node).xyz + solve.directionShare * oldImage;
+      precise vec3 residual = before.residual - solve.stepLength * image;
       precise vec3 correction = fetch(kCorrections, node).xyz + solve.stepLength * direction;
       if (k < walk.count && lane < end) {
         vectors[vectorAt(kDirections, node)].xyz = direction;

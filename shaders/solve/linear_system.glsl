@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT
-// A cloth's linear system and how it is cut: what the kernels of a solve share.
+// A cloth's linear system and the partition of its nodes, shared by the kernels of a solve.
 //
-// Unknown is what the velocities u of the nodes change by. Of a spring with d from one end to the other,
+// The unknown is the change u of the nodes' velocities. With d from one end of a spring to the other,
 //   (c M + sum of along d d^T + across I) u = side,
-// where c and each spring's `along` and `across` follow from the solver: prepare_grids.comp.
+// where c and the `along` and `across` of each spring follow from the solver: spring_terms.glsl.
 //
-// Nodes are cut into walks of kWalk (rows of a column, or numbers in a row), and those into chunks of kLanes
-// walks. Dot products add up along the walk, then the lanes of a chunk in a tree, then the chunks in lanes
-// and a tree: nothing of that depends on the device, on the workgroup's size, or on who does which chunk.
+// A walk has kWalk nodes (rows of a column, or consecutive nodes), and a chunk has kLanes walks. Dot products
+// add up along the walk, then the lanes of a chunk in a tree, then the chunks in lanes and a tree. This order
+// does not depend on the device, on the workgroup's size, or on which workgroup handles which chunk.
 #ifndef CLOTHSTREAM_SHADERS_SOLVE_LINEAR_SYSTEM_GLSL
 #define CLOTHSTREAM_SHADERS_SOLVE_LINEAR_SYSTEM_GLSL
 
@@ -16,14 +16,14 @@
 #include "shaders/shared/arithmetic.glsl"
 #include "shaders/shared/fixed_sums.glsl"
 #include "shaders/shared/simulation.h"
-#include "shaders/shared/whole_number.glsl"
+#include "shaders/shared/whole_number.h"
 
-// Whether springs pull as they will (implicit Euler) or hold their length.
+// True: implicit Euler, springs are forces. False: springs are constraints.
 layout(constant_id = 1) const bool kImplicit = false;
 layout(constant_id = 2) const bool kMesh = false;
-// Whether bend springs of any grid are solved for.
+// True if the system of any grid has bend springs.
 layout(constant_id = 3) const bool kBend = true;
-// Whether springs are constraints only where they would be stretched too far.
+// ACAD, [Va21] 3.3: only springs that would be stretched too far are constraints.
 layout(constant_id = 4) const bool kAdaptive = false;
 
 layout(binding = 0) uniform samplerBuffer cloths;   // ClothRecord
@@ -32,20 +32,66 @@ layout(binding = 2) uniform samplerBuffer chunks;   // ChunkRecord
 
 const uint kWalk = CLOTHSTREAM_SOLVE_WALK;
 
-// The vectors of a solve, which lie one after the other: residual r, w: the preconditioner, 0 for pinned
-// nodes; direction p; A p; A z, z the preconditioned residual; what is solved for.
+// The vectors of a solve, one after the other in their buffer: residual r (ResidualRecord), direction p, A p,
+// A z with z the preconditioned residual, and the solution u.
 const uint kResiduals = 0, kDirections = 1, kImages = 2, kProducts = 3, kCorrections = 4;
 
-// Of a chunk: it has something to solve; what it had is to be cleared, or it has.
+// The residual of a node.
+struct ResidualRecord {
+  vec3 residual;
+  float preconditioner;  // 0 for pinned nodes
+};
+
+ResidualRecord residualFrom(vec4 texel) {
+  return ResidualRecord(CLOTHSTREAM_VECTOR(texel));
+}
+
+// `along` or `across` of the springs of a grid's node, two texels. The texels of `along` also have the
+// preconditioner times c M.
+struct SpringWeights {
+  float right;
+  float below;
+  float rightBelow;
+  float rightToBelow;  // the spring from the right neighbour to the node below this one
+  float secondRight;
+  float secondBelow;
+  float mass;  // of `along`: the preconditioner times c M
+  float reserved;
+};
+
+SpringWeights springWeightsAt(samplerBuffer table, uint node) {
+  vec4 near = texelFetch(table, 2 * int(node));
+  vec4 far = texelFetch(table, 2 * int(node) + 1);
+  return SpringWeights(CLOTHSTREAM_FLOATS(near), CLOTHSTREAM_FLOATS(far));
+}
+vec4 firstTexelOf(SpringWeights weights) {
+  return vec4(weights.right, weights.below, weights.rightBelow, weights.rightToBelow);
+}
+vec4 secondTexelOf(SpringWeights weights) {
+  return vec4(weights.secondRight, weights.secondBelow, weights.mass, weights.reserved);
+}
+
+// The terms of a spring of a mesh.
+struct WeightedSpring {
+  vec3 row;  // d times the square root of `along`
+  float across;
+};
+
+WeightedSpring weightedSpringAt(samplerBuffer table, uint spring) {
+  vec4 texel = texelFetch(table, int(spring));
+  return WeightedSpring(CLOTHSTREAM_VECTOR(texel));
+}
+
+// Flags of a chunk: it has something to solve; its vectors must be prepared (or cleared).
 const uint kActive = 1, kPrepared = 2;
 
-// A software device runs what a branch leaves out too, masked, and a loop that tests first once more than it
-// must. Loops over lanes and chunks therefore test last, with a bound of 0 where there is nothing to do;
-// their counts do not differ between invocations, as width() divides kLanes.
+// A software device also runs the masked-out side of a branch, and runs a loop that tests first once more
+// than needed. Loops over lanes and chunks therefore test last, with a bound of 0 if there is nothing to do.
+// Their counts do not differ between invocations, because width() divides kLanes.
 
 struct System {
   uint number;
-  int cloth;  // first texel of its record
+  uint cloth;
   uint firstNode, nodes;
   uint rows, columns;  // of a grid
   uint firstChunk, chunks;
@@ -53,28 +99,26 @@ struct System {
 };
 
 System systemAt(uint number) {
-  int record = CLOTHSTREAM_SYSTEM_TEXELS * int(number);
-  vec4 springs = texelFetch(systems, record);
-  vec4 nodes = texelFetch(systems, record + 1);
-  vec4 part = texelFetch(systems, record + 2);
+  SystemRecord record = systemRecordAt(systems, number);
   System system;
   system.number = number;
-  system.cloth = CLOTHSTREAM_CLOTH_TEXELS * int(springs.w);
-  system.firstSpring = wholeNumber(springs.x, springs.y);
-  system.springs = uint(springs.z);
-  system.firstNode = uint(nodes.x);
-  system.nodes = uint(nodes.y);
-  system.rows = uint(nodes.z);
-  system.columns = uint(nodes.w);
-  system.firstChunk = uint(part.x);
-  system.chunks = uint(part.y);
+  system.cloth = uint(record.cloth);
+  system.firstSpring = wholeNumber(record.firstSpringLow, record.firstSpringHigh);
+  system.springs = uint(record.springCount);
+  system.firstNode = uint(record.firstNode);
+  system.nodes = uint(record.nodeCount);
+  system.rows = uint(record.rows);
+  system.columns = uint(record.columns);
+  system.firstChunk = uint(record.firstChunk);
+  system.chunks = uint(record.chunkCount);
   return system;
 }
 
-// The nodes of a walk: first + k * step for k < count. One past the last lies on the last, and has none.
+// The nodes of a walk: first + k * step for k < count. A walk past the last node starts at that node and has
+// count 0.
 struct Walk {
   uint first, step, count;
-  uint row, column;  // of a grid: where it starts
+  uint row, column;  // of a grid: first node
 };
 
 Walk walkAt(System system, uint number) {

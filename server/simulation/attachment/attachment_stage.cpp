@@ -8,9 +8,10 @@
 #include <utility>
 
 #include "kernels/aim_attachments.h"
+#include "kernels/begin_grabs.h"
 #include "kernels/find_nearest_nodes.h"
 #include "kernels/pull_nodes.h"
-#include "kernels/begin_grabs.h"
+#include "server/simulation/texel.h"
 
 namespace clothstream::simulation {
 namespace {
@@ -34,24 +35,30 @@ float stateOf(Grab::State state) {
   }
 }
 
-// Turns the shorter way.
+// The grab rotates the shorter way.
 shared::GrabRecord recordOf(const Grab& grab) {
   const model::Vec3& start = grab.start.position;
   const model::Vec3 motion = grab.end.position - start;
   const Eigen::Vector4f from = grab.start.orientation.coeffs();
   const Eigen::Vector4f to = grab.end.orientation.coeffs();
   const Eigen::Vector4f turn = (from.dot(to) < 0 ? Eigen::Vector4f(-to) : to) - from;
-  return {.start = {start.x(), start.y(), start.z(), grab.slipDistance * grab.slipDistance},
-          .motion = {motion.x(), motion.y(), motion.z(), grab.maxForce},
-          .turned = {from.x(), from.y(), from.z(), from.w()},
-          .turn = {turn.x(), turn.y(), turn.z(), turn.w()},
-          .state = {stateOf(grab.state), grab.radius * grab.radius, grab.reach * grab.reach, 0}};
+  return {.position = vectorOf(start),
+          .squaredSlip = grab.slipDistance * grab.slipDistance,
+          .motion = vectorOf(motion),
+          .force = grab.maxForce,
+          .orientation = texel(grab.start.orientation),
+          .orientationChange = {turn.x(), turn.y(), turn.z(), turn.w()},
+          .state = stateOf(grab.state),
+          .squaredRadius = grab.radius * grab.radius,
+          .squaredReach = grab.reach * grab.reach,
+          .reserved = 0};
 }
 
 }  // namespace
 
-AttachmentStage::AttachmentStage(const vulkan::Device& device, const AttachmentTables& tables, const StateBuffers& state,
-                     std::uint32_t nodeCount, std::uint32_t workgroupSize)
+AttachmentStage::AttachmentStage(const vulkan::Device& device, const AttachmentTables& tables,
+                                 const StateBuffers& state, std::uint32_t nodeCount,
+                                 std::uint32_t workgroupSize)
     : workgroupSize_(workgroupSize),
       nodeCount_(nodeCount),
       attachedCount_(static_cast<std::uint32_t>(tables.attached.size())),
@@ -63,7 +70,7 @@ AttachmentStage::AttachmentStage(const vulkan::Device& device, const AttachmentT
       frames_(device, BufferPurpose::texels,
               std::max<std::size_t>(1, tables.frames.size()) * sizeof(shared::FrameRecord)),
       grabs_(device, BufferPurpose::texels, kGrabBytes),
-      grabbed_(device, BufferPurpose::state, nodeCount * sizeof(shared::vec4)),
+      grabbed_(device, BufferPurpose::state, nodeCount * sizeof(shared::GrabbedNode)),
       reports_(device, BufferPurpose::state, kReportBytes),
       uploads_{Buffer(device, BufferPurpose::upload, frames_.bytes() + kGrabBytes),
                Buffer(device, BufferPurpose::upload, frames_.bytes() + kGrabBytes)},
@@ -85,17 +92,17 @@ AttachmentStage::AttachmentStage(const vulkan::Device& device, const AttachmentT
                     .workgroupSize = workgroupSize},
                    {&grabs_, &reports_, state.positions[0]}, {&grabs_, &reports_, state.positions[1]}),
       beginGrabs_(device,
-                {.name = "begin_grabs",
-                 .spirv = kernels::begin_grabs,
-                 .bindings = {kTexels, kStorage, kTexels, kStorage},
-                 .pushConstantBytes = sizeof(shared::GrabPush),
-                 .workgroupSize = workgroupSize},
-                {&grabs_, &reports_, state.positions[0], &grabbed_},
-                {&grabs_, &reports_, state.positions[1], &grabbed_}),
+                  {.name = "begin_grabs",
+                   .spirv = kernels::begin_grabs,
+                   .bindings = {kTexels, kStorage, kTexels, kStorage},
+                   .pushConstantBytes = sizeof(shared::GrabPush),
+                   .workgroupSize = workgroupSize},
+                  {&grabs_, &reports_, state.positions[0], &grabbed_},
+                  {&grabs_, &reports_, state.positions[1], &grabbed_}),
       tie_(makePull(device, state, false)),
       pull_(makePull(device, state, true)) {}
 
-// From the substep's start it is the other buffers that hold its result.
+// The buffers that do not have the substep's start have its result.
 Stage AttachmentStage::makePull(const vulkan::Device& device, const StateBuffers& state, bool grabs) const {
   return Stage(device,
                {.name = "pull_nodes",
@@ -122,8 +129,8 @@ void AttachmentStage::setSlack(std::span<const model::Cloth> cloths) {
   std::size_t node = 0;
   for (std::size_t cloth = 0; cloth < cloths.size(); ++cloth)
     for (std::uint32_t i = 0; i < cloths[cloth].nodeCount(); ++i, ++node) {
-      tethers[node].anchors.y *= longer[cloth];
-      tethers[node].anchors.w *= longer[cloth];
+      tethers[node].ends[0].distance *= longer[cloth];
+      tethers[node].ends[1].distance *= longer[cloth];
     }
   tethers_.set(tethers);
   longer_ = std::move(longer);
@@ -131,7 +138,7 @@ void AttachmentStage::setSlack(std::span<const model::Cloth> cloths) {
 }
 
 void AttachmentStage::recordInputs(vulkan::Recorder& recorder, std::span<const model::Pose> frames,
-                             std::span<const Grab> grabs) {
+                                   std::span<const Grab> grabs) {
   assert(frames.empty() || frames.size() == startFrames_.size());
   assert(grabs.size() <= kMaxGrabs);
   if (!std::exchange(tabled_, true)) {
@@ -157,8 +164,8 @@ void AttachmentStage::recordInputs(vulkan::Recorder& recorder, std::span<const m
     takes_ = true;
     const std::size_t report = i * sizeof(shared::GrabReport);
     recorder.fill(reports_, ~0u, sizeof(shared::uint32_t), report + offsetof(shared::GrabReport, nearest));
-    recorder.fill(reports_, 0, sizeof(shared::GrabReport) - offsetof(shared::GrabReport, held),
-                  report + offsetof(shared::GrabReport, held));
+    recorder.fill(reports_, 0, sizeof(shared::GrabReport) - offsetof(shared::GrabReport, grabbed),
+                  report + offsetof(shared::GrabReport, grabbed));
   }
   recorder.copy(through, grabs_, grabs.size() * sizeof(shared::GrabRecord), frames_.bytes());
 }
@@ -174,7 +181,7 @@ void AttachmentStage::recordAim(vulkan::Recorder& recorder, std::uint32_t presen
 }
 
 void AttachmentStage::recordSubstep(vulkan::Recorder& recorder, std::uint32_t present, std::uint32_t substep,
-                              std::uint32_t substeps, float tickRate) {
+                                    std::uint32_t substeps, float tickRate) {
   if (!hasTethers_ && grabCount_ == 0) return;
   const float rate = tickRate * static_cast<float>(substeps);
   recorder.barrier();

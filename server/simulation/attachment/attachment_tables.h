@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What holds a scene's cloth from its start, as the kernels read it.
+// Tables of a scene's attachments and tethers.
 #pragma once
 
 #include <vector>
@@ -11,8 +11,9 @@ namespace clothstream::simulation {
 
 struct AttachmentTables {
   std::vector<shared::AttachedRecord> attached;
-  std::vector<shared::FrameRecord> frames;  // of the attachments, in the order of the cloths, at the start
-  // A node of the scene, without slack; none where no cloth has tethers.
+  std::vector<shared::FrameRecord>
+      frames;  // poses of the attachments at the start, in the order of the cloths
+  // By node of the scene, without slack. Empty if no cloth has tethers.
   std::vector<shared::TetherRecord> tethers;
 
   bool empty() const { return attached.empty() && tethers.empty(); }

@@ -9,28 +9,28 @@
 
 namespace clothstream::simulation {
 
-// It moves from start to end over the tick's substeps, as a MovingCollider does. Metres, newtons; as
-// model::Grab.
+// A grab moves from start to end over the tick's substeps, as a MovingCollider does. Metres and newtons; the
+// parameters are those of model::Grab.
 struct Grab {
   enum class State : std::uint8_t {
-    free,  // lets go of what it held
+    free,  // releases all of its nodes
     holds,
-    takes,  // hold of nodes near its start
+    takes,  // grabs nodes near its start
   };
   State state = State::free;
   model::Pose start = {}, end = {};
-  float radius = 0.03f, reach = 0.1f;  // of one that takes hold
+  float radius = 0.03f, reach = 0.1f;  // m, of a beginning grab
   float maxForce = 20;
   float slipDistance = 0.1f;
 };
 
-// At most so many in a tick.
+// Largest number of grabs in a tick.
 inline constexpr std::size_t kMaxGrabs = 1024;
 
-// What a grab holds after a tick.
+// Status of a grab after a tick.
 struct GrabStatus {
-  std::uint32_t taken = 0;    // nodes that it took hold of
-  std::uint32_t slipped = 0;  // those of them that slipped away since
+  std::uint32_t taken = 0;    // nodes that it grabbed
+  std::uint32_t slipped = 0;  // grabbed nodes that slipped away since
 };
 
 }  // namespace clothstream::simulation
