@@ -1,24 +1,25 @@
 // SPDX-License-Identifier: MIT
-// What holds a scene's cloth from its start, as the kernels read it.
+// Tables of a scene's attachments and tethers.
 #pragma once
 
 #include <vector>
 
 #include "server/model/scene.h"
-#include "shaders/hold/hold.h"
+#include "shaders/attachment/attachment.h"
 
 namespace clothstream::simulation {
 
-struct HoldTables {
+struct AttachmentTables {
   std::vector<shared::AttachedRecord> attached;
-  std::vector<shared::FrameRecord> frames;  // of the attachments, in the order of the cloths, at the start
-  // A node of the scene, without slack; none where no cloth has tethers.
+  std::vector<shared::FrameRecord>
+      frames;  // poses of the attachments at the start, in the order of the cloths
+  // By node of the scene, without slack. Empty if no cloth has tethers.
   std::vector<shared::TetherRecord> tethers;
 
   bool empty() const { return attached.empty() && tethers.empty(); }
 };
 
-HoldTables holdTables(const model::Scene& scene);
+AttachmentTables attachmentTables(const model::Scene& scene);
 
 shared::FrameRecord frameRecord(const model::Pose& pose);
 

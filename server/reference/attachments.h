@@ -24,9 +24,9 @@ struct Grab {
   double slipDistance = 0.1;
 };
 
-class Holds {
+class Attachments {
  public:
-  explicit Holds(const model::Scene& scene);
+  explicit Attachments(const model::Scene& scene);
 
   // A tick's start: attached nodes get the velocity that takes them to their frames' places at its end, at
   // most model::kMaxAttachmentSpeed; no frames: where they start. Grabs that begin take hold.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Attachments, tethers and grabs of the reference.
-#include "server/reference/holds.h"
+#include "server/reference/attachments.h"
 
 #include <algorithm>
 #include <limits>
@@ -26,7 +26,7 @@ void tie(ReferenceCloth& cloth, std::size_t node, const model::Tether& tether, d
 
 }  // namespace
 
-Holds::Holds(const model::Scene& scene) {
+Attachments::Attachments(const model::Scene& scene) {
   for (std::size_t c = 0; c < scene.cloths.size(); ++c) {
     const model::Cloth& cloth = scene.cloths[c];
     const std::vector<model::Vec3> rest = model::restPositions(cloth);
@@ -45,7 +45,7 @@ Holds::Holds(const model::Scene& scene) {
   }
 }
 
-void Holds::begin(std::vector<ReferenceCloth>& cloths, std::span<const Pose> frames,
+void Attachments::begin(std::vector<ReferenceCloth>& cloths, std::span<const Pose> frames,
                   std::span<const Grab> grabs, double tickSeconds) {
   for (const Attached& attached : attached_) {
     ReferenceCloth& cloth = cloths[attached.cloth];
@@ -82,7 +82,7 @@ void Holds::begin(std::vector<ReferenceCloth>& cloths, std::span<const Pose> fra
   }
 }
 
-void Holds::apply(std::vector<ReferenceCloth>& cloths, std::span<const Grab> grabs, std::uint32_t substep,
+void Attachments::apply(std::vector<ReferenceCloth>& cloths, std::span<const Grab> grabs, std::uint32_t substep,
                   std::uint32_t substeps, double tickSeconds) {
   const double h = tickSeconds / substeps;
   for (std::size_t c = 0; c < cloths.size(); ++c) {

@@ -1,18 +1,19 @@
 // SPDX-License-Identifier: MIT
 // Attached nodes and tethers of a scene.
-#include "server/simulation/hold/hold_tables.h"
+#include "server/simulation/attachment/attachment_tables.h"
 
 #include <algorithm>
 #include <array>
 
 #include "server/model/tethers.h"
+#include "server/simulation/texel.h"
 
 namespace clothstream::simulation {
 namespace {
 
-// `first`: the cloth's first node.
+// `first` is the cloth's first node in the scene.
 void addAttached(const model::Scene& scene, const model::Cloth& cloth, std::uint32_t first,
-                 HoldTables& tables) {
+                 AttachmentTables& tables) {
   const std::vector<model::Vec3> rest = model::restPositions(cloth);
   for (const model::Attachment& attachment : cloth.attachments) {
     const model::Pose start = model::frameAt(scene, attachment, 0);
@@ -23,30 +24,32 @@ void addAttached(const model::Scene& scene, const model::Cloth& cloth, std::uint
       if (attached[node] == 0) continue;
       const Eigen::Vector3d away = (rest[node] - start.position).cast<double>();
       const model::Vec3 place = (start.orientation.cast<double>().conjugate() * away).cast<float>();
-      tables.attached.push_back(
-          {{static_cast<float>(first + node), frame, 0, 0}, {place.x(), place.y(), place.z(), 0}});
+      tables.attached.push_back({.node = static_cast<float>(first + node),
+                                 .frame = frame,
+                                 .reserved0 = 0,
+                                 .reserved1 = 0,
+                                 .place = vectorOf(place),
+                                 .reserved2 = 0});
     }
   }
 }
 
 shared::TetherRecord record(const model::NodeTethers& tethers, std::uint32_t first) {
-  shared::TetherRecord record{};
-  const auto number = [&](const model::Tether& tether) {
-    return tether.anchor == model::Tether::kNone ? 0.0f : static_cast<float>(first + tether.anchor + 1);
+  const auto end = [&](const model::Tether& tether) -> shared::TetherEnd {
+    const bool exists = tether.anchor != model::Tether::kNone;
+    return {exists ? static_cast<float>(first + tether.anchor + 1) : 0.0f, tether.length};
   };
-  record.anchors = {number(tethers[0]), tethers[0].length, number(tethers[1]), tethers[1].length};
-  return record;
+  return {{end(tethers[0]), end(tethers[1])}};
 }
 
 }  // namespace
 
 shared::FrameRecord frameRecord(const model::Pose& pose) {
-  const auto& q = pose.orientation;
-  return {{pose.position.x(), pose.position.y(), pose.position.z(), 0}, {q.x(), q.y(), q.z(), q.w()}};
+  return {vectorOf(pose.position), 0, texel(pose.orientation)};
 }
 
-HoldTables holdTables(const model::Scene& scene) {
-  HoldTables tables;
+AttachmentTables attachmentTables(const model::Scene& scene) {
+  AttachmentTables tables;
   const bool anyTethers =
       std::ranges::any_of(scene.cloths, [](const model::Cloth& cloth) { return cloth.tethers.has_value(); });
   std::uint32_t first = 0;

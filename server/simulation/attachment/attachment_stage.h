@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What holds cloth, on the device: nodes attached to moving frames, tethers, participants' grabs.
+// Attachments, tethers and grabs on the device.
 #pragma once
 
 #include <array>
@@ -8,9 +8,9 @@
 
 #include "server/model/pose.h"
 #include "server/model/scene.h"
+#include "server/simulation/attachment/attachment_tables.h"
+#include "server/simulation/attachment/grab.h"
 #include "server/simulation/device_table.h"
-#include "server/simulation/hold/grab.h"
-#include "server/simulation/hold/hold_tables.h"
 #include "server/simulation/stage.h"
 #include "server/simulation/state_buffers.h"
 #include "server/vulkan/buffer.h"
@@ -23,52 +23,54 @@ namespace clothstream::simulation {
 //
 // A tick:   recordInputs -> barrier -> recordAim -> substeps, each with recordSubstep at its end ->
 // recordReport
-class HoldStage {
+class AttachmentStage {
  public:
   // Throws std::runtime_error where the device has no room.
-  HoldStage(const vulkan::Device& device, const HoldTables& tables, const StateBuffers& state,
-            std::uint32_t nodeCount, std::uint32_t workgroupSize);
+  AttachmentStage(const vulkan::Device& device, const AttachmentTables& tables, const StateBuffers& state,
+                  std::uint32_t nodeCount, std::uint32_t workgroupSize);
 
-  // Of the tethers of these cloths, from the next tick on: to be called before the first.
+  // Sets the slack of the tethers of these cloths from the next tick on. Must be called before the first
+  // tick.
   void setSlack(std::span<const model::Cloth> cloths);
 
-  // `frames`: where each attachment of the tables is at the tick's end; none: where they start. At most one
+  // `frames` are the poses of the attachments at the tick's end; empty: their poses at the start. At most one
   // tick may be in flight.
   void recordInputs(vulkan::Recorder& recorder, std::span<const model::Pose> frames,
                     std::span<const Grab> grabs);
-  // Whether recordAim() has something to do in this tick.
+  // True if recordAim() has work in this tick.
   bool aims() const { return attachedCount_ > 0 || takes_; }
-  // Attached nodes get their velocities, grabs that begin take hold; the state lies in the buffers `present`.
+  // Gives attached nodes their velocities, and lets grabs begin. The state is in the buffers `present`.
   void recordAim(vulkan::Recorder& recorder, std::uint32_t present, float tickRate);
-  // The substep's result lies in the buffers that are not `present`.
+  // Applies tethers and grabs at a substep's end. The result of the substep is in the buffers other than
+  // `present`.
   void recordSubstep(vulkan::Recorder& recorder, std::uint32_t present, std::uint32_t substep,
                      std::uint32_t substeps, float tickRate);
   void recordReport(vulkan::Recorder& recorder);
 
-  // Of the grabs of the last recorded tick, once it is complete.
+  // Reports of the grabs of the last recorded tick, once it is complete.
   std::span<const shared::GrabReport> report() const;
 
  private:
-  Stage makeHold(const vulkan::Device& device, const StateBuffers& state, bool grabs) const;
-  // They share the nodes.
+  Stage makePull(const vulkan::Device& device, const StateBuffers& state, bool grabs) const;
+  // Number of invocations, which share the nodes.
   std::uint64_t invocations() const;
 
   std::uint32_t workgroupSize_, nodeCount_, attachedCount_;
   bool hasTethers_;
-  bool tabled_ = false;    // what does not change is on the device
-  bool slackened_ = true;  // the tethers are
-  bool takes_ = false;     // some grab takes hold in this tick
+  bool tabled_ = false;    // the constant tables are on the device
+  bool slackened_ = true;  // the tethers on the device have the present slack
+  bool takes_ = false;     // a grab begins in this tick
   std::uint32_t grabCount_ = 0, slot_ = 0;
 
   DeviceTable attached_, tethers_;
   std::vector<shared::TetherRecord> restTethers_;  // without slack
-  std::vector<float> longer_;                      // by which each cloth's are, as the table has them
+  std::vector<float> longer_;                      // factor of each cloth's tethers in the table
   std::vector<shared::FrameRecord> startFrames_;
-  vulkan::Buffer frames_, grabs_, holds_, reports_;
-  // By turns: a tick may be in flight while the next is recorded.
+  vulkan::Buffer frames_, grabs_, grabbed_, reports_;
+  // Used alternately, because a tick may be in flight while the next one is recorded.
   std::array<vulkan::Buffer, 2> uploads_;  // frames, then grabs
   std::array<vulkan::Buffer, 2> readbacks_;
-  Stage aim_, findNearest_, takeHold_, tie_, hold_;
+  Stage aim_, findNearest_, beginGrabs_, tie_, pull_;
 };
 
 }  // namespace clothstream::simulation

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Kernels of attachments, tethers and grabs.
-#include "server/simulation/hold/hold_stage.h"
+#include "server/simulation/attachment/attachment_stage.h"
 
 #include <algorithm>
 #include <cassert>
@@ -8,9 +8,10 @@
 #include <utility>
 
 #include "kernels/aim_attachments.h"
-#include "kernels/find_nearest.h"
-#include "kernels/hold_nodes.h"
-#include "kernels/take_hold.h"
+#include "kernels/begin_grabs.h"
+#include "kernels/find_nearest_nodes.h"
+#include "kernels/pull_nodes.h"
+#include "server/simulation/texel.h"
 
 namespace clothstream::simulation {
 namespace {
@@ -26,32 +27,38 @@ constexpr std::size_t kReportBytes = kMaxGrabs * sizeof(shared::GrabReport);
 float stateOf(Grab::State state) {
   switch (state) {
     case Grab::State::holds:
-      return shared::kHoldingGrab;
+      return shared::kActiveGrab;
     case Grab::State::takes:
-      return shared::kTakingGrab;
+      return shared::kBeginningGrab;
     default:
-      return shared::kFreeGrab;
+      return shared::kReleasedGrab;
   }
 }
 
-// Turns the shorter way.
+// The grab rotates the shorter way.
 shared::GrabRecord recordOf(const Grab& grab) {
   const model::Vec3& start = grab.start.position;
   const model::Vec3 motion = grab.end.position - start;
   const Eigen::Vector4f from = grab.start.orientation.coeffs();
   const Eigen::Vector4f to = grab.end.orientation.coeffs();
   const Eigen::Vector4f turn = (from.dot(to) < 0 ? Eigen::Vector4f(-to) : to) - from;
-  return {.start = {start.x(), start.y(), start.z(), grab.slipDistance * grab.slipDistance},
-          .motion = {motion.x(), motion.y(), motion.z(), grab.maxForce},
-          .turned = {from.x(), from.y(), from.z(), from.w()},
-          .turn = {turn.x(), turn.y(), turn.z(), turn.w()},
-          .state = {stateOf(grab.state), grab.radius * grab.radius, grab.reach * grab.reach, 0}};
+  return {.position = vectorOf(start),
+          .squaredSlip = grab.slipDistance * grab.slipDistance,
+          .motion = vectorOf(motion),
+          .force = grab.maxForce,
+          .orientation = texel(grab.start.orientation),
+          .orientationChange = {turn.x(), turn.y(), turn.z(), turn.w()},
+          .state = stateOf(grab.state),
+          .squaredRadius = grab.radius * grab.radius,
+          .squaredReach = grab.reach * grab.reach,
+          .reserved = 0};
 }
 
 }  // namespace
 
-HoldStage::HoldStage(const vulkan::Device& device, const HoldTables& tables, const StateBuffers& state,
-                     std::uint32_t nodeCount, std::uint32_t workgroupSize)
+AttachmentStage::AttachmentStage(const vulkan::Device& device, const AttachmentTables& tables,
+                                 const StateBuffers& state, std::uint32_t nodeCount,
+                                 std::uint32_t workgroupSize)
     : workgroupSize_(workgroupSize),
       nodeCount_(nodeCount),
       attachedCount_(static_cast<std::uint32_t>(tables.attached.size())),
@@ -63,7 +70,7 @@ HoldStage::HoldStage(const vulkan::Device& device, const HoldTables& tables, con
       frames_(device, BufferPurpose::texels,
               std::max<std::size_t>(1, tables.frames.size()) * sizeof(shared::FrameRecord)),
       grabs_(device, BufferPurpose::texels, kGrabBytes),
-      holds_(device, BufferPurpose::state, nodeCount * sizeof(shared::vec4)),
+      grabbed_(device, BufferPurpose::state, nodeCount * sizeof(shared::GrabbedNode)),
       reports_(device, BufferPurpose::state, kReportBytes),
       uploads_{Buffer(device, BufferPurpose::upload, frames_.bytes() + kGrabBytes),
                Buffer(device, BufferPurpose::upload, frames_.bytes() + kGrabBytes)},
@@ -78,42 +85,42 @@ HoldStage::HoldStage(const vulkan::Device& device, const HoldTables& tables, con
            {&attached_.texels(), &frames_, state.positions[0], state.velocities[0]},
            {&attached_.texels(), &frames_, state.positions[1], state.velocities[1]}),
       findNearest_(device,
-                   {.name = "find_nearest",
-                    .spirv = kernels::find_nearest,
+                   {.name = "find_nearest_nodes",
+                    .spirv = kernels::find_nearest_nodes,
                     .bindings = {kTexels, kStorage, kTexels},
                     .pushConstantBytes = sizeof(shared::GrabPush),
                     .workgroupSize = workgroupSize},
                    {&grabs_, &reports_, state.positions[0]}, {&grabs_, &reports_, state.positions[1]}),
-      takeHold_(device,
-                {.name = "take_hold",
-                 .spirv = kernels::take_hold,
-                 .bindings = {kTexels, kStorage, kTexels, kStorage},
-                 .pushConstantBytes = sizeof(shared::GrabPush),
-                 .workgroupSize = workgroupSize},
-                {&grabs_, &reports_, state.positions[0], &holds_},
-                {&grabs_, &reports_, state.positions[1], &holds_}),
-      tie_(makeHold(device, state, false)),
-      hold_(makeHold(device, state, true)) {}
+      beginGrabs_(device,
+                  {.name = "begin_grabs",
+                   .spirv = kernels::begin_grabs,
+                   .bindings = {kTexels, kStorage, kTexels, kStorage},
+                   .pushConstantBytes = sizeof(shared::GrabPush),
+                   .workgroupSize = workgroupSize},
+                  {&grabs_, &reports_, state.positions[0], &grabbed_},
+                  {&grabs_, &reports_, state.positions[1], &grabbed_}),
+      tie_(makePull(device, state, false)),
+      pull_(makePull(device, state, true)) {}
 
-// From the substep's start it is the other buffers that hold its result.
-Stage HoldStage::makeHold(const vulkan::Device& device, const StateBuffers& state, bool grabs) const {
+// The buffers that do not have the substep's start have its result.
+Stage AttachmentStage::makePull(const vulkan::Device& device, const StateBuffers& state, bool grabs) const {
   return Stage(device,
-               {.name = "hold_nodes",
-                .spirv = kernels::hold_nodes,
+               {.name = "pull_nodes",
+                .spirv = kernels::pull_nodes,
                 .bindings = {kTexels, kStorage, kTexels, kStorage, kStorage, kStorage},
-                .pushConstantBytes = sizeof(shared::HoldPush),
+                .pushConstantBytes = sizeof(shared::PullPush),
                 .workgroupSize = workgroupSize_,
                 .specialisation = {hasTethers_ ? 1u : 0u, grabs ? 1u : 0u}},
-               {&grabs_, &reports_, &tethers_.texels(), state.positions[1], state.velocities[1], &holds_},
-               {&grabs_, &reports_, &tethers_.texels(), state.positions[0], state.velocities[0], &holds_});
+               {&grabs_, &reports_, &tethers_.texels(), state.positions[1], state.velocities[1], &grabbed_},
+               {&grabs_, &reports_, &tethers_.texels(), state.positions[0], state.velocities[0], &grabbed_});
 }
 
-std::uint64_t HoldStage::invocations() const {
+std::uint64_t AttachmentStage::invocations() const {
   constexpr std::uint64_t kMost = 1 << 20;
   return std::min<std::uint64_t>(nodeCount_, kMost);
 }
 
-void HoldStage::setSlack(std::span<const model::Cloth> cloths) {
+void AttachmentStage::setSlack(std::span<const model::Cloth> cloths) {
   if (!hasTethers_) return;
   std::vector<float> longer;
   for (const model::Cloth& cloth : cloths) longer.push_back(1 + (cloth.tethers ? cloth.tethers->slack : 0));
@@ -122,21 +129,21 @@ void HoldStage::setSlack(std::span<const model::Cloth> cloths) {
   std::size_t node = 0;
   for (std::size_t cloth = 0; cloth < cloths.size(); ++cloth)
     for (std::uint32_t i = 0; i < cloths[cloth].nodeCount(); ++i, ++node) {
-      tethers[node].anchors.y *= longer[cloth];
-      tethers[node].anchors.w *= longer[cloth];
+      tethers[node].ends[0].distance *= longer[cloth];
+      tethers[node].ends[1].distance *= longer[cloth];
     }
   tethers_.set(tethers);
   longer_ = std::move(longer);
   slackened_ = false;
 }
 
-void HoldStage::recordInputs(vulkan::Recorder& recorder, std::span<const model::Pose> frames,
-                             std::span<const Grab> grabs) {
+void AttachmentStage::recordInputs(vulkan::Recorder& recorder, std::span<const model::Pose> frames,
+                                   std::span<const Grab> grabs) {
   assert(frames.empty() || frames.size() == startFrames_.size());
   assert(grabs.size() <= kMaxGrabs);
   if (!std::exchange(tabled_, true)) {
     attached_.recordUpload(recorder);
-    recorder.fill(holds_, 0, holds_.bytes());
+    recorder.fill(grabbed_, 0, grabbed_.bytes());
     recorder.fill(reports_, 0, reports_.bytes());
     recorder.barrier();
   }
@@ -157,30 +164,30 @@ void HoldStage::recordInputs(vulkan::Recorder& recorder, std::span<const model::
     takes_ = true;
     const std::size_t report = i * sizeof(shared::GrabReport);
     recorder.fill(reports_, ~0u, sizeof(shared::uint32_t), report + offsetof(shared::GrabReport, nearest));
-    recorder.fill(reports_, 0, sizeof(shared::GrabReport) - offsetof(shared::GrabReport, held),
-                  report + offsetof(shared::GrabReport, held));
+    recorder.fill(reports_, 0, sizeof(shared::GrabReport) - offsetof(shared::GrabReport, grabbed),
+                  report + offsetof(shared::GrabReport, grabbed));
   }
   recorder.copy(through, grabs_, grabs.size() * sizeof(shared::GrabRecord), frames_.bytes());
 }
 
-void HoldStage::recordAim(vulkan::Recorder& recorder, std::uint32_t present, float tickRate) {
+void AttachmentStage::recordAim(vulkan::Recorder& recorder, std::uint32_t present, float tickRate) {
   if (attachedCount_ > 0)
     recorder.dispatch(aim_.from[present],
                       shared::AimPush{attachedCount_, tickRate, model::kMaxAttachmentSpeed}, attachedCount_);
   if (!takes_) return;
   recorder.dispatch(findNearest_.from[present], shared::GrabPush{nodeCount_, grabCount_}, invocations());
   recorder.barrier();
-  recorder.dispatch(takeHold_.from[present], shared::GrabPush{nodeCount_, grabCount_}, invocations());
+  recorder.dispatch(beginGrabs_.from[present], shared::GrabPush{nodeCount_, grabCount_}, invocations());
 }
 
-void HoldStage::recordSubstep(vulkan::Recorder& recorder, std::uint32_t present, std::uint32_t substep,
-                              std::uint32_t substeps, float tickRate) {
+void AttachmentStage::recordSubstep(vulkan::Recorder& recorder, std::uint32_t present, std::uint32_t substep,
+                                    std::uint32_t substeps, float tickRate) {
   if (!hasTethers_ && grabCount_ == 0) return;
   const float rate = tickRate * static_cast<float>(substeps);
   recorder.barrier();
   recorder.dispatch(
-      (grabCount_ > 0 ? hold_ : tie_).from[present],
-      shared::HoldPush{.nodeCount = nodeCount_,
+      (grabCount_ > 0 ? pull_ : tie_).from[present],
+      shared::PullPush{.nodeCount = nodeCount_,
                        .progressBefore = static_cast<float>(substep) / static_cast<float>(substeps),
                        .progressAfter = static_cast<float>(substep + 1) / static_cast<float>(substeps),
                        .substepSeconds = 1 / rate,
@@ -189,11 +196,11 @@ void HoldStage::recordSubstep(vulkan::Recorder& recorder, std::uint32_t present,
       invocations());
 }
 
-void HoldStage::recordReport(vulkan::Recorder& recorder) {
+void AttachmentStage::recordReport(vulkan::Recorder& recorder) {
   if (grabCount_ > 0) recorder.copy(reports_, readbacks_[slot_], grabCount_ * sizeof(shared::GrabReport));
 }
 
-std::span<const shared::GrabReport> HoldStage::report() const {
+std::span<const shared::GrabReport> AttachmentStage::report() const {
   return readbacks_[slot_].mapped<const shared::GrabReport>().first(grabCount_);
 }
 

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
-// The velocity with which an attached node, which no force moves, is in its place at the tick's end.
+// Gives each attached node, which no force moves, the velocity that takes it to its place at the tick's end.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 
-#include "shaders/hold/hold.h"
+#include "shaders/attachment/attachment.h"
 #include "shaders/shared/rotation.glsl"
 
 layout(local_size_x_id = 0) in;
@@ -25,15 +25,16 @@ void main() {
   if (i >= push.count) {
     return;
   }
-  vec4 node = texelFetch(attached, 2 * int(i));
-  int frame = 2 * int(node.y);
-  vec3 inFrame = texelFetch(attached, 2 * int(i) + 1).xyz;
-  precise vec3 place = texelFetch(frames, frame).xyz + rotate(texelFetch(frames, frame + 1), inFrame);
-  precise vec3 velocity = push.tickRate * (place - texelFetch(positions, int(node.x)).xyz);
+  AttachedRecord record = attachedAt(attached, i);
+  int node = int(record.node);
+  FrameRecord frame = frameAt(frames, uint(record.frame));
+  precise vec3 place = frame.position + rotate(frame.orientation, record.place);
+  precise vec3 velocity = push.tickRate * (place - texelFetch(positions, node).xyz);
   precise float squared = dotProduct(velocity, velocity);
-  if (squared > push.maxSpeed * push.maxSpeed) {
+  precise float mostSquared = push.maxSpeed * push.maxSpeed;
+  if (squared > mostSquared) {
     precise vec3 slower = velocity * (push.maxSpeed * reciprocalSquareRoot(squared));
     velocity = slower;
   }
-  velocities[int(node.x)].xyz = snapTiny(velocity);
+  velocities[node].xyz = snapTiny(velocity);
 }

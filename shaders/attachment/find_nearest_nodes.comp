@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
-// How far the nearest node is that a grab could take hold of.
+// Finds the distance of the nearest node that a beginning grab could grab.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 
-#include "shaders/hold/grab.glsl"
+#include "shaders/attachment/grab.glsl"
 
 layout(binding = 2) uniform samplerBuffer positions;  // w: inverse mass
 
@@ -11,18 +11,18 @@ layout(push_constant) uniform Push {
   GrabPush push;
 };
 
-// The bits of floats from 0 on are in the order of the floats: their least does not depend on who comes
-// first.
+// The bits of floats from 0 on order as the floats do. The minimum does not depend on the order of the
+// invocations.
 void measure(uint node) {
   vec4 position = texelFetch(positions, int(node));
   if (position.w == 0.0) {
     return;
   }
   for (uint grab = 0; grab < push.grabCount; ++grab) {
-    vec4 state = grabTexel(grab, 4);
-    vec3 away = fromGrab(grab, position.xyz);
+    GrabRecord record = grabAt(grabs, grab);
+    vec3 away = fromGrab(record, position.xyz);
     float squared = dotProduct(away, away);
-    if (state.x == kTakingGrab && squared <= max(state.y, state.z)) {
+    if (record.state == kBeginningGrab && squared <= max(record.squaredRadius, record.squaredReach)) {
       atomicMin(reports[grab].nearest, floatBitsToUint(squared));
     }
   }

@@ -1,34 +1,34 @@
 // SPDX-License-Identifier: MIT
-// What a spring adds to its system.
+// The terms that a spring adds to its linear system.
 //
 // Implicit Euler: (M + h D + h^2 K) (v' - v) = M (v_free - v) - h^2 K v, with K and D at the substep's start
 // (Baraff and Witkin, "Large steps in cloth simulation", 1998). With n from one end to the other, l the
 // length and r the rest length,
 //   h D + h^2 K = (e + w - a) n n^T + a I,   e = h^2 k,  w = h d,  a = e max(0, 1 - r / l)
-// (what pushes across a compressed spring is left out, so that the matrix is positive definite).
+// (the part that pushes across a compressed spring is left out, so that the matrix is positive definite).
 //
-// Constraints: [Va21] Eq. 3-11 have (J M^-1 J^T + c) lambda = b, and the nodes move by -M^-1 J^T lambda. Put
-// lambda = (b + J move) / c into that: (c M + J^T J) move = -J^T b, which has as few unknowns as nodes have
-// coordinates, one gather a product, the same eigenvalues, and a solution where c is 0. b = C + h J v_free, C
-// the length less r; a spring that may still be a force has no part unless v_free would stretch it too far
-// ([Va21] 3.3). Solved for the velocity move / h.
-#ifndef CLOTHSTREAM_SHADERS_SOLVE_WEIGH_GLSL
-#define CLOTHSTREAM_SHADERS_SOLVE_WEIGH_GLSL
+// Constraints: [Va21] Eq. 3-11 have (J M^-1 J^T + c) lambda = b, and the nodes move by -M^-1 J^T lambda.
+// Substituting lambda = (b + J move) / c gives (c M + J^T J) move = -J^T b. This system has only as many
+// unknowns as the nodes have coordinates, needs one gather per product, has the same eigenvalues, and has a
+// solution if c is 0. b = C + h J v_free, with C the length minus r. With ACAD a spring takes part only if
+// v_free would stretch it too far ([Va21] 3.3). The kernels solve for the velocity move / h.
+#ifndef CLOTHSTREAM_SHADERS_SOLVE_SPRING_TERMS_GLSL
+#define CLOTHSTREAM_SHADERS_SOLVE_SPRING_TERMS_GLSL
 
-#include "shaders/solve/system.glsl"
+#include "shaders/solve/linear_system.glsl"
 
 layout(binding = 3) uniform samplerBuffer positions;   // at the substep's start; w: inverse mass
-layout(binding = 4) uniform samplerBuffer velocities;  // then
+layout(binding = 4) uniform samplerBuffer velocities;  // at the substep's start
 layout(binding = 5) uniform samplerBuffer freeVelocities;
 layout(binding = 6) uniform samplerBuffer freePositions;
 layout(std430, binding = 7) buffer Solves {
   SolveRecord solves[];
 };
 layout(std430, binding = 8) buffer Actives {
-  uint actives[];  // a chunk: kActive, kPrepared; then those that are, a group after the other
+  uint actives[];  // by chunk: kActive, kPrepared; then the numbers of the active chunks, group by group
 };
 layout(std430, binding = 9) buffer Groups {
-  uint groups[];  // three numbers an iteration: how many workgroups it takes
+  uint groups[];  // dispatch sizes, three numbers per iteration
 };
 
 layout(push_constant) uniform Push {
@@ -37,7 +37,8 @@ layout(push_constant) uniform Push {
 
 bool isTooLong(vec3 a, vec3 b, float longest) {
   precise vec3 d = b - a;
-  return dotProduct(d, d) > longest * longest;
+  precise float squared = longest * longest;
+  return dotProduct(d, d) > squared;
 }
 
 struct End {
@@ -55,21 +56,27 @@ End endAt(uint node) {
              kAdaptive ? texelFetch(freePositions, int(node)).xyz : vec3(0.0));
 }
 
-struct Kind {
+// Springs of one kind and rest length.
+struct SpringKind {
   float restLength;
   float elastic;  // h^2 k
   float viscous;  // h d
 };
 
+SpringKind springKind(float restLength, float stiffness, float damping) {
+  precise float elastic = push.substepSeconds * push.substepSeconds * stiffness;
+  precise float viscous = push.substepSeconds * damping;
+  return SpringKind(restLength, elastic, viscous);
+}
+
 struct Weight {
-  float along;  // times d d^T
+  float along;  // factor of d d^T
   float across;
-  vec3 impulse;  // on `here`: its part of the right-hand side
+  vec3 impulse;  // part of the right-hand side of `here`
   float trace;
 };
 
-// `limits`: of the cloth's record.
-Weight weigh(End here, End other, Kind kind, vec4 limits, bool exists) {
+Weight weightOf(End here, End other, SpringKind kind, ClothRecord cloth, bool exists) {
   precise vec3 d = other.place - here.place;
   precise float squared = max(dotProduct(d, d), 1e-12);
   float inverseLength = reciprocalSquareRoot(squared);
@@ -86,26 +93,27 @@ Weight weigh(End here, End other, Kind kind, vec4 limits, bool exists) {
                   exists ? trace : 0.0);
   }
   precise vec3 relative = other.freeVelocity - here.freeVelocity;
-  precise float longest = kind.restLength + limits.x * kind.restLength;
-  // Between two pinned nodes nothing can move.
-  bool isActive = exists && here.inverseMass + other.inverseMass > 0.0 &&
-                  (!kAdaptive || isTooLong(here.freePlace, other.freePlace, longest));
+  precise float longest = kind.restLength + cloth.activation * kind.restLength;
+  // Two pinned nodes do not move.
+  precise float inverseMasses = here.inverseMass + other.inverseMass;
+  bool isActive =
+      exists && inverseMasses > 0.0 && (!kAdaptive || isTooLong(here.freePlace, other.freePlace, longest));
   precise float excess = squared * inverseLength - longest;
-  precise float takenBack = excess > 0.0 || !kAdaptive ? limits.y * excess : excess;
-  precise float side = push.substepRate * takenBack + inverseLength * dotProduct(d, relative);
+  precise float corrected = excess > 0.0 || !kAdaptive ? cloth.correctionFraction * excess : excess;
+  precise float side = push.substepRate * corrected + inverseLength * dotProduct(d, relative);
   precise vec3 impulse = (side * inverseLength) * d;
   return Weight(isActive ? inverseSquared : 0.0, 0.0, isActive ? impulse : vec3(0.0), 0.0);
 }
 
-// What a node starts its solve with.
+// The start of a node's solve.
 struct Start {
-  vec4 residual;
+  vec4 residual;  // ResidualRecord
   vec3 correction;
   float mass;  // the preconditioner times c M
 };
 
-// `impulse`, `trace`: sums over the node's springs. Implicit velocities are solved for from v' = v on, so
-// that a solve that ends early leaves motion out rather than forces unbraked.
+// `impulse` and `trace` are sums over the node's springs. A solve for implicit velocities starts from v' = v.
+// If it ends early, it leaves out motion instead of leaving forces without damping.
 Start startOf(End here, vec3 impulse, float trace, float compliance) {
   float inverseMass = here.inverseMass;
   float mass = reciprocal(max(inverseMass, 1e-30));
@@ -130,9 +138,9 @@ void beginChunk() {
   barrier();
 }
 
-// Whether a chunk has anything to solve, by all of its nodes; and how many workgroups there are then of the
-// group's chunks, of its small systems, of the large ones' chunks. Those are listed, in whatever order: it
-// does not matter who does which.
+// Stores whether a chunk has anything to solve, which follows from all of its nodes. Updates the dispatch
+// sizes of the group: of all chunks, of the small systems, of the chunks of large systems. The latter are
+// listed in arbitrary order, because it does not matter which workgroup handles which chunk.
 void keepActive(System system, uint chunk) {
   barrier();
   if (self() == 0) {

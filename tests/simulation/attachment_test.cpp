@@ -91,8 +91,8 @@ TEST_F(Hold, HoldsAsTheReferenceDoesWithEverySolver) {
     const std::vector<simulation::GrabStatus> grabs = running.grabs();
     ASSERT_EQ(grabs.size(), 2u);
     for (std::size_t i = 0; i < 2; ++i) {
-      EXPECT_EQ(grabs[i].taken, reference.holds().status()[i].taken);
-      EXPECT_EQ(grabs[i].slipped, reference.holds().status()[i].slipped);
+      EXPECT_EQ(grabs[i].taken, reference.attachments().status()[i].taken);
+      EXPECT_EQ(grabs[i].slipped, reference.attachments().status()[i].slipped);
       EXPECT_GT(grabs[i].taken, 0u);
     }
     const double h = scene.substepSeconds(), extent = 4;
