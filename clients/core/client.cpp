@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "clients/core/description.h"
+#include "clients/core/wire/description.h"
 #include "proto/codec/packet_header.h"
 
 namespace clothstream::client {
@@ -260,28 +260,12 @@ void Client::timeFrame(bool key, std::uint64_t nowUs) {
                 clock_.known() ? arrivedUs + decodeUs : 0);
 }
 
-bool Client::setPlayOut(const cs_play_out_options* options) {
-  if (options && !isAllowed(*options)) return false;
-  playOut_ = options ? std::make_unique<PlayOut>(*options) : nullptr;
-  if (playOut_ && decoder_) playOut_->begin(description_);
-  return true;
-}
-
-std::optional<cs_played> Client::play(std::uint64_t nowUs, std::uint64_t displayUs) {
-  if (!playOut_) return std::nullopt;
-  return playOut_->play(clock_.serverTimeUs(nowUs), clock_.serverTimeUs(displayUs));
-}
-
 codec::DecodeResult Client::decode(std::span<const std::byte> packet) {
   if (!nowUs_) return decoder_->decode(packet);
   const std::uint64_t start = nowUs_();
   const codec::DecodeResult result = decoder_->decode(packet);
   decodeMs_ = static_cast<double>(nowUs_() - start) / 1000;
   return result;
-}
-
-void Client::requestEarlyKeyFrame(std::uint64_t nowUs) {
-  if (state_ == CS_STATE_JOINED) requestKeyFrame(nowUs, true);
 }
 
 void Client::requestKeyFrame(std::uint64_t nowUs, bool early) {
@@ -382,94 +366,11 @@ std::optional<cs_playback> Client::playback(std::uint64_t nowUs) const {
   return now;
 }
 
-void Client::control(const SceneControl& control) {
-  if (state_ != CS_STATE_JOINED) return;
-  std::string message;
-  writeControlScene(message, ++lastRequestId_, welcome_.scene, control);
-  send(std::move(message));
-}
-
 const std::string* Client::nextOutgoing() {
   const std::string* message = outbox_.next();
   // Attachments stay where they are put: it need not be said again.
   if (outbox_.poses().empty() && isConnected() && mayCollide()) poses_.attachments.clear();
   return message;
-}
-
-void Client::setColliders(std::span<const cs_own_collider> colliders, std::uint64_t nowUs) {
-  poses_.colliders.assign(colliders.begin(), colliders.end());
-  sendPoses(nowUs);
-}
-
-void Client::setHand(std::uint32_t side, std::span<const float> joints, std::uint64_t nowUs) {
-  std::vector<float>& hand = side == CS_HAND_LEFT ? poses_.leftHand : poses_.rightHand;
-  hand.assign(joints.begin(), joints.end());
-  sendPoses(nowUs);
-}
-
-void Client::setGrabs(std::span<const cs_grab> grabs, std::uint64_t nowUs) {
-  poses_.grabs.assign(grabs.begin(), grabs.end());
-  sendPoses(nowUs);
-}
-
-void Client::wantContacts(bool wants, std::uint64_t nowUs) {
-  poses_.wantsContacts = wants;
-  sendPoses(nowUs);
-}
-
-void Client::move(AttachmentPose attachment, std::uint64_t nowUs) {
-  const auto known =
-      std::find_if(poses_.attachments.begin(), poses_.attachments.end(),
-                   [&](const AttachmentPose& waiting) { return waiting.name == attachment.name; });
-  if (known != poses_.attachments.end())
-    *known = std::move(attachment);
-  else
-    poses_.attachments.push_back(std::move(attachment));
-  sendPoses(nowUs);
-}
-
-bool Client::mayCollide() const {
-  return (welcomed_ ? welcome_.role : greeting_.role) != CS_ROLE_VIEWER;
-}
-
-void Client::sendPoses(std::uint64_t nowUs) {
-  posed_ = true;
-  if (state_ == CS_STATE_FAILED || !isConnected()) return;
-  const std::uint64_t serverUs = clock_.serverTimeUs(nowUs);
-  if (mayCollide()) return writeColliderPoses(outbox_.poses(), poses_, nowUs, serverUs);
-  Poses seen;
-  seen.wantsContacts = poses_.wantsContacts;
-  writeColliderPoses(outbox_.poses(), seen, nowUs, serverUs);
-}
-
-void Client::setRole(std::uint64_t participant, std::uint32_t role) {
-  std::string message;
-  writeSetRole(message, ++lastRequestId_, participant, role);
-  send(std::move(message));
-}
-
-void Client::remove(std::uint64_t participant) {
-  std::string message;
-  writeRemoveParticipant(message, ++lastRequestId_, participant);
-  send(std::move(message));
-}
-
-void Client::change(const ParameterChange& change) {
-  std::string message;
-  writeParameterChange(message, ++lastRequestId_, change);
-  send(std::move(message));
-}
-
-void Client::change(const ColliderChange& change) {
-  std::string message;
-  writeColliderChange(message, ++lastRequestId_, change);
-  send(std::move(message));
-}
-
-void Client::listScenes() {
-  std::string message;
-  writeListScenes(message, ++lastRequestId_);
-  send(std::move(message));
 }
 
 std::span<const float> Client::positions() const {

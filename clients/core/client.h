@@ -9,18 +9,17 @@
 #include <string>
 #include <vector>
 
-#include "clients/core/acknowledgement.h"
-#include "clients/core/client_message.h"
-#include "clients/core/content_assembly.h"
 #include "clients/core/core.h"
-#include "clients/core/description.h"
-#include "clients/core/frame_statistics.h"
-#include "clients/core/key_frame_request.h"
-#include "clients/core/outbox.h"
-#include "clients/core/play_out.h"
-#include "clients/core/reconnection.h"
-#include "clients/core/server_clock.h"
-#include "clients/core/server_message.h"
+#include "clients/core/stream/content_assembly.h"
+#include "clients/core/stream/frame_feedback.h"
+#include "clients/core/stream/frame_statistics.h"
+#include "clients/core/stream/outbox.h"
+#include "clients/core/stream/play_out.h"
+#include "clients/core/stream/reconnection.h"
+#include "clients/core/stream/server_clock.h"
+#include "clients/core/wire/client_message.h"
+#include "clients/core/wire/description.h"
+#include "clients/core/wire/server_message.h"
 #include "proto/codec/decoder.h"
 
 namespace clothstream::client {

@@ -8,7 +8,7 @@
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 
-#include "clients/core/wire.h"
+#include "clients/core/wire/wire.h"
 #include "tests/core/scripted_server.h"
 
 namespace clothstream::client {

@@ -5,7 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "clients/core/outbox.h"
+#include "clients/core/stream/outbox.h"
 #include "tests/core/scripted_server.h"
 
 namespace clothstream::client {

@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "clients/core/content_assembly.h"
+#include "clients/core/stream/content_assembly.h"
 #include "tests/core/scripted_server.h"
 #include "tests/core/sessions.h"
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // What play-out shows of the cloth, through gaps, jumps in time and new descriptions.
-#include "clients/core/play_out.h"
+#include "clients/core/stream/play_out.h"
 
 #include <algorithm>
 #include <cmath>

@@ -6,7 +6,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "clients/core/reconnection.h"
+#include "clients/core/stream/reconnection.h"
 #include "tests/core/scripted_server.h"
 
 namespace clothstream::client {

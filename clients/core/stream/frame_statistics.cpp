@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Rates over a ring of the last arrivals.
-#include "clients/core/frame_statistics.h"
+#include "clients/core/stream/frame_statistics.h"
 
 #include <algorithm>
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The order in which waiting messages leave.
-#include "clients/core/outbox.h"
+#include "clients/core/stream/outbox.h"
 
 #include <utility>
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // A StreamDescription, read, checked, and completed with triangles and normals.
-#include "clients/core/description.h"
+#include "clients/core/wire/description.h"
 
 #include <algorithm>
 #include <bit>
@@ -32,9 +32,10 @@ constexpr std::size_t kMaxMaterials = 1024;
 constexpr std::size_t kMaxSolvers = 32;  // kinds that are remembered of a cloth
 
 bool readSubmesh(Bytes message, Submesh& submesh) {
-  return readFields(message, [&](std::uint32_t field, Reader& reader) {
-    if (field == bytes(1)) return setText(submesh.name, reader);
-    if (field != varint(2)) return skip(reader);
+  using F = field::Submesh;
+  return readFields(message, [&](std::uint32_t tag, Reader& reader) {
+    if (tag == F::kName.tag) return setText(submesh.name, reader);
+    if (tag != F::kTriangleCount.tag) return skip(reader);
     const std::uint32_t triangles = reader.get_uint32();
     submesh.indexCount = 3 * triangles;
     return triangles <= codec::kMaxVertices;
@@ -42,25 +43,26 @@ bool readSubmesh(Bytes message, Submesh& submesh) {
 }
 
 bool readCloth(Bytes message, ClothMessage& cloth) {
-  return readFields(message, [&](std::uint32_t field, Reader& reader) {
-    switch (field) {
-      case bytes(1):
+  using F = field::ClothDescription;
+  return readFields(message, [&](std::uint32_t tag, Reader& reader) {
+    switch (tag) {
+      case F::kName.tag:
         return setText(cloth.name, reader);
-      case varint(2):
+      case F::kVertexCount.tag:
         return cloth.layout.vertexCount = reader.get_uint32(), true;
-      case varint(3):
+      case F::kRows.tag:
         return cloth.layout.rows = reader.get_uint32(), true;
-      case varint(4):
+      case F::kColumns.tag:
         return cloth.layout.columns = reader.get_uint32(), true;
-      case bytes(5):
+      case F::kRestPositions.tag:
         return cloth.restPositions = reader.get_view(), true;
-      case bytes(6):
+      case F::kTriangles.tag:
         return cloth.triangles = reader.get_view(), true;
-      case bytes(7):
+      case F::kUvs.tag:
         return cloth.uvs = reader.get_view(), true;
-      case bytes(8):
+      case F::kUvTriangles.tag:
         return cloth.uvTriangles = reader.get_view(), true;
-      case bytes(9):
+      case F::kSubmeshes.tag:
         return cloth.submeshes.size() < kMaxSubmeshes &&
                readSubmesh(reader.get_view(), cloth.submeshes.emplace_back());
       default:
@@ -71,15 +73,16 @@ bool readCloth(Bytes message, ClothMessage& cloth) {
 
 // Of a Scene's Environment.
 bool readEnvironment(Bytes message, Environment& environment) {
-  return readFields(message, [&](std::uint32_t field, Reader& reader) {
-    switch (field) {
-      case bytes(1):
+  using F = field::Environment;
+  return readFields(message, [&](std::uint32_t tag, Reader& reader) {
+    switch (tag) {
+      case F::kGravity.tag:
         return readVec3(reader.get_view(), environment.gravity);
-      case bytes(2):
+      case F::kWind.tag:
         return readVec3(reader.get_view(), environment.wind);
-      case fixed32(3):
-        return std::isfinite(environment.airDensity = reader.get_float());
-      case bytes(4):
+      case F::kAirDensity.tag:
+        return setFinite(environment.airDensity, reader);
+      case F::kGust.tag:
         return readGust(reader.get_view(), environment.gust);
       default:
         return skip(reader);
@@ -89,35 +92,36 @@ bool readEnvironment(Bytes message, Environment& environment) {
 
 // Of a Scene's Cloth.
 bool readClothParameters(Bytes message, std::string& name, ClothParameters& parameters) {
-  return readFields(message, [&](std::uint32_t field, Reader& reader) {
-    switch (field) {
-      case bytes(1):
+  using F = field::Cloth;
+  return readFields(message, [&](std::uint32_t tag, Reader& reader) {
+    switch (tag) {
+      case F::kName.tag:
         return setText(name, reader);
-      case bytes(5):
+      case F::kStructural.tag:
         return readSpring(reader.get_view(), parameters.structural);
-      case bytes(6):
+      case F::kShear.tag:
         return readSpring(reader.get_view(), parameters.shear);
-      case bytes(7):
+      case F::kBend.tag:
         return readSpring(reader.get_view(), parameters.bend);
-      case fixed32(8):
-        return std::isfinite(parameters.damping = reader.get_float());
-      case fixed32(9):
-        return std::isfinite(parameters.drag = reader.get_float());
-      case fixed32(10):
-        return std::isfinite(parameters.lift = reader.get_float());
-      case fixed32(11):
-        return std::isfinite(parameters.friction = reader.get_float());
-      case fixed32(12):
-        return std::isfinite(parameters.thickness = reader.get_float());
-      case bytes(20):
+      case F::kDamping.tag:
+        return setFinite(parameters.damping, reader);
+      case F::kDrag.tag:
+        return setFinite(parameters.drag, reader);
+      case F::kLift.tag:
+        return setFinite(parameters.lift, reader);
+      case F::kFriction.tag:
+        return setFinite(parameters.friction, reader);
+      case F::kThickness.tag:
+        return setFinite(parameters.thickness, reader);
+      case F::kSolver.tag:
         return readSolver(reader.get_view(), parameters.solver);
-      case bytes(21):
+      case F::kSelfCollision.tag:
         return readSelfCollision(reader.get_view(), parameters.ballRadius, parameters.ballFriction);
-      case bytes(23):
+      case F::kTethers.tag:
         return readTethers(reader.get_view(), parameters.tetherSlack);
-      case fixed32(24):
-        return std::isfinite(parameters.dihedralBending = reader.get_float());
-      case bytes(40):
+      case F::kDihedralBending.tag:
+        return setFinite(parameters.dihedralBending, reader);
+      case F::kMaterial.tag:
         return setText(parameters.material, reader);
       default:
         return skip(reader);
@@ -126,9 +130,10 @@ bool readClothParameters(Bytes message, std::string& name, ClothParameters& para
 }
 
 bool readDefinition(Bytes message, Description& description) {
-  return readFields(message, [&](std::uint32_t field, Reader& reader) {
-    if (field == bytes(7)) return readEnvironment(reader.get_view(), description.environment);
-    if (field != bytes(8)) return skip(reader);
+  using F = field::Scene;
+  return readFields(message, [&](std::uint32_t tag, Reader& reader) {
+    if (tag == F::kEnvironment.tag) return readEnvironment(reader.get_view(), description.environment);
+    if (tag != F::kCloths.tag) return skip(reader);
     std::string name;
     ClothParameters parameters;
     if (!readClothParameters(reader.get_view(), name, parameters)) return false;
@@ -143,42 +148,44 @@ bool readDefinition(Bytes message, Description& description) {
 // Gives false where the message is not well formed; what is well formed and wrong is for check() to say.
 bool readParts(Bytes message, Description& description, std::vector<ClothMessage>& cloths,
                Bytes& definition) {
-  return readFields(message, [&](std::uint32_t field, Reader& reader) {
-    switch (field) {
-      case varint(1):
+  using F = field::StreamDescription;
+  return readFields(message, [&](std::uint32_t tag, Reader& reader) {
+    switch (tag) {
+      case F::kEpoch.tag:
         return description.layout.epoch = reader.get_uint32(), true;
-      case varint(2):
+      case F::kCodec.tag:
         description.codec = reader.get_uint32();
         description.layout.codec = static_cast<std::uint8_t>(description.codec);
         return true;
-      case bytes(3):
+      case F::kScene.tag:
         return setText(description.scene, reader);
-      case varint(4):
+      case F::kSimulationRate.tag:
         return description.simulationRate = reader.get_uint32(), true;
-      case varint(5):
+      case F::kStreamRate.tag:
         return description.streamRate = reader.get_uint32(), true;
-      case fixed32(6):
+      case F::kMaxError.tag:
         return description.layout.maxError = reader.get_float(), true;
-      case varint(7):
-        description.layout.normals =
-            reader.get_enum() == 2 ? codec::NormalMode::octahedral : codec::NormalMode::none;
+      case F::kNormals.tag:
+        description.layout.normals = reader.get_uint32() == field::Normals::kOctahedral
+                                         ? codec::NormalMode::octahedral
+                                         : codec::NormalMode::none;
         return true;
-      case bytes(8):
+      case F::kCloths.tag:
         return cloths.size() <= codec::kMaxClothRanges && readCloth(reader.get_view(), cloths.emplace_back());
-      case bytes(9):
+      case F::kColliders.tag:
         return description.colliders.size() < kMaxSceneColliders &&
                readCollider(reader.get_view(), description.colliders.emplace_back());
-      case bytes(10):
+      case F::kDefinition.tag:
         return definition = reader.get_view(), true;
-      case varint(11):
+      case F::kTemporalLayers.tag:
         description.layout.temporalLayers =
             static_cast<std::uint8_t>(std::clamp<std::uint32_t>(reader.get_uint32(), 1, 255));
         return true;
-      case varint(12):
+      case F::kQualities.tag:
         description.layout.qualities =
             static_cast<std::uint8_t>(std::clamp<std::uint32_t>(reader.get_uint32(), 1, 255));
         return true;
-      case bytes(40):
+      case F::kMaterials.tag:
         return description.materials.size() < kMaxMaterials &&
                setText(description.materials.emplace_back(), reader);
       default:

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
 // A ring of frames, a delay that follows what is late, lines between two frames.
-#include "clients/core/play_out.h"
+#include "clients/core/stream/play_out.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "clients/core/server_clock.h"
+#include "clients/core/stream/server_clock.h"
 #include "proto/codec/vertex_normals.h"
 
 namespace clothstream::client {

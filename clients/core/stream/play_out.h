@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "clients/core/core.h"
-#include "clients/core/description.h"
+#include "clients/core/wire/description.h"
 
 namespace clothstream::client {
 

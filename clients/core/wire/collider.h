@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "clients/core/core.h"
-#include "clients/core/vectors.h"
+#include "clients/core/wire/wire.h"
 
 namespace clothstream::client {
 

@@ -1,32 +1,37 @@
 // SPDX-License-Identifier: MIT
-// Field by field through a ColliderState, its shape and its hull.
-#include "clients/core/collider.h"
+// Reads a ColliderState, its shape and its hull.
+#include "clients/core/wire/collider.h"
 
 #include <algorithm>
 
 namespace clothstream::client {
 namespace {
 
-// Of a sphere, which has one number, and of a capsule.
+// Reads a Sphere or a Capsule. A Sphere is a Capsule without a length.
 bool readRound(Bytes message, Collider& collider) {
-  return readFields(message, [&](std::uint32_t field, Reader& reader) {
-    if (field == fixed32(1)) return setFinite(collider.radius, reader);
-    return field == fixed32(2) ? setFinite(collider.length, reader) : skip(reader);
+  using F = field::Capsule;
+  static_assert(field::Sphere::kRadius.tag == F::kRadius.tag);
+  return readFields(message, [&](std::uint32_t tag, Reader& reader) {
+    if (tag == F::kRadius.tag) return setFinite(collider.radius, reader);
+    return tag == F::kLength.tag ? setFinite(collider.length, reader) : skip(reader);
   });
 }
 
 bool readBox(Bytes message, Vec3& size) {
-  return readFields(message, [&](std::uint32_t field, Reader& reader) {
-    return field == bytes(1) ? readVec3(reader.get_view(), size) : skip(reader);
+  using F = field::Box;
+  return readFields(message, [&](std::uint32_t tag, Reader& reader) {
+    return tag == F::kSize.tag ? readVec3(reader.get_view(), size) : skip(reader);
   });
 }
 
-// Appends a face's triangles, a fan about its first corner.
+// Appends the triangles of a face as a fan around its first corner.
 bool readFace(Bytes message, std::vector<std::uint32_t>& triangles) {
+  using F = field::Face;
   std::vector<std::uint32_t> corners;
-  const bool read = readFields(message, [&](std::uint32_t field, Reader& reader) {
-    if (field == bytes(1)) return readPackedVarints(reader.get_view(), kMaxHullParts, corners);
-    if (field != varint(1)) return skip(reader);
+  const bool read = readFields(message, [&](std::uint32_t tag, Reader& reader) {
+    if (tag == F::kVertices.tag) return readPackedVarints(reader.get_view(), kMaxHullParts, corners);
+    // A sender may leave a repeated number unpacked.
+    if (tag != varint(F::kVertices.number)) return skip(reader);
     corners.push_back(reader.get_uint32());
     return corners.size() <= kMaxHullParts;
   });
@@ -38,6 +43,7 @@ bool readFace(Bytes message, std::vector<std::uint32_t>& triangles) {
 }  // namespace
 
 bool readCollider(Bytes message, Collider& collider) {
+  using F = field::ColliderState;
   collider.name.clear();
   collider.position = {};
   collider.orientation = {0, 0, 0, 1};
@@ -46,30 +52,30 @@ bool readCollider(Bytes message, Collider& collider) {
   collider.size = {};
   collider.hull = {};
   collider.participantId = 0;
-  return readFields(message, [&](std::uint32_t field, Reader& reader) {
-    switch (field) {
-      case bytes(1):
+  return readFields(message, [&](std::uint32_t tag, Reader& reader) {
+    switch (tag) {
+      case F::kName.tag:
         return setText(collider.name, reader);
-      case bytes(2):
+      case F::kPosition.tag:
         return readVec3(reader.get_view(), collider.position);
-      case bytes(3): {
+      case F::kOrientation.tag: {
         if (!readFloats(reader.get_view(), collider.orientation)) return false;
         // All zero means no rotation (scene.proto).
         if (collider.orientation == std::array<float, 4>{}) collider.orientation[3] = 1;
         return true;
       }
-      case varint(4):
+      case F::kParticipantId.tag:
         return set(collider.participantId, reader.get_uint64());
-      case bytes(5):
+      case F::kSphere.tag:
         return set(collider.shape, CS_SHAPE_SPHERE) && readRound(reader.get_view(), collider);
-      case bytes(6):
+      case F::kCapsule.tag:
         return set(collider.shape, CS_SHAPE_CAPSULE) && readRound(reader.get_view(), collider);
-      case bytes(7):
+      case F::kPlane.tag:
         reader.skip();
         return set(collider.shape, CS_SHAPE_PLANE);
-      case bytes(8):
+      case F::kBox.tag:
         return set(collider.shape, CS_SHAPE_BOX) && readBox(reader.get_view(), collider.size);
-      case bytes(9):
+      case F::kHull.tag:
         return set(collider.shape, CS_SHAPE_HULL) && set(collider.hull, reader.get_view());
       default:
         return skip(reader);
@@ -78,10 +84,11 @@ bool readCollider(Bytes message, Collider& collider) {
 }
 
 std::optional<Hull> readHull(Bytes message) {
+  using F = field::ConvexHull;
   std::size_t faces = 0;
-  std::optional<Hull> hull = readMessage<Hull>(message, [&](Hull& out, std::uint32_t field, Reader& reader) {
-    if (field == bytes(2)) return ++faces <= kMaxHullParts && readFace(reader.get_view(), out.triangles);
-    if (field != bytes(1)) return skip(reader);
+  std::optional<Hull> hull = readMessage<Hull>(message, [&](Hull& out, std::uint32_t tag, Reader& reader) {
+    if (tag == F::kFaces.tag) return ++faces <= kMaxHullParts && readFace(reader.get_view(), out.triangles);
+    if (tag != F::kVertices.tag) return skip(reader);
     Vec3 vertex{};
     if (!readVec3(reader.get_view(), vertex)) return false;
     out.vertices.insert(out.vertices.end(), vertex.begin(), vertex.end());

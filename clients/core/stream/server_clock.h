@@ -8,7 +8,7 @@
 #include <deque>
 #include <vector>
 
-#include "clients/core/server_message.h"
+#include "clients/core/wire/server_message.h"
 
 namespace clothstream::client {
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Field by field through a ParameterChange, its cloths and their solvers.
-#include "clients/core/parameter_change.h"
+#include "clients/core/wire/parameter_change.h"
 
 namespace clothstream::client {
 namespace {

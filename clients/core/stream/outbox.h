@@ -7,7 +7,7 @@
 #include <optional>
 #include <string>
 
-#include "clients/core/client_message.h"
+#include "clients/core/wire/client_message.h"
 
 namespace clothstream::client {
 

@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "clients/core/core.h"
-#include "clients/core/parameter_change.h"
-#include "clients/core/server_message.h"
+#include "clients/core/wire/parameter_change.h"
+#include "clients/core/wire/server_message.h"
 
 namespace clothstream::client {
 

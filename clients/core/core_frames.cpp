@@ -1,17 +1,14 @@
 // SPDX-License-Identifier: MIT
-// The C interface over Client: what the scene is, and its clock.
+// C interface: what the scene contains, the newest frame, and play-out.
 #include <cstdint>
-#include <string>
+#include <limits>
+#include <optional>
 #include <vector>
 
 #include "clients/core/core.h"
 #include "clients/core/core_handle.h"
 
 using namespace clothstream::client;
-
-const char* cs_scene_name(const cs_client* client) noexcept {
-  return client->client.welcome().scene.c_str();
-}
 
 uint32_t cs_stream_rate(const cs_client* client) noexcept {
   return client->client.description().streamRate;
@@ -106,25 +103,39 @@ const float* cs_get_hull(const cs_client* client, uint32_t index, uint32_t* vert
   return hull ? hull->vertices.data() : nullptr;
 }
 
-int cs_get_playback(const cs_client* client, uint64_t now_us, cs_playback* out) noexcept {
-  const auto playback = client->client.playback(now_us);
-  if (!playback) return 0;
-  *out = *playback;
+int cs_set_play_out(cs_client* client, const cs_play_out_options* options) noexcept {
+  return client->client.setPlayOut(options) ? 1 : 0;
+}
+
+void cs_default_play_out(cs_play_out_options* out) noexcept {
+  *out = {.version = CS_PLAY_OUT_OPTIONS_VERSION,
+          .frames = 32,
+          .delay_ms = std::numeric_limits<double>::quiet_NaN(),
+          .least_delay_ms = 0,
+          .most_delay_ms = 250,
+          .lead_ms = 30};
+}
+
+int cs_play_out(cs_client* client, uint64_t now_us, uint64_t display_time_us, cs_played* out) noexcept {
+  if (out && out->version != CS_PLAYED_VERSION) return 0;
+  const std::optional<cs_played> played = client->client.play(now_us, display_time_us);
+  if (!played) return 0;
+  if (out) *out = *played;
   return 1;
 }
 
-void cs_pause(cs_client* client, int paused) noexcept {
-  client->client.control({.paused = paused != 0});
+const float* cs_played_positions(const cs_client* client) noexcept {
+  return client->client.playedPositions().data();
 }
 
-void cs_seek(cs_client* client, double seconds) noexcept {
-  client->client.control({.seek = seconds});
+const float* cs_played_normals(const cs_client* client) noexcept {
+  return client->client.playedNormals().data();
 }
 
-void cs_set_speed(cs_client* client, double speed) noexcept {
-  client->client.control({.speed = speed});
+uint32_t cs_played_collider_count(const cs_client* client) noexcept {
+  return static_cast<std::uint32_t>(client->client.playedColliders().size());
 }
 
-void cs_set_loop(cs_client* client, int loop) noexcept {
-  client->client.control({.loop = loop != 0});
+int cs_get_played_collider(const cs_client* client, uint32_t index, cs_collider* out) noexcept {
+  return writeCollider(at(client->client.playedColliders(), index), out);
 }

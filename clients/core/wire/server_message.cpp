@@ -1,37 +1,38 @@
 // SPDX-License-Identifier: MIT
-// Field by field through the messages of session.proto that a client gets.
-#include "clients/core/server_message.h"
+// Reads the messages of session.proto that a server sends, field by field.
+#include "clients/core/wire/server_message.h"
 
 #include <array>
 #include <cmath>
 
-#include "clients/core/collider.h"
+#include "clients/core/wire/collider.h"
 
 namespace clothstream::client {
 namespace {
 
 bool readClothReport(Bytes message, ClothReport& report) {
-  return readFields(message, [&](std::uint32_t field, Reader& reader) {
-    switch (field) {
-      case fixed32(1):
+  using F = field::ClothReport;
+  return readFields(message, [&](std::uint32_t tag, Reader& reader) {
+    switch (tag) {
+      case F::kStrainMax.tag:
         return setFinite(report.strainMax, reader);
-      case fixed32(2):
+      case F::kStrainP99.tag:
         return setFinite(report.strainP99, reader);
-      case fixed32(3):
+      case F::kStrainMean.tag:
         return setFinite(report.strainMean, reader);
-      case fixed32(4):
+      case F::kKineticEnergy.tag:
         return setFinite(report.kineticEnergy, reader);
-      case fixed32(5):
+      case F::kElasticEnergy.tag:
         return setFinite(report.elasticEnergy, reader);
-      case fixed32(6):
+      case F::kGravityEnergy.tag:
         return setFinite(report.gravityEnergy, reader);
-      case varint(7):
+      case F::kActiveConstraints.tag:
         return set(report.activeConstraints, reader.get_uint32());
-      case varint(8):
+      case F::kIterations.tag:
         return set(report.iterations, reader.get_uint32());
-      case fixed32(9):
+      case F::kResidual.tag:
         return setFinite(report.residual, reader);
-      case fixed32(10):
+      case F::kPenetration.tag:
         return setFinite(report.penetration, reader);
       default:
         return skip(reader);
@@ -40,17 +41,18 @@ bool readClothReport(Bytes message, ClothReport& report) {
 }
 
 bool readParticipant(Bytes message, Participant& out) {
-  return readFields(message, [&](std::uint32_t field, Reader& reader) {
-    switch (field) {
-      case varint(1):
+  using F = field::Participant;
+  return readFields(message, [&](std::uint32_t tag, Reader& reader) {
+    switch (tag) {
+      case F::kId.tag:
         return set(out.id, reader.get_uint64());
-      case bytes(2):
+      case F::kDisplayName.tag:
         return setText(out.name, reader);
-      case bytes(3):
+      case F::kClientName.tag:
         return setText(out.clientName, reader);
-      case varint(4):
+      case F::kRole.tag:
         return set(out.role, reader.get_uint32());
-      case varint(5):
+      case F::kAway.tag:
         return set(out.away, reader.get_bool());
       default:
         return skip(reader);
@@ -58,13 +60,13 @@ bool readParticipant(Bytes message, Participant& out) {
   });
 }
 
-Body bodyOf(std::uint32_t field) {
+Body bodyOf(std::uint32_t tag) {
   constexpr std::array kKnown{Body::welcome,  Body::chunk,      Body::frame,
                               Body::pong,     Body::notice,     Body::parameterChanged,
                               Body::error,    Body::tickEvents, Body::listScenes,
                               Body::presence, Body::playback,   Body::operatingPoint};
   for (const Body body : kKnown) {
-    if (field == bytes(static_cast<std::uint32_t>(body))) return body;
+    if (tag == bytes(static_cast<std::uint32_t>(body))) return body;
   }
   return Body::none;
 }
@@ -72,8 +74,8 @@ Body bodyOf(std::uint32_t field) {
 }  // namespace
 
 std::optional<ServerMessage> readServerMessage(Bytes bytes) {
-  return readMessage<ServerMessage>(bytes, [](ServerMessage& message, std::uint32_t field, Reader& reader) {
-    const Body body = bodyOf(field);
+  return readMessage<ServerMessage>(bytes, [](ServerMessage& message, std::uint32_t tag, Reader& reader) {
+    const Body body = bodyOf(tag);
     if (body == Body::none) return skip(reader);
     message = {body, reader.get_view()};
     return true;
@@ -81,32 +83,33 @@ std::optional<ServerMessage> readServerMessage(Bytes bytes) {
 }
 
 std::optional<Welcome> readWelcome(Bytes message) {
-  return readMessage<Welcome>(message, [](Welcome& welcome, std::uint32_t field, Reader& reader) {
-    switch (field) {
-      case varint(1):
+  using F = field::Welcome;
+  return readMessage<Welcome>(message, [](Welcome& welcome, std::uint32_t tag, Reader& reader) {
+    switch (tag) {
+      case F::kProtocolVersion.tag:
         return set(welcome.protocolVersion, reader.get_uint32());
-      case varint(2):
+      case F::kCodec.tag:
         return set(welcome.codec, reader.get_uint32());
-      case bytes(3):
+      case F::kScene.tag:
         return setText(welcome.scene, reader);
-      case varint(4):
+      case F::kParticipantId.tag:
         return set(welcome.participantId, reader.get_uint64());
-      case bytes(5):
+      case F::kServerName.tag:
         return setText(welcome.serverName, reader);
-      case bytes(6):
+      case F::kDeviceName.tag:
         return setText(welcome.deviceName, reader);
-      case varint(7):
+      case F::kDescriptionContentId.tag:
         return set(welcome.contentId, reader.get_uint64());
-      case varint(30):
+      case F::kRole.tag:
         return set(welcome.role, reader.get_uint32());
-      case bytes(31):
+      case F::kResumeToken.tag:
         return setText(welcome.token, reader);
-      case varint(32):
+      case F::kResumed.tag:
         return set(welcome.resumed, reader.get_bool());
-      case bytes(33):
+      case F::kParticipants.tag:
         return welcome.participants.size() < kMaxParticipants &&
                readParticipant(reader.get_view(), welcome.participants.emplace_back());
-      case varint(34):
+      case F::kHoldMs.tag:
         return set(welcome.holdMs, reader.get_uint32());
       default:
         return skip(reader);
@@ -115,19 +118,20 @@ std::optional<Welcome> readWelcome(Bytes message) {
 }
 
 std::optional<Chunk> readChunk(Bytes message) {
-  return readMessage<Chunk>(message, [](Chunk& chunk, std::uint32_t field, Reader& reader) {
-    switch (field) {
-      case varint(1):
+  using F = field::Chunk;
+  return readMessage<Chunk>(message, [](Chunk& chunk, std::uint32_t tag, Reader& reader) {
+    switch (tag) {
+      case F::kContentId.tag:
         return set(chunk.contentId, reader.get_uint64());
-      case varint(2):
+      case F::kKind.tag:
         return set(chunk.kind, reader.get_uint32());
-      case varint(3):
+      case F::kIndex.tag:
         return set(chunk.index, reader.get_uint32());
-      case varint(4):
+      case F::kCount.tag:
         return set(chunk.count, reader.get_uint32());
-      case varint(5):
+      case F::kTotalBytes.tag:
         return set(chunk.totalBytes, reader.get_uint64());
-      case bytes(6):
+      case F::kData.tag:
         return set(chunk.data, reader.get_view());
       default:
         return skip(reader);
@@ -136,26 +140,27 @@ std::optional<Chunk> readChunk(Bytes message) {
 }
 
 bool readFrame(Bytes message, Frame& frame) {
+  using F = field::Frame;
   frame.packet = {};
   frame.tickTimeUs = frame.packetTimeUs = 0;
   frame.reconstructionHash = 0;
   frame.colliders.clear();
   frame.report.reset();
-  return readFields(message, [&](std::uint32_t field, Reader& reader) {
-    switch (field) {
-      case bytes(1):
+  return readFields(message, [&](std::uint32_t tag, Reader& reader) {
+    switch (tag) {
+      case F::kPacket.tag:
         return set(frame.packet, reader.get_view());
-      case varint(2):
+      case F::kTickTimeUs.tag:
         return set(frame.tickTimeUs, reader.get_uint64());
-      case varint(3):
+      case F::kPacketTimeUs.tag:
         return set(frame.packetTimeUs, reader.get_uint64());
-      case fixed64(4):
+      case F::kReconstructionHash.tag:
         return set(frame.reconstructionHash, reader.get_fixed64());
-      case bytes(6):
+      case F::kColliders.tag:
         if (frame.colliders.size() == kMaxSceneColliders) return false;
         frame.colliders.push_back(reader.get_view());
         return true;
-      case bytes(7):
+      case F::kReport.tag:
         frame.report = reader.get_view();
         return true;
       default:
@@ -165,11 +170,12 @@ bool readFrame(Bytes message, Frame& frame) {
 }
 
 std::optional<Pong> readPong(Bytes message) {
-  return readMessage<Pong>(message, [](Pong& pong, std::uint32_t field, Reader& reader) {
-    switch (field) {
-      case varint(1):
+  using F = field::Pong;
+  return readMessage<Pong>(message, [](Pong& pong, std::uint32_t tag, Reader& reader) {
+    switch (tag) {
+      case F::kClientTimeUs.tag:
         return set(pong.clientTimeUs, reader.get_uint64());
-      case varint(2):
+      case F::kServerTimeUs.tag:
         return set(pong.serverTimeUs, reader.get_uint64());
       default:
         return skip(reader);
@@ -178,18 +184,19 @@ std::optional<Pong> readPong(Bytes message) {
 }
 
 std::optional<cs_playback> readPlayback(Bytes message) {
+  using F = field::Playback;
   std::optional<cs_playback> playback =
-      readMessage<cs_playback>(message, [](cs_playback& out, std::uint32_t field, Reader& reader) {
-        switch (field) {
-          case fixed64(1):
-            return std::isfinite(out.length = reader.get_double());
-          case fixed64(2):
-            return std::isfinite(out.position = reader.get_double());
-          case fixed64(3):
-            return std::isfinite(out.speed = reader.get_double());
-          case varint(4):
+      readMessage<cs_playback>(message, [](cs_playback& out, std::uint32_t tag, Reader& reader) {
+        switch (tag) {
+          case F::kLength.tag:
+            return setFinite(out.length, reader);
+          case F::kPosition.tag:
+            return setFinite(out.position, reader);
+          case F::kSpeed.tag:
+            return setFinite(out.speed, reader);
+          case F::kLoop.tag:
             return set(out.loop, reader.get_bool() ? 1 : 0);
-          case varint(5):
+          case F::kPaused.tag:
             return set(out.paused, reader.get_bool() ? 1 : 0);
           default:
             return skip(reader);
@@ -200,29 +207,32 @@ std::optional<cs_playback> readPlayback(Bytes message) {
 }
 
 std::optional<OperatingPoint> readOperatingPoint(Bytes message) {
-  return readMessage<OperatingPoint>(message, [](OperatingPoint& point, std::uint32_t field, Reader& reader) {
-    if (field == varint(1)) return set(point.quality, reader.get_uint32());
-    return field == varint(2) ? set(point.temporalLayers, reader.get_uint32()) : skip(reader);
+  using F = field::OperatingPoint;
+  return readMessage<OperatingPoint>(message, [](OperatingPoint& point, std::uint32_t tag, Reader& reader) {
+    if (tag == F::kQuality.tag) return set(point.quality, reader.get_uint32());
+    return tag == F::kTemporalLayers.tag ? set(point.temporalLayers, reader.get_uint32()) : skip(reader);
   });
 }
 
 std::optional<Notice> readNotice(Bytes message) {
-  return readMessage<Notice>(message, [](Notice& notice, std::uint32_t field, Reader& reader) {
-    if (field == varint(30)) return set(notice.participantId, reader.get_uint64());
-    return field == bytes(2) ? setText(notice.text, reader) : skip(reader);
+  using F = field::Notice;
+  return readMessage<Notice>(message, [](Notice& notice, std::uint32_t tag, Reader& reader) {
+    if (tag == F::kParticipantId.tag) return set(notice.participantId, reader.get_uint64());
+    return tag == F::kText.tag ? setText(notice.text, reader) : skip(reader);
   });
 }
 
 std::optional<Presence> readPresence(Bytes message) {
-  return readMessage<Presence>(message, [](Presence& presence, std::uint32_t field, Reader& reader) {
-    switch (field) {
-      case varint(1):
+  using F = field::Presence;
+  return readMessage<Presence>(message, [](Presence& presence, std::uint32_t tag, Reader& reader) {
+    switch (tag) {
+      case F::kKind.tag:
         return set(presence.kind, reader.get_uint32());
-      case bytes(2):
+      case F::kParticipant.tag:
         return readParticipant(reader.get_view(), presence.participant);
-      case varint(3):
+      case F::kReason.tag:
         return set(presence.reason, reader.get_uint32());
-      case varint(4):
+      case F::kByParticipantId.tag:
         return set(presence.by, reader.get_uint64());
       default:
         return skip(reader);
@@ -231,21 +241,23 @@ std::optional<Presence> readPresence(Bytes message) {
 }
 
 std::optional<ParameterChange> readParameterChanged(Bytes message) {
+  using F = field::ParameterChanged;
   return readMessage<ParameterChange>(
-      message, [](ParameterChange& change, std::uint32_t field, Reader& reader) {
-        if (field == varint(2)) return set(change.participantId, reader.get_uint64());
-        return field == bytes(1) ? readParameterChange(reader.get_view(), change) : skip(reader);
+      message, [](ParameterChange& change, std::uint32_t tag, Reader& reader) {
+        if (tag == F::kParticipantId.tag) return set(change.participantId, reader.get_uint64());
+        return tag == F::kChange.tag ? readParameterChange(reader.get_view(), change) : skip(reader);
       });
 }
 
 std::optional<ServerError> readError(Bytes message) {
-  return readMessage<ServerError>(message, [](ServerError& error, std::uint32_t field, Reader& reader) {
-    switch (field) {
-      case varint(1):
+  using F = field::Error;
+  return readMessage<ServerError>(message, [](ServerError& error, std::uint32_t tag, Reader& reader) {
+    switch (tag) {
+      case F::kCode.tag:
         return set(error.code, reader.get_uint32());
-      case bytes(2):
+      case F::kText.tag:
         return setText(error.text, reader);
-      case varint(3):
+      case F::kFatal.tag:
         return set(error.fatal, reader.get_bool());
       default:
         return skip(reader);
@@ -256,15 +268,16 @@ std::optional<ServerError> readError(Bytes message) {
 namespace {
 
 bool readGrabEvent(Bytes message, cs_grab_event& out) {
-  return readFields(message, [&](std::uint32_t field, Reader& reader) {
-    switch (field) {
-      case varint(1):
+  using F = field::GrabEvent;
+  return readFields(message, [&](std::uint32_t tag, Reader& reader) {
+    switch (tag) {
+      case F::kParticipantId.tag:
         return set(out.participant_id, reader.get_uint64());
-      case varint(2):
+      case F::kGrabId.tag:
         return set(out.grab_id, reader.get_uint32());
-      case varint(3):
+      case F::kKind.tag:
         return set(out.kind, reader.get_uint32());
-      case varint(4):
+      case F::kVertices.tag:
         return set(out.vertices, reader.get_uint32());
       default:
         return skip(reader);
@@ -273,22 +286,23 @@ bool readGrabEvent(Bytes message, cs_grab_event& out) {
 }
 
 bool readContactEvent(Bytes message, ContactEvent& out) {
-  return readFields(message, [&](std::uint32_t field, Reader& reader) {
-    switch (field) {
-      case varint(1):
+  using F = field::ContactEvent;
+  return readFields(message, [&](std::uint32_t tag, Reader& reader) {
+    switch (tag) {
+      case F::kKind.tag:
         return set(out.kind, reader.get_uint32());
-      case bytes(2):
+      case F::kCollider.tag:
         return setText(out.collider, reader);
-      case varint(3):
+      case F::kParticipantId.tag:
         return set(out.participantId, reader.get_uint64());
-      case varint(4):
+      case F::kColliderId.tag:
         return set(out.colliderId, reader.get_uint32());
-      case bytes(5):
+      case F::kCloth.tag:
         return setText(out.cloth, reader);
-      case fixed32(6):
-        return std::isfinite(out.impulse = reader.get_float());
-      case fixed32(7):
-        return std::isfinite(out.seconds = reader.get_float());
+      case F::kImpulse.tag:
+        return setFinite(out.impulse, reader);
+      case F::kSeconds.tag:
+        return setFinite(out.seconds, reader);
       default:
         return skip(reader);
     }
@@ -298,12 +312,13 @@ bool readContactEvent(Bytes message, ContactEvent& out) {
 }  // namespace
 
 bool readTickEvents(Bytes message, TickEvents& events) {
+  using F = field::TickEvents;
   events = {};
-  return readFields(message, [&](std::uint32_t field, Reader& reader) {
-    if (field == bytes(2))
+  return readFields(message, [&](std::uint32_t tag, Reader& reader) {
+    if (tag == F::kGrabs.tag)
       return events.grabs.size() < kMaxEvents &&
              readGrabEvent(reader.get_view(), events.grabs.emplace_back());
-    if (field == bytes(3))
+    if (tag == F::kContacts.tag)
       return events.contacts.size() < kMaxEvents &&
              readContactEvent(reader.get_view(), events.contacts.emplace_back());
     return skip(reader);
@@ -311,23 +326,25 @@ bool readTickEvents(Bytes message, TickEvents& events) {
 }
 
 std::optional<std::vector<std::string>> readScenes(Bytes message) {
+  using F = field::ListScenesResponse;
   using Names = std::vector<std::string>;
-  return readMessage<Names>(message, [](Names& names, std::uint32_t field, Reader& reader) {
-    if (field != bytes(1)) return skip(reader);
+  return readMessage<Names>(message, [](Names& names, std::uint32_t tag, Reader& reader) {
+    if (tag != F::kScenes.tag) return skip(reader);
     if (names.size() == kMaxScenes) return false;
     std::string& name = names.emplace_back();
-    return readFields(reader.get_view(), [&](std::uint32_t summaryField, Reader& summary) {
-      return summaryField == bytes(1) ? setText(name, summary) : skip(summary);
+    return readFields(reader.get_view(), [&](std::uint32_t summaryTag, Reader& summary) {
+      return summaryTag == field::SceneSummary::kName.tag ? setText(name, summary) : skip(summary);
     });
   });
 }
 
 bool readReport(Bytes message, SimulationReport& out) {
+  using F = field::SimulationReport;
   out.cloths.clear();
   out.deviceSeconds = 0;
-  return readFields(message, [&](std::uint32_t field, Reader& reader) {
-    if (field == fixed64(2)) return std::isfinite(out.deviceSeconds = reader.get_double());
-    if (field != bytes(1)) return skip(reader);
+  return readFields(message, [&](std::uint32_t tag, Reader& reader) {
+    if (tag == F::kDeviceSeconds.tag) return setFinite(out.deviceSeconds, reader);
+    if (tag != F::kCloths.tag) return skip(reader);
     return out.cloths.size() < kMaxCloths && readClothReport(reader.get_view(), out.cloths.emplace_back());
   });
 }

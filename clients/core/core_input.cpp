@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The C interface over Client: this participant's poses and grabs, and what came of everybody's.
+// C interface: input of this participant, and events of grabs and contacts.
 #include <algorithm>
 #include <array>
 #include <cstddef>

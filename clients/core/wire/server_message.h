@@ -9,26 +9,26 @@
 #include <vector>
 
 #include "clients/core/core.h"
-#include "clients/core/parameter_change.h"
-#include "clients/core/wire.h"
+#include "clients/core/wire/parameter_change.h"
+#include "clients/core/wire/wire.h"
 
 namespace clothstream::client {
 
-// Field numbers of ServerMessage's bodies.
+// Bodies of ServerMessage. The values are field numbers.
 enum class Body : std::uint32_t {
   none = 0,
-  welcome = 2,
-  chunk = 3,
-  frame = 4,
-  pong = 5,
-  notice = 6,
-  parameterChanged = 7,
-  error = 8,
-  tickEvents = 9,
-  listScenes = 16,
-  presence = 30,
-  playback = 40,
-  operatingPoint = 50,
+  welcome = field::ServerMessage::kWelcome.number,
+  chunk = field::ServerMessage::kChunk.number,
+  frame = field::ServerMessage::kFrame.number,
+  pong = field::ServerMessage::kPong.number,
+  notice = field::ServerMessage::kNotice.number,
+  parameterChanged = field::ServerMessage::kParameterChanged.number,
+  error = field::ServerMessage::kError.number,
+  tickEvents = field::ServerMessage::kTickEvents.number,
+  listScenes = field::ServerMessage::kListScenes.number,
+  presence = field::ServerMessage::kPresence.number,
+  playback = field::ServerMessage::kPlayback.number,
+  operatingPoint = field::ServerMessage::kOperatingPoint.number,
 };
 
 // A kind of body that this client does not know is `none`.

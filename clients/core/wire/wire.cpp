@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The structure of a protobuf message.
-#include "clients/core/wire.h"
+// Checks the structure of protobuf messages and reads packed varints.
+#include "clients/core/wire/wire.h"
 
 #include <cstddef>
 #include <cstdint>
@@ -38,7 +38,7 @@ class Cursor {
   const char* end_;
 };
 
-// Those that protobuf reserves for itself, and zero, are no field's.
+// Zero and the numbers that protobuf reserves for itself are not valid.
 bool isFieldNumber(std::uint64_t number) {
   return number != 0 && (number < 19000 || number > 19999);
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The clock filter: a line through the shortest exchanges.
-#include "clients/core/server_clock.h"
+#include "clients/core/stream/server_clock.h"
 
 #include <algorithm>
 #include <cmath>

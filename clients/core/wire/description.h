@@ -9,8 +9,8 @@
 
 #include <tl/expected.hpp>
 
-#include "clients/core/collider.h"
-#include "clients/core/parameter_change.h"
+#include "clients/core/wire/collider.h"
+#include "clients/core/wire/parameter_change.h"
 #include "proto/codec/stream_layout.h"
 
 namespace clothstream::client {

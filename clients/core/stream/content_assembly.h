@@ -9,7 +9,7 @@
 
 #include <tl/expected.hpp>
 
-#include "clients/core/server_message.h"
+#include "clients/core/wire/server_message.h"
 
 namespace clothstream::client {
 

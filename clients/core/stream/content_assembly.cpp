@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Chunk after chunk, each checked against what its content announced.
-#include "clients/core/content_assembly.h"
+#include "clients/core/stream/content_assembly.h"
 
 #include <algorithm>
 #include <numeric>
