@@ -16,7 +16,7 @@ cs_client* cs_create(const char* scene, const char* client_name) noexcept {
 cs_client* cs_create_as(const char* scene, const char* client_name, const char* display_name,
                         uint32_t role) noexcept {
   assert(scene && client_name && display_name);
-  // NOLINTNEXTLINE(bugprone-unhandled-exception-at-new): where memory runs out, the program ends.
+  // NOLINTNEXTLINE(bugprone-unhandled-exception-at-new): out of memory ends the program.
   return new cs_client{Client({.scene = scene,
                                .clientName = client_name,
                                .displayName = display_name,

@@ -214,7 +214,7 @@ TEST(Outgoing, ATransportThatTakesNothingEndsTheClientInsteadOfItsMemory) {
   client.join(ScriptedServer());
   for (std::size_t i = 0; i <= Outbox::kMaxControl; ++i) cs_list_scenes(client.get());
   EXPECT_EQ(cs_get_state(client.get()), CS_STATE_FAILED);
-  EXPECT_THAT(cs_error_text(client.get()), HasSubstr("takes no messages"));
+  EXPECT_THAT(cs_error_text(client.get()), HasSubstr("sends no messages"));
   std::size_t bytes = 1;
   EXPECT_EQ(cs_next_outgoing(client.get(), &bytes), nullptr);
   EXPECT_EQ(bytes, 0u);

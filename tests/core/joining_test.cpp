@@ -158,7 +158,7 @@ TEST(Joining, RefusesMeshesThatDoNotAddUp) {
        [](auto& c) {
          c.set_uv_triangles(littleEndian<std::uint32_t>({0, 1}));
        }},
-      {"submeshes are not all of its 2 triangles",
+      {"submeshes do not cover its 2 triangles",
        [](auto& c) { c.mutable_submeshes(0)->set_triangle_count(2); }},
       {"no StreamDescription", [](auto& c) { c.mutable_submeshes(0)->set_triangle_count(4'000'000'000); }},
   };

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Chunk after chunk, each checked against what its content announced.
+// Checks each chunk against the size and count that its content announced.
 #include "clients/core/stream/content_assembly.h"
 
 #include <algorithm>
@@ -27,7 +27,7 @@ tl::expected<ContentAssembly::Content*, std::string> ContentAssembly::contentOf(
     if (chunk.index != known->nextIndex)
       return wrong(chunk, "expected piece " + std::to_string(known->nextIndex));
     if (chunk.count != known->count || chunk.totalBytes != known->totalBytes)
-      return wrong(chunk, "announces another size than the pieces before");
+      return wrong(chunk, "announces another size than the earlier pieces");
     return &*known;
   }
   if (chunk.index != 0) return wrong(chunk, "the first piece is missing");
@@ -35,9 +35,9 @@ tl::expected<ContentAssembly::Content*, std::string> ContentAssembly::contentOf(
   if (chunk.totalBytes > kMaxContentBytes - announcedBytes())
     return wrong(chunk, std::to_string(chunk.totalBytes) + " bytes announced; " +
                             std::to_string(kMaxContentBytes) +
-                            " are allowed, all unfinished contents together");
+                            " are allowed for all unfinished contents together");
   if (unfinished_.size() == kMaxUnfinished)
-    return wrong(chunk, "more than " + std::to_string(kMaxUnfinished) + " contents at a time");
+    return wrong(chunk, "more than " + std::to_string(kMaxUnfinished) + " contents at the same time");
   Content& content = unfinished_.emplace_back();
   content.id = chunk.contentId;
   content.count = chunk.count;
@@ -59,7 +59,7 @@ tl::expected<std::optional<std::string>, std::string> ContentAssembly::add(const
   ++content.nextIndex;
   if (content.nextIndex < content.count) return std::nullopt;
   if (content.data.size() != content.totalBytes)
-    return wrong(chunk, "the last one, after " + std::to_string(content.data.size()) + " bytes of " +
+    return wrong(chunk, "the last piece ends after " + std::to_string(content.data.size()) + " bytes of " +
                             std::to_string(content.totalBytes));
   std::optional<std::string> data(std::move(content.data));
   unfinished_.erase(unfinished_.begin() + (&content - unfinished_.data()));

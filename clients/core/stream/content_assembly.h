@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Puts large contents together from the chunks they travel in.
+// Assembles large contents from chunks.
 #pragma once
 
 #include <cstdint>
@@ -18,13 +18,13 @@ enum class ContentKind : std::uint32_t { streamDescription = 1 };
 class ContentAssembly {
  public:
   static constexpr std::size_t kMaxChunkBytes = 256 * 1024;
-  // Also of all unfinished contents together.
+  // Limit for all unfinished contents together.
   static constexpr std::uint64_t kMaxContentBytes = 256ull * 1024 * 1024;
   static constexpr std::size_t kMaxUnfinished = 4;
 
-  // Pieces of one content come in order; contents may interleave. Gives the bytes of a stream description
-  // when its last piece is in; nothing for kinds that this client does not know, which take no memory. The
-  // error says what the server did wrong. Memory grows with what arrives, not with what is announced.
+  // Adds a chunk. Chunks of one content must arrive in order; contents may interleave. Returns the bytes of a
+  // stream description after its last chunk, else nullopt. Unknown kinds of content are ignored. The error
+  // says what the server did wrong. Memory grows with the data that arrived, not with the announced size.
   [[nodiscard]] tl::expected<std::optional<std::string>, std::string> add(const Chunk& chunk);
 
  private:

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Rates over a ring of the last arrivals.
+// Computes rates from a ring buffer of the last arrivals.
 #include "clients/core/stream/frame_statistics.h"
 
 #include <algorithm>
@@ -8,7 +8,7 @@ namespace clothstream::client {
 namespace {
 
 constexpr std::uint64_t kWindowUs = 1'000'000;
-// Of a stream that has just begun: rates over less than this say nothing.
+// Shortest window for rates: a shorter one at the start of a stream is not meaningful.
 constexpr std::uint64_t kShortestWindowUs = 100'000;
 
 }  // namespace

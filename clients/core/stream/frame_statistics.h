@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Counts and rates of the frames that came.
+// Counts and rates of received frames.
 #pragma once
 
 #include <array>
@@ -19,13 +19,13 @@ struct DecodedFrame {
 
 class FrameStatistics {
  public:
-  // Every packet that came, whatever becomes of it. `tick` is what its header says, if it has one; from the
-  // one before so many ticks should have passed.
+  // Counts a received packet, decodable or not. `tick` is from its header; empty if the header is malformed.
+  // ticksPerFrame is the expected distance to the previous frame.
   void arrived(std::optional<std::uint64_t> tick, std::size_t packetBytes, std::uint32_t ticksPerFrame,
                std::uint64_t nowUs);
   void refused() { ++decodeErrors_; }
   void decoded(const DecodedFrame& frame, std::uint64_t nowUs);
-  // A new description: ticks may start anew.
+  // Call after a new description, because ticks may restart.
   void forgetTicks() { newestArrivedTick_.reset(); }
 
   std::uint64_t tick() const { return tick_; }
@@ -36,11 +36,11 @@ class FrameStatistics {
   std::uint64_t bytes() const { return bytes_; }
   std::uint64_t hashMismatches() const { return hashMismatches_; }
 
-  // Over the last second, or since the first packet if that is less.
+  // Rates over the last second, or since the first packet if that is shorter.
   double framesPerSecond(std::uint64_t nowUs) const;
   double kbitPerSecond(std::uint64_t nowUs) const;
   double bitsPerVertex() const;
-  // Between the first and the newest decoded frame.
+  // Time between the first and the newest decoded frame.
   double streamSeconds() const;
 
  private:
@@ -49,7 +49,7 @@ class FrameStatistics {
     std::size_t bytes = 0;
     bool decoded = false;
   };
-  // A second at the highest stream rate.
+  // Frames of one second at the highest stream rate.
   static constexpr std::size_t kArrivals = 1024;
 
   template <typename Amount>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The order in which waiting messages leave.
+// Order of messages: control, acknowledgement, poses.
 #include "clients/core/stream/outbox.h"
 
 #include <utility>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Serialised ClientMessages that wait for the transport.
+// Queue of serialised ClientMessages that wait for the transport.
 #pragma once
 
 #include <cstddef>
@@ -11,26 +11,25 @@
 
 namespace clothstream::client {
 
-// Of acknowledgements and of poses only the newest says anything: a transport that is behind skips
-// the others.
+// Keeps only the newest acknowledgement and the newest poses. Control messages are sent first, in order.
 class Outbox {
  public:
-  // More control messages than this means a transport that takes nothing.
+  // Limit of waiting control messages. At the limit the transport has stopped sending.
   static constexpr std::size_t kMaxControl = 256;
 
-  // False if there is no room.
+  // Returns false if the queue is full.
   [[nodiscard]] bool addControl(std::string message);
   void setAck(std::uint64_t tick) { ackTick_ = tick; }
-  // Replaces what waits.
+  // Poses that wait to be sent; write to it to replace them.
   std::string& poses() { return poses_; }
   void clear();
 
-  // nullptr where there is nothing; valid until the next call of this function.
+  // Returns the next message, or nullptr. Valid until the next call of this function.
   const std::string* next();
 
  private:
   std::deque<std::string> control_;
-  std::string poses_;  // empty: none waits
+  std::string poses_;  // empty if none wait
   std::optional<std::uint64_t> ackTick_;
   std::string taken_;
 };

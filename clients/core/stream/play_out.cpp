@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A ring of frames, a delay that follows what is late, lines between two frames.
+// Ring buffer of frames, adaptive delay, interpolation and extrapolation.
 #include "clients/core/stream/play_out.h"
 
 #include <algorithm>
@@ -14,7 +14,7 @@ namespace {
 constexpr double kMostDelayMs = 10'000, kMostLeadMs = 1000;
 constexpr std::uint32_t kMostFrames = 256;
 
-// Not of NaN.
+// Returns false for NaN.
 bool isWithin(double number, double most) {
   return number >= 0 && number <= most;
 }
@@ -23,16 +23,17 @@ bool isUnit(float squared) {
   return squared >= 1e-30f && std::isfinite(squared);
 }
 
-// What moves or turns more between two frames has jumped, as the server sees it (docs/protocol.md): it is at
-// the one until it is at the other.
+// A collider that moves or turns more than this between two frames has jumped, by the server's rule
+// (docs/protocol.md). A jump is not interpolated.
 constexpr float kMostSpeed = 30;      // m/s
-constexpr float kLeastCosine = 0.5f;  // of half the turn
+constexpr float kLeastCosine = 0.5f;  // cosine of half the angle
 
 bool isSame(const Collider& a, const Collider& b) {
   return a.participantId == b.participantId && a.name == b.name;
 }
 
-// `moved` is `from` or, where motion is led on, `to`; so far along, or beyond it.
+// Moves `moved` by `fraction` of the way from `from` to `to`. It starts as a copy of `from`, or of `to` for
+// an extrapolation (isAtTo).
 void move(Collider& moved, const Collider& from, const Collider& to, bool isAtTo, float fraction,
           float seconds) {
   Vec3 way{};
@@ -41,7 +42,7 @@ void move(Collider& moved, const Collider& from, const Collider& to, bool isAtTo
     way[axis] = to.position[axis] - from.position[axis];
     squared += way[axis] * way[axis];
   }
-  // Not of infinity.
+  // Also rejects infinity and NaN.
   if (!(squared <= kMostSpeed * kMostSpeed * seconds * seconds)) return;
   for (std::size_t axis = 0; axis < 3; ++axis) moved.position[axis] += way[axis] * fraction;
 
@@ -120,7 +121,7 @@ void PlayOut::sample(double neededUs) {
 }
 
 void PlayOut::moveDelay(double aheadUs, double elapsedUs) {
-  // What is displayed later is asked for before the frames that come meanwhile are here.
+  // A request for a later display time comes earlier, so it needs a longer delay.
   wantedUs_ = std::clamp(neededUs_ + aheadUs, 1000 * options_.least_delay_ms, 1000 * options_.most_delay_ms);
   const double most = kSlew * elapsedUs;
   delayUs_ = plays_ ? delayUs_ + std::clamp(wantedUs_ - delayUs_, -most, most) : wantedUs_;
@@ -176,7 +177,7 @@ cs_shown PlayOut::chooseBeyond(const Frame& frame, double pastUs) {
   const double lead = pastUs <= most ? pastUs : 2 * most - pastUs;
   if (lead <= 0 || held() < 2 || frame.key) return CS_SHOWN_HELD;
   const Frame& before = newest(1);
-  // Frames of a server that catches up are nearer in time than their motion.
+  // A server that catches up sends frames faster than the simulated motion.
   const double step = std::max(frameUs_, since(before.timeUs, frame.timeUs));
   shown_ = {&frame, &before, &frame, lead / step};
   return CS_SHOWN_LED_ON;
@@ -209,7 +210,7 @@ std::span<const float> PlayOut::normals(const codec::StreamLayout& layout) {
   for (std::size_t i = 0; i < normals_.size(); i += 3) {
     float* n = &normals_[i];
     const float squared = n[0] * n[0] + n[1] * n[1] + n[2] * n[2];
-    // Opposite ones may cancel.
+    // Opposite normals may cancel.
     if (!isUnit(squared)) {
       std::copy_n(&own[i], 3, n);
       continue;
@@ -234,7 +235,7 @@ void PlayOut::moveColliders() {
   const auto fraction = static_cast<float>(shown_.fraction);
   const double stepUs = std::max(frameUs_, since(shown_.from->timeUs, shown_.to->timeUs));
   const std::vector<Collider>& others = (isAtTo ? shown_.from : shown_.to)->colliders;
-  // All frames have them in the same order.
+  // Colliders have the same order in all frames.
   auto next = others.begin();
   for (std::size_t i = 0; i < bases.size(); ++i) {
     const Collider& base = bases[i];

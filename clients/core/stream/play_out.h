@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The newest frames, and what to show of them at a time: see cs_play_out_options in core.h.
+// Keeps the newest frames and computes what to show at a time. See cs_play_out_options in core.h.
 #pragma once
 
 #include <array>
@@ -13,40 +13,41 @@
 
 namespace clothstream::client {
 
-// Whether the version is known and each number within its bounds.
+// Whether the version is known and each number is within its limits.
 bool isAllowed(const cs_play_out_options& options);
 
 struct DisplayableFrame {
   std::uint64_t tick = 0;
-  std::uint64_t timeUs = 0;  // when the tick began
+  std::uint64_t timeUs = 0;  // start of the tick
   bool key = false;
-  std::span<const float> positions, normals;  // 3 a vertex; normals where the stream sends them
+  std::span<const float> positions, normals;  // 3 floats per vertex; normals only if the stream sends them
   std::span<const Collider> colliders = {};
 };
 
-// All times are microseconds of the server's clock; those of frames may be any numbers. It takes memory for a
-// frame when it first needs it, and none any more once it has been full.
+// All times are microseconds of the server's clock. Times of frames are not trusted: any number is allowed.
+// Memory for a frame is allocated when first needed; a full ring allocates no more.
 class PlayOut {
  public:
   static constexpr std::size_t kMostBytes = 256 * 1024 * 1024, kFewestFrames = 3;
 
   explicit PlayOut(const cs_play_out_options& options) : options_(options) {}
 
-  // A stream begins: what there was is forgotten.
+  // Starts a stream. Forgets all frames.
   void begin(const Description& description);
-  // Ticks grow. Where their time does not, the frames before are forgotten: it is another time from here on.
-  // `displayableUs` is when the frame was decoded; 0: the server's clock is not known.
+  // Adds a frame with a larger tick. If its time is not larger, all earlier frames are forgotten, because the
+  // server's time has changed. displayableUs is when the frame was decoded; 0 if the server's clock is
+  // unknown.
   void add(const DisplayableFrame& frame, std::uint64_t displayableUs);
 
-  // Chooses what is shown. Of a server's clock that is not known, both times are 0.
+  // Chooses what to show. Both times are 0 if the server's clock is unknown.
   cs_played play(std::uint64_t nowUs, std::uint64_t displayUs);
-  // Whether play() chose a frame, or one between two; what follows is defined only then.
+  // Whether the last play() chose a frame or an interpolation. The functions below require it.
   bool shows() const { return shown_.base != nullptr; }
   std::span<const float> positions() const;
   std::span<const float> normals(const codec::StreamLayout& layout);
   const std::vector<Collider>& colliders();
 
-  // Fills in what is of play-out.
+  // Fills in the members about play-out.
   void report(cs_stage_statistics& out) const;
 
  private:
@@ -59,7 +60,7 @@ class PlayOut {
     std::vector<float> positions, normals;
     std::vector<Collider> colliders;
   };
-  // base + fraction * (to - from); with a fraction of 0 the base itself.
+  // Result: base + fraction * (to - from). A fraction of 0 means the base itself.
   struct Shown {
     const Frame *base = nullptr, *from = nullptr, *to = nullptr;
     double fraction = 0;
@@ -76,24 +77,24 @@ class PlayOut {
   void moveColliders();
 
   cs_play_out_options options_;
-  double frameUs_ = 0;  // between frames of the stream where none is missing
+  double frameUs_ = 0;  // nominal time between frames of the stream
   bool sendsNormals_ = false;
-  std::vector<Frame> frames_;  // a ring
-  std::size_t count_ = 0;      // that came; the newest of them are held
+  std::vector<Frame> frames_;  // ring buffer
+  std::size_t count_ = 0;      // frames added; the newest are in the ring
 
-  // How long after the tick before it each of the newest frames could be displayed: with this delay it comes
-  // when its turn begins.
+  // For each of the newest frames: time from the start of the previous tick until the frame could be
+  // displayed. With this delay the frame arrives just when interpolation towards it starts.
   std::array<double, kSamples> samples_{}, sorted_{};
   std::size_t sampleCount_ = 0;
-  double neededUs_ = 0;  // the percentile of these
+  double neededUs_ = 0;  // their percentile kPercentile
   double delayUs_ = 0, wantedUs_ = 0;
-  bool plays_ = false;                        // since then there are the delay and, of the newest play():
-  std::uint64_t displayUs_ = 0, timeUs_ = 0;  // the display time, the same less the delay
+  bool plays_ = false;                        // whether the delay and the two times below are set
+  std::uint64_t displayUs_ = 0, timeUs_ = 0;  // last play(): display time, and display time minus delay
 
   Shown shown_;
-  std::vector<float> positions_, normals_;  // of what is no frame's own
+  std::vector<float> positions_, normals_;  // interpolated or computed values
   std::vector<Collider> colliders_;
-  // In normals_ and colliders_, of what is shown.
+  // Whether normals_ and colliders_ are up to date.
   bool hasNormals_ = false, hasColliders_ = false;
 
   std::uint64_t lateFrames_ = 0;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// When a client that was cut off tries again.
+// Schedules reconnects after a lost connection.
 #pragma once
 
 #include <algorithm>
@@ -8,24 +8,25 @@
 
 namespace clothstream::client {
 
-// A link that returns is to be noticed at once, for as long as the server may hold the participant: attempts
-// are at most kLongestHeldUs apart. After that a server is not to be hurried: at most kLongestUs. Delays grow
-// from kShortestUs, and are jittered by up to a half, so that those who were cut off together do not come
-// back together. All times are microseconds.
+// Exponential back-off with jitter. Delays start at kShortestUs and double. During the server's reconnect
+// grace period they are at most kLongestHeldUs, so that a working network is noticed at once; later at most
+// kLongestUs. Up to half of each delay is subtracted at random, so that clients that lost their connection
+// together return at different times. All times are microseconds. The grace period (holdUs) is
+// Welcome.hold_ms.
 class Reconnection {
  public:
   static constexpr std::uint64_t kNever = std::numeric_limits<std::uint64_t>::max();
   static constexpr std::uint64_t kShortestUs = 50'000, kLongestHeldUs = 120'000, kLongestUs = 5'000'000;
-  // An attempt that has led to no Welcome by then is given up for another: soon while the participant is
-  // held, for a link that returns may have swallowed its beginning; else slow links have their time.
+  // Time limit of an attempt without Welcome. It is short in the grace period, because a recovering network
+  // may have lost the first packets. Later it leaves time for slow networks.
   static constexpr std::uint64_t kHeldAttemptUs = 2'000'000, kAttemptUs = 10'000'000;
-  // A connection that brings nothing for this long is given up: servers answer pings. Of the time between two
-  // updates this much counts at most.
+  // A connection without any message for kSilenceUs is closed; servers answer pings. At most kLongestStepUs
+  // of the time between two updates counts.
   static constexpr std::uint64_t kSilenceUs = 4'000'000, kLongestStepUs = 500'000;
-  // A connection that held this long was a good one: the first attempt after it comes at once.
+  // After a connection that lasted this long, the first attempt is immediate.
   static constexpr std::uint64_t kStableUs = 2'000'000;
 
-  // When to try again. `seed` differs from client to client.
+  // Returns when to try again. `seed` must differ between clients.
   std::uint64_t lost(std::uint64_t nowUs, std::uint64_t holdUs, std::uint64_t seed) {
     if (joinedUs_ && nowUs - joinedUs_ >= kStableUs) attempts_ = 0;
     if (attempts_ == 0) lostUs_ = nowUs;
@@ -36,7 +37,7 @@ class Reconnection {
         attempts_ == 1 ? 0 : std::min(longest, kShortestUs << std::min(attempts_ - 2, 20u));
     return nowUs + delay - jitter(delay / 2, seed + attempts_);
   }
-  // Until when an attempt that begins now is waited for.
+  // Returns the time limit of an attempt that starts now.
   std::uint64_t attemptEnd(std::uint64_t nowUs, std::uint64_t holdUs) const {
     return nowUs + (isHeld(nowUs, holdUs) ? kHeldAttemptUs : kAttemptUs);
   }
@@ -47,7 +48,7 @@ class Reconnection {
     return attempts_ > 0 && nowUs - lostUs_ < holdUs;
   }
 
-  // 0 to `most`: splitmix64 of the seed.
+  // Pseudo-random number from 0 to `most`: splitmix64 of the seed.
   static std::uint64_t jitter(std::uint64_t most, std::uint64_t seed) {
     seed += 0x9e3779b97f4a7c15u;
     seed = (seed ^ (seed >> 30)) * 0xbf58476d1ce4e5b9u;
@@ -56,7 +57,7 @@ class Reconnection {
   }
 
   std::uint32_t attempts_ = 0;
-  std::uint64_t lostUs_ = 0, joinedUs_ = 0;  // 0: not
+  std::uint64_t lostUs_ = 0, joinedUs_ = 0;  // joinedUs_ is 0 while not joined
 };
 
 }  // namespace clothstream::client

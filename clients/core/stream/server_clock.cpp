@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The clock filter: a line through the shortest exchanges.
+// Fits a line through the exchanges with the shortest round trips.
 #include "clients/core/stream/server_clock.h"
 
 #include <algorithm>
@@ -64,7 +64,7 @@ void ServerClock::fit() {
   std::nth_element(trips_.begin(), quarter, trips_.end());
   const std::uint64_t longest = *quarter;
 
-  // Relative to one of them, so that squares keep their digits.
+  // Values are relative to the newest exchange, so that squares keep their precision.
   const Exchange& origin = exchanges_.back();
   double count = 0, t = 0, y = 0, tt = 0, ty = 0, yy = 0;
   for (const Exchange& exchange : exchanges_) {
@@ -82,8 +82,8 @@ void ServerClock::fit() {
   tt -= count * t * t;
   ty -= count * t * y;
   yy -= count * y * y;
-  // Least squares, with what clocks commonly drift as what is known beforehand: a few seconds of jitter say
-  // nothing of a drift, minutes do.
+  // Least squares with the typical drift as prior: a few seconds of jitter say little about the drift,
+  // minutes say enough.
   constexpr double kLeastVariance = 100.0 * 100.0;
   const double variance = std::max(kLeastVariance, (tt > 0 ? yy - ty * ty / tt : yy) / count);
   const double slope = ty / (tt + variance / (kDrift * kDrift));
@@ -109,7 +109,7 @@ double ServerClock::offsetUs(std::uint64_t nowUs) const {
 }
 
 std::uint64_t ServerClock::serverTimeUs(std::uint64_t nowUs) const {
-  // Signed, since a clock may be behind; unsigned again, it is right all the same.
+  // The offset may be negative; unsigned wrap-around gives the right sum.
   return known() ? nowUs + static_cast<std::uint64_t>(std::llround(offsetUs(nowUs))) : 0;
 }
 

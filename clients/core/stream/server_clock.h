@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The server's clock, as pings and their pongs let it be known.
+// Estimates the server's clock from pings and pongs.
 #pragma once
 
 #include <array>
@@ -12,36 +12,35 @@
 
 namespace clothstream::client {
 
-// Of two times of an unsigned clock: read as signed, the difference is right whichever is ahead.
+// Difference of two times of an unsigned clock; negative if `now` is earlier.
 constexpr double since(std::uint64_t before, std::uint64_t now) {
   return static_cast<double>(static_cast<std::int64_t>(now - before));
 }
 
-// A ping's server time was true somewhere between its sending and its pong: the offset lies within half a
-// round trip of the middle. Queues only ever lengthen a round trip, so those exchanges are believed whose
-// round trips are among the shortest quarter of the last minutes; a line through their offsets says where the
-// server's clock is now, and how much faster it runs. Jitter averages out of it, and a single slow exchange
-// is not among them. What differs between the two directions for good cannot be known: half of it stays as an
-// error.
+// The server read its clock between the sending of a ping and the arrival of its pong. The offset is
+// therefore within half a round trip of the middle. Queues only lengthen round trips, so the estimate uses
+// the exchanges with the shortest quarter of the round trips of the last minutes. A line through their
+// offsets gives offset and drift. Jitter averages out, and single slow exchanges are ignored. A constant
+// difference between the two directions cannot be measured: half of it remains as an error.
 //
-// An exchange that the line is not within, by more than kToleranceUs, is set aside. Where kSuspects in a row
-// are, one of the clocks has stepped: what was known before is dropped.
+// An exchange that contradicts the line by more than kToleranceUs is suspect. After kSuspects suspect
+// exchanges in a row, one of the clocks has jumped, and the estimate starts again from them.
 class ServerClock {
  public:
   bool pingDue(std::uint64_t nowUs) const;
   void pingSent(std::uint64_t nowUs);
-  // A pong that answers none of the last pings is left aside.
+  // Ignores a pong that answers none of the last pings.
   void pongReceived(const Pong& pong, std::uint64_t nowUs);
 
-  // Whether a pong came.
+  // Whether a pong arrived.
   bool known() const { return !exchanges_.empty(); }
-  // The shortest of the last ones; 0 before the first pong.
+  // Minimum of the last kRecent round trips; 0 before the first pong.
   double roundTripMs() const;
-  // Server's - own, at this time; 0 before the first pong. It comes nearer to what is known by
-  // kSlew of the time that passes, so that what it maps own times to does not step back; but it jumps where
-  // more than kJumpUs are missing.
+  // Server's clock minus own clock at this time; 0 before the first pong. The offset moves towards the
+  // estimate by at most kSlew of the elapsed time, so that server times never go back. It jumps if the
+  // difference exceeds kJumpUs.
   double offsetUs(std::uint64_t nowUs) const;
-  // The server's clock at this time of the own one; 0 before the first pong.
+  // Server's clock at this time of the own clock; 0 before the first pong.
   std::uint64_t serverTimeUs(std::uint64_t nowUs) const;
 
   static constexpr double kSlew = 0.02, kJumpUs = 50'000;
@@ -50,16 +49,16 @@ class ServerClock {
   static constexpr std::size_t kPending = 64, kRecent = 16, kMostExchanges = 1024, kSuspects = 4;
   static constexpr std::uint64_t kFirstIntervalUs = 10'000, kIntervalUs = 250'000;
   static constexpr double kWindowUs = 240e6;
-  static constexpr std::size_t kBurst = 64;  // pings soon after each other, where nothing is known
+  static constexpr std::size_t kBurst = 64;  // fast pings at the start and after a jump
   static constexpr double kToleranceUs = 5'000;
-  static constexpr double kDrift = 20e-6;  // that quartz clocks commonly have between them
+  static constexpr double kDrift = 20e-6;  // typical drift between quartz clocks
 
   struct Exchange {
-    std::uint64_t atUs = 0;  // the middle, own clock
+    std::uint64_t atUs = 0;  // middle of the round trip, own clock
     std::uint64_t roundTripUs = 0;
     double offsetUs = 0;
   };
-  // Offset at a time, and how much it grows a microsecond.
+  // Offset at a time, and its growth per microsecond.
   struct Line {
     std::uint64_t atUs = 0;
     double offsetUs = 0, slope = 0;
@@ -72,14 +71,14 @@ class ServerClock {
 
   std::uint64_t lastPingUs_ = 0;
   bool pinged_ = false;
-  std::size_t burst_ = kBurst;                     // pings that are still to come soon
-  std::array<std::uint64_t, kPending> pending_{};  // client times; 0: answered
+  std::size_t burst_ = kBurst;                     // fast pings that remain
+  std::array<std::uint64_t, kPending> pending_{};  // client times; 0 if answered
   std::size_t nextPending_ = 0;
   std::deque<Exchange> exchanges_;    // oldest first
-  std::vector<Exchange> suspects_;    // since the newest that was believed
-  std::vector<std::uint64_t> trips_;  // of fit()
+  std::vector<Exchange> suspects_;    // since the newest accepted exchange
+  std::vector<std::uint64_t> trips_;  // scratch of fit()
   Line line_;
-  // What was last told of: from there it slews.
+  // Last offset that was returned at a pong; the slew starts from it.
   std::uint64_t shownAtUs_ = 0;
   double shownUs_ = 0;
 };

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What a client says (proto/clothstream/v1/session.proto), serialised. Each function replaces what `out`
-// holds and reuses its memory.
+// Serialises the messages of a client (proto/clothstream/v1/session.proto). Each function replaces the
+// content of `out` and reuses its memory. A request id of 0 is omitted.
 #pragma once
 
 #include <array>
@@ -22,45 +22,46 @@ struct ColliderChange {
   const float* radius = nullptr;
 };
 
-// Who joins what.
+// Content of Hello: the client and the scene that it joins.
 struct Greeting {
   std::string scene, clientName, displayName;
   std::uint32_t role = 0;
-  OperatingPoint wanted = {};  // at most
-  // Of who comes back: what the Welcome before said. Empty and 0: it does not, or holds no description.
+  OperatingPoint wanted = {};  // upper limit
+  // Token and description of the last Welcome, for a client that returns. Empty and 0 if it has none.
   std::string token;
   std::uint64_t contentId = 0;
-  std::uint32_t attempt = 1;  // counts connections
+  std::uint32_t attempt = 1;  // number of this connection
 };
 
 void writeHello(std::string& out, std::uint64_t requestId, const Greeting& greeting);
+
 struct AttachmentPose {
   std::string name;
   std::array<float, 3> position{};
-  std::array<float, 4> orientation{};  // all zero: not turned
+  std::array<float, 4> orientation{};  // x y z w; all zero means no rotation
 };
 
-// What this participant does.
+// Input of this participant.
 struct Poses {
-  std::vector<cs_own_collider> colliders;  // their ids are their places
-  std::vector<float> leftHand, rightHand;  // {x, y, z, radius} of each joint; empty: none
+  std::vector<cs_own_collider> colliders;  // the id of each is its index
+  std::vector<float> leftHand, rightHand;  // {x, y, z, radius} per joint; empty: none
   std::vector<cs_grab> grabs;
   std::vector<AttachmentPose> attachments;
   bool wantsContacts = false;
 };
-// `serverTimeUs`: the same time on the server's clock; 0: not known.
+// Both times are the same instant, on the client's and on the server's clock. serverTimeUs is 0 if unknown.
 void writeColliderPoses(std::string& out, const Poses& poses, std::uint64_t clientTimeUs,
                         std::uint64_t serverTimeUs);
 void writeParameterChange(std::string& out, std::uint64_t requestId, const ParameterChange& change);
 void writeColliderChange(std::string& out, std::uint64_t requestId, const ColliderChange& change);
 void writePing(std::string& out, std::uint64_t requestId, std::uint64_t clientTimeUs);
 void writeFrameAck(std::string& out, std::uint64_t tick);
-// `early`: what comes until then can be decoded.
+// `early`: the client can decode the frames until then.
 void writeKeyFrameRequest(std::string& out, std::uint32_t epoch, bool early);
 void writeSetRole(std::string& out, std::uint64_t requestId, std::uint64_t participant, std::uint32_t role);
 void writeRemoveParticipant(std::string& out, std::uint64_t requestId, std::uint64_t participant);
 void writeListScenes(std::string& out, std::uint64_t requestId);
-// Of a scene's clock; what is not given stays.
+// Changes the clock of a scene. Empty members keep their value.
 struct SceneControl {
   std::optional<bool> paused{};
   std::optional<double> seek{}, speed{};

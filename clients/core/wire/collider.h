@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A collider, as descriptions and frames have it.
+// Reads a collider of a description or a frame.
 #pragma once
 
 #include <array>
@@ -21,23 +21,24 @@ struct Collider {
   cs_shape shape = CS_SHAPE_HULL;
   float radius = 0, length = 0;
   Vec3 size{};
-  Bytes hull;  // a serialised ConvexHull, good as long as the message; frames have none
+  Bytes hull;  // serialised ConvexHull, points into the message; empty in frames
   std::uint64_t participantId = 0;
 };
 
-// Of a hull, in its own frame.
+// Convex hull in the collider's own frame.
 struct Hull {
-  std::vector<float> vertices;  // 3 each
+  std::vector<float> vertices;  // 3 floats each
   std::vector<std::uint32_t> triangles;
 };
 
-// Reuses the memory of `collider`. False, or nullopt: not well formed, a number that is not finite, or more
-// parts than the protocol allows.
+// Reuses the memory of `collider`. The functions return false or nullopt if the message is not well formed, a
+// number is not finite, or there are more elements than the protocol allows.
 [[nodiscard]] bool readCollider(Bytes message, Collider& collider);
 [[nodiscard]] std::optional<Hull> readHull(Bytes message);
 
-// The scene's and all participants'.
+// Limit for the colliders of the scene and of all participants together.
 inline constexpr std::size_t kMaxSceneColliders = 4096;
-inline constexpr std::size_t kMaxHullParts = 128;  // vertices, faces
+// Limit for the vertices, the faces, and the vertices of a face.
+inline constexpr std::size_t kMaxHullParts = 128;
 
 }  // namespace clothstream::client

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A StreamDescription, read, checked, and completed with triangles and normals.
+// Reads and checks a StreamDescription, and adds triangles and normals.
 #include "clients/core/wire/description.h"
 
 #include <algorithm>
@@ -14,7 +14,7 @@
 namespace clothstream::client {
 namespace {
 
-constexpr std::uint32_t kMaxRate = 1000;  // per second, scene.proto
+constexpr std::uint32_t kMaxRate = 1000;  // Hz; limit of scene.proto
 
 bool isFinite(float number) {
   return std::isfinite(number);
@@ -24,12 +24,12 @@ struct ClothMessage {
   std::string name;
   codec::ClothLayout layout;
   Bytes restPositions, triangles, uvs, uvTriangles;
-  std::vector<Submesh> submeshes;  // their firstIndex not yet known
+  std::vector<Submesh> submeshes;  // firstIndex is set later
 };
 
 constexpr std::size_t kMaxSubmeshes = 65536;
 constexpr std::size_t kMaxMaterials = 1024;
-constexpr std::size_t kMaxSolvers = 32;  // kinds that are remembered of a cloth
+constexpr std::size_t kMaxSolvers = 32;  // kinds of solver remembered per cloth
 
 bool readSubmesh(Bytes message, Submesh& submesh) {
   using F = field::Submesh;
@@ -71,7 +71,7 @@ bool readCloth(Bytes message, ClothMessage& cloth) {
   });
 }
 
-// Of a Scene's Environment.
+// Reads the Environment of a Scene.
 bool readEnvironment(Bytes message, Environment& environment) {
   using F = field::Environment;
   return readFields(message, [&](std::uint32_t tag, Reader& reader) {
@@ -90,7 +90,7 @@ bool readEnvironment(Bytes message, Environment& environment) {
   });
 }
 
-// Of a Scene's Cloth.
+// Reads a Cloth of a Scene.
 bool readClothParameters(Bytes message, std::string& name, ClothParameters& parameters) {
   using F = field::Cloth;
   return readFields(message, [&](std::uint32_t tag, Reader& reader) {
@@ -145,7 +145,7 @@ bool readDefinition(Bytes message, Description& description) {
   });
 }
 
-// Gives false where the message is not well formed; what is well formed and wrong is for check() to say.
+// Returns false if the message is not well formed. Wrong values are left to check().
 bool readParts(Bytes message, Description& description, std::vector<ClothMessage>& cloths,
                Bytes& definition) {
   using F = field::StreamDescription;
@@ -198,7 +198,7 @@ std::string quoted(const std::string& name) {
   return "cloth \"" + name + "\"";
 }
 
-// Little-endian numbers; false where the bytes are no whole ones.
+// Appends little-endian numbers. Returns false if the last number is incomplete.
 template <typename T>
 bool appendNumbers(Bytes bytes, std::vector<T>& out) {
   static_assert(std::endian::native == std::endian::little);
@@ -212,7 +212,7 @@ bool allBelow(const std::vector<std::uint32_t>& numbers, std::size_t limit) {
   return std::all_of(numbers.begin(), numbers.end(), [&](std::uint32_t number) { return number < limit; });
 }
 
-// Texture coordinates and submeshes; empty if they fit the triangles.
+// Reads texture coordinates and submeshes. Returns the error; empty if they match the triangles.
 std::string readDrawing(const ClothMessage& source, Cloth& cloth) {
   const bool whole =
       appendNumbers(source.uvs, cloth.uvs) && appendNumbers(source.uvTriangles, cloth.uvIndices);
@@ -228,11 +228,11 @@ std::string readDrawing(const ClothMessage& source, Cloth& cloth) {
     next += submesh.indexCount;
   }
   if (!source.submeshes.empty() && next != std::uint64_t{cloth.firstIndex} + cloth.indexCount)
-    return "submeshes are not all of its " + std::to_string(cloth.indexCount / 3) + " triangles";
+    return "submeshes do not cover its " + std::to_string(cloth.indexCount / 3) + " triangles";
   return {};
 }
 
-// Empty if the numbers agree.
+// Returns the error; empty if the numbers agree.
 std::string check(const Description& description, const std::vector<ClothMessage>& cloths) {
   if (!codec::isCodec(description.codec))
     return "codec is " + std::to_string(description.codec) + "; this client decodes " + decodedCodecs();
@@ -249,7 +249,8 @@ std::string check(const Description& description, const std::vector<ClothMessage
   for (const ClothMessage& cloth : cloths) {
     if (cloth.restPositions.size() != std::uint64_t{cloth.layout.vertexCount} * 3 * sizeof(float))
       return quoted(cloth.name) + ": rest_positions has " + std::to_string(cloth.restPositions.size()) +
-             " bytes for " + std::to_string(cloth.layout.vertexCount) + " vertices; 12 a vertex are needed";
+             " bytes for " + std::to_string(cloth.layout.vertexCount) +
+             " vertices; 12 bytes per vertex are needed";
   }
   if (!codec::isPossible(description.layout))
     return "a cloth's rows x columns is not its vertex_count, a triangle names a vertex that is not there, "
@@ -282,14 +283,14 @@ bool appendPositions(Bytes bytes, std::vector<float>& out) {
 
 tl::expected<Description, std::string> readDescription(Bytes message) {
   Description description;
-  description.layout.maxError = 0;  // what is not on the wire is zero
+  description.layout.maxError = 0;  // a missing field is zero
   std::vector<ClothMessage> cloths;
   Bytes definition;
   if (!readParts(message, description, cloths, definition))
-    return tl::unexpected(std::string("its bytes are no StreamDescription"));
+    return tl::unexpected(std::string("it is not a StreamDescription"));
   for (ClothMessage& cloth : cloths) {
     if (!appendNumbers(cloth.triangles, cloth.layout.triangles))
-      return tl::unexpected(quoted(cloth.name) + ": triangles are not whole numbers of 4 bytes");
+      return tl::unexpected(quoted(cloth.name) + ": the size of triangles is not a multiple of 4 bytes");
     if (!cloth.layout.triangles.empty()) appendNumbers(cloth.restPositions, cloth.layout.restPositions);
     description.layout.cloths.push_back(cloth.layout);
   }
@@ -299,7 +300,7 @@ tl::expected<Description, std::string> readDescription(Bytes message) {
   for (Collider& collider : description.colliders) {
     if (collider.hull.empty()) continue;
     std::optional<Hull> hull = readHull(collider.hull);
-    if (!hull) return tl::unexpected("collider \"" + collider.name + "\" is no hull");
+    if (!hull) return tl::unexpected("collider \"" + collider.name + "\" has a malformed hull");
     description.hulls[collider.name] = std::move(*hull);
     collider.hull = {};
   }
@@ -322,7 +323,7 @@ tl::expected<Description, std::string> readDescription(Bytes message) {
   codec::computeVertexNormals(description.layout, description.restPositions.data(),
                               description.restNormals.data());
   if (!readDefinition(definition, description))
-    return tl::unexpected(std::string("its definition is no Scene"));
+    return tl::unexpected(std::string("its definition is not a Scene"));
   return description;
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What a stream shows: cloths, rest state, triangles, colliders and the parameters as they stand now.
+// Description of a stream: cloths, rest state, triangles, colliders and current parameters.
 #pragma once
 
 #include <cstdint>
@@ -21,24 +21,24 @@ struct ClothParameters {
   float damping = 0, drag = 0, lift = 0;
   float friction = 0.3f, thickness = 0.005f;
   float dihedralBending = 0;
-  // Of cloths that have self-collision, and of those that have tethers.
+  // Empty if the cloth has no self-collision, or no tethers.
   std::optional<float> ballRadius, ballFriction, tetherSlack;
   Solver solver;
-  std::map<std::uint32_t, Solver> solvers;  // of each kind what was told last
+  std::map<std::uint32_t, Solver> solvers;  // last known settings of each kind
 };
 
-// Triangles that are drawn with one material.
+// Triangles with one material.
 struct Submesh {
   std::string name;
-  std::uint32_t firstIndex = 0, indexCount = 0;  // of the description's triangles
+  std::uint32_t firstIndex = 0, indexCount = 0;  // range in Description::triangles
 };
 
 struct Cloth {
   std::string name;
   std::uint32_t firstVertex = 0, firstIndex = 0, indexCount = 0;
-  std::vector<float> uvs;                // 2 each; of meshes that have any
-  std::vector<std::uint32_t> uvIndices;  // one a corner of the cloth's triangles, where there are uvs
-  std::vector<Submesh> submeshes;        // of meshes; together all of its triangles
+  std::vector<float> uvs;                // 2 floats each; empty if there are none
+  std::vector<std::uint32_t> uvIndices;  // one per triangle corner; empty without uvs
+  std::vector<Submesh> submeshes;        // meshes only; they cover all triangles of the cloth
   ClothParameters parameters;
 };
 
@@ -53,28 +53,30 @@ struct Description {
   std::uint32_t codec = 0;
   std::string scene;
   std::uint32_t simulationRate = 0, streamRate = 0;
-  codec::StreamLayout layout;  // vertex counts, rows and columns, or triangles, of the cloths
+  codec::StreamLayout layout;  // for each cloth: vertex count, and rows and columns or triangles
   std::vector<Cloth> cloths;
   std::vector<Collider> colliders;
-  std::map<std::string, Hull> hulls;  // of the colliders that are hulls, by name
+  std::map<std::string, Hull> hulls;  // by the collider's name
   Environment environment;
-  std::vector<std::string> materials;             // that the server has
-  std::vector<float> restPositions, restNormals;  // 3 a vertex
-  std::vector<std::uint32_t> triangles;           // 3 indices each
+  std::vector<std::string> materials;             // names that the server offers
+  std::vector<float> restPositions, restNormals;  // 3 floats per vertex
+  std::vector<std::uint32_t> triangles;           // 3 indices per triangle
 
   std::uint32_t ticksPerFrame() const { return simulationRate / streamRate; }
 };
 
-// A serialised StreamDescription. Sizes what it makes by the positions that came, never by numbers alone. The
-// error names the field, its value and what is allowed.
+// Reads a serialised StreamDescription, checks it, and adds triangles and normals. Memory grows with the
+// positions in the message, not with the counts that it states. The error names the field, its value and the
+// allowed values.
 [[nodiscard]] tl::expected<Description, std::string> readDescription(Bytes message);
 
-// nullptr where the collider is no hull of this description.
+// Returns nullptr if the collider is not a hull of this description.
 const Hull* hullOf(const Collider& collider, const Description& description);
 
+// Applies a change to the environment and to the cloths that it names; the name "" means all cloths.
 void apply(const ParameterChange& change, Description& description);
 
-// The ids of all codecs, for a text.
+// Lists the ids of all codecs, for error messages.
 std::string decodedCodecs();
 
 }  // namespace clothstream::client

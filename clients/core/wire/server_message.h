@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What the server says (proto/clothstream/v1/session.proto), as plain structs that look into the message's
-// bytes.
+// Reads the messages of the server (proto/clothstream/v1/session.proto) into plain structs. Members of type
+// Bytes point into the message.
 #pragma once
 
 #include <cstdint>
@@ -31,7 +31,7 @@ enum class Body : std::uint32_t {
   operatingPoint = field::ServerMessage::kOperatingPoint.number,
 };
 
-// A kind of body that this client does not know is `none`.
+// An unknown kind of body is `none`.
 struct ServerMessage {
   Body kind = Body::none;
   Bytes body;
@@ -48,7 +48,7 @@ struct Welcome {
   std::uint32_t protocolVersion = 0, codec = 0;
   std::uint64_t participantId = 0;
   std::string scene, serverName, deviceName;
-  std::uint64_t contentId = 0;  // of the description
+  std::uint64_t contentId = 0;  // description's
   std::uint32_t role = 0;
   std::string token;
   bool resumed = false;
@@ -88,7 +88,7 @@ struct SimulationReport {
 
 struct Frame {
   Bytes packet;
-  std::uint64_t tickTimeUs = 0, packetTimeUs = 0;  // on the server's clock
+  std::uint64_t tickTimeUs = 0, packetTimeUs = 0;  // server's clock
   std::uint64_t reconstructionHash = 0;
   std::vector<Bytes> colliders;  // serialised ColliderStates
   std::optional<Bytes> report;   // a serialised SimulationReport
@@ -98,10 +98,10 @@ struct Pong {
   std::uint64_t clientTimeUs = 0, serverTimeUs = 0;
 };
 
-// How much of the stream comes.
+// Part of the stream that the server sends.
 struct OperatingPoint {
   std::uint32_t quality = 0;
-  std::uint32_t temporalLayers = 0;  // 0: all
+  std::uint32_t temporalLayers = 0;  // 0 means all
 };
 
 struct ServerError {
@@ -122,29 +122,29 @@ struct TickEvents {
   std::vector<ContactEvent> contacts;
 };
 
-// nullopt: not well formed, a number that is not finite where the protocol has finite ones, or more parts
-// than the protocol allows.
+// The functions return nullopt or false if the message is not well formed, a number is not finite, or there
+// are more elements than the protocol allows.
 [[nodiscard]] std::optional<ServerMessage> readServerMessage(Bytes message);
 [[nodiscard]] std::optional<Welcome> readWelcome(Bytes message);
 [[nodiscard]] std::optional<Chunk> readChunk(Bytes message);
-// Reuses the memory of `frame`.
+// Reuses the memory of `frame`, whose views point into the message.
 [[nodiscard]] bool readFrame(Bytes message, Frame& frame);
 [[nodiscard]] std::optional<Pong> readPong(Bytes message);
 [[nodiscard]] std::optional<Notice> readNotice(Bytes message);
 [[nodiscard]] std::optional<Presence> readPresence(Bytes message);
-// Of times that are no numbers, and lengths below 0, there is none.
+// Also nullopt if the length is negative.
 [[nodiscard]] std::optional<cs_playback> readPlayback(Bytes message);
 [[nodiscard]] std::optional<OperatingPoint> readOperatingPoint(Bytes message);
 [[nodiscard]] std::optional<ParameterChange> readParameterChanged(Bytes message);
 [[nodiscard]] std::optional<ServerError> readError(Bytes message);
 [[nodiscard]] bool readTickEvents(Bytes message, TickEvents& events);
-// The names of the scenes.
+// Returns the names of the scenes.
 [[nodiscard]] std::optional<std::vector<std::string>> readScenes(Bytes message);
 // Reuses the memory of `out`.
 [[nodiscard]] bool readReport(Bytes message, SimulationReport& out);
 
 inline constexpr std::size_t kMaxParticipants = 4096;
 inline constexpr std::size_t kMaxScenes = 65536;
-inline constexpr std::size_t kMaxEvents = 65536;  // of a kind
+inline constexpr std::size_t kMaxEvents = 65536;  // per kind
 
 }  // namespace clothstream::client
