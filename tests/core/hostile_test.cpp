@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Bytes that no server would send: whatever comes, the client says so and lives.
+// Malformed and random input: the client reports an error and never crashes.
 #include <csignal>
 #include <cstdlib>
 #include <random>
@@ -16,7 +16,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-// One of each kind of message, in an order in which a client takes them all.
+// One message of each kind, in an order that a client accepts.
 std::vector<std::string> session() {
   ScriptedServer server({.normals = codec::NormalMode::octahedral, .cloths = {{"a", 4, 3}, {"b", 3, 3}}});
   std::vector<std::string> messages{server.welcome()};
@@ -37,7 +37,7 @@ std::vector<std::string> session() {
   return messages;
 }
 
-// Everything that can be read is read, so that a sanitizer sees it.
+// Reads everything that the client returns, so that a sanitizer checks it.
 void readAll(ClientUnderTest& client) {
   const std::uint32_t vertices = cs_vertex_count(client.get());
   float sum = 0;
@@ -59,7 +59,7 @@ void readAll(ClientUnderTest& client) {
   client.outgoing();
 }
 
-// Messages before `index` as they are, then `spoilt`, then the rest.
+// Sends the messages with message `index` replaced by `spoilt`.
 void runSession(const std::vector<std::string>& messages, std::size_t index, const std::string& spoilt) {
   ClientUnderTest client;
   cs_play_out_options options;
@@ -73,7 +73,7 @@ void runSession(const std::vector<std::string>& messages, std::size_t index, con
   readAll(client);
 }
 
-TEST(Hostile, EveryTruncationOfEveryMessage) {
+TEST(Hostile, SurvivesEveryTruncationOfEveryMessage) {
   const std::vector<std::string> messages = session();
   for (std::size_t i = 0; i < messages.size(); ++i) {
     for (std::size_t length = 0; length < messages[i].size(); ++length)
@@ -81,7 +81,7 @@ TEST(Hostile, EveryTruncationOfEveryMessage) {
   }
 }
 
-TEST(Hostile, EveryBitOfEveryMessageFlipped) {
+TEST(Hostile, SurvivesEveryFlippedBitOfEveryMessage) {
   const std::vector<std::string> messages = session();
   for (std::size_t i = 0; i < messages.size(); ++i) {
     for (std::size_t bit = 0; bit < 8 * messages[i].size(); ++bit) {
@@ -92,7 +92,7 @@ TEST(Hostile, EveryBitOfEveryMessageFlipped) {
   }
 }
 
-TEST(Hostile, RandomBytesOverRandomPlaces) {
+TEST(Hostile, SurvivesRandomBytesAtRandomPlaces) {
   const std::vector<std::string> messages = session();
   std::mt19937 random(11);
   const auto below = [&](std::size_t bound) {
@@ -107,15 +107,15 @@ TEST(Hostile, RandomBytesOverRandomPlaces) {
   }
 }
 
-TEST(Hostile, BytesThatAreNoMessageEndTheClientWithAReason) {
+TEST(Hostile, MalformedMessageFailsTheClientWithAReason) {
   ClientUnderTest client;
   EXPECT_EQ(client.receive("HTTP/1.1 400 Bad Request\r\n"), static_cast<std::uint32_t>(CS_EVENT_ERROR));
   EXPECT_EQ(cs_get_state(client.get()), CS_STATE_FAILED);
   EXPECT_THAT(cs_error_text(client.get()), HasSubstr("is it a clothstream-server"));
-  EXPECT_EQ(client.receive(ScriptedServer().welcome()), 0u) << "nothing more is taken";
+  EXPECT_EQ(client.receive(ScriptedServer().welcome()), 0u) << "a failed client ignores messages";
 }
 
-TEST(Hostile, FieldsAndBodiesThatAreNotKnownAreSkipped) {
+TEST(Hostile, SkipsUnknownFieldsAndBodies) {
   // Field 500 as a varint, field 501 as bytes, field 502 as 64 bits, field 503 as 32 bits.
   const std::string unknown(
       "\xa0\x1f\x05\xaa\x1f\x02xy\xb1\x1f"
@@ -133,9 +133,9 @@ TEST(Hostile, FieldsAndBodiesThatAreNotKnownAreSkipped) {
 
 TEST(Interface, NoExceptionLeavesIt) {
 #ifdef __SANITIZE_ADDRESS__
-  GTEST_SKIP() << "the sanitizer's allocator ends the program itself";
+  GTEST_SKIP() << "the sanitizer's allocator ends the program";
 #endif
-  // Lack of memory is the only reason for one.
+  // Only a failed allocation throws.
   const auto runOutOfMemory = [] {
     const rlimit none{};
     setrlimit(RLIMIT_DATA, &none);
@@ -148,7 +148,7 @@ TEST(Interface, NoExceptionLeavesIt) {
   EXPECT_EXIT(runOutOfMemory(), ::testing::KilledBySignal(SIGABRT), "");
 }
 
-TEST(Wire, RefusesWhatProtobufWouldRefuse) {
+TEST(Wire, RefusesMalformedFields) {
   const auto isWhole = [](std::string_view bytes) { return wellFormed(Bytes(bytes.data(), bytes.size())); };
   using namespace std::string_view_literals;
   EXPECT_TRUE(isWhole(""sv));

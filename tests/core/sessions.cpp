@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Sessions out of the scripted server, the golden packets, and a random generator with a fixed seed.
+// Creates sessions from the scripted server, the golden packets, and a random generator with a fixed seed.
 #include "tests/core/sessions.h"
 
 #include <random>
@@ -17,11 +17,11 @@ Session streamOf(const std::string& name, ScriptedStream stream) {
   ScriptedServer server(std::move(stream));
   Session session{name, {server.welcome()}};
   for (std::string& chunk : server.chunks(400)) session.messages.push_back(std::move(chunk));
-  // To the ping that was sent at the message before.
+  // Answers the ping that was sent at the previous message.
   const std::uint64_t pingUs = (session.messages.size() - 1) * kStepUs;
   session.messages.push_back(ScriptedServer::pong(pingUs, pingUs + kServerAheadUs));
   for (std::uint64_t tick = 1; tick <= 12; ++tick) {
-    // One frame is lost, and a key frame comes two frames later.
+    // One frame is lost. A key frame follows two frames later.
     const auto kind = tick == 8 ? codec::PacketKind::key : codec::PacketKind::predicted;
     v1::Frame frame = server.frameMessage(tick, kind);
     frame.set_tick_time_us(pingUs + kServerAheadUs + tick * kTickUs);

@@ -46,7 +46,7 @@ tl::expected<ContentAssembly::Content*, std::string> ContentAssembly::contentOf(
 }
 
 tl::expected<std::optional<std::string>, std::string> ContentAssembly::add(const Chunk& chunk) {
-  if (chunk.kind != static_cast<std::uint32_t>(ContentKind::streamDescription)) return std::nullopt;
+  if (chunk.kind != field::ContentKind::kStreamDescription) return std::nullopt;
   if (chunk.data.size() > kMaxChunkBytes)
     return wrong(chunk, std::to_string(chunk.data.size()) + " bytes; at most " +
                             std::to_string(kMaxChunkBytes) + " are allowed");

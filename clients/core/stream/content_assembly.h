@@ -13,8 +13,6 @@
 
 namespace clothstream::client {
 
-enum class ContentKind : std::uint32_t { streamDescription = 1 };
-
 class ContentAssembly {
  public:
   static constexpr std::size_t kMaxChunkBytes = 256 * 1024;

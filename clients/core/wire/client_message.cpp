@@ -16,6 +16,13 @@ namespace {
 
 using Writer = protozero::pbf_writer;
 
+// The kind of a solver is the number of its field in Solver.kind.
+static_assert(CS_SOLVER_MASS_SPRING == field::Solver::kMassSpring.number &&
+              CS_SOLVER_CONSTRAINT == field::Solver::kConstraint.number &&
+              CS_SOLVER_ACAD == field::Solver::kAcad.number &&
+              CS_SOLVER_XPBD == field::Solver::kXpbd.number &&
+              CS_SOLVER_IMPLICIT_EULER == field::Solver::kImplicitEuler.number);
+
 template <typename Fill>
 void writeMessage(std::string& out, std::uint64_t requestId, field::Field bodyField, Fill fill) {
   out.clear();

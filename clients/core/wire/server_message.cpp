@@ -10,6 +10,24 @@
 namespace clothstream::client {
 namespace {
 
+// The C interface returns these values as they are on the wire.
+static_assert(CS_ROLE_VIEWER == field::Role::kViewer && CS_ROLE_PARTICIPANT == field::Role::kParticipant &&
+              CS_ROLE_OWNER == field::Role::kOwner);
+static_assert(CS_PRESENCE_JOINED == field::PresenceKind::kJoined &&
+              CS_PRESENCE_LEFT == field::PresenceKind::kLeft &&
+              CS_PRESENCE_ROLE_CHANGED == field::PresenceKind::kRoleChanged &&
+              CS_PRESENCE_DISCONNECTED == field::PresenceKind::kDisconnected &&
+              CS_PRESENCE_RETURNED == field::PresenceKind::kReturned);
+static_assert(CS_LEAVE_LEFT == field::LeaveReason::kLeft &&
+              CS_LEAVE_TIMED_OUT == field::LeaveReason::kTimedOut &&
+              CS_LEAVE_REMOVED == field::LeaveReason::kRemoved);
+static_assert(CS_GRAB_TAKEN == field::GrabEventKind::kTaken &&
+              CS_GRAB_SLIPPED == field::GrabEventKind::kSlipped &&
+              CS_GRAB_RELEASED == field::GrabEventKind::kReleased);
+static_assert(CS_CONTACT_BEGAN == field::ContactEventKind::kBegan &&
+              CS_CONTACT_ENDED == field::ContactEventKind::kEnded);
+static_assert(CS_HAND_LEFT == field::HandSide::kLeft && CS_HAND_RIGHT == field::HandSide::kRight);
+
 bool readClothReport(Bytes message, ClothReport& report) {
   using F = field::ClothReport;
   return readFields(message, [&](std::uint32_t tag, Reader& reader) {
