@@ -11,24 +11,26 @@ bool setSpring(std::optional<Spring>& target, Reader& reader) {
 
 // Vec3Value { Vec3 value = 1; }
 bool setVec3Value(std::optional<Vec3>& target, Reader& reader) {
+  using F = field::Vec3Value;
   Vec3& value = target.emplace();
-  return readFields(reader.get_view(), [&](std::uint32_t field, Reader& wrapped) {
-    return field == bytes(1) ? readVec3(wrapped.get_view(), value) : skip(wrapped);
+  return readFields(reader.get_view(), [&](std::uint32_t tag, Reader& wrapped) {
+    return tag == F::kValue.tag ? readVec3(wrapped.get_view(), value) : skip(wrapped);
   });
 }
 
 bool readConstraintSolver(Bytes message, Solver& solver) {
-  return readFields(message, [&](std::uint32_t field, Reader& reader) {
-    switch (field) {
-      case varint(1):
+  using F = field::ConstraintSolver;
+  return readFields(message, [&](std::uint32_t tag, Reader& reader) {
+    switch (tag) {
+      case F::kBendConstraints.tag:
         return set(solver.bendConstraints, reader.get_bool());
-      case fixed32(2):
+      case F::kCompliance.tag:
         return setFinite(solver.compliance, reader);
-      case varint(3):
+      case F::kIterations.tag:
         return set(solver.iterations, reader.get_uint32());
-      case fixed32(4):
+      case F::kTolerance.tag:
         return setFinite(solver.tolerance, reader);
-      case varint(5):
+      case F::kPath.tag:
         return solver.path = reader.get_uint32(), true;
       default:
         return skip(reader);
@@ -37,56 +39,60 @@ bool readConstraintSolver(Bytes message, Solver& solver) {
 }
 
 bool readAcadSolver(Bytes message, Solver& solver) {
-  return readFields(message, [&](std::uint32_t field, Reader& reader) {
-    if (field == fixed32(1)) return setFinite(solver.activation, reader);
-    return field == bytes(2) ? readConstraintSolver(reader.get_view(), solver) : skip(reader);
+  using F = field::AcadSolver;
+  return readFields(message, [&](std::uint32_t tag, Reader& reader) {
+    if (tag == F::kActivation.tag) return setFinite(solver.activation, reader);
+    return tag == F::kConstraint.tag ? readConstraintSolver(reader.get_view(), solver) : skip(reader);
   });
 }
 
 bool readXpbdSolver(Bytes message, Solver& solver) {
-  return readFields(message, [&](std::uint32_t field, Reader& reader) {
-    if (field == varint(1)) return set(solver.iterations, reader.get_uint32());
-    return field == fixed32(2) ? setFinite(solver.compliance, reader) : skip(reader);
+  using F = field::XpbdSolver;
+  return readFields(message, [&](std::uint32_t tag, Reader& reader) {
+    if (tag == F::kIterations.tag) return set(solver.iterations, reader.get_uint32());
+    return tag == F::kCompliance.tag ? setFinite(solver.compliance, reader) : skip(reader);
   });
 }
 
 bool readImplicitEulerSolver(Bytes message, Solver& solver) {
-  return readFields(message, [&](std::uint32_t field, Reader& reader) {
-    if (field == varint(1)) return set(solver.iterations, reader.get_uint32());
-    return field == fixed32(2) ? setFinite(solver.tolerance, reader) : skip(reader);
+  using F = field::ImplicitEulerSolver;
+  return readFields(message, [&](std::uint32_t tag, Reader& reader) {
+    if (tag == F::kIterations.tag) return set(solver.iterations, reader.get_uint32());
+    return tag == F::kTolerance.tag ? setFinite(solver.tolerance, reader) : skip(reader);
   });
 }
 
 bool readClothChange(Bytes message, ClothChange& change) {
-  return readFields(message, [&](std::uint32_t field, Reader& reader) {
-    switch (field) {
-      case bytes(1):
+  using F = field::ClothChange;
+  return readFields(message, [&](std::uint32_t tag, Reader& reader) {
+    switch (tag) {
+      case F::kName.tag:
         return setText(change.name, reader);
-      case bytes(2):
+      case F::kStructural.tag:
         return setSpring(change.structural, reader);
-      case bytes(3):
+      case F::kShear.tag:
         return setSpring(change.shear, reader);
-      case bytes(4):
+      case F::kBend.tag:
         return setSpring(change.bend, reader);
-      case fixed32(5):
+      case F::kDamping.tag:
         return setFinite(change.damping, reader);
-      case fixed32(6):
+      case F::kDrag.tag:
         return setFinite(change.drag, reader);
-      case fixed32(7):
+      case F::kLift.tag:
         return setFinite(change.lift, reader);
-      case fixed32(8):
+      case F::kFriction.tag:
         return setFinite(change.friction, reader);
-      case fixed32(9):
+      case F::kThickness.tag:
         return setFinite(change.thickness, reader);
-      case bytes(20):
+      case F::kSolver.tag:
         return readSolver(reader.get_view(), change.solver.emplace());
-      case bytes(21):
+      case F::kSelfCollision.tag:
         return readSelfCollision(reader.get_view(), change.ballRadius, change.ballFriction);
-      case bytes(23):
+      case F::kTethers.tag:
         return readTethers(reader.get_view(), change.tetherSlack);
-      case fixed32(24):
+      case F::kDihedralBending.tag:
         return setFinite(change.dihedralBending, reader);
-      case bytes(40):
+      case F::kMaterial.tag:
         return setText(change.material.emplace(), reader);
       default:
         return skip(reader);
@@ -97,18 +103,19 @@ bool readClothChange(Bytes message, ClothChange& change) {
 }  // namespace
 
 bool readParameterChange(Bytes message, ParameterChange& change) {
-  return readFields(message, [&](std::uint32_t field, Reader& reader) {
-    switch (field) {
-      case bytes(1):
+  using F = field::ParameterChange;
+  return readFields(message, [&](std::uint32_t tag, Reader& reader) {
+    switch (tag) {
+      case F::kGravity.tag:
         return setVec3Value(change.gravity, reader);
-      case bytes(2):
+      case F::kWind.tag:
         return setVec3Value(change.wind, reader);
-      case fixed32(3):
+      case F::kAirDensity.tag:
         return setFinite(change.airDensity, reader);
-      case bytes(4):
+      case F::kCloths.tag:
         return change.cloths.size() < kMaxCloths &&
                readClothChange(reader.get_view(), change.cloths.emplace_back());
-      case bytes(40):
+      case F::kGust.tag:
         return readGust(reader.get_view(), change.gust.emplace());
       default:
         return skip(reader);
@@ -121,33 +128,36 @@ bool readSpring(Bytes message, Spring& out) {
 }
 
 bool readGust(Bytes message, Gust& out) {
+  using F = field::Gust;
   out = {};
-  return readFields(message, [&](std::uint32_t field, Reader& reader) {
-    if (field == fixed32(1)) return setFinite(out.strength, reader);
-    return field == fixed32(2) ? setFinite(out.seconds, reader) : skip(reader);
+  return readFields(message, [&](std::uint32_t tag, Reader& reader) {
+    if (tag == F::kStrength.tag) return setFinite(out.strength, reader);
+    return tag == F::kSeconds.tag ? setFinite(out.seconds, reader) : skip(reader);
   });
 }
 
 bool readSelfCollision(Bytes message, std::optional<float>& radius, std::optional<float>& friction) {
-  return readFields(message, [&](std::uint32_t field, Reader& reader) {
-    if (field == fixed32(1)) return setFinite(radius, reader);
-    return field == fixed32(2) ? setFinite(friction, reader) : skip(reader);
+  using F = field::SelfCollision;
+  return readFields(message, [&](std::uint32_t tag, Reader& reader) {
+    if (tag == F::kRadius.tag) return setFinite(radius, reader);
+    return tag == F::kFriction.tag ? setFinite(friction, reader) : skip(reader);
   });
 }
 
 bool readTethers(Bytes message, std::optional<float>& slack) {
-  return readFields(message, [&](std::uint32_t field, Reader& reader) {
-    return field == fixed32(1) ? setFinite(slack, reader) : skip(reader);
+  using F = field::Tethers;
+  return readFields(message, [&](std::uint32_t tag, Reader& reader) {
+    return tag == F::kSlack.tag ? setFinite(slack, reader) : skip(reader);
   });
 }
 
 // A kind that this client does not know keeps its number and its settings.
 bool readSolver(Bytes message, Solver& out) {
   out = {};
-  return readFields(message, [&](std::uint32_t field, Reader& reader) {
-    if (field % 8 != bytes(0) % 8) return skip(reader);
+  return readFields(message, [&](std::uint32_t tag, Reader& reader) {
+    if (tag % 8 != static_cast<std::uint32_t>(field::WireType::kBytes)) return skip(reader);
     const Bytes settings = reader.get_view();
-    out.kind = field / 8;
+    out.kind = tag / 8;
     out.settings.assign(settings.data(), settings.size());
     switch (out.kind) {
       case CS_SOLVER_CONSTRAINT:
