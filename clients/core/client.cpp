@@ -36,7 +36,7 @@ void Client::connecting(std::uint64_t nowUs) {
   assembly_ = {};
   keyFrameRequest_ = {};
   ++greeting_.attempt;
-  connectAtUs_ = reconnection_.attemptEnd(nowUs, std::uint64_t{1000} * welcome_.holdMs);
+  connectAtUs_ = reconnection_.attemptEnd(nowUs, std::uint64_t{1000} * welcome_.graceMs);
   greet();
 }
 
@@ -47,7 +47,7 @@ void Client::disconnected(std::uint64_t nowUs) {
   outbox_.clear();
   std::uint64_t seed = 0;
   for (const char byte : greeting_.token) seed = seed * 257 + static_cast<unsigned char>(byte);
-  connectAtUs_ = reconnection_.lost(nowUs, std::uint64_t{1000} * welcome_.holdMs, seed);
+  connectAtUs_ = reconnection_.lost(nowUs, std::uint64_t{1000} * welcome_.graceMs, seed);
 }
 
 std::uint64_t Client::connectAtUs() const {

@@ -54,9 +54,10 @@ void Client::sendPoses(std::uint64_t nowUs) {
   if (state_ == CS_STATE_FAILED || !isConnected()) return;
   const std::uint64_t serverUs = clock_.serverTimeUs(nowUs);
   if (mayCollide()) return writeColliderPoses(outbox_.poses(), poses_, nowUs, serverUs);
-  Poses seen;
-  seen.wantsContacts = poses_.wantsContacts;
-  writeColliderPoses(outbox_.poses(), seen, nowUs, serverUs);
+  // A viewer sends no poses, only whether it wants contact events.
+  Poses none;
+  none.wantsContacts = poses_.wantsContacts;
+  writeColliderPoses(outbox_.poses(), none, nowUs, serverUs);
 }
 
 bool Client::setPlayOut(const cs_play_out_options* options) {

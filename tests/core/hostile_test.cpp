@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 
+#include "clients/core/wire/server_message.h"
 #include "clients/core/wire/wire.h"
 #include "tests/core/scripted_server.h"
 
@@ -59,14 +60,14 @@ void readAll(ClientUnderTest& client) {
   client.outgoing();
 }
 
-// Sends the messages with message `index` replaced by `spoilt`.
-void runSession(const std::vector<std::string>& messages, std::size_t index, const std::string& spoilt) {
+// Sends the messages with message `index` replaced by `corrupted`.
+void runSession(const std::vector<std::string>& messages, std::size_t index, const std::string& corrupted) {
   ClientUnderTest client;
   cs_play_out_options options;
   cs_default_play_out(&options);
   cs_set_play_out(client.get(), &options);
   for (std::size_t i = 0; i < messages.size(); ++i) {
-    client.receive(i == index ? spoilt : messages[i], i * 1000);
+    client.receive(i == index ? corrupted : messages[i], i * 1000);
     cs_update(client.get(), i * 1000);
     cs_play_out(client.get(), i * 1000, i * 1000, nullptr);
   }
@@ -85,9 +86,9 @@ TEST(Hostile, SurvivesEveryFlippedBitOfEveryMessage) {
   const std::vector<std::string> messages = session();
   for (std::size_t i = 0; i < messages.size(); ++i) {
     for (std::size_t bit = 0; bit < 8 * messages[i].size(); ++bit) {
-      std::string spoilt = messages[i];
-      spoilt[bit / 8] = static_cast<char>(spoilt[bit / 8] ^ (1 << (bit % 8)));
-      runSession(messages, i, spoilt);
+      std::string corrupted = messages[i];
+      corrupted[bit / 8] = static_cast<char>(corrupted[bit / 8] ^ (1 << (bit % 8)));
+      runSession(messages, i, corrupted);
     }
   }
 }
@@ -100,10 +101,10 @@ TEST(Hostile, SurvivesRandomBytesAtRandomPlaces) {
   };
   for (int run = 0; run < 5000; ++run) {
     const std::size_t index = below(messages.size());
-    std::string spoilt = messages[index];
-    for (std::size_t changes = 1 + below(8); changes > 0 && !spoilt.empty(); --changes)
-      spoilt[below(spoilt.size())] = static_cast<char>(below(256));
-    runSession(messages, index, spoilt);
+    std::string corrupted = messages[index];
+    for (std::size_t changes = 1 + below(8); changes > 0 && !corrupted.empty(); --changes)
+      corrupted[below(corrupted.size())] = static_cast<char>(below(256));
+    runSession(messages, index, corrupted);
   }
 }
 
@@ -111,7 +112,7 @@ TEST(Hostile, MalformedMessageFailsTheClientWithAReason) {
   ClientUnderTest client;
   EXPECT_EQ(client.receive("HTTP/1.1 400 Bad Request\r\n"), static_cast<std::uint32_t>(CS_EVENT_ERROR));
   EXPECT_EQ(cs_get_state(client.get()), CS_STATE_FAILED);
-  EXPECT_THAT(cs_error_text(client.get()), HasSubstr("is it a clothstream-server"));
+  EXPECT_THAT(cs_error_text(client.get()), HasSubstr("is a clothstream-server"));
   EXPECT_EQ(client.receive(ScriptedServer().welcome()), 0u) << "a failed client ignores messages";
 }
 
@@ -129,6 +130,17 @@ TEST(Hostile, SkipsUnknownFieldsAndBodies) {
   client.receive(server.welcome() + unknown);
   client.receive(server.chunks()[0] + unknown);
   EXPECT_EQ(client.receive(server.frame(1) + unknown), static_cast<std::uint32_t>(CS_EVENT_FRAME));
+}
+
+TEST(Hostile, SkipsKnownFieldsWithAnotherWireType) {
+  v1::Frame sent = ScriptedServer().frameMessage(1, codec::PacketKind::key);
+  sent.set_tick_time_us(5);
+  // Field 1 (bytes) as a varint, field 2 (a varint) as 64 bits.
+  const std::string bytes = sent.SerializeAsString() + "\x08\x07\x11" + "12345678";
+  Frame read;
+  ASSERT_TRUE(readFrame(Bytes(bytes), read));
+  EXPECT_EQ(read.tickTimeUs, 5u);
+  EXPECT_EQ(std::string(read.packet), sent.packet());
 }
 
 TEST(Interface, NoExceptionLeavesIt) {

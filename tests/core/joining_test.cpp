@@ -131,7 +131,7 @@ TEST(Joining, ReturnsTrianglesTextureCoordinatesAndSubmeshesOfAMesh) {
 TEST(Joining, RefusesInconsistentMeshes) {
   struct Wrong {
     const char* says;
-    void (*spoil)(v1::ClothDescription&);
+    void (*corrupt)(v1::ClothDescription&);
   };
   const Wrong cases[] = {
       {"triangles are not whole numbers", [](auto& c) { c.set_triangles("abc"); }},
@@ -165,7 +165,7 @@ TEST(Joining, RefusesInconsistentMeshes) {
   for (const Wrong& wrong : cases) {
     ScriptedServer server({.cloths = {{"a", 2, 2}, {"b", 2, 2}}});
     v1::StreamDescription description = withMesh(server);
-    wrong.spoil(*description.mutable_cloths(1));
+    wrong.corrupt(*description.mutable_cloths(1));
     ClientUnderTest client;
     client.receive(server.welcome());
     client.receiveAll(chunksOf(description.SerializeAsString(), 1000, 1));
@@ -241,7 +241,7 @@ TEST(Joining, RefusesFramesAndDescriptionsOutOfOrder) {
 
 struct WrongDescription {
   const char* name;
-  void (*spoil)(v1::StreamDescription&);
+  void (*corrupt)(v1::StreamDescription&);
   const char* says;
 };
 
@@ -254,7 +254,7 @@ class Descriptions : public ::testing::TestWithParam<WrongDescription> {};
 TEST_P(Descriptions, AreRefusedWithAReason) {
   ScriptedServer server;
   v1::StreamDescription description = server.description();
-  GetParam().spoil(description);
+  GetParam().corrupt(description);
   ClientUnderTest client;
   client.receive(server.welcome());
   client.receiveAll(chunksOf(description.SerializeAsString(), 1000, 1));

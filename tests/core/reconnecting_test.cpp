@@ -77,7 +77,7 @@ class Reconnecting : public ::testing::Test {
       all.emplace_back(participant.name);
     return all;
   }
-  void hold(float x) {
+  void setCollider(float x) {
     const float sphere[] = {x, 0, 0, 0.1f};
     cs_set_colliders(client.get(), sphere, 1, now);
     cs_grab grab{};
@@ -139,10 +139,10 @@ TEST_F(Reconnecting, SendsRoleChangesAndRemovals) {
 
 TEST_F(Reconnecting, ReturnsWithTokenAndRepeatsPoses) {
   join();
-  hold(1);
+  setCollider(1);
   client.outgoing();
   cutOff();
-  hold(2);  // not sent while disconnected
+  setCollider(2);  // not sent while disconnected
   EXPECT_THAT(client.outgoing(), IsEmpty());
   EXPECT_EQ(cs_vertex_count(client.get()), 63u);  // the last description can still be read
   const v1::Hello hello = connect();
@@ -196,7 +196,7 @@ TEST_F(Reconnecting, OffersNoDescriptionIfCutOffBeforeTheNewOne) {
 
 TEST_F(Reconnecting, JoinsARestartedServerAsNewParticipant) {
   join();
-  hold(1);
+  setCollider(1);
   client.outgoing();
   cutOff();
   connect();
@@ -233,11 +233,11 @@ TEST_F(Reconnecting, RetriesAtOnceThenOftenThenRarely) {
     cs_disconnected(client.get(), now);
     const std::uint64_t delay = cs_connect_at(client.get()) - now;
     if (now < lost + 60 * kSecond) {
-      EXPECT_LE(delay, Reconnection::kLongestHeldUs);
+      EXPECT_LE(delay, Reconnection::kLongestInGraceUs);
       longest = std::max(longest, delay);
     } else {
       EXPECT_LE(delay, Reconnection::kLongestUs);
-      EXPECT_GE(delay, Reconnection::kLongestHeldUs);
+      EXPECT_GE(delay, Reconnection::kLongestInGraceUs);
     }
     EXPECT_GE(delay, Reconnection::kShortestUs / 2);
     if (attempts == 0) {
@@ -246,7 +246,7 @@ TEST_F(Reconnecting, RetriesAtOnceThenOftenThenRarely) {
     before = delay;
     now += delay;
   }
-  EXPECT_GT(longest, Reconnection::kLongestHeldUs * 3 / 4);
+  EXPECT_GT(longest, Reconnection::kLongestInGraceUs * 3 / 4);
   EXPECT_GE(before, Reconnection::kLongestUs / 2);
 }
 
@@ -334,7 +334,7 @@ TEST_F(Reconnecting, DropsRequestsWhileDisconnected) {
 
 TEST_F(Reconnecting, SendsPosesOfAViewerWhenItsRoleAllows) {
   join(v1::ROLE_VIEWER);
-  hold(1);
+  setCollider(1);
   cs_want_contacts(client.get(), 1, now);
   auto messages = client.outgoing();
   ASSERT_EQ(messages.size(), 1u);

@@ -32,9 +32,9 @@ Session streamOf(const std::string& name, ScriptedStream stream) {
   return session;
 }
 
-Session spoilt(const Session& session, std::mt19937& random, int run) {
+Session corrupted(const Session& session, std::mt19937& random, int run) {
   const auto below = [&](std::size_t bound) { return random() % bound; };
-  Session result{session.name + " spoilt " + std::to_string(run), session.messages};
+  Session result{session.name + " corrupted " + std::to_string(run), session.messages};
   std::string& message = result.messages[below(result.messages.size())];
   for (std::size_t changes = 1 + below(4); changes > 0; --changes) {
     if (below(4) == 0) message.resize(below(message.size() + 1));
@@ -140,7 +140,7 @@ std::vector<Session> recordedSessions() {
   std::mt19937 random(20);
   const std::size_t whole = sessions.size();
   for (int run = 0; run < 300; ++run)
-    sessions.push_back(spoilt(sessions[static_cast<std::size_t>(run) % whole], random, run));
+    sessions.push_back(corrupted(sessions[static_cast<std::size_t>(run) % whole], random, run));
   return sessions;
 }
 

@@ -9,17 +9,17 @@
 namespace clothstream::client {
 
 // Exponential back-off with jitter. Delays start at kShortestUs and double. During the server's reconnect
-// grace period they are at most kLongestHeldUs, so that a working network is noticed at once; later at most
-// kLongestUs. Up to half of each delay is subtracted at random, so that clients that lost their connection
-// together return at different times. All times are microseconds. The grace period (holdUs) is
+// grace period they are at most kLongestInGraceUs, so that a working network is noticed at once; later at
+// most kLongestUs. Up to half of each delay is subtracted at random, so that clients that lost their
+// connection together return at different times. All times are microseconds. The grace period (graceUs) is
 // Welcome.hold_ms.
 class Reconnection {
  public:
   static constexpr std::uint64_t kNever = std::numeric_limits<std::uint64_t>::max();
-  static constexpr std::uint64_t kShortestUs = 50'000, kLongestHeldUs = 120'000, kLongestUs = 5'000'000;
+  static constexpr std::uint64_t kShortestUs = 50'000, kLongestInGraceUs = 120'000, kLongestUs = 5'000'000;
   // Time limit of an attempt without Welcome. It is short in the grace period, because a recovering network
   // may have lost the first packets. Later it leaves time for slow networks.
-  static constexpr std::uint64_t kHeldAttemptUs = 2'000'000, kAttemptUs = 10'000'000;
+  static constexpr std::uint64_t kGraceAttemptUs = 2'000'000, kAttemptUs = 10'000'000;
   // A connection without any message for kSilenceUs is closed; servers answer pings. At most kLongestStepUs
   // of the time between two updates counts.
   static constexpr std::uint64_t kSilenceUs = 4'000'000, kLongestStepUs = 500'000;
@@ -27,25 +27,25 @@ class Reconnection {
   static constexpr std::uint64_t kStableUs = 2'000'000;
 
   // Returns when to try again. `seed` must differ between clients.
-  std::uint64_t lost(std::uint64_t nowUs, std::uint64_t holdUs, std::uint64_t seed) {
+  std::uint64_t lost(std::uint64_t nowUs, std::uint64_t graceUs, std::uint64_t seed) {
     if (joinedUs_ && nowUs - joinedUs_ >= kStableUs) attempts_ = 0;
     if (attempts_ == 0) lostUs_ = nowUs;
     joinedUs_ = 0;
     ++attempts_;
-    const std::uint64_t longest = isHeld(nowUs, holdUs) ? kLongestHeldUs : kLongestUs;
+    const std::uint64_t longest = inGracePeriod(nowUs, graceUs) ? kLongestInGraceUs : kLongestUs;
     const std::uint64_t delay =
         attempts_ == 1 ? 0 : std::min(longest, kShortestUs << std::min(attempts_ - 2, 20u));
     return nowUs + delay - jitter(delay / 2, seed + attempts_);
   }
   // Returns the time limit of an attempt that starts now.
-  std::uint64_t attemptEnd(std::uint64_t nowUs, std::uint64_t holdUs) const {
-    return nowUs + (isHeld(nowUs, holdUs) ? kHeldAttemptUs : kAttemptUs);
+  std::uint64_t attemptEnd(std::uint64_t nowUs, std::uint64_t graceUs) const {
+    return nowUs + (inGracePeriod(nowUs, graceUs) ? kGraceAttemptUs : kAttemptUs);
   }
   void joined(std::uint64_t nowUs) { joinedUs_ = std::max<std::uint64_t>(nowUs, 1); }
 
  private:
-  bool isHeld(std::uint64_t nowUs, std::uint64_t holdUs) const {
-    return attempts_ > 0 && nowUs - lostUs_ < holdUs;
+  bool inGracePeriod(std::uint64_t nowUs, std::uint64_t graceUs) const {
+    return attempts_ > 0 && nowUs - lostUs_ < graceUs;
   }
 
   // Pseudo-random number from 0 to `most`: splitmix64 of the seed.

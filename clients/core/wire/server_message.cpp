@@ -128,7 +128,7 @@ std::optional<Welcome> readWelcome(Bytes message) {
         return welcome.participants.size() < kMaxParticipants &&
                readParticipant(reader.get_view(), welcome.participants.emplace_back());
       case F::kHoldMs.tag:
-        return set(welcome.holdMs, reader.get_uint32());
+        return set(welcome.graceMs, reader.get_uint32());
       default:
         return skip(reader);
     }

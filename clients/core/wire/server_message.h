@@ -53,7 +53,7 @@ struct Welcome {
   std::string token;
   bool resumed = false;
   std::vector<Participant> participants;
-  std::uint32_t holdMs = 0;
+  std::uint32_t graceMs = 0;
 };
 
 struct Presence {
