@@ -134,7 +134,7 @@ TEST(Joining, RefusesInconsistentMeshes) {
     void (*corrupt)(v1::ClothDescription&);
   };
   const Wrong cases[] = {
-      {"triangles are not whole numbers", [](auto& c) { c.set_triangles("abc"); }},
+      {"the size of triangles is not a multiple of 4 bytes", [](auto& c) { c.set_triangles("abc"); }},
       {"a triangle names a vertex that is not there",
        [](auto& c) {
          c.set_triangles(littleEndian<std::uint32_t>({0, 1, 3, 0, 3, 4}));
@@ -160,7 +160,7 @@ TEST(Joining, RefusesInconsistentMeshes) {
        }},
       {"submeshes do not cover its 2 triangles",
        [](auto& c) { c.mutable_submeshes(0)->set_triangle_count(2); }},
-      {"no StreamDescription", [](auto& c) { c.mutable_submeshes(0)->set_triangle_count(4'000'000'000); }},
+      {"not a StreamDescription", [](auto& c) { c.mutable_submeshes(0)->set_triangle_count(4'000'000'000); }},
   };
   for (const Wrong& wrong : cases) {
     ScriptedServer server({.cloths = {{"a", 2, 2}, {"b", 2, 2}}});
