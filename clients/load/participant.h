@@ -11,8 +11,8 @@
 #include <string>
 #include <vector>
 
-#include "clients/core/acknowledgement.h"
 #include "clients/core/core.h"
+#include "clients/core/stream/frame_feedback.h"
 #include "clients/grpc/failure.h"
 #include "clients/load/link.h"
 #include "clients/load/pose_timing.h"

@@ -1,6 +1,23 @@
 // SPDX-License-Identifier: MIT
 // Typed interface to one client of the core: messages in and out, and the contents of the newest frame.
 
+import {
+  CS_CLOTH_REPORT_VERSION,
+  CS_CLOTH_SETTINGS_VERSION,
+  cs_cloth,
+  cs_cloth_parameters,
+  cs_cloth_report,
+  cs_cloth_settings,
+  cs_collider,
+  cs_environment,
+  cs_grab,
+  cs_grab_event,
+  cs_participant,
+  cs_play_out_options,
+  cs_playback,
+  cs_statistics,
+  cs_submesh,
+} from "./layout";
 import type { CoreModule } from "./wasm";
 
 export type Vec3 = readonly [number, number, number];
@@ -150,31 +167,21 @@ export interface Playback {
   paused: boolean;
 }
 
-// Sizes of the structs of core.h on a 32-bit machine.
-const kStatisticsBytes = 104;
-const kClothBytes = 28;
-const kColliderBytes = 64;
-const kEnvironmentBytes = 28;
-const kClothParametersBytes = 28;
-const kClothReportBytes = 56;
-const kClothReportVersion = 1;
-const kClothSettingsBytes = 92;
-const kClothSettingsVersion = 1;
-const kGrabBytes = 48;
-const kGrabEventBytes = 24;
-const kParticipantBytes = 24;
-const kSolverAt = 48; // in cs_cloth_settings
+// Bytes of the memory that the core writes structs to: enough for each of them.
 const kScratchBytes = Math.max(
-  kStatisticsBytes,
-  kClothBytes,
-  kColliderBytes,
-  kEnvironmentBytes,
-  kClothParametersBytes,
-  kClothReportBytes,
-  kClothSettingsBytes,
-  kGrabBytes,
-  kGrabEventBytes,
-  kParticipantBytes,
+  cs_statistics.sizeof,
+  cs_cloth.sizeof,
+  cs_submesh.sizeof,
+  cs_collider.sizeof,
+  cs_environment.sizeof,
+  cs_cloth_parameters.sizeof,
+  cs_cloth_report.sizeof,
+  cs_cloth_settings.sizeof,
+  cs_grab.sizeof,
+  cs_grab_event.sizeof,
+  cs_participant.sizeof,
+  cs_play_out_options.sizeof,
+  cs_playback.sizeof,
 );
 
 // A joining participant: displayed name, requested role, and whether frames are played out smoothly with a delay.
@@ -247,13 +254,13 @@ export class Client {
     const own = this.core.exports.cs_participant_id(this.handle);
     const count = this.core.exports.cs_participant_count(this.handle);
     return this.list(count, this.core.exports.cs_get_participant, (view, at) => {
-      const id = view.getBigUint64(at, true);
-      const program = this.core.text(view.getUint32(at + 12, true));
+      const id = view.getBigUint64(at + cs_participant.id, true);
+      const program = this.core.text(view.getUint32(at + cs_participant.client_name, true));
       return {
         id,
-        name: this.core.text(view.getUint32(at + 8, true)) || program || "unnamed",
-        role: view.getUint32(at + 16, true),
-        away: view.getInt32(at + 20, true) !== 0,
+        name: this.core.text(view.getUint32(at + cs_participant.name, true)) || program || "unnamed",
+        role: view.getUint32(at + cs_participant.role, true),
+        away: view.getInt32(at + cs_participant.away, true) !== 0,
         self: id === own,
       };
     });
@@ -293,20 +300,20 @@ export class Client {
   statistics(): Statistics {
     this.core.exports.cs_get_statistics(this.handle, nowUs(), this.scratch);
     const view = this.core.view();
-    const count = (index: number) => Number(view.getBigUint64(this.scratch + 8 * index, true));
-    const real = (index: number) => view.getFloat64(this.scratch + 8 * index, true);
+    const count = (offset: number) => Number(view.getBigUint64(this.scratch + offset, true));
+    const real = (offset: number) => view.getFloat64(this.scratch + offset, true);
     return {
-      tick: count(0),
-      frames: count(1),
-      keyFrames: count(2),
-      dropped: count(3),
-      decodeErrors: count(4),
-      bytes: count(5),
-      hashMismatches: count(6),
-      framesPerSecond: real(7),
-      kbitPerSecond: real(8),
-      bitsPerVertex: real(9),
-      roundTripMs: real(10),
+      tick: count(cs_statistics.tick),
+      frames: count(cs_statistics.frames),
+      keyFrames: count(cs_statistics.key_frames),
+      dropped: count(cs_statistics.dropped),
+      decodeErrors: count(cs_statistics.decode_errors),
+      bytes: count(cs_statistics.bytes),
+      hashMismatches: count(cs_statistics.hash_mismatches),
+      framesPerSecond: real(cs_statistics.frames_per_second),
+      kbitPerSecond: real(cs_statistics.kbit_per_second),
+      bitsPerVertex: real(cs_statistics.bits_per_vertex),
+      roundTripMs: real(cs_statistics.round_trip_ms),
     };
   }
 
@@ -340,13 +347,13 @@ export class Client {
 
   cloths(): ClothLayout[] {
     return this.list(this.core.exports.cs_cloth_count(this.handle), this.core.exports.cs_get_cloth, (view, at) => ({
-      name: this.core.text(view.getUint32(at, true)),
-      firstVertex: view.getUint32(at + 4, true),
-      vertexCount: view.getUint32(at + 8, true),
-      rows: view.getUint32(at + 12, true),
-      columns: view.getUint32(at + 16, true),
-      firstIndex: view.getUint32(at + 20, true),
-      indexCount: view.getUint32(at + 24, true),
+      name: this.core.text(view.getUint32(at + cs_cloth.name, true)),
+      firstVertex: view.getUint32(at + cs_cloth.first_vertex, true),
+      vertexCount: view.getUint32(at + cs_cloth.vertex_count, true),
+      rows: view.getUint32(at + cs_cloth.rows, true),
+      columns: view.getUint32(at + cs_cloth.columns, true),
+      firstIndex: view.getUint32(at + cs_cloth.first_index, true),
+      indexCount: view.getUint32(at + cs_cloth.index_count, true),
     }));
   }
 
@@ -362,9 +369,9 @@ export class Client {
       uvs: this.core.floats(uvs, 2 * uvCount).slice(),
       uvIndices: this.core.indices(uvIndices, indexCount).slice(),
       submeshes: this.list(exports.cs_submesh_count(this.handle, cloth), submesh, (view, at) => ({
-        name: this.core.text(view.getUint32(at, true)),
-        firstIndex: view.getUint32(at + 4, true),
-        indexCount: view.getUint32(at + 8, true),
+        name: this.core.text(view.getUint32(at + cs_submesh.name, true)),
+        firstIndex: view.getUint32(at + cs_submesh.first_index, true),
+        indexCount: view.getUint32(at + cs_submesh.index_count, true),
       })),
     };
   }
@@ -388,14 +395,14 @@ export class Client {
   ): Collider[] {
     return this.list(count, get, (view, at, index) => ({
       index,
-      name: this.core.text(view.getUint32(at, true)),
-      shape: view.getUint32(at + 4, true),
-      position: vec3(view, at + 8),
-      orientation: [...vec3(view, at + 20), view.getFloat32(at + 32, true)] as const,
-      radius: view.getFloat32(at + 36, true),
-      length: view.getFloat32(at + 40, true),
-      size: vec3(view, at + 44),
-      participantId: view.getBigUint64(at + 56, true),
+      name: this.core.text(view.getUint32(at + cs_collider.name, true)),
+      shape: view.getUint32(at + cs_collider.shape, true),
+      position: vec3(view, at + cs_collider.position),
+      orientation: quaternion(view, at + cs_collider.orientation),
+      radius: view.getFloat32(at + cs_collider.radius, true),
+      length: view.getFloat32(at + cs_collider.length, true),
+      size: vec3(view, at + cs_collider.size),
+      participantId: view.getBigUint64(at + cs_collider.participant_id, true),
     }));
   }
 
@@ -421,11 +428,11 @@ export class Client {
     if (this.core.exports.cs_get_environment(this.handle, this.scratch) === 0) return undefined;
     const view = this.core.view();
     return {
-      gravity: vec3(view, this.scratch),
-      wind: vec3(view, this.scratch + 12),
-      airDensity: view.getFloat32(this.scratch + 24, true),
-      gustStrength: view.getFloat32(this.scratch + 28, true),
-      gustSeconds: view.getFloat32(this.scratch + 32, true),
+      gravity: vec3(view, this.scratch + cs_environment.gravity),
+      wind: vec3(view, this.scratch + cs_environment.wind),
+      airDensity: view.getFloat32(this.scratch + cs_environment.air_density, true),
+      gustStrength: view.getFloat32(this.scratch + cs_environment.gust_strength, true),
+      gustSeconds: view.getFloat32(this.scratch + cs_environment.gust_seconds, true),
     };
   }
 
@@ -433,24 +440,24 @@ export class Client {
   clothParameters(): ClothParameters[] {
     const count = this.core.exports.cs_cloth_count(this.handle);
     return this.list(count, this.core.exports.cs_get_cloth_parameters, (view, at) => ({
-      structural: spring(view, at),
-      shear: spring(view, at + 8),
-      bend: spring(view, at + 16),
-      damping: view.getFloat32(at + 24, true),
+      structural: spring(view, at + cs_cloth_parameters.structural),
+      shear: spring(view, at + cs_cloth_parameters.shear),
+      bend: spring(view, at + cs_cloth_parameters.bend),
+      damping: view.getFloat32(at + cs_cloth_parameters.damping, true),
     }));
   }
 
   // Solver of a cloth as a cs_solver.
   solver(cloth: number): number {
-    this.core.view().setUint32(this.scratch, kClothSettingsVersion, true);
+    this.core.view().setUint32(this.scratch + cs_cloth_settings.version, CS_CLOTH_SETTINGS_VERSION, true);
     if (this.core.exports.cs_get_cloth_settings(this.handle, cloth, this.scratch) === 0) return 0;
-    return this.core.view().getUint32(this.scratch + kSolverAt, true);
+    return this.core.view().getUint32(this.scratch + cs_cloth_settings.solver, true);
   }
 
   // Selects a solver. The cloth keeps the settings that it last had for this solver, or the defaults.
   setSolver(cloth: string, solver: number): void {
     this.core.exports.cs_keep_cloth_settings(this.scratch);
-    this.core.view().setUint32(this.scratch + kSolverAt, solver, true);
+    this.core.view().setUint32(this.scratch + cs_cloth_settings.solver, solver, true);
     this.core.with([cloth], (name) => this.core.exports.cs_change_cloth(this.handle, name!, this.scratch));
   }
 
@@ -474,23 +481,23 @@ export class Client {
 
   // Newest report of a cloth; undefined before the first.
   report(cloth: number): ClothReport | undefined {
-    this.core.view().setUint32(this.scratch, kClothReportVersion, true);
+    this.core.view().setUint32(this.scratch + cs_cloth_report.version, CS_CLOTH_REPORT_VERSION, true);
     if (this.core.exports.cs_get_cloth_report(this.handle, cloth, this.scratch) === 0) return undefined;
     const view = this.core.view();
-    const real = (place: number) => view.getFloat32(this.scratch + 4 * place, true);
+    const real = (offset: number) => view.getFloat32(this.scratch + offset, true);
     return {
-      activeConstraints: view.getUint32(this.scratch + 4, true),
-      iterations: view.getUint32(this.scratch + 8, true),
-      residual: real(3),
-      strainMax: real(4),
-      strainP99: real(5),
-      strainMean: real(6),
-      kineticEnergy: real(7),
-      elasticEnergy: real(8),
-      gravityEnergy: real(9),
-      penetration: real(10),
-      deviceMs: real(11),
-      tick: Number(view.getBigUint64(this.scratch + 48, true)),
+      activeConstraints: view.getUint32(this.scratch + cs_cloth_report.active_constraints, true),
+      iterations: view.getUint32(this.scratch + cs_cloth_report.iterations, true),
+      residual: real(cs_cloth_report.residual),
+      strainMax: real(cs_cloth_report.strain_max),
+      strainP99: real(cs_cloth_report.strain_p99),
+      strainMean: real(cs_cloth_report.strain_mean),
+      kineticEnergy: real(cs_cloth_report.kinetic_energy),
+      elasticEnergy: real(cs_cloth_report.elastic_energy),
+      gravityEnergy: real(cs_cloth_report.gravity_energy),
+      penetration: real(cs_cloth_report.penetration),
+      deviceMs: real(cs_cloth_report.device_ms),
+      tick: Number(view.getBigUint64(this.scratch + cs_cloth_report.tick, true)),
     };
   }
 
@@ -515,9 +522,9 @@ export class Client {
       this.core.exports.cs_grab_event_count(this.handle),
       this.core.exports.cs_get_grab_event,
       (view, at) => ({
-        participant: view.getBigUint64(at, true),
-        grab: view.getUint32(at + 8, true),
-        vertices: view.getUint32(at + 16, true),
+        participant: view.getBigUint64(at + cs_grab_event.participant_id, true),
+        grab: view.getUint32(at + cs_grab_event.grab_id, true),
+        vertices: view.getUint32(at + cs_grab_event.vertices, true),
       }),
     );
     return events.filter(({ participant, vertices }) => participant === own && vertices === 0).map(({ grab }) => grab);
@@ -527,10 +534,13 @@ export class Client {
   setGrab(grab: { id: number; position: Vec3 } | undefined): void {
     const view = this.core.view();
     if (grab) {
-      view.setUint32(this.scratch, grab.id, true);
-      const turned = [0, 0, 0, 0];
-      const byDefault = [NaN, NaN, NaN, NaN]; // radius, reach, force, slip distance
-      [...grab.position, ...turned, ...byDefault].forEach((value, i) => view.setFloat32(this.scratch + 4 + 4 * i, value, true));
+      const set = (offset: number, values: readonly number[]) =>
+        values.forEach((value, i) => view.setFloat32(this.scratch + offset + 4 * i, value, true));
+      view.setUint32(this.scratch + cs_grab.id, grab.id, true);
+      set(cs_grab.position, grab.position);
+      set(cs_grab.orientation, [0, 0, 0, 0]); // not rotated
+      // NaN: the server's default.
+      for (const offset of [cs_grab.radius, cs_grab.reach, cs_grab.max_force, cs_grab.slip_distance]) set(offset, [NaN]);
     }
     this.core.exports.cs_set_grabs(this.handle, this.scratch, grab ? 1 : 0, nowUs());
   }
@@ -547,11 +557,11 @@ export class Client {
     if (this.core.exports.cs_get_playback(this.handle, nowUs(), this.scratch) === 0) return undefined;
     const view = this.core.view();
     return {
-      length: view.getFloat64(this.scratch, true),
-      position: view.getFloat64(this.scratch + 8, true),
-      speed: view.getFloat64(this.scratch + 16, true),
-      loop: view.getInt32(this.scratch + 24, true) !== 0,
-      paused: view.getInt32(this.scratch + 28, true) !== 0,
+      length: view.getFloat64(this.scratch + cs_playback.length, true),
+      position: view.getFloat64(this.scratch + cs_playback.position, true),
+      speed: view.getFloat64(this.scratch + cs_playback.speed, true),
+      loop: view.getInt32(this.scratch + cs_playback.loop, true) !== 0,
+      paused: view.getInt32(this.scratch + cs_playback.paused, true) !== 0,
     };
   }
 
@@ -592,6 +602,10 @@ function nowUs(): bigint {
 
 function vec3(view: DataView, at: number): Vec3 {
   return [view.getFloat32(at, true), view.getFloat32(at + 4, true), view.getFloat32(at + 8, true)];
+}
+
+function quaternion(view: DataView, at: number): readonly [number, number, number, number] {
+  return [...vec3(view, at), view.getFloat32(at + 12, true)];
 }
 
 function spring(view: DataView, at: number): Spring {
