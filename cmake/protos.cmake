@@ -1,5 +1,5 @@
-# clothstream_protos: the messages as a library (C++ in <build>/proto). clothstream_protos_grpc: the service too.
-# clothstream_protos_health: gRPC's service of health checks.
+# Libraries: clothstream_protos holds the messages, clothstream_protos_grpc also our gRPC service, and
+# clothstream_protos_health gRPC's health service. Generated sources are in <build>/proto_generated.
 find_package(Protobuf REQUIRED)
 set(protoOut ${PROJECT_BINARY_DIR}/proto_generated)
 set(protoNames recording scene session)
@@ -16,7 +16,8 @@ endforeach()
 add_library(clothstream_protos STATIC ${messageSources})
 set_target_properties(clothstream_protos PROPERTIES UNITY_BUILD OFF) # generated files repeat names
 target_include_directories(clothstream_protos SYSTEM PUBLIC ${protoOut})
-# Programs with the property CLOTHSTREAM_STATIC_PROTOBUF carry it; they cannot have gRPC, which needs the shared one.
+# Programs with the property CLOTHSTREAM_STATIC_PROTOBUF link protobuf statically. They cannot use gRPC, which links the
+# shared library.
 find_library(CLOTHSTREAM_PROTOBUF_ARCHIVE libprotobuf.a REQUIRED)
 target_link_libraries(clothstream_protos PUBLIC
   $<IF:$<BOOL:$<TARGET_PROPERTY:CLOTHSTREAM_STATIC_PROTOBUF>>,${CLOTHSTREAM_PROTOBUF_ARCHIVE},protobuf::libprotobuf>)

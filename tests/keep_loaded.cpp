@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Linked into what the address sanitizer watches: drivers and layers stay loaded until the program ends. Once
-// they are gone, what their own variables still point at looks lost (Mesa's table of the caches of AMD
-// processors does), and no suppression can name a library that is no longer there.
+// Keeps Vulkan drivers and layers loaded until the program ends, for programs with the address sanitizer. After
+// dlclose(), memory that a driver's variables point at counts as leaked (for example Mesa's table of caches of AMD
+// processors), and a suppression cannot name a library that is not loaded.
 
 extern "C" int dlclose(void* /*library*/) noexcept {
   return 0;

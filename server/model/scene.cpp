@@ -34,8 +34,8 @@ std::uint32_t Scene::nodeCount() const {
   return sum;
 }
 
-float takenBack(const Solver& solver) {
-  return solver.takenBack.value_or(solver.kind == SolverKind::acad ? kTakenBack : 1.0f);
+float correctionFraction(const Solver& solver) {
+  return solver.correctionFraction.value_or(solver.kind == SolverKind::acad ? kCorrectionFraction : 1.0f);
 }
 
 bool isAssembled(const Solver& solver) {

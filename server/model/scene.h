@@ -70,13 +70,13 @@ struct Solver {
   float activation = 0.1f;
   // The part of what a spring is too long already that a substep takes back (Baumgarte's stabilisation); of
   // `constraint` also of what it is too short. All of it gives the nodes that speed. Absent: all for
-  // `constraint`, kTakenBack for acad.
-  std::optional<float> takenBack = {};
+  // `constraint`, kCorrectionFraction for acad.
+  std::optional<float> correctionFraction = {};
   ConstraintPath path = ConstraintPath::matrixFree;  // of `constraint`
 };
 
-inline constexpr float kTakenBack = 0.15f;
-float takenBack(const Solver& solver);
+inline constexpr float kCorrectionFraction = 0.15f;
+float correctionFraction(const Solver& solver);
 
 // Whether its system is one of sparse matrices.
 bool isAssembled(const Solver& solver);
@@ -95,7 +95,7 @@ inline constexpr float kNeighbours = 1.1f;
 // How often a substep looks who touches and puts them apart. The part of an overlap that is taken back each
 // time, and the most speed that balls get for that, m/s.
 inline constexpr int kContactIterations = 2;
-inline constexpr float kOverlapTakenBack = 0.5f;
+inline constexpr float kOverlapCorrectionFraction = 0.5f;
 inline constexpr float kPushOutSpeed = 3;
 
 struct Mesh;  // mesh.h

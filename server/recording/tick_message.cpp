@@ -42,7 +42,7 @@ void writeCloths(const model::Scene& scene, v1::RecordedTick& message) {
     v1::ClothParameters& to = *message.add_cloths();
     to.mutable_cloth()->Swap(parameters.mutable_cloths(static_cast<int>(i)));
     to.mutable_cloth()->clear_grid();
-    if (const auto& takenBack = bare.cloths[i].solver.takenBack) to.set_taken_back(*takenBack);
+    if (const auto& correctionFraction = bare.cloths[i].solver.correctionFraction) to.set_taken_back(*correctionFraction);
   }
 }
 
@@ -218,7 +218,7 @@ tl::expected<std::vector<model::Cloth>, std::string> toCloths(const v1::Recorded
   if (!scene) return tl::unexpected(fmt::format("tick {}: {}", message.tick(), scene.error().text));
   for (int i = 0; i < message.cloths_size(); ++i)
     if (message.cloths(i).has_taken_back())
-      scene->cloths[static_cast<std::size_t>(i)].solver.takenBack = message.cloths(i).taken_back();
+      scene->cloths[static_cast<std::size_t>(i)].solver.correctionFraction = message.cloths(i).taken_back();
   return std::move(scene->cloths);
 }
 

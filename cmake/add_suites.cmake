@@ -1,0 +1,25 @@
+# Run by ctest: adds each GoogleTest suite of `program` as one test with `labels` and `environment`. A process for each suite
+# starts the device once, where a process for each test would take twice the time. Tests whose names match a pattern of the
+# environment variable CLOTHSTREAM_LEAVE_OUT (separated by colons, with wildcards) are not run.
+if(NOT EXISTS ${program})
+  add_test(${name}_is_not_built ${program})
+  return()
+endif()
+execute_process(COMMAND ${program} --gtest_list_tests WORKING_DIRECTORY ${directory} OUTPUT_VARIABLE listing
+  RESULT_VARIABLE result TIMEOUT 60)
+if(NOT result EQUAL 0)
+  message(FATAL_ERROR "${program} --gtest_list_tests failed: ${result}\n${listing}")
+endif()
+set(leftOut "")
+if(DEFINED ENV{CLOTHSTREAM_LEAVE_OUT})
+  set(leftOut "-$ENV{CLOTHSTREAM_LEAVE_OUT}")
+endif()
+# A suite's line is its name and a dot; a comment follows for parametrised and typed suites.
+string(REGEX MATCHALL "(^|\n)[A-Za-z0-9_/]+\\." suites "${listing}")
+foreach(suite IN LISTS suites)
+  string(STRIP "${suite}" suite)
+  string(REGEX REPLACE "\\.$" "" suite "${suite}")
+  add_test(${suite} ${program} --gtest_filter=${suite}.*${leftOut} --gtest_brief=1)
+  set_tests_properties(${suite} PROPERTIES LABELS "${labels}" ENVIRONMENT "${environment}" TIMEOUT 900
+    WORKING_DIRECTORY ${directory})
+endforeach()

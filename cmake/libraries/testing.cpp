@@ -1,0 +1,2 @@
+// SPDX-License-Identifier: MIT
+// Owner of the precompiled header that all test programs share (cmake/options.cmake).
