@@ -22,7 +22,7 @@ namespace clothstream::endpoint {
 class Call;
 
 // The loop's thread alone touches it, but for the loop.
-struct EndpointContext {
+struct GrpcEndpointContext {
   stream::SceneServer& server;
   const std::shared_ptr<CompletionLoop> loop;
   const std::size_t maxStreams;
@@ -53,7 +53,7 @@ class Call : public std::enable_shared_from_this<Call> {
   }
 
  protected:
-  explicit Call(EndpointContext& endpoint) : endpoint_(endpoint) {}
+  explicit Call(GrpcEndpointContext& endpoint) : endpoint_(endpoint) {}
 
   // An operation of a call, and what the call does next.
   template <typename Derived>
@@ -87,7 +87,7 @@ class Call : public std::enable_shared_from_this<Call> {
   // Nothing will be begun any more.
   void over() { isOver_ = true; }
 
-  EndpointContext& endpoint_;
+  GrpcEndpointContext& endpoint_;
   grpc::ServerContext context_;
 
  private:
@@ -102,7 +102,7 @@ class Call : public std::enable_shared_from_this<Call> {
 
 // Waits for the next call of a kind.
 template <typename Kind, typename... Arguments>
-void await(EndpointContext& endpoint, Arguments&&... arguments) {
+void await(GrpcEndpointContext& endpoint, Arguments&&... arguments) {
   const auto call = std::make_shared<Kind>(endpoint, std::forward<Arguments>(arguments)...);
   endpoint.calls.insert(call);
   call->await();

@@ -97,7 +97,7 @@ struct GrpcEndpoint::State {
   HealthService health;
   int port = 0;
   std::unique_ptr<grpc::Server> server;
-  std::optional<EndpointContext> context;
+  std::optional<GrpcEndpointContext> context;
   boost::asio::thread_pool questions{1};  // those that take longer than a frame may wait
 
   State(stream::SceneServer& scenes, const GrpcEndpointOptions& options) {
@@ -110,7 +110,7 @@ struct GrpcEndpoint::State {
     const auto loop = std::make_shared<CompletionLoop>(builder.AddCompletionQueue());
     server = builder.BuildAndStart();
     if (!server || port == 0) throw std::runtime_error(whyNotListening(options.host, options.port));
-    context.emplace(EndpointContext{scenes, loop, options.maxStreams});
+    context.emplace(GrpcEndpointContext{scenes, loop, options.maxStreams});
     offerService(*context, service, questions);
     offerHealth(*context, health);
     loop->start();

@@ -41,7 +41,7 @@ tl::expected<HealthCheckResponse, v1::Error> check(const HealthCheckRequest& req
 // One who watches: told once that all is well, and once more when the endpoint closes.
 class HealthWatch final : public Call {
  public:
-  HealthWatch(EndpointContext& endpoint, HealthService& service) : Call(endpoint), service_(service) {}
+  HealthWatch(GrpcEndpointContext& endpoint, HealthService& service) : Call(endpoint), service_(service) {}
 
   void await() {
     context_.AsyncNotifyWhenDone(&ended_);
@@ -107,7 +107,7 @@ class HealthWatch final : public Call {
 
 }  // namespace
 
-void offerHealth(EndpointContext& endpoint, HealthService& service) {
+void offerHealth(GrpcEndpointContext& endpoint, HealthService& service) {
   offer(endpoint, service, &HealthService::RequestCheck,
         [](const auto& request, auto answer) { answer(check(request)); });
   await<HealthWatch>(endpoint, service);

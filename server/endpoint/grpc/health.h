@@ -14,6 +14,6 @@ using HealthService = grpc::health::v1::Health::WithAsyncMethod_Check<
     grpc::health::v1::Health::WithAsyncMethod_Watch<grpc::health::v1::Health::Service>>;
 
 // Answers all its calls, for as long as the endpoint is open.
-void offerHealth(EndpointContext& endpoint, HealthService& service);
+void offerHealth(GrpcEndpointContext& endpoint, HealthService& service);
 
 }  // namespace clothstream::endpoint

@@ -18,7 +18,7 @@ namespace clothstream::endpoint {
 // One read and one write under way at most.
 class JoinStream final : public Call {
  public:
-  JoinStream(EndpointContext& endpoint, Service& service) : Call(endpoint), service_(service) {}
+  JoinStream(GrpcEndpointContext& endpoint, Service& service) : Call(endpoint), service_(service) {}
 
   void await();
 

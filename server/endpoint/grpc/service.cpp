@@ -11,7 +11,7 @@
 
 namespace clothstream::endpoint {
 
-void offerService(EndpointContext& endpoint, Service& service, boost::asio::thread_pool& questions) {
+void offerService(GrpcEndpointContext& endpoint, Service& service, boost::asio::thread_pool& questions) {
   stream::SceneServer& server = endpoint.server;
   offer(endpoint, service, &Service::RequestListScenes,
         [&server](const auto&, auto answer) { answer(server.listScenes()); });

@@ -18,6 +18,6 @@ using Service = v1::ClothStream::WithRawMethod_Join<
 
 // Answers all its calls, for as long as the endpoint is open; on a thread of `questions` where that may take
 // long.
-void offerService(EndpointContext& endpoint, Service& service, boost::asio::thread_pool& questions);
+void offerService(GrpcEndpointContext& endpoint, Service& service, boost::asio::thread_pool& questions);
 
 }  // namespace clothstream::endpoint

@@ -27,7 +27,7 @@ class UnaryCall final : public Call {
   using Answer = std::function<void(tl::expected<Response, v1::Error>)>;
   using Handler = std::function<void(const Request&, Answer)>;
 
-  UnaryCall(EndpointContext& endpoint, Take take, Handler handler)
+  UnaryCall(GrpcEndpointContext& endpoint, Take take, Handler handler)
       : Call(endpoint), take_(std::move(take)), handler_(std::move(handler)) {}
 
   void await() {
@@ -73,7 +73,7 @@ class UnaryCall final : public Call {
 
 // Waits for calls of a method of `service`, for as long as the endpoint is open: `take` is its Request... .
 template <typename Service, typename Method, typename Request, typename Response, typename Handler>
-void offer(EndpointContext& endpoint, Service& service,
+void offer(GrpcEndpointContext& endpoint, Service& service,
            void (Method::*take)(grpc::ServerContext*, Request*, grpc::ServerAsyncResponseWriter<Response>*,
                                 grpc::CompletionQueue*, grpc::ServerCompletionQueue*, void*),
            Handler handler) {

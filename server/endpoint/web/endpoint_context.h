@@ -20,7 +20,7 @@ namespace clothstream::endpoint {
 
 class StreamSession;
 
-struct EndpointContext {
+struct WebEndpointContext {
   stream::SceneServer& server;
   boost::asio::io_context& io;
   const Page page;
@@ -34,13 +34,13 @@ struct EndpointContext {
 // Counts one connection as long as it lives; handed on when HTTP becomes WebSocket.
 class ConnectionSlot {
  public:
-  explicit ConnectionSlot(EndpointContext& endpoint) : endpoint_(endpoint) { ++endpoint_.connections; }
+  explicit ConnectionSlot(WebEndpointContext& endpoint) : endpoint_(endpoint) { ++endpoint_.connections; }
   ~ConnectionSlot() { --endpoint_.connections; }
   ConnectionSlot(const ConnectionSlot&) = delete;
   ConnectionSlot& operator=(const ConnectionSlot&) = delete;
 
  private:
-  EndpointContext& endpoint_;
+  WebEndpointContext& endpoint_;
 };
 
 }  // namespace clothstream::endpoint

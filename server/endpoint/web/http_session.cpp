@@ -54,7 +54,7 @@ bool originAllowed(const Request& request, const std::vector<std::string>& allow
 
 }  // namespace
 
-HttpSession::HttpSession(boost::asio::ip::tcp::socket&& socket, EndpointContext& endpoint)
+HttpSession::HttpSession(boost::asio::ip::tcp::socket&& socket, WebEndpointContext& endpoint)
     : endpoint_(endpoint),
       slot_(std::make_unique<ConnectionSlot>(endpoint)),
       beyondLimit_(endpoint.connections > endpoint.maxConnections),

@@ -23,7 +23,7 @@ inline constexpr std::size_t kMaxHeaderBytes = 16 * 1024;
 // Lives as long as an operation of its socket is pending. All on the io thread.
 class HttpSession : public std::enable_shared_from_this<HttpSession> {
  public:
-  HttpSession(boost::asio::ip::tcp::socket&& socket, EndpointContext& endpoint);
+  HttpSession(boost::asio::ip::tcp::socket&& socket, WebEndpointContext& endpoint);
 
   void read();
 
@@ -39,7 +39,7 @@ class HttpSession : public std::enable_shared_from_this<HttpSession> {
   void onWritten(boost::beast::error_code error);
   void drain();
 
-  EndpointContext& endpoint_;
+  WebEndpointContext& endpoint_;
   std::unique_ptr<ConnectionSlot> slot_;
   const bool beyondLimit_;
   boost::beast::tcp_stream socket_;

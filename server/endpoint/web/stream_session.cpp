@@ -59,7 +59,7 @@ ws::close_reason reasonOf(const stream::SharedBytes& last) {
 
 }  // namespace
 
-StreamSession::StreamSession(beast::tcp_stream&& socket, EndpointContext& endpoint,
+StreamSession::StreamSession(beast::tcp_stream&& socket, WebEndpointContext& endpoint,
                              std::unique_ptr<ConnectionSlot> slot)
     : endpoint_(endpoint), slot_(std::move(slot)), socket_(std::move(socket)), closingTimer_(endpoint.io) {
   socket_.binary(true);

@@ -23,7 +23,7 @@ namespace clothstream::endpoint {
 // is pending.
 class StreamSession : public std::enable_shared_from_this<StreamSession> {
  public:
-  StreamSession(boost::beast::tcp_stream&& socket, EndpointContext& endpoint,
+  StreamSession(boost::beast::tcp_stream&& socket, WebEndpointContext& endpoint,
                 std::unique_ptr<ConnectionSlot> slot);
 
   void accept(boost::beast::http::request<boost::beast::http::empty_body>&& request);
@@ -45,7 +45,7 @@ class StreamSession : public std::enable_shared_from_this<StreamSession> {
   void endSoon();
   void end();
 
-  EndpointContext& endpoint_;
+  WebEndpointContext& endpoint_;
   std::unique_ptr<ConnectionSlot> slot_;
   // Without permessage-deflate: frames are compressed already.
   boost::beast::websocket::stream<boost::beast::tcp_stream, false> socket_;

@@ -60,7 +60,7 @@ void sendFresh(tcp::socket& socket) {
 }  // namespace
 
 struct WebEndpoint::State {
-  EndpointContext context;  // outlives the sessions, which die with the io context
+  WebEndpointContext context;  // outlives the sessions, which die with the io context
   net::io_context io{1};
   tcp::acceptor acceptor;
   net::steady_timer timer{io};
