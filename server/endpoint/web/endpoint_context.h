@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What the sessions of one endpoint share; the endpoint's io thread alone touches it.
+// State that the sessions of one endpoint share. Belongs to the endpoint's io thread.
 #pragma once
 
 #include <cstddef>
@@ -31,7 +31,7 @@ struct WebEndpointContext {
   bool stopping = false;
 };
 
-// Counts one connection as long as it lives; handed on when HTTP becomes WebSocket.
+// Counts one connection while it lives. Passes to the WebSocket when HTTP is upgraded.
 class ConnectionSlot {
  public:
   explicit ConnectionSlot(WebEndpointContext& endpoint) : endpoint_(endpoint) { ++endpoint_.connections; }
