@@ -66,7 +66,7 @@ tl::expected<std::uint32_t, Complaint> writeGltf(const ExportOptions& options) {
   });
   if (!frames) return frames;
   const bool text = std::filesystem::path(options.out).extension() == ".gltf";
-  const std::string gltf = text ? animation.toGltf() : animation.toGlb();
+  const std::string gltf = animation.finish(!text);
   if (gltf.empty()) return complaint(kUsage, "{} would have more than 4 GiB: take fewer frames", options.out);
   auto file = orComplaint(kNotWritten, recording::OutputFile::create(options.out));
   if (!file) return tl::unexpected(file.error());

@@ -1,8 +1,5 @@
 // SPDX-License-Identifier: MIT
-// tinyobjloader and tinygltf, compiled in from their headers: programs that are carried to other machines
-// cannot count on Debian's shared ones.
+// tinyobjloader, compiled from its header. Debian's shared library is not available on machines that programs are
+// carried to.
 #define TINYOBJLOADER_IMPLEMENTATION
 #include <tiny_obj_loader.h>
-
-#define TINYGLTF_IMPLEMENTATION
-#include <tiny_gltf.h>
