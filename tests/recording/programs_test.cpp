@@ -116,9 +116,9 @@ TEST_F(RecordingPrograms, RecordAStreamCompletelyWithKeyFrames) {
   ASSERT_EQ(recorded.code, 0) << recorded.errors;
   const Ended info = clothstream({"info", path});
   EXPECT_EQ(info.code, 0) << info.output << info.errors;
-  EXPECT_THAT(info.output, HasSubstr("; 0 not what the server held"));
+  EXPECT_THAT(info.output, HasSubstr("; 0 differ from the server's"));
   EXPECT_THAT(info.output, HasSubstr("all checksums match"));
-  EXPECT_THAT(clothstream({"info", "--quick", path}).output, HasSubstr("index     whole"));
+  EXPECT_THAT(clothstream({"info", "--quick", path}).output, HasSubstr("index     complete"));
   EXPECT_THAT(clothstream({"info", "--json", path}).output, HasSubstr("\"whole\": true"));
 
   auto reader = RecordingReader::open(path);
@@ -168,12 +168,12 @@ TEST_F(RecordingPrograms, InterruptCompletesRecordings) {
   EXPECT_THAT(again.output, HasSubstr("all the same to the bit"));
 }
 
-// An open chunk is lost, so no chunk may be longer than the promise, however long its writer's thread had to
-// wait. Timely closing is measured by the ticks that a client got, over as many seconds as the recorded ones
-// took. The writer's thread may once be delayed by as much again as is promised, but not every time.
+// A killed server can lose only the chunk that is not closed. So no chunk may be longer than promised, and a
+// client may have seen at most as many ticks beyond the recording as two chunks hold. One of three runs must
+// achieve that, since a busy machine may delay the writer's thread.
 TEST_F(RecordingPrograms, KilledServerLosesAtMostItsLastChunk) {
   constexpr double kPromised = 0.25;  // s
-  double least = std::numeric_limits<double>::infinity();
+  double leastChunksLost = std::numeric_limits<double>::infinity();
   std::string path;
   for (const char* name : {"first", "second", "third"}) {
     startServer({"--always-run", "--record", pathOf(name)});
@@ -185,26 +185,24 @@ TEST_F(RecordingPrograms, KilledServerLosesAtMostItsLastChunk) {
     ASSERT_TRUE(cut.has_value()) << cut.error();
     for (const ChunkPlace& chunk : cut->mcap().chunks())
       EXPECT_LE(static_cast<double>(chunk.end - chunk.start) * 1e-9, kPromised);
-    struct Ticked {
-      std::uint64_t tick = 0, time = 0;  // ns
-    };
-    std::optional<Ticked> first;
-    Ticked last;
+    const std::span<const ChunkPlace> chunks = cut->mcap().chunks();
+    std::vector<std::uint64_t> ticksInChunk(chunks.size());
+    std::uint64_t lastTick = 0;
     v1::RecordedTick tick;
     for (auto message = cut->next(); message && *message; message = cut->next()) {
       if ((*message)->topic != Topic::ticks) continue;
       ASSERT_TRUE(tick.ParseFromArray((*message)->bytes.data(), static_cast<int>((*message)->bytes.size())));
-      last = {tick.tick(), (*message)->time};
-      if (!first) first = last;
+      lastTick = tick.tick();
+      for (std::size_t i = 0; i < chunks.size(); ++i)
+        ticksInChunk[i] += chunks[i].start <= (*message)->time && (*message)->time <= chunks[i].end ? 1 : 0;
     }
-    ASSERT_TRUE(first && last.tick > first->tick);
-    const double secondsATick =
-        static_cast<double>(last.time - first->time) * 1e-9 / static_cast<double>(last.tick - first->tick);
-    const double lost = (static_cast<double>(seen) - static_cast<double>(last.tick)) * secondsATick;
-    std::printf("killed: the last tick of a client is %.3f s after the last that was recorded\n", lost);
-    least = std::min(least, lost);
+    const std::uint64_t mostTicks = *std::ranges::max_element(ticksInChunk);
+    ASSERT_GT(mostTicks, 0u);
+    const double ticksLost = static_cast<double>(seen) - static_cast<double>(lastTick);
+    std::printf("killed: %.0f ticks lost; a chunk holds up to %lu\n", ticksLost, mostTicks);
+    leastChunksLost = std::min(leastChunksLost, ticksLost / static_cast<double>(mostTicks));
   }
-  EXPECT_LT(least, 2 * kPromised);
+  EXPECT_LE(leastChunksLost, 2);
 
   const std::string whole = pathOf("whole.mcap");
   const Ended damaged = clothstream({"info", path});
@@ -273,7 +271,7 @@ TEST_F(RecordingPrograms, PlayARecordingToClients) {
   EXPECT_EQ(recorded.code, 0) << recorded.errors;
   const Ended info = clothstream({"info", again});
   EXPECT_EQ(info.code, 0) << info.output;
-  EXPECT_THAT(info.output, HasSubstr("; 0 not what the server held"));
+  EXPECT_THAT(info.output, HasSubstr("; 0 differ from the server's"));
 
   const auto control = [&](std::vector<std::string> command) {
     command.insert(command.end(), {"--server", address_});

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "clients/load/intruder.h"
+#include "clients/load/hostile_client.h"
 
 #include <limits>
 #include <utility>
@@ -11,29 +11,29 @@
 namespace clothstream::load {
 namespace {
 
-enum Kind : std::size_t { kNoise, kNoNumbers, kHuge, kNeverReads, kGoneAtOnce, kKinds };
+enum Kind : std::size_t { kRandomBytes, kNotFinite, kHuge, kNeverReads, kLeavesAtOnce, kKinds };
 
 constexpr std::chrono::milliseconds kPause{50};
-// Whom the server has not thrown out by then goes by itself.
+// Time after which the client disconnects if the server has not ended the connection.
 constexpr std::chrono::seconds kPatience{3};
 constexpr std::size_t kHugeBytes = 1 << 20;
 constexpr int kRequestsAStep = 100;
 
 }  // namespace
 
-Intruder::Intruder(Links& links, std::string scene, std::size_t first)
-    : endpoint_(links), scene_(std::move(scene)), kind_(first % kKinds) {}
+HostileClient::HostileClient(Links& links, std::string scene, std::size_t first)
+    : links_(links), scene_(std::move(scene)), kind_(first % kKinds) {}
 
-Intruder::~Intruder() {
+HostileClient::~HostileClient() {
   drop();
 }
 
-void Intruder::drop() {
+void HostileClient::drop() {
   if (link_) link_->drop();
   link_.reset();
 }
 
-std::string Intruder::hello() const {
+std::string HostileClient::hello() const {
   v1::ClientMessage message;
   v1::Hello& hello = *message.mutable_hello();
   hello.set_protocol_version(CS_PROTOCOL_VERSION);
@@ -45,11 +45,11 @@ std::string Intruder::hello() const {
   return message.SerializeAsString();
 }
 
-void Intruder::visit() {
+void HostileClient::visit() {
   gone_ = joined_ = false;
   ++visits_;
-  link_ = endpoint_.open(*this);
-  if (kind_ == kNoise) {
+  link_ = links_.open(*this);
+  if (kind_ == kRandomBytes) {
     std::string noise(200, '\0');
     for (std::size_t i = 0; i < noise.size(); ++i) noise[i] = static_cast<char>(i * i + 7 * visits_);
     link_->send(std::move(noise));
@@ -58,7 +58,7 @@ void Intruder::visit() {
   } else {
     link_->send(hello());
   }
-  if (kind_ == kNoNumbers) {
+  if (kind_ == kNotFinite) {
     v1::ClientMessage message;
     v1::ParticipantCollider& collider = *message.mutable_collider_poses()->add_colliders();
     collider.mutable_pose()->mutable_position()->set_x(std::numeric_limits<float>::quiet_NaN());
@@ -68,13 +68,13 @@ void Intruder::visit() {
   if (kind_ != kNeverReads) link_->read();
 }
 
-void Intruder::received(std::span<const std::byte> message) {
+void HostileClient::received(std::span<const std::byte> message) {
   static_cast<void>(message);
   joined_ = true;
   link_->read();
 }
 
-void Intruder::step(std::chrono::steady_clock::time_point now) {
+void HostileClient::step(std::chrono::steady_clock::time_point now) {
   if (!link_) {
     if (now - since_ < kPause) return;
     since_ = now;
@@ -86,7 +86,7 @@ void Intruder::step(std::chrono::steady_clock::time_point now) {
     request.mutable_list_scenes();
     for (int i = 0; i < kRequestsAStep; ++i) link_->send(request.SerializeAsString());
   }
-  if (!gone_ && !(kind_ == kGoneAtOnce && joined_) && now - since_ < kPatience) return;
+  if (!gone_ && !(kind_ == kLeavesAtOnce && joined_) && now - since_ < kPatience) return;
   drop();
   since_ = now;
   kind_ = (kind_ + 1) % kKinds;

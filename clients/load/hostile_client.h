@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Somebody who means a server no good.
+// A misbehaving client for load tests.
 #pragma once
 
 #include <atomic>
@@ -13,19 +13,19 @@
 
 namespace clothstream::load {
 
-// Comes again and again, each time with another of these: bytes that are no message; poses that are no
-// numbers; a message of a megabyte; requests without end whose answers it never reads; gone as soon as it has
-// joined.
-class Intruder final : private LinkListener {
+// Connects repeatedly, each time with the next kind of misbehaviour: random bytes; poses with NaN and
+// infinity; a message of 1 MiB; endless requests without reading the answers; disconnecting right after
+// joining.
+class HostileClient final : private LinkListener {
  public:
-  // `first`: of those kinds, the one to begin with.
-  Intruder(Links& links, std::string scene, std::size_t first);
-  ~Intruder();
-  Intruder(const Intruder&) = delete;
-  Intruder& operator=(const Intruder&) = delete;
+  // `first` is the index of the first kind, modulo the number of kinds.
+  HostileClient(Links& links, std::string scene, std::size_t first);
+  ~HostileClient();
+  HostileClient(const HostileClient&) = delete;
+  HostileClient& operator=(const HostileClient&) = delete;
 
   void step(std::chrono::steady_clock::time_point now);
-  // Connections so far.
+  // Number of connections so far.
   std::uint64_t visits() const { return visits_; }
 
  private:
@@ -35,7 +35,7 @@ class Intruder final : private LinkListener {
   void drop();
   std::string hello() const;
 
-  Links& endpoint_;
+  Links& links_;
   const std::string scene_;
   std::size_t kind_;
   std::uint64_t visits_ = 0;
