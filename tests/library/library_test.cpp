@@ -20,7 +20,7 @@
 #include <gtest/gtest.h>
 
 #include "clients/grpc/grpc_client.h"
-#include "tests/e2e/server_test.h"
+#include "tests/e2e/running_server.h"
 #include "tests/e2e/temporary_directory.h"
 
 namespace clothstream::e2e {
@@ -112,7 +112,7 @@ class Watcher {
   std::unique_ptr<GrpcClient> client_;
 };
 
-class LibraryTest : public ServerTest {
+class LibraryTest : public RunningServer {
  protected:
   void SetUp() override { startServer(); }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What tests of programs and clients against the real clothstream-server have in common.
+// Fixture of the tests that run the real clothstream-server.
 #pragma once
 
 #include <chrono>
@@ -18,9 +18,10 @@
 
 namespace clothstream::e2e {
 
-// Generous: sanitizers, validation and software Vulkan on a busy machine.
+// Enough for sanitizers, validation and software Vulkan on a busy machine.
 inline constexpr std::chrono::seconds kPatience{60};
 
+// Polls until `holds` returns true. Returns false after kPatience.
 inline bool eventually(const std::function<bool()>& holds) {
   using Clock = std::chrono::steady_clock;
   for (const auto end = Clock::now() + kPatience; Clock::now() < end;
@@ -29,13 +30,13 @@ inline bool eventually(const std::function<bool()>& holds) {
   return false;
 }
 
-class ServerTest : public ::testing::Test {
+class RunningServer : public ::testing::Test {
  protected:
   using Arguments = std::vector<std::string>;
   static inline const Arguments kSmallScene{"--scene", "small", "--scene-file", "tests/e2e/small.json"};
 
-  // At ports that are free, unless there is one for gRPC. Skips the test where there is no Vulkan; it fails,
-  // or is skipped, when this returns without an address.
+  // Uses free ports unless `grpcPort` is given. Leaves address_ empty if the server does not start; then the
+  // test is skipped (no Vulkan) or has failed.
   void startServer(const Arguments& more = kSmallScene, const std::string& grpcPort = "0") {
     Arguments command{CLOTHSTREAM_SERVER, "--port", "0", "--grpc-port", grpcPort};
     command.insert(command.end(), more.begin(), more.end());
@@ -60,7 +61,7 @@ class ServerTest : public ::testing::Test {
   void TearDown() override {
     if (!server_) return;
     stopServer();
-    if (HasFailure()) std::cerr << "The server said:\n" << server_->output() << server_->errors();
+    if (HasFailure()) std::cerr << "Output of the server:\n" << server_->output() << server_->errors();
   }
 
   static std::uint16_t portIn(const std::string& address) {
@@ -68,7 +69,7 @@ class ServerTest : public ::testing::Test {
   }
 
   std::unique_ptr<Process> server_;
-  std::string address_, web_;  // of gRPC and of the page, HOST:PORT
+  std::string address_, web_;  // HOST:PORT of gRPC and of the page
 };
 
 }  // namespace clothstream::e2e
