@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Codec 2: residuals are read back, and coded on the CPU.
+// Codec 2: the CPU codes residuals that are read back.
 #include <algorithm>
 
 #include "proto/codec/hierarchical/rans_frame_writer.h"
@@ -31,7 +31,7 @@ class CodedOutput final : public DeviceOutput {
   }
 
  private:
-  // Returns whether it has a residual.
+  // Returns true if the phase has a residual.
   bool writePhase(std::uint32_t slot, const codec::hierarchical::Phase& phase) {
     bool any = false;
     writer_.beginPhase();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// How a frame's residuals get from the device into its packet.
+// Writes the residuals of a frame from the device into its packet.
 #pragma once
 
 #include <cstddef>
@@ -13,28 +13,28 @@
 
 namespace clothstream::encode {
 
-// record() belongs to the device's thread, write() to that which entropy-codes.
+// record() belongs to the device's thread, write() to the thread that entropy-codes.
 class DeviceOutput {
  public:
   virtual ~DeviceOutput() = default;
 
   virtual std::size_t packetBound() const = 0;
-  // After the predictor's.
+  // Must follow the predictor's record().
   virtual void record(vulkan::Recorder& recorder, std::uint32_t slot) = 0;
 
   struct Written {
     std::size_t bytes;
-    bool any;  // a vertex stays or has a residual that is not 0
+    bool any;  // true: a vertex stays, or has a residual other than 0
   };
-  // `weights` is the packet's first section; the slot's recording is complete.
+  // `weights` is the packet's first section. The recording of the slot must be complete.
   virtual Written write(std::uint32_t slot, const codec::FrameRole& role, std::span<const std::byte> weights,
                         std::span<std::byte> out) = 0;
 };
 
-// Codec 2: residuals are read back, and coded on the CPU. The predictor outlives it.
+// Codec 2: the CPU codes residuals that are read back. The predictor must outlive the output.
 std::unique_ptr<DeviceOutput> makeCodedOutput(const DevicePredictor& predictor,
                                               const codec::StreamLayout& layout);
-// Codec 3: the device packs them, the CPU copies bytes.
+// Codec 3: the device packs residuals, and the CPU copies the bytes.
 std::unique_ptr<DeviceOutput> makePackedOutput(const vulkan::Device& device, const DevicePredictor& predictor,
                                                const codec::StreamLayout& layout);
 

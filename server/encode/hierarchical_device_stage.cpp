@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Prediction on the device: the CPU fits weights, to frames some frames back, and makes packets.
+// Prediction on the device. The CPU fits the weights to earlier frames and writes packets.
 #include <array>
 
 #include "proto/codec/hierarchical/weight_plan.h"
@@ -44,10 +44,10 @@ class HierarchicalDeviceStage final : public EncodeStage {
  private:
   DevicePredictor predictor_;
   FitSchedule fitted_;
-  // Of the device's thread.
+  // Belong to the device's thread.
   std::uint64_t recorded_ = 0;
   std::uint32_t recordedSinceKey_ = 0;
-  // Of the thread that entropy-codes; but what is planned is read by the device's.
+  // Belong to the thread that entropy-codes, but the device's thread reads the planned weights.
   WeightPlan plan_;
   std::unique_ptr<DeviceOutput> output_;
   std::uint32_t sinceKey_ = 0;

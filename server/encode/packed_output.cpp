@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Codec 3: the device packs residuals, the CPU copies bytes.
+// Codec 3: the device packs residuals, and the CPU copies the bytes.
 #include <algorithm>
 #include <array>
 #include <optional>
@@ -23,7 +23,7 @@ using vulkan::BufferPurpose;
 static_assert(shared::kPackedBlock == codec::hierarchical::kBlockVertices &&
               shared::kPackedGroup == codec::hierarchical::kGroupVertices &&
               shared::kPackedModes == codec::hierarchical::kModes);
-// A block of one vertex, the last one, is what the extra words are for.
+// The extra words have room for a block of one vertex, the last block.
 static_assert(32 * shared::kPackedWords * shared::kPackedBlock >=
               codec::hierarchical::kComponents *
                   (codec::hierarchical::kMostModeBits +
@@ -38,10 +38,10 @@ std::uint32_t groupsOf(std::uint32_t vertices) {
   return (vertices + shared::kPackedGroup - 1) / shared::kPackedGroup;
 }
 
-// The groups of all vertices' residuals, or of their normals'.
+// The groups of all vertices' residuals, or of their normals' residuals.
 class GroupKernel {
  public:
-  // `sources` of each slot are what the kernel packs.
+  // `sources` are the buffers of each slot that the kernel packs.
   GroupKernel(const vulkan::Device& device, const char* name, std::span<const std::uint32_t> spirv,
               std::uint32_t vertices, std::uint32_t groups, std::uint32_t vertexWords,
               const std::array<std::vector<const Buffer*>, kFrameSlots>& sources)
@@ -66,7 +66,7 @@ class GroupKernel {
     recorder.dispatch(bindings_[slot], push, std::uint64_t{kernel_.workgroupSize()} * groups_);
   }
 
-  // Of the groups from `begin` on, the first of which has vertices from `first` on.
+  // Copies the groups from `begin` on. The vertices of the first group start at `first`.
   std::byte* copy(std::uint32_t slot, std::uint32_t begin, std::uint32_t end, std::uint32_t first,
                   std::byte* out) const {
     for (std::uint32_t group = begin; group < end; ++group, first += shared::kPackedGroup)
@@ -133,7 +133,7 @@ class PackedOutput final : public DeviceOutput {
     std::byte* end = residuals_->copy(slot, 0, coarseGroups_, 0, start);
     packet_.endSection(end);
     end = residuals_->copy(slot, coarseGroups_, groups_, push_.coarseVertices, end);
-    // A group that has a number takes nine bits at least, others take one.
+    // A group with a number takes at least nine bits; other groups take one bit.
     const bool any = static_cast<std::size_t>(end - start) > groups_;
     if (normals_) end = normals_->copy(slot, 0, groupsOf(push_.vertexCount), 0, end);
     packet_.endSection(end);

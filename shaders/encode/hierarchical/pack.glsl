@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
-// Groups of numbers, as in proto/codec/hierarchical/packed_blocks.cpp: a workgroup writes a group, each of
-// its invocations a block.
+// Packs groups of numbers, as in proto/codec/hierarchical/packed_blocks.cpp. A workgroup writes a group, and
+// each of its invocations a block.
 //
-// Whoever includes this defines PACKED_COMPONENTS and PACKED_WORDS, for a vertex, and the functions that are
-// only declared here.
+// The including kernel defines PACKED_COMPONENTS and PACKED_WORDS per vertex, and the functions that are only
+// declared here.
 #ifndef CLOTHSTREAM_SHADERS_ENCODE_HIERARCHICAL_PACK_GLSL
 #define CLOTHSTREAM_SHADERS_ENCODE_HIERARCHICAL_PACK_GLSL
 
@@ -31,9 +31,9 @@ const uint kRunVertices = 4;
 const uint kEscape = 15;
 const uint kStayNumber = 0xFFFFFFFFu;
 
-// The vertices of a group: the first one and the end.
+// First vertex and end of a group.
 uvec2 verticesOf(uint group);
-// In the zigzag form; kStayNumber along the normal where the vertex stays.
+// A number in zigzag form; kStayNumber along the normal if the vertex stays.
 uint numberOf(uint vertex, uint component);
 
 shared uint modesOf[kBlocks];
@@ -44,7 +44,7 @@ uint zigzag(int value) {
   return uint(value << 1) ^ uint(value >> 31);
 }
 
-// How many of the escapes' numbers stand for something else.
+// Number of escape numbers with a special meaning.
 uint reservedOf(uint component) {
   return PACKED_COMPONENTS == 3 && component == 0 ? 1 : 0;
 }
@@ -85,7 +85,7 @@ bool isZero(uvec2 vertices, uint component) {
   return some == 0;
 }
 
-// The mode of a component of the block, and the bits of its numbers.
+// Best mode of a component of the block, and the number of bits it takes.
 uvec2 choose(uvec2 block, uint component) {
   if (isZero(block, component)) {
     return uvec2(0);
@@ -101,7 +101,7 @@ uvec2 choose(uvec2 block, uint component) {
   return best;
 }
 
-// Where the next bit goes, from the start of the scratch on, and what is not yet there of its word.
+// Index of the next bit in the scratch memory, and the pending bits of its word.
 uint at;
 uint pending;
 
@@ -147,12 +147,12 @@ void putBlock(uvec2 block, uint component, uint mode) {
   }
 }
 
-// How much a mode is above that of the block before.
+// Difference between a mode and that of the block before.
 uint modeNumber(uint mode, uint before, uint component) {
   return zigzag(int(mode) - int(bitfieldExtract(before, int(8 * component), 8)));
 }
 
-// Writes cannot race: a workgroup has words of its own, in which its invocations set other bits each.
+// Writes cannot race: a workgroup has its own words, and its invocations set different bits.
 void main() {
   uint group = gl_WorkGroupID.x, place = gl_LocalInvocationIndex;
   uvec2 vertices = verticesOf(group);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Codec 3: what normals are off their prediction.
+// Codec 3: packs the residuals of normals.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 
@@ -8,7 +8,7 @@
 #include "shaders/encode/hierarchical/pack.glsl"
 
 layout(std430, binding = 3) readonly buffer NormalResiduals {
-  uint normalResiduals[];  // by vertex: of u and v, a byte each
+  uint normalResiduals[];  // by vertex: residuals of u and v, one byte each
 };
 
 uvec2 verticesOf(uint group) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Codec 3: the residuals of positions, first of the coarse vertices, then of the others.
+// Codec 3: packs the residuals of positions, first of the coarse vertices, then of the others.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 
@@ -8,7 +8,7 @@
 #include "shaders/encode/hierarchical/pack.glsl"
 
 layout(std430, binding = 3) readonly buffer Residuals {
-  uint residuals[];  // kResidualRows words a slot, and where they say so three more
+  uint residuals[];  // kResidualRows words per slot; wideResiduals has three more words if they say so
 };
 layout(std430, binding = 4) readonly buffer WideResiduals {
   int wideResiduals[];
