@@ -51,7 +51,7 @@ TEST_P(FrameEncoder, MakesThePacketsOfTheReferenceEncoder) {
   EXPECT_GT(encoding.kilobytes(), 120 * 0.1);
 }
 
-TEST_P(FrameEncoder, EqualsTheReferenceOnStatesOfAnySize) {
+TEST_P(FrameEncoder, EqualsTheReferenceOnStatesOfEverySize) {
   Encoding encoding(GetParam().cloths(), GetParam().prediction);
   std::mt19937 random(1);
   for (std::uint64_t tick = 1; tick <= 12; ++tick) {
@@ -66,7 +66,7 @@ TEST_P(FrameEncoder, EqualsTheReferenceOnStatesOfAnySize) {
   }
 }
 
-TEST_P(FrameEncoder, KeepsTheErrorAtRoundingsEdges) {
+TEST_P(FrameEncoder, KeepsTheErrorAtTheEdgesOfRounding) {
   // Half way between lattice points, and the floats beside it: where a device that rounds otherwise would
   // differ.
   Encoding encoding(GetParam().cloths(), GetParam().prediction);
@@ -88,7 +88,7 @@ TEST_P(FrameEncoder, KeepsTheErrorAtRoundingsEdges) {
   }
 }
 
-TEST_P(FrameEncoder, MakesThoseOfMeshesToo) {
+TEST_P(FrameEncoder, MakesThePacketsOfMeshes) {
   model::Scene scene = GetParam().cloths();
   scene.cloths.insert(scene.cloths.begin() + 1, discCloth(9));
   Encoding encoding(scene, GetParam().prediction);

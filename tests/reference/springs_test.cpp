@@ -79,7 +79,7 @@ TEST(ReferenceColumn, StretchesEachLinkByTheWeightBelowIt) {
   }
 }
 
-TEST(ReferenceSprings, ExertNoForceAndNoTorqueAsAWhole) {
+TEST(ReferenceSprings, ExertNoTotalForceAndNoTotalTorque) {
   ReferenceCloth cloth(sheetWithAllSprings(9, 7));
   shake(cloth, 0.05, 1);
   std::vector<Vec3> forces(cloth.nodeCount(), Vec3::Zero());
@@ -119,7 +119,7 @@ TEST(ReferenceSprings, PullWithTheGradientOfTheirEnergy) {
     }
 }
 
-TEST(ReferenceSprings, DampAlongThemselvesAlone) {
+TEST(ReferenceSprings, DampOnlyAlongTheirLength) {
   model::Cloth model = sheet(2, 2);
   model.structural = {0, 2};
   ReferenceCloth cloth(model);
@@ -186,7 +186,7 @@ TEST(ReferencePins, NeverMove) {
   }
 }
 
-TEST(ReferenceSymmetry, OfASheetOnASphereIsKept) {
+TEST(ReferenceSymmetry, IsKeptByASheetOnASphere) {
   model::Scene scene;
   model::Cloth model = sheetWithAllSprings(11, 11);
   model.grid.pose = {model::Vec3(0, 0.6f, -0.5f), model::Quaternion(std::sqrt(0.5f), -std::sqrt(0.5f), 0, 0)};

@@ -79,7 +79,7 @@ std::vector<float> listOf(const shared::EntriesRecord& range,
   return list;
 }
 
-TEST(AssembledTables, HaveAnEntryWhereTheMatrixHas) {
+TEST(AssembledTables, HaveTheEntriesOfTheMatrix) {
   const model::Scene scene = variedScene();
   std::mt19937 random(2);
   const NodeState state = randomState(scene, random, 0.003f, 1);
@@ -211,7 +211,7 @@ Products productsOf(const model::Scene& scene, const AssembledTables& tables, co
 // 3e-6 of an inverse mass, with its own rounding, and on the diagonal by twice that. A product adds at most a
 // rounding of what is summed so far for each of its entries. A length is wrong by 1e-6 of itself, a speed by
 // that and its own rounding.
-TEST_F(AssembledMatrix, TimesAVectorIsTheDenseProduct) {
+TEST_F(AssembledMatrix, MultipliesLikeTheDenseMatrix) {
   const model::Scene scene = variedScene();
   std::mt19937 random(3);
   const NodeState state = randomState(scene, random, 0.003f, 1);

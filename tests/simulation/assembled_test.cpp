@@ -110,22 +110,22 @@ TEST_F(Assembled, MoveNodesAsTheReferenceOnEveryShapeOfGrid) {
   }
 }
 
-TEST_F(Assembled, ThatArePulledGentlyMoveNodesAsTheReference) {
+TEST_F(Assembled, MoveNodesAsTheReferenceWithPartialCorrection) {
   model::Cloth cloth = assembled(calmCloth(9, 8));
   cloth.solver.correctionFraction = 0.125f;
   expectLikeSolution(sceneOf({cloth}), 8);
 }
 
-TEST_F(Assembled, OfBendSpringsMoveNodesAsTheReference) {
+TEST_F(Assembled, MoveNodesAsTheReferenceWithBendSprings) {
   expectLikeSolution(sceneOf({assembled(calmCloth(12, 11), true)}), 5);
 }
 
-TEST_F(Assembled, OfMeshesMoveNodesAsTheReference) {
+TEST_F(Assembled, MoveMeshesAsTheReference) {
   expectLikeSolution(sceneOf({assembled(calmCloth(6, 9)), disc(7)}), 7);
 }
 
 // Attached nodes move at a speed of their own, which is part of b.
-TEST_F(Assembled, FollowAttachmentsAsTheReferenceDoes) {
+TEST_F(Assembled, FollowAttachmentsAsTheReference) {
   model::Cloth cloth = assembled(calmCloth(8, 7));
   model::Attachment rod;
   rod.name = "rod";
@@ -136,12 +136,12 @@ TEST_F(Assembled, FollowAttachmentsAsTheReferenceDoes) {
   expectLikeSolution(sceneOf({cloth}), 11, {}, compared);
 }
 
-TEST_F(Assembled, ThatSeveralWorkgroupsSolveMoveNodesAsTheReference) {
+TEST_F(Assembled, MoveNodesAsTheReferenceWithSeveralWorkgroups) {
   expectLikeSolution(sceneOf({assembled(calmCloth(21, 26)), disc(7)}), 9, {.solveWholeNodes = 0});
 }
 
 // The same iterates, not just the same limit: [Va21] Eq. 12-17. Few enough that rounding has not grown.
-TEST_F(Assembled, GoAsFarInFewIterationsAsTheReference) {
+TEST_F(Assembled, MoveAsFarAsTheReferenceInFewIterations) {
   for (const std::uint32_t wholeNodes : {1'000'000u, 0u})
     for (const std::uint32_t iterations : {1u, 2u, 4u}) {
       SCOPED_TRACE(::testing::Message() << iterations << " iterations, " << wholeNodes);
@@ -184,7 +184,7 @@ TEST_F(Assembled, MoveAsTheMatrixFreePathDoes) {
 }
 
 // Of pinned nodes alone there is nothing to solve, and beside others they are no row.
-TEST_F(Assembled, LeavePinnedNodesWhereTheyAre) {
+TEST_F(Assembled, KeepPinnedNodesInPlace) {
   model::Cloth stiff = assembled(calmCloth(5, 4), true);
   stiff.pins = {{.firstRow = 0, .lastRow = 4, .firstColumn = 0, .lastColumn = 3}};
   model::Cloth half = assembled(calmCloth(8, 9), true);
@@ -210,7 +210,7 @@ TEST_F(Assembled, LeavePinnedNodesWhereTheyAre) {
 
 // [Va21]'s system, singular, and in general without a solution: few iterations hold a sheet. More of them
 // throw its nodes about, in double precision too.
-TEST_F(Assembled, WithoutComplianceHoldASheetInFewIterations) {
+TEST_F(Assembled, HoldASheetWithoutComplianceInFewIterations) {
   model::Cloth cloth = assembled(calmCloth(20, 20), true);
   cloth.pins = {topRow(cloth)};
   cloth.damping = 2;
@@ -252,7 +252,7 @@ model::Scene systems() {
   return scene;
 }
 
-TEST_F(Assembled, GiveTheSameBitsHoweverTheWorkIsCut) {
+TEST_F(Assembled, GiveTheSameBitsForEveryPartitionOfWork) {
   const simulation::SimulationOptions ways[] = {{.workgroupSize = 8, .solveWholeNodes = 1'000'000},
                                                 {.workgroupSize = 8, .solveWholeNodes = 0},
                                                 {.workgroupSize = 0, .solveWholeNodes = 700},
@@ -262,7 +262,7 @@ TEST_F(Assembled, GiveTheSameBitsHoweverTheWorkIsCut) {
   expectSameBits(systems(), passingBall, 10, ways);
 }
 
-TEST_F(Assembled, ReportTheSameWhoeverSolves) {
+TEST_F(Assembled, ReportTheSameForEveryPartitionOfWork) {
   const model::Scene scene = systems();
   for (const auto& reports :
        expectSameReports(scene, passingBall, {.solveWholeNodes = 1'000'000}, {.solveWholeNodes = 0}))
@@ -302,7 +302,7 @@ TEST_F(Assembled, ReachTheHashOfEveryOtherDevice) {
 
 // Back and forth: the state stays to the bit, and goes on to the bit as one that always had this path would
 // from the same state.
-TEST_F(Assembled, TakeOverFromTheMatrixFreePathWithoutAJump) {
+TEST_F(Assembled, ReplaceTheMatrixFreePathWithoutAJump) {
   model::Scene scene = sceneOf({assembled(calmCloth(14, 11)), disc(5)});
   scene.cloths[0].pins = {topRow(scene.cloths[0])};
   const simulation::TickInputs inputs = passingBall(scene, 30);

@@ -218,7 +218,7 @@ TEST_F(ImplicitEuler, KeepsAFreeClothsMomentum) {
   EXPECT_LT((momentum(running.state()) - momentum(start)).norm(), 20 * 12 * 100 * kRounding * flow);
 }
 
-TEST_F(ImplicitEuler, HoldsASheetWhereMassSpringBlowsUp) {
+TEST_F(ImplicitEuler, HoldsASheetWhereMassSpringDiverges) {
   for (const model::SolverKind solver : {model::SolverKind::massSpring, model::SolverKind::implicitEuler}) {
     model::Cloth cloth = stiffCloth(16, 16);
     cloth.solver.kind = solver;
@@ -238,7 +238,7 @@ TEST_F(ImplicitEuler, HoldsASheetWhereMassSpringBlowsUp) {
 }
 
 // Far stiffer than so few iterations solve: it lags, and does not blow up.
-TEST_F(ImplicitEuler, StaysCalmWhereTheSolveEndsEarly) {
+TEST_F(ImplicitEuler, StaysCalmIfTheSolveEndsEarly) {
   model::Cloth cloth = stiffCloth(24, 24);
   cloth.structural.stiffness = 4000;
   cloth.pins = {topRow(cloth)};
@@ -254,7 +254,7 @@ TEST_F(ImplicitEuler, StaysCalmWhereTheSolveEndsEarly) {
   EXPECT_LT(hung.kineticEnergy(), 0.01 * 576 * 9.81 * 0.46);
 }
 
-TEST_F(ImplicitEuler, LivesBesideEveryOtherSolver) {
+TEST_F(ImplicitEuler, WorksInASceneWithEveryOtherSolver) {
   model::Cloth free = calmCloth(9, 14), held = calmCloth(7, 8), implicit = stiffCloth(8, 6);
   model::Cloth disc = implicitCloth(discCloth(4));
   free.pins = {topRow(free)};
