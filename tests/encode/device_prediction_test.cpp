@@ -53,7 +53,8 @@ model::Scene squareOf(std::uint32_t edge, model::Coding coding) {
 }
 
 TEST_P(DevicePrediction, EqualsTheReferenceIfWeightsFitOnlySomeChunks) {
-  // So many that each phase of the finest level is a dispatch of its own, and chunks take turns.
+  // The cloth is so large that each phase of the finest level needs its own dispatch and only some chunks are
+  // fitted per frame.
   Playing playing(squareOf(100, GetParam()));
   for (std::uint64_t tick = 1; tick <= 24 && !HasFailure(); ++tick)
     playing.show(codec::sampleMotion(playing.layout, tick, 0.04f).positions, tick, tick == 16);
@@ -105,7 +106,8 @@ TEST_P(DevicePrediction, EqualsTheReferenceAtEveryMaxErrorAndWithWideResiduals) 
 
 TEST_P(DevicePrediction, EqualsTheReferenceHalfwayBetweenUnits) {
   model::Scene scene = squareOf(16, GetParam());
-  // A unit is 2^-18 m then (codec::hierarchical::latticeUnit()): metres are exactly so many and a half.
+  // A unit is 2^-18 m at this error (codec::hierarchical::latticeUnit()), so that positions are exactly
+  // halfway between units.
   scene.stream.maxError = 261 * 0x1p-19f;
   Playing playing(scene);
   std::mt19937 random(4);

@@ -27,7 +27,7 @@ struct Packet {
 };
 using Packets = std::vector<Packet>;
 
-// Of frames of which some are key frames.
+// Packets of frames, some of which are key frames.
 Packets packetsOf(const StreamLayout& layout, std::uint32_t weightLag, codec::Workers* workers) {
   const auto encoder = codec::Encoder::make(layout, {.weightLag = weightLag, .workers = workers});
   std::vector<std::byte> packet(encoder->packetBound());

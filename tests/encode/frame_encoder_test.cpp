@@ -67,8 +67,8 @@ TEST_P(FrameEncoder, EqualsTheReferenceOnStatesOfEverySize) {
 }
 
 TEST_P(FrameEncoder, KeepsTheErrorAtTheEdgesOfRounding) {
-  // Half way between lattice points, and the floats beside it: where a device that rounds otherwise would
-  // differ.
+  // Positions halfway between lattice points and the floats next to them, where a device with other rounding
+  // would differ.
   Encoding encoding(GetParam().cloths(), GetParam().prediction);
   const float step = 2 * encoding.layout.maxError - 0x1p-18f;
   std::mt19937 random(2);

@@ -10,8 +10,8 @@
 namespace clothstream::reference {
 namespace {
 
-// A mesh's rest lengths come from float positions, a grid's from its spacing: for coordinates up to |p| they
-// differ by the rounding of two positions and of the length, 4 |p| 2^-24 at most, and the force by the
+// A mesh's rest lengths come from float positions, a grid's from its spacing. For coordinates up to |p| they
+// differ by the rounding of two positions and of the length, at most 4 |p| 2^-24. The forces differ by the
 // stiffness times that for each of a node's twelve springs.
 TEST(ReferenceMesh, PullsAsTheEquivalentGrid) {
   const model::Cloth model = sheetWithAllSprings(7, 6);

@@ -143,7 +143,7 @@ TEST(ReferenceEnergy, DriftsByLessThanTwoPercentWithoutDamping) {
            cloth.gravityEnergy(environment.gravity.cast<double>());
   };
   const double start = energy();
-  // What can turn into motion: the sheet sags and swings by about its stretch under its own weight.
+  // Energy that can turn into motion: the sheet sags and swings by about its stretch under its own weight.
   const double scale = cloth.kineticEnergy();
   double worst = 0;
   for (int i = 0; i < 20000; ++i) {

@@ -112,8 +112,8 @@ TEST(StabilityBound, IsBelowTheTrueLimitOfRungeKutta) {
   EXPECT_TRUE(diverges(energyAfter(above, scene.integrator, 1.1 * limit, 1000)));
 }
 
-// What the bound takes for granted: the half disc of radius 2.61 in which every mode's step times its rate
-// lies is one of the method's amplification not beyond 1.
+// The assumption of the bound: in the half disc of radius 2.61, in which the product of every mode's step and
+// rate lies, the amplification of the method is at most 1.
 TEST(StabilityBound, LiesWithinTheRegionOfRungeKutta) {
   for (double radius = 0.01; radius <= 2.61; radius += 0.01)
     for (int i = 0; i <= 360; ++i) {

@@ -48,7 +48,7 @@ model::Scene variedScene() {
   return sceneOf({sheet, other, disc, small});
 }
 
-// What the reference says of one cloth.
+// The system of one cloth in the reference.
 reference::ConstraintSystem systemOf(const model::Scene& scene, std::size_t number, const NodeState& state) {
   const model::Cloth& cloth = scene.cloths[number];
   const std::uint32_t first = simulation::clothOffsets(scene.cloths)[number];
@@ -126,7 +126,7 @@ std::vector<shared::vec4> vectorsOf(const std::vector<model::Vec3>& vectors, con
   return texels;
 }
 
-// What the kernels make of a state: b, and A times a vector of one number a row.
+// Results of the kernels for a state: b, and A times a vector with one number per row.
 struct Products {
   std::vector<float> sides, products;
 };

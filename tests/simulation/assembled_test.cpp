@@ -30,11 +30,12 @@ double rowsOf(const model::Scene& scene) {
   return rows;
 }
 
-// Off the solution by what the solve may leave, m. With w the largest inverse mass, c >= 0.01 w and rho what
-// is left of b - A lambda, nodes are off by |M^-1 J^T A^-1 rho| <= |rho| sqrt(w) / (2 sqrt(c)) = 5 |rho|. Of
-// b, as long as `side`, rho is the tolerance, and the rounding of A lambda: entries are good to 1e-6, |A| <=
-// 24 w (J^T J is at most twice the springs of a node), and |lambda| <= 5 |b| / w, as b is as good as all J
-// times something. And b is rounded in two positions of each row.
+// Largest error that the solve may leave in positions, m. Let w be the largest inverse mass, c >= 0.01 w, and
+// rho the remaining residual b - A lambda. The error of the nodes is at most |M^-1 J^T A^-1 rho| <= |rho|
+// sqrt(w) / (2 sqrt(c)) = 5 |rho|. The length of b is `side`. Two terms make up rho: the tolerance, and the
+// rounding of A lambda. Entries of A have an error of 1e-6. |A| <= 24 w, because J^T J is at most twice the
+// springs of a node. |lambda| <= 5 |b| / w, because b is J times a vector up to rounding. In addition, b is
+// rounded in two positions of each row.
 double errorOfSolve(double rows, double side) {
   return 5 * (double{kSolveTolerance} + 1e-6 * 24 * 5) * std::sqrt(rows) * side +
          5 * std::sqrt(rows) * 2 * kRounding * kExtent;
@@ -183,7 +184,7 @@ TEST_F(Assembled, MoveAsTheMatrixFreePathDoes) {
   EXPECT_GT(apart(state, after(scene)), 2 * tolerance);
 }
 
-// Of pinned nodes alone there is nothing to solve, and beside others they are no row.
+// Pinned nodes alone give nothing to solve. Springs between pinned nodes make no rows.
 TEST_F(Assembled, KeepPinnedNodesInPlace) {
   model::Cloth stiff = assembled(calmCloth(5, 4), true);
   stiff.pins = {{.firstRow = 0, .lastRow = 4, .firstColumn = 0, .lastColumn = 3}};
@@ -231,7 +232,7 @@ TEST_F(Assembled, HoldASheetWithoutComplianceInFewIterations) {
   EXPECT_GT(reference.cloths().front().strain().max, 1);
 }
 
-// Grids and meshes, large and small, beside cloths of other solvers; and a ball.
+// Grids and meshes, large and small, together with cloths of other solvers and a ball.
 model::Scene systems() {
   model::Cloth held = assembled(calmCloth(37, 29), true);
   held.pins = {topRow(held)};

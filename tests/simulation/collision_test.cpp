@@ -59,7 +59,7 @@ TEST_F(Collision, ASheetOnASlopeSticksIfFrictionReachesItsTangent) {
   }
 }
 
-// What lies on a shape that spins about Y goes round with it: friction carries it, springs hold it together.
+// Cloth on a shape that spins about Y rotates with it: friction carries it, and springs hold it together.
 TEST_F(Collision, SpinCarriesTheCloth) {
   const float radius = 0.3f, rate = 1;  // rad/s
   const model::Shape shapes[] = {model::Sphere{radius},
@@ -190,7 +190,7 @@ TEST_F(Collision, NodesStayOutsideEveryShapeAndComeToRest) {
 
 // ---- Lists of what is near
 
-// All kinds, in a cloud round the cloth; from where they are to a hand's breadth beside it.
+// Shapes of all kinds in a cloud around the cloth, from its position to 10 cm away.
 std::vector<MovingCollider> cloud(std::size_t count, float size, unsigned seed) {
   std::mt19937 random(seed);
   std::uniform_real_distribution<float> unit(-1, 1);
@@ -274,8 +274,8 @@ TEST_F(Collision, TheMaximumNumberOfCollidersActsAsInTheReference) {
   EXPECT_GT(largestDistance(simulation::restState(scene.cloths), reference), 0.001);
 }
 
-// What falls on the ground and comes to rest has got back what gravity gave it: M g t. With every kernel that
-// collides.
+// Cloth that falls on the ground and comes to rest got back the impulse of gravity: M g t. The test covers
+// every kernel that collides.
 TEST_F(Collision, ReportsTheImpulsesOfColliders) {
   using enum model::SolverKind;
   struct Kernel {

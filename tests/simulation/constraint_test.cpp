@@ -45,11 +45,11 @@ double norm(const std::vector<model::Vec3>& vectors) {
   return std::sqrt(sum);
 }
 
-// Off the reference by what the solve may leave, m. It solves A e = side with A = c M + J^T J and c M = 0.01
-// (times one), of a side J^T b. With rho = A e what is left, |e| <= 100 |rho|; |rho| is the tolerance times
-// |J^T b|, plus the rounding of rows, 1e-6 of it; |J^T b| <= 5 |b|, as |J^T J| is at most twice the springs
-// of a node, 24. b is as long as nodes were displaced, and rounded in two positions of each row (2 kRounding
-// kExtent), of which the solution makes at most |b| / (2 sqrt(0.01)).
+// Largest difference from the reference that the solve may leave, m. It solves A e = J^T b with A = c M + J^T
+// J and c M = 0.01 times the identity. With the remaining residual rho = A e, |e| <= 100 |rho|. |rho| is the
+// tolerance times |J^T b|, plus the rounding of rows, 1e-6 of it. |J^T b| <= 5 |b|, because |J^T J| is at
+// most twice the springs of a node, 24. b is as long as the displacements of the nodes. It is rounded in two
+// positions of each row (2 kRounding kExtent), and the solution scales that by at most 1 / (2 sqrt(0.01)).
 double errorOfSolve(double rows) {
   const double side = std::sqrt(rows) * 0.007;  // two ends off by up to 2 mm an axis
   return 100 * (double{kSolveTolerance} + 1e-6) * 5 * side + 5 * std::sqrt(rows) * 2 * kRounding * kExtent;
@@ -121,7 +121,7 @@ TEST_F(Constraints, MoveMeshesAsTheReference) {
   expectLikeReference(sceneOf({constrained(6, 9), disc}), 7);
 }
 
-// Of cloths that several workgroups solve, some of them with empty lanes.
+// Several workgroups solve each cloth, some with empty lanes.
 TEST_F(Constraints, MoveNodesAsTheReferenceWithSeveralWorkgroups) {
   model::Cloth disc = discCloth(7);
   disc.mass = 0.01f * static_cast<float>(disc.nodeCount());
@@ -316,8 +316,8 @@ TEST_F(Adaptive, HoldASheetWhereMassSpringDiverges) {
   for (const model::Vec3& p : state.positions) EXPECT_LT(p.norm(), 1.5f * 4.7f);
 }
 
-// Hung by its corners it would stretch by more than half. While it falls into its constraints, springs beside
-// those that are held go beyond for a few substeps.
+// Without constraints the cloth, which hangs by its corners, would stretch by more than half. While it falls
+// into its constraints, springs next to constrained ones exceed the bound for a few substeps.
 TEST_F(Adaptive, KeepEverySpringWithinItsBound) {
   model::Cloth cloth = adaptive(24, 24);
   cloth.structural.stiffness = 60;

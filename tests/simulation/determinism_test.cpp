@@ -83,8 +83,8 @@ TEST_F(Determinism, ClothsInOneSceneMoveAsEachAlone) {
   std::vector<model::Cloth> cloths;
   for (const auto& [rows, columns] : shapes) {
     model::Cloth cloth = calmCloth(rows, columns);
-    // Each of its own material: the first has neither air nor damped springs, which must not change when
-    // others do.
+    // Each cloth has a different material. The first has neither air nor damped springs, which must not
+    // change because of the others.
     const auto i = static_cast<float>(cloths.size());
     cloth.drag = 0.3f * i;
     cloth.structural.damping = cloth.shear.damping = cloth.bend.damping = 0.05f * i;

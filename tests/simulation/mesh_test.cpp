@@ -12,11 +12,11 @@ namespace {
 class Meshes : public GpuTest {};
 
 // Both hang from their top row and drop into their springs. Around a taut cloth the difference x of the two
-// obeys M x'' + C x' + K x = f with K >= 0, so in no mode does it grow beyond that of a free mass: of all
-// nodes together, rms(x) <= |f| / m T^2 / 2. What differs, f, is for each of a node's twelve springs its
-// stiffness times the rounding of its rest length (four roundings of where the nodes are, scene/mesh.h), of
-// its ends' difference in both (twice two), and some ten roundings of its own length; the dashpots' is far
-// less.
+// obeys M x'' + C x' + K x = f with K >= 0. No mode of it grows beyond that of a free mass: over all nodes,
+// rms(x) <= |f| / m T^2 / 2. The differing force f has a term for each of a node's twelve springs: the
+// stiffness times three roundings. These are the rounding of the rest length (four roundings of positions,
+// model/mesh.h), the rounding of the ends' difference in both cloths (twice two), and some ten roundings of
+// the length. The term of the dashpots is far smaller.
 TEST_F(Meshes, MoveAsTheEquivalentGrid) {
   model::Cloth cloth = calmCloth(24, 20);
   cloth.structural.stiffness = 50;

@@ -24,7 +24,7 @@ std::vector<std::byte> bitsOf(const std::vector<ClothReport>& reports) {
   return bits;
 }
 
-// Of what a cloth says of a state that is exactly known: the kernel's rounding alone.
+// Tolerances of the report on an exactly known state: the rounding of the kernel.
 //
 // A stretch: differences of positions are rounded (3 kRounding of the square), as are the two squares and
 // what is computed from them (reciprocals to 1e-6 of the extension): 6 kRounding + 2e-6 of it. A sum: at most

@@ -33,7 +33,7 @@ model::Cloth withBalls(model::Cloth cloth, float radius = kDistance / 2, float f
   return cloth;
 }
 
-// Lies in the XZ plane, turned about Y.
+// A cloth in the XZ plane, rotated about Y.
 model::Cloth flat(model::Cloth cloth, float y, float degrees = 0) {
   const model::Quaternion turn = turned(degrees, model::Vec3::UnitY()) * turned(-90, model::Vec3::UnitX());
   const model::Vec3 middle = turn * model::Vec3(0, -cloth.grid.height / 2, 0);
@@ -57,7 +57,7 @@ std::vector<reference::Vec3> inDouble(std::span<const model::Vec3> vectors) {
   return result;
 }
 
-// Of the pairs that collide, the smallest distance, as a part of that at which they touch; at most 1.
+// Smallest distance of a colliding pair, relative to the distance at which it touches; at most 1.
 double nearest(const model::Scene& scene, const NodeState& state) {
   const std::vector<reference::Vec3> positions = inDouble(state.positions);
   double least = 1;
@@ -72,7 +72,7 @@ double speedOf(const NodeState& state) {
   return std::sqrt(sum / static_cast<double>(state.velocities.size()));
 }
 
-// In panels of so many rows that lie above each other to and fro, the first at height y.
+// Folds the cloth to and fro into panels of `panel` rows that lie above each other, the first at height y.
 NodeState folded(const model::Scene& scene, std::uint32_t panel, float gap, float y) {
   NodeState state = simulation::restState(scene.cloths);
   const model::Grid& grid = scene.cloths[0].grid;
@@ -86,7 +86,7 @@ NodeState folded(const model::Scene& scene, std::uint32_t panel, float gap, floa
   return state;
 }
 
-// ---- Who is near
+// ---- Lists of neighbours
 
 // The stage alone, on a state as it is.
 class Lists {
@@ -148,7 +148,7 @@ class Lists {
   vulkan::Buffer readback_;
 };
 
-// What a list is to hold, by its rule, every pair looked at: nodes plus one, negative of another cloth.
+// Expected lists by brute force over all pairs: nodes plus one, negative for a node of another cloth.
 std::vector<std::set<float>> expectedLists(const model::Scene& scene, const NodeState& state) {
   const double ahead = 1.25 * 3 * scene.substepSeconds();  // three substeps follow the one that makes them
   const std::vector<reference::Vec3> positions = inDouble(state.positions);
@@ -413,7 +413,7 @@ TEST_F(SelfCollision, FoldsOnTheFloorStayAStack) {
         least = std::min(least, double{state.positions[above].y() - state.positions[below].y()});
       }
     if (balls) {
-      // Half of what lies in a hollow at least: panels slope.
+      // In a hollow at least half of the distance remains, because panels slope.
       EXPECT_GT(least, 0.5 * std::sqrt(0.5) * kDistance);
       EXPECT_EQ(intersections(scene, state.positions), 0u);
       EXPECT_GT(nearest(scene, state), 0.85);

@@ -51,7 +51,7 @@ TEST_F(Solve, GivesTheSameBitsForEveryPartitionOfWork) {
   expectSameBits(solvedScene(), passingBall, 10, ways);
 }
 
-// What it says of itself too; the systems' order alone depends on who solves which.
+// The reports are the same too. Only the order of the systems depends on the partition.
 TEST_F(Solve, ReportsTheSameForEveryPartitionOfWork) {
   const Reports reports =
       expectSameReports(solvedScene(), passingBall, {.solveWholeNodes = 1'000'000}, {.solveWholeNodes = 0});
