@@ -134,7 +134,7 @@ TEST_P(KernelArithmetic, UsesOnlyOperationsWithTheSameBitsOnEveryDevice) {
 }
 
 INSTANTIATE_TEST_SUITE_P(All, KernelArithmetic, ::testing::ValuesIn(kAllKernels),
-                         [](const auto& info) { return std::string(info.param.name); });
+                         [](const auto& kernel) { return std::string(kernel.param.name); });
 
 TEST(KernelArithmeticCheck, SeesTheArithmeticOfKernels) {
   const FloatArithmetic found = floatArithmeticOf(kernels::advance_mass_spring);
