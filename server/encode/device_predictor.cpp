@@ -30,17 +30,17 @@ using vulkan::BufferPurpose;
 
 using Row = std::array<std::uint32_t, 4>;
 
-// What one workgroup takes at a time: larger phases are dispatches of their own.
+// Largest phase that one workgroup handles. Larger phases have their own dispatch.
 constexpr std::uint32_t kSmallPhase = 512;
 constexpr std::uint32_t kWorkgroupSize = 64;
 
-// Two turns for a small phase, where the device has so many invocations.
+// Invocations that handle a small phase in two rounds, if the device allows as many.
 std::uint32_t smallPhasesWorkgroupSize(const vulkan::Device& device) {
   return std::min(
       {kSmallPhase / 2, device.limits().maxWorkgroupInvocations, device.limits().maxWorkgroupSizeX});
 }
 
-// A word for each number of the model.
+// One word for each number of the model.
 constexpr std::size_t kScaleWords = sizeof codec::hierarchical::kScaleWeights / sizeof(std::int16_t);
 
 constexpr std::size_t momentBytes(std::size_t vertices) {
@@ -58,7 +58,7 @@ vulkan::KernelDescription describe(const char* name, std::span<const std::uint32
           .workgroupSize = workgroupSize};
 }
 
-// Ten bits each: they are within twice a whole.
+// Packs ten bits each; the weights are within twice a whole.
 constexpr std::uint32_t packed(const std::array<std::int16_t, 4>& parentWeights) {
   std::uint32_t word = 0;
   for (std::size_t i = 1; i < 4; ++i)
@@ -144,7 +144,7 @@ DevicePredictor::DevicePredictor(const vulkan::Device& device, const simulation:
 void DevicePredictor::makeNormals(const vulkan::Device& device, const codec::StreamLayout& layout) {
   const NormalTables tables = makeNormalTables(layout, hierarchy_);
   const auto fill = [&](const auto& table, Buffer& buffer, Buffer& upload) {
-    // Never empty: there may be no face.
+    // The table is never empty, although there may be no face.
     const std::size_t bytes = std::max(std::span(table).size_bytes(), sizeof(Row));
     buffer = Buffer(device, BufferPurpose::state, bytes);
     upload = Buffer(device, BufferPurpose::upload, bytes);
@@ -240,7 +240,7 @@ void DevicePredictor::uploadTables(vulkan::Recorder& recorder) {
     recorder.copy(facesUpload_, faces_, faces_.bytes());
     recorder.copy(facesOfUpload_, facesOf_, facesOf_.bytes());
   }
-  // The origin, after the last node.
+  // The origin follows the last node.
   for (const Buffer& moment : moments_) recorder.fill(moment, 0, sizeof(Row), vertices_ * sizeof(Row));
 }
 
@@ -274,7 +274,7 @@ void DevicePredictor::record(vulkan::Recorder& recorder, std::uint32_t slot, std
   recorder.barrier();
   recorder.dispatch(sumBindings_[kFrameSlots * turn + slot], push_, kWorkgroupSize * chunks.size());
   if (hasNormals_) recorder.dispatch(normalBindings_[kFrameSlots * turn + slot], push_, vertices_);
-  recorder.barrier();  // what follows changes the weights
+  recorder.barrier();  // the next kernel changes the weights
   recorder.dispatch(finishBindings_[turn], push_, std::max(vertices_, shared::kClassWeights));
   recorder.barrier();
   recorder.copy(status_, to.status, status_.bytes());

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Prediction and choice of residuals on the device: kernels, tables and what is read back.
+// Prediction and choice of residuals on the device: kernels, tables and readback.
 #pragma once
 
 #include <array>
@@ -18,30 +18,31 @@
 
 namespace clothstream::encode {
 
-// Records on the device's thread; what is read back of a frame belongs to whoever entropy-codes it.
+// Records on the device's thread. The readback of a frame belongs to the thread that entropy-codes it.
 class DevicePredictor {
  public:
-  // Throws std::runtime_error where it is not supported or memory runs out.
+  // Throws std::runtime_error if the layout is not supported or memory runs out.
   DevicePredictor(const vulkan::Device& device, const simulation::ClothSimulation& simulation,
                   const codec::StreamLayout& layout);
 
-  // One temporal layer, no more than the device's buffers and dispatches hold.
+  // True for one temporal layer, if the device's buffers and dispatches are large enough.
   static bool supports(const vulkan::Device& device, const codec::StreamLayout& layout);
 
   struct FrameWeights {
-    const codec::hierarchical::Weights *used, *left;  // in the frame, if it is not at rest, and after it
+    const codec::hierarchical::Weights *used,
+        *left;  // weights in the frame (if it is not at rest), and weights after it
   };
-  // The frame so many after its key frame. Without weights it uses those that its reference left. `chunks`
-  // are summed up.
+  // Records the frame that comes `sinceKey` frames after its key frame. Without `weights` it uses those that
+  // its reference left. `chunks` are summed up.
   void record(vulkan::Recorder& recorder, std::uint32_t slot, std::uint32_t sinceKey,
               const FrameWeights* weights, std::span<const codec::hierarchical::Phase> chunks);
 
-  // Of a slot whose recording is complete.
+  // Status of a slot whose recording is complete.
   const shared::SlotStatus& status(std::uint32_t slot) const;
   codec::hierarchical::ChunkProducts products(std::uint32_t slot, std::size_t chunk) const;
-  // By vertex: what u and v of its normal are off the prediction, a byte each; empty where there are none.
+  // By vertex: residuals of u and v of its normal, a byte each. Empty without normals.
   std::span<const std::uint32_t> normalResiduals(std::uint32_t slot) const;
-  // Returns whether one of them stays or has a residual that is not 0.
+  // Returns true if a vertex stays or has a residual other than 0.
   bool read(std::uint32_t slot, std::uint32_t begin, std::uint32_t count,
             codec::hierarchical::ChunkResiduals& out) const;
 
@@ -53,7 +54,7 @@ class DevicePredictor {
     vulkan::Buffer status, residuals, wideResiduals, normalResiduals, products;
     vulkan::Buffer weights, chunks;
   };
-  // Phases that one dispatch takes: a large one, or several small ones in one workgroup.
+  // Phases of one dispatch: a large phase, or several small phases in one workgroup.
   struct Step {
     std::uint32_t firstPhase, endPhase, vertices;
     bool isSmall;
@@ -71,18 +72,18 @@ class DevicePredictor {
   codec::hierarchical::Hierarchy hierarchy_;
   std::vector<Step> steps_;
 
-  std::array<vulkan::Buffer, 2> moments_;  // of the reference and of the frame, by turns
+  std::array<vulkan::Buffer, 2> moments_;  // of the reference and of the frame, alternating
   vulkan::Buffer links_, linksUpload_, slotTable_, slotTableUpload_, model_, modelUpload_;
   vulkan::Buffer wanted_, status_, weights_, sentNormals_;
-  vulkan::Buffer faces_, facesUpload_, facesOf_, facesOfUpload_;  // where there are normals
+  vulkan::Buffer faces_, facesUpload_, facesOf_, facesOfUpload_;  // only with normals
   std::array<Slot, kFrameSlots> slots_;
   vulkan::Kernel quantise_, predictPhase_, predictSmallPhases_, sumProducts_, predictNormals_, finish_;
-  // By the present positions, then the turn; by the turn, then the slot; by the turn.
+  // Indexed by the present positions and then the turn; by the turn and then the slot; or by the turn.
   std::vector<vulkan::Bindings> quantiseBindings_, phaseBindings_, smallPhaseBindings_, sumBindings_,
       normalBindings_, finishBindings_;
 
   shared::PredictPush push_{};
-  std::uint32_t turn_ = 0;  // whose moment is the reference's
+  std::uint32_t turn_ = 0;  // index of the reference's moment
   bool started_ = false;
 };
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What a codec records and codes of a frame; slots, kinds and references are FrameEncoder's.
+// Recording and coding of a frame by a codec. Slots, kinds and references belong to FrameEncoder.
 #pragma once
 
 #include <cstddef>
@@ -18,9 +18,9 @@ class EncodeStage {
  public:
   virtual ~EncodeStage() = default;
   virtual std::size_t packetBound() const = 0;
-  // After a barrier, in the stage "encode".
+  // Called after a barrier, in the stage "encode".
   virtual void record(vulkan::Recorder& recorder, std::uint32_t slot, bool predicted) = 0;
-  // In the order of record().
+  // Called in the order of record().
   virtual EncodedFrame entropyCode(const RecordedFrame& frame, std::span<std::byte> out) = 0;
 };
 
@@ -28,7 +28,7 @@ std::unique_ptr<EncodeStage> makeHierarchicalHostStage(const vulkan::Device& dev
                                                        const simulation::ClothSimulation& simulation,
                                                        const codec::StreamLayout& layout,
                                                        std::unique_ptr<codec::Encoder> encoder);
-// Throws std::runtime_error where DevicePredictor does not support it.
+// Throws std::runtime_error if DevicePredictor does not support the layout.
 std::unique_ptr<EncodeStage> makeHierarchicalDeviceStage(const vulkan::Device& device,
                                                          const simulation::ClothSimulation& simulation,
                                                          const codec::StreamLayout& layout);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Threads that predict large frames together.
+// Worker threads that predict large frames.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +13,7 @@ namespace clothstream::encode {
 // Thread-safe: several callers share the threads.
 class EncoderThreads final : public codec::Workers {
  public:
-  // `threads` with the caller's own, at least 1; then there is no other.
+  // `threads` includes the caller's thread and is at least 1. With 1 there is no other thread.
   explicit EncoderThreads(std::uint32_t threads);
   ~EncoderThreads() override;
   EncoderThreads(const EncoderThreads&) = delete;
@@ -21,7 +21,8 @@ class EncoderThreads final : public codec::Workers {
 
   void run(std::uint32_t pieces, const std::function<void(std::uint32_t)>& piece) override;
 
-  // Of a machine with so many processors: a quarter, 1 to 8. A software device wants the others.
+  // Number of threads for a machine with `processors` processors: a quarter of them, 1 to 8. A software
+  // device needs the others.
   static std::uint32_t suitedTo(std::uint32_t processors);
 
  private:

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Frames from simulation state: what all codecs have in common.
+// Encodes simulation states as frames: the part that all codecs share.
 #include "server/encode/frame_encoder.h"
 
 #include <algorithm>
@@ -67,7 +67,7 @@ struct FrameEncoder::State {
   }
 
   std::unique_ptr<EncodeStage> stage;
-  // Of the device's thread.
+  // Belong to the device's thread.
   bool hasReference = false;
   std::uint64_t tick = 0;
   // Set by record(), cleared by entropyCode().

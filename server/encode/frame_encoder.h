@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Frames from simulation state: prepared on the device, packets by the CPU.
+// Encodes simulation states as frames: the device prepares them, the CPU writes packets.
 #pragma once
 
 #include <cstddef>
@@ -17,28 +17,28 @@
 
 namespace clothstream::encode {
 
-// Which of codec::kCodecs a scene's stream is in.
+// The codec of a scene's stream, one of codec::kCodecs.
 std::uint8_t codecOf(const model::Scene& scene);
 
 // The layout of a scene's stream.
 codec::StreamLayout streamLayout(const model::Scene& scene, std::uint32_t epoch);
 
-// Where frames are predicted: on GPUs on the device, on the host where the device is software (a dispatch
-// costs more there than the CPU's vectors do), where there are temporal layers, or where the device's buffers
-// are too small.
+// The place of prediction. `automatic` chooses the device on GPUs. It chooses the host on software devices,
+// where a dispatch costs more than the CPU's vectors, for temporal layers, and if the device's buffers are
+// too small.
 enum class Prediction : std::uint8_t { automatic, onHost, onDevice };
 
-// The packets of frames that are predicted on the device are those of a codec::Encoder of this lag: the
-// weights of a frame are known when it is recorded, whatever of the frames before it is still to be
-// entropy-coded.
+// Lag of the weights, in frames. Frames that the device predicts have the packets of a codec::Encoder with
+// this lag. The weights of a frame are known when it is recorded, although earlier frames may still wait for
+// entropy coding.
 inline constexpr std::uint32_t kWeightLag = 3;
 
-// The readback of one recorded frame, waiting to be entropy-coded.
+// A recorded frame that waits for entropy coding.
 struct RecordedFrame {
   std::uint32_t slot = 0;
   std::uint64_t tick = 0;
   codec::PacketKind kind = codec::PacketKind::key;
-  std::uint64_t referenceTick = 0;  // of a predicted frame of a stream of one temporal layer
+  std::uint64_t referenceTick = 0;  // of a predicted frame in a stream with one temporal layer
 };
 
 struct EncodedFrame {
@@ -49,37 +49,37 @@ struct EncodedFrame {
 // record() belongs to the device's thread, entropyCode() to one other thread (or the same).
 class FrameEncoder {
  public:
-  // Frames that may be recorded and not yet entropy-coded.
+  // Largest number of frames that are recorded and not yet entropy-coded.
   static constexpr std::uint32_t kSlots = kWeightLag;
 
-  // Throws std::runtime_error where `prediction` is asked for and cannot be. `workers`, if any, predict large
-  // frames on the host and outlive the encoder.
+  // Throws std::runtime_error if the requested `prediction` is not possible. `workers`, if given, predict
+  // large frames on the host and must outlive the encoder.
   FrameEncoder(const vulkan::Device& device, const simulation::ClothSimulation& simulation,
                const codec::StreamLayout& layout, Prediction prediction = Prediction::automatic,
                codec::Workers* workers = nullptr);
-  // Predicted on the host by this encoder, which is of that layout.
+  // Predicts on the host by `encoder`, which has the same layout.
   FrameEncoder(const vulkan::Device& device, const simulation::ClothSimulation& simulation,
                const codec::StreamLayout& layout, std::unique_ptr<codec::Encoder> encoder);
   ~FrameEncoder();
   FrameEncoder(const FrameEncoder&) = delete;
   FrameEncoder& operator=(const FrameEncoder&) = delete;
 
-  // Whether a slot is free.
+  // True if a slot is free.
   bool canRecord() const;
-  // Whether all are: no frame waits to be entropy-coded.
+  // True if all slots are free: no frame waits for entropy coding.
   bool isIdle() const;
 
-  // Takes the simulation's present positions (and normals, which must have been recorded,
-  // where the layout has them). `tick` must grow from call to call, but where history was forgotten. A
-  // predicted frame refers to the frame recorded before, or with temporal layers as codec::Encoder has it;
-  // the first is always a key frame, whatever is asked.
+  // Records a frame of the simulation's present positions, and of its normals if the layout has them; these
+  // must be recorded before. `tick` must grow from call to call, unless history was forgotten. A predicted
+  // frame refers to the frame recorded before; with temporal layers codec::Encoder chooses. The first frame
+  // is always a key frame.
   RecordedFrame record(vulkan::Recorder& recorder, std::uint64_t tick, bool forceKey);
 
-  // After a rollback or restore: the next frame is a key frame.
+  // Makes the next frame a key frame, after a rollback or restore.
   void forgetHistory();
 
-  // Once the recording is complete on the device, in the order of record(); frees the slot. `out` holds at
-  // least packetBound() bytes.
+  // Codes a frame whose recording is complete, in the order of record(). Frees the slot. `out` has at least
+  // packetBound() bytes.
   EncodedFrame entropyCode(const RecordedFrame& frame, std::span<std::byte> out);
 
   std::size_t packetBound() const;

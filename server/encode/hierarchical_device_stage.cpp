@@ -49,10 +49,10 @@ class HierarchicalDeviceStage final : public EncodeStage {
 
   DevicePredictor predictor_;
   FitSchedule fitted_;
-  // Of the device's thread.
+  // Belong to the device's thread.
   std::uint64_t recorded_ = 0;
   std::uint32_t recordedSinceKey_ = 0;
-  // Of the thread that entropy-codes; but what is planned is read by the device's.
+  // Belong to the thread that entropy-codes, but the device's thread reads the planned weights.
   WeightPlan plan_;
   std::unique_ptr<codec::hierarchical::FrameWriter> writer_;
   codec::hierarchical::ChunkResiduals chunk_;

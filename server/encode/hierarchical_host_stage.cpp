@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Prediction on the host: positions, and normals where they are sent, are read back, all else is done on the
-// CPU.
+// Prediction on the host: the device only copies positions, and normals if they are sent.
 #include <array>
 #include <utility>
 #include <vector>
@@ -41,7 +40,7 @@ class HierarchicalHostStage final : public EncodeStage {
     const Slot& slot = slots_[frame.slot];
     unpack(slot.positions, positions_);
     if (!normals_.empty()) unpack(slot.normals, normals_);
-    // The frames before it may be of a history that was given up, and of later ticks.
+    // Earlier frames may belong to a history that was dropped, with later ticks.
     if (frame.kind == codec::PacketKind::key) encoder_->forgetHistory();
     const std::size_t bytes = encoder_->encode(frame.tick, frame.kind, positions_, normals_, out);
     return {.bytes = bytes, .reconstructionHash = encoder_->reconstructionHash()};
@@ -52,7 +51,7 @@ class HierarchicalHostStage final : public EncodeStage {
     vulkan::Buffer positions, normals;
   };
 
-  // Three of four components.
+  // Copies three of four components.
   static void unpack(const vulkan::Buffer& buffer, std::vector<float>& out) {
     float* component = out.data();
     for (const shared::vec4& vector : buffer.mapped<shared::vec4>().first(out.size() / 3)) {

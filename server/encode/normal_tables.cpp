@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Which faces meet in each vertex.
+// Tables of the faces that meet at each vertex.
 #include "server/encode/normal_tables.h"
 
 #include <algorithm>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Which faces meet in each vertex, as the kernel that predicts normals reads it.
+// Tables of the faces that meet at each vertex, for the kernel that predicts normals.
 #pragma once
 
 #include <array>
@@ -13,12 +13,11 @@ namespace clothstream::encode {
 
 struct NormalTables {
   std::vector<std::array<std::uint32_t, 4>> faces;  // slots of the corners; shared::kNoCorner
-  // By vertex: where its faces start, and where those of the last end; then these, one vertex after the
-  // other.
+  // By vertex: start of its faces, and the end of the last vertex's faces. Then the faces, vertex by vertex.
   std::vector<std::uint32_t> facesOf;
 };
 
-// Quads of grids and triangles of meshes (proto/codec/hierarchical/normal_prediction.h).
+// Tables for quads of grids and triangles of meshes (proto/codec/hierarchical/normal_prediction.h).
 NormalTables makeNormalTables(const codec::StreamLayout& layout,
                               const codec::hierarchical::Hierarchy& hierarchy);
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The encoders of a stream: one for each quality that somebody gets.
+// The encoders of a stream: one for each quality that a subscriber receives.
 #pragma once
 
 #include <array>
@@ -12,29 +12,29 @@
 
 namespace clothstream::encode {
 
-// The finest quality's is always there. That of another is made when it is first wanted, on a thread of its
-// own, for that of a large cloth takes long, and is gone some time after it was wanted last. Belongs to the
-// device's thread.
+// The encoder of the finest quality always exists. Other encoders are created on a separate thread when their
+// quality is first needed, because that takes long for a large cloth. They are destroyed some time after
+// their last use. Belongs to the device's thread.
 class QualityEncoders {
  public:
   using Clock = std::chrono::steady_clock;
-  // After which one that nobody wants is gone.
+  // Time after which an unused encoder is destroyed.
   static constexpr std::chrono::seconds kKept{10};
 
-  // Throws what FrameEncoder throws. `device`, `simulation` and `workers` outlive it.
+  // Throws the exceptions of FrameEncoder. `device`, `simulation` and `workers` must outlive this object.
   QualityEncoders(const vulkan::Device& device, const simulation::ClothSimulation& simulation,
                   const codec::StreamLayout& layout, codec::Workers* workers);
 
   FrameEncoder& finest() { return *qualities_[0].encoder; }
   std::uint8_t count() const { return layout_.qualities; }
-  // Of one of them, which somebody wants now; nullptr while it is made.
+  // Encoder of a quality that a subscriber needs now; nullptr while it is being created.
   FrameEncoder* wanted(std::uint8_t quality, Clock::time_point now);
-  // Nobody wants it now: its next frame is a key frame.
+  // No subscriber needs the quality now. Its next frame is a key frame.
   void unwanted(std::uint8_t quality, Clock::time_point now);
 
-  // After a rollback or restore: the next frame of each is a key frame.
+  // Makes the next frame of each quality a key frame, after a rollback or restore.
   void forgetHistory();
-  // All but the finest; they must be idle.
+  // Destroys all encoders but the finest; they must be idle.
   void drop();
 
  private:

@@ -84,7 +84,7 @@ class Playback : public stream::FrameSource {
   const std::uint64_t ticksAFrame_;
   std::optional<RecordedStream::Next> next_;
   bool asleep_ = true, atEnd_ = false;
-  bool reportsContacts_ = false;  // something changed that everybody is to know
+  bool tells_ = false;  // something changed that everybody is to know
   Clock::time_point origin_{}, nextTold_{};
   double originPosition_ = 0;      // s of the recording at the origin
   std::uint64_t shift_ = 0;        // from recorded ticks to those sent, modulo 2^64

@@ -42,7 +42,7 @@ void writeCloths(const model::Scene& scene, v1::RecordedTick& message) {
     v1::ClothParameters& to = *message.add_cloths();
     to.mutable_cloth()->Swap(parameters.mutable_cloths(static_cast<int>(i)));
     to.mutable_cloth()->clear_grid();
-    if (const auto& correctionFraction = bare.cloths[i].solver.correctionFraction) to.set_taken_back(*correctionFraction);
+    if (const auto& fraction = bare.cloths[i].solver.correctionFraction) to.set_taken_back(*fraction);
   }
 }
 

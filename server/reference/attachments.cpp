@@ -46,7 +46,7 @@ Attachments::Attachments(const model::Scene& scene) {
 }
 
 void Attachments::begin(std::vector<ReferenceCloth>& cloths, std::span<const Pose> frames,
-                  std::span<const Grab> grabs, double tickSeconds) {
+                        std::span<const Grab> grabs, double tickSeconds) {
   for (const Attached& attached : attached_) {
     ReferenceCloth& cloth = cloths[attached.cloth];
     const Pose& frame = frames.empty() ? start_[attached.frame] : frames[attached.frame];
@@ -74,7 +74,7 @@ void Attachments::begin(std::vector<ReferenceCloth>& cloths, std::span<const Pos
         std::optional<Held>& held = held_[c][node];
         const bool isFree = !held || grabs[held->grab].state != Grab::State::holds;
         if (!isFree || cloths[c].inverseMasses()[node] == 0 || distance(c, node) > within) continue;
-        // Of grabs that begin together, the first has it.
+        // The first of several beginning grabs gets the node.
         if (held && held->grab < g && grabs[held->grab].state == Grab::State::takes) continue;
         held = {g, grab.start.orientation.conjugate() * (cloths[c].positions()[node] - grab.start.position)};
         ++status_[g].taken;
@@ -82,8 +82,8 @@ void Attachments::begin(std::vector<ReferenceCloth>& cloths, std::span<const Pos
   }
 }
 
-void Attachments::apply(std::vector<ReferenceCloth>& cloths, std::span<const Grab> grabs, std::uint32_t substep,
-                  std::uint32_t substeps, double tickSeconds) {
+void Attachments::apply(std::vector<ReferenceCloth>& cloths, std::span<const Grab> grabs,
+                        std::uint32_t substep, std::uint32_t substeps, double tickSeconds) {
   const double h = tickSeconds / substeps;
   for (std::size_t c = 0; c < cloths.size(); ++c) {
     ReferenceCloth& cloth = cloths[c];

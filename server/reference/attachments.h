@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What holds cloth, in double precision: attachments, tethers, grabs.
+// Attachments, tethers and grabs, in double precision.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +14,7 @@
 
 namespace clothstream::reference {
 
-// Moves from start to end over a tick's substeps; as simulation::Grab says.
+// Moves from start to end over a tick's substeps, as simulation::Grab does.
 struct Grab {
   enum class State : std::uint8_t { free, holds, takes };
   State state = State::free;
@@ -28,15 +28,16 @@ class Attachments {
  public:
   explicit Attachments(const model::Scene& scene);
 
-  // A tick's start: attached nodes get the velocity that takes them to their frames' places at its end, at
-  // most model::kMaxAttachmentSpeed; no frames: where they start. Grabs that begin take hold.
+  // Starts a tick. Attached nodes get the velocity that takes them to their frames' places at its end, at
+  // most model::kMaxAttachmentSpeed. Without `frames`, the frames stay where they start. Beginning grabs grab
+  // nodes.
   void begin(std::vector<ReferenceCloth>& cloths, std::span<const Pose> frames, std::span<const Grab> grabs,
              double tickSeconds);
-  // The end of a substep.
+  // Ends a substep.
   void apply(std::vector<ReferenceCloth>& cloths, std::span<const Grab> grabs, std::uint32_t substep,
              std::uint32_t substeps, double tickSeconds);
 
-  // Of each grab: nodes that it took hold of, and those that slipped away since.
+  // Status of each grab: nodes that it grabbed, and grabbed nodes that slipped away since.
   struct Status {
     std::uint32_t taken = 0, slipped = 0;
   };
@@ -54,9 +55,9 @@ class Attachments {
 
   std::vector<Pose> start_;
   std::vector<Attached> attached_;
-  std::vector<std::vector<model::NodeTethers>> tethers_;  // of each cloth; empty: it has none
+  std::vector<std::vector<model::NodeTethers>> tethers_;  // by cloth; empty if it has none
   std::vector<double> slack_;
-  std::vector<std::vector<std::optional<Held>>> held_;  // of each cloth's nodes
+  std::vector<std::vector<std::optional<Held>>> held_;  // by cloth and node
   std::vector<Status> status_;
 };
 

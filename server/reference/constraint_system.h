@@ -10,20 +10,20 @@
 
 namespace clothstream::reference {
 
-// Between two nodes, which a substep is to bring nearer to each other by `excess`, m, than they are at its
-// start.
+// A constraint between two nodes: the substep has to bring them nearer by `excess`, m.
 struct Constraint {
   std::uint32_t a = 0, b = 0;
   double excess = 0;
 };
 
-// One substep's system  (J M^-1 J^T + compliance I) lambda = b,  b = C + h J v,  with C the constraints'
-// excess and J the derivative of |x_b - x_a| at the substep's start; then x -= M^-1 J^T lambda. In this form
-// (lambda times h^2 of the paper's) lambda is a mass times a length over a length: kg m / m.
+// The system of one substep:  (J M^-1 J^T + compliance I) lambda = b,  b = C + h J v.  C is the excess of the
+// constraints, and J the derivative of |x_b - x_a| at the substep's start. Then x -= M^-1 J^T lambda. In this
+// form (lambda is the paper's times h^2) lambda is a mass times a length over a length: kg m / m.
 class ConstraintSystem {
  public:
-  // `start`: positions that J is of; `velocities`: those that the forces alone give. `compliance` in 1/kg,
-  // scaled by 1 / h^2 already. Constraints between nodes without inverse mass are left out.
+  // `start` are the positions for J; `velocities` are those of the free motion that the forces alone give.
+  // `compliance` is in 1/kg, already divided by h^2. Constraints between nodes without inverse mass are left
+  // out.
   ConstraintSystem(std::span<const Constraint> constraints, std::span<const Eigen::Vector3d> start,
                    std::span<const Eigen::Vector3d> velocities, std::span<const double> inverseMasses,
                    double compliance, double h);
@@ -36,12 +36,13 @@ class ConstraintSystem {
   struct Solution {
     Eigen::VectorXd multipliers;
     std::uint32_t iterations = 0;
-    double residual = 0;  // norm, relative to where it started
+    double residual = 0;  // norm, relative to its start
   };
-  // From zero, until the residual's norm is `tolerance` of where it started, or the iterations are spent.
+  // Starts from zero. Ends when the residual's norm is `tolerance` times that at the start, or after
+  // `iterations`.
   Solution conjugateGradients(std::uint32_t iterations, double tolerance) const;
 
-  // -M^-1 J^T lambda: how far each node goes.
+  // -M^-1 J^T lambda: displacement of each node.
   std::vector<Eigen::Vector3d> moves(const Eigen::VectorXd& multipliers) const;
 
  private:

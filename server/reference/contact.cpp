@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Contact by the height over a convex surface, which is a convex function along any straight way.
+// Contact by the height above a convex surface, which is a convex function along a straight path.
 #include "server/reference/contact.h"
 
 #include <algorithm>
@@ -10,7 +10,7 @@
 namespace clothstream::reference {
 namespace {
 
-// Over the nearest part of a shape's surface, thickness counted; negative inside.
+// Height above the nearest part of a shape's surface, including thickness; negative inside.
 struct Surface {
   double height;
   Vec3 normal;
@@ -59,10 +59,10 @@ bool isRound(const model::Shape& shape) {
   return std::holds_alternative<model::Sphere>(shape) || std::holds_alternative<model::Capsule>(shape);
 }
 
-// Where between from, outside, and to the height first is zero.
+// First point between `from`, which is outside, and `to` with height zero.
 std::optional<Vec3> entry(const model::Shape& shape, double thickness, const Vec3& from, const Vec3& to) {
   const auto height = [&](double t) { return over(shape, thickness, from + t * (to - from)).height; };
-  // The lowest point, by thirds.
+  // Ternary search for the lowest point.
   double low = 0, high = 1;
   if (height(1) >= 0)
     for (int i = 0; i < 80; ++i) {
@@ -79,14 +79,14 @@ std::optional<Vec3> entry(const model::Shape& shape, double thickness, const Vec
   return from + inside * (to - from);
 }
 
-// Both in the shape's frame.
+// Both points are in the shape's frame.
 std::optional<Contact> contactOf(const model::Shape& shape, double thickness, const Vec3& from,
                                  const Vec3& to) {
   const bool begunInside = over(shape, thickness, from).height <= 0;
   const std::optional<Vec3> entered = begunInside ? from : entry(shape, thickness, from, to);
   if (!entered) return std::nullopt;
   const Surface there = over(shape, thickness, *entered);
-  // Round shapes push along their own normal where that is on the side that the way came from.
+  // Round shapes push along their own normal if it is on the side that the path came from.
   if (isRound(shape)) {
     const Surface end = over(shape, thickness, to);
     if (end.normal.dot(there.normal) > 0) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Where a point on its way runs into a shape, in double precision.
+// Contact of a moving point with a shape, in double precision.
 #pragma once
 
 #include <Eigen/Core>
@@ -22,7 +22,8 @@ inline Pose toPose(const model::Pose& pose) {
   return {pose.position.cast<double>(), pose.orientation.cast<double>()};
 }
 
-// In a straight line, and by the normalised mean of the quaternions the shorter way; part from 0 to 1.
+// Interpolates in a straight line, and by the normalised mean of the quaternions the shorter way. `part` is
+// from 0 to 1.
 Pose between(const Pose& from, const Pose& to, double part);
 
 // A collider over one substep.
@@ -32,20 +33,22 @@ struct ColliderStep {
   Vec3 spin = Vec3::Zero();  // axis times twice the sine of half the angle, over the substep's seconds
 };
 
-// Substep `index` of `substeps` on the way from start to end.
+// Substep `index` of `substeps` on the way from `start` to `end`.
 ColliderStep stepOf(const Pose& start, const Pose& end, std::uint32_t index, std::uint32_t substeps,
                     double tickSeconds);
 
-// Metres from the point to the shape's surface (to the highest plane of what has planes); negative inside.
+// Distance of the point from the shape's surface, m (from the highest plane of shapes with planes). Negative
+// inside.
 double heightOver(const model::Shape& shape, const Pose& pose, const Vec3& point);
 
 struct Contact {
   Vec3 normal;   // out of the shape
-  double depth;  // how far along it the end of the way has to go
+  double depth;  // distance by which the end of the path has to move along it
 };
 
-// Cloth keeps `thickness` from the surface (from the planes of what has planes). A way that begins outside
-// meets the shape where it first enters; one that begins inside leaves by the nearest way at its beginning.
+// Cloth keeps `thickness` from the surface (from the planes of shapes with planes). A path that begins
+// outside meets the shape where it first enters. A path that begins inside leaves by the nearest way at its
+// beginning.
 std::optional<Contact> contactOf(const model::Shape& shape, double thickness, const ColliderStep& step,
                                  const Vec3& from, const Vec3& to);
 

@@ -11,27 +11,27 @@
 
 namespace clothstream::reference {
 
-// Between two nodes; N/m, N s/m, m.
+// A spring between two nodes; N/m, N s/m, m.
 struct ImplicitSpring {
   std::uint32_t a = 0, b = 0;
   double stiffness = 0, damping = 0, restLength = 0;
 };
 
-// One substep's system  (M + h D + h^2 K) u = -(h D (v_free - v) + h^2 K v_free)  for the velocities v_free +
-// u, with D and K the springs' derivatives at the substep's start, of K what pushes across a compressed
-// spring left out. Nodes without inverse mass have u = 0.
+// The system of one substep for the velocities v_free + u:  (M + h D + h^2 K) u = -(h D (v_free - v) + h^2 K
+// v_free).  D and K are the springs' derivatives at the substep's start; K leaves out the part that pushes
+// across a compressed spring. Nodes without inverse mass have u = 0.
 class ImplicitSystem {
  public:
-  // `free`: the velocities that the forces alone give from `velocities`.
+  // `free` are the velocities that the forces alone give, starting from `velocities`.
   ImplicitSystem(std::span<const ImplicitSpring> springs, std::span<const Eigen::Vector3d> positions,
                  std::span<const Eigen::Vector3d> velocities, std::span<const Eigen::Vector3d> free,
                  std::span<const double> inverseMasses, double h);
 
-  // kg, three rows a node; of pinned nodes those of the identity.
+  // kg, three rows per node; rows of pinned nodes are those of the identity.
   const Eigen::SparseMatrix<double>& matrix() const { return matrix_; }
   const Eigen::VectorXd& side() const { return side_; }
 
-  // u, m/s a node, by a factorisation.
+  // u by node, m/s, from a factorisation.
   std::vector<Eigen::Vector3d> solve() const;
 
  private:

@@ -18,7 +18,7 @@ constexpr double kTinyLengthSquared = 1e-12;  // m^2, of a spring
 constexpr double kTinyAirSquared = 1e-20;     // of |u||N|, m^6/s^2
 constexpr double kTinyNormalSquared = 1e-30;  // m^4
 
-// u: velocity of the air against the triangle; N: its area vector.
+// `u` is the velocity of the air relative to the triangle, `N` its area vector.
 Vec3 airForce(const Vec3& u, const Vec3& N, double density, double drag, double lift) {
   const double flow = N.dot(u);
   const double square = u.squaredNorm() * N.squaredNorm();
@@ -105,7 +105,7 @@ void ReferenceCloth::accumulateBendingForces(std::span<Vec3> forces) const {
   }
 }
 
-// The integral of 2 sin(theta / 2) - bent from the shape at rest on.
+// Integral of 2 sin(theta / 2) - bent, from the rest shape on.
 double ReferenceCloth::bendingEnergy() const {
   double sum = 0;
   for (const model::Hinge& hinge : hinges_) {
@@ -209,7 +209,7 @@ void ReferenceCloth::takeImplicitVelocities(double h) {
   }
 }
 
-// [MMC16] Alg. 1, Eq. 18 and 26, with C the length's excess, the gradient a unit vector at b and its negative
+// [MMC16] Alg. 1, Eq. 18 and 26. C is the excess length; its gradient is a unit vector at b and the negative
 // at a.
 void ReferenceCloth::correctSprings(double h) {
   if (colours_.links.empty()) colours_ = model::springColours(cloth_);

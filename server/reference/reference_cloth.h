@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// One cloth in double precision, serial, spring by spring: the oracle of the kernels and the CPU baseline.
+// One cloth in double precision, serial, spring by spring: the reference for the kernels and the CPU
+// baseline.
 #pragma once
 
 #include <Eigen/Core>
@@ -16,66 +17,66 @@
 
 namespace clothstream::reference {
 
-// Of the structural springs: |d| / L - 1.
+// Stretch |d| / L - 1 of the structural springs.
 struct Strain {
   double max = 0;   // largest stretch
-  double p99 = 0;   // the smallest that 99 % of them do not exceed
+  double p99 = 0;   // the smallest value that 99 % of them do not exceed
   double mean = 0;  // mean of the absolute values
 };
 
-// A grid's nodes are row-major. Not thread-safe; after construction no member allocates but normals(), and
-// solvers that solve a system.
+// Nodes of a grid are row-major. Not thread-safe. After construction only normals() and solvers of linear
+// systems allocate memory.
 class ReferenceCloth {
  public:
-  // At rest in its start pose. Springs are those of model::springLinks().
+  // Starts at rest in its start pose. The springs are those of model::springLinks().
   explicit ReferenceCloth(const model::Cloth& cloth);
 
-  // Springs, bending, damping, drag, lift, friction, thickness, mass, solver from now on; same shape, same
-  // pins.
+  // Sets springs, bending, damping, drag, lift, friction, thickness, mass and solver. Shape and pins must
+  // stay the same.
   void setParameters(const model::Cloth& cloth);
 
   std::span<Vec3> positions() { return positions_; }
   std::span<const Vec3> positions() const { return positions_; }
   std::span<Vec3> velocities() { return velocities_; }
   std::span<const Vec3> velocities() const { return velocities_; }
-  // 1/kg; 0 for pinned nodes, which go on at the velocity that they are given.
+  // 1/kg; 0 for pinned nodes, which keep the velocity that they are given.
   std::span<const double> inverseMasses() const { return inverseMasses_; }
   std::uint32_t nodeCount() const { return cloth_.nodeCount(); }
-  // kg; of pinned nodes too.
+  // kg, also of pinned nodes.
   std::span<const double> masses() const { return masses_; }
 
-  // Both add to one force a node, N. [Va21] Eq. 1; air with drag and lift a triangle.
+  // Both functions add one force per node, N: [Va21] Eq. 1, and air with drag and lift per triangle.
   void accumulateSpringForces(std::span<Vec3> forces) const;
   void accumulateAirForces(const model::Environment& environment, std::span<Vec3> forces) const;
 
-  // J of dihedral bending, and what it pulls at nodes with, N: scene/hinges.h.
+  // Energy of dihedral bending, J, and its forces on the nodes, N: model/hinges.h.
   double bendingEnergy() const;
   void accumulateBendingForces(std::span<Vec3> forces) const;
 
-  // Forces, one step of h seconds, and the cloth's constraints; colliders apart.
+  // Computes forces, takes one step of h seconds, and enforces the cloth's constraints; without colliders.
   void integrate(const model::Environment& environment, model::Integrator integrator, double h);
 
-  // Nodes on their way from `from`, one place a node, to where they are go out of the shape; their velocity
-  // relative to its surface loses what goes into it, and the rest meets Coulomb friction ([Va21] 3.4, Alg.
-  // 4). `only`: one byte a node, which of them; empty: all.
+  // Moves nodes out of the shape on their way from `from` (one place per node) to their positions. Their
+  // velocity relative to the surface loses the part into the surface, and Coulomb friction acts on the rest
+  // ([Va21] 3.4, Alg. 4). `only` selects nodes, one byte per node; empty: all.
   void collide(const model::Shape& shape, const ColliderStep& step, double friction,
                std::span<const Vec3> from, std::span<const std::uint8_t> only = {});
 
-  // Unit normals; (0,0,1) where they vanish. A grid's from up to eight triangles round a node ([Va21] 3.5,
-  // Alg. 5), a mesh's from the area vectors of a node's triangles.
+  // Unit normals; (0,0,1) if they vanish. A grid uses up to eight triangles around a node ([Va21] 3.5, Alg.
+  // 5), a mesh the area vectors of a node's triangles.
   std::vector<Vec3> normals() const;
 
-  // J, of the nodes that can move; gravity's is 0 at the origin.
+  // Energies of free nodes, J; the gravity energy is 0 at the origin.
   double kineticEnergy() const;
   double elasticEnergy() const;
   double gravityEnergy(const Vec3& gravity) const;
   Strain strain() const;
-  // How deep the deepest node that can move lies below the shape's surface, m; 0 where none does.
+  // Depth of the deepest free node below the shape's surface, m; 0 if no node is below.
   double penetration(const model::Shape& shape, const Pose& pose) const;
 
  private:
   void setMass(float mass);
-  // m/s^2; 0 of pinned nodes. Until the next call.
+  // m/s^2; 0 for pinned nodes. Valid until the next call.
   const std::vector<Vec3>& accelerations(const model::Environment& environment);
   void integrateRungeKutta(const model::Environment& environment, double h);
   void bend(double h);
@@ -88,10 +89,10 @@ class ReferenceCloth {
   model::Cloth cloth_;
   std::vector<model::SpringLink> links_;
   std::vector<model::Triangle> triangles_;
-  std::vector<model::Hinge> hinges_;  // once they are needed
+  std::vector<model::Hinge> hinges_;  // created at first use
   std::vector<Vec3> positions_, velocities_, forces_;
-  std::vector<Vec3> start_, startVelocities_;  // of the substep, where a system is solved
-  model::SpringColours colours_;               // of xpbd, once they are needed
+  std::vector<Vec3> start_, startVelocities_;  // at the substep's start, for solvers of linear systems
+  model::SpringColours colours_;               // of xpbd, created at first use
   std::vector<double> masses_, inverseMasses_;
 };
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// All cloths of a scene on the CPU in double precision: ticks of substeps, as the kernels do them.
+// All cloths of a scene on the CPU in double precision: the ticks and substeps of the kernels.
 #pragma once
 
 #include <cstdint>
@@ -22,29 +22,27 @@ struct MovingCollider {
 struct TickInputs {
   model::Environment environment;
   std::vector<MovingCollider> colliders;
-  std::vector<Pose> attachments =
-      {};  // at the tick's end, in the order of the cloths; none: where they start
+  std::vector<Pose> attachments = {};  // at the tick's end, in the order of the cloths; empty: the start
   std::vector<Grab> grabs = {};
 };
 
-// The scene's own environment, colliders and attachments over the given tick: from tick * dt to (tick + 1) *
-// dt.
+// Environment, colliders and attachments of the scene itself in a tick: from tick * dt to (tick + 1) * dt.
 TickInputs inputsAt(const model::Scene& scene, std::uint64_t tick);
 
 class ReferenceSimulation {
  public:
   explicit ReferenceSimulation(const model::Scene& scene);
 
-  // One tick.
+  // Simulates one tick.
   void tick(const TickInputs& inputs);
-  // The next tick of the scene by itself.
+  // Simulates the next tick with the scene's own inputs.
   void tick();
 
-  // Substep `index` of a tick: forces, integration, colliders in order; what holds the cloths;
-  // self-collision, and colliders again.
+  // Simulates substep `index` of a tick: forces, integration and colliders in order; attachments, tethers and
+  // grabs; self-collision, and colliders again.
   void substep(const TickInputs& inputs, std::uint32_t index);
 
-  // Ticks done.
+  // Number of simulated ticks.
   std::uint64_t ticks() const { return ticks_; }
   std::vector<ReferenceCloth>& cloths() { return cloths_; }
   const std::vector<ReferenceCloth>& cloths() const { return cloths_; }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Nodes as balls that keep out of each other, in double precision.
+// Nodes as balls that repel each other, in double precision.
 #include "server/reference/self_collision.h"
 
 #include <algorithm>
@@ -21,7 +21,7 @@ SelfCollision::SelfCollision(const model::Scene& scene) {
 }
 
 std::vector<SelfCollision::Pair> SelfCollision::pairs(std::span<const Vec3> positions, double reach) const {
-  // Along one axis only those need be looked at that are not too far apart on it.
+  // Only nodes that are close along one axis have to be checked.
   std::vector<std::uint32_t> order(balls_.size());
   for (std::uint32_t i = 0; i < order.size(); ++i) order[i] = i;
   Vec3 low = Vec3::Constant(1e30), high = -low;

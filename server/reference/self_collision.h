@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Nodes as balls that keep out of each other, in double precision: every pair looked at, none listed ahead.
+// Nodes as balls that repel each other, in double precision. Every pair is checked; there are no lists.
 #pragma once
 
 #include <cstdint>
@@ -11,24 +11,24 @@
 
 namespace clothstream::reference {
 
-// Of a whole scene; nodes are numbered as its cloths follow each other.
+// Self-collision of a whole scene. Node numbers follow the order of the cloths.
 class SelfCollision {
  public:
   explicit SelfCollision(const model::Scene& scene);
 
-  // Whether any cloth has it.
+  // True if a cloth has self-collision.
   bool exists() const { return !balls_.empty(); }
 
-  // Two nodes that are nearer than their radii add up to, and not neighbours at rest.
+  // Two nodes closer than the sum of their radii that are not neighbours at rest.
   struct Pair {
     std::uint32_t a, b;  // a < b
     double distance;
   };
-  // By a, then by b. `reach`: factor on the distance at which two nodes count as a pair.
+  // Pairs, ordered by a, then by b. `reach` is a factor of the distance at which two nodes count as a pair.
   std::vector<Pair> pairs(std::span<const Vec3> positions, double reach = 1) const;
 
-  // One iteration in a substep of h seconds: impulses to all pairs at once, by mass splitting, and positions
-  // after them. Returns one byte a node: whether it touches another.
+  // One iteration in a substep of h seconds: impulses to all pairs at once by mass splitting, then positions.
+  // Returns one byte per node: 1 if it touches another node.
   std::vector<std::uint8_t> resolve(std::span<Vec3> positions, std::span<Vec3> velocities,
                                     std::span<const double> inverseMasses, double h) const;
 
@@ -39,7 +39,7 @@ class SelfCollision {
     Vec3 rest;
   };
   std::vector<Ball> balls_;          // by node
-  std::vector<std::uint32_t> ball_;  // of a node; meaningless where it has none
+  std::vector<std::uint32_t> ball_;  // by node; meaningless if it has no ball
   double longest_ = 0;               // m, the largest sum of two radii
   std::uint32_t nodeCount_ = 0;
 };

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Raw frames, and the JSON beside them.
+// Raw frames, and their description in JSON.
 #include "server/step/state_file.h"
 
 #include <bit>
@@ -25,7 +25,7 @@ StateFile::StateFile(std::filesystem::path path)
     : path_(std::move(path)), file_(path_, std::ios::binary | std::ios::trunc) {
   if (!file_) fail(path_);
   std::error_code none;
-  std::filesystem::remove(sidecar(), none);  // it is of a former file
+  std::filesystem::remove(sidecar(), none);  // it describes an earlier file
 }
 
 std::filesystem::path StateFile::sidecar() const {
@@ -49,7 +49,7 @@ void StateFile::finish(const nlohmann::ordered_json& description, std::uint32_t 
   whole.update(description);
   const std::filesystem::path temporary = sidecar().string() + ".part";
   std::ofstream out(temporary);
-  // Names of devices and files need not be UTF-8.
+  // Names of devices and files may not be UTF-8.
   out << whole.dump(1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) << '\n';
   out.close();
   if (!out) fail(temporary);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// States of a scene as raw numbers for researchers, and beside them what they are.
+// States of a scene as raw numbers for researchers, with a description.
 #pragma once
 
 #include <cstddef>
@@ -13,16 +13,16 @@
 
 namespace clothstream::step {
 
-// FILE holds frames of little-endian float32, one after the other: of each node in order its position (m) and
-// its velocity (m/s), six numbers. FILE.json says the rest (docs/simulation.md); finish() writes it, whole or
-// not at all. Until then there is none beside FILE.
+// FILE has frames of little-endian float32: for each node in order its position (m) and velocity (m/s), six
+// numbers. FILE.json describes them (docs/simulation.md). finish() writes FILE.json completely or not at all;
+// before that it does not exist.
 class StateFile {
  public:
-  // Throws std::runtime_error with the path and what the system said, as the others do.
+  // Throws std::runtime_error with the path and the system's message, like the other functions.
   explicit StateFile(std::filesystem::path path);
 
   void append(std::span<const std::byte> frame);
-  // `description` gets this format's own fields: format, file, dtype, shape, columns.
+  // Adds this format's fields to `description`: format, file, dtype, shape, columns.
   void finish(const nlohmann::ordered_json& description, std::uint32_t nodes);
   std::uint64_t frames() const { return frames_; }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Ticks into a file.
+// Writes ticks into a file.
 #include "server/step/step.h"
 
 #include <chrono>
@@ -50,7 +50,7 @@ Json describe(std::span<const simulation::ClothReport> reports, double deviceSec
   return {{"deviceSeconds", deviceSeconds}, {"cloths", std::move(cloths)}};
 }
 
-// Of the last recording, but for what the report and the copy of the state took.
+// Device time of the last recording, without the report and the copy of the state.
 double tickSeconds(vulkan::Recorder& recorder) {
   double sum = 0;
   for (const vulkan::StageTime& stage : recorder.stageTimes())
@@ -76,7 +76,7 @@ class Progress {
   Clock::time_point start_ = Clock::now(), next_ = start_ + std::chrono::seconds(1);
 };
 
-// What frames say beside their numbers.
+// Descriptions of the frames.
 struct Frames {
   Json ticks = Json::array(), hashes = Json::array(), reports = Json::array();
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// `clothstream-server step`: a scene's ticks without clock or network, into a file.
+// `clothstream-server step`: writes a scene's ticks into a file, without clock or network.
 #pragma once
 
 #include <cstdint>
@@ -14,16 +14,16 @@ namespace clothstream::step {
 
 struct StepOptions {
   std::uint64_t ticks = 0;
-  std::uint64_t every = 1;  // ticks between frames; the start is the first frame
+  std::uint64_t every = 1;  // ticks between frames; the first frame is the start
   std::filesystem::path out = {};
   std::string serverName = {};
 };
 
 enum class Outcome : std::uint8_t { complete, interrupted, unhealthy };
 
-// The scene by itself, as a server runs it with nobody in it: the same states, to the bit. Says on standard
-// error once a second how far it is. `interrupted` is asked after every tick. However it ends but by an
-// exception, the file and what stands beside it are valid, with the frames so far. Throws std::runtime_error.
+// Simulates the scene as a server without participants does, with the same states to the bit. Prints progress
+// on standard error once per second. Calls `interrupted` after every tick. Unless it throws, the file and its
+// description are valid and have the frames so far. Throws std::runtime_error.
 Outcome run(vulkan::Device& device, const model::Scene& scene, const StepOptions& options,
             const std::function<bool()>& interrupted);
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Device memory, made by purpose.
+// Device memory, created for a purpose.
 #include "server/vulkan/buffer.h"
 
 #include <cassert>

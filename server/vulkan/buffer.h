@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Device memory, made by purpose.
+// Device memory, created for a purpose.
 #pragma once
 
 #include <cstddef>
@@ -12,14 +12,15 @@
 namespace clothstream::vulkan {
 
 enum class BufferPurpose : std::uint8_t {
-  state,     // lives on the device; storage, copies either way
-  texels,    // state that kernels also read as RGBA32F texels (the fast path for gathers on software devices)
+  state,     // data on the device; kernels and copies read and write it
+  texels,    // state that kernels also read as RGBA32F texels (fast for gathers on software devices)
   upload,    // written by the CPU through mapped(), read by kernels and copies
   readback,  // written by kernels and copies, read by the CPU through mapped()
-  indirect,  // state that also holds dispatch sizes
+  indirect,  // state that also has dispatch sizes
 };
 
-// Move-only. Contents start undefined. Throws std::runtime_error naming the size when memory runs out.
+// Move-only. The contents start undefined. Throws std::runtime_error, which names the size, if memory runs
+// out.
 class Buffer {
  public:
   Buffer();
@@ -30,15 +31,15 @@ class Buffer {
 
   std::size_t bytes() const { return bytes_; }
 
-  // The whole buffer, for upload and readback; empty for the others. Host-coherent. What kernels wrote is
-  // visible once the submission's timeline value is reached (Recorder ends every recording with the barrier
-  // for it).
+  // The whole buffer, for upload and readback; empty for the other purposes. Host-coherent. Writes of kernels
+  // are visible once the submission's timeline value is reached (Recorder ends every recording with the
+  // necessary barrier).
   template <typename T = std::byte>
   std::span<T> mapped() const {
     return {static_cast<T*>(mapped_), mapped_ == nullptr ? 0 : bytes_ / sizeof(T)};
   }
 
-  // For this room alone (handles.h).
+  // Only for this folder (handles.h).
   struct Handles;
   const Handles& handles() const { return *handles_; }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A Vulkan device with one compute queue: chosen, opened, its limits asked.
+// A Vulkan device with one compute queue.
 #include "server/vulkan/device.h"
 
 #include <algorithm>
@@ -21,7 +21,7 @@ namespace clothstream::vulkan {
 namespace {
 
 constexpr const char* kLost =
-    "the Vulkan device was lost (VK_ERROR_DEVICE_LOST): everything made on it must be made anew";
+    "the Vulkan device was lost (VK_ERROR_DEVICE_LOST): create everything on it again on another device";
 
 Limits limitsOf(const vk::raii::PhysicalDevice& physical) {
   const auto chain =
@@ -53,14 +53,14 @@ vk::raii::Device openDevice(const Candidate& candidate) {
           vk::DeviceCreateInfo{.pNext = &features, .queueCreateInfoCount = 1, .pQueueCreateInfos = &queue}};
 }
 
-// What a pipeline cache file begins with; the driver's own data follows.
+// Header of a pipeline cache file; the driver's own data follows.
 struct CacheFileHeader {
   std::array<char, 8> magic = {'c', 's', 'p', 'i', 'p', 'e', 's', '1'};
   std::uint64_t bytes = 0;
   std::uint64_t checksum = 0;
 };
 
-// FNV-1a: drivers need not survive damaged data, so that it must not reach them.
+// FNV-1a checksum. Drivers may not survive damaged data, which must therefore not reach them.
 std::uint64_t checksum(std::span<const std::uint8_t> bytes) {
   std::uint64_t hash = 0xcbf29ce484222325u;
   for (const std::uint8_t byte : bytes) hash = (hash ^ byte) * 0x100000001b3u;
@@ -75,7 +75,7 @@ std::filesystem::path cacheFile(const std::filesystem::path& directory,
   return directory / (name + ".pipelines");
 }
 
-// The driver's data in the file; empty if the file is missing, damaged or of another device or driver.
+// The driver's data in the file. Empty if the file is missing, damaged, or from another device or driver.
 std::vector<std::uint8_t> readCache(const std::filesystem::path& path,
                                     const vk::PhysicalDeviceProperties& properties) {
   std::ifstream file(path, std::ios::binary);
@@ -97,7 +97,7 @@ std::vector<std::uint8_t> readCache(const std::filesystem::path& path,
   return {};
 }
 
-// A reader never sees half a file: it is written beside and then renamed.
+// Writes a draft next to the file and renames it, so that a reader never sees half a file.
 void writeCache(const std::filesystem::path& path, std::span<const std::uint8_t> data) {
   const CacheFileHeader header{.bytes = data.size(), .checksum = checksum(data)};
   std::filesystem::create_directories(path.parent_path());

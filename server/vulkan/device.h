@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A Vulkan device with one compute queue: chosen, opened, its limits asked.
+// A Vulkan device with one compute queue.
 #pragma once
 
 #include <chrono>
@@ -17,7 +17,7 @@ namespace clothstream::vulkan {
 enum class DeviceKind : std::uint8_t { discrete, integrated, virtualGpu, software, other };
 
 struct DeviceInfo {
-  std::uint32_t index = 0;  // place in listDevices()
+  std::uint32_t index = 0;  // index in listDevices()
   std::string name = {};
   DeviceKind kind = DeviceKind::other;
   std::string driver = {};      // name and version
@@ -25,18 +25,18 @@ struct DeviceInfo {
 };
 
 struct DeviceOptions {
-  // Empty: the best (discrete before integrated before software). Else an index of listDevices() or a
-  // case-insensitive part of a name.
+  // Empty: the best device (discrete before integrated before software). Otherwise an index of listDevices()
+  // or a case-insensitive part of a name.
   std::string select = {};
-  // Threads of a software device (LP_NUM_THREADS); set before the instance is made. Absent: the environment's
-  // value or else the measured default.
+  // Threads of a software device (LP_NUM_THREADS); set before the instance is created. Absent: the value of
+  // the environment, or else the measured default.
   std::optional<std::uint32_t> softwareThreads = {};
-  // VK_LAYER_KHRONOS_validation with synchronisation checks; its messages are counted (validationMessages())
-  // and logged. Tests switch it on by the environment variable CLOTHSTREAM_VALIDATION=1.
+  // Enables VK_LAYER_KHRONOS_validation with synchronisation checks. Its messages are counted
+  // (validationMessages()) and logged. Tests enable it by the environment variable CLOTHSTREAM_VALIDATION=1.
   bool validation = false;
-  // Directory of the pipeline cache, one file a device and driver version; made if missing. Empty: none is
-  // kept. A file that is damaged or of another driver is ignored and replaced; one that cannot be written is
-  // only logged.
+  // Directory of the pipeline cache, with one file per device and driver version; created if missing. Empty:
+  // no cache. A damaged file, or one of another driver, is ignored and replaced. A failed write is only
+  // logged.
   std::filesystem::path cacheDirectory = {};
 };
 
@@ -45,32 +45,33 @@ struct Limits {
   std::uint32_t maxWorkgroupSizeX = 0;
   std::uint32_t maxDispatchX = 0;  // workgroups
   std::uint32_t maxSharedBytes = 0;
-  std::uint64_t maxStorageRange = 0;   // bytes a binding
-  std::uint64_t maxTexelElements = 0;  // elements a texel-buffer binding
+  std::uint64_t maxStorageRange = 0;   // bytes per binding
+  std::uint64_t maxTexelElements = 0;  // elements per texel-buffer binding
   std::uint32_t maxPushConstantBytes = 0;
   std::uint32_t subgroupSize = 0;
-  float timestampPeriod = 0;  // ns a tick of the timestamp counter
+  float timestampPeriod = 0;  // ns per tick of the timestamp counter
   std::uint64_t deviceMemoryBytes = 0;
 };
 
-// A queue timeline value: reached when all that was submitted up to it is complete.
+// A value of the queue's timeline. It is reached when all earlier submissions are complete.
 using TimelineValue = std::uint64_t;
 
 class Recorder;
 
-// No device at all, or none that matches `select`: what() says what to install or which there are.
+// No device, or none that matches `select`. what() says what to install or which devices there are.
 class DeviceError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-// The device was lost (VK_ERROR_DEVICE_LOST): everything made on it must be made anew on another Device.
+// The device was lost (VK_ERROR_DEVICE_LOST). Everything created on it must be created again on another
+// Device.
 class DeviceLost : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
 std::vector<DeviceInfo> listDevices();
 
-// Thread-safe but for its end. What is made on it belongs to one thread at a time, whichever.
+// Thread-safe, except for destruction. An object created on the device belongs to one thread at a time.
 class Device {
  public:
   // Throws DeviceError.
@@ -83,32 +84,31 @@ class Device {
   const Limits& limits() const { return limits_; }
   bool isSoftware() const { return info_.kind == DeviceKind::software; }
 
-  // Hands a finished recording to the queue and returns the value that the timeline reaches when it is done.
-  // The recorder must not be begun again before that. What one thread submits is done in its order. Throws
-  // DeviceLost.
+  // Submits a finished recording to the queue. Returns the timeline value that is reached when it is done.
+  // The recorder must not begin again before that. Submissions of one thread run in order. Throws DeviceLost.
   TimelineValue submit(Recorder& recorder);
 
-  // False on time-out. Throws DeviceLost.
+  // Returns false on timeout. Throws DeviceLost.
   bool wait(TimelineValue value, std::chrono::nanoseconds timeout = std::chrono::nanoseconds::max()) const;
   TimelineValue completed() const;
-  // Returns when all that was submitted is complete. Throws DeviceLost.
+  // Waits until all submissions are complete. Throws DeviceLost.
   void drain();
 
-  // Messages of the validation layer so far, in this process; text of the newest few.
+  // Number of messages of the validation layer in this process so far, and the text of the newest ones.
   static std::uint64_t validationMessages();
   static std::vector<std::string> validationTexts();
 
-  // Bytes of pipeline cache that were taken from DeviceOptions::cacheDirectory.
+  // Bytes of pipeline cache that were loaded from DeviceOptions::cacheDirectory.
   std::size_t pipelineCacheLoaded() const { return pipelineCacheLoaded_; }
 
-  // For this room alone (handles.h).
+  // Only for this folder (handles.h).
   struct Handles;
   const Handles& handles() const { return *handles_; }
 
  private:
   std::unique_ptr<Handles> handles_;
   std::size_t pipelineCacheLoaded_ = 0;
-  std::mutex submitting_;  // guards the queue and:
+  std::mutex submitting_;  // guards the queue and submitted_
   TimelineValue submitted_ = 0;
   DeviceInfo info_;
   Limits limits_;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The Vulkan objects behind this room's classes; kept out of their headers, for the bindings are slow to
-// compile.
+// The Vulkan objects of this folder's classes. They stay out of the public headers, because the Vulkan
+// bindings compile slowly.
 #pragma once
 
 #include <vulkan/vulkan_raii.hpp>
@@ -46,7 +46,8 @@ struct Bindings::Handles {
 struct Recorder::Handles {
   vk::raii::CommandPool pool = nullptr;
   vk::raii::CommandBuffer commands = nullptr;
-  vk::raii::QueryPool timestamps = nullptr;  // mark i begins stage marks_[i]; one more ends the last
+  vk::raii::QueryPool timestamps =
+      nullptr;  // mark i begins stage marks_[i]; one more mark ends the last stage
 };
 
 }  // namespace clothstream::vulkan

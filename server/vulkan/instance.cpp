@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The way to the driver: loader, instance, validation, and which device is meant. For this room alone.
+// Loader, instance, validation and the choice of a device. Only for this folder.
 #include "server/vulkan/instance.h"
 
 #include <algorithm>
@@ -27,7 +27,7 @@ constexpr std::string_view kInstallDriver =
     "NVIDIA install nvidia-driver and nvidia-vulkan-icd. `vulkaninfo --summary` (vulkan-tools) shows what is "
     "found.";
 
-// What the validation layer said, in this process: messages come from whichever thread calls Vulkan.
+// Messages of the validation layer in this process. They come from every thread that calls Vulkan.
 struct Messages {
   static constexpr std::size_t kKept = 16;
   std::atomic<std::uint64_t> count = 0;
@@ -158,7 +158,7 @@ vk::raii::Instance makeInstance(const vk::raii::Context& context, bool validate)
   const char* extension = VK_EXT_DEBUG_UTILS_EXTENSION_NAME;
   vk::InstanceCreateInfo info{.pApplicationInfo = &application};
   if (validate) {
-    // Hazards between submissions are found only with this setting, which this layer takes from here alone.
+    // Only this environment setting makes the layer find hazards between submissions.
     setenv("VK_LAYER_ENABLES",
            "VK_VALIDATION_FEATURE_ENABLE_SYNCHRONIZATION_VALIDATION_EXT:"
            "VALIDATION_CHECK_ENABLE_SYNCHRONIZATION_VALIDATION_QUEUE_SUBMIT",

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The way to the driver: loader, instance, validation, and which device is meant. For this room alone.
+// Loader, instance, validation and the choice of a device. Only for this folder.
 #pragma once
 
 #include <optional>
@@ -13,12 +13,12 @@
 
 namespace clothstream::vulkan {
 
-// Whether CLOTHSTREAM_VALIDATION in the environment asks for validation (anything but empty and 0).
+// True if the environment variable CLOTHSTREAM_VALIDATION asks for validation (anything but empty and 0).
 bool validationByEnvironment();
 
-// While it lives, the number of threads of software devices is in the environment, where Mesa reads it as
-// devices are listed: the given one, else what is there already, else the default. The environment belongs to
-// the whole process: no other thread may read it meanwhile.
+// Keeps the number of threads of software devices in the environment during its lifetime. Mesa reads it when
+// devices are listed. The number is the given one, else the value of the environment, else the default. The
+// environment belongs to the whole process: no other thread may read it meanwhile.
 class SoftwareThreads {
  public:
   explicit SoftwareThreads(std::optional<std::uint32_t> threads);
@@ -30,31 +30,31 @@ class SoftwareThreads {
   std::optional<std::string> before_;
 };
 
-// Throws DeviceError where the loader is not installed.
+// Throws DeviceError if the loader is not installed.
 vk::raii::Context openLoader();
 
-// Vulkan 1.2, with the validation layer where `validate`. Throws DeviceError where there is no driver or no
-// layer.
+// Creates a Vulkan 1.2 instance, with the validation layer if `validate`. Throws DeviceError if there is no
+// driver or no layer.
 vk::raii::Instance makeInstance(const vk::raii::Context& context, bool validate);
 
-// Counts and logs what the validation layer says, for as long as it lives.
+// Counts and logs the messages of the validation layer during its lifetime.
 vk::raii::DebugUtilsMessengerEXT makeMessenger(const vk::raii::Instance& instance);
 
 struct Candidate {
   DeviceInfo info;
   vk::raii::PhysicalDevice physical;
-  std::uint32_t queueFamily = 0;  // one that computes
+  std::uint32_t queueFamily = 0;  // a family with compute queues
 };
 
-// Best first (discrete, integrated, virtual, software, other; the loader's order among equals), and numbers
-// them so.
+// Sorts devices, best first (discrete, integrated, virtual, software, other; the loader's order among
+// equals), and numbers them in that order.
 void rank(std::vector<Candidate>& candidates);
 
-// The devices that can serve (Vulkan 1.2, timeline semaphores, compute), ranked. Throws DeviceError if none
-// can.
+// Returns the usable devices (Vulkan 1.2, timeline semaphores, compute), sorted by rank(). Throws DeviceError
+// if no device is usable.
 std::vector<Candidate> candidates(const vk::raii::Instance& instance);
 
-// The one that DeviceOptions::select means. Throws DeviceError that lists what there is.
+// Returns the index that DeviceOptions::select means. Throws DeviceError, which lists the devices.
 std::size_t select(const std::vector<Candidate>& candidates, std::string_view wanted);
 
 }  // namespace clothstream::vulkan

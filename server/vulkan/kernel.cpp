@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A compute pipeline made from embedded SPIR-V, and the buffers it is bound to.
+// A compute pipeline from embedded SPIR-V, and the buffers that are bound to it.
 #include "server/vulkan/kernel.h"
 
 #include <algorithm>

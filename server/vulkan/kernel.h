@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A compute pipeline made from embedded SPIR-V, and the buffers it is bound to.
+// A compute pipeline from embedded SPIR-V, and the buffers that are bound to it.
 #pragma once
 
 #include <cstdint>
@@ -28,12 +28,13 @@ struct KernelDescription {
   std::span<const std::uint32_t> spirv = {};  // from clothstream_add_kernels
   std::vector<BindingKind> bindings = {};     // binding 0, 1, 2, ... of set 0
   std::uint32_t pushConstantBytes = 0;
-  // Invocations in x. Kernels declare `layout(local_size_x_id = 0) in;`: it is given as constant_id 0.
+  // Invocations in x. Kernels declare `layout(local_size_x_id = 0) in;`, which receives this number as
+  // constant_id 0.
   std::uint32_t workgroupSize = 64;
   std::vector<std::uint32_t> specialisation = {};  // constant_id 1, 2, 3, ...; pass floats by std::bit_cast
 };
 
-// Throws std::runtime_error naming the kernel where the device refuses it.
+// Throws std::runtime_error, which names the kernel, if the device refuses it.
 class Kernel {
  public:
   Kernel(const Device& device, const KernelDescription& description);
@@ -43,7 +44,7 @@ class Kernel {
 
   std::uint32_t workgroupSize() const { return workgroupSize_; }
 
-  // For this room alone (handles.h).
+  // Only for this folder (handles.h).
   struct Handles;
   const Handles& handles() const { return *handles_; }
   const std::string& name() const { return name_; }
@@ -58,7 +59,7 @@ class Kernel {
   std::unique_ptr<Handles> handles_;
 };
 
-// One buffer for each of the kernel's bindings, in order. Kernel and buffers must outlive it.
+// One buffer for each of the kernel's bindings, in order. Kernel and buffers must outlive this object.
 class Bindings {
  public:
   Bindings(const Device& device, const Kernel& kernel, std::span<const Buffer* const> buffers);

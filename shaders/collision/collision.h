@@ -66,8 +66,8 @@ struct CollisionPush {
   uint32_t reserved0, reserved1;
 };
 
-// What a collider does to a cloth in a tick is one number, at (collider times cloths plus cloth): the impulse
-// in units of 1 / kImpulseUnits N s, plus one for each contact. 0: they do not touch.
+// The effect of a collider on a cloth in a tick is one number, at (collider times cloths plus cloth): the
+// impulse in units of 1 / kImpulseUnits N s, plus one for each contact. 0: they do not touch.
 const float kImpulseUnits = 1e6f;
 // The largest impulse that one contact adds, N s.
 const float kMostImpulse = 1000;

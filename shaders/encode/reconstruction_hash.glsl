@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The hash of what a decoder holds: FRAME_FORMAT.md, "Reconstruction hash".
+// The hash of a decoder's reconstruction: FRAME_FORMAT.md, "Reconstruction hash".
 #ifndef CLOTHSTREAM_SHADERS_ENCODE_RECONSTRUCTION_HASH_GLSL
 #define CLOTHSTREAM_SHADERS_ENCODE_RECONSTRUCTION_HASH_GLSL
 

@@ -22,11 +22,11 @@ vec3 crossProduct(vec3 a, vec3 b) {
   return c;
 }
 
-// 1 / sqrt(x) for a finite, normal x > 0, with a relative error below 7e-7.
-// Subtracting half of the bits from a constant negates and halves the exponent. For every x, x seed^2 then
-// lies in [0.875, 0.9924]. With u = 1 - x seed^2, the remaining factor is (1 - u)^(-1/2). It is computed by
-// its minimax cubic over that range (error 6.5e-7; the rest is rounding). The error of a spring's length
-// stays below the rounding of its ends' positions, which is 1e-7 of their distance from the origin.
+// 1 / sqrt(x) for a finite, normal x > 0, with a relative error below 7e-7. Subtracting half of the bits from
+// a constant negates and halves the exponent. The product x seed^2 is then in [0.875, 0.9924] for every x.
+// With u = 1 - x seed^2, the remaining factor is (1 - u)^(-1/2). It is computed by its minimax cubic over
+// that range (error 6.5e-7; the rest is rounding). The error of a spring's length stays below the rounding of
+// its ends' positions, which is 1e-7 of their distance from the origin.
 float reciprocalSquareRoot(float x) {
 #ifdef CLOTHSTREAM_BUILTIN_ARITHMETIC
   return inversesqrt(x);

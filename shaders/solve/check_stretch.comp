@@ -12,8 +12,8 @@ bool isStretched(vec4 here, vec4 there, float longest) {
   return longest >= 0.0 && inverseMasses > 0.0 && isTooLong(here.xyz, there.xyz, longest);
 }
 
-// Walks down a column with a window of registers, as in conjugate_gradient.glsl. Both nodes of a spring check
-// it, because they may lie in different chunks.
+// Walks down a column with a window of registers, as in conjugate_gradient.glsl. Each node checks its
+// springs, because the two nodes of a spring may be in different chunks.
 bool isAnyStretched(System system, Walk walk, ClothRecord cloth) {
   vec3 spacing = vec3(cloth.columnSpacing, cloth.rowSpacing, cloth.diagonalSpacing);
   bool hasBend = cloth.solvesBend != 0.0;

@@ -52,14 +52,15 @@ model::Scene squareOf(std::uint32_t edge, model::Coding coding) {
   return codedAs(coding, sceneOf({calmCloth(edge, edge)}));
 }
 
-TEST_P(DevicePrediction, EqualsTheReferenceWhereWeightsAreFittedToSomeChunksOnly) {
-  // So many that each phase of the finest level is a dispatch of its own, and chunks take turns.
+TEST_P(DevicePrediction, EqualsTheReferenceIfWeightsFitOnlySomeChunks) {
+  // The cloth is so large that each phase of the finest level needs its own dispatch and only some chunks are
+  // fitted per frame.
   Playing playing(squareOf(100, GetParam()));
   for (std::uint64_t tick = 1; tick <= 24 && !HasFailure(); ++tick)
     playing.show(codec::sampleMotion(playing.layout, tick, 0.04f).positions, tick, tick == 16);
 }
 
-TEST_P(DevicePrediction, EqualsTheReferenceWhileMuchComesToRestAndMovesAgain) {
+TEST_P(DevicePrediction, EqualsTheReferenceWhileVerticesRestAndMoveAgain) {
   Playing playing(squareOf(40, GetParam()));
   std::uint64_t moment = 1;
   for (std::uint64_t tick = 1; tick <= 60 && !HasFailure(); ++tick) {
@@ -75,7 +76,7 @@ TEST_P(DevicePrediction, EqualsTheReferenceWhileMuchComesToRestAndMovesAgain) {
   }
 }
 
-TEST_P(DevicePrediction, EqualsTheReferenceWhereverKeyFramesAre) {
+TEST_P(DevicePrediction, EqualsTheReferenceForEveryPlaceOfKeyFrames) {
   Playing playing(squareOf(24, GetParam()));
   const std::set<std::uint64_t> keys{1, 2, 3, 6, 10, 15, 21, 22, 40};
   for (std::uint64_t tick = 1; tick <= 50 && !HasFailure(); ++tick) {
@@ -87,7 +88,7 @@ TEST_P(DevicePrediction, EqualsTheReferenceWhereverKeyFramesAre) {
   }
 }
 
-TEST_P(DevicePrediction, EqualsTheReferenceAtAnyMaxErrorAndWhereResidualsAreWide) {
+TEST_P(DevicePrediction, EqualsTheReferenceAtEveryMaxErrorAndWithWideResiduals) {
   for (const float maxError : {5e-6f, 1e-4f, 0.0005f, 0.01f, 1.0f}) {
     model::Scene scene = squareOf(16, GetParam());
     scene.stream.maxError = maxError;
@@ -103,9 +104,10 @@ TEST_P(DevicePrediction, EqualsTheReferenceAtAnyMaxErrorAndWhereResidualsAreWide
   }
 }
 
-TEST_P(DevicePrediction, EqualsTheReferenceHalfWayBetweenUnits) {
+TEST_P(DevicePrediction, EqualsTheReferenceHalfwayBetweenUnits) {
   model::Scene scene = squareOf(16, GetParam());
-  // A unit is 2^-18 m then (codec::hierarchical::latticeUnit()): metres are exactly so many and a half.
+  // A unit is 2^-18 m at this error (codec::hierarchical::latticeUnit()), so that positions are exactly
+  // halfway between units.
   scene.stream.maxError = 261 * 0x1p-19f;
   Playing playing(scene);
   std::mt19937 random(4);
@@ -135,14 +137,14 @@ model::Cloth confetti(std::uint32_t triangles) {
   return cloth;
 }
 
-TEST_P(DevicePrediction, EqualsTheReferenceOnClothOfAnyShape) {
+TEST_P(DevicePrediction, EqualsTheReferenceForEveryShapeOfCloth) {
   Playing playing(
       codedAs(GetParam(), sceneOf({confetti(600), calmCloth(3, 2), discCloth(12), calmCloth(2, 31)})));
   for (std::uint64_t tick = 1; tick <= 12 && !HasFailure(); ++tick)
     playing.show(codec::sampleMotion(playing.layout, tick, 0.05f).positions, tick);
 }
 
-TEST_P(DevicePrediction, EqualsTheReferenceHoweverManyFramesWait) {
+TEST_P(DevicePrediction, EqualsTheReferenceForEveryNumberOfWaitingFrames) {
   const model::Scene scene = squareOf(30, GetParam());
   simulation::ClothSimulation simulation(device(), scene);
   const codec::StreamLayout layout = encode::streamLayout(scene, kEpoch);
@@ -177,7 +179,7 @@ TEST_P(DevicePrediction, EqualsTheReferenceHoweverManyFramesWait) {
   }
 }
 
-TEST_P(DevicePrediction, EqualsTheReferenceWhereAnotherThreadCodes) {
+TEST_P(DevicePrediction, EqualsTheReferenceIfAnotherThreadCodes) {
   const model::Scene scene = squareOf(20, GetParam());
   simulation::ClothSimulation simulation(device(), scene);
   const codec::StreamLayout layout = encode::streamLayout(scene, kEpoch);

@@ -27,7 +27,7 @@ struct Packet {
 };
 using Packets = std::vector<Packet>;
 
-// Of frames of which some are key frames.
+// Packets of frames, some of which are key frames.
 Packets packetsOf(const StreamLayout& layout, std::uint32_t weightLag, codec::Workers* workers) {
   const auto encoder = codec::Encoder::make(layout, {.weightLag = weightLag, .workers = workers});
   std::vector<std::byte> packet(encoder->packetBound());
@@ -57,11 +57,11 @@ StreamLayout largeLayout() {
           .cloths = {{200 * 190, 200, 190}, {7 * 9, 7, 9}, {60 * 50, 60, 50}, {1, 1, 1}}};
 }
 
-TEST(EncoderThreads, MakeThePacketsOfOne) {
+TEST(EncoderThreads, MakeTheSamePacketsAsOneThread) {
   expectTheSamePackets(largeLayout());
 }
 
-TEST(EncoderThreads, MakeThePacketsOfOneWithLayersNormalsAndALag) {
+TEST(EncoderThreads, MakeTheSamePacketsWithLayersNormalsAndLag) {
   StreamLayout layout = largeLayout();
   layout.temporalLayers = 3;
   expectTheSamePackets(layout);
@@ -71,12 +71,12 @@ TEST(EncoderThreads, MakeThePacketsOfOneWithLayersNormalsAndALag) {
   expectTheSamePackets(layout, 3);
 }
 
-TEST(EncoderThreads, MakeThePacketsOfOneOfAMesh) {
+TEST(EncoderThreads, MakeTheSamePacketsOfAMesh) {
   const codec::CutGrid cut(90);
   expectTheSamePackets({.epoch = 1, .maxError = 0.0005f, .cloths = {cut.cloth()}});
 }
 
-TEST(EncoderThreads, DoEachPieceOnceForEachOfSeveralCallers) {
+TEST(EncoderThreads, RunEachPieceOnceForSeveralCallers) {
   EncoderThreads threads(3);
   std::atomic<std::uint32_t> wrong = 0;
   const auto call = [&] {
@@ -92,7 +92,7 @@ TEST(EncoderThreads, DoEachPieceOnceForEachOfSeveralCallers) {
   EXPECT_EQ(wrong, 0u);
 }
 
-TEST(EncoderThreads, AreAQuarterOfTheProcessors) {
+TEST(EncoderThreads, NumberAQuarterOfTheProcessors) {
   EXPECT_EQ(EncoderThreads::suitedTo(0), 1u);
   EXPECT_EQ(EncoderThreads::suitedTo(2), 1u);
   EXPECT_EQ(EncoderThreads::suitedTo(16), 4u);

@@ -51,7 +51,7 @@ TEST_P(FrameEncoder, MakesThePacketsOfTheReferenceEncoder) {
   EXPECT_GT(encoding.kilobytes(), 120 * 0.1);
 }
 
-TEST_P(FrameEncoder, EqualsTheReferenceOnStatesOfAnySize) {
+TEST_P(FrameEncoder, EqualsTheReferenceOnStatesOfEverySize) {
   Encoding encoding(GetParam().cloths(), GetParam().prediction);
   std::mt19937 random(1);
   for (std::uint64_t tick = 1; tick <= 12; ++tick) {
@@ -66,9 +66,9 @@ TEST_P(FrameEncoder, EqualsTheReferenceOnStatesOfAnySize) {
   }
 }
 
-TEST_P(FrameEncoder, KeepsTheErrorAtRoundingsEdges) {
-  // Half way between lattice points, and the floats beside it: where a device that rounds otherwise would
-  // differ.
+TEST_P(FrameEncoder, KeepsTheErrorAtTheEdgesOfRounding) {
+  // Positions halfway between lattice points and the floats next to them, where a device with other rounding
+  // would differ.
   Encoding encoding(GetParam().cloths(), GetParam().prediction);
   const float step = 2 * encoding.layout.maxError - 0x1p-18f;
   std::mt19937 random(2);
@@ -88,7 +88,7 @@ TEST_P(FrameEncoder, KeepsTheErrorAtRoundingsEdges) {
   }
 }
 
-TEST_P(FrameEncoder, MakesThoseOfMeshesToo) {
+TEST_P(FrameEncoder, MakesThePacketsOfMeshes) {
   model::Scene scene = GetParam().cloths();
   scene.cloths.insert(scene.cloths.begin() + 1, discCloth(9));
   Encoding encoding(scene, GetParam().prediction);

@@ -40,7 +40,7 @@ TEST(ReferenceAir, DragsFromEitherSide) {
   EXPECT_LT((force - Vec3(0, 0, -0.5 * 1.2 * 0.8 * kArea * 25)).norm(), kTolerance);
 }
 
-TEST(ReferenceAir, LeavesASheetAloneThatIsEdgeOnOrMovesAlong) {
+TEST(ReferenceAir, IgnoresASheetThatIsEdgeOnOrMovesWithTheWind) {
   EXPECT_LT(totalAirForce(ReferenceCloth(sail(1, 1)), model::Vec3(5, 3, 0)).norm(), kTolerance);
   ReferenceCloth drifting(sail(1, 1));
   for (Vec3& velocity : drifting.velocities()) velocity = Vec3(1, 2, 3);

@@ -31,7 +31,7 @@ TEST(ReferenceContact, LeavesARoundShapeByTheNearestWay) {
   expectContact(touch(kCapsule, Vec3(0, 2.9, 0), Vec3(0, 2.5, 0)), Vec3::UnitY(), 0.5);
 }
 
-TEST(ReferenceContact, StaysOnTheSideThatItCameFrom) {
+TEST(ReferenceContact, StaysOnTheSideOfItsStart) {
   expectContact(touch(model::Sphere{1}, Vec3(0, 3, 0), Vec3(0, -0.8, 0)), Vec3::UnitY(), 1.8);
   expectContact(touch(model::Sphere{1}, Vec3(0, 3, 0), Vec3(0, -5, 0)), Vec3::UnitY(), 6);
   expectContact(touch(kCapsule, Vec3(4, 1, 0), Vec3(-4, 1, 0)), Vec3::UnitX(), 5);
@@ -40,12 +40,12 @@ TEST(ReferenceContact, StaysOnTheSideThatItCameFrom) {
   expectContact(touch(model::Plane{}, Vec3(0, 2, 0), Vec3(5, -3, 0)), Vec3::UnitY(), 3);
 }
 
-TEST(ReferenceContact, MeetsAnEndOfACapsuleBesideItsSegment) {
+TEST(ReferenceContact, MeetsTheEndOfACapsule) {
   // Through the round end, 0.6 off its axis: it enters 0.8 above the end's centre.
   expectContact(touch(kCapsule, Vec3(0.6, 9, 0), Vec3(0.6, -9, 0)), Vec3(0.6, 0.8, 0), 1 - 0.36 + 8.8);
 }
 
-TEST(ReferenceContact, LetsPassWhatGoesBy) {
+TEST(ReferenceContact, IgnoresAPassingNode) {
   EXPECT_FALSE(touch(model::Sphere{1}, Vec3(1.01, 3, 0), Vec3(1.01, -3, 0)));
   EXPECT_FALSE(touch(model::Sphere{1}, Vec3(0, 3, 0), Vec3(0, 1.01, 0)));
   EXPECT_FALSE(touch(kCapsule, Vec3(4, 3.1, 0), Vec3(-4, 3.1, 0)));
@@ -53,12 +53,12 @@ TEST(ReferenceContact, LetsPassWhatGoesBy) {
   EXPECT_FALSE(touch(kBox, Vec3(3, 0, 0), Vec3(0, 5, 0)));  // across the corner outside
 }
 
-TEST(ReferenceContact, LetsGoWhatLeaves) {
+TEST(ReferenceContact, IgnoresALeavingNode) {
   EXPECT_FALSE(touch(model::Sphere{1}, Vec3(0, 0.9, 0), Vec3(0, 1.1, 0)));
   EXPECT_FALSE(touch(kBox, Vec3(0.9, 0, 0), Vec3(1.1, 0, 0)));
 }
 
-TEST(ReferenceContact, LeavesABoxByTheFaceNearestToWhereItBegan) {
+TEST(ReferenceContact, LeavesABoxByTheFaceNearestToItsStart) {
   expectContact(touch(kBox, Vec3(0, 1.9, 0), Vec3(0.95, 1.8, 0)), Vec3::UnitY(), 0.2);
 }
 
@@ -67,7 +67,7 @@ TEST(ReferenceContact, KeepsTheClothsThickness) {
   expectContact(contactOf(kCapsule, 0.1, kStill, Vec3(2, 0, 0), Vec3(1.05, 0, 0)), Vec3::UnitX(), 0.05);
 }
 
-TEST(ReferenceContact, SeesTheWayFromWhatMovesAndTurns) {
+TEST(ReferenceContact, FollowsTheMotionAndRotationOfTheShape) {
   // The box comes to the point, which stands still.
   ColliderStep step;
   step.before = {Vec3(-5, 0, 0), Quaternion::Identity()};

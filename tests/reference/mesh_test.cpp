@@ -10,10 +10,10 @@
 namespace clothstream::reference {
 namespace {
 
-// A mesh's rest lengths come from float positions, a grid's from its spacing: for coordinates up to |p| they
-// differ by the rounding of two positions and of the length, 4 |p| 2^-24 at most, and the force by the
+// A mesh's rest lengths come from float positions, a grid's from its spacing. For coordinates up to |p| they
+// differ by the rounding of two positions and of the length, at most 4 |p| 2^-24. The forces differ by the
 // stiffness times that for each of a node's twelve springs.
-TEST(ReferenceMesh, PullsAsTheGridThatItIs) {
+TEST(ReferenceMesh, PullsAsTheEquivalentGrid) {
   const model::Cloth model = sheetWithAllSprings(7, 6);
   ReferenceCloth grid(model), mesh(model::asMesh(model));
   shake(grid, 0.02, 0.5);
@@ -26,7 +26,7 @@ TEST(ReferenceMesh, PullsAsTheGridThatItIs) {
     EXPECT_LE((found[i] - expected[i]).norm(), 4 * (100 + 60 + 30) * lengthError * 1.1) << i;
 }
 
-TEST(ReferenceMesh, FeelsTheAirAsTheGridThatItIs) {
+TEST(ReferenceMesh, FeelsTheAirAsTheEquivalentGrid) {
   model::Cloth model = sheetWithAllSprings(5, 6);
   model.drag = 1;
   model.lift = 0.5f;

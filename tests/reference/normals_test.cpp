@@ -9,7 +9,7 @@
 namespace clothstream::reference {
 namespace {
 
-TEST(ReferenceNormals, OfASheetAtRestPointAlongZ) {
+TEST(ReferenceNormals, PointAlongZForASheetAtRest) {
   for (const Vec3& normal : ReferenceCloth(sheet(4, 5)).normals())
     EXPECT_LT((normal - Vec3::UnitZ()).norm(), 1e-12);
 }
@@ -21,7 +21,7 @@ TEST(ReferenceNormals, TurnWithThePose) {
   for (const Vec3& normal : ReferenceCloth(cloth).normals()) EXPECT_LT((normal - Vec3::UnitY()).norm(), 1e-5);
 }
 
-TEST(ReferenceNormals, OfABowlAreItsGradient) {
+TEST(ReferenceNormals, FollowTheGradientOfABowl) {
   ReferenceCloth cloth(sheet(21, 21));
   for (Vec3& x : cloth.positions()) x.z() = 0.1 * (x.x() * x.x() + x.y() * x.y());
   const std::vector<Vec3> normals = cloth.normals();
@@ -35,7 +35,7 @@ TEST(ReferenceNormals, OfABowlAreItsGradient) {
     }
 }
 
-TEST(ReferenceNormals, OfASheetOfNoAreaPointAlongZ) {
+TEST(ReferenceNormals, PointAlongZForASheetWithoutArea) {
   ReferenceCloth cloth(sheet(3, 3));
   for (Vec3& x : cloth.positions()) x = Vec3(1, 2, 3);
   for (const Vec3& normal : cloth.normals()) EXPECT_EQ(normal, Vec3::UnitZ());

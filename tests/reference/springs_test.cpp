@@ -79,7 +79,7 @@ TEST(ReferenceColumn, StretchesEachLinkByTheWeightBelowIt) {
   }
 }
 
-TEST(ReferenceSprings, ExertNoForceAndNoTorqueAsAWhole) {
+TEST(ReferenceSprings, ExertNoTotalForceAndNoTotalTorque) {
   ReferenceCloth cloth(sheetWithAllSprings(9, 7));
   shake(cloth, 0.05, 1);
   std::vector<Vec3> forces(cloth.nodeCount(), Vec3::Zero());
@@ -119,7 +119,7 @@ TEST(ReferenceSprings, PullWithTheGradientOfTheirEnergy) {
     }
 }
 
-TEST(ReferenceSprings, DampAlongThemselvesAlone) {
+TEST(ReferenceSprings, DampOnlyAlongTheirLength) {
   model::Cloth model = sheet(2, 2);
   model.structural = {0, 2};
   ReferenceCloth cloth(model);
@@ -143,7 +143,7 @@ TEST(ReferenceEnergy, DriftsByLessThanTwoPercentWithoutDamping) {
            cloth.gravityEnergy(environment.gravity.cast<double>());
   };
   const double start = energy();
-  // What can turn into motion: the sheet sags and swings by about its stretch under its own weight.
+  // Energy that can turn into motion: the sheet sags and swings by about its stretch under its own weight.
   const double scale = cloth.kineticEnergy();
   double worst = 0;
   for (int i = 0; i < 20000; ++i) {
@@ -186,7 +186,7 @@ TEST(ReferencePins, NeverMove) {
   }
 }
 
-TEST(ReferenceSymmetry, OfASheetOnASphereIsKept) {
+TEST(ReferenceSymmetry, IsKeptByASheetOnASphere) {
   model::Scene scene;
   model::Cloth model = sheetWithAllSprings(11, 11);
   model.grid.pose = {model::Vec3(0, 0.6f, -0.5f), model::Quaternion(std::sqrt(0.5f), -std::sqrt(0.5f), 0, 0)};

@@ -84,7 +84,7 @@ TEST(StabilityBound, KeepsSemiImplicitEulerBounded) {
   EXPECT_LT(energyAfter(cloth, scene.integrator, scene.tickSeconds() / substeps, 20000), 1e-7);
 }
 
-TEST(StabilityBound, IsLessThanTheTrueLimitAndTheTrueLimitIsReal) {
+TEST(StabilityBound, IsBelowTheTrueLimit) {
   model::Scene scene = stretched(Integrator::semiImplicitEuler);
   for (model::Spring* spring : {&scene.cloths[0].structural, &scene.cloths[0].shear, &scene.cloths[0].bend})
     spring->damping = 0;
@@ -98,7 +98,7 @@ TEST(StabilityBound, IsLessThanTheTrueLimitAndTheTrueLimitIsReal) {
   EXPECT_TRUE(diverges(energyAfter(above, scene.integrator, 1.1 * limit, 1000)));
 }
 
-TEST(StabilityBound, OfRungeKuttaIsLessThanTheTrueLimitAndTheTrueLimitIsReal) {
+TEST(StabilityBound, IsBelowTheTrueLimitOfRungeKutta) {
   model::Scene scene = stretched(Integrator::rungeKutta4);
   for (model::Spring* spring : {&scene.cloths[0].structural, &scene.cloths[0].shear, &scene.cloths[0].bend})
     spring->damping = 0;
@@ -112,9 +112,9 @@ TEST(StabilityBound, OfRungeKuttaIsLessThanTheTrueLimitAndTheTrueLimitIsReal) {
   EXPECT_TRUE(diverges(energyAfter(above, scene.integrator, 1.1 * limit, 1000)));
 }
 
-// What the bound takes for granted: the half disc of radius 2.61 in which every mode's step times its rate
-// lies is one of the method's amplification not beyond 1.
-TEST(StabilityBound, OfRungeKuttaLiesWithinItsRegion) {
+// The assumption of the bound: in the half disc of radius 2.61, in which the product of every mode's step and
+// rate lies, the amplification of the method is at most 1.
+TEST(StabilityBound, LiesWithinTheRegionOfRungeKutta) {
   for (double radius = 0.01; radius <= 2.61; radius += 0.01)
     for (int i = 0; i <= 360; ++i) {
       const std::complex<double> z = std::polar(radius, M_PI * (0.5 + i / 360.0));
@@ -142,7 +142,7 @@ TEST(RungeKutta, ErrsWithTheFourthPowerOfTheStep) {
   EXPECT_GT(errorWith(50), 0);
 }
 
-TEST(StabilityBound, KeepsExplicitEulerBoundedAndItDivergesWithout) {
+TEST(StabilityBound, KeepsExplicitEulerBounded) {
   model::Scene scene = stretched(Integrator::explicitEuler);
   model::Cloth& cloth = scene.cloths[0];
   cloth.structural.damping = cloth.shear.damping = cloth.bend.damping = 0.2f;

@@ -53,11 +53,11 @@ class Arithmetic : public GpuTest {
 };
 
 // The exponent is halved exactly, so that the error repeats every two binades. This test covers all of them.
-TEST_F(Arithmetic, ReciprocalSquareRootKeepsItsErrorBoundForEveryFloatFromOneToFour) {
+TEST_F(Arithmetic, KeepsErrorBoundOfReciprocalSquareRootFromOneToFour) {
   EXPECT_LT(largestError(std::bit_cast<std::uint32_t>(1.0f), 1, 1u << 24), kReciprocalSquareRootError);
 }
 
-TEST_F(Arithmetic, ReciprocalSquareRootKeepsItsErrorBoundAtEveryMagnitude) {
+TEST_F(Arithmetic, KeepsErrorBoundOfReciprocalSquareRootAtEveryMagnitude) {
   const std::uint32_t smallest = 0x00800000, largest = 0x7F7FFFFF, stride = 997;
   EXPECT_LT(largestError(smallest, stride, (largest - smallest) / stride), kReciprocalSquareRootError);
 }
@@ -134,7 +134,7 @@ TEST_P(KernelArithmetic, UsesOnlyOperationsWithTheSameBitsOnEveryDevice) {
 }
 
 INSTANTIATE_TEST_SUITE_P(All, KernelArithmetic, ::testing::ValuesIn(kAllKernels),
-                         [](const auto& info) { return std::string(info.param.name); });
+                         [](const auto& kernel) { return std::string(kernel.param.name); });
 
 TEST(KernelArithmeticCheck, SeesTheArithmeticOfKernels) {
   const FloatArithmetic found = floatArithmeticOf(kernels::advance_mass_spring);

@@ -48,7 +48,7 @@ model::Scene variedScene() {
   return sceneOf({sheet, other, disc, small});
 }
 
-// What the reference says of one cloth.
+// The system of one cloth in the reference.
 reference::ConstraintSystem systemOf(const model::Scene& scene, std::size_t number, const NodeState& state) {
   const model::Cloth& cloth = scene.cloths[number];
   const std::uint32_t first = simulation::clothOffsets(scene.cloths)[number];
@@ -79,7 +79,7 @@ std::vector<float> listOf(const shared::EntriesRecord& range,
   return list;
 }
 
-TEST(AssembledTables, HaveAnEntryWhereTheMatrixHas) {
+TEST(AssembledTables, HaveTheEntriesOfTheMatrix) {
   const model::Scene scene = variedScene();
   std::mt19937 random(2);
   const NodeState state = randomState(scene, random, 0.003f, 1);
@@ -126,7 +126,7 @@ std::vector<shared::vec4> vectorsOf(const std::vector<model::Vec3>& vectors, con
   return texels;
 }
 
-// What the kernels make of a state: b, and A times a vector of one number a row.
+// Results of the kernels for a state: b, and A times a vector with one number per row.
 struct Products {
   std::vector<float> sides, products;
 };
@@ -211,7 +211,7 @@ Products productsOf(const model::Scene& scene, const AssembledTables& tables, co
 // 3e-6 of an inverse mass, with its own rounding, and on the diagonal by twice that. A product adds at most a
 // rounding of what is summed so far for each of its entries. A length is wrong by 1e-6 of itself, a speed by
 // that and its own rounding.
-TEST_F(AssembledMatrix, TimesAVectorIsTheDenseProduct) {
+TEST_F(AssembledMatrix, MultipliesLikeTheDenseMatrix) {
   const model::Scene scene = variedScene();
   std::mt19937 random(3);
   const NodeState state = randomState(scene, random, 0.003f, 1);

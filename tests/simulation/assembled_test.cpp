@@ -30,11 +30,12 @@ double rowsOf(const model::Scene& scene) {
   return rows;
 }
 
-// Off the solution by what the solve may leave, m. With w the largest inverse mass, c >= 0.01 w and rho what
-// is left of b - A lambda, nodes are off by |M^-1 J^T A^-1 rho| <= |rho| sqrt(w) / (2 sqrt(c)) = 5 |rho|. Of
-// b, as long as `side`, rho is the tolerance, and the rounding of A lambda: entries are good to 1e-6, |A| <=
-// 24 w (J^T J is at most twice the springs of a node), and |lambda| <= 5 |b| / w, as b is as good as all J
-// times something. And b is rounded in two positions of each row.
+// Largest error that the solve may leave in positions, m. Let w be the largest inverse mass, c >= 0.01 w, and
+// rho the remaining residual b - A lambda. The error of the nodes is at most |M^-1 J^T A^-1 rho| <= |rho|
+// sqrt(w) / (2 sqrt(c)) = 5 |rho|. The length of b is `side`. Two terms make up rho: the tolerance, and the
+// rounding of A lambda. Entries of A have an error of 1e-6. |A| <= 24 w, because J^T J is at most twice the
+// springs of a node. |lambda| <= 5 |b| / w, because b is J times a vector up to rounding. In addition, b is
+// rounded in two positions of each row.
 double errorOfSolve(double rows, double side) {
   return 5 * (double{kSolveTolerance} + 1e-6 * 24 * 5) * std::sqrt(rows) * side +
          5 * std::sqrt(rows) * 2 * kRounding * kExtent;
@@ -110,22 +111,22 @@ TEST_F(Assembled, MoveNodesAsTheReferenceOnEveryShapeOfGrid) {
   }
 }
 
-TEST_F(Assembled, ThatArePulledGentlyMoveNodesAsTheReference) {
+TEST_F(Assembled, MoveNodesAsTheReferenceWithPartialCorrection) {
   model::Cloth cloth = assembled(calmCloth(9, 8));
   cloth.solver.correctionFraction = 0.125f;
   expectLikeSolution(sceneOf({cloth}), 8);
 }
 
-TEST_F(Assembled, OfBendSpringsMoveNodesAsTheReference) {
+TEST_F(Assembled, MoveNodesAsTheReferenceWithBendSprings) {
   expectLikeSolution(sceneOf({assembled(calmCloth(12, 11), true)}), 5);
 }
 
-TEST_F(Assembled, OfMeshesMoveNodesAsTheReference) {
+TEST_F(Assembled, MoveMeshesAsTheReference) {
   expectLikeSolution(sceneOf({assembled(calmCloth(6, 9)), disc(7)}), 7);
 }
 
 // Attached nodes move at a speed of their own, which is part of b.
-TEST_F(Assembled, FollowAttachmentsAsTheReferenceDoes) {
+TEST_F(Assembled, FollowAttachmentsAsTheReference) {
   model::Cloth cloth = assembled(calmCloth(8, 7));
   model::Attachment rod;
   rod.name = "rod";
@@ -136,12 +137,12 @@ TEST_F(Assembled, FollowAttachmentsAsTheReferenceDoes) {
   expectLikeSolution(sceneOf({cloth}), 11, {}, compared);
 }
 
-TEST_F(Assembled, ThatSeveralWorkgroupsSolveMoveNodesAsTheReference) {
+TEST_F(Assembled, MoveNodesAsTheReferenceWithSeveralWorkgroups) {
   expectLikeSolution(sceneOf({assembled(calmCloth(21, 26)), disc(7)}), 9, {.solveWholeNodes = 0});
 }
 
 // The same iterates, not just the same limit: [Va21] Eq. 12-17. Few enough that rounding has not grown.
-TEST_F(Assembled, GoAsFarInFewIterationsAsTheReference) {
+TEST_F(Assembled, MoveAsFarAsTheReferenceInFewIterations) {
   for (const std::uint32_t wholeNodes : {1'000'000u, 0u})
     for (const std::uint32_t iterations : {1u, 2u, 4u}) {
       SCOPED_TRACE(::testing::Message() << iterations << " iterations, " << wholeNodes);
@@ -183,8 +184,8 @@ TEST_F(Assembled, MoveAsTheMatrixFreePathDoes) {
   EXPECT_GT(apart(state, after(scene)), 2 * tolerance);
 }
 
-// Of pinned nodes alone there is nothing to solve, and beside others they are no row.
-TEST_F(Assembled, LeavePinnedNodesWhereTheyAre) {
+// Pinned nodes alone give nothing to solve. Springs between pinned nodes make no rows.
+TEST_F(Assembled, KeepPinnedNodesInPlace) {
   model::Cloth stiff = assembled(calmCloth(5, 4), true);
   stiff.pins = {{.firstRow = 0, .lastRow = 4, .firstColumn = 0, .lastColumn = 3}};
   model::Cloth half = assembled(calmCloth(8, 9), true);
@@ -210,7 +211,7 @@ TEST_F(Assembled, LeavePinnedNodesWhereTheyAre) {
 
 // [Va21]'s system, singular, and in general without a solution: few iterations hold a sheet. More of them
 // throw its nodes about, in double precision too.
-TEST_F(Assembled, WithoutComplianceHoldASheetInFewIterations) {
+TEST_F(Assembled, HoldASheetWithoutComplianceInFewIterations) {
   model::Cloth cloth = assembled(calmCloth(20, 20), true);
   cloth.pins = {topRow(cloth)};
   cloth.damping = 2;
@@ -231,7 +232,7 @@ TEST_F(Assembled, WithoutComplianceHoldASheetInFewIterations) {
   EXPECT_GT(reference.cloths().front().strain().max, 1);
 }
 
-// Grids and meshes, large and small, beside cloths of other solvers; and a ball.
+// Grids and meshes, large and small, together with cloths of other solvers and a ball.
 model::Scene systems() {
   model::Cloth held = assembled(calmCloth(37, 29), true);
   held.pins = {topRow(held)};
@@ -252,7 +253,7 @@ model::Scene systems() {
   return scene;
 }
 
-TEST_F(Assembled, GiveTheSameBitsHoweverTheWorkIsCut) {
+TEST_F(Assembled, GiveTheSameBitsForEveryPartitionOfWork) {
   const simulation::SimulationOptions ways[] = {{.workgroupSize = 8, .solveWholeNodes = 1'000'000},
                                                 {.workgroupSize = 8, .solveWholeNodes = 0},
                                                 {.workgroupSize = 0, .solveWholeNodes = 700},
@@ -262,7 +263,7 @@ TEST_F(Assembled, GiveTheSameBitsHoweverTheWorkIsCut) {
   expectSameBits(systems(), passingBall, 10, ways);
 }
 
-TEST_F(Assembled, ReportTheSameWhoeverSolves) {
+TEST_F(Assembled, ReportTheSameForEveryPartitionOfWork) {
   const model::Scene scene = systems();
   for (const auto& reports :
        expectSameReports(scene, passingBall, {.solveWholeNodes = 1'000'000}, {.solveWholeNodes = 0}))
@@ -302,7 +303,7 @@ TEST_F(Assembled, ReachTheHashOfEveryOtherDevice) {
 
 // Back and forth: the state stays to the bit, and goes on to the bit as one that always had this path would
 // from the same state.
-TEST_F(Assembled, TakeOverFromTheMatrixFreePathWithoutAJump) {
+TEST_F(Assembled, ReplaceTheMatrixFreePathWithoutAJump) {
   model::Scene scene = sceneOf({assembled(calmCloth(14, 11)), disc(5)});
   scene.cloths[0].pins = {topRow(scene.cloths[0])};
   const simulation::TickInputs inputs = passingBall(scene, 30);

@@ -16,7 +16,7 @@ using model::Vec3;
 using simulation::Grab;
 using simulation::NodeState;
 
-class Hold : public GpuTest {};
+class Attachments : public GpuTest {};
 
 model::Attachment leftColumn(const model::Cloth& cloth) {
   model::Attachment attachment;
@@ -56,7 +56,7 @@ model::Scene dust(std::uint32_t rows, std::uint32_t columns) {
 // some roundings of where they are, which velocities feel over a substep; the rest is what kernels_test.cpp
 // allows a spring's force. Slipping and being near enough are yes or no: no node of these states is within
 // those roundings of either.
-TEST_F(Hold, HoldsAsTheReferenceDoesWithEverySolver) {
+TEST_F(Attachments, MatchTheReferenceWithEverySolver) {
   using enum model::SolverKind;
   unsigned seed = 1;
   for (const model::SolverKind solver : {massSpring, constraint, acad, xpbd, implicitEuler}) {
@@ -111,7 +111,7 @@ TEST_F(Hold, HoldsAsTheReferenceDoesWithEverySolver) {
   }
 }
 
-TEST_F(Hold, AttachedNodesAreWhereTheirFrameIsWhateverPullsAtThem) {
+TEST_F(Attachments, KeepNodesAtTheirFrameAgainstEveryForce) {
   using enum model::SolverKind;
   for (const model::SolverKind solver : {massSpring, constraint, acad, xpbd, implicitEuler}) {
     model::Scene scene = sceneOf({calmCloth(9, 9)});
@@ -141,7 +141,7 @@ TEST_F(Hold, AttachedNodesAreWhereTheirFrameIsWhateverPullsAtThem) {
   }
 }
 
-TEST_F(Hold, AFrameThatJumpsIsCaughtUpWithAtThirtyMetresASecond) {
+TEST_F(Attachments, FollowAJumpingFrameAtThirtyMetresPerSecond) {
   model::Scene scene = dust(3, 3);
   scene.cloths[0].attachments = {leftColumn(scene.cloths[0])};
   Running running(scene);
@@ -158,7 +158,7 @@ TEST_F(Hold, AFrameThatJumpsIsCaughtUpWithAtThirtyMetresASecond) {
 
 // Hung by two corners, of springs so weak that they would let it fall: no node gets farther from either
 // corner than the way along the cloth.
-TEST_F(Hold, TethersHoldWhatWeakSpringsWouldLetGo) {
+TEST_F(Attachments, TethersLimitTheStretchOfWeakSprings) {
   const auto farthestOf = [](bool tethered, std::size_t which) {
     model::Cloth cloth = calmCloth(17, 17);
     cloth.structural.stiffness = cloth.shear.stiffness = 2;
@@ -186,7 +186,7 @@ TEST_F(Hold, TethersHoldWhatWeakSpringsWouldLetGo) {
   EXPECT_GT(farthestOf(false, 0), 1.5);
 }
 
-TEST_F(Hold, AGrabTakesWhatIsWithinItsRadiusElseTheNearestWithinReach) {
+TEST_F(Attachments, GrabsTakeNodesWithinRadiusOrTheNearestWithinReach) {
   const model::Scene scene = dust(9, 9);  // 2 cm apart
   const std::vector<Vec3> rest = model::restPositions(scene.cloths[0]);
   const auto taken = [&](const Grab& grab) {
@@ -203,7 +203,7 @@ TEST_F(Hold, AGrabTakesWhatIsWithinItsRadiusElseTheNearestWithinReach) {
   EXPECT_EQ(taken(taking(rest[40] + Vec3(0, 0, 0.11f), 0.03f)), 0u);
 }
 
-TEST_F(Hold, WhatIsHeldGoesWithTheHand) {
+TEST_F(Attachments, GrabbedNodesFollowTheHand) {
   model::Scene scene = sceneOf({calmCloth(9, 9)});
   const std::vector<Vec3> rest = model::restPositions(scene.cloths[0]);
   Running running(scene);
@@ -228,7 +228,7 @@ TEST_F(Hold, WhatIsHeldGoesWithTheHand) {
 }
 
 // The force is shared by the nodes that the grab took: of dust under gravity g it holds back F / (n m).
-TEST_F(Hold, AWeakGrabHoldsBackAsMuchAsItsForceDoes) {
+TEST_F(Attachments, AWeakGrabPullsWithItsForce) {
   model::Scene scene = dust(3, 3);
   scene.environment.gravity = Vec3(0, -9.81f, 0);
   const Vec3 centre = model::restPositions(scene.cloths[0])[4];
@@ -252,7 +252,7 @@ TEST_F(Hold, AWeakGrabHoldsBackAsMuchAsItsForceDoes) {
   EXPECT_NEAR(running.state().velocities[0].y(), before - 9.81 / 72, 1e-4);
 }
 
-TEST_F(Hold, WhatIsLetGoIsFreeAndMayBeTakenAgain) {
+TEST_F(Attachments, ReleasedNodesAreFreeAndCanBeGrabbedAgain) {
   model::Scene scene = dust(3, 3);
   const Vec3 centre = model::restPositions(scene.cloths[0])[4];
   Running running(scene);
@@ -273,7 +273,7 @@ TEST_F(Hold, WhatIsLetGoIsFreeAndMayBeTakenAgain) {
   EXPECT_NEAR(running.state().velocities[4].norm(), 0, 1e-4);
 }
 
-TEST_F(Hold, GivesTheSameBitsHoweverTheWorkIsCut) {
+TEST_F(Attachments, GiveTheSameBitsForEveryPartitionOfWork) {
   model::Scene scene = sceneOf({calmCloth(33, 31)});
   model::Cloth& cloth = scene.cloths[0];
   cloth.attachments = {leftColumn(cloth)};

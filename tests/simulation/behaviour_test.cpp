@@ -109,11 +109,11 @@ TEST_F(Behaviour, PinnedNodesKeepEveryBit) {
   EXPECT_GT(moved, 300);
 }
 
-// 2,000 substeps of a cloth that sags, overdamped, and blows out a little: nothing in it amplifies a
-// difference. Each substep rounds every position to half an ulp of the extent (0.5 m), and the spring forces
-// of that position with it, which moves the velocity by h k / m of it over a period of the springs, sqrt(m /
-// k), some tenfold: independent errors that add up as a random walk does, of which three standard deviations
-// are allowed. What the float time step errs by, 2^-25, is far less.
+// Simulates 2,000 substeps of a cloth that sags, overdamped, and moves a little in the wind. The motion
+// amplifies no difference. Each substep rounds every position to half an ulp of the extent (0.5 m), and the
+// spring forces of that position with it. That moves the velocity by h k / m of the rounding over a period of
+// the springs, sqrt(m / k), some tenfold. These independent errors add up as a random walk; the test allows
+// three standard deviations. The error of the float time step, 2^-25, is far smaller.
 TEST_F(Behaviour, ACalmClothStaysWithTheReferenceFor200Ticks) {
   model::Cloth cloth = calmCloth(24, 24);
   cloth.pins = {topRow(cloth)};
@@ -140,8 +140,9 @@ TEST_F(Behaviour, ACalmClothStaysWithTheReferenceFor200Ticks) {
   RecordProperty("largestDistance", std::to_string(largest));
 }
 
-// Nodes never end a tick inside the sphere: the collision comes last in a substep. What is left is the
-// rounding of the centre, the normal and their sum, each within an ulp of the 0.5 m that they measure.
+// Nodes never end a tick inside the sphere, because the collision comes last in a substep. The remaining
+// error is the rounding of the centre, the normal and their sum. Each is within an ulp of their size of 0.5
+// m.
 TEST_F(Behaviour, AClothDroppedOnASphereRestsOnItsSurface) {
   model::Cloth cloth = calmCloth(33, 33);
   cloth.grid.pose.orientation =

@@ -40,10 +40,10 @@ model::Cloth looseGrid(float rigidity) {
   return cloth;
 }
 
-// How far a step's velocities may be from the reference's. A node's place errs by its rounding, which turns a
-// hinge by so much over the least height; unit normals and what follows from them err by five reciprocal
-// roots of 7e-7. What hinges pull with then errs by that part of the most they could pull with, and the sum
-// is rounded to velocities of up to 1 m/s.
+// Largest difference of a step's velocities from the reference. The rounding of a node's position rotates a
+// hinge by the rounding over the least height. Unit normals and values computed from them have the error of
+// five reciprocal roots, 7e-7 each. The forces of hinges then have that share of the largest possible force
+// as their error. The sum is rounded to velocities of up to 1 m/s.
 double errorOf(const model::Cloth& cloth, const NodeState& state, std::uint32_t first, double h) {
   const std::vector<double> masses = model::nodeMasses(cloth);
   std::vector<double> errors(cloth.nodeCount(), 0);

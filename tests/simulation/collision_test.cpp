@@ -59,7 +59,7 @@ TEST_F(Collision, ASheetOnASlopeSticksIfFrictionReachesItsTangent) {
   }
 }
 
-// What lies on a shape that spins about Y goes round with it: friction carries it, springs hold it together.
+// Cloth on a shape that spins about Y rotates with it: friction carries it, and springs hold it together.
 TEST_F(Collision, SpinCarriesTheCloth) {
   const float radius = 0.3f, rate = 1;  // rad/s
   const model::Shape shapes[] = {model::Sphere{radius},
@@ -92,7 +92,7 @@ TEST_F(Collision, SpinCarriesTheCloth) {
 
 // 25 m/s are 35 mm in a substep: several times the thickness of what flies here. Whatever is hit is carried
 // in front of it, and nothing is passed through.
-TEST_F(Collision, NothingFastAndThinPassesThroughTheCloth) {
+TEST_F(Collision, AFastThinShapeDoesNotPassThroughTheCloth) {
   model::Scene scene = sceneOf({calmCloth(33, 33)});
   model::Cloth& cloth = scene.cloths[0];
   cloth.structural = cloth.shear = cloth.bend = {};  // dust: nothing pulls a node along but what hits it
@@ -155,7 +155,7 @@ TEST_F(Collision, AFastClothDoesNotPassThroughAThinShape) {
   }
 }
 
-TEST_F(Collision, NodesStayOutsideOfEveryShapeAndComeToRest) {
+TEST_F(Collision, NodesStayOutsideEveryShapeAndComeToRest) {
   const model::Shape shapes[] = {model::Capsule{.radius = 0.08f, .length = 0.2f},
                                  model::Box{model::Vec3(0.2f, 0.2f, 0.2f)}, octahedron()};
   for (const model::Shape& shape : shapes) {
@@ -190,7 +190,7 @@ TEST_F(Collision, NodesStayOutsideOfEveryShapeAndComeToRest) {
 
 // ---- Lists of what is near
 
-// All kinds, in a cloud round the cloth; from where they are to a hand's breadth beside it.
+// Shapes of all kinds in a cloud around the cloth, from its position to 10 cm away.
 std::vector<MovingCollider> cloud(std::size_t count, float size, unsigned seed) {
   std::mt19937 random(seed);
   std::uniform_real_distribution<float> unit(-1, 1);
@@ -207,7 +207,7 @@ std::vector<MovingCollider> cloud(std::size_t count, float size, unsigned seed) 
   return colliders;
 }
 
-TEST_F(Collision, CollidersThatAreFarAwayChangeNoBit) {
+TEST_F(Collision, FarCollidersChangeNoBit) {
   const model::Scene scene = sceneOf({calmCloth(40, 50)});
   std::vector<MovingCollider> near = cloud(40, 0.5f, 5), mixed;
   for (const MovingCollider& collider : near) {
@@ -228,7 +228,7 @@ TEST_F(Collision, CollidersThatAreFarAwayChangeNoBit) {
 // Lists are made for runs of 64 nodes. With a rag of 21 before it, a cloth's nodes fall into other runs, one
 // of which reaches from the rag to the cloth: lists that run over, nodes that leave the box that their list
 // is good for, lists that serve, all give the same.
-TEST_F(Collision, TheRunsThatListsAreMadeForChangeNoBitHoweverMuchIsNear) {
+TEST_F(Collision, ListsOfNearCollidersChangeNoBit) {
   const model::Cloth cloth = calmCloth(37, 29);
   model::Cloth rag = calmCloth(3, 7);
   rag.name = "rag";
@@ -258,7 +258,7 @@ TEST_F(Collision, TheRunsThatListsAreMadeForChangeNoBitHoweverMuchIsNear) {
   }
 }
 
-TEST_F(Collision, AsManyCollidersAsThereMayBeActAsInTheReference) {
+TEST_F(Collision, TheMaximumNumberOfCollidersActsAsInTheReference) {
   model::Scene scene = sceneOf({calmCloth(12, 12)});
   scene.cloths[0].structural = scene.cloths[0].shear = scene.cloths[0].bend = {};
   scene.substeps = 1;
@@ -274,9 +274,9 @@ TEST_F(Collision, AsManyCollidersAsThereMayBeActAsInTheReference) {
   EXPECT_GT(largestDistance(simulation::restState(scene.cloths), reference), 0.001);
 }
 
-// What falls on the ground and comes to rest has got back what gravity gave it: M g t. With every kernel that
-// collides.
-TEST_F(Collision, WhatCollidersGiveToTheClothIsTold) {
+// Cloth that falls on the ground and comes to rest got back the impulse of gravity: M g t. The test covers
+// every kernel that collides.
+TEST_F(Collision, ReportsTheImpulsesOfColliders) {
   using enum model::SolverKind;
   struct Kernel {
     model::SolverKind solver = massSpring;

@@ -45,11 +45,11 @@ double norm(const std::vector<model::Vec3>& vectors) {
   return std::sqrt(sum);
 }
 
-// Off the reference by what the solve may leave, m. It solves A e = side with A = c M + J^T J and c M = 0.01
-// (times one), of a side J^T b. With rho = A e what is left, |e| <= 100 |rho|; |rho| is the tolerance times
-// |J^T b|, plus the rounding of rows, 1e-6 of it; |J^T b| <= 5 |b|, as |J^T J| is at most twice the springs
-// of a node, 24. b is as long as nodes were displaced, and rounded in two positions of each row (2 kRounding
-// kExtent), of which the solution makes at most |b| / (2 sqrt(0.01)).
+// Largest difference from the reference that the solve may leave, m. It solves A e = J^T b with A = c M + J^T
+// J and c M = 0.01 times the identity. With the remaining residual rho = A e, |e| <= 100 |rho|. |rho| is the
+// tolerance times |J^T b|, plus the rounding of rows, 1e-6 of it. |J^T b| <= 5 |b|, because |J^T J| is at
+// most twice the springs of a node, 24. b is as long as the displacements of the nodes. It is rounded in two
+// positions of each row (2 kRounding kExtent), and the solution scales that by at most 1 / (2 sqrt(0.01)).
 double errorOfSolve(double rows) {
   const double side = std::sqrt(rows) * 0.007;  // two ends off by up to 2 mm an axis
   return 100 * (double{kSolveTolerance} + 1e-6) * 5 * side + 5 * std::sqrt(rows) * 2 * kRounding * kExtent;
@@ -103,17 +103,17 @@ TEST_F(Constraints, MoveNodesAsTheReferenceOnEveryShapeOfGrid) {
 }
 
 // As after a change of solver.
-TEST_F(Constraints, ThatArePulledGentlyMoveNodesAsTheReference) {
+TEST_F(Constraints, MoveNodesAsTheReferenceWithPartialCorrection) {
   model::Cloth cloth = constrained(9, 8);
   cloth.solver.correctionFraction = 0.125f;
   expectLikeReference(sceneOf({cloth}), 8);
 }
 
-TEST_F(Constraints, OfBendSpringsMoveNodesAsTheReference) {
+TEST_F(Constraints, MoveNodesAsTheReferenceWithBendSprings) {
   expectLikeReference(sceneOf({constrained(12, 11, true)}), 5);
 }
 
-TEST_F(Constraints, OfMeshesMoveNodesAsTheReference) {
+TEST_F(Constraints, MoveMeshesAsTheReference) {
   model::Cloth disc = discCloth(7);
   disc.mass = 0.01f * static_cast<float>(disc.nodeCount());
   disc.solver.kind = model::SolverKind::constraint;
@@ -121,8 +121,8 @@ TEST_F(Constraints, OfMeshesMoveNodesAsTheReference) {
   expectLikeReference(sceneOf({constrained(6, 9), disc}), 7);
 }
 
-// Of cloths that several workgroups solve, some of them with empty lanes.
-TEST_F(Constraints, ThatSeveralWorkgroupsSolveMoveNodesAsTheReference) {
+// Several workgroups solve each cloth, some with empty lanes.
+TEST_F(Constraints, MoveNodesAsTheReferenceWithSeveralWorkgroups) {
   model::Cloth disc = discCloth(7);
   disc.mass = 0.01f * static_cast<float>(disc.nodeCount());
   disc.solver.kind = model::SolverKind::constraint;
@@ -132,7 +132,7 @@ TEST_F(Constraints, ThatSeveralWorkgroupsSolveMoveNodesAsTheReference) {
 
 // [Va21]'s system, which is singular, and more equations than unknowns: in this form least squares, which
 // have a solution.
-TEST_F(Constraints, WithoutComplianceConverge) {
+TEST_F(Constraints, ConvergeWithoutCompliance) {
   model::Scene scene = swing(20, 10, 200);
   model::Solver& solver = scene.cloths.front().solver;
   solver.bendConstraints = true;
@@ -145,7 +145,7 @@ TEST_F(Constraints, WithoutComplianceConverge) {
   }
 }
 
-TEST_F(Constraints, OfSeveralClothsAreSolvedApart) {
+TEST_F(Constraints, AreSolvedIndependentlyForEachCloth) {
   model::Cloth second = constrained(8, 5, true);
   second.name = "second";
   expectLikeReference(sceneOf({constrained(6, 9), second}), 6);
@@ -197,7 +197,7 @@ TEST_F(Constraints, LetASheetHangWithinOnePercent) {
   EXPECT_LT(strainOf(scene, running.state()).max, 0.01);
 }
 
-TEST_F(Constraints, LeaveNothingInsideASphere) {
+TEST_F(Constraints, LeaveNoNodeInsideASphere) {
   model::Scene scene = swing(24, 10, 20);
   const simulation::MovingCollider ball{
       model::Sphere{0.2f}, {model::Vec3(0, -0.3f, -0.3f)}, {model::Vec3(0, -0.3f, -0.3f)}, 1};
@@ -214,7 +214,7 @@ TEST_F(Constraints, LeaveNothingInsideASphere) {
   EXPECT_LT(nearest, distance * 1.01);  // and it does touch it
 }
 
-TEST_F(Constraints, LeaveAMassSpringClothBesideThemAsItIsAlone) {
+TEST_F(Constraints, DoNotChangeAMassSpringClothInTheSameScene) {
   model::Cloth free = calmCloth(9, 14);
   free.pins = {topRow(free)};
   model::Cloth held = constrained(7, 8);
@@ -282,7 +282,7 @@ TEST_F(Adaptive, MoveNodesAsTheReference) {
   EXPECT_LT(largestDistance(running.state(), reference), tolerance);
 }
 
-TEST_F(Adaptive, AreMassSpringClothToTheBitWhereNothingIsStretched) {
+TEST_F(Adaptive, EqualMassSpringClothToTheBitWithoutStretch) {
   model::Cloth cloth = adaptive(13, 12);
   cloth.pins = {topRow(cloth)};
   model::Scene held = sceneOf({cloth});
@@ -298,7 +298,7 @@ TEST_F(Adaptive, AreMassSpringClothToTheBitWhereNothingIsStretched) {
   }
 }
 
-TEST_F(Adaptive, HoldASheetWhereMassSpringBlowsUp) {
+TEST_F(Adaptive, HoldASheetWhereMassSpringDiverges) {
   const model::Scene free = figure15(model::SolverKind::massSpring);
   Running blown(free);
   bool healthy = true;
@@ -316,8 +316,8 @@ TEST_F(Adaptive, HoldASheetWhereMassSpringBlowsUp) {
   for (const model::Vec3& p : state.positions) EXPECT_LT(p.norm(), 1.5f * 4.7f);
 }
 
-// Hung by its corners it would stretch by more than half. While it falls into its constraints, springs beside
-// those that are held go beyond for a few substeps.
+// Without constraints the cloth, which hangs by its corners, would stretch by more than half. While it falls
+// into its constraints, springs next to constrained ones exceed the bound for a few substeps.
 TEST_F(Adaptive, KeepEverySpringWithinItsBound) {
   model::Cloth cloth = adaptive(24, 24);
   cloth.structural.stiffness = 60;

@@ -52,7 +52,7 @@ TickInputs busyInputs(const model::Scene& scene, int tick) {
 
 class Determinism : public GpuTest {};
 
-TEST_F(Determinism, OneThousandTicksGiveTheSameHashesInTwoRunsHoweverTheWorkIsCut) {
+TEST_F(Determinism, GivesTheSameHashesInRunsOfAThousandTicks) {
   const model::Scene scene = busyScene();
   Running narrow(scene, {.rowsPerInvocation = 1, .workgroupSize = 32, .advanceKernel = {}});
   Running wide(scene, {.rowsPerInvocation = 7, .workgroupSize = 128, .advanceKernel = {}});
@@ -83,8 +83,8 @@ TEST_F(Determinism, ClothsInOneSceneMoveAsEachAlone) {
   std::vector<model::Cloth> cloths;
   for (const auto& [rows, columns] : shapes) {
     model::Cloth cloth = calmCloth(rows, columns);
-    // Each of its own material: the first has neither air nor damped springs, which must not change when
-    // others do.
+    // Each cloth has a different material. The first has neither air nor damped springs, which must not
+    // change because of the others.
     const auto i = static_cast<float>(cloths.size());
     cloth.drag = 0.3f * i;
     cloth.structural.damping = cloth.shear.damping = cloth.bend.damping = 0.05f * i;
@@ -115,7 +115,7 @@ TEST_F(Determinism, ClothsInOneSceneMoveAsEachAlone) {
   }
 }
 
-TEST_F(Determinism, TheDevicesHashIsTheOneComputedOnTheCpu) {
+TEST_F(Determinism, TheHashOfTheDeviceEqualsThatOfTheCpu) {
   const model::Scene scene = busyScene();
   Running running(scene);
   for (int tick = 0; tick < 3; ++tick) {
@@ -124,7 +124,7 @@ TEST_F(Determinism, TheDevicesHashIsTheOneComputedOnTheCpu) {
   }
 }
 
-TEST_F(Determinism, NoStoredComponentIsTinierThanTheSmallest) {
+TEST_F(Determinism, NoStoredComponentIsBelowTheSmallestNumber) {
   // A cloth at rest in its plane: everything sideways is zero or decays towards it.
   model::Scene scene = sceneOf({calmCloth(8, 8)});
   NodeState state = simulation::restState(scene.cloths);
@@ -141,7 +141,7 @@ TEST_F(Determinism, NoStoredComponentIsTinierThanTheSmallest) {
   }
 }
 
-TEST(StateHash, ChangesWithAnyBitAndWithAnyNodesPlace) {
+TEST(StateHash, ChangesWithEveryBitAndWithTheOrderOfNodes) {
   NodeState state{{{1, 2, 3}, {4, 5, 6}}, {{0, 0, 0}, {7, 8, 9}}};
   const auto hash = [](const NodeState& s) { return simulation::statusOf(simulation::pack(s, 0)).stateHash; };
   const std::uint64_t original = hash(state);

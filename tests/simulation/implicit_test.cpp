@@ -38,12 +38,13 @@ model::Scene steps(std::vector<model::Cloth> cloths, std::uint32_t rate) {
   return scene;
 }
 
-// How far the solve may leave velocities from the exact ones, m/s, where it starts with the residual `start`,
-// kg m/s. With e the error and rho = A e what is left,
-//   m |e|^2 <= e A e = rho A^-1 rho <= |rho|^2 / m,  m the lightest node,
-// and with D the preconditioner, rho D^-1 rho <= tolerance^2 start D^-1 start:  |e| <= sqrt(largest D / m)
-// tolerance |start| / m. Float arithmetic makes D, the right-hand side and products of A from rows that err
-// by 2e-6 (two reciprocal roots), which is as if the residual did; and the free velocities are rounded.
+// Largest error that the solve may leave in velocities, m/s, if it starts with the residual `start`, kg m/s.
+// With the error e and the remaining residual rho = A e,
+//   m |e|^2 <= e A e = rho A^-1 rho <= |rho|^2 / m,  where m is the lightest node.
+// With the preconditioner D, rho D^-1 rho <= tolerance^2 start D^-1 start. Therefore |e| <= sqrt(largest D /
+// m) tolerance |start| / m. Float arithmetic computes D, the right-hand side and products of A from rows with
+// an error of 2e-6 (two reciprocal roots). The residual has the same relative error. The free velocities are
+// rounded in addition.
 double errorOfSolve(const reference::ImplicitSystem& system, double start, double lightest,
                     double tolerance) {
   double diagonal = 0;
@@ -156,7 +157,7 @@ TEST_F(ImplicitEuler, SwingsASpringAsTheFormulaDoes) {
   double x = 0.005, v = 0;
   for (const std::size_t node : {2, 3}) state.positions[node].y() -= static_cast<float>(x);
   running.restore(state);
-  // Of 2 cm a rounding of 1e-9 m, which h omega^2 makes a speed of at every step; decaying by a third.
+  // Rounding of 2 cm is 1e-9 m. In every step h omega^2 turns it into a speed, which decays by a third.
   const double rounding = 0.02 * kRounding * 4, tolerance = 2 * rounding * omega * omega * h;
   for (int step = 0; step < 8; ++step) {
     running.tick(inputsOf(scene));
@@ -213,12 +214,12 @@ TEST_F(ImplicitEuler, KeepsAFreeClothsMomentum) {
   for (int tick = 0; tick < 20; ++tick) running.tick(inputsOf(scene));
   double flow = 0;
   for (const model::Vec3& v : start.velocities) flow += v.norm();
-  // A free velocity is (h^2 k / m) times the springs' stretch over h, a hundred times what comes of it, and a
-  // sum of twelve forces, each of which rounds it once.
+  // A free velocity is (h^2 k / m) times the springs' stretch over h, a hundred times the resulting velocity.
+  // It is a sum of twelve forces, and each of them rounds it once.
   EXPECT_LT((momentum(running.state()) - momentum(start)).norm(), 20 * 12 * 100 * kRounding * flow);
 }
 
-TEST_F(ImplicitEuler, HoldsASheetWhereMassSpringBlowsUp) {
+TEST_F(ImplicitEuler, HoldsASheetWhereMassSpringDiverges) {
   for (const model::SolverKind solver : {model::SolverKind::massSpring, model::SolverKind::implicitEuler}) {
     model::Cloth cloth = stiffCloth(16, 16);
     cloth.solver.kind = solver;
@@ -238,7 +239,7 @@ TEST_F(ImplicitEuler, HoldsASheetWhereMassSpringBlowsUp) {
 }
 
 // Far stiffer than so few iterations solve: it lags, and does not blow up.
-TEST_F(ImplicitEuler, StaysCalmWhereTheSolveEndsEarly) {
+TEST_F(ImplicitEuler, StaysCalmIfTheSolveEndsEarly) {
   model::Cloth cloth = stiffCloth(24, 24);
   cloth.structural.stiffness = 4000;
   cloth.pins = {topRow(cloth)};
@@ -249,12 +250,12 @@ TEST_F(ImplicitEuler, StaysCalmWhereTheSolveEndsEarly) {
   for (int tick = 0; tick < 216; ++tick) ASSERT_TRUE(running.tick(inputsOf(scene)).healthy) << tick;
   reference::ReferenceSimulation reference(scene);
   setState(reference, running.state());
-  // What it started with, all of its height at most, it cannot have gained.
+  // It cannot gain more than its potential energy at the start, which is at most that of its whole height.
   const reference::ReferenceCloth& hung = reference.cloths().front();
   EXPECT_LT(hung.kineticEnergy(), 0.01 * 576 * 9.81 * 0.46);
 }
 
-TEST_F(ImplicitEuler, LivesBesideEveryOtherSolver) {
+TEST_F(ImplicitEuler, WorksInASceneWithEveryOtherSolver) {
   model::Cloth free = calmCloth(9, 14), held = calmCloth(7, 8), implicit = stiffCloth(8, 6);
   model::Cloth disc = implicitCloth(discCloth(4));
   free.pins = {topRow(free)};

@@ -25,11 +25,11 @@ struct Expectation {
 
 class Kernels : public GpuTest {
  protected:
-  // One substep of both from the same random state.
-  // Tolerance: a spring's force is wrong by the rounding of its ends' difference (2 kRounding of where they
-  // are) times its stiffness, and by some ten roundings of its own size; its damping by as many of its own; a
-  // node has twelve springs. That moves a velocity by h / m as much, and a position by h more. Velocity and
-  // position are rounded a few times themselves.
+  // Compares one substep of both from the same random state.
+  // Tolerance: the error of a spring's force is the rounding of the difference of its ends (2 kRounding of
+  // their positions) times its stiffness, plus some ten roundings of the force. The error of its damping is
+  // of the same number of roundings. A node has twelve springs. The force moves a velocity by h / m times its
+  // error, and a position by h times that. Velocity and position are rounded a few times themselves.
   static void expectLikeReference(model::Scene scene, std::vector<simulation::MovingCollider> colliders,
                                   unsigned seed, const Expectation& expectation = {}) {
     scene.substeps = 1;
@@ -124,9 +124,9 @@ TEST_F(Kernels, AirDragsAndLiftsAsInTheReference) {
   cloth.lift = 0.6f;
   model::Scene scene = sceneOf({cloth});
   scene.environment.wind = model::Vec3(3, -1, 8);
-  // A triangle's area (2e-4 m^2) is wrong by two roundings of its corners' places times its sides (0.03 m),
-  // and its force, density / 6 |u|^2 (drag + 2 lift) times the area, by some twenty roundings more; six
-  // triangles.
+  // A triangle's area (2e-4 m^2) has an error of two roundings of its corners' positions times its sides
+  // (0.03 m). Its force, density / 6 |u|^2 (drag + 2 lift) times the area, adds some twenty roundings. A node
+  // has six triangles.
   const double pressure = 1.2 / 6 * 15 * 15 * (0.8 + 2 * 0.6);
   const double air = 6 * kRounding * pressure * (2 * kExtent * 2 * 0.03 + 20 * 2e-4);
   expectLikeReference(scene, {}, 5, {.extraForce = air});

@@ -12,12 +12,12 @@ namespace {
 class Meshes : public GpuTest {};
 
 // Both hang from their top row and drop into their springs. Around a taut cloth the difference x of the two
-// obeys M x'' + C x' + K x = f with K >= 0, so in no mode does it grow beyond that of a free mass: of all
-// nodes together, rms(x) <= |f| / m T^2 / 2. What differs, f, is for each of a node's twelve springs its
-// stiffness times the rounding of its rest length (four roundings of where the nodes are, scene/mesh.h), of
-// its ends' difference in both (twice two), and some ten roundings of its own length; the dashpots' is far
-// less.
-TEST_F(Meshes, MoveAsTheGridThatTheyAre) {
+// obeys M x'' + C x' + K x = f with K >= 0. No mode of it grows beyond that of a free mass: over all nodes,
+// rms(x) <= |f| / m T^2 / 2. The differing force f has a term for each of a node's twelve springs: the
+// stiffness times three roundings. These are the rounding of the rest length (four roundings of positions,
+// model/mesh.h), the rounding of the ends' difference in both cloths (twice two), and some ten roundings of
+// the length. The term of the dashpots is far smaller.
+TEST_F(Meshes, MoveAsTheEquivalentGrid) {
   model::Cloth cloth = calmCloth(24, 20);
   cloth.structural.stiffness = 50;
   cloth.shear.stiffness = cloth.bend.stiffness = 25;
@@ -60,7 +60,7 @@ simulation::TickInputs discInputs(const model::Scene& scene) {
       {{model::Sphere{0.15f}, {model::Vec3(0.1f, -0.2f, 0)}, {model::Vec3(0.1f, -0.19f, 0.01f)}, 0.5f}});
 }
 
-TEST_F(Meshes, HaveTheSameBitsWhateverTheWorkgroup) {
+TEST_F(Meshes, HaveTheSameBitsForEveryWorkgroupSize) {
   const model::Scene scene = discs();
   std::vector<std::uint64_t> hashes;
   for (const std::uint32_t workgroup : {64u, 8u, 32u, 128u}) {
@@ -73,7 +73,7 @@ TEST_F(Meshes, HaveTheSameBitsWhateverTheWorkgroup) {
   EXPECT_EQ(std::vector<std::uint64_t>(hashes.size(), hashes.front()), hashes);
 }
 
-TEST_F(Meshes, KeepPinnedNodesWhereTheyStart) {
+TEST_F(Meshes, KeepPinnedNodesInPlace) {
   const model::Scene scene = discs();
   Running running(scene);
   for (int tick = 0; tick < 20; ++tick) running.tick(discInputs(scene));
@@ -82,7 +82,7 @@ TEST_F(Meshes, KeepPinnedNodesWhereTheyStart) {
   EXPECT_GT((state.positions[5] - start.positions[5]).norm(), 0.001f);
 }
 
-TEST_F(Meshes, TakeParametersWhileTheyRun) {
+TEST_F(Meshes, TakeParametersWhileRunning) {
   model::Scene scene = sceneOf({discCloth(6)});
   Running soft(scene), stiff(scene);
   scene.cloths[0].structural.stiffness = 400;

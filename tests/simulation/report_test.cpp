@@ -24,7 +24,7 @@ std::vector<std::byte> bitsOf(const std::vector<ClothReport>& reports) {
   return bits;
 }
 
-// Of what a cloth says of a state that is exactly known: the kernel's rounding alone.
+// Tolerances of the report on an exactly known state: the rounding of the kernel.
 //
 // A stretch: differences of positions are rounded (3 kRounding of the square), as are the two squares and
 // what is computed from them (reciprocals to 1e-6 of the extension): 6 kRounding + 2e-6 of it. A sum: at most
@@ -76,7 +76,7 @@ model::Scene reportedScene() {
   return scene;
 }
 
-TEST_F(Report, SaysOfRandomStatesWhatTheReferenceDoes) {
+TEST_F(Report, MatchesTheReferenceOnRandomStates) {
   const model::Scene scene = reportedScene();
   Running running(scene);
   std::mt19937 random(11);
@@ -96,7 +96,7 @@ TEST_F(Report, SaysOfRandomStatesWhatTheReferenceDoes) {
 }
 
 // Stiffness counts whether a spring is a force or a constraint; what a solve says belongs to its cloth.
-TEST_F(Report, SaysWhatEachClothsSolverDid) {
+TEST_F(Report, HasTheSolverResultsOfEachCloth) {
   model::Scene scene = reportedScene();
   scene.cloths[1].solver.kind = model::SolverKind::acad;
   scene.cloths[1].solver.activation = 0.01f;
@@ -156,7 +156,7 @@ TEST_F(Report, FindsTheDeepestPenetrationIntoEveryShape) {
     }
 }
 
-TEST_F(Report, FindsNoPenetrationWhereClothLiesOnACollider) {
+TEST_F(Report, FindsNoPenetrationOfClothOnACollider) {
   model::Scene scene = sceneOf({calmCloth(12, 12)});
   const model::Pose below{model::Vec3(0, -0.1f, -0.101f), model::Quaternion::Identity()};
   const simulation::TickInputs inputs = inputsOf(scene, {{model::Sphere{0.1f}, below, below, 1}});
@@ -165,7 +165,7 @@ TEST_F(Report, FindsNoPenetrationWhereClothLiesOnACollider) {
     ASSERT_EQ(running.tickAndReport(inputs)[0].penetration, 0) << "tick " << tick;
 }
 
-TEST_F(Report, HasTheSameBitsWhateverTheWorkgroupsAndChangesNothing) {
+TEST_F(Report, HasTheSameBitsForEveryWorkgroupSizeAndChangesNothing) {
   model::Scene scene = reportedScene();
   scene.cloths[1].solver.kind = model::SolverKind::acad;
   scene.cloths[3].solver.kind = model::SolverKind::constraint;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The tables that kernels read: every node is somebody's, once.
+// The tables that kernels read: every node belongs to exactly one invocation.
 #include "server/simulation/scene_tables.h"
 
 #include <gmock/gmock.h>
@@ -10,7 +10,7 @@
 namespace clothstream::tests {
 namespace {
 
-// What locateStrip() does with a tile, for each of its invocations.
+// Number of visits of each node by the invocations of all tiles, as in locateStrip().
 std::vector<int> visitsOf(const std::vector<model::Cloth>& cloths, std::uint32_t rowsPerInvocation,
                           std::uint32_t workgroupSize) {
   const std::vector<std::uint32_t> offsets = simulation::clothOffsets(cloths);

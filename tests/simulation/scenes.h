@@ -21,7 +21,7 @@ inline constexpr double kRounding = 1.0 / (1 << 24);
 // m; further from the origin than any node of these tests.
 inline constexpr double kExtent = 4;
 
-// Of an enforcement that is to be compared.
+// Settings of solvers whose results are compared.
 inline constexpr float kSolveTolerance = 1e-6f;
 inline constexpr std::uint32_t kSolveIterations = 2000;
 
@@ -54,7 +54,7 @@ double largestDistance(const simulation::NodeState& state, const reference::Refe
 double largestSpeedDifference(const simulation::NodeState& state,
                               const reference::ReferenceSimulation& reference);
 
-// Of the first cloth.
+// Strain of the first cloth.
 reference::Strain strainOf(const model::Scene& scene, const simulation::NodeState& state);
 
 // A simulation and what it takes to run it.
@@ -87,18 +87,18 @@ class Running {
   simulation::ClothSimulation simulation_;
 };
 
-// What determinism means for whatever a scene is solved by; `inputs` of a tick.
+// Checks of determinism. `InputsAt` gives the inputs of a tick.
 using InputsAt = simulation::TickInputs (*)(const model::Scene& scene, int tick);
-// A ball of 8 cm goes through where small cloths hang, again and again.
+// A ball of 8 cm passes repeatedly through the place where small cloths hang.
 simulation::TickInputs passingBall(const model::Scene& scene, int tick);
 
-// The same bits after so many ticks with each of these ways to cut the work.
+// Expects the same bits after `ticks` ticks with each of these partitions of the work.
 void expectSameBits(const model::Scene& scene, InputsAt inputs, int ticks,
                     std::span<const simulation::SimulationOptions> ways);
-// In two runs of a thousand ticks, and for a hundred of them in a way of its own.
+// Expects the same hashes in two runs of a thousand ticks, and in a hundred ticks with the options `other`.
 void expectSameThousandTicks(const model::Scene& scene, InputsAt inputs,
                              const simulation::SimulationOptions& other);
-// The same reports of ten ticks from both; these are for what else holds of them.
+// Expects the same reports of ten ticks with both options, and returns them for further checks.
 using Reports = std::vector<std::vector<simulation::ClothReport>>;
 Reports expectSameReports(const model::Scene& scene, InputsAt inputs,
                           const simulation::SimulationOptions& one,
@@ -106,8 +106,8 @@ Reports expectSameReports(const model::Scene& scene, InputsAt inputs,
 std::uint64_t hashAfter(const model::Scene& scene, InputsAt inputs, int ticks,
                         const simulation::SimulationOptions& options = {});
 
-// Gives a running scene the cloths of another: the state stays to the bit, and goes on to the bit as that of
-// one that always had them would from there.
+// Gives a running scene the cloths of another. The state stays to the bit. It then continues, to the bit, as
+// a simulation that always had these cloths would continue from that state.
 void expectGoesOnAsAlways(Running& changing, const model::Scene& changed,
                           const simulation::TickInputs& inputs, int ticks);
 

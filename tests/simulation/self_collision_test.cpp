@@ -33,7 +33,7 @@ model::Cloth withBalls(model::Cloth cloth, float radius = kDistance / 2, float f
   return cloth;
 }
 
-// Lies in the XZ plane, turned about Y.
+// A cloth in the XZ plane, rotated about Y.
 model::Cloth flat(model::Cloth cloth, float y, float degrees = 0) {
   const model::Quaternion turn = turned(degrees, model::Vec3::UnitY()) * turned(-90, model::Vec3::UnitX());
   const model::Vec3 middle = turn * model::Vec3(0, -cloth.grid.height / 2, 0);
@@ -57,7 +57,7 @@ std::vector<reference::Vec3> inDouble(std::span<const model::Vec3> vectors) {
   return result;
 }
 
-// Of the pairs that collide, the smallest distance, as a part of that at which they touch; at most 1.
+// Smallest distance of a colliding pair, relative to the distance at which it touches; at most 1.
 double nearest(const model::Scene& scene, const NodeState& state) {
   const std::vector<reference::Vec3> positions = inDouble(state.positions);
   double least = 1;
@@ -72,7 +72,7 @@ double speedOf(const NodeState& state) {
   return std::sqrt(sum / static_cast<double>(state.velocities.size()));
 }
 
-// In panels of so many rows that lie above each other to and fro, the first at height y.
+// Folds the cloth to and fro into panels of `panel` rows that lie above each other, the first at height y.
 NodeState folded(const model::Scene& scene, std::uint32_t panel, float gap, float y) {
   NodeState state = simulation::restState(scene.cloths);
   const model::Grid& grid = scene.cloths[0].grid;
@@ -86,7 +86,7 @@ NodeState folded(const model::Scene& scene, std::uint32_t panel, float gap, floa
   return state;
 }
 
-// ---- Who is near
+// ---- Lists of neighbours
 
 // The stage alone, on a state as it is.
 class Lists {
@@ -148,7 +148,7 @@ class Lists {
   vulkan::Buffer readback_;
 };
 
-// What a list is to hold, by its rule, every pair looked at: nodes plus one, negative of another cloth.
+// Expected lists by brute force over all pairs: nodes plus one, negative for a node of another cloth.
 std::vector<std::set<float>> expectedLists(const model::Scene& scene, const NodeState& state) {
   const double ahead = 1.25 * 3 * scene.substepSeconds();  // three substeps follow the one that makes them
   const std::vector<reference::Vec3> positions = inDouble(state.positions);
@@ -188,7 +188,7 @@ NodeState scattered(const model::Scene& scene, std::uint32_t seed, const model::
   return state;
 }
 
-TEST_F(SelfCollision, ListsAreThoseOfBruteForceInAFixedOrder) {
+TEST_F(SelfCollision, ListsMatchBruteForceInAFixedOrder) {
   const model::Scene scene = twoCrumpled();
   // Dense; spread so far that cells share entries of the table; and fast.
   const std::pair<model::Vec3, float> cases[] = {{model::Vec3(0.3f, 0.2f, 0.3f), 0.1f},
@@ -212,7 +212,7 @@ TEST_F(SelfCollision, ListsAreThoseOfBruteForceInAFixedOrder) {
   }
 }
 
-TEST_F(SelfCollision, ListsThatAreFullAreCountedAndStillInAFixedOrder) {
+TEST_F(SelfCollision, FullListsAreCountedAndKeepAFixedOrder) {
   const model::Scene scene = sceneOf({withBalls(calmCloth(30, 31))});
   const NodeState state = scattered(scene, 12, model::Vec3(0.1f, 0.1f, 0.1f), 0);
   std::uint32_t full = 0;
@@ -227,7 +227,7 @@ TEST_F(SelfCollision, ListsThatAreFullAreCountedAndStillInAFixedOrder) {
   for (std::uint32_t node = 0; node < scene.nodeCount(); ++node) EXPECT_EQ(lists.of(node), narrow.of(node));
 }
 
-TEST_F(SelfCollision, CrowdsThatNobodyLooksIntoAreReportedAndHarmless) {
+TEST_F(SelfCollision, SkippedCrowdsAreReportedAndHarmless) {
   const model::Scene scene = sceneOf({withBalls(calmCloth(40, 40))});
   NodeState state = scattered(scene, 13, model::Vec3(1e-3f, 1e-3f, 1e-3f), 0);
   Running running(scene);
@@ -279,12 +279,12 @@ model::Scene heap(model::SolverKind kind) {
 
 // Twenty iterations, each of which adds the rounding of a position (2^-25 of 0.3 m) to an overlap, half of
 // which comes out as speed, 360 1/s times as large; what speeds differ by, friction and springs carry on.
-TEST_F(SelfCollision, OfForcesMovesNodesAsTheReference) {
+TEST_F(SelfCollision, MovesNodesAsTheReferenceWithForces) {
   expectLikeReference(heap(model::SolverKind::massSpring), 5e-6);
 }
 
 // Solved as far as floats go: what a solve leaves, a tick of contacts makes a hundred times as large.
-TEST_F(SelfCollision, OfAdaptiveConstraintsMovesNodesAsTheReference) {
+TEST_F(SelfCollision, MovesNodesAsTheReferenceWithAdaptiveConstraints) {
   model::Scene scene = heap(model::SolverKind::acad);
   for (model::Cloth& cloth : scene.cloths) {
     cloth.solver.iterations = 2000;
@@ -295,7 +295,7 @@ TEST_F(SelfCollision, OfAdaptiveConstraintsMovesNodesAsTheReference) {
 
 // One substep: from here springs throw nodes about, and what a solve leaves grows fast. It leaves 1e-5 of
 // some thousand springs' errors of 0.014 m: 5e-6 m, and more of it at a single node.
-TEST_F(SelfCollision, OfConstraintsMovesNodesAsTheReference) {
+TEST_F(SelfCollision, MovesNodesAsTheReferenceWithConstraints) {
   model::Scene scene = heap(model::SolverKind::constraint);
   scene.simulationRate = 720;
   scene.substeps = 1;
@@ -320,7 +320,7 @@ TEST_F(SelfCollision, ASheetAtRestIsNoNeighbourOfItself) {
     EXPECT_EQ(with.tick(inputsOf(scene)).stateHash, without.tick(inputsOf(scene)).stateHash);
 }
 
-TEST_F(SelfCollision, ClothWithoutItMovesAsIfAlone) {
+TEST_F(SelfCollision, DoesNotChangeClothWithoutSelfCollision) {
   const model::Cloth other = flat(calmCloth(12, 12), 0.005f, 30);
   const model::Scene alone = sceneOf({other});
   const model::Scene both = sceneOf({withBalls(flat(calmCloth(12, 12), 0)), other});
@@ -333,7 +333,7 @@ TEST_F(SelfCollision, ClothWithoutItMovesAsIfAlone) {
   EXPECT_TRUE(std::equal(expected.positions.begin(), expected.positions.end(), state.positions.end() - 144));
 }
 
-TEST_F(SelfCollision, MomentumStays) {
+TEST_F(SelfCollision, KeepsMomentum) {
   // A small sheet flies into a larger, heavier one, with friction between them.
   model::Cloth large = withBalls(flat(calmCloth(20, 20), 0)),
                small = withBalls(flat(calmCloth(9, 9), 0.05f, 35));
@@ -361,7 +361,7 @@ TEST_F(SelfCollision, MomentumStays) {
   EXPECT_EQ(intersections(scene, after.positions), 0u);
 }
 
-TEST_F(SelfCollision, ASheetThatFallsOnASheetComesToRestOnIt) {
+TEST_F(SelfCollision, AFallingSheetComesToRestOnASheet) {
   model::Cloth lower = withBalls(flat(calmCloth(30, 30), 0.03f));
   model::Cloth upper = withBalls(flat(calmCloth(20, 20), 0.3f, 20));
   const model::Scene scene = sceneOf({lower, upper});
@@ -393,7 +393,7 @@ TEST_F(SelfCollision, ASheetThatFallsOnASheetComesToRestOnIt) {
   EXPECT_LT(speedOf(state), 0.005);
 }
 
-TEST_F(SelfCollision, FoldsThatFallOnTheFloorStayAStack) {
+TEST_F(SelfCollision, FoldsOnTheFloorStayAStack) {
   model::Cloth cloth = calmCloth(60, 20);
   cloth.bend = {2, 0.01f};
   for (const bool balls : {true, false}) {
@@ -413,7 +413,7 @@ TEST_F(SelfCollision, FoldsThatFallOnTheFloorStayAStack) {
         least = std::min(least, double{state.positions[above].y() - state.positions[below].y()});
       }
     if (balls) {
-      // Half of what lies in a hollow at least: panels slope.
+      // In a hollow at least half of the distance remains, because panels slope.
       EXPECT_GT(least, 0.5 * std::sqrt(0.5) * kDistance);
       EXPECT_EQ(intersections(scene, state.positions), 0u);
       EXPECT_GT(nearest(scene, state), 0.85);
@@ -425,7 +425,7 @@ TEST_F(SelfCollision, FoldsThatFallOnTheFloorStayAStack) {
 }
 
 // Boxes push it together from both sides.
-TEST_F(SelfCollision, ACurtainThatIsPushedTogetherFoldsAndDoesNotPassThroughItself) {
+TEST_F(SelfCollision, APushedCurtainFoldsWithoutPassingThroughItself) {
   model::Cloth cloth = calmCloth(24, 60);
   cloth.structural = {100, 0.05f};
   cloth.shear = {20, 0.02f};
@@ -497,7 +497,7 @@ TEST_F(SelfCollision, FrictionHoldsASheetOnASheetUpToItsAngle) {
 
 // ---- The same bits
 
-TEST_F(SelfCollision, OneThousandTicksGiveTheSameHashesInTwoRunsHoweverTheWorkIsCut) {
+TEST_F(SelfCollision, GivesTheSameHashesInRunsOfAThousandTicks) {
   model::Cloth sheet = withBalls(calmCloth(30, 20));
   sheet.bend = {1, 0.01f};
   sheet.grid.pose = {model::Vec3(0, 0.7f, 0), turned(4, model::Vec3::UnitX())};

@@ -12,7 +12,7 @@ namespace {
 
 constexpr const char* kVariable = "LP_NUM_THREADS";
 
-TEST(SoftwareThreads, AreNoneForFewNodesUnlessSomebodySaysOtherwise) {
+TEST(SoftwareThreads, AreZeroForFewNodesUnlessConfigured) {
   const char* given = std::getenv(kVariable);
   const std::string before = given != nullptr ? given : "";
   unsetenv(kVariable);

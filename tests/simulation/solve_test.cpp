@@ -41,7 +41,7 @@ model::Scene solvedScene() {
   return scene;
 }
 
-TEST_F(Solve, GivesTheSameBitsHoweverTheWorkIsCut) {
+TEST_F(Solve, GivesTheSameBitsForEveryPartitionOfWork) {
   const simulation::SimulationOptions ways[] = {{.workgroupSize = 8, .solveWholeNodes = 1'000'000},
                                                 {.workgroupSize = 8, .solveWholeNodes = 0},
                                                 {.workgroupSize = 0, .solveWholeNodes = 700},
@@ -51,8 +51,8 @@ TEST_F(Solve, GivesTheSameBitsHoweverTheWorkIsCut) {
   expectSameBits(solvedScene(), passingBall, 10, ways);
 }
 
-// What it says of itself too; the systems' order alone depends on who solves which.
-TEST_F(Solve, ReportsTheSameWhoeverSolves) {
+// The reports are the same too. Only the order of the systems depends on the partition.
+TEST_F(Solve, ReportsTheSameForEveryPartitionOfWork) {
   const Reports reports =
       expectSameReports(solvedScene(), passingBall, {.solveWholeNodes = 1'000'000}, {.solveWholeNodes = 0});
   for (const auto& tick : reports) EXPECT_LT(tick[1].activeConstraints, 4u * 30 * 41 / 2);

@@ -60,7 +60,7 @@ float largestStrain(const model::Cloth& cloth, const NodeState& state) {
 
 // Every solver after every other, and back: the state stays to the bit, and goes on to the bit as one that
 // had this solver from its start would from the same state.
-TEST_F(SolverChange, GoesOnAsAClothThatAlwaysHadTheSolver) {
+TEST_F(SolverChange, ContinuesAsIfTheClothAlwaysHadTheSolver) {
   const model::Scene scene = softScene();
   const simulation::TickInputs inputs = inputsWithBall(scene);
   Running changing(scene);
@@ -103,7 +103,7 @@ TEST_F(SolverChange, ChangesTheStrainAsTheSolverPromises) {
   EXPECT_NEAR(largestStrain(scene.cloths[0], running.state()), asForces, 0.2f * asForces);
 }
 
-TEST_F(SolverChange, OfOtherSettingsOrAnotherThicknessKeepsTheStateToo) {
+TEST_F(SolverChange, KeepsTheStateIfSettingsOrThicknessChange) {
   model::Scene scene = withSolvers(softScene(), SolverKind::constraint, SolverKind::acad);
   Running running(scene);
   const simulation::TickInputs inputs = inputsWithBall(scene);
@@ -126,7 +126,7 @@ TEST_F(SolverChange, OfOtherSettingsOrAnotherThicknessKeepsTheStateToo) {
 
 // Whichever buffer holds the state, in the checkpoint too, under every solver: it goes on to the bit as one
 // that always had these masses would.
-TEST_F(SolverChange, OfMassesGoesOnAsAClothThatAlwaysHadThem) {
+TEST_F(SolverChange, ContinuesAsIfTheClothAlwaysHadTheMasses) {
   const model::Scene light = softScene();
   const simulation::TickInputs inputs = inputsWithBall(light);
   for (const SolverKind kind : kKinds) {
@@ -152,7 +152,7 @@ TEST_F(SolverChange, OfMassesGoesOnAsAClothThatAlwaysHadThem) {
 }
 
 // Balls of another size and friction, alike and not; tethers of another length.
-TEST_F(SolverChange, OfSelfCollisionAndTethersGoesOnAsAClothThatAlwaysHadThem) {
+TEST_F(SolverChange, ContinuesAsIfTheClothAlwaysHadSelfCollisionAndTethers) {
   model::Scene scene = softScene();
   for (model::Cloth& cloth : scene.cloths) {
     cloth.selfCollision = model::SelfCollision{.radius = 0.01f, .friction = 0.3f};

@@ -46,7 +46,7 @@ TEST_F(State, StartsAtRestWhereTheScenePutsIt) {
   for (const model::Vec3& velocity : state.velocities) EXPECT_EQ(velocity, model::Vec3::Zero());
 }
 
-TEST_F(State, IsRestoredToTheBitAndGoesOnAsIfNothingHappened) {
+TEST_F(State, IsRestoredToTheBitAndContinuesUnchanged) {
   Running running(scene);
   run(running, 0, 7);  // an odd number of ticks of an even number of substeps, and the other way round below
   const StateSnapshot saved = running.save();
@@ -60,7 +60,7 @@ TEST_F(State, IsRestoredToTheBitAndGoesOnAsIfNothingHappened) {
   EXPECT_EQ(running.save().bytes, later.bytes);
 }
 
-TEST_F(State, SavedAfterAnOddNumberOfSubstepsIsThePresentOne) {
+TEST_F(State, SavesThePresentStateAfterAnOddNumberOfSubsteps) {
   model::Scene odd = scene;
   odd.substeps = 3;
   Running running(odd);
@@ -82,12 +82,12 @@ TEST_F(State, ContinuesOnAnotherDeviceWithTheSameHashes) {
     ASSERT_EQ(there.tick(inputs(tick)).stateHash, here.tick(inputs(tick)).stateHash) << "tick " << tick;
 }
 
-TEST_F(State, SnapshotOfAnotherSceneIsRefused) {
+TEST_F(State, RefusesASnapshotOfAnotherScene) {
   Running running(scene), other(sceneOf({hung(3, 3)}));
   EXPECT_THROW(running.restore(other.save()), std::invalid_argument);
 }
 
-TEST_F(State, RollsBackToTheCheckpointAndWithoutOneToTheStart) {
+TEST_F(State, RollsBackToTheCheckpointOrElseToTheStart) {
   Running running(scene);
   const StateSnapshot start = running.save();
   run(running, 0, 3);
@@ -102,7 +102,7 @@ TEST_F(State, RollsBackToTheCheckpointAndWithoutOneToTheStart) {
   EXPECT_EQ(running.save().bytes, kept.bytes);
 }
 
-TEST_F(State, BadNumbersAreNoticedInTheSameTickAndRolledBack) {
+TEST_F(State, DetectsBadNumbersInTheSameTickAndRollsBack) {
   const float bad[] = {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity(),
                        -std::numeric_limits<float>::infinity(), 2 * simulation::kWorldExtent};
   Running running(scene);
@@ -122,7 +122,7 @@ TEST_F(State, BadNumbersAreNoticedInTheSameTickAndRolledBack) {
   }
 }
 
-TEST_F(State, AStateThatGoesBadByItselfReturnsToTheCheckpoint) {
+TEST_F(State, RollsBackADivergingState) {
   // Far beyond the stability bound: it explodes within some ticks.
   model::Scene stiff = sceneOf({calmCloth(16, 16)});
   stiff.cloths[0].structural.stiffness = 1e5f;

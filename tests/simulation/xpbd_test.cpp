@@ -69,10 +69,10 @@ void expectCorrectedLikeReference(model::Scene scene, unsigned seed,
   const NodeState state = running.state();
   const reference::ReferenceSimulation expected = referenceAfter(scene);
 
-  // A correction rounds each end to half of 2^-24 of at most half a metre on each axis, 2.6e-8 m in all, and
-  // takes a length of at most 0.04 m from such ends with a relative error of 1e-6: 1e-7 m with room to spare.
-  // A sweep corrects a node twelve times, of the disc fifteen; what errors it finds at its neighbours it
-  // makes smaller.
+  // A correction rounds each end to half of 2^-24 of at most half a metre on each axis, 2.6e-8 m in all. It
+  // computes a length of at most 0.04 m from such ends with a relative error of 1e-6: less than 1e-7 m in
+  // all. A sweep corrects a node of a grid twelve times, of the disc fifteen times. It reduces the errors
+  // that it finds at the neighbours.
   std::uint32_t iterations = 0;
   for (const model::Cloth& cloth : scene.cloths) iterations = std::max(iterations, cloth.solver.iterations);
   const double tolerance = iterations * 15 * 1e-7;
@@ -130,7 +130,7 @@ TEST_F(Xpbd, MovesNodesAsTheReferenceWithACompliance) {
   }
 }
 
-TEST_F(Xpbd, FeelsTheAirAsTheReferenceDoes) {
+TEST_F(Xpbd, AirMovesNodesAsInTheReference) {
   model::Cloth cloth = grid(9, 10);
   cloth.drag = 0.8f;
   cloth.lift = 0.5f;
@@ -139,11 +139,10 @@ TEST_F(Xpbd, FeelsTheAirAsTheReferenceDoes) {
   expectCorrectedLikeReference(scene, 16);
 }
 
-// A chain hangs still where a substep's corrections undo exactly what gravity does in it. What the spring
-// below n nodes then gives is h^2 times its force n m g, whatever the sweep's order: right after it was
-// corrected it is n m g / k too long, and what is corrected after it moves each of its ends by at most h^2 /
-// m times the largest force.
-TEST_F(Xpbd, LetsAColumnHangAsItsStiffnessSays) {
+// A chain hangs still if a substep's corrections undo exactly the motion by gravity. The spring below n nodes
+// then gives h^2 times its force n m g, for every order of the sweep. Right after its correction it is n m g
+// / k too long. The later corrections move each of its ends by at most h^2 / m times the largest force.
+TEST_F(Xpbd, StretchesAHangingColumnAsItsStiffnessRequires) {
   constexpr std::uint32_t kNodes = 12;
   model::Cloth cloth = corrected(calmCloth(kNodes, 2));
   cloth.structural = {200, 0};
@@ -202,7 +201,7 @@ TEST_F(Xpbd, KeepsAFreeClothsMomentum) {
 
 // Velocities are not taken from rounded places: what nothing corrects falls as gravity says, however short
 // the substep.
-TEST_F(Xpbd, FallsExactlyWhereNothingIsStretched) {
+TEST_F(Xpbd, FallsExactlyWithoutStretch) {
   model::Cloth cloth = corrected(calmCloth(8, 8));
   cloth.damping = 0;
   cloth.grid.pose.position = model::Vec3(3, 5, 1);
@@ -216,7 +215,7 @@ TEST_F(Xpbd, FallsExactlyWhereNothingIsStretched) {
   EXPECT_NEAR(mean.y(), -9.81 * 0.5, 0.001 * 9.81 * 0.5);
 }
 
-TEST_F(Xpbd, LeavesPinnedNodesWhereTheyAre) {
+TEST_F(Xpbd, KeepsPinnedNodesInPlace) {
   const model::Scene scene = sceneOf({grid(9, 14), mesh(4)});
   const simulation::MovingCollider ball{
       model::Sphere{0.1f}, {model::Vec3(0, -0.05f, 0)}, {model::Vec3(0, -0.05f, 0)}, 1};
@@ -231,11 +230,11 @@ TEST_F(Xpbd, LeavesPinnedNodesWhereTheyAre) {
   }
 }
 
-// What a hard spring is too long is what its neighbours, corrected after it, have pulled: h^2 / m times their
-// forces. A row carries at most 32 m g a column, so that with h = 1/720 s one such pull is 6e-4 m of 0.032
-// m, 1.9 %; at the ends of the two springs of a column that is two of them. Short substeps are what counts:
-// four times as many leave a sixteenth.
-TEST_F(Xpbd, LetsHardSpringsStretchAsLittleAsTheSubstepIsShort) {
+// The excess length of a hard spring comes from its neighbours, which are corrected after it: h^2 / m times
+// their forces. A row carries at most 32 m g per column. With h = 1/720 s one such pull is 6e-4 m of 0.032
+// m, 1.9 %. The two springs at the ends of a column have two such pulls. The length of the substep decides:
+// four times as many substeps leave a sixteenth.
+TEST_F(Xpbd, StretchesHardSpringsInProportionToTheSubstep) {
   std::vector<double> strains;
   for (const std::uint32_t substeps : {10u, 40u}) {
     model::Scene scene = sheet(32, substeps, true);
@@ -251,7 +250,7 @@ TEST_F(Xpbd, LetsHardSpringsStretchAsLittleAsTheSubstepIsShort) {
   EXPECT_LT(strains[1], strains[0] / 10);
 }
 
-TEST_F(Xpbd, LeavesNothingInsideASphere) {
+TEST_F(Xpbd, LeavesNoNodeInsideASphere) {
   const model::Scene scene = sheet(24, 20, false);
   const model::Pose place{model::Vec3(0, -0.3f, -0.3f)};
   const simulation::MovingCollider ball{model::Sphere{0.2f}, place, place, 1};
@@ -295,7 +294,7 @@ void eraseSystems(model::Scene& scene) {
   });
 }
 
-TEST_F(Xpbd, GivesTheSameBitsHoweverTheWorkIsCut) {
+TEST_F(Xpbd, GivesTheSameBitsForEveryPartitionOfWork) {
   model::Scene scene = mixedScene();
   eraseSystems(scene);
   const simulation::SimulationOptions ways[] = {{.workgroupSize = 0, .xpbdWholeNodes = 0},
@@ -321,7 +320,7 @@ TEST_F(Xpbd, ReachesTheHashOfEveryOtherDevice) {
   EXPECT_EQ(hashAfter(scene, passingBall, 60), 0xb62da311813aa0f5u);
 }
 
-TEST_F(Xpbd, LeavesClothsOfOtherSolversAsTheyAreAlone) {
+TEST_F(Xpbd, DoesNotChangeClothsOfOtherSolvers) {
   const model::Scene together = mixedScene();
   model::Scene alone = together;
   std::erase_if(alone.cloths, [](const model::Cloth& c) { return c.solver.kind == model::SolverKind::xpbd; });

@@ -96,7 +96,7 @@ TEST_F(DeviceTest, ListedDevicesAreNumberedFromTheBestOn) {
   }
 }
 
-TEST_F(DeviceTest, OpensTheBestDeviceUnlessToldOtherwise) {
+TEST_F(DeviceTest, OpensTheBestDeviceByDefault) {
   const std::vector<DeviceInfo> devices = listDevices();
   EXPECT_EQ(Device().info().name, devices.front().name);
   EXPECT_EQ(Device({.select = "0"}).info().name, devices.front().name);
@@ -144,7 +144,7 @@ TEST(DeviceSelection, TakesAnIndexOrAPartOfANameInAnyCase) {
   EXPECT_EQ(select(all, "rtx 40"), 0u);
 }
 
-TEST_F(DeviceTest, RefusesAnUnknownSelectionAndListsWhatThereIs) {
+TEST_F(DeviceTest, RefusesAnUnknownSelectionAndListsTheDevices) {
   const std::string there = tests::device().info().name;
   EXPECT_THAT(errorOf({.select = "no such device"}),
               AllOf(HasSubstr("\"no such device\""), HasSubstr("0: " + there)));
@@ -165,14 +165,14 @@ TEST(DeviceSelection, RefusesANameThatFitsSeveralAndListsThem) {
   }
 }
 
-TEST(DeviceErrors, NameWhatToInstallWhereThereIsNoDriver) {
+TEST(DeviceErrors, NameWhatToInstallWithoutADriver) {
   const Environment drivers("VK_DRIVER_FILES", "/nonexistent.json");
   const Environment formerName("VK_ICD_FILENAMES", "/nonexistent.json");
   EXPECT_THAT(errorOf({}), AllOf(HasSubstr("mesa-vulkan-drivers"), HasSubstr("nvidia")));
   EXPECT_THROW(listDevices(), DeviceError);
 }
 
-TEST(DeviceErrors, NameWhatToInstallWhereThereIsNoLoader) {
+TEST(DeviceErrors, NameWhatToInstallWithoutALoader) {
   // A program's library path is read when it starts: the child starts with files in the way of the real
   // loader.
   const std::filesystem::path directory =
@@ -191,7 +191,7 @@ TEST(DeviceErrors, NameWhatToInstallWhereThereIsNoLoader) {
   std::filesystem::remove_all(directory);
 }
 
-TEST(DeviceErrors, SayWhereValidationIsAskedForAndNotInstalled) {
+TEST(DeviceErrors, NameTheSettingIfValidationIsNotInstalled) {
   const Environment layers("VK_LAYER_PATH", "/nonexistent");
   EXPECT_THAT(errorOf({.validation = true}), HasSubstr("vulkan-validationlayers"));
 }
@@ -217,7 +217,7 @@ TEST_F(DeviceTest, SoftwareDeviceRunsAsManyThreadsAsAsked) {
   EXPECT_EQ(threadsAddedBy({.softwareThreads = 3}), inlineOnly + 3 * one);
 }
 
-TEST_F(DeviceTest, SoftwareDeviceTakesItsThreadsFromTheEnvironmentOrElseOneAProcessor) {
+TEST_F(DeviceTest, SoftwareDeviceTakesThreadsFromTheEnvironmentOrOnePerProcessor) {
   if (!tests::device().isSoftware()) GTEST_SKIP() << "threads are chosen on software devices alone";
   const Environment given("LP_NUM_THREADS", "3");
   const std::size_t three = threadsAddedBy({.softwareThreads = 3});

@@ -18,11 +18,11 @@ namespace clothstream::tests {
 // always validates; devices that tests open themselves do so under ctest, which sets
 // CLOTHSTREAM_VALIDATION=1.
 
-// The device of this test program: opened by the first call, closed after the last test. Throws
-// vulkan::DeviceError where there is none.
+// The device of this test program. The first call opens it; it closes after the last test. Throws
+// vulkan::DeviceError if no device is usable.
 vulkan::Device& device();
 
-// Skips its tests, with the reason, where there is no device.
+// Skips its tests, with the reason, if there is no device.
 class GpuTest : public ::testing::Test {
  protected:
   void SetUp() override;
@@ -34,8 +34,8 @@ void submitAndWait(vulkan::Device& device, vulkan::Recorder& recorder);
 // Records by `record` on the shared device, submits and waits.
 void run(const std::function<void(vulkan::Recorder&)>& record);
 
-// What the validation layer said since the test began or the last call: expected by the caller, so that it
-// does not fail the test.
+// Returns the messages of the validation layer since the test began or the last call. The caller expects
+// them, so that they do not fail the test.
 std::vector<std::string> takeValidationTexts();
 
 }  // namespace clothstream::tests

@@ -92,7 +92,7 @@ TEST_F(PipelineCacheTest, IsReplacedWhenDamaged) {
   }
 }
 
-TEST_F(PipelineCacheTest, IsReplacedWhenOfAnotherDriver) {
+TEST_F(PipelineCacheTest, IsReplacedIfFromAnotherDriver) {
   useCache();
   std::vector<char> foreign = read();
   foreign[kUuidOffset] = static_cast<char>(foreign[kUuidOffset] ^ 1);
@@ -104,7 +104,7 @@ TEST_F(PipelineCacheTest, IsReplacedWhenOfAnotherDriver) {
   expectReplaced();
 }
 
-TEST_F(PipelineCacheTest, ThatCannotBeWrittenDisturbsNobody) {
+TEST_F(PipelineCacheTest, IsOptionalIfItCannotBeWritten) {
   std::filesystem::create_directories(directory_.parent_path());
   std::ofstream(directory_) << "a file where the directory should be";
   EXPECT_EQ(useCache(), 0u);

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: MIT
-// The residuals of a vertex, and where they lead, as in proto/codec/hierarchical/hierarchical_encoder.cpp.
+// Chooses the residuals of a vertex and computes its position, as in
+// proto/codec/hierarchical/hierarchical_encoder.cpp.
 #ifndef CLOTHSTREAM_SHADERS_ENCODE_HIERARCHICAL_CHOOSE_GLSL
 #define CLOTHSTREAM_SHADERS_ENCODE_HIERARCHICAL_CHOOSE_GLSL
 
 #include "shaders/encode/hierarchical/slots.glsl"
 #include "shaders/encode/hierarchical/surface_frame.glsl"
 
-// To the nearest, the even one of two.
+// Rounds to the nearest integer, and to the even one of two.
 int nearest(float x) {
   return int(roundEven(x));
 }
@@ -14,7 +15,7 @@ ivec3 nearest(vec3 x) {
   return ivec3(roundEven(x));
 }
 
-// In steps, along u, v and n.
+// The difference in steps along u, v and n.
 vec3 inSteps(SurfaceFrame frame, ivec3 difference) {
   float scale = uintBitsToFloat((127 - uint(kUnitBits) - push.stepBits) << 23);
   precise vec3 d = scale * vec3(difference);
@@ -24,8 +25,8 @@ vec3 inSteps(SurfaceFrame frame, ivec3 difference) {
   return vec3(u, v, n);
 }
 
-// `residual` and the error that it leaves, or those of the next smaller one where the vertex stays within
-// half the diagonal of a cube of steps.
+// Replaces `residual` and its `error` by the next smaller residual, if the vertex then stays within half the
+// diagonal of a cube of steps.
 void tryLess(float wished, vec3 errors, inout int residual, inout float error) {
   int smaller = residual - ((residual >> 31) | 1);
   precise float moved = wished - float(smaller);
@@ -37,11 +38,11 @@ void tryLess(float wished, vec3 errors, inout int residual, inout float error) {
   }
 }
 
-// Smaller residuals along the surface; along the normal the nearest stays.
+// Prefers smaller residuals along the surface; along the normal it takes the nearest.
 ivec3 economise(vec3 wish) {
   ivec3 r = nearest(wish);
   precise vec3 errors = wish - vec3(r);
-  // The one that is farther off first.
+  // The component with the larger error comes first.
   bool isU = abs(errors.x) > abs(errors.y);
   for (uint i = 0; i < 2; ++i, isU = !isU) {
     if (isU) {
@@ -57,8 +58,8 @@ bool isBeyond16Bits(ivec3 r) {
   return saturate16(r) != r;
 }
 
-// How far residuals below 2^27 move a vertex, in units. The sum of three products, shifted, fits 32 bits
-// though the products do not: their high parts are shifted apart, and wrap alike.
+// Displacement of a vertex by residuals below 2^27, in units. The shifted sum of three products fits 32 bits,
+// although the products do not. Their high parts are shifted separately and wrap in the same way.
 ivec3 movedBy(SurfaceFrame frame, ivec3 r) {
   int down = kUnitBits - int(push.stepBits);
   ivec3 low = combine(frame, r & 0xFFF) + (1 << (down - 1));
@@ -71,8 +72,8 @@ ivec3 reconstruct(SurfaceFrame frame, ivec3 position, ivec3 r) {
   return clamp(position + movedBy(frame, r), -kFar, kFar);
 }
 
-// Returns where they lead. The surface's frame is orthonormal to one in thousands: after a long way a second
-// and a third look are needed.
+// Chooses residuals and returns the position that they lead to. The surface frame is orthonormal to one part
+// in thousands: long displacements need further corrections.
 ivec3 choose(SurfaceFrame frame, ivec3 position, ivec3 target, out ivec3 residual) {
   residual = economise(inSteps(frame, target - position));
   ivec3 reached = position + movedBy(frame, residual);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What a record says of the vertices round its own, once all are placed; the weights that the frame leaves;
-// the hash of the frame.
+// Completes the records with the curvature around each vertex after all vertices are placed. It also updates
+// the weights that the frame leaves, and computes the frame's hash.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 
@@ -17,7 +17,7 @@ layout(std430, binding = 2) buffer Made {
   uvec4 made[];
 };
 layout(std430, binding = 3) readonly buffer SlotTable {
-  uint slotTable[];  // the vertex first
+  uint slotTable[];  // the first row has the vertices
 };
 layout(std430, binding = 4) buffer Status {
   SlotStatus status;
@@ -27,7 +27,7 @@ layout(std430, binding = 5) buffer ClassWeights {
 };
 
 layout(std430, binding = 6) readonly buffer SentNormals {
-  uint sentNormals[];  // by vertex; 0 where the stream has none
+  uint sentNormals[];  // by vertex; 0 if the stream has no normals
 };
 
 shared uint hashLow;
@@ -59,7 +59,7 @@ void main() {
     atomicAdd(hashLow, hashWord(vertex, position, normal, kLowSeed));
     atomicAdd(hashHigh, hashWord(vertex, position, normal, kHighSeed));
   }
-  // At rest the frame leaves what it found.
+  // A frame at rest leaves the weights that it found.
   if (slot < kClassWeights && push.hasWeights != 0 && (isKey() || status.moved != 0)) {
     weights[kKeptWeights + slot] = weights[kLeftWeights + slot];
   }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A vertex of a phase: predicted, placed, and its residuals told with the scales at which they are expected.
+// Predicts and places a vertex of a phase, and writes its residuals with their expected scales.
 #ifndef CLOTHSTREAM_SHADERS_ENCODE_HIERARCHICAL_PLACE_GLSL
 #define CLOTHSTREAM_SHADERS_ENCODE_HIERARCHICAL_PLACE_GLSL
 
@@ -21,7 +21,7 @@ layout(std430, binding = 7) readonly buffer Model {
   ScaleWeights scaleWeights[3 * kScaleClasses];
   uvec4 phases[];  // first slot, end, weight class
 };
-// kResidualRows words a slot, and where they say so three more.
+// kResidualRows words per slot, and three more words if they say so.
 layout(std430, binding = 8) writeonly buffer Residuals {
   uint residuals[];
 };
@@ -33,7 +33,8 @@ uint byteOf(uint bytes, uint component) {
   return bitfieldExtract(bytes, int(8 * component), 8);
 }
 
-// Two an octave: the octave of the expected magnitude, from the second bit up, and which half of it.
+// Returns two scales per octave: the octave of the expected magnitude, from the second bit up, and which half
+// of it.
 uint scaleOf(ScaleWeights w, Prediction p, uint lastMagnitudes, uint component, ivec3 magnitudes) {
   int expected = w.parents * int(byteOf(p.parentMagnitudes, component)) +
                  w.ring * int(byteOf(p.ringMagnitudes, component)) +
@@ -45,7 +46,8 @@ uint scaleOf(ScaleWeights w, Prediction p, uint lastMagnitudes, uint component, 
   return 2 * (octave - 2) + ((e >> (octave - 1)) & 1u);
 }
 
-// What is wanted in the same place for some frames, and serves there, is told to stay, in turns.
+// Starts to rest if the vertex has not moved for some frames and its last position still serves. Vertices
+// start in turn, a limited number per frame.
 bool startsToRest(uint slot, PastVertex before) {
   ivec4 target = wanted[slot];
   if (isKey() || target.w < kMostStillFrames || rests(before.node) ||

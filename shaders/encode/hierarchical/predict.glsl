@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-// Where codec 2 expects a vertex, as in proto/codec/hierarchical/predictor.h; FRAME_FORMAT.md has the
-// letters.
+// The position at which codec 2 expects a vertex, as in proto/codec/hierarchical/predictor.h. FRAME_FORMAT.md
+// defines the letters.
 //
-// Whoever includes this defines MADE_QUALIFIERS: how the moment that is being made is accessed.
+// The including kernel defines MADE_QUALIFIERS: the memory qualifiers of the moment that is being made.
 #ifndef CLOTHSTREAM_SHADERS_ENCODE_HIERARCHICAL_PREDICT_GLSL
 #define CLOTHSTREAM_SHADERS_ENCODE_HIERARCHICAL_PREDICT_GLSL
 
@@ -23,7 +23,7 @@ layout(std430, binding = 2) MADE_QUALIFIERS buffer Made {
   uvec4 made[];
 };
 layout(std430, binding = 3) readonly buffer Wanted {
-  ivec4 wanted[];  // positions by slot; for how many frames the same
+  ivec4 wanted[];  // positions by slot; w: number of frames without change
 };
 layout(std430, binding = 4) readonly buffer Status {
   SlotStatus status;
@@ -33,11 +33,11 @@ layout(std430, binding = 5) readonly buffer ClassWeights {
 };
 
 layout(std430, binding = 6) readonly buffer SlotTable {
-  uint slotTable[];  // the vertex; three weights of parents
+  uint slotTable[];  // the vertex, then three weights of parents
 };
 
-// Of the parents, in 2^-kParentBits; the first has the rest of a whole. Where all weigh the same, more than
-// 32 bits would be needed: nothing overflows in their sum.
+// Weighted mean of the parents, with weights in 2^-kParentBits; the first parent has the rest of a whole.
+// With equal weights the products would need more than 32 bits, but the plain sum does not overflow.
 ivec3 averageOf(uint slot, ivec3 p0, ivec3 p1, ivec3 p2, ivec3 p3) {
   uint packed_ = slotTable[push.vertexCount + slot];
   if (packed_ == kEqualParentWeights) {
@@ -87,12 +87,12 @@ struct Prediction {
   ivec3 ring;    // G
   ivec3 moved;   // W
   ivec3 faster;  // W0 - W1
-  // As in a node: sums over the parents and over the ring.
+  // Sums over the parents and over the ring, in the format of a node.
   uint parentMagnitudes;
   uint ringMagnitudes;
 };
 
-// Those that are not turned with the surface.
+// Number of features that do not rotate with the surface.
 const uint kPlainFeatures = 12;
 
 void plainFeatures(Prediction p, PastVertex before, out ivec3 features[kPlainFeatures]) {
@@ -111,8 +111,8 @@ void plainFeatures(Prediction p, PastVertex before, out ivec3 features[kPlainFea
       ivec3(firstOf(before.average.www).x, secondOf(before.average.www).x, firstOf(before.detail.www).x);
 }
 
-// The detail along u, v and n that the last two frames let expect; weights 12 and 14 are those of u and v, 13
-// and 15 of n.
+// The detail along u, v and n that follows from the last two frames. Weights 12 and 14 belong to u and v,
+// weights 13 and 15 to n.
 ivec3 wishedDetail(uint weightClass, ivec3 now, ivec3 change) {
   int along = weightOf(weightClass, 12), across = weightOf(weightClass, 13);
   int alongChange = weightOf(weightClass, 14), acrossChange = weightOf(weightClass, 15);
@@ -136,7 +136,7 @@ Prediction predict(uint slot, uint weightClass, PastVertex before) {
   p.frame = surfaceFrame(ivec3(p1.xyz - p0.xyz), ivec3(p3.xyz - p2.xyz));
   p.ring = saturate16((((ivec3(ring.xyz) + 4) >> 3) - p.average) >> fineBits());
   p.twist = saturate16(ivec3(p0.xyz + p1.xyz - p2.xyz - p3.xyz) >> (2 + fineBits()));
-  // In a key frame nothing moves.
+  // Nothing moves in a key frame.
   ivec3 averageBefore = isKey() ? p.average : ivec3(before.average.xyz);
   p.moved = saturate16((p.average - averageBefore) >> fineBits());
   p.faster = saturate16(p.moved - secondOf(before.twist));
@@ -146,7 +146,8 @@ Prediction predict(uint slot, uint weightClass, PastVertex before) {
   }
   ivec3 features[kPlainFeatures];
   plainFeatures(p, before, features);
-  // Sixteenths of a step in 2^-kWeightBits, to units; half a unit for the rounding.
+  // Sums are sixteenths of a step times 2^kWeightBits. The shift converts them to units; half a unit is added
+  // for rounding.
   int down = kWeightBits - fineBits();
   ivec3 change = ivec3(1 << (down - 1));
   for (uint f = 0; f < kPlainFeatures; ++f) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Normals beside those that follow from the frame's positions, as in
+// Computes the residuals of normals relative to those that follow from the frame's positions, as in
 // proto/codec/hierarchical/normal_prediction.cpp.
 #version 450
 #extension GL_GOOGLE_include_directive : require
@@ -11,24 +11,24 @@ layout(std430, binding = 1) readonly buffer Made {
   uvec4 made[];
 };
 layout(std430, binding = 2) readonly buffer Faces {
-  uvec4 faces[];  // slots of the corners; kNoCorner for a triangle's fourth
+  uvec4 faces[];  // slots of the corners; kNoCorner as the fourth corner of a triangle
 };
-// By vertex: where its faces start; then these.
+// By vertex: start of its faces; then the faces.
 layout(std430, binding = 3) readonly buffer FacesOf {
   uint facesOf[];
 };
 layout(std430, binding = 4) writeonly buffer SentNormals {
-  uint sentNormals[];  // by vertex, as they are hashed
+  uint sentNormals[];  // by vertex, in the form that is hashed
 };
 layout(std430, binding = 5) writeonly buffer NormalResiduals {
-  uint normalResiduals[];  // by vertex: of u and v, a byte each
+  uint normalResiduals[];  // by vertex: residuals of u and v, one byte each
 };
 
 const int kOctahedralLimit = 127;
 const float kOne = 32768.0;
 const int kNormalBits = 15;
 
-// 64 bits in two words, the low one first; two's complement.
+// Numbers of 64 bits are two words, the low one first, in two's complement.
 uvec2 add(uvec2 a, uvec2 b) {
   uint carry;
   uint low = uaddCarry(a.x, b.x, carry);
@@ -57,7 +57,7 @@ int bitWidth(uvec2 a) {
   return a.y != 0 ? findMSB(a.y) + 33 : findMSB(a.x) + 1;
 }
 
-// Of what then fits 32 bits.
+// Shifts a number right that then fits 32 bits.
 int shiftedRight(uvec2 a, int bits) {
   if (bits <= 0) {
     return int(a.x << -bits);
@@ -75,7 +75,7 @@ int octahedralPart(int magnitude, int sum, int signedBy) {
   return signedBy < 0 ? -rounded : rounded;
 }
 
-// Of components of 2^15 at most.
+// Octahedral form of a vector whose components are at most 2^15.
 ivec2 encodeOctahedral(ivec3 n) {
   ivec3 a = abs(n);
   int sum = a.x + a.y + a.z;
@@ -86,14 +86,14 @@ ivec2 encodeOctahedral(ivec3 n) {
   return ivec2(octahedralPart(magnitude.x, sum, n.x), octahedralPart(magnitude.y, sum, n.y));
 }
 
-// What is no number is -1.
+// Fixed-point form of a component; -1 for a NaN.
 int fixedPoint(float x) {
   precise float q = floor(x * kOne + 0.5);
   float low = q >= -kOne ? q : -kOne;
   return int(low > kOne ? kOne : low);
 }
 
-// The axes of the octahedron whose top is that one: the others follow it.
+// The axes of the octahedron with this top; the other two follow it.
 uvec3 axesOf(uint top) {
   return uvec3((top + 1) % 3, (top + 2) % 3, top);
 }
@@ -109,7 +109,7 @@ void main() {
     uvec4 face = faces[facesOf[at]];
     ivec3 p = ivec3(made[face.x].xyz), a = ivec3(made[face.y].xyz), c = ivec3(made[face.z].xyz);
     bool isQuad = face.w != kNoCorner;
-    // Diagonals of a quad, two sides of a triangle.
+    // Diagonals of a quad, or two sides of a triangle.
     ivec3 first = isQuad ? c - p : a - p;
     ivec3 second = isQuad ? ivec3(made[isQuad ? face.w : face.x].xyz) - a : c - p;
     for (uint i = 0; i < 3; ++i) {

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
-// Phases so small that one workgroup takes one after the other.
+// Predicts small phases: one workgroup handles one phase after the other.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 
 #define MADE_QUALIFIERS coherent
 #include "shaders/encode/hierarchical/place.glsl"
 
-// Writes cannot race: each invocation takes other slots of a phase, and all wait for each other between
+// Writes cannot race: the invocations handle different slots of a phase and wait for each other between
 // phases.
 void main() {
   for (uint i = push.firstPhase; i < push.endPhase; ++i) {

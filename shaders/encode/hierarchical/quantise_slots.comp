@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Positions to integers, in coding order; which of them stand still, and whether all do.
+// Quantises positions to integers in coding order, and finds out which vertices stand still.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 
@@ -7,7 +7,7 @@
 
 layout(binding = 0) uniform samplerBuffer positions;
 layout(std430, binding = 1) readonly buffer SlotTable {
-  uint slotTable[];  // the vertex first
+  uint slotTable[];  // the first row has the vertices
 };
 layout(std430, binding = 2) readonly buffer Past {
   uvec4 past[];
@@ -22,7 +22,7 @@ layout(std430, binding = 4) buffer Status {
 shared uint moved;
 shared uint restWishes;
 
-// The product with push.scale, of 53 bits, is exact; then to the nearest integer, the even one of two.
+// Multiplies by push.scale, exactly (53 bits). Rounds to the nearest integer, and to the even one of two.
 int quantise(float x) {
   const int kLimit = (1 << 27) - (4 << 8);
   uint bits = floatBitsToUint(x);
@@ -37,7 +37,7 @@ int quantise(float x) {
   }
   uint high, low;
   umulExtended(mantissa | 0x800000u, push.scale, high, low);
-  // The number is (high, low) / 2^down, the two at least 2^51.
+  // The number is (high, low) / 2^down, with (high, low) at least 2^51.
   int down = 150 + int(push.scaleShift) - int(exponent);
   uint magnitude;
   if (down < 24) {
@@ -47,7 +47,7 @@ int quantise(float x) {
   } else {
     bool hasHigh = down >= 32;
     uint whole = hasHigh ? high >> (down - 32) : (high << (32 - down)) | (low >> down);
-    // What is left of the point, from the highest bit down, and whether there is more.
+    // Fraction bits from the highest one down, and whether there are more.
     uint rest =
         hasHigh ? (down == 32 ? low : (high << (64 - down)) | (low >> (down - 32))) : low << (32 - down);
     bool hasMore = down > 32 && (low << (64 - down)) != 0;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What every kernel of codec 2 knows: its push constants, and 16-bit vectors in pairs.
+// Push constants of all kernels of codec 2, and vectors of 16-bit components in pairs.
 #ifndef CLOTHSTREAM_SHADERS_ENCODE_HIERARCHICAL_SLOTS_GLSL
 #define CLOTHSTREAM_SHADERS_ENCODE_HIERARCHICAL_SLOTS_GLSL
 
@@ -38,8 +38,8 @@ ivec3 secondOf(uvec3 pair) {
   return ivec3(pair) >> 16;
 }
 
-// Whether it is no longer than what is promised (proto/codec/hierarchical/hierarchical_encoder.cpp): in
-// units.
+// True if a difference, in units, is within the promised error
+// (proto/codec/hierarchical/hierarchical_encoder.cpp).
 bool isPromised(ivec3 difference) {
   int perAxis = (1 << (push.stepBits - 1)) + 1;
   ivec3 d = abs(difference);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What chunks of vertices say about the weights that would have predicted them best: sums of products of
-// their features, as ProductSums adds them up (proto/codec/hierarchical/weight_fitter.h).
+// Adds up products of features over chunks of vertices, which say which weights would have predicted them
+// best; ProductSums does the same (proto/codec/hierarchical/weight_fitter.h).
 #version 450
 #extension GL_GOOGLE_include_directive : require
 
@@ -11,10 +11,10 @@ layout(std430, binding = 7) readonly buffer FittedChunks {
   uvec4 fittedChunks[];  // by workgroup: first slot, end, weight class
 };
 layout(std430, binding = 8) writeonly buffer Products {
-  float products[];  // kFeatureProducts a workgroup
+  float products[];  // kFeatureProducts per workgroup
 };
 
-// By slot: the features, then the goal; component after component. And how much the slot counts.
+// By slot: the features and then the goal, component by component; and the importance of the slot.
 const uint kColumns = kClassFeatures + 1;
 shared float values[kChunkSlots][3 * kColumns];
 shared float importances[kChunkSlots];
@@ -26,7 +26,8 @@ void keep(uint i, uint column, ivec3 value, float unit) {
   }
 }
 
-// How much the weights are to say about it; what is hard to predict is not to spoil them for the rest.
+// Importance of a vertex for the weights. Vertices that are hard to predict must not spoil the weights for
+// the rest.
 float importanceOf(uint magnitudes, uint parentMagnitudes) {
   uvec3 shifts = uvec3(0, 8, 16);
   uvec3 m = (uvec3(magnitudes) >> shifts) & 0xFFu, around = (uvec3(parentMagnitudes) >> shifts) & 0xFFu;
@@ -65,7 +66,7 @@ void keepVertex(uint i, uint slot, uint weightClass) {
   importances[i] = importanceOf(made[slot].w, p.parentMagnitudes);
 }
 
-// Of feature i and column j.
+// Sum of products of feature i and column j.
 float sumOf(uint count, uint i, uint j) {
   precise vec3 sum = vec3(0.0);
   for (uint k = 0; k < count; ++k) {

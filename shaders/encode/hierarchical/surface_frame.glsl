@@ -22,7 +22,7 @@ ivec3 project(SurfaceFrame frame, ivec3 a) {
                frame.n.x * a.x + frame.n.y * a.y + frame.n.z * a.z);
 }
 
-// The largest component to 13 bits. Returns whether the vector is not zero.
+// Scales the largest component to 13 bits. Returns true if the vector is not zero.
 bool scaleVector(inout ivec3 a) {
   uvec3 magnitudes = uvec3(abs(a));
   int bits = findMSB(magnitudes.x | magnitudes.y | magnitudes.z) + 1;
@@ -36,8 +36,8 @@ bool isNotAbove(uint root, uint factor) {
   return high < 512u || (high == 512u && low == 0u);  // 2^41
 }
 
-// The largest with root^2 (2 n + 1) <= 2^41; n is from 1024 to 4095. The estimate is the device's own, the
-// root is not: as a rule neither loop runs.
+// The largest root with root^2 (2 n + 1) <= 2^41; n is from 1024 to 4095. The estimate may differ between
+// devices, but the root does not: usually neither loop runs.
 uint rootOf(uint n) {
   precise float estimate = 1048576.0 * inversesqrt(float(n) + 0.5);
   uint root = uint(estimate);
@@ -50,7 +50,7 @@ uint rootOf(uint n) {
   return root;
 }
 
-// To unit length; `a` is scaled.
+// Scales a vector to unit length; `a` must come from scaleVector().
 ivec3 normalised(ivec3 a) {
   uint squared = uint(a.x * a.x + a.y * a.y + a.z * a.z);
   int raise = (27 - findMSB(squared)) & ~1;
@@ -63,7 +63,7 @@ ivec3 crossOf(ivec3 a, ivec3 b) {
   return ivec3(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x);
 }
 
-// u along `first`, n across both; the axes x, y, z where the two span no plane.
+// Frame with u along `first` and n perpendicular to both vectors; the axes x, y, z if they span no plane.
 SurfaceFrame surfaceFrame(ivec3 first, ivec3 second) {
   const int kOne = 1 << kUnitBits;
   SurfaceFrame frame = SurfaceFrame(ivec3(kOne, 0, 0), ivec3(0, kOne, 0), ivec3(0, 0, kOne));
