@@ -12,21 +12,21 @@ namespace clothstream::client {
 
 namespace {}  // namespace
 
-Client::Client(Greeting greeting) : greeting_(std::move(greeting)) {
-  greet();
+Client::Client(Hello hello) : hello_(std::move(hello)) {
+  sendHello();
 }
 
-void Client::greet() {
+void Client::sendHello() {
   std::string hello;
-  writeHello(hello, ++lastRequestId_, greeting_);
+  writeHello(hello, ++lastRequestId_, hello_);
   // The outbox is empty, so there is room.
   static_cast<void>(outbox_.addControl(std::move(hello)));
 }
 
 void Client::want(const OperatingPoint& atMost) {
-  greeting_.wanted = atMost;
+  hello_.wanted = atMost;
   outbox_.clear();
-  greet();
+  sendHello();
 }
 
 void Client::connecting(std::uint64_t nowUs) {
@@ -35,18 +35,18 @@ void Client::connecting(std::uint64_t nowUs) {
   outbox_.clear();
   assembly_ = {};
   keyFrameRequest_ = {};
-  ++greeting_.attempt;
+  ++hello_.attempt;
   connectAtUs_ = reconnection_.attemptEnd(nowUs, std::uint64_t{1000} * welcome_.graceMs);
-  greet();
+  sendHello();
 }
 
 void Client::disconnected(std::uint64_t nowUs) {
   if (state_ == CS_STATE_FAILED) return;
-  if (!greeting_.token.empty()) state_ = CS_STATE_RECONNECTING;
+  if (!hello_.token.empty()) state_ = CS_STATE_RECONNECTING;
   welcomed_ = false;
   outbox_.clear();
   std::uint64_t seed = 0;
-  for (const char byte : greeting_.token) seed = seed * 257 + static_cast<unsigned char>(byte);
+  for (const char byte : hello_.token) seed = seed * 257 + static_cast<unsigned char>(byte);
   connectAtUs_ = reconnection_.lost(nowUs, std::uint64_t{1000} * welcome_.graceMs, seed);
 }
 
@@ -117,15 +117,15 @@ std::uint32_t Client::welcomed(Bytes body, std::uint64_t nowUs) {
                 decodedCodecs() + ".");
   const bool returned = state_ == CS_STATE_RECONNECTING;
   // Whether the server resumed the participant and its description is still the one that this client has.
-  const bool known = returned && welcome->resumed && decoder_ && greeting_.contentId != 0 &&
-                     welcome->contentId == greeting_.contentId;
+  const bool known = returned && welcome->resumed && decoder_ && hello_.contentId != 0 &&
+                     welcome->contentId == hello_.contentId;
   welcome_ = std::move(*welcome);
   welcomed_ = true;
   resumed_ = returned && welcome_.resumed;
   participants_ = std::move(welcome_.participants);
-  greeting_.token = welcome_.token;
-  greeting_.scene = welcome_.scene;
-  greeting_.contentId = known ? welcome_.contentId : 0;
+  hello_.token = welcome_.token;
+  hello_.scene = welcome_.scene;
+  hello_.contentId = known ? welcome_.contentId : 0;
   reconnection_.joined(nowUs);
   point_ = formerPoint_ = {};
   acknowledgement_ = {};
@@ -181,7 +181,7 @@ std::uint32_t Client::described(Bytes content) {
   if (!resumed_) statistics_.forgetTicks();
   report_ = {};
   if (playOut_) playOut_->begin(description_);
-  greeting_.contentId = welcome_.contentId;
+  hello_.contentId = welcome_.contentId;
   const bool returned = state_ == CS_STATE_RECONNECTING;
   state_ = CS_STATE_JOINED;
   return returned ? CS_EVENT_DESCRIPTION | CS_EVENT_RETURNED : CS_EVENT_DESCRIPTION;

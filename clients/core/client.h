@@ -26,7 +26,7 @@ namespace clothstream::client {
 
 class Client {
  public:
-  explicit Client(Greeting greeting);
+  explicit Client(Hello hello);
 
   // Returns a set of CS_EVENT bits.
   std::uint32_t receive(Bytes message, std::uint64_t nowUs);
@@ -98,7 +98,7 @@ class Client {
 
  private:
   void sendPoses(std::uint64_t nowUs);
-  void greet();
+  void sendHello();
   bool isConnected() const { return state_ != CS_STATE_RECONNECTING || welcomed_; }
   bool mayCollide() const;
   std::uint32_t welcomed(Bytes body, std::uint64_t nowUs);
@@ -131,7 +131,7 @@ class Client {
   std::uint32_t errorCode_ = 0;
   std::string errorText_;
   Notice notice_;
-  Greeting greeting_;  // the token is set after the first Welcome
+  Hello hello_;  // the token is set after the first Welcome
   Welcome welcome_;
   std::vector<Participant> participants_;
   Presence presence_;

@@ -46,7 +46,7 @@ void Client::move(AttachmentPose attachment, std::uint64_t nowUs) {
 }
 
 bool Client::mayCollide() const {
-  return (welcomed_ ? welcome_.role : greeting_.role) != CS_ROLE_VIEWER;
+  return (welcomed_ ? welcome_.role : hello_.role) != CS_ROLE_VIEWER;
 }
 
 void Client::sendPoses(std::uint64_t nowUs) {

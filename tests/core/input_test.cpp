@@ -147,13 +147,13 @@ TEST(Grabs, EventsAreReported) {
   event.set_vertices(11);
   EXPECT_EQ(joined.client.receive(message.SerializeAsString()), static_cast<std::uint32_t>(CS_EVENT_GRABS));
   ASSERT_EQ(cs_grab_event_count(joined.client.get()), 1u);
-  cs_grab_event told;
-  ASSERT_EQ(cs_get_grab_event(joined.client.get(), 0, &told), 1);
-  EXPECT_EQ(told.participant_id, 5u);
-  EXPECT_EQ(told.grab_id, 2u);
-  EXPECT_EQ(told.kind, static_cast<std::uint32_t>(CS_GRAB_SLIPPED));
-  EXPECT_EQ(told.vertices, 11u);
-  EXPECT_EQ(cs_get_grab_event(joined.client.get(), 1, &told), 0);
+  cs_grab_event received;
+  ASSERT_EQ(cs_get_grab_event(joined.client.get(), 0, &received), 1);
+  EXPECT_EQ(received.participant_id, 5u);
+  EXPECT_EQ(received.grab_id, 2u);
+  EXPECT_EQ(received.kind, static_cast<std::uint32_t>(CS_GRAB_SLIPPED));
+  EXPECT_EQ(received.vertices, 11u);
+  EXPECT_EQ(cs_get_grab_event(joined.client.get(), 1, &received), 0);
 }
 
 TEST(Contacts, AreReportedOnRequest) {
@@ -171,16 +171,16 @@ TEST(Contacts, AreReportedOnRequest) {
   EXPECT_EQ(joined.client.receive(message.SerializeAsString()),
             static_cast<std::uint32_t>(CS_EVENT_CONTACTS));
   ASSERT_EQ(cs_contact_event_count(joined.client.get()), 1u);
-  cs_contact_event told;
-  ASSERT_EQ(cs_get_contact_event(joined.client.get(), 0, &told), 1);
-  EXPECT_EQ(told.kind, static_cast<std::uint32_t>(CS_CONTACT_ENDED));
-  EXPECT_EQ(told.participant_id, 5u);
-  EXPECT_EQ(told.collider_id, 2u);
-  EXPECT_STREQ(told.collider, "");
-  EXPECT_STREQ(told.cloth, "sheet");
-  EXPECT_EQ(told.impulse, 0.25f);
-  EXPECT_EQ(told.seconds, 1.5f);
-  EXPECT_EQ(cs_get_contact_event(joined.client.get(), 1, &told), 0);
+  cs_contact_event received;
+  ASSERT_EQ(cs_get_contact_event(joined.client.get(), 0, &received), 1);
+  EXPECT_EQ(received.kind, static_cast<std::uint32_t>(CS_CONTACT_ENDED));
+  EXPECT_EQ(received.participant_id, 5u);
+  EXPECT_EQ(received.collider_id, 2u);
+  EXPECT_STREQ(received.collider, "");
+  EXPECT_STREQ(received.cloth, "sheet");
+  EXPECT_EQ(received.impulse, 0.25f);
+  EXPECT_EQ(received.seconds, 1.5f);
+  EXPECT_EQ(cs_get_contact_event(joined.client.get(), 1, &received), 0);
   event.set_impulse(kNan);
   joined.client.receive(message.SerializeAsString());
   EXPECT_EQ(cs_get_state(joined.client.get()), CS_STATE_FAILED);

@@ -107,8 +107,8 @@ TEST_F(Reconnecting, TracksParticipants) {
   client.receiveAll(server.chunks(), now);
   EXPECT_THAT(names(), ElementsAre("Ben", "Ada"));
   EXPECT_EQ(cs_get_role(client.get()), static_cast<std::uint32_t>(CS_ROLE_OWNER));
-  cs_presence told;
-  EXPECT_EQ(cs_get_presence(client.get(), &told), 0);
+  cs_presence received;
+  EXPECT_EQ(cs_get_presence(client.get(), &received), 0);
   constexpr auto kBoth = static_cast<std::uint32_t>(CS_EVENT_PARTICIPANTS | CS_EVENT_PRESENCE);
   EXPECT_EQ(client.receive(presence(v1::PRESENCE_KIND_JOINED, 50)), kBoth);
   EXPECT_THAT(names(), ElementsAre("Ben", "Ada", "Cy"));
@@ -119,11 +119,11 @@ TEST_F(Reconnecting, TracksParticipants) {
   EXPECT_EQ(cs_get_participant(client.get(), 3, &participant), 0);
   client.receive(presence(v1::PRESENCE_KIND_LEFT, 50, v1::ROLE_PARTICIPANT, v1::LEAVE_REASON_REMOVED, 42));
   EXPECT_THAT(names(), ElementsAre("Ben", "Ada"));
-  ASSERT_EQ(cs_get_presence(client.get(), &told), 1);
-  EXPECT_EQ(told.kind, static_cast<std::uint32_t>(CS_PRESENCE_LEFT));
-  EXPECT_EQ(told.reason, static_cast<std::uint32_t>(CS_LEAVE_REMOVED));
-  EXPECT_EQ(told.by, 42u);
-  EXPECT_STREQ(told.participant.name, "Cy");
+  ASSERT_EQ(cs_get_presence(client.get(), &received), 1);
+  EXPECT_EQ(received.kind, static_cast<std::uint32_t>(CS_PRESENCE_LEFT));
+  EXPECT_EQ(received.reason, static_cast<std::uint32_t>(CS_LEAVE_REMOVED));
+  EXPECT_EQ(received.by, 42u);
+  EXPECT_STREQ(received.participant.name, "Cy");
 }
 
 TEST_F(Reconnecting, SendsRoleChangesAndRemovals) {

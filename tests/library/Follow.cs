@@ -106,7 +106,7 @@ static unsafe class Follow
         clothstream_default_options(out options);
         Check(options.version == 1 && options.joinTimeoutMs == 10000, "options are as the header says");
         options.joinTimeoutMs = 3000;
-        Check(clothstream_open(Utf8("127.0.0.1:1"), ref options, out stream) == Result.Unreachable, "nobody is there");
+        Check(clothstream_open(Utf8("127.0.0.1:1"), ref options, out stream) == Result.Unreachable, "an unreachable server is reported");
         Check(stream == IntPtr.Zero, "there is no stream");
         Check(Marshal.PtrToStringAnsi(clothstream_error_text()).Contains("127.0.0.1:1"), "the error names the address");
 

@@ -149,22 +149,22 @@ void addShape(Writer& parent, const cs_own_collider& collider) {
 
 }  // namespace
 
-void writeHello(std::string& out, std::uint64_t requestId, const Greeting& greeting) {
-  writeMessage(out, requestId, field::ClientMessage::kHello, [&](Writer& hello) {
+void writeHello(std::string& out, std::uint64_t requestId, const Hello& hello) {
+  writeMessage(out, requestId, field::ClientMessage::kHello, [&](Writer& message) {
     using F = field::Hello;
-    hello.add_uint32(F::kProtocolVersion.number, CS_PROTOCOL_VERSION);
-    hello.add_packed_uint32(F::kCodecs.number, codec::kCodecs.begin(), codec::kCodecs.end());
-    hello.add_string(F::kScene.number, greeting.scene);
-    hello.add_string(F::kClientName.number, greeting.clientName);
-    hello.add_string(F::kDisplayName.number, greeting.displayName);
-    if (greeting.wanted.quality > 0) hello.add_uint32(F::kQuality.number, greeting.wanted.quality);
-    if (greeting.wanted.temporalLayers > 0)
-      hello.add_uint32(F::kTemporalLayer.number, greeting.wanted.temporalLayers - 1);
-    hello.add_uint32(F::kRole.number, greeting.role);
-    if (greeting.token.empty()) return;
-    hello.add_bytes(F::kResumeToken.number, greeting.token);
-    hello.add_uint64(F::kDescriptionContentId.number, greeting.contentId);
-    hello.add_uint32(F::kAttempt.number, greeting.attempt);
+    message.add_uint32(F::kProtocolVersion.number, CS_PROTOCOL_VERSION);
+    message.add_packed_uint32(F::kCodecs.number, codec::kCodecs.begin(), codec::kCodecs.end());
+    message.add_string(F::kScene.number, hello.scene);
+    message.add_string(F::kClientName.number, hello.clientName);
+    message.add_string(F::kDisplayName.number, hello.displayName);
+    if (hello.wanted.quality > 0) message.add_uint32(F::kQuality.number, hello.wanted.quality);
+    if (hello.wanted.temporalLayers > 0)
+      message.add_uint32(F::kTemporalLayer.number, hello.wanted.temporalLayers - 1);
+    message.add_uint32(F::kRole.number, hello.role);
+    if (hello.token.empty()) return;
+    message.add_bytes(F::kResumeToken.number, hello.token);
+    message.add_uint64(F::kDescriptionContentId.number, hello.contentId);
+    message.add_uint32(F::kAttempt.number, hello.attempt);
   });
 }
 

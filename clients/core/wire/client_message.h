@@ -23,7 +23,7 @@ struct ColliderChange {
 };
 
 // Content of Hello: the client and the scene that it joins.
-struct Greeting {
+struct Hello {
   std::string scene, clientName, displayName;
   std::uint32_t role = 0;
   OperatingPoint wanted = {};  // upper limit
@@ -33,7 +33,7 @@ struct Greeting {
   std::uint32_t attempt = 1;  // number of this connection
 };
 
-void writeHello(std::string& out, std::uint64_t requestId, const Greeting& greeting);
+void writeHello(std::string& out, std::uint64_t requestId, const Hello& hello);
 
 struct AttachmentPose {
   std::string name;
