@@ -175,9 +175,9 @@ TEST(Recording, ReportsTheKindOfOtherFiles) {
   };
   EXPECT_THAT(RecordingReader::open((directory.path() / "none").string()).error(),
               HasSubstr("none: No such file or directory"));
-  EXPECT_THAT(RecordingReader::open(directory.path().string()).error(), HasSubstr("it is no regular file"));
-  EXPECT_THAT(errorOf("empty", ""), HasSubstr("it is no MCAP file: it is too short"));
-  EXPECT_THAT(errorOf("text", "This is a text."), HasSubstr("it is no MCAP file"));
+  EXPECT_THAT(RecordingReader::open(directory.path().string()).error(), HasSubstr("not a regular file"));
+  EXPECT_THAT(errorOf("empty", ""), HasSubstr("not an MCAP file: too short"));
+  EXPECT_THAT(errorOf("text", "This is a text."), HasSubstr("not an MCAP file"));
   std::string later = sampleRecording(3);
   later[kVersionByte] = '1';
   EXPECT_THAT(errorOf("later", later), HasSubstr("MCAP of version '1'"));
