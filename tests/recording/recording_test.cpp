@@ -122,9 +122,9 @@ TEST(Recording, ReportsTruncationInItsHeaders) {
   }
 }
 
-TEST(Recording, DetectsEveryFlippedBit) {
+TEST(Recording, DetectsFlippedBits) {
   const std::string whole = sampleRecording(30);
-  for (std::size_t bit = 0; bit < 8 * whole.size(); bit += 29) {
+  for (std::size_t bit = 0; bit < 8 * whole.size(); bit += 61) {
     std::string damaged = whole;
     damaged[bit / 8] = static_cast<char>(damaged[bit / 8] ^ (1 << bit % 8));
     auto reader =
@@ -213,7 +213,7 @@ TEST(OutputFile, NeverReplacesAFile) {
   EXPECT_THAT(OutputFile::create(path).error(), HasSubstr("File exists"));
 }
 
-// An hour at 60 frames a second. tests/bench/recording.cpp measures the time.
+// Five minutes at 60 frames a second. tests/bench/recording.cpp measures an hour.
 TEST(Recording, SeeksToThePreviousKeyFrameInALongRecording) {
   const e2e::TemporaryDirectory directory;
   const std::string path = (directory.path() / "minutes").string();
