@@ -38,7 +38,7 @@ class Encoder {
   std::size_t packetBound() const;
 
   // Encodes one frame into `out`, which has at least packetBound() bytes, and returns the size of the packet.
-  // `positions` are metres, 3 floats a vertex, within 2^27 units (32 m at any max error). `normals` have
+  // `positions` are metres, 3 floats a vertex, within 2^27 units (at least 32 m). `normals` have
   // about unit length, or are empty if the layout has none. `tick` must grow from call to call, except after
   // forgetHistory().
   // The first frame is always a key frame. A predicted frame refers to the previous frame; with temporal

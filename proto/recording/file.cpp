@@ -52,7 +52,7 @@ tl::expected<std::unique_ptr<ByteSource>, std::string> openFile(const std::strin
   struct stat status {};
   if (::fstat(file, &status) != 0 || !S_ISREG(status.st_mode)) {
     ::close(file);
-    return tl::unexpected(fmt::format("cannot read {}: it is no regular file", path));
+    return tl::unexpected(fmt::format("cannot read {}: not a regular file", path));
   }
   return std::make_unique<FileSource>(file, static_cast<std::uint64_t>(status.st_size));
 }

@@ -115,22 +115,21 @@ bool McapReader::State::content(const Record& record, std::uint64_t most, std::s
 Done McapReader::State::readStart() {
   std::string bytes;
   if (source->size() < kMagic.size() || !source->read(0, kMagic.size(), bytes))
-    return broken("it is no MCAP file: it is too short");
+    return broken("not an MCAP file: too short");
   if (bytes != kMagic) {
     std::string otherVersion(kMagic);
     otherVersion[kVersionByte] = bytes[kVersionByte];
     if (bytes == otherVersion)
-      return broken("it is MCAP of version '{}', and version '0' is what can be read",
-                    bytes.substr(kVersionByte, 1));
-    return broken("it is no MCAP file: it begins with something else");
+      return broken("MCAP of version '{}'; only version '0' can be read", bytes.substr(kVersionByte, 1));
+    return broken("not an MCAP file: wrong magic bytes");
   }
   const std::optional<Record> header = recordAt(kMagic.size());
   if (!header || header->opcode != Opcode::header || !content(*header, kMaxPlainRecordBytes, bytes))
-    return broken("it ends in its header, or has none");
+    return broken("its header is missing or truncated");
   ByteReader reader(bytes);
   reader.text();
   library = reader.text();
-  if (!reader.ok()) return broken("its header cannot be read");
+  if (!reader.ok()) return broken("its header is invalid");
   firstRecord = dataEnd = header->end();
   return {};
 }
@@ -373,9 +372,9 @@ Done McapReader::State::parseMessages(const ChunkHead& head) {
   while (reader.left() > 0) {
     const auto opcode = static_cast<Opcode>(reader.number<std::uint8_t>());
     const std::string_view content = reader.take(reader.number<std::uint64_t>());
-    if (!reader.ok()) return broken("a record in it goes past its end");
-    if (opcode == Opcode::schema && !takeSchema(content)) return broken("a schema in it cannot be read");
-    if (opcode == Opcode::channel && !takeChannel(content)) return broken("a channel in it cannot be read");
+    if (!reader.ok()) return broken("a record reaches past its end");
+    if (opcode == Opcode::schema && !takeSchema(content)) return broken("a schema in it is invalid");
+    if (opcode == Opcode::channel && !takeChannel(content)) return broken("a channel in it is invalid");
     if (opcode != Opcode::message) continue;
     ByteReader fields(content);
     Message& message = messages.emplace_back();
@@ -386,9 +385,9 @@ Done McapReader::State::parseMessages(const ChunkHead& head) {
     if (!fields.ok()) return broken("a message in it is too short");
     message.bytes = fields.rest();
     if (!channels.contains(message.channel))
-      return broken("a message in it is of channel {}, which there is not", message.channel);
+      return broken("a message in it belongs to the unknown channel {}", message.channel);
     if (message.time < head.start || message.time > head.end)
-      return broken("a message in it is of another time");
+      return broken("a message in it is outside of its time range");
   }
   return {};
 }
@@ -429,7 +428,7 @@ tl::expected<std::span<const Message>, std::string> McapReader::read(std::size_t
 
 Done McapReader::check() {
   State& s = *state_;
-  if (!s.indexed) return broken("it has no index: it was cut off, or is damaged at its end");
+  if (!s.indexed) return broken("it has no index: it is truncated or damaged at its end");
   Statistics found;
   for (std::size_t i = 0; i < s.chunks.size(); ++i) {
     const auto messages = read(i);
@@ -439,22 +438,22 @@ Done McapReader::check() {
   }
   if (s.statistics && (s.statistics->messages != found.messages || s.statistics->chunks != s.chunks.size() ||
                        s.statistics->counts != found.counts))
-    return broken("its statistics say {} messages in {} chunks, and there are {} in {}",
+    return broken("its statistics count {} messages in {} chunks, but it has {} in {}",
                   s.statistics->messages, s.statistics->chunks, found.messages, s.chunks.size());
   const std::optional<Record> end = s.recordAt(s.dataEnd);
   std::string bytes;
   if (!end || end->opcode != Opcode::dataEnd || end->end() != s.summaryStart ||
       !s.content(*end, kDataEndBytes, bytes))
-    return broken("its data has no end");
-  const auto told = ByteReader(bytes).number<std::uint32_t>();
+    return broken("its data has no end record");
+  const auto stated = ByteReader(bytes).number<std::uint32_t>();
   std::uint32_t crc = 0;
   constexpr std::uint64_t kPiece = std::uint64_t{1} << 20;
   for (std::uint64_t offset = 0; offset < s.dataEnd; offset += kPiece) {
     if (!s.source->read(offset, std::min(kPiece, s.dataEnd - offset), bytes))
-      return broken("byte {} and what follows cannot be read", offset);
+      return broken("the bytes from {} on cannot be read", offset);
     crc = crcOf(bytes, crc);
   }
-  if (told != 0 && told != crc) return broken("the checksum of its data does not match");
+  if (stated != 0 && stated != crc) return broken("the checksum of its data does not match");
   return {};
 }
 

@@ -41,12 +41,12 @@ tl::expected<RecordingReader, std::string> RecordingReader::open(std::unique_ptr
   const Facts* facts = reader.mcap_.facts(std::string(kFactsName));
   if (facts == nullptr || reader.topics_.empty())
     return tl::unexpected(fmt::format(
-        "{} is an MCAP file, but no recording of clothstream: it has no facts of one", reader.name_));
+        "{} is an MCAP file, but no recording of clothstream: its metadata is missing", reader.name_));
   reader.facts_ = *facts;
   if (cutFiles == CutFiles::refused && !reader.mcap_.indexed())
     return tl::unexpected(
-        fmt::format("{} was cut off, or is damaged at its end: `clothstream recover {} OUT` makes a whole "
-                    "recording of what there is",
+        fmt::format("{} is truncated or damaged at its end: `clothstream recover {} OUT` makes a complete "
+                    "recording of the rest",
                     reader.name_, reader.name_));
   return reader;
 }
@@ -104,13 +104,13 @@ tl::expected<v1::StreamDescription, std::string> RecordingReader::description() 
   for (;;) {
     const auto message = next();
     if (!message) return tl::unexpected(message.error());
-    if (!*message) return broken("it has no description of its stream");
+    if (!*message) return broken("the description of its stream is missing");
     if ((*message)->topic != Topic::description) continue;
     rewind();
     v1::StreamDescription description;
     const std::string_view bytes = (*message)->bytes;
     if (!description.ParseFromArray(bytes.data(), static_cast<int>(bytes.size())))
-      return broken("its description of the stream cannot be read");
+      return broken("the description of its stream is invalid");
     return description;
   }
 }

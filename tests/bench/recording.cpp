@@ -91,16 +91,16 @@ class Viewer {
 };
 
 // Checks that the viewer has the last parameters and stands at the right frame.
-void check(std::uint32_t frame, const v1::Playback& playback, const v1::ParameterChange& told, bool sliders) {
+void check(std::uint32_t frame, const v1::Playback& playback, const v1::ParameterChange& sent, bool sliders) {
   const std::uint32_t key = frame / kFramesAKeyFrame * kFramesAKeyFrame;
   if (std::abs(playback.position() * kSampleRate - key) > 0.01)
     throw std::runtime_error(fmt::format("a seek to frame {} led to {} s", frame, playback.position()));
   if (!sliders) return;
   const SampleSliders wanted = sampleSliders(key);
-  if (told.wind().value().x() != wanted.wind || told.cloths_size() != 1 ||
-      told.cloths(0).structural().stiffness() != wanted.stiffness)
+  if (sent.wind().value().x() != wanted.wind || sent.cloths_size() != 1 ||
+      sent.cloths(0).structural().stiffness() != wanted.stiffness)
     throw std::runtime_error(
-        fmt::format("a seek to frame {} sent wrong parameters: {}", frame, told.ShortDebugString()));
+        fmt::format("a seek to frame {} sent wrong parameters: {}", frame, sent.ShortDebugString()));
 }
 
 // Measures a recording of `frames` frames that is played to one viewer.

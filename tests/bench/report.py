@@ -194,7 +194,8 @@ def report(program, suites):
             output = subprocess.run([program, *command, "--json"], cwd=ROOT, capture_output=True, text=True)
             if output.returncode:
                 sys.exit(output.stderr.strip())
-            results[key] = json.loads(output.stdout)
+            # Log lines of a suite may precede the rows.
+            results[key] = json.loads(output.stdout[output.stdout.index("[\n"):])
         rows = results[key]
         device = next((row["device"] for row in rows if "device" in row), "no device")
         table = (f"`clothstream-bench {' '.join(command)}`; {device}, {processor()}; commit {made}; "

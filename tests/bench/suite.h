@@ -22,7 +22,7 @@ struct Settings {
   std::uint32_t workgroupSize = 0;
   std::optional<std::uint32_t> xpbdWholeNodes;  // chosen by the simulation if absent
   std::optional<std::uint32_t> solveWholeNodes;
-  std::filesystem::path pictures = ".";  // directory of the suites' pictures
+  std::filesystem::path pictures = ".";  // directory of the pictures of suite behaviour
   // Input of the codec suites: named motions, or instead a file (bench_motion.h); number of frames of each;
   // max error in metres.
   std::vector<std::string> motions;

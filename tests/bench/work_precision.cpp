@@ -10,7 +10,6 @@
 #include <fmt/format.h>
 
 #include "server/reference/reference_simulation.h"
-#include "tests/bench/picture/log_plot.h"
 #include "tests/bench/simulated.h"
 #include "tests/bench/suite.h"
 
@@ -152,20 +151,15 @@ Measured measure(vulkan::Device& device, model::Scene scene, const Method& metho
 Rows runWorkPrecision(vulkan::Device& device, const Settings& settings) {
   if (settings.size) throw std::runtime_error("--size: not allowed, because the sheet has 32x32 nodes");
   Rows rows;
-  std::vector<LogPlot> plots;
   for (const model::Scene& scene : scenes()) {
     const Trajectory truth = referenceTrajectory(scene, kReferenceSubsteps);
     const double floor = distance(referenceTrajectory(scene, kCoarserSubsteps), truth);
-    LogPlot& plot =
-        plots.emplace_back(LogPlot{scene.name, "s of two cores a simulated second", "error, m", {}});
     std::optional<double> worst;
     for (const Method& method : methods()) {
-      LogPlot::Curve& curve = plot.curves.emplace_back(LogPlot::Curve{method.name, {}});
       for (const std::uint32_t substeps : method.substeps) {
         const Measured measured = measure(device, scene, method, substeps);
         const double error = distance(measured.trajectory, truth);
         if (method.kind == model::SolverKind::massSpring) worst = error;
-        curve.points.push_back({measured.seconds, error});
         rows.push_back({{"suite", "work_precision"},
                         {"scene", scene.name},
                         {"method", method.name},
@@ -181,7 +175,6 @@ Rows runWorkPrecision(vulkan::Device& device, const Settings& settings) {
     if (!(*worst < 0.005))
       throw std::runtime_error(fmt::format("{}: the finest forces are {} m off", scene.name, *worst));
   }
-  writeSvg(plots, settings.pictures / "work_precision.svg");
   return rows;
 }
 

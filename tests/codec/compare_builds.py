@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Whatever compiles the codec, for whatever processor: it writes the golden packets as they are, and reads them alike.
+"""Builds of the codec by several compilers and for several processors write and read identical golden packets.
 
-Run from the project's root. Takes minutes.
+Run it from the project's root. It takes minutes.
 """
 import concurrent.futures
 import filecmp
@@ -36,7 +36,7 @@ def compile_all(compiler, sources, options, folder):
 
 
 def differences(written):
-    """What is not as it is in tests/golden."""
+    """Names of files that differ from tests/golden."""
     names = ["streams.json"] + [packet["file"] for stream in json.load(open("tests/golden/streams.json"))
                                 for packet in stream["packets"]]
     return [name for name in names
@@ -47,7 +47,7 @@ def check(name):
     (compiler, runner) = BUILDS[name]
     for program in compiler[:1] + runner[:1]:
         if shutil.which(program) is None:
-            return "there is no %s: install it (./dev test --long does)" % program
+            return "%s is missing: install it (./dev test --long does)" % program
     with tempfile.TemporaryDirectory() as folder:
         # Header-only libraries, the same for every processor.
         headers = os.path.join(folder, "headers")
@@ -61,7 +61,7 @@ def check(name):
         os.makedirs(os.path.join(folder, "tests/golden"))
         subprocess.run(runner + [program], cwd=folder, check=True)
         different = differences(os.path.join(folder, "tests/golden/"))
-        return "other than they are: " + " ".join(different) if different else None
+        return "different files: " + " ".join(different) if different else None
 
 
 def main():

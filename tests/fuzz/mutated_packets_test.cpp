@@ -64,7 +64,7 @@ class Mutator {
 TEST(MutatedPackets, KeepTheDecodersPromises) {
   const std::vector<GoldenStream> streams = readGoldenStreams();
   Mutator mutator(1);
-  for (int i = 0; i < 20'000; ++i) {
+  for (int i = 0; i < 10'000; ++i) {
     const GoldenStream& stream = streams[mutator.below(streams.size())];
     const std::size_t place = mutator.below(stream.packets.size());
     const GoldenStream& otherStream = streams[mutator.below(streams.size())];

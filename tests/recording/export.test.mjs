@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What `clothstream export` writes is read by three.js as glTF, and moves there as the OBJ files of the same frames do.
+// three.js reads the glTF files of `clothstream export`. They move like the OBJ files of the same frames.
 // Usage: node export.test.mjs CLOTHSTREAM RECORDING
 import assert from "node:assert/strict";
 import { execFileSync, spawnSync } from "node:child_process";
@@ -26,7 +26,7 @@ try {
   const bytes = readFileSync(glb);
   const gltf = await new GLTFLoader().parseAsync(bytes.buffer.slice(bytes.byteOffset, bytes.byteOffset + bytes.length), "");
 
-  // As text it is the same: its JSON but for where the numbers are, and the numbers.
+  // The text form holds the same JSON, except for the place of the numbers, and the same numbers.
   const text = join(directory, "out.gltf");
   execFileSync(clothstream, ["export", recording, text, "--rate", `${rate}`]);
   const { buffers, ...embedded } = JSON.parse(readFileSync(text, "utf8"));

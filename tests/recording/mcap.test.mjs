@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
-// MCAP's own reader reads our recordings whole: from end to end, and by their index.
+// The MCAP project's reader reads our recordings completely: from start to end, and by their index.
 // Usage: node mcap.test.mjs RECORDING [--frames N] [--info CLOTHSTREAM]
-//   --frames  that there are so many
-//   --info    it is a server's recording, and `clothstream info` says of it what this reader does
-// A recording may be compressed whole by gzip.
+//   --frames  expects N frames
+//   --info    expects a server's recording, of which `clothstream info` reports what this reader finds
+// A recording may be compressed with gzip.
 import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
 import { mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
@@ -38,7 +38,7 @@ const schemaOf = {
   "/checkpoints": "Checkpoint",
 };
 
-// Checksums of chunks and of all data are compared on the way, where there are any: a zero stands for none.
+// Also compares the checksums of chunks and of all data. A zero means that there is none.
 const counts = new Map();
 const sizes = new Map();
 const topics = new Map();

@@ -278,8 +278,8 @@ std::string sampleWithChanges() {
     EXPECT_TRUE(writer->write(Topic::frames, (*message)->time, (*message)->bytes));
     ++frame;
     if (frame != 30 && frame != 90) continue;
-    const v1::ParameterChanged& told = frame == 30 ? early : late;
-    EXPECT_TRUE(writer->write(Topic::parameters, sampleTime(frame), told.SerializeAsString()));
+    const v1::ParameterChanged& sent = frame == 30 ? early : late;
+    EXPECT_TRUE(writer->write(Topic::parameters, sampleTime(frame), sent.SerializeAsString()));
   }
   EXPECT_TRUE(writer->finish());
   return bytes;
@@ -361,11 +361,11 @@ TEST_F(PlaybackTest, SeekGivesTheParametersOfPlayingThrough) {
       const std::size_t frame = frameOf(viewer->frames.back());
       ASSERT_LT(frame, played.size());
       EXPECT_EQ(playback->parameters().SerializeAsString(), played[frame]) << frame;
-      const v1::ParameterChange& told = viewer->changes.back().change();
-      EXPECT_EQ(told.SerializeAsString(), played[frame]) << frame;
+      const v1::ParameterChange& sent = viewer->changes.back().change();
+      EXPECT_EQ(sent.SerializeAsString(), played[frame]) << frame;
       const SampleSliders sliders = sampleSliders(static_cast<std::uint32_t>(frame));
-      EXPECT_EQ(told.wind().value().x(), sliders.wind) << frame;
-      EXPECT_EQ(told.cloths(0).structural().stiffness(), sliders.stiffness) << frame;
+      EXPECT_EQ(sent.wind().value().x(), sliders.wind) << frame;
+      EXPECT_EQ(sent.cloths(0).structural().stiffness(), sliders.stiffness) << frame;
     }
     viewer.reset();
   }

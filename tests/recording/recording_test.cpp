@@ -122,9 +122,9 @@ TEST(Recording, ReportsTruncationInItsHeaders) {
   }
 }
 
-TEST(Recording, DetectsEveryFlippedBit) {
+TEST(Recording, DetectsFlippedBits) {
   const std::string whole = sampleRecording(30);
-  for (std::size_t bit = 0; bit < 8 * whole.size(); bit += 29) {
+  for (std::size_t bit = 0; bit < 8 * whole.size(); bit += 61) {
     std::string damaged = whole;
     damaged[bit / 8] = static_cast<char>(damaged[bit / 8] ^ (1 << bit % 8));
     auto reader =
@@ -175,9 +175,9 @@ TEST(Recording, ReportsTheKindOfOtherFiles) {
   };
   EXPECT_THAT(RecordingReader::open((directory.path() / "none").string()).error(),
               HasSubstr("none: No such file or directory"));
-  EXPECT_THAT(RecordingReader::open(directory.path().string()).error(), HasSubstr("it is no regular file"));
-  EXPECT_THAT(errorOf("empty", ""), HasSubstr("it is no MCAP file: it is too short"));
-  EXPECT_THAT(errorOf("text", "This is a text."), HasSubstr("it is no MCAP file"));
+  EXPECT_THAT(RecordingReader::open(directory.path().string()).error(), HasSubstr("not a regular file"));
+  EXPECT_THAT(errorOf("empty", ""), HasSubstr("not an MCAP file: too short"));
+  EXPECT_THAT(errorOf("text", "This is a text."), HasSubstr("not an MCAP file"));
   std::string later = sampleRecording(3);
   later[kVersionByte] = '1';
   EXPECT_THAT(errorOf("later", later), HasSubstr("MCAP of version '1'"));
@@ -213,7 +213,7 @@ TEST(OutputFile, NeverReplacesAFile) {
   EXPECT_THAT(OutputFile::create(path).error(), HasSubstr("File exists"));
 }
 
-// An hour at 60 frames a second. tests/bench/recording.cpp measures the time.
+// Five minutes at 60 frames a second. tests/bench/recording.cpp measures an hour.
 TEST(Recording, SeeksToThePreviousKeyFrameInALongRecording) {
   const e2e::TemporaryDirectory directory;
   const std::string path = (directory.path() / "minutes").string();

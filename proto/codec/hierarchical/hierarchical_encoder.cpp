@@ -136,7 +136,8 @@ struct HierarchicalEncoder::State {
   // Positions to encode, in coding order.
   std::vector<Node> wanted;
   std::vector<std::uint8_t> stillFrames;  // frames with an unchanged position, up to kStillFrames
-  std::uint32_t restInterval = 0;  // 1 / restInterval of the vertices may start to rest in this frame; 0: none may
+  std::uint32_t restInterval =
+      0;  // 1 / restInterval of the vertices may start to rest in this frame; 0: none may
   std::unique_ptr<FrameWriter> writer;
   std::optional<FitSchedule> fitted;
   std::array<std::uint32_t, kWeightClasses + 1> chunks{};  // number of chunks of each class coded so far

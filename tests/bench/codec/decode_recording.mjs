@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What a frame takes in the page's client core: decodes what `clothstream encode` wrote, as WebAssembly.
+// Time of a frame in the page's client core: decodes a file of `clothstream encode` in WebAssembly.
 // Usage: node decode_recording.mjs MODULE RECORDING [--json]; the module is build/release/web/clothstream_core.wasm.
 import { Core, readRecording } from "../../core/recording.mjs";
 
@@ -8,7 +8,7 @@ if (recording === undefined) {
   console.error("usage: node decode_recording.mjs MODULE RECORDING [--json]");
   process.exit(2);
 }
-// The engine compiles what runs often a second time: the last pass is what counts.
+// The engine optimises code that runs often, so the last pass counts.
 const kPasses = 3;
 
 const messages = readRecording(recording);
@@ -27,7 +27,7 @@ for (let pass = 0; pass < kPasses; ++pass) {
     return { decode: decoded - start, normals: now() - decoded };
   });
   vertices = core.exports.cs_vertex_count(client);
-  if (core.goodFrames(client) !== messages.frames.length) throw new Error("a frame is not decoded to what was encoded");
+  if (core.goodFrames(client) !== messages.frames.length) throw new Error("a frame decodes to a different state");
   core.exports.cs_destroy(client);
 }
 

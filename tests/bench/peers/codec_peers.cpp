@@ -9,8 +9,6 @@
 #include "tests/bench/codec/our_codec.h"
 #include "tests/bench/peers/peer_codecs.h"
 #include "tests/bench/peers/peers.h"
-#include "tests/bench/picture/log_plot.h"
-#include "tests/bench/picture/rasterise.h"
 
 namespace clothstream::bench {
 namespace {
@@ -37,26 +35,6 @@ void play(const BenchMotion& motion, std::vector<CodecMeasurement>& all) {
   });
 }
 
-struct Figure {
-  const char *file, *up, *field;
-};
-constexpr std::array kFigures{
-    Figure{"codec_distance", "largest distance, mm", "measuredMaxErrorMm"},
-    Figure{"codec_normals", "error of normals, mean, degrees", "normalErrorDegMean"},
-    Figure{"codec_flicker", "flicker of normals, RMS, degrees", "normalFlickerDegRms"}};
-
-LogPlot plotOf(const std::string& motion, const Rows& rows, const Figure& figure) {
-  LogPlot plot{motion, "bits a vertex a frame", figure.up, {}};
-  for (const auto& row : rows) {
-    if (row.at("motion") != motion) continue;
-    const auto name = row.at("codec").get<std::string>();
-    auto curve = std::ranges::find(plot.curves, name, &LogPlot::Curve::name);
-    if (curve == plot.curves.end()) curve = plot.curves.insert(curve, LogPlot::Curve{name, {}});
-    curve->points.emplace_back(row.at("bitsPerVertex").get<double>(), row.at(figure.field).get<double>());
-  }
-  return plot;
-}
-
 }  // namespace
 
 Rows compareCodecs(vulkan::Device& device, const Settings& settings) {
@@ -72,19 +50,12 @@ Rows compareCodecs(vulkan::Device& device, const Settings& settings) {
 
 Rows codecCurves(vulkan::Device& device, const Settings& settings) {
   Rows rows;
-  std::vector<std::string> names;
   for (const BenchMotion& motion : chosenMotions(device, settings)) {
     std::vector<CodecMeasurement> all;
     for (const double maxError : kErrors)
       for (CodecMeasurement& one : measurements(motion.cloth, maxError)) all.push_back(std::move(one));
     play(motion, all);
     for (const CodecMeasurement& one : all) rows.push_back(one.row(motion.name));
-    names.push_back(motion.name);
-  }
-  for (const Figure& figure : kFigures) {
-    std::vector<LogPlot> plots;
-    for (const std::string& name : names) plots.push_back(plotOf(name, rows, figure));
-    writePng(svgOf(plots), settings.pictures / (std::string(figure.file) + ".png"));
   }
   return rows;
 }

@@ -26,16 +26,13 @@ int main(int argc, char** argv) {
   std::uint32_t size = 0;
   CLI::App* codec =
       app.add_subcommand("codec", "Motions by raw floats, Draco, meshoptimizer, zstd, and ours");
-  CLI::App* curves = app.add_subcommand("codec_curves", "Bits against errors of the same, as pictures too");
+  CLI::App* curves = app.add_subcommand("codec_curves", "Bits against errors of the same");
   for (CLI::App* one : {codec, curves}) {
     bench::addMotionOptions(*one, settings);
     one->add_option("--size", size, "Rows and columns of the grid (default: 100)")
         ->check(CLI::Range(2, 4096));
     one->add_flag("--json", json, "Print the rows as one JSON array");
   }
-  curves->add_option("--pictures", settings.pictures, "Directory of the pictures")
-      ->check(CLI::ExistingDirectory)
-      ->capture_default_str();
   CLI11_PARSE(app, argc, argv);
   if (size > 0) settings.size = size;
   try {
