@@ -44,57 +44,6 @@ void addVec3(Writer& parent, std::uint32_t field, const Vec3& value) {
   for (std::uint32_t i = 0; i < 3; ++i) vec3.add_float(i + 1, value[i]);
 }
 
-void addVec3Value(Writer& parent, std::uint32_t field, const std::optional<Vec3>& value) {
-  if (!value) return;
-  Writer wrapper(parent, field);
-  addVec3(wrapper, 1, *value);
-}
-
-void addSpring(Writer& parent, std::uint32_t field, const std::optional<Spring>& value) {
-  if (!value) return;
-  Writer spring(parent, field);
-  spring.add_float(1, (*value)[0]);
-  spring.add_float(2, (*value)[1]);
-}
-
-std::string constraintMessage(const Solver& solver) {
-  std::string settings;
-  Writer writer(settings);
-  writer.add_bool(1, solver.bendConstraints);
-  if (solver.compliance) writer.add_float(2, *solver.compliance);
-  writer.add_uint32(3, solver.iterations);
-  writer.add_float(4, solver.tolerance);
-  if (solver.kind == CS_SOLVER_CONSTRAINT) writer.add_uint32(5, solver.path);
-  return settings;
-}
-
-// A kind whose settings this client does not know says them as they came.
-std::string solverMessage(const Solver& solver) {
-  std::string settings = solver.settings;
-  if (solver.kind == CS_SOLVER_CONSTRAINT) settings = constraintMessage(solver);
-  if (solver.kind == CS_SOLVER_ACAD) {
-    settings.clear();
-    Writer writer(settings);
-    writer.add_float(1, solver.activation);
-    writer.add_message(2, constraintMessage(solver));
-  }
-  if (solver.kind == CS_SOLVER_XPBD) {
-    settings.clear();
-    Writer writer(settings);
-    writer.add_uint32(1, solver.iterations);
-    if (solver.compliance) writer.add_float(2, *solver.compliance);
-  }
-  if (solver.kind == CS_SOLVER_IMPLICIT_EULER) {
-    settings.clear();
-    Writer writer(settings);
-    writer.add_uint32(1, solver.iterations);
-    writer.add_float(2, solver.tolerance);
-  }
-  std::string message;
-  Writer(message).add_message(solver.kind, settings);
-  return message;
-}
-
 // Absent where it is not turned, for a Writer leaves out nothing by itself.
 void addPose(Writer& parent, std::uint32_t field, std::span<const float, 3> position,
              std::span<const float, 4> orientation) {
@@ -190,37 +139,8 @@ void writeColliderPoses(std::string& out, const Poses& poses, std::uint64_t clie
 }
 
 void writeParameterChange(std::string& out, std::uint64_t requestId, const ParameterChange& change) {
-  writeMessage(out, requestId, kParameterChange, [&](Writer& parameters) {
-    addVec3Value(parameters, 1, change.gravity);
-    addVec3Value(parameters, 2, change.wind);
-    if (change.airDensity) parameters.add_float(3, *change.airDensity);
-    if (change.gust) {
-      Writer gust(parameters, 40);
-      gust.add_float(1, change.gust->strength);
-      gust.add_float(2, change.gust->seconds);
-    }
-    for (const ClothChange& clothChange : change.cloths) {
-      Writer cloth(parameters, 4);
-      cloth.add_string(1, clothChange.name);
-      addSpring(cloth, 2, clothChange.structural);
-      addSpring(cloth, 3, clothChange.shear);
-      addSpring(cloth, 4, clothChange.bend);
-      if (clothChange.damping) cloth.add_float(5, *clothChange.damping);
-      if (clothChange.drag) cloth.add_float(6, *clothChange.drag);
-      if (clothChange.lift) cloth.add_float(7, *clothChange.lift);
-      if (clothChange.friction) cloth.add_float(8, *clothChange.friction);
-      if (clothChange.thickness) cloth.add_float(9, *clothChange.thickness);
-      if (clothChange.solver) cloth.add_message(20, solverMessage(*clothChange.solver));
-      if (clothChange.ballRadius || clothChange.ballFriction) {
-        Writer balls(cloth, 21);
-        if (clothChange.ballRadius) balls.add_float(1, *clothChange.ballRadius);
-        if (clothChange.ballFriction) balls.add_float(2, *clothChange.ballFriction);
-      }
-      if (clothChange.tetherSlack) Writer(cloth, 23).add_float(1, *clothChange.tetherSlack);
-      if (clothChange.dihedralBending) cloth.add_float(24, *clothChange.dihedralBending);
-      if (clothChange.material) cloth.add_string(40, *clothChange.material);
-    }
-  });
+  writeMessage(out, requestId, kParameterChange,
+               [&](Writer& parameters) { writeFields(parameters, change); });
 }
 
 void writeColliderChange(std::string& out, std::uint64_t requestId, const ColliderChange& change) {

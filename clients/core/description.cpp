@@ -29,7 +29,6 @@ struct ClothMessage {
 
 constexpr std::size_t kMaxSubmeshes = 65536;
 constexpr std::size_t kMaxMaterials = 1024;
-constexpr std::size_t kMaxSolvers = 32;  // kinds that are remembered of a cloth
 
 bool readSubmesh(Bytes message, Submesh& submesh) {
   return readFields(message, [&](std::uint32_t field, Reader& reader) {
@@ -81,44 +80,6 @@ bool readEnvironment(Bytes message, Environment& environment) {
         return std::isfinite(environment.airDensity = reader.get_float());
       case bytes(4):
         return readGust(reader.get_view(), environment.gust);
-      default:
-        return skip(reader);
-    }
-  });
-}
-
-// Of a Scene's Cloth.
-bool readClothParameters(Bytes message, std::string& name, ClothParameters& parameters) {
-  return readFields(message, [&](std::uint32_t field, Reader& reader) {
-    switch (field) {
-      case bytes(1):
-        return setText(name, reader);
-      case bytes(5):
-        return readSpring(reader.get_view(), parameters.structural);
-      case bytes(6):
-        return readSpring(reader.get_view(), parameters.shear);
-      case bytes(7):
-        return readSpring(reader.get_view(), parameters.bend);
-      case fixed32(8):
-        return std::isfinite(parameters.damping = reader.get_float());
-      case fixed32(9):
-        return std::isfinite(parameters.drag = reader.get_float());
-      case fixed32(10):
-        return std::isfinite(parameters.lift = reader.get_float());
-      case fixed32(11):
-        return std::isfinite(parameters.friction = reader.get_float());
-      case fixed32(12):
-        return std::isfinite(parameters.thickness = reader.get_float());
-      case bytes(20):
-        return readSolver(reader.get_view(), parameters.solver);
-      case bytes(21):
-        return readSelfCollision(reader.get_view(), parameters.ballRadius, parameters.ballFriction);
-      case bytes(23):
-        return readTethers(reader.get_view(), parameters.tetherSlack);
-      case fixed32(24):
-        return std::isfinite(parameters.dihedralBending = reader.get_float());
-      case bytes(40):
-        return setText(parameters.material, reader);
       default:
         return skip(reader);
     }
@@ -334,24 +295,7 @@ void apply(const ParameterChange& change, Description& description) {
   for (const ClothChange& clothChange : change.cloths) {
     for (Cloth& cloth : description.cloths) {
       if (!clothChange.name.empty() && clothChange.name != cloth.name) continue;
-      ClothParameters& parameters = cloth.parameters;
-      parameters.structural = clothChange.structural.value_or(parameters.structural);
-      parameters.shear = clothChange.shear.value_or(parameters.shear);
-      parameters.bend = clothChange.bend.value_or(parameters.bend);
-      parameters.damping = clothChange.damping.value_or(parameters.damping);
-      parameters.drag = clothChange.drag.value_or(parameters.drag);
-      parameters.lift = clothChange.lift.value_or(parameters.lift);
-      parameters.friction = clothChange.friction.value_or(parameters.friction);
-      parameters.thickness = clothChange.thickness.value_or(parameters.thickness);
-      parameters.material = clothChange.material.value_or(parameters.material);
-      parameters.dihedralBending = clothChange.dihedralBending.value_or(parameters.dihedralBending);
-      if (clothChange.ballRadius) parameters.ballRadius = clothChange.ballRadius;
-      if (clothChange.ballFriction) parameters.ballFriction = clothChange.ballFriction;
-      if (clothChange.tetherSlack) parameters.tetherSlack = clothChange.tetherSlack;
-      if (!clothChange.solver) continue;
-      parameters.solver = *clothChange.solver;
-      if (parameters.solvers.size() < kMaxSolvers)
-        parameters.solvers[parameters.solver.kind] = parameters.solver;
+      apply(clothChange, cloth.parameters);
     }
   }
 }

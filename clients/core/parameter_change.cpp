@@ -1,15 +1,47 @@
 // SPDX-License-Identifier: MIT
-// Field by field through a ParameterChange, its cloths and their solvers.
+// Reads, writes and applies parameter changes. The table of parameters gives the fields of a cloth's numbers.
 #include "clients/core/parameter_change.h"
 
 namespace clothstream::client {
 namespace {
 
-bool setSpring(std::optional<Spring>& target, Reader& reader) {
-  return readSpring(reader.get_view(), target.emplace());
+using parameters::ClothNumbers;
+using parameters::ClothParameter;
+using parameters::Group;
+using parameters::kClothParameters;
+using parameters::WireField;
+using Writer = protozero::pbf_writer;
+
+constexpr std::size_t kMaxSolvers = 32;  // remembered solver kinds per cloth
+constexpr std::uint32_t kSolverInChange = 20;
+
+// Message that a field number belongs to: Cloth or ClothChange.
+using In = std::uint32_t WireField::*;
+
+bool readGroup(Bytes message, const Group& group, In in, ClothNumbers& numbers) {
+  if (group.isReplaced)
+    for (const ClothParameter& parameter : kClothParameters)
+      if (parameter.group == &group) numbers[parameter.number] = 0;
+  return readFields(message, [&](std::uint32_t field, Reader& reader) {
+    for (const ClothParameter& parameter : kClothParameters)
+      if (parameter.group == &group && field == fixed32(parameter.field.*in))
+        return setFinite(numbers[parameter.number], reader);
+    return skip(reader);
+  });
 }
 
-// Vec3Value { Vec3 value = 1; }
+// Skips a field that the table does not list.
+bool readNumber(std::uint32_t field, Reader& reader, In in, ClothNumbers& numbers) {
+  for (const ClothParameter& parameter : kClothParameters) {
+    if (parameter.group == nullptr && field == fixed32(parameter.field.*in))
+      return setFinite(numbers[parameter.number], reader);
+    if (parameter.group != nullptr && field == bytes(parameter.group->field.*in))
+      return readGroup(reader.get_view(), *parameter.group, in, numbers);
+  }
+  return skip(reader);
+}
+
+// The message is Vec3Value { Vec3 value = 1; }.
 bool setVec3Value(std::optional<Vec3>& target, Reader& reader) {
   Vec3& value = target.emplace();
   return readFields(reader.get_view(), [&](std::uint32_t field, Reader& wrapped) {
@@ -62,36 +94,91 @@ bool readClothChange(Bytes message, ClothChange& change) {
     switch (field) {
       case bytes(1):
         return setText(change.name, reader);
-      case bytes(2):
-        return setSpring(change.structural, reader);
-      case bytes(3):
-        return setSpring(change.shear, reader);
-      case bytes(4):
-        return setSpring(change.bend, reader);
-      case fixed32(5):
-        return setFinite(change.damping, reader);
-      case fixed32(6):
-        return setFinite(change.drag, reader);
-      case fixed32(7):
-        return setFinite(change.lift, reader);
-      case fixed32(8):
-        return setFinite(change.friction, reader);
-      case fixed32(9):
-        return setFinite(change.thickness, reader);
-      case bytes(20):
+      case bytes(kSolverInChange):
         return readSolver(reader.get_view(), change.solver.emplace());
-      case bytes(21):
-        return readSelfCollision(reader.get_view(), change.ballRadius, change.ballFriction);
-      case bytes(23):
-        return readTethers(reader.get_view(), change.tetherSlack);
-      case fixed32(24):
-        return setFinite(change.dihedralBending, reader);
       case bytes(40):
         return setText(change.material.emplace(), reader);
       default:
-        return skip(reader);
+        return readNumber(field, reader, &WireField::inChange, change.numbers);
     }
   });
+}
+
+void addVec3Value(Writer& parent, std::uint32_t field, const std::optional<Vec3>& value) {
+  if (!value) return;
+  Writer wrapper(parent, field);
+  Writer vec3(wrapper, 1);
+  for (std::uint32_t i = 0; i < 3; ++i) vec3.add_float(i + 1, (*value)[i]);
+}
+
+std::string constraintMessage(const Solver& solver) {
+  std::string settings;
+  Writer writer(settings);
+  writer.add_bool(1, solver.bendConstraints);
+  if (solver.compliance) writer.add_float(2, *solver.compliance);
+  writer.add_uint32(3, solver.iterations);
+  writer.add_float(4, solver.tolerance);
+  if (solver.kind == CS_SOLVER_CONSTRAINT) writer.add_uint32(5, solver.path);
+  return settings;
+}
+
+// The settings of a kind that this client does not know are sent back as received.
+std::string solverMessage(const Solver& solver) {
+  std::string settings = solver.settings;
+  if (solver.kind == CS_SOLVER_CONSTRAINT) settings = constraintMessage(solver);
+  if (solver.kind == CS_SOLVER_ACAD) {
+    settings.clear();
+    Writer writer(settings);
+    writer.add_float(1, solver.activation);
+    writer.add_message(2, constraintMessage(solver));
+  }
+  if (solver.kind == CS_SOLVER_XPBD) {
+    settings.clear();
+    Writer writer(settings);
+    writer.add_uint32(1, solver.iterations);
+    if (solver.compliance) writer.add_float(2, *solver.compliance);
+  }
+  if (solver.kind == CS_SOLVER_IMPLICIT_EULER) {
+    settings.clear();
+    Writer writer(settings);
+    writer.add_uint32(1, solver.iterations);
+    writer.add_float(2, solver.tolerance);
+  }
+  std::string message;
+  Writer(message).add_message(solver.kind, settings);
+  return message;
+}
+
+// Writes a group. A group that is replaced is written in full.
+void writeGroup(Writer& cloth, const Group& group, const ClothNumbers& numbers) {
+  Writer message(cloth, group.field.inChange);
+  for (const ClothParameter& parameter : kClothParameters)
+    if (parameter.group == &group && (group.isReplaced || numbers.has(parameter.number)))
+      message.add_float(parameter.field.inChange, numbers[parameter.number]);
+}
+
+void writeCloth(Writer& cloth, const ClothChange& change) {
+  cloth.add_string(1, change.name);
+  const auto writeSolver = [&] {
+    if (change.solver) cloth.add_message(kSolverInChange, solverMessage(*change.solver));
+  };
+  // Fields are written in ascending order.
+  bool isSolverDue = true;
+  const Group* previous = nullptr;
+  for (const ClothParameter& parameter : kClothParameters) {
+    const Group* group = parameter.group;
+    if (isSolverDue && (group != nullptr ? group->field : parameter.field).inChange > kSolverInChange) {
+      writeSolver();
+      isSolverDue = false;
+    }
+    if (group == nullptr && change.numbers.has(parameter.number))
+      cloth.add_float(parameter.field.inChange, change.numbers[parameter.number]);
+    if (group != nullptr && group != previous && change.numbers.hasAnyOf(*group))
+      writeGroup(cloth, *group, change.numbers);
+    previous = group;
+  }
+  if (isSolverDue) writeSolver();
+  if (change.material) cloth.add_string(40, *change.material);
 }
 
 }  // namespace
@@ -116,10 +203,6 @@ bool readParameterChange(Bytes message, ParameterChange& change) {
   });
 }
 
-bool readSpring(Bytes message, Spring& out) {
-  return readFloats(message, out);
-}
-
 bool readGust(Bytes message, Gust& out) {
   out = {};
   return readFields(message, [&](std::uint32_t field, Reader& reader) {
@@ -128,20 +211,22 @@ bool readGust(Bytes message, Gust& out) {
   });
 }
 
-bool readSelfCollision(Bytes message, std::optional<float>& radius, std::optional<float>& friction) {
+bool readClothParameters(Bytes message, std::string& name, ClothParameters& parameters) {
   return readFields(message, [&](std::uint32_t field, Reader& reader) {
-    if (field == fixed32(1)) return setFinite(radius, reader);
-    return field == fixed32(2) ? setFinite(friction, reader) : skip(reader);
+    switch (field) {
+      case bytes(1):
+        return setText(name, reader);
+      case bytes(20):
+        return readSolver(reader.get_view(), parameters.solver);
+      case bytes(40):
+        return setText(parameters.material, reader);
+      default:
+        return readNumber(field, reader, &WireField::inCloth, parameters.numbers);
+    }
   });
 }
 
-bool readTethers(Bytes message, std::optional<float>& slack) {
-  return readFields(message, [&](std::uint32_t field, Reader& reader) {
-    return field == fixed32(1) ? setFinite(slack, reader) : skip(reader);
-  });
-}
-
-// A kind that this client does not know keeps its number and its settings.
+// Keeps the number and the settings of a kind that this client does not know.
 bool readSolver(Bytes message, Solver& out) {
   out = {};
   return readFields(message, [&](std::uint32_t field, Reader& reader) {
@@ -162,6 +247,38 @@ bool readSolver(Bytes message, Solver& out) {
         return true;
     }
   });
+}
+
+void writeFields(Writer& message, const ParameterChange& change) {
+  addVec3Value(message, 1, change.gravity);
+  addVec3Value(message, 2, change.wind);
+  if (change.airDensity) message.add_float(3, *change.airDensity);
+  if (change.gust) {
+    Writer gust(message, 40);
+    gust.add_float(1, change.gust->strength);
+    gust.add_float(2, change.gust->seconds);
+  }
+  for (const ClothChange& clothChange : change.cloths) {
+    Writer cloth(message, 4);
+    writeCloth(cloth, clothChange);
+  }
+}
+
+ClothNumbers ClothParameters::defaultNumbers() {
+  ClothNumbers numbers;
+  for (const ClothParameter& parameter : kClothParameters)
+    if (parameter.group == nullptr || parameter.group->isReplaced)
+      numbers[parameter.number] = parameter.initial;
+  return numbers;
+}
+
+void apply(const ClothChange& change, ClothParameters& cloth) {
+  parameters::applyNumbers(change.numbers,
+                           [&](parameters::ClothNumber number) { return &cloth.numbers[number]; });
+  cloth.material = change.material.value_or(cloth.material);
+  if (!change.solver) return;
+  cloth.solver = *change.solver;
+  if (cloth.solvers.size() < kMaxSolvers) cloth.solvers[cloth.solver.kind] = cloth.solver;
 }
 
 }  // namespace clothstream::client

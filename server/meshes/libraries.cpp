@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// tinyobjloader and tinygltf, compiled in from their headers: programs that are carried to other machines
-// cannot count on Debian's shared ones.
+// Compiles tinyobjloader and tinygltf from their headers. Programs that are copied to other machines cannot
+// rely on shared libraries there.
 #define TINYOBJLOADER_IMPLEMENTATION
 #include <tiny_obj_loader.h>
 

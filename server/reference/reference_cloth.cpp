@@ -240,17 +240,17 @@ void ReferenceCloth::correctSprings(double h) {
 
 void ReferenceCloth::enforceConstraints(double h) {
   const model::Solver& solver = cloth_.solver;
-  const double takenBack = model::takenBack(solver);
+  const double correctionFraction = model::correctionFraction(solver);
   std::vector<Constraint> constraints;
   for (const model::SpringLink& link : links_) {
     if (!model::isConstraint(solver, link.kind)) continue;
     const double rest = link.restLength, longest = rest * (1 + double{solver.activation});
     const Vec3 d = start_[link.b] - start_[link.a];
     if (solver.kind == model::SolverKind::constraint) {
-      constraints.push_back({link.a, link.b, takenBack * (d.norm() - rest)});
+      constraints.push_back({link.a, link.b, correctionFraction * (d.norm() - rest)});
     } else if ((d + h * (velocities_[link.b] - velocities_[link.a])).norm() > longest) {
       const double excess = d.norm() - longest;
-      constraints.push_back({link.a, link.b, excess > 0 ? takenBack * excess : excess});
+      constraints.push_back({link.a, link.b, excess > 0 ? correctionFraction * excess : excess});
     }
   }
   const ConstraintSystem system(constraints, start_, velocities_, inverseMasses_,

@@ -67,7 +67,7 @@ std::vector<std::uint8_t> SelfCollision::resolve(std::span<Vec3> positions, std:
     const Vec3 normal = length < 1e-8 ? Vec3(-Vec3::UnitY()) : Vec3(apart / length);
     const Vec3 relative = velocities[pair.a] - velocities[pair.b];
     const double separation = relative.dot(normal);
-    const double wanted = std::min(double{model::kOverlapTakenBack} / h * (pair.distance - length),
+    const double wanted = std::min(double{model::kOverlapCorrectionFraction} / h * (pair.distance - length),
                                    double{model::kPushOutSpeed});
     const double pressed = std::max(0.0, wanted - separation);
     const Vec3 slip = relative - separation * normal;

@@ -22,7 +22,7 @@ float snapTiny(float x) {
 shared::vec4 limitsOf(const model::Cloth& cloth) {
   const model::Solver& solver = cloth.solver;
   const bool adaptive = solver.kind == model::SolverKind::acad;
-  return {adaptive ? solver.activation : 0, model::takenBack(solver), adaptive ? 1.0f : 0.0f,
+  return {adaptive ? solver.activation : 0, model::correctionFraction(solver), adaptive ? 1.0f : 0.0f,
           cloth.dihedralBending};
 }
 

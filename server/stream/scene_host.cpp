@@ -161,15 +161,16 @@ void SceneHost::changeGently(model::Scene& changed) {
     model::Solver& solver = changed.cloths[i].solver;
     if (solver.kind != scene_.cloths[i].solver.kind)
       gentleUntil_[i] = tick_ + static_cast<std::uint64_t>(std::ceil(kGentleSeconds * rate_));
-    if (gentleUntil_[i] > tick_) solver.takenBack = std::min(part, model::takenBack(solver));
+    if (gentleUntil_[i] > tick_)
+      solver.correctionFraction = std::min(part, model::correctionFraction(solver));
   }
 }
 
 void SceneHost::endGentleness() {
   bool ended = false;
   for (std::size_t i = 0; i < gentleUntil_.size(); ++i) {
-    if (gentleUntil_[i] != tick_ || !scene_.cloths[i].solver.takenBack) continue;
-    scene_.cloths[i].solver.takenBack.reset();
+    if (gentleUntil_[i] != tick_ || !scene_.cloths[i].solver.correctionFraction) continue;
+    scene_.cloths[i].solver.correctionFraction.reset();
     ended = true;
   }
   if (ended) setCloths(scene_.cloths);

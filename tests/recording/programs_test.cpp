@@ -164,7 +164,7 @@ TEST_F(RecordingPrograms, AnInterruptEndsRecordingsWhole) {
   EXPECT_EQ(info.code, 0) << info.output;
   const Ended again = run({CLOTHSTREAM_SERVER, "resimulate", serversRecording()});
   EXPECT_EQ(again.code, 0) << again.output << again.errors;
-  EXPECT_THAT(again.output, HasSubstr("all the same to the bit"));
+  EXPECT_THAT(again.output, HasSubstr("all bit-identical"));
 }
 
 // What is in a chunk that is not closed is what can be lost: no chunk may be longer than is promised,
@@ -306,7 +306,7 @@ TEST_F(RecordingPrograms, ClientsAskForRecordings) {
   const Ended started = ask({"start-recording", "small", "--name", "mine"});
   EXPECT_EQ(started.code, 0) << started.errors;
   EXPECT_EQ(started.output, "mine.mcap\n");
-  EXPECT_THAT(ask({"start-recording", "small"}).errors, HasSubstr("is recorded already, to mine.mcap"));
+  EXPECT_THAT(ask({"start-recording", "small"}).errors, HasSubstr("is already being recorded to mine.mcap"));
   EXPECT_THAT(ask({"start-recording", "small", "--name", "../mine"}).errors,
               HasSubstr("must be 1 to 64 characters"));
   EXPECT_THAT(ask({"start-recording", "none"}).errors, HasSubstr("there is no scene 'none'"));

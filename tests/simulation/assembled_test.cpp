@@ -112,7 +112,7 @@ TEST_F(Assembled, MoveNodesAsTheReferenceOnEveryShapeOfGrid) {
 
 TEST_F(Assembled, ThatArePulledGentlyMoveNodesAsTheReference) {
   model::Cloth cloth = assembled(calmCloth(9, 8));
-  cloth.solver.takenBack = 0.125f;
+  cloth.solver.correctionFraction = 0.125f;
   expectLikeSolution(sceneOf({cloth}), 8);
 }
 

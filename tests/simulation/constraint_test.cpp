@@ -105,7 +105,7 @@ TEST_F(Constraints, MoveNodesAsTheReferenceOnEveryShapeOfGrid) {
 // As after a change of solver.
 TEST_F(Constraints, ThatArePulledGentlyMoveNodesAsTheReference) {
   model::Cloth cloth = constrained(9, 8);
-  cloth.solver.takenBack = 0.125f;
+  cloth.solver.correctionFraction = 0.125f;
   expectLikeReference(sceneOf({cloth}), 8);
 }
 

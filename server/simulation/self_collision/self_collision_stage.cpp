@@ -250,7 +250,7 @@ void SelfCollisionStage::recordContacts(vulkan::Recorder& recorder, std::uint32_
   const shared::ContactPush push{.collision = collision,
                                  .nodeCount = nodeCount_,
                                  .substepSeconds = substepSeconds_,
-                                 .takenBack = model::kOverlapTakenBack / substepSeconds_,
+                                 .takenBack = model::kOverlapCorrectionFraction / substepSeconds_,
                                  .pushOutSpeed = model::kPushOutSpeed};
   recorder.barrier();
   recorder.fill(groups_, 0, sizeof(std::uint32_t), offsetof(shared::ContactGroups, x));

@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: MIT
+// Numbers of a cloth between the messages Cloth and ClothChange and the model, by the table of parameters.
+#pragma once
+
+#include <span>
+
+#include "clothstream/v1/scene.pb.h"
+#include "clothstream/v1/session.pb.h"
+#include "proto/parameters/cloth_parameters.h"
+#include "server/messages/validation.h"
+#include "server/model/scene.h"
+
+namespace clothstream::messages {
+
+// Numbers that the message gives. Each must lie in its range for all of the cloths.
+parameters::ClothNumbers readNumbers(Checks& checks, const Path& path, const v1::Cloth& message,
+                                     const model::Cloth& cloth);
+// Groups that a change cannot add must exist in all of the cloths.
+parameters::ClothNumbers readNumbers(Checks& checks, const Path& path, const v1::ClothChange& message,
+                                     std::span<const model::Cloth* const> cloths);
+
+// Sets every number that the cloth has.
+void writeNumbers(const model::Cloth& cloth, v1::Cloth& message);
+
+// Copies every number to the change. Springs are copied even if the cloth leaves them out.
+void copyNumbers(const v1::Cloth& cloth, v1::ClothChange& change);
+
+}  // namespace clothstream::messages
