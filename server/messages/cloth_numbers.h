@@ -12,17 +12,18 @@
 
 namespace clothstream::messages {
 
-// Numbers that the message gives. Each must lie in its range for all of the cloths.
+// Numbers that the message gives. Each must be in its range.
 parameters::ClothNumbers readNumbers(Checks& checks, const Path& path, const v1::Cloth& message,
                                      const model::Cloth& cloth);
-// Groups that a change cannot add must exist in all of the cloths.
+// Numbers that the message gives. Each must be in its range for every cloth. Groups that a change cannot add
+// must exist in every cloth.
 parameters::ClothNumbers readNumbers(Checks& checks, const Path& path, const v1::ClothChange& message,
                                      std::span<const model::Cloth* const> cloths);
 
 // Sets every number that the cloth has.
 void writeNumbers(const model::Cloth& cloth, v1::Cloth& message);
 
-// Copies every number to the change. Springs are copied even if the cloth leaves them out.
+// Copies every number to the change. Springs are copied also if the cloth leaves them out.
 void copyNumbers(const v1::Cloth& cloth, v1::ClothChange& change);
 
 }  // namespace clothstream::messages

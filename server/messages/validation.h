@@ -52,7 +52,7 @@ class Checks {
   // the Unicode characters that change direction or break lines.
   const std::string& label(const Path& path, const std::string& value);
 
-  // `value` is empty if there is none to show.
+  // An empty `value` is not shown.
   void fail(const Path& path, std::string_view value, std::string_view allowed,
             v1::ErrorCode code = v1::ERROR_CODE_INVALID_ARGUMENT);
 

@@ -18,7 +18,7 @@ constexpr double kCurvature = 0.65;
 
 // [WOR11] is Wang, O'Brien and Ramamoorthi, "Data-driven elastic models for cloth: modeling and measurement",
 // SIGGRAPH 2011, with data published in ARCSim. 1 oz/yd^2 is 33.9 g/m^2, 1 momme is 4.34 g/m^2. Shear and
-// bending of woven cloth lie in the range that Kawabata measured for apparel ("The standardization and
+// bending of woven cloth are in the range that Kawabata measured for apparel ("The standardization and
 // analysis of hand evaluation", 1980): 20 to 100 N/m and 1 to 20 uN m.
 constexpr Material kMaterials[] = {
     {.name = "cotton",

@@ -31,8 +31,8 @@ std::span<const Material> materials();
 // nullptr if no material has that name.
 const Material* findMaterial(std::string_view name);
 
-// Bending length in metres: (rigidity / weight)^(1/3). It is half the overhang at which a strip bends down
-// by 41.5 degrees (Peirce, "The handle of cloth as a measurable quantity", 1930; ASTM D1388).
+// Bending length in metres: (rigidity / weight)^(1/3). It is half the overhang at which a strip bends down by
+// 41.5 degrees (Peirce, "The handle of cloth as a measurable quantity", 1930; ASTM D1388).
 double bendingLength(const Material& material);
 
 // Stiffness of a cloth's bend springs, N/m. A bend spring skips one node at a distance of `a` from both ends.

@@ -49,8 +49,7 @@ enum class SolverKind : std::uint8_t {
   // [Va21] 3.3.
   acad,
   // Springs are corrected one after another, each according to its stiffness: extended position-based
-  // dynamics,
-  // [MMC16].
+  // dynamics, [MMC16].
   xpbd,
   // Every spring is a force, evaluated at the end of the substep: Baraff and Witkin, "Large steps in cloth
   // simulation", 1998.
@@ -96,7 +95,7 @@ inline constexpr float kRelativeCompliance = 0.01f;
 // kNeighbours times the sum of their radii, because springs keep them apart.
 struct SelfCollision {
   float radius = 0;  // m, above 0
-  // Coulomb; two cloths use the mean of theirs
+  // Coulomb. Two cloths use the mean of their values.
   float friction = initial(parameters::ClothNumber::ballFriction);
 };
 inline constexpr float kNeighbours = 1.1f;
@@ -126,7 +125,7 @@ struct Attachment {
   std::vector<GridRange> ranges;        // nodes of a grid
   std::vector<std::uint32_t> vertices;  // nodes by index
   std::vector<Region> regions;          // nodes whose rest position lies inside
-  std::string collider;                 // name of the collider that is the frame; empty: pose and motion are
+  std::string collider;                 // name of the collider that is the frame; empty: uses pose and motion
   Pose pose;
   Motion motion;
 };
@@ -139,15 +138,15 @@ inline constexpr float kCaughtUp = 0.25f;
 
 // Long-range attachments: [KCM12] Kim, Chentanez, Mueller-Fischer, "Long Range Attachments", SCA 2012.
 struct Tethers {
-  // Extra length, as a fraction of the distance along the cloth at rest
+  // Extra length, as a fraction of the distance along the cloth at rest.
   float slack = initial(parameters::ClothNumber::tetherSlack);
 };
 
 struct Cloth {
   std::string name;
-  std::string
-      material;  // name of the material it was last made of; empty: none. Its numbers may have changed since.
-  Grid grid;     // used if there is no mesh
+  // Name of the material that the cloth was last made of; empty: none. Its numbers may have changed since.
+  std::string material;
+  Grid grid;                         // used if there is no mesh
   std::shared_ptr<const Mesh> mesh;  // null: the cloth is the grid
   float mass = 0;                    // kg, whole cloth; nodeMasses() distributes it
   // Units, ranges and defaults of the following numbers are in proto/parameters/cloth_parameters.h.

@@ -27,7 +27,7 @@ std::vector<Link> ends(const std::vector<SpringLink>& links) {
   return all;
 }
 
-TEST(MeshLinks, OfQuadsEqualTheSpringsOfAGrid) {
+TEST(MeshLinks, EqualThoseOfAGridForQuads) {
   for (const auto& [rows, columns] :
        {std::pair(2u, 2u), std::pair(2u, 5u), std::pair(6u, 2u), std::pair(7u, 5u)}) {
     const std::vector<SpringLink> expected = springLinks(grid(rows, columns));
@@ -39,7 +39,7 @@ TEST(MeshLinks, OfQuadsEqualTheSpringsOfAGrid) {
 }
 
 // Two triangles have five edges, one bend spring across the middle one and no shear springs.
-TEST(MeshLinks, OfTrianglesJoinEdgesAndOppositeCorners) {
+TEST(MeshLinks, JoinEdgesAndOppositeCornersOfTriangles) {
   const Mesh mesh = makeMesh(
       triangles({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 1}}, {Triangle{0, 1, 2}, Triangle{1, 3, 2}}));
   EXPECT_EQ(ends(mesh.links), (std::vector<Link>{{0, 1, SpringKind::structural},

@@ -59,7 +59,7 @@ TEST(SpringColours, ContainAtMostOneSpringPerNode) {
 }
 
 // A kernel can process a whole block: within a pass, springs that share a node belong to one block.
-TEST(SpringColours, OfAGridPassMeetOnlyInsideABlock) {
+TEST(SpringColours, MeetOnlyInsideABlockInEachPass) {
   const Cloth cloth = grid(18, 15);
   const SpringColours colours = springColours(cloth);
   ASSERT_EQ(colours.count(), kCornerColours + kSeamColours + kInsideColours);
@@ -80,7 +80,7 @@ TEST(SpringColours, OfAGridPassMeetOnlyInsideABlock) {
   EXPECT_EQ(std::ranges::max(springs), 1);
 }
 
-TEST(SpringColours, OfAMeshAreFewAndDeterministic) {
+TEST(SpringColours, AreFewAndDeterministicForMeshes) {
   const Cloth cloth = discCloth(12);
   const SpringColours colours = springColours(cloth), again = springColours(cloth);
   EXPECT_EQ(keysOf(colours.links), keysOf(again.links));

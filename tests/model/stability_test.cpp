@@ -101,7 +101,7 @@ TEST(StableSubsteps, AreZeroIfTheMaximumIsNotEnough) {
   EXPECT_EQ(stableSubsteps(scene), 0u);
 }
 
-TEST(StableSubsteps, OfExplicitEulerNeedDashpotsAndDamping) {
+TEST(StableSubsteps, NeedDashpotsAndDampingForExplicitEuler) {
   Scene scene = sheet(10, 10);
   scene.integrator = Integrator::explicitEuler;
   EXPECT_EQ(stableSubsteps(scene), 0u);

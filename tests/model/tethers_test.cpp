@@ -77,7 +77,7 @@ TEST(Tethers, AreAbsentWithoutFixedNodes) {
   }
 }
 
-TEST(Tethers, OfAMeshEqualThoseOfTheSameGrid) {
+TEST(Tethers, EqualThoseOfTheSameGridForMeshes) {
   model::Cloth cloth = grid(6, 5);
   cloth.pins = {{}, {.firstColumn = 4, .lastColumn = 4}};
   const model::Cloth mesh = model::asMesh(cloth);
