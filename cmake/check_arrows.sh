@@ -22,6 +22,8 @@ server/step        | server/model server/vulkan server/simulation server/message
 server/endpoint/grpc         | server/stream server/telemetry clothstream grpc/health
 server/endpoint/web         | server/stream server/telemetry clothstream
 clients/core       | proto/codec proto/parameters
+clients/core/stream | clients/core/core.h clients/core/wire proto/codec proto/parameters
+clients/core/wire  | clients/core/core.h proto/codec proto/parameters
 clients/grpc       | clients/core clothstream
 clients/library    | clients/core clients/grpc
 clients/files      | proto/codec clothstream
@@ -47,7 +49,7 @@ while IFS='|' read -r room seen; do
     case "$target" in kernels/*) continue ;; esac
     allowed=no
     for prefix in "$room" $seen; do
-      case "$target" in "$prefix"/*) allowed=yes ;; esac
+      case "$target" in "$prefix" | "$prefix"/*) allowed=yes ;; esac
     done
     [ $allowed = yes ] || complain "$file:$line: $room must not see $target"
   done < <(grep -rnE '^#include "' --include='*.h' --include='*.cpp' "$room" || true)

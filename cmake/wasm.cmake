@@ -1,19 +1,20 @@
-# clothstream_core_wasm: the client core as WebAssembly, built from the native core's sources with Debian's clang for
-# wasm32. The global property CLOTHSTREAM_CORE_WASM holds the module's path, CLOTHSTREAM_CORE_WASM_SCALAR that of one
-# without WebAssembly's vectors, which the tests compare. Modules import nothing and export their memory, _initialize,
-# malloc, free and the functions of clients/core/core.h.
+# The client core as WebAssembly, built from the sources of the native core with Debian's clang for wasm32.
+# Targets: clothstream_core_wasm is the module of the page and uses WebAssembly's SIMD. clothstream_core_wasm_scalar is
+# the same without SIMD, for tests only. The global properties CLOTHSTREAM_CORE_WASM and CLOTHSTREAM_CORE_WASM_SCALAR
+# hold their paths. A module imports nothing. It exports its memory, _initialize, malloc, free and the functions of
+# clients/core/core.h.
 find_program(WASM_CXX NAMES clang++ clang++-14 REQUIRED)
 find_program(WASM_LD NAMES wasm-ld wasm-ld-14 REQUIRED)
 
 set(wasmOut ${PROJECT_BINARY_DIR}/web-wasm)
-# SIMDe alone of what Debian's include folder has: the rest is for the machine that builds.
+# Only SIMDe is taken from Debian's include folder: its other headers are for the build machine.
 find_path(SIMDE_INCLUDE simde/x86/sse2.h REQUIRED)
 file(MAKE_DIRECTORY ${wasmOut}/include)
 file(CREATE_LINK ${SIMDE_INCLUDE}/simde ${wasmOut}/include/simde SYMBOLIC)
 set(wasmFlags --target=wasm32-wasi -O3 -DNDEBUG -ffp-contract=off -fvisibility=hidden -isystem ${wasmOut}/include -std=c++20
   -fno-rtti -fno-exceptions -Wall -Wextra -Wconversion -Wshadow -Werror -I${PROJECT_SOURCE_DIR})
 
-# All functions that core.h declares, but the one that takes a function of the caller's.
+# All functions that core.h declares, except cs_set_clock, which takes a function pointer.
 set(coreHeader ${PROJECT_SOURCE_DIR}/clients/core/core.h)
 set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${coreHeader})
 file(READ ${coreHeader} coreText)
@@ -23,7 +24,7 @@ list(REMOVE_ITEM wasmExports cs_set_clock)
 list(APPEND wasmExports malloc free)
 list(TRANSFORM wasmExports PREPEND -Wl,--export=)
 
-# clothstream_wasm_module(FOLDER PROPERTY flags...): FOLDER/clothstream_core.wasm, whose path PROPERTY then holds.
+# clothstream_wasm_module(FOLDER PROPERTY flags...) builds FOLDER/clothstream_core.wasm and stores its path in PROPERTY.
 function(clothstream_wasm_module folder property)
   get_property(decoderSources GLOBAL PROPERTY CLOTHSTREAM_DECODER_SOURCES)
   set(objects)
@@ -46,7 +47,10 @@ function(clothstream_wasm_module folder property)
 endfunction()
 
 clothstream_wasm_module(${wasmOut} CLOTHSTREAM_CORE_WASM -msimd128)
-clothstream_wasm_module(${wasmOut}/scalar CLOTHSTREAM_CORE_WASM_SCALAR)
 get_property(vectorModule GLOBAL PROPERTY CLOTHSTREAM_CORE_WASM)
-get_property(scalarModule GLOBAL PROPERTY CLOTHSTREAM_CORE_WASM_SCALAR)
-add_custom_target(clothstream_core_wasm ALL DEPENDS ${vectorModule} ${scalarModule})
+add_custom_target(clothstream_core_wasm ALL DEPENDS ${vectorModule})
+if(CLOTHSTREAM_TESTS)
+  clothstream_wasm_module(${wasmOut}/scalar CLOTHSTREAM_CORE_WASM_SCALAR)
+  get_property(scalarModule GLOBAL PROPERTY CLOTHSTREAM_CORE_WASM_SCALAR)
+  add_custom_target(clothstream_core_wasm_scalar ALL DEPENDS ${scalarModule})
+endif()

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// clothstream-server: scenes on a device, and two endpoints to them.
+// clothstream-server: simulates scenes on a Vulkan device and serves them through two endpoints.
 #include <algorithm>
 #include <csignal>
 #include <cstdint>
@@ -33,18 +33,19 @@
 namespace clothstream {
 namespace {
 
-// Held back in every thread, and taken by waitForStop() alone: made before any other thread is.
+// Blocks SIGINT, SIGTERM and SIGUSR1 in every thread; wait() takes them. Must be created before other
+// threads.
 class Signals {
  public:
   Signals() {
     sigemptyset(&set_);
     for (const int signal : {SIGINT, SIGTERM, SIGUSR1}) sigaddset(&set_, signal);
     pthread_sigmask(SIG_BLOCK, &set_, nullptr);
-    std::signal(SIGPIPE, SIG_IGN);  // a peer that went away is an error of its socket
-    std::signal(SIGXFSZ, SIG_IGN);  // a file that may grow no more is an error like a full disk
+    std::signal(SIGPIPE, SIG_IGN);  // a closed peer is reported as an error of its socket
+    std::signal(SIGXFSZ, SIG_IGN);  // a file at its size limit is reported like a full disk
   }
 
-  // The next of them; 0 when the time is over.
+  // Returns the next signal, or 0 after `timeout`.
   int wait(std::chrono::nanoseconds timeout) const {
     const auto wholeSeconds = std::chrono::duration_cast<std::chrono::seconds>(timeout);
     const timespec limit{static_cast<std::time_t>(wholeSeconds.count()),
@@ -58,7 +59,7 @@ class Signals {
 
 constexpr const char* kServerName = "clothstream-server " CLOTHSTREAM_VERSION;
 
-// For a scene of so many nodes.
+// `nodes` is the size of the scene that the device will simulate.
 vulkan::DeviceOptions deviceOptions(const ProgramOptions& options, std::uint32_t nodes) {
   return simulation::suitedTo(nodes, {.select = options.device,
                                       .softwareThreads = options.softwareThreads,
@@ -71,16 +72,18 @@ std::string describe(const vulkan::DeviceInfo& device) {
                      device.driver, device.apiVersion);
 }
 
-void listDevices() {
+int listDevices() {
   for (const vulkan::DeviceInfo& device : vulkan::listDevices())
     fmt::print("{}  {}\n", device.index, describe(device));
+  return 0;
 }
 
-void listMaterials() {
+int listMaterials() {
   fmt::print("{:<12}{:>8}{:>10}{:>8}{:>10}  {}\n", "", "kg/m^2", "N/m", "shear", "uN m", "");
   for (const model::Material& material : model::materials())
     fmt::print("{:<12}{:>8}{:>10}{:>8}{:>10.3g}  {}\n", material.name, material.arealMass, material.tension,
                material.shear, 1e6 * double{material.rigidity}, material.description);
+  return 0;
 }
 
 model::Scene loaded(messages::Result<model::Scene> scene) {
@@ -114,7 +117,7 @@ model::Scene adjusted(model::Scene scene, const ProgramOptions& options) {
   return std::move(*checked);
 }
 
-// The named ones and those from files; a file's takes the place of a named one with its name.
+// Built-in scenes and those from files. A file replaces a built-in scene of the same name.
 std::vector<model::Scene> loadScenes(const ProgramOptions& options) {
   std::vector<model::Scene> scenes;
   for (const std::string& name : messages::namedScenes()) scenes.push_back(loaded(messages::loadScene(name)));
@@ -128,8 +131,8 @@ std::vector<model::Scene> loadScenes(const ProgramOptions& options) {
   return scenes;
 }
 
-// Where the build and an installation put the page, seen from the program; empty if it is in neither.
-std::filesystem::path pageBesideProgram() {
+// Directory of the page in a build or an installation, relative to the program. Empty if it does not exist.
+std::filesystem::path pageNextToProgram() {
   const std::filesystem::path programs = std::filesystem::read_symlink("/proc/self/exe").parent_path();
   for (const char* place : {"../web", "../share/clothstream/web"})
     if (const auto page = programs / place; std::filesystem::exists(page / "index.html"))
@@ -137,8 +140,8 @@ std::filesystem::path pageBesideProgram() {
   return {};
 }
 
-// How somebody on this machine reaches it.
-std::string reachable(const std::string& host, std::uint16_t port) {
+// Address under which a client on this machine reaches the endpoint.
+std::string localAddress(const std::string& host, std::uint16_t port) {
   if (host == "0.0.0.0") return fmt::format("127.0.0.1:{}", port);
   if (host == "::") return fmt::format("[::1]:{}", port);
   return host.find(':') == std::string::npos ? fmt::format("{}:{}", host, port)
@@ -164,21 +167,21 @@ void waitForStop(const Signals& signals, const ProgramOptions& options,
   }
 }
 
-// Through both endpoints, until a signal or the end of the time; `intro` is what to say of the scenes.
+// Serves through both endpoints until a signal or --seconds ends it. `intro` is printed before the addresses.
 void openEndpoints(stream::SceneServer& server, const ProgramOptions& options, const Signals& signals,
                    const std::string& intro, const std::function<std::string()>& report) {
   {
-    const std::filesystem::path page = options.page.empty() ? pageBesideProgram() : options.page;
+    const std::filesystem::path page = options.page.empty() ? pageNextToProgram() : options.page;
     if (page.empty())
-      spdlog::warn("there is no page beside the program: build clothstream_page, or name one by --page");
+      spdlog::warn("no page found next to the program: build the target clothstream_page, or use --page DIR");
     const endpoint::WebEndpoint web(server, {.host = options.host,
                                              .port = options.port,
                                              .pageDirectory = page,
                                              .allowedOrigins = options.allowedOrigins});
     const endpoint::GrpcEndpoint rpc(server, {.host = options.host, .port = options.grpcPort});
 
-    fmt::print("{}page    http://{}/\ngRPC    {}\n", intro, reachable(options.host, web.port()),
-               reachable(options.host, rpc.port()));
+    fmt::print("{}page    http://{}/\ngRPC    {}\n", intro, localAddress(options.host, web.port()),
+               localAddress(options.host, rpc.port()));
     std::fflush(stdout);
     waitForStop(signals, options, report);
     spdlog::info("stopping");
@@ -187,8 +190,8 @@ void openEndpoints(stream::SceneServer& server, const ProgramOptions& options, c
   fmt::print("{}", report());
 }
 
-// What holds for scenes that are simulated and for one that is played.
-stream::ServerOptions shared(const ProgramOptions& options, const std::string& defaultScene) {
+// Options that apply both to simulated scenes and to a recording.
+stream::ServerOptions sharedOptions(const ProgramOptions& options, const std::string& defaultScene) {
   return {.device = {},
           .defaultScene = defaultScene,
           .serverName = kServerName,
@@ -198,31 +201,32 @@ stream::ServerOptions shared(const ProgramOptions& options, const std::string& d
           .outsideControl = !options.ownersAlone};
 }
 
-void play(const ProgramOptions& options, const Signals& signals) {
-  auto recording = recording::RecordedStream::open(options.play);
+int play(const ProgramOptions& options, const Signals& signals) {
+  auto recording = recording::RecordedStream::open(options.recording);
   if (!recording) throw std::runtime_error(recording.error());
   if (options.playback.from > recording->length())
-    throw std::runtime_error(fmt::format("--from {}: {} is {:.3f} s long", options.playback.from,
-                                         options.play, recording->length()));
+    throw std::runtime_error(fmt::format("--from: {} s is after the end of {}; use 0 to {:.3f}",
+                                         options.playback.from, options.recording, recording->length()));
   if (recording->cut())
-    spdlog::warn("{} was cut off, or is damaged at its end: what there is of it is played", options.play);
+    spdlog::warn("{} is truncated or damaged at its end; the readable part is played", options.recording);
   const std::string scene = recording->scene();
-  const std::string intro = fmt::format("plays   {}, {:.1f} s of {}, recorded on {}\n", options.play,
+  const std::string intro = fmt::format("plays   {}, {:.1f} s of {}, recorded on {}\n", options.recording,
                                         recording->length(), scene, recording->device());
   stream::SceneServer server(scene,
                              std::make_shared<recording::Playback>(std::move(*recording), options.playback),
-                             shared(options, scene));
+                             sharedOptions(options, scene));
   openEndpoints(server, options, signals, intro, [&] { return server.report(); });
+  return 0;
 }
 
-void serve(const ProgramOptions& options, const Signals& signals) {
+int serve(const ProgramOptions& options, const Signals& signals) {
   std::vector<model::Scene> scenes = loadScenes(options);
   std::string sceneList;
   for (const model::Scene& scene : scenes)
     sceneList +=
         fmt::format("{}{} ({} vertices)", sceneList.empty() ? "" : ", ", scene.name, scene.nodeCount());
 
-  // Outlives the scenes: it waits for what they told last.
+  // Outlives the scenes, because it waits for their last records.
   std::optional<recording::Recordings> recordings;
   if (!options.recordDirectory.empty())
     recordings.emplace(
@@ -232,7 +236,7 @@ void serve(const ProgramOptions& options, const Signals& signals) {
         !options.recordsOnRequest);
   const auto first = std::ranges::find(scenes, options.scene, &model::Scene::name);
   const std::uint32_t nodes = first == scenes.end() ? 0 : first->nodeCount();
-  stream::ServerOptions serverOptions = shared(options, options.scene);
+  stream::ServerOptions serverOptions = sharedOptions(options, options.scene);
   serverOptions.device = deviceOptions(options, nodes);
   serverOptions.runAlways = options.alwaysRun;
   serverOptions.reportRate = options.reportRate;
@@ -245,16 +249,17 @@ void serve(const ProgramOptions& options, const Signals& signals) {
   const auto report = [&] { return server.report() + (recordings ? recordings->report() : ""); };
   openEndpoints(server, options, signals,
                 fmt::format("device  {}\nscenes  {}\n", describe(server.deviceInfo()), sceneList), report);
+  return 0;
 }
 
-constexpr int kInterrupted = 130;  // as shells have it
+constexpr int kInterrupted = 130;  // exit code of shells for SIGINT
 
 bool isInterrupted(const Signals& signals) {
   const int signal = signals.wait(std::chrono::nanoseconds(0));
   return signal == SIGINT || signal == SIGTERM;
 }
 
-// A line on standard error once a second.
+// Prints the share done on standard error, once per second.
 class Progress {
  public:
   void show(double part) {
@@ -269,10 +274,10 @@ class Progress {
   Clock::time_point next_ = Clock::now() + std::chrono::seconds(1);
 };
 
-int runAgain(const ProgramOptions& options, const Signals& signals) {
+int resimulate(const ProgramOptions& options, const Signals& signals) {
   Progress progress;
   const auto result =
-      recording::resimulate({.path = options.resimulate,
+      recording::resimulate({.path = options.recording,
                              .device = [&](std::uint32_t nodes) { return deviceOptions(options, nodes); },
                              .interrupted = [&] { return isInterrupted(signals); },
                              .progress = [&](double part) { progress.show(part); }});
@@ -285,7 +290,7 @@ int runAgain(const ProgramOptions& options, const Signals& signals) {
 int runSteps(const ProgramOptions& options, const Signals& signals) {
   const model::Scene scene = adjusted(loaded(messages::loadScene(options.scene)), options);
   vulkan::Device device(deviceOptions(options, scene.nodeCount()));
-  step::StepOptions stepOptions = *options.step;
+  step::StepOptions stepOptions = options.step;
   stepOptions.serverName = kServerName;
   switch (step::run(device, scene, stepOptions, [&] { return isInterrupted(signals); })) {
     case step::Outcome::complete:
@@ -294,6 +299,31 @@ int runSteps(const ProgramOptions& options, const Signals& signals) {
       return kInterrupted;
     case step::Outcome::unhealthy:
       return 1;
+  }
+  return 1;
+}
+
+int printScene(const ProgramOptions& options) {
+  fmt::print("{}\n", messages::toJson(loaded(messages::loadScene(options.printScene))));
+  return 0;
+}
+
+int run(const ProgramOptions& options, const Signals& signals) {
+  switch (options.command) {
+    case Command::serve:
+      return serve(options, signals);
+    case Command::play:
+      return play(options, signals);
+    case Command::resimulate:
+      return resimulate(options, signals);
+    case Command::step:
+      return runSteps(options, signals);
+    case Command::printScene:
+      return printScene(options);
+    case Command::listDevices:
+      return listDevices();
+    case Command::listMaterials:
+      return listMaterials();
   }
   return 1;
 }
@@ -309,21 +339,8 @@ int main(int argc, char** argv) {
     const ProgramOptions& options = std::get<ProgramOptions>(parsed);
     const Signals signals;
     telemetry::setUpLog(options.logLevel);
-    if (options.step) return runSteps(options, signals);
-    if (!options.play.empty()) {
-      play(options, signals);
-      return 0;
-    }
-    if (!options.resimulate.empty()) return runAgain(options, signals);
-    if (!options.printScene.empty())
-      fmt::print("{}\n", messages::toJson(loaded(messages::loadScene(options.printScene))));
-    else if (options.listDevices)
-      listDevices();
-    else if (options.listMaterials)
-      listMaterials();
-    else
-      serve(options, signals);
-    return 0;
+    for (const std::string& warning : options.warnings) spdlog::warn("{}", warning);
+    return run(options, signals);
   } catch (const std::exception& error) {
     std::fprintf(stderr, "clothstream-server: %s\n", error.what());
     return 1;

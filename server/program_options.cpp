@@ -1,19 +1,24 @@
 // SPDX-License-Identifier: MIT
-// Reads the command line.
+// Rows of the server's table of options.
 #include "server/program_options.h"
 
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
-#include <map>
 
-#include <CLI/CLI.hpp>
-#include <fmt/format.h>
+#include <unistd.h>
 
+#include "server/option_table.h"
 #include "server/stream/scene_server.h"
 
 namespace clothstream {
 namespace {
+
+constexpr NumberRange kPort{.min = 0, .max = 65535, .type = "PORT", .noun = "a port"};
+constexpr NumberRange kRate{.min = 1, .max = 1000};
+constexpr NumberRange kSubsteps{.min = 1, .max = 256};
+constexpr NumberRange kTicks{.min = 1, .max = 1e9};
+constexpr NumberRange kThreads{.min = 0, .max = 64};
 
 std::filesystem::path defaultCacheDirectory() {
   if (const char* cache = std::getenv("XDG_CACHE_HOME"); cache != nullptr && *cache != '\0')
@@ -23,237 +28,255 @@ std::filesystem::path defaultCacheDirectory() {
   return {};
 }
 
-constexpr const char* kDevice = "Device";
+// Values that need a conversion after parsing, and flags that name a command.
+struct Parsed {
+  ProgramOptions options;
+  std::vector<std::string> changeable;
+  std::string record, recordings, config;
+  bool listDevices = false, listMaterials = false, printConfig = false, printMarkdown = false;
+};
 
-void addDeviceOptions(CLI::App& app, ProgramOptions& options) {
-  app.add_option("--device", options.device, "Index or part of the name of a Vulkan device; else the best")
-      ->group(kDevice);
-  app.add_option("--software-threads", options.softwareThreads,
-                 "Threads of a software device beside the one that waits; else what suits --scene")
-      ->check(CLI::Range(0, 64))
-      ->group(kDevice);
-  app.add_option("--cache-dir", options.cacheDirectory, "Where compiled kernels are kept; '' for nowhere")
-      ->type_name("DIR")
-      ->capture_default_str()
-      ->group(kDevice);
+void addSceneOptions(OptionTable& table, Parsed& parsed) {
+  ProgramOptions& options = parsed.options;
+  table.group("Scenes");
+  table.text("--scene", options.scene, "NAME", "Default scene, for clients that name none");
+  table.list("--scene-file", options.sceneFiles, "FILE",
+             "Additional scene as a JSON file; may be repeated. Replaces a built-in scene of the same name");
+  table.number("--rate", options.rate, kRate, "Ticks per second of --scene, instead of the scene's own rate");
+  table.number("--substeps", options.substeps, kSubsteps, "Integration steps per tick of --scene");
+  table.number("--max-error", options.maxError, {.type = "METRES"},
+               "Largest error of a streamed coordinate of --scene, in metres");
+  table.choice("--normals", options.normals,
+               std::map<std::string, model::Normals>{{"none", model::Normals::none},
+                                                     {"octahedral", model::Normals::octahedral}},
+               "Normals of --scene: none (clients compute them) or octahedral");
+  table.choice("--coding", options.coding,
+               std::map<std::string, model::Coding>{{"entropy", model::Coding::entropy},
+                                                    {"packed", model::Coding::packed}},
+               "Coding of the residuals of --scene: entropy (fewest bits) or packed (written by the device)");
+  table.number("--temporal-layers", options.temporalLayers, {.min = 1, .max = 3},
+               "Temporal layers of --scene. Clients with slow links skip layers above the first");
+  table.number("--qualities", options.qualities, {.min = 1, .max = 4},
+               "Quality levels of --scene. Clients with slow links receive coarser ones");
+  table.flag(
+      "--always-run", options.alwaysRun,
+      "Keep simulating without clients: --scene from the start, other scenes after their first client");
+  table.number("--reports", options.reportRate, {.min = 0, .max = 1000},
+               "Simulation reports per second (strain, energy, ...). 0 sends none");
+  CLI::Option* record = table.text("--record", parsed.record, "DIR",
+                                   "Record every running scene, each to its own file in this directory");
+  table.exclude(record, table.text("--recordings", parsed.recordings, "DIR",
+                                   "Record scenes when a client asks for it, to files in this directory"));
+  table.number("--record-limit", options.recordLimitMb, {.min = 0, .max = 1e9, .type = "MEGABYTES"},
+               "Start a new file when a recording reaches this many megabytes. 0 means no limit");
+  table.number("--max-created-scenes", options.maxCreatedScenes, {.min = 0, .max = 1000},
+               "Scenes that clients may create in addition. 0 allows none");
+  table.number("--encoder-threads", options.encoderThreads, kThreads,
+               "CPU threads that predict large frames where the device does not. 0 means a quarter of the "
+               "processors, at most 8");
+  table.action("--list-materials", parsed.listMaterials, "List the materials of cloths, and exit");
 }
 
-void addStepOptions(CLI::App& app, ProgramOptions& options, step::StepOptions& stepOptions) {
-  app.footer(
-      "The file holds frames of little-endian float32, six a node: position and velocity. FILE.json says how "
-      "many of "
-      "what,\n"
-      "and how the simulation did. In Python: numpy.fromfile(FILE, '<f4').reshape(json.load(open(FILE + "
-      "'.json'))['shape'])\n"
-      "Ends with 0 if all ticks were run, 1 for an error or a state that left the range of numbers, 130 if "
-      "interrupted.");
-  app.add_option("--scene", options.scene, "Name of a scene, or a JSON file")->required();
-  app.add_option("--ticks", stepOptions.ticks, "How many")
+void addParticipantOptions(OptionTable& table, Parsed& parsed) {
+  ProgramOptions& options = parsed.options;
+  table.group("Participants");
+  table.number("--hold", options.hold, {.min = 0, .max = 3600, .type = "SECONDS"},
+               "Reconnect grace: seconds for which a disconnected participant keeps its place. 0 means none");
+  table.number("--max-participants", options.maxParticipants, {.min = 1, .max = stream::kMostParticipants},
+               "Participants per scene. When the scene is full, the participant that has been disconnected "
+               "longest is evicted");
+  CLI::Option* changeable = table.list(
+      "--participants-change", parsed.changeable, "LIST",
+      "Parameters that participants may change in a scene that another participant owns: a comma-separated "
+      "list of environment, cloths and colliders, or none",
+      checkChoice({"environment", "cloths", "colliders", "none"}));
+  changeable->delimiter(',')
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll)
+      ->default_str("environment,cloths,colliders");
+  table.showDefault(changeable, "environment,cloths,colliders");
+  table.flag("--owners-alone", options.ownersAlone,
+             "Only its owners may pause, reset and delete a scene that has an owner");
+}
+
+void addNetworkOptions(OptionTable& table, ProgramOptions& options) {
+  table.group("Network");
+  table.text("--host", options.host, "ADDRESS", "Address to listen on; 0.0.0.0 means all addresses");
+  table.number("--port", options.port, kPort, "Port of the page and the WebSocket. 0 picks a free port");
+  table.number("--grpc-port", options.grpcPort, kPort, "Port of gRPC. 0 picks a free port");
+  table.text("--page", options.page, "DIR", "Directory of the page, instead of the one next to the program");
+  table.list("--allow-origin", options.allowedOrigins, "ORIGIN",
+             "Origin of another page that may connect, such as https://example.org; may be repeated");
+}
+
+void addDeviceOptions(OptionTable& table, ProgramOptions& options) {
+  table.text("--device", options.device, "DEVICE",
+             "Index of a Vulkan device, or part of its name. By default the best device is used");
+  table.number("--software-threads", options.softwareThreads, kThreads,
+               "Threads of a software device in addition to the waiting one. By default chosen for --scene");
+  table.showDefault(table.text("--cache-dir", options.cacheDirectory, "DIR",
+                               "Directory for compiled kernels; '' disables the cache"),
+                    "$XDG_CACHE_HOME/clothstream or $HOME/.cache/clothstream");
+}
+
+void addProgramOptions(OptionTable& table, Parsed& parsed) {
+  table.group("Program");
+  table.text("--log-level", parsed.options.logLevel, "LEVEL", "trace, debug, info, warning, error or off",
+             checkChoice({"trace", "debug", "info", "warning", "error", "off"}, {"warn", "err", "critical"}));
+  table.number("--seconds", parsed.options.stopAfter, {.min = 0, .type = "SECONDS", .aboveMin = true},
+               "Stop after this time");
+  table.text("--config", parsed.config, "FILE", "Read options from this TOML file");
+  table.action("--print-config", parsed.printConfig, "Print the effective options as a TOML file, and exit");
+  table.action("--help-markdown", parsed.printMarkdown, "Print this help as a page of Markdown, and exit");
+}
+
+CLI::App& addPrintSceneCommand(OptionTable& table, ProgramOptions& options) {
+  CLI::App& command = table.command(
+      "print-scene", "Print a scene as JSON, with all defaults and the geometry of its meshes filled in");
+  table.word("SCENE", options.printScene, "Name of a scene, or a JSON file");
+  return command;
+}
+
+CLI::App& addStepCommand(OptionTable& table, ProgramOptions& options) {
+  CLI::App& command =
+      table.command("step", "Run a scene without clock or network, and write its states to a file");
+  table.text("--scene", options.scene, "NAME", "Name of a scene, or a JSON file")
       ->required()
-      ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1'000'000'000}));
-  app.add_option("--out", stepOptions.out, "The file that is written; FILE.json stands beside it")
-      ->type_name("FILE")
-      ->required();
-  app.add_option("--every", stepOptions.every, "Write a state every so many ticks; the start is the first")
-      ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1'000'000'000}))
-      ->capture_default_str();
-  app.add_option("--rate", options.rate, "Ticks a second, instead of the scene's own")
-      ->check(CLI::Range(1, 1000));
-  app.add_option("--substeps", options.substeps, "Integration steps a tick, instead of the scene's own")
-      ->check(CLI::Range(1, 256));
-  addDeviceOptions(app, options);
+      ->default_str("");
+  table.showDefault(command.get_option("--scene"), "");
+  table.number("--ticks", options.step.ticks, kTicks, "Number of ticks")->required()->default_str("");
+  table.showDefault(command.get_option("--ticks"), "");
+  table.text("--out", options.step.out, "FILE", "Output file; FILE.json describes it")->required();
+  table.number("--every", options.step.every, kTicks, "Write one state per this many ticks, from the start");
+  table.number("--rate", options.rate, kRate, "Ticks per second, instead of the scene's own rate");
+  table.number("--substeps", options.substeps, kSubsteps,
+               "Integration steps per tick, instead of the scene's own number");
+  addDeviceOptions(table, options);
+  command.footer(
+      "The file holds frames of little-endian float32, six per node: position and velocity. FILE.json has "
+      "the\n"
+      "shape of the array, and reports of the simulation. In Python:\n"
+      "  numpy.fromfile(FILE, '<f4').reshape(json.load(open(FILE + '.json'))['shape'])\n"
+      "Exit code: 0 if all ticks ran, 1 for an error or a state with infinite or undefined numbers, 130 if\n"
+      "interrupted.");
+  return command;
+}
+
+CLI::App& addResimulateCommand(OptionTable& table, ProgramOptions& options) {
+  CLI::App& command =
+      table.command("resimulate", "Simulate a recording again, and compare each state with the recorded one");
+  table.word("FILE", options.recording, "Recording that --record wrote");
+  addDeviceOptions(table, options);
+  command.footer(
+      "Exit code: 0 if every state is bitwise equal, 1 for an error, a difference or a missing part, 130 if\n"
+      "interrupted.");
+  return command;
+}
+
+CLI::App& addPlayCommand(OptionTable& table, ProgramOptions& options) {
+  CLI::App& command =
+      table.command("play", "Serve a recording as a scene that clients join, pause, seek, speed up and loop");
+  table.word("FILE", options.recording, "Recording that --record or `clothstream record` wrote");
+  table.number("--from", options.playback.from, {.min = 0, .type = "SECONDS"},
+               "Start this many seconds after the beginning");
+  table.number("--speed", options.playback.speed, {.min = recording::kMinSpeed, .max = recording::kMaxSpeed},
+               "Recorded seconds per second");
+  table.flag("--loop", options.playback.loop, "Continue from the beginning at the end, instead of pausing");
+  command.footer(
+      "Options of clothstream-server for participants, network and log apply too. No device is needed.");
+  command.fallthrough();
+  return command;
+}
+
+std::string configFile(const Parsed& parsed) {
+  const char* fromEnvironment = std::getenv("CLOTHSTREAM_CONFIG");
+  return parsed.config.empty() && fromEnvironment != nullptr ? fromEnvironment : parsed.config;
+}
+
+stream::Permissions permissions(const std::vector<std::string>& changeable) {
+  const auto has = [&](const char* what) { return std::ranges::find(changeable, what) != changeable.end(); };
+  if (has("none") && changeable.size() > 1)
+    throw OptionError("--participants-change: 'none' excludes the other values; use it alone");
+  return {has("environment"), has("cloths"), has("colliders")};
+}
+
+void printMarkdown(const OptionTable& table) {
+  fmt::print(
+      "# Options of clothstream-server\n\n"
+      "Generated by `clothstream-server --help-markdown`; a test compares this page with the program.\n\n"
+      "An option has one name and three sources. The stronger source wins:\n\n"
+      "1. the command line: `--grpc-port 50052`;\n"
+      "2. the environment: `CLOTHSTREAM_GRPC_PORT=50052`. Lists are separated by commas; an empty variable "
+      "is ignored;\n"
+      "3. a TOML file named by `--config` or `CLOTHSTREAM_CONFIG`: `grpc-port = 50052`. Lists are arrays, "
+      "flags are\n"
+      "   `true` or `false`.\n\n"
+      "`clothstream-server --print-config` prints the effective options as such a file. An unknown key of "
+      "the file is\n"
+      "an error. An unknown variable that starts with `CLOTHSTREAM_` is a warning. Options of commands (last "
+      "sections)\n"
+      "come from the command line only. In Kubernetes, set `enableServiceLinks: false`: a service named "
+      "`clothstream`\n"
+      "would otherwise define `CLOTHSTREAM_PORT`.\n"
+      "{}",
+      table.toMarkdown());
 }
 
 }  // namespace
 
 std::variant<ProgramOptions, int> parseOptions(int argc, const char* const* argv) {
-  ProgramOptions options;
+  Parsed parsed;
+  ProgramOptions& options = parsed.options;
   options.cacheDirectory = defaultCacheDirectory();
-  double seconds = 0, hold = 60;
-  std::vector<std::string> changeable;
-  const std::map<std::string, model::Normals> normals{{"none", model::Normals::none},
-                                                      {"octahedral", model::Normals::octahedral}};
-  const std::map<std::string, model::Coding> codings{{"entropy", model::Coding::entropy},
-                                                     {"packed", model::Coding::packed}};
 
   CLI::App app{"Simulates cloth with Vulkan and streams it to browsers and gRPC clients.",
                "clothstream-server"};
   app.set_version_flag("--version", "clothstream-server " CLOTHSTREAM_VERSION);
   app.get_formatter()->column_width(34);
+  app.footer(
+      "Options may also come from a TOML file (--config FILE, grpc-port = 50052) or from the environment\n"
+      "(CLOTHSTREAM_GRPC_PORT=50052). The command line wins over the environment, the environment over the "
+      "file.");
   app.option_defaults()->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);  // scripts append to defaults
-
-  const char* scenes = "Scenes";
-  app.add_option("--scene", options.scene, "Scene for whoever names none")
-      ->capture_default_str()
-      ->group(scenes);
-  app.add_option("--scene-file", options.sceneFiles, "Another scene, as a JSON file; may be given again")
-      ->type_name("FILE")
-      ->group(scenes);
-  app.add_option("--rate", options.rate, "Ticks a second of --scene, instead of its own")
-      ->check(CLI::Range(1, 1000))
-      ->group(scenes);
-  app.add_option("--substeps", options.substeps, "Integration steps a tick of --scene")
-      ->check(CLI::Range(1, 256))
-      ->group(scenes);
-  app.add_option("--max-error", options.maxError, "Largest error of a streamed coordinate of --scene, metres")
-      ->group(scenes);
-  app.add_option("--normals", options.normals,
-                 "Normals of --scene: none (clients compute them) or octahedral")
-      ->transform(CLI::CheckedTransformer(normals, CLI::ignore_case))
-      ->group(scenes);
-  app.add_option("--coding", options.coding,
-                 "How residuals of --scene are written: entropy (fewest bits) or packed (by the device)")
-      ->transform(CLI::CheckedTransformer(codings, CLI::ignore_case))
-      ->group(scenes);
-  app.add_option("--temporal-layers", options.temporalLayers,
-                 "Temporal layers of --scene: those above the first are left out for clients with slow links")
-      ->check(CLI::Range(1, 3))
-      ->group(scenes);
-  app.add_option("--qualities", options.qualities,
-                 "Qualities in which --scene can come: the coarser ones are for clients with slow links")
-      ->check(CLI::Range(1, 4))
-      ->group(scenes);
-  app.add_flag("--always-run", options.alwaysRun,
-               "Go on simulating while nobody is there: --scene from the start, others once somebody came")
-      ->group(scenes);
-  app.add_option("--reports", options.reportRate,
-                 "Frames a second that tell how the simulation does: strain, energy, ...; 0: none")
-      ->check(CLI::Range(0.0, 1000.0))
-      ->capture_default_str()
-      ->group(scenes);
-
-  CLI::Option* record =
-      app.add_option("--record", options.recordDirectory,
-                     "Record every scene while it runs, each to a file of its own in this directory")
-          ->type_name("DIR")
-          ->group(scenes);
-  const CLI::Option* recordings =
-      app.add_option("--recordings", options.recordDirectory,
-                     "Record the scenes that clients ask to be recorded, to files in this directory")
-          ->type_name("DIR")
-          ->excludes(record)
-          ->group(scenes);
-  app.add_option("--record-limit", options.recordLimitMb,
-                 "Go on in another file when one has so many megabytes; 0: never")
-      ->check(CLI::Range(0.0, 1e9))
-      ->capture_default_str()
-      ->group(scenes);
-  app.add_option("--max-created-scenes", options.maxCreatedScenes,
-                 "Scenes that clients may create beside these; 0: none")
-      ->check(CLI::Range(0, 1000))
-      ->capture_default_str()
-      ->group(scenes);
-  app.add_option("--encoder-threads", options.encoderThreads,
-                 "Threads that predict large frames where the device does not; 0: a quarter of the "
-                 "processors, 8 at most")
-      ->check(CLI::Range(0, 64))
-      ->capture_default_str()
-      ->group(scenes);
-  const char* people = "People";
-  app.add_option("--hold", hold,
-                 "Seconds for which the place of somebody whose connection is lost is kept; 0: not at all")
-      ->check(CLI::Range(0.0, 3600.0))
-      ->capture_default_str()
-      ->group(people);
-  app.add_option("--max-participants", options.maxParticipants,
-                 "People in a scene; who is cut off makes room for somebody who comes where it is full")
-      ->check(CLI::Range(1u, stream::kMostParticipants))
-      ->capture_default_str()
-      ->group(people);
-  app.add_option("--participants-change", changeable,
-                 "Parameters that participants change of a scene that somebody else owns: a list of "
-                 "environment, cloths and colliders, or none")
-      ->delimiter(',')
-      ->type_name("LIST")
-      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll)
-      ->check(CLI::IsMember({"environment", "cloths", "colliders", "none"}))
-      ->default_str("environment,cloths,colliders")
-      ->group(people);
-  app.add_flag(
-         "--owners-alone", options.ownersAlone,
-         "A scene that somebody owns is paused, reset and deleted by its owners alone, not from outside")
-      ->group(people);
-  app.add_flag("--list-materials", options.listMaterials, "Show what cloths may be made of, and exit")
-      ->group(scenes);
-
-  const char* network = "Network";
-  app.add_option("--host", options.host, "Address to listen on; 0.0.0.0 for every one this machine has")
-      ->capture_default_str()
-      ->group(network);
-  app.add_option("--port", options.port, "Port of the page and the WebSocket; 0 for one that is free")
-      ->capture_default_str()
-      ->group(network);
-  app.add_option("--grpc-port", options.grpcPort, "Port of gRPC; 0 for one that is free")
-      ->capture_default_str()
-      ->group(network);
-  app.add_option("--page", options.page, "Directory of the page, instead of the one beside the program")
-      ->type_name("DIR")
-      ->group(network);
-  app.add_option("--allow-origin", options.allowedOrigins,
-                 "A page from elsewhere that may connect, such as https://example.org; may be given again")
-      ->type_name("ORIGIN")
-      ->group(network);
-
-  addDeviceOptions(app, options);
-  app.add_flag("--list-devices", options.listDevices, "Show the Vulkan devices there are, and exit")
-      ->group(kDevice);
-
-  CLI::App& printCommand = *app.add_subcommand(
-      "print-scene", "Print a scene as JSON with every default, and its meshes' geometry, filled in");
-  printCommand.add_option("SCENE", options.printScene, "Name of a scene, or a JSON file")->required();
-
-  step::StepOptions stepOptions;
-  CLI::App& stepCommand =
-      *app.add_subcommand("step", "Run a scene without clock or network, and write its states to a file");
-  addStepOptions(stepCommand, options, stepOptions);
-
-  CLI::App& resimulateCommand = *app.add_subcommand(
-      "resimulate", "Simulate a recording's ticks once more, and compare each state with what it was");
-  resimulateCommand.add_option("FILE", options.resimulate, "What --record wrote")->required();
-  resimulateCommand.footer(
-      "Ends with 0 if every state is the same to the bit, 1 for an error, a difference or a part that is "
-      "missing, "
-      "130 if interrupted.");
-  addDeviceOptions(resimulateCommand, options);
-
-  CLI::App& playCommand = *app.add_subcommand(
-      "play", "Serve a recording as a scene: clients join it, and pause, seek, speed, loop it");
-  playCommand.add_option("FILE", options.play, "What --record or `clothstream record` wrote")->required();
-  playCommand.add_option("--from", options.playback.from, "Begin so many seconds after its start")
-      ->check(CLI::NonNegativeNumber);
-  playCommand.add_option("--speed", options.playback.speed, "Seconds of it that pass in one")
-      ->check(CLI::Range(recording::kMinSpeed, recording::kMaxSpeed))
-      ->capture_default_str();
-  playCommand.add_flag("--loop", options.playback.loop,
-                       "Go on from its start at its end, instead of pausing there");
-  playCommand.footer(
-      "Options of people, the network and the log are those of clothstream-server. No device is needed.");
-  playCommand.fallthrough();
-
-  app.add_option("--log-level", options.logLevel, "trace, debug, info, warning, error or off")
-      ->capture_default_str();
-  const CLI::Option* stopAfter =
-      app.add_option("--seconds", seconds, "Stop after so long")->check(CLI::PositiveNumber);
+  OptionTable table(app);
+  addSceneOptions(table, parsed);
+  addParticipantOptions(table, parsed);
+  addNetworkOptions(table, options);
+  table.group("Device");
+  addDeviceOptions(table, options);
+  table.action("--list-devices", parsed.listDevices, "List the Vulkan devices, and exit");
+  addProgramOptions(table, parsed);
+  const CLI::App& printScene = addPrintSceneCommand(table, options);
+  const CLI::App& step = addStepCommand(table, options);
+  const CLI::App& resimulate = addResimulateCommand(table, options);
+  const CLI::App& play = addPlayCommand(table, options);
 
   try {
     app.parse(argc, argv);
+    options.warnings = table.applySources(environ, configFile(parsed));
+    if (!parsed.changeable.empty()) options.participantsMay = permissions(parsed.changeable);
+  } catch (const CLI::ExtrasError&) {
+    fmt::print(stderr, "{}\nRun with --help for more information.\n",
+               table.unexpected(app.remaining(true).front()));
+    return 1;
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : 1;
+  } catch (const OptionError& error) {
+    fmt::print(stderr, "{}\n", error.what());
+    return 1;
   }
-  options.recordsOnRequest = recordings->count() > 0;
-  options.hold = std::chrono::duration<double>(hold);
-  if (!changeable.empty()) {
-    const auto given = [&](const char* what) {
-      return std::ranges::find(changeable, what) != changeable.end();
-    };
-    if (given("none") && changeable.size() > 1) {
-      fmt::print(stderr, "--participants-change: none stands alone\n");
-      return 1;
-    }
-    options.participantsMay = {given("environment"), given("cloths"), given("colliders")};
-  }
-  if (stepCommand.parsed()) options.step = stepOptions;
-  if (stopAfter->count() > 0) options.stopAfter = std::chrono::duration<double>(seconds);
+  if (parsed.printConfig) return fmt::print("{}", table.toToml()), 0;
+  if (parsed.printMarkdown) return printMarkdown(table), 0;
+
+  options.logLevel = CLI::detail::to_lower(options.logLevel);
+  options.recordsOnRequest = !parsed.recordings.empty();
+  options.recordDirectory = options.recordsOnRequest ? parsed.recordings : parsed.record;
+  options.command = step.parsed()          ? Command::step
+                    : play.parsed()        ? Command::play
+                    : resimulate.parsed()  ? Command::resimulate
+                    : printScene.parsed()  ? Command::printScene
+                    : parsed.listDevices   ? Command::listDevices
+                    : parsed.listMaterials ? Command::listMaterials
+                                           : Command::serve;
   return options;
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// `clothstream decode`: a recorded stream becomes a motion again.
+// `clothstream decode`: decodes a stream file to a motion file.
 #pragma once
 
 #include <cstdint>
@@ -11,12 +11,12 @@ namespace clothstream::cli {
 
 struct DecodeOptions {
   std::string recording, out;
-  // What the recording may ask for; a vertex takes some 400 bytes of memory.
+  // Larger recordings are refused. A vertex needs about 400 bytes of memory.
   std::uint32_t maxVertices = 1u << 20;
 };
 
-// Positions as every client of the stream has them, and the normals that it computes from them. SIGINT and
-// SIGTERM must be blocked: then there is no file.
+// Writes positions as a client decodes them and normals computed from them. SIGINT and SIGTERM must be
+// blocked in every thread; they cancel the command and leave no file.
 ExitCode decode(const DecodeOptions& options);
 
 }  // namespace clothstream::cli

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Frame by frame: read, encode, decode, compare, write.
+// For each frame: read, encode, decode, compare, write.
 #include "clients/cli/encode.h"
 
 #include <algorithm>
@@ -11,7 +11,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "clients/cli/complaint.h"
+#include "clients/cli/error.h"
 #include "clients/cli/progress.h"
 #include "clients/cli/signals.h"
 #include "clients/files/motion_file.h"
@@ -24,9 +24,10 @@ namespace clothstream::cli {
 namespace {
 
 template <typename T>
-using Expected = tl::expected<T, Complaint>;
+using Expected = tl::expected<T, Error>;
 
-// Coordinates as far from the origin as this have room in every codec, and floats that are fine enough.
+// Largest coordinate that every codec can represent and for which floats are precise enough: in m, and in max
+// errors. The larger of the two applies.
 constexpr float kReach = 32, kReachInErrors = 65536;
 
 constexpr std::uint32_t kEpoch = 1;
@@ -41,21 +42,21 @@ Expected<float> maxErrorFor(const EncodeOptions& options, const files::MotionSha
                             std::span<const float> first) {
   const double edge = files::meanEdge(shape, first);
   if (!options.maxError && !(edge > 0))
-    return complaint(
+    return makeError(
         kUnreadable,
-        "{}: the first frame's edges have no length that a quality could be a part of; give --max-error",
+        "{}: the edges of the first frame have no length, so a quality has no meaning; give --max-error",
         options.motion);
   const auto maxError = static_cast<float>(options.maxError.value_or(relativeError(options.quality) * edge));
   if (!(maxError >= codec::kSmallestMaxError && maxError <= codec::kLargestMaxError))
-    return complaint(kUsage, "a max error of {} m is asked for; {} to {} m is allowed", maxError,
-                     codec::kSmallestMaxError, codec::kLargestMaxError);
+    return makeError(kUsage, "the max error is {} m; use {} to {} m", maxError, codec::kSmallestMaxError,
+                     codec::kLargestMaxError);
   return maxError;
 }
 
-// On which side of the cloth the motion's own normals of its first frame are.
+// Side of the cloth to which the normals of the first frame point.
 Expected<files::Side> sideOf(files::MotionReader& motion, const codec::StreamLayout& layout,
                              std::span<const float> positions) {
-  const auto given = orComplaint(kUnreadable, motion.normals());
+  const auto given = orError(kUnreadable, motion.normals());
   if (!given) return tl::unexpected(given.error());
   std::vector<float> computed(positions.size());
   codec::computeVertexNormals(layout, positions.data(), computed.data());
@@ -63,7 +64,7 @@ Expected<files::Side> sideOf(files::MotionReader& motion, const codec::StreamLay
                                                                                      : files::Side::front;
 }
 
-// What came of it.
+// Results of encoding.
 struct EncodeFigures {
   files::MotionShape shape;
   float maxError = 0;
@@ -80,10 +81,10 @@ struct EncodeFigures {
     const double seconds = 1.0 * shape.frames / files::kMotionRate;
     return fmt::format(
         "{}: {}x{} vertices, {} frames, {:.1f} s at {} Hz, max error {:.4g} mm\n"
-        "{:.3f} bits a vertex a frame, {:.3f} with all that the file has; {} bytes, {:.0f} kbit/s; {} key {} "
-        "of {} "
-        "bytes on average\n"
-        "no vertex farther than {:.4g} mm from where it should be, {:.4g} are promised\n"
+        "{:.3f} bits a vertex a frame, {:.3f} including the rest of the file; {} bytes, {:.0f} kbit/s; {} "
+        "key {} "
+        "of {} bytes on average\n"
+        "largest error of a vertex {:.4g} mm; promised {:.4g} mm\n"
         "{:.3f} ms to encode a frame, {:.3f} ms to decode it",
         out, shape.columns, shape.rows, shape.frames, seconds, files::kMotionRate, 1e3 * double{maxError},
         bitsPerVertex(packetBytes), bitsPerVertex(fileBytes), fileBytes,
@@ -124,9 +125,9 @@ Expected<void> encodeFrame(codec::Encoder& encoder, codec::Decoder& decoder, std
   const float reach = std::max(kReach, kReachInErrors * figures.maxError);
   const auto far = std::ranges::find_if(positions, [=](float x) { return std::abs(x) > reach; });
   if (far != positions.end())
-    return complaint(
+    return makeError(
         kUnreadable,
-        "{}: in frame {}, vertex {} has a coordinate of {} m; with this max error {} m are allowed",
+        "{}: in frame {}, vertex {} has a coordinate of {} m; this max error allows at most {} m",
         options.motion, frame, (far - positions.begin()) / 3, *far, reach);
   const bool key = frame == 0 || (options.keyEvery > 0 && frame % options.keyEvery == 0);
   std::size_t bytes = 0;
@@ -137,21 +138,21 @@ Expected<void> encodeFrame(codec::Encoder& encoder, codec::Decoder& decoder, std
   codec::DecodeResult result{};
   figures.decodeMs += millisecondsOf([&] { result = decoder.decode(packet.first(bytes)); });
   if (result != codec::DecodeResult::ok || decoder.reconstructionHash() != encoder.reconstructionHash())
-    return complaint(kHashMismatch, "frame {} is not decoded to what was encoded", frame);
+    return makeError(kHashMismatch, "frame {} decodes to something else than was encoded", frame);
   figures.largestError = std::max(figures.largestError, largestDistance(positions, decoder.positions()));
   if (figures.largestError > figures.promise())
-    return complaint(kHashMismatch, "in frame {} a vertex is {} m off; {} m are promised", frame,
+    return makeError(kHashMismatch, "in frame {} a vertex has an error of {} m; promised {} m", frame,
                      figures.largestError, figures.promise());
   figures.packetBytes += bytes;
   figures.keyFrames += key ? 1 : 0;
   figures.keyBytes += key ? bytes : 0;
-  return orComplaint(kNotWritten, out.append(packet.first(bytes), encoder.reconstructionHash()));
+  return orError(kNotWritten, out.append(packet.first(bytes), encoder.reconstructionHash()));
 }
 
 Expected<EncodeFigures> encodeFile(const EncodeOptions& options) {
-  auto motion = orComplaint(kUnreadable, files::MotionReader::open(options.motion));
+  auto motion = orError(kUnreadable, files::MotionReader::open(options.motion));
   if (!motion) return tl::unexpected(motion.error());
-  auto positions = orComplaint(kUnreadable, motion->next());
+  auto positions = orError(kUnreadable, motion->next());
   if (!positions) return tl::unexpected(positions.error());
   const auto maxError = maxErrorFor(options, motion->shape(), *positions);
   if (!maxError) return tl::unexpected(maxError.error());
@@ -165,14 +166,13 @@ Expected<EncodeFigures> encodeFile(const EncodeOptions& options) {
                                    .cloths = {figures.shape.cloth()}};
   const auto side = sideOf(*motion, layout, *positions);
   if (!side) return tl::unexpected(side.error());
-  auto out = orComplaint(
-      kNotWritten,
-      files::RecordingWriter::create(options.out, {layout, files::kMotionRate, figures.shape.frames, *side}));
+  auto out = orError(kNotWritten, files::RecordingWriter::create(options.out, {layout, files::kMotionRate,
+                                                                               figures.shape.frames, *side}));
   if (!out) return tl::unexpected(out.error());
   const auto encoder = codec::Encoder::make(layout);
   const auto decoder = codec::Decoder::make(layout);
   if (!encoder || !decoder)
-    return complaint(kLost, "there is no memory for {} vertices", figures.shape.vertexCount());
+    return makeError(kLost, "not enough memory for {} vertices", figures.shape.vertexCount());
   std::vector<std::byte> packet(encoder->packetBound());
   Progress progress("encode", figures.shape.frames);
   for (std::uint32_t frame = 0;;) {
@@ -181,11 +181,11 @@ Expected<EncodeFigures> encodeFile(const EncodeOptions& options) {
     progress.show(++frame);
     if (frame == figures.shape.frames) break;
     if (interrupted())
-      return complaint(kNotWritten, "interrupted in frame {}; {} is not written", frame, options.out);
-    positions = orComplaint(kUnreadable, motion->next());
+      return makeError(kNotWritten, "interrupted in frame {}; {} was not written", frame, options.out);
+    positions = orError(kUnreadable, motion->next());
     if (!positions) return tl::unexpected(positions.error());
   }
-  if (auto done = orComplaint(kNotWritten, out->finish()); !done) return tl::unexpected(done.error());
+  if (auto done = orError(kNotWritten, out->finish()); !done) return tl::unexpected(done.error());
   figures.fileBytes = out->bytes();
   return figures;
 }
@@ -194,7 +194,7 @@ Expected<EncodeFigures> encodeFile(const EncodeOptions& options) {
 
 ExitCode encode(const EncodeOptions& options) {
   const auto figures = encodeFile(options);
-  if (!figures) return say(figures.error());
+  if (!figures) return printError(figures.error());
   fmt::print("{}\n", options.json ? figures->json() : figures->text(options.out));
   return kOk;
 }

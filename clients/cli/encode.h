@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// `clothstream encode`: a motion becomes a recorded stream.
+// `clothstream encode`: encodes a motion file as a stream file.
 #pragma once
 
 #include <cstdint>
@@ -12,7 +12,7 @@ namespace clothstream::cli {
 
 enum class Quality : std::uint8_t { fine, standard, coarse };
 
-// The max error, as a part of the mean edge of the cloth in its first frame.
+// Max error as a fraction of the mean edge length of the first frame.
 constexpr double relativeError(Quality quality) {
   switch (quality) {
     case Quality::fine:
@@ -28,14 +28,14 @@ constexpr double relativeError(Quality quality) {
 struct EncodeOptions {
   std::string motion, out;
   Quality quality = Quality::standard;
-  std::optional<double> maxError;  // m along each of three axes; instead of a quality
-  std::uint32_t layers = 1;        // temporal
-  std::uint32_t keyEvery = 0;      // frames; 0: the first alone
+  std::optional<double> maxError;  // m along each axis; replaces the quality
+  std::uint32_t layers = 1;        // temporal layers
+  std::uint32_t keyEvery = 0;      // frames; 0: only the first
   bool json = false;
 };
 
-// Every frame is decoded again and compared before the file is put into its place. SIGINT and SIGTERM must be
-// blocked: then there is no file.
+// Decodes and checks every frame before the file appears. SIGINT and SIGTERM must be blocked in every thread;
+// they cancel the command and leave no file.
 ExitCode encode(const EncodeOptions& options);
 
 }  // namespace clothstream::cli

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What the program ends with; --help says the same.
+// Exit codes of the program and their text in --help.
 #pragma once
 
 #include "clients/grpc/failure.h"
@@ -18,16 +18,13 @@ enum ExitCode : int {
 };
 
 inline constexpr const char* kExitCodes =
-    "Ends with 0 if all went well, 1 if --hash found a frame that is not the server's or encode one that is "
-    "not as "
-    "promised,\n"
-    "2 for wrong arguments, 3 if no server answers, 4 if the server refuses (an unknown scene, a value that "
-    "is not "
-    "allowed),\n"
-    "5 if the stream is lost, 6 if a file cannot be written or writing it was interrupted, 7 if a file "
-    "cannot be read "
+    "Exit codes: 0 success; 1 --hash found a frame that differs from the server's, or encode one that breaks "
+    "its\n"
+    "promise; 2 wrong arguments; 3 no server answers; 4 the server refuses (unknown scene, value not "
+    "allowed);\n"
+    "5 the stream was lost; 6 a file cannot be written, or writing was interrupted; 7 a file cannot be read "
     "or is\n"
-    "not what it should be.";
+    "damaged.";
 
 constexpr ExitCode exitCodeOf(Failure::Kind kind) {
   switch (kind) {

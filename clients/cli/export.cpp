@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Frame by frame, at no more than the rate.
+// Exports frames at no more than the requested rate.
 #include "clients/cli/export.h"
 
 #include <algorithm>
@@ -8,7 +8,7 @@
 
 #include <fmt/format.h>
 
-#include "clients/cli/complaint.h"
+#include "clients/cli/error.h"
 #include "clients/cli/gltf_animation.h"
 #include "clients/cli/obj_file.h"
 #include "clients/cli/played_recording.h"
@@ -19,75 +19,75 @@
 namespace clothstream::cli {
 namespace {
 
-using Done = tl::expected<void, Complaint>;
-// Seconds since the first frame.
+using Done = tl::expected<void, Error>;
+// Takes a frame and its time in seconds since the first frame.
 using TakeFrame = std::function<Done(const cs_client*, double)>;
 
-// Gives the frames that are wanted, and how many they were.
-tl::expected<std::uint32_t, Complaint> forEachFrame(const ExportOptions& options, const TakeFrame& take) {
-  auto reader = orComplaint(kUnreadable, recording::RecordingReader::open(options.recording));
+// Passes each requested frame to `take` and returns their number.
+tl::expected<std::uint32_t, Error> forEachFrame(const ExportOptions& options, const TakeFrame& take) {
+  auto reader = orError(kUnreadable, recording::RecordingReader::open(options.recording));
   if (!reader) return tl::unexpected(reader.error());
   auto played = PlayedRecording::open(std::move(*reader));
-  if (!played) return complaint(kUnreadable, "{}: {}", options.recording, played.error());
+  if (!played) return makeError(kUnreadable, "{}: {}", options.recording, played.error());
   const double length = static_cast<double>(played->reader().end() - played->reader().start()) * 1e-9;
   const double wanted = std::min(std::max(length - options.from, 0.0), options.seconds.value_or(length));
   Progress progress("export", 1 + static_cast<std::uint32_t>(std::min(wanted * options.rate, 1e9)));
   std::uint32_t frames = 0;
   double first = 0;
   for (;;) {
-    if (interrupted()) return complaint(kNotWritten, "interrupted; {} is not written", options.out);
+    if (interrupted()) return makeError(kNotWritten, "interrupted; {} was not written", options.out);
     const auto more = played->next();
-    if (!more) return complaint(kUnreadable, "{}: {}", options.recording, more.error());
+    if (!more) return makeError(kUnreadable, "{}: {}", options.recording, more.error());
     if (!*more) break;
     const double now = played->seconds();
     if (now < options.from) continue;
     if (options.seconds && now >= options.from + *options.seconds) break;
     if (frames == 0) first = now;
-    // A millisecond early is in time: frames are told by when they were written down.
+    // Tolerates 1 ms, since the time of a frame is when it was recorded.
     if (now - first + 0.001 < frames / options.rate) continue;
     if (auto taken = take(played->client(), now - first); !taken) return tl::unexpected(taken.error());
     progress.show(++frames);
   }
-  if (frames == 0) return complaint(kUnreadable, "{} has no frame there", options.recording);
+  if (frames == 0) return makeError(kUnreadable, "{} has no frame in the requested time", options.recording);
   return frames;
 }
 
-tl::expected<std::uint32_t, Complaint> writeGltf(const ExportOptions& options) {
+tl::expected<std::uint32_t, Error> writeGltf(const ExportOptions& options) {
   GltfAnimation animation;
   const auto frames = forEachFrame(options, [&](const cs_client* client, double seconds) -> Done {
     if (animation.frames() == kMaxGltfFrames)
-      return complaint(
+      return makeError(
           kUsage,
-          "a glTF of more than {} frames is not written: take a smaller --rate, or a part of the "
-          "recording with --from and --seconds",
+          "the glTF would have more than {} frames; use a lower --rate, or a part of the recording with "
+          "--from and --seconds",
           kMaxGltfFrames);
     animation.add(client, seconds);
     return {};
   });
   if (!frames) return frames;
   const bool text = std::filesystem::path(options.out).extension() == ".gltf";
-  const std::string gltf = text ? animation.toGltf() : animation.toGlb();
-  if (gltf.empty()) return complaint(kUsage, "{} would have more than 4 GiB: take fewer frames", options.out);
-  auto file = orComplaint(kNotWritten, recording::OutputFile::create(options.out));
+  const std::string gltf = animation.finish(!text);
+  if (gltf.empty()) return makeError(kUsage, "{} would exceed 4 GiB; export fewer frames", options.out);
+  auto file = orError(kNotWritten, recording::OutputFile::create(options.out));
   if (!file) return tl::unexpected(file.error());
-  if (auto written = orComplaint(kNotWritten, file->write(gltf)); !written) {
+  if (auto written = orError(kNotWritten, file->write(gltf)); !written) {
     std::filesystem::remove(options.out);
     return tl::unexpected(written.error());
   }
   return frames;
 }
 
-tl::expected<std::uint32_t, Complaint> writeObjs(const ExportOptions& options) {
+tl::expected<std::uint32_t, Error> writeObjs(const ExportOptions& options) {
   std::error_code problem;
   if (!std::filesystem::create_directory(options.out, problem))
-    return complaint(kNotWritten, "cannot make the directory {}: {}", options.out,
-                     problem ? problem.message() : "it is there already");
+    return makeError(kNotWritten, "cannot create the directory {}: {}", options.out,
+                     problem ? problem.message() : "it exists already");
   std::uint32_t next = 0;
   auto frames = forEachFrame(options, [&](const cs_client* client, double) -> Done {
     const auto path = std::filesystem::path(options.out) / fmt::format("frame_{:06}.obj", next++);
-    auto file = orComplaint(kNotWritten, files::NewFile::create(path.string()));
+    auto file = orError(kNotWritten, files::NewFile::create(path.string()));
     if (!file) return tl::unexpected(file.error());
-    return orComplaint(kNotWritten, writeObj(client, *file));
+    return orError(kNotWritten, writeObj(client, *file));
   });
   if (!frames) std::filesystem::remove_all(options.out, problem);
   return frames;
@@ -99,9 +99,9 @@ ExitCode exportFrames(const ExportOptions& options) {
   const std::filesystem::path extension = std::filesystem::path(options.out).extension();
   const bool gltf = extension == ".glb" || extension == ".gltf";
   if (std::filesystem::exists(options.out))
-    return say({kNotWritten, fmt::format("cannot write {}: it is there already", options.out)});
+    return printError(Error{kNotWritten, fmt::format("cannot write {}: it exists already", options.out)});
   const auto frames = gltf ? writeGltf(options) : writeObjs(options);
-  if (!frames) return say(frames.error());
+  if (!frames) return printError(frames.error());
   fmt::print("{}: {} frames\n", options.out, *frames);
   return kOk;
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// `clothstream export`: the frames of a recording for other programs.
+// `clothstream export`: writes the frames of a recording as glTF or OBJ files.
 #pragma once
 
 #include <cstdint>
@@ -12,16 +12,16 @@ namespace clothstream::cli {
 
 struct ExportOptions {
   std::string recording;
-  std::string out;   // FILE.glb, or else a directory for OBJ files; there must be none yet
-  double rate = 24;  // frames/s, at most
-  double from = 0;   // s of the recording
+  std::string out;   // FILE.glb, FILE.gltf or a directory for OBJ files; must not exist
+  double rate = 24;  // most frames a second
+  double from = 0;   // seconds of the recording to skip
   std::optional<double> seconds;
 };
 
-// glTF has each frame as a morph target and is held in memory: at most so many frames.
+// Most frames of a glTF file, which is built in memory with one morph target per frame.
 inline constexpr std::uint32_t kMaxGltfFrames = 1000;
 
-// SIGINT and SIGTERM must be blocked: then nothing is left.
+// SIGINT and SIGTERM must be blocked in every thread; they cancel the command and leave no files.
 ExitCode exportFrames(const ExportOptions& options);
 
 }  // namespace clothstream::cli

@@ -2,172 +2,137 @@
 #include "clients/cli/gltf_animation.h"
 
 #include <algorithm>
-#include <array>
+#include <functional>
 #include <limits>
-#include <span>
-#include <string_view>
+#include <sstream>
+#include <utility>
 
 #include <nlohmann/json.hpp>
 
 namespace clothstream::cli {
 namespace {
 
-using Json = nlohmann::ordered_json;
+// Longest GLB, and longest input of tinygltf's base64 encoder.
+constexpr std::size_t kMaxBytes = std::numeric_limits<std::uint32_t>::max();
 
-// As glTF names them.
-constexpr int kFloat = 5126, kUnsignedInt = 5125;
-
-class Buffer {
- public:
-  // The number of a new accessor of these.
-  std::size_t add(std::span<const float> values, const char* type, std::size_t count) {
-    return add(values.data(), values.size_bytes(), kFloat, type, count);
-  }
-  std::size_t add(std::span<const std::uint32_t> values) {
-    return add(values.data(), values.size_bytes(), kUnsignedInt, "SCALAR", values.size());
-  }
-  std::size_t addPositions(std::span<const float> values) {
-    const std::size_t accessor = add(values, "VEC3", values.size() / 3);
-    std::array<float, 3> least, most;
-    least.fill(std::numeric_limits<float>::max());
-    most.fill(std::numeric_limits<float>::lowest());
-    for (std::size_t i = 0; i < values.size(); ++i) {
-      least[i % 3] = std::min(least[i % 3], values[i]);
-      most[i % 3] = std::max(most[i % 3], values[i]);
-    }
-    accessors[accessor]["min"] = least;
-    accessors[accessor]["max"] = most;
-    return accessor;
-  }
-  void bound(std::size_t accessor, float least, float most) {
-    accessors[accessor]["min"] = {least};
-    accessors[accessor]["max"] = {most};
-  }
-
-  Json views = Json::array(), accessors = Json::array();
-  std::string bytes;
-
- private:
-  std::size_t add(const void* data, std::size_t size, int component, const char* type, std::size_t count) {
-    views.push_back({{"buffer", 0}, {"byteOffset", bytes.size()}, {"byteLength", size}});
-    bytes.append(static_cast<const char*>(data), size);
-    accessors.push_back(
-        {{"bufferView", views.size() - 1}, {"componentType", component}, {"count", count}, {"type", type}});
-    return accessors.size() - 1;
-  }
-};
-
-void appendNumber(std::string& out, std::size_t number) {
-  const auto value = static_cast<std::uint32_t>(number);
-  out.append(reinterpret_cast<const char*>(&value), sizeof value);
-}
-
-std::string base64(std::string_view bytes) {
-  constexpr std::string_view kDigits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string text;
-  text.reserve((bytes.size() + 2) / 3 * 4);
-  for (std::size_t i = 0; i < bytes.size(); i += 3) {
-    const std::size_t count = std::min<std::size_t>(3, bytes.size() - i);
-    std::uint32_t group = 0;
-    for (std::size_t k = 0; k < 3; ++k)
-      group = group << 8 | (k < count ? static_cast<unsigned char>(bytes[i + k]) : 0u);
-    for (std::size_t k = 0; k < 4; ++k) text += k <= count ? kDigits[group >> (18 - 6 * k) & 63] : '=';
-  }
-  return text;
-}
-
-void appendChunk(std::string& out, std::string_view name, std::string content, char filler) {
-  content.resize((content.size() + 3) / 4 * 4, filler);
-  appendNumber(out, content.size());
-  out += name;
-  out += content;
+// Replaces invalid UTF-8, which tinygltf cannot write.
+std::string validUtf8(const std::string& text) {
+  using nlohmann::json;
+  return json::parse(json(text).dump(-1, ' ', false, json::error_handler_t::replace)).get<std::string>();
 }
 
 }  // namespace
 
+int GltfAnimation::addAccessor(std::span<const std::byte> bytes, int componentType, int type) {
+  std::vector<unsigned char>& data = model_.buffers[0].data;
+  tinygltf::BufferView view;
+  view.buffer = 0;
+  view.byteOffset = data.size();
+  view.byteLength = bytes.size();
+  model_.bufferViews.push_back(view);
+  const auto* const first = reinterpret_cast<const unsigned char*>(bytes.data());
+  data.insert(data.end(), first, first + bytes.size());
+  tinygltf::Accessor accessor;
+  accessor.bufferView = static_cast<int>(model_.bufferViews.size() - 1);
+  accessor.componentType = componentType;
+  accessor.type = type;
+  const int components = tinygltf::GetNumComponentsInType(static_cast<std::uint32_t>(type));
+  accessor.count = bytes.size() / sizeof(float) / static_cast<std::size_t>(components);
+  model_.accessors.push_back(accessor);
+  return static_cast<int>(model_.accessors.size() - 1);
+}
+
+int GltfAnimation::addFloats(std::span<const float> values, int type) {
+  return addAccessor(std::as_bytes(values), TINYGLTF_COMPONENT_TYPE_FLOAT, type);
+}
+
+int GltfAnimation::addBoundedFloats(std::span<const float> values, int type) {
+  const int index = addFloats(values, type);
+  tinygltf::Accessor& accessor = model_.accessors.back();
+  const std::size_t components = values.size() / accessor.count;
+  accessor.minValues.assign(components, std::numeric_limits<float>::max());
+  accessor.maxValues.assign(components, std::numeric_limits<float>::lowest());
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    double &least = accessor.minValues[i % components], &most = accessor.maxValues[i % components];
+    least = std::min<double>(least, values[i]);
+    most = std::max<double>(most, values[i]);
+  }
+  return index;
+}
+
 void GltfAnimation::add(const cs_client* client, double seconds) {
   const std::size_t numbers = 3 * std::size_t{cs_vertex_count(client)};
-  const float* positions = cs_positions(client);
-  const float* normals = cs_normals(client);
+  std::vector<float> positions(cs_positions(client), cs_positions(client) + numbers);
+  std::vector<float> normals(cs_normals(client), cs_normals(client) + numbers);
   if (seconds_.empty()) {
-    numbers_ = numbers;
+    model_.buffers.resize(1);
+    positions_ = positions;
+    normals_ = normals;
     std::uint32_t count = 0;
     const std::uint32_t* indices = cs_triangles(client, &count);
     indices_.assign(indices, indices + count);
     cs_cloth cloth;
     for (std::uint32_t i = 0; cs_get_cloth(client, i, &cloth) != 0; ++i)
       cloths_.push_back({cloth.name, cloth.first_index, cloth.index_count});
-    positions_.assign(positions, positions + numbers);
-    normals_.assign(normals, normals + numbers);
   } else {
-    for (std::size_t i = 0; i < numbers_; ++i) {
-      positions_.push_back(positions[i] - positions_[i]);
-      normals_.push_back(normals[i] - normals_[i]);
-    }
+    // A morph target holds the difference from the first frame.
+    std::ranges::transform(positions, positions_, positions.begin(), std::minus<>());
+    std::ranges::transform(normals, normals_, normals.begin(), std::minus<>());
   }
+  const int position = addBoundedFloats(positions, TINYGLTF_TYPE_VEC3);
+  attributes_.push_back({{"POSITION", position}, {"NORMAL", addFloats(normals, TINYGLTF_TYPE_VEC3)}});
   seconds_.push_back(static_cast<float>(seconds));
 }
 
-GltfAnimation::Document GltfAnimation::toDocument(bool embedded) const {
-  Buffer buffer;
-  const auto frame = [&](const std::vector<float>& values, std::size_t i) {
-    return std::span(values).subspan(i * numbers_, numbers_);
-  };
-  const Json attributes{{"POSITION", buffer.addPositions(frame(positions_, 0))},
-                        {"NORMAL", buffer.add(frame(normals_, 0), "VEC3", numbers_ / 3)}};
-  Json targets = Json::array();
-  for (std::size_t i = 1; i < seconds_.size(); ++i)
-    targets.push_back({{"POSITION", buffer.addPositions(frame(positions_, i))},
-                       {"NORMAL", buffer.add(frame(normals_, i), "VEC3", numbers_ / 3)}});
-  Json primitives = Json::array();
+// At its time, the weight of a frame is 1 and all others are 0. Between two times the weights are
+// interpolated.
+void GltfAnimation::addAnimation(tinygltf::Mesh& mesh) {
+  const std::size_t targets = seconds_.size() - 1;
+  mesh.weights.assign(targets, 0);
+  std::vector<float> weights(seconds_.size() * targets, 0);
+  for (std::size_t i = 1; i < seconds_.size(); ++i) weights[i * targets + i - 1] = 1;
+  tinygltf::Animation animation;
+  animation.samplers.resize(1);
+  animation.samplers[0].input = addBoundedFloats(seconds_, TINYGLTF_TYPE_SCALAR);
+  animation.samplers[0].output = addFloats(weights, TINYGLTF_TYPE_SCALAR);
+  animation.channels.resize(1);
+  animation.channels[0].sampler = 0;
+  animation.channels[0].target_node = 0;
+  animation.channels[0].target_path = "weights";
+  model_.animations.push_back(animation);
+}
+
+std::string GltfAnimation::finish(bool binary) {
+  model_.asset.generator = "clothstream export";
+  model_.materials.resize(1);
+  model_.materials[0].doubleSided = true;
+  tinygltf::Mesh mesh;
   for (const Cloth& cloth : cloths_) {
-    Json primitive{{"attributes", attributes},
-                   {"indices", buffer.add(std::span(indices_).subspan(cloth.firstIndex, cloth.indexCount))},
-                   {"material", 0},
-                   {"extras", {{"cloth", cloth.name}}}};
-    if (!targets.empty()) primitive["targets"] = targets;
-    primitives.push_back(std::move(primitive));
+    tinygltf::Primitive primitive;
+    primitive.mode = TINYGLTF_MODE_TRIANGLES;
+    primitive.material = 0;
+    primitive.attributes = attributes_[0];
+    primitive.targets.assign(attributes_.begin() + 1, attributes_.end());
+    const auto indices = std::span(indices_).subspan(cloth.firstIndex, cloth.indexCount);
+    primitive.indices =
+        addAccessor(std::as_bytes(indices), TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT, TINYGLTF_TYPE_SCALAR);
+    primitive.extras = tinygltf::Value({{"cloth", tinygltf::Value(validUtf8(cloth.name))}});
+    mesh.primitives.push_back(std::move(primitive));
   }
-  Json gltf{{"asset", {{"version", "2.0"}, {"generator", "clothstream export"}}},
-            {"scene", 0},
-            {"scenes", {{{"nodes", {0}}}}},
-            {"nodes", {{{"mesh", 0}, {"name", "cloth"}}}},
-            {"materials", {{{"doubleSided", true}}}},
-            {"meshes", {{{"primitives", primitives}}}}};
-  if (!targets.empty()) {
-    // Each frame's own weight is 1 at its time, all others are 0; between two times they cross.
-    gltf["meshes"][0]["weights"] = std::vector<float>(targets.size(), 0);
-    std::vector<float> weights(seconds_.size() * targets.size(), 0);
-    for (std::size_t i = 1; i < seconds_.size(); ++i) weights[i * targets.size() + i - 1] = 1;
-    const std::size_t times = buffer.add(seconds_, "SCALAR", seconds_.size());
-    buffer.bound(times, seconds_.front(), seconds_.back());
-    const std::size_t output = buffer.add(weights, "SCALAR", weights.size());
-    gltf["animations"] = {
-        {{"samplers", {{{"input", times}, {"output", output}, {"interpolation", "LINEAR"}}}},
-         {"channels", {{{"sampler", 0}, {"target", {{"node", 0}, {"path", "weights"}}}}}}}};
-  }
-  gltf["bufferViews"] = std::move(buffer.views);
-  gltf["accessors"] = std::move(buffer.accessors);
-  gltf["buffers"] = {{{"byteLength", buffer.bytes.size()}}};
-  if (embedded) gltf["buffers"][0]["uri"] = "data:application/octet-stream;base64," + base64(buffer.bytes);
-  return {gltf.dump(-1, ' ', false, Json::error_handler_t::replace), std::move(buffer.bytes)};
-}
-
-std::string GltfAnimation::toGltf() const {
-  return toDocument(true).json;
-}
-
-std::string GltfAnimation::toGlb() const {
-  Document document = toDocument(false);
-  if (document.json.size() + document.numbers.size() > std::numeric_limits<std::uint32_t>::max() - 64)
-    return {};
-  std::string chunks;
-  appendChunk(chunks, "JSON", std::move(document.json), ' ');
-  appendChunk(chunks, std::string_view("BIN\0", 4), std::move(document.numbers), '\0');
-  std::string out = "glTF";
-  appendNumber(out, 2);
-  appendNumber(out, 12 + chunks.size());
-  return out + chunks;
+  if (frames() > 1) addAnimation(mesh);
+  model_.meshes.push_back(std::move(mesh));
+  model_.nodes.resize(1);
+  model_.nodes[0].mesh = 0;
+  model_.nodes[0].name = "cloth";
+  model_.scenes.resize(1);
+  model_.scenes[0].nodes = {0};
+  model_.defaultScene = 0;
+  if (model_.buffers[0].data.size() > kMaxBytes) return {};
+  std::ostringstream out;
+  if (!tinygltf::TinyGLTF().WriteGltfSceneToStream(&model_, out, false, binary)) return {};
+  std::string content = std::move(out).str();
+  if (binary && content.size() > kMaxBytes) content.clear();
+  return content;
 }
 
 }  // namespace clothstream::cli

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Index, then every chunk and every frame.
+// Reads the index, then every chunk and every frame.
 #include "clients/cli/info.h"
 
 #include <array>
@@ -9,7 +9,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "clients/cli/complaint.h"
+#include "clients/cli/error.h"
 #include "clients/cli/played_recording.h"
 #include "clients/cli/progress.h"
 #include "clients/cli/signals.h"
@@ -27,12 +27,11 @@ struct ChannelFigures {
 struct RecordingFigures {
   std::array<ChannelFigures, recording::kTopicNames.size()> channels{};
   std::uint64_t chunksLost = 0;
-  std::string damage;  // the first; empty: none
+  std::string damage;  // first damage found; empty: none
   std::optional<cs_statistics> stream;
 };
 
-// What others wrote into a file must not steer a terminal: control characters as \\xNN. UTF-8 stays, but for
-// its own.
+// Escapes control characters as \\xNN, so that text from a file cannot control a terminal. Keeps other UTF-8.
 std::string printable(const std::string& text) {
   std::string shown;
   for (std::size_t i = 0; i < text.size(); ++i) {
@@ -59,12 +58,12 @@ void countByIndex(const RecordingReader& reader, RecordingFigures& figures) {
       figures.channels[static_cast<std::size_t>(*topic)].messages = count;
 }
 
-// Chunk by chunk: one that is damaged does not hide the others.
-tl::expected<void, Complaint> countByReading(recording::McapReader& mcap, const RecordingReader& reader,
-                                             RecordingFigures& figures) {
+// Reads chunk by chunk, so that a damaged chunk does not hide the others.
+tl::expected<void, Error> countByReading(recording::McapReader& mcap, const RecordingReader& reader,
+                                         RecordingFigures& figures) {
   Progress progress("read", static_cast<std::uint32_t>(mcap.chunks().size()));
   for (std::size_t i = 0; i < mcap.chunks().size(); ++i) {
-    if (interrupted()) return complaint(kUnreadable, "interrupted");
+    if (interrupted()) return makeError(kUnreadable, "interrupted");
     progress.show(static_cast<std::uint32_t>(i));
     const auto messages = mcap.read(i);
     if (!messages) {
@@ -83,11 +82,11 @@ tl::expected<void, Complaint> countByReading(recording::McapReader& mcap, const 
   return {};
 }
 
-tl::expected<void, Complaint> decode(PlayedRecording& played, RecordingFigures& figures) {
+tl::expected<void, Error> decode(PlayedRecording& played, RecordingFigures& figures) {
   const auto all = figures.channels[static_cast<std::size_t>(Topic::frames)].messages;
   Progress progress("decode", static_cast<std::uint32_t>(all));
   for (std::uint32_t frame = 0;; ++frame) {
-    if (interrupted()) return complaint(kUnreadable, "interrupted");
+    if (interrupted()) return makeError(kUnreadable, "interrupted");
     progress.show(frame);
     const auto more = played.next();
     if (!more && figures.damage.empty()) figures.damage = more.error();
@@ -100,11 +99,10 @@ tl::expected<void, Complaint> decode(PlayedRecording& played, RecordingFigures& 
 std::string damageOf(const RecordingReader& reader, const RecordingFigures& figures,
                      const InfoOptions& options) {
   if (!reader.mcap().indexed())
-    return fmt::format("it was cut off, or is damaged at its end: run clothstream recover {} OUT",
-                       options.recording);
+    return fmt::format("the end is missing or damaged; run clothstream recover {} OUT", options.recording);
   if (!figures.damage.empty()) return figures.damage;
   if (figures.stream && figures.stream->hash_mismatches > 0)
-    return fmt::format("{} frames are not what the server held", figures.stream->hash_mismatches);
+    return fmt::format("{} frames differ from the server's", figures.stream->hash_mismatches);
   return {};
 }
 
@@ -116,7 +114,7 @@ std::string toText(const RecordingReader& reader, const RecordingFigures& figure
                    const InfoOptions& options) {
   const auto fact = [&](const char* name) { return printable(reader.fact(name)); };
   std::string text = fmt::format(
-      "file      {}, {}, {} chunks\nscene     {}, begun {}, {:.1f} s, {} vertices\nserver    {}\ndevice    "
+      "file      {}, {}, {} chunks\nscene     {}, started {}, {:.1f} s, {} vertices\nserver    {}\ndevice    "
       "{}; {}; "
       "processor {}\nstream    {} ticks/s, {} frames/s, codec {}, max error {} m\n",
       options.recording, mebibytes(reader.mcap().bytes()), reader.mcap().chunks().size(), fact("scene"),
@@ -131,12 +129,12 @@ std::string toText(const RecordingReader& reader, const RecordingFigures& figure
   }
   if (figures.stream)
     text += fmt::format(
-        "frames    {} decoded, {} of them key frames, {:.2f} bits a vertex; {} not what the server held\n",
+        "frames    {} decoded, {} of them key frames, {:.2f} bits a vertex; {} differ from the server's\n",
         figures.stream->frames, figures.stream->key_frames, figures.stream->bits_per_vertex,
         figures.stream->hash_mismatches);
   if (!damage.empty()) return text + fmt::format("damaged   {}\n", damage);
   return text +
-         (options.quick ? "index     whole; the rest was not read\n" : "whole     all checksums match\n");
+         (options.quick ? "index     complete; the rest was not read\n" : "complete  all checksums match\n");
 }
 
 std::string toJson(const RecordingReader& reader, const RecordingFigures& figures, const std::string& damage,
@@ -161,9 +159,9 @@ std::string toJson(const RecordingReader& reader, const RecordingFigures& figure
   return json.dump(1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + '\n';
 }
 
-tl::expected<ExitCode, Complaint> run(const InfoOptions& options) {
+tl::expected<ExitCode, Error> run(const InfoOptions& options) {
   const auto open = [&] {
-    return orComplaint(kUnreadable, RecordingReader::open(options.recording, recording::CutFiles::read));
+    return orError(kUnreadable, RecordingReader::open(options.recording, recording::CutFiles::read));
   };
   auto reader = open();
   if (!reader) return tl::unexpected(reader.error());
@@ -171,9 +169,9 @@ tl::expected<ExitCode, Complaint> run(const InfoOptions& options) {
   if (options.quick) {
     countByIndex(*reader, figures);
   } else {
-    auto file = orComplaint(kUnreadable, recording::openFile(options.recording));
+    auto file = orError(kUnreadable, recording::openFile(options.recording));
     if (!file) return tl::unexpected(file.error());
-    auto mcap = orComplaint(kUnreadable, recording::McapReader::open(std::move(*file)));
+    auto mcap = orError(kUnreadable, recording::McapReader::open(std::move(*file)));
     if (!mcap) return tl::unexpected(mcap.error());
     if (auto counted = countByReading(*mcap, *reader, figures); !counted)
       return tl::unexpected(counted.error());
@@ -194,7 +192,7 @@ tl::expected<ExitCode, Complaint> run(const InfoOptions& options) {
 
 ExitCode info(const InfoOptions& options) {
   const auto code = run(options);
-  return code ? *code : say(code.error());
+  return code ? *code : printError(code.error());
 }
 
 }  // namespace clothstream::cli

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// `clothstream info`: what is in a recording, and whether it is whole.
+// `clothstream info`: shows the content of a recording and checks it.
 #pragma once
 
 #include <string>
@@ -10,11 +10,11 @@ namespace clothstream::cli {
 
 struct InfoOptions {
   std::string recording;
-  bool quick = false;  // by the index alone
+  bool quick = false;  // reads only the index
   bool json = false;
 };
 
-// Reads all of it, unless it is to be quick. SIGINT and SIGTERM must be blocked.
+// Reads and checks the whole file unless `quick`. SIGINT and SIGTERM must be blocked in every thread.
 ExitCode info(const InfoOptions& options);
 
 }  // namespace clothstream::cli

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Joining, waiting for the end, the summary.
+// Joins, follows the stream to its end, prints the summary.
 #include "clients/cli/join.h"
 
 #include <chrono>
@@ -8,7 +8,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include "clients/cli/complaint.h"
+#include "clients/cli/error.h"
 #include "clients/cli/obj_file.h"
 #include "clients/cli/presence.h"
 #include "clients/cli/report.h"
@@ -22,16 +22,17 @@ using SteadyClock = std::chrono::steady_clock;
 
 constexpr std::chrono::milliseconds kLineInterval{100};
 
-// What the stream says beside its frames goes to standard error as it comes.
+// Prints the events of the stream, except frames, to standard error.
 class Listener {
  public:
   Listener(const StatusLine& line, bool report) : line_(line), report_(report) {}
 
   void operator()(cs_client* client, std::uint32_t events) const {
     if (events == 0 && cs_get_state(client) == CS_STATE_RECONNECTING)
-      say("the connection is lost; trying to come back");
+      say("the connection is lost; reconnecting");
     if ((events & CS_EVENT_RETURNED) != 0)
-      say(cs_resumed(client) != 0 ? "back as the same participant" : "back, as a new participant");
+      say(cs_resumed(client) != 0 ? "reconnected as the same participant"
+                                  : "reconnected as a new participant");
     if ((events & CS_EVENT_NOTICE) != 0) {
       const std::uint64_t by = cs_notice_participant(client);
       say(fmt::format("notice from the server: {}{}", cs_notice_text(client),
@@ -43,7 +44,7 @@ class Listener {
       cs_presence presence;
       if (cs_get_presence(client, &presence) != 0) say(text(client, presence));
     } else if ((events & CS_EVENT_PARTICIPANTS) != 0) {
-      sayWhoIsThere(client);
+      sayParticipants(client);
     }
     if (report_ && (events & CS_EVENT_REPORT) != 0) {
       line_.clear();
@@ -59,13 +60,13 @@ class Listener {
     fmt::print(stderr, "clothstream: {}\n", text);
   }
 
-  void sayWhoIsThere(cs_client* client) const {
+  void sayParticipants(cs_client* client) const {
     say(fmt::format("joined as {}", roleName(cs_get_role(client))));
     cs_participant other;
     for (std::uint32_t i = 0; cs_get_participant(client, i, &other) != 0; ++i)
       if (other.id != cs_participant_id(client))
         say(fmt::format("{} is here as {}{}", nameOf(other), roleName(other.role),
-                        other.away != 0 ? ", cut off at the moment" : ""));
+                        other.away != 0 ? ", currently disconnected" : ""));
   }
 
   const StatusLine& line_;
@@ -86,7 +87,7 @@ Report reportOf(GrpcClient& client) {
   return report;
 }
 
-// Until the time is over, a signal comes, or the stream ends; the last is returned.
+// Waits for the end of the time, a signal or the end of the stream. Returns the failure if the stream ended.
 std::optional<Failure> follow(GrpcClient& client, const JoinOptions& options, const StatusLine& line) {
   const auto start = SteadyClock::now();
   for (;;) {
@@ -110,7 +111,7 @@ ExitCode join(const JoinOptions& options) {
   std::optional<files::NewFile> obj;
   if (!options.objPath.empty()) {
     auto created = files::NewFile::create(options.objPath);
-    if (!created) return complain(kNotWritten, created.error());
+    if (!created) return printError(kNotWritten, created.error());
     obj.emplace(std::move(*created));
   }
   const StatusLine line(!options.json && isatty(STDOUT_FILENO) != 0);
@@ -124,23 +125,24 @@ ExitCode join(const JoinOptions& options) {
   if (!options.reconnects) clientOptions.reconnectFor = std::chrono::milliseconds(0);
   clientOptions.cancelled = [] { return interrupted(); };
   auto joined = GrpcClient::join(options.address, clientOptions, Listener(line, options.report));
-  if (!joined) return complain(exitCodeOf(joined.error().kind), joined.error().text);
+  if (!joined) return printError(exitCodeOf(joined.error().kind), joined.error().text);
   GrpcClient& client = **joined;
   sendColliders(client, options);
 
   const std::optional<Failure> failure = follow(client, options, line);
   line.clear();
   ExitCode code = kOk;
-  if (failure) code = complain(exitCodeOf(failure->kind), failure->text);
+  if (failure) code = printError(exitCodeOf(failure->kind), failure->text);
   const Report report = reportOf(client);
   if (options.hash && report.statistics.hash_mismatches > 0)
-    code = complain(kHashMismatch, fmt::format("{} of {} decoded frames are not what the server holds",
-                                               report.statistics.hash_mismatches, report.statistics.frames));
+    code =
+        printError(kHashMismatch, fmt::format("{} of {} decoded frames differ from the server's",
+                                              report.statistics.hash_mismatches, report.statistics.frames));
   if (obj && report.statistics.frames == 0) {
-    code = complain(kNotWritten, fmt::format("{} is not written: no frame came", options.objPath));
+    code = printError(kNotWritten, fmt::format("{} was not written: no frame arrived", options.objPath));
   } else if (obj) {
     client.visit([&](cs_client* core) {
-      if (auto written = writeObj(core, *obj); !written) code = complain(kNotWritten, written.error());
+      if (auto written = writeObj(core, *obj); !written) code = printError(kNotWritten, written.error());
     });
   }
   fmt::print("{}\n", options.json ? report.json(options.hash) : report.text(options.hash));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// `clothstream join`: follows a stream and says what it was like.
+// `clothstream join`: follows a stream and prints a summary.
 #pragma once
 
 #include <array>
@@ -14,21 +14,21 @@
 namespace clothstream::cli {
 
 struct JoinOptions {
-  std::string address;  // as completeAddress gives it
+  std::string address;  // from completeAddress()
   std::string scene;
-  std::string name;  // shown to others
+  std::string name;  // name that others see
   cs_role role = CS_ROLE_UNSPECIFIED;
-  std::uint32_t quality = 0, temporalLayers = 0;  // the most that is wanted, as cs_want has it
+  std::uint32_t quality = 0, temporalLayers = 0;  // upper limits, as in cs_want
   bool reconnects = true;
-  std::optional<double> seconds;  // nothing: until a signal
-  std::string objPath;            // empty: none
+  std::optional<double> seconds;  // not set: until a signal
+  std::string objPath;            // empty: no file
   bool json = false;
   bool hash = false;
-  bool report = false;                          // a line for each report of the simulation as it comes
-  std::vector<std::array<float, 4>> colliders;  // x, y, z, radius, metres
+  bool report = false;                          // print each report of the simulation
+  std::vector<std::array<float, 4>> colliders;  // x, y, z and radius, m
 };
 
-// SIGINT and SIGTERM must be blocked in every thread: they end the stream like the end of its time.
+// SIGINT and SIGTERM must be blocked in every thread; they end the stream like its time limit.
 ExitCode join(const JoinOptions& options);
 
 }  // namespace clothstream::cli

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A line, or an object, for each scene.
+// Prints one table row or JSON object per scene.
 #include "clients/cli/list.h"
 
 #include <fmt/format.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// `clothstream list`: the scenes of a server.
+// `clothstream list`: lists the scenes of a server.
 #pragma once
 
 #include <string>
@@ -9,7 +9,7 @@
 namespace clothstream::cli {
 
 struct ListOptions {
-  std::string address;  // as completeAddress gives it
+  std::string address;  // from completeAddress()
   bool json = false;
 };
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Options, progress and the report of a load.
+// Options, progress line and report of a load test.
 #include "clients/cli/load_command.h"
 
 #include <cstdio>
@@ -10,7 +10,7 @@
 #include <nlohmann/json.hpp>
 #include <unistd.h>
 
-#include "clients/cli/complaint.h"
+#include "clients/cli/error.h"
 #include "clients/cli/signals.h"
 #include "clients/grpc/address.h"
 
@@ -19,12 +19,12 @@ namespace {
 
 constexpr const char* kWebPort = ":8080";
 
-// Of a process so far, by the kernel; nothing where there is no such process.
+// CPU time of a process so far, from /proc. Nothing if there is no such process.
 std::optional<double> cpuSeconds(std::uint32_t pid) {
   std::ifstream file(fmt::format("/proc/{}/stat", pid));
   std::string text;
   if (!std::getline(file, text)) return std::nullopt;
-  // The name, in brackets, may hold anything.
+  // Skips the process name in brackets, which may contain anything.
   std::istringstream rest(text.substr(text.rfind(')') + 1));
   std::string skipped;
   for (int i = 0; i < 11; ++i) rest >> skipped;
@@ -50,7 +50,7 @@ constexpr Stage kStages[]{{"poseToDisplayable", &load::PoseTimes::whole},
                           {"packetToDecoded", &load::PoseTimes::packetToDecoded},
                           {"decodedToDisplayable", &load::PoseTimes::decodedToDisplayable}};
 
-// Of no pose, null.
+// Adds the times of poses; null without poses.
 void addPoses(nlohmann::ordered_json& object, load::PoseTimes& poses) {
   const bool some = !poses.whole.empty();
   object["poses"] = poses.whole.size();
@@ -88,7 +88,7 @@ std::string json(load::LoadReport& report, std::optional<double> serverCpu) {
       {"slow", report.slow},
       {"slowFramesPerSecond", report.slowFramesPerSecond()},
       {"slowDropped", report.slowFigures.dropped},
-      {"intruders", report.intruders},
+      {"intruders", report.hostileClients},
       {"intrusions", report.visits},
   };
   if (serverCpu) object["serverCpuSeconds"] = *serverCpu;
@@ -99,8 +99,8 @@ std::string json(load::LoadReport& report, std::optional<double> serverCpu) {
 std::string text(load::LoadReport& report, std::optional<double> serverCpu) {
   const Ages ages = agesOf(report.figures.ages), tickAges = agesOf(report.figures.tickAges);
   std::string text = fmt::format(
-      "{} participants for {:.1f} s: {:.1f} frames/s each, {:.1f} Mbit/s altogether, {} dropped, {} refused\n"
-      "age of a frame upon arrival: {:.2f} ms median, {:.2f} ms p99; since its tick began: {:.2f} and {:.2f} "
+      "{} participants for {:.1f} s: {:.1f} frames/s each, {:.1f} Mbit/s in total, {} dropped, {} refused\n"
+      "age of a frame on arrival: {:.2f} ms median, {:.2f} ms p99; since its tick began: {:.2f} and {:.2f} "
       "ms",
       report.participants, report.seconds, report.framesPerSecond(), report.mbitPerSecond(),
       report.figures.dropped, report.figures.decodeErrors + report.slowFigures.decodeErrors, ages.p50,
@@ -111,18 +111,19 @@ std::string text(load::LoadReport& report, std::optional<double> serverCpu) {
       return fmt::format("{:.2f} / {:.2f}", times.p50, times.p99);
     };
     text += fmt::format(
-        "\nfrom a pose to its effect first displayable, ms median / p99: {}; of it until its tick begins {}, "
-        "until the packet {}, until decoded {}, in play-out {}",
+        "\nfrom a pose to its effect first displayable, ms median / p99: {}; by stage: to the tick {}, to "
+        "the "
+        "packet {}, to decoded {}, in play-out {}",
         of(kStages[0]), of(kStages[1]), of(kStages[2]), of(kStages[3]), of(kStages[4]));
   }
   if (report.slow > 0)
     text += fmt::format("\n{} slow: {:.1f} frames/s each, {} dropped", report.slow,
                         report.slowFramesPerSecond(), report.slowFigures.dropped);
-  if (report.left > 0) text += fmt::format("\n{} left, and as many came", report.left);
-  if (report.intruders > 0)
-    text += fmt::format("\n{} intruders came {} times", report.intruders, report.visits);
+  if (report.left > 0) text += fmt::format("\n{} left and were replaced", report.left);
+  if (report.hostileClients > 0)
+    text += fmt::format("\n{} hostile clients connected {} times", report.hostileClients, report.visits);
   if (serverCpu)
-    text += fmt::format("\n{:.2f} s of the server's processor time, {:.3f} ms a second and participant",
+    text += fmt::format("\n{:.2f} s of CPU time of the server, {:.3f} ms per second and participant",
                         *serverCpu, 1000 * *serverCpu / report.seconds / (report.participants + report.slow));
   return text;
 }
@@ -130,51 +131,54 @@ std::string text(load::LoadReport& report, std::optional<double> serverCpu) {
 }  // namespace
 
 void LoadCommand::add(CLI::App& app) {
-  command_ = app.add_subcommand("load", "Be many participants at once, and say what they get");
+  command_ = app.add_subcommand("load", "Run a load test with many participants and print what they receive");
   command_->footer(kExitCodes);
   command_->add_option(
       "ADDRESS", address_,
-      "HOST or HOST:PORT of the server's gRPC, by default 127.0.0.1:50051; with --web of its "
-      "page, 127.0.0.1:8080");
-  command_->add_option("--scene", options_.scene, "The scene to join; the server's default if left out");
-  command_->add_option("--participants", options_.participants, "So many who read as fast as frames come")
+      "HOST or HOST:PORT of the server's gRPC endpoint, default 127.0.0.1:50051; with --web, of its web "
+      "endpoint, default 127.0.0.1:8080");
+  command_->add_option("--scene", options_.scene, "Scene to join; default: the server's default scene");
+  command_
+      ->add_option("--participants", options_.participants, "Number of participants that read at full speed")
       ->check(CLI::Range(1u, 100'000u))
       ->capture_default_str();
   command_
-      ->add_option("--viewers", options_.viewers, "Of these, so many send no poses; the others move a sphere")
+      ->add_option("--viewers", options_.viewers,
+                   "Number of these that send no poses; the others move a sphere")
       ->capture_default_str();
   command_->add_option(
       "--decoders", decoders_,
-      "Of these, so many decode what comes, and compare it with what the server holds (all); the "
-      "others acknowledge it");
-  command_->add_option("--slow", options_.slow, "Beside these, so many who read slowly")
+      "Number of these that decode frames and compare them with the server's; the others only acknowledge. "
+      "Default: all");
+  command_->add_option("--slow", options_.slow, "Number of additional participants that read slowly")
       ->check(CLI::Range(0u, 100'000u))
       ->capture_default_str();
-  command_->add_option("--slow-rate", options_.slowBytesPerSecond, "Bytes a second that each of those reads")
+  command_
+      ->add_option("--slow-rate", options_.slowBytesPerSecond,
+                   "Reading rate of each slow participant, bytes/s")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
   command_
-      ->add_option("--intruders", options_.intruders,
-                   "Beside these, so many who send what is no message, never read, vanish, and come again")
+      ->add_option("--intruders", options_.hostileClients,
+                   "Number of additional hostile clients, which send invalid messages, never read, "
+                   "disconnect and reconnect")
       ->check(CLI::Range(0u, 10'000u))
       ->capture_default_str();
-  command_
-      ->add_option("--joins", options_.joinsPerSecond,
-                   "Participants that join in a second, until all are there")
+  command_->add_option("--joins", options_.joinsPerSecond, "Participants that join per second at the start")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
   command_
       ->add_option("--leaves", options_.leavesPerSecond,
-                   "Participants that then leave in a second, for each of whom another comes")
+                   "Participants that leave per second after that; each is replaced")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
-  command_->add_option("--seconds", options_.seconds, "For how long, once all are there")
+  command_->add_option("--seconds", options_.seconds, "Seconds to measure after all have joined")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
-  command_->add_flag("--web", web_, "By WebSocket, as a page does, instead of gRPC");
+  command_->add_flag("--web", web_, "Use WebSocket, as the page does, instead of gRPC");
   command_->add_option("--server-pid", serverPid_,
-                       "Process of the server on this machine, for the processor time that it takes");
-  command_->add_flag("--json", json_, "Print one JSON object, and nothing else");
+                       "Process id of the server on this machine; adds its CPU time to the report");
+  command_->add_flag("--json", json_, "Print only one JSON object");
 }
 
 void LoadCommand::check() {
@@ -185,12 +189,13 @@ void LoadCommand::check() {
   if (!address) throw CLI::ValidationError("ADDRESS", address.error());
   address_ = *address;
   if (options_.viewers > options_.participants)
-    throw CLI::ValidationError("--viewers", "there are no more of them than --participants");
+    throw CLI::ValidationError("--viewers", "must not exceed --participants");
   options_.decoders = decoders_.value_or(options_.participants);
   if (options_.decoders > options_.participants)
-    throw CLI::ValidationError("--decoders", "there are no more of them than --participants");
+    throw CLI::ValidationError("--decoders", "must not exceed --participants");
   if (serverPid_ && !cpuSeconds(*serverPid_))
-    throw CLI::ValidationError("--server-pid", fmt::format("there is no process {} here", *serverPid_));
+    throw CLI::ValidationError("--server-pid",
+                               fmt::format("there is no process {} on this machine", *serverPid_));
 }
 
 ExitCode LoadCommand::run() const {
@@ -216,13 +221,14 @@ ExitCode LoadCommand::run() const {
   if (before && after) serverCpu = *after - *before;
   const ExitCode loss = exitCodeOf(report.firstLoss.kind);
   if (report.joined == 0 && report.lost > 0)
-    return say({loss, fmt::format("nobody could join at {}: {}", address_, report.firstLoss.text)});
+    return printError(
+        Error{loss, fmt::format("no participant could join at {}: {}", address_, report.firstLoss.text)});
   fmt::print("{}\n", json_ ? json(report, serverCpu) : text(report, serverCpu));
   if (report.lost > 0)
-    return say({loss, fmt::format("{} times somebody could not stay; at first: {}", report.lost,
-                                  report.firstLoss.text)});
+    return printError(Error{loss, fmt::format("{} participants were refused or disconnected; the first: {}",
+                                              report.lost, report.firstLoss.text)});
   if (report.figures.hashMismatches + report.slowFigures.hashMismatches > 0)
-    return say({kHashMismatch, "decoded frames are not what the server holds"});
+    return printError(Error{kHashMismatch, "decoded frames differ from the server's"});
   return kOk;
 }
 

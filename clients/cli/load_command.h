@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// `clothstream load`.
+// `clothstream load`: command-line options of the load test.
 #pragma once
 
 #include <cstdint>
@@ -13,14 +13,14 @@
 
 namespace clothstream::cli {
 
-// The command, which may be parsed. Outlives the parsing.
+// Must outlive the parsing.
 class LoadCommand {
  public:
   void add(CLI::App& app);
   bool parsed() const { return command_->parsed(); }
-  // What the options say that no option alone can know. Throws CLI::ValidationError.
+  // Checks the options together. Throws CLI::ValidationError.
   void check();
-  // SIGINT and SIGTERM must be blocked in every thread: they end the load early.
+  // SIGINT and SIGTERM must be blocked in every thread; they end the test early.
   ExitCode run() const;
 
  private:

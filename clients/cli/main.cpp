@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// `clothstream`: what a user of a server needs, on the command line.
+// `clothstream`: command-line client of clothstream-server.
 #include <charconv>
 #include <cmath>
 #include <cstdio>
@@ -26,7 +26,7 @@ namespace {
 using namespace clothstream;
 using namespace clothstream::cli;
 
-// "x,y,z" or "x,y,z,r".
+// Parses "x,y,z" or "x,y,z,radius".
 std::array<float, 4> parseCollider(const std::string& text) {
   constexpr float kDefaultRadius = 0.1f;
   std::array<float, 4> values{0, 0, 0, kDefaultRadius};
@@ -41,7 +41,7 @@ std::array<float, 4> parseCollider(const std::string& text) {
   }
   if (count < 3 || at != end || values[3] <= 0)
     throw CLI::ValidationError(
-        "--collider", fmt::format("\"{}\" is no sphere; write X,Y,Z or X,Y,Z,RADIUS in metres", text));
+        "--collider", fmt::format("\"{}\" is not a sphere; use X,Y,Z or X,Y,Z,RADIUS in metres", text));
   return values;
 }
 
@@ -52,8 +52,7 @@ std::string addressOf(const std::string& text) {
 }
 
 int run(int argc, char** argv) {
-  CLI::App app("Follows and records the cloth that a clothstream-server simulates; encodes motions in files.",
-               "clothstream");
+  CLI::App app("Follows and records scenes of a clothstream-server; encodes motion files.", "clothstream");
   app.footer(kExitCodes);
   app.require_subcommand(1);
   app.set_version_flag("--version", CLOTHSTREAM_VERSION);
@@ -61,49 +60,48 @@ int run(int argc, char** argv) {
   std::string address(kDefaultAddress);
   JoinOptions joinOptions;
   std::vector<std::string> colliders;
-  CLI::App& joinCommand = *app.add_subcommand("join", "Join a scene, show what streams, end with a summary");
+  CLI::App& joinCommand =
+      *app.add_subcommand("join", "Join a scene, show the stream, print a summary at the end");
   joinCommand.footer(kExitCodes);
   joinCommand.add_option("ADDRESS", address, "HOST or HOST:PORT of the server")->capture_default_str();
-  joinCommand.add_option("--scene", joinOptions.scene, "The scene to join; the server's default if left out");
+  joinCommand.add_option("--scene", joinOptions.scene, "Scene to join; default: the server's default scene");
   std::string role;
-  joinCommand.add_option("--name", joinOptions.name, "How others see who joins, at most 64 bytes");
+  joinCommand.add_option("--name", joinOptions.name, "Name that other participants see, at most 64 bytes");
   joinCommand
-      .add_option(
-          "--role", role,
-          "viewer, participant or owner; who comes first owns the scene unless it is a viewer, and there "
-          "is one owner at first")
+      .add_option("--role", role,
+                  "viewer, participant or owner; the first client that is not a viewer becomes the owner")
       ->check(CLI::IsMember({"viewer", "participant", "owner"}));
   joinCommand
       .add_option("--quality", joinOptions.quality,
-                  "The finest quality wanted: 0 is the finest there is, each other has twice the error")
+                  "Finest quality to receive: 0 is the finest, each further level doubles the error")
       ->check(CLI::Range(0, 3));
   joinCommand
       .add_option("--layers", joinOptions.temporalLayers,
-                  "So many temporal layers at most: fewer make fewer frames a second; all if left out")
+                  "Most temporal layers to receive; fewer layers mean fewer frames a second. Default: all")
       ->check(CLI::Range(1, 3));
   joinCommand.add_flag("!--no-reconnect", joinOptions.reconnects,
-                       "End when the connection is lost, instead of trying for a minute to come back");
+                       "End when the connection is lost. Default: try to reconnect for a minute");
   joinCommand
       .add_option("--seconds", joinOptions.seconds,
-                  "Leave after this time; otherwise at an interrupt (Ctrl-C)")
+                  "Leave after this time; default: at an interrupt (Ctrl-C)")
       ->check(CLI::PositiveNumber);
   joinCommand.add_option("--obj", joinOptions.objPath, "Write the last frame to this Wavefront OBJ file");
-  joinCommand.add_flag("--json", joinOptions.json, "Print the summary as one JSON object, and nothing else");
+  joinCommand.add_flag("--json", joinOptions.json, "Print only the summary, as one JSON object");
   joinCommand.add_flag("--hash", joinOptions.hash,
-                       "Compare every decoded frame with the server's own reconstruction");
+                       "Compare every decoded frame with the server's reconstruction");
   joinCommand
       .add_flag("--report", joinOptions.report,
-                "Print how the simulation of each cloth does whenever the server says: strain, energy, ...")
+                "Print each report of the simulation: strain, energy and more per cloth")
       ->excludes("--json");
   joinCommand
-      .add_option("--collider", colliders,
-                  "A sphere X,Y,Z[,RADIUS] in metres that the cloth meets while this client is there; may be "
-                  "repeated")
+      .add_option(
+          "--collider", colliders,
+          "Sphere X,Y,Z[,RADIUS] in metres that the cloth collides with while this client is joined; may be "
+          "repeated")
       ->allow_extra_args(false);
 
   SetOptions setOptions;
-  CLI::App& setCommand =
-      *app.add_subcommand("set", "Change parameters of a scene that runs, for everybody in it");
+  CLI::App& setCommand = *app.add_subcommand("set", "Change parameters of a running scene");
   addSetOptions(setCommand, setOptions);
   setCommand.footer(kExitCodes);
   setCommand.add_option("ADDRESS", address, "HOST or HOST:PORT of the server")->capture_default_str();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// `clothstream encode` and `decode`: motions in files, without a server.
+// `clothstream encode` and `decode`: options of the commands for motion files.
 #pragma once
 
 #include <string>
@@ -11,7 +11,7 @@
 
 namespace clothstream::cli {
 
-// The commands, of which one may be parsed. Outlives the parsing.
+// Must outlive the parsing.
 class MotionCommands {
  public:
   void add(CLI::App& app);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Vertices, normals, and faces in groups.
+// Formats vertices, normals and groups of faces.
 #include "clients/cli/obj_file.h"
 
 #include <iterator>
@@ -15,7 +15,7 @@ void appendTriples(std::string& text, const char* keyword, const float* values, 
                    values[3 * i + 2]);
 }
 
-// OBJ counts from 1; a vertex and its normal have the same number.
+// OBJ indices start at 1. A vertex and its normal have the same index.
 void appendFaces(std::string& text, const std::uint32_t* indices, std::uint32_t count) {
   for (std::uint32_t i = 0; i + 2 < count; i += 3)
     fmt::format_to(std::back_inserter(text), "f {0}//{0} {1}//{1} {2}//{2}\n", indices[i] + 1,

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The cloths of a client as a Wavefront OBJ file.
+// Writes the cloths of a client as a Wavefront OBJ file.
 #pragma once
 
 #include <string>
@@ -11,8 +11,8 @@
 
 namespace clothstream::cli {
 
-// Positions and normals of the newest frame, a group for each cloth; finishes the file. The error is the
-// file's.
+// Writes positions and normals of the newest frame with one group per cloth, and finishes the file. Errors as
+// in NewFile.
 [[nodiscard]] tl::expected<void, std::string> writeObj(const cs_client* client, files::NewFile& file);
 
 }  // namespace clothstream::cli

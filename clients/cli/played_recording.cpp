@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What a server would send, made from what was recorded.
+// Feeds recorded messages to a client, as a server would send them.
 #include "clients/cli/played_recording.h"
 
 #include <algorithm>
@@ -52,7 +52,7 @@ tl::expected<PlayedRecording, std::string> PlayedRecording::open(recording::Reco
   describe(played.client_.get(), *description, played.reader_.start());
   if (cs_get_state(played.client()) != CS_STATE_JOINED)
     return tl::unexpected(
-        fmt::format("the recorded stream cannot be shown: {}", cs_error_text(played.client())));
+        fmt::format("the recorded stream cannot be played: {}", cs_error_text(played.client())));
   return played;
 }
 
@@ -66,11 +66,11 @@ tl::expected<bool, std::string> PlayedRecording::next() {
     v1::ServerMessage envelope;
     const std::string_view bytes = (*message)->bytes;
     if (!envelope.mutable_frame()->ParseFromArray(bytes.data(), static_cast<int>(bytes.size())))
-      return tl::unexpected(std::string("a frame in it cannot be read"));
+      return tl::unexpected(std::string("a frame of the recording cannot be read"));
     const std::uint32_t events = give(client_.get(), envelope, time_);
     if (cs_get_state(client()) == CS_STATE_FAILED)
       return tl::unexpected(std::string(cs_error_text(client())));
-    // What the client asks and acknowledges nobody hears.
+    // Discards requests and acknowledgements of the client.
     for (std::size_t size = 0; cs_next_outgoing(client_.get(), &size) != nullptr;) {
     }
     if ((events & CS_EVENT_FRAME) != 0) return true;

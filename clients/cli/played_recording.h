@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A recorded stream in a client, frame by frame.
+// Plays a recorded stream in a client, frame by frame.
 #pragma once
 
 #include <cstdint>
@@ -15,16 +15,16 @@ namespace clothstream::cli {
 
 class PlayedRecording {
  public:
-  // The error names the path and what is wrong with it.
+  // The error describes the problem.
   [[nodiscard]] static tl::expected<PlayedRecording, std::string> open(recording::RecordingReader reader);
 
-  // Goes on to the next frame that can be decoded; false at the end. cs_get_statistics() counts those that
-  // cannot.
+  // Continues to the next frame that can be decoded. Returns false at the end. cs_get_statistics() counts the
+  // others.
   [[nodiscard]] tl::expected<bool, std::string> next();
 
   const cs_client* client() const { return client_.get(); }
   const recording::RecordingReader& reader() const { return reader_; }
-  // Of the newest frame, from the start of the recording on.
+  // Time of the newest frame since the start of the recording, s.
   double seconds() const { return static_cast<double>(time_ - reader_.start()) * 1e-9; }
 
  private:

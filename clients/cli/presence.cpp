@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Who is there, in words.
+// Texts about participants.
 #include "clients/cli/presence.h"
 
 #include <array>
@@ -30,7 +30,7 @@ std::optional<cs_role> roleNamed(const std::string& name) {
 std::string nameOf(const cs_participant& participant) {
   if (*participant.name != '\0') return participant.name;
   return fmt::format("{} (participant {})",
-                     *participant.client_name != '\0' ? participant.client_name : "somebody", participant.id);
+                     *participant.client_name != '\0' ? participant.client_name : "client", participant.id);
 }
 
 std::string nameOf(const cs_client* client, std::uint64_t participant) {
@@ -46,19 +46,19 @@ std::string text(const cs_client* client, const cs_presence& presence) {
     case CS_PRESENCE_JOINED:
       return fmt::format("{} joined as {}", name, roleName(presence.participant.role));
     case CS_PRESENCE_LEFT:
-      if (presence.reason == CS_LEAVE_TIMED_OUT) return name + " was cut off and did not come back";
+      if (presence.reason == CS_LEAVE_TIMED_OUT) return name + " was disconnected and did not return";
       if (presence.reason == CS_LEAVE_REMOVED)
         return fmt::format("{} was removed{}", name, byWhom(client, presence.by));
       return name + " left";
     case CS_PRESENCE_ROLE_CHANGED:
-      return fmt::format("{} was made {}{}", name, roleName(presence.participant.role),
+      return fmt::format("{} became {}{}", name, roleName(presence.participant.role),
                          byWhom(client, presence.by));
     case CS_PRESENCE_DISCONNECTED:
-      return name + " was cut off";
+      return name + " was disconnected";
     case CS_PRESENCE_RETURNED:
-      return name + " is back";
+      return name + " has returned";
     default:
-      return fmt::format("{}: something that this client does not know", name);
+      return fmt::format("{}: an event that this client does not know", name);
   }
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Who is there, in words.
+// Texts about participants.
 #pragma once
 
 #include <cstdint>
@@ -10,17 +10,17 @@
 
 namespace clothstream::cli {
 
-// "viewer", ...; of one that this client does not know, its number.
+// Name of a role, such as "viewer"; the number of an unknown role.
 std::string roleName(std::uint32_t role);
-// The cs_role of that name.
+// Role with this name.
 std::optional<cs_role> roleNamed(const std::string& name);
 
-// Such as: Ada, or clothstream page (participant 3) of who has no name.
+// Display name such as "Ada", or "clothstream page (participant 3)" without one.
 std::string nameOf(const cs_participant& participant);
-// Of the participant with this id; of who is not there (any more), its number.
+// Name of the participant with this id; its number if it is not in the scene.
 std::string nameOf(const cs_client* client, std::uint64_t participant);
 
-// What CS_EVENT_PRESENCE told; such as: Ada joined as participant.
+// Text of a presence event, such as "Ada joined as participant".
 std::string text(const cs_client* client, const cs_presence& presence);
 
 }  // namespace clothstream::cli

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// How far something long is.
+// Progress line of a long command.
 #pragma once
 
 #include <chrono>
@@ -7,7 +7,7 @@
 
 namespace clothstream::cli {
 
-// A line on standard error where that is a terminal, from the second second on; gone with the object.
+// Shows a line on standard error after 1 s if that is a terminal. The destructor clears it.
 class Progress {
  public:
   Progress(const char* what, std::uint32_t frames);

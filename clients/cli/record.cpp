@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Joining, and every message into the file.
+// Joins and writes every message to the file.
 #include "clients/cli/record.h"
 
 #include <chrono>
@@ -12,7 +12,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include "clients/cli/complaint.h"
+#include "clients/cli/error.h"
 #include "clients/cli/report.h"
 #include "clients/cli/signals.h"
 #include "clients/grpc/grpc_client.h"
@@ -28,10 +28,10 @@ namespace {
 using SteadyClock = std::chrono::steady_clock;
 
 constexpr std::chrono::milliseconds kInterval{50};
-// A key frame that is asked for now comes some frames later.
+// Requests a key frame early, since it arrives some frames later.
 constexpr std::uint32_t kAskAfterFrames = recording::kFramesAKeyFrame - 8;
 
-// Thread-safe: messages come on the stream's thread, chunks are closed by the waiting one.
+// Thread-safe: the stream's thread adds messages, the waiting thread closes chunks.
 class StreamFile {
  public:
   StreamFile(recording::OutputFile file, std::string program)
@@ -40,7 +40,7 @@ class StreamFile {
   void receive(std::span<const std::byte> bytes) {
     const std::lock_guard lock(mutex_);
     if (!written_ || !message_.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()))) return;
-    // What comes to somebody else than who began the file is of another stream, perhaps of another server.
+    // A Welcome that does not resume starts another stream, perhaps of another server.
     if (message_.has_welcome() && writer_ && !message_.welcome().resumed()) broken_ = true;
     if (broken_) return;
     if (message_.has_welcome()) welcome_ = message_.welcome();
@@ -53,7 +53,7 @@ class StreamFile {
     sinceKey_ = isKey(message_.frame()) ? 0 : sinceKey_ + 1;
   }
 
-  // The stream that the file holds is over, though another one comes.
+  // Whether the recorded stream is over because another one has started.
   bool broken() const {
     const std::lock_guard lock(mutex_);
     return broken_;
@@ -64,7 +64,7 @@ class StreamFile {
     return sinceKey_ >= kAskAfterFrames;
   }
 
-  // What was received a chunk's time ago is with the system when it returns.
+  // Closes the chunk when its time is over, so that its messages reach the operating system.
   recording::Written flush() {
     const std::lock_guard lock(mutex_);
     if (written_ && writer_ && chunkStart_ &&
@@ -96,7 +96,7 @@ class StreamFile {
     return packet && packet->header.kind == codec::PacketKind::key;
   }
 
-  // Pieces of one content come in order; the client's core refuses a stream in which they do not.
+  // Chunks of one content are in order; the client core refuses other streams.
   void take(const v1::Chunk& chunk) {
     if (chunk.content_id() != welcome_.description_content_id() && writer_ == std::nullopt) return;
     if (chunk.index() == 0) content_.clear();
@@ -134,18 +134,18 @@ class StreamFile {
   const std::string program_;
   const recording::RecordingClock clock_;
   recording::Written written_;
-  std::optional<recording::RecordingWriter> writer_;  // from the description on
+  std::optional<recording::RecordingWriter> writer_;  // set after the description
   v1::ServerMessage message_;
   v1::Welcome welcome_;
   std::string content_;
   std::optional<SteadyClock::time_point> chunkStart_;
   bool broken_ = false;
   std::uint64_t frames_ = 0;
-  std::uint32_t sinceKey_ = 0;  // frames
+  std::uint32_t sinceKey_ = 0;  // frames since the last key frame
 };
 
-// Until the time is over, a signal comes, the stream ends or the file cannot be written.
-std::optional<Complaint> follow(GrpcClient& client, StreamFile& file, const RecordOptions& options) {
+// Waits for the end of the time, a signal, the end of the stream or a write error.
+std::optional<Error> follow(GrpcClient& client, StreamFile& file, const RecordOptions& options) {
   const auto start = SteadyClock::now();
   const bool terminal = isatty(STDERR_FILENO) != 0;
   for (;;) {
@@ -158,12 +158,13 @@ std::optional<Complaint> follow(GrpcClient& client, StreamFile& file, const Reco
       wait = std::min(wait, left);
     }
     if (interrupted(wait)) return std::nullopt;
-    if (auto written = file.flush(); !written) return Complaint{kNotWritten, written.error()};
+    if (auto written = file.flush(); !written) return Error{kNotWritten, written.error()};
     if (file.broken())
-      return Complaint{kLost,
-                       "The connection was lost for so long, or the server began anew, that the stream "
-                       "could not be taken up again: the recording ends there."};
-    if (const auto failure = client.ended()) return Complaint{exitCodeOf(failure->kind), failure->text};
+      return Error{
+          kLost,
+          "The stream could not be resumed, because the connection was lost for too long or the server "
+          "was restarted: the recording ends there."};
+    if (const auto failure = client.ended()) return Error{exitCodeOf(failure->kind), failure->text};
     if (terminal)
       fmt::print(stderr, "\r\033[K{:.0f} s, {} frames, {:.1f} MiB", passed.count(), file.frames(),
                  static_cast<double>(file.bytes()) / (1 << 20));
@@ -174,7 +175,7 @@ std::optional<Complaint> follow(GrpcClient& client, StreamFile& file, const Reco
 
 ExitCode record(const RecordOptions& options) {
   auto output = recording::OutputFile::create(options.output);
-  if (!output) return say({kNotWritten, output.error()});
+  if (!output) return printError(Error{kNotWritten, output.error()});
   StreamFile file(std::move(*output), options.program);
   GrpcClientOptions clientOptions;
   clientOptions.scene = options.scene;
@@ -185,31 +186,29 @@ ExitCode record(const RecordOptions& options) {
   const auto onEvents = [&](cs_client* core, std::uint32_t events) {
     if (events == 0 && cs_get_state(core) == CS_STATE_RECONNECTING)
       fmt::print(stderr,
-                 "clothstream: the connection is lost; trying to come back. What is streamed meanwhile "
-                 "will be missing.\n");
+                 "clothstream: the connection is lost; reconnecting. Frames of this time will be missing.\n");
     if ((events & CS_EVENT_RETURNED) != 0 && cs_resumed(core) != 0)
-      fmt::print(stderr, "clothstream: back; the recording goes on.\n");
+      fmt::print(stderr, "clothstream: reconnected; the recording continues.\n");
     if ((events & CS_EVENT_FRAME) != 0 && file.wantsKeyFrame())
       cs_request_key_frame(core, GrpcClient::nowUs());
   };
-  std::optional<Complaint> problem;
+  std::optional<Error> problem;
   Report report;
   {
     auto joined = GrpcClient::join(options.address, clientOptions, onEvents);
     if (!joined) {
       std::filesystem::remove(options.output);
-      return say({exitCodeOf(joined.error().kind), joined.error().text});
+      return printError(Error{exitCodeOf(joined.error().kind), joined.error().text});
     }
     problem = follow(**joined, file, options);
     (*joined)->visit([&](cs_client* core) { report = Report::of(core, GrpcClient::nowUs()); });
   }
   if (isatty(STDERR_FILENO) != 0) fmt::print(stderr, "\r\033[K");
-  if (auto finished = file.finish(); !finished && !problem)
-    problem = Complaint{kNotWritten, finished.error()};
-  fmt::print("{}: {}, {} frames in {:.1f} s, {:.1f} MiB; {} frames were lost on the way\n", options.output,
-             report.scene, file.frames(), report.seconds, static_cast<double>(file.bytes()) / (1 << 20),
+  if (auto finished = file.finish(); !finished && !problem) problem = Error{kNotWritten, finished.error()};
+  fmt::print("{}: {}, {} frames in {:.1f} s, {:.1f} MiB; {} frames were lost\n", options.output, report.scene,
+             file.frames(), report.seconds, static_cast<double>(file.bytes()) / (1 << 20),
              report.statistics.dropped);
-  return problem ? say(*problem) : kOk;
+  return problem ? printError(*problem) : kOk;
 }
 
 }  // namespace clothstream::cli

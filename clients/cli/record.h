@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// `clothstream record`: writes a stream down as it comes.
+// `clothstream record`: writes a live stream to a file.
 #pragma once
 
 #include <optional>
@@ -10,14 +10,15 @@
 namespace clothstream::cli {
 
 struct RecordOptions {
-  std::string address;  // as completeAddress gives it
-  std::string scene;    // empty: the server's default
+  std::string address;  // from completeAddress()
+  std::string scene;    // empty: the server's default scene
   std::string output;
-  std::optional<double> seconds;  // nothing: until a signal
-  std::string program;            // name and version of this one
+  std::optional<double> seconds;  // not set: until a signal
+  std::string program;            // name and version of this program
 };
 
-// SIGINT and SIGTERM must be blocked: they end the recording like the end of its time, and it is whole.
+// SIGINT and SIGTERM must be blocked in every thread; they end the recording like its time limit, and the
+// file is complete.
 ExitCode record(const RecordOptions& options);
 
 }  // namespace clothstream::cli

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// `clothstream record`, `info`, `recover` and `export`.
+// `clothstream record`, `info`, `recover` and `export`: options of the commands for recordings.
 #pragma once
 
 #include <string>
@@ -13,10 +13,10 @@
 
 namespace clothstream::cli {
 
-// The commands, of which one may be parsed. Outlives the parsing.
+// Must outlive the parsing.
 class RecordingCommands {
  public:
-  // `address` is what the server's is read into.
+  // The parser stores the server's address in `address`.
   void add(CLI::App& app, std::string& address);
   bool parsed() const;
   ExitCode run(const std::string& address, const std::string& program);

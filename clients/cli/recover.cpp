@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Every chunk that can be read, written anew and read again.
+// Copies every readable chunk to a new recording and verifies the copy.
 #include "clients/cli/recover.h"
 
 #include <filesystem>
@@ -8,7 +8,7 @@
 
 #include <fmt/format.h>
 
-#include "clients/cli/complaint.h"
+#include "clients/cli/error.h"
 #include "clients/cli/progress.h"
 #include "clients/cli/signals.h"
 #include "proto/recording/file.h"
@@ -22,9 +22,9 @@ using recording::CutFiles;
 using recording::RecordingReader;
 
 template <typename T>
-using Expected = tl::expected<T, Complaint>;
+using Expected = tl::expected<T, Error>;
 
-// Of what was read or written, all messages together.
+// Checksum over all messages that were read or written.
 struct Sum {
   std::uint64_t messages = 0, firstTime = 0, lastTime = 0;
   std::uint32_t crc = 0;
@@ -48,15 +48,15 @@ class Recovery {
   explicit Recovery(const RecoverOptions& options) : options_(options) {}
 
   Expected<Recovered> run() {
-    auto facts = orComplaint(kUnreadable, RecordingReader::open(options_.recording, CutFiles::read));
-    if (!facts) return tl::unexpected(facts.error());
-    auto file = orComplaint(kUnreadable, recording::openFile(options_.recording));
+    auto damaged = orError(kUnreadable, RecordingReader::open(options_.recording, CutFiles::read));
+    if (!damaged) return tl::unexpected(damaged.error());
+    auto file = orError(kUnreadable, recording::openFile(options_.recording));
     if (!file) return tl::unexpected(file.error());
-    auto mcap = orComplaint(kUnreadable, recording::McapReader::open(std::move(*file)));
+    auto mcap = orError(kUnreadable, recording::McapReader::open(std::move(*file)));
     if (!mcap) return tl::unexpected(mcap.error());
-    auto out = orComplaint(kNotWritten, recording::OutputFile::create(options_.out));
+    auto out = orError(kNotWritten, recording::OutputFile::create(options_.out));
     if (!out) return tl::unexpected(out.error());
-    auto recovered = copy(*facts, *mcap, *out);
+    auto recovered = copy(*damaged, *mcap, *out);
     if (recovered) {
       if (auto verified = verify(*recovered); !verified) recovered = tl::unexpected(verified.error());
     }
@@ -65,16 +65,16 @@ class Recovery {
   }
 
  private:
-  Expected<Recovered> copy(const RecordingReader& facts, recording::McapReader& mcap,
+  Expected<Recovered> copy(const RecordingReader& damaged, recording::McapReader& mcap,
                            recording::OutputFile& out) {
-    auto writer = orComplaint(kNotWritten, recording::RecordingWriter::begin(
-                                               [&](std::string_view bytes) { return out.write(bytes); },
-                                               mcap.library() + "; clothstream recover", facts.facts()));
+    auto writer = orError(kNotWritten, recording::RecordingWriter::begin(
+                                           [&](std::string_view bytes) { return out.write(bytes); },
+                                           mcap.library() + "; clothstream recover", damaged.facts()));
     if (!writer) return tl::unexpected(writer.error());
     Recovered recovered;
     Progress progress("recover", static_cast<std::uint32_t>(mcap.chunks().size()));
     for (std::size_t i = 0; i < mcap.chunks().size(); ++i) {
-      if (interrupted()) return complaint(kNotWritten, "interrupted; {} is not written", options_.out);
+      if (interrupted()) return makeError(kNotWritten, "interrupted; {} was not written", options_.out);
       progress.show(static_cast<std::uint32_t>(i));
       const auto messages = mcap.read(i);
       if (!messages) {
@@ -82,34 +82,33 @@ class Recovery {
         continue;
       }
       for (const recording::Message& message : *messages) {
-        const auto topic = facts.topicOf(message.channel);
+        const auto topic = damaged.topicOf(message.channel);
         if (!topic) continue;
-        if (auto written = orComplaint(kNotWritten, writer->write(*topic, message.time, message.bytes));
-            !written)
+        if (auto written = orError(kNotWritten, writer->write(*topic, message.time, message.bytes)); !written)
           return tl::unexpected(written.error());
         recovered.sum.add(message);
       }
     }
     if (recovered.sum.messages == 0)
-      return complaint(kUnreadable, "there is nothing in {} that could be recovered", options_.recording);
-    if (auto done = orComplaint(kNotWritten, writer->finish().and_then([&] { return out.sync(); })); !done)
+      return makeError(kUnreadable, "{} has no readable messages", options_.recording);
+    if (auto done = orError(kNotWritten, writer->finish().and_then([&] { return out.sync(); })); !done)
       return tl::unexpected(done.error());
     return recovered;
   }
 
   Expected<void> verify(const Recovered& recovered) const {
-    auto reader = orComplaint(kNotWritten, RecordingReader::open(options_.out));
+    auto reader = orError(kNotWritten, RecordingReader::open(options_.out));
     if (!reader) return tl::unexpected(reader.error());
-    if (auto checked = orComplaint(kNotWritten, reader->check()); !checked) return checked;
+    if (auto checked = orError(kNotWritten, reader->check()); !checked) return checked;
     Sum sum;
     for (;;) {
-      const auto message = orComplaint(kNotWritten, reader->next());
+      const auto message = orError(kNotWritten, reader->next());
       if (!message) return tl::unexpected(message.error());
       if (!*message) break;
       sum.add({0, (*message)->time, (*message)->bytes});
     }
     if (sum != recovered.sum)
-      return complaint(kNotWritten, "{} is not read as it was written; it is removed", options_.out);
+      return makeError(kNotWritten, "{} differs from what was written; it was removed", options_.out);
     return {};
   }
 
@@ -120,13 +119,14 @@ class Recovery {
 
 ExitCode recover(const RecoverOptions& options) {
   const auto recovered = Recovery(options).run();
-  if (!recovered) return say(recovered.error());
+  if (!recovered) return printError(recovered.error());
   const Sum& sum = recovered->sum;
-  fmt::print("{}: {} messages of {:.1f} s, read again and whole\n", options.out, sum.messages,
+  fmt::print("{}: {} messages of {:.1f} s, complete and verified\n", options.out, sum.messages,
              static_cast<double>(sum.lastTime - sum.firstTime) * 1e-9);
   if (recovered->lostChunks == 0) return kOk;
-  return say({kUnreadable, fmt::format("{} damaged chunks of {} are not in {}: {}", recovered->lostChunks,
-                                       options.recording, options.out, recovered->firstLoss)});
+  return printError(
+      Error{kUnreadable, fmt::format("{} damaged chunks of {} are missing in {}: {}", recovered->lostChunks,
+                                     options.recording, options.out, recovered->firstLoss)});
 }
 
 }  // namespace clothstream::cli

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// `clothstream recover`: a whole recording of what a damaged one still holds.
+// `clothstream recover`: writes a complete recording from a damaged one.
 #pragma once
 
 #include <string>
@@ -12,8 +12,8 @@ struct RecoverOptions {
   std::string recording, out;
 };
 
-// What was written is read again and compared before this says that all is well; otherwise there is no file.
-// SIGINT and SIGTERM must be blocked: then there is none either.
+// Reads the written file again and compares it; removes it if it differs. SIGINT and SIGTERM must be blocked
+// in every thread; they cancel the command and leave no file.
 ExitCode recover(const RecoverOptions& options);
 
 }  // namespace clothstream::cli

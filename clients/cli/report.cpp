@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Figures in words.
+// Formats the figures.
 #include "clients/cli/report.h"
 
 #include <cstdio>
@@ -37,7 +37,7 @@ std::string text(const ClothFigures& figures) {
   if (now.iterations > 0 || now.active_constraints > 0)
     line += fmt::format("; {} constraints, {} iterations, residual {:.2g}", now.active_constraints,
                         now.iterations, now.residual);
-  return line + fmt::format("; {:.2g} mm into a collider; {:.2f} ms on the device", 1000 * now.penetration,
+  return line + fmt::format("; {:.2g} mm inside a collider; {:.2f} ms on the device", 1000 * now.penetration,
                             now.device_ms);
 }
 
@@ -110,7 +110,7 @@ std::string Report::json(bool hash) const {
                                 {"deviceMs", now.device_ms}});
   }
   if (hash) object["hashMismatches"] = statistics.hash_mismatches;
-  // Names come from the server and need not be UTF-8.
+  // Names come from the server and may be invalid UTF-8.
   return object.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
 }
 
@@ -123,7 +123,7 @@ std::string Report::text(bool hash) const {
       kbitPerSecond(), statistics.bits_per_vertex, statistics.round_trip_ms, statistics.dropped,
       statistics.decode_errors);
   if (hash)
-    text += fmt::format("\n{} of {} frames are what the server holds",
+    text += fmt::format("\n{} of {} frames equal the server's",
                         statistics.frames - statistics.hash_mismatches, statistics.frames);
   for (const ClothFigures& figures : cloths) text += '\n' + cli::text(figures);
   return text;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The figures of a stream: as a live line, as a summary, as JSON.
+// Figures of a stream: live line, summary and JSON.
 #pragma once
 
 #include <cstdint>
@@ -10,16 +10,16 @@
 
 namespace clothstream::cli {
 
-// How the simulation of one cloth does, as the server said last.
+// Newest simulation report of one cloth.
 struct ClothFigures {
   std::string name, solver;
   cs_cloth_report report{};
 };
 
-// A line for people.
+// One line of text for users.
 std::string text(const ClothFigures& figures);
 
-// The name of a cs_solver, as the scene files have it; of one that this client does not know, its number.
+// Name of a cs_solver as in scene files; the number of an unknown solver.
 std::string solverName(std::uint32_t solver);
 
 struct Report {
@@ -27,22 +27,22 @@ struct Report {
   std::uint32_t vertices = 0, streamRate = 0;
   double seconds = 0;  // from the first frame to the newest
   cs_statistics statistics{};
-  std::uint32_t quality = 0, temporalLayers = 0;  // of what is sent now
-  std::vector<ClothFigures> cloths;               // none before the first report
+  std::uint32_t quality = 0, temporalLayers = 0;  // as currently sent
+  std::vector<ClothFigures> cloths;               // empty before the first report
 
   static Report of(const cs_client* client, std::uint64_t nowUs);
 
-  // Over all frames, unlike those of the statistics.
+  // Averages over all frames. The statistics hold averages over the last second.
   double framesPerSecond() const;
   double kbitPerSecond() const;
 
-  // One object; with what --hash adds.
+  // One JSON object. `hash` adds the result of --hash.
   std::string json(bool hash) const;
-  // Some lines for people, without the last line's end.
+  // Several lines of text, without a final line break.
   std::string text(bool hash) const;
 };
 
-// One line of a terminal that is written again and again; nothing where it is not shown.
+// A line on the terminal that is updated in place. Does nothing if not shown.
 class StatusLine {
  public:
   explicit StatusLine(bool shown) : shown_(shown) {}

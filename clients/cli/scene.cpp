@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Scenes of a server, made and ended.
+// Options and actions of the scene commands.
 #include "clients/cli/scene.h"
 
 #include <fstream>
@@ -9,7 +9,7 @@
 #include <google/protobuf/util/json_util.h>
 #include <unistd.h>
 
-#include "clients/cli/complaint.h"
+#include "clients/cli/error.h"
 #include "clients/grpc/scene_control.h"
 
 namespace clothstream::cli {
@@ -18,21 +18,22 @@ namespace {
 tl::expected<v1::Scene, std::string> readScene(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
   const std::string json{std::istreambuf_iterator<char>(file), {}};
-  if (!file) return tl::unexpected(fmt::format("{}: cannot be read", path));
+  if (!file) return tl::unexpected(fmt::format("cannot read {}", path));
   v1::Scene scene;
   const auto status = google::protobuf::util::JsonStringToMessage(json, &scene);
   if (!status.ok()) return tl::unexpected(fmt::format("{}: {}", path, std::string(status.message())));
   for (const v1::Cloth& cloth : scene.cloths())
     if (!cloth.mesh().file().empty())
-      return tl::unexpected(fmt::format(
-          "{}: the cloth '{}' names the mesh file {}, which the server does not have; `clothstream-server "
-          "print-scene {}` gives the scene with its geometry",
-          path, cloth.name(), cloth.mesh().file(), path));
+      return tl::unexpected(
+          fmt::format("{}: the cloth '{}' refers to the mesh file {}, which the server does not have; "
+                      "`clothstream-server "
+                      "print-scene {}` prints the scene with its geometry",
+                      path, cloth.name(), cloth.mesh().file(), path));
   return scene;
 }
 
 ExitCode done(const tl::expected<void, Failure>& result) {
-  return result ? kOk : complain(exitCodeOf(result.error().kind), result.error().text);
+  return result ? kOk : printError(exitCodeOf(result.error().kind), result.error().text);
 }
 
 }  // namespace
@@ -46,39 +47,38 @@ void SceneCommands::add(CLI::App& app, std::string& address) {
   const auto takesAddress = [&](CLI::App* added) {
     added->add_option("--server", address, "HOST or HOST:PORT of the server")->capture_default_str();
   };
-  create_ = command("create", "Make another scene on a server, from a JSON file or one that it knows");
-  CLI::Option* file = create_->add_option("FILE", options_.file, "A scene in JSON");
-  create_->add_option("--named", options_.named, "A copy of this scene of the server's instead of a file")
+  create_ = command("create", "Create a scene on a server from a JSON file or a built-in scene");
+  CLI::Option* file = create_->add_option("FILE", options_.file, "Scene in JSON");
+  create_->add_option("--named", options_.named, "Copy this built-in scene of the server instead of a file")
       ->excludes(file);
-  create_->add_option("--name", options_.name, "The new scene's name, instead of its own");
+  create_->add_option("--name", options_.name, "Name of the new scene; default: the name in the file");
   create_->add_option("--max-participants", options_.maxParticipants,
-                      "Who may be in it at once, instead of as many as the server lets into a scene");
+                      "Most participants at a time; default: the server's limit");
   takesAddress(create_);
-  delete_ = command("delete", "End a scene that was created; who is in it is told");
-  pause_ = command("pause", "Stop the clock of a scene");
-  resume_ = command("resume", "Let a paused scene go on");
-  reset_ = command("reset", "Put the cloths of a scene back to where they start");
-  seek_ = command("seek", "Let a recording that is played go on from another time");
-  speed_ = command("speed", "Play a recording slower or faster");
-  loop_ = command("loop", "Whether a recording that is played begins anew at its end");
-  startRecording_ =
-      command("start-recording", "Let a server write down all that happens in a scene, on its own disk");
+  delete_ = command("delete", "Delete a scene that was created; its participants are notified");
+  pause_ = command("pause", "Pause a scene");
+  resume_ = command("resume", "Resume a paused scene");
+  reset_ = command("reset", "Reset the cloths of a scene to their start");
+  seek_ = command("seek", "Continue a played recording at another time");
+  speed_ = command("speed", "Set the speed of a played recording");
+  loop_ = command("loop", "Set whether a played recording restarts at its end");
+  startRecording_ = command("start-recording", "Record a scene to a file on the server");
   startRecording_->add_option("--name", options_.recording,
-                              "Of the file, without .mcap; else the server's choice");
-  stopRecording_ = command("stop-recording", "End the recording of a scene on its server");
+                              "Name of the file without .mcap; default: the server chooses");
+  stopRecording_ = command("stop-recording", "Stop the recording of a scene on the server");
   for (CLI::App* added :
        {delete_, pause_, resume_, reset_, seek_, speed_, loop_, startRecording_, stopRecording_}) {
-    added->add_option("SCENE", options_.name, "Its name")->required();
+    added->add_option("SCENE", options_.name, "Name of the scene")->required();
     takesAddress(added);
   }
-  seek_->add_option("SECONDS", options_.seek, "From its start")->required();
-  speed_->add_option("SPEED", options_.speed, "Seconds of it that pass in one; 1: as it was")->required();
+  seek_->add_option("SECONDS", options_.seek, "Seconds from the start")->required();
+  speed_->add_option("SPEED", options_.speed, "Playback speed; 1 is the recorded speed")->required();
   loop_->add_option("ON", options_.loop, "on or off")->required();
 }
 
 void SceneCommands::check() const {
   if (create_->parsed() && options_.file.empty() && options_.named.empty())
-    throw CLI::ValidationError("create", "give a FILE, or --named and a scene that the server knows");
+    throw CLI::ValidationError("create", "give a FILE, or --named with a built-in scene of the server");
 }
 
 bool SceneCommands::parsed() const {
@@ -95,7 +95,7 @@ ExitCode SceneCommands::create() const {
   create.maxParticipants = options_.maxParticipants;
   if (options_.named.empty()) {
     auto scene = readScene(options_.file);
-    if (!scene) return complain(kUsage, scene.error());
+    if (!scene) return printError(kUsage, scene.error());
     create.scene = std::move(*scene);
   }
   if (isatty(STDERR_FILENO) != 0)
@@ -104,7 +104,7 @@ ExitCode SceneCommands::create() const {
         fmt::print(stderr, "\rsent {} of {} KiB{}", sent / 1024, all / 1024, sent == all ? "\n" : "");
     };
   const auto created = createScene(options_.address, create);
-  if (!created) return complain(exitCodeOf(created.error().kind), created.error().text);
+  if (!created) return printError(exitCodeOf(created.error().kind), created.error().text);
   fmt::print("{}\n", *created);
   return kOk;
 }
@@ -118,7 +118,7 @@ ExitCode SceneCommands::control(const std::string& address) const {
   if (speed_->parsed()) request.set_speed(options_.speed);
   if (loop_->parsed()) request.set_loop(options_.loop);
   const auto scene = controlScene(address, request);
-  if (!scene) return complain(exitCodeOf(scene.error().kind), scene.error().text);
+  if (!scene) return printError(exitCodeOf(scene.error().kind), scene.error().text);
   if (!scene->has_playback()) return kOk;
   const v1::Playback& playback = scene->playback();
   fmt::print("{}: at {:.2f} s of {:.2f} s, speed {}{}{}\n", scene->name(), playback.position(),
@@ -130,12 +130,12 @@ ExitCode SceneCommands::control(const std::string& address) const {
 ExitCode SceneCommands::record(const std::string& address) const {
   if (startRecording_->parsed()) {
     const auto file = startRecording(address, options_.name, options_.recording);
-    if (!file) return complain(exitCodeOf(file.error().kind), file.error().text);
+    if (!file) return printError(exitCodeOf(file.error().kind), file.error().text);
     fmt::print("{}\n", *file);
     return kOk;
   }
   const auto stopped = stopRecording(address, options_.name);
-  if (!stopped) return complain(exitCodeOf(stopped.error().kind), stopped.error().text);
+  if (!stopped) return printError(exitCodeOf(stopped.error().kind), stopped.error().text);
   fmt::print("{}: {:.1f} MiB\n", stopped->file(), static_cast<double>(stopped->bytes()) / (1 << 20));
   return kOk;
 }

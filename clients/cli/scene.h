@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// `clothstream create`, `delete`, `pause`, `resume`, `reset`: scenes of a server; `seek`, `speed` and `loop`:
-// those that are recordings.
+// Commands for scenes of a server: `create`, `delete`, `pause`, `resume`, `reset`, `start-recording`,
+// `stop-recording`; for scenes that play a recording: `seek`, `speed`, `loop`.
 #pragma once
 
 #include <cstdint>
@@ -14,23 +14,23 @@
 namespace clothstream::cli {
 
 struct SceneOptions {
-  std::string address;                // as completeAddress gives it
-  std::string file;                   // create: of a scene, in JSON
-  std::string named;                  // create: instead of a file, one that the server knows
-  std::string name;                   // of the scene; create: instead of its own
+  std::string address;                // from completeAddress()
+  std::string file;                   // create: scene in JSON
+  std::string named;                  // create: built-in scene instead of a file
+  std::string name;                   // scene; create: new name of the scene
   std::uint32_t maxParticipants = 0;  // create; 0: the server's limit
   double seek = 0;                    // s
   double speed = 1;
   bool loop = false;
-  std::string recording;  // start-recording: the file's name; empty: the server's choice
+  std::string recording;  // start-recording: name of the file; empty: the server chooses
 };
 
-// The commands, of which one may be parsed. Both outlive the parsing.
+// Must outlive the parsing, like the address.
 class SceneCommands {
  public:
-  // `address` is shared with the other commands.
+  // The commands share `address` with other commands.
   void add(CLI::App& app, std::string& address);
-  // Throws CLI::ValidationError where what is given does not make sense together.
+  // Checks the options together. Throws CLI::ValidationError.
   void check() const;
   bool parsed() const;
   ExitCode run(const std::string& address);

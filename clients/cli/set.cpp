@@ -10,7 +10,7 @@
 
 #include <fmt/format.h>
 
-#include "clients/cli/complaint.h"
+#include "clients/cli/error.h"
 #include "clients/grpc/grpc_client.h"
 
 namespace clothstream::cli {
@@ -83,7 +83,7 @@ ExitCode set(const SetOptions& options) {
   auto joined =
       GrpcClient::join(options.address, clientOptions,
                        [&](cs_client* client, std::uint32_t events) { answers.heard(client, events); });
-  if (!joined) return complain(exitCodeOf(joined.error().kind), joined.error().text);
+  if (!joined) return printError(exitCodeOf(joined.error().kind), joined.error().text);
   int changes = 0;
   std::string refusal;
   const auto changeBy = [&](const auto& send) {
@@ -115,8 +115,8 @@ ExitCode set(const SetOptions& options) {
     }
   });
   if (const auto failure = (*joined)->ended(); failure && !refusal.empty())
-    return complain(exitCodeOf(failure->kind), failure->text);
-  if (!refusal.empty()) return complain(kRefused, refusal);
+    return printError(exitCodeOf(failure->kind), failure->text);
+  if (!refusal.empty()) return printError(kRefused, refusal);
   return kOk;
 }
 

@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: MIT
-// Signals that end the program are waited for, never handled.
+// Signals that end the program. The program waits for them instead of handling them.
 #pragma once
 
 #include <chrono>
 
 namespace clothstream::cli {
 
-// SIGINT and SIGTERM. Before any thread starts, so that all inherit it.
+// Blocks SIGINT and SIGTERM. Call it before any thread starts, so that all inherit it.
 void blockEndingSignals();
 
-// True if one of them came within the time.
+// Waits for one of the signals. Returns false if none arrived within the time.
 bool interrupted(std::chrono::milliseconds time = {});
 
 }  // namespace clothstream::cli

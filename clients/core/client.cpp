@@ -1,21 +1,16 @@
 // SPDX-License-Identifier: MIT
-// One message of the server's after the other.
+// The state machine: connection and messages of the server.
 #include "clients/core/client.h"
 
 #include <algorithm>
 #include <utility>
 
-#include "clients/core/description.h"
+#include "clients/core/wire/description.h"
 #include "proto/codec/packet_header.h"
 
 namespace clothstream::client {
 
-namespace {
-
-// ErrorCode of session.proto.
-constexpr std::uint32_t kResourceExhausted = 8, kCutOff = 31;
-
-}  // namespace
+namespace {}  // namespace
 
 Client::Client(Greeting greeting) : greeting_(std::move(greeting)) {
   greet();
@@ -24,7 +19,7 @@ Client::Client(Greeting greeting) : greeting_(std::move(greeting)) {
 void Client::greet() {
   std::string hello;
   writeHello(hello, ++lastRequestId_, greeting_);
-  // There is room: it is the first.
+  // The outbox is empty, so there is room.
   static_cast<void>(outbox_.addControl(std::move(hello)));
 }
 
@@ -41,7 +36,7 @@ void Client::connecting(std::uint64_t nowUs) {
   assembly_ = {};
   keyFrameRequest_ = {};
   ++greeting_.attempt;
-  connectAtUs_ = reconnection_.attemptEnd(nowUs, std::uint64_t{1000} * welcome_.holdMs);
+  connectAtUs_ = reconnection_.attemptEnd(nowUs, std::uint64_t{1000} * welcome_.graceMs);
   greet();
 }
 
@@ -52,7 +47,7 @@ void Client::disconnected(std::uint64_t nowUs) {
   outbox_.clear();
   std::uint64_t seed = 0;
   for (const char byte : greeting_.token) seed = seed * 257 + static_cast<unsigned char>(byte);
-  connectAtUs_ = reconnection_.lost(nowUs, std::uint64_t{1000} * welcome_.holdMs, seed);
+  connectAtUs_ = reconnection_.lost(nowUs, std::uint64_t{1000} * welcome_.graceMs, seed);
 }
 
 std::uint64_t Client::connectAtUs() const {
@@ -97,10 +92,11 @@ std::uint32_t Client::receive(Bytes bytes, std::uint64_t nowUs) {
 }
 
 void Client::update(std::uint64_t nowUs) {
-  // Who stood still has not listened: what came meanwhile still waits to be received.
-  const std::uint64_t stoodStill = nowUs - std::exchange(updatedUs_, nowUs);
-  if (stoodStill > Reconnection::kLongestStepUs)
-    lastHeardUs_ = std::min(nowUs, lastHeardUs_ + stoodStill - Reconnection::kLongestStepUs);
+  // A long pause between two updates does not count as silence: messages that arrived meanwhile are not read
+  // yet.
+  const std::uint64_t pauseUs = nowUs - std::exchange(updatedUs_, nowUs);
+  if (pauseUs > Reconnection::kLongestStepUs)
+    lastHeardUs_ = std::min(nowUs, lastHeardUs_ + pauseUs - Reconnection::kLongestStepUs);
   if (!welcomed_ || state_ == CS_STATE_FAILED || !clock_.pingDue(nowUs)) return;
   std::string ping;
   writePing(ping, ++lastRequestId_, nowUs);
@@ -111,21 +107,21 @@ void Client::update(std::uint64_t nowUs) {
 std::uint32_t Client::welcomed(Bytes body, std::uint64_t nowUs) {
   std::optional<Welcome> welcome = readWelcome(body);
   if (!welcome) return failMalformed("Welcome");
-  if (welcomed_) return fail("The server said Welcome twice.");
+  if (welcomed_) return fail("The server sent Welcome twice.");
   if (welcome->protocolVersion != CS_PROTOCOL_VERSION)
-    return fail("The server answers in protocol version " + std::to_string(welcome->protocolVersion) +
-                "; this client speaks version " + std::to_string(CS_PROTOCOL_VERSION) +
+    return fail("The server uses protocol version " + std::to_string(welcome->protocolVersion) +
+                "; this client uses version " + std::to_string(CS_PROTOCOL_VERSION) +
                 ". Use a client and a server of the same release.");
   if (!codec::isCodec(welcome->codec))
     return fail("The server chose codec " + std::to_string(welcome->codec) + "; this client decodes " +
                 decodedCodecs() + ".");
-  const bool again = state_ == CS_STATE_RECONNECTING;
-  // Said where the server said so before, and only then.
-  const bool known = again && welcome->resumed && decoder_ && greeting_.contentId != 0 &&
+  const bool returned = state_ == CS_STATE_RECONNECTING;
+  // Whether the server resumed the participant and its description is still the one that this client has.
+  const bool known = returned && welcome->resumed && decoder_ && greeting_.contentId != 0 &&
                      welcome->contentId == greeting_.contentId;
   welcome_ = std::move(*welcome);
   welcomed_ = true;
-  resumed_ = again && welcome_.resumed;
+  resumed_ = returned && welcome_.resumed;
   participants_ = std::move(welcome_.participants);
   greeting_.token = welcome_.token;
   greeting_.scene = welcome_.scene;
@@ -133,8 +129,8 @@ std::uint32_t Client::welcomed(Bytes body, std::uint64_t nowUs) {
   reconnection_.joined(nowUs);
   point_ = formerPoint_ = {};
   acknowledgement_ = {};
-  if (again && !resumed_) clock_ = {};
-  if (again && posed_) sendPoses(nowUs);
+  if (returned && !resumed_) clock_ = {};
+  if (returned && posed_) sendPoses(nowUs);
   const std::uint32_t events = participants_.empty() ? 0 : CS_EVENT_PARTICIPANTS;
   if (!known) return events;
   state_ = CS_STATE_JOINED;
@@ -167,7 +163,7 @@ std::uint32_t Client::chunkReceived(Bytes body) {
   if (!chunk) return failMalformed("Chunk");
   if (!welcomed_) return fail("The server sent a description before its Welcome.");
   auto content = assembly_.add(*chunk);
-  if (!content) return fail("The server sent the description wrongly: " + content.error() + ".");
+  if (!content) return fail("The server sent a wrong description: " + content.error() + ".");
   if (!*content) return 0;
   return described(**content);
 }
@@ -177,18 +173,18 @@ std::uint32_t Client::described(Bytes content) {
   if (!description)
     return fail("The server's description of the scene is wrong: " + description.error() + ".");
   auto decoder = codec::Decoder::make(description->layout);
-  if (!decoder) return fail("The server's description of the scene is wrong: no stream can have its layout.");
+  if (!decoder) return fail("The server's description of the scene is wrong: its layout is not possible.");
   description_ = std::move(*description);
   decoder_ = std::move(decoder);
   keyFrameRequest_.answered();
-  // Of who came back they go on: what it missed was dropped.
+  // After a resume the ticks continue, so frames missed during the outage count as dropped.
   if (!resumed_) statistics_.forgetTicks();
   report_ = {};
   if (playOut_) playOut_->begin(description_);
   greeting_.contentId = welcome_.contentId;
-  const bool again = state_ == CS_STATE_RECONNECTING;
+  const bool returned = state_ == CS_STATE_RECONNECTING;
   state_ = CS_STATE_JOINED;
-  return again ? CS_EVENT_DESCRIPTION | CS_EVENT_RETURNED : CS_EVENT_DESCRIPTION;
+  return returned ? CS_EVENT_DESCRIPTION | CS_EVENT_RETURNED : CS_EVENT_DESCRIPTION;
 }
 
 std::uint32_t Client::frameReceived(Bytes body, std::uint64_t nowUs) {
@@ -208,7 +204,8 @@ std::uint32_t Client::frameReceived(Bytes body, std::uint64_t nowUs) {
 std::uint32_t Client::packetReceived(std::uint64_t nowUs) {
   const auto packet = std::as_bytes(std::span(frame_.packet.data(), frame_.packet.size()));
   const auto parsed = codec::parsePacket(packet);
-  // What the server left out, where fewer layers came until now or come from now on, is not lost.
+  // Frames that the server omits are not lost. At a change of layers, the larger distance between frames
+  // counts.
   statistics_.arrived(parsed ? std::optional(parsed->header.tick) : std::nullopt, packet.size(),
                       std::max(ticksPerFrame(point_), ticksPerFrame(formerPoint_)), nowUs);
   formerPoint_ = point_;
@@ -233,7 +230,7 @@ std::uint32_t Client::packetReceived(std::uint64_t nowUs) {
   };
   statistics_.decoded(decoded, nowUs);
   if (decoded.key) keyFrameRequest_.answered();
-  // A key frame is the way back to what the server holds.
+  // A key frame makes the client's state equal to the server's again.
   if (!decoded.hashMatches) requestKeyFrame(nowUs);
   if (acknowledgement_.due(nowUs)) outbox_.setAck(decoded.tick);
   timeFrame(decoded.key, nowUs);
@@ -260,28 +257,12 @@ void Client::timeFrame(bool key, std::uint64_t nowUs) {
                 clock_.known() ? arrivedUs + decodeUs : 0);
 }
 
-bool Client::setPlayOut(const cs_play_out_options* options) {
-  if (options && !isAllowed(*options)) return false;
-  playOut_ = options ? std::make_unique<PlayOut>(*options) : nullptr;
-  if (playOut_ && decoder_) playOut_->begin(description_);
-  return true;
-}
-
-std::optional<cs_played> Client::play(std::uint64_t nowUs, std::uint64_t displayUs) {
-  if (!playOut_) return std::nullopt;
-  return playOut_->play(clock_.serverTimeUs(nowUs), clock_.serverTimeUs(displayUs));
-}
-
 codec::DecodeResult Client::decode(std::span<const std::byte> packet) {
   if (!nowUs_) return decoder_->decode(packet);
   const std::uint64_t start = nowUs_();
   const codec::DecodeResult result = decoder_->decode(packet);
   decodeMs_ = static_cast<double>(nowUs_() - start) / 1000;
   return result;
-}
-
-void Client::requestEarlyKeyFrame(std::uint64_t nowUs) {
-  if (state_ == CS_STATE_JOINED) requestKeyFrame(nowUs, true);
 }
 
 void Client::requestKeyFrame(std::uint64_t nowUs, bool early) {
@@ -332,10 +313,11 @@ std::uint32_t Client::errorReceived(Bytes body) {
   std::optional<ServerError> error = readError(body);
   if (!error) return failMalformed("Error");
   errorCode_ = error->code;
-  // A server that gave up on the connection alone, or has no room for who comes back: another time it may.
-  const bool passing = error->code == kCutOff ||
-                       (error->code == kResourceExhausted && state_ == CS_STATE_RECONNECTING && !welcomed_);
-  if (error->fatal && !passing) return fail(std::move(error->text));
+  // The client may try again if only the connection was cut off, or if a reconnect found the server full.
+  const bool temporary =
+      error->code == field::ErrorCode::kCutOff ||
+      (error->code == field::ErrorCode::kResourceExhausted && state_ == CS_STATE_RECONNECTING && !welcomed_);
+  if (error->fatal && !temporary) return fail(std::move(error->text));
   errorText_ = std::move(error->text);
   return CS_EVENT_ERROR;
 }
@@ -382,94 +364,11 @@ std::optional<cs_playback> Client::playback(std::uint64_t nowUs) const {
   return now;
 }
 
-void Client::control(const SceneControl& control) {
-  if (state_ != CS_STATE_JOINED) return;
-  std::string message;
-  writeControlScene(message, ++lastRequestId_, welcome_.scene, control);
-  send(std::move(message));
-}
-
 const std::string* Client::nextOutgoing() {
   const std::string* message = outbox_.next();
-  // Attachments stay where they are put: it need not be said again.
+  // Attachments stay where they were moved, so each pose is sent once.
   if (outbox_.poses().empty() && isConnected() && mayCollide()) poses_.attachments.clear();
   return message;
-}
-
-void Client::setColliders(std::span<const cs_own_collider> colliders, std::uint64_t nowUs) {
-  poses_.colliders.assign(colliders.begin(), colliders.end());
-  sendPoses(nowUs);
-}
-
-void Client::setHand(std::uint32_t side, std::span<const float> joints, std::uint64_t nowUs) {
-  std::vector<float>& hand = side == CS_HAND_LEFT ? poses_.leftHand : poses_.rightHand;
-  hand.assign(joints.begin(), joints.end());
-  sendPoses(nowUs);
-}
-
-void Client::setGrabs(std::span<const cs_grab> grabs, std::uint64_t nowUs) {
-  poses_.grabs.assign(grabs.begin(), grabs.end());
-  sendPoses(nowUs);
-}
-
-void Client::wantContacts(bool wants, std::uint64_t nowUs) {
-  poses_.wantsContacts = wants;
-  sendPoses(nowUs);
-}
-
-void Client::move(AttachmentPose attachment, std::uint64_t nowUs) {
-  const auto known =
-      std::find_if(poses_.attachments.begin(), poses_.attachments.end(),
-                   [&](const AttachmentPose& waiting) { return waiting.name == attachment.name; });
-  if (known != poses_.attachments.end())
-    *known = std::move(attachment);
-  else
-    poses_.attachments.push_back(std::move(attachment));
-  sendPoses(nowUs);
-}
-
-bool Client::mayCollide() const {
-  return (welcomed_ ? welcome_.role : greeting_.role) != CS_ROLE_VIEWER;
-}
-
-void Client::sendPoses(std::uint64_t nowUs) {
-  posed_ = true;
-  if (state_ == CS_STATE_FAILED || !isConnected()) return;
-  const std::uint64_t serverUs = clock_.serverTimeUs(nowUs);
-  if (mayCollide()) return writeColliderPoses(outbox_.poses(), poses_, nowUs, serverUs);
-  Poses seen;
-  seen.wantsContacts = poses_.wantsContacts;
-  writeColliderPoses(outbox_.poses(), seen, nowUs, serverUs);
-}
-
-void Client::setRole(std::uint64_t participant, std::uint32_t role) {
-  std::string message;
-  writeSetRole(message, ++lastRequestId_, participant, role);
-  send(std::move(message));
-}
-
-void Client::remove(std::uint64_t participant) {
-  std::string message;
-  writeRemoveParticipant(message, ++lastRequestId_, participant);
-  send(std::move(message));
-}
-
-void Client::change(const ParameterChange& change) {
-  std::string message;
-  writeParameterChange(message, ++lastRequestId_, change);
-  send(std::move(message));
-}
-
-void Client::change(const ColliderChange& change) {
-  std::string message;
-  writeColliderChange(message, ++lastRequestId_, change);
-  send(std::move(message));
-}
-
-void Client::listScenes() {
-  std::string message;
-  writeListScenes(message, ++lastRequestId_);
-  send(std::move(message));
 }
 
 std::span<const float> Client::positions() const {
@@ -514,14 +413,14 @@ std::uint32_t Client::fail(std::string text) {
 }
 
 std::uint32_t Client::failMalformed(const char* what) {
-  return fail(std::string("The server sent bytes that are no ") + what +
-              " of this protocol: is it a clothstream-server of the same release?");
+  return fail(std::string("The server sent a malformed ") + what +
+              ". Check that the address is a clothstream-server of the same release.");
 }
 
 void Client::send(std::string message) {
   if (state_ == CS_STATE_FAILED || !isConnected()) return;
   if (!outbox_.addControl(std::move(message)))
-    fail("The connection takes no messages: " + std::to_string(Outbox::kMaxControl) + " wait to be sent.");
+    fail("The connection sends no messages: " + std::to_string(Outbox::kMaxControl) + " are waiting.");
 }
 
 }  // namespace clothstream::client

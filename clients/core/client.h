@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The state machine of a client: joining, description, frames. What it promises is said in core.h.
+// The state machine of a client: joining, description, frames, reconnecting. The contract is in core.h.
 #pragma once
 
 #include <cstdint>
@@ -9,18 +9,17 @@
 #include <string>
 #include <vector>
 
-#include "clients/core/acknowledgement.h"
-#include "clients/core/client_message.h"
-#include "clients/core/content_assembly.h"
 #include "clients/core/core.h"
-#include "clients/core/description.h"
-#include "clients/core/frame_statistics.h"
-#include "clients/core/key_frame_request.h"
-#include "clients/core/outbox.h"
-#include "clients/core/play_out.h"
-#include "clients/core/reconnection.h"
-#include "clients/core/server_clock.h"
-#include "clients/core/server_message.h"
+#include "clients/core/stream/content_assembly.h"
+#include "clients/core/stream/frame_feedback.h"
+#include "clients/core/stream/frame_statistics.h"
+#include "clients/core/stream/outbox.h"
+#include "clients/core/stream/play_out.h"
+#include "clients/core/stream/reconnection.h"
+#include "clients/core/stream/server_clock.h"
+#include "clients/core/wire/client_message.h"
+#include "clients/core/wire/description.h"
+#include "clients/core/wire/server_message.h"
 #include "proto/codec/decoder.h"
 
 namespace clothstream::client {
@@ -29,7 +28,7 @@ class Client {
  public:
   explicit Client(Greeting greeting);
 
-  // A set of CS_EVENT bits.
+  // Returns a set of CS_EVENT bits.
   std::uint32_t receive(Bytes message, std::uint64_t nowUs);
   void update(std::uint64_t nowUs);
   void connecting(std::uint64_t nowUs);
@@ -37,12 +36,12 @@ class Client {
   std::uint64_t connectAtUs() const;
   const std::string* nextOutgoing();
 
-  // Said before anything is sent.
+  // Call before the first message is sent.
   void want(const OperatingPoint& atMost);
 
   void setClock(std::uint64_t (*nowUs)()) { nowUs_ = nowUs; }
   void setColliders(std::span<const cs_own_collider> colliders, std::uint64_t nowUs);
-  // Four numbers for each joint; empty: there is none of this side.
+  // Four numbers per joint: {x, y, z, radius}. Empty removes the hand.
   void setHand(std::uint32_t side, std::span<const float> joints, std::uint64_t nowUs);
   void setGrabs(std::span<const cs_grab> grabs, std::uint64_t nowUs);
   void wantContacts(bool wants, std::uint64_t nowUs);
@@ -54,9 +53,9 @@ class Client {
   void remove(std::uint64_t participant);
   void control(const SceneControl& control);
   void requestEarlyKeyFrame(std::uint64_t nowUs);
-  // nullptr: off. False where the options are not allowed.
+  // nullptr turns play-out off. Returns false if the options are not allowed.
   bool setPlayOut(const cs_play_out_options* options);
-  // Nothing where it is off.
+  // nullopt if play-out is off.
   std::optional<cs_played> play(std::uint64_t nowUs, std::uint64_t displayUs);
 
   cs_state state() const { return state_; }
@@ -65,32 +64,32 @@ class Client {
   const Notice& notice() const { return notice_; }
   bool resumed() const { return resumed_; }
   const std::vector<Participant>& participants() const { return participants_; }
-  // The newest; of no kind before the first.
+  // The newest change of participants; kind 0 before the first.
   const Presence& presence() const { return presence_; }
   const Welcome& welcome() const { return welcome_; }
-  // Before the first description: empty.
+  // Empty before the first description.
   const Description& description() const { return description_; }
   bool described() const { return decoder_ != nullptr; }
   const FrameStatistics& statistics() const { return statistics_; }
   const ServerClock& clock() const { return clock_; }
-  // What is sent now; of no layers before the description.
+  // Quality and layers that the server sends now; no layers before the description.
   OperatingPoint operatingPoint() const;
-  // As it stands at this time.
+  // State of the recording at this time.
   std::optional<cs_playback> playback(std::uint64_t nowUs) const;
   double decodeMs() const { return decodeMs_; }
   const std::vector<std::string>& scenes() const { return scenes_; }
 
-  // Of the newest frame, or at rest.
+  // Newest frame, or the rest state before the first frame.
   std::span<const float> positions() const;
   std::span<const float> normals() const;
-  // As play() chose; like those above before a frame came to it.
+  // Result of the last play(). Same as above while play-out shows no frame.
   std::span<const float> playedPositions() const;
   std::span<const float> playedNormals() const;
   const std::vector<Collider>& playedColliders() const;
   cs_stage_statistics stages() const;
   std::uint64_t reconstructionHash() const;
   std::uint64_t parametersParticipant() const { return parametersParticipant_; }
-  // The newest, and its tick; no cloths before the first.
+  // The newest report and its tick; no cloths before the first.
   const SimulationReport& report() const { return report_; }
   std::uint64_t reportTick() const { return reportTick_; }
   const std::vector<cs_grab_event>& grabEvents() const { return events_.grabs; }
@@ -118,7 +117,7 @@ class Client {
   std::uint32_t errorReceived(Bytes body);
   std::uint32_t scenesReceived(Bytes body);
   std::uint32_t operatingPointReceived(Bytes body);
-  // From one frame to the next, where so many layers come.
+  // Ticks from one frame to the next at this operating point.
   std::uint32_t ticksPerFrame(const OperatingPoint& point) const;
   std::uint32_t playbackReceived(Bytes body, std::uint64_t nowUs);
 
@@ -127,34 +126,34 @@ class Client {
   void send(std::string message);
 
   cs_state state_ = CS_STATE_JOINING;
-  bool welcomed_ = false;  // on the connection that there is
+  bool welcomed_ = false;  // on the current connection
   bool resumed_ = false;
   std::uint32_t errorCode_ = 0;
   std::string errorText_;
   Notice notice_;
-  Greeting greeting_;  // has a token from the first Welcome on
+  Greeting greeting_;  // the token is set after the first Welcome
   Welcome welcome_;
   std::vector<Participant> participants_;
   Presence presence_;
   Reconnection reconnection_;
-  std::uint64_t connectAtUs_ = Reconnection::kNever;  // unless welcomed
+  std::uint64_t connectAtUs_ = Reconnection::kNever;  // used while not welcomed
   std::uint64_t lastHeardUs_ = 0, updatedUs_ = 0;
   ContentAssembly assembly_;
   Description description_;
   std::unique_ptr<codec::Decoder> decoder_;
   Frame frame_;
-  OperatingPoint point_, formerPoint_;  // now, and when the newest frame came
+  OperatingPoint point_, formerPoint_;  // now, and at the newest frame
   Acknowledgement acknowledgement_;
   KeyFrameRequest keyFrameRequest_;
   FrameStatistics statistics_;
   ServerClock clock_;
   Outbox outbox_;
-  Poses poses_;         // of this participant
-  bool posed_ = false;  // it has said something of them
+  Poses poses_;         // this participant's
+  bool posed_ = false;  // whether the program has set a pose
   std::uint64_t lastRequestId_ = 0;
   std::uint64_t (*nowUs_)() = nullptr;
   double decodeMs_ = 0;
-  cs_stage_statistics stages_{};  // of the newest frame
+  cs_stage_statistics stages_{};  // newest frame
   std::unique_ptr<PlayOut> playOut_;
   std::vector<std::string> scenes_;
   TickEvents events_;
@@ -162,7 +161,7 @@ class Client {
   std::uint64_t reportTick_ = 0;
   std::uint64_t parametersParticipant_ = 0;
   std::optional<cs_playback> playback_;
-  std::uint64_t playbackUs_ = 0;  // when it was told
+  std::uint64_t playbackUs_ = 0;  // time of arrival of playback_
 };
 
 }  // namespace clothstream::client

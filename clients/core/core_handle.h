@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What the C interface's handle points to, and what the files of that interface share.
+// The handle of the C interface, and conversions that its files share.
 #pragma once
 
 #include <algorithm>
@@ -15,7 +15,7 @@ struct cs_client {
 
 namespace clothstream::client {
 
-// The element, or nullptr where there is none.
+// Returns nullptr if the index is out of range.
 template <typename Element>
 const Element* at(const std::vector<Element>& elements, std::uint32_t index) {
   return index < elements.size() ? &elements[index] : nullptr;
@@ -26,7 +26,7 @@ void copy(const Values& values, float* out) {
   std::copy(values.begin(), values.end(), out);
 }
 
-// 0 where there is none.
+// Returns 0 and leaves *out unchanged if `collider` is nullptr, else 1.
 inline int writeCollider(const Collider* collider, cs_collider* out) {
   if (!collider) return 0;
   *out = {};

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The C interface over Client: how the stream and the simulation do.
+// C interface: statistics.
+
 #include "clients/core/core.h"
 #include "clients/core/core_handle.h"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A header of four numbers, then floats.
+// Reads and writes the header and the frames.
 #include "clients/files/motion_file.h"
 
 #include <algorithm>
@@ -23,13 +23,13 @@ std::uint64_t planeBytes(const MotionShape& shape) {
   return std::uint64_t{shape.vertexCount()} * 3 * sizeof(float);
 }
 
-// Where a frame's positions begin; of the one after the last, the file's length.
+// Offset of the positions of a frame. For `frame` = shape.frames: length of the file.
 std::uint64_t offset(const MotionShape& shape, std::uint32_t frame) {
   return sizeof(Header) + frame * 2 * planeBytes(shape);
 }
 
 std::string notAMotion(const std::string& path, const std::string& why) {
-  return fmt::format("{} is no motion: {}", path, why);
+  return fmt::format("{} is not a motion file: {}", path, why);
 }
 
 }  // namespace
@@ -63,13 +63,13 @@ tl::expected<MotionReader, std::string> MotionReader::open(const std::string& pa
   if (!file) return tl::unexpected(std::move(file.error()));
   Header header{};
   if (!file->stream.read(reinterpret_cast<char*>(header.data()), sizeof header))
-    return tl::unexpected(notAMotion(path, fmt::format("it has {} bytes, and its header alone would have {}",
-                                                       file->bytes, sizeof header)));
+    return tl::unexpected(notAMotion(
+        path, fmt::format("it has {} bytes, but its header needs {}", file->bytes, sizeof header)));
   const auto& [columns, rows, frames, zero] = header;
   if (columns < 1 || rows < 1 || frames < 1 || zero != 0)
     return tl::unexpected(
-        notAMotion(path, fmt::format("its header has {} columns, {} rows, {} frames and {}; one or more "
-                                     "of each and 0 are wanted",
+        notAMotion(path, fmt::format("its header has {} columns, {} rows, {} frames and {}; expected "
+                                     "at least 1 of each and then 0",
                                      columns, rows, frames, zero)));
   if (std::int64_t{columns} * rows > codec::kMaxVertices)
     return tl::unexpected(
@@ -78,7 +78,7 @@ tl::expected<MotionReader, std::string> MotionReader::open(const std::string& pa
   const MotionShape shape{static_cast<std::uint32_t>(columns), static_cast<std::uint32_t>(rows),
                           static_cast<std::uint32_t>(frames)};
   if (const std::uint64_t whole = offset(shape, shape.frames); file->bytes != whole)
-    return tl::unexpected(notAMotion(path, fmt::format("it has {} bytes; {} frames of {}x{} vertices have {}",
+    return tl::unexpected(notAMotion(path, fmt::format("it has {} bytes; {} frames of {}x{} vertices need {}",
                                                        file->bytes, frames, columns, rows, whole)));
   return MotionReader(path, std::move(file->stream), shape);
 }
@@ -87,7 +87,7 @@ tl::expected<void, std::string> MotionReader::read(std::uint32_t frame, std::uin
                                                    std::vector<float>& out) {
   file_.seekg(static_cast<std::streamoff>(offset));
   if (!file_.read(reinterpret_cast<char*>(out.data()), static_cast<std::streamsize>(planeBytes(shape_))))
-    return tl::unexpected(fmt::format("{} cannot be read at frame {}", path_, frame));
+    return tl::unexpected(fmt::format("cannot read frame {1} of {0}", path_, frame));
   return {};
 }
 
@@ -97,7 +97,7 @@ tl::expected<std::span<const float>, std::string> MotionReader::next() {
   const auto wrong = std::ranges::find_if_not(positions_, [](float x) { return std::isfinite(x); });
   if (wrong != positions_.end())
     return tl::unexpected(
-        notAMotion(path_, fmt::format("in frame {} (of 0 to {}), vertex {} lies at {}", frame_,
+        notAMotion(path_, fmt::format("in frame {} (of 0 to {}), vertex {} has the coordinate {}", frame_,
                                       shape_.frames - 1, (wrong - positions_.begin()) / 3, *wrong)));
   ++frame_;
   return positions_;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Motions of a grid as raw numbers: int32 columns, rows, frames, 0; then of each frame float32 positions (m)
-// and float32 normals, 3 a vertex, row-major. Little-endian; 72 frames a second.
+// Motion files of a grid: int32 columns, rows, frames, 0; then per frame float32 positions (m) and float32
+// normals, 3 numbers a vertex, row-major. Little-endian; 72 frames a second.
 #pragma once
 
 #include <cstdint>
@@ -25,19 +25,20 @@ struct MotionShape {
   codec::ClothLayout cloth() const { return {vertexCount(), rows, columns, {}}; }
 };
 
-// Of the edges between neighbours in rows and columns, m; 0 where there are none.
+// Mean length of the edges between neighbours in rows and columns, m. 0 without edges.
 double meanEdge(const MotionShape& shape, std::span<const float> positions);
 
-// Reads frame by frame. Errors name the path and what is wrong with the file.
+// Reads frame by frame. Errors name the path and the problem.
 class MotionReader {
  public:
-  // Whether the file has the length that its header says is known from here on.
+  // Checks that the length of the file matches its header.
   [[nodiscard]] static tl::expected<MotionReader, std::string> open(const std::string& path);
 
   const MotionShape& shape() const { return shape_; }
-  // Positions of the next frame, of which there must be one; all are finite. Until the next call.
+  // Positions of the next frame; all are finite. Valid until the next call. Call it at most shape().frames
+  // times.
   [[nodiscard]] tl::expected<std::span<const float>, std::string> next();
-  // Normals of the frame that next() gave, whatever stands there. Until the next call.
+  // Normals of the frame that next() returned, unchecked. Valid until the next call.
   [[nodiscard]] tl::expected<std::span<const float>, std::string> normals();
 
  private:
@@ -48,19 +49,19 @@ class MotionReader {
   std::string path_;
   std::ifstream file_;
   MotionShape shape_;
-  std::uint32_t frame_ = 0;  // the next
+  std::uint32_t frame_ = 0;  // next frame
   std::vector<float> positions_, normals_;
 };
 
 class MotionWriter {
  public:
-  // All as NewFile's.
+  // Errors as in NewFile.
   [[nodiscard]] static tl::expected<MotionWriter, std::string> create(const std::string& path,
                                                                       const MotionShape& shape);
-  // 3 floats a vertex each.
+  // Both have 3 floats per vertex.
   [[nodiscard]] tl::expected<void, std::string> append(std::span<const float> positions,
                                                        std::span<const float> normals);
-  // After all frames of the shape.
+  // Call it after all frames of the shape.
   [[nodiscard]] tl::expected<void, std::string> finish() { return file_.finish(); }
 
  private:

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// mkostemp, write, fsync, rename.
+// Implementation with mkostemp, write, fsync and rename.
 #include "clients/files/new_file.h"
 
 #include <cerrno>
@@ -29,12 +29,12 @@ tl::expected<NewFile, std::string> NewFile::create(const std::string& path) {
   struct stat present {};
   if (::stat(path.c_str(), &present) == 0) {
     if (S_ISDIR(present.st_mode)) return problem(path, std::strerror(EISDIR));
-    if (!S_ISREG(present.st_mode)) return problem(path, "it is no regular file");
+    if (!S_ISREG(present.st_mode)) return problem(path, "it is not a regular file");
   }
   std::string temporary = path + ".XXXXXX";
   const int file = ::mkostemp(temporary.data(), O_CLOEXEC);
   if (file < 0) return problem(path);
-  // mkostemp makes files for their owner alone: this one is to be like any other.
+  // mkostemp lets only the owner access the file. Set the usual permissions.
   const mode_t mask = ::umask(0);
   ::umask(mask);
   ::fchmod(file, 0666 & ~mask);

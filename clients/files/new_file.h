@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A file that is there whole or not at all.
+// Writes a file that exists either completely or not at all.
 #pragma once
 
 #include <cstddef>
@@ -12,13 +12,13 @@
 
 namespace clothstream::files {
 
-// Written beside its place and then moved there: whoever reads the path sees a whole file or the former one.
-// Errors name the path and what the system said of it.
+// Writes to a temporary file next to the path and renames it at the end. So readers of the path see either
+// the old or the complete new file. Errors name the path and the system's reason.
 class NewFile {
  public:
-  // The path may be that of a file, which stays until finish(), but not of a directory or a device.
+  // The path may name an existing file, which stays until finish(), but not a directory or device.
   [[nodiscard]] static tl::expected<NewFile, std::string> create(const std::string& path);
-  // What was not finished leaves nothing.
+  // Removes the temporary file unless finish() was called.
   ~NewFile();
   NewFile(NewFile&& other) noexcept;
   NewFile& operator=(NewFile&&) = delete;
@@ -27,7 +27,7 @@ class NewFile {
   [[nodiscard]] tl::expected<void, std::string> write(std::string_view text) {
     return write(std::as_bytes(std::span(text)));
   }
-  // Moves it into its place. Once, and nothing after it.
+  // Moves the file to its path. Must be the last call.
   [[nodiscard]] tl::expected<void, std::string> finish();
 
   std::uint64_t bytes() const { return bytes_; }
@@ -37,7 +37,7 @@ class NewFile {
       : path_(std::move(path)), temporary_(std::move(temporary)), file_(file) {}
 
   std::string path_, temporary_;
-  int file_ = -1;  // -1: finished, or moved to another NewFile
+  int file_ = -1;  // -1 after finish() or a move
   std::uint64_t bytes_ = 0;
 };
 

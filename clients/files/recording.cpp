@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Length-delimited messages behind a name and a number.
+// Reads and writes length-delimited messages after the header.
 #include "clients/files/recording.h"
 
 #include <array>
@@ -57,7 +57,7 @@ v1::StreamDescription toMessage(const RecordingHead& head) {
   return message;
 }
 
-// Numbers that the layout has no room for become impossible ones.
+// Numbers that are too large for the layout become invalid ones.
 codec::StreamLayout toLayout(const v1::StreamDescription& message) {
   const auto small = [](std::uint32_t number) { return static_cast<std::uint8_t>(std::min(number, 255u)); };
   codec::StreamLayout layout{.epoch = message.epoch(),
@@ -120,7 +120,7 @@ tl::expected<RecordingReader, std::string> RecordingReader::open(const std::stri
   std::array<char, kName.size()> name{};
   if (!file->stream.read(name.data(), name.size()) || std::string_view(name.data(), name.size()) != kName)
     return tl::unexpected(
-        fmt::format("{} is not what clothstream encode writes: it begins with something else", path));
+        fmt::format("{} is not a file of clothstream encode: its first bytes differ", path));
   const auto broken = [&](const std::string& what) {
     return tl::unexpected(fmt::format("{} is broken: {}", path, what));
   };
@@ -134,7 +134,7 @@ tl::expected<RecordingReader, std::string> RecordingReader::open(const std::stri
     return broken("it has no description of its stream");
   state->head = {toLayout(description), description.stream_rate(), frames, static_cast<Side>(side)};
   if (!codec::isPossible(state->head.layout) || frames == 0 || frames > INT32_MAX || side > 1)
-    return broken("what it says of its stream is not possible");
+    return broken("its description of the stream is not valid");
   return RecordingReader(std::move(state));
 }
 
@@ -152,7 +152,7 @@ tl::expected<RecordedPacket, std::string> RecordingReader::next() {
     const void* more = nullptr;
     int size = 0;
     while (s.stream.Next(&more, &size))
-      if (size > 0) return broken(fmt::format("something follows its {} frames", s.head.frames));
+      if (size > 0) return broken(fmt::format("there are bytes after its {} frames", s.head.frames));
   }
   return RecordedPacket{std::move(*frame.mutable_packet()), frame.reconstruction_hash()};
 }

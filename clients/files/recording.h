@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
-// A stream as a file: "clothstream\n"; the number of frames and one of Side (uint32, little-endian); then
-// messages of session.proto, each behind its length as a varint: a StreamDescription without rest positions,
-// then a Frame for each, with its packet and its reconstruction hash.
+// Stream file of `clothstream encode`: "clothstream\n"; then the number of frames and a Side, each as
+// little-endian uint32; then messages of session.proto, each after its length as a varint. The first is a
+// StreamDescription without rest positions. A Frame with packet and reconstruction hash follows for each
+// frame.
 #pragma once
 
 #include <cstddef>
@@ -18,12 +19,12 @@
 
 namespace clothstream::files {
 
-// Where normals point to: as computeVertexNormals() has them, or the other way.
+// Direction of normals: as from computeVertexNormals(), or opposite.
 enum class Side : std::uint32_t { front = 0, back = 1 };
 
-// What is known before the first frame.
+// Header of the file.
 struct RecordingHead {
-  codec::StreamLayout layout;  // possible (stream_layout.h); all cloths are grids
+  codec::StreamLayout layout;  // valid (stream_layout.h); all cloths are grids
   std::uint32_t rate = 0;      // frames a second
   std::uint32_t frames = 0;
   Side side = Side::front;
@@ -38,12 +39,12 @@ struct RecordedPacket {
 
 class RecordingWriter {
  public:
-  // Errors as NewFile's.
+  // Errors as in NewFile.
   [[nodiscard]] static tl::expected<RecordingWriter, std::string> create(const std::string& path,
                                                                          const RecordingHead& head);
   [[nodiscard]] tl::expected<void, std::string> append(std::span<const std::byte> packet,
                                                        std::uint64_t reconstructionHash);
-  // After all frames.
+  // Call it after all frames.
   [[nodiscard]] tl::expected<void, std::string> finish() { return file_.finish(); }
   std::uint64_t bytes() const { return file_.bytes(); }
 
@@ -53,7 +54,7 @@ class RecordingWriter {
   NewFile file_;
 };
 
-// Safe on any bytes. Errors name the path and what is wrong with the file.
+// Safe on any bytes. Errors name the path and the problem.
 class RecordingReader {
  public:
   [[nodiscard]] static tl::expected<RecordingReader, std::string> open(const std::string& path);
@@ -62,7 +63,7 @@ class RecordingReader {
   RecordingReader& operator=(RecordingReader&&) = delete;
 
   const RecordingHead& head() const;
-  // The next frame's, of which there must be one. With the last it is known that nothing follows.
+  // Packet of the next frame. The last call checks that nothing follows. Call it at most head().frames times.
   [[nodiscard]] tl::expected<RecordedPacket, std::string> next();
 
  private:

@@ -16,7 +16,7 @@ tl::expected<RegularFile, std::string> openRegularFile(const std::string& path) 
   std::error_code error;
   const std::filesystem::file_status status = std::filesystem::status(path, error);
   if (error) return problem(error.message());
-  if (status.type() != std::filesystem::file_type::regular) return problem("it is no regular file");
+  if (status.type() != std::filesystem::file_type::regular) return problem("it is not a regular file");
   RegularFile file;
   file.bytes = std::filesystem::file_size(path, error);
   if (error) return problem(error.message());

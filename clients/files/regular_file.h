@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A file to read whose length is known.
+// Opens a regular file for reading.
 #pragma once
 
 #include <cstdint>
@@ -15,7 +15,7 @@ struct RegularFile {
   std::uint64_t bytes = 0;
 };
 
-// The error names the path and why it cannot be read: pipes and directories cannot.
+// The error names the path and the reason. Pipes and directories are errors.
 [[nodiscard]] tl::expected<RegularFile, std::string> openRegularFile(const std::string& path);
 
 }  // namespace clothstream::files

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Host and port, taken apart and checked.
+// Splits and checks host and port.
 #include "clients/grpc/address.h"
 
 #include <algorithm>
@@ -32,7 +32,7 @@ tl::expected<std::string, std::string> completeAddress(std::string_view text) {
   if (text.starts_with('[')) {
     const std::size_t close = text.find(']');
     if (close == std::string_view::npos)
-      return tl::unexpected("the address \"" + std::string(text) + "\" lacks a ]");
+      return tl::unexpected("the address \"" + std::string(text) + "\" has no closing ]");
     v6 = true;
     host = text.substr(1, close - 1);
     const std::string_view rest = text.substr(close + 1);
@@ -44,10 +44,10 @@ tl::expected<std::string, std::string> completeAddress(std::string_view text) {
     port = text.substr(colon + 1);
   }
   if (!isHost(host))
-    return tl::unexpected("the address \"" + std::string(text) + "\" names no host; write HOST or HOST:PORT");
+    return tl::unexpected("the address \"" + std::string(text) + "\" has no host; use HOST or HOST:PORT");
   if (!isPort(port))
     return tl::unexpected("the address \"" + std::string(text) +
-                          "\" has no port from 1 to 65535 after its host");
+                          "\" has no valid port after the host; use 1 to 65535");
   std::string address;
   address.append(v6 ? "[" : "").append(host).append(v6 ? "]:" : ":").append(port);
   return address;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Where a server answers, as people write it.
+// Addresses of servers, as users write them.
 #pragma once
 
 #include <string>
@@ -11,8 +11,8 @@ namespace clothstream {
 
 inline constexpr std::string_view kDefaultAddress = "127.0.0.1:50051";
 
-// "host", "host:port", "[v6]", "[v6]:port" or a bare v6 address, completed with port 50051. The error says
-// what is wrong and what is allowed.
+// Accepts "host", "host:port", "[v6]", "[v6]:port" or a bare v6 address. The default port is 50051.
+// The error names the mistake and the allowed form.
 [[nodiscard]] tl::expected<std::string, std::string> completeAddress(std::string_view text);
 
 }  // namespace clothstream

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Channel arguments, and statuses in words.
+// Channel arguments and texts of failures.
 #include "clients/grpc/channel.h"
 
 #include <fmt/format.h>
@@ -9,7 +9,7 @@
 namespace clothstream {
 namespace {
 
-// A key frame of the largest scene; a description travels in small pieces.
+// Enough for a key frame of the largest scene. A description travels in small chunks.
 constexpr int kMaxMessageBytes = 256 * 1024 * 1024;
 
 std::string inBrackets(const std::string& text) {
@@ -21,7 +21,7 @@ std::string inBrackets(const std::string& text) {
 std::shared_ptr<grpc::Channel> makeChannel(const std::string& address) {
   grpc::ChannelArguments arguments;
   arguments.SetMaxReceiveMessageSize(kMaxMessageBytes);
-  // Each client has a connection of its own: two in a process do not share one's flow control.
+  // A separate connection per client, so that two clients of a process do not share flow control.
   arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
   return grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments);
 }
@@ -37,7 +37,7 @@ Failure notJoined(const std::string& address, const grpc::Status& status) {
     case grpc::StatusCode::OK:
       return {Kind::refused, fmt::format("The server at {} ended the stream before it began.", address)};
     case grpc::StatusCode::UNIMPLEMENTED:
-      return {Kind::refused, fmt::format("What answers at {} is no clothstream-server of this release{}.",
+      return {Kind::refused, fmt::format("The server at {} is not a clothstream-server of this release{}.",
                                          address, inBrackets(status.error_message()))};
     default:
       return {Kind::refused, fmt::format("The server at {} refuses: {}", address, status.error_message())};

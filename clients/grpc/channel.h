@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Channels to a server, and what gRPC's statuses mean to people.
+// Channels to a server, and failures from gRPC statuses.
 #pragma once
 
 #include <memory>
@@ -14,9 +14,9 @@ namespace clothstream {
 
 std::shared_ptr<grpc::Channel> makeChannel(const std::string& address);
 
-// Of a call that ended before anything came.
+// Failure of a call that ended before any message arrived.
 Failure notJoined(const std::string& address, const grpc::Status& status);
-// Of a stream that ended by itself.
+// Failure of a stream that ended although the client had not left.
 Failure lost(const std::string& address, const grpc::Status& status);
 
 }  // namespace clothstream

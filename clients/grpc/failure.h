@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Why there is no stream, or no more of it.
+// Reason why a stream could not start or has ended.
 #pragma once
 
 #include <string>
@@ -8,12 +8,12 @@ namespace clothstream {
 
 struct Failure {
   enum class Kind {
-    unreachable,  // nobody answers at the address, or not in time
-    refused,      // the server said no: unknown scene, version, full
-    lost,         // there was a stream, and it ended without being asked to
+    unreachable,  // no server answers at the address in time
+    refused,      // the server refuses: unknown scene, version, full
+    lost,         // the stream ended although the client had not left
   };
   Kind kind = Kind::lost;
-  // A sentence for people, with the address and what to do.
+  // Text for users, with the address and advice.
   std::string text;
 };
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// One call at a time, one completion queue, one thread for it; a mutex for all but its waiting.
+// One call at a time on one completion queue and thread. A mutex is held except while the thread waits.
 #include "clients/grpc/grpc_client.h"
 
 #include <algorithm>
@@ -24,18 +24,18 @@ using SteadyClock = std::chrono::steady_clock;
 using SystemClock = std::chrono::system_clock;
 
 constexpr const char* kJoinMethod = "/clothstream.v1.ClothStream/Join";
-// How often cs_update is called where nothing else happens.
+// Longest time between two calls of cs_update.
 constexpr std::chrono::milliseconds kUpdateInterval{50};
-// For the server to end a stream that we have ended.
+// Time that the server has to end a stream after the client has left.
 constexpr std::chrono::milliseconds kClosingTime{500};
 
-// Bounds of what is waited for a connection to open, see openingPatience().
+// Bounds of openingTimeout().
 constexpr std::chrono::milliseconds kShortestOpening{150}, kLongestOpening{2000};
 
-// How often a caller who waits to be joined may give up.
+// Interval at which a waiting join() calls `cancelled`.
 constexpr std::chrono::milliseconds kCancelInterval{100};
 
-// What a completion is about.
+// Kind of a completion.
 enum Operation : std::intptr_t { kStarted = 1, kRead, kWritten, kHalfClosed, kFinished, kWoken };
 
 double seconds(std::chrono::milliseconds time) {
@@ -43,7 +43,7 @@ double seconds(std::chrono::milliseconds time) {
 }
 
 void* tagOf(Operation operation) {
-  // gRPC hands it back, no more. NOLINTNEXTLINE(performance-no-int-to-ptr)
+  // gRPC only returns the tag. NOLINTNEXTLINE(performance-no-int-to-ptr)
   return reinterpret_cast<void*>(operation);
 }
 
@@ -72,7 +72,7 @@ class GrpcClient::Stream {
     thread_.join();
   }
 
-  // Nothing if it is joined by then.
+  // Returns nothing if the client joins in time.
   std::optional<Failure> waitUntilJoined() {
     const auto deadline = SteadyClock::now() + options_.joinTimeout;
     std::unique_lock lock(mutex_);
@@ -105,8 +105,8 @@ class GrpcClient::Stream {
 
   std::uint32_t wait(std::chrono::milliseconds timeout) {
     std::unique_lock lock(mutex_);
-    changed_.wait_for(lock, timeout, [&] { return news_ || ended_; });
-    news_ = false;
+    changed_.wait_for(lock, timeout, [&] { return hasNews_ || ended_; });
+    hasNews_ = false;
     return std::exchange(events_, 0);
   }
 
@@ -116,14 +116,14 @@ class GrpcClient::Stream {
   }
 
  private:
-  // Has the thread look at what is to be sent. Only one alarm is on its way.
+  // Makes the thread check for outgoing messages. At most one alarm is pending.
   void wake() {
     if (wakeUnderway_ || ended_) return;
     wakeUnderway_ = true;
     alarm_.Set(&queue_, SystemClock::now(), tagOf(kWoken));
   }
 
-  // What belongs to one connection.
+  // State of one connection.
   struct Call {
     explicit Call(const std::string& address) : stub(makeChannel(address)) {}
 
@@ -143,7 +143,7 @@ class GrpcClient::Stream {
     do {
       connect();
       while (call_->underway > 0) step(SystemClock::now() + kUpdateInterval);
-    } while (comesBack());
+    } while (waitForNextAttempt());
     end();
   }
 
@@ -171,13 +171,13 @@ class GrpcClient::Stream {
     call_->stream->StartCall(tagOf(kStarted));
   }
 
-  // The call is over: waits until it is time for another one. False if there is to be none.
-  bool comesBack() {
-    if (!cutOffAt_) cutOffAt_ = SteadyClock::now();
-    const auto giveUpAt = *cutOffAt_ + options_.reconnectFor;
+  // Waits after the end of a call until the next attempt is due. Returns false if no attempt follows.
+  bool waitForNextAttempt() {
+    if (!disconnectedAt_) disconnectedAt_ = SteadyClock::now();
+    const auto giveUpAt = *disconnectedAt_ + options_.reconnectFor;
     const bool tries = wasJoined_ && options_.reconnectFor.count() > 0;
     if (!tries || leaving_ || cs_get_state(core_.get()) == CS_STATE_FAILED) return false;
-    triesToComeBack_ = true;
+    reconnects_ = true;
     cs_disconnected(core_.get(), GrpcClient::nowUs());
     announce(0);
     for (;;) {
@@ -207,7 +207,7 @@ class GrpcClient::Stream {
         return ok ? received() : finish();
       case kWritten:
         call_->writing = false;
-        // A write that fails means that the stream has ended; the read says so too.
+        // A failed write means that the stream has ended; the read fails too.
         call_->broken |= !ok;
         return;
       case kHalfClosed:
@@ -235,10 +235,10 @@ class GrpcClient::Stream {
 
   void announce(std::uint32_t events) {
     onEvents_(core_.get(), events);
-    if (cs_get_state(core_.get()) == CS_STATE_JOINED) cutOffAt_.reset();
+    if (cs_get_state(core_.get()) == CS_STATE_JOINED) disconnectedAt_.reset();
     if ((events & CS_EVENT_DESCRIPTION) != 0) wasJoined_ = true;
     events_ |= events;
-    news_ = true;
+    hasNews_ = true;
     changed_.notify_all();
   }
 
@@ -251,7 +251,7 @@ class GrpcClient::Stream {
     const bool tooLong = now - lastHeard_ > options_.silenceTimeout && call_->started;
     const bool givenUp =
         wasJoined_ && options_.reconnectFor.count() > 0 && GrpcClient::nowUs() >= cs_connect_at(core_.get());
-    call_->swallowed = triesToComeBack_ && !call_->started && now - call_->begun > openingPatience();
+    call_->swallowed = reconnects_ && !call_->started && now - call_->begun > openingTimeout();
     if (tooLong || givenUp || call_->swallowed) {
       call_->silent = true;
       call_->context.TryCancel();
@@ -259,9 +259,9 @@ class GrpcClient::Stream {
     write();
   }
 
-  // How long a connection that is to bring the client back may take to open: a link that returned may have
-  // swallowed its beginning. A little longer each time, for it may take longer than it did.
-  SteadyClock::duration openingPatience() const {
+  // Longest time to open a connection while reconnecting, since a link that was just restored may have lost
+  // the first packets. Grows with each attempt, since opening may take longer than before.
+  SteadyClock::duration openingTimeout() const {
     const auto first = std::clamp<SteadyClock::duration>(3 * openingTook_, kShortestOpening, kLongestOpening);
     return first + first * attempts_ / 64;
   }
@@ -277,7 +277,7 @@ class GrpcClient::Stream {
     call_->stream->Write(grpc::ByteBuffer(&slice, 1), tagOf(kWritten));
   }
 
-  // Says that nothing more comes; the server then ends the stream. It has kClosingTime for that.
+  // Closes the sending half. The server then has kClosingTime to end the stream.
   void leave(SteadyClock::time_point now) {
     if (!cancelAt_) cancelAt_ = now + kClosingTime;
     if (!call_->started || now >= *cancelAt_) return call_->context.TryCancel();
@@ -300,15 +300,16 @@ class GrpcClient::Stream {
       return {Failure::Kind::refused,
               saidByServer ? fmt::format("The server at {} refuses: {}", address_, text) : text};
     }
-    if (leaving_) return {Failure::Kind::lost, "The stream was left."};
-    if (call_->silent && !call_->status.ok() && !triesToComeBack_)
+    if (leaving_) return {Failure::Kind::lost, "The client left the stream."};
+    if (call_->silent && !call_->status.ok() && !reconnects_)
       return {Failure::Kind::lost,
-              fmt::format("The server at {} has said nothing for {} s: the stream is lost.", address_,
+              fmt::format("The server at {} has sent nothing for {} s: the stream is lost.", address_,
                           seconds(options_.silenceTimeout))};
     if (!wasJoined_) return notJoined(address_, call_->status);
     Failure failure = lost(address_, call_->status);
-    if (triesToComeBack_)
-      failure.text += fmt::format(" It could not be had back within {} s.", seconds(options_.reconnectFor));
+    if (reconnects_)
+      failure.text +=
+          fmt::format(" The client could not reconnect within {} s.", seconds(options_.reconnectFor));
     return failure;
   }
 
@@ -327,22 +328,23 @@ class GrpcClient::Stream {
   const GrpcClientOptions options_;
   const OnEvents onEvents_;
   grpc::CompletionQueue queue_;
-  // The thread has its turn as soon as it wants it, however often others lock.
+  // Set while the thread waits for the mutex. Then lock() lets the thread go first.
   std::atomic<bool> threadWaits_{false};
   std::condition_variable turn_;
-  mutable std::mutex mutex_;  // guards all that follows; the thread has it but while it waits for the queue
+  // Guards everything below. The thread releases it only while it waits for the queue.
+  mutable std::mutex mutex_;
   std::condition_variable changed_;
   grpc::Alarm alarm_;
   bool wakeUnderway_ = false;
-  bool news_ = false;         // since the last wait(),
-  std::uint32_t events_ = 0;  // with these
+  bool hasNews_ = false;      // since the last wait()
+  std::uint32_t events_ = 0;  // since the last wait()
   std::optional<Failure> ended_;
   std::unique_ptr<cs_client, decltype(&cs_destroy)> core_;
   std::optional<Call> call_;
-  bool leaving_ = false, wasJoined_ = false, triesToComeBack_ = false;
-  SteadyClock::duration openingTook_ = kLongestOpening;  // last
-  int attempts_ = 0;                                     // since then
-  std::optional<SteadyClock::time_point> cutOffAt_;      // since then it is, or tries to come back
+  bool leaving_ = false, wasJoined_ = false, reconnects_ = false;
+  SteadyClock::duration openingTook_ = kLongestOpening;    // of the last connection
+  int attempts_ = 0;                                       // since the last connection
+  std::optional<SteadyClock::time_point> disconnectedAt_;  // set while it is disconnected or reconnects
   std::optional<SteadyClock::time_point> cancelAt_;
   SteadyClock::time_point lastHeard_;
   std::thread thread_;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// CreateScene inside a stream, DeleteScene and ControlScene as calls.
+// CreateScene uses a stream for the upload; the others are unary calls.
 #include "clients/grpc/scene_control.h"
 
 #include <algorithm>
@@ -74,7 +74,7 @@ tl::expected<std::string, Failure> createScene(const std::string& address,
   v1::ServerMessage answer;
   while (stream->Read(&answer) && !answer.has_error() && !answer.has_create_scene()) {
   }
-  // Whoever ends its own half of the stream leaves: not before the answer.
+  // Closing the sending half leaves the scene, so it must follow the answer.
   stream->WritesDone();
   if (answer.has_create_scene() || answer.has_error()) context.TryCancel();
   const grpc::Status status = stream->Finish();

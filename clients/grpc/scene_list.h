@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The scenes of a server, asked for without joining.
+// Lists the scenes of a server without joining one.
 #pragma once
 
 #include <chrono>
@@ -19,7 +19,7 @@ struct SceneSummary {
   bool running = false, paused = false, created = false;
 };
 
-// `address` as completeAddress gives it.
+// `address` must come from completeAddress().
 [[nodiscard]] tl::expected<std::vector<SceneSummary>, Failure> listScenes(
     const std::string& address, std::chrono::milliseconds timeout = std::chrono::milliseconds(10'000));
 

@@ -40,34 +40,34 @@ clothstream_result fail(const Failure& failure) {
   return fail(CLOTHSTREAM_LOST, failure.text);
 }
 
-// Of a function that gives a result; no exception leaves it.
+// Runs `body` and converts exceptions to results.
 template <typename Body>
 clothstream_result guarded(Body body) noexcept {
   try {
     errorText.clear();
     return body();
   } catch (const std::bad_alloc&) {
-    errorText = "no memory";  // as short as a string may be without any
+    errorText = "no memory";  // short enough to need no allocation
   } catch (const std::exception& error) {
     return fail(CLOTHSTREAM_FAILED, error.what());
   }
   return CLOTHSTREAM_FAILED;
 }
 
-// What is wrong with the options; empty: nothing.
-std::string complaint(const clothstream_options& options) {
+// Returns what is wrong with the options; empty if they are valid.
+std::string optionsError(const clothstream_options& options) {
   if (options.version != CLOTHSTREAM_OPTIONS_VERSION)
-    return "options->version is " + std::to_string(options.version) + "; this library knows version " +
+    return "options->version is " + std::to_string(options.version) + "; this library accepts version " +
            std::to_string(CLOTHSTREAM_OPTIONS_VERSION) +
-           ". Begin from clothstream_default_options, with the header of this library.";
+           ". Start from clothstream_default_options, with the header of this library.";
   if (options.role > CS_ROLE_OWNER)
-    return "options->role is " + std::to_string(options.role) + "; a cs_role is allowed, 0 to " +
+    return "options->role is " + std::to_string(options.role) + "; allowed is a cs_role, 0 to " +
            std::to_string(CS_ROLE_OWNER) + ".";
   constexpr std::uint32_t kMost = 3;
   if (options.quality > kMost || options.temporal_layers > kMost)
     return "options->quality is " + std::to_string(options.quality) + " and temporal_layers " +
            std::to_string(options.temporal_layers) + "; 0 to " + std::to_string(kMost) +
-           " is allowed of each.";
+           " is allowed for both.";
   if (!options.scene || !options.client_name || !options.display_name)
     return "options->scene, client_name or display_name is NULL; \"\" is allowed.";
   if (options.join_timeout_ms == 0) return "options->join_timeout_ms is 0; at least 1 is allowed.";
@@ -98,7 +98,7 @@ clothstream_result clothstream_open(const char* address, const clothstream_optio
     clothstream_options wanted;
     clothstream_default_options(&wanted);
     if (options) {
-      if (std::string wrong = complaint(*options); !wrong.empty())
+      if (std::string wrong = optionsError(*options); !wrong.empty())
         return fail(CLOTHSTREAM_INVALID, std::move(wrong));
       wanted = *options;
     }

@@ -1,22 +1,21 @@
 /* SPDX-License-Identifier: MIT
- * The native client library: the client of core.h with a connection of its own. A C interface.
+ * C interface of the native client library: the client core (core.h) with a network connection.
  *
- * clothstream_open joins a scene; from then on a thread of the library moves bytes, decodes frames, keeps the
- * clock, and comes back where the connection is lost. Between clothstream_acquire and clothstream_release
- * that thread rests, and the cs_client is the caller's: every function of core.h may be called, and what they
- * point to stays as it is, so that positions, normals and triangles are read without a copy. Of core.h only
- * those are not for it that open and move a connection themselves: cs_create, cs_create_as, cs_want,
- * cs_destroy, cs_set_clock, cs_receive, cs_update, cs_next_outgoing, cs_connecting, cs_disconnected (they
- * serve who has a connection of another kind).
+ * clothstream_open joins a scene. From then on a thread of the library sends and receives messages, decodes
+ * frames, keeps the clock, and reconnects after a loss. Between clothstream_acquire and clothstream_release
+ * that thread waits, and the caller may use the cs_client: its data does not change, so positions, normals
+ * and triangles can be read without a copy. All functions of core.h are allowed, except those for programs
+ * with their own connection: cs_create, cs_create_as, cs_want, cs_destroy, cs_set_clock, cs_receive,
+ * cs_update, cs_next_outgoing, cs_connecting, cs_disconnected.
  *
- * Threads: all functions may be called from any thread; on one stream, clothstream_close is the last call,
- * and clothstream_release comes from the thread that acquired. Acquire for as long as it takes to copy or
- * draw: no message is taken meanwhile, and a stream that rests for seconds loses its connection. Whoever has
- * acquired a stream must not call clothstream_acquire, clothstream_wait or clothstream_close with it. Not to
- * be used in a child after fork() without exec().
+ * Threads: all functions may be called from any thread. On one stream, clothstream_close must be the last
+ * call, and the thread that acquired must release. Acquire only as long as copying or drawing takes: no
+ * message is processed meanwhile, and a stream that is acquired for seconds loses its connection. Do not call
+ * clothstream_acquire, clothstream_wait or clothstream_close on a stream that the same thread has acquired.
+ * Do not use the library in a child process after fork() without exec().
  *
- * Times are microseconds of clothstream_now_us. Strings are UTF-8. No exception leaves the library; where
- * memory runs out while a stream runs, the program ends.
+ * Times are microseconds of clothstream_now_us. Strings are UTF-8. No exception leaves the library. If memory
+ * runs out while a stream runs, the program ends.
  */
 #ifndef CLOTHSTREAM_CLIENTS_LIBRARY_CLOTHSTREAM_H
 #define CLOTHSTREAM_CLIENTS_LIBRARY_CLOTHSTREAM_H
@@ -33,54 +32,57 @@ typedef struct clothstream_stream clothstream_stream;
 typedef enum clothstream_result {
   CLOTHSTREAM_OK = 0,
   CLOTHSTREAM_INVALID = 1,     /* an argument is not allowed */
-  CLOTHSTREAM_UNREACHABLE = 2, /* nobody answers at the address, or not in time */
-  CLOTHSTREAM_REFUSED = 3,     /* the server said no: unknown scene, version, full, removed */
-  CLOTHSTREAM_LOST = 4,        /* the stream has ended, and could not be had back */
-  CLOTHSTREAM_FAILED = 5       /* no memory, no thread */
+  CLOTHSTREAM_UNREACHABLE = 2, /* no answer from the address, or not in time */
+  CLOTHSTREAM_REFUSED = 3,     /* by the server: unknown scene, wrong version, full, removed */
+  CLOTHSTREAM_LOST = 4,        /* the stream ended and could not be resumed */
+  CLOTHSTREAM_FAILED = 5       /* out of memory or threads */
 } clothstream_result;
 
 #define CLOTHSTREAM_OPTIONS_VERSION 1u
 typedef struct clothstream_options {
-  uint32_t version; /* CLOTHSTREAM_OPTIONS_VERSION; later ones add fields at the end */
-  uint32_t role;    /* cs_role that is wanted */
-  /* The most that is wanted of the stream, as cs_want has it: the finest quality, 0 to 3; temporal layers, 1
-   * to 3, or 0: all. What is sent, cs_get_operating_point says. */
+  uint32_t version; /* CLOTHSTREAM_OPTIONS_VERSION; later versions add fields at the end */
+  uint32_t role;    /* requested cs_role */
+  /* Limits as in cs_want. quality: best quality level, 0 (finest) to 3. temporal_layers: 1 to 3; 0 means all.
+   * cs_get_operating_point returns what the server sends. */
   uint32_t quality, temporal_layers;
-  const char* scene;        /* "": the server's default */
-  const char* client_name;  /* of the program */
-  const char* display_name; /* for other people; may be "" */
+  const char* scene;        /* "" means the server's default scene */
+  const char* client_name;  /* name of the program */
+  const char* display_name; /* name for other participants; may be "" */
   uint32_t join_timeout_ms; /* at least 1 */
-  /* For how long who is cut off tries to come back; 0: the stream ends with its connection. */
+  /* How long to try to reconnect after a loss. 0 means the stream ends with its connection. */
   uint32_t reconnect_for_ms;
 } clothstream_options;
 
-/* client_name is "libclothstream", the other strings are empty; no role is asked for; all of the stream; 10 s
- * to join, 60 s to come back. */
+/* Fills in the defaults and the version: client_name "libclothstream", other strings "", role unspecified,
+ * the whole stream, 10 s to join, 60 s to reconnect. */
 void clothstream_default_options(clothstream_options* out) CS_NOEXCEPT;
 
-/* Joins; returns when the scene's description is there. `address`: HOST or HOST:PORT, port 50051 by default.
- * options NULL: the default ones; strings are copied. *out is the stream, NULL unless CLOTHSTREAM_OK. */
+/* Joins a scene. Returns when the description of the scene has arrived.
+ * address: HOST or HOST:PORT; the default port is 50051.
+ * options: NULL means the defaults. Strings are copied.
+ * *out: the stream; NULL unless the result is CLOTHSTREAM_OK. Free it with clothstream_close. */
 clothstream_result clothstream_open(const char* address, const clothstream_options* options,
                                     clothstream_stream** out) CS_NOEXCEPT;
-/* Leaves the scene, which takes half a second at most; NULL is left alone. */
+/* Leaves the scene and frees the stream. Takes at most half a second. NULL is allowed. */
 void clothstream_close(clothstream_stream* stream) CS_NOEXCEPT;
 
-/* Until something has changed since the last call (the opening's changes are told by the first), the stream
- * has ended, or timeout_ms are over. *events: the CS_EVENT bits of all that changed. CLOTHSTREAM_OK while the
- * stream goes on, else why it ended; what came until then can still be read. */
+/* Waits until something has changed since the last call, the stream has ended, or timeout_ms have passed. The
+ * first call also reports the changes of clothstream_open. *events: the CS_EVENT bits of all changes. Returns
+ * CLOTHSTREAM_OK while the stream runs, else why it ended. The data received until then can still be read. */
 clothstream_result clothstream_wait(clothstream_stream* stream, uint32_t timeout_ms,
                                     uint32_t* events) CS_NOEXCEPT;
 
-/* See above. What was set while it was acquired is sent upon release. */
+/* Stops the library's thread and returns the client, which belongs to the stream. Requests made while the
+ * stream is acquired are sent after clothstream_release. */
 cs_client* clothstream_acquire(clothstream_stream* stream) CS_NOEXCEPT;
 void clothstream_release(clothstream_stream* stream) CS_NOEXCEPT;
 
-/* The clock that all times are of; it never steps. */
+/* Monotonic clock of all times. */
 uint64_t clothstream_now_us(void) CS_NOEXCEPT;
-/* Why the newest call in this thread did not give CLOTHSTREAM_OK: what was wrong, where, what to do. Until
- * the next call that gives a clothstream_result; "" before the first. */
+/* Returns why the last call in this thread did not return CLOTHSTREAM_OK: what was wrong, where, what to do.
+ * Valid until the next call in this thread that returns a clothstream_result. "" before the first. */
 const char* clothstream_error_text(void) CS_NOEXCEPT;
-/* Of the library, "major.minor.patch". */
+/* Version of the library: "major.minor.patch". */
 const char* clothstream_version(void) CS_NOEXCEPT;
 
 /* NOLINTEND(modernize-use-using) */

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Streams of gRPC's own threads.
+// Links over gRPC streams; gRPC's own threads call the listeners.
 #include <condition_variable>
 #include <deque>
 #include <mutex>
@@ -17,8 +17,8 @@ namespace {
 
 constexpr const char* kJoinMethod = "/clothstream.v1.ClothStream/Join";
 
-// Calls of gRPC that come from elsewhere than its own threads are allowed while it holds the call: until its
-// first read fails, which is how a stream ends.
+// gRPC allows operations from other threads only while a hold exists. The hold lasts until the first failed
+// read, which marks the end of the stream.
 class GrpcLink final : public Link, private grpc::ClientBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer> {
  public:
   GrpcLink(const std::string& address, LinkListener& listener)
@@ -87,7 +87,7 @@ class GrpcLink final : public Link, private grpc::ClientBidiReactor<grpc::ByteBu
       reading_ = false;
       dropped = dropped_;
     }
-    // Nobody asks for the last one, which ends the stream.
+    // After drop() the link reads on until the read that ends the stream.
     if (dropped) return read();
     grpc::Slice bytes;
     if (incoming_.DumpToSingleSlice(&bytes).ok())
@@ -126,7 +126,7 @@ class GrpcLink final : public Link, private grpc::ClientBidiReactor<grpc::ByteBu
 class GrpcLinks final : public Links {
  public:
   explicit GrpcLinks(std::string address) : address_(std::move(address)) {
-    // As the server does (server/endpoint/grpc/grpc_link.cpp).
+    // Same setting as in server/endpoint/grpc/grpc_endpoint.cpp.
     absl::SetMutexDeadlockDetectionMode(absl::OnDeadlockCycle::kIgnore);
   }
   std::unique_ptr<Link> open(LinkListener& listener) override {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// One connection to a server by either of its endpoints, many of which share few threads.
+// A connection to either endpoint of a server. Many connections share few threads.
 #pragma once
 
 #include <cstddef>
@@ -9,12 +9,12 @@
 
 namespace clothstream::load {
 
-// What a link tells, from a thread of its links, one call at a time; closed() is the last.
+// Receives the events of a link. A thread of the Links makes one call at a time; closed() is the last.
 class LinkListener {
  public:
-  // One message, for which Link::read() asked; the bytes are gone when it returns.
+  // One message after a call of Link::read(). The bytes are valid only during the call.
   virtual void received(std::span<const std::byte> message) = 0;
-  // The server's reason, or the network's.
+  // `why` is the reason from the server or the network.
   virtual void closed(const std::string& why) = 0;
 
  protected:
@@ -25,21 +25,22 @@ class LinkListener {
 class Link {
  public:
   virtual ~Link() = default;
-  // One message more: to be called once for the first, then once after each received(). Who does so seldom is
-  // slow.
+  // Requests one more message. Call it once at first and once after each received(); fewer calls make a slow
+  // reader.
   virtual void read() = 0;
-  // Queued until it is open, and in the order of the calls.
+  // Queues a message. Messages are sent in order once the link is open.
   virtual void send(std::string message) = 0;
-  // Says goodbye: closed() follows once the server has heard it.
+  // Says goodbye. closed() follows when the server has closed the link.
   virtual void leave() = 0;
-  // Without a word, if it is still there; the listener is called no more when it returns. The last call.
+  // Disconnects without a goodbye. Must be the last call. After it returns, the listener is not called any
+  // more.
   virtual void drop() = 0;
 };
 
 class Links {
  public:
   virtual ~Links() = default;
-  // Begins to connect. The listener outlives the link, which must not outlive the links.
+  // Starts to connect. The listener must outlive the link; the link must not outlive the Links.
   virtual std::unique_ptr<Link> open(LinkListener& listener) = 0;
 };
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// One thread steps everybody; the links's threads do what comes.
+// One thread steps all clients. The threads of the Links handle received messages.
 #include "clients/load/load.h"
 
 #include <algorithm>
@@ -8,16 +8,17 @@
 #include <numeric>
 #include <thread>
 
-#include "clients/load/intruder.h"
+#include "clients/load/hostile_client.h"
 
 namespace clothstream::load {
 namespace {
 
-// Not 72 a second: against ticks at that rate, a second's poses fall on all moments between two ticks alike.
+// Pose interval. At 71 poses a second and 72 ticks a second, poses fall evenly on all times between two
+// ticks.
 constexpr std::chrono::duration<double> kStep{1.0 / 71};
-// For everybody to be there once the last has knocked.
+// Time for the last participant to join.
 constexpr std::chrono::seconds kJoinTime{30};
-// For those who said goodbye.
+// Time for the goodbye of a participant that leaves.
 constexpr std::chrono::seconds kLeaveTime{2};
 
 Clock::duration inSeconds(double seconds) {
@@ -27,12 +28,12 @@ Clock::duration inSeconds(double seconds) {
 class Load {
  public:
   Load(Links& links, const LoadOptions& options, const LoadProgress& progress)
-      : endpoint_(links), options_(options), progress_(progress) {
+      : links_(links), options_(options), progress_(progress) {
     report_.participants = options.participants;
     report_.slow = options.slow;
-    report_.intruders = options.intruders;
-    for (std::uint32_t i = 0; i < options.intruders; ++i)
-      intruders_.push_back(std::make_unique<Intruder>(links, options.scene, i));
+    report_.hostileClients = options.hostileClients;
+    for (std::uint32_t i = 0; i < options.hostileClients; ++i)
+      hostileClients_.push_back(std::make_unique<HostileClient>(links, options.scene, i));
   }
 
   LoadReport run() {
@@ -42,7 +43,7 @@ class Load {
     measure();
     progress_.measured();
     for (Seat& seat : seats_) collect(seat);
-    for (const auto& intruder : intruders_) report_.visits += intruder->visits();
+    for (const auto& client : hostileClients_) report_.visits += client->visits();
     return report_;
   }
 
@@ -50,7 +51,7 @@ class Load {
   struct Seat {
     std::uint32_t number;
     std::unique_ptr<Participant> participant;
-    bool counted = false;  // among those who joined
+    bool counted = false;  // whether it counts as joined
   };
   struct Leaving {
     std::unique_ptr<Participant> participant;
@@ -62,16 +63,16 @@ class Load {
 
   std::unique_ptr<Participant> make(std::uint32_t number) {
     return std::make_unique<Participant>(
-        endpoint_, ParticipantOptions{
-                       .scene = options_.scene,
-                       .name = "load " + std::to_string(++names_),
-                       .decodes = number < options_.decoders,
-                       .moves = number + options_.viewers < options_.participants,
-                       .phase = number * std::numbers::phi,
-                       .bytesPerSecond = number < options_.participants ? 0 : options_.slowBytesPerSecond});
+        links_, ParticipantOptions{
+                    .scene = options_.scene,
+                    .name = "load " + std::to_string(++names_),
+                    .decodes = number < options_.decoders,
+                    .moves = number + options_.viewers < options_.participants,
+                    .phase = number * std::numbers::phi,
+                    .bytesPerSecond = number < options_.participants ? 0 : options_.slowBytesPerSecond});
   }
 
-  // False where it was ended early, or somebody could not stay.
+  // Returns false if the test was ended early or a participant was lost.
   bool gather() {
     const auto start = Clock::now();
     const auto end = start + inSeconds(seats() / options_.joinsPerSecond) + kJoinTime;
@@ -89,8 +90,8 @@ class Load {
         return true;
     }
     report_.lost += 1;
-    report_.firstLoss = {Failure::Kind::lost,
-                         "not everybody could join within " + std::to_string(kJoinTime.count()) + " s"};
+    report_.firstLoss = {Failure::Kind::lost, "not all participants could join within " +
+                                                  std::to_string(kJoinTime.count()) + " s"};
     return false;
   }
 
@@ -119,7 +120,7 @@ class Load {
     report_.seconds = std::chrono::duration<double>(Clock::now() - start).count();
   }
 
-  // One leaves, and another takes the seat.
+  // One participant leaves and another replaces it.
   void change(std::uint64_t turn) {
     Seat& seat = seats_[turn % seats_.size()];
     collect(seat);
@@ -151,18 +152,18 @@ class Load {
         seat.participant = make(seat.number);
       }
     }
-    for (const auto& intruder : intruders_) intruder->step(now);
+    for (const auto& client : hostileClients_) client->step(now);
     std::erase_if(leaving_, [&](const Leaving& one) { return one.participant->ended() || now >= one.until; });
     return progress_.running();
   }
 
-  Links& endpoint_;
+  Links& links_;
   const LoadOptions options_;
   const LoadProgress progress_;
   LoadReport report_;
   std::vector<Seat> seats_;
   std::vector<Leaving> leaving_;
-  std::vector<std::unique_ptr<Intruder>> intruders_;
+  std::vector<std::unique_ptr<HostileClient>> hostileClients_;
   std::uint64_t names_ = 0;
   Clock::time_point next_ = Clock::now();
 };

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Many participants of one scene at once, and what they get.
+// Load test: many participants in one scene, and what they receive.
 #pragma once
 
 #include <cstdint>
@@ -15,43 +15,43 @@ namespace clothstream::load {
 struct LoadOptions {
   std::string scene;  // empty: the server's default
   std::uint32_t participants = 10;
-  std::uint32_t decoders = 0;  // of these; the others acknowledge frames unread
-  std::uint32_t viewers = 0;   // of these, the last ones: they send no poses
-  std::uint32_t slow = 0;      // beside these
+  std::uint32_t decoders = 0;  // of these; the others acknowledge frames without decoding
+  std::uint32_t viewers = 0;   // of these, the last ones; they send no poses
+  std::uint32_t slow = 0;      // slow readers in addition to the participants
   double slowBytesPerSecond = 20'000;
-  std::uint32_t intruders = 0;  // beside these
-  double joinsPerSecond = 100;  // until all are there
-  double leavesPerSecond = 0;   // then; another comes for each
-  double seconds = 10;          // once all are there
+  std::uint32_t hostileClients = 0;  // in addition to the others
+  double joinsPerSecond = 100;       // until all have joined
+  double leavesPerSecond = 0;        // after that; each is replaced
+  double seconds = 10;               // after all have joined
 };
 
 struct LoadReport {
   double seconds = 0;
-  std::uint32_t participants = 0, slow = 0, intruders = 0;
-  // Of those that are not slow.
+  std::uint32_t participants = 0, slow = 0, hostileClients = 0;
+  // Figures of the participants that are not slow.
   Figures figures;
   Figures slowFigures;
   std::uint64_t joined = 0, left = 0, visits = 0;
-  // Those who were refused or lost their connection, and what the first was told.
+  // Number of participants that were refused or disconnected, and the reason of the first.
   std::uint64_t lost = 0;
   Failure firstLoss;
 
-  // Of all that took part at a time, a second and participant.
+  // Average rates over the measured time: frames per participant, and Mbit of all clients.
   double framesPerSecond() const;
   double slowFramesPerSecond() const;
   double mbitPerSecond() const;
 };
 
-// 0 of none.
+// Returns 0 without samples.
 double mean(const std::vector<float>& samples);
-// Nearest rank; 0 of none. `samples` is put in order.
+// Nearest-rank percentile; 0 without samples. Reorders `samples`.
 double percentile(std::vector<float>& samples, double percent);
 
 struct LoadProgress {
-  std::function<bool()> running;                // asked 71 times a second; false ends the load early
-  std::function<void()> gathered;               // all are there
-  std::function<void()> measured;               // and still are: the time is over
-  std::function<void(const LoadReport&)> show;  // once a second, of the last one; may be empty
+  std::function<bool()> running;                // called 71 times a second; false ends the test
+  std::function<void()> gathered;               // called when all have joined
+  std::function<void()> measured;               // called at the end of the measurement
+  std::function<void(const LoadReport&)> show;  // figures of the last second; may be empty
 };
 LoadReport runLoad(Links& links, const LoadOptions& options, const LoadProgress& progress);
 

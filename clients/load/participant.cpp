@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The protocol is the client core's; frames are looked at before it gets them.
+// The client core handles the protocol. Frames are measured before the core receives them.
 #include "clients/load/participant.h"
 
 #include <algorithm>
@@ -10,7 +10,7 @@
 namespace clothstream::load {
 namespace {
 
-// How the hand moves: round the middle of the cloth, once in so many seconds.
+// Time for one orbit of the sphere around the middle of the cloth.
 constexpr double kOrbitSeconds = 3;
 
 std::uint64_t nowUs() {
@@ -168,7 +168,7 @@ void Participant::frameDecoded(const v1::Frame& frame) {
     return static_cast<double>(serverUs) - statistics.clock_offset_us;
   };
   const auto decoded = static_cast<double>(decodedUs);
-  // Something of it shows once what is shown is past the frame before it.
+  // The frame becomes visible when play-out passes the frame before it.
   const FrameTimes times{.tick = own(frame.tick_time_us()),
                          .packet = own(frame.packet_time_us()),
                          .decoded = decoded,

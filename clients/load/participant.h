@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Somebody in a scene who moves a hand, and measures what comes.
+// A participant that moves a sphere and measures the frames it receives.
 #pragma once
 
 #include <array>
@@ -11,8 +11,8 @@
 #include <string>
 #include <vector>
 
-#include "clients/core/acknowledgement.h"
 #include "clients/core/core.h"
+#include "clients/core/stream/frame_feedback.h"
 #include "clients/grpc/failure.h"
 #include "clients/load/link.h"
 #include "clients/load/pose_timing.h"
@@ -25,24 +25,24 @@ using Clock = std::chrono::steady_clock;
 
 struct ParticipantOptions {
   std::string scene, name;
-  bool decodes = true;  // else frames are acknowledged unread, but for their headers
-  bool moves = true;    // a sphere, as told with each step(); from here on its orbit:
-  double phase = 0;     // turns
-  // Reads no faster than this; 0: as it comes.
+  bool decodes = true;  // otherwise it reads only the packet headers
+  bool moves = true;    // whether it moves a sphere on an orbit
+  double phase = 0;     // of the orbit, turns
+  // Reading rate; 0: unlimited.
   double bytesPerSecond = 0;
 };
 
-// Of one participant since its figures were taken last, or of several together.
+// Figures of one participant since the last take(), or sums over several participants.
 struct Figures {
-  std::uint64_t frames = 0, bytes = 0;  // of packets
-  std::uint64_t dropped = 0;            // frames of the stream that never came, by the gaps in their ticks
-  // Packets that the decoder refused; of who does not decode, whose reference never came.
+  std::uint64_t frames = 0, bytes = 0;  // received packets
+  std::uint64_t dropped = 0;            // missing frames, from the gaps between ticks
+  // Packets that the decoder refused. Without decoding: packets whose reference is missing.
   std::uint64_t decodeErrors = 0;
   std::uint64_t hashMismatches = 0;
-  // ms of each frame, on the server's clock: from the packet's completion, and from the start of its tick's
-  // simulation, to its arrival here.
+  // Age of each frame on arrival, ms on the server's clock: since the packet was complete, and since its tick
+  // began.
   std::vector<float> ages, tickAges;
-  // Of who moves and decodes.
+  // Only if the participant moves and decodes.
   PoseTimes poses;
 
   void add(const Figures& other);
@@ -55,12 +55,12 @@ class Participant final : private LinkListener {
   Participant(const Participant&) = delete;
   Participant& operator=(const Participant&) = delete;
 
-  // To be called at the rate at which it is to send poses.
+  // Sends one pose. Call it at the rate of the poses.
   void step(Clock::time_point now);
   void leave();
 
   bool joined() const;
-  // Why the link is gone, once it is.
+  // Reason why the link ended, or nothing while it is open.
   std::optional<Failure> ended() const;
   Figures take();
 
@@ -69,7 +69,7 @@ class Participant final : private LinkListener {
   void closed(const std::string& why) override;
   bool timesPoses() const { return options_.moves && options_.decodes; }
   void frameReceived(const v1::Frame& frame, std::uint64_t nowUs);
-  // The core has just decoded it.
+  // Measures poses after the core has decoded the frame.
   void frameDecoded(const v1::Frame& frame);
   void count(const codec::PacketHeader& header);
   void move(std::uint64_t nowUs);
@@ -79,12 +79,12 @@ class Participant final : private LinkListener {
   mutable std::mutex mutex_;
   std::unique_ptr<cs_client, void (*)(cs_client*)> core_;
   v1::ServerMessage message_;
-  client::Acknowledgement acknowledgement_;  // of who does not decode
+  client::Acknowledgement acknowledgement_;  // used if it does not decode
   Figures figures_;
   std::uint64_t decodeErrorsTaken_ = 0, hashMismatchesTaken_ = 0;
   PoseTiming poseTiming_;
-  std::uint64_t decodedTickUs_ = 0;  // when the newest decoded frame's began, on the server's clock; 0: none
-  // The newest, by number: what frames can refer to.
+  std::uint64_t decodedTickUs_ = 0;  // start of the newest decoded tick, server's clock; 0: none
+  // Newest ticks, a ring indexed by frame number. Frames can only refer to these.
   std::array<std::uint64_t, 64> ticks_{};
   std::uint64_t frames_ = 0;
   Clock::time_point readsAgainAt_{};

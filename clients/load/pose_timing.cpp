@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Poses are numbered by what floats hold exactly.
+// Radii are multiples of a power of two, which floats represent exactly.
 #include "clients/load/pose_timing.h"
 
 #include <algorithm>
@@ -33,7 +33,7 @@ float PoseTiming::nextRadius(std::uint64_t nowUs) {
 void PoseTiming::shown(float radius, const FrameTimes& frame, PoseTimes& out) {
   const float number = (radius - kLeastRadius) / kRadiusStep;
   if (!(number >= 0 && number < kNumbers) || number != std::floor(number)) return;
-  // How many were set since.
+  // Number of poses that were set after this one.
   const std::uint64_t newer = (set_ - 1 - static_cast<std::uint64_t>(number)) % kNumbers;
   if (newer >= set_ - shown_) return;
   shown_ = std::max(shown_, set_ - std::min<std::uint64_t>(set_, kNumbers));

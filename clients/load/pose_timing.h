@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// How long a participant's poses take until play-out shows something of them, stage by stage.
+// Latency of a participant's poses until play-out first shows their effect, by stage.
 #pragma once
 
 #include <array>
@@ -9,35 +9,34 @@
 
 namespace clothstream::load {
 
-// ms, one of each a pose; the stages add up to the whole.
+// Times in ms, one sample per pose. The stages add up to `whole`.
 struct PoseTimes {
-  std::vector<float> whole;  // from when it is set to when its frame is first displayable
+  std::vector<float> whole;  // from setting the pose to its first displayable frame
   std::vector<float> toTick, tickToPacket, packetToDecoded, decodedToDisplayable;
 
   void add(const PoseTimes& other);
 };
 
-// Of the first frame that shows a pose; microseconds of the own clock.
+// Times of the first frame that shows a pose, microseconds of the client's clock.
 struct FrameTimes {
   double tick, packet, decoded, displayable;
 };
 
-// The server moves spheres between and beyond their poses, but their size is that of the newest pose which is
-// true at the tick. So each pose has a size of its own, by which its frame is known. Sizes repeat after
-// kNumbers poses.
+// The server interpolates the positions of spheres but uses the radius of the newest pose at the tick. So
+// each pose has a different radius, which identifies it in frames. Radii repeat after kNumbers poses.
 class PoseTiming {
  public:
-  // Of a pose that is set now, m: 47 mm and up to 1 mm more.
+  // Radius for a pose that is set now: 0.047 to 0.048 m.
   float nextRadius(std::uint64_t nowUs);
-  // A frame shows the sphere with this radius: every pose since the one that was shown before is first shown
-  // in it, itself or by a newer one. Radii that are none of those above are left aside.
+  // Records a frame with this radius. It is the first to show every pose up to this one since the previous
+  // call. Ignores other radii.
   void shown(float radius, const FrameTimes& frame, PoseTimes& out);
 
  private:
   static constexpr std::size_t kNumbers = 1024;
 
   std::array<std::uint64_t, kNumbers> setUs_{};
-  std::uint64_t set_ = 0, shown_ = 0;  // poses so far
+  std::uint64_t set_ = 0, shown_ = 0;  // number of poses so far
 };
 
 }  // namespace clothstream::load

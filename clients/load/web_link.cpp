@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// WebSockets, all of them on one thread.
+// Links over WebSockets. One thread serves all of them.
 #include <atomic>
 #include <condition_variable>
 #include <deque>
@@ -38,7 +38,7 @@ struct Address {
   }
 };
 
-// All but the count of what is underway belongs to the links's thread.
+// Members belong to the thread of the Links, except underway_ and those that the mutex guards.
 class WebLink final : public Link {
  public:
   WebLink(net::io_context& io, const Address& address, LinkListener& listener)
@@ -76,7 +76,7 @@ class WebLink final : public Link {
   }
 
  private:
-  // Tasks and handlers count as underway until they have run: the link is there for them.
+  // Counts a task until it has run. The link exists at least as long.
   template <class Task>
   void post(Task task) {
     ++underway_;
@@ -131,7 +131,7 @@ class WebLink final : public Link {
     if (waiting_.empty()) {
       if (!leaving_) return;
       closing_ = true;
-      // Reads go on until the server's own goodbye, which this waits for.
+      // Completes when the server has answered with its close frame; reads continue until then.
       stream_.async_close(websocket::close_code::normal, tracked([this] { end({}); }));
       return;
     }

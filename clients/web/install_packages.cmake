@@ -1,7 +1,7 @@
-# cmake -DNPM=<npm> -P install_packages.cmake: installs what the lock file names into node_modules beside this script,
-# unless it is there. Build directories share it, so only one installs at a time.
+# cmake -DNPM=<npm> -P install_packages.cmake: installs the packages of the lock file into node_modules next to this script,
+# unless they are installed. Build directories share them, so a lock lets one build install at a time.
 set(room ${CMAKE_CURRENT_LIST_DIR})
-set(packages ${room}/node_modules/.package-lock.json) # npm writes it last of all
+set(packages ${room}/node_modules/.package-lock.json) # written last by npm
 file(LOCK ${room}/../../.cache/npm DIRECTORY TIMEOUT 600)
 if(EXISTS ${packages} AND NOT ${room}/package-lock.json IS_NEWER_THAN ${packages})
   return()

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// An array whose allocation may fail without an exception.
+// Array whose allocation can fail without an exception.
 #pragma once
 
 #include <cstddef>
@@ -8,7 +8,7 @@
 
 namespace clothstream::codec {
 
-// Not cleared.
+// Elements are not initialised.
 template <typename T>
 class Array {
  public:

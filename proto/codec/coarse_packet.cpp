@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Packets without what the finest levels take.
+// Coarse packets: removes the data of the two finest levels.
 #include "proto/codec/coarse_packet.h"
 
 #include <array>
@@ -13,10 +13,11 @@
 namespace clothstream::codec {
 namespace {
 
-// Of one range of cloths, kSections sections and kMaxReferences references: a varint takes ten bytes at most.
+// Header with one range of cloths, kSections sections and kMaxReferences references. A varint takes at most
+// ten bytes.
 constexpr std::size_t kLargestHeader = 256;
 
-// Which of a packet's sections have something of fine vertices.
+// Sections of a packet that hold data of fine vertices.
 std::span<const std::uint8_t> fineSections(const PacketHeader& header) {
   static constexpr std::array<std::uint8_t, 2> kOfSymbols{hierarchical::kFineSymbols,
                                                           hierarchical::kFineBits};
@@ -38,7 +39,7 @@ std::size_t makeCoarsePacket(std::span<const std::byte> packet, std::span<std::b
   if (fine.empty()) return 0;
   PacketHeader header = whole->header;
   for (const std::uint8_t section : fine) header.sectionBytes[section] = 0;
-  // It is not longer than it was: nothing is written over that is still to be read.
+  // The coarse packet is no longer than the whole one, so nothing is overwritten before it is read.
   std::array<std::byte, kLargestHeader> small;
   assert(headerBound(header) <= small.size());
   const std::size_t headerBytes = writeHeader(header, small);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A sixteenth of the vertices, for who is far or weak: packets without what the finest levels take.
+// Coarse packets: a sixteenth of the vertices, for clients that are far away or weak. The data of the two
+// finest levels is removed.
 #pragma once
 
 #include <cstddef>
@@ -8,11 +9,12 @@
 
 namespace clothstream::codec {
 
-// What a decoder takes of each packet. Decoders of Detail::coarse read whole packets as well as coarse ones.
+// Part of each packet that a decoder uses. Decoders of Detail::coarse accept whole packets and coarse
+// packets.
 enum class Detail : std::uint8_t { full, coarse };
 
-// Writes what Detail::coarse needs of a packet to `out` (at least as large; they may be the same memory) and
-// returns the number of bytes written; 0 where it is no packet.
+// Writes the part of a packet that Detail::coarse needs and returns its size in bytes. `out` is at least as
+// large as `packet` and may be the same memory. Returns 0 if the bytes are no packet.
 std::size_t makeCoarsePacket(std::span<const std::byte> packet, std::span<std::byte> out);
 
 }  // namespace clothstream::codec

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Packets to vertices: what all codecs have in common.
+// Decoder: checks that apply to both codecs, and results that are computed on demand.
 #include "proto/codec/decoder.h"
 
 #include <new>
@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "proto/codec/array.h"
-#include "proto/codec/body.h"
+#include "proto/codec/hierarchical/hierarchical_decoder.h"
 #include "proto/codec/temporal_layers.h"
 #include "proto/codec/vertex_normals.h"
 
@@ -16,11 +16,10 @@ namespace clothstream::codec {
 struct Decoder::State {
   bool allocate(const StreamLayout& streamLayout, Detail detail) {
     layout = streamLayout;
-    // The coarse vertices' normals alone are of no use.
+    // Sent normals predict one another, so those of the coarse vertices alone cannot be decoded.
     sendsNormals = layout.normals == NormalMode::octahedral && detail == Detail::full;
-    body = makeHierarchicalDecoder(layout, detail);
     const std::size_t floats = 3 * std::size_t{layout.vertexCount()};
-    return body != nullptr && positions.allocate(floats) && normals.allocate(floats);
+    return body.allocate(layout, detail) && positions.allocate(floats) && normals.allocate(floats);
   }
 
   DecodeResult decode(std::span<const std::byte> bytes) {
@@ -29,7 +28,7 @@ struct Decoder::State {
     const PacketHeader& header = packet->header;
     if (header.epoch != layout.epoch) return DecodeResult::wrongEpoch;
     if (hasFrame && header.tick <= tick) return DecodeResult::stale;
-    // A packet of these codecs covers all cloths and refers to one frame.
+    // Packets of both codecs cover all cloths and refer to one frame.
     const ClothRange& range = header.ranges[0];
     if (header.rangeCount != 1 || range.first != 0 || range.count != layout.cloths.size())
       return DecodeResult::malformed;
@@ -44,24 +43,24 @@ struct Decoder::State {
       if (*found > header.temporalLayer || header.quality != quality) return DecodeResult::malformed;
       referenceLayer = *found;
     }
-    if (!body->decode(*packet, referenceLayer)) return DecodeResult::malformed;
+    if (!body.decode(*packet, referenceLayer)) return DecodeResult::malformed;
     if (key) held.clear();
     held.hold(header.temporalLayer, header.tick);
     tick = header.tick;
     quality = header.quality;
     hasFrame = true;
     hasHash = hasNormals = false;
-    body->writePositions(positions.data());
+    body.writePositions(positions.data());
     return DecodeResult::ok;
   }
 
   void makeNormals() {
-    if (sendsNormals) return body->writeNormals(normals.data());
+    if (sendsNormals) return body.writeNormals(normals.data());
     computeVertexNormals(layout, positions.data(), normals.data());
   }
 
   StreamLayout layout;
-  std::unique_ptr<BodyDecoder> body;
+  hierarchical::HierarchicalDecoder body;
   bool sendsNormals = false;
   Array<float> positions, normals;
   HeldFrames held;
@@ -69,7 +68,7 @@ struct Decoder::State {
   std::uint8_t quality = 0;
   std::uint64_t hash = 0;
   bool hasFrame = false;
-  // Of the newest frame; made when they are first asked for.
+  // Results for the newest frame, computed when they are first requested.
   bool hasHash = false, hasNormals = false;
 };
 
@@ -106,7 +105,7 @@ std::span<const float> Decoder::normals() const {
 
 std::uint64_t Decoder::reconstructionHash() const {
   State& s = *state_;
-  if (s.hasFrame && !s.hasHash) s.hash = s.body->reconstructionHash();
+  if (s.hasFrame && !s.hasHash) s.hash = s.body.reconstructionHash();
   s.hasHash = true;
   return s.hash;
 }

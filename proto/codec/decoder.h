@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Packets to vertices. Safe on any bytes: it never reads or writes out of bounds, never allocates by an
-// unchecked count, always ends.
+// Decoder: packets to vertices. Safe on any bytes: it never reads or writes out of bounds, never allocates by
+// an unchecked count, and always ends.
 #pragma once
 
 #include <cstddef>
@@ -16,17 +16,17 @@ namespace clothstream::codec {
 
 enum class DecodeResult : std::uint8_t {
   ok,
-  malformed,         // not a packet of this stream's codec; the decoder's state is as before
-  wrongEpoch,        // of another description
-  missingReference,  // refers to a tick that was not decoded, or is no longer held: ask for a key frame, or
-                     // leave it out where it is of a layer above the base
-  stale,             // not newer than what is decoded
+  malformed,         // no packet of this stream's codec; the decoder is unchanged
+  wrongEpoch,        // packet of another description
+  missingReference,  // the reference was not decoded or is no longer held: request a key frame, or
+                     // skip the packet if its layer is above the base
+  stale,             // not newer than the newest decoded frame
 };
 
-// One decoder a stream; not thread-safe. Memory is taken once, at construction.
+// One decoder for each stream. Not thread-safe. Allocates only at construction.
 class Decoder {
  public:
-  // nullptr if the layout is impossible (stream_layout.h), or memory is out.
+  // nullptr if the layout is impossible (stream_layout.h) or memory is out.
   static std::unique_ptr<Decoder> make(const StreamLayout& layout, Detail detail = Detail::full);
   ~Decoder();
   Decoder(const Decoder&) = delete;
@@ -34,17 +34,18 @@ class Decoder {
 
   [[nodiscard]] DecodeResult decode(std::span<const std::byte> packet);
 
-  // Of the newest decoded frame, like all that follows; undefined before the first.
+  // Tick of the newest decoded frame. Undefined before the first frame, like everything below.
   std::uint64_t tick() const;
   bool hasFrame() const;
 
-  // 3 floats a vertex, metres, cloths one after the other; valid until the next decode. With Detail::coarse
-  // those that are not coarse lie between the others, without a promise.
+  // Positions in metres, 3 floats a vertex, cloth after cloth. Valid until the next decode. With
+  // Detail::coarse the positions of other vertices are interpolated, without a promise about their error.
   std::span<const float> positions() const;
-  // 3 floats a vertex, unit length: as sent, or computed from the positions where the stream sends none. The
+  // Unit normals, 3 floats a vertex: as sent, or computed from the positions if the stream sends none. The
   // first call after a decode does the work.
   std::span<const float> normals() const;
-  // 64-bit hash of the reconstruction; equal to the server's (FRAME_FORMAT.md), but with Detail::coarse.
+  // 64-bit hash of the reconstruction (FRAME_FORMAT.md). Equals the server's hash, except with
+  // Detail::coarse.
   std::uint64_t reconstructionHash() const;
 
  private:

@@ -1,23 +1,23 @@
 // SPDX-License-Identifier: MIT
-// Vertices to packets: what all codecs have in common.
+// Encoder: frame numbers, layers and references, which are the same in both codecs.
 #include "proto/codec/encoder.h"
 
 #include <cassert>
 #include <utility>
 
-#include "proto/codec/body.h"
+#include "proto/codec/hierarchical/hierarchical_encoder.h"
 #include "proto/codec/temporal_layers.h"
 
 namespace clothstream::codec {
 
 struct Encoder::State {
-  std::unique_ptr<BodyEncoder> body;
+  std::unique_ptr<hierarchical::HierarchicalEncoder> body;
   std::size_t floats = 0;
   bool hasNormals = false;
   std::uint8_t layers = 1, quality = 0;
   HeldFrames held;
   std::uint64_t tick = 0;
-  std::uint64_t frame = 0;  // the next one's number since the key frame; 0: it is a key frame
+  std::uint64_t frame = 0;  // number of the next frame since the key frame; 0 is a key frame
 };
 
 std::unique_ptr<Encoder> Encoder::make(const StreamLayout& stream, const EncoderOptions& options) {
@@ -27,7 +27,7 @@ std::unique_ptr<Encoder> Encoder::make(const StreamLayout& stream, const Encoder
   assert(options.weightLag == 0 || layout.temporalLayers == 1);
   auto state = std::make_unique<State>();
   state->quality = options.quality;
-  state->body = makeHierarchicalEncoder(layout, options);
+  state->body = std::make_unique<hierarchical::HierarchicalEncoder>(layout, options);
   state->floats = 3 * std::size_t{layout.vertexCount()};
   state->layers = layout.temporalLayers;
   state->hasNormals = layout.normals == NormalMode::octahedral;

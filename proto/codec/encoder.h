@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Vertices to packets on the CPU: the reference that the kernels equal to the bit.
+// Encoder on the CPU: vertices to packets. It is the reference for the kernels, which give the same bits.
 #pragma once
 
 #include <cstddef>
@@ -14,21 +14,22 @@
 namespace clothstream::codec {
 
 struct EncoderOptions {
-  // Of the layout's: a stream in another one is another encoder's.
+  // Index of the layout's quality that this encoder writes. Each quality of a stream needs its own encoder.
   std::uint8_t quality = 0;
-  // Of one temporal layer: the weights of a frame are fitted to the frames that are so many or more
-  // before it, and a key frame's to an earlier one's, as they are where frames are prepared before those
-  // before them are coded. 0: all frames before it, and itself. For any of them a decoder is the same.
+  // Number of frames between a frame and the newest frame that its weights are fitted to; the weights of a
+  // key frame are fitted to an earlier key frame. 0 fits to all earlier frames, and fits a key frame to
+  // itself. A lag lets later frames be prepared before earlier ones are coded. It requires one temporal
+  // layer. Decoders do not depend on it.
   std::uint32_t weightLag = 0;
-  // Large frames are predicted by all of them, to the same bits; they outlive the encoder. None: by the
-  // caller alone.
+  // Threads that predict large frames, with the same result to the bit. They must outlive the encoder.
+  // Without them the caller's thread does all work.
   Workers* workers = nullptr;
 };
 
-// One encoder a stream; not thread-safe. Memory is taken once, at construction.
+// One encoder for each stream and quality. Not thread-safe. Allocates only at construction.
 class Encoder {
  public:
-  // nullptr if the layout is impossible (stream_layout.h), or has no such quality.
+  // nullptr if the layout is impossible (stream_layout.h) or has no such quality.
   static std::unique_ptr<Encoder> make(const StreamLayout& layout, const EncoderOptions& options = {});
   ~Encoder();
   Encoder(const Encoder&) = delete;
@@ -36,18 +37,20 @@ class Encoder {
 
   std::size_t packetBound() const;
 
-  // 3 floats a vertex, metres, within 2^27 units (32 m at any max error); normals of about unit length, or
-  // nothing where the layout has none. `tick` must grow from call to call, but where history was forgotten. A
-  // predicted frame refers to the frame encoded before, or with temporal layers to the newest of a lower
-  // layer (of its own in the base), and the header says which; the first is always a key frame, whatever is
-  // asked. Writes to `out` (at least packetBound() bytes) and returns the number of bytes written.
+  // Encodes one frame into `out`, which has at least packetBound() bytes, and returns the size of the packet.
+  // `positions` are metres, 3 floats a vertex, within 2^27 units (32 m at any max error). `normals` have
+  // about unit length, or are empty if the layout has none. `tick` must grow from call to call, except after
+  // forgetHistory().
+  // The first frame is always a key frame. A predicted frame refers to the previous frame; with temporal
+  // layers, to the newest frame of a lower layer or, in the base, to the previous frame of the base. The
+  // packet header names the reference.
   std::size_t encode(std::uint64_t tick, PacketKind kind, std::span<const float> positions,
                      std::span<const float> normals, std::span<std::byte> out);
 
-  // The next frame is a key frame.
+  // Makes the next frame a key frame.
   void forgetHistory();
 
-  // Of the newest frame; equal to the decoder's.
+  // Hash of the newest frame. Equals the decoder's hash.
   std::uint64_t reconstructionHash() const;
 
  private:

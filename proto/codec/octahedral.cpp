@@ -18,7 +18,7 @@ std::int32_t fixedPoint(float x) {
 }
 
 // kOctahedralLimit * magnitude / sum, rounded to nearest, with the sign of `signedBy`. Integer division is
-// exact everywhere; a float reciprocal is not.
+// exact on every machine; a float reciprocal is not.
 std::int8_t component(std::int32_t magnitude, std::int32_t sum, std::int32_t signedBy) {
   const std::int32_t rounded = (2 * kOctahedralLimit * magnitude + sum) / (2 * sum);
   return static_cast<std::int8_t>(signedBy < 0 ? -rounded : rounded);

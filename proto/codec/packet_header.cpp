@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The header that every packet starts with, whatever its codec.
+// Header of every packet of both codecs.
 #include "proto/codec/packet_header.h"
 
 #include <cassert>
@@ -20,7 +20,7 @@ class Reader {
     return true;
   }
 
-  // LEB128, shortest form only: a header has one encoding.
+  // LEB128 in its shortest form only, so that a header has exactly one encoding.
   bool varint(std::uint64_t& out) {
     out = 0;
     for (unsigned shift = 0; shift < 64; shift += 7) {
@@ -69,7 +69,7 @@ class Writer {
   std::size_t at_ = 0;
 };
 
-// References are distances back from the packet's tick, so that a long stream's header stays short.
+// A reference is the distance back from the packet's tick, so headers of long streams stay short.
 bool readReferences(Reader& reader, PacketHeader& header) {
   if (!reader.byte(header.referenceCount) || header.referenceCount > kMaxReferences) return false;
   if ((header.referenceCount == 0) != (header.kind == PacketKind::key)) return false;
@@ -81,7 +81,7 @@ bool readReferences(Reader& reader, PacketHeader& header) {
   return true;
 }
 
-// A range's start counts from the end of the range before: ranges ascend and never overlap.
+// The start of a range counts from the end of the previous range, so ranges ascend and never overlap.
 bool readRanges(Reader& reader, PacketHeader& header) {
   std::uint32_t count;
   if (!reader.varint(count) || count == 0 || count > kMaxClothRanges) return false;

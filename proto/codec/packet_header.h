@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The header that every packet starts with, whatever its codec. FRAME_FORMAT.md has the bytes.
+// Header of every packet of both codecs. FRAME_FORMAT.md defines the bytes.
 #pragma once
 
 #include <array>
@@ -42,17 +42,17 @@ struct PacketHeader {
 
 struct ParsedPacket {
   PacketHeader header;
-  // Everything after the header; exactly the sections, one after the other.
+  // All bytes after the header: exactly the sections, in order.
   std::span<const std::byte> body;
 };
 
-// nullopt where the bytes are no packet of this version, or the sections do not fill it exactly.
+// nullopt if the bytes are no packet of this version or the sections do not fill it exactly.
 [[nodiscard]] std::optional<ParsedPacket> parsePacket(std::span<const std::byte> bytes);
 
-// Largest number of bytes that writeHeader can take.
+// Upper bound of the bytes that writeHeader() writes.
 std::size_t headerBound(const PacketHeader& header);
 
-// Writes to `out` (at least headerBound bytes) and returns the number of bytes written.
+// Writes to `out`, which has at least headerBound() bytes, and returns the number of bytes written.
 std::size_t writeHeader(const PacketHeader& header, std::span<std::byte> out);
 
 }  // namespace clothstream::codec

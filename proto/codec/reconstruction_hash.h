@@ -1,16 +1,17 @@
 // SPDX-License-Identifier: MIT
-// 64-bit hash of a reconstruction's integers: a sum over vertices, so that any order of work gives the same.
+// 64-bit hash of a reconstruction's integers. It is a sum over vertices, so it does not depend on their
+// order.
 #pragma once
 
 #include <cstdint>
 
 namespace clothstream::codec {
 
-// Two halves, each a sum modulo 2^32 of one word a vertex; FRAME_FORMAT.md defines it. The kernels do the
+// Two halves, each a sum modulo 2^32 of one word for each vertex (FRAME_FORMAT.md). The kernels compute the
 // same.
 class ReconstructionHash {
  public:
-  // x, y, z: in units; normal: u and v as bytes, u | v << 8, 0 where the stream sends no normals.
+  // x, y, z are in units. `normal` is the bytes u | v << 8, or 0 if the stream sends no normals.
   void add(std::uint32_t vertex, std::int32_t x, std::int32_t y, std::int32_t z, std::uint32_t normal) {
     low_ += word(vertex, x, y, z, normal, 0x243f6a88u);
     high_ += word(vertex, x, y, z, normal, 0x85a308d3u);
@@ -19,7 +20,7 @@ class ReconstructionHash {
   std::uint64_t value() const { return std::uint64_t{high_} << 32 | low_; }
 
  private:
-  // A bijection of 32 bits in which each bit of the input moves each of the output.
+  // Bijection of 32 bits in which each bit of the input changes each bit of the output.
   static constexpr std::uint32_t mix(std::uint32_t h) {
     h = (h ^ h >> 16) * 0x7feb352du;
     h = (h ^ h >> 15) * 0x846ca68bu;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What encoder and decoder know of a stream before its first packet.
+// Layout of a stream: everything that encoder and decoder know before its first packet.
 #pragma once
 
 #include <algorithm>
@@ -12,42 +12,44 @@ namespace clothstream::codec {
 
 enum class NormalMode : std::uint8_t { none = 0, octahedral = 1 };
 
-// Vertices are row-major where rows and columns are not zero.
+// Vertices of a grid are row-major. Rows and columns are both zero for a cloth that is no grid.
 struct ClothLayout {
   std::uint32_t vertexCount = 0;
   std::uint32_t rows = 0, columns = 0;
-  // Of a cloth that is no grid, for its normals: three of the cloth's own vertices each, counter-clockwise.
+  // Triangles of a mesh, for its normals and its coding order: three vertices of this cloth each,
+  // counter-clockwise.
   std::vector<std::uint32_t> triangles = {};
-  // Of a mesh, 3 floats a vertex, or nothing: they tell which vertices lie between which others. Without them
-  // it takes more bits.
+  // Rest positions of a mesh, 3 floats a vertex, or empty. They show which vertices lie between others.
+  // Without them the stream takes more bits.
   std::vector<float> restPositions = {};
 };
 
-// The same but for how residuals are written: with the fewest bits, or so that a device does it.
+// Codecs 2 and 3 differ only in the way residuals are written: with the fewest bits, or in blocks.
 inline constexpr std::uint8_t kCodecHierarchical = 2, kCodecPacked = 3;
-// All there are, the best first.
+// All codecs, the preferred one first.
 inline constexpr std::array<std::uint32_t, 2> kCodecs{kCodecHierarchical, kCodecPacked};
 
 constexpr bool isCodec(std::uint32_t id) {
   return std::find(kCodecs.begin(), kCodecs.end(), id) != kCodecs.end();
 }
 
-// Frames at full, half and a quarter of the rate.
+// Maximum number of temporal layers: frames at full, half and a quarter of the rate.
 inline constexpr std::uint8_t kMaxTemporalLayers = 3;
 
 struct StreamLayout {
   std::uint32_t epoch = 0;
   std::uint8_t codec = kCodecHierarchical;
-  // m along each of three axes: the promise the encoder keeps for whatever lies within 32 m of the origin.
-  // Farther out the spacing of floats there comes on top. The axes turn with the surface: what is promised is
-  // the distance that follows, sqrt(3) maxError at most.
+  // Maximum error in metres along each of three orthogonal axes, for vertices within 32 m of the origin.
+  // Farther out the spacing of floats is added. The axes turn with the surface, so the encoder promises a
+  // distance of at most sqrt(3) maxError.
   float maxError = 0.0005f;
   NormalMode normals = NormalMode::none;
-  // 1: each frame refers to the one before it, and none can be left out. 2 or 3: every second
-  // frame can, or all but every fourth, layer by layer from the highest; it costs bits (docs/codec.md).
+  // Number of temporal layers. With 1, each frame refers to the previous one and no packet can be dropped.
+  // With 2 or 3, every second frame or all but every fourth can be dropped, from the highest layer down.
+  // Layers cost bits (docs/codec.md).
   std::uint8_t temporalLayers = 1;
-  // In how many the stream can come. maxError is that of quality 0; each other has twice the max error of the
-  // one before. A stream goes from one to another at a key frame.
+  // Number of quality levels of the stream. maxError is that of quality 0, and each further quality doubles
+  // it. A stream changes its quality at a key frame.
   std::uint8_t qualities = 1;
   std::vector<ClothLayout> cloths;
 
@@ -62,9 +64,9 @@ inline constexpr std::uint8_t kMaxQualities = 4;
 inline constexpr std::uint32_t kMaxVertices = 1u << 26;
 inline constexpr float kSmallestMaxError = 5e-6f, kLargestMaxError = 1000;
 
-// Whether a stream can have this layout: a codec of ours, 1 to kMaxTemporalLayers layers, one cloth or more,
-// none empty, grids whose numbers agree, triangles of vertices that there are and finite rest positions, at
-// most kMaxVertices, a max error within the two bounds above.
+// True if a stream can have this layout: a known codec, 1 to kMaxTemporalLayers layers, at least one cloth,
+// no empty cloth, grids of rows x columns vertices, triangles of existing vertices, finite rest positions, at
+// most kMaxVertices vertices, and a max error between the two bounds above.
 inline bool isPossible(const StreamLayout& layout) {
   if (!(layout.maxError >= kSmallestMaxError && layout.maxError <= kLargestMaxError)) return false;
   if (layout.normals != NormalMode::none && layout.normals != NormalMode::octahedral) return false;
@@ -89,7 +91,7 @@ inline bool isPossible(const StreamLayout& layout) {
   return vertices > 0;
 }
 
-// Of a quality that there is.
+// Max error of a quality of the layout.
 constexpr float maxErrorOf(const StreamLayout& layout, std::uint8_t quality) {
   return layout.maxError * static_cast<float>(1u << quality);
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Which frames of a stream can be left out without harm to the others, and which are held to refer to.
+// Temporal layers: which frames can be dropped without harm to others, and which are held as references.
 #pragma once
 
 #include <array>
@@ -11,22 +11,22 @@
 
 namespace clothstream::codec {
 
-// The layer of a frame, counted from the key frame: each layer above the base has the frames half-way between
-// those below it. Of three layers 0 2 1 2, over and over.
+// Layer of a frame, counted from the key frame. Each layer above the base has the frames half-way between
+// those below it. Three layers give 0 2 1 2, repeated.
 constexpr std::uint8_t layerOf(std::uint64_t frame, std::uint8_t layers) {
   const std::uint64_t place = frame & ((std::uint64_t{1} << (layers - 1)) - 1);
   return place == 0 ? std::uint8_t{0} : static_cast<std::uint8_t>(layers - 1 - std::countr_zero(place));
 }
 
-// The newest frame of each layer since the last key frame, by its tick. Both ends hold them; what a reader
-// was not sent it does not hold, and nothing that it is sent refers to it.
+// Newest frame of each layer since the last key frame, by tick. Both ends hold these frames. A reader that
+// missed a frame does not hold it, and is sent nothing that refers to it.
 class HeldFrames {
  public:
   void clear() { ticks_ = {}; }
   void hold(std::uint8_t layer, std::uint64_t tick) { ticks_[layer] = tick; }
   std::optional<std::uint64_t> tick(std::uint8_t layer) const { return ticks_[layer]; }
 
-  // The layer whose newest frame has this tick.
+  // Layer whose newest frame has this tick.
   std::optional<std::uint8_t> find(std::uint64_t tick) const {
     for (std::uint8_t layer = 0; layer < kMaxTemporalLayers; ++layer) {
       if (ticks_[layer] == tick) return layer;
@@ -34,7 +34,8 @@ class HeldFrames {
     return std::nullopt;
   }
 
-  // To which layer's newest frame one of this layer refers: the newest of those below; the base to itself.
+  // Layer whose newest frame is the reference of a frame of `layer`: the newest of the lower layers. The base
+  // refers to itself.
   std::uint8_t referenceOf(std::uint8_t layer) const {
     std::uint8_t newest = 0;
     for (std::uint8_t other = 1; other < layer; ++other) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Threads that somebody else has.
+// Interface to worker threads that the program provides.
 #pragma once
 
 #include <cstdint>
@@ -10,8 +10,8 @@ namespace clothstream::codec {
 class Workers {
  public:
   virtual ~Workers() = default;
-  // Does `piece` for each number below `pieces`, several at a time and in any order; returns when all are
-  // done. For one caller at a time.
+  // Calls `piece` for each number below `pieces`, several at a time and in any order. Returns when all calls
+  // have returned. Only one caller at a time.
   virtual void run(std::uint32_t pieces, const std::function<void(std::uint32_t)>& piece) = 0;
 };
 

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
-// Signed numbers as unsigned ones.
+// Zigzag form: signed numbers as unsigned ones.
 #pragma once
 
 #include <cstdint>
 
 namespace clothstream::codec {
 
-// Small magnitudes of either sign to small numbers: 0, -1, 1, -2, ... to 0, 1, 2, 3, ...
+// Maps 0, -1, 1, -2, ... to 0, 1, 2, 3, ..., so that small magnitudes of either sign become small numbers.
 constexpr std::uint32_t zigzag(std::int32_t value) {
   return (static_cast<std::uint32_t>(value) << 1) ^ static_cast<std::uint32_t>(value >> 31);
 }

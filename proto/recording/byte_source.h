@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Where a reader's bytes come from: a file, or memory.
+// Source of a reader's bytes: a file or memory.
 #pragma once
 
 #include <cstdint>
@@ -15,7 +15,8 @@ class ByteSource {
  public:
   virtual ~ByteSource() = default;
   virtual std::uint64_t size() const = 0;
-  // Exactly so many bytes, which must lie inside; replaces `out`. False where they cannot be read.
+  // Reads exactly `count` bytes, which must lie inside the source, and replaces `out`. False if they cannot
+  // be read.
   [[nodiscard]] virtual bool read(std::uint64_t offset, std::uint64_t count, std::string& out) const = 0;
 };
 
@@ -32,7 +33,8 @@ class MemorySource : public ByteSource {
   std::string bytes_;
 };
 
-// As long as it is now. The error names the path and why it cannot be read: pipes and directories cannot.
+// Opens a regular file with its present size. The error names the path and the reason; pipes and directories
+// are refused.
 [[nodiscard]] tl::expected<std::unique_ptr<ByteSource>, std::string> openFile(const std::string& path);
 
 }  // namespace clothstream::recording

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Numbers and texts as MCAP has them: little-endian, texts behind their length.
+// Numbers and texts of MCAP: little-endian; a text follows its length.
 #pragma once
 
 #include <bit>
@@ -24,8 +24,8 @@ inline void appendText(std::string& out, std::string_view text) {
   out.append(text);
 }
 
-// Reads from the front. What is not there any more reads as zero and as empty, from then on everything does,
-// and ok() is false. Texts are views of the bytes.
+// Reads from the front. Past the end it reads zeros and empty texts, and from then on ok() is false. Texts
+// are views of the bytes.
 class ByteReader {
  public:
   explicit ByteReader(std::string_view bytes) : bytes_(bytes) {}
@@ -47,7 +47,7 @@ class ByteReader {
   }
 
   bool ok() const { return ok_; }
-  // Bytes that are left; 0 where it is not ok.
+  // Number of bytes left; 0 if ok() is false.
   std::size_t left() const { return ok_ ? bytes_.size() : 0; }
   std::string_view rest() { return take(left()); }
 

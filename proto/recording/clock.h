@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The times of a recording.
+// Clock of a recording.
 #pragma once
 
 #include <chrono>
@@ -7,8 +7,8 @@
 
 namespace clothstream::recording {
 
-// Nanoseconds since 1970 as they were when it was made, and from there on by the steady clock: whatever
-// becomes of the machine's time of day, a recording's times go on. Thread-safe.
+// Nanoseconds since 1970. Starts with the time of day at construction and then follows the steady clock, so a
+// change of the machine's time of day does not affect a recording. Thread-safe.
 class RecordingClock {
  public:
   std::uint64_t now() const {

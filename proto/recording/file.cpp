@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// open, write, pread.
+// File access by open, write and pread.
 #include "proto/recording/file.h"
 
 #include <cerrno>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A recording's file while it is written.
+// File of a recording while it is written.
 #pragma once
 
 #include <string>
@@ -9,26 +9,26 @@
 
 namespace clothstream::recording {
 
-// In its place from the start: what was written to it stays, however the program ends. Errors name the path
-// and what the system said of it.
+// The file has its final path from the start, so written data survives any end of the program. Errors name
+// the path and the system's message.
 class OutputFile {
  public:
-  // There must be nothing of this path yet.
+  // Fails if the path exists.
   [[nodiscard]] static tl::expected<OutputFile, std::string> create(const std::string& path);
   ~OutputFile();
   OutputFile(OutputFile&& other) noexcept;
   OutputFile& operator=(OutputFile&&) = delete;
 
-  // With the operating system when it returns.
+  // The operating system has the bytes when the call returns.
   [[nodiscard]] tl::expected<void, std::string> write(std::string_view bytes);
-  // On the disk.
+  // The disk has the bytes when the call returns.
   [[nodiscard]] tl::expected<void, std::string> sync();
 
  private:
   OutputFile(std::string path, int file) : path_(std::move(path)), file_(file) {}
 
   std::string path_;
-  int file_ = -1;  // -1: moved to another OutputFile
+  int file_ = -1;  // -1 after a move to another OutputFile
 };
 
 }  // namespace clothstream::recording

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What MCAP readers and writers share: https://mcap.dev/spec.
+// Definitions that MCAP readers and writers share: https://mcap.dev/spec.
 #pragma once
 
 #include <cstddef>
@@ -30,11 +30,11 @@ enum class Opcode : std::uint8_t {
 };
 
 inline constexpr std::string_view kMagic{"\x89MCAP0\r\n", 8};
-inline constexpr std::size_t kVersionByte = 5;     // of the magic
+inline constexpr std::size_t kVersionByte = 5;     // place in the magic
 inline constexpr std::size_t kRecordHead = 1 + 8;  // opcode, length
 inline constexpr std::size_t kFooterBytes = 8 + 8 + 4;
 
-// What a reader takes at most. A chunk can hold one message that is larger than a writer's usual chunk: the
+// Limits of a reader. A chunk can hold one message that is larger than a writer's usual chunk: the
 // description of a large mesh.
 inline constexpr std::uint64_t kMaxChunkBytes = std::uint64_t{320} << 20;
 inline constexpr std::uint64_t kMaxSummaryBytes = std::uint64_t{256} << 20;
@@ -42,7 +42,7 @@ inline constexpr std::uint64_t kMaxPlainRecordBytes = std::uint64_t{16} << 20;  
 
 using Facts = std::map<std::string, std::string>;
 
-// CRC-32 as in zip files, going on from `before`.
+// CRC-32 as in zip files, continued from `before`.
 inline std::uint32_t crcOf(std::string_view bytes, std::uint32_t before = 0) {
   return static_cast<std::uint32_t>(
       ::crc32_z(before, reinterpret_cast<const Bytef*>(bytes.data()), bytes.size()));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Index or scan, then chunk by chunk.
+// Reader of MCAP files: index or scan, then chunk by chunk.
 #include "proto/recording/mcap_reader.h"
 
 #include <algorithm>
@@ -20,17 +20,17 @@ tl::unexpected<std::string> broken(fmt::format_string<Arguments...> text, Argume
 
 using Done = tl::expected<void, std::string>;
 
-// The record that ends the data, before the summary.
+// Record that ends the data, before the summary.
 constexpr std::uint64_t kDataEndBytes = kRecordHead + 4;
 
 struct Record {
   Opcode opcode{};
-  std::uint64_t offset = 0;  // of its content
-  std::uint64_t length = 0;  // of its content
+  std::uint64_t offset = 0;  // start of the content
+  std::uint64_t length = 0;  // length of the content
   std::uint64_t end() const { return offset + length; }
 };
 
-// A chunk's record, but for what it holds.
+// Fields of a chunk's record, without its messages.
 struct ChunkHead {
   std::uint64_t start = 0, end = 0, size = 0;
   std::uint32_t crc = 0;
@@ -66,7 +66,7 @@ std::optional<Facts> parseMap(std::string_view entries) {
 struct McapReader::State {
   std::unique_ptr<ByteSource> source;
   std::string library;
-  std::uint64_t firstRecord = 0;  // after the header
+  std::uint64_t firstRecord = 0;  // offset after the header
   bool indexed = false;
   std::map<std::uint16_t, Channel> channels;
   std::map<std::uint16_t, ReadSchema> schemas;
@@ -74,9 +74,9 @@ struct McapReader::State {
   std::optional<Statistics> statistics;
   std::map<std::string, Facts> facts;
   std::uint64_t dataEnd = 0;
-  std::uint64_t summaryStart = 0;  // where there is an index
+  std::uint64_t summaryStart = 0;  // only if there is an index
 
-  // Used again from chunk to chunk.
+  // Buffers that are reused from chunk to chunk.
   std::string raw, records;
   std::vector<Message> messages;
 
@@ -153,7 +153,7 @@ bool McapReader::State::takeChannel(std::string_view content) {
   channel.schema = reader.number<std::uint16_t>();
   channel.topic = reader.text();
   channel.encoding = reader.text();
-  reader.text();  // its own metadata
+  reader.text();  // metadata of the channel
   if (reader.ok()) channels.insert_or_assign(channel.id, channel);
   return reader.ok();
 }
@@ -178,7 +178,7 @@ bool McapReader::State::takeChunkIndex(std::string_view content) {
   place.channels.emplace();
   while (indexes.left() > 0 && indexes.ok()) {
     place.channels->push_back(indexes.number<std::uint16_t>());
-    indexes.number<std::uint64_t>();  // where its messages are
+    indexes.number<std::uint64_t>();  // offset of its messages
   }
   const std::uint64_t size = source->size();
   if (!reader.ok() || !indexes.ok() || place.offset > size || place.length > size - place.offset ||
@@ -195,7 +195,7 @@ bool McapReader::State::takeStatistics(std::string_view content) {
   reader.number<std::uint16_t>();  // schemas
   reader.number<std::uint32_t>();  // channels
   reader.number<std::uint32_t>();  // attachments
-  reader.number<std::uint32_t>();  // facts
+  reader.number<std::uint32_t>();  // metadata records
   s.chunks = reader.number<std::uint32_t>();
   s.start = reader.number<std::uint64_t>();
   s.end = reader.number<std::uint64_t>();
@@ -233,7 +233,7 @@ bool McapReader::State::takeSummaryRecord(Opcode opcode, std::string_view conten
   }
 }
 
-// False where there is none, or one that is not whole.
+// False if there is no complete summary.
 bool McapReader::State::readSummary() {
   constexpr std::uint64_t kEnd = kRecordHead + kFooterBytes + kMagic.size();
   const std::uint64_t size = source->size();
@@ -246,7 +246,7 @@ bool McapReader::State::readSummary() {
   if (!footer || footer->opcode != Opcode::footer || !content(*footer, kFooterBytes, bytes)) return false;
   ByteReader reader(bytes);
   const auto start = reader.number<std::uint64_t>();
-  reader.number<std::uint64_t>();  // of its own index
+  reader.number<std::uint64_t>();  // offset of its message index
   const auto crc = reader.number<std::uint32_t>();
   if (!reader.ok() || start < firstRecord || start > footerAt || footerAt - start > kMaxSummaryBytes)
     return false;
@@ -265,7 +265,7 @@ bool McapReader::State::readSummary() {
 }
 
 bool McapReader::State::scanChunk(const Record& record) {
-  // Its times and, before what it holds, at most the name of a compression: the rest is not read.
+  // Reads the times and the few bytes before the messages, with room for the name of a compression.
   constexpr std::uint64_t kTimes = 16;
   std::string bytes;
   if (record.length < kTimes || !source->read(record.offset, kTimes, bytes)) return false;
@@ -281,7 +281,7 @@ bool McapReader::State::scanChunk(const Record& record) {
 
 void McapReader::State::scan() {
   std::string bytes;
-  std::vector<std::uint16_t> named;  // by the message indexes that follow the last chunk
+  std::vector<std::uint16_t> named;  // from the message indexes after the last chunk
   for (std::uint64_t offset = firstRecord;;) {
     const std::optional<Record> record = recordAt(offset);
     if (!record) return;
@@ -291,7 +291,7 @@ void McapReader::State::scan() {
               source->read(record->offset, sizeof(std::uint16_t), bytes);
       if (taken) named.push_back(ByteReader(bytes).number<std::uint16_t>());
     } else if (!named.empty()) {
-      // Another record follows: these were all.
+      // Another record starts, so the list of message indexes is complete.
       if (!chunks.empty()) chunks.back().channels = named;
       named.clear();
     }
@@ -380,9 +380,9 @@ Done McapReader::State::parseMessages(const ChunkHead& head) {
     ByteReader fields(content);
     Message& message = messages.emplace_back();
     message.channel = fields.number<std::uint16_t>();
-    fields.number<std::uint32_t>();  // its number in the channel
+    fields.number<std::uint32_t>();  // number in the channel
     message.time = fields.number<std::uint64_t>();
-    fields.number<std::uint64_t>();  // when it was published
+    fields.number<std::uint64_t>();  // time of publication
     if (!fields.ok()) return broken("a message in it is too short");
     message.bytes = fields.rest();
     if (!channels.contains(message.channel))
@@ -411,7 +411,7 @@ tl::expected<std::span<const Message>, std::string> McapReader::read(std::size_t
     if (head->records.size() != head->size) return wrong("it has another size than it says");
     s.records = head->records;
   } else if (head->compression == "zstd") {
-    // Both say it, and neither is believed beyond kMaxChunkBytes.
+    // Two fields hold the size. Neither is trusted beyond kMaxChunkBytes.
     if (ZSTD_getFrameContentSize(head->records.data(), head->records.size()) != head->size)
       return wrong("it has another size than it says");
     s.records.resize(head->size);

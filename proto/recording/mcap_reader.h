@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Reads MCAP, whole or cut off. Safe on any bytes.
+// Reader of MCAP files, complete or truncated. Safe on any bytes.
 #pragma once
 
 #include <cstddef>
@@ -28,12 +28,12 @@ struct ReadSchema {
   std::string name, encoding, data;
 };
 
-// Where a chunk is, and the times of its messages, ns.
+// Place of a chunk in the file, and the times of its messages in ns.
 struct ChunkPlace {
   std::uint64_t start = 0, end = 0;
-  std::uint64_t offset = 0, length = 0;  // of the record in the file
-  // Of its messages, as the index says, or in a file without one the message indexes behind the chunk;
-  // nothing where there are none, or the file ends in them.
+  std::uint64_t offset = 0, length = 0;  // place of the record in the file
+  // Channels of its messages, from the index. In a file without an index they come from the message indexes
+  // after the chunk. Empty if there are none or the file ends in them.
   std::optional<std::vector<std::uint16_t>> channels = {};
 };
 
@@ -53,36 +53,35 @@ struct Message {
 // Errors say what is wrong with the bytes, without the file's name.
 class McapReader {
  public:
-  // Finds all chunks: by the index at the end where it is there and whole, and otherwise by going from record
-  // to record.
+  // Finds all chunks: from the index at the end if it is complete, otherwise record by record.
   [[nodiscard]] static tl::expected<McapReader, std::string> open(std::unique_ptr<ByteSource> source);
   ~McapReader();
   McapReader(McapReader&&) noexcept;
   McapReader& operator=(McapReader&&) = delete;
 
-  // Whether there is an index. A recording without one was cut off, or damaged at its end.
+  // True if the file has an index. A recording without one was truncated or is damaged at its end.
   bool indexed() const;
   const std::string& library() const;
   const std::map<std::uint16_t, Channel>& channels() const;
   const std::map<std::uint16_t, ReadSchema>& schemas() const;
-  // In the order of their times.
+  // Ordered by time.
   std::span<const ChunkPlace> chunks() const;
-  // As the file says.
+  // Statistics from the file.
   const std::optional<Statistics>& statistics() const;
   const Facts* facts(const std::string& name) const;
   std::uint64_t bytes() const;
 
-  // The last chunk that begins at this time or before, or else the first.
+  // Last chunk that starts at or before `time`; otherwise the first chunk.
   std::size_t chunkAt(std::uint64_t time) const;
-  // The messages of a chunk, in their order; until the next call. The error, too: its checksum does not
-  // match.
+  // Messages of a chunk in their order, valid until the next call. A checksum that does not match is an
+  // error.
   [[nodiscard]] tl::expected<std::span<const Message>, std::string> read(std::size_t chunk);
 
-  // Where the chunks, their indexes, and what stands before them end: what follows is index, or nothing that
-  // can be read.
+  // End of the chunks, of their indexes and of everything before them. The index follows, or bytes that
+  // cannot be read.
   std::uint64_t dataEnd() const;
-  // Reads every byte once: chunks, message indexes, the checksum of all data, and whether the statistics are
-  // true. The error is the first that was found.
+  // Reads every byte once and checks chunks, message indexes, the checksum of all data and the statistics.
+  // The error is the first one found.
   [[nodiscard]] tl::expected<void, std::string> check();
 
  private:

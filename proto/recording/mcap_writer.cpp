@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Records, chunk by chunk.
+// Writer of MCAP files: records, chunk by chunk.
 #include "proto/recording/mcap_writer.h"
 
 #include <algorithm>
@@ -12,7 +12,7 @@
 namespace clothstream::recording {
 namespace {
 
-// Frames are coded already; ticks and states are what gets smaller.
+// Frames are already entropy-coded; only ticks and states shrink.
 constexpr int kCompressionLevel = 1;
 constexpr const char* kCompression = "zstd";
 
@@ -60,7 +60,7 @@ struct McapWriter::State {
     appendRecord(bytes, opcode, content);
     return put(bytes);
   }
-  // A group of the summary.
+  // Writes a group of the summary.
   Written put(Opcode opcode, const std::vector<std::string>& contents) {
     if (contents.empty()) return outcome;
     std::string records;
@@ -78,18 +78,18 @@ struct McapWriter::State {
   Sink sink;
   Written outcome;
   std::uint64_t offset = 0;
-  std::uint32_t crc = 0;  // of all bytes so far, or of those of the summary
+  std::uint32_t crc = 0;  // of all bytes so far, or of the bytes of the summary
 
   std::vector<std::string> schemas, channels, chunkIndexes, factIndexes;  // contents of records
   std::string offsets;                                                    // records
   std::uint64_t messages = 0;
-  std::uint64_t firstTime = 0, lastTime = 0;  // of all messages, ns
+  std::uint64_t firstTime = 0, lastTime = 0;  // of all messages, in ns
   std::map<std::uint16_t, std::uint64_t> counts;
 
-  std::string chunk;  // what the open one holds
+  std::string chunk;  // messages of the open chunk
   std::uint64_t chunkStart = 0;
   std::map<std::uint16_t, std::string> index;  // of the open chunk: times and offsets
-  std::string compressed, record;              // used again for every chunk
+  std::string compressed, record;              // reused for every chunk
 };
 
 McapWriter::McapWriter(Sink sink) : state_(std::make_unique<State>(std::move(sink))) {}
@@ -125,7 +125,7 @@ tl::expected<std::uint16_t, std::string> McapWriter::addChannel(std::string_view
   appendText(channelContent, topic);
   appendText(channelContent, "protobuf");
   channelContent += mapOf(Facts{});
-  // Outside of chunks: no loss of a chunk takes the meaning of others along.
+  // Schemas stand outside of chunks, so that losing a chunk does not affect the meaning of others.
   return s.put(Opcode::schema, schemaContent)
       .and_then([&] { return s.put(Opcode::channel, channelContent); })
       .map([&] {
@@ -177,7 +177,8 @@ Written McapWriter::closeChunk() {
                                          s.chunk.size(), kCompressionLevel);
   if (ZSTD_isError(size) != 0) return s.outcome = tl::unexpected(std::string(ZSTD_getErrorName(size)));
 
-  // Chunk and message indexes in one piece: the sink has all of them or the file ends in this chunk.
+  // A chunk and its message indexes are written in one call, so the sink gets all of them or the file ends in
+  // this chunk.
   std::string content;
   appendNumber(content, s.chunkStart);
   appendNumber(content, s.lastTime);

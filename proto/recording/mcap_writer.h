@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Writes MCAP: messages of channels, in compressed chunks with an index.
+// Writer of MCAP files: messages of channels, in compressed chunks with an index.
 #pragma once
 
 #include <cstddef>
@@ -17,20 +17,20 @@
 
 namespace clothstream::recording {
 
-// Takes bytes that follow those before. The error says what went wrong.
+// Takes the next bytes of the file. The error says what went wrong.
 using Sink = std::function<tl::expected<void, std::string>(std::string_view)>;
 using Written = tl::expected<void, std::string>;
 
-// Of protobuf messages.
+// Schema of protobuf messages.
 struct Schema {
-  std::string name;  // of the message, in full
-  std::string data;  // a serialised FileDescriptorSet
+  std::string name;  // full name of the message
+  std::string data;  // serialised FileDescriptorSet
 };
 
 // Not thread-safe. After an error of the sink nothing more is written, and every call returns that error.
 class McapWriter {
  public:
-  // A chunk is closed before it holds messages of more time, and when it holds as many bytes.
+  // Limits of a chunk: it is closed before it spans more time, and as soon as it holds this many bytes.
   static constexpr std::uint64_t kChunkNs = 200'000'000;
   static constexpr std::size_t kChunkBytes = std::size_t{1} << 20;
 
@@ -39,20 +39,20 @@ class McapWriter {
   McapWriter(McapWriter&&) noexcept;
   McapWriter& operator=(McapWriter&&) = delete;
 
-  // First of all, once.
+  // The first call, made once.
   [[nodiscard]] Written begin(std::string_view library);
-  // Gives the channel's number. Channels come before their messages.
+  // Returns the channel's number. A channel must be added before its messages.
   [[nodiscard]] tl::expected<std::uint16_t, std::string> addChannel(std::string_view topic,
                                                                     const Schema& schema);
   [[nodiscard]] Written addFacts(std::string_view name, const Facts& facts);
-  // A time before that of the last message counts as that: messages are in the order of their times.
+  // A time before that of the last message is raised to it, so that messages are ordered by time.
   [[nodiscard]] Written write(std::uint16_t channel, std::uint64_t logTimeNs, std::string_view message);
-  // What was written so far is with the sink then.
+  // Passes everything written so far to the sink.
   [[nodiscard]] Written closeChunk();
-  // Closes the chunk, writes index and end. Once, and nothing after it.
+  // Closes the chunk and writes the index and the end. The last call, made once.
   [[nodiscard]] Written finish();
 
-  // With the sink.
+  // Bytes that the sink has taken.
   std::uint64_t bytes() const;
   std::uint64_t messages() const;
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Chunk by chunk.
+// Reader of recordings, chunk by chunk.
 #include "proto/recording/recording_reader.h"
 
 #include <algorithm>

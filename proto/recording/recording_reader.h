@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A recording message by message, from any time on.
+// Reader of recordings, message by message, from any time on.
 #pragma once
 
 #include <array>
@@ -22,13 +22,13 @@ namespace clothstream::recording {
 struct RecordedMessage {
   Topic topic{};
   std::uint64_t time = 0;  // ns since 1970
-  std::string_view bytes;  // until the next call
+  std::string_view bytes;  // valid until the next call
 };
 
-// Whether recordings that were cut off can be read, as far as they go.
+// Policy for truncated recordings: refuse them, or read them up to their end.
 enum class CutFiles : std::uint8_t { refused, read };
 
-// Safe on any bytes. Errors name the path, and what to do where something can be done.
+// Safe on any bytes. Errors name the path and, if possible, what to do.
 class RecordingReader {
  public:
   [[nodiscard]] static tl::expected<RecordingReader, std::string> open(const std::string& path,
@@ -38,27 +38,28 @@ class RecordingReader {
 
   const McapReader& mcap() const { return mcap_; }
   [[nodiscard]] tl::expected<void, std::string> check();
-  // Of what the recording was made on and with.
+  // Metadata: the machine and the program that made the recording.
   const Facts& facts() const { return facts_; }
-  // The value; "unknown" where there is none.
+  // Value of a metadata entry; "unknown" if it is missing.
   const std::string& fact(const std::string& name) const;
   std::optional<Topic> topicOf(std::uint16_t channel) const;
-  // Of the first and the last message, ns.
+  // Times of the first and the last message, ns.
   std::uint64_t start() const;
   std::uint64_t end() const;
 
-  // Of the recorded stream, as it was when the recording began.
+  // Description of the recorded stream at the start of the recording.
   [[nodiscard]] tl::expected<v1::StreamDescription, std::string> description();
 
-  // The next message, nothing at the end. Messages of unknown channels are passed over.
+  // Next message; nothing at the end. Messages of unknown channels are skipped.
   [[nodiscard]] tl::expected<std::optional<RecordedMessage>, std::string> next();
-  // The next message is then the newest key frame at this time or before, or else the first message.
+  // Makes the newest key frame at or before `time` the next message; without one, the first message.
   [[nodiscard]] tl::expected<void, std::string> seek(std::uint64_t time);
   void rewind();
-  // All of this topic in a chunk; until the next call of anything. What comes next stays what it was.
+  // All messages of a topic in a chunk, valid until the next call. Does not move the reader.
   [[nodiscard]] tl::expected<std::vector<RecordedMessage>, std::string> messages(std::size_t chunk,
                                                                                  Topic topic);
-  // After an error of next(): the next message is then the first of the chunk that follows. What is left out.
+  // Recovers after an error of next(): the next message is the first of the following chunk. Returns the
+  // chunk that is skipped.
   ChunkPlace passChunk();
 
  private:
@@ -71,12 +72,12 @@ class RecordingReader {
   Facts facts_;
   std::map<std::uint16_t, Topic> topics_;
 
-  std::size_t chunk_ = 0, message_ = 0;  // the next
-  std::optional<std::size_t> loaded_;    // chunk
-  std::span<const Message> messages_;    // of it
+  std::size_t chunk_ = 0, message_ = 0;  // next chunk and message
+  std::optional<std::size_t> loaded_;    // chunk in messages_
+  std::span<const Message> messages_;
 };
 
-// Whether a serialised Frame can be decoded without those before it.
+// True if a serialised Frame can be decoded without earlier frames.
 bool isKeyFrame(std::string_view frame);
 
 }  // namespace clothstream::recording

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A channel for each topic, with the schema of its messages.
+// Writer of recordings: a channel for each topic, with the schema of its messages.
 #include "proto/recording/recording_writer.h"
 
 #include <set>
@@ -40,7 +40,7 @@ const protobuf::Descriptor& typeOf(Topic topic) {
   return *v1::Checkpoint::descriptor();
 }
 
-// What is imported comes first.
+// Adds imported files first.
 void add(const protobuf::FileDescriptor& file, std::set<std::string>& known,
          protobuf::FileDescriptorSet& files) {
   if (!known.insert(file.name()).second) return;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Messages of the protocol into a recording's channels.
+// Writes messages of the protocol to the channels of a recording.
 #pragma once
 
 #include <array>
@@ -13,17 +13,18 @@
 
 namespace clothstream::recording {
 
-// Not thread-safe. Errors are the sink's. Times are nanoseconds since 1970, by a clock that never goes back.
+// Not thread-safe. Errors come from the sink. Times are nanoseconds since 1970 from a clock that never goes
+// back.
 class RecordingWriter {
  public:
   // `writer` is the program's name and version.
   [[nodiscard]] static tl::expected<RecordingWriter, std::string> begin(Sink sink, std::string_view writer,
                                                                         const Facts& facts);
 
-  // A serialised message of the topic's type.
+  // Writes a serialised message of the topic's type.
   [[nodiscard]] Written write(Topic topic, std::uint64_t time, std::string_view message);
-  // What a stream sends to everybody in a scene: frames with their reports, changes, events, notices.
-  // Anything else is passed over.
+  // Writes what a stream sends to everyone in a scene: frames with their reports, changes, events and
+  // notices. Ignores all other messages.
   [[nodiscard]] Written write(std::uint64_t time, const v1::ServerMessage& message);
 
   [[nodiscard]] Written closeChunk() { return mcap_.closeChunk(); }
@@ -35,7 +36,7 @@ class RecordingWriter {
 
   McapWriter mcap_;
   std::array<std::uint16_t, kTopicNames.size()> channels_{};
-  std::string bytes_;  // of a message, used again
+  std::string bytes_;  // serialised message; reused
 };
 
 }  // namespace clothstream::recording

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The channels of a recording.
+// Channels of a recording.
 #pragma once
 
 #include <array>
@@ -12,11 +12,11 @@ namespace clothstream::recording {
 enum class Topic : std::uint8_t {
   description,   // StreamDescription
   frames,        // Frame
-  reports,       // SimulationReport: those of frames once more, by themselves
+  reports,       // SimulationReport; a copy of the reports in frames
   parameters,    // ParameterChanged
   events,        // TickEvents
   notices,       // Notice
-  participants,  // ParticipantEvent; this and what follows only on a server
+  participants,  // ParticipantEvent; this and the following ones only in recordings of a server
   scene,         // RecordedScene
   ticks,         // RecordedTick
   checkpoints,   // Checkpoint
@@ -30,10 +30,12 @@ constexpr std::string_view nameOf(Topic topic) {
   return kTopicNames[static_cast<std::size_t>(topic)];
 }
 
-// Who writes asks for key frames, so that no frame is farther than this from one before it.
+// Maximum distance in frames between key frames. The writer of a recording requests key frames at this
+// interval.
 inline constexpr std::uint32_t kFramesAKeyFrame = 24;
 
-// Of what the recording was made on and with; the names are in docs/recording.md.
+// Name of the metadata record: machine and program that made the recording. docs/recording.md lists its
+// entries.
 inline constexpr std::string_view kFactsName = "clothstream";
 
 }  // namespace clothstream::recording

@@ -94,7 +94,6 @@ DevicePredictor::DevicePredictor(const vulkan::Device& device, const simulation:
     : simulation_(simulation),
       vertices_(layout.vertexCount()),
       hasNormals_(layout.normals == codec::NormalMode::octahedral),
-      residualPurpose_(layout.codec == codec::kCodecPacked ? BufferPurpose::state : BufferPurpose::readback),
       unit_(codec::hierarchical::latticeUnit(layout.maxError)),
       quantise_(device, describe("quantise_slots", kernels::quantise_slots, true, 5)),
       predictPhase_(device, describe("predict_phase", kernels::predict_phase, false, 10)),
@@ -122,8 +121,9 @@ DevicePredictor::DevicePredictor(const vulkan::Device& device, const simulation:
   weights_ = Buffer(device, BufferPurpose::state, shared::kAllWeights * sizeof(std::int32_t));
   for (Slot& slot : slots_) {
     slot.status = Buffer(device, BufferPurpose::readback, sizeof(shared::SlotStatus));
-    slot.residuals = Buffer(device, residualPurpose_, shared::kResidualRows * n * sizeof(std::uint32_t));
-    slot.wideResiduals = Buffer(device, residualPurpose_, 3 * n * sizeof(std::int32_t));
+    slot.residuals =
+        Buffer(device, BufferPurpose::readback, shared::kResidualRows * n * sizeof(std::uint32_t));
+    slot.wideResiduals = Buffer(device, BufferPurpose::readback, 3 * n * sizeof(std::int32_t));
     slot.products = Buffer(device, BufferPurpose::readback,
                            FitSchedule::kMaxChunks * sizeof(codec::hierarchical::ChunkProducts));
     slot.weights = Buffer(device, BufferPurpose::upload, 2 * shared::kClassWeights * sizeof(std::int32_t));
@@ -153,7 +153,7 @@ void DevicePredictor::makeNormals(const vulkan::Device& device, const codec::Str
   fill(tables.faces, faces_, facesUpload_);
   fill(tables.facesOf, facesOf_, facesOfUpload_);
   for (Slot& slot : slots_)
-    slot.normalResiduals = Buffer(device, residualPurpose_, vertices_ * sizeof(std::uint32_t));
+    slot.normalResiduals = Buffer(device, BufferPurpose::readback, vertices_ * sizeof(std::uint32_t));
   for (std::uint32_t turn = 0; turn < 2; ++turn) {
     for (const Slot& slot : slots_) {
       normalBindings_.emplace_back(

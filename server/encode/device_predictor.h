@@ -41,15 +41,6 @@ class DevicePredictor {
   codec::hierarchical::ChunkProducts products(std::uint32_t slot, std::size_t chunk) const;
   // By vertex: what u and v of its normal are off the prediction, a byte each; empty where there are none.
   std::span<const std::uint32_t> normalResiduals(std::uint32_t slot) const;
-  // As the kernels leave them (hierarchical.h), for other kernels; the last is empty where there are no
-  // normals.
-  struct Residuals {
-    const vulkan::Buffer *residuals, *wideResiduals, *normalResiduals;
-  };
-  Residuals residuals(std::uint32_t slot) const {
-    const Slot& of = slots_[slot];
-    return {&of.residuals, &of.wideResiduals, &of.normalResiduals};
-  }
   // Returns whether one of them stays or has a residual that is not 0.
   bool read(std::uint32_t slot, std::uint32_t begin, std::uint32_t count,
             codec::hierarchical::ChunkResiduals& out) const;
@@ -57,7 +48,7 @@ class DevicePredictor {
   const codec::hierarchical::Hierarchy& hierarchy() const { return hierarchy_; }
 
  private:
-  // Read back of a frame, but residuals where codec 3 packs them on the device, and brought to it.
+  // Buffers of one frame: the first five are read back, the others are written by the CPU.
   struct Slot {
     vulkan::Buffer status, residuals, wideResiduals, normalResiduals, products;
     vulkan::Buffer weights, chunks;
@@ -76,7 +67,6 @@ class DevicePredictor {
   const simulation::ClothSimulation& simulation_;
   std::uint32_t vertices_;
   bool hasNormals_;
-  vulkan::BufferPurpose residualPurpose_;
   codec::hierarchical::LatticeUnit unit_;
   codec::hierarchical::Hierarchy hierarchy_;
   std::vector<Step> steps_;

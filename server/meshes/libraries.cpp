@@ -1,8 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Compiles tinyobjloader and tinygltf from their headers. Programs that are copied to other machines cannot
-// rely on shared libraries there.
+// tinyobjloader, compiled from its header. Debian's shared library is not available on machines that programs are
+// carried to.
 #define TINYOBJLOADER_IMPLEMENTATION
 #include <tiny_obj_loader.h>
-
-#define TINYGLTF_IMPLEMENTATION
-#include <tiny_gltf.h>

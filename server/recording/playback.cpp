@@ -134,7 +134,7 @@ std::optional<Playback::Clock::time_point> Playback::step(stream::LiveScene& sce
   const bool flows = here && !asleep_ && !paused_;
   scene.running = flows;
   if (flows) flow(scene, now);
-  if (here && (tells_ || (flows && now >= nextTold_))) {
+  if (here && (announcementDue_ || (flows && now >= nextTold_))) {
     nextTold_ = now + kTellPeriod;
     tell(scene);
   }
@@ -152,13 +152,13 @@ void Playback::takeWanted(stream::LiveScene& scene, Clock::time_point now) {
       paused_ = scene.paused;
       origin_ = now;
       originPosition_ = position_;
-      tells_ = true;
+      announcementDue_ = true;
     }
     speed_ = wanted.speed.value_or(speed_);
     loop_ = wanted.loop.value_or(loop_);
   }
   if (atEnd_ && !paused_ && !wanted.seek) wanted.seek = 0;
-  if (wanted.loop) tells_ = true;
+  if (wanted.loop) announcementDue_ = true;
   if (wanted.seek) jump(scene, *wanted.seek, now);
 }
 
@@ -166,7 +166,7 @@ void Playback::jump(stream::LiveScene& scene, double seconds, Clock::time_point 
   recording_.seek(seconds);
   next_.reset();
   atEnd_ = false;
-  tells_ = true;
+  announcementDue_ = true;
   moveTo(seconds);
   for (;;) {
     RecordedStream::Next next = recording_.next();
@@ -215,7 +215,7 @@ void Playback::reachEnd(stream::LiveScene& scene, Clock::time_point now) {
   if (loop_) return jump(scene, 0, now);
   scene.paused = true;
   atEnd_ = true;
-  tells_ = true;
+  announcementDue_ = true;
   moveTo(recording_.length());
   {
     const std::lock_guard lock(mutex_);
@@ -282,7 +282,7 @@ void Playback::publishFrame(stream::LiveScene& scene, RecordedStream::Told& told
 }
 
 void Playback::tell(stream::LiveScene& scene) {
-  tells_ = false;
+  announcementDue_ = false;
   scene.audience.announce(stream::playbackMessage(*this));
 }
 

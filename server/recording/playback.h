@@ -83,7 +83,7 @@ class Playback : public stream::FrameSource {
   const std::uint64_t ticksAFrame_;
   std::optional<RecordedStream::Next> next_;
   bool asleep_ = true, atEnd_ = false;
-  bool tells_ = false;  // the state changed and must be announced
+  bool announcementDue_ = false;  // the state changed and must be announced
   Clock::time_point origin_{}, nextTold_{};
   double originPosition_ = 0;      // position in the recording at the origin, s
   std::uint64_t shift_ = 0;        // sent tick minus recorded tick, modulo 2^64

@@ -24,7 +24,7 @@ TickInputs inputsAt(const model::Scene& scene, std::uint64_t tick) {
 ReferenceSimulation::ReferenceSimulation(const model::Scene& scene)
     : scene_(scene),
       cloths_(scene.cloths.begin(), scene.cloths.end()),
-      holds_(scene),
+      attachments_(scene),
       selfCollision_(scene),
       before_(scene.cloths.size()) {}
 
@@ -38,7 +38,7 @@ void ReferenceSimulation::tick() {
 }
 
 void ReferenceSimulation::substep(const TickInputs& inputs, std::uint32_t index) {
-  if (index == 0) holds_.begin(cloths_, inputs.attachments, inputs.grabs, scene_.tickSeconds());
+  if (index == 0) attachments_.begin(cloths_, inputs.attachments, inputs.grabs, scene_.tickSeconds());
   for (std::size_t i = 0; i < cloths_.size(); ++i) {
     ReferenceCloth& cloth = cloths_[i];
     before_[i].assign(cloth.positions().begin(), cloth.positions().end());
@@ -48,7 +48,7 @@ void ReferenceSimulation::substep(const TickInputs& inputs, std::uint32_t index)
                     stepOf(collider.start, collider.end, index, scene_.substeps, scene_.tickSeconds()),
                     collider.friction, before_[i]);
   }
-  holds_.apply(cloths_, inputs.grabs, index, scene_.substeps, scene_.tickSeconds());
+  attachments_.apply(cloths_, inputs.grabs, index, scene_.substeps, scene_.tickSeconds());
   if (!selfCollision_.exists()) return;
   for (int i = 0; i < model::kContactIterations; ++i) collideWithCloth(inputs, index);
 }

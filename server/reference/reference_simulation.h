@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "server/model/scene.h"
-#include "server/reference/holds.h"
+#include "server/reference/attachments.h"
 #include "server/reference/reference_cloth.h"
 #include "server/reference/self_collision.h"
 
@@ -48,14 +48,14 @@ class ReferenceSimulation {
   std::uint64_t ticks() const { return ticks_; }
   std::vector<ReferenceCloth>& cloths() { return cloths_; }
   const std::vector<ReferenceCloth>& cloths() const { return cloths_; }
-  const Holds& holds() const { return holds_; }
+  const Attachments& attachments() const { return attachments_; }
 
  private:
   void collideWithCloth(const TickInputs& inputs, std::uint32_t index);
 
   model::Scene scene_;
   std::vector<ReferenceCloth> cloths_;
-  Holds holds_;
+  Attachments attachments_;
   SelfCollision selfCollision_;
   std::vector<std::vector<Vec3>> before_;  // each cloth's nodes at the start of a substep
   std::uint64_t ticks_ = 0;

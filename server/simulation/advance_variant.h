@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Which build of a kernel advances a scene.
+// Variants of the kernels that advance a scene.
 #pragma once
 
 #include <cstddef>
@@ -10,7 +10,7 @@
 
 namespace clothstream::simulation {
 
-// What the kernel leaves out where a scene has none of it; the bits are the same.
+// Code that a scene needs. The kernel leaves out the rest; the bits are the same.
 struct AdvanceVariant {
   bool springDamping, air, colliders, springForces;
 
@@ -19,7 +19,7 @@ struct AdvanceVariant {
   }
   static constexpr std::size_t kCount = 16;
 
-  // constant_id 1 and on. The Runge-Kutta method is made of steps of explicit Euler.
+  // Values of constant_id 1, 2, 3, ... The Runge-Kutta method consists of steps of explicit Euler.
   std::vector<std::uint32_t> specialisation(std::uint32_t rowsPerInvocation,
                                             model::Integrator integrator) const {
     return {rowsPerInvocation,

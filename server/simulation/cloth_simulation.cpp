@@ -15,10 +15,10 @@
 #include "kernels/hash_state.h"
 #include "server/simulation/advance_variant.h"
 #include "server/simulation/assembled/assembled_stage.h"
+#include "server/simulation/attachment/attachment_stage.h"
 #include "server/simulation/bending/bending_stage.h"
 #include "server/simulation/collision/collision_stage.h"
 #include "server/simulation/grid_stage.h"
-#include "server/simulation/hold/hold_stage.h"
 #include "server/simulation/mass_stage.h"
 #include "server/simulation/mesh_stage.h"
 #include "server/simulation/report_stage.h"
@@ -43,18 +43,18 @@ std::uint32_t workgroupSizeOn(const vulkan::Device& device, const SimulationOpti
   return std::min(wanted, device.limits().maxWorkgroupInvocations);
 }
 
-// Invocations that hash a state share its nodes, enough of them to fill the device.
+// Number of invocations that hash a state. They share the nodes and fill the device.
 std::uint64_t hashInvocations(const vulkan::Device& device, std::uint32_t nodes) {
   const std::uint64_t nodesPerInvocation = device.isSoftware() ? 64 : 8;
   return (nodes + nodesPerInvocation - 1) / nodesPerInvocation;
 }
 
 bool isDamped(const shared::ClothRecord& cloth) {
-  return cloth.damping.x != 0 || cloth.damping.y != 0 || cloth.damping.z != 0;
+  return cloth.structuralDamping != 0 || cloth.shearDamping != 0 || cloth.bendDamping != 0;
 }
 
 bool isBlown(const shared::ClothRecord& cloth) {
-  return cloth.air.x != 0 || cloth.air.y != 0;
+  return cloth.drag != 0 || cloth.lift != 0;
 }
 
 // All memory of a scene on the device.
@@ -64,8 +64,8 @@ struct Buffers {
   StateMemory state;
   Buffer normals;
   Buffer cloths, status;
-  // What the CPU writes and reads. Inputs and status by turns: a tick may be in flight while the next is
-  // recorded.
+  // Buffers that the CPU writes and reads. Inputs and status alternate between two copies, because a tick may
+  // be in flight while the next one is recorded.
   std::array<Buffer, 2> inputs;  // cloths
   Buffer statusReadback;
 };
@@ -83,7 +83,7 @@ StateBuffers stateOf(const Buffers& b, const CollisionStage& collision) {
   return {.cloths = b.cloths,
           .colliders = collision.colliders(),
           .nearColliders = collision.nearLists(),
-          .toldContacts = collision.toldContacts(),
+          .contactImpulses = collision.contactImpulses(),
           .positions = {&b.state.positions[0], &b.state.positions[1]},
           .velocities = {&b.state.velocities[0], &b.state.velocities[1]}};
 }
@@ -100,13 +100,13 @@ std::vector<float> massesOf(std::span<const model::Cloth> cloths) {
   return masses;
 }
 
-// Whether they make the same tables; how systems are solved may differ.
+// True if two solvers need the same tables. The way in which systems are solved may differ.
 bool sameTables(const model::Solver& a, const model::Solver& b) {
   return a.kind == b.kind && a.bendConstraints == b.bendConstraints && a.path == b.path &&
          (a.kind == model::SolverKind::massSpring || a.iterations == b.iterations);
 }
 
-// Cloths collide at once where nothing follows.
+// Cloths collide in the advance kernel if no other stage follows.
 AdvanceVariant variantOf(std::span<const shared::ClothRecord> cloths, float airDensity, bool colliders,
                          Follow follow) {
   const bool springs = follow != Follow::corrections;
@@ -136,7 +136,7 @@ struct ClothSimulation::Pipeline {
   std::unique_ptr<XpbdStage> makeXpbd(std::span<const model::Cloth> cloths);
   std::unique_ptr<AssembledStage> makeAssembled(std::span<const model::Cloth> cloths);
   void makeBending(std::span<const model::Cloth> cloths);
-  void makeHolds(const HoldTables& tables);
+  void makeAttachments(const AttachmentTables& tables);
   void setSolvers(std::span<const model::Cloth> cloths);
   void makeMassStage();
   void setMasses(std::span<const model::Cloth> cloths);
@@ -156,33 +156,33 @@ struct ClothSimulation::Pipeline {
   std::vector<std::uint32_t> offsets;
   std::uint32_t nodes;
   std::vector<shared::ClothRecord> records;
-  std::vector<float> masses;       // inverse, of nodes
+  std::vector<float> masses;       // 1/kg, by node
   std::vector<float> clothMasses;  // kg
   std::uint32_t workgroupSize;
   Buffers buffers;
   CollisionStage collision;
   GridStage grids;
   Stage hash;
-  std::unique_ptr<MeshStage> meshes;            // where there are any
-  std::unique_ptr<RungeKuttaStage> rungeKutta;  // where that is the integrator
+  std::unique_ptr<MeshStage> meshes;            // null if no cloth is a mesh
+  std::unique_ptr<RungeKuttaStage> rungeKutta;  // null for other integrators
   SolveStage solves;
-  std::unique_ptr<XpbdStage> xpbd;                    // where a cloth's solver is that
-  std::unique_ptr<AssembledStage> assembled;          // where a cloth's system is that
-  std::unique_ptr<BendingStage> bending;              // where a cloth has it, or had
-  bool bends = false;                                 // some has it now
-  std::unique_ptr<SelfCollisionStage> selfCollision;  // where a cloth has it
-  std::vector<model::Solver> solvers;                 // of the cloths, as the tables have them
-  std::vector<shared::vec4> stiffness;                // of their springs
-  std::unique_ptr<HoldStage> holds;                   // where something holds cloth, or did
-  std::unique_ptr<ReportStage> report;                // made when it is first wanted
-  std::unique_ptr<MassStage> massChange;              // made when one first changes
+  std::unique_ptr<XpbdStage> xpbd;                    // null if no cloth uses it
+  std::unique_ptr<AssembledStage> assembled;          // null if no cloth uses it
+  std::unique_ptr<BendingStage> bending;              // created when a cloth first uses it
+  bool bends = false;                                 // true if a cloth uses it now
+  std::unique_ptr<SelfCollisionStage> selfCollision;  // null if no cloth uses it
+  std::vector<model::Solver> solvers;                 // of the cloths in the tables
+  std::vector<SpringStiffness> stiffness;             // of the cloths' springs
+  std::unique_ptr<AttachmentStage> attachments;       // created when it is first needed
+  std::unique_ptr<ReportStage> report;                // created for the first report
+  std::unique_ptr<MassStage> massChange;              // created when a mass first changes
   SimulationOptions asked;
 
   bool started = false;       // the start state is on the device
-  bool tabled = false;        // the tables of the solvers are
-  bool weighed = true;        // the masses are those that the states on the device have
-  std::uint32_t present = 0;  // which state buffers hold the state
-  std::uint32_t slot = 0;     // of inputs and status, of the tick recorded last
+  bool tabled = false;        // the tables of the solvers are on the device
+  bool weighed = true;        // the states on the device have the present masses
+  std::uint32_t present = 0;  // index of the state buffers with the present state
+  std::uint32_t slot = 0;     // index of the inputs and status of the last recorded tick
 };
 
 ClothSimulation::Pipeline::Pipeline(const vulkan::Device& on, const model::Scene& scene,
@@ -225,18 +225,19 @@ ClothSimulation::Pipeline::Pipeline(const vulkan::Device& on, const model::Scene
   if (SelfCollisionStage::isIn(scene))
     selfCollision =
         std::make_unique<SelfCollisionStage>(on, scene, stateOf(buffers, collision), workgroupSize);
-  if (const HoldTables tables = holdTables(scene); !tables.empty()) {
-    makeHolds(tables);
-    holds->setSlack(scene.cloths);
+  if (const AttachmentTables tables = attachmentTables(scene); !tables.empty()) {
+    makeAttachments(tables);
+    attachments->setSlack(scene.cloths);
   }
   prepare(scene.environment.airDensity);
 }
 
-void ClothSimulation::Pipeline::makeHolds(const HoldTables& tables) {
-  holds = std::make_unique<HoldStage>(device, tables, stateOf(buffers, collision), nodes, workgroupSize);
+void ClothSimulation::Pipeline::makeAttachments(const AttachmentTables& tables) {
+  attachments =
+      std::make_unique<AttachmentStage>(device, tables, stateOf(buffers, collision), nodes, workgroupSize);
 }
 
-// The kernels that the scene starts with, and those that it needs as soon as somebody brings a collider.
+// Creates the kernels that the scene starts with, and those that it needs as soon as a collider appears.
 void ClothSimulation::Pipeline::prepare(float airDensity) {
   for (const bool colliders : {false, true}) {
     for (const Follow follow : kFollows) {
@@ -275,7 +276,7 @@ void ClothSimulation::Pipeline::makeBending(std::span<const model::Cloth> cloths
 void ClothSimulation::Pipeline::setSolvers(std::span<const model::Cloth> cloths) {
   std::vector<model::Solver> wanted = solversOf(cloths);
   if (std::ranges::equal(wanted, solvers, sameTables)) return;
-  // Whatever the device has no room for is found before anything changes.
+  // Memory is allocated before anything changes, because that may fail.
   solves.makeTables(cloths);
   std::unique_ptr<XpbdStage> otherXpbd = makeXpbd(cloths);
   std::unique_ptr<AssembledStage> otherAssembled = makeAssembled(cloths);
@@ -331,9 +332,9 @@ void ClothSimulation::Pipeline::recordInputs(vulkan::Recorder& recorder, const T
   std::memcpy(from.mapped().data(), records.data(), clothBytes);
   recorder.beginStage("inputs");
   recorder.copy(from, buffers.cloths, clothBytes);
-  collision.recordInputs(recorder, inputs.colliders, inputs.tellsContacts);
-  if (!holds && !inputs.grabs.empty()) makeHolds({});
-  if (holds) holds->recordInputs(recorder, inputs.attachments, inputs.grabs);
+  collision.recordInputs(recorder, inputs.colliders, inputs.reportsContacts);
+  if (!attachments && !inputs.grabs.empty()) makeAttachments({});
+  if (attachments) attachments->recordInputs(recorder, inputs.attachments, inputs.grabs);
   recorder.fill(buffers.status, 0, buffers.status.bytes());
   if (selfCollision) selfCollision->recordClear(recorder);
 }
@@ -349,28 +350,30 @@ void ClothSimulation::Pipeline::recordRungeKutta(vulkan::Recorder& recorder, con
                                                  shared::AdvancePush push) {
   const AdvanceVariant variant = variantOf(records, inputs.environment.airDensity, false, Follow::nothing);
   rungeKutta->record(recorder, present, push.collision, [&](std::uint32_t from, float part) {
-    push.gravityStep.w = part * static_cast<float>(substepSeconds);
+    push.stepSeconds = part * static_cast<float>(substepSeconds);
     recordAdvance(recorder, from, variant, Follow::nothing, push);
   });
 }
 
 void ClothSimulation::Pipeline::recordSubsteps(vulkan::Recorder& recorder, const TickInputs& inputs) {
   const model::Environment& environment = inputs.environment;
-  shared::AdvancePush push{.gravityStep = texel(environment.gravity, static_cast<float>(substepSeconds)),
-                           .windAir = texel(environment.wind, environment.airDensity / 6),
+  shared::AdvancePush push{.gravity = vectorOf(environment.gravity),
+                           .stepSeconds = static_cast<float>(substepSeconds),
+                           .wind = vectorOf(environment.wind),
+                           .airFactor = environment.airDensity / 6,
                            .collision = {},
                            .firstTile = 0,
                            .reserved0 = 0,
                            .reserved1 = 0,
                            .reserved2 = 0};
-  if (holds && holds->aims()) {
+  if (attachments && attachments->aims()) {
     recorder.beginStage("hold");
     recorder.barrier();
-    holds->recordAim(recorder, present, tickRate);
+    attachments->recordAim(recorder, present, tickRate);
   }
   if (collision.active()) {
     float thickness = 0;
-    for (const shared::ClothRecord& record : records) thickness = std::max(thickness, record.damping.w);
+    for (const shared::ClothRecord& record : records) thickness = std::max(thickness, record.thickness);
     recorder.beginStage("near");
     recorder.barrier();
     collision.recordGather(recorder, present, 1 / tickRate, thickness);
@@ -401,7 +404,7 @@ void ClothSimulation::Pipeline::recordSubsteps(vulkan::Recorder& recorder, const
                     .substepRate = tickRate * static_cast<float>(substeps),
                     .firstTile = 0,
                     .reserved = 0});
-    if (holds) holds->recordSubstep(recorder, present, substep, substeps, tickRate);
+    if (attachments) attachments->recordSubstep(recorder, present, substep, substeps, tickRate);
     if (selfCollision) selfCollision->recordSubstep(recorder, present, substep, push.collision);
     present = 1 - present;
   }
@@ -417,8 +420,8 @@ void ClothSimulation::Pipeline::recordStatus(vulkan::Recorder& recorder) {
   if (solves.active()) solves.recordReport(recorder);
   if (assembled) assembled->recordReport(recorder);
   if (selfCollision) selfCollision->recordReport(recorder, slot);
-  if (holds) holds->recordReport(recorder);
-  collision.recordTold(recorder);
+  if (attachments) attachments->recordReport(recorder);
+  collision.recordContacts(recorder);
 }
 
 ClothSimulation::ClothSimulation(const vulkan::Device& device, const model::Scene& scene,
@@ -432,7 +435,7 @@ void ClothSimulation::setCloths(std::span<const model::Cloth> cloths) {
   assert(records.size() == pipeline_->records.size());
   assert(std::equal(records.begin(), records.end(), pipeline_->records.begin(),
                     [](const shared::ClothRecord& a, const shared::ClothRecord& b) {
-                      return a.place.z == b.place.z && a.place.w == b.place.w;
+                      return a.rows == b.rows && a.columns == b.columns;
                     }));
   const bool heavier = massesOf(cloths) != pipeline_->clothMasses;
   if (heavier) pipeline_->makeMassStage();
@@ -440,7 +443,7 @@ void ClothSimulation::setCloths(std::span<const model::Cloth> cloths) {
   pipeline_->setSolvers(cloths);
   if (heavier) pipeline_->setMasses(cloths);
   if (pipeline_->selfCollision) pipeline_->selfCollision->setCloths(cloths);
-  if (pipeline_->holds) pipeline_->holds->setSlack(cloths);
+  if (pipeline_->attachments) pipeline_->attachments->setSlack(cloths);
   pipeline_->stiffness = springStiffness(cloths);
   pipeline_->records = std::move(records);
 }
@@ -472,14 +475,14 @@ void ClothSimulation::recordReport(vulkan::Recorder& recorder, const TickInputs&
 }
 
 std::vector<ContactStatus> ClothSimulation::contacts() const {
-  return pipeline_->collision.told();
+  return pipeline_->collision.contacts();
 }
 
 std::vector<GrabStatus> ClothSimulation::grabs() const {
   std::vector<GrabStatus> grabs;
-  if (pipeline_->holds)
-    for (const shared::GrabReport& report : pipeline_->holds->report())
-      grabs.push_back({report.held, report.slipped});
+  if (pipeline_->attachments)
+    for (const shared::GrabReport& report : pipeline_->attachments->report())
+      grabs.push_back({report.grabbed, report.slipped});
   return grabs;
 }
 

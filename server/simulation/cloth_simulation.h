@@ -9,9 +9,9 @@
 #include <vector>
 
 #include "server/model/scene.h"
+#include "server/simulation/attachment/grab.h"
 #include "server/simulation/cloth_report.h"
 #include "server/simulation/collision/moving_collider.h"
-#include "server/simulation/hold/grab.h"
 #include "server/simulation/scene_tables.h"
 #include "server/simulation/state_snapshot.h"
 #include "server/vulkan/buffer.h"
@@ -20,28 +20,28 @@
 
 namespace clothstream::simulation {
 
-// Model (immutable: sizes, springs, pins) apart from state (positions, velocities). All cloths share one set
-// of buffers; a stage is one dispatch for all of them. Belongs to the device's thread; records, never submits
-// or waits. Every record...() begins with a barrier: it sees what came before it, in its recording and in
-// earlier ones.
+// All cloths of a scene on one device. The model (sizes, springs, pins) is immutable; the state (positions,
+// velocities) changes. All cloths share one set of buffers, and a stage is one dispatch for all of them.
+// Belongs to the device's thread. It records work, but never submits or waits. Every record...() begins with
+// a barrier, so that it sees earlier work of its recording and of earlier recordings.
 //
 // A tick:   recordTick -> (submit, wait) -> status
 // Same inputs give the same bits, on every conforming device, whatever the options.
 
-// What may change from tick to tick. All values validated before.
+// Inputs of one tick. All values are validated before.
 struct TickInputs {
   model::Environment environment;
   std::vector<MovingCollider> colliders;  // at most kMaxColliders, in the order in which they act
-  bool tellsContacts = false;             // whether contacts() has something to say after this tick
-  // Where each attachment of the scene is at the tick's end, in the order of its cloths; none: where they
+  bool reportsContacts = false;           // true: contacts() reports this tick
+  // Pose of each attachment at the tick's end, in the order of the scene's cloths. Empty: the poses at the
   // start.
   std::vector<model::Pose> attachments = {};
-  // At most kMaxGrabs. One that holds has the place of the one that took hold; before a place is another's,
-  // it is free for a tick.
+  // At most kMaxGrabs. A grab keeps its index while it is active. An index must be free for one tick before
+  // another grab uses it.
   std::vector<Grab> grabs = {};
 };
 
-// Of the scene by itself: its wind, its colliders and what is attached to them during this tick, from 0 on.
+// Inputs that the scene itself gives to a tick (from 0): its wind, its colliders and its attachments.
 TickInputs inputsAt(const model::Scene& scene, std::uint64_t tick);
 
 struct SimulationOptions {
@@ -50,76 +50,77 @@ struct SimulationOptions {
   std::uint32_t rowsPerInvocation = 0;
   // Invocations in a workgroup. 0: the measured best for the device.
   std::uint32_t workgroupSize = 0;
-  // Nodes of the largest cloth whose springs one workgroup corrects, where its solver is xpbd. Absent: the
-  // measured best for the device.
+  // Nodes of the largest cloth with solver xpbd that one workgroup corrects. Absent: the measured best for
+  // the device.
   std::optional<std::uint32_t> xpbdWholeNodes = {};
-  // Nodes of the largest cloth whose linear system one workgroup solves. Absent: likewise.
+  // Nodes of the largest cloth whose linear system one workgroup solves. Absent: the measured best for the
+  // device.
   std::optional<std::uint32_t> solveWholeNodes = {};
-  // Another build of the kernel advance_mass_spring, for comparisons; empty: the one that belongs here.
+  // Another build of the kernel advance_mass_spring, for comparisons. Empty: the regular one.
   std::span<const std::uint32_t> advanceKernel = {};
 };
 
 class ClothSimulation {
  public:
-  // The scene must be valid (messages/validate). Throws std::runtime_error where the device has no room for
-  // it.
+  // The scene must be valid (messages/validate). Throws std::runtime_error if the device has too little
+  // memory.
   ClothSimulation(const vulkan::Device& device, const model::Scene& scene, SimulationOptions options = {});
   ~ClothSimulation();
   ClothSimulation(const ClothSimulation&) = delete;
   ClothSimulation& operator=(const ClothSimulation&) = delete;
 
-  // Parameters of cloths from the next recorded tick on. Same cloths, same shapes, same pins and attachments
-  // as at construction, self-collision and tethers of the same cloths; the state stays. No tick may be in
-  // flight. Throws std::runtime_error where the device has no room for what is asked for, and changes nothing
-  // then. Kernels are made when a cloth first needs them, and kept.
+  // Sets the parameters of the cloths from the next recorded tick on. Shapes, pins and attachments must be
+  // those of construction, and the same cloths must have self-collision and tethers. The state stays. No tick
+  // may be in flight. Throws std::runtime_error and changes nothing if the device has too little memory.
+  // Kernels are created when a cloth first needs them and are kept.
   void setCloths(std::span<const model::Cloth> cloths);
 
-  // All substeps of one tick, and its status. At most one tick may be in flight when it is called.
-  // Stages: "inputs", "hold" (where something holds cloth), "near" (where there are colliders), "advance",
-  // "hash".
+  // Records all substeps of one tick, and its status. At most one tick may be in flight at the call. Stages:
+  // "inputs", "hold" (if cloth is attached or grabbed), "near" (if there are colliders), "advance", "hash".
   void recordTick(vulkan::Recorder& recorder, const TickInputs& inputs);
 
-  // Vertex normals of the present positions ([Va21] 3.5, Alg. 5; of meshes from their triangles). Only when
-  // somebody needs them. Stage "normals".
+  // Records the vertex normals of the present positions ([Va21] 3.5, Alg. 5; of meshes from their triangles).
+  // Call it only if normals are needed. Stage "normals".
   void recordNormals(vulkan::Recorder& recorder);
 
-  // Of the last recorded tick, once it is complete.
+  // Status of the last recorded tick, once it is complete.
   TickStatus status() const;
-  // Of its last substep: one a cloth that a linear system is solved for; first constraints, then implicit
-  // Euler, each first of grids and first of small ones; then those whose systems are assembled.
+  // Records of the solves of its last substep, one per cloth with a linear system. The order is: constraints,
+  // then implicit Euler (each first grids, then meshes, and small systems first), then assembled systems.
   std::vector<shared::SolveRecord> solves() const;
 
-  // Of the last recorded tick, once it is complete: by colliders, then by cloths. Colliders that did nothing
-  // have none.
+  // Contacts of the last recorded tick, once it is complete, ordered by collider, then by cloth. Colliders
+  // without contact are left out.
   std::vector<ContactStatus> contacts() const;
 
-  // Of the last recorded tick's grabs, once it is complete.
+  // Status of the grabs of the last recorded tick, once it is complete.
   std::vector<GrabStatus> grabs() const;
 
-  // What the cloths are like, each of them: recorded after a tick in the same recording, and read when that
-  // is complete. Only when somebody wants it: other ticks cost nothing. Stage "report".
+  // Records a report of each cloth after a tick, in the same recording. report() reads it once that is
+  // complete. Ticks without a report cost nothing. Stage "report".
   void recordReport(vulkan::Recorder& recorder, const TickInputs& inputs);
   std::vector<ClothReport> report() const;
 
-  // Keeps the present state on the device; goes back to what was kept last (the start, if nothing was).
+  // Keeps the present state on the device, or returns to the state that was kept last (initially the start).
   // Stage "checkpoint".
   void recordCheckpoint(vulkan::Recorder& recorder);
   void recordRollback(vulkan::Recorder& recorder);
 
-  // The state to the CPU: record, submit and wait, collect. Stage "state".
+  // Copies the state to the CPU: record, submit and wait, collect. Stage "state".
   void recordSaveState(vulkan::Recorder& recorder);
   StateSnapshot collectState(std::uint64_t tick) const;
-  // The state from the CPU; also becomes the checkpoint. An earlier restore, and the first recording of all,
-  // must be complete. Throws std::invalid_argument on a snapshot of another scene's size. Stage "state".
+  // Sets the state from the CPU; it also becomes the checkpoint. An earlier restore, and the first recording
+  // of all, must be complete. Throws std::invalid_argument if the snapshot has the size of another scene.
+  // Stage "state".
   void recordRestoreState(vulkan::Recorder& recorder, const StateSnapshot& snapshot);
 
   std::uint32_t nodeCount() const;
-  // First node of each cloth, and at the end nodeCount(): clothCount + 1 numbers.
+  // First node of each cloth, then nodeCount(): clothCount + 1 numbers.
   std::span<const std::uint32_t> clothOffsets() const;
 
-  // What other stages read: RGBA32F texels, xyz = position, w = inverse mass (0 for pinned nodes); and
-  // normals, vec4 a node, w = 0. Positions lie in two buffers in turn: stages bind both ahead and choose by
-  // presentIndex(), as it stands when they record. They begin with a barrier of their own.
+  // Buffers that other stages read. Positions are RGBA32F texels: xyz = position, w = inverse mass (0 for
+  // pinned nodes). Normals are one vec4 per node with w = 0. Positions alternate between two buffers. Other
+  // stages bind both and choose by presentIndex() when they record; they begin with their own barrier.
   const vulkan::Buffer& positions(std::uint32_t index) const;  // 0 or 1
   std::uint32_t presentIndex() const;
   const vulkan::Buffer& normals() const;

@@ -17,7 +17,8 @@ namespace clothstream::simulation {
 // Belongs to the device's thread.
 class DeviceTable {
  public:
-  // Bindings want a buffer, even of no record. Throws std::runtime_error where the device has no room.
+  // Bindings need a buffer even without records. Throws std::runtime_error if the device has too little
+  // memory.
   template <typename Record>
   DeviceTable(const vulkan::Device& device, const std::vector<Record>& records)
       : upload_(device, vulkan::BufferPurpose::upload,
@@ -26,14 +27,14 @@ class DeviceTable {
     if (!records.empty()) set(records);
   }
 
-  // As many others, from the next upload on. None may be in flight.
+  // Replaces the records by as many others, from the next upload on. No upload may be in flight.
   template <typename Record>
   void set(const std::vector<Record>& records) {
     assert(records.size() * sizeof(Record) == upload_.bytes());
     std::memcpy(upload_.mapped().data(), records.data(), upload_.bytes());
   }
 
-  // Before a kernel reads it.
+  // Must be recorded before a kernel reads the table.
   void recordUpload(vulkan::Recorder& recorder) const { recorder.copy(upload_, texels_, upload_.bytes()); }
 
   const vulkan::Buffer& texels() const { return texels_; }

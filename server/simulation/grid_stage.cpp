@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Kernels of grids, and how their work is cut.
+// Kernels of grids, and the partition of their work.
 #include "server/simulation/grid_stage.h"
 
 #include <initializer_list>
@@ -11,7 +11,8 @@ namespace clothstream::simulation {
 
 using vulkan::BindingKind;
 
-// Software devices pay for every load, so that an invocation does several rows; GPUs pay for every idle lane.
+// On software devices every load costs time, so that an invocation handles several rows. On GPUs every idle
+// lane costs time.
 GridStage::Cut GridStage::cutGrids(const vulkan::Device& device, std::span<const model::Cloth> cloths,
                                    const GridOptions& options) {
   Cut cut{options.rowsPerInvocation, options.workgroupSize, {}};
@@ -61,9 +62,9 @@ const Stage& GridStage::advance(const AdvanceVariant& variant) {
           .workgroupSize = cut_.workgroupSize,
           .specialisation = variant.specialisation(cut_.rowsPerInvocation, integrator_)},
       Stage::Buffers{&s.cloths, &tiles_.texels(), s.positions[0], s.velocities[0], s.positions[1],
-                     s.velocities[1], &s.colliders, &s.nearColliders, &s.toldContacts},
+                     s.velocities[1], &s.colliders, &s.nearColliders, &s.contactImpulses},
       Stage::Buffers{&s.cloths, &tiles_.texels(), s.positions[1], s.velocities[1], s.positions[0],
-                     s.velocities[0], &s.colliders, &s.nearColliders, &s.toldContacts});
+                     s.velocities[0], &s.colliders, &s.nearColliders, &s.contactImpulses});
   return *made;
 }
 

@@ -18,35 +18,35 @@
 
 namespace clothstream::simulation {
 
-// As in SimulationOptions.
+// See SimulationOptions.
 struct GridOptions {
   std::uint32_t rowsPerInvocation = 0;
-  std::uint32_t workgroupSize = 64;  // at most what the device can have
+  std::uint32_t workgroupSize = 64;  // at most the limit of the device
   std::span<const std::uint32_t> advanceKernel = {};
 };
 
-// Belongs to the device's thread. It touches the nodes of grids alone; there need not be any.
+// Belongs to the device's thread. Accesses the nodes of grids only; there may be none.
 class GridStage {
  public:
-  // Throws std::runtime_error where the device has no room for its table.
+  // Throws std::runtime_error if the device has too little memory for the table.
   GridStage(const vulkan::Device& device, std::span<const model::Cloth> cloths, const StateBuffers& state,
             const vulkan::Buffer& normals, model::Integrator integrator, const GridOptions& options);
 
-  // Of the same grids, other solvers' order of them; nothing of this stage may be in flight.
+  // Replaces the tiles after solvers changed, for the same grids. No work of this stage may be in flight.
   void setTiles(std::span<const model::Cloth> cloths);
-  // Its table, before anything else that is with it.
+  // Uploads the table, before any other work of this stage.
   void recordTables(vulkan::Recorder& recorder) const;
-  // One substep from state `from` to the other, of the grids whose forces are followed by this.
+  // Records one substep from state `from` to the other, for the grids whose forces are followed by `follow`.
   void recordAdvance(vulkan::Recorder& recorder, std::uint32_t from, const AdvanceVariant& variant,
                      Follow follow, shared::AdvancePush push);
   void recordNormals(vulkan::Recorder& recorder, std::uint32_t present) const;
-  // Makes the kernel of this variant now rather than when it is first needed.
+  // Creates the kernel of this variant now instead of at its first use.
   void prepare(const AdvanceVariant& variant, Follow follow) {
     if (cut_.tiles.ranges.of(follow).count > 0) advance(variant);
   }
 
  private:
-  // How the work is cut; the results do not depend on it.
+  // Partition of the work. The results do not depend on it.
   struct Cut {
     std::uint32_t rowsPerInvocation, workgroupSize;
     Tiles tiles;
@@ -61,7 +61,7 @@ class GridStage {
   std::span<const std::uint32_t> advanceSpirv_;
   Cut cut_;
   DeviceTable tiles_;
-  std::array<std::unique_ptr<Stage>, AdvanceVariant::kCount> advances_;  // made when they are first needed
+  std::array<std::unique_ptr<Stage>, AdvanceVariant::kCount> advances_;  // created at their first use
   Stage normals_;
 };
 

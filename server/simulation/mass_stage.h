@@ -13,20 +13,20 @@
 
 namespace clothstream::simulation {
 
-// Belongs to the device's thread; states hold the inverse mass of a node beside its position.
+// Belongs to the device's thread. States have the inverse mass of a node in the w of its position.
 class MassStage {
  public:
-  // The states that are given others: the two that take turns, and the checkpoint.
+  // States to change: the two alternating ones and the checkpoint.
   static constexpr std::size_t kStates = 3;
 
-  // Throws std::runtime_error where the device has no room. The buffers must outlive it.
+  // Throws std::runtime_error if the device has too little memory. The buffers must outlive it.
   MassStage(const vulkan::Device& device, std::uint32_t nodes,
             const std::array<const vulkan::Buffer*, kStates>& positions);
 
-  // Inverse masses, 1/kg, one a node; 0 of pinned ones. What recorded the last ones must be complete.
+  // Sets the inverse masses, 1/kg, by node; 0 for pinned nodes. The last recording must be complete.
   void set(std::span<const float> inverseMasses);
 
-  // Between a barrier and another.
+  // The caller records a barrier before and after.
   void record(vulkan::Recorder& recorder) const;
 
  private:

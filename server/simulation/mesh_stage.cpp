@@ -39,7 +39,7 @@ vulkan::Bindings MeshStage::advanceFrom(const Kernel& kernel, std::size_t from) 
   return Bindings(device_, kernel,
                   {&state_.cloths, &tiles_.texels(), state_.positions[from], state_.velocities[from],
                    state_.positions[to], state_.velocities[to], &state_.colliders, &state_.nearColliders,
-                   &state_.toldContacts, &nodes_.texels(), &corners_.texels(), &springEnds_.texels()});
+                   &state_.contactImpulses, &nodes_.texels(), &corners_.texels(), &springEnds_.texels()});
 }
 
 MeshStage::Advance::Advance(const MeshStage& stage, const AdvanceVariant& variant)
@@ -60,7 +60,7 @@ const MeshStage::Advance& MeshStage::advance(const AdvanceVariant& variant) {
   return *made;
 }
 
-void MeshStage::setTiles(const Tiles& tiles) {
+void MeshStage::setTiles(const MeshTiles& tiles) {
   tiles_.set(tiles.records);
   tileRanges_ = tiles.ranges;
 }

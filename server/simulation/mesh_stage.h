@@ -19,24 +19,25 @@
 
 namespace clothstream::simulation {
 
-// Belongs to the device's thread. It touches the nodes of meshes alone, so that it may run beside the stages
-// of grids without a barrier between.
+// Belongs to the device's thread. Accesses the nodes of meshes only, so that no barrier is needed between it
+// and the stages of grids.
 class MeshStage {
  public:
-  // There must be a mesh. Throws std::runtime_error where the device has no room for a table.
+  // At least one cloth must be a mesh. Throws std::runtime_error if the device has too little memory for a
+  // table.
   MeshStage(const vulkan::Device& device, const MeshTables& tables, const StateBuffers& state,
             const vulkan::Buffer& normals, model::Integrator integrator, std::uint32_t workgroupSize);
 
-  // Of the same meshes, other solvers' order of them; nothing of this stage may be in flight.
-  void setTiles(const Tiles& tiles);
-  // Its tables, before anything else that is with them.
+  // Replaces the tiles after solvers changed, for the same meshes. No work of this stage may be in flight.
+  void setTiles(const MeshTiles& tiles);
+  // Uploads the tables, before any other work of this stage.
   void recordTables(vulkan::Recorder& recorder) const;
-  // One substep from state `from` to the other, of the meshes whose forces are followed by this.
+  // Records one substep from state `from` to the other, for the meshes whose forces are followed by `follow`.
   void recordAdvance(vulkan::Recorder& recorder, std::uint32_t from, const AdvanceVariant& variant,
                      Follow follow, shared::AdvancePush push);
   void recordNormals(vulkan::Recorder& recorder, std::uint32_t present) const;
   MeshSprings springs() const { return {.nodes = &nodes_.texels(), .ends = &springEnds_.texels()}; }
-  // Makes the kernel of this variant now rather than when it is first needed.
+  // Creates the kernel of this variant now instead of at its first use.
   void prepare(const AdvanceVariant& variant, Follow follow) {
     if (tileRanges_.of(follow).count > 0) advance(variant);
   }
@@ -48,7 +49,7 @@ class MeshStage {
     Advance& operator=(const Advance&) = delete;
 
     vulkan::Kernel kernel;
-    std::array<vulkan::Bindings, 2> from;  // they point to the kernel
+    std::array<vulkan::Bindings, 2> from;  // they refer to the kernel
   };
 
   const Advance& advance(const AdvanceVariant& variant);

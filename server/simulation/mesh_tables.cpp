@@ -8,16 +8,10 @@ namespace clothstream::simulation {
 namespace {
 
 void appendTiles(std::uint32_t cloth, std::uint32_t nodes, std::size_t nodesBefore,
-                 std::uint32_t workgroupSize, std::vector<shared::TileRecord>& tiles) {
+                 std::uint32_t workgroupSize, std::vector<shared::MeshTileRecord>& tiles) {
   for (std::uint32_t first = 0; first < nodes; first += workgroupSize)
     tiles.push_back(
-        {{static_cast<float>(cloth), static_cast<float>(first), static_cast<float>(nodesBefore + first), 0}});
-}
-
-// Texels from `first` to the table's end.
-shared::vec4 listFrom(std::size_t first, std::size_t end) {
-  return {static_cast<float>(first & 0xFFFF), static_cast<float>(first >> 16),
-          static_cast<float>(end - first), 0};
+        {static_cast<float>(cloth), static_cast<float>(first), static_cast<float>(nodesBefore + first), 0});
 }
 
 void appendSprings(const model::Mesh& mesh, std::uint32_t firstNode, std::span<shared::MeshNodeRecord> nodes,
@@ -33,12 +27,12 @@ void appendSprings(const model::Mesh& mesh, std::uint32_t firstNode, std::span<s
       const float signedOther = link.kind == model::SpringKind::shear ? -other : other;
       const float signedLength = link.kind == model::SpringKind::bend ? -link.restLength : link.restLength;
       if (full)
-        pairs.push_back({{signedOther, signedLength, numberOf(node), 1}});
+        pairs.push_back({{{signedOther, signedLength}, {numberOf(node), 1}}});
       else
-        pairs.back().ends.z = signedOther, pairs.back().ends.w = signedLength;
+        pairs.back().springs[1] = {signedOther, signedLength};
       full = !full;
     }
-    nodes[node].springs = listFrom(first, pairs.size());
+    nodes[node].springs = shared::listRecord(first, pairs.size());
   }
 }
 
@@ -51,29 +45,25 @@ void appendCorners(const model::Mesh& mesh, std::uint32_t firstNode, std::span<s
   for (std::uint32_t node = 0; node < mesh.nodeCount(); ++node) {
     const std::uint32_t texels = (counts[node] + 1) / 2;
     const auto self = static_cast<float>(firstNode + node);
-    nodes[node].triangles = listFrom(pairs.size(), pairs.size() + texels);
-    pairs.resize(pairs.size() + texels, {{self, self, self, self}});
-    counts[node] = 0;  // now how many are written
+    nodes[node].triangles = shared::listRecord(pairs.size(), pairs.size() + texels);
+    pairs.resize(pairs.size() + texels, {{{self, self}, {self, self}}});
+    counts[node] = 0;  // now the number of written triangles
   }
   for (const model::Triangle& triangle : mesh.shape.triangles)
     for (std::size_t i = 0; i < 3; ++i) {
       const std::uint32_t node = triangle[i], written = counts[node]++;
-      const shared::vec4& list = nodes[node].triangles;
-      const std::size_t start = static_cast<std::size_t>(list.x) + (static_cast<std::size_t>(list.y) << 16);
+      const shared::ListRecord& list = nodes[node].triangles;
+      const std::size_t start = shared::wholeNumber(list.firstLow, list.firstHigh);
       const auto second = static_cast<float>(firstNode + triangle[(i + 1) % 3]);
       const auto third = static_cast<float>(firstNode + triangle[(i + 2) % 3]);
-      shared::vec4& corners = pairs[start + written / 2].corners;
-      if (written % 2 == 0)
-        corners.x = second, corners.y = third;
-      else
-        corners.z = second, corners.w = third;
+      pairs[start + written / 2].triangles[written % 2] = {second, third};
     }
 }
 
 }  // namespace
 
-Tiles meshTiles(std::span<const model::Cloth> cloths, std::uint32_t workgroupSize) {
-  Tiles tiles;
+MeshTiles meshTiles(std::span<const model::Cloth> cloths, std::uint32_t workgroupSize) {
+  MeshTiles tiles;
   for (const Follow follow : kFollows) {
     std::size_t nodes = 0;
     for (std::uint32_t i = 0; i < cloths.size(); ++i) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The meshes of a scene as the kernels read them.
+// Tables of the meshes of a scene.
 #pragma once
 
 #include <cstdint>
@@ -13,17 +13,16 @@
 namespace clothstream::simulation {
 
 struct MeshTables {
-  // One a workgroup: cloth, first node in the cloth, its number among the nodes of all meshes.
-  Tiles tiles;
+  MeshTiles tiles;                            // one per workgroup
   std::vector<shared::MeshNodeRecord> nodes;  // of all meshes
   std::vector<shared::SpringPairRecord> springEnds;
   std::vector<shared::CornerPairRecord> corners;
 };
 
-// Of the meshes; MeshTables has them.
-Tiles meshTiles(std::span<const model::Cloth> cloths, std::uint32_t workgroupSize);
+// Tiles of the meshes; part of meshTables().
+MeshTiles meshTiles(std::span<const model::Cloth> cloths, std::uint32_t workgroupSize);
 
-// Empty where no cloth is a mesh.
+// Empty if no cloth is a mesh.
 MeshTables meshTables(std::span<const model::Cloth> cloths, std::uint32_t workgroupSize);
 
 }  // namespace clothstream::simulation

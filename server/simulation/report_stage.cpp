@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Kernels of the report, and what its counts say.
+// Kernels of the report, and the evaluation of their counts.
 #include "server/simulation/report_stage.h"
 
 #include <algorithm>
@@ -27,18 +27,17 @@ ReportBlocks blocksOf(std::span<const shared::ClothRecord> cloths) {
   ReportBlocks blocks;
   std::uint32_t inMeshes = 0;
   for (std::size_t cloth = 0; cloth < cloths.size(); ++cloth) {
-    const shared::vec4& place = cloths[cloth].place;
-    const bool isMesh = place.z == 0;
-    const std::uint32_t nodes =
-        isMesh ? static_cast<std::uint32_t>(place.w)
-               : static_cast<std::uint32_t>(place.z) * static_cast<std::uint32_t>(place.w);
+    const auto rows = static_cast<std::uint32_t>(cloths[cloth].rows);
+    const auto columns = static_cast<std::uint32_t>(cloths[cloth].columns);
+    const bool isMesh = rows == 0;
+    const std::uint32_t nodes = isMesh ? columns : rows * columns;
     const std::uint32_t count = (nodes + shared::kReportBlock - 1) / shared::kReportBlock;
-    blocks.cloths.push_back(
-        {.stiffness = {},
-         .blocks = {static_cast<float>(blocks.records.size()), static_cast<float>(count), 0, 0}});
+    shared::ReportClothRecord& record = blocks.cloths.emplace_back();
+    record.firstBlock = static_cast<float>(blocks.records.size());
+    record.blockCount = static_cast<float>(count);
     for (std::uint32_t first = 0; first < nodes; first += shared::kReportBlock)
-      blocks.records.push_back({{static_cast<float>(cloth), static_cast<float>(first),
-                                 static_cast<float>(isMesh ? inMeshes + first : 0), 0}});
+      blocks.records.push_back({static_cast<float>(cloth), static_cast<float>(first),
+                                static_cast<float>(isMesh ? inMeshes + first : 0), 0});
     if (isMesh) inMeshes += nodes;
   }
   return blocks;
@@ -51,7 +50,7 @@ Buffer uploadOf(const vulkan::Device& device, const std::vector<Record>& records
   return upload;
 }
 
-// The upper end of the bin in which 99 % of all are reached; the last one has none.
+// Upper end of the bin in which 99 % of all springs are reached. The last bin has no upper end.
 float p99Of(std::span<const std::uint32_t> bins, std::uint64_t all) {
   const std::uint64_t rank = (99 * all + 99) / 100;
   std::uint64_t before = 0;
@@ -62,10 +61,10 @@ float p99Of(std::span<const std::uint32_t> bins, std::uint64_t all) {
 
 }  // namespace
 
-std::vector<shared::vec4> springStiffness(std::span<const model::Cloth> cloths) {
-  std::vector<shared::vec4> all;
+std::vector<SpringStiffness> springStiffness(std::span<const model::Cloth> cloths) {
+  std::vector<SpringStiffness> all;
   for (const model::Cloth& cloth : cloths)
-    all.push_back({cloth.structural.stiffness, cloth.shear.stiffness, cloth.bend.stiffness, 0});
+    all.push_back({cloth.structural.stiffness, cloth.shear.stiffness, cloth.bend.stiffness});
   return all;
 }
 
@@ -127,10 +126,14 @@ Bindings ReportStage::penetrationsIn(const vulkan::Device& device, const StateBu
 }
 
 void ReportStage::record(vulkan::Recorder& recorder, std::uint32_t present,
-                         std::span<const shared::vec4> stiffness, const model::Vec3& gravity,
+                         std::span<const SpringStiffness> stiffness, const model::Vec3& gravity,
                          const shared::CollisionPush& collision) {
   assert(stiffness.size() == of_.cloths.size());
-  for (std::size_t i = 0; i < stiffness.size(); ++i) of_.cloths[i].stiffness = stiffness[i];
+  for (std::size_t i = 0; i < stiffness.size(); ++i) {
+    of_.cloths[i].structuralStiffness = stiffness[i].structural;
+    of_.cloths[i].shearStiffness = stiffness[i].shear;
+    of_.cloths[i].bendStiffness = stiffness[i].bend;
+  }
   slot_ = 1 - slot_;
   const Buffer& upload = clothUploads_[slot_];
   std::memcpy(upload.mapped().data(), of_.cloths.data(), upload.bytes());

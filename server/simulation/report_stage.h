@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What cloths are like at a tick's end, measured on the device.
+// Measures the cloths at a tick's end, on the device.
 #pragma once
 
 #include <array>
@@ -20,34 +20,37 @@
 
 namespace clothstream::simulation {
 
-// The springs of meshes by their nodes; null where no cloth is a mesh.
+// The springs of meshes by node; null if no cloth is a mesh.
 struct MeshSprings {
   const vulkan::Buffer* nodes = nullptr;
   const vulkan::Buffer* ends = nullptr;
 };
 
-// Stiffness of each kind of spring, whether it is a force or a constraint.
-std::vector<shared::vec4> springStiffness(std::span<const model::Cloth> cloths);
+// Stiffness of each kind of spring of a cloth, N/m, also of springs that are constraints.
+struct SpringStiffness {
+  float structural, shear, bend;
+};
+std::vector<SpringStiffness> springStiffness(std::span<const model::Cloth> cloths);
 
-// How cloths are cut into blocks.
+// Partition of cloths into blocks.
 struct ReportBlocks {
   std::vector<shared::ReportBlockRecord> records;
   std::vector<shared::ReportClothRecord> cloths;  // without their stiffness
 };
 
-// Belongs to the device's thread. Costs nothing in recordings that it has no part in. The bits depend neither
-// on the workgroup's size nor on the device.
+// Belongs to the device's thread. Recordings without a report cost nothing. The bits depend neither on the
+// workgroup's size nor on the device.
 class ReportStage {
  public:
-  // `cloths` say where the nodes of each are. `workgroupSize` 0: the measured best for the device.
+  // `cloths` have the nodes of each cloth. `workgroupSize` 0: the measured best for the device.
   ReportStage(const vulkan::Device& device, std::span<const shared::ClothRecord> cloths,
               const StateBuffers& state, const MeshSprings& meshes, std::uint32_t workgroupSize);
 
-  // Of the state in the buffers `present`, against colliders as they are at the end of `collision`. Begins
-  // with a barrier. At most one recording of it may be in flight.
-  void record(vulkan::Recorder& recorder, std::uint32_t present, std::span<const shared::vec4> stiffness,
+  // Measures the state in the buffers `present` against the colliders at the end of `collision`. Begins with
+  // a barrier. At most one such recording may be in flight.
+  void record(vulkan::Recorder& recorder, std::uint32_t present, std::span<const SpringStiffness> stiffness,
               const model::Vec3& gravity, const shared::CollisionPush& collision);
-  // Of a complete recording, without what a solve says: a cloth each.
+  // Reports of a complete recording, one per cloth, without the values of a solve.
   std::vector<ClothReport> collect() const;
 
  private:
@@ -64,7 +67,7 @@ class ReportStage {
   ReportBlocks of_;
   vulkan::Buffer blockUpload_, blocks_, cloths_, runs_, sums_, counts_, readback_;
   std::array<vulkan::Buffer, 2>
-      clothUploads_;  // by turns: a recording may be in flight while the next is made
+      clothUploads_;  // used alternately: a recording may be in flight while the next one is made
   vulkan::Kernel measure_, penetrations_, addUp_;
   std::array<vulkan::Bindings, 2> measureIn_, penetrationsIn_;
   vulkan::Bindings addUpAll_;

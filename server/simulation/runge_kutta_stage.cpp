@@ -14,7 +14,7 @@ using vulkan::Kernel;
 using vulkan::kStorage;
 using vulkan::kTexels;
 
-// Of a substep, of explicit Euler's steps.
+// Length of each explicit Euler step, as a part of the substep.
 constexpr std::array<float, 4> kParts{0.5f, 0.5f, 1.0f, 1.0f / 6};
 
 Buffer makeBuffer(const vulkan::Device& device, BufferPurpose purpose, std::uint32_t nodes) {
@@ -53,7 +53,7 @@ Bindings RungeKuttaStage::combineFrom(const vulkan::Device& device, const StateB
   return Bindings(device, combine_[stage],
                   {&state.cloths, &state.colliders, &state.nearColliders, &start_, state.positions[from],
                    state.velocities[from], state.positions[to], state.velocities[to], &start_,
-                   &startVelocities_, &sums_, &velocitySums_, &state.toldContacts});
+                   &startVelocities_, &sums_, &velocitySums_, &state.contactImpulses});
 }
 
 void RungeKuttaStage::record(vulkan::Recorder& recorder, std::uint32_t from,
@@ -69,7 +69,7 @@ void RungeKuttaStage::record(vulkan::Recorder& recorder, std::uint32_t from,
       recorder.dispatch(combineFrom_[stage][stepFrom], push, push.count);
       continue;
     }
-    // Each cloth has a friction and a thickness of its own.
+    // Each cloth has its own friction and thickness.
     for (; push.cloth + 1 < offsets_.size(); ++push.cloth) {
       push.firstNode = offsets_[push.cloth];
       push.count = offsets_[push.cloth + 1] - push.firstNode;

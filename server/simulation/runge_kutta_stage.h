@@ -17,16 +17,16 @@
 
 namespace clothstream::simulation {
 
-// Belongs to the device's thread. For scenes whose every cloth is integrated by it.
+// Belongs to the device's thread. For scenes in which it integrates every cloth.
 class RungeKuttaStage {
  public:
-  // `clothOffsets`: the first node of each cloth, and at the end the number of nodes.
+  // `clothOffsets` are the first node of each cloth, then the number of nodes.
   RungeKuttaStage(const vulkan::Device& device, const StateBuffers& state,
                   std::span<const std::uint32_t> clothOffsets);
 
-  // Records a step of explicit Euler from state `from` to the other, by this part of a substep.
+  // Records an explicit Euler step from state `from` to the other, over this part of a substep.
   using RecordEuler = std::function<void(std::uint32_t from, float part)>;
-  // One substep from state `from` to the other, collisions included; the former is left as it was.
+  // Records one substep from state `from` to the other, including collisions. State `from` stays unchanged.
   void record(vulkan::Recorder& recorder, std::uint32_t from, const shared::CollisionPush& collision,
               const RecordEuler& recordEuler) const;
 
@@ -40,7 +40,7 @@ class RungeKuttaStage {
   std::vector<std::uint32_t> offsets_;
   vulkan::Buffer start_, startVelocities_, sums_, velocitySums_;
   std::array<vulkan::Kernel, kStages> combine_;
-  // The steps that they follow go there and back: of a substep from either state.
+  // The steps alternate between the states. The substep may start from either state.
   std::array<std::array<vulkan::Bindings, 2>, kStages> combineFrom_;
 };
 

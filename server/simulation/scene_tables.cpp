@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A scene as the kernels read it: a record a cloth, a record a workgroup.
+// Tables of a scene: one record per cloth and one per workgroup.
 #include "server/simulation/scene_tables.h"
 
 #include <algorithm>
@@ -12,34 +12,33 @@
 namespace clothstream::simulation {
 namespace {
 
-// As kernels store numbers, so that a state at rest has been through them already.
+// Kernels store numbers in this form. A state at rest must have it from the start.
 float snapTiny(float x) {
   return std::abs(x) < 1e-20f ? 0.0f : x;
 }
 
-// Where springs become constraints, how much of what is too much is taken back; the third tells from those
-// that always are.
-shared::vec4 limitsOf(const model::Cloth& cloth) {
-  const model::Solver& solver = cloth.solver;
-  const bool adaptive = solver.kind == model::SolverKind::acad;
-  return {adaptive ? solver.activation : 0, model::correctionFraction(solver), adaptive ? 1.0f : 0.0f,
-          cloth.dihedralBending};
-}
-
-// Compliance over h^2, iterations and tolerance of conjugate gradients; whether it has bend springs.
-shared::vec4 solverOf(const model::Cloth& cloth, double substepSeconds) {
-  if (followOf(cloth.solver.kind) != Follow::solve) return {0, 0, 0, 0};
-  const bool bend = cloth.solver.kind == model::SolverKind::implicitEuler || cloth.solver.bendConstraints;
-  return {static_cast<float>(model::scaledCompliance(cloth, substepSeconds)),
-          static_cast<float>(cloth.solver.iterations), cloth.solver.tolerance * cloth.solver.tolerance,
-          bend ? 1.0f : 0.0f};
-}
-
-shared::vec4 xpbdSpringOf(const model::Cloth& cloth, model::SpringKind kind, double substepSeconds, float w) {
+shared::XpbdSpringRecord xpbdSpringOf(const model::Cloth& cloth, model::SpringKind kind,
+                                      double substepSeconds) {
   if (cloth.solver.kind != model::SolverKind::xpbd) return {0, 0, 0, 0};
   const model::XpbdSpring spring = model::xpbdSpring(cloth, kind, substepSeconds);
   return {static_cast<float>(spring.stretch), static_cast<float>(spring.damping),
-          static_cast<float>(spring.memory), w};
+          static_cast<float>(spring.memory), 0};
+}
+
+// Sets the members of the record that only solvers read.
+void setSolver(const model::Cloth& cloth, double substepSeconds, shared::ClothRecord& record) {
+  const model::Solver& solver = cloth.solver;
+  using enum model::SpringKind;
+  record.activation = solver.kind == model::SolverKind::acad ? solver.activation : 0;
+  record.correctionFraction = model::correctionFraction(solver);
+  for (const model::SpringKind kind : {structural, shear, bend})
+    record.xpbdSprings[static_cast<std::size_t>(kind)] = xpbdSpringOf(cloth, kind, substepSeconds);
+  if (solver.kind == model::SolverKind::massSpring) return;
+  record.solverIterations = static_cast<float>(solver.iterations);
+  if (followOf(solver.kind) != Follow::solve) return;
+  record.scaledCompliance = static_cast<float>(model::scaledCompliance(cloth, substepSeconds));
+  record.squaredTolerance = solver.tolerance * solver.tolerance;
+  record.solvesBend = solver.kind == model::SolverKind::implicitEuler || solver.bendConstraints ? 1.0f : 0.0f;
 }
 
 }  // namespace
@@ -64,25 +63,35 @@ std::vector<shared::ClothRecord> clothRecords(std::span<const model::Cloth> clot
       assert(number < 1u << 24);
       return static_cast<float>(number);
     };
-    const auto force = [&](model::SpringKind kind) { return model::forceOf(cloth, kind); };
-    const auto xpbd = [&](model::SpringKind kind, float w) {
-      return xpbdSpringOf(cloth, kind, substepSeconds, w);
-    };
-    const auto inverseMass = static_cast<float>(cloth.nodeCount() / double{cloth.mass});
     using enum model::SpringKind;
-    records.push_back(
-        {.place = {whole(firstNode & 0xFFFF), whole(firstNode >> 16), cloth.mesh ? 0 : whole(cloth.grid.rows),
-                   whole(cloth.mesh ? cloth.nodeCount() : cloth.grid.columns)},
-         .spacing = {spacing.column, spacing.row, spacing.diagonal, cloth.damping},
-         .stiffness = {force(structural).stiffness, force(shear).stiffness, force(bend).stiffness,
-                       cloth.friction},
-         .damping = {force(structural).damping, force(shear).damping, force(bend).damping, cloth.thickness},
-         .air = {cloth.drag, cloth.lift, cloth.selfCollision ? cloth.selfCollision->radius : 0.0f,
-                 cloth.selfCollision ? cloth.selfCollision->friction : 0.0f},
-         .solver = solverOf(cloth, substepSeconds),
-         .limits = limitsOf(cloth),
-         .springs = {xpbd(structural, static_cast<float>(cloth.solver.iterations)), xpbd(shear, inverseMass),
-                     xpbd(bend, 0)}});
+    const model::Spring structuralForce = model::forceOf(cloth, structural);
+    const model::Spring shearForce = model::forceOf(cloth, shear);
+    const model::Spring bendForce = model::forceOf(cloth, bend);
+    shared::ClothRecord record{};
+    record.firstNodeLow = shared::lowHalf(firstNode);
+    record.firstNodeHigh = shared::highHalf(firstNode);
+    record.rows = cloth.mesh ? 0 : whole(cloth.grid.rows);
+    record.columns = whole(cloth.mesh ? cloth.nodeCount() : cloth.grid.columns);
+    record.columnSpacing = spacing.column;
+    record.rowSpacing = spacing.row;
+    record.diagonalSpacing = spacing.diagonal;
+    record.velocityDecay = cloth.damping;
+    record.structuralStiffness = structuralForce.stiffness;
+    record.shearStiffness = shearForce.stiffness;
+    record.bendStiffness = bendForce.stiffness;
+    record.friction = cloth.friction;
+    record.structuralDamping = structuralForce.damping;
+    record.shearDamping = shearForce.damping;
+    record.bendDamping = bendForce.damping;
+    record.thickness = cloth.thickness;
+    record.drag = cloth.drag;
+    record.lift = cloth.lift;
+    record.ballRadius = cloth.selfCollision ? cloth.selfCollision->radius : 0.0f;
+    record.ballFriction = cloth.selfCollision ? cloth.selfCollision->friction : 0.0f;
+    record.gridInverseMass = static_cast<float>(cloth.nodeCount() / double{cloth.mass});
+    record.bendingRigidity = cloth.dihedralBending;
+    setSolver(cloth, substepSeconds, record);
+    records.push_back(record);
     firstNode += cloth.nodeCount();
   }
   return records;
@@ -100,9 +109,9 @@ Tiles makeTiles(std::span<const model::Cloth> cloths, std::uint32_t rowsPerInvoc
       const std::uint64_t invocations = std::uint64_t{strips} * grid.columns;
       for (std::uint64_t first = 0; first < invocations; first += workgroupSize)
         tiles.records.push_back(
-            {{static_cast<float>(cloth),
-              static_cast<float>(static_cast<std::uint32_t>(first / grid.columns) * rowsPerInvocation),
-              static_cast<float>(first % grid.columns), 0}});
+            {static_cast<float>(cloth),
+             static_cast<float>(static_cast<std::uint32_t>(first / grid.columns) * rowsPerInvocation),
+             static_cast<float>(first % grid.columns), 0});
     }
     tiles.ranges.ends[static_cast<std::size_t>(follow)] = static_cast<std::uint32_t>(tiles.records.size());
   }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A scene as the kernels read it: a record a cloth, a record a workgroup.
+// Tables of a scene: one record per cloth and one per workgroup.
 #pragma once
 
 #include <array>
@@ -13,7 +13,7 @@
 
 namespace clothstream::simulation {
 
-// First node of each cloth, and at the end the number of nodes: clothCount + 1 numbers.
+// First node of each cloth, then the number of nodes: clothCount + 1 numbers.
 std::vector<std::uint32_t> clothOffsets(std::span<const model::Cloth> cloths);
 
 std::vector<shared::ClothRecord> clothRecords(std::span<const model::Cloth> cloths, double substepSeconds);
@@ -22,18 +22,18 @@ struct TileRange {
   std::uint32_t first, count;
 };
 
-// What a cloth's forces are followed by in a substep.
+// The stage that follows a cloth's forces in a substep.
 enum class Follow : std::uint8_t {
-  nothing,      // they collide at once
+  nothing,      // no stage: the advance kernel also collides
   solve,        // SolveStage
-  corrections,  // XpbdStage; of springs there are no forces
+  corrections,  // XpbdStage: springs are no forces
 };
 inline constexpr std::array kFollows{Follow::nothing, Follow::solve, Follow::corrections};
 Follow followOf(model::SolverKind kind);
 
-// Tiles in the order of kFollows.
+// End of the tiles of each kind, in the order of kFollows.
 struct TileRanges {
-  std::array<std::uint32_t, kFollows.size()> ends{};  // of each kind
+  std::array<std::uint32_t, kFollows.size()> ends{};
 
   TileRange of(Follow follow) const {
     const auto i = static_cast<std::size_t>(follow);
@@ -43,20 +43,24 @@ struct TileRanges {
   std::uint32_t count() const { return ends.back(); }
 };
 
-struct Tiles {
-  std::vector<shared::TileRecord> records;
+// Tiles of all grids or all meshes.
+template <typename Record>
+struct TileTable {
+  std::vector<Record> records;
   TileRanges ranges;
 };
+using Tiles = TileTable<shared::TileRecord>;
+using MeshTiles = TileTable<shared::MeshTileRecord>;
 
-// One tile a workgroup: together they cover every node of the grids once, `rowsPerInvocation` rows an
+// One tile per workgroup. Together they cover every node of the grids once, with `rowsPerInvocation` rows per
 // invocation.
 Tiles makeTiles(std::span<const model::Cloth> cloths, std::uint32_t rowsPerInvocation,
                 std::uint32_t workgroupSize);
 
-// 1/kg a node; 0 for pinned nodes.
+// 1/kg by node; 0 for pinned nodes.
 std::vector<float> inverseMasses(std::span<const model::Cloth> cloths);
 
-// Every node where it starts, at rest.
+// Every node at its start position, with zero velocity.
 NodeState restState(std::span<const model::Cloth> cloths);
 
 }  // namespace clothstream::simulation

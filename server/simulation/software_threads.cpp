@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// How many threads a software device is to have for a scene.
+// Number of threads of a software device for a scene.
 #include "server/simulation/software_threads.h"
 
 #include <cstdlib>

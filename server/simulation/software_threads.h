@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// How many threads a software device is to have for a scene.
+// Number of threads of a software device for a scene.
 #pragma once
 
 #include <cstdint>
@@ -8,13 +8,13 @@
 
 namespace clothstream::simulation {
 
-// Cloth of at most so many nodes is simulated as fast or up to twice as fast by the thread that waits for it
-// as by one for each processor: these are woken for each dispatch, of which a substep has several
-// (docs/benchmarks.md).
+// Largest number of nodes for which a software device should have no threads. The waiting thread then
+// simulates as fast as one thread per processor, or up to twice as fast: those threads are woken for each
+// dispatch, and a substep has several dispatches (docs/benchmarks.md).
 inline constexpr std::uint32_t kFewNodes = 4096;
 
-// The options, with the threads that suit a scene of so many nodes where neither they nor the environment
-// (LP_NUM_THREADS) say how many.
+// Returns the options with the number of threads that suits a scene of `nodes` nodes, unless the options or
+// the environment (LP_NUM_THREADS) give a number.
 vulkan::DeviceOptions suitedTo(std::uint32_t nodes, vulkan::DeviceOptions options);
 
 }  // namespace clothstream::simulation

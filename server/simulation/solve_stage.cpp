@@ -30,9 +30,9 @@ using vulkan::kStorage;
 using vulkan::kTexels;
 
 constexpr std::uint32_t kSolveLanes = CLOTHSTREAM_SOLVE_LANES;
-constexpr std::uint32_t kVectors = 5;  // shaders/solve/system.glsl
-// Sizes of dispatches, x, y, z each: of a group's chunks, of its small systems, of the large ones'
-// iterations.
+constexpr std::uint32_t kVectors = 5;  // shaders/solve/linear_system.glsl
+// Dispatch sizes, x, y, z each: of a group's chunks, of its small systems, of the iterations of large
+// systems.
 constexpr std::uint32_t kSize = 3, kSmallSystems = kSize, kIteration = 2 * kSize;
 
 std::uint32_t sizesOf(const SolveGroup& group) {
@@ -47,15 +47,16 @@ bool isImplicit(const SolveGroup& group) {
   return group.kind == model::SolverKind::implicitEuler;
 }
 
-// A workgroup is a chunk, or solves a system chunk by chunk, with barriers between its passes: on a software
-// device these cost nothing as long as it is no wider than the CPU's vectors, for it then runs without
-// switching between invocations. Loops over the lanes count on a divisor of their number.
+// A workgroup handles one chunk, or solves a system chunk by chunk with barriers between its passes. On a
+// software device barriers cost nothing if the workgroup is no wider than the CPU's vectors, because it then
+// does not switch between invocations. Loops over lanes rely on a width that divides their number.
 std::uint32_t solveWorkgroup(const vulkan::Device& device, std::uint32_t wanted) {
   if (wanted == 0) wanted = device.isSoftware() ? 8 : kSolveLanes;
   return std::bit_floor(std::min({wanted, kSolveLanes, device.limits().maxWorkgroupInvocations}));
 }
 
-// lavapipe lets an invocation make 65,535 rounds of loops, all loops together, and then ends each after one.
+// lavapipe allows an invocation 65,535 loop rounds, over all loops together. Beyond that it ends each loop
+// after one round.
 std::uint32_t iterationsPerDispatch(const vulkan::Device& device, const SolveGroup& group,
                                     std::uint32_t listed, std::uint32_t workgroup) {
   if (!device.isSoftware()) return ~0u;
@@ -69,7 +70,8 @@ std::uint32_t iterationsPerDispatch(const vulkan::Device& device, const SolveGro
 
 }  // namespace
 
-// All kernels of a group but those that it does not need: systems that one workgroup solves, or several.
+// Kernels of a group. Those that it does not need are null: for systems that one workgroup solves, or for
+// larger ones.
 struct GroupKernels {
   std::unique_ptr<Kernel> check, springs, prepare, whole, multiply, measure, update;
 };
@@ -95,7 +97,7 @@ struct SolveStage::Kernels {
   const GroupKernels& of(const SolveGroup& group) {
     const std::size_t kind = isImplicit(group) ? 2 : (isAdaptive(group) ? 1 : 0);
     GroupKernels& on = groups[(2 * kind + (group.mesh ? 1 : 0)) * 2 + (group.bend ? 1 : 0)];
-    // The same first ones of all that weigh springs.
+    // All kernels that compute spring terms have the same first bindings.
     const auto weighing = [](std::initializer_list<BindingKind> more) {
       std::vector<BindingKind> bindings = {kTexels, kTexels, kTexels,  kTexels,  kTexels,
                                            kTexels, kTexels, kStorage, kStorage, kStorage};
@@ -150,13 +152,13 @@ struct SolveStage::Kernels {
   std::array<std::unique_ptr<Kernel>, 2> applies;
 };
 
-// All whose size follows from the cloths, and what binds it.
+// Everything whose size follows from the cloths, and its bindings.
 struct SolveStage::Systems {
-  // Of a group, for when the state lies in the first of the two buffers and for when it lies in the second.
+  // A group with its bindings, one for each index of the state buffer that has the state.
   struct Group {
     SolveGroup on;
     std::uint32_t iterationsPerDispatch;
-    std::uint32_t firstSize;  // of its dispatches'
+    std::uint32_t firstSize;  // index of its first dispatch size
     std::vector<Bindings> check{}, springs{}, prepare{}, whole{}, multiply{}, measure{}, update{}, apply{};
   };
 
@@ -184,7 +186,7 @@ struct SolveStage::Systems {
     const std::span<std::uint32_t> numbers = emptyGroups.mapped<std::uint32_t>();
     for (std::size_t i = 0; i < numbers.size(); ++i) numbers[i] = i % kSize == 0 ? 0 : 1;
     for (const shared::SystemRecord& system : tables.systems)
-      cloths.push_back(static_cast<std::uint32_t>(system.springs.w));
+      cloths.push_back(static_cast<std::uint32_t>(system.cloth));
     std::uint32_t size = 0;
     for (const SolveGroup& on : tables.groups) {
       groups.push_back(
@@ -202,7 +204,7 @@ struct SolveStage::Systems {
     return sizes;
   }
   static bool has(const SolveTables& tables, auto what) { return std::ranges::any_of(tables.groups, what); }
-  // Bindings want a buffer even of nothing.
+  // Bindings need a buffer even for an empty table.
   static std::size_t texels(std::size_t count, bool any) { return (any ? count : 1) * sizeof(shared::vec4); }
 
   void bind(const vulkan::Device& device, Kernels& kernels, const StateBuffers& state, std::size_t from,
@@ -249,7 +251,7 @@ struct SolveStage::Systems {
         device, kernels.apply(group.on),
         std::initializer_list<const Buffer*>{&state.cloths, &systems.texels(), &chunks.texels(), &vectors,
                                              &state.colliders, &state.nearColliders, &position, &freePosition,
-                                             &freeVelocity, &actives, &state.toldContacts});
+                                             &freeVelocity, &actives, &state.contactImpulses});
   }
 
   void recordPrepare(vulkan::Recorder& recorder, const Group& group, std::uint32_t from, double h) const;
@@ -292,7 +294,7 @@ void SolveStage::recordTables(vulkan::Recorder& recorder) const {
   for (const DeviceTable* table :
        {&systems_->systems, &systems_->chunks, &systems_->springs, &systems_->incidences, &systems_->lists})
     table->recordUpload(recorder);
-  // What ACAD does not prepare has no weight.
+  // Springs that ACAD does not prepare have no weight.
   for (const Buffer* buffer : {&systems_->along, &systems_->vectors, &systems_->actives})
     recorder.fill(*buffer, 0, buffer->bytes());
 }
@@ -386,7 +388,7 @@ void SolveStage::record(vulkan::Recorder& recorder, std::uint32_t from,
                                  .substepSeconds = static_cast<float>(substepSeconds),
                                  .reserved = 0};
     recorder.barrier();
-    // What ACAD leaves alone stays where it is, unless it may collide.
+    // Nodes that ACAD leaves alone stay in place, unless they may collide.
     if (isAdaptive(group.on) && collision.colliderCount == 0)
       recorder.dispatchIndirect(group.apply[from], push, all.groupSizes,
                                 group.firstSize * sizeof(std::uint32_t));

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Linear systems on the device: cloths whose springs keep their length, always or where they are stretched
-// too far, and cloths whose springs pull as they will at the substep's end.
+// Linear systems on the device: cloths with constraints (always, or if springs are stretched too far), and
+// cloths with implicit Euler.
 #pragma once
 
 #include <cstdint>
@@ -16,33 +16,35 @@
 
 namespace clothstream::simulation {
 
-// Belongs to the device's thread. After the forces have given every node a free velocity and position, it
-// solves for what the velocities change by (shaders/solve/weigh.glsl has the systems), moves the nodes by as
-// much times h, and lets them collide. Large cloths are solved by several workgroups in a dispatch or two an
-// iteration, which are empty once all have converged; the bits are those of one workgroup.
+// Belongs to the device's thread. The forces have given every node a free velocity and position. This stage
+// solves for the change of the velocities (shaders/solve/spring_terms.glsl has the systems). It moves the
+// nodes by h times that change and lets them collide. Several workgroups solve a large cloth, with one or two
+// dispatches per iteration; these are empty after all systems have converged. The bits are those of a solve
+// by one workgroup.
 class SolveStage {
  public:
-  // `workgroupSize` 0, and `wholeNodes` (of the largest cloth that one workgroup solves) absent: the measured
-  // best for the device. Throws std::runtime_error where the device cannot take the systems.
+  // `workgroupSize` 0 and `wholeNodes` absent (nodes of the largest cloth that one workgroup solves) mean the
+  // measured best for the device. Throws std::runtime_error if the device cannot take the systems.
   SolveStage(const vulkan::Device& device, std::span<const model::Cloth> cloths, const StateBuffers& state,
              std::uint32_t workgroupSize, std::optional<std::uint32_t> wholeNodes);
   ~SolveStage();
 
-  // Other cloths, or none, are made ready; then they are taken from now on, with nothing of this stage in
-  // flight. Kernels that were made are kept. Where the former throws, all is as before.
+  // makeTables() prepares other cloths, or none; takeTables() makes them current, with no work of this stage
+  // in flight. Existing kernels are kept. If makeTables() throws, nothing changes.
   void makeTables(std::span<const model::Cloth> cloths);
   void takeTables();
-  // Whether there is a system; nothing below may be called where there is none.
+  // True if there is a system. Otherwise nothing below may be called.
   bool active() const { return systems_ != nullptr; }
 
-  // Its tables, before the first substep with them.
+  // Uploads the tables, before the first substep with them.
   void recordTables(vulkan::Recorder& recorder) const;
-  // One substep of so many seconds whose free motion leads from state `from` to the other; corrects the
-  // latter in place. Begins with a barrier.
+  // Records one substep of `substepSeconds`. The free motion led from state `from` to the other state, which
+  // is corrected in place. Begins with a barrier.
   void record(vulkan::Recorder& recorder, std::uint32_t from, const shared::CollisionPush& collision,
               double substepSeconds) const;
 
-  // Of the tick's last substep, a system: to the CPU, and there once the recording is complete.
+  // Copies the records of the tick's last substep to the CPU, one per system; report() has them once the
+  // recording is complete.
   void recordReport(vulkan::Recorder& recorder) const;
   std::span<const shared::SolveRecord> report() const;
 
@@ -56,8 +58,8 @@ class SolveStage {
   const vulkan::Device& device_;
   StateBuffers state_;
   std::uint32_t workgroupSize_, wholeNodes_;
-  std::unique_ptr<Kernels> kernels_;  // made when they are first needed
-  std::unique_ptr<Systems> systems_;  // null where there are none
+  std::unique_ptr<Kernels> kernels_;  // created at their first use
+  std::unique_ptr<Systems> systems_;  // null if there is no system
   std::unique_ptr<Systems> nextSystems_;
 };
 

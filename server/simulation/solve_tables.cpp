@@ -1,17 +1,16 @@
 // SPDX-License-Identifier: MIT
-// The linear systems of a scene as the kernels read them.
+// Tables of the linear systems of a scene.
 #include "server/simulation/solve_tables.h"
 
 #include <algorithm>
 
 #include "server/model/springs.h"
-#include "server/simulation/halves.h"
 #include "server/simulation/scene_tables.h"
 
 namespace clothstream::simulation {
 namespace {
 
-// The springs that meet at a node of the cloth, two a record.
+// Appends the springs that meet at a node of the cloth, two per record.
 void appendList(std::span<const std::uint32_t> springs, std::span<const model::SpringLink> links,
                 std::uint32_t node, std::uint32_t firstNode, std::vector<shared::SpringEndsRecord>& lists) {
   const auto self = static_cast<float>(firstNode + node);
@@ -21,9 +20,9 @@ void appendList(std::span<const std::uint32_t> springs, std::span<const model::S
     const float number = static_cast<float>(springs[i] + 1) * (isFirstEnd ? 1.0f : -1.0f);
     const auto other = static_cast<float>(firstNode + (isFirstEnd ? link.b : link.a));
     if (i % 2 == 0)
-      lists.push_back({{number, other, 0, self}});
+      lists.push_back({{{number, other}, {0, self}}});
     else
-      lists.back().two.z = number, lists.back().two.w = other;
+      lists.back().ends[1] = {number, other};
   }
 }
 
@@ -31,14 +30,14 @@ void appendMesh(const model::Cloth& cloth, std::size_t number, std::uint32_t fir
   const std::vector<model::SpringLink> links = model::systemLinks(cloth);
   for (const model::SpringLink& link : links)
     tables.springs.push_back(
-        {{static_cast<float>(firstNode + link.a), static_cast<float>(firstNode + link.b), link.restLength,
-          static_cast<float>(CLOTHSTREAM_SPRING_KINDS * number + static_cast<std::size_t>(link.kind))}});
+        {static_cast<float>(firstNode + link.a), static_cast<float>(firstNode + link.b), link.restLength,
+         static_cast<float>(CLOTHSTREAM_SPRING_KINDS * number + static_cast<std::size_t>(link.kind))});
   const model::SpringAdjacency adjacency = model::springAdjacency(links, cloth.nodeCount());
   for (std::uint32_t node = 0; node < cloth.nodeCount(); ++node) {
     const std::size_t first = tables.lists.size();
     appendList(adjacency.of(node), links, node, firstNode, tables.lists);
     const auto listed = static_cast<std::uint32_t>(tables.lists.size() - first);
-    tables.incidences[firstNode + node] = {halves(first, static_cast<float>(listed), 0)};
+    tables.incidences[firstNode + node] = shared::listRecord(first, tables.lists.size());
     tables.listed = std::max(tables.listed, listed);
   }
 }
@@ -57,17 +56,23 @@ void appendSystem(const model::Cloth& cloth, std::size_t number, std::uint32_t f
   if (cloth.mesh) appendMesh(cloth, number, firstNode, tables);
   const std::uint32_t chunks = chunksOf(cloth);
   const auto system = static_cast<float>(tables.systems.size());
-  tables.systems.push_back(
-      {.springs = halves(firstSpring, static_cast<float>(tables.springs.size() - firstSpring),
-                         static_cast<float>(number)),
-       .nodes = {static_cast<float>(firstNode), static_cast<float>(cloth.nodeCount()),
-                 static_cast<float>(cloth.grid.rows), static_cast<float>(cloth.grid.columns)},
-       .chunks = {static_cast<float>(tables.chunks.size()), static_cast<float>(chunks), 0, 0}});
+  tables.systems.push_back({.firstSpringLow = shared::lowHalf(firstSpring),
+                            .firstSpringHigh = shared::highHalf(firstSpring),
+                            .springCount = static_cast<float>(tables.springs.size() - firstSpring),
+                            .cloth = static_cast<float>(number),
+                            .firstNode = static_cast<float>(firstNode),
+                            .nodeCount = static_cast<float>(cloth.nodeCount()),
+                            .rows = static_cast<float>(cloth.grid.rows),
+                            .columns = static_cast<float>(cloth.grid.columns),
+                            .firstChunk = static_cast<float>(tables.chunks.size()),
+                            .chunkCount = static_cast<float>(chunks),
+                            .reserved0 = 0,
+                            .reserved1 = 0});
   for (std::uint32_t chunk = 0; chunk < chunks; ++chunk)
-    tables.chunks.push_back({{system, static_cast<float>(chunk), 0, 0}});
+    tables.chunks.push_back({system, static_cast<float>(chunk), 0, 0});
 }
 
-// All cloths of a group: the small ones or the large ones.
+// Appends the small or the large cloths of a group.
 void appendCloths(std::span<const model::Cloth> cloths, SolveGroup& group, bool large,
                   std::uint32_t wholeNodes, SolveTables& tables) {
   std::uint32_t firstNode = 0;
@@ -90,7 +95,7 @@ void appendCloths(std::span<const model::Cloth> cloths, SolveGroup& group, bool 
 SolveTables solveTables(std::span<const model::Cloth> cloths, std::uint32_t wholeNodes) {
   SolveTables tables;
   for (const model::Cloth& cloth : cloths) tables.nodes += cloth.nodeCount();
-  tables.incidences.resize(tables.nodes, {{0, 0, 0, 0}});
+  tables.incidences.resize(tables.nodes, {0, 0, 0, 0});
   const auto count = [](const auto& table) { return static_cast<std::uint32_t>(table.size()); };
   using enum model::SolverKind;
   for (const model::SolverKind kind : {constraint, acad, implicitEuler})

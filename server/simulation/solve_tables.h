@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The linear systems of a scene as the kernels read them.
+// Tables of the linear systems of a scene.
 #pragma once
 
 #include <cstdint>
@@ -11,34 +11,34 @@
 
 namespace clothstream::simulation {
 
-// Systems that the same kernels solve, one after the other in the tables: first those that one workgroup
-// solves each, then the large ones.
+// Systems that the same kernels solve; they are consecutive in the tables. Systems that one workgroup solves
+// come first, then the large ones.
 struct SolveGroup {
   model::SolverKind kind = model::SolverKind::constraint;
   bool mesh = false;
-  bool bend = false;  // some grid has bend springs in its system
+  bool bend = false;  // a grid has bend springs in its system
   std::uint32_t firstSystem = 0, smallSystems = 0;
   std::uint32_t firstChunk = 0, firstLargeChunk = 0, endChunk = 0;
   std::uint32_t firstSpring = 0, endSpring = 0;  // of meshes
-  std::uint32_t iterations = 0;                  // the most of any
-  std::uint32_t smallChunks = 0;                 // of the largest of the small ones
+  std::uint32_t iterations = 0;                  // the largest of any cloth
+  std::uint32_t smallChunks = 0;                 // of the largest small system
 
   bool hasLarge() const { return firstLargeChunk < endChunk; }
 };
 
 struct SolveTables {
-  std::vector<SolveGroup> groups;  // those that there are
+  std::vector<SolveGroup> groups;  // groups that have systems
   std::vector<shared::SystemRecord> systems;
   std::vector<shared::ChunkRecord> chunks;
-  std::vector<shared::LinkRecord> springs;          // of meshes, in the order of model::springLinks()
-  std::vector<shared::IncidenceRecord> incidences;  // a node of the scene
+  std::vector<shared::LinkRecord> springs;     // of meshes, in the order of model::springLinks()
+  std::vector<shared::ListRecord> incidences;  // by node of the scene: its texels of `lists`
   std::vector<shared::SpringEndsRecord> lists;
   std::uint32_t nodes = 0;   // of the scene
   std::uint32_t listed = 0;  // texels of the longest list
 };
 
-// `wholeNodes`: of the largest cloth that one workgroup solves. Cloths whose systems are assembled are left
-// out (AssembledStage); of meshes, springs between two pinned nodes, where nothing can move.
+// `wholeNodes` is the number of nodes of the largest cloth that one workgroup solves. Cloths with assembled
+// systems are left out (AssembledStage). Springs of meshes between two pinned nodes are left out.
 SolveTables solveTables(std::span<const model::Cloth> cloths, std::uint32_t wholeNodes);
 
 }  // namespace clothstream::simulation

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A kernel that works on one of the two state buffers or the other.
+// A kernel that works on either of the two state buffers.
 #pragma once
 
 #include <array>
@@ -11,7 +11,7 @@
 
 namespace clothstream::simulation {
 
-// Bound for when the state lies in the first of the two buffers and for when it lies in the second.
+// Has bindings for each index of the state buffer that has the state.
 struct Stage {
   using Buffers = std::initializer_list<const vulkan::Buffer*>;
   Stage(const vulkan::Device& device, const vulkan::KernelDescription& description, Buffers first,
@@ -22,7 +22,7 @@ struct Stage {
   Stage& operator=(const Stage&) = delete;
 
   vulkan::Kernel kernel;
-  std::array<vulkan::Bindings, 2> from;  // they point to the kernel
+  std::array<vulkan::Bindings, 2> from;  // they refer to the kernel
 };
 
 }  // namespace clothstream::simulation

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The buffers of a scene that several stages work on.
+// Buffers of a scene that several stages use.
 #pragma once
 
 #include <array>
@@ -8,12 +8,12 @@
 
 namespace clothstream::simulation {
 
-// They outlive the stages. State lies in two by turns.
+// The buffers outlive the stages. The state alternates between two of them.
 struct StateBuffers {
   const vulkan::Buffer& cloths;
-  const vulkan::Buffer& colliders;      // CollisionStage::colliders()
-  const vulkan::Buffer& nearColliders;  // CollisionStage::nearLists()
-  const vulkan::Buffer& toldContacts;   // CollisionStage::toldContacts()
+  const vulkan::Buffer& colliders;        // CollisionStage::colliders()
+  const vulkan::Buffer& nearColliders;    // CollisionStage::nearLists()
+  const vulkan::Buffer& contactImpulses;  // CollisionStage::contactImpulses()
   std::array<const vulkan::Buffer*, 2> positions, velocities;
 };
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The state of a scene on the device, and its ways there and back.
+// The state of a scene on the device, with upload and readback.
 #pragma once
 
 #include <array>
@@ -13,24 +13,24 @@
 
 namespace clothstream::simulation {
 
-// Belongs to the device's thread. The state lies in one of two pairs of buffers by turns; `present` says in
-// which. What is recorded needs a barrier before and after it.
+// Belongs to the device's thread. The state is in one of two alternating pairs of buffers; `present` is the
+// index of the pair. The caller records a barrier before and after each recording.
 class StateMemory {
  public:
   StateMemory(const vulkan::Device& device, std::uint32_t nodes);
 
-  // RGBA32F texels: xyz, and of positions w = 1/kg, 0 for pinned nodes.
+  // RGBA32F texels: xyz; w of positions is the inverse mass, 1/kg, 0 for pinned nodes.
   std::array<vulkan::Buffer, 2> positions, velocities;
   vulkan::Buffer checkpointPositions, checkpointVelocities;
 
-  // What recordUpload() brings: no such upload may be in flight.
+  // Sets the state that recordUpload() uploads. No such upload may be in flight.
   void write(const NodeState& state, std::span<const float> inverseMasses);
-  // It also becomes the checkpoint.
+  // Also sets the checkpoint.
   void recordUpload(vulkan::Recorder& recorder, std::uint32_t present) const;
   void recordCheckpoint(vulkan::Recorder& recorder, std::uint32_t present) const;
   void recordRollback(vulkan::Recorder& recorder, std::uint32_t present) const;
   void recordSave(vulkan::Recorder& recorder, std::uint32_t present);
-  // What was saved last, once that is complete.
+  // The state that was saved last, once that recording is complete.
   NodeState collect() const;
 
  private:
@@ -39,7 +39,7 @@ class StateMemory {
   const vulkan::Device& device_;
   std::uint32_t nodes_;
   vulkan::Buffer upload_;    // positions, then velocities
-  vulkan::Buffer readback_;  // the same; made when a state is first saved
+  vulkan::Buffer readback_;  // the same; created when a state is first saved
 };
 
 }  // namespace clothstream::simulation

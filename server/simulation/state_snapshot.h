@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The state of a scene's nodes outside of the device, exact to the bit, and its hash.
+// The state of a scene's nodes on the CPU, exact to the bit, and its hash.
 #pragma once
 
 #include <cstddef>
@@ -10,32 +10,33 @@
 
 namespace clothstream::simulation {
 
-// Positions and velocities of all nodes. Good for another ClothSimulation of the same scene on any device.
-// bytes: for each node, in order, six little-endian floats: position, velocity.
+// Positions and velocities of all nodes. Usable for another ClothSimulation of the same scene on any device.
+// `bytes` has six little-endian floats per node, in order: position, velocity.
 struct StateSnapshot {
-  std::uint64_t tick = 0;  // the caller's
+  std::uint64_t tick = 0;  // chosen by the caller
   std::vector<std::byte> bytes;
 };
 inline constexpr std::size_t kSnapshotBytesPerNode = 24;
 
-// The same as numbers.
+// The state as numbers.
 struct NodeState {
   std::vector<model::Vec3> positions, velocities;
 };
-// The snapshot must hold whole nodes, the state as many velocities as positions.
+// A snapshot must have whole nodes, and a state as many velocities as positions.
 NodeState unpack(const StateSnapshot& snapshot);
 StateSnapshot pack(const NodeState& state, std::uint64_t tick);
 
-// What the device reports of a tick.
+// Status of a tick.
 struct TickStatus {
   std::uint64_t stateHash = 0;  // of positions and velocities, bits
-  bool healthy = true;          // every component finite, and within kWorldExtent of zero (m; m/s)
-  // Self-collision: how many lists of neighbours were too long, and how often a ball touched too many.
+  bool healthy = true;          // true: every component is finite and within kWorldExtent of zero (m; m/s)
+  // Self-collision: number of lists of neighbours that were too long, plus number of balls that touched too
+  // many others.
   std::uint32_t crowded = 0;
 };
 inline constexpr float kWorldExtent = 8192;
 
-// The status of a state, computed on the CPU: what a device holding the same bits reports.
+// Computes the status of a state on the CPU. A device with the same bits reports the same status.
 TickStatus statusOf(const StateSnapshot& snapshot);
 
 }  // namespace clothstream::simulation

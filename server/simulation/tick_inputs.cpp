@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What a scene by itself brings to a tick.
+// Inputs that the scene itself gives to a tick.
 #include "server/model/wind.h"
 #include "server/simulation/cloth_simulation.h"
 

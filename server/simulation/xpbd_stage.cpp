@@ -19,9 +19,10 @@ using vulkan::kTexels;
 
 constexpr std::uint32_t kAllPasses = 7;
 
-// On a software device barriers cost nothing as long as the workgroup is no wider than the CPU's vectors, and
-// a loop goes round 65,535 times at most. A cloth in one workgroup saves dispatches (a grid two, a mesh one
-// less than it has colours) and leaves all other CPUs idle: on two of them, that turns at about these sizes.
+// On a software device barriers cost nothing if the workgroup is no wider than the CPU's vectors, and an
+// invocation makes at most 65,535 loop rounds. A cloth in one workgroup saves dispatches (two for a grid, one
+// less than the number of colours for a mesh) but leaves all other CPUs idle. With two CPUs the break-even is
+// at about these sizes.
 XpbdCut cutXpbd(const vulkan::Device& device, std::uint32_t workgroupSize,
                 std::optional<std::uint32_t> wholeNodes) {
   const bool software = device.isSoftware();
@@ -42,7 +43,7 @@ std::uint64_t threads(const TileRange& tiles, std::uint32_t workgroupSize) {
   return std::uint64_t{tiles.count} * workgroupSize;
 }
 
-// All of them work on the same positions: each waits for the one before it.
+// All dispatches work on the same positions: each waits for the one before it.
 void dispatch(vulkan::Recorder& recorder, const Bindings& bindings, const auto& push, std::uint64_t threads) {
   recorder.barrier();
   recorder.dispatch(bindings, push, threads);
@@ -53,8 +54,9 @@ void dispatch(vulkan::Recorder& recorder, const Bindings& bindings, const auto& 
 XpbdVariant xpbdVariantOf(std::span<const shared::ClothRecord> cloths, bool colliders) {
   XpbdVariant variant{false, false, colliders};
   for (const shared::ClothRecord& cloth : cloths) {
-    for (const shared::vec4& spring : cloth.springs) variant.damped = variant.damped || spring.y != 0;
-    variant.bend = variant.bend || cloth.springs[2].x != 0;
+    for (const shared::XpbdSpringRecord& spring : cloth.xpbdSprings)
+      variant.damped = variant.damped || spring.damping != 0;
+    variant.bend = variant.bend || cloth.xpbdSprings[2].stretch != 0;
   }
   return variant;
 }
@@ -134,9 +136,9 @@ const Stage& XpbdStage::finish(const XpbdVariant& variant) {
                                 .workgroupSize = cut_.partWorkgroup,
                                 .specialisation = {variant.colliders ? 1u : 0u}},
       Stage::Buffers{&state_.cloths, &tiles_.texels(), one, other, colliders, near, other, otherVelocity,
-                     otherVelocity, &state_.toldContacts},
+                     otherVelocity, &state_.contactImpulses},
       Stage::Buffers{&state_.cloths, &tiles_.texels(), other, one, colliders, near, one, oneVelocity,
-                     oneVelocity, &state_.toldContacts});
+                     oneVelocity, &state_.contactImpulses});
   return *stage;
 }
 
@@ -149,7 +151,7 @@ void XpbdStage::prepare(const XpbdVariant& variant) {
   finish(variant);
 }
 
-// In as many dispatches as the device's limit on loops asks for.
+// Records as many dispatches as the device's limit on loop rounds requires.
 void XpbdStage::recordWhole(vulkan::Recorder& recorder, std::uint32_t from, const XpbdVariant& variant) {
   const std::uint32_t each = std::max(1u, cut_.rounds / std::max(1u, tables_.roundsPerIteration));
   for (std::uint32_t first = 0; first < tables_.wholeIterations; first += each) {

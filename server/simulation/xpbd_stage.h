@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Extended position-based dynamics on the device: after the forces of a substep, springs are corrected in
-// turn.
+// Extended position-based dynamics on the device: after the forces of a substep, it corrects the springs one
+// after the other.
 #pragma once
 
 #include <array>
@@ -20,38 +20,38 @@
 
 namespace clothstream::simulation {
 
-// What the kernels leave out where no cloth has it; the bits are the same.
+// Code that the cloths need. The kernels leave out the rest; the bits are the same.
 struct XpbdVariant {
   bool damped, bend, colliders;
 };
 
-// Of the cloths' records, all of the scene.
+// Variant for the records of all cloths of the scene.
 XpbdVariant xpbdVariantOf(std::span<const shared::ClothRecord> cloths, bool colliders);
 
-// Belongs to the device's thread. A substep of [MMC16]: from where the forces alone would take the nodes, one
-// or more Gauss-Seidel sweeps over the springs in the order of model::springColours(), whose multipliers
-// start from zero; then velocities from how far the nodes have come, and collisions. It has no state of its
-// own.
+// Belongs to the device's thread. A substep of [MMC16] starts from the free motion that the forces alone
+// give. One or more Gauss-Seidel sweeps correct the springs in the order of model::springColours(), with
+// multipliers that start from zero. Then velocities follow from the displacement of the nodes, and the nodes
+// collide. The stage keeps no state between substeps.
 class XpbdStage {
  public:
-  // Some cloth's solver must be xpbd. `workgroupSize` 0, and `wholeNodes` (the largest cloth that one
-  // workgroup corrects) absent: the measured best for the device. Throws std::runtime_error where there is no
-  // room.
+  // At least one cloth must have the solver xpbd. `workgroupSize` 0 and `wholeNodes` absent (nodes of the
+  // largest cloth that one workgroup corrects) mean the measured best for the device. Throws
+  // std::runtime_error if the device has too little memory.
   XpbdStage(const vulkan::Device& device, std::span<const model::Cloth> cloths, const StateBuffers& state,
             std::uint32_t workgroupSize, std::optional<std::uint32_t> wholeNodes);
 
-  // Its tables, once, before the first substep.
+  // Uploads the tables, once, before the first substep.
   void recordTables(vulkan::Recorder& recorder) const;
-  // Makes the kernels of this variant now rather than when they are first needed.
+  // Creates the kernels of this variant now instead of at their first use.
   void prepare(const XpbdVariant& variant);
-  // One substep whose free motion leads from state `from` to the other; corrects the latter in place. Begins
-  // with a barrier.
+  // Records one substep. The free motion led from state `from` to the other state, which is corrected in
+  // place. Begins with a barrier.
   void record(vulkan::Recorder& recorder, std::uint32_t from, const XpbdVariant& variant,
               shared::FinishPush push);
 
  private:
   template <std::size_t count>
-  using Stages = std::array<std::unique_ptr<Stage>, count>;  // made when they are first needed
+  using Stages = std::array<std::unique_ptr<Stage>, count>;  // created at their first use
 
   const Stage& grids(const XpbdVariant& variant, std::uint32_t passes);
   const Stage& meshes(const XpbdVariant& variant, bool whole);

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT
-// The cloths that xpbd moves as its kernels read them.
+// Tables of the cloths with solver xpbd.
 #include "server/simulation/xpbd_tables.h"
 
 #include <algorithm>
+#include <bit>
 #include <cassert>
 
 #include "server/model/spring_colours.h"
@@ -10,7 +11,7 @@
 namespace clothstream::simulation {
 namespace {
 
-// Two parts of a whole number that floats hold exactly.
+// A whole number as two floats that hold its parts exactly.
 struct Parts {
   explicit Parts(std::size_t number)
       : low(static_cast<float>(number & 0xFFFFFF)), high(static_cast<float>(number >> 24)) {}
@@ -21,7 +22,7 @@ std::uint32_t blocksAlong(std::uint32_t nodes) {
   return (nodes + model::kBlock - 1) / model::kBlock;
 }
 
-// Blocks of each pass over a grid.
+// Number of blocks of each pass over a grid.
 std::array<std::uint32_t, kGridPasses> blocksOf(const model::Grid& grid) {
   constexpr std::uint32_t kShift = model::kBlock / 2;
   const std::uint32_t unshifted = blocksAlong(grid.rows) * blocksAlong(grid.columns);
@@ -41,7 +42,7 @@ class XpbdTablesMaker {
   XpbdTables make() {
     const std::vector<std::uint32_t> offsets = clothOffsets(cloths_);
     std::vector<Grid> whole, parts;
-    std::vector<shared::XpbdTile> meshTiles;
+    std::vector<XpbdTile> meshTiles;
     for (std::uint32_t i = 0; i < cloths_.size(); ++i) {
       const model::Cloth& cloth = cloths_[i];
       if (cloth.solver.kind != model::SolverKind::xpbd) continue;
@@ -70,7 +71,8 @@ class XpbdTablesMaker {
     for (std::uint32_t i = 0; i < cloths_.size(); ++i)
       if (cloths_[i].solver.kind == model::SolverKind::xpbd)
         for (std::uint32_t node = 0; node < cloths_[i].nodeCount(); node += cut_.partWorkgroup)
-          tables_.tiles.push_back({{static_cast<float>(i), static_cast<float>(node), 0, 0}});
+          tables_.tiles.push_back(std::bit_cast<XpbdTile>(
+              shared::XpbdNodeTile{static_cast<float>(i), static_cast<float>(node), 0, 0}));
     tables_.nodes = rangeFrom(first);
     return std::move(tables_);
   }
@@ -87,13 +89,13 @@ class XpbdTablesMaker {
 
   void addTile(const Grid& grid, std::uint32_t block) {
     const Parts multiplier(tables_.iterated ? grid.firstMultiplier : 0);
-    tables_.tiles.push_back(
-        {{static_cast<float>(grid.cloth), static_cast<float>(block), multiplier.low, multiplier.high}});
+    tables_.tiles.push_back(std::bit_cast<XpbdTile>(shared::XpbdGridTile{
+        static_cast<float>(grid.cloth), static_cast<float>(block), multiplier.low, multiplier.high}));
   }
 
   std::uint32_t roundsOf(std::uint32_t elements) const { return elements / cut_.wholeWorkgroup + 2; }
 
-  // Whether one workgroup can correct a cloth that takes so many rounds an iteration.
+  // True if one workgroup can correct a cloth that takes `rounds` loop rounds per iteration.
   bool takeWhole(const model::Cloth& cloth, std::uint32_t limit, std::uint32_t rounds) {
     if (cloth.nodeCount() > limit || rounds > cut_.rounds) return false;
     tables_.roundsPerIteration = std::max(tables_.roundsPerIteration, rounds);
@@ -109,7 +111,7 @@ class XpbdTablesMaker {
     return false;
   }
 
-  void addMesh(std::uint32_t number, std::uint32_t firstNode, std::vector<shared::XpbdTile>& tiles) {
+  void addMesh(std::uint32_t number, std::uint32_t firstNode, std::vector<XpbdTile>& tiles) {
     const model::Cloth& cloth = cloths_[number];
     const model::SpringColours colours = model::springColours(cloth);
     const std::vector<std::uint8_t> pinned = model::pinnedNodes(cloth);
@@ -119,9 +121,9 @@ class XpbdTablesMaker {
       const std::size_t first = tables_.links.size();
       for (const model::SpringLink& link : colours.of(colour))
         if (pinned[link.a] == 0 || pinned[link.b] == 0)
-          tables_.links.push_back(
-              {{static_cast<float>(firstNode + link.a), static_cast<float>(firstNode + link.b),
-                link.restLength, static_cast<float>(link.kind)}});
+          tables_.links.push_back({static_cast<float>(firstNode + link.a),
+                                   static_cast<float>(firstNode + link.b), link.restLength,
+                                   static_cast<float>(link.kind)});
       const auto count = static_cast<std::uint32_t>(tables_.links.size() - first);
       if (count == 0) continue;
       mesh.colours.push_back({static_cast<std::uint32_t>(first), count});
@@ -132,11 +134,12 @@ class XpbdTablesMaker {
       tables_.partMeshes.push_back(std::move(mesh));
       return;
     }
-    tiles.push_back({{static_cast<float>(number), static_cast<float>(tables_.colours.size()),
-                      static_cast<float>(mesh.colours.size()), 0}});
+    tiles.push_back(std::bit_cast<XpbdTile>(
+        shared::XpbdMeshTile{static_cast<float>(number), static_cast<float>(tables_.colours.size()),
+                             static_cast<float>(mesh.colours.size()), 0}));
     for (const TileRange& colour : mesh.colours) {
       const Parts first(colour.first);
-      tables_.colours.push_back({{first.low, first.high, static_cast<float>(colour.count), 0}});
+      tables_.colours.push_back({first.low, first.high, static_cast<float>(colour.count), 0});
     }
   }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The cloths that xpbd moves as its kernels read them.
+// Tables of the cloths with solver xpbd.
 #pragma once
 
 #include <array>
@@ -13,42 +13,48 @@
 
 namespace clothstream::simulation {
 
-// Passes of a sweep over a grid: scene/spring_colours.h.
+// Passes of a sweep over a grid: model/spring_colours.h.
 inline constexpr std::size_t kGridPasses = 3;
 
-// How the work is cut; the results do not depend on it.
+// Partition of the work. The results do not depend on it.
 struct XpbdCut {
-  std::uint32_t wholeWorkgroup;  // of a cloth that one workgroup corrects
-  std::uint32_t partWorkgroup;   // of part of a cloth
-  // The largest cloths that one workgroup corrects, nodes.
+  std::uint32_t wholeWorkgroup;  // size for a whole cloth
+  std::uint32_t partWorkgroup;   // size for a part of a cloth
+  // Nodes of the largest cloths that one workgroup corrects.
   std::uint32_t wholeGridNodes, wholeMeshNodes;
-  // Rounds of loops that the device lets an invocation make.
+  // Loop rounds that the device allows an invocation.
   std::uint32_t rounds;
 };
 
+// Bits of a shared::XpbdGridTile, XpbdMeshTile or XpbdNodeTile.
+struct XpbdTile {
+  shared::vec4 bits;
+};
+
 struct XpbdTables {
-  // A mesh whose colours are dispatches of their own.
+  // A mesh with one dispatch per colour.
   struct PartMesh {
     std::uint32_t cloth, iterations;
     std::vector<TileRange> colours;  // of the links
   };
 
-  std::vector<shared::XpbdTile> tiles;
-  TileRange wholeGrids{}, wholeMeshes{}, nodes{};  // of the tiles; nodes: XpbdCut::partWorkgroup each
+  std::vector<XpbdTile> tiles;
+  TileRange wholeGrids{}, wholeMeshes{},
+      nodes{};  // ranges of `tiles`; a tile of `nodes` has XpbdCut::partWorkgroup nodes
   std::array<TileRange, kGridPasses> partGrids{};
   std::vector<shared::ColourRecord> colours;  // of meshes that one workgroup corrects
   std::vector<shared::XpbdLinkRecord> links;  // of all meshes, colour by colour
   std::vector<PartMesh> partMeshes;
-  std::uint32_t partGridIterations = 0;  // the most of any grid in parts, of any cloth as a whole
+  std::uint32_t partGridIterations = 0;  // the largest of any grid in parts
   std::uint32_t wholeIterations = 0;
-  std::uint32_t roundsPerIteration = 0;  // the most of a cloth as a whole
-  std::uint32_t gridMultipliers = 0;     // none where no cloth is swept twice
+  std::uint32_t roundsPerIteration = 0;  // the largest of any whole cloth
+  std::uint32_t gridMultipliers = 0;     // 0 if no cloth is swept twice
   bool iterated = false;
 
   bool empty() const { return tiles.empty(); }
 };
 
-// Springs between two pinned nodes of a mesh are left out: nothing can move there.
+// Springs of a mesh between two pinned nodes are left out, because nothing can move there.
 XpbdTables xpbdTables(std::span<const model::Cloth> cloths, const XpbdCut& cut);
 
 }  // namespace clothstream::simulation

@@ -61,7 +61,7 @@ void SceneHost::begin(Clock::time_point now) {
   const double endSeconds = static_cast<double>(tick_ + 1) * scene_.tickSeconds();
   colliders_.advance(scene_, endSeconds, tickInputs_.colliders);
   holds_.advance(scene_, endSeconds, tickInputs_);
-  tickInputs_.tellsContacts = contacts_.wanted();
+  tickInputs_.reportsContacts = contacts_.wanted();
   tickInputs_.environment = model::environmentAt(scene_, tick_);
 
   SceneOnDevice& on = *onDevice_;
@@ -161,8 +161,7 @@ void SceneHost::changeGently(model::Scene& changed) {
     model::Solver& solver = changed.cloths[i].solver;
     if (solver.kind != scene_.cloths[i].solver.kind)
       gentleUntil_[i] = tick_ + static_cast<std::uint64_t>(std::ceil(kGentleSeconds * rate_));
-    if (gentleUntil_[i] > tick_)
-      solver.correctionFraction = std::min(part, model::correctionFraction(solver));
+    if (gentleUntil_[i] > tick_) solver.correctionFraction = std::min(part, model::correctionFraction(solver));
   }
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Quantiles from bins on a logarithmic axis.
+// Histograms and quantiles, with Boost.Histogram.
 #include "server/telemetry/histogram.h"
 
 #include <algorithm>
@@ -18,7 +18,7 @@ namespace {
 namespace bh = boost::histogram;
 
 constexpr double kShortest = 1e-6, kLongest = 1e3;
-constexpr unsigned kBinsADecade = 48, kDecades = 9;
+constexpr unsigned kBinsPerDecade = 48, kDecades = 9;
 
 using Axis = bh::axis::regular<double, bh::axis::transform::log>;
 using Storage = bh::dense_storage<bh::accumulators::thread_safe<std::uint64_t>>;
@@ -27,7 +27,7 @@ using Storage = bh::dense_storage<bh::accumulators::thread_safe<std::uint64_t>>;
 
 struct Histogram::Bins {
   bh::histogram<std::tuple<Axis>, Storage> counts =
-      bh::make_histogram_with(Storage(), Axis(kBinsADecade* kDecades, kShortest, kLongest));
+      bh::make_histogram_with(Storage(), Axis(kBinsPerDecade* kDecades, kShortest, kLongest));
   std::atomic<double> max{0};
 };
 
@@ -43,8 +43,8 @@ void Histogram::record(double seconds) {
 
 Summary Histogram::summary() const {
   const Axis& axis = bins_->counts.axis();
-  // A copy, so that all quantiles speak of the same records while others go on recording. Bin -1 and the last
-  // one hold what lies outside the axis.
+  // Copying the counts takes a snapshot while other threads record. Bin -1 and the last bin count values
+  // outside the axis.
   std::vector<std::uint64_t> counts;
   for (int bin = -1; bin <= axis.size(); ++bin) counts.push_back(bins_->counts.at(bin).load());
 

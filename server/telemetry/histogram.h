@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// How long something took, over many times: quantiles from bins on a logarithmic axis.
+// Histograms of durations, with quantiles from bins on a logarithmic axis.
 #pragma once
 
 #include <cstdint>
@@ -12,15 +12,15 @@
 
 namespace clothstream::telemetry {
 
-// Seconds.
+// Times in seconds. All are 0 if nothing was recorded.
 struct Summary {
   std::uint64_t count = 0;
   double p50 = 0, p90 = 0, p99 = 0, max = 0;
 };
 
-// Thread-safe, without locks; memory is taken once. From 1 microsecond to 1,000 seconds (what lies outside
-// counts to the ends) with 48 bins a decade, so that a quantile is within 5 % of its true value; the maximum
-// is exact.
+// Thread-safe without locks; allocates only when constructed. Range: 1 microsecond to 1,000 seconds; values
+// outside count in the first or the last bin. 48 bins per decade keep a quantile within 5 % of its true
+// value. The maximum is exact.
 class Histogram {
  public:
   Histogram();
@@ -29,6 +29,7 @@ class Histogram {
   Histogram& operator=(const Histogram&) = delete;
 
   void record(double seconds);
+  // Quantiles and count belong to one snapshot, also while other threads record.
   Summary summary() const;
 
  private:
@@ -36,10 +37,10 @@ class Histogram {
   std::unique_ptr<Bins> bins_;
 };
 
-// A histogram for each name, in order of first appearance. Thread-safe; memory is taken when a name is new.
+// One histogram per stage, in the order of their first records. Thread-safe; allocates when a stage is new.
 class StageHistograms {
  public:
-  // `stage` in static storage.
+  // `stage` must have static storage duration.
   void record(std::string_view stage, double seconds);
   std::vector<std::pair<std::string_view, Summary>> summaries() const;
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Sets spdlog's default logger up.
+// Creates the default logger.
 #include "server/telemetry/log.h"
 
 #include <stdexcept>
@@ -11,12 +11,12 @@ namespace clothstream::telemetry {
 
 void setUpLog(const std::string& level) {
   const spdlog::level::level_enum parsed = spdlog::level::from_str(level);
-  // from_str answers `off` to what it does not know.
+  // from_str() returns `off` for unknown names.
   if (parsed == spdlog::level::off && level != "off")
-    throw std::invalid_argument("log level '" + level +
-                                "' is none of trace, debug, info, warning, error, off");
+    throw std::invalid_argument("'" + level +
+                                "' is not a log level; use trace, debug, info, warning, error or off");
 
-  // Replacing the logger, not its sink, lets tests do it more than once.
+  // A new logger, instead of a new sink, allows repeated calls in tests.
   auto logger = std::make_shared<spdlog::logger>("", std::make_shared<spdlog::sinks::stderr_color_sink_mt>());
   logger->set_level(parsed);
   logger->set_pattern("%H:%M:%S.%e %^%l%$ %v");

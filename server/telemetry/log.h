@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT
-// The log: lines on standard error through spdlog's default logger.
+// Configures spdlog's default logger, which writes lines to standard error.
 #pragma once
 
 #include <string>
 
 namespace clothstream::telemetry {
 
-// `level` is one of trace, debug, info, warning, error, off. Throws std::invalid_argument that names them
-// otherwise. Colours where standard error is a terminal. Flushed at every warning.
+// `level` is trace, debug, info, warning, error or off; otherwise throws std::invalid_argument. Lines are
+// coloured if standard error is a terminal. Every warning and error is flushed at once.
 void setUpLog(const std::string& level);
 
 }  // namespace clothstream::telemetry

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The table of metrics for people.
+// Formats metrics as text.
 #include "server/telemetry/metrics.h"
 
 #include <initializer_list>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What is counted and timed of a scene and of the server, and its table for people.
+// Counters and timings of scenes and of the server, and their report as text.
 #pragma once
 
 #include <atomic>
@@ -10,7 +10,7 @@
 
 namespace clothstream::telemetry {
 
-// Thread-safe.
+// Thread-safe, without ordering between counters.
 class Counter {
  public:
   void add(std::uint64_t amount = 1) { value_.fetch_add(amount, std::memory_order_relaxed); }
@@ -20,47 +20,46 @@ class Counter {
   std::atomic<std::uint64_t> value_{0};
 };
 
-// All of it is recorded by whoever sees it happen, and read at any time.
+// Any thread may record and read. "Per subscriber" counts an event once for each subscriber that it concerns.
 struct SceneMetrics {
-  // Seconds.
-  Histogram tick;          // from a tick's start to its status on the CPU
-  Histogram lateness;      // of a tick's start behind its due time
-  Histogram deviceTotal;   // on the device, all stages of a tick
-  StageHistograms device;  // on the device, each stage
-  Histogram
-      encode;  // from the tick's completion on the device to the packet, entropy coding and waiting for it
-  Histogram send;           // from the packet to a endpoint taking it
-  Histogram inputToPacket;  // from a pose's arrival to the packet that shows its effect
+  // Times in seconds.
+  Histogram tick;          // from the start of a tick to its status on the CPU
+  Histogram lateness;      // start of a tick behind its due time
+  Histogram deviceTotal;   // all stages of a tick on the device
+  StageHistograms device;  // each stage of a tick on the device
+  Histogram encode;  // from the end of a tick on the device to its packet, with the wait for entropy coding
+  Histogram send;    // from the packet to the moment an endpoint takes it
+  Histogram inputToPacket;  // from the arrival of a pose to the packet that shows its effect
 
   Counter ticks;
-  Counter lateTicks;         // started more than a quarter of a tick behind
-  Counter slippedTicks;      // by which simulated time fell behind real time
-  Counter frames;            // packets made
-  Counter keyFrames;         // of these
-  Counter packetBytes;       // of these, counted once whoever listens
-  Counter skippedFrames;     // not recorded, each quality's: the encoder was behind
-  Counter framesTaken;       // by endpoints, each subscriber's
-  Counter framesDropped;     // not sent to a subscriber that was behind, each subscriber's
-  Counter framesThinned;     // of temporal layers that a subscriber is not sent, each subscriber's
-  Counter stepsDown;         // of subscribers to fewer layers or a coarser quality
-  Counter stepsUp;           // and back
-  Counter rollbacks;         // to the last good state
-  Counter resets;            // to the start
-  Counter crowdedBalls;      // of self-collision: lists too long, and balls that touch too many others
-  Counter rejectedMessages;  // answered by an Error
+  Counter lateTicks;         // ticks that started more than a quarter of a period late
+  Counter slippedTicks;      // ticks by which simulated time fell behind real time
+  Counter frames;            // packets encoded
+  Counter keyFrames;         // packets that are key frames
+  Counter packetBytes;       // bytes of all packets; subscribers do not multiply them
+  Counter skippedFrames;     // frames not encoded because the encoder was behind, per quality
+  Counter framesTaken;       // frames taken by endpoints, per subscriber
+  Counter framesDropped;     // frames not sent because the subscriber was behind, per subscriber
+  Counter framesThinned;     // frames of temporal layers that the subscriber skips, per subscriber
+  Counter stepsDown;         // subscribers moved to fewer layers or a coarser quality
+  Counter stepsUp;           // subscribers moved to more layers or a finer quality
+  Counter rollbacks;         // returns to the last good state
+  Counter resets;            // returns to the initial state
+  Counter crowdedBalls;      // self-collision: full neighbour lists, and balls with too many contacts
+  Counter rejectedMessages;  // messages answered by an Error
   Counter joins;
 };
 
 struct ServerMetrics {
   Counter connections;
   Counter refusedConnections;
-  Counter droppedConnections;  // silent, too slow, or abusive
-  Counter rejectedMessages;    // answered by an Error before joining
+  Counter droppedConnections;  // connections closed because they were silent, too slow or abusive
+  Counter rejectedMessages;    // messages answered by an Error before the client joined
   Counter deviceRebuilds;
 };
 
-// One line a histogram (count, p50, p90, p99, maximum in milliseconds) and one line of counters; stages that
-// never happened are left out.
+// One line per histogram (count, p50, p90, p99 and maximum in milliseconds), then lines of counters.
+// Histograms without records are left out.
 std::string table(const std::string& scene, const SceneMetrics& metrics);
 std::string table(const ServerMetrics& metrics);
 

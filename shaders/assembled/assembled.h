@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Tables and push constants of the kernels that assemble the constraints' system, laid out alike in C++ and
-// in GLSL's std430.
+// Tables and push constants of the kernels that assemble the system matrix of constraints. C++ and GLSL use
+// the same layout.
 #ifndef CLOTHSTREAM_SHADERS_ASSEMBLED_ASSEMBLED_H
 #define CLOTHSTREAM_SHADERS_ASSEMBLED_ASSEMBLED_H
 
@@ -9,33 +9,41 @@
 
 CLOTHSTREAM_SHARED_BEGIN
 
-// Read as texels of four floats, as the tables of simulation.h are; here whole numbers are all below 2^24.
-// Rows are those of all systems together, one a constraint: shared::LinkRecord.
+// Whole numbers in these tables are below 2^24. Rows count through all systems, one per constraint
+// (shared::LinkRecord).
 
-// Rows that a lane of a chunk has, CLOTHSTREAM_SOLVE_LANES apart.
+// Rows that a lane of a chunk has; they are CLOTHSTREAM_SOLVE_LANES apart.
 #define CLOTHSTREAM_ASSEMBLED_LANE_ROWS 4
 #define CLOTHSTREAM_ASSEMBLED_CHUNK_ROWS (CLOTHSTREAM_ASSEMBLED_LANE_ROWS * CLOTHSTREAM_SOLVE_LANES)
 
-// One cloth's system.
+// The system of one cloth.
 struct AssembledSystemRecord {
-  vec4 rows;  // cloth; first row, one past the last; first chunk
+  float cloth;
+  float firstRow;
+  float endRow;
+  float firstChunk;
 };
 
-// A workgroup of most of these kernels. Every system has one.
+// A workgroup of most of these kernels. Every system has at least one.
 struct AssembledChunkRecord {
-  vec4 part;  // system, which of its chunks, how many it has
+  float system;
+  float chunk;       // in the system
+  float chunkCount;  // of the system
+  float reserved;
 };
 
-// Where the entries of a row of the system matrix are listed, or those of a column of J.
+// The texels that list the entries of a row of the system matrix, or of a column of J.
 struct EntriesRecord {
-  vec4 range;  // first texel, one past the last
+  float firstTexel;
+  float endTexel;
+  float reserved0, reserved1;
 };
 
 // Four entries of a list.
 //
-// Of a row of the system matrix, one table has the columns, one what the entries are made of: 2 p + q where
-// the p-th node of the row is the q-th of the column, CLOTHSTREAM_DIAGONAL, or CLOTHSTREAM_NO_ENTRY, which
-// fills the last texel. Of a column of J: 2 row + p, or -1.
+// A row of the system matrix has two such lists. One names the columns. The other says what each entry is
+// made of: 2 p + q if node p of the row is node q of the column, CLOTHSTREAM_DIAGONAL, or
+// CLOTHSTREAM_NO_ENTRY, which fills the last texel. A column of J has one list: 2 row + p, or -1.
 struct NumbersRecord {
   vec4 four;
 };
@@ -44,7 +52,10 @@ struct NumbersRecord {
 
 // A workgroup of the kernel that moves the nodes.
 struct NodeRangeRecord {
-  vec4 part;  // cloth; in the scene: first node, one past the last
+  float cloth;
+  float firstNode;  // in the scene
+  float endNode;
+  float reserved;
 };
 
 struct AssemblePush {
@@ -53,11 +64,11 @@ struct AssemblePush {
 
 struct MultiplierPush {
   uint32_t rows;            // of all systems
-  uint32_t firstSystem;     // where one workgroup solves a system
+  uint32_t firstSystem;     // if one workgroup solves a system
   uint32_t firstIteration;  // of this dispatch
   uint32_t endIteration;
-  uint32_t firstChunk;  // where several do
-  uint32_t measures;    // whether to say what is left after the last iteration: a product more
+  uint32_t firstChunk;  // if several workgroups solve a system
+  uint32_t measures;    // 1: one more product measures the residual after the last iteration
 };
 
 struct ApplyMultiplierPush {
@@ -74,6 +85,55 @@ static_assert(sizeof(AssembledSystemRecord) == 16 && sizeof(AssembledChunkRecord
               sizeof(EntriesRecord) == 16 && sizeof(NumbersRecord) == 16 && sizeof(NodeRangeRecord) == 16);
 static_assert(sizeof(AssemblePush) == 4 && sizeof(MultiplierPush) == 24 && sizeof(ApplyMultiplierPush) == 48);
 }  // namespace clothstream::shared
+#else
+
+AssembledSystemRecord assembledSystemAt(samplerBuffer table, uint number) {
+  vec4 texel = texelFetch(table, int(number));
+  return AssembledSystemRecord(CLOTHSTREAM_FLOATS(texel));
+}
+
+AssembledChunkRecord assembledChunkAt(samplerBuffer table, uint number) {
+  vec4 texel = texelFetch(table, int(number));
+  return AssembledChunkRecord(CLOTHSTREAM_FLOATS(texel));
+}
+
+EntriesRecord entriesAt(samplerBuffer table, uint number) {
+  vec4 texel = texelFetch(table, int(number));
+  return EntriesRecord(CLOTHSTREAM_FLOATS(texel));
+}
+
+NodeRangeRecord nodeRangeAt(samplerBuffer table, uint number) {
+  vec4 texel = texelFetch(table, int(number));
+  return NodeRangeRecord(CLOTHSTREAM_FLOATS(texel));
+}
+
+// The state of a row; the other texel of the row has A r as its first component.
+struct RowState {
+  float residual;    // r
+  float direction;   // p
+  float image;       // A p
+  float multiplier;  // lambda
+};
+
+RowState rowStateFrom(vec4 texel) {
+  return RowState(CLOTHSTREAM_FLOATS(texel));
+}
+
+vec4 texelFrom(RowState state) {
+  return vec4(state.residual, state.direction, state.image, state.multiplier);
+}
+
+// One of the two blocks of a row of J.
+struct JacobianBlock {
+  vec3 gradient;
+  float inverseMass;  // of the column's node
+};
+
+JacobianBlock jacobianBlockAt(samplerBuffer table, uint number) {
+  vec4 texel = texelFetch(table, int(number));
+  return JacobianBlock(CLOTHSTREAM_VECTOR(texel));
+}
+
 #endif
 
 #endif

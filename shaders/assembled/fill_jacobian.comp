@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// J at the substep's start, in CSR with a block of three numbers an entry, and b; [Va21] Alg. 2. One chunk a
-// workgroup; every row belongs to one invocation.
+// Computes J at the substep's start, in CSR format with a block of three numbers per entry, and b; [Va21]
+// Alg. 2. A workgroup handles one chunk; every row belongs to one invocation.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 
@@ -8,9 +8,9 @@
 
 layout(binding = 3) uniform samplerBuffer links;       // LinkRecord
 layout(binding = 4) uniform samplerBuffer positions;   // at the substep's start; w: inverse mass
-layout(binding = 5) uniform samplerBuffer velocities;  // those that the forces alone give
+layout(binding = 5) uniform samplerBuffer velocities;  // of the free motion
 layout(std430, binding = 6) writeonly buffer Blocks {
-  vec4 blocks[];  // two a row; w: the inverse mass of the column's node
+  vec4 blocks[];  // JacobianBlock, two per row
 };
 layout(std430, binding = 7) writeonly buffer Vectors {
   vec4 vectors[];
@@ -23,41 +23,41 @@ layout(push_constant) uniform Push {
   AssemblePush push;
 };
 
-void fillRow(uint row, float takenBack) {
-  vec4 link = texelFetch(links, int(row));
-  vec4 a = texelFetch(positions, int(link.x));
-  vec4 b = texelFetch(positions, int(link.y));
+void fillRow(uint row, float correctionFraction) {
+  LinkRecord link = linkAt(links, row);
+  vec4 a = texelFetch(positions, int(link.a));
+  vec4 b = texelFetch(positions, int(link.b));
   precise vec3 d = b.xyz - a.xyz;
   precise float squared = max(dotProduct(d, d), 1e-12);
   float inverseLength = reciprocalSquareRoot(squared);
   precise vec3 direction = inverseLength * d;
-  precise vec3 relative = texelFetch(velocities, int(link.y)).xyz - texelFetch(velocities, int(link.x)).xyz;
-  precise float excess = takenBack * (squared * inverseLength - link.z);
+  precise vec3 relative = texelFetch(velocities, int(link.b)).xyz - texelFetch(velocities, int(link.a)).xyz;
+  precise float excess = correctionFraction * (squared * inverseLength - link.restLength);
   precise float side = push.substepRate * excess + dotProduct(direction, relative);
   blocks[2 * row] = vec4(-direction, a.w);
   blocks[2 * row + 1] = vec4(direction, b.w);
-  vectors[row] = vec4(side, 0.0, 0.0, 0.0);
+  vectors[row] = texelFrom(RowState(side, 0.0, 0.0, 0.0));
 }
 
 void main() {
-  vec4 part = texelFetch(chunks, int(gl_WorkGroupID.x));
-  System system = systemAt(uint(part.x));
-  uint chunk = uint(part.y);
-  float takenBack = texelFetch(cloths, system.cloth + 6).y;
+  AssembledChunkRecord part = assembledChunkAt(chunks, gl_WorkGroupID.x);
+  System system = systemAt(uint(part.system));
+  uint chunk = uint(part.chunk);
+  float correctionFraction = clothAt(cloths, system.cloth).correctionFraction;
   uint lane = self();
   do {
     uint k = 0;
     do {
       uint row = rowAt(system, chunk, k, lane);
       if (row < system.endRow) {
-        fillRow(row, takenBack);
+        fillRow(row, correctionFraction);
       }
       ++k;
     } while (k < kLaneRows);
     lane += width();
   } while (lane < kLanes);
   if (chunk == 0 && self() == 0) {
-    solves[system.number] =
-        SolveRecord(0, 0.0, system.endRow - system.firstRow, 1, 0.0, 0.0, 0.0, 0.0, uint(part.z) << 16);
+    solves[system.number] = SolveRecord(0, 0.0, system.endRow - system.firstRow, 1, 0.0, 0.0, 0.0, 0.0,
+                                        uint(part.chunkCount) << 16);
   }
 }

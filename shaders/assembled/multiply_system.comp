@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// The system matrix times the residuals, a chunk a workgroup, and the dot products of an iteration of
-// conjugate gradients. Whichever workgroup of a system ends last adds up the chunks' sums, in their order.
+// Multiplies the system matrix by the residuals and computes the dot products of an iteration of conjugate
+// gradients. A workgroup handles one chunk. The workgroup of a system that ends last adds up the chunks' sums
+// in their order.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 
@@ -9,12 +10,12 @@
 shared bool last;
 
 void main() {
-  vec4 part = texelFetch(chunks, int(push.firstChunk + gl_WorkGroupID.x));
-  System system = systemAt(uint(part.x));
+  AssembledChunkRecord part = assembledChunkAt(chunks, push.firstChunk + gl_WorkGroupID.x);
+  System system = systemAt(uint(part.system));
   if (solves[system.number].running == 0) {
     return;
   }
-  multiplyChunk(system, uint(part.y));
+  multiplyChunk(system, uint(part.chunk));
   if (self() == 0) {
     memoryBarrierBuffer();
     uint before = atomicAdd(solves[system.number].arrived, 1);
@@ -23,6 +24,6 @@ void main() {
   barrier();
   if (last) {
     memoryBarrierBuffer();
-    takeSums(system, uint(part.z), push.measures != 0);
+    takeSums(system, uint(part.chunkCount), push.measures != 0);
   }
 }

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: MIT
-// The constraints' system as sparse matrices, [Va21] 3.2.2, and how its rows are cut: what the kernels share.
+// The constraints' system as sparse matrices, [Va21] 3.2.2, and the partition of its rows among invocations.
 //   (J M^-1 J^T + c) lambda = b,   u = -M^-1 J^T lambda                                       [Va21] Eq. 3-11
-// where u is what the velocities of the nodes change by.
+// where u is the change of the nodes' velocities.
 //
-// Rows are cut into chunks of kLanes lanes of kLaneRows rows each. Dot products add up along a lane, then the
-// lanes of a chunk in a tree, then the chunks in lanes and a tree: nothing of that depends on the device, on
-// the workgroup's size, or on who does which chunk. Loops over lanes and chunks test last (shaders/solve).
+// A chunk has kLanes lanes of kLaneRows rows each. Dot products add up along a lane, then the lanes of a
+// chunk in a tree, then the chunks in lanes and a tree. This order does not depend on the device, on the
+// workgroup's size, or on which workgroup handles which chunk. Loops over lanes and chunks test last
+// (shaders/solve/linear_system.glsl).
 #ifndef CLOTHSTREAM_SHADERS_ASSEMBLED_ROWS_GLSL
 #define CLOTHSTREAM_SHADERS_ASSEMBLED_ROWS_GLSL
 
@@ -22,23 +23,23 @@ layout(binding = 2) uniform samplerBuffer chunks;   // AssembledChunkRecord
 
 const uint kLaneRows = CLOTHSTREAM_ASSEMBLED_LANE_ROWS;
 
-// The vectors of conjugate gradients, two texels a row which lie apart. A state is the residual r, direction
-// p, A p and lambda; a product is A r.
+// The vectors of conjugate gradients: two texels per row, in two halves of the buffer.
 const uint kStates = 0, kProducts = 1;
 
 struct System {
   uint number;
-  int cloth;  // first texel of its record
+  uint cloth;
   uint firstRow, endRow;
   uint firstChunk;
 };
 
 System systemAt(uint number) {
-  vec4 rows = texelFetch(systems, int(number));
-  return System(number, CLOTHSTREAM_CLOTH_TEXELS * int(rows.x), uint(rows.y), uint(rows.z), uint(rows.w));
+  AssembledSystemRecord record = assembledSystemAt(systems, number);
+  return System(number, uint(record.cloth), uint(record.firstRow), uint(record.endRow),
+                uint(record.firstChunk));
 }
 
-// At or past the system's end where the lane has no such row.
+// Row `k` of a lane. It is at or past the system's end if the lane has no such row.
 uint rowAt(System system, uint chunk, uint k, uint lane) {
   return system.firstRow + (chunk * kLaneRows + k) * kLanes + lane;
 }

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT
-// A solve by conjugate gradients, one workgroup a cloth, as many iterations in a dispatch as the device lets
-// it. The same bits as by multiply_system.comp and update_multipliers.comp in turn.
+// Solves by conjugate gradients, one workgroup per cloth, with as many iterations per dispatch as the device
+// allows. It gives the same bits as alternating multiply_system.comp and update_multipliers.comp.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 
 #include "shaders/assembled/multipliers.glsl"
 
-// A r, and whether to go on.
-void multiply(System system, uint count, bool norm) {
+// Computes A r and decides whether to continue.
+void multiply(System system, uint count, bool normOnly) {
   uint chunk = 0;
   do {
     multiplyChunk(system, chunk);
@@ -15,14 +15,14 @@ void multiply(System system, uint count, bool norm) {
   } while (chunk < count);
   memoryBarrier();
   barrier();
-  takeSums(system, count, norm);
+  takeSums(system, count, normOnly);
   memoryBarrier();
   barrier();
 }
 
 void main() {
   System system = systemAt(push.firstSystem + gl_WorkGroupID.x);
-  uint count = uint(texelFetch(chunks, int(system.firstChunk)).z);
+  uint count = uint(assembledChunkAt(chunks, system.firstChunk).chunkCount);
   uint iteration = push.firstIteration;
   SolveRecord solve = solves[system.number];
   if (solve.running == 0) {

@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: MIT
-// The step of an iteration of conjugate gradients, a chunk a workgroup.
+// Takes the step of an iteration of conjugate gradients; a workgroup handles one chunk.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 
 #include "shaders/assembled/multipliers.glsl"
 
 void main() {
-  vec4 part = texelFetch(chunks, int(push.firstChunk + gl_WorkGroupID.x));
-  System system = systemAt(uint(part.x));
+  AssembledChunkRecord part = assembledChunkAt(chunks, push.firstChunk + gl_WorkGroupID.x);
+  System system = systemAt(uint(part.system));
   SolveRecord solve = solves[system.number];
   if (solve.running != 0) {
-    updateChunk(system, uint(part.y), solve);
+    updateChunk(system, uint(part.chunk), solve);
   }
 }

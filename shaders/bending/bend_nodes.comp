@@ -1,18 +1,19 @@
 // SPDX-License-Identifier: MIT
-// The velocity that the hinges round a node give it in a substep, before everything else moves it.
+// Adds the velocity that the hinges at a node give it in a substep. Bending comes before everything else in a
+// substep.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 
 #include "shaders/bending/bending.h"
 #include "shaders/shared/arithmetic.glsl"
-#include "shaders/shared/whole_number.glsl"
+#include "shaders/shared/whole_number.h"
 
 layout(local_size_x_id = 0) in;
 
-layout(binding = 0) uniform samplerBuffer incidences;  // HingeListRecord
-layout(binding = 1) uniform samplerBuffer lists;
-layout(binding = 2) uniform samplerBuffer forces;     // four a hinge
-layout(binding = 3) uniform samplerBuffer positions;  // w: inverse mass
+layout(binding = 0) uniform samplerBuffer incidences;  // ListRecord by node
+layout(binding = 1) uniform samplerBuffer lists;       // HingeNumbers
+layout(binding = 2) uniform samplerBuffer forces;      // four per hinge
+layout(binding = 3) uniform samplerBuffer positions;   // w: inverse mass
 layout(std430, binding = 4) buffer Velocities {
   vec4 velocities[];
 };
@@ -32,21 +33,19 @@ void main() {
   if (node >= push.count) {
     return;
   }
-  vec4 list = texelFetch(incidences, int(node));
+  TexelRange list = rangeOf(listAt(incidences, node));
   float inverseMass = texelFetch(positions, int(node)).w;
-  if (list.z == 0.0 || inverseMass == 0.0) {
+  if (list.first == list.end || inverseMass == 0.0) {
     return;
   }
-  int texel = int(wholeNumber(list.x, list.y));
-  int end = texel + int(list.z);
   precise vec3 sum = vec3(0.0);
-  while (texel < end) {
-    vec4 four = texelFetch(lists, texel);
+  while (list.first < list.end) {
+    vec4 four = texelFetch(lists, list.first);
     sum = sum + forceOf(four.x);
     sum = sum + forceOf(four.y);
     sum = sum + forceOf(four.z);
     sum = sum + forceOf(four.w);
-    ++texel;
+    ++list.first;
   }
   precise vec3 velocity = velocities[node].xyz + (push.substepSeconds * inverseMass) * sum;
   velocities[node].xyz = snapTiny(velocity);

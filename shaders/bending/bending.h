@@ -1,31 +1,53 @@
 // SPDX-License-Identifier: MIT
-// Tables of the kernels of dihedral bending, laid out alike in C++ and in GLSL's std430.
+// Tables of the kernels of dihedral bending. C++ and GLSL use the same layout.
 #ifndef CLOTHSTREAM_SHADERS_BENDING_BENDING_H
 #define CLOTHSTREAM_SHADERS_BENDING_BENDING_H
 
 #include "shaders/shared/types.h"
+#include "shaders/shared/whole_number.h"
 
 CLOTHSTREAM_SHARED_BEGIN
 
-// Read as texels of four floats, in which whole numbers are exact below 2^24.
-
+// model::Hinge: two triangles that share an edge.
 #define CLOTHSTREAM_HINGE_TEXELS 2
 struct HingeRecord {
-  vec4 nodes;  // of the scene: the edge's two, then those opposite of it
-  vec4 rest;   // weight, bent, least square of a normal as model::Hinge has them; the cloth
+  float edgeStart;  // nodes in the scene
+  float edgeEnd;
+  float firstOpposite;
+  float secondOpposite;
+
+  float weight;
+  float restBent;
+  float leastSquare;  // m^4, lower bound of a normal's square
+  float cloth;
 };
 
-// Of a node: the texels that name its hinges' forces. Each has up to four numbers: four times a hinge plus
-// the node's place in it, plus one; 0: none.
-struct HingeListRecord {
-  vec4 list;  // the first modulo 2^16, the first / 2^16, how many
+// The forces on a node: four numbers per texel. A number is four times a hinge, plus the node's place in the
+// hinge, plus one; 0 fills the last texel. ListRecord says where the texels of a node are.
+struct HingeNumbers {
+  vec4 four;
 };
 
 struct BendingPush {
-  uint32_t count;  // of hinges, or of nodes
+  uint32_t count;  // of hinges or nodes
   float substepSeconds;
 };
 
 CLOTHSTREAM_SHARED_END
+
+#ifdef __cplusplus
+namespace clothstream::shared {
+static_assert(sizeof(HingeRecord) == CLOTHSTREAM_HINGE_TEXELS * sizeof(vec4) && sizeof(HingeNumbers) == 16);
+}  // namespace clothstream::shared
+#else
+
+HingeRecord hingeAt(samplerBuffer table, uint number) {
+  int first = CLOTHSTREAM_HINGE_TEXELS * int(number);
+  vec4 nodes = texelFetch(table, first);
+  vec4 rest = texelFetch(table, first + 1);
+  return HingeRecord(CLOTHSTREAM_FLOATS(nodes), CLOTHSTREAM_FLOATS(rest));
+}
+
+#endif
 
 #endif

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The forces of a hinge on its four nodes, as scene::HingeShape says.
+// Computes the forces of a hinge on its four nodes: model::HingeShape.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 
@@ -13,14 +13,14 @@ layout(binding = 0) uniform samplerBuffer cloths;  // ClothRecord
 layout(binding = 1) uniform samplerBuffer hinges;  // HingeRecord
 layout(binding = 2) uniform samplerBuffer positions;
 layout(std430, binding = 3) writeonly buffer Forces {
-  vec4 forces[];  // four a hinge
+  vec4 forces[];  // four per hinge
 };
 
 layout(push_constant) uniform Push {
   BendingPush push;
 };
 
-// Below this |n1 + n2|^2 of unit normals the faces lie on each other.
+// Least |n1 + n2|^2 of the unit normals; below it the faces lie on each other.
 const float kFolded = 1e-6;
 
 void main() {
@@ -28,13 +28,12 @@ void main() {
   if (hinge >= push.count) {
     return;
   }
-  vec4 nodes = texelFetch(hinges, int(hinge) * CLOTHSTREAM_HINGE_TEXELS);
-  vec4 rest = texelFetch(hinges, int(hinge) * CLOTHSTREAM_HINGE_TEXELS + 1);
-  float rigidity = texelFetch(cloths, int(rest.w) * CLOTHSTREAM_CLOTH_TEXELS + 6).w;
-  vec3 a = texelFetch(positions, int(nodes.x)).xyz;
-  vec3 b = texelFetch(positions, int(nodes.y)).xyz;
-  vec3 c = texelFetch(positions, int(nodes.z)).xyz;
-  vec3 d = texelFetch(positions, int(nodes.w)).xyz;
+  HingeRecord record = hingeAt(hinges, hinge);
+  float rigidity = clothAt(cloths, uint(record.cloth)).bendingRigidity;
+  vec3 a = texelFetch(positions, int(record.edgeStart)).xyz;
+  vec3 b = texelFetch(positions, int(record.edgeEnd)).xyz;
+  vec3 c = texelFetch(positions, int(record.firstOpposite)).xyz;
+  vec3 d = texelFetch(positions, int(record.secondOpposite)).xyz;
 
   precise vec3 edge = b - a;
   precise vec3 ac = a - c;
@@ -46,8 +45,8 @@ void main() {
   precise vec3 along = inverseLength * edge;
   vec3 first = crossProduct(ac, bc);
   vec3 second = crossProduct(bd, ad);
-  float inverse1 = reciprocalSquareRoot(max(dotProduct(first, first), rest.z));
-  float inverse2 = reciprocalSquareRoot(max(dotProduct(second, second), rest.z));
+  float inverse1 = reciprocalSquareRoot(max(dotProduct(first, first), record.leastSquare));
+  float inverse2 = reciprocalSquareRoot(max(dotProduct(second, second), record.leastSquare));
   precise vec3 n1 = inverse1 * first;
   precise vec3 n2 = inverse2 * second;
   precise vec3 sum = n1 + n2;
@@ -55,12 +54,16 @@ void main() {
   precise vec3 h2 = inverse2 * n2;
   precise float sine = dotProduct(crossProduct(n2, n1), along);
   precise float bent = (2.0 * sine) * reciprocalSquareRoot(max(dotProduct(sum, sum), kFolded));
-  precise float strength = (rigidity * rest.x) * (rest.y - bent);
+  precise float strength = (rigidity * record.weight) * (record.restBent - bent);
   precise vec3 onA = -dotProduct(bc, along) * h1 - dotProduct(bd, along) * h2;
   precise vec3 onB = dotProduct(ac, along) * h1 + dotProduct(ad, along) * h2;
   precise float length_ = squared * inverseLength;
-  forces[4 * hinge] = vec4(strength * onA, 0.0);
-  forces[4 * hinge + 1] = vec4(strength * onB, 0.0);
-  forces[4 * hinge + 2] = vec4((strength * length_) * h1, 0.0);
-  forces[4 * hinge + 3] = vec4((strength * length_) * h2, 0.0);
+  precise vec3 forceA = strength * onA;
+  precise vec3 forceB = strength * onB;
+  precise vec3 forceC = (strength * length_) * h1;
+  precise vec3 forceD = (strength * length_) * h2;
+  forces[4 * hinge] = vec4(forceA, 0.0);
+  forces[4 * hinge + 1] = vec4(forceB, 0.0);
+  forces[4 * hinge + 2] = vec4(forceC, 0.0);
+  forces[4 * hinge + 3] = vec4(forceD, 0.0);
 }

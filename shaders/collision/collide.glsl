@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
-// Collision of a node with moving shapes over a substep, with Coulomb friction: [Va21] 3.4, Alg. 4, and more
-// shapes.
+// Collision of a node with moving shapes during a substep, with Coulomb friction: [Va21] 3.4, Alg. 4, for
+// more kinds of shapes.
 //
-// The kernel that includes this defines kColliderBinding, the first of two bindings, and kToldBinding, and
-// calls collideWithAll() with a node's index in the scene.
+// The including kernel defines kColliderBinding, the first of two bindings, and kContactImpulseBinding. It
+// calls collideWithAll().
 #ifndef CLOTHSTREAM_SHADERS_COLLISION_COLLIDE_GLSL
 #define CLOTHSTREAM_SHADERS_COLLISION_COLLIDE_GLSL
 
@@ -14,20 +14,23 @@ layout(binding = kColliderBinding) uniform samplerBuffer colliders;  // Collider
 layout(binding = kColliderBinding +
                  1) uniform samplerBuffer nearColliders;  // a list for each kNearNodes nodes
 
-layout(std430, binding = kToldBinding) buffer ToldContacts {
-  uint toldContacts[];  // a collider, a cloth: kImpulseUnits
+layout(std430, binding = kContactImpulseBinding) buffer ContactImpulses {
+  uint contactImpulses[];  // by collider, then by cloth, in kImpulseUnits
 };
 
-// Who collides: its cloth's number; 0 where its contacts are not to be told.
-struct Toucher {
+// A node that collides. An inverse mass of 0 keeps its contacts out of the report.
+struct CollidingNode {
+  uint index;  // in the scene
   uint cloth;
   float inverseMass;
+  float thickness;  // m, of its cloth
+  float friction;   // of its cloth
 };
 
-// ---- Which colliders
+// ---- The list of near colliders
 
 struct NearList {
-  int first;  // texel of the indices; negative: all colliders are meant
+  int first;  // texel of the numbers; negative: the list means all colliders
   uint count;
   vec3 low;
   vec3 high;
@@ -35,12 +38,12 @@ struct NearList {
 
 NearList fetchNearList(uint node) {
   int first = int((node / kNearNodes) * (kNearStride / 4));
-  vec4 low = texelFetch(nearColliders, first);
-  vec4 high = texelFetch(nearColliders, first + 1);
-  return NearList(first + 2, uint(low.w), low.xyz, high.xyz);
+  vec4 lowAndCount = texelFetch(nearColliders, first + int(kNearLow / 4));
+  vec4 high = texelFetch(nearColliders, first + int(kNearHigh / 4));
+  return NearList(first + int(kNearHeader / 4), uint(lowAndCount.w), lowAndCount.xyz, high.xyz);
 }
 
-// Whether the list holds all that a node on its way from one place to the other can touch.
+// True if the list has every collider that a node can touch on its way from `from` to `to`.
 bool covers(NearList list, vec3 from, vec3 to) {
   if (list.first < 0) {
     return true;
@@ -54,7 +57,7 @@ NearList allColliders(uint count) {
   return NearList(-1, count, vec3(0.0), vec3(0.0));
 }
 
-// The index-th one, in ascending order.
+// Number of the collider at place `index` of the list, in ascending order.
 uint colliderAt(NearList list, uint index) {
   if (list.first < 0) {
     return index;
@@ -64,41 +67,39 @@ uint colliderAt(NearList list, uint index) {
   return uint(place < 2u ? (place == 0u ? four.x : four.y) : (place == 2u ? four.z : four.w));
 }
 
-// ---- Where they are
+// ---- The pose of a collider
 
 // A collider at the start and at the end of a substep.
 struct Collider {
-  int record;  // its first texel
+  uint number;
   vec3 before;
   vec3 after;
   vec3 velocity;
-  float reach;     // with the cloth's thickness
-  float friction;  // with the cloth's
+  float reach;     // includes the cloth's thickness
+  float friction;  // product with the cloth's friction
   float thickness;
 };
 
-// How it is turned, and its shape: only needed close by.
+// The rotation and shape of a collider, needed only for near nodes.
 struct ColliderFrame {
   vec4 before;  // unit quaternions
   vec4 after;
   vec3 spin;  // 1/s
-  vec4 shape;
+  ShapeRecord shape;
 };
 
 Collider fetchCollider(uint index, CollisionPush push, float thickness, float friction) {
-  int record = int(5 * index);
-  vec4 start = texelFetch(colliders, record);
-  vec4 motion = texelFetch(colliders, record + 1);
-  precise vec3 before = start.xyz + push.progressBefore * motion.xyz;
-  precise vec3 after = start.xyz + push.progressAfter * motion.xyz;
-  precise vec3 velocity = push.tickRate * motion.xyz;
-  precise float reach = start.w + kThicknessReach * thickness;
-  precise float both = friction * motion.w;
-  return Collider(record, before, after, velocity, reach, both, thickness);
+  ColliderRecord record = colliderRecordAt(colliders, index);
+  precise vec3 before = record.position + push.progressBefore * record.motion;
+  precise vec3 after = record.position + push.progressAfter * record.motion;
+  precise vec3 velocity = push.tickRate * record.motion;
+  precise float reach = record.reach + kThicknessReach * thickness;
+  precise float both = friction * record.friction;
+  return Collider(index, before, after, velocity, reach, both, thickness);
 }
 
-// False only where a node on this way stays farther from the collider than it reaches. Of three lengths a, b,
-// c with a > b + c, a^2 > 2 (b^2 + c^2) asks for a little more.
+// False only if a node on this way stays farther from the collider than its reach. For lengths a, b and c,
+// the test a^2 > 2 (b^2 + c^2) is slightly stricter than a > b + c.
 bool mayTouch(Collider collider, vec3 from, vec3 to) {
   precise vec3 before = from - collider.before;
   precise vec3 after = to - collider.after;
@@ -109,47 +110,46 @@ bool mayTouch(Collider collider, vec3 from, vec3 to) {
 }
 
 ColliderFrame fetchFrame(Collider collider, CollisionPush push) {
-  vec4 shape = texelFetch(colliders, collider.record + 4);
-  vec4 start = texelFetch(colliders, collider.record + 2);
-  vec4 turn = texelFetch(colliders, collider.record + 3);
-  vec4 before = turnedAt(start, turn, push.progressBefore);
-  vec4 after = turnedAt(start, turn, push.progressAfter);
+  ColliderRecord record = colliderRecordAt(colliders, collider.number);
+  vec4 before = orientationAt(record.orientation, record.orientationChange, push.progressBefore);
+  vec4 after = orientationAt(record.orientation, record.orientationChange, push.progressAfter);
   // Twice the vector part of after * conjugate(before) is the axis times the angle.
   precise vec3 difference = before.w * after.xyz - after.w * before.xyz - crossProduct(after.xyz, before.xyz);
   precise vec3 spin = (2.0 * push.substepRate) * difference;
-  return ColliderFrame(before, after, spin, shape);
+  return ColliderFrame(before, after, spin, record.shape);
 }
 
-// ---- What they do
+// ---- Contacts
 
 Contact findContact(Collider collider, ColliderFrame frame, vec3 from, vec3 to) {
   precise vec3 before = from - collider.before;
   precise vec3 after = to - collider.after;
-  precise float radius = frame.shape.y + collider.thickness;
+  ShapeRecord shape = frame.shape;
+  precise float radius = radiusOf(shape) + collider.thickness;
   before = rotateBack(frame.before, before);
   after = rotateBack(frame.after, after);
   Contact contact = kNoContact;
-  if (frame.shape.x == kRoundShape) {
-    contact = touchRound(before, after, radius, frame.shape.z);
+  if (shape.kind == kRoundShape) {
+    contact = touchRound(before, after, radius, halfLengthOf(shape));
   } else {
-    contact = touchPlanes(colliders, before, after, frame.shape, collider.thickness);
+    contact = touchPlanes(colliders, before, after, shape, collider.thickness);
   }
   contact.normal = rotate(frame.after, contact.normal);
   return contact;
 }
 
-// Whole numbers, so that the sum does not depend on who comes first.
-void tell(uint contact, vec3 gained, float inverseMass) {
+// Adds an impulse to the report. Whole numbers make the sum independent of the order.
+void reportContact(uint contact, vec3 gained, float inverseMass) {
   precise float squared = max(dotProduct(gained, gained), 1e-30);
   precise float impulse = (squared * reciprocalSquareRoot(squared)) * reciprocal(inverseMass);
   precise float units = (impulse < kMostImpulse ? impulse : kMostImpulse) * kImpulseUnits;
-  atomicAdd(toldContacts[contact], uint(units) + 1);
+  atomicAdd(contactImpulses[contact], uint(units) + 1);
 }
 
-// Puts a node that comes from `from` out of the collider. Its velocity relative to the surface loses what
-// goes into it, and, of what goes along it, at most friction times that. For nodes that can move.
-void collide(uint index, Collider collider, ColliderFrame frame, CollisionPush push, Toucher who, vec3 from,
-             inout vec3 position, inout vec3 velocity) {
+// Moves a free node that comes from `from` out of the collider. Its velocity relative to the surface loses
+// the part into the surface. The part along the surface loses at most friction times that.
+void collide(uint index, Collider collider, ColliderFrame frame, CollisionPush push, CollidingNode node,
+             vec3 from, inout vec3 position, inout vec3 velocity) {
   Contact contact = findContact(collider, frame, from, position);
   if (contact.depth <= 0.0) {
     return;
@@ -170,16 +170,16 @@ void collide(uint index, Collider collider, ColliderFrame frame, CollisionPush p
     gained = difference;
     velocity = after;
   }
-  if (push.toldCloths > 0 && who.inverseMass > 0.0) {
-    tell(index * push.toldCloths + who.cloth, gained, who.inverseMass);
+  if (push.contactClothCount > 0 && node.inverseMass > 0.0) {
+    reportContact(index * push.contactClothCount + node.cloth, gained, node.inverseMass);
   }
 }
 
-// Every collider that the node may touch, in ascending order. One that is pushed out of what the list covers
-// goes on with the collider that comes next of all.
-void collideWithAll(uint node, Toucher who, CollisionPush push, float thickness, float friction, vec3 from,
-                    inout vec3 position, inout vec3 velocity) {
-  NearList list = fetchNearList(node);
+// Collides a node with every collider that it may touch, in ascending order. A node that is pushed out of the
+// list's box continues with the next of all colliders.
+void collideWithAll(CollidingNode node, CollisionPush push, vec3 from, inout vec3 position,
+                    inout vec3 velocity) {
+  NearList list = fetchNearList(node.index);
   uint i = 0;
   uint next = 0;
   do {
@@ -189,9 +189,9 @@ void collideWithAll(uint node, Toucher who, CollisionPush push, float thickness,
     }
     if (i < list.count) {
       uint index = colliderAt(list, i);
-      Collider collider = fetchCollider(index, push, thickness, friction);
+      Collider collider = fetchCollider(index, push, node.thickness, node.friction);
       if (mayTouch(collider, from, position)) {
-        collide(index, collider, fetchFrame(collider, push), push, who, from, position, velocity);
+        collide(index, collider, fetchFrame(collider, push), push, node, from, position, velocity);
       }
       next = index + 1;
       ++i;

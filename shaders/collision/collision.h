@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Tables and push constants of collision, laid out alike in C++ and in GLSL's std430.
+// Tables and push constants of collision with shapes. C++ and GLSL use the same layout.
 #ifndef CLOTHSTREAM_SHADERS_COLLISION_COLLISION_H
 #define CLOTHSTREAM_SHADERS_COLLISION_COLLISION_H
 
@@ -7,72 +7,136 @@
 
 CLOTHSTREAM_SHARED_BEGIN
 
-// What ColliderRecord::shape says first.
-const float kRoundShape = 0;   // sphere or capsule: radius, half the length of its segment
-const float kBoxShape = 1;     // half of its size
-const float kPlanesShape = 2;  // plane or hull: first texel of its planes, how many
+// Values of ShapeRecord::kind.
+const float kRoundShape = 0;   // sphere or capsule
+const float kBoxShape = 1;     // box
+const float kPlanesShape = 2;  // plane or convex hull
 
-// A collider over one tick, five texels. Planes lie behind all records, a texel each: normal, offset.
-struct ColliderRecord {
-  vec4 start;   // where it is; w: reach, the radius of a sphere that holds it
-  vec4 motion;  // how far it goes until the tick's end; w: friction
-  vec4 turned;  // unit quaternion
-  vec4 turn;    // what is added until the tick's end
-  vec4 shape;
+// The shape of a collider. The meaning of the other members depends on `kind`; the functions below name it.
+struct ShapeRecord {
+  float kind;
+  vec3 sizes;
 };
 
-// The box that holds a collider, or a group of kColliderGroup that follow each other, during the whole tick.
+// A collider during one tick. The planes of all shapes follow behind the records, one texel each: normal,
+// offset.
+#define CLOTHSTREAM_COLLIDER_TEXELS 5
+struct ColliderRecord {
+  vec3 position;  // at the tick's start
+  float reach;    // radius of a sphere about `position` that contains the shape
+  vec3 motion;    // displacement during the tick
+  float friction;
+  vec4 orientation;        // unit quaternion at the tick's start
+  vec4 orientationChange;  // difference of the quaternions during the tick
+  ShapeRecord shape;
+};
+
+// The box that contains a collider, or kColliderGroup consecutive colliders, during the whole tick.
+#define CLOTHSTREAM_BOUNDS_TEXELS 2
 struct ColliderBounds {
-  vec4 low;  // w: the farthest that one of them goes
-  vec4 high;
+  vec3 low;
+  float farthestMotion;  // m, the largest displacement of any of them
+  vec3 high;
+  float reserved;
 };
 const uint32_t kColliderGroup = 32;
 
-// What kNearNodes nodes that follow each other in the scene may touch in a tick, in floats: the box that the
-// list is good for (low, count, high, -), then indices of colliders, ascending. A count above kMaxNear: too
-// many, and none is listed.
+// The list of the colliders that kNearNodes consecutive nodes of the scene may touch in a tick, kNearStride
+// floats: the box within which the list is valid (low, count, high, unused), then ascending collider numbers.
+// A count above kMaxNear means that there are too many and none is listed.
 const uint32_t kNearNodes = 64;
 const uint32_t kMaxNear = 120;
+const uint32_t kNearLow = 0;
+const uint32_t kNearCount = 3;
+const uint32_t kNearHigh = 4;
+const uint32_t kNearHeader = 8;
 const uint32_t kNearStride = 8 + 120;
 
-// A cloth's thickness times this is the most that it adds to a shape's reach: at the corner of a box.
+// The thickness of a cloth adds at most this multiple of itself to a shape's reach (at the corner of a box).
 const float kThicknessReach = 1.75;
 
 // One substep.
 struct CollisionPush {
   uint32_t colliderCount;
-  float progressBefore;  // of the tick's motion, at the substep's start
+  float progressBefore;  // share of the tick's motion at the substep's start
   float progressAfter;
   float tickRate;  // 1/s
   float substepRate;
-  uint32_t toldCloths;  // cloths of the scene, where contacts are to be told of; else 0
+  uint32_t contactClothCount;  // cloths in the scene if contacts are reported, else 0
   uint32_t reserved0, reserved1;
 };
 
-// What a collider does to a cloth in a tick is one number, at collider times cloths plus cloth: the impulse
-// in units of which a N s has so many, and one more for each touch; 0: they do not touch.
+// What a collider does to a cloth in a tick is one number, at (collider times cloths plus cloth): the impulse
+// in units of 1 / kImpulseUnits N s, plus one for each contact. 0: they do not touch.
 const float kImpulseUnits = 1e6f;
-// The most that one touch adds.
+// The largest impulse that one contact adds, N s.
 const float kMostImpulse = 1000;
 
 struct GatherPush {
   uint32_t nodeCount;
   uint32_t colliderCount;
   float tickSeconds;
-  float thickness;  // the largest of any cloth
+  float thickness;  // the largest of any cloth, m
 };
 
 CLOTHSTREAM_SHARED_END
 
 #ifdef __cplusplus
 namespace clothstream::shared {
-static_assert(sizeof(ColliderRecord) == 80 && offsetof(ColliderRecord, motion) == 16 &&
-              offsetof(ColliderRecord, turned) == 32 && offsetof(ColliderRecord, turn) == 48 &&
-              offsetof(ColliderRecord, shape) == 64);
-static_assert(sizeof(ColliderBounds) == 32 && offsetof(ColliderBounds, high) == 16);
+
+inline ShapeRecord roundShape(float radius, float halfLength) {
+  return {kRoundShape, {radius, halfLength, 0}};
+}
+inline ShapeRecord boxShape(const vec3& halfSize) {
+  return {kBoxShape, halfSize};
+}
+// `firstPlane` is a texel of the colliders' table.
+inline ShapeRecord planesShape(float firstPlane, float planeCount) {
+  return {kPlanesShape, {firstPlane, planeCount, 0}};
+}
+
+static_assert(sizeof(ColliderRecord) == CLOTHSTREAM_COLLIDER_TEXELS * sizeof(vec4) &&
+              offsetof(ColliderRecord, motion) == 16 && offsetof(ColliderRecord, orientation) == 32 &&
+              offsetof(ColliderRecord, orientationChange) == 48 && offsetof(ColliderRecord, shape) == 64);
+static_assert(sizeof(ColliderBounds) == CLOTHSTREAM_BOUNDS_TEXELS * sizeof(vec4) &&
+              offsetof(ColliderBounds, high) == 16);
 static_assert(sizeof(CollisionPush) == 32 && offsetof(CollisionPush, substepRate) == 16);
 static_assert(sizeof(GatherPush) == 16);
 }  // namespace clothstream::shared
+#else
+
+float radiusOf(ShapeRecord shape) {
+  return shape.sizes.x;
+}
+float halfLengthOf(ShapeRecord shape) {
+  return shape.sizes.y;
+}
+vec3 halfSizeOf(ShapeRecord shape) {
+  return shape.sizes;
+}
+uint firstPlaneOf(ShapeRecord shape) {
+  return uint(shape.sizes.x);
+}
+uint planeCountOf(ShapeRecord shape) {
+  return uint(shape.sizes.y);
+}
+
+ColliderRecord colliderRecordAt(samplerBuffer table, uint collider) {
+  int first = CLOTHSTREAM_COLLIDER_TEXELS * int(collider);
+  vec4 start = texelFetch(table, first);
+  vec4 motion = texelFetch(table, first + 1);
+  vec4 shape = texelFetch(table, first + 4);
+  return ColliderRecord(CLOTHSTREAM_VECTOR(start), CLOTHSTREAM_VECTOR(motion), texelFetch(table, first + 2),
+                        texelFetch(table, first + 3), ShapeRecord(shape.x, shape.yzw));
+}
+
+ColliderBounds colliderBoundsAt(samplerBuffer table, uint number) {
+  int first = CLOTHSTREAM_BOUNDS_TEXELS * int(number);
+  vec4 low = texelFetch(table, first);
+  vec4 high = texelFetch(table, first + 1);
+  return ColliderBounds(CLOTHSTREAM_VECTOR(low), CLOTHSTREAM_VECTOR(high));
+}
+
 #endif
 
 #endif

@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: MIT
-// Where a path in a shape's frame runs into the shape, and what keeps it out.
+// The contact of a path with a shape, in the shape's frame.
 //
-// A path that begins outside meets the shape where it enters; one that begins inside, by rounding or because
-// the shape came to be there, leaves by the nearest way at its beginning. Either way the side is that of the
-// path's beginning: nothing fast or thin is passed through.
+// A path that begins outside meets the shape where it enters. A path that begins inside (because of rounding,
+// or because the shape moved there) leaves by the nearest way at its beginning. In both cases the path stays
+// on the side of its beginning, so that fast nodes do not pass through thin shapes.
 #ifndef CLOTHSTREAM_SHADERS_COLLISION_CONTACT_GLSL
 #define CLOTHSTREAM_SHADERS_COLLISION_CONTACT_GLSL
 
 #include "shaders/collision/collision.h"
 #include "shaders/shared/arithmetic.glsl"
 
-// The path's end is to go this far along the normal; not at all where depth <= 0.
+// The path's end has to move by `depth` along the normal. There is no contact if depth <= 0.
 struct Contact {
   vec3 normal;
   float depth;
@@ -29,32 +29,33 @@ vec3 onSegment(float y, float halfLength) {
   return vec3(0.0, y > halfLength ? halfLength : (y < otherEnd ? otherEnd : y), 0.0);
 }
 
-// The part of the path after which a square distance, squared + 2 t along + t^2 pathSquared, first falls to
-// zero; more than 1 if it does not. It is above zero at the beginning.
-float whereItFallsToZero(float squared, float along, float pathSquared) {
+// Share t of the path at which the squared distance, squared + 2 t along + t^2 pathSquared, first falls to
+// zero. More than 1 if it does not. The squared distance is above zero at the beginning.
+float shareUntilZero(float squared, float along, float pathSquared) {
   precise float discriminant = along * along - pathSquared * squared;
   precise float root = discriminant * reciprocalSquareRoot(max(discriminant, 1e-30));
   precise float part = squared * reciprocal(max(root - along, 1e-20));
   return along < 0.0 && discriminant >= 0.0 ? part : 2.0;
 }
 
-// Where the path, which begins outside, enters the capsule: `centre` is the point of the segment next to it.
+// True if the path, which begins outside, enters the capsule. `centre` is the point of the segment nearest to
+// the entry.
 bool entersRound(vec3 from, vec3 path, float radius, float halfLength, out vec3 centre, out vec3 normal) {
-  // First the infinite cylinder. Who is in that already is beyond one of the ends.
+  // The infinite cylinder comes first. A path that begins inside it lies beyond one of the capsule's ends.
   precise float radiusSquared = radius * radius;
   precise float squared = from.x * from.x + from.z * from.z - radiusSquared;
   precise float along = from.x * path.x + from.z * path.z;
   precise float pathSquared = path.x * path.x + path.z * path.z;
   float part = 0.0;
   if (squared > 0.0) {
-    part = whereItFallsToZero(squared, along, pathSquared);
+    part = shareUntilZero(squared, along, pathSquared);
   }
   precise float y = from.y + part * path.y;
   centre = onSegment(y, halfLength);
   if (part <= 1.0 && centre.y != y) {
     precise vec3 offset = from - centre;
     precise float outside = dotProduct(offset, offset) - radiusSquared;
-    part = whereItFallsToZero(outside, dotProduct(offset, path), dotProduct(path, path));
+    part = shareUntilZero(outside, dotProduct(offset, path), dotProduct(path, path));
   }
   precise vec3 out_ = from + part * path - centre;
   normal = unit(out_, dotProduct(out_, out_));
@@ -77,7 +78,7 @@ Contact touchRound(vec3 from, vec3 to, float radius, float halfLength) {
       return kNoContact;
     }
   }
-  // The round way out where that is on the same side; else along the plane that touches where it came in.
+  // The node leaves along its own normal if that is on the same side, else along the normal at the entry.
   vec3 outwards = unit(after, afterSquared);
   if (dotProduct(normal, outwards) > 0.0) {
     if (afterSquared < radiusSquared) {
@@ -94,7 +95,7 @@ Contact touchRound(vec3 from, vec3 to, float radius, float halfLength) {
   return Contact(normal, depth);
 }
 
-// Of a box: the sides of one axis after those of the other.
+// Plane of a box (normal, offset), axis by axis.
 vec4 boxPlane(vec3 halfSize, uint index) {
   float side = (index & 1u) == 0u ? 1.0 : -1.0;
   return index < 2u   ? vec4(side, 0.0, 0.0, halfSize.x)
@@ -102,15 +103,15 @@ vec4 boxPlane(vec3 halfSize, uint index) {
                       : vec4(0.0, 0.0, side, halfSize.z);
 }
 
-// The shape is what lies behind all its planes, each of which `thickness` is added to.
-Contact touchPlanes(samplerBuffer colliders, vec3 from, vec3 to, vec4 shape, float thickness) {
-  bool isBox = shape.x == kBoxShape;
-  uint count = isBox ? 6u : uint(shape.z);
+// The shape is the set of points behind all its planes, each moved outwards by `thickness`.
+Contact touchPlanes(samplerBuffer colliders, vec3 from, vec3 to, ShapeRecord shape, float thickness) {
+  bool isBox = shape.kind == kBoxShape;
+  uint count = isBox ? 6u : planeCountOf(shape);
   bool begunInside = true;
   float entry = 0.0, exit = 1.0, nearest = -1e30;
   Contact contact = kNoContact;
   for (uint i = 0; i < count; ++i) {
-    vec4 plane = isBox ? boxPlane(shape.yzw, i) : texelFetch(colliders, int(shape.y) + int(i));
+    vec4 plane = isBox ? boxPlane(halfSizeOf(shape), i) : texelFetch(colliders, int(firstPlaneOf(shape) + i));
     precise float surface = plane.w + thickness;
     precise float before = dotProduct(plane.xyz, from) - surface;
     precise float after = dotProduct(plane.xyz, to) - surface;

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT
-// One substep of every node: spring and air forces, integration, collision; [Va21] Alg. 1, gathered a node at
-// a time.
+// One substep of every node of the grids: spring and air forces, integration and collision. [Va21] Alg. 1,
+// gathered node by node.
 //
 // An invocation walks down a strip of one column. Neighbours come from texel buffers into a window of
-// registers that slides with it: five positions are read a node instead of thirteen. The force of a vertical
-// spring, and of a triangle, serves both rows that it touches. Neither changes a bit of the result, which
-// therefore depends on neither the strip's length nor the workgroup's size. The loop over rows is unrolled,
-// so that the window's moves cost nothing. Writes cannot race: each node belongs to one invocation, and what
-// is read lies in other buffers.
+// registers that slides along, so that each node reads five positions instead of thirteen. The force of a
+// vertical spring, and of a triangle, serves both rows that it touches. Neither changes a bit of the result,
+// so that the result depends neither on the strip's length nor on the workgroup's size. The loop over rows is
+// unrolled, so that moving the window costs nothing. Writes cannot race: each node belongs to one invocation,
+// and reads go to other buffers.
 
 #extension GL_EXT_control_flow_attributes : require
 
@@ -19,16 +19,11 @@ void main() {
   if (strip.row >= strip.rows) {
     return;
   }
-  vec4 spacing = texelFetch(cloths, strip.cloth + 1);
-  vec4 stiffness = texelFetch(cloths, strip.cloth + 2);
-  vec4 damping = texelFetch(cloths, strip.cloth + 3);
-  vec4 resistance = texelFetch(cloths, strip.cloth + 4);
-  float friction = stiffness.w;
-  float thickness = damping.w;
+  ClothRecord cloth = clothAt(cloths, strip.cloth);
   uint columns = strip.columns;
   uint lastRow = strip.rows - 1;
 
-  // Loads beyond an edge stay on it: their springs have no stiffness, their triangles no area.
+  // Loads beyond an edge read the edge instead. Their springs have no stiffness, and their triangles no area.
   bool hasLeft = strip.column > 0;
   bool hasRight = strip.column + 1 < columns;
   bool hasLeft2 = strip.column > 1;
@@ -39,22 +34,22 @@ void main() {
   uint toRight2 = hasRight2 ? 2 : 0;
   uint start = strip.firstNode + strip.column;
 
-  Spring alongRow = Spring(stiffness.x, damping.x, spacing.x);
-  Spring alongColumn = Spring(stiffness.x, damping.x, spacing.y);
-  Spring shear = Spring(stiffness.y, damping.y, spacing.z);
-  Spring bendRow = Spring(stiffness.z, damping.z, 2.0 * spacing.x);
-  Spring bendColumn = Spring(stiffness.z, damping.z, 2.0 * spacing.y);
+  Spring alongRow = Spring(cloth.structuralStiffness, cloth.structuralDamping, cloth.columnSpacing);
+  Spring alongColumn = Spring(cloth.structuralStiffness, cloth.structuralDamping, cloth.rowSpacing);
+  Spring shear = Spring(cloth.shearStiffness, cloth.shearDamping, cloth.diagonalSpacing);
+  Spring bendRow = Spring(cloth.bendStiffness, cloth.bendDamping, 2.0 * cloth.columnSpacing);
+  Spring bendColumn = Spring(cloth.bendStiffness, cloth.bendDamping, 2.0 * cloth.rowSpacing);
   Spring leftSpring = where(hasLeft, alongRow);
   Spring rightSpring = where(hasRight, alongRow);
   Spring left2Spring = where(hasLeft2, bendRow);
   Spring right2Spring = where(hasRight2, bendRow);
   Spring leftShear = where(hasLeft, shear);
   Spring rightShear = where(hasRight, shear);
-  precise float drag = push.windAir.w * resistance.x;
-  precise float lift = push.windAir.w * resistance.y;
-  Air air = Air(push.windAir.xyz, drag, lift);
+  precise float drag = push.airFactor * cloth.drag;
+  precise float lift = push.airFactor * cloth.lift;
+  Air air = Air(push.wind, drag, lift);
 
-  // The window: columns left, centre and right; rows above, here and below.
+  // The window has the columns left, centre and right, and the rows above, here and below.
   uint row = strip.row;
   uint index = start + row * columns;
   uint aboveIndex = start + (row > 0 ? row - 1 : 0) * columns;
@@ -68,8 +63,8 @@ void main() {
   Node here = fetchNode(index);
   here.velocity = fetchVelocity(index);
 
-  // From rows before the strip: upward springs of its first row and the second row's bend, the triangles
-  // above.
+  // Forces from rows before the strip: upward springs of its first row, the bend spring of its second row,
+  // and the triangles above.
   vec3 aboveForce = springForce(here, above, where(row > 0, alongColumn));
   vec3 above2Force =
       springForce(here, fetchNode(start + (row > 1 ? row - 2 : 0) * columns), where(row > 1, bendColumn));
@@ -84,7 +79,7 @@ void main() {
   Node moved[kRowsPerInvocation];
   vec3 origins[kRowsPerInvocation];
   bool idle = true;
-  // Rows past the cloth's last repeat it, and are not stored.
+  // Rows past the cloth's last row repeat that row and are not stored.
   [[unroll]] for (uint k = 0; k < kRowsPerInvocation; ++k) {
     bool hasBelow = row < lastRow;
     bool hasBelow2 = row + 1 < lastRow;
@@ -110,7 +105,7 @@ void main() {
     force = force + below2Force;
 
     if (kAir) {
-      // Quad by quad, its corners a b / e f: triangles (a, e, b) and (b, e, f).
+      // A quad with corners a b above e f has the triangles (a, e, b) and (b, e, f).
       vec3 leftAir1 = airForce(left, leftBelow, here, air);
       vec3 leftAir2 = airForce(here, leftBelow, below, air);
       vec3 rightAir1 = airForce(here, below, right, air);
@@ -121,7 +116,7 @@ void main() {
       rightAboveAir2 = airForce(right, below, rightBelow, air);
     }
 
-    moved[k] = moveNode(here, force, spacing.w);
+    moved[k] = moveNode(here, force, cloth.velocityDecay);
     if (kColliders) {
       origins[k] = here.position;
       NearList list = fetchNearList(index);
@@ -146,8 +141,8 @@ void main() {
   }
 
   if (kColliders) {
-    // Row by row, the first one of the window; a software device runs all that is written here once, even
-    // where nothing is near, and that is not to be four times.
+    // Each round takes the first row of the window. A software device runs this code once even if nothing is
+    // near, so that the code must not be repeated for each row.
     uint k = 0;
     do {
       Node node = moved[0];
@@ -155,10 +150,10 @@ void main() {
       if (!idle) {
         if (node.inverseMass > 0.0) {
           bool exists = strip.row + k <= lastRow;
-          Toucher who =
-              Toucher(uint(strip.cloth) / CLOTHSTREAM_CLOTH_TEXELS, exists ? node.inverseMass : 0.0);
-          collideWithAll(start + min(strip.row + k, lastRow) * columns, who, push.collision, thickness,
-                         friction, from, node.position, node.velocity);
+          CollidingNode collidingNode =
+              CollidingNode(start + min(strip.row + k, lastRow) * columns, strip.cloth,
+                            exists ? node.inverseMass : 0.0, cloth.thickness, cloth.friction);
+          collideWithAll(collidingNode, push.collision, from, node.position, node.velocity);
         }
         [[unroll]] for (uint i = 0; i + 1 < kRowsPerInvocation; ++i) {
           moved[i] = moved[i + 1];

@@ -6,19 +6,19 @@
 #include "shaders/mass_spring/node.glsl"
 #include "shaders/shared/arithmetic.glsl"
 
-// Whether the air moves any cloth.
+// True if the air moves any cloth.
 layout(constant_id = 3) const bool kAir = true;
 
 struct Air {
   vec3 wind;
-  float drag;  // coefficient x density / 6: half the dynamic pressure, a third of it for each node
+  float drag;  // coefficient times density / 6: half of the density, a third of it for each node
   float lift;
 };
 
-// On each of the triangle's three nodes. With the air's velocity u relative to the triangle and the area
-// vector N:
+// Force on each of the triangle's three nodes. With the air's velocity u relative to the triangle and the
+// area vector N:
 //   F = density / 2 (C_drag |N.u| u + C_lift (N.u) / (|u||N|) (N |u|^2 - (N.u) u))
-// A triangle with two corners in one place, as the loads at a cloth's edge make it, gives exactly zero.
+// A triangle with two equal corners, such as at a cloth's edge, gives exactly zero.
 vec3 airForce(Node a, Node b, Node c, Air air) {
   precise vec3 relative = air.wind - (a.velocity + b.velocity + c.velocity) * 0.33333334;
   precise vec3 area = 0.5 * crossProduct(b.position - a.position, c.position - a.position);

@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: MIT
-// The fourth-order Runge-Kutta method, put together from steps of explicit Euler E_c(y) = y + c h f(y), which
-// the kernels of the forces take:
+// The fourth-order Runge-Kutta method, composed of steps of explicit Euler E_c(y) = y + c h f(y), which the
+// kernels of the forces compute:
 //   y1 = E_1/2(y0),  y2 = y0 + E_1/2(y1) - y1,  y3 = y0 + E_1(y2) - y2,
 //   y  = y0 + ((y1 - y0) + 2 (y2 - y0) + (y3 - y0)) / 3 + E_1/6(y3) - y3.
-// A step led from one of two states to the other; this is what happens to both after the kStage-th of four.
+// Each step leads from one of two states to the other. This kernel updates both after step kStage of four.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 
 const int kColliderBinding = 1;
 const int kStateBinding = 3;
-const int kToldBinding = 12;
+const int kContactImpulseBinding = 12;
 
 #include "shaders/shared/simulation.h"
 
@@ -20,14 +20,14 @@ layout(binding = 0) uniform samplerBuffer cloths;  // ClothRecord
 
 #include "shaders/shared/end_of_substep.glsl"
 
-// `positions` and `velocities` are what the step led from; what it led to:
+// `positions` and `velocities` are the state before the step; these are the state after it.
 layout(std430, binding = 6) buffer NextPositions {
   vec4 nextPositions[];
 };
 layout(std430, binding = 7) buffer NextVelocities {
   vec4 nextVelocities[];
 };
-// y0; the sum of what y1, y2 and y3 differ from it by, with their weights.
+// y0 (`start`), and the weighted sum of the differences of y1, y2 and y3 from y0 (`sums`).
 layout(std430, binding = 8) buffer Start {
   vec4 start[];
 };
@@ -67,7 +67,7 @@ void main() {
     precise vec3 velocity = originVelocity + (velocitySums[index].xyz * 0.33333334 + velocityStep);
     nextPositions[index] = start[index];
     nextVelocities[index] = startVelocities[index];
-    endSubstep(index, position, velocity, from.w, CLOTHSTREAM_CLOTH_TEXELS * int(push.cloth), push.collision);
+    endSubstep(index, position, velocity, from.w, push.cloth, push.collision);
     return;
   }
   float weight = kStage == 2 ? 2.0 : 1.0;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The state of a node as the forces see it.
+// The state of a node that the forces depend on.
 #ifndef CLOTHSTREAM_SHADERS_MASS_SPRING_NODE_GLSL
 #define CLOTHSTREAM_SHADERS_MASS_SPRING_NODE_GLSL
 

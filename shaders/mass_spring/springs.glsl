@@ -6,11 +6,11 @@
 #include "shaders/mass_spring/node.glsl"
 #include "shaders/shared/arithmetic.glsl"
 
-// Whether any cloth's springs are damped. Where none is, neighbours' velocities need not be read; the bits
-// are the same, for the damping term is then zero.
+// True if any cloth has damped springs. False saves reading the neighbours' velocities. The bits are the
+// same, because the damping term is then zero.
 layout(constant_id = 2) const bool kSpringDamping = true;
 
-// Whether any spring is a force at all.
+// True if any spring acts as a force.
 layout(constant_id = 6) const bool kSpringForces = true;
 
 struct Spring {
@@ -19,13 +19,13 @@ struct Spring {
   float restLength;
 };
 
-// A spring that is not there pulls with zero, whatever lies at its other end.
+// A spring that does not exist pulls with zero, independent of its other end.
 Spring where(bool exists, Spring spring) {
   return Spring(exists ? spring.stiffness : 0.0, exists ? spring.damping : 0.0, spring.restLength);
 }
 
-// On `node`, from the spring to `other`; not finite where an end is not. Exactly the negative of the force on
-// `other`: swapping the two negates differences, and nothing else.
+// Force on `node` of the spring to `other`. It is not finite if an end is not finite. It is exactly the
+// negative of the force on `other`, because swapping the two only negates differences.
 vec3 springForce(Node node, Node other, Spring spring) {
   if (!kSpringForces) {
     return vec3(0.0);

@@ -1,19 +1,19 @@
 // SPDX-License-Identifier: MIT
-// The state that a substep reads and the one that it writes, and a node's step from one to the other.
+// The state that a substep reads, the state that it writes, and the step of a node between them.
 #ifndef CLOTHSTREAM_SHADERS_MASS_SPRING_STATE_GLSL
 #define CLOTHSTREAM_SHADERS_MASS_SPRING_STATE_GLSL
 
 const int kColliderBinding = 6;
-const int kToldBinding = 8;
+const int kContactImpulseBinding = 8;
 
 #include "shaders/collision/collide.glsl"
 #include "shaders/mass_spring/air.glsl"
 #include "shaders/mass_spring/springs.glsl"
 #include "shaders/shared/simulation.h"
 
-// Whether there is a collider at all.
+// True if the tick has a collider.
 layout(constant_id = 4) const bool kColliders = true;
-// As in [Va21]; else semi-implicit Euler.
+// True: explicit Euler as in [Va21]. False: semi-implicit Euler.
 layout(constant_id = 5) const bool kExplicitEuler = false;
 
 layout(binding = 2) uniform samplerBuffer positions;  // w: inverse mass
@@ -33,7 +33,7 @@ vec3 fetchVelocity(uint index) {
   return texelFetch(velocities, int(index)).xyz;
 }
 
-// The velocity of a neighbour is read where some force depends on it.
+// Reads the velocity of a neighbour only if a force depends on it.
 Node fetchNode(uint index) {
   vec4 position = texelFetch(positions, int(index));
   return Node(position.xyz, position.w, kSpringDamping || kAir ? fetchVelocity(index) : vec3(0.0));
@@ -44,13 +44,13 @@ void store(uint index, Node node) {
   nextVelocities[index] = vec4(snapTiny(node.velocity), 0.0);
 }
 
-// By all forces on it and its own decay, one over seconds; `node` has its velocity. No force moves
-// a pinned node: it goes on at its velocity, which is 0 but where it is attached to something that moves.
+// Moves a node by the force on it and by the decay of its velocity, 1/s. No force moves a pinned node: it
+// keeps its velocity, which is 0 unless the node is attached to a moving frame.
 Node moveNode(Node node, vec3 force, float decay) {
-  precise vec3 acceleration = force * node.inverseMass + push.gravityStep.xyz - decay * node.velocity;
-  precise vec3 velocity = node.velocity + push.gravityStep.w * acceleration;
+  precise vec3 acceleration = force * node.inverseMass + push.gravity - decay * node.velocity;
+  precise vec3 velocity = node.velocity + push.stepSeconds * acceleration;
   velocity = node.inverseMass == 0.0 ? node.velocity : velocity;
-  precise vec3 position = node.position + push.gravityStep.w * (kExplicitEuler ? node.velocity : velocity);
+  precise vec3 position = node.position + push.stepSeconds * (kExplicitEuler ? node.velocity : velocity);
   return Node(position, node.inverseMass, velocity);
 }
 

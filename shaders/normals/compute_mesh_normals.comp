@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Vertex normals of every mesh of a scene: of a node's triangles the area vectors, added.
+// Vertex normals of every mesh of a scene: the sum of the area vectors of a node's triangles.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 
@@ -18,9 +18,9 @@ vec3 fetchPosition(uint index) {
 }
 
 // Twice the area vector of a triangle.
-vec3 areaOf(vec3 here, vec2 others) {
-  precise vec3 toSecond = fetchPosition(uint(others.x)) - here;
-  precise vec3 toThird = fetchPosition(uint(others.y)) - here;
+vec3 areaOf(vec3 here, OtherCorners others) {
+  precise vec3 toSecond = fetchPosition(uint(others.second)) - here;
+  precise vec3 toThird = fetchPosition(uint(others.third)) - here;
   return crossProduct(toSecond, toThird);
 }
 
@@ -34,9 +34,9 @@ void main() {
   precise vec3 sum = vec3(0.0);
   TexelRange triangles = trianglesOf(self);
   while (triangles.first < triangles.end) {
-    vec4 corners = texelFetch(triangleCorners, triangles.first);
-    sum = sum + areaOf(here, corners.xy);
-    sum = sum + areaOf(here, corners.zw);
+    CornerPairRecord pair = cornerPairAt(triangleCorners, triangles.first);
+    sum = sum + areaOf(here, pair.triangles[0]);
+    sum = sum + areaOf(here, pair.triangles[1]);
     ++triangles.first;
   }
   precise float squared = dotProduct(sum, sum);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Vertex normals of every cloth of a scene, [Va21] 3.5, Alg. 5.
+// Vertex normals of every grid of a scene, [Va21] 3.5, Alg. 5.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 
@@ -15,14 +15,15 @@ vec3 fetchPosition(uint index) {
   return texelFetch(positions, int(index)).xyz;
 }
 
-// Twice the area vectors of the quadrant's triangles (p, first, diagonal) and (p, diagonal, second), added.
+// Twice the sum of the area vectors of the quadrant's triangles (p, first, diagonal) and (p, diagonal,
+// second).
 vec3 quadrant(vec3 p, vec3 first, vec3 diagonal, vec3 second) {
   precise vec3 across = diagonal - p;
   precise vec3 along = second - first;
   return crossProduct(across, along);
 }
 
-// Beyond an edge the window repeats the edge: such a quadrant has no area, and adds exactly zero. Writes
+// Beyond an edge the window repeats the edge. Such a quadrant has no area and adds exactly zero. Writes
 // cannot race: each node belongs to one invocation.
 void main() {
   Strip strip = locateStrip(0);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// The sums of a cloth from those of its runs: a workgroup a cloth, in lanes and a tree that do not depend on
-// the workgroup's size. Writes cannot race: a lane belongs to one invocation between barriers.
+// Adds up the sums of a cloth from those of its runs, one workgroup per cloth. The lanes and the tree of the
+// sums do not depend on the workgroup's size. Writes cannot race: between barriers a lane belongs to one
+// invocation.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 
@@ -13,16 +14,16 @@ layout(std430, binding = 1) readonly buffer Runs {
   ReportSums runs[];
 };
 layout(std430, binding = 2) writeonly buffer Sums {
-  ReportSums sums[];  // a cloth
+  ReportSums sums[];  // by cloth
 };
 
 shared float largest[kReportLanes];
 shared vec4 lanes[kReportLanes];
 
 void main() {
-  vec4 blocks = texelFetch(reportCloths, CLOTHSTREAM_REPORT_CLOTH_TEXELS * int(gl_WorkGroupID.x) + 1);
-  uint first = uint(blocks.x) * kReportRuns;
-  uint end = first + uint(blocks.y) * kReportRuns;
+  ReportClothRecord cloth = reportClothAt(reportCloths, gl_WorkGroupID.x);
+  uint first = uint(cloth.firstBlock) * kReportRuns;
+  uint end = first + uint(cloth.blockCount) * kReportRuns;
   for (uint lane = gl_LocalInvocationID.x; lane < kReportLanes; lane += gl_WorkGroupSize.x) {
     float most = -1e30;
     precise vec4 sum = vec4(0.0);

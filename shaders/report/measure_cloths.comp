@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Stretch of the structural springs, and the energies, of every cloth: an invocation a run of nodes, each
-// with the springs to nodes of higher numbers. Writes cannot race: sums belong to one run, counts are added
-// up atomically, and the order of whole numbers does not matter.
+// Measures the stretch of the structural springs and the energies of every cloth. An invocation handles a run
+// of nodes, each with its springs to nodes of higher numbers. Writes cannot race: sums belong to one run, and
+// counts are added atomically as whole numbers, whose order does not matter.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 
@@ -31,7 +31,7 @@ layout(push_constant) uniform Push {
 };
 
 ReportSums sums = ReportSums(-1e30, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
-// Stretches that follow each other are mostly alike: they are counted here until another bin's turn comes.
+// Consecutive stretches mostly fall into the same bin: they are counted here until another bin is needed.
 uint openBin = 0;
 uint inOpenBin = 0;
 uint firstCount;
@@ -53,7 +53,8 @@ void count(float stretch) {
   ++inOpenBin;
 }
 
-// The extension is a difference of squares, which rounds less than that of two lengths that are almost one.
+// Computes the extension as a difference of squares, which rounds less than a difference of two similar
+// lengths.
 void measureSpring(vec3 here, uint other, float restLength, float stiffness, bool structural) {
   precise vec3 d = texelFetch(positions, int(other)).xyz - here;
   precise float squared = dotProduct(d, d);
@@ -71,58 +72,57 @@ void measureSpring(vec3 here, uint other, float restLength, float stiffness, boo
   }
 }
 
-void measureGridSprings(vec3 here, uint index, uint inCloth, vec4 place, int record, vec4 stiffness) {
-  uint rows = uint(place.z);
-  uint columns = uint(place.w);
+void measureGridSprings(vec3 here, uint index, uint inCloth, ClothRecord cloth, ReportClothRecord springs) {
+  uint rows = uint(cloth.rows);
+  uint columns = uint(cloth.columns);
   uint row = inCloth / columns;
   uint column = inCloth - row * columns;
-  vec4 spacing = texelFetch(cloths, record + 1);
   bool right = column + 1 < columns;
   bool down = row + 1 < rows;
   if (right) {
-    measureSpring(here, index + 1, spacing.x, stiffness.x, true);
+    measureSpring(here, index + 1, cloth.columnSpacing, springs.structuralStiffness, true);
   }
   if (down) {
-    measureSpring(here, index + columns, spacing.y, stiffness.x, true);
+    measureSpring(here, index + columns, cloth.rowSpacing, springs.structuralStiffness, true);
   }
   if (down && column > 0) {
-    measureSpring(here, index + columns - 1, spacing.z, stiffness.y, false);
+    measureSpring(here, index + columns - 1, cloth.diagonalSpacing, springs.shearStiffness, false);
   }
   if (down && right) {
-    measureSpring(here, index + columns + 1, spacing.z, stiffness.y, false);
+    measureSpring(here, index + columns + 1, cloth.diagonalSpacing, springs.shearStiffness, false);
   }
   if (column + 2 < columns) {
-    measureSpring(here, index + 2, 2.0 * spacing.x, stiffness.z, false);
+    precise float length_ = 2.0 * cloth.columnSpacing;
+    measureSpring(here, index + 2, length_, springs.bendStiffness, false);
   }
   if (row + 2 < rows) {
-    measureSpring(here, index + 2 * columns, 2.0 * spacing.y, stiffness.z, false);
+    precise float length_ = 2.0 * cloth.rowSpacing;
+    measureSpring(here, index + 2 * columns, length_, springs.bendStiffness, false);
   }
 }
 
-// Of half a SpringPairRecord.
-void measureEnd(vec3 here, uint index, vec2 end, vec4 stiffness) {
-  uint other = uint(abs(end.x)) - 1;
-  bool isShear = end.x < 0.0;
-  bool isBend = end.y < 0.0;
+void measureSignedSpring(vec3 here, uint index, SignedSpring end, ReportClothRecord springs) {
+  uint other = uint(abs(end.signedOther)) - 1;
+  bool isShear = end.signedOther < 0.0;
+  bool isBend = end.signedLength < 0.0;
   if (other > index) {
-    measureSpring(here, other, abs(end.y), isShear ? stiffness.y : (isBend ? stiffness.z : stiffness.x),
-                  !isShear && !isBend);
+    float stiffness =
+        isShear ? springs.shearStiffness : (isBend ? springs.bendStiffness : springs.structuralStiffness);
+    measureSpring(here, other, abs(end.signedLength), stiffness, !isShear && !isBend);
   }
 }
 
-void measureMeshSprings(vec3 here, uint index, uint inMeshes, vec4 stiffness) {
-  vec4 list = texelFetch(meshNodes, CLOTHSTREAM_MESH_NODE_TEXELS * int(inMeshes));
-  int texel = int(uint(list.x) + (uint(list.y) << 16));
-  int end = texel + int(list.z);
-  while (texel < end) {
-    vec4 ends = texelFetch(springEnds, texel);
-    measureEnd(here, index, ends.xy, stiffness);
-    measureEnd(here, index, ends.zw, stiffness);
-    ++texel;
+void measureMeshSprings(vec3 here, uint index, uint meshNode, ReportClothRecord springs) {
+  TexelRange list = rangeOf(meshNodeAt(meshNodes, meshNode).springs);
+  while (list.first < list.end) {
+    SpringPairRecord pair = springPairAt(springEnds, list.first);
+    measureSignedSpring(here, index, pair.springs[0], springs);
+    measureSignedSpring(here, index, pair.springs[1], springs);
+    ++list.first;
   }
 }
 
-// Of nodes that can move.
+// Adds the energies of a free node.
 void measureNode(vec3 here, float inverseMass, uint index) {
   float mass = reciprocal(inverseMass);
   vec3 velocity = texelFetch(velocities, int(index)).xyz;
@@ -138,27 +138,25 @@ void main() {
     return;
   }
   uint run = gl_GlobalInvocationID.x - block * kReportRuns;
-  vec4 blockPlace = texelFetch(blocks, int(block));
-  uint cloth = uint(blockPlace.x);
-  int record = CLOTHSTREAM_CLOTH_TEXELS * int(cloth);
-  vec4 place = texelFetch(cloths, record);
-  vec4 stiffness = texelFetch(reportCloths, CLOTHSTREAM_REPORT_CLOTH_TEXELS * int(cloth));
-  bool isMesh = place.z == 0.0;
-  uint firstNode = uint(place.x) + (uint(place.y) << 16);
-  uint nodes = isMesh ? uint(place.w) : uint(place.z) * uint(place.w);
-  uint first = uint(blockPlace.y);
-  uint end = min(first + kReportBlock, nodes);
-  firstCount = cloth * kReportCounts;
+  ReportBlockRecord place = reportBlockAt(blocks, block);
+  uint number = uint(place.cloth);
+  ClothRecord cloth = clothAt(cloths, number);
+  ReportClothRecord springs = reportClothAt(reportCloths, number);
+  bool meshed = isMesh(cloth);
+  uint firstNode = firstNodeOf(cloth);
+  uint first = uint(place.firstNode);
+  uint end = min(first + kReportBlock, nodeCountOf(cloth));
+  firstCount = number * kReportCounts;
   for (uint inCloth = first + run; inCloth < end; inCloth += kReportRuns) {
     uint index = firstNode + inCloth;
     vec4 here = texelFetch(positions, int(index));
     if (here.w > 0.0) {
       measureNode(here.xyz, here.w, index);
     }
-    if (isMesh) {
-      measureMeshSprings(here.xyz, index, uint(blockPlace.z) + inCloth - first, stiffness);
+    if (meshed) {
+      measureMeshSprings(here.xyz, index, uint(place.firstMeshNode) + inCloth - first, springs);
     } else {
-      measureGridSprings(here.xyz, index, inCloth, place, record, stiffness);
+      measureGridSprings(here.xyz, index, inCloth, cloth, springs);
     }
   }
   countOpenBin();

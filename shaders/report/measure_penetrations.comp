@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
-// How deep nodes that can move lie in a collider at the tick's end: an invocation kReportDepths nodes. The
-// deepest of a cloth is found by an atomic maximum of the depths' bits, which order as the depths do, in
-// whatever order they come.
+// Measures how deep free nodes lie in a collider at the tick's end; an invocation handles kReportDepths
+// nodes. The deepest node of a cloth follows from an atomic maximum of the depths' bits, which order as the
+// depths do. The order of the invocations does not matter.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 
 const int kColliderBinding = 4;
-const int kToldBinding = 6;  // nobody collides here
+const int kContactImpulseBinding = 6;  // unused: this kernel changes no node
 
 #include "shaders/collision/collide.glsl"
 #include "shaders/report/report.h"
@@ -26,25 +26,27 @@ layout(push_constant) uniform Push {
   PenetrationPush push;
 };
 
-// Below the shape's surface, along the nearest of its planes; not above 0 outside.
+// Depth below the shape's surface, along the nearest of its planes. At most 0 outside.
 float depthIn(Collider collider, ColliderFrame frame, vec3 position) {
   precise vec3 offset = position - collider.after;
   precise vec3 p = rotateBack(frame.after, offset);
-  if (frame.shape.x == kRoundShape) {
-    precise vec3 out_ = p - onSegment(p.y, frame.shape.z);
+  if (frame.shape.kind == kRoundShape) {
+    precise vec3 out_ = p - onSegment(p.y, halfLengthOf(frame.shape));
     precise float squared = max(dotProduct(out_, out_), 1e-24);
-    precise float depth = frame.shape.y - squared * reciprocalSquareRoot(squared);
+    precise float depth = radiusOf(frame.shape) - squared * reciprocalSquareRoot(squared);
     return depth;
   }
-  bool isBox = frame.shape.x == kBoxShape;
-  uint count = isBox ? 6u : uint(frame.shape.z);
+  bool isBox = frame.shape.kind == kBoxShape;
+  uint count = isBox ? 6u : planeCountOf(frame.shape);
   float highest = -1e30;
   for (uint i = 0; i < count; ++i) {
-    vec4 plane = isBox ? boxPlane(frame.shape.yzw, i) : texelFetch(colliders, int(frame.shape.y) + int(i));
+    vec4 plane = isBox ? boxPlane(halfSizeOf(frame.shape), i)
+                       : texelFetch(colliders, int(firstPlaneOf(frame.shape) + i));
     precise float height = dotProduct(plane.xyz, p) - plane.w;
     highest = max(highest, height);
   }
-  return -highest;
+  precise float depth = -highest;
+  return depth;
 }
 
 float deepest(uint node, vec3 position) {
@@ -68,13 +70,12 @@ void main() {
   if (block >= push.blockCount) {
     return;
   }
-  vec4 blockPlace = texelFetch(blocks, int(block));
-  uint cloth = uint(blockPlace.x);
-  vec4 place = texelFetch(cloths, CLOTHSTREAM_CLOTH_TEXELS * int(cloth));
-  uint firstNode = uint(place.x) + (uint(place.y) << 16);
-  uint nodes = place.z == 0.0 ? uint(place.w) : uint(place.z) * uint(place.w);
-  uint first = uint(blockPlace.y);
-  uint end = min(first + kReportBlock, nodes);
+  ReportBlockRecord place = reportBlockAt(blocks, block);
+  uint number = uint(place.cloth);
+  ClothRecord cloth = clothAt(cloths, number);
+  uint firstNode = firstNodeOf(cloth);
+  uint first = uint(place.firstNode);
+  uint end = min(first + kReportBlock, nodeCountOf(cloth));
   float depth = 0.0;
   for (uint i = first + gl_GlobalInvocationID.x - block * kRuns; i < end; i += kRuns) {
     vec4 here = texelFetch(positions, int(firstNode + i));
@@ -83,6 +84,6 @@ void main() {
     }
   }
   if (depth > 0.0) {
-    atomicMax(counts[cloth * kReportCounts + kStretchBins], floatBitsToUint(depth));
+    atomicMax(counts[number * kReportCounts + kStretchBins], floatBitsToUint(depth));
   }
 }

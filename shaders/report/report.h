@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Tables and push constants of the report, laid out alike in C++ and in GLSL's std430.
+// Tables and push constants of the report. C++ and GLSL use the same layout.
 #ifndef CLOTHSTREAM_SHADERS_REPORT_REPORT_H
 #define CLOTHSTREAM_SHADERS_REPORT_REPORT_H
 
@@ -8,36 +8,43 @@
 
 CLOTHSTREAM_SHARED_BEGIN
 
-// Sums are made in an order that is fixed by these numbers alone: a cloth is cut into blocks of nodes that
-// follow each other, node i of a block belongs to run i % kReportRuns, and the runs of a cloth add up in
-// kReportLanes lanes and a tree.
+// These numbers alone fix the order of the sums. A cloth is cut into blocks of consecutive nodes, and node i
+// of a block belongs to run i % kReportRuns. The runs of a cloth add up in kReportLanes lanes and a tree.
 const uint32_t kReportBlock = 4096;
 const uint32_t kReportRuns = 64;
 const uint32_t kReportLanes = 256;
-// Nodes of a block that are looked for in colliders by one invocation.
+// Nodes of a block whose penetration one invocation measures.
 const uint32_t kReportDepths = 8;
 
-// Bins of stretch. The first counts all below 2^-20, contracted springs too; from there on 32 of equal width
-// an octave, up to 2^6; the last counts what is beyond.
+// Bins of stretch. The first bin counts every stretch below 2^-20, and contracted springs. From there each
+// octave up to 2^6 has 32 bins of equal width. The last bin counts the rest.
 const uint32_t kStretchOctave = 32;
-const uint32_t kStretchFirst = (127 - 20) * 32;  // the upper 14 bits of 2^-20 as a float
+const uint32_t kStretchFirst = (127 - 20) * 32;  // upper 14 bits of 2^-20 as a float
 const uint32_t kStretchBins = 26 * 32 + 2;
-// Of a cloth: its bins, then the bits of its deepest penetration, m.
+// Words per cloth: its bins, then the bits of its deepest penetration, m.
 const uint32_t kReportCounts = 26 * 32 + 3;
 
-// A cloth; texels.
+// One cloth.
 #define CLOTHSTREAM_REPORT_CLOTH_TEXELS 2
 struct ReportClothRecord {
-  vec4 stiffness;  // structural, shear, bend, whether they are forces or constraints
-  vec4 blocks;     // the first, how many
+  float structuralStiffness;  // N/m, also of springs that are constraints
+  float shearStiffness;
+  float bendStiffness;
+  float reserved0;
+  float firstBlock;
+  float blockCount;
+  float reserved1, reserved2;
 };
 
-// A block; a texel.
+// One block of nodes.
 struct ReportBlockRecord {
-  vec4 place;  // cloth; the first node, of the cloth, and of all meshes where the cloth is one
+  float cloth;
+  float firstNode;      // in the cloth
+  float firstMeshNode;  // among the nodes of all meshes, if the cloth is a mesh
+  float reserved;
 };
 
-// Of a run, and of a cloth.
+// Sums of a run or of a cloth.
 struct ReportSums {
   float largest;  // stretch
   float strain;   // sum of absolute stretches
@@ -64,9 +71,24 @@ CLOTHSTREAM_SHARED_END
 #ifdef __cplusplus
 namespace clothstream::shared {
 static_assert(sizeof(ReportClothRecord) == CLOTHSTREAM_REPORT_CLOTH_TEXELS * sizeof(vec4));
-static_assert(sizeof(ReportSums) == 32 && sizeof(MeasurePush) == 32 && sizeof(PenetrationPush) == 48);
+static_assert(sizeof(ReportBlockRecord) == 16 && sizeof(ReportSums) == 32 && sizeof(MeasurePush) == 32 &&
+              sizeof(PenetrationPush) == 48);
 static_assert(kReportCounts == kStretchBins + 1 && kReportBlock % (kReportRuns * kReportDepths) == 0);
 }  // namespace clothstream::shared
+#else
+
+ReportClothRecord reportClothAt(samplerBuffer table, uint cloth) {
+  int first = CLOTHSTREAM_REPORT_CLOTH_TEXELS * int(cloth);
+  vec4 stiffness = texelFetch(table, first);
+  vec4 blocks = texelFetch(table, first + 1);
+  return ReportClothRecord(CLOTHSTREAM_FLOATS(stiffness), CLOTHSTREAM_FLOATS(blocks));
+}
+
+ReportBlockRecord reportBlockAt(samplerBuffer table, uint block) {
+  vec4 texel = texelFetch(table, int(block));
+  return ReportBlockRecord(CLOTHSTREAM_FLOATS(texel));
+}
+
 #endif
 
 #endif

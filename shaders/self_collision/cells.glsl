@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
-// Which cell a place is in, and where that stands in the table.
+// The cell of a position, and its entry in the table.
 #ifndef CLOTHSTREAM_SHADERS_SELF_COLLISION_CELLS_GLSL
 #define CLOTHSTREAM_SHADERS_SELF_COLLISION_CELLS_GLSL
 
 #include "shaders/self_collision/self_collision.h"
 
-// Space is cut off far out, so that whatever is there, and what is no number, has a cell too.
+// Positions far out, and components that are not numbers, fall into cell 0.
 int cellAlong(float place, float inverseWidth) {
   precise float scaled = place * inverseWidth;
   return scaled > -8388608.0 && scaled < 8388608.0 ? int(floor(scaled)) : 0;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// How wide cells are, and how many balls fall into each: integer atomics, whose order does not matter.
+// Computes the width of the cells and counts the balls in each. It uses integer atomics, whose order does not
+// matter.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 
@@ -8,7 +9,7 @@
 
 layout(local_size_x_id = 0) in;
 
-layout(binding = 0) uniform samplerBuffer rests;  // w: cloth + 1; 0: no ball
+layout(binding = 0) uniform samplerBuffer rests;  // RestRecord
 layout(binding = 1) uniform samplerBuffer positions;
 layout(std430, binding = 2) buffer Table {
   uint table[];
@@ -21,16 +22,15 @@ layout(push_constant) uniform Push {
   NeighbourPush push;
 };
 
-const float kSlack = 0.25;    // of the reach, for what velocities do not foretell
-const float kFarthest = 3.0;  // times the reach, that balls look for each other at most
-const float kWider = 1.01;    // times that a cell is wide, for rounding
+const float kSlack = 0.25;    // share of the reach, for motion that the velocities do not predict
+const float kFarthest = 3.0;  // times the reach, the largest search radius
+const float kWider = 1.01;    // width of a cell in search radii, because of rounding
 
 uint unordered(uint bits) {
   return (bits & 0x80000000u) != 0 ? bits & 0x7FFFFFFFu : ~bits;
 }
 
-// Balls whose way leads them together in this time are no farther apart, unless they are faster than
-// kFarthest allows.
+// Distance within which balls can meet during the time ahead. kFarthest limits it.
 float searchRadius() {
   uint words = push.cellCount + push.cellCount / kCellBlock;
   vec3 box;
@@ -59,7 +59,7 @@ void main() {
     table[words + kSearchWord] = floatBitsToUint(search);
     table[words + kCellWord] = floatBitsToUint(inverseWidth);
   }
-  if (texelFetch(rests, int(node)).w == 0.0) {
+  if (!isBall(restAt(rests, node))) {
     return;
   }
   uint entry = entryOf(cellOf(texelFetch(positions, int(node)).xyz, inverseWidth), push.cellCount);

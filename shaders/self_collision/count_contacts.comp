@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
-// Which others each ball touches, of those that it may; who touches any; and the state that contacts are
-// resolved from, for they write where it was.
+// Finds the balls of each list that touch its ball, and lists the balls that touch any. It also copies the
+// state, which the kernel that resolves contacts reads while it overwrites the original.
 //
-// The order of those who touch is whatever it comes to be: none of them looks at another's place in it. Other
-// writes cannot race: each node belongs to one invocation.
+// The order of the touching balls is arbitrary: no ball depends on the place of another. Other writes cannot
+// race: each node belongs to one invocation.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 
@@ -13,17 +13,17 @@ const int kMaterialBinding = 0;
 
 layout(local_size_x_id = 0) in;
 
-layout(binding = 2) uniform samplerBuffer neighbours;  // kNeighbourStride floats a node
+layout(binding = 2) uniform samplerBuffer neighbours;  // kNeighbourStride floats per node
 layout(binding = 3) uniform samplerBuffer positions;   // w: inverse mass
 layout(binding = 4) uniform samplerBuffer velocities;
 layout(std430, binding = 5) writeonly buffer Positions {
   vec4 contactPositions[];
 };
 layout(std430, binding = 6) writeonly buffer Velocities {
-  vec4 contactVelocities[];  // w: how many it touches
+  vec4 contactVelocities[];  // w: number of balls that it touches
 };
 layout(std430, binding = 7) writeonly buffer Contacts {
-  float contacts[];  // kMaxContacts a node
+  float contacts[];  // kMaxContacts per node
 };
 layout(std430, binding = 8) writeonly buffer Touching {
   uint touching[];
@@ -41,14 +41,14 @@ layout(push_constant) uniform Push {
 
 void main() {
   uint node = gl_GlobalInvocationID.x;
-  if (node >= push.nodeCount || texelFetch(rests, int(node)).w == 0.0) {
+  if (node >= push.nodeCount || !isBall(restAt(rests, node))) {
     return;
   }
   vec4 here = texelFetch(positions, int(node));
   int texel = int(node * (kNeighbourStride / 4));
-  vec4 head = texelFetch(neighbours, texel);
-  int end = texel + (int(head.x) + 3) / 4;
-  Material own = Material(head.y, head.z);
+  NeighbourHead head = neighbourHeadAt(neighbours, texel);
+  int end = texel + (int(head.count) + 3) / 4;
+  Material own = Material(head.radius, head.friction);
   uint first = node * kMaxContacts;
   uint count = 0;
   while (texel < end) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Every ball takes a place in its cell, in whatever order: sort_cells.comp puts them right.
+// Gives every ball a place in its cell, in arbitrary order. sort_cells.comp sorts them.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 
@@ -7,12 +7,12 @@
 
 layout(local_size_x_id = 0) in;
 
-layout(binding = 0) uniform samplerBuffer rests;  // w: cloth + 1; 0: no ball
+layout(binding = 0) uniform samplerBuffer rests;  // RestRecord
 layout(std430, binding = 1) readonly buffer Entries {
   uint entries[];
 };
 layout(std430, binding = 2) buffer Table {
-  uint table[];  // where the entry's next ball goes
+  uint table[];  // place of the entry's next ball
 };
 layout(std430, binding = 3) writeonly buffer Order {
   uint order[];
@@ -24,7 +24,7 @@ layout(push_constant) uniform Push {
 
 void main() {
   uint node = gl_GlobalInvocationID.x;
-  if (node >= push.nodeCount || texelFetch(rests, int(node)).w == 0.0) {
+  if (node >= push.nodeCount || !isBall(restAt(rests, node))) {
     return;
   }
   order[atomicAdd(table[entries[node]], 1u)] = node;

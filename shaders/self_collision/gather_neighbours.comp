@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-// Lists whom each ball may touch until lists are made anew: those whose distance now is no more than their
-// radii, a quarter more, and what their velocities relative to each other can bring them together. Where
-// these are too many, those that are near now.
+// Lists the balls that each ball may touch until the next search. Their distance is at most 1.25 times the
+// sum of the radii, plus the way that their relative velocity brings them together. If these are too many,
+// only those that are near now are listed.
 //
-// The order is that of the cells round the ball and, in each, of the nodes. Writes cannot race: each list
-// belongs to one invocation.
+// The list is in the order of the cells around the ball and, within a cell, of the nodes. Writes cannot race:
+// each list belongs to one invocation.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 
@@ -15,7 +15,7 @@
 layout(local_size_x_id = 0) in;
 
 layout(binding = 0) uniform samplerBuffer cloths;  // ClothRecord
-layout(binding = 1) uniform samplerBuffer rests;   // where a node is at rest; cloth + 1
+layout(binding = 1) uniform samplerBuffer rests;   // RestRecord
 layout(binding = 2) uniform samplerBuffer sorted;  // position, node
 layout(binding = 3) uniform samplerBuffer velocities;
 layout(std430, binding = 4) readonly buffer Table {
@@ -41,47 +41,49 @@ struct Ball {
   vec3 position;
   uint node;
   vec3 velocity;
-  vec4 rest;
+  RestRecord rest;
   float radius;
 };
 
-float radiusOf(vec4 rest) {
-  return texelFetch(cloths, CLOTHSTREAM_CLOTH_TEXELS * (int(rest.w) - 1) + 4).z;
+float radiusOf(RestRecord rest) {
+  return clothAt(cloths, clothOf(rest)).ballRadius;
 }
 
-// Whether they may collide, and come near enough to each other; the distance is known.
+// True if two balls at a known squared distance may collide and come near enough to each other.
 bool mayTouch(Ball self, uint node, float squared, float aheadSeconds) {
-  vec4 rest = texelFetch(rests, int(node));
+  RestRecord rest = restAt(rests, node);
   float sum = 2.0 * self.radius;
-  if (rest.w != self.rest.w) {
+  if (rest.clothNumber != self.rest.clothNumber) {
     precise float both = self.radius + radiusOf(rest);
     sum = both;
   } else {
-    precise vec3 apart = rest.xyz - self.rest.xyz;
+    precise vec3 apart = rest.position - self.rest.position;
     precise float least = push.restFactor * sum;
-    if (dotProduct(apart, apart) < least * least) {
+    precise float leastSquared = least * least;
+    if (dotProduct(apart, apart) < leastSquared) {
       return false;
     }
   }
   precise vec3 relative = texelFetch(velocities, int(node)).xyz - self.velocity;
   precise float speed = max(dotProduct(relative, relative), 1e-20);
   precise float near = kSlack * sum + aheadSeconds * (speed * reciprocalSquareRoot(speed));
-  return squared < near * near;
+  precise float nearSquared = near * near;
+  return squared < nearSquared;
 }
 
-// Lists them, and says how many there are, and whether cells were passed over.
+// Lists the neighbours and returns their number. `passed` says whether cells were skipped.
 uint list(Ball self, uint total, float aheadSeconds, out bool passed) {
   uint words = push.cellCount + push.cellCount / kCellBlock;
   float search = uintBitsToFloat(table[words + kSearchWord]);
   float inverseWidth = uintBitsToFloat(table[words + kCellWord]);
   precise float searchSquared = search * search;
   ivec3 cell = cellOf(self.position, inverseWidth);
-  uint first = self.node * kNeighbourStride + 4;
+  uint first = self.node * kNeighbourStride + kNeighbourHead;
   uint count = 0;
   passed = false;
   for (int row = 0; row < 9; ++row) {
     ivec3 centre = cell + ivec3(0, row % 3 - 1, row / 3 - 1);
-    // Three cells along the row: in the table one behind the other, and the first behind the last.
+    // Three cells along the row are consecutive in the table, which wraps round.
     uint entry = entryOf(centre - ivec3(1, 0, 0), push.cellCount);
     uint last = entry + 3;
     uint at = starts[entry];
@@ -100,8 +102,10 @@ uint list(Ball self, uint total, float aheadSeconds, out bool passed) {
         if (where.y == centre.y && where.z == centre.z && abs(where.x - centre.x) <= 1 &&
             mayTouch(self, uint(other.w), squared, aheadSeconds)) {
           if (count < kMaxNeighbours) {
-            bool own = texelFetch(rests, int(other.w)).w == self.rest.w;
-            neighbours[first + count] = own ? other.w + 1.0 : -other.w - 1.0;
+            bool own = restAt(rests, uint(other.w)).clothNumber == self.rest.clothNumber;
+            precise float number = other.w + 1.0;
+            precise float signedNumber = own ? number : -number;
+            neighbours[first + count] = signedNumber;
           }
           ++count;
         }
@@ -123,17 +127,17 @@ void main() {
   }
   vec4 place = texelFetch(sorted, int(slot));
   uint node = uint(place.w);
-  vec4 rest = texelFetch(rests, int(node));
-  vec4 material = texelFetch(cloths, CLOTHSTREAM_CLOTH_TEXELS * (int(rest.w) - 1) + 4);
-  Ball self = Ball(place.xyz, node, texelFetch(velocities, int(node)).xyz, rest, material.z);
+  RestRecord rest = restAt(rests, node);
+  ClothRecord cloth = clothAt(cloths, clothOf(rest));
+  Ball self = Ball(place.xyz, node, texelFetch(velocities, int(node)).xyz, rest, cloth.ballRadius);
   bool passed;
   uint count = list(self, total, push.aheadSeconds, passed);
   for (bool crowded = count > kMaxNeighbours || passed; crowded; crowded = false) {
     atomicAdd(report.lists, 1u);
     count = list(self, total, 0.0, passed);
   }
-  uint head = node * kNeighbourStride;
+  uint head = node * kNeighbourStride;  // NeighbourHead
   neighbours[head] = float(min(count, kMaxNeighbours));
-  neighbours[head + 1] = material.z;
-  neighbours[head + 2] = material.w;
+  neighbours[head + 1] = cloth.ballRadius;
+  neighbours[head + 2] = cloth.ballFriction;
 }

@@ -1,28 +1,28 @@
 // SPDX-License-Identifier: MIT
-// Puts balls that touch apart, all at once, and lets them collide with the scene's colliders again, which
-// win.
+// Separates all touching balls at once. Then they collide with the scene's colliders again, which have
+// priority.
 //
-// A ball that touches n others is taken for n balls of a share of its mass, one a contact, and gets the mean
-// of what they would (Tonge, Benevolenski, Voroshilov, "Mass Splitting for Jitter-Free Parallel Rigid Body
-// Simulation", 2012): it converges for any heap, and both sides of a pair get the same impulse. Its parts:
-// what stops the approach, and takes back a part of the overlap; Coulomb friction up to its share of that.
-// Positions follow velocities, so that nothing gets speed that it does not need, and balls at rest stay.
+// A ball that touches n others counts as n balls with a share of its mass each, one per contact, and gets the
+// mean of their changes (Tonge, Benevolenski, Voroshilov, "Mass Splitting for Jitter-Free Parallel Rigid Body
+// Simulation", 2012). This converges for any heap, and both sides of a pair get the same impulse. The impulse
+// stops the approach and corrects a share of the overlap; Coulomb friction acts within its share of the
+// impulse. Positions follow velocities, so that no ball gains unneeded speed and balls at rest stay at rest.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 
 const int kMaterialBinding = 0;
 const int kColliderBinding = 2;
-const int kToldBinding = 12;
+const int kContactImpulseBinding = 12;
 
 #include "shaders/collision/collide.glsl"
 #include "shaders/self_collision/neighbours.glsl"
 
 layout(local_size_x_id = 0) in;
 
-layout(binding = 4) uniform samplerBuffer contacts;           // kMaxContacts floats a node
+layout(binding = 4) uniform samplerBuffer contacts;           // kMaxContacts floats per node
 layout(binding = 5) uniform samplerBuffer contactPositions;   // w: inverse mass
-layout(binding = 6) uniform samplerBuffer contactVelocities;  // w: how many it touches
-layout(binding = 7) uniform samplerBuffer startPositions;     // of the substep
+layout(binding = 6) uniform samplerBuffer contactVelocities;  // w: number of balls that it touches
+layout(binding = 7) uniform samplerBuffer startPositions;     // at the substep's start
 layout(std430, binding = 8) readonly buffer Touching {
   uint touching[];
 };
@@ -40,13 +40,14 @@ layout(push_constant) uniform Push {
   ContactPush push;
 };
 
-// In metres a second, for one share of inverse mass: both sides of a pair compute the same, but for its sign.
+// Impulse in m/s for one share of inverse mass. Both sides of a pair compute the same value with opposite
+// signs.
 vec3 contactImpulse(vec3 apart, float squared, vec3 relative, float touching, float friction, bool above) {
   float inverse = reciprocalSquareRoot(max(squared, 1e-20));
   precise vec3 direction = apart * inverse;
   vec3 normal = squared < 1e-16 ? vec3(0.0, above ? 1.0 : -1.0, 0.0) : direction;
   precise float overlap = touching - squared * inverse;
-  precise float wanted = push.takenBack * overlap;
+  precise float wanted = push.correctionRate * overlap;
   float separation = dotProduct(relative, normal);
   precise float along = (wanted < push.pushOutSpeed ? wanted : push.pushOutSpeed) - separation;
   float pressed = max(along, 0.0);
@@ -57,7 +58,7 @@ vec3 contactImpulse(vec3 apart, float squared, vec3 relative, float touching, fl
   return impulse;
 }
 
-// Writes cannot race: each node belongs to one invocation, and what is read lies in other buffers.
+// Writes cannot race: each node belongs to one invocation, and reads go to other buffers.
 void main() {
   if (gl_GlobalInvocationID.x >= groups.touching) {
     return;
@@ -65,9 +66,9 @@ void main() {
   uint node = touching[gl_GlobalInvocationID.x];
   vec4 here = texelFetch(contactPositions, int(node));
   vec4 moving = texelFetch(contactVelocities, int(node));
-  int record = CLOTHSTREAM_CLOTH_TEXELS * (int(texelFetch(rests, int(node)).w) - 1);
-  vec4 balls = texelFetch(cloths, record + 4);
-  Material own = Material(balls.z, balls.w);
+  uint number = clothOf(restAt(rests, node));
+  ClothRecord cloth = clothAt(cloths, number);
+  Material own = Material(cloth.ballRadius, cloth.ballFriction);
   precise float ownShare = moving.w * here.w;
   precise vec3 sum = vec3(0.0);
   int texel = int(node * (kMaxContacts / 4));
@@ -92,10 +93,8 @@ void main() {
   precise vec3 velocity = moving.xyz + change;
   precise vec3 position = here.xyz + push.substepSeconds * change;
   if (push.collision.colliderCount > 0) {
-    // With the cloth's friction and thickness against colliders.
-    Toucher who = Toucher(uint(record) / CLOTHSTREAM_CLOTH_TEXELS, here.w);
-    collideWithAll(node, who, push.collision, texelFetch(cloths, record + 3).w,
-                   texelFetch(cloths, record + 2).w, texelFetch(startPositions, int(node)).xyz, position,
+    CollidingNode collidingNode = CollidingNode(node, number, here.w, cloth.thickness, cloth.friction);
+    collideWithAll(collidingNode, push.collision, texelFetch(startPositions, int(node)).xyz, position,
                    velocity);
   }
   positions[node] = vec4(snapTiny(position), here.w);

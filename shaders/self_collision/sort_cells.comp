@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The balls of a cell in the order of their nodes, whatever the order in which they came: each counts those
-// that belong before it. Writes cannot race: no two nodes have one rank.
+// Sorts the balls of a cell by node, independent of the order in which they came. Each ball counts those
+// before it. Writes cannot race: no two nodes have the same rank.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 
@@ -36,7 +36,7 @@ void main() {
   uint first = starts[entry];
   uint end = starts[entry + 1];
   uint place = slot;
-  // A cell with more is passed over by all who would read it.
+  // Searches skip a cell with more balls.
   if (end - first <= kMaxInRow) {
     place = first;
     while (first < end) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Where each cell's balls begin: the exclusive prefix sum of their counts, an invocation a block of entries.
+// Computes where each cell's balls begin: the exclusive prefix sum of the counts, one invocation per block of
+// entries.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 
@@ -8,10 +9,10 @@
 layout(local_size_x_id = 0) in;
 
 layout(std430, binding = 0) buffer Table {
-  uint table[];  // counts; where the next ball goes afterwards
+  uint table[];  // counts before, start of each cell after
 };
 layout(std430, binding = 1) writeonly buffer Starts {
-  uint starts[];  // one more than entries
+  uint starts[];  // one more than there are entries
 };
 
 layout(push_constant) uniform Push {

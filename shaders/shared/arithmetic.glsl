@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
 // Float arithmetic that gives the same bits on every device.
 //
-// Vulkan fixes the result of addition, subtraction and multiplication alone; division, inversesqrt, dot,
-// length and normalize may differ from device to device, and so may an expression that the compiler is free
-// to contract or reorder. Kernels of the simulation therefore use only + - * and comparisons on `precise`
-// variables, and these functions (and max() where neither side is NaN). Devices may also flush denormal
-// numbers to zero or keep them: what is stored is snapped to zero below kTiny, far above the denormals, so
-// that neither choice can be seen in the state.
+// Vulkan fixes the result of addition, subtraction and multiplication only. Division, inversesqrt, dot,
+// length and normalize may differ between devices. So may an expression that the compiler is free to contract
+// or reorder. Kernels of the simulation therefore use only + - * and comparisons on `precise` variables, the
+// functions below, and max() if neither side is NaN. Devices may flush denormal numbers to zero or keep them.
+// Stored values below kTiny, which is far above the denormals, become zero, so that the state shows neither
+// choice.
 #ifndef CLOTHSTREAM_SHADERS_SHARED_ARITHMETIC_GLSL
 #define CLOTHSTREAM_SHADERS_SHARED_ARITHMETIC_GLSL
 
@@ -23,10 +23,10 @@ vec3 crossProduct(vec3 a, vec3 b) {
 }
 
 // 1 / sqrt(x) for a finite, normal x > 0, with a relative error below 7e-7.
-// Subtracting half of the bits from a constant negates and halves the exponent: x seed^2 then lies in [0.875,
-// 0.9924], whatever x. With u = 1 - x seed^2, what is left is (1 - u)^(-1/2), by its minimax cubic over that
-// range (error 6.5e-7; the rest is rounding). Springs err by less than by the rounding of their ends'
-// positions, which is 1e-7 of their distance from the origin.
+// Subtracting half of the bits from a constant negates and halves the exponent. For every x, x seed^2 then
+// lies in [0.875, 0.9924]. With u = 1 - x seed^2, the remaining factor is (1 - u)^(-1/2). It is computed by
+// its minimax cubic over that range (error 6.5e-7; the rest is rounding). The error of a spring's length
+// stays below the rounding of its ends' positions, which is 1e-7 of their distance from the origin.
 float reciprocalSquareRoot(float x) {
 #ifdef CLOTHSTREAM_BUILTIN_ARITHMETIC
   return inversesqrt(x);
@@ -39,7 +39,7 @@ float reciprocalSquareRoot(float x) {
 }
 
 // 1 / x for a finite, normal x > 0 whose inverse is normal too, with a relative error below 3e-7: the square
-// of the above, and one step of Newton's.
+// of reciprocalSquareRoot(x) and one Newton step.
 float reciprocal(float x) {
   float root = reciprocalSquareRoot(x);
   precise float seed = root * root;

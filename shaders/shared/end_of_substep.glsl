@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
-// The end of a node's substep where a solver has taken it: there it collides.
+// The end of a node's substep after its solver moved it: the node collides and is stored.
 //
-// The kernel that includes this defines kColliderBinding, kToldBinding and, from kStateBinding on, binds the
-// positions at the substep's start, then the positions and velocities that it ends with. `cloths` are its
-// ClothRecords.
+// The including kernel declares the table `cloths` and defines kColliderBinding, kContactImpulseBinding and
+// kStateBinding. From kStateBinding on it binds the positions at the substep's start, then the positions and
+// velocities at its end.
 #ifndef CLOTHSTREAM_SHADERS_SHARED_END_OF_SUBSTEP_GLSL
 #define CLOTHSTREAM_SHADERS_SHARED_END_OF_SUBSTEP_GLSL
 
@@ -19,12 +19,11 @@ layout(std430, binding = kStateBinding + 2) buffer Velocities {
   vec4 velocities[];
 };
 
-// `record`: the first texel of its cloth.
-void endSubstep(uint index, vec3 position, vec3 velocity, float inverseMass, int record, CollisionPush push) {
+void endSubstep(uint index, vec3 position, vec3 velocity, float inverseMass, uint cloth, CollisionPush push) {
   if (inverseMass > 0.0 && push.colliderCount > 0) {
-    Toucher who = Toucher(uint(record) / CLOTHSTREAM_CLOTH_TEXELS, inverseMass);
-    collideWithAll(index, who, push, texelFetch(cloths, record + 3).w, texelFetch(cloths, record + 2).w,
-                   texelFetch(startPositions, int(index)).xyz, position, velocity);
+    ClothRecord material = clothAt(cloths, cloth);
+    CollidingNode node = CollidingNode(index, cloth, inverseMass, material.thickness, material.friction);
+    collideWithAll(node, push, texelFetch(startPositions, int(index)).xyz, position, velocity);
   }
   positions[index] = vec4(snapTiny(position), inverseMass);
   velocities[index] = vec4(snapTiny(velocity), 0.0);

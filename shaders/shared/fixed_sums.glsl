@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: MIT
-// Sums over a workgroup whose bits do not depend on its size: kLanes fixed lanes, then a fixed tree.
+// Sums over a workgroup: kLanes fixed lanes, then a fixed tree. The bits do not depend on the workgroup's
+// size.
 #ifndef CLOTHSTREAM_SHADERS_SHARED_FIXED_SUMS_GLSL
 #define CLOTHSTREAM_SHADERS_SHARED_FIXED_SUMS_GLSL
 
 #include "shaders/shared/simulation.h"
 
-// Before gl_WorkGroupSize is used, or it would be 1.
+// This declaration must precede every use of gl_WorkGroupSize, which would be 1 otherwise.
 layout(local_size_x_id = 0) in;
 
 const uint kLanes = CLOTHSTREAM_SOLVE_LANES;
@@ -19,7 +20,7 @@ uint width() {
   return gl_WorkGroupSize.x;
 }
 
-// Of the lanes, written by whoever; every invocation gets it.
+// Sum of all lanes. Any invocation may have written a lane; every invocation gets the sum.
 vec2 sumOfLanes() {
   barrier();
   for (uint half_ = kLanes / 2; half_ > 0; half_ /= 2) {

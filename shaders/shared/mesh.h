@@ -1,41 +1,69 @@
 // SPDX-License-Identifier: MIT
-// Tables of meshes, laid out alike in C++ and in GLSL's std430.
+// Tables of meshes: which springs and triangles meet at each node.
 #ifndef CLOTHSTREAM_SHADERS_SHARED_MESH_H
 #define CLOTHSTREAM_SHADERS_SHARED_MESH_H
 
 #include "shaders/shared/types.h"
+#include "shaders/shared/whole_number.h"
 
 CLOTHSTREAM_SHARED_BEGIN
 
-// Read as texels of four floats, as the tables of simulation.h are.
-
-// Where the springs and triangles of a node are listed, two texels. Nodes of all meshes in their order.
+// The lists of one node. Records follow the order of the nodes of all meshes.
 #define CLOTHSTREAM_MESH_NODE_TEXELS 2
 struct MeshNodeRecord {
-  vec4 springs;    // first texel modulo 2^16, first / 2^16, how many texels
-  vec4 triangles;  // likewise
+  ListRecord springs;    // SpringPairRecords
+  ListRecord triangles;  // CornerPairRecords
 };
 
-// Two springs as one of their nodes sees them, in the order of model::springAdjacency(): the other node's
-// number in the scene plus one, negative of a shear spring; the rest length, negative of a bend spring. The
-// last texel is filled with a spring from the node to itself, which pulls with exactly zero.
+// One spring as one of its nodes sees it, in the order of model::springAdjacency(). `signedOther` is the
+// other node in the scene plus one, negative for a shear spring. `signedLength` is the rest length, negative
+// for a bend spring.
+struct SignedSpring {
+  float signedOther;
+  float signedLength;  // m
+};
+
+// Two springs of a node. A spring from the node to itself, which pulls with exactly zero, fills the last
+// record.
 struct SpringPairRecord {
-  vec4 ends;
+  SignedSpring springs[2];
 };
 
-// Two triangles as one of their corners sees them: the others, nodes of the scene, in the triangle's own
-// sense. The last texel is filled with a triangle of the node alone, which has exactly no area.
+// The other corners of one triangle as one of its corners sees it, in the triangle's orientation.
+struct OtherCorners {
+  float second;  // nodes in the scene
+  float third;
+};
+
+// Two triangles of a node. A triangle of the node alone, which has exactly no area, fills the last record.
 struct CornerPairRecord {
-  vec4 corners;
+  OtherCorners triangles[2];
 };
 
 CLOTHSTREAM_SHARED_END
 
 #ifdef __cplusplus
 namespace clothstream::shared {
-static_assert(sizeof(MeshNodeRecord) == 32 && offsetof(MeshNodeRecord, triangles) == 16);
+static_assert(sizeof(MeshNodeRecord) == CLOTHSTREAM_MESH_NODE_TEXELS * sizeof(vec4));
 static_assert(sizeof(SpringPairRecord) == 16 && sizeof(CornerPairRecord) == 16);
 }  // namespace clothstream::shared
+#else
+
+MeshNodeRecord meshNodeAt(samplerBuffer table, uint number) {
+  uint first = CLOTHSTREAM_MESH_NODE_TEXELS * number;
+  return MeshNodeRecord(listAt(table, first), listAt(table, first + 1));
+}
+
+SpringPairRecord springPairAt(samplerBuffer table, int texel) {
+  vec4 pair = texelFetch(table, texel);
+  return SpringPairRecord(SignedSpring[2](SignedSpring(pair.x, pair.y), SignedSpring(pair.z, pair.w)));
+}
+
+CornerPairRecord cornerPairAt(samplerBuffer table, int texel) {
+  vec4 pair = texelFetch(table, texel);
+  return CornerPairRecord(OtherCorners[2](OtherCorners(pair.x, pair.y), OtherCorners(pair.z, pair.w)));
+}
+
 #endif
 
 #endif

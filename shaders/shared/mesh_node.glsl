@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-// Which node of which mesh an invocation works on.
+// The mesh node that an invocation works on.
 //
-// Loops over a node's springs or triangles test first: their number differs between invocations, and lavapipe
-// 22.3 lets those that are done run on in a loop that tests at its end.
+// Loops over a node's springs or triangles test first. The count differs between invocations, and in a loop
+// that tests at its end lavapipe 22.3 lets finished invocations run on.
 #ifndef CLOTHSTREAM_SHADERS_SHARED_MESH_NODE_GLSL
 #define CLOTHSTREAM_SHADERS_SHARED_MESH_NODE_GLSL
 
@@ -12,45 +12,36 @@
 layout(local_size_x_id = 0) in;
 
 layout(binding = 0) uniform samplerBuffer cloths;  // ClothRecord
-layout(binding = 1) uniform samplerBuffer tiles;   // TileRecord of meshes
-// Where a kernel binds the lists; it says so before it includes this.
+layout(binding = 1) uniform samplerBuffer tiles;   // MeshTileRecord
+// The including kernel defines the first binding of the lists.
 layout(binding = CLOTHSTREAM_MESH_BINDING) uniform samplerBuffer meshNodes;            // MeshNodeRecord
 layout(binding = CLOTHSTREAM_MESH_BINDING + 1) uniform samplerBuffer triangleCorners;  // CornerPairRecord
 
 struct MeshNode {
   bool exists;
-  int cloth;   // first texel of its record
-  uint index;  // in the scene
-  int lists;   // first texel of its MeshNodeRecord
+  uint cloth;
+  uint index;   // in the scene
+  uint number;  // among the nodes of all meshes
 };
 
 MeshNode locateMeshNode(uint firstTile) {
-  vec4 tile = texelFetch(tiles, int(firstTile + gl_WorkGroupID.x));
+  MeshTileRecord tile = meshTileAt(tiles, firstTile + gl_WorkGroupID.x);
   MeshNode node;
-  node.cloth = CLOTHSTREAM_CLOTH_TEXELS * int(tile.x);
-  vec4 place = texelFetch(cloths, node.cloth);
-  uint inCloth = uint(tile.y) + gl_LocalInvocationID.x;
-  node.exists = inCloth < uint(place.w);
-  node.index = uint(place.x) + (uint(place.y) << 16) + inCloth;
-  node.lists = CLOTHSTREAM_MESH_NODE_TEXELS * int(uint(tile.z) + gl_LocalInvocationID.x);
+  node.cloth = uint(tile.cloth);
+  ClothRecord cloth = clothAt(cloths, node.cloth);
+  uint inCloth = uint(tile.firstNode) + gl_LocalInvocationID.x;
+  node.exists = inCloth < nodeCountOf(cloth);
+  node.index = firstNodeOf(cloth) + inCloth;
+  node.number = uint(tile.firstMeshNode) + gl_LocalInvocationID.x;
   return node;
 }
 
-struct TexelRange {
-  int first;
-  int end;
-};
-
 TexelRange springsOf(MeshNode node) {
-  vec4 list = texelFetch(meshNodes, node.lists);
-  int first = int(uint(list.x) + (uint(list.y) << 16));
-  return TexelRange(first, first + int(list.z));
+  return rangeOf(meshNodeAt(meshNodes, node.number).springs);
 }
 
 TexelRange trianglesOf(MeshNode node) {
-  vec4 list = texelFetch(meshNodes, node.lists + 1);
-  int first = int(uint(list.x) + (uint(list.y) << 16));
-  return TexelRange(first, first + int(list.z));
+  return rangeOf(meshNodeAt(meshNodes, node.number).triangles);
 }
 
 #endif

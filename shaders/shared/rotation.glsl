@@ -5,9 +5,10 @@
 
 #include "shaders/shared/arithmetic.glsl"
 
-// The normalised mean of two quaternions, one Newton step more exact than our reciprocal square root.
-vec4 turnedAt(vec4 start, vec4 turn, float progress) {
-  precise vec4 q = start + progress * turn;
+// The orientation after a share of the way from `start` to `start` plus `change`: the normalised mean of the
+// two quaternions. One Newton step makes it more exact than our reciprocal square root.
+vec4 orientationAt(vec4 start, vec4 change, float progress) {
+  precise vec4 q = start + progress * change;
   precise float squared = q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w;
   precise float inverse = reciprocalSquareRoot(squared);
   precise float half_ = (0.5 * squared * inverse) * inverse;

@@ -1,107 +1,139 @@
 // SPDX-License-Identifier: MIT
-// Tables and push constants of the simulation kernels, laid out alike in C++ and in GLSL's std430.
+// Tables and push constants of the simulation kernels. C++ and GLSL use the same layout.
 #ifndef CLOTHSTREAM_SHADERS_SHARED_SIMULATION_H
 #define CLOTHSTREAM_SHADERS_SHARED_SIMULATION_H
 
 #include "shaders/collision/collision.h"
+#include "shaders/shared/cloth_record.h"
 #include "shaders/shared/types.h"
+#include "shaders/shared/whole_number.h"
 
 CLOTHSTREAM_SHARED_BEGIN
 
-// Kernels read these tables as texels of four floats, which costs a software device a tenth of storage loads.
-// Whole numbers are floats too, exact below 2^24.
+// Kernels read these tables as texels of four floats: on a software device that costs a tenth of a load from
+// a storage buffer. Each record has one function that decodes it (`...At`), in the order of its members.
 
-// One cloth: where its nodes lie in the scene's buffers, its material and its solver. Row-major, SI units.
-#define CLOTHSTREAM_CLOTH_TEXELS 10
-#define CLOTHSTREAM_XPBD_TEXEL 7
-struct ClothRecord {
-  vec4 place;      // first node modulo 2^16, first node / 2^16, rows, columns; of a mesh: 0, nodes
-  vec4 spacing;    // of columns, of rows, along the diagonal; damping
-  vec4 stiffness;  // structural, shear, bend; friction
-  vec4 damping;    // structural, shear, bend; thickness
-  vec4 air;        // drag, lift; of self-collision: radius, friction
-  vec4 solver;  // compliance / h^2, iterations, square of the tolerance; whether bend springs are solved for
-  vec4 limits;  // stretch that springs are held at; part of more that is taken back; 0: always; flexural
-                // rigidity
-  // Of xpbd: structural, shear, bend as model::XpbdSpring; of their w the first is the number of iterations,
-  // the second the inverse mass of a grid's nodes.
-  vec4 springs[3];
-};
-
-// One workgroup of a kernel that walks down columns: its first invocation starts at (row, column) of the
-// cloth. The others follow along the row, and from its end at the start of the next strip of rows.
+// One workgroup of a kernel that walks down the columns of a grid. Its first invocation starts at (row,
+// column). The others follow along the row and continue at the start of the next strip of rows.
 struct TileRecord {
-  vec4 start;  // cloth, row, column
+  float cloth;
+  float row;
+  float column;
+  float reserved;
 };
 
-// Nodes that one invocation of a solve walks along, and walks in a chunk: the lanes of its sums.
+// One workgroup of a kernel that works on a mesh.
+struct MeshTileRecord {
+  float cloth;
+  float firstNode;      // in the cloth
+  float firstMeshNode;  // among the nodes of all meshes
+  float reserved;
+};
+
+// Consecutive nodes that one invocation of a solve handles; lanes of a chunk and of its sums.
 #define CLOTHSTREAM_SOLVE_WALK 4
 #define CLOTHSTREAM_SOLVE_LANES 64
 
-// One cloth that a linear system is solved for.
+// One cloth whose linear system is solved.
 #define CLOTHSTREAM_SYSTEM_TEXELS 3
 struct SystemRecord {
-  vec4 springs;  // of a mesh: the first modulo 2^16, the first / 2^16, how many; of all: the cloth
-  vec4 nodes;    // the first, how many; of a grid: rows, columns
-  vec4 chunks;   // the first, how many
+  float firstSpringLow;  // of a mesh: wholeNumber(low, high)
+  float firstSpringHigh;
+  float springCount;
+  float cloth;
+
+  float firstNode;
+  float nodeCount;
+  float rows;  // of a grid
+  float columns;
+
+  float firstChunk;
+  float chunkCount;
+  float reserved0, reserved1;
 };
 
-// A workgroup of most of a solve's kernels.
+// A workgroup of most kernels of a solve.
 struct ChunkRecord {
-  vec4 part;  // system, which of its chunks
+  float system;
+  float chunk;  // in the system
+  float reserved0, reserved1;
 };
 
-// A spring of a mesh: its two nodes in the scene, its length. Its last number is the cloth times
-// CLOTHSTREAM_SPRING_KINDS, plus its kind in the order of ClothRecord::stiffness.
+// A spring of a mesh in a linear system. `clothAndKind` is the cloth times CLOTHSTREAM_SPRING_KINDS plus the
+// kind: 0 structural, 1 shear, 2 bend.
 #define CLOTHSTREAM_SPRING_KINDS 3
 struct LinkRecord {
-  vec4 ends;  // a, b, rest length; cloth and kind
+  float a;  // nodes in the scene
+  float b;
+  float restLength;  // m
+  float clothAndKind;
 };
 
-// Two of the springs that meet at a node: the number of a spring of the cloth plus one, negative where the
-// node is its second end, and the other end in the scene; 0 and the node itself fill the last texel.
+// One end of a spring as the node at that end sees it. `signedSpring` is the number of the spring in the
+// cloth plus one; it is negative if the node is the spring's second end, and 0 if there is no spring.
+struct SpringEnd {
+  float signedSpring;
+  float other;  // node at the other end; the node itself if there is no spring
+};
+
+// Two of the springs that meet at a node. ListRecord says where the records of a node are.
 struct SpringEndsRecord {
-  vec4 two;  // number, other end; number, other end
+  SpringEnd ends[2];
 };
 
-// Which springs meet at a node of a mesh: SpringEndsRecords.
-struct IncidenceRecord {
-  vec4 list;  // the first texel modulo 2^16, the first / 2^16, how many texels
-};
-
-// What a solve says of itself, and what it goes on from.
+// State and result of a solve.
 struct SolveRecord {
   uint32_t iterations;
-  float residual;        // its norm, relative to where it started
+  float residual;        // norm, relative to its start
   uint32_t constraints;  // active ones
-  uint32_t running;      // whether this iteration takes a step
-  float start;           // square of the residual's norm when it started, and in this iteration
-  float square;
-  float stepLength;  // of this iteration, and how much of the last direction is in this one's
-  float turn;
-  uint32_t arrived;  // active chunks times 2^16, those that have done this iteration
+  uint32_t running;      // 1: this iteration takes a step
+  float start;           // square of the residual's norm at the start
+  float square;          // square of the residual's norm in this iteration
+  float stepLength;      // alpha of this iteration
+  float directionShare;  // beta: share of the last direction in the new one
+  uint32_t arrived;      // active chunks times 2^16, plus chunks that finished this iteration
 };
 
-// A workgroup of a kernel that corrects springs.
-struct XpbdTile {
-  vec4 start;  // cloth; of a grid: the first block, the first multiplier modulo 2^24, and / 2^24;
-               // of a mesh: the first colour, colours
+// A workgroup of a kernel that corrects springs or finishes a substep. One table holds all three kinds.
+struct XpbdGridTile {
+  float cloth;
+  float firstBlock;
+  float firstMultiplierLow;  // modulo 2^24
+  float firstMultiplierHigh;
+};
+struct XpbdMeshTile {
+  float cloth;
+  float firstColour;
+  float colourCount;
+  float reserved;
+};
+struct XpbdNodeTile {
+  float cloth;
+  float firstNode;  // in the cloth
+  float reserved0, reserved1;
 };
 
 // A colour of a mesh that one workgroup corrects.
 struct ColourRecord {
-  vec4 springs;  // the first modulo 2^24, and / 2^24; how many
+  float firstSpringLow;  // modulo 2^24
+  float firstSpringHigh;
+  float springCount;
+  float reserved;
 };
 
 // A spring of a mesh that is corrected.
 struct XpbdLinkRecord {
-  vec4 ends;  // a, b, rest length; structural, shear or bend: 0, 1, 2
+  float a;  // nodes in the scene
+  float b;
+  float restLength;  // m
+  float kind;        // 0 structural, 1 shear, 2 bend
 };
 
-// What differs from substep to substep and from tick to tick.
 struct AdvancePush {
-  vec4 gravityStep;  // w: seconds of a substep
-  vec4 windAir;      // w: air density / 6, half of it for each of a triangle's three nodes
+  vec3 gravity;       // m/s^2
+  float stepSeconds;  // of a substep, or of a Runge-Kutta stage
+  vec3 wind;          // m/s
+  float airFactor;    // air density / 6: half of it, for each of a triangle's three nodes
   CollisionPush collision;
   uint32_t firstTile;
   uint32_t reserved0, reserved1, reserved2;
@@ -116,13 +148,13 @@ struct RungeKuttaPush {
 };
 
 struct PreparePush {
-  uint32_t nodes;  // of the scene
+  uint32_t nodes;  // in the scene
   uint32_t firstChunk;
   uint32_t chunks;
-  uint32_t smallSystems;  // which one workgroup solves each
+  uint32_t smallSystems;  // systems that one workgroup solves each
   uint32_t firstLargeChunk;
   uint32_t largeChunks;
-  uint32_t firstGroup;  // where the number of workgroups goes: of chunks, of small systems, of large chunks
+  uint32_t firstGroup;  // index of the dispatch sizes: of all chunks, of small systems, of large chunks
   float substepSeconds;
   float substepRate;     // 1/s
   uint32_t firstSpring;  // of meshes
@@ -130,17 +162,17 @@ struct PreparePush {
 };
 
 struct SolvePush {
-  uint32_t nodes;           // of the scene
-  uint32_t firstSystem;     // where one workgroup solves a system
+  uint32_t nodes;           // in the scene
+  uint32_t firstSystem;     // if one workgroup solves a system
   uint32_t firstIteration;  // of this dispatch
   uint32_t endIteration;
-  uint32_t firstChunk;  // where several do
-  uint32_t nextGroup;   // where their number goes if another iteration is to come
+  uint32_t firstChunk;  // if several workgroups solve a system
+  uint32_t nextGroup;   // index of the dispatch size of the next iteration
 };
 
 struct ApplyPush {
   CollisionPush collision;
-  uint32_t nodes;  // of the scene
+  uint32_t nodes;  // in the scene
   uint32_t firstChunk;
   float substepSeconds;
   uint32_t reserved;
@@ -150,7 +182,7 @@ struct XpbdPush {
   uint32_t firstTile;
   uint32_t firstIteration;  // of this dispatch
   uint32_t endIteration;
-  // Of a mesh, where a dispatch does one colour.
+  // For a dispatch that corrects one colour of a mesh:
   uint32_t cloth;
   uint32_t firstSpring;
   uint32_t springs;
@@ -169,11 +201,12 @@ struct HashPush {
   uint32_t nodeCount;
 };
 
-// What a tick says of its state. Sums of the nodes' hashes modulo 2^32: their order does not matter.
+// Result of a tick. The hash is the sum of the nodes' hashes modulo 2^32, so that their order does not
+// matter.
 struct StatusRecord {
   uint32_t hashLow;
   uint32_t hashHigh;
-  uint32_t unhealthy;  // not 0: some component is not finite, or outside the world
+  uint32_t unhealthy;  // not 0: a component is not finite or outside the world
   uint32_t reserved;
 };
 
@@ -181,22 +214,78 @@ CLOTHSTREAM_SHARED_END
 
 #ifdef __cplusplus
 namespace clothstream::shared {
-static_assert(sizeof(ClothRecord) == CLOTHSTREAM_CLOTH_TEXELS * sizeof(vec4) &&
-              offsetof(ClothRecord, spacing) == 16 && offsetof(ClothRecord, stiffness) == 32 &&
-              offsetof(ClothRecord, damping) == 48 && offsetof(ClothRecord, air) == 64 &&
-              offsetof(ClothRecord, solver) == 80 && offsetof(ClothRecord, limits) == 96 &&
-              offsetof(ClothRecord, springs) == CLOTHSTREAM_XPBD_TEXEL * sizeof(vec4));
-static_assert(sizeof(XpbdTile) == 16 && sizeof(ColourRecord) == 16 && sizeof(XpbdLinkRecord) == 16);
-static_assert(sizeof(XpbdPush) == 28 && sizeof(FinishPush) == 48);
-static_assert(sizeof(SystemRecord) == CLOTHSTREAM_SYSTEM_TEXELS * sizeof(vec4));
-static_assert(sizeof(SolveRecord) == 36 && sizeof(PreparePush) == 44 && sizeof(SolvePush) == 24 &&
-              sizeof(ApplyPush) == 48 && sizeof(RungeKuttaPush) == 48);
-static_assert(sizeof(TileRecord) == 16);
-static_assert(sizeof(AdvancePush) == 80 && offsetof(AdvancePush, windAir) == 16 &&
+static_assert(sizeof(TileRecord) == 16 && sizeof(MeshTileRecord) == 16 && sizeof(ListRecord) == 16);
+static_assert(sizeof(SystemRecord) == CLOTHSTREAM_SYSTEM_TEXELS * sizeof(vec4) && sizeof(ChunkRecord) == 16 &&
+              sizeof(LinkRecord) == 16 && sizeof(SpringEndsRecord) == 16);
+static_assert(sizeof(XpbdGridTile) == 16 && sizeof(XpbdMeshTile) == 16 && sizeof(XpbdNodeTile) == 16 &&
+              sizeof(ColourRecord) == 16 && sizeof(XpbdLinkRecord) == 16);
+static_assert(sizeof(AdvancePush) == 80 && offsetof(AdvancePush, wind) == 16 &&
               offsetof(AdvancePush, collision) == 32 && offsetof(AdvancePush, firstTile) == 64);
-static_assert(sizeof(HashPush) == 4);
+static_assert(sizeof(SolveRecord) == 36 && sizeof(PreparePush) == 44 && sizeof(SolvePush) == 24 &&
+              sizeof(ApplyPush) == 48 && sizeof(RungeKuttaPush) == 48 && sizeof(XpbdPush) == 28 &&
+              sizeof(FinishPush) == 48 && sizeof(HashPush) == 4);
 static_assert(sizeof(StatusRecord) == 16 && offsetof(StatusRecord, unhealthy) == 8);
 }  // namespace clothstream::shared
+#else
+
+TileRecord tileAt(samplerBuffer table, uint number) {
+  vec4 texel = texelFetch(table, int(number));
+  return TileRecord(CLOTHSTREAM_FLOATS(texel));
+}
+
+MeshTileRecord meshTileAt(samplerBuffer table, uint number) {
+  vec4 texel = texelFetch(table, int(number));
+  return MeshTileRecord(CLOTHSTREAM_FLOATS(texel));
+}
+
+SystemRecord systemRecordAt(samplerBuffer table, uint number) {
+  int first = CLOTHSTREAM_SYSTEM_TEXELS * int(number);
+  vec4 springs = texelFetch(table, first);
+  vec4 nodes = texelFetch(table, first + 1);
+  vec4 chunks = texelFetch(table, first + 2);
+  return SystemRecord(CLOTHSTREAM_FLOATS(springs), CLOTHSTREAM_FLOATS(nodes), CLOTHSTREAM_FLOATS(chunks));
+}
+
+ChunkRecord chunkAt(samplerBuffer table, uint number) {
+  vec4 texel = texelFetch(table, int(number));
+  return ChunkRecord(CLOTHSTREAM_FLOATS(texel));
+}
+
+LinkRecord linkAt(samplerBuffer table, uint number) {
+  vec4 texel = texelFetch(table, int(number));
+  return LinkRecord(CLOTHSTREAM_FLOATS(texel));
+}
+
+SpringEndsRecord springEndsAt(samplerBuffer table, int texel) {
+  vec4 ends = texelFetch(table, texel);
+  return SpringEndsRecord(SpringEnd[2](SpringEnd(ends.x, ends.y), SpringEnd(ends.z, ends.w)));
+}
+
+XpbdGridTile xpbdGridTileAt(samplerBuffer table, uint number) {
+  vec4 texel = texelFetch(table, int(number));
+  return XpbdGridTile(CLOTHSTREAM_FLOATS(texel));
+}
+
+XpbdMeshTile xpbdMeshTileAt(samplerBuffer table, uint number) {
+  vec4 texel = texelFetch(table, int(number));
+  return XpbdMeshTile(CLOTHSTREAM_FLOATS(texel));
+}
+
+XpbdNodeTile xpbdNodeTileAt(samplerBuffer table, uint number) {
+  vec4 texel = texelFetch(table, int(number));
+  return XpbdNodeTile(CLOTHSTREAM_FLOATS(texel));
+}
+
+ColourRecord colourAt(samplerBuffer table, uint number) {
+  vec4 texel = texelFetch(table, int(number));
+  return ColourRecord(CLOTHSTREAM_FLOATS(texel));
+}
+
+XpbdLinkRecord xpbdLinkAt(samplerBuffer table, uint number) {
+  vec4 texel = texelFetch(table, int(number));
+  return XpbdLinkRecord(CLOTHSTREAM_FLOATS(texel));
+}
+
 #endif
 
 #endif

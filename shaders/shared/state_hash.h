@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The hash of a simulation state: integer operations alone, so that C++ and every device agree.
+// The hash of a simulation state. It uses integer operations only, so that C++ and every device agree.
 #ifndef CLOTHSTREAM_SHADERS_SHARED_STATE_HASH_H
 #define CLOTHSTREAM_SHADERS_SHARED_STATE_HASH_H
 
@@ -20,8 +20,8 @@ CLOTHSTREAM_SHARED_FUNCTION NodeHash absorbWord(NodeHash hash, uint32_t word) {
   return hash;
 }
 
-// Of one node: its index in the scene, and the bits of its position and velocity. A state's hash is the sum
-// of its nodes' hashes, each half modulo 2^32.
+// Hash of one node from its index in the scene and the bits of its position and velocity. A state's hash is
+// the sum of its nodes' hashes, each half modulo 2^32.
 CLOTHSTREAM_SHARED_FUNCTION NodeHash hashNode(uint32_t index, uint32_t px, uint32_t py, uint32_t pz,
                                               uint32_t vx, uint32_t vy, uint32_t vz) {
   NodeHash hash;
@@ -34,12 +34,12 @@ CLOTHSTREAM_SHARED_FUNCTION NodeHash hashNode(uint32_t index, uint32_t px, uint3
   hash = absorbWord(hash, vx);
   hash = absorbWord(hash, vy);
   hash = absorbWord(hash, vz);
-  // One round more spreads the last word over all bits.
+  // One more round spreads the last word over all bits.
   return absorbWord(hash, 0xC2B2AE3Du);
 }
 
-// Whether a float with these bits is infinite, not a number, or further than 8192 from zero: without its
-// sign, a float's bits order as its magnitude does, and what is not finite comes after everything that is.
+// True if a float with these bits is infinite, not a number, or further than 8192 from zero. Without the
+// sign, the bits of floats have the order of their magnitudes, and non-finite floats come last.
 CLOTHSTREAM_SHARED_FUNCTION bool isOutsideWorld(uint32_t bits) {
   return (bits & 0x7FFFFFFFu) > 0x46000000u;
 }

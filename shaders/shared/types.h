@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The scalar types and the namespace of what C++ and GLSL both include.
+// Scalar types, vectors and the namespace of headers that C++ and GLSL both include.
 #ifndef CLOTHSTREAM_SHADERS_SHARED_TYPES_H
 #define CLOTHSTREAM_SHADERS_SHARED_TYPES_H
 
@@ -15,6 +15,11 @@
 namespace clothstream::shared {
 using std::uint32_t;
 
+// Three floats without padding. A float follows a vec3 in every shared struct, so that C++ and std430 agree.
+struct vec3 {
+  float x, y, z;
+};
+
 struct alignas(16) vec4 {
   float x, y, z, w;
 };
@@ -26,6 +31,10 @@ struct alignas(16) vec4 {
 #define CLOTHSTREAM_SHARED_END
 #define CLOTHSTREAM_SHARED_FUNCTION
 #define uint32_t uint
+
+// Arguments of a record's constructor from a texel: four floats, or a vec3 and a float.
+#define CLOTHSTREAM_FLOATS(texel) (texel).x, (texel).y, (texel).z, (texel).w
+#define CLOTHSTREAM_VECTOR(texel) (texel).xyz, (texel).w
 
 #endif
 

@@ -1,21 +1,21 @@
 // SPDX-License-Identifier: MIT
-// What was solved for takes every node of its cloths from where the forces alone took it; then it collides.
-// One chunk a workgroup; every node belongs to one invocation.
+// Adds the solution to the free motion of every node; then the node collides. A workgroup handles one chunk;
+// every node belongs to one invocation.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 
 const int kColliderBinding = 4;
 const int kStateBinding = 6;
-const int kToldBinding = 10;
+const int kContactImpulseBinding = 10;
 
-#include "shaders/solve/system.glsl"
-// Reads `cloths`.
+#include "shaders/solve/linear_system.glsl"
+// This header reads the table `cloths`, which linear_system.glsl declares.
 #include "shaders/shared/end_of_substep.glsl"
 
 layout(binding = 3) uniform samplerBuffer vectors;
 
 layout(std430, binding = 9) readonly buffer Actives {
-  uint actives[];  // a chunk: kActive
+  uint actives[];  // by chunk: kActive
 };
 
 layout(push_constant) uniform Push {
@@ -23,12 +23,12 @@ layout(push_constant) uniform Push {
 };
 
 void main() {
-  vec4 part = texelFetch(chunks, int(push.firstChunk + gl_WorkGroupID.x));
-  System system = systemAt(uint(part.x));
-  bool solved = (actives[system.firstChunk + uint(part.y)] & kActive) != 0;
+  ChunkRecord part = chunkAt(chunks, push.firstChunk + gl_WorkGroupID.x);
+  System system = systemAt(uint(part.system));
+  bool solved = (actives[system.firstChunk + uint(part.chunk)] & kActive) != 0;
   uint lane = self();
   do {
-    Walk walk = walkAt(system, uint(part.y) * kLanes + lane);
+    Walk walk = walkAt(system, uint(part.chunk) * kLanes + lane);
     uint k = 0;
     do {
       if (k < walk.count) {

@@ -1,27 +1,30 @@
 // SPDX-License-Identifier: MIT
-// Which chunks of ACAD's grids have a spring that the forces alone would stretch too far, [Va21] 3.3: all
-// else of the solve is left out where none has. One chunk a workgroup.
+// Finds the chunks of ACAD's grids with a spring that the forces alone would stretch too far, [Va21] 3.3. The
+// solve skips the other chunks. A workgroup handles one chunk.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 
-#include "shaders/solve/weigh.glsl"
+#include "shaders/solve/spring_terms.glsl"
 
-// Whether a spring between here and there is to be a constraint; `longest`: below 0 where there is none.
+// True if the spring between `here` and `there` becomes a constraint. `longest` below 0 means no spring.
 bool isStretched(vec4 here, vec4 there, float longest) {
-  return longest >= 0.0 && here.w + there.w > 0.0 && isTooLong(here.xyz, there.xyz, longest);
+  precise float inverseMasses = here.w + there.w;
+  return longest >= 0.0 && inverseMasses > 0.0 && isTooLong(here.xyz, there.xyz, longest);
 }
 
-// Down a column, with a window of registers as in vectors.glsl. A spring is looked at from each of its nodes,
-// as either may lie in another chunk.
-bool isAnyStretched(System system, Walk walk, vec4 spacing, float activation, bool hasBend) {
+// Walks down a column with a window of registers, as in conjugate_gradient.glsl. Both nodes of a spring check
+// it, because they may lie in different chunks.
+bool isAnyStretched(System system, Walk walk, ClothRecord cloth) {
+  vec3 spacing = vec3(cloth.columnSpacing, cloth.rowSpacing, cloth.diagonalSpacing);
+  bool hasBend = cloth.solvesBend != 0.0;
   uint columns = system.columns;
   uint lastRow = system.rows - 1;
   uint toLeft = walk.column > 0 ? 1 : 0;
   uint toRight = walk.column + 1 < columns ? 1 : 0;
   uint toLeft2 = walk.column > 1 ? 2 : 0;
   uint toRight2 = walk.column + 2 < columns ? 2 : 0;
-  precise vec3 longest = spacing.xyz + activation * spacing.xyz;
-  precise vec2 bend = hasBend ? 2.0 * spacing.xy + activation * (2.0 * spacing.xy) : vec2(1e18);
+  precise vec3 longest = spacing + cloth.activation * spacing;
+  precise vec2 bend = hasBend ? 2.0 * spacing.xy + cloth.activation * (2.0 * spacing.xy) : vec2(1e18);
   float left2Longest = toLeft2 > 0 ? bend.x : -1.0;
   float right2Longest = toRight2 > 0 ? bend.x : -1.0;
   float leftLongest = toLeft > 0 ? longest.x : -1.0;
@@ -78,21 +81,19 @@ bool isAnyStretched(System system, Walk walk, vec4 spacing, float activation, bo
 }
 
 void main() {
-  vec4 part = texelFetch(chunks, int(push.firstChunk + gl_WorkGroupID.x));
-  System system = systemAt(uint(part.x));
-  vec4 spacing = texelFetch(cloths, system.cloth + 1);
-  float activation = texelFetch(cloths, system.cloth + 6).x;
-  bool hasBend = texelFetch(cloths, system.cloth + 5).w != 0.0;
+  ChunkRecord part = chunkAt(chunks, push.firstChunk + gl_WorkGroupID.x);
+  System system = systemAt(uint(part.system));
+  ClothRecord cloth = clothAt(cloths, system.cloth);
   beginChunk();
   uint lane = self();
   bool any = false;
   do {
-    Walk walk = walkAt(system, uint(part.y) * kLanes + lane);
-    any = isAnyStretched(system, walk, spacing, activation, hasBend) && walk.count > 0 || any;
+    Walk walk = walkAt(system, uint(part.chunk) * kLanes + lane);
+    any = isAnyStretched(system, walk, cloth) && walk.count > 0 || any;
     lane += width();
   } while (lane < kLanes);
   if (any) {
     atomicOr(touched, 1);
   }
-  keepActive(system, uint(part.y));
+  keepActive(system, uint(part.chunk));
 }

@@ -1,27 +1,28 @@
 // SPDX-License-Identifier: MIT
-// The matrix times the preconditioned residuals, a chunk a workgroup, and the dot products of an iteration of
-// conjugate gradients. Whichever workgroup of a system ends last adds up the chunks' sums, in their order.
+// Multiplies the matrix by the preconditioned residuals and computes the dot products of an iteration of
+// conjugate gradients. A workgroup handles one chunk. The workgroup of a system that ends last adds up the
+// chunks' sums in their order.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 
-#include "shaders/solve/vectors.glsl"
+#include "shaders/solve/conjugate_gradient.glsl"
 
-// Only the residual's norm, for the report.
+// True: only measures the residual's norm, for the report.
 layout(constant_id = 5) const bool kMeasure = false;
 
 layout(std430, binding = 13) buffer Groups {
-  uint groups[];  // three numbers an iteration: how many workgroups it takes
+  uint groups[];  // dispatch sizes, three numbers per iteration
 };
 
 shared bool last;
 
 void main() {
-  vec4 part = ownChunk();
-  System system = systemAt(uint(part.x));
+  ChunkRecord part = ownChunk();
+  System system = systemAt(uint(part.system));
   if (kMeasure) {
-    measureChunk(system, uint(part.y));
+    measureChunk(system, uint(part.chunk));
   } else {
-    multiplyChunk(system, uint(part.y));
+    multiplyChunk(system, uint(part.chunk));
   }
   if (self() == 0) {
     memoryBarrierBuffer();

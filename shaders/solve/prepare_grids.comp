@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: MIT
-// The systems of grids at the substep's start: the weight of each spring, kept at one of its nodes, and what
-// conjugate gradients start with at each node. One chunk a workgroup; every node belongs to one invocation.
+// Computes the systems of grids at the substep's start: the weight of each spring, stored at one of its
+// nodes, and the start of conjugate gradients at each node. A workgroup handles one chunk; every node belongs
+// to one invocation.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 
-#include "shaders/solve/weigh.glsl"
+#include "shaders/solve/spring_terms.glsl"
 
 layout(std430, binding = 10) writeonly buffer Along {
-  vec4 along[];  // vectors.glsl
+  vec4 along[];  // SpringWeights
 };
 layout(std430, binding = 11) writeonly buffer Across {
   vec4 across[];
@@ -16,59 +17,55 @@ layout(std430, binding = 12) writeonly buffer Vectors {
   vec4 vectors[];
 };
 
-struct Cloth {
+struct Grid {
   uint start, rows, columns;
-  Kind alongRow, alongColumn, shear, bendRow, bendColumn;
+  SpringKind alongRow, alongColumn, shear, bendRow, bendColumn;
   bool hasBend;
-  vec4 limits;
-  float compliance;
+  ClothRecord cloth;
 };
 
-Kind kindOf(float restLength, float stiffness, float damping) {
-  precise float elastic = push.substepSeconds * push.substepSeconds * stiffness;
-  precise float viscous = push.substepSeconds * damping;
-  return Kind(restLength, elastic, viscous);
+Grid gridOf(System system) {
+  ClothRecord cloth = clothAt(cloths, system.cloth);
+  float structural = cloth.structuralStiffness, structuralDamping = cloth.structuralDamping;
+  precise float bendRow = 2.0 * cloth.columnSpacing;
+  precise float bendColumn = 2.0 * cloth.rowSpacing;
+  float bend = cloth.bendStiffness, bendDamping = cloth.bendDamping;
+  return Grid(system.firstNode, system.rows, system.columns,
+              springKind(cloth.columnSpacing, structural, structuralDamping),
+              springKind(cloth.rowSpacing, structural, structuralDamping),
+              springKind(cloth.diagonalSpacing, cloth.shearStiffness, cloth.shearDamping),
+              springKind(bendRow, bend, bendDamping), springKind(bendColumn, bend, bendDamping),
+              kBend && cloth.solvesBend != 0.0, cloth);
 }
 
-Cloth clothOf(System system) {
-  vec4 spacing = texelFetch(cloths, system.cloth + 1);
-  vec4 solver = texelFetch(cloths, system.cloth + 5);
-  vec4 k = texelFetch(cloths, system.cloth + 2);
-  vec4 d = texelFetch(cloths, system.cloth + 3);
-  return Cloth(system.firstNode, system.rows, system.columns, kindOf(spacing.x, k.x, d.x),
-               kindOf(spacing.y, k.x, d.x), kindOf(spacing.z, k.y, d.y), kindOf(2.0 * spacing.x, k.z, d.z),
-               kindOf(2.0 * spacing.y, k.z, d.z), kBend && solver.w != 0.0,
-               texelFetch(cloths, system.cloth + 6), solver.x);
+// Node of a grid; a place beyond an edge gives the node on the edge.
+uint nodeAt(Grid grid, int row, int column) {
+  return grid.start + uint(clamp(row, 0, int(grid.rows) - 1)) * grid.columns +
+         uint(clamp(column, 0, int(grid.columns) - 1));
 }
 
-// A node beyond an edge lies on it.
-uint nodeAt(Cloth cloth, int row, int column) {
-  return cloth.start + uint(clamp(row, 0, int(cloth.rows) - 1)) * cloth.columns +
-         uint(clamp(column, 0, int(cloth.columns) - 1));
+Weight springTo(Grid grid, End here, int row, int column, SpringKind kind, bool exists) {
+  bool inside = row >= 0 && row < int(grid.rows) && column >= 0 && column < int(grid.columns);
+  return weightOf(here, endAt(nodeAt(grid, row, column)), kind, grid.cloth, exists && inside);
 }
 
-Weight springTo(Cloth cloth, End here, int row, int column, Kind kind, bool exists) {
-  bool inside = row >= 0 && row < int(cloth.rows) && column >= 0 && column < int(cloth.columns);
-  return weigh(here, endAt(nodeAt(cloth, row, column)), kind, cloth.limits, exists && inside);
-}
-
-void prepareNode(Cloth cloth, int row, int column, bool stored) {
-  uint node = nodeAt(cloth, row, column);
+void prepareNode(Grid grid, int row, int column, bool stored) {
+  uint node = nodeAt(grid, row, column);
   End here = endAt(node);
-  Weight right = springTo(cloth, here, row, column + 1, cloth.alongRow, true);
-  Weight below = springTo(cloth, here, row + 1, column, cloth.alongColumn, true);
-  Weight rightBelow = springTo(cloth, here, row + 1, column + 1, cloth.shear, true);
-  Weight right2 = springTo(cloth, here, row, column + 2, cloth.bendRow, cloth.hasBend);
-  Weight below2 = springTo(cloth, here, row + 2, column, cloth.bendColumn, cloth.hasBend);
-  End rightEnd = endAt(nodeAt(cloth, row, column + 1));
-  Weight fromRight = springTo(cloth, rightEnd, row + 1, column, cloth.shear, column + 1 < int(cloth.columns));
-  Weight others[6] = Weight[](springTo(cloth, here, row, column - 1, cloth.alongRow, true),
-                              springTo(cloth, here, row - 1, column, cloth.alongColumn, true),
-                              springTo(cloth, here, row - 1, column - 1, cloth.shear, true),
-                              springTo(cloth, here, row - 1, column + 1, cloth.shear, true),
-                              springTo(cloth, here, row + 1, column - 1, cloth.shear, true),
-                              springTo(cloth, here, row, column - 2, cloth.bendRow, cloth.hasBend));
-  Weight above2 = springTo(cloth, here, row - 2, column, cloth.bendColumn, cloth.hasBend);
+  Weight right = springTo(grid, here, row, column + 1, grid.alongRow, true);
+  Weight below = springTo(grid, here, row + 1, column, grid.alongColumn, true);
+  Weight rightBelow = springTo(grid, here, row + 1, column + 1, grid.shear, true);
+  Weight right2 = springTo(grid, here, row, column + 2, grid.bendRow, grid.hasBend);
+  Weight below2 = springTo(grid, here, row + 2, column, grid.bendColumn, grid.hasBend);
+  End rightEnd = endAt(nodeAt(grid, row, column + 1));
+  Weight fromRight = springTo(grid, rightEnd, row + 1, column, grid.shear, column + 1 < int(grid.columns));
+  Weight others[6] = Weight[](springTo(grid, here, row, column - 1, grid.alongRow, true),
+                              springTo(grid, here, row - 1, column, grid.alongColumn, true),
+                              springTo(grid, here, row - 1, column - 1, grid.shear, true),
+                              springTo(grid, here, row - 1, column + 1, grid.shear, true),
+                              springTo(grid, here, row + 1, column - 1, grid.shear, true),
+                              springTo(grid, here, row, column - 2, grid.bendRow, grid.hasBend));
+  Weight above2 = springTo(grid, here, row - 2, column, grid.bendColumn, grid.hasBend);
 
   precise vec3 impulse = right.impulse + below.impulse + rightBelow.impulse + right2.impulse + below2.impulse;
   precise float trace = right.trace + below.trace + rightBelow.trace + right2.trace + below2.trace;
@@ -82,13 +79,17 @@ void prepareNode(Cloth cloth, int row, int column, bool stored) {
   trace = trace + above2.trace;
   all = all + above2.along;
 
-  Start start = startOf(here, impulse, trace, cloth.compliance);
+  Start start = startOf(here, impulse, trace, grid.cloth.scaledCompliance);
   if (stored) {
-    along[2 * node] = vec4(right.along, below.along, rightBelow.along, fromRight.along);
-    along[2 * node + 1] = vec4(right2.along, below2.along, start.mass, 0.0);
+    SpringWeights weights = SpringWeights(right.along, below.along, rightBelow.along, fromRight.along,
+                                          right2.along, below2.along, start.mass, 0.0);
+    along[2 * node] = firstTexelOf(weights);
+    along[2 * node + 1] = secondTexelOf(weights);
     if (kImplicit) {
-      across[2 * node] = vec4(right.across, below.across, rightBelow.across, fromRight.across);
-      across[2 * node + 1] = vec4(right2.across, below2.across, 0.0, 0.0);
+      SpringWeights acrossWeights = SpringWeights(right.across, below.across, rightBelow.across,
+                                                  fromRight.across, right2.across, below2.across, 0.0, 0.0);
+      across[2 * node] = firstTexelOf(acrossWeights);
+      across[2 * node + 1] = secondTexelOf(acrossWeights);
     }
     vectors[kResiduals * push.nodes + node] = start.residual;
     vectors[kCorrections * push.nodes + node] = vec4(start.correction, 0.0);
@@ -105,11 +106,11 @@ void prepareNode(Cloth cloth, int row, int column, bool stored) {
 }
 
 void main() {
-  vec4 part = texelFetch(chunks, int(push.firstChunk + gl_WorkGroupID.x));
-  System system = systemAt(uint(part.x));
-  uint chunk = uint(part.y);
-  Cloth cloth = clothOf(system);
-  // Of ACAD's chunks check_stretch.comp has said which.
+  ChunkRecord part = chunkAt(chunks, push.firstChunk + gl_WorkGroupID.x);
+  System system = systemAt(uint(part.system));
+  uint chunk = uint(part.chunk);
+  Grid grid = gridOf(system);
+  // check_stretch.comp has marked the chunks of ACAD.
   bool wanted = !kAdaptive || (actives[system.firstChunk + chunk] & kPrepared) != 0;
   uint end = wanted ? kLanes : 0;
   beginChunk();
@@ -118,7 +119,7 @@ void main() {
     Walk walk = walkAt(system, chunk * kLanes + lane);
     uint k = 0;
     do {
-      prepareNode(cloth, int(walk.row + k), int(walk.column), k < walk.count && lane < end);
+      prepareNode(grid, int(walk.row + k), int(walk.column), k < walk.count && lane < end);
       ++k;
     } while (k < kWalk);
     lane += width();

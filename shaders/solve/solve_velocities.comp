@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-// A solve by conjugate gradients, one workgroup a cloth, as many iterations in a dispatch as the device lets
-// it. The same bits as by multiply_residuals.comp and update_corrections.comp in turn.
+// Solves by conjugate gradients, one workgroup per cloth, with as many iterations per dispatch as the device
+// allows. It gives the same bits as alternating multiply_residuals.comp and update_corrections.comp.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 
-#include "shaders/solve/vectors.glsl"
+#include "shaders/solve/conjugate_gradient.glsl"
 
 void main() {
   System system = systemAt(push.firstSystem + gl_WorkGroupID.x);

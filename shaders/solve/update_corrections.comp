@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
-// The step of an iteration of conjugate gradients, a chunk a workgroup.
+// Takes the step of an iteration of conjugate gradients; a workgroup handles one chunk.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 
-#include "shaders/solve/vectors.glsl"
+#include "shaders/solve/conjugate_gradient.glsl"
 
 void main() {
-  vec4 part = ownChunk();
-  System system = systemAt(uint(part.x));
-  updateChunk(system, uint(part.y), solves[system.number]);
+  ChunkRecord part = ownChunk();
+  System system = systemAt(uint(part.system));
+  updateChunk(system, uint(part.chunk), solves[system.number]);
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The hash of the state and whether it is healthy: integer sums, whose order does not matter.
+// Computes the hash of the state and whether it is healthy, by integer sums, whose order does not matter.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 
@@ -18,7 +18,7 @@ layout(push_constant) uniform Push {
   HashPush push;
 };
 
-// Each invocation takes every stride-th node, and adds what it found with atomics on integers.
+// Each invocation handles every stride-th node and adds its result with integer atomics.
 void main() {
   uint stride = gl_NumWorkGroups.x * gl_WorkGroupSize.x;
   NodeHash sum = NodeHash(0, 0);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Other masses for the nodes of a state.
+// Replaces the inverse masses of a state's nodes.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 

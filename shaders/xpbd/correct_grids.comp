@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
-// Corrects the springs of grids, in the order of scene::springColours(): corners, seams, insides.
+// Corrects the springs of grids in the order of model::springColours(): corners, seams, insides.
 //
-// An invocation takes a block of 4x4 nodes into registers and corrects its springs one after the other there:
-// each node is read and written two and a half times a sweep instead of twelve times, which is what a sweep a
-// colour would take. Writes cannot race: within a pass no two blocks share a node that either of them reads.
-// A workgroup does one pass of some blocks, or all passes of a whole cloth with barriers between; the bits
-// are the same.
+// An invocation loads a block of 4x4 nodes into registers and corrects its springs there, one after the
+// other. A sweep then reads and writes each node 2.5 times instead of the 12 times of a pass per colour.
+// Writes cannot race: within a pass, no two blocks share a node that either of them reads. A workgroup
+// handles one pass of some blocks, or all passes of a whole cloth with barriers between; the bits are the
+// same.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
@@ -13,15 +13,15 @@
 #include "shaders/xpbd/spring.glsl"
 
 layout(local_size_x_id = 0) in;
-// Bits: corners, seams, insides. All three: of a whole cloth.
+// Bits: corners, seams, insides. All three bits: a workgroup handles a whole cloth.
 layout(constant_id = 3) const uint kPasses = 7;
 layout(constant_id = 4) const bool kBend = true;
 
 layout(binding = 0) uniform samplerBuffer cloths;          // ClothRecord
-layout(binding = 1) uniform samplerBuffer tiles;           // XpbdTile
-layout(binding = 2) uniform samplerBuffer startPositions;  // of the substep
+layout(binding = 1) uniform samplerBuffer tiles;           // XpbdGridTile
+layout(binding = 2) uniform samplerBuffer startPositions;  // at the substep's start
 layout(binding = 3) uniform samplerBuffer
-    heldPositions;  // the same as the next, where nobody else writes them
+    currentPositions;  // the same memory as `positions`, if no other invocation writes it
 layout(std430, binding = 4) buffer Positions {
   vec4 positions[];  // w: inverse mass
 };
@@ -36,19 +36,19 @@ layout(push_constant) uniform Push {
 const uint kCorners = 1, kSeams = 2, kInsides = 4;
 const bool kWhole = kPasses == 7;
 const uint kSize = 4;
-// Colours of each pass.
+// Number of colours of each pass.
 const uint kCornerColours = 4, kSeamColours = 34, kInsideColours = 58;
-// The inverse mass of a node beyond the grid's edge: with it no sum is above zero.
+// Inverse mass of a node beyond the grid's edge. Every sum with it is below zero.
 const float kAbsent = -1e30;
 
-// A spring of the cloth, and its inverse resistances with one end pinned and with none.
+// A kind of spring of the cloth, and its inverse resistance with one free end and with two.
 struct Rule {
   Spring spring;
   float one;
   float both;
 };
 
-struct Cloth {
+struct Grid {
   int firstNode;
   int rows;
   int columns;
@@ -57,42 +57,43 @@ struct Cloth {
   Rule alongRow, alongColumn, shear, bendRow, bendColumn;
 };
 
-Cloth cloth;
+Grid grid;
 
-// The block: its nodes row by row, where they were at the substep's start.
+// The nodes of the block, row by row, and their places at the substep's start.
 vec4 nodes[kSize * kSize];
 vec3 begun[kSize * kSize];
 int indices[kSize * kSize];
-// Its multipliers: the first one, and from a colour's to the next colour's.
+// The block's first multiplier, and the distance from a colour's multiplier to that of the next colour.
 uint multiplierAt;
 uint multiplierStride;
-bool again;   // not the first sweep of the substep
-bool exists;  // whether there is such a block at all: if not, none of its nodes is in the grid
+bool again;   // true from the second sweep of a substep on
+bool exists;  // false: no node of the block is in the grid
 
-Rule ruleOf(vec4 record, float restLength, float inverseMass) {
+Rule ruleOf(XpbdSpringRecord record, float restLength, float inverseMass) {
   Spring spring = springFrom(record, restLength);
-  return Rule(spring, inverseResistance(spring, inverseMass), inverseResistance(spring, 2.0 * inverseMass));
+  precise float both = 2.0 * inverseMass;
+  return Rule(spring, inverseResistance(spring, inverseMass), inverseResistance(spring, both));
 }
 
-Cloth locateCloth(vec4 tile) {
-  int record = CLOTHSTREAM_CLOTH_TEXELS * int(tile.x);
-  vec4 place = texelFetch(cloths, record);
-  vec4 spacing = texelFetch(cloths, record + 1);
-  vec4 structural = texelFetch(cloths, record + CLOTHSTREAM_XPBD_TEXEL);
-  vec4 shear = texelFetch(cloths, record + CLOTHSTREAM_XPBD_TEXEL + 1);
-  vec4 bend = texelFetch(cloths, record + CLOTHSTREAM_XPBD_TEXEL + 2);
-  float inverseMass = shear.w;
-  return Cloth(int(place.x) + (int(place.y) << 16), int(place.z), int(place.w),
-               uint(tile.z) + (uint(tile.w) << 24), inverseMass, ruleOf(structural, spacing.x, inverseMass),
-               ruleOf(structural, spacing.y, inverseMass), ruleOf(shear, spacing.z, inverseMass),
-               ruleOf(bend, 2.0 * spacing.x, inverseMass), ruleOf(bend, 2.0 * spacing.y, inverseMass));
+Grid gridOf(XpbdGridTile tile, ClothRecord cloth) {
+  XpbdSpringRecord structural = cloth.xpbdSprings[0], shear = cloth.xpbdSprings[1],
+                   bend = cloth.xpbdSprings[2];
+  float inverseMass = cloth.gridInverseMass;
+  precise float bendRow = 2.0 * cloth.columnSpacing;
+  precise float bendColumn = 2.0 * cloth.rowSpacing;
+  return Grid(int(firstNodeOf(cloth)), int(cloth.rows), int(cloth.columns),
+              uint(tile.firstMultiplierLow) + (uint(tile.firstMultiplierHigh) << 24), inverseMass,
+              ruleOf(structural, cloth.columnSpacing, inverseMass),
+              ruleOf(structural, cloth.rowSpacing, inverseMass),
+              ruleOf(shear, cloth.diagonalSpacing, inverseMass), ruleOf(bend, bendRow, inverseMass),
+              ruleOf(bend, bendColumn, inverseMass));
 }
 
 void load(uint at, int row, int column) {
-  bool inside = row >= 0 && row < cloth.rows && column >= 0 && column < cloth.columns;
+  bool inside = row >= 0 && row < grid.rows && column >= 0 && column < grid.columns;
   int index =
-      cloth.firstNode + clamp(row, 0, cloth.rows - 1) * cloth.columns + clamp(column, 0, cloth.columns - 1);
-  vec4 node = kWhole ? positions[index] : texelFetch(heldPositions, index);
+      grid.firstNode + clamp(row, 0, grid.rows - 1) * grid.columns + clamp(column, 0, grid.columns - 1);
+  vec4 node = kWhole ? positions[index] : texelFetch(currentPositions, index);
   nodes[at] = vec4(node.xyz, inside ? node.w : kAbsent);
   indices[at] = index;
   if (kDamped) {
@@ -113,7 +114,7 @@ void correct(uint a, uint b, Rule rule, uint colour) {
     before = begun[b] - begun[a];
   }
   precise float inverseMasses = nodes[a].w + nodes[b].w;
-  precise float nearlyBoth = 1.5 * cloth.inverseMass;
+  precise float nearlyBoth = 1.5 * grid.inverseMass;
   float inverse = inverseMasses > nearlyBoth ? rule.both : (inverseMasses > 0.0 ? rule.one : 0.0);
   uint at = multiplierAt + colour * multiplierStride;
   float multiplier = 0.0;
@@ -130,16 +131,16 @@ void correct(uint a, uint b, Rule rule, uint colour) {
   nodes[b].xyz = movedB;
 }
 
-// Of a quad, its corners a b above e f.
+// Corrects the shear springs of a quad with corners a b above e f.
 void correctShear(uint a, uint b, uint e, uint f, uint colour) {
-  correct(a, f, cloth.shear, colour);
-  correct(b, e, cloth.shear, colour + 1);
+  correct(a, f, grid.shear, colour);
+  correct(b, e, grid.shear, colour + 1);
 }
 
 void placeBlock(uint block, uint perRow, float inversePerRow, uint count, uint firstMultiplier, int shift,
                 out int row, out int column) {
-  // Without a division, which a software device does a lane at a time: exact while a cloth has below a
-  // million blocks.
+  // A software device divides one lane at a time, so that this multiplies. It is exact below a million
+  // blocks.
   precise float quotient = (float(block) + 0.5) * inversePerRow;
   uint blockRow = uint(quotient);
   row = int(kSize * blockRow) - shift;
@@ -164,12 +165,12 @@ void correctCorners(uint block, uint perRow, float inversePerRow, uint count, ui
   }
 }
 
-// Whether a spring goes through the middle of the block, either way.
+// True if a spring crosses the middle of the block in either direction.
 bool crosses(uint a, uint b) {
   return (a / 8 != b / 8) || (a % 4 / 2 != b % 4 / 2);
 }
 
-// Of insides all, of seams what crosses one.
+// Corrects all springs of an inside, or those that cross a seam.
 void correctBlock(uint block, uint perRow, float inversePerRow, uint count, uint firstMultiplier,
                   bool seams) {
   int row, column;
@@ -182,13 +183,13 @@ void correctBlock(uint block, uint perRow, float inversePerRow, uint count, uint
     [[unroll]] for (uint k = 0; k < 8; ++k) {
       uint a = k / 2 * kSize + k % 2;
       if (!seams || crosses(a, a + 2)) {
-        correct(a, a + 2, cloth.bendRow, colour);
+        correct(a, a + 2, grid.bendRow, colour);
         ++colour;
       }
     }
     [[unroll]] for (uint a = 0; a < 8; ++a) {
       if (!seams || crosses(a, a + 2 * kSize)) {
-        correct(a, a + 2 * kSize, cloth.bendColumn, colour);
+        correct(a, a + 2 * kSize, grid.bendColumn, colour);
         ++colour;
       }
     }
@@ -203,13 +204,13 @@ void correctBlock(uint block, uint perRow, float inversePerRow, uint count, uint
   [[unroll]] for (uint k = 0; k < 12; ++k) {
     uint a = k / 3 * kSize + k % 3;
     if (!seams || crosses(a, a + 1)) {
-      correct(a, a + 1, cloth.alongRow, colour);
+      correct(a, a + 1, grid.alongRow, colour);
       ++colour;
     }
   }
   [[unroll]] for (uint a = 0; a < 12; ++a) {
     if (!seams || crosses(a, a + kSize)) {
-      correct(a, a + kSize, cloth.alongColumn, colour);
+      correct(a, a + kSize, grid.alongColumn, colour);
       ++colour;
     }
   }
@@ -218,7 +219,7 @@ void correctBlock(uint block, uint perRow, float inversePerRow, uint count, uint
   }
 }
 
-// Rounds are as many for every invocation; the last one's surplus are of blocks beyond the grid.
+// Every invocation makes the same number of rounds. Surplus rounds handle blocks beyond the grid.
 #define PASS(CORRECT, count)                                                            \
   {                                                                                     \
     uint block = firstBlock + gl_LocalInvocationID.x;                                   \
@@ -235,29 +236,29 @@ void correctBlock(uint block, uint perRow, float inversePerRow, uint count, uint
   }
 
 void main() {
-  vec4 tile = texelFetch(tiles, int(push.firstTile + gl_WorkGroupID.x));
-  cloth = locateCloth(tile);
-  float iterations = texelFetch(cloths, CLOTHSTREAM_CLOTH_TEXELS * int(tile.x) + CLOTHSTREAM_XPBD_TEXEL).w;
-  uint endIteration = min(uint(iterations), push.endIteration);
+  XpbdGridTile tile = xpbdGridTileAt(tiles, push.firstTile + gl_WorkGroupID.x);
+  ClothRecord cloth = clothAt(cloths, uint(tile.cloth));
+  grid = gridOf(tile, cloth);
+  uint endIteration = min(uint(cloth.solverIterations), push.endIteration);
   if (push.firstIteration >= endIteration) {
     return;
   }
-  uint firstBlock = uint(tile.y);
-  // Blocks in a row, and in all: without and with a shift.
-  uint perRow = (uint(cloth.columns) + 3) / 4;
-  uint count = perRow * ((uint(cloth.rows) + 3) / 4);
-  uint shiftedPerRow = (uint(cloth.columns) + 5) / 4;
-  uint shiftedCount = shiftedPerRow * ((uint(cloth.rows) + 5) / 4);
+  uint firstBlock = uint(tile.firstBlock);
+  // Blocks per row and in total, without and with a shift.
+  uint perRow = (uint(grid.columns) + 3) / 4;
+  uint count = perRow * ((uint(grid.rows) + 3) / 4);
+  uint shiftedPerRow = (uint(grid.columns) + 5) / 4;
+  uint shiftedCount = shiftedPerRow * ((uint(grid.rows) + 5) / 4);
   float inversePerRow = reciprocal(float(perRow));
   float inverseShiftedPerRow = reciprocal(float(shiftedPerRow));
-  uint seamMultipliers = cloth.firstMultiplier + kCornerColours * count;
+  uint seamMultipliers = grid.firstMultiplier + kCornerColours * count;
   uint insideMultipliers = seamMultipliers + kSeamColours * shiftedCount;
 
   uint iteration = push.firstIteration;
   do {
     again = iteration > 0;
     if ((kPasses & kCorners) != 0) {
-      PASS(correctCorners(block, perRow, inversePerRow, count, cloth.firstMultiplier), count)
+      PASS(correctCorners(block, perRow, inversePerRow, count, grid.firstMultiplier), count)
     }
     if ((kPasses & kSeams) != 0) {
       PASS(correctBlock(block, shiftedPerRow, inverseShiftedPerRow, shiftedCount, seamMultipliers, true),

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Corrects the springs of meshes, colour by colour. Writes cannot race: no two springs of a colour share a
-// node. A workgroup does its part of one colour, or all colours of a whole cloth with barriers between; the
-// bits are the same.
+// Corrects the springs of meshes colour by colour. Writes cannot race: no two springs of a colour share a
+// node. A workgroup handles its part of one colour, or all colours of a whole cloth with barriers between;
+// the bits are the same.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 
@@ -11,10 +11,10 @@ layout(local_size_x_id = 0) in;
 layout(constant_id = 3) const bool kWhole = true;
 
 layout(binding = 0) uniform samplerBuffer cloths;          // ClothRecord
-layout(binding = 1) uniform samplerBuffer tiles;           // XpbdTile
-layout(binding = 2) uniform samplerBuffer startPositions;  // of the substep
+layout(binding = 1) uniform samplerBuffer tiles;           // XpbdMeshTile
+layout(binding = 2) uniform samplerBuffer startPositions;  // at the substep's start
 layout(binding = 3) uniform samplerBuffer
-    heldPositions;  // the same as the next, where nobody else writes them
+    currentPositions;  // the same memory as `positions`, if no other invocation writes it
 layout(std430, binding = 4) buffer Positions {
   vec4 positions[];  // w: inverse mass
 };
@@ -29,14 +29,14 @@ layout(push_constant) uniform Push {
 };
 
 vec4 fetchNode(int index) {
-  return kWhole ? positions[index] : texelFetch(heldPositions, index);
+  return kWhole ? positions[index] : texelFetch(currentPositions, index);
 }
 
-void correct(uint link, int cloth, bool again) {
-  vec4 ends = texelFetch(links, int(link));
-  int a = int(ends.x);
-  int b = int(ends.y);
-  Spring spring = springFrom(texelFetch(cloths, cloth + CLOTHSTREAM_XPBD_TEXEL + int(ends.w)), ends.z);
+void correct(uint link, uint cloth, bool again) {
+  XpbdLinkRecord record = xpbdLinkAt(links, link);
+  int a = int(record.a);
+  int b = int(record.b);
+  Spring spring = springFrom(xpbdSpringAt(cloths, cloth, uint(record.kind)), record.restLength);
   vec4 nodeA = fetchNode(a);
   vec4 nodeB = fetchNode(b);
   precise vec3 d = nodeB.xyz - nodeA.xyz;
@@ -60,20 +60,20 @@ void correct(uint link, int cloth, bool again) {
 }
 
 void correctCloth() {
-  vec4 tile = texelFetch(tiles, int(push.firstTile + gl_WorkGroupID.x));
-  int cloth = CLOTHSTREAM_CLOTH_TEXELS * int(tile.x);
-  uint endIteration = min(uint(texelFetch(cloths, cloth + CLOTHSTREAM_XPBD_TEXEL).w), push.endIteration);
+  XpbdMeshTile tile = xpbdMeshTileAt(tiles, push.firstTile + gl_WorkGroupID.x);
+  uint cloth = uint(tile.cloth);
+  uint endIteration = min(uint(clothAt(cloths, cloth).solverIterations), push.endIteration);
   uint iteration = push.firstIteration;
   if (iteration >= endIteration) {
     return;
   }
-  // Of colours there is one at least, and of a colour's springs.
+  // There is at least one colour, and each colour has at least one spring.
   do {
-    int colour = int(tile.y);
+    uint colour = uint(tile.firstColour);
     do {
-      vec4 springs = texelFetch(colours, colour);
-      uint first = uint(springs.x) + (uint(springs.y) << 24);
-      uint count = uint(springs.z);
+      ColourRecord springs = colourAt(colours, colour);
+      uint first = uint(springs.firstSpringLow) + (uint(springs.firstSpringHigh) << 24);
+      uint count = uint(springs.springCount);
       uint i = gl_LocalInvocationID.x;
       uint rounds = (count + gl_WorkGroupSize.x - 1) / gl_WorkGroupSize.x;
       do {
@@ -86,7 +86,7 @@ void correctCloth() {
       memoryBarrierBuffer();
       barrier();
       ++colour;
-    } while (colour < int(tile.y) + int(tile.z));
+    } while (colour < uint(tile.firstColour) + uint(tile.colourCount));
     ++iteration;
   } while (iteration < endIteration);
 }
@@ -95,7 +95,6 @@ void main() {
   if (kWhole) {
     correctCloth();
   } else if (gl_GlobalInvocationID.x < push.springs) {
-    correct(push.firstSpring + gl_GlobalInvocationID.x, CLOTHSTREAM_CLOTH_TEXELS * int(push.cloth),
-            push.firstIteration > 0);
+    correct(push.firstSpring + gl_GlobalInvocationID.x, push.cloth, push.firstIteration > 0);
   }
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// One correction of one spring: [MMC16] Macklin, Müller and Chentanez, "XPBD", Motion in Games 2016, Eq. 17,
+// The correction of one spring: [MMC16] Macklin, Müller and Chentanez, "XPBD", Motion in Games 2016, Eq. 17,
 // 18, 26.
 #ifndef CLOTHSTREAM_SHADERS_XPBD_SPRING_GLSL
 #define CLOTHSTREAM_SHADERS_XPBD_SPRING_GLSL
@@ -7,13 +7,12 @@
 #include "shaders/shared/arithmetic.glsl"
 #include "shaders/shared/simulation.h"
 
-// What a kernel leaves out where no cloth needs it; the bits are the same.
+// False leaves out code that no cloth needs; the bits are the same.
 layout(constant_id = 1) const bool kDamped = true;
-// Whether some cloth's springs are corrected more than once in a substep. Only then do multipliers outlive
-// it.
+// True if a cloth's springs are corrected more than once per substep. Only then are the multipliers stored.
 layout(constant_id = 2) const bool kIterated = true;
 
-// As scene::XpbdSpring.
+// model::XpbdSpring and a rest length.
 struct Spring {
   float stretch;
   float damping;
@@ -21,18 +20,19 @@ struct Spring {
   float restLength;
 };
 
-Spring springFrom(vec4 record, float restLength) {
-  return Spring(record.x, record.y, record.z, restLength);
+Spring springFrom(XpbdSpringRecord record, float restLength) {
+  return Spring(record.stretch, record.damping, record.memory, restLength);
 }
 
-// 1 / (what a spring with ends of these inverse masses in all resists with).
+// Inverse of the resistance of a spring whose ends have this sum of inverse masses: the denominator of
+// [MMC16] Eq. 26.
 float inverseResistance(Spring spring, float inverseMasses) {
   precise float resistance = (spring.stretch + spring.damping) * inverseMasses + spring.memory;
   return reciprocal(resistance);
 }
 
-// What b goes by, times its inverse mass, and a by its negative. `d`: from a to b; `begun`: likewise at the
-// substep's start.
+// Correction of b divided by its inverse mass; that of a is the negative. `d` leads from a to b; `begun` is
+// the same at the substep's start.
 vec3 pullOf(vec3 d, vec3 begun, Spring spring, float inverseResistance, inout float multiplier) {
   precise float squared = max(dotProduct(d, d), 1e-12);
   float inverseLength = reciprocalSquareRoot(squared);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Suite acad: adaptive constraints where 0, 1, 5 and 20 % of the springs are constraints, beside mass-spring
-// and full constraint enforcement of the same cloth.
+// Suite acad: adaptive constraints with 0, 1, 5 and 20 % of the springs as constraints, compared with
+// mass-spring and with full constraint enforcement of the same cloth.
 #include <cmath>
 #include <memory>
 #include <stdexcept>
@@ -17,19 +17,19 @@
 namespace clothstream::bench {
 namespace {
 
-// Texels of a node and substep that must move: a mass-spring step reads two and writes two; the check reads
-// one; a node of a chunk with constraints is prepared (four read, four written), in each iteration as in the
-// suite enforcement, and corrected (three read, two written). A copy reads one and writes one.
+// Texels that must move for a node and substep. A mass-spring step reads two and writes two. The check reads
+// one. A node of a chunk with constraints is prepared (four read, four written), iterated as in suite
+// enforcement, and corrected (three read, two written). A copy reads one and writes one.
 constexpr double kForces = 4, kCheck = 1, kPrepared = 8 + 5, kIteration = 14, kTexelsOfACopy = 2;
 constexpr std::uint32_t kTicks = 40;
 
-// A sheet that hangs at rest by its upper edge, as stiff as its substeps bear, under so much gravity that its
-// uppermost rows would be stretched beyond 10 %; every fourth of their springs is vertical, and all of these
+// A sheet that hangs at rest by its upper edge, as stiff as its substeps allow. Gravity is so strong that its
+// uppermost rows would be stretched beyond 10 %. A quarter of their springs are vertical, and all of these
 // are stretched.
 struct Case {
   std::string method;
   model::SolverKind kind;
-  double active = 0;  // part of the springs
+  double active = 0;  // part of the springs that are constraints
 };
 
 constexpr float kMass = 0.2f, kActivation = 0.1f;
@@ -47,7 +47,7 @@ model::Scene sceneOf(const Case& experiment, std::uint32_t size) {
   const double h = scene.substepSeconds();
   cloth.structural.stiffness = static_cast<float>(0.25 * double{cloth.nodeMass()} / (h * h));
   cloth.shear.stiffness = 0.01f * cloth.structural.stiffness;
-  // Below row i of N hang (N - i) nodes a column: k strain L = (N - i) m g.
+  // (N - i) nodes hang below row i of N in a column: k strain L = (N - i) m g.
   const double rows = 4 * experiment.active, length = 1.0 / (size - 1);
   const double most = experiment.active == 0 ? 0.5 * double{kActivation} : double{kActivation} / (1 - rows);
   scene.environment.gravity = model::Vec3(
@@ -57,7 +57,7 @@ model::Scene sceneOf(const Case& experiment, std::uint32_t size) {
   return scene;
 }
 
-// Where its rows hang at rest, none beyond the bound; a little beyond it where constraints hold it.
+// Rows at their rest positions, none beyond the bound; a little beyond it where constraints hold them.
 simulation::NodeState hanging(const model::Scene& scene) {
   const model::Cloth& cloth = scene.cloths.front();
   const model::Grid& grid = cloth.grid;
@@ -97,7 +97,7 @@ Rows measureSize(vulkan::Device& device, const Settings& settings, std::uint32_t
     candidate.simulated->restart(hanging(candidate.scene));
     candidates.push_back(std::move(candidate));
   }
-  // By turns, so that what disturbs the machine disturbs them alike.
+  // Candidates alternate, so that disturbances of the machine affect all of them alike.
   for (std::uint32_t tick = 0; tick < kTicks; ++tick)
     for (Candidate& candidate : candidates) {
       candidate.simulated->tick({candidate.scene.environment, {}});

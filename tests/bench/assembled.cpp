@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Suite assembled: the constraints' system as the paper has it, sparse matrices that each substep fills and
-// multiplies ([Va21] 3.2.2), beside the matrix-free solve of the same scene, by turns in one run.
+// Suite assembled: the constraints' system as in the paper, with sparse matrices that each substep fills and
+// multiplies ([Va21] 3.2.2). It alternates with the matrix-free solve of the same scene.
 #include <array>
 #include <cmath>
 #include <memory>
@@ -23,10 +23,10 @@ using model::ConstraintPath;
 
 constexpr std::uint32_t kSubsteps = 10, kFew = 20, kMany = 40;
 constexpr ConstraintPath kPaths[] = {ConstraintPath::matrixFree, ConstraintPath::assembled};
-// What the sheet may be stretched by while it swings, and in the mean when it hangs; docs/simulation.md.
+// Allowed strain while the sheet swings, and mean strain when it hangs; see docs/simulation.md.
 constexpr double kMostStrain = 0.05, kMeanStrain = 0.001;
 
-// No solve ends before its last iteration.
+// Every solve runs all its iterations.
 model::Scene sheetOf(std::uint32_t size, bool bend, ConstraintPath path, std::uint32_t iterations) {
   return bench::hungSheet(size,
                           {.kind = model::SolverKind::constraint,
@@ -42,17 +42,17 @@ model::Scene sheetOf(std::uint32_t size, bool bend, ConstraintPath path, std::ui
 double bytesOfIteration(const model::Cloth& cloth) {
   constexpr double kTexel = sizeof(shared::vec4);
   if (!model::isAssembled(cloth.solver)) {
-    // A node: positions, residuals and two texels of weights are read, a product is written (12 of 16 bytes);
-    // then five vectors are read and four written.
+    // For each node: positions, residuals and two texels of weights are read, and a product is written (12 of
+    // 16 bytes). Then five vectors are read and four written.
     return cloth.nodeCount() * (4 * kTexel + 12 + 5 * kTexel + 4 * 12);
   }
-  // An entry: its column and its value, in fours. A row: where it is listed, its state, and its product; then
-  // both are read, and the state is written.
+  // For each entry: column and value, in fours. For each row: its place in the list, its state and its
+  // product; then both are read and the state is written.
   const double rows = static_cast<double>(model::systemLinks(cloth).size());
   return static_cast<double>(model::systemEntries(cloth)) * 8 + rows * (2 * kTexel + 4 + 2 * kTexel + kTexel);
 }
 
-// Bytes that a substep moves to fill J and to multiply it into the matrix: links, positions, velocities;
+// Bytes that a substep moves to fill J and to multiply it into the matrix: links, positions and velocities;
 // blocks written and read again; columns, sources and values.
 double bytesOfAssembly(const model::Cloth& cloth) {
   constexpr double kTexel = sizeof(shared::vec4);
@@ -61,7 +61,8 @@ double bytesOfAssembly(const model::Cloth& cloth) {
          static_cast<double>(model::systemEntries(cloth)) * 12;
 }
 
-// As suite enforcement: one substep solved to the end against the reference. Returns the iterations it took.
+// Compares one substep that is solved to the end with the reference, as in suite enforcement. Returns its
+// iterations.
 std::uint32_t check(vulkan::Device& device, const Settings& settings, model::Scene scene) {
   const double allowed = solveToTheEnd(scene);
   Simulated simulated(device, scene,
@@ -70,8 +71,8 @@ std::uint32_t check(vulkan::Device& device, const Settings& settings, model::Sce
   return simulated.solves().front().iterations;
 }
 
-// A path with few iterations and with many: what is between them is iterations. By the least ticks, as a
-// difference of medians would be of what disturbs the machine.
+// A path with few and with many iterations; the difference is the cost of iterations. Uses minimum times,
+// since a difference of medians would contain disturbances of the machine.
 struct Contender {
   std::uint32_t iterationsToConverge;
   std::unique_ptr<Simulated> few, many;
@@ -109,7 +110,7 @@ Rows measureSize(vulkan::Device& device, const Settings& settings, std::uint32_t
     };
     contenders[i] = {iterations, make(kFew), make(kMany)};
   }
-  // By turns, so that what disturbs the machine disturbs all alike.
+  // All alternate, so that disturbances of the machine affect them alike.
   double spent = 0;
   while (spent < 4 * settings.seconds || all.front()->wall().count() < 7)
     for (Simulated* one : all) spent += secondsOf([&] { one->tick(inputs); });

@@ -19,14 +19,14 @@ namespace clothstream::bench {
 namespace {
 
 // The paper gives neither masses nor lengths. Its springs of 200 N/m are stable at 0.005 s and blow up at
-// 0.016 s, which a node of 0.03 to 0.3 kg has with twelve of them; its sheets are as wide as Unity's plane.
-constexpr std::uint32_t kNodes = 32;  // a side: the 1,024 nodes and 5,826 springs of its Figure 10
+// 0.016 s. Nodes of 0.03 to 0.3 kg with twelve springs behave so. Its sheets are as wide as Unity's plane.
+constexpr std::uint32_t kNodes = 32;  // nodes a side: the 1,024 nodes and 5,826 springs of Figure 10
 constexpr float kNodeMass = 0.13f, kWidth = 10, kSpringDamping = 0.1f;
-// Ticks of one step. 0.016 s is no whole number of steps a second: this is 0.0161.
+// Ticks of one step. 0.016 s is no whole number of steps a second; this is 0.0161 s.
 constexpr std::uint32_t kShortSteps = 200, kLongSteps = 62;
 constexpr std::uint32_t kSeconds = 6;
 
-// Of a spring that shows that all is lost, parts of its length.
+// Strain of a spring at which the sheet counts as torn.
 constexpr double kTorn = 6;
 
 constexpr float kBallRadius = 2.5f;
@@ -42,8 +42,8 @@ struct Outcome {
   Panel panel;
   bool healthy = true;
   Samples strains = {};
-  double lowest = 1000;  // m, of its nodes
-  double depth = 0;      // m, of the deepest node in the ball
+  double lowest = 1000;  // m, lowest node
+  double depth = 0;      // m, depth of the deepest node in the ball
   Picture picture = {};
 };
 
@@ -51,7 +51,7 @@ struct Figure {
   int number;
   std::uint32_t stepsASecond;
   std::vector<Panel> panels;
-  // Throws std::runtime_error where it does not show what the paper's does.
+  // Throws std::runtime_error if the outcomes differ from what the paper's figure shows.
   void (*check)(std::span<const Outcome> outcomes);
 };
 
@@ -86,7 +86,7 @@ void checkAcad(std::span<const Outcome> outcomes) {
         fmt::format("ks {}: a spring stretched by {}", outcome.panel.stiffness, outcome.strains.quantile(1)));
 }
 
-// Constraints hold; with bend springs among them the sheet is a plate, which does not hang down so far.
+// Constraints hold. With bend springs among them the sheet is a plate, which does not hang down as far.
 void checkBend(std::span<const Outcome> outcomes) {
   expectHealthy(outcomes);
   for (const Outcome& outcome : outcomes)
@@ -180,8 +180,8 @@ Picture pictureOf(const model::Scene& scene, const simulation::NodeState& state)
       surfaces);
 }
 
-// All of its seconds, or until it leaves the range of numbers: then what it was like when a spring was first
-// torn.
+// Runs for all seconds, or until the state is not finite. Then the outcome is the state in which a spring
+// first tore.
 Outcome run(vulkan::Device& device, const Figure& figure, const Panel& panel) {
   const model::Scene scene = sceneOf(figure, panel);
   const model::Cloth& cloth = scene.cloths.front();
@@ -215,7 +215,7 @@ Outcome run(vulkan::Device& device, const Figure& figure, const Panel& panel) {
 }  // namespace
 
 Rows runBehaviour(vulkan::Device& device, const Settings& settings) {
-  if (settings.size) throw std::runtime_error("the sizes are the paper's: leave out --size");
+  if (settings.size) throw std::runtime_error("--size: not allowed, because the sizes are the paper's");
   Rows rows;
   for (const Figure& figure : figures()) {
     std::vector<Outcome> outcomes;
@@ -225,7 +225,7 @@ Rows runBehaviour(vulkan::Device& device, const Settings& settings) {
       pictures.push_back(outcomes.back().picture);
     }
     const auto file = settings.pictures / fmt::format("figure_{}.png", figure.number);
-    writePng(besideEachOther(pictures), file);
+    writePng(sideBySide(pictures), file);
     for (const Outcome& outcome : outcomes)
       rows.push_back({{"suite", "behaviour"},
                       {"figure", figure.number},

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// How fast the device moves bytes: the floor under everything that reads and writes a state.
+// Speed at which the device moves bytes.
 #include "tests/bench/bytes_moved.h"
 
 #include <algorithm>
@@ -36,7 +36,7 @@ double secondsToCopyTexels(vulkan::Device& device, std::size_t texels) {
 
   double least = std::numeric_limits<double>::infinity();
   const auto measure = [&](std::uint32_t pattern, const auto& copy) {
-    // Enough copies that the call's own overhead does not show, and the best of several.
+    // Uses enough copies to hide the overhead of a call, and the best of several rounds.
     const std::size_t copies = std::clamp<std::size_t>((64u << 20) / bytes, 1, 256);
     for (int round = 0; round < 7; ++round) {
       runOn(device, recorder, [&] { recorder.fill(from, pattern, bytes); });
@@ -52,7 +52,7 @@ double secondsToCopyTexels(vulkan::Device& device, std::size_t texels) {
     }
     runOn(device, recorder, [&] { recorder.copy(to, sample, 16, bytes - 16); });
     for (const std::uint32_t word : sample.mapped<const std::uint32_t>())
-      if (word != pattern) throw std::runtime_error("the device did not copy what it was told to");
+      if (word != pattern) throw std::runtime_error("the device copied wrong bytes");
   };
   measure(0x3F800000u, [&] { recorder.copy(from, to, bytes); });
   if (kernelFits) measure(0x40000000u, [&] { recorder.dispatch(bindings, texels); });

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// How fast the device moves bytes: the floor under everything that reads and writes a state.
+// Speed at which the device moves bytes: a lower bound for everything that reads and writes a state.
 #pragma once
 
 #include <cstddef>
@@ -8,8 +8,8 @@
 
 namespace clothstream::bench {
 
-// Least seconds the device takes to read and write so many texels of 16 bytes (32 bytes moved each), by the
-// faster of a copy kernel and vkCmdCopyBuffer. Checks that they were copied.
+// Minimum seconds that the device takes to read and write this many texels of 16 bytes (32 bytes moved each),
+// with the faster of a copy kernel and vkCmdCopyBuffer. Checks the copied bytes.
 double secondsToCopyTexels(vulkan::Device& device, std::size_t texels);
 
 }  // namespace clothstream::bench

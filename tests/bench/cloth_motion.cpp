@@ -56,7 +56,7 @@ class Motion {
     if (settings.scene != MotionScene::drape) floor_ = -10;
   }
 
-  // Frames before the first that is seen.
+  // Number of frames before the first one that is used.
   int warmUp() const {
     return settings_.scene == MotionScene::flag ? 72 : settings_.scene == MotionScene::curtain ? 144 : 0;
   }
@@ -121,7 +121,7 @@ class Motion {
     }
   }
 
-  // In an order in which neighbours in the list share no vertex.
+  // Orders the list so that neighbours in it share no vertex.
   void connect() {
     constexpr double kStretch = 0, kShear = 2e-6, kBend = 2e-3;
     const auto add = [&](int column, int row, int toColumn, int toRow, double compliance) {
@@ -170,7 +170,7 @@ class Motion {
     sphereMove_ = sphere_ - from;
   }
 
-  // The mean wind, and how strong its gusts are.
+  // Mean wind, and strength of its gusts.
   std::pair<Vec3, double> wind() const {
     if (settings_.scene != MotionScene::flag) return {Vec3::Zero(), 0.05};
     const double t = time_;
@@ -229,7 +229,7 @@ class Motion {
     }
   }
 
-  // Pairs that are near and no neighbours in the grid.
+  // Finds pairs that are near but not neighbours in the grid.
   void findContacts() {
     constexpr std::uint32_t kBuckets = 1u << 17;
     const double cell = contactDistance() + 0.5 * spacing_;
@@ -341,7 +341,7 @@ class Motion {
     if (length > 0) p -= slip * std::min(1.0, most / length);
   }
 
-  // Evens out velocities among neighbours.
+  // Smooths velocities among neighbours.
   void damp() {
     const double scale = width_ / 100.0;
     const double part = settings_.damping * scale * scale * dt_ * 2;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Motions of one cloth for measuring the codec: position-based dynamics with self-collision and gusts, in
-// double precision, a function of its settings alone.
+// double precision. The motion depends only on its settings.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Suite colliders: what 1, 100 and 4,000 colliders cost, the hands of a hundred people among them.
+// Suite colliders: the cost of 1, 100 and 4,000 colliders, which are the hands of a hundred people.
 #include <cmath>
 #include <cstdint>
 #include <random>
@@ -12,7 +12,7 @@ namespace {
 
 constexpr std::size_t kHand = 40;  // capsules of one person's two hands
 
-// 2 cm and 10 g a node, hung by its upper edge.
+// A cloth with 2 cm and 10 g for each node, hung by its upper edge.
 model::Scene curtain(std::uint32_t size) {
   model::Cloth cloth;
   cloth.name = "curtain";
@@ -31,8 +31,8 @@ model::Scene curtain(std::uint32_t size) {
   return scene;
 }
 
-// Hands in a room of 6 x 2.5 x 6 m in whose middle the cloth hangs: some in the cloth, most far away, all
-// moving.
+// Moving hands in a room of 6 x 2.5 x 6 m with the cloth in its middle. Some are in the cloth, most are far
+// away.
 std::vector<simulation::MovingCollider> hands(std::size_t count) {
   std::mt19937 random(4);
   std::uniform_real_distribution<float> unit(-1, 1);
@@ -42,7 +42,7 @@ std::vector<simulation::MovingCollider> hands(std::size_t count) {
   for (std::size_t i = 0; i < count; ++i) {
     if (i % kHand == 0) {
       palm = vector().cwiseProduct(model::Vec3(3, 1.25f, 3)) - model::Vec3(0, 1, 0);
-      way = 0.014f * vector();  // in a tick: 1 m/s
+      way = 0.014f * vector();  // displacement in a tick: 1 m/s
     }
     const model::Quaternion turn(Eigen::AngleAxisf(3 * unit(random), vector().normalized()));
     const model::Vec3 place = palm + 0.1f * vector();

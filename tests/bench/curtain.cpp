@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Suite curtain: the named scene in real time, as clothstream-server runs it, with one client in this process
-// who decodes every frame and moves a hand.
+// Suite curtain: the named scene in real time, as clothstream-server runs it. One client in this process
+// decodes every frame and moves a hand.
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -17,6 +17,7 @@
 #include "server/stream/connection.h"
 #include "server/stream/scene_server.h"
 #include "server/stream/server_state.h"
+#include "tests/bench/simulated.h"
 #include "tests/bench/suite.h"
 
 namespace clothstream::bench {
@@ -24,10 +25,10 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-// A tick's p99 says little below some hundreds of ticks.
+// The p99 of a tick needs some hundreds of ticks.
 constexpr double kLeastSeconds = 10;
-// Of poses, as a headset's tracking gives them; no multiple of the scene's rate, so that they arrive at every
-// phase of a tick.
+// Interval of poses, like those of a headset's tracking. It is no multiple of the scene's rate, so that poses
+// arrive at every phase of a tick.
 constexpr std::chrono::microseconds kPoseInterval{1'000'000 / 90};
 
 class Viewer {
@@ -74,7 +75,7 @@ class Viewer {
     if (cs_get_state(core_.get()) == CS_STATE_FAILED) throw std::runtime_error(cs_error_text(core_.get()));
   }
 
-  // To and fro through the curtain.
+  // Moves the hand back and forth through the curtain.
   void moveHand(Clock::time_point now) {
     const double seconds = std::chrono::duration<double>(now.time_since_epoch()).count();
     const float hand[4] = {0.6f, 1.2f, static_cast<float>(0.3 * std::sin(2 * seconds)), 0.1f};
@@ -92,15 +93,16 @@ class Viewer {
 
 void checkFrames(const cs_statistics& seen) {
   if (seen.frames == 0 || seen.decode_errors + seen.hash_mismatches > 0)
-    throw std::runtime_error(fmt::format("of {} frames {} were refused and {} decoded to something else",
+    throw std::runtime_error(fmt::format("of {} frames {} were refused and {} decoded to a different state",
                                          seen.frames, seen.decode_errors, seen.hash_mismatches));
 }
 
 }  // namespace
 
 Rows runCurtain(vulkan::Device& device, const Settings& settings) {
-  if (settings.size) throw std::runtime_error("the scene has a size of its own: leave out --size");
+  if (settings.size) throw std::runtime_error("--size: not allowed, because the scene has a fixed size");
   const model::Scene scene = *messages::loadScene("curtain");
+  Simulated(device, scene, {}).check({scene.environment, {}});
   stream::SceneServer server({scene}, {.device = settings.device, .defaultScene = scene.name});
   const telemetry::SceneMetrics& metrics = server.state().scenes.front()->metrics;
   const double seconds = std::max(settings.seconds, kLeastSeconds);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Suite enforcement: implicit constraint enforcement over all springs, ten substeps of twenty iterations, by
-// one workgroup and by several, beside the bytes that an iteration moves.
+// one workgroup and by several, compared with the time to move an iteration's bytes.
 #include <cmath>
 #include <memory>
 #include <stdexcept>
@@ -19,10 +19,10 @@ namespace clothstream::bench {
 namespace {
 
 constexpr std::uint32_t kSubsteps = 10, kIterations = 20;
-// A node's texels in an iteration: its position, its residual and two of weights are read and a product is
+// Texels of a node in an iteration: its position, its residual and two of weights are read and a product is
 // written; five vectors are read and four written. A copy reads one and writes one.
 constexpr double kTexelsMoved = 5 + 9, kTexelsOfACopy = 2;
-// What the sheet may be stretched by while it swings, and in the mean when it hangs; docs/simulation.md.
+// Allowed strain while the sheet swings, and mean strain when it hangs; see docs/simulation.md.
 constexpr double kMostStrain = 0.05, kMeanStrain = 0.001;
 
 simulation::SimulationOptions optionsOf(const Settings& settings, bool whole) {
@@ -31,7 +31,7 @@ simulation::SimulationOptions optionsOf(const Settings& settings, bool whole) {
           .solveWholeNodes = whole ? ~0u : 0u};
 }
 
-// One substep solved to the end against the reference.
+// Compares one substep that is solved to the end with the reference.
 void check(vulkan::Device& device, const Settings& settings, model::Scene scene, bool whole) {
   const double allowed = solveToTheEnd(scene);
   Simulated(device, scene, optionsOf(settings, whole)).check({scene.environment, {}}, allowed);
@@ -47,7 +47,7 @@ Rows measureSize(vulkan::Device& device, const Settings& settings, std::uint32_t
                                        kSubsteps);
   const model::Cloth& cloth = scene.cloths.front();
   const simulation::TickInputs inputs{scene.environment, {}};
-  // By turns, so that what disturbs the machine disturbs both alike.
+  // Both alternate, so that disturbances of the machine affect them alike.
   std::vector<std::unique_ptr<Simulated>> both;
   for (const bool whole : {true, false}) {
     if (size <= 32) check(device, settings, scene, whole);
@@ -59,7 +59,7 @@ Rows measureSize(vulkan::Device& device, const Settings& settings, std::uint32_t
   while (spent < 2 * settings.seconds || both.front()->wall().count() < 7) {
     for (const std::unique_ptr<Simulated>& one : both) spent += secondsOf([&] { one->tick(inputs); });
     if (both[0]->status().stateHash != both[1]->status().stateHash)
-      throw std::runtime_error("one workgroup and several do not give the same bits");
+      throw std::runtime_error("one workgroup and several workgroups give different bits");
   }
   const double floor = secondsToCopyTexels(device, cloth.nodeCount()) * kTexelsMoved / kTexelsOfACopy;
   Rows rows;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Suite equal_strain: what a node and frame cost with the cheapest setting of each solver that stretches a
-// sheet no more than a bound.
+// Suite equal_strain: cost of a node and frame with the cheapest setting of each solver that keeps a sheet's
+// strain below a bound.
 #include <algorithm>
 #include <cmath>
 #include <optional>
@@ -17,14 +17,14 @@
 namespace clothstream::bench {
 namespace {
 
-// Mean strains of NvCloth's CPU solver, 5 iterations a frame, under the same sheets.
+// Mean strains of the same sheets with NvCloth's CPU solver, 5 iterations a frame.
 struct Bound {
   std::uint32_t size;
   double strain;
 };
 constexpr Bound kBounds[] = {{32, 0.008}, {64, 0.026}, {128, 0.041}, {256, 0.053}};
 
-// J that the sheet's gravity must have lost by then, 90 % of what one that hangs has: a solve that ends early
+// Energy in J that gravity must have lost by then: 90 % of that of a hanging sheet. A solve that ends early
 // holds a sheet together by hardly letting it fall.
 constexpr float kMass = 0.2f;
 constexpr double kFallen = 0.9 * double{kMass} * 9.81 * 0.5;
@@ -35,11 +35,12 @@ struct Setting {
   std::uint32_t substeps, iterations;
 };
 
-// From cheap to dear.
+// Ordered from cheap to expensive.
 struct Ladder {
   const char* method;
   model::SolverKind kind;
-  std::uint32_t largest;  // rows; where one workgroup solves a cloth, software devices take minutes beyond
+  // maximum rows; where one workgroup solves a cloth, software devices take minutes for more
+  std::uint32_t largest;
   std::vector<Setting> settings;
   bool tethers = false;
 };
@@ -93,8 +94,8 @@ model::Scene sceneOf(const Ladder& ladder, const Setting& setting, std::uint32_t
   if (ladder.tethers) cloth.tethers = model::Tethers{};
   cloth.solver.kind = ladder.kind;
   cloth.solver.iterations = std::max(1u, setting.iterations);
-  // Forces as stiff as the step bears: 8 (0.36 + 0.08 + 0.04) k h^2 / m are 3.84 of 4, k being m / h^2. The
-  // others as stiff as cloth is.
+  // Forces are as stiff as the step allows: 8 (0.36 + 0.08 + 0.04) k h^2 / m = 3.84 of 4, with k = m / h^2.
+  // The other solvers have the stiffness of cloth.
   const double h = scene.substepSeconds();
   const double bearable = double{cloth.nodeMass()} / (h * h);
   const bool forces = ladder.kind == model::SolverKind::massSpring;
@@ -105,7 +106,7 @@ model::Scene sceneOf(const Ladder& ladder, const Setting& setting, std::uint32_t
   return scene;
 }
 
-// J since the start.
+// Energy lost since the start, in J.
 double gravityEnergyLost(const model::Scene& scene, const reference::ReferenceCloth& measured) {
   const reference::Vec3 gravity = scene.environment.gravity.cast<double>();
   return reference::ReferenceCloth(scene.cloths.front()).gravityEnergy(gravity) -
@@ -131,8 +132,7 @@ Rows::value_type rowOf(const Ladder& ladder, const Setting& setting, const Bound
           {"gravityEnergyLost", gravityEnergyLost(scene, measured)}};
 }
 
-// The first setting of the ladder with which the sheet falls and stretches no more than the bound; nullopt:
-// none does.
+// First setting of the ladder with which the sheet falls and keeps the bound. Otherwise nullopt.
 std::optional<Rows::value_type> cheapest(vulkan::Device& device, const Settings& settings,
                                          const Ladder& ladder, const Bound& bound) {
   for (const Setting& setting : ladder.settings) {
@@ -154,7 +154,7 @@ std::optional<Rows::value_type> cheapest(vulkan::Device& device, const Settings&
 
 }  // namespace
 
-// Each size on a device as the server would make it.
+// Runs each size on a device that the server would choose for it.
 Rows runEqualStrain(vulkan::Device&, const Settings& settings) {
   Rows rows;
   for (const Bound& bound : kBounds) {
@@ -168,7 +168,7 @@ Rows runEqualStrain(vulkan::Device&, const Settings& settings) {
       throw std::runtime_error(
           fmt::format("{} nodes a side: every setting stretches by more than {}", bound.size, bound.strain));
   }
-  if (rows.empty()) throw std::runtime_error("--size must be 32, 64, 128 or 256");
+  if (rows.empty()) throw std::runtime_error("--size: use 32, 64, 128 or 256");
   return rows;
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Fits the tables of codec 2 to cloth in motion and prints residual_tables.cpp: only when the format changes.
-// The motions are others than those of suite codec.
+// Fits the tables of codec 2 to moving cloth and prints residual_tables.cpp. Only for changes of the format.
+// The motions differ from those of suite codec.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -22,11 +22,11 @@ namespace {
 using codec::hierarchical::CodedResidual;
 using namespace codec::hierarchical;
 
-constexpr std::size_t kTerms = 6;  // of ScaleWeights
+constexpr std::size_t kTerms = 6;  // number of ScaleWeights' terms
 using Terms = std::array<double, kTerms>;
 using Estimators = std::array<std::array<Terms, kComponents>, kScaleClasses>;
 
-// An encoder on its way through a motion.
+// An encoder that is fed a motion.
 struct Trainee {
   Trainee(const codec::ClothLayout& cloth, bool onlyKeys, float maxError)
       : keysAlone(onlyKeys),
@@ -42,7 +42,7 @@ struct Trainee {
     encoder.encode({.tick = frame + 1, .kind = kind, .referenceTick = frame}, positions, {}, packet);
   }
 
-  bool keysAlone;  // and few frames
+  bool keysAlone;  // only key frames, and few of them
   HierarchicalEncoder encoder;
   std::vector<std::byte> packet;
 };
@@ -88,7 +88,7 @@ double expectation(const Terms& weights, const Terms& terms) {
   return sum;
 }
 
-// Weighted least squares by Gauss-Jordan; in steps.
+// Weighted least squares by Gauss-Jordan elimination, in steps.
 Terms fit(const std::vector<CodedResidual>& residuals, std::size_t scaleClass, std::size_t component,
           Terms weights) {
   for (int pass = 0; pass < 6; ++pass) {
@@ -96,7 +96,7 @@ Terms fit(const std::vector<CodedResidual>& residuals, std::size_t scaleClass, s
     for (const CodedResidual& r : residuals) {
       if (r.scaleClass != scaleClass || r.component != component) continue;
       const Terms terms = termsOf(r);
-      // The larger is expected, the larger is the error that counts the same.
+      // An error counts relative to the expected magnitude.
       const double expected = std::max(expectation(weights, terms), 0.02);
       const double importance = 1 / (expected * expected + 0.02 * expected);
       for (std::size_t i = 0; i < kTerms; ++i) {
@@ -118,7 +118,7 @@ Terms fit(const std::vector<CodedResidual>& residuals, std::size_t scaleClass, s
   return weights;
 }
 
-// Frequencies of what was counted, and a little of what a geometric distribution of that scale has.
+// Frequencies of the counts, mixed with a little of a geometric distribution of that scale.
 Distribution toDistribution(const std::array<double, kSymbols>& counts, std::uint32_t scale) {
   const unsigned raw = rawBits(scale);
   const double expected = std::exp2(scale / 2.0 + 2.25) / 256 / (1u << raw), decay = std::max(0.1, expected);
@@ -130,7 +130,7 @@ Distribution toDistribution(const std::array<double, kSymbols>& counts, std::uin
     total += counts[i];
   }
   for (std::size_t i = 0; i < kSymbols; ++i) parts[i] = (counts[i] + 30 * geometric[i] / sum) / (total + 30);
-  // Neither sign is more likely.
+  // Both signs are equally likely.
   for (std::size_t i = 1; raw == 0 && i + 1 < kEscape; i += 2)
     parts[i] = parts[i + 1] = (parts[i] + parts[i + 1]) / 2;
   Distribution frequencies;
@@ -167,12 +167,12 @@ void print(const Estimators& estimators, const std::array<Distribution, 2 * kSca
 
 void fitTables() {
   const std::vector<CodedResidual> residuals = codeMotions();
-  Estimators estimators;  // rounded, in 1/256 of a step, as they are printed
+  Estimators estimators;  // rounded, in 1/256 of a step, as printed
   for (std::size_t c = 0; c < kScaleClasses; ++c) {
     for (std::size_t k = 0; k < kComponents; ++k) {
       const Terms fitted = fit(residuals, c, k, {0.05, 0.02, 0.03, 0.02, 0.02, 0.01});
       for (std::size_t i = 0; i < kTerms; ++i)
-        estimators[c][k][i] = std::round(256 * fitted[i]) + 0.0;  // no -0
+        estimators[c][k][i] = std::round(256 * fitted[i]) + 0.0;  // avoids -0
     }
   }
   std::array<std::array<double, kSymbols>, 2 * kScales> counts{};

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// clothstream-bench-grpc: what gRPC itself takes of a server's processor to send paced messages to many
-// streams. Its server is as bare as can be: one thread, one completion queue, nothing serialised. Ends with 1
-// where a message was not delivered in its time.
+// clothstream-bench-grpc: processor time that gRPC itself takes to send paced messages to many streams. Its
+// server is minimal: one thread, one completion queue, no serialisation. The exit status is 1 if a message
+// was not delivered in time.
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
@@ -38,8 +38,8 @@ struct Options {
   std::size_t streams = 120;
   std::size_t bytes = 7400;
   double rate = 72;        // messages a second to each stream
-  std::uint32_t acks = 1;  // every so many messages are answered; 0: none
-  double seconds = 6;      // measured, after one that is not
+  std::uint32_t acks = 1;  // every n-th message is acknowledged; 0: none
+  double seconds = 6;      // measured seconds, after one second of warm-up
 };
 
 constexpr std::size_t kAckBytes = 8;
@@ -55,7 +55,7 @@ double processorSeconds() {
   return seconds(usage.ru_utime) + seconds(usage.ru_stime);
 }
 
-// Reads what comes and answers every so many of it.
+// Reads messages and answers every n-th of them.
 class Client final : public grpc::ClientBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer> {
  public:
   Client(const std::string& address, std::uint32_t acks)
@@ -93,8 +93,8 @@ class Client final : public grpc::ClientBidiReactor<grpc::ByteBuffer, grpc::Byte
   bool writing_ = false;
 };
 
-// A process of its own, whose time is not the server's. It waits for the server's port in one pipe, and goes
-// when the other end of it is closed.
+// Clients in a separate process, so that their time is not the server's. It reads the server's port from a
+// pipe and ends when the other end is closed.
 [[noreturn]] void runClients(int pipe, const Options& options) {
   int port = 0;
   if (::read(pipe, &port, sizeof port) != sizeof port) ::_exit(1);
@@ -112,18 +112,18 @@ struct Figures {
   double seconds = 0, processor = 0;
 };
 
-// Everything happens on the thread that calls run().
+// Everything runs on the thread that calls run().
 class Server {
  public:
   explicit Server(const Options& options) : options_(options), payload_(options.bytes, 'x') {
     absl::SetMutexDeadlockDetectionMode(absl::OnDeadlockCycle::kIgnore);
     grpc::ServerBuilder builder;
     builder.AddListeningPort("127.0.0.1:0", grpc::InsecureServerCredentials(), &port_);
-    builder.AddChannelArgument(GRPC_ARG_HTTP2_WRITE_BUFFER_SIZE, 1);  // as the server's
+    builder.AddChannelArgument(GRPC_ARG_HTTP2_WRITE_BUFFER_SIZE, 1);  // same as the server's
     builder.RegisterAsyncGenericService(&service_);
     queue_ = builder.AddCompletionQueue();
     server_ = builder.BuildAndStart();
-    if (!server_) throw std::runtime_error("gRPC does not listen");
+    if (!server_) throw std::runtime_error("gRPC cannot listen");
   }
   ~Server() {
     server_->Shutdown(Clock::now());
@@ -159,7 +159,7 @@ class Server {
       const Clock::time_point now = Clock::now();
       if (!measured) {
         if (streams_.size() == options_.streams + 1) measured = now + 1s;
-        if (now - started > kOpeningTimeout) throw std::runtime_error("not all clients came");
+        if (now - started > kOpeningTimeout) throw std::runtime_error("not all clients connected in time");
       } else if (before.seconds == 0 && now >= *measured) {
         before = figures(started);
       } else if (before.seconds > 0 && now - *measured >= std::chrono::duration<double>(options_.seconds)) {
@@ -169,7 +169,7 @@ class Server {
       due += period;
       alarm.Set(queue_.get(), due, &tick);
     }
-    throw std::runtime_error("gRPC's queue has ended");
+    throw std::runtime_error("gRPC's completion queue ended");
   }
 
  private:
@@ -195,7 +195,7 @@ class Server {
 
   void completed(const Operation& operation, bool ok) {
     Stream& stream = *operation.stream;
-    if (!ok) throw std::runtime_error("a client went away");
+    if (!ok) throw std::runtime_error("a client disconnected");
     if (operation.kind == Operation::Kind::write) {
       stream.writing = false;
       ++sum_.messages;
@@ -252,15 +252,16 @@ void report(const Options& options, const Figures& figures) {
       1e6 * figures.processor / messages,
       8e-9 * messages * static_cast<double>(options.bytes) / figures.processor);
   if (figures.late > 0)
-    throw std::runtime_error(fmt::format("{} messages found the one before them still unsent", figures.late));
+    throw std::runtime_error(
+        fmt::format("{} messages were due before the previous one was sent", figures.late));
 }
 
 void measure(const Options& options) {
   int ends[2];
-  if (::pipe(ends) != 0) throw std::runtime_error("no pipe");
-  // Before gRPC has threads.
+  if (::pipe(ends) != 0) throw std::runtime_error("cannot create a pipe");
+  // Forks before gRPC starts threads.
   const pid_t clients = ::fork();
-  if (clients < 0) throw std::runtime_error("no second process");
+  if (clients < 0) throw std::runtime_error("cannot create a process");
   if (clients == 0) {
     ::close(ends[1]);
     runClients(ends[0], options);
@@ -268,7 +269,8 @@ void measure(const Options& options) {
   ::close(ends[0]);
   Server server(options);
   const int port = server.port();
-  if (::write(ends[1], &port, sizeof port) != sizeof port) throw std::runtime_error("the clients are gone");
+  if (::write(ends[1], &port, sizeof port) != sizeof port)
+    throw std::runtime_error("the client process ended");
   const Figures figures = server.run();
   ::close(ends[1]);
   ::waitpid(clients, nullptr, 0);
@@ -278,20 +280,21 @@ void measure(const Options& options) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app{"What gRPC itself takes of a server's processor, paced, to many streams on loopback."};
+  CLI::App app{
+      "Measures the processor time that gRPC itself takes to send paced messages to many streams on "
+      "loopback."};
   Options options;
   app.add_option("--streams", options.streams, "Clients, a stream and a connection each")
       ->check(CLI::Range(1, 10000))
       ->capture_default_str();
-  app.add_option("--bytes", options.bytes, "Of a message")
+  app.add_option("--bytes", options.bytes, "Bytes of a message")
       ->check(CLI::Range(1, 1 << 20))
       ->capture_default_str();
   app.add_option("--rate", options.rate, "Messages a second to each stream")
       ->check(CLI::Range(1.0, 1000.0))
       ->capture_default_str();
-  app.add_option("--acks", options.acks, "Every so many messages are answered; 0: none")
-      ->capture_default_str();
-  app.add_option("--seconds", options.seconds, "Measured")
+  app.add_option("--acks", options.acks, "Acknowledge every n-th message; 0: none")->capture_default_str();
+  app.add_option("--seconds", options.seconds, "Seconds to measure")
       ->check(CLI::Range(1.0, 600.0))
       ->capture_default_str();
   CLI11_PARSE(app, argc, argv);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// clothstream-bench: measures what ClothStream does on the Vulkan device of this machine.
+// clothstream-bench: measures ClothStream on the Vulkan device of this machine.
 #include <array>
 #include <cstdio>
 #include <exception>
@@ -18,41 +18,41 @@ namespace {
 using namespace clothstream;
 
 constexpr std::array kSuites{
-    bench::Suite{"mass_spring", "node-steps a second over grid sizes, 32x32 up to the device's memory",
+    bench::Suite{"mass_spring", "node-steps a second for grids from 32x32 up to the device's memory",
                  &bench::runMassSpring},
-    bench::Suite{"paper", "Figures 7 to 10 of the paper at its sizes, beside its frames per second",
+    bench::Suite{"paper", "Figures 7 to 10 of the paper at its sizes, with its frames per second",
                  &bench::runPaper},
-    bench::Suite{"behaviour", "Figures 11 to 15 of the paper as pictures, and whether they show what it says",
+    bench::Suite{"behaviour", "Figures 11 to 15 of the paper as pictures, with checks of what they show",
                  &bench::runBehaviour},
-    bench::Suite{"solvers", "a hanging sheet by every solver: what a substep costs and what it stretches",
+    bench::Suite{"solvers", "a hanging sheet by every solver: cost of a substep, and strain",
                  &bench::runSolvers},
     bench::Suite{"enforcement", "constraint enforcement over all springs, by one workgroup and by several",
                  &bench::runEnforcement},
     bench::Suite{"assembled",
-                 "constraints with sparse matrices, as in the paper, beside the matrix-free solve",
+                 "constraints with sparse matrices as in the paper, and with the matrix-free solve",
                  &bench::runAssembled},
-    bench::Suite{"equal_strain", "the cheapest setting of each solver that stretches no more than NvCloth's",
+    bench::Suite{"equal_strain",
+                 "the cheapest setting of each solver that stretches at most as much as NvCloth's",
                  &bench::runEqualStrain},
-    bench::Suite{"work_precision",
-                 "what a simulated second costs and how far it is from the truth, every solver",
+    bench::Suite{"work_precision", "cost of a simulated second and distance from the truth, for every solver",
                  &bench::runWorkPrecision},
-    bench::Suite{"acad", "a sheet of which 0, 1, 5 and 20 % of the springs are constraints", &bench::runAcad},
+    bench::Suite{"acad", "a sheet with 0, 1, 5 and 20 % of its springs as constraints", &bench::runAcad},
     bench::Suite{"curtain", "the scene curtain, served to one client in this process: tick, pose to packet",
                  &bench::runCurtain},
     bench::Suite{"colliders", "a tick with 0, 1, 100 and 4,000 colliders, most of them far from the cloth",
                  &bench::runColliders},
-    bench::Suite{"self_collision", "a sheet that collides with itself or does not, flat and in folds",
+    bench::Suite{"self_collision", "a sheet with and without self-collision, flat and in folds",
                  &bench::runSelfCollision},
-    bench::Suite{"codec", "both codecs on the CPU over motions: bits, errors, what the eye sees, times",
+    bench::Suite{"codec", "both codecs on the CPU over motions: bits, errors, flicker, times",
                  &bench::runCodec},
-    bench::Suite{"codec_device", "what frames of a hung cloth cost on the device, key and predicted",
+    bench::Suite{"codec_device", "cost of key and predicted frames of a hung cloth on the device",
                  &bench::runCodecDevice},
 };
 
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app{"Measures what ClothStream does on the Vulkan device of this machine."};
+  CLI::App app{"Measures ClothStream on the Vulkan device of this machine."};
   std::map<std::string, const bench::Suite*> suites;
   std::string list;
   for (const bench::Suite& suite : kSuites) {
@@ -63,24 +63,25 @@ int main(int argc, char** argv) {
   bench::Settings settings;
   bool json = false;
   std::uint32_t size = 0, softwareThreads = 0, xpbdWholeNodes = 0, solveWholeNodes = 0;
-  app.add_option("suite", name, "Which suite to run:" + list)->required()->check(CLI::IsMember(suites));
+  app.add_option("suite", name, "Suite to run:" + list)->required()->check(CLI::IsMember(suites));
   CLI::Option* sizeOption =
-      app.add_option("--size", size, "Rows and columns of the grid, instead of the suite's own")
+      app.add_option("--size", size, "Rows and columns of the grid (default: the suite's sizes)")
           ->check(CLI::Range(2, 65536));
-  app.add_flag("--json", json, "Print one JSON array of rows");
+  app.add_flag("--json", json, "Print the rows as one JSON array");
   app.add_option("--device", settings.device.select, "Index or part of the name of the Vulkan device");
   CLI::Option* threadsOption = app.add_option("--software-threads", softwareThreads,
-                                              "Threads of a software device (0: none but the caller's)");
-  app.add_option("--seconds", settings.seconds, "Time to measure, a row")->check(CLI::PositiveNumber);
-  app.add_option("--rows", settings.rowsPerInvocation, "Rows an invocation walks down (0: the default)");
-  app.add_option("--workgroup", settings.workgroupSize, "Invocations in a workgroup (0: the default)");
-  app.add_option("--pictures", settings.pictures, "Directory that pictures go to")
+                                              "Threads of a software device (0: only the calling thread)");
+  app.add_option("--seconds", settings.seconds, "Seconds to measure for each row")
+      ->check(CLI::PositiveNumber);
+  app.add_option("--rows", settings.rowsPerInvocation, "Rows of a grid for each invocation (0: automatic)");
+  app.add_option("--workgroup", settings.workgroupSize, "Invocations of a workgroup (0: automatic)");
+  app.add_option("--pictures", settings.pictures, "Directory of the pictures")
       ->check(CLI::ExistingDirectory)
       ->capture_default_str();
   CLI::Option* wholeOption = app.add_option("--xpbd-whole", xpbdWholeNodes,
-                                            "Nodes of the largest cloth that one workgroup sweeps (xpbd)");
-  CLI::Option* solveOption = app.add_option("--solve-whole", solveWholeNodes,
-                                            "Nodes of the largest cloth that one workgroup solves");
+                                            "Maximum nodes of a cloth that one workgroup sweeps (xpbd)");
+  CLI::Option* solveOption =
+      app.add_option("--solve-whole", solveWholeNodes, "Maximum nodes of a cloth that one workgroup solves");
   bench::addMotionOptions(app, settings);
   CLI11_PARSE(app, argc, argv);
   if (*sizeOption) settings.size = size;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Suite mass_spring: node-steps a second over grid sizes, beside the device's byte floor and the serial
-// reference.
+// Suite mass_spring: node-steps a second over grid sizes, compared with the device's byte floor and the
+// serial reference.
 #include <algorithm>
 #include <memory>
 
@@ -15,10 +15,10 @@
 namespace clothstream::bench {
 namespace {
 
-// Positions and velocities, four floats each, read and written.
+// Positions and velocities, four floats each, are read and written.
 constexpr double kTexelsMovedPerNodeStep = 2;
 constexpr float kSpacing = 0.02f;
-// Device memory of a ClothSimulation and host memory of the check, a node.
+// Bytes a node: device memory of a ClothSimulation, and host memory of the check.
 constexpr std::uint64_t kDeviceBytesPerNode = 14 * 16;
 constexpr std::uint64_t kHostBytesPerNode = 400;
 
@@ -27,7 +27,7 @@ struct Variant {
   bool air = false;
   std::uint32_t spheres = 0;
   bool builtin = false;
-  bool mesh = false;  // the same cloth, given as a mesh
+  bool mesh = false;  // the same cloth as a mesh
 };
 
 model::Scene squareCloth(std::uint32_t size, const Variant& variant) {
@@ -56,7 +56,7 @@ model::Scene squareCloth(std::uint32_t size, const Variant& variant) {
 
 simulation::TickInputs inputsOf(const model::Scene& scene, const Variant& variant) {
   simulation::TickInputs inputs{scene.environment, {}};
-  // Out of the cloth's way: what is measured is the search, and the check stays the same.
+  // The spheres do not touch the cloth: only the search is measured, and the check stays the same.
   for (std::uint32_t i = 0; i < variant.spheres; ++i) {
     const model::Vec3 place(static_cast<float>(i), 5, 0);
     inputs.colliders.push_back({model::Sphere{0.1f}, {place}, {place}, 1});
@@ -85,7 +85,7 @@ struct Candidate {
   double referenceSeconds = 0;
 };
 
-// All variants of one size by turns, so that what disturbs the machine disturbs them alike.
+// All variants of one size alternate, so that disturbances of the machine affect them alike.
 Rows measureSize(vulkan::Device& device, const Settings& settings, std::uint32_t size,
                  const std::vector<Variant>& variants) {
   std::vector<Candidate> candidates;

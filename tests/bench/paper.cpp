@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Suite paper: Figures 7 to 10 of [Va21] at the paper's own sizes. A frame is one step of its time step.
+// Suite paper: Figures 7 to 10 of [Va21] at the paper's sizes. Our frame is one step of its time step,
+// without rendering. The paper's frame is a rendered frame of a Unity scene (docs/benchmarks.md).
 #include <algorithm>
 #include <cmath>
 #include <optional>
@@ -18,9 +19,9 @@ namespace {
 // stiffness.
 constexpr std::uint32_t kStepsPerSecond = 200;
 constexpr float kSpacing = 0.1f, kNodeMass = 0.1f, kStiffness = 200, kDamping = 0.1f;
-// The paper averages over as many.
+// The paper averages over 500 frames.
 constexpr std::size_t kFrames = 500;
-// "Converged" of a row.
+// Largest relative residual of a row that counts as converged.
 constexpr float kConverged = 0.01f;
 
 struct Case {
@@ -81,8 +82,8 @@ model::Scene sceneOf(const Case& experiment) {
   return scene;
 }
 
-// Against the reference, with a solve tight enough to compare: with the default compliance nodes are off by
-// at most 500 times the tolerance of what is demanded of the constraints (tests/simulation derives it).
+// Compares with the reference, with a solve tight enough to compare. With the default compliance, nodes are
+// off by at most 500 times the tolerance times the constraints' demand (tests/simulation derives it).
 void check(vulkan::Device& device, model::Scene scene, std::size_t links,
            const simulation::TickInputs& inputs) {
   model::Solver& solver = scene.cloths.front().solver;
@@ -113,7 +114,7 @@ Rows::value_type measure(vulkan::Device& device, const Settings& settings, const
     try {
       spent += secondsOf([&] { simulated.tick(inputs); });
     } catch (const std::runtime_error&) {
-      finite = false;  // as compliance 0 may end: the system is singular
+      finite = false;  // the system can be singular with compliance 0
     }
     for (const shared::SolveRecord& solve : simulated.solves()) {
       iterations.add(solve.iterations);
@@ -150,7 +151,7 @@ Rows::value_type measure(vulkan::Device& device, const Settings& settings, const
 }  // namespace
 
 Rows runPaper(vulkan::Device& device, const Settings& settings) {
-  if (settings.size) throw std::runtime_error("the sizes are the paper's: leave out --size");
+  if (settings.size) throw std::runtime_error("--size: not allowed, because the sizes are the paper's");
   Rows rows;
   for (const Case& experiment : cases()) rows.push_back(measure(device, settings, experiment));
   return rows;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// clothstream-bench-recording: what opening a recording of an hour to play it takes, and going to any time in
-// it until who watches has the key frame and the parameters that hold with it; also where these changed all
-// the time, and of files that were cut. Ends with 1 where a seek does not lead to what it should.
+// clothstream-bench-recording: time to open a recording of an hour for playback, and to seek in it until the
+// viewer has the key frame and its parameters. Also for recordings with constant parameter changes, and for
+// truncated files. The exit status is 1 if a seek leads to a wrong place.
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -44,7 +44,7 @@ Value got(tl::expected<Value, std::string> value) {
   if constexpr (!std::is_void_v<Value>) return std::move(*value);
 }
 
-// Of this thread, ms: what a seek takes where nothing else runs.
+// Processor time of this thread in ms: the cost of a seek without other work.
 double processorMs() {
   timespec now{};
   ::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
@@ -55,24 +55,24 @@ double millisecondsSince(Clock::time_point start) {
   return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
 }
 
-// What is sent to somebody who watches, of which each frame is acknowledged at once.
+// A viewer that acknowledges each frame at once.
 class Viewer {
  public:
   explicit Viewer(stream::LiveScene& scene) : scene_(scene) {
     if (scene.audience.join(mailbox_, 10) != stream::Audience::Joining::joined)
-      throw std::runtime_error("nobody can join");
+      throw std::runtime_error("cannot join the scene");
     mailbox_->subscribe(scene.description(), scene.shape(), scene.metrics, {});
   }
   ~Viewer() { scene_.audience.leave(*mailbox_); }
   Viewer(const Viewer&) = delete;
   Viewer& operator=(const Viewer&) = delete;
 
-  // All that waits; gives whether a frame was among it.
+  // Reads all waiting messages. Returns true if a frame was among them.
   bool read(Clock::time_point now) {
     bool framed = false;
     while (const auto bytes = mailbox_->next(now)) {
       if (!message_.ParseFromArray((*bytes)->data(), static_cast<int>((*bytes)->size())))
-        throw std::runtime_error("what was sent cannot be read");
+        throw std::runtime_error("a message cannot be parsed");
       if (message_.has_parameter_changed()) parameters.Swap(message_.mutable_parameter_changed());
       if (!message_.has_frame()) continue;
       const auto packet = codec::parsePacket(std::as_bytes(std::span(message_.frame().packet())));
@@ -82,7 +82,7 @@ class Viewer {
     return framed;
   }
 
-  v1::ParameterChanged parameters;  // told last
+  v1::ParameterChanged parameters;  // last received parameters
 
  private:
   stream::LiveScene& scene_;
@@ -90,7 +90,7 @@ class Viewer {
   v1::ServerMessage message_;
 };
 
-// Whether the sliders' last places are known to who watches, and it stands where it should.
+// Checks that the viewer has the last parameters and stands at the right frame.
 void check(std::uint32_t frame, const v1::Playback& playback, const v1::ParameterChange& told, bool sliders) {
   const std::uint32_t key = frame / kFramesAKeyFrame * kFramesAKeyFrame;
   if (std::abs(playback.position() * kSampleRate - key) > 0.01)
@@ -100,10 +100,10 @@ void check(std::uint32_t frame, const v1::Playback& playback, const v1::Paramete
   if (told.wind().value().x() != wanted.wind || told.cloths_size() != 1 ||
       told.cloths(0).structural().stiffness() != wanted.stiffness)
     throw std::runtime_error(
-        fmt::format("a seek to frame {} told other parameters: {}", frame, told.ShortDebugString()));
+        fmt::format("a seek to frame {} sent wrong parameters: {}", frame, told.ShortDebugString()));
 }
 
-// Of a recording of so many frames that is played to one who watches.
+// Measures a recording of `frames` frames that is played to one viewer.
 void measure(const std::string& name, const std::string& path, std::uint32_t frames, bool sliders) {
   const auto opening = Clock::now();
   RecordedStream recording = got(RecordedStream::open(path));
@@ -119,7 +119,7 @@ void measure(const std::string& name, const std::string& path, std::uint32_t fra
   for (int i = 0; i < kSeeks; ++i) {
     const auto frame = static_cast<std::uint32_t>(random() % frames);
     v1::ControlSceneRequest request;
-    // Not before the frame, however it is rounded.
+    // Never before the frame, whatever the rounding.
     request.set_seek((frame + 1e-3) / kSampleRate);
     viewer.parameters.Clear();
     const double processorStart = processorMs();
@@ -129,7 +129,7 @@ void measure(const std::string& name, const std::string& path, std::uint32_t fra
     const bool framed = viewer.read(Clock::now());
     seeks.push_back(millisecondsSince(start));
     mostProcessorMs = std::max(mostProcessorMs, processorMs() - processorStart);
-    if (!framed) throw std::runtime_error("a seek showed no key frame");
+    if (!framed) throw std::runtime_error("a seek sent no key frame");
     check(frame, playback->playback(), viewer.parameters.change(), sliders);
   }
   std::ranges::sort(seeks);
@@ -138,12 +138,12 @@ void measure(const std::string& name, const std::string& path, std::uint32_t fra
              seeks[seeks.size() / 2], seeks[seeks.size() * 99 / 100], seeks.back(), mostProcessorMs);
 }
 
-// The file as it is left by who is killed: without an index, and its last chunk cut.
+// Truncates the file like a killed program: no index, and an incomplete last chunk.
 std::uint32_t cut(const std::string& path) {
   RecordingReader reader = got(RecordingReader::open(path));
   const ChunkPlace last = reader.mcap().chunks().back();
   std::filesystem::resize_file(path, last.offset + last.length / 2);
-  // The frames before it; times are rounded to ns.
+  // Number of frames before it; times are rounded to ns.
   return static_cast<std::uint32_t>(
       std::llround(1e-9 * static_cast<double>(last.start - kSampleStart) * kSampleRate));
 }

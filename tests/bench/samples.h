@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Repeated measurements of one thing, and what to say of them.
+// Repeated measurements of one quantity, and their statistics.
 #pragma once
 
 #include <algorithm>
@@ -23,7 +23,7 @@ class Samples {
     return std::accumulate(values_.begin(), values_.end(), 0.0) / static_cast<double>(values_.size());
   }
 
-  // The smallest value that at least this part of all does not exceed. There must be one.
+  // Smallest value that at least `part` of all values do not exceed. Requires a value.
   double quantile(double part) const {
     std::vector<double> sorted = values_;
     std::sort(sorted.begin(), sorted.end());
@@ -35,7 +35,7 @@ class Samples {
   std::vector<double> values_;
 };
 
-// Wall time of a call, s.
+// Wall time of a call in seconds.
 template <typename Work>
 double secondsOf(const Work& work) {
   const auto start = std::chrono::steady_clock::now();

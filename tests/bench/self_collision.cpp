@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Suite self_collision: what it costs a sheet that it collides with itself, where it lies flat and where it
-// lies in folds, and in the scene folds.
+// Suite self_collision: cost of self-collision for a sheet that lies flat or in folds, and in the scene
+// folds.
 #include "server/reference/self_collision.h"
 
 #include <algorithm>
@@ -38,8 +38,8 @@ model::Scene sheetOnFloor(std::uint32_t size, bool balls) {
   return scene;
 }
 
-// On the floor in one layer, or to and fro in layers that touch; a little off its place, so that nothing is
-// even.
+// On the floor in one layer, or back and forth in touching layers; slightly displaced, so that nothing is
+// regular.
 simulation::NodeState lying(const model::Scene& scene, bool folds) {
   simulation::NodeState state = simulation::restState(scene.cloths);
   std::mt19937 random(1);
@@ -62,16 +62,16 @@ std::size_t touching(const model::Scene& scene, const simulation::NodeState& sta
   return reference::SelfCollision(scene).pairs(positions).size();
 }
 
-// Where the cloth passes through itself; a sheet that does not collide does so thousands of times.
+// Number of places where the cloth passes through itself. A sheet without self-collision has thousands.
 std::size_t crossingsIn(const model::Scene& scene, const simulation::NodeState& state) {
   const std::size_t crossings = tests::intersections(scene, state.positions);
   if (crossings > scene.nodeCount() / 100)
-    throw std::runtime_error(fmt::format("{} of {} nodes passes through itself {} times", scene.name,
+    throw std::runtime_error(fmt::format("{} with {} nodes passes through itself {} times", scene.name,
                                          scene.nodeCount(), crossings));
   return crossings;
 }
 
-// Returns how many lists of neighbours were too long.
+// Returns the number of neighbour lists that were too long.
 std::uint64_t measure(Simulated& simulated, const simulation::TickInputs& inputs, double seconds) {
   simulated.forgetTimes();
   std::uint64_t crowded = 0;
@@ -101,9 +101,9 @@ nlohmann::ordered_json sheet(vulkan::Device& device, const Settings& settings, s
   const simulation::TickInputs inputs{scene.environment, {{model::Plane{}, floor, floor, 1}}};
   Simulated simulated(device, scene, {settings.rowsPerInvocation, settings.workgroupSize, {}});
   const simulation::NodeState start = lying(scene, folds);
-  // A pair that just touches in one and just not in the other gets a contact's impulse a substep earlier, and
-  // passes that on: up to gravity's speed times a few substeps, 1e-4 m. Without contacts the folds would be
-  // millimetres off.
+  // A pair that touches in one and just misses in the other gets a contact's impulse a substep earlier and
+  // passes it on. That is up to gravity's speed times a few substeps, 1e-4 m. Without contacts the folds
+  // would be millimetres off.
   const double tolerance = kSpacing / 100;
   const double referenceSeconds = simulated.check(start, inputs, tolerance);
   simulated.restart(start);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A scene on the device that is timed tick by tick, and checked against the reference first.
+// A scene on the device that is checked against the reference and then timed tick by tick.
 #include "tests/bench/simulated.h"
 
 #include <algorithm>
@@ -14,7 +14,7 @@
 namespace clothstream::bench {
 namespace {
 
-// Every free node off its place by up to a fifth of the nodes' distance, and moving: no spring is idle.
+// Every free node is displaced by up to a fifth of the nodes' distance and moves, so that every spring acts.
 simulation::NodeState displacedState(const model::Scene& scene) {
   simulation::NodeState state = simulation::restState(scene.cloths);
   const std::vector<float> masses = simulation::inverseMasses(scene.cloths);
@@ -45,9 +45,9 @@ Simulated::Simulated(vulkan::Device& device, const model::Scene& scene,
     : device_(device), scene_(scene), recorder_(device), simulation_(device, scene, options) {}
 
 double Simulated::check(const simulation::TickInputs& inputs) {
-  // A tick moves a position by sums of rounded terms; each substep rounds it once, to 2^-24 of the cloth's
-  // extent, and twelve spring forces carry the rounding of their ends on. An eighth of a thousandth of the
-  // nodes' distance is far above that and far below what any missing term does.
+  // A tick moves a position by sums of rounded terms. Each substep rounds it once, to 2^-24 of the cloth's
+  // extent, and twelve spring forces pass on the rounding of their ends. An eighth of a thousandth of the
+  // nodes' distance is far above that and far below the effect of any missing term.
   const model::Grid& grid = scene_.cloths.front().grid;
   const double extent = std::max(double{grid.width}, double{grid.height});
   const double tolerance = scene_.substeps * 20 * extent / (1 << 24) + model::spacing(grid).column / 8000.0;
@@ -82,8 +82,9 @@ double Simulated::check(const simulation::NodeState& start, const simulation::Ti
     for (const reference::Vec3& expected : cloth.positions()) {
       const double distance = (state.positions[node].cast<double>() - expected).norm();
       if (!(distance <= tolerance))
-        throw std::runtime_error(fmt::format(
-            "node {} is {} m from where the reference has it, {} m are allowed", node, distance, tolerance));
+        throw std::runtime_error(
+            fmt::format("node {} is {} m from its place in the reference; at most {} m are allowed", node,
+                        distance, tolerance));
       ++node;
     }
   return seconds;
@@ -111,7 +112,7 @@ void Simulated::tick(const simulation::TickInputs& inputs) {
       advance_.add(time.seconds);
     else if (time.stage == "near")
       near_.add(time.seconds);
-  if (!simulation_.status().healthy) throw std::runtime_error("the state is not finite any more");
+  if (!simulation_.status().healthy) throw std::runtime_error("the state is no longer finite");
 }
 
 }  // namespace clothstream::bench

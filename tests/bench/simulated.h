@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A scene on the device that is timed tick by tick, and checked against the reference first.
+// A scene on the device that is checked against the reference and then timed tick by tick.
 #pragma once
 
 #include <span>
@@ -18,32 +18,32 @@ class Simulated {
  public:
   Simulated(vulkan::Device& device, const model::Scene& scene, const simulation::SimulationOptions& options);
 
-  // One tick from a displaced state on the device and in the reference; throws std::runtime_error where
-  // they differ by more than float rounding explains. Leaves the state it reached. Returns the reference's
+  // Computes one tick from a displaced state on the device and in the reference. Throws std::runtime_error if
+  // they differ by more than float rounding explains. Keeps the resulting state. Returns the reference's
   // seconds.
   double check(const simulation::TickInputs& inputs);
-  // The same with this distance allowed, m.
+  // The same with an allowed distance in metres.
   double check(const simulation::TickInputs& inputs, double tolerance);
-  // From this state.
+  // The same from a given state.
   double check(const simulation::NodeState& start, const simulation::TickInputs& inputs, double tolerance);
 
-  // Records, submits and waits for one tick; throws std::runtime_error if its state is not healthy.
+  // Records, submits and waits for one tick. Throws std::runtime_error if the state is not healthy.
   void tick(const simulation::TickInputs& inputs);
 
-  // Back to the scene's start, or to this state, and the times forgotten.
+  // Returns to the scene's start or to a given state, and discards the times.
   void restart();
   void restart(const simulation::NodeState& start);
 
-  // Of the last tick.
+  // Status of the last tick.
   simulation::TickStatus status() const { return simulation_.status(); }
 
   simulation::NodeState state();
   std::vector<shared::SolveRecord> solves() const { return simulation_.solves(); }
 
-  // Of a tick: all of it on the wall clock, and its advance stage by the device's clock. s.
+  // Times of ticks in seconds: wall clock of the whole tick, and the advance stage by the device's clock.
   const Samples& wall() const { return wall_; }
   const Samples& advance() const { return advance_; }
-  // Its search for what is near; where there are colliders.
+  // Search for near colliders; without colliders there are no samples.
   const Samples& near() const { return near_; }
   void forgetTimes() { wall_ = advance_ = near_ = {}; }
 
@@ -55,10 +55,10 @@ class Simulated {
   Samples wall_, advance_, near_;
 };
 
-// A scene's only cloth in this state, with its strain and energies.
+// The scene's only cloth in this state, with its strain and energies.
 reference::ReferenceCloth measuredCloth(const model::Cloth& cloth, const simulation::NodeState& state);
 
-// Records with `record`, submits, waits.
+// Records with `record`, submits and waits.
 void runOn(vulkan::Device& device, vulkan::Recorder& recorder, const auto& record) {
   recorder.begin();
   record();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// How far a cloth's structural springs are stretched.
+// Strain of a cloth's structural springs.
 #pragma once
 
 #include "server/model/springs.h"
@@ -8,8 +8,8 @@
 
 namespace clothstream::bench {
 
-// Of each structural spring of a scene's only cloth: parts of its length at rest, negative where it is
-// shorter.
+// Strain of each structural spring of the scene's only cloth, as part of its rest length. Negative for
+// compressed springs.
 inline Samples structuralStrains(const model::Cloth& cloth, const simulation::NodeState& state) {
   Samples strains;
   for (const model::SpringLink& link : model::springLinks(cloth))

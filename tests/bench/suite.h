@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What a benchmark suite is given, and what it gives back.
+// Settings and results of a benchmark suite.
 #pragma once
 
 #include <cstdint>
@@ -16,15 +16,15 @@ namespace clothstream::bench {
 
 struct Settings {
   vulkan::DeviceOptions device;
-  std::optional<std::uint32_t> size;    // one grid size instead of a ladder
-  double seconds = 1;                   // of measuring, a row
-  std::uint32_t rowsPerInvocation = 0;  // 0: as the simulation chooses
+  std::optional<std::uint32_t> size;    // one grid size instead of several
+  double seconds = 1;                   // minimum time of measuring for each row
+  std::uint32_t rowsPerInvocation = 0;  // 0: chosen by the simulation
   std::uint32_t workgroupSize = 0;
-  std::optional<std::uint32_t> xpbdWholeNodes;  // likewise where it is absent
+  std::optional<std::uint32_t> xpbdWholeNodes;  // chosen by the simulation if absent
   std::optional<std::uint32_t> solveWholeNodes;
-  std::filesystem::path pictures = ".";  // where suites that make some put them
-  // Of what codecs are measured on: named motions, or instead of them a file (bench_motion.h); how much of
-  // each; and the codecs' max error, m.
+  std::filesystem::path pictures = ".";  // directory of the suites' pictures
+  // Input of the codec suites: named motions, or instead a file (bench_motion.h); number of frames of each;
+  // max error in metres.
   std::vector<std::string> motions;
   std::optional<std::filesystem::path> input;
   std::uint32_t frames = 600;
@@ -32,8 +32,8 @@ struct Settings {
   std::uint32_t encoderThreads = 1;
 };
 
-// One JSON object a row; every row names its suite. A suite checks its results before it reports a time, and
-// throws std::runtime_error when they are wrong.
+// One JSON object for each row; every row names its suite. A suite checks its results before it reports a
+// time, and throws std::runtime_error if they are wrong.
 using Rows = std::vector<nlohmann::ordered_json>;
 
 struct Suite {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Rows of a benchmark for people.
+// Rows of a benchmark as text.
 #include "tests/bench/table.h"
 
 #include <fmt/format.h>

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
-// Rows of a benchmark for people.
+// Rows of a benchmark as text.
 #pragma once
 
 #include "tests/bench/suite.h"
 
 namespace clothstream::bench {
 
-// A line a row on stdout: names and values, the device left out.
+// Prints one line for each row on stdout: names and values, without the device.
 void printTable(const Rows& rows);
 
 }  // namespace clothstream::bench

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Suite work_precision: what a simulated second costs by every solver, against how far it is from what the
-// springs really do.
+// Suite work_precision: cost of a simulated second by every solver, against the distance from the true motion
+// of the springs.
 #include <Eigen/Geometry>
 #include <cmath>
 #include <optional>
@@ -18,8 +18,8 @@ namespace clothstream::bench {
 namespace {
 
 constexpr std::uint32_t kSize = 32, kFramesPerSecond = 60, kFrames = 30;
-// Of the run in double precision that the others are compared with, and of the one that says how far that is
-// from its limit.
+// Substeps of the double-precision run that the others are compared with, and of the run that estimates its
+// error.
 constexpr std::uint32_t kReferenceSubsteps = 1024, kCoarserSubsteps = 512;
 
 struct Method {
@@ -30,7 +30,7 @@ struct Method {
   std::vector<std::uint32_t> substeps;
 };
 
-// Forces from the fewest substeps on that they bear.
+// Explicit forces start with the fewest substeps that are stable.
 std::vector<Method> methods() {
   using enum model::SolverKind;
   using enum model::Integrator;
@@ -42,7 +42,7 @@ std::vector<Method> methods() {
           {"constraint", constraint, semiImplicitEuler, 40, {12, 24}}};
 }
 
-// A square metre of 0.2 kg, whose springs of 200 N/m give way by a few percent.
+// A square metre of 0.2 kg whose springs of 200 N/m stretch by a few percent.
 model::Cloth sheet() {
   model::Cloth cloth;
   cloth.name = "sheet";
@@ -65,7 +65,7 @@ model::Scene sceneOf(const char* name, model::Cloth cloth) {
   return scene;
 }
 
-// Half a second each, of motions that springs decide: what folds by itself does so at random.
+// Half a second each of motions that springs determine. Free folding would be random.
 std::vector<model::Scene> scenes() {
   const model::GridRange upperEdge{.lastColumn = kSize - 1};
   model::Cloth swinging = sheet();
@@ -90,7 +90,7 @@ std::vector<model::Scene> scenes() {
   return {sceneOf("swing", swinging), push, flag};
 }
 
-// Where the nodes are after each frame, and the energy at the end, J.
+// Positions of the nodes after each frame, and the energy at the end in J.
 struct Trajectory {
   std::vector<std::vector<reference::Vec3>> frames;
   double energy = 0;
@@ -114,7 +114,7 @@ Trajectory referenceTrajectory(model::Scene scene, std::uint32_t substeps) {
   return trajectory;
 }
 
-// Root of the mean square over nodes and frames, m.
+// Root mean square over nodes and frames, in metres.
 double distance(const Trajectory& a, const Trajectory& b) {
   double sum = 0;
   for (std::size_t frame = 0; frame < a.frames.size(); ++frame)
@@ -125,7 +125,7 @@ double distance(const Trajectory& a, const Trajectory& b) {
 
 struct Measured {
   Trajectory trajectory;
-  double seconds;  // a simulated one
+  double seconds;  // of a simulated second
 };
 
 Measured measure(vulkan::Device& device, model::Scene scene, const Method& method, std::uint32_t substeps) {
@@ -150,7 +150,7 @@ Measured measure(vulkan::Device& device, model::Scene scene, const Method& metho
 }  // namespace
 
 Rows runWorkPrecision(vulkan::Device& device, const Settings& settings) {
-  if (settings.size) throw std::runtime_error("the sheet has 32x32 nodes: leave out --size");
+  if (settings.size) throw std::runtime_error("--size: not allowed, because the sheet has 32x32 nodes");
   Rows rows;
   std::vector<LogPlot> plots;
   for (const model::Scene& scene : scenes()) {
@@ -177,7 +177,7 @@ Rows runWorkPrecision(vulkan::Device& device, const Settings& settings) {
                         {"device", device.info().name}});
       }
     }
-    // Forces go to the truth with their steps; where they do not, something is wrong.
+    // Explicit forces converge to the truth with smaller steps. If they do not, something is wrong.
     if (!(*worst < 0.005))
       throw std::runtime_error(fmt::format("{}: the finest forces are {} m off", scene.name, *worst));
   }

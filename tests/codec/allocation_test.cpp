@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Counts every allocation of the program: the linker sends malloc and its like through here (--wrap).
+// Counts every allocation of the program. The linker redirects malloc, calloc and realloc to these functions
+// (--wrap).
 #include <atomic>
 #include <cstdlib>
 #include <new>
@@ -55,7 +56,7 @@ void expectAllocationOnlyAtConstruction(const StreamLayout& layout, const Encode
   const auto encoder = Encoder::make(layout, options);
   const auto decoder = Decoder::make(layout);
   std::vector<std::byte> packet(encoder->packetBound());
-  ASSERT_GT(allocations, before + 10);  // they are counted
+  ASSERT_GT(allocations, before + 10);  // shows that allocations are counted
 
   const std::size_t constructed = allocations;
   bool decoded = true;
@@ -72,25 +73,25 @@ void expectAllocationOnlyAtConstruction(const StreamLayout& layout, const Encode
   EXPECT_NE(sum, 0.0f);
 }
 
-TEST(Allocation, OfTheHierarchicalCodecHappensOnlyAtConstruction) {
+TEST(Allocation, HappensOnlyAtConstructionInCodec2) {
   expectAllocationOnlyAtConstruction(mixedLayout(NormalMode::none, kCodecHierarchical));
 }
 
-TEST(Allocation, WhereNormalsAreSentHappensOnlyAtConstruction) {
+TEST(Allocation, HappensOnlyAtConstructionWithNormals) {
   expectAllocationOnlyAtConstruction(mixedLayout(NormalMode::octahedral, kCodecHierarchical));
 }
 
-TEST(Allocation, OfThePackedCodecHappensOnlyAtConstruction) {
+TEST(Allocation, HappensOnlyAtConstructionInCodec3) {
   expectAllocationOnlyAtConstruction(mixedLayout(NormalMode::octahedral, kCodecPacked));
 }
 
-TEST(Allocation, OfTemporalLayersHappensOnlyAtConstruction) {
+TEST(Allocation, HappensOnlyAtConstructionWithTemporalLayers) {
   StreamLayout layout = mixedLayout(NormalMode::none, kCodecHierarchical);
   layout.temporalLayers = 3;
   expectAllocationOnlyAtConstruction(layout);
 }
 
-TEST(Allocation, WhereWeightsLagHappensOnlyAtConstruction) {
+TEST(Allocation, HappensOnlyAtConstructionWithAWeightLag) {
   expectAllocationOnlyAtConstruction(mixedLayout(NormalMode::none, kCodecHierarchical), {.weightLag = 3});
 }
 

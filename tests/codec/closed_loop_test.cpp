@@ -16,7 +16,7 @@
 namespace clothstream::codec {
 namespace {
 
-// Of the vertex whose first coordinate is number i.
+// Squared distance of the vertex whose first coordinate has index i.
 double squaredDistance(std::span<const float> a, std::span<const float> b, std::size_t i) {
   double squared = 0;
   for (std::size_t c = i; c < i + 3; ++c) {
@@ -35,7 +35,7 @@ class Loop {
         decoder_(Decoder::make(layout)),
         packet_(encoder_->packetBound()) {}
 
-  // Sends one frame and checks what arrives.
+  // Sends one frame and checks the decoded result.
   PacketHeader send(std::uint64_t tick, PacketKind kind, const MotionFrame& frame) {
     const std::size_t bytes = encoder_->encode(tick, kind, frame.positions, frame.normals, packet_);
     const std::span<const std::byte> packet = std::span(packet_).first(bytes);
@@ -61,7 +61,7 @@ class Loop {
   }
 
   void expectNormals(const MotionFrame& frame) {
-    constexpr double kLargestAngle = 1;  // encodeOctahedral()
+    constexpr double kLargestAngle = 1;  // bound of encodeOctahedral()
     for (std::size_t i = 0; i < frame.normals.size(); i += 3)
       EXPECT_LT(degreesBetween(&decoder_->normals()[i], &frame.normals[i]), kLargestAngle) << i;
   }
@@ -90,7 +90,7 @@ INSTANTIATE_TEST_SUITE_P(Sorts, ClosedLoop,
                                          Sort{"packedWithNormals", kCodecPacked, NormalMode::octahedral}),
                          [](const auto& chosen) { return chosen.param.name; });
 
-TEST_P(ClosedLoop, KeepsTheMaxErrorOverAMotion) {
+TEST_P(ClosedLoop, KeepsMaxErrorOverAMotion) {
   const StreamLayout layout = mixed();
   Loop loop(layout);
   for (std::uint64_t tick = 1; tick <= 60; ++tick) {
@@ -105,7 +105,7 @@ TEST_P(ClosedLoop, KeepsTheMaxErrorOverAMotion) {
   }
 }
 
-TEST_P(ClosedLoop, KeepsTheMaxErrorWhenEverythingJumps) {
+TEST_P(ClosedLoop, KeepsMaxErrorWhenEverythingJumps) {
   const StreamLayout layout = mixed();
   Loop loop(layout);
   for (std::uint32_t tick = 1; tick <= 30; ++tick) {
@@ -113,7 +113,7 @@ TEST_P(ClosedLoop, KeepsTheMaxErrorWhenEverythingJumps) {
   }
 }
 
-TEST_P(ClosedLoop, KeepsTheMaxErrorAtTheFinestAndAtTheCoarsest) {
+TEST_P(ClosedLoop, KeepsSmallestAndLargestMaxError) {
   for (const float maxError : {kSmallestMaxError, 1e-5f, 2e-4f, 0.1f}) {
     StreamLayout layout = mixed();
     layout.maxError = maxError;
@@ -127,7 +127,7 @@ TEST_P(ClosedLoop, KeepsTheMaxErrorAtTheFinestAndAtTheCoarsest) {
   }
 }
 
-TEST_P(ClosedLoop, StartsWithAKeyFrameWhateverIsAsked) {
+TEST_P(ClosedLoop, AlwaysStartsWithAKeyFrame) {
   const StreamLayout layout = mixed();
   Loop loop(layout);
   EXPECT_EQ(loop.send(5, PacketKind::predicted, sampleMotion(layout, 5, 0.1f)).kind, PacketKind::key);
@@ -136,7 +136,7 @@ TEST_P(ClosedLoop, StartsWithAKeyFrameWhateverIsAsked) {
   EXPECT_EQ(loop.send(7, PacketKind::predicted, sampleMotion(layout, 7, 0.1f)).kind, PacketKind::key);
 }
 
-TEST_P(ClosedLoop, SurvivesPositionsThatAreNone) {
+TEST_P(ClosedLoop, SurvivesPositionsThatAreNotFinite) {
   const StreamLayout layout = mixed();
   const auto encoder = Encoder::make(layout);
   const auto decoder = Decoder::make(layout);
@@ -161,7 +161,7 @@ StreamLayout square(std::uint32_t edge, std::uint8_t codec) {
 class EachCodec : public testing::TestWithParam<std::uint8_t> {};
 INSTANTIATE_TEST_SUITE_P(Codecs, EachCodec, testing::Values(kCodecHierarchical, kCodecPacked));
 
-TEST_P(EachCodec, SendsAStillClothInATwentiethOfABitAVertex) {
+TEST_P(EachCodec, SendsStillClothInATwentiethOfABitAVertex) {
   const StreamLayout layout = square(100, GetParam());
   Loop loop(layout);
   PacketHeader last;
@@ -184,9 +184,9 @@ std::size_t bodyBytes(const PacketHeader& header) {
   return sum;
 }
 
-// By its triangles alone a mesh is told apart from a row of vertices; by where its vertices are at rest it
-// comes near the grid that it was cut from.
-TEST(Hierarchical, FindsAMeshsOrderInItsTrianglesAndRestPositions) {
+// Triangles alone let the codec do better than for a row of vertices. Rest positions bring it near the grid
+// that the mesh was cut from.
+TEST(Hierarchical, FindsMeshOrderFromTrianglesAndRestPositions) {
   CutGrid mesh(64);
   StreamLayout known = cut(mesh), noPositions = known;
   noPositions.cloths[0].restPositions.clear();
@@ -211,8 +211,8 @@ TEST(Hierarchical, FindsAMeshsOrderInItsTrianglesAndRestPositions) {
 }
 
 TEST_P(EachCodec, CodesMeshesOfAnyShape) {
-  // A fan whose hub comes last, triangles that share no vertex, one that names a vertex thrice, lone
-  // vertices.
+  // A fan whose hub comes last, triangles without common vertices, a triangle that names one vertex three
+  // times, and lone vertices.
   StreamLayout layout{.epoch = 2, .codec = GetParam(), .cloths = {}};
   ClothLayout fan{.vertexCount = 3001}, apart{.vertexCount = 300}, odd{.vertexCount = 40};
   for (std::uint32_t i = 0; i + 1 < 3000; ++i) fan.triangles.insert(fan.triangles.end(), {i, i + 1, 3000});
@@ -225,7 +225,7 @@ TEST_P(EachCodec, CodesMeshesOfAnyShape) {
   }
 }
 
-TEST_P(EachCodec, LetsPinsStandStillInAMovingCloth) {
+TEST_P(EachCodec, KeepsPinsStillInMovingCloth) {
   const StreamLayout layout = square(20, GetParam());
   Loop loop(layout);
   std::vector<float> before;
@@ -243,18 +243,19 @@ TEST_P(EachCodec, LetsPinsStandStillInAMovingCloth) {
   }
 }
 
-TEST(Hierarchical, FitsItsWeightsToEarlierFramesForLittleMore) {
+TEST(Hierarchical, WeightLagCostsFewBits) {
   const StreamLayout layout = square(64, kCodecHierarchical);
   std::vector<std::size_t> bytes;
   for (const std::uint32_t lag : {0u, 1u, 3u}) {
     Loop loop(layout, {.weightLag = lag});
     bytes.push_back(0);
     for (std::uint64_t tick = 1; tick <= 60; ++tick) {
-      // A key frame before the weights of the one before it are known, and one long after.
+      // One key frame before the weights of the previous key frame are known, and one long after.
       const bool key = tick == 3 || tick == 30;
       const PacketHeader header =
           loop.send(tick, key ? PacketKind::key : PacketKind::predicted, sampleMotion(layout, tick, 0.03f));
-      // The first has the weights from before the key frame; those of the next are not known yet.
+      // The first frame has the weights from before the key frame; the weights of the next ones are not known
+      // yet.
       const std::uint64_t sinceKey = tick < 3 ? tick - 1 : tick < 30 ? tick - 3 : tick - 30;
       if (sinceKey <= lag + 1) {
         EXPECT_EQ(header.sectionBytes[0] == 0, sinceKey > 1 && sinceKey <= lag) << tick;
@@ -268,14 +269,14 @@ TEST(Hierarchical, FitsItsWeightsToEarlierFramesForLittleMore) {
   EXPECT_LT(bytes[2], bytes[0] * 110 / 100);
 }
 
-TEST_P(EachCodec, SendsTheNextFrameOfAStillClothInAFewBytes) {
+TEST_P(EachCodec, SendsNextFrameOfStillClothInAFewBytes) {
   const StreamLayout layout = mixedLayout(NormalMode::none, GetParam());
   Loop loop(layout);
   loop.send(1, PacketKind::key, sampleMotion(layout, 1, 0.1f));
   EXPECT_LT(bodyBytes(loop.send(2, PacketKind::predicted, sampleMotion(layout, 1, 0.1f))), 16u);
 }
 
-TEST_P(EachCodec, PredictionPaysOnASlowMotion) {
+TEST_P(EachCodec, PredictionSavesBitsInSlowMotion) {
   const StreamLayout layout = square(64, GetParam());
   const auto predicted = Encoder::make(layout), keys = Encoder::make(layout);
   std::vector<std::byte> packet(keys->packetBound());
@@ -287,12 +288,12 @@ TEST_P(EachCodec, PredictionPaysOnASlowMotion) {
     const std::size_t keyFrame = keys->encode(tick, PacketKind::key, frame.positions, {}, packet);
     if (tick > 1) keyBytes += keyFrame;
   }
-  // A key frame spends a few bits a coordinate where float32 spends 32.
+  // A key frame takes a few bits for a coordinate that takes 32 bits as float32.
   EXPECT_LT(keyBytes, 19 * layout.vertexCount() * 12 / 8);
   EXPECT_LT(predictedBytes, keyBytes);
 }
 
-TEST(Packed, TakesAQuarterMoreThanEntropyCodingAtMost) {
+TEST(Packed, TakesAtMostAQuarterMoreThanEntropyCoding) {
   std::array<std::size_t, kCodecs.size()> bytes{};
   for (std::size_t i = 0; i < kCodecs.size(); ++i) {
     const StreamLayout layout = square(64, static_cast<std::uint8_t>(kCodecs[i]));
@@ -304,8 +305,8 @@ TEST(Packed, TakesAQuarterMoreThanEntropyCodingAtMost) {
   EXPECT_LT(4 * bytes[1], 5 * bytes[0]);
 }
 
-// Nothing but how residuals are written is another.
-TEST(Packed, LeadsToTheSamePositions) {
+// The codecs differ only in the way residuals are written.
+TEST(Packed, DecodesToThePositionsOfCodec2) {
   const StreamLayout entropy = square(50, kCodecHierarchical), packed = square(50, kCodecPacked);
   Loop one(entropy), other(packed);
   for (std::uint32_t tick = 1; tick <= 20; ++tick) {
@@ -317,8 +318,8 @@ TEST(Packed, LeadsToTheSamePositions) {
   }
 }
 
-// The same scene in three qualities; a reader goes from one to another at key frames alone.
-TEST_P(EachCodec, ChangesItsQualityAtAKeyFrame) {
+// The same scene in three qualities. A reader changes its quality only at key frames.
+TEST_P(EachCodec, ChangesQualityAtAKeyFrame) {
   StreamLayout layout = square(60, GetParam());
   layout.qualities = 3;
   const auto decoder = Decoder::make(layout);
@@ -338,7 +339,8 @@ TEST_P(EachCodec, ChangesItsQualityAtAKeyFrame) {
                                                          frame.positions, {}, packet);
       if (!key) bytes[quality] += size;
       if (quality != wanted) {
-        // It refers to a frame of another quality, or comes too late; where the quality changes none is sent.
+        // The packet refers to a frame of another quality, or is stale. Nothing is sent at a change of
+        // quality.
         if (tick % 6 == 0) continue;
         EXPECT_NE(decoder->decode(std::span(packet).first(size)), DecodeResult::ok);
         continue;
@@ -360,7 +362,7 @@ TEST_P(EachCodec, ChangesItsQualityAtAKeyFrame) {
   EXPECT_GT(bytes[1], bytes[2]);
 }
 
-TEST(Layout, ThatIsImpossibleMakesNoCodec) {
+TEST(Layout, IsRefusedIfImpossible) {
   const StreamLayout good = mixedLayout(NormalMode::none);
   ASSERT_NE(Decoder::make(good), nullptr);
   std::vector<StreamLayout> bad(17, good);
@@ -376,7 +378,7 @@ TEST(Layout, ThatIsImpossibleMakesNoCodec) {
   bad[9].codec = 0;
   bad[10].codec = 1;
   bad[11].codec = 200;
-  bad[12].cloths[0].restPositions.assign(3 * 63, 0);  // of a grid
+  bad[12].cloths[0].restPositions.assign(3 * 63, 0);  // rest positions of a grid
   bad[13].temporalLayers = 0;
   bad[14].temporalLayers = kMaxTemporalLayers + 1;
   bad[15].qualities = 0;

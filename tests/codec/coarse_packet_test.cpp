@@ -25,7 +25,7 @@ StreamLayout layoutWith(NormalMode normals, std::uint8_t layers, std::uint8_t co
                      {.vertexCount = 25}}};
 }
 
-// Of the grid: every fourth of every fourth row, and the last ones.
+// Every fourth vertex of every fourth row of the grid, and the last ones.
 std::vector<std::uint32_t> coarseVertices() {
   std::vector<std::uint32_t> vertices;
   for (std::uint32_t row = 0; row < kRows; ++row) {
@@ -50,7 +50,7 @@ INSTANTIATE_TEST_SUITE_P(Layouts, CoarsePacket,
                                          layoutWith(NormalMode::none, 1, kCodecPacked),
                                          layoutWith(NormalMode::octahedral, 3, kCodecPacked)));
 
-TEST_P(CoarsePacket, HoldsCoarseVerticesAsTheyAre) {
+TEST_P(CoarsePacket, HoldsExactCoarseVertices) {
   const StreamLayout& layout = GetParam();
   const auto encoder = Encoder::make(layout);
   const auto full = Decoder::make(layout), coarse = Decoder::make(layout, Detail::coarse),
@@ -58,7 +58,7 @@ TEST_P(CoarsePacket, HoldsCoarseVerticesAsTheyAre) {
   std::vector<std::byte> packet(encoder->packetBound()), small(packet.size());
   std::size_t fullBytes = 0, coarseBytes = 0;
   for (std::uint64_t tick = 1; tick <= 40; ++tick) {
-    // It rests for a while.
+    // The cloth rests for a while.
     const MotionFrame frame = sampleMotion(layout, tick < 20 || tick > 30 ? tick : 20, 0.01f);
     const PacketKind kind = tick % 16 == 1 ? PacketKind::key : PacketKind::predicted;
     const std::size_t bytes = encoder->encode(tick, kind, frame.positions, frame.normals, packet);
@@ -74,7 +74,7 @@ TEST_P(CoarsePacket, HoldsCoarseVerticesAsTheyAre) {
       for (std::size_t c = 0; c < 3; ++c)
         ASSERT_EQ(coarse->positions()[3 * vertex + c], full->positions()[3 * vertex + c]) << tick;
     }
-    // Waves of 1 cm are followed to half of that, at the borders, too.
+    // Waves of 1 cm are followed to within half of that, also at borders.
     for (std::size_t i = 0; i < 3 * kRows * kColumns; i += 3)
       ASSERT_LT(distance(&coarse->positions()[i], &full->positions()[i]), 0.005) << tick << ' ' << i;
   }
@@ -84,7 +84,7 @@ TEST_P(CoarsePacket, HoldsCoarseVerticesAsTheyAre) {
 class CoarsePacketOf : public testing::TestWithParam<std::uint8_t> {};
 INSTANTIATE_TEST_SUITE_P(Codecs, CoarsePacketOf, testing::Values(kCodecHierarchical, kCodecPacked));
 
-TEST_P(CoarsePacketOf, IsNoPacketForWhoWantsAll) {
+TEST_P(CoarsePacketOf, IsRefusedByAFullDecoder) {
   const StreamLayout layout = layoutWith(NormalMode::none, 1, GetParam());
   const auto encoder = Encoder::make(layout);
   const auto decoder = Decoder::make(layout);
@@ -97,7 +97,7 @@ TEST_P(CoarsePacketOf, IsNoPacketForWhoWantsAll) {
   EXPECT_EQ(decoder->decode(whole), DecodeResult::ok);
 }
 
-TEST_P(CoarsePacketOf, IsMadeOfPacketsOfOurCodecsAlone) {
+TEST_P(CoarsePacketOf, IsMadeOnlyFromPacketsOfKnownCodecs) {
   const StreamLayout layout = layoutWith(NormalMode::none, 1, GetParam());
   const auto encoder = Encoder::make(layout);
   std::vector<std::byte> packet(encoder->packetBound()), out(packet.size());

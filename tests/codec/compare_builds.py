@@ -49,7 +49,7 @@ def check(name):
         if shutil.which(program) is None:
             return "there is no %s: install it (./dev test --long does)" % program
     with tempfile.TemporaryDirectory() as folder:
-        # These are headers alone, the same for every processor.
+        # Header-only libraries, the same for every processor.
         headers = os.path.join(folder, "headers")
         os.mkdir(headers)
         for library in "simde", "nlohmann", "fmt":

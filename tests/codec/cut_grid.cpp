@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A grid as a mesh.
+// A grid cut into an irregular mesh.
 #include "tests/codec/cut_grid.h"
 
 #include <algorithm>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A grid as a mesh, for measuring what irregular cloth costs.
+// A grid cut into an irregular mesh, to measure the cost of irregular cloth.
 #pragma once
 
 #include <cstdint>
@@ -10,18 +10,19 @@
 
 namespace clothstream::codec {
 
-// Each quad is cut one way or the other and the vertices are numbered in any order; a function of the size.
+// Cuts each quad along one of its diagonals and numbers the vertices in random order. The result depends only
+// on the size.
 class CutGrid {
  public:
   explicit CutGrid(std::uint32_t edge);
 
   const codec::ClothLayout& cloth() const { return cloth_; }
-  // The grid's positions, 3 floats a vertex, in the mesh's order; valid until the next call.
+  // Positions of the grid in the mesh's order, 3 floats a vertex. Valid until the next call.
   std::span<const float> renumbered(std::span<const float> positions);
 
  private:
   codec::ClothLayout cloth_;
-  std::vector<std::uint32_t> numbers_;  // of the grid's vertices
+  std::vector<std::uint32_t> numbers_;  // indexed by vertex of the grid
   std::vector<float> positions_;
 };
 

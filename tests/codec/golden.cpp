@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: MIT
-// The golden packets of tests/golden.
+// Golden packets of tests/golden.
 #include "tests/codec/golden.h"
 
+#include <algorithm>
 #include <bit>
+#include <cmath>
 #include <fstream>
 #include <iterator>
 #include <stdexcept>
@@ -15,7 +17,7 @@ namespace {
 
 const std::string kFolder = "tests/golden/";
 
-// 64-bit numbers are hexadecimal strings: JSON's numbers are doubles to many readers.
+// 64-bit numbers are hexadecimal strings, because many JSON readers turn numbers into doubles.
 std::string hexadecimal(std::uint64_t value) {
   return fmt::format("{:016x}", value);
 }
@@ -44,6 +46,7 @@ GoldenStream readStream(const nlohmann::json& json) {
   stream.layout.codec = json.at("codec");
   stream.layout.maxError = json.at("maxError");
   stream.layout.temporalLayers = json.value("temporalLayers", std::uint8_t{1});
+  stream.layout.qualities = json.value("qualities", std::uint8_t{1});
   stream.layout.normals = json.at("normals") == "octahedral" ? NormalMode::octahedral : NormalMode::none;
   for (const nlohmann::json& cloth : json.at("cloths")) {
     stream.layout.cloths.push_back({cloth.at("vertexCount"), cloth.at("rows"), cloth.at("columns"),
@@ -55,8 +58,11 @@ GoldenStream readStream(const nlohmann::json& json) {
     stream.packets.push_back({file, readBytes(kFolder + file), packet.at("tick"),
                               packet.at("kind") == "key" ? PacketKind::key : PacketKind::predicted,
                               fromHexadecimal(packet.at("reconstructionHash")),
-                              fromHexadecimal(packet.at("positionsHash"))});
+                              fromHexadecimal(packet.at("positionsHash")),
+                              fromHexadecimal(packet.at("coarsePositionsHash"))});
   }
+  for (const nlohmann::json& normal : json.at("normalSamples"))
+    stream.normals.push_back({normal.at("vertex"), normal.at("normal")});
   return stream;
 }
 
@@ -68,6 +74,7 @@ nlohmann::ordered_json describe(const GoldenStream& stream) {
       {"maxError", stream.layout.maxError},
       {"normals", stream.layout.normals == NormalMode::octahedral ? "octahedral" : "none"}};
   if (stream.layout.temporalLayers > 1) json["temporalLayers"] = stream.layout.temporalLayers;
+  if (stream.layout.qualities > 1) json["qualities"] = stream.layout.qualities;
   for (const ClothLayout& cloth : stream.layout.cloths) {
     nlohmann::ordered_json& described = json["cloths"].emplace_back();
     described = {{"vertexCount", cloth.vertexCount}, {"rows", cloth.rows}, {"columns", cloth.columns}};
@@ -79,8 +86,11 @@ nlohmann::ordered_json describe(const GoldenStream& stream) {
                                {"tick", packet.tick},
                                {"kind", packet.kind == PacketKind::key ? "key" : "predicted"},
                                {"reconstructionHash", hexadecimal(packet.reconstructionHash)},
-                               {"positionsHash", hexadecimal(packet.positionsHash)}});
+                               {"positionsHash", hexadecimal(packet.positionsHash)},
+                               {"coarsePositionsHash", hexadecimal(packet.coarsePositionsHash)}});
   }
+  for (const GoldenNormal& normal : stream.normals)
+    json["normalSamples"].push_back({{"vertex", normal.vertex}, {"normal", normal.xyz}});
   return json;
 }
 
@@ -103,6 +113,18 @@ void writeGoldenStreams(const std::vector<GoldenStream>& streams) {
     }
   }
   std::ofstream(kFolder + "streams.json") << json.dump(2) << '\n';
+}
+
+std::vector<GoldenNormal> sampleNormals(std::span<const float> normals) {
+  const std::size_t vertices = normals.size() / 3, count = std::min(vertices, kGoldenNormals);
+  std::vector<GoldenNormal> samples(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::size_t vertex = i * vertices / count;
+    samples[i].vertex = static_cast<std::uint32_t>(vertex);
+    for (std::size_t c = 0; c < 3; ++c)
+      samples[i].xyz[c] = std::round(kNormalSteps * double{normals[3 * vertex + c]}) / kNormalSteps;
+  }
+  return samples;
 }
 
 std::uint64_t hashFloats(std::span<const float> values) {

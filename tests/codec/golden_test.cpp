@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "tests/codec/golden.h"
 
+#include <cmath>
+
 #include <gtest/gtest.h>
 
 #include "proto/codec/decoder.h"
@@ -8,12 +10,18 @@
 namespace clothstream::codec {
 namespace {
 
-TEST(GoldenPackets, AreDecodedToTheSameBitsForEver) {
+// Normals are exact with float32 arithmetic. The tolerance allows for compilers that compute with more
+// precision.
+constexpr double kNormalTolerance = 2 / kNormalSteps;
+
+TEST(GoldenPackets, DecodeToTheSameBitsForever) {
   const std::vector<GoldenStream> streams = readGoldenStreams();
   ASSERT_FALSE(streams.empty());
   for (const GoldenStream& stream : streams) {
     const auto decoder = Decoder::make(stream.layout);
+    const auto coarse = Decoder::make(stream.layout, Detail::coarse);
     ASSERT_NE(decoder, nullptr) << stream.name;
+    ASSERT_NE(coarse, nullptr) << stream.name;
     ASSERT_FALSE(stream.packets.empty());
     for (const GoldenPacket& packet : stream.packets) {
       ASSERT_EQ(decoder->decode(packet.bytes), DecodeResult::ok) << packet.file;
@@ -21,6 +29,17 @@ TEST(GoldenPackets, AreDecodedToTheSameBitsForEver) {
       EXPECT_EQ(parsePacket(packet.bytes)->header.kind, packet.kind);
       EXPECT_EQ(decoder->reconstructionHash(), packet.reconstructionHash) << packet.file;
       EXPECT_EQ(hashFloats(decoder->positions()), packet.positionsHash) << packet.file;
+      std::vector<std::byte> smaller(packet.bytes.size());
+      smaller.resize(makeCoarsePacket(packet.bytes, smaller));
+      ASSERT_EQ(coarse->decode(smaller), DecodeResult::ok) << packet.file;
+      EXPECT_EQ(hashFloats(coarse->positions()), packet.coarsePositionsHash) << packet.file;
+    }
+    ASSERT_FALSE(stream.normals.empty()) << stream.name;
+    for (const GoldenNormal& normal : stream.normals) {
+      for (std::size_t c = 0; c < 3; ++c) {
+        EXPECT_NEAR(double{decoder->normals()[3 * normal.vertex + c]}, normal.xyz[c], kNormalTolerance)
+            << stream.name << ' ' << normal.vertex;
+      }
     }
   }
 }

@@ -16,7 +16,7 @@ namespace {
 
 constexpr std::uint64_t kLateTick = 1'000'000;
 
-// A decoder that has the stream's first packets, and a key frame that comes after all of them.
+// A decoder with the stream's first packets, and an encoder for a key frame after all of them.
 class Victim {
  public:
   explicit Victim(const GoldenStream& stream) : stream_(stream), encoder_(Encoder::make(stream.layout)) {}
@@ -28,7 +28,8 @@ class Victim {
     }
   }
 
-  // Bytes in memory of exactly their size, so that the address sanitizer sees a read past the end.
+  // Copies the bytes to memory of exactly their size, so that the address sanitizer detects a read past the
+  // end.
   DecodeResult receive(std::span<const std::byte> bytes) {
     const auto copy = std::make_unique<std::byte[]>(bytes.size());
     if (!bytes.empty()) std::memcpy(copy.get(), bytes.data(), bytes.size());
@@ -63,7 +64,7 @@ class Victim {
   std::uint64_t tick_ = kLateTick;
 };
 
-TEST(HostilePacket, EveryTruncationIsRefusedAndChangesNothing) {
+TEST(HostilePacket, TruncationIsRefusedAndChangesNothing) {
   for (const GoldenStream& stream : readGoldenStreams()) {
     Victim victim(stream);
     for (std::size_t p = 0; p < stream.packets.size(); ++p) {
@@ -80,7 +81,7 @@ TEST(HostilePacket, EveryTruncationIsRefusedAndChangesNothing) {
   }
 }
 
-TEST(HostilePacket, EveryFlippedBitLeavesTheDecoderUsable) {
+TEST(HostilePacket, FlippedBitLeavesTheDecoderUsable) {
   for (const GoldenStream& stream : readGoldenStreams()) {
     Victim victim(stream);
     for (std::size_t p = 0; p < stream.packets.size(); ++p) {
@@ -94,7 +95,7 @@ TEST(HostilePacket, EveryFlippedBitLeavesTheDecoderUsable) {
         if (result != DecodeResult::ok) continue;
         for (const float x : victim.decoder().positions()) ASSERT_TRUE(std::isfinite(x));
         for (const float x : victim.decoder().normals()) ASSERT_TRUE(std::isfinite(x));
-        // A flip in the tick can put the decoder far ahead: it starts again.
+        // A flipped bit of the tick can put the decoder far ahead, so it restarts.
         victim.receiveUpTo(p);
       }
       victim.expectState(p);
@@ -103,14 +104,14 @@ TEST(HostilePacket, EveryFlippedBitLeavesTheDecoderUsable) {
   }
 }
 
-TEST(HostilePacket, OfAnotherEpochIsRefused) {
+TEST(HostilePacket, RefusedIfOfAnotherEpoch) {
   const std::vector<GoldenStream> streams = readGoldenStreams();
   StreamLayout layout = streams[0].layout;
   layout.epoch += 1;
   EXPECT_EQ(Decoder::make(layout)->decode(streams[0].packets[0].bytes), DecodeResult::wrongEpoch);
 }
 
-TEST(HostilePacket, OfAnotherLayoutIsRefused) {
+TEST(HostilePacket, RefusedIfOfAnotherLayout) {
   const std::vector<GoldenStream> streams = readGoldenStreams();
   StreamLayout larger = streams[0].layout, withNormals = streams[0].layout, fewer = streams[0].layout;
   larger.cloths[0] = {.vertexCount = 9 * 8, .rows = 9, .columns = 8};
@@ -123,12 +124,13 @@ TEST(HostilePacket, OfAnotherLayoutIsRefused) {
   }
 }
 
-TEST(HostilePacket, ThatRefersToWhatWasNotDecodedAsksForAKeyFrame) {
+TEST(HostilePacket, MissingReferenceIsReported) {
   for (const GoldenStream& stream : readGoldenStreams()) {
     Victim victim(stream);
     victim.receiveUpTo(0);
     EXPECT_EQ(victim.receive(stream.packets[1].bytes), DecodeResult::missingReference);
-    if (stream.layout.temporalLayers > 1) continue;  // packet 2 refers to packet 0: temporal_layers_test.cpp
+    // packet 2 refers to packet 0; see temporal_layers_test.cpp
+    if (stream.layout.temporalLayers > 1) continue;
     victim.receiveUpTo(1);
     EXPECT_EQ(victim.receive(stream.packets[2].bytes), DecodeResult::missingReference);
     victim.expectState(1);
@@ -136,7 +138,7 @@ TEST(HostilePacket, ThatRefersToWhatWasNotDecodedAsksForAKeyFrame) {
   }
 }
 
-TEST(HostilePacket, ThatIsNotNewerIsStale) {
+TEST(HostilePacket, StaleIfNotNewer) {
   for (const GoldenStream& stream : readGoldenStreams()) {
     Victim victim(stream);
     victim.receiveUpTo(2);
@@ -146,7 +148,7 @@ TEST(HostilePacket, ThatIsNotNewerIsStale) {
   }
 }
 
-TEST(HostilePacket, OfAnotherCodecIsRefused) {
+TEST(HostilePacket, RefusedIfOfAnotherCodec) {
   const std::vector<GoldenStream> streams = readGoldenStreams();
   std::vector<std::byte> bytes = streams[0].packets[0].bytes;
   for (const std::byte codec : {std::byte{0}, std::byte{1}, std::byte{kCodecPacked}, std::byte{200}}) {

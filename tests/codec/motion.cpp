@@ -45,7 +45,7 @@ MotionFrame scatter(const StreamLayout& layout, std::uint32_t seed, float extent
   const auto uniform = [&] { return static_cast<double>(random()) / 2147483648.0 - 1.0; };
   for (std::uint32_t i = 0; i < layout.vertexCount(); ++i) {
     const double e = static_cast<double>(extent);
-    // One after the other: compilers call a function's arguments in any order.
+    // Separate statements, because compilers evaluate function arguments in any order.
     std::array<double, 6> any;
     for (double& value : any) value = uniform();
     append(frame.positions, e * any[0], e * any[1], e * any[2]);

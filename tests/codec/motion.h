@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Cloth-like motions for tests of the codec: smooth waves that travel, with jumps now and then.
+// Cloth-like motions for tests of the codec: travelling waves, with occasional jumps.
 #pragma once
 
 #include <cstdint>
@@ -10,21 +10,21 @@
 namespace clothstream::codec {
 
 struct MotionFrame {
-  std::vector<float> positions;  // 3 a vertex
-  std::vector<float> normals;    // 3 a vertex, unit length
+  std::vector<float> positions;  // 3 floats a vertex
+  std::vector<float> normals;    // 3 floats a vertex, unit length
 };
 
 // Waves of `amplitude` metres over cloths that lie side by side.
 MotionFrame sampleMotion(const StreamLayout& layout, std::uint64_t tick, float amplitude);
 
-// Every vertex anywhere within `extent` metres of the origin on each axis, normals any way; a function of the
-// seed.
+// Puts every vertex at random within `extent` metres of the origin on each axis, with random normals. The
+// result depends only on the seed.
 MotionFrame scatter(const StreamLayout& layout, std::uint32_t seed, float extent);
 
-// Odd-sized grids, a grid of one row, one of one vertex, a cloth that is no grid.
+// Odd-sized grids, a grid of one row, a grid of one vertex and a cloth that is no grid.
 StreamLayout mixedLayout(NormalMode normals, std::uint8_t codec = kCodecHierarchical);
 
-// Of vectors of any length.
+// Angle between vectors of any length.
 double degreesBetween(const float* a, const float* b);
 
 }  // namespace clothstream::codec

@@ -13,8 +13,8 @@ namespace clothstream::codec {
 namespace {
 
 TEST(Octahedral, ReturnsAnyDirectionWithinADegree) {
-  // Half a step of 1/127 on either axis of the octahedron, whose face is at most sqrt(3) nearer than the
-  // sphere: sqrt(2) * 0.5 / 127 * 3 / sqrt(3) rad = 0.55 degrees, and the same again where |u| + |v| bends.
+  // Half a step of 1/127 on each axis of the octahedron. Its faces are up to sqrt(3) nearer than the sphere:
+  // sqrt(2) * 0.5 / 127 * 3 / sqrt(3) rad = 0.55 degrees, and the same again where |u| + |v| bends.
   std::mt19937 random(1);
   std::normal_distribution<float> gauss;
   for (int i = 0; i < 100'000; ++i) {
@@ -48,7 +48,7 @@ TEST(Octahedral, GivesAUnitVectorForAnyBytes) {
   }
 }
 
-TEST(VertexNormals, OfARectangleFaceUsWhenRowsRunDown) {
+TEST(VertexNormals, FaceTheViewerWhenRowsRunDown) {
   const StreamLayout layout{.epoch = 1, .cloths = {{.vertexCount = 12, .rows = 3, .columns = 4}}};
   std::vector<float> positions, normals(36);
   for (int i = 0; i < 12; ++i) {
@@ -63,8 +63,8 @@ TEST(VertexNormals, OfARectangleFaceUsWhenRowsRunDown) {
 }
 
 TEST(VertexNormals, FollowASphere) {
-  // A patch of the unit sphere, 1 degree a step: the normal is the position, to the order of the step squared
-  // inside and of the step at the edges.
+  // A patch of the unit sphere with 1 degree a step. The normal equals the position, with an error of the
+  // order of the squared step inside and of the step at the edges.
   constexpr std::uint32_t kSize = 21;
   const StreamLayout layout{.epoch = 1,
                             .cloths = {{.vertexCount = kSize * kSize, .rows = kSize, .columns = kSize}}};
@@ -83,8 +83,9 @@ TEST(VertexNormals, FollowASphere) {
   }
 }
 
-// A pyramid over a square, its base left out: at the top the sides' mean, at a corner the two sides'.
-TEST(VertexNormals, OfATriangleMeshAreTheMeanOfItsTriangles) {
+// A pyramid over a square without its base. At the top the normal is the mean of four sides, at a corner of
+// two.
+TEST(VertexNormals, AreTheMeanOfAMeshsTriangles) {
   const StreamLayout layout{
       .epoch = 1,
       .cloths = {{.vertexCount = 1, .rows = 1, .columns = 1},
@@ -98,7 +99,7 @@ TEST(VertexNormals, OfATriangleMeshAreTheMeanOfItsTriangles) {
   for (std::size_t i = 0; i < expected.size(); ++i) EXPECT_NEAR(normals[3 + i], expected[i], 1e-6) << i;
 }
 
-TEST(VertexNormals, AreOfTrianglesThatExist) {
+TEST(VertexNormals, NeedTrianglesOfExistingVertices) {
   for (const std::vector<std::uint32_t>& triangles :
        {std::vector<std::uint32_t>{0, 1}, std::vector<std::uint32_t>{0, 1, 3}}) {
     EXPECT_FALSE(isPossible({.epoch = 1, .cloths = {{.vertexCount = 3, .triangles = triangles}}}));
@@ -107,7 +108,7 @@ TEST(VertexNormals, AreOfTrianglesThatExist) {
       {.epoch = 1, .cloths = {{.vertexCount = 4, .rows = 2, .columns = 2, .triangles = {0, 1, 2}}}}));
 }
 
-TEST(VertexNormals, OfWhatHasNoAreaOrNoTrianglesPointAlongZ) {
+TEST(VertexNormals, PointAlongZWithoutAreaOrTriangles) {
   const StreamLayout layout{
       .epoch = 1,
       .cloths = {{.vertexCount = 4, .rows = 2, .columns = 2}, {.vertexCount = 2, .rows = 0, .columns = 0}}};

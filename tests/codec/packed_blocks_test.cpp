@@ -13,7 +13,7 @@
 namespace clothstream::codec::hierarchical {
 namespace {
 
-// The numbers of one group of vertices, and what becomes of them.
+// Numbers of one group of vertices, and their bytes.
 struct Group {
   std::array<std::vector<std::uint32_t>, 3> numbers;
 
@@ -34,7 +34,7 @@ struct Group {
   }
 };
 
-// Everywhere 77 before.
+// Destinations start with 77 everywhere.
 struct Read {
   std::array<std::vector<std::int32_t>, 3> residuals;
   std::vector<std::uint8_t> stays;
@@ -62,7 +62,7 @@ void expectReadBack(const Group& group) {
   }
 }
 
-// Of so many bits at most; mostly zero where `sparse`.
+// Random numbers of at most `mostBits` bits, mostly zero if `sparse`.
 Group anyGroup(std::mt19937& random, std::size_t count, unsigned mostBits, bool sparse) {
   Group group(count);
   for (auto& component : group.numbers)
@@ -72,7 +72,7 @@ Group anyGroup(std::mt19937& random, std::size_t count, unsigned mostBits, bool 
   return group;
 }
 
-TEST(PackedBlocks, AreReadBackWhateverTheNumbersAre) {
+TEST(PackedBlocks, ReadBackAnyNumbers) {
   std::mt19937 random(1);
   for (const std::size_t count : {1u, 3u, 31u, 32u, 33u, 200u, 2047u, 2048u}) {
     for (const unsigned mostBits : {1u, 3u, 8u, 17u, 29u, 31u}) {
@@ -86,7 +86,7 @@ TEST(PackedBlocks, AreReadBackWhateverTheNumbersAre) {
   }
 }
 
-TEST(PackedBlocks, KeepTheirBoundWhereEveryNumberIsLargeOrTheModeChangesEachTime) {
+TEST(PackedBlocks, KeepTheirBoundForLargeNumbersAndChangingModes) {
   Group large(2048), changing(2048);
   for (std::size_t i = 0; i < large.count(); ++i) {
     for (std::size_t c = 0; c < 3; ++c) {
@@ -98,32 +98,32 @@ TEST(PackedBlocks, KeepTheirBoundWhereEveryNumberIsLargeOrTheModeChangesEachTime
   expectReadBack(changing);
 }
 
-TEST(PackedBlocks, OfNothingAreAByte) {
+TEST(PackedBlocks, TakeOneByteIfAllNumbersAreZero) {
   EXPECT_EQ(Group(2048).written(), std::vector{std::byte{1}});
 }
 
-TEST(PackedBlocks, OfSmallNumbersTakeFewBits) {
+TEST(PackedBlocks, TakeFewBitsForSmallNumbers) {
   std::mt19937 random(2);
   Group group(2048);
   for (auto& component : group.numbers)
     for (std::uint32_t& number : component) number = random() % 8 == 0 ? 1 : 0;
-  // Their entropy is 0.54 bits each.
+  // Each number has 0.54 bits of entropy.
   EXPECT_LT(10 * 8 * group.written().size(), 3 * 2048 * 9);
 }
 
-TEST(PackedBlocks, AreWholeOrNone) {
+TEST(PackedBlocks, RefuseEveryTruncation) {
   std::mt19937 random(3);
   const Group group = anyGroup(random, 100, 9, false);
   const std::vector<std::byte> bytes = group.written();
   for (std::size_t size = 0; size < bytes.size(); ++size) {
-    // Exactly sized, so that a read past the end is seen by the address sanitizer.
+    // Exactly sized, so that the address sanitizer detects a read past the end.
     const auto copy = std::make_unique<std::byte[]>(size);
     std::copy_n(bytes.begin(), size, copy.get());
     EXPECT_FALSE(Read({copy.get(), size}, group.count()).isWhole) << size;
   }
 }
 
-TEST(PackedBlocks, AreNoneWhereAModeIsBeyondTheLastOrBitsAreLeft) {
+TEST(PackedBlocks, RefuseUnknownModesAndLeftoverBits) {
   std::array<std::byte, 16> bytes{};
   BitWriter out(bytes.data());
   out.put(0, 1);

@@ -72,7 +72,7 @@ void expectEqual(const PacketHeader& a, const PacketHeader& b) {
   EXPECT_EQ(a.sectionBytes, b.sectionBytes);
 }
 
-TEST(PacketHeader, ReadsBackWhatWasWritten) {
+TEST(PacketHeader, RoundTrips) {
   for (const PacketHeader& header : {smallHeader(), largestHeader()}) {
     const std::vector<std::byte> bytes = packetOf(header);
     const auto packet = parsePacket(bytes);
@@ -90,20 +90,20 @@ TEST(PacketHeader, TakesFewBytes) {
 TEST(PacketHeader, RefusesEveryTruncation) {
   const std::vector<std::byte> bytes = packetOf(smallHeader());
   for (std::size_t size = 0; size < bytes.size(); ++size) {
-    // Exactly sized, so that a read past the end is seen by the address sanitizer.
+    // Exactly sized, so that the address sanitizer detects a read past the end.
     const auto copy = std::make_unique<std::byte[]>(size);
     std::memcpy(copy.get(), bytes.data(), size);
     EXPECT_FALSE(parsePacket({copy.get(), size}).has_value()) << size;
   }
 }
 
-TEST(PacketHeader, RefusesBytesThatNoSectionHolds) {
+TEST(PacketHeader, RefusesBytesOutsideOfSections) {
   std::vector<std::byte> bytes = packetOf(smallHeader());
   bytes.push_back(std::byte{0});
   EXPECT_FALSE(parsePacket(bytes).has_value());
 }
 
-// The small header byte by byte: version, codec, kind, quality, layer, epoch, tick (2), references (count,
+// Bytes of the small header: version, codec, kind, quality, layer, epoch, tick (2), references (count,
 // distance), ranges (count, gap, cloths, gap, cloths), sections (count, sizes).
 struct Damage {
   const char* what;
@@ -125,7 +125,7 @@ TEST(PacketHeader, RefusesValuesOutOfRange) {
   }
 }
 
-TEST(PacketHeader, RefusesNumbersInALongerFormThanNeeded) {
+TEST(PacketHeader, RefusesLongFormsOfNumbers) {
   std::vector<std::byte> bytes = packetOf(smallHeader());
   bytes[5] = std::byte{0x83};  // epoch 3 in two bytes
   bytes.insert(bytes.begin() + 6, std::byte{0});

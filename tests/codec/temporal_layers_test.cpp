@@ -26,7 +26,7 @@ StreamLayout layered(std::uint8_t layers, std::uint8_t codec = kCodecHierarchica
           .cloths = {{.vertexCount = 30 * 20, .rows = 30, .columns = 20}, {.vertexCount = 12}}};
 }
 
-// Moves, rests for a while, and moves again; key frames where they are asked for.
+// The cloth moves, rests for a while, and moves again. `keys` are the ticks of key frames.
 std::vector<Sent> send(const StreamLayout& layout, const std::set<std::uint64_t>& keys,
                        std::uint64_t frames) {
   const auto encoder = Encoder::make(layout);
@@ -43,14 +43,14 @@ std::vector<Sent> send(const StreamLayout& layout, const std::set<std::uint64_t>
   return sent;
 }
 
-TEST(TemporalLayers, HalveTheRateOneAfterTheOther) {
+TEST(TemporalLayers, HalveTheRateEach) {
   const std::vector<int> three{0, 2, 1, 2, 0, 2, 1, 2}, two{0, 1, 0, 1};
   for (std::size_t i = 0; i < three.size(); ++i) EXPECT_EQ(layerOf(i, 3), three[i]);
   for (std::size_t i = 0; i < two.size(); ++i) EXPECT_EQ(layerOf(i, 2), two[i]);
   EXPECT_EQ(layerOf(7, 1), 0);
 }
 
-TEST(TemporalLayers, ReferToLowerOnesOrWithinTheBase) {
+TEST(TemporalLayers, ReferToLowerLayersOrWithinTheBase) {
   for (std::uint8_t layers = 1; layers <= kMaxTemporalLayers; ++layers) {
     const std::vector<Sent> sent = send(layered(layers), {1, 27}, 60);
     std::size_t sinceKey = 0;
@@ -65,8 +65,8 @@ TEST(TemporalLayers, ReferToLowerOnesOrWithinTheBase) {
   }
 }
 
-// Whatever is left out, a frame is decoded where what it refers to was, to the bits that it always has; else
-// the decoder says so at once.
+// A frame is decoded to the same bits whenever its reference was decoded, whatever else was dropped.
+// Otherwise the decoder reports the missing reference at once.
 void expectSameBits(const StreamLayout& layout, const std::vector<Sent>& sent,
                     const std::vector<bool>& leftOut) {
   const auto decoder = Decoder::make(layout);
@@ -85,7 +85,7 @@ void expectSameBits(const StreamLayout& layout, const std::vector<Sent>& sent,
   }
 }
 
-TEST(TemporalLayers, AnySubsetOfThemLeavesTheOthersTheirBits) {
+TEST(TemporalLayers, DroppedLayersDoNotChangeOthers) {
   for (std::uint8_t layers = 2; layers <= kMaxTemporalLayers; ++layers) {
     const StreamLayout layout = layered(layers);
     const std::vector<Sent> sent = send(layout, {1, 27}, 60);
@@ -97,7 +97,7 @@ TEST(TemporalLayers, AnySubsetOfThemLeavesTheOthersTheirBits) {
   }
 }
 
-TEST(TemporalLayers, WithoutTheHighestAllIsDecoded) {
+TEST(TemporalLayers, DecodeWithoutTheHighestLayers) {
   const StreamLayout layout = layered(3);
   const std::vector<Sent> sent = send(layout, {1, 27}, 60);
   for (std::uint8_t highest = 0; highest < 3; ++highest) {
@@ -113,7 +113,7 @@ TEST(TemporalLayers, WithoutTheHighestAllIsDecoded) {
 class TemporalLayersOf : public testing::TestWithParam<std::uint8_t> {};
 INSTANTIATE_TEST_SUITE_P(Codecs, TemporalLayersOf, testing::Values(kCodecHierarchical, kCodecPacked));
 
-TEST_P(TemporalLayersOf, AnyFramesLeaveTheOthersTheirBits) {
+TEST_P(TemporalLayersOf, DroppedFramesDoNotChangeOthers) {
   const StreamLayout layout = layered(3, GetParam());
   const std::vector<Sent> sent = send(layout, {1, 27}, 60);
   std::uint32_t random = 1;
@@ -127,7 +127,7 @@ TEST_P(TemporalLayersOf, AnyFramesLeaveTheOthersTheirBits) {
   }
 }
 
-TEST(TemporalLayers, AKeyFrameHealsTheLossOfABaseFrame) {
+TEST(TemporalLayers, KeyFrameHealsLossOfABaseFrame) {
   const StreamLayout layout = layered(3);
   const std::vector<Sent> sent = send(layout, {1, 27}, 40);
   const auto decoder = Decoder::make(layout);
@@ -147,7 +147,7 @@ TEST(TemporalLayers, AKeyFrameHealsTheLossOfABaseFrame) {
   }
 }
 
-TEST(TemporalLayers, OfWhichTheLayoutHasNoneAreRefused) {
+TEST(TemporalLayers, AreRefusedIfNotInTheLayout) {
   const StreamLayout layout = layered(2);
   const std::vector<Sent> sent = send(layered(3), {1}, 4);
   const auto decoder = Decoder::make(layout);

@@ -8,7 +8,7 @@
 namespace clothstream::codec {
 namespace {
 
-TEST(Zigzag, IsUndoneAtTheEnds) {
+TEST(Zigzag, RoundTripsAtTheLimits) {
   for (const std::int32_t value : {0, -1, 1, -2, 127, -128, std::numeric_limits<std::int32_t>::max(),
                                    std::numeric_limits<std::int32_t>::min()}) {
     EXPECT_EQ(unzigzag(zigzag(value)), value);

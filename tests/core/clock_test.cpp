@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Pings and what their pongs say of round trip and clock.
+// Round trip and server clock, as measured by pings.
 #include <algorithm>
 #include <cmath>
 #include <deque>
@@ -22,7 +22,7 @@ std::vector<std::uint64_t> pings(ClientUnderTest& client) {
   return times;
 }
 
-TEST(Clock, PingsOftenOnceWelcomedAndThenFourTimesASecond) {
+TEST(Clock, PingsFastAfterWelcomeThenFourTimesASecond) {
   ClientUnderTest client;
   client.join(ScriptedServer());
   std::size_t firstSecond = 0, laterSecond = 0;
@@ -36,25 +36,25 @@ TEST(Clock, PingsOftenOnceWelcomedAndThenFourTimesASecond) {
   EXPECT_EQ(laterSecond, 4u);
 }
 
-// Milliseconds beyond a direction's delay.
+// Additional delay of one direction, in milliseconds.
 using Jitter = std::function<double(std::mt19937&)>;
 
-// A client, a server, and a link between them that keeps the order of messages, in one true time, ms.
+// A client, a server, and an ordered link between them. Times are milliseconds of a true clock.
 struct SimulatedLink {
   double delayMs = 12;
   Jitter up = [](std::mt19937&) { return 0.0; };
   Jitter down = [](std::mt19937&) { return 0.0; };
-  // What the clocks say at a true time, us.
+  // Readings of the two clocks at a true time, in microseconds.
   std::function<double(double)> own = [](double ms) { return 7e9 + ms * 1000; };
   std::function<double(double)> server = [](double ms) { return 123e9 + ms * 1000; };
-  // Of the ping that is sent at this time, beside all other delays.
+  // Extra delay of the ping that is sent at this time.
   std::function<double(double)> stallMs = [](double) { return 0.0; };
-  // That the server's clock is wrong by in a single pong.
+  // Error of the server's clock in a single pong.
   std::function<double(double)> slipUs = [](double) { return 0.0; };
 
   struct Measured {
-    std::vector<double> errorsMs;  // of the mapped time, each 10 ms
-    double stepBackMs = 0;         // the largest
+    std::vector<double> errorsMs;  // errors of the estimated server time, every 10 ms
+    double stepBackMs = 0;         // largest step back of the estimated server time
     double p95() {
       const auto nth = errorsMs.begin() + static_cast<std::ptrdiff_t>(errorsMs.size() * 95 / 100);
       std::nth_element(errorsMs.begin(), nth, errorsMs.end());
@@ -62,7 +62,7 @@ struct SimulatedLink {
     }
   };
 
-  // The true time begins at 0; errors are taken in each of these spans.
+  // The true time starts at 0. Errors are measured in each of these spans.
   std::vector<Measured> run(const std::vector<std::pair<double, double>>& spansMs, unsigned seed = 7) const {
     struct Pong {
       double atMs;
@@ -100,7 +100,7 @@ struct SimulatedLink {
     return measured;
   }
 
-  // From the end of the first second on.
+  // Errors are measured after the first second.
   void expectWithinAMillisecond(const std::string& what) const {
     for (const unsigned seed : {1u, 2u, 3u}) {
       Measured measured = run({{1000, 120'000}}, seed).front();
@@ -116,28 +116,29 @@ Jitter uniform(double mostMs) {
 Jitter queues(double meanMs) {
   return [meanMs](std::mt19937& random) { return std::exponential_distribution<>(1 / meanMs)(random); };
 }
-// Less than 10 ms early is not possible.
+// Jitter never shortens the delay by more than 10 ms.
 Jitter normal(double deviationMs) {
   return [deviationMs](std::mt19937& random) {
     return std::max(-10.0, std::normal_distribution<>(0, deviationMs)(random));
   };
 }
 
-TEST(Clock, IsWithinAMillisecondThroughJitterOfFive) {
+TEST(Clock, IsWithinOneMillisecondWithFiveMillisecondsOfJitter) {
   SimulatedLink{.up = uniform(5), .down = uniform(5)}.expectWithinAMillisecond("5 ms, uniform");
   SimulatedLink{.up = uniform(10), .down = uniform(10)}.expectWithinAMillisecond("+-5 ms, uniform");
   SimulatedLink{.up = queues(5), .down = queues(5)}.expectWithinAMillisecond("5 ms, queues");
 }
 
-TEST(Clock, IsWithinAMillisecondThroughJitterOnOneSide) {
+TEST(Clock, IsWithinOneMillisecondWithJitterInOneDirection) {
   SimulatedLink{.up = uniform(5)}.expectWithinAMillisecond("5 ms up, uniform");
   SimulatedLink{.down = uniform(5)}.expectWithinAMillisecond("5 ms down, uniform");
   SimulatedLink{.up = queues(5)}.expectWithinAMillisecond("5 ms up, queues");
   SimulatedLink{.down = queues(5)}.expectWithinAMillisecond("5 ms down, queues");
 }
 
-// Where no exchange is better than another, only their number helps: 95 % within 5 ms, and twice that.
-TEST(Clock, IsWithinAMillisecondThroughNormalJitter) {
+// With normal jitter all exchanges are equally good, so only their number helps: 95 % within 5 ms and within
+// 10 ms.
+TEST(Clock, IsWithinOneMillisecondWithNormalJitter) {
   SimulatedLink{.up = normal(2.5), .down = normal(2.5)}.expectWithinAMillisecond("2.5 ms, normal");
   for (const unsigned seed : {1u, 2u, 3u}) {
     const SimulatedLink link{.up = normal(5), .down = normal(5)};
@@ -145,7 +146,7 @@ TEST(Clock, IsWithinAMillisecondThroughNormalJitter) {
   }
 }
 
-TEST(Clock, IsWithinAMillisecondOfAClockThatDrifts) {
+TEST(Clock, IsWithinOneMillisecondOfADriftingClock) {
   for (const double drift : {-50e-6, 50e-6}) {
     SimulatedLink link{.up = uniform(5), .down = uniform(5)};
     link.server = [drift](double ms) { return 123e9 + ms * 1000 * (1 + drift); };
@@ -157,9 +158,9 @@ TEST(Clock, IsWithinAMillisecondOfAClockThatDrifts) {
   }
 }
 
-TEST(Clock, IsNotMovedByOutliers) {
+TEST(Clock, IgnoresOutliers) {
   SimulatedLink link{.up = uniform(5), .down = uniform(5)};
-  // A ping in 40 takes a second longer, and all behind it wait; in another, the server's time is a second
+  // One ping in 40 takes a second longer and delays all later ones. In another, the server's time is a second
   // off.
   link.stallMs = [](double ms) { return static_cast<int>(ms / 250) % 40 == 20 ? 1000.0 : 0.0; };
   link.slipUs = [](double ms) { return static_cast<int>(ms / 250) % 40 == 35 ? 1e6 : 0.0; };
@@ -169,7 +170,7 @@ TEST(Clock, IsNotMovedByOutliers) {
   stalled.expectWithinAMillisecond("a stalled link");
 }
 
-TEST(Clock, FollowsAClockThatSteps) {
+TEST(Clock, FollowsAJumpOfTheServersClock) {
   constexpr double kHourUs = 3600e6;
   for (const double step : {kHourUs, -kHourUs / 2}) {
     for (const bool isOwn : {false, true}) {
@@ -186,7 +187,7 @@ TEST(Clock, FollowsAClockThatSteps) {
   }
 }
 
-TEST(Clock, AServerWhoseClockIsBehindHasANegativeOffset) {
+TEST(Clock, ReportsNegativeOffsetOfAServerThatIsBehind) {
   ClientUnderTest client;
   client.join(ScriptedServer());
   cs_update(client.get(), 5000 * kMs);
@@ -195,7 +196,7 @@ TEST(Clock, AServerWhoseClockIsBehindHasANegativeOffset) {
   EXPECT_DOUBLE_EQ(client.statistics().clock_offset_us, -3'000'000);
 }
 
-TEST(Clock, PongsThatAnswerNothingAreLeftAside) {
+TEST(Clock, IgnoresPongsThatAnswerNoPing) {
   ClientUnderTest client;
   client.join(ScriptedServer());
   cs_update(client.get(), 1000 * kMs);

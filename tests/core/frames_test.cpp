@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Frames: decoding, acknowledgements, requests for key frames, hashes, statistics.
+// Decoding of frames, acknowledgements, key-frame requests, hashes and statistics.
 #include <cmath>
 
 #include <gmock/gmock.h>
@@ -41,14 +41,14 @@ struct Joined {
 
 class DecodedFrames : public ::testing::TestWithParam<codec::NormalMode> {};
 
-TEST_P(DecodedFrames, AreWithinThePromisedErrorAndAcknowledged) {
+TEST_P(DecodedFrames, AreWithinMaxErrorAndAcknowledged) {
   Joined joined({.normals = GetParam(), .cloths = {{"a", 9, 7}, {"b", 4, 5}}});
   for (std::uint64_t tick = 1; tick <= 20; ++tick) {
     ASSERT_EQ(joined.client.receive(joined.server.frame(tick), tick * 28 * kMs), kFrame);
     EXPECT_THAT(joined.acks(), ElementsAre(tick));
     const std::vector<float>& sent = joined.server.positions();
     const float* decoded = cs_positions(joined.client.get());
-    // What both codecs promise, and the rounding of floats of about 2 m.
+    // Maximum error of both codecs, plus float rounding at about 2 m.
     for (std::size_t i = 0; i < sent.size(); i += 3) {
       const float off =
           std::hypot(decoded[i] - sent[i], decoded[i + 1] - sent[i + 1], decoded[i + 2] - sent[i + 2]);
@@ -86,7 +86,7 @@ TEST(Frames, MoveColliders) {
   EXPECT_EQ(cs_get_collider(joined.client.get(), 5, &collider), 0);
 }
 
-TEST(Frames, HaveCollidersOfEveryShape) {
+TEST(Frames, ReadCollidersOfEveryShape) {
   Joined joined;
   joined.client.receive(joined.server.frame(5));
   const cs_client* client = joined.client.get();
@@ -117,7 +117,7 @@ TEST(Frames, KeepTheHullsOfTheDescription) {
   EXPECT_EQ(vertices, 0u);
 }
 
-TEST(Frames, OfAFastStreamEverySecondIsAcknowledged) {
+TEST(Frames, AcknowledgesEverySecondFrameOfAFastStream) {
   Joined joined;
   std::vector<std::uint64_t> ticks;
   for (std::uint64_t tick = 1; tick <= 6; ++tick) {
@@ -127,7 +127,7 @@ TEST(Frames, OfAFastStreamEverySecondIsAcknowledged) {
   EXPECT_THAT(ticks, ElementsAre(1, 3, 5));
 }
 
-TEST(Frames, OfASlowStreamEachIsAcknowledged) {
+TEST(Frames, AcknowledgesEachFrameOfASlowStream) {
   Joined joined;
   for (std::uint64_t tick = 1; tick <= 4; ++tick) {
     joined.client.receive(joined.server.frame(tick), tick * 28 * kMs);
@@ -135,8 +135,8 @@ TEST(Frames, OfASlowStreamEachIsAcknowledged) {
   }
 }
 
-// Else a server with room for two would wait for an acknowledgement, and the client for a frame.
-TEST(Frames, OfManyThatComeAtOnceNoTwoInARowAreLeftOut) {
+// Otherwise a server that allows two unacknowledged frames would wait for the client, and the client for it.
+TEST(Frames, NeverSkipsTwoAcknowledgementsInARow) {
   Joined joined;
   std::vector<std::uint64_t> ticks;
   for (std::uint64_t tick = 1; tick <= 6; ++tick) {
@@ -146,13 +146,13 @@ TEST(Frames, OfManyThatComeAtOnceNoTwoInARowAreLeftOut) {
   EXPECT_THAT(ticks, ElementsAre(1, 3, 5));
 }
 
-TEST(Frames, OnlyTheNewestIsAcknowledgedWhereTheTransportIsBehind) {
+TEST(Frames, AcknowledgesOnlyTheNewestFrameOnASlowTransport) {
   Joined joined;
   for (std::uint64_t tick = 1; tick <= 3; ++tick) joined.client.receive(joined.server.frame(tick));
   EXPECT_THAT(joined.acks(), ElementsAre(3));
 }
 
-TEST(Frames, CountsWhatNeverCameByTheGapsInTheirTicks) {
+TEST(Frames, CountsLostFramesFromGapsBetweenTicks) {
   Joined joined({.simulationRate = 240, .streamRate = 80});  // a frame every 3 ticks
   joined.client.receive(joined.server.frame(3));
   joined.client.receive(joined.server.frame(6));
@@ -161,7 +161,7 @@ TEST(Frames, CountsWhatNeverCameByTheGapsInTheirTicks) {
   EXPECT_EQ(joined.client.statistics().dropped, 2u);
 }
 
-TEST(Frames, AsksForAKeyFrameOnceWhenAReferenceIsMissing) {
+TEST(Frames, RequestsAKeyFrameOnceWhenAReferenceIsMissing) {
   Joined joined;
   joined.client.receive(joined.server.frame(1), 0);
   joined.server.frame(2);  // lost
@@ -172,13 +172,13 @@ TEST(Frames, AsksForAKeyFrameOnceWhenAReferenceIsMissing) {
   EXPECT_EQ(messages[0].key_frame_request().epoch(), 7u);
   EXPECT_EQ(messages[1].frame_ack().tick(), 1u);
   joined.client.receive(joined.server.frame(4), 500 * kMs);
-  EXPECT_EQ(joined.keyFrameRequests(), 0u) << "one is outstanding";
+  EXPECT_EQ(joined.keyFrameRequests(), 0u) << "one request is outstanding";
   EXPECT_EQ(joined.client.statistics().decode_errors, 2u);
   EXPECT_EQ(joined.client.receive(joined.server.frame(5, codec::PacketKind::key), 520 * kMs), kFrame);
   EXPECT_EQ(joined.client.receive(joined.server.frame(6), 530 * kMs), kFrame);
 }
 
-TEST(Frames, AsksForAnEarlyKeyFrameOnceUntilItComes) {
+TEST(Frames, RequestsAnEarlyKeyFrameOnceUntilItArrives) {
   Joined joined;
   cs_request_key_frame(joined.client.get(), 5 * kMs);
   joined.client.receive(joined.server.frame(1), 10 * kMs);
@@ -189,10 +189,10 @@ TEST(Frames, AsksForAnEarlyKeyFrameOnceUntilItComes) {
   std::vector<bool> early;
   for (const v1::ClientMessage& message : messages)
     if (message.has_key_frame_request()) early.push_back(message.key_frame_request().early());
-  EXPECT_THAT(early, testing::ElementsAre(true, true)) << "the first was answered by the first frame";
+  EXPECT_THAT(early, testing::ElementsAre(true, true)) << "the first frame answered the first request";
 }
 
-TEST(Frames, AsksNotMoreOftenThanEvery100MsAndAgainAfterASecondWithoutAKeyFrame) {
+TEST(Frames, LimitsKeyFrameRequestsAndRepeatsAfterOneSecond) {
   Joined joined;
   joined.client.receive(joined.server.frame(1), 0);
   joined.server.frame(2);
@@ -205,12 +205,12 @@ TEST(Frames, AsksNotMoreOftenThanEvery100MsAndAgainAfterASecondWithoutAKeyFrame)
   joined.client.receive(joined.server.frame(6, codec::PacketKind::key), 1020 * kMs);
   joined.server.frame(7);
   joined.client.receive(joined.server.frame(8), 1109 * kMs);
-  EXPECT_EQ(joined.keyFrameRequests(), 0u) << "99 ms after the last one";
+  EXPECT_EQ(joined.keyFrameRequests(), 0u) << "99 ms after the last request";
   joined.client.receive(joined.server.frame(9), 1110 * kMs);
   EXPECT_EQ(joined.keyFrameRequests(), 1u);
 }
 
-TEST(Frames, AHashThatIsNotTheServersIsCountedAndAnsweredByARequest) {
+TEST(Frames, CountsHashMismatchAndRequestsAKeyFrame) {
   Joined joined;
   v1::Frame frame = joined.server.frameMessage(1, codec::PacketKind::key);
   EXPECT_EQ(joined.client.receive(ScriptedServer::serialise(frame)), kFrame);
@@ -223,7 +223,7 @@ TEST(Frames, AHashThatIsNotTheServersIsCountedAndAnsweredByARequest) {
   EXPECT_EQ(joined.keyFrameRequests(), 1u);
 }
 
-TEST(Frames, APacketThatIsNoneIsRefusedAndTheStreamGoesOn) {
+TEST(Frames, RefusesMalformedPacketAndContinues) {
   Joined joined;
   joined.client.receive(joined.server.frame(1));
   v1::Frame garbage;
@@ -234,7 +234,7 @@ TEST(Frames, APacketThatIsNoneIsRefusedAndTheStreamGoesOn) {
   EXPECT_EQ(joined.client.receive(joined.server.frame(2)), kFrame);
 }
 
-TEST(Frames, OneThatCameBeforeIsLeftAside) {
+TEST(Frames, IgnoresRepeatedFrame) {
   Joined joined;
   const std::string first = joined.server.frame(1);
   joined.client.receive(first);
@@ -245,7 +245,7 @@ TEST(Frames, OneThatCameBeforeIsLeftAside) {
   EXPECT_EQ(joined.client.statistics().decode_errors, 0u);
 }
 
-TEST(Frames, OfAnotherEpochAreRefused) {
+TEST(Frames, RefusesFrameOfAnotherEpoch) {
   Joined joined;
   ScriptedServer other({.epoch = 6});
   EXPECT_EQ(joined.client.receive(other.frame(1)), 0u);
@@ -253,7 +253,7 @@ TEST(Frames, OfAnotherEpochAreRefused) {
   EXPECT_EQ(joined.keyFrameRequests(), 1u);
 }
 
-TEST(Frames, MayGoToAnotherQuality) {
+TEST(Frames, FollowsChangeOfQuality) {
   Joined joined({.qualities = 3});
   std::uint32_t quality = 9, layers = 9;
   ASSERT_EQ(cs_get_operating_point(joined.client.get(), &quality, &layers), 1);
@@ -273,9 +273,9 @@ TEST(Frames, MayGoToAnotherQuality) {
   EXPECT_EQ(statistics.dropped, 0u);
 }
 
-TEST(Frames, OfLayersThatAreLeftOutAreNotLost) {
+TEST(Frames, DoesNotCountOmittedLayersAsDropped) {
   Joined joined({.temporalLayers = 3});
-  // Ticks from 1 on are of layers 0 2 1 2; those up to `highest` are sent.
+  // Ticks from 1 have the layers 0 2 1 2. The server sends layers up to `highest`.
   std::uint64_t tick = 1;
   const auto send = [&](std::uint64_t end, std::uint8_t highest) {
     for (; tick < end; ++tick) {
@@ -294,14 +294,14 @@ TEST(Frames, OfLayersThatAreLeftOutAreNotLost) {
   joined.client.receive(ScriptedServer::operatingPoint(0, 2));
   send(42, 1);
   EXPECT_EQ(joined.client.statistics().dropped, 0u);
-  // One that is sent, and does not come.
+  // One frame is sent and lost.
   for (; tick < 45; ++tick) static_cast<void>(joined.server.frame(tick));
   send(46, 1);
   EXPECT_EQ(joined.client.statistics().dropped, 1u);
   EXPECT_EQ(joined.client.statistics().decode_errors, 0u);
 }
 
-TEST(Statistics, RatesAreThoseOfTheLastSecond) {
+TEST(Statistics, RatesCoverTheLastSecond) {
   Joined joined;
   std::uint64_t nowUs = 0;
   std::uint64_t bytes = 0, bytesOfLastSecond = 0;
@@ -318,11 +318,11 @@ TEST(Statistics, RatesAreThoseOfTheLastSecond) {
   EXPECT_NEAR(statistics.bits_per_vertex, static_cast<double>(bytes) * 8 / (100 * 63), 1e-9);
   EXPECT_EQ(statistics.bytes, bytes);
   EXPECT_DOUBLE_EQ(cs_stream_seconds(joined.client.get()), 99 * 0.02);
-  // A stream that stands still has no rate.
+  // A stopped stream has a rate of zero.
   EXPECT_EQ(joined.client.statistics(nowUs + 1000 * kMs).frames_per_second, 0);
 }
 
-TEST(Statistics, AStreamThatHasJustBegunShowsItsRate) {
+TEST(Statistics, ShowsRateOfNewStream) {
   Joined joined;
   for (std::uint64_t tick = 1; tick <= 25; ++tick)
     joined.client.receive(joined.server.frame(tick), tick * 20 * kMs);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The golden packets through the client.
+// Decodes the golden packets with the client.
 #include "tests/codec/golden.h"
 
 #include <gtest/gtest.h>
@@ -9,7 +9,7 @@
 namespace clothstream::client {
 namespace {
 
-TEST(Golden, PacketsGiveWhatTheyAlwaysGave) {
+TEST(Golden, PacketsDecodeToRecordedHashes) {
   const auto streams = codec::readGoldenStreams();
   ASSERT_FALSE(streams.empty());
   for (const codec::GoldenStream& stream : streams) {

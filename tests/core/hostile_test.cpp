@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Bytes that no server would send: whatever comes, the client says so and lives.
+// Malformed and random input: the client reports an error and never crashes.
 #include <csignal>
 #include <cstdlib>
 #include <random>
@@ -8,7 +8,8 @@
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 
-#include "clients/core/wire.h"
+#include "clients/core/wire/server_message.h"
+#include "clients/core/wire/wire.h"
 #include "tests/core/scripted_server.h"
 
 namespace clothstream::client {
@@ -16,7 +17,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-// One of each kind of message, in an order in which a client takes them all.
+// One message of each kind, in an order that a client accepts.
 std::vector<std::string> session() {
   ScriptedServer server({.normals = codec::NormalMode::octahedral, .cloths = {{"a", 4, 3}, {"b", 3, 3}}});
   std::vector<std::string> messages{server.welcome()};
@@ -37,7 +38,7 @@ std::vector<std::string> session() {
   return messages;
 }
 
-// Everything that can be read is read, so that a sanitizer sees it.
+// Reads everything that the client returns, so that a sanitizer checks it.
 void readAll(ClientUnderTest& client) {
   const std::uint32_t vertices = cs_vertex_count(client.get());
   float sum = 0;
@@ -59,21 +60,21 @@ void readAll(ClientUnderTest& client) {
   client.outgoing();
 }
 
-// Messages before `index` as they are, then `spoilt`, then the rest.
-void runSession(const std::vector<std::string>& messages, std::size_t index, const std::string& spoilt) {
+// Sends the messages with message `index` replaced by `corrupted`.
+void runSession(const std::vector<std::string>& messages, std::size_t index, const std::string& corrupted) {
   ClientUnderTest client;
   cs_play_out_options options;
   cs_default_play_out(&options);
   cs_set_play_out(client.get(), &options);
   for (std::size_t i = 0; i < messages.size(); ++i) {
-    client.receive(i == index ? spoilt : messages[i], i * 1000);
+    client.receive(i == index ? corrupted : messages[i], i * 1000);
     cs_update(client.get(), i * 1000);
     cs_play_out(client.get(), i * 1000, i * 1000, nullptr);
   }
   readAll(client);
 }
 
-TEST(Hostile, EveryTruncationOfEveryMessage) {
+TEST(Hostile, SurvivesEveryTruncationOfEveryMessage) {
   const std::vector<std::string> messages = session();
   for (std::size_t i = 0; i < messages.size(); ++i) {
     for (std::size_t length = 0; length < messages[i].size(); ++length)
@@ -81,18 +82,18 @@ TEST(Hostile, EveryTruncationOfEveryMessage) {
   }
 }
 
-TEST(Hostile, EveryBitOfEveryMessageFlipped) {
+TEST(Hostile, SurvivesEveryFlippedBitOfEveryMessage) {
   const std::vector<std::string> messages = session();
   for (std::size_t i = 0; i < messages.size(); ++i) {
     for (std::size_t bit = 0; bit < 8 * messages[i].size(); ++bit) {
-      std::string spoilt = messages[i];
-      spoilt[bit / 8] = static_cast<char>(spoilt[bit / 8] ^ (1 << (bit % 8)));
-      runSession(messages, i, spoilt);
+      std::string corrupted = messages[i];
+      corrupted[bit / 8] = static_cast<char>(corrupted[bit / 8] ^ (1 << (bit % 8)));
+      runSession(messages, i, corrupted);
     }
   }
 }
 
-TEST(Hostile, RandomBytesOverRandomPlaces) {
+TEST(Hostile, SurvivesRandomBytesAtRandomPlaces) {
   const std::vector<std::string> messages = session();
   std::mt19937 random(11);
   const auto below = [&](std::size_t bound) {
@@ -100,22 +101,22 @@ TEST(Hostile, RandomBytesOverRandomPlaces) {
   };
   for (int run = 0; run < 5000; ++run) {
     const std::size_t index = below(messages.size());
-    std::string spoilt = messages[index];
-    for (std::size_t changes = 1 + below(8); changes > 0 && !spoilt.empty(); --changes)
-      spoilt[below(spoilt.size())] = static_cast<char>(below(256));
-    runSession(messages, index, spoilt);
+    std::string corrupted = messages[index];
+    for (std::size_t changes = 1 + below(8); changes > 0 && !corrupted.empty(); --changes)
+      corrupted[below(corrupted.size())] = static_cast<char>(below(256));
+    runSession(messages, index, corrupted);
   }
 }
 
-TEST(Hostile, BytesThatAreNoMessageEndTheClientWithAReason) {
+TEST(Hostile, MalformedMessageFailsTheClientWithAReason) {
   ClientUnderTest client;
   EXPECT_EQ(client.receive("HTTP/1.1 400 Bad Request\r\n"), static_cast<std::uint32_t>(CS_EVENT_ERROR));
   EXPECT_EQ(cs_get_state(client.get()), CS_STATE_FAILED);
-  EXPECT_THAT(cs_error_text(client.get()), HasSubstr("is it a clothstream-server"));
-  EXPECT_EQ(client.receive(ScriptedServer().welcome()), 0u) << "nothing more is taken";
+  EXPECT_THAT(cs_error_text(client.get()), HasSubstr("is a clothstream-server"));
+  EXPECT_EQ(client.receive(ScriptedServer().welcome()), 0u) << "a failed client ignores messages";
 }
 
-TEST(Hostile, FieldsAndBodiesThatAreNotKnownAreSkipped) {
+TEST(Hostile, SkipsUnknownFieldsAndBodies) {
   // Field 500 as a varint, field 501 as bytes, field 502 as 64 bits, field 503 as 32 bits.
   const std::string unknown(
       "\xa0\x1f\x05\xaa\x1f\x02xy\xb1\x1f"
@@ -131,11 +132,22 @@ TEST(Hostile, FieldsAndBodiesThatAreNotKnownAreSkipped) {
   EXPECT_EQ(client.receive(server.frame(1) + unknown), static_cast<std::uint32_t>(CS_EVENT_FRAME));
 }
 
+TEST(Hostile, SkipsKnownFieldsWithAnotherWireType) {
+  v1::Frame sent = ScriptedServer().frameMessage(1, codec::PacketKind::key);
+  sent.set_tick_time_us(5);
+  // Field 1 (bytes) as a varint, field 2 (a varint) as 64 bits.
+  const std::string bytes = sent.SerializeAsString() + "\x08\x07\x11" + "12345678";
+  Frame read;
+  ASSERT_TRUE(readFrame(Bytes(bytes), read));
+  EXPECT_EQ(read.tickTimeUs, 5u);
+  EXPECT_EQ(std::string(read.packet), sent.packet());
+}
+
 TEST(Interface, NoExceptionLeavesIt) {
 #ifdef __SANITIZE_ADDRESS__
-  GTEST_SKIP() << "the sanitizer's allocator ends the program itself";
+  GTEST_SKIP() << "the sanitizer's allocator ends the program";
 #endif
-  // Lack of memory is the only reason for one.
+  // Only a failed allocation throws.
   const auto runOutOfMemory = [] {
     const rlimit none{};
     setrlimit(RLIMIT_DATA, &none);
@@ -148,7 +160,7 @@ TEST(Interface, NoExceptionLeavesIt) {
   EXPECT_EXIT(runOutOfMemory(), ::testing::KilledBySignal(SIGABRT), "");
 }
 
-TEST(Wire, RefusesWhatProtobufWouldRefuse) {
+TEST(Wire, RefusesMalformedFields) {
   const auto isWhole = [](std::string_view bytes) { return wellFormed(Bytes(bytes.data(), bytes.size())); };
   using namespace std::string_view_literals;
   EXPECT_TRUE(isWhole(""sv));

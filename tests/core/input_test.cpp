@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
-// Colliders, hands, grabs and attachments on their way to the server, and what it tells of them.
+// Colliders, hands, grabs and attachments sent to the server, and the events that it returns.
 #include <limits>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "clients/core/outbox.h"
+#include "clients/core/stream/outbox.h"
 #include "tests/core/scripted_server.h"
 
 namespace clothstream::client {
@@ -16,7 +16,7 @@ constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 using ::testing::HasSubstr;
 using ::testing::SizeIs;
 
-TEST(Colliders, TravelWithTheTimeTheyWereTrue) {
+TEST(Colliders, AreSentWithTheirTime) {
   JoinedClient joined;
   const float spheres[] = {1, 2, 3, 0.1f, 4, 5, 6, 0.2f};
   cs_set_colliders(joined.client.get(), spheres, 2, 777);
@@ -28,21 +28,21 @@ TEST(Colliders, TravelWithTheTimeTheyWereTrue) {
   EXPECT_EQ(poses.colliders(1).sphere().radius(), 0.2f);
 }
 
-TEST(Colliders, TravelWithTheServersTimeOnceItIsKnown) {
+TEST(Colliders, AreSentWithServerTimeOnceKnown) {
   JoinedClient joined;
   const float sphere[] = {1, 2, 3, 0.1f};
   cs_set_colliders(joined.client.get(), sphere, 1, 5000);
   EXPECT_EQ(joined.sent().collider_poses().server_time_us(), 0u);
   cs_update(joined.client.get(), 10'000);
   ASSERT_TRUE(joined.sent().has_ping());
-  // 8 ms there and back: the server's clock was at 1'000'000 when the client's was at 14'000.
+  // Round trip of 8 ms: the server's clock was at 1'000'000 when the client's was at 14'000.
   joined.client.receive(ScriptedServer::pong(10'000, 1'000'000), 18'000);
   cs_set_colliders(joined.client.get(), sphere, 1, 24'000);
   EXPECT_EQ(joined.sent().collider_poses().server_time_us(), 1'010'000u);
   EXPECT_EQ(joined.client.statistics(24'000).clock_offset_us, 986'000);
 }
 
-TEST(Colliders, HandsTravelAsTheirJoints) {
+TEST(Colliders, HandsAreSentAsJoints) {
   JoinedClient joined;
   std::vector<float> joints(std::size_t{4} * CS_HAND_JOINTS);
   for (std::size_t i = 0; i < joints.size(); ++i) joints[i] = static_cast<float>(i);
@@ -54,13 +54,13 @@ TEST(Colliders, HandsTravelAsTheirJoints) {
   ASSERT_THAT(poses.hands(0).radii(), SizeIs(26));
   EXPECT_EQ(poses.hands(0).positions(4), 5);  // y of the wrist
   EXPECT_EQ(poses.hands(0).radii(25), 103);
-  // As WebXR has them; the other hand stays.
+  // WebXR hands have no palm. The other hand stays.
   EXPECT_EQ(cs_set_hand(joined.client.get(), CS_HAND_LEFT, joints.data(), CS_HAND_JOINTS - 1, 6), 1);
   const v1::ColliderPoses both = joined.sent().collider_poses();
   ASSERT_THAT(both.hands(), SizeIs(2));
   EXPECT_EQ(both.hands(0).side(), v1::HAND_SIDE_LEFT);
   EXPECT_THAT(both.hands(0).radii(), SizeIs(25));
-  // Sixty colliders are what a server takes: forty of them are these hands'.
+  // A server accepts 60 colliders; these two hands use 40.
   const std::vector<float> spheres(4 * CS_MAX_COLLIDERS, 0.5f);
   cs_set_colliders(joined.client.get(), spheres.data(), CS_MAX_COLLIDERS, 6);
   EXPECT_THAT(joined.sent().collider_poses().colliders(), SizeIs(20));
@@ -72,7 +72,7 @@ TEST(Colliders, HandsTravelAsTheirJoints) {
   EXPECT_EQ(cs_set_hand(joined.client.get(), CS_HAND_LEFT, joints.data(), 20, 8), 0);
 }
 
-TEST(Colliders, TravelWithTheirShapeAndTurn) {
+TEST(Colliders, AreSentWithShapeAndOrientation) {
   JoinedClient joined;
   const cs_own_collider own[] = {{.shape = CS_SHAPE_CAPSULE,
                                   .position = {1, 2, 3},
@@ -96,7 +96,7 @@ TEST(Colliders, TravelWithTheirShapeAndTurn) {
   EXPECT_FALSE(poses.colliders(1).pose().has_orientation());
 }
 
-TEST(Colliders, OnlyTheNewestTravelWhereTheTransportIsBehindAndNoneMeansNone) {
+TEST(Colliders, OnlyTheNewestAreSentAndZeroRemovesAll) {
   JoinedClient joined;
   const float sphere[] = {1, 2, 3, 0.1f};
   cs_set_colliders(joined.client.get(), sphere, 1, 1);
@@ -107,7 +107,7 @@ TEST(Colliders, OnlyTheNewestTravelWhereTheTransportIsBehindAndNoneMeansNone) {
   EXPECT_THAT(message.collider_poses().colliders(), SizeIs(0));
 }
 
-TEST(Grabs, TravelBesideTheCollidersWithWhatIsNotTheDefault) {
+TEST(Grabs, AreSentWithCollidersAndOmitDefaults) {
   JoinedClient joined;
   const float sphere[] = {1, 2, 3, 0.1f};
   cs_set_colliders(joined.client.get(), sphere, 1, 1);
@@ -129,14 +129,14 @@ TEST(Grabs, TravelBesideTheCollidersWithWhatIsNotTheDefault) {
   EXPECT_EQ(both.grabs(0).reach(), 0.5f);
   EXPECT_FALSE(both.grabs(0).has_max_force());
   EXPECT_FALSE(both.grabs(0).has_slip_distance());
-  // Colliders that move do not let go.
+  // A change of colliders does not release the grab.
   cs_set_colliders(joined.client.get(), sphere, 1, 3);
   EXPECT_THAT(joined.sent().collider_poses().grabs(), SizeIs(1));
   cs_set_grabs(joined.client.get(), nullptr, 0, 4);
   EXPECT_THAT(joined.sent().collider_poses().grabs(), SizeIs(0));
 }
 
-TEST(Grabs, WhatBecomesOfThemIsTold) {
+TEST(Grabs, EventsAreReported) {
   JoinedClient joined;
   v1::ServerMessage message;
   message.mutable_tick_events()->set_tick(9);
@@ -156,7 +156,7 @@ TEST(Grabs, WhatBecomesOfThemIsTold) {
   EXPECT_EQ(cs_get_grab_event(joined.client.get(), 1, &told), 0);
 }
 
-TEST(Contacts, AreWantedAndTold) {
+TEST(Contacts, AreReportedOnRequest) {
   JoinedClient joined;
   cs_want_contacts(joined.client.get(), 1, 1);
   EXPECT_TRUE(joined.sent().collider_poses().contact_events());
@@ -186,7 +186,7 @@ TEST(Contacts, AreWantedAndTold) {
   EXPECT_EQ(cs_get_state(joined.client.get()), CS_STATE_FAILED);
 }
 
-TEST(Attachments, AreMovedOnceEachToWhereTheyWereLastPut) {
+TEST(Attachments, AreSentOnceWithTheirLastPose) {
   JoinedClient joined;
   const float first[] = {1, 0, 0}, second[] = {2, 0, 0}, turned[] = {0, 0, 0, 1};
   cs_move_attachment(joined.client.get(), "rod", first, nullptr, 1);
@@ -202,19 +202,19 @@ TEST(Attachments, AreMovedOnceEachToWhereTheyWereLastPut) {
   EXPECT_THAT(joined.sent().collider_poses().attachments(), SizeIs(0));
 }
 
-TEST(Colliders, MoreThanAllowedAreLeftOut) {
+TEST(Colliders, DropsCollidersBeyondTheLimit) {
   JoinedClient joined;
   const std::vector<float> spheres(4 * 50, 1.0f);
   cs_set_colliders(joined.client.get(), spheres.data(), 50, 1);
   EXPECT_THAT(joined.sent().collider_poses().colliders(), SizeIs(CS_MAX_COLLIDERS));
 }
 
-TEST(Outgoing, ATransportThatTakesNothingEndsTheClientInsteadOfItsMemory) {
+TEST(Outgoing, FailsWhenTheTransportStopsSending) {
   ClientUnderTest client;
   client.join(ScriptedServer());
   for (std::size_t i = 0; i <= Outbox::kMaxControl; ++i) cs_list_scenes(client.get());
   EXPECT_EQ(cs_get_state(client.get()), CS_STATE_FAILED);
-  EXPECT_THAT(cs_error_text(client.get()), HasSubstr("takes no messages"));
+  EXPECT_THAT(cs_error_text(client.get()), HasSubstr("sends no messages"));
   std::size_t bytes = 1;
   EXPECT_EQ(cs_next_outgoing(client.get(), &bytes), nullptr);
   EXPECT_EQ(bytes, 0u);

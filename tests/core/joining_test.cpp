@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
-// Hello, Welcome, the description in chunks.
+// Hello, Welcome, and the description in chunks.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "clients/core/content_assembly.h"
+#include "clients/core/stream/content_assembly.h"
 #include "tests/core/scripted_server.h"
 #include "tests/core/sessions.h"
 
@@ -15,7 +15,7 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::SizeIs;
 
-TEST(Joining, SaysHelloFirstAndOnlyThat) {
+TEST(Joining, SendsOnlyHelloFirst) {
   ClientUnderTest client("flag");
   cs_update(client.get(), 1'000'000);
   const auto messages = client.outgoing();
@@ -28,7 +28,7 @@ TEST(Joining, SaysHelloFirstAndOnlyThat) {
   EXPECT_NE(messages[0].request_id(), 0u);
 }
 
-TEST(Joining, IsJoinedOnceTheDescriptionIsWhole) {
+TEST(Joining, IsJoinedWhenTheDescriptionIsComplete) {
   ScriptedServer server;
   ClientUnderTest client;
   EXPECT_EQ(client.receive(server.welcome()), 0u);
@@ -54,11 +54,11 @@ TEST(Joining, ShowsRestPositionsUntilTheFirstFrame) {
   client.join(server);
   ASSERT_EQ(cs_vertex_count(client.get()), 63u);
   EXPECT_EQ(std::vector(cs_positions(client.get()), cs_positions(client.get()) + rest.size()), rest);
-  // A sheet that waves by a few centimetres faces +Z everywhere.
+  // The sheet waves by a few centimetres, so all normals face +Z.
   for (std::uint32_t i = 0; i < 63; ++i) EXPECT_GT(cs_normals(client.get())[3 * i + 2], 0.9f);
 }
 
-TEST(Joining, GivesTrianglesOfEveryClothInItsPlace) {
+TEST(Joining, ReturnsTrianglesOfEachCloth) {
   ScriptedServer server({.cloths = {{"a", 2, 3}, {"b", 2, 2}}});
   ClientUnderTest client;
   client.join(server);
@@ -77,8 +77,8 @@ TEST(Joining, GivesTrianglesOfEveryClothInItsPlace) {
   EXPECT_EQ(cs_get_cloth(client.get(), 2, &cloth), 0);
 }
 
-// The first cloth is a grid of 2 x 2, the second a mesh of two triangles whose seam has two texture
-// coordinates.
+// The first cloth is a grid of 2 x 2. The second is a mesh of two triangles with two texture coordinates per
+// vertex at the seam.
 v1::StreamDescription withMesh(const ScriptedServer& server) {
   v1::StreamDescription description = server.description();
   v1::ClothDescription& cloth = *description.mutable_cloths(1);
@@ -95,7 +95,7 @@ v1::StreamDescription withMesh(const ScriptedServer& server) {
   return description;
 }
 
-TEST(Joining, GivesAMeshsTrianglesTextureCoordinatesAndParts) {
+TEST(Joining, ReturnsTrianglesTextureCoordinatesAndSubmeshesOfAMesh) {
   ScriptedServer server({.cloths = {{"a", 2, 2}, {"b", 2, 2}}});
   ClientUnderTest client;
   client.receive(server.welcome());
@@ -123,18 +123,18 @@ TEST(Joining, GivesAMeshsTrianglesTextureCoordinatesAndParts) {
   EXPECT_EQ(cs_uvs(client.get(), 0, &count), nullptr);
   EXPECT_EQ(cs_submesh_count(client.get(), 0), 0u);
   EXPECT_EQ(cs_uv_indices(client.get(), 7, &count), nullptr);
-  // The mesh's triangles run the other way round than the grid's.
+  // The mesh's triangles have the opposite orientation of the grid's.
   const float* normals = cs_normals(client.get());
   for (std::size_t i = 0; i < 8; ++i) EXPECT_GT((i < 4 ? 1.0f : -1.0f) * normals[3 * i + 2], 0.5f) << i;
 }
 
-TEST(Joining, RefusesMeshesThatDoNotAddUp) {
+TEST(Joining, RefusesInconsistentMeshes) {
   struct Wrong {
     const char* says;
-    void (*spoil)(v1::ClothDescription&);
+    void (*corrupt)(v1::ClothDescription&);
   };
   const Wrong cases[] = {
-      {"triangles are not whole numbers", [](auto& c) { c.set_triangles("abc"); }},
+      {"the size of triangles is not a multiple of 4 bytes", [](auto& c) { c.set_triangles("abc"); }},
       {"a triangle names a vertex that is not there",
        [](auto& c) {
          c.set_triangles(littleEndian<std::uint32_t>({0, 1, 3, 0, 3, 4}));
@@ -158,14 +158,14 @@ TEST(Joining, RefusesMeshesThatDoNotAddUp) {
        [](auto& c) {
          c.set_uv_triangles(littleEndian<std::uint32_t>({0, 1}));
        }},
-      {"submeshes are not all of its 2 triangles",
+      {"submeshes do not cover its 2 triangles",
        [](auto& c) { c.mutable_submeshes(0)->set_triangle_count(2); }},
-      {"no StreamDescription", [](auto& c) { c.mutable_submeshes(0)->set_triangle_count(4'000'000'000); }},
+      {"not a StreamDescription", [](auto& c) { c.mutable_submeshes(0)->set_triangle_count(4'000'000'000); }},
   };
   for (const Wrong& wrong : cases) {
     ScriptedServer server({.cloths = {{"a", 2, 2}, {"b", 2, 2}}});
     v1::StreamDescription description = withMesh(server);
-    wrong.spoil(*description.mutable_cloths(1));
+    wrong.corrupt(*description.mutable_cloths(1));
     ClientUnderTest client;
     client.receive(server.welcome());
     client.receiveAll(chunksOf(description.SerializeAsString(), 1000, 1));
@@ -174,7 +174,7 @@ TEST(Joining, RefusesMeshesThatDoNotAddUp) {
   }
 }
 
-TEST(Joining, TakesANewDescriptionWhole) {
+TEST(Joining, ReplacesTheDescription) {
   ClientUnderTest client;
   client.join(ScriptedServer());
   ScriptedServer next({.epoch = 8, .cloths = {{"a", 3, 3}, {"b", 2, 2}}});
@@ -183,7 +183,7 @@ TEST(Joining, TakesANewDescriptionWhole) {
   EXPECT_EQ(client.receive(next.frame(1)), static_cast<std::uint32_t>(CS_EVENT_FRAME));
 }
 
-TEST(Joining, RefusesAnotherProtocolVersionAndSaysWhichOnesThereAre) {
+TEST(Joining, RefusesAnotherProtocolVersionAndNamesBoth) {
   v1::ServerMessage message;
   message.mutable_welcome()->set_protocol_version(9);
   message.mutable_welcome()->set_codec(2);
@@ -195,7 +195,7 @@ TEST(Joining, RefusesAnotherProtocolVersionAndSaysWhichOnesThereAre) {
   EXPECT_THAT(client.outgoing(), IsEmpty());
 }
 
-TEST(Joining, RefusesACodecItDoesNotDecode) {
+TEST(Joining, RefusesUnknownCodec) {
   v1::ServerMessage message;
   message.mutable_welcome()->set_protocol_version(1);
   message.mutable_welcome()->set_codec(5);
@@ -205,7 +205,7 @@ TEST(Joining, RefusesACodecItDoesNotDecode) {
   EXPECT_THAT(cs_error_text(client.get()), HasSubstr("codec 5"));
 }
 
-TEST(Joining, PassesOnWhyTheServerRefuses) {
+TEST(Joining, ReportsWhyTheServerRefuses) {
   ClientUnderTest client;
   client.receive(ScriptedServer::error(v1::ERROR_CODE_NOT_FOUND,
                                        "hello.scene: there is no 'x'; there is curtain", true));
@@ -214,7 +214,7 @@ TEST(Joining, PassesOnWhyTheServerRefuses) {
   EXPECT_EQ(cs_error_code(client.get()), static_cast<std::uint32_t>(v1::ERROR_CODE_NOT_FOUND));
 }
 
-TEST(Joining, AnErrorThatIsNotFatalEndsNothing) {
+TEST(Joining, ContinuesAfterANonFatalError) {
   ClientUnderTest client;
   client.join(ScriptedServer());
   EXPECT_EQ(client.receive(ScriptedServer::error(v1::ERROR_CODE_INVALID_ARGUMENT, "no", false)),
@@ -237,11 +237,11 @@ TEST(Joining, RefusesFramesAndDescriptionsOutOfOrder) {
   EXPECT_THAT(cs_error_text(twice.get()), HasSubstr("twice"));
 }
 
-// ---- Descriptions that are wrong
+// ---- Wrong descriptions
 
 struct WrongDescription {
   const char* name;
-  void (*spoil)(v1::StreamDescription&);
+  void (*corrupt)(v1::StreamDescription&);
   const char* says;
 };
 
@@ -254,7 +254,7 @@ class Descriptions : public ::testing::TestWithParam<WrongDescription> {};
 TEST_P(Descriptions, AreRefusedWithAReason) {
   ScriptedServer server;
   v1::StreamDescription description = server.description();
-  GetParam().spoil(description);
+  GetParam().corrupt(description);
   ClientUnderTest client;
   client.receive(server.welcome());
   client.receiveAll(chunksOf(description.SerializeAsString(), 1000, 1));
@@ -310,25 +310,25 @@ Chunk chunk(std::uint64_t id, std::uint32_t index, std::uint32_t count, std::uin
       .contentId = id, .kind = 1, .index = index, .count = count, .totalBytes = total, .data = Bytes(data)};
 }
 
-TEST(ContentAssembly, PutsInterleavedContentsTogether) {
+TEST(ContentAssembly, AssemblesInterleavedContents) {
   ContentAssembly assembly;
   EXPECT_EQ(assembly.add(chunk(1, 0, 2, 4, "ab")).value(), std::nullopt);
   EXPECT_EQ(assembly.add(chunk(2, 0, 3, 3, "x")).value(), std::nullopt);
   EXPECT_EQ(assembly.add(chunk(1, 1, 2, 4, "cd")).value(), "abcd");
   EXPECT_EQ(assembly.add(chunk(2, 1, 3, 3, "y")).value(), std::nullopt);
   EXPECT_EQ(assembly.add(chunk(2, 2, 3, 3, "z")).value(), "xyz");
-  // The id is free again.
+  // The id can be used again.
   EXPECT_EQ(assembly.add(chunk(1, 0, 1, 1, "q")).value(), "q");
 }
 
-TEST(ContentAssembly, LeavesUnknownKindsAside) {
+TEST(ContentAssembly, IgnoresUnknownKinds) {
   ContentAssembly assembly;
   Chunk unknown = chunk(1, 5, 2, ~0ull, "ab");
   unknown.kind = 77;
   EXPECT_EQ(assembly.add(unknown).value(), std::nullopt);
 }
 
-TEST(ContentAssembly, RefusesPiecesThatDoNotFit) {
+TEST(ContentAssembly, RefusesInconsistentChunks) {
   const auto refusal = [](std::initializer_list<Chunk> pieces) {
     ContentAssembly assembly;
     std::string text;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Which colliders play-out shows, and where: those of the time of the cloth.
+// Colliders of play-out: they belong to the same time as the cloth that is shown.
 #include <cmath>
 #include <cstdint>
 #include <set>
@@ -15,22 +15,22 @@
 namespace clothstream::client {
 namespace {
 
-// Where ScriptedServer's finger is at a tick, whole or not.
+// Position of ScriptedServer's finger at a tick, which may be fractional.
 void expectFingerAt(const cs_collider& finger, double tick) {
-  // Of floats up to 1; and of a line along the chord of an arc of 0.05, led on by half of it: off by 0.05^3
-  // / 3.
+  // Tolerance: float rounding up to 1, and the distance between an arc of 0.05 and its chord extrapolated by
+  // half: 0.05^3 / 3.
   EXPECT_NEAR(finger.position[1], 0.02 * tick, 1e-6);
   EXPECT_NEAR(finger.orientation[2], std::sin(0.05 * tick), 5e-5);
   EXPECT_NEAR(finger.orientation[3], std::cos(0.05 * tick), 5e-5);
   EXPECT_EQ(finger.radius, 0.01f);
 }
 
-TEST(PlayOut, CollidersAreOfTheTimeOfTheCloth) {
+TEST(PlayOut, CollidersMatchTheTimeOfTheCloth) {
   Viewer viewer(chosenDelay(50));
   viewer.learnClock();
   for (std::uint64_t tick = 1; tick <= 5; ++tick)
     viewer.receive(tick, tick * kFrameUs, tick * kFrameUs + 20 * kMs);
-  expectFingerAt(viewer.playedCollider(7), 5);  // before it plays, the newest
+  expectFingerAt(viewer.playedCollider(7), 5);  // newest frame before play-out starts
   EXPECT_EQ(viewer.play(3 * kFrameUs + 50 * kMs).shown, CS_SHOWN_FRAME);
   expectFingerAt(viewer.playedCollider(7), 3);
   EXPECT_EQ(viewer.playedCollider(0).position[0], 3);
@@ -38,10 +38,10 @@ TEST(PlayOut, CollidersAreOfTheTimeOfTheCloth) {
   expectFingerAt(viewer.playedCollider(7), 3.25);
   EXPECT_EQ(viewer.play(3 * kFrameUs + 57'500).fraction, 0.75);
   expectFingerAt(viewer.playedCollider(7), 3.75);
-  EXPECT_EQ(viewer.playedCollider(0).position[0], 3) << "what jumps has not yet";
+  EXPECT_EQ(viewer.playedCollider(0).position[0], 3) << "a jump happens at the next frame";
   EXPECT_EQ(viewer.play(5 * kFrameUs + 55 * kMs).shown, CS_SHOWN_LED_ON);
   expectFingerAt(viewer.playedCollider(7), 5.5);
-  EXPECT_EQ(viewer.playedCollider(0).position[0], 5) << "jumps are not led on";
+  EXPECT_EQ(viewer.playedCollider(0).position[0], 5) << "jumps are not extrapolated";
   EXPECT_EQ(viewer.play(5 * kFrameUs + 200 * kMs).shown, CS_SHOWN_HELD);
   expectFingerAt(viewer.playedCollider(7), 5);
   EXPECT_EQ(cs_played_collider_count(viewer.client.get()), cs_collider_count(viewer.client.get()));
@@ -52,7 +52,7 @@ TEST(PlayOut, CollidersAreOfTheTimeOfTheCloth) {
   expectFingerAt(viewer.playedCollider(7), 5);
 }
 
-TEST(PlayOut, CollidersBeginAndEndWithTheirFrames) {
+TEST(PlayOut, CollidersAppearAndDisappearWithTheirFrames) {
   Viewer viewer(chosenDelay(50));
   viewer.learnClock();
   const auto receive = [&](std::uint64_t tick, const std::vector<std::uint64_t>& participants) {
@@ -90,7 +90,8 @@ TEST(PlayOut, CollidersTurnTheShorterWay) {
   for (std::uint64_t tick = 1; tick <= 2; ++tick) {
     v1::Frame frame = viewer.server.frameMessage(tick, codec::PacketKind::predicted);
     v1::Quaternion& q = *frame.mutable_colliders(2)->mutable_orientation();
-    // The same turn said the other way; of the other one 180 degrees, which no way is the shorter of.
+    // The first has the same rotation with the opposite sign. The other turns by 180 degrees, where neither
+    // way is shorter.
     if (tick == 2) {
       q.set_z(-q.z());
       q.set_w(-q.w());
@@ -105,7 +106,7 @@ TEST(PlayOut, CollidersTurnTheShorterWay) {
   EXPECT_EQ(viewer.playedCollider(0).orientation[3], 1);
 }
 
-TEST(PlayOut, CollidersTakeNoMemoryOnceItIsFull) {
+TEST(PlayOut, CollidersAllocateNothingInAFullRing) {
   Viewer viewer(chosenDelay(50));
   viewer.learnClock();
   const std::string longName(100, 'x');
@@ -118,7 +119,7 @@ TEST(PlayOut, CollidersTakeNoMemoryOnceItIsFull) {
     viewer.play(tick * kFrameUs + (tick % 2 == 0 ? 0 : 5 * kMs));
     if (tick > 10) names.insert(viewer.playedCollider(7).name);
   }
-  // Of each kept frame, and of what lies between two.
+  // Names of each kept frame, and of the interpolated colliders.
   EXPECT_LE(names.size(), std::size_t{defaultPlayOut().frames} + 1);
 }
 

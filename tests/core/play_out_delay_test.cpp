@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// How play-out's delay adapts to what frames need to be in time, and what is shown with it.
+// Adaptive delay of play-out, and the motion that is shown with it.
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -18,21 +18,21 @@
 namespace clothstream::client {
 namespace {
 
-// Frames over a link that keeps their order, shown 90 times a second.
+// Frames over an ordered link, shown 90 times a second.
 struct JitteredRun {
   double networkMs = 30;
-  std::function<double(std::mt19937&, double)> jitterMs;  // at a time, ms
+  std::function<double(std::mt19937&, double)> jitterMs;  // jitter at a time in ms
   std::function<bool(double)> sends = [](double) { return true; };
-  double aheadMs = 0;  // of display times
+  double aheadMs = 0;  // display time minus now
 
   struct Shown {
-    double ms = 0;  // display
+    double ms = 0;  // display time
     cs_played played{};
     double delayMs = 0;
-    double error = 0;  // m, of the farthest vertex, from where the cloth was at the time that is shown
+    double error = 0;  // m; largest distance of a vertex from its true position at the shown time
   };
 
-  // The first tick begins at 1 s.
+  // The first tick starts at 1 s.
   std::vector<Shown> run(double seconds, unsigned seed = 1) const {
     Viewer viewer;
     viewer.learnClock();
@@ -67,7 +67,7 @@ struct JitteredRun {
     return shown;
   }
 
-  // From ScriptedServer's wave at a tick, whole or not.
+  // Largest distance from ScriptedServer's wave at a tick, which may be fractional.
   static double errorAt(const Floats& positions, double tick) {
     double largest = 0;
     for (std::uint32_t row = 0; row < 9; ++row) {
@@ -85,10 +85,10 @@ bool isInTime(const JitteredRun::Shown& one) {
   return one.played.shown == CS_SHOWN_FRAME || one.played.shown == CS_SHOWN_BETWEEN;
 }
 
-// What the codec may be off by, and a line from a point of the wave to the next: h^2 / 8 times its curvature.
+// Codec error plus the error of linear interpolation on the wave: h^2 / 8 times its curvature.
 const double kMostError = std::sqrt(3.0) * 0.0005 + 0.05 * 0.1 * 0.1 / 8 + 1e-6;
 
-TEST(PlayOut, ShowsTheClothWhereItWasThroughJitter) {
+TEST(PlayOut, ShowsTrueMotionDespiteJitter) {
   const auto uniform = [](std::mt19937& random, double) {
     return std::uniform_real_distribution<>(0, 25)(random);
   };
@@ -113,16 +113,17 @@ TEST(PlayOut, ShowsTheClothWhereItWasThroughJitter) {
         const auto passed =
             static_cast<double>(shown[i].played.server_time_us - shown[i - 1].played.server_time_us);
         const double displayed = 1000 * (shown[i].ms - shown[i - 1].ms);
-        ASSERT_NEAR(passed / displayed, 1, 0.05 + 2 / displayed) << "a microsecond is lost at either end";
+        ASSERT_NEAR(passed / displayed, 1, 0.05 + 2 / displayed)
+            << "rounding loses a microsecond at either end";
       }
-      // 98 % of frames come in time with the delay that is wanted; the delay follows what was seen.
+      // The wanted delay is enough for 98 % of the past frames. The current delay follows it.
       EXPECT_GE(static_cast<double>(inTime), 0.96 * static_cast<double>(counted)) << isUniform << seed;
       std::printf("%s: %.1f %% in time, within %.2f mm of the truth; delay %.1f ms\n",
                   isUniform ? "0 to 25 ms" : "queues of 5 ms",
                   100 * static_cast<double>(inTime) / static_cast<double>(counted), 1000 * error,
                   shown.back().delayMs);
       if (isUniform) {
-        // A frame's time, the network, and 98 % of the jitter, which the order lengthens.
+        // One frame interval, the network delay, and 98 % of the jitter, which the ordered link lengthens.
         EXPECT_GE(shown.back().delayMs, 10 + 30 + 0.9 * 25);
         EXPECT_LE(shown.back().delayMs, 10 + 30 + 25);
       }
@@ -130,7 +131,7 @@ TEST(PlayOut, ShowsTheClothWhereItWasThroughJitter) {
   }
 }
 
-TEST(PlayOut, TheDelayFollowsTheJitterUpAndDown) {
+TEST(PlayOut, DelayFollowsJitterUpAndDown) {
   JitteredRun link;
   link.jitterMs = [](std::mt19937& random, double ms) {
     return ms > 11'000 && ms < 21'000 ? std::uniform_real_distribution<>(0, 60)(random) : 0.0;
@@ -145,7 +146,7 @@ TEST(PlayOut, TheDelayFollowsTheJitterUpAndDown) {
   EXPECT_NEAR(delayAt(30'900), 40, 0.1);
 }
 
-TEST(PlayOut, APauseDoesNotChangeTheDelay) {
+TEST(PlayOut, KeepsDelayDuringAPause) {
   JitteredRun link;
   link.jitterMs = [](std::mt19937&, double) { return 0.0; };
   link.sends = [](double ms) { return ms < 5000 || ms > 8000; };
@@ -157,7 +158,7 @@ TEST(PlayOut, APauseDoesNotChangeTheDelay) {
   }
 }
 
-TEST(PlayOut, DisplayTimesAheadOfNowAreInTimeToo) {
+TEST(PlayOut, AllowsForDisplayTimesAheadOfNow) {
   JitteredRun link;
   link.aheadMs = 35;
   link.jitterMs = [](std::mt19937& random, double) { return std::uniform_real_distribution<>(0, 5)(random); };

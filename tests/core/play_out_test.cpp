@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What play-out shows of the cloth, through gaps, jumps in time and new descriptions.
-#include "clients/core/play_out.h"
+// Cloth that play-out shows: gaps, jumps in time and new descriptions.
+#include "clients/core/stream/play_out.h"
 
 #include <algorithm>
 #include <cmath>
@@ -25,7 +25,7 @@ Floats between(const Floats& base, const Floats& from, const Floats& to, float f
   return result;
 }
 
-TEST(PlayOut, IsOffUntilItIsAskedFor) {
+TEST(PlayOut, IsOffByDefault) {
   ClientUnderTest client;
   ScriptedServer server;
   client.join(server);
@@ -39,7 +39,7 @@ TEST(PlayOut, IsOffUntilItIsAskedFor) {
   EXPECT_EQ(cs_play_out(client.get(), 1, 1, nullptr), 0);
 }
 
-TEST(PlayOut, RefusesWhatIsNotAllowed) {
+TEST(PlayOut, RefusesInvalidOptions) {
   Viewer viewer;
   const auto refused = [&](auto change) {
     cs_play_out_options options = defaultPlayOut();
@@ -57,14 +57,14 @@ TEST(PlayOut, RefusesWhatIsNotAllowed) {
   EXPECT_TRUE(refused([](auto& o) { o.lead_ms = 1001; }));
   EXPECT_FALSE(refused([](auto& o) { o.lead_ms = 0; }));
   cs_played played{};
-  EXPECT_EQ(cs_play_out(viewer.client.get(), 1, 1, &played), 0) << "a version that is not known";
+  EXPECT_EQ(cs_play_out(viewer.client.get(), 1, 1, &played), 0) << "unknown version";
   cs_stage_statistics stages{};
   EXPECT_EQ(cs_get_stage_statistics(viewer.client.get(), &stages), 0);
 }
 
 class PlayOutOf : public ::testing::TestWithParam<codec::NormalMode> {};
 
-TEST_P(PlayOutOf, AFramesOwnTimeShowsItsBits) {
+TEST_P(PlayOutOf, ShowsAFrameBitForBitAtItsTime) {
   Viewer viewer(chosenDelay(50), {.normals = GetParam(), .cloths = {{"a", 9, 7}, {"b", 4, 5}}});
   viewer.learnClock();
   std::vector<Floats> positions, normals;
@@ -84,7 +84,7 @@ TEST_P(PlayOutOf, AFramesOwnTimeShowsItsBits) {
   }
 }
 
-TEST_P(PlayOutOf, ATimeBetweenTwoFramesShowsWhatLiesBetween) {
+TEST_P(PlayOutOf, InterpolatesBetweenTwoFrames) {
   Viewer viewer(chosenDelay(50), {.normals = GetParam()});
   viewer.learnClock();
   viewer.receive(1, 100 * kMs, 110 * kMs);
@@ -121,7 +121,7 @@ INSTANTIATE_TEST_SUITE_P(Normals, PlayOutOf,
                            return mode.param == codec::NormalMode::none ? "Computed" : "Sent";
                          });
 
-TEST(PlayOut, ShowsTheNewestFrameAsLongAsTheServersClockIsNotKnown) {
+TEST(PlayOut, ShowsTheNewestFrameWhileTheServersClockIsUnknown) {
   Viewer viewer(chosenDelay(50));
   EXPECT_EQ(viewer.play(5 * kMs).shown, CS_SHOWN_NOTHING);
   EXPECT_TRUE(sameBits(viewer.playedPositions(), viewer.positions())) << "at rest";
@@ -136,7 +136,7 @@ TEST(PlayOut, ShowsTheNewestFrameAsLongAsTheServersClockIsNotKnown) {
   }
 }
 
-TEST(PlayOut, LeadsMotionOnOverAGapAndComesBack) {
+TEST(PlayOut, ExtrapolatesOverAGapAndReturns) {
   cs_play_out_options options = chosenDelay(50);
   options.lead_ms = 20;
   Viewer viewer(options);
@@ -163,27 +163,27 @@ TEST(PlayOut, LeadsMotionOnOverAGapAndComesBack) {
   }
   EXPECT_DOUBLE_EQ(viewer.stages().led_on_ms, 30);
   EXPECT_DOUBLE_EQ(viewer.stages().held_ms, 10'000 - 30);
-  // What was paused goes on.
+  // The stream continues after the pause.
   viewer.receive(4, 10'080 * kMs, 10'090 * kMs);
   EXPECT_EQ(viewer.play(10'090 * kMs).shown, CS_SHOWN_BETWEEN);
   viewer.receive(5, 10'090 * kMs, 10'110 * kMs);
   EXPECT_EQ(viewer.play(10'135 * kMs).fraction, 0.5);
 }
 
-TEST(PlayOut, DoesNotLeadOnFromAKeyFrameNorByMoreThanAFramesStep) {
+TEST(PlayOut, DoesNotExtrapolateAKeyFrameNorBeyondOneStep) {
   Viewer viewer(chosenDelay(0));
   viewer.learnClock();
   viewer.receive(1, 10 * kMs, 10 * kMs);
   viewer.receive(2, 20 * kMs, 20 * kMs, codec::PacketKind::key);
   EXPECT_EQ(viewer.play(25 * kMs).shown, CS_SHOWN_HELD);
-  // As a server that catches up says them: 10 us apart.
+  // A server that catches up: frames 10 us apart.
   viewer.receive(3, 20 * kMs + 10, 21 * kMs);
   const cs_played played = viewer.play(25 * kMs + 10);
   EXPECT_EQ(played.shown, CS_SHOWN_LED_ON);
   EXPECT_DOUBLE_EQ(played.fraction, 0.5);
 }
 
-TEST(PlayOut, InterpolatesOverFramesThatAreMissing) {
+TEST(PlayOut, InterpolatesAcrossMissingFrames) {
   Viewer viewer(chosenDelay(100));
   viewer.learnClock();
   viewer.receive(1, 10 * kMs, 20 * kMs, codec::PacketKind::key);
@@ -194,7 +194,7 @@ TEST(PlayOut, InterpolatesOverFramesThatAreMissing) {
   EXPECT_TRUE(sameBits(viewer.playedPositions(), between(before, before, after, 0.5f)));
 }
 
-TEST(PlayOut, ADelayThatReachesBackTooFarShowsTheOldestFrameThereIs) {
+TEST(PlayOut, ShowsTheOldestFrameIfTheDelayIsTooLong) {
   cs_play_out_options options = chosenDelay(1000);
   options.frames = 4;
   Viewer viewer(options);
@@ -208,10 +208,10 @@ TEST(PlayOut, ADelayThatReachesBackTooFarShowsTheOldestFrameThereIs) {
     places.insert(cs_played_positions(viewer.client.get()));
     EXPECT_EQ(viewer.stages().frames_waiting, std::min<std::uint64_t>(tick, 4));
   }
-  EXPECT_EQ(places.size(), 4u) << "memory is taken once";
+  EXPECT_EQ(places.size(), 4u) << "memory is allocated once";
 }
 
-TEST(PlayOut, KeepsFewerOfLargeFrames) {
+TEST(PlayOut, KeepsFewerLargeFrames) {
   Description description;
   description.streamRate = 100;
   constexpr std::uint32_t kSide = 1500;
@@ -224,10 +224,10 @@ TEST(PlayOut, KeepsFewerOfLargeFrames) {
   for (std::uint64_t tick = 1; tick <= fit + 5; ++tick)
     playOut.add(
         {.tick = tick, .timeUs = tick * kFrameUs, .key = false, .positions = positions, .normals = {}}, 1);
-  EXPECT_EQ(playOut.play(1, 1).tick, 6u) << "the oldest one that is kept";
+  EXPECT_EQ(playOut.play(1, 1).tick, 6u) << "the oldest kept frame";
 }
 
-TEST(PlayOut, CountsWhatComesAfterItsTime) {
+TEST(PlayOut, CountsLateFrames) {
   Viewer viewer(chosenDelay(20));
   viewer.learnClock();
   viewer.receive(1, 10 * kMs, 20 * kMs);
@@ -240,7 +240,7 @@ TEST(PlayOut, CountsWhatComesAfterItsTime) {
   EXPECT_EQ(viewer.stages().late_frames, 1u);
 }
 
-TEST(PlayOut, BeginsAnewWhereTheServersTimeGoesBack) {
+TEST(PlayOut, RestartsWhenTheServersTimeGoesBack) {
   Viewer viewer(chosenDelay(20));
   viewer.learnClock();
   viewer.receive(1, 5000 * kMs, 5010 * kMs);
@@ -249,14 +249,14 @@ TEST(PlayOut, BeginsAnewWhereTheServersTimeGoesBack) {
   viewer.receive(3, 3000 * kMs, 5030 * kMs);
   EXPECT_EQ(viewer.play(5035 * kMs).shown, CS_SHOWN_HELD);
   EXPECT_TRUE(sameBits(viewer.playedPositions(), viewer.positions()));
-  EXPECT_EQ(viewer.play(5036 * kMs, 2990 * kMs).tick, 3u) << "those of the other time are gone";
+  EXPECT_EQ(viewer.play(5036 * kMs, 2990 * kMs).tick, 3u) << "frames of the earlier time are gone";
   viewer.receive(4, 3010 * kMs, 5040 * kMs);
   const cs_played played = viewer.play(5045 * kMs);
   EXPECT_EQ(played.tick, 4u);
   EXPECT_TRUE(sameBits(viewer.playedPositions(), viewer.positions()));
 }
 
-TEST(PlayOut, BeginsAnewWithANewDescription) {
+TEST(PlayOut, RestartsAfterNewDescription) {
   Viewer viewer(chosenDelay(20));
   viewer.learnClock();
   viewer.receive(1, 10 * kMs, 20 * kMs);
@@ -273,7 +273,7 @@ TEST(PlayOut, BeginsAnewWithANewDescription) {
   EXPECT_TRUE(sameBits(viewer.playedPositions(), viewer.positions()));
 }
 
-TEST(PlayOut, TellsWhereTimeWent) {
+TEST(PlayOut, ReportsTimeOfEachStage) {
   Viewer viewer(chosenDelay(40));
   viewer.learnClock();
   static std::uint64_t clockUs;
@@ -289,7 +289,7 @@ TEST(PlayOut, TellsWhereTimeWent) {
   EXPECT_DOUBLE_EQ(viewer.stages().delay_ms, 40);
 }
 
-TEST(PlayOut, WithstandsAnyTimes) {
+TEST(PlayOut, AcceptsAnyTimes) {
   Viewer viewer;
   viewer.learnClock();
   std::mt19937_64 random(3);

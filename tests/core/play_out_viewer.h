@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A client with play-out, for tests of what it shows.
+// Client with play-out, for tests of what it shows.
 #pragma once
 
 #include <cstdint>
@@ -16,7 +16,7 @@
 
 namespace clothstream::client {
 
-inline constexpr std::uint64_t kServerAhead = 5'000'000'000;  // us, of the own clock
+inline constexpr std::uint64_t kServerAhead = 5'000'000'000;  // us; server's clock minus own clock
 inline constexpr std::uint64_t kFrameUs = 10 * kMs;
 
 inline cs_play_out_options defaultPlayOut() {
@@ -33,8 +33,8 @@ inline cs_play_out_options chosenDelay(double ms) {
 
 using Floats = std::vector<float>;
 
-// A client with play-out, of a server whose clock it knows to the microsecond; frames every 10 ms. Times are
-// of the own clock.
+// Client with play-out. It knows the server's clock exactly. Frames come every 10 ms. Times are of the own
+// clock.
 class Viewer {
  public:
   explicit Viewer(const cs_play_out_options& options = defaultPlayOut(), ScriptedStream stream = {})
@@ -48,14 +48,14 @@ class Viewer {
     return stream;
   }
 
-  // One exchange of no length.
+  // Simulates one ping with a round trip of zero.
   void learnClock(std::uint64_t nowUs = 1) {
     cs_update(client.get(), nowUs);
     client.outgoing();
     client.receive(ScriptedServer::pong(nowUs, nowUs + kServerAhead), nowUs);
   }
 
-  // The frame of a tick that began at tickUs.
+  // Frame of a tick that started at tickUs.
   std::string frame(std::uint64_t tick, std::uint64_t tickUs,
                     codec::PacketKind kind = codec::PacketKind::predicted) {
     v1::Frame frame = server.frameMessage(tick, kind);
@@ -81,7 +81,7 @@ class Viewer {
   Floats normals() const { return copied(cs_normals(client.get())); }
   Floats playedPositions() const { return copied(cs_played_positions(client.get())); }
   Floats playedNormals() const { return copied(cs_played_normals(client.get())); }
-  // The first of this participant; 0: of the scene.
+  // First collider of this participant; 0 means the scene.
   cs_collider playedCollider(std::uint64_t participant) const {
     return colliderOf(participant, &cs_get_played_collider);
   }
@@ -107,7 +107,7 @@ class Viewer {
   ClientUnderTest client;
 };
 
-// Bit for bit: NaN and the sign of 0 count.
+// Compares bit for bit, so NaN equals NaN, and 0 differs from -0.
 inline bool sameBits(const Floats& a, const Floats& b) {
   return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(float)) == 0;
 }

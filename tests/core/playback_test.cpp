@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Where a recording that is played stands, and what is asked of it.
+// State of a played recording, and requests that control it.
 #include <limits>
 #include <vector>
 
@@ -27,7 +27,7 @@ double positionAt(const ClientUnderTest& client, std::uint64_t nowUs) {
   return cs_get_playback(client.get(), nowUs, &playback) != 0 ? playback.position : -1;
 }
 
-TEST(Playback, GoesOnBetweenWhatIsTold) {
+TEST(Playback, AdvancesBetweenMessages) {
   ScriptedServer server;
   ClientUnderTest client;
   client.join(server);
@@ -49,7 +49,7 @@ TEST(Playback, GoesOnBetweenWhatIsTold) {
   EXPECT_DOUBLE_EQ(positionAt(client, 9'000'000), 4);
 }
 
-TEST(Playback, OfNoNumbersIsNone) {
+TEST(Playback, RefusesNonFiniteNumbers) {
   for (const double wrong : {std::numeric_limits<double>::quiet_NaN(), -1.0}) {
     ScriptedServer server;
     ClientUnderTest client;
@@ -59,10 +59,10 @@ TEST(Playback, OfNoNumbersIsNone) {
   }
 }
 
-TEST(Playback, IsControlledOfTheSceneThatWasJoined) {
+TEST(Playback, ControlsTheJoinedScene) {
   ScriptedServer server;
   ClientUnderTest client("");
-  cs_seek(client.get(), 1);  // before it is joined: nothing
+  cs_seek(client.get(), 1);  // ignored before joining
   client.join(server);
   client.outgoing();
   cs_pause(client.get(), 1);

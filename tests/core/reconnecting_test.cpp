@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
-// Participants, and coming back after the connection was lost, with a clock of the test's own.
+// Participants, roles, and reconnects after a lost connection, with a simulated clock.
 #include <limits>
 #include <set>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "clients/core/reconnection.h"
+#include "clients/core/stream/reconnection.h"
 #include "tests/core/scripted_server.h"
 
 namespace clothstream::client {
@@ -19,7 +19,7 @@ using ::testing::SizeIs;
 
 constexpr std::uint64_t kSecond = 1'000'000, kNever = std::numeric_limits<std::uint64_t>::max();
 
-// The server's Welcome with what belongs to participants.
+// Welcome of the server, with participants and a resume token.
 std::string welcome(const ScriptedServer& server, bool resumed = false, v1::Role role = v1::ROLE_OWNER) {
   v1::ServerMessage message;
   message.ParseFromString(server.welcome());
@@ -77,7 +77,7 @@ class Reconnecting : public ::testing::Test {
       all.emplace_back(participant.name);
     return all;
   }
-  void hold(float x) {
+  void setCollider(float x) {
     const float sphere[] = {x, 0, 0, 0.1f};
     cs_set_colliders(client.get(), sphere, 1, now);
     cs_grab grab{};
@@ -90,7 +90,7 @@ class Reconnecting : public ::testing::Test {
   ClientUnderTest client;
 };
 
-TEST_F(Reconnecting, SaysWhoItIsAndWhatItWantsToBe) {
+TEST_F(Reconnecting, SendsNameAndRequestedRole) {
   const std::unique_ptr<cs_client, decltype(&cs_destroy)> named(
       cs_create_as("flag", "test", "Ada", CS_ROLE_VIEWER), &cs_destroy);
   std::size_t bytes = 0;
@@ -102,7 +102,7 @@ TEST_F(Reconnecting, SaysWhoItIsAndWhatItWantsToBe) {
   EXPECT_THAT(hello.hello().resume_token(), IsEmpty());
 }
 
-TEST_F(Reconnecting, KnowsWhoIsThere) {
+TEST_F(Reconnecting, TracksParticipants) {
   EXPECT_EQ(client.receive(welcome(server), now), static_cast<std::uint32_t>(CS_EVENT_PARTICIPANTS));
   client.receiveAll(server.chunks(), now);
   EXPECT_THAT(names(), ElementsAre("Ben", "Ada"));
@@ -126,7 +126,7 @@ TEST_F(Reconnecting, KnowsWhoIsThere) {
   EXPECT_STREQ(told.participant.name, "Cy");
 }
 
-TEST_F(Reconnecting, GivesAndTakes) {
+TEST_F(Reconnecting, SendsRoleChangesAndRemovals) {
   join();
   cs_set_role(client.get(), 7, CS_ROLE_VIEWER);
   cs_remove_participant(client.get(), 8);
@@ -137,14 +137,14 @@ TEST_F(Reconnecting, GivesAndTakes) {
   EXPECT_EQ(messages[1].remove_participant().participant_id(), 8u);
 }
 
-TEST_F(Reconnecting, ComesBackWithItsTokenAndSendsItsPosesAgain) {
+TEST_F(Reconnecting, ReturnsWithTokenAndRepeatsPoses) {
   join();
-  hold(1);
+  setCollider(1);
   client.outgoing();
   cutOff();
-  hold(2);  // nobody hears it now
+  setCollider(2);  // not sent while disconnected
   EXPECT_THAT(client.outgoing(), IsEmpty());
-  EXPECT_EQ(cs_vertex_count(client.get()), 63u);  // still there to be seen
+  EXPECT_EQ(cs_vertex_count(client.get()), 63u);  // the last description can still be read
   const v1::Hello hello = connect();
   EXPECT_EQ(hello.resume_token(), "0123456789abcdef");
   EXPECT_EQ(hello.description_content_id(), 1u);
@@ -158,13 +158,13 @@ TEST_F(Reconnecting, ComesBackWithItsTokenAndSendsItsPosesAgain) {
   ASSERT_EQ(messages.size(), 1u);
   EXPECT_EQ(messages[0].collider_poses().colliders(0).pose().position().x(), 2);
   EXPECT_EQ(messages[0].collider_poses().grabs(0).id(), 5u);
-  // No description came: the one before holds, and what was missed counts as dropped.
+  // No new description arrived: the previous one remains, and missed frames count as dropped.
   client.receive(server.frame(5, codec::PacketKind::key), now);
   EXPECT_EQ(client.statistics(now).tick, 5u);
   EXPECT_EQ(client.statistics(now).dropped, 3u);
 }
 
-TEST_F(Reconnecting, TakesANewDescriptionWhereTheServerSendsOne) {
+TEST_F(Reconnecting, AcceptsNewDescriptionAfterReturning) {
   join();
   cutOff();
   connect();
@@ -182,7 +182,7 @@ TEST_F(Reconnecting, TakesANewDescriptionWhereTheServerSendsOne) {
   EXPECT_EQ(connect().description_content_id(), 9u);
 }
 
-TEST_F(Reconnecting, WhoIsCutOffBeforeTheNewDescriptionHoldsNone) {
+TEST_F(Reconnecting, OffersNoDescriptionIfCutOffBeforeTheNewOne) {
   join();
   cutOff();
   connect();
@@ -194,22 +194,22 @@ TEST_F(Reconnecting, WhoIsCutOffBeforeTheNewDescriptionHoldsNone) {
   EXPECT_EQ(connect().description_content_id(), 0u);
 }
 
-TEST_F(Reconnecting, ANewServerIsJoinedAnew) {
+TEST_F(Reconnecting, JoinsARestartedServerAsNewParticipant) {
   join();
-  hold(1);
+  setCollider(1);
   client.outgoing();
   cutOff();
   connect();
   client.receive(welcome(server, false), now);
-  // The same number, but of a server that never saw this client.
+  // The content id is the same, but the server does not know this client.
   EXPECT_EQ(cs_get_state(client.get()), CS_STATE_RECONNECTING);
   client.receiveAll(server.chunks(), now);
   EXPECT_EQ(cs_get_state(client.get()), CS_STATE_JOINED);
   EXPECT_EQ(cs_resumed(client.get()), 0);
-  EXPECT_THAT(client.outgoing(), SizeIs(1));  // its hands are there all the same
+  EXPECT_THAT(client.outgoing(), SizeIs(1));  // the poses are sent again
 }
 
-TEST_F(Reconnecting, AFrameBeforeTheDescriptionIsRefusedUponReturnToo) {
+TEST_F(Reconnecting, RefusesFrameBeforeDescriptionAfterReturning) {
   join();
   cutOff();
   connect();
@@ -219,7 +219,7 @@ TEST_F(Reconnecting, AFrameBeforeTheDescriptionIsRefusedUponReturnToo) {
   EXPECT_THAT(cs_error_text(client.get()), HasSubstr("before the description"));
 }
 
-TEST_F(Reconnecting, TriesAtOnceThenOftenThenSeldom) {
+TEST_F(Reconnecting, RetriesAtOnceThenOftenThenRarely) {
   join();
   EXPECT_EQ(cs_connect_at(client.get()), now + Reconnection::kSilenceUs);
   now += 3 * kSecond;
@@ -233,11 +233,11 @@ TEST_F(Reconnecting, TriesAtOnceThenOftenThenSeldom) {
     cs_disconnected(client.get(), now);
     const std::uint64_t delay = cs_connect_at(client.get()) - now;
     if (now < lost + 60 * kSecond) {
-      EXPECT_LE(delay, Reconnection::kLongestHeldUs);
+      EXPECT_LE(delay, Reconnection::kLongestInGraceUs);
       longest = std::max(longest, delay);
     } else {
       EXPECT_LE(delay, Reconnection::kLongestUs);
-      EXPECT_GE(delay, Reconnection::kLongestHeldUs);
+      EXPECT_GE(delay, Reconnection::kLongestInGraceUs);
     }
     EXPECT_GE(delay, Reconnection::kShortestUs / 2);
     if (attempts == 0) {
@@ -246,11 +246,11 @@ TEST_F(Reconnecting, TriesAtOnceThenOftenThenSeldom) {
     before = delay;
     now += delay;
   }
-  EXPECT_GT(longest, Reconnection::kLongestHeldUs * 3 / 4);
+  EXPECT_GT(longest, Reconnection::kLongestInGraceUs * 3 / 4);
   EXPECT_GE(before, Reconnection::kLongestUs / 2);
 }
 
-TEST_F(Reconnecting, CountsItsAttempts) {
+TEST_F(Reconnecting, CountsAttempts) {
   join();
   cutOff();
   const std::uint32_t second = connect().attempt();
@@ -259,7 +259,7 @@ TEST_F(Reconnecting, CountsItsAttempts) {
   EXPECT_GT(connect().attempt(), second);
 }
 
-TEST_F(Reconnecting, WhoStoodStillListensBeforeItGivesUp) {
+TEST_F(Reconnecting, ReadsWaitingMessagesAfterAPauseBeforeGivingUp) {
   join();
   cs_update(client.get(), now);
   const std::uint64_t heard = now;
@@ -268,13 +268,13 @@ TEST_F(Reconnecting, WhoStoodStillListensBeforeItGivesUp) {
   now += 60 * kSecond;
   cs_update(client.get(), now);
   EXPECT_GT(cs_connect_at(client.get()), now);
-  // Silence while it is awake is silence still.
+  // Silence between regular updates still counts.
   for (const std::uint64_t woke = now; now < woke + 4 * kSecond; now += kSecond / 10)
     cs_update(client.get(), now);
   EXPECT_LE(cs_connect_at(client.get()), now);
 }
 
-TEST_F(Reconnecting, ThoseWhoAreCutOffTogetherDoNotComeBackTogether) {
+TEST_F(Reconnecting, SpreadsReconnectsOfManyClients) {
   std::set<std::uint64_t> delays;
   for (std::uint64_t seed = 0; seed < 20; ++seed) {
     Reconnection reconnection;
@@ -284,7 +284,7 @@ TEST_F(Reconnecting, ThoseWhoAreCutOffTogetherDoNotComeBackTogether) {
   EXPECT_GT(delays.size(), 15u);
 }
 
-TEST_F(Reconnecting, AConnectionThatHeldIsTakenUpAtOnceAndOneThatDidNotIsNot) {
+TEST_F(Reconnecting, RetriesAtOnceOnlyAfterAStableConnection) {
   join();
   now += kSecond;
   cutOff();
@@ -301,7 +301,7 @@ TEST_F(Reconnecting, AConnectionThatHeldIsTakenUpAtOnceAndOneThatDidNotIsNot) {
   EXPECT_EQ(cs_connect_at(client.get()), now);
 }
 
-TEST_F(Reconnecting, WhatIsRefusedForGoodIsNotTriedAgain) {
+TEST_F(Reconnecting, DoesNotRetryAFatalRefusal) {
   join();
   client.receive(ScriptedServer::error(v1::ERROR_CODE_REMOVED, "an owner removed this participant", true),
                  now);
@@ -312,7 +312,7 @@ TEST_F(Reconnecting, WhatIsRefusedForGoodIsNotTriedAgain) {
   EXPECT_THAT(client.outgoing(), IsEmpty());
 }
 
-TEST_F(Reconnecting, AServerThatCutsOffOrIsFullForTheMomentIsTriedAgain) {
+TEST_F(Reconnecting, RetriesAServerThatCutOffOrIsFull) {
   join();
   client.receive(ScriptedServer::error(v1::ERROR_CODE_CUT_OFF, "too much waits to be read", true), now);
   EXPECT_EQ(cs_get_state(client.get()), CS_STATE_JOINED);
@@ -324,7 +324,7 @@ TEST_F(Reconnecting, AServerThatCutsOffOrIsFullForTheMomentIsTriedAgain) {
   EXPECT_NE(cs_connect_at(client.get()), kNever);
 }
 
-TEST_F(Reconnecting, WhatIsAskedForMeanwhileIsDropped) {
+TEST_F(Reconnecting, DropsRequestsWhileDisconnected) {
   join();
   cutOff();
   for (int i = 0; i < 1000; ++i) cs_set_gust(client.get(), 1, 1);
@@ -332,9 +332,9 @@ TEST_F(Reconnecting, WhatIsAskedForMeanwhileIsDropped) {
   connect();
 }
 
-TEST_F(Reconnecting, AViewersHandsAreSentWhenItsRoleAllowsThem) {
+TEST_F(Reconnecting, SendsPosesOfAViewerWhenItsRoleAllows) {
   join(v1::ROLE_VIEWER);
-  hold(1);
+  setCollider(1);
   cs_want_contacts(client.get(), 1, now);
   auto messages = client.outgoing();
   ASSERT_EQ(messages.size(), 1u);

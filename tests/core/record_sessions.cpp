@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Writes the recorded sessions and what the native client makes of them as JSON, for the test of the
+// Writes the recorded sessions and the observations of the native client as JSON, for the test of the
 // WebAssembly build.
 #include <fstream>
 #include <iostream>
@@ -34,7 +34,7 @@ nlohmann::json json(const Observation& seen) {
           {"playedCollidersHash", hash(seen.playedCollidersHash)},
           {"triangleCount", seen.triangleCount},
           {"outgoingHash", hash(seen.outgoingHash)},
-          // In hexadecimal: spoilt text need not be UTF-8.
+          // Hexadecimal, because corrupted text may not be UTF-8.
           {"errorText", hex(seen.errorText)}};
 }
 

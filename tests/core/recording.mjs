@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A file that `clothstream encode` wrote, as the ServerMessages of a stream, and the client core that decodes them.
+// Reads a file of `clothstream encode` as the ServerMessages of a stream, and decodes them with the client core.
 import { readFileSync } from "node:fs";
 
 const kName = "clothstream\n";
@@ -35,7 +35,7 @@ class Reader {
     if (this.at + count > this.buffer.length) throw new Error("the recording ends too early");
     return this.buffer.subarray(this.at, (this.at += count));
   }
-  // Each field: its number, all of its bytes, and its value where that is a number or bytes.
+  // Yields for each field its number, all of its bytes, and its value if that is a number or bytes.
   *fields() {
     while (this.more) {
       const start = this.at;
@@ -47,7 +47,7 @@ class Reader {
   }
 }
 
-// A server tells where vertices are at rest, by which a client knows that they are there; a recording leaves it out.
+// Rest positions are part of a server's description and say how many vertices exist. A recording omits them.
 function withRestPositions(description) {
   return Buffer.concat(
     [...new Reader(description).fields()].map(({ field, whole, value }) => {
@@ -58,7 +58,7 @@ function withRestPositions(description) {
   );
 }
 
-// Serialised ServerMessages: what comes before the first frame, and a message for each frame.
+// Returns serialised ServerMessages: those before the first frame, and one per frame.
 export function readRecording(path) {
   const reader = new Reader(readFileSync(path));
   if (reader.take(kName.length).toString() !== kName) throw new Error(`${path} is not what clothstream encode writes`);
@@ -95,7 +95,7 @@ export class Core {
     return client;
   }
 
-  // A set of CS_EVENT bits; nothing is sent back.
+  // Returns a set of CS_EVENT bits. Outgoing messages are ignored.
   receive(client, message) {
     const { malloc, free, memory, cs_receive, cs_next_outgoing } = this.exports;
     const pointer = malloc(message.length);
@@ -106,7 +106,7 @@ export class Core {
     return events;
   }
 
-  // Frames that were decoded and are what was encoded.
+  // Number of decoded frames whose hash matches the encoder's.
   goodFrames(client) {
     this.exports.cs_get_statistics(client, 0n, this.scratch);
     const view = new DataView(this.exports.memory.buffer, this.scratch);

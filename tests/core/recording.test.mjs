@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What `clothstream encode` writes, the WebAssembly core decodes to what `clothstream decode` makes of it, to the bit.
+// The WebAssembly core decodes a file of `clothstream encode` bit for bit like `clothstream decode`.
 // Usage: node recording.test.mjs MODULE CLOTHSTREAM
 import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
@@ -10,7 +10,7 @@ import { join } from "node:path";
 import { Core, readRecording } from "./recording.mjs";
 
 const [modulePath, clothstream] = process.argv.slice(2);
-// More rest positions than one chunk holds.
+// The rest positions need more than one chunk.
 const [columns, rows, frames] = [190, 121, 6];
 const directory = mkdtempSync(join(tmpdir(), "clothstream-"));
 const [motion, recording, decoded] = ["motion", "recording", "decoded"].map((name) => join(directory, name));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Waves on a grid, encoded and put into messages.
+// Encodes waves on a grid and serialises them as messages.
 #include "tests/core/scripted_server.h"
 
 #include <array>
@@ -33,7 +33,7 @@ ScriptedServer::ScriptedServer(ScriptedStream stream) : stream_(std::move(stream
 
 void ScriptedServer::goTo(std::uint8_t quality) {
   encoder_ = codec::Encoder::make(layout_, {.quality = quality});
-  if (!encoder_) throw std::invalid_argument("no stream can have this layout");
+  if (!encoder_) throw std::invalid_argument("this layout is not possible");
 }
 
 void ScriptedServer::pose(std::uint64_t tick) {
@@ -210,7 +210,7 @@ std::vector<v1::ClientMessage> ClientUnderTest::outgoing() {
   std::size_t bytes = 0;
   while (const std::uint8_t* message = cs_next_outgoing(get(), &bytes)) {
     if (!messages.emplace_back().ParseFromArray(message, static_cast<int>(bytes)))
-      throw std::runtime_error("the client sent bytes that are no ClientMessage");
+      throw std::runtime_error("the client sent a malformed ClientMessage");
   }
   return messages;
 }

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Messages as a server says them, for tests of the client: a small wavy cloth or two through the real
-// encoder.
+// Simulated server for tests of the client: one or two small waving cloths, encoded by the real encoder.
 #pragma once
 
 #include <cstdint>
@@ -31,24 +30,24 @@ struct ScriptedStream {
   std::uint8_t temporalLayers = 1, qualities = 1;
 };
 
-// Bytes are serialised ServerMessages.
+// The functions return serialised ServerMessages.
 class ScriptedServer {
  public:
   explicit ScriptedServer(ScriptedStream stream = {});
 
   std::string welcome() const;
   v1::StreamDescription description() const;
-  // The description in pieces of `pieceBytes`.
+  // Description in chunks of `pieceBytes`.
   std::vector<std::string> chunks(std::size_t pieceBytes = 256 * 1024, std::uint64_t contentId = 1) const;
-  // Of one tick, which must grow from call to call.
+  // Frame of a tick. Ticks must grow from call to call.
   std::string frame(std::uint64_t tick, codec::PacketKind kind = codec::PacketKind::predicted);
-  // Frames of this quality from now on; the next is to be a key frame.
+  // Switches to this quality. The next frame must be a key frame.
   void goTo(std::uint8_t quality);
-  // A ball that jumps by 1 m a tick, a finger of participant 7 that moves by 2 cm and turns by 0.1, and
-  // others that stay.
+  // Frame with colliders: a ball that jumps by 1 m per tick, a finger of participant 7 that moves by 2 cm and
+  // turns by 0.1 per tick, and others that do not move.
   v1::Frame frameMessage(std::uint64_t tick, codec::PacketKind kind);
 
-  // What was encoded last.
+  // Positions of the last encoded frame.
   const std::vector<float>& positions() const { return positions_; }
 
   static std::string serialise(const v1::Frame& frame);
@@ -65,20 +64,20 @@ class ScriptedServer {
   std::vector<float> positions_, normals_;
 };
 
-// Pieces of any content.
+// Chunks of any content.
 std::vector<std::string> chunksOf(const std::string& content, std::size_t pieceBytes,
                                   std::uint64_t contentId);
 
-// A client under test, and what it said.
+// Client under test.
 class ClientUnderTest {
  public:
   explicit ClientUnderTest(const char* scene = "curtain") : client_(cs_create(scene, "test"), &cs_destroy) {}
 
   cs_client* get() const { return client_.get(); }
-  // The bytes are copied to a buffer of exactly their size, so that the sanitizer sees a read past it.
+  // Copies the bytes to a buffer of exactly their size, so that a sanitizer detects a read past the end.
   std::uint32_t receive(const std::string& message, std::uint64_t nowUs = 0);
   void receiveAll(const std::vector<std::string>& messages, std::uint64_t nowUs = 0);
-  // Welcome and description.
+  // Receives Welcome and description.
   void join(const ScriptedServer& server);
   std::vector<v1::ClientMessage> outgoing();
   cs_statistics statistics(std::uint64_t nowUs = 0) const;
@@ -87,10 +86,10 @@ class ClientUnderTest {
   std::unique_ptr<cs_client, decltype(&cs_destroy)> client_;
 };
 
-// One that joined, and has nothing more to say.
+// Client that has joined and has no outgoing messages.
 struct JoinedClient {
   JoinedClient() { client.join(ScriptedServer()); }
-  // The one message that it has to say now.
+  // The only outgoing message.
   v1::ClientMessage sent() {
     const auto messages = client.outgoing();
     EXPECT_EQ(messages.size(), 1u);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Sessions out of the scripted server, the golden packets, and a random generator with a fixed seed.
+// Creates sessions from the scripted server, the golden packets, and a random generator with a fixed seed.
 #include "tests/core/sessions.h"
 
 #include <random>
@@ -17,11 +17,11 @@ Session streamOf(const std::string& name, ScriptedStream stream) {
   ScriptedServer server(std::move(stream));
   Session session{name, {server.welcome()}};
   for (std::string& chunk : server.chunks(400)) session.messages.push_back(std::move(chunk));
-  // To the ping that was sent at the message before.
+  // Answers the ping that was sent at the previous message.
   const std::uint64_t pingUs = (session.messages.size() - 1) * kStepUs;
   session.messages.push_back(ScriptedServer::pong(pingUs, pingUs + kServerAheadUs));
   for (std::uint64_t tick = 1; tick <= 12; ++tick) {
-    // One frame is lost, and a key frame comes two frames later.
+    // One frame is lost. A key frame follows two frames later.
     const auto kind = tick == 8 ? codec::PacketKind::key : codec::PacketKind::predicted;
     v1::Frame frame = server.frameMessage(tick, kind);
     frame.set_tick_time_us(pingUs + kServerAheadUs + tick * kTickUs);
@@ -32,9 +32,9 @@ Session streamOf(const std::string& name, ScriptedStream stream) {
   return session;
 }
 
-Session spoilt(const Session& session, std::mt19937& random, int run) {
+Session corrupted(const Session& session, std::mt19937& random, int run) {
   const auto below = [&](std::size_t bound) { return random() % bound; };
-  Session result{session.name + " spoilt " + std::to_string(run), session.messages};
+  Session result{session.name + " corrupted " + std::to_string(run), session.messages};
   std::string& message = result.messages[below(result.messages.size())];
   for (std::size_t changes = 1 + below(4); changes > 0; --changes) {
     if (below(4) == 0) message.resize(below(message.size() + 1));
@@ -140,7 +140,7 @@ std::vector<Session> recordedSessions() {
   std::mt19937 random(20);
   const std::size_t whole = sessions.size();
   for (int run = 0; run < 300; ++run)
-    sessions.push_back(spoilt(sessions[static_cast<std::size_t>(run) % whole], random, run));
+    sessions.push_back(corrupted(sessions[static_cast<std::size_t>(run) % whole], random, run));
   return sessions;
 }
 

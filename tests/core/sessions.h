@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Sessions that every build of the client core must take alike, and what is seen of a client after each
-// message.
+// Sessions for comparing builds of the client core, and the observed state of a client after each message.
 #pragma once
 
 #include <cstdint>
@@ -21,28 +20,28 @@ struct Observation {
   cs_state state = CS_STATE_JOINING;
   std::uint64_t tick = 0, decodeErrors = 0, hashMismatches = 0;
   std::uint64_t reconstructionHash = 0;
-  // hashFloats, zero where there are no vertices.
+  // hashFloats; zero if there are no vertices.
   std::uint64_t positionsHash = 0, normalsHash = 0, playedPositionsHash = 0, playedNormalsHash = 0;
-  std::uint64_t playedCollidersHash = 0;  // of position and orientation
+  std::uint64_t playedCollidersHash = 0;  // positions and orientations
   std::uint32_t triangleCount = 0;
-  std::uint64_t outgoingHash = 0;  // FNV-1a of all that the client wants to send
+  std::uint64_t outgoingHash = 0;  // FNV-1a of all outgoing messages
   std::string errorText;
 
   bool operator==(const Observation&) const = default;
 };
 
-// Regular streams, the golden packets of tests/golden, and some hundred sessions with spoilt bytes; the
-// working directory is the project's root. The same in every run.
+// Regular streams, the golden packets of tests/golden, and hundreds of sessions with corrupted bytes. The
+// working directory must be the project's root. The result is the same in every run.
 std::vector<Session> recordedSessions();
-// Of one stream of tests/golden: its description, then a frame a packet.
+// Session of one stream of tests/golden: its description, then one frame per packet.
 Session goldenSession(const std::string& stream);
 
-// One after each message, message i arriving at i * kStepUs.
+// Returns one observation per message. Message i arrives at i * kStepUs.
 inline constexpr std::uint64_t kStepUs = 14'000;
 inline constexpr double kPlayOutDelayMs = 45;
 std::vector<Observation> replay(const Session& session);
 
-// Numbers as a description has them.
+// Encodes numbers for a description.
 template <typename T>
 std::string littleEndian(const std::vector<T>& values) {
   return std::string(reinterpret_cast<const char*>(values.data()), values.size() * sizeof(T));

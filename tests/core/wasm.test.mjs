@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The WebAssembly client core makes of every recorded session what the native one made of it, and of the golden
-// packets what tests/golden says. Usage: node wasm.test.mjs MODULE SESSIONS GOLDEN
+// The WebAssembly client core gives the same observations as the native one for every recorded session, and the hashes
+// of tests/golden for the golden packets. Usage: node wasm.test.mjs MODULE SESSIONS GOLDEN
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 
@@ -9,10 +9,10 @@ const module = new WebAssembly.Module(readFileSync(modulePath));
 const { stepUs, playOutDelayMs, sessions } = JSON.parse(readFileSync(sessionsPath));
 const golden = JSON.parse(readFileSync(goldenPath));
 
-assert.deepEqual(WebAssembly.Module.imports(module), [], "the core does no input or output");
+assert.deepEqual(WebAssembly.Module.imports(module), [], "the core imports nothing");
 const header = readFileSync(new URL("../../clients/core/core.h", import.meta.url), "utf8");
 const declared = new Set(header.match(/cs_[a-z_]+(?=\()/g));
-declared.delete("cs_set_clock"); // takes a function of the caller's: natively only
+declared.delete("cs_set_clock"); // takes a function pointer, so it is native only
 const exported = new Set(WebAssembly.Module.exports(module).map(({ name }) => name));
 for (const name of [...declared, "memory", "_initialize", "malloc", "free"]) assert(exported.has(name), `${name} is exported`);
 
@@ -57,7 +57,7 @@ function floatsHash(pointer, vertices) {
   return vertices === 0 ? 0n : fnv1a(bytes(pointer, 12 * vertices));
 }
 
-// Of position and orientation.
+// Hashes positions and orientations.
 function playedCollidersHash(client) {
   let hash = kBasis;
   for (let index = 0; core.cs_get_played_collider(client, index, scratch) !== 0; ++index) hash = fnv1a(bytes(scratch + 8, 28), hash);
@@ -129,11 +129,11 @@ for (const session of sessions) {
   stream.seen = true;
 }
 assert(golden.every(({ seen }) => seen), "every golden stream was replayed");
-assert(failed > 50, "spoilt bytes were noticed");
+assert(failed > 50, "corrupted bytes were detected");
 const decodedPositions = new Set(sessions[0].expected.map(({ positionsHash }) => positionsHash));
 const blended = sessions[0].expected.filter(({ playedPositionsHash }) => !decodedPositions.has(playedPositionsHash));
-assert(blended.length > 3, "play-out showed what lies between frames");
+assert(blended.length > 3, "play-out interpolated between frames");
 const growth = core.memory.buffer.byteLength;
 for (let run = 0; run < 200; ++run) replay(sessions[0]);
-assert.equal(core.memory.buffer.byteLength, growth, "a client that is gone leaves nothing behind");
+assert.equal(core.memory.buffer.byteLength, growth, "destroyed clients leak no memory");
 console.log(`${sessions.length} sessions, ${decoded} frames decoded, ${failed} refused; memory ${growth >> 10} KiB`);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Addresses as people write them.
+// Server addresses as users write them.
 #include "clients/grpc/address.h"
 
 #include <gmock/gmock.h>
@@ -10,7 +10,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-TEST(Address, WithoutAPortGets50051) {
+TEST(Address, WithoutPortGets50051) {
   EXPECT_EQ(completeAddress("localhost"), "localhost:50051");
   EXPECT_EQ(completeAddress("10.0.0.7"), "10.0.0.7:50051");
   EXPECT_EQ(completeAddress("::1"), "[::1]:50051");
@@ -22,7 +22,7 @@ TEST(Address, KeepsItsPort) {
   EXPECT_EQ(completeAddress("[fe80::1]:6000"), "[fe80::1]:6000");
 }
 
-TEST(Address, IsRefusedWithAReason) {
+TEST(Address, IsRefusedWithReason) {
   for (const char* text : {"", ":50051", "http://host", "a b", "[::1", "[]:1"}) {
     const auto address = completeAddress(text);
     ASSERT_FALSE(address) << text;

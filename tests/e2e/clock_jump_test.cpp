@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
-// clothstream-server whose machine's time of day jumps while it streams and records: libfaketime tells it
-// another.
+// The time of day jumps while clothstream-server streams and records. libfaketime simulates the jumps.
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
@@ -16,7 +15,7 @@
 
 #include "clients/grpc/grpc_client.h"
 #include "proto/recording/recording_reader.h"
-#include "tests/e2e/server_test.h"
+#include "tests/e2e/running_server.h"
 #include "tests/e2e/temporary_directory.h"
 
 namespace clothstream::e2e {
@@ -26,13 +25,12 @@ using namespace std::chrono_literals;
 using ::testing::HasSubstr;
 using Clock = std::chrono::steady_clock;
 
-constexpr std::chrono::seconds kHour = 1h;
-// Of what tells an hour from the time that a busy machine takes.
-constexpr std::chrono::seconds kMuch = 30min;
-// Between two frames. Half a minute without a word would have ended the stream.
+// Distinguishes a jump of an hour from delays of a busy machine.
+constexpr std::chrono::seconds kThreshold = 30min;
+// Longest gap between two frames. A gap of 30 s would end the stream.
 constexpr std::chrono::seconds kLongestGap = 10s;
 
-// What a client sees, on its thread.
+// Events that a client has received.
 struct Watcher {
   void operator()(cs_client* client, std::uint32_t events) {
     const std::lock_guard lock(mutex);
@@ -59,7 +57,7 @@ struct Watcher {
   Clock::duration longestGap{};
 };
 
-class ClockJump : public ServerTest {
+class ClockJump : public RunningServer {
  protected:
   void SetUp() override {
     if (!std::filesystem::exists(CLOTHSTREAM_FAKETIME))
@@ -89,8 +87,8 @@ class ClockJump : public ServerTest {
     EXPECT_EQ(process.waitForEnd(kPatience), code) << process.errors();
     return process.output();
   }
-  // By how much the server's time of day is ahead: a recording that it names itself is named by it. It is
-  // given up, for nobody is in the scene.
+  // Time by which the server's clock is ahead, from the name that the server chooses for a recording. The
+  // recording itself fails, since the scene has no participants.
   std::chrono::seconds ahead() const {
     const std::string name = ask({"start-recording", "small_with_normals"});
     ask({"stop-recording", "small_with_normals"}, 4);
@@ -107,7 +105,7 @@ class ClockJump : public ServerTest {
   TemporaryDirectory directory_;
 };
 
-TEST_F(ClockJump, NeitherTheStreamNorARecordingNoticesAnHour) {
+TEST_F(ClockJump, DoesNotAffectStreamOrRecording) {
   Watcher watcher;
   auto client = GrpcClient::join(address_, {},
                                  [&](cs_client* joined, std::uint32_t events) { watcher(joined, events); });
@@ -119,13 +117,13 @@ TEST_F(ClockJump, NeitherTheStreamNorARecordingNoticesAnHour) {
   ask({"start-recording", "small", "--name", "jumps"});
   ASSERT_TRUE(seesMore(60));
   jump("+1h");
-  ASSERT_TRUE(eventually([&] { return ahead() > kMuch; }));
+  ASSERT_TRUE(eventually([&] { return ahead() > kThreshold; }));
   ASSERT_TRUE(seesMore(60));
   jump("-1h");
-  ASSERT_TRUE(eventually([&] { return ahead() < -kMuch; }));
+  ASSERT_TRUE(eventually([&] { return ahead() < -kThreshold; }));
   ASSERT_TRUE(seesMore(60));
   jump("+0");
-  ASSERT_TRUE(eventually([&] { return std::chrono::abs(ahead()) < kMuch; }));
+  ASSERT_TRUE(eventually([&] { return std::chrono::abs(ahead()) < kThreshold; }));
   ASSERT_TRUE(seesMore(60));
   ask({"stop-recording", "small"});
   const std::chrono::duration<double> took = Clock::now() - began;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The native client over a link that is slow, uneven, narrow or stands still, against the real
+// The native client over a link with delay, jitter, low bandwidth or stalls, against the real
 // clothstream-server.
 #include <atomic>
 #include <chrono>
@@ -22,7 +22,7 @@
 
 #include "clients/grpc/grpc_client.h"
 #include "tests/e2e/link.h"
-#include "tests/e2e/server_test.h"
+#include "tests/e2e/running_server.h"
 
 namespace clothstream::e2e {
 namespace {
@@ -30,7 +30,7 @@ namespace {
 using namespace std::chrono_literals;
 using Clock = std::chrono::steady_clock;
 
-class ImpairedLinkTest : public ServerTest {
+class ImpairedLink : public RunningServer {
  protected:
   void SetUp() override {
     Arguments arguments = kSmallScene;
@@ -66,7 +66,7 @@ class ImpairedLinkTest : public ServerTest {
   std::atomic<int> cuts_{0};
 };
 
-TEST_F(ImpairedLinkTest, AFarServerIsKnownToBeFarAndItsClockIsKnown) {
+TEST_F(ImpairedLink, MeasuresRoundTripTimeAndClockOffset) {
   constexpr auto kDelay = 40ms, kJitter = 20ms;
   link_->impair({.delay = kDelay, .jitter = kJitter});
   const auto client = joinThroughLink();
@@ -74,15 +74,15 @@ TEST_F(ImpairedLinkTest, AFarServerIsKnownToBeFarAndItsClockIsKnown) {
   const cs_statistics statistics = statisticsOf(*client);
   expectNothingWrong(statistics);
   EXPECT_GE(statistics.round_trip_ms, 2 * 40);
-  // Both ends have one clock. The exchanges that are believed lie within half of what their two ways differ
-  // by.
+  // Both ends use the same clock. The error of a measured offset is at most half of the difference between
+  // the two directions.
   EXPECT_LE(std::abs(statistics.clock_offset_us), 1000 * 20 / 2 + 5000.0);
   std::printf("round trip %.1f ms, clock off by %.2f ms\n", statistics.round_trip_ms,
               statistics.clock_offset_us / 1000);
   EXPECT_EQ(cuts_, 0);
 }
 
-TEST_F(ImpairedLinkTest, ALinkThatStandsStillForASecondCutsNobodyOff) {
+TEST_F(ImpairedLink, KeepsConnectionThroughStallOfOneSecond) {
   const auto client = joinThroughLink();
   ASSERT_TRUE(streams(*client, 10));
   link_->impair({.stalled = true});
@@ -91,28 +91,28 @@ TEST_F(ImpairedLinkTest, ALinkThatStandsStillForASecondCutsNobodyOff) {
   link_->impair({});
   const auto restored = Clock::now();
   ASSERT_TRUE(eventually([&] { return statisticsOf(*client).frames > before; }));
-  std::printf("first frame %.0f ms after the link goes on\n",
+  std::printf("first frame %.0f ms after the stall\n",
               std::chrono::duration<double, std::milli>(Clock::now() - restored).count());
   ASSERT_TRUE(streams(*client, 60));
   expectNothingWrong(statisticsOf(*client));
   EXPECT_EQ(cuts_, 0);
 }
 
-// The promise is down within 500 ms and back within 3 s (tests/stream holds it to that by a clock of its
-// own); five times as long is for machines that are busy.
-TEST_F(ImpairedLinkTest, ANarrowLinkGetsLessAndNothingWrong) {
+// The promise is to reduce the rate within 500 ms and to restore it within 3 s; tests/stream checks that with
+// a simulated clock. Here five times as long is allowed for a busy machine.
+TEST_F(ImpairedLink, SendsLessOverNarrowLink) {
   const auto client = joinThroughLink();
   ASSERT_TRUE(streams(*client, 60));
   const cs_statistics wide = statisticsOf(*client);
-  const auto isWhole = [&] {
+  const auto isUnlimited = [&] {
     std::uint32_t quality = 0, layers = 0;
     client->visit([&](cs_client* core) { cs_get_operating_point(core, &quality, &layers); });
     return quality == 0 && layers == 3;
   };
-  ASSERT_TRUE(eventually(isWhole));
+  ASSERT_TRUE(eventually(isUnlimited));
   link_->impair({.bytesPerSecond = 1000 * wide.kbit_per_second / 8 / 4, .queueBytes = 2048});
   const auto narrowed = Clock::now();
-  ASSERT_TRUE(eventually([&] { return !isWhole(); }));
+  ASSERT_TRUE(eventually([&] { return !isUnlimited(); }));
   const std::chrono::duration<double> down = Clock::now() - narrowed;
   EXPECT_LE(down.count(), 5 * 0.5);
   std::this_thread::sleep_for(3s);
@@ -122,22 +122,22 @@ TEST_F(ImpairedLinkTest, ANarrowLinkGetsLessAndNothingWrong) {
   expectNothingWrong(statisticsOf(*client));
   link_->impair({});
   const auto restored = Clock::now();
-  ASSERT_TRUE(eventually(isWhole));
+  ASSERT_TRUE(eventually(isUnlimited));
   const std::chrono::duration<double> up = Clock::now() - restored;
   EXPECT_LE(up.count(), 5 * 3.0);
-  std::printf("on a quarter of the rate less after %.2f s, %.1f of %.1f frames/s; all again after %.2f s\n",
-              down.count(), narrow, wide.frames_per_second, up.count());
+  std::printf("reduced after %.2f s to %.1f of %.1f frames/s; restored after %.2f s\n", down.count(), narrow,
+              wide.frames_per_second, up.count());
   ASSERT_TRUE(streams(*client, 60));
   expectNothingWrong(statisticsOf(*client));
 }
 
-TEST_F(ImpairedLinkTest, WhoVanishesWithoutAWordIsNoticed) {
+TEST_F(ImpairedLink, RemovesCollidersOfVanishedClient) {
   const auto watcher = join(address_);
   {
     auto doomed = joinThroughLink();
     const float sphere[] = {0.4f, 1.7f, 0.3f, 0.1f};
     doomed->visit([&](cs_client* core) { cs_set_colliders(core, sphere, 1, GrpcClient::nowUs()); });
-    const auto ofOthers = [&] {
+    const auto seesCollider = [&] {
       bool there = false;
       watcher->visit([&](cs_client* core) {
         cs_collider collider;
@@ -146,11 +146,11 @@ TEST_F(ImpairedLinkTest, WhoVanishesWithoutAWordIsNoticed) {
       });
       return there;
     };
-    ASSERT_TRUE(eventually(ofOthers));
+    ASSERT_TRUE(eventually(seesCollider));
     link_->impair({.stalled = true});
     const auto gone = Clock::now();
-    doomed.reset();  // its goodbye does not arrive, nor does the end of its connection
-    ASSERT_TRUE(eventually([&] { return !ofOthers(); }));
+    doomed.reset();  // neither its goodbye nor the end of its connection arrives
+    ASSERT_TRUE(eventually([&] { return !seesCollider(); }));
     std::printf("colliders gone %.1f s after their owner\n",
                 std::chrono::duration<double>(Clock::now() - gone).count());
   }
@@ -158,22 +158,22 @@ TEST_F(ImpairedLinkTest, WhoVanishesWithoutAWordIsNoticed) {
   expectNothingWrong(statisticsOf(*watcher));
 }
 
-// A connection that is reset as soon as it stands.
-void knock(std::uint16_t port) {
-  const int knocking = socket(AF_INET, SOCK_STREAM, 0);
-  ASSERT_GE(knocking, 0);
+// Opens a connection and resets it at once.
+void connectAndReset(std::uint16_t port) {
+  const int descriptor = socket(AF_INET, SOCK_STREAM, 0);
+  ASSERT_GE(descriptor, 0);
   sockaddr_in address{};
   address.sin_family = AF_INET;
   address.sin_port = htons(port);
   address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  EXPECT_EQ(connect(knocking, reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
+  EXPECT_EQ(connect(descriptor, reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
   const linger now{.l_onoff = 1, .l_linger = 0};
-  setsockopt(knocking, SOL_SOCKET, SO_LINGER, &now, sizeof now);
-  close(knocking);
+  setsockopt(descriptor, SOL_SOCKET, SO_LINGER, &now, sizeof now);
+  close(descriptor);
 }
 
-TEST_F(ImpairedLinkTest, AThousandConnectionsASecondHarmNobody) {
-  constexpr int kKnocks = 3000;
+TEST_F(ImpairedLink, ServesClientDuringThousandConnectionsPerSecond) {
+  constexpr int kConnections = 3000;
   const auto client = join(address_);
   ASSERT_TRUE(streams(*client, 10));
   const auto openFiles = [&] {
@@ -184,15 +184,15 @@ TEST_F(ImpairedLinkTest, AThousandConnectionsASecondHarmNobody) {
   for (const std::uint16_t port : {portIn(address_), portIn(web_)}) {
     const std::uint64_t frames = statisticsOf(*client).frames;
     const auto start = Clock::now();
-    for (int i = 0; i < kKnocks; ++i) {
-      knock(port);
+    for (int i = 0; i < kConnections; ++i) {
+      connectAndReset(port);
       std::this_thread::sleep_until(start + i * 1ms);
     }
     const double seconds = std::chrono::duration<double>(Clock::now() - start).count();
     const std::uint64_t served = statisticsOf(*client).frames - frames;
-    std::printf("%.0f connections and resets a second; %.1f frames/s beside them\n", kKnocks / seconds,
+    std::printf("%.0f connections and resets a second; %.1f frames/s meanwhile\n", kConnections / seconds,
                 static_cast<double>(served) / seconds);
-    EXPECT_GT(served, 0u) << "whoever is there is served meanwhile";
+    EXPECT_GT(served, 0u) << "the client is served meanwhile";
     ASSERT_TRUE(streams(*client, 10));
   }
   EXPECT_TRUE(eventually([&] { return openFiles() <= before; }));

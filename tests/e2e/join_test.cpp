@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// `clothstream` against the real clothstream-server, both as programs.
+// Runs `clothstream` against the real clothstream-server.
 #include <cmath>
 #include <csignal>
 #include <filesystem>
@@ -12,7 +12,7 @@
 #include <nlohmann/json.hpp>
 #include <unistd.h>
 
-#include "tests/e2e/server_test.h"
+#include "tests/e2e/running_server.h"
 #include "tests/e2e/temporary_directory.h"
 
 namespace clothstream::e2e {
@@ -27,7 +27,7 @@ using ::testing::Not;
 constexpr std::uint32_t kVertices = 17 * 13 + 9 * 11;
 constexpr std::uint32_t kTriangles = 2 * (16 * 12 + 8 * 10);
 
-class JoinTest : public ServerTest {
+class Join : public RunningServer {
  protected:
   void SetUp() override {
     Arguments arguments = kSmallScene;
@@ -77,7 +77,7 @@ Obj readObj(const std::filesystem::path& path) {
   return obj;
 }
 
-TEST_F(JoinTest, DecodesWhatTheServerHoldsAndWritesItAsObj) {
+TEST_F(Join, DecodesFramesAndWritesLastAsObj) {
   const TemporaryDirectory directory;
   const std::filesystem::path obj = directory.path() / "last.obj";
   const auto client = clothstream({"join", address_, "--json", "--hash", "--seconds", "2", "--obj", obj});
@@ -90,7 +90,7 @@ TEST_F(JoinTest, DecodesWhatTheServerHoldsAndWritesItAsObj) {
   EXPECT_EQ(report.at("hashMismatches"), 0);
   EXPECT_EQ(report.at("decodeErrors"), 0);
   EXPECT_GE(report.at("frames").get<int>(), 2);
-  // Two ticks a frame, and no more frames than ticks.
+  // A frame is two ticks long.
   EXPECT_GE(report.at("ticks").get<int>(), 2 * (report.at("frames").get<int>() - 1));
   EXPECT_GT(report.at("fps").get<double>(), 0);
   EXPECT_LT(report.at("fps").get<double>(), 61 * 2);
@@ -107,16 +107,16 @@ TEST_F(JoinTest, DecodesWhatTheServerHoldsAndWritesItAsObj) {
   EXPECT_THAT(written.groups, ::testing::ElementsAre("left", "right"));
   for (const auto& normal : written.normals)
     EXPECT_NEAR(std::hypot(normal[0], normal[1], normal[2]), 1, 1e-5);
-  // The pinned corner is where the scene says, to the promised 0.5 mm along each of three axes.
+  // The pinned corner is at its place, with an error of at most 0.5 mm along each axis.
   EXPECT_LT(std::hypot(written.positions[0][0] + 0.8, written.positions[0][1] - 2),
             std::sqrt(3) * 0.0005 + 1e-6);
-  // The wind blows towards +Z: the middle of the lower edge has moved that way.
+  // The wind blows towards +Z and has moved the middle of the lower edge that way.
   EXPECT_GT(written.positions[16 * 13 + 6][2], 0.001);
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(directory.path()), {}), 1)
-      << "nothing else is left there";
+      << "no other file is left";
 }
 
-TEST_F(JoinTest, TakesNormalsFromTheStreamWhereItHasThem) {
+TEST_F(Join, UsesNormalsOfTheStream) {
   const auto client =
       clothstream({"join", address_, "--scene", "small_with_normals", "--json", "--hash", "--seconds", "1"});
   ASSERT_EQ(client->waitForEnd(kPatience), 0) << client->errors();
@@ -127,7 +127,7 @@ TEST_F(JoinTest, TakesNormalsFromTheStreamWhereItHasThem) {
   EXPECT_GE(report.at("frames").get<int>(), 2);
 }
 
-TEST_F(JoinTest, TwoClientsAtOnceSeeTheSameScene) {
+TEST_F(Join, TwoClientsSeeTheSameScene) {
   const std::vector<std::string> arguments{"join", address_, "--json", "--hash", "--seconds", "2"};
   const auto first = clothstream(arguments), second = clothstream(arguments);
   for (const auto& client : {first.get(), second.get()}) {
@@ -139,22 +139,22 @@ TEST_F(JoinTest, TwoClientsAtOnceSeeTheSameScene) {
   }
 }
 
-TEST_F(JoinTest, ItsColliderPushesTheCloth) {
+TEST_F(Join, ColliderPushesTheCloth) {
   const TemporaryDirectory directory;
   const std::filesystem::path obj = directory.path() / "pushed.obj";
-  // In the right sheet's middle, from behind.
+  // Behind the middle of the right sheet.
   const auto client =
       clothstream({"join", address_, "--seconds", "3", "--collider", "0.5,1.8,-0.05,0.15", "--obj", obj});
   ASSERT_EQ(client->waitForEnd(kPatience), 0) << client->errors();
   const Obj written = readObj(obj);
   ASSERT_EQ(written.positions.size(), kVertices);
   for (const auto& p : written.positions) {
-    // Kept outside the sphere, but for the streamed error of 0.5 mm an axis.
+    // Outside the sphere, except for the streamed error of 0.5 mm along each axis.
     EXPECT_GT(std::hypot(p[0] - 0.5, p[1] - 1.8, p[2] + 0.05), 0.15 - 0.001);
   }
 }
 
-TEST_F(JoinTest, AnUnknownSceneIsRefusedWithTheNamesThereAre) {
+TEST_F(Join, RefusalOfUnknownSceneListsScenes) {
   const auto client = clothstream({"join", address_, "--scene", "nowhere", "--seconds", "1"});
   EXPECT_EQ(client->waitForEnd(kPatience), 4);
   EXPECT_THAT(client->errors(), HasSubstr("nowhere"));
@@ -162,7 +162,7 @@ TEST_F(JoinTest, AnUnknownSceneIsRefusedWithTheNamesThereAre) {
   EXPECT_THAT(client->output(), IsEmpty());
 }
 
-TEST_F(JoinTest, ScenesAreCreatedPausedResetAndDeleted) {
+TEST_F(Join, CreatesPausesResetsAndDeletesScenes) {
   const auto run = [&](std::vector<std::string> arguments) {
     arguments.insert(arguments.end(), {"--server", address_});
     const auto client = clothstream(arguments);
@@ -189,7 +189,7 @@ TEST_F(JoinTest, ScenesAreCreatedPausedResetAndDeleted) {
 
   EXPECT_EQ(run({"pause", "mine"}).first, 0);
   EXPECT_EQ(stateOf("mine").at("paused"), true);
-  // Who comes now sees the cloth as it stands, moved by the wind.
+  // A client that joins the paused scene sees the cloth as the wind has moved it.
   const TemporaryDirectory shown;
   const std::filesystem::path obj = shown.path() / "paused.obj";
   const auto late = clothstream(
@@ -212,7 +212,7 @@ TEST_F(JoinTest, ScenesAreCreatedPausedResetAndDeleted) {
   EXPECT_EQ(run({"pause", "nowhere"}).first, 4);
   EXPECT_EQ(run({"create", "tests/e2e/nowhere.json"}).first, 2);
   EXPECT_EQ(run({"create"}).first, 2);
-  // A scene that names a file of the server's.
+  // A scene that refers to a mesh file.
   const TemporaryDirectory directory;
   const std::filesystem::path file = directory.path() / "mesh.json";
   std::ofstream(file) << R"({"name": "m", "cloths": [{"name": "c", "mesh": {"file": "dress.obj"}}]})";
@@ -221,16 +221,16 @@ TEST_F(JoinTest, ScenesAreCreatedPausedResetAndDeleted) {
   EXPECT_THAT(meshless.second, HasSubstr("print-scene"));
 }
 
-TEST_F(JoinTest, AServerThatIsKilledIsNoticed) {
+TEST_F(Join, ReportsServerThatIsKilled) {
   const auto client = clothstream({"join", address_, "--no-reconnect"}, Process::Output::terminal);
   ASSERT_TRUE(client->waitForOutput("fps", kPatience)) << client->errors();
   server_->signal(SIGKILL);
   EXPECT_EQ(client->waitForEnd(kPatience), 5);
   EXPECT_THAT(client->errors(), ContainsRegex("The (stream|server).*" + address_));
-  EXPECT_THAT(client->output(), HasSubstr("bits a vertex")) << "the summary comes all the same";
+  EXPECT_THAT(client->output(), HasSubstr("bits a vertex")) << "the summary is printed nevertheless";
 }
 
-TEST_F(JoinTest, AServerThatStopsSaysSo) {
+TEST_F(Join, ReportsServerThatStops) {
   const auto client = clothstream({"join", address_, "--no-reconnect"}, Process::Output::terminal);
   ASSERT_TRUE(client->waitForOutput("fps", kPatience)) << client->errors();
   server_->signal(SIGTERM);
@@ -238,7 +238,7 @@ TEST_F(JoinTest, AServerThatStopsSaysSo) {
   EXPECT_THAT(client->errors(), HasSubstr("stop"));
 }
 
-TEST_F(JoinTest, AnInterruptEndsItWithTheSummary) {
+TEST_F(Join, PrintsSummaryAfterInterrupt) {
   const auto client = clothstream({"join", address_}, Process::Output::terminal);
   // The live line, on a terminal.
   ASSERT_TRUE(client->waitForOutput("ms round trip", kPatience)) << client->errors();
@@ -248,7 +248,7 @@ TEST_F(JoinTest, AnInterruptEndsItWithTheSummary) {
   EXPECT_THAT(client->output(), HasSubstr("bits a vertex"));
 }
 
-TEST_F(JoinTest, ListsTheScenes) {
+TEST_F(Join, ListsTheScenes) {
   const auto table = clothstream({"list", address_});
   ASSERT_EQ(table->waitForEnd(kPatience), 0) << table->errors();
   EXPECT_THAT(table->output(), HasSubstr("small_with_normals"));
@@ -276,16 +276,16 @@ int run(std::vector<std::string> arguments, std::string& errors) {
   return code;
 }
 
-TEST(JoinWithoutServer, SaysThatNobodyAnswers) {
+TEST(JoinWithoutServer, ReportsThatNoServerAnswers) {
   std::string errors;
-  // Port 1 of this machine: nobody listens there.
+  // No program listens on port 1 of this machine.
   EXPECT_EQ(run({"join", "127.0.0.1:1", "--seconds", "1"}, errors), 3);
   EXPECT_THAT(errors, HasSubstr("No server answers at 127.0.0.1:1: is clothstream-server running there?"));
   EXPECT_EQ(run({"list", "127.0.0.1:1"}, errors), 3);
   EXPECT_THAT(errors, HasSubstr("is clothstream-server running there?"));
 }
 
-TEST(JoinWithoutServer, AFileThatCannotBeWrittenIsNoticedBeforeJoining) {
+TEST(JoinWithoutServer, ReportsUnwritableFileBeforeJoining) {
   std::string errors;
   EXPECT_EQ(run({"join", "127.0.0.1:1", "--obj", "/nowhere/last.obj"}, errors), 6);
   EXPECT_THAT(errors, HasSubstr("cannot write /nowhere/last.obj: No such file or directory"));
@@ -300,7 +300,7 @@ TEST(JoinWithoutServer, LeavesNoFileBehind) {
   EXPECT_TRUE(std::filesystem::is_empty(directory.path()));
 }
 
-TEST_F(JoinTest, SaysHowTheSimulationDoes) {
+TEST_F(Join, PrintsReportsOfTheSimulation) {
   const auto client = clothstream({"join", address_, "--json", "--seconds", "2"});
   ASSERT_EQ(client->waitForEnd(kPatience), 0) << client->errors();
   const auto cloths = nlohmann::json::parse(client->output())["cloths"];
@@ -314,13 +314,13 @@ TEST_F(JoinTest, SaysHowTheSimulationDoes) {
     EXPECT_EQ(cloth["activeConstraints"], 0);
     EXPECT_GE(cloth["penetration"], 0);
   }
-  const auto talking = clothstream({"join", address_, "--report"});
-  EXPECT_TRUE(talking->waitForOutput("% mean; energy", kPatience)) << talking->errors();
-  talking->signal(SIGINT);
-  EXPECT_EQ(talking->waitForEnd(kPatience), 0);
+  const auto reporting = clothstream({"join", address_, "--report"});
+  EXPECT_TRUE(reporting->waitForOutput("% mean; energy", kPatience)) << reporting->errors();
+  reporting->signal(SIGINT);
+  EXPECT_EQ(reporting->waitForEnd(kPatience), 0);
 }
 
-TEST_F(JoinTest, SetsParametersForEverybody) {
+TEST_F(Join, SetsParametersForAllClients) {
   const std::string cloth = [&] {
     const auto client = clothstream({"join", address_, "--json", "--seconds", "1"});
     EXPECT_EQ(client->waitForEnd(kPatience), 0) << client->errors();
@@ -351,10 +351,10 @@ TEST_F(JoinTest, SetsParametersForEverybody) {
   EXPECT_THAT(unknown->errors(), HasSubstr("'rug' does not exist in the scene"));
 }
 
-TEST(JoinWithoutServer, RefusesWrongArguments) {
+TEST(JoinWithoutServer, RefusesInvalidArguments) {
   std::string errors;
   EXPECT_EQ(run({"join", "127.0.0.1:port"}, errors), 2);
-  EXPECT_THAT(errors, HasSubstr("no port from 1 to 65535"));
+  EXPECT_THAT(errors, HasSubstr("has no valid port after the host; use 1 to 65535"));
   EXPECT_EQ(run({"join", "--seconds", "-1"}, errors), 2);
   EXPECT_EQ(run({"join", "--collider", "1,2"}, errors), 2);
   EXPECT_THAT(errors, HasSubstr("X,Y,Z or X,Y,Z,RADIUS"));

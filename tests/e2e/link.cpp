@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// All connections on one thread.
+// One thread serves all connections.
 #include "tests/e2e/link.h"
 
 #include <algorithm>
@@ -28,8 +28,8 @@ using boost::system::error_code;
 using net::ip::tcp;
 using Clock = std::chrono::steady_clock;
 
-// What a link does now, and how uneven it is: the same in every run.
-struct Weather {
+// Current impairment of the link. The jitter is the same in every run.
+struct Conditions {
   Impairment impairment;
   bool whole = true;
   std::mt19937 random{1};
@@ -41,11 +41,11 @@ void reset(tcp::socket& socket) {
   socket.close(ignored);
 }
 
-// A client's connection and the one that it became.
+// The client's connection and the matching one to the server.
 class Pair : public std::enable_shared_from_this<Pair> {
  public:
-  Pair(Weather& weather, tcp::socket client, net::io_context& io)
-      : weather_(weather),
+  Pair(Conditions& conditions, tcp::socket client, net::io_context& io)
+      : conditions_(conditions),
         client_(std::move(client)),
         server_(io),
         pipes_{Pipe(client_, server_, io), Pipe(server_, client_, io)} {}
@@ -68,7 +68,7 @@ class Pair : public std::enable_shared_from_this<Pair> {
     for (Pipe& pipe : pipes_) pipe.timer.cancel();
   }
   bool isOpen() const { return isOpen_; }
-  // The weather has changed.
+  // Continues after the conditions have changed.
   void goOn() {
     for (Pipe& pipe : pipes_) {
       read(pipe);
@@ -87,7 +87,7 @@ class Pair : public std::enable_shared_from_this<Pair> {
     net::steady_timer timer;
     std::array<char, 16 * 1024> incoming{};
     std::deque<Chunk> waiting{};
-    std::size_t bytes = 0;  // waiting
+    std::size_t bytes = 0;  // that wait
     Clock::time_point free{}, lastDue{};
     bool reading = false, writing = false, ended = false;
 
@@ -95,7 +95,7 @@ class Pair : public std::enable_shared_from_this<Pair> {
   };
 
   void read(Pipe& pipe) {
-    const Impairment& now = weather_.impairment;
+    const Impairment& now = conditions_.impairment;
     if (!isOpen_ || pipe.reading || pipe.ended || now.stalled || !isConnected_) return;
     if (pipe.bytes >= now.queueBytes) return;
     pipe.reading = true;
@@ -112,14 +112,14 @@ class Pair : public std::enable_shared_from_this<Pair> {
   }
 
   void queue(Pipe& pipe, std::size_t count) {
-    const Impairment& now = weather_.impairment;
+    const Impairment& now = conditions_.impairment;
     pipe.free = std::max(pipe.free, Clock::now());
     if (now.bytesPerSecond > 0) {
       const std::chrono::duration<double> time(static_cast<double>(count) / now.bytesPerSecond);
       pipe.free += std::chrono::duration_cast<Clock::duration>(time);
     }
     std::uniform_int_distribution<std::int64_t> jitter(0, now.jitter.count());
-    const auto due = pipe.free + now.delay + std::chrono::microseconds(jitter(weather_.random));
+    const auto due = pipe.free + now.delay + std::chrono::microseconds(jitter(conditions_.random));
     pipe.lastDue = std::max(pipe.lastDue, due);
     pipe.waiting.push_back(
         {{pipe.incoming.begin(), pipe.incoming.begin() + static_cast<std::ptrdiff_t>(count)}, pipe.lastDue});
@@ -127,7 +127,7 @@ class Pair : public std::enable_shared_from_this<Pair> {
   }
 
   void write(Pipe& pipe) {
-    if (!isOpen_ || pipe.writing || weather_.impairment.stalled) return;
+    if (!isOpen_ || pipe.writing || conditions_.impairment.stalled) return;
     if (pipe.waiting.empty()) {
       if (pipe.ended) close();
       return;
@@ -135,7 +135,7 @@ class Pair : public std::enable_shared_from_this<Pair> {
     pipe.writing = true;
     pipe.timer.expires_at(pipe.waiting.front().due);
     pipe.timer.async_wait([self = shared_from_this(), &pipe](error_code error) {
-      if (error || self->weather_.impairment.stalled) {
+      if (error || self->conditions_.impairment.stalled) {
         pipe.writing = false;
         return;
       }
@@ -151,7 +151,7 @@ class Pair : public std::enable_shared_from_this<Pair> {
     });
   }
 
-  Weather& weather_;
+  Conditions& conditions_;
   tcp::socket client_, server_;
   std::array<Pipe, 2> pipes_;
   bool isOpen_ = true, isConnected_ = false;
@@ -181,8 +181,8 @@ struct Link::State {
     acceptor.async_accept([this](error_code error, tcp::socket client) {
       if (error) return;
       std::erase_if(pairs, [](const auto& pair) { return !pair->isOpen(); });
-      if (weather.whole) {
-        pairs.push_back(std::make_shared<Pair>(weather, std::move(client), io));
+      if (conditions.whole) {
+        pairs.push_back(std::make_shared<Pair>(conditions, std::move(client), io));
         pairs.back()->open(target);
       } else {
         reset(client);
@@ -194,7 +194,7 @@ struct Link::State {
     for (const auto& pair : pairs) pair->close();
     pairs.clear();
   }
-  // Connections that nobody takes fill the queue of those to be taken: the kernel drops what else comes.
+  // Fills the accept queue with connections that are never accepted. The kernel then drops new ones.
   void fillQueue() {
     acceptor.cancel();
     acceptor.listen(0);
@@ -214,7 +214,7 @@ struct Link::State {
     }
     accept();
   }
-  // On the link's thread, and returns when it is done.
+  // Runs `how` on the link's thread and returns when it is done.
   void change(const std::function<void()>& how) {
     std::promise<void> done;
     net::post(io, [&] {
@@ -230,9 +230,9 @@ struct Link::State {
   tcp::acceptor acceptor;
   const std::uint16_t port;
   net::executor_work_guard<net::io_context::executor_type> work;
-  Weather weather;
+  Conditions conditions;
   std::vector<std::shared_ptr<Pair>> pairs;
-  // One is taken to the queue, however short; the others see that it is full.
+  // The shortest queue takes one connection; the others find it full.
   static constexpr int kFilling = 3;
   std::vector<tcp::socket> filling;
   std::thread thread;
@@ -246,12 +246,12 @@ std::uint16_t Link::port() const {
 }
 
 void Link::impair(const Impairment& impairment) {
-  state_->change([&] { state_->weather.impairment = impairment; });
+  state_->change([&] { state_->conditions.impairment = impairment; });
 }
 
 void Link::cut() {
   state_->change([&] {
-    state_->weather.whole = false;
+    state_->conditions.whole = false;
     state_->closeAll();
   });
 }
@@ -265,7 +265,7 @@ void Link::swallow() {
 
 void Link::restore() {
   state_->change([&] {
-    state_->weather.whole = true;
+    state_->conditions.whole = true;
     if (!state_->filling.empty()) state_->emptyQueue();
   });
 }

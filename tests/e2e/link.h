@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A link to a server that is as bad as a test wants it.
+// TCP proxy that delays, limits, stalls or cuts connections to a server.
 #pragma once
 
 #include <chrono>
@@ -8,21 +8,21 @@
 
 namespace clothstream::e2e {
 
-// Of each direction by itself. Bytes stay in order, as TCP's do.
+// Applied to each direction separately. The order of bytes is kept.
 struct Impairment {
   std::chrono::microseconds delay{0};
-  std::chrono::microseconds jitter{0};  // beside the delay, evenly from 0 to this
-  double bytesPerSecond = 0;            // 0: as fast as can be
-  // Waiting at the narrow place; who sends more is not read from.
+  std::chrono::microseconds jitter{0};  // added to the delay, uniform from 0 to this
+  double bytesPerSecond = 0;            // 0: unlimited
+  // Bytes that may wait for the limited rate. The proxy does not read more from the sender.
   std::size_t queueBytes = 64 * 1024;
-  // Nothing passes, the end of a connection neither: whoever goes meanwhile leaves the other end half open.
+  // Nothing passes, not even the end of a connection, which then stays half open.
   bool stalled = false;
 };
 
-// Passes TCP connections on to a port of this machine. Thread-safe.
+// Forwards TCP connections to a port of this machine. Thread-safe.
 class Link {
  public:
-  // Throws std::exception where there is no port.
+  // Throws std::exception if no port can be opened.
   explicit Link(std::uint16_t target);
   // Resets every connection.
   ~Link();
@@ -30,11 +30,11 @@ class Link {
   Link& operator=(const Link&) = delete;
 
   std::uint16_t port() const;
-  // From here on; what waits at the narrow place is older.
+  // Applies to bytes read from now on. Bytes that already wait keep their old due time.
   void impair(const Impairment& impairment);
-  // Resets every connection, and those that come until it is restored.
+  // Resets every connection, and each new one until restore().
   void cut();
-  // The same, but those that come get no answer at all, until it is restored.
+  // Resets every connection. New ones get no answer at all until restore().
   void swallow();
   void restore();
 

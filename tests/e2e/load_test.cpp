@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// `clothstream load` against the real clothstream-server, by both endpoints.
+// Runs `clothstream load` against both endpoints of the real clothstream-server.
 #include <csignal>
 #include <memory>
 #include <string>
@@ -9,7 +9,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "tests/e2e/server_test.h"
+#include "tests/e2e/running_server.h"
 
 namespace clothstream::e2e {
 namespace {
@@ -19,13 +19,13 @@ using ::testing::HasSubstr;
 
 constexpr auto kEnd = 120s;
 
-class LoadTest : public ServerTest {
+class Load : public RunningServer {
  protected:
   static std::unique_ptr<Process> load(std::vector<std::string> arguments) {
     arguments.insert(arguments.begin(), {CLOTHSTREAM, "load"});
     return std::make_unique<Process>(arguments);
   }
-  // Two of those who move decode. Their stages follow each other, and together are the whole.
+  // Two participants move and decode. The stages of their poses add up to the total.
   static void expectPosesAreTimed(const nlohmann::json& report) {
     ASSERT_GT(report.at("poses").get<int>(), 10);
     double sum = 0;
@@ -33,7 +33,7 @@ class LoadTest : public ServerTest {
       const auto ms = [&](const char* what) {
         return report.at(std::string(stage) + "Ms" + what).get<double>();
       };
-      // As well as the clock of a server on this machine is known.
+      // The estimate of the server's clock may be off by a few milliseconds.
       EXPECT_GT(ms("P50"), -5) << stage;
       EXPECT_GE(ms("P99"), ms("P50")) << stage;
       sum += ms("Mean");
@@ -41,10 +41,10 @@ class LoadTest : public ServerTest {
     EXPECT_GT(report.at("tickToPacketMsP50").get<double>(), 0);
     EXPECT_GE(report.at("decodedToDisplayableMsP50").get<double>(), 0);
     EXPECT_GE(report.at("poseToDisplayableMsP99"), report.at("poseToDisplayableMsP50"));
-    // Of floats of at most some seconds.
+    // Sums of floats of up to a few seconds.
     EXPECT_NEAR(report.at("poseToDisplayableMsMean").get<double>(), sum, 0.01);
   }
-  // Some of everybody.
+  // Runs participants of every kind.
   void expectAllAreServed(const std::vector<std::string>& endpoint) {
     std::vector<std::string> arguments{
         "--participants", "6", "--viewers",   "2",    "--decoders",   "3",
@@ -59,7 +59,7 @@ class LoadTest : public ServerTest {
     EXPECT_GE(report.at("seconds").get<double>(), 4);
     EXPECT_GT(report.at("framesPerSecond").get<double>(), 1);
     EXPECT_LT(report.at("framesPerSecond").get<double>(), 2 * 60);
-    // Clocks are of the same machine: an age below 0 by more than their estimate's error is a lie.
+    // Both programs use the same clock, so an age may be negative only by the error of the estimate.
     EXPECT_GT(report.at("frameAgeMsP50").get<double>(), -5);
     EXPECT_GE(report.at("frameAgeMsP99"), report.at("frameAgeMsP50"));
     EXPECT_GT(report.at("tickAgeMsP50"), report.at("frameAgeMsP50"));
@@ -76,17 +76,17 @@ class LoadTest : public ServerTest {
   }
 };
 
-TEST_F(LoadTest, GrpcServesAllAmongIntruders) {
+TEST_F(Load, GrpcServesParticipantsAmongHostileClients) {
   startServer();
   if (!address_.empty()) expectAllAreServed({address_});
 }
 
-TEST_F(LoadTest, WebSocketsServeAllAmongIntruders) {
+TEST_F(Load, WebSocketServesParticipantsAmongHostileClients) {
   startServer();
   if (!web_.empty()) expectAllAreServed({"--web", web_});
 }
 
-TEST_F(LoadTest, OfWhoSendsNoPosesThereIsNoTime) {
+TEST_F(Load, ReportsNoLatencyWithoutPoses) {
   startServer();
   if (address_.empty()) return;
   const auto program = load({address_, "--participants", "2", "--viewers", "2", "--seconds", "1", "--json"});
@@ -97,30 +97,30 @@ TEST_F(LoadTest, OfWhoSendsNoPosesThereIsNoTime) {
   EXPECT_TRUE(report.at("decodedToDisplayableMsP99").is_null());
 }
 
-TEST_F(LoadTest, SaysWhatNobodyWasTold) {
+TEST_F(Load, ReportsWhyParticipantsWereRefused) {
   startServer({"--scene", "small", "--scene-file", "tests/e2e/small.json", "--max-participants", "3"});
   if (address_.empty()) return;
   const auto crowd = load({address_, "--participants", "4"});
   EXPECT_EQ(crowd->waitForEnd(kEnd), 4);
-  EXPECT_THAT(crowd->errors(), HasSubstr("1 times somebody could not stay"));
+  EXPECT_THAT(crowd->errors(), HasSubstr("1 participants were refused or disconnected"));
   EXPECT_THAT(crowd->errors(), HasSubstr("has 3 participants"));
 
   const auto elsewhere = load({address_, "--scene", "nowhere"});
   EXPECT_EQ(elsewhere->waitForEnd(kEnd), 4);
-  EXPECT_THAT(elsewhere->errors(), HasSubstr("nobody could join"));
+  EXPECT_THAT(elsewhere->errors(), HasSubstr("no participant could join"));
   EXPECT_THAT(elsewhere->errors(), HasSubstr("nowhere"));
 }
 
-TEST_F(LoadTest, NobodyAnswers) {
+TEST_F(Load, ReportsThatNoServerAnswers) {
   for (const std::vector<std::string>& endpoint :
        {std::vector<std::string>{"127.0.0.1:9"}, {"--web", "127.0.0.1:9"}}) {
     const auto program = load(endpoint);
     EXPECT_EQ(program->waitForEnd(kEnd), 3);
-    EXPECT_THAT(program->errors(), HasSubstr("nobody could join at 127.0.0.1:9"));
+    EXPECT_THAT(program->errors(), HasSubstr("no participant could join at 127.0.0.1:9"));
   }
 }
 
-TEST_F(LoadTest, RefusesWhatMakesNoSense) {
+TEST_F(Load, RefusesInvalidArguments) {
   for (const std::vector<std::string>& arguments : {std::vector<std::string>{"--viewers", "11"},
                                                     {"--decoders", "11"},
                                                     {"--participants", "0"},
@@ -133,7 +133,7 @@ TEST_F(LoadTest, RefusesWhatMakesNoSense) {
   }
 }
 
-TEST_F(LoadTest, AnInterruptEndsItWithItsReport) {
+TEST_F(Load, PrintsReportAfterInterrupt) {
   startServer();
   if (address_.empty()) return;
   const auto program = load({address_, "--participants", "2", "--seconds", "3600"});

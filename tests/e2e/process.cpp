@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// fork, exec, poll.
+// Implementation with fork, exec and poll.
 #include "tests/e2e/process.h"
 
 #include <algorithm>
@@ -88,7 +88,7 @@ void Process::readFrom(Stream& stream) {
   const ssize_t count = ::read(stream.file, buffer.data(), buffer.size());
   if (count > 0) {
     stream.text.append(buffer.data(), static_cast<std::size_t>(count));
-  } else if (count == 0 || errno != EINTR) {  // a terminal whose other end is gone says EIO
+  } else if (count == 0 || errno != EINTR) {  // a terminal whose other end is closed reports EIO
     close(stream.file);
     stream.file = -1;
   }
@@ -115,7 +115,7 @@ std::optional<std::string> Process::waitForLine(const std::string& start, std::c
   const Deadline deadline = SteadyClock::now() + timeout;
   do {
     std::istringstream lines(output_.text);
-    // A line whose end has not come yet ends with the text.
+    // Skips the last line while its end is missing.
     for (std::string line; std::getline(lines, line) && !lines.eof();) {
       if (line.starts_with(start)) return line.substr(start.size());
     }
@@ -128,7 +128,7 @@ std::optional<int> Process::waitForEnd(std::chrono::milliseconds timeout) {
   while (read(deadline)) {
   }
   if (exitCode_ || output_.file >= 0 || errors_.file >= 0) return exitCode_;
-  // Its streams are closed: it is ending.
+  // Both streams are closed, so the program is ending.
   int status = 0;
   check(waitpid(pid_, &status, 0), "waitpid");
   exitCode_ = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Another program, started, read and ended by a test.
+// Runs another program: reads its output, sends it signals, waits for its end.
 #pragma once
 
 #include <chrono>
@@ -15,19 +15,20 @@ class Process {
  public:
   enum class Output { pipe, terminal };
 
-  // Starts it; standard output comes through a pipe or as from a terminal, standard error through a pipe.
-  // Throws std::system_error.
+  // Starts the program. Standard output goes to a pipe or a pseudo-terminal, standard error to a pipe. Throws
+  // std::system_error.
   explicit Process(const std::vector<std::string>& command, Output output = Output::pipe);
-  // Kills it if it still runs.
+  // Kills the program if it still runs.
   ~Process();
   Process(const Process&) = delete;
   Process& operator=(const Process&) = delete;
 
-  // Until standard output holds `text`. False if it ends or the time is over before.
+  // Waits until standard output contains `text`. Returns false if the output ends or the time is over first.
   bool waitForOutput(const std::string& text, std::chrono::milliseconds timeout);
-  // The rest of the first line of standard output that begins with `start`.
+  // Waits for the first line of standard output that begins with `start`, and returns the rest of that line.
   std::optional<std::string> waitForLine(const std::string& start, std::chrono::milliseconds timeout);
-  // Its exit code, or 128 + the signal that ended it; nothing if it still runs when the time is over.
+  // Exit code, or 128 + the number of the signal that ended the program. Nothing if it still runs after the
+  // timeout.
   std::optional<int> waitForEnd(std::chrono::milliseconds timeout);
   void signal(int number) const;
   pid_t id() const { return pid_; }
@@ -42,7 +43,7 @@ class Process {
     std::string text;
   };
 
-  // Takes what is there, waiting for it until the deadline. False when both streams are at their ends or time
+  // Waits for output until the deadline and reads it. Returns false when both streams have ended or the time
   // is over.
   bool read(Deadline deadline);
   static void readFrom(Stream& stream);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// clothstream-server as a process of its own.
+// Starts, reads and ends clothstream-server.
 #include "tests/e2e/server_process.h"
 
 #include <array>
@@ -17,7 +17,8 @@ extern char** environ;
 
 namespace clothstream::tests {
 
-ServerProcess::ServerProcess(const std::vector<std::string>& options) {
+ServerProcess::ServerProcess(const std::vector<std::string>& options,
+                             const std::vector<std::string>& environment) {
   std::array<int, 2> ends{};
   if (pipe2(ends.data(), O_CLOEXEC) != 0) throw std::system_error(errno, std::generic_category(), "pipe2");
   posix_spawn_file_actions_t actions;
@@ -30,10 +31,16 @@ ServerProcess::ServerProcess(const std::vector<std::string>& options) {
   std::vector<char*> arguments;
   for (std::string& word : words) arguments.push_back(word.data());
   arguments.push_back(nullptr);
-  const int error = posix_spawn(&pid_, words.front().c_str(), &actions, nullptr, arguments.data(), environ);
+  std::vector<std::string> added = environment;
+  std::vector<char*> variables;
+  for (char** variable = environ; *variable != nullptr; ++variable) variables.push_back(*variable);
+  for (std::string& variable : added) variables.push_back(variable.data());
+  variables.push_back(nullptr);
+  const int error =
+      posix_spawn(&pid_, words.front().c_str(), &actions, nullptr, arguments.data(), variables.data());
   posix_spawn_file_actions_destroy(&actions);
   close(ends[1]);
-  output_ = ends[0];
+  pipe_ = ends[0];
   if (error != 0) throw std::system_error(error, std::generic_category(), words.front());
 }
 
@@ -42,31 +49,31 @@ ServerProcess::~ServerProcess() {
     kill(pid_, SIGKILL);
     waitpid(pid_, nullptr, 0);
   }
-  close(output_);
+  close(pipe_);
 }
 
 bool ServerProcess::read(std::chrono::steady_clock::time_point deadline) {
   const auto left =
       std::chrono::duration_cast<std::chrono::milliseconds>(deadline - std::chrono::steady_clock::now());
-  pollfd waiting{output_, POLLIN, 0};
+  pollfd waiting{pipe_, POLLIN, 0};
   if (left.count() <= 0 || poll(&waiting, 1, static_cast<int>(left.count())) == 0)
-    throw std::runtime_error("the server did not say what was waited for, but:\n" + said_);
+    throw std::runtime_error("the server did not print the awaited line, but:\n" + output_);
   std::array<char, 4096> buffer{};
-  const ssize_t count = ::read(output_, buffer.data(), buffer.size());
-  if (count > 0) said_.append(buffer.data(), static_cast<std::size_t>(count));
+  const ssize_t count = ::read(pipe_, buffer.data(), buffer.size());
+  if (count > 0) output_.append(buffer.data(), static_cast<std::size_t>(count));
   return count > 0;
 }
 
 std::string ServerProcess::lineWith(const std::string& text) {
   const auto deadline = std::chrono::steady_clock::now() + kPatience;
   for (;;) {
-    for (std::size_t end; (end = said_.find('\n', searched_)) != std::string::npos;) {
-      const std::string line = said_.substr(searched_, end - searched_);
+    for (std::size_t end; (end = output_.find('\n', searched_)) != std::string::npos;) {
+      const std::string line = output_.substr(searched_, end - searched_);
       searched_ = end + 1;
       if (line.find(text) != std::string::npos) return line;
     }
     if (!read(deadline))
-      throw std::runtime_error("the server ended without saying '" + text + "', but:\n" + said_);
+      throw std::runtime_error("the server ended without printing '" + text + "', but:\n" + output_);
   }
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The server program: what it says, what its options do, how it ends.
+// Output, options and exit codes of clothstream-server.
 #include <algorithm>
 #include <csignal>
 #include <cstdlib>
@@ -20,7 +20,7 @@ namespace {
 
 using testing::HasSubstr;
 
-// A small scene in a file of the test's own, so that a busy machine can keep up.
+// Serves a small scene from a temporary file, so that a busy machine keeps up.
 class ServerProgram : public ::testing::Test {
  protected:
   void SetUp() override {
@@ -45,7 +45,7 @@ class ServerProgram : public ::testing::Test {
   std::filesystem::path directory_;
 };
 
-TEST_F(ServerProgram, SaysDeviceScenesAndAddressesAndStreams) {
+TEST_F(ServerProgram, PrintsDeviceScenesAndAddressesAndStreams) {
   ServerProcess server(options());
   EXPECT_THAT(server.lineWith("device"), HasSubstr("Vulkan"));
   EXPECT_THAT(server.lineWith("scenes"),
@@ -68,19 +68,19 @@ TEST_F(ServerProgram, SaysDeviceScenesAndAddressesAndStreams) {
   EXPECT_FALSE(client.watch(viewer, [] { return false; }));
   ASSERT_FALSE(viewer.notices.empty());
   EXPECT_EQ(viewer.notices.back().kind(), v1::NOTICE_KIND_SERVER_STOPPING);
-  EXPECT_EQ(server.exitCode(), 0) << server.said();
-  EXPECT_THAT(server.said().substr(server.said().rfind("scene small (ms)")), HasSubstr("joins 1"));
+  EXPECT_EQ(server.exitCode(), 0) << server.output();
+  EXPECT_THAT(server.output().substr(server.output().rfind("scene small (ms)")), HasSubstr("joins 1"));
 }
 
-TEST_F(ServerProgram, StopsByItselfAndOnInterrupt) {
+TEST_F(ServerProgram, StopsAfterSecondsAndOnInterrupt) {
   EXPECT_EQ(ServerProcess(options({"--seconds", "0.2"})).exitCode(), 0);
   ServerProcess interrupted(options());
   interrupted.lineWith("gRPC");
   interrupted.signal(SIGINT);
-  EXPECT_EQ(interrupted.exitCode(), 0) << interrupted.said();
+  EXPECT_EQ(interrupted.exitCode(), 0) << interrupted.output();
 }
 
-TEST_F(ServerProgram, RunsTheSceneAtTheRateItIsTold) {
+TEST_F(ServerProgram, OverridesRateSubstepsErrorAndNormalsOfTheScene) {
   ServerProcess server(
       options({"--rate", "50", "--substeps", "16", "--max-error", "0.002", "--normals", "octahedral"}));
   WebSocketClient client(server.portIn(server.lineWith("page    http://")));
@@ -94,39 +94,39 @@ TEST_F(ServerProgram, RunsTheSceneAtTheRateItIsTold) {
   EXPECT_FLOAT_EQ(viewer.description.max_error(), 0.002f);
 }
 
-TEST_F(ServerProgram, NamesThePortAndTheOptionWhenAPortIsInUse) {
+TEST_F(ServerProgram, NamesPortAndOptionWhenAPortIsInUse) {
   ServerProcess first(options());
   const std::string page = std::to_string(first.portIn(first.lineWith("page    http://")));
   const std::string grpc = std::to_string(first.portIn(first.lineWith("gRPC    ")));
   ServerProcess samePage(options({"--port", page}));
   EXPECT_EQ(samePage.exitCode(), 1);
-  EXPECT_THAT(samePage.said(), testing::AllOf(HasSubstr("port " + page), HasSubstr("--port")));
+  EXPECT_THAT(samePage.output(), testing::AllOf(HasSubstr("port " + page), HasSubstr("--port")));
   ServerProcess sameGrpc(options({"--grpc-port", grpc}));
   EXPECT_EQ(sameGrpc.exitCode(), 1);
-  EXPECT_THAT(sameGrpc.said(), testing::AllOf(HasSubstr("port " + grpc), HasSubstr("--grpc-port")));
+  EXPECT_THAT(sameGrpc.output(), testing::AllOf(HasSubstr("port " + grpc), HasSubstr("--grpc-port")));
 }
 
-TEST_F(ServerProgram, NamesTheScenesThereAre) {
+TEST_F(ServerProgram, ListsTheScenesForAnUnknownName) {
   ServerProcess server({"--scene", "nowhere"});
   EXPECT_EQ(server.exitCode(), 1);
-  EXPECT_THAT(server.said(),
+  EXPECT_THAT(server.output(),
               HasSubstr("there is no scene 'nowhere'; there are curtain, figure_07, figure_09"));
 }
 
-TEST_F(ServerProgram, NamesTheSubstepsThatWouldDo) {
+TEST_F(ServerProgram, RefusesTooFewSubsteps) {
   ServerProcess server(options({"--substeps", "1"}));
   EXPECT_EQ(server.exitCode(), 1);
-  EXPECT_THAT(server.said(), HasSubstr("scene 'small' with these options: substeps"));
+  EXPECT_THAT(server.output(), HasSubstr("scene 'small' with these options: substeps"));
 }
 
-TEST_F(ServerProgram, SaysWhereASceneFileIsWrong) {
+TEST_F(ServerProgram, NamesTheSceneFileThatCannotBeRead) {
   std::ofstream(sceneFile()) << "{\"name\": \"small\", ";
   ServerProcess server(options());
   EXPECT_EQ(server.exitCode(), 1);
-  EXPECT_THAT(server.said(), HasSubstr("small.json"));
+  EXPECT_THAT(server.output(), HasSubstr("small.json"));
   ServerProcess missing({"--scene-file", "/nowhere/scene.json"});
   EXPECT_EQ(missing.exitCode(), 1);
-  EXPECT_THAT(missing.said(), HasSubstr("/nowhere/scene.json"));
+  EXPECT_THAT(missing.output(), HasSubstr("/nowhere/scene.json"));
 }
 
 std::vector<float> numbersIn(const std::filesystem::path& path) {
@@ -137,15 +137,15 @@ std::vector<float> numbersIn(const std::filesystem::path& path) {
   return numbers;
 }
 
-// Two runs write the same bytes, whatever is left out between.
-TEST_F(ServerProgram, StepsASceneIntoAFileThatOthersCanRead) {
+// Two runs write the same states, also when the second one writes fewer of them.
+TEST_F(ServerProgram, StepWritesAFileWithADescription) {
   const std::filesystem::path whole = sceneFile().replace_filename("whole.f32");
   const std::filesystem::path some = sceneFile().replace_filename("some.f32");
-  std::ofstream(some.string() + ".json") << "of a former run";
+  std::ofstream(some.string() + ".json") << "of an earlier run";
   ServerProcess every({"step", "--scene", sceneFile(), "--ticks", "20", "--out", whole});
-  EXPECT_EQ(every.exitCode(), 0) << every.said();
+  EXPECT_EQ(every.exitCode(), 0) << every.output();
   ServerProcess fifth({"step", "--scene", sceneFile(), "--ticks", "20", "--out", some, "--every", "5"});
-  EXPECT_EQ(fifth.exitCode(), 0) << fifth.said();
+  EXPECT_EQ(fifth.exitCode(), 0) << fifth.output();
 
   const model::Scene scene = smallScene("small");
   const std::size_t frame = std::size_t{scene.nodeCount()} * 6;
@@ -157,74 +157,74 @@ TEST_F(ServerProgram, StepsASceneIntoAFileThatOthersCanRead) {
                            few.begin() + static_cast<std::ptrdiff_t>((i + 1) * frame),
                            all.begin() + static_cast<std::ptrdiff_t>(5 * i * frame)))
         << "frame " << i;
-  // Frame 0 is the start: at rest, the first node at its corner. Later ones fall.
+  // Frame 0 is the start: at rest, with the first node at its corner. Later frames fall.
   EXPECT_EQ(few[0], -0.45f);
   EXPECT_EQ(few[3], 0);
   EXPECT_LT(few[4 * frame + 6 * 115 + 1], few[6 * 115 + 1]);
 
-  const auto said = nlohmann::json::parse(std::ifstream(some.string() + ".json"));
-  EXPECT_EQ(said["shape"], (std::vector<std::size_t>{5, 120, 6}));
-  EXPECT_EQ(said["dtype"], "<f4");
-  EXPECT_EQ(said["file"], "some.f32");
-  EXPECT_EQ(said["complete"], true);
-  EXPECT_EQ(said["ticks"], (std::vector<int>{0, 5, 10, 15, 20}));
-  EXPECT_EQ(said["hashes"].size(), 5u);
-  EXPECT_EQ(said["cloths"][0]["name"], "sheet");
-  EXPECT_EQ(said["cloths"][0]["rows"], 12);
-  EXPECT_TRUE(said["reports"][0].is_null());
-  const auto& report = said["reports"][4]["cloths"][0];
+  const auto description = nlohmann::json::parse(std::ifstream(some.string() + ".json"));
+  EXPECT_EQ(description["shape"], (std::vector<std::size_t>{5, 120, 6}));
+  EXPECT_EQ(description["dtype"], "<f4");
+  EXPECT_EQ(description["file"], "some.f32");
+  EXPECT_EQ(description["complete"], true);
+  EXPECT_EQ(description["ticks"], (std::vector<int>{0, 5, 10, 15, 20}));
+  EXPECT_EQ(description["hashes"].size(), 5u);
+  EXPECT_EQ(description["cloths"][0]["name"], "sheet");
+  EXPECT_EQ(description["cloths"][0]["rows"], 12);
+  EXPECT_TRUE(description["reports"][0].is_null());
+  const auto& report = description["reports"][4]["cloths"][0];
   EXPECT_GT(report["strainMax"], 0);
   EXPECT_GT(report["kineticEnergy"], 0);
   EXPECT_GE(report["penetration"], 0);
-  EXPECT_EQ(said["scene"]["cloths"][0]["grid"]["columns"], 10);
-  EXPECT_THAT(said["server"].get<std::string>(), HasSubstr("clothstream-server 0."));
+  EXPECT_EQ(description["scene"]["cloths"][0]["grid"]["columns"], 10);
+  EXPECT_THAT(description["server"].get<std::string>(), HasSubstr("clothstream-server 0."));
 }
 
-// What docs/simulation.md shows, with what Python always has.
-TEST_F(ServerProgram, WritesWhatPythonReads) {
+// The example of docs/simulation.md, with the standard library of Python.
+TEST_F(ServerProgram, PythonReadsTheFileOfAStep) {
   const std::filesystem::path out = sceneFile().replace_filename("state.f32");
   ServerProcess server({"step", "--scene", sceneFile(), "--ticks", "8", "--every", "4", "--out", out});
-  ASSERT_EQ(server.exitCode(), 0) << server.said();
+  ASSERT_EQ(server.exitCode(), 0) << server.output();
   const std::filesystem::path script = sceneFile().replace_filename("read.py");
   std::ofstream(script) << R"(
 import array, json, sys
-said = json.load(open(sys.argv[1] + '.json'))
-frames, nodes, columns = said['shape']
+description = json.load(open(sys.argv[1] + '.json'))
+frames, nodes, columns = description['shape']
 numbers = array.array('f')
 numbers.fromfile(open(sys.argv[1], 'rb'), frames * nodes * columns)
-assert (frames, nodes, columns) == (3, 120, 6) and said['columns'][1] == 'py'
+assert (frames, nodes, columns) == (3, 120, 6) and description['columns'][1] == 'py'
 height = lambda frame: sum(numbers[(frame * nodes + node) * columns + 1] for node in range(nodes)) / nodes
-assert height(2) < height(1) < height(0), 'it falls'
+assert height(2) < height(1) < height(0), 'the cloth must fall'
 energy = [sum(report['cloths'][0][kind] for kind in ('kineticEnergy', 'elasticEnergy', 'gravityEnergy'))
-          for report in said['reports'][1:]]
+          for report in description['reports'][1:]]
 assert len(energy) == 2
 )";
   const std::string command = "python3 '" + script.string() + "' '" + out.string() + "'";
   EXPECT_EQ(std::system(command.c_str()), 0);
 }
 
-TEST_F(ServerProgram, LeavesAValidFileWhenAStepIsInterrupted) {
+TEST_F(ServerProgram, InterruptedStepLeavesAValidFile) {
   const std::filesystem::path out = sceneFile().replace_filename("long.f32");
   ServerProcess server(
       {"step", "--scene", sceneFile(), "--ticks", "100000000", "--every", "3", "--out", out});
-  server.lineWith("tick ");  // says how far it is
+  server.lineWith("tick ");  // progress
   server.signal(SIGINT);
   EXPECT_EQ(server.exitCode(), 130);
-  EXPECT_THAT(server.said(), HasSubstr("interrupted after tick"));
-  const auto said = nlohmann::json::parse(std::ifstream(out.string() + ".json"));
-  EXPECT_EQ(said["complete"], false);
-  const std::size_t frames = said["shape"][0];
+  EXPECT_THAT(server.output(), HasSubstr("interrupted after tick"));
+  const auto description = nlohmann::json::parse(std::ifstream(out.string() + ".json"));
+  EXPECT_EQ(description["complete"], false);
+  const std::size_t frames = description["shape"][0];
   EXPECT_GT(frames, 1u);
   EXPECT_EQ(std::filesystem::file_size(out), frames * 120 * 6 * sizeof(float));
-  EXPECT_EQ(said["ticks"].size(), frames);
-  EXPECT_EQ(said["reports"].size(), frames);
+  EXPECT_EQ(description["ticks"].size(), frames);
+  EXPECT_EQ(description["reports"].size(), frames);
 }
 
-TEST_F(ServerProgram, SaysWhatIsWrongWithAStep) {
+TEST_F(ServerProgram, ExplainsWrongOptionsOfAStep) {
   const auto fails = [](const std::vector<std::string>& options, const std::string& text) {
     ServerProcess server(options);
-    EXPECT_EQ(server.exitCode(), 1) << server.said();
-    EXPECT_THAT(server.said(), HasSubstr(text));
+    EXPECT_EQ(server.exitCode(), 1) << server.output();
+    EXPECT_THAT(server.output(), HasSubstr(text));
   };
   const std::string file = sceneFile(), out = sceneFile().replace_filename("x.f32");
   fails({"step", "--scene", file, "--ticks", "1"}, "--out");
@@ -235,41 +235,174 @@ TEST_F(ServerProgram, SaysWhatIsWrongWithAStep) {
   ServerProcess help({"step", "--help"});
   EXPECT_EQ(help.exitCode(), 0);
   for (const char* word : {"--scene", "--ticks", "--out", "--every", "--device", "numpy"})
-    EXPECT_THAT(help.said(), HasSubstr(word));
+    EXPECT_THAT(help.output(), HasSubstr(word));
 }
 
-TEST_F(ServerProgram, NamesTheDevicesThereAre) {
+TEST_F(ServerProgram, ListsDevicesAndRefusesAnUnknownOne) {
   ServerProcess list({"--list-devices"});
   EXPECT_EQ(list.exitCode(), 0);
-  EXPECT_THAT(list.said(), HasSubstr("0  "));
+  EXPECT_THAT(list.output(), HasSubstr("0  "));
   ServerProcess server(options({"--device", "no such device"}));
   EXPECT_EQ(server.exitCode(), 1);
-  EXPECT_THAT(server.said(), HasSubstr("no such device"));
+  EXPECT_THAT(server.output(), HasSubstr("no such device"));
 }
 
-TEST_F(ServerProgram, NamesTheMaterialsThereAre) {
+TEST_F(ServerProgram, ListsMaterials) {
   ServerProcess list({"--list-materials"});
   EXPECT_EQ(list.exitCode(), 0);
-  for (const char* word : {"cotton", "wool", "0.324", "denim"}) EXPECT_THAT(list.said(), HasSubstr(word));
+  for (const char* word : {"cotton", "wool", "0.324", "denim"}) EXPECT_THAT(list.output(), HasSubstr(word));
 }
 
-TEST_F(ServerProgram, ExplainsItsOptions) {
+TEST_F(ServerProgram, ExplainsOptionsAndRefusesUnknownOnes) {
   ServerProcess help({"--help"});
   EXPECT_EQ(help.exitCode(), 0);
   for (const char* option :
        {"--scene", "--scene-file", "--rate", "--substeps", "--max-error", "--normals", "--reports", "step",
         "--host", "--port", "--grpc-port", "--page", "--device", "--list-devices", "--list-materials",
         "--software-threads", "--log-level", "--seconds"})
-    EXPECT_THAT(help.said(), HasSubstr(option));
+    EXPECT_THAT(help.output(), HasSubstr(option));
   ServerProcess version({"--version"});
   EXPECT_EQ(version.exitCode(), 0);
-  EXPECT_THAT(version.said(), HasSubstr("clothstream-server 0."));
+  EXPECT_THAT(version.output(), HasSubstr("clothstream-server 0."));
   ServerProcess wrong({"--speed", "3"});
   EXPECT_EQ(wrong.exitCode(), 1);
-  EXPECT_THAT(wrong.said(), HasSubstr("--speed"));
+  EXPECT_THAT(wrong.output(), HasSubstr("--speed"));
   ServerProcess level(options({"--log-level", "loud"}));
   EXPECT_EQ(level.exitCode(), 1);
-  EXPECT_THAT(level.said(), HasSubstr("loud"));
+  EXPECT_THAT(level.output(), HasSubstr("loud"));
+}
+
+// Options come from the command line, the environment and a file. Needs no device.
+class ServerOptions : public ServerProgram {
+ protected:
+  struct Result {
+    int exitCode = 0;
+    std::string output;
+  };
+  static Result run(const std::vector<std::string>& options,
+                    const std::vector<std::string>& environment = {}) {
+    ServerProcess server(options, environment);
+    const int exitCode = server.exitCode();
+    return {exitCode, server.output()};
+  }
+  std::string file(const std::string& text) const {
+    std::ofstream(sceneFile().replace_filename("server.toml")) << text;
+    return sceneFile().replace_filename("server.toml");
+  }
+  void expectError(const Result& result, const std::string& text) const {
+    EXPECT_EQ(result.exitCode, 1) << result.output;
+    EXPECT_THAT(result.output, HasSubstr(text));
+  }
+};
+
+TEST_F(ServerOptions, CommandLineBeatsEnvironmentWhichBeatsFile) {
+  const std::string config = file("port = 1001\ngrpc-port = 1002\nscene = \"flag\"\nalways-run = true\n");
+  const std::vector<std::string> environment{"CLOTHSTREAM_PORT=2001", "CLOTHSTREAM_GRPC_PORT=2002",
+                                             "CLOTHSTREAM_HOLD="};
+  const Result result = run({"--config", config, "--port", "3001", "--print-config"}, environment);
+  EXPECT_EQ(result.exitCode, 0);
+  for (const char* line : {"\nport = 3001\n", "\ngrpc-port = 2002\n", "\nscene = \"flag\"\n",
+                           "\nalways-run = true\n", "\nhold = 60\n"})
+    EXPECT_THAT(result.output, HasSubstr(line));
+  EXPECT_EQ(
+      run({"--port", "3001", "--print-config"}, {"CLOTHSTREAM_CONFIG=" + config, environment[1]}).output,
+      result.output);
+  EXPECT_THAT(run({"--config", config, "--print-config"}, {"CLOTHSTREAM_ALWAYS_RUN=false"}).output,
+              HasSubstr("\nalways-run = false\n"));
+}
+
+TEST_F(ServerOptions, PrintedConfigurationReadsBackUnchanged) {
+  const std::string config = file(
+      "# A comment.\n"
+      "scene = 'fl#ag' # another\n"
+      "page = \"a \\\"quoted\\\" \\\\ \\u00e9 directory\"\n"
+      "allow-origin = [\n  \"https://a.example\", # first\n  \"https://b.example\",\n]\n"
+      "participants-change = [\"cloths\"]\n"
+      "cache-dir = \"\"\nmax-error = 0.002\nnormals = \"octahedral\"\nhold = 2.5\nrecord-limit = 1_000\n"
+      "recordings = \"records\"\nseconds = 3\n");
+  const Result first = run({"--config", config, "--print-config"});
+  ASSERT_EQ(first.exitCode, 0) << first.output;
+  for (const char* line :
+       {"\nscene = \"fl#ag\"\n", "\npage = \"a \\\"quoted\\\" \\\\ \u00e9 directory\"\n",
+        "\nallow-origin = [\"https://a.example\", \"https://b.example\"]\n", "\ncache-dir = \"\"\n",
+        "\nparticipants-change = [\"cloths\"]\n", "\nnormals = \"octahedral\"\n", "\nrecord-limit = 1000\n",
+        "\nrecordings = \"records\"\n", "\nseconds = 3\n", "\n# record is not set\n"})
+    EXPECT_THAT("\n" + first.output, HasSubstr(line));
+  EXPECT_EQ(run({"--config", file(first.output), "--print-config"}).output, first.output);
+  const Result defaults = run({"--print-config"});
+  EXPECT_EQ(run({"--config", file(defaults.output), "--print-config"}).output, defaults.output);
+  EXPECT_EQ(run({"--config", "deploy/server.toml", "--print-config"}).output, defaults.output);
+}
+
+TEST_F(ServerOptions, StrongerOfTwoExclusiveOptionsWins) {
+  const std::string config = file("record = \"all\"\n");
+  const Result result = run({"--config", config, "--recordings", "asked", "--print-config"});
+  EXPECT_THAT(result.output, HasSubstr("# record is not set\nrecordings = \"asked\"\n"));
+  expectError(run({"--record", "all", "--recordings", "asked"}), "--record excludes --recordings");
+  expectError(run({}, {"CLOTHSTREAM_RECORD=a", "CLOTHSTREAM_RECORDINGS=b"}),
+              "CLOTHSTREAM_RECORDINGS: cannot be combined with record");
+}
+
+TEST_F(ServerOptions, SuggestsTheNearestNameForAnUnknownOne) {
+  expectError(run({"--prot", "1"}), "--prot: unknown option; did you mean '--port'?");
+  expectError(run({"ply", "x.mcap"}), "ply: unknown command; did you mean 'play'?");
+  const std::string config = file("port = 1\n\ngrpc_port = 2\n");
+  expectError(run({"--config", config}), config + ":3: unknown key 'grpc_port'; did you mean 'grpc-port'?");
+  const Result warned = run({"--list-materials"}, {"CLOTHSTREAM_PROT=1", "CLOTHSTREAM_VALIDATION=1"});
+  EXPECT_EQ(warned.exitCode, 0);
+  EXPECT_THAT(warned.output,
+              HasSubstr("CLOTHSTREAM_PROT is not an option of this program and is ignored; did you mean "
+                        "'CLOTHSTREAM_PORT'?"));
+  EXPECT_THAT(warned.output, testing::Not(HasSubstr("CLOTHSTREAM_VALIDATION")));
+}
+
+TEST_F(ServerOptions, NamesSourceAndAllowedRangeOfABadValue) {
+  const std::string problem = "70000 is not a port; use 0 to 65535";
+  expectError(run({"--port", "70000"}), "--port: " + problem);
+  expectError(run({}, {"CLOTHSTREAM_PORT=70000"}), "CLOTHSTREAM_PORT: " + problem);
+  const std::string config = file("scene = \"flag\"\nport = 70000\n");
+  expectError(run({"--config", config}), config + ":2: port: " + problem);
+  expectError(run({"--substeps", "0"}), "--substeps: 0 is out of range; use 1 to 256");
+  expectError(run({"--substeps", "few"}), "--substeps: few is not a whole number; use 1 to 256");
+  expectError(run({"--normals", "octal"}), "--normals: 'octal' is not allowed; use none, octahedral");
+  expectError(run({}, {"CLOTHSTREAM_ALWAYS_RUN=maybe"}),
+              "CLOTHSTREAM_ALWAYS_RUN: 'maybe' is not allowed; use true");
+  expectError(run({"--participants-change", "none,cloths"}), "--participants-change: 'none' excludes");
+}
+
+TEST_F(ServerOptions, NamesTheLineOfASyntaxError) {
+  const auto refuses = [&](const std::string& text, const std::string& error) {
+    const std::string config = file("# first line\n" + text);
+    expectError(run({"--config", config}), config + ":" + error);
+  };
+  refuses("[play]\n", "2: tables are not supported");
+  refuses("port 3\n", "2: '=' and a value must follow 'port'");
+  refuses("port =\n", "2: a value is missing");
+  refuses("scene = flag\n", "2: flag is not a number, true or false; put text in quotes");
+  refuses("scene = \"flag\n", "2: the string has no closing quote on its line");
+  refuses("scene = \"\\q\"\n", "2: \\q is not an escape of TOML");
+  refuses("port = 1\nport = 2\n", "3: 'port' is given twice, first on line 2");
+  refuses("port = 1 scene = 2\n", "2: there is text after the value of 'port'");
+  refuses("port = [1, 2]\n", "2: port: use one value, not an array");
+  refuses("allow-origin = [\n\"a\"\n", "4: the array has no ']'");
+  expectError(run({"--config", "/nowhere/server.toml"}), "--config: cannot read /nowhere/server.toml");
+}
+
+TEST_F(ServerOptions, CommandsUseSourcesForOptionsThatTheyShare) {
+  const std::string out = sceneFile().replace_filename("x.f32");
+  const std::vector<std::string> step{"step", "--scene", sceneFile(), "--ticks", "1", "--out", out};
+  expectError(run(step, {"CLOTHSTREAM_DEVICE=no such device"}), "no such device");
+  std::vector<std::string> chosen = step;
+  chosen.insert(chosen.end(), {"--device", "0"});
+  const Result result = run(chosen, {"CLOTHSTREAM_DEVICE=no such device", "CLOTHSTREAM_SCENE=nowhere"});
+  EXPECT_EQ(result.exitCode, 0) << result.output;
+}
+
+// To update the page: clothstream-server --help-markdown > docs/server-options.md
+TEST_F(ServerOptions, DocumentationPageMatchesTheProgram) {
+  std::ifstream in("docs/server-options.md");
+  const std::string page{std::istreambuf_iterator<char>(in), {}};
+  EXPECT_EQ(run({"--help-markdown"}).output, page);
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A directory of a test's own, gone with the object.
+// Temporary directory that the destructor removes.
 #pragma once
 
 #include <filesystem>

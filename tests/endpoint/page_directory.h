@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A directory of files for tests, beside one that must not be reached; removed when the test ends.
+// Temporary page directory for tests, next to files that must not be served. Removed by the destructor.
 #pragma once
 
 #include <filesystem>

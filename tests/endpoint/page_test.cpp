@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The page's files: what is found, and that nothing else is.
+// Page::find(): files of the directory are found, and nothing else is.
 #include "server/endpoint/web/page.h"
 
 #include <fstream>
@@ -15,7 +15,7 @@ namespace {
 
 using tests::PageDirectory;
 
-TEST(Page, FindsFilesByTheirPathWithContentTypeAndEntityTag) {
+TEST(Page, FindsFileWithContentTypeAndEntityTag) {
   const PageDirectory directory;
   directory.write("index.html", "<html>");
   directory.write("assets/core.wasm", "wasm");
@@ -28,7 +28,7 @@ TEST(Page, FindsFilesByTheirPathWithContentTypeAndEntityTag) {
   EXPECT_NE(page.find("/assets/core.wasm")->entityTag, page.find("/index.html")->entityTag);
 }
 
-TEST(Page, ADirectoryStandsForItsIndexAndAQueryIsIgnored) {
+TEST(Page, FindsIndexOfDirectoryAndIgnoresQuery) {
   const PageDirectory directory;
   directory.write("index.html", "root");
   directory.write("help/index.html", "help");
@@ -49,7 +49,7 @@ TEST(Page, DecodesPercentEncodedNames) {
   EXPECT_EQ(page.find("/%61%20file.txt"), page.find("/a%20file.txt"));
 }
 
-TEST(Page, NoTargetLeadsOutOfTheDirectory) {
+TEST(Page, FindsNothingOutsideTheDirectory) {
   const PageDirectory directory;
   directory.write("index.html", "root");
   directory.write("assets/app.js", "app");
@@ -62,7 +62,7 @@ TEST(Page, NoTargetLeadsOutOfTheDirectory) {
     EXPECT_EQ(page.find(target), nullptr) << target;
 }
 
-TEST(Page, LinksAreFollowedInsideTheDirectoryOnly) {
+TEST(Page, FollowsLinksInsideTheDirectoryOnly) {
   const PageDirectory directory;
   directory.write("index.html", "root");
   directory.writeOutside("secret.txt", "secret");
@@ -78,7 +78,7 @@ TEST(Page, LinksAreFollowedInsideTheDirectoryOnly) {
   EXPECT_EQ(page.find("/dangling.txt"), nullptr);
 }
 
-TEST(Page, HiddenFilesAreLeftOut) {
+TEST(Page, SkipsHiddenFiles) {
   const PageDirectory directory;
   directory.write(".env", "secret");
   directory.write(".git/config", "secret");
@@ -86,13 +86,13 @@ TEST(Page, HiddenFilesAreLeftOut) {
   EXPECT_TRUE(page.empty());
 }
 
-TEST(Page, AMissingDirectoryIsNamed) {
+TEST(Page, NamesMissingDirectory) {
   EXPECT_THAT(
       [] { Page("/nonexistent/page"); },
       testing::ThrowsMessage<std::runtime_error>(testing::HasSubstr("/nonexistent/page is not a directory")));
 }
 
-TEST(Page, WithoutADirectoryThereAreNoFiles) {
+TEST(Page, IsEmptyWithoutDirectory) {
   EXPECT_TRUE(Page("").empty());
 }
 

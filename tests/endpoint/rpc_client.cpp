@@ -8,7 +8,7 @@
 namespace clothstream::tests {
 namespace {
 
-// Far beyond what any answer takes, so that a test that hangs ends.
+// Much longer than any answer takes, so that a test that hangs ends.
 constexpr std::chrono::seconds kLongestWait{20};
 
 grpc::ByteBuffer bufferOf(const std::string& bytes) {
@@ -71,13 +71,9 @@ std::optional<std::string> RpcStream::receive() {
   return std::string(reinterpret_cast<const char*>(bytes.begin()), bytes.size());
 }
 
-bool RpcStream::watch(Viewer& viewer, const std::function<bool()>& done) {
-  while (!done()) {
-    const std::optional<std::string> message = receive();
-    if (!message) return false;
-    if (const std::optional<std::string> answer = viewer.hear(*message)) send(*answer);
-  }
-  return true;
+StreamEnd RpcStream::end() {
+  const grpc::Status status = finish();
+  return {status.error_code(), status.error_message()};
 }
 
 void RpcStream::sendDone() {

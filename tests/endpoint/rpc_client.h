@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A real gRPC client for tests that moves bytes, good and bad; every step of it ends within a time.
+// gRPC client for tests that sends any bytes. Every step ends within 20 s.
 #pragma once
 
 #include <chrono>
@@ -15,7 +15,7 @@
 #include <grpcpp/completion_queue.h>
 #include <grpcpp/generic/generic_stub.h>
 
-#include "tests/endpoint/viewer.h"
+#include "tests/endpoint/client.h"
 
 namespace clothstream::tests {
 
@@ -24,31 +24,31 @@ inline constexpr const char* kJoin = "/clothstream.v1.ClothStream/Join";
 struct RpcOptions {
   std::string method = kJoin;
   bool compressed = false;
-  // Takes 64 KiB that nobody read, instead of as much as the connection's speed suggests.
+  // Flow-control window of 64 KiB instead of one that grows with the speed of the connection.
   bool smallWindow = false;
 };
 
-// A channel of its own, so that it shares no connection with others.
+// Channel with a separate connection.
 std::shared_ptr<grpc::Channel> channelTo(std::uint16_t port, const RpcOptions& options = {});
 
 // A bidirectional stream of serialised messages.
-class RpcStream {
+class RpcStream final : public Client {
  public:
   explicit RpcStream(std::uint16_t port, const RpcOptions& options = {});
-  ~RpcStream();
+  ~RpcStream() override;
   RpcStream(const RpcStream&) = delete;
   RpcStream& operator=(const RpcStream&) = delete;
 
-  // False if the stream is broken.
-  bool send(const std::string& message);
-  // nullopt when the server has ended the stream; finish() says why.
-  std::optional<std::string> receive();
-  // Receives until `done`, answering as a polite client does; false when the server ends the stream first.
-  bool watch(Viewer& viewer, const std::function<bool()>& done);
-  // Says that nothing more will come.
+  bool send(const std::string& message) override;
+  std::optional<std::string> receive() override;
+  StreamEnd end() override;
+  void leave() override { sendDone(); }
+  void disconnect() override { context_.TryCancel(); }
+
+  // Closes the client's half of the stream.
   void sendDone();
+  // Status with which the server ended the stream.
   grpc::Status finish();
-  void cancel() { context_.TryCancel(); }
 
  private:
   bool await(const char* what);

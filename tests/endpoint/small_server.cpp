@@ -24,14 +24,14 @@ model::Scene sheet(std::string name, std::uint32_t side) {
   model::Scene scene;
   scene.name = std::move(name);
   scene.simulationRate = scene.streamRate = 30;
-  scene.stream.qualities = 1;  // so that who reads slowly gets what others get
+  scene.stream.qualities = 1;  // so that a slow reader gets the same packets as others
   scene.cloths = {cloth};
   return scene;
 }
 
 }  // namespace
 
-void EndpointTest::SetUp() {
+void SmallServer::SetUp() {
   telemetry::setUpLog("warning");
   stream::ServerOptions options;
   options.defaultScene = "small";
@@ -43,7 +43,7 @@ void EndpointTest::SetUp() {
   }
 }
 
-void EndpointTest::TearDown() {
+void SmallServer::TearDown() {
   closeServer();
   for (const std::string& text : takeValidationTexts()) ADD_FAILURE() << "Vulkan validation: " << text;
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What tests of the endpoints share: a server with small scenes on whatever device there is.
+// Fixture of the endpoint tests: a server with small scenes on any Vulkan device.
 #pragma once
 
 #include <memory>
@@ -10,16 +10,16 @@
 
 namespace clothstream::tests {
 
-// Skips its tests, with the reason, where there is no device. A validation message fails them.
-class EndpointTest : public ::testing::Test {
+// Skips the test, with the reason, if there is no device. A validation message fails the test.
+class SmallServer : public ::testing::Test {
  protected:
   void SetUp() override;
   void TearDown() override;
 
-  // Of the scenes "small" (8 x 8 nodes hung by their first row, 30 frames a second), which is the default,
-  // and "other".
+  // Scenes: "small" (the default) and "other" with 8 x 8 nodes each, "large" with 128 x 128. Each hangs by
+  // two corners and streams 30 frames a second.
   stream::SceneServer& server() { return *server_; }
-  // Closes it; every endpoint must be closed.
+  // Destroys the server. Every endpoint must be closed.
   void closeServer() { server_.reset(); }
 
  private:

@@ -61,11 +61,11 @@ std::string garbage(std::size_t bytes) {
   std::mt19937 random(7);
   std::string text(bytes, '\0');
   for (char& c : text) c = static_cast<char>(random());
-  text.front() = '\x07';  // field 0 with wire type 7: no message starts so
+  text.front() = '\x07';  // field 0 with wire type 7: no message starts like this
   return text;
 }
 
-std::optional<std::string> Viewer::hear(std::string_view message) {
+std::optional<std::string> Viewer::receive(std::string_view message) {
   if (!last.ParseFromArray(message.data(), static_cast<int>(message.size()))) {
     ADD_FAILURE() << "not a ServerMessage: " << message.size() << " bytes";
     return std::nullopt;
@@ -75,10 +75,10 @@ std::optional<std::string> Viewer::hear(std::string_view message) {
       welcome = last.welcome();
       break;
     case v1::ServerMessage::kChunk:
-      hearChunk(last.chunk());
+      receiveChunk(last.chunk());
       break;
     case v1::ServerMessage::kFrame:
-      return hearFrame(last.frame());
+      return receiveFrame(last.frame());
     case v1::ServerMessage::kPong:
       ++pongs;
       break;
@@ -94,7 +94,7 @@ std::optional<std::string> Viewer::hear(std::string_view message) {
   return std::nullopt;
 }
 
-void Viewer::hearChunk(const v1::Chunk& chunk) {
+void Viewer::receiveChunk(const v1::Chunk& chunk) {
   if (chunk.index() == 0) content_.clear();
   content_ += chunk.data();
   if (chunk.index() + 1 < chunk.count()) return;
@@ -104,14 +104,15 @@ void Viewer::hearChunk(const v1::Chunk& chunk) {
   ASSERT_NE(decoder_, nullptr);
 }
 
-std::string Viewer::hearFrame(const v1::Frame& heard) {
+std::string Viewer::receiveFrame(const v1::Frame& received) {
   v1::ClientMessage answer;
   if (!decoder_) {
     ADD_FAILURE() << "a frame before the description";
-  } else if (decoder_->decode(std::as_bytes(std::span(heard.packet()))) == codec::DecodeResult::ok) {
-    frame = heard;
+  } else if (decoder_->decode(std::as_bytes(std::span(received.packet()))) == codec::DecodeResult::ok) {
+    frame = received;
     ++frames;
-    EXPECT_EQ(decoder_->reconstructionHash(), heard.reconstruction_hash()) << "at tick " << decoder_->tick();
+    EXPECT_EQ(decoder_->reconstructionHash(), received.reconstruction_hash())
+        << "at tick " << decoder_->tick();
     answer.mutable_frame_ack()->set_tick(decoder_->tick());
   } else {
     answer.mutable_key_frame_request()->set_epoch(description.epoch());

@@ -11,7 +11,7 @@ namespace {
 
 using net::ip::tcp;
 
-// Runs one asynchronous operation to its end. `start` gets the handler to pass on.
+// Runs one asynchronous operation to its end. `start` begins it with the given handler.
 template <class Start>
 beast::error_code await(net::io_context& io, Start&& start) {
   std::optional<beast::error_code> result;
@@ -87,7 +87,7 @@ WebSocketClient::WebSocketClient(std::uint16_t port, const Handshake& handshake)
   mustSucceed(error, "handshake");
 }
 
-bool WebSocketClient::send(const std::string& message, bool binary) {
+bool WebSocketClient::sendMessage(const std::string& message, bool binary) {
   stream_.binary(binary);
   return !await(io_, [&](auto handler) { stream_.async_write(net::buffer(message), handler); });
 }
@@ -100,13 +100,9 @@ std::optional<std::string> WebSocketClient::receive() {
   return message;
 }
 
-bool WebSocketClient::watch(Viewer& viewer, const std::function<bool()>& done) {
-  while (!done()) {
-    const std::optional<std::string> message = receive();
-    if (!message) return false;
-    if (const std::optional<std::string> answer = viewer.hear(*message)) send(*answer);
-  }
-  return true;
+StreamEnd WebSocketClient::end() {
+  const websocket::close_reason& reason = stream_.reason();
+  return {reason.code, reason.reason.c_str()};
 }
 
 bool WebSocketClient::closesWithin(std::chrono::steady_clock::duration time) {
@@ -126,11 +122,11 @@ bool WebSocketClient::closesWithin(std::chrono::steady_clock::duration time) {
   return closed;
 }
 
-void WebSocketClient::close() {
+void WebSocketClient::leave() {
   await(io_, [&](auto handler) { stream_.async_close(websocket::close_code::normal, handler); });
 }
 
-void WebSocketClient::reset() {
+void WebSocketClient::disconnect() {
   tcp::socket& socket = stream_.next_layer().socket();
   socket.set_option(net::socket_base::linger(true, 0));
   socket.close();

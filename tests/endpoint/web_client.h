@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Real HTTP and WebSocket clients for tests, every step of which ends within a time.
+// HTTP and WebSocket clients for tests. Every step ends within kPatience.
 #pragma once
 
 #include <chrono>
@@ -18,7 +18,7 @@
 #include <boost/beast/http/string_body.hpp>
 #include <boost/beast/websocket/stream.hpp>
 
-#include "tests/endpoint/viewer.h"
+#include "tests/endpoint/client.h"
 
 namespace clothstream::tests {
 
@@ -27,12 +27,12 @@ namespace beast = boost::beast;
 namespace http = beast::http;
 namespace websocket = beast::websocket;
 
-// Far beyond what any answer takes, so that a test that hangs ends.
+// Much longer than any answer takes, so that a test that hangs ends.
 inline constexpr std::chrono::seconds kPatience{20};
 
 using Response = http::response<http::string_body>;
 
-// Thrown by the clients when nothing happens for kPatience, or a connection cannot be made.
+// Thrown when nothing happens for kPatience, or a connection cannot be opened.
 class ClientError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
@@ -41,12 +41,12 @@ class HttpClient {
  public:
   explicit HttpClient(std::uint16_t port);
 
-  // The bytes as they are, complete with header fields.
+  // Sends the bytes unchanged; they include the header fields.
   void send(const std::string& bytes);
-  // `fields` are lines such as "Origin: http://x\r\n". The answer of a HEAD has no body.
+  // `fields` are lines such as "Origin: http://x\r\n". The response to HEAD has no body.
   Response get(const std::string& target, const std::string& fields = "", const std::string& method = "GET");
   Response readResponse(bool headOnly = false);
-  // True if the server closes without another byte.
+  // Whether the server closes without sending another byte.
   bool closes();
   void shutdownSend();
 
@@ -56,37 +56,38 @@ class HttpClient {
   beast::flat_buffer buffer_;
 };
 
-class WebSocketClient {
+class WebSocketClient final : public Client {
  public:
   struct Handshake {
     std::string origin = {};
     std::string subprotocol = {};
-    int receiveBufferBytes = 0;  // 0: the system's choice
+    int receiveBufferBytes = 0;  // 0: the default of the system
   };
 
   explicit WebSocketClient(std::uint16_t port) : WebSocketClient(port, Handshake{}) {}
   // Throws ClientError with the server's HTTP status if it does not upgrade.
   WebSocketClient(std::uint16_t port, const Handshake& handshake);
 
-  // False if the connection is broken.
-  bool send(const std::string& message, bool binary = true);
-  // One message; nullopt when the server closes, for which closeReason() says why.
-  std::optional<std::string> receive();
-  // Receives until `done`, answering as a polite client does; false when the server closes first.
-  bool watch(Viewer& viewer, const std::function<bool()>& done);
-  // Reads and answers pings, but says nothing else. False if it is still open then; nothing may be asked of
-  // it any more.
+  bool send(const std::string& message) override { return sendMessage(message, true); }
+  std::optional<std::string> receive() override;
+  StreamEnd end() override;
+  // Sends a close frame and waits for the server's.
+  void leave() override;
+  // Resets the TCP connection.
+  void disconnect() override;
+
+  // Sends a text message, which the protocol does not allow.
+  bool sendText(const std::string& message) { return sendMessage(message, false); }
+  // Reads and answers pings, and sends nothing else. Returns false if the connection is still open after
+  // `time`; then the client must not be used any more.
   bool closesWithin(std::chrono::steady_clock::duration time);
-  websocket::close_reason closeReason() const { return stream_.reason(); }
   const websocket::response_type& response() const { return response_; }
-  // Says goodbye with a close frame.
-  void close();
-  // Goes away without a word.
-  void reset();
-  // Says at TCP's level that nothing more will come.
+  // Closes the client's half of the TCP connection.
   void shutdownSend();
 
  private:
+  bool sendMessage(const std::string& message, bool binary);
+
   net::io_context io_;
   websocket::stream<beast::tcp_stream, false> stream_;
   websocket::response_type response_;

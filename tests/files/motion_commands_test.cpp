@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// `clothstream encode` and `decode` as programs.
+// Runs `clothstream encode` and `decode`.
 #include <algorithm>
 #include <cmath>
 #include <csignal>
@@ -30,7 +30,7 @@ using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
-// Generous: sanitizers on a busy machine.
+// Enough for sanitizers on a busy machine.
 constexpr auto kEnd = 120s;
 
 constexpr int kUsage = 2, kNotWritten = 6, kUnreadable = 7;
@@ -58,7 +58,7 @@ class MotionCommands : public ::testing::Test {
     return run(std::move(arguments));
   }
 
-  // Encodes and decodes; the summary.
+  // Encodes and decodes the motion. Returns the summary of encode.
   nlohmann::json roundTrip(const std::vector<std::string>& options = {}) {
     std::vector<std::string> arguments{"encode", motion_, stream_, "--json"};
     arguments.insert(arguments.end(), options.begin(), options.end());
@@ -99,7 +99,7 @@ double largestDistance(std::span<const float> a, std::span<const float> b) {
   return largest;
 }
 
-TEST_F(MotionCommands, GiveBackWhatWasEncodedToThePromisedError) {
+TEST_F(MotionCommands, DecodeWithinPromisedError) {
   const nlohmann::json summary = roundTrip({"--max-error", "0.0007"});
   const MotionContent back = readMotion(frames_);
   ASSERT_EQ(back.shape.columns, kShape.columns);
@@ -114,7 +114,7 @@ TEST_F(MotionCommands, GiveBackWhatWasEncodedToThePromisedError) {
     EXPECT_LT(largestDistance(normals, back.normals(frame)), 1e-6) << frame;
   }
   EXPECT_LE(largest, std::sqrt(3.0) * 0.0007);
-  EXPECT_GT(largest, 0.0002) << "where the error is used, bits are saved";
+  EXPECT_GT(largest, 0.0002) << "the encoder uses the allowed error to save bits";
   EXPECT_NEAR(summary.at("measuredMaxErrorMm").get<double>(), 1e3 * largest, 1e-6);
   EXPECT_EQ(summary.at("fileBytes"), std::filesystem::file_size(stream_));
   EXPECT_EQ(summary.at("keyFrames"), 1);
@@ -122,7 +122,7 @@ TEST_F(MotionCommands, GiveBackWhatWasEncodedToThePromisedError) {
   EXPECT_THAT(filesThere(), ::testing::ElementsAre("frames", "motion", "stream"));
 }
 
-TEST_F(MotionCommands, KeepTheSideThatNormalsAreOn) {
+TEST_F(MotionCommands, KeepSideOfNormals) {
   for (std::uint32_t frame = 0; frame < kShape.frames; ++frame)
     for (std::size_t i = 0; i < 3 * kShape.vertexCount(); ++i)
       content_.floats[(2 * frame + 1) * std::size_t{3} * kShape.vertexCount() + i] *= -1;
@@ -137,7 +137,7 @@ TEST_F(MotionCommands, KeepTheSideThatNormalsAreOn) {
   }
 }
 
-TEST_F(MotionCommands, ScaleQualitiesWithTheEdgesOfTheFirstFrame) {
+TEST_F(MotionCommands, ScaleQualityWithEdgesOfFirstFrame) {
   const double edgeMm = 1e3 * meanEdge(kShape, content_.positions(0));
   EXPECT_NEAR(roundTrip().at("maxErrorMm").get<double>(), 0.025 * edgeMm, 1e-4);
   EXPECT_NEAR(roundTrip({"--quality", "standard"}).at("maxErrorMm").get<double>(), 0.025 * edgeMm, 1e-4);
@@ -147,7 +147,7 @@ TEST_F(MotionCommands, ScaleQualitiesWithTheEdgesOfTheFirstFrame) {
   EXPECT_LT(coarse.at("bitsPerVertex").get<double>(), fine.at("bitsPerVertex").get<double>());
 }
 
-TEST_F(MotionCommands, SetLayersAndKeyFramesAsAsked) {
+TEST_F(MotionCommands, SetRequestedLayersAndKeyFrames) {
   EXPECT_EQ(roundTrip({"--layers", "3", "--key-every", "16"}).at("keyFrames"), 3);
   auto recording = RecordingReader::open(stream_);
   ASSERT_TRUE(recording) << recording.error();
@@ -162,7 +162,7 @@ TEST_F(MotionCommands, SetLayersAndKeyFramesAsAsked) {
   }
 }
 
-TEST_F(MotionCommands, TakeCreasedAndTinyCloths) {
+TEST_F(MotionCommands, AcceptTinyCloths) {
   for (const MotionShape shape : {MotionShape{2, 1, 3}, MotionShape{1, 9, 1}, MotionShape{3, 2, 5}}) {
     content_ = waves(shape);
     writeMotion(content_, motion_);
@@ -180,16 +180,16 @@ TEST_F(MotionCommands, TakeCreasedAndTinyCloths) {
   EXPECT_EQ(readMotion(frames_).shape.frames, 2u);
 }
 
-TEST_F(MotionCommands, SummariseForPeople) {
+TEST_F(MotionCommands, PrintSummary) {
   const Result encoded = clothstream({"encode", motion_, stream_, "--max-error", "0.001"});
   EXPECT_EQ(encoded.code, 0);
   EXPECT_THAT(encoded.output,
               AllOf(HasSubstr("24x17 vertices, 40 frames"), HasSubstr("bits a vertex a frame"),
-                    HasSubstr("1 key frame"), HasSubstr("1.732 are promised")));
-  EXPECT_THAT(encoded.errors, IsEmpty()) << "progress is for terminals";
+                    HasSubstr("1 key frame"), HasSubstr("promised 1.732 mm")));
+  EXPECT_THAT(encoded.errors, IsEmpty()) << "progress is shown only on a terminal";
 }
 
-TEST_F(MotionCommands, RefuseArgumentsThatMakeNoSense) {
+TEST_F(MotionCommands, RefuseInvalidArguments) {
   for (const std::vector<std::string>& arguments : std::vector<std::vector<std::string>>{
            {"encode", motion_},
            {"encode", motion_, stream_, "--quality", "great"},
@@ -209,7 +209,7 @@ TEST_F(MotionCommands, RefuseArgumentsThatMakeNoSense) {
   EXPECT_THAT(filesThere(), ::testing::ElementsAre("motion"));
 }
 
-TEST_F(MotionCommands, RefuseMotionsThatAreNone) {
+TEST_F(MotionCommands, RefuseInvalidMotionFiles) {
   const auto refused = [&](const std::string& reason) {
     const Result result = clothstream({"encode", motion_, stream_});
     EXPECT_EQ(result.code, kUnreadable) << reason;
@@ -217,11 +217,11 @@ TEST_F(MotionCommands, RefuseMotionsThatAreNone) {
     EXPECT_FALSE(std::filesystem::exists(stream_));
   };
   std::filesystem::resize_file(motion_, std::filesystem::file_size(motion_) - 1);
-  refused("40 frames of 24x17 vertices have");
+  refused("40 frames of 24x17 vertices need");
   content_.floats.back() = 1;
   content_.floats[2 * 3 * kShape.vertexCount() * std::size_t{30}] = std::numeric_limits<float>::infinity();
   writeMotion(content_, motion_);
-  refused("in frame 30 (of 0 to 39), vertex 0 lies at inf");
+  refused("in frame 30 (of 0 to 39), vertex 0 has the coordinate inf");
   content_.floats[2 * 3 * kShape.vertexCount() * std::size_t{30}] = 1e6f;
   writeMotion(content_, motion_);
   refused("vertex 0 has a coordinate of 1000000 m");
@@ -235,7 +235,7 @@ TEST_F(MotionCommands, RefuseMotionsThatAreNone) {
   EXPECT_THAT(filesThere(), IsEmpty());
 }
 
-TEST_F(MotionCommands, RefuseStreamsThatAreNone) {
+TEST_F(MotionCommands, RefuseInvalidStreamFiles) {
   const auto refused = [&](const std::string& bytes, const std::string& reason) {
     std::ofstream(stream_, std::ios::binary) << bytes;
     const Result result = clothstream({"decode", stream_, frames_});
@@ -245,37 +245,37 @@ TEST_F(MotionCommands, RefuseStreamsThatAreNone) {
   ASSERT_EQ(clothstream({"encode", motion_, stream_}).code, 0);
   const std::string whole = streamBytes();
   refused(whole.substr(0, whole.size() - 1), "frame 39 (of 0 to 39) cannot be read");
-  refused(whole + "more", "something follows its 40 frames");
+  refused(whole + "more", "there are bytes after its 40 frames");
   refused("clothstream\n", "it ends in its header");
-  refused(std::string(100, 'x'), "is not what clothstream encode writes");
-  refused("", "is not what clothstream encode writes");
+  refused(std::string(100, 'x'), "is not a file of clothstream encode");
+  refused("", "is not a file of clothstream encode");
   const Result ofAMotion = clothstream({"decode", motion_, frames_});
   EXPECT_EQ(ofAMotion.code, kUnreadable);
-  EXPECT_THAT(ofAMotion.errors, HasSubstr("is not what clothstream encode writes"));
+  EXPECT_THAT(ofAMotion.errors, HasSubstr("is not a file of clothstream encode"));
   std::filesystem::remove(stream_);
   EXPECT_EQ(clothstream({"decode", stream_, frames_}).code, kUnreadable);
   EXPECT_THAT(filesThere(), ::testing::ElementsAre("motion"));
 }
 
-TEST_F(MotionCommands, RefuseStreamsThatAskForMoreThanIsAllowed) {
+TEST_F(MotionCommands, RefuseStreamsWithTooManyVertices) {
   ASSERT_EQ(clothstream({"encode", motion_, stream_}).code, 0);
   const auto decoded = [&](std::uint32_t maxVertices) {
     return clothstream({"decode", stream_, frames_, "--max-vertices", std::to_string(maxVertices)});
   };
   const Result refused = decoded(kShape.vertexCount() - 1);
   EXPECT_EQ(refused.code, kUnreadable);
-  EXPECT_THAT(refused.errors, HasSubstr("is of 408 vertices; 407 are allowed (--max-vertices)"));
+  EXPECT_THAT(refused.errors, HasSubstr("has 408 vertices; at most 407 are allowed (--max-vertices)"));
   EXPECT_FALSE(std::filesystem::exists(frames_));
   EXPECT_EQ(decoded(kShape.vertexCount()).code, 0);
 }
 
-TEST_F(MotionCommands, NoticeEveryPacketThatIsSpoilt) {
+TEST_F(MotionCommands, DetectEveryDamagedPacket) {
   ASSERT_EQ(clothstream({"encode", motion_, stream_}).code, 0);
   const std::string whole = streamBytes();
   for (std::size_t at = 60; at < whole.size(); at += whole.size() / 23) {
-    std::string spoilt = whole;
-    spoilt[at] = static_cast<char>(spoilt[at] ^ 0x10);
-    std::ofstream(stream_, std::ios::binary) << spoilt;
+    std::string damaged = whole;
+    damaged[at] = static_cast<char>(damaged[at] ^ 0x10);
+    std::ofstream(stream_, std::ios::binary) << damaged;
     const Result result = clothstream({"decode", stream_, frames_});
     EXPECT_EQ(result.code, kUnreadable) << at;
     EXPECT_THAT(result.errors, HasSubstr("is broken")) << at;
@@ -283,7 +283,7 @@ TEST_F(MotionCommands, NoticeEveryPacketThatIsSpoilt) {
   }
 }
 
-TEST_F(MotionCommands, LeaveNothingWhereTheResultCannotBeWritten) {
+TEST_F(MotionCommands, LeaveNoFileWhenResultCannotBeWritten) {
   ASSERT_EQ(clothstream({"encode", motion_, stream_}).code, 0);
   const std::string before = streamBytes();
   const auto limited = [](const std::vector<std::string>& arguments) {
@@ -299,12 +299,12 @@ TEST_F(MotionCommands, LeaveNothingWhereTheResultCannotBeWritten) {
     EXPECT_EQ(result.code, kNotWritten) << result.errors;
     EXPECT_THAT(result.errors, HasSubstr("cannot write"));
   }
-  EXPECT_EQ(streamBytes(), before) << "the former one stays";
+  EXPECT_EQ(streamBytes(), before) << "the old file stays";
   EXPECT_THAT(filesThere(), ::testing::ElementsAre("motion", "stream"));
 }
 
-TEST_F(MotionCommands, LeaveNothingWhereTheyAreInterrupted) {
-  // Long enough that it cannot be over; a sparse file is read as zeros, so the max error is given.
+TEST_F(MotionCommands, LeaveNoFileWhenInterrupted) {
+  // Too long to finish in time. The file is sparse and reads as zeros, so --max-error is needed.
   MotionContent still{{.columns = 300, .rows = 300, .frames = 3000}, {}};
   writeMotion(still, motion_);
   std::filesystem::resize_file(motion_, 16 + std::uint64_t{24} * 300 * 300 * 3000);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Whole or not at all.
+// NewFile: the file exists completely or not at all.
 #include "clients/files/new_file.h"
 
 #include <fstream>
@@ -24,15 +24,15 @@ std::ptrdiff_t filesIn(const std::filesystem::path& directory) {
   return std::distance(std::filesystem::directory_iterator(directory), {});
 }
 
-TEST(NewFile, ReplacesTheFormerOneOnlyOnceItIsFinished) {
+TEST(NewFile, ReplacesOldFileOnlyWhenFinished) {
   const e2e::TemporaryDirectory directory;
   const auto path = directory.path() / "file";
-  std::ofstream(path) << "former";
+  std::ofstream(path) << "old";
   {
     auto file = NewFile::create(path);
     ASSERT_TRUE(file) << file.error();
     ASSERT_TRUE(file->write("new"));
-    EXPECT_EQ(contentOf(path), "former");
+    EXPECT_EQ(contentOf(path), "old");
     ASSERT_TRUE(file->finish());
     EXPECT_EQ(file->bytes(), 3u);
   }
@@ -40,7 +40,7 @@ TEST(NewFile, ReplacesTheFormerOneOnlyOnceItIsFinished) {
   EXPECT_EQ(filesIn(directory.path()), 1);
 }
 
-TEST(NewFile, LeavesNothingWhereItIsNotFinished) {
+TEST(NewFile, LeavesNoFileUnlessFinished) {
   const e2e::TemporaryDirectory directory;
   {
     auto file = NewFile::create(directory.path() / "file");
@@ -52,7 +52,7 @@ TEST(NewFile, LeavesNothingWhereItIsNotFinished) {
   EXPECT_EQ(filesIn(directory.path()), 0);
 }
 
-TEST(NewFile, TakesNoPlaceOfADirectoryOrADevice) {
+TEST(NewFile, DoesNotReplaceDirectoryOrDevice) {
   const e2e::TemporaryDirectory directory;
   for (const std::string& path : {directory.path().string(), std::string("/dev/null"),
                                   (directory.path() / "missing" / "file").string()}) {

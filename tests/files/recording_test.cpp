@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Recorded streams: what was written comes back, and spoilt bytes are noticed or harmless.
+// Stream files: reading returns what was written; damaged bytes are detected or harmless.
 #include "clients/files/recording.h"
 
 #include <fstream>
@@ -15,7 +15,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-class Recording : public ::testing::Test {
+class StreamFile : public ::testing::Test {
  protected:
   void SetUp() override {
     auto writer = RecordingWriter::create(path(), {.layout = {.epoch = 7,
@@ -39,7 +39,7 @@ class Recording : public ::testing::Test {
 
   std::filesystem::path path() const { return directory_.path() / "recording"; }
 
-  // What is said of a file with these bytes: of the first that is wrong.
+  // First error when a file with these bytes is read; empty without an error.
   std::string errorOf(const std::string& bytes) const {
     std::ofstream(path(), std::ios::binary) << bytes;
     auto reader = RecordingReader::open(path());
@@ -56,7 +56,7 @@ class Recording : public ::testing::Test {
   e2e::TemporaryDirectory directory_;
 };
 
-TEST_F(Recording, ComesBackAsItWasWritten) {
+TEST_F(StreamFile, ReadsWhatWasWritten) {
   auto reader = RecordingReader::open(path());
   ASSERT_TRUE(reader) << reader.error();
   const RecordingHead& head = reader->head();
@@ -81,29 +81,30 @@ TEST_F(Recording, ComesBackAsItWasWritten) {
   EXPECT_EQ(second->bytes, "");
 }
 
-TEST_F(Recording, ThatIsCutAnywhereIsRefused) {
+TEST_F(StreamFile, RefusesTruncatedFile) {
   ASSERT_EQ(errorOf(whole_), "");
   for (std::size_t length = 0; length < whole_.size(); ++length)
-    EXPECT_THAT(errorOf(whole_.substr(0, length)), HasSubstr(length < 12 ? "something else" : "is broken"))
+    EXPECT_THAT(errorOf(whole_.substr(0, length)),
+                HasSubstr(length < 12 ? "its first bytes differ" : "is broken"))
         << length << " of " << whole_.size();
-  EXPECT_THAT(errorOf(whole_ + '\0'), HasSubstr("something follows its 2 frames"));
+  EXPECT_THAT(errorOf(whole_ + '\0'), HasSubstr("there are bytes after its 2 frames"));
 }
 
-TEST_F(Recording, ThatIsSpoiltAnywhereIsReadSafely) {
-  std::size_t noticed = 0;
+TEST_F(StreamFile, ReadsDamagedFileSafely) {
+  std::size_t detected = 0;
   for (std::size_t at = 0; at < whole_.size(); ++at)
     for (const int flip : {0x01, 0x80, 0xff}) {
-      std::string spoilt = whole_;
-      spoilt[at] = static_cast<char>(spoilt[at] ^ flip);
-      noticed += errorOf(spoilt).empty() ? 0 : 1;
+      std::string damaged = whole_;
+      damaged[at] = static_cast<char>(damaged[at] ^ flip);
+      detected += errorOf(damaged).empty() ? 0 : 1;
     }
-  // The rest is for the decoder and its hash.
-  EXPECT_GT(noticed, whole_.size());
+  // The decoder and its hash detect the rest.
+  EXPECT_GT(detected, whole_.size());
 }
 
-TEST_F(Recording, OfAnotherKindIsRefused) {
-  EXPECT_THAT(errorOf("not one"), HasSubstr("is not what clothstream encode writes"));
-  EXPECT_THAT(errorOf(std::string(100000, '\xff')), HasSubstr("is not what clothstream encode writes"));
+TEST_F(StreamFile, RefusesOtherFile) {
+  EXPECT_THAT(errorOf("not one"), HasSubstr("is not a file of clothstream encode"));
+  EXPECT_THAT(errorOf(std::string(100000, '\xff')), HasSubstr("is not a file of clothstream encode"));
   EXPECT_THAT(RecordingReader::open("/missing").error(), HasSubstr("No such file"));
 }
 

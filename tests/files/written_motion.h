@@ -12,7 +12,7 @@ namespace clothstream::files {
 
 struct MotionContent {
   MotionShape shape;
-  std::vector<float> floats;  // of all frames: positions, then normals
+  std::vector<float> floats;  // per frame: positions, then normals
 
   std::span<const float> positions(std::uint32_t frame) const { return plane(2 * frame); }
   std::span<const float> normals(std::uint32_t frame) const { return plane(2 * frame + 1); }
@@ -24,10 +24,10 @@ struct MotionContent {
   }
 };
 
-// Waves that travel over a cloth whose vertices lie a few millimetres apart.
+// Waves that travel over a cloth.
 MotionContent waves(const MotionShape& shape);
 
-// Byte by byte as the format says, by no code but this.
+// Written and read independently of MotionWriter and MotionReader.
 void writeMotion(const MotionContent& content, const std::filesystem::path& path);
 MotionContent readMotion(const std::filesystem::path& path);
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What fuzzing asks of the decoder.
+// Promises of the decoder that fuzzing checks.
 #include "tests/fuzz/decoder_target.h"
 
 #include <cmath>
@@ -22,7 +22,7 @@ void requireFinite(std::span<const float> values) {
   for (const float value : values) require(std::isfinite(value), "floats are finite");
 }
 
-// The same of a decoder of coarse vertices, after the packet was made smaller.
+// Checks the same for a decoder of coarse vertices, with the coarse packet.
 void decodeHostileCoarse(const GoldenStream& stream, std::size_t place, std::span<const std::byte> bytes,
                          bool isTakenWhole) {
   const auto decoder = Decoder::make(stream.layout, Detail::coarse);

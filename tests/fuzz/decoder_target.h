@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What fuzzing asks of the decoder, whoever makes up the bytes.
+// Promises of the decoder that fuzzing checks, for bytes from any source.
 #pragma once
 
 #include <cstddef>
@@ -9,9 +9,9 @@
 
 namespace clothstream::codec {
 
-// Feeds a decoder the stream's packets, but `bytes` in the place of packet `place`, and after it what comes
-// next. Aborts where the decoder breaks a promise: its state changed by a packet that it refused, a
-// coordinate or normal that is not finite, or a key frame that it does not decode afterwards.
+// Feeds a decoder the stream's packets, with `bytes` instead of packet `place`. Aborts if the decoder breaks
+// a promise: a refused packet changed its state, a coordinate or normal is not finite, or a later key frame
+// cannot be decoded.
 void decodeHostile(const GoldenStream& stream, std::size_t place, std::span<const std::byte> bytes);
 
 }  // namespace clothstream::codec

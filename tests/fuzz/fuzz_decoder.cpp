@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// libFuzzer's entry: the first byte chooses stream and place, the rest is the packet. Run from the project's
-// root:
-//   build/fuzz/bin/fuzz_decoder -max_len=4096 CORPUS tests/golden
+// Entry point for libFuzzer. The first byte selects stream and place; the rest is the packet. Run it from the
+// project's root:
+//    build/fuzz/bin/fuzz_decoder -max_len=4096 CORPUS tests/golden
 #include "tests/fuzz/decoder_target.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

@@ -18,7 +18,8 @@ class Mutator {
 
   std::size_t below(std::size_t bound) { return random_() % bound; }
 
-  // One to four changes of the kinds that break parsers: bits, bytes, extreme values, cuts, copies, splices.
+  // Applies one to four changes that typically break parsers: bits, bytes, extreme values, cuts, copies,
+  // splices.
   Bytes mutate(Bytes bytes, const Bytes& other) {
     for (std::size_t changes = 1 + below(4); changes > 0 && !bytes.empty(); --changes) change(bytes, other);
     return bytes;
@@ -26,7 +27,7 @@ class Mutator {
 
  private:
   void change(Bytes& bytes, const Bytes& other) {
-    // Half of the changes go where the header is: it is small, and all else follows from it.
+    // Half of the changes hit the header, which is small and determines everything else.
     const std::size_t at = below(below(2) == 0 ? std::min<std::size_t>(bytes.size(), 24) : bytes.size());
     const auto position = bytes.begin() + static_cast<std::ptrdiff_t>(at);
     const std::size_t length = std::min(bytes.size() - at, 1 + below(8));
@@ -60,7 +61,7 @@ class Mutator {
   std::mt19937 random_;
 };
 
-TEST(MutatedPackets, NeverBreakTheDecodersPromises) {
+TEST(MutatedPackets, KeepTheDecodersPromises) {
   const std::vector<GoldenStream> streams = readGoldenStreams();
   Mutator mutator(1);
   for (int i = 0; i < 20'000; ++i) {
@@ -69,7 +70,7 @@ TEST(MutatedPackets, NeverBreakTheDecodersPromises) {
     const GoldenStream& otherStream = streams[mutator.below(streams.size())];
     const Bytes& other = otherStream.packets[mutator.below(otherStream.packets.size())].bytes;
     const Bytes mutated = mutator.mutate(stream.packets[place].bytes, other);
-    // Exactly sized, so that the address sanitizer sees a read past the end.
+    // Exactly sized, so that the address sanitizer detects a read past the end.
     const auto copy = std::make_unique<std::byte[]>(mutated.size());
     std::copy(mutated.begin(), mutated.end(), copy.get());
     decodeHostile(stream, place, {copy.get(), mutated.size()});

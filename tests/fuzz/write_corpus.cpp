@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Writes each golden packet as fuzz_decoder takes it; run from the project's root:
-//   build/fuzz/bin/write_fuzz_corpus DIRECTORY
+// Writes each golden packet as an input of fuzz_decoder. Run it from the project's root:
+//    build/fuzz/bin/write_fuzz_corpus DIRECTORY
 #include <cstdio>
 #include <exception>
 #include <fstream>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// libclothstream from C# against a server, by P/Invoke. Usage: Follow.exe ADDRESS
-// Says "frame TICK HASH" of what it decodes.
+// Test program in C#: follows a stream through libclothstream by P/Invoke. Usage: Follow.exe ADDRESS
+// Prints "frame TICK HASH" for each decoded frame.
 using System;
 using System.Runtime.InteropServices;
 using System.Text;

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT
- * libclothstream from C against a server. Usage: follow_c ADDRESS; follow_c ADDRESS lost to wait for the end;
- * follow_c ADDRESS wants to have a part of a stream of several qualities and temporal layers.
- * Says "frame TICK HASH" of what it decodes; what is not as it should be, and 1, if something is not. */
+ * Test program in C: follows a stream through libclothstream. Usage: follow_c ADDRESS [lost|wants]
+ * lost: waits for the end of the stream. wants: requests a part of a stream with several qualities and
+ * temporal layers. Prints "frame TICK HASH" for each decoded frame. Prints the failed check and returns 1 on
+ * an error. */
 #define _POSIX_C_SOURCE 200809L
 #include <math.h>
 #include <stdint.h>
@@ -10,12 +11,13 @@
 
 #include "clothstream.h"
 
-#define CHECK(holds)                                                                                     \
-  do {                                                                                                   \
-    if (!(holds)) {                                                                                      \
-      fprintf(stderr, "%s:%d: not so: %s (%s)\n", __FILE__, __LINE__, #holds, clothstream_error_text()); \
-      return 1;                                                                                          \
-    }                                                                                                    \
+#define CHECK(holds)                                                                \
+  do {                                                                              \
+    if (!(holds)) {                                                                 \
+      fprintf(stderr, "%s:%d: check failed: %s (%s)\n", __FILE__, __LINE__, #holds, \
+              clothstream_error_text());                                            \
+      return 1;                                                                     \
+    }                                                                               \
   } while (0)
 
 static const uint64_t kSecond = 1000000;
@@ -162,7 +164,7 @@ static int follows(const char* address) {
     CHECK(clothstream_wait(stream, 1000, &events) == CLOTHSTREAM_OK);
     client = clothstream_acquire(stream);
     CHECK(look(client, sphere, &seen) == 0);
-    if (seen.frames == 10) { /* takes hold of a corner that hangs */
+    if (seen.frames == 10) { /* grabs a hanging corner */
       cs_grab grab;
       memset(&grab, 0, sizeof grab);
       grab.id = 5;
@@ -247,7 +249,8 @@ static int has_what_it_wants(const char* address) {
     clothstream_release(stream);
     if (statistics.frames == 0 || statistics.tick == tick) continue;
     CHECK(quality >= 1 && layers == 1);
-    CHECK(tick == 0 || statistics.tick >= tick + 4); /* of 120 ticks a second, every second has a frame */
+    /* 120 ticks and 60 frames per second; one of two layers halves the frames. */
+    CHECK(tick == 0 || statistics.tick >= tick + 4);
     tick = statistics.tick;
     ++frames;
   }

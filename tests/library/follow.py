@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-# libclothstream from Python against a server. Usage: follow.py LIBRARY ADDRESS
-# Says "frame TICK HASH" of what it decodes, as numpy sees it.
+# Test program in Python: follows a stream through libclothstream and numpy. Usage: follow.py LIBRARY ADDRESS
+# Prints "frame TICK HASH" for each decoded frame.
 import ctypes as c
 import sys
 import time
@@ -102,7 +102,7 @@ while len(ticks) < 60 or not seen:
     get_statistics(client, now_us(), c.byref(statistics))
     pointer = positions(client)
     view = np.ctypeslib.as_array(pointer, shape=(vertex_count(client), 3))
-    # The view looks into the library's memory: so does one that was made of the frame before, and shows the new one.
+    # The view points into the library's memory. A view of the previous frame now shows the new frame too.
     assert view.__array_interface__["data"][0] == c.addressof(pointer.contents)
     assert not view.flags.owndata and view.dtype == np.float32
     if kept is not None and kept.__array_interface__["data"] == view.__array_interface__["data"]:

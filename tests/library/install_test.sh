@@ -1,7 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: MIT
-# Installs what was built into a prefix of its own, and builds and runs a program against it with find_package and with
-# pkg-config. Usage: install_test.sh CMAKE BUILD_FOLDER VERSION
+# Installs the build to a temporary prefix, then builds and runs a program against it with find_package and pkg-config. Usage: install_test.sh CMAKE BUILD_FOLDER VERSION
 set -euo pipefail
 cmake=$1 build=$2 version=$3
 consumer=$(cd "$(dirname "${BASH_SOURCE[0]}")/consumer" && pwd)
@@ -9,7 +8,7 @@ folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
 
 "$cmake" --install "$build" --prefix "$folder/first" >/dev/null
-# It works from wherever it is.
+# The installation works after a move.
 mv "$folder/first" "$folder/prefix"
 prefix=$folder/prefix
 "$prefix/bin/clothstream" --version

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// libclothstream.so as programs in C, Python, C# and Rust use it, against the real clothstream-server.
+// Programs in C, Python, C# and Rust use libclothstream.so with the real clothstream-server.
 #include <chrono>
 #include <csignal>
 #include <cstdio>
@@ -20,7 +20,7 @@
 #include <gtest/gtest.h>
 
 #include "clients/grpc/grpc_client.h"
-#include "tests/e2e/server_test.h"
+#include "tests/e2e/running_server.h"
 #include "tests/e2e/temporary_directory.h"
 
 namespace clothstream::e2e {
@@ -30,7 +30,7 @@ using namespace std::chrono_literals;
 using ::testing::Contains;
 using ::testing::HasSubstr;
 
-// Generous: sanitizers, validation and software Vulkan on a busy machine.
+// Generous timeouts for sanitizers, validation and software Vulkan on a busy machine.
 constexpr auto kProgram = 120s;
 
 using Command = std::vector<std::string>;
@@ -40,7 +40,7 @@ struct Ended {
   std::string output, errors;
 };
 
-// Programs are looked for in the path, and find the library.
+// Runs a program from PATH with the library's folder in LD_LIBRARY_PATH.
 Ended run(const Command& command) {
   Command all{"/usr/bin/env", std::string("LD_LIBRARY_PATH=") +
                                   std::filesystem::path(CLOTHSTREAM_LIBRARY).parent_path().string()};
@@ -71,7 +71,7 @@ std::string contents(const char* path) {
   return text.str();
 }
 
-// Another client, with our own code, and what each frame was to it.
+// Second client for comparison. It records the hash of each frame.
 class Watcher {
  public:
   explicit Watcher(const std::string& address) {
@@ -89,7 +89,7 @@ class Watcher {
     client_ = std::move(*joined);
   }
 
-  // Of the lines "frame TICK HASH" those whose tick was seen here; each must have the same hash.
+  // Counts the lines "frame TICK HASH" whose tick was seen here. Each must have the same hash.
   std::size_t sameFrames(const std::string& output) const {
     const std::lock_guard lock(mutex_);
     std::istringstream lines(output);
@@ -112,11 +112,11 @@ class Watcher {
   std::unique_ptr<GrpcClient> client_;
 };
 
-class LibraryTest : public ServerTest {
+class LibraryTest : public RunningServer {
  protected:
   void SetUp() override { startServer(); }
 
-  // Runs a program that follows the stream, and compares what it saw.
+  // Runs a program that follows the stream, and compares its frames.
   void expectSameFrames(const Command& command) {
     const Watcher watcher(address_);
     const Ended ended = run(command);
@@ -129,7 +129,7 @@ class LibraryTest : public ServerTest {
   }
 };
 
-// A program that was built without the sanitizer cannot load what was built with it.
+// A program without the sanitizer cannot load a library with it.
 constexpr bool kSanitized = CLOTHSTREAM_SANITIZE[0] != '\0';
 constexpr const char* kNotSanitized = "only programs that are built with the sanitizer can load the library";
 
@@ -137,14 +137,14 @@ TEST_F(LibraryTest, ServesC) {
   expectSameFrames({FOLLOW_C, address_});
 }
 
-TEST_F(LibraryTest, TellsOfTheEndOfTheStream) {
+TEST_F(LibraryTest, ReportsTheEndOfTheStream) {
   Process program({FOLLOW_C, address_, "lost"});
   ASSERT_TRUE(program.waitForLine("joined", kPatience)) << program.errors();
   server_->signal(SIGTERM);
   EXPECT_EQ(program.waitForEnd(kProgram), 0) << program.errors();
 }
 
-TEST_F(LibraryTest, GivesCThePartOfTheStreamThatItWants) {
+TEST_F(LibraryTest, SendsOnlyTheRequestedPartOfTheStream) {
   const TemporaryDirectory directory;
   const std::string sceneFile = directory.path() / "layered.json";
   std::string scene = contents("tests/e2e/small.json");
@@ -166,7 +166,7 @@ TEST_F(LibraryTest, ServesPythonWithoutACopy) {
 TEST_F(LibraryTest, ServesCSharp) {
   if (kSanitized) GTEST_SKIP() << kNotSanitized;
   if (!hasTool("mcs") || !hasTool("mono"))
-    GTEST_SKIP() << "there is no mono: ./dev test installs Debian's mono-mcs and mono-runtime";
+    GTEST_SKIP() << "mono is not installed: ./dev test installs Debian's mono-mcs and mono-runtime";
   const TemporaryDirectory directory;
   const std::string program = directory.path() / "Follow.exe";
   const Ended compiled =
@@ -175,8 +175,8 @@ TEST_F(LibraryTest, ServesCSharp) {
   expectSameFrames({"mono", program, address_});
 }
 
-// A game that draws all the time, say.
-TEST_F(LibraryTest, FramesComeHoweverOftenItIsAcquired) {
+// Example: a game that draws all the time.
+TEST_F(LibraryTest, ReceivesFramesWhileOftenAcquired) {
   const auto client = GrpcClient::join(address_, {}, [](cs_client*, std::uint32_t) {});
   ASSERT_TRUE(client.has_value()) << client.error().text;
   const auto end = std::chrono::steady_clock::now() + 3s;
@@ -189,17 +189,17 @@ TEST_F(LibraryTest, FramesComeHoweverOftenItIsAcquired) {
   }
   std::printf("acquired %llu times, %llu frames\n", static_cast<unsigned long long>(acquired),
               static_cast<unsigned long long>(frames));
-  // Of 180, on a machine that simulates as fast as it should.
+  // 180 frames on a machine that simulates in real time.
   EXPECT_GE(frames, 30u);
 }
 
-// ---- The page's examples
+// ---- Examples of docs/client-library.md
 
 struct Language {
-  const char* name;   // of the block in docs/client-library.md
-  const char* file;   // that it is written to
-  const char* tool;   // without which it is skipped
-  const char* toRun;  // a shell's line, with {file}, {program} and {address}
+  const char* name;   // language of the code block in docs/client-library.md
+  const char* file;   // file name of the example
+  const char* tool;   // required program; the test is skipped without it
+  const char* toRun;  // shell command with {file}, {program} and {address}
 
   friend std::ostream& operator<<(std::ostream& out, const Language& language) {
     return out << language.name;
@@ -208,7 +208,7 @@ struct Language {
 
 class Example : public LibraryTest, public ::testing::WithParamInterface<Language> {
  protected:
-  // The first block of a language.
+  // Returns the first code block of a language.
   static std::string block(const std::string& language) {
     std::ifstream page("docs/client-library.md");
     std::string text, line;
@@ -222,10 +222,10 @@ class Example : public LibraryTest, public ::testing::WithParamInterface<Languag
   }
 };
 
-TEST_P(Example, OfThePageRuns) {
+TEST_P(Example, Runs) {
   if (kSanitized) GTEST_SKIP() << kNotSanitized;
   const Language& language = GetParam();
-  if (!hasTool(language.tool)) GTEST_SKIP() << "there is no " << language.tool << " to run the example with";
+  if (!hasTool(language.tool)) GTEST_SKIP() << language.tool << " is not installed";
   if (std::string(language.name) == "python" && !succeeds({CLOTHSTREAM_PYTHON, "-c", "import numpy"}))
     GTEST_SKIP() << CLOTHSTREAM_PYTHON " has no numpy: ./dev test installs Debian's python3-numpy";
   const std::string text = block(language.name);
@@ -261,7 +261,7 @@ INSTANTIATE_TEST_SUITE_P(
                  "/usr/bin/rustc -D warnings -L {folder} {file} -o {program} && {program} {address}"}),
     [](const auto& language) { return std::string(language.param.name); });
 
-// ---- What it exports
+// ---- Exported functions
 
 std::set<std::string> matches(const std::string& text, const char* pattern) {
   std::set<std::string> found;
@@ -272,8 +272,8 @@ std::set<std::string> matches(const std::string& text, const char* pattern) {
 }
 
 TEST(Library, ExportsItsInterfaceAndNothingElse) {
-  if (!hasTool("nm")) GTEST_SKIP() << "there is no nm";
-  // A declaration begins its line, and its name is before the first parenthesis.
+  if (!hasTool("nm")) GTEST_SKIP() << "nm is not installed";
+  // A declaration starts its line. Its name is before the first parenthesis.
   const char* declaration = R"((?:^|\n)[a-z][a-z0-9_ *]*[ *]((?:cs|clothstream)_[a-z_]+)\()";
   std::set<std::string> declared = matches(contents("clients/core/core.h"), declaration);
   EXPECT_GE(declared.size(), 80u);

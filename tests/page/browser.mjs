@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Debian's Chromium without a window, and how the tests look at a page in it.
+// Opens pages in Debian's Chromium without a window, waits for their state, and reads the pixels of screenshots.
 
 import { createRequire } from "node:module";
 import { mkdir } from "node:fs/promises";
@@ -11,6 +11,14 @@ const { chromium } = require("playwright-core");
 export const kChromium = "/usr/bin/chromium";
 const kScreenshots = process.env.CLOTHSTREAM_SCREENSHOTS;
 const kWaitMs = 60_000;
+// Size of screenshots, in pixels.
+export const kPicture = { width: 800, height: 450 };
+// Size of pages between screenshots. Software rendering takes most of the tests' time, in proportion to the pixels.
+// The width keeps the layout of wide screens.
+const kQuick = { width: 656, height: 200 };
+// Milliseconds between drawn frames, at least. Without a pause, software rendering would take the processors from the
+// server.
+const kDrawPeriodMs = 50;
 
 export function launchBrowser() {
   return chromium.launch({
@@ -27,17 +35,24 @@ export function launchBrowser() {
   });
 }
 
-// `prepare` runs in the page before its own scripts. What goes wrong in the page is collected in `errors`.
-export async function openPage(browser, url, { prepare, viewport = { width: 800, height: 450 } } = {}) {
-  const page = await browser.newPage({ viewport });
+// Opens a page. `prepare` runs in it before its own scripts. Errors of the page are collected in `errors`. Without a
+// viewport the page is small, and takes the size of a picture only for screenshots.
+export async function openPage(browser, url, { prepare, viewport } = {}) {
+  const page = await browser.newPage({ viewport: viewport ?? kQuick });
+  page.grows = viewport === undefined;
   page.setDefaultTimeout(kWaitMs);
   page.errors = [];
   page.on("pageerror", (error) => page.errors.push(String(error)));
+  await page.addInitScript((period) => {
+    const draw = window.requestAnimationFrame.bind(window);
+    window.requestAnimationFrame = (callback) => setTimeout(() => draw(callback), period);
+  }, kDrawPeriodMs);
   if (prepare) await page.addInitScript(prepare);
   await page.goto(url);
   return page;
 }
 
+// Waits for a state: connecting, live, reconnecting or failed.
 export function untilState(page, state) {
   return page.waitForFunction((wanted) => window.clothstream?.state === wanted, state);
 }
@@ -48,10 +63,26 @@ export async function untilFrames(page, count) {
   await page.waitForFunction((wanted) => window.clothstream.statistics?.frames >= wanted, now + count);
 }
 
-// Saves a screenshot under its name and gives its pixels: colourAt(x, y) is [red, green, blue], 0 to 255.
+// Saves a screenshot under its name.
 export async function takePicture(page, name) {
   await mkdir(kScreenshots, { recursive: true });
+  if (page.grows) await resize(page, kPicture);
   const png = await page.screenshot({ path: path.join(kScreenshots, `${name}.png`) });
+  if (page.grows) await page.setViewportSize(kQuick);
+  return png;
+}
+
+// Waits until the page has drawn in the new size.
+async function resize(page, size) {
+  await page.setViewportSize(size);
+  await page.evaluate(
+    () => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => requestAnimationFrame(done)))),
+  );
+}
+
+// Saves a screenshot under its name. Returns its pixels: colourAt(x, y) is [red, green, blue], each 0 to 255.
+export async function takePixels(page, name) {
+  const png = await takePicture(page, name);
   const { width, height, base64 } = await page.evaluate(async (source) => {
     const bytes = Uint8Array.from(atob(source), (character) => character.charCodeAt(0));
     const bitmap = await createImageBitmap(new Blob([bytes], { type: "image/png" }));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A link to a port of this machine that can be cut, and returns.
+// A TCP proxy to a local port. The link can be cut and restored.
 
 import { once } from "node:events";
 import net from "node:net";
@@ -18,7 +18,7 @@ export async function makeLink(target) {
       from.on("error", () => {});
       from.on("close", () => {
         sockets.delete(from);
-        // What was said last still goes through.
+        // Bytes that were already received are still forwarded.
         to.destroySoon();
       });
       from.pipe(to);
@@ -28,7 +28,7 @@ export async function makeLink(target) {
   await once(listener, "listening");
   return {
     url: `http://127.0.0.1:${listener.address().port}/`,
-    // Resets every connection, and those that come until it is restored.
+    // Resets all connections, and new ones until restore().
     cut() {
       whole = false;
       for (const socket of sockets) socket.resetAndDestroy();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The page in a browser, on the real server: the cloth moves, hangs, is lit, can be pushed; bad days are told.
+// The page in a browser, with a real server: picture, controls, participants, lost connections.
 
 import assert from "node:assert/strict";
 import { existsSync } from "node:fs";
@@ -7,7 +7,7 @@ import { mkdtemp, readFile, rm, writeFile } from "node:fs/promises";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { after, before, test } from "node:test";
-import { kChromium, launchBrowser, luminance, openPage, takePicture, untilFrames, untilState } from "./browser.mjs";
+import { kChromium, launchBrowser, kPicture, luminance, openPage, takePicture, takePixels, untilFrames, untilState } from "./browser.mjs";
 import { makeLink } from "./link.mjs";
 import { startServer } from "./server.mjs";
 
@@ -17,12 +17,12 @@ if (!existsSync(kChromium)) {
   process.exit(kSkipped);
 }
 
-// The codec's promise, metres along each of three axes, where the scene does not say otherwise.
+// Default error limit of the codec, metres along each of three axes.
 const kMaxError = 0.0005;
-// How far a vertex may be from where it is: a busy page gets coarser qualities, of which the third has four times the
-// error.
+// Largest distance of a decoded vertex from its true position. A busy page receives coarser qualities; the third has four
+// times the error.
 const kPromise = Math.sqrt(3) * 4 * kMaxError;
-// Where the ball is dragged to: behind the curtain, which hangs at z = 0 and is pushed along.
+// z to which the sphere is dragged: behind the curtain, which hangs at z = 0 and is pushed along.
 const kGoal = -0.3;
 
 const scene = JSON.parse(await readFile(new URL("../../server/scenes/curtain.json", import.meta.url), "utf8"));
@@ -49,7 +49,7 @@ function furthest(before, after) {
   return far;
 }
 
-// What the page holds, all of one frame.
+// Copies vertices, colliders and statistics of one frame.
 function look(page) {
   return page.evaluate(() => {
     const { positions, restPositions, colliders, statistics } = window.clothstream;
@@ -62,18 +62,18 @@ function look(page) {
   });
 }
 
-// Waits until the ball is where it was some frames ago.
-function untilHeld(page) {
+// Waits until the sphere has not moved for three frames.
+function untilAtRest(page) {
   return page.waitForFunction(() => {
     const { colliders, statistics } = window.clothstream;
-    const seen = window.seenBall;
+    const seen = window.seenSphere;
     if (seen && statistics.frames < seen.frames + 3) return false;
-    window.seenBall = { frames: statistics.frames, position: colliders[0].position.join() };
-    return window.seenBall.position === seen?.position;
+    window.seenSphere = { frames: statistics.frames, position: colliders[0].position.join() };
+    return window.seenSphere.position === seen?.position;
   });
 }
 
-// The sheet of "swing" on a rod that stands still: it is where it was shown however late the page is.
+// Writes the scene "swing" with a rod at rest, so that a late page still finds the cloth where it was drawn.
 async function writeHangingSheet(folder) {
   const swing = JSON.parse(await readFile(new URL("../../server/scenes/swing.json", import.meta.url), "utf8"));
   delete swing.cloths[0].attachments[0].motion;
@@ -106,7 +106,7 @@ async function withPage(options, use) {
   }
 }
 
-test("the cloth moves, and every packet decodes to what the server holds", () =>
+test("the cloth moves, and every packet decodes to the state of the server", () =>
   withPage({}, async (page) => {
     await untilState(page, "live");
     await untilFrames(page, 5);
@@ -122,11 +122,11 @@ test("the cloth moves, and every packet decodes to what the server holds", () =>
     await takePicture(page, "curtain");
   }));
 
-test("frames can be shown evenly, a little later", () =>
+test("play-out shows positions between frames", () =>
   withPage({ query: "?smooth" }, async (page) => {
     await untilState(page, "live");
     await untilFrames(page, 60);
-    // The last vertex and the ball, as they are drawn and in the newest frame, display frame by display frame.
+    // The last vertex and the sphere, as drawn and as in the newest frame, for each displayed frame.
     const seen = await page.evaluate(
       () =>
         new Promise((done) => {
@@ -136,8 +136,8 @@ test("frames can be shown evenly, a little later", () =>
             seen.push({
               drawn: [...drawn[0].slice(-3)],
               newest: [...positions.slice(-3)],
-              drawnBall: drawnColliders[0],
-              newestBall: colliders[0].position,
+              drawnSphere: drawnColliders[0],
+              newestSphere: colliders[0].position,
             });
             if (seen.length < 40) requestAnimationFrame(look);
             else done(seen);
@@ -145,25 +145,25 @@ test("frames can be shown evenly, a little later", () =>
           requestAnimationFrame(look);
         }),
     );
-    // Without play-out the newest frame is what is drawn.
+    // Without play-out, drawn positions would equal those of the newest frame.
     const frames = new Set(seen.map(({ newest }) => newest.join()));
     const between = seen.filter(({ drawn }) => !frames.has(drawn.join()));
     assert.ok(between.length > seen.length / 2, `${between.length} of ${seen.length} lie between frames`);
     assert.ok(seen.every(({ drawn }) => drawn.every(Number.isFinite)));
-    const balls = new Set(seen.map(({ newestBall }) => newestBall.join()));
-    const ballsBetween = seen.filter(({ drawnBall }) => !balls.has(drawnBall.join()));
-    assert.ok(ballsBetween.length > seen.length / 2, `${ballsBetween.length} of ${seen.length} balls lie between frames`);
+    const spheres = new Set(seen.map(({ newestSphere }) => newestSphere.join()));
+    const spheresBetween = seen.filter(({ drawnSphere }) => !spheres.has(drawnSphere.join()));
+    assert.ok(spheresBetween.length > seen.length / 2, `${spheresBetween.length} of ${seen.length} spheres lie between frames`);
     assert.ok(new Set(between.map(({ drawn }) => drawn.join())).size > 5);
     await takePicture(page, "smooth");
   }));
 
-test("the cloth hangs from its pins, which stay where they start", () =>
+test("the cloth hangs from its pins, which do not move", () =>
   withPage({}, async (page) => {
     await untilState(page, "live");
     const pins = pinnedNodes();
     assert.ok(pins.size > 1);
     let seen;
-    // Within what the codec promises, which a key frame in between may use otherwise.
+    // Pins may move within the codec's error, also between key frames.
     for (let i = 0; i < 2; ++i) {
       await untilFrames(page, 30);
       seen = await look(page);
@@ -176,7 +176,7 @@ test("the cloth hangs from its pins, which stay where they start", () =>
     for (let column = 0; column < columns; ++column) {
       if (!pins.has(column)) assert.ok(height(column) < seen.rest[1], `node ${column} hangs lower than the pins`);
     }
-    // The ball lifts parts of it, but the lower edge as a whole hangs below the middle, and that below the upper edge.
+    // The sphere lifts parts of the cloth, but on average the lower edge is below the middle, and the middle below the top.
     const meanHeight = (row) => {
       let sum = 0;
       for (let column = 0; column < columns; ++column) sum += height(row * columns + column);
@@ -185,9 +185,9 @@ test("the cloth hangs from its pins, which stay where they start", () =>
     assert.ok(meanHeight(rows - 1) < meanHeight(rows >> 1) && meanHeight(rows >> 1) < meanHeight(0));
   }));
 
-// In the scene whose cloth comes to rest, so that the picture shows what the points say.
+// Uses a scene whose cloth comes to rest, so that the screenshot agrees with the positions.
 test("the cloth is lit and casts a shadow", () =>
-  withPage({ query: "?scene=sphere_drop" }, async (page) => {
+  withPage({ query: "?scene=sphere_drop", viewport: kPicture }, async (page) => {
     await untilState(page, "live");
     for (let before, after; furthest(before, after) > 2 * kMaxError; ) {
       before = (await look(page)).positions;
@@ -199,14 +199,14 @@ test("the cloth is lit and casts a shadow", () =>
       const vertices = Array.from({ length: positions.length / 3 }, (_, i) => Array.from(positions.slice(3 * i, 3 * i + 3)));
       const open = ([x, y]) => document.elementFromPoint(x, y) === canvas;
       const shades = vertices.map(shadowOf);
-      // Each with the point as far away on the side that the light comes from, if no shadow reaches there.
+      // Pairs each shadowed point with its mirror point towards the light, if no shadow reaches that point.
       const end = Math.max(...shades.map(([x]) => x));
       const pairs = shades.filter(([x]) => -x > end).map(([x, y, z]) => [project([x, y, z]), project([-x, y, z])]);
       return { cloth: vertices.map(project).filter(open), floor: pairs.filter((pair) => pair.every(open)) };
     });
-    const picture = await takePicture(page, "sphere_drop");
+    const picture = await takePixels(page, "sphere_drop");
 
-    // Red outweighs blue on the cloth, not on the floor.
+    // The cloth is more red than blue, the floor is not.
     const isCloth = ([red, , blue]) => red > blue + 20;
     const cloth = points.cloth.map(([x, y]) => picture.colourAt(x, y)).filter(isCloth).map(luminance);
     assert.ok(cloth.length > 0.8 * points.cloth.length, `${cloth.length} of ${points.cloth.length} vertices show as cloth`);
@@ -222,14 +222,14 @@ test("the cloth is lit and casts a shadow", () =>
     assert.ok(median < 0.85, `the shadowed floor has ${median} of the lit floor's luminance`);
   }));
 
-// The hem of the round cloth is a part of its own, in a colour with more green. Seen from the front, cloth hides its back.
-test("a mesh falls and is drawn in the colours of its parts", () =>
-  withPage({ query: "?scene=tablecloth" }, async (page) => {
+// The hem of the round cloth is a separate submesh in a colour with more green. The front hides the back of the cloth.
+test("a mesh falls and has the colours of its submeshes", () =>
+  withPage({ query: "?scene=tablecloth", viewport: kPicture }, async (page) => {
     await untilState(page, "live");
     await untilFrames(page, 60);
     const seen = await look(page);
     assert.equal(seen.positions.length, 3 * 1519);
-    assert.ok(furthest(seen.rest, seen.positions) > 0.1, "it fell");
+    assert.ok(furthest(seen.rest, seen.positions) > 0.1, "the cloth falls");
     assert.equal(seen.statistics.decodeErrors + seen.statistics.hashMismatches, 0);
     const placesNow = () =>
       page.evaluate(() => {
@@ -245,7 +245,7 @@ test("a mesh falls and is drawn in the colours of its parts", () =>
         }
         return places;
       });
-    // Of the picture are those that were in the same place before it and after.
+    // Points that have the same place before and after the screenshot are valid for it.
     const still = (first, second) =>
       first.filter((place, i) => place && second[i] && Math.hypot(place[0] - second[i][0], place[1] - second[i][1]) < 2);
     let points, picture;
@@ -253,7 +253,7 @@ test("a mesh falls and is drawn in the colours of its parts", () =>
     do {
       assert.ok(++pictures < 100, "the cloth comes to rest");
       const first = await placesNow();
-      picture = await takePicture(page, "tablecloth");
+      picture = await takePixels(page, "tablecloth");
       const second = await placesNow();
       points = { linen: still(first.linen, second.linen), hem: still(first.hem, second.hem) };
     } while (points.linen.length < 100 || points.hem.length < 20);
@@ -267,7 +267,7 @@ test("a mesh falls and is drawn in the colours of its parts", () =>
     assert.ok(hem > 1.2 * linen, `green over red is ${hem} at the hem, ${linen} inside`);
   }));
 
-// Its lower half comes to lie on the floor, in more layers than one: balls of 12.5 mm that rest on each other.
+// The lower half of the sheet lies on the floor in several layers: self-collision keeps nodes 12.5 mm apart.
 test("a sheet falls into folds and lies on itself", () =>
   withPage({ query: "?scene=folds" }, async (page) => {
     await untilState(page, "live");
@@ -283,13 +283,13 @@ test("a sheet falls into folds and lies on itself", () =>
   }));
 
 test("the sphere can be dragged through the cloth", () =>
-  withPage({}, async (page) => {
+  withPage({ viewport: kPicture }, async (page) => {
     await untilState(page, "live");
-    // From the side, so that the drag goes across the cloth: 90 degrees less those of the default view, 5 a key.
+    // View from the side, so that the drag crosses the cloth: 13 steps of 5 degrees in addition to the default view.
     await page.focus("#canvas");
     for (let i = 0; i < 13; ++i) await page.keyboard.press("ArrowRight");
     const project = (point) => page.evaluate((at) => window.clothstream.project(at), point);
-    // The ball swings on while the mouse comes: it is taken near its turning point, at the second try if need be.
+    // The sphere swings while the mouse approaches. It is grabbed near its turning point, if necessary with a second try.
     let grab;
     for (let grabbed = false; !grabbed; grabbed = await page.evaluate(() => window.clothstream.canvas.style.cursor === "grabbing")) {
       await page.mouse.up();
@@ -298,20 +298,20 @@ test("the sphere can be dragged through the cloth", () =>
       await page.mouse.move(...grab);
       await page.mouse.down();
     }
-    await untilHeld(page);
+    await untilAtRest(page);
     const held = (await look(page)).spheres[0].position;
     const [heldX, heldY] = await project(held);
     const [goalX, goalY] = await project([held[0], held[1], kGoal]);
     await page.mouse.move(grab[0] + goalX - heldX, grab[1] + goalY - heldY, { steps: 20 });
     await page.waitForFunction((goal) => Math.abs(window.clothstream.colliders[0].position[2] - goal) < 0.05, kGoal);
-    await untilHeld(page);
+    await untilAtRest(page);
     await untilFrames(page, 20);
     const pushed = await look(page);
     await takePicture(page, "dragged");
 
     const { position, radius } = pushed.spheres[0];
-    assert.ok(Math.abs(position[2] - kGoal) < 0.05, `the ball is at z = ${position[2]}`);
-    // Nodes are put on the sphere's surface plus the cloth's thickness; what arrives is rounded by the codec.
+    assert.ok(Math.abs(position[2] - kGoal) < 0.05, `the sphere is at z = ${position[2]}`);
+    // Contact keeps nodes at the radius plus the cloth's thickness. The codec rounds positions.
     const keep = radius + scene.cloths[0].thickness - kPromise - 1e-5;
     let nearest = Infinity;
     let reach = 0;
@@ -319,19 +319,19 @@ test("the sphere can be dragged through the cloth", () =>
       nearest = Math.min(nearest, distance(vertexOf(pushed.positions, i), position));
       reach = Math.min(reach, pushed.positions[3 * i + 2]);
     }
-    assert.ok(nearest >= keep, `a vertex is ${nearest} m from the centre of the ball, less than ${keep} m`);
-    assert.ok(nearest < radius + 0.1, "the cloth lies against the ball");
+    assert.ok(nearest >= keep, `a vertex is ${nearest} m from the centre of the sphere, less than ${keep} m`);
+    assert.ok(nearest < radius + 0.1, "the cloth touches the sphere");
     assert.ok(reach < position[2], `the cloth is pushed to z = ${reach}`);
 
     await page.mouse.up();
-    await untilHeld(page);
+    await untilAtRest(page);
     const left = (await look(page)).spheres[0].position;
-    assert.ok(distance(left, position) < 0.01, "the ball stays where it was left");
+    assert.ok(distance(left, position) < 0.01, "the sphere stays where it was released");
   }));
 
-// The middle of the lower edge goes where the mouse does, and falls back when it lets go.
-test("the cloth can be taken hold of", () =>
-  withPage({ query: "?scene=hanging" }, async (page) => {
+// The middle of the lower edge follows the mouse, and falls back when the mouse releases it.
+test("the cloth can be grabbed", () =>
+  withPage({ query: "?scene=hanging", viewport: kPicture }, async (page) => {
     await untilState(page, "live");
     await untilFrames(page, 60);
     const corner = 39 * 32 + 16;
@@ -341,7 +341,7 @@ test("the cloth can be taken hold of", () =>
     const project = (point) => page.evaluate((at) => window.clothstream.project(at), point);
     const [x, y] = await project(start);
     const [goalX, goalY] = await project(goal);
-    // A little above the edge, so that the pointer is on the cloth.
+    // Slightly above the edge, so that the pointer is on the cloth.
     await page.mouse.move(x, y - 6);
     await page.mouse.down();
     assert.equal(await page.evaluate(() => window.clothstream.canvas.style.cursor), "grabbing");
@@ -361,7 +361,7 @@ test("the cloth can be taken hold of", () =>
     );
   }));
 
-test("a slider works by keyboard, and others in the scene see it", () =>
+test("a slider works by keyboard, and other pages follow", () =>
   withPage({}, (first) =>
     withPage({}, async (second) => {
       await untilState(first, "live");
@@ -375,14 +375,14 @@ test("a slider works by keyboard, and others in the scene see it", () =>
     }),
   ));
 
-// The flag pulls at its pole; as constraints its springs keep their length, and the server's report says so.
-test("each cloth's solver can be chosen, and the panel says how its simulation does", () =>
-  withPage({ query: "?scene=flag", viewport: { width: 1000, height: 900 } }, (first) =>
+// The flag stretches at its pole. The constraint solver reduces the stretch, and the server's report shows this.
+test("the panel changes the solver of a cloth and shows its report", () =>
+  withPage({ query: "?scene=flag", viewport: { width: 660, height: 600 } }, (first) =>
     withPage({ query: "?scene=flag" }, async (second) => {
       await untilState(first, "live");
       await untilState(second, "live");
       const figure = (page, name) => page.textContent(`#cloths [data-figure="${name}"]`);
-      // The panel shows a report a quarter of a second later at most.
+      // The panel updates four times per second.
       const untilFigure = (page, name, pattern) =>
         page.waitForFunction(
           ([key, source]) => RegExp(source).test(document.querySelector(`#cloths [data-figure="${key}"]`)?.textContent),
@@ -391,7 +391,7 @@ test("each cloth's solver can be chosen, and the panel says how its simulation d
       await untilFigure(first, "constraints", /^none$/);
       const nodes = await first.evaluate(() => window.clothstream.cloths[0].vertexCount.toLocaleString("en"));
       assert.equal(await figure(first, "nodes"), nodes);
-      await first.waitForFunction(() => /^\d+\.\d ms a tick$/.test(document.getElementById("device-ms").textContent));
+      await first.waitForFunction(() => /^\d+\.\d ms per tick$/.test(document.getElementById("device-ms").textContent));
       const before = await first.evaluate(() => window.clothstream.reports[0]);
       assert.ok(before.strainMax >= before.strainP99 && before.strainP99 > 0 && before.strainMean > 0);
       assert.ok(before.kineticEnergy >= 0 && before.elasticEnergy > 0 && before.deviceMs > 0);
@@ -412,7 +412,7 @@ test("each cloth's solver can be chosen, and the panel says how its simulation d
     }),
   ));
 
-test("an unknown scene is told with the server's words, and the default one is a click away", () =>
+test("an unknown scene shows the server's error, and a button joins the default scene", () =>
   withPage({ query: "?scene=no_such_scene" }, async (page) => {
     await untilState(page, "failed");
     await page.waitForSelector("#banner:not([hidden])");
@@ -435,12 +435,12 @@ test("the scene chooser joins another scene", () =>
     await takePicture(page, "flag");
   }));
 
-test("a lost server is told, and the page comes back with it", () =>
+test("the page shows a lost server, and reconnects when it returns", () =>
   withPage({}, async (page) => {
     await untilState(page, "live");
     await server.stop();
     await untilState(page, "reconnecting");
-    await page.waitForFunction(() => /Trying (to come back|again in \d+ s)\./.test(document.getElementById("banner-text").textContent));
+    await page.waitForFunction(() => /(Reconnecting|Trying again in \d+ s)\./.test(document.getElementById("banner-text").textContent));
     await takePicture(page, "reconnecting");
     server = await startServer(server.port);
     await untilState(page, "live");
@@ -448,7 +448,7 @@ test("a lost server is told, and the page comes back with it", () =>
     await page.waitForSelector("#banner", { state: "hidden" });
   }));
 
-test("people see who is there, and who is cut off comes back as the same one", async () => {
+test("participants are listed, and a disconnected one returns with its id", async () => {
   const link = await makeLink(server.port);
   const here = () => window.clothstream.participants.map(({ name, role, away }) => `${name} ${role}${away ? " away" : ""}`);
   const ada = await openPage(browser, `${server.url}?name=Ada`);
@@ -497,7 +497,7 @@ test("people see who is there, and who is cut off comes back as the same one", a
   }
 });
 
-test("a browser without WebGL is told what is missing", () =>
+test("a browser without WebGL shows what is missing", () =>
   withPage({ prepare: () => (HTMLCanvasElement.prototype.getContext = () => null) }, async (page) => {
     await page.waitForSelector("#banner:not([hidden])");
     assert.match(await page.textContent("#banner-text"), /WebGL/);

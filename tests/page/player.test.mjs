@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The page on a recording that is played: its timeline shows where it stands, and moves it.
+// The page with a recording: its timeline shows and controls the playback.
 
 import assert from "node:assert/strict";
 import { existsSync } from "node:fs";
@@ -19,7 +19,7 @@ let page;
 before(async () => {
   server = await startServer(0, ["play", process.env.CLOTHSTREAM_RECORDING, "--loop"]);
   browser = await launchBrowser();
-  page = await openPage(browser, server.url, { viewport: { width: 1100, height: 620 } });
+  page = await openPage(browser, server.url, { viewport: { width: 800, height: 450 } });
   await untilState(page, "live");
   await untilFrames(page, 5);
 });
@@ -31,7 +31,7 @@ after(async () => {
 const playback = () => page.evaluate(() => window.clothstream.playback);
 const until = (wanted, value) => page.waitForFunction(wanted, value);
 
-test("a recording plays, with a timeline and nothing that would change it", async () => {
+test("a recording has a timeline and no controls of the simulation", async () => {
   const { length, paused, loop, speed } = await playback();
   assert.ok(length > 1);
   assert.deepEqual([paused, loop, speed], [false, true, 1]);
@@ -44,7 +44,7 @@ test("a recording plays, with a timeline and nothing that would change it", asyn
   await takePicture(page, "recording");
 });
 
-test("the button pauses it and lets it go on", async () => {
+test("the button pauses and continues", async () => {
   await page.getByRole("button", { name: "Pause" }).click();
   await until(() => window.clothstream.playback.paused);
   await page.getByRole("button", { name: "Play", exact: true }).waitFor();
@@ -53,13 +53,13 @@ test("the button pauses it and lets it go on", async () => {
   await until((then) => window.clothstream.statistics.frames > then + 3, frames);
 });
 
-test("the timeline goes to a time, and shows what is there", async () => {
+test("the timeline seeks and shows the frame", async () => {
   await page.getByRole("button", { name: "Pause" }).click();
   await until(() => window.clothstream.playback.paused);
   const { length } = await playback();
   const before = await page.evaluate(() => window.clothstream.statistics);
   await page.locator("#player-position").fill(String(length / 2));
-  // The key frame before it: at most 24 frames.
+  // Playback starts at the previous key frame, at most 24 frames earlier.
   await until((half) => Math.abs(window.clothstream.playback.position - half) < 0.6, length / 2);
   await until((then) => window.clothstream.statistics.keyFrames > then, before.keyFrames);
   const after = await page.evaluate(() => window.clothstream.statistics);
@@ -68,7 +68,7 @@ test("the timeline goes to a time, and shows what is there", async () => {
   assert.ok(after.tick > before.tick);
 });
 
-test("speed and loop are for everybody", async () => {
+test("speed and loop act for all pages", async () => {
   const other = await openPage(browser, server.url);
   await untilState(other, "live");
   await page.locator("#player-speed").selectOption("0.5");
@@ -79,4 +79,4 @@ test("speed and loop are for everybody", async () => {
   await other.close();
 });
 
-test("nothing went wrong in the page", () => assert.deepEqual(page.errors, []));
+test("the page reported no errors", () => assert.deepEqual(page.errors, []));

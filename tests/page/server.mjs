@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A clothstream-server of the test's own, on ports that are free.
+// Starts a clothstream-server on free ports.
 
 import { spawn } from "node:child_process";
 import { once } from "node:events";
@@ -9,19 +9,20 @@ const kStartMs = 60_000;
 
 for (const signal of ["SIGINT", "SIGTERM"]) process.once(signal, () => process.exit(1));
 
-// Starts the program named by CLOTHSTREAM_SERVER; resolves once it has said where its page is. `port` 0: any.
+// Starts the program named by CLOTHSTREAM_SERVER. Resolves when it has printed the address of its page. Port 0 picks a
+// free one.
 export async function startServer(port = 0, more = ["--scene", "curtain"]) {
   const program = process.env.CLOTHSTREAM_SERVER;
-  // Whoever goes without being heard is held for less than a test waits for anything.
+  // The reconnect grace is shorter than the timeout of a test.
   const options = ["--port", String(port), "--grpc-port", "0", "--hold", "30", ...more];
   const child = spawn(program, options, { stdio: ["ignore", "pipe", "pipe"] });
-  // Whatever ends the test, the server does not outlive it.
+  // The server ends with the test, whatever ends the test.
   process.once("exit", () => child.kill("SIGKILL"));
-  const said = [];
+  const output = [];
   const address = await new Promise((resolve, reject) => {
-    const timer = setTimeout(() => reject(new Error(`no address within ${kStartMs} ms\n${said.join("\n")}`)), kStartMs);
+    const timer = setTimeout(() => reject(new Error(`no address within ${kStartMs} ms\n${output.join("\n")}`)), kStartMs);
     const read = (line) => {
-      said.push(line);
+      output.push(line);
       const found = /http:\/\/[^\s/]+:(\d+)/.exec(line);
       if (!found) return;
       clearTimeout(timer);
@@ -31,11 +32,11 @@ export async function startServer(port = 0, more = ["--scene", "curtain"]) {
     child.once("error", reject);
     child.once("exit", (code) => {
       clearTimeout(timer);
-      reject(new Error(`${program} ended with ${code} before it served a page\n${said.join("\n")}`));
+      reject(new Error(`${program} ended with ${code} before it served a page\n${output.join("\n")}`));
     });
   });
-  // So that a test that fails for want of a server says so.
-  const complain = (code, signal) => console.error(`${program} ended with ${code ?? signal}\n${said.join("\n")}`);
+  // Explains the failure of a test whose server has ended.
+  const complain = (code, signal) => console.error(`${program} ended with ${code ?? signal}\n${output.join("\n")}`);
   child.once("exit", complain);
   return {
     ...address,

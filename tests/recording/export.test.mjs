@@ -65,7 +65,7 @@ try {
     assert.ok(!existsSync(out));
     return ended;
   };
-  assert.match(refused("--from", "100").stderr, /has no frame there/);
+  assert.match(refused("--from", "100").stderr, /has no frame in the requested time/);
   assert.equal(spawnSync(clothstream, ["export", recording, glb]).status, 6, "what is there is not overwritten");
 } finally {
   rmSync(directory, { recursive: true, force: true });

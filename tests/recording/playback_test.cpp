@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Recordings as the source of a scene's frames: in order, on time, from any time on, and what is left of
-// damaged ones.
+// Playback of recordings: frames in order and on time, from any time on, and from damaged files.
 #include "server/recording/playback.h"
 
 #include <algorithm>
@@ -28,8 +27,7 @@ namespace {
 using stream::Clock;
 using ::testing::HasSubstr;
 
-constexpr std::uint32_t kFrames = 150;
-constexpr double kLength = (kFrames - 1) / double{kSampleRate};
+constexpr double kLength = (kSampleFrames - 1) / double{kSampleRate};
 
 Clock::duration seconds(double value) {
   return std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(value));
@@ -44,10 +42,10 @@ RecordedStream streamOf(std::string bytes) {
 struct Seen {
   std::uint64_t tick = 0;
   bool key = false;
-  std::uint64_t hash = 0;  // of what was decoded
+  std::uint64_t hash = 0;  // hash of the decoded frame
 };
 
-// Takes and acknowledges all that it is sent at once.
+// Accepts and acknowledges every frame at once.
 class Viewer {
  public:
   explicit Viewer(stream::LiveScene& scene, std::uint8_t layers = codec::kMaxTemporalLayers)
@@ -102,12 +100,12 @@ class PlaybackTest : public ::testing::Test {
     playback = std::make_shared<Playback>(streamOf(std::move(bytes)), options);
     scene = std::make_unique<stream::LiveScene>("sample", playback);
   }
-  void play(const PlaybackOptions& options = {}) { play(sampleRecording(kFrames), options); }
+  void play(const PlaybackOptions& options = {}) { play(sampleRecording(kSampleFrames), options); }
   void join() {
     viewer = std::make_unique<Viewer>(*scene);
     step(0);
   }
-  // A step a millisecond, for so long.
+  // Advances the clock in steps of a millisecond.
   void pass(double time) {
     for (const Clock::time_point end = now + seconds(time); now < end;) step(0.001);
   }
@@ -130,11 +128,11 @@ class PlaybackTest : public ::testing::Test {
     scene->paused = paused;
     step(0);
   }
-  // The frame of the recording that holds what was decoded.
+  // Frame of the recording that equals the decoded one.
   static std::size_t frameOf(const Seen& seen) {
     static const std::vector<std::uint64_t> hashes = [] {
       std::vector<std::uint64_t> all;
-      auto reader = readerOf(sampleRecording(kFrames));
+      auto reader = readerOf(sampleRecording(kSampleFrames));
       for (auto message = reader.next(); *message; message = reader.next()) {
         if ((*message)->topic != Topic::frames) continue;
         v1::Frame frame;
@@ -152,8 +150,8 @@ class PlaybackTest : public ::testing::Test {
   Clock::time_point now = Clock::now();
 };
 
-TEST_F(PlaybackTest, LayersAreLeftOutForWhoWantsFewer) {
-  play(sampleRecording(kFrames, 3));
+TEST_F(PlaybackTest, DropsLayersThatAViewerDoesNotRequest) {
+  play(sampleRecording(kSampleFrames, 3));
   Viewer base(*scene, 1);
   join();
   for (double time = 0; time < 1; time += 0.001) {
@@ -166,20 +164,20 @@ TEST_F(PlaybackTest, LayersAreLeftOutForWhoWantsFewer) {
   EXPECT_LT(base.frames.size(), viewer->frames.size() / 3);
 }
 
-TEST_F(PlaybackTest, EveryFrameComesWhenItIsDueAsItWasRecorded) {
+TEST_F(PlaybackTest, SendsEveryFrameWhenItIsDue) {
   play();
   pass(1);
   join();
   ASSERT_EQ(viewer->frames.size(), 1u);
   const Clock::time_point start = now;
-  for (std::size_t i = 1; i < kFrames; ++i) {
+  for (std::size_t i = 1; i < kSampleFrames; ++i) {
     while (now < start + seconds(static_cast<double>(i) / kSampleRate)) step(0.001);
-    // Rounded to the steps of a millisecond.
+    // Rounded to steps of a millisecond.
     ASSERT_NEAR(static_cast<double>(viewer->frames.size()), static_cast<double>(i + 1), 1) << i;
   }
   pass(0.01);
-  ASSERT_EQ(viewer->frames.size(), kFrames);
-  for (std::size_t i = 0; i < kFrames; ++i) {
+  ASSERT_EQ(viewer->frames.size(), kSampleFrames);
+  for (std::size_t i = 0; i < kSampleFrames; ++i) {
     EXPECT_EQ(frameOf(viewer->frames[i]), i);
     EXPECT_EQ(viewer->frames[i].tick, i + 1);
     EXPECT_EQ(viewer->frames[i].key, i % kFramesAKeyFrame == 0);
@@ -187,7 +185,7 @@ TEST_F(PlaybackTest, EveryFrameComesWhenItIsDueAsItWasRecorded) {
   EXPECT_EQ(scene->metrics.framesDropped.value(), 0u);
 }
 
-TEST_F(PlaybackTest, AtItsEndItIsPausedAndGoesOnFromTheStart) {
+TEST_F(PlaybackTest, PausesAtTheEndAndResumesFromTheStart) {
   play();
   join();
   pass(kLength + 0.1);
@@ -197,27 +195,27 @@ TEST_F(PlaybackTest, AtItsEndItIsPausedAndGoesOnFromTheStart) {
   EXPECT_TRUE(viewer->playbacks.back().paused());
   EXPECT_NEAR(viewer->playbacks.back().position(), kLength, 1e-6);
   pass(0.1);
-  EXPECT_EQ(viewer->frames.size(), kFrames);
+  EXPECT_EQ(viewer->frames.size(), kSampleFrames);
   pause(false);
   pass(0.1);
-  EXPECT_EQ(frameOf(viewer->frames[kFrames]), 0u);
-  EXPECT_TRUE(viewer->frames[kFrames].key);
+  EXPECT_EQ(frameOf(viewer->frames[kSampleFrames]), 0u);
+  EXPECT_TRUE(viewer->frames[kSampleFrames].key);
 }
 
-TEST_F(PlaybackTest, ALoopGoesOnWithAKeyFrameAndLaterTicks) {
+TEST_F(PlaybackTest, LoopContinuesWithAKeyFrameAndLaterTicks) {
   play({.loop = true});
   join();
   pass(2.5 * (kLength + 1.0 / kSampleRate));
-  ASSERT_GT(viewer->frames.size(), 2 * kFrames);
+  ASSERT_GT(viewer->frames.size(), 2 * kSampleFrames);
   for (std::size_t i = 0; i < viewer->frames.size(); ++i) {
-    ASSERT_EQ(frameOf(viewer->frames[i]), i % kFrames);
-    ASSERT_EQ(viewer->frames[i].tick, i + 1);  // nothing seems to be missing
+    ASSERT_EQ(frameOf(viewer->frames[i]), i % kSampleFrames);
+    ASSERT_EQ(viewer->frames[i].tick, i + 1);  // ticks have no gaps
   }
-  EXPECT_TRUE(viewer->frames[kFrames].key);
+  EXPECT_TRUE(viewer->frames[kSampleFrames].key);
   EXPECT_EQ(scene->metrics.framesDropped.value(), 0u);
 }
 
-TEST_F(PlaybackTest, ASeekGoesOnFromTheKeyFrameBeforeIt) {
+TEST_F(PlaybackTest, SeekContinuesFromThePreviousKeyFrame) {
   play();
   join();
   pass(0.5);
@@ -237,8 +235,8 @@ TEST_F(PlaybackTest, ASeekGoesOnFromTheKeyFrameBeforeIt) {
   }
 }
 
-// The sample, and in it changes: after half a second the wind and the structural springs, after a second and
-// a half the wind again, mass and material.
+// The sample with changes: after half a second the wind and the structural springs, after a second and a half
+// the wind, the mass and the material.
 std::string sampleWithChanges() {
   std::string bytes;
   auto writer = RecordingWriter::begin(
@@ -266,14 +264,14 @@ std::string sampleWithChanges() {
   v1::ClothChange& everyCloth = *early.mutable_change()->add_cloths();
   everyCloth.mutable_structural()->set_stiffness(40);
   everyCloth.mutable_self_collision()->set_friction(0.5f);
-  late.mutable_change()->mutable_wind()->mutable_value();  // none
+  late.mutable_change()->mutable_wind()->mutable_value();  // no value: the wind is cleared
   v1::ClothChange& sheet = *late.mutable_change()->add_cloths();
   sheet.set_name("sheet");
   sheet.set_areal_mass(0.5f);
   sheet.set_material("denim");
   late.mutable_change()->add_cloths()->set_name("none such");
 
-  auto sample = readerOf(sampleRecording(kFrames));
+  auto sample = readerOf(sampleRecording(kSampleFrames));
   std::uint32_t frame = 0;
   for (auto message = sample.next(); *message; message = sample.next()) {
     if ((*message)->topic != Topic::frames) continue;
@@ -287,9 +285,9 @@ std::string sampleWithChanges() {
   return bytes;
 }
 
-TEST_F(PlaybackTest, ASeekTellsTheParametersThatHoldThere) {
+TEST_F(PlaybackTest, SeekSendsTheParametersOfThatTime) {
   for (const bool cut : {false, true}) {
-    // Without its index, too: then it is not known where the changes are.
+    // Also without its index, when the places of the changes are unknown.
     std::string bytes = sampleWithChanges();
     if (cut) bytes.resize(bytes.size() - 100);
     play(std::move(bytes));
@@ -306,15 +304,15 @@ TEST_F(PlaybackTest, ASeekTellsTheParametersThatHoldThere) {
       EXPECT_EQ(last().cloths(0).self_collision().radius(), 0.01f);
       EXPECT_EQ(last().cloths(0).self_collision().friction(), friction);
       EXPECT_EQ(last().cloths(0).areal_mass(), arealMass);
-      // Told where there is none, too: whoever was told of one forgets it.
+      // A missing value is sent too, so that clients forget an earlier one.
       EXPECT_TRUE(last().cloths(0).has_material());
       EXPECT_EQ(last().cloths(0).material(), material);
-      // With the frame that it is told before.
+      // The change arrives with the next frame.
       EXPECT_EQ(viewer->changes.back().tick(), viewer->frames.back().tick);
     };
     ASSERT_EQ(viewer->changes.size(), 1u);
     expect(0, 3, 20, 0.3f, 0.25f, "");
-    // Who joins later is told what holds by then.
+    // A later participant gets the values that hold by then.
     EXPECT_EQ(playback->parameters().SerializeAsString(), last().SerializeAsString());
     pass(1);
     ASSERT_EQ(viewer->changes.size(), 2u);
@@ -338,24 +336,24 @@ std::string sampleWithSliders() {
         bytes += more;
         return Written();
       },
-      kFrames);
+      kSampleFrames);
   return bytes;
 }
 
-TEST_F(PlaybackTest, AfterASeekParametersAreThoseOfPlayingThrough) {
+TEST_F(PlaybackTest, SeekGivesTheParametersOfPlayingThrough) {
   for (const bool cut : {false, true}) {
     std::string bytes = sampleWithSliders();
     const std::size_t lastChunk = readerOf(bytes).mcap().chunks().back().offset;
     if (cut) bytes.resize(lastChunk + 100);
     play(std::move(bytes));
     join();
-    std::vector<std::string> played;  // with each frame
+    std::vector<std::string> played;  // hashes with each frame
     while (!scene->paused) {
       played.resize(viewer->frames.size(), playback->parameters().SerializeAsString());
       step(0.001);
     }
     ASSERT_EQ(played.size(), viewer->frames.size());
-    ASSERT_GT(played.size(), kFrames - 13);
+    ASSERT_GT(played.size(), kSampleFrames - 13);
     pause(true);
     std::mt19937 random(5);
     for (int i = 0; i < 100; ++i) {
@@ -373,7 +371,7 @@ TEST_F(PlaybackTest, AfterASeekParametersAreThoseOfPlayingThrough) {
   }
 }
 
-TEST(ParameterHistory, WithFewerKeptItSaysTheSame) {
+TEST(ParameterHistory, GivesTheSameWithFewerEntries) {
   RecordingReader reader = readerOf(sampleWithSliders());
   const v1::StreamDescription description = reader.description().value();
   const ParameterHistory all(reader, description);
@@ -382,7 +380,7 @@ TEST(ParameterHistory, WithFewerKeptItSaysTheSame) {
   for (const std::size_t most : {std::size_t{0}, 3 * one, 6 * one}) {
     const ParameterHistory few(reader, description, most);
     EXPECT_GT(few.stride(), 1u);
-    for (std::uint32_t frame = 0; frame < kFrames; ++frame) {
+    for (std::uint32_t frame = 0; frame < kSampleFrames; ++frame) {
       const v1::ParameterChange there = few.at(sampleTime(frame), reader).now();
       EXPECT_EQ(there.SerializeAsString(), all.at(sampleTime(frame), reader).now().SerializeAsString());
       EXPECT_EQ(there.wind().value().x(), sampleSliders(frame).wind) << frame;
@@ -392,7 +390,7 @@ TEST(ParameterHistory, WithFewerKeptItSaysTheSame) {
   }
 }
 
-TEST_F(PlaybackTest, WhilePausedNothingFlowsButASeekIsShown) {
+TEST_F(PlaybackTest, ShowsASeekWhilePaused) {
   play({.from = 1});
   join();
   pass(0.2);
@@ -405,7 +403,7 @@ TEST_F(PlaybackTest, WhilePausedNothingFlowsButASeekIsShown) {
   ASSERT_EQ(viewer->frames.size(), before + 1);
   EXPECT_EQ(frameOf(viewer->frames.back()), 120u);
 
-  // Who joins now is shown where it stands.
+  // A participant that joins now gets the present frame.
   Viewer late(*scene);
   step(0.1);
   late.read(now);
@@ -431,7 +429,7 @@ TEST_F(PlaybackTest, SpeedStretchesTime) {
   EXPECT_EQ(viewer->playbacks.back().speed(), 0.25);
 }
 
-TEST_F(PlaybackTest, ItStandsStillWhileNobodyIsThere) {
+TEST_F(PlaybackTest, StandsStillWithoutViewers) {
   play();
   join();
   pass(0.5);
@@ -444,7 +442,7 @@ TEST_F(PlaybackTest, ItStandsStillWhileNobodyIsThere) {
   EXPECT_EQ(frameOf(viewer->frames.front()), 24u);
 }
 
-TEST_F(PlaybackTest, WhoComesLaterGoesOnFromTheNextKeyFrame) {
+TEST_F(PlaybackTest, LaterViewerStartsAtTheNextKeyFrame) {
   play();
   join();
   pass(0.2);
@@ -459,7 +457,7 @@ TEST_F(PlaybackTest, WhoComesLaterGoesOnFromTheNextKeyFrame) {
   for (std::size_t i = 1; i < viewer->frames.size(); ++i) ASSERT_EQ(frameOf(viewer->frames[i]), i);
 }
 
-TEST_F(PlaybackTest, WhatCannotBeAskedForIsRefused) {
+TEST_F(PlaybackTest, RefusesImpossibleRequests) {
   play();
   for (const double wrong : {-0.1, kLength + 0.1, std::nan("")}) {
     const auto refused = control([&](auto& request) { request.set_seek(wrong); });
@@ -476,8 +474,8 @@ TEST_F(PlaybackTest, WhatCannotBeAskedForIsRefused) {
   EXPECT_THAT(refused.error().text, HasSubstr("a recording that is played"));
 }
 
-TEST_F(PlaybackTest, WhatIsLeftOfADamagedFileIsPlayedAndWhatIsLostIsSaid) {
-  std::string bytes = sampleRecording(kFrames);
+TEST_F(PlaybackTest, PlaysTheRestOfADamagedFileAndReportsTheLoss) {
+  std::string bytes = sampleRecording(kSampleFrames);
   const auto place = readerOf(bytes).mcap().chunks()[4];
   bytes[place.offset + place.length / 2] ^= 0x10;
   play(bytes);
@@ -489,27 +487,27 @@ TEST_F(PlaybackTest, WhatIsLeftOfADamagedFileIsPlayedAndWhatIsLostIsSaid) {
   std::vector<std::size_t> missing;
   for (std::size_t i = 0, next = 0; i < viewer->frames.size(); ++i, ++next)
     for (const std::size_t at = frameOf(viewer->frames[i]); next < at; ++next) missing.push_back(next);
-  // From the chunk's first to the next key frame.
+  // The gap reaches from the first frame of the chunk to the next key frame.
   ASSERT_FALSE(missing.empty());
   const auto first = static_cast<std::size_t>(
       std::llround(1e-9 * static_cast<double>(place.start - kSampleStart) * kSampleRate));
   EXPECT_EQ(missing.front(), first);
   EXPECT_EQ((missing.back() + 1) % kFramesAKeyFrame, 0u);
   EXPECT_EQ(missing.back() - missing.front() + 1, missing.size());
-  EXPECT_EQ(viewer->frames.size() + missing.size(), kFrames);
+  EXPECT_EQ(viewer->frames.size() + missing.size(), kSampleFrames);
   EXPECT_EQ(viewer->notices[0].text(),
             fmt::format("the recording is damaged: {:.2f} s to {:.2f} s of it cannot be shown",
                         static_cast<double>(missing.front()) / kSampleRate,
                         static_cast<double>(missing.back() + 1) / kSampleRate));
 
-  // A seek into it shows what is before.
+  // A seek into the gap shows the frame before it.
   pause(false);
   seek(static_cast<double>(first + 1) / kSampleRate);
   EXPECT_LE(frameOf(viewer->frames.back()), first);
 }
 
-TEST_F(PlaybackTest, AFileThatWasCutOffIsPlayedAsFarAsItGoes) {
-  std::string bytes = sampleRecording(kFrames);
+TEST_F(PlaybackTest, PlaysATruncatedFileToItsEnd) {
+  std::string bytes = sampleRecording(kSampleFrames);
   const auto place = readerOf(bytes).mcap().chunks()[8];
   bytes.resize(place.offset + place.length / 2);
   EXPECT_TRUE(streamOf(bytes).cut());
@@ -521,8 +519,8 @@ TEST_F(PlaybackTest, AFileThatWasCutOffIsPlayedAsFarAsItGoes) {
   for (std::size_t i = 0; i < viewer->frames.size(); ++i) ASSERT_EQ(frameOf(viewer->frames[i]), i);
 }
 
-TEST_F(PlaybackTest, WhateverIsInAFileItIsPlayedToItsEndOrRefused) {
-  const std::string whole = sampleRecording(kFrames);
+TEST_F(PlaybackTest, PlaysAnyFileToItsEndOrRefusesIt) {
+  const std::string whole = sampleRecording(kSampleFrames);
   const std::size_t data = readerOf(whole).mcap().chunks().front().offset;
   std::mt19937 random(7);
   for (int round = 0; round < 60; ++round) {
@@ -538,13 +536,13 @@ TEST_F(PlaybackTest, WhateverIsInAFileItIsPlayedToItsEndOrRefused) {
     for (;;) {
       const RecordedStream::Next next = stream->next();
       if (std::holds_alternative<RecordedStream::End>(next)) break;
-      ASSERT_LT(++frames, 10 * kFrames);
+      ASSERT_LT(++frames, 10 * kSampleFrames);
     }
   }
 }
 
-// A file that others wrote: a key frame whose tick is the largest there is, then one that is smaller.
-TEST_F(PlaybackTest, TicksGrowWhateverWasRecorded) {
+// A file from another program: a key frame with the largest possible tick, then one with a smaller tick.
+TEST_F(PlaybackTest, TicksGrowForAnyRecordedTicks) {
   std::string bytes;
   auto writer = RecordingWriter::begin(
       [&](std::string_view more) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// `clothstream record`, `info`, `recover` and `clothstream-server --record`, `resimulate`, as programs.
+// Tests of the programs: `clothstream record`, `info` and `recover`, `clothstream-server --record` and
+// `resimulate`.
 #include <algorithm>
 #include <atomic>
 #include <chrono>
@@ -31,7 +32,7 @@ using namespace std::chrono_literals;
 using e2e::Process;
 using ::testing::HasSubstr;
 
-// Generous: sanitizers, validation and software Vulkan on a busy machine.
+// Long enough for sanitizers, validation and software Vulkan on a busy machine.
 constexpr auto kPatience = 60s;
 
 struct Ended {
@@ -47,7 +48,7 @@ Ended run(const std::vector<std::string>& command) {
 
 class RecordingPrograms : public ::testing::Test {
  protected:
-  // With the scene "small".
+  // Starts a server with the scene "small".
   void startServer(std::vector<std::string> options = {}) {
     options.insert(options.begin(), {CLOTHSTREAM_SERVER, "--port", "0", "--grpc-port", "0", "--scene",
                                      "small", "--scene-file", "tests/e2e/small.json"});
@@ -71,8 +72,8 @@ class RecordingPrograms : public ::testing::Test {
       return entry.path().string();
     return {};
   }
-  // The server, which records to this directory, when its next chunk is nearly due; gives the tick of the
-  // last frame that somebody saw of it.
+  // Kills a server that records to `directory` shortly before its next chunk is due. Returns the tick of the
+  // last frame that a client got.
   void killAfterAChunk(const char* directory, std::uint64_t& tick) {
     std::atomic<std::uint64_t> seen = 0;
     GrpcClientOptions options;
@@ -91,7 +92,7 @@ class RecordingPrograms : public ::testing::Test {
       ASSERT_LT(std::chrono::steady_clock::now(), deadline);
       std::this_thread::sleep_for(20ms);
     }
-    // A chunk was just closed.
+    // A chunk was closed just before.
     std::this_thread::sleep_for(170ms);
     server_->signal(SIGKILL);
     server_->waitForEnd(kPatience);
@@ -107,7 +108,7 @@ class RecordingPrograms : public ::testing::Test {
   std::string address_;
 };
 
-TEST_F(RecordingPrograms, AStreamIsRecordedWholeWithKeyFramesOnTheWay) {
+TEST_F(RecordingPrograms, RecordAStreamCompletelyWithKeyFrames) {
   startServer();
   if (IsSkipped() || HasFatalFailure()) return;
   const std::string path = pathOf("stream.mcap");
@@ -115,9 +116,9 @@ TEST_F(RecordingPrograms, AStreamIsRecordedWholeWithKeyFramesOnTheWay) {
   ASSERT_EQ(recorded.code, 0) << recorded.errors;
   const Ended info = clothstream({"info", path});
   EXPECT_EQ(info.code, 0) << info.output << info.errors;
-  EXPECT_THAT(info.output, HasSubstr("; 0 not what the server held"));
+  EXPECT_THAT(info.output, HasSubstr("; 0 differ from the server's"));
   EXPECT_THAT(info.output, HasSubstr("all checksums match"));
-  EXPECT_THAT(clothstream({"info", "--quick", path}).output, HasSubstr("index     whole"));
+  EXPECT_THAT(clothstream({"info", "--quick", path}).output, HasSubstr("index     complete"));
   EXPECT_THAT(clothstream({"info", "--json", path}).output, HasSubstr("\"whole\": true"));
 
   auto reader = RecordingReader::open(path);
@@ -143,7 +144,7 @@ TEST_F(RecordingPrograms, AStreamIsRecordedWholeWithKeyFramesOnTheWay) {
   EXPECT_THAT(simulated.errors, HasSubstr("it holds no simulation"));
 }
 
-TEST_F(RecordingPrograms, AnInterruptEndsRecordingsWhole) {
+TEST_F(RecordingPrograms, InterruptCompletesRecordings) {
   startServer({"--always-run", "--record", pathOf("recordings")});
   if (IsSkipped() || HasFatalFailure()) return;
   const std::string path = pathOf("stream.mcap");
@@ -167,13 +168,12 @@ TEST_F(RecordingPrograms, AnInterruptEndsRecordingsWhole) {
   EXPECT_THAT(again.output, HasSubstr("all bit-identical"));
 }
 
-// What is in a chunk that is not closed is what can be lost: no chunk may be longer than is promised,
-// whatever its writer's thread had to wait for. That it is closed on time is measured by the ticks that a
-// client saw, of as many seconds as the recorded ones took. The writer's thread may be kept waiting once, but
-// not each time, by as much again as is promised.
-TEST_F(RecordingPrograms, AKilledServerLosesAtMostItsLastChunk) {
+// A killed server can lose only the chunk that is not closed. So no chunk may be longer than promised, and a
+// client may have seen at most as many ticks beyond the recording as two chunks hold. One of three runs must
+// achieve that, since a busy machine may delay the writer's thread.
+TEST_F(RecordingPrograms, KilledServerLosesAtMostItsLastChunk) {
   constexpr double kPromised = 0.25;  // s
-  double least = std::numeric_limits<double>::infinity();
+  double leastChunksLost = std::numeric_limits<double>::infinity();
   std::string path;
   for (const char* name : {"first", "second", "third"}) {
     startServer({"--always-run", "--record", pathOf(name)});
@@ -185,26 +185,24 @@ TEST_F(RecordingPrograms, AKilledServerLosesAtMostItsLastChunk) {
     ASSERT_TRUE(cut.has_value()) << cut.error();
     for (const ChunkPlace& chunk : cut->mcap().chunks())
       EXPECT_LE(static_cast<double>(chunk.end - chunk.start) * 1e-9, kPromised);
-    struct Ticked {
-      std::uint64_t tick = 0, time = 0;  // ns
-    };
-    std::optional<Ticked> first;
-    Ticked last;
+    const std::span<const ChunkPlace> chunks = cut->mcap().chunks();
+    std::vector<std::uint64_t> ticksInChunk(chunks.size());
+    std::uint64_t lastTick = 0;
     v1::RecordedTick tick;
     for (auto message = cut->next(); message && *message; message = cut->next()) {
       if ((*message)->topic != Topic::ticks) continue;
       ASSERT_TRUE(tick.ParseFromArray((*message)->bytes.data(), static_cast<int>((*message)->bytes.size())));
-      last = {tick.tick(), (*message)->time};
-      if (!first) first = last;
+      lastTick = tick.tick();
+      for (std::size_t i = 0; i < chunks.size(); ++i)
+        ticksInChunk[i] += chunks[i].start <= (*message)->time && (*message)->time <= chunks[i].end ? 1 : 0;
     }
-    ASSERT_TRUE(first && last.tick > first->tick);
-    const double secondsATick =
-        static_cast<double>(last.time - first->time) * 1e-9 / static_cast<double>(last.tick - first->tick);
-    const double lost = (static_cast<double>(seen) - static_cast<double>(last.tick)) * secondsATick;
-    std::printf("killed: the last tick of a client is %.3f s after the last that was recorded\n", lost);
-    least = std::min(least, lost);
+    const std::uint64_t mostTicks = *std::ranges::max_element(ticksInChunk);
+    ASSERT_GT(mostTicks, 0u);
+    const double ticksLost = static_cast<double>(seen) - static_cast<double>(lastTick);
+    std::printf("killed: %.0f ticks lost; a chunk holds up to %lu\n", ticksLost, mostTicks);
+    leastChunksLost = std::min(leastChunksLost, ticksLost / static_cast<double>(mostTicks));
   }
-  EXPECT_LT(least, 2 * kPromised);
+  EXPECT_LE(leastChunksLost, 2);
 
   const std::string whole = pathOf("whole.mcap");
   const Ended damaged = clothstream({"info", path});
@@ -218,7 +216,7 @@ TEST_F(RecordingPrograms, AKilledServerLosesAtMostItsLastChunk) {
   EXPECT_EQ(again.code, 0) << again.output << again.errors;
 }
 
-TEST_F(RecordingPrograms, RecoverSaysWhatIsLost) {
+TEST_F(RecordingPrograms, RecoverReportsTheLoss) {
   const std::string path = pathOf("damaged.mcap"), out = pathOf("out.mcap");
   std::string bytes = sampleRecording(150);
   const ChunkPlace fifth = readerOf(bytes).mcap().chunks()[5];
@@ -234,10 +232,10 @@ TEST_F(RecordingPrograms, RecoverSaysWhatIsLost) {
   ASSERT_TRUE(reader.has_value()) << reader.error();
   EXPECT_TRUE(reader->check().has_value());
   EXPECT_EQ(countMessages(*reader, Topic::frames), 138u);  // a fifth of a second is missing
-  EXPECT_EQ(clothstream({"recover", path, out}).code, 6);  // it is there already
+  EXPECT_EQ(clothstream({"recover", path, out}).code, 6);  // the file exists already
 }
 
-TEST_F(RecordingPrograms, WhatOthersWroteDoesNotSteerATerminal) {
+TEST_F(RecordingPrograms, EscapeControlCharactersOfOtherPrograms) {
   const std::string path = pathOf("foreign.mcap");
   std::string bytes;
   auto writer = RecordingWriter::begin(
@@ -257,8 +255,8 @@ TEST_F(RecordingPrograms, WhatOthersWroteDoesNotSteerATerminal) {
   EXPECT_THAT(info.output, HasSubstr("Gerät"));
 }
 
-// Without a device, for what is played is not simulated.
-TEST_F(RecordingPrograms, ARecordingIsPlayedToClients) {
+// Without a device, since playing does not simulate.
+TEST_F(RecordingPrograms, PlayARecordingToClients) {
   const std::string path = pathOf("sample.mcap"), again = pathOf("again.mcap");
   std::ofstream(path, std::ios::binary) << sampleRecording(150);
   server_ = std::make_unique<Process>(std::vector<std::string>{
@@ -273,7 +271,7 @@ TEST_F(RecordingPrograms, ARecordingIsPlayedToClients) {
   EXPECT_EQ(recorded.code, 0) << recorded.errors;
   const Ended info = clothstream({"info", again});
   EXPECT_EQ(info.code, 0) << info.output;
-  EXPECT_THAT(info.output, HasSubstr("; 0 not what the server held"));
+  EXPECT_THAT(info.output, HasSubstr("; 0 differ from the server's"));
 
   const auto control = [&](std::vector<std::string> command) {
     command.insert(command.end(), {"--server", address_});
@@ -296,7 +294,7 @@ TEST_F(RecordingPrograms, ARecordingIsPlayedToClients) {
   EXPECT_EQ(server_->waitForEnd(kPatience), 0);
 }
 
-TEST_F(RecordingPrograms, ClientsAskForRecordings) {
+TEST_F(RecordingPrograms, StartAndStopRecordingsForClients) {
   startServer({"--always-run", "--recordings", pathOf("recordings")});
   if (IsSkipped() || HasFatalFailure()) return;
   const auto ask = [&](std::vector<std::string> command) {
@@ -323,7 +321,7 @@ TEST_F(RecordingPrograms, ClientsAskForRecordings) {
   EXPECT_THAT(ask({"start-recording", "small"}).errors, HasSubstr("clothstream-server --recordings DIR"));
 }
 
-TEST_F(RecordingPrograms, FilesThatAreNoRecordingsAreRefused) {
+TEST_F(RecordingPrograms, RefuseFilesThatAreNoRecordings) {
   std::ofstream(pathOf("text")) << "This is a text.";
   std::ofstream(pathOf("headers"), std::ios::binary) << sampleRecording(3).substr(0, 40'000);
   for (const char* command : {"info", "recover"}) {
@@ -338,7 +336,7 @@ TEST_F(RecordingPrograms, FilesThatAreNoRecordingsAreRefused) {
   }
 }
 
-TEST_F(RecordingPrograms, AFullDiskEndsTheClientsRecording) {
+TEST_F(RecordingPrograms, FullDiskEndsTheClientsRecording) {
   startServer();
   if (IsSkipped() || HasFatalFailure()) return;
   const std::string path = pathOf("stream.mcap");

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Scenes that are recorded while they run, and simulated again from what was recorded.
+// Scenes that are recorded while they run, and simulated again from the recording.
 #include "server/recording/recorder.h"
 
 #include <algorithm>
@@ -33,7 +33,7 @@ using tests::handAt;
 using tests::smallScene;
 using tests::wind;
 
-// A scene on the shared device that is recorded.
+// A recorded scene on the shared device.
 class RecordedScene {
  public:
   explicit RecordedScene(RecorderOptions options, model::Scene scene = smallScene())
@@ -55,7 +55,7 @@ class RecordedScene {
   void change(model::ParameterChange change) {
     ASSERT_TRUE(live.inbox.postChange({.participant = 5, .change = std::move(change)}));
   }
-  // The path of the recording, which is complete.
+  // Ends the recording and returns its path.
   std::string finish() {
     packer.drain();
     host.reset();
@@ -87,7 +87,7 @@ class RecorderTest : public tests::GpuTest {
   e2e::TemporaryDirectory directory_;
 };
 
-// All that can happen to a scene.
+// Applies every kind of input to a scene.
 void happen(RecordedScene& recorded) {
   recorded.ticks(3);
   recorded.change(wind(3));
@@ -104,13 +104,13 @@ void happen(RecordedScene& recorded) {
   for (int i = 0; i < 12; ++i) {
     const float z = 0.02f * static_cast<float>(i) - 0.2f;
     pose(z - 0.01f, -33);
-    pose(z, i < 6 ? 11 : -11);  // the tick is between the two, then after them
+    pose(z, i < 6 ? 11 : -11);  // before: the tick lies between the two poses; after: it follows both
     recorded.ticks(1);
   }
   model::Solver constraint;
   constraint.kind = model::SolverKind::constraint;
   recorded.change({.cloths = {{.solver = constraint}}});
-  recorded.ticks(30);  // gently at first, then not
+  recorded.ticks(30);  // gently at first, then hard
   recorded.live.inbox.postPoses(9, {}, recorded.now);
   model::ParameterChange heavier;
   heavier.cloths = {{.name = "sheet", .damping = 0.7f, .arealMass = 0.3f}};
@@ -120,16 +120,16 @@ void happen(RecordedScene& recorded) {
   recorded.live.resetWanted = true;
   recorded.ticks(50);
   recorded.change(gravity(-1e6f));
-  recorded.ticks(1);  // goes bad
+  recorded.ticks(1);  // the state becomes invalid
   recorded.change(gravity(-9.81f));
-  recorded.ticks(20);  // from the last good state
+  recorded.ticks(20);  // continues from the last valid state
   recorded.change(gravity(-1e6f));
-  recorded.ticks(2);  // goes bad again: from the start
+  recorded.ticks(2);  // invalid again: restarts from the start
   recorded.change(gravity(-5));
   recorded.ticks(60);
 }
 
-TEST_F(RecorderTest, WhatHappenedIsSimulatedAgainToTheBit) {
+TEST_F(RecorderTest, ResimulatesEveryInputToTheBit) {
   RecordedScene recorded(options());
   happen(recorded);
   const std::size_t ticks = recorded.hashes.size();
@@ -141,7 +141,7 @@ TEST_F(RecorderTest, WhatHappenedIsSimulatedAgainToTheBit) {
   EXPECT_THAT(toText(result), HasSubstr("all bit-identical"));
 }
 
-TEST_F(RecorderTest, AScenePicksUpAfterItsDeviceWasLost) {
+TEST_F(RecorderTest, ContinuesAfterItsDeviceWasLost) {
   RecordedScene recorded(options());
   recorded.ticks(30);
   recorded.live.inbox.postPoses(
@@ -160,7 +160,7 @@ TEST_F(RecorderTest, AScenePicksUpAfterItsDeviceWasLost) {
   EXPECT_EQ(result.different, 0u) << toText(result);
 }
 
-TEST_F(RecorderTest, ScenesOfMeshesHullsAndAttachmentsAreSimulatedAgainToTheBit) {
+TEST_F(RecorderTest, ResimulatesMeshesHullsAndAttachmentsToTheBit) {
   for (const char* name : {"swing", "obstacles", "tablecloth", "figure_15", "solver_xpbd"}) {
     auto scene = messages::loadScene(name);
     ASSERT_TRUE(scene.has_value());
@@ -172,7 +172,7 @@ TEST_F(RecorderTest, ScenesOfMeshesHullsAndAttachmentsAreSimulatedAgainToTheBit)
   }
 }
 
-TEST_F(RecorderTest, HoldsWhatAStreamHoldsAndKeyFramesOftenEnough) {
+TEST_F(RecorderTest, HoldsTheStreamAndRegularKeyFrames) {
   RecordedScene recorded(options());
   recorded.recorder->joined(3, "page", "Ada");
   recorded.ticks(250);
@@ -195,13 +195,13 @@ TEST_F(RecorderTest, HoldsWhatAStreamHoldsAndKeyFramesOftenEnough) {
   const auto count = [&](Topic topic) { return counts[static_cast<std::size_t>(topic)]; };
   EXPECT_EQ(count(Topic::frames), 250u);
   EXPECT_EQ(count(Topic::ticks), 250u);
-  EXPECT_EQ(count(Topic::checkpoints), 2u);  // the start, and after five seconds
+  EXPECT_EQ(count(Topic::checkpoints), 2u);  // at the start, and after five seconds
   EXPECT_EQ(count(Topic::participants), 2u);
   EXPECT_EQ(count(Topic::reports), 25u);
   EXPECT_LT(farthest, kFramesAKeyFrame);
 }
 
-TEST_F(RecorderTest, ATickThatIsNotWhatItWasIsFoundAndMeasured) {
+TEST_F(RecorderTest, FindsAndMeasuresADifferingTick) {
   RecordedScene recorded(options());
   recorded.ticks(210);
   auto reader = RecordingReader::open(recorded.finish());
@@ -227,14 +227,14 @@ TEST_F(RecorderTest, ATickThatIsNotWhatItWasIsFoundAndMeasured) {
   EXPECT_EQ(result.ticks, 210u);
   EXPECT_EQ(result.firstDifferent, 100u);
   EXPECT_EQ(result.different, 111u);
-  ASSERT_EQ(result.differences.size(), 1u);  // the state after five seconds
+  ASSERT_EQ(result.differences.size(), 1u);  // state after five seconds
   EXPECT_EQ(result.differences[0].tick, 201u);
   EXPECT_GT(result.differences[0].largest, 1e-6);
   EXPECT_LT(result.differences[0].largest, 0.1);
   EXPECT_THAT(toText(result), HasSubstr("first tick 100"));
 }
 
-TEST_F(RecorderTest, BytesThatAreNoTickOfTheSceneAreRefused) {
+TEST_F(RecorderTest, RefusesBytesThatAreNoTickOfTheScene) {
   RecordedScene recorded(options());
   recorded.ticks(5);
   auto reader = RecordingReader::open(recorded.finish());
@@ -284,10 +284,10 @@ TEST_F(RecorderTest, BytesThatAreNoTickOfTheSceneAreRefused) {
               HasSubstr("tick 3: it has 2 cloths, but the scene has 1"));
 }
 
-TEST_F(RecorderTest, AfterALostChunkItGoesOnFromTheNextState) {
+TEST_F(RecorderTest, ContinuesFromTheNextStateAfterALostChunk) {
   RecordedScene recorded(options());
   recorded.ticks(100);
-  // In what is going to be lost: the state after it does not tell of it.
+  // This change is in the part that will be lost. The next state does not show it.
   model::ParameterChange change;
   change.cloths.push_back({.damping = 2.0f});
   recorded.change(change);
@@ -329,7 +329,7 @@ TEST_F(RecorderTest, AfterALostChunkItGoesOnFromTheNextState) {
   EXPECT_THAT(toText(result), HasSubstr("are missing until tick 201"));
 }
 
-// As long as it lives, no file of this program grows beyond the limit.
+// While it lives, no file of this program can grow beyond the limit.
 class FileSizeLimit {
  public:
   explicit FileSizeLimit(rlim_t bytes) {
@@ -344,7 +344,7 @@ class FileSizeLimit {
   rlimit before_{};
 };
 
-TEST_F(RecorderTest, AFullDiskEndsTheRecordingAndNotTheScene) {
+TEST_F(RecorderTest, FullDiskEndsTheRecordingButNotTheScene) {
   std::string path;
   std::vector<std::uint64_t> hashes;
   {
@@ -373,11 +373,11 @@ TEST_F(RecorderTest, AFullDiskEndsTheRecordingAndNotTheScene) {
   EXPECT_LT(frames, hashes.size());
 }
 
-TEST_F(RecorderTest, ADiskThatIsTooSlowEndsTheRecordingWholeAndNotTheScene) {
+TEST_F(RecorderTest, SlowDiskCompletesTheRecordingAndKeepsTheScene) {
   RecorderOptions small = options();
   small.maxWaitingBytes = 20'000;
   RecordedScene recorded(small);
-  // No disk is as fast as this many states.
+  // Too many states for any disk.
   for (int i = 0; i < 200; ++i) recorded.recorder->saved({1, std::vector<std::byte>(10'000)}, false);
   recorded.ticks(20);
   const std::string path = recorded.finish();
@@ -388,7 +388,7 @@ TEST_F(RecorderTest, ADiskThatIsTooSlowEndsTheRecordingWholeAndNotTheScene) {
   EXPECT_TRUE(reader->check().has_value());
 }
 
-TEST_F(RecorderTest, NoRecordingTakesTheNameOfAnother) {
+TEST_F(RecorderTest, NeverReusesTheNameOfARecording) {
   std::vector<std::string> paths;
   for (int i = 0; i < 3; ++i) {
     RecordedScene recorded(options());
@@ -399,7 +399,7 @@ TEST_F(RecorderTest, NoRecordingTakesTheNameOfAnother) {
   EXPECT_EQ(std::ranges::unique(paths).size(), 0u);
 }
 
-TEST(Recordings, NeedADirectoryThatCanBeWrittenTo) {
+TEST(Recordings, NeedAWritableDirectory) {
   const e2e::TemporaryDirectory directory;
   const Recordings made({.directory = directory.path() / "a" / "b", .serverName = "test"}, true);
   EXPECT_TRUE(std::filesystem::is_directory(directory.path() / "a" / "b"));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Written, read back, cut, damaged.
+// Recordings that are written, read back, truncated and damaged.
 #include <chrono>
 #include <fstream>
 #include <random>
@@ -21,22 +21,20 @@ namespace {
 
 using ::testing::HasSubstr;
 
-constexpr std::uint32_t kFrames = 150;  // 2.5 s, 13 chunks
-
 std::uint64_t tickOf(std::string_view bytes) {
   v1::Frame frame;
   EXPECT_TRUE(frame.ParseFromArray(bytes.data(), static_cast<int>(bytes.size())));
   return codec::parsePacket(std::as_bytes(std::span(frame.packet())))->header.tick;
 }
 
-TEST(Recording, IsReadAsItWasWritten) {
-  RecordingReader reader = readerOf(sampleRecording(kFrames));
+TEST(Recording, RoundTrips) {
+  RecordingReader reader = readerOf(sampleRecording(kSampleFrames));
   EXPECT_TRUE(reader.check().has_value());
   EXPECT_EQ(reader.fact("scene"), "sample");
   EXPECT_EQ(reader.fact("driver"), "unknown");
   EXPECT_EQ(reader.description()->scene(), "sample");
   EXPECT_EQ(reader.start(), sampleTime(0));
-  EXPECT_EQ(reader.end(), sampleTime(kFrames - 1));
+  EXPECT_EQ(reader.end(), sampleTime(kSampleFrames - 1));
   std::uint64_t frames = 0, ticks = 0;
   for (auto message = reader.next(); *message; message = reader.next()) {
     if ((*message)->topic == Topic::frames) {
@@ -48,18 +46,18 @@ TEST(Recording, IsReadAsItWasWritten) {
     ASSERT_TRUE(tick.ParseFromArray((*message)->bytes.data(), static_cast<int>((*message)->bytes.size())));
     EXPECT_EQ(tick.tick(), ++ticks);
   }
-  EXPECT_EQ(frames, kFrames);
-  EXPECT_EQ(ticks, kFrames);
+  EXPECT_EQ(frames, kSampleFrames);
+  EXPECT_EQ(ticks, kSampleFrames);
 }
 
-TEST(Recording, HasNoChunkOfMoreThanAFifthOfASecond) {
-  RecordingReader reader = readerOf(sampleRecording(kFrames));
+TEST(Recording, HasChunksOfAtMostAFifthOfASecond) {
+  RecordingReader reader = readerOf(sampleRecording(kSampleFrames));
   EXPECT_EQ(reader.mcap().chunks().size(), 13u);
   for (const ChunkPlace& chunk : reader.mcap().chunks())
     EXPECT_LT(chunk.end - chunk.start, McapWriter::kChunkNs);
 }
 
-TEST(Recording, WithoutAMessageIsWholeToo) {
+TEST(Recording, IsCompleteWithoutMessages) {
   std::string bytes;
   McapWriter writer([&](std::string_view more) {
     bytes += more;
@@ -73,8 +71,8 @@ TEST(Recording, WithoutAMessageIsWholeToo) {
   EXPECT_TRUE(reader->check().has_value());
 }
 
-TEST(Recording, SeekGoesToTheKeyFrameBefore) {
-  RecordingReader reader = readerOf(sampleRecording(kFrames));
+TEST(Recording, SeeksToThePreviousKeyFrame) {
+  RecordingReader reader = readerOf(sampleRecording(kSampleFrames));
   for (const std::uint32_t frame : {149u, 0u, 23u, 24u, 25u, 71u, 72u, 130u}) {
     ASSERT_TRUE(reader.seek(sampleTime(frame)));
     const auto message = reader.next();
@@ -86,8 +84,8 @@ TEST(Recording, SeekGoesToTheKeyFrameBefore) {
   EXPECT_EQ((*reader.next())->topic, Topic::description);
 }
 
-TEST(Recording, CutAnywhereLosesAtMostTheChunkInWhichItIsCut) {
-  const std::string whole = sampleRecording(kFrames);
+TEST(Recording, TruncationLosesAtMostOneChunk) {
+  const std::string whole = sampleRecording(kSampleFrames);
   const RecordingReader reader = readerOf(whole);
   const std::uint64_t dataStart = reader.mcap().chunks().front().offset;
   for (std::uint64_t length = dataStart; length < whole.size(); length += 7) {
@@ -98,7 +96,7 @@ TEST(Recording, CutAnywhereLosesAtMostTheChunkInWhichItIsCut) {
     RecordingReader cutReader = readerOf(cut, CutFiles::read);
     EXPECT_FALSE(cutReader.mcap().indexed());
     ASSERT_EQ(cutReader.mcap().chunks().size(), wholeChunks) << length;
-    // What is in them is known without the index, but of the last.
+    // The contents are known without the index, except for the last chunk.
     for (std::size_t i = 0; i < wholeChunks; ++i) {
       const auto& channels = cutReader.mcap().chunks()[i].channels;
       if (channels || i + 1 < wholeChunks) {
@@ -109,11 +107,11 @@ TEST(Recording, CutAnywhereLosesAtMostTheChunkInWhichItIsCut) {
   }
   RecordingReader half = readerOf(whole.substr(0, whole.size() / 2), CutFiles::read);
   const std::size_t frames = countMessages(half, Topic::frames);
-  EXPECT_GT(frames, kFrames / 4);
-  EXPECT_LT(frames, std::size_t{kFrames});
+  EXPECT_GT(frames, kSampleFrames / 4);
+  EXPECT_LT(frames, std::size_t{kSampleFrames});
 }
 
-TEST(Recording, CutInItsHeadersIsSaidToBeSo) {
+TEST(Recording, ReportsTruncationInItsHeaders) {
   const std::string whole = sampleRecording(10);
   const std::uint64_t dataStart = readerOf(whole).mcap().chunks().front().offset;
   for (std::uint64_t length = 0; length < dataStart; ++length) {
@@ -124,7 +122,7 @@ TEST(Recording, CutInItsHeadersIsSaidToBeSo) {
   }
 }
 
-TEST(Recording, NoFlippedBitGoesUnnoticed) {
+TEST(Recording, DetectsEveryFlippedBit) {
   const std::string whole = sampleRecording(30);
   for (std::size_t bit = 0; bit < 8 * whole.size(); bit += 29) {
     std::string damaged = whole;
@@ -135,7 +133,7 @@ TEST(Recording, NoFlippedBitGoesUnnoticed) {
   }
 }
 
-TEST(Recording, AnyBytesAreReadSafely) {
+TEST(Recording, ReadsAnyBytesSafely) {
   const std::string whole = sampleRecording(40);
   std::mt19937 random(1);
   for (int round = 0; round < 4000; ++round) {
@@ -168,7 +166,7 @@ TEST(Recording, AnyBytesAreReadSafely) {
   }
 }
 
-TEST(Recording, OtherFilesAreSaidToBeWhatTheyAre) {
+TEST(Recording, ReportsTheKindOfOtherFiles) {
   const e2e::TemporaryDirectory directory;
   const auto errorOf = [&](const char* name, const std::string& content) {
     const auto path = directory.path() / name;
@@ -195,7 +193,7 @@ TEST(Recording, OtherFilesAreSaidToBeWhatTheyAre) {
   EXPECT_THAT(errorOf("other", other), HasSubstr("no recording of clothstream"));
 }
 
-TEST(Recording, SaysWhatItsSinkSaysAndWritesNothingAfterIt) {
+TEST(Recording, PassesOnTheSinksErrorAndStopsWriting) {
   std::size_t calls = 0;
   McapWriter writer([&](std::string_view) -> Written {
     if (++calls == 3) return tl::unexpected(std::string("no room"));
@@ -208,16 +206,15 @@ TEST(Recording, SaysWhatItsSinkSaysAndWritesNothingAfterIt) {
   EXPECT_EQ(calls, 3u);
 }
 
-TEST(OutputFile, ReplacesNothing) {
+TEST(OutputFile, NeverReplacesAFile) {
   const e2e::TemporaryDirectory directory;
   const std::string path = (directory.path() / "file").string();
   std::ofstream(path) << "mine";
   EXPECT_THAT(OutputFile::create(path).error(), HasSubstr("File exists"));
 }
 
-// An hour of 60 frames a second.
-// How long that takes is measured by tests/bench/recording.cpp.
-TEST(Recording, IsSoughtThroughToTheKeyFrameBeforeAnyTime) {
+// An hour at 60 frames a second. tests/bench/recording.cpp measures the time.
+TEST(Recording, SeeksToThePreviousKeyFrameInALongRecording) {
   const e2e::TemporaryDirectory directory;
   const std::string path = (directory.path() / "minutes").string();
   constexpr std::uint32_t kMinutes = 5 * 60 * kSampleRate;

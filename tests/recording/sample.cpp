@@ -21,7 +21,7 @@ const codec::StreamLayout kLayout{.epoch = 1,
                                   .normals = codec::NormalMode::none,
                                   .cloths = {{.vertexCount = 42, .rows = 6, .columns = 7}}};
 
-constexpr float kStiffness = 20;  // at the start
+constexpr float kStiffness = 20;  // stiffness at the start
 
 void must(const Written& written) {
   if (!written) throw std::runtime_error(written.error());
@@ -66,7 +66,7 @@ void write(const Sink& sink, std::uint32_t frames, const codec::StreamLayout& la
   if (!writer) throw std::runtime_error(writer.error());
   must(writer->write(Topic::description, sampleTime(0), description.SerializeAsString()));
   const auto encoder = codec::Encoder::make(layout);
-  std::vector<codec::MotionFrame> motion;  // which begins anew after as many frames
+  std::vector<codec::MotionFrame> motion;  // repeated after its last frame
   for (std::uint32_t i = 0; i < std::min(frames, 600u); ++i)
     motion.push_back(codec::sampleMotion(layout, i, 0.05f));
   std::vector<std::byte> packet(encoder->packetBound());

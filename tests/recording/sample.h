@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A recording of a small cloth that waves.
+// Sample recording of a small waving cloth.
 #pragma once
 
 #include <cstddef>
@@ -14,33 +14,34 @@ namespace clothstream::recording {
 
 inline constexpr std::uint64_t kSampleStart = 1'700'000'000'000'000'000;  // ns
 inline constexpr std::uint32_t kSampleRate = 60;                          // frames/s
+inline constexpr std::uint32_t kSampleFrames = 150;                       // usual length: 2.5 s, 13 chunks
 constexpr std::uint64_t sampleTime(std::uint64_t frame) {
   return kSampleStart + frame * 1'000'000'000 / kSampleRate;
 }
 
-// Of its stream, but that its description says how many temporal layers there are.
+// Layout of its stream. The number of temporal layers in the description may differ.
 const codec::StreamLayout& sampleLayout();
 v1::StreamDescription sampleDescription(std::uint8_t layers = 1);
 
-// Of so many frames, with ticks beside them. As its sink got it.
+// Writes a recording of `frames` frames and their ticks to the sink.
 void writeSample(const Sink& sink, std::uint32_t frames, std::uint8_t layers = 1);
 std::string sampleRecording(std::uint32_t frames, std::uint8_t layers = 1);
 
-// Before each frame of a number that this divides, but the first, sliders were moved: with each second of
-// these the wind's x became that frame's number, with the others the stiffness of the structural springs.
+// Interval of parameter changes in frames, starting after the first frame. At every second change the wind's
+// x becomes the frame's number, at the others the stiffness of the structural springs.
 inline constexpr std::uint32_t kFramesAChange = 6;
 void writeSampleWithSliders(const Sink& sink, std::uint32_t frames,
                             const codec::StreamLayout& layout = sampleLayout());
-// Of the wind and the stiffness, as they are with this frame.
+// Wind and stiffness at this frame.
 struct SampleSliders {
   float wind = 0, stiffness = 0;
 };
 SampleSliders sampleSliders(std::uint32_t frame);
 
-// Fails where the bytes cannot be opened.
+// Fails the test if the bytes cannot be opened.
 RecordingReader readerOf(std::string bytes, CutFiles cutFiles = CutFiles::refused);
 
-// What is read until the end or the first error: so many messages of this topic.
+// Reads to the end or the first error and counts the messages of this topic.
 std::size_t countMessages(RecordingReader& reader, Topic topic);
 
 }  // namespace clothstream::recording

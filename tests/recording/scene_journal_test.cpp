@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Recordings that begin and end while the scene runs.
+// Recordings that start and end while the scene runs.
 #include "server/recording/scene_journal.h"
 
 #include <atomic>
@@ -63,7 +63,7 @@ class SceneJournalTest : public tests::GpuTest {
       poses.grabs.push_back({.id = 1, .pose = {.position = {0, -0.5f, 0}}, .radius = 0.2f, .reach = 0.5f});
     live->inbox.postPoses(3, poses, now);
   }
-  // The kinds of all notices from here on, as somebody in the scene is told them.
+  // Kinds of all notices from now on that a participant of the scene receives.
   std::shared_ptr<stream::Mailbox> listen() {
     auto mailbox = std::make_shared<stream::Mailbox>([] {});
     EXPECT_EQ(live->audience.join(mailbox, 5), stream::Audience::Joining::joined);
@@ -95,7 +95,7 @@ class SceneJournalTest : public tests::GpuTest {
   stream::Clock::time_point now = stream::Clock::now();
 };
 
-TEST_F(SceneJournalTest, WhatBeginsInTheMiddleIsSimulatedAgainToTheBit) {
+TEST_F(SceneJournalTest, ResimulatesARecordingThatStartsInTheMiddle) {
   grab(true);
   ticks(30);
   model::ParameterChange change = tests::wind(2);
@@ -128,11 +128,11 @@ TEST_F(SceneJournalTest, WhatBeginsInTheMiddleIsSimulatedAgainToTheBit) {
   ASSERT_TRUE(reader);
   for (auto message = reader->next(); *message; message = reader->next()) {
     if ((*message)->topic != Topic::frames) continue;
-    EXPECT_TRUE(isKeyFrame((*message)->bytes));  // the first
+    EXPECT_TRUE(isKeyFrame((*message)->bytes));  // the first frame
     break;
   }
 
-  // And another one.
+  // A second recording.
   EXPECT_TRUE(journal->start(""));
   ticks(5);
   const auto next = journal->stop();
@@ -141,7 +141,7 @@ TEST_F(SceneJournalTest, WhatBeginsInTheMiddleIsSimulatedAgainToTheBit) {
   EXPECT_EQ(journal->counts().complete, 2u);
 }
 
-TEST_F(SceneJournalTest, WhatIsShownWhileTheClockStandsIsNoneOfIt) {
+TEST_F(SceneJournalTest, OmitsFramesOfAPausedScene) {
   ticks(1);
   ASSERT_TRUE(journal->start("paused"));
   ticks(10);
@@ -168,7 +168,7 @@ TEST_F(SceneJournalTest, WhatIsShownWhileTheClockStandsIsNoneOfIt) {
   EXPECT_EQ(recorded, 20u);
 }
 
-TEST_F(SceneJournalTest, WhatCannotBeIsRefused) {
+TEST_F(SceneJournalTest, RefusesImpossibleRequests) {
   for (const char* name : {"../up", "a/b", ".", "a.mcap", "a b", "\n"}) {
     const auto refused = journal->start(name);
     ASSERT_FALSE(refused) << name;
@@ -178,7 +178,7 @@ TEST_F(SceneJournalTest, WhatCannotBeIsRefused) {
   EXPECT_THAT(journal->stop().error().text, HasSubstr("'small' is not being recorded"));
   ASSERT_TRUE(journal->start("one"));
   EXPECT_THAT(journal->start("two").error().text, HasSubstr("is already being recorded to one.mcap"));
-  // The scene did not run meanwhile.
+  // The scene did not run in between.
   EXPECT_THAT(journal->stop().error().text, HasSubstr("did not run"));
   EXPECT_FALSE(std::filesystem::exists(pathOf("one.mcap")));
 
@@ -194,7 +194,7 @@ TEST_F(SceneJournalTest, WhatCannotBeIsRefused) {
   EXPECT_THAT(journal->stop().error().text, HasSubstr("is recorded by the server all the time"));
 }
 
-TEST_F(SceneJournalTest, EverybodyIsToldWhenItBeginsAndEnds) {
+TEST_F(SceneJournalTest, NotifiesParticipantsOfStartAndEnd) {
   std::vector<v1::NoticeKind> kinds;
   const auto mailbox = listen();
   ticks(2);
@@ -210,7 +210,7 @@ TEST_F(SceneJournalTest, EverybodyIsToldWhenItBeginsAndEnds) {
   live->audience.leave(*mailbox);
 }
 
-TEST_F(SceneJournalTest, AtTheLimitItGoesOnInAnotherFile) {
+TEST_F(SceneJournalTest, ContinuesInAnotherFileAtTheLimit) {
   RecorderOptions limited;
   limited.maxBytes = 260'000;
   make(limited, true);
@@ -224,7 +224,7 @@ TEST_F(SceneJournalTest, AtTheLimitItGoesOnInAnotherFile) {
     read(*mailbox, kinds);
     ASSERT_LT(run, 20'000);
   }
-  // Of the files in between nobody is told.
+  // Participants are not notified of the files in between.
   EXPECT_THAT(kinds, ::testing::ElementsAre(v1::NOTICE_KIND_RECORDING_STARTED));
   live->audience.leave(*mailbox);
   packer->drain();
@@ -240,7 +240,7 @@ TEST_F(SceneJournalTest, AtTheLimitItGoesOnInAnotherFile) {
   EXPECT_EQ(all, static_cast<std::uint64_t>(run));
 }
 
-TEST_F(SceneJournalTest, NoGrabTakesHoldAnewForAnotherFileUnlessItHoldsOn) {
+TEST_F(SceneJournalTest, SplitsTheFileWhenNoGrabIsHeldOrAGrabLasts) {
   RecorderOptions limited;
   limited.maxBytes = 240'000;
   make(limited, true);
@@ -249,7 +249,7 @@ TEST_F(SceneJournalTest, NoGrabTakesHoldAnewForAnotherFileUnlessItHoldsOn) {
     const RecordingCounts counts = journal->counts();
     return counts.running + counts.complete;
   };
-  // So few at a time that what is written at once is less than an eighth of the limit.
+  // Few ticks at a time, so that each write is less than an eighth of the limit.
   while (journal->counts().bytes < limited.maxBytes) {
     const std::uint64_t before = journal->counts().bytes;
     ticks(20);
@@ -260,7 +260,7 @@ TEST_F(SceneJournalTest, NoGrabTakesHoldAnewForAnotherFileUnlessItHoldsOn) {
   ticks(1);
   EXPECT_EQ(files(), 1u);
   grab(false);
-  ticks(3);  // lets go, then the file is ended, then another one begins
+  ticks(3);  // releases the grab, then the file ends, then another one starts
   EXPECT_EQ(files(), 2u);
   grab(true);
   for (int run = 0; files() < 3; ++run) {
@@ -269,8 +269,8 @@ TEST_F(SceneJournalTest, NoGrabTakesHoldAnewForAnotherFileUnlessItHoldsOn) {
   }
 }
 
-// Such as the device's thread gives up a scene whose ticks fail; who joins it later has another host.
-TEST_F(SceneJournalTest, AfterItsHostIsGoneAnotherOneIsRecorded) {
+// The device's thread gives up a scene whose ticks fail. A later participant gets another host.
+TEST_F(SceneJournalTest, RecordsTheNextHostOfAScene) {
   const auto another = [&] {
     packer->drain();
     host.reset();
@@ -288,7 +288,7 @@ TEST_F(SceneJournalTest, AfterItsHostIsGoneAnotherOneIsRecorded) {
   ASSERT_TRUE(journal->start("after"));
   ticks(4);
   ASSERT_TRUE(journal->stop());
-  // What was asked for and has not begun waits for the other one.
+  // A request that has not started waits for the other recording.
   ASSERT_TRUE(journal->start("waits"));
   another();
   ticks(5);
@@ -309,7 +309,7 @@ TEST_F(SceneJournalTest, AfterItsHostIsGoneAnotherOneIsRecorded) {
   EXPECT_EQ(journal->counts().complete, 2u);
 }
 
-TEST_F(SceneJournalTest, OfManyWhoAskAtOnceOneGetsARecording) {
+TEST_F(SceneJournalTest, GivesOneRecordingForSimultaneousRequests) {
   ticks(1);
   for (int round = 0; round < 20; ++round) {
     std::atomic<int> got{0};
@@ -325,7 +325,7 @@ TEST_F(SceneJournalTest, OfManyWhoAskAtOnceOneGetsARecording) {
   EXPECT_EQ(std::distance(begin(files), end(files)), 20);
 }
 
-TEST_F(SceneJournalTest, WhatIsRecordedOfScenesThatAreGoneIsCountedAndNoMoreKept) {
+TEST_F(SceneJournalTest, CountsRecordingsOfRemovedScenesWithoutKeepingThem) {
   Recordings recordings({.directory = directory.path(), .serverName = "test"}, true);
   std::weak_ptr<stream::Journal> gone;
   for (int scene = 1; scene <= 3; ++scene) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Writes the sample of tests to a file, for other readers: write_sample FILE FRAMES.
+// Writes the sample of the tests to a file, for other readers: write_sample FILE FRAMES.
 #include <cstdlib>
 #include <filesystem>
 

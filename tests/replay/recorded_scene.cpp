@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A named scene that runs for some ticks, with somebody in it, and is recorded.
+// Runs and records a named scene with a participant for some ticks.
 #include "tests/replay/recorded_scene.h"
 
 #include <algorithm>
@@ -24,8 +24,7 @@ using stream::Clock;
 
 constexpr std::uint64_t kParticipant = 7;
 
-// What the participant does at a tick, 0 being the first, of so many. `centre` is the first cloth's at the
-// start.
+// Poses of the participant at `tick`, counted from 0. `centre` is the centre of the first cloth at the start.
 model::ParticipantPoses posesAt(std::uint32_t tick, std::uint32_t ticks, const model::Vec3& centre) {
   model::ParticipantPoses poses;
   const float part = static_cast<float>(tick) / static_cast<float>(ticks);
@@ -48,7 +47,7 @@ model::ParticipantPoses posesAt(std::uint32_t tick, std::uint32_t ticks, const m
 
 std::uint32_t ticksFor(const model::Scene& scene) {
   constexpr std::uint32_t kNodeFrames = 60'000, kMinFrames = 12, kMaxFrames = 40;
-  // A mesh's geometry takes as much as its frames.
+  // The geometry of a mesh takes as much space as its frames.
   const bool mesh = scene.cloths.front().mesh != nullptr;
   const std::uint32_t frames =
       mesh ? kMinFrames : std::clamp(kNodeFrames / scene.nodeCount(), kMinFrames, kMaxFrames);

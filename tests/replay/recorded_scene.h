@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A named scene that runs for some ticks, with somebody in it, and is recorded.
+// Runs and records a named scene with a participant for some ticks.
 #pragma once
 
 #include <cstdint>
@@ -11,17 +11,17 @@
 
 namespace clothstream::replay {
 
-// How long recordings of this scene are: so that they stay small, and have some frames.
+// Length of this scene's recordings in ticks: enough for some frames, and small files.
 std::uint32_t ticksFor(const model::Scene& scene);
 
-// Runs a named scene while a ball goes through it, a hand pulls at it and the wind changes. Gives the path of
-// the recording, in the directory. Throws std::runtime_error where it cannot be.
+// Runs a named scene while a ball moves through it, a hand pulls at it and the wind changes. Returns the path
+// of the recording in the directory. Throws std::runtime_error on failure.
 std::string recordScene(vulkan::Device& device, const std::string& name,
                         const std::filesystem::path& directory);
 
-// A recording as it is kept: compressed whole, for its schemas are larger than the rest.
+// Compresses a whole recording, since its schemas are larger than the rest.
 void compress(const std::string& recording, const std::string& to);
-// Throws std::runtime_error where it cannot be read.
+// Throws std::runtime_error if the file cannot be read.
 void decompress(const std::string& from, const std::string& recording);
 
 }  // namespace clothstream::replay

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: MIT
-// The recordings beside this file, one of each named scene, once more: through the decoder, and through the
+// Replays the recordings of this folder, one for each named scene: through the decoder, and through the
 // simulation.
 //
-// Neither is allowed to differ at all. The decoder computes with integers. Kernels use only operations whose
-// result Vulkan fixes, in an order that nothing but the scene decides (docs/architecture.md), whichever
-// instructions a device makes of them; so a state that was recorded elsewhere has the same hash here. How far
-// off a state is that has not, is told by the frames: none of its vertices was farther than sqrt(3) max_error
-// from what its tick's frame shows, and the rounding of a coordinate to float32.
+// Neither may differ at all. The decoder computes with integers. Kernels use only operations whose result
+// Vulkan defines, in an order that depends on the scene alone (docs/architecture.md), so every device must
+// reach the recorded hash.
+//
+// The frames show how far a differing state is off. No vertex of the original was farther from its frame than
+// sqrt(3) max_error plus the rounding of a coordinate to float32.
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
@@ -39,7 +40,7 @@ std::string keptRecordingOf(const std::string& scene) {
   return "tests/replay/" + scene + ".mcap.gz";
 }
 
-// Decoded positions by tick; every frame of the recording must decode to what its encoder held.
+// Decoded positions by tick. Every frame must decode to the state that its encoder held.
 struct DecodedFrames {
   std::map<std::uint64_t, std::vector<float>> positions;
   float maxError = 0;
@@ -80,7 +81,7 @@ DecodedFrames decode(const std::string& path) {
   return decoded;
 }
 
-// The largest distance of a vertex from where the frame shows it, m.
+// Largest distance of a vertex from its position in the frame, in metres.
 double distance(const std::vector<float>& shown, const simulation::NodeState& state) {
   double largest = 0;
   for (std::size_t i = 0; i < state.positions.size(); ++i) {
@@ -127,7 +128,7 @@ void replay(const std::string& path, std::uint32_t ticks) {
 
 class Replay : public tests::GpuTest, public ::testing::WithParamInterface<std::string> {};
 
-TEST_P(Replay, OfAKeptRecordingHasTheSameFramesAndStates) {
+TEST_P(Replay, KeptRecordingHasTheSameFramesAndStates) {
   auto scene = messages::loadScene(GetParam());
   ASSERT_TRUE(scene);
   const std::string kept = keptRecordingOf(GetParam());
@@ -144,7 +145,7 @@ INSTANTIATE_TEST_SUITE_P(Scenes, Replay, ::testing::ValuesIn(messages::namedScen
 
 class ReplayHere : public tests::GpuTest {};
 
-TEST_F(ReplayHere, OfWhatWasJustRecordedHasTheSameFramesAndStates) {
+TEST_F(ReplayHere, NewRecordingHasTheSameFramesAndStates) {
   const e2e::TemporaryDirectory directory;
   const auto scene = messages::loadScene("folds");
   ASSERT_TRUE(scene);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Records every named scene anew for tests/replay (docs/recording.md): write_replays DIRECTORY [SCENE...].
+// Records every named scene for tests/replay (docs/recording.md): write_replays DIRECTORY [SCENE...].
 #include <cstdio>
 #include <exception>
 #include <filesystem>

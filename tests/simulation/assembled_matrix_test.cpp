@@ -71,8 +71,8 @@ reference::ConstraintSystem systemOf(const model::Scene& scene, std::size_t numb
 std::vector<float> listOf(const shared::EntriesRecord& range,
                           const std::vector<shared::NumbersRecord>& table) {
   std::vector<float> list;
-  for (auto texel = static_cast<std::size_t>(range.range.x); texel < static_cast<std::size_t>(range.range.y);
-       ++texel) {
+  for (auto texel = static_cast<std::size_t>(range.firstTexel);
+       texel < static_cast<std::size_t>(range.endTexel); ++texel) {
     const shared::vec4& four = table[texel].four;
     list.insert(list.end(), {four.x, four.y, four.z, four.w});
   }
@@ -88,8 +88,8 @@ TEST(AssembledTables, HaveAnEntryWhereTheMatrixHas) {
   for (std::size_t i = 0; i < tables.cloths.size(); ++i) {
     SCOPED_TRACE(scene.cloths[tables.cloths[i]].name);
     const Eigen::MatrixXd A = systemOf(scene, tables.cloths[i], state).matrix();
-    const auto first = static_cast<std::size_t>(tables.systems[i].rows.y);
-    ASSERT_EQ(static_cast<Eigen::Index>(tables.systems[i].rows.z) - static_cast<Eigen::Index>(first),
+    const auto first = static_cast<std::size_t>(tables.systems[i].firstRow);
+    ASSERT_EQ(static_cast<Eigen::Index>(tables.systems[i].endRow) - static_cast<Eigen::Index>(first),
               A.rows());
     std::uint64_t all = 0;
     for (Eigen::Index row = 0; row < A.rows(); ++row) {
@@ -224,7 +224,7 @@ TEST_F(AssembledMatrix, TimesAVectorIsTheDenseProduct) {
     SCOPED_TRACE(scene.cloths[tables.cloths[i]].name);
     const reference::ConstraintSystem system = systemOf(scene, tables.cloths[i], state);
     const Eigen::MatrixXd A = system.matrix();
-    const auto first = static_cast<std::size_t>(tables.systems[i].rows.y);
+    const auto first = static_cast<std::size_t>(tables.systems[i].firstRow);
     const Eigen::VectorXd p = Eigen::Map<const Eigen::VectorXf>(&vector[first], A.rows()).cast<double>();
     const Eigen::VectorXd expected = A * p, side = system.side() / kSubstepSeconds;
     for (Eigen::Index row = 0; row < A.rows(); ++row) {

@@ -310,10 +310,10 @@ TEST_F(Collision, WhatCollidersGiveToTheClothIsTold) {
                          resting(model::Plane{}, {})});
     double impulse = 0;
     for (int tick = 0; tick < 36; ++tick) {
-      inputs.tellsContacts = false;
+      inputs.reportsContacts = false;
       const std::uint64_t expected = untold.tick(inputs).stateHash;
       EXPECT_TRUE(untold.contacts().empty());
-      inputs.tellsContacts = true;
+      inputs.reportsContacts = true;
       EXPECT_EQ(running.tick(inputs).stateHash, expected);
       for (const simulation::ContactStatus& contact : running.contacts()) {
         EXPECT_EQ(contact.collider, 1u);

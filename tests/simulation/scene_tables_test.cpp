@@ -18,11 +18,11 @@ std::vector<int> visitsOf(const std::vector<model::Cloth>& cloths, std::uint32_t
   for (const shared::TileRecord& tile :
        simulation::makeTiles(cloths, rowsPerInvocation, workgroupSize).records)
     for (std::uint32_t lane = 0; lane < workgroupSize; ++lane) {
-      const auto cloth = static_cast<std::uint32_t>(tile.start.x);
+      const auto cloth = static_cast<std::uint32_t>(tile.cloth);
       const model::Grid& grid = cloths[cloth].grid;
-      const std::uint32_t along = static_cast<std::uint32_t>(tile.start.z) + lane;
+      const std::uint32_t along = static_cast<std::uint32_t>(tile.column) + lane;
       const std::uint32_t row =
-          static_cast<std::uint32_t>(tile.start.y) + along / grid.columns * rowsPerInvocation;
+          static_cast<std::uint32_t>(tile.row) + along / grid.columns * rowsPerInvocation;
       for (std::uint32_t r = row; r < std::min(row + rowsPerInvocation, grid.rows); ++r)
         ++visits[offsets[cloth] + r * grid.columns + along % grid.columns];
     }
@@ -49,8 +49,7 @@ TEST(SceneTables, PinnedNodesHaveNoInverseMass) {
 TEST(SceneTables, FirstNodesOfLargeScenesAreExact) {
   const std::vector<model::Cloth> cloths{calmCloth(5000, 5003), calmCloth(2, 2)};
   const shared::ClothRecord record = simulation::clothRecords(cloths, 0.001).back();
-  EXPECT_EQ(static_cast<std::uint32_t>(record.place.x) + (static_cast<std::uint32_t>(record.place.y) << 16),
-            5000u * 5003u);
+  EXPECT_EQ(shared::wholeNumber(record.firstNodeLow, record.firstNodeHigh), 5000u * 5003u);
 }
 
 }  // namespace

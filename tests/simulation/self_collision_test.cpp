@@ -100,7 +100,7 @@ class Lists {
                {.cloths = cloths_,
                 .colliders = none_,
                 .nearColliders = none_,
-                .toldContacts = none_,
+                .contactImpulses = none_,
                 .positions = {&positions_, &positions_},
                 .velocities = {&velocities_, &velocities_}},
                workgroupSize),

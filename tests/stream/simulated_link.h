@@ -13,7 +13,7 @@
 
 #include <gtest/gtest.h>
 
-#include "clients/core/acknowledgement.h"
+#include "clients/core/stream/frame_feedback.h"
 #include "proto/codec/temporal_layers.h"
 #include "server/stream/mailbox.h"
 

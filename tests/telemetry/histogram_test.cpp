@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Quantiles lie within a bin of the truth, and nothing is lost between threads.
+// Accuracy of quantiles, and concurrent recording.
 #include "server/telemetry/histogram.h"
 
 #include <algorithm>
@@ -13,7 +13,7 @@
 namespace clothstream::telemetry {
 namespace {
 
-// 48 bins a decade: the ratio of a bin's two edges.
+// Ratio of the two edges of a bin, with 48 bins per decade.
 const double kBinRatio = std::pow(10.0, 1.0 / 48);
 
 TEST(Histogram, IsEmptyAtFirst) {
@@ -22,7 +22,7 @@ TEST(Histogram, IsEmptyAtFirst) {
   EXPECT_EQ(summary.max, 0);
 }
 
-TEST(Histogram, QuantilesLieWithinABinOfTheSortedValues) {
+TEST(Histogram, QuantilesAreWithinOneBinOfTheSortedValues) {
   Histogram histogram;
   std::mt19937 random(7);
   std::lognormal_distribution<double> durations(std::log(0.004), 1.2);
@@ -42,7 +42,7 @@ TEST(Histogram, QuantilesLieWithinABinOfTheSortedValues) {
   }
 }
 
-TEST(Histogram, CountsWhatLiesOutsideItsRangeToTheEnds) {
+TEST(Histogram, CountsValuesOutsideTheRangeInTheEndBins) {
   Histogram histogram;
   histogram.record(0);
   histogram.record(-1);
@@ -53,7 +53,7 @@ TEST(Histogram, CountsWhatLiesOutsideItsRangeToTheEnds) {
   EXPECT_LE(summary.p50, 1e-6 * kBinRatio);
 }
 
-TEST(Histogram, LosesNothingBetweenThreads) {
+TEST(Histogram, CountsEveryRecordOfConcurrentThreads) {
   Histogram histogram;
   StageHistograms stages;
   std::vector<std::thread> threads;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The table says what happened, and leaves out what did not.
+// Text of the metrics, and log levels.
 #include "server/telemetry/metrics.h"
 
 #include <stdexcept>
@@ -16,7 +16,7 @@ namespace {
 using testing::HasSubstr;
 using testing::Not;
 
-TEST(Table, ShowsStagesThatHappenedInMilliseconds) {
+TEST(Table, ShowsRecordedStagesInMillisecondsAndOmitsOthers) {
   SceneMetrics metrics;
   metrics.tick.record(0.25);
   metrics.device.record("springs", 0.125);
@@ -30,7 +30,7 @@ TEST(Table, ShowsStagesThatHappenedInMilliseconds) {
   EXPECT_THAT(text, Not(HasSubstr("pose arrival")));
 }
 
-TEST(Log, KnowsItsLevelsAndRefusesOthers) {
+TEST(Log, RefusesUnknownLevels) {
   setUpLog("warning");
   EXPECT_EQ(spdlog::get_level(), spdlog::level::warn);
   setUpLog("off");

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: MIT
-// What the C++ run-time library would need a terminal and exceptions for: in WebAssembly a throw and lack of
-// memory trap.
+// Replaces the parts of the C++ runtime that need exceptions or a terminal. In WebAssembly, a throw and a
+// failed allocation trap.
 //
-// No throw is reached by bytes from outside: wire.h checks a message before protozero reads it. Without these
-// the module would import file functions only to print why it ends.
+// Input bytes cannot cause a throw: wire.h checks a message before protozero reads it. Without these
+// functions the module would import file functions, only to print an error.
 #include <cstddef>
 #include <cstdlib>
 #include <new>
 
-// NOLINTBEGIN(bugprone-reserved-identifier): names of the C++ ABI.
+// NOLINTBEGIN(bugprone-reserved-identifier): the C++ ABI defines these names.
 extern "C" {
 
 [[noreturn]] void* __cxa_allocate_exception(std::size_t) {

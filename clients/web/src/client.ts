@@ -1,6 +1,23 @@
 // SPDX-License-Identifier: MIT
-// One client of the core, typed: messages in and out, and what the newest frame holds.
+// Typed interface to one client of the core: messages in and out, and the contents of the newest frame.
 
+import {
+  CS_CLOTH_REPORT_VERSION,
+  CS_CLOTH_SETTINGS_VERSION,
+  cs_cloth,
+  cs_cloth_parameters,
+  cs_cloth_report,
+  cs_cloth_settings,
+  cs_collider,
+  cs_environment,
+  cs_grab,
+  cs_grab_event,
+  cs_participant,
+  cs_play_out_options,
+  cs_playback,
+  cs_statistics,
+  cs_submesh,
+} from "./layout";
 import type { CoreModule } from "./wasm";
 
 export type Vec3 = readonly [number, number, number];
@@ -49,11 +66,11 @@ export interface ClothLayout {
   indexCount: number;
 }
 
-// What a mesh is drawn with; nothing of it is there for a grid.
+// Texture coordinates and submeshes of a mesh. Empty for a grid.
 export interface Drawing {
-  uvs: Float32Array; // (u, v) each, v upwards; empty where there are none
-  uvIndices: Uint32Array; // one a corner of the cloth's triangles
-  submeshes: { name: string; firstIndex: number; indexCount: number }[]; // of the scene's triangles
+  uvs: Float32Array; // (u, v) pairs, v upwards; may be empty
+  uvIndices: Uint32Array; // one per corner of the cloth's triangles
+  submeshes: { name: string; firstIndex: number; indexCount: number }[]; // indices count in the scene's triangles
 }
 
 export enum Shape {
@@ -64,26 +81,26 @@ export enum Shape {
   hull = 4,
 }
 
-// Sizes are those of its shape, in its own frame (core.h); metres.
+// Lengths in metres, in the collider's own frame (core.h).
 export interface Collider {
   index: number;
   name: string;
   shape: Shape;
   position: Vec3;
-  orientation: readonly [number, number, number, number]; // x y z w
+  orientation: readonly [number, number, number, number]; // quaternion x, y, z, w
   radius: number;
   length: number;
   size: Vec3;
-  participantId: bigint; // 0: the scene's
+  participantId: bigint; // 0 for a collider of the scene
 }
 
-// Corners, 3 floats each, and triangles.
+// Vertices (3 floats each) and triangles (3 indices each).
 export interface Hull {
   vertices: Float32Array;
   triangles: Uint32Array;
 }
 
-// cs_role; a server may have others.
+// Names of cs_role. A newer server may have more roles.
 export const Roles: ReadonlyMap<number, string> = new Map([
   [1, "viewer"],
   [2, "participant"],
@@ -92,13 +109,13 @@ export const Roles: ReadonlyMap<number, string> = new Map([
 
 export interface Participant {
   id: bigint;
-  name: string; // of who has none: its program's
+  name: string; // the program's name if the participant has none
   role: number;
-  away: boolean; // cut off, and held for a while
+  away: boolean; // disconnected, within the reconnect grace
   self: boolean;
 }
 
-// {stiffness in N/m, damping in N s/m}
+// Stiffness in N/m and damping in N s/m.
 export type Spring = readonly [number, number];
 
 export interface Environment {
@@ -116,7 +133,7 @@ export interface ClothParameters {
   damping: number; // 1/s
 }
 
-// cs_solver; a server may have others.
+// Names of cs_solver. A newer server may have more solvers.
 export const Solvers: ReadonlyMap<number, string> = new Map([
   [1, "mass-spring"],
   [2, "constraint"],
@@ -125,7 +142,7 @@ export const Solvers: ReadonlyMap<number, string> = new Map([
   [5, "implicit Euler"],
 ]);
 
-// How the simulation of a cloth does (cs_cloth_report); SI units, strains as parts of a length.
+// Health of one cloth's simulation (cs_cloth_report). SI units; strains are fractions of a length.
 export interface ClothReport {
   activeConstraints: number;
   iterations: number;
@@ -141,50 +158,40 @@ export interface ClothReport {
   tick: number;
 }
 
-// Where a recording that is played stands.
+// State of a recording that is played.
 export interface Playback {
   length: number; // s
-  position: number; // s from its start, now
+  position: number; // current time in the recording, s
   speed: number;
   loop: boolean;
   paused: boolean;
 }
 
-// Sizes of the structs of core.h on a 32-bit machine.
-const kStatisticsBytes = 104;
-const kClothBytes = 28;
-const kColliderBytes = 64;
-const kEnvironmentBytes = 28;
-const kClothParametersBytes = 28;
-const kClothReportBytes = 56;
-const kClothReportVersion = 1;
-const kClothSettingsBytes = 92;
-const kClothSettingsVersion = 1;
-const kGrabBytes = 48;
-const kGrabEventBytes = 24;
-const kParticipantBytes = 24;
-const kSolverAt = 48; // in cs_cloth_settings
+// Bytes of the memory that the core writes structs to: enough for each of them.
 const kScratchBytes = Math.max(
-  kStatisticsBytes,
-  kClothBytes,
-  kColliderBytes,
-  kEnvironmentBytes,
-  kClothParametersBytes,
-  kClothReportBytes,
-  kClothSettingsBytes,
-  kGrabBytes,
-  kGrabEventBytes,
-  kParticipantBytes,
+  cs_statistics.sizeof,
+  cs_cloth.sizeof,
+  cs_submesh.sizeof,
+  cs_collider.sizeof,
+  cs_environment.sizeof,
+  cs_cloth_parameters.sizeof,
+  cs_cloth_report.sizeof,
+  cs_cloth_settings.sizeof,
+  cs_grab.sizeof,
+  cs_grab_event.sizeof,
+  cs_participant.sizeof,
+  cs_play_out_options.sizeof,
+  cs_playback.sizeof,
 );
 
-// Who joins: a name that others see, the role that is wanted, and whether frames are to be shown evenly, a little later.
+// A joining participant: displayed name, requested role, and whether frames are played out smoothly with a delay.
 export interface Identity {
   name: string;
   role: number;
   smooth: boolean;
 }
 
-// Views that it gives (positions, normals, triangles) look into the core's memory: they are good until the next call.
+// Returned views (positions, normals, triangles) point into the core's memory. They are valid until the next call.
 export class Client {
   private readonly handle: number;
   private readonly scratch: number;
@@ -192,7 +199,7 @@ export class Client {
   private inbox = 0;
   private inboxBytes = 0;
 
-  // `scene` may be "" for the server's default, `name` too; `role` is what is wanted of Roles, or 0.
+  // An empty `scene` means the server's default scene; `name` may be empty. `role` is a key of Roles, or 0 for any.
   constructor(
     private readonly core: CoreModule,
     scene: string,
@@ -216,7 +223,7 @@ export class Client {
     this.core.exports.free(this.inbox);
   }
 
-  // One ServerMessage; gives a set of ClientEvent bits.
+  // Handles one ServerMessage. Returns ClientEvent bits.
   receive(message: ArrayBuffer): number {
     if (message.byteLength > this.inboxBytes) {
       this.core.exports.free(this.inbox);
@@ -227,44 +234,44 @@ export class Client {
     return this.core.exports.cs_receive(this.handle, this.inbox, message.byteLength, nowUs());
   }
 
-  // A connection begins; the first message from here on is Hello.
+  // Starts a connection. The next outgoing message is Hello.
   connecting(): void {
     this.core.exports.cs_connecting(this.handle, nowUs());
   }
 
-  // The connection is lost, or could not be made.
+  // Ends a connection that was lost or could not be opened.
   disconnected(): void {
     this.core.exports.cs_disconnected(this.handle, nowUs());
   }
 
-  // When to drop the connection that there is, if any, and open another; on performance.now()'s clock.
+  // Time to drop the current connection, if any, and to open a new one; on the clock of performance.now().
   get connectAtMs(): number {
     return Number(BigInt.asUintN(64, this.core.exports.cs_connect_at(this.handle))) / 1000;
   }
 
-  // All who are in the scene, in the order in which they joined.
+  // Participants of the scene, in the order in which they joined.
   participants(): Participant[] {
     const own = this.core.exports.cs_participant_id(this.handle);
     const count = this.core.exports.cs_participant_count(this.handle);
     return this.list(count, this.core.exports.cs_get_participant, (view, at) => {
-      const id = view.getBigUint64(at, true);
-      const program = this.core.text(view.getUint32(at + 12, true));
+      const id = view.getBigUint64(at + cs_participant.id, true);
+      const program = this.core.text(view.getUint32(at + cs_participant.client_name, true));
       return {
         id,
-        name: this.core.text(view.getUint32(at + 8, true)) || program || "somebody",
-        role: view.getUint32(at + 16, true),
-        away: view.getInt32(at + 20, true) !== 0,
+        name: this.core.text(view.getUint32(at + cs_participant.name, true)) || program || "unnamed",
+        role: view.getUint32(at + cs_participant.role, true),
+        away: view.getInt32(at + cs_participant.away, true) !== 0,
         self: id === own,
       };
     });
   }
 
-  // Pings; to be called ten times a second or more.
+  // Sends pings and runs timers. Call at least ten times per second.
   update(): void {
     this.core.exports.cs_update(this.handle, nowUs());
   }
 
-  // The next ClientMessage to send: a copy.
+  // Copy of the next ClientMessage to send.
   nextOutgoing(): Uint8Array<ArrayBuffer> | undefined {
     const message = this.core.exports.cs_next_outgoing(this.handle, this.scratch);
     if (message === 0) return undefined;
@@ -293,24 +300,24 @@ export class Client {
   statistics(): Statistics {
     this.core.exports.cs_get_statistics(this.handle, nowUs(), this.scratch);
     const view = this.core.view();
-    const count = (index: number) => Number(view.getBigUint64(this.scratch + 8 * index, true));
-    const real = (index: number) => view.getFloat64(this.scratch + 8 * index, true);
+    const count = (offset: number) => Number(view.getBigUint64(this.scratch + offset, true));
+    const real = (offset: number) => view.getFloat64(this.scratch + offset, true);
     return {
-      tick: count(0),
-      frames: count(1),
-      keyFrames: count(2),
-      dropped: count(3),
-      decodeErrors: count(4),
-      bytes: count(5),
-      hashMismatches: count(6),
-      framesPerSecond: real(7),
-      kbitPerSecond: real(8),
-      bitsPerVertex: real(9),
-      roundTripMs: real(10),
+      tick: count(cs_statistics.tick),
+      frames: count(cs_statistics.frames),
+      keyFrames: count(cs_statistics.key_frames),
+      dropped: count(cs_statistics.dropped),
+      decodeErrors: count(cs_statistics.decode_errors),
+      bytes: count(cs_statistics.bytes),
+      hashMismatches: count(cs_statistics.hash_mismatches),
+      framesPerSecond: real(cs_statistics.frames_per_second),
+      kbitPerSecond: real(cs_statistics.kbit_per_second),
+      bitsPerVertex: real(cs_statistics.bits_per_vertex),
+      roundTripMs: real(cs_statistics.round_trip_ms),
     };
   }
 
-  // 3 floats a vertex; rest positions before the first frame.
+  // 3 floats per vertex. Rest positions before the first frame.
   positions(): Float32Array {
     return this.core.floats(this.core.exports.cs_positions(this.handle), 3 * this.vertexCount);
   }
@@ -319,12 +326,12 @@ export class Client {
     return this.core.floats(this.core.exports.cs_normals(this.handle), 3 * this.vertexCount);
   }
 
-  // What is to be drawn at a time of performance.now(): the newest frame, or what play-out makes of the last ones.
+  // Vertices to draw at a time of performance.now(): the newest frame, or the result of play-out.
   shownAt(displayMs: number): { positions: Float32Array; normals: Float32Array } {
     if (!this.playsOut) return { positions: this.positions(), normals: this.normals() };
     const { exports } = this.core;
     exports.cs_play_out(this.handle, nowUs(), BigInt(Math.round(1000 * displayMs)), 0);
-    // The first call may take memory, which detaches views.
+    // The first call may grow the memory, which detaches views.
     const normals = exports.cs_played_normals(this.handle);
     const positions = exports.cs_played_positions(this.handle);
     return {
@@ -340,17 +347,17 @@ export class Client {
 
   cloths(): ClothLayout[] {
     return this.list(this.core.exports.cs_cloth_count(this.handle), this.core.exports.cs_get_cloth, (view, at) => ({
-      name: this.core.text(view.getUint32(at, true)),
-      firstVertex: view.getUint32(at + 4, true),
-      vertexCount: view.getUint32(at + 8, true),
-      rows: view.getUint32(at + 12, true),
-      columns: view.getUint32(at + 16, true),
-      firstIndex: view.getUint32(at + 20, true),
-      indexCount: view.getUint32(at + 24, true),
+      name: this.core.text(view.getUint32(at + cs_cloth.name, true)),
+      firstVertex: view.getUint32(at + cs_cloth.first_vertex, true),
+      vertexCount: view.getUint32(at + cs_cloth.vertex_count, true),
+      rows: view.getUint32(at + cs_cloth.rows, true),
+      columns: view.getUint32(at + cs_cloth.columns, true),
+      firstIndex: view.getUint32(at + cs_cloth.first_index, true),
+      indexCount: view.getUint32(at + cs_cloth.index_count, true),
     }));
   }
 
-  // Of the cloth of that number: copies.
+  // Copies the texture coordinates and submeshes of a cloth.
   drawing(cloth: number): Drawing {
     const { exports } = this.core;
     const uvs = exports.cs_uvs(this.handle, cloth, this.scratch);
@@ -362,20 +369,20 @@ export class Client {
       uvs: this.core.floats(uvs, 2 * uvCount).slice(),
       uvIndices: this.core.indices(uvIndices, indexCount).slice(),
       submeshes: this.list(exports.cs_submesh_count(this.handle, cloth), submesh, (view, at) => ({
-        name: this.core.text(view.getUint32(at, true)),
-        firstIndex: view.getUint32(at + 4, true),
-        indexCount: view.getUint32(at + 8, true),
+        name: this.core.text(view.getUint32(at + cs_submesh.name, true)),
+        firstIndex: view.getUint32(at + cs_submesh.first_index, true),
+        indexCount: view.getUint32(at + cs_submesh.index_count, true),
       })),
     };
   }
 
-  // Of the newest frame.
+  // Colliders of the newest frame.
   colliders(): Collider[] {
     const { cs_collider_count, cs_get_collider } = this.core.exports;
     return this.readColliders(cs_collider_count(this.handle), cs_get_collider);
   }
 
-  // Where they are in what the newest shownAt() gave.
+  // Colliders at the time of the last shownAt().
   shownColliders(): Collider[] {
     if (!this.playsOut) return this.colliders();
     const { cs_played_collider_count, cs_get_played_collider } = this.core.exports;
@@ -388,18 +395,18 @@ export class Client {
   ): Collider[] {
     return this.list(count, get, (view, at, index) => ({
       index,
-      name: this.core.text(view.getUint32(at, true)),
-      shape: view.getUint32(at + 4, true),
-      position: vec3(view, at + 8),
-      orientation: [...vec3(view, at + 20), view.getFloat32(at + 32, true)] as const,
-      radius: view.getFloat32(at + 36, true),
-      length: view.getFloat32(at + 40, true),
-      size: vec3(view, at + 44),
-      participantId: view.getBigUint64(at + 56, true),
+      name: this.core.text(view.getUint32(at + cs_collider.name, true)),
+      shape: view.getUint32(at + cs_collider.shape, true),
+      position: vec3(view, at + cs_collider.position),
+      orientation: quaternion(view, at + cs_collider.orientation),
+      radius: view.getFloat32(at + cs_collider.radius, true),
+      length: view.getFloat32(at + cs_collider.length, true),
+      size: vec3(view, at + cs_collider.size),
+      participantId: view.getBigUint64(at + cs_collider.participant_id, true),
     }));
   }
 
-  // Of a collider that is a hull: copies.
+  // Copies the geometry of a hull collider.
   hull(collider: Collider): Hull {
     const { cs_get_hull } = this.core.exports;
     const [vertexCount, triangles, indexCount] = [this.scratch, this.scratch + 4, this.scratch + 8];
@@ -416,45 +423,45 @@ export class Client {
     return Array.from({ length: count }, (_, index) => this.core.text(this.core.exports.cs_scene(this.handle, index)));
   }
 
-  // As it stands now; undefined before the description.
+  // Current environment; undefined before the description.
   environment(): Environment | undefined {
     if (this.core.exports.cs_get_environment(this.handle, this.scratch) === 0) return undefined;
     const view = this.core.view();
     return {
-      gravity: vec3(view, this.scratch),
-      wind: vec3(view, this.scratch + 12),
-      airDensity: view.getFloat32(this.scratch + 24, true),
-      gustStrength: view.getFloat32(this.scratch + 28, true),
-      gustSeconds: view.getFloat32(this.scratch + 32, true),
+      gravity: vec3(view, this.scratch + cs_environment.gravity),
+      wind: vec3(view, this.scratch + cs_environment.wind),
+      airDensity: view.getFloat32(this.scratch + cs_environment.air_density, true),
+      gustStrength: view.getFloat32(this.scratch + cs_environment.gust_strength, true),
+      gustSeconds: view.getFloat32(this.scratch + cs_environment.gust_seconds, true),
     };
   }
 
-  // Of each cloth, as they stand now.
+  // Current parameters of each cloth.
   clothParameters(): ClothParameters[] {
     const count = this.core.exports.cs_cloth_count(this.handle);
     return this.list(count, this.core.exports.cs_get_cloth_parameters, (view, at) => ({
-      structural: spring(view, at),
-      shear: spring(view, at + 8),
-      bend: spring(view, at + 16),
-      damping: view.getFloat32(at + 24, true),
+      structural: spring(view, at + cs_cloth_parameters.structural),
+      shear: spring(view, at + cs_cloth_parameters.shear),
+      bend: spring(view, at + cs_cloth_parameters.bend),
+      damping: view.getFloat32(at + cs_cloth_parameters.damping, true),
     }));
   }
 
-  // cs_solver of a cloth.
+  // Solver of a cloth as a cs_solver.
   solver(cloth: number): number {
-    this.core.view().setUint32(this.scratch, kClothSettingsVersion, true);
+    this.core.view().setUint32(this.scratch + cs_cloth_settings.version, CS_CLOTH_SETTINGS_VERSION, true);
     if (this.core.exports.cs_get_cloth_settings(this.handle, cloth, this.scratch) === 0) return 0;
-    return this.core.view().getUint32(this.scratch + kSolverAt, true);
+    return this.core.view().getUint32(this.scratch + cs_cloth_settings.solver, true);
   }
 
-  // The cloth goes on with what it last had for this solver, else with the defaults.
+  // Selects a solver. The cloth keeps the settings that it last had for this solver, or the defaults.
   setSolver(cloth: string, solver: number): void {
     this.core.exports.cs_keep_cloth_settings(this.scratch);
-    this.core.view().setUint32(this.scratch + kSolverAt, solver, true);
+    this.core.view().setUint32(this.scratch + cs_cloth_settings.solver, solver, true);
     this.core.with([cloth], (name) => this.core.exports.cs_change_cloth(this.handle, name!, this.scratch));
   }
 
-  // What a cloth may be made of, and what it was made of last; "" for nothing.
+  // Names of the available materials. material() is the material of a cloth, or "".
   materials(): string[] {
     const count = this.core.exports.cs_material_count(this.handle);
     return Array.from({ length: count }, (_, index) => this.core.text(this.core.exports.cs_material(this.handle, index)));
@@ -472,25 +479,25 @@ export class Client {
     this.core.exports.cs_set_gust(this.handle, strength, seconds);
   }
 
-  // The newest; undefined before the first.
+  // Newest report of a cloth; undefined before the first.
   report(cloth: number): ClothReport | undefined {
-    this.core.view().setUint32(this.scratch, kClothReportVersion, true);
+    this.core.view().setUint32(this.scratch + cs_cloth_report.version, CS_CLOTH_REPORT_VERSION, true);
     if (this.core.exports.cs_get_cloth_report(this.handle, cloth, this.scratch) === 0) return undefined;
     const view = this.core.view();
-    const real = (place: number) => view.getFloat32(this.scratch + 4 * place, true);
+    const real = (offset: number) => view.getFloat32(this.scratch + offset, true);
     return {
-      activeConstraints: view.getUint32(this.scratch + 4, true),
-      iterations: view.getUint32(this.scratch + 8, true),
-      residual: real(3),
-      strainMax: real(4),
-      strainP99: real(5),
-      strainMean: real(6),
-      kineticEnergy: real(7),
-      elasticEnergy: real(8),
-      gravityEnergy: real(9),
-      penetration: real(10),
-      deviceMs: real(11),
-      tick: Number(view.getBigUint64(this.scratch + 48, true)),
+      activeConstraints: view.getUint32(this.scratch + cs_cloth_report.active_constraints, true),
+      iterations: view.getUint32(this.scratch + cs_cloth_report.iterations, true),
+      residual: real(cs_cloth_report.residual),
+      strainMax: real(cs_cloth_report.strain_max),
+      strainP99: real(cs_cloth_report.strain_p99),
+      strainMean: real(cs_cloth_report.strain_mean),
+      kineticEnergy: real(cs_cloth_report.kinetic_energy),
+      elasticEnergy: real(cs_cloth_report.elastic_energy),
+      gravityEnergy: real(cs_cloth_report.gravity_energy),
+      penetration: real(cs_cloth_report.penetration),
+      deviceMs: real(cs_cloth_report.device_ms),
+      tick: Number(view.getBigUint64(this.scratch + cs_cloth_report.tick, true)),
     };
   }
 
@@ -500,7 +507,7 @@ export class Client {
     );
   }
 
-  // An empty name means every cloth.
+  // Changes a cloth. An empty name means every cloth.
   setCloth(cloth: string, change: Partial<ClothParameters>): void {
     const damping = change.damping === undefined ? undefined : [change.damping];
     this.core.with([cloth, change.structural, change.shear, change.bend, damping], (name, structural, shear, bend, rate) =>
@@ -508,29 +515,32 @@ export class Client {
     );
   }
 
-  // Those of this participant's grabs that hold nothing any more, as the newest ClientEvent.grabs told.
+  // Ids of this participant's grabs that slipped off the cloth, according to the newest ClientEvent.grabs.
   lostGrabs(): number[] {
     const own = this.core.exports.cs_participant_id(this.handle);
     const events = this.list(
       this.core.exports.cs_grab_event_count(this.handle),
       this.core.exports.cs_get_grab_event,
       (view, at) => ({
-        participant: view.getBigUint64(at, true),
-        grab: view.getUint32(at + 8, true),
-        vertices: view.getUint32(at + 16, true),
+        participant: view.getBigUint64(at + cs_grab_event.participant_id, true),
+        grab: view.getUint32(at + cs_grab_event.grab_id, true),
+        vertices: view.getUint32(at + cs_grab_event.vertices, true),
       }),
     );
     return events.filter(({ participant, vertices }) => participant === own && vertices === 0).map(({ grab }) => grab);
   }
 
-  // This participant's grab on cloth; none: it lets go. Another id takes hold anew.
+  // Sets this participant's grab on the cloth; undefined releases it. A new id starts a new grab.
   setGrab(grab: { id: number; position: Vec3 } | undefined): void {
     const view = this.core.view();
     if (grab) {
-      view.setUint32(this.scratch, grab.id, true);
-      const turned = [0, 0, 0, 0];
-      const byDefault = [NaN, NaN, NaN, NaN]; // radius, reach, force, slip distance
-      [...grab.position, ...turned, ...byDefault].forEach((value, i) => view.setFloat32(this.scratch + 4 + 4 * i, value, true));
+      const set = (offset: number, values: readonly number[]) =>
+        values.forEach((value, i) => view.setFloat32(this.scratch + offset + 4 * i, value, true));
+      view.setUint32(this.scratch + cs_grab.id, grab.id, true);
+      set(cs_grab.position, grab.position);
+      set(cs_grab.orientation, [0, 0, 0, 0]); // not rotated
+      // NaN: the server's default.
+      for (const offset of [cs_grab.radius, cs_grab.reach, cs_grab.max_force, cs_grab.slip_distance]) set(offset, [NaN]);
     }
     this.core.exports.cs_set_grabs(this.handle, this.scratch, grab ? 1 : 0, nowUs());
   }
@@ -542,20 +552,20 @@ export class Client {
     );
   }
 
-  // Undefined unless the scene is a recording.
+  // State of the playback; undefined unless the scene is a recording.
   playback(): Playback | undefined {
     if (this.core.exports.cs_get_playback(this.handle, nowUs(), this.scratch) === 0) return undefined;
     const view = this.core.view();
     return {
-      length: view.getFloat64(this.scratch, true),
-      position: view.getFloat64(this.scratch + 8, true),
-      speed: view.getFloat64(this.scratch + 16, true),
-      loop: view.getInt32(this.scratch + 24, true) !== 0,
-      paused: view.getInt32(this.scratch + 28, true) !== 0,
+      length: view.getFloat64(this.scratch + cs_playback.length, true),
+      position: view.getFloat64(this.scratch + cs_playback.position, true),
+      speed: view.getFloat64(this.scratch + cs_playback.speed, true),
+      loop: view.getInt32(this.scratch + cs_playback.loop, true) !== 0,
+      paused: view.getInt32(this.scratch + cs_playback.paused, true) !== 0,
     };
   }
 
-  // For everybody in the scene, all four.
+  // The four functions below act for every participant of the scene.
   pause(paused: boolean): void {
     this.core.exports.cs_pause(this.handle, paused ? 1 : 0);
   }
@@ -592,6 +602,10 @@ function nowUs(): bigint {
 
 function vec3(view: DataView, at: number): Vec3 {
   return [view.getFloat32(at, true), view.getFloat32(at + 4, true), view.getFloat32(at + 8, true)];
+}
+
+function quaternion(view: DataView, at: number): readonly [number, number, number, number] {
+  return [...vec3(view, at), view.getFloat32(at + 12, true)];
 }
 
 function spring(view: DataView, at: number): Spring {

@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: MIT
-// One cloth as a three.js mesh, whose vertices are drawn straight from the core's memory.
+// One cloth as a three.js mesh. Vertices are uploaded from the core's memory without a copy, except at seams.
 
 import * as THREE from "three";
 import type { ClothLayout, Drawing } from "./client";
 import { type DrawnVertices, separateSeams } from "./seams";
 
-// Madder, indigo, ochre, moss, plum, linen: told apart also where colours are not.
+// Madder, indigo, ochre, moss, plum and linen. Their brightness differs too, for colour-blind viewers.
 const kColours = [0x8a3433, 0x2a567a, 0xb5843c, 0x55714a, 0x745684, 0xb5a98f];
 
-// Metres that one tile of the weave covers, which is two threads.
+// Width of one tile of the weave, two threads, in metres.
 const kWeaveTile = 0.012;
-// How far a cloth moves away from where it starts, in parts of its size.
+// Expected motion of a cloth, as a fraction of its size.
 const kSwing = 0.3;
 const kWeaveTexels = 32;
 
@@ -20,7 +20,7 @@ export class ClothMesh {
   private readonly normals: THREE.BufferAttribute;
   private readonly drawn: DrawnVertices;
 
-  // `restPositions` and `triangles` are those of the whole scene; they are copied.
+  // `restPositions` and `triangles` belong to the whole scene and are copied.
   constructor(
     private readonly layout: ClothLayout,
     drawing: Drawing,
@@ -49,12 +49,12 @@ export class ClothMesh {
     this.mesh = new THREE.Mesh(geometry, materials);
     this.mesh.castShadow = true;
     this.mesh.receiveShadow = true;
-    // The vertices move every frame: bounds kept up to date would cost more than drawing, and than picking.
+    // Vertices move every frame. Updating the bounds would cost more than it saves in drawing and picking.
     this.mesh.frustumCulled = false;
     geometry.boundingSphere = new THREE.Sphere(new THREE.Vector3(), Infinity);
   }
 
-  // The arrays are the whole scene's, in the core's memory: they are read when the frame is drawn, not kept.
+  // The arrays belong to the whole scene and to the core's memory. They are read when the frame is drawn.
   update(positions: Float32Array, normals: Float32Array): void {
     for (const [attribute, values] of [
       [this.positions, positions],
@@ -66,7 +66,7 @@ export class ClothMesh {
     }
   }
 
-  // Where the cloth will mostly be: as it starts, and from there down and to both sides, where it falls and flies.
+  // Box in which the cloth will mostly stay: its start, extended downwards and to both sides.
   reach(): THREE.Box3 {
     const box = new THREE.Box3().setFromBufferAttribute(this.positions);
     const size = box.getSize(new THREE.Vector3());
@@ -80,18 +80,18 @@ export class ClothMesh {
     for (const material of this.mesh.material) material.dispose();
   }
 
-  // Texture coordinates that count threads, so that every cloth has threads of the same size; undefined for a mesh
-  // that has none.
+  // Texture coordinates in units of threads, so that all cloths have threads of equal size. Undefined for a mesh
+  // without coordinates.
   private threadCoordinates(drawing: Drawing, rest: Float32Array): Float32Array | undefined {
     if (this.layout.rows > 1 && this.layout.columns > 1) return gridThreads(this.layout, rest);
     if (drawing.uvs.length === 0) return undefined;
     const uvs = new Float32Array(2 * this.drawn.count);
     this.drawn.uvs.forEach((uv, vertex) => uvs.set(drawing.uvs.subarray(2 * uv, 2 * uv + 2), 2 * vertex));
-    const scale = metresAUv(this.drawn.indices, rest, uvs) / kWeaveTile;
+    const scale = metresPerUv(this.drawn.indices, rest, uvs) / kWeaveTile;
     return uvs.map((coordinate) => coordinate * scale);
   }
 
-  // Copies the cloth's vertices to `out`, and those at seams once more.
+  // Copies the cloth's vertices to `out`, followed by the duplicates at seams.
   private place(values: Float32Array, out: Float32Array): void {
     const own = this.part(values);
     out.set(own);
@@ -122,8 +122,8 @@ function fabric(colourOfThreads: number, woven: boolean): THREE.MeshPhysicalMate
   return material;
 }
 
-// How many metres of cloth one unit of texture coordinates covers, by the areas of all triangles.
-function metresAUv(indices: Uint32Array, rest: Float32Array, uvs: Float32Array): number {
+// Metres of cloth per unit of texture coordinates, from the areas of all triangles.
+function metresPerUv(indices: Uint32Array, rest: Float32Array, uvs: Float32Array): number {
   const corner = (k: number) => new THREE.Vector3().fromArray(rest, 3 * indices[k]!);
   const uv = (k: number) => new THREE.Vector2().fromArray(uvs, 2 * indices[k]!);
   let cloth = 0;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The part of the panel that says of each cloth what it is made of and which solver it has, and how its simulation does.
+// The cloths in the panel: material, solver and simulation report of each.
 
 import { Solvers, type Client, type ClothReport } from "./client";
 import { element, write } from "./hud";
@@ -17,11 +17,11 @@ export class ClothReports {
   private readonly list = element("cloths");
   private readonly deviceMs = element("device-ms");
   private cards: Card[] = [];
-  // What people chose and the client has not been told yet.
+  // Choices of the user that are not yet sent, by cloth.
   private readonly chosen = new Map<string, number>();
   private readonly chosenMaterials = new Map<string, string>();
 
-  // Other cloths than before.
+  // Rebuilds the list for the cloths of a new description.
   describe(client: Client): void {
     this.chosen.clear();
     this.chosenMaterials.clear();
@@ -34,7 +34,7 @@ export class ClothReports {
     this.showSolvers(client);
   }
 
-  // As they stand.
+  // Shows the current material and solver of each cloth.
   showSolvers(client: Client): void {
     this.cards.forEach(({ material, solver }, index) => {
       material.value = client.material(index);
@@ -45,17 +45,17 @@ export class ClothReports {
     });
   }
 
-  // Of the newest report; to be called now and then.
+  // Shows the newest report of each cloth.
   showReports(client: Client): void {
     this.cards.forEach(({ figures }, index) => {
       const report = client.report(index);
       if (!report) return;
       for (const [figure, text] of texts(report)) write(figures.get(figure)!, text);
-      write(this.deviceMs, `${report.deviceMs.toFixed(1)} ms a tick`);
+      write(this.deviceMs, `${report.deviceMs.toFixed(1)} ms per tick`);
     });
   }
 
-  // Hands choices to the client; to be called once a drawn frame.
+  // Sends choices to the client. Call once per drawn frame.
   apply(client: Client): void {
     for (const [cloth, material] of this.chosenMaterials) client.setMaterial(cloth, material);
     for (const [cloth, solver] of this.chosen) client.setSolver(cloth, solver);

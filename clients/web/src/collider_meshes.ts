@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: MIT
-// The colliders as three.js meshes: one for each, in the order of what is shown.
+// Colliders as three.js meshes, one per collider in the order of shownColliders().
 
 import * as THREE from "three";
 import { Shape, type Client, type Collider } from "./client";
 
 export type ColliderMesh = THREE.Mesh<THREE.BufferGeometry, THREE.MeshStandardMaterial>;
 
-// Slightly smaller than they are: the cloth's triangles cut corners between the nodes that rest on a shape.
+// Scale of drawn colliders. Slightly smaller, because triangles between nodes that touch a shape cut into it.
 const kShrink = 0.985;
-// Metres of a plane that are drawn, to each side of its origin.
+// Half the edge of the drawn part of a plane, metres.
 const kPlaneReach = 4;
 
 export class ColliderMeshes {
@@ -16,7 +16,7 @@ export class ColliderMeshes {
 
   constructor(private readonly scene: THREE.Scene) {}
 
-  // Hulls come with a description: those of a former one go.
+  // Removes all meshes, because a new description brings new hulls.
   describe(): void {
     for (const mesh of this.meshes.splice(0)) this.remove(mesh);
   }
@@ -45,7 +45,7 @@ export class ColliderMeshes {
   }
 }
 
-// A sphere that holds the shape, for the view's bounds; none for a plane.
+// Radius of a sphere around the shape, for the bounds of the view. 0 for a plane.
 export function reachOf(client: Client, collider: Collider): number {
   switch (collider.shape) {
     case Shape.sphere:
@@ -65,7 +65,7 @@ export function reachOf(client: Client, collider: Collider): number {
   }
 }
 
-// What a mesh is made for: as long as that stays, the mesh stays.
+// Key of the mesh's geometry. The mesh is reused while the key stays the same.
 function lookOf({ shape, name, radius, length, size }: Collider): string {
   return [shape, shape === Shape.hull ? name : "", radius, length, ...size].join(" ");
 }
@@ -87,7 +87,7 @@ function geometryOf(client: Client, collider: Collider): THREE.BufferGeometry {
     case Shape.capsule:
       return new THREE.CapsuleGeometry(kShrink * radius, length, 16, 48);
     case Shape.plane:
-      // Below itself by as much as others are smaller, which also keeps it off a floor in the same place.
+      // 2 mm lower, as other shapes are smaller. This also avoids flicker with a floor at the same height.
       return new THREE.PlaneGeometry(2 * kPlaneReach, 2 * kPlaneReach).rotateX(-Math.PI / 2).translate(0, -0.002, 0);
     case Shape.box:
       return new THREE.BoxGeometry(...size.map((edge) => kShrink * edge));
@@ -101,7 +101,7 @@ function hullGeometry(client: Client, collider: Collider): THREE.BufferGeometry 
   const indexed = new THREE.BufferGeometry();
   indexed.setAttribute("position", new THREE.BufferAttribute(vertices, 3));
   indexed.setIndex(new THREE.BufferAttribute(triangles, 1));
-  // Each face with corners of its own, so that its edges are sharp.
+  // Faces do not share vertices, so that edges are sharp.
   const geometry = indexed.toNonIndexed().scale(kShrink, kShrink, kShrink);
   geometry.computeVertexNormals();
   return geometry;

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: MIT
-// The panel: scene, wind, gusts, gravity, stiffness, damping, collider. What people change goes out once a drawn frame.
+// The control panel: scene, wind, gusts, gravity, stiffness, damping and collider. Changes are sent once per frame.
 
 import { Shape, type Client, type ClothParameters, type Environment, type Spring, type Vec3 } from "./client";
 import { element } from "./hud";
 
 const kStill: Vec3 = [0, 0, 0];
-// Where the scene itself has none: from the viewer's side, and down.
+// Directions for scenes without wind or gravity: away from the default camera, and down.
 const kDefaultWind: Vec3 = [0, 0, -1];
 const kDown: Vec3 = [0, -1, 0];
-const kGustSeconds = 2; // as scene.proto has it
+const kGustSeconds = 2; // default of scene.proto
 
 export interface ControlsListener {
   sceneChosen(scene: string): void;
@@ -21,14 +21,14 @@ export class Controls {
   private readonly wind = new Slider("wind", (value) => `${value.toFixed(1)} m/s`);
   private readonly gust = new Slider("gust", (value) => `${value.toFixed(1)} m/s`);
   private readonly gravity = new Slider("gravity", (value) => `${value.toFixed(2)} m/s²`);
-  // On a scale of powers of two.
+  // The slider holds the binary logarithm of the factor.
   private readonly stiffness = new Slider("stiffness", (value) => `× ${(2 ** value).toFixed(2)}`);
   private readonly damping = new Slider("damping", (value) => `${value.toFixed(2)} /s`);
   private readonly radius = new Slider("radius", (value) => `${value.toFixed(2)} m`);
   private readonly sliders = [this.wind, this.gust, this.gravity, this.stiffness, this.damping, this.radius];
   private windDirection = kDefaultWind;
   private gravityDirection = kDown;
-  // The cloths as the description found them, or as their material made them: what stiffness multiplies.
+  // Parameters that the stiffness factor multiplies: from the description, or from a change of material.
   private base: ClothParameters[] = [];
   private materials: string[] = [];
 
@@ -43,7 +43,7 @@ export class Controls {
     this.scenes.replaceChildren(...scenes.map((scene) => new Option(scene, scene, false, scene === current)));
   }
 
-  // Name of the collider that the keys and the radius belong to; "" if there is none.
+  // Name of the collider that keys and the radius act on; "" without colliders.
   get collider(): string {
     return this.choice.value;
   }
@@ -66,13 +66,13 @@ export class Controls {
     this.show(client);
   }
 
-  // The server refused a change: the sliders go back to what holds.
+  // Resets the sliders to the current parameters after the server refused a change.
   refused(client: Client): void {
     for (const slider of this.sliders) slider.forget();
     this.show(client);
   }
 
-  // Shows the parameters as they stand.
+  // Shows the current parameters.
   show(client: Client): void {
     const environment = client.environment();
     if (environment) this.showEnvironment(environment);
@@ -87,7 +87,7 @@ export class Controls {
     this.showRadius(client);
   }
 
-  // Hands changes to the client; to be called once a drawn frame.
+  // Sends changes to the client. Call once per drawn frame.
   apply(client: Client): void {
     const wind = this.wind.take();
     const gust = this.gust.take();
@@ -132,12 +132,12 @@ export class Controls {
   }
 }
 
-// A labelled range input with its value beside it.
+// A labelled range input with its value as text.
 class Slider {
   private readonly input: HTMLInputElement;
   private readonly output: HTMLElement;
   private changed = false;
-  // What went to the server and has not come back yet.
+  // Value that was sent and that the server has not confirmed yet.
   private sent: number | undefined;
 
   constructor(
@@ -152,7 +152,7 @@ class Slider {
     });
   }
 
-  // The value to send, if it was changed since the last call.
+  // Returns the value to send if the user changed it since the last call.
   take(): number | undefined {
     if (!this.changed) return undefined;
     this.changed = false;
@@ -160,7 +160,7 @@ class Slider {
     return this.sent;
   }
 
-  // The server's value. Older ones, on their way while a hand moves the slider, do not move it back.
+  // Shows the server's value. Ignores older values that arrive while the user moves the slider.
   show(value: number): void {
     const step = Number(this.input.step);
     if (this.sent !== undefined && Math.abs(value - this.sent) < step / 2) this.sent = undefined;
@@ -171,7 +171,7 @@ class Slider {
     this.write();
   }
 
-  // It now stands for something else, or what was sent will not come back.
+  // Forgets unsent and unconfirmed values, because the slider now controls something else or a change was refused.
   forget(): void {
     this.changed = false;
     this.sent = undefined;

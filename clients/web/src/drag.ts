@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
-// Takes hold of a collider or of the cloth with mouse, pen, finger or keys, and says where that is to go.
+// Drags a collider or the cloth by mouse, pen, finger or keys.
 
 import * as THREE from "three";
 import type { Vec3 } from "./client";
 import type { View } from "./view";
 
-// Of a collider its place; of a grab on the cloth its place too, or nothing when it lets go.
+// New position of a collider, or of a grab on the cloth. An undefined grab releases the cloth.
 export type DragTarget =
   | { kind: "collider"; collider: string; position: Vec3 }
   | { kind: "grab"; grab: { id: number; position: Vec3 } | undefined };
@@ -13,33 +13,33 @@ export type DragTarget =
 type Held = { collider: string } | { grab: number };
 
 export class Drag {
-  // Whether anything can be taken.
+  // False while nothing can be dragged.
   enabled = true;
   private readonly raycaster = new THREE.Raycaster();
   private readonly plane = new THREE.Plane();
-  private readonly grab = new THREE.Vector3();
+  private readonly offset = new THREE.Vector3(); // from the pointer to the dragged point
   private held: Held | undefined;
   private wanted: THREE.Vector3 | undefined;
-  private lets = false;
+  private released = false;
   private pointer: number | undefined;
   private grabs = 0;
 
-  // `grabbed` is told the name of each collider that is taken.
+  // `grabbed` receives the name of each collider that the user starts to drag.
   constructor(
     private readonly view: View,
     private readonly grabbed: (collider: string) => void,
   ) {
     const canvas = view.canvas;
-    // Capturing, so that a press on what can be taken never reaches the camera.
+    // Capture phase, so that a press on a collider or the cloth does not turn the camera.
     canvas.addEventListener("pointerdown", (event) => this.press(event), { capture: true });
     canvas.addEventListener("pointermove", (event) => this.move(event));
     for (const end of ["pointerup", "pointercancel"] as const) canvas.addEventListener(end, (event) => this.release(event));
   }
 
-  // Where what is held is to be, if that changed since the last call. To be asked once a drawn frame.
+  // Returns the new target if it changed since the last call. Call once per drawn frame.
   take(): DragTarget | undefined {
-    if (this.lets) {
-      this.lets = false;
+    if (this.released) {
+      this.released = false;
       return { kind: "grab", grab: undefined };
     }
     if (!this.held || !this.wanted) return undefined;
@@ -49,15 +49,15 @@ export class Drag {
     return { kind: "grab", grab: { id: this.held.grab, position } };
   }
 
-  // That grab holds nothing any more.
+  // Ends a grab that slipped off the cloth.
   slipped(grab: number): void {
     if (!this.held || !("grab" in this.held) || this.held.grab !== grab) return;
     this.held = undefined;
-    this.lets = true;
+    this.released = true;
     this.view.canvas.style.cursor = "";
   }
 
-  // For keys: moves a collider in the camera-facing plane, metres.
+  // Moves a collider in the plane that faces the camera, in metres; for keys.
   nudge(name: string, right: number, up: number): void {
     const collider = this.view.colliders.find((candidate) => candidate.name === name);
     if (!this.enabled || !collider || this.pointer !== undefined) return;
@@ -76,15 +76,15 @@ export class Drag {
     this.view.canvas.setPointerCapture(event.pointerId);
     this.view.canvas.focus();
     this.view.canvas.style.cursor = "grabbing";
-    // A collider is held by its centre, cloth where the pointer is on it.
+    // A collider is dragged by its centre, the cloth by the point under the pointer.
     const centre = hit.collider ? hit.object.position : hit.point;
     const facing = this.view.camera.getWorldDirection(new THREE.Vector3());
     this.plane.setFromNormalAndCoplanarPoint(facing, centre);
-    // The pointer stays where it took hold.
+    // The pointer keeps its offset from the dragged point.
     const start = this.raycaster.ray.intersectPlane(this.plane, new THREE.Vector3());
-    this.grab.copy(centre).sub(start ?? centre);
+    this.offset.copy(centre).sub(start ?? centre);
     this.pointer = event.pointerId;
-    this.lets = false;
+    this.released = false;
     this.wanted = centre.clone();
     if (hit.collider) {
       this.held = { collider: hit.collider };
@@ -99,7 +99,7 @@ export class Drag {
     if (event.pointerId === this.pointer) {
       if (!this.held) return;
       const point = this.raycaster.ray.intersectPlane(this.plane, new THREE.Vector3());
-      if (point) this.wanted = point.add(this.grab);
+      if (point) this.wanted = point.add(this.offset);
     } else if (event.pointerType === "mouse" && event.buttons === 0) {
       this.view.canvas.style.cursor = this.pick() ? "grab" : "";
     }
@@ -111,11 +111,11 @@ export class Drag {
     this.view.canvas.style.cursor = "";
     if (this.held && "grab" in this.held) {
       this.held = undefined;
-      this.lets = true;
+      this.released = true;
     }
   }
 
-  // What lies foremost under the pointer and can be taken: a collider of the scene, or cloth.
+  // Finds the nearest collider of the scene or cloth under the pointer.
   private pick(): { object: THREE.Object3D; point: THREE.Vector3; collider: string | undefined } | undefined {
     if (!this.enabled) return undefined;
     const cloths = this.view.clothMeshes;

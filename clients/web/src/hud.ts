@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What the page says: where it is connected, how the stream does, and what went wrong.
+// Text over the picture: connection state, figures of the stream, participants, errors and notices.
 
 import { Roles, type Client } from "./client";
 import type { SessionState } from "./session";
@@ -27,14 +27,14 @@ export class Hud {
     this.retry.addEventListener("click", retry);
   }
 
-  // To be called when the state changes and while it counts down.
+  // Call when the state changes, and regularly to update the countdown.
   showState(state: SessionState): void {
     let label: string = state.kind;
     let text = "";
     if (state.kind === "reconnecting") {
       const seconds = Math.max(0, Math.ceil((state.attemptAt - performance.now()) / 1000));
       label = seconds > 1 ? `reconnecting in ${seconds} s` : "reconnecting";
-      text = `${state.reason} ${seconds > 1 ? `Trying again in ${seconds} s.` : "Trying to come back."}`;
+      text = `${state.reason} ${seconds > 1 ? `Trying again in ${seconds} s.` : "Reconnecting."}`;
     } else if (state.kind === "failed") {
       text = state.reason;
     }
@@ -45,7 +45,7 @@ export class Hud {
     write(this.retry, state.kind === "failed" ? "Join the default scene" : "Try now");
   }
 
-  // Nothing more can be done on this page as it is.
+  // Shows an error from which the page cannot recover.
   showFatal(text: string): void {
     write(this.state, "stopped");
     this.state.dataset["kind"] = "failed";
@@ -67,14 +67,14 @@ export class Hud {
     document.title = `${client.sceneName} - ClothStream`;
   }
 
-  // Whoever is cut off stays in the list for as long as its place is kept.
+  // Disconnected participants stay in the list during their reconnect grace.
   showParticipants(client: Client): void {
     const items = client.participants().map(({ name, role, away, self }) => {
       const item = document.createElement("li");
       const who = document.createElement("span");
       who.textContent = self ? `${name} (you)` : name;
       const what = document.createElement("span");
-      what.textContent = away ? "cut off" : (Roles.get(role) ?? `role ${role}`);
+      what.textContent = away ? "disconnected" : (Roles.get(role) ?? `role ${role}`);
       item.append(who, what);
       item.classList.toggle("away", away);
       return item;
@@ -97,7 +97,7 @@ export class Hud {
   }
 }
 
-// Untouched text stays untouched, so that screen readers do not say it again.
+// Writes only changed text, so that screen readers do not repeat it.
 export function write(target: HTMLElement, text: string): void {
   if (target.textContent !== text) target.textContent = text;
 }

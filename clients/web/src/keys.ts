@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The keyboard on the picture: arrows turn, plus and minus zoom, W A S D move the collider, R resets the view.
+// Keys on the picture: arrows turn, plus and minus zoom, W A S D move the collider, R resets the view.
 
 import type { Controls } from "./controls";
 import type { Drag } from "./drag";

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Starts the page: core, view, session and panel, and the loop that draws.
+// Starts the page: core, view, session, panel, and the drawing loop.
 
 import { ClothReports } from "./cloth_reports";
 import { Roles } from "./client";
@@ -25,14 +25,14 @@ async function start(): Promise<void> {
     view = new View(element<HTMLCanvasElement>("canvas"));
   } catch (error) {
     hud.showFatal(
-      "This browser gives the page no WebGL 2, without which it cannot draw. " +
-        "Switch on hardware acceleration, or try another browser.",
+      "This page needs WebGL 2, which this browser does not provide. " +
+        "Turn on hardware acceleration, or use another browser.",
     );
     console.error(error);
     return;
   }
   const core = await CoreModule.load("clothstream_core.wasm").catch((error: unknown) => {
-    hud.showFatal(`The client core cannot be started: ${error instanceof Error ? error.message : String(error)}`);
+    hud.showFatal(`The client core did not start: ${error instanceof Error ? error.message : String(error)}`);
     throw error;
   });
 
@@ -51,7 +51,7 @@ async function start(): Promise<void> {
   const wanted = [...Roles].find(([, name]) => name === role)?.[0];
   const identity = { name: query.get("name") ?? "", role: wanted ?? 0, smooth: query.has("smooth") };
   if (role !== null && wanted === undefined)
-    hud.showNotice(`There is no role "${role}": there are ${[...Roles.values()].join(", ")}.`);
+    hud.showNotice(`"${role}" is not a role; use ${[...Roles.values()].join(", ")}.`);
   const session: Session = new Session(core, address.href, scene, identity, {
     stateChanged: () => hud.showState(session.state),
     described: (client) => {

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-// The timeline of a scene that is a recording: pause, seek, speed, loop, for everybody in it.
+// Timeline of a recording: pause, seek, speed and loop, which act for every participant.
 
 import type { Client, Playback } from "./client";
 import { element, write } from "./hud";
 
-// While the hand moves the timeline; a server takes ten requests a second.
+// Period of seek requests while the user drags the timeline. The server accepts ten requests per second.
 const kSeekPeriodMs = 200;
 
 export class Player {
@@ -16,18 +16,18 @@ export class Player {
   private readonly loop = element<HTMLInputElement>("player-loop");
   private client: Client | undefined;
   private playback: Playback | undefined;
-  private seeks: number | undefined; // s, not sent yet
-  private soughtAt = -Infinity; // on performance.now()'s clock
-  private held = false;
+  private seeks: number | undefined; // requested time, s; not sent yet
+  private soughtAt = -Infinity; // time of the last request, on the clock of performance.now()
+  private dragged = false;
 
   constructor() {
     this.pause.addEventListener("click", () => this.client?.pause(!this.playback?.paused));
     this.timeline.addEventListener("input", () => {
-      this.held = true;
+      this.dragged = true;
       this.seeks = this.timeline.valueAsNumber;
     });
     this.timeline.addEventListener("change", () => {
-      this.held = false;
+      this.dragged = false;
       this.seek(this.timeline.valueAsNumber);
     });
     this.speed.addEventListener("change", () => this.client?.setSpeed(Number(this.speed.value)));
@@ -39,7 +39,7 @@ export class Player {
     return this.playback !== undefined;
   }
 
-  // To be called once a drawn frame.
+  // Updates the timeline. Call once per drawn frame.
   draw(client: Client | undefined): void {
     this.client = client;
     this.playback = client?.playback();
@@ -49,7 +49,7 @@ export class Player {
     if (this.seeks !== undefined && performance.now() - this.soughtAt >= kSeekPeriodMs) this.seek(this.seeks);
     const { length, position, paused, loop, speed } = this.playback;
     this.timeline.max = String(length);
-    if (!this.held) this.timeline.valueAsNumber = position;
+    if (!this.dragged) this.timeline.valueAsNumber = position;
     const text = `${clock(this.timeline.valueAsNumber)} / ${clock(length)}`;
     write(this.time, text);
     if (this.timeline.getAttribute("aria-valuetext") !== text) this.timeline.setAttribute("aria-valuetext", text);
@@ -65,7 +65,7 @@ export class Player {
     this.client?.seek(Math.min(seconds, this.playback?.length ?? 0));
   }
 
-  // One that somebody else chose need not be in the list.
+  // Another client may choose a speed that is not in the list.
   private showSpeed(speed: number): void {
     const value = String(speed);
     if (![...this.speed.options].some((option) => option.value === value)) this.speed.add(new Option(`× ${value}`, value));
@@ -73,7 +73,7 @@ export class Player {
   }
 }
 
-// Such as 1:02.5
+// Formats a time, such as 1:02.5.
 function clock(seconds: number): string {
   const tenths = Math.floor(10 * seconds);
   const rest = ((tenths % 600) / 10).toFixed(1).padStart(4, "0");

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// `window.clothstream`: lets tests and the curious look inside; it changes nothing.
+// `window.clothstream`: read-only view of the page's state, for tests and debugging.
 
 import type { Client, ClothLayout, ClothReport, Collider, Participant, Playback, Statistics, Vec3 } from "./client";
 import type { Session, SessionState } from "./session";
@@ -7,26 +7,26 @@ import type { View } from "./view";
 
 export interface Probe {
   readonly state: SessionState["kind"];
-  // Arrays are copies, 3 floats a vertex.
+  // Arrays are copies with 3 floats per vertex.
   readonly statistics: Statistics;
   readonly positions: Float32Array;
   readonly restPositions: Float32Array | undefined;
   readonly normals: Float32Array;
-  // Positions as they are drawn, of each cloth; beside seams more often than once.
+  // Drawn positions of each cloth. Vertices at seams appear several times.
   readonly drawn: Float32Array[];
   readonly cloths: ClothLayout[];
-  // Of each cloth, once there is one.
+  // Newest report of each cloth, undefined before the first.
   readonly reports: (ClothReport | undefined)[];
   readonly colliders: Collider[];
-  // Where these are drawn.
+  // Drawn positions of the colliders.
   readonly drawnColliders: Vec3[];
   readonly participants: Participant[];
-  // Of a scene that is a recording.
+  // Defined if the scene is a recording.
   readonly playback: Playback | undefined;
   readonly canvas: HTMLCanvasElement;
-  // A point of the scene, in CSS pixels of the page.
+  // Projects a point of the scene to CSS pixels of the page.
   project(point: Vec3): [number, number];
-  // Where the key light casts the point's shadow on the floor.
+  // Position of the point's shadow on the floor, cast by the key light.
   shadowOf(point: Vec3): Vec3;
 }
 
@@ -36,7 +36,7 @@ declare global {
   }
 }
 
-// The result is to be told each description, before any frame.
+// Call described() of the result for each description, before its first frame.
 export function expose(session: Session, view: View): { described(client: Client): void } {
   let restPositions: Float32Array | undefined;
   window.clothstream = {

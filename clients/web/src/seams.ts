@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: MIT
-// Vertices as a graphics card wants them: one texture coordinate each, so that those at a seam are there several times.
+// Duplicates vertices at texture seams, because a drawn vertex has one texture coordinate.
 
 export interface DrawnVertices {
   count: number;
-  indices: Uint32Array; // of drawn vertices, three a triangle
-  copies: Uint32Array; // whose vertex each of the drawn ones beyond the cloth's own repeats
-  uvs: Uint32Array; // which texture coordinate each drawn vertex has; all 0 where there are none
+  indices: Uint32Array; // three drawn vertices per triangle
+  copies: Uint32Array; // original vertex of each duplicate
+  uvs: Uint32Array; // texture coordinate of each drawn vertex; all 0 without coordinates
 }
 
-// `corners` are the cloth's vertices, `uvIndices` as many texture coordinates or none.
+// `corners` holds one vertex per corner. `uvIndices` holds one texture coordinate per corner, or is empty.
 export function separateSeams(vertexCount: number, corners: Uint32Array, uvIndices: Uint32Array): DrawnVertices {
   const kUnused = 0xffffffff;
   const uvs = new Array<number>(vertexCount).fill(kUnused);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A stay in a scene, over however many connections it takes: the client core says when to connect, and as whom.
+// Membership in a scene across several connections. The client core decides when to connect, and as which participant.
 
 import { Client, ClientEvent, ClientState, type Identity } from "./client";
 import { StreamSocket } from "./socket";
@@ -8,7 +8,7 @@ import type { CoreModule } from "./wasm";
 export type SessionState =
   | { kind: "connecting" }
   | { kind: "live" }
-  | { kind: "reconnecting"; reason: string; attemptAt: number } // on performance.now()'s clock
+  | { kind: "reconnecting"; reason: string; attemptAt: number } // on the clock of performance.now()
   | { kind: "failed"; reason: string };
 
 export interface SessionListener {
@@ -19,7 +19,7 @@ export interface SessionListener {
   scenesListed(scenes: string[]): void;
   grabsLost(client: Client): void;
   notice(text: string): void;
-  // The server refused something, and goes on.
+  // The server refused a request; the session continues.
   refused(client: Client): void;
 }
 
@@ -47,12 +47,12 @@ export class Session {
     window.addEventListener("online", () => {
       if (this.state.kind === "reconnecting") this.connect();
     });
-    // A goodbye: else the place of who closes or reloads the page would be held.
+    // Closing the socket leaves the scene at once. Otherwise the server would keep the participant's place for a while.
     window.addEventListener("pagehide", () => this.socket.close());
     this.connect();
   }
 
-  // Another scene, or the same one anew.
+  // Joins a scene. Joining the current scene again starts a new session.
   join(scene: string): void {
     this.client.destroy();
     this.client = new Client(this.core, scene, this.identity);
@@ -60,12 +60,12 @@ export class Session {
     this.connect();
   }
 
-  // At once.
+  // Connects at once instead of at the scheduled time.
   reconnect(): void {
     if (this.state.kind === "reconnecting") this.connect();
   }
 
-  // Sends what the client has to say, as far as there is somebody to hear it.
+  // Sends queued messages while the socket is open.
   flush(): void {
     while (this.socket.isOpen) {
       const message = this.client.nextOutgoing();
@@ -114,7 +114,7 @@ export class Session {
     if (performance.now() >= this.client.connectAtMs) this.connect();
   }
 
-  // Asking the same again would be refused again: it waits for somebody to choose.
+  // Stops, because the same request would be refused again. The user must choose another scene.
   private fail(reason: string): void {
     this.socket.close();
     this.enter({ kind: "failed", reason });

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-// The binary WebSocket to the server.
+// Binary WebSocket to the server.
 
 export interface SocketListener {
   opened(): void;
   message(bytes: ArrayBuffer): void;
-  // Lost, or never there.
+  // The connection was lost or could not be opened.
   lost(reason: string): void;
 }
 
@@ -16,7 +16,7 @@ export class StreamSocket {
     private readonly listener: SocketListener,
   ) {}
 
-  // Open, or being opened.
+  // True while the socket is open or opening.
   get inUse(): boolean {
     return this.socket !== undefined;
   }
@@ -25,7 +25,7 @@ export class StreamSocket {
     return this.socket?.readyState === WebSocket.OPEN;
   }
 
-  // Drops what there is, if anything, and connects now.
+  // Closes the current socket, if any, and opens a new one.
   open(): void {
     this.close();
     const socket = new WebSocket(this.url);

@@ -1,24 +1,24 @@
 // SPDX-License-Identifier: MIT
-// Shadows of a light that is not a point: sharp where things touch, softer the further the shadow falls. Percentage-
-// closer soft shadows (Fernando 2005) in the place of three.js's percentage-closer filter.
+// Soft shadows of an area light: sharp at contacts, softer with distance. Replaces three.js's percentage-closer filter
+// by percentage-closer soft shadows (Fernando 2005).
 
 import * as THREE from "three";
 
 const kTexels = 2048;
-// Of the shadow camera, in radii of what it looks at, which it stands 4 radii away from.
+// Width and depth range of the shadow camera, in radii of the lit sphere. The camera is 4 radii from its centre.
 const kWidth = 3.2;
 const kNear = 1;
 const kFar = 9;
-// Diameter of the light over its distance.
+// Diameter of the light divided by its distance.
 const kLightSpread = 0.14;
-// How far in front of a surface, as a part of the camera's depth, something that shades it is looked for.
+// Largest distance of a searched blocker from the surface, as a fraction of the camera's depth range.
 const kSearchDepth = 0.25;
-// Samples that look for what shades, and that find how much of it does.
+// Samples that search for blockers, and samples that average the shadow.
 const kSearchSamples = 12;
 const kFilterSamples = 18;
 
 const kDepthPerWidth = kWidth / (kFar - kNear);
-// Largest slope along a surface that is believed, and how much it may bend within a sample's reach.
+// Largest slope of a surface, and tolerance for its curvature within the reach of a sample.
 const kSteepest = 6 * kDepthPerWidth;
 const kCurvature = 0.9 * kDepthPerWidth;
 const kUvPerDepth = kLightSpread / 2 / kDepthPerWidth;
@@ -30,14 +30,14 @@ vec2 diskSample(int index, int count, float turn) {
 }
 
 float softShadow(sampler2D shadowMap, vec3 coord) {
-  // Depth over the map's axes along the shaded surface, so that it does not shade itself where it leans.
+  // Slope of depth along the surface in map coordinates. It prevents inclined surfaces from shading themselves.
   vec3 dx = dFdx(coord);
   vec3 dy = dFdy(coord);
   float area = dx.x * dy.y - dx.y * dy.x;
   vec2 slope = vec2(dy.y * dx.z - dx.y * dy.z, dx.x * dy.z - dy.x * dx.z) / (abs(area) > 1e-12 ? area : 1.0);
   slope *= min(1.0, ${kSteepest.toFixed(6)} / max(length(slope), 1e-6));
 
-  // Interleaved gradient noise turns the disk from pixel to pixel, so that few samples leave no bands.
+  // Interleaved gradient noise rotates the disk per pixel. It turns bands of few samples into noise.
   float turn = 6.2831853 * fract(52.9829189 * fract(dot(gl_FragCoord.xy, vec2(0.06711056, 0.00583715))));
   float blockers = 0.0;
   float blockerDepth = 0.0;
@@ -61,29 +61,30 @@ float softShadow(sampler2D shadowMap, vec3 coord) {
 }
 `;
 
-// Replaces three.js's filter for maps of the type PCFShadowMap. To be called before any material is compiled.
+// Replaces three.js's filter for PCFShadowMap. Call before any material is compiled.
 export function useSoftShadows(): void {
   const filter = "#if defined( SHADOWMAP_TYPE_PCF )";
   const lookUp = "float getShadow(";
   const chunk = THREE.ShaderChunk.shadowmap_pars_fragment;
-  if (!chunk.includes(filter) || !chunk.includes(lookUp)) throw new Error("three.js has other shadow shaders than expected");
+  if (!chunk.includes(filter) || !chunk.includes(lookUp))
+    throw new Error("This version of three.js is not supported; use the version in package.json");
   THREE.ShaderChunk.shadowmap_pars_fragment = chunk
     .replace(lookUp, kShadowFunction + lookUp)
     .replace(filter, `${filter}\nshadow = softShadow( shadowMap, shadowCoord.xyz );\n#elif defined( SHADOWMAP_TYPE_PCF_OF_THREE )`);
 }
 
-// Lets `light` shine on a ball from the given direction, with room in its shadow for what swings out of the ball.
-export function aimSoftLight(light: THREE.DirectionalLight, ball: THREE.Sphere, direction: THREE.Vector3): void {
+// Aims `light` at a sphere from `direction`. The shadow map leaves room for cloth that swings out of the sphere.
+export function aimSoftLight(light: THREE.DirectionalLight, sphere: THREE.Sphere, direction: THREE.Vector3): void {
   light.castShadow = true;
-  light.target.position.copy(ball.center);
-  light.position.copy(direction).setLength(4 * ball.radius).add(ball.center);
+  light.target.position.copy(sphere.center);
+  light.position.copy(direction).setLength(4 * sphere.radius).add(sphere.center);
   const camera = light.shadow.camera;
-  camera.left = camera.bottom = (-kWidth / 2) * ball.radius;
-  camera.right = camera.top = (kWidth / 2) * ball.radius;
-  camera.near = kNear * ball.radius;
-  camera.far = kFar * ball.radius;
+  camera.left = camera.bottom = (-kWidth / 2) * sphere.radius;
+  camera.right = camera.top = (kWidth / 2) * sphere.radius;
+  camera.near = kNear * sphere.radius;
+  camera.far = kFar * sphere.radius;
   camera.updateProjectionMatrix();
   light.shadow.mapSize.setScalar(kTexels);
   light.shadow.bias = -0.0005;
-  light.shadow.normalBias = (3 * kWidth * ball.radius) / kTexels;
+  light.shadow.normalBias = (3 * kWidth * sphere.radius) / kTexels;
 }

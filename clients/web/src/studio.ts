@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The room in which cloths are shown: lights, shadow, floor, background; fitted to the size of what stands in it.
+// Surroundings of the cloths: lights, shadow, floor and background, fitted to the size of the scene.
 
 import * as THREE from "three";
 import { aimSoftLight } from "./soft_shadow";
@@ -28,7 +28,7 @@ export class Studio {
     this.scene.add(this.floor);
   }
 
-  // Unit vector towards the key light.
+  // Unit vector from the scene to the key light.
   get lightDirection(): THREE.Vector3 {
     return this.key.position.clone().sub(this.key.target.position).normalize();
   }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What is seen: the newest frame's cloths and colliders in the studio, and the camera that turns round them.
+// The picture: cloths and colliders of the newest frame, their surroundings, and an orbiting camera.
 
 import * as THREE from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
@@ -25,7 +25,7 @@ export class View {
   private vertexCount = 0;
   private floorHeight = 0;
 
-  // Throws where WebGL is not to be had.
+  // Throws if the browser does not provide WebGL 2.
   constructor(readonly canvas: HTMLCanvasElement) {
     useSoftShadows();
     this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, powerPreference: "high-performance" });
@@ -49,7 +49,7 @@ export class View {
     return this.cloths.map((cloth) => cloth.mesh);
   }
 
-  // Takes the topology and the rest state of a new description, and frames them.
+  // Loads topology and rest state of a new description, and fits the camera to them.
   describe(client: Client): void {
     for (const cloth of this.cloths) {
       this.studio.scene.remove(cloth.mesh);
@@ -75,9 +75,9 @@ export class View {
     this.fit();
   }
 
-  // Draws the frame of this time of performance.now(). The core's memory is read before this returns.
+  // Draws the frame for a time of performance.now(). Reads the core's memory only during the call.
   draw(client: Client | undefined, now: number): void {
-    // A client that joins has no vertices yet: until it has, the last frame of the former one stays.
+    // A joining client has no vertices yet. The last frame of the previous client stays until the description arrives.
     if (client && client.vertexCount === this.vertexCount) {
       const { positions, normals } = client.shownAt(now);
       for (const cloth of this.cloths) cloth.update(positions, normals);
@@ -87,7 +87,7 @@ export class View {
     this.renderer.render(this.studio.scene, this.camera);
   }
 
-  // The default view: everything in the frame, whatever the canvas's shape.
+  // Moves the camera to the default view, which shows the whole scene in a canvas of any shape.
   reset(): void {
     const centre = this.bounds.getCenter(new THREE.Vector3());
     this.camera.position.copy(centre).add(kViewDirection);
@@ -118,7 +118,7 @@ export class View {
     this.orbit.update();
   }
 
-  // Moves the camera round what it looks at, in steps to the right and up; for keys.
+  // Turns the camera around its target, in steps of kTurnStep to the right and up.
   turn(right: number, up: number): void {
     const offset = this.camera.position.clone().sub(this.orbit.target);
     const spherical = new THREE.Spherical().setFromVector3(offset);
@@ -131,12 +131,12 @@ export class View {
     this.camera.position.sub(this.orbit.target).multiplyScalar(factor).add(this.orbit.target);
   }
 
-  // Vector in the camera-facing plane, metres.
+  // Vector in the plane that faces the camera, metres.
   inViewPlane(right: number, up: number): THREE.Vector3 {
     return new THREE.Vector3(right, up, 0).applyQuaternion(this.camera.quaternion);
   }
 
-  // Where a point is on the canvas, in CSS pixels of the page.
+  // Projects a point to CSS pixels of the page.
   project(point: Vec3): [number, number] {
     const projected = new THREE.Vector3(...point).project(this.camera);
     const frame = this.canvas.getBoundingClientRect();
@@ -146,14 +146,14 @@ export class View {
     ];
   }
 
-  // Where the key light casts a point's shadow on the floor.
+  // Position of a point's shadow on the floor, cast by the key light.
   shadowOf(point: Vec3): Vec3 {
     const light = this.studio.lightDirection;
     const reach = (point[1] - this.floorHeight) / light.y;
     return [point[0] - reach * light.x, this.floorHeight, point[2] - reach * light.z];
   }
 
-  // The floor is the plane y = 0 where that lies near the lower end of things, which is how scenes are made.
+  // Fits floor and lights to the bounds. The floor is y = 0 if the bounds end near it, and else their lower end.
   private fit(): void {
     const { min, max } = this.bounds;
     const size = max.distanceTo(min);

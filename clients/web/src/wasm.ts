@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
-// The client core as a WebAssembly module: loading it, and reading and writing its memory.
+// Loads the client core as a WebAssembly module, and reads and writes its memory.
 
 type Pointer = number;
 
-// The C interface of clients/core/core.h, as WebAssembly types: size_t and pointers are numbers, uint64_t are bigints.
+// Functions of clients/core/core.h with WebAssembly types: size_t and pointers are numbers, uint64_t is bigint.
 export interface CoreExports {
   memory: WebAssembly.Memory;
   _initialize(): void;
@@ -75,7 +75,7 @@ export interface CoreExports {
 
 const kNull: Pointer = 0;
 
-// Memory may grow in any call, which detaches every view: views are made anew for each access.
+// Any call may grow the memory, which detaches every view. Create a new view for each access.
 export class CoreModule {
   private readonly decoder = new TextDecoder();
   private readonly encoder = new TextEncoder();
@@ -107,7 +107,7 @@ export class CoreModule {
     return new Uint32Array(this.exports.memory.buffer, pointer, count);
   }
 
-  // A zero-terminated string; "" for a null pointer.
+  // Reads a zero-terminated string. Returns "" for a null pointer.
   text(pointer: Pointer): string {
     if (pointer === kNull) return "";
     const memory = new Uint8Array(this.exports.memory.buffer, pointer);
@@ -116,11 +116,11 @@ export class CoreModule {
 
   allocate(bytes: number): Pointer {
     const pointer = this.exports.malloc(bytes);
-    if (pointer === kNull) throw new Error(`The client core has no memory left for ${bytes} bytes`);
+    if (pointer === kNull) throw new Error(`The client core is out of memory (${bytes} bytes requested)`);
     return pointer;
   }
 
-  // Calls `use` with pointers to copies of the values, null for undefined ones; they are freed when it returns.
+  // Calls `use` with pointers to copies of the values; undefined becomes null. The copies are freed when it returns.
   with<Result>(values: (string | readonly number[] | undefined)[], use: (...pointers: Pointer[]) => Result): Result {
     const pointers = values.map((value) => {
       if (value === undefined) return kNull;

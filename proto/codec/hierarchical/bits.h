@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Plain bits, and small numbers in few of them.
+// Streams of bits, and short codes for small numbers.
 #pragma once
 
 #include <algorithm>
@@ -10,12 +10,12 @@
 
 namespace clothstream::codec::hierarchical {
 
-// Of an Elias gamma of value + 2^k (BitWriter::putGamma()).
+// Number of bits of an Elias gamma code of value + 2^k (BitWriter::putGamma()).
 constexpr unsigned gammaBits(std::uint32_t value, unsigned k) {
   return 2 * static_cast<unsigned>(std::bit_width(value + (1u << k))) - 1 - k;
 }
 
-// Lowest bit first. The caller sees to it that `out` has room.
+// Writes bits, lowest first. The caller makes sure that `out` has room.
 class BitWriter {
  public:
   explicit BitWriter(std::byte* out) : out_(out) {}
@@ -27,7 +27,7 @@ class BitWriter {
       pending_ >>= 8;
     }
   }
-  // Elias gamma of value + 2^k: the smaller the fewer. value < 2^31.
+  // Writes the Elias gamma code of value + 2^k; small values take few bits. value < 2^31.
   void putGamma(std::uint32_t value, unsigned k) {
     const std::uint32_t shifted = value + (1u << k);
     const auto width = static_cast<unsigned>(std::bit_width(shifted));
@@ -35,11 +35,11 @@ class BitWriter {
     put(1, 1);
     put(shifted - std::bit_floor(shifted), width - 1);
   }
-  // How many bytes it takes up to here, the last of which may be shared with what follows.
+  // Number of bytes written since `start`, including a partly filled last byte.
   std::size_t bytesSince(const std::byte* start) const {
     return static_cast<std::size_t>(out_ - start) + (count_ > 0 ? 1 : 0);
   }
-  // Zeros up to a whole byte; where the next byte would stand.
+  // Fills the last byte with zeros and returns the address of the next byte.
   std::byte* finish() {
     if (count_ > 0) put(0, 8 - count_);
     return out_;
@@ -55,7 +55,7 @@ class BitReader {
  public:
   explicit BitReader(std::span<const std::byte> bytes) : bytes_(bytes) {}
 
-  // 0 past the end.
+  // Reads zeros past the end.
   std::uint32_t get(unsigned bits) {
     if (count_ < bits) refill();
     const auto value = static_cast<std::uint32_t>(pending_ & ((std::uint64_t{1} << bits) - 1));
@@ -71,8 +71,8 @@ class BitReader {
     const unsigned width = k + extra;
     return (get(width) | 1u << width) - (1u << k);
   }
-  // How many ones stand before the next zero, which is taken with them; of more than `most` (16 at most) so
-  // many, and no zero.
+  // Reads ones up to and including the next zero, and returns their number. Reads at most `most` ones (16 or
+  // fewer), and then no zero.
   std::uint32_t getOnes(unsigned most) {
     if (count_ <= most) refill();
     const unsigned ones = std::min(static_cast<unsigned>(std::countr_one(pending_)), most);
@@ -81,13 +81,13 @@ class BitReader {
     count_ -= taken;
     return ones;
   }
-  // Goes on to a whole byte; false where something is left of the last one.
+  // Skips to the next whole byte. False if the skipped bits are not zero.
   [[nodiscard]] bool endByte() { return get(count_ % 8) == 0 && !broken_; }
-  // The bytes that were taken from, if only in part.
+  // Number of bytes from which at least one bit was read.
   std::size_t bytesTaken() const { return at_ - count_ / 8; }
-  // All bytes were used, none was missing, and what is left of the last are zeros.
+  // True if all bytes were read, none was missing, and the rest of the last byte is zero.
   bool atEnd() const {
-    const std::size_t whole = count_ / 8;  // bytes that are pending and untouched
+    const std::size_t whole = count_ / 8;  // pending bytes of which no bit was read
     return !broken_ && at_ == bytes_.size() + whole && pending_ == 0;
   }
 
@@ -99,7 +99,7 @@ class BitReader {
   }
 
   std::span<const std::byte> bytes_;
-  std::size_t at_ = 0;  // of the next byte; beyond the end where zeros were taken instead
+  std::size_t at_ = 0;  // index of the next byte; past the end it counts zero bytes that were read instead
   std::uint64_t pending_ = 0;
   unsigned count_ = 0;
   bool broken_ = false;

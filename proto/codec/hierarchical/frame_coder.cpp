@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What encoder and decoder of codec 2 agree on beside the prediction.
+// Definitions that encoder and decoder of codec 2 share, apart from the prediction.
 #include "proto/codec/hierarchical/frame_coder.h"
 
 #include <cmath>
@@ -41,7 +41,7 @@ std::array<WeightVectors, kWeightClasses + 1> weightVectors(const Weights& weigh
     for (std::size_t pair = 0; pair < kPlainPairs; ++pair) {
       vectors[c].plain[pair] = Int16x8::allPairs(w[2 * pair], w[2 * pair + 1]);
     }
-    // Of what is now, and of what was before.
+    // Weights of the present and of the previous value.
     const auto now = [&](std::size_t f) { return static_cast<std::int16_t>(w[f] + w[f + 2]); };
     const auto before = [&](std::size_t f) { return static_cast<std::int16_t>(-w[f + 2]); };
     constexpr std::size_t along = 2 * kPlainPairs, across = along + 1;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Which writer a codec has.
+// Selects the writer of a codec.
 #include "proto/codec/hierarchical/frame_writer.h"
 
 #include "proto/codec/hierarchical/packed_frame_writer.h"

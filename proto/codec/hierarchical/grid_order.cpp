@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The coding order of a grid: its corners, then level by level what lies between.
+// Coding order of a grid: its corners, then level by level the vertices in between.
 #include <utility>
 
 #include "proto/codec/hierarchical/coding_order.h"
@@ -14,7 +14,7 @@ class Axis {
 
   std::int64_t count() const { return (last_ + stride_ - 1) / stride_ + 1; }
   std::int64_t at(std::int64_t index) const { return std::min(index * stride_, last_); }
-  // Whether it comes in at this level: it is between two of the level above.
+  // True if this level adds the row or column: it lies between two of the level above.
   bool isNew(std::int64_t index) const { return index % 2 != 0 && index * stride_ < last_; }
 
  private:
@@ -65,7 +65,7 @@ class GridOrder {
     }
   }
 
-  // First what is new both ways, between four old ones across, then what is new one way.
+  // Adds the vertices that are new in both directions, each between four old ones, then those new in one.
   void addLevel(std::uint32_t level) {
     const std::int64_t stride = std::int64_t{1} << level;
     const Axis column(columns_, stride), row(rows_, stride);
@@ -79,7 +79,7 @@ class GridOrder {
     }
   }
 
-  // Of the ring only what lies opposite of each other: its mean is then where the vertex is.
+  // The ring holds only opposite pairs, so that its mean is at the vertex.
   void add(const Axis& column, const Axis& row, std::int64_t c, std::int64_t r, bool both, Rank rank) {
     constexpr std::array<Offset, 4> kAcross{{{-1, -1}, {1, 1}, {-1, 1}, {1, -1}}},
         kAlong{{{-1, 0}, {1, 0}, {0, -1}, {0, 1}}};
@@ -104,7 +104,7 @@ class GridOrder {
     Neighbours& neighbours = order_.neighbours[vertex];
     setParents(neighbours, parents);
     if (parents.size() == 3) {
-      // At a border: half-way between the two along it. The first is a parent twice.
+      // At a border the mean is half-way between the two neighbours along it. The first is a parent twice.
       constexpr std::int16_t half = 2 * kEqualWeight;
       const bool alongRow = column.isNew(c);
       neighbours.weights = alongRow ? std::array<std::int16_t, 4>{half, half, 0, 0}
@@ -117,7 +117,7 @@ class GridOrder {
     order_.ranks[vertex] = rank;
   }
 
-  // In the finest level, or, of coarse vertices, in the finest coarse one.
+  // Uses the finest level; for coarse vertices the finest coarse level.
   void addNearest(std::int64_t stride) {
     const bool coarse = stride > 1;
     const Axis column(columns_, stride), row(rows_, stride);

@@ -1,14 +1,10 @@
 // SPDX-License-Identifier: MIT
-// Codecs 2 and 3: packets to vertices.
-#include <algorithm>
-#include <cstring>
-#include <new>
+// Decoder of codecs 2 and 3.
+#include "proto/codec/hierarchical/hierarchical_decoder.h"
 
-#include "proto/codec/body.h"
-#include "proto/codec/hierarchical/bits.h"
-#include "proto/codec/hierarchical/frame_coder.h"
-#include "proto/codec/hierarchical/packed_residuals.h"
-#include "proto/codec/hierarchical/rans.h"
+#include <algorithm>
+#include <utility>
+
 #include "proto/codec/zigzag.h"
 
 namespace clothstream::codec::hierarchical {
@@ -18,81 +14,20 @@ Int32x4 unzigzagLanes(Int32x4 numbers) {
   return numbers.bitsShiftedRight(1) ^ (Int32x4::all(0) - (numbers & Int32x4::all(1)));
 }
 
-class HierarchicalDecoder final : public BodyDecoder {
- public:
-  bool allocate(const StreamLayout& layout, Detail detail) {
-    layout_ = layout;
-    isCoarse_ = detail == Detail::coarse;
-    isPacked_ = layout.codec == kCodecPacked;
-    hasNormals_ = layout.normals == NormalMode::octahedral;
-    unit_ = latticeUnit(layout.maxError);
-    if (hasNormals_ && !(normals_.allocate(layout.vertexCount()) &&
-                         newNormals_.allocate(layout.vertexCount()) && normalPrediction_.allocate(layout)))
-      return false;
-    return predictor_.allocate(layout, unit_.stepBits) &&
-           (!isPacked_ || packed_.allocate(layout, predictor_.hierarchy().coarseVertices));
-  }
+}  // namespace
 
-  bool decode(const ParsedPacket& packet, std::uint8_t referenceLayer) override;
-  void writePositions(float* out) const override;
-  void writeNormals(float* out) const override;
-  std::uint64_t reconstructionHash() const override;
-
- private:
-  // Of codec 2; empty of codec 3, whose residuals are all read before.
-  struct Streams {
-    RansReader symbols;
-    BitReader bits;
-    std::size_t coarseSymbols, coarseBits;  // bytes that coarse vertices take
-
-    bool isCoarseRead() const {
-      return symbols.bytesTaken() == coarseSymbols && bits.bytesTaken() == coarseBits;
-    }
-  };
-  using Vectors = std::array<WeightVectors, kWeightClasses + 1>;
-
-  bool decodeFrame(const ParsedPacket& packet, std::uint8_t referenceLayer);
-  Streams openStreams(const ParsedPacket& packet) const;
-  bool readPacked(const ParsedPacket& packet);
-  // Changes those of `weights` that a frame of this layer can.
-  bool readWeights(std::span<const std::byte> section, bool key, std::uint8_t layer, LayerWeights& weights,
-                   bool& atRest) const;
-  void decodePhases(std::size_t begin, std::size_t end, bool key, const Vectors& weights, Streams& streams);
-  void decodeNormals(Streams& streams);
-  // In place of readResiduals(); false where none stays or has a residual that is not 0.
-  bool loadPacked(std::uint32_t begin, std::uint32_t count);
-  std::int32_t readOfNormal(std::size_t component, std::size_t vertex, NormalScale& scale, Streams& streams);
-  // Without a model there are no residuals.
-  void decodeChunk(std::uint32_t begin, std::uint32_t count, const WeightVectors& weights,
-                   const ScaleModel* model, Streams& streams);
-  void readResiduals(std::uint32_t count, const ScaleModel& model, Streams& streams);
-  void readComponent(Component component, std::uint32_t count, Streams& streams);
-  bool isOutside() const { return (beyond_.signs() & 7) != 0; }
-  template <bool within>
-  void readSymbols(Component component, std::uint32_t count, RansReader& reader);
-  void completeResiduals(Component component, std::uint32_t first, std::uint32_t count, BitReader& bits);
-  std::uint32_t readEscaped(Component component, std::size_t i, BitReader& bits);
-  void reconstruct(std::uint32_t begin, std::uint32_t count);
-  void place(std::uint32_t begin, std::uint32_t count, const Prediction* predictions,
-             const std::array<Int32x4, 4>& positions, Int32x4 magnitudes);
-
-  StreamLayout layout_;
-  bool isCoarse_ = false, isPacked_ = false, hasNormals_ = false;
-  LatticeUnit unit_{};
-  Predictor predictor_;
-  PackedResiduals packed_;  // of codec 3
-  NormalPrediction normalPrediction_;
-  Array<FacedNormal> normals_, newNormals_;                 // by vertex; of the frame that is being decoded
-  std::array<LayerWeights, kMaxTemporalLayers> weights_{};  // that the newest frame of each layer left
-  Int32x4 beyond_{};  // where a coordinate of this frame was beyond kMaxCoordinate
-  // Of the chunk that is being decoded.
-  std::array<Prediction, kChunk> predictions_{};
-  std::array<SurfaceFrames, kChunk / 4> frames_;
-  alignas(16) std::int32_t residuals_[kComponents][kChunk] = {};
-  alignas(16) std::int32_t scales_[kChunk];
-  std::array<bool, kChunk> stays_{};
-  bool anyStays_ = false;
-};
+bool HierarchicalDecoder::allocate(const StreamLayout& layout, Detail detail) {
+  layout_ = layout;
+  isCoarse_ = detail == Detail::coarse;
+  isPacked_ = layout.codec == kCodecPacked;
+  hasNormals_ = layout.normals == NormalMode::octahedral;
+  unit_ = latticeUnit(layout.maxError);
+  if (hasNormals_ && !(normals_.allocate(layout.vertexCount()) &&
+                       newNormals_.allocate(layout.vertexCount()) && normalPrediction_.allocate(layout)))
+    return false;
+  return predictor_.allocate(layout, unit_.stepBits) &&
+         (!isPacked_ || packed_.allocate(layout, predictor_.hierarchy().coarseVertices));
+}
 
 bool HierarchicalDecoder::readWeights(std::span<const std::byte> section, bool key, std::uint8_t layer,
                                       LayerWeights& weights, bool& atRest) const {
@@ -116,7 +51,7 @@ bool HierarchicalDecoder::readWeights(std::span<const std::byte> section, bool k
 }
 
 bool HierarchicalDecoder::decode(const ParsedPacket& packet, std::uint8_t referenceLayer) {
-  // A quality comes with a key frame; one that is refused changes nothing.
+  // A quality starts with a key frame. A refused key frame changes nothing.
   const LatticeUnit unit = latticeUnit(maxErrorOf(layout_, packet.header.quality));
   predictor_.setStepBits(unit.stepBits);
   if (!decodeFrame(packet, referenceLayer)) {
@@ -193,7 +128,7 @@ void HierarchicalDecoder::decodePhases(std::size_t begin, std::size_t end, bool 
   }
 }
 
-// They are the last symbols and bits of a packet.
+// Normals are the last symbols and bits of a packet.
 void HierarchicalDecoder::decodeNormals(Streams& streams) {
   const std::span<const FacedNormal> predicted = normalPrediction_.predict(layout_, predictor_);
   std::array<NormalScale, 2> scales;
@@ -285,11 +220,11 @@ void HierarchicalDecoder::readComponent(Component component, std::uint32_t count
     completeResiduals(component, first, std::min(count - first, 4u), streams.bits);
 }
 
-// What stays has no symbol.
+// A vertex that stays has no symbol.
 template <bool within>
 void HierarchicalDecoder::readSymbols(Component component, std::uint32_t count, RansReader& reader) {
   const SymbolTable* tables = &symbolTables()[distributionOf(component, 0)];
-  RansReader symbols = reader;  // its states in registers
+  RansReader symbols = reader;  // keeps the states in registers
   std::int32_t* const out = residuals_[component];
   const auto read = [&](std::size_t i, std::size_t coder) {
     out[i] = static_cast<std::int32_t>(symbols.read<within>(coder, tables[scales_[i]]));
@@ -309,7 +244,7 @@ void HierarchicalDecoder::readSymbols(Component component, std::uint32_t count, 
   reader = symbols;
 }
 
-// From symbols, and what stands beside them among the bits.
+// Completes residuals from their symbols and from the bits next to these.
 void HierarchicalDecoder::completeResiduals(Component component, std::uint32_t first, std::uint32_t count,
                                             BitReader& bits) {
   std::int32_t* const residuals = &residuals_[component][first];
@@ -387,16 +322,4 @@ void HierarchicalDecoder::writeNormals(float* out) const {
     unfaceNormal(normals_[vertex], out + 3 * vertex);
 }
 
-}  // namespace
 }  // namespace clothstream::codec::hierarchical
-
-namespace clothstream::codec {
-
-std::unique_ptr<BodyDecoder> makeHierarchicalDecoder(const StreamLayout& layout, Detail detail) {
-  using hierarchical::HierarchicalDecoder;
-  std::unique_ptr<HierarchicalDecoder> decoder(new (std::nothrow) HierarchicalDecoder);
-  if (decoder == nullptr || !decoder->allocate(layout, detail)) return nullptr;
-  return decoder;
-}
-
-}  // namespace clothstream::codec

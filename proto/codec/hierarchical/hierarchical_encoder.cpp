@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Codecs 2 and 3: vertices to packets.
+// Encoder of codecs 2 and 3.
 #include "proto/codec/hierarchical/hierarchical_encoder.h"
 
 #include <cmath>
@@ -17,7 +17,7 @@
 namespace clothstream::codec::hierarchical {
 namespace {
 
-// Along u, v and n, in steps: of one vertex, and of four.
+// Distances along u, v and n in steps, of one vertex and of four.
 struct Local {
   float u, v, n;
 };
@@ -36,36 +36,36 @@ std::int32_t nearest(float value) {
   return simde_mm_cvtss_si32(simde_mm_set_ss(value));
 }
 
-// What one thread needs for the chunk that it encodes.
-struct Desk {
+// Scratch memory of one thread for the chunk that it encodes.
+struct ChunkScratch {
   std::array<Prediction, kChunk> predictions;
   std::array<SurfaceFrames, kChunk / 4> frames;
-  alignas(16) std::int32_t magnitudes[kComponents][kChunk];  // by component
+  alignas(16) std::int32_t magnitudes[kComponents][kChunk];  // indexed by component
   ProductSums products;
 };
 
-// What comes of a chunk, until it is its turn to be written.
+// Result of a chunk, held until it is written.
 struct EncodedChunk {
   ChunkResiduals residuals;
   std::uint32_t count = 0;
-  bool any = false;   // something that is not a residual of 0
-  bool fits = false;  // the weights are fitted to it
+  bool any = false;   // a vertex stays or has a residual that is not 0
+  bool fits = false;  // weights are fitted to this chunk
   ChunkProducts products{};
 };
 
-void scale(const Desk& desk, std::size_t count, const ScaleModel& model, ChunkResiduals& chunk) {
+void scale(const ChunkScratch& scratch, std::size_t count, const ScaleModel& model, ChunkResiduals& chunk) {
   for (std::size_t first = 0; first < count; first += 4) {
-    const Vectors4 e = model.expect(&desk.predictions[first]);
+    const Vectors4 e = model.expect(&scratch.predictions[first]);
     const Int32x4 byComponent[]{e.x, e.y, e.z};
-    const Int32x4 n = Int32x4::load(&desk.magnitudes[kAlongNormal][first]);
-    const Int32x4 u = Int32x4::load(&desk.magnitudes[kAlongU][first]);
+    const Int32x4 n = Int32x4::load(&scratch.magnitudes[kAlongNormal][first]);
+    const Int32x4 u = Int32x4::load(&scratch.magnitudes[kAlongU][first]);
     for (const Component c : kCodingOrder)
       model.scales(c, byComponent[c], n, u).store(&chunk.scales[c][first]);
   }
 }
 
-// Where there are workers, so many vertices are encoded before they are written, in so many pieces at most,
-// each of so many at least.
+// With workers: number of vertices that are encoded before they are written, maximum number of pieces, and
+// minimum vertices of a piece.
 constexpr std::uint32_t kBatch = 256 * kChunk, kMostPieces = 16, kLeastPiece = 8 * kChunk;
 
 }  // namespace
@@ -83,21 +83,21 @@ struct HierarchicalEncoder::State {
         writer(makeFrameWriter(layout)),
         sentNormals(hasNormals ? vertices : 0) {
     if (!predictor.allocate(layout, unit.stepBits) || (hasNormals && !normalPrediction.allocate(layout)))
-      std::abort();  // memory is out, as of any other allocation here
+      std::abort();  // memory is out, as in any other allocation here
     fitted.emplace(predictor.hierarchy());
     plan.emplace(predictor.hierarchy(), layout.temporalLayers, options.weightLag);
-    desks.resize(workers != nullptr ? kMostPieces : 1);
+    scratches.resize(workers != nullptr ? kMostPieces : 1);
     encoded.resize(batch / kChunk);
   }
 
-  // Of the distance, in units: half a step along three axes, and a unit for roundings.
+  // Square of the promised distance, in units: half a step along three axes, and a unit for rounding.
   double squaredPromise() const {
     const double perAxis = (1 << (unit.stepBits - 1)) + 1;
     return 3 * perAxis * perAxis;
   }
   void quantise(std::span<const float> positions);
   Local local(const SurfaceFrame& frame, Int32x4 difference) const;
-  void choose(const Desk& desk, std::uint32_t begin, std::size_t first, ChunkResiduals& chunk,
+  void choose(const ChunkScratch& scratch, std::uint32_t begin, std::size_t first, ChunkResiduals& chunk,
               std::array<Int32x4, 4>& positions) const;
   Int32x4 chooseFar(const Prediction& prediction, Int32x4 target, std::int32_t* residual) const;
   bool isAtRest() const;
@@ -109,57 +109,59 @@ struct HierarchicalEncoder::State {
   bool startsToRest(std::uint32_t slot) const;
   bool goesOnResting(std::uint32_t slot, const Prediction& prediction) const;
   void encodePhase(const Phase& phase);
-  // `piece` of each part of so many things, in parts of at least `least` where several threads do it.
+  // Calls `piece` for parts of a range. With several threads each part has at least `least` elements.
   template <typename Piece>
   void share(std::uint32_t count, std::uint32_t least, const Piece& piece);
-  // Of the phase, what begins there; all are of one class, of which `number` chunks came before the phase.
-  void encodeChunk(const Phase& phase, std::uint32_t begin, std::uint32_t number, Desk& desk,
+  // Encodes the chunk of `phase` that starts at `begin`. `number` counts the chunks of its class, including
+  // those of earlier phases.
+  void encodeChunk(const Phase& phase, std::uint32_t begin, std::uint32_t number, ChunkScratch& scratch,
                    EncodedChunk& out);
-  // Returns whether there was something that is not a residual of 0.
+  // Returns whether a vertex stays or has a residual that is not 0.
   bool write(std::uint32_t weightClass, const EncodedChunk& encoded);
-  void rest(const Desk& desk, std::uint32_t begin, std::size_t first, std::size_t count,
+  void rest(const ChunkScratch& scratch, std::uint32_t begin, std::size_t first, std::size_t count,
             ChunkResiduals& chunk, std::array<Int32x4, 4>& positions) const;
-  void fitTo(Desk& desk, std::uint32_t weightClass, const FeatureVectors& features, Int32x4 target,
+  void fitTo(ChunkScratch& scratch, std::uint32_t weightClass, const FeatureVectors& features, Int32x4 target,
              std::size_t i) const;
   void encodeNormals(std::span<const float> normals);
-  void note(const Desk& desk, std::uint32_t weightClass, const ChunkResiduals& chunk, std::size_t i);
+  void note(const ChunkScratch& scratch, std::uint32_t weightClass, const ChunkResiduals& chunk,
+            std::size_t i);
 
   StreamLayout layout;
   Workers* workers;
-  std::uint32_t batch;  // vertices that are encoded before they are written
+  std::uint32_t batch;  // number of vertices that are encoded before they are written
   std::size_t vertices;
   bool hasNormals;
   LatticeUnit unit;
   Predictor predictor;
-  // In coding order.
+  // Positions to encode, in coding order.
   std::vector<Node> wanted;
-  std::vector<std::uint8_t> stillFrames;  // how long the same was wanted, up to kStillFrames
-  std::uint32_t restTurns = 0;            // of which one comes in this frame; 0: none rests anew
+  std::vector<std::uint8_t> stillFrames;  // frames with an unchanged position, up to kStillFrames
+  std::uint32_t restInterval = 0;  // 1 / restInterval of the vertices may start to rest in this frame; 0: none may
   std::unique_ptr<FrameWriter> writer;
   std::optional<FitSchedule> fitted;
-  std::array<std::uint32_t, kWeightClasses + 1> chunks{};  // of each class that were coded
+  std::array<std::uint32_t, kWeightClasses + 1> chunks{};  // number of chunks of each class coded so far
   std::optional<WeightPlan> plan;
   std::array<std::byte, WeightPlan::kMaxBytes> weightBytes{};
   Weights used{};  // in this frame
   std::array<WeightVectors, kWeightClasses + 1> vectors{};
-  std::uint32_t frame = 0;  // since the key frame
-  bool quiet = false;       // no residual in this frame
+  std::uint32_t frame = 0;  // number of frames since the key frame
+  bool quiet = false;       // true if this frame has no residual
   NormalPrediction normalPrediction;
-  std::vector<FacedNormal> sentNormals;  // by vertex
+  std::vector<FacedNormal> sentNormals;  // indexed by vertex
   std::vector<CodedResidual>* recorded = nullptr;
-  std::vector<Desk> desks;            // of each piece
-  std::vector<EncodedChunk> encoded;  // of a batch
+  std::vector<ChunkScratch> scratches;  // one for each piece
+  std::vector<EncodedChunk> encoded;    // chunks of a batch
 };
 
 void HierarchicalEncoder::State::quantise(std::span<const float> positions) {
-  // A residual ends within a step of what was wanted, which is then still possible.
+  // A residual ends within a step of the wanted position, which must stay within the limit.
   constexpr std::int32_t kLimit = kMaxCoordinate - (4 << 8);
   constexpr double limit = kLimit;
   const Array<std::uint32_t>& vertexOf = predictor.hierarchy().vertexOf;
   const double perUnit = quantisationScale(unit.unit);
   const auto coordinate = [&](float x) {
     const double q = static_cast<double>(x) * perUnit;
-    if (!(q >= -limit)) return -kLimit;  // what is no number, too
+    if (!(q >= -limit)) return -kLimit;  // also catches NaN
     return q > limit ? kLimit : simde_mm_cvtsd_si32(simde_mm_set_sd(q));
   };
   const auto quantiseSlots = [&](std::uint32_t, std::uint32_t begin, std::uint32_t end) {
@@ -176,7 +178,7 @@ void HierarchicalEncoder::State::quantise(std::span<const float> positions) {
   share(static_cast<std::uint32_t>(vertices), 4 * kLeastPiece, quantiseSlots);
 }
 
-// In steps.
+// Result in steps.
 Local HierarchicalEncoder::State::local(const SurfaceFrame& frame_, Int32x4 difference) const {
   alignas(16) std::int32_t d[4];
   alignas(16) std::int16_t t[8], n[8];
@@ -192,9 +194,9 @@ Local HierarchicalEncoder::State::local(const SurfaceFrame& frame_, Int32x4 diff
   return {dot(t), dot(t + 4), dot(n)};
 }
 
-// What is promised is a distance, half the diagonal of a cube of steps: seldom is a vertex in a corner, so
-// that a smaller residual along the surface often serves as well. Along the normal, where the eye looks, the
-// nearest one stays.
+// The promise is a distance: half the diagonal of a cube of steps. A vertex is seldom in a corner of the
+// cube, so a smaller residual along the surface often keeps the promise too. Along the normal, where errors
+// are most visible, the nearest residual stays.
 Vectors4 economise(const Local4& wish) {
   Vectors4 r{wish.u.rounded(), wish.v.rounded(), wish.n.rounded()};
   Float32x4 u = wish.u - Float32x4::of(r.x), v = wish.v - Float32x4::of(r.y);
@@ -208,7 +210,7 @@ Vectors4 economise(const Local4& wish) {
     residual = select(stays, residual, smaller);
     error = select(stays, error, moved);
   };
-  // The one that is farther off first.
+  // Starts with the component that has the larger error.
   const Int32x4 uFirst = u.magnitude() > v.magnitude();
   for (const bool second : {false, true}) {
     const Int32x4 isU = second ? Int32x4::without(uFirst, Int32x4::all(-1)) : uFirst;
@@ -223,16 +225,16 @@ Vectors4 economise(const Local4& wish) {
   return r;
 }
 
-// The residuals of four vertices, and where they lead.
-void HierarchicalEncoder::State::choose(const Desk& desk, std::uint32_t begin, std::size_t first,
+// Chooses the residuals of four vertices and computes the positions that they lead to.
+void HierarchicalEncoder::State::choose(const ChunkScratch& scratch, std::uint32_t begin, std::size_t first,
                                         ChunkResiduals& chunk, std::array<Int32x4, 4>& positions) const {
-  const auto& predictions = desk.predictions;
+  const auto& predictions = scratch.predictions;
   std::array<Int32x4, 4> differences;
   for (std::size_t i = 0; i < 4; ++i)
     differences[i] =
         wanted[std::min(begin + first + i, vertices - 1)].load() - predictions[first + i].position;
   const Vectors4 d = transposed(differences);
-  const SurfaceFrames& f = desk.frames[first / 4];
+  const SurfaceFrames& f = scratch.frames[first / 4];
   const Float32x4 scale = Float32x4::all(1.0f / static_cast<float>(1 << (kUnitBits + unit.stepBits)));
   const Float32x4 x = scale * Float32x4::of(d.x), y = scale * Float32x4::of(d.y),
                   z = scale * Float32x4::of(d.z);
@@ -260,7 +262,7 @@ void HierarchicalEncoder::State::choose(const Desk& desk, std::uint32_t begin, s
   }
 }
 
-// The frame is orthonormal to one in thousands: after a long way a second and a third look are needed.
+// The frame is orthonormal only to about 1 in 1000, so a long way needs further passes.
 Int32x4 HierarchicalEncoder::State::chooseFar(const Prediction& prediction, Int32x4 target,
                                               std::int32_t* residual) const {
   Int32x4 position = predictor.reconstruct(prediction, residual);
@@ -274,7 +276,7 @@ Int32x4 HierarchicalEncoder::State::chooseFar(const Prediction& prediction, Int3
   return position;
 }
 
-// Whether the reference serves once more.
+// True if the reference keeps the promise for every vertex.
 bool HierarchicalEncoder::State::isAtRest() const {
   const std::span<const Node> former = predictor.reference();
   const double limit = squaredPromise();
@@ -308,8 +310,8 @@ void HierarchicalEncoder::State::attempt() {
   recorded = record;
 }
 
-// What is wanted in the same place for some frames is pinned, it seems: it is to stand still. To say so takes
-// two bytes.
+// A vertex whose position stays the same for some frames is probably pinned, and shall stand still. This
+// costs two bytes.
 bool HierarchicalEncoder::State::wantsToRest(std::uint32_t slot) const {
   if (stillFrames[slot] < kStillFrames) return false;
   const Node& former = predictor.reference()[slot];
@@ -317,13 +319,13 @@ bool HierarchicalEncoder::State::wantsToRest(std::uint32_t slot) const {
 }
 
 void HierarchicalEncoder::State::countRests() {
-  std::uint32_t wishes = 0;
-  for (std::uint32_t slot = 0; slot < vertices; ++slot) wishes += wantsToRest(slot) ? 1 : 0;
-  restTurns = (wishes + kRestsAtOnce - 1) / kRestsAtOnce;
+  std::uint32_t candidates = 0;
+  for (std::uint32_t slot = 0; slot < vertices; ++slot) candidates += wantsToRest(slot) ? 1 : 0;
+  restInterval = (candidates + kRestsAtOnce - 1) / kRestsAtOnce;
 }
 
 bool HierarchicalEncoder::State::startsToRest(std::uint32_t slot) const {
-  return restTurns > 0 && wantsToRest(slot) && (slot + frame) % restTurns == 0;
+  return restInterval > 0 && wantsToRest(slot) && (slot + frame) % restInterval == 0;
 }
 
 bool HierarchicalEncoder::State::goesOnResting(std::uint32_t slot, const Prediction& prediction) const {
@@ -350,7 +352,7 @@ void HierarchicalEncoder::State::encodePhase(const Phase& phase) {
     const std::uint32_t count = (std::min(batch, phase.end - first) + kChunk - 1) / kChunk;
     share(count, kLeastPiece / kChunk, [&](std::uint32_t piece, std::uint32_t begin, std::uint32_t end) {
       for (std::uint32_t i = begin; i < end; ++i)
-        encodeChunk(phase, first + i * kChunk, number + i, desks[piece], encoded[i]);
+        encodeChunk(phase, first + i * kChunk, number + i, scratches[piece], encoded[i]);
     });
     number += count;
     for (std::uint32_t i = 0; i < count; ++i) any = write(phase.weightClass, encoded[i]) || any;
@@ -360,38 +362,38 @@ void HierarchicalEncoder::State::encodePhase(const Phase& phase) {
 }
 
 void HierarchicalEncoder::State::encodeChunk(const Phase& phase, std::uint32_t begin, std::uint32_t number,
-                                             Desk& desk, EncodedChunk& out) {
+                                             ChunkScratch& scratch, EncodedChunk& out) {
   const std::uint32_t weightClass = phase.weightClass, count = std::min(kChunk, phase.end - begin);
   const ScaleModel model(kScaleWeights[scaleClassOf(weightClass, frame == 0)]);
   ChunkResiduals& chunk = out.residuals;
   out.count = count;
   out.fits = weightClass < kWeightClasses && fitted->isFitted(weightClass, number, frame);
   out.any = chunk.anyStays = false;
-  predictor.predict(begin, count, vectors[weightClass], desk.predictions.data(), desk.frames.data());
+  predictor.predict(begin, count, vectors[weightClass], scratch.predictions.data(), scratch.frames.data());
   for (std::size_t first = 0; first < count; first += 4) {
     const std::size_t four = std::min<std::size_t>(count - first, 4);
     std::array<Int32x4, 4> positions;
-    choose(desk, begin, first, chunk, positions);
-    rest(desk, begin, first, four, chunk, positions);
+    choose(scratch, begin, first, chunk, positions);
+    rest(scratch, begin, first, four, chunk, positions);
     Int32x4 counted[kComponents];
     for (std::size_t c = 0; c < kComponents; ++c) {
       counted[c] = countedMagnitudes(Int32x4::load(&chunk.residuals[c][first]));
-      counted[c].store(&desk.magnitudes[c][first]);
+      counted[c].store(&scratch.magnitudes[c][first]);
     }
     const Int32x4 packed = packMagnitudes(counted[kAlongU], counted[kAlongV], counted[kAlongNormal]);
     out.any = out.any || (~(packed == Int32x4::all(0)).signs() & ((1 << four) - 1)) != 0;
     predictor.place(begin + static_cast<std::uint32_t>(first), static_cast<std::uint32_t>(four),
-                    &desk.predictions[first], positions, packed);
+                    &scratch.predictions[first], positions, packed);
   }
   out.any = out.any || chunk.anyStays;
-  if (writer->needsScales()) scale(desk, count, model, chunk);
+  if (writer->needsScales()) scale(scratch, count, model, chunk);
   for (std::uint32_t i = 0; out.fits && i < count; ++i) {
     const std::uint32_t slot = begin + i;
-    fitTo(desk, weightClass, predictor.features(slot, desk.predictions[i]), wanted[slot].load(), i);
+    fitTo(scratch, weightClass, predictor.features(slot, scratch.predictions[i]), wanted[slot].load(), i);
   }
-  if (out.fits) out.products = desk.products.take();
+  if (out.fits) out.products = scratch.products.take();
   if (recorded != nullptr) {
-    for (std::size_t i = 0; i < count; ++i) note(desk, weightClass, chunk, i);
+    for (std::size_t i = 0; i < count; ++i) note(scratch, weightClass, chunk, i);
   }
 }
 
@@ -401,23 +403,23 @@ bool HierarchicalEncoder::State::write(std::uint32_t weightClass, const EncodedC
   return chunk.any;
 }
 
-// Leaves out the residuals of what rests, or starts to.
-void HierarchicalEncoder::State::rest(const Desk& desk, std::uint32_t begin, std::size_t first,
+// Removes the residuals of vertices that rest or start to rest.
+void HierarchicalEncoder::State::rest(const ChunkScratch& scratch, std::uint32_t begin, std::size_t first,
                                       std::size_t count, ChunkResiduals& chunk,
                                       std::array<Int32x4, 4>& positions) const {
   for (std::size_t i = first; i < first + count; ++i) {
     const std::uint32_t slot = begin + static_cast<std::uint32_t>(i);
     chunk.stays[i] = startsToRest(slot);
     chunk.anyStays = chunk.anyStays || chunk.stays[i];
-    if (!chunk.stays[i] && !goesOnResting(slot, desk.predictions[i])) continue;
-    positions[i - first] = desk.predictions[i].last;
+    if (!chunk.stays[i] && !goesOnResting(slot, scratch.predictions[i])) continue;
+    positions[i - first] = scratch.predictions[i].last;
     for (auto& component : chunk.residuals) component[i] = 0;
   }
 }
 
-void HierarchicalEncoder::State::fitTo(Desk& desk, std::uint32_t weightClass, const FeatureVectors& features,
-                                       Int32x4 target, std::size_t i) const {
-  const Prediction& prediction = desk.predictions[i];
+void HierarchicalEncoder::State::fitTo(ChunkScratch& scratch, std::uint32_t weightClass,
+                                       const FeatureVectors& features, Int32x4 target, std::size_t i) const {
+  const Prediction& prediction = scratch.predictions[i];
   const auto& w = used[weightClass];
   Int32x4 predicted = Int32x4::all(0), turned = predicted;
   for (std::size_t f = 0; f < kFeaturePairs; ++f) {
@@ -427,12 +429,12 @@ void HierarchicalEncoder::State::fitTo(Desk& desk, std::uint32_t weightClass, co
   predicted = predicted + turned.shiftedRight(kTurnedBits);
   const Int32x4 goal =
       (target - prediction.position).shiftedRight(unit.stepBits - 4) + predicted.shiftedRight(kWeightBits);
-  // What is hard to predict here is not to spoil the weights for the rest.
+  // Vertices that are hard to predict get a low weight, so that they do not spoil the weights for the others.
   const std::uint32_t around = prediction.parentMagnitudes;
   const std::uint32_t near = (around & 255u) + (around >> 8 & 255u) + (around >> 16 & 255u);
-  const auto own =
-      static_cast<std::uint32_t>(desk.magnitudes[0][i] + desk.magnitudes[1][i] + desk.magnitudes[2][i]);
-  desk.products.add(features, goal, roughReciprocal(6 + 4 * own * own + near));
+  const auto own = static_cast<std::uint32_t>(scratch.magnitudes[0][i] + scratch.magnitudes[1][i] +
+                                              scratch.magnitudes[2][i]);
+  scratch.products.add(features, goal, roughReciprocal(6 + 4 * own * own + near));
 }
 
 void HierarchicalEncoder::State::encodeNormals(std::span<const float> normals) {
@@ -446,16 +448,16 @@ void HierarchicalEncoder::State::encodeNormals(std::span<const float> normals) {
   }
 }
 
-void HierarchicalEncoder::State::note(const Desk& desk, std::uint32_t weightClass,
+void HierarchicalEncoder::State::note(const ChunkScratch& scratch, std::uint32_t weightClass,
                                       const ChunkResiduals& chunk, std::size_t i) {
-  const Prediction& prediction = desk.predictions[i];
+  const Prediction& prediction = scratch.predictions[i];
   for (std::size_t c = 0; c < kComponents; ++c) {
     const auto byte = [c](std::uint32_t bytes) { return static_cast<std::uint8_t>(bytes >> 8 * c); };
     recorded->push_back(
         {static_cast<std::uint8_t>(c), static_cast<std::uint8_t>(scaleClassOf(weightClass, frame == 0)),
          byte(prediction.parentMagnitudes), byte(prediction.ringMagnitudes), byte(prediction.lastMagnitudes),
-         static_cast<std::uint8_t>(desk.magnitudes[kAlongNormal][i]),
-         static_cast<std::uint8_t>(desk.magnitudes[kAlongU][i]), chunk.residuals[c][i]});
+         static_cast<std::uint8_t>(scratch.magnitudes[kAlongNormal][i]),
+         static_cast<std::uint8_t>(scratch.magnitudes[kAlongU][i]), chunk.residuals[c][i]});
   }
 }
 
@@ -475,10 +477,10 @@ std::size_t HierarchicalEncoder::encode(const FrameRole& role, std::span<const f
   s.quantise(positions);
   s.predictor.begin(key, role.referenceLayer);
   s.plan->begin(role);
-  s.restTurns = 0;
-  // Once in the base is enough: the others refer to it.
+  s.restInterval = 0;
+  // Counting in the base is enough: all other layers refer to it.
   if (!key && role.layer == 0) s.countRests();
-  // What a key frame leaves out of account is the past: its weights are fitted to a first attempt at itself.
+  // A key frame cannot use the past, so its weights are fitted to a first attempt at the same frame.
   if (key && s.plan->attempts()) s.attempt();
   const std::size_t weightBytes = s.plan->write(!key && s.isAtRest(), s.weightBytes.data());
   s.use(s.plan->used());
@@ -498,12 +500,3 @@ void HierarchicalEncoder::record(std::vector<CodedResidual>* residuals) {
 }
 
 }  // namespace clothstream::codec::hierarchical
-
-namespace clothstream::codec {
-
-std::unique_ptr<BodyEncoder> makeHierarchicalEncoder(const StreamLayout& layout,
-                                                     const EncoderOptions& options) {
-  return std::make_unique<hierarchical::HierarchicalEncoder>(layout, options);
-}
-
-}  // namespace clothstream::codec

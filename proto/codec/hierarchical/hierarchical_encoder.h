@@ -1,32 +1,40 @@
 // SPDX-License-Identifier: MIT
-// Codecs 2 and 3: vertices to packets.
+// Encoder of codecs 2 and 3: vertices to packets.
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
 #include <memory>
+#include <span>
 #include <vector>
 
-#include "proto/codec/body.h"
+#include "proto/codec/encoder.h"
+#include "proto/codec/frame_role.h"
 
 namespace clothstream::codec::hierarchical {
 
-// A residual and what was known when it was coded: what the tables of residual_tables.cpp are fitted to.
+// A residual with the values that were known when it was coded. residual_tables.cpp is fitted to these.
 struct CodedResidual {
   std::uint8_t component, scaleClass;
-  std::uint8_t parents, ring, last, normal, u;  // the magnitudes that ScaleWeights multiplies
+  std::uint8_t parents, ring, last, normal, u;  // magnitudes that ScaleWeights multiplies
   std::int32_t residual;
 };
 
-class HierarchicalEncoder final : public BodyEncoder {
+class HierarchicalEncoder {
  public:
+  // `layout` has the max error of the quality that is encoded.
   explicit HierarchicalEncoder(const StreamLayout& layout, const EncoderOptions& options = {});
-  ~HierarchicalEncoder() override;
+  ~HierarchicalEncoder();
 
-  std::size_t packetBound() const override;
+  std::size_t packetBound() const;
+  // Writes a whole packet, header included; see Encoder::encode().
   std::size_t encode(const FrameRole& role, std::span<const float> positions, std::span<const float> normals,
-                     std::span<std::byte> out) override;
-  std::uint64_t reconstructionHash() const override;
+                     std::span<std::byte> out);
+  // Hash of the newest frame.
+  std::uint64_t reconstructionHash() const;
 
-  // Appends to `residuals` what is coded from now on; null: no more. Without workers.
+  // Appends every residual that is coded from now on to `residuals`; null stops it. Requires an encoder
+  // without workers.
   void record(std::vector<CodedResidual>* residuals);
 
  private:

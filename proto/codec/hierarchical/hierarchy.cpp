@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The order in which codec 2 codes the vertices of all cloths.
+// Coding order of the vertices of all cloths.
 #include "proto/codec/hierarchical/hierarchy.h"
 
 #include <array>
@@ -23,7 +23,7 @@ bool Hierarchy::build(const StreamLayout& layout) {
     orders.push_back(orderOf(cloth));
     for (const Rank rank : orders.back().ranks) ++sizes[rank];
   }
-  std::array<std::uint32_t, kRanks> next;  // slot
+  std::array<std::uint32_t, kRanks> next;  // next free slot
   std::vector<Phase> made;
   std::uint32_t slots = 0;
   for (Rank rank = kRanks; rank-- > 0;) {

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The order in which codec 2 codes the vertices of all cloths, coarse to fine, and from which others each is
-// predicted.
+// Coding order of all cloths, coarse to fine, and the neighbours that each vertex is predicted from.
 #pragma once
 
 #include <cstdint>
@@ -11,23 +10,23 @@
 
 namespace clothstream::codec::hierarchical {
 
-// Vertices that are coded together: none is predicted from another of them.
+// Vertices that are coded together. None of them is predicted from another.
 struct Phase {
-  std::uint32_t begin, end;  // slots
+  std::uint32_t begin, end;  // range of slots
   std::uint32_t weightClass;
 };
 
-// From the layout alone: both ends compute the same. A vertex's slot is its place in the coding order, by
-// phase, then by number. Slot vertexCount is no vertex: it stands for the origin.
+// Follows from the layout alone, so both ends compute the same. The slot of a vertex is its place in the
+// coding order: by phase, then by number. Slot vertexCount is the origin, not a vertex.
 struct Hierarchy {
   // False if memory is out.
   [[nodiscard]] bool build(const StreamLayout& layout);
 
-  Array<std::uint32_t> vertexOf;  // by slot
-  Array<Neighbours> neighbours;   // by slot, slots
-  Array<Nearest> nearest;         // by slot, slots
+  Array<std::uint32_t> vertexOf;  // indexed by slot
+  Array<Neighbours> neighbours;   // indexed by slot; holds slots
+  Array<Nearest> nearest;         // indexed by slot; holds slots
   Array<Phase> phases;
-  // The first ones are of all coarse vertices, which need none of the others.
+  // Number of the first phases, which hold all coarse vertices and depend on no others.
   std::size_t coarsePhases = 0;
   std::uint32_t coarseVertices = 0;
 };

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// The coding order of a mesh: each level is what of the one below stands apart, about half of it, so that at
-// rest a level lies between the vertices of those above it. Floating point without contraction: the same
-// everywhere.
+// Coding order of a mesh. Each level is vertices of the one below that stand apart, about half of them, so
+// that at rest a level lies between the vertices of the levels above. Floating point without contraction
+// gives the same result on every machine.
 #include <cmath>
 #include <functional>
 #include <queue>
@@ -12,16 +12,16 @@
 namespace clothstream::codec::hierarchical {
 namespace {
 
-// Where searches end. They bound the work, whatever the mesh is.
+// Limits of the searches. They bound the work for any mesh.
 constexpr std::size_t kMaxVisited = 64, kMaxOthers = 16, kMaxCandidates = 8, kMaxRingCandidates = 24;
 constexpr std::size_t kMaxMeshLevels = 2 * kLevels - 2;
 constexpr std::uint32_t kMeshParts = 3;
-// Vertices nearer than this many times the mean distance to the four nearest are not apart.
+// Vertices nearer than this factor times the mean distance to the four nearest are not apart.
 constexpr double kApart = 1.2;
-// What large weights of parents cost beside being off at rest.
+// Cost of large parent weights, compared with an error at rest.
 constexpr double kEven = 0.05;
-// How far from where it would be opposite of another one a vertex of the ring is at most, as part of the
-// other's distance.
+// Maximum distance of a ring vertex from the point opposite another one, as part of the distance of that
+// other one.
 constexpr double kOpposite = 0.35;
 
 struct Vector {
@@ -34,7 +34,7 @@ double dot(const Vector& a, const Vector& b) {
   return a.x * b.x + a.y * b.y + a.z * b.z;
 }
 
-// The nearest comes first; of two as near, that with the lower number.
+// Sorted by distance; equal distances by number.
 struct Other {
   double distance;
   std::uint32_t vertex;
@@ -44,7 +44,7 @@ struct Other {
   friend bool operator>(const Other& a, const Other& b) { return b < a; }
 };
 
-// Which vertices of a level are near which others: at most kMaxOthers each.
+// Neighbours of the vertices of a level, at most kMaxOthers each.
 struct Graph {
   std::span<const Other> of(std::uint32_t vertex) const {
     return std::span(others).subspan(starts[vertex], starts[vertex + 1] - starts[vertex]);
@@ -56,7 +56,7 @@ struct Graph {
   }
   void end() { starts.push_back(others.size()); }
 
-  std::vector<std::size_t> starts{0};  // by vertex, and the end
+  std::vector<std::size_t> starts{0};  // indexed by vertex, and the end
   std::vector<Other> others;
 };
 
@@ -127,7 +127,7 @@ class MeshOrder {
     return graph;
   }
 
-  // The first of those round `start` that are wanted, breadth first.
+  // First wanted vertices around `start`, breadth first.
   template <typename IsWanted>
   std::vector<Other>& search(const Graph& graph, std::uint32_t start, IsWanted&& isWanted) {
     ++search_;
@@ -146,7 +146,8 @@ class MeshOrder {
     return found_;
   }
 
-  // By the length of the way along edges from the first, and so on from the first that is left.
+  // Orders by path length along edges from the first vertex; continues from the first vertex that was not
+  // reached.
   std::vector<std::uint32_t> fromTheFirst(const Level& level) const {
     std::vector<bool> done(count_);
     std::vector<std::uint32_t> order;
@@ -167,7 +168,7 @@ class MeshOrder {
     return order;
   }
 
-  // In this order, those that are not too near to one that was taken before.
+  // Takes vertices in this order, except those too near to one that was taken before.
   static std::vector<bool> takeApart(const Graph& graph, std::span<const std::uint32_t> order,
                                      std::size_t count) {
     std::vector<bool> taken(count), excluded(count);
@@ -202,7 +203,8 @@ class MeshOrder {
     return coarse;
   }
 
-  // A few, each from those before it; or many that have no neighbours left, from nothing.
+  // Adds a few vertices, each predicted from those before it; or many without any neighbours, predicted from
+  // nothing.
   void addCoarsest(std::span<const std::uint32_t> vertices) {
     const bool few = vertices.size() <= kMostCorners;
     std::vector<std::uint32_t> before;
@@ -242,7 +244,7 @@ class MeshOrder {
     }
   }
 
-  // Two pairs of parents, each across from one side to the other, where there are four; the rest is the ring.
+  // Chooses two pairs of parents, each across the vertex, if there are four. The rest is the ring.
   void setNeighbours(std::uint32_t v, std::vector<Other>& near) {
     Neighbours& neighbours = order_.neighbours[v];
     std::vector<std::uint32_t> chosen;
@@ -281,8 +283,8 @@ class MeshOrder {
     setRing(neighbours, pairsAcross(v, near, neighbours.ring.size()));
   }
 
-  // Of these, the nearest that lie opposite of each other, or about: at rest their mean is where the vertex
-  // is.
+  // Takes the nearest vertices that lie roughly opposite each other, so that their mean at rest is near the
+  // vertex.
   std::vector<std::uint32_t> pairsAcross(std::uint32_t v, std::vector<Other>& near, std::size_t most) const {
     std::vector<std::uint32_t> pairs;
     if (near.size() > kMaxRingCandidates) near.resize(kMaxRingCandidates);
@@ -303,7 +305,7 @@ class MeshOrder {
     return pairs;
   }
 
-  // Those of which the sum is 1 and the mean nearest to the vertex at rest, beside being small.
+  // Chooses weights that add up to 1, are small, and put the mean at rest as near to the vertex as possible.
   void setWeights(std::uint32_t v, std::span<const std::uint32_t> parents, Neighbours& neighbours) const {
     const std::size_t n = parents.size();
     double m[4][4], x[4];
@@ -316,7 +318,7 @@ class MeshOrder {
     }
     if (!(size > 0)) return;
     for (std::size_t i = 0; i < n; ++i) m[i][i] += kEven * size / static_cast<double>(n);
-    // Elimination: the matrix is positive definite.
+    // Gaussian elimination; the matrix is positive definite.
     for (std::size_t k = 0; k < n; ++k) {
       for (std::size_t i = k + 1; i < n; ++i) {
         const double factor = m[i][k] / m[k][k];
@@ -333,7 +335,7 @@ class MeshOrder {
     constexpr int kWhole = 1 << kParentBits;
     std::array<std::int16_t, 4> weights{};
     int rest = kWhole;
-    // Where parents are repeated (setParents), only the first of each counts.
+    // Repeated parents (setParents) count only in their first place.
     constexpr std::uint8_t kPlace[5][4] = {{}, {0}, {0, 1}, {0, 1, 3}, {0, 1, 2, 3}};
     for (std::size_t i = 1; i < n; ++i) {
       const double weight = std::clamp(kWhole * (x[i] / sum), -2.0 * kWhole, 2.0 * kWhole);
@@ -356,12 +358,12 @@ class MeshOrder {
 
   std::size_t count_;
   CodingOrder order_;
-  std::vector<std::uint32_t> seen_;  // by vertex: the last search that came by
+  std::vector<std::uint32_t> seen_;  // indexed by vertex: the last search that visited it
   std::uint32_t search_ = 0;
   std::vector<std::uint32_t> visited_;
   std::vector<Other> found_;
-  std::vector<Vector> place_;   // at rest; all in one place where that is unknown
-  std::vector<bool> onBorder_;  // of an edge that only one triangle has
+  std::vector<Vector> place_;   // rest positions; all at the origin if unknown
+  std::vector<bool> onBorder_;  // ends of edges that belong to only one triangle
   std::vector<bool> known_;
 };
 

@@ -9,7 +9,7 @@ namespace {
 
 constexpr int kNormalBits = 15;
 
-// The other axes follow the top one.
+// The two axes after the top one.
 struct Axes {
   explicit Axes(std::uint8_t top_) : top(top_ % 3u), first((top + 1) % 3), second((top + 2) % 3) {}
   std::size_t top, first, second;
@@ -57,7 +57,7 @@ bool NormalPrediction::allocate(const StreamLayout& layout) {
   return places_.allocate(vertices) && sums_.allocate(vertices) && normals_.allocate(vertices);
 }
 
-// The cross product of the diagonals of a quad, or of two sides of a triangle, to each corner.
+// Adds to each corner the cross product of a quad's diagonals or of two sides of a triangle.
 void NormalPrediction::addFace(const std::uint32_t* corners, std::size_t count) {
   const Place &p = places_[corners[0]], &a = places_[corners[1]], &c = places_[corners[2]];
   const Place& b = places_[corners[count - 1]];
@@ -68,7 +68,7 @@ void NormalPrediction::addFace(const std::uint32_t* corners, std::size_t count) 
   }
   for (std::size_t i = 0; i < 3; ++i) {
     const std::size_t j = (i + 1) % 3, k = (i + 2) % 3;
-    // Each factor is below 2^28, the products below 2^57.
+    // Factors are below 2^28, products below 2^57.
     const auto cross = static_cast<std::uint64_t>(first[j] * second[k] - first[k] * second[j]);
     for (std::size_t corner = 0; corner < count; ++corner) sums_[corners[corner]][i] += cross;
   }

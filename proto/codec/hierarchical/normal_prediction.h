@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Normals beside codec 2's positions: what they are off those that follow from the positions.
+// Prediction of sent normals: their difference from the normals that follow from the decoded positions.
 #pragma once
 
 #include <algorithm>
@@ -15,27 +15,27 @@
 
 namespace clothstream::codec::hierarchical {
 
-// On the octahedron of which the top points where the normal about does: the seams are far away.
+// A normal on an octahedron whose top points roughly along the normal, so that its seams are far away.
 struct FacedNormal {
   Octahedral octahedral;
-  // The axis that points up, 0 to 2, and 3 more where it points down.
+  // Axis of the top, 0 to 2; plus 3 if the top points in the negative direction.
   std::uint8_t top = 2;
 };
 
 FacedNormal faceNormal(const float* normal, std::uint8_t top);
-// 3 floats, unit length.
+// Writes 3 floats of unit length.
 void unfaceNormal(const FacedNormal& faced, float* normal);
 
-// In integers: both ends find the same.
+// Computes in integers, so both ends find the same.
 class NormalPrediction {
  public:
   // False if memory is out.
   [[nodiscard]] bool allocate(const StreamLayout& layout);
-  // From the positions of the frame that is being made; by vertex.
+  // Predicts from the positions of the frame that is being coded. The result is indexed by vertex.
   std::span<const FacedNormal> predict(const StreamLayout& layout, const Predictor& predictor);
 
  private:
-  // Of the sum of the faces' normals; modulo 2^64.
+  // Sum of the faces' normals, modulo 2^64.
   using Sum = std::array<std::uint64_t, 3>;
   using Place = std::array<std::int32_t, 3>;
 
@@ -46,7 +46,7 @@ class NormalPrediction {
   Array<FacedNormal> normals_;
 };
 
-// How large residuals along u or v are of late: which distribution the next one has.
+// Recent magnitude of the residuals along u or v. It selects the distribution of the next residual.
 class NormalScale {
  public:
   std::uint32_t scale() const { return scaleOf(expected_); }

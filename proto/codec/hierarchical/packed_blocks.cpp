@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Numbers in blocks that each say how they are written.
+// Blocks of numbers that each say how they are written.
 #include "proto/codec/hierarchical/packed_blocks.h"
 
 #include <algorithm>
@@ -13,7 +13,7 @@ namespace {
 
 using Numbers = std::span<const std::uint32_t>;
 
-// `reserved`: how many of the escapes' numbers stand for something else.
+// `reserved`: number of escape values with another meaning.
 unsigned bitsOf(std::uint32_t number, unsigned low, std::uint32_t reserved) {
   if (number == kStayNumber) return kEscape + gammaBits(kStays, kEscapeGammaBits);
   const std::uint32_t ones = number >> low;
@@ -54,7 +54,7 @@ std::uint32_t bitsOf(Numbers numbers, Mode mode, std::uint32_t reserved) {
   return bits;
 }
 
-// From the first on as long as the next one takes fewer bits.
+// Tries modes from the first on, as long as the next one takes fewer bits.
 Mode modeOf(Numbers numbers, std::uint32_t reserved) {
   if (isZero(numbers)) return kNoNumbers;
   Mode mode = kRuns;
@@ -93,7 +93,7 @@ class Block {
 
  private:
   void readPlain(std::size_t begin, std::size_t end, unsigned low) {
-    BitReader in = in_;  // in registers
+    BitReader in = in_;  // keeps the reader in registers
     for (std::size_t i = begin; i < end; ++i) {
       std::uint32_t number = in.getOnes(kEscape);
       if (number == kEscape) {

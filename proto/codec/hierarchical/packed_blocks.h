@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Numbers in blocks that each say how they are written: what codec 3 has in place of rANS. A device can write
-// many of them at once, and the kernels do, to the bit (shaders/encode/hierarchical/pack.glsl).
+// Blocks of numbers that each say how they are written. Codec 3 has them instead of rANS.
 #pragma once
 
 #include <array>
@@ -13,45 +12,45 @@
 namespace clothstream::codec::hierarchical {
 
 inline constexpr std::uint32_t kBlockVertices = 32;
-// A group stands by itself, in whole bytes.
+// A group can be decoded on its own and takes whole bytes.
 inline constexpr std::uint32_t kGroupBlocks = 64, kGroupVertices = kGroupBlocks * kBlockVertices;
 
-// How a block writes the numbers of a component. 0: none, all are 0. 1: of each run of so many, a bit says
-// whether all are 0; where not, they follow as in mode 2. From 2 on: all, with mode - 2 of their lowest bits
-// as they are, what is above in so many ones.
+// The way a block writes the numbers of a component. 0: no numbers, all are 0. 1: for each run of
+// kRunVertices vertices a bit that says whether all are 0, and otherwise their numbers as in mode 2. From 2
+// on: all numbers, with mode - 2 low bits each and the rest in unary.
 using Mode = std::uint32_t;
 inline constexpr std::uint32_t kRunVertices = 4;
 inline constexpr Mode kNoNumbers = 0, kRuns = 1, kFirstPlain = 2, kModes = 32;
 
-// Among the numbers along the normal: the vertex stays.
+// Number along the normal of a vertex that stays.
 inline constexpr std::uint32_t kStayNumber = ~0u;
 
-// The numbers of a group, by component; null beyond the last one.
+// Numbers of a group, by component; pointers past the last component are null.
 struct GroupNumbers {
   std::array<const std::uint32_t*, 3> components{};
-  std::size_t count = 0;  // of vertices, kGroupVertices at most
-  bool hasStays = false;  // in the first component
+  std::size_t count = 0;  // number of vertices, at most kGroupVertices
+  bool hasStays = false;  // true if the first component can hold kStayNumber
 };
 
-// Bits that a number below 2^31 takes at most, and what else a block says of a component.
+// Maximum bits of a number below 2^31, and of the mode of a block and component.
 inline constexpr std::size_t kMostNumberBits = 76, kMostModeBits = 26;
-// Bytes that the groups of so many vertices take at most.
+// Maximum bytes of the groups of this many vertices.
 constexpr std::size_t groupsBound(std::size_t components, std::size_t vertices) {
   const std::size_t blocks = vertices / kBlockVertices + 1, groups = vertices / kGroupVertices + 1;
   return components * (blocks * kMostModeBits + vertices * kMostNumberBits) / 8 + 2 * groups;
 }
 
-// `out` stands at a whole byte, before and after.
+// `out` is at a whole byte before and after the call.
 void writeGroup(const GroupNumbers& numbers, BitWriter& out);
 
-// Where readGroup() writes to; as in GroupNumbers, and null where there are no stays.
+// Destination of readGroup(), as in GroupNumbers; `stays` is null if no vertex can stay.
 struct GroupResiduals {
   std::array<std::int32_t*, 3> components{};
   std::uint8_t* stays = nullptr;
   std::size_t count = 0;
 };
 
-// False where it is no group; `in` may end anywhere.
+// False if the bytes are no group. `in` may end anywhere.
 [[nodiscard]] bool readGroup(BitReader& in, const GroupResiduals& residuals);
 
 }  // namespace clothstream::codec::hierarchical

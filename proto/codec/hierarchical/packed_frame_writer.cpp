@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Packets of codec 3.
+// Writer of packets of codec 3.
 #include "proto/codec/hierarchical/packed_frame_writer.h"
 
 #include <algorithm>
@@ -10,7 +10,7 @@
 namespace clothstream::codec::hierarchical {
 namespace {
 
-// The groups of the vertices from `begin` to `end`, by the numbers of all.
+// Writes the groups of the vertices from `begin` to `end`. `numbers` holds those of all vertices.
 template <std::size_t components>
 void writeGroups(const std::array<std::vector<std::uint32_t>, components>& numbers, std::size_t begin,
                  std::size_t end, BitWriter& out) {
@@ -32,7 +32,7 @@ PackedFrameWriter::PackedFrameWriter(const StreamLayout& layout) : packet_(layou
 
 std::size_t PackedFrameWriter::packetBound() const {
   const std::size_t vertices = numbers_[0].size();
-  // Coarse vertices and the others each end with a group that is not full.
+  // The coarse vertices and the others each end with a group that is not full.
   return packet_.headerBound() + WeightPlan::kMaxBytes + groupsBound(kComponents, vertices) +
          groupsBound(kComponents, 0) + groupsBound(normalNumbers_.size(), normalNumbers_[0].size());
 }

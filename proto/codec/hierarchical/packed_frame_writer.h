@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Packets of codec 3: residuals in blocks (packed_blocks.h).
+// Writer of packets of codec 3: residuals in blocks (packed_blocks.h).
 #pragma once
 
 #include <array>
@@ -29,10 +29,10 @@ class PackedFrameWriter final : public FrameWriter {
 
  private:
   PacketAssembly packet_;
-  // By component in kCodingOrder and slot; those of normals by vertex.
+  // By component in kCodingOrder, then by slot; those of normals by vertex.
   std::array<std::vector<std::uint32_t>, kComponents> numbers_;
   std::array<std::vector<std::uint32_t>, 2> normalNumbers_;
-  std::size_t vertices_ = 0, coarse_ = 0, normals_ = 0;  // that were added
+  std::size_t vertices_ = 0, coarse_ = 0, normals_ = 0;  // numbers added so far
 };
 
 }  // namespace clothstream::codec::hierarchical

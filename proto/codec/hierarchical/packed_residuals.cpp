@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The residuals of a packet of codec 3.
+// Residuals of a packet of codec 3.
 #include "proto/codec/hierarchical/packed_residuals.h"
 
 #include <algorithm>
@@ -7,7 +7,8 @@
 namespace clothstream::codec::hierarchical {
 namespace {
 
-// The groups of the vertices from `begin` to `end`, to where the residuals of all stand.
+// Reads the groups of the vertices from `begin` to `end` into `all`, which holds the residuals of all
+// vertices.
 bool readGroups(BitReader& in, const GroupResiduals& all, std::size_t begin, std::size_t end) {
   for (std::size_t first = begin; first < end; first += kGroupVertices) {
     GroupResiduals group = all;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The residuals of a packet of codec 3, all read before the first vertex is placed.
+// Residuals of a packet of codec 3. All are read before the first vertex is placed.
 #pragma once
 
 #include <array>
@@ -19,15 +19,16 @@ class PackedResiduals {
   // False if memory is out.
   [[nodiscard]] bool allocate(const StreamLayout& layout, std::size_t coarseVertices);
 
-  // False where the bytes are not exactly the groups of those vertices.
+  // False if the bytes are not exactly the groups of the coarse vertices.
   [[nodiscard]] bool readCoarse(std::span<const std::byte> section);
-  // And of the normals, where the stream sends them.
+  // False if the bytes are not exactly the groups of the other vertices and, if the stream sends normals, of
+  // all normals.
   [[nodiscard]] bool readFine(std::span<const std::byte> section);
 
-  // By slot.
+  // Indexed by slot.
   const std::int32_t* residuals(Component component) const { return residuals_[component].data(); }
   const std::uint8_t* stays() const { return stays_.data(); }
-  // By vertex, along u and v.
+  // Residual along u (0) or v (1).
   std::int32_t ofNormal(std::size_t component, std::size_t vertex) const {
     return ofNormals_[component][vertex];
   }

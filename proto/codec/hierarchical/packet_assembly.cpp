@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A packet of sections that are written one after the other, and the header before them.
+// Assembles a packet from sections that are written in order.
 #include "proto/codec/hierarchical/packet_assembly.h"
 
 #include <algorithm>
@@ -29,7 +29,8 @@ std::byte* PacketAssembly::begin(const FrameRole& role, std::span<std::byte> out
   header_.referenceCount = role.kind == PacketKind::key ? 0 : 1;
   header_.references[0] = role.referenceTick;
   header_.sectionCount = 0;
-  // The header's length depends on the sections' sizes: they are written behind its bound and moved up.
+  // The header's length depends on the sections' sizes. Sections are written after its bound and moved up at
+  // the end.
   out_ = out;
   body_ = out.data() + headerBound();
   end_ = body_;

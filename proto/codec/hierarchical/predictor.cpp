@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Where codec 2 expects a vertex.
+// Prediction of a vertex in codec 2.
 #include "proto/codec/hierarchical/predictor.h"
 
 #include <algorithm>
@@ -60,7 +60,7 @@ FeatureVectors Predictor::features(std::uint32_t slot, const Prediction& p) cons
           turned(local.broadcastPair<2>(), local.broadcastPair<3>())};
 }
 
-// In 64 bits: residuals may be of more than 16.
+// Computes in 64 bits, since residuals may exceed 16 bits.
 Int32x4 Predictor::reconstruct(const Prediction& prediction, const std::int32_t* r) const {
   alignas(16) std::int32_t position[4];
   alignas(16) std::int16_t tangents[8], normal[8];

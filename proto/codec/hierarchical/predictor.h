@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Where codec 2 expects a vertex: from those coded before it in this frame, and from what all of them did in
-// the frames before. The same integers at both ends.
+// Prediction of a vertex in codec 2: from the vertices coded before it in this frame, and from the motion of
+// all of them in earlier frames. Both ends compute the same integers.
 #pragma once
 
 #include <algorithm>
@@ -9,19 +9,19 @@
 #include <span>
 
 #include "proto/codec/hierarchical/hierarchy.h"
-#include "proto/codec/hierarchical/lanes.h"
+#include "proto/codec/hierarchical/simd.h"
 #include "proto/codec/hierarchical/surface_frame.h"
 
 namespace clothstream::codec::hierarchical {
 
-// |x|, |y| and |z| of a position in units are this at most: sums of eight stay within 32 bits.
+// Limit of |x|, |y| and |z| of a position in units. Sums of eight stay within 32 bits.
 inline constexpr std::int32_t kMaxCoordinate = 1 << 27;
-// Residuals count as this at most where they tell what others will be like: eight sums fit a byte.
+// Limit of a residual's magnitude where it estimates other residuals. Eight sums fit a byte.
 inline constexpr std::uint32_t kMaxMagnitude = 31;
 
-// A vertex's position, in units. In `magnitudes` the lowest byte is the residual along u without its sign, at
-// most kMaxMagnitude, the next along v, then n: loaded and added up together with the position. In the
-// highest byte is 1 where the vertex rests: it is exactly where it was in the frame before.
+// Position of a vertex in units. In `magnitudes` the lowest byte is the magnitude of the residual along u, at
+// most kMaxMagnitude; the next two bytes are those along v and n. They are loaded and added together with the
+// position. The highest byte is 1 if the vertex rests: it is exactly where it was in the previous frame.
 struct alignas(16) Node {
   std::int32_t x = 0, y = 0, z = 0;
   std::uint32_t magnitudes = 0;
@@ -30,105 +30,109 @@ struct alignas(16) Node {
   bool rests() const { return magnitudes >> 24 != 0; }
 };
 
-// What the frames that refer to this one need of a vertex. The frame before is the one that this one refers
-// to; after a key frame all was at rest. 16-bit vectors are in sixteenths of a step, saturated.
+// State of a vertex that later frames need. The previous frame is the reference of this one. Before a key
+// frame everything counts as resting. 16-bit vectors are in sixteenths of a step, saturated.
 struct alignas(64) Record {
-  std::int32_t average[3];        // of the parents
-  std::uint32_t magnitudes;       // of the residuals: of this vertex four times and of the nearest
-  std::int16_t curvatures[8];     // the discrete Laplacian, and that of the frame before: x x y y z z
-  std::int16_t twistAndRing[8];   // half the difference of the two pairs of parents; the ring off the average
-  std::int16_t detailAndRing[8];  // of the vertex, and of the ring, off the average: x x y y z z
-  std::int16_t change[8];         // of these two since the frame before
-  std::int16_t changeBefore[8];   // the same of the frame before
-  std::int16_t movedAndFaster[8];  // what the average was off that of the frame before; the change of that
-  std::int16_t local[8];           // the detail along u, v and n, and that of the frame before: u u v v n n
+  std::int32_t average[3];  // mean of the parents
+  // magnitudes of the residuals: four times this vertex's plus those of the nearest vertices
+  std::uint32_t magnitudes;
+  std::int16_t curvatures[8];  // discrete Laplacian, and that of the previous frame: x x y y z z
+  // half the difference of the two pairs of parents; mean of the ring minus average
+  std::int16_t twistAndRing[8];
+  std::int16_t detailAndRing[8];   // vertex minus average, and mean of the ring minus average: x x y y z z
+  std::int16_t change[8];          // change of these two since the previous frame
+  std::int16_t changeBefore[8];    // the same change in the previous frame
+  std::int16_t movedAndFaster[8];  // average minus that of the previous frame; change of this difference
+  std::int16_t local[8];           // detail along u, v and n, and that of the previous frame: u u v v n n
 };
 
-// What predicts a change: vectors in sixteenths of a step, interleaved by two, and their weights.
+// Features that predict a change, and their weights: vectors in sixteenths of a step, interleaved in pairs.
 inline constexpr std::size_t kFeaturePairs = 8;
 inline constexpr std::size_t kFeatures = 2 * kFeaturePairs;
 inline constexpr std::size_t kDetailChangeFeature = 2, kTwistFeature = 6, kRingFeature = 7;
 using FeatureVectors = std::array<Int16x8, kFeaturePairs>;
 
-// The others are turned with the surface: their sum is, to 2^-kTurnedBits of what the others are told in.
+// Plain features come first. The others are turned with the surface, and their sum has kTurnedBits more
+// fraction bits.
 inline constexpr std::size_t kPlainPairs = 6;
 inline constexpr int kTurnedBits = 2;
 
-// A weight of 1 is 2^kWeightBits.
+// 2^kWeightBits stands for a weight of 1.
 inline constexpr int kWeightBits = 10;
 inline constexpr std::int32_t kMaxWeight = 2047;
-// The last class, of the corners, has none.
+// The last class is that of the corners, which has no weights.
 using Weights = std::array<std::array<std::int16_t, kFeatures>, kWeightClasses + 1>;
 
-// A class's weights as what they multiply.
+// Weights of a class, laid out like the features that they multiply.
 struct WeightVectors {
   std::array<Int16x8, kPlainPairs> plain;
-  Int16x8 local;  // of a record
+  Int16x8 local;  // for `local` of a record
 };
 
-// What is known of a vertex before its residual.
+// Prediction of a vertex, before its residual is known.
 struct Prediction {
   Int32x4 position, average;
-  Int32x4 last;  // position; of no meaning in a key frame
+  Int32x4 last;  // position in the previous frame; undefined in a key frame
   SurfaceFrame frame;
-  Int16x8 twistAndRing, movedAndFaster;  // as in the record
-  // Sums over the parents, over the ring, and of the last frame: of this vertex four times and of the
-  // nearest.
+  Int16x8 twistAndRing, movedAndFaster;  // same as in the record
+  // Sums of magnitudes: over the parents; over the ring; and of the previous frame, four times this vertex's
+  // plus those of the nearest vertices.
   std::uint32_t parentMagnitudes, ringMagnitudes, lastMagnitudes;
 };
 
-// Vertices that are predicted before the first of them is coded: few enough to stay in the nearest cache.
+// Vertices that are predicted before the first of them is coded: few enough for the first-level cache.
 inline constexpr std::uint32_t kChunk = 64;
-static_assert(kChunk % 8 == 0);  // as many are predicted at a time
+static_assert(kChunk % 8 == 0);  // eight are predicted at a time
 
-// A frame is begin(), then predict() and place() for all vertices in coding order, then keep(), or nothing
-// where the frame is given up.
+// The calls for a frame are begin(); predict() and place() for all vertices in coding order; keep(). Without
+// keep() the frame is discarded.
 class Predictor {
  public:
-  // Residuals are in steps of 2^stepBits units, 4 to 8. False if memory is out.
+  // Residuals are in steps of 2^stepBits units, with stepBits from 4 to 8. False if memory is out.
   [[nodiscard]] bool allocate(const StreamLayout& layout, int stepBits);
 
-  // From the next key frame on.
+  // Takes effect at the next key frame.
   void setStepBits(int stepBits) { stepBits_ = stepBits; }
 
   const Hierarchy& hierarchy() const { return hierarchy_; }
 
-  // A predicted frame refers to the newest one of that layer.
+  // A predicted frame refers to the newest frame of `referenceLayer`.
   void begin(bool key, std::uint8_t referenceLayer);
-  // Of up to kChunk vertices, none of which is a parent or of the ring of another; `out` and `frames` have
-  // room for whole eights of them.
+  // Predicts up to kChunk vertices, none of which is a parent of another or in its ring. `out` and `frames`
+  // have room for a multiple of eight vertices.
   void predict(std::uint32_t begin, std::uint32_t count, const WeightVectors& weights, Prediction* out,
                SurfaceFrames* frames) const;
-  // What the weights multiplied; the turned ones in parts of 2^-kTurnedBits.
+  // Features that the weights multiplied; the turned ones have kTurnedBits fraction bits.
   FeatureVectors features(std::uint32_t slot, const Prediction& prediction) const;
-  // How far these residuals of four vertices move them, in steps along u, v and n: each within 16 bits.
+  // Displacement of four vertices in units, for residuals in steps along u, v and n. Each residual fits 16
+  // bits.
   Vectors4 moved(const SurfaceFrames& frames, const Vectors4& residuals) const;
-  // The position to which these residuals lead, whatever they are.
+  // Position of a vertex for residuals of any size.
   Int32x4 reconstruct(const Prediction& prediction, const std::int32_t* residual) const;
-  // Up to four vertices in a row.
+  // Places up to four consecutive vertices.
   void place(std::uint32_t begin, std::uint32_t count, const Prediction* predictions,
              const std::array<Int32x4, 4>& positions, Int32x4 magnitudes);
-  // In place of predict() and place(): to where the vertices lie between the others by this frame alone.
+  // Replaces predict() and place() for vertices without residuals: interpolates them from this frame alone.
   void interpolate(std::uint32_t begin, std::uint32_t end);
-  // The frame is now the newest one of that layer; of the first so many slots, if nothing refers to the
-  // others.
+  // Makes the frame the newest one of `layer`. Only the first `slots` slots are kept; nothing may refer to
+  // the others.
   void keep(std::uint8_t layer, std::size_t slots);
   void keep(std::uint8_t layer) { keep(layer, hierarchy_.vertexOf.size()); }
 
-  // In coding order, of the newest frame that was kept, and of the one that this one refers to (of no meaning
-  // in a key frame).
+  // Nodes in coding order: of the newest frame that was kept; of the frame that is being made; and of its
+  // reference (undefined in a key frame).
   std::span<const Node> nodes() const { return {moments_[newest_].nodes.data(), hierarchy_.vertexOf.size()}; }
-  // Of the frame that is being made.
   std::span<const Node> made() const { return {work_.nodes, hierarchy_.vertexOf.size()}; }
   std::span<const Node> reference() const { return {work_.pastNodes, hierarchy_.vertexOf.size()}; }
 
  private:
-  // What a frame is made from and into. Whoever stores vectors works on a copy: they might lie anywhere, for
-  // all that a compiler knows, in members too.
+  // Everything that a frame is made from and into. Functions that store vectors work on a copy, because a
+  // compiler must assume that a stored vector could overwrite members.
   struct Work {
     bool key = true;
-    int fineBits = 0;  // a sixteenth of a step is 2^fineBits units
-    // What is read of the past: of a key frame one of each that is all zero, by a stride of 0.
+    int fineBits = 0;  // 2^fineBits units are a sixteenth of a step
+    // Past nodes and records. For a key frame these are a single zero node and record, read with a stride of
+    // 0.
     std::size_t stride = 0;
     const Node* pastNodes = nullptr;
     const Record* pastRecords = nullptr;
@@ -149,19 +153,19 @@ class Predictor {
 
   Hierarchy hierarchy_;
   int stepBits_ = 0;
-  // What a frame leaves.
+  // State that a frame leaves.
   struct Moment {
     Array<Node> nodes;
     Array<Record> records;
   };
-  // Of each layer's newest frame, and of the one that is being made.
+  // Moments of each layer's newest frame, and of the frame that is being made.
   std::array<Moment, kMaxTemporalLayers + 1> moments_;
   std::array<std::size_t, kMaxTemporalLayers> ofLayer_{};
   std::size_t made_ = 0, newest_ = 0;
   Work work_;
 };
 
-// The same as of four equal weights, where they are equal.
+// With equal weights this equals the mean of the four.
 inline Int32x4 weightedAverage(const std::array<std::int16_t, 4>& weights, Int32x4 p0, Int32x4 p1, Int32x4 p2,
                                Int32x4 p3) {
   const Int32x4 sum = (p1 - p0) * weights[1] + (p2 - p0) * weights[2] + (p3 - p0) * weights[3];
@@ -175,14 +179,15 @@ inline Predictor::Work::Surroundings Predictor::Work::surroundingsOf(std::uint32
   const Int32x4 sum = (p0 + p1) + (p2 + p3);
   Int32x4 ringSum = nodes[ring[0]].load();
   for (std::size_t i = 1; i < 8; ++i) ringSum = ringSum + nodes[ring[i]].load();
-  // Of a grid all but borders.
+  // True for all vertices of a grid except those at borders.
   const bool isEven = weights == kEqualWeights;
   const Int32x4 average =
       isEven ? (sum + Int32x4::all(2)).shiftedRight(2) : weightedAverage(weights, p0, p1, p2, p3);
   return {{p0, p1, p2, p3}, sum, average, ringSum};
 }
 
-// All but the frame and what follows from it. `first` and `second` span the surface.
+// Computes all of a prediction except the frame and what follows from it. `first` and `second` span the
+// surface.
 inline void Predictor::Work::look(std::uint32_t slot, Prediction& out, Int32x4& first,
                                   Int32x4& second) const {
   const Surroundings around = surroundingsOf(slot);
@@ -199,7 +204,7 @@ inline void Predictor::Work::look(std::uint32_t slot, Prediction& out, Int32x4& 
 
   const Record& past = pastRecords[slot * stride];
   out.lastMagnitudes = past.magnitudes;
-  // In a key frame nothing moves.
+  // Nothing moves in a key frame.
   const Int32x4 before = key ? average : Int32x4::load(past.average);
   const Int32x4 moved = (average - before).shiftedRight(fineBits);
   const Int16x8 narrowed = narrow(moved, moved);
@@ -228,7 +233,8 @@ inline void Predictor::predict(std::uint32_t begin, std::uint32_t count, const W
     frames[eight / 4] = made[0];
     frames[eight / 4 + 1] = made[1];
   }
-  // Sixteenths of a step in 2^-kWeightBits, to units; half a unit for the rounding.
+  // Bits from sixteenths of a step with kWeightBits fraction bits to units. The sum starts at half a unit,
+  // for rounding.
   const int down = kWeightBits - work.fineBits;
   for (std::uint32_t four = 0; four < count; four += 4) {
     const std::array<SurfaceFrame, 4> split = frames[four / 4].split();
@@ -248,7 +254,7 @@ inline void Predictor::predict(std::uint32_t begin, std::uint32_t count, const W
       change = change + turned.shiftedRight(kUnitBits + kTurnedBits - kWeightBits);
       const Node& own = work.pastNodes[at];
       p.last = own.load();
-      // What rests is expected to go on resting: pins do, in the middle of a moving cloth.
+      // A resting vertex is expected to go on resting, for example a pin in moving cloth.
       p.position = own.rests()
                        ? p.last
                        : p.average + (p.last - Int32x4::load(past.average)) + change.shiftedRight(down);
@@ -256,7 +262,7 @@ inline void Predictor::predict(std::uint32_t begin, std::uint32_t count, const W
   }
 }
 
-// All bits where a component is not within 16 bits.
+// Sets all bits of a lane if a component does not fit 16 bits.
 inline Int32x4 beyond16Bits(const Vectors4& a) {
   const auto beyond = [](Int32x4 c) { return c.shiftedLeft(16).shiftedRight(16) == c; };
   return Int32x4::without(beyond(a.x) & beyond(a.y) & beyond(a.z), Int32x4::all(-1));
@@ -286,14 +292,14 @@ inline void Predictor::Work::place(std::uint32_t slot, const Prediction& predict
       interleave(narrowed, interleave64High(prediction.twistAndRing, prediction.twistAndRing));
   const Record& past = pastRecords[slot * stride];
   Record& record = records[slot];
-  prediction.average.store(record.average);  // and what keep() puts beside it
+  prediction.average.store(record.average);  // also writes the lane that keep() fills
   prediction.twistAndRing.store(record.twistAndRing);
   prediction.movedAndFaster.store(record.movedAndFaster);
   detailAndRing.store(record.detailAndRing);
   Int16x8::load(past.change).store(record.changeBefore);
   Int16x8::load(past.curvatures).store(record.curvatures);
   if (key) {
-    // All was at rest before.
+    // Everything counts as resting before a key frame.
     Int16x8::zero().store(record.change);
     interleave(local, local).store(record.local);
   } else {

@@ -26,14 +26,14 @@ RansWriter::Written RansWriter::write(std::byte* out, std::size_t firstSymbols) 
   states.fill(kLowestState);
   std::uint16_t* const end = words_.data() + words_.size();
   std::uint16_t *first = end, *firstEnd = end;
-  // The last symbol first: a reader takes them in the order of add().
+  // Starts with the last symbol, so that a reader gets them in the order of add().
   for (std::size_t i = count_; i-- > 0;) {
     if (i + 1 == firstSymbols) firstEnd = first;
     const std::uint32_t entry = entries_[i], symbol = entry & (kSymbols - 1);
     std::uint32_t& state = states[entry >> kCoderShift];
     const SymbolTable& table = tables[entry >> kTableShift & ((1u << (kCoderShift - kTableShift)) - 1)];
     const std::uint32_t start = table.start(symbol), frequency = table.frequency(symbol);
-    // Below 2^32 after this symbol, that is.
+    // True if the state would otherwise reach 2^32 after this symbol.
     if (state >> (32 - kProbabilityBits) >= frequency) {
       *--first = static_cast<std::uint16_t>(state);
       state >>= 16;

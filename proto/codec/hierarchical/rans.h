@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Range coding with asymmetric numeral systems: J. Duda, arXiv:1311.2540. Several coders take turns, so that
-// a processor works on several symbols at a time.
+// Range coding with asymmetric numeral systems (J. Duda, arXiv:1311.2540). Several interleaved coders let a
+// processor work on several symbols at a time.
 #pragma once
 
 #include <array>
@@ -11,16 +11,16 @@
 #include <span>
 #include <vector>
 
-#include "proto/codec/hierarchical/lanes.h"
 #include "proto/codec/hierarchical/residual_model.h"
+#include "proto/codec/hierarchical/simd.h"
 
 namespace clothstream::codec::hierarchical {
 
 inline constexpr std::size_t kCoders = 4;
-// A coder's state before the first symbol that is written, which is the last that is read.
+// State of a coder before the first written symbol, which is the last one read.
 inline constexpr std::uint32_t kLowestState = 1u << 16;
 
-// A distribution as RansReader searches it.
+// A distribution in the form that RansReader searches.
 struct alignas(16) SymbolTable {
   SymbolTable() = default;
   explicit SymbolTable(const Distribution& frequencies);
@@ -31,7 +31,7 @@ struct alignas(16) SymbolTable {
   std::uint32_t frequency(std::uint32_t symbol) const {
     return static_cast<std::uint32_t>(bounds[kFirstBound + symbol] - bounds[kFirstBound - 1 + symbol]);
   }
-  // Of the kProbabilityBits bits that choose it.
+  // Symbol that `bits`, a number of kProbabilityBits bits, selects.
   std::uint32_t symbolAt(std::uint32_t bits) const {
     const Int16x8 wanted = Int16x8::all(static_cast<std::int16_t>(bits));
     return countNotAbove(Int16x8::load(&bounds[kFirstBound]), Int16x8::load(&bounds[kFirstBound + 8]),
@@ -39,14 +39,14 @@ struct alignas(16) SymbolTable {
   }
 
   static constexpr std::size_t kFirstBound = 8;
-  // From the first bound on: where each symbol ends.
+  // End of each symbol's range, from kFirstBound on.
   std::int16_t bounds[kFirstBound + kSymbols];
 };
 
-// Those of kDistributions.
+// Tables of kDistributions.
 const std::array<SymbolTable, 2 * kScales>& symbolTables();
 
-// Reads what RansWriter wrote; any bytes may be given to it.
+// Reads the output of RansWriter. Safe on any bytes.
 class RansReader {
  public:
   explicit RansReader(std::span<const std::byte> bytes) : bytes_(bytes) {
@@ -58,17 +58,17 @@ class RansReader {
     }
   }
 
-  // Whether so many symbols more cannot lead beyond the end.
+  // True if reading this many more symbols cannot reach past the end.
   bool hasRoomFor(std::size_t symbols) const { return at_ + 2 * symbols <= bytes_.size(); }
 
-  // 0 stands for what is beyond the end. `within`: the symbol cannot lead there.
+  // Reads 0 past the end. `within` promises that the symbol cannot reach past the end.
   template <bool within>
   std::uint32_t read(std::size_t coder, const SymbolTable& table) {
     std::uint32_t state = states_[coder];
     const std::uint32_t bits = state & ((1u << kProbabilityBits) - 1);
     const std::uint32_t symbol = table.symbolAt(bits);
     state = table.frequency(symbol) * (state >> kProbabilityBits) + bits - table.start(symbol);
-    // Seldom, and hard to foretell: without a branch.
+    // Rare and hard to predict, therefore without a branch.
     const std::uint32_t low = state < kLowestState ? 1 : 0;
     const std::uint32_t next = within ? wordWithin(at_) : wordAt(at_);
     states_[coder] = state << 16 * low | (next & (0u - low));
@@ -77,7 +77,7 @@ class RansReader {
   }
 
   std::size_t bytesTaken() const { return at_; }
-  // All of it was read, and nothing beyond.
+  // True if all bytes were read and none past the end.
   bool atEnd() const {
     bool end = at_ == bytes_.size();
     for (const std::uint32_t state : states_) end = end && state == kLowestState;
@@ -89,7 +89,7 @@ class RansReader {
     at_ += 2;
     return wordAt(at_ - 2);
   }
-  // 0 past the end.
+  // Returns 0 past the end.
   std::uint32_t wordAt(std::size_t at) const {
     if (at + 2 > bytes_.size()) return 0;
     return wordWithin(at);
@@ -112,12 +112,12 @@ class RansWriter {
   explicit RansWriter(std::size_t mostSymbols) : entries_(mostSymbols + 8), words_(mostSymbols) {}
 
   std::size_t count() const { return count_; }
-  // What was added after the first `count` is forgotten.
+  // Drops all symbols after the first `count`.
   void shrink(std::size_t count) { count_ = count; }
   void add(std::size_t coder, std::size_t table, std::uint32_t symbol) {
     entries_[count_++] = static_cast<std::uint16_t>(coder << kCoderShift | table << kTableShift | symbol);
   }
-  // One with each of four coders, from `coder` on.
+  // Adds one symbol for each of four coders, from `coder` on.
   void addFour(std::size_t coder, Int32x4 tables, Int32x4 some) {
     const auto c = static_cast<std::int32_t>(coder);
     const Int32x4 entries =
@@ -126,12 +126,12 @@ class RansWriter {
     count_ += 4;
   }
 
-  // Bytes that write() writes at most; it writes none where there is no symbol.
+  // Maximum bytes that write() writes. Without symbols it writes none.
   std::size_t bound() const { return 4 * kCoders + 2 * words_.size(); }
   struct Written {
     std::size_t bytes, firstBytes;
   };
-  // All of them; and how many bytes a reader takes for the first `firstSymbols`.
+  // Writes all symbols. `firstBytes` is the number of bytes that a reader takes for the first `firstSymbols`.
   Written write(std::byte* out, std::size_t firstSymbols);
 
  private:

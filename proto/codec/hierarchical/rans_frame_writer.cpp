@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Packets of codec 2.
+// Writer of packets of codec 2.
 #include "proto/codec/hierarchical/rans_frame_writer.h"
 
 #include <algorithm>
@@ -10,7 +10,7 @@
 namespace clothstream::codec::hierarchical {
 namespace {
 
-// Of an escape and what stands beside it, at most.
+// Maximum bytes of an escape and of the bits next to it.
 constexpr std::size_t kMaxExtraBytes = 8;
 
 std::size_t componentsOf(const StreamLayout& layout) {
@@ -43,7 +43,7 @@ void RansFrameWriter::beginPhase() {
   bits_.put(0, 1);
 }
 
-// A phase without residuals is a bit that says so, in place of all that was written of it.
+// A phase without residuals is written as a single bit; everything else of it is dropped.
 void RansFrameWriter::endPhase(bool any) {
   if (any) return;
   bits_ = bitsBefore_;

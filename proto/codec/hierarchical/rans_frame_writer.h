@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Packets of codec 2: symbols by rANS, and bits beside them.
+// Writer of packets of codec 2: symbols by rANS, and bits.
 #pragma once
 
 #include <array>
@@ -30,18 +30,18 @@ class RansFrameWriter final : public FrameWriter {
 
  private:
   void code(const ChunkResiduals& chunk, Component component, std::size_t i);
-  // `reserved`: how many of the escapes' numbers stand for something else.
+  // `reserved`: number of escape values with another meaning.
   void put(std::int32_t residual, Component component, std::uint32_t scale, std::uint32_t reserved,
            std::size_t coder);
 
   PacketAssembly packet_;
   RansWriter symbols_;
   std::vector<std::byte> extra_;
-  BitWriter bits_, bitsBefore_;  // before the phase
+  BitWriter bits_, bitsBefore_;  // the second is the state before the phase
   std::size_t symbolsBefore_ = 0;
   std::array<NormalScale, 2> normalScales_;
-  std::uint32_t normals_ = 0;  // that were added
-  // What coarse vertices take.
+  std::uint32_t normals_ = 0;  // normals added so far
+  // Symbols and bytes that the coarse vertices take.
   std::size_t coarseSymbols_ = 0, coarseBytes_ = 0;
 };
 

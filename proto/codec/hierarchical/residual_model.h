@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// How large a residual is expected to be, and how its values are then distributed.
+// Model of residuals: their expected magnitude, and the distribution that follows from it.
 #pragma once
 
 #include <algorithm>
@@ -7,8 +7,8 @@
 #include <bit>
 #include <cstdint>
 
-#include "proto/codec/hierarchical/lanes.h"
 #include "proto/codec/hierarchical/predictor.h"
+#include "proto/codec/hierarchical/simd.h"
 
 namespace clothstream::codec::hierarchical {
 
@@ -16,53 +16,54 @@ enum Component : std::uint8_t { kAlongU, kAlongV, kAlongNormal };
 inline constexpr std::size_t kComponents = 3;
 inline constexpr std::array<Component, kComponents> kCodingOrder{kAlongNormal, kAlongU, kAlongV};
 
-// The expected magnitude of a component, in 1/256 of a step, is the sum of these.
+// Weights of the terms whose sum is the expected magnitude of a component, in 1/256 of a step.
 struct ScaleWeights {
-  std::int16_t parents, ring, last;  // times that component's byte of a Prediction's sums of magnitudes
-  std::int16_t normal, u;            // times the magnitudes of this vertex that are known by then
+  std::int16_t parents, ring, last;  // multiply this component's byte of the Prediction's sums of magnitudes
+  std::int16_t normal, u;            // multiply the magnitudes of this vertex that are already known
   std::int16_t constant;
 };
-// Two weight classes each, the fourth the corners'; then the same of key frames, which know of no last frame.
+// Each class covers two weight classes; the fourth is that of the corners. The second half is for key frames,
+// which have no previous frame.
 inline constexpr std::size_t kScaleClasses = 8;
 constexpr std::size_t scaleClassOf(std::uint32_t weightClass, bool key) {
   return weightClass / 2 + (key ? kScaleClasses / 2 : 0);
 }
 extern const std::array<std::array<ScaleWeights, kComponents>, kScaleClasses> kScaleWeights;
 
-// Frequencies of symbols, of 2^kProbabilityBits; the last symbol is the escape.
+// Frequencies of symbols, which add up to 2^kProbabilityBits. The last symbol is the escape.
 inline constexpr int kProbabilityBits = 12;
 inline constexpr std::size_t kSymbols = 16;
 inline constexpr std::uint32_t kEscape = kSymbols - 1;
 using Distribution = std::array<std::int16_t, kSymbols>;
-inline constexpr std::size_t kScales = 24;  // of expected magnitudes, two an octave
+inline constexpr std::size_t kScales = 24;  // scales of expected magnitudes, two for each octave
 extern const std::array<Distribution, 2 * kScales> kDistributions;
 
-// Those along the surface come first.
+// Distributions along the surface come first.
 constexpr std::size_t distributionOf(Component component, std::uint32_t scale) {
   return (component == kAlongNormal ? kScales : 0) + scale;
 }
 
-// From the second bit of the expected magnitude up: its octave, and which half of it.
+// Scale of an expected magnitude: its octave, and the half of the octave.
 constexpr std::uint32_t scaleOf(std::int32_t expected) {
   const auto e = static_cast<std::uint32_t>(std::clamp(expected, 4, 16383));
   const auto octave = static_cast<std::uint32_t>(std::bit_width(e)) - 1;
   return 2 * (octave - 2) + (e >> (octave - 1) & 1u);
 }
 
-// How many of the lowest bits of a residual's number stand beside its symbol.
+// Number of low bits of a residual's number that are written next to its symbol.
 inline constexpr std::uint32_t kFirstScaleWithRawBits = 16;
 constexpr unsigned rawBits(std::uint32_t scale) {
   return scale < kFirstScaleWithRawBits ? 0 : (scale + 2 - kFirstScaleWithRawBits) / 2;
 }
 
-// The same of four.
+// Scales of four expected magnitudes.
 inline Int32x4 scalesOf(Int32x4 expected) {
-  // A float's exponent and the bit below are that.
+  // They are the exponent of a float and the bit below it.
   const Float32x4 e = clamp(Float32x4::of(expected), 4, 16383);
   return e.bits().bitsShiftedRight(22) - Int32x4::all(2 * (127 + 2));
 }
 
-// A scale class's weights as vectors.
+// Weights of a scale class, as vectors.
 class ScaleModel {
  public:
   explicit ScaleModel(const std::array<ScaleWeights, kComponents>& w)
@@ -70,7 +71,7 @@ class ScaleModel {
         past_(Int16x8::of(w[0].last, w[0].constant, w[1].last, w[1].constant, w[2].last, w[2].constant)),
         own_{Int16x8::allPairs(w[0].normal, 0), Int16x8::allPairs(w[1].normal, w[1].u), Int16x8::zero()} {}
 
-  // What is expected of four before the vertices' own residuals are known: along u, v and n.
+  // Expected magnitudes of four vertices along u, v and n, before their own residuals are known.
   Vectors4 expect(const Prediction* four) const {
     std::array<Int32x4, 4> expected;
     for (std::size_t i = 0; i < 4; ++i) {
@@ -82,7 +83,7 @@ class ScaleModel {
     return transposed(expected);
   }
 
-  // Magnitudes of a component that comes later in kCodingOrder are of no matter.
+  // Ignores the magnitudes of components that come later in kCodingOrder.
   Int32x4 scales(Component component, Int32x4 expected, Int32x4 normalMagnitudes, Int32x4 uMagnitudes) const {
     return scalesOf(expected + dotPairs(pairs(normalMagnitudes, uMagnitudes), own_[component]));
   }
@@ -92,12 +93,12 @@ class ScaleModel {
   std::array<Int16x8, kComponents> own_;
 };
 
-// As they count in a Node.
+// Magnitudes of residuals as a Node counts them.
 inline Int32x4 countedMagnitudes(Int32x4 residuals) {
   const Int32x4 m = residuals.magnitude(), most = Int32x4::all(kMaxMagnitude);
   return select(m.bitsShiftedRight(5) == Int32x4::all(0), m, most);
 }
-// Along u, v and n, as in a Node.
+// Packs magnitudes along u, v and n as in a Node.
 inline Int32x4 packMagnitudes(Int32x4 u, Int32x4 v, Int32x4 n) {
   return u | v.shiftedLeft(8) | n.shiftedLeft(16);
 }

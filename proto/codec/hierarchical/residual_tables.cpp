@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Fitted by tests/bench/fit_residual_tables.cpp.
+// Tables of the residual model, fitted by tests/bench/fit_residual_tables.cpp. FRAME_FORMAT.md holds the same
+// tables.
 #include "proto/codec/hierarchical/residual_model.h"
 
 namespace clothstream::codec::hierarchical {

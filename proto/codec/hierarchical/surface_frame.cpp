@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The roots that make vectors of unit length.
+// Table of square roots for unit vectors.
 #include "proto/codec/hierarchical/surface_frame.h"
 
 namespace clothstream::codec::hierarchical::detail {

@@ -1,33 +1,33 @@
 // SPDX-License-Identifier: MIT
-// Two directions along a surface and its normal, in integers alone.
+// Surface frames: two directions along a surface and its normal, in integers.
 #pragma once
 
 #include <array>
 #include <cstdint>
 
-#include "proto/codec/hierarchical/lanes.h"
+#include "proto/codec/hierarchical/simd.h"
 
 namespace clothstream::codec::hierarchical {
 
-inline constexpr int kUnitBits = 14;  // a component of a unit vector is 2^kUnitBits at most
+inline constexpr int kUnitBits = 14;  // maximum component of a unit vector is 2^kUnitBits
 
-// Three orthogonal unit vectors u, v and n, to about 2^-13.
+// Three orthogonal unit vectors u, v and n, accurate to about 2^-13.
 struct SurfaceFrame {
   Int16x8 tangents;  // ux uy uz 0 vx vy vz 0
   Int16x8 normal;    // nx ny nz 0 0 0 0 0
 
-  // u a + v b + n c, of which the lanes are x, y, z: `along` has a b in all pairs, `across` c 0.
+  // u a + v b + n c in the lanes x, y, z. All pairs of `along` are a b, all pairs of `across` are c 0.
   Int32x4 combine(Int16x8 along, Int16x8 across) const {
     return dotPairs(interleaveHalves(tangents), along) +
            dotPairs(interleave(normal, Int16x8::zero()), across);
   }
-  // The products with u, v and n of what has x y z 0 x y z 0, in units of 2^-kUnitBits; the fourth lane 0.
+  // Products of the vector x y z 0 x y z 0 with u, v and n, in units of 2^-kUnitBits. The fourth lane is 0.
   Int32x4 project(Int16x8 vector) const {
     return addNeighbours(dotPairs(vector, tangents), dotPairs(vector, normal));
   }
 };
 
-// The frames of four vertices.
+// Surface frames of four vertices.
 struct SurfaceFrames {
   Vectors4 u, v, n;
 
@@ -49,19 +49,19 @@ struct SurfaceFrames {
 
 namespace detail {
 
-// 2^28 / sqrt(n) for the n from 2^26 to below 2^28 that have these twelve highest of 28 bits, in their
-// middle: to about 2^-12.
+// 2^28 / sqrt(n), accurate to about 2^-12, for n from 2^26 to below 2^28. The index is the twelve highest of
+// n's 28 bits; the entry is for the middle of the range.
 extern const std::array<std::uint16_t, 4096> kRoots;
 
-// The largest component to 13 bits, so that the squared length has less than 28. All bits where a vector is
-// zero. Components are below 2^30.
+// Scales the largest component to 13 bits, so that the squared length has fewer than 28 bits. Returns all
+// bits for a zero vector. Components are below 2^30.
 inline Int32x8 scale(Vectors8& a) {
   const Int32x8 all = a.x.magnitude() | a.y.magnitude() | a.z.magnitude();
-  // Of two ones beside each other the lower goes, so that the float is not rounded to the next power of two.
+  // Clears the lower of two adjacent ones, so that the float is not rounded up to the next power of two.
   const Int32x8 exponent =
       Float32x8::of(Int32x8::without(all.shiftedRight(1), all)).bits().bitsShiftedRight(23);
   const Float32x8 factor = Float32x8::ofBits((Int32x8::all(266) - exponent).shiftedLeft(23));
-  // Bits that the shift takes away, and a float has no room for.
+  // Bits that the shift removes and that a float has no room for.
   const Int32x8 lost = (all > Int32x8::all((1 << 18) - 1)) & Int32x8::all(31);
   const auto floor = [&](Int32x8 value) {
     const Float32x8 scaled = Float32x8::of(Int32x8::without(lost, value)) * factor;
@@ -82,14 +82,14 @@ inline Int32x8 rootsAt(const Int32x8& places) {
   return {rootsAt(places.first), rootsAt(places.second)};
 }
 
-// To unit length; `a` is scaled.
+// Scales to unit length; `a` is already scaled by scale().
 inline Vectors8 normalised(const Vectors8& a) {
   const auto xy = pairs(a.x, a.y), z = pairs(a.z);
   Int32x8 squared = dotPairs(xy, xy) + dotPairs(z, z);
   // The table starts at 2^26.
   const Int32x8 isLow = Int32x8::all(1 << 26) > squared;
   squared = select(isLow, squared.shiftedLeft(2), squared);
-  const auto root = asHalves(rootsAt(squared.shiftedRight(16) & Int32x8::all(4095)));  // whatever `a` is
+  const auto root = asHalves(rootsAt(squared.shiftedRight(16) & Int32x8::all(4095)));  // valid for any `a`
   const auto times = [&](Int32x8 value) {
     const Int32x8 product = dotPairs(asHalves(value), root);
     return (product + (product & isLow) + Int32x8::all(1 << 13)).shiftedRight(14);
@@ -97,7 +97,7 @@ inline Vectors8 normalised(const Vectors8& a) {
   return {times(a.x), times(a.y), times(a.z)};
 }
 
-// Of components of 16 bits.
+// Components fit 16 bits.
 inline Vectors8 cross(const Vectors8& a, const Vectors8& b) {
   const auto x = pairs(b.x), y = pairs(b.y), z = pairs(b.z);
   const auto times = [](Int32x8 value, const auto& other) { return dotPairs(asHalves(value), other); };
@@ -106,7 +106,7 @@ inline Vectors8 cross(const Vectors8& a, const Vectors8& b) {
 
 }  // namespace detail
 
-// u along `first`, n across both; the axes x, y, z where the two span no plane.
+// u lies along `first` and n is orthogonal to both. If they span no plane, the axes are x, y, z.
 inline std::array<SurfaceFrames, 2> surfaceFrames(Vectors8 first, Vectors8 second) {
   constexpr std::int32_t kOne = 1 << kUnitBits;
   Int32x8 isNoPlane = detail::scale(first) | detail::scale(second);

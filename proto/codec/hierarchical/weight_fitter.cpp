@@ -9,15 +9,16 @@
 namespace clothstream::codec::hierarchical {
 namespace {
 
-constexpr double kFade = 0.75;                    // of what was known, at each fit
-constexpr double kStay = 0.01, kStayOfKey = 0.1;  // how much the former weights count beside what was added
-// By class, in a frame. More of a large cloth would say no more.
+constexpr double kFade = 0.75;                    // part of earlier data that is kept at each fit
+constexpr double kStay = 0.01, kStayOfKey = 0.1;  // weight of the former weights, compared with the data
+// Chunks of each class in a frame. More of a large cloth would add no information.
 constexpr std::array<std::uint32_t, kWeightClasses> kFittedChunks{8, 16, 6, 12, 10, 20};
 
 using Matrix = std::array<std::array<double, kFeatures>, kFeatures>;
 using SystemVector = std::array<double, kFeatures>;
 
-// x with m x = x as it was; m is symmetric and positive definite, and overwritten (Cholesky).
+// Solves m x = b by Cholesky factorisation; x holds b on entry. m is symmetric and positive definite, and is
+// overwritten.
 void solve(Matrix& m, SystemVector& x) {
   for (std::size_t j = 0; j < kFeatures; ++j) {
     for (std::size_t k = 0; k < j; ++k) m[j][j] -= m[j][k] * m[j][k];

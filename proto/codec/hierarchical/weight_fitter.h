@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The weights that would have predicted the last frames best, by least squares. The encoder's own business:
-// floating point serves.
+// Least-squares fit of the weights that would have predicted the last frames best. Only the encoder uses it,
+// so floating point is allowed.
 #pragma once
 
 #include <array>
@@ -14,19 +14,20 @@
 
 namespace clothstream::codec::hierarchical {
 
-// What a chunk says about its class's weights: the sums over some vertices of feature i times feature j, j
-// from i up, then of feature i times the goal; for each i one after the other. Floats, in an order that does
-// not depend on how many work on it: by x, y and z over the vertices, then over these.
+// Contribution of a chunk to its class's weights. For each feature i in order: the sums over the chosen
+// vertices of feature i times feature j, for j from i up, then of feature i times the goal. Floats are added
+// over the vertices for x, y and z separately, then over the axes. That order does not depend on the number
+// of threads.
 inline constexpr std::size_t kProducts = kFeatures * (kFeatures + 1) / 2 + kFeatures;
 using ChunkProducts = std::array<float, kProducts>;
 
-// Those of the chunk that is being coded.
+// Products of the chunk that is being coded.
 class ProductSums {
  public:
-  // `goal`: what the weighted features should have added up to, in sixteenths of a step. The fourth lanes are
+  // `goal`: the sum that the weighted features should have had, in sixteenths of a step. Fourth lanes are
   // ignored.
   void add(const FeatureVectors& features, Int32x4 goal, float importance);
-  // What was added since the last call.
+  // Sums since the last call.
   const ChunkProducts& take();
 
  private:
@@ -34,7 +35,7 @@ class ProductSums {
   ChunkProducts sums_{};
 };
 
-// 1 / x, less up to an eighth: the same on every machine, which a quotient is not.
+// 1 / x, up to an eighth too small. Unlike a quotient it is the same on every machine.
 inline float roughReciprocal(std::uint32_t x) {
   return std::bit_cast<float>(0x7ef311c3u - std::bit_cast<std::uint32_t>(static_cast<float>(x)));
 }
@@ -43,30 +44,32 @@ class WeightFitter {
  public:
   void add(std::size_t weightClass, const ChunkProducts& products);
 
-  // To all that was added, the older the less; stays near `weights` where that says little, and nearer in a
-  // key frame, of which there is one alone.
+  // Fits to everything that was added; older frames count less. Stays near `weights` where the data says
+  // little, and nearer in a key frame, which is a single frame.
   void fit(Weights& weights, bool key);
 
   void clear() { classes_ = {}; }
 
  private:
   struct Sums {
-    std::array<double, kProducts> fresh{}, all{};  // since the last fit; those before it too
+    std::array<double, kProducts> fresh{}, all{};  // since the last fit; including earlier fits
   };
 
   std::array<Sums, kWeightClasses> classes_{};
 };
 
-// Which chunks are fitted to: so many of each class in a frame, others in each. The encoder's choice.
+// Schedule of the chunks that weights are fitted to: a number of each class in every frame, and different
+// ones from frame to frame. Decoders do not depend on it.
 class FitSchedule {
  public:
   explicit FitSchedule(const Hierarchy& hierarchy);
 
-  // A chunk's number is its place among those of its class, in coding order.
+  // A chunk's number is its place among the chunks of its class, in coding order.
   bool isFitted(std::uint32_t weightClass, std::uint32_t chunk, std::uint32_t frame) const {
     return (chunk + frame) % strides_[weightClass] == 0;
   }
-  // All of a frame, class after class; of a class in coding order. `out` has room for kMaxChunks.
+  // Selects all chunks of a frame, class after class; within a class in coding order. `out` has room for
+  // kMaxChunks.
   std::size_t select(std::uint32_t frame, std::span<Phase> out) const;
 
   static constexpr std::size_t kMaxChunks = 72;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Which weights a frame predicts with.
+// Plan of the weights that a frame predicts with.
 #include "proto/codec/hierarchical/weight_plan.h"
 
 #include <cassert>
@@ -9,9 +9,9 @@
 namespace clothstream::codec::hierarchical {
 namespace {
 
-// The weights are fitted and sent once in so many frames, and in each of the first that can.
+// Weights are fitted and sent every kWeightInterval frames, and in the first kEagerFrames frames that can.
 constexpr std::uint32_t kWeightInterval = 4, kEagerFrames = 3;
-// What so few vertices would gain is less than what their weights take.
+// For fewer vertices the weights cost more than they save.
 constexpr std::uint32_t kFewVertices = 100;
 
 }  // namespace
@@ -39,7 +39,7 @@ void WeightPlan::retry() {
 
 bool WeightPlan::isDue(std::uint32_t sinceKey, bool quiet) const {
   if (sinceKey == 0) return true;
-  // With layers it is the base that sends the weights of all: it is never left out.
+  // With layers the base sends the weights of all layers, because it is never dropped.
   const bool eager = layers_ == 1 && sinceKey <= lag_ + kEagerFrames;
   return sinceKey > lag_ && !quiet && (eager || sinceKey % kWeightInterval == 0);
 }
@@ -69,7 +69,7 @@ std::size_t WeightPlan::write(bool atRest, std::byte* out) {
   return bytes;
 }
 
-// The motion after a key frame is that before it.
+// Motion after a key frame is expected to be like the motion before it.
 Weights WeightPlan::next(std::size_t of) {
   return sinceKey_ == 1 && layers_ == 1 ? beforeKey_ : fitted(of);
 }

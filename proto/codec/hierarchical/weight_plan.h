@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Which weights a frame predicts with: when new ones are due, what they are fitted to, and how they are sent.
+// Plan of the weights: when new ones are due, which frames they are fitted to, and how they are sent.
 #pragma once
 
 #include <array>
@@ -7,19 +7,18 @@
 #include <cstdint>
 #include <vector>
 
-#include "proto/codec/body.h"
+#include "proto/codec/frame_role.h"
 #include "proto/codec/hierarchical/bits.h"
 #include "proto/codec/hierarchical/frame_coder.h"
 #include "proto/codec/hierarchical/weight_fitter.h"
 
 namespace clothstream::codec::hierarchical {
 
-// A frame is begin(), write(), add() for the chunks that are fitted to, and end().
-//
-// Without a lag a frame's weights are fitted to all that was added before, a key frame's to what was added
-// between retry() and write(). With one they are fitted to the frames that are so many or more before it (a
-// key frame's to the last such key frame): who prepares frames knows them before those in between are coded.
-// There is one temporal layer then.
+// The calls for a frame are begin(), write(), add() for the chunks that weights are fitted to, and end().
+// Without a lag the weights of a frame are fitted to everything that was added before; those of a key frame
+// to everything added between retry() and write(). With a lag they are fitted to the frames that are at least
+// `lag` frames older, and those of a key frame to the last such key frame. A caller that prepares frames
+// ahead then knows the weights before the frames in between are coded. A lag requires one temporal layer.
 class WeightPlan {
  public:
   WeightPlan(const Hierarchy& hierarchy, std::uint8_t layers, std::uint32_t lag);
@@ -27,11 +26,11 @@ class WeightPlan {
   static constexpr std::size_t kMaxBytes = kMaxTemporalLayers * kWeightClasses * kFeatures * 4;
 
   void begin(const FrameRole& role);
-  // A key frame is attempted once before it is coded: only without a lag.
+  // True if a key frame is attempted once before it is coded. Only without a lag.
   bool attempts() const { return lag_ == 0; }
   void retry();
-  // The packet's first section, at most kMaxBytes; returns its bytes. used() is then what the frame predicts
-  // with; at rest it leaves what it started with.
+  // Writes the packet's first section, at most kMaxBytes, and returns its size. After it, used() is the
+  // weights that the frame predicts with. A frame at rest leaves the weights that it started with.
   std::size_t write(bool atRest, std::byte* out);
   const Weights& used() const { return used_; }
   void add(std::uint32_t weightClass, const ChunkProducts& products) {
@@ -40,9 +39,9 @@ class WeightPlan {
   // `quiet`: the frame had no residuals.
   void end(bool quiet);
 
-  // With a lag: the weights of the frame of this number (of all that were begun, from 0) that is so many
-  // after its key frame; null: those that its reference left. For any thread that knows that the frame `lag`
-  // before it has ended and the one after it has not.
+  // Requires a lag. Weights of frame `number` (counted from 0 since construction), which is `sinceKey` frames
+  // after its key frame. Null if it keeps the weights that its reference left. May be called by any thread
+  // that knows that the frame `lag` before it has ended and the next one has not.
   const Weights* planned(std::uint64_t number, std::uint32_t sinceKey) const;
 
  private:
@@ -60,17 +59,17 @@ class WeightPlan {
   std::uint32_t lag_;
   std::uint8_t layers_;
   std::array<std::uint32_t, kWeightClasses + 1> classSizes_{};
-  std::vector<WeightFitter> fitters_;                    // by layer
-  std::array<LayerWeights, kMaxTemporalLayers> kept_{};  // that the newest frame of each layer left
-  Weights beforeKey_{};                                  // that the frame before the key frame left
-  LayerWeights weights_{};                               // that this one leaves
-  Weights used_{};                                       // in this frame
-  std::uint64_t number_ = 0;                             // of this frame
+  std::vector<WeightFitter> fitters_;                    // indexed by layer
+  std::array<LayerWeights, kMaxTemporalLayers> kept_{};  // left by the newest frame of each layer
+  Weights beforeKey_{};                                  // left by the frame before the key frame
+  LayerWeights weights_{};                               // left by this frame
+  Weights used_{};                                       // used in this frame
+  std::uint64_t number_ = 0;                             // number of this frame
   std::uint32_t sinceKey_ = 0;
   bool key_ = true, quiet_ = false;
   std::uint8_t layer_ = 0;
   Weights keyWeights_;
-  std::vector<Planned> planned_;  // by number, modulo their number
+  std::vector<Planned> planned_;  // indexed by number modulo the size
 };
 
 }  // namespace clothstream::codec::hierarchical

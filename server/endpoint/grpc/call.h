@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A call that a client makes, and what the calls of one endpoint share.
+// Base class of a gRPC call, and the state that all calls of one endpoint share.
 #pragma once
 
 #include <cstddef>
@@ -21,17 +21,17 @@ namespace clothstream::endpoint {
 
 class Call;
 
-// The loop's thread alone touches it, but for the loop.
-struct EndpointContext {
+// Belongs to the loop's thread; only the loop itself may be used by others.
+struct GrpcEndpointContext {
   stream::SceneServer& server;
   const std::shared_ptr<CompletionLoop> loop;
   const std::size_t maxStreams;
-  std::size_t streams = 0;  // joined, but for those that were refused
-  std::size_t watches = 0;  // of health
+  std::size_t streams = 0;  // open Join streams, without refused ones
+  std::size_t watches = 0;  // open health watches
   std::unordered_set<std::shared_ptr<Call>> calls = {};
-  std::size_t callsMade = 0;               // of them, those that a client made
-  grpc::Status refusal = {};               // of new calls, unless it is OK
-  std::function<void()> onForgotten = {};  // when there is one call fewer, if set
+  std::size_t callsMade = 0;               // number of these that a client has made
+  grpc::Status refusal = {};               // status for new calls; OK accepts them
+  std::function<void()> onForgotten = {};  // runs after each removed call; may be empty
 
   void forget(const std::shared_ptr<Call>& call) {
     calls.erase(call);
@@ -39,23 +39,24 @@ struct EndpointContext {
   }
 };
 
-// There is from before a client makes it, so that gRPC has where to put it, until all its operations are
-// done. The loop's thread alone uses it.
+// Created before a client makes the call, so that gRPC can store it. Lives until all its operations are done.
+// Belongs to the loop's thread.
 class Call : public std::enable_shared_from_this<Call> {
  public:
   virtual ~Call() = default;
   Call(const Call&) = delete;
   Call& operator=(const Call&) = delete;
 
-  // The endpoint closes: one that was made ends with this, unless it says more itself.
+  // Called when the endpoint closes. Ends the call with this status, unless it has a more specific one. Does
+  // nothing before a client has made the call.
   void stop(const grpc::Status& status) {
     if (isMade_) close(status);
   }
 
  protected:
-  explicit Call(EndpointContext& endpoint) : endpoint_(endpoint) {}
+  explicit Call(GrpcEndpointContext& endpoint) : endpoint_(endpoint) {}
 
-  // An operation of a call, and what the call does next.
+  // An operation of a call, and the member function that continues the call.
   template <typename Derived>
   class Step final : public Operation {
    public:
@@ -74,20 +75,20 @@ class Call : public std::enable_shared_from_this<Call> {
 
   virtual void close(const grpc::Status& status) = 0;
 
-  // The tag of an operation that is being begun: `operation` is a member, and lives until it is done.
+  // Counts an operation that begins and returns its tag. `operation` must be a member of the call.
   void* begin(Operation& operation) {
     ++underway_;
     return &operation;
   }
-  // A client has made it.
+  // Call it when a client has made the call.
   void made() {
     isMade_ = true;
     ++endpoint_.callsMade;
   }
-  // Nothing will be begun any more.
+  // Call it when no operation will begin any more.
   void over() { isOver_ = true; }
 
-  EndpointContext& endpoint_;
+  GrpcEndpointContext& endpoint_;
   grpc::ServerContext context_;
 
  private:
@@ -100,9 +101,9 @@ class Call : public std::enable_shared_from_this<Call> {
   bool isMade_ = false, isOver_ = false;
 };
 
-// Waits for the next call of a kind.
+// Waits for the next call of this kind.
 template <typename Kind, typename... Arguments>
-void await(EndpointContext& endpoint, Arguments&&... arguments) {
+void await(GrpcEndpointContext& endpoint, Arguments&&... arguments) {
   const auto call = std::make_shared<Kind>(endpoint, std::forward<Arguments>(arguments)...);
   endpoint.calls.insert(call);
   call->await();

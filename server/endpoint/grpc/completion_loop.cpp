@@ -25,7 +25,7 @@ void CompletionLoop::stop() {
     tasks_.clear();
   }
   queue_->Shutdown();
-  if (!thread_.joinable()) start();  // a queue must be empty before it dies
+  if (!thread_.joinable()) start();  // the queue must be drained before its destruction
   thread_.join();
 }
 
@@ -34,7 +34,7 @@ void CompletionLoop::post(std::function<void()> task) {
   if (stopped_) return;
   tasks_.push_back(std::move(task));
   if (std::exchange(waking_, true)) return;
-  alarm_.Set(queue_.get(), gpr_inf_past(GPR_CLOCK_MONOTONIC), &woken_);
+  alarm_.Set(queue_.get(), gpr_inf_past(GPR_CLOCK_MONOTONIC), &wakeup_);
 }
 
 void CompletionLoop::runTasks() {

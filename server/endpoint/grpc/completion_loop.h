@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// gRPC's completion queue and the one thread that works on it.
+// gRPC's completion queue and the one thread that serves it.
 #pragma once
 
 #include <functional>
@@ -13,21 +13,21 @@
 
 namespace clothstream::endpoint {
 
-// What is to happen when gRPC is done with something: its address is the tag.
+// Handler of a completed gRPC operation. Its address is the tag.
 class Operation {
  public:
-  // `ok` is gRPC's. May destroy the operation.
+  // `ok` comes from gRPC. May destroy the operation.
   virtual void done(bool ok) = 0;
 
  protected:
   ~Operation() = default;
 };
 
-// All operations are done on the loop's thread, one after the other. There is one thread, not gRPC's own few,
-// because those hand each other what they find (docs/benchmarks.md).
+// Runs all operations on one thread, one after the other. One thread is faster than gRPC's own pool, whose
+// threads hand events to each other (docs/benchmarks.md).
 class CompletionLoop {
  public:
-  // Nothing runs before start().
+  // Runs nothing before start().
   explicit CompletionLoop(std::unique_ptr<grpc::ServerCompletionQueue> queue);
   ~CompletionLoop() { stop(); }
   CompletionLoop(const CompletionLoop&) = delete;
@@ -36,15 +36,16 @@ class CompletionLoop {
   grpc::ServerCompletionQueue& queue() { return *queue_; }
 
   void start();
-  // Returns when all operations are done; none may be begun from here on. Belongs to the thread that started.
+  // Returns when all operations are done. No operation may begin afterwards. Call it on the thread that
+  // called start().
   void stop();
 
-  // From any thread: runs the task on the loop's. One that comes after stop() is dropped.
+  // Runs the task on the loop's thread. Drops it after stop(). Thread-safe.
   void post(std::function<void()> task);
 
  private:
-  struct Woken final : Operation {
-    explicit Woken(CompletionLoop& its) : loop(its) {}
+  struct Wakeup final : Operation {
+    explicit Wakeup(CompletionLoop& owner) : loop(owner) {}
     void done(bool) override { loop.runTasks(); }
     CompletionLoop& loop;
   };
@@ -57,7 +58,7 @@ class CompletionLoop {
   bool waking_ = false;
   bool stopped_ = false;
   grpc::Alarm alarm_;
-  Woken woken_{*this};
+  Wakeup wakeup_{*this};
   std::thread thread_;
 };
 

@@ -35,42 +35,40 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr auto kStopTimeout = 1s;
-// A ping after 2 s without a byte, 2 s for its answer: a peer that vanished is found within 5 s.
+// Pings after 2 s without a byte and waits 2 s for the answer, so a vanished client is found within 5 s.
 constexpr int kPingAfterMs = 2000;
 constexpr int kPingTimeoutMs = 2000;
-constexpr int kClientPingsAtMostEveryMs = 1000;
-constexpr int kUnusedConnectionMs = 300'000;
-constexpr std::size_t kMemory = std::size_t{256} << 20;
+constexpr int kMinClientPingIntervalMs = 1000;
+constexpr int kMaxIdleConnectionMs = 300'000;
+constexpr std::size_t kMaxMemory = std::size_t{256} << 20;
 constexpr int kMaxThreads = 16;
-constexpr int kStreamsAConnection = 64;
+constexpr int kMaxStreamsPerConnection = 64;
 
 void configure(grpc::ServerBuilder& builder) {
-  // Debian's library is built to look for deadlocks of gRPC's own locks, which takes some 4 % of a busy
-  // process.
+  // Debian's build of gRPC checks its own locks for deadlocks, which costs about 4 % of a busy process.
   absl::SetMutexDeadlockDetectionMode(absl::OnDeadlockCycle::kIgnore);
-  // Otherwise a second server would share the port, and each would get half of the clients.
+  // Without this a second server could share the port, and each would get half of the clients.
   builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, kPingAfterMs);
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, kPingTimeoutMs);
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_PERMIT_WITHOUT_CALLS, 1);
   builder.AddChannelArgument(GRPC_ARG_HTTP2_MAX_PINGS_WITHOUT_DATA, 0);
-  builder.AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS,
-                             kClientPingsAtMostEveryMs);
-  builder.AddChannelArgument(GRPC_ARG_MAX_CONNECTION_IDLE_MS, kUnusedConnectionMs);
-  builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS, kStreamsAConnection);
-  // A write counts as done when the transport has passed it on, not when it lies in a buffer in front of it.
+  builder.AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS, kMinClientPingIntervalMs);
+  builder.AddChannelArgument(GRPC_ARG_MAX_CONNECTION_IDLE_MS, kMaxIdleConnectionMs);
+  builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS, kMaxStreamsPerConnection);
+  // Completes a write only after the transport has sent it, not when a buffer has taken it.
   builder.AddChannelArgument(GRPC_ARG_HTTP2_WRITE_BUFFER_SIZE, 1);
   builder.SetMaxReceiveMessageSize(static_cast<int>(stream::kMaxClientMessageBytes));
   builder.SetMaxSendMessageSize(-1);
-  // Frames are compressed already, and a small compressed message could stand for a large one.
+  // Frames are compressed already, and a small compressed message could expand to a large one.
   builder.SetCompressionAlgorithmSupportStatus(GRPC_COMPRESS_DEFLATE, false);
   builder.SetCompressionAlgorithmSupportStatus(GRPC_COMPRESS_GZIP, false);
   grpc::ResourceQuota quota("clothstream");
-  quota.Resize(kMemory).SetMaxThreads(kMaxThreads);
+  quota.Resize(kMaxMemory).SetMaxThreads(kMaxThreads);
   builder.SetResourceQuota(quota);
 }
 
-// gRPC says only that it does not listen; binding once more says why.
+// gRPC reports only that it cannot listen. A second bind finds the reason.
 std::string whyNotListening(const std::string& host, std::uint16_t port) {
   const addrinfo hints{AI_PASSIVE, AF_UNSPEC, SOCK_STREAM, 0, 0, nullptr, nullptr, nullptr};
   addrinfo* found = nullptr;
@@ -97,8 +95,8 @@ struct GrpcEndpoint::State {
   HealthService health;
   int port = 0;
   std::unique_ptr<grpc::Server> server;
-  std::optional<EndpointContext> context;
-  boost::asio::thread_pool questions{1};  // those that take longer than a frame may wait
+  std::optional<GrpcEndpointContext> context;
+  boost::asio::thread_pool slowCalls{1};  // for calls that take longer than a frame may wait
 
   State(stream::SceneServer& scenes, const GrpcEndpointOptions& options) {
     grpc::reflection::InitProtoReflectionServerBuilderPlugin();
@@ -110,8 +108,8 @@ struct GrpcEndpoint::State {
     const auto loop = std::make_shared<CompletionLoop>(builder.AddCompletionQueue());
     server = builder.BuildAndStart();
     if (!server || port == 0) throw std::runtime_error(whyNotListening(options.host, options.port));
-    context.emplace(EndpointContext{scenes, loop, options.maxStreams});
-    offerService(*context, service, questions);
+    context.emplace(GrpcEndpointContext{scenes, loop, options.maxStreams});
+    offerService(*context, service, slowCalls);
     offerHealth(*context, health);
     loop->start();
   }
@@ -120,25 +118,25 @@ struct GrpcEndpoint::State {
     if (!context) return;
     const auto deadline = std::chrono::system_clock::now() + kStopTimeout;
     context->loop->post([this] { stopCalls(); });
-    // gRPC closes a connection when its client has answered a ping and no call is left on it. Only a ping
-    // that comes after the calls' last bytes keeps the connection until the client has them.
+    // Waits for the calls before Shutdown(): it pings the client and closes the connection after the answer.
+    // The ping must follow the last bytes of the calls, so that the client receives them.
     when([this] { return context->callsMade == 0; }).wait_until(deadline);
     server->Shutdown(deadline + kStopTimeout);
     server->Wait();
-    // The connections are gone; of the calls the loop may still have to hear.
+    // The connections are closed, but the loop may still have completions of calls.
     when([this] { return context->calls.empty(); }).wait();
     context->loop->stop();
-    questions.join();
+    slowCalls.join();
   }
 
-  // Ready when it holds. Asked on the loop's thread, at once and after each call; the next one takes its
-  // place.
-  std::future<void> when(std::function<bool()> holds) {
+  // Becomes ready when `condition` holds. The loop's thread checks it now and after each removed call. A
+  // later when() replaces the condition.
+  std::future<void> when(std::function<bool()> condition) {
     auto reached = std::make_shared<std::promise<void>>();
     std::future<void> future = reached->get_future();
-    context->loop->post([this, reached = std::move(reached), holds = std::move(holds)]() mutable {
-      context->onForgotten = [reached = std::move(reached), holds = std::move(holds)]() mutable {
-        if (reached && holds()) std::exchange(reached, nullptr)->set_value();
+    context->loop->post([this, reached = std::move(reached), condition = std::move(condition)]() mutable {
+      context->onForgotten = [reached = std::move(reached), condition = std::move(condition)]() mutable {
+        if (reached && condition()) std::exchange(reached, nullptr)->set_value();
       };
       context->onForgotten();
     });

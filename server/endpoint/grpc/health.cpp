@@ -29,7 +29,7 @@ tl::expected<HealthCheckResponse, v1::Error> check(const HealthCheckRequest& req
   if (!isOffered(request.service())) {
     v1::Error error;
     error.set_code(v1::ERROR_CODE_NOT_FOUND);
-    error.set_text(fmt::format("service '{:.64}' is not known: it is {}", request.service(),
+    error.set_text(fmt::format("unknown service '{:.64}'; the service is {}", request.service(),
                                v1::ClothStream::service_full_name()));
     return tl::unexpected(error);
   }
@@ -38,10 +38,10 @@ tl::expected<HealthCheckResponse, v1::Error> check(const HealthCheckRequest& req
   return response;
 }
 
-// One who watches: told once that all is well, and once more when the endpoint closes.
+// A Watch call: reports SERVING at once and NOT_SERVING when the endpoint closes.
 class HealthWatch final : public Call {
  public:
-  HealthWatch(EndpointContext& endpoint, HealthService& service) : Call(endpoint), service_(service) {}
+  HealthWatch(GrpcEndpointContext& endpoint, HealthService& service) : Call(endpoint), service_(service) {}
 
   void await() {
     context_.AsyncNotifyWhenDone(&ended_);
@@ -57,10 +57,11 @@ class HealthWatch final : public Call {
     endpoint::await<HealthWatch>(endpoint_, service_);
     if (!endpoint_.refusal.ok()) return finish(endpoint_.refusal);
     if (endpoint_.watches >= kMaxWatches)
-      return finish({grpc::StatusCode::RESOURCE_EXHAUSTED, "too many watch the server's health: ask Check"});
+      return finish(
+          {grpc::StatusCode::RESOURCE_EXHAUSTED, "too many health watches are open; call Check instead"});
     ++endpoint_.watches;
     isCounted_ = true;
-    tell(HealthCheckResponse::SERVING);
+    write(HealthCheckResponse::SERVING);
   }
   void onWritten(bool) {
     isWriting_ = false;
@@ -68,7 +69,7 @@ class HealthWatch final : public Call {
     if (std::exchange(isLast_, true))
       finish(*closing_);
     else
-      tell(HealthCheckResponse::NOT_SERVING);
+      write(HealthCheckResponse::NOT_SERVING);
   }
   void onFinished(bool) {}
   void onEnded(bool) {
@@ -77,14 +78,14 @@ class HealthWatch final : public Call {
     over();
   }
 
-  // Says so first; after what is being written.
+  // Reports NOT_SERVING before the end, after a write that is under way.
   void close(const grpc::Status& status) override {
     if (!isCounted_ || hasEnded_) return;
     closing_ = status;
     if (!isWriting_) onWritten(true);
   }
 
-  void tell(HealthCheckResponse::ServingStatus status) {
+  void write(HealthCheckResponse::ServingStatus status) {
     isWriting_ = true;
     writer_.Write(response(status), begin(written_));
   }
@@ -99,7 +100,7 @@ class HealthWatch final : public Call {
   HealthService& service_;
   HealthCheckRequest request_;
   grpc::ServerAsyncWriter<HealthCheckResponse> writer_{&context_};
-  std::optional<grpc::Status> closing_;  // set when it is
+  std::optional<grpc::Status> closing_;  // set while the watch closes
   bool isCounted_ = false, isWriting_ = false, isLast_ = false, hasEnded_ = false;
   Step<HealthWatch> begun_{*this, &HealthWatch::onBegun}, written_{*this, &HealthWatch::onWritten},
       finished_{*this, &HealthWatch::onFinished}, ended_{*this, &HealthWatch::onEnded};
@@ -107,7 +108,7 @@ class HealthWatch final : public Call {
 
 }  // namespace
 
-void offerHealth(EndpointContext& endpoint, HealthService& service) {
+void offerHealth(GrpcEndpointContext& endpoint, HealthService& service) {
   offer(endpoint, service, &HealthService::RequestCheck,
         [](const auto& request, auto answer) { answer(check(request)); });
   await<HealthWatch>(endpoint, service);

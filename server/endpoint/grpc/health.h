@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The calls of grpc.health.v1.Health: the server and its service are well for as long as the endpoint is
-// open.
+// Calls of grpc.health.v1.Health. The server and its service are SERVING while the endpoint is open.
 #pragma once
 
 #include "grpc/health/v1/health.grpc.pb.h"
@@ -8,12 +7,11 @@
 
 namespace clothstream::endpoint {
 
-// gRPC's own would do, but it brings gRPC's own threads, which then share the work of every other call
-// (completion_loop.h).
+// gRPC's own health service would start threads that then also serve every other call (completion_loop.h).
 using HealthService = grpc::health::v1::Health::WithAsyncMethod_Check<
     grpc::health::v1::Health::WithAsyncMethod_Watch<grpc::health::v1::Health::Service>>;
 
-// Answers all its calls, for as long as the endpoint is open.
-void offerHealth(EndpointContext& endpoint, HealthService& service);
+// Answers all calls of the service while the endpoint is open.
+void offerHealth(GrpcEndpointContext& endpoint, HealthService& service);
 
 }  // namespace clothstream::endpoint

@@ -11,9 +11,9 @@
 namespace clothstream::endpoint {
 namespace {
 
-// A view of the message that keeps it alive for as long as gRPC holds the slice.
+// View of the message. Keeps the message alive while gRPC holds the slice.
 grpc::ByteBuffer sharedBuffer(const stream::SharedBytes& message) {
-  // gRPC takes bytes as mutable, and never writes to them.
+  // gRPC takes mutable bytes but never writes to them.
   void* const bytes = const_cast<std::byte*>(message->data());
   const grpc::Slice slice(
       bytes, message->size(), [](void* owner) { delete static_cast<stream::SharedBytes*>(owner); },
@@ -21,11 +21,11 @@ grpc::ByteBuffer sharedBuffer(const stream::SharedBytes& message) {
   return grpc::ByteBuffer(&slice, 1);
 }
 
-// A peer that does not read keeps a write under way for ever.
+// Bounds the last write, since a client that does not read never completes it.
 constexpr std::chrono::seconds kLastWriteTimeout{1};
 
 grpc::Status cancelled() {
-  return {grpc::StatusCode::CANCELLED, "the client went away"};
+  return {grpc::StatusCode::CANCELLED, "the client disconnected"};
 }
 
 }  // namespace
@@ -42,12 +42,11 @@ void JoinStream::onBegun(bool ok) {
   endpoint::await<JoinStream>(endpoint_, service_);
   if (!endpoint_.refusal.ok()) return finish(endpoint_.refusal);
   if (endpoint_.streams >= endpoint_.maxStreams)
-    return finish(
-        {grpc::StatusCode::RESOURCE_EXHAUSTED, "the server has all the streams it takes; try again later"});
+    return finish({grpc::StatusCode::RESOURCE_EXHAUSTED, "the server has no free stream; try again later"});
   ++endpoint_.streams;
   isCounted_ = true;
-  // Called from any thread, so it must not own the stream: whoever drops the last owner inside a wake would
-  // wait in the connection's destructor for that wake to return.
+  // A wake may come from any thread, so it must not own the stream. Dropping the last owner inside a wake
+  // would deadlock: the connection's destructor waits for that wake to return.
   std::weak_ptr<JoinStream> weak = std::static_pointer_cast<JoinStream>(shared_from_this());
   auto wake = [&loop = *endpoint_.loop, weak, posted = std::make_shared<std::atomic<bool>>(false)] {
     if (posted->exchange(true)) return;
@@ -69,19 +68,19 @@ void JoinStream::read() {
 void JoinStream::onRead(bool ok) {
   if (!connection_) return;
   if (!ok) {
-    parting_ = std::move(connection_);
+    departing_ = std::move(connection_);
     return finish(grpc::Status::OK);
   }
   grpc::Slice bytes;
   if (!incoming_.DumpToSingleSlice(&bytes).ok())
-    return finish({grpc::StatusCode::INTERNAL, "the message could not be read"});
+    return finish({grpc::StatusCode::INTERNAL, "cannot read the message"});
   connection_->receive(std::as_bytes(std::span(bytes.begin(), bytes.size())));
   read();
 }
 
 void JoinStream::pump() {
   if (!connection_) return;
-  const bool finished = connection_->finished();  // asked first: what came before it is still to be written
+  const bool finished = connection_->finished();  // checked before next(), so that no message is lost
   if (isWriting_) {
     if (finished) cancelSoon();
   } else if (std::optional<stream::SharedBytes> message = connection_->next()) {
@@ -130,14 +129,14 @@ void JoinStream::onEnded(bool) {
   hasEnded_ = true;
   if (isCounted_) --endpoint_.streams;
   if (cancellation_) cancellation_->Cancel();
-  if (parting_ && !context_.IsCancelled()) parting_->leave();
-  parting_.reset();
+  if (departing_ && !context_.IsCancelled()) departing_->leave();
+  departing_.reset();
   finish(cancelled());
   over();
 }
 
 void JoinStream::close(const grpc::Status& status) {
-  // Of one that is finished the last message may still be to be written, and says more.
+  // The last message of a finished connection may still wait, and it gives a more specific status.
   if (connection_ && connection_->finished())
     pump();
   else

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// One joined stream: moves bytes between gRPC and a stream::Connection.
+// One Join stream: forwards bytes between gRPC and a stream::Connection.
 #pragma once
 
 #include <memory>
@@ -15,10 +15,10 @@
 
 namespace clothstream::endpoint {
 
-// One read and one write under way at most.
+// At most one read and one write are under way.
 class JoinStream final : public Call {
  public:
-  JoinStream(EndpointContext& endpoint, Service& service) : Call(endpoint), service_(service) {}
+  JoinStream(GrpcEndpointContext& endpoint, Service& service) : Call(endpoint), service_(service) {}
 
   void await();
 
@@ -31,24 +31,25 @@ class JoinStream final : public Call {
   void onEnded(bool ok);
 
   void read();
-  // Writes the next message unless one is being written; ends the stream when there is none left to come.
+  // Writes the next message unless a write is under way. Ends the stream after the last message.
   void pump();
-  // Gives the connection up; gRPC hears of the end when what is being written is. The first one's status
-  // holds.
+  // Drops the connection and ends the stream after the write that is under way. Only the first call's status
+  // counts.
   void finish(const grpc::Status& status);
   void cancelSoon();
   void close(const grpc::Status& status) override;
 
   Service& service_;
   grpc::ServerAsyncReaderWriter<grpc::ByteBuffer, grpc::ByteBuffer> io_{&context_};
-  std::unique_ptr<stream::Connection> connection_;  // nullptr when the stream is closing
-  // Of a client that says no more. Whether it went or was cut off is known when the call has ended.
-  std::unique_ptr<stream::Connection> parting_;
+  std::unique_ptr<stream::Connection> connection_;  // nullptr while the stream closes
+  // Connection of a client that sends nothing more. The end of the call tells a goodbye from a lost
+  // connection.
+  std::unique_ptr<stream::Connection> departing_;
   grpc::ByteBuffer incoming_;
   stream::SharedBytes lastMessage_;
-  std::optional<grpc::Status> closing_;  // set when it is
+  std::optional<grpc::Status> closing_;  // set while the stream closes
   bool isCounted_ = false, isWriting_ = false, hasEnded_ = false;
-  std::optional<grpc::Alarm> cancellation_;  // set when the write under way is the last that is waited for
+  std::optional<grpc::Alarm> cancellation_;  // set while the stream waits for its last write
   Step<JoinStream> begun_{*this, &JoinStream::onBegun}, read_{*this, &JoinStream::onRead},
       written_{*this, &JoinStream::onWritten}, lateForEnd_{*this, &JoinStream::onLateForEnd},
       finished_{*this, &JoinStream::onFinished}, ended_{*this, &JoinStream::onEnded};

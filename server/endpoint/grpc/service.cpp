@@ -11,15 +11,15 @@
 
 namespace clothstream::endpoint {
 
-void offerService(EndpointContext& endpoint, Service& service, boost::asio::thread_pool& questions) {
+void offerService(GrpcEndpointContext& endpoint, Service& service, boost::asio::thread_pool& slowCalls) {
   stream::SceneServer& server = endpoint.server;
   offer(endpoint, service, &Service::RequestListScenes,
         [&server](const auto&, auto answer) { answer(server.listScenes()); });
-  // A scene may have a mesh of millions of vertices in it.
+  // Slow, since a scene may contain a mesh of millions of vertices.
   offer(
-      endpoint, service, &Service::RequestGetScene, [&server, &questions](const auto& request, auto answer) {
+      endpoint, service, &Service::RequestGetScene, [&server, &slowCalls](const auto& request, auto answer) {
         boost::asio::post(
-            questions, [&server, request, answer = std::move(answer)] { answer(server.getScene(request)); });
+            slowCalls, [&server, request, answer = std::move(answer)] { answer(server.getScene(request)); });
       });
   offer(endpoint, service, &Service::RequestCreateScene,
         [&server](const auto& request, auto answer) { server.createScene(request, std::move(answer)); });

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The calls of clothstream.v1.ClothStream.
+// Calls of clothstream.v1.ClothStream.
 #pragma once
 
 #include <boost/asio/thread_pool.hpp>
@@ -9,15 +9,14 @@
 
 namespace clothstream::endpoint {
 
-// Join is raw: its messages are already serialised, once for all who get them.
+// Join is raw, since each message is serialised once for all its receivers.
 using Service = v1::ClothStream::WithRawMethod_Join<
     v1::ClothStream::WithAsyncMethod_ListScenes<v1::ClothStream::WithAsyncMethod_GetScene<
         v1::ClothStream::WithAsyncMethod_CreateScene<v1::ClothStream::WithAsyncMethod_DeleteScene<
             v1::ClothStream::WithAsyncMethod_ControlScene<v1::ClothStream::WithAsyncMethod_StartRecording<
                 v1::ClothStream::WithAsyncMethod_StopRecording<v1::ClothStream::Service>>>>>>>>;
 
-// Answers all its calls, for as long as the endpoint is open; on a thread of `questions` where that may take
-// long.
-void offerService(EndpointContext& endpoint, Service& service, boost::asio::thread_pool& questions);
+// Answers all calls of the service while the endpoint is open. Calls that may take long run on `slowCalls`.
+void offerService(GrpcEndpointContext& endpoint, Service& service, boost::asio::thread_pool& slowCalls);
 
 }  // namespace clothstream::endpoint

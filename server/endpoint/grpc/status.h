@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The protocol's errors as gRPC statuses.
+// Errors of the protocol as gRPC statuses.
 #pragma once
 
 #include <grpcpp/support/status.h>
@@ -11,8 +11,8 @@ namespace clothstream::endpoint {
 
 grpc::Status statusOf(const v1::Error& error);
 
-// Why a finished connection ends is what was said last: a fatal Error, that the scene was deleted, or else
-// that the server stops.
+// Status for a finished connection, from its last message: a fatal Error, a notice that the scene was
+// deleted, or else UNAVAILABLE because the server stops.
 grpc::Status closingStatus(const stream::SharedBytes& lastMessage);
 
 }  // namespace clothstream::endpoint

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A call with one question and one answer.
+// A call with one request and one response.
 #pragma once
 
 #include <functional>
@@ -20,14 +20,14 @@ template <typename Request, typename Response>
 class UnaryCall final : public Call {
  public:
   using Writer = grpc::ServerAsyncResponseWriter<Response>;
-  // gRPC's way to ask for the next call of this method.
+  // gRPC function that requests the next call of this method.
   using Take = std::function<void(grpc::ServerContext*, Request*, Writer*, grpc::CompletionQueue*,
                                   grpc::ServerCompletionQueue*, void*)>;
-  // May be called from any thread, once, whenever it suits.
+  // Call it once, from any thread, at any time.
   using Answer = std::function<void(tl::expected<Response, v1::Error>)>;
   using Handler = std::function<void(const Request&, Answer)>;
 
-  UnaryCall(EndpointContext& endpoint, Take take, Handler handler)
+  UnaryCall(GrpcEndpointContext& endpoint, Take take, Handler handler)
       : Call(endpoint), take_(std::move(take)), handler_(std::move(handler)) {}
 
   void await() {
@@ -71,9 +71,9 @@ class UnaryCall final : public Call {
   Step<UnaryCall> begun_{*this, &UnaryCall::onBegun}, finished_{*this, &UnaryCall::onFinished};
 };
 
-// Waits for calls of a method of `service`, for as long as the endpoint is open: `take` is its Request... .
+// Answers calls of a method of `service` while the endpoint is open. `take` is its Request... function.
 template <typename Service, typename Method, typename Request, typename Response, typename Handler>
-void offer(EndpointContext& endpoint, Service& service,
+void offer(GrpcEndpointContext& endpoint, Service& service,
            void (Method::*take)(grpc::ServerContext*, Request*, grpc::ServerAsyncResponseWriter<Response>*,
                                 grpc::CompletionQueue*, grpc::ServerCompletionQueue*, void*),
            Handler handler) {

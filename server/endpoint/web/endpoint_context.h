@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What the sessions of one endpoint share; the endpoint's io thread alone touches it.
+// State that the sessions of one endpoint share. Belongs to the endpoint's io thread.
 #pragma once
 
 #include <cstddef>
@@ -20,7 +20,7 @@ namespace clothstream::endpoint {
 
 class StreamSession;
 
-struct EndpointContext {
+struct WebEndpointContext {
   stream::SceneServer& server;
   boost::asio::io_context& io;
   const Page page;
@@ -31,16 +31,16 @@ struct EndpointContext {
   bool stopping = false;
 };
 
-// Counts one connection as long as it lives; handed on when HTTP becomes WebSocket.
+// Counts one connection while it lives. Passes to the WebSocket when HTTP is upgraded.
 class ConnectionSlot {
  public:
-  explicit ConnectionSlot(EndpointContext& endpoint) : endpoint_(endpoint) { ++endpoint_.connections; }
+  explicit ConnectionSlot(WebEndpointContext& endpoint) : endpoint_(endpoint) { ++endpoint_.connections; }
   ~ConnectionSlot() { --endpoint_.connections; }
   ConnectionSlot(const ConnectionSlot&) = delete;
   ConnectionSlot& operator=(const ConnectionSlot&) = delete;
 
  private:
-  EndpointContext& endpoint_;
+  WebEndpointContext& endpoint_;
 };
 
 }  // namespace clothstream::endpoint

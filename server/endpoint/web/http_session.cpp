@@ -18,8 +18,8 @@ namespace beast = boost::beast;
 namespace http = beast::http;
 using namespace std::chrono_literals;
 
-constexpr auto kRequestTimeout = 5s;    // for a whole header, and between requests
-constexpr auto kResponseTimeout = 30s;  // for a file over a thin line
+constexpr auto kRequestTimeout = 5s;    // for a whole header and between requests
+constexpr auto kResponseTimeout = 30s;  // for a file over a slow link
 constexpr auto kDrainTimeout = 1s;
 
 std::string_view view(beast::string_view text) {
@@ -36,7 +36,8 @@ auto plainAnswer(const Request& request, http::status status, std::string_view t
   return response;
 }
 
-// Browsers name the page that opens a WebSocket; whoever does not is no browser, and could claim anything.
+// Browsers send the origin of the page that opens a WebSocket. Other clients may send any origin or none, so
+// the check protects only against pages.
 template <class Request>
 bool originAllowed(const Request& request, const std::vector<std::string>& allowed) {
   const auto field = request.find(http::field::origin);
@@ -54,7 +55,7 @@ bool originAllowed(const Request& request, const std::vector<std::string>& allow
 
 }  // namespace
 
-HttpSession::HttpSession(boost::asio::ip::tcp::socket&& socket, EndpointContext& endpoint)
+HttpSession::HttpSession(boost::asio::ip::tcp::socket&& socket, WebEndpointContext& endpoint)
     : endpoint_(endpoint),
       slot_(std::make_unique<ConnectionSlot>(endpoint)),
       beyondLimit_(endpoint.connections > endpoint.maxConnections),
@@ -77,17 +78,15 @@ void HttpSession::onHeader(beast::error_code error) {
   };
   if (error == http::error::header_limit || error == http::error::buffer_overflow)
     return refuse(http::status::request_header_fields_too_large, "The header is larger than 16 KiB.\n");
-  // Everything else that http::error names is a malformed request, save a connection that ends between two of
-  // them.
+  // All other values of http::error mean a malformed request, except the end of the connection.
   if (error.category() == http::make_error_code(http::error::end_of_stream).category() &&
       error != http::error::end_of_stream && error != http::error::partial_message)
-    return refuse(http::status::bad_request, "This is no HTTP request.\n");
+    return refuse(http::status::bad_request, "This is not an HTTP request.\n");
   if (error) return;
   if (beyondLimit_)
-    return refuse(http::status::service_unavailable,
-                  "The server has all the connections it takes; try again later.\n");
+    return refuse(http::status::service_unavailable, "The server has no free connection; try again later.\n");
   if (parser_->chunked() || parser_->content_length().value_or(0) > 0)
-    return refuse(http::status::payload_too_large, "Requests have no body here.\n");
+    return refuse(http::status::payload_too_large, "Requests must not have a body.\n");
   const std::string_view target = view(parser_->get().target());
   if (target.substr(0, target.find('?')) == "/stream") return answerStream(parser_->get());
   write(answer(parser_->get()));
@@ -95,15 +94,17 @@ void HttpSession::onHeader(beast::error_code error) {
 
 void HttpSession::answerStream(const Request& request) {
   if (!beast::websocket::is_upgrade(request)) {
-    Response response = plainAnswer(request, http::status::upgrade_required, "/stream is a WebSocket.\n");
+    Response response =
+        plainAnswer(request, http::status::upgrade_required, "/stream accepts only WebSocket connections.\n");
     response.set(http::field::upgrade, "websocket");
     return write(std::move(response));
   }
   if (!originAllowed(request, endpoint_.allowedOrigins)) {
-    return write(plainAnswer(request, http::status::forbidden,
-                             "Pages of this origin may not open /stream; --allow-origin lets them.\n"));
+    return write(plainAnswer(
+        request, http::status::forbidden,
+        "Pages of this origin may not open /stream. The server option --allow-origin allows them.\n"));
   }
-  socket_.expires_never();  // the WebSocket has time-outs of its own
+  socket_.expires_never();  // the WebSocket sets its own timeouts
   std::make_shared<StreamSession>(std::move(socket_), endpoint_, std::move(slot_))
       ->accept(parser_->release());
 }
@@ -111,23 +112,22 @@ void HttpSession::answerStream(const Request& request) {
 HttpSession::Response HttpSession::answer(const Request& request) const {
   if (request.method() != http::verb::get && request.method() != http::verb::head) {
     Response response =
-        plainAnswer(request, http::status::method_not_allowed, "GET and HEAD are what there is.\n");
+        plainAnswer(request, http::status::method_not_allowed, "Only GET and HEAD are allowed.\n");
     response.set(http::field::allow, "GET, HEAD");
     return response;
   }
   const std::string_view target = view(request.target());
   if (target == "/healthz") return plainAnswer(request, http::status::ok, "ok");
   if (const PageFile* file = endpoint_.page.find(target)) return answerFile(request, *file);
-  return plainAnswer(request, http::status::not_found,
-                     endpoint_.page.empty() ? "This server was started without a page; /stream is open.\n"
-                                            : "There is no such page here.\n");
+  return plainAnswer(
+      request, http::status::not_found,
+      endpoint_.page.empty() ? "This server has no page; /stream is open.\n" : "There is no such file.\n");
 }
 
 HttpSession::Response HttpSession::answerFile(const Request& request, const PageFile& file) const {
   const bool known = view(request[http::field::if_none_match]).find(file.entityTag) != std::string_view::npos;
   Response response{known ? http::status::not_modified : http::status::ok, request.version()};
-  // Names of files stay the same from build to build: a browser may keep a file, but asks whether it is still
-  // right.
+  // File names do not change between builds. So a browser may cache a file but must revalidate it.
   response.set(http::field::cache_control, "no-cache");
   response.set(http::field::etag, file.entityTag);
   response.set(http::field::content_type,
@@ -157,7 +157,8 @@ void HttpSession::onWritten(beast::error_code error) {
   drain();
 }
 
-// A socket that is closed with bytes unread is reset, and the reset may overtake the answer.
+// Reads the rest of the request: closing a socket with unread bytes resets the connection, and the reset may
+// overtake the response.
 void HttpSession::drain() {
   buffer_.clear();
   socket_.async_read_some(buffer_.prepare(kMaxHeaderBytes),

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// One HTTP connection: answers requests for the page until it closes, idles, or becomes a WebSocket.
+// One HTTP connection: answers requests for the page until it closes, times out or becomes a WebSocket.
 #pragma once
 
 #include <memory>
@@ -20,10 +20,10 @@ namespace clothstream::endpoint {
 
 inline constexpr std::size_t kMaxHeaderBytes = 16 * 1024;
 
-// Lives as long as an operation of its socket is pending. All on the io thread.
+// Lives while an operation of its socket is pending. Belongs to the io thread.
 class HttpSession : public std::enable_shared_from_this<HttpSession> {
  public:
-  HttpSession(boost::asio::ip::tcp::socket&& socket, EndpointContext& endpoint);
+  HttpSession(boost::asio::ip::tcp::socket&& socket, WebEndpointContext& endpoint);
 
   void read();
 
@@ -39,7 +39,7 @@ class HttpSession : public std::enable_shared_from_this<HttpSession> {
   void onWritten(boost::beast::error_code error);
   void drain();
 
-  EndpointContext& endpoint_;
+  WebEndpointContext& endpoint_;
   std::unique_ptr<ConnectionSlot> slot_;
   const bool beyondLimit_;
   boost::beast::tcp_stream socket_;

@@ -50,7 +50,7 @@ std::string_view contentTypeOf(const fs::path& file) {
 std::string readFile(const fs::path& file) {
   std::ifstream in(file, std::ios::binary);
   std::string content{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
-  if (!in) throw std::runtime_error(fmt::format("cannot read {} of the page", file.string()));
+  if (!in) throw std::runtime_error(fmt::format("cannot read the page's file {}", file.string()));
   return content;
 }
 
@@ -63,7 +63,7 @@ bool isHidden(const fs::path& path) {
   return path.filename().string().starts_with('.');
 }
 
-// nullopt where a percent sign is not followed by two hexadecimal digits.
+// Returns nullopt if a percent sign is not followed by two hexadecimal digits.
 std::optional<std::string> percentDecoded(std::string_view text) {
   std::string decoded;
   decoded.reserve(text.size());
@@ -96,7 +96,7 @@ Page::Page(const fs::path& directory) {
       entry.disable_recursion_pending();
       continue;
     }
-    std::error_code unreachable;  // a link to nothing, or to itself
+    std::error_code unreachable;  // such as a broken or circular link
     if (!entry->is_regular_file(unreachable)) continue;
     if (entry->is_symlink() && !isInside(fs::canonical(entry->path()), root)) continue;
     total += entry->file_size();

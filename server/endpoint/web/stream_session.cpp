@@ -24,9 +24,10 @@ using namespace std::chrono_literals;
 constexpr const char* kSubprotocol = "clothstream.v1";
 constexpr auto kHandshakeTimeout = 2s;
 constexpr auto kClosingTimeout = 2s;
-// Without a byte from the peer for half of it a ping goes out, after the whole of it the peer counts as gone.
+// After half of this time without a byte the server sends a ping; after all of it the client counts as
+// vanished.
 constexpr auto kIdleTimeout = 4s;
-// RFC 6455 5.5: 125 bytes a control frame, of which the code takes two.
+// RFC 6455 5.5: a control frame holds 125 bytes, of which the code takes two.
 constexpr std::size_t kMaxCloseText = 123;
 
 std::string peerOf(const beast::tcp_stream& socket) {
@@ -35,14 +36,14 @@ std::string peerOf(const beast::tcp_stream& socket) {
   return error ? "web" : fmt::format("web {}:{}", endpoint.address().to_string(), endpoint.port());
 }
 
-// The longest start of `text` that a close frame holds and that does not cut a UTF-8 sequence.
+// Longest prefix of `text` that fits into a close frame and does not cut a UTF-8 sequence.
 std::string_view closeText(std::string_view text) {
   std::size_t size = std::min(text.size(), kMaxCloseText);
   while (size < text.size() && size > 0 && (static_cast<unsigned char>(text[size]) & 0xC0) == 0x80) --size;
   return text.substr(0, size);
 }
 
-// Why a finished connection ends is what was said last.
+// Close reason of a finished connection, from its last message.
 ws::close_reason reasonOf(const stream::SharedBytes& last) {
   const auto reason = [](ws::close_code code, const std::string& why) {
     const std::string_view text = closeText(why);
@@ -59,7 +60,7 @@ ws::close_reason reasonOf(const stream::SharedBytes& last) {
 
 }  // namespace
 
-StreamSession::StreamSession(beast::tcp_stream&& socket, EndpointContext& endpoint,
+StreamSession::StreamSession(beast::tcp_stream&& socket, WebEndpointContext& endpoint,
                              std::unique_ptr<ConnectionSlot> slot)
     : endpoint_(endpoint), slot_(std::move(slot)), socket_(std::move(socket)), closingTimer_(endpoint.io) {
   socket_.binary(true);
@@ -84,8 +85,8 @@ void StreamSession::accept(http::request<http::empty_body>&& request) {
 void StreamSession::open() {
   if (endpoint_.stopping) return;
   endpoint_.streams.insert(shared_from_this());
-  // Called from any thread, so it must not own the session: whoever drops the last owner inside a wake would
-  // wait in the connection's destructor for that wake to return.
+  // A wake may come from any thread, so it must not own the session. Dropping the last owner inside a wake
+  // would deadlock: the connection's destructor waits for that wake to return.
   auto wake = [&io = endpoint_.io, weak = weak_from_this(),
                posted = std::make_shared<std::atomic<bool>>(false)] {
     if (posted->exchange(true)) return;
@@ -105,12 +106,12 @@ void StreamSession::read() {
 }
 
 void StreamSession::onRead(beast::error_code error) {
-  // A close frame is a goodbye; anything else is a connection that was lost.
+  // Only a close frame is a goodbye. All other errors mean a lost connection.
   if (error == ws::error::closed && connection_) connection_->leave();
   if (error) return end();
   if (closing_ || !connection_) return;
   if (socket_.got_text())
-    return close({ws::close_code::unknown_data, "messages are binary: one ClientMessage each"});
+    return close({ws::close_code::unknown_data, "messages must be binary, one ClientMessage each"});
   connection_->receive({static_cast<const std::byte*>(incoming_.cdata().data()), incoming_.size()});
   incoming_.consume(incoming_.size());
   read();
@@ -118,7 +119,7 @@ void StreamSession::onRead(beast::error_code error) {
 
 void StreamSession::pump() {
   if (closing_ || !connection_) return;
-  const bool finished = connection_->finished();  // asked first: what came before it is still to be written
+  const bool finished = connection_->finished();  // checked before next(), so that no message is lost
   if (writing_) {
     if (finished) endSoon();
   } else if (std::optional<stream::SharedBytes> message = connection_->next()) {
@@ -134,7 +135,7 @@ void StreamSession::pump() {
 
 void StreamSession::onWritten(beast::error_code error) {
   writing_ = false;
-  // A close frame that came, or a timeout, ended it: the read that is under way says which.
+  // A close frame or a timeout aborted the write. The read that is under way reports which.
   if (error == boost::asio::error::operation_aborted) return;
   if (error) return end();
   pump();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// One WebSocket: moves bytes between a socket and a stream::Connection.
+// One WebSocket: forwards bytes between a socket and a stream::Connection.
 #pragma once
 
 #include <atomic>
@@ -19,42 +19,42 @@
 
 namespace clothstream::endpoint {
 
-// All on the io thread. Lives as long as it stands in the endpoint's `streams` or an operation of its socket
-// is pending.
+// Belongs to the io thread. Lives while the endpoint's `streams` contains it or an operation of its socket is
+// pending.
 class StreamSession : public std::enable_shared_from_this<StreamSession> {
  public:
-  StreamSession(boost::beast::tcp_stream&& socket, EndpointContext& endpoint,
+  StreamSession(boost::beast::tcp_stream&& socket, WebEndpointContext& endpoint,
                 std::unique_ptr<ConnectionSlot> slot);
 
   void accept(boost::beast::http::request<boost::beast::http::empty_body>&& request);
 
-  // The closing handshake, at most kClosingTimeout of it; then the session ends.
+  // Starts the closing handshake. The session ends after it, at most kClosingTimeout later.
   void close(const boost::beast::websocket::close_reason& reason);
 
-  // Gives the connection up; its `wake` is not called any more once this returns.
+  // Drops the connection. Its `wake` is not called after this returns.
   void leave() { connection_.reset(); }
 
  private:
   void open();
   void read();
   void onRead(boost::beast::error_code error);
-  // Writes the next message unless one is being written.
+  // Writes the next message unless a write is under way.
   void pump();
   void onWritten(boost::beast::error_code error);
-  // Ends it in kClosingTimeout, whatever the peer does.
+  // Ends the session after kClosingTimeout, whatever the client does.
   void endSoon();
   void end();
 
-  EndpointContext& endpoint_;
+  WebEndpointContext& endpoint_;
   std::unique_ptr<ConnectionSlot> slot_;
-  // Without permessage-deflate: frames are compressed already.
+  // No permessage-deflate, since frames are compressed already.
   boost::beast::websocket::stream<boost::beast::tcp_stream, false> socket_;
   boost::beast::http::request<boost::beast::http::empty_body> request_;
   boost::beast::flat_buffer incoming_;
   std::optional<stream::Connection> connection_;
   stream::SharedBytes outgoing_;
   boost::asio::steady_timer closingTimer_;
-  bool ending_ = false;  // the timer runs
+  bool ending_ = false;  // closingTimer_ runs
   bool writing_ = false;
   bool closing_ = false;
 };

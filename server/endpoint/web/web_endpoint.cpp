@@ -26,9 +26,9 @@ namespace net = boost::asio;
 using net::ip::tcp;
 using namespace std::chrono_literals;
 
-// More connections than the limit are answered, so that they learn why, but not without end.
+// Number of connections beyond the limit that still get an answer with the reason.
 constexpr std::size_t kAnsweredBeyondLimit = 64;
-// What waits unsent in the kernel is stale by the time it goes out.
+// Most unsent bytes in the kernel. Frames that wait there longer are stale when they are sent.
 constexpr int kUnsentBytes = 16 * 1024;
 constexpr auto kStopTimeout = 1s;
 constexpr auto kAcceptPause = 100ms;
@@ -52,7 +52,7 @@ tcp::acceptor listen(net::io_context& io, const std::string& host, std::uint16_t
 }
 
 void sendFresh(tcp::socket& socket) {
-  boost::system::error_code ignored;  // a socket that died already is found by its first read
+  boost::system::error_code ignored;  // the first read finds a socket that is already closed
   socket.set_option(tcp::no_delay(true), ignored);
   ::setsockopt(socket.native_handle(), IPPROTO_TCP, TCP_NOTSENT_LOWAT, &kUnsentBytes, sizeof kUnsentBytes);
 }
@@ -60,7 +60,7 @@ void sendFresh(tcp::socket& socket) {
 }  // namespace
 
 struct WebEndpoint::State {
-  EndpointContext context;  // outlives the sessions, which die with the io context
+  WebEndpointContext context;  // outlives the sessions, which are destroyed with `io`
   net::io_context io{1};
   tcp::acceptor acceptor;
   net::steady_timer timer{io};
@@ -79,7 +79,7 @@ struct WebEndpoint::State {
   ~State() {
     net::post(io, [this] { stop(); });
     thread.join();
-    // No wake may reach an io context that is being destroyed.
+    // No wake may reach `io` during its destruction.
     for (const auto& session : context.streams) session->leave();
     context.streams.clear();
   }
@@ -87,7 +87,7 @@ struct WebEndpoint::State {
   void accept() {
     acceptor.async_accept([this](boost::system::error_code error, tcp::socket socket) {
       if (context.stopping) return;
-      if (error) {  // such as no descriptor left: asking at once again would only spin
+      if (error) {  // such as no free descriptor; an immediate retry would only spin
         timer.expires_after(kAcceptPause);
         timer.async_wait([this](boost::system::error_code cancelled) {
           if (!cancelled) accept();
@@ -110,7 +110,7 @@ struct WebEndpoint::State {
     timer.async_wait([this](boost::system::error_code cancelled) {
       if (!cancelled) io.stop();
     });
-    const auto open = context.streams;  // closing may end one at once
+    const auto open = context.streams;  // a copy, since close() may remove a session
     for (const auto& session : open)
       session->close({boost::beast::websocket::close_code::going_away, "the server is stopping"});
   }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The browser's endpoint: the static page over HTTP, and the server's messages over WebSocket at /stream.
+// Endpoint for browsers: the static page over HTTP, and the server's messages over WebSocket at /stream.
 #pragma once
 
 #include <cstddef>
@@ -17,33 +17,32 @@ namespace clothstream::endpoint {
 
 struct WebEndpointOptions {
   std::string host = "127.0.0.1";
-  std::uint16_t port = 8080;  // 0: one that is free
-  // Empty: no page, /stream and /healthz alone.
+  std::uint16_t port = 8080;  // 0: a free port
+  // Directory of the page. Empty: only /stream and /healthz.
   std::filesystem::path pageDirectory;
-  // Of all kinds; one more is answered with 503.
+  // Most connections at a time, HTTP and WebSocket. Further ones are answered with 503.
   std::size_t maxConnections = 256;
-  // Pages from elsewhere that may open /stream, such as "https://example.org"; "*" stands for every page. The
-  // endpoint's own page always may, and so may what is no browser and names no origin.
+  // Origins of other pages that may open /stream, such as "https://example.org"; "*" allows every page. The
+  // endpoint's own page and clients that send no origin are always allowed.
   std::vector<std::string> allowedOrigins;
 };
 
-// GET and HEAD: the page's files, /healthz ("ok" while the server runs). /stream upgrades to a WebSocket: a
-// binary message is an envelope of session.proto; anything else closes it. A peer that vanishes is found
-// within 5 s.
+// Answers GET and HEAD for the page's files and for /healthz ("ok" while the server runs). /stream upgrades
+// to a WebSocket: each binary message is an envelope of session.proto; a text message closes it. A client
+// that vanishes is found within 5 s.
 //
-// All sockets are served by one thread of the endpoint's own. Construction and destruction belong to the
-// caller's thread.
+// The endpoint has one thread for all sockets. Create and destroy the endpoint on one thread.
 class WebEndpoint {
  public:
-  // Listens when it returns. `server` must outlive the endpoint. Throws std::runtime_error that says what to
-  // do when the port is in use, the host is none of this machine's, or the page cannot be read.
+  // Listens when it returns. `server` must outlive the endpoint. Throws std::runtime_error with advice if the
+  // port is in use, the host is not an address of this machine, or the page cannot be read.
   WebEndpoint(stream::SceneServer& server, const WebEndpointOptions& options);
-  // Closes every WebSocket with "going away"; takes at most about a second.
+  // Closes every WebSocket with "going away": at most about 1 s.
   ~WebEndpoint();
   WebEndpoint(const WebEndpoint&) = delete;
   WebEndpoint& operator=(const WebEndpoint&) = delete;
 
-  // The actual one.
+  // Port on which the endpoint listens.
   std::uint16_t port() const;
 
  private:

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Constraint enforcement on the device with the matrices written out.
+// Constraint enforcement on the device with assembled matrices.
 #include "server/simulation/assembled/assembled_stage.h"
 
 #include <algorithm>
@@ -22,8 +22,8 @@ using vulkan::kImages;
 using vulkan::kStorage;
 using vulkan::kTexels;
 
-// As SolveStage: a workgroup on a software device is no wider than the CPU's vectors, and an invocation makes
-// 65,535 rounds of loops at most.
+// On a software device a workgroup is no wider than the CPU's vectors, and an invocation makes at most 65,535
+// loop rounds; compare SolveStage.
 AssembledCut cutAssembled(const vulkan::Device& device, std::uint32_t workgroupSize,
                           std::optional<std::uint32_t> wholeNodes) {
   constexpr std::uint32_t kLanes = CLOTHSTREAM_SOLVE_LANES;
@@ -35,7 +35,7 @@ AssembledCut cutAssembled(const vulkan::Device& device, std::uint32_t workgroupS
       .rounds = software ? 65'000 : ~0u};
 }
 
-// Bindings want a buffer even of nothing.
+// Bindings need a buffer even for an empty table.
 std::size_t texels(std::size_t count) {
   return std::max<std::size_t>(1, count) * sizeof(shared::vec4);
 }
@@ -98,10 +98,10 @@ AssembledStage::AssembledStage(const vulkan::Device& device, std::span<const mod
                     sizeof(shared::ApplyMultiplierPush), cut_),
              {&state.cloths, &nodeRanges_.texels(), &nodeEntries_.texels(), &nodeRows_.texels(),
               &state.colliders, &state.nearColliders, state.positions[0], state.positions[1],
-              state.velocities[1], &blocks_, &state.toldContacts, &vectors_},
+              state.velocities[1], &blocks_, &state.contactImpulses, &vectors_},
              {&state.cloths, &nodeRanges_.texels(), &nodeEntries_.texels(), &nodeRows_.texels(),
               &state.colliders, &state.nearColliders, state.positions[1], state.positions[0],
-              state.velocities[0], &blocks_, &state.toldContacts, &vectors_}) {
+              state.velocities[0], &blocks_, &state.contactImpulses, &vectors_}) {
   const auto make = [&](const char* name, std::span<const std::uint32_t> spirv) {
     return std::make_unique<Pass>(
         device,
@@ -116,7 +116,7 @@ AssembledStage::AssembledStage(const vulkan::Device& device, std::span<const mod
     multiply_ = make("multiply_system", kernels::multiply_system);
     update_ = make("update_multipliers", kernels::update_multipliers);
   }
-  // By far the largest tables; the device has them.
+  // The largest tables by far; only the device still needs them.
   for (std::vector<shared::NumbersRecord>* table : {&tables_.columns, &tables_.sources}) {
     table->clear();
     table->shrink_to_fit();
@@ -129,7 +129,7 @@ void AssembledStage::recordTables(vulkan::Recorder& recorder) const {
     table->recordUpload(recorder);
 }
 
-// In as many dispatches as the device's limit on loops asks for.
+// Records as many dispatches as the device's limit on loop rounds requires.
 void AssembledStage::recordWhole(vulkan::Recorder& recorder, bool measures) const {
   if (!solve_) return;
   shared::MultiplierPush push{};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Constraint enforcement on the device as [Va21] 3.2.2 has it: with the matrices written out.
+// Constraint enforcement on the device with assembled matrices, [Va21] 3.2.2.
 #pragma once
 
 #include <cstdint>
@@ -18,34 +18,36 @@
 
 namespace clothstream::simulation {
 
-// The baseline beside SolveStage, of cloths with model::isAssembled(): same constraints, same settings, same
-// report, and the same motion as far as both converge and but for rounding. Belongs to the device's thread.
+// Solves the constraints of cloths with model::isAssembled(), as a baseline for SolveStage. Constraints,
+// settings and report are the same. The motion agrees up to convergence and rounding. Belongs to the device's
+// thread.
 //
-// A substep: J in CSR from where the nodes are; the matrix  J M^-1 J^T + c I,  whose entries' places follow
-// from the cloth and are known ahead, row by row (SpMM); conjugate gradients with it (SpMV); and J^T, which
-// is J in CSC, takes the multipliers to the nodes (SpMVT), which then collide. Every sum has one invocation
-// and one order where the paper has atomic additions of floats, so that its bits do not depend on the device.
-// It has no state of its own.
+// A substep fills J in CSR format from the nodes' positions, then the matrix J M^-1 J^T + c I row by row
+// (SpMM); the places of its entries follow from the cloth. Conjugate gradients solve with it (SpMV). J^T,
+// which is J in CSC format, moves the nodes by the multipliers (SpMVT), and the nodes collide. The paper adds
+// floats atomically; here each sum has one invocation and one order, so that its bits do not depend on the
+// device. The stage keeps no state between substeps.
 class AssembledStage {
  public:
-  // Some cloth's system must be assembled. `workgroupSize` 0, and `wholeNodes` (of the largest cloth that one
-  // workgroup solves) absent: the measured best for the device. Throws std::runtime_error where there is no
-  // room.
+  // At least one cloth must be assembled. `workgroupSize` 0 and `wholeNodes` absent (nodes of the largest
+  // cloth that one workgroup solves) mean the measured best for the device. Throws std::runtime_error if the
+  // device has too little memory.
   AssembledStage(const vulkan::Device& device, std::span<const model::Cloth> cloths,
                  const StateBuffers& state, std::uint32_t workgroupSize,
                  std::optional<std::uint32_t> wholeNodes);
 
   static bool isIn(std::span<const model::Cloth> cloths);
 
-  // Its tables, once, before the first substep.
+  // Uploads the tables, once, before the first substep.
   void recordTables(vulkan::Recorder& recorder) const;
-  // One substep of so many seconds whose free motion leads from state `from` to the other; corrects the
-  // latter in place. Begins with a barrier. `measures`: also what is left after the last iteration.
+  // Records one substep of `substepSeconds`. The free motion led from state `from` to the other state, which
+  // is corrected in place. Begins with a barrier. `measures`: also measure the residual after the last
+  // iteration.
   void record(vulkan::Recorder& recorder, std::uint32_t from, const shared::CollisionPush& collision,
               double substepSeconds, bool measures) const;
 
-  // Of the last substep that measures, a system: to the CPU, and there once the recording is complete. The
-  // residual is SolveStage's.
+  // Copies the records of the last measured substep to the CPU, one per system; report() has them once the
+  // recording is complete. The residual is defined as in SolveStage.
   void recordReport(vulkan::Recorder& recorder) const;
   std::span<const shared::SolveRecord> report() const;
 
@@ -53,7 +55,7 @@ class AssembledStage {
   std::span<const std::uint32_t> cloths() const { return tables_.cloths; }
 
  private:
-  // A kernel that does not see the state.
+  // A kernel that does not access the state.
   struct Pass {
     Pass(const vulkan::Device& device, const vulkan::KernelDescription& description, Stage::Buffers buffers)
         : kernel(device, description), bindings(device, kernel, buffers) {}
@@ -61,7 +63,7 @@ class AssembledStage {
     Pass& operator=(const Pass&) = delete;
 
     vulkan::Kernel kernel;
-    vulkan::Bindings bindings;  // they point to the kernel
+    vulkan::Bindings bindings;  // they refer to the kernel
   };
 
   void recordWhole(vulkan::Recorder& recorder, bool measures) const;
@@ -73,8 +75,8 @@ class AssembledStage {
   vulkan::Buffer blocks_, values_, vectors_, sums_, solves_, solvesReadback_;
   Stage fill_;
   Pass multiplyJacobians_;
-  std::unique_ptr<Pass> solve_;              // where one workgroup solves a system
-  std::unique_ptr<Pass> multiply_, update_;  // where several do
+  std::unique_ptr<Pass> solve_;              // if one workgroup solves a system
+  std::unique_ptr<Pass> multiply_, update_;  // if several workgroups solve a system
   Stage apply_;
 };
 

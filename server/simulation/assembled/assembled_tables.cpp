@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The constraints' systems of a scene as sparse matrices, but for their values.
+// Sparse matrices of the constraints' systems, without their values.
 #include "server/simulation/assembled/assembled_tables.h"
 
 #include <algorithm>
@@ -22,7 +22,7 @@ std::uint32_t count(const auto& table) {
   return static_cast<std::uint32_t>(table.size());
 }
 
-// One list of a table of lists: four numbers a texel, whose last one is filled up with `filler`.
+// One list of a table of lists: four numbers per texel. `filler` fills the last texel.
 class List {
  public:
   List(std::vector<shared::NumbersRecord>& table, float filler)
@@ -34,7 +34,7 @@ class List {
     float* const places[] = {&four.x, &four.y, &four.z, &four.w};
     *places[length_++ % 4] = number;
   }
-  shared::EntriesRecord range() const { return {{whole(first_), whole(table_.size()), 0, 0}}; }
+  shared::EntriesRecord range() const { return {whole(first_), whole(table_.size()), 0, 0}; }
 
  private:
   std::vector<shared::NumbersRecord>& table_;
@@ -42,7 +42,7 @@ class List {
   std::size_t first_, length_ = 0;
 };
 
-// A cloth, and what it adds to the tables.
+// A cloth with its constraints.
 struct Source {
   const model::Cloth& cloth;
   std::uint32_t number, firstNode;
@@ -53,7 +53,7 @@ struct Source {
   std::uint32_t chunks() const { return std::max(1u, (count(links) + kChunkRows - 1) / kChunkRows); }
 };
 
-// Of the matrix, in texels.
+// Length of the longest row of the matrix, in texels.
 std::uint32_t longestRow(const Source& source) {
   std::uint32_t longest = 0;
   for (const model::SpringLink& link : source.links) {
@@ -65,7 +65,7 @@ std::uint32_t longestRow(const Source& source) {
   return longest;
 }
 
-// Of loops, that an invocation makes in an iteration of a solve by one workgroup: the most it can be.
+// Upper bound of the loop rounds of an invocation in one iteration of a solve by one workgroup.
 std::uint64_t roundsOf(const Source& source, const AssembledCut& cut) {
   const std::uint64_t lanes = kLanes / cut.workgroup, tree = 2 * lanes + 16;
   const std::uint64_t multiply = lanes * (kLaneRows * (longestRow(source) + 2) + 1) + tree + 1;
@@ -73,7 +73,7 @@ std::uint64_t roundsOf(const Source& source, const AssembledCut& cut) {
   return source.chunks() * (multiply + update + 1) + lanes + tree + 1;
 }
 
-// Where the p-th node of a row is the q-th of a column.
+// Entry of a row: `source` is 2 p + q if node p of the row is node q of the column.
 struct Entry {
   std::uint32_t column, source;
 };
@@ -100,8 +100,8 @@ void appendRows(const Source& from, AssembledTables& tables) {
       columns.push(whole(firstRow + entry.column));
       sources.push(whole(entry.source));
     }
-    tables.rows.push_back({{whole(from.firstNode + link.a), whole(from.firstNode + link.b), link.restLength,
-                            whole(CLOTHSTREAM_SPRING_KINDS * from.number + static_cast<int>(link.kind))}});
+    tables.rows.push_back({whole(from.firstNode + link.a), whole(from.firstNode + link.b), link.restLength,
+                           whole(CLOTHSTREAM_SPRING_KINDS * from.number + static_cast<int>(link.kind))});
     tables.entries.push_back(columns.range());
   }
 }
@@ -115,7 +115,7 @@ void appendNodes(const Source& from, std::uint32_t firstRow, AssembledTables& ta
   }
   const std::uint32_t end = from.firstNode + from.cloth.nodeCount();
   for (std::uint32_t node = from.firstNode; node < end; node += kLanes)
-    tables.nodeRanges.push_back({{whole(from.number), whole(node), whole(std::min(node + kLanes, end)), 0}});
+    tables.nodeRanges.push_back({whole(from.number), whole(node), whole(std::min(node + kLanes, end)), 0});
 }
 
 void appendSystem(const Source& from, AssembledTables& tables) {
@@ -125,9 +125,9 @@ void appendSystem(const Source& from, AssembledTables& tables) {
   appendRows(from, tables);
   appendNodes(from, firstRow, tables);
   tables.systems.push_back(
-      {{whole(from.number), whole(firstRow), whole(tables.rows.size()), whole(tables.chunks.size())}});
+      {whole(from.number), whole(firstRow), whole(tables.rows.size()), whole(tables.chunks.size())});
   for (std::uint32_t chunk = 0; chunk < chunks; ++chunk)
-    tables.chunks.push_back({{system, whole(chunk), whole(chunks), 0}});
+    tables.chunks.push_back({system, whole(chunk), whole(chunks), 0});
 }
 
 }  // namespace
@@ -136,14 +136,14 @@ AssembledTables assembledTables(std::span<const model::Cloth> cloths, const Asse
   AssembledTables tables;
   std::vector<Source> parts;
   std::uint32_t firstNode = 0;
-  tables.nodeEntries.resize(clothOffsets(cloths).back(), {{0, 0, 0, 0}});
+  tables.nodeEntries.resize(clothOffsets(cloths).back(), {0, 0, 0, 0});
   for (std::uint32_t i = 0; i < cloths.size(); firstNode += cloths[i++].nodeCount()) {
     if (!model::isAssembled(cloths[i].solver)) continue;
     std::vector<model::SpringLink> links = model::systemLinks(cloths[i]);
     model::SpringAdjacency adjacency = model::springAdjacency(links, cloths[i].nodeCount());
     Source source{
         cloths[i], i, firstNode, std::move(links), std::move(adjacency), model::pinnedNodes(cloths[i])};
-    // A dispatch must bear an iteration, and what measures its end.
+    // A dispatch must have room for one iteration and the measurement at its end.
     const std::uint64_t rounds = roundsOf(source, cut);
     if (source.cloth.nodeCount() > cut.wholeNodes || 2 * rounds > cut.rounds) {
       parts.push_back(std::move(source));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Dihedral bending on the device: scene/hinges.h.
+// Dihedral bending on the device: model/hinges.h.
 #pragma once
 
 #include <cstdint>
@@ -17,21 +17,20 @@
 
 namespace clothstream::simulation {
 
-// Belongs to the device's thread. Changes velocities before everything else in a substep, whatever the
-// cloth's solver.
+// Belongs to the device's thread. Changes velocities at the start of a substep, for every solver.
 class BendingStage {
  public:
-  // Throws std::runtime_error where the device has no room.
+  // Throws std::runtime_error if the device has too little memory.
   BendingStage(const vulkan::Device& device, std::span<const model::Cloth> cloths, const StateBuffers& state,
                std::uint32_t workgroupSize);
 
   static bool isIn(std::span<const model::Cloth> cloths);
-  // Whether it has the hinges of all that bend now.
+  // True if the tables have the hinges of all cloths that bend now.
   bool serves(std::span<const model::Cloth> cloths) const;
 
-  // Its tables, before the next substep.
+  // Uploads the tables, before the next substep.
   void recordTables(vulkan::Recorder& recorder) const;
-  // The substep's start lies in the buffers `present`. Begins behind a barrier and must be followed by one.
+  // The substep's start is in the buffers `present`. The caller records a barrier before and after.
   void record(vulkan::Recorder& recorder, std::uint32_t present, double substepSeconds) const;
 
  private:

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Hinges of a scene as the kernels read them.
+// Tables of the hinges of a scene.
 #include "server/simulation/bending/bending_tables.h"
 
 #include "server/model/hinges.h"
@@ -9,13 +9,12 @@ namespace {
 
 void addLists(const std::vector<std::vector<std::uint32_t>>& numbers, BendingTables& tables) {
   for (const std::vector<std::uint32_t>& ofNode : numbers) {
-    const auto first = static_cast<std::uint32_t>(tables.lists.size());
+    const std::size_t first = tables.lists.size();
     for (std::size_t i = 0; i < ofNode.size(); i += 4) {
       const auto at = [&](std::size_t k) { return k < ofNode.size() ? static_cast<float>(ofNode[k]) : 0.0f; };
-      tables.lists.push_back({at(i), at(i + 1), at(i + 2), at(i + 3)});
+      tables.lists.push_back({{at(i), at(i + 1), at(i + 2), at(i + 3)}});
     }
-    tables.incidences.push_back({{static_cast<float>(first & 0xFFFF), static_cast<float>(first >> 16),
-                                  static_cast<float>(tables.lists.size() - first), 0}});
+    tables.incidences.push_back(shared::listRecord(first, tables.lists.size()));
   }
 }
 
@@ -31,8 +30,14 @@ BendingTables bendingTables(std::span<const model::Cloth> cloths) {
          cloth.dihedralBending > 0 ? model::hinges(cloth) : std::vector<model::Hinge>()) {
       const auto slot = static_cast<std::uint32_t>(4 * tables.hinges.size());
       const auto node = [&](std::size_t place) { return static_cast<float>(firstNode + hinge.nodes[place]); };
-      tables.hinges.push_back({{node(0), node(1), node(2), node(3)},
-                               {hinge.weight, hinge.bent, hinge.leastSquare, static_cast<float>(i)}});
+      tables.hinges.push_back({.edgeStart = node(0),
+                               .edgeEnd = node(1),
+                               .firstOpposite = node(2),
+                               .secondOpposite = node(3),
+                               .weight = hinge.weight,
+                               .restBent = hinge.bent,
+                               .leastSquare = hinge.leastSquare,
+                               .cloth = static_cast<float>(i)});
       for (std::uint32_t place = 0; place < 4; ++place)
         numbers[hinge.nodes[place]].push_back(slot + place + 1);
     }

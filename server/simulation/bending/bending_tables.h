@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Hinges of a scene as the kernels read them.
+// Tables of the hinges of a scene.
 #pragma once
 
 #include <cstdint>
@@ -14,11 +14,11 @@ namespace clothstream::simulation {
 
 struct BendingTables {
   std::vector<shared::HingeRecord> hinges;
-  std::vector<shared::HingeListRecord> incidences;  // a node of the scene
-  std::vector<shared::vec4> lists;
+  std::vector<shared::ListRecord> incidences;  // by node of the scene: its texels of `lists`
+  std::vector<shared::HingeNumbers> lists;
 };
 
-// Of the cloths with dihedral bending.
+// Tables of the cloths with dihedral bending.
 BendingTables bendingTables(std::span<const model::Cloth> cloths);
 
 }  // namespace clothstream::simulation

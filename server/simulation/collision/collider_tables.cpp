@@ -13,30 +13,27 @@ namespace {
 using shared::vec4;
 
 constexpr std::size_t kRecordTexels = sizeof(shared::ColliderRecord) / sizeof(vec4);
-// Instead of infinity, whose square kernels would have to avoid.
+// Reach of an unbounded shape. The square of infinity would not be usable in kernels.
 constexpr float kFar = 1e15f;
 
-// Appends the planes that the shape needs; `firstPlane` is the texel of the first of all.
-vec4 shapeTexel(const model::Shape& shape, std::size_t firstPlane, std::vector<vec4>& planes) {
+// Appends the planes of the shape. `firstPlane` is the texel of the first plane of all shapes.
+shared::ShapeRecord shapeRecord(const model::Shape& shape, std::size_t firstPlane,
+                                std::vector<vec4>& planes) {
   const auto first = static_cast<float>(firstPlane + planes.size());
   return std::visit(
-      model::ShapeVisitor{[](const model::Sphere& sphere) -> vec4 {
-                            return {shared::kRoundShape, sphere.radius, 0, 0};
+      model::ShapeVisitor{[](const model::Sphere& sphere) { return shared::roundShape(sphere.radius, 0); },
+                          [](const model::Capsule& capsule) {
+                            return shared::roundShape(capsule.radius, capsule.length / 2);
                           },
-                          [](const model::Capsule& capsule) -> vec4 {
-                            return {shared::kRoundShape, capsule.radius, capsule.length / 2, 0};
-                          },
-                          [&](const model::Plane&) -> vec4 {
+                          [&](const model::Plane&) {
                             planes.push_back({0, 1, 0, 0});
-                            return {shared::kPlanesShape, first, 1, 0};
+                            return shared::planesShape(first, 1);
                           },
-                          [](const model::Box& box) -> vec4 {
-                            return {shared::kBoxShape, box.size.x() / 2, box.size.y() / 2, box.size.z() / 2};
-                          },
-                          [&](const model::Hull& hull) -> vec4 {
+                          [](const model::Box& box) { return shared::boxShape(vectorOf(box.size / 2)); },
+                          [&](const model::Hull& hull) {
                             for (const model::HalfSpace& plane : hull->planes)
                               planes.push_back(texel(plane.normal, plane.offset));
-                            return {shared::kPlanesShape, first, static_cast<float>(hull->planes.size()), 0};
+                            return shared::planesShape(first, static_cast<float>(hull->planes.size()));
                           }},
       shape);
 }
@@ -46,27 +43,32 @@ shared::ColliderRecord recordOf(const MovingCollider& collider, std::size_t firs
   const model::Quaternion& from = collider.start.orientation;
   const model::Quaternion& to = collider.end.orientation;
   const float sign = from.dot(to) < 0 ? -1.0f : 1.0f;
-  return {.start = texel(collider.start.position, std::min(model::reachOf(collider.shape), kFar)),
-          .motion = texel(collider.end.position - collider.start.position, collider.friction),
-          .turned = {from.x(), from.y(), from.z(), from.w()},
-          .turn = {sign * to.x() - from.x(), sign * to.y() - from.y(), sign * to.z() - from.z(),
-                   sign * to.w() - from.w()},
-          .shape = shapeTexel(collider.shape, firstPlane, planes)};
+  return {.position = vectorOf(collider.start.position),
+          .reach = std::min(model::reachOf(collider.shape), kFar),
+          .motion = vectorOf(collider.end.position - collider.start.position),
+          .friction = collider.friction,
+          .orientation = texel(from),
+          .orientationChange = {sign * to.x() - from.x(), sign * to.y() - from.y(), sign * to.z() - from.z(),
+                                sign * to.w() - from.w()},
+          .shape = shapeRecord(collider.shape, firstPlane, planes)};
 }
 
 shared::ColliderBounds boundsOf(const MovingCollider& collider, float reach) {
   const model::Vec3& a = collider.start.position;
   const model::Vec3& b = collider.end.position;
   const model::Vec3 reaches = model::Vec3::Constant(reach);
-  return {texel(a.cwiseMin(b) - reaches, (b - a).norm()), texel(a.cwiseMax(b) + reaches, 0)};
+  return {.low = vectorOf(a.cwiseMin(b) - reaches),
+          .farthestMotion = (b - a).norm(),
+          .high = vectorOf(a.cwiseMax(b) + reaches),
+          .reserved = 0};
 }
 
-vec4 lower(const vec4& a, const vec4& b) {
-  return {std::min(a.x, b.x), std::min(a.y, b.y), std::min(a.z, b.z), std::max(a.w, b.w)};
-}
-
-vec4 upper(const vec4& a, const vec4& b) {
-  return {std::max(a.x, b.x), std::max(a.y, b.y), std::max(a.z, b.z), 0};
+// Bounds of both.
+shared::ColliderBounds unite(const shared::ColliderBounds& a, const shared::ColliderBounds& b) {
+  return {.low = {std::min(a.low.x, b.low.x), std::min(a.low.y, b.low.y), std::min(a.low.z, b.low.z)},
+          .farthestMotion = std::max(a.farthestMotion, b.farthestMotion),
+          .high = {std::max(a.high.x, b.high.x), std::max(a.high.y, b.high.y), std::max(a.high.z, b.high.z)},
+          .reserved = 0};
 }
 
 }  // namespace
@@ -83,11 +85,9 @@ void fill(ColliderTables& tables, std::span<const MovingCollider> colliders) {
   tables.bounds.clear();
   tables.bounds.resize(groups);
   for (std::size_t i = 0; i < colliders.size(); ++i) {
-    const shared::ColliderBounds own = boundsOf(colliders[i], tables.records[i].start.w);
+    const shared::ColliderBounds own = boundsOf(colliders[i], tables.records[i].reach);
     shared::ColliderBounds& group = tables.bounds[i / shared::kColliderGroup];
-    group = i % shared::kColliderGroup == 0
-                ? own
-                : shared::ColliderBounds{lower(group.low, own.low), upper(group.high, own.high)};
+    group = i % shared::kColliderGroup == 0 ? own : unite(group, own);
     tables.bounds.push_back(own);
   }
 }

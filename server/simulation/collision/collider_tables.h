@@ -14,11 +14,12 @@ namespace clothstream::simulation {
 struct ColliderTables {
   std::vector<shared::ColliderRecord> records;
   std::vector<shared::vec4> planes;  // of planes and hulls, as records number them
-  // Of each group of kColliderGroup that follow each other, then of each collider.
+  // Bounds of each group of kColliderGroup consecutive colliders, then of each collider.
   std::vector<shared::ColliderBounds> bounds;
 };
 
-// Replaces what `tables` hold and reuses its memory. At most kMaxColliders, with kMaxColliderPlanes.
+// Replaces the contents of `tables` and reuses its memory. At most kMaxColliders, with kMaxColliderPlanes in
+// total.
 void fill(ColliderTables& tables, std::span<const MovingCollider> colliders);
 
 }  // namespace clothstream::simulation

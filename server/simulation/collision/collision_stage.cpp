@@ -44,7 +44,7 @@ CollisionStage::CollisionStage(const vulkan::Device& device, std::uint32_t nodeC
       colliders_(device, BufferPurpose::texels, kColliderBytes),
       bounds_(device, BufferPurpose::texels, kBoundsBytes),
       nearLists_(device, BufferPurpose::texels, listsOf(nodeCount) * shared::kNearStride * sizeof(float)),
-      toldContacts_(device, BufferPurpose::state, kMaxColliders * clothCount * sizeof(std::uint32_t)),
+      contactImpulses_(device, BufferPurpose::state, kMaxColliders * clothCount * sizeof(std::uint32_t)),
       uploads_{Buffer(device, BufferPurpose::upload, kColliderBytes + kBoundsBytes),
                Buffer(device, BufferPurpose::upload, kColliderBytes + kBoundsBytes)},
       device_(device),
@@ -67,21 +67,21 @@ void CollisionStage::recordInputs(vulkan::Recorder& recorder, std::span<const Mo
   std::size_t offset = upload(recorder, tables_.records, through, 0, colliders_, 0);
   offset = upload(recorder, tables_.planes, through, offset, colliders_, offset);
   upload(recorder, tables_.bounds, through, offset, bounds_, 0);
-  tells_ = tells && count_ > 0;
-  if (tells_) recorder.fill(toldContacts_, 0, toldBytes());
+  reportsContacts_ = tells && count_ > 0;
+  if (reportsContacts_) recorder.fill(contactImpulses_, 0, contactBytes());
 }
 
-void CollisionStage::recordTold(vulkan::Recorder& recorder) {
-  if (!tells_) return;
-  Buffer& readback = toldReadbacks_[slot_];
-  if (readback.bytes() == 0) readback = Buffer(device_, BufferPurpose::readback, toldContacts_.bytes());
-  recorder.copy(toldContacts_, readback, toldBytes());
+void CollisionStage::recordContacts(vulkan::Recorder& recorder) {
+  if (!reportsContacts_) return;
+  Buffer& readback = contactReadbacks_[slot_];
+  if (readback.bytes() == 0) readback = Buffer(device_, BufferPurpose::readback, contactImpulses_.bytes());
+  recorder.copy(contactImpulses_, readback, contactBytes());
 }
 
-std::vector<ContactStatus> CollisionStage::told() const {
+std::vector<ContactStatus> CollisionStage::contacts() const {
   std::vector<ContactStatus> told;
-  if (!tells_) return told;
-  const auto units = toldReadbacks_[slot_].mapped<const std::uint32_t>();
+  if (!reportsContacts_) return told;
+  const auto units = contactReadbacks_[slot_].mapped<const std::uint32_t>();
   for (std::uint32_t i = 0; i < count_ * clothCount_; ++i)
     if (units[i] != 0)
       told.push_back({i / clothCount_, i % clothCount_, units[i] / double{shared::kImpulseUnits}});
@@ -102,7 +102,7 @@ shared::CollisionPush CollisionStage::push(std::uint32_t substep, std::uint32_t 
           .progressAfter = static_cast<float>(substep + 1) / static_cast<float>(substeps),
           .tickRate = tickRate,
           .substepRate = tickRate * static_cast<float>(substeps),
-          .toldCloths = tells_ ? clothCount_ : 0,
+          .contactClothCount = reportsContacts_ ? clothCount_ : 0,
           .reserved0 = 0,
           .reserved1 = 0};
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Colliders on the device: uploaded a tick, and found for the nodes that may touch them.
+// Colliders on the device: the upload in each tick, and the lists of colliders near the nodes.
 #pragma once
 
 #include <array>
@@ -22,46 +22,48 @@ namespace clothstream::simulation {
 // A tick:   recordInputs -> barrier -> recordGather -> substeps
 class CollisionStage {
  public:
-  // `positions` and `velocities` are the scene's, by turns: texels that outlive the stage.
+  // `positions` and `velocities` are the two state buffers of the scene: texels that outlive the stage.
   CollisionStage(const vulkan::Device& device, std::uint32_t nodeCount, std::uint32_t clothCount,
                  std::array<const vulkan::Buffer*, 2> positions,
                  std::array<const vulkan::Buffer*, 2> velocities);
 
-  // The colliders of the tick to come; at most one tick may be in flight. Whether their contacts are to be
-  // told.
+  // Uploads the colliders of the next tick. At most one tick may be in flight. `reportsContacts`: count their
+  // contacts.
   void recordInputs(vulkan::Recorder& recorder, std::span<const MovingCollider> colliders, bool tells);
 
-  // Lists what nodes may touch within `tickSeconds`, the state being in the buffers `present`; no cloth is
-  // thicker than `thickness`. Begins no stage and no barrier of its own; records nothing where there are no
-  // colliders.
+  // Lists the colliders that nodes may touch within `tickSeconds`. The state is in the buffers `present`, and
+  // no cloth is thicker than `thickness`. The caller records stage and barrier. Records nothing if there are
+  // no colliders.
   void recordGather(vulkan::Recorder& recorder, std::uint32_t present, float tickSeconds, float thickness);
 
-  // Whether the tick has colliders.
+  // True if the tick has colliders.
   bool active() const { return count_ > 0; }
   shared::CollisionPush push(std::uint32_t substep, std::uint32_t substeps, float tickRate) const;
 
-  // After the tick's substeps, with a barrier before.
-  void recordTold(vulkan::Recorder& recorder);
-  // Of the last recorded tick, once it is complete.
-  std::vector<ContactStatus> told() const;
+  // Copies the contacts to the CPU, after the tick's substeps and a barrier.
+  void recordContacts(vulkan::Recorder& recorder);
+  // Contacts of the last recorded tick, once it is complete.
+  std::vector<ContactStatus> contacts() const;
 
   const vulkan::Buffer& colliders() const { return colliders_; }
   const vulkan::Buffer& nearLists() const { return nearLists_; }
-  const vulkan::Buffer& toldContacts() const { return toldContacts_; }
+  const vulkan::Buffer& contactImpulses() const { return contactImpulses_; }
 
  private:
-  std::size_t toldBytes() const {
-    return tells_ ? std::size_t{count_} * clothCount_ * sizeof(std::uint32_t) : 0;
+  std::size_t contactBytes() const {
+    return reportsContacts_ ? std::size_t{count_} * clothCount_ * sizeof(std::uint32_t) : 0;
   }
 
   std::uint32_t nodeCount_, clothCount_;
-  bool tells_ = false;
+  bool reportsContacts_ = false;
   std::uint32_t count_ = 0;
   std::uint32_t slot_ = 0;
   ColliderTables tables_;
-  vulkan::Buffer colliders_, bounds_, nearLists_, toldContacts_;
-  std::array<vulkan::Buffer, 2> uploads_;  // by turns: a tick may be in flight while the next is recorded
-  std::array<vulkan::Buffer, 2> toldReadbacks_;  // likewise; made when they are first wanted
+  vulkan::Buffer colliders_, bounds_, nearLists_, contactImpulses_;
+  std::array<vulkan::Buffer, 2>
+      uploads_;  // used alternately: a tick may be in flight while the next one is recorded
+  std::array<vulkan::Buffer, 2>
+      contactReadbacks_;  // used alternately; created when contacts are first reported
   const vulkan::Device& device_;
   vulkan::Kernel kernel_;
   std::array<vulkan::Bindings, 2> from_;

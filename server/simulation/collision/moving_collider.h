@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A collider as a tick sees it.
+// A collider during one tick.
 #pragma once
 
 #include <cstddef>
@@ -9,7 +9,7 @@
 
 namespace clothstream::simulation {
 
-// It moves in a straight line from start to end over the tick's substeps, and turns the shorter way, by the
+// Moves in a straight line from start to end over the tick's substeps. Rotates the shorter way, by the
 // normalised mean of the two quaternions.
 struct MovingCollider {
   model::Shape shape = model::Sphere{};
@@ -17,13 +17,13 @@ struct MovingCollider {
   float friction = 1;  // Coulomb; multiplied with the cloth's
 };
 
-// What a collider did to a cloth in a tick.
+// Effect of a collider on a cloth in a tick.
 struct ContactStatus {
   std::uint32_t collider = 0, cloth = 0;
-  double impulse = 0;  // N s: the sum of the sizes of what its nodes got, of each at least a millionth
+  double impulse = 0;  // N s, sum of the impulses on the cloth's nodes; each counts at least 1e-6
 };
 
-// At most so many in a tick, and so many planes of their hulls in all.
+// Largest number of colliders in a tick, and of planes of their shapes in total.
 inline constexpr std::size_t kMaxColliders = 8192;
 inline constexpr std::size_t kMaxColliderPlanes = 16384;
 

@@ -27,10 +27,10 @@ using vulkan::kStorage;
 using vulkan::kTexels;
 
 constexpr std::uint32_t kListsATick = 3;
-// Of the time that lists are for: velocities change in it.
+// Factor of the time until the next search, because velocities change in it.
 constexpr float kAhead = 1.25f;
 
-// Twice as many entries as nodes: cells that are not neighbours seldom share one.
+// There are twice as many entries as nodes, so that cells that are not neighbours seldom share an entry.
 std::uint32_t cellCountOf(std::uint32_t nodes) {
   return std::max(shared::kCellBlock, std::bit_ceil(2 * nodes));
 }
@@ -57,15 +57,13 @@ bool hasSeveralMaterials(std::span<const model::Cloth> cloths) {
   return false;
 }
 
-// Where each node is at rest, and cloth + 1; 0 of cloths without self-collision.
-void fillRests(const model::Scene& scene, std::span<shared::vec4> rests) {
+void fillRests(const model::Scene& scene, std::span<shared::RestRecord> rests) {
   const NodeState state = restState(scene.cloths);
   std::size_t node = 0;
   for (std::size_t cloth = 0; cloth < scene.cloths.size(); ++cloth)
     for (std::uint32_t i = 0; i < scene.cloths[cloth].nodeCount(); ++i, ++node) {
-      const model::Vec3& rest = state.positions[node];
       const bool balls = scene.cloths[cloth].selfCollision.has_value();
-      rests[node] = {rest.x(), rest.y(), rest.z(), balls ? static_cast<float>(cloth + 1) : 0.0f};
+      rests[node] = {vectorOf(state.positions[node]), balls ? static_cast<float>(cloth + 1) : 0.0f};
     }
 }
 
@@ -161,7 +159,7 @@ SelfCollisionStage::SelfCollisionStage(const vulkan::Device& device, const model
                                  &neighbours_, &report_});
               }) {
   assert(isIn(scene));
-  fillRests(scene, restsUpload_.mapped<shared::vec4>());
+  fillRests(scene, restsUpload_.mapped<shared::RestRecord>());
   makeContacts(scene.cloths);
 }
 
@@ -194,7 +192,7 @@ SelfCollisionStage::Contacts::Contacts(const vulkan::Device& device, const State
                                 {&state.cloths, &stage.rests_, &state.colliders, &state.nearColliders,
                                  &stage.contacts_, &stage.contactPositions_, &stage.contactVelocities_,
                                  state.positions[1 - of], &stage.touching_, &stage.groups_,
-                                 state.positions[of], state.velocities[of], &state.toldContacts});
+                                 state.positions[of], state.velocities[of], &state.contactImpulses});
               }) {}
 
 void SelfCollisionStage::makeContacts(std::span<const model::Cloth> cloths) {
@@ -250,7 +248,7 @@ void SelfCollisionStage::recordContacts(vulkan::Recorder& recorder, std::uint32_
   const shared::ContactPush push{.collision = collision,
                                  .nodeCount = nodeCount_,
                                  .substepSeconds = substepSeconds_,
-                                 .takenBack = model::kOverlapCorrectionFraction / substepSeconds_,
+                                 .correctionRate = model::kOverlapCorrectionFraction / substepSeconds_,
                                  .pushOutSpeed = model::kPushOutSpeed};
   recorder.barrier();
   recorder.fill(groups_, 0, sizeof(std::uint32_t), offsetof(shared::ContactGroups, x));

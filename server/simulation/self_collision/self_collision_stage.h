@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Self-collision on the device: nodes as balls that keep out of each other, within and between cloths.
+// Self-collision on the device: nodes are balls that repel each other within a cloth and between cloths.
 #pragma once
 
 #include <array>
@@ -17,41 +17,41 @@
 
 namespace clothstream::simulation {
 
-// Belongs to the device's thread. Runs behind all that moves nodes in a substep and corrects what that wrote,
-// in place. Three times a tick it lists who may touch whom until the next time (a counting sort into cells,
-// whose order depends on the state alone); every substep it looks which of these do and puts them apart. What
-// is to keep cloth free of penetrations takes the place of recordContacts().
+// Belongs to the device's thread. Runs after all other stages of a substep and corrects their result in
+// place. Three times per tick it lists the nodes that may touch until the next search. The search is a
+// counting sort into cells, whose order depends only on the state. In every substep it separates the listed
+// nodes that touch. A method that keeps cloth free of penetrations would replace recordContacts().
 //
 // A tick:   recordClear -> (substeps: recordSubstep) -> recordReport
 class SelfCollisionStage {
  public:
-  // Some cloth must have self-collision. `workgroupSize`: 0 for the measured best; the results do not depend
-  // on it.
+  // At least one cloth must have self-collision. `workgroupSize` 0: the measured best. The results do not
+  // depend on it.
   SelfCollisionStage(const vulkan::Device& device, const model::Scene& scene, const StateBuffers& state,
                      std::uint32_t workgroupSize);
 
   static bool isIn(const model::Scene& scene);
 
-  // Other radii and frictions for the cloths that have self-collision. No tick may be in flight.
+  // Sets radii and frictions of the cloths that have self-collision. No tick may be in flight.
   void setCloths(std::span<const model::Cloth> cloths);
 
-  // Its tables, once, before the first tick.
+  // Uploads the tables, once, before the first tick.
   void recordTables(vulkan::Recorder& recorder) const;
-  // The tick's report begins anew; a barrier must follow.
+  // Resets the tick's report. The caller records a barrier after it.
   void recordClear(vulkan::Recorder& recorder) const;
-  // Substep `index` of a tick, which led from state `from` to the other one. Begins with a barrier.
+  // Records substep `index` of a tick, which led from state `from` to the other state. Begins with a barrier.
   void recordSubstep(vulkan::Recorder& recorder, std::uint32_t from, std::uint32_t index,
                      const shared::CollisionPush& collision) const;
 
-  // To the CPU, behind a barrier; and there once the recording is complete.
+  // Copies the report to the CPU, after a barrier; report() has it once the recording is complete.
   void recordReport(vulkan::Recorder& recorder, std::uint32_t slot) const;
   const shared::CrowdReport& report(std::uint32_t slot) const;
 
-  // For tests: a node's list as gather_neighbours.comp leaves it, kNeighbourStride floats a node.
+  // For tests: the lists of gather_neighbours.comp, kNeighbourStride floats per node.
   const vulkan::Buffer& neighbours() const { return neighbours_; }
 
  private:
-  // A kernel bound to either state.
+  // A kernel with bindings for each of the two states.
   struct Kernel {
     template <typename Bind>
     Kernel(const vulkan::Device& device, const vulkan::KernelDescription& description, const Bind& bind)
@@ -60,10 +60,10 @@ class SelfCollisionStage {
     Kernel& operator=(const Kernel&) = delete;
 
     vulkan::Kernel kernel;
-    std::array<vulkan::Bindings, 2> on;  // the state of this index
+    std::array<vulkan::Bindings, 2> on;  // by state
   };
 
-  // Kernels of contacts, for when all cloths are alike and for when they are not.
+  // Kernels of contacts, for equal and for different materials of the cloths.
   struct Contacts {
     Contacts(const vulkan::Device& device, const StateBuffers& state, const SelfCollisionStage& stage,
              bool several);
@@ -79,7 +79,7 @@ class SelfCollisionStage {
   const StateBuffers state_;
   std::uint32_t workgroupSize_;
   std::uint32_t nodeCount_, cellCount_, measureInvocations_;
-  std::uint32_t interval_;  // substeps that lists are for
+  std::uint32_t interval_;  // substeps between searches
   float substepSeconds_, reach_;
   vulkan::Buffer restsUpload_, rests_;
   vulkan::Buffer table_, starts_, entries_, order_, sorted_, neighbours_;
@@ -87,7 +87,7 @@ class SelfCollisionStage {
   vulkan::Buffer report_, reportReadback_;
   Kernel measure_, countCells_, startCells_, fillCells_, sortCells_, gather_;
   std::array<std::unique_ptr<Contacts>, 2> contactKernels_;
-  std::size_t several_ = 0;  // which of them
+  std::size_t several_ = 0;  // index of the kernels in use
 };
 
 }  // namespace clothstream::simulation

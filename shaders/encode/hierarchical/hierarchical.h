@@ -73,21 +73,6 @@ const uint32_t kResidualRows = 2;
 // three words a slot, elsewhere.
 const uint32_t kSpecialWord = 0x80000000u;
 
-// Codec 3: its blocks and groups (proto/codec/hierarchical/packed_blocks.h).
-const uint32_t kPackedBlock = 32;
-const uint32_t kPackedGroup = 2048;
-const uint32_t kPackedModes = 32;
-// What a group is written to: so many words for each of its vertices with three components (two, of normals),
-// and so many more.
-const uint32_t kPackedWords = 8;
-const uint32_t kPackedNormalWords = 5;
-const uint32_t kPackedExtraWords = 4;
-
-struct PackPush {
-  uint32_t vertexCount;
-  uint32_t coarseVertices;
-};
-
 // In place of a triangle's fourth corner.
 const uint32_t kNoCorner = 0xFFFFFFFFu;
 
@@ -95,7 +80,7 @@ CLOTHSTREAM_SHARED_END
 
 #ifdef __cplusplus
 namespace clothstream::shared {
-static_assert(sizeof(PredictPush) == 32 && sizeof(SlotStatus) == 16 && sizeof(PackPush) == 8);
+static_assert(sizeof(PredictPush) == 32 && sizeof(SlotStatus) == 16);
 }  // namespace clothstream::shared
 #endif
 

@@ -128,7 +128,9 @@ void main() {
   expected.z = abs(expected.z);
   vec3 normal = texelFetch(normals, int(vertex)).xyz;
   float up = normal[axes.z];
-  ivec3 actual = ivec3(fixedPoint(normal[axes.x]), fixedPoint(normal[axes.y]), fixedPoint(isDown ? -up : up));
+  precise float down_ = -up;
+  ivec3 actual =
+      ivec3(fixedPoint(normal[axes.x]), fixedPoint(normal[axes.y]), fixedPoint(isDown ? down_ : up));
   ivec2 sent = encodeOctahedral(actual);
   uvec2 residual = uvec2(sent - encodeOctahedral(expected)) & 0xFFu;
   sentNormals[vertex] = (uint(sent.x) & 0xFFu) | (uint(sent.y) & 0xFFu) << 8;

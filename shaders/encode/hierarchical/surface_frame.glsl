@@ -39,7 +39,8 @@ bool isNotAbove(uint root, uint factor) {
 // The largest with root^2 (2 n + 1) <= 2^41; n is from 1024 to 4095. The estimate is the device's own, the
 // root is not: as a rule neither loop runs.
 uint rootOf(uint n) {
-  uint root = uint(1048576.0 * inversesqrt(float(n) + 0.5));
+  precise float estimate = 1048576.0 * inversesqrt(float(n) + 0.5);
+  uint root = uint(estimate);
   while (isNotAbove(root + 1, 2 * n + 1)) {
     ++root;
   }

@@ -24,10 +24,10 @@ constexpr std::size_t kWithoutDevice = 4;
 
 struct Named {
   const char* name;
-  const char* scene;  // of the server's; null: of cloth_motion.h
-  // Where a flag is in the air already.
+  const char* scene;  // scene of the server; null: motion of cloth_motion.h
+  // Frames until a flag is in the air.
   std::uint32_t warmUp = 0;
-  float wind = 1, gust = 1;  // times that of the scene
+  float wind = 1, gust = 1;  // factors on the scene's values
 };
 
 constexpr std::array kMotions{Named{"drape", nullptr},
@@ -53,7 +53,8 @@ BenchMotion played(const Named& named, const Settings& settings) {
           }};
 }
 
-// The same cloth of size x size nodes: held at the same places, its balls as large beside its meshes.
+// Changes the cloth to size x size nodes, held at the same places, with collision balls in proportion to its
+// meshes.
 void resize(model::Cloth& cloth, std::uint32_t size) {
   const auto coarser = [&] {
     return std::max(model::spacing(cloth.grid).column, model::spacing(cloth.grid).row);
@@ -76,7 +77,7 @@ void resize(model::Cloth& cloth, std::uint32_t size) {
 
 model::Scene sceneOf(const Named& named, const Settings& settings) {
   auto loaded = messages::loadScene(named.scene);
-  if (!loaded) throw std::runtime_error(fmt::format("the scene {} is not there", named.scene));
+  if (!loaded) throw std::runtime_error(fmt::format("unknown scene {}", named.scene));
   model::Scene scene = std::move(*loaded);
   scene.environment.wind *= named.wind;
   scene.environment.gust.strength *= named.gust;
@@ -84,7 +85,7 @@ model::Scene sceneOf(const Named& named, const Settings& settings) {
   if (!cloth.mesh) resize(cloth, settings.size.value_or(kDefaultSize));
   const std::uint32_t substeps = model::stableSubsteps(scene);
   if (substeps == 0)
-    throw std::runtime_error(fmt::format("{} cannot be integrated at this size", named.name));
+    throw std::runtime_error(fmt::format("{} has no stable time step at this size", named.name));
   scene.substeps = std::max(scene.substeps, substeps);
   return scene;
 }
@@ -147,7 +148,7 @@ std::vector<BenchMotion> chosenMotions(vulkan::Device& device, const Settings& s
   std::vector<BenchMotion> motions;
   for (const std::string& name : names) {
     const auto named = std::ranges::find(kMotions, name, &Named::name);
-    if (named == kMotions.end()) throw std::runtime_error(fmt::format("there is no motion {}", name));
+    if (named == kMotions.end()) throw std::runtime_error(fmt::format("unknown motion {}", name));
     motions.push_back(named->scene == nullptr ? played(*named, settings)
                                               : simulated(device, *named, settings));
   }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What codecs are measured on: motions by name, or a file.
+// Motions that codecs are measured on: by name, or from a file.
 #pragma once
 
 #include <functional>
@@ -15,15 +15,16 @@ namespace clothstream::bench {
 struct BenchMotion {
   std::string name;
   codec::ClothLayout cloth;
-  // Calls what it is given with each frame's positions, 3 floats a vertex.
+  // Calls its argument with each frame's positions, 3 floats a vertex.
   std::function<void(const std::function<void(std::span<const float>)>&)> play;
 };
 
-// Four of cloth_motion.h, which need no device, then named scenes of the server's, simulated on it.
+// Names of four motions of cloth_motion.h, which need no device, then of scenes of the server, simulated on
+// the device.
 std::vector<std::string> motionNames();
 
-// Those that the settings choose: the first four where they choose none. The device must outlive them. Throws
-// std::runtime_error where a name is not known or a file is no motion; playing it too, where a state is not
+// Motions that the settings choose; the first four if they name none. The device must outlive them. Throws
+// std::runtime_error if a name is unknown or a file is no motion. Playing a motion throws if a state is not
 // healthy.
 std::vector<BenchMotion> chosenMotions(vulkan::Device& device, const Settings& settings);
 

@@ -14,7 +14,7 @@
 namespace clothstream::bench {
 namespace {
 
-// A 99th percentile needs no more.
+// The 99th percentile needs no more samples.
 constexpr std::uint32_t kNormalSamplesEvery = 10;
 
 constexpr double kDegrees = 180 / std::numbers::pi;
@@ -114,7 +114,7 @@ nlohmann::ordered_json CodecMeasurement::row(const std::string& motion) const {
       {"normalErrorDegMean", normalErrorSum_ / all},
       {"normalErrorDegP99", normalErrors_.p99()},
       {"normalFlickerDegRms", frames_ > 1 ? kDegrees * std::sqrt(flickerSum_ / changes) : 0}};
-  // Where nothing is calm there is nothing to say of it.
+  // There is no value if no vertex is calm.
   if (calm_ > 0)
     row["normalFlickerCalmDegRms"] = kDegrees * std::sqrt(calmFlickerSum_ / static_cast<double>(calm_));
   row["calmPart"] = frames_ > 1 ? static_cast<double>(calm_) / changes : 0;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What a codec makes of a motion, in bytes, metres, degrees and milliseconds.
+// Results of a codec for a motion, in bytes, metres, degrees and milliseconds.
 #pragma once
 
 #include <functional>
@@ -15,18 +15,17 @@
 
 namespace clothstream::bench {
 
-// One codec's way through a motion. A normal's error is the decoded unit vector less the true one; in degrees
-// it is the angle between the two. Flicker is the root of the mean square, over vertices and frames, of how
-// much that error changed since the frame before: the length of the difference of the two error vectors,
-// taken as an angle.
+// Measures one codec over a motion. A normal's error is the decoded unit vector minus the true one; in
+// degrees it is the angle between the two. Flicker is the root mean square, over vertices and frames, of the
+// change of that error since the previous frame, as an angle.
 class CodecMeasurement {
  public:
   CodecMeasurement(std::unique_ptr<FrameCodec> codec, const codec::ClothLayout& cloth, double maxError);
 
-  // Throws std::runtime_error where what is decoded is not what was encoded, to the promised distance.
+  // Throws std::runtime_error if a decoded position is farther from the true one than promised.
   void add(const TrueFrame& frame);
 
-  // Needs a frame. What else a suite says of a row comes behind.
+  // Requires at least one frame. A suite appends further values.
   nlohmann::ordered_json row(const std::string& motion) const;
 
  private:
@@ -34,7 +33,7 @@ class CodecMeasurement {
   void addNormals(const TrueFrame& frame, std::span<const float> decoded);
 
   std::unique_ptr<FrameCodec> codec_;
-  codec::StreamLayout layout_;  // for normals
+  codec::StreamLayout layout_;  // for computing normals
   double maxError_;
   Samples bytes_, encode_, decode_, normalErrors_;
   std::vector<float> normals_, normalError_, normalErrorBefore_;
@@ -42,11 +41,11 @@ class CodecMeasurement {
   std::size_t frames_ = 0, keyBytes_ = 0, calm_ = 0;
 };
 
-// The frames of a motion with all that is true of them.
+// Frames of a motion with their true normals and calm vertices.
 class Truth {
  public:
   explicit Truth(const codec::ClothLayout& cloth);
-  // Until the next call.
+  // Valid until the next call.
   TrueFrame next(std::span<const float> positions);
 
  private:

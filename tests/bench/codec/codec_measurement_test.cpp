@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// That the figures of codecs are what they are said to be: codecs whose errors are known.
+// Checks the measurement with codecs whose errors are known.
 #include "tests/bench/codec/codec_measurement.h"
 
 #include <cmath>
@@ -14,11 +14,11 @@ namespace {
 constexpr std::uint32_t kVertices = 6;
 const codec::ClothLayout kCloth{kVertices, 2, 3, {}, {}};
 
-// Decodes to what the functions make of a frame, from packets of that many bytes.
+// Decodes to what the functions make of a frame, from packets of a given size.
 struct Behaviour {
   std::function<void(std::uint32_t frame, std::vector<float>& positions)> spoil = [](auto, auto&) {};
   std::function<std::array<float, 3>(std::uint32_t frame)> normal =
-      {};  // of all vertices; none: it sends none
+      {};  // for all vertices; none: it sends no normals
   std::function<std::size_t(std::uint32_t frame)> bytes = [](auto) { return 3; };
 };
 
@@ -51,7 +51,7 @@ class FakeCodec final : public FrameCodec {
   std::vector<float> positions_, normals_;
 };
 
-// Flat, facing +Z; the last vertex moves on by `step` each frame.
+// A flat cloth that faces +Z. Its last vertex moves by `step` each frame.
 nlohmann::ordered_json measured(Behaviour behaviour, std::uint32_t frames = 4, float step = 0) {
   CodecMeasurement measurement(std::make_unique<FakeCodec>(std::move(behaviour)), kCloth, 0.001);
   Truth truth(kCloth);
@@ -82,7 +82,7 @@ TEST(CodecMeasurement, CountsEveryByteOfEveryFrame) {
     EXPECT_EQ(value(row, field), 0) << field;
 }
 
-TEST(CodecMeasurement, SaysHowFarVerticesAre) {
+TEST(CodecMeasurement, ReportsDistancesOfVertices) {
   const auto row = measured({.spoil = [](std::uint32_t frame, std::vector<float>& positions) {
     positions[2] += frame == 1 ? 0.0015f : 0.0005f;
   }});
@@ -90,7 +90,7 @@ TEST(CodecMeasurement, SaysHowFarVerticesAre) {
   EXPECT_NEAR(value(row, "meanErrorMm"), (1.5 + 3 * 0.5) / (4 * kVertices), 1e-6);
 }
 
-TEST(CodecMeasurement, EndsWhereAPromiseIsBroken) {
+TEST(CodecMeasurement, FailsIfAPromiseIsBroken) {
   EXPECT_THROW(
       measured({.spoil = [](std::uint32_t, std::vector<float>& positions) { positions[4] += 0.0021f; }}),
       std::runtime_error);
@@ -98,19 +98,19 @@ TEST(CodecMeasurement, EndsWhereAPromiseIsBroken) {
                std::runtime_error);
 }
 
-TEST(CodecMeasurement, TakesNormalsThatAreSentElseThoseOfTheDecodedPositions) {
+TEST(CodecMeasurement, UsesSentNormalsIfThereAreAny) {
   const auto sent = measured({.normal = [](std::uint32_t) { return tilted(3); }});
   EXPECT_NEAR(value(sent, "normalErrorDegMean"), 3, 1e-4);
   EXPECT_NEAR(value(sent, "normalErrorDegP99"), 3, 1e-4);
   EXPECT_EQ(value(sent, "normalFlickerDegRms"), 0) << "what stays wrong does not flicker";
-  // The whole cloth turned: 1.8 mm at 2 m.
+  // The whole cloth is turned: 1.8 mm at 2 m.
   const auto computed = measured({.spoil = [](std::uint32_t, std::vector<float>& positions) {
     for (std::size_t i = 0; i < positions.size(); i += 3) positions[i + 2] += 0.0009f * positions[i];
   }});
   EXPECT_NEAR(value(computed, "normalErrorDegMean"), std::atan(0.0009) * 180 / std::numbers::pi, 1e-5);
 }
 
-TEST(CodecMeasurement, CallsFlickerHowMuchTheErrorOfNormalsChanges) {
+TEST(CodecMeasurement, MeasuresFlickerAsChangeOfNormalErrors) {
   // From one side to the other each time: twice the error.
   const auto row = measured({.normal = [](std::uint32_t frame) { return tilted(frame % 2 == 0 ? 1 : -1); }});
   EXPECT_NEAR(value(row, "normalErrorDegMean"), 1, 1e-4);
@@ -122,7 +122,7 @@ TEST(CodecMeasurement, CallsFlickerHowMuchTheErrorOfNormalsChanges) {
   EXPECT_NEAR(value(once, "normalFlickerDegRms"), std::sqrt(1.0 / 3), 1e-3);
 }
 
-TEST(CodecMeasurement, CallsVerticesCalmThatHardlyMove) {
+TEST(CodecMeasurement, TreatsSlowVerticesAsCalm) {
   EXPECT_DOUBLE_EQ(value(measured({}, 3, 0.9f * static_cast<float>(kCalmMetres)), "calmPart"), 1);
   EXPECT_NEAR(value(measured({}, 3, 1.1f * static_cast<float>(kCalmMetres)), "calmPart"), 5.0 / 6, 1e-9);
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Suite codec: both codecs on the CPU over motions that they were not fitted to; codec 2 with temporal
-// layers, and of a square grid as a mesh, too.
+// Suite codec: both codecs on the CPU over motions that they were not fitted to; codec 2 also with temporal
+// layers, and for a square grid as a mesh.
 #include <array>
 #include <functional>
 #include <vector>
@@ -14,7 +14,7 @@
 namespace clothstream::bench {
 namespace {
 
-// A motion's frames one after the other, in memory: each codec has them, and the caches, to itself.
+// Frames of a motion in memory, so that each codec has them and the caches to itself.
 class Frames {
  public:
   explicit Frames(const BenchMotion& motion) : floats_(3 * std::size_t{motion.cloth.vertexCount}) {
@@ -32,7 +32,7 @@ class Frames {
   std::vector<float> all_;
 };
 
-// `positionsOf` gives a frame's in the order of the layout's vertices.
+// `positionsOf` returns the positions of a frame in the order of the layout's vertices.
 nlohmann::ordered_json measure(const std::string& motion, const codec::StreamLayout& layout,
                                std::size_t frames,
                                const std::function<std::span<const float>(std::size_t)>& positionsOf,

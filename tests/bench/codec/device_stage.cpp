@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Suite codec_device: what the device's part of a frame costs, of a curtain that a sphere swings through.
+// Suite codec_device: cost of the device's part of a frame, for a curtain with a sphere that swings through
+// it.
 #include <algorithm>
 #include <stdexcept>
 #include <string>
@@ -19,11 +20,11 @@
 namespace clothstream::bench {
 namespace {
 
-// The motion starts from rest: frames count from here on.
+// First measured tick. The motion starts from rest.
 constexpr std::uint64_t kFirstTick = 72;
 constexpr std::uint64_t kTicks = 4 * 72;
 
-// Nothing where the device takes no time stamps.
+// Adds nothing if the device takes no time stamps.
 void addTimes(nlohmann::ordered_json& row, const std::string& what, const Samples& seconds) {
   if (seconds.count() == 0) return;
   row[what + "MsMin"] = seconds.min() * 1e3;
@@ -56,7 +57,7 @@ nlohmann::ordered_json measure(vulkan::Device& device, const model::Scene& scene
     const double decodeSeconds =
         secondsOf([&] { result = decoder->decode(std::span(packet).first(encoded.bytes)); });
     if (result != codec::DecodeResult::ok || decoder->reconstructionHash() != encoded.reconstructionHash)
-      throw std::runtime_error(fmt::format("the frame of tick {} is not decoded to what was encoded", tick));
+      throw std::runtime_error(fmt::format("the frame of tick {} decodes to a different state", tick));
     if (tick <= kFirstTick) continue;
     sum += static_cast<double>(encoded.bytes);
     bytes.add(static_cast<double>(encoded.bytes));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A codec as it is measured: a stream of frames of one cloth, coded and decoded again.
+// Interface to a codec that is measured: a stream of frames of one cloth, encoded and decoded.
 #pragma once
 
 #include <cstddef>
@@ -11,10 +11,9 @@ namespace clothstream::bench {
 
 // 3 floats a vertex each.
 struct TrueFrame {
-  std::uint32_t frame = 0;  // from 0 on
+  std::uint32_t frame = 0;  // counted from 0
   std::span<const float> positions, normals;
-  // Of each vertex, whether it is as good as still: since the frame before it has moved by less than
-  // kCalmMetres.
+  // True for each vertex that has moved by less than kCalmMetres since the previous frame.
   std::span<const std::uint8_t> calm;
 };
 
@@ -25,16 +24,16 @@ class FrameCodec {
  public:
   virtual ~FrameCodec() = default;
   virtual std::string name() const = 0;
-  // How far a decoded vertex may be from where it was, m.
+  // Maximum distance of a decoded vertex from its true position, in metres.
   virtual double promise() const = 0;
-  // The packet; until the next call.
+  // Returns the packet, valid until the next call.
   virtual std::span<const std::byte> encode(const TrueFrame& frame) = 0;
-  // The packet's positions, in the order of the frame; until the next call. Throws std::runtime_error where
-  // it cannot.
+  // Returns the packet's positions in the order of the frame, valid until the next call. Throws
+  // std::runtime_error on failure.
   virtual std::span<const float> decode(std::span<const std::byte> packet) = 0;
-  // Of the decoded frame, where the codec sends any.
+  // Normals of the decoded frame, if the codec sends any.
   virtual std::span<const float> normals() const { return {}; }
-  // Throws std::runtime_error where what was decoded is not what was encoded and the codec can tell.
+  // Throws std::runtime_error if the codec can tell that it did not decode what it encoded.
   virtual void check() const {}
 };
 

@@ -16,13 +16,14 @@ void addMotionOptions(CLI::App& app, Settings& settings) {
          "--input", [&settings](const std::string& path) { settings.input = path; },
          "Instead: a motion in a file, as clothstream encode reads it")
       ->excludes(motions);
-  app.add_option("--frames", settings.frames, "Frames of a motion, at most")
+  app.add_option("--frames", settings.frames, "Maximum frames of a motion")
       ->check(CLI::Range(1u, 1u << 30))
       ->capture_default_str();
-  app.add_option("--max-error", settings.maxError, "Of the codecs, m along each of three axes")
+  app.add_option("--max-error", settings.maxError,
+                 "Max error of the codecs in metres along each of three axes")
       ->check(CLI::Range(double{codec::kSmallestMaxError}, double{codec::kLargestMaxError}))
       ->capture_default_str();
-  app.add_option("--encoder-threads", settings.encoderThreads, "Measure codec 2 with so many threads, too")
+  app.add_option("--encoder-threads", settings.encoderThreads, "Also measure codec 2 with this many threads")
       ->check(CLI::Range(1u, 64u))
       ->capture_default_str();
 }

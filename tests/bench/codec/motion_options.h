@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The options of what codecs are measured on.
+// Command-line options that choose motions for codecs.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -8,7 +8,7 @@
 
 namespace clothstream::bench {
 
-// Both outlive the parsing.
+// `app` and `settings` must live until the command line is parsed.
 void addMotionOptions(CLI::App& app, Settings& settings);
 
 }  // namespace clothstream::bench

@@ -36,7 +36,7 @@ std::span<const std::byte> OurCodec::encode(const TrueFrame& frame) {
 
 std::span<const float> OurCodec::decode(std::span<const std::byte> packet) {
   if (decoder_->decode(packet) != codec::DecodeResult::ok)
-    throw std::runtime_error(fmt::format("{} does not decode its packet", name()));
+    throw std::runtime_error(fmt::format("{} cannot decode its packet", name()));
   return decoder_->positions();
 }
 
@@ -46,7 +46,7 @@ std::span<const float> OurCodec::normals() const {
 
 void OurCodec::check() const {
   if (decoder_->reconstructionHash() != encoder_->reconstructionHash())
-    throw std::runtime_error(fmt::format("{} does not decode what it encoded", name()));
+    throw std::runtime_error(fmt::format("{} decodes to a different state", name()));
 }
 
 }  // namespace clothstream::bench

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Our codecs as they are measured.
+// Codecs 2 and 3 as FrameCodec.
 #pragma once
 
 #include <memory>
@@ -13,7 +13,7 @@ namespace clothstream::bench {
 
 class OurCodec final : public FrameCodec {
  public:
-  // `workers`, if any, outlive it.
+  // `workers`, if any, must outlive it.
   explicit OurCodec(const codec::StreamLayout& layout, codec::Workers* workers = nullptr);
 
   std::string name() const override;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// advance_mass_spring with the device's own arithmetic: what the same bits everywhere cost is measured
-// against it.
+// advance_mass_spring with the device's own arithmetic. The difference is the cost of identical bits on all
+// devices.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 

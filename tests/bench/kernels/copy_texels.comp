@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Copies texels, as the simulation reads and writes its state: the floor of its speed.
+// Copies texels in the way that the simulation reads and writes its state: a lower bound for its time.
 #version 450
 
 layout(local_size_x_id = 0) in;

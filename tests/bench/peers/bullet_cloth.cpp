@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A square sheet hung by two corners in Bullet.
+// A square sheet in Bullet, hung by two corners.
 #include "tests/bench/peers/bullet_cloth.h"
 
 #include <cmath>
@@ -19,7 +19,7 @@ struct BulletCloth::World {
   btDbvtBroadphase broadphase;
   btSequentialImpulseConstraintSolver solver;
   btSoftRigidDynamicsWorld dynamics{&dispatcher, &broadphase, &solver, &configuration};
-  btSoftBody* sheet = nullptr;  // the world's
+  btSoftBody* sheet = nullptr;  // owned by the world
 };
 
 BulletCloth::BulletCloth(std::uint32_t size, int positionIterations)

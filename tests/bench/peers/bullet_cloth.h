@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A square sheet hung by two corners in Bullet.
+// A square sheet in Bullet, hung by two corners.
 #pragma once
 
 #include <cstdint>
@@ -9,7 +9,7 @@ namespace clothstream::bench {
 
 class BulletCloth {
  public:
-  // size x size nodes on 1 m, 1 kg, structural and diagonal links and bend links over two edges.
+  // size x size nodes on 1 m, 1 kg, with structural and diagonal links and bend links over two edges.
   BulletCloth(std::uint32_t size, int positionIterations);
   ~BulletCloth();
 

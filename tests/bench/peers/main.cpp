@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// clothstream-bench-peers: ClothStream beside Debian's libraries for the same job, by turns in one run.
+// clothstream-bench-peers: ClothStream compared with Debian's libraries for the same job, alternating in one
+// run.
 #include <array>
 #include <cstdio>
 #include <exception>
@@ -13,11 +14,11 @@
 
 int main(int argc, char** argv) {
   using namespace clothstream;
-  CLI::App app{"Measures ClothStream beside Debian's libraries for the same job, by turns in one run."};
+  CLI::App app{"Compares ClothStream with Debian's libraries for the same job, alternating in one run."};
   app.require_subcommand(1);
   bool json = false;
   vulkan::DeviceOptions options;
-  app.add_flag("--json", json, "Print one JSON array of rows");
+  app.add_flag("--json", json, "Print the rows as one JSON array");
   app.add_option("--device", options.select, "Index or part of the name of the Vulkan device");
   CLI::App* massSpring =
       app.add_subcommand("mass_spring", "A frame of 1/60 s of a hung sheet: Bullet's soft body, and ours");
@@ -28,11 +29,11 @@ int main(int argc, char** argv) {
   CLI::App* curves = app.add_subcommand("codec_curves", "Bits against errors of the same, as pictures too");
   for (CLI::App* one : {codec, curves}) {
     bench::addMotionOptions(*one, settings);
-    one->add_option("--size", size, "Rows and columns of the grid, instead of 100")
+    one->add_option("--size", size, "Rows and columns of the grid (default: 100)")
         ->check(CLI::Range(2, 4096));
-    one->add_flag("--json", json, "Print one JSON array of rows");
+    one->add_flag("--json", json, "Print the rows as one JSON array");
   }
-  curves->add_option("--pictures", settings.pictures, "Directory that pictures go to")
+  curves->add_option("--pictures", settings.pictures, "Directory of the pictures")
       ->check(CLI::ExistingDirectory)
       ->capture_default_str();
   CLI11_PARSE(app, argc, argv);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A frame of a hung sheet: Bullet's soft body beside our mass-spring pipeline, with the strain each leaves.
+// A frame of a hung sheet: Bullet's soft body compared with our mass-spring pipeline, with the strain of
+// each.
 #include <cmath>
 #include <stdexcept>
 
@@ -16,7 +17,7 @@ namespace {
 constexpr std::uint32_t kFrames = 180;  // 3 s
 constexpr std::uint32_t kRate = 60;
 
-// The stiffest sheet that this many substeps carry: twelve equal springs a node.
+// The stiffest sheet that this many substeps allow, with twelve equal springs a node.
 model::Scene sheet(std::uint32_t size, std::uint32_t substeps) {
   model::Cloth cloth;
   cloth.name = "sheet";
@@ -76,7 +77,7 @@ nlohmann::ordered_json rowOf(const char* who, std::uint32_t size, const std::str
 
 Rows compareMassSpring(const vulkan::DeviceOptions& options) {
   Rows rows;
-  // Bullet's search for bend springs takes the square of the nodes: 256 x 256 is beyond it.
+  // Bullet's search for bend springs takes quadratic time in the nodes, too long for 256 x 256.
   for (const std::uint32_t size : {32u, 64u, 128u}) {
     constexpr int kIterations = 10;
     vulkan::Device device(simulation::suitedTo(size * size, options));

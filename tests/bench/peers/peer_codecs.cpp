@@ -39,7 +39,8 @@ class Lattice {
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const long place = std::lround(double{position[axis]} / double{step_}) + kMiddle;
       if (place < 0 || place >= 2 * kMiddle)
-        throw std::runtime_error(fmt::format("a coordinate of {} m is beyond the lattice", position[axis]));
+        throw std::runtime_error(
+            fmt::format("a coordinate of {} m is outside of the lattice", position[axis]));
       point[axis] = static_cast<std::uint16_t>(place);
     }
     return point;
@@ -69,14 +70,14 @@ class Zstd {
     packet_.resize(ZSTD_compressBound(plain.size()));
     const std::size_t bytes = ZSTD_compressCCtx(compressor_.get(), packet_.data(), packet_.size(),
                                                 plain.data(), plain.size(), kLevel);
-    if (ZSTD_isError(bytes) != 0) throw std::runtime_error("zstd does not compress");
+    if (ZSTD_isError(bytes) != 0) throw std::runtime_error("zstd cannot compress");
     return std::span(packet_).first(bytes);
   }
   std::span<const std::byte> decompress(std::span<const std::byte> packet) {
     plain_.resize(ZSTD_getFrameContentSize(packet.data(), packet.size()));
     const std::size_t bytes =
         ZSTD_decompressDCtx(decompressor_.get(), plain_.data(), plain_.size(), packet.data(), packet.size());
-    if (bytes != plain_.size()) throw std::runtime_error("zstd does not decompress");
+    if (bytes != plain_.size()) throw std::runtime_error("zstd cannot decompress");
     return plain_;
   }
 
@@ -166,7 +167,7 @@ class DracoMesh final : public FrameCodec {
     encoder.SetAttributeExplicitQuantization(draco::GeometryAttribute::POSITION, kLatticeBits, 3, origins,
                                              step * static_cast<float>((1 << kLatticeBits) - 1));
     buffer_.Clear();
-    if (!encoder.EncodeMeshToBuffer(mesh_, &buffer_).ok()) throw std::runtime_error("Draco does not encode");
+    if (!encoder.EncodeMeshToBuffer(mesh_, &buffer_).ok()) throw std::runtime_error("Draco cannot encode");
   }
 
   static std::unique_ptr<draco::Mesh> decodeMesh(std::span<const std::byte> packet) {
@@ -174,11 +175,12 @@ class DracoMesh final : public FrameCodec {
     buffer.Init(reinterpret_cast<const char*>(packet.data()), packet.size());
     draco::Decoder decoder;
     auto mesh = decoder.DecodeMeshFromBuffer(&buffer);
-    if (!mesh.ok()) throw std::runtime_error("Draco does not decode");
+    if (!mesh.ok()) throw std::runtime_error("Draco cannot decode");
     return std::move(mesh).value();
   }
 
-  // Its order follows from the triangles alone: a frame whose positions are the vertices' numbers tells it.
+  // Draco's order follows from the triangles alone. A frame whose positions are the vertices' numbers reveals
+  // it.
   void learnOrder() {
     constexpr std::uint32_t kRow = 1 << 12;
     std::vector<float> places;
@@ -203,14 +205,14 @@ class DracoMesh final : public FrameCodec {
   draco::Mesh mesh_;
   int positionId_ = 0;
   draco::EncoderBuffer buffer_;
-  std::vector<std::uint32_t> numbers_;  // of our vertices, in Draco's order
+  std::vector<std::uint32_t> numbers_;  // our vertex numbers in Draco's order
   std::vector<float> positions_;
 };
 
-// Each frame alone, or its differences to the one before.
+// Each frame alone, or its differences from the previous one.
 enum class Prediction : std::uint8_t { intra, inter };
 
-// Vertex codec version 0, zstd behind it.
+// Vertex codec version 0, followed by zstd.
 class Meshoptimizer final : public FrameCodec {
  public:
   Meshoptimizer(std::uint32_t vertices, double maxError, Prediction prediction)
@@ -246,7 +248,7 @@ class Meshoptimizer final : public FrameCodec {
     const std::span<const std::byte> plain = zstd_.decompress(packet);
     if (meshopt_decodeVertexBuffer(sent_.data(), sent_.size(), sizeof(Vertex),
                                    reinterpret_cast<const unsigned char*>(plain.data()), plain.size()) != 0)
-      throw std::runtime_error("meshoptimizer does not decode");
+      throw std::runtime_error("meshoptimizer cannot decode");
     for (std::size_t i = 0; i < sent_.size(); ++i) {
       for (std::size_t axis = 0; axis < 3; ++axis)
         decoded_[i][axis] = prediction_ == Prediction::intra
@@ -258,7 +260,7 @@ class Meshoptimizer final : public FrameCodec {
   }
 
  private:
-  using Vertex = std::array<std::uint16_t, 4>;  // the codec wants multiples of four bytes
+  using Vertex = std::array<std::uint16_t, 4>;  // the codec requires multiples of four bytes
   Lattice lattice_;
   double maxError_;
   Prediction prediction_;
@@ -269,7 +271,7 @@ class Meshoptimizer final : public FrameCodec {
   Zstd zstd_;
 };
 
-// Differences to the frame before, low bytes and high bytes of each axis in planes of their own.
+// Differences from the previous frame; low and high bytes of each axis are in separate planes.
 class ZstdPlanes final : public FrameCodec {
  public:
   ZstdPlanes(std::uint32_t vertices, double maxError)

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Other libraries' codecs for the positions of a frame, at the same largest error.
+// Codecs of other libraries for the positions of a frame, at the same max error.
 #pragma once
 
 #include <memory>
@@ -10,15 +10,15 @@
 
 namespace clothstream::bench {
 
-// Of the lattice that all but raw floats round to: its step is twice the max error, and it reaches 32,768
-// steps from the origin each way; whatever lies beyond ends the measurement.
+// Bits of the lattice that all but raw floats round to. Its step is twice the max error, and it reaches
+// 32,768 steps from the origin each way. Vertices beyond it end the measurement.
 inline constexpr int kLatticeBits = 16;
 
-// Each knows the cloth beforehand, as ours do, but for Draco, which sends the triangles with each frame and
-// the vertices in an order of its own.
+// Each knows the cloth beforehand, as ours do. The exception is Draco, which sends the triangles with each
+// frame and has a different order of vertices.
 std::vector<std::unique_ptr<FrameCodec>> peerCodecs(const codec::ClothLayout& cloth, double maxError);
 
-// 12 bytes a vertex; nothing is lost, whatever the max error.
+// 12 bytes a vertex, lossless.
 std::unique_ptr<FrameCodec> rawFloats();
 
 }  // namespace clothstream::bench

@@ -18,8 +18,8 @@ constexpr int kWidth = 330, kHeight = 300, kLeft = 52, kBottom = 44, kTop = 28, 
               kLegendRow = 18;
 constexpr std::array kColours{"#1b6ca8", "#3aa6d0", "#7a4fa3", "#d1495b", "#2e8b57", "#c98a1b", "#666666"};
 
-// Where a value lies between pixels, and where lines stand about all values: at whole decades, or, where
-// there are few of them, at 1, 2 and 5 of each.
+// An axis between two pixels, with grid lines that enclose all values: at whole decades or, if there are few,
+// at 1, 2 and 5 of each.
 struct Axis {
   double least = std::numeric_limits<double>::max(), most = 0;
   double from = 0, to = 0;

@@ -19,10 +19,11 @@ struct LogPlot {
   std::vector<Curve> curves;
 };
 
-// Side by side; all have the first one's names of curves, which stand below.
+// Draws the plots side by side. All have the same curves; the legend below shows the names of the first
+// plot's.
 std::string svgOf(std::span<const LogPlot> plots);
 
-// Throws std::runtime_error where it cannot be written.
+// Throws std::runtime_error if the file cannot be written.
 void writeSvg(std::span<const LogPlot> plots, const std::filesystem::path& file);
 
 }  // namespace clothstream::bench

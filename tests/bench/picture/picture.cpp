@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Pixels, and files of them.
+// Pictures as pixels, and as PNG files.
 #include "tests/bench/picture/picture.h"
 
 #include <algorithm>
@@ -16,7 +16,7 @@ constexpr std::size_t kChannels = 3;
 
 }  // namespace
 
-Picture besideEachOther(std::span<const Picture> pictures) {
+Picture sideBySide(std::span<const Picture> pictures) {
   Picture all;
   for (const Picture& one : pictures) {
     assert(all.height == 0 || all.height == one.height);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Pixels, and files of them.
+// Pictures as pixels, and as PNG files.
 #pragma once
 
 #include <cstdint>
@@ -9,16 +9,16 @@
 
 namespace clothstream::bench {
 
-// Row by row from the upper left corner; red, green, blue a pixel.
+// Pixels row by row from the upper left corner: red, green, blue.
 struct Picture {
   std::uint32_t width = 0, height = 0;
   std::vector<std::uint8_t> pixels;
 };
 
-// Pictures of one height, from left to right.
-Picture besideEachOther(std::span<const Picture> pictures);
+// Joins pictures of the same height from left to right.
+Picture sideBySide(std::span<const Picture> pictures);
 
-// Throws std::runtime_error where it cannot be written.
+// Throws std::runtime_error if the file cannot be written.
 void writePng(const Picture& picture, const std::filesystem::path& file);
 
 }  // namespace clothstream::bench

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// librsvg draws on a surface of cairo's.
+// Rasterises with librsvg on a cairo surface.
 #include "tests/bench/picture/rasterise.h"
 
 #include <cmath>
@@ -22,7 +22,7 @@ void writePng(const std::string& svg, const std::filesystem::path& file) {
       &g_object_unref);
   double width = 0, height = 0;
   if (!drawing || rsvg_handle_get_intrinsic_size_in_pixels(drawing.get(), &width, &height) == 0)
-    throw std::runtime_error(fmt::format("{}: it is no drawing with a size", file.string()));
+    throw std::runtime_error(fmt::format("{}: not a drawing with a size", file.string()));
   const RsvgRectangle page{0, 0, kPixelsPerUnit * width, kPixelsPerUnit * height};
   const std::unique_ptr<cairo_surface_t, decltype(&cairo_surface_destroy)> surface(
       cairo_image_surface_create(CAIRO_FORMAT_RGB24, static_cast<int>(std::ceil(page.width)),

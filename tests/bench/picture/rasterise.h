@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Drawings to pixels.
+// Rasterises drawings.
 #pragma once
 
 #include <filesystem>
@@ -7,8 +7,8 @@
 
 namespace clothstream::bench {
 
-// An SVG text as a PNG file, two pixels a unit. Throws std::runtime_error where it is no drawing or cannot be
-// written.
+// Writes an SVG text as a PNG file with two pixels a unit. Throws std::runtime_error if the text is no
+// drawing or the file cannot be written.
 void writePng(const std::string& svg, const std::filesystem::path& file);
 
 }  // namespace clothstream::bench

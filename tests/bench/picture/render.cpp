@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Triangles to pixels on the CPU: first which triangle each sample sees, then its light.
+// Renders triangles on the CPU: first the visible triangle of each sample, then its light.
 #include "tests/bench/picture/render.h"
 
 #include <Eigen/Geometry>
@@ -13,22 +13,22 @@ namespace {
 
 using model::Vec3;
 
-constexpr std::uint32_t kSamples = 3;  // a pixel, each way
+constexpr std::uint32_t kSamples = 3;  // samples a pixel along each axis
 constexpr int kShadowSize = 2048;
 constexpr float kShadowReach = 12, kShadowBias = 0.06f;  // m
 constexpr float kFar = std::numeric_limits<float>::max();
 
-const Vec3 kLamp = Vec3(0.45f, 0.8f, 0.4f).normalized();  // towards it
+const Vec3 kLamp = Vec3(0.45f, 0.8f, 0.4f).normalized();  // direction towards the lamp
 const Vec3 kSky(0.93f, 0.95f, 0.97f);
 const Vec3 kFloor(0.78f, 0.79f, 0.80f);
 
-// Where a point lies in a raster: x to the right, y down, in samples; how far it is; and by what its weight
-// in a triangle shrinks with its distance.
+// A point in a raster: x to the right and y down in samples, its depth, and the factor by which perspective
+// reduces its weight.
 struct Projected {
   float x, y, depth, nearness;
 };
 
-// Across, up and forward of whoever looks, or of the lamp.
+// Directions right, up and forward of the viewer or of the lamp.
 struct Frame {
   Vec3 origin, right, up, forward;
 
@@ -42,7 +42,7 @@ struct Frame {
   }
 };
 
-// What a sample sees: of which triangle, and the weights of its corners.
+// Visible triangle of a sample, and the weights of its corners.
 struct Seen {
   float depth = kFar;
   std::uint32_t surface = 0, triangle = 0;
@@ -78,7 +78,7 @@ class Raster {
 
   void drawTriangle(const Projected& a, const Projected& b, const Projected& c, std::uint32_t surface,
                     std::uint32_t triangle) {
-    // Behind the eye, or of a cloth that blew up.
+    // Behind the eye, or part of a cloth that blew up.
     for (const Projected& corner : {a, b, c})
       if (!(corner.depth > 0 && std::abs(corner.x) < 1e6f && std::abs(corner.y) < 1e6f)) return;
     const auto twice = [](const Projected& p, const Projected& q, float x, float y) {
@@ -117,7 +117,7 @@ std::vector<Vec3> normalsOf(const Surface& surface) {
   return normals;
 }
 
-// What the lamp reaches first, seen from it without perspective.
+// Depth map of the lamp, without perspective.
 class Shadows {
  public:
   Shadows(std::span<const Surface> surfaces, const Vec3& target)
@@ -125,7 +125,7 @@ class Shadows {
     raster_.draw(surfaces, [&](const Vec3& point) { return project(point); });
   }
 
-  // 0 to 1, over the nine samples about the point.
+  // Part of the nine samples around the point that are lit, 0 to 1.
   float light(const Vec3& point) const {
     const Projected at = project(point);
     int lit = 0;
@@ -150,7 +150,7 @@ class Shadows {
   Raster raster_;
 };
 
-// Darker near a whole number of either coordinate.
+// Darkens near a whole number of either coordinate.
 float lined(const Eigen::Vector2f& at) {
   const Eigen::Array2f away = (at.array() - at.array().round()).abs();
   return away.minCoeff() < 0.06f ? 0.72f : 1.0f;
@@ -191,7 +191,7 @@ Vec3 floorColour(const Vec3& eye, const Vec3& ray, const Vec3& target, const Sha
   return (1 - fade) * colour + fade * kSky;
 }
 
-// 0 to 1 to a byte as screens want it, in 64 steps: smooth to the eye and small in a file.
+// From 0 to 1 to a gamma-corrected byte in 64 steps: smooth to the eye, and small in a file.
 std::uint8_t toByte(float light) {
   const float bright = std::pow(std::clamp(light, 0.0f, 1.0f), 1 / 2.2f);
   return static_cast<std::uint8_t>(std::lround(bright * 63) * 255 / 63);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Triangles to pixels on the CPU: depth, one lamp with shadows, a floor at y = 0.
+// Renders triangles on the CPU, with depth, one lamp with shadows, and a floor at y = 0.
 #pragma once
 
 #include <cstdint>
@@ -14,16 +14,16 @@ namespace clothstream::bench {
 
 struct View {
   model::Vec3 eye, target;
-  float height;               // m that the picture shows at the target
+  float height;               // metres that the picture shows at the target
   std::uint32_t width, rows;  // pixels
 };
 
-// Smooth, both sides drawn.
+// A smooth surface of which both sides are drawn.
 struct Surface {
   std::vector<model::Vec3> positions;
   std::vector<model::Triangle> triangles;
-  model::Vec3 front, back;  // colours, 0 to 1; front where triangles are counter-clockwise
-  // One (u, v) a position; where there are any, a thin line is drawn at every whole number.
+  model::Vec3 front, back;  // colours, 0 to 1; the front is where triangles are counter-clockwise
+  // One (u, v) for each position, or empty. A thin line is drawn at every whole number.
   std::vector<Eigen::Vector2f> lines;
 };
 

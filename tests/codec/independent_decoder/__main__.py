@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""A decoder written from proto/FRAME_FORMAT.md alone: decodes the golden packets and compares the reconstruction hashes.
+"""A decoder written from proto/FRAME_FORMAT.md alone. It decodes the golden packets and compares what they must give.
 
-Run from the project's root. It is slow, simple, and checks little of what it reads.
+Run it from the project's root. It is slow and simple, and checks little of what it reads.
 """
 import json
+import struct
 import sys
 
 from decoder import Decoder, parse
@@ -11,17 +12,40 @@ from decoder import Decoder, parse
 GOLDEN = "tests/golden/"
 
 
+def fnv(floats):
+    """FNV-1a (64 bits) of little-endian float32 numbers, in hexadecimal."""
+    value = 0xcbf29ce484222325
+    for byte in struct.pack("<%df" % len(floats), *floats):
+        value = (value ^ byte) * 0x100000001b3 & 0xffffffffffffffff
+    return "%016x" % value
+
+
+def expect(what, packet, found, expected):
+    if found != expected:
+        sys.exit("%s: %s is %s instead of %s" % (packet["file"], what, found, expected))
+
+
 def main():
-    packets = 0
+    packets = normals = 0
     for stream in json.load(open(GOLDEN + "streams.json")):
-        decoder = Decoder(stream)
+        decoder, coarse = Decoder(stream), Decoder(stream, coarse=True)
         for packet in stream["packets"]:
-            decoder.decode(parse(open(GOLDEN + packet["file"], "rb").read()))
-            if decoder.hash() != packet["reconstructionHash"]:
-                sys.exit("%s: %s, not %s" % (packet["file"], decoder.hash(), packet["reconstructionHash"]))
+            parsed = parse(open(GOLDEN + packet["file"], "rb").read())
+            decoder.decode(parsed)
+            coarse.decode(parsed)
+            expect("the reconstruction hash", packet, decoder.hash(), packet["reconstructionHash"])
+            expect("the hash of the positions", packet, fnv(decoder.metres()), packet["positionsHash"])
+            expect("the hash of the coarse positions", packet, fnv(coarse.metres()), packet["coarsePositionsHash"])
             packets += 1
-    assert packets > 0
-    print("%d packets are decoded alike" % packets)
+        decoded = decoder.normals()
+        for sample in stream["normalSamples"]:
+            normal = decoded[sample["vertex"]]
+            if max(abs(x - y) for x, y in zip(normal, sample["normal"])) > 2e-6:
+                sys.exit("%s: the normal of vertex %d is %s instead of %s" % (
+                    stream["name"], sample["vertex"], normal, sample["normal"]))
+            normals += 1
+    assert packets > 0 and normals > 0
+    print("%d packets give the expected positions, whole and coarse, and %d normals" % (packets, normals))
 
 
 if __name__ == "__main__":

@@ -1,26 +1,43 @@
 # SPDX-License-Identifier: MIT
-"""Packets to lattice positions and normals."""
+"""Packets to integer positions, metres and normals."""
+import math
+import struct
+
 from arithmetic import add, cross, dot, frame, sat, sat16, shift, sub, subs, times
 from entropy import Bits, DISTRIBUTIONS, Groups, SCALE_WEIGHTS, Symbols, unzigzag
 from order import Cloths
 
 
+def float32(x):
+    return struct.unpack("<f", struct.pack("<f", x))[0]
+
+
 class Decoder:
-    def __init__(self, stream):
+    """A decoder of whole packets or, if `coarse`, of coarse packets."""
+
+    def __init__(self, stream, coarse=False):
+        self.coarse = coarse
         self.cloths = Cloths(stream["cloths"])
         self.count = sum(cloth["vertexCount"] for cloth in stream["cloths"])
-        error = stream["maxError"] - 2.0 ** -19
-        self.k = 8
-        while self.k > 4 and error / (2 ** (self.k - 1) + 2) * 2 ** 27 < 40:
-            self.k -= 1
+        self.max_error, self.qualities = stream["maxError"], stream.get("qualities", 1)
         self.layers = stream.get("temporalLayers", 1)
         self.packed = stream["codec"] == 3
         self.has_normals = stream["normals"] == "octahedral"
         self.held = {}  # the newest frame of each layer, by layer
-        self.history = []  # what the frame that is decoded refers to, what that one does, and so on
+        self.history = []  # reference of the current frame, reference of that frame, and so on
+
+    def set_quality(self, quality):
+        """Chooses the step bits and the unit of a quality."""
+        assert quality < self.qualities
+        error = float32(self.max_error * 2 ** quality) - 2.0 ** -19
+        unit = lambda k: error / (2 ** (k - 1) + 2)
+        self.k = 8
+        while self.k > 4 and unit(self.k) * 2 ** 27 < 40:
+            self.k -= 1
+        self.unit = float32(unit(self.k))
 
     def read_weights(self, section, key, layer):
-        """The weights that the frame uses; those that it leaves, by layer."""
+        """The weights that the frame uses, and by layer the weights that it leaves."""
         alone = lambda f, w: [[w if i == f and c < 6 else 0 for i in range(16)] for c in range(7)]
         if key:
             left = [alone(7, -192)] * 3
@@ -42,14 +59,18 @@ class Decoder:
         return used, [alone(2, 700)] * 3 if key else left
 
     def decode(self, packet):
-        key, layer, tick, reference, sections = packet
+        key, layer, tick, reference, sections, quality = packet
+        if self.coarse:
+            emptied = (2,) if self.packed else (2, 4)
+            sections = [b"" if i in emptied else section for i, section in enumerate(sections)]
         self.history = []
         if key:
             self.held = {}
         else:
             at = next(frame for frame in self.held.values() if frame["tick"] == reference)
-            assert at["layer"] <= layer < self.layers
+            assert at["layer"] <= layer < self.layers and at["quality"] == quality
             self.history = [at, at["history"][0], at["history"][1]]
+        self.set_quality(quality)
         weights, left = self.read_weights(sections[0], key, layer)
         if self.packed:
             symbols, bits = self.read_packed(sections), Bits(b"")
@@ -60,6 +81,8 @@ class Decoder:
         for number, (weight_class, phase) in enumerate(self.cloths.phases):
             if number == self.cloths.coarse_phases:
                 self.check_coarse(sections, symbols, bits)
+                if self.coarse:
+                    break
             quiet = not self.packed and bits.get(1)
             for start in range(0, len(phase), 64):
                 group = phase[start:start + 64]
@@ -69,25 +92,34 @@ class Decoder:
                     self.place(now, v, predicted[i], residuals[i], stays[i])
         if len(self.cloths.phases) == self.cloths.coarse_phases:
             self.check_coarse(sections, symbols, bits)
-        now["normals"] = self.read_normals(now, symbols, bits) if self.has_normals else None
-        if not self.packed:
+        has_normals = self.has_normals and not self.coarse
+        now["normals"] = self.read_normals(now, symbols, bits) if has_normals else None
+        if not self.packed and not self.coarse:
             symbols.check_end()
             bits.check_end()
-        now["C"] = []
-        for v in range(self.count):
-            around = add(*(now["R"][n] for n in self.cloths.nearest[v]))
-            now["C"].append(sat(shift(sub(around, times(now["R"][v], 4)), self.k - 4)))
-        now.update(tick=tick, layer=layer, weights=left)
+        phases = self.cloths.phases
+        decoded = phases[:self.cloths.coarse_phases] if self.coarse else phases
+        now["C"] = [None] * self.count
+        for _, phase in decoded:
+            for v in phase:
+                around = add(*(now["R"][n] for n in self.cloths.nearest[v]))
+                now["C"][v] = sat(shift(sub(around, times(now["R"][v], 4)), self.k - 4))
+        for _, phase in phases[len(decoded):]:
+            for v in phase:
+                now["R"][v] = self.guess(now, v)
+        now.update(tick=tick, layer=layer, weights=left, quality=quality)
         now["history"] = self.history[:2] or [now, now]
         self.newest = self.held[layer] = now
 
     def read_packed(self, sections):
-        """Residuals of all vertices along u, v, n, None for n where it stays; those of normals behind."""
+        """The residuals of all vertices along u, v, n (None for n if the vertex stays), and those of the normals."""
         order = [v for _, phase in self.cloths.phases for v in phase]
         coarse = sum(len(phase) for _, phase in self.cloths.phases[:self.cloths.coarse_phases])
         first, second = Groups(sections[1]), Groups(sections[2])
-        residuals = first.read(coarse, 3) + second.read(self.count - coarse, 3)
-        normals = second.read(self.count, 2) if self.has_normals else []
+        residuals, normals = first.read(coarse, 3), []
+        if not self.coarse:
+            residuals += second.read(self.count - coarse, 3)
+            normals = second.read(self.count, 2) if self.has_normals else []
         first.bits.check_end()
         second.bits.check_end()
         return {v: (u, w, n) for v, (n, u, w) in zip(order, residuals)}, normals
@@ -100,14 +132,14 @@ class Decoder:
     def read_normals(self, now, symbols, bits):
         sums = [(0, 0, 0)] * self.count
         for face in self.cloths.faces:
-            p = [now["R"][v] for v in face]
-            area = cross(sub(p[2], p[0]), sub(p[3], p[1])) if len(p) == 4 else cross(sub(p[1], p[0]), sub(p[2], p[0]))
+            area = area_of([now["R"][v] for v in face])
             for v in face:
                 sums[v] = add(sums[v], area)
         expected = [256, 256]
         normals = []
         for v, n in enumerate(sums):
             top = max((2, 0, 1), key=lambda c: abs(n[c]))
+            facing = top, n[top] < 0
             down = abs(n[top]).bit_length() - 15
             n = shift(n, down) if down > 0 else times(n, 1 << -down)
             octahedral = []
@@ -127,22 +159,62 @@ class Decoder:
                 r = unzigzag(number << b | bits.get(b))
                 expected[c] += 256 * min(abs(r), 31) - expected[c] >> 5
                 octahedral.append((guess + r + 128) % 256 - 128)
-            normals.append(octahedral)
+            normals.append((*octahedral, facing))
         return normals
+
+    def metres(self):
+        """The decoded positions: float32 coordinates of all vertices, one after the other."""
+        return [float32(float32(x) * self.unit) for position in self.newest["R"] for x in position]
+
+    def normals(self):
+        """Unit normals of all vertices: as sent, or from the decoded positions."""
+        return self.sent_normals() if self.has_normals else self.computed_normals()
+
+    def sent_normals(self):
+        normals = []
+        for u, v, (top, down) in self.newest["normals"]:
+            a, b = u / 127, v / 127
+            c = 1 - abs(a) - abs(b)
+            if c < 0:
+                a, b = math.copysign(1 - abs(b), a), math.copysign(1 - abs(a), b)
+            length = math.sqrt(a * a + b * b + c * c)
+            normal = [0.0] * 3
+            normal[(top + 1) % 3], normal[(top + 2) % 3] = a / length, b / length
+            normal[top] = (-c if down else c) / length
+            normals.append(normal)
+        return normals
+
+    def computed_normals(self):
+        metres = self.metres()
+        sums = [(0, 0, 0)] * self.count
+        for face in self.cloths.faces:
+            area = area_of([metres[3 * v:3 * v + 3] for v in face])
+            for v in face:
+                sums[v] = add(sums[v], area)
+        lengths = [math.sqrt(dot(n, n)) for n in sums]
+        return [times(n, 1 / length) if length >= 1e-15 else (0, 0, 1) for n, length in zip(sums, lengths)]
 
     def past(self, name, i, v):
         if not self.history:
             return (0, 0, 0)
         return self.history[i - 1][name][v]
 
-    def predict(self, now, v, w):
-        f = self.k - 4
+    def surroundings(self, now, v):
+        """The parents of a vertex, their weighted mean S, and the mean of its ring."""
         at = lambda n: (0, 0, 0) if n is None else now["R"][n]
         p = [at(n) for n in self.cloths.parents[v]]
         w1, w2, w3 = self.cloths.weights[v][1:]
         off = add(times(sub(p[1], p[0]), w1), times(sub(p[2], p[0]), w2), times(sub(p[3], p[0]), w3), (32, 32, 32))
-        s = add(p[0], shift(off, 6))
-        ring = shift(add(*(at(n) for n in self.cloths.ring[v]), (4, 4, 4)), 3)
+        return p, add(p[0], shift(off, 6)), shift(add(*(at(n) for n in self.cloths.ring[v]), (4, 4, 4)), 3)
+
+    def guess(self, now, v):
+        """The position of a vertex that a coarse packet does not hold."""
+        _, s, ring = self.surroundings(now, v)
+        return sub(s, shift(times(sub(ring, s), 3), 4))
+
+    def predict(self, now, v, w):
+        f = self.k - 4
+        p, s, ring = self.surroundings(now, v)
         g = sat(shift(sub(ring, s), f))
         q = sat(shift(sub(add(p[0], p[1]), add(p[2], p[3])), 2 + f))
         u, v_, n = axes = frame(sub(p[1], p[0]), sub(p[3], p[2]))
@@ -232,13 +304,21 @@ class Decoder:
                 h = mix(i + seed & mask)
                 for x in position:
                     h = mix(h ^ x & mask)
-                u, v = self.newest["normals"][i] if self.has_normals else (0, 0)
+                u, v = self.newest["normals"][i][:2] if self.has_normals else (0, 0)
                 total += mix(h ^ (u & 255 | (v & 255) << 8))
             halves.append(total & mask)
         return "%08x%08x" % tuple(halves)
 
 
+def area_of(corners):
+    """The cross product that a face adds to its corners."""
+    if len(corners) == 4:
+        return cross(sub(corners[2], corners[0]), sub(corners[3], corners[1]))
+    return cross(sub(corners[1], corners[0]), sub(corners[2], corners[0]))
+
+
 def parse(packet):
+    """Kind, layer, tick, reference, sections and quality."""
     at = 5
 
     def byte():
@@ -267,4 +347,4 @@ def parse(packet):
     for size in sizes:
         sections.append(packet[at:at + size])
         at += size
-    return packet[2] == 0, packet[4], tick, references[0] if references else None, sections
+    return packet[2] == 0, packet[4], tick, references[0] if references else None, sections, packet[3]

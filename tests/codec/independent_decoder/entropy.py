@@ -1,18 +1,20 @@
 # SPDX-License-Identifier: MIT
-"""What the sections of a packet hold: bits, symbols, residuals."""
-import re
+"""Contents of the sections of a packet: bits, symbols, residuals."""
 import struct
 
-TABLES = "proto/codec/hierarchical/residual_tables.cpp"
+FORMAT = "proto/FRAME_FORMAT.md"
 
 
 def read_tables():
-    text = open(TABLES).read()
-    rows = lambda part, n: [tuple(map(int, re.findall(r"-?\d+", row)))
-                            for row in re.findall(r"\{(-?\d+(?:, -?\d+){%d})\}" % (n - 1), part)]
-    scales, distributions = text.split("kDistributions{{")
-    weights = rows(scales, 6)
-    return [weights[3 * i:3 * i + 3] for i in range(8)], rows(distributions, 16)
+    """The table of scale weights, by scale class and component, and the table of distributions, by row."""
+    rows = [[cell.strip() for cell in line.strip(" |\n").split("|")] for line in open(FORMAT) if line.startswith("|")]
+    weights = {(int(row[0]), row[1]): tuple(map(int, row[2:]))
+               for row in rows if len(row) == 8 and row[1] in ("u", "v", "n")}
+    frequencies = {(row[0], int(row[1])): tuple(map(int, row[2:]))
+                   for row in rows if len(row) == 18 and row[1].isdigit()}
+    assert len(weights) == 24 and len(frequencies) == 48 and all(sum(row) == 4096 for row in frequencies.values())
+    return ([[weights[scale_class, component] for component in "uvn"] for scale_class in range(8)],
+            [frequencies[component, scale] for component in ("u, v", "n") for scale in range(24)])
 
 
 SCALE_WEIGHTS, DISTRIBUTIONS = read_tables()
@@ -65,13 +67,13 @@ def unzigzag(z):
 
 
 class Groups:
-    """Of codec 3: the residuals of vertices that follow each other, in components."""
+    """Groups of codec 3: the residuals of consecutive vertices, by component."""
 
     def __init__(self, data):
         self.bits = Bits(data)
 
     def number(self, low, reserved=0):
-        """None where it stands for something else."""
+        """A number; None if it is one of the reserved ones."""
         q = 0
         while q < 15 and self.bits.get(1):
             q += 1
@@ -83,7 +85,7 @@ class Groups:
         return q << low | self.bits.get(low)
 
     def read(self, vertices, components):
-        """A list for each vertex; None in the place of one along n where the vertex stays."""
+        """A list of residuals for each vertex; the one along n is None if the vertex stays."""
         residuals = []
         for start in range(0, vertices, 2048):
             residuals += self.read_group(min(2048, vertices - start), components)

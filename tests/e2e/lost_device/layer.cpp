@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-// A Vulkan layer whose devices are lost at the first submission after a file is there: the one that
-// CLOTHSTREAM_LOSE_DEVICE names, which it removes. From then on the device says VK_ERROR_DEVICE_LOST to
-// whatever is asked of its queues and semaphores; another device is whole. Where "memory" is in the file,
-// only that submission fails, with VK_ERROR_OUT_OF_HOST_MEMORY; where "memory N", so many in a row.
+// Vulkan layer that simulates a lost device. CLOTHSTREAM_LOSE_DEVICE names a file. At the first submission
+// after the file appears, the layer removes the file and the device is lost. From then on its queues and
+// semaphores return VK_ERROR_DEVICE_LOST; other devices work. If the file contains "memory N", the next N
+// submissions fail with VK_ERROR_OUT_OF_HOST_MEMORY instead. Default N is 1.
 #include <atomic>
 #include <cstdlib>
 #include <cstring>
@@ -18,7 +18,7 @@
 
 namespace {
 
-// Of an instance or device, and of all that is made of it: the same for each.
+// Key of an instance or device; its child objects have the same key.
 void* keyOf(const void* dispatchable) {
   return *static_cast<void* const*>(dispatchable);
 }
@@ -37,17 +37,17 @@ struct Device {
   PFN_vkWaitSemaphores waitSemaphores;
   PFN_vkGetSemaphoreCounterValue counter;
   std::atomic<bool> lost{false};
-  std::atomic<int> failing{0};  // submissions, from the next on
+  std::atomic<int> failing{0};  // number of next submissions that fail
 
-  // What becomes of the next submission.
+  // Result of the next submission.
   VkResult fate() {
     const char* const name = std::getenv("CLOTHSTREAM_LOSE_DEVICE");
-    // One that appears after this is for the next submission.
+    // A file that appears after this check affects the next submission.
     if (std::ifstream file(name != nullptr ? name : ""); file && unlink(name) == 0) {
       std::string word;
       int count = 1;
       file >> word;
-      if (int said = 0; file >> said) count = said;
+      if (int given = 0; file >> given) count = given;
       if (word == "memory")
         failing = count;
       else
@@ -133,7 +133,7 @@ VKAPI_ATTR void VKAPI_CALL destroyDevice(VkDevice handle, const VkAllocationCall
     const std::lock_guard lock(mutex);
     devices.erase(keyOf(handle));
   }
-  // What was underway when it was lost is not to be pulled from under the driver.
+  // The driver may still run work that was submitted before the loss.
   device->waitIdle(handle);
   device->destroy(handle, allocator);
 }
@@ -162,14 +162,14 @@ VKAPI_ATTR VkResult VKAPI_CALL counterValue(VkDevice handle, VkSemaphore semapho
   return device->lost ? VK_ERROR_DEVICE_LOST : device->counter(handle, semaphore, value);
 }
 
-PFN_vkVoidFunction ours(const char* name) {
+PFN_vkVoidFunction intercepted(const char* name) {
   struct Named {
     const char* name;
     PFN_vkVoidFunction function;
   };
 #define CLOTHSTREAM_NAMED(name, function) \
   { name, reinterpret_cast<PFN_vkVoidFunction>(&(function)) }
-  static const Named kOurs[]{
+  static const Named kIntercepted[]{
       CLOTHSTREAM_NAMED("vkCreateInstance", createInstance),
       CLOTHSTREAM_NAMED("vkCreateDevice", createDevice),
       CLOTHSTREAM_NAMED("vkDestroyDevice", destroyDevice),
@@ -180,7 +180,7 @@ PFN_vkVoidFunction ours(const char* name) {
       CLOTHSTREAM_NAMED("vkGetSemaphoreCounterValue", counterValue),
   };
 #undef CLOTHSTREAM_NAMED
-  for (const Named& one : kOurs)
+  for (const Named& one : kIntercepted)
     if (std::strcmp(one.name, name) == 0) return one.function;
   return nullptr;
 }
@@ -188,7 +188,7 @@ PFN_vkVoidFunction ours(const char* name) {
 VKAPI_ATTR PFN_vkVoidFunction VKAPI_CALL getDeviceProcAddr(VkDevice handle, const char* name) {
   if (std::strcmp(name, "vkGetDeviceProcAddr") == 0)
     return reinterpret_cast<PFN_vkVoidFunction>(&getDeviceProcAddr);
-  if (const PFN_vkVoidFunction function = ours(name)) return function;
+  if (const PFN_vkVoidFunction function = intercepted(name)) return function;
   return deviceOf(handle)->getProcAddr(handle, name);
 }
 
@@ -197,7 +197,7 @@ VKAPI_ATTR PFN_vkVoidFunction VKAPI_CALL getInstanceProcAddr(VkInstance handle, 
     return reinterpret_cast<PFN_vkVoidFunction>(&getInstanceProcAddr);
   if (std::strcmp(name, "vkGetDeviceProcAddr") == 0)
     return reinterpret_cast<PFN_vkVoidFunction>(&getDeviceProcAddr);
-  if (const PFN_vkVoidFunction function = ours(name)) return function;
+  if (const PFN_vkVoidFunction function = intercepted(name)) return function;
   return handle == VK_NULL_HANDLE ? nullptr : instanceOf(handle).next(handle, name);
 }
 

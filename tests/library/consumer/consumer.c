@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT
- * Says which library it has; 1 if that does not work. */
+ * Prints the version of the library. Returns 1 if a function fails. */
 #include <clothstream.h>
 #include <stdio.h>
 #include <string.h>

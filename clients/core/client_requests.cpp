@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: MIT
+// Requests of the program: input, changes, roles, play-out.
+#include <algorithm>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "clients/core/client.h"
+
+namespace clothstream::client {
+
+void Client::setColliders(std::span<const cs_own_collider> colliders, std::uint64_t nowUs) {
+  poses_.colliders.assign(colliders.begin(), colliders.end());
+  sendPoses(nowUs);
+}
+
+void Client::setHand(std::uint32_t side, std::span<const float> joints, std::uint64_t nowUs) {
+  std::vector<float>& hand = side == CS_HAND_LEFT ? poses_.leftHand : poses_.rightHand;
+  hand.assign(joints.begin(), joints.end());
+  sendPoses(nowUs);
+}
+
+void Client::setGrabs(std::span<const cs_grab> grabs, std::uint64_t nowUs) {
+  poses_.grabs.assign(grabs.begin(), grabs.end());
+  sendPoses(nowUs);
+}
+
+void Client::wantContacts(bool wants, std::uint64_t nowUs) {
+  poses_.wantsContacts = wants;
+  sendPoses(nowUs);
+}
+
+void Client::move(AttachmentPose attachment, std::uint64_t nowUs) {
+  const auto known =
+      std::find_if(poses_.attachments.begin(), poses_.attachments.end(),
+                   [&](const AttachmentPose& waiting) { return waiting.name == attachment.name; });
+  if (known != poses_.attachments.end())
+    *known = std::move(attachment);
+  else
+    poses_.attachments.push_back(std::move(attachment));
+  sendPoses(nowUs);
+}
+
+bool Client::mayCollide() const {
+  return (welcomed_ ? welcome_.role : greeting_.role) != CS_ROLE_VIEWER;
+}
+
+void Client::sendPoses(std::uint64_t nowUs) {
+  posed_ = true;
+  if (state_ == CS_STATE_FAILED || !isConnected()) return;
+  const std::uint64_t serverUs = clock_.serverTimeUs(nowUs);
+  if (mayCollide()) return writeColliderPoses(outbox_.poses(), poses_, nowUs, serverUs);
+  // A viewer sends no poses, only whether it wants contact events.
+  Poses none;
+  none.wantsContacts = poses_.wantsContacts;
+  writeColliderPoses(outbox_.poses(), none, nowUs, serverUs);
+}
+
+bool Client::setPlayOut(const cs_play_out_options* options) {
+  if (options && !isAllowed(*options)) return false;
+  playOut_ = options ? std::make_unique<PlayOut>(*options) : nullptr;
+  if (playOut_ && decoder_) playOut_->begin(description_);
+  return true;
+}
+
+std::optional<cs_played> Client::play(std::uint64_t nowUs, std::uint64_t displayUs) {
+  if (!playOut_) return std::nullopt;
+  return playOut_->play(clock_.serverTimeUs(nowUs), clock_.serverTimeUs(displayUs));
+}
+
+void Client::change(const ParameterChange& change) {
+  std::string message;
+  writeParameterChange(message, ++lastRequestId_, change);
+  send(std::move(message));
+}
+
+void Client::change(const ColliderChange& change) {
+  std::string message;
+  writeColliderChange(message, ++lastRequestId_, change);
+  send(std::move(message));
+}
+
+void Client::control(const SceneControl& control) {
+  if (state_ != CS_STATE_JOINED) return;
+  std::string message;
+  writeControlScene(message, ++lastRequestId_, welcome_.scene, control);
+  send(std::move(message));
+}
+
+void Client::listScenes() {
+  std::string message;
+  writeListScenes(message, ++lastRequestId_);
+  send(std::move(message));
+}
+
+void Client::setRole(std::uint64_t participant, std::uint32_t role) {
+  std::string message;
+  writeSetRole(message, ++lastRequestId_, participant, role);
+  send(std::move(message));
+}
+
+void Client::remove(std::uint64_t participant) {
+  std::string message;
+  writeRemoveParticipant(message, ++lastRequestId_, participant);
+  send(std::move(message));
+}
+
+void Client::requestEarlyKeyFrame(std::uint64_t nowUs) {
+  if (state_ == CS_STATE_JOINED) requestKeyFrame(nowUs, true);
+}
+
+}  // namespace clothstream::client

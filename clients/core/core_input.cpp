@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: MIT
+// C interface: input of this participant, and events of grabs and contacts.
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <utility>
+
+#include "clients/core/core.h"
+#include "clients/core/core_handle.h"
+
+using namespace clothstream::client;
+
+void cs_set_colliders(cs_client* client, const float* spheres, uint32_t count, uint64_t now_us) noexcept {
+  std::array<cs_own_collider, CS_MAX_COLLIDERS> colliders{};
+  count = std::min(count, CS_MAX_COLLIDERS);
+  for (std::uint32_t i = 0; i < count; ++i) {
+    const float* sphere = spheres + 4 * i;
+    colliders[i].shape = CS_SHAPE_SPHERE;
+    std::copy(sphere, sphere + 3, colliders[i].position);
+    colliders[i].radius = sphere[3];
+  }
+  cs_set_shapes(client, colliders.data(), count, now_us);
+}
+
+void cs_set_shapes(cs_client* client, const cs_own_collider* colliders, uint32_t count,
+                   uint64_t now_us) noexcept {
+  client->client.setColliders(std::span(colliders, std::min(count, CS_MAX_COLLIDERS)), now_us);
+}
+
+int cs_set_hand(cs_client* client, uint32_t side, const float* joints, uint32_t count,
+                uint64_t now_us) noexcept {
+  if (side != CS_HAND_LEFT && side != CS_HAND_RIGHT) return 0;
+  if (count != 0 && count != CS_HAND_JOINTS && count != CS_HAND_JOINTS - 1) return 0;
+  client->client.setHand(side, std::span(joints, std::size_t{4} * count), now_us);
+  return 1;
+}
+
+void cs_set_grabs(cs_client* client, const cs_grab* grabs, uint32_t count, uint64_t now_us) noexcept {
+  client->client.setGrabs(std::span(grabs, std::min(count, CS_MAX_GRABS)), now_us);
+}
+
+void cs_move_attachment(cs_client* client, const char* attachment, const float* position3,
+                        const float* orientation4, uint64_t now_us) noexcept {
+  AttachmentPose pose{.name = attachment};
+  std::copy(position3, position3 + 3, pose.position.begin());
+  if (orientation4 != nullptr) std::copy(orientation4, orientation4 + 4, pose.orientation.begin());
+  client->client.move(std::move(pose), now_us);
+}
+
+uint32_t cs_grab_event_count(const cs_client* client) noexcept {
+  return static_cast<std::uint32_t>(client->client.grabEvents().size());
+}
+
+int cs_get_grab_event(const cs_client* client, uint32_t index, cs_grab_event* out) noexcept {
+  const cs_grab_event* event = at(client->client.grabEvents(), index);
+  if (!event) return 0;
+  *out = *event;
+  return 1;
+}
+
+void cs_want_contacts(cs_client* client, int wants, uint64_t now_us) noexcept {
+  client->client.wantContacts(wants != 0, now_us);
+}
+
+uint32_t cs_contact_event_count(const cs_client* client) noexcept {
+  return static_cast<std::uint32_t>(client->client.contactEvents().size());
+}
+
+int cs_get_contact_event(const cs_client* client, uint32_t index, cs_contact_event* out) noexcept {
+  const ContactEvent* event = at(client->client.contactEvents(), index);
+  if (!event) return 0;
+  *out = {.kind = event->kind,
+          .collider_id = event->colliderId,
+          .participant_id = event->participantId,
+          .collider = event->collider.c_str(),
+          .cloth = event->cloth.c_str(),
+          .impulse = event->impulse,
+          .seconds = event->seconds};
+  return 1;
+}

@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: MIT
+// C interface: creating a client, its connection, messages and state.
+#include <cassert>
+#include <cstdint>
+#include <string>
+
+#include "clients/core/core.h"
+#include "clients/core/core_handle.h"
+
+using namespace clothstream::client;
+
+cs_client* cs_create(const char* scene, const char* client_name) noexcept {
+  return cs_create_as(scene, client_name, "", CS_ROLE_UNSPECIFIED);
+}
+
+cs_client* cs_create_as(const char* scene, const char* client_name, const char* display_name,
+                        uint32_t role) noexcept {
+  assert(scene && client_name && display_name);
+  // NOLINTNEXTLINE(bugprone-unhandled-exception-at-new): out of memory ends the program.
+  return new cs_client{Client({.scene = scene,
+                               .clientName = client_name,
+                               .displayName = display_name,
+                               .role = role,
+                               .wanted = {},
+                               .token = {},
+                               .contentId = 0})};
+}
+
+void cs_destroy(cs_client* client) noexcept {
+  delete client;
+}
+
+void cs_want(cs_client* client, uint32_t quality, uint32_t temporal_layers) noexcept {
+  client->client.want({quality, temporal_layers});
+}
+
+void cs_set_clock(cs_client* client, uint64_t (*now_us)(void)) noexcept {
+  client->client.setClock(now_us);
+}
+
+uint32_t cs_receive(cs_client* client, const uint8_t* message, size_t bytes, uint64_t now_us) noexcept {
+  return client->client.receive(Bytes(reinterpret_cast<const char*>(message), bytes), now_us);
+}
+
+void cs_update(cs_client* client, uint64_t now_us) noexcept {
+  client->client.update(now_us);
+}
+
+const uint8_t* cs_next_outgoing(cs_client* client, size_t* bytes) noexcept {
+  const std::string* message = client->client.nextOutgoing();
+  *bytes = message ? message->size() : 0;
+  return message ? reinterpret_cast<const uint8_t*>(message->data()) : nullptr;
+}
+
+void cs_connecting(cs_client* client, uint64_t now_us) noexcept {
+  client->client.connecting(now_us);
+}
+
+void cs_disconnected(cs_client* client, uint64_t now_us) noexcept {
+  client->client.disconnected(now_us);
+}
+
+uint64_t cs_connect_at(const cs_client* client) noexcept {
+  return client->client.connectAtUs();
+}
+
+int cs_resumed(const cs_client* client) noexcept {
+  return client->client.resumed() ? 1 : 0;
+}
+
+cs_state cs_get_state(const cs_client* client) noexcept {
+  return client->client.state();
+}
+
+const char* cs_error_text(const cs_client* client) noexcept {
+  return client->client.errorText().c_str();
+}
+
+uint32_t cs_error_code(const cs_client* client) noexcept {
+  return client->client.errorCode();
+}
+
+const char* cs_notice_text(const cs_client* client) noexcept {
+  return client->client.notice().text.c_str();
+}
+
+uint64_t cs_notice_participant(const cs_client* client) noexcept {
+  return client->client.notice().participantId;
+}
+
+const char* cs_server_name(const cs_client* client) noexcept {
+  return client->client.welcome().serverName.c_str();
+}
+
+const char* cs_device_name(const cs_client* client) noexcept {
+  return client->client.welcome().deviceName.c_str();
+}
+
+const char* cs_scene_name(const cs_client* client) noexcept {
+  return client->client.welcome().scene.c_str();
+}
+
+void cs_list_scenes(cs_client* client) noexcept {
+  client->client.listScenes();
+}
+
+uint32_t cs_scene_count(const cs_client* client) noexcept {
+  return static_cast<std::uint32_t>(client->client.scenes().size());
+}
+
+const char* cs_scene(const cs_client* client, uint32_t index) noexcept {
+  const std::string* scene = at(client->client.scenes(), index);
+  return scene ? scene->c_str() : "";
+}

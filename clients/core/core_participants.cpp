@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: MIT
+// C interface: participants and their roles.
+#include <cstdint>
+
+#include "clients/core/core.h"
+#include "clients/core/core_handle.h"
+
+using namespace clothstream::client;
+
+namespace {
+
+cs_participant toC(const Participant& participant) {
+  return {.id = participant.id,
+          .name = participant.name.c_str(),
+          .client_name = participant.clientName.c_str(),
+          .role = participant.role,
+          .away = participant.away ? 1 : 0};
+}
+
+}  // namespace
+
+uint64_t cs_participant_id(const cs_client* client) noexcept {
+  return client->client.welcome().participantId;
+}
+
+uint32_t cs_get_role(const cs_client* client) noexcept {
+  return client->client.welcome().role;
+}
+
+uint32_t cs_participant_count(const cs_client* client) noexcept {
+  return static_cast<std::uint32_t>(client->client.participants().size());
+}
+
+int cs_get_participant(const cs_client* client, uint32_t index, cs_participant* out) noexcept {
+  const Participant* participant = at(client->client.participants(), index);
+  if (!participant) return 0;
+  *out = toC(*participant);
+  return 1;
+}
+
+int cs_get_presence(const cs_client* client, cs_presence* out) noexcept {
+  const Presence& presence = client->client.presence();
+  if (presence.kind == 0) return 0;
+  *out = {.kind = presence.kind,
+          .reason = presence.reason,
+          .by = presence.by,
+          .participant = toC(presence.participant)};
+  return 1;
+}
+
+void cs_set_role(cs_client* client, uint64_t participant_id, uint32_t role) noexcept {
+  client->client.setRole(participant_id, role);
+}
+
+void cs_remove_participant(cs_client* client, uint64_t participant_id) noexcept {
+  client->client.remove(participant_id);
+}

@@ -1,0 +1,213 @@
+// SPDX-License-Identifier: MIT
+// Writes the messages of session.proto that a client sends.
+#include "clients/core/wire/client_message.h"
+
+#include <algorithm>
+#include <cmath>
+#include <span>
+
+#include <protozero/pbf_writer.hpp>
+
+#include "clients/core/core.h"
+#include "proto/codec/stream_layout.h"
+
+namespace clothstream::client {
+namespace {
+
+using Writer = protozero::pbf_writer;
+
+// The kind of a solver is the number of its field in Solver.kind.
+static_assert(CS_SOLVER_MASS_SPRING == field::Solver::kMassSpring.number &&
+              CS_SOLVER_CONSTRAINT == field::Solver::kConstraint.number &&
+              CS_SOLVER_ACAD == field::Solver::kAcad.number &&
+              CS_SOLVER_XPBD == field::Solver::kXpbd.number &&
+              CS_SOLVER_IMPLICIT_EULER == field::Solver::kImplicitEuler.number);
+
+template <typename Fill>
+void writeMessage(std::string& out, std::uint64_t requestId, field::Field bodyField, Fill fill) {
+  out.clear();
+  Writer message(out);
+  if (requestId != 0) message.add_uint64(field::ClientMessage::kRequestId.number, requestId);
+  Writer body(message, bodyField.number);
+  fill(body);
+}
+
+void addVec3(Writer& parent, field::Field vec3Field, const Vec3& value) {
+  Writer vec3(parent, vec3Field.number);
+  vec3.add_float(field::Vec3::kX.number, value[0]);
+  vec3.add_float(field::Vec3::kY.number, value[1]);
+  vec3.add_float(field::Vec3::kZ.number, value[2]);
+}
+
+// Omits an orientation that is all zero. Writer itself omits nothing.
+void addPose(Writer& parent, field::Field poseField, std::span<const float, 3> position,
+             std::span<const float, 4> orientation) {
+  Writer pose(parent, poseField.number);
+  addVec3(pose, field::Pose::kPosition, {position[0], position[1], position[2]});
+  if (std::all_of(orientation.begin(), orientation.end(), [](float part) { return part == 0; })) return;
+  Writer quaternion(pose, field::Pose::kOrientation.number);
+  quaternion.add_float(field::Quaternion::kX.number, orientation[0]);
+  quaternion.add_float(field::Quaternion::kY.number, orientation[1]);
+  quaternion.add_float(field::Quaternion::kZ.number, orientation[2]);
+  quaternion.add_float(field::Quaternion::kW.number, orientation[3]);
+}
+
+void addGiven(Writer& message, field::Field floatField, float value) {
+  if (!std::isnan(value)) message.add_float(floatField.number, value);
+}
+
+void addGrab(Writer& poses, const cs_grab& grab) {
+  using F = field::Grab;
+  Writer message(poses, field::ColliderPoses::kGrabs.number);
+  message.add_uint32(F::kId.number, grab.id);
+  addPose(message, F::kPose, grab.position, grab.orientation);
+  addGiven(message, F::kRadius, grab.radius);
+  addGiven(message, F::kReach, grab.reach);
+  addGiven(message, F::kMaxForce, grab.max_force);
+  addGiven(message, F::kSlipDistance, grab.slip_distance);
+}
+
+void addHand(Writer& poses, std::uint32_t side, const std::vector<float>& joints) {
+  if (joints.empty()) return;
+  std::vector<float> positions, radii;
+  for (std::size_t i = 0; i < joints.size(); i += 4) {
+    positions.insert(positions.end(), {joints[i], joints[i + 1], joints[i + 2]});
+    radii.push_back(joints[i + 3]);
+  }
+  Writer hand(poses, field::ColliderPoses::kHands.number);
+  hand.add_uint32(field::HandJoints::kSide.number, side);
+  hand.add_packed_float(field::HandJoints::kPositions.number, positions.begin(), positions.end());
+  hand.add_packed_float(field::HandJoints::kRadii.number, radii.begin(), radii.end());
+}
+
+// Adds the shape of a ParticipantCollider. Other shapes are omitted, so the server refuses the message.
+void addShape(Writer& parent, const cs_own_collider& collider) {
+  if (collider.shape == CS_SHAPE_SPHERE) {
+    Writer sphere(parent, field::ParticipantCollider::kSphere.number);
+    sphere.add_float(field::Sphere::kRadius.number, collider.radius);
+  } else if (collider.shape == CS_SHAPE_CAPSULE) {
+    Writer capsule(parent, field::ParticipantCollider::kCapsule.number);
+    capsule.add_float(field::Capsule::kRadius.number, collider.radius);
+    capsule.add_float(field::Capsule::kLength.number, collider.length);
+  } else if (collider.shape == CS_SHAPE_BOX) {
+    Writer box(parent, field::ParticipantCollider::kBox.number);
+    addVec3(box, field::Box::kSize, {collider.size[0], collider.size[1], collider.size[2]});
+  }
+}
+
+}  // namespace
+
+void writeHello(std::string& out, std::uint64_t requestId, const Greeting& greeting) {
+  writeMessage(out, requestId, field::ClientMessage::kHello, [&](Writer& hello) {
+    using F = field::Hello;
+    hello.add_uint32(F::kProtocolVersion.number, CS_PROTOCOL_VERSION);
+    hello.add_packed_uint32(F::kCodecs.number, codec::kCodecs.begin(), codec::kCodecs.end());
+    hello.add_string(F::kScene.number, greeting.scene);
+    hello.add_string(F::kClientName.number, greeting.clientName);
+    hello.add_string(F::kDisplayName.number, greeting.displayName);
+    if (greeting.wanted.quality > 0) hello.add_uint32(F::kQuality.number, greeting.wanted.quality);
+    if (greeting.wanted.temporalLayers > 0)
+      hello.add_uint32(F::kTemporalLayer.number, greeting.wanted.temporalLayers - 1);
+    hello.add_uint32(F::kRole.number, greeting.role);
+    if (greeting.token.empty()) return;
+    hello.add_bytes(F::kResumeToken.number, greeting.token);
+    hello.add_uint64(F::kDescriptionContentId.number, greeting.contentId);
+    hello.add_uint32(F::kAttempt.number, greeting.attempt);
+  });
+}
+
+void writeColliderPoses(std::string& out, const Poses& poses, std::uint64_t clientTimeUs,
+                        std::uint64_t serverTimeUs) {
+  // The server's limit, including the bones that it builds for each hand.
+  constexpr std::size_t kMost = CS_MAX_COLLIDERS + CS_HAND_BONES;
+  const std::size_t handBones =
+      CS_HAND_BONES * ((poses.leftHand.empty() ? 0u : 1u) + (poses.rightHand.empty() ? 0u : 1u));
+  writeMessage(out, 0, field::ClientMessage::kColliderPoses, [&](Writer& message) {
+    using F = field::ColliderPoses;
+    for (std::size_t i = 0; i < std::min(poses.colliders.size(), kMost - handBones); ++i) {
+      const cs_own_collider& from = poses.colliders[i];
+      Writer collider(message, F::kColliders.number);
+      collider.add_uint32(field::ParticipantCollider::kId.number, static_cast<std::uint32_t>(i));
+      addPose(collider, field::ParticipantCollider::kPose, from.position, from.orientation);
+      addShape(collider, from);
+    }
+    message.add_uint64(F::kClientTimeUs.number, clientTimeUs);
+    for (const cs_grab& grab : poses.grabs) addGrab(message, grab);
+    for (const AttachmentPose& put : poses.attachments) {
+      Writer attachment(message, F::kAttachments.number);
+      attachment.add_string(field::AttachmentPose::kName.number, put.name.data(), put.name.size());
+      addPose(attachment, field::AttachmentPose::kPose, put.position, put.orientation);
+    }
+    if (poses.wantsContacts) message.add_bool(F::kContactEvents.number, true);
+    if (serverTimeUs != 0) message.add_uint64(F::kServerTimeUs.number, serverTimeUs);
+    addHand(message, CS_HAND_LEFT, poses.leftHand);
+    addHand(message, CS_HAND_RIGHT, poses.rightHand);
+  });
+}
+
+void writeParameterChange(std::string& out, std::uint64_t requestId, const ParameterChange& change) {
+  writeMessage(out, requestId, field::ClientMessage::kParameterChange,
+               [&](Writer& message) { writeFields(message, change); });
+}
+
+void writeColliderChange(std::string& out, std::uint64_t requestId, const ColliderChange& change) {
+  writeMessage(out, requestId, field::ClientMessage::kParameterChange, [&](Writer& parameters) {
+    using F = field::ColliderChange;
+    Writer collider(parameters, field::ParameterChange::kColliders.number);
+    collider.add_string(F::kName.number, change.name.data(), change.name.size());
+    if (change.position) addVec3(collider, F::kPosition, *change.position);
+    if (change.radius) collider.add_float(F::kRadius.number, *change.radius);
+  });
+}
+
+void writePing(std::string& out, std::uint64_t requestId, std::uint64_t clientTimeUs) {
+  writeMessage(out, requestId, field::ClientMessage::kPing,
+               [&](Writer& ping) { ping.add_uint64(field::Ping::kClientTimeUs.number, clientTimeUs); });
+}
+
+void writeFrameAck(std::string& out, std::uint64_t tick) {
+  writeMessage(out, 0, field::ClientMessage::kFrameAck,
+               [&](Writer& ack) { ack.add_uint64(field::FrameAck::kTick.number, tick); });
+}
+
+void writeKeyFrameRequest(std::string& out, std::uint32_t epoch, bool early) {
+  writeMessage(out, 0, field::ClientMessage::kKeyFrameRequest, [&](Writer& request) {
+    request.add_uint32(field::KeyFrameRequest::kEpoch.number, epoch);
+    if (early) request.add_bool(field::KeyFrameRequest::kEarly.number, true);
+  });
+}
+
+void writeSetRole(std::string& out, std::uint64_t requestId, std::uint64_t participant, std::uint32_t role) {
+  writeMessage(out, requestId, field::ClientMessage::kSetRole, [&](Writer& message) {
+    message.add_uint64(field::SetRole::kParticipantId.number, participant);
+    message.add_uint32(field::SetRole::kRole.number, role);
+  });
+}
+
+void writeRemoveParticipant(std::string& out, std::uint64_t requestId, std::uint64_t participant) {
+  writeMessage(out, requestId, field::ClientMessage::kRemoveParticipant, [&](Writer& message) {
+    message.add_uint64(field::RemoveParticipant::kParticipantId.number, participant);
+  });
+}
+
+void writeListScenes(std::string& out, std::uint64_t requestId) {
+  out.clear();
+  Writer message(out);
+  message.add_uint64(field::ClientMessage::kRequestId.number, requestId);
+  // A nested Writer omits an empty submessage, so the body is added as bytes.
+  message.add_message(field::ClientMessage::kListScenes.number, std::string());
+}
+
+void writeControlScene(std::string& out, std::uint64_t requestId, std::string_view scene,
+                       const SceneControl& control) {
+  writeMessage(out, requestId, field::ClientMessage::kControlScene, [&](Writer& request) {
+    using F = field::ControlSceneRequest;
+    request.add_bytes(F::kName.number, scene.data(), scene.size());
+    if (control.paused) request.add_bool(F::kPaused.number, *control.paused);
+    if (control.seek) request.add_double(F::kSeek.number, *control.seek);
+    if (control.speed) request.add_double(F::kSpeed.number, *control.speed);
+    if (control.loop) request.add_bool(F::kLoop.number, *control.loop);
+  });
+}
+
+}  // namespace clothstream::client

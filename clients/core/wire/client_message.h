@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: MIT
+// Serialises the messages of a client (proto/clothstream/v1/session.proto). Each function replaces the
+// content of `out` and reuses its memory. A request id of 0 is omitted.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "clients/core/core.h"
+#include "clients/core/wire/parameter_change.h"
+#include "clients/core/wire/server_message.h"
+
+namespace clothstream::client {
+
+struct ColliderChange {
+  std::string_view name;
+  const Vec3* position = nullptr;
+  const float* radius = nullptr;
+};
+
+// Content of Hello: the client and the scene that it joins.
+struct Greeting {
+  std::string scene, clientName, displayName;
+  std::uint32_t role = 0;
+  OperatingPoint wanted = {};  // upper limit
+  // Token and description of the last Welcome, for a client that returns. Empty and 0 if it has none.
+  std::string token;
+  std::uint64_t contentId = 0;
+  std::uint32_t attempt = 1;  // number of this connection
+};
+
+void writeHello(std::string& out, std::uint64_t requestId, const Greeting& greeting);
+
+struct AttachmentPose {
+  std::string name;
+  std::array<float, 3> position{};
+  std::array<float, 4> orientation{};  // x y z w; all zero means no rotation
+};
+
+// Input of this participant.
+struct Poses {
+  std::vector<cs_own_collider> colliders;  // the id of each is its index
+  std::vector<float> leftHand, rightHand;  // {x, y, z, radius} per joint; empty: none
+  std::vector<cs_grab> grabs;
+  std::vector<AttachmentPose> attachments;
+  bool wantsContacts = false;
+};
+// Both times are the same instant, on the client's and on the server's clock. serverTimeUs is 0 if unknown.
+void writeColliderPoses(std::string& out, const Poses& poses, std::uint64_t clientTimeUs,
+                        std::uint64_t serverTimeUs);
+void writeParameterChange(std::string& out, std::uint64_t requestId, const ParameterChange& change);
+void writeColliderChange(std::string& out, std::uint64_t requestId, const ColliderChange& change);
+void writePing(std::string& out, std::uint64_t requestId, std::uint64_t clientTimeUs);
+void writeFrameAck(std::string& out, std::uint64_t tick);
+// `early`: the client can decode the frames until then.
+void writeKeyFrameRequest(std::string& out, std::uint32_t epoch, bool early);
+void writeSetRole(std::string& out, std::uint64_t requestId, std::uint64_t participant, std::uint32_t role);
+void writeRemoveParticipant(std::string& out, std::uint64_t requestId, std::uint64_t participant);
+void writeListScenes(std::string& out, std::uint64_t requestId);
+// Changes the clock of a scene. Empty members keep their value.
+struct SceneControl {
+  std::optional<bool> paused{};
+  std::optional<double> seek{}, speed{};
+  std::optional<bool> loop{};
+};
+void writeControlScene(std::string& out, std::uint64_t requestId, std::string_view scene,
+                       const SceneControl& control);
+
+}  // namespace clothstream::client

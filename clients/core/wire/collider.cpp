@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: MIT
+// Reads a ColliderState, its shape and its hull.
+#include "clients/core/wire/collider.h"
+
+#include <algorithm>
+
+namespace clothstream::client {
+namespace {
+
+// Reads a Sphere or a Capsule. A Sphere is a Capsule without a length.
+bool readRound(Bytes message, Collider& collider) {
+  using F = field::Capsule;
+  static_assert(field::Sphere::kRadius.tag == F::kRadius.tag);
+  return readFields(message, [&](std::uint32_t tag, Reader& reader) {
+    if (tag == F::kRadius.tag) return setFinite(collider.radius, reader);
+    return tag == F::kLength.tag ? setFinite(collider.length, reader) : skip(reader);
+  });
+}
+
+bool readBox(Bytes message, Vec3& size) {
+  using F = field::Box;
+  return readFields(message, [&](std::uint32_t tag, Reader& reader) {
+    return tag == F::kSize.tag ? readVec3(reader.get_view(), size) : skip(reader);
+  });
+}
+
+// Appends the triangles of a face as a fan around its first corner.
+bool readFace(Bytes message, std::vector<std::uint32_t>& triangles) {
+  using F = field::Face;
+  std::vector<std::uint32_t> corners;
+  const bool read = readFields(message, [&](std::uint32_t tag, Reader& reader) {
+    if (tag == F::kVertices.tag) return readPackedVarints(reader.get_view(), kMaxHullParts, corners);
+    // A sender may leave a repeated number unpacked.
+    if (tag != varint(F::kVertices.number)) return skip(reader);
+    corners.push_back(reader.get_uint32());
+    return corners.size() <= kMaxHullParts;
+  });
+  for (std::size_t i = 2; i < corners.size(); ++i)
+    triangles.insert(triangles.end(), {corners[0], corners[i - 1], corners[i]});
+  return read;
+}
+
+}  // namespace
+
+bool readCollider(Bytes message, Collider& collider) {
+  using F = field::ColliderState;
+  collider.name.clear();
+  collider.position = {};
+  collider.orientation = {0, 0, 0, 1};
+  collider.shape = CS_SHAPE_HULL;
+  collider.radius = collider.length = 0;
+  collider.size = {};
+  collider.hull = {};
+  collider.participantId = 0;
+  return readFields(message, [&](std::uint32_t tag, Reader& reader) {
+    switch (tag) {
+      case F::kName.tag:
+        return setText(collider.name, reader);
+      case F::kPosition.tag:
+        return readVec3(reader.get_view(), collider.position);
+      case F::kOrientation.tag: {
+        if (!readFloats(reader.get_view(), collider.orientation)) return false;
+        // All zero means no rotation (scene.proto).
+        if (collider.orientation == std::array<float, 4>{}) collider.orientation[3] = 1;
+        return true;
+      }
+      case F::kParticipantId.tag:
+        return set(collider.participantId, reader.get_uint64());
+      case F::kSphere.tag:
+        return set(collider.shape, CS_SHAPE_SPHERE) && readRound(reader.get_view(), collider);
+      case F::kCapsule.tag:
+        return set(collider.shape, CS_SHAPE_CAPSULE) && readRound(reader.get_view(), collider);
+      case F::kPlane.tag:
+        reader.skip();
+        return set(collider.shape, CS_SHAPE_PLANE);
+      case F::kBox.tag:
+        return set(collider.shape, CS_SHAPE_BOX) && readBox(reader.get_view(), collider.size);
+      case F::kHull.tag:
+        return set(collider.shape, CS_SHAPE_HULL) && set(collider.hull, reader.get_view());
+      default:
+        return skip(reader);
+    }
+  });
+}
+
+std::optional<Hull> readHull(Bytes message) {
+  using F = field::ConvexHull;
+  std::size_t faces = 0;
+  std::optional<Hull> hull = readMessage<Hull>(message, [&](Hull& out, std::uint32_t tag, Reader& reader) {
+    if (tag == F::kFaces.tag) return ++faces <= kMaxHullParts && readFace(reader.get_view(), out.triangles);
+    if (tag != F::kVertices.tag) return skip(reader);
+    Vec3 vertex{};
+    if (!readVec3(reader.get_view(), vertex)) return false;
+    out.vertices.insert(out.vertices.end(), vertex.begin(), vertex.end());
+    return out.vertices.size() <= 3 * kMaxHullParts;
+  });
+  if (hull && std::any_of(hull->triangles.begin(), hull->triangles.end(),
+                          [&](std::uint32_t corner) { return corner >= hull->vertices.size() / 3; }))
+    hull.reset();
+  return hull;
+}
+
+}  // namespace clothstream::client

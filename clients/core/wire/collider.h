@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: MIT
+// Reads a collider of a description or a frame.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "clients/core/core.h"
+#include "clients/core/wire/wire.h"
+
+namespace clothstream::client {
+
+struct Collider {
+  std::string name;
+  Vec3 position{};
+  std::array<float, 4> orientation{0, 0, 0, 1};  // x y z w
+  cs_shape shape = CS_SHAPE_HULL;
+  float radius = 0, length = 0;
+  Vec3 size{};
+  Bytes hull;  // serialised ConvexHull, points into the message; empty in frames
+  std::uint64_t participantId = 0;
+};
+
+// Convex hull in the collider's own frame.
+struct Hull {
+  std::vector<float> vertices;  // 3 floats each
+  std::vector<std::uint32_t> triangles;
+};
+
+// Reuses the memory of `collider`. The functions return false or nullopt if the message is not well formed, a
+// number is not finite, or there are more elements than the protocol allows.
+[[nodiscard]] bool readCollider(Bytes message, Collider& collider);
+[[nodiscard]] std::optional<Hull> readHull(Bytes message);
+
+// Limit for the colliders of the scene and of all participants together.
+inline constexpr std::size_t kMaxSceneColliders = 4096;
+// Limit for the vertices, the faces, and the vertices of a face.
+inline constexpr std::size_t kMaxHullParts = 128;
+
+}  // namespace clothstream::client

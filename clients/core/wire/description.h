@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: MIT
+// Description of a stream: cloths, rest state, triangles, colliders and current parameters.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+#include <tl/expected.hpp>
+
+#include "clients/core/wire/collider.h"
+#include "clients/core/wire/parameter_change.h"
+#include "proto/codec/stream_layout.h"
+
+namespace clothstream::client {
+
+// Triangles with one material.
+struct Submesh {
+  std::string name;
+  std::uint32_t firstIndex = 0, indexCount = 0;  // range in Description::triangles
+};
+
+struct Cloth {
+  std::string name;
+  std::uint32_t firstVertex = 0, firstIndex = 0, indexCount = 0;
+  std::vector<float> uvs;                // 2 floats each; empty if there are none
+  std::vector<std::uint32_t> uvIndices;  // one per triangle corner; empty without uvs
+  std::vector<Submesh> submeshes;        // meshes only; they cover all triangles of the cloth
+  ClothParameters parameters;
+};
+
+struct Environment {
+  Vec3 gravity{0, -9.81f, 0};
+  Vec3 wind{};
+  float airDensity = 1.2f;
+  Gust gust;
+};
+
+struct Description {
+  std::uint32_t codec = 0;
+  std::string scene;
+  std::uint32_t simulationRate = 0, streamRate = 0;
+  codec::StreamLayout layout;  // for each cloth: vertex count, and rows and columns or triangles
+  std::vector<Cloth> cloths;
+  std::vector<Collider> colliders;
+  std::map<std::string, Hull> hulls;  // by the collider's name
+  Environment environment;
+  std::vector<std::string> materials;             // names that the server offers
+  std::vector<float> restPositions, restNormals;  // 3 floats per vertex
+  std::vector<std::uint32_t> triangles;           // 3 indices per triangle
+
+  std::uint32_t ticksPerFrame() const { return simulationRate / streamRate; }
+};
+
+// Reads a serialised StreamDescription, checks it, and adds triangles and normals. Memory grows with the
+// positions in the message, not with the counts that it states. The error names the field, its value and the
+// allowed values.
+[[nodiscard]] tl::expected<Description, std::string> readDescription(Bytes message);
+
+// Returns nullptr if the collider is not a hull of this description.
+const Hull* hullOf(const Collider& collider, const Description& description);
+
+// Applies a change to the environment and to the cloths that it names; the name "" means all cloths.
+void apply(const ParameterChange& change, Description& description);
+
+// Lists the ids of all codecs, for error messages.
+std::string decodedCodecs();
+
+}  // namespace clothstream::client

@@ -1,0 +1,301 @@
+// SPDX-License-Identifier: MIT
+// Reads, writes and applies parameter changes. The table of parameters gives the fields of a cloth's numbers.
+#include "clients/core/wire/parameter_change.h"
+
+namespace clothstream::client {
+namespace {
+
+using parameters::ClothNumbers;
+using parameters::ClothParameter;
+using parameters::Group;
+using parameters::kClothParameters;
+using parameters::WireField;
+using Writer = protozero::pbf_writer;
+
+constexpr std::size_t kMaxSolvers = 32;  // remembered solver kinds per cloth
+
+// Message that a field number belongs to: Cloth or ClothChange.
+using In = std::uint32_t WireField::*;
+
+bool readGroup(Bytes message, const Group& group, In in, ClothNumbers& numbers) {
+  if (group.isReplaced)
+    for (const ClothParameter& parameter : kClothParameters)
+      if (parameter.group == &group) numbers[parameter.number] = 0;
+  return readFields(message, [&](std::uint32_t tag, Reader& reader) {
+    for (const ClothParameter& parameter : kClothParameters)
+      if (parameter.group == &group && tag == fixed32(parameter.field.*in))
+        return setFinite(numbers[parameter.number], reader);
+    return skip(reader);
+  });
+}
+
+// Skips a field that the table does not list.
+bool readNumber(std::uint32_t tag, Reader& reader, In in, ClothNumbers& numbers) {
+  for (const ClothParameter& parameter : kClothParameters) {
+    if (parameter.group == nullptr && tag == fixed32(parameter.field.*in))
+      return setFinite(numbers[parameter.number], reader);
+    if (parameter.group != nullptr && tag == bytes(parameter.group->field.*in))
+      return readGroup(reader.get_view(), *parameter.group, in, numbers);
+  }
+  return skip(reader);
+}
+
+// The message is a Vec3Value.
+bool setVec3Value(std::optional<Vec3>& target, Reader& reader) {
+  using F = field::Vec3Value;
+  Vec3& value = target.emplace();
+  return readFields(reader.get_view(), [&](std::uint32_t tag, Reader& wrapped) {
+    return tag == F::kValue.tag ? readVec3(wrapped.get_view(), value) : skip(wrapped);
+  });
+}
+
+bool readConstraintSolver(Bytes message, Solver& solver) {
+  using F = field::ConstraintSolver;
+  return readFields(message, [&](std::uint32_t tag, Reader& reader) {
+    switch (tag) {
+      case F::kBendConstraints.tag:
+        return set(solver.bendConstraints, reader.get_bool());
+      case F::kCompliance.tag:
+        return setFinite(solver.compliance, reader);
+      case F::kIterations.tag:
+        return set(solver.iterations, reader.get_uint32());
+      case F::kTolerance.tag:
+        return setFinite(solver.tolerance, reader);
+      case F::kPath.tag:
+        return solver.path = reader.get_uint32(), true;
+      default:
+        return skip(reader);
+    }
+  });
+}
+
+bool readAcadSolver(Bytes message, Solver& solver) {
+  using F = field::AcadSolver;
+  return readFields(message, [&](std::uint32_t tag, Reader& reader) {
+    if (tag == F::kActivation.tag) return setFinite(solver.activation, reader);
+    return tag == F::kConstraint.tag ? readConstraintSolver(reader.get_view(), solver) : skip(reader);
+  });
+}
+
+bool readXpbdSolver(Bytes message, Solver& solver) {
+  using F = field::XpbdSolver;
+  return readFields(message, [&](std::uint32_t tag, Reader& reader) {
+    if (tag == F::kIterations.tag) return set(solver.iterations, reader.get_uint32());
+    return tag == F::kCompliance.tag ? setFinite(solver.compliance, reader) : skip(reader);
+  });
+}
+
+bool readImplicitEulerSolver(Bytes message, Solver& solver) {
+  using F = field::ImplicitEulerSolver;
+  return readFields(message, [&](std::uint32_t tag, Reader& reader) {
+    if (tag == F::kIterations.tag) return set(solver.iterations, reader.get_uint32());
+    return tag == F::kTolerance.tag ? setFinite(solver.tolerance, reader) : skip(reader);
+  });
+}
+
+bool readClothChange(Bytes message, ClothChange& change) {
+  using F = field::ClothChange;
+  return readFields(message, [&](std::uint32_t tag, Reader& reader) {
+    switch (tag) {
+      case F::kName.tag:
+        return setText(change.name, reader);
+      case F::kSolver.tag:
+        return readSolver(reader.get_view(), change.solver.emplace());
+      case F::kMaterial.tag:
+        return setText(change.material.emplace(), reader);
+      default:
+        return readNumber(tag, reader, &WireField::inChange, change.numbers);
+    }
+  });
+}
+
+void addVec3(Writer& parent, field::Field vec3Field, const Vec3& value) {
+  Writer vec3(parent, vec3Field.number);
+  vec3.add_float(field::Vec3::kX.number, value[0]);
+  vec3.add_float(field::Vec3::kY.number, value[1]);
+  vec3.add_float(field::Vec3::kZ.number, value[2]);
+}
+
+void addVec3Value(Writer& parent, field::Field wrapperField, const std::optional<Vec3>& value) {
+  if (!value) return;
+  Writer wrapper(parent, wrapperField.number);
+  addVec3(wrapper, field::Vec3Value::kValue, *value);
+}
+
+std::string constraintMessage(const Solver& solver) {
+  std::string settings;
+  Writer writer(settings);
+  using F = field::ConstraintSolver;
+  writer.add_bool(F::kBendConstraints.number, solver.bendConstraints);
+  if (solver.compliance) writer.add_float(F::kCompliance.number, *solver.compliance);
+  writer.add_uint32(F::kIterations.number, solver.iterations);
+  writer.add_float(F::kTolerance.number, solver.tolerance);
+  if (solver.kind == CS_SOLVER_CONSTRAINT) writer.add_uint32(F::kPath.number, solver.path);
+  return settings;
+}
+
+// The settings of a kind that this client does not know are sent back unchanged.
+std::string solverMessage(const Solver& solver) {
+  std::string settings = solver.settings;
+  if (solver.kind == CS_SOLVER_CONSTRAINT) settings = constraintMessage(solver);
+  if (solver.kind == CS_SOLVER_ACAD) {
+    settings.clear();
+    Writer writer(settings);
+    writer.add_float(field::AcadSolver::kActivation.number, solver.activation);
+    writer.add_message(field::AcadSolver::kConstraint.number, constraintMessage(solver));
+  }
+  if (solver.kind == CS_SOLVER_XPBD) {
+    settings.clear();
+    Writer writer(settings);
+    writer.add_uint32(field::XpbdSolver::kIterations.number, solver.iterations);
+    if (solver.compliance) writer.add_float(field::XpbdSolver::kCompliance.number, *solver.compliance);
+  }
+  if (solver.kind == CS_SOLVER_IMPLICIT_EULER) {
+    settings.clear();
+    Writer writer(settings);
+    writer.add_uint32(field::ImplicitEulerSolver::kIterations.number, solver.iterations);
+    writer.add_float(field::ImplicitEulerSolver::kTolerance.number, solver.tolerance);
+  }
+  std::string message;
+  Writer(message).add_message(solver.kind, settings);
+  return message;
+}
+
+// Writes a group. A group that is replaced is written in full.
+void writeGroup(Writer& cloth, const Group& group, const ClothNumbers& numbers) {
+  Writer message(cloth, group.field.inChange);
+  for (const ClothParameter& parameter : kClothParameters)
+    if (parameter.group == &group && (group.isReplaced || numbers.has(parameter.number)))
+      message.add_float(parameter.field.inChange, numbers[parameter.number]);
+}
+
+void writeCloth(Writer& cloth, const ClothChange& change) {
+  using F = field::ClothChange;
+  cloth.add_string(F::kName.number, change.name);
+  const auto writeSolver = [&] {
+    if (change.solver) cloth.add_message(F::kSolver.number, solverMessage(*change.solver));
+  };
+  // Fields are written in ascending order.
+  bool isSolverDue = true;
+  const Group* previous = nullptr;
+  for (const ClothParameter& parameter : kClothParameters) {
+    const Group* group = parameter.group;
+    if (isSolverDue && (group != nullptr ? group->field : parameter.field).inChange > F::kSolver.number) {
+      writeSolver();
+      isSolverDue = false;
+    }
+    if (group == nullptr && change.numbers.has(parameter.number))
+      cloth.add_float(parameter.field.inChange, change.numbers[parameter.number]);
+    if (group != nullptr && group != previous && change.numbers.hasAnyOf(*group))
+      writeGroup(cloth, *group, change.numbers);
+    previous = group;
+  }
+  if (isSolverDue) writeSolver();
+  if (change.material) cloth.add_string(F::kMaterial.number, *change.material);
+}
+
+}  // namespace
+
+bool readParameterChange(Bytes message, ParameterChange& change) {
+  using F = field::ParameterChange;
+  return readFields(message, [&](std::uint32_t tag, Reader& reader) {
+    switch (tag) {
+      case F::kGravity.tag:
+        return setVec3Value(change.gravity, reader);
+      case F::kWind.tag:
+        return setVec3Value(change.wind, reader);
+      case F::kAirDensity.tag:
+        return setFinite(change.airDensity, reader);
+      case F::kCloths.tag:
+        return change.cloths.size() < kMaxCloths &&
+               readClothChange(reader.get_view(), change.cloths.emplace_back());
+      case F::kGust.tag:
+        return readGust(reader.get_view(), change.gust.emplace());
+      default:
+        return skip(reader);
+    }
+  });
+}
+
+bool readGust(Bytes message, Gust& out) {
+  using F = field::Gust;
+  out = {};
+  return readFields(message, [&](std::uint32_t tag, Reader& reader) {
+    if (tag == F::kStrength.tag) return setFinite(out.strength, reader);
+    return tag == F::kSeconds.tag ? setFinite(out.seconds, reader) : skip(reader);
+  });
+}
+
+bool readClothParameters(Bytes message, std::string& name, ClothParameters& parameters) {
+  using F = field::Cloth;
+  return readFields(message, [&](std::uint32_t tag, Reader& reader) {
+    switch (tag) {
+      case F::kName.tag:
+        return setText(name, reader);
+      case F::kSolver.tag:
+        return readSolver(reader.get_view(), parameters.solver);
+      case F::kMaterial.tag:
+        return setText(parameters.material, reader);
+      default:
+        return readNumber(tag, reader, &WireField::inCloth, parameters.numbers);
+    }
+  });
+}
+
+// Keeps the number and the settings of a kind that this client does not know.
+bool readSolver(Bytes message, Solver& out) {
+  out = {};
+  return readFields(message, [&](std::uint32_t tag, Reader& reader) {
+    if (tag % 8 != static_cast<std::uint32_t>(field::WireType::kBytes)) return skip(reader);
+    const Bytes settings = reader.get_view();
+    out.kind = tag / 8;
+    out.settings.assign(settings.data(), settings.size());
+    switch (out.kind) {
+      case CS_SOLVER_CONSTRAINT:
+        return readConstraintSolver(settings, out);
+      case CS_SOLVER_ACAD:
+        return readAcadSolver(settings, out);
+      case CS_SOLVER_XPBD:
+        return readXpbdSolver(settings, out);
+      case CS_SOLVER_IMPLICIT_EULER:
+        return readImplicitEulerSolver(settings, out);
+      default:
+        return true;
+    }
+  });
+}
+
+void writeFields(Writer& message, const ParameterChange& change) {
+  using F = field::ParameterChange;
+  addVec3Value(message, F::kGravity, change.gravity);
+  addVec3Value(message, F::kWind, change.wind);
+  if (change.airDensity) message.add_float(F::kAirDensity.number, *change.airDensity);
+  if (change.gust) {
+    Writer gust(message, F::kGust.number);
+    gust.add_float(field::Gust::kStrength.number, change.gust->strength);
+    gust.add_float(field::Gust::kSeconds.number, change.gust->seconds);
+  }
+  for (const ClothChange& clothChange : change.cloths) {
+    Writer cloth(message, F::kCloths.number);
+    writeCloth(cloth, clothChange);
+  }
+}
+
+ClothNumbers ClothParameters::defaultNumbers() {
+  ClothNumbers numbers;
+  for (const ClothParameter& parameter : kClothParameters)
+    if (parameter.group == nullptr || parameter.group->isReplaced)
+      numbers[parameter.number] = parameter.initial;
+  return numbers;
+}
+
+void apply(const ClothChange& change, ClothParameters& cloth) {
+  parameters::applyNumbers(change.numbers,
+                           [&](parameters::ClothNumber number) { return &cloth.numbers[number]; });
+  cloth.material = change.material.value_or(cloth.material);
+  if (!change.solver) return;
+  cloth.solver = *change.solver;
+  if (cloth.solvers.size() < kMaxSolvers) cloth.solvers[cloth.solver.kind] = cloth.solver;
+}
+
+}  // namespace clothstream::client

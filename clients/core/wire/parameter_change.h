@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: MIT
+// Parameters of a running scene, and changes of them. Reads and writes the messages that a Scene and a
+// ParameterChange share.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <protozero/pbf_writer.hpp>
+
+#include "clients/core/core.h"
+#include "clients/core/wire/wire.h"
+#include "proto/parameters/cloth_parameters.h"
+
+namespace clothstream::client {
+
+// Values of ConstraintPath in scene.proto.
+inline constexpr std::uint32_t kMatrixFree = 1, kAssembled = 2;
+
+struct Solver {
+  std::uint32_t kind = CS_SOLVER_MASS_SPRING;  // number of the field in Solver.kind
+  bool bendConstraints = false;
+  std::uint32_t iterations = 20;
+  float tolerance = 0.001f;
+  std::optional<float> compliance;
+  float activation = 0.1f;
+  std::uint32_t path = kMatrixFree;
+  std::string settings;  // message of the kind as received
+};
+
+struct Gust {
+  float strength = 0;  // m/s
+  float seconds = 2;
+};
+
+// Current parameters of a cloth.
+struct ClothParameters {
+  std::string material;
+  parameters::ClothNumbers numbers = defaultNumbers();
+  Solver solver;
+  std::map<std::uint32_t, Solver> solvers;  // newest settings of each kind
+
+  // Defaults of scene.proto. Self-collision and tethers are NaN, because a cloth has none by default.
+  static parameters::ClothNumbers defaultNumbers();
+};
+
+struct ClothChange {
+  std::string name;  // empty: every cloth
+  parameters::ClothNumbers numbers = {};
+  std::optional<Solver> solver = {};
+  std::optional<std::string> material = {};
+};
+
+struct ParameterChange {
+  std::optional<Vec3> gravity, wind;
+  std::optional<float> airDensity;
+  std::optional<Gust> gust;
+  std::vector<ClothChange> cloths;
+  std::uint64_t participantId = 0;  // participant that made the change; 0 is the server
+};
+
+// The functions below return false if the message is not well formed or a number is not finite.
+
+// Returns false also if there are more than kMaxCloths cloths.
+[[nodiscard]] bool readParameterChange(Bytes message, ParameterChange& change);
+// Reads the parameters of a Scene's Cloth, and its name.
+[[nodiscard]] bool readClothParameters(Bytes message, std::string& name, ClothParameters& parameters);
+[[nodiscard]] bool readGust(Bytes message, Gust& out);
+[[nodiscard]] bool readSolver(Bytes message, Solver& out);
+
+// Writes the fields of a ParameterChange.
+void writeFields(protozero::pbf_writer& message, const ParameterChange& change);
+
+void apply(const ClothChange& change, ClothParameters& cloth);
+
+inline constexpr std::size_t kMaxCloths = 256;
+
+}  // namespace clothstream::client

@@ -1,0 +1,370 @@
+// SPDX-License-Identifier: MIT
+// Reads the messages of session.proto that a server sends, field by field.
+#include "clients/core/wire/server_message.h"
+
+#include <array>
+#include <cmath>
+
+#include "clients/core/wire/collider.h"
+
+namespace clothstream::client {
+namespace {
+
+// The C interface returns these values as they are on the wire.
+static_assert(CS_ROLE_VIEWER == field::Role::kViewer && CS_ROLE_PARTICIPANT == field::Role::kParticipant &&
+              CS_ROLE_OWNER == field::Role::kOwner);
+static_assert(CS_PRESENCE_JOINED == field::PresenceKind::kJoined &&
+              CS_PRESENCE_LEFT == field::PresenceKind::kLeft &&
+              CS_PRESENCE_ROLE_CHANGED == field::PresenceKind::kRoleChanged &&
+              CS_PRESENCE_DISCONNECTED == field::PresenceKind::kDisconnected &&
+              CS_PRESENCE_RETURNED == field::PresenceKind::kReturned);
+static_assert(CS_LEAVE_LEFT == field::LeaveReason::kLeft &&
+              CS_LEAVE_TIMED_OUT == field::LeaveReason::kTimedOut &&
+              CS_LEAVE_REMOVED == field::LeaveReason::kRemoved);
+static_assert(CS_GRAB_TAKEN == field::GrabEventKind::kTaken &&
+              CS_GRAB_SLIPPED == field::GrabEventKind::kSlipped &&
+              CS_GRAB_RELEASED == field::GrabEventKind::kReleased);
+static_assert(CS_CONTACT_BEGAN == field::ContactEventKind::kBegan &&
+              CS_CONTACT_ENDED == field::ContactEventKind::kEnded);
+static_assert(CS_HAND_LEFT == field::HandSide::kLeft && CS_HAND_RIGHT == field::HandSide::kRight);
+
+bool readClothReport(Bytes message, ClothReport& report) {
+  using F = field::ClothReport;
+  return readFields(message, [&](std::uint32_t tag, Reader& reader) {
+    switch (tag) {
+      case F::kStrainMax.tag:
+        return setFinite(report.strainMax, reader);
+      case F::kStrainP99.tag:
+        return setFinite(report.strainP99, reader);
+      case F::kStrainMean.tag:
+        return setFinite(report.strainMean, reader);
+      case F::kKineticEnergy.tag:
+        return setFinite(report.kineticEnergy, reader);
+      case F::kElasticEnergy.tag:
+        return setFinite(report.elasticEnergy, reader);
+      case F::kGravityEnergy.tag:
+        return setFinite(report.gravityEnergy, reader);
+      case F::kActiveConstraints.tag:
+        return set(report.activeConstraints, reader.get_uint32());
+      case F::kIterations.tag:
+        return set(report.iterations, reader.get_uint32());
+      case F::kResidual.tag:
+        return setFinite(report.residual, reader);
+      case F::kPenetration.tag:
+        return setFinite(report.penetration, reader);
+      default:
+        return skip(reader);
+    }
+  });
+}
+
+bool readParticipant(Bytes message, Participant& out) {
+  using F = field::Participant;
+  return readFields(message, [&](std::uint32_t tag, Reader& reader) {
+    switch (tag) {
+      case F::kId.tag:
+        return set(out.id, reader.get_uint64());
+      case F::kDisplayName.tag:
+        return setText(out.name, reader);
+      case F::kClientName.tag:
+        return setText(out.clientName, reader);
+      case F::kRole.tag:
+        return set(out.role, reader.get_uint32());
+      case F::kAway.tag:
+        return set(out.away, reader.get_bool());
+      default:
+        return skip(reader);
+    }
+  });
+}
+
+Body bodyOf(std::uint32_t tag) {
+  constexpr std::array kKnown{Body::welcome,  Body::chunk,      Body::frame,
+                              Body::pong,     Body::notice,     Body::parameterChanged,
+                              Body::error,    Body::tickEvents, Body::listScenes,
+                              Body::presence, Body::playback,   Body::operatingPoint};
+  for (const Body body : kKnown) {
+    if (tag == bytes(static_cast<std::uint32_t>(body))) return body;
+  }
+  return Body::none;
+}
+
+}  // namespace
+
+std::optional<ServerMessage> readServerMessage(Bytes bytes) {
+  return readMessage<ServerMessage>(bytes, [](ServerMessage& message, std::uint32_t tag, Reader& reader) {
+    const Body body = bodyOf(tag);
+    if (body == Body::none) return skip(reader);
+    message = {body, reader.get_view()};
+    return true;
+  });
+}
+
+std::optional<Welcome> readWelcome(Bytes message) {
+  using F = field::Welcome;
+  return readMessage<Welcome>(message, [](Welcome& welcome, std::uint32_t tag, Reader& reader) {
+    switch (tag) {
+      case F::kProtocolVersion.tag:
+        return set(welcome.protocolVersion, reader.get_uint32());
+      case F::kCodec.tag:
+        return set(welcome.codec, reader.get_uint32());
+      case F::kScene.tag:
+        return setText(welcome.scene, reader);
+      case F::kParticipantId.tag:
+        return set(welcome.participantId, reader.get_uint64());
+      case F::kServerName.tag:
+        return setText(welcome.serverName, reader);
+      case F::kDeviceName.tag:
+        return setText(welcome.deviceName, reader);
+      case F::kDescriptionContentId.tag:
+        return set(welcome.contentId, reader.get_uint64());
+      case F::kRole.tag:
+        return set(welcome.role, reader.get_uint32());
+      case F::kResumeToken.tag:
+        return setText(welcome.token, reader);
+      case F::kResumed.tag:
+        return set(welcome.resumed, reader.get_bool());
+      case F::kParticipants.tag:
+        return welcome.participants.size() < kMaxParticipants &&
+               readParticipant(reader.get_view(), welcome.participants.emplace_back());
+      case F::kHoldMs.tag:
+        return set(welcome.graceMs, reader.get_uint32());
+      default:
+        return skip(reader);
+    }
+  });
+}
+
+std::optional<Chunk> readChunk(Bytes message) {
+  using F = field::Chunk;
+  return readMessage<Chunk>(message, [](Chunk& chunk, std::uint32_t tag, Reader& reader) {
+    switch (tag) {
+      case F::kContentId.tag:
+        return set(chunk.contentId, reader.get_uint64());
+      case F::kKind.tag:
+        return set(chunk.kind, reader.get_uint32());
+      case F::kIndex.tag:
+        return set(chunk.index, reader.get_uint32());
+      case F::kCount.tag:
+        return set(chunk.count, reader.get_uint32());
+      case F::kTotalBytes.tag:
+        return set(chunk.totalBytes, reader.get_uint64());
+      case F::kData.tag:
+        return set(chunk.data, reader.get_view());
+      default:
+        return skip(reader);
+    }
+  });
+}
+
+bool readFrame(Bytes message, Frame& frame) {
+  using F = field::Frame;
+  frame.packet = {};
+  frame.tickTimeUs = frame.packetTimeUs = 0;
+  frame.reconstructionHash = 0;
+  frame.colliders.clear();
+  frame.report.reset();
+  return readFields(message, [&](std::uint32_t tag, Reader& reader) {
+    switch (tag) {
+      case F::kPacket.tag:
+        return set(frame.packet, reader.get_view());
+      case F::kTickTimeUs.tag:
+        return set(frame.tickTimeUs, reader.get_uint64());
+      case F::kPacketTimeUs.tag:
+        return set(frame.packetTimeUs, reader.get_uint64());
+      case F::kReconstructionHash.tag:
+        return set(frame.reconstructionHash, reader.get_fixed64());
+      case F::kColliders.tag:
+        if (frame.colliders.size() == kMaxSceneColliders) return false;
+        frame.colliders.push_back(reader.get_view());
+        return true;
+      case F::kReport.tag:
+        frame.report = reader.get_view();
+        return true;
+      default:
+        return skip(reader);
+    }
+  });
+}
+
+std::optional<Pong> readPong(Bytes message) {
+  using F = field::Pong;
+  return readMessage<Pong>(message, [](Pong& pong, std::uint32_t tag, Reader& reader) {
+    switch (tag) {
+      case F::kClientTimeUs.tag:
+        return set(pong.clientTimeUs, reader.get_uint64());
+      case F::kServerTimeUs.tag:
+        return set(pong.serverTimeUs, reader.get_uint64());
+      default:
+        return skip(reader);
+    }
+  });
+}
+
+std::optional<cs_playback> readPlayback(Bytes message) {
+  using F = field::Playback;
+  std::optional<cs_playback> playback =
+      readMessage<cs_playback>(message, [](cs_playback& out, std::uint32_t tag, Reader& reader) {
+        switch (tag) {
+          case F::kLength.tag:
+            return setFinite(out.length, reader);
+          case F::kPosition.tag:
+            return setFinite(out.position, reader);
+          case F::kSpeed.tag:
+            return setFinite(out.speed, reader);
+          case F::kLoop.tag:
+            return set(out.loop, reader.get_bool() ? 1 : 0);
+          case F::kPaused.tag:
+            return set(out.paused, reader.get_bool() ? 1 : 0);
+          default:
+            return skip(reader);
+        }
+      });
+  if (playback && !(playback->length >= 0)) playback.reset();
+  return playback;
+}
+
+std::optional<OperatingPoint> readOperatingPoint(Bytes message) {
+  using F = field::OperatingPoint;
+  return readMessage<OperatingPoint>(message, [](OperatingPoint& point, std::uint32_t tag, Reader& reader) {
+    if (tag == F::kQuality.tag) return set(point.quality, reader.get_uint32());
+    return tag == F::kTemporalLayers.tag ? set(point.temporalLayers, reader.get_uint32()) : skip(reader);
+  });
+}
+
+std::optional<Notice> readNotice(Bytes message) {
+  using F = field::Notice;
+  return readMessage<Notice>(message, [](Notice& notice, std::uint32_t tag, Reader& reader) {
+    if (tag == F::kParticipantId.tag) return set(notice.participantId, reader.get_uint64());
+    return tag == F::kText.tag ? setText(notice.text, reader) : skip(reader);
+  });
+}
+
+std::optional<Presence> readPresence(Bytes message) {
+  using F = field::Presence;
+  return readMessage<Presence>(message, [](Presence& presence, std::uint32_t tag, Reader& reader) {
+    switch (tag) {
+      case F::kKind.tag:
+        return set(presence.kind, reader.get_uint32());
+      case F::kParticipant.tag:
+        return readParticipant(reader.get_view(), presence.participant);
+      case F::kReason.tag:
+        return set(presence.reason, reader.get_uint32());
+      case F::kByParticipantId.tag:
+        return set(presence.by, reader.get_uint64());
+      default:
+        return skip(reader);
+    }
+  });
+}
+
+std::optional<ParameterChange> readParameterChanged(Bytes message) {
+  using F = field::ParameterChanged;
+  return readMessage<ParameterChange>(
+      message, [](ParameterChange& change, std::uint32_t tag, Reader& reader) {
+        if (tag == F::kParticipantId.tag) return set(change.participantId, reader.get_uint64());
+        return tag == F::kChange.tag ? readParameterChange(reader.get_view(), change) : skip(reader);
+      });
+}
+
+std::optional<ServerError> readError(Bytes message) {
+  using F = field::Error;
+  return readMessage<ServerError>(message, [](ServerError& error, std::uint32_t tag, Reader& reader) {
+    switch (tag) {
+      case F::kCode.tag:
+        return set(error.code, reader.get_uint32());
+      case F::kText.tag:
+        return setText(error.text, reader);
+      case F::kFatal.tag:
+        return set(error.fatal, reader.get_bool());
+      default:
+        return skip(reader);
+    }
+  });
+}
+
+namespace {
+
+bool readGrabEvent(Bytes message, cs_grab_event& out) {
+  using F = field::GrabEvent;
+  return readFields(message, [&](std::uint32_t tag, Reader& reader) {
+    switch (tag) {
+      case F::kParticipantId.tag:
+        return set(out.participant_id, reader.get_uint64());
+      case F::kGrabId.tag:
+        return set(out.grab_id, reader.get_uint32());
+      case F::kKind.tag:
+        return set(out.kind, reader.get_uint32());
+      case F::kVertices.tag:
+        return set(out.vertices, reader.get_uint32());
+      default:
+        return skip(reader);
+    }
+  });
+}
+
+bool readContactEvent(Bytes message, ContactEvent& out) {
+  using F = field::ContactEvent;
+  return readFields(message, [&](std::uint32_t tag, Reader& reader) {
+    switch (tag) {
+      case F::kKind.tag:
+        return set(out.kind, reader.get_uint32());
+      case F::kCollider.tag:
+        return setText(out.collider, reader);
+      case F::kParticipantId.tag:
+        return set(out.participantId, reader.get_uint64());
+      case F::kColliderId.tag:
+        return set(out.colliderId, reader.get_uint32());
+      case F::kCloth.tag:
+        return setText(out.cloth, reader);
+      case F::kImpulse.tag:
+        return setFinite(out.impulse, reader);
+      case F::kSeconds.tag:
+        return setFinite(out.seconds, reader);
+      default:
+        return skip(reader);
+    }
+  });
+}
+
+}  // namespace
+
+bool readTickEvents(Bytes message, TickEvents& events) {
+  using F = field::TickEvents;
+  events = {};
+  return readFields(message, [&](std::uint32_t tag, Reader& reader) {
+    if (tag == F::kGrabs.tag)
+      return events.grabs.size() < kMaxEvents &&
+             readGrabEvent(reader.get_view(), events.grabs.emplace_back());
+    if (tag == F::kContacts.tag)
+      return events.contacts.size() < kMaxEvents &&
+             readContactEvent(reader.get_view(), events.contacts.emplace_back());
+    return skip(reader);
+  });
+}
+
+std::optional<std::vector<std::string>> readScenes(Bytes message) {
+  using F = field::ListScenesResponse;
+  using Names = std::vector<std::string>;
+  return readMessage<Names>(message, [](Names& names, std::uint32_t tag, Reader& reader) {
+    if (tag != F::kScenes.tag) return skip(reader);
+    if (names.size() == kMaxScenes) return false;
+    std::string& name = names.emplace_back();
+    return readFields(reader.get_view(), [&](std::uint32_t summaryTag, Reader& summary) {
+      return summaryTag == field::SceneSummary::kName.tag ? setText(name, summary) : skip(summary);
+    });
+  });
+}
+
+bool readReport(Bytes message, SimulationReport& out) {
+  using F = field::SimulationReport;
+  out.cloths.clear();
+  out.deviceSeconds = 0;
+  return readFields(message, [&](std::uint32_t tag, Reader& reader) {
+    if (tag == F::kDeviceSeconds.tag) return setFinite(out.deviceSeconds, reader);
+    if (tag != F::kCloths.tag) return skip(reader);
+    return out.cloths.size() < kMaxCloths && readClothReport(reader.get_view(), out.cloths.emplace_back());
+  });
+}
+
+}  // namespace clothstream::client

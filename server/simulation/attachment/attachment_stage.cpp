@@ -1,0 +1,207 @@
+// SPDX-License-Identifier: MIT
+// Kernels of attachments, tethers and grabs.
+#include "server/simulation/attachment/attachment_stage.h"
+
+#include <algorithm>
+#include <cassert>
+#include <cstring>
+#include <utility>
+
+#include "kernels/aim_attachments.h"
+#include "kernels/begin_grabs.h"
+#include "kernels/find_nearest_nodes.h"
+#include "kernels/pull_nodes.h"
+#include "server/simulation/texel.h"
+
+namespace clothstream::simulation {
+namespace {
+
+using vulkan::Buffer;
+using vulkan::BufferPurpose;
+using vulkan::kStorage;
+using vulkan::kTexels;
+
+constexpr std::size_t kGrabBytes = kMaxGrabs * sizeof(shared::GrabRecord);
+constexpr std::size_t kReportBytes = kMaxGrabs * sizeof(shared::GrabReport);
+
+float stateOf(Grab::State state) {
+  switch (state) {
+    case Grab::State::holds:
+      return shared::kActiveGrab;
+    case Grab::State::takes:
+      return shared::kBeginningGrab;
+    default:
+      return shared::kReleasedGrab;
+  }
+}
+
+// The grab rotates the shorter way.
+shared::GrabRecord recordOf(const Grab& grab) {
+  const model::Vec3& start = grab.start.position;
+  const model::Vec3 motion = grab.end.position - start;
+  const Eigen::Vector4f from = grab.start.orientation.coeffs();
+  const Eigen::Vector4f to = grab.end.orientation.coeffs();
+  const Eigen::Vector4f turn = (from.dot(to) < 0 ? Eigen::Vector4f(-to) : to) - from;
+  return {.position = vectorOf(start),
+          .squaredSlip = grab.slipDistance * grab.slipDistance,
+          .motion = vectorOf(motion),
+          .force = grab.maxForce,
+          .orientation = texel(grab.start.orientation),
+          .orientationChange = {turn.x(), turn.y(), turn.z(), turn.w()},
+          .state = stateOf(grab.state),
+          .squaredRadius = grab.radius * grab.radius,
+          .squaredReach = grab.reach * grab.reach,
+          .reserved = 0};
+}
+
+}  // namespace
+
+AttachmentStage::AttachmentStage(const vulkan::Device& device, const AttachmentTables& tables,
+                                 const StateBuffers& state, std::uint32_t nodeCount,
+                                 std::uint32_t workgroupSize)
+    : workgroupSize_(workgroupSize),
+      nodeCount_(nodeCount),
+      attachedCount_(static_cast<std::uint32_t>(tables.attached.size())),
+      hasTethers_(!tables.tethers.empty()),
+      attached_(device, tables.attached),
+      tethers_(device, tables.tethers),
+      restTethers_(tables.tethers),
+      startFrames_(tables.frames),
+      frames_(device, BufferPurpose::texels,
+              std::max<std::size_t>(1, tables.frames.size()) * sizeof(shared::FrameRecord)),
+      grabs_(device, BufferPurpose::texels, kGrabBytes),
+      grabbed_(device, BufferPurpose::state, nodeCount * sizeof(shared::GrabbedNode)),
+      reports_(device, BufferPurpose::state, kReportBytes),
+      uploads_{Buffer(device, BufferPurpose::upload, frames_.bytes() + kGrabBytes),
+               Buffer(device, BufferPurpose::upload, frames_.bytes() + kGrabBytes)},
+      readbacks_{Buffer(device, BufferPurpose::readback, kReportBytes),
+                 Buffer(device, BufferPurpose::readback, kReportBytes)},
+      aim_(device,
+           {.name = "aim_attachments",
+            .spirv = kernels::aim_attachments,
+            .bindings = {kTexels, kTexels, kTexels, kStorage},
+            .pushConstantBytes = sizeof(shared::AimPush),
+            .workgroupSize = workgroupSize},
+           {&attached_.texels(), &frames_, state.positions[0], state.velocities[0]},
+           {&attached_.texels(), &frames_, state.positions[1], state.velocities[1]}),
+      findNearest_(device,
+                   {.name = "find_nearest_nodes",
+                    .spirv = kernels::find_nearest_nodes,
+                    .bindings = {kTexels, kStorage, kTexels},
+                    .pushConstantBytes = sizeof(shared::GrabPush),
+                    .workgroupSize = workgroupSize},
+                   {&grabs_, &reports_, state.positions[0]}, {&grabs_, &reports_, state.positions[1]}),
+      beginGrabs_(device,
+                  {.name = "begin_grabs",
+                   .spirv = kernels::begin_grabs,
+                   .bindings = {kTexels, kStorage, kTexels, kStorage},
+                   .pushConstantBytes = sizeof(shared::GrabPush),
+                   .workgroupSize = workgroupSize},
+                  {&grabs_, &reports_, state.positions[0], &grabbed_},
+                  {&grabs_, &reports_, state.positions[1], &grabbed_}),
+      tie_(makePull(device, state, false)),
+      pull_(makePull(device, state, true)) {}
+
+// The buffers that do not have the substep's start have its result.
+Stage AttachmentStage::makePull(const vulkan::Device& device, const StateBuffers& state, bool grabs) const {
+  return Stage(device,
+               {.name = "pull_nodes",
+                .spirv = kernels::pull_nodes,
+                .bindings = {kTexels, kStorage, kTexels, kStorage, kStorage, kStorage},
+                .pushConstantBytes = sizeof(shared::PullPush),
+                .workgroupSize = workgroupSize_,
+                .specialisation = {hasTethers_ ? 1u : 0u, grabs ? 1u : 0u}},
+               {&grabs_, &reports_, &tethers_.texels(), state.positions[1], state.velocities[1], &grabbed_},
+               {&grabs_, &reports_, &tethers_.texels(), state.positions[0], state.velocities[0], &grabbed_});
+}
+
+std::uint64_t AttachmentStage::invocations() const {
+  constexpr std::uint64_t kMost = 1 << 20;
+  return std::min<std::uint64_t>(nodeCount_, kMost);
+}
+
+void AttachmentStage::setSlack(std::span<const model::Cloth> cloths) {
+  if (!hasTethers_) return;
+  std::vector<float> longer;
+  for (const model::Cloth& cloth : cloths) longer.push_back(1 + (cloth.tethers ? cloth.tethers->slack : 0));
+  if (longer == longer_) return;
+  std::vector<shared::TetherRecord> tethers = restTethers_;
+  std::size_t node = 0;
+  for (std::size_t cloth = 0; cloth < cloths.size(); ++cloth)
+    for (std::uint32_t i = 0; i < cloths[cloth].nodeCount(); ++i, ++node) {
+      tethers[node].ends[0].distance *= longer[cloth];
+      tethers[node].ends[1].distance *= longer[cloth];
+    }
+  tethers_.set(tethers);
+  longer_ = std::move(longer);
+  slackened_ = false;
+}
+
+void AttachmentStage::recordInputs(vulkan::Recorder& recorder, std::span<const model::Pose> frames,
+                                   std::span<const Grab> grabs) {
+  assert(frames.empty() || frames.size() == startFrames_.size());
+  assert(grabs.size() <= kMaxGrabs);
+  if (!std::exchange(tabled_, true)) {
+    attached_.recordUpload(recorder);
+    recorder.fill(grabbed_, 0, grabbed_.bytes());
+    recorder.fill(reports_, 0, reports_.bytes());
+    recorder.barrier();
+  }
+  if (!std::exchange(slackened_, true)) tethers_.recordUpload(recorder);
+  slot_ = 1 - slot_;
+  const Buffer& through = uploads_[slot_];
+  const std::span<shared::FrameRecord> frameRecords = through.mapped<shared::FrameRecord>();
+  for (std::size_t i = 0; i < startFrames_.size(); ++i)
+    frameRecords[i] = frames.empty() ? startFrames_[i] : frameRecord(frames[i]);
+  if (!startFrames_.empty()) recorder.copy(through, frames_, frames_.bytes());
+  grabCount_ = static_cast<std::uint32_t>(grabs.size());
+  takes_ = false;
+  if (grabs.empty()) return;
+  for (std::size_t i = 0; i < grabs.size(); ++i) {
+    const shared::GrabRecord record = recordOf(grabs[i]);
+    std::memcpy(through.mapped().data() + frames_.bytes() + i * sizeof(record), &record, sizeof(record));
+    if (grabs[i].state != Grab::State::takes) continue;
+    takes_ = true;
+    const std::size_t report = i * sizeof(shared::GrabReport);
+    recorder.fill(reports_, ~0u, sizeof(shared::uint32_t), report + offsetof(shared::GrabReport, nearest));
+    recorder.fill(reports_, 0, sizeof(shared::GrabReport) - offsetof(shared::GrabReport, grabbed),
+                  report + offsetof(shared::GrabReport, grabbed));
+  }
+  recorder.copy(through, grabs_, grabs.size() * sizeof(shared::GrabRecord), frames_.bytes());
+}
+
+void AttachmentStage::recordAim(vulkan::Recorder& recorder, std::uint32_t present, float tickRate) {
+  if (attachedCount_ > 0)
+    recorder.dispatch(aim_.from[present],
+                      shared::AimPush{attachedCount_, tickRate, model::kMaxAttachmentSpeed}, attachedCount_);
+  if (!takes_) return;
+  recorder.dispatch(findNearest_.from[present], shared::GrabPush{nodeCount_, grabCount_}, invocations());
+  recorder.barrier();
+  recorder.dispatch(beginGrabs_.from[present], shared::GrabPush{nodeCount_, grabCount_}, invocations());
+}
+
+void AttachmentStage::recordSubstep(vulkan::Recorder& recorder, std::uint32_t present, std::uint32_t substep,
+                                    std::uint32_t substeps, float tickRate) {
+  if (!hasTethers_ && grabCount_ == 0) return;
+  const float rate = tickRate * static_cast<float>(substeps);
+  recorder.barrier();
+  recorder.dispatch(
+      (grabCount_ > 0 ? pull_ : tie_).from[present],
+      shared::PullPush{.nodeCount = nodeCount_,
+                       .progressBefore = static_cast<float>(substep) / static_cast<float>(substeps),
+                       .progressAfter = static_cast<float>(substep + 1) / static_cast<float>(substeps),
+                       .substepSeconds = 1 / rate,
+                       .substepRate = rate,
+                       .caughtUp = model::kCaughtUp},
+      invocations());
+}
+
+void AttachmentStage::recordReport(vulkan::Recorder& recorder) {
+  if (grabCount_ > 0) recorder.copy(reports_, readbacks_[slot_], grabCount_ * sizeof(shared::GrabReport));
+}
+
+std::span<const shared::GrabReport> AttachmentStage::report() const {
+  return readbacks_[slot_].mapped<const shared::GrabReport>().first(grabCount_);
+}
+
+}  // namespace clothstream::simulation

@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: MIT
+// Attachments, tethers and grabs on the device.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+
+#include "server/model/pose.h"
+#include "server/model/scene.h"
+#include "server/simulation/attachment/attachment_tables.h"
+#include "server/simulation/attachment/grab.h"
+#include "server/simulation/device_table.h"
+#include "server/simulation/stage.h"
+#include "server/simulation/state_buffers.h"
+#include "server/vulkan/buffer.h"
+#include "server/vulkan/device.h"
+#include "server/vulkan/recorder.h"
+
+namespace clothstream::simulation {
+
+// Belongs to the device's thread.
+//
+// A tick:   recordInputs -> barrier -> recordAim -> substeps, each with recordSubstep at its end ->
+// recordReport
+class AttachmentStage {
+ public:
+  // Throws std::runtime_error where the device has no room.
+  AttachmentStage(const vulkan::Device& device, const AttachmentTables& tables, const StateBuffers& state,
+                  std::uint32_t nodeCount, std::uint32_t workgroupSize);
+
+  // Sets the slack of the tethers of these cloths from the next tick on. Must be called before the first
+  // tick.
+  void setSlack(std::span<const model::Cloth> cloths);
+
+  // `frames` are the poses of the attachments at the tick's end; empty: their poses at the start. At most one
+  // tick may be in flight.
+  void recordInputs(vulkan::Recorder& recorder, std::span<const model::Pose> frames,
+                    std::span<const Grab> grabs);
+  // True if recordAim() has work in this tick.
+  bool aims() const { return attachedCount_ > 0 || takes_; }
+  // Gives attached nodes their velocities, and lets grabs begin. The state is in the buffers `present`.
+  void recordAim(vulkan::Recorder& recorder, std::uint32_t present, float tickRate);
+  // Applies tethers and grabs at a substep's end. The result of the substep is in the buffers other than
+  // `present`.
+  void recordSubstep(vulkan::Recorder& recorder, std::uint32_t present, std::uint32_t substep,
+                     std::uint32_t substeps, float tickRate);
+  void recordReport(vulkan::Recorder& recorder);
+
+  // Reports of the grabs of the last recorded tick, once it is complete.
+  std::span<const shared::GrabReport> report() const;
+
+ private:
+  Stage makePull(const vulkan::Device& device, const StateBuffers& state, bool grabs) const;
+  // Number of invocations, which share the nodes.
+  std::uint64_t invocations() const;
+
+  std::uint32_t workgroupSize_, nodeCount_, attachedCount_;
+  bool hasTethers_;
+  bool tabled_ = false;    // the constant tables are on the device
+  bool slackened_ = true;  // the tethers on the device have the present slack
+  bool takes_ = false;     // a grab begins in this tick
+  std::uint32_t grabCount_ = 0, slot_ = 0;
+
+  DeviceTable attached_, tethers_;
+  std::vector<shared::TetherRecord> restTethers_;  // without slack
+  std::vector<float> longer_;                      // factor of each cloth's tethers in the table
+  std::vector<shared::FrameRecord> startFrames_;
+  vulkan::Buffer frames_, grabs_, grabbed_, reports_;
+  // Used alternately, because a tick may be in flight while the next one is recorded.
+  std::array<vulkan::Buffer, 2> uploads_;  // frames, then grabs
+  std::array<vulkan::Buffer, 2> readbacks_;
+  Stage aim_, findNearest_, beginGrabs_, tie_, pull_;
+};
+
+}  // namespace clothstream::simulation

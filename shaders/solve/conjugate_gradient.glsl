@@ -1,0 +1,323 @@
+// SPDX-License-Identifier: MIT
+// The two halves of an iteration of conjugate gradients. The first half multiplies the matrix by the
+// preconditioned residuals and computes the dot products. The second half takes the step. The preconditioner
+// is one number per node.
+#ifndef CLOTHSTREAM_SHADERS_SOLVE_CONJUGATE_GRADIENT_GLSL
+#define CLOTHSTREAM_SHADERS_SOLVE_CONJUGATE_GRADIENT_GLSL
+
+#include "shaders/shared/conjugate_gradient_step.glsl"
+#include "shaders/solve/linear_system.glsl"
+
+layout(binding = 3) uniform samplerBuffer positions;   // at the substep's start; w: inverse mass
+layout(binding = 4) uniform samplerBuffer incidences;  // ListRecord by node of a mesh
+layout(binding = 5) uniform samplerBuffer lists;       // SpringEndsRecord
+layout(binding = 6) uniform samplerBuffer along;       // SpringWeights of a grid, WeightedSprings of a mesh
+layout(binding = 7) uniform samplerBuffer across;      // SpringWeights of an implicit grid
+// The same memory twice: a software device reads texels three times as fast as storage and writes storage
+// five times as fast as texels.
+layout(binding = 8, rgba32f) uniform coherent readonly imageBuffer texels;
+layout(std430, binding = 9) coherent buffer Vectors {
+  vec4 vectors[];
+};
+layout(std430, binding = 10) coherent buffer Sums {
+  vec2 chunkSums[];  // by chunk: residual . z, z . A z,  with z the preconditioned residual
+};
+layout(std430, binding = 11) coherent buffer Solves {
+  SolveRecord solves[];
+};
+layout(std430, binding = 12) readonly buffer Actives {
+  uint actives[];  // by chunk: kActive, kPrepared; then the numbers of the active chunks, group by group
+};
+
+layout(push_constant) uniform Push {
+  SolvePush push;
+};
+
+uint vectorAt(uint which, uint node) {
+  return which * push.nodes + node;
+}
+vec4 fetch(uint which, uint node) {
+  return imageLoad(texels, int(vectorAt(which, node)));
+}
+
+ResidualRecord residualAt(uint node) {
+  return residualFrom(fetch(kResiduals, node));
+}
+
+struct Point {
+  vec3 place;
+  vec3 z;  // preconditioned residual
+  ResidualRecord own;
+};
+
+Point pointAt(uint node) {
+  ResidualRecord own = residualAt(node);
+  precise vec3 z = own.preconditioner * own.residual;
+  return Point(texelFetch(positions, int(node)).xyz, z, own);
+}
+
+// Term of a spring at `here`; at `other` it is the exact negative.
+vec3 pull(Point here, Point other, float along, float across) {
+  precise vec3 d = other.place - here.place;
+  precise vec3 relative = here.z - other.z;
+  precise vec3 force = (along * dotProduct(d, relative)) * d;
+  if (kImplicit) {
+    force = force + across * relative;
+  }
+  return force;
+}
+
+// Stores A z of a node. Returns what the node adds to the sums.
+vec2 keepProduct(uint node, Point here, vec3 product) {
+  precise vec3 kept = here.own.preconditioner > 0.0 ? product : vec3(0.0);
+  vectors[vectorAt(kProducts, node)].xyz = kept;
+  precise vec2 sums = vec2(dotProduct(here.own.residual, here.z), dotProduct(here.z, kept));
+  return sums;
+}
+
+const SpringWeights kNoWeights = SpringWeights(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
+
+SpringWeights weightsAt(samplerBuffer table, bool exists, uint node) {
+  SpringWeights weights = springWeightsAt(table, node);
+  return SpringWeights(exists ? weights.right : 0.0, exists ? weights.below : 0.0,
+                       exists ? weights.rightBelow : 0.0, exists ? weights.rightToBelow : 0.0,
+                       exists ? weights.secondRight : 0.0, exists ? weights.secondBelow : 0.0,
+                       exists ? weights.mass : 0.0, 0.0);
+}
+
+SpringWeights alongAt(bool exists, uint node) {
+  return weightsAt(along, exists, node);
+}
+SpringWeights acrossAt(bool exists, uint node) {
+  if (kImplicit) {
+    return weightsAt(across, exists, node);
+  }
+  return kNoWeights;
+}
+
+// Walks down a column with a window of registers, as in shaders/mass_spring. Springs beyond an edge have no
+// weight, and loads beyond an edge read the edge instead.
+vec2 multiplyGrid(System system, Walk walk) {
+  uint columns = system.columns;
+  uint lastRow = system.rows - 1;
+  bool hasLeft = walk.column > 0;
+  bool hasLeft2 = walk.column > 1;
+  uint toLeft = hasLeft ? 1 : 0;
+  uint toLeft2 = hasLeft2 ? 2 : 0;
+  uint toRight = walk.column + 1 < columns ? 1 : 0;
+  uint toRight2 = walk.column + 2 < columns ? 2 : 0;
+  uint start = system.firstNode + walk.column;
+
+  uint row = walk.row;
+  bool hasAbove = row > 0;
+  uint index = start + row * columns;
+  uint aboveIndex = start + (hasAbove ? row - 1 : 0) * columns;
+  uint above2Index = start + (row > 1 ? row - 2 : 0) * columns;
+  uint belowIndex = start + min(row + 1, lastRow) * columns;
+  Point leftAbove = pointAt(aboveIndex - toLeft);
+  Point above = pointAt(aboveIndex);
+  Point rightAbove = pointAt(aboveIndex + toRight);
+  Point left = pointAt(index - toLeft);
+  Point here = pointAt(index);
+  Point right = pointAt(index + toRight);
+  Point below = pointAt(belowIndex);
+  SpringWeights aboveAlong = alongAt(hasAbove, aboveIndex);
+  SpringWeights aboveAcross = acrossAt(hasAbove, aboveIndex);
+  SpringWeights leftAboveAlong = alongAt(hasAbove && hasLeft, aboveIndex - toLeft);
+  SpringWeights leftAboveAcross = acrossAt(hasAbove && hasLeft, aboveIndex - toLeft);
+  SpringWeights above2Along = alongAt(row > 1, above2Index);
+  SpringWeights above2Across = acrossAt(row > 1, above2Index);
+  vec3 aboveForce = pull(here, above, aboveAlong.below, aboveAcross.below);
+  vec3 above2Force, nextAbove2Force;
+  if (kBend) {
+    above2Force = pull(here, pointAt(above2Index), above2Along.secondBelow, above2Across.secondBelow);
+    nextAbove2Force = pull(below, above, aboveAlong.secondBelow, aboveAcross.secondBelow);
+  }
+
+  precise vec2 sums = vec2(0.0);
+  [[unroll]] for (uint k = 0; k < kWalk; ++k) {
+    index = start + min(row, lastRow) * columns;
+    belowIndex = start + min(row + 1, lastRow) * columns;
+    Point below2 = pointAt(start + min(row + 2, lastRow) * columns);
+    Point leftBelow = pointAt(belowIndex - toLeft);
+    Point rightBelow = pointAt(belowIndex + toRight);
+    SpringWeights own = alongAt(true, index);
+    SpringWeights ownAcross = acrossAt(true, index);
+    SpringWeights ofLeft = alongAt(hasLeft, index - toLeft);
+    SpringWeights ofLeftAcross = acrossAt(hasLeft, index - toLeft);
+
+    vec3 belowForce = pull(here, below, own.below, ownAcross.below);
+    precise vec3 sum = own.mass * here.own.residual;
+    sum = sum + pull(here, left, ofLeft.right, ofLeftAcross.right);
+    sum = sum + pull(here, right, own.right, ownAcross.right);
+    sum = sum + aboveForce;
+    sum = sum + belowForce;
+    sum = sum + pull(here, leftAbove, leftAboveAlong.rightBelow, leftAboveAcross.rightBelow);
+    sum = sum + pull(here, rightAbove, aboveAlong.rightToBelow, aboveAcross.rightToBelow);
+    sum = sum + pull(here, leftBelow, ofLeft.rightToBelow, ofLeftAcross.rightToBelow);
+    sum = sum + pull(here, rightBelow, own.rightBelow, ownAcross.rightBelow);
+    if (kBend) {
+      float left2Along = alongAt(hasLeft2, index - toLeft2).secondRight;
+      float left2Across = acrossAt(hasLeft2, index - toLeft2).secondRight;
+      vec3 below2Force = pull(here, below2, own.secondBelow, ownAcross.secondBelow);
+      sum = sum + pull(here, pointAt(index - toLeft2), left2Along, left2Across);
+      sum = sum + pull(here, pointAt(index + toRight2), own.secondRight, ownAcross.secondRight);
+      sum = sum + above2Force;
+      sum = sum + below2Force;
+      above2Force = nextAbove2Force;
+      nextAbove2Force = -below2Force;
+    }
+    if (row <= lastRow) {
+      sums = sums + keepProduct(index, here, sum);
+    }
+
+    aboveForce = -belowForce;
+    leftAbove = left;
+    rightAbove = right;
+    left = leftBelow;
+    right = rightBelow;
+    here = below;
+    below = below2;
+    aboveAlong = own;
+    aboveAcross = ownAcross;
+    leftAboveAlong = ofLeft;
+    leftAboveAcross = ofLeftAcross;
+    ++row;
+  }
+  return sums;
+}
+
+// Multiplies the matrix of a mesh by gathering the springs that meet at each node.
+vec2 multiplyMesh(System system, Walk walk) {
+  float compliance = clothAt(cloths, system.cloth).scaledCompliance;
+  precise vec2 sums = vec2(0.0);
+  for (uint k = 0; k < kWalk; ++k) {
+    uint node = walk.first + min(k, max(walk.count, 1) - 1);
+    Point here = pointAt(node);
+    float inverseMass = texelFetch(positions, int(node)).w;
+    precise vec3 sum =
+        kImplicit ? reciprocal(max(inverseMass, 1e-30)) * here.z : compliance * here.own.residual;
+    TexelRange list = rangeOf(listAt(incidences, node));
+    while (list.first < list.end) {
+      SpringEndsRecord two = springEndsAt(lists, list.first);
+      [[unroll]] for (int i = 0; i < 2; ++i) {
+        float number = two.ends[i].signedSpring;
+        uint spring = system.firstSpring + uint(max(abs(number), 1.0)) - 1;
+        ResidualRecord other = residualAt(uint(two.ends[i].other));
+        WeightedSpring weighted = weightedSpringAt(along, spring);
+        precise vec3 relative = here.z - other.preconditioner * other.residual;
+        precise vec3 part = dotProduct(weighted.row, relative) * weighted.row;
+        if (kImplicit) {
+          part = part + weighted.across * relative;
+        }
+        sum = sum + (number == 0.0 ? vec3(0.0) : part);
+      }
+      ++list.first;
+    }
+    if (k < walk.count) {
+      sums = sums + keepProduct(node, here, sum);
+    }
+  }
+  return sums;
+}
+
+uint lanesOf(System system, uint chunk) {
+  return (actives[system.firstChunk + chunk] & kActive) == 0 ? 0 : kLanes;
+}
+
+void keepSums(System system, uint chunk) {
+  vec2 sums = sumOfLanes();
+  if (self() == 0) {
+    chunkSums[system.firstChunk + chunk] = sums;
+  }
+}
+
+// Computes a chunk's part of A z and of the sums.
+void multiplyChunk(System system, uint chunk) {
+  uint end = lanesOf(system, chunk);
+  uint lane = self();
+  do {
+    Walk walk = walkAt(system, chunk * kLanes + lane);
+    vec2 sums = vec2(0.0);
+    if (walk.count > 0 && lane < end) {
+      sums = kMesh ? multiplyMesh(system, walk) : multiplyGrid(system, walk);
+    }
+    lanes[lane] = sums;
+    lane += width();
+  } while (lane < end);
+  keepSums(system, chunk);
+}
+
+// Measures only the residual's norm.
+void measureChunk(System system, uint chunk) {
+  uint end = lanesOf(system, chunk);
+  uint lane = self();
+  do {
+    Walk walk = walkAt(system, chunk * kLanes + lane);
+    precise vec2 sums = vec2(0.0);
+    [[unroll]] for (uint k = 0; k < kWalk; ++k) {
+      if (k < walk.count && lane < end) {
+        ResidualRecord own = residualAt(walk.first + k * walk.step);
+        precise vec3 z = own.preconditioner * own.residual;
+        sums.x = sums.x + dotProduct(own.residual, z);
+      }
+    }
+    lanes[lane] = sums;
+    lane += width();
+  } while (lane < end);
+  keepSums(system, chunk);
+}
+
+// The chunk of a workgroup if several workgroups solve a system.
+ChunkRecord ownChunk() {
+  return chunkAt(chunks, actives[actives.length() / 2 + push.firstChunk + gl_WorkGroupID.x]);
+}
+
+// Decides whether to continue, and by which step, after all chunks have their sums. One workgroup calls this.
+void takeSums(System system, bool normOnly) {
+  for (uint lane = self(); lane < kLanes; lane += width()) {
+    precise vec2 sum = vec2(0.0);
+    for (uint chunk = system.firstChunk + lane; chunk < system.firstChunk + system.chunks; chunk += kLanes) {
+      sum = sum + ((actives[chunk] & kActive) == 0 ? vec2(0.0) : chunkSums[chunk]);
+    }
+    lanes[lane] = sum;
+  }
+  vec2 sums = sumOfLanes();
+  if (self() != 0) {
+    return;
+  }
+  SolveRecord solve = measured(solves[system.number], sums.x, clothAt(cloths, system.cloth), normOnly);
+  if (solve.running != 0) {
+    solve = stepped(solve, sums);
+  }
+  solves[system.number] = solve;
+}
+
+// Takes the step at the nodes of a chunk.
+void updateChunk(System system, uint chunk, SolveRecord solve) {
+  uint end = solve.running == 0 ? 0 : lanesOf(system, chunk);
+  bool first = solve.iterations == 1;
+  uint lane = self();
+  do {
+    Walk walk = walkAt(system, chunk * kLanes + lane);
+    [[unroll]] for (uint k = 0; k < kWalk; ++k) {
+      uint node = walk.first + min(k, max(walk.count, 1) - 1) * walk.step;
+      ResidualRecord before = residualAt(node);
+      vec3 oldDirection = first ? vec3(0.0) : fetch(kDirections, node).xyz;
+      vec3 oldImage = first ? vec3(0.0) : fetch(kImages, node).xyz;
+      precise vec3 direction = before.preconditioner * before.residual + solve.directionShare * oldDirection;
+      precise vec3 image = fetch(kProducts, node).xyz + solve.directionShare * oldImage;
+      precise vec3 residual = before.residual - solve.stepLength * image;
+      precise vec3 correction = fetch(kCorrections, node).xyz + solve.stepLength * direction;
+      if (k < walk.count && lane < end) {
+        vectors[vectorAt(kDirections, node)].xyz = direction;
+        vectors[vectorAt(kImages, node)].xyz = image;
+        vectors[vectorAt(kResiduals, node)].xyz = residual;
+        vectors[vectorAt(kCorrections, node)].xyz = correction;
+      }
+    }
+    lane += width();
+  } while (lane < end);
+}
+
+#endif

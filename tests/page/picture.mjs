@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: MIT
+// Makes docs/picture.png and docs/cloth.webp: the page with a collider in the curtain, and one swing of the collider.
+//   CLOTHSTREAM_SERVER=build/release/bin/clothstream-server node tests/page/picture.mjs
+// Needs Chromium, and img2webp of Debian's package webp.
+
+import { execFileSync } from "node:child_process";
+import { mkdtemp, readdir, rm, writeFile } from "node:fs/promises";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
+import { fileURLToPath } from "node:url";
+import { launchBrowser, openPage, untilState } from "./browser.mjs";
+import { startServer } from "./server.mjs";
+
+const kDocs = fileURLToPath(new URL("../../docs/", import.meta.url));
+const kDesktop = { width: 1280, height: 800 };
+const kMoving = { width: 560, height: 400 };
+const kSwing = 5; // s, period of the collider's motion
+const kStart = 6.25; // s, after the first swing
+const kFramesPerSecond = 12;
+const kSlow = 0.1; // speed of the playback while frames are taken
+
+// Turns the view around the curtain, so that the push is visible.
+async function turnView(page) {
+  await page.focus("#canvas");
+  for (let i = 0; i < 4; ++i) await page.keyboard.press("ArrowRight");
+}
+
+const folder = await mkdtemp(join(tmpdir(), "clothstream-picture-"));
+const browser = await launchBrowser();
+let server;
+try {
+  server = await startServer(0, ["--scene", "curtain", "--record", folder]);
+  const page = await openPage(browser, server.url, { viewport: kDesktop });
+  await untilState(page, "live");
+  await turnView(page);
+  await page.waitForFunction(
+    () =>
+      window.clothstream.statistics.tick / 72 > 5 &&
+      window.clothstream.colliders[0].position[2] < -0.5 &&
+      document.getElementById("notice").hidden,
+  );
+  await page.screenshot({ path: join(kDocs, "picture.png") });
+  await page.waitForFunction((end) => window.clothstream.statistics.tick / 72 > end, kStart + kSwing + 1);
+  await page.close();
+  await server.stop();
+
+  const [recording] = (await readdir(folder)).filter((name) => name.endsWith(".mcap"));
+  server = await startServer(0, ["play", join(folder, recording), "--speed", String(kSlow), "--from", String(kStart)]);
+  const player = await openPage(browser, server.url, { viewport: kMoving });
+  await untilState(player, "live");
+  await player.addStyleTag({ content: ".card { display: none !important; }" });
+  await turnView(player);
+  const frames = [];
+  for (let frame = 0; frame < kSwing * kFramesPerSecond; ++frame) {
+    await player.waitForFunction((time) => window.clothstream.playback.position >= time, kStart + frame / kFramesPerSecond);
+    const file = join(folder, `${String(frame).padStart(3, "0")}.png`);
+    await writeFile(file, await player.screenshot());
+    frames.push(file);
+  }
+  const options = ["-loop", "0", "-lossy", "-q", "75", "-m", "4", "-d", String(Math.round(1000 / kFramesPerSecond))];
+  execFileSync("img2webp", [...options, ...frames, "-o", join(kDocs, "cloth.webp")]);
+} finally {
+  await browser.close();
+  await server?.stop();
+  await rm(folder, { recursive: true });
+}

@@ -1,0 +1,300 @@
+// SPDX-License-Identifier: MIT
+// What holds cloth: attachments, tethers, grabs.
+#include <algorithm>
+#include <cmath>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "server/model/tethers.h"
+#include "tests/simulation/scenes.h"
+
+namespace clothstream::tests {
+namespace {
+
+using model::Vec3;
+using simulation::Grab;
+using simulation::NodeState;
+
+class Hold : public GpuTest {};
+
+model::Attachment leftColumn(const model::Cloth& cloth) {
+  model::Attachment attachment;
+  attachment.name = "rod";
+  attachment.ranges = {{.firstRow = 0, .lastRow = cloth.grid.rows - 1}};
+  return attachment;
+}
+
+model::Pose moved(const Vec3& by, float degrees = 0, const Vec3& axis = Vec3::UnitY()) {
+  return {by, turned(degrees, axis)};
+}
+
+Grab taking(const Vec3& at, float radius) {
+  return {.state = Grab::State::takes, .start = moved(at), .end = moved(at), .radius = radius};
+}
+
+// The same grab, on its way to another place.
+Grab onTheWay(const Grab& grab, const Vec3& to) {
+  Grab next = grab;
+  next.state = Grab::State::holds;
+  next.start = grab.end;
+  next.end.position = to;
+  return next;
+}
+
+// Nothing between its nodes, and nothing that pulls at them.
+model::Scene dust(std::uint32_t rows, std::uint32_t columns) {
+  model::Scene scene = sceneOf({calmCloth(rows, columns)});
+  model::Cloth& cloth = scene.cloths[0];
+  cloth.structural = cloth.shear = cloth.bend = {};
+  cloth.damping = 0;
+  scene.environment.gravity = Vec3::Zero();
+  return scene;
+}
+
+// One substep of both from a random state, with everything that holds. Places of what is held are wrong by
+// some roundings of where they are, which velocities feel over a substep; the rest is what kernels_test.cpp
+// allows a spring's force. Slipping and being near enough are yes or no: no node of these states is within
+// those roundings of either.
+TEST_F(Hold, HoldsAsTheReferenceDoesWithEverySolver) {
+  using enum model::SolverKind;
+  unsigned seed = 1;
+  for (const model::SolverKind solver : {massSpring, constraint, acad, xpbd, implicitEuler}) {
+    SCOPED_TRACE(static_cast<int>(solver));
+    model::Scene scene = sceneOf({calmCloth(13, 17), discCloth(5)});
+    scene.substeps = 1;
+    scene.simulationRate = 720;
+    scene.cloths[1].name = "disc";
+    scene.cloths[0].attachments = {leftColumn(scene.cloths[0])};
+    scene.cloths[0].tethers = model::Tethers{.slack = 0};
+    for (model::Cloth& cloth : scene.cloths) {
+      cloth.solver.kind = solver;
+      cloth.solver.iterations = solver == xpbd ? 1 : 400;
+      cloth.solver.tolerance = 1e-6f;
+    }
+    simulation::TickInputs inputs = inputsOf(scene);
+    inputs.attachments = {moved(Vec3(0.003f, 0.001f, -0.002f), 1, Vec3(1, 2, 3))};
+    std::mt19937 random(seed++);
+    const NodeState start = randomState(scene, random, 0.002f, 0.1f);
+    inputs.grabs = {taking(start.positions[100], 0.031f),
+                    taking(start.positions[230] + Vec3(0, 0.02f, 0), 0.001f)};
+    inputs.grabs[0].end = {inputs.grabs[0].start.position + Vec3(0, 0.001f, 0.002f),
+                           turned(2, Vec3(3, 1, 2))};
+    inputs.grabs[1].maxForce = 0.05f;
+
+    Running running(scene);
+    running.restore(start);
+    EXPECT_TRUE(running.tick(inputs).healthy);
+    reference::ReferenceSimulation reference(scene);
+    setState(reference, start);
+    reference.tick(referenceInputs(inputs));
+    const std::vector<simulation::GrabStatus> grabs = running.grabs();
+    ASSERT_EQ(grabs.size(), 2u);
+    for (std::size_t i = 0; i < 2; ++i) {
+      EXPECT_EQ(grabs[i].taken, reference.attachments().status()[i].taken);
+      EXPECT_EQ(grabs[i].slipped, reference.attachments().status()[i].slipped);
+      EXPECT_GT(grabs[i].taken, 0u);
+    }
+    const double h = scene.substepSeconds(), extent = 4;
+    // A constraint takes its whole error of length back in a substep: as a place does.
+    const double place = 16 * kRounding * extent / h;
+    const model::Spring& spring = scene.cloths[0].structural;
+    const double force = 12 * kRounding * spring.stiffness * (2 * extent + 0.6);
+    // Systems are solved to a millionth of the residual that they begin with, which is of the size of the
+    // velocities.
+    const double solved = solver == massSpring || solver == xpbd ? 0 : 1e-6 * 100;
+    const double speed = place + h / 0.01 * force + solved;
+    EXPECT_LT(largestSpeedDifference(running.state(), reference), speed);
+    EXPECT_LT(largestDistance(running.state(), reference), h * speed + 4 * kRounding * extent);
+    setState(reference, start);
+    EXPECT_GT(largestSpeedDifference(running.state(), reference), 100 * speed);
+  }
+}
+
+TEST_F(Hold, AttachedNodesAreWhereTheirFrameIsWhateverPullsAtThem) {
+  using enum model::SolverKind;
+  for (const model::SolverKind solver : {massSpring, constraint, acad, xpbd, implicitEuler}) {
+    model::Scene scene = sceneOf({calmCloth(9, 9)});
+    model::Cloth& cloth = scene.cloths[0];
+    cloth.attachments = {leftColumn(cloth)};
+    cloth.solver.kind = solver;
+    if (solver == xpbd) cloth.solver.iterations = 1;
+    Running running(scene);
+    const std::vector<Vec3> rest = model::restPositions(cloth);
+    for (int tick = 1; tick <= 100; ++tick) {
+      const float t = static_cast<float>(tick) / 72;
+      const model::Pose frame = moved(Vec3(0.2f * t, 0.1f * t * t, -0.3f * t), 90 * t, Vec3(1, 1, 0));
+      simulation::TickInputs inputs = inputsOf(scene);
+      inputs.attachments = {frame};
+      ASSERT_TRUE(running.tick(inputs).healthy);
+      if (tick % 25 != 0) continue;
+      const NodeState state = running.state();
+      for (std::uint32_t node = 0; node < 81; node += 9) {
+        const Vec3 place = frame.position + frame.orientation * rest[node];
+        // Ten substeps, each rounded once at positions within a metre, and the place itself.
+        EXPECT_LT((state.positions[node] - place).norm(), 20 * kRounding) << tick;
+      }
+    }
+    // The cloth came along.
+    EXPECT_GT(running.state().positions[44].z(), -2);
+    EXPECT_LT(running.state().positions[44].z(), -0.1f);
+  }
+}
+
+TEST_F(Hold, AFrameThatJumpsIsCaughtUpWithAtThirtyMetresASecond) {
+  model::Scene scene = dust(3, 3);
+  scene.cloths[0].attachments = {leftColumn(scene.cloths[0])};
+  Running running(scene);
+  simulation::TickInputs inputs = inputsOf(scene);
+  inputs.attachments = {moved(Vec3(1, 0, 0))};
+  running.tick(inputs);
+  const float step = 30.0f / 72, first = model::restPositions(scene.cloths[0])[0].x();
+  EXPECT_NEAR(running.state().positions[0].x(), first + step, 1e-5);
+  for (int tick = 0; tick < 2; ++tick) running.tick(inputs);
+  EXPECT_NEAR(running.state().positions[0].x(), first + 1, 1e-6);
+  running.tick(inputs);
+  EXPECT_NEAR(running.state().velocities[0].norm(), 0, 1e-4);
+}
+
+// Hung by two corners, of springs so weak that they would let it fall: no node gets farther from either
+// corner than the way along the cloth.
+TEST_F(Hold, TethersHoldWhatWeakSpringsWouldLetGo) {
+  const auto farthestOf = [](bool tethered, std::size_t which) {
+    model::Cloth cloth = calmCloth(17, 17);
+    cloth.structural.stiffness = cloth.shear.stiffness = 2;
+    cloth.bend.stiffness = 0;
+    cloth.pins = {{}, {.firstColumn = 16, .lastColumn = 16}};
+    if (tethered) cloth.tethers = model::Tethers{.slack = 0.05f};
+    const model::Scene scene = sceneOf({cloth});
+    const std::vector<model::NodeTethers> tethers = model::nodeTethers(cloth);
+    Running running(scene);
+    double farthest = 0;
+    for (int tick = 0; tick < 144; ++tick) running.tick(inputsOf(scene));
+    const NodeState state = running.state();
+    for (std::size_t node = 0; node < tethers.size(); ++node) {
+      const model::Tether& tether = tethers[node][which];
+      if (tether.anchor != model::Tether::kNone)
+        farthest =
+            std::max(farthest, double{(state.positions[node] - state.positions[tether.anchor]).norm()} /
+                                   double{tether.length});
+    }
+    return farthest;
+  };
+  EXPECT_LT(farthestOf(true, 0), 1.05 + 1e-5);
+  // The shorter tether may pull beyond the other's end again.
+  EXPECT_LT(farthestOf(true, 1), 1.06);
+  EXPECT_GT(farthestOf(false, 0), 1.5);
+}
+
+TEST_F(Hold, AGrabTakesWhatIsWithinItsRadiusElseTheNearestWithinReach) {
+  const model::Scene scene = dust(9, 9);  // 2 cm apart
+  const std::vector<Vec3> rest = model::restPositions(scene.cloths[0]);
+  const auto taken = [&](const Grab& grab) {
+    Running running(scene);
+    simulation::TickInputs inputs = inputsOf(scene);
+    inputs.grabs = {grab};
+    running.tick(inputs);
+    return running.grabs()[0].taken;
+  };
+  EXPECT_EQ(taken(taking(rest[40], 0.001f)), 1u);
+  EXPECT_EQ(taken(taking(rest[40], 0.021f)), 5u);
+  EXPECT_EQ(taken(taking(rest[40], 0.029f)), 9u);
+  EXPECT_EQ(taken(taking(rest[40] + Vec3(0, 0, 0.09f), 0.03f)), 1u);
+  EXPECT_EQ(taken(taking(rest[40] + Vec3(0, 0, 0.11f), 0.03f)), 0u);
+}
+
+TEST_F(Hold, WhatIsHeldGoesWithTheHand) {
+  model::Scene scene = sceneOf({calmCloth(9, 9)});
+  const std::vector<Vec3> rest = model::restPositions(scene.cloths[0]);
+  Running running(scene);
+  simulation::TickInputs inputs = inputsOf(scene);
+  inputs.grabs = {taking(rest[40], 0.03f)};
+  inputs.grabs[0].maxForce = 1000;
+  running.tick(inputs);
+  for (int tick = 1; tick <= 72; ++tick) {
+    inputs.grabs = {onTheWay(inputs.grabs[0], rest[40] + Vec3(0.005f, 0.01f, 0) * static_cast<float>(tick))};
+    inputs.grabs[0].end.orientation = turned(static_cast<float>(tick), Vec3::UnitZ());
+    ASSERT_TRUE(running.tick(inputs).healthy);
+  }
+  const NodeState state = running.state();
+  const model::Pose& hand = inputs.grabs[0].end;
+  for (const std::uint32_t node : {30u, 31u, 32u, 39u, 40u, 41u, 48u, 49u, 50u}) {
+    const Vec3 place = hand.position + hand.orientation * (rest[node] - rest[40]);
+    // A substep's fall, h^2 (g + forces / m), is taken back by a quarter each: some four of them are left,
+    // with the 80 N/kg that the springs of a hanging cloth of 81 nodes may pull with.
+    EXPECT_LT((state.positions[node] - place).norm(), 4 * 100 / 720.0 / 720.0) << node;
+  }
+  EXPECT_EQ(running.grabs()[0].slipped, 0u);
+}
+
+// The force is shared by the nodes that the grab took: of dust under gravity g it holds back F / (n m).
+TEST_F(Hold, AWeakGrabHoldsBackAsMuchAsItsForceDoes) {
+  model::Scene scene = dust(3, 3);
+  scene.environment.gravity = Vec3(0, -9.81f, 0);
+  const Vec3 centre = model::restPositions(scene.cloths[0])[4];
+  const float weight = scene.cloths[0].mass * 9.81f;
+  Running running(scene);
+  simulation::TickInputs inputs = inputsOf(scene);
+  inputs.grabs = {taking(centre, 1)};
+  inputs.grabs[0].maxForce = 0.25f * weight;
+  running.tick(inputs);
+  EXPECT_EQ(running.grabs()[0].taken, 9u);
+  inputs.grabs = {onTheWay(inputs.grabs[0], centre)};
+  for (int tick = 1; tick < 9; ++tick) running.tick(inputs);
+  const double seconds = 9.0 / 72;
+  for (const Vec3& velocity : running.state().velocities)
+    EXPECT_NEAR(velocity.y(), -0.75 * 9.81 * seconds, 1e-4);
+  // After 0.1 m all have slipped, and fall freely.
+  for (int tick = 9; tick < 18; ++tick) running.tick(inputs);
+  EXPECT_EQ(running.grabs()[0].slipped, 9u);
+  const double before = double{running.state().velocities[0].y()};
+  running.tick(inputs);
+  EXPECT_NEAR(running.state().velocities[0].y(), before - 9.81 / 72, 1e-4);
+}
+
+TEST_F(Hold, WhatIsLetGoIsFreeAndMayBeTakenAgain) {
+  model::Scene scene = dust(3, 3);
+  const Vec3 centre = model::restPositions(scene.cloths[0])[4];
+  Running running(scene);
+  simulation::TickInputs inputs = inputsOf(scene);
+  inputs.grabs = {taking(centre, 0.001f)};
+  running.tick(inputs);
+  inputs.grabs = {onTheWay(inputs.grabs[0], centre + Vec3(0, 0, 0.01f))};
+  running.tick(inputs);
+  EXPECT_NEAR(running.state().velocities[4].z(), 0.72, 1e-3);
+  inputs.grabs = {Grab{}};
+  running.tick(inputs);
+  EXPECT_NEAR(running.state().positions[4].z() - centre.z(), 0.02, 1e-4);
+  inputs.grabs = {taking(running.state().positions[4], 0.001f), taking(running.state().positions[4], 0.001f)};
+  running.tick(inputs);
+  // One node, two hands: the first has it.
+  EXPECT_EQ(running.grabs()[0].taken, 1u);
+  EXPECT_EQ(running.grabs()[1].taken, 0u);
+  EXPECT_NEAR(running.state().velocities[4].norm(), 0, 1e-4);
+}
+
+TEST_F(Hold, GivesTheSameBitsHoweverTheWorkIsCut) {
+  model::Scene scene = sceneOf({calmCloth(33, 31)});
+  model::Cloth& cloth = scene.cloths[0];
+  cloth.attachments = {leftColumn(cloth)};
+  cloth.tethers = model::Tethers{};
+  const std::vector<Vec3> rest = model::restPositions(cloth);
+  const auto hashesOf = [&](simulation::SimulationOptions options) {
+    Running running(scene, options);
+    std::vector<std::uint64_t> hashes;
+    simulation::TickInputs inputs = inputsOf(scene);
+    inputs.grabs = {taking(rest[500], 0.07f), taking(rest[504], 0.07f)};
+    for (int tick = 1; tick <= 60; ++tick) {
+      inputs.attachments = {moved(Vec3(0.01f * static_cast<float>(tick), 0, 0))};
+      hashes.push_back(running.tick(inputs).stateHash);
+      for (Grab& grab : inputs.grabs) grab = onTheWay(grab, grab.end.position + Vec3(0.001f, 0.002f, 0.004f));
+    }
+    return hashes;
+  };
+  const std::vector<std::uint64_t> expected = hashesOf({});
+  EXPECT_EQ(hashesOf({.rowsPerInvocation = 3, .workgroupSize = 32}), expected);
+  EXPECT_EQ(hashesOf({.workgroupSize = 8}), expected);
+}
+
+}  // namespace
+}  // namespace clothstream::tests
