@@ -32,13 +32,6 @@ void writeMessage(std::string& out, std::uint64_t requestId, field::Field bodyFi
   fill(body);
 }
 
-void addVec3(Writer& parent, field::Field vec3Field, const Vec3& value) {
-  Writer vec3(parent, vec3Field.number);
-  vec3.add_float(field::Vec3::kX.number, value[0]);
-  vec3.add_float(field::Vec3::kY.number, value[1]);
-  vec3.add_float(field::Vec3::kZ.number, value[2]);
-}
-
 // Omits an orientation that is all zero. Writer itself omits nothing.
 void addPose(Writer& parent, field::Field poseField, std::span<const float, 3> position,
              std::span<const float, 4> orientation) {

@@ -109,13 +109,6 @@ bool readClothChange(Bytes message, ClothChange& change) {
   });
 }
 
-void addVec3(Writer& parent, field::Field vec3Field, const Vec3& value) {
-  Writer vec3(parent, vec3Field.number);
-  vec3.add_float(field::Vec3::kX.number, value[0]);
-  vec3.add_float(field::Vec3::kY.number, value[1]);
-  vec3.add_float(field::Vec3::kZ.number, value[2]);
-}
-
 void addVec3Value(Writer& parent, field::Field wrapperField, const std::optional<Vec3>& value) {
   if (!value) return;
   Writer wrapper(parent, wrapperField.number);
@@ -263,6 +256,13 @@ bool readSolver(Bytes message, Solver& out) {
         return true;
     }
   });
+}
+
+void addVec3(Writer& parent, field::Field vec3Field, const Vec3& value) {
+  Writer vec3(parent, vec3Field.number);
+  vec3.add_float(field::Vec3::kX.number, value[0]);
+  vec3.add_float(field::Vec3::kY.number, value[1]);
+  vec3.add_float(field::Vec3::kZ.number, value[2]);
 }
 
 void writeFields(Writer& message, const ParameterChange& change) {

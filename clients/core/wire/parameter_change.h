@@ -72,6 +72,9 @@ struct ParameterChange {
 [[nodiscard]] bool readGust(Bytes message, Gust& out);
 [[nodiscard]] bool readSolver(Bytes message, Solver& out);
 
+// Writes a Vec3 as a submessage.
+void addVec3(protozero::pbf_writer& parent, field::Field vec3Field, const Vec3& value);
+
 // Writes the fields of a ParameterChange.
 void writeFields(protozero::pbf_writer& message, const ParameterChange& change);
 
