@@ -134,7 +134,7 @@ struct Attachment {
 inline constexpr float kMaxAttachmentSpeed = 30;
 
 // Fraction of a grabbed node's distance from its place that a substep corrects.
-inline constexpr float kCaughtUp = 0.25f;
+inline constexpr float kGrabCorrectionFraction = 0.25f;
 
 // Long-range attachments: [KCM12] Kim, Chentanez, Mueller-Fischer, "Long Range Attachments", SCA 2012.
 struct Tethers {

@@ -46,7 +46,7 @@ Attachments::Attachments(const model::Scene& scene) {
 }
 
 void Attachments::begin(std::vector<ReferenceCloth>& cloths, std::span<const Pose> frames,
-                  std::span<const Grab> grabs, double tickSeconds) {
+                        std::span<const Grab> grabs, double tickSeconds) {
   for (const Attached& attached : attached_) {
     ReferenceCloth& cloth = cloths[attached.cloth];
     const Pose& frame = frames.empty() ? start_[attached.frame] : frames[attached.frame];
@@ -82,8 +82,8 @@ void Attachments::begin(std::vector<ReferenceCloth>& cloths, std::span<const Pos
   }
 }
 
-void Attachments::apply(std::vector<ReferenceCloth>& cloths, std::span<const Grab> grabs, std::uint32_t substep,
-                  std::uint32_t substeps, double tickSeconds) {
+void Attachments::apply(std::vector<ReferenceCloth>& cloths, std::span<const Grab> grabs,
+                        std::uint32_t substep, std::uint32_t substeps, double tickSeconds) {
   const double h = tickSeconds / substeps;
   for (std::size_t c = 0; c < cloths.size(); ++c) {
     ReferenceCloth& cloth = cloths[c];
@@ -104,8 +104,8 @@ void Attachments::apply(std::vector<ReferenceCloth>& cloths, std::span<const Gra
         held.reset();
         continue;
       }
-      Vec3 gained = (1 - double{model::kCaughtUp}) * ((after - before) / h - velocity) +
-                    double{model::kCaughtUp} * (after - position) / h;
+      Vec3 gained = (1 - double{model::kGrabCorrectionFraction}) * ((after - before) / h - velocity) +
+                    double{model::kGrabCorrectionFraction} * (after - position) / h;
       const double most = grab.maxForce / status_[held->grab].taken * cloth.inverseMasses()[node] * h;
       if (gained.norm() > most) gained *= most / gained.norm();
       velocity += gained;
