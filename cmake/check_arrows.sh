@@ -5,7 +5,8 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
 # room | the rooms of ours that it sees, beside itself
 readonly ARROWS='
-server/model       |
+proto/parameters   |
+server/model       | proto/parameters
 server/vulkan      |
 proto/codec        |
 proto/recording    | proto/codec clothstream
@@ -13,21 +14,21 @@ server/reference   | server/model
 server/telemetry   |
 server/simulation  | server/model server/vulkan shaders
 server/meshes      | server/model
-server/messages    | server/model server/meshes clothstream
+server/messages    | server/model server/meshes proto/parameters clothstream
 server/encode      | server/model server/simulation server/vulkan proto/codec shaders
 server/stream      | server/model server/vulkan server/simulation server/encode server/messages server/telemetry proto/codec clothstream
-server/recording   | server/model server/vulkan server/simulation server/messages server/stream proto/codec proto/recording clothstream
+server/recording   | proto/parameters server/model server/vulkan server/simulation server/messages server/stream proto/codec proto/recording clothstream
 server/step        | server/model server/vulkan server/simulation server/messages
 server/endpoint/grpc         | server/stream server/telemetry clothstream grpc/health
 server/endpoint/web         | server/stream server/telemetry clothstream
-clients/core       | proto/codec
-clients/core/stream | clients/core/core.h clients/core/wire proto/codec
-clients/core/wire  | clients/core/core.h proto/codec
+clients/core       | proto/codec proto/parameters
+clients/core/stream | clients/core/core.h clients/core/wire proto/codec proto/parameters
+clients/core/wire  | clients/core/core.h proto/codec proto/parameters
 clients/grpc       | clients/core clothstream
 clients/library    | clients/core clients/grpc
 clients/files      | proto/codec clothstream
 clients/load       | clients/core clients/grpc proto/codec clothstream
-clients/cli        | clients/core clients/grpc clients/files clients/load proto/codec proto/recording clothstream
+clients/cli        | clients/core clients/grpc clients/files clients/load proto/codec proto/parameters proto/recording clothstream
 '
 # rooms that may include these headers
 readonly OUTSIDE='

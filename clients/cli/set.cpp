@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A change, and the answer to it.
+// Sends a parameter change and waits for the answer.
 #include "clients/cli/set.h"
 
 #include <array>
@@ -17,10 +17,10 @@ namespace clothstream::cli {
 namespace {
 
 constexpr std::chrono::seconds kPatience{10};
-constexpr float kGustSeconds = 2;  // as scene.proto has it
+constexpr float kGustSeconds = 2;  // default of scene.proto
 
 bool changesCloths(const SetOptions& options) {
-  // By its bits: what is not to change is NaN.
+  // Compares the bits, because unchanged values are NaN.
   using Words = std::array<std::uint32_t, sizeof(cs_cloth_settings) / sizeof(std::uint32_t)>;
   cs_cloth_settings none;
   cs_keep_cloth_settings(&none);
@@ -31,7 +31,7 @@ bool changesEnvironment(const SetOptions& options) {
   return !options.gravity.empty() || !options.wind.empty() || options.airDensity;
 }
 
-// What the server said of this client's changes, on its way from the stream's thread.
+// Answers of the server to the changes of this client. The stream's thread adds them.
 class Answers {
  public:
   void heard(cs_client* client, std::uint32_t events) {
@@ -42,11 +42,12 @@ class Answers {
     changed_.notify_all();
   }
 
-  // Empty once `count` changes hold; else why not.
+  // Waits until `count` changes are accepted. Returns an empty string, or the reason of a failure.
   std::string waitFor(int count) {
     std::unique_lock lock(mutex_);
     if (!changed_.wait_for(lock, kPatience, [&] { return held_ >= count || !refusal_.empty(); }))
-      return fmt::format("the server has not answered within {} s", kPatience.count());
+      return fmt::format("the server did not answer within {} s; check its address and load, then try again",
+                         kPatience.count());
     return refusal_;
   }
 
@@ -62,8 +63,8 @@ std::string noSuchCloth(const cs_client* client, const std::string& name) {
   cs_cloth cloth;
   for (std::uint32_t i = 0; cs_get_cloth(client, i, &cloth) != 0; ++i)
     known += (known.empty() ? "" : ", ") + std::string(cloth.name);
-  return fmt::format("there is no cloth '{}' in the scene {}; there are {}", name, cs_scene_name(client),
-                     known);
+  return fmt::format("--cloth: '{}' does not exist in the scene {}; use one of {}", name,
+                     cs_scene_name(client), known);
 }
 
 }  // namespace
@@ -90,7 +91,7 @@ ExitCode set(const SetOptions& options) {
     (*joined)->visit([&](cs_client* client) { send(client); });
     if (refusal.empty()) refusal = answers.waitFor(changes);
   };
-  // Settings are of the cloth as its material makes it: that is to hold before.
+  // The material must be in effect before other settings apply to it.
   changeBy([&](cs_client* client) {
     if (options.material.empty()) return;
     cs_set_material(client, options.cloth.c_str(), options.material.c_str());

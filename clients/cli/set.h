@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// `clothstream set`: changes parameters of a scene that runs.
+// `clothstream set`: changes parameters of a running scene.
 #pragma once
 
 #include <optional>
@@ -12,21 +12,21 @@
 namespace clothstream::cli {
 
 struct SetOptions {
-  std::string address;  // as completeAddress gives it
+  std::string address;  // result of completeAddress()
   std::string scene;
   std::string cloth;                 // empty: every cloth
-  cs_cloth_settings settings;        // what is not given is as cs_keep_cloth_settings leaves it
-  std::vector<float> gravity, wind;  // three numbers, or none
+  cs_cloth_settings settings;        // values that are not given stay as cs_keep_cloth_settings sets them
+  std::vector<float> gravity, wind;  // three numbers; empty: no change
   std::optional<float> airDensity;
-  std::vector<float> gust;  // strength, and seconds; or none
-  std::string material;     // empty: as it is
+  std::vector<float> gust;  // strength and optional seconds; empty: no change
+  std::string material;     // empty: no change
 
   SetOptions() { cs_keep_cloth_settings(&settings); }
 };
 
 bool changesAnything(const SetOptions& options);
 
-// Joins, changes, waits until the server has said that it holds or why not, leaves.
+// Joins the scene, sends the change, waits until the server has accepted or refused it, and leaves.
 ExitCode set(const SetOptions& options);
 
 }  // namespace clothstream::cli

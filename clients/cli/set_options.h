@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The options of `clothstream set`.
+// Options of `clothstream set`.
 #pragma once
 
 #include <CLI/CLI.hpp>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The C interface over Client: parameters, as they stand and as they are changed.
+// The part of the C interface that reads and changes parameters.
 #include <cmath>
 #include <limits>
 #include <optional>
@@ -9,17 +9,17 @@
 #include "clients/core/core_handle.h"
 
 using namespace clothstream::client;
+using clothstream::parameters::ClothNumber;
+using clothstream::parameters::ClothNumbers;
+using clothstream::parameters::ClothParameter;
+using clothstream::parameters::kClothParameters;
+using clothstream::parameters::settingOf;
 
 namespace {
 
 std::optional<Vec3> vec3(const float* values) {
   if (!values) return std::nullopt;
   return Vec3{values[0], values[1], values[2]};
-}
-
-std::optional<Spring> spring(const float* values) {
-  if (!values) return std::nullopt;
-  return Spring{values[0], values[1]};
 }
 
 std::optional<float> scalar(const float* value) {
@@ -32,13 +32,26 @@ std::optional<float> given(float value) {
   return std::isnan(value) ? std::nullopt : std::optional(value);
 }
 
-// What is not given of a spring is as it is now.
-std::optional<Spring> changed(const float* values, const Spring& now) {
-  if (std::isnan(values[0]) && std::isnan(values[1])) return std::nullopt;
-  return Spring{given(values[0]).value_or(now[0]), given(values[1]).value_or(now[1])};
+void setSpring(ClothNumbers& numbers, ClothNumber stiffness, ClothNumber damping, const float* values) {
+  if (!values) return;
+  numbers[stiffness] = values[0];
+  numbers[damping] = values[1];
 }
 
-// What the server takes for what is not said (scene.proto).
+// Numbers that the settings change. The server replaces some groups as a whole: these get their current
+// numbers where the settings give none.
+ClothNumbers changed(const cs_cloth_settings& settings, const ClothNumbers& now) {
+  ClothNumbers change;
+  for (const ClothParameter& parameter : kClothParameters)
+    change[parameter.number] = settingOf(settings, parameter.number);
+  for (const ClothParameter& parameter : kClothParameters)
+    if (parameter.group && parameter.group->isReplaced && change.hasAnyOf(*parameter.group) &&
+        !change.has(parameter.number))
+      change[parameter.number] = now[parameter.number];
+  return change;
+}
+
+// Defaults of scene.proto.
 Solver defaultSolver(std::uint32_t kind) {
   Solver solver;
   solver.kind = kind;
@@ -66,21 +79,9 @@ std::optional<Solver> changed(const cs_cloth_settings& settings, const ClothPara
 }
 
 ClothChange changeOf(const Cloth& cloth, const cs_cloth_settings& settings) {
-  const ClothParameters& now = cloth.parameters;
   return {.name = cloth.name,
-          .structural = changed(settings.structural, now.structural),
-          .shear = changed(settings.shear, now.shear),
-          .bend = changed(settings.bend, now.bend),
-          .damping = given(settings.damping),
-          .drag = given(settings.drag),
-          .lift = given(settings.lift),
-          .friction = given(settings.friction),
-          .thickness = given(settings.thickness),
-          .solver = changed(settings, now),
-          .ballRadius = given(settings.ball_radius),
-          .ballFriction = given(settings.ball_friction),
-          .tetherSlack = given(settings.tether_slack),
-          .dihedralBending = given(settings.dihedral_bending)};
+          .numbers = changed(settings, cloth.parameters.numbers),
+          .solver = changed(settings, cloth.parameters)};
 }
 
 }  // namespace
@@ -99,10 +100,15 @@ int cs_get_environment(const cs_client* client, cs_environment* out) noexcept {
 int cs_get_cloth_parameters(const cs_client* client, uint32_t index, cs_cloth_parameters* out) noexcept {
   const Cloth* cloth = at(client->client.description().cloths, index);
   if (!cloth) return 0;
-  copy(cloth->parameters.structural, out->structural);
-  copy(cloth->parameters.shear, out->shear);
-  copy(cloth->parameters.bend, out->bend);
-  out->damping = cloth->parameters.damping;
+  cs_cloth_settings settings;
+  cs_keep_cloth_settings(&settings);
+  cs_get_cloth_settings(client, index, &settings);
+  for (int i = 0; i < 2; ++i) {
+    out->structural[i] = settings.structural[i];
+    out->shear[i] = settings.shear[i];
+    out->bend[i] = settings.bend[i];
+  }
+  out->damping = settings.damping;
   return 1;
 }
 
@@ -111,18 +117,8 @@ int cs_get_cloth_settings(const cs_client* client, uint32_t index, cs_cloth_sett
   if (!cloth || out->version != CS_CLOTH_SETTINGS_VERSION) return 0;
   const ClothParameters& parameters = cloth->parameters;
   cs_keep_cloth_settings(out);
-  copy(parameters.structural, out->structural);
-  copy(parameters.shear, out->shear);
-  copy(parameters.bend, out->bend);
-  out->damping = parameters.damping;
-  out->drag = parameters.drag;
-  out->lift = parameters.lift;
-  out->friction = parameters.friction;
-  out->thickness = parameters.thickness;
-  out->dihedral_bending = parameters.dihedralBending;
-  out->ball_radius = parameters.ballRadius.value_or(kAsIs);
-  out->ball_friction = parameters.ballFriction.value_or(kAsIs);
-  out->tether_slack = parameters.tetherSlack.value_or(kAsIs);
+  for (const ClothParameter& parameter : kClothParameters)
+    settingOf(*out, parameter.number) = parameters.numbers[parameter.number];
   out->solver = parameters.solver.kind;
   const bool constrained = out->solver == CS_SOLVER_CONSTRAINT || out->solver == CS_SOLVER_ACAD;
   if (constrained || out->solver == CS_SOLVER_XPBD || out->solver == CS_SOLVER_IMPLICIT_EULER)
@@ -175,34 +171,21 @@ void cs_set_cloth(cs_client* client, const char* cloth, const float* structural2
   ParameterChange change;
   ClothChange& clothChange = change.cloths.emplace_back();
   clothChange.name = cloth;
-  clothChange.structural = spring(structural2);
-  clothChange.shear = spring(shear2);
-  clothChange.bend = spring(bend2);
-  clothChange.damping = scalar(damping);
+  ClothNumbers& numbers = clothChange.numbers;
+  setSpring(numbers, ClothNumber::structuralStiffness, ClothNumber::structuralDamping, structural2);
+  setSpring(numbers, ClothNumber::shearStiffness, ClothNumber::shearDamping, shear2);
+  setSpring(numbers, ClothNumber::bendStiffness, ClothNumber::bendDamping, bend2);
+  if (damping) numbers[ClothNumber::damping] = *damping;
   client->client.change(change);
 }
 
 void cs_keep_cloth_settings(cs_cloth_settings* out) noexcept {
-  *out = {.version = CS_CLOTH_SETTINGS_VERSION,
-          .structural = {kAsIs, kAsIs},
-          .shear = {kAsIs, kAsIs},
-          .bend = {kAsIs, kAsIs},
-          .damping = kAsIs,
-          .drag = kAsIs,
-          .lift = kAsIs,
-          .friction = kAsIs,
-          .thickness = kAsIs,
-          .solver = CS_SOLVER_AS_IS,
-          .bend_constraints = -1,
-          .iterations = 0,
-          .tolerance = kAsIs,
-          .compliance = kAsIs,
-          .activation = kAsIs,
-          .assembled = -1,
-          .dihedral_bending = kAsIs,
-          .ball_radius = kAsIs,
-          .ball_friction = kAsIs,
-          .tether_slack = kAsIs};
+  *out = {};
+  out->version = CS_CLOTH_SETTINGS_VERSION;
+  out->solver = CS_SOLVER_AS_IS;
+  out->bend_constraints = out->assembled = -1;
+  out->tolerance = out->compliance = out->activation = kAsIs;
+  for (const ClothParameter& parameter : kClothParameters) settingOf(*out, parameter.number) = kAsIs;
 }
 
 int cs_change_cloth(cs_client* client, const char* cloth, const cs_cloth_settings* settings) noexcept {

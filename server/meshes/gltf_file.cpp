@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// glTF 2.0, read by tinygltf; accessors and nodes are checked here.
+// Reads glTF 2.0 with tinygltf. Checks accessors and nodes.
 #include "server/meshes/gltf_file.h"
 
 #include <cstring>
@@ -16,7 +16,7 @@ using Affine = Eigen::Affine3d;
 template <typename T>
 using Expected = tl::expected<T, std::string>;
 
-// Elements of an accessor in its buffer, bounds checked.
+// Elements of an accessor in its buffer. The bounds are checked.
 struct Elements {
   const unsigned char* first = nullptr;
   std::size_t stride = 0, count = 0;
@@ -39,11 +39,12 @@ auto* find(const Things& things, int index) {
 
 Expected<Elements> elementsOf(const tinygltf::Model& model, int index, int type) {
   const tinygltf::Accessor* accessor = find(model.accessors, index);
-  if (!accessor) return tl::unexpected(fmt::format("accessor {} is not there", index));
+  if (!accessor) return tl::unexpected(fmt::format("accessor {} does not exist", index));
   const auto refuse = [&](std::string_view what) {
     return tl::unexpected(fmt::format("accessor {} {}", index, what));
   };
-  if (accessor->sparse.isSparse) return refuse("is sparse, which is not supported: export it without");
+  if (accessor->sparse.isSparse)
+    return refuse("is sparse, which is not supported: export it without sparse accessors");
   if (accessor->type != type) return refuse("has the wrong number of components");
   const tinygltf::BufferView* view = find(model.bufferViews, accessor->bufferView);
   const tinygltf::Buffer* buffer = view ? find(model.buffers, view->buffer) : nullptr;
@@ -89,7 +90,7 @@ Expected<std::vector<std::uint32_t>> readIndices(const tinygltf::Model& model,
         break;
       default:
         return tl::unexpected(
-            fmt::format("accessor {} has indices that are no unsigned integers", primitive.indices));
+            fmt::format("accessor {} has indices that are not unsigned integers", primitive.indices));
     }
   }
   return indices;
@@ -143,21 +144,21 @@ class Gatherer {
   }
 
  private:
-  // Without recursion: trees from outside may be deep.
+  // Avoids recursion, because trees from outside may be deep.
   Expected<void> addTree(int root) {
     std::vector<std::pair<int, Affine>> open{{root, Affine::Identity()}};
     while (!open.empty()) {
       const auto [index, parent] = open.back();
       open.pop_back();
       const tinygltf::Node* node = find(model_.nodes, index);
-      if (!node) return tl::unexpected(fmt::format("node {} is not there", index));
+      if (!node) return tl::unexpected(fmt::format("node {} does not exist", index));
       if (visited_[static_cast<std::size_t>(index)])
-        return tl::unexpected(fmt::format("node {} has two parents, or is its own", index));
+        return tl::unexpected(fmt::format("node {} has two parents or is its own ancestor", index));
       visited_[static_cast<std::size_t>(index)] = true;
       const Affine transform = parent * localTransform(*node);
       if (node->mesh >= 0) {
         const tinygltf::Mesh* mesh = find(model_.meshes, node->mesh);
-        if (!mesh) return tl::unexpected(fmt::format("mesh {} is not there", node->mesh));
+        if (!mesh) return tl::unexpected(fmt::format("mesh {} does not exist", node->mesh));
         if (auto done = addMesh(*mesh, transform); !done) return done;
       }
       // NOLINTNEXTLINE(modernize-loop-convert): backwards
@@ -183,11 +184,11 @@ class Gatherer {
     const auto vertices = elementsOf(model_, position->second, TINYGLTF_TYPE_VEC3);
     if (!vertices) return tl::unexpected(vertices.error());
     if (vertices->componentType != TINYGLTF_COMPONENT_TYPE_FLOAT)
-      return tl::unexpected(std::string("has positions that are no floats: export it without compression"));
+      return tl::unexpected(std::string("has positions that are not floats: export it without compression"));
     const auto indices = readIndices(model_, primitive, vertices->count);
     if (!indices) return tl::unexpected(indices.error());
     if (indices->size() % 3 != 0)
-      return tl::unexpected(fmt::format("has {} indices, which are no whole triangles", indices->size()));
+      return tl::unexpected(fmt::format("has {} indices, which is not a multiple of three", indices->size()));
 
     const auto firstVertex = source_.vertices.size();
     const auto firstUv = source_.uvs.size();
@@ -222,13 +223,13 @@ class Gatherer {
       const auto uv = readUv(*elements, i);
       if (!uv)
         return tl::unexpected(std::string("has texture coordinates of a type that glTF does not have"));
-      // glTF's v runs down the picture, ours up.
+      // v runs downwards in glTF and upwards here.
       source_.uvs.emplace_back(uv->x(), 1 - uv->y());
     }
     return {};
   }
 
-  // A mirrored mesh shows its back: its triangles are turned round, as the specification asks.
+  // A mirrored mesh shows its back. The specification requires that its triangles are reversed.
   void addFaces(const std::vector<std::uint32_t>& indices, std::uint32_t firstVertex, std::uint32_t firstUv,
                 bool mirrored) {
     const std::uint32_t limit = std::numeric_limits<std::uint32_t>::max();
@@ -253,7 +254,7 @@ class Gatherer {
 
 tl::expected<MeshSource, std::string> readGltf(const std::filesystem::path& path, bool binary) {
   tinygltf::TinyGLTF loader;
-  // Pictures are not ours to decode.
+  // Images are not needed, so they are not decoded.
   loader.SetImageLoader([](tinygltf::Image*, int, std::string*, std::string*, int, int, const unsigned char*,
                            int, void*) { return true; },
                         nullptr);
@@ -263,11 +264,11 @@ tl::expected<MeshSource, std::string> readGltf(const std::filesystem::path& path
                            : loader.LoadASCIIFromFile(&model, &error, &warning, path.string());
   while (!error.empty() && error.back() == '\n') error.pop_back();
   if (!read)
-    return tl::unexpected(fmt::format("is no glTF 2.0: {}", error.empty() ? "cannot be parsed" : error));
+    return tl::unexpected(fmt::format("is not glTF 2.0: {}", error.empty() ? "cannot be parsed" : error));
   for (const std::string& extension : model.extensionsRequired)
     if (extension != "KHR_texture_transform" && !extension.starts_with("KHR_materials"))
-      return tl::unexpected(
-          fmt::format("needs the extension {}, which is not supported: export it without", extension));
+      return tl::unexpected(fmt::format(
+          "needs the extension {}, which is not supported: export it without that extension", extension));
   return Gatherer(model).gather();
 }
 

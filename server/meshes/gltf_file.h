@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// glTF 2.0, as text or binary.
+// Reads glTF 2.0 files.
 #pragma once
 
 #include <filesystem>
@@ -11,7 +11,7 @@
 
 namespace clothstream::meshes {
 
-// mesh_file.h says what of it.
+// mesh_file.h describes the result. `binary` means .glb.
 [[nodiscard]] tl::expected<MeshSource, std::string> readGltf(const std::filesystem::path& path, bool binary);
 
 }  // namespace clothstream::meshes

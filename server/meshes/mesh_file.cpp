@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Which file is read how.
+// Selects the reader of a mesh file by its extension.
 #include "server/meshes/mesh_file.h"
 
 #include <algorithm>
@@ -44,7 +44,7 @@ tl::expected<MeshSource, std::string> read(const std::filesystem::path& path, st
   if (kindOfFile == ".obj") return readObj(path, bytes);
   if (kindOfFile == ".gltf" || kindOfFile == ".glb") return readGltf(path, kindOfFile == ".glb");
   return tl::unexpected(
-      std::string("is of a kind that is not read; .obj, .gltf and .glb are: export it as one"));
+      std::string("has an unknown extension; must be .obj, .gltf or .glb: export it as one of these"));
 }
 
 }  // namespace

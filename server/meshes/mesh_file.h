@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Meshes on disk: Wavefront OBJ and glTF 2.0.
+// Reads mesh files: Wavefront OBJ and glTF 2.0.
 #pragma once
 
 #include <filesystem>
@@ -12,13 +12,13 @@
 
 namespace clothstream::meshes {
 
-// A text in the OBJ format. Faces have three or four corners; a part begins wherever object, group or
-// material changes, and has the material's name, else the object's. Materials themselves are not read.
+// Parses text in the OBJ format. Faces must have three or four corners. A new part starts where object, group
+// or material changes. Its name is that of the material, or else of the object. Material files are not read.
 [[nodiscard]] tl::expected<MeshSource, std::string> parseObj(std::string_view text);
 
-// By its ending: .obj, .gltf or .glb, of at most `maxBytes`. Of a glTF the triangles of all meshes in its
-// scene, where its nodes put them, a part a primitive, named after its material, else its mesh; the texture
-// coordinates are TEXCOORD_0. The error begins with the path.
+// Reads an .obj, .gltf or .glb file of at most `maxBytes`. The result of a glTF file contains the triangles
+// of all meshes in its scene, transformed by its nodes. Each primitive is a part with the name of its
+// material, or else of its mesh. Texture coordinates are TEXCOORD_0. The error starts with the path.
 [[nodiscard]] tl::expected<MeshSource, std::string> readMeshFile(const std::filesystem::path& path,
                                                                  std::uint64_t maxBytes);
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// From a source to a mesh that is fit to be simulated.
+// Builds a mesh that can be simulated.
 #include "server/meshes/mesh_source.h"
 
 #include <algorithm>
@@ -66,26 +66,26 @@ Problem place(const MeshSource& source, const MeshOptions& options, const MeshLi
               : Vec3((origin + rotation * (double{options.scale} * vertex.cast<double>())).cast<float>());
     if (!(p.cwiseAbs().maxCoeff() <= limits.maxCoordinate))
       return fmt::format(
-          "vertex {} comes to lie at {}, metres; each axis must stay within {:g} of the origin: set its "
-          "scale "
-          "(0.01 for centimetres) or move it",
+          "vertex {} is at {} m after scaling; each coordinate must be within {:g} m of the origin: set the "
+          "scale (0.01 for "
+          "centimetres) or move it",
           placed.size(), shown(p), limits.maxCoordinate);
     placed.push_back(p);
   }
   return std::nullopt;
 }
 
-// 21 bits an axis wrap, which only makes some cells share a key.
+// Coordinates wrap at 21 bits per axis. Cells that share a key cost time only.
 std::uint64_t cellKey(std::int64_t x, std::int64_t y, std::int64_t z) {
   constexpr std::int64_t kMask = (1 << 21) - 1;
   return static_cast<std::uint64_t>((x & kMask) | (y & kMask) << 21 | (z & kMask) << 42);
 }
 
-// m; keeps the numbers of cells within 64 bits.
+// Minimum size of a cell in metres. It keeps cell indices within 64 bits.
 constexpr double kSmallestCell = 1e-9;
 
-// Of each vertex the first one before it that is near enough, else itself. Cells are some times larger, so
-// that what is near enough mostly lies in the vertex's own.
+// For each vertex the first earlier vertex within the distance, or else itself. Cells are larger than the
+// distance, so that a close vertex is usually in the same cell.
 std::vector<std::uint32_t> weld(const std::vector<Vec3>& positions, float distance) {
   std::vector<std::uint32_t> first(positions.size());
   std::iota(first.begin(), first.end(), 0u);
@@ -113,7 +113,7 @@ std::vector<std::uint32_t> weld(const std::vector<Vec3>& positions, float distan
   return first;
 }
 
-// Every third bit of a number of 21 bits.
+// Spreads 21 bits to every third bit.
 std::uint64_t spread(std::uint64_t x) {
   x &= (1u << 21) - 1;
   x = (x | x << 32) & 0x001F00000000FFFFull;
@@ -123,8 +123,8 @@ std::uint64_t spread(std::uint64_t x) {
   return (x | x << 2) & 0x1249249249249249ull;
 }
 
-// Along a Morton curve through the bounding cube. The order depends on places alone, so that ordering twice
-// changes nothing; where two share a cell of the curve they keep their order.
+// Order along a Morton curve through the bounding cube. It depends on positions only, so ordering twice
+// changes nothing. Vertices in the same cell of the curve keep their order.
 std::vector<std::uint32_t> curveOrder(const std::vector<Vec3>& positions, std::vector<std::uint32_t> nodes) {
   Vec3 low = positions[nodes.front()], high = low;
   for (const std::uint32_t i : nodes) {
@@ -143,7 +143,7 @@ std::vector<std::uint32_t> curveOrder(const std::vector<Vec3>& positions, std::v
   return nodes;
 }
 
-// The nodes and the source's numbers side by side.
+// Nodes and the corresponding indices of the source.
 struct Numbering {
   std::vector<std::uint32_t> nodeOfVertex, vertexOfNode;
 };
@@ -176,9 +176,7 @@ Problem checkFace(const MeshSource& source, std::size_t f, const Numbering& numb
                                            face.vertices[corner], face.vertices[other]);
       if (a == b)
         return fmt::format(
-            "{} are the same node; delete the face, or make weldDistance smaller than they lie "
-            "apart",
-            what);
+            "{} are the same node; delete the face, or make weldDistance smaller than their distance", what);
       const float length = (positions[a] - positions[b]).norm();
       if (length < minEdge)
         return fmt::format("{} lie {:g} m apart; at least {:g} is needed: merge them, or set the scale", what,
@@ -187,13 +185,13 @@ Problem checkFace(const MeshSource& source, std::size_t f, const Numbering& numb
   return std::nullopt;
 }
 
-// A triangle whose corners lie on one line has no area to be drawn, nor to feel the air.
+// A triangle whose corners are on one line has no area, so it cannot be drawn and has no air resistance.
 bool isFlat(const Vec3& a, const Vec3& b, const Vec3& c) {
   const double longest = std::max({(b - a).squaredNorm(), (c - b).squaredNorm(), (a - c).squaredNorm()});
   return double{(b - a).cross(c - a).norm()} < 1e-5 * longest;
 }
 
-// Appends the face's triangles, and says which face each is of.
+// Appends the triangles of the face, and the face of each triangle.
 Problem appendFace(const MeshSource& source, std::size_t f, const Numbering& numbering,
                    model::MeshShape& shape, std::vector<std::size_t>& faceOfTriangle) {
   const SourceFace& face = source.faces[f];
@@ -211,23 +209,24 @@ Problem appendFace(const MeshSource& source, std::size_t f, const Numbering& num
   };
   if (face.cornerCount == 3) return append(0, 1, 2);
   shape.quads.push_back(static_cast<std::uint32_t>(shape.triangles.size()));
-  // On a tie the second, as a grid given row by row is halved.
+  // Equal diagonals: the second one, as in a grid.
   const bool fromFirst = (at(0) - at(2)).squaredNorm() < 0.9999f * (at(1) - at(3)).squaredNorm();
   Problem problem = fromFirst ? append(0, 1, 2) : append(0, 1, 3);
   if (problem) return problem;
   return fromFirst ? append(0, 2, 3) : append(1, 2, 3);
 }
 
-// Those of the source that come as two triangles.
+// Quads that the source gives as two triangles.
 Problem addQuads(const MeshSource& source, const std::vector<std::size_t>& faceOfTriangle,
                  model::MeshShape& shape) {
   std::size_t free = 0;
   for (const std::size_t f : source.halves) {
     const auto refuse = [&](std::string_view why) {
-      return fmt::format("faces {} and {} are no quad: {}", f, f + 1, why);
+      return fmt::format("faces {} and {} are not a quad: {}", f, f + 1, why);
     };
     if (f < free || f + 1 >= source.faces.size())
-      return refuse("a quad is a face and the one after it, in ascending order, each of one quad");
+      return refuse(
+          "a quad is a face and the next one, listed in ascending order, and no face may be in two quads");
     if (source.faces[f].cornerCount != 3 || source.faces[f + 1].cornerCount != 3)
       return refuse("its halves must be triangles");
     free = f + 2;

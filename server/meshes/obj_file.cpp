@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Wavefront OBJ, read by tinyobjloader.
+// Reads Wavefront OBJ with tinyobjloader.
 #include <istream>
 #include <streambuf>
 
@@ -11,16 +11,16 @@
 namespace clothstream::meshes {
 namespace {
 
-// A text as a stream, without a copy.
+// Stream over a text without a copy.
 class TextBuffer : public std::streambuf {
  public:
   explicit TextBuffer(std::string_view text) {
-    char* begin = const_cast<char*>(text.data());  // get areas are never written
+    char* begin = const_cast<char*>(text.data());  // a stream never writes to its get area
     setg(begin, begin, begin + text.size());
   }
 };
 
-// The loader takes what is no number as 0 without a word.
+// The loader silently reads text that is not a number as 0.
 tl::expected<void, std::string> checkVertexLines(std::string_view text) {
   std::size_t line = 1;
   for (std::size_t start = 0; start < text.size(); ++line) {
@@ -36,7 +36,7 @@ tl::expected<void, std::string> checkVertexLines(std::string_view text) {
   return {};
 }
 
-// What the loader calls, statement by statement.
+// Callbacks of the loader, one for each kind of statement.
 class ObjReader {
  public:
   tl::expected<MeshSource, std::string> read(std::string_view text) {
@@ -58,7 +58,7 @@ class ObjReader {
     std::string warning, error;
     const bool read = tinyobj::LoadObjWithCallback(stream, callbacks, this, nullptr, &warning, &error);
     if (!problem_.empty()) return tl::unexpected(std::move(problem_));
-    if (!read) return tl::unexpected(fmt::format("is no OBJ: {}", error));
+    if (!read) return tl::unexpected(fmt::format("is not OBJ: {}", error));
     if (!everyCornerHasUv_) source_.uvs.clear();
     return std::move(source_);
   }
@@ -92,8 +92,8 @@ class ObjReader {
     }
   }
 
-  // From 1 upwards, or backwards from the newest; what is neither comes out too large, which buildMesh()
-  // refuses.
+  // Indices count from 1, or backwards from the newest element if negative. Any other index becomes too
+  // large, and buildMesh() refuses it.
   static std::uint32_t absolute(int index, std::size_t count) {
     return static_cast<std::uint32_t>(index > 0    ? index - 1
                                       : index == 0 ? -1

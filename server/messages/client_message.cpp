@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Envelopes, greetings and collider poses from clients.
+// Converts envelopes, join requests and poses of clients.
 #include "server/messages/client_message.h"
 
 #include <algorithm>
@@ -23,7 +23,7 @@ tl::unexpected<FieldError> refuse(v1::ErrorCode code, std::string text) {
 
 void checkNew(Checks& checks, const Path& path, std::uint32_t id, std::unordered_set<std::uint32_t>& ids) {
   if (!ids.insert(id).second)
-    checks.fail(path / "id", fmt::format("{}", id), "is another's id already; ids must be unique");
+    checks.fail(path / "id", fmt::format("{}", id), "is used twice; ids must be unique");
 }
 
 void readColliders(Checks& checks, const Path& poses, const v1::ColliderPoses& message,
@@ -96,10 +96,10 @@ Result<v1::ClientMessage> parseClientMessage(std::span<const std::byte> bytes) {
   v1::ClientMessage message;
   if (!message.ParseFromArray(bytes.data(), static_cast<int>(bytes.size())))
     return refuse(v1::ERROR_CODE_MALFORMED_MESSAGE,
-                  fmt::format("{} bytes are no clothstream.v1.ClientMessage", bytes.size()));
+                  fmt::format("{} bytes are not a clothstream.v1.ClientMessage", bytes.size()));
   if (message.body_case() == v1::ClientMessage::BODY_NOT_SET)
     return refuse(v1::ERROR_CODE_MALFORMED_MESSAGE,
-                  "a clothstream.v1.ClientMessage without a body that this server knows");
+                  "a clothstream.v1.ClientMessage has no body that this server knows");
   return message;
 }
 
@@ -113,7 +113,7 @@ Result<Joining> toJoining(const v1::Hello& message, std::span<const std::uint32_
   const auto codec = std::ranges::find_first_of(message.codecs(), codecs);
   if (codec == message.codecs().end())
     checks.fail(hello / "codecs", "",
-                fmt::format("must have one that this server encodes: {}", fmt::join(codecs, ", ")),
+                fmt::format("must contain a codec of this server: {}", fmt::join(codecs, ", ")),
                 v1::ERROR_CODE_UNSUPPORTED_CODEC);
   if (!message.scene().empty()) checks.name(hello / "scene", message.scene());
   checks.label(hello / "clientName", message.client_name());

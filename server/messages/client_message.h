@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What clients send, checked: bytes to envelopes, envelopes to domain types.
+// Messages of clients: parses and checks them, and converts them to the model.
 #pragma once
 
 #include <cstddef>
@@ -14,35 +14,35 @@
 
 namespace clothstream::messages {
 
-// The newest protocol version that this server speaks.
+// Newest protocol version that this server speaks.
 inline constexpr std::uint32_t kProtocolVersion = 1;
 
-// One envelope of at most limits::kMaxClientMessageBytes, with a body. MALFORMED_MESSAGE where the bytes are
-// no ClientMessage, RESOURCE_EXHAUSTED where they are too many.
+// Parses an envelope of at most limits::kMaxClientMessageBytes that has a body. Errors: MALFORMED_MESSAGE if
+// the bytes are not a ClientMessage, RESOURCE_EXHAUSTED if they are too many.
 [[nodiscard]] Result<v1::ClientMessage> parseClientMessage(std::span<const std::byte> bytes);
 
-// What both ends have agreed on, and who joins.
+// Join request after the negotiation of version and codec.
 struct Joining {
   std::uint32_t protocolVersion = 0;
   std::uint32_t codec = 0;
   std::string scene;  // empty: the server's default
   std::string clientName, displayName;
   v1::Role role = v1::ROLE_UNSPECIFIED;
-  // The most that it wants of the stream.
-  std::uint8_t quality = 0;         // the finest
-  std::uint8_t temporalLayers = 1;  // so many
+  // Upper limits that the client sets for its stream.
+  std::uint8_t quality = 0;         // finest quality; 0 is the finest of all
+  std::uint8_t temporalLayers = 1;  // number of temporal layers
 };
 
-// `codecs` are the server's; the client's best that is among them is taken.
+// `codecs` are the codecs of the server. Selects the first codec of the client that is among them.
 [[nodiscard]] Result<Joining> toJoining(const v1::Hello& message, std::span<const std::uint32_t> codecs);
 
-// At most limits::kMaxParticipantColliders, those of hands after the others, and
-// limits::kMaxParticipantGrabs, with unique ids; attachments that this scene has, each once.
+// At most limits::kMaxParticipantColliders colliders, with the bones of hands last, and
+// limits::kMaxParticipantGrabs grabs. Ids must be unique. Attachments must exist in the scene.
 [[nodiscard]] Result<model::ParticipantPoses> toPoses(const v1::ColliderPoses& message,
                                                       const model::Scene& scene);
 
-// A change that may be applied to this scene as a whole: names exist in it, values are in range, and it stays
-// stable with its substeps.
+// Refuses a change that cannot be applied to this scene as a whole: if a name does not exist, a value is out
+// of range, or the scene would be unstable with its substeps.
 [[nodiscard]] Result<model::ParameterChange> toParameterChange(const v1::ParameterChange& message,
                                                                const model::Scene& scene);
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Stream descriptions, collider states, chunks.
+// Writes stream descriptions, collider states and chunks.
 #include "server/messages/description.h"
 
 #include <algorithm>
@@ -18,7 +18,7 @@ namespace {
 
 static_assert(sizeof(model::Vec3) == 12 && sizeof(model::Uv) == 8 && sizeof(model::Triangle) == 12);
 
-// Of elements that are floats or numbers side by side.
+// Bytes of contiguous elements that consist of floats or integers.
 template <typename Element>
 std::string littleEndian(const std::vector<Element>& elements) {
   static_assert(std::endian::native == std::endian::little);
@@ -139,7 +139,7 @@ v1::Chunk toChunk(std::uint64_t contentId, v1::ContentKind kind, std::span<const
   chunk.set_count(static_cast<std::uint32_t>(chunkCount(total)));
   chunk.set_total_bytes(total);
   chunk.mutable_data()->reserve(end - begin);
-  std::size_t start = 0;  // of the part
+  std::size_t start = 0;  // offset of the part in the content
   for (const std::string_view part : parts) {
     const std::size_t from = std::max(begin, start), to = std::min(end, start + part.size());
     if (from < to) chunk.mutable_data()->append(part.substr(from - start, to - from));

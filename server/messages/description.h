@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What a client needs before its first frame, and how large things are cut for the wire.
+// Stream descriptions, collider states and chunks of large content.
 #pragma once
 
 #include <cstddef>
@@ -13,31 +13,30 @@
 
 namespace clothstream::messages {
 
-// Overwrites every field of `state`, so that one message can be filled again each tick. A participant's
-// collider is named by its id. A hull's shape is left out.
+// Overwrites every field of `state`, so that one message can be reused each tick. A collider of a participant
+// has an id but no name. The shape of a hull is left out.
 void write(const model::Collider& collider, const model::Pose& pose, v1::ColliderState& state);
 void write(const model::ParticipantCollider& collider, std::uint64_t participantId, v1::ColliderState& state);
 
-// What a cloth's vertices, triangles and texture coordinates take in a description.
+// Bytes of a cloth's vertices, triangles and texture coordinates in a description.
 std::size_t geometryBytes(const model::Cloth& cloth);
 
-// With the scene's own colliders, hulls too, as they are at `seconds` of simulated time. The scene must be
-// valid.
+// Includes the colliders of the scene, with hulls, at `seconds` of simulated time. The scene must be valid.
 v1::StreamDescription toDescription(const model::Scene& scene, std::uint32_t epoch, std::uint32_t codec,
                                     double seconds);
-// Its two parts, which one after the other on the wire are the whole: `cloths`, most of its bytes, which stay
-// as they are while the scene runs, and all else.
+// The two parts of a description. Their bytes, concatenated, are the whole description. The cloths are most
+// of the bytes and do not change while the scene runs.
 v1::StreamDescription clothsOfDescription(const model::Scene& scene);
 v1::StreamDescription descriptionWithoutCloths(const model::Scene& scene, std::uint32_t epoch,
                                                std::uint32_t codec, double seconds);
 
-// A scene as a list shows it; who is in it, and whether it runs, only the caller knows.
+// Summary of a scene for a list. The caller adds the participants and whether the scene runs.
 v1::SceneSummary toSummary(const model::Scene& scene);
 
-// How many pieces a content of so many bytes has: of limits::kMaxChunkBytes, the last may be shorter; one
-// empty piece for empty content.
+// Number of chunks of a content. Each has limits::kMaxChunkBytes, the last may be shorter. Empty content has
+// one empty chunk.
 std::size_t chunkCount(std::size_t contentBytes);
-// One of them, of the content that these parts are one after the other; it has at most
+// One chunk of a content that is the concatenation of `parts`. The content has at most
 // limits::kMaxContentBytes.
 v1::Chunk toChunk(std::uint64_t contentId, v1::ContentKind kind, std::span<const std::string_view> parts,
                   std::size_t index);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The files of server/scenes/ as they were when the program was built.
+// Scene files of server/scenes/, embedded when the program is built.
 #pragma once
 
 #include <span>
@@ -12,10 +12,10 @@ struct EmbeddedScene {
   std::string_view json;
 };
 
-// In the order of their names.
+// Sorted by name.
 std::span<const EmbeddedScene> embeddedScenes();
 
-// An OBJ file that one of them names.
+// OBJ file that an embedded scene refers to.
 struct EmbeddedMesh {
   std::string_view file;
   std::string_view obj;

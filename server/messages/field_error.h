@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What is said about a value from outside that is refused.
+// Error about a refused value from outside.
 #pragma once
 
 #include <string>
@@ -10,7 +10,7 @@
 
 namespace clothstream::messages {
 
-// `text` names the field's path, its value and what is allowed, such as
+// `text` gives the path of the field, its value and the allowed values, such as
 //   cloths[0].structural.stiffness = -3: must be a finite number from 0 to 1e+06
 struct FieldError {
   v1::ErrorCode code = v1::ERROR_CODE_INVALID_ARGUMENT;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Joints to capsules.
+// Converts joints to capsules.
 #include "server/messages/hands.h"
 
 #include <array>
@@ -12,7 +12,7 @@
 namespace clothstream::messages {
 namespace {
 
-// Joints in OpenXR's order; WebXR's begins with the wrist.
+// Joints in the order of OpenXR. The order of WebXR starts with the wrist.
 constexpr std::size_t kJoints = 26, kJointsWithoutPalm = 25;
 constexpr std::size_t kWrist = 1, kIndexProximal = 7, kMiddleMetacarpal = 11, kMiddleProximal = 12,
                       kLittleProximal = 22;
@@ -20,7 +20,7 @@ constexpr std::size_t kWrist = 1, kIndexProximal = 7, kMiddleMetacarpal = 11, kM
 struct Bone {
   std::size_t from, to;
 };
-// Thumb; index, middle, ring and little finger; wrist.
+// Bones of the thumb; of index, middle, ring and little finger; from the wrist.
 constexpr std::array<Bone, kHandBones> kBones{{{2, 3},   {3, 4},   {4, 5},   {6, 7},
                                                {7, 8},   {8, 9},   {9, 10},  {11, 12},
                                                {12, 13}, {13, 14}, {14, 15}, {16, 17},
@@ -33,8 +33,8 @@ struct Joints {
   std::array<float, kJoints> radii;
 };
 
-// From Y to the bone. X is kept in the plane of the bone and what lies across it, so that a capsule that
-// follows a hand does not spin about itself.
+// Rotation that turns Y to the direction of the bone. X stays in the plane of the bone and `across`, so that
+// a capsule that follows a hand does not spin around its axis.
 model::Quaternion along(const model::Vec3& bone, const model::Vec3& across) {
   const float length = bone.norm();
   if (!(length > 0)) return model::Quaternion::Identity();
@@ -55,7 +55,7 @@ bool readJoints(Checks& checks, const Path& path, const v1::HandJoints& message,
                             kJointsWithoutPalm));
   checks.count(path / "positions", static_cast<std::size_t>(message.positions_size()), 3 * count, 3 * count);
   if (checks.failed()) return false;
-  // Without a palm, of which no bone is.
+  // Skips the palm joint, which belongs to no bone.
   const std::size_t first = kJoints - count;
   for (std::size_t i = 0; i < count; ++i) {
     const auto element = static_cast<int>(i);

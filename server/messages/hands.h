@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Tracked hands, as the capsules that cloth collides with.
+// Converts tracked hands to capsules that collide with cloth.
 #pragma once
 
 #include <cstddef>
@@ -12,15 +12,15 @@
 
 namespace clothstream::messages {
 
-// Capsules of a hand: the thumb's three bones, each finger's four, of which the first lies in the palm, and
-// one from the wrist to the middle finger.
+// Number of capsules per hand: three bones of the thumb, four of each finger (the first one lies in the
+// palm), and one from the wrist to the middle finger.
 inline constexpr std::size_t kHandBones = 20;
-// Ids of a hand's bones begin here, 32 apart for the second side.
+// Id of the first bone of the left hand. Ids of the right hand start 32 higher.
 inline constexpr std::uint32_t kFirstBoneId = 0x80000000;
 
-// kHandBones capsules, each between two joints with the mean of their radii, in the order of
-// docs/protocol.md. Refuses what is no hand: another number of joints than 26 or 25, numbers out of range,
-// joints too far from the wrist. Empty if so.
+// Returns kHandBones capsules in the order of docs/protocol.md. Each connects two joints and has the mean of
+// their radii. Refuses a number of joints other than 26 or 25, numbers out of range, and joints too far from
+// the wrist. Then returns an empty vector.
 [[nodiscard]] std::vector<model::ParticipantCollider> toBones(Checks& checks, const Path& path,
                                                               const v1::HandJoints& message);
 

@@ -1,18 +1,16 @@
 // SPDX-License-Identifier: MIT
-// What values from outside may be: the one place for every number that is checked.
+// Limits of values from outside. proto/parameters/cloth_parameters.h has the limits of a cloth's numbers.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
 
+#include "proto/parameters/cloth_parameters.h"
 #include "server/model/stability.h"
 
 namespace clothstream::messages {
 
-// Both ends included.
-struct Range {
-  double min, max;
-};
+using parameters::Range;
 
 namespace limits {
 
@@ -20,14 +18,14 @@ inline constexpr std::uint32_t kMaxRate = 1000;  // ticks/s
 inline constexpr std::uint32_t kMaxSubsteps = model::kMaxSubsteps;
 inline constexpr std::size_t kMaxCloths = 256;
 inline constexpr std::size_t kMaxColliders = 64;
-inline constexpr std::size_t kMaxPins = 4096;        // ranges a cloth
-inline constexpr std::size_t kMaxAttachments = 64;   // of a scene
-inline constexpr std::size_t kMaxMotionKeys = 1024;  // a collider
+inline constexpr std::size_t kMaxPins = 4096;        // ranges per cloth
+inline constexpr std::size_t kMaxAttachments = 64;   // per scene
+inline constexpr std::size_t kMaxMotionKeys = 1024;  // per collider
 inline constexpr std::size_t kMinHullParts = 4;      // vertices, faces
 inline constexpr std::size_t kMaxHullParts = 128;
-inline constexpr std::uint32_t kMinGridNodes = 2;  // a row or column
+inline constexpr std::uint32_t kMinGridNodes = 2;  // per row or column
 inline constexpr std::uint32_t kMaxGridNodes = 8192;
-inline constexpr std::uint64_t kMaxNodes = 16'777'216;  // of a scene
+inline constexpr std::uint64_t kMaxNodes = 16'777'216;  // per scene
 inline constexpr std::size_t kMaxNameLength = 64;
 inline constexpr std::size_t kMaxTextBytes = 1024;
 inline constexpr std::size_t kMaxLabelBytes = 64;
@@ -38,20 +36,14 @@ inline constexpr Range kWind{-100, 100};          // m/s
 inline constexpr Range kAirDensity{0, 100};       // kg/m^3
 inline constexpr Range kGridLength{0.001, 1000};  // m
 inline constexpr double kMinSpacing = 0.0001;     // m; also of a mesh's edges
-inline constexpr Range kScale{1e-6, 1e6};         // m a unit
+inline constexpr Range kScale{1e-6, 1e6};         // m per unit
 inline constexpr Range kWeldDistance{0, 0.1};     // m
 inline constexpr Range kRegionLength{0, 1000};    // m
 inline constexpr Range kMass{1e-6, 1e6};          // kg
 inline constexpr Range kArealMass{1e-4, 1000};    // kg/m^2
 inline constexpr Range kGustStrength{0, 100};     // m/s
 inline constexpr Range kGustSeconds{0.01, 3600};  // s
-inline constexpr Range kStiffness{0, 1e6};        // N/m
-inline constexpr Range kDihedralBending{0, 1};    // N m
-inline constexpr Range kSpringDamping{0, 1e4};    // N s/m
-inline constexpr Range kDamping{0, 1000};         // 1/s
-inline constexpr Range kAirCoefficient{0, 10};
-inline constexpr Range kFriction{0, 10};
-inline constexpr Range kThickness{0, 1};               // m
+inline constexpr Range kFriction = parameters::kFriction;
 inline constexpr Range kRadius{0.001, 1000};           // m
 inline constexpr Range kShapeLength{0, 1000};          // m
 inline constexpr Range kShapeSize{0.001, 1000};        // m
@@ -59,27 +51,26 @@ inline constexpr Range kParticipantRadius{0.001, 10};  // m
 inline constexpr Range kParticipantLength{0, 10};      // m
 inline constexpr Range kParticipantSize{0.001, 10};    // m
 inline constexpr Range kJointRadius{0.001, 0.1};       // m
-inline constexpr double kMaxHandReach = 0.5;           // m, of a joint from its wrist
+inline constexpr double kMaxHandReach = 0.5;           // m, distance of a joint from its wrist
 inline constexpr Range kMotionTime{0, 86400};          // s
 inline constexpr Range kMaxError{0.00001, 0.1};        // m
 inline constexpr std::uint32_t kMaxTemporalLayers = 3;
 inline constexpr std::uint32_t kMaxQualities = 4;
 inline constexpr Range kCompliance{0, 1};  // m/N
 inline constexpr Range kTolerance{0, 1};
-inline constexpr Range kActivation{0, 10};        // part of a length
-inline constexpr Range kSlack{0, 1};              // part of a length
+inline constexpr Range kActivation{0, 10};        // fraction of a length
 inline constexpr Range kGrabRadius{0.001, 1};     // m
 inline constexpr Range kGrabReach{0, 1};          // m
 inline constexpr Range kGrabForce{0.001, 1e6};    // N
 inline constexpr Range kSlipDistance{0.001, 10};  // m
 inline constexpr std::uint32_t kMaxIterations = 10'000;
 inline constexpr std::uint32_t kMaxXpbdIterations = 1'000;
-inline constexpr std::uint32_t kMaxSolverNodes = 1'048'576;  // of a cloth
-inline constexpr std::uint64_t kMaxAssembledNodes = 65'536;  // of a scene, where systems are assembled
-inline constexpr std::uint64_t kMaxAssembledEntries = 256;   // a node, of a cloth's matrix: 20 bytes each
-inline constexpr double kMinBallRadius = 0.00005;            // m, of self-collision
-inline constexpr std::uint32_t kMaxSelfCollisionNodes = 524'288;  // of a scene
-inline constexpr double kUnitTolerance = 0.001;                   // of a quaternion's length
+inline constexpr std::uint32_t kMaxSolverNodes = 1'048'576;  // per cloth
+inline constexpr std::uint64_t kMaxAssembledNodes = 65'536;  // per scene, in cloths with an assembled system
+inline constexpr std::uint64_t kMaxAssembledEntries =
+    256;  // per node of a cloth with an assembled system; 20 bytes each
+inline constexpr std::uint32_t kMaxSelfCollisionNodes = 524'288;  // per scene
+inline constexpr double kUnitTolerance = 0.001;                   // deviation of a quaternion's length from 1
 
 inline constexpr float kDefaultWeldDistance = 1e-5f;  // m
 inline constexpr float kDefaultArealMass = 0.2f;      // kg/m^2
@@ -88,11 +79,11 @@ inline constexpr std::uint32_t kDefaultStreamRate = 72;
 inline constexpr std::size_t kMaxSceneFileBytes = 4 * 1024 * 1024;
 inline constexpr std::size_t kMaxMeshFileBytes = 512 * 1024 * 1024;
 inline constexpr std::size_t kMaxClientMessageBytes = 64 * 1024;
-inline constexpr std::size_t kMaxParticipantColliders = 60;  // those of hands included
+inline constexpr std::size_t kMaxParticipantColliders = 60;  // includes the bones of hands
 inline constexpr std::size_t kMaxParticipantGrabs = 10;
 inline constexpr std::size_t kMaxChunkBytes = 256 * 1024;
 inline constexpr std::size_t kMaxContentBytes = 256 * 1024 * 1024;
-// Of all cloths in a description, beside which everything else finds room.
+// Geometry of all cloths in a description. The remaining bytes of the content are for everything else.
 inline constexpr std::size_t kMaxGeometryBytes = kMaxContentBytes - 8 * 1024 * 1024;
 
 }  // namespace limits

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Meshes in messages, and those that messages name.
+// Converts meshes that messages contain or name.
 #include "server/messages/mesh_message.h"
 
 #include <numeric>
@@ -74,11 +74,12 @@ meshes::MeshSource readSource(Checks& checks, const Path& path, const v1::Mesh& 
                               const MeshReader& readMesh) {
   const std::string shown = '"' + message.file() + '"';
   if (message.positions_size() > 0 || message.triangles_size() > 0) {
-    checks.fail(path / "file", shown, "stands beside positions or triangles; must have one or the other");
+    checks.fail(path / "file", shown, "is given together with positions or triangles; give one or the other");
     return {};
   }
   if (!readMesh) {
-    checks.fail(path / "file", shown, "files are read for scene files only; send positions and triangles");
+    checks.fail(path / "file", shown,
+                "files can only be named in scene files; send positions and triangles instead");
     return {};
   }
   auto source = readMesh(message.file());

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Meshes between messages and the domain.
+// Converts meshes between messages and the model.
 #pragma once
 
 #include <cstdint>
@@ -16,15 +16,15 @@
 
 namespace clothstream::messages {
 
-// Gives the mesh that a scene names as its file; the error says which file, and what is wrong with it.
+// Reads the mesh file that a scene names. The error names the file and the problem.
 using MeshReader = std::function<tl::expected<meshes::MeshSource, std::string>(const std::string& file)>;
 
-// Sets the cloth's mesh; returns the node that each vertex of the message became, or meshes::kNoNode. Without
-// a reader no file may be named.
+// Sets the mesh of the cloth. Returns the node of each vertex of the message, or meshes::kNoNode. Refuses a
+// file name if there is no reader.
 std::vector<std::uint32_t> toMeshCloth(Checks& checks, const Path& path, const v1::Cloth& message,
                                        const MeshReader& readMesh, model::Cloth& cloth);
 
-// The mesh itself, whatever file it came from: in the scene's frame, welded, in the order of its nodes.
+// Writes the mesh itself, not the name of its file: in world space, welded, in the order of its nodes.
 void write(const model::Mesh& mesh, v1::Mesh& message);
 
 }  // namespace clothstream::messages

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The scenes that the program brings along.
+// Finds scenes that are built into the program.
 #include <algorithm>
 
 #include <fmt/format.h>

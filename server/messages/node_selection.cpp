@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Which nodes of a cloth its pins and attachments name.
+// Converts the nodes that pins and attachments select.
 #include "server/messages/node_selection.h"
 
 #include <fmt/format.h>
@@ -51,7 +51,8 @@ std::uint32_t toNode(Checks& checks, const Path& path, std::uint32_t vertex, con
   checks.integer(path, vertex, 0, static_cast<std::uint32_t>(nodeOfVertex.size()) - 1);
   if (checks.failed()) return 0;
   if (nodeOfVertex[vertex] == meshes::kNoNode)
-    checks.fail(path, fmt::format("{}", vertex), "is a vertex without a face, which is left out");
+    checks.fail(path, fmt::format("{}", vertex),
+                "is a vertex without a face, so it has no node; name a vertex of a face");
   return nodeOfVertex[vertex];
 }
 
@@ -64,9 +65,9 @@ NodeSelection toSelection(Checks& checks, const Path& path, const NamedNodes& na
   checks.count(path / named.regionsField, static_cast<std::size_t>(named.regions.size()), 0,
                limits::kMaxPins);
   if (cloth.mesh && !named.ranges.empty())
-    checks.fail(
-        path / named.rangesField, "",
-        fmt::format("are of grids; a mesh has \"{}\" and \"{}\"", named.verticesField, named.regionsField));
+    checks.fail(path / named.rangesField, "",
+                fmt::format("must be absent for a mesh; use \"{}\" or \"{}\"", named.verticesField,
+                            named.regionsField));
   for (int i = 0; i < named.vertices.size() && !checks.failed(); ++i)
     selection.vertices.push_back(
         toNode(checks, path.at(named.verticesField, i), named.vertices[i], cloth, nodeOfVertex));

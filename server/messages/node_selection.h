@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Which nodes of a cloth its pins and attachments name.
+// Nodes of a cloth that its pins and attachments select.
 #pragma once
 
 #include <cstdint>
@@ -15,11 +15,11 @@ namespace clothstream::messages {
 
 struct NodeSelection {
   std::vector<model::GridRange> ranges;
-  std::vector<std::uint32_t> vertices;  // nodes
+  std::vector<std::uint32_t> vertices;  // indices of nodes
   std::vector<model::Region> regions;
 };
 
-// The fields of a message that name nodes, and what they are called.
+// Fields of a message that select nodes, with their names.
 struct NamedNodes {
   std::string_view rangesField, verticesField, regionsField;
   const google::protobuf::RepeatedPtrField<v1::GridRange>& ranges;
@@ -27,7 +27,7 @@ struct NamedNodes {
   const google::protobuf::RepeatedPtrField<v1::Region>& regions;
 };
 
-// Of a cloth whose shape is read already; `nodeOfVertex` as toMeshCloth() gives it, empty for grids.
+// The shape of the cloth must be set. `nodeOfVertex` is the result of toMeshCloth(), empty for grids.
 NodeSelection toSelection(Checks& checks, const Path& path, const NamedNodes& named,
                           const model::Cloth& cloth, std::span<const std::uint32_t> nodeOfVertex);
 

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: MIT
-// Parameter changes from clients, checked against the scene they are for.
+// Converts parameter changes of clients and checks them against their scene.
 #include <algorithm>
+#include <vector>
 
 #include <fmt/format.h>
 
 #include "server/messages/client_message.h"
+#include "server/messages/cloth_numbers.h"
 #include "server/messages/limits.h"
 #include "server/messages/scene_message.h"
 #include "server/messages/validation.h"
@@ -13,33 +15,12 @@
 namespace clothstream::messages {
 namespace {
 
-// Those that the change is for.
-template <typename Check>
-void forEachCloth(const model::Scene& scene, const std::string& name, const Check& check) {
+// Cloths that a change with this name addresses. An empty name addresses every cloth.
+std::vector<const model::Cloth*> addressed(const model::Scene& scene, const std::string& name) {
+  std::vector<const model::Cloth*> cloths;
   for (const model::Cloth& cloth : scene.cloths)
-    if (name.empty() || name == cloth.name) check(cloth);
-}
-
-void readSelfCollision(Checks& checks, const Path& path, const v1::SelfCollision& message,
-                       const model::Scene& scene, model::ClothChange& change) {
-  if (message.has_friction())
-    change.ballFriction = checks.number(path / "friction", message.friction(), limits::kFriction);
-  forEachCloth(scene, change.name, [&](const model::Cloth& cloth) {
-    if (!cloth.selfCollision)
-      checks.fail(path, "", fmt::format("must be absent: \"{}\" has none from its start", cloth.name));
-    if (message.has_radius())
-      change.ballRadius = toBallRadius(checks, path / "radius", message.radius(), cloth);
-  });
-}
-
-void readTethers(Checks& checks, const Path& path, const v1::Tethers& message, const model::Scene& scene,
-                 model::ClothChange& change) {
-  if (message.has_slack())
-    change.tetherSlack = checks.number(path / "slack", message.slack(), limits::kSlack);
-  forEachCloth(scene, change.name, [&](const model::Cloth& cloth) {
-    if (!cloth.tethers)
-      checks.fail(path, "", fmt::format("must be absent: \"{}\" has none from its start", cloth.name));
-  });
+    if (name.empty() || name == cloth.name) cloths.push_back(&cloth);
+  return cloths;
 }
 
 model::ClothChange toClothChange(Checks& checks, const Path& path, const v1::ClothChange& message,
@@ -47,24 +28,7 @@ model::ClothChange toClothChange(Checks& checks, const Path& path, const v1::Clo
   model::ClothChange change;
   change.name = message.name();
   if (!change.name.empty()) checkKnown(checks, path / "name", change.name, scene.cloths);
-  if (message.has_structural())
-    change.structural = toSpring(checks, path / "structural", message.structural());
-  if (message.has_shear()) change.shear = toSpring(checks, path / "shear", message.shear());
-  if (message.has_bend()) change.bend = toSpring(checks, path / "bend", message.bend());
-  if (message.has_dihedral_bending())
-    change.dihedralBending =
-        checks.number(path / "dihedralBending", message.dihedral_bending(), limits::kDihedralBending);
-  if (message.has_self_collision())
-    readSelfCollision(checks, path / "selfCollision", message.self_collision(), scene, change);
-  if (message.has_tethers()) readTethers(checks, path / "tethers", message.tethers(), scene, change);
-  if (message.has_damping())
-    change.damping = checks.number(path / "damping", message.damping(), limits::kDamping);
-  if (message.has_drag()) change.drag = checks.number(path / "drag", message.drag(), limits::kAirCoefficient);
-  if (message.has_lift()) change.lift = checks.number(path / "lift", message.lift(), limits::kAirCoefficient);
-  if (message.has_friction())
-    change.friction = checks.number(path / "friction", message.friction(), limits::kFriction);
-  if (message.has_thickness())
-    change.thickness = checks.number(path / "thickness", message.thickness(), limits::kThickness);
+  change.numbers = readNumbers(checks, path, message, addressed(scene, change.name));
   if (message.has_solver()) change.solver = toSolver(checks, path / "solver", message.solver());
   if (message.has_material() && toMaterial(checks, path / "material", message.material()) != nullptr)
     change.material = message.material();
@@ -73,18 +37,17 @@ model::ClothChange toClothChange(Checks& checks, const Path& path, const v1::Clo
   return change;
 }
 
-// Those that the change chooses, for the cloths that get them.
+// Solvers that the change selects must suit the cloths that get them.
 void checkSolvers(Checks& checks, const Path& path, const model::Scene& changed,
                   const model::ParameterChange& change) {
   for (std::size_t i = 0; i < change.cloths.size(); ++i) {
     const model::ClothChange& chosen = change.cloths[i];
     if (!chosen.solver && !chosen.material) continue;
-    forEachCloth(changed, chosen.name, [&](const model::Cloth& cloth) {
-      const Path element = path.at("cloths", static_cast<int>(i));
-      if (const auto complaint = unfitSolver(changed, cloth))
+    const Path element = path.at("cloths", static_cast<int>(i));
+    for (const model::Cloth* cloth : addressed(changed, chosen.name))
+      if (const auto error = unfitSolver(changed, *cloth))
         checks.fail(element / (chosen.solver ? "solver" : "material"), "",
-                    fmt::format("\"{}\" {}", cloth.name, *complaint));
-    });
+                    fmt::format("\"{}\" {}", cloth->name, *error));
   }
 }
 
@@ -148,10 +111,9 @@ Result<model::ParameterChange> toParameterChange(const v1::ParameterChange& mess
     model::Scene changed = scene;
     model::applyChange(changed, change);
     checkSolvers(checks, path, changed, change);
-    if (const auto complaint = unfitBending(changed))
-      checks.fail(path / "cloths[].dihedralBending", "", *complaint);
-    if (const auto complaint = instability(changed))
-      checks.fail(path, "", fmt::format("with substeps = {}, {}", scene.substeps, *complaint));
+    if (const auto error = unfitBending(changed)) checks.fail(path / "cloths[].dihedralBending", "", *error);
+    if (const auto error = instability(changed))
+      checks.fail(path, "", fmt::format("with substeps = {}, {}", scene.substeps, *error));
   }
   return std::move(checks).result(std::move(change));
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Scene files.
+// Reads and writes scene files.
 #include "server/messages/scene_file.h"
 
 #include <cerrno>
@@ -22,14 +22,14 @@ tl::unexpected<FieldError> refuse(v1::ErrorCode code, std::string_view source, s
   return tl::unexpected(FieldError{code, fmt::format("{}: {}", source, text)});
 }
 
-// Where the text stops being JSON, with line and column, which protobuf's parser does not tell.
+// Line and column where the text is not JSON. The parser of protobuf does not report them.
 std::optional<std::string> syntaxError(std::string_view json) {
   try {
     [[maybe_unused]] const nlohmann::json parsed = nlohmann::json::parse(json);
     return std::nullopt;
   } catch (const nlohmann::json::exception& error) {
     const std::string_view what = error.what();
-    const std::size_t after = what.find("] ");  // an identifier of the exception stands before
+    const std::size_t after = what.find("] ");  // skips the identifier of the exception
     return std::string(after == what.npos ? what : what.substr(after + 2));
   }
 }

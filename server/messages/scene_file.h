@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Scenes on disk and by name: the Scene message in protobuf's JSON form.
+// Scenes in files and by name. A scene file is the Scene message in the JSON form of protobuf.
 #pragma once
 
 #include <filesystem>
@@ -13,21 +13,21 @@
 
 namespace clothstream::messages {
 
-// `source` (a file's name) opens the text of an error. Unknown fields are errors. Meshes may be named as
-// files only where there is a reader.
+// Error texts start with `source`, such as a file name. Unknown fields are errors. Mesh files are refused if
+// there is no reader.
 [[nodiscard]] Result<model::Scene> parseScene(std::string_view json, std::string_view source,
                                               const MeshReader& readMesh = {});
 
-// A file of at most limits::kMaxSceneFileBytes; the meshes that it names lie relative to it.
+// Reads a file of at most limits::kMaxSceneFileBytes. Paths of meshes are relative to the file.
 [[nodiscard]] Result<model::Scene> readSceneFile(const std::filesystem::path& path);
 
-// With every field; parseScene() of it gives the scene back.
+// Writes every field. parseScene() of the result returns the same scene.
 std::string toJson(const model::Scene& scene);
 
 // Names of the scenes that are built into the program (server/scenes/), sorted.
 std::vector<std::string> namedScenes();
 
-// The named scene of that name, else the file of that path.
+// Loads the built-in scene with that name, or the file with that path.
 [[nodiscard]] Result<model::Scene> loadScene(const std::string& nameOrPath);
 
 }  // namespace clothstream::messages

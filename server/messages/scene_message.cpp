@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// From the Scene message to a scene that is valid as a whole.
+// Converts a Scene message to a scene and checks it as a whole.
 #include "server/messages/scene_message.h"
 
 #include <algorithm>
@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "server/messages/cloth_numbers.h"
 #include "server/messages/description.h"
 #include "server/messages/limits.h"
 #include "server/messages/node_selection.h"
@@ -98,7 +99,7 @@ model::Grid toGrid(Checks& checks, const Path& path, const v1::Grid& message) {
   return grid;
 }
 
-// What all messages of solvers that iterate have.
+// Reads the fields that all iterative solvers with a tolerance have.
 template <typename Message>
 void readIterations(Checks& checks, const Path& path, const Message& message, model::Solver& solver) {
   if (message.has_iterations())
@@ -129,16 +130,7 @@ void readConstraint(Checks& checks, const Path& path, const v1::ConstraintSolver
   }
 }
 
-model::SelfCollision toSelfCollision(Checks& checks, const Path& path, const v1::SelfCollision& message,
-                                     const model::Cloth& cloth) {
-  model::SelfCollision collision{.radius = model::shortestSpring(cloth) / 2};
-  if (message.has_radius()) collision.radius = toBallRadius(checks, path / "radius", message.radius(), cloth);
-  if (message.has_friction())
-    collision.friction = checks.number(path / "friction", message.friction(), limits::kFriction);
-  return collision;
-}
-
-// Returns what toMeshCloth() does; nothing for a grid.
+// Returns the result of toMeshCloth(); empty for a grid.
 std::vector<std::uint32_t> toShape(Checks& checks, const Path& path, const v1::Cloth& message,
                                    const MeshReader& readMesh, model::Cloth& cloth) {
   switch (message.shape_case()) {
@@ -200,14 +192,14 @@ model::Attachment toAttachment(Checks& checks, const Path& path, const v1::Attac
   attachment.collider = message.collider();
   if (!message.collider().empty() && (message.has_pose() || message.has_motion()))
     checks.fail(path / "collider", '"' + message.collider() + '"',
-                "stands beside a pose or motion; the frame is one or the other");
+                "is given together with a pose or motion; give one or the other");
   attachment.pose = toPose(checks, path / "pose", message.pose());
   if (message.has_motion())
     attachment.motion = toMotion(checks, path / "motion", message.motion(), attachment.pose.orientation);
   return attachment;
 }
 
-// No node is held twice.
+// A node is pinned or attached at most once.
 void checkAttached(Checks& checks, const Path& path, const model::Cloth& cloth) {
   model::Cloth pinnedOnly = cloth;
   pinnedOnly.attachments.clear();
@@ -237,22 +229,23 @@ void readAttachments(Checks& checks, const Path& path, const v1::Cloth& message,
   if (!checks.failed() && !cloth.attachments.empty()) checkAttached(checks, path, cloth);
 }
 
-model::Tethers toTethers(Checks& checks, const Path& path, const v1::Tethers& message,
-                         const model::Cloth& cloth) {
-  model::Tethers tethers;
-  if (message.has_slack()) tethers.slack = checks.number(path / "slack", message.slack(), limits::kSlack);
+// Self-collision and tethers with their defaults, if the message has them.
+void addParts(Checks& checks, const Path& path, const v1::Cloth& message, model::Cloth& cloth) {
+  if (message.has_self_collision())
+    cloth.selfCollision = model::SelfCollision{.radius = model::shortestSpring(cloth) / 2};
+  if (!message.has_tethers()) return;
+  cloth.tethers.emplace();
   if (cloth.nodeCount() > limits::kMaxSolverNodes)
-    checks.fail(path, "",
+    checks.fail(path / "tethers", "",
                 fmt::format("are for cloths of at most {} nodes; this one has {}", limits::kMaxSolverNodes,
                             cloth.nodeCount()));
-  return tethers;
 }
 
-// kg; what the material says is there already.
+// Mass in kg. The cloth already has the mass of its material.
 void readMass(Checks& checks, const Path& path, const v1::Cloth& message, model::Cloth& cloth) {
   if (message.has_mass() && message.has_areal_mass())
     checks.fail(path / "arealMass", fmt::format("{}", message.areal_mass()),
-                "must be absent where \"mass\" is given: it says the same");
+                "must be absent if \"mass\" is given; give one or the other");
   if (message.has_mass()) cloth.mass = checks.number(path / "mass", message.mass(), limits::kMass);
   if (message.has_areal_mass())
     cloth.mass = static_cast<float>(
@@ -267,31 +260,17 @@ model::Cloth toCloth(Checks& checks, const Path& path, const v1::Cloth& message,
   if (checks.failed()) return cloth;
   readPins(checks, path, message, nodeOfVertex, cloth);
   readAttachments(checks, path, message, nodeOfVertex, cloth);
-  if (message.has_tethers() && !checks.failed())
-    cloth.tethers = toTethers(checks, path / "tethers", message.tethers(), cloth);
+  if (checks.failed()) return cloth;
+  addParts(checks, path, message, cloth);
   cloth.mass = static_cast<float>(double{limits::kDefaultArealMass} * model::areaOf(cloth));
   if (!message.material().empty())
     if (const model::Material* material = toMaterial(checks, path / "material", message.material()))
       model::makeOf(*material, cloth);
   readMass(checks, path, message, cloth);
-  if (message.has_structural())
-    cloth.structural = toSpring(checks, path / "structural", message.structural());
-  if (message.has_shear()) cloth.shear = toSpring(checks, path / "shear", message.shear());
-  if (message.has_bend()) cloth.bend = toSpring(checks, path / "bend", message.bend());
-  if (message.has_dihedral_bending())
-    cloth.dihedralBending =
-        checks.number(path / "dihedralBending", message.dihedral_bending(), limits::kDihedralBending);
-  if (message.has_damping())
-    cloth.damping = checks.number(path / "damping", message.damping(), limits::kDamping);
-  if (message.has_drag()) cloth.drag = checks.number(path / "drag", message.drag(), limits::kAirCoefficient);
-  if (message.has_lift()) cloth.lift = checks.number(path / "lift", message.lift(), limits::kAirCoefficient);
-  if (message.has_friction())
-    cloth.friction = checks.number(path / "friction", message.friction(), limits::kFriction);
-  if (message.has_thickness())
-    cloth.thickness = checks.number(path / "thickness", message.thickness(), limits::kThickness);
+  parameters::applyNumbers(readNumbers(checks, path, message, cloth), [&](parameters::ClothNumber number) {
+    return parameters::memberOf(cloth, number);
+  });
   if (message.has_solver()) cloth.solver = toSolver(checks, path / "solver", message.solver());
-  if (message.has_self_collision() && !checks.failed())
-    cloth.selfCollision = toSelfCollision(checks, path / "selfCollision", message.self_collision(), cloth);
   return cloth;
 }
 
@@ -338,17 +317,16 @@ void checkUnique(Checks& checks, std::string_view field, const std::vector<Named
     if (!names.insert(elements[i].name).second) {
       const Path root;
       const Path element = root.at(field, static_cast<int>(i));
-      checks.fail(element / "name", '"' + elements[i].name + '"',
-                  "is another's name already; names must be unique");
+      checks.fail(element / "name", '"' + elements[i].name + '"', "is used twice; names must be unique");
     }
 }
 
 void checkSolvers(Checks& checks, const model::Scene& scene) {
   const Path root;
   for (std::size_t i = 0; i < scene.cloths.size(); ++i)
-    if (const auto complaint = unfitSolver(scene, scene.cloths[i])) {
+    if (const auto error = unfitSolver(scene, scene.cloths[i])) {
       const Path element = root.at("cloths", static_cast<int>(i));
-      checks.fail(element / "solver", "", *complaint);
+      checks.fail(element / "solver", "", *error);
     }
 }
 
@@ -363,7 +341,7 @@ void checkSelfCollision(Checks& checks, const model::Scene& scene) {
                           limits::kMaxSelfCollisionNodes, scene.nodeCount()));
 }
 
-// Of all cloths together: names, number, and the colliders that they follow.
+// Checks the attachments of all cloths together: unique names, number, and colliders that exist.
 void checkAttachments(Checks& checks, const model::Scene& scene) {
   std::unordered_set<std::string_view> names;
   for (std::size_t i = 0; i < scene.cloths.size(); ++i)
@@ -373,8 +351,7 @@ void checkAttachments(Checks& checks, const model::Scene& scene) {
       const Path cloth = root.at("cloths", static_cast<int>(i));
       const Path element = cloth.at("attachments", static_cast<int>(k));
       if (!names.insert(attachment.name).second)
-        checks.fail(element / "name", '"' + attachment.name + '"',
-                    "is another's name already; names must be unique");
+        checks.fail(element / "name", '"' + attachment.name + '"', "is used twice; names must be unique");
       if (!attachment.collider.empty())
         checkKnown(checks, element / "collider", attachment.collider, scene.colliders,
                    v1::ERROR_CODE_INVALID_ARGUMENT);
@@ -399,10 +376,6 @@ void checkSize(Checks& checks, const model::Scene& scene) {
 }
 
 }  // namespace
-
-float toBallRadius(Checks& checks, const Path& path, float value, const model::Cloth& cloth) {
-  return checks.number(path, value, {limits::kMinBallRadius, double{model::shortestSpring(cloth)}});
-}
 
 model::Gust toGust(Checks& checks, const Path& path, const v1::Gust& message) {
   model::Gust gust;
@@ -502,8 +475,8 @@ std::optional<std::string> instability(const model::Scene& scene) {
   if (scene.integrator == model::Integrator::explicitEuler)
     return fmt::format(
         "no number up to {} keeps this scene stable: INTEGRATOR_EXPLICIT_EULER needs springs with a damping "
-        "of at least "
-        "their stiffness times the step, and a cloth damping beside; or use INTEGRATOR_SEMI_IMPLICIT_EULER",
+        "of at least their stiffness times the step, and also a cloth damping; or use "
+        "INTEGRATOR_SEMI_IMPLICIT_EULER",
         limits::kMaxSubsteps);
   return fmt::format(
       "no number up to {} keeps this scene stable: lower stiffness or damping, or raise mass or "
@@ -541,11 +514,10 @@ Result<model::Scene> toScene(const v1::Scene& message, const MeshReader& readMes
   checkSize(checks, scene);
   checkSolvers(checks, scene);
   checkSelfCollision(checks, scene);
-  if (const auto complaint = unfitBending(scene))
-    checks.fail(Path("cloths[].dihedralBending"), "", *complaint);
+  if (const auto error = unfitBending(scene)) checks.fail(Path("cloths[].dihedralBending"), "", *error);
   if (!checks.failed())
-    if (const auto complaint = instability(scene))
-      checks.fail(root / "substeps", fmt::format("{}", scene.substeps), *complaint);
+    if (const auto error = instability(scene))
+      checks.fail(root / "substeps", fmt::format("{}", scene.substeps), *error);
   return std::move(checks).result(std::move(scene));
 }
 

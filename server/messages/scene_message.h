@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Scenes between their message and the domain.
+// Converts scenes between their message and the model.
 #pragma once
 
 #include <optional>
@@ -15,40 +15,38 @@
 
 namespace clothstream::messages {
 
-// Applies the defaults of scene.proto and checks everything: ranges, names and their uniqueness, pins inside
-// their grid, meshes, rates, the number of nodes, and that the integrator is stable with these substeps.
-// Meshes may be named as files only where there is a reader.
+// Applies the defaults of scene.proto and checks everything: ranges, unique names, pins inside their grid,
+// meshes, rates, the number of nodes, and that the integrator is stable with these substeps. Refuses mesh
+// files if there is no reader.
 [[nodiscard]] Result<model::Scene> toScene(const v1::Scene& message, const MeshReader& readMesh = {});
 
-// Every field set, defaults too, meshes in full. toScene() of it gives the scene back.
+// Sets every field, defaults included, and writes whole meshes. toScene() of the result returns the same
+// scene.
 v1::Scene toMessage(const model::Scene& scene);
-// But for the meshes, which are there and empty.
+// Like toMessage(), but meshes are empty.
 v1::Scene toMessageWithoutMeshes(const model::Scene& scene);
 v1::Normals toMessage(model::Normals normals);
-// What can be changed of environment and cloths, as the message has it. `areas`: m², a cloth; of those that
-// it has no area of, or 0, the areal mass is left out.
+// All parameters of environment and cloths as one change. `areas` are the areas of the cloths in m²; a cloth
+// with a missing area or 0 gets no areal mass.
 v1::ParameterChange allParameters(const v1::Scene& scene, std::span<const double> areas);
 
-// The solver that a cloth names; what a cloth of this scene must be for it, unfitSolver() says.
+// Solver of a cloth. unfitSolver() checks whether it suits the cloth.
 model::Solver toSolver(Checks& checks, const Path& path, const v1::Solver& message);
 v1::Solver toMessage(const model::Solver& solver);
-// What stands in Environment and in ParameterChange alike.
+// Gust of an Environment or a ParameterChange.
 model::Gust toGust(Checks& checks, const Path& path, const v1::Gust& message);
 void write(const model::Gust& gust, v1::Gust& message);
 
-// The radius of a cloth's balls in self-collision, m.
-float toBallRadius(Checks& checks, const Path& path, float value, const model::Cloth& cloth);
-
-// nullptr, and the check failed with the names that there are: none of this name.
+// nullptr and a failed check, whose text lists all materials, if no material has this name.
 const model::Material* toMaterial(Checks& checks, const Path& path, const std::string& name);
 
-// What to say of a cloth whose solver cannot serve it in this scene; nullopt if it can.
+// Error text if the solver of a cloth cannot be used in this scene; nullopt if it can.
 std::optional<std::string> unfitSolver(const model::Scene& scene, const model::Cloth& cloth);
 
-// What to say of the dihedral bending of a scene's cloths where it cannot be; nullopt if it can.
+// Error text if the dihedral bending of the scene's cloths cannot be used; nullopt if it can.
 std::optional<std::string> unfitBending(const model::Scene& scene);
 
-// What to say of a scene whose integrator is not stable with its substeps; nullopt if it is.
+// Error text if the integrator is not stable with the scene's substeps; nullopt if it is.
 std::optional<std::string> instability(const model::Scene& scene);
 
 }  // namespace clothstream::messages

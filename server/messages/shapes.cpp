@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Conversion and checks of shapes.
+// Converts and checks shapes.
 #include "server/messages/shapes.h"
 
 #include <cmath>
@@ -14,7 +14,7 @@
 namespace clothstream::messages {
 namespace {
 
-// What sizes may be, which differs for a scene and for its participants.
+// Allowed sizes, which differ between scenes and participants.
 struct Sizes {
   Range radius, length, size;
 };
@@ -67,7 +67,7 @@ model::Shape toHull(Checks& checks, const Path& path, const v1::ConvexHull& mess
   return std::make_shared<const model::ConvexHull>(std::get<model::ConvexHull>(std::move(made)));
 }
 
-// What all messages that have a shape have in common.
+// Writes a shape to any message that has the shape fields.
 template <typename Message>
 void writeSimple(const model::Shape& shape, Message& message) {
   std::visit(model::ShapeVisitor{

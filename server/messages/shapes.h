@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Shapes of colliders between messages and domain types.
+// Converts shapes of colliders between messages and the model.
 #pragma once
 
 #include "clothstream/v1/scene.pb.h"
@@ -12,9 +12,9 @@ namespace clothstream::messages {
 model::Shape toShape(Checks& checks, const Path& path, const v1::Collider& message);
 model::Shape toShape(Checks& checks, const Path& path, const v1::ParticipantCollider& message);
 
-// Replaces the message's shape.
+// Replaces the shape of the message.
 void write(const model::Shape& shape, v1::Collider& message);
-// The same, but for a hull, of which a state has at most the mention: hulls are part of the description.
+// Replaces the shape of the message. A hull is written without its corners, which are in the description.
 void write(const model::Shape& shape, v1::ColliderState& message);
 void writeHull(const model::ConvexHull& hull, v1::ConvexHull& message);
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// From a scene to its message.
+// Converts a scene to its message.
+#include "server/messages/cloth_numbers.h"
 #include "server/messages/node_selection.h"
 #include "server/messages/scene_message.h"
 #include "server/messages/shapes.h"
@@ -64,26 +65,13 @@ void writeCloth(const model::Cloth& cloth, v1::Cloth& message) {
     writeGrid(cloth.grid, *message.mutable_grid());
   message.set_mass(cloth.mass);
   message.set_material(cloth.material);
-  write(cloth.structural, *message.mutable_structural());
-  write(cloth.shear, *message.mutable_shear());
-  write(cloth.bend, *message.mutable_bend());
-  message.set_dihedral_bending(cloth.dihedralBending);
-  message.set_damping(cloth.damping);
-  message.set_drag(cloth.drag);
-  message.set_lift(cloth.lift);
-  message.set_friction(cloth.friction);
-  message.set_thickness(cloth.thickness);
+  writeNumbers(cloth, message);
   for (const model::GridRange& range : cloth.pins) write(range, *message.add_pins());
   *message.mutable_solver() = toMessage(cloth.solver);
-  if (cloth.selfCollision) {
-    message.mutable_self_collision()->set_radius(cloth.selfCollision->radius);
-    message.mutable_self_collision()->set_friction(cloth.selfCollision->friction);
-  }
   message.mutable_pinned_vertices()->Add(cloth.pinnedVertices.begin(), cloth.pinnedVertices.end());
   for (const model::Region& region : cloth.pinnedRegions) write(region, *message.add_pinned_regions());
   for (const model::Attachment& attachment : cloth.attachments)
     writeAttachment(attachment, *message.add_attachments());
-  if (cloth.tethers) message.mutable_tethers()->set_slack(cloth.tethers->slack);
 }
 
 void writeCollider(const model::Collider& collider, v1::Collider& message) {
@@ -181,19 +169,9 @@ v1::ParameterChange allParameters(const v1::Scene& scene, std::span<const double
     all.set_name(cloth.name());
     if (i < areas.size() && areas[i] > 0)
       all.set_areal_mass(static_cast<float>(double{cloth.mass()} / areas[i]));
-    all.set_material(cloth.material());  // "": of none, whatever was told before
-    *all.mutable_structural() = cloth.structural();
-    *all.mutable_shear() = cloth.shear();
-    *all.mutable_bend() = cloth.bend();
-    all.set_damping(cloth.damping());
-    all.set_drag(cloth.drag());
-    all.set_lift(cloth.lift());
-    all.set_friction(cloth.friction());
-    all.set_thickness(cloth.thickness());
+    all.set_material(cloth.material());  // an empty name clears the material that a client knows
+    copyNumbers(cloth, all);
     *all.mutable_solver() = cloth.solver();
-    all.set_dihedral_bending(cloth.dihedral_bending());
-    if (cloth.has_self_collision()) *all.mutable_self_collision() = cloth.self_collision();
-    if (cloth.has_tethers()) *all.mutable_tethers() = cloth.tethers();
   }
   return change;
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Checks of single values, and the words for what they refuse.
+// Checks single values and writes the error texts.
 #include "server/messages/validation.h"
 
 #include <algorithm>
@@ -10,7 +10,7 @@
 namespace clothstream::messages {
 namespace {
 
-// Values in error texts are cut to this, so that an answer stays smaller than a question.
+// Maximum length of a value in an error text. An answer is then not larger than its request.
 constexpr std::size_t kMaxShown = 80;
 
 std::string inQuotes(std::string_view value) {
@@ -71,7 +71,7 @@ const std::string& Checks::label(const Path& path, const std::string& value) {
   for (std::size_t i = 0; i < value.size(); ++i) {
     control |= at(i) < 0x20 || at(i) == 0x7f;
     control |= at(i) == 0xc2 && at(i + 1) < 0xa0;  // U+0080 to U+009F
-    // U+200E, U+200F, U+2028 to U+202E, U+2066 to U+2069: marks of direction, ends of lines.
+    // U+200E, U+200F, U+2028 to U+202E, U+2066 to U+2069: direction marks and line separators.
     if (at(i) != 0xe2) continue;
     const unsigned second = at(i + 1), third = at(i + 2);
     control |= second == 0x80 && (third == 0x8e || third == 0x8f || (third >= 0xa8 && third <= 0xae));

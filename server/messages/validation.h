@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The checks that every message, file and change goes through.
+// Checks of values in messages, files and changes.
 #pragma once
 
 #include <algorithm>
@@ -14,8 +14,8 @@
 
 namespace clothstream::messages {
 
-// Where a value lies in its message. Segments point to their parents, which must outlive them: nothing is
-// allocated unless something is wrong.
+// Path of a field in its message. Segments point to their parents, which must outlive them. Nothing is
+// allocated unless there is an error.
 class Path {
  public:
   Path() = default;  // the message itself
@@ -23,7 +23,7 @@ class Path {
   Path operator/(std::string_view field) const { return Path(this, field, -1); }
   Path at(std::string_view field, int index) const { return Path(this, field, index); }
 
-  // Such as "cloths[0].structural.stiffness", in the names of the JSON form.
+  // Path in JSON names, such as "cloths[0].structural.stiffness".
   std::string text() const;
 
  private:
@@ -32,31 +32,31 @@ class Path {
 
   const Path* parent_ = nullptr;
   std::string_view field_;
-  int index_ = -1;  // of a repeated field
+  int index_ = -1;  // index in a repeated field; -1 if it is not repeated
 };
 
-// Keeps the first error; later ones do not matter. Checks return their value as it is, so that a conversion
-// can be written down straight and asked once, at its end, whether all was well.
+// Collects the first error of a conversion. Each check returns its value unchanged, so that a conversion
+// needs to test for an error only once, at its end.
 class Checks {
  public:
   float number(const Path& path, float value, Range allowed);
   std::uint32_t integer(const Path& path, std::uint32_t value, std::uint32_t min, std::uint32_t max);
-  // `count` elements of a repeated field.
+  // Number of elements of a repeated field.
   void count(const Path& path, std::size_t count, std::size_t min, std::size_t max);
-  // 1 to 64 characters out of [a-z0-9_-].
+  // Identifier: 1 to 64 characters out of [a-z0-9_-].
   const std::string& name(const Path& path, const std::string& value);
-  // For people: no control characters, at most kMaxTextBytes.
+  // Text for people: one line without control characters, at most kMaxTextBytes.
   const std::string& text(const Path& path, const std::string& value);
 
-  // What somebody is called, told to others: short, without control characters, also those of Unicode that
-  // turn or break lines.
+  // Name of a participant, shown to others: at most kMaxLabelBytes, without control characters and without
+  // the Unicode characters that change direction or break lines.
   const std::string& label(const Path& path, const std::string& value);
 
-  // `value` is empty where there is none to show.
+  // An empty `value` is not shown.
   void fail(const Path& path, std::string_view value, std::string_view allowed,
             v1::ErrorCode code = v1::ERROR_CODE_INVALID_ARGUMENT);
 
-  // The same for a text from outside, which is quoted and cut to what an answer may hold.
+  // Fails with a text from outside as the value. The text is quoted and truncated.
   void failNamed(const Path& path, std::string_view name, std::string_view allowed,
                  v1::ErrorCode code = v1::ERROR_CODE_INVALID_ARGUMENT);
 
@@ -71,7 +71,7 @@ class Checks {
   std::optional<FieldError> error_;
 };
 
-// Whether one of the elements has this name.
+// Fails unless one of the elements has this name.
 template <typename Named>
 void checkKnown(Checks& checks, const Path& path, const std::string& name, const std::vector<Named>& elements,
                 v1::ErrorCode code = v1::ERROR_CODE_NOT_FOUND) {

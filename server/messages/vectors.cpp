@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Conversion of the smallest messages.
+// Converts vectors and poses.
 #include "server/messages/vectors.h"
 
 #include <cmath>
@@ -31,11 +31,6 @@ model::Pose toPose(Checks& checks, const Path& path, const v1::Pose& message) {
           toQuaternion(checks, path / "orientation", message.orientation())};
 }
 
-model::Spring toSpring(Checks& checks, const Path& path, const v1::Spring& message) {
-  return {checks.number(path / "stiffness", message.stiffness(), limits::kStiffness),
-          checks.number(path / "damping", message.damping(), limits::kSpringDamping)};
-}
-
 void write(const model::Vec3& value, v1::Vec3& message) {
   message.set_x(value.x());
   message.set_y(value.y());
@@ -52,11 +47,6 @@ void write(const model::Quaternion& value, v1::Quaternion& message) {
 void write(const model::Pose& value, v1::Pose& message) {
   write(value.position, *message.mutable_position());
   write(value.orientation, *message.mutable_orientation());
-}
-
-void write(const model::Spring& value, v1::Spring& message) {
-  message.set_stiffness(value.stiffness);
-  message.set_damping(value.damping);
 }
 
 }  // namespace clothstream::messages

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Size of shapes, and motion from key to key.
+// Sizes of shapes, and interpolation between motion keys.
 #include "server/model/collider.h"
 
 #include <cmath>

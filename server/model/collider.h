@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What cloth collides with: solid shapes, and how they move by themselves.
+// Colliders: solid shapes and their motion over simulated time.
 #pragma once
 
 #include <memory>
@@ -12,7 +12,7 @@
 
 namespace clothstream::model {
 
-// Shapes lie in the collider's own frame, metres.
+// Shapes are given in the frame of their collider. Units are metres.
 
 struct Sphere {
   float radius = 0.1f;
@@ -21,22 +21,22 @@ struct Sphere {
 // All points within `radius` of a segment along Y, which is centred on the origin.
 struct Capsule {
   float radius = 0.1f;
-  float length = 0.2f;  // of the segment
+  float length = 0.2f;  // length of the segment
 };
 
-// Everything with y <= 0.
+// Half-space y <= 0.
 struct Plane {};
 
 struct Box {
   Vec3 size = Vec3::Ones();  // between opposite faces; centred on the origin
 };
 
-// Immutable, and shared by whoever has the collider. Never null.
+// Immutable and shared between copies of the collider. Never null.
 using Hull = std::shared_ptr<const ConvexHull>;
 
 using Shape = std::variant<Sphere, Capsule, Plane, Box, Hull>;
 
-// For std::visit: a function for each of them.
+// Visitor for std::visit with one function per shape.
 template <typename... Visitors>
 struct ShapeVisitor : Visitors... {
   using Visitors::operator()...;
@@ -44,11 +44,11 @@ struct ShapeVisitor : Visitors... {
 template <typename... Visitors>
 ShapeVisitor(Visitors...) -> ShapeVisitor<Visitors...>;
 
-// A sphere of this radius about its frame's origin holds the shape (a hull: the box that holds it); infinite
-// for a plane.
+// Radius of a sphere around the origin of the frame that contains the shape. For a hull it contains the
+// bounding box. For a plane it is infinite.
 float reachOf(const Shape& shape);
 
-// nullptr where the shape has no radius.
+// nullptr if the shape has no radius.
 float* radiusOf(Shape& shape);
 
 struct MotionKey {
@@ -57,23 +57,24 @@ struct MotionKey {
   Quaternion orientation = Quaternion::Identity();
 };
 
-// From key to key and then again from the first; times ascend from 0. None: it stays at its pose.
+// Repeats from the first key after the last one. Times ascend from 0. Without keys the collider stays at its
+// pose.
 struct Motion {
   std::vector<MotionKey> keys = {};
-  bool steady = false;  // at one speed from key to key; else slow at each
+  bool steady = false;  // constant speed between keys; otherwise slow at each key (smoothstep)
 };
 
 struct Collider {
   std::string name = {};
   Shape shape = Sphere{};
   Pose pose = {};
-  float friction = 1;  // Coulomb; multiplied with the cloth's
+  float friction = 1;  // Coulomb; multiplied by the friction of the cloth
   Motion motion = {};
 };
 
-// Where something that moves by itself, or else stays at a pose, is at a simulated time. Between keys the
-// orientation takes the shorter way, by the normalised mean of the quaternions. The arithmetic is + - * /
-// floor and sqrt in double alone, so that every machine gives the same value.
+// Pose at a simulated time: from the motion, or `pose` if the motion has no keys. Orientations between two
+// keys follow the shorter path, as the normalised weighted mean of the quaternions. Only + - * / floor and
+// sqrt in double are used, so every machine gives the same value.
 Pose poseAt(const Pose& pose, const Motion& motion, double seconds);
 inline Pose poseAt(const Collider& collider, double seconds) {
   return poseAt(collider.pose, collider.motion, seconds);

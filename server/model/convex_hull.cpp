@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Checks of a polyhedron, and the planes of its faces.
+// Checks polyhedra and computes the planes of their faces.
 #include "server/model/convex_hull.h"
 
 #include <algorithm>
@@ -29,7 +29,7 @@ std::optional<std::string> cornersProblem(const Face& face, std::size_t vertexCo
   return std::nullopt;
 }
 
-// Every edge of a closed surface belongs to two faces, which run along it in opposite directions.
+// Every edge of a closed surface belongs to two faces that traverse it in opposite directions.
 std::optional<HullProblem> opening(const std::vector<Face>& faces) {
   std::map<std::pair<std::uint32_t, std::uint32_t>, std::size_t> edges;
   for (std::size_t f = 0; f < faces.size(); ++f)
@@ -47,7 +47,7 @@ std::optional<HullProblem> opening(const std::vector<Face>& faces) {
   return std::nullopt;
 }
 
-// Newell's: twice the area times the normal, whichever corner one starts at.
+// Newell's method: twice the area times the normal, independent of the first corner.
 FacePlane planeOf(const Face& face, const std::vector<Vec3>& vertices) {
   Vec3d normal = Vec3d::Zero(), centre = Vec3d::Zero();
   const Vec3d origin = vertices[face[0]].cast<double>();

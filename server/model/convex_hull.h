@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A convex polyhedron from its corners and faces, and what is wrong with one that is none.
+// Convex polyhedra, made from corners and faces and checked.
 #pragma once
 
 #include <cstddef>
@@ -13,31 +13,33 @@
 
 namespace clothstream::model {
 
-// The points with normal . x <= offset.
+// Points with normal . x <= offset.
 struct HalfSpace {
-  Vec3 normal = Vec3::UnitY();  // of length 1
+  Vec3 normal = Vec3::UnitY();  // length 1
   float offset = 0;             // m
 };
 
 struct ConvexHull {
   std::vector<Vec3> vertices;
   std::vector<std::vector<std::uint32_t>> faces;  // corners, counter-clockwise seen from outside
-  // Whose intersection it is; faces in one plane share theirs. With them, and changing nothing, the sides of
-  // the box that holds it: where cloth keeps its distance from the planes, they cut off what sharp edges
-  // would grow.
+  // The hull is the intersection of these half-spaces. Faces in one plane share a half-space. The six sides
+  // of the bounding box are included: they do not change the hull. Cloth keeps a distance from every plane,
+  // so they limit how far that distance extends a sharp edge.
   std::vector<HalfSpace> planes;
 };
 
-// How far a corner may lie off the plane of a face, or in front of it, in parts of the hull's size.
+// Maximum distance of a corner from the plane of its face, or in front of any face, as a fraction of the
+// hull's size.
 inline constexpr double kHullTolerance = 1e-4;
 
 struct HullProblem {
-  std::optional<std::size_t> face;  // none: it is of the hull as a whole
+  std::optional<std::size_t> face;  // absent: the problem concerns the whole hull
   std::string text;
 };
 
-// Corners must be finite. A problem where it is not convex, not closed, flat, inside out, or a face has fewer
-// than three corners, names one that is not there or one twice, or is not plane.
+// Corners must be finite. Returns a problem if the polyhedron is not convex, not closed, flat or inside out.
+// Returns a problem also if a face has fewer than three corners, an unknown or a repeated corner, or is not
+// planar.
 std::variant<ConvexHull, HullProblem> makeConvexHull(std::vector<Vec3> vertices,
                                                      std::vector<std::vector<std::uint32_t>> faces);
 

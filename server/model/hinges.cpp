@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Hinges of a cloth.
+// Collects the hinges of a cloth and computes their angles.
 #include "server/model/hinges.h"
 
 #include <Eigen/Geometry>
@@ -14,19 +14,19 @@ namespace {
 
 using Eigen::Vector3d;
 
-// Heights of triangles that are squeezed together count at least half of what they are at rest.
+// Minimum height of a compressed triangle, as a fraction of its height at rest.
 constexpr double kLeastPart = 0.25;
-// Below this |n1 + n2|^2 of unit normals the faces lie on each other.
+// Faces with |n1 + n2|^2 of their unit normals below this are folded onto each other.
 constexpr double kFolded = 1e-6;
 
-// What the diagonals of a quad count, of what they would in a triangle mesh: enough that quads that are
-// twisted in turn resist.
+// Weight of a quad's diagonals relative to an edge of a triangle mesh. It makes alternately twisted quads
+// resist.
 constexpr float kDiagonalPart = 0.125f;
 
 // Corners of a triangle or of a quad, counter-clockwise.
 using Face = std::vector<std::uint32_t>;
 
-// Corners of a face beside its edge from a to b.
+// Corners of a face next to its edge from a to b.
 struct FaceSide {
   std::uint32_t beforeStart, afterEnd;
 };
@@ -84,7 +84,7 @@ HingeShape hingeShape(const std::array<Vector3d, 4>& positions, double leastSqua
   const Vector3d first = (a - c).cross(b - c), second = (b - d).cross(a - d);
   const Vector3d n1 = first / std::sqrt(std::max(first.squaredNorm(), leastSquare));
   const Vector3d n2 = second / std::sqrt(std::max(second.squaredNorm(), leastSquare));
-  // One over the heights of c and d above the edge, times the normals.
+  // Normals divided by the heights of c and d above the edge.
   const Vector3d h1 = first / std::max(first.squaredNorm(), leastSquare);
   const Vector3d h2 = second / std::max(second.squaredNorm(), leastSquare);
   const double cosine2 = std::sqrt(std::max((n1 + n2).squaredNorm(), kFolded));  // 2 cos(theta / 2)
@@ -100,7 +100,7 @@ std::vector<Hinge> hinges(const Cloth& cloth) {
     found.push_back(hingeOf(rest, nodes));
     found.back().weight *= part;
   };
-  std::unordered_map<std::uint64_t, FaceSide> sides;  // of edges that one face has so far
+  std::unordered_map<std::uint64_t, FaceSide> sides;  // edges that have one face so far
   const auto edge = [](std::uint32_t from, std::uint32_t to) { return std::uint64_t{from} << 32 | to; };
   for (const Face& face : facesOf(cloth)) {
     if (face.size() == 4) {
@@ -125,8 +125,8 @@ std::vector<Hinge> hinges(const Cloth& cloth) {
   return found;
 }
 
-// By Gershgorin's circles: the block row of a node of mass m in the sum of weight grad grad^T sums to at most
-// the sum of weight |grad_i| (sum of |grad_j|), over m.
+// Gershgorin's circle theorem: in the sum of weight grad grad^T, the block row of a node of mass m is at most
+// the sum of weight |grad_i| (sum of |grad_j|) over m.
 double bendingRate(const Cloth& cloth) {
   const std::vector<Vec3> rest = restPositions(cloth);
   const std::vector<double> masses = nodeMasses(cloth);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Parameter changes take effect on a scene.
+// Applies parameter changes to a scene.
 #include "server/model/input.h"
 
 #include <algorithm>
@@ -17,25 +17,13 @@ void assign(T& field, const std::optional<T>& value) {
 
 void apply(Cloth& cloth, const ClothChange& change) {
   if (change.material) makeOf(*findMaterial(*change.material), cloth);
-  assign(cloth.structural, change.structural);
-  assign(cloth.shear, change.shear);
-  assign(cloth.bend, change.bend);
-  assign(cloth.damping, change.damping);
-  assign(cloth.drag, change.drag);
-  assign(cloth.lift, change.lift);
-  assign(cloth.friction, change.friction);
-  assign(cloth.thickness, change.thickness);
+  parameters::applyNumbers(
+      change.numbers, [&](parameters::ClothNumber number) { return parameters::memberOf(cloth, number); });
   assign(cloth.solver, change.solver);
-  assign(cloth.dihedralBending, change.dihedralBending);
-  if (cloth.selfCollision) {
-    assign(cloth.selfCollision->radius, change.ballRadius);
-    assign(cloth.selfCollision->friction, change.ballFriction);
-  }
-  if (cloth.tethers) assign(cloth.tethers->slack, change.tetherSlack);
   if (change.arealMass) cloth.mass = static_cast<float>(double{*change.arealMass} * areaOf(cloth));
 }
 
-// A motion that ends leaves what is not changed at the pose that the scene gives.
+// A motion that ends leaves the part of the pose that does not change at the pose of the scene.
 void apply(Collider& collider, const ColliderChange& change) {
   if (change.position || change.orientation) collider.motion.keys.clear();
   assign(collider.pose.position, change.position);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What participants put into a scene while it runs, as plain data. All values validated before.
+// Input of participants to a running scene, as plain data. All values are validated before they get here.
 #pragma once
 
 #include <cstdint>
@@ -7,20 +7,21 @@
 #include <string>
 #include <vector>
 
+#include "proto/parameters/cloth_parameters.h"
 #include "server/model/scene.h"
 
 namespace clothstream::model {
 
-// A shape that belongs to a participant: a hand, a part of a finger, a head.
+// Collider of a participant, such as a hand, a part of a finger or a head.
 struct ParticipantCollider {
-  std::uint32_t id = 0;  // unique among this participant's; the same id moves the same collider
+  std::uint32_t id = 0;  // unique for this participant; the same id moves the same collider
   Pose pose;
   Shape shape = Sphere{};  // sphere, capsule or box
 };
 
-// A participant's grab on cloth, as scene.proto's Grab says. Metres, newtons.
+// Grab of a participant on cloth; session.proto describes Grab. Metres, newtons.
 struct Grab {
-  std::uint32_t id = 0;  // unique among this participant's; the same id is the same grab
+  std::uint32_t id = 0;  // unique for this participant; the same id is the same grab
   Pose pose = {};
   float radius = 0.03f, reach = 0.1f;
   float maxForce = 20;
@@ -28,42 +29,39 @@ struct Grab {
 };
 
 struct AttachmentPose {
-  std::size_t attachment = 0;  // of all of the scene's, in the order of its cloths
+  std::size_t attachment = 0;  // index into all attachments of the scene, in the order of its cloths
   Pose pose = {};
 };
 
-// What a participant does at one time.
+// Everything that a participant moves, at one time.
 struct ParticipantPoses {
   std::vector<ParticipantCollider> colliders = {};
   std::vector<Grab> grabs = {};
   std::vector<AttachmentPose> attachments = {};
-  bool wantsContacts = false;  // to be told what colliders do to cloth
+  bool wantsContacts = false;  // subscribes to contact events
 };
 
+// Absent values leave the cloth as it is. A material sets its own numbers first, then `numbers` apply.
 struct ClothChange {
   std::string name = {};  // empty: every cloth
-  std::optional<Spring> structural = {}, shear = {}, bend = {};
-  std::optional<float> damping = {}, drag = {}, lift = {}, friction = {}, thickness = {};
+  parameters::ClothNumbers numbers = {};
   std::optional<Solver> solver = {};
-  std::optional<std::string> material = {};  // one of materials(); what is given above goes before it
+  std::optional<std::string> material = {};  // name of one of materials()
   std::optional<float> arealMass = {};       // kg/m^2
-  // Of cloths that have self-collision, and of those that have tethers.
-  std::optional<float> ballRadius = {}, ballFriction = {}, tetherSlack = {};
-  std::optional<float> dihedralBending = {};
 };
 
 struct ColliderChange {
   std::string name = {};
-  // Either ends the collider's own motion.
+  // Position and orientation both end the collider's own motion.
   std::optional<Vec3> position = {};
   std::optional<Quaternion> orientation = {};
-  // Of shapes that have them.
+  // Sizes apply to shapes that have them.
   std::optional<float> radius = {}, length = {};
   std::optional<Vec3> size = {};
   std::optional<float> friction = {};
 };
 
-// Takes effect at a tick's start, all of it.
+// The whole change takes effect at the start of one tick.
 struct ParameterChange {
   std::optional<Vec3> gravity = {}, wind = {};
   std::optional<float> airDensity = {};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The materials, and what becomes of a cloth made of one.
+// Table of materials, and cloths made of them.
 #include "server/model/material.h"
 
 #include <algorithm>
@@ -11,14 +11,15 @@ namespace clothstream::model {
 namespace {
 
 constexpr double kGravity = 9.81;  // m/s^2
-// Of a strip that hangs over an edge by twice its bending length, times that length: about the root mean
-// square over it, with which strips of all materials come nearest to hanging as they should.
+// Curvature times bending length of a strip that hangs over an edge by twice its bending length. The value is
+// about the root mean square over the strip. With it, strips of all materials hang closest to their true
+// shape.
 constexpr double kCurvature = 0.65;
 
 // [WOR11] is Wang, O'Brien and Ramamoorthi, "Data-driven elastic models for cloth: modeling and measurement",
-// SIGGRAPH 2011, whose data came with ARCSim. A weight of 1 oz/yd^2 is 33.9 g/m^2, 1 momme 4.34 g/m^2. Shear
-// and bending of cloth that is woven lie where Kawabata's instruments find apparel ("The standardization and
-// analysis of hand evaluation", 1980): 20 to 100 N/m, 1 to 20 uN m.
+// SIGGRAPH 2011, with data published in ARCSim. 1 oz/yd^2 is 33.9 g/m^2, 1 momme is 4.34 g/m^2. Shear and
+// bending of woven cloth are in the range that Kawabata measured for apparel ("The standardization and
+// analysis of hand evaluation", 1980): 20 to 100 N/m and 1 to 20 uN m.
 constexpr Material kMaterials[] = {
     {.name = "cotton",
      .description = "shirting, plain weave",
@@ -110,7 +111,7 @@ constexpr Material kMaterials[] = {
      .friction = 0.4f},
 };
 
-// m, of bend springs; a cloth so small that it has none gets any.
+// Mean length of the bend springs, m. A cloth without bend springs gets an arbitrary length.
 double meanBendLength(const Cloth& cloth) {
   if (!cloth.mesh) {
     const GridSpacing lengths = spacing(cloth.grid);

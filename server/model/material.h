@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What cloths may be made of, by name.
+// Materials of cloths, by name.
 #pragma once
 
 #include <span>
@@ -9,39 +9,40 @@
 
 namespace clothstream::model {
 
-// What a cloth is where nobody says anything else. The stiffness of a structural or shear spring is the
-// cloth's own in tension along its threads and in shear, in N/m, whatever the nodes' distance; that of bend
-// springs follows from the rigidity, see bendStiffness(). Springs have no dashpots: `damping`, the air and
+// Default numbers of a cloth. The stiffness of structural and shear springs is the stiffness of the fabric in
+// tension along its threads and in shear, in N/m, independent of the distance between nodes. bendStiffness()
+// derives the stiffness of bend springs from the rigidity. Springs have no dashpots: `damping`, the air and
 // the solver damp.
 struct Material {
   std::string_view name;
   std::string_view description;  // one line
-  std::string_view source;       // of the numbers, one line
+  std::string_view source;       // source of the numbers, one line
   float arealMass;               // kg/m^2
   float tension, shear;          // N/m
-  float rigidity;                // N m, against bending
+  float rigidity;                // flexural rigidity, N m
   float damping;                 // 1/s
   float drag, lift;              // dimensionless
   float friction;                // Coulomb
 };
 
-// By name in alphabetical order.
+// All materials in alphabetical order of their names.
 std::span<const Material> materials();
 
-// nullptr: there is none of that name.
+// nullptr if no material has that name.
 const Material* findMaterial(std::string_view name);
 
-// m: the bending length of cloth, (rigidity / weight)^(1/3): half of what a strip hangs over an edge when it
-// bends down by 41.5 degrees (Peirce, "The handle of cloth as a measurable quantity", 1930; ASTM D1388).
+// Bending length in metres: (rigidity / weight)^(1/3). It is half the overhang at which a strip bends down by
+// 41.5 degrees (Peirce, "The handle of cloth as a measurable quantity", 1930; ASTM D1388).
 double bendingLength(const Material& material);
 
-// N/m, of a cloth's bend springs. A spring from a node to the next but one, both `a` apart, shortens with the
-// square of the angle between: its energy is that of a bent cloth at one curvature only. Chosen is that of a
-// strip of twice the bending length over an edge, so that the spring is 16 rigidity / (a^4 curvature^2). `a`
-// is half of a bend spring's mean length; no bend spring is stiffer than the cloth in tension.
+// Stiffness of a cloth's bend springs, N/m. A bend spring skips one node at a distance of `a` from both ends.
+// It shortens with the square of the angle, so its energy matches that of bent cloth at one curvature only.
+// The chosen curvature is that of a strip that hangs over an edge by twice its bending length. The stiffness
+// is then 16 rigidity / (a^4 curvature^2), but at most the stiffness in tension. `a` is half of the mean
+// length of the bend springs.
 double bendStiffness(const Material& material, const Cloth& cloth);
 
-// The cloth, which has its shape, becomes one of this material, its solver (xpbd) included.
+// Sets the numbers and the solver (xpbd) of a cloth to those of the material. The cloth must have its shape.
 void makeOf(const Material& material, Cloth& cloth);
 
 }  // namespace clothstream::model

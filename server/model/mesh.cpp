@@ -13,11 +13,11 @@ namespace {
 
 constexpr std::uint32_t kNone = ~0u;
 
-// One side of one triangle.
+// Side of a triangle.
 struct Side {
-  std::uint32_t low, high;  // its ends, low < high
+  std::uint32_t low, high;  // end nodes, low < high
   std::uint32_t triangle;
-  std::uint32_t apex;  // the triangle's third corner
+  std::uint32_t apex;  // third corner of the triangle
 };
 
 std::vector<Side> sidesOf(const std::vector<Triangle>& triangles) {
@@ -32,7 +32,7 @@ std::vector<Side> sidesOf(const std::vector<Triangle>& triangles) {
   return sides;
 }
 
-// What a quad's corners are, seen from one of its halves.
+// Corners of a quad relative to one of its halves.
 struct Half {
   std::uint32_t diagonal[2] = {kNone, kNone};
   std::uint32_t otherApex = kNone;
@@ -87,12 +87,13 @@ class LinkFinder {
     halves_[second.triangle] = {{first.low, first.high}, first.apex};
   }
 
-  // Where the face that a side belongs to ends on the way from `end`, one of the side's ends, away from it.
+  // Node that a bend spring across `side` joins: the apex of a triangle, or the other neighbour of `end` in a
+  // quad.
   std::uint32_t across(const Side& side, std::uint32_t end) const {
     const Half& half = halves_[side.triangle];
     if (half.otherApex == kNone) return side.apex;
     if (end == half.diagonal[0] || end == half.diagonal[1]) return half.otherApex;
-    // The side runs from this half's own apex to one end of the diagonal: it goes on to the other.
+    // The side connects the apex of this half to one end of the diagonal, so the corner is the other end.
     const std::uint32_t taken = side.low == end ? side.high : side.low;
     return half.diagonal[taken == half.diagonal[0] ? 1 : 0];
   }
@@ -108,7 +109,7 @@ class LinkFinder {
   }
 
   const MeshShape& shape_;
-  std::vector<std::uint32_t> partner_;  // a triangle's other half, where it is one of a quad
+  std::vector<std::uint32_t> partner_;  // other half of the quad, for a triangle that is half of one
   std::vector<Half> halves_;
   std::vector<SpringLink> links_;
 };

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Places and directions.
+// Vectors, rotations and poses.
 #pragma once
 
 #include <Eigen/Core>
@@ -7,7 +7,7 @@
 
 namespace clothstream::model {
 
-// Right-handed, +Y up, -Z forward; metres.
+// Coordinates are right-handed with +Y up and -Z forward. Units are metres.
 using Vec3 = Eigen::Vector3f;
 using Quaternion = Eigen::Quaternionf;
 

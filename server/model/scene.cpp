@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Rest positions and pins: what follows from a scene's numbers.
+// Rest positions, masses and pins, computed from the numbers of a scene.
 #include "server/model/scene.h"
 
 #include <algorithm>
@@ -11,7 +11,7 @@
 namespace clothstream::model {
 namespace {
 
-// Between neighbours in a row or column of a grid; of a mesh's triangles.
+// Mean distance between neighbours in a row or column of a grid; mean edge of a mesh's triangles. Metres.
 double meanEdge(const Cloth& cloth) {
   if (!cloth.mesh) {
     const GridSpacing s = spacing(cloth.grid);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Colours of springs: a closed form for grids, greedy for meshes.
+// Assigns colours to springs: a closed form for grids, greedy for meshes.
 #include "server/model/spring_colours.h"
 
 #include <algorithm>
@@ -11,7 +11,7 @@
 namespace clothstream::model {
 namespace {
 
-// A spring by its ends' places in a block.
+// Spring by the positions of its ends within a block.
 struct BlockSpring {
   std::uint32_t rowA, columnA, rowB, columnB;
   SpringKind kind;
@@ -39,7 +39,8 @@ std::vector<BlockSpring> allOfBlock() {
   return springs;
 }
 
-// Of a block that lies across seams: through its middle, either way.
+// True if the spring of a shifted block crosses a seam. Seams run through the middle of the block in both
+// directions.
 bool crossesSeam(const BlockSpring& spring) {
   const auto beyond = [](std::uint32_t index) { return index >= kBlock / 2; };
   return beyond(spring.rowA) != beyond(spring.rowB) || beyond(spring.columnA) != beyond(spring.columnB);
@@ -63,7 +64,7 @@ class GridColours {
   }
 
  private:
-  // Blocks whose first node lies `shift` rows and columns before a multiple of four.
+  // Adds blocks that start `shift` rows and columns before a multiple of kBlock.
   void addPass(const std::vector<BlockSpring>& springs, std::uint32_t shift) {
     for (const BlockSpring& spring : springs) {
       for (std::uint32_t row = 0; row < grid_.rows + shift; row += kBlock)
@@ -74,7 +75,7 @@ class GridColours {
   }
 
   void addSpring(const BlockSpring& spring, std::uint32_t row, std::uint32_t column, std::uint32_t shift) {
-    // Nodes before the first row or column wrap round to very large numbers.
+    // Indices before the first row or column wrap around to very large values.
     const std::uint32_t rowA = row + spring.rowA - shift, rowB = row + spring.rowB - shift;
     const std::uint32_t columnA = column + spring.columnA - shift, columnB = column + spring.columnB - shift;
     if (std::max(rowA, rowB) >= grid_.rows || std::max(columnA, columnB) >= grid_.columns) return;
@@ -91,12 +92,12 @@ class GridColours {
   SpringColours colours_;
 };
 
-// Sets of small numbers, one for each node.
+// Colours in use at each node.
 class ColoursAtNodes {
  public:
   explicit ColoursAtNodes(std::uint32_t nodes) : nodes_(nodes) {}
 
-  // The first number in neither set; it is in both from now on.
+  // Returns the first colour that is free at both nodes, and marks it as used at both.
   std::uint32_t takeFirstFree(std::uint32_t a, std::uint32_t b) {
     for (std::uint32_t word = 0;; ++word) {
       if (word == words_.size()) words_.emplace_back(nodes_, 0);
@@ -112,7 +113,7 @@ class ColoursAtNodes {
 
  private:
   std::uint32_t nodes_;
-  std::vector<std::vector<std::uint64_t>> words_;  // 64 numbers each, a node
+  std::vector<std::vector<std::uint64_t>> words_;  // 64 colours per word, one word per node
 };
 
 SpringColours meshColours(const Mesh& mesh) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The springs of a cloth in the order in which a Gauss-Seidel sweep takes them, cut into colours: no two
-// springs of a colour share a node, so that a colour may be done all at once.
+// Springs of a cloth in the order of a Gauss-Seidel sweep, grouped by colour. No two springs of a colour
+// share a node, so all springs of a colour can be processed in parallel.
 #pragma once
 
 #include <cstdint>
@@ -12,8 +12,8 @@
 namespace clothstream::model {
 
 struct SpringColours {
-  std::vector<SpringLink> links;    // every spring once
-  std::vector<std::uint32_t> ends;  // of each colour, the place behind its last spring
+  std::vector<SpringLink> links;    // all springs
+  std::vector<std::uint32_t> ends;  // end index of each colour in `links`
 
   std::size_t count() const { return ends.size(); }
   std::span<const SpringLink> of(std::size_t colour) const {
@@ -22,17 +22,18 @@ struct SpringColours {
   }
 };
 
-// A grid's colours are a closed form in three passes over blocks of 4x4 nodes. An invocation of a kernel can
-// take a whole block with its nodes in registers, for within a pass no two blocks share a node:
-//   corners  what crosses a seam between blocks where the seams' own blocks end: two quads a block, 4
-//   colours; seams    everything else that crosses a seam: blocks that lie two nodes further up and left, 34
-//   colours; insides  what lies in one block: 58 colours.
-// In a block bend springs come first and structural ones last: what comes last is kept best.
+// Colours of a grid have a closed form: three passes over blocks of 4x4 nodes. Within a pass no two blocks
+// share a node, so a kernel invocation can process a whole block with its nodes in registers.
+//   corners: springs across a seam near the corners of blocks, two quads per block, 4 colours
+//   seams:   all other springs across a seam; blocks are shifted by two nodes up and left, 34 colours
+//   insides: springs inside a block, 58 colours
+// Within a block bend springs come first and structural springs last, because the last ones are satisfied
+// best.
 inline constexpr std::uint32_t kBlock = 4;
 inline constexpr std::uint32_t kCornerColours = 4, kSeamColours = 34, kInsideColours = 58;
 
-// A mesh's: in the order of its list each spring takes the first colour that is free at both its nodes; fewer
-// than twice the most springs at a node.
+// Colours of a cloth. For a mesh each spring, in the order of its list, gets the first colour that is free at
+// both nodes. The number of colours is less than twice the maximum number of springs at a node.
 SpringColours springColours(const Cloth& cloth);
 
 }  // namespace clothstream::model

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Springs of grids, and adjacency of any springs.
+// Springs of grids, solver coefficients and adjacency.
 #include "server/model/springs.h"
 
 #include <algorithm>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The springs of a cloth as a list, and which of them meet at a node.
+// Springs of a cloth as a list, and the springs at each node.
 #pragma once
 
 #include <cstdint>
@@ -13,54 +13,53 @@ namespace clothstream::model {
 enum class SpringKind : std::uint8_t { structural, shear, bend };
 inline constexpr std::size_t kSpringKinds = 3;
 
-// Between two nodes of one cloth, a < b.
+// Spring between two nodes of one cloth, a < b.
 struct SpringLink {
   std::uint32_t a = 0, b = 0;
   SpringKind kind = SpringKind::structural;
   float restLength = 0;  // m
 };
 
-// Every spring once, by ascending a; of one a by kind, then by ascending b. A grid's: [Va21] Fig. 1; a
-// mesh's: makeMesh().
+// All springs, ordered by a, then kind, then b. [Va21] Fig. 1 gives the springs of a grid, makeMesh() those
+// of a mesh.
 std::vector<SpringLink> springLinks(const Cloth& cloth);
 
-// Length at rest of the shortest structural spring, m.
+// Rest length of the shortest structural spring, m.
 float shortestSpring(const Cloth& cloth);
 
 const Spring& springOf(const Cloth& cloth, SpringKind kind);
 
-// Whether the cloth's solver keeps springs of this kind at their length, always or when they are stretched
-// too far.
+// True if the solver keeps springs of this kind at their length, always or when they are stretched too far.
 bool isConstraint(const Solver& solver, SpringKind kind);
 
-// Those that the cloth's linear system is of (its constraints; of implicit Euler all), in the order of
-// springLinks(), but for springs between two nodes that no force moves: they have no part in it.
+// Springs that form the linear system of the cloth, in the order of springLinks(): its constraints, or all
+// springs for implicit Euler. Springs between two nodes that no force moves are left out.
 std::vector<SpringLink> systemLinks(const Cloth& cloth);
 
-// Entries of the matrix that an assembled path multiplies out of these: where two of them, or one with
-// itself, share a node that can move. A mesh's grow with the square of what meets at a node.
+// Number of entries of the assembled system matrix: one for each pair of its springs, or spring with itself,
+// that shares a node that can move. It grows with the square of the springs per node.
 std::uint64_t systemEntries(const Cloth& cloth);
 
-// As a force: without stiffness where it always is a constraint. Constraints keep their damping, but those of
-// xpbd, which are damped as constraints.
+// Force of a spring of this kind. A spring that is always a constraint has no stiffness, but keeps its
+// damping. With xpbd it has no damping either, because the constraint is damped.
 Spring forceOf(const Cloth& cloth, SpringKind kind);
 
-// Of the cloth's constraints, 1/kg: what stands on the diagonal of their system in a substep of h seconds.
+// Compliance term on the diagonal of the constraint system in a substep of h seconds, 1/kg.
 double scaledCompliance(const Cloth& cloth, double h);
 
-// What xpbd does with a spring in a substep of h seconds. Its excess of length C, how much that grew in this
-// substep, D, and its multiplier lambda so far give
+// Coefficients of a spring in xpbd for a substep of h seconds. C is its excess length, D the growth of C in
+// this substep, and lambda its multiplier. An iteration adds
 //   -(stretch C + damping D + memory lambda) / ((stretch + damping) (w_a + w_b) + memory)
-// more of lambda, [MMC16] Eq. 18 and 26 times whatever keeps all three numbers small. All but memory 0: the
-// spring is not there.
+// to lambda: [MMC16] Eq. 18 and 26, scaled so that all three coefficients are small. If stretch and damping
+// are 0, there is no spring.
 struct XpbdSpring {
   double stretch = 0, damping = 0, memory = 1;
 };
 XpbdSpring xpbdSpring(const Cloth& cloth, SpringKind kind, double h);
 
-// Which springs meet at each node, in the order of the list.
+// Springs at each node, in the order of the list.
 struct SpringAdjacency {
-  std::vector<std::uint32_t> first;    // a node's first place in `springs`; one more at the end
+  std::vector<std::uint32_t> first;    // first index in `springs` per node; one more at the end
   std::vector<std::uint32_t> springs;  // indices into the list, each twice
 
   std::span<const std::uint32_t> of(std::uint32_t node) const {

@@ -1,25 +1,25 @@
 // SPDX-License-Identifier: MIT
-// Stability bound of explicit integration, by Gershgorin's circles.
+// Stability bound of explicit integration, derived with Gershgorin's circle theorem.
 //
-// Small motions about any shape obey M x'' = -K x - C x'. A spring with direction e and length |d| adds to K
-// the graph Laplacian of its two nodes times  k (e e^T + (1 - L/|d|)(I - e e^T)) <= k I,  and to C the same
-// Laplacian times kd e e^T <= kd I. (Under compression the second part of K is negative: that is buckling,
-// which belongs to the cloth and not to the integrator.) Damping adds `damping` M to C, and the air what
-// airDamping() says.
+// Small motions around any shape obey M x'' = -K x - C x'. Take a spring with direction e and length |d|. It
+// adds the graph Laplacian of its two nodes times  k (e e^T + (1 - L/|d|)(I - e e^T)) <= k I  to K, and the
+// same Laplacian times kd e e^T <= kd I  to C. Under compression the second part of K is negative. That is
+// buckling, a property of the cloth and not of the integrator. Damping adds `damping` M to C, and the air
+// adds the rate of airDamping().
 //
-// A mode's growth z in a step h satisfies, with the Rayleigh quotients s = h^2 x*Kx / x*Mx and c = h x*Cx /
-// x*Mx,
+// Let s = h^2 x*Kx / x*Mx and c = h x*Cx / x*Mx be the Rayleigh quotients of a mode in a step h. Its growth z
+// satisfies
 //   semi-implicit Euler:  z^2 + (s + c - 2) z + 1 - c = 0,      |z| <= 1  if  s + 2c < 4  (Jury's criterion),
 //   Runge-Kutta of 4th order: |z| <= 1 if h |w| <= kRungeKuttaRadius for the mode's rate w, Re w <= 0, with
 //   h^2 |w|^2 = s or h |w| <= c  (underdamped or not),
 //   explicit Euler:       z^2 + (c - 2) z + 1 - c + s = 0,      |z| <= 1  if  s <= c  and  2c - s < 4.
 //
-// A Laplacian with weights w_ij has, in the row of a node of mass m, the diagonal sum_j w_ij and as much
-// beside it, so no Rayleigh quotient exceeds  max_i 2 sum_j w_ij / m.  Dihedral bending, which only
-// semi-implicit Euler has, adds h^2 times bendingRate() to s. Pinned nodes have no row; their
-// springs stay on the diagonals of others. With w = h^2 k + 2 h kd that bounds s + 2c at once. For explicit
-// Euler, s <= c holds spring by spring as far as its dashpot reaches, and mass-proportional damping has to
-// carry the rest.
+// Take a Laplacian with weights w_ij. The row of a node of mass m has the diagonal sum_j w_ij and
+// off-diagonal entries of the same sum. So no Rayleigh quotient exceeds  max_i 2 sum_j w_ij / m.  Dihedral
+// bending, which needs semi-implicit Euler, adds h^2 times bendingRate() to s. Pinned nodes have no row, but
+// their springs stay on the diagonals of other nodes. With w = h^2 k + 2 h kd this bounds s + 2c. For
+// explicit Euler, dashpots ensure s <= c for each spring as far as they reach. Mass-proportional damping must
+// provide the rest.
 #include "server/model/stability.h"
 
 #include <algorithm>
@@ -32,7 +32,7 @@
 namespace clothstream::model {
 namespace {
 
-// Springs of each kind at one node, and one over its mass.
+// Number of springs of each kind at a node, and 1 / mass.
 struct NodeSprings {
   std::uint32_t structural, shear, bend;
   double perMass;
@@ -42,13 +42,13 @@ struct NodeSprings {
   }
 };
 
-// Neighbours at a distance of `step` before and after an index.
+// Number of neighbours at a distance of `step` before and after an index.
 std::uint32_t neighbours(std::uint32_t index, std::uint32_t count, std::uint32_t step) {
   return (index >= step ? 1u : 0u) + (index + step < count ? 1u : 0u);
 }
 
-// Every combination at nodes that are not pinned; of those the one that exceeds all others, if there is such
-// a node.
+// All combinations of spring counts at nodes that are not pinned. If one node has the maximum of every count,
+// only its combination.
 std::vector<NodeSprings> gridSprings(const Cloth& cloth) {
   const std::uint32_t rows = cloth.grid.rows, columns = cloth.grid.columns;
   const double perMass = cloth.grid.nodeCount() / double{cloth.mass};
@@ -79,7 +79,7 @@ std::vector<NodeSprings> gridSprings(const Cloth& cloth) {
   return found;
 }
 
-// Every combination of springs at nodes that are not pinned, with the lightest such node's mass.
+// All combinations of spring counts at nodes that are not pinned, each with the mass of its lightest node.
 std::vector<NodeSprings> meshSprings(const Cloth& cloth) {
   std::vector<NodeSprings> nodes;
   nodes.reserve(cloth.nodeCount());
@@ -103,8 +103,8 @@ std::vector<NodeSprings> meshSprings(const Cloth& cloth) {
   return found;
 }
 
-// The largest area round a node over its mass, m^2/kg. A node of a grid has at most six triangles, of half a
-// cell each, and a third of each node.
+// Maximum area of a node divided by its mass, m^2/kg. A grid node has at most six triangles, each of half a
+// cell, and a third of each belongs to the node.
 double areaPerMass(const Cloth& cloth) {
   if (!cloth.mesh) {
     const GridSpacing lengths = spacing(cloth.grid);
@@ -116,10 +116,10 @@ double areaPerMass(const Cloth& cloth) {
   return most / cloth.mass;
 }
 
-// Largest rate in 1/s at which the air can brake a node. A triangle's force is 0.5 rho (C_D |N.u| u + C_L
-// ...), a function of the mean velocity of its three nodes; the symmetric part of its derivative is at most
-// 0.5 rho (2 C_D + C_L) |N| |u|. A third of that goes to each node, so a row sums to
-// 0.5 rho (2 C_D + C_L) |u| area / m.
+// Maximum rate in 1/s at which air can slow a node. The force on a triangle is 0.5 rho (C_D |N.u| u + C_L
+// ...), a function of the mean velocity of its three nodes. The symmetric part of its derivative is at most
+// 0.5 rho (2 C_D + C_L) |N| |u|. Each node gets a third of it, so a row sums to 0.5 rho (2 C_D + C_L) |u|
+// area / m.
 double airDamping(const Cloth& cloth, const Environment& environment) {
   const double gust = std::sqrt(3.0) * environment.gust.strength;
   const double speed = environment.wind.cast<double>().norm() + gust + kAirSpeed;
@@ -136,7 +136,7 @@ bool semiImplicitStable(const Cloth& cloth, const NodeSprings& node, double air,
 
 // Whether the Runge-Kutta method with step h is stable: s <= r^2 and c <= r.
 bool rungeKuttaStable(const Cloth& cloth, const NodeSprings& node, double air, double, double h) {
-  // Of the largest half disc round 0 within |1 + z + z^2/2 + z^3/6 + z^4/24| <= 1, rounded down.
+  // Radius of the largest half disc around 0 inside |1 + z + z^2/2 + z^3/6 + z^4/24| <= 1, rounded down.
   constexpr double kRungeKuttaRadius = 2.61;
   const auto sum = [&](auto&& of) {
     return node.structural * of(cloth.structural) + node.shear * of(cloth.shear) + node.bend * of(cloth.bend);
@@ -150,7 +150,7 @@ bool rungeKuttaStable(const Cloth& cloth, const NodeSprings& node, double air, d
 // Whether explicit Euler with step h is stable: s <= c, and c < 2, from which 2c - s < 4 follows.
 bool explicitStable(const Cloth& cloth, const NodeSprings& node, double air, double, double h) {
   const double tension = 1 - 1 / (1 + double{kTensionStrain});
-  // What damping has to carry of one spring: along it, what the dashpot does not; across it, all of its
+  // Damping that a spring needs in addition to its dashpot: along the spring the rest, across it all of the
   // tension.
   const auto deficit = [&](const Spring& spring) {
     return std::max(h * spring.stiffness - spring.damping, h * spring.stiffness * tension);
@@ -163,9 +163,9 @@ bool explicitStable(const Cloth& cloth, const NodeSprings& node, double air, dou
          h * (2 * dashpots * node.perMass + cloth.damping + air) < 2;
 }
 
-// Fewest substeps from `atLeast` on; both criteria only get easier with smaller steps. 0: none. Constraints,
-// and the springs of implicit Euler, are solved for: they set no bound, and hold those springs that become
-// constraints when they stretch too far. Those of xpbd are damped implicitly, too.
+// Minimum number of substeps, at least `atLeast`; 0 if no number is stable. Smaller steps only make the
+// criteria easier to meet. Constraints and the springs of implicit Euler are solved implicitly and set no
+// bound. Springs of xpbd are also damped implicitly.
 std::uint32_t stableSubsteps(const Scene& scene, Cloth cloth, std::uint32_t atLeast) {
   if (isConstraint(cloth.solver, SpringKind::structural))
     cloth.structural.stiffness = cloth.shear.stiffness = 0;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Dijkstra's algorithm from all anchors at once, each node reached from two groups of them.
+// Runs Dijkstra's algorithm from all anchors at once until two groups of anchors have reached each node.
 #include "server/model/tethers.h"
 
 #include <functional>
@@ -11,7 +11,7 @@
 namespace clothstream::model {
 namespace {
 
-// Along which paths lead.
+// Springs that paths may follow: structural and shear.
 std::vector<SpringLink> paths(const Cloth& cloth) {
   std::vector<SpringLink> links = springLinks(cloth);
   std::erase_if(links, [](const SpringLink& link) { return link.kind == SpringKind::bend; });
@@ -22,7 +22,7 @@ std::uint32_t otherEnd(const SpringLink& link, std::uint32_t node) {
   return link.a == node ? link.b : link.a;
 }
 
-// Each anchor's group by its first anchor; Tether::kNone for other nodes.
+// Group of each anchor, identified by its first anchor. Tether::kNone for other nodes.
 std::vector<std::uint32_t> groupsOf(const std::vector<std::uint8_t>& anchors,
                                     const std::vector<SpringLink>& links, const SpringAdjacency& adjacency) {
   std::vector<std::uint32_t> groups(anchors.size(), Tether::kNone);
@@ -53,7 +53,8 @@ std::vector<NodeTethers> nodeTethers(const Cloth& cloth) {
   const std::vector<std::uint8_t> anchors = pinnedNodes(cloth);
   const std::vector<std::uint32_t> groups = groupsOf(anchors, links, adjacency);
 
-  // Distance, node, anchor: of equal distances the smaller numbers come first, so that the result is one.
+  // Distance, node, anchor. Equal distances are ordered by node and anchor, so that the result is
+  // deterministic.
   using Step = std::tuple<double, std::uint32_t, std::uint32_t>;
   std::priority_queue<Step, std::vector<Step>, std::greater<>> steps;
   for (std::uint32_t node = 0; node < anchors.size(); ++node)

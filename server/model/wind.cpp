@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Gusts, in whole numbers.
+// Computes gusts in integer arithmetic.
 #include "server/model/wind.h"
 
 #include <algorithm>
@@ -8,11 +8,12 @@
 namespace clothstream::model {
 namespace {
 
-// Of noise and of parts of a turn: what 1 is.
+// Fixed-point 1 for noise and for fractions of a period.
 constexpr std::int64_t kOne = 1 << 16;
-constexpr std::uint64_t kFineTurns = 3;  // a turn
+constexpr std::uint64_t kFineTurns = 3;  // short periods per period
 
-// The mixing of SplitMix64: Steele, Lea and Flood, "Fast splittable pseudorandom number generators", 2014.
+// Mixing function of SplitMix64: Steele, Lea and Flood, "Fast splittable pseudorandom number generators",
+// 2014.
 std::uint64_t mixed(std::uint64_t bits) {
   bits += 0x9E3779B97F4A7C15u;
   bits = (bits ^ (bits >> 30)) * 0xBF58476D1CE4E5B9u;
@@ -20,12 +21,12 @@ std::uint64_t mixed(std::uint64_t bits) {
   return bits ^ (bits >> 31);
 }
 
-// -kOne to kOne.
+// Hashed value from -kOne to kOne.
 std::int64_t valueAt(std::uint64_t turn, std::uint64_t stream) {
   return static_cast<std::int64_t>(mixed(mixed(stream) ^ turn) % (2 * kOne + 1)) - kOne;
 }
 
-// From the value of one turn to that of the next.
+// Interpolates between the values of two consecutive periods.
 std::int64_t noise(std::uint64_t tick, std::uint64_t ticksATurn, std::uint64_t stream) {
   const std::uint64_t turn = tick / ticksATurn;
   const auto part = static_cast<std::int64_t>((tick % ticksATurn) * kOne / ticksATurn);

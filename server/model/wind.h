@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The wind of a tick: its mean and its gust.
+// Wind in a tick: mean and gust.
 #pragma once
 
 #include <cstdint>
@@ -8,14 +8,14 @@
 
 namespace clothstream::model {
 
-// What holds during a tick: `wind` is the mean plus what it strays by then, and the gust is none. The mean to
-// the bit where there is no gust.
+// Environment during a tick. `wind` is the mean plus the gust's deviation at that tick, and `gust` is empty.
+// Without a gust `wind` is exactly the mean.
 //
-// Each component strays by strength times a noise from -1 to 1: values hashed from the number of a turn and
-// of the component, a turn being `seconds` in whole ticks (at least one), joined by smoothstep; and on top,
-// half as strong, the same with turns a third as long, the sum scaled back to -1 to 1. All of it is done in
-// whole numbers and depends on nothing else, so that every machine and every run has the same bits; other
-// `seconds` go on elsewhere in the noise.
+// The deviation of each component is `strength` times a noise from -1 to 1. The noise interpolates hashed
+// values with smoothstep. Their period is `seconds` in whole ticks, at least one. A second noise of half the
+// strength and a third of the period is added, and the sum is scaled to -1 to 1. The noise uses integers only
+// and depends on tick, component and period only, so every machine and every run gets the same bits. A change
+// of `seconds` jumps to another place in the noise.
 Environment environmentAt(const Scene& scene, std::uint64_t tick);
 
 }  // namespace clothstream::model

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What the parameters were at any time of a recording, without reading it from its start.
+// Collects and restores snapshots of the parameters of a recording.
 #include "server/recording/parameter_history.h"
 
 #include <algorithm>
@@ -11,11 +11,11 @@ namespace {
 
 constexpr std::uint64_t kWholeChunk = std::numeric_limits<std::uint64_t>::max();
 
-// Those in the chunk up to this time. Gives whether there are changes in it at all.
+// Applies the changes in the chunk up to this time. Returns whether the chunk holds any changes.
 bool applyChunk(RecordingReader& reader, std::size_t chunk, std::uint64_t time,
                 ParametersInForce& parameters) {
   const auto messages = reader.messages(chunk, Topic::parameters);
-  if (!messages) return false;  // who plays it says that it is damaged
+  if (!messages) return false;  // playback reports the damage
   v1::ParameterChanged message;
   for (const RecordedMessage& told : *messages)
     if (told.time <= time && message.ParseFromArray(told.bytes.data(), static_cast<int>(told.bytes.size())))

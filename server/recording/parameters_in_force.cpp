@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The parameters that hold at some time of a recorded stream.
+// Applies recorded changes of parameters.
 #include "server/recording/parameters_in_force.h"
 
 #include <algorithm>
@@ -11,6 +11,7 @@
 #include <google/protobuf/descriptor.h>
 #include <google/protobuf/message.h>
 
+#include "proto/parameters/cloth_parameters.h"
 #include "server/messages/scene_message.h"
 #include "server/model/scene.h"
 
@@ -19,7 +20,7 @@ namespace {
 
 using google::protobuf::FieldDescriptor;
 
-// m²; 0 where it cannot be told.
+// Area in m²; 0 if it is unknown.
 double areaOf(const v1::Cloth& cloth, const v1::ClothDescription& described) {
   if (cloth.has_grid()) return double{cloth.grid().width()} * double{cloth.grid().height()};
   const std::string &positions = described.rest_positions(), &triangles = described.triangles();
@@ -37,17 +38,22 @@ double areaOf(const v1::Cloth& cloth, const v1::ClothDescription& described) {
   return area;
 }
 
-// What is set replaces what was there: a vector in whose message a zero is not written, too. But of these
-// what is not given stays.
-bool isInParts(const FieldDescriptor& field) {
-  return field.name() == "self_collision" || field.name() == "tethers";
+// True if a change leaves what it does not give: a group that the table keeps. Every other field is replaced
+// as a whole, so that a zero, which is not on the wire, replaces too.
+bool isKept(const FieldDescriptor& field) {
+  const auto number = static_cast<std::uint32_t>(field.number());
+  return field.containing_type() == v1::ClothChange::descriptor() &&
+         std::ranges::any_of(parameters::kClothParameters, [&](const parameters::ClothParameter& parameter) {
+           return parameter.group != nullptr && parameter.group->field.inChange == number &&
+                  !parameter.group->isReplaced;
+         });
 }
 
 void overwrite(const google::protobuf::Message& with, google::protobuf::Message& all) {
   std::vector<const FieldDescriptor*> fields;
   with.GetReflection()->ListFields(with, &fields);
   for (const FieldDescriptor* field : fields)
-    if (!field->is_repeated() && !isInParts(*field)) all.GetReflection()->ClearField(&all, field);
+    if (!field->is_repeated() && !isKept(*field)) all.GetReflection()->ClearField(&all, field);
   all.MergeFrom(with);
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The parameters that hold at some time of a recorded stream.
+// Parameters in effect at a time of a recorded stream.
 #pragma once
 
 #include <utility>
@@ -8,19 +8,19 @@
 
 namespace clothstream::recording {
 
-// Safe on any messages: what they say of cloths that the stream does not have is passed over. Colliders are
-// told by each frame, and not here.
+// Safe for any messages: changes of unknown cloths are ignored. Colliders are part of each frame and not
+// included here.
 class ParametersInForce {
  public:
-  // As when the stream began: of nothing that its definition does not tell.
+  // Parameters at the start of the stream, as far as its definition gives them.
   explicit ParametersInForce(const v1::StreamDescription& description);
-  // These, which are all.
+  // `all` must hold all parameters.
   explicit ParametersInForce(v1::ParameterChange all) : now_(std::move(all)) {}
 
-  // Those told later come later.
+  // Changes must be applied in the order of the stream.
   void apply(const v1::ParameterChange& change);
 
-  // All of them, as one change.
+  // All parameters as one change.
   const v1::ParameterChange& now() const { return now_; }
 
  private:

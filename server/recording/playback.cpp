@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A recording's frames when they are due.
+// Publishes the frames of a recording when they are due.
 #include "server/recording/playback.h"
 
 #include <algorithm>
@@ -19,14 +19,14 @@ namespace {
 
 using namespace std::chrono_literals;
 
-// How often it is asked whether somebody waits for a key frame while nothing flows.
+// Interval between checks for key-frame requests while playback is stopped.
 constexpr auto kLookAgain = 20ms;
 constexpr auto kTellPeriod = 1s;
-// What it is behind more than this, it does not catch up.
+// Maximum delay that playback catches up; a longer delay shifts the schedule.
 constexpr auto kMaxLateness = 250ms;
-// Messages of one step, so that it hears of what is wanted meanwhile.
+// Maximum number of messages per step, so that control requests are handled in between.
 constexpr int kMaxMessages = 256;
-// Recorded ticks beyond this begin anew: there is room for all that can follow.
+// Maximum first tick. Streams with larger ticks are renumbered, so that ticks cannot overflow.
 constexpr std::uint64_t kMaxFirstTick = std::uint64_t{1} << 62;
 
 messages::FieldError wrong(std::string text) {
@@ -134,7 +134,7 @@ std::optional<Playback::Clock::time_point> Playback::step(stream::LiveScene& sce
   const bool flows = here && !asleep_ && !paused_;
   scene.running = flows;
   if (flows) flow(scene, now);
-  if (here && (tells_ || (flows && now >= nextTold_))) {
+  if (here && (announcementDue_ || (flows && now >= nextTold_))) {
     nextTold_ = now + kTellPeriod;
     tell(scene);
   }
@@ -152,13 +152,13 @@ void Playback::takeWanted(stream::LiveScene& scene, Clock::time_point now) {
       paused_ = scene.paused;
       origin_ = now;
       originPosition_ = position_;
-      tells_ = true;
+      announcementDue_ = true;
     }
     speed_ = wanted.speed.value_or(speed_);
     loop_ = wanted.loop.value_or(loop_);
   }
   if (atEnd_ && !paused_ && !wanted.seek) wanted.seek = 0;
-  if (wanted.loop) tells_ = true;
+  if (wanted.loop) announcementDue_ = true;
   if (wanted.seek) jump(scene, *wanted.seek, now);
 }
 
@@ -166,7 +166,7 @@ void Playback::jump(stream::LiveScene& scene, double seconds, Clock::time_point 
   recording_.seek(seconds);
   next_.reset();
   atEnd_ = false;
-  tells_ = true;
+  announcementDue_ = true;
   moveTo(seconds);
   for (;;) {
     RecordedStream::Next next = recording_.next();
@@ -215,7 +215,7 @@ void Playback::reachEnd(stream::LiveScene& scene, Clock::time_point now) {
   if (loop_) return jump(scene, 0, now);
   scene.paused = true;
   atEnd_ = true;
-  tells_ = true;
+  announcementDue_ = true;
   moveTo(recording_.length());
   {
     const std::lock_guard lock(mutex_);
@@ -236,7 +236,8 @@ void Playback::publish(stream::LiveScene& scene, RecordedStream::Next& next) {
   }
   auto& told = std::get<RecordedStream::Told>(next);
   if (told.isFrame()) {
-    // What refers to the frame before comes after it; a key frame of a file that others wrote may not.
+    // A frame that refers to the previous one has a larger tick. A key frame in a file from another program
+    // may not.
     const std::uint64_t tick = told.header.tick + shift_;
     if (tick <= newest_ || tick - newest_ > kMaxTickStep) shift_ += newest_ + ticksAFrame_ - tick;
     return publishFrame(scene, told);
@@ -281,12 +282,12 @@ void Playback::publishFrame(stream::LiveScene& scene, RecordedStream::Told& told
 }
 
 void Playback::tell(stream::LiveScene& scene) {
-  tells_ = false;
+  announcementDue_ = false;
   scene.audience.announce(stream::playbackMessage(*this));
 }
 
 void Playback::tellParameters(stream::LiveScene& scene, const RecordedStream::Told& frame) {
-  ParametersInForce there = recording_.parametersAt(frame.time);  // which may read the file
+  ParametersInForce there = recording_.parametersAt(frame.time);  // may read the file
   {
     const std::lock_guard lock(mutex_);
     parameters_ = std::move(there);

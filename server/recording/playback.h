@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// `clothstream-server play`: a recording as the source of a scene's frames.
+// `clothstream-server play`: a recording as the frame source of a scene.
 #pragma once
 
 #include <condition_variable>
@@ -19,16 +19,15 @@ namespace clothstream::recording {
 inline constexpr double kMinSpeed = 0.1, kMaxSpeed = 8;
 
 struct PlaybackOptions {
-  double from = 0;   // s, at most the recording's length
+  double from = 0;   // start position, s, at most the length of the recording
   double speed = 1;  // kMinSpeed to kMaxSpeed
   bool loop = false;
 };
 
-// Packets are sent as they were recorded but for their ticks, which only ever grow: wherever the recording
-// goes on from, it is with a key frame whose tick is that of the next frame, and references are told by their
-// distance. The recording stands still while nobody is in the scene, and until the first who joins can take a
-// frame. Who can go on only from a key frame gets the next one that was recorded; while the scene is paused,
-// the one before.
+// Sends packets as recorded, except for their ticks, which always increase. After a seek or loop the first
+// frame is a key frame with the next tick. References between frames are relative, so they stay valid.
+// Playback stops while the scene has no participants, and until the first one can receive a frame. A client
+// that needs a key frame gets the next recorded one, or, while the scene is paused, the previous one.
 class Playback : public stream::FrameSource {
  public:
   Playback(RecordedStream recording, const PlaybackOptions& options);
@@ -45,8 +44,8 @@ class Playback : public stream::FrameSource {
   v1::Playback playback() const override;
   v1::ParameterChange parameters() const override;
 
-  // Publishes what is due by `now`; gives when to call it again, or nothing: after a wake(). Of one thread,
-  // which begin() starts; a test may call it in its place.
+  // Publishes everything due by `now`. Returns when to call it again; nullopt means after a wake(). Only the
+  // thread that begin() starts may call it. A test that does not call begin() may call it too.
   std::optional<stream::Clock::time_point> step(stream::LiveScene& scene, stream::Clock::time_point now);
 
  private:
@@ -58,7 +57,7 @@ class Playback : public stream::FrameSource {
 
   void run(stream::LiveScene& scene);
   void takeWanted(stream::LiveScene& scene, Clock::time_point now);
-  // Goes on from the newest key frame at this time or before, which is published at once.
+  // Continues from the newest key frame at or before this time, and publishes it immediately.
   void jump(stream::LiveScene& scene, double seconds, Clock::time_point now);
   void flow(stream::LiveScene& scene, Clock::time_point now);
   Clock::time_point due(double seconds) const;
@@ -67,29 +66,29 @@ class Playback : public stream::FrameSource {
   void publishFrame(stream::LiveScene& scene, RecordedStream::Told& frame);
   void reachEnd(stream::LiveScene& scene, Clock::time_point now);
   void tell(stream::LiveScene& scene);
-  // Those that hold with this frame.
+  // Announces the parameters in effect at this frame.
   void tellParameters(stream::LiveScene& scene, const RecordedStream::Told& frame);
   void moveTo(double seconds);
 
-  mutable std::mutex mutex_;  // of what follows
+  mutable std::mutex mutex_;  // protects the members down to parameters_
   std::condition_variable changed_;
   bool woken_ = false, stopping_ = false;
   Wanted wanted_;
-  double position_ = 0, speed_ = 1;  // s; written by step() alone
+  double position_ = 0, speed_ = 1;  // s; written by step() only
   bool loop_ = false, paused_ = false;
   ParametersInForce parameters_;
 
-  // step()'s own.
+  // Used by step() only.
   RecordedStream recording_;
   const std::uint64_t ticksAFrame_;
   std::optional<RecordedStream::Next> next_;
   bool asleep_ = true, atEnd_ = false;
-  bool tells_ = false;  // something changed that everybody is to know
+  bool announcementDue_ = false;  // the state changed and must be announced
   Clock::time_point origin_{}, nextTold_{};
-  double originPosition_ = 0;      // s of the recording at the origin
-  std::uint64_t shift_ = 0;        // from recorded ticks to those sent, modulo 2^64
-  std::uint64_t newest_ = 0;       // tick sent
-  std::set<double> lossesLogged_;  // s; each is logged once, however often it is passed
+  double originPosition_ = 0;      // position in the recording at the origin, s
+  std::uint64_t shift_ = 0;        // sent tick minus recorded tick, modulo 2^64
+  std::uint64_t newest_ = 0;       // newest tick sent
+  std::set<double> lossesLogged_;  // start of each loss that was logged, s; each is logged once
 
   std::thread thread_;
 };

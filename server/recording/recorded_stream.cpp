@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A recording's stream in the order in which it is played.
+// Reads the messages of a recording in playback order.
 #include "server/recording/recorded_stream.h"
 
 #include <algorithm>
@@ -21,7 +21,7 @@ bool isName(const std::string& text) {
          });
 }
 
-// Those of what happened in the scene; others are of the server that it was on.
+// Announcements about the scene. The others concern the server that recorded it.
 bool isOfScene(v1::NoticeKind kind) {
   return kind == v1::NOTICE_KIND_ROLLED_BACK || kind == v1::NOTICE_KIND_DEVICE_REBUILT ||
          kind == v1::NOTICE_KIND_RUNNING_SLOW || kind == v1::NOTICE_KIND_CHANGE_UNDONE ||
@@ -48,7 +48,7 @@ tl::expected<RecordedStream, std::string> RecordedStream::of(RecordingReader rea
   if (!description) return tl::unexpected(description.error());
   const auto isRate = [](std::uint32_t rate) { return rate >= 1 && rate <= 1000; };
   if (!isRate(description->simulation_rate()) || !isRate(description->stream_rate()))
-    return tl::unexpected(fmt::format("its rates of {} and {} a second are none that a stream has",
+    return tl::unexpected(fmt::format("its rates of {} and {} per second are invalid for a stream",
                                       description->simulation_rate(), description->stream_rate()));
   if (description->temporal_layers() > codec::kMaxTemporalLayers)
     return tl::unexpected(fmt::format("its stream has {} temporal layers; a stream has at most {}",
@@ -87,7 +87,7 @@ RecordedStream::Next RecordedStream::next() {
     if (!*message) break;
     held_ = told(**message);
   }
-  // What was lost ends where a frame can be decoded again.
+  // A loss ends at the next frame that can be decoded.
   if (lost_ && (!held_ || held_->isFrame())) {
     if (held_) lost_->end = held_->time;
     return *std::exchange(lost_, std::nullopt);
@@ -102,7 +102,7 @@ void RecordedStream::seek(double seconds) {
   lost_.reset();
   held_.reset();
   sought_ = true;
-  // Past what cannot be read, back to what can.
+  // Skips unreadable parts backwards to the previous readable one.
   while (!reader_.seek(time)) {
     const ChunkPlace place = reader_.mcap().chunks()[reader_.mcap().chunkAt(time)];
     if (place.start <= reader_.start()) return reader_.rewind();
@@ -147,13 +147,13 @@ std::optional<RecordedStream::Told> RecordedStream::frame(const RecordedMessage&
   if (!packet || packet->header.epoch != description_.epoch() ||
       packet->header.codec != description_.codec() ||
       packet->header.temporalLayer >= std::max(description_.temporal_layers(), 1u))
-    return refuse("a frame in it is none of its stream");
+    return refuse("a frame in it does not belong to its stream");
   told.header = packet->header;
   const bool key = told.header.kind == codec::PacketKind::key;
   if (!key && (!newest_ || told.header.referenceCount != 1 || !decoded_.find(told.header.references[0]) ||
                told.header.tick - *newest_ > kMaxTickStep)) {
     if (sought_ && !lost_) return std::nullopt;
-    return refuse("a frame that others refer to is not in it");
+    return refuse("a frame that other frames refer to is missing");
   }
   if (key) decoded_.clear();
   decoded_.hold(told.header.temporalLayer, told.header.tick);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A recording's stream in the order in which it is played.
+// Messages of a recording in playback order.
 #pragma once
 
 #include <cstdint>
@@ -19,33 +19,33 @@
 
 namespace clothstream::recording {
 
-// Later ticks than this after the one before are of no stream.
+// Maximum distance between consecutive ticks of a stream.
 inline constexpr std::uint64_t kMaxTickStep = std::uint64_t{1} << 32;
 
-// Frames that can be decoded one after the other, from a key frame on, and what everybody was told between
-// them. What cannot be read, or not be decoded any more, is left out and said. Safe on any bytes.
+// Yields frames that can be decoded in order, starting with a key frame, and the announcements between them.
+// Leaves out and reports everything that cannot be read or decoded. Safe for any bytes.
 class RecordedStream {
  public:
-  // The error names the path and what is wrong with it. Files that were cut off are taken as far as they go.
-  // Reads what holds a change of parameters, so that no seek has to.
+  // The error names the path and the problem. A truncated file is read up to its end. Reads every chunk with
+  // a change of parameters, so that a seek does not have to.
   [[nodiscard]] static tl::expected<RecordedStream, std::string> open(const std::string& path);
   [[nodiscard]] static tl::expected<RecordedStream, std::string> of(RecordingReader reader);
 
-  // The stream's, as when the recording began.
+  // Description of the stream at the start of the recording.
   const v1::StreamDescription& description() const { return description_; }
-  // Of whose server it is; a name of [a-z0-9_-], "recording" where it has none such.
+  // Name of the recorded scene, out of [a-z0-9_-]; "recording" if the name is invalid.
   const std::string& scene() const { return scene_; }
   const std::string& device() const { return reader_.fact("device"); }
-  // Whether its end is missing.
+  // True if the end of the file is missing.
   bool cut() const { return !reader_.mcap().indexed(); }
-  // s
+  // Length in seconds.
   double length() const { return secondsAt(reader_.end()); }
 
   struct Told {
     double time = 0;              // s from the start of the recording
-    v1::ServerMessage message{};  // as it was sent
+    v1::ServerMessage message{};  // message as sent
     bool isFrame() const { return message.has_frame(); }
-    codec::PacketHeader header{};  // of a frame
+    codec::PacketHeader header{};  // set for a frame
   };
   struct Lost {
     double start = 0, end = 0;  // s
@@ -54,11 +54,11 @@ class RecordedStream {
   struct End {};
   using Next = std::variant<End, Told, Lost>;
 
-  // What comes next.
+  // Returns the next message, loss or end.
   [[nodiscard]] Next next();
-  // What comes next is then the newest key frame at this time or before, or else the first message.
+  // next() continues with the newest key frame at or before this time, or else with the first message.
   void seek(double seconds);
-  // All parameters as they are known to whoever saw everything up to then.
+  // All parameters after every change up to this time.
   ParametersInForce parametersAt(double seconds);
 
  private:
@@ -66,7 +66,7 @@ class RecordedStream {
   double secondsAt(std::uint64_t time) const;
   std::uint64_t timeAt(double seconds) const;
   void lose(double from, std::string reason);
-  // Nothing where it is not to be played.
+  // nullopt if the message is not played.
   std::optional<Told> told(const RecordedMessage& message);
   std::optional<Told> frame(const RecordedMessage& message);
 
@@ -74,11 +74,11 @@ class RecordedStream {
   v1::StreamDescription description_;
   ParameterHistory parameters_;
   std::string scene_;
-  std::optional<std::uint64_t> newest_;  // tick of the frame before; nothing: only a key frame can follow
-  codec::HeldFrames decoded_;            // while there is a newest one
-  bool sought_ = true;                   // and no frame since: what cannot be decoded is not lost
-  std::optional<Lost> lost_;             // and not said yet
-  std::optional<Told> held_;             // comes after what was lost
+  std::optional<std::uint64_t> newest_;  // tick of the previous frame; absent: only a key frame can follow
+  codec::HeldFrames decoded_;            // valid while newest_ is set
+  bool sought_ = true;                   // no frame since the last seek, so undecodable frames are not a loss
+  std::optional<Lost> lost_;             // loss that next() has not returned yet
+  std::optional<Told> held_;             // message after the loss
 };
 
 }  // namespace clothstream::recording

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A bounded queue, and the thread that empties it into a file.
+// Bounded queue of messages, and the thread that writes them to a file.
 #include "server/recording/recorder.h"
 
 #include <chrono>
@@ -12,7 +12,7 @@
 
 #include "proto/recording/file.h"
 #include "server/messages/scene_message.h"
-#include "server/recording/facts.h"
+#include "server/recording/metadata.h"
 #include "server/recording/tick_message.h"
 
 namespace clothstream::recording {
@@ -20,12 +20,12 @@ namespace {
 
 using SteadyClock = std::chrono::steady_clock;
 
-// So that what is lost when the program is killed is of a quarter of a second at most, with what writing
-// takes.
+// Maximum time before a chunk is closed. If the program is killed, at most this time plus the time of writing
+// is lost.
 constexpr std::chrono::nanoseconds kChunkTime{McapWriter::kChunkNs};
 constexpr int kMaxSameNames = 100;
 
-// What is there already stays: the next name is taken.
+// Creates a file with the next free name. Existing files are kept.
 using Created = tl::expected<std::pair<OutputFile, std::string>, std::string>;
 
 Created createAnew(const std::filesystem::path& directory, const std::string& scene) {
@@ -40,15 +40,15 @@ Created createAnew(const std::filesystem::path& directory, const std::string& sc
   }
 }
 
-// The error does not name the directory: it is for whoever asked.
+// The error does not name the directory, because it is sent to a client.
 Created createNamed(const std::filesystem::path& directory, const std::string& name) {
   const std::string path = (directory / (name + ".mcap")).string();
   auto file = OutputFile::create(path);
   if (file) return std::pair(std::move(*file), path);
   std::error_code none;
   if (!std::filesystem::exists(path, none))
-    return tl::unexpected(fmt::format("{}.mcap cannot be made on the server", name));
-  return tl::unexpected(fmt::format("there is a recording {}.mcap already; choose another name", name));
+    return tl::unexpected(fmt::format("{}.mcap cannot be created on the server", name));
+  return tl::unexpected(fmt::format("a recording {}.mcap already exists; choose another name", name));
 }
 
 }  // namespace
@@ -60,7 +60,8 @@ tl::expected<std::shared_ptr<Recorder>, std::string> Recorder::create(RecorderOp
       name.empty() ? createAnew(options.directory, scene) : createNamed(options.directory, name);
   if (!created) {
     spdlog::warn("{}: not recorded: {}", scene, created.error());
-    return tl::unexpected(name.empty() ? std::string("no file can be made on the server") : created.error());
+    return tl::unexpected(name.empty() ? std::string("no file can be created on the server")
+                                       : created.error());
   }
   auto recorder = std::make_shared<Recorder>(std::move(options));
   recorder->file_ = std::make_unique<OutputFile>(std::move(created->first));
@@ -103,9 +104,10 @@ void Recorder::begin(const vulkan::DeviceInfo& device, const model::Scene& scene
   put(Topic::scene, recorded);
   saved(state, false);
   if (&start != &state) put(start, false, true);
-  thread_ =
-      std::thread([this, name = scene.name,
-                   facts = factsOf(options_.serverName, device, scene, description)] { run(name, facts); });
+  thread_ = std::thread(
+      [this, name = scene.name, facts = metadataOf(options_.serverName, device, scene, description)] {
+        run(name, facts);
+      });
 }
 
 void Recorder::ticked(const stream::AppliedTick& tick) {
@@ -209,11 +211,11 @@ void Recorder::run(const std::string& sceneName, const Facts& facts) {
                                        options_.serverName, facts);
   if (!writer) return fail(writer.error());
   const auto written = writeAll(*writer);
-  // Also after an error that is not the disk's: what there is is then whole.
+  // Finishes the file also after an error that is not the disk's, so that it is complete.
   const auto finished = writer->finish().and_then([&] { return file->sync(); });
   bytes_ = writer->bytes();
   if (!finished)
-    return fail(fmt::format("{}; what there is of it can be read after `clothstream recover {} OUT`",
+    return fail(fmt::format("{}; read the rest of the recording after `clothstream recover {} OUT`",
                             finished.error(), path));
   if (!written) return fail(fmt::format("{}; {} ends there", written.error(), path));
   spdlog::info("{}: the recording {} is complete, {:.1f} MiB", sceneName, path,
@@ -223,7 +225,7 @@ void Recorder::run(const std::string& sceneName, const Facts& facts) {
 
 Written Recorder::writeAll(RecordingWriter& writer) {
   std::vector<Waiting> taken;
-  SteadyClock::time_point due = SteadyClock::time_point::max();  // of closing the chunk
+  SteadyClock::time_point due = SteadyClock::time_point::max();  // time to close the chunk
   v1::ServerMessage message;
   for (;;) {
     bool ends = false;
@@ -237,8 +239,8 @@ Written Recorder::writeAll(RecordingWriter& writer) {
       taken.swap(waiting_);
       waitingBytes_ = 0;
       if (overflowed_)
-        return tl::unexpected(fmt::format("more than {} bytes waited to be written: the disk is too slow",
-                                          options_.maxWaitingBytes));
+        return tl::unexpected(fmt::format(
+            "more than {} bytes are waiting to be written: the disk is too slow", options_.maxWaitingBytes));
       ends = ended_;
     }
     if (!taken.empty() && due == SteadyClock::time_point::max()) due = SteadyClock::now() + kChunkTime;
@@ -264,7 +266,7 @@ Written Recorder::writeAll(RecordingWriter& writer) {
 }
 
 void Recorder::fail(const std::string& reason) {
-  spdlog::error("a recording stopped, its scene goes on: {}", reason);
+  spdlog::error("a recording stopped; its scene continues: {}", reason);
   const std::lock_guard lock(mutex_);
   state_ = State::failed;
   waiting_.clear();

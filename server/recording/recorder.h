@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The journal of one scene, written to a file by a thread of its own.
+// Writes the journal of one scene to a file in a separate thread.
 #pragma once
 
 #include <atomic>
@@ -23,34 +23,36 @@
 namespace clothstream::recording {
 
 struct RecorderOptions {
-  std::filesystem::path directory;  // there must be one
+  std::filesystem::path directory;  // must exist
   std::string serverName;
-  // After which a recording goes on in another file, where grabs hold cloth up to an eighth later; 0: never.
+  // File size after which the recording continues in another file; 0: never. While grabs hold cloth the
+  // switch is delayed, up to an eighth of this size.
   std::uint64_t maxBytes = 0;
-  // Of what waits to be written. When it is more, the recording ends: the scene does not wait for a disk.
+  // Maximum size of the queue. The recording ends if it overflows, because the scene does not wait for a
+  // disk.
   std::size_t maxWaitingBytes = std::size_t{64} << 20;
 };
 
-// Thread-safe. Of one recording. Its file is SCENE-TIME.mcap, made when the scene begins to run. An error
-// ends the recording, is logged, and leaves the scene alone.
+// Journal of one recording. Thread-safe. Creates the file SCENE-TIME.mcap when the scene starts to run. An
+// error ends the recording and is logged; it does not affect the scene.
 class Recorder : public stream::Journal {
  public:
   explicit Recorder(RecorderOptions options) : options_(std::move(options)) {}
-  // The file is made at once, under this name where it is not empty. The error says why it cannot be, such as
-  // that there is one.
+  // Creates the file immediately, with this name if it is not empty. The error says why that is impossible,
+  // for example because the file exists.
   [[nodiscard]] static tl::expected<std::shared_ptr<Recorder>, std::string> create(RecorderOptions options,
                                                                                    const std::string& scene,
                                                                                    const std::string& name);
-  // Everything that was told is written first.
+  // Writes everything in the queue first.
   ~Recorder() override;
 
   enum class State : std::uint8_t { waiting, running, complete, failed };
   State state() const { return state_; }
-  // Empty before it runs.
+  // Path of the file. Empty before the recording starts.
   std::string path() const;
   std::uint64_t bytes() const { return bytes_; }
-  // Ends it, and waits until it is written. One that never began is gone, with its file. Of one thread at a
-  // time.
+  // Ends the recording and waits until it is written. A recording that never started is deleted with its
+  // file. Only one thread may call it at a time.
   State finish();
 
   bool active() const override { return state_ == State::running && !ended_; }
@@ -83,7 +85,7 @@ class Recorder : public stream::Journal {
                        const std::string& clientName, const std::string& displayName);
   void put(const simulation::StateSnapshot& state, bool grabsHold, bool start);
   void run(const std::string& sceneName, const Facts& facts);
-  // Until the end, or the error that it returns.
+  // Writes until the recording ends, or until an error, which it returns.
   [[nodiscard]] Written writeAll(RecordingWriter& writer);
   void fail(const std::string& reason);
 
@@ -93,19 +95,18 @@ class Recorder : public stream::Journal {
   std::atomic<bool> ended_ = false;
   std::atomic<std::uint64_t> bytes_ = 0;
 
-  std::mutex beginning_;      // so that it does not end meanwhile
-  mutable std::mutex mutex_;  // of all down to overflowed_
+  std::mutex beginning_;      // prevents an end during begin()
+  mutable std::mutex mutex_;  // protects the members down to overflowed_
   std::condition_variable changed_;
   std::string path_;
-  std::unique_ptr<OutputFile> file_;  // that was made before it runs
+  std::unique_ptr<OutputFile> file_;  // created before the recording starts
   std::vector<Waiting> waiting_;
   std::size_t waitingBytes_ = 0;
   bool overflowed_ = false;
 
-  v1::RecordedTick tick_;  // the device's thread's, used again
-  bool tellsCloths_ =
-      true;             // the same thread's: with the next tick, so that one can go on from the state before
-  std::thread thread_;  // from begin() on
+  v1::RecordedTick tick_;    // reused; device thread only
+  bool tellsCloths_ = true;  // write the cloths with the next tick; device thread only
+  std::thread thread_;       // runs after begin()
 };
 
 }  // namespace clothstream::recording

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The recordings of a server.
+// Creates the journals of a server's scenes.
 #include "server/recording/recordings.h"
 
 #include <stdexcept>

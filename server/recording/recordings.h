@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The recordings of a server: of each scene while it runs, or when somebody asks.
+// Recordings of a server: of every scene while it runs, or on request.
 #pragma once
 
 #include <memory>
@@ -11,17 +11,18 @@
 
 namespace clothstream::recording {
 
-// Thread-safe. Ends them all, and waits until they are on the disk.
+// Thread-safe. The destructor ends all recordings and waits until they are written.
 class Recordings {
  public:
-  // `always`: each scene is recorded from when it begins to run; else when somebody asks. Makes the directory
-  // where there is none. Throws std::runtime_error with the reason where nothing can be written there.
+  // `always` records every scene from its start; otherwise scenes are recorded on request. Creates the
+  // directory if it does not exist. Throws std::runtime_error with the reason if nothing can be written
+  // there.
   Recordings(RecorderOptions options, bool always);
 
-  // Of the scene of this name. Those of scenes that are gone go as well, once they are written.
+  // Returns the journal of a scene. Removes journals of scenes that no longer exist, once they are written.
   std::shared_ptr<stream::Journal> add(const std::string& scene);
 
-  // For people: how many run, are complete, and failed, and their bytes.
+  // Report for people: number of running, complete and failed recordings, and their bytes.
   std::string report() const;
 
  private:
@@ -29,7 +30,7 @@ class Recordings {
   const bool always_;
   mutable std::mutex mutex_;
   std::vector<std::shared_ptr<SceneJournal>> journals_;
-  RecordingCounts before_;  // of those that are gone
+  RecordingCounts before_;  // counts of removed journals
 };
 
 }  // namespace clothstream::recording

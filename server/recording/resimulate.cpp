@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// From the start, tick by tick, with what the device was given then.
+// Simulates the ticks of a recording with their recorded inputs.
 #include "server/recording/resimulate.h"
 
 #include <algorithm>
@@ -37,14 +37,14 @@ Difference differenceOf(const simulation::StateSnapshot& recorded, const simulat
   Difference difference{.tick = recorded.tick};
   for (std::size_t i = 0; i < was.positions.size(); ++i) {
     const double distance = (is.positions[i].cast<double>() - was.positions[i].cast<double>()).norm();
-    // Written so that what is no number counts as far.
+    // The negated comparison counts NaN as the largest distance.
     if (!(distance <= difference.largest)) difference.largest = distance;
     difference.mean += distance / static_cast<double>(was.positions.size());
   }
   return difference;
 }
 
-// What a SceneHost does to the device, by what it wrote down.
+// Repeats the device work of a SceneHost from its recording.
 class Replay {
  public:
   Replay(const ResimulateOptions& options, Resimulation& result) : options_(options), result_(result) {}
@@ -53,8 +53,8 @@ class Replay {
   Done take(const v1::RecordedScene& message);
   Done take(v1::Checkpoint& message);
   Done take(const v1::RecordedTick& message);
-  // Something before the next message cannot be read: it goes on from the next state in which no grab holds,
-  // for which nodes one has is not in it.
+  // Reports that a message cannot be read. The replay continues from the next state in which no grab holds
+  // cloth, because a state does not contain the grabbed nodes.
   void lose(std::string reason);
 
  private:
@@ -73,8 +73,8 @@ class Replay {
   model::Scene scene_;
   simulation::StateSnapshot start_;
   std::uint64_t tick_ = 0;
-  bool lost_ = false;   // until a state from which it can go on
-  bool keeps_ = false;  // the device has a state that a rollback goes back to
+  bool lost_ = false;   // waits for a state from which it can continue
+  bool keeps_ = false;  // the device has a state for a rollback
   std::unique_ptr<vulkan::Device> device_;
   std::unique_ptr<vulkan::Recorder> recorder_;
   std::unique_ptr<simulation::ClothSimulation> simulation_;
@@ -87,7 +87,7 @@ void Replay::lose(std::string reason) {
 
 Done Replay::take(const v1::RecordedScene& message) {
   messages::Result<model::Scene> scene = messages::toScene(message.scene());
-  if (!scene) return broken("its scene cannot be: {}", scene.error().text);
+  if (!scene) return broken("its scene is invalid: {}", scene.error().text);
   definition_ = message.scene();
   scene_ = std::move(*scene);
   return {};
@@ -97,7 +97,7 @@ Done Replay::take(v1::Checkpoint& message) {
   if (scene_.cloths.empty()) return broken("it has a state before its scene");
   const std::size_t bytes = std::size_t{scene_.nodeCount()} * simulation::kSnapshotBytesPerNode;
   if (message.state().size() != bytes)
-    return broken("its state after tick {} is not of its scene's {} nodes", message.tick(),
+    return broken("its state after tick {} does not fit the {} nodes of its scene", message.tick(),
                   scene_.nodeCount());
   const auto state = std::as_bytes(std::span(message.state()));
   simulation::StateSnapshot snapshot{message.tick(), {state.begin(), state.end()}};
@@ -130,7 +130,7 @@ Done Replay::take(v1::Checkpoint& message) {
 }
 
 void Replay::makeSimulation(const simulation::StateSnapshot& state) {
-  // Made anew, it goes back to its start, as the scene's host does.
+  // A new simulation starts from its first state, as in SceneHost.
   keeps_ = true;
   simulation_.reset();
   simulation_ = std::make_unique<simulation::ClothSimulation>(*device_, scene_);
@@ -145,7 +145,7 @@ Done Replay::take(const v1::RecordedTick& message) {
     return {};
   }
   if (message.recovery() == v1::RECOVERY_ROLLBACK && !keeps_) {
-    lose("it went back to a state that is not in the recording");
+    lose("it rolled back to a state that is not in the recording");
     return {};
   }
   keeps_ |= message.keeps_state();
@@ -170,7 +170,7 @@ Done Replay::take(const v1::RecordedTick& message) {
 
 void Replay::compare(const v1::RecordedTick& message, const simulation::TickStatus& status) {
   ++result_.ticks;
-  // Numbers that are none need not be the same ones.
+  // NaNs may have different bits.
   const bool bothUnhealthy = message.unhealthy() && !status.healthy;
   const bool same = bothUnhealthy || (!message.unhealthy() && status.stateHash == message.state_hash());
   if (options_.states) {
@@ -218,8 +218,7 @@ Done replay(RecordingReader& reader, const ResimulateOptions& options, Resimulat
   }
   if (!replay.started() && !result.missing.empty()) return broken("{}", result.missing.front().reason);
   if (!replay.started())
-    return broken(
-        "it holds no simulation: only recordings that a server made do (clothstream-server --record)");
+    return broken("it holds no simulation; use a recording made by a server (clothstream-server --record)");
   return {};
 }
 
@@ -242,19 +241,20 @@ std::string toText(const Resimulation& result) {
   std::string text = fmt::format("scene     {}\nrecorded  {}\nagain     {}\n", result.scene,
                                  result.recordedOn, result.device);
   for (const Difference& difference : result.differences)
-    text += fmt::format("tick {}: nodes are {:.3g} m from where they were at most, {:.3g} m in the mean\n",
+    text += fmt::format("tick {}: nodes differ by at most {:.3g} m, on average by {:.3g} m\n",
                         difference.tick, difference.largest, difference.mean);
   for (const Missing& missing : result.missing)
-    text += fmt::format("after tick {} it is missing{}: {}\n", missing.after,
+    text += fmt::format("ticks after {} are missing{}: {}\n", missing.after,
                         missing.until ? fmt::format(" until tick {}", *missing.until) : " to the end",
                         missing.reason);
-  const char* all = result.missing.empty() ? "all" : "all that there is";
-  if (!result.firstDifferent) return text + fmt::format("{}, {} the same to the bit\n", ticks, all);
+  const char* all = result.missing.empty() ? "all" : "all available ticks";
+  if (!result.firstDifferent) return text + fmt::format("{}, {} bit-identical\n", ticks, all);
   if (result.differences.empty())
-    text += "no state was recorded after the first difference to measure it by\n";
+    text += "no state was recorded after the first difference, so its size is unknown\n";
   return text +
-         fmt::format("{} of {} are different, first tick {}: its state's hash is {:016x}, and was {:016x}\n",
-                     result.different, ticks, *result.firstDifferent, result.hash, result.recordedHash);
+         fmt::format(
+             "{} of {} differ, first tick {}: the hash of its state is {:016x}, recorded was {:016x}\n",
+             result.different, ticks, *result.firstDifferent, result.hash, result.recordedHash);
 }
 
 }  // namespace clothstream::recording

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// `clothstream-server resimulate`: a recording's ticks once more, compared with what they were.
+// `clothstream-server resimulate`: simulates a recording again and compares the result.
 #pragma once
 
 #include <cstdint>
@@ -16,48 +16,48 @@
 
 namespace clothstream::recording {
 
-// How far nodes are from where they were, metres.
+// Distance of nodes from their recorded positions, metres.
 struct Difference {
   std::uint64_t tick = 0;
   double largest = 0, mean = 0;
 };
 
-// What could not be simulated again.
+// Part of a recording that could not be simulated again.
 struct Missing {
   std::uint64_t after = 0;             // tick
-  std::optional<std::uint64_t> until;  // tick of the state from which it went on; nothing: there was none
+  std::optional<std::uint64_t> until;  // tick of the state from which the simulation continued; absent: none
   std::string reason;
 };
 
 struct Resimulation {
-  std::uint64_t ticks = 0;      // simulated again
-  std::uint64_t different = 0;  // of these, with another state than recorded
+  std::uint64_t ticks = 0;      // number of simulated ticks
+  std::uint64_t different = 0;  // number of ticks whose state differs from the recording
   bool interrupted = false;
   std::vector<Missing> missing;
-  // Of the first that is different.
+  // First tick that differs, with its hashes.
   std::optional<std::uint64_t> firstDifferent;
   std::uint64_t hash = 0, recordedHash = 0;
-  // From there on, at every recorded state.
+  // Differences at every recorded state from there on.
   std::vector<Difference> differences;
-  std::string scene, recordedOn, device;  // names; the device with its driver
+  std::string scene, recordedOn, device;  // names; recordedOn and device include the driver
 };
 
 struct ResimulateOptions {
   std::string path;
-  // For a scene of so many nodes.
+  // Options of the device for a scene with this number of nodes.
   std::function<vulkan::DeviceOptions(std::uint32_t nodes)> device;
-  // Asked after every tick.
+  // Called after every tick; true stops the simulation.
   std::function<bool()> interrupted;
-  // Told after every tick: how much of the recording is done, from 0 to 1. May be empty.
+  // Called after every tick with the completed fraction, 0 to 1. May be empty.
   std::function<void(double)> progress;
-  // Told after every tick: whether the state is what it was, and the state. May be empty.
+  // Called after every tick with the state, and whether it equals the recorded one. May be empty.
   std::function<void(std::uint64_t tick, bool same, const simulation::NodeState& state)> states{};
 };
 
-// The error says what is wrong with the file. Throws what the device throws.
+// The error describes the problem of the file. Exceptions of the device pass through.
 [[nodiscard]] tl::expected<Resimulation, std::string> resimulate(const ResimulateOptions& options);
 
-// For people; the last line is the verdict.
+// Report for people. The last line is the verdict.
 std::string toText(const Resimulation& result);
 
 }  // namespace clothstream::recording

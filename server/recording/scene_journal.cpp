@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The journal of a scene over all of its recordings.
+// Starts, continues and stops the recordings of a scene.
 #include "server/recording/scene_journal.h"
 
 #include <algorithm>
@@ -71,10 +71,10 @@ void SceneJournal::replace(std::shared_ptr<Recorder> next, bool continues) {
 messages::Result<void> SceneJournal::isFree() {
   if (current_ && current_->state() == Recorder::State::failed) replace(nullptr);
   if (!current_) return {};
-  return refused(
-      v1::ERROR_CODE_INVALID_ARGUMENT,
-      always_ ? fmt::format("startRecording: '{}' is recorded by the server all the time", scene_)
-              : fmt::format("startRecording: '{}' is recorded already, to {}", scene_, fileOf(*current_)));
+  return refused(v1::ERROR_CODE_INVALID_ARGUMENT,
+                 always_ ? fmt::format("startRecording: '{}' is recorded by the server all the time", scene_)
+                         : fmt::format("startRecording: '{}' is already being recorded to {}", scene_,
+                                       fileOf(*current_)));
 }
 
 messages::Result<std::string> SceneJournal::start(const std::string& name) {
@@ -87,8 +87,8 @@ messages::Result<std::string> SceneJournal::start(const std::string& name) {
     const std::lock_guard lock(mutex_);
     if (auto free = isFree(); !free) return tl::unexpected(std::move(free).error());
   }
-  // The device's thread takes the lock, and must not wait for a disk. Where somebody else was faster, its
-  // file goes.
+  // The device thread takes the lock and must not wait for a disk, so the file is created without it. If
+  // another request was faster, the file is deleted.
   auto recorder = Recorder::create(options_, scene_, name);
   if (!recorder) return refused(v1::ERROR_CODE_RESOURCE_EXHAUSTED, "startRecording: " + recorder.error());
   const std::lock_guard lock(mutex_);
@@ -107,7 +107,7 @@ messages::Result<v1::StopRecordingResponse> SceneJournal::stop() {
                      fmt::format("stopRecording: '{}' is recorded by the server all the time", scene_));
     if (!current_)
       return refused(v1::ERROR_CODE_INVALID_ARGUMENT,
-                     fmt::format("stopRecording: '{}' is not recorded", scene_));
+                     fmt::format("stopRecording: '{}' is not being recorded", scene_));
     recorder = current_;
     replace(nullptr);
   }
@@ -116,12 +116,11 @@ messages::Result<v1::StopRecordingResponse> SceneJournal::stop() {
     case Recorder::State::waiting:
       return refused(
           v1::ERROR_CODE_INVALID_ARGUMENT,
-          fmt::format("stopRecording: '{}' did not run since the recording was asked for: there is none",
+          fmt::format("stopRecording: '{}' has not run since startRecording, so there is no recording",
                       scene_));
     case Recorder::State::failed:
-      return refused(
-          v1::ERROR_CODE_RESOURCE_EXHAUSTED,
-          fmt::format("stopRecording: {} could not be written to its end; the server's log says why", file));
+      return refused(v1::ERROR_CODE_RESOURCE_EXHAUSTED,
+                     fmt::format("stopRecording: {} is incomplete; the log of the server says why", file));
     default:
       break;
   }
@@ -152,10 +151,10 @@ void SceneJournal::ticked(const stream::AppliedTick& tick) {
   if (!recorder) return;
   recorder->ticked(tick);
   if (options_.maxBytes == 0 || !recorder->active()) return;
-  // Grabs take hold anew where a file begins: that is put off, but not for ever.
+  // Grabs start again at the start of a file, so the switch is delayed while they hold cloth, up to a limit.
   const std::uint64_t most = options_.maxBytes + (tick.inputs.grabs.empty() ? 0 : options_.maxBytes / 8);
   if (recorder->bytes() < most) return;
-  // The next file begins with the next tick.
+  // The next file starts with the next tick.
   const std::lock_guard lock(mutex_);
   if (current_ != recorder) return;
   recorder->end();

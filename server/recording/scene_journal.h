@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The journal of a scene over all of its recordings, of which one runs at a time.
+// Journal of a scene over all of its recordings. At most one runs at a time.
 #pragma once
 
 #include <cstdint>
@@ -15,7 +15,7 @@
 
 namespace clothstream::recording {
 
-// Of recordings.
+// Numbers of recordings by state, and their total bytes.
 struct RecordingCounts {
   std::uint64_t running = 0, complete = 0, failed = 0, bytes = 0;
 
@@ -31,7 +31,7 @@ struct RecordingCounts {
 // Thread-safe.
 class SceneJournal : public stream::Journal {
  public:
-  // `always`: it is recorded from the start, and nobody can stop that.
+  // `always` records the scene from its start, and clients cannot stop it.
   SceneJournal(std::string scene, RecorderOptions options, bool always);
 
   RecordingCounts counts() const;
@@ -54,21 +54,21 @@ class SceneJournal : public stream::Journal {
 
  private:
   std::shared_ptr<Recorder> current() const;
-  // All with the lock held. Whether none can begin now.
+  // The caller must hold the lock for the following functions. Refuses if a recording runs.
   [[nodiscard]] messages::Result<void> isFree();
-  // `continues`: from one file to another.
+  // `continues`: the recording continues in another file.
   void replace(std::shared_ptr<Recorder> next, bool continues = false);
 
   const std::string scene_;
   const RecorderOptions options_;
   const bool always_;
 
-  mutable std::mutex mutex_;                          // of what follows
-  std::shared_ptr<Recorder> current_;                 // null: none runs
-  bool continues_ = false;                            // it goes on where another one ended
-  std::vector<std::shared_ptr<Recorder>> finishing_;  // what they were told is still being written
-  RecordingCounts before_;                            // of those that are gone
-  std::map<std::uint64_t, std::pair<std::string, std::string>> participants_;  // client's and display name
+  mutable std::mutex mutex_;                          // protects the following members
+  std::shared_ptr<Recorder> current_;                 // null if none runs
+  bool continues_ = false;                            // current_ continues another recording
+  std::vector<std::shared_ptr<Recorder>> finishing_;  // ended, but still being written
+  RecordingCounts before_;                            // counts of deleted recorders
+  std::map<std::uint64_t, std::pair<std::string, std::string>> participants_;  // client name and display name
 };
 
 }  // namespace clothstream::recording

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Inputs of a tick, written and read field by field.
+// Writes and reads the inputs of a tick field by field.
 #include "server/recording/tick_message.h"
 
 #include <cmath>
@@ -26,7 +26,7 @@ v1::Recovery toMessage(stream::Recovery recovery) {
   return v1::RECOVERY_NONE;
 }
 
-// But for their geometry.
+// Scene without the geometry of its cloths.
 void writeCloths(const model::Scene& scene, v1::RecordedTick& message) {
   model::Scene bare;
   for (const model::Cloth& cloth : scene.cloths) {
@@ -42,7 +42,8 @@ void writeCloths(const model::Scene& scene, v1::RecordedTick& message) {
     v1::ClothParameters& to = *message.add_cloths();
     to.mutable_cloth()->Swap(parameters.mutable_cloths(static_cast<int>(i)));
     to.mutable_cloth()->clear_grid();
-    if (const auto& fraction = bare.cloths[i].solver.correctionFraction) to.set_taken_back(*fraction);
+    if (const auto& correctionFraction = bare.cloths[i].solver.correctionFraction)
+      to.set_taken_back(*correctionFraction);
   }
 }
 
@@ -86,7 +87,7 @@ void writeGrab(const simulation::Grab& grab, v1::AppliedGrip& message) {
   message.set_slip_distance(grab.slipDistance);
 }
 
-// Numbers as they are: what was normalised once is not to be again. The first that no tick can have is kept.
+// Reads numbers unchanged: quaternions are not normalised again. Remembers whether any number is impossible.
 class Numbers {
  public:
   float number(float value, float least, float most) {
@@ -110,11 +111,11 @@ class Numbers {
   bool good_ = true;
 };
 
-constexpr float kMostSize = 1e4f;  // m
+constexpr float kMaxSize = 1e4f;  // m
 
 model::Shape shapeOf(Numbers& numbers, const v1::AppliedCollider& message, const model::Scene& scene,
                      bool& known) {
-  const auto size = [&](float value) { return numbers.number(value, 0, kMostSize); };
+  const auto size = [&](float value) { return numbers.number(value, 0, kMaxSize); };
   switch (message.shape_case()) {
     case v1::AppliedCollider::kSphere:
       return model::Sphere{size(message.sphere().radius())};
@@ -140,8 +141,8 @@ simulation::Grab grabOf(Numbers& numbers, const v1::AppliedGrip& message) {
                                                                    : simulation::Grab::State::holds,
           .start = numbers.pose(message.start()),
           .end = numbers.pose(message.end()),
-          .radius = numbers.number(message.radius(), 0, kMostSize),
-          .reach = numbers.number(message.reach(), 0, kMostSize),
+          .radius = numbers.number(message.radius(), 0, kMaxSize),
+          .reach = numbers.number(message.reach(), 0, kMaxSize),
           .maxForce = numbers.number(message.max_force()),
           .slipDistance = numbers.number(message.slip_distance())};
 }
@@ -172,10 +173,10 @@ tl::expected<simulation::TickInputs, std::string> toInputs(const v1::RecordedTic
   std::size_t attachments = 0;
   for (const model::Cloth& cloth : scene.cloths) attachments += cloth.attachments.size();
   if (static_cast<std::size_t>(message.attachments_size()) != attachments)
-    return wrong("it has not the scene's attachments");
+    return wrong("its attachments are not those of the scene");
   if (static_cast<std::size_t>(message.colliders_size()) > simulation::kMaxColliders ||
       static_cast<std::size_t>(message.grips_size()) > simulation::kMaxGrabs)
-    return wrong("it has more colliders or grabs than there can be");
+    return wrong("it has too many colliders or grabs");
   Numbers numbers;
   simulation::TickInputs inputs;
   inputs.environment.gravity = numbers.vec3(message.gravity());
@@ -190,14 +191,14 @@ tl::expected<simulation::TickInputs, std::string> toInputs(const v1::RecordedTic
   }
   for (const v1::Pose& pose : message.attachments()) inputs.attachments.push_back(numbers.pose(pose));
   for (const v1::AppliedGrip& grab : message.grips()) inputs.grabs.push_back(grabOf(numbers, grab));
-  if (!numbers.good()) return wrong("one of its numbers cannot be");
+  if (!numbers.good()) return wrong("one of its numbers is out of range");
   return inputs;
 }
 
 tl::expected<std::vector<model::Cloth>, std::string> toCloths(const v1::RecordedTick& message,
                                                               const v1::Scene& definition) {
   if (message.cloths_size() != definition.cloths_size())
-    return tl::unexpected(fmt::format("tick {}: it has {} cloths, and the scene {}", message.tick(),
+    return tl::unexpected(fmt::format("tick {}: it has {} cloths, but the scene has {}", message.tick(),
                                       message.cloths_size(), definition.cloths_size()));
   v1::Scene changed = definition;
   for (int i = 0; i < message.cloths_size(); ++i) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Ticks between the device's inputs and their message, exact to the bit.
+// Converts ticks between the inputs of the device and their message, bit-exactly.
 #pragma once
 
 #include <string>
@@ -14,14 +14,14 @@
 
 namespace clothstream::recording {
 
-// Replaces what `message` says.
+// Overwrites `message`.
 void write(const stream::AppliedTick& tick, v1::RecordedTick& message);
 
-// What the device was given. The error says what in the message cannot be of this scene.
+// Inputs of the device. The error says which part of the message does not fit this scene.
 [[nodiscard]] tl::expected<simulation::TickInputs, std::string> toInputs(const v1::RecordedTick& message,
                                                                          const model::Scene& scene);
-// The scene's cloths with the parameters that the tick brings, which must bring some. `definition` is that of
-// the scene.
+// Cloths of the scene with the parameters of the tick, which must contain some. `definition` is that of the
+// scene.
 [[nodiscard]] tl::expected<std::vector<model::Cloth>, std::string> toCloths(const v1::RecordedTick& message,
                                                                             const v1::Scene& definition);
 

@@ -104,8 +104,8 @@ void Attachments::apply(std::vector<ReferenceCloth>& cloths, std::span<const Gra
         held.reset();
         continue;
       }
-      Vec3 gained = (1 - double{model::kCaughtUp}) * ((after - before) / h - velocity) +
-                    double{model::kCaughtUp} * (after - position) / h;
+      Vec3 gained = (1 - double{model::kGrabCorrectionFraction}) * ((after - before) / h - velocity) +
+                    double{model::kGrabCorrectionFraction} * (after - position) / h;
       const double most = grab.maxForce / status_[held->grab].taken * cloth.inverseMasses()[node] * h;
       if (gained.norm() > most) gained *= most / gained.norm();
       velocity += gained;

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-# Writes figure_*.json, after the figures of Va, Choi and Hong (Applied Sciences 2021, 11, 8255), and solver_*.json: one
-# sheet with every solver. Figure 8 (7,820,856 nodes) is only in clothstream-bench paper: no scene to open by mistake.
+# Writes figure_*.json, based on the figures of Va, Choi and Hong (Applied Sciences 2021, 11, 8255), and solver_*.json: one
+# sheet with every solver. Figure 8 (7,820,856 nodes) is only in clothstream-bench paper, because it is too large to open by mistake.
 import json
 
 NODE_MASS, WIDTH, BALL, DAMPING = 0.13, 10, 2.5, 0.1
@@ -15,7 +15,7 @@ def write(name, description, scene):
 
 
 def on_balls(rate, panels):
-    """Sheets beside each other, each over its ball; a tick is a step."""
+    """Scene with sheets next to each other, each above its ball. A tick is one substep."""
     cloths, colliders = [], [{"name": "floor", "plane": {}}]
     for i, (name, nodes, stiffness, solver, bend) in enumerate(panels):
         x = (i - (len(panels) - 1) / 2) * 12
@@ -41,7 +41,7 @@ def acad(iterations=20):
 
 
 SPRINGS = {"massSpring": {}}
-SHORT, LONG = 200, 62  # steps a second: 0.005 s, and 0.0161 s for 0.016 s
+SHORT, LONG = 200, 62  # steps per second: 0.005 s, and 0.0161 s instead of 0.016 s
 
 write("figure_07", "Mass-spring sheet of 9,216 nodes on a ball, steps of 5 ms.",
       on_balls(SHORT, [("sheet", 96, 600, SPRINGS, True)]))

@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-# Writes tablecloth.obj: a disc in the XZ plane, of rings that are turned against each other, with a hem.
+# Writes tablecloth.obj: a disc of rings with a hem, in the XZ plane. Each ring is rotated against its neighbours.
 from math import cos, pi, sin
 
-RINGS, RADIUS, HEM = 22, 0.8, 2  # rings; metres; outer rings that are the hem
+RINGS, RADIUS, HEM = 22, 0.8, 2  # number of rings; metres; number of outer rings that form the hem
 
 points = [(0.0, 0.0)]
-rings = [[1]]  # numbers of a ring's vertices, from 1
+rings = [[1]]  # vertex numbers of each ring, from 1
 for ring in range(1, RINGS + 1):
     rings.append([])
     for i in range(6 * ring):

@@ -87,7 +87,7 @@ struct PullPush {
   float progressAfter;
   float substepSeconds;
   float substepRate;  // 1/s
-  float caughtUp;     // model::kCaughtUp
+  float caughtUp;     // model::kGrabCorrectionFraction
 };
 
 CLOTHSTREAM_SHARED_END

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Parameters and settings on their way to the server; changes, reports, notices and scenes on their way back.
+// Parameters and settings sent to the server. Changes, reports, notices and scenes received from it.
 #include <cmath>
 #include <limits>
 
@@ -7,6 +7,7 @@
 #include <google/protobuf/unknown_field_set.h>
 #include <gtest/gtest.h>
 
+#include "proto/parameters/cloth_parameters.h"
 #include "tests/core/scripted_server.h"
 
 namespace clothstream::client {
@@ -15,7 +16,7 @@ namespace {
 using ::testing::HasSubstr;
 using ::testing::SizeIs;
 
-TEST(Parameters, OnlyWhatIsGivenIsChanged) {
+TEST(Parameters, SendOnlyGivenValues) {
   JoinedClient joined;
   const float wind[] = {1, 0, -2};
   cs_set_environment(joined.client.get(), nullptr, wind, nullptr);
@@ -46,11 +47,11 @@ TEST(Parameters, OnlyWhatIsGivenIsChanged) {
   EXPECT_EQ(collider.colliders(0).radius(), 0.3f);
 }
 
-TEST(Parameters, AreThoseOfTheDescriptionUntilSomebodyChangesThem) {
+TEST(Parameters, FollowTheDescriptionAndLaterChanges) {
   JoinedClient joined;
   cs_environment environment;
   ASSERT_EQ(cs_get_environment(joined.client.get(), &environment), 1);
-  EXPECT_EQ(environment.gravity[1], -9.81f);  // the default: the definition is silent
+  EXPECT_EQ(environment.gravity[1], -9.81f);  // default, because the definition gives none
   EXPECT_EQ(environment.wind[0], 3);
   EXPECT_EQ(environment.air_density, 1.2f);
   cs_cloth_parameters cloth;
@@ -74,7 +75,7 @@ TEST(Parameters, AreThoseOfTheDescriptionUntilSomebodyChangesThem) {
   EXPECT_EQ(cloth.damping, 0.25f);
 }
 
-TEST(Parameters, GustsAndMaterialsAreToldAndChanged) {
+TEST(Parameters, IncludeGustsAndMaterials) {
   ScriptedServer server;
   v1::StreamDescription description = server.description();
   description.add_materials("cotton");
@@ -116,13 +117,13 @@ TEST(Parameters, GustsAndMaterialsAreToldAndChanged) {
   EXPECT_EQ(environment.gust_strength, 3);
   EXPECT_STREQ(cs_cloth_material(client.get(), 0), "cotton");
 
-  // None, as is told where there is none, is not nothing told.
+  // An empty name clears the material. An absent name would keep it.
   change.mutable_cloths(0)->set_material("");
   client.receive(message.SerializeAsString());
   EXPECT_STREQ(cs_cloth_material(client.get(), 0), "");
 }
 
-TEST(Parameters, ThereAreNoneBeforeTheDescription) {
+TEST(Parameters, AreAbsentBeforeTheDescription) {
   ClientUnderTest client;
   cs_environment environment;
   cs_cloth_parameters cloth;
@@ -131,7 +132,7 @@ TEST(Parameters, ThereAreNoneBeforeTheDescription) {
   EXPECT_EQ(cs_vertex_count(client.get()), 0u);
 }
 
-TEST(ClothSettings, SayWhatHoldsAndChangeOnlyWhatIsGiven) {
+TEST(ClothSettings, ShowCurrentValuesAndChangeOnlyGivenOnes) {
   ScriptedServer server;
   v1::StreamDescription description = server.description();
   v1::Cloth& definition = *description.mutable_definition()->mutable_cloths(0);
@@ -172,7 +173,7 @@ TEST(ClothSettings, SayWhatHoldsAndChangeOnlyWhatIsGiven) {
   const v1::ClothChange springs = sent();
   EXPECT_EQ(springs.name(), "curtain");
   EXPECT_EQ(springs.structural().stiffness(), 50);
-  EXPECT_EQ(springs.structural().damping(), 0.5f);  // as it was
+  EXPECT_EQ(springs.structural().damping(), 0.5f);  // does not change
   EXPECT_EQ(springs.lift(), 0.125f);
   EXPECT_FALSE(springs.has_shear() || springs.has_damping() || springs.has_thickness() ||
                springs.has_solver());
@@ -192,7 +193,7 @@ TEST(ClothSettings, SayWhatHoldsAndChangeOnlyWhatIsGiven) {
   EXPECT_THAT(client.outgoing(), SizeIs(0));
 }
 
-TEST(ClothSettings, OfBendingSelfCollisionTethersAndPath) {
+TEST(ClothSettings, IncludeBendingSelfCollisionTethersAndPath) {
   ScriptedServer server;
   v1::StreamDescription description = server.description();
   v1::Cloth& definition = *description.mutable_definition()->mutable_cloths(0);
@@ -228,7 +229,7 @@ TEST(ClothSettings, OfBendingSelfCollisionTethersAndPath) {
   EXPECT_FALSE(sent.self_collision().has_radius());
   EXPECT_EQ(sent.self_collision().friction(), 0.5f);
   EXPECT_EQ(sent.tethers().slack(), 0.0625f);
-  // As it was.
+  // The path does not change.
   EXPECT_EQ(sent.solver().constraint().path(), v1::CONSTRAINT_PATH_ASSEMBLED);
 
   v1::ServerMessage changed;
@@ -242,7 +243,7 @@ TEST(ClothSettings, OfBendingSelfCollisionTethersAndPath) {
   EXPECT_EQ(now.iterations, 30u);
 }
 
-TEST(ClothSettings, OfImplicitEulerAreItsIterationsAndTolerance) {
+TEST(ClothSettings, IncludeIterationsAndToleranceOfImplicitEuler) {
   ScriptedServer server;
   v1::StreamDescription description = server.description();
   v1::Solver& solver = *description.mutable_definition()->mutable_cloths(0)->mutable_solver();
@@ -269,9 +270,40 @@ TEST(ClothSettings, OfImplicitEulerAreItsIterationsAndTolerance) {
   EXPECT_EQ(sent.tolerance(), 0.25f);
 }
 
-// A solver that is left and chosen again has the settings that it had; one that this client does not know
-// too.
-TEST(ClothSettings, OfASolverAreKeptForItsReturn) {
+// Each number of the table is sent, and read back from the change that the server announces.
+TEST(ClothSettings, CarryEveryNumberOfTheTable) {
+  for (const parameters::ClothParameter& parameter : parameters::kClothParameters) {
+    SCOPED_TRACE(std::string(parameter.option));
+    JoinedClient joined;
+    cs_cloth_settings change;
+    cs_keep_cloth_settings(&change);
+    settingOf(change, parameter.number) = 0.125f;
+    ASSERT_EQ(cs_change_cloth(joined.client.get(), "", &change), 1);
+    v1::ServerMessage changed;
+    *changed.mutable_parameter_changed()->mutable_change() = joined.sent().parameter_change();
+
+    const google::protobuf::Message* holder = &changed.parameter_changed().change().cloths(0);
+    const auto field = [&](std::uint32_t number) {
+      return holder->GetDescriptor()->FindFieldByNumber(static_cast<int>(number));
+    };
+    if (parameter.group != nullptr)
+      holder = &holder->GetReflection()->GetMessage(*holder, field(parameter.group->field.inChange));
+    EXPECT_EQ(holder->GetReflection()->GetFloat(*holder, field(parameter.field.inChange)), 0.125f);
+
+    cs_cloth_settings now{};
+    now.version = CS_CLOTH_SETTINGS_VERSION;
+    ASSERT_EQ(cs_get_cloth_settings(joined.client.get(), 0, &now), 1);
+    const float before = settingOf(now, parameter.number);
+    const bool isKept = parameter.group != nullptr && !parameter.group->isReplaced;
+    EXPECT_EQ(std::isnan(before), isKept);
+    joined.client.receive(changed.SerializeAsString());
+    ASSERT_EQ(cs_get_cloth_settings(joined.client.get(), 0, &now), 1);
+    EXPECT_EQ(settingOf(now, parameter.number), 0.125f);
+  }
+}
+
+// A solver that is selected again keeps its previous settings, also if this client does not know its kind.
+TEST(ClothSettings, KeepSettingsOfPreviousSolvers) {
   JoinedClient joined;
   const auto told = [&](const v1::Solver& solver, std::uint64_t participant) {
     v1::ServerMessage message;
@@ -309,7 +341,7 @@ TEST(ClothSettings, OfASolverAreKeptForItsReturn) {
             unknown.SerializeAsString());
 }
 
-TEST(Reports, AreHandedOnWithTheTickThatTheyAreOf) {
+TEST(Reports, AreAvailableWithTheirTick) {
   ScriptedServer server;
   ClientUnderTest client;
   client.join(server);
@@ -332,7 +364,7 @@ TEST(Reports, AreHandedOnWithTheTickThatTheyAreOf) {
   cloth.set_penetration(0.003f);
   EXPECT_EQ(client.receive(ScriptedServer::serialise(frame)),
             static_cast<std::uint32_t>(CS_EVENT_FRAME | CS_EVENT_REPORT));
-  // Frames without one leave it.
+  // Frames without a report keep the previous one.
   EXPECT_EQ(client.receive(server.frame(6)), static_cast<std::uint32_t>(CS_EVENT_FRAME));
   ASSERT_EQ(cs_get_cloth_report(client.get(), 0, &report), 1);
   EXPECT_EQ(report.tick, 5u);
@@ -352,7 +384,7 @@ TEST(Reports, AreHandedOnWithTheTickThatTheyAreOf) {
   EXPECT_EQ(cs_get_cloth_report(client.get(), 0, &report), 0);
 }
 
-TEST(Reports, ThatAreNoneEndTheClient) {
+TEST(Reports, WithInvalidNumbersEndTheClient) {
   ScriptedServer server;
   ClientUnderTest client;
   client.join(server);
@@ -363,7 +395,7 @@ TEST(Reports, ThatAreNoneEndTheClient) {
   EXPECT_THAT(cs_error_text(client.get()), HasSubstr("SimulationReport"));
 }
 
-TEST(Notices, AreHandedOn) {
+TEST(Notices, AreAvailable) {
   JoinedClient joined;
   v1::ServerMessage message;
   message.mutable_notice()->set_text("simulated time runs slow");
@@ -371,7 +403,7 @@ TEST(Notices, AreHandedOn) {
   EXPECT_STREQ(cs_notice_text(joined.client.get()), "simulated time runs slow");
 }
 
-TEST(Scenes, CanBeAskedForInsideTheStream) {
+TEST(Scenes, AreListedInsideTheStream) {
   JoinedClient joined;
   cs_list_scenes(joined.client.get());
   EXPECT_TRUE(joined.sent().has_list_scenes());

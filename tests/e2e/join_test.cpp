@@ -348,7 +348,7 @@ TEST_F(Join, SetsParametersForAllClients) {
   EXPECT_THAT(refused->errors(), HasSubstr("substeps"));
   const auto unknown = clothstream({"set", address_, "--cloth", "rug", "--damping", "1"});
   EXPECT_EQ(unknown->waitForEnd(kPatience), 4);
-  EXPECT_THAT(unknown->errors(), HasSubstr("there is no cloth 'rug'"));
+  EXPECT_THAT(unknown->errors(), HasSubstr("'rug' does not exist in the scene"));
 }
 
 TEST(JoinWithoutServer, RefusesInvalidArguments) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// OBJ and glTF files, good and bad.
+// Valid and invalid OBJ and glTF files.
 #include "server/meshes/mesh_file.h"
 
 #include <cstring>
@@ -37,7 +37,7 @@ class MeshFile : public testing::Test {
   std::filesystem::path folder_;
 };
 
-TEST_F(MeshFile, ObjGivesVerticesFacesCoordinatesAndParts) {
+TEST_F(MeshFile, ReadsVerticesFacesCoordinatesAndPartsOfObj) {
   const auto source = readMeshFile(write("cloth.obj", R"(# a comment
 o sheet
 v 0 0 0
@@ -72,13 +72,13 @@ f 2/1 -1/2 3/3
   EXPECT_EQ(source->parts[1].firstFace, 1u);
 }
 
-TEST_F(MeshFile, ObjWithoutCoordinatesAtSomeCornerHasNone) {
+TEST_F(MeshFile, IgnoresIncompleteTextureCoordinatesOfObj) {
   const auto source = parseObj("v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nf 1/1 2/1 3\n");
   ASSERT_TRUE(source) << source.error();
   EXPECT_TRUE(source->uvs.empty());
 }
 
-TEST_F(MeshFile, BadObjIsRefusedOrHasIndicesThatBuildMeshRefuses) {
+TEST_F(MeshFile, RefusesInvalidObjHereOrInBuildMesh) {
   for (const auto& [text, says] :
        {std::pair("v 0 0 0\nv 1 nan 0\n", "line 2 is \"v 1 nan 0\""), std::pair("v 0 0 inf\n", "line 1"),
         std::pair("  v nan 0 0\n", "line 1"), std::pair("v\t0 nan 0\n", "line 1"),
@@ -98,7 +98,7 @@ TEST_F(MeshFile, BadObjIsRefusedOrHasIndicesThatBuildMeshRefuses) {
   }
 }
 
-// A quad as two triangles: floats, then 16-bit indices, in a buffer of its own; moved and mirrored by nodes.
+// Quad as two triangles. The buffer holds floats, then 16-bit indices. Nodes translate and mirror the quad.
 constexpr const char* kGltf = R"({
   "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}],
   "nodes": [{"translation": [1, 2, 3], "children": [1]}, {"scale": [-2, 1, 1], "mesh": 0}],
@@ -142,12 +142,12 @@ void expectSheet(const tl::expected<MeshSource, std::string>& source) {
   EXPECT_EQ(source->parts[0].name, "linen");
 }
 
-TEST_F(MeshFile, GltfGivesTheTrianglesOfItsSceneWhereItsNodesPutThem) {
+TEST_F(MeshFile, ReadsTransformedTrianglesOfTheGltfScene) {
   write("sheet.bin", sheetBuffer());
   expectSheet(readMeshFile(write("sheet.gltf", kGltf), kMaxBytes));
 }
 
-TEST_F(MeshFile, GlbIsReadToo) {
+TEST_F(MeshFile, ReadsGlb) {
   std::string json = replaced(kGltf, "\"uri\": \"sheet.bin\", ", "");
   json.resize((json.size() + 3) / 4 * 4, ' ');
   const std::string buffer = sheetBuffer();
@@ -166,10 +166,10 @@ TEST_F(MeshFile, GlbIsReadToo) {
   }
 }
 
-TEST_F(MeshFile, BadGltfIsRefused) {
+TEST_F(MeshFile, RefusesInvalidGltf) {
   write("sheet.bin", sheetBuffer());
   for (const auto& [from, to, says] : {
-           std::tuple("\"version\": \"2.0\"", "\"version\": ", "is no glTF 2.0"),
+           std::tuple("\"version\": \"2.0\"", "\"version\": ", "is not glTF 2.0"),
            std::tuple("\"sheet.bin\"", "\"missing.bin\"", "missing.bin"),
            std::tuple("\"indices\": 2", "\"indices\": 9", "accessor out of bounds"),
            std::tuple("\"count\": 6", "\"count\": 7", "accessor 2 has 7 elements"),
@@ -177,9 +177,9 @@ TEST_F(MeshFile, BadGltfIsRefused) {
                       "accessor 0 has 4000000000 elements"),
            std::tuple("\"byteOffset\": 80,", "\"byteOffset\": 90,", "accessor 2"),
            std::tuple("\"children\": [1]", "\"children\": [0, 1]", "node 0 has two parents"),
-           std::tuple("\"children\": [1]", "\"children\": [7]", "node 7 is not there"),
+           std::tuple("\"children\": [1]", "\"children\": [7]", "node 7 does not exist"),
            std::tuple("\"indices\": 2,", "\"indices\": 2, \"mode\": 1,", "not made of triangles"),
-           std::tuple("\"count\": 6", "\"count\": 5", "no whole triangles"),
+           std::tuple("\"count\": 6", "\"count\": 5", "not a multiple of three"),
            std::tuple("\"POSITION\": 0", "\"NORMAL\": 0", "has no POSITION"),
            std::tuple("\"asset\"", "\"extensionsRequired\": [\"KHR_draco_mesh_compression\"], \"asset\"",
                       "KHR_draco_mesh_compression"),
@@ -190,7 +190,7 @@ TEST_F(MeshFile, BadGltfIsRefused) {
   }
 }
 
-TEST_F(MeshFile, WhatIsNoMeshFileIsNamedInTheError) {
+TEST_F(MeshFile, NamesFilesThatAreNotMeshes) {
   const auto expectRefused = [&](const std::filesystem::path& path, const char* says) {
     const auto source = readMeshFile(path, 100);
     ASSERT_FALSE(source) << path;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Welding, order, quads, and every check of what a source holds.
+// Welding, order, quads, and every check of a source.
 #include "server/meshes/mesh_source.h"
 
 #include <cmath>
@@ -29,7 +29,7 @@ SourceFace quad(std::uint32_t a, std::uint32_t b, std::uint32_t c, std::uint32_t
   return {.cornerCount = 4, .vertices = {a, b, c, d}, .uvs = {a, b, c, d}};
 }
 
-// Two triangles over a unit square, counter-clockwise seen from +Z.
+// Unit square of two triangles, counter-clockwise seen from +Z.
 MeshSource square() {
   MeshSource source;
   source.vertices = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}};
@@ -37,7 +37,7 @@ MeshSource square() {
   return source;
 }
 
-// Every triangle with three vertices of its own, in an order of its own.
+// Splits every vertex, so that no two triangles share one, and shuffles them.
 MeshSource soup(const model::MeshShape& shape, float noise) {
   std::mt19937 random(3);
   std::uniform_real_distribution<float> unit(-noise, noise);
@@ -52,7 +52,7 @@ MeshSource soup(const model::MeshShape& shape, float noise) {
   return source;
 }
 
-TEST(BuildMesh, WeldsWhatLiesNearerThanTheWeldDistance) {
+TEST(BuildMesh, WeldsVerticesWithinTheWeldDistance) {
   const model::MeshShape disc = model::disc(9, 0.5f);
   for (const float noise : {0.0f, 2e-6f}) {
     const auto built = buildMesh(soup(disc, noise), {.weldDistance = 1e-5f}, kLimits);
@@ -69,7 +69,7 @@ TEST(BuildMesh, WeldsWhatLiesNearerThanTheWeldDistance) {
   EXPECT_EQ(same->mesh.nodeCount(), disc.positions.size());
 }
 
-TEST(BuildMesh, KeepsEveryVertexWhereItWasUnderAnotherNumber) {
+TEST(BuildMesh, KeepsPositionsWhenRenumbering) {
   const MeshSource source = soup(model::disc(5, 0.5f), 0);
   const auto built = buildMesh(source, {.weldDistance = 1e-5f}, kLimits);
   ASSERT_TRUE(built) << built.error();
@@ -81,8 +81,8 @@ TEST(BuildMesh, KeepsEveryVertexWhereItWasUnderAnotherNumber) {
                 built->nodeOfVertex[source.faces[f].vertices[corner]]);
 }
 
-// The reach of an edge in memory, averaged: far below that of numbers drawn by lot.
-TEST(BuildMesh, PutsNeighboursNearEachOtherInMemory) {
+// Mean distance of edge ends in memory: far below that of a random order.
+TEST(BuildMesh, PlacesNeighboursCloseInMemory) {
   MeshSource source = soup(model::disc(20, 0.5f), 0);
   const auto built = buildMesh(source, {.weldDistance = 1e-5f}, kLimits);
   ASSERT_TRUE(built) << built.error();
@@ -92,7 +92,7 @@ TEST(BuildMesh, PutsNeighboursNearEachOtherInMemory) {
   EXPECT_LT(reach, built->mesh.nodeCount() / 20.0);  // by lot it is a third of the nodes
 }
 
-TEST(BuildMesh, LeavesItsOwnOrderAsItIs) {
+TEST(BuildMesh, KeepsItsOwnOrder) {
   const auto once = buildMesh(soup(model::disc(12, 0.5f), 0), {.weldDistance = 1e-5f}, kLimits);
   ASSERT_TRUE(once);
   MeshSource again;
@@ -105,7 +105,7 @@ TEST(BuildMesh, LeavesItsOwnOrderAsItIs) {
   EXPECT_EQ(twice->mesh.shape.triangles, once->mesh.shape.triangles);
 }
 
-TEST(BuildMesh, ScalesTurnsAndMovesInThisOrder) {
+TEST(BuildMesh, ScalesRotatesAndTranslatesInThisOrder) {
   const auto built = buildMesh(
       square(),
       {.pose = {Vec3(1, 2, 3), model::Quaternion(std::sqrt(0.5f), 0, std::sqrt(0.5f), 0)}, .scale = 2},
@@ -126,7 +126,7 @@ TEST(BuildMesh, LeavesOutVerticesWithoutFaces) {
   EXPECT_EQ(built->nodeOfVertex[0], kNoNode);
 }
 
-TEST(BuildMesh, HalvesQuadsAlongTheShorterDiagonalAndGivesThemShearSprings) {
+TEST(BuildMesh, SplitsQuadsAlongTheShorterDiagonalAndAddsShearSprings) {
   MeshSource source = square();
   source.vertices[2] = {1.5f, 1.5f, 0};
   source.faces = {quad(0, 1, 2, 3)};
@@ -143,7 +143,7 @@ TEST(BuildMesh, HalvesQuadsAlongTheShorterDiagonalAndGivesThemShearSprings) {
       EXPECT_TRUE(std::ranges::count(half, built->nodeOfVertex[vertex]));
 }
 
-TEST(BuildMesh, KeepsTextureCoordinatesWhereTheyMeetAtASeam) {
+TEST(BuildMesh, KeepsTextureCoordinatesAtSeams) {
   MeshSource source = soup(model::disc(2, 0.5f), 0);
   for (const Vec3& vertex : source.vertices)
     source.uvs.emplace_back(vertex.x() + static_cast<float>(source.uvs.size()), vertex.z());
@@ -175,7 +175,7 @@ struct BadCase {
   std::function<void(MeshSource&)> spoil;
 };
 
-TEST(BuildMesh, RefusesWhatIsNoCloth) {
+TEST(BuildMesh, RefusesInvalidSources) {
   const float nan = std::numeric_limits<float>::quiet_NaN();
   const BadCase cases[] = {
       {"has no vertices", [](MeshSource& s) { s.vertices.clear(); }},
@@ -186,7 +186,7 @@ TEST(BuildMesh, RefusesWhatIsNoCloth) {
       {"vertex 1 is at (inf, 0, 0)", [](MeshSource& s) { s.vertices[1].x() = INFINITY; }},
       {"texture coordinate 3 is not finite",
        [&](MeshSource& s) { s.uvs.assign(4, model::Uv(0, 0)), s.uvs[3].x() = nan; }},
-      {"vertex 1 comes to lie at (2000, 0, 0)", [](MeshSource& s) { s.vertices[1].x() = 2000; }},
+      {"vertex 1 is at (2000, 0, 0) m", [](MeshSource& s) { s.vertices[1].x() = 2000; }},
       {"face 1 names vertex 4; there are 4", [](MeshSource& s) { s.faces[1].vertices[2] = 4; }},
       {"face 0 names texture coordinate 9; there are 4",
        [](MeshSource& s) { s.uvs.assign(4, model::Uv(0, 0)), s.faces[0].uvs[1] = 9; }},

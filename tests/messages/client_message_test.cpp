@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What clients send: garbage, envelopes, greetings.
+// Messages of clients: invalid bytes, envelopes, join requests.
 #include "server/messages/client_message.h"
 
 #include <cstddef>
@@ -23,7 +23,7 @@ std::span<const std::byte> bytesOf(const std::string& text) {
   return std::as_bytes(std::span(text));
 }
 
-TEST(ParseClientMessage, GivesTheEnvelope) {
+TEST(ParseClientMessage, ReturnsTheEnvelope) {
   v1::ClientMessage message;
   message.set_request_id(7);
   message.mutable_ping()->set_client_time_us(123);
@@ -33,7 +33,7 @@ TEST(ParseClientMessage, GivesTheEnvelope) {
   EXPECT_EQ(parsed->ping().client_time_us(), 123u);
 }
 
-TEST(ParseClientMessage, RefusesNothingAndAnEmptyEnvelope) {
+TEST(ParseClientMessage, RefusesEmptyBytesAndAnEmptyEnvelope) {
   EXPECT_EQ(parseClientMessage({}).error().code, v1::ERROR_CODE_MALFORMED_MESSAGE);
   v1::ClientMessage message;
   message.set_request_id(7);
@@ -41,7 +41,7 @@ TEST(ParseClientMessage, RefusesNothingAndAnEmptyEnvelope) {
             v1::ERROR_CODE_MALFORMED_MESSAGE);
 }
 
-TEST(ParseClientMessage, RefusesTooManyBytesWithTheLimit) {
+TEST(ParseClientMessage, RefusesTooManyBytesAndNamesTheLimit) {
   const auto parsed = parseClientMessage(bytesOf(std::string(limits::kMaxClientMessageBytes + 1, 'x')));
   ASSERT_FALSE(parsed);
   EXPECT_EQ(parsed.error().code, v1::ERROR_CODE_RESOURCE_EXHAUSTED);
@@ -59,7 +59,7 @@ TEST(ParseClientMessage, RefusesTruncatedMessages) {
   }
 }
 
-TEST(ParseClientMessage, SurvivesGarbage) {
+TEST(ParseClientMessage, SurvivesRandomBytes) {
   std::mt19937 random(1);
   int refused = 0;
   for (int i = 0; i < 10000; ++i) {
@@ -80,7 +80,7 @@ v1::Hello hello() {
   return message;
 }
 
-TEST(ToJoining, KnowsHowMuchOfTheStreamIsWanted) {
+TEST(ToJoining, ReadsQualityAndTemporalLayers) {
   v1::Hello message = hello();
   auto joining = toJoining(message, kCodecs);
   ASSERT_TRUE(joining);
@@ -99,7 +99,7 @@ TEST(ToJoining, KnowsHowMuchOfTheStreamIsWanted) {
   EXPECT_THAT(toJoining(message, kCodecs).error().text, StartsWith("hello.temporalLayer = 3: must be"));
 }
 
-TEST(ToJoining, AgreesOnVersionAndTheClientsBestCodec) {
+TEST(ToJoining, SelectsVersionAndFirstCommonCodec) {
   v1::Hello message = hello();
   message.set_protocol_version(9);
   message.clear_codecs();
@@ -116,7 +116,7 @@ TEST(ToJoining, AgreesOnVersionAndTheClientsBestCodec) {
   EXPECT_EQ(joining->displayName, "Ann");
 }
 
-TEST(ToJoining, RefusesWhatItCannotAgreeOn) {
+TEST(ToJoining, RefusesUnsupportedVersionsAndCodecs) {
   v1::Hello message = hello();
   message.set_protocol_version(0);
   EXPECT_EQ(toJoining(message, kCodecs).error().code, v1::ERROR_CODE_UNSUPPORTED_VERSION);
@@ -129,7 +129,7 @@ TEST(ToJoining, RefusesWhatItCannotAgreeOn) {
   EXPECT_EQ(toJoining(message, kCodecs).error().code, v1::ERROR_CODE_UNSUPPORTED_CODEC);
 }
 
-TEST(ToJoining, RefusesNamesThatWouldSpoilALog) {
+TEST(ToJoining, RefusesNamesWithControlCharacters) {
   v1::Hello message = hello();
   message.set_client_name("a\nb");
   EXPECT_THAT(toJoining(message, kCodecs).error().text, StartsWith("hello.clientName = \"a?b\":"));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Descriptions, collider states, chunks.
+// Descriptions, collider states and chunks.
 #include "server/messages/description.h"
 
 #include <algorithm>
@@ -16,7 +16,7 @@
 namespace clothstream::messages {
 namespace {
 
-TEST(ToDescription, TellsAllThatADecoderNeeds) {
+TEST(ToDescription, HasEverythingThatADecoderNeeds) {
   const model::Scene scene = *toScene(smallScene());
   const v1::StreamDescription description = toDescription(scene, 3, 1, 0);
   EXPECT_EQ(description.epoch(), 3u);
@@ -42,7 +42,7 @@ TEST(ToDescription, TellsAllThatADecoderNeeds) {
   EXPECT_TRUE(toScene(description.definition()));
 }
 
-TEST(ToDescription, IsItsTwoPartsOneAfterTheOther) {
+TEST(ToDescription, EqualsItsTwoPartsConcatenated) {
   const model::Scene scene = *toScene(sceneWithHull());
   v1::StreamDescription parsed;
   ASSERT_TRUE(parsed.ParseFromString(clothsOfDescription(scene).SerializeAsString() +
@@ -58,7 +58,7 @@ TEST(ToSummary, CountsVerticesAndCloths) {
   EXPECT_EQ(summary.cloth_count(), 1u);
 }
 
-TEST(ColliderStates, OverwriteWhatWasThere) {
+TEST(ColliderStates, OverwriteThePreviousState) {
   v1::ColliderState state;
   write(model::ParticipantCollider{.id = 4, .pose = {model::Vec3(1, 2, 3)}, .shape = model::Sphere{0.5f}}, 77,
         state);
@@ -76,7 +76,7 @@ TEST(ColliderStates, OverwriteWhatWasThere) {
   EXPECT_EQ(state.sphere().radius(), 0.25f);
 }
 
-TEST(ColliderStates, SayTheShapeButForAHulls) {
+TEST(ColliderStates, HaveTheShapeExceptForHulls) {
   v1::ColliderState state;
   const model::Pose pose{model::Vec3(1, 2, 3), model::Quaternion(0, 0, 1, 0)};
   write(model::Collider{.name = "a", .shape = model::Capsule{.radius = 0.1f, .length = 0.4f}}, pose, state);
@@ -91,7 +91,7 @@ TEST(ColliderStates, SayTheShapeButForAHulls) {
   EXPECT_EQ(state.shape_case(), v1::ColliderState::SHAPE_NOT_SET);
 }
 
-TEST(ToDescription, HasTheCollidersHullsTooAsTheyAreAtThatTime) {
+TEST(ToDescription, HasCollidersAndHullsAtTheGivenTime) {
   v1::Scene message = sceneWithHull();
   v1::Motion& motion = *message.mutable_colliders(0)->mutable_motion();
   motion.set_steady(true);
@@ -105,7 +105,7 @@ TEST(ToDescription, HasTheCollidersHullsTooAsTheyAreAtThatTime) {
   EXPECT_EQ(description.colliders(0).hull().faces(2).vertices_size(), 3);
 }
 
-TEST(ToChunk, CutsContentThatCanBePutTogetherAgain) {
+TEST(ToChunk, SplitsContentThatCanBeReassembled) {
   for (const std::size_t size : {std::size_t{0}, std::size_t{1}, limits::kMaxChunkBytes,
                                  limits::kMaxChunkBytes + 1, 3 * limits::kMaxChunkBytes - 5}) {
     std::string content(size, '\0');

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Meshes in messages: there and back, pins, and every refusal.
+// Meshes in messages: conversion in both directions, pins and errors.
 #include <cmath>
 #include <functional>
 #include <numbers>
@@ -19,7 +19,7 @@ namespace {
 
 using testing::HasSubstr;
 
-// A quad and a triangle beside it, two parts, a vertex without a face.
+// A quad with an adjacent triangle, two parts and a vertex without a face.
 v1::Scene meshScene() {
   v1::Scene message = smallScene();
   v1::Cloth& cloth = *message.mutable_cloths(0);
@@ -54,7 +54,7 @@ TEST(MeshMessage, BecomesAMesh) {
   for (const model::Vec3& p : cloth.mesh->shape.positions) EXPECT_GE(p.y(), 2);
 }
 
-TEST(MeshMessage, ComesBackAsTheSameMesh) {
+TEST(MeshMessage, SurvivesTheWayThroughAMessage) {
   v1::Scene message = meshScene();
   message.mutable_cloths(0)->add_pinned_vertices(5);
   message.mutable_cloths(0)->add_pinned_regions()->set_radius(0.5f);
@@ -68,7 +68,7 @@ TEST(MeshMessage, ComesBackAsTheSameMesh) {
   EXPECT_TRUE(google::protobuf::util::MessageDifferencer::Equals(toMessage(*again), once));
 }
 
-TEST(MeshMessage, PinsVerticesByTheMessagesNumbersAndWhatStartsInARegion) {
+TEST(MeshMessage, PinsVerticesOfTheMessageAndRegions) {
   v1::Scene message = meshScene();
   v1::Cloth& cloth = *message.mutable_cloths(0);
   const auto pinned = [&] {
@@ -94,7 +94,7 @@ TEST(MeshMessage, PinsVerticesByTheMessagesNumbersAndWhatStartsInARegion) {
   EXPECT_EQ(pinned(), (Places{{0, 2.5f}, {0.5f, 2.5f}, {1, 2}}));
 }
 
-TEST(MeshMessage, GridsAreAlsoPinnedByVertexAndRegion) {
+TEST(MeshMessage, PinsGridsByVertexAndRegion) {
   v1::Scene message = smallScene();
   v1::Cloth& cloth = *message.mutable_cloths(0);
   cloth.clear_pins();
@@ -109,8 +109,8 @@ TEST(MeshMessage, GridsAreAlsoPinnedByVertexAndRegion) {
               HasSubstr("cloths[0].pinnedVertices[1] = 100000: must be a whole number from 0 to"));
 }
 
-// A fan: one node where all triangles meet.
-TEST(MeshMessage, WhoseMatrixWouldBeTooLargeIsNotAssembled) {
+// Fan of triangles that share one node.
+TEST(MeshMessage, RefusesAssembledSystemsThatAreTooLarge) {
   v1::Scene message = smallScene();
   v1::Cloth& cloth = *message.mutable_cloths(0);
   cloth.clear_pins();
@@ -148,8 +148,8 @@ TEST(MeshMessage, IsDescribedToClientsOnce) {
   EXPECT_EQ(description.definition().cloths(0).mesh().positions_size(), 0);
 }
 
-// Texture coordinates alone are too many, used or not.
-TEST(MeshMessage, FitsIntoADescription) {
+// Texture coordinates alone exceed the limit, used or not.
+TEST(MeshMessage, RefusesMeshesThatDoNotFitADescription) {
   v1::Scene message = meshScene();
   v1::Mesh& mesh = *message.mutable_cloths(0)->mutable_mesh();
   for (const std::uint32_t i : {0u, 1u, 3u, 1u, 2u, 3u, 1u, 5u, 2u}) mesh.add_uv_triangles(i);
@@ -165,7 +165,7 @@ struct BadCase {
   std::function<void(v1::Cloth&, v1::Mesh&)> spoil;
 };
 
-TEST(MeshMessage, SaysWhatIsWrong) {
+TEST(MeshMessage, RefusesInvalidMeshes) {
   const BadCase cases[] = {
       {"cloths[0].mesh.positions: has 19 numbers; must have 3 for each",
        [](auto&, auto& m) { m.add_positions(0); }},
@@ -177,22 +177,22 @@ TEST(MeshMessage, SaysWhatIsWrong) {
        [](auto&, auto& m) { m.add_uv_triangles(0); }},
       {"cloths[0].mesh: face 2 names vertex 6; there are 6", [](auto&, auto& m) { m.set_triangles(7, 6); }},
       {"cloths[0].mesh: vertex 0 is at (nan, 0, 0)", [](auto&, auto& m) { m.set_positions(0, NAN); }},
-      {"cloths[0].mesh: faces 1 and 2 are no quad: they share no edge",
+      {"cloths[0].mesh: faces 1 and 2 are not a quad: they share no edge",
        [](auto&, auto& m) {
          m.set_quads(0, 1);
          m.set_triangles(6, 4), m.set_triangles(8, 5), m.set_triangles(7, 0);
        }},
-      {"cloths[0].mesh: faces 7 and 8 are no quad", [](auto&, auto& m) { m.set_quads(0, 7); }},
+      {"cloths[0].mesh: faces 7 and 8 are not a quad", [](auto&, auto& m) { m.set_quads(0, 7); }},
       {"cloths[0].mesh.submeshes[1].triangleCount = 2: must be 1 or more, and there are 1",
        [](auto&, auto& m) { m.mutable_submeshes(1)->set_triangle_count(2); }},
       {"cloths[0].mesh.submeshes: have 2 triangles of 3",
        [](auto&, auto& m) { m.mutable_submeshes()->RemoveLast(); }},
       {"cloths[0].mesh.scale = 0:", [](auto&, auto& m) { m.set_scale(0); }},
       {"cloths[0].mesh.weldDistance = 1:", [](auto&, auto& m) { m.set_weld_distance(1); }},
-      {"cloths[0].mesh.file = \"x.obj\": stands beside positions",
+      {"cloths[0].mesh.file = \"x.obj\": is given together with positions",
        [](auto&, auto& m) { m.set_file("x.obj"); }},
       {"cloths[0].mesh: has no vertices", [](auto&, auto& m) { m.Clear(); }},
-      {"cloths[0].pins: are of grids", [](auto& c, auto&) { c.add_pins(); }},
+      {"cloths[0].pins: must be absent for a mesh", [](auto& c, auto&) { c.add_pins(); }},
       {"cloths[0].pinnedVertices[0] = 6: must be a whole number from 0 to 5",
        [](auto& c, auto&) { c.add_pinned_vertices(6); }},
       {"cloths[0].pinnedVertices[0] = 4: is a vertex without a face",

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The scenes that come with the program load, and the reference simulates them as they are meant.
+// Built-in scenes load, and the reference simulates them as intended.
 #include <cmath>
 
 #include <gtest/gtest.h>
@@ -12,15 +12,15 @@ namespace {
 
 class NamedScene : public testing::TestWithParam<std::string> {};
 
-TEST_P(NamedScene, LoadsUnderItsName) {
+TEST_P(NamedScene, LoadsByName) {
   const Result<model::Scene> scene = loadScene(GetParam());
   ASSERT_TRUE(scene) << scene.error().text;
   EXPECT_EQ(scene->name, GetParam());
   EXPECT_FALSE(scene->description.empty());
 }
 
-// Through the ball's first push of the curtain, the sheet's fall, and the flag's unfurling.
-TEST_P(NamedScene, StaysAClothThatNothingIsIn) {
+// Simulates until the ball has pushed the curtain, the sheet has fallen and the flag has unfurled.
+TEST_P(NamedScene, StaysIntactAndOutsideColliders) {
   const model::Scene scene = *loadScene(GetParam());
   reference::ReferenceSimulation simulation(scene);
   double worstMeanStrain = 0;
@@ -37,14 +37,14 @@ TEST_P(NamedScene, StaysAClothThatNothingIsIn) {
               << "tick " << simulation.ticks();
     }
   }
-  // Those of the paper's figures show how soft springs of 100 N/m are, while they fall on the ball too.
+  // Scenes of the paper's figures stretch more: they show soft springs of 100 N/m that fall on a ball.
   EXPECT_LT(worstMeanStrain, GetParam().starts_with("figure_") ? 0.15 : 0.1);
 }
 
 INSTANTIATE_TEST_SUITE_P(All, NamedScene, testing::ValuesIn(namedScenes()),
                          [](const auto& name) { return name.param; });
 
-TEST(NamedScenes, AreThoseOfTheHouse) {
+TEST(NamedScenes, AreAllListed) {
   EXPECT_EQ(namedScenes(), (std::vector<std::string>{"curtain",
                                                      "figure_07",
                                                      "figure_09",

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What clients change of a scene that runs.
+// Parameter changes of clients.
 #include <string>
 
 #include <gmock/gmock.h>
@@ -25,7 +25,7 @@ class ToParameterChange : public testing::Test {
   v1::ParameterChange message_;
 };
 
-TEST_F(ToParameterChange, RefusesWhatAColliderDoesNotHave) {
+TEST_F(ToParameterChange, RefusesSizesThatTheShapeDoesNotHave) {
   v1::ColliderChange& change = *message_.add_colliders();
   change.set_name("ball");
   change.set_length(0.2f);
@@ -40,7 +40,7 @@ TEST_F(ToParameterChange, RefusesWhatAColliderDoesNotHave) {
   EXPECT_EQ(error(), "parameterChange.colliders[0].friction = 11: must be a finite number from 0 to 10");
 }
 
-TEST_F(ToParameterChange, TakesSizesOfTheShape) {
+TEST_F(ToParameterChange, AcceptsSizesOfTheShape) {
   scene_.colliders[0].shape = model::Box{};
   v1::ColliderChange& change = *message_.add_colliders();
   change.set_name("ball");
@@ -60,7 +60,7 @@ TEST_F(ToParameterChange, TakesSizesOfTheShape) {
   EXPECT_EQ(std::get<model::Capsule>(scene_.colliders[0].shape).radius, 0.2f);
 }
 
-TEST_F(ToParameterChange, ChangesSelfCollisionAndTethersWhereTheyAre) {
+TEST_F(ToParameterChange, ChangesSelfCollisionAndTethersOfClothsThatHaveThem) {
   v1::ClothChange& change = *message_.add_cloths();
   change.mutable_self_collision()->set_friction(1);
   EXPECT_EQ(error(), "parameterChange.cloths[0].selfCollision: must be absent: \"" + scene_.cloths[0].name +
@@ -81,7 +81,7 @@ TEST_F(ToParameterChange, ChangesSelfCollisionAndTethersWhereTheyAre) {
   EXPECT_EQ(scene_.cloths[0].tethers->slack, 0.5f);
 }
 
-TEST_F(ToParameterChange, RefusesDihedralBendingThatCannotBe) {
+TEST_F(ToParameterChange, RefusesDihedralBendingThatIsUnstableOrUnsupported) {
   v1::ClothChange& change = *message_.add_cloths();
   change.set_dihedral_bending(2);
   EXPECT_EQ(error(), "parameterChange.cloths[0].dihedralBending = 2: must be a finite number from 0 to 1");
@@ -97,7 +97,7 @@ TEST_F(ToParameterChange, RefusesDihedralBendingThatCannotBe) {
             "INTEGRATOR_SEMI_IMPLICIT_EULER");
 }
 
-TEST_F(ToParameterChange, RefusesARadiusForWhatHasNone) {
+TEST_F(ToParameterChange, RefusesARadiusForShapesWithoutOne) {
   scene_ = *toScene(sceneWithHull());
   message_.add_colliders()->set_name("ball");
   message_.mutable_colliders(0)->set_radius(0.5f);
@@ -157,10 +157,11 @@ TEST_F(ToParameterChange, LeavesOutWhatIsAbsent) {
   const auto change = toParameterChange(message_, scene_);
   ASSERT_TRUE(change) << change.error().text;
   EXPECT_FALSE(change->gravity || change->wind || change->airDensity);
-  EXPECT_FALSE(change->cloths[0].structural || change->cloths[0].drag);
+  EXPECT_FALSE(change->cloths[0].numbers.hasAnyOf(parameters::kStructural) ||
+               change->cloths[0].numbers.has(parameters::ClothNumber::drag));
 }
 
-TEST_F(ToParameterChange, NamesWhatTheSceneHas) {
+TEST_F(ToParameterChange, ListsTheNamesOfTheScene) {
   message_.add_cloths()->set_name("rug");
   EXPECT_THAT(error(), StartsWith("parameterChange.cloths[0].name = \"rug\": must be one of sheet"));
   EXPECT_EQ(toParameterChange(message_, scene_).error().code, v1::ERROR_CODE_NOT_FOUND);
@@ -184,15 +185,15 @@ TEST_F(ToParameterChange, RefusesValuesWithTheirPath) {
   EXPECT_THAT(error(), StartsWith("parameterChange.colliders[0].position.y = 5000:"));
 }
 
-TEST_F(ToParameterChange, RefusesWhatWouldMakeTheSceneUnstableNamingTheSubsteps) {
+TEST_F(ToParameterChange, RefusesUnstableChangesAndNamesTheSubsteps) {
   message_.add_cloths()->mutable_structural()->set_stiffness(20000);
   // 4 springs of 20000 N/m at nodes of 0.03 kg: h < 2 / sqrt(2 * 4 * 20000 / 0.03) s = 1 / 1154.7, 16.04 a
   // tick.
   EXPECT_THAT(error(), StartsWith("parameterChange: with substeps = 10, this scene needs at least 17"));
 }
 
-// Constraints set no bound on the step; going back to forces meets it again.
-TEST_F(ToParameterChange, RefusesASolverThatTheSceneCannotHave) {
+// Constraints set no bound on the step. A change back to forces meets the bound again.
+TEST_F(ToParameterChange, RefusesSolversThatTheSceneCannotUse) {
   v1::ClothChange& cloth = *message_.add_cloths();
   cloth.mutable_structural()->set_stiffness(20000);
   cloth.mutable_solver()->mutable_constraint();
@@ -231,7 +232,7 @@ TEST_F(ToParameterChange, MakesClothsOfAMaterial) {
   EXPECT_EQ(scene_.cloths[0].solver.kind, model::SolverKind::xpbd);
 }
 
-TEST_F(ToParameterChange, RefusesMaterialsThatThereAreNotAndThoseThatTheSceneCannotHave) {
+TEST_F(ToParameterChange, RefusesUnknownAndUnusableMaterials) {
   v1::ClothChange& cloth = *message_.add_cloths();
   cloth.set_material("velvet");
   EXPECT_THAT(error(),
@@ -257,7 +258,7 @@ TEST_F(ToParameterChange, RefusesMaterialsThatThereAreNotAndThoseThatTheSceneCan
   EXPECT_THAT(error(), StartsWith("parameterChange.gust.seconds = 0:"));
 }
 
-TEST_F(ToParameterChange, JudgesAChangeAsAWhole) {
+TEST_F(ToParameterChange, ChecksTheCombinedChange) {
   message_.add_cloths()->mutable_structural()->set_stiffness(20000);
   message_.add_cloths()->mutable_structural()->set_stiffness(10);
   EXPECT_EQ(error(), "no error");

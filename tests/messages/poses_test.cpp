@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What clients send of their poses: colliders, hands, grabs, attachments.
+// Poses of clients: colliders, hands, grabs and attachments.
 #include <cmath>
 #include <cstdint>
 #include <string>
@@ -27,7 +27,7 @@ v1::ColliderPoses poses(std::uint32_t count) {
   return message;
 }
 
-// A scene with an attachment on each of its two cloths.
+// Scene with two cloths and one attachment on each.
 model::Scene sceneWithAttachments() {
   model::Scene scene;
   for (const char* name : {"rod", "knot"}) {
@@ -41,7 +41,7 @@ Result<std::vector<model::ParticipantCollider>> collidersOf(const v1::ColliderPo
   return toPoses(message, sceneWithAttachments()).map([](const auto& poses) { return poses.colliders; });
 }
 
-TEST(ToPoses, GivesGrabsWithTheirDefaultsAndAttachmentsByTheirPlace) {
+TEST(ToPoses, ReturnsGrabsWithDefaultsAndAttachmentsByIndex) {
   v1::ColliderPoses message;
   message.add_grabs()->set_id(3);
   v1::Grab& strong = *message.add_grabs();
@@ -71,7 +71,7 @@ TEST(ToPoses, GivesGrabsWithTheirDefaultsAndAttachmentsByTheirPlace) {
   EXPECT_EQ(poses->attachments[0].pose.position, model::Vec3(7, 0, 0));
 }
 
-TEST(ToPoses, RefusesWrongGrabsAndAttachmentsWithTheirPath) {
+TEST(ToPoses, RefusesInvalidGrabsAndAttachmentsWithTheirPath) {
   const auto error = [](auto spoil) {
     v1::ColliderPoses message;
     message.add_grabs()->set_id(1);
@@ -103,7 +103,7 @@ TEST(ToPoses, RefusesWrongGrabsAndAttachmentsWithTheirPath) {
               StartsWith("colliderPoses.attachments[0].pose.position.x = 2000:"));
 }
 
-TEST(ToColliders, GivesThemAll) {
+TEST(ToColliders, ReturnsEveryCollider) {
   const auto colliders = collidersOf(poses(60));
   ASSERT_TRUE(colliders) << colliders.error().text;
   ASSERT_EQ(colliders->size(), 60u);
@@ -113,7 +113,7 @@ TEST(ToColliders, GivesThemAll) {
   EXPECT_TRUE(collidersOf(poses(0))->empty());
 }
 
-TEST(ToColliders, TakesCapsulesAndBoxes) {
+TEST(ToColliders, AcceptsCapsulesAndBoxes) {
   v1::ColliderPoses message = poses(2);
   message.mutable_colliders(0)->mutable_capsule()->set_radius(0.01f);
   message.mutable_colliders(0)->mutable_capsule()->set_length(0.03f);
@@ -134,8 +134,8 @@ TEST(ToColliders, TakesCapsulesAndBoxes) {
       StartsWith("colliderPoses.colliders[0].capsule.length = 11: must be a finite number from 0 to 10"));
 }
 
-// A flat hand at z = 0 that points along +Y: fingers 2 cm apart, joints 2 cm apart, each a little thinner
-// than the one before.
+// Flat hand at z = 0 that points along +Y. Fingers are 2 cm apart, joints 2 cm. Each joint is slightly
+// thinner than the previous one.
 v1::HandJoints hand(v1::HandSide side, bool palm = true) {
   v1::HandJoints message;
   message.set_side(side);
@@ -154,7 +154,7 @@ v1::HandJoints hand(v1::HandSide side, bool palm = true) {
   return message;
 }
 
-TEST(ToColliders, MakesCapsulesOfHands) {
+TEST(ToColliders, ConvertsHandsToCapsules) {
   for (const bool palm : {true, false}) {
     v1::ColliderPoses message = poses(20);
     *message.add_hands() = hand(v1::HAND_SIDE_RIGHT, palm);
@@ -162,21 +162,22 @@ TEST(ToColliders, MakesCapsulesOfHands) {
     const auto colliders = collidersOf(message);
     ASSERT_TRUE(colliders) << colliders.error().text;
     ASSERT_EQ(colliders->size(), 60u);
-    // The first bone of the right index finger, from (-0.02, 0.02) to (-0.02, 0.04).
+    // First bone of the right index finger, from (-0.02, 0.02) to (-0.02, 0.04).
     const model::ParticipantCollider& bone = (*colliders)[23];
     EXPECT_EQ(bone.id, 0x80000000u + 32 + 3);
     EXPECT_TRUE(bone.pose.position.isApprox(model::Vec3(-0.02f, 0.03f, 0)));
     EXPECT_TRUE((bone.pose.orientation * model::Vec3::UnitY()).isApprox(model::Vec3::UnitY()));
     EXPECT_NEAR(std::get<model::Capsule>(bone.shape).length, 0.02f, 1e-6f);
     EXPECT_NEAR(std::get<model::Capsule>(bone.shape).radius, 0.0115f, 1e-6f);
-    // The left one's last: from the wrist to the middle finger.
+    // Last bone of the left hand, from the wrist to the middle finger.
     EXPECT_EQ(colliders->back().id, 0x80000000u + 19);
     EXPECT_TRUE(colliders->back().pose.position.isApprox(model::Vec3(0, 0.01f, 0)));
   }
 }
 
-// Whichever way a hand points, its capsules end at its joints, and do not spin about themselves as it turns.
-TEST(ToColliders, HandsMayPointAnywhere) {
+// Capsules end at the joints for every direction of the hand, and do not spin around their axes when it
+// turns.
+TEST(ToColliders, FollowsHandsInEveryDirection) {
   model::Quaternion before = model::Quaternion::Identity();
   for (int degrees = 0; degrees <= 360; degrees += 5) {
     const model::Quaternion turn(
@@ -200,7 +201,7 @@ TEST(ToColliders, HandsMayPointAnywhere) {
   }
 }
 
-TEST(ToColliders, RefusesWhatIsNoHand) {
+TEST(ToColliders, RefusesInvalidHands) {
   const auto error = [](auto spoil) {
     v1::ColliderPoses message;
     *message.add_hands() = hand(v1::HAND_SIDE_LEFT);
@@ -223,7 +224,7 @@ TEST(ToColliders, RefusesWhatIsNoHand) {
   EXPECT_THAT(error([](M& m) { m.mutable_hands(0)->set_positions(3 * 10, 1); }),
               StartsWith("colliderPoses.hands[0].positions[30]: the joint is"));
   EXPECT_THAT(error([](M& m) { *m.add_hands() = m.hands(0); }),
-              StartsWith("colliderPoses.hands[1].id = 2147483648: is another's id already"));
+              StartsWith("colliderPoses.hands[1].id = 2147483648: is used twice"));
   EXPECT_THAT(error([](M& m) { m.add_hands(), m.add_hands(); }),
               StartsWith("colliderPoses.hands: has 3 elements; must have 0 to 2"));
   EXPECT_THAT(error([](M& m) {
@@ -233,7 +234,7 @@ TEST(ToColliders, RefusesWhatIsNoHand) {
               StartsWith("colliderPoses.colliders: has 41 elements; must have 0 to 40"));
 }
 
-TEST(ToColliders, RefusesWhatIsWrongWithItsPath) {
+TEST(ToColliders, RefusesInvalidCollidersWithTheirPath) {
   const auto error = [](auto spoil) {
     v1::ColliderPoses message = poses(3);
     spoil(message);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Scene files: every field survives, and what is wrong is said with the file's name.
+// Scene files: every field survives, and errors name the file.
 #include "server/messages/scene_file.h"
 
 #include <filesystem>
@@ -117,7 +117,7 @@ constexpr const char* kEveryField = R"json({
 
 using Names = std::set<std::string>;
 
-// Of every field of a message of this kind, and of the messages in it.
+// Names of every field of a message type and of its submessages.
 void addFields(const google::protobuf::Descriptor* descriptor, Names& names) {
   for (int i = 0; i < descriptor->field_count(); ++i) {
     const auto* field = descriptor->field(i);
@@ -126,7 +126,7 @@ void addFields(const google::protobuf::Descriptor* descriptor, Names& names) {
   }
 }
 
-// Of those that are set.
+// Names of the fields that are set.
 void addSetFields(const google::protobuf::Message& message, Names& names) {
   const auto* reflection = message.GetReflection();
   std::vector<const google::protobuf::FieldDescriptor*> fields;
@@ -142,12 +142,12 @@ void addSetFields(const google::protobuf::Message& message, Names& names) {
   }
 }
 
-// So that a field that is added to the proto cannot be forgotten above.
+// Ensures that the test above covers fields that are added to the proto.
 void expectEveryFieldSet(const v1::Scene& message) {
   Names all, set;
   addFields(message.GetDescriptor(), all);
   addSetFields(message, set);
-  // A mesh comes back as it lies in the scene, whatever file it came from (test_mesh_message.cpp).
+  // A mesh is written as it is in the scene, not as the name of its file (mesh_message_test.cpp).
   for (const char* field : {"file", "pose", "scale"}) all.erase(std::string("clothstream.v1.Mesh.") + field);
   all.erase("clothstream.v1.Cloth.areal_mass");  // comes back as `mass`
   EXPECT_THAT(set, testing::ContainerEq(all));
@@ -159,7 +159,7 @@ v1::Scene messageOf(const char* json) {
   return message;
 }
 
-TEST(SceneFile, KeepsEveryFieldThroughTheDomainAndBack) {
+TEST(SceneFile, KeepsEveryFieldThroughTheModel) {
   const v1::Scene message = messageOf(kEveryField);
   expectEveryFieldSet(message);
   const Result<model::Scene> scene = parseScene(kEveryField, "test");
@@ -170,7 +170,7 @@ TEST(SceneFile, KeepsEveryFieldThroughTheDomainAndBack) {
   EXPECT_TRUE(differencer.Compare(message, toMessage(*scene))) << difference;
 }
 
-TEST(SceneFile, KeepsEveryFieldThroughJsonAndBack) {
+TEST(SceneFile, KeepsEveryFieldThroughJson) {
   const Result<model::Scene> scene = parseScene(kEveryField, "test");
   const Result<model::Scene> again = parseScene(toJson(*scene), "again");
   ASSERT_TRUE(again) << again.error().text;
@@ -182,7 +182,7 @@ std::string errorOf(const char* json) {
   return scene ? "no error" : scene.error().text;
 }
 
-TEST(SceneFile, SaysLineAndColumnOfMalformedJson) {
+TEST(SceneFile, ReportsLineAndColumnOfMalformedJson) {
   EXPECT_THAT(errorOf("{\n  \"name\": \"a\"\n  \"substeps\": 3}"),
               AllOf(StartsWith("my.json: "), HasSubstr("line 3, column 12")));
   EXPECT_THAT(errorOf(""), AllOf(StartsWith("my.json: "), HasSubstr("line 1, column 1")));
@@ -190,7 +190,7 @@ TEST(SceneFile, SaysLineAndColumnOfMalformedJson) {
   EXPECT_THAT(errorOf("{\"name\": \"\xff\"}"), HasSubstr("UTF-8"));
 }
 
-TEST(SceneFile, NamesUnknownFieldsAndWrongTypes) {
+TEST(SceneFile, RefusesUnknownFieldsAndWrongTypes) {
   EXPECT_THAT(errorOf("{\"subteps\": 3}"), AllOf(StartsWith("my.json: "), HasSubstr("subteps")));
   EXPECT_THAT(errorOf("{\"cloths\": [{\"mas\": 1}]}"), AllOf(HasSubstr("cloths[0]"), HasSubstr("mas")));
   EXPECT_THAT(errorOf("{\"cloths\": [{\"mass\": \"heavy\"}]}"),
@@ -200,12 +200,12 @@ TEST(SceneFile, NamesUnknownFieldsAndWrongTypes) {
   EXPECT_THAT(errorOf("[]"), StartsWith("my.json: not a scene"));
 }
 
-TEST(SceneFile, RefusesNestingWithoutEnd) {
+TEST(SceneFile, RefusesDeepNesting) {
   const std::string deep = "{\"cloths\":" + std::string(200'000, '[') + std::string(200'000, ']') + "}";
   EXPECT_THAT(errorOf(deep.c_str()), StartsWith("my.json: "));
 }
 
-TEST(SceneFile, NamesTheFieldOfABadValue) {
+TEST(SceneFile, NamesTheFieldOfAnInvalidValue) {
   EXPECT_THAT(errorOf("{\"name\": \"a\", \"substeps\": 300}"),
               StartsWith("my.json: substeps = 300: must be a whole number from 1 to 256"));
 }
@@ -225,7 +225,7 @@ class SceneFileOnDisk : public testing::Test {
       ("scene_file_" + std::string(testing::UnitTest::GetInstance()->current_test_info()->name()));
 };
 
-TEST_F(SceneFileOnDisk, NamesAMeshBesideItself) {
+TEST_F(SceneFileOnDisk, ReadsMeshesRelativeToItself) {
   std::filesystem::create_directory(directory_ / "meshes");
   write("meshes/rag.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n");
   constexpr const char* kScene = R"json({"name": "a", "cloths": [{
@@ -237,7 +237,7 @@ TEST_F(SceneFileOnDisk, NamesAMeshBesideItself) {
   const Result<model::Scene> elsewhere = parseScene(kScene, "message");
   ASSERT_FALSE(elsewhere);
   EXPECT_THAT(elsewhere.error().text,
-              HasSubstr("cloths[0].mesh.file = \"meshes/rag.obj\": files are read for scene"));
+              HasSubstr("cloths[0].mesh.file = \"meshes/rag.obj\": files can only be named in scene"));
   write("meshes/rag.obj", "v 0 0 0\nv 1 0 0\nf 1 2 3\n");
   const Result<model::Scene> bad = readSceneFile(directory_ / "scene.json");
   ASSERT_FALSE(bad);
@@ -256,20 +256,20 @@ TEST_F(SceneFileOnDisk, IsRead) {
   EXPECT_EQ(scene->name, "every_field");
 }
 
-TEST_F(SceneFileOnDisk, IsNotFound) {
+TEST_F(SceneFileOnDisk, IsRefusedIfMissing) {
   const Result<model::Scene> scene = readSceneFile(directory_ / "none.json");
   ASSERT_FALSE(scene);
   EXPECT_EQ(scene.error().code, v1::ERROR_CODE_NOT_FOUND);
   EXPECT_THAT(scene.error().text, AllOf(HasSubstr("none.json"), HasSubstr("no such file")));
 }
 
-TEST_F(SceneFileOnDisk, IsADirectory) {
+TEST_F(SceneFileOnDisk, IsRefusedIfADirectory) {
   const Result<model::Scene> scene = readSceneFile(directory_);
   ASSERT_FALSE(scene);
   EXPECT_THAT(scene.error().text, HasSubstr("is a directory"));
 }
 
-TEST_F(SceneFileOnDisk, IsTooLarge) {
+TEST_F(SceneFileOnDisk, IsRefusedIfTooLarge) {
   const Result<model::Scene> scene =
       readSceneFile(write("large.json", std::string(limits::kMaxSceneFileBytes + 1, ' ')));
   ASSERT_FALSE(scene);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Scene messages: defaults, and everything that is refused, with the words for it.
+// Scene messages: defaults, and the error for everything that is refused.
 #include "server/messages/scene_message.h"
 
 #include <cctype>
@@ -19,7 +19,7 @@ namespace {
 using testing::HasSubstr;
 using testing::StartsWith;
 
-TEST(ToScene, StreamsFineClothAsFinelyAsItsEdgesAre) {
+TEST(ToScene, DerivesTheMaximumErrorFromTheFinestEdges) {
   v1::Scene message = smallScene();
   v1::Grid& grid = *message.mutable_cloths(0)->mutable_grid();
   grid.set_width(0.6f);
@@ -61,13 +61,13 @@ TEST(ToScene, AppliesTheDefaultsOfTheProto) {
   EXPECT_TRUE(scene->colliders.at(0).motion.keys.empty());
 }
 
-TEST(ToScene, StreamsASlowSimulationAtItsOwnRate) {
+TEST(ToScene, StreamsASlowSimulationAtTheSimulationRate) {
   v1::Scene message = smallScene();
   message.set_simulation_rate(60);
   EXPECT_EQ(toScene(message)->streamRate, 60u);
 }
 
-TEST(ToScene, TakesExplicitZerosForWhatTheyAre) {
+TEST(ToScene, KeepsExplicitZeros) {
   v1::Scene message = smallScene();
   message.mutable_environment()->mutable_gravity();
   message.mutable_environment()->set_air_density(0);
@@ -81,7 +81,7 @@ TEST(ToScene, TakesExplicitZerosForWhatTheyAre) {
   EXPECT_EQ(scene->cloths[0].thickness, 0);
 }
 
-TEST(ToScene, MakesClothsOfTheirMaterialButForWhatIsGiven) {
+TEST(ToScene, AppliesTheMaterialBeforeGivenValues) {
   v1::Scene message = smallScene();
   v1::Cloth& described = *message.mutable_cloths(0);
   described.clear_structural();
@@ -98,13 +98,13 @@ TEST(ToScene, MakesClothsOfTheirMaterialButForWhatIsGiven) {
   EXPECT_EQ(cloth.drag, wool.drag);
   EXPECT_EQ(cloth.friction, 0.9f);
   EXPECT_EQ(cloth.solver.kind, model::SolverKind::xpbd);
-  // All of it, the name too, comes back from a message.
+  // A message keeps everything, including the name of the material.
   const Result<model::Scene> again = toScene(toMessage(*scene));
   ASSERT_TRUE(again) << again.error().text;
   EXPECT_EQ(again->cloths[0].material, "wool");
   EXPECT_EQ(again->cloths[0].mass, cloth.mass);
   EXPECT_EQ(again->cloths[0].friction, 0.9f);
-  // As forces its springs are too stiff for these steps, and it says so.
+  // Used as forces, its springs are too stiff for these steps.
   described.mutable_solver()->mutable_mass_spring();
   described.mutable_grid()->set_rows(64);
   EXPECT_THAT(toScene(message).error().text, HasSubstr("this scene needs at least"));
@@ -114,7 +114,7 @@ TEST(ToScene, MakesClothsOfTheirMaterialButForWhatIsGiven) {
   EXPECT_FLOAT_EQ(toScene(message)->cloths[0].mass, 1.5f);
 }
 
-TEST(ToScene, HasTheGustsOfItsMessage) {
+TEST(ToScene, ReadsGusts) {
   v1::Scene message = smallScene();
   EXPECT_EQ(toScene(message)->environment.gust.strength, 0);
   message.mutable_environment()->mutable_gust()->set_strength(3);
@@ -125,10 +125,10 @@ TEST(ToScene, HasTheGustsOfItsMessage) {
   EXPECT_EQ(gust.seconds, 0.5f);
 }
 
-TEST(ToScene, SweepsOnceWhereXpbdDoesNotSayOtherwise) {
+TEST(ToScene, UsesOneXpbdIterationByDefault) {
   v1::Scene message = smallScene();
   message.mutable_cloths(0)->mutable_solver()->mutable_xpbd();
-  // No bound on explicit steps is asked of its springs.
+  // Springs of xpbd set no bound on explicit steps.
   message.mutable_cloths(0)->mutable_structural()->set_stiffness(1e6f);
   message.set_substeps(1);
   const Result<model::Scene> scene = toScene(message);
@@ -139,7 +139,7 @@ TEST(ToScene, SweepsOnceWhereXpbdDoesNotSayOtherwise) {
   EXPECT_FALSE(solver.compliance);
 }
 
-TEST(ToScene, PinsOneNodeWhereARangeHasNoLast) {
+TEST(ToScene, PinsOneNodeIfARangeHasNoLast) {
   v1::Scene message = smallScene();
   v1::GridRange& range = *message.mutable_cloths(0)->add_pins();
   range.set_first_row(2);
@@ -148,7 +148,7 @@ TEST(ToScene, PinsOneNodeWhereARangeHasNoLast) {
   for (std::size_t i = 0; i < pinned.size(); ++i) EXPECT_EQ(pinned[i], i == 2 * 5 + 3 ? 1 : 0);
 }
 
-TEST(ToScene, NormalisesQuaternionsThatAreNearlyUnit) {
+TEST(ToScene, NormalisesNearlyUnitQuaternions) {
   v1::Scene message = smallScene();
   v1::Quaternion& q = *message.mutable_cloths(0)->mutable_grid()->mutable_pose()->mutable_orientation();
   q.set_x(0.6005f);
@@ -158,7 +158,7 @@ TEST(ToScene, NormalisesQuaternionsThatAreNearlyUnit) {
   EXPECT_NEAR(scene->cloths[0].grid.pose.orientation.norm(), 1, 1e-6);
 }
 
-TEST(ToScene, MakesBallsOfHalfTheShortestStructuralSpring) {
+TEST(ToScene, DefaultsBallRadiusToHalfTheShortestSpring) {
   v1::Scene message = smallScene();
   EXPECT_FALSE(toScene(message)->cloths[0].selfCollision);
   message.mutable_cloths(0)->mutable_grid()->set_height(1.2f);  // rows 0.4 m apart, columns 0.5 m
@@ -168,7 +168,7 @@ TEST(ToScene, MakesBallsOfHalfTheShortestStructuralSpring) {
   ASSERT_TRUE(scene->cloths[0].selfCollision);
   EXPECT_FLOAT_EQ(scene->cloths[0].selfCollision->radius, 0.2f);
   EXPECT_EQ(scene->cloths[0].selfCollision->friction, 0.3f);
-  // And keeps them on its way through a message.
+  // A message keeps the radius.
   message.mutable_cloths(0)->mutable_self_collision()->set_radius(0.4f);
   message.mutable_cloths(0)->mutable_self_collision()->set_friction(0);
   const Result<model::Scene> again = toScene(toMessage(*toScene(message)));
@@ -177,7 +177,7 @@ TEST(ToScene, MakesBallsOfHalfTheShortestStructuralSpring) {
   EXPECT_EQ(again->cloths[0].selfCollision->friction, 0);
 }
 
-TEST(ToScene, KeepsAttachmentsAndTethersOnTheirWayThroughAMessage) {
+TEST(ToScene, KeepsAttachmentsAndTethersThroughAMessage) {
   v1::Scene message = smallScene();
   v1::Cloth& cloth = *message.mutable_cloths(0);
   cloth.clear_pins();
@@ -259,7 +259,7 @@ const BadScene kBadScenes[] = {
        s.mutable_cloths(0)->mutable_attachments(1)->set_vertices(0, 12);
      },
      "attached already"},
-    {"cloths[0].attachments[1].name = \"rod\": is another's name already",
+    {"cloths[0].attachments[1].name = \"rod\": is used twice",
      [](v1::Scene& s) {
        attachment(s, "rod");
        attachment(s, "rod");
@@ -301,7 +301,7 @@ const BadScene kBadScenes[] = {
        cloth(s).set_mass(1);
        cloth(s).set_areal_mass(1);
      },
-     "must be absent where \"mass\" is given"},
+     "must be absent if \"mass\" is given"},
     {"environment.airDensity = -1:", [](v1::Scene& s) { s.mutable_environment()->set_air_density(-1); }},
     {"cloths: has 0 elements", [](v1::Scene& s) { s.clear_cloths(); }, "must have 1 to 256"},
     {"cloths: has 257 elements",
@@ -531,7 +531,7 @@ const BadScene kBadScenes[] = {
      [](v1::Scene& s) { s.set_integrator(v1::INTEGRATOR_EXPLICIT_EULER); }, "INTEGRATOR_SEMI_IMPLICIT_EULER"},
 };
 
-// The letters and digits of the error: CTest stumbles over brackets and quotes.
+// Letters and digits of the error. CTest cannot handle brackets and quotes in names.
 std::string nameOf(const BadScene& bad) {
   std::string name;
   for (const char c : std::string_view(bad.error))
@@ -545,7 +545,7 @@ void PrintTo(const BadScene& bad, std::ostream* out) {
 
 class ToSceneRefuses : public testing::TestWithParam<BadScene> {};
 
-TEST_P(ToSceneRefuses, WithPathValueAndWhatIsAllowed) {
+TEST_P(ToSceneRefuses, WithPathValueAndAllowedRange) {
   v1::Scene message = smallScene();
   ASSERT_TRUE(toScene(message));
   GetParam().spoil(message);
@@ -559,7 +559,7 @@ TEST_P(ToSceneRefuses, WithPathValueAndWhatIsAllowed) {
 INSTANTIATE_TEST_SUITE_P(All, ToSceneRefuses, testing::ValuesIn(kBadScenes),
                          [](const auto& bad) { return nameOf(bad.param) + "_" + std::to_string(bad.index); });
 
-TEST(ToScene, AcceptsTheSubstepsThatItAskedFor) {
+TEST(ToScene, AcceptsTheSubstepsThatItRequested) {
   v1::Scene message = smallScene();
   cloth(message).mutable_structural()->set_stiffness(4000);
   message.set_substeps(8);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Scene messages that tests start from.
+// Scene messages shared by tests.
 #pragma once
 
 #include <array>
@@ -11,7 +11,7 @@ namespace clothstream::messages {
 
 inline constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 
-// Only what has no default.
+// Scene with only the fields that have no default.
 inline v1::Scene smallScene() {
   v1::Scene scene;
   scene.set_name("small");
@@ -29,7 +29,7 @@ inline v1::Scene smallScene() {
   return scene;
 }
 
-// The same with a tetrahedron for the ball.
+// smallScene() with a tetrahedron as the collider.
 inline v1::Scene sceneWithHull() {
   v1::Scene scene = smallScene();
   v1::ConvexHull& hull = *scene.mutable_colliders(0)->mutable_hull();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Motion of colliders from key to key, size of their shapes.
+// Motion of colliders between keys, and sizes of their shapes.
 #include "server/model/collider.h"
 
 #include <cmath>
@@ -27,14 +27,14 @@ Vec3 positionAt(const Collider& collider, double seconds) {
   return poseAt(collider, seconds).position;
 }
 
-// Of a turn about Y, degrees.
+// Angle of a rotation about Y, degrees.
 double angleAt(const Collider& collider, double seconds) {
   const Quaternion turn = poseAt(collider, seconds).orientation;
   EXPECT_NEAR(turn.norm(), 1, 1e-6);
   return std::atan2(double{turn.y()}, double{turn.w()}) * 360 / std::acos(-1.0);
 }
 
-TEST(PoseAt, IsThePoseWithoutMotion) {
+TEST(PoseAt, ReturnsThePoseWithoutMotion) {
   Collider collider = moving();
   collider.motion.keys.clear();
   collider.pose.orientation = aboutY(30);
@@ -42,7 +42,7 @@ TEST(PoseAt, IsThePoseWithoutMotion) {
   EXPECT_EQ(poseAt(collider, 123.4).orientation.coeffs(), aboutY(30).coeffs());
 }
 
-TEST(PoseAt, GoesThroughItsKeysBySmoothstep) {
+TEST(PoseAt, InterpolatesKeysWithSmoothstep) {
   const Collider collider = moving();
   EXPECT_EQ(positionAt(collider, 0), Vec3(0, 0, 0));
   EXPECT_EQ(positionAt(collider, 0.5), Vec3(2, 0, 0));
@@ -51,7 +51,7 @@ TEST(PoseAt, GoesThroughItsKeysBySmoothstep) {
   EXPECT_EQ(positionAt(collider, 2.5), Vec3(4, 4, 0));
 }
 
-TEST(PoseAt, TurnsWithItsKeys) {
+TEST(PoseAt, InterpolatesOrientations) {
   const Collider collider = moving();
   EXPECT_NEAR(angleAt(collider, 0), 0, 1e-4);
   EXPECT_NEAR(angleAt(collider, 0.5), 45, 1e-4);
@@ -59,32 +59,32 @@ TEST(PoseAt, TurnsWithItsKeys) {
   EXPECT_NEAR(angleAt(collider, 2.5), 45, 1e-4);
 }
 
-TEST(PoseAt, TurnsTheShorterWay) {
+TEST(PoseAt, RotatesAlongTheShorterPath) {
   Collider collider = moving();
   collider.motion.keys[1].orientation.coeffs() *= -1;  // the same turn
   EXPECT_NEAR(angleAt(collider, 0.5), 45, 1e-4);
 }
 
-TEST(PoseAt, StartsAgainAfterItsPeriod) {
+TEST(PoseAt, RepeatsAfterThePeriod) {
   const Collider collider = moving();
   EXPECT_EQ(positionAt(collider, 4), Vec3(0, 0, 0));
   EXPECT_EQ(positionAt(collider, 4 * 1000 + 2.5), Vec3(4, 4, 0));
 }
 
-TEST(PoseAt, IsSlowAtItsKeys) {
+TEST(PoseAt, IsSlowAtKeys) {
   const Collider collider = moving();
-  // Smoothstep starts as 3 u^2: after 1 % of the time 0.03 % of the way.
+  // Smoothstep starts as 3 u^2: after 1 % of the time it has covered 0.03 % of the distance.
   EXPECT_LT(positionAt(collider, 0.01).x(), 4 * 0.00031f);
 }
 
-TEST(PoseAt, KeepsItsSpeedWhereTheMotionIsSteady) {
+TEST(PoseAt, HasConstantSpeedIfSteady) {
   Collider collider = moving();
   collider.motion.steady = true;
   EXPECT_FLOAT_EQ(positionAt(collider, 0.01).x(), 0.04f);
   EXPECT_EQ(positionAt(collider, 0.25), Vec3(1, 0, 0));
 }
 
-TEST(ReachOf, HoldsTheShape) {
+TEST(ReachOf, ContainsTheShape) {
   EXPECT_EQ(reachOf(Sphere{0.3f}), 0.3f);
   EXPECT_FLOAT_EQ(reachOf(Capsule{.radius = 0.1f, .length = 0.4f}), 0.3f);
   EXPECT_FLOAT_EQ(reachOf(Box{Vec3(2, 4, 4)}), 3);

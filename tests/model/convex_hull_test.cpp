@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What a hull may be, and what is said of what it may not be.
+// Valid hulls, and the errors for invalid ones.
 #include "server/model/convex_hull.h"
 
 #include <gmock/gmock.h>
@@ -18,13 +18,13 @@ struct Parts {
   Faces faces;
 };
 
-// With a square base of 2 m and its tip 1 m above.
+// Pyramid with a square base of 2 m and a height of 1 m.
 Parts pyramid() {
   return {{Vec3(-1, 0, -1), Vec3(1, 0, -1), Vec3(1, 0, 1), Vec3(-1, 0, 1), Vec3(0, 1, 0)},
           {{0, 1, 2, 3}, {1, 0, 4}, {2, 1, 4}, {3, 2, 4}, {0, 3, 4}}};
 }
 
-// Of 12 triangles, as modelling programs write it.
+// Cube of 12 triangles, as modelling programs export it.
 Parts cube() {
   Parts parts;
   for (int i = 0; i < 8; ++i)
@@ -45,7 +45,7 @@ HullProblem problemOf(const Parts& parts) {
   return {};
 }
 
-TEST(ConvexHull, HasThePlanesOfItsFacesAndOfItsBox) {
+TEST(ConvexHull, HasPlanesOfItsFacesAndBoundingBox) {
   const auto hull = std::get<ConvexHull>(make(pyramid()));
   ASSERT_EQ(hull.planes.size(), 5u + 5u);  // the base is a side of the box
   EXPECT_EQ(hull.planes[0].normal, Vec3(0, -1, 0));
@@ -59,11 +59,11 @@ TEST(ConvexHull, HasThePlanesOfItsFacesAndOfItsBox) {
   EXPECT_FLOAT_EQ(reachOf(std::make_shared<const ConvexHull>(hull)), Vec3(1, 1, 1).norm());
 }
 
-TEST(ConvexHull, SharesThePlaneOfTriangledFaces) {
+TEST(ConvexHull, MergesPlanesOfCoplanarTriangles) {
   EXPECT_EQ(std::get<ConvexHull>(make(cube())).planes.size(), 6u);
 }
 
-TEST(ConvexHull, RefusesAnOpenOne) {
+TEST(ConvexHull, RefusesAnOpenSurface) {
   Parts parts = pyramid();
   parts.faces.pop_back();
   EXPECT_THAT(problemOf(parts).text, HasSubstr("must be closed"));
@@ -75,13 +75,13 @@ TEST(ConvexHull, RefusesADent) {
   EXPECT_THAT(problemOf(parts).text, HasSubstr("must be convex"));
 }
 
-TEST(ConvexHull, RefusesOneInsideOut) {
+TEST(ConvexHull, RefusesAnInsideOutSurface) {
   Parts parts = pyramid();
   for (auto& face : parts.faces) std::ranges::reverse(face);
   EXPECT_THAT(problemOf(parts).text, HasSubstr("counter-clockwise"));
 }
 
-TEST(ConvexHull, RefusesAFaceThatRunsTheWrongWay) {
+TEST(ConvexHull, RefusesAFlippedFace) {
   Parts parts = cube();
   std::ranges::reverse(parts.faces[7]);
   EXPECT_THAT(problemOf(parts).text, HasSubstr("as another face does"));
@@ -95,7 +95,7 @@ TEST(ConvexHull, RefusesABentFace) {
   EXPECT_THAT(problem.text, HasSubstr("is not plane"));
 }
 
-TEST(ConvexHull, RefusesFacesWithoutCornersToSpeakOf) {
+TEST(ConvexHull, RefusesFacesWithInvalidCorners) {
   Parts parts = pyramid();
   parts.faces[1] = {1, 0};
   EXPECT_THAT(problemOf(parts).text, HasSubstr("has 2 corners"));
@@ -106,13 +106,13 @@ TEST(ConvexHull, RefusesFacesWithoutCornersToSpeakOf) {
   EXPECT_EQ(problemOf(parts).face, 1u);
 }
 
-TEST(ConvexHull, RefusesAFlatOne) {
+TEST(ConvexHull, RefusesAFlatSurface) {
   const Parts sheet{{Vec3(0, 0, 0), Vec3(1, 0, 0), Vec3(1, 1, 0), Vec3(0, 1, 0)},
                     {{0, 1, 2, 3}, {3, 2, 1, 0}}};
   EXPECT_THAT(problemOf(sheet).text, HasSubstr("is flat"));
 }
 
-TEST(ConvexHull, RefusesNothingAtAll) {
+TEST(ConvexHull, RefusesAnEmptySurface) {
   EXPECT_THAT(problemOf({}).text, HasSubstr("is flat"));
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Dihedral bending: geometry, energy, and the bound on its rate.
+// Dihedral bending: geometry, energy and stability bound.
 #include "server/model/hinges.h"
 
 #include <Eigen/Geometry>
@@ -24,8 +24,8 @@ double angleOf(const Corners& at) {
   return std::atan2(n2.cross(n1).dot((at[1] - at[0]).normalized()), n1.dot(n2));
 }
 
-// Faces turned to either side, far too.
-TEST(Hinges, HaveTheAngleAndItsGradient) {
+// Small and large angles to both sides.
+TEST(Hinges, HaveTheRightAngleAndGradient) {
   for (const double lift : {-3.0, -0.4, 0.0, 0.01, 0.7, 5.0}) {
     SCOPED_TRACE(lift);
     const Corners at = {Vector3d(0.1, 0, 0.2), Vector3d(0, 1, 0), Vector3d(-1, 0.3, lift),
@@ -44,13 +44,13 @@ TEST(Hinges, HaveTheAngleAndItsGradient) {
         EXPECT_NEAR(shape.gradients[i][axis], (angleOf(above) - angleOf(below)) / (2 * kStep), 1e-8);
       }
     }
-    // Neither moving nor turning all four bends them.
+    // Rigid motion of all four nodes does not change the angle.
     EXPECT_LT(sum.norm(), 1e-12);
     EXPECT_LT(moment.norm(), 1e-12);
   }
 }
 
-TEST(Hinges, AreTheDiagonalsOfQuadsAndTheEdgesBetweenThem) {
+TEST(Hinges, IncludeDiagonalsAndInnerEdgesOfQuads) {
   Cloth cloth;
   cloth.grid = {.rows = 4, .columns = 6, .width = 0.5f, .height = 0.3f};
   EXPECT_EQ(hinges(cloth).size(), 2u * (3 * 5 + 3 * 4 + 2 * 5));
@@ -58,7 +58,7 @@ TEST(Hinges, AreTheDiagonalsOfQuadsAndTheEdgesBetweenThem) {
   EXPECT_EQ(hinges(asMesh(cloth)).size(), hinges(cloth).size());
 }
 
-// B / 2 curvature^2 area, to the second order of the angle between faces.
+// Plate energy B / 2 curvature^2 area, to second order in the angle between faces.
 double plateEnergy(const std::vector<Hinge>& hinges, const std::vector<Vector3d>& bent) {
   double sum = 0;
   for (const Hinge& hinge : hinges) {
@@ -70,7 +70,7 @@ double plateEnergy(const std::vector<Hinge>& hinges, const std::vector<Vector3d>
   return sum;
 }
 
-// Onto a cylinder whose axis is turned by `degrees` from Y.
+// Bends the cloth onto a cylinder whose axis has an angle of `degrees` to Y.
 std::vector<Vector3d> rolled(const std::vector<Vec3>& flat, double curvature, double degrees) {
   const double angle = degrees * std::acos(-1.0) / 180;
   const Vector3d across(std::cos(angle), std::sin(angle), 0);
@@ -84,8 +84,9 @@ std::vector<Vector3d> rolled(const std::vector<Vec3>& flat, double curvature, do
   return bent;
 }
 
-// Of cloths of 10, 20 and 30 times as many cells a side: a fringe has fewer hinges, so that what is compared
-// is how the energy grows with the area. It is quadratic in n: inside n^2, at the edges n, at the corners 1.
+// Energy per area from cloths with 10, 20 and 30 times as many cells per side. The fringe has fewer hinges,
+// so the growth of the energy is compared. It is quadratic in n: n^2 inside, n at the edges, 1 at the
+// corners.
 template <typename Patch>
 double energyOfACell(const Patch& patch, double curvature, double degrees) {
   const auto energy = [&](std::uint32_t n) {
@@ -95,9 +96,9 @@ double energyOfACell(const Patch& patch, double curvature, double degrees) {
   return (energy(30) - 2 * energy(20) + energy(10)) / 200;
 }
 
-// At an angle phi from the rows, p = cos^2, q = sin cos, r = sin^2: p^2 + r^2 + (2 + 4/8) q^2 of them, which
-// is 1 + sin(2 phi)^2 / 8.
-TEST(Hinges, HaveThePlatesEnergyOnGrids) {
+// At an angle phi to the rows, with p = cos^2, q = sin cos and r = sin^2, the ratio to the plate energy is
+// p^2 + r^2 + (2 + 4/8) q^2 = 1 + sin(2 phi)^2 / 8.
+TEST(Hinges, MatchPlateEnergyOnGrids) {
   const auto patch = [](std::uint32_t n) {
     Cloth cloth;
     const float side = 0.01f * static_cast<float>(n);
@@ -113,7 +114,7 @@ TEST(Hinges, HaveThePlatesEnergyOnGrids) {
   }
 }
 
-TEST(Hinges, HaveThePlatesEnergyInEveryDirectionOnEquilateralTriangles) {
+TEST(Hinges, MatchPlateEnergyInEveryDirectionOnEquilateralTriangles) {
   const auto patch = [](std::uint32_t n) {
     const auto side = static_cast<float>(n);
     MeshShape shape;
@@ -140,21 +141,22 @@ TEST(Hinges, HaveThePlatesEnergyInEveryDirectionOnEquilateralTriangles) {
         << degrees << " degrees";
 }
 
-// Squares whose corners go up and down in turn: nothing but the diagonals feels it.
-TEST(Hinges, ResistTwistsInTurn) {
+// Squares whose corners alternate up and down: only the diagonals bend.
+TEST(Hinges, ResistAlternatingTwists) {
   Cloth cloth;
   cloth.grid = {.rows = 5, .columns = 5, .width = 0.04f, .height = 0.04f};
   std::vector<Vector3d> bent;
   for (const Vec3& node : restPositions(cloth)) bent.push_back(node.cast<double>());
   for (std::size_t i = 0; i < bent.size(); ++i) bent[i].z() = i % 2 == 0 ? 1e-4 : -1e-4;
-  // A diagonal's faces turn by twice 2e-4 over half of its length, on either diagonal of 16 squares; all
-  // weigh 1/8 of 2 together.
+  // The faces at a diagonal rotate by twice 2e-4 over half of its length, on both diagonals of 16 squares.
+  // Their total weight is 1/8 of 2.
   const double turn = 2 * 2e-4 / (0.01 / std::sqrt(2.0));
   EXPECT_NEAR(plateEnergy(hinges(cloth), bent), 16 * 0.5 * 0.25 * turn * turn,
               1e-3 * 16 * 0.5 * 0.25 * turn * turn);
 }
 
-// Of a square of which one corner is free, by hand: the diagonal opposite of it, and the one through it.
+// Bound of a square with one free corner, computed by hand from the diagonal opposite the corner and the one
+// through it.
 TEST(Hinges, BoundTheTimeStep) {
   Scene scene;
   Cloth cloth;
@@ -165,8 +167,8 @@ TEST(Hinges, BoundTheTimeStep) {
   scene.cloths = {cloth};
   scene.environment.airDensity = 0;
   scene.simulationRate = 10;
-  // Either weighs a sixteenth of 0.1^2 2 / 0.1^2. Opposite corners have heights of 0.1 / sqrt(2) over it, and
-  // each end half of both.
+  // Each weighs a sixteenth of 0.1^2 2 / 0.1^2. Opposite corners have heights of 0.1 / sqrt(2) above it, and
+  // each end has half of both.
   const double gradient = std::sqrt(2.0) / 0.1;
   const double rate = 2 * (2.0 / 16) * gradient * 4 * gradient / 0.01;
   EXPECT_NEAR(bendingRate(cloth), rate, 1e-5 * rate);

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: MIT
-// Parameter changes take effect on what they name and on nothing else.
+// Parameter changes affect only what they name.
 #include "server/model/input.h"
 
 #include <gtest/gtest.h>
 
 namespace clothstream::model {
 namespace {
+
+using parameters::ClothNumber;
 
 Scene twoClothsAndABall() {
   Scene scene;
@@ -37,13 +39,16 @@ TEST(ApplyChange, SetsTheEnvironment) {
 TEST(ApplyChange, SetsEveryClothParameterOfTheNamedCloth) {
   Scene scene = twoClothsAndABall();
   ClothChange change{.name = "right",
-                     .structural = Spring{1, 2},
-                     .shear = Spring{3, 4},
-                     .bend = Spring{5, 6},
-                     .damping = 7.f,
-                     .drag = 8.f,
-                     .lift = 9.f,
-                     .friction = 0.5f};
+                     .numbers = {{ClothNumber::structuralStiffness, 1.f},
+                                 {ClothNumber::structuralDamping, 2.f},
+                                 {ClothNumber::shearStiffness, 3.f},
+                                 {ClothNumber::shearDamping, 4.f},
+                                 {ClothNumber::bendStiffness, 5.f},
+                                 {ClothNumber::bendDamping, 6.f},
+                                 {ClothNumber::damping, 7.f},
+                                 {ClothNumber::drag, 8.f},
+                                 {ClothNumber::lift, 9.f},
+                                 {ClothNumber::friction, 0.5f}}};
   applyChange(scene, {.cloths = {change}});
   const Cloth& right = scene.cloths[1];
   EXPECT_EQ(right.structural.stiffness, 1);
@@ -60,14 +65,14 @@ TEST(ApplyChange, SetsEveryClothParameterOfTheNamedCloth) {
   EXPECT_EQ(scene.cloths[0].friction, 0.3f);
 }
 
-TEST(ApplyChange, SetsEveryClothWithoutAName) {
+TEST(ApplyChange, SetsEveryClothIfTheNameIsEmpty) {
   Scene scene = twoClothsAndABall();
-  applyChange(scene, {.cloths = {{.drag = 1.f}}});
+  applyChange(scene, {.cloths = {{.numbers = {{ClothNumber::drag, 1.f}}}}});
   EXPECT_EQ(scene.cloths[0].drag, 1);
   EXPECT_EQ(scene.cloths[1].drag, 1);
 }
 
-TEST(ApplyChange, EndsAMotionByAPositionButNotByARadius) {
+TEST(ApplyChange, EndsTheMotionWithAPositionButNotWithARadius) {
   Scene scene = twoClothsAndABall();
   applyChange(scene, {.colliders = {{.name = "ball", .radius = 0.7f}}});
   EXPECT_EQ(std::get<Sphere>(scene.colliders[0].shape).radius, 0.7f);
@@ -76,7 +81,7 @@ TEST(ApplyChange, EndsAMotionByAPositionButNotByARadius) {
   EXPECT_EQ(poseAt(scene.colliders[0], 0.5).position, Vec3(1, 2, 3));
 }
 
-TEST(ApplyChange, TurnsAColliderInItsPlace) {
+TEST(ApplyChange, RotatesAColliderInPlace) {
   Scene scene = twoClothsAndABall();
   scene.colliders[0].pose.position = Vec3(1, 2, 3);
   const Quaternion onItsSide(0, 1, 0, 0);

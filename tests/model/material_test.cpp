@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Materials by name, and what becomes of a cloth made of one.
+// Materials by name, and cloths made of them.
 #include "server/model/material.h"
 
 #include <algorithm>
@@ -22,7 +22,7 @@ Cloth sheet(std::uint32_t size) {
   return cloth;
 }
 
-TEST(Materials, AreThoseOfTheHouseInOrder) {
+TEST(Materials, AreListedAlphabetically) {
   std::vector<std::string_view> names;
   for (const Material& material : materials()) {
     names.push_back(material.name);
@@ -35,7 +35,7 @@ TEST(Materials, AreThoseOfTheHouseInOrder) {
   EXPECT_EQ(findMaterial(""), nullptr);
 }
 
-TEST(Materials, MakeAClothThatAnySubstepsBear) {
+TEST(Materials, AreStableWithAnySubsteps) {
   for (const Material& material : materials()) {
     Scene scene;
     scene.cloths = {sheet(64)};
@@ -47,23 +47,24 @@ TEST(Materials, MakeAClothThatAnySubstepsBear) {
     EXPECT_EQ(cloth.shear.stiffness, material.shear);
     EXPECT_EQ(cloth.friction, material.friction);
     EXPECT_EQ(cloth.solver.kind, SolverKind::xpbd);
-    EXPECT_EQ(cloth.thickness, 0.005f);  // is the scene's
+    EXPECT_EQ(cloth.thickness, 0.005f);  // not changed by the material
     EXPECT_LE(stableSubsteps(scene), scene.substeps) << material.name;
     EXPECT_NE(stableSubsteps(scene), 0u) << material.name;
   }
 }
 
-// Sixteenfold where nodes are half as far apart, until it is as stiff as the cloth in tension.
-TEST(Materials, BendAlikeWhateverTheNodesDistance) {
+// Half the distance between nodes gives 16 times the stiffness, up to the stiffness in tension.
+TEST(Materials, BendEquallyForAnyDistanceBetweenNodes) {
   const Material& silk = *findMaterial("silk");
   const double coarse = bendStiffness(silk, sheet(26)), fine = bendStiffness(silk, sheet(51));
   EXPECT_NEAR(fine / coarse, 16, 1e-3);
   EXPECT_EQ(bendStiffness(silk, sheet(1001)), silk.tension);
-  EXPECT_NEAR(bendStiffness(silk, asMesh(sheet(26))) / coarse, 1, 1);  // across edges, not along rows
+  EXPECT_NEAR(bendStiffness(silk, asMesh(sheet(26))) / coarse, 1,
+              1);  // springs across edges instead of along rows
 }
 
-// Of ASTM D1388, where apparel lies between one and four centimetres.
-TEST(Materials, HaveBendingLengthsOfTheirKind) {
+// Bending length by ASTM D1388. Apparel has one to four centimetres.
+TEST(Materials, HaveRealisticBendingLengths) {
   const auto length = [](const char* name) { return bendingLength(*findMaterial(name)); };
   EXPECT_NEAR(length("silk"), 0.013, 0.002);
   EXPECT_NEAR(length("denim"), 0.027, 0.003);
@@ -74,11 +75,13 @@ TEST(Materials, HaveBendingLengthsOfTheirKind) {
   EXPECT_LT(length("leather"), length("paper"));
 }
 
-TEST(Materials, AreChangedToWithWhatIsGivenBeside) {
+TEST(Materials, ApplyBeforeTheOtherChanges) {
   Scene scene;
   scene.cloths = {sheet(26), sheet(51)};
   scene.cloths[1].name = "other";
-  ClothChange change{.bend = Spring{3, 0}, .material = "denim"};
+  ClothChange change{
+      .numbers = {{parameters::ClothNumber::bendStiffness, 3.f}, {parameters::ClothNumber::bendDamping, 0.f}},
+      .material = "denim"};
   applyChange(scene, {.cloths = {change}});
   for (const Cloth& cloth : scene.cloths) {
     EXPECT_EQ(cloth.material, "denim");

@@ -27,7 +27,7 @@ std::vector<Link> ends(const std::vector<SpringLink>& links) {
   return all;
 }
 
-TEST(MeshLinks, OfAGridOfQuadsAreThoseOfTheGrid) {
+TEST(MeshLinks, EqualThoseOfAGridForQuads) {
   for (const auto& [rows, columns] :
        {std::pair(2u, 2u), std::pair(2u, 5u), std::pair(6u, 2u), std::pair(7u, 5u)}) {
     const std::vector<SpringLink> expected = springLinks(grid(rows, columns));
@@ -38,8 +38,8 @@ TEST(MeshLinks, OfAGridOfQuadsAreThoseOfTheGrid) {
   }
 }
 
-// Two triangles: five edges, one bend spring over the middle one, no shear.
-TEST(MeshLinks, OfTrianglesAreTheirEdgesAndTheCornersOppositeOfThem) {
+// Two triangles have five edges, one bend spring across the middle one and no shear springs.
+TEST(MeshLinks, JoinEdgesAndOppositeCornersOfTriangles) {
   const Mesh mesh = makeMesh(
       triangles({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 1}}, {Triangle{0, 1, 2}, Triangle{1, 3, 2}}));
   EXPECT_EQ(ends(mesh.links), (std::vector<Link>{{0, 1, SpringKind::structural},
@@ -51,9 +51,9 @@ TEST(MeshLinks, OfTrianglesAreTheirEdgesAndTheCornersOppositeOfThem) {
   EXPECT_FLOAT_EQ(mesh.links[2].restLength, std::sqrt(3.0f));
 }
 
-// A quad 0 1 2 3 and a triangle 1 4 2 beside its edge 1-2: the triangle's corner bends against both corners
-// that the quad has beyond that edge.
-TEST(MeshLinks, AcrossAQuadAndATriangleBendBothWays) {
+// A quad 0 1 2 3 and a triangle 1 4 2 share the edge 1-2. Bend springs join corner 4 to both corners of the
+// quad that are not on the edge.
+TEST(MeshLinks, CrossAnEdgeBetweenQuadAndTriangle) {
   MeshShape shape = triangles({{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {2, 0.5f, 0}},
                               {Triangle{0, 1, 2}, Triangle{0, 2, 3}, Triangle{1, 4, 2}});
   shape.quads = {0};
@@ -63,35 +63,35 @@ TEST(MeshLinks, AcrossAQuadAndATriangleBendBothWays) {
   EXPECT_EQ(bends, (std::vector<Link>{{0, 4, SpringKind::bend}, {3, 4, SpringKind::bend}}));
 }
 
-// A tetrahedron without its base: opposite corners are neighbours already.
-TEST(MeshLinks, AreOneBetweenTwoNodes) {
+// In a tetrahedron without base, opposite corners are already neighbours.
+TEST(MeshLinks, JoinTwoNodesAtMostOnce) {
   const Mesh mesh = makeMesh(triangles({{0, 0, 1}, {1, 0, 0}, {0, 1, 0}, {-1, -1, 0}},
                                        {Triangle{0, 1, 2}, Triangle{0, 2, 3}, Triangle{0, 3, 1}}));
   EXPECT_EQ(mesh.links.size(), 6u);
 }
 
-TEST(MeshLinks, AreOrderedAsAGridsAre) {
+TEST(MeshLinks, HaveTheOrderOfAGrid) {
   const std::vector<SpringLink> links = makeMesh(disc(6, 1)).links;
   const auto key = [](const SpringLink& link) { return std::tuple(link.a, link.kind, link.b); };
   EXPECT_TRUE(std::ranges::is_sorted(links, {}, key));
-  // A disc's edges by Euler: nodes + triangles - 1.
+  // Euler's formula for the edges of a disc: nodes + triangles - 1.
   const MeshShape shape = disc(6, 1);
   EXPECT_EQ(std::ranges::count(links, SpringKind::structural, &SpringLink::kind),
             static_cast<std::ptrdiff_t>(shape.positions.size() + shape.triangles.size() - 1));
 }
 
-TEST(MeshMasses, FollowTheAreaAndAddUpToTheCloths) {
+TEST(MeshMasses, FollowTheAreaAndAddUpToTheMass) {
   Cloth cloth = grid(2, 2);
   cloth.mesh = std::make_shared<const Mesh>(makeMesh(disc(20, 0.5f)));
   EXPECT_NEAR(cloth.mesh->area(), std::numbers::pi * 0.25, 0.002);
   double sum = 0;
   for (const double mass : nodeMasses(cloth)) sum += mass;
   EXPECT_NEAR(sum, 1.5, 1e-6);
-  // A node in the middle has six triangles, one at the border three or four.
+  // Inner nodes have six triangles, border nodes three or four.
   EXPECT_GT(nodeMasses(cloth).front(), 1.4 * nodeMasses(cloth).back());
 }
 
-TEST(MeshStability, OfAGridGivenAsMeshIsThatOfTheGrid) {
+TEST(MeshStability, EqualsThatOfTheSameGrid) {
   Cloth cloth = grid(7, 6);
   cloth.structural = {900, 0.1f};
   cloth.shear = {700, 0};
@@ -107,8 +107,8 @@ TEST(MeshStability, OfAGridGivenAsMeshIsThatOfTheGrid) {
   }
 }
 
-// What is light needs short steps.
-TEST(MeshStability, IsThatOfTheNodeWithTheStiffestSpringsForItsMass) {
+// Light nodes need short steps.
+TEST(MeshStability, FollowsTheNodeWithTheStiffestSpringsPerMass) {
   Cloth cloth = grid(2, 2);
   cloth.structural.stiffness = 1000;
   cloth.mesh = std::make_shared<const Mesh>(makeMesh(disc(8, 0.5f)));
@@ -125,7 +125,7 @@ TEST(MeshStability, IsThatOfTheNodeWithTheStiffestSpringsForItsMass) {
   EXPECT_EQ(stableSubsteps(scene), static_cast<std::uint32_t>(std::floor(1 / (72 * step))) + 1);
 }
 
-TEST(MeshPins, AreTheNodesThatAreNamed) {
+TEST(MeshPins, AreTheNamedNodes) {
   Cloth cloth = asMesh(grid(3, 3));
   cloth.pinnedVertices = {4, 8};
   EXPECT_EQ(pinnedNodes(cloth), (std::vector<std::uint8_t>{0, 0, 0, 0, 1, 0, 0, 0, 1}));

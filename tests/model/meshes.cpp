@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Meshes that several tests start from.
+// Builds the meshes shared by tests.
 #include "tests/model/meshes.h"
 
 #include <cmath>

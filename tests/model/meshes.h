@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Meshes that several tests start from.
+// Meshes shared by tests.
 #pragma once
 
 #include <algorithm>
@@ -12,7 +12,7 @@
 
 namespace clothstream::model {
 
-// rows x columns nodes of a rectangle of 3 x 2 m and 1.5 kg.
+// Grid of rows x columns nodes, 3 x 2 m, 1.5 kg.
 inline Cloth grid(std::uint32_t rows, std::uint32_t columns) {
   Cloth cloth;
   cloth.grid = {.rows = rows, .columns = columns, .width = 3, .height = 2, .pose = {}};
@@ -20,7 +20,7 @@ inline Cloth grid(std::uint32_t rows, std::uint32_t columns) {
   return cloth;
 }
 
-// The grid's nodes, triangles and quads.
+// Nodes, triangles and quads of the grid.
 inline MeshShape shapeOf(const Cloth& grid) {
   MeshShape shape{.positions = restPositions(grid.grid),
                   .triangles = clothTriangles(grid),
@@ -33,7 +33,7 @@ inline MeshShape shapeOf(const Cloth& grid) {
   return shape;
 }
 
-// The same cloth as a mesh, its mass spread evenly as a grid's is; the same nodes are pinned.
+// The grid as a mesh, with the even masses of a grid and the same pinned nodes.
 inline Cloth asMesh(const Cloth& grid) {
   Cloth cloth = grid;
   Mesh mesh = makeMesh(shapeOf(grid));
@@ -46,8 +46,8 @@ inline Cloth asMesh(const Cloth& grid) {
   return cloth;
 }
 
-// A disc of `rings` rings round its centre, the k-th of 6 k nodes, in the XZ plane: as good as no node sees
-// what its neighbour sees.
+// Disc of `rings` rings around its centre in the XZ plane. Ring k has 6 k nodes. The mesh is irregular:
+// almost every node has different surroundings from its neighbours.
 MeshShape disc(std::uint32_t rings, float radius);
 
 }  // namespace clothstream::model

@@ -9,7 +9,7 @@
 namespace clothstream::model {
 namespace {
 
-TEST(RestPositions, HangInTheXyPlaneCentredOnXWithRowsDownFromZero) {
+TEST(RestPositions, HangInTheXyPlaneWithRowsDownFromZero) {
   const std::vector<Vec3> positions = restPositions({.rows = 3, .columns = 5, .width = 4, .height = 1});
   ASSERT_EQ(positions.size(), 15u);
   EXPECT_EQ(positions[0], Vec3(-2, 0, 0));
@@ -18,7 +18,7 @@ TEST(RestPositions, HangInTheXyPlaneCentredOnXWithRowsDownFromZero) {
   EXPECT_EQ(positions[14], Vec3(2, -1, 0));
 }
 
-TEST(RestPositions, AreTurnedThenMovedByThePose) {
+TEST(RestPositions, AreRotatedThenTranslatedByThePose) {
   Grid grid{.rows = 2, .columns = 2, .width = 2, .height = 3};
   const float half = std::sqrt(0.5f);
   grid.pose = {Vec3(10, 20, 30), Quaternion(half, half, 0, 0)};  // a quarter turn about +X takes -Y to -Z
@@ -27,7 +27,7 @@ TEST(RestPositions, AreTurnedThenMovedByThePose) {
   EXPECT_LT((positions[3] - Vec3(11, 20, 27)).norm(), 1e-5f);
 }
 
-TEST(Spacing, IsThatOfTheRestPositions) {
+TEST(Spacing, EqualsDistancesOfRestPositions) {
   const GridSpacing lengths = spacing({.rows = 4, .columns = 5, .width = 12, .height = 12});
   EXPECT_EQ(lengths.column, 3);
   EXPECT_EQ(lengths.row, 4);
@@ -50,7 +50,7 @@ TEST(PinnedNodes, FollowRangesWithSteps) {
                 expected[row * 7 + column] == 1);
 }
 
-TEST(PinnedNodes, AreNoneWithoutRanges) {
+TEST(PinnedNodes, AreEmptyWithoutRanges) {
   Cloth cloth;
   cloth.grid = {.rows = 3, .columns = 3};
   EXPECT_EQ(pinnedNodes(cloth), std::vector<std::uint8_t>(9, 0));

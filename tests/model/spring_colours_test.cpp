@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Colours of springs: each spring in one of them, no two of one at a node.
+// Colours of springs: each spring has one colour, and no two springs of a colour share a node.
 #include "server/model/spring_colours.h"
 
 #include <algorithm>
@@ -36,7 +36,7 @@ std::vector<Cloth> cloths() {
   return all;
 }
 
-TEST(SpringColours, HoldEverySpringOnce) {
+TEST(SpringColours, ContainEverySpringOnce) {
   for (const Cloth& cloth : cloths()) {
     std::vector<Key> coloured = keysOf(springColours(cloth).links), listed = keysOf(springLinks(cloth));
     std::ranges::sort(coloured);
@@ -45,7 +45,7 @@ TEST(SpringColours, HoldEverySpringOnce) {
   }
 }
 
-TEST(SpringColours, HaveNoTwoSpringsAtOneNode) {
+TEST(SpringColours, ContainAtMostOneSpringPerNode) {
   for (const Cloth& cloth : cloths()) {
     const SpringColours colours = springColours(cloth);
     ASSERT_EQ(colours.ends.back(), colours.links.size());
@@ -58,8 +58,8 @@ TEST(SpringColours, HaveNoTwoSpringsAtOneNode) {
   }
 }
 
-// What lets a kernel do a block at once: in a pass, springs that share a node are of one block.
-TEST(SpringColours, OfAGridsPassMeetOnlyWithinABlock) {
+// A kernel can process a whole block: within a pass, springs that share a node belong to one block.
+TEST(SpringColours, MeetOnlyInsideABlockInEachPass) {
   const Cloth cloth = grid(18, 15);
   const SpringColours colours = springColours(cloth);
   ASSERT_EQ(colours.count(), kCornerColours + kSeamColours + kInsideColours);
@@ -72,7 +72,7 @@ TEST(SpringColours, OfAGridsPassMeetOnlyWithinABlock) {
     for (const SpringLink& link : colours.of(colour))
       EXPECT_EQ(blockOf(link.a, shift), blockOf(link.b, shift)) << link.a << " " << link.b;
   }
-  // Corners are quads that share no node: two springs at a node, no more.
+  // Quads of the corner pass share no node, so a node has at most two springs.
   std::vector<int> springs(cloth.nodeCount(), 0);
   for (std::size_t colour = 0; colour < kCornerColours; ++colour)
     for (const SpringLink& link : colours.of(colour))
@@ -80,7 +80,7 @@ TEST(SpringColours, OfAGridsPassMeetOnlyWithinABlock) {
   EXPECT_EQ(std::ranges::max(springs), 1);
 }
 
-TEST(SpringColours, OfAMeshAreFewAndTheSameEachTime) {
+TEST(SpringColours, AreFewAndDeterministicForMeshes) {
   const Cloth cloth = discCloth(12);
   const SpringColours colours = springColours(cloth), again = springColours(cloth);
   EXPECT_EQ(keysOf(colours.links), keysOf(again.links));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The list of springs, and which meet at a node.
+// List of springs, and the springs at each node.
 #include "server/model/springs.h"
 
 #include <algorithm>
@@ -16,8 +16,8 @@ std::size_t countOf(const std::vector<SpringLink>& links, SpringKind kind) {
   return static_cast<std::size_t>(std::ranges::count(links, kind, &SpringLink::kind));
 }
 
-// Those of [Va21] Fig. 9 and 10.
-TEST(SpringLinks, AreAsManyAsInThePaper) {
+// Numbers of springs from [Va21] Fig. 9 and 10.
+TEST(SpringLinks, HaveTheNumbersOfThePaper) {
   EXPECT_EQ(springLinks(grid(34, 34)).size(), 6'598u);
   EXPECT_EQ(springLinks(grid(32, 32)).size(), 5'826u);
   const auto withoutBend = [](std::uint32_t size) {
@@ -28,14 +28,14 @@ TEST(SpringLinks, AreAsManyAsInThePaper) {
   EXPECT_EQ(withoutBend(38), 5'550u);
 }
 
-TEST(SpringLinks, AreAsLongAsTheirEndsAreApartAtRest) {
+TEST(SpringLinks, HaveTheDistanceOfTheirEndsAsRestLength) {
   const Cloth cloth = grid(5, 4);
   const std::vector<Vec3> rest = restPositions(cloth.grid);
   for (const SpringLink& link : springLinks(cloth))
     EXPECT_NEAR((rest[link.b] - rest[link.a]).norm(), link.restLength, 1e-6f) << link.a << " " << link.b;
 }
 
-TEST(SpringLinks, AreOrderedAndEachIsThereOnce) {
+TEST(SpringLinks, AreOrderedAndUnique) {
   const std::vector<SpringLink> links = springLinks(grid(4, 6));
   for (std::size_t i = 0; i < links.size(); ++i) {
     EXPECT_LT(links[i].a, links[i].b);
@@ -45,8 +45,8 @@ TEST(SpringLinks, AreOrderedAndEachIsThereOnce) {
   }
 }
 
-// Rows of 1 + (d_a - 1) + (d_b - 1) entries, where d springs meet at a node that can move.
-TEST(SystemEntries, AreThoseOfNodesThatCanMove) {
+// A row has 1 + (d_a - 1) + (d_b - 1) entries for d springs at a node that can move.
+TEST(SystemEntries, CountNodesThatCanMove) {
   Cloth cloth = grid(7, 6);
   cloth.solver.kind = SolverKind::constraint;
   cloth.solver.bendConstraints = true;
@@ -63,7 +63,7 @@ TEST(SystemEntries, AreThoseOfNodesThatCanMove) {
   EXPECT_EQ(systemEntries(cloth), entries);
 }
 
-TEST(SpringAdjacency, NamesEachSpringAtBothOfItsNodesInTheListsOrder) {
+TEST(SpringAdjacency, ListsEachSpringAtBothNodesInOrder) {
   const std::vector<SpringLink> links = springLinks(grid(5, 5));
   const SpringAdjacency adjacency = springAdjacency(links, 25);
   ASSERT_EQ(adjacency.springs.size(), 2 * links.size());

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The stability bound against hand-made numbers; tests/reference checks it against the physics.
+// Stability bound compared with numbers computed by hand. tests/reference compares it with simulations.
 #include "server/model/stability.h"
 
 #include <cmath>
@@ -21,7 +21,7 @@ Scene sheet(std::uint32_t rows, std::uint32_t columns) {
   return scene;
 }
 
-// s = h^2 2 sum(w) / m < 4 for the sum of stiffnesses at the worst node.
+// Bound: s = h^2 2 sum(w) / m < 4, with the sum of stiffnesses at the worst node.
 std::uint32_t substepsFor(double stiffnessSum) {
   return static_cast<std::uint32_t>(std::floor(0.01 * std::sqrt(2 * stiffnessSum / 0.01 / 4))) + 1;
 }
@@ -41,8 +41,8 @@ TEST(StableSubsteps, CountOnlySpringsThatExist) {
   EXPECT_EQ(stableSubsteps(scene), substepsFor(2 * 500 + 1 * 5000));
 }
 
-// In three rows, those with a bend spring along the column are not those with two structural springs.
-TEST(StableSubsteps, TakeTheWorstOfNodesThatDoNotExceedEachOther) {
+// With three rows, nodes with a bend spring along the column are not those with two structural springs.
+TEST(StableSubsteps, ConsiderAllIncomparableNodes) {
   Scene scene = sheet(3, 2);
   scene.cloths[0].bend.stiffness = 2000;
   EXPECT_EQ(stableSubsteps(scene), substepsFor(2 * 500 + 2000));
@@ -50,7 +50,7 @@ TEST(StableSubsteps, TakeTheWorstOfNodesThatDoNotExceedEachOther) {
   EXPECT_EQ(stableSubsteps(scene), substepsFor(3 * 500));
 }
 
-TEST(StableSubsteps, DoNotCountPinnedNodes) {
+TEST(StableSubsteps, IgnorePinnedNodes) {
   Scene scene = sheet(3, 3);
   scene.cloths[0].pins = {{.firstRow = 1, .lastRow = 1, .firstColumn = 0, .lastColumn = 2}};
   EXPECT_EQ(stableSubsteps(scene), substepsFor(3 * 500));
@@ -69,7 +69,7 @@ TEST(StableSubsteps, GrowWithDampingOfSpringsOfNodesAndOfTheAir) {
   EXPECT_GT(stableSubsteps(windy), bare);
 }
 
-TEST(StableSubsteps, AreThoseOfTheMostDemandingCloth) {
+TEST(StableSubsteps, FollowTheMostDemandingCloth) {
   Scene scene = sheet(10, 10);
   Cloth stiff = scene.cloths[0];
   stiff.structural.stiffness = 5000;
@@ -77,41 +77,41 @@ TEST(StableSubsteps, AreThoseOfTheMostDemandingCloth) {
   EXPECT_EQ(stableSubsteps(scene), substepsFor(4 * 5000));
 }
 
-TEST(StableSubsteps, AreOneForAClothThatIsAllPinned) {
+TEST(StableSubsteps, AreOneForAFullyPinnedCloth) {
   Scene scene = sheet(3, 3);
   scene.cloths[0].structural.stiffness = 1e6f;
   scene.cloths[0].pins = {{.firstRow = 0, .lastRow = 2, .firstColumn = 0, .lastColumn = 2}};
   EXPECT_EQ(stableSubsteps(scene), 1u);
 }
 
-TEST(StableSubsteps, DoNotCountSpringsOfXpbd) {
+TEST(StableSubsteps, IgnoreSpringsOfXpbd) {
   Scene scene = sheet(10, 10);
   scene.cloths[0].structural = scene.cloths[0].bend = {1e6f, 1e4f};
   scene.cloths[0].solver.kind = SolverKind::xpbd;
   EXPECT_EQ(stableSubsteps(scene), 1u);
-  // Its own damping is explicit: h c < 2.
+  // The damping of the cloth is explicit: h c < 2.
   scene.cloths[0].damping = 500;
   EXPECT_EQ(stableSubsteps(scene), 3u);
 }
 
-TEST(StableSubsteps, AreNoneWhereNotEvenTheMostWouldDo) {
+TEST(StableSubsteps, AreZeroIfTheMaximumIsNotEnough) {
   Scene scene = sheet(10, 10);
   scene.cloths[0].structural.stiffness = 1e6f;
   scene.simulationRate = 1;
   EXPECT_EQ(stableSubsteps(scene), 0u);
 }
 
-TEST(StableSubsteps, ExplicitEulerNeedsDashpotsAndDamping) {
+TEST(StableSubsteps, NeedDashpotsAndDampingForExplicitEuler) {
   Scene scene = sheet(10, 10);
   scene.integrator = Integrator::explicitEuler;
   EXPECT_EQ(stableSubsteps(scene), 0u);
   scene.cloths[0].structural.damping = 0.5f;
   EXPECT_EQ(stableSubsteps(scene), 0u);
   scene.cloths[0].damping = 50;
-  // Across the springs h 500 (1 - 1/1.1) 2 * 4 / 0.01 <= 50 needs h <= 1/727 s; along them h 500 <= 0.5, h <=
-  // 1/1000 s, the damping carrying nothing beside the tension; and c = h (2 * 4 * 0.5 / 0.01 + 50) < 2 is
-  // easier. Between 7.27 and 10 substeps the deficit along the springs is the larger one: h 500 - 0.5 <=
-  // 0.0625 gives h <= 1/889 s.
+  // Across the springs, h 500 (1 - 1/1.1) 2 * 4 / 0.01 <= 50 needs h <= 1/727 s. Along them, h 500 <= 0.5
+  // needs h <= 1/1000 s if the damping carries only the tension. c = h (2 * 4 * 0.5 / 0.01 + 50) < 2 is
+  // easier. Between 7.27 and 10 substeps the deficit along the springs is larger: h 500 - 0.5 <= 0.0625 gives
+  // h <= 1/889 s.
   EXPECT_EQ(stableSubsteps(scene), 9u);
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Ways along a cloth to the nodes that hold it.
+// Distances along a cloth to its fixed nodes.
 #include "server/model/tethers.h"
 
 #include <algorithm>
@@ -28,7 +28,7 @@ model::Cloth grid(std::uint32_t rows, std::uint32_t columns) {
   return cloth;
 }
 
-// Along rows, columns and diagonals.
+// Distance along rows, columns and diagonals.
 double way(std::uint32_t rows, std::uint32_t columns) {
   const std::uint32_t both = std::min(rows, columns), rest = std::max(rows, columns) - both;
   return double{kSpacing} * (both * std::sqrt(2) + rest);
@@ -62,7 +62,7 @@ TEST(Tethers, LeadToOneNodeOfEachGroup) {
   rod.ranges = {{.lastColumn = 5}};
   cloth.attachments = {rod};
   for (const NodeTethers& of : nodeTethers(cloth)) EXPECT_EQ(of[1].anchor, Tether::kNone);
-  // Straight up to the rod.
+  // The path is straight up to the rod.
   EXPECT_EQ(nodeTethers(cloth)[3 * 6 + 2][0].anchor, 2u);
   EXPECT_NEAR(nodeTethers(cloth)[3 * 6 + 2][0].length, 3 * kSpacing, 1e-6);
   cloth.pinnedVertices = {3 * 6 + 5};
@@ -70,14 +70,14 @@ TEST(Tethers, LeadToOneNodeOfEachGroup) {
   EXPECT_EQ(nodeTethers(cloth)[2 * 6 + 5][1].anchor, 5u);
 }
 
-TEST(Tethers, AreNoneWhereNothingHoldsTheCloth) {
+TEST(Tethers, AreAbsentWithoutFixedNodes) {
   for (const NodeTethers& of : nodeTethers(grid(3, 3))) {
     EXPECT_EQ(of[0].anchor, Tether::kNone);
     EXPECT_EQ(of[1].anchor, Tether::kNone);
   }
 }
 
-TEST(Tethers, OfAMeshAreThoseOfTheGridThatItIs) {
+TEST(Tethers, EqualThoseOfTheSameGridForMeshes) {
   model::Cloth cloth = grid(6, 5);
   cloth.pins = {{}, {.firstColumn = 4, .lastColumn = 4}};
   const model::Cloth mesh = model::asMesh(cloth);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Gusts: bounded, smooth, the same in every run.
+// Gusts are bounded, smooth and the same in every run.
 #include "server/model/wind.h"
 
 #include <algorithm>
@@ -20,7 +20,7 @@ Scene gustyScene() {
   return scene;
 }
 
-TEST(Wind, IsItsMeanToTheBitWithoutGusts) {
+TEST(Wind, EqualsItsMeanWithoutGusts) {
   Scene scene = gustyScene();
   scene.environment.gust.strength = 0;
   const Environment now = environmentAt(scene, 12345);
@@ -28,7 +28,7 @@ TEST(Wind, IsItsMeanToTheBitWithoutGusts) {
   EXPECT_EQ(now.gravity, scene.environment.gravity);
 }
 
-TEST(Wind, StraysByItsStrengthAtMostAndUsesMuchOfIt) {
+TEST(Wind, DeviatesByAtMostItsStrength) {
   const Scene scene = gustyScene();
   Eigen::Array3f most = Eigen::Array3f::Zero();
   Eigen::Array3d sum = Eigen::Array3d::Zero();
@@ -38,8 +38,8 @@ TEST(Wind, StraysByItsStrengthAtMostAndUsesMuchOfIt) {
     most = most.max(strayed.abs());
     sum += strayed.cast<double>();
   }
-  // 600 turns of a noise between -2 and 2 whose deviation is about 0.9: the mean lies within four deviations
-  // of their mean, and the largest is not far from what there can be.
+  // 600 periods of a noise from -2 to 2 with a standard deviation of about 0.9. The mean is within four
+  // deviations of the mean, and the largest value is close to the maximum.
   for (int axis = 0; axis < 3; ++axis) {
     EXPECT_LE(most[axis], 2) << axis;
     EXPECT_GT(most[axis], 1.4f) << axis;
@@ -47,8 +47,8 @@ TEST(Wind, StraysByItsStrengthAtMostAndUsesMuchOfIt) {
   }
 }
 
-// Between two ticks smoothstep moves by 1.5 times what a straight line would at most: of the long turns 2/3
-// of twice the strength, of the short ones 1/3 three times as fast.
+// Smoothstep moves at most 1.5 times as fast as a straight line. Long periods have 2/3 of twice the strength,
+// short ones 1/3 at three times the speed.
 TEST(Wind, ChangesSmoothly) {
   const Scene scene = gustyScene();
   const float most = 1.5f * 2 * 2 * (2.0f / 3 + 1.0f / 3 * 3) / 72 * 1.01f;
@@ -58,7 +58,7 @@ TEST(Wind, ChangesSmoothly) {
   }
 }
 
-TEST(Wind, IsSlowerWithLongerTurns) {
+TEST(Wind, IsSlowerWithLongerPeriods) {
   Scene scene = gustyScene();
   const auto fastest = [&] {
     float most = 0;
@@ -71,8 +71,8 @@ TEST(Wind, IsSlowerWithLongerTurns) {
   EXPECT_LT(fastest(), quick / 5);
 }
 
-// Whole numbers throughout: these bits hold on every machine and in every later version.
-TEST(Wind, HasTheseBits) {
+// Integer arithmetic: these bits are the same on every machine and in every later version.
+TEST(Wind, HasTheRecordedBits) {
   const Scene scene = gustyScene();
   std::uint32_t bits[3];
   std::memcpy(bits, environmentAt(scene, 1000).wind.data(), sizeof(bits));
@@ -81,7 +81,7 @@ TEST(Wind, HasTheseBits) {
   EXPECT_EQ(bits[2], 1069023744u);
 }
 
-TEST(Wind, TakesTheShortestTurnsAndTheLongestRuns) {
+TEST(Wind, AcceptsShortPeriodsAndLongRuns) {
   Scene scene = gustyScene();
   scene.environment.gust.seconds = 0.01f;
   for (const std::uint64_t tick : {std::uint64_t{0}, std::uint64_t{1} << 40, ~std::uint64_t{0} / 65536}) {
@@ -90,7 +90,7 @@ TEST(Wind, TakesTheShortestTurnsAndTheLongestRuns) {
   }
 }
 
-TEST(Wind, CountsForTheBoundOnSteps) {
+TEST(Wind, AffectsTheStabilityBound) {
   Scene scene = gustyScene();
   Cloth cloth;
   cloth.grid = {.rows = 20, .columns = 20, .width = 1, .height = 1, .pose = {}};

@@ -165,7 +165,7 @@ TEST_F(RecordingPrograms, InterruptCompletesRecordings) {
   EXPECT_EQ(info.code, 0) << info.output;
   const Ended again = run({CLOTHSTREAM_SERVER, "resimulate", serversRecording()});
   EXPECT_EQ(again.code, 0) << again.output << again.errors;
-  EXPECT_THAT(again.output, HasSubstr("all the same to the bit"));
+  EXPECT_THAT(again.output, HasSubstr("all bit-identical"));
 }
 
 // A killed server can lose only the chunk that is not closed. So no chunk may be longer than promised, and a
@@ -304,7 +304,7 @@ TEST_F(RecordingPrograms, StartAndStopRecordingsForClients) {
   const Ended started = ask({"start-recording", "small", "--name", "mine"});
   EXPECT_EQ(started.code, 0) << started.errors;
   EXPECT_EQ(started.output, "mine.mcap\n");
-  EXPECT_THAT(ask({"start-recording", "small"}).errors, HasSubstr("is recorded already, to mine.mcap"));
+  EXPECT_THAT(ask({"start-recording", "small"}).errors, HasSubstr("is already being recorded to mine.mcap"));
   EXPECT_THAT(ask({"start-recording", "small", "--name", "../mine"}).errors,
               HasSubstr("must be 1 to 64 characters"));
   EXPECT_THAT(ask({"start-recording", "none"}).errors, HasSubstr("there is no scene 'none'"));

@@ -138,7 +138,7 @@ TEST_F(RecorderTest, ResimulatesEveryInputToTheBit) {
   const Resimulation result = again(recorded.finish());
   EXPECT_EQ(result.ticks, ticks);
   EXPECT_EQ(result.different, 0u) << toText(result);
-  EXPECT_THAT(toText(result), HasSubstr("all the same to the bit"));
+  EXPECT_THAT(toText(result), HasSubstr("all bit-identical"));
 }
 
 TEST_F(RecorderTest, ContinuesAfterItsDeviceWasLost) {
@@ -265,23 +265,23 @@ TEST_F(RecorderTest, RefusesBytesThatAreNoTickOfTheScene) {
   EXPECT_THAT(errorWith("missing", [](v1::RecordedTick& tick) { tick.set_tick(4); }),
               HasSubstr("after tick 2 comes tick 4"));
   EXPECT_THAT(errorWith("far", [](v1::RecordedTick& tick) { tick.mutable_wind()->set_x(1e30f); }),
-              HasSubstr("tick 3: one of its numbers cannot be"));
+              HasSubstr("tick 3: one of its numbers is out of range"));
   EXPECT_THAT(errorWith("turned",
                         [](v1::RecordedTick& tick) {
                           tick.mutable_colliders(0)->mutable_start()->mutable_orientation()->set_w(3);
                         }),
-              HasSubstr("tick 3: one of its numbers cannot be"));
+              HasSubstr("tick 3: one of its numbers is out of range"));
   EXPECT_THAT(
       errorWith("shapeless", [](v1::RecordedTick& tick) { tick.mutable_colliders(0)->clear_shape(); }),
       HasSubstr("tick 3: one of its colliders has no shape"));
   EXPECT_THAT(errorWith("attached", [](v1::RecordedTick& tick) { tick.add_attachments(); }),
-              HasSubstr("tick 3: it has not the scene's attachments"));
+              HasSubstr("tick 3: its attachments are not those of the scene"));
   EXPECT_THAT(errorWith("cloths",
                         [](v1::RecordedTick& tick) {
                           tick.add_cloths();
                           tick.add_cloths();
                         }),
-              HasSubstr("tick 3: it has 2 cloths, and the scene 1"));
+              HasSubstr("tick 3: it has 2 cloths, but the scene has 1"));
 }
 
 TEST_F(RecorderTest, ContinuesFromTheNextStateAfterALostChunk) {
@@ -326,7 +326,7 @@ TEST_F(RecorderTest, ContinuesFromTheNextStateAfterALostChunk) {
   EXPECT_THAT(result.missing[0].reason, HasSubstr("checksum does not match"));
   EXPECT_EQ(result.ticks, result.missing[0].after + 250 - 201);
   EXPECT_EQ(result.different, 0u);
-  EXPECT_THAT(toText(result), HasSubstr("it is missing until tick 201"));
+  EXPECT_THAT(toText(result), HasSubstr("are missing until tick 201"));
 }
 
 // While it lives, no file of this program can grow beyond the limit.

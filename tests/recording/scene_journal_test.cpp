@@ -175,9 +175,9 @@ TEST_F(SceneJournalTest, RefusesImpossibleRequests) {
     EXPECT_THAT(refused.error().text, HasSubstr("must be 1 to 64 characters out of"));
   }
   EXPECT_FALSE(journal->start(std::string(65, 'a')));
-  EXPECT_THAT(journal->stop().error().text, HasSubstr("'small' is not recorded"));
+  EXPECT_THAT(journal->stop().error().text, HasSubstr("'small' is not being recorded"));
   ASSERT_TRUE(journal->start("one"));
-  EXPECT_THAT(journal->start("two").error().text, HasSubstr("is recorded already, to one.mcap"));
+  EXPECT_THAT(journal->start("two").error().text, HasSubstr("is already being recorded to one.mcap"));
   // The scene did not run in between.
   EXPECT_THAT(journal->stop().error().text, HasSubstr("did not run"));
   EXPECT_FALSE(std::filesystem::exists(pathOf("one.mcap")));
@@ -186,7 +186,7 @@ TEST_F(SceneJournalTest, RefusesImpossibleRequests) {
   ticks(2);
   ASSERT_TRUE(journal->stop());
   const auto size = std::filesystem::file_size(pathOf("one.mcap"));
-  EXPECT_THAT(journal->start("one").error().text, HasSubstr("there is a recording one.mcap already"));
+  EXPECT_THAT(journal->start("one").error().text, HasSubstr("a recording one.mcap already exists"));
   EXPECT_EQ(std::filesystem::file_size(pathOf("one.mcap")), size);
 
   make({}, true);
@@ -283,7 +283,7 @@ TEST_F(SceneJournalTest, RecordsTheNextHostOfAScene) {
   another();
   const auto stopped = journal->stop();
   ASSERT_FALSE(stopped);
-  EXPECT_THAT(stopped.error().text, HasSubstr("'small' is not recorded"));
+  EXPECT_THAT(stopped.error().text, HasSubstr("'small' is not being recorded"));
   ticks(1);
   ASSERT_TRUE(journal->start("after"));
   ticks(4);

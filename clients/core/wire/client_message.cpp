@@ -32,65 +32,6 @@ void writeMessage(std::string& out, std::uint64_t requestId, field::Field bodyFi
   fill(body);
 }
 
-void addVec3(Writer& parent, field::Field vec3Field, const Vec3& value) {
-  Writer vec3(parent, vec3Field.number);
-  vec3.add_float(field::Vec3::kX.number, value[0]);
-  vec3.add_float(field::Vec3::kY.number, value[1]);
-  vec3.add_float(field::Vec3::kZ.number, value[2]);
-}
-
-void addVec3Value(Writer& parent, field::Field wrapperField, const std::optional<Vec3>& value) {
-  if (!value) return;
-  Writer wrapper(parent, wrapperField.number);
-  addVec3(wrapper, field::Vec3Value::kValue, *value);
-}
-
-void addSpring(Writer& parent, field::Field springField, const std::optional<Spring>& value) {
-  if (!value) return;
-  Writer spring(parent, springField.number);
-  spring.add_float(field::Spring::kStiffness.number, (*value)[0]);
-  spring.add_float(field::Spring::kDamping.number, (*value)[1]);
-}
-
-std::string constraintMessage(const Solver& solver) {
-  std::string settings;
-  Writer writer(settings);
-  using F = field::ConstraintSolver;
-  writer.add_bool(F::kBendConstraints.number, solver.bendConstraints);
-  if (solver.compliance) writer.add_float(F::kCompliance.number, *solver.compliance);
-  writer.add_uint32(F::kIterations.number, solver.iterations);
-  writer.add_float(F::kTolerance.number, solver.tolerance);
-  if (solver.kind == CS_SOLVER_CONSTRAINT) writer.add_uint32(F::kPath.number, solver.path);
-  return settings;
-}
-
-// The settings of a kind that this client does not know are sent back unchanged.
-std::string solverMessage(const Solver& solver) {
-  std::string settings = solver.settings;
-  if (solver.kind == CS_SOLVER_CONSTRAINT) settings = constraintMessage(solver);
-  if (solver.kind == CS_SOLVER_ACAD) {
-    settings.clear();
-    Writer writer(settings);
-    writer.add_float(field::AcadSolver::kActivation.number, solver.activation);
-    writer.add_message(field::AcadSolver::kConstraint.number, constraintMessage(solver));
-  }
-  if (solver.kind == CS_SOLVER_XPBD) {
-    settings.clear();
-    Writer writer(settings);
-    writer.add_uint32(field::XpbdSolver::kIterations.number, solver.iterations);
-    if (solver.compliance) writer.add_float(field::XpbdSolver::kCompliance.number, *solver.compliance);
-  }
-  if (solver.kind == CS_SOLVER_IMPLICIT_EULER) {
-    settings.clear();
-    Writer writer(settings);
-    writer.add_uint32(field::ImplicitEulerSolver::kIterations.number, solver.iterations);
-    writer.add_float(field::ImplicitEulerSolver::kTolerance.number, solver.tolerance);
-  }
-  std::string message;
-  Writer(message).add_message(solver.kind, settings);
-  return message;
-}
-
 // Omits an orientation that is all zero. Writer itself omits nothing.
 void addPose(Writer& parent, field::Field poseField, std::span<const float, 3> position,
              std::span<const float, 4> orientation) {
@@ -198,43 +139,8 @@ void writeColliderPoses(std::string& out, const Poses& poses, std::uint64_t clie
 }
 
 void writeParameterChange(std::string& out, std::uint64_t requestId, const ParameterChange& change) {
-  writeMessage(out, requestId, field::ClientMessage::kParameterChange, [&](Writer& parameters) {
-    using F = field::ParameterChange;
-    addVec3Value(parameters, F::kGravity, change.gravity);
-    addVec3Value(parameters, F::kWind, change.wind);
-    if (change.airDensity) parameters.add_float(F::kAirDensity.number, *change.airDensity);
-    if (change.gust) {
-      Writer gust(parameters, F::kGust.number);
-      gust.add_float(field::Gust::kStrength.number, change.gust->strength);
-      gust.add_float(field::Gust::kSeconds.number, change.gust->seconds);
-    }
-    for (const ClothChange& clothChange : change.cloths) {
-      using C = field::ClothChange;
-      Writer cloth(parameters, F::kCloths.number);
-      cloth.add_string(C::kName.number, clothChange.name);
-      addSpring(cloth, C::kStructural, clothChange.structural);
-      addSpring(cloth, C::kShear, clothChange.shear);
-      addSpring(cloth, C::kBend, clothChange.bend);
-      if (clothChange.damping) cloth.add_float(C::kDamping.number, *clothChange.damping);
-      if (clothChange.drag) cloth.add_float(C::kDrag.number, *clothChange.drag);
-      if (clothChange.lift) cloth.add_float(C::kLift.number, *clothChange.lift);
-      if (clothChange.friction) cloth.add_float(C::kFriction.number, *clothChange.friction);
-      if (clothChange.thickness) cloth.add_float(C::kThickness.number, *clothChange.thickness);
-      if (clothChange.solver) cloth.add_message(C::kSolver.number, solverMessage(*clothChange.solver));
-      if (clothChange.ballRadius || clothChange.ballFriction) {
-        Writer balls(cloth, C::kSelfCollision.number);
-        if (clothChange.ballRadius)
-          balls.add_float(field::SelfCollision::kRadius.number, *clothChange.ballRadius);
-        if (clothChange.ballFriction)
-          balls.add_float(field::SelfCollision::kFriction.number, *clothChange.ballFriction);
-      }
-      if (clothChange.tetherSlack)
-        Writer(cloth, C::kTethers.number).add_float(field::Tethers::kSlack.number, *clothChange.tetherSlack);
-      if (clothChange.dihedralBending)
-        cloth.add_float(C::kDihedralBending.number, *clothChange.dihedralBending);
-      if (clothChange.material) cloth.add_string(C::kMaterial.number, *clothChange.material);
-    }
-  });
+  writeMessage(out, requestId, field::ClientMessage::kParameterChange,
+               [&](Writer& message) { writeFields(message, change); });
 }
 
 void writeColliderChange(std::string& out, std::uint64_t requestId, const ColliderChange& change) {

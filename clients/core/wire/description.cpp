@@ -29,7 +29,6 @@ struct ClothMessage {
 
 constexpr std::size_t kMaxSubmeshes = 65536;
 constexpr std::size_t kMaxMaterials = 1024;
-constexpr std::size_t kMaxSolvers = 32;  // kinds of solver remembered per cloth
 
 bool readSubmesh(Bytes message, Submesh& submesh) {
   using F = field::Submesh;
@@ -84,45 +83,6 @@ bool readEnvironment(Bytes message, Environment& environment) {
         return setFinite(environment.airDensity, reader);
       case F::kGust.tag:
         return readGust(reader.get_view(), environment.gust);
-      default:
-        return skip(reader);
-    }
-  });
-}
-
-// Reads a Cloth of a Scene.
-bool readClothParameters(Bytes message, std::string& name, ClothParameters& parameters) {
-  using F = field::Cloth;
-  return readFields(message, [&](std::uint32_t tag, Reader& reader) {
-    switch (tag) {
-      case F::kName.tag:
-        return setText(name, reader);
-      case F::kStructural.tag:
-        return readSpring(reader.get_view(), parameters.structural);
-      case F::kShear.tag:
-        return readSpring(reader.get_view(), parameters.shear);
-      case F::kBend.tag:
-        return readSpring(reader.get_view(), parameters.bend);
-      case F::kDamping.tag:
-        return setFinite(parameters.damping, reader);
-      case F::kDrag.tag:
-        return setFinite(parameters.drag, reader);
-      case F::kLift.tag:
-        return setFinite(parameters.lift, reader);
-      case F::kFriction.tag:
-        return setFinite(parameters.friction, reader);
-      case F::kThickness.tag:
-        return setFinite(parameters.thickness, reader);
-      case F::kSolver.tag:
-        return readSolver(reader.get_view(), parameters.solver);
-      case F::kSelfCollision.tag:
-        return readSelfCollision(reader.get_view(), parameters.ballRadius, parameters.ballFriction);
-      case F::kTethers.tag:
-        return readTethers(reader.get_view(), parameters.tetherSlack);
-      case F::kDihedralBending.tag:
-        return setFinite(parameters.dihedralBending, reader);
-      case F::kMaterial.tag:
-        return setText(parameters.material, reader);
       default:
         return skip(reader);
     }
@@ -342,24 +302,7 @@ void apply(const ParameterChange& change, Description& description) {
   for (const ClothChange& clothChange : change.cloths) {
     for (Cloth& cloth : description.cloths) {
       if (!clothChange.name.empty() && clothChange.name != cloth.name) continue;
-      ClothParameters& parameters = cloth.parameters;
-      parameters.structural = clothChange.structural.value_or(parameters.structural);
-      parameters.shear = clothChange.shear.value_or(parameters.shear);
-      parameters.bend = clothChange.bend.value_or(parameters.bend);
-      parameters.damping = clothChange.damping.value_or(parameters.damping);
-      parameters.drag = clothChange.drag.value_or(parameters.drag);
-      parameters.lift = clothChange.lift.value_or(parameters.lift);
-      parameters.friction = clothChange.friction.value_or(parameters.friction);
-      parameters.thickness = clothChange.thickness.value_or(parameters.thickness);
-      parameters.material = clothChange.material.value_or(parameters.material);
-      parameters.dihedralBending = clothChange.dihedralBending.value_or(parameters.dihedralBending);
-      if (clothChange.ballRadius) parameters.ballRadius = clothChange.ballRadius;
-      if (clothChange.ballFriction) parameters.ballFriction = clothChange.ballFriction;
-      if (clothChange.tetherSlack) parameters.tetherSlack = clothChange.tetherSlack;
-      if (!clothChange.solver) continue;
-      parameters.solver = *clothChange.solver;
-      if (parameters.solvers.size() < kMaxSolvers)
-        parameters.solvers[parameters.solver.kind] = parameters.solver;
+      apply(clothChange, cloth.parameters);
     }
   }
 }

@@ -15,18 +15,6 @@
 
 namespace clothstream::client {
 
-struct ClothParameters {
-  std::string material;
-  Spring structural{}, shear{}, bend{};
-  float damping = 0, drag = 0, lift = 0;
-  float friction = 0.3f, thickness = 0.005f;
-  float dihedralBending = 0;
-  // Empty if the cloth has no self-collision, or no tethers.
-  std::optional<float> ballRadius, ballFriction, tetherSlack;
-  Solver solver;
-  std::map<std::uint32_t, Solver> solvers;  // last known settings of each kind
-};
-
 // Triangles with one material.
 struct Submesh {
   std::string name;

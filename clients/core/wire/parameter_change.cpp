@@ -1,15 +1,46 @@
 // SPDX-License-Identifier: MIT
-// Field by field through a ParameterChange, its cloths and their solvers.
+// Reads, writes and applies parameter changes. The table of parameters gives the fields of a cloth's numbers.
 #include "clients/core/wire/parameter_change.h"
 
 namespace clothstream::client {
 namespace {
 
-bool setSpring(std::optional<Spring>& target, Reader& reader) {
-  return readSpring(reader.get_view(), target.emplace());
+using parameters::ClothNumbers;
+using parameters::ClothParameter;
+using parameters::Group;
+using parameters::kClothParameters;
+using parameters::WireField;
+using Writer = protozero::pbf_writer;
+
+constexpr std::size_t kMaxSolvers = 32;  // remembered solver kinds per cloth
+
+// Message that a field number belongs to: Cloth or ClothChange.
+using In = std::uint32_t WireField::*;
+
+bool readGroup(Bytes message, const Group& group, In in, ClothNumbers& numbers) {
+  if (group.isReplaced)
+    for (const ClothParameter& parameter : kClothParameters)
+      if (parameter.group == &group) numbers[parameter.number] = 0;
+  return readFields(message, [&](std::uint32_t tag, Reader& reader) {
+    for (const ClothParameter& parameter : kClothParameters)
+      if (parameter.group == &group && tag == fixed32(parameter.field.*in))
+        return setFinite(numbers[parameter.number], reader);
+    return skip(reader);
+  });
 }
 
-// Vec3Value { Vec3 value = 1; }
+// Skips a field that the table does not list.
+bool readNumber(std::uint32_t tag, Reader& reader, In in, ClothNumbers& numbers) {
+  for (const ClothParameter& parameter : kClothParameters) {
+    if (parameter.group == nullptr && tag == fixed32(parameter.field.*in))
+      return setFinite(numbers[parameter.number], reader);
+    if (parameter.group != nullptr && tag == bytes(parameter.group->field.*in))
+      return readGroup(reader.get_view(), *parameter.group, in, numbers);
+  }
+  return skip(reader);
+}
+
+// The message is a Vec3Value.
 bool setVec3Value(std::optional<Vec3>& target, Reader& reader) {
   using F = field::Vec3Value;
   Vec3& value = target.emplace();
@@ -68,36 +99,92 @@ bool readClothChange(Bytes message, ClothChange& change) {
     switch (tag) {
       case F::kName.tag:
         return setText(change.name, reader);
-      case F::kStructural.tag:
-        return setSpring(change.structural, reader);
-      case F::kShear.tag:
-        return setSpring(change.shear, reader);
-      case F::kBend.tag:
-        return setSpring(change.bend, reader);
-      case F::kDamping.tag:
-        return setFinite(change.damping, reader);
-      case F::kDrag.tag:
-        return setFinite(change.drag, reader);
-      case F::kLift.tag:
-        return setFinite(change.lift, reader);
-      case F::kFriction.tag:
-        return setFinite(change.friction, reader);
-      case F::kThickness.tag:
-        return setFinite(change.thickness, reader);
       case F::kSolver.tag:
         return readSolver(reader.get_view(), change.solver.emplace());
-      case F::kSelfCollision.tag:
-        return readSelfCollision(reader.get_view(), change.ballRadius, change.ballFriction);
-      case F::kTethers.tag:
-        return readTethers(reader.get_view(), change.tetherSlack);
-      case F::kDihedralBending.tag:
-        return setFinite(change.dihedralBending, reader);
       case F::kMaterial.tag:
         return setText(change.material.emplace(), reader);
       default:
-        return skip(reader);
+        return readNumber(tag, reader, &WireField::inChange, change.numbers);
     }
   });
+}
+
+void addVec3Value(Writer& parent, field::Field wrapperField, const std::optional<Vec3>& value) {
+  if (!value) return;
+  Writer wrapper(parent, wrapperField.number);
+  addVec3(wrapper, field::Vec3Value::kValue, *value);
+}
+
+std::string constraintMessage(const Solver& solver) {
+  std::string settings;
+  Writer writer(settings);
+  using F = field::ConstraintSolver;
+  writer.add_bool(F::kBendConstraints.number, solver.bendConstraints);
+  if (solver.compliance) writer.add_float(F::kCompliance.number, *solver.compliance);
+  writer.add_uint32(F::kIterations.number, solver.iterations);
+  writer.add_float(F::kTolerance.number, solver.tolerance);
+  if (solver.kind == CS_SOLVER_CONSTRAINT) writer.add_uint32(F::kPath.number, solver.path);
+  return settings;
+}
+
+// The settings of a kind that this client does not know are sent back unchanged.
+std::string solverMessage(const Solver& solver) {
+  std::string settings = solver.settings;
+  if (solver.kind == CS_SOLVER_CONSTRAINT) settings = constraintMessage(solver);
+  if (solver.kind == CS_SOLVER_ACAD) {
+    settings.clear();
+    Writer writer(settings);
+    writer.add_float(field::AcadSolver::kActivation.number, solver.activation);
+    writer.add_message(field::AcadSolver::kConstraint.number, constraintMessage(solver));
+  }
+  if (solver.kind == CS_SOLVER_XPBD) {
+    settings.clear();
+    Writer writer(settings);
+    writer.add_uint32(field::XpbdSolver::kIterations.number, solver.iterations);
+    if (solver.compliance) writer.add_float(field::XpbdSolver::kCompliance.number, *solver.compliance);
+  }
+  if (solver.kind == CS_SOLVER_IMPLICIT_EULER) {
+    settings.clear();
+    Writer writer(settings);
+    writer.add_uint32(field::ImplicitEulerSolver::kIterations.number, solver.iterations);
+    writer.add_float(field::ImplicitEulerSolver::kTolerance.number, solver.tolerance);
+  }
+  std::string message;
+  Writer(message).add_message(solver.kind, settings);
+  return message;
+}
+
+// Writes a group. A group that is replaced is written in full.
+void writeGroup(Writer& cloth, const Group& group, const ClothNumbers& numbers) {
+  Writer message(cloth, group.field.inChange);
+  for (const ClothParameter& parameter : kClothParameters)
+    if (parameter.group == &group && (group.isReplaced || numbers.has(parameter.number)))
+      message.add_float(parameter.field.inChange, numbers[parameter.number]);
+}
+
+void writeCloth(Writer& cloth, const ClothChange& change) {
+  using F = field::ClothChange;
+  cloth.add_string(F::kName.number, change.name);
+  const auto writeSolver = [&] {
+    if (change.solver) cloth.add_message(F::kSolver.number, solverMessage(*change.solver));
+  };
+  // Fields are written in ascending order.
+  bool isSolverDue = true;
+  const Group* previous = nullptr;
+  for (const ClothParameter& parameter : kClothParameters) {
+    const Group* group = parameter.group;
+    if (isSolverDue && (group != nullptr ? group->field : parameter.field).inChange > F::kSolver.number) {
+      writeSolver();
+      isSolverDue = false;
+    }
+    if (group == nullptr && change.numbers.has(parameter.number))
+      cloth.add_float(parameter.field.inChange, change.numbers[parameter.number]);
+    if (group != nullptr && group != previous && change.numbers.hasAnyOf(*group))
+      writeGroup(cloth, *group, change.numbers);
+    previous = group;
+  }
+  if (isSolverDue) writeSolver();
+  if (change.material) cloth.add_string(F::kMaterial.number, *change.material);
 }
 
 }  // namespace
@@ -123,10 +210,6 @@ bool readParameterChange(Bytes message, ParameterChange& change) {
   });
 }
 
-bool readSpring(Bytes message, Spring& out) {
-  return readFloats(message, out);
-}
-
 bool readGust(Bytes message, Gust& out) {
   using F = field::Gust;
   out = {};
@@ -136,22 +219,23 @@ bool readGust(Bytes message, Gust& out) {
   });
 }
 
-bool readSelfCollision(Bytes message, std::optional<float>& radius, std::optional<float>& friction) {
-  using F = field::SelfCollision;
+bool readClothParameters(Bytes message, std::string& name, ClothParameters& parameters) {
+  using F = field::Cloth;
   return readFields(message, [&](std::uint32_t tag, Reader& reader) {
-    if (tag == F::kRadius.tag) return setFinite(radius, reader);
-    return tag == F::kFriction.tag ? setFinite(friction, reader) : skip(reader);
+    switch (tag) {
+      case F::kName.tag:
+        return setText(name, reader);
+      case F::kSolver.tag:
+        return readSolver(reader.get_view(), parameters.solver);
+      case F::kMaterial.tag:
+        return setText(parameters.material, reader);
+      default:
+        return readNumber(tag, reader, &WireField::inCloth, parameters.numbers);
+    }
   });
 }
 
-bool readTethers(Bytes message, std::optional<float>& slack) {
-  using F = field::Tethers;
-  return readFields(message, [&](std::uint32_t tag, Reader& reader) {
-    return tag == F::kSlack.tag ? setFinite(slack, reader) : skip(reader);
-  });
-}
-
-// A kind that this client does not know keeps its number and its settings.
+// Keeps the number and the settings of a kind that this client does not know.
 bool readSolver(Bytes message, Solver& out) {
   out = {};
   return readFields(message, [&](std::uint32_t tag, Reader& reader) {
@@ -172,6 +256,46 @@ bool readSolver(Bytes message, Solver& out) {
         return true;
     }
   });
+}
+
+void addVec3(Writer& parent, field::Field vec3Field, const Vec3& value) {
+  Writer vec3(parent, vec3Field.number);
+  vec3.add_float(field::Vec3::kX.number, value[0]);
+  vec3.add_float(field::Vec3::kY.number, value[1]);
+  vec3.add_float(field::Vec3::kZ.number, value[2]);
+}
+
+void writeFields(Writer& message, const ParameterChange& change) {
+  using F = field::ParameterChange;
+  addVec3Value(message, F::kGravity, change.gravity);
+  addVec3Value(message, F::kWind, change.wind);
+  if (change.airDensity) message.add_float(F::kAirDensity.number, *change.airDensity);
+  if (change.gust) {
+    Writer gust(message, F::kGust.number);
+    gust.add_float(field::Gust::kStrength.number, change.gust->strength);
+    gust.add_float(field::Gust::kSeconds.number, change.gust->seconds);
+  }
+  for (const ClothChange& clothChange : change.cloths) {
+    Writer cloth(message, F::kCloths.number);
+    writeCloth(cloth, clothChange);
+  }
+}
+
+ClothNumbers ClothParameters::defaultNumbers() {
+  ClothNumbers numbers;
+  for (const ClothParameter& parameter : kClothParameters)
+    if (parameter.group == nullptr || parameter.group->isReplaced)
+      numbers[parameter.number] = parameter.initial;
+  return numbers;
+}
+
+void apply(const ClothChange& change, ClothParameters& cloth) {
+  parameters::applyNumbers(change.numbers,
+                           [&](parameters::ClothNumber number) { return &cloth.numbers[number]; });
+  cloth.material = change.material.value_or(cloth.material);
+  if (!change.solver) return;
+  cloth.solver = *change.solver;
+  if (cloth.solvers.size() < kMaxSolvers) cloth.solvers[cloth.solver.kind] = cloth.solver;
 }
 
 }  // namespace clothstream::client

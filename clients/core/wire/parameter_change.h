@@ -1,34 +1,35 @@
 // SPDX-License-Identifier: MIT
-// What changes of a scene while it runs, and the parts of it that a Scene has too.
+// Parameters of a running scene, and changes of them. Reads and writes the messages that a Scene and a
+// ParameterChange share.
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include <protozero/pbf_writer.hpp>
+
 #include "clients/core/core.h"
 #include "clients/core/wire/wire.h"
+#include "proto/parameters/cloth_parameters.h"
 
 namespace clothstream::client {
 
-// {stiffness, damping}
-using Spring = std::array<float, 2>;
-
-// ConstraintPath in scene.proto.
+// Values of ConstraintPath in scene.proto.
 inline constexpr std::uint32_t kMatrixFree = 1, kAssembled = 2;
 
 struct Solver {
-  std::uint32_t kind = CS_SOLVER_MASS_SPRING;  // the field that Solver.kind is
+  std::uint32_t kind = CS_SOLVER_MASS_SPRING;  // number of the field in Solver.kind
   bool bendConstraints = false;
   std::uint32_t iterations = 20;
   float tolerance = 0.001f;
   std::optional<float> compliance;
   float activation = 0.1f;
   std::uint32_t path = kMatrixFree;
-  std::string settings;  // the kind's own message as it came
+  std::string settings;  // message of the kind as received
 };
 
 struct Gust {
@@ -36,13 +37,22 @@ struct Gust {
   float seconds = 2;
 };
 
+// Current parameters of a cloth.
+struct ClothParameters {
+  std::string material;
+  parameters::ClothNumbers numbers = defaultNumbers();
+  Solver solver;
+  std::map<std::uint32_t, Solver> solvers;  // newest settings of each kind
+
+  // Defaults of scene.proto. Self-collision and tethers are NaN, because a cloth has none by default.
+  static parameters::ClothNumbers defaultNumbers();
+};
+
 struct ClothChange {
-  std::string name;
-  std::optional<Spring> structural, shear, bend;
-  std::optional<float> damping, drag, lift, friction, thickness;
-  std::optional<Solver> solver;
+  std::string name;  // empty: every cloth
+  parameters::ClothNumbers numbers = {};
+  std::optional<Solver> solver = {};
   std::optional<std::string> material = {};
-  std::optional<float> ballRadius = {}, ballFriction = {}, tetherSlack = {}, dihedralBending = {};
 };
 
 struct ParameterChange {
@@ -50,18 +60,25 @@ struct ParameterChange {
   std::optional<float> airDensity;
   std::optional<Gust> gust;
   std::vector<ClothChange> cloths;
-  std::uint64_t participantId = 0;  // who made it
+  std::uint64_t participantId = 0;  // participant that made the change; 0 is the server
 };
 
-// False where the message is not well formed, a number is not finite, or there are too many cloths.
+// The functions below return false if the message is not well formed or a number is not finite.
+
+// Returns false also if there are more than kMaxCloths cloths.
 [[nodiscard]] bool readParameterChange(Bytes message, ParameterChange& change);
-[[nodiscard]] bool readSpring(Bytes message, Spring& out);
+// Reads the parameters of a Scene's Cloth, and its name.
+[[nodiscard]] bool readClothParameters(Bytes message, std::string& name, ClothParameters& parameters);
 [[nodiscard]] bool readGust(Bytes message, Gust& out);
-// Of a SelfCollision and of Tethers, in a Scene's Cloth and in a change.
-[[nodiscard]] bool readSelfCollision(Bytes message, std::optional<float>& radius,
-                                     std::optional<float>& friction);
-[[nodiscard]] bool readTethers(Bytes message, std::optional<float>& slack);
 [[nodiscard]] bool readSolver(Bytes message, Solver& out);
+
+// Writes a Vec3 as a submessage.
+void addVec3(protozero::pbf_writer& parent, field::Field vec3Field, const Vec3& value);
+
+// Writes the fields of a ParameterChange.
+void writeFields(protozero::pbf_writer& message, const ParameterChange& change);
+
+void apply(const ClothChange& change, ClothParameters& cloth);
 
 inline constexpr std::size_t kMaxCloths = 256;
 

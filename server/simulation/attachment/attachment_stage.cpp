@@ -192,7 +192,7 @@ void AttachmentStage::recordSubstep(vulkan::Recorder& recorder, std::uint32_t pr
                        .progressAfter = static_cast<float>(substep + 1) / static_cast<float>(substeps),
                        .substepSeconds = 1 / rate,
                        .substepRate = rate,
-                       .caughtUp = model::kCaughtUp},
+                       .caughtUp = model::kGrabCorrectionFraction},
       invocations());
 }
 

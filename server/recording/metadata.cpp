@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What a recording was made on and with.
-#include "server/recording/facts.h"
+// Collects the metadata of a recording.
+#include "server/recording/metadata.h"
 
 #include <cstdlib>
 #include <ctime>
@@ -11,7 +11,7 @@
 namespace clothstream::recording {
 namespace {
 
-// Of the environment; what software devices go by.
+// Environment variable that changes the code of software Vulkan devices.
 std::string setting(const char* name) {
   const char* value = std::getenv(name);
   return value == nullptr ? "default" : value;
@@ -42,8 +42,8 @@ std::string shaderHash() {
   return CLOTHSTREAM_SHADER_HASH;
 }
 
-Facts factsOf(const std::string& serverName, const vulkan::DeviceInfo& device, const model::Scene& scene,
-              const v1::StreamDescription& description) {
+Facts metadataOf(const std::string& serverName, const vulkan::DeviceInfo& device, const model::Scene& scene,
+                 const v1::StreamDescription& description) {
   return {{"server", serverName},
           {"scene", scene.name},
           {"started", fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr)))},

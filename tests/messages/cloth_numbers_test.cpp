@@ -1,0 +1,208 @@
+// SPDX-License-Identifier: MIT
+// Table of parameters compared with the messages, the model and the conversion between them.
+#include "server/messages/cloth_numbers.h"
+
+#include <algorithm>
+#include <cstdint>
+#include <limits>
+#include <set>
+#include <string>
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <google/protobuf/descriptor.h>
+#include <gtest/gtest.h>
+
+#include "server/messages/client_message.h"
+#include "server/messages/scene_message.h"
+#include "tests/messages/scenes.h"
+
+namespace clothstream::messages {
+namespace {
+
+using google::protobuf::Descriptor;
+using google::protobuf::FieldDescriptor;
+using google::protobuf::Message;
+using parameters::ClothNumber;
+using parameters::ClothParameter;
+using parameters::Group;
+using parameters::kClothParameters;
+using parameters::WireField;
+
+using In = std::uint32_t WireField::*;
+
+// Field of a parameter in Cloth or ClothChange; null if it does not exist.
+const FieldDescriptor* fieldOf(const ClothParameter& parameter, const Descriptor* message, In in) {
+  if (parameter.group != nullptr) {
+    const FieldDescriptor* group = message->FindFieldByNumber(static_cast<int>(parameter.group->field.*in));
+    message = group == nullptr ? nullptr : group->message_type();
+  }
+  return message == nullptr ? nullptr : message->FindFieldByNumber(static_cast<int>(parameter.field.*in));
+}
+
+// Names of the fields of `message` that the table does not list.
+std::set<std::string> unlisted(const Descriptor* message, In in) {
+  std::set<std::string> names;
+  for (int i = 0; i < message->field_count(); ++i) {
+    const auto number = static_cast<std::uint32_t>(message->field(i)->number());
+    const auto lists = [&](const ClothParameter& parameter) {
+      return (parameter.group != nullptr ? parameter.group->field : parameter.field).*in == number;
+    };
+    if (std::ranges::none_of(kClothParameters, lists)) names.insert(std::string(message->field(i)->name()));
+  }
+  return names;
+}
+
+TEST(ParameterTable, HasTheFieldsOfBothMessages) {
+  for (const ClothParameter& parameter : kClothParameters)
+    for (const auto& [message, in] : {std::pair{v1::Cloth::descriptor(), &WireField::inCloth},
+                                      std::pair{v1::ClothChange::descriptor(), &WireField::inChange}}) {
+      SCOPED_TRACE(fmt::format("--{} in {}", parameter.option, std::string(message->full_name())));
+      const FieldDescriptor* field = fieldOf(parameter, message, in);
+      ASSERT_NE(field, nullptr);
+      EXPECT_EQ(field->name(), parameter.name);
+      EXPECT_EQ(field->cpp_type(), FieldDescriptor::CPPTYPE_FLOAT);
+      // A number that a change can leave out must be optional.
+      EXPECT_EQ(field->has_presence(), parameter.group == nullptr || !parameter.group->isReplaced);
+    }
+}
+
+TEST(ParameterTable, ListsEveryFieldOfAChangeThatIsANumber) {
+  EXPECT_THAT(unlisted(v1::ClothChange::descriptor(), &WireField::inChange),
+              testing::UnorderedElementsAre("name", "solver", "material", "areal_mass"));
+  EXPECT_THAT(
+      unlisted(v1::Cloth::descriptor(), &WireField::inCloth),
+      testing::UnorderedElementsAre("name", "grid", "mesh", "mass", "areal_mass", "pins", "pinned_vertices",
+                                    "pinned_regions", "solver", "attachments", "material"));
+  for (const ClothParameter& parameter : kClothParameters) {
+    if (parameter.group == nullptr) continue;
+    const Descriptor* group = v1::Cloth::descriptor()
+                                  ->FindFieldByNumber(static_cast<int>(parameter.group->field.inCloth))
+                                  ->message_type();
+    const auto isInGroup = [&](const ClothParameter& other) { return other.group == parameter.group; };
+    EXPECT_EQ(group->field_count(), std::ranges::count_if(kClothParameters, isInGroup)) << parameter.option;
+  }
+}
+
+TEST(ParameterTable, HasItsRowsInTheOrderOfTheWire) {
+  std::uint32_t previous = 0;
+  for (const ClothParameter& parameter : kClothParameters) {
+    const std::uint32_t group = parameter.group != nullptr ? parameter.group->field.inChange : 0;
+    const std::uint32_t place =
+        group != 0 ? 1000 * group + parameter.field.inChange : 1000 * parameter.field.inChange;
+    EXPECT_GT(place, previous) << parameter.option;
+    previous = place;
+  }
+}
+
+TEST(ParameterTable, SetsTheDefaultsOfTheModel) {
+  model::Cloth cloth;
+  cloth.selfCollision.emplace();
+  cloth.tethers.emplace();
+  std::set<const float*> members;
+  for (const ClothParameter& parameter : kClothParameters) {
+    const float* member = parameters::memberOf(cloth, parameter.number);
+    ASSERT_NE(member, nullptr) << parameter.option;
+    EXPECT_TRUE(members.insert(member).second) << parameter.option;
+    EXPECT_EQ(*member, parameter.initial) << parameter.option;
+    // 0 as the radius of a ball means that the server derives it.
+    EXPECT_TRUE(parameter.initial == 0 || double{parameter.initial} >= parameter.range.min)
+        << parameter.option;
+    EXPECT_LE(double{parameter.initial}, parameter.range.max) << parameter.option;
+  }
+}
+
+TEST(ParameterTable, HasUniqueOptionsWithHelp) {
+  std::set<std::string_view> options;
+  for (const ClothParameter& parameter : kClothParameters) {
+    EXPECT_TRUE(options.insert(parameter.option).second) << parameter.option;
+    EXPECT_FALSE(parameter.option.empty() || parameter.optionGroup.empty() || parameter.help.empty());
+    EXPECT_LT(parameter.range.min, parameter.range.max) << parameter.option;
+  }
+}
+
+class EveryNumber : public testing::TestWithParam<ClothParameter> {
+ protected:
+  EveryNumber() {
+    scene_.cloths[0].selfCollision = model::SelfCollision{.radius = 0.01f};
+    scene_.cloths[0].tethers.emplace();
+  }
+
+  // A change of this parameter only.
+  v1::ParameterChange changeTo(float value) const {
+    v1::ParameterChange change;
+    Message* holder = change.add_cloths();
+    const auto field = [&](std::uint32_t number) {
+      return holder->GetDescriptor()->FindFieldByNumber(static_cast<int>(number));
+    };
+    if (GetParam().group != nullptr)
+      holder = holder->GetReflection()->MutableMessage(holder, field(GetParam().group->field.inChange));
+    holder->GetReflection()->SetFloat(holder, field(GetParam().field.inChange), value);
+    return change;
+  }
+
+  double maximum() const {
+    const double shortestSpring = 0.5;
+    return GetParam().number == ClothNumber::ballRadius ? shortestSpring : GetParam().range.max;
+  }
+
+  // Near the minimum, where the scene is stable.
+  float allowed() const {
+    const parameters::Range& range = GetParam().range;
+    return static_cast<float>(range.min + 1e-4 * (maximum() - range.min));
+  }
+
+  model::Scene scene_ = *toScene(smallScene());
+};
+
+TEST_P(EveryNumber, ChangesItsMemberOnly) {
+  const float value = allowed();
+  const auto change = toParameterChange(changeTo(value), scene_);
+  ASSERT_TRUE(change) << change.error().text;
+  model::Scene changed = scene_;
+  model::applyChange(changed, *change);
+  for (const ClothParameter& other : kClothParameters) {
+    const float before = *parameters::memberOf(scene_.cloths[0], other.number);
+    const Group* group = GetParam().group;
+    const bool isReplaced = group != nullptr && group->isReplaced && other.group == group;
+    const float expected = other.number == GetParam().number ? value : isReplaced ? 0 : before;
+    EXPECT_EQ(*parameters::memberOf(changed.cloths[0], other.number), expected) << other.option;
+  }
+}
+
+TEST_P(EveryNumber, SurvivesTheSceneMessage) {
+  *parameters::memberOf(scene_.cloths[0], GetParam().number) = allowed();
+  const auto scene = toScene(toMessage(scene_));
+  ASSERT_TRUE(scene) << scene.error().text;
+  EXPECT_EQ(*parameters::memberOf(scene->cloths[0], GetParam().number), allowed());
+}
+
+TEST_P(EveryNumber, IsPartOfAChangeThatHoldsAll) {
+  model::Scene changed = scene_;
+  *parameters::memberOf(changed.cloths[0], GetParam().number) = allowed();
+  v1::ParameterChange all;
+  copyNumbers(toMessage(changed).cloths(0), *all.add_cloths());
+  model::applyChange(scene_, toParameterChange(all, scene_).value());
+  EXPECT_EQ(*parameters::memberOf(scene_.cloths[0], GetParam().number), allowed());
+}
+
+TEST_P(EveryNumber, IsRefusedOutsideItsRange) {
+  for (const float value : {static_cast<float>(GetParam().range.min) - 0.001f,
+                            static_cast<float>(maximum()) * 1.01f, std::numeric_limits<float>::quiet_NaN()}) {
+    const auto change = toParameterChange(changeTo(value), scene_);
+    ASSERT_FALSE(change) << value;
+    EXPECT_THAT(change.error().text,
+                testing::HasSubstr(fmt::format(" = {}: must be a finite number from {:g} to ", value,
+                                               GetParam().range.min)));
+    EXPECT_THAT(change.error().text, testing::StartsWith("parameterChange.cloths[0]."));
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(All, EveryNumber, testing::ValuesIn(kClothParameters), [](const auto& instance) {
+  std::string name;
+  for (const char c : instance.param.option) name += c == '-' ? '_' : c;
+  return name;
+});
+
+}  // namespace
+}  // namespace clothstream::messages
