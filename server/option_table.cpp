@@ -3,6 +3,8 @@
 #include "server/option_table.h"
 
 #include <algorithm>
+#include <cctype>
+#include <cstdint>
 #include <fstream>
 #include <iterator>
 #include <sstream>
