@@ -10,7 +10,7 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
-#include "server/stream/scene_server.h"
+#include "server/hosting/scene_server.h"
 
 namespace clothstream {
 namespace {
@@ -157,7 +157,7 @@ std::variant<ProgramOptions, int> parseOptions(int argc, const char* const* argv
       ->group(people);
   app.add_option("--max-participants", options.maxParticipants,
                  "People in a scene; who is cut off makes room for somebody who comes where it is full")
-      ->check(CLI::Range(1u, stream::kMostParticipants))
+      ->check(CLI::Range(1u, hosting::kMostParticipants))
       ->capture_default_str()
       ->group(people);
   app.add_option("--participants-change", changeable,

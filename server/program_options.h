@@ -13,7 +13,7 @@
 #include "server/model/scene.h"
 #include "server/recording/playback.h"
 #include "server/step/step.h"
-#include "server/stream/roles.h"
+#include "server/scene/roles.h"
 
 namespace clothstream {
 
@@ -33,7 +33,7 @@ struct ProgramOptions {
   std::chrono::duration<double> hold{60};  // of who is cut off
   // What participants change of a scene that somebody else owns, and whether it is controlled from outside.
   std::uint32_t maxParticipants = 64;
-  stream::Permissions participantsMay;
+  scene::Permissions participantsMay;
   bool ownersAlone = false;
   std::optional<step::StepOptions> step;  // instead of serving
   std::string resimulate;                 // a recording, instead of serving; empty: none

@@ -47,6 +47,10 @@ class Encoder {
   // The next frame is a key frame.
   void forgetHistory();
 
+  // Layer and reference of the newest frame, as in its header; the reference of a key frame is 0.
+  std::uint8_t layer() const;
+  std::uint64_t referenceTick() const;
+
   // Of the newest frame; equal to the decoder's.
   std::uint64_t reconstructionHash() const;
 

@@ -69,7 +69,9 @@ EncodedFrame HierarchicalDeviceStage::entropyCode(const RecordedFrame& frame, st
     plan_.add(chunks[i].weightClass, predictor_.products(frame.slot, i));
   plan_.end(!written.any);
   return {.bytes = written.bytes,
-          .reconstructionHash = std::uint64_t{status.hashHigh} << 32 | status.hashLow};
+          .reconstructionHash = std::uint64_t{status.hashHigh} << 32 | status.hashLow,
+          .layer = role.layer,
+          .referenceTick = role.referenceTick};
 }
 
 }  // namespace

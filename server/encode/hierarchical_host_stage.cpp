@@ -44,7 +44,10 @@ class HierarchicalHostStage final : public EncodeStage {
     // The frames before it may be of a history that was given up, and of later ticks.
     if (frame.kind == codec::PacketKind::key) encoder_->forgetHistory();
     const std::size_t bytes = encoder_->encode(frame.tick, frame.kind, positions_, normals_, out);
-    return {.bytes = bytes, .reconstructionHash = encoder_->reconstructionHash()};
+    return {.bytes = bytes,
+            .reconstructionHash = encoder_->reconstructionHash(),
+            .layer = encoder_->layer(),
+            .referenceTick = encoder_->referenceTick()};
   }
 
  private:

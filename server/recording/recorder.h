@@ -18,7 +18,7 @@
 #include "proto/recording/clock.h"
 #include "proto/recording/file.h"
 #include "proto/recording/recording_writer.h"
-#include "server/stream/journal.h"
+#include "server/scene/journal.h"
 
 namespace clothstream::recording {
 
@@ -33,7 +33,7 @@ struct RecorderOptions {
 
 // Thread-safe. Of one recording. Its file is SCENE-TIME.mcap, made when the scene begins to run. An error
 // ends the recording, is logged, and leaves the scene alone.
-class Recorder : public stream::Journal {
+class Recorder : public scene::Journal {
  public:
   explicit Recorder(RecorderOptions options) : options_(std::move(options)) {}
   // The file is made at once, under this name where it is not empty. The error says why it cannot be, such as
@@ -58,11 +58,11 @@ class Recorder : public stream::Journal {
   void begin(const vulkan::DeviceInfo& device, const model::Scene& scene,
              const v1::StreamDescription& description, const simulation::StateSnapshot& state,
              const simulation::StateSnapshot& start) override;
-  void ticked(const stream::AppliedTick& tick) override;
+  void ticked(const scene::AppliedTick& tick) override;
   void saved(const simulation::StateSnapshot& state, bool grabsHold) override;
   void restored(std::uint64_t tick, const simulation::StateSnapshot& state) override;
   void end() override;
-  void sent(const stream::SharedBytes& message) override;
+  void sent(const delivery::SharedBytes& message) override;
   void joined(std::uint64_t participant, const std::string& clientName,
               const std::string& displayName) override;
   void left(std::uint64_t participant) override;
@@ -74,11 +74,11 @@ class Recorder : public stream::Journal {
   };
   struct Waiting {
     std::uint64_t time = 0;
-    std::variant<Own, stream::SharedBytes> what;
+    std::variant<Own, delivery::SharedBytes> what;
   };
 
   void put(Topic topic, const google::protobuf::MessageLite& message);
-  void push(std::variant<Own, stream::SharedBytes> what, std::size_t bytes);
+  void push(std::variant<Own, delivery::SharedBytes> what, std::size_t bytes);
   void tellParticipant(std::uint64_t participant, v1::ParticipantEventKind kind,
                        const std::string& clientName, const std::string& displayName);
   void put(const simulation::StateSnapshot& state, bool grabsHold, bool start);

@@ -19,7 +19,7 @@ class Recordings {
   Recordings(RecorderOptions options, bool always);
 
   // Of the scene of this name. Those of scenes that are gone go as well, once they are written.
-  std::shared_ptr<stream::Journal> add(const std::string& scene);
+  std::shared_ptr<scene::Journal> add(const std::string& scene);
 
   // For people: how many run, are complete, and failed, and their bytes.
   std::string report() const;

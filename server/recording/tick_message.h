@@ -10,12 +10,12 @@
 #include "clothstream/v1/recording.pb.h"
 #include "server/model/scene.h"
 #include "server/simulation/cloth_simulation.h"
-#include "server/stream/journal.h"
+#include "server/scene/journal.h"
 
 namespace clothstream::recording {
 
 // Replaces what `message` says.
-void write(const stream::AppliedTick& tick, v1::RecordedTick& message);
+void write(const scene::AppliedTick& tick, v1::RecordedTick& message);
 
 // What the device was given. The error says what in the message cannot be of this scene.
 [[nodiscard]] tl::expected<simulation::TickInputs, std::string> toInputs(const v1::RecordedTick& message,

@@ -15,7 +15,7 @@
 #include "tests/endpoint/rpc_client.h"
 #include "tests/endpoint/small_server.h"
 #include "tests/endpoint/web_client.h"
-#include "tests/stream/allocated_bytes.h"
+#include "tests/serving/allocated_bytes.h"
 
 namespace clothstream::tests {
 namespace {

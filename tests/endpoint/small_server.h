@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "server/stream/scene_server.h"
+#include "server/hosting/scene_server.h"
 
 namespace clothstream::tests {
 
@@ -18,12 +18,12 @@ class EndpointTest : public ::testing::Test {
 
   // Of the scenes "small" (8 x 8 nodes hung by their first row, 30 frames a second), which is the default,
   // and "other".
-  stream::SceneServer& server() { return *server_; }
+  hosting::SceneServer& server() { return *server_; }
   // Closes it; every endpoint must be closed.
   void closeServer() { server_.reset(); }
 
  private:
-  std::unique_ptr<stream::SceneServer> server_;
+  std::unique_ptr<hosting::SceneServer> server_;
 };
 
 }  // namespace clothstream::tests

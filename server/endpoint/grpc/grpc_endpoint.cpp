@@ -27,7 +27,7 @@
 #include "server/endpoint/grpc/call.h"
 #include "server/endpoint/grpc/health.h"
 #include "server/endpoint/grpc/service.h"
-#include "server/stream/connection.h"
+#include "server/session/session.h"
 
 namespace clothstream::endpoint {
 namespace {
@@ -60,7 +60,7 @@ void configure(grpc::ServerBuilder& builder) {
   builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS, kStreamsAConnection);
   // A write counts as done when the transport has passed it on, not when it lies in a buffer in front of it.
   builder.AddChannelArgument(GRPC_ARG_HTTP2_WRITE_BUFFER_SIZE, 1);
-  builder.SetMaxReceiveMessageSize(static_cast<int>(stream::kMaxClientMessageBytes));
+  builder.SetMaxReceiveMessageSize(static_cast<int>(session::kMaxClientMessageBytes));
   builder.SetMaxSendMessageSize(-1);
   // Frames are compressed already, and a small compressed message could stand for a large one.
   builder.SetCompressionAlgorithmSupportStatus(GRPC_COMPRESS_DEFLATE, false);
@@ -100,7 +100,7 @@ struct GrpcEndpoint::State {
   std::optional<EndpointContext> context;
   boost::asio::thread_pool questions{1};  // those that take longer than a frame may wait
 
-  State(stream::SceneServer& scenes, const GrpcEndpointOptions& options) {
+  State(hosting::SceneServer& scenes, const GrpcEndpointOptions& options) {
     grpc::reflection::InitProtoReflectionServerBuilderPlugin();
     grpc::ServerBuilder builder;
     configure(builder);
@@ -151,7 +151,7 @@ struct GrpcEndpoint::State {
   }
 };
 
-GrpcEndpoint::GrpcEndpoint(stream::SceneServer& server, const GrpcEndpointOptions& options)
+GrpcEndpoint::GrpcEndpoint(hosting::SceneServer& server, const GrpcEndpointOptions& options)
     : state_(std::make_unique<State>(server, options)) {}
 
 GrpcEndpoint::~GrpcEndpoint() = default;

@@ -7,7 +7,7 @@
 #include <memory>
 #include <string>
 
-namespace clothstream::stream {
+namespace clothstream::hosting {
 class SceneServer;
 }
 
@@ -30,7 +30,7 @@ class GrpcEndpoint {
  public:
   // Listens when it returns. `server` must outlive the endpoint. Throws std::runtime_error that says what to
   // do when the port is in use or the host is none of this machine's.
-  GrpcEndpoint(stream::SceneServer& server, const GrpcEndpointOptions& options);
+  GrpcEndpoint(hosting::SceneServer& server, const GrpcEndpointOptions& options);
   // Ends every stream with UNAVAILABLE and waits until the clients have it; takes at most about two seconds.
   ~GrpcEndpoint();
   GrpcEndpoint(const GrpcEndpoint&) = delete;

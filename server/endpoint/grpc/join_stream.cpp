@@ -12,12 +12,12 @@ namespace clothstream::endpoint {
 namespace {
 
 // A view of the message that keeps it alive for as long as gRPC holds the slice.
-grpc::ByteBuffer sharedBuffer(const stream::SharedBytes& message) {
+grpc::ByteBuffer sharedBuffer(const delivery::SharedBytes& message) {
   // gRPC takes bytes as mutable, and never writes to them.
   void* const bytes = const_cast<std::byte*>(message->data());
   const grpc::Slice slice(
-      bytes, message->size(), [](void* owner) { delete static_cast<stream::SharedBytes*>(owner); },
-      new stream::SharedBytes(message));
+      bytes, message->size(), [](void* owner) { delete static_cast<delivery::SharedBytes*>(owner); },
+      new delivery::SharedBytes(message));
   return grpc::ByteBuffer(&slice, 1);
 }
 
@@ -56,8 +56,7 @@ void JoinStream::onBegun(bool ok) {
       if (const auto self = weak.lock()) self->pump();
     });
   };
-  connection_ =
-      std::make_unique<stream::Connection>(endpoint_.server, "grpc " + context_.peer(), std::move(wake));
+  connection_ = session::Session::open(endpoint_.server, "grpc " + context_.peer(), std::move(wake));
   read();
   pump();
 }
@@ -84,7 +83,7 @@ void JoinStream::pump() {
   const bool finished = connection_->finished();  // asked first: what came before it is still to be written
   if (isWriting_) {
     if (finished) cancelSoon();
-  } else if (std::optional<stream::SharedBytes> message = connection_->next()) {
+  } else if (std::optional<delivery::SharedBytes> message = connection_->next()) {
     lastMessage_ = std::move(*message);
     isWriting_ = true;
     io_.Write(sharedBuffer(lastMessage_), begin(written_));

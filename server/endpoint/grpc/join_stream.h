@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// One joined stream: moves bytes between gRPC and a stream::Connection.
+// One joined stream: moves bytes between gRPC and a session::Session.
 #pragma once
 
 #include <memory>
@@ -11,7 +11,7 @@
 
 #include "server/endpoint/grpc/call.h"
 #include "server/endpoint/grpc/service.h"
-#include "server/stream/connection.h"
+#include "server/session/session.h"
 
 namespace clothstream::endpoint {
 
@@ -41,11 +41,11 @@ class JoinStream final : public Call {
 
   Service& service_;
   grpc::ServerAsyncReaderWriter<grpc::ByteBuffer, grpc::ByteBuffer> io_{&context_};
-  std::unique_ptr<stream::Connection> connection_;  // nullptr when the stream is closing
+  std::shared_ptr<session::Session> connection_;  // nullptr when the stream is closing
   // Of a client that says no more. Whether it went or was cut off is known when the call has ended.
-  std::unique_ptr<stream::Connection> parting_;
+  std::shared_ptr<session::Session> parting_;
   grpc::ByteBuffer incoming_;
-  stream::SharedBytes lastMessage_;
+  delivery::SharedBytes lastMessage_;
   std::optional<grpc::Status> closing_;  // set when it is
   bool isCounted_ = false, isWriting_ = false, hasEnded_ = false;
   std::optional<grpc::Alarm> cancellation_;  // set when the write under way is the last that is waited for

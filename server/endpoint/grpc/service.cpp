@@ -7,12 +7,12 @@
 
 #include "server/endpoint/grpc/join_stream.h"
 #include "server/endpoint/grpc/unary_call.h"
-#include "server/stream/scene_server.h"
+#include "server/hosting/scene_server.h"
 
 namespace clothstream::endpoint {
 
 void offerService(EndpointContext& endpoint, Service& service, boost::asio::thread_pool& questions) {
-  stream::SceneServer& server = endpoint.server;
+  hosting::SceneServer& server = endpoint.server;
   offer(endpoint, service, &Service::RequestListScenes,
         [&server](const auto&, auto answer) { answer(server.listScenes()); });
   // A scene may have a mesh of millions of vertices in it.

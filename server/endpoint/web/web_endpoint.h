@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-namespace clothstream::stream {
+namespace clothstream::hosting {
 class SceneServer;
 }
 
@@ -37,7 +37,7 @@ class WebEndpoint {
  public:
   // Listens when it returns. `server` must outlive the endpoint. Throws std::runtime_error that says what to
   // do when the port is in use, the host is none of this machine's, or the page cannot be read.
-  WebEndpoint(stream::SceneServer& server, const WebEndpointOptions& options);
+  WebEndpoint(hosting::SceneServer& server, const WebEndpointOptions& options);
   // Closes every WebSocket with "going away"; takes at most about a second.
   ~WebEndpoint();
   WebEndpoint(const WebEndpoint&) = delete;
