@@ -61,7 +61,7 @@ TEST_F(MailboxTest, SendsRepliesThenDescriptionThenAnnouncementsThenFrames) {
   const SharedBytes welcome = bytes(1), told = bytes(4), pong = bytes(5);
   ASSERT_TRUE(mailbox.reply(welcome));
   const auto content = description(256 * 1024);
-  ASSERT_EQ(content->chunks(), 2u);
+  ASSERT_EQ(content->count(), 2u);
   mailbox.subscribe(content, shape, metrics);
   ASSERT_TRUE(mailbox.announce(told));
   EXPECT_FALSE(wantsKeyFrame());

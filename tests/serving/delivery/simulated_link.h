@@ -14,10 +14,13 @@
 #include <gtest/gtest.h>
 
 #include "clients/core/acknowledgement.h"
+#include "clothstream/v1/session.pb.h"
 #include "proto/codec/temporal_layers.h"
 #include "server/delivery/mailbox.h"
 
 namespace clothstream::delivery {
+
+using schedule::seconds;
 
 // One subscriber behind a link that carries so many bytes/s, each message `latency` late, but none before one
 // that went before it. Its endpoint writes without ever waiting, as into a large buffer. It acknowledges as

@@ -141,8 +141,9 @@ TEST_F(ColliderSetTest, SceneColliderFollowsItsMotionUntilMoved) {
 TEST_F(ColliderSetTest, WritesAllCollidersWithTheirParticipant) {
   colliders.place(7, std::vector{handAt(1, 0.5f)});
   advance();
-  google::protobuf::RepeatedPtrField<v1::ColliderState> states;
-  colliders.write(scene, states);
+  v1::Frame frame;
+  colliders.write(scene, frame);
+  const auto& states = frame.colliders();
   ASSERT_EQ(states.size(), 2);
   EXPECT_EQ(states[0].name(), "ball");
   EXPECT_EQ(states[0].participant_id(), 0u);

@@ -298,7 +298,7 @@ TEST_F(RosterTest, QuickReconnectKeepsPoses) {
   EXPECT_EQ(back.admission.id, 2u);
   EXPECT_EQ(back.admission.token, lost.admission.token);
   EXPECT_THAT(idsOf(back.admission), ElementsAre(1, 2));
-  EXPECT_FALSE(back.admission.participants[1].away());
+  EXPECT_FALSE(back.admission.participants[1].away);
   EXPECT_THAT(watcher.heard(), ElementsAre("joined 2", "away 2", "back 2"));
   pass(10min);
   EXPECT_THAT(inputs(), IsEmpty());

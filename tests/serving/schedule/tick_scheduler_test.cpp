@@ -45,14 +45,14 @@ class TickSchedulerTest : public ::testing::Test {
       }
       for (TickSchedule* turn : chosen) {
         SimulatedScene& scene = sceneOf(turn);
-        const Pacer::Start start = turn->pacer.begin(now, turn->spare);
+        const Pacer::Start start = turn->pacer.begin(now, turn->catchUp);
         scene.slipped += start.slippedTicks;
         scene.worstLateness = std::max(scene.worstLateness, start.lateness);
         ++scene.ticks;
       }
       for (TickSchedule* turn : chosen) {
         now += sceneOf(turn).cost;
-        turn->took(sceneOf(turn).cost, now);
+        turn->tickEnded(sceneOf(turn).cost, now);
       }
     }
   }
