@@ -1,9 +1,10 @@
 #!/usr/bin/env bash
-# Fails where a file includes what its room must not see (docs/architecture.md: arrows point down only).
+# Fails if a file includes something that its room must not see, or if headers of a room include each other
+# (docs/architecture.md: arrows point down only).
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
-# room | the rooms of ours that it sees, beside itself
+# room | the rooms of ours that it sees, in addition to itself
 readonly ARROWS='
 proto/parameters   |
 server/model       | proto/parameters
@@ -16,11 +17,15 @@ server/simulation  | server/model server/vulkan shaders
 server/meshes      | server/model
 server/messages    | server/model server/meshes proto/parameters clothstream
 server/encode      | server/model server/simulation server/vulkan proto/codec shaders
-server/stream      | server/model server/vulkan server/simulation server/encode server/messages server/telemetry proto/codec clothstream
-server/recording   | proto/parameters server/model server/vulkan server/simulation server/messages server/stream proto/codec proto/recording clothstream
+server/schedule    |
+server/delivery    | server/schedule server/encode server/messages server/telemetry proto/codec clothstream
+server/scene       | server/delivery server/schedule server/model server/vulkan server/simulation server/encode server/messages server/telemetry proto/codec clothstream
+server/hosting     | server/scene server/delivery server/schedule server/model server/vulkan server/simulation server/messages server/telemetry clothstream
+server/session     | server/hosting server/scene server/delivery server/schedule server/messages proto/codec clothstream
+server/recording   | proto/parameters server/model server/vulkan server/simulation server/messages server/scene server/delivery server/schedule proto/codec proto/recording clothstream
 server/step        | server/model server/vulkan server/simulation server/messages
-server/endpoint/grpc         | server/stream server/telemetry clothstream grpc/health
-server/endpoint/web         | server/stream server/telemetry clothstream
+server/endpoint/grpc         | server/session server/hosting server/delivery server/telemetry clothstream grpc/health
+server/endpoint/web         | server/session server/hosting server/delivery server/telemetry clothstream
 clients/core       | proto/codec proto/parameters
 clients/core/stream | clients/core/core.h clients/core/wire proto/codec proto/parameters
 clients/core/wire  | clients/core/core.h proto/codec proto/parameters
@@ -66,5 +71,15 @@ while IFS='|' read -r header rooms; do
     [ $allowed = yes ] || complain "$file:$line: only ${rooms# } may include $header...>"
   done < <(grep -rnF "#include $header" --include='*.h' --include='*.cpp' server clients proto || true)
 done <<<"$OUTSIDE"
+
+# Headers inside a room form no cycle; an upward arrow always closes one.
+while IFS='|' read -r room _; do
+  room=$(echo "$room" | xargs)
+  case "$room" in server/* | clients/core) ;; *) continue ;; esac
+  edges=$(grep -rE "^#include \"$room/[^\"]+\.h\"" --include='*.h' "$room" |
+    sed -E 's/^([^:]+):#include "([^"]+)".*/\2 \1/' || true)
+  cycle=$(tsort <<<"$edges" 2>&1 >/dev/null | sed -n 's/^tsort: \(.*\.h\)$/\1/p' | tr '\n' ' ' || true)
+  [ -z "$cycle" ] || complain "$room: these headers include each other: $cycle"
+done <<<"$ARROWS"
 
 exit $failed

@@ -26,7 +26,7 @@
 #include "server/recording/recordings.h"
 #include "server/recording/resimulate.h"
 #include "server/simulation/software_threads.h"
-#include "server/stream/scene_server.h"
+#include "server/hosting/scene_server.h"
 #include "server/telemetry/log.h"
 #include "server/vulkan/device.h"
 
@@ -168,7 +168,7 @@ void waitForStop(const Signals& signals, const ProgramOptions& options,
 }
 
 // Serves through both endpoints until a signal or --seconds ends it. `intro` is printed before the addresses.
-void openEndpoints(stream::SceneServer& server, const ProgramOptions& options, const Signals& signals,
+void openEndpoints(hosting::SceneServer& server, const ProgramOptions& options, const Signals& signals,
                    const std::string& intro, const std::function<std::string()>& report) {
   {
     const std::filesystem::path page = options.page.empty() ? pageNextToProgram() : options.page;
@@ -191,12 +191,12 @@ void openEndpoints(stream::SceneServer& server, const ProgramOptions& options, c
 }
 
 // Options that apply both to simulated scenes and to a recording.
-stream::ServerOptions sharedOptions(const ProgramOptions& options, const std::string& defaultScene) {
+hosting::ServerOptions sharedOptions(const ProgramOptions& options, const std::string& defaultScene) {
   return {.device = {},
           .defaultScene = defaultScene,
           .serverName = kServerName,
           .maxParticipants = options.maxParticipants,
-          .holding = {.hold = std::chrono::duration_cast<stream::Clock::duration>(options.hold)},
+          .reconnectGrace = {.place = std::chrono::duration_cast<schedule::Clock::duration>(options.hold)},
           .participantsMay = options.participantsMay,
           .outsideControl = !options.ownersAlone};
 }
@@ -212,7 +212,7 @@ int play(const ProgramOptions& options, const Signals& signals) {
   const std::string scene = recording->scene();
   const std::string intro = fmt::format("plays   {}, {:.1f} s of {}, recorded on {}\n", options.recording,
                                         recording->length(), scene, recording->device());
-  stream::SceneServer server(scene,
+  hosting::SceneServer server(scene,
                              std::make_shared<recording::Playback>(std::move(*recording), options.playback),
                              sharedOptions(options, scene));
   openEndpoints(server, options, signals, intro, [&] { return server.report(); });
@@ -236,7 +236,7 @@ int serve(const ProgramOptions& options, const Signals& signals) {
         !options.recordsOnRequest);
   const auto first = std::ranges::find(scenes, options.scene, &model::Scene::name);
   const std::uint32_t nodes = first == scenes.end() ? 0 : first->nodeCount();
-  stream::ServerOptions serverOptions = sharedOptions(options, options.scene);
+  hosting::ServerOptions serverOptions = sharedOptions(options, options.scene);
   serverOptions.device = deviceOptions(options, nodes);
   serverOptions.runAlways = options.alwaysRun;
   serverOptions.reportRate = options.reportRate;
@@ -245,7 +245,7 @@ int serve(const ProgramOptions& options, const Signals& signals) {
   serverOptions.journals = [&](const model::Scene& scene) {
     return recordings ? recordings->add(scene.name) : nullptr;
   };
-  stream::SceneServer server(std::move(scenes), std::move(serverOptions));
+  hosting::SceneServer server(std::move(scenes), std::move(serverOptions));
   const auto report = [&] { return server.report() + (recordings ? recordings->report() : ""); };
   openEndpoints(server, options, signals,
                 fmt::format("device  {}\nscenes  {}\n", describe(server.deviceInfo()), sceneList), report);

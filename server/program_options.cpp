@@ -9,7 +9,7 @@
 #include <unistd.h>
 
 #include "server/option_table.h"
-#include "server/stream/scene_server.h"
+#include "server/hosting/scene_server.h"
 
 namespace clothstream {
 namespace {
@@ -82,7 +82,7 @@ void addParticipantOptions(OptionTable& table, Parsed& parsed) {
   table.group("Participants");
   table.number("--hold", options.hold, {.min = 0, .max = 3600, .type = "SECONDS"},
                "Reconnect grace: seconds for which a disconnected participant keeps its place. 0 means none");
-  table.number("--max-participants", options.maxParticipants, {.min = 1, .max = stream::kMostParticipants},
+  table.number("--max-participants", options.maxParticipants, {.min = 1, .max = hosting::kMostParticipants},
                "Participants per scene. When the scene is full, the participant that has been disconnected "
                "longest is evicted");
   CLI::Option* changeable = table.list(
@@ -192,7 +192,7 @@ std::string configFile(const Parsed& parsed) {
   return parsed.config.empty() && fromEnvironment != nullptr ? fromEnvironment : parsed.config;
 }
 
-stream::Permissions permissions(const std::vector<std::string>& changeable) {
+scene::Permissions permissions(const std::vector<std::string>& changeable) {
   const auto has = [&](const char* what) { return std::ranges::find(changeable, what) != changeable.end(); };
   if (has("none") && changeable.size() > 1)
     throw OptionError("--participants-change: 'none' excludes the other values; use it alone");

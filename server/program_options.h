@@ -13,7 +13,7 @@
 #include "server/model/scene.h"
 #include "server/recording/playback.h"
 #include "server/step/step.h"
-#include "server/stream/roles.h"
+#include "server/scene/roles.h"
 
 namespace clothstream {
 
@@ -42,7 +42,7 @@ struct ProgramOptions {
   // Participants.
   std::chrono::duration<double> hold{60};  // reconnect grace
   std::uint32_t maxParticipants = 64;
-  stream::Permissions participantsMay;  // what a participant may change in a scene that another one owns
+  scene::Permissions participantsMay;  // what a participant may change in a scene that another one owns
   bool ownersAlone = false;             // only an owner controls a scene that has one
 
   // Network.

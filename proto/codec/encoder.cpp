@@ -16,7 +16,7 @@ struct Encoder::State {
   bool hasNormals = false;
   std::uint8_t layers = 1, quality = 0;
   HeldFrames held;
-  std::uint64_t tick = 0;
+  FrameRole newest;
   std::uint64_t frame = 0;  // number of the next frame since the key frame; 0 is a key frame
 };
 
@@ -46,7 +46,7 @@ std::size_t Encoder::encode(std::uint64_t tick, PacketKind kind, std::span<const
   State& s = *state_;
   assert(positions.size() == s.floats);
   assert(!s.hasNormals || normals.size() == s.floats);
-  assert(s.frame == 0 || tick > s.tick);
+  assert(s.frame == 0 || tick > s.newest.tick);
   assert(out.size() >= packetBound());
   FrameRole role{.tick = tick, .quality = s.quality};
   if (kind == PacketKind::key || s.frame == 0) {
@@ -60,13 +60,21 @@ std::size_t Encoder::encode(std::uint64_t tick, PacketKind kind, std::span<const
   }
   const std::size_t bytes = s.body->encode(role, positions, normals, out);
   s.held.hold(role.layer, tick);
-  s.tick = tick;
+  s.newest = role;
   s.frame += 1;
   return bytes;
 }
 
 void Encoder::forgetHistory() {
   state_->frame = 0;
+}
+
+std::uint8_t Encoder::layer() const {
+  return state_->newest.layer;
+}
+
+std::uint64_t Encoder::referenceTick() const {
+  return state_->newest.referenceTick;
 }
 
 std::uint64_t Encoder::reconstructionHash() const {

@@ -50,6 +50,10 @@ class Encoder {
   // Makes the next frame a key frame.
   void forgetHistory();
 
+  // Layer and reference of the newest frame, as in its header; the reference of a key frame is 0.
+  std::uint8_t layer() const;
+  std::uint64_t referenceTick() const;
+
   // Hash of the newest frame. Equals the decoder's hash.
   std::uint64_t reconstructionHash() const;
 

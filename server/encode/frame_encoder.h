@@ -44,6 +44,9 @@ struct RecordedFrame {
 struct EncodedFrame {
   std::size_t bytes = 0;  // written to `out`
   std::uint64_t reconstructionHash = 0;
+  // As in the packet's header.
+  std::uint8_t layer = 0;
+  std::uint64_t referenceTick = 0;  // of a predicted frame; else 0
 };
 
 // record() belongs to the device's thread, entropyCode() to one other thread (or the same).

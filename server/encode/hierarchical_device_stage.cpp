@@ -99,7 +99,10 @@ EncodedFrame HierarchicalDeviceStage::entropyCode(const RecordedFrame& frame, st
   for (std::size_t i = 0; i < count; ++i)
     plan_.add(chunks[i].weightClass, predictor_.products(frame.slot, i));
   plan_.end(!any);
-  return {.bytes = bytes, .reconstructionHash = std::uint64_t{status.hashHigh} << 32 | status.hashLow};
+  return {.bytes = bytes,
+          .reconstructionHash = std::uint64_t{status.hashHigh} << 32 | status.hashLow,
+          .layer = role.layer,
+          .referenceTick = role.referenceTick};
 }
 
 }  // namespace

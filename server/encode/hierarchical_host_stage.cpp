@@ -43,7 +43,10 @@ class HierarchicalHostStage final : public EncodeStage {
     // Earlier frames may belong to a history that was dropped, with later ticks.
     if (frame.kind == codec::PacketKind::key) encoder_->forgetHistory();
     const std::size_t bytes = encoder_->encode(frame.tick, frame.kind, positions_, normals_, out);
-    return {.bytes = bytes, .reconstructionHash = encoder_->reconstructionHash()};
+    return {.bytes = bytes,
+            .reconstructionHash = encoder_->reconstructionHash(),
+            .layer = encoder_->layer(),
+            .referenceTick = encoder_->referenceTick()};
   }
 
  private:

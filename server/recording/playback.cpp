@@ -12,7 +12,7 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
-#include "server/stream/live_scene.h"
+#include "server/scene/live_scene.h"
 
 namespace clothstream::recording {
 namespace {
@@ -47,7 +47,7 @@ Playback::~Playback() {
   end();
 }
 
-void Playback::begin(stream::LiveScene& scene) {
+void Playback::begin(scene::LiveScene& scene) {
   thread_ = std::thread([this, &scene] { run(scene); });
 }
 
@@ -73,7 +73,7 @@ v1::ParameterChange Playback::parameters() const {
   return parameters_.now();
 }
 
-void Playback::run(stream::LiveScene& scene) {
+void Playback::run(scene::LiveScene& scene) {
   for (;;) {
     const std::optional<Clock::time_point> next = step(scene, Clock::now());
     std::unique_lock lock(mutex_);
@@ -123,11 +123,11 @@ v1::Playback Playback::playback() const {
   return playback;
 }
 
-std::optional<Playback::Clock::time_point> Playback::step(stream::LiveScene& scene, Clock::time_point now) {
+std::optional<Playback::Clock::time_point> Playback::step(scene::LiveScene& scene, Clock::time_point now) {
   takeWanted(scene, now);
-  const bool here = scene.audience.size() > 0;
+  const bool here = scene.subscribers.size() > 0;
   if (!here) asleep_ = true;
-  if (here && (asleep_ || paused_) && scene.audience.wishes(now).keys != 0) {
+  if (here && (asleep_ || paused_) && scene.subscribers.requested(now).keyFrames != 0) {
     jump(scene, position_, now);
     asleep_ = false;
   }
@@ -143,7 +143,7 @@ std::optional<Playback::Clock::time_point> Playback::step(stream::LiveScene& sce
   return due(timeOf(*next_));
 }
 
-void Playback::takeWanted(stream::LiveScene& scene, Clock::time_point now) {
+void Playback::takeWanted(scene::LiveScene& scene, Clock::time_point now) {
   Wanted wanted;
   {
     const std::lock_guard lock(mutex_);
@@ -162,7 +162,7 @@ void Playback::takeWanted(stream::LiveScene& scene, Clock::time_point now) {
   if (wanted.seek) jump(scene, *wanted.seek, now);
 }
 
-void Playback::jump(stream::LiveScene& scene, double seconds, Clock::time_point now) {
+void Playback::jump(scene::LiveScene& scene, double seconds, Clock::time_point now) {
   recording_.seek(seconds);
   next_.reset();
   atEnd_ = false;
@@ -198,7 +198,7 @@ double Playback::timeOf(const RecordedStream::Next& next) const {
   return recording_.length() + 1.0 / recording_.description().stream_rate();
 }
 
-void Playback::flow(stream::LiveScene& scene, Clock::time_point now) {
+void Playback::flow(scene::LiveScene& scene, Clock::time_point now) {
   for (int i = 0; i < kMaxMessages; ++i) {
     if (!next_) next_ = recording_.next();
     const Clock::time_point dueAt = due(timeOf(*next_));
@@ -211,7 +211,7 @@ void Playback::flow(stream::LiveScene& scene, Clock::time_point now) {
   next_ = recording_.next();
 }
 
-void Playback::reachEnd(stream::LiveScene& scene, Clock::time_point now) {
+void Playback::reachEnd(scene::LiveScene& scene, Clock::time_point now) {
   if (loop_) return jump(scene, 0, now);
   scene.paused = true;
   atEnd_ = true;
@@ -221,17 +221,17 @@ void Playback::reachEnd(stream::LiveScene& scene, Clock::time_point now) {
     const std::lock_guard lock(mutex_);
     paused_ = true;
   }
-  scene.audience.announce(
-      stream::notice(v1::NOTICE_KIND_SCENE_PAUSED, "the recording is at its end", newest_));
+  scene.subscribers.announce(
+      delivery::notice(v1::NOTICE_KIND_SCENE_PAUSED, "the recording is at its end", newest_));
 }
 
-void Playback::publish(stream::LiveScene& scene, RecordedStream::Next& next) {
+void Playback::publish(scene::LiveScene& scene, RecordedStream::Next& next) {
   if (const auto* lost = std::get_if<RecordedStream::Lost>(&next)) {
     const std::string text = fmt::format(
         "the recording is damaged: {:.2f} s to {:.2f} s of it cannot be shown", lost->start, lost->end);
     if (lossesLogged_.insert(lost->start).second)
       spdlog::warn("{}: {}: {}", scene.name(), text, lost->reason);
-    scene.audience.announce(stream::notice(v1::NOTICE_KIND_RECORDING_DAMAGED, text, newest_));
+    scene.subscribers.announce(delivery::notice(v1::NOTICE_KIND_RECORDING_DAMAGED, text, newest_));
     return;
   }
   auto& told = std::get<RecordedStream::Told>(next);
@@ -252,10 +252,10 @@ void Playback::publish(stream::LiveScene& scene, RecordedStream::Next& next) {
     told.message.mutable_tick_events()->set_tick(told.message.tick_events().tick() + shift_);
   if (told.message.has_notice())
     told.message.mutable_notice()->set_tick(told.message.notice().tick() + shift_);
-  scene.audience.announce(stream::serialise(told.message));
+  scene.subscribers.announce(delivery::serialise(told.message));
 }
 
-void Playback::publishFrame(stream::LiveScene& scene, RecordedStream::Told& told) {
+void Playback::publishFrame(scene::LiveScene& scene, RecordedStream::Told& told) {
   v1::Frame& frame = *told.message.mutable_frame();
   codec::PacketHeader& header = told.header;
   header.tick += shift_;
@@ -267,33 +267,33 @@ void Playback::publishFrame(stream::LiveScene& scene, RecordedStream::Told& told
   frame.mutable_packet()->assign(reinterpret_cast<const char*>(packet.data()),
                                  headerBytes + parsed->body.size());
   const Clock::time_point now = Clock::now();
-  frame.set_tick_time_us(stream::microseconds(now));
-  frame.set_packet_time_us(stream::microseconds(now));
+  frame.set_tick_time_us(schedule::microseconds(now));
+  frame.set_packet_time_us(schedule::microseconds(now));
 
-  const stream::PublishedFrame published =
-      stream::publishedFrame(header, stream::serialise(told.message), now);
+  const delivery::PublishedFrame published =
+      delivery::publishedFrame(header, delivery::serialise(told.message), now);
   newest_ = header.tick;
   scene.tick = header.tick;
   scene.metrics.frames.add();
   if (published.key) scene.metrics.keyFrames.add();
   scene.metrics.packetBytes.add(frame.packet().size());
   moveTo(told.time);
-  scene.audience.publish(published);
+  scene.subscribers.publish(published);
 }
 
-void Playback::tell(stream::LiveScene& scene) {
+void Playback::tell(scene::LiveScene& scene) {
   announcementDue_ = false;
-  scene.audience.announce(stream::playbackMessage(*this));
+  scene.subscribers.announce(scene::playbackMessage(*this));
 }
 
-void Playback::tellParameters(stream::LiveScene& scene, const RecordedStream::Told& frame) {
+void Playback::tellParameters(scene::LiveScene& scene, const RecordedStream::Told& frame) {
   ParametersInForce there = recording_.parametersAt(frame.time);  // may read the file
   {
     const std::lock_guard lock(mutex_);
     parameters_ = std::move(there);
   }
-  if (const auto message = stream::parametersMessage(*this, frame.header.tick + shift_))
-    scene.audience.announce(message);
+  if (const auto message = scene::parametersMessage(*this, frame.header.tick + shift_))
+    scene.subscribers.announce(message);
 }
 
 void Playback::moveTo(double seconds) {

@@ -11,8 +11,8 @@
 #include <thread>
 
 #include "server/recording/recorded_stream.h"
-#include "server/stream/clock.h"
-#include "server/stream/frame_source.h"
+#include "server/schedule/clock.h"
+#include "server/scene/frame_source.h"
 
 namespace clothstream::recording {
 
@@ -28,7 +28,7 @@ struct PlaybackOptions {
 // frame is a key frame with the next tick. References between frames are relative, so they stay valid.
 // Playback stops while the scene has no participants, and until the first one can receive a frame. A client
 // that needs a key frame gets the next recorded one, or, while the scene is paused, the previous one.
-class Playback : public stream::FrameSource {
+class Playback : public scene::FrameSource {
  public:
   Playback(RecordedStream recording, const PlaybackOptions& options);
   ~Playback() override;
@@ -37,7 +37,7 @@ class Playback : public stream::FrameSource {
 
   const v1::StreamDescription& description() const override { return recording_.description(); }
   std::string deviceName() const override { return recording_.device(); }
-  void begin(stream::LiveScene& scene) override;
+  void begin(scene::LiveScene& scene) override;
   void end() override;
   void wake() override;
   messages::Result<void> control(const v1::ControlSceneRequest& request) override;
@@ -46,28 +46,28 @@ class Playback : public stream::FrameSource {
 
   // Publishes everything due by `now`. Returns when to call it again; nullopt means after a wake(). Only the
   // thread that begin() starts may call it. A test that does not call begin() may call it too.
-  std::optional<stream::Clock::time_point> step(stream::LiveScene& scene, stream::Clock::time_point now);
+  std::optional<schedule::Clock::time_point> step(scene::LiveScene& scene, schedule::Clock::time_point now);
 
  private:
-  using Clock = stream::Clock;
+  using Clock = schedule::Clock;
   struct Wanted {
     std::optional<double> seek, speed;
     std::optional<bool> loop;
   };
 
-  void run(stream::LiveScene& scene);
-  void takeWanted(stream::LiveScene& scene, Clock::time_point now);
+  void run(scene::LiveScene& scene);
+  void takeWanted(scene::LiveScene& scene, Clock::time_point now);
   // Continues from the newest key frame at or before this time, and publishes it immediately.
-  void jump(stream::LiveScene& scene, double seconds, Clock::time_point now);
-  void flow(stream::LiveScene& scene, Clock::time_point now);
+  void jump(scene::LiveScene& scene, double seconds, Clock::time_point now);
+  void flow(scene::LiveScene& scene, Clock::time_point now);
   Clock::time_point due(double seconds) const;
   double timeOf(const RecordedStream::Next& next) const;
-  void publish(stream::LiveScene& scene, RecordedStream::Next& next);
-  void publishFrame(stream::LiveScene& scene, RecordedStream::Told& frame);
-  void reachEnd(stream::LiveScene& scene, Clock::time_point now);
-  void tell(stream::LiveScene& scene);
+  void publish(scene::LiveScene& scene, RecordedStream::Next& next);
+  void publishFrame(scene::LiveScene& scene, RecordedStream::Told& frame);
+  void reachEnd(scene::LiveScene& scene, Clock::time_point now);
+  void tell(scene::LiveScene& scene);
   // Announces the parameters in effect at this frame.
-  void tellParameters(stream::LiveScene& scene, const RecordedStream::Told& frame);
+  void tellParameters(scene::LiveScene& scene, const RecordedStream::Told& frame);
   void moveTo(double seconds);
 
   mutable std::mutex mutex_;  // protects the members down to parameters_

@@ -110,9 +110,9 @@ void Recorder::begin(const vulkan::DeviceInfo& device, const model::Scene& scene
       });
 }
 
-void Recorder::ticked(const stream::AppliedTick& tick) {
+void Recorder::ticked(const scene::AppliedTick& tick) {
   if (!active()) return;
-  stream::AppliedTick told = tick;
+  scene::AppliedTick told = tick;
   told.clothsChanged |= std::exchange(tellsCloths_, false);
   write(told, tick_);
   put(Topic::ticks, tick_);
@@ -148,7 +148,7 @@ void Recorder::end() {
   changed_.notify_all();
 }
 
-void Recorder::sent(const stream::SharedBytes& message) {
+void Recorder::sent(const delivery::SharedBytes& message) {
   if (!active()) return;
   push(message, message->size());
 }
@@ -178,7 +178,7 @@ void Recorder::put(Topic topic, const google::protobuf::MessageLite& message) {
   push(std::move(own), bytes);
 }
 
-void Recorder::push(std::variant<Own, stream::SharedBytes> what, std::size_t bytes) {
+void Recorder::push(std::variant<Own, delivery::SharedBytes> what, std::size_t bytes) {
   {
     const std::lock_guard lock(mutex_);
     if (ended_ || overflowed_ || state_ == State::failed) return;
@@ -249,7 +249,7 @@ Written Recorder::writeAll(RecordingWriter& writer) {
       if (const auto* own = std::get_if<Own>(&waiting.what)) {
         written = writer.write(own->topic, waiting.time, own->bytes);
       } else {
-        const stream::SharedBytes& bytes = std::get<stream::SharedBytes>(waiting.what);
+        const delivery::SharedBytes& bytes = std::get<delivery::SharedBytes>(waiting.what);
         if (message.ParseFromArray(bytes->data(), static_cast<int>(bytes->size())))
           written = writer.write(waiting.time, message);
       }

@@ -18,7 +18,7 @@
 #include "proto/recording/clock.h"
 #include "proto/recording/file.h"
 #include "proto/recording/recording_writer.h"
-#include "server/stream/journal.h"
+#include "server/scene/journal.h"
 
 namespace clothstream::recording {
 
@@ -35,7 +35,7 @@ struct RecorderOptions {
 
 // Journal of one recording. Thread-safe. Creates the file SCENE-TIME.mcap when the scene starts to run. An
 // error ends the recording and is logged; it does not affect the scene.
-class Recorder : public stream::Journal {
+class Recorder : public scene::Journal {
  public:
   explicit Recorder(RecorderOptions options) : options_(std::move(options)) {}
   // Creates the file immediately, with this name if it is not empty. The error says why that is impossible,
@@ -60,11 +60,11 @@ class Recorder : public stream::Journal {
   void begin(const vulkan::DeviceInfo& device, const model::Scene& scene,
              const v1::StreamDescription& description, const simulation::StateSnapshot& state,
              const simulation::StateSnapshot& start) override;
-  void ticked(const stream::AppliedTick& tick) override;
+  void ticked(const scene::AppliedTick& tick) override;
   void saved(const simulation::StateSnapshot& state, bool grabsHold) override;
   void restored(std::uint64_t tick, const simulation::StateSnapshot& state) override;
   void end() override;
-  void sent(const stream::SharedBytes& message) override;
+  void sent(const delivery::SharedBytes& message) override;
   void joined(std::uint64_t participant, const std::string& clientName,
               const std::string& displayName) override;
   void left(std::uint64_t participant) override;
@@ -76,11 +76,11 @@ class Recorder : public stream::Journal {
   };
   struct Waiting {
     std::uint64_t time = 0;
-    std::variant<Own, stream::SharedBytes> what;
+    std::variant<Own, delivery::SharedBytes> what;
   };
 
   void put(Topic topic, const google::protobuf::MessageLite& message);
-  void push(std::variant<Own, stream::SharedBytes> what, std::size_t bytes);
+  void push(std::variant<Own, delivery::SharedBytes> what, std::size_t bytes);
   void tellParticipant(std::uint64_t participant, v1::ParticipantEventKind kind,
                        const std::string& clientName, const std::string& displayName);
   void put(const simulation::StateSnapshot& state, bool grabsHold, bool start);

@@ -19,7 +19,7 @@ Recordings::Recordings(RecorderOptions options, bool always) : options_(std::mov
                                          options_.directory.string(), problem.message()));
 }
 
-std::shared_ptr<stream::Journal> Recordings::add(const std::string& scene) {
+std::shared_ptr<scene::Journal> Recordings::add(const std::string& scene) {
   const std::lock_guard lock(mutex_);
   std::erase_if(journals_, [&](const auto& journal) {
     if (journal.use_count() > 1) return false;

@@ -20,7 +20,7 @@ class Recordings {
   Recordings(RecorderOptions options, bool always);
 
   // Returns the journal of a scene. Removes journals of scenes that no longer exist, once they are written.
-  std::shared_ptr<stream::Journal> add(const std::string& scene);
+  std::shared_ptr<scene::Journal> add(const std::string& scene);
 
   // Report for people: number of running, complete and failed recordings, and their bytes.
   std::string report() const;

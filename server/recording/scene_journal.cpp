@@ -146,7 +146,7 @@ void SceneJournal::begin(const vulkan::DeviceInfo& device, const model::Scene& s
   if (const auto recorder = current()) recorder->begin(device, scene, description, state, start);
 }
 
-void SceneJournal::ticked(const stream::AppliedTick& tick) {
+void SceneJournal::ticked(const scene::AppliedTick& tick) {
   const auto recorder = current();
   if (!recorder) return;
   recorder->ticked(tick);
@@ -176,7 +176,7 @@ void SceneJournal::end() {
   replace(always_ ? std::make_shared<Recorder>(options_) : nullptr);
 }
 
-void SceneJournal::sent(const stream::SharedBytes& message) {
+void SceneJournal::sent(const delivery::SharedBytes& message) {
   if (const auto recorder = current()) recorder->sent(message);
 }
 

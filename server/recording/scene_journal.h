@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "server/recording/recorder.h"
-#include "server/stream/journal.h"
+#include "server/scene/journal.h"
 
 namespace clothstream::recording {
 
@@ -29,7 +29,7 @@ struct RecordingCounts {
 };
 
 // Thread-safe.
-class SceneJournal : public stream::Journal {
+class SceneJournal : public scene::Journal {
  public:
   // `always` records the scene from its start, and clients cannot stop it.
   SceneJournal(std::string scene, RecorderOptions options, bool always);
@@ -43,11 +43,11 @@ class SceneJournal : public stream::Journal {
   void begin(const vulkan::DeviceInfo& device, const model::Scene& scene,
              const v1::StreamDescription& description, const simulation::StateSnapshot& state,
              const simulation::StateSnapshot& start) override;
-  void ticked(const stream::AppliedTick& tick) override;
+  void ticked(const scene::AppliedTick& tick) override;
   void saved(const simulation::StateSnapshot& state, bool grabsHold) override;
   void restored(std::uint64_t tick, const simulation::StateSnapshot& state) override;
   void end() override;
-  void sent(const stream::SharedBytes& message) override;
+  void sent(const delivery::SharedBytes& message) override;
   void joined(std::uint64_t participant, const std::string& clientName,
               const std::string& displayName) override;
   void left(std::uint64_t participant) override;

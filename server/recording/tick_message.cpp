@@ -14,13 +14,13 @@
 namespace clothstream::recording {
 namespace {
 
-v1::Recovery toMessage(stream::Recovery recovery) {
+v1::Recovery toMessage(scene::Recovery recovery) {
   switch (recovery) {
-    case stream::Recovery::rollback:
+    case scene::Recovery::rollback:
       return v1::RECOVERY_ROLLBACK;
-    case stream::Recovery::reset:
+    case scene::Recovery::reset:
       return v1::RECOVERY_RESET;
-    case stream::Recovery::none:
+    case scene::Recovery::none:
       break;
   }
   return v1::RECOVERY_NONE;
@@ -61,14 +61,14 @@ void writeShape(const model::Shape& shape, v1::AppliedCollider& message) {
       shape);
 }
 
-void writeColliders(const stream::AppliedTick& tick, v1::RecordedTick& message) {
+void writeColliders(const scene::AppliedTick& tick, v1::RecordedTick& message) {
   for (std::size_t i = 0; i < tick.inputs.colliders.size(); ++i) {
     const simulation::MovingCollider& collider = tick.inputs.colliders[i];
     v1::AppliedCollider& to = *message.add_colliders();
     messages::write(collider.start, *to.mutable_start());
     messages::write(collider.end, *to.mutable_end());
     to.set_friction(collider.friction);
-    const stream::ColliderSet::Identity identity = tick.colliders.identity(i);
+    const scene::ColliderSet::Identity identity = tick.colliders.identity(i);
     to.set_participant_id(identity.participant);
     to.set_id(identity.id);
     writeShape(collider.shape, to);
@@ -149,7 +149,7 @@ simulation::Grab grabOf(Numbers& numbers, const v1::AppliedGrip& message) {
 
 }  // namespace
 
-void write(const stream::AppliedTick& tick, v1::RecordedTick& message) {
+void write(const scene::AppliedTick& tick, v1::RecordedTick& message) {
   message.Clear();
   message.set_tick(tick.tick);
   message.set_state_hash(tick.status.stateHash);

@@ -10,12 +10,12 @@
 #include "clothstream/v1/recording.pb.h"
 #include "server/model/scene.h"
 #include "server/simulation/cloth_simulation.h"
-#include "server/stream/journal.h"
+#include "server/scene/journal.h"
 
 namespace clothstream::recording {
 
 // Overwrites `message`.
-void write(const stream::AppliedTick& tick, v1::RecordedTick& message);
+void write(const scene::AppliedTick& tick, v1::RecordedTick& message);
 
 // Inputs of the device. The error says which part of the message does not fit this scene.
 [[nodiscard]] tl::expected<simulation::TickInputs, std::string> toInputs(const v1::RecordedTick& message,

@@ -14,9 +14,9 @@
 
 #include "clients/core/core.h"
 #include "server/messages/scene_file.h"
-#include "server/stream/connection.h"
-#include "server/stream/scene_server.h"
-#include "server/stream/server_state.h"
+#include "server/session/session.h"
+#include "server/hosting/scene_server.h"
+#include "server/hosting/server_state.h"
 #include "tests/bench/simulated.h"
 #include "tests/bench/suite.h"
 
@@ -33,7 +33,7 @@ constexpr std::chrono::microseconds kPoseInterval{1'000'000 / 90};
 
 class Viewer {
  public:
-  explicit Viewer(stream::SceneServer& server)
+  explicit Viewer(hosting::SceneServer& server)
       : connection_(server, "bench", [this] {
           const std::lock_guard lock(mutex_);
           awake_ = true;
@@ -88,7 +88,7 @@ class Viewer {
   bool awake_ = false;
   Clock::time_point nextPose_{};
   std::unique_ptr<cs_client, void (*)(cs_client*)> core_{cs_create("", "bench"), &cs_destroy};
-  stream::Connection connection_;
+  session::Session connection_;
 };
 
 void checkFrames(const cs_statistics& seen) {
@@ -103,7 +103,7 @@ Rows runCurtain(vulkan::Device& device, const Settings& settings) {
   if (settings.size) throw std::runtime_error("--size: not allowed, because the scene has a fixed size");
   const model::Scene scene = *messages::loadScene("curtain");
   Simulated(device, scene, {}).check({scene.environment, {}});
-  stream::SceneServer server({scene}, {.device = settings.device, .defaultScene = scene.name});
+  hosting::SceneServer server({scene}, {.device = settings.device, .defaultScene = scene.name});
   const telemetry::SceneMetrics& metrics = server.state().scenes.front()->metrics;
   const double seconds = std::max(settings.seconds, kLeastSeconds);
   cs_statistics seen;

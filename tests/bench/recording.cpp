@@ -25,7 +25,7 @@
 #include "proto/recording/recording_reader.h"
 #include "server/recording/playback.h"
 #include "server/recording/recorded_stream.h"
-#include "server/stream/live_scene.h"
+#include "server/scene/live_scene.h"
 #include "tests/e2e/temporary_directory.h"
 #include "tests/recording/sample.h"
 
@@ -58,12 +58,11 @@ double millisecondsSince(Clock::time_point start) {
 // A viewer that acknowledges each frame at once.
 class Viewer {
  public:
-  explicit Viewer(stream::LiveScene& scene) : scene_(scene) {
-    if (scene.audience.join(mailbox_, 10) != stream::Audience::Joining::joined)
-      throw std::runtime_error("cannot join the scene");
+  explicit Viewer(scene::LiveScene& scene) : scene_(scene) {
+    scene.subscribers.add(mailbox_);
     mailbox_->subscribe(scene.description(), scene.shape(), scene.metrics, {});
   }
-  ~Viewer() { scene_.audience.leave(*mailbox_); }
+  ~Viewer() { scene_.subscribers.remove(*mailbox_); }
   Viewer(const Viewer&) = delete;
   Viewer& operator=(const Viewer&) = delete;
 
@@ -85,8 +84,8 @@ class Viewer {
   v1::ParameterChanged parameters;  // last received parameters
 
  private:
-  stream::LiveScene& scene_;
-  std::shared_ptr<stream::Mailbox> mailbox_ = std::make_shared<stream::Mailbox>([] {});
+  scene::LiveScene& scene_;
+  std::shared_ptr<delivery::Mailbox> mailbox_ = std::make_shared<delivery::Mailbox>([] {});
   v1::ServerMessage message_;
 };
 
@@ -109,7 +108,7 @@ void measure(const std::string& name, const std::string& path, std::uint32_t fra
   RecordedStream recording = got(RecordedStream::open(path));
   const double openMs = millisecondsSince(opening);
   const auto playback = std::make_shared<Playback>(std::move(recording), PlaybackOptions{});
-  stream::LiveScene scene("sample", playback);
+  scene::LiveScene scene("sample", playback);
   Viewer viewer(scene);
   playback->step(scene, Clock::now());
   viewer.read(Clock::now());

@@ -13,7 +13,7 @@
 #include "server/messages/scene_file.h"
 #include "tests/e2e/server_process.h"
 #include "tests/endpoint/web_client.h"
-#include "tests/stream/small_scene.h"
+#include "tests/serving/small_scene.h"
 
 namespace clothstream::tests {
 namespace {

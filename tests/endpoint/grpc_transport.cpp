@@ -12,7 +12,7 @@ namespace {
 
 class GrpcTransport final : public Transport {
  public:
-  void open(stream::SceneServer& server, const TransportOptions& options) override {
+  void open(hosting::SceneServer& server, const TransportOptions& options) override {
     close();
     endpoint::GrpcEndpointOptions endpointOptions;
     endpointOptions.host = options.host;

@@ -33,10 +33,10 @@ model::Scene sheet(std::string name, std::uint32_t side) {
 
 void SmallServer::SetUp() {
   telemetry::setUpLog("warning");
-  stream::ServerOptions options;
+  hosting::ServerOptions options;
   options.defaultScene = "small";
   try {
-    server_ = std::make_unique<stream::SceneServer>(
+    server_ = std::make_unique<hosting::SceneServer>(
         std::vector{sheet("small", 8), sheet("other", 8), sheet("large", 128)}, options);
   } catch (const vulkan::DeviceError& error) {
     GTEST_SKIP() << error.what();

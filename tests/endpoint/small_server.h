@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "server/stream/scene_server.h"
+#include "server/hosting/scene_server.h"
 
 namespace clothstream::tests {
 
@@ -18,12 +18,12 @@ class SmallServer : public ::testing::Test {
 
   // Scenes: "small" (the default) and "other" with 8 x 8 nodes each, "large" with 128 x 128. Each hangs by
   // two corners and streams 30 frames a second.
-  stream::SceneServer& server() { return *server_; }
+  hosting::SceneServer& server() { return *server_; }
   // Destroys the server. Every endpoint must be closed.
   void closeServer() { server_.reset(); }
 
  private:
-  std::unique_ptr<stream::SceneServer> server_;
+  std::unique_ptr<hosting::SceneServer> server_;
 };
 
 }  // namespace clothstream::tests

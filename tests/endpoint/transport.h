@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "server/stream/scene_server.h"
+#include "server/hosting/scene_server.h"
 #include "tests/endpoint/client.h"
 
 namespace clothstream::tests {
@@ -31,7 +31,7 @@ class Transport {
   virtual ~Transport() = default;
 
   // Closes the open endpoint, if any, and opens another. Throws std::runtime_error as the endpoint does.
-  virtual void open(stream::SceneServer& server, const TransportOptions& options = {}) = 0;
+  virtual void open(hosting::SceneServer& server, const TransportOptions& options = {}) = 0;
   virtual void close() = 0;
   // Port of the open endpoint.
   virtual std::uint16_t port() const = 0;

@@ -10,7 +10,7 @@ namespace {
 
 class WebTransport final : public Transport {
  public:
-  void open(stream::SceneServer& server, const TransportOptions& options) override {
+  void open(hosting::SceneServer& server, const TransportOptions& options) override {
     close();
     endpoint::WebEndpointOptions endpointOptions;
     endpointOptions.host = options.host;

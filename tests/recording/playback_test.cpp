@@ -17,14 +17,14 @@
 #include "proto/codec/decoder.h"
 #include "proto/codec/encoder.h"
 #include "proto/recording/recording_writer.h"
-#include "server/stream/live_scene.h"
+#include "server/scene/live_scene.h"
 #include "tests/codec/motion.h"
 #include "tests/recording/sample.h"
 
 namespace clothstream::recording {
 namespace {
 
-using stream::Clock;
+using schedule::Clock;
 using ::testing::HasSubstr;
 
 constexpr double kLength = (kSampleFrames - 1) / double{kSampleRate};
@@ -48,16 +48,16 @@ struct Seen {
 // Accepts and acknowledges every frame at once.
 class Viewer {
  public:
-  explicit Viewer(stream::LiveScene& scene, std::uint8_t layers = codec::kMaxTemporalLayers)
-      : scene_(scene), mailbox_(std::make_shared<stream::Mailbox>([] {})) {
-    EXPECT_EQ(scene.audience.join(mailbox_, 10), stream::Audience::Joining::joined);
+  explicit Viewer(scene::LiveScene& scene, std::uint8_t layers = codec::kMaxTemporalLayers)
+      : scene_(scene), mailbox_(std::make_shared<delivery::Mailbox>([] {})) {
+    scene.subscribers.add(mailbox_);
     codec::StreamLayout layout = sampleLayout();
     layout.temporalLayers = scene.shape().layers;
     decoder_ = codec::Decoder::make(layout);
     mailbox_->subscribe(scene.description(), scene.shape(), scene.metrics, {.quality = 0, .layers = layers});
     read(Clock::time_point{});
   }
-  ~Viewer() { scene_.audience.leave(*mailbox_); }
+  ~Viewer() { scene_.subscribers.remove(*mailbox_); }
 
   void read(Clock::time_point now) {
     while (const auto bytes = mailbox_->next(now)) {
@@ -89,8 +89,8 @@ class Viewer {
     ASSERT_TRUE(mailbox_->acknowledge(decoder_->tick(), now));
   }
 
-  stream::LiveScene& scene_;
-  std::shared_ptr<stream::Mailbox> mailbox_;
+  scene::LiveScene& scene_;
+  std::shared_ptr<delivery::Mailbox> mailbox_;
   std::unique_ptr<codec::Decoder> decoder_;
 };
 
@@ -98,7 +98,7 @@ class PlaybackTest : public ::testing::Test {
  protected:
   void play(std::string bytes, const PlaybackOptions& options = {}) {
     playback = std::make_shared<Playback>(streamOf(std::move(bytes)), options);
-    scene = std::make_unique<stream::LiveScene>("sample", playback);
+    scene = std::make_unique<scene::LiveScene>("sample", playback);
   }
   void play(const PlaybackOptions& options = {}) { play(sampleRecording(kSampleFrames), options); }
   void join() {
@@ -145,7 +145,7 @@ class PlaybackTest : public ::testing::Test {
   }
 
   std::shared_ptr<Playback> playback;
-  std::unique_ptr<stream::LiveScene> scene;
+  std::unique_ptr<scene::LiveScene> scene;
   std::unique_ptr<Viewer> viewer;
   Clock::time_point now = Clock::now();
 };

@@ -18,15 +18,15 @@
 #include "server/messages/scene_file.h"
 #include "server/recording/recordings.h"
 #include "server/recording/resimulate.h"
-#include "server/stream/scene_host.h"
+#include "server/scene/scene_host.h"
 #include "tests/e2e/temporary_directory.h"
-#include "tests/stream/small_scene.h"
+#include "tests/serving/small_scene.h"
 #include "tests/vulkan/gpu_test.h"
 
 namespace clothstream::recording {
 namespace {
 
-using stream::Clock;
+using schedule::Clock;
 using ::testing::HasSubstr;
 using tests::gravity;
 using tests::handAt;
@@ -40,7 +40,7 @@ class RecordedScene {
       : recorder(std::make_shared<Recorder>(std::move(options))),
         live(std::move(scene), false, recorder),
         packer(encode::FrameEncoder::kSlots, [] {}),
-        host(std::make_unique<stream::SceneHost>(tests::device(), live, packer)) {}
+        host(std::make_unique<scene::SceneHost>(tests::device(), live, packer)) {}
   ~RecordedScene() { packer.drain(); }
 
   void ticks(int count) {
@@ -65,9 +65,9 @@ class RecordedScene {
   }
 
   std::shared_ptr<Recorder> recorder;
-  stream::LiveScene live;
-  stream::FramePacker packer;
-  std::unique_ptr<stream::SceneHost> host;
+  scene::LiveScene live;
+  delivery::FramePublisher packer;
+  std::unique_ptr<scene::SceneHost> host;
   Clock::time_point now = Clock::now();
   std::vector<std::uint64_t> hashes;
 };
@@ -99,7 +99,7 @@ void happen(RecordedScene& recorded) {
         9,
         {.colliders = {handAt(1, 0.1f, -0.6f, z), handAt(4, -0.1f, -0.2f, z)},
          .grabs = {{.id = 1, .pose = {model::Vec3(0, -0.4f, z), model::Quaternion::Identity()}}}},
-        recorded.now, {.trueAt = trueAt, .clientTimeUs = stream::microseconds(trueAt)});
+        recorded.now, {.trueAt = trueAt, .clientTimeUs = schedule::microseconds(trueAt)});
   };
   for (int i = 0; i < 12; ++i) {
     const float z = 0.02f * static_cast<float>(i) - 0.2f;
@@ -117,7 +117,7 @@ void happen(RecordedScene& recorded) {
   heavier.colliders = {{.name = "ball", .position = model::Vec3(0.2f, -0.4f, 0.1f)}};
   recorded.change(heavier);
   recorded.ticks(40);
-  recorded.live.resetWanted = true;
+  recorded.live.resetRequested = true;
   recorded.ticks(50);
   recorded.change(gravity(-1e6f));
   recorded.ticks(1);  // the state becomes invalid
@@ -151,7 +151,7 @@ TEST_F(RecorderTest, ContinuesAfterItsDeviceWasLost) {
   vulkan::Device another;
   recorded.host->release();
   recorded.host->rebuild(
-      std::make_unique<stream::SceneOnDevice>(another, recorded.live.start(), recorded.packer.workers()),
+      std::make_unique<scene::SceneOnDevice>(another, recorded.live.start(), recorded.packer.workers()),
       "the device was lost");
   recorded.change(wind(2));
   recorded.ticks(30);

@@ -18,9 +18,9 @@
 #include "proto/recording/recording_reader.h"
 #include "server/recording/recordings.h"
 #include "server/recording/resimulate.h"
-#include "server/stream/scene_host.h"
+#include "server/scene/scene_host.h"
 #include "tests/e2e/temporary_directory.h"
-#include "tests/stream/small_scene.h"
+#include "tests/serving/small_scene.h"
 #include "tests/vulkan/gpu_test.h"
 
 namespace clothstream::recording {
@@ -45,9 +45,9 @@ class SceneJournalTest : public tests::GpuTest {
     options.directory = directory.path();
     options.serverName = "test";
     journal = std::make_shared<SceneJournal>("small", options, always);
-    live = std::make_unique<stream::LiveScene>(tests::smallScene(), false, journal);
-    packer = std::make_unique<stream::FramePacker>(encode::FrameEncoder::kSlots, [] {});
-    host = std::make_unique<stream::SceneHost>(tests::device(), *live, *packer);
+    live = std::make_unique<scene::LiveScene>(tests::smallScene(), false, journal);
+    packer = std::make_unique<delivery::FramePublisher>(encode::FrameEncoder::kSlots, [] {});
+    host = std::make_unique<scene::SceneHost>(tests::device(), *live, *packer);
   }
   void ticks(int count) {
     for (int i = 0; i < count; ++i) {
@@ -64,13 +64,13 @@ class SceneJournalTest : public tests::GpuTest {
     live->inbox.postPoses(3, poses, now);
   }
   // Kinds of all notices from now on that a participant of the scene receives.
-  std::shared_ptr<stream::Mailbox> listen() {
-    auto mailbox = std::make_shared<stream::Mailbox>([] {});
-    EXPECT_EQ(live->audience.join(mailbox, 5), stream::Audience::Joining::joined);
+  std::shared_ptr<delivery::Mailbox> listen() {
+    auto mailbox = std::make_shared<delivery::Mailbox>([] {});
+    live->subscribers.add(mailbox);
     mailbox->subscribe(live->description(), live->shape(), live->metrics);
     return mailbox;
   }
-  void read(stream::Mailbox& mailbox, std::vector<v1::NoticeKind>& kinds) const {
+  void read(delivery::Mailbox& mailbox, std::vector<v1::NoticeKind>& kinds) const {
     while (const auto bytes = mailbox.next(now)) {
       v1::ServerMessage message;
       ASSERT_TRUE(message.ParseFromArray((*bytes)->data(), static_cast<int>((*bytes)->size())));
@@ -89,10 +89,10 @@ class SceneJournalTest : public tests::GpuTest {
 
   e2e::TemporaryDirectory directory;
   std::shared_ptr<SceneJournal> journal;
-  std::unique_ptr<stream::LiveScene> live;
-  std::unique_ptr<stream::FramePacker> packer;
-  std::unique_ptr<stream::SceneHost> host;
-  stream::Clock::time_point now = stream::Clock::now();
+  std::unique_ptr<scene::LiveScene> live;
+  std::unique_ptr<delivery::FramePublisher> packer;
+  std::unique_ptr<scene::SceneHost> host;
+  schedule::Clock::time_point now = schedule::Clock::now();
 };
 
 TEST_F(SceneJournalTest, ResimulatesARecordingThatStartsInTheMiddle) {
@@ -110,7 +110,7 @@ TEST_F(SceneJournalTest, ResimulatesARecordingThatStartsInTheMiddle) {
   EXPECT_TRUE(journal->active());
   grab(false);
   ticks(20);
-  live->resetWanted = true;
+  live->resetRequested = true;
   ticks(20);
   packer->drain();
   const auto stopped = journal->stop();
@@ -150,13 +150,13 @@ TEST_F(SceneJournalTest, OmitsFramesOfAPausedScene) {
   while (late->next(now)) {
   }
   now += std::chrono::seconds(1);
-  host->show(now);
+  host->encodePausedFrame(now);
   packer->drain();
   EXPECT_EQ(live->metrics.frames.value(), frames + 1);
   EXPECT_TRUE(late->next(now));
   ticks(10);
   ASSERT_TRUE(journal->stop());
-  live->audience.leave(*late);
+  live->subscribers.remove(*late);
   EXPECT_EQ(again("paused.mcap").ticks, 20u);
   EXPECT_EQ(again("paused.mcap").different, 0u);
   auto reader = RecordingReader::open(pathOf("paused.mcap"));
@@ -207,7 +207,7 @@ TEST_F(SceneJournalTest, NotifiesParticipantsOfStartAndEnd) {
   read(*mailbox, kinds);
   EXPECT_THAT(kinds,
               ::testing::ElementsAre(v1::NOTICE_KIND_RECORDING_STARTED, v1::NOTICE_KIND_RECORDING_STOPPED));
-  live->audience.leave(*mailbox);
+  live->subscribers.remove(*mailbox);
 }
 
 TEST_F(SceneJournalTest, ContinuesInAnotherFileAtTheLimit) {
@@ -226,7 +226,7 @@ TEST_F(SceneJournalTest, ContinuesInAnotherFileAtTheLimit) {
   }
   // Participants are not notified of the files in between.
   EXPECT_THAT(kinds, ::testing::ElementsAre(v1::NOTICE_KIND_RECORDING_STARTED));
-  live->audience.leave(*mailbox);
+  live->subscribers.remove(*mailbox);
   packer->drain();
   host.reset();
   while (journal->counts().running > 0) std::this_thread::yield();
@@ -275,7 +275,7 @@ TEST_F(SceneJournalTest, RecordsTheNextHostOfAScene) {
     packer->drain();
     host.reset();
     EXPECT_FALSE(journal->active());
-    host = std::make_unique<stream::SceneHost>(tests::device(), *live, *packer);
+    host = std::make_unique<scene::SceneHost>(tests::device(), *live, *packer);
   };
   ticks(1);
   ASSERT_TRUE(journal->start("before"));
@@ -327,7 +327,7 @@ TEST_F(SceneJournalTest, GivesOneRecordingForSimultaneousRequests) {
 
 TEST_F(SceneJournalTest, CountsRecordingsOfRemovedScenesWithoutKeepingThem) {
   Recordings recordings({.directory = directory.path(), .serverName = "test"}, true);
-  std::weak_ptr<stream::Journal> gone;
+  std::weak_ptr<scene::Journal> gone;
   for (int scene = 1; scene <= 3; ++scene) {
     packer->drain();
     host.reset();
@@ -335,8 +335,8 @@ TEST_F(SceneJournalTest, CountsRecordingsOfRemovedScenesWithoutKeepingThem) {
     auto added = recordings.add("small");
     EXPECT_TRUE(gone.expired());
     gone = added;
-    live = std::make_unique<stream::LiveScene>(tests::smallScene(), true, std::move(added));
-    host = std::make_unique<stream::SceneHost>(tests::device(), *live, *packer);
+    live = std::make_unique<scene::LiveScene>(tests::smallScene(), true, std::move(added));
+    host = std::make_unique<scene::SceneHost>(tests::device(), *live, *packer);
     ticks(3);
     packer->drain();
     host.reset();

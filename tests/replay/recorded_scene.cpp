@@ -15,12 +15,12 @@
 #include "server/messages/scene_file.h"
 #include "server/recording/recorder.h"
 #include "server/simulation/state_snapshot.h"
-#include "server/stream/scene_host.h"
+#include "server/scene/scene_host.h"
 
 namespace clothstream::replay {
 namespace {
 
-using stream::Clock;
+using schedule::Clock;
 
 constexpr std::uint64_t kParticipant = 7;
 
@@ -63,9 +63,9 @@ std::string recordScene(vulkan::Device& device, const std::string& name,
   const model::Vec3 wind = scene->environment.wind;
   const auto recorder = std::make_shared<recording::Recorder>(
       recording::RecorderOptions{.directory = directory, .serverName = "clothstream replay"});
-  stream::FramePacker packer(encode::FrameEncoder::kSlots, [] {});
-  stream::LiveScene live(std::move(*scene), false, recorder);
-  auto host = std::make_unique<stream::SceneHost>(device, live, packer);
+  delivery::FramePublisher packer(encode::FrameEncoder::kSlots, [] {});
+  scene::LiveScene live(std::move(*scene), false, recorder);
+  auto host = std::make_unique<scene::SceneHost>(device, live, packer);
   model::Vec3 centre = model::Vec3::Zero();
   const std::vector<model::Vec3> rest = model::restPositions(live.start().cloths.front());
   for (const model::Vec3& node : rest) centre += node / static_cast<float>(rest.size());

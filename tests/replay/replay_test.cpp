@@ -26,7 +26,7 @@
 #include "server/messages/scene_file.h"
 #include "server/messages/scene_message.h"
 #include "server/recording/resimulate.h"
-#include "server/stream/live_scene.h"
+#include "server/scene/live_scene.h"
 #include "tests/e2e/temporary_directory.h"
 #include "tests/replay/recorded_scene.h"
 #include "tests/vulkan/gpu_test.h"
@@ -64,7 +64,7 @@ DecodedFrames decode(const std::string& path) {
       EXPECT_TRUE(scene) << scene.error().text;
       if (!scene) return decoded;
       decoded.maxError = scene->stream.maxError;
-      decoder = codec::Decoder::make(encode::streamLayout(*scene, stream::LiveScene::kEpoch));
+      decoder = codec::Decoder::make(encode::streamLayout(*scene, scene::LiveScene::kEpoch));
     }
     if ((*message)->topic != Topic::frames) continue;
     v1::Frame frame;

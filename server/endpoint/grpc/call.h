@@ -13,7 +13,7 @@
 
 #include "server/endpoint/grpc/completion_loop.h"
 
-namespace clothstream::stream {
+namespace clothstream::hosting {
 class SceneServer;
 }
 
@@ -23,7 +23,7 @@ class Call;
 
 // Belongs to the loop's thread; only the loop itself may be used by others.
 struct GrpcEndpointContext {
-  stream::SceneServer& server;
+  hosting::SceneServer& server;
   const std::shared_ptr<CompletionLoop> loop;
   const std::size_t maxStreams;
   std::size_t streams = 0;  // open Join streams, without refused ones

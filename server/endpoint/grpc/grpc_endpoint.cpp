@@ -27,7 +27,7 @@
 #include "server/endpoint/grpc/call.h"
 #include "server/endpoint/grpc/health.h"
 #include "server/endpoint/grpc/service.h"
-#include "server/stream/connection.h"
+#include "server/session/session.h"
 
 namespace clothstream::endpoint {
 namespace {
@@ -58,7 +58,7 @@ void configure(grpc::ServerBuilder& builder) {
   builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS, kMaxStreamsPerConnection);
   // Completes a write only after the transport has sent it, not when a buffer has taken it.
   builder.AddChannelArgument(GRPC_ARG_HTTP2_WRITE_BUFFER_SIZE, 1);
-  builder.SetMaxReceiveMessageSize(static_cast<int>(stream::kMaxClientMessageBytes));
+  builder.SetMaxReceiveMessageSize(static_cast<int>(session::kMaxClientMessageBytes));
   builder.SetMaxSendMessageSize(-1);
   // Frames are compressed already, and a small compressed message could expand to a large one.
   builder.SetCompressionAlgorithmSupportStatus(GRPC_COMPRESS_DEFLATE, false);
@@ -98,7 +98,7 @@ struct GrpcEndpoint::State {
   std::optional<GrpcEndpointContext> context;
   boost::asio::thread_pool slowCalls{1};  // for calls that take longer than a frame may wait
 
-  State(stream::SceneServer& scenes, const GrpcEndpointOptions& options) {
+  State(hosting::SceneServer& scenes, const GrpcEndpointOptions& options) {
     grpc::reflection::InitProtoReflectionServerBuilderPlugin();
     grpc::ServerBuilder builder;
     configure(builder);
@@ -149,7 +149,7 @@ struct GrpcEndpoint::State {
   }
 };
 
-GrpcEndpoint::GrpcEndpoint(stream::SceneServer& server, const GrpcEndpointOptions& options)
+GrpcEndpoint::GrpcEndpoint(hosting::SceneServer& server, const GrpcEndpointOptions& options)
     : state_(std::make_unique<State>(server, options)) {}
 
 GrpcEndpoint::~GrpcEndpoint() = default;

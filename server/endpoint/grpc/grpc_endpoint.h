@@ -7,7 +7,7 @@
 #include <memory>
 #include <string>
 
-namespace clothstream::stream {
+namespace clothstream::hosting {
 class SceneServer;
 }
 
@@ -20,7 +20,7 @@ struct GrpcEndpointOptions {
   std::size_t maxStreams = 256;
 };
 
-// Join forwards the bytes of a stream::Connection unchanged. SceneServer answers the unary calls. When a
+// Join forwards the bytes of a session::Session unchanged. SceneServer answers the unary calls. When a
 // connection finishes, its stream ends with the status that matches the last Error. A client that vanishes is
 // found within 5 s.
 //
@@ -30,7 +30,7 @@ class GrpcEndpoint {
  public:
   // Listens when it returns. `server` must outlive the endpoint. Throws std::runtime_error with advice if the
   // port is in use or the host is not an address of this machine.
-  GrpcEndpoint(stream::SceneServer& server, const GrpcEndpointOptions& options);
+  GrpcEndpoint(hosting::SceneServer& server, const GrpcEndpointOptions& options);
   // Ends every stream with UNAVAILABLE and waits until the clients have the status: at most about 2 s.
   ~GrpcEndpoint();
   GrpcEndpoint(const GrpcEndpoint&) = delete;

@@ -12,12 +12,12 @@ namespace clothstream::endpoint {
 namespace {
 
 // View of the message. Keeps the message alive while gRPC holds the slice.
-grpc::ByteBuffer sharedBuffer(const stream::SharedBytes& message) {
+grpc::ByteBuffer sharedBuffer(const delivery::SharedBytes& message) {
   // gRPC takes mutable bytes but never writes to them.
   void* const bytes = const_cast<std::byte*>(message->data());
   const grpc::Slice slice(
-      bytes, message->size(), [](void* owner) { delete static_cast<stream::SharedBytes*>(owner); },
-      new stream::SharedBytes(message));
+      bytes, message->size(), [](void* owner) { delete static_cast<delivery::SharedBytes*>(owner); },
+      new delivery::SharedBytes(message));
   return grpc::ByteBuffer(&slice, 1);
 }
 
@@ -55,8 +55,7 @@ void JoinStream::onBegun(bool ok) {
       if (const auto self = weak.lock()) self->pump();
     });
   };
-  connection_ =
-      std::make_unique<stream::Connection>(endpoint_.server, "grpc " + context_.peer(), std::move(wake));
+  connection_ = session::Session::open(endpoint_.server, "grpc " + context_.peer(), std::move(wake));
   read();
   pump();
 }
@@ -83,7 +82,7 @@ void JoinStream::pump() {
   const bool finished = connection_->finished();  // checked before next(), so that no message is lost
   if (isWriting_) {
     if (finished) cancelSoon();
-  } else if (std::optional<stream::SharedBytes> message = connection_->next()) {
+  } else if (std::optional<delivery::SharedBytes> message = connection_->next()) {
     lastMessage_ = std::move(*message);
     isWriting_ = true;
     io_.Write(sharedBuffer(lastMessage_), begin(written_));

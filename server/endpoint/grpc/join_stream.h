@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// One Join stream: forwards bytes between gRPC and a stream::Connection.
+// One Join stream: forwards bytes between gRPC and a session::Session.
 #pragma once
 
 #include <memory>
@@ -11,7 +11,7 @@
 
 #include "server/endpoint/grpc/call.h"
 #include "server/endpoint/grpc/service.h"
-#include "server/stream/connection.h"
+#include "server/session/session.h"
 
 namespace clothstream::endpoint {
 
@@ -41,12 +41,12 @@ class JoinStream final : public Call {
 
   Service& service_;
   grpc::ServerAsyncReaderWriter<grpc::ByteBuffer, grpc::ByteBuffer> io_{&context_};
-  std::unique_ptr<stream::Connection> connection_;  // nullptr while the stream closes
+  std::shared_ptr<session::Session> connection_;  // nullptr while the stream closes
   // Connection of a client that sends nothing more. The end of the call tells a goodbye from a lost
   // connection.
-  std::unique_ptr<stream::Connection> departing_;
+  std::shared_ptr<session::Session> departing_;
   grpc::ByteBuffer incoming_;
-  stream::SharedBytes lastMessage_;
+  delivery::SharedBytes lastMessage_;
   std::optional<grpc::Status> closing_;  // set while the stream closes
   bool isCounted_ = false, isWriting_ = false, hasEnded_ = false;
   std::optional<grpc::Alarm> cancellation_;  // set while the stream waits for its last write

@@ -7,12 +7,12 @@
 
 #include "server/endpoint/grpc/join_stream.h"
 #include "server/endpoint/grpc/unary_call.h"
-#include "server/stream/scene_server.h"
+#include "server/hosting/scene_server.h"
 
 namespace clothstream::endpoint {
 
 void offerService(GrpcEndpointContext& endpoint, Service& service, boost::asio::thread_pool& slowCalls) {
-  stream::SceneServer& server = endpoint.server;
+  hosting::SceneServer& server = endpoint.server;
   offer(endpoint, service, &Service::RequestListScenes,
         [&server](const auto&, auto answer) { answer(server.listScenes()); });
   // Slow, since a scene may contain a mesh of millions of vertices.

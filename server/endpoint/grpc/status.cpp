@@ -37,7 +37,7 @@ grpc::Status statusOf(const v1::Error& error) {
   return {codeOf(error.code()), error.text()};
 }
 
-grpc::Status closingStatus(const stream::SharedBytes& lastMessage) {
+grpc::Status closingStatus(const delivery::SharedBytes& lastMessage) {
   v1::ServerMessage message;
   if (lastMessage && message.ParseFromArray(lastMessage->data(), static_cast<int>(lastMessage->size()))) {
     if (message.error().fatal()) return statusOf(message.error());

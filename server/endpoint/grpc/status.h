@@ -5,7 +5,7 @@
 #include <grpcpp/support/status.h>
 
 #include "clothstream/v1/session.pb.h"
-#include "server/stream/connection.h"
+#include "server/delivery/envelope.h"
 
 namespace clothstream::endpoint {
 
@@ -13,6 +13,6 @@ grpc::Status statusOf(const v1::Error& error);
 
 // Status for a finished connection, from its last message: a fatal Error, a notice that the scene was
 // deleted, or else UNAVAILABLE because the server stops.
-grpc::Status closingStatus(const stream::SharedBytes& lastMessage);
+grpc::Status closingStatus(const delivery::SharedBytes& lastMessage);
 
 }  // namespace clothstream::endpoint

@@ -12,7 +12,7 @@
 
 #include "server/endpoint/web/page.h"
 
-namespace clothstream::stream {
+namespace clothstream::hosting {
 class SceneServer;
 }
 
@@ -21,7 +21,7 @@ namespace clothstream::endpoint {
 class StreamSession;
 
 struct WebEndpointContext {
-  stream::SceneServer& server;
+  hosting::SceneServer& server;
   boost::asio::io_context& io;
   const Page page;
   const std::vector<std::string> allowedOrigins;

@@ -44,7 +44,7 @@ std::string_view closeText(std::string_view text) {
 }
 
 // Close reason of a finished connection, from its last message.
-ws::close_reason reasonOf(const stream::SharedBytes& last) {
+ws::close_reason reasonOf(const delivery::SharedBytes& last) {
   const auto reason = [](ws::close_code code, const std::string& why) {
     const std::string_view text = closeText(why);
     return ws::close_reason(code, beast::string_view(text.data(), text.size()));
@@ -65,7 +65,7 @@ StreamSession::StreamSession(beast::tcp_stream&& socket, WebEndpointContext& end
     : endpoint_(endpoint), slot_(std::move(slot)), socket_(std::move(socket)), closingTimer_(endpoint.io) {
   socket_.binary(true);
   socket_.auto_fragment(false);
-  socket_.read_message_max(stream::kMaxClientMessageBytes);
+  socket_.read_message_max(session::kMaxClientMessageBytes);
   socket_.set_option(ws::stream_base::timeout{kHandshakeTimeout, kIdleTimeout, true});
 }
 
@@ -95,7 +95,7 @@ void StreamSession::open() {
       if (const auto self = weak.lock()) self->pump();
     });
   };
-  connection_.emplace(endpoint_.server, peerOf(socket_.next_layer()), std::move(wake));
+  connection_ = session::Session::open(endpoint_.server, peerOf(socket_.next_layer()), std::move(wake));
   read();
   pump();
 }
@@ -122,7 +122,7 @@ void StreamSession::pump() {
   const bool finished = connection_->finished();  // checked before next(), so that no message is lost
   if (writing_) {
     if (finished) endSoon();
-  } else if (std::optional<stream::SharedBytes> message = connection_->next()) {
+  } else if (std::optional<delivery::SharedBytes> message = connection_->next()) {
     outgoing_ = std::move(*message);
     writing_ = true;
     socket_.async_write(

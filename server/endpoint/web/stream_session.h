@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// One WebSocket: forwards bytes between a socket and a stream::Connection.
+// One WebSocket: forwards bytes between a socket and a session::Session.
 #pragma once
 
 #include <atomic>
@@ -15,7 +15,7 @@
 #include <boost/beast/websocket/stream.hpp>
 
 #include "server/endpoint/web/endpoint_context.h"
-#include "server/stream/connection.h"
+#include "server/session/session.h"
 
 namespace clothstream::endpoint {
 
@@ -51,8 +51,8 @@ class StreamSession : public std::enable_shared_from_this<StreamSession> {
   boost::beast::websocket::stream<boost::beast::tcp_stream, false> socket_;
   boost::beast::http::request<boost::beast::http::empty_body> request_;
   boost::beast::flat_buffer incoming_;
-  std::optional<stream::Connection> connection_;
-  stream::SharedBytes outgoing_;
+  std::shared_ptr<session::Session> connection_;
+  delivery::SharedBytes outgoing_;
   boost::asio::steady_timer closingTimer_;
   bool ending_ = false;  // closingTimer_ runs
   bool writing_ = false;

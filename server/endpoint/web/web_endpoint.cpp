@@ -67,7 +67,7 @@ struct WebEndpoint::State {
   std::uint16_t port;
   std::thread thread;
 
-  State(stream::SceneServer& server, const WebEndpointOptions& options)
+  State(hosting::SceneServer& server, const WebEndpointOptions& options)
       : context{server, io,   Page(options.pageDirectory), options.allowedOrigins, options.maxConnections, 0,
                 {},     false},
         acceptor(listen(io, options.host, options.port)),
@@ -116,7 +116,7 @@ struct WebEndpoint::State {
   }
 };
 
-WebEndpoint::WebEndpoint(stream::SceneServer& server, const WebEndpointOptions& options)
+WebEndpoint::WebEndpoint(hosting::SceneServer& server, const WebEndpointOptions& options)
     : state_(std::make_unique<State>(server, options)) {}
 
 WebEndpoint::~WebEndpoint() = default;

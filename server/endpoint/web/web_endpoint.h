@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-namespace clothstream::stream {
+namespace clothstream::hosting {
 class SceneServer;
 }
 
@@ -36,7 +36,7 @@ class WebEndpoint {
  public:
   // Listens when it returns. `server` must outlive the endpoint. Throws std::runtime_error with advice if the
   // port is in use, the host is not an address of this machine, or the page cannot be read.
-  WebEndpoint(stream::SceneServer& server, const WebEndpointOptions& options);
+  WebEndpoint(hosting::SceneServer& server, const WebEndpointOptions& options);
   // Closes every WebSocket with "going away": at most about 1 s.
   ~WebEndpoint();
   WebEndpoint(const WebEndpoint&) = delete;

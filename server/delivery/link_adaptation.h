@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: MIT
+// Adapts the part of a stream that one subscriber receives to the throughput of its link.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "proto/codec/stream_layout.h"
+#include "server/schedule/clock.h"
+
+namespace clothstream::delivery {
+
+using schedule::Clock;
+
+// Part of a stream: one quality, and its temporal layers 0 to layers - 1.
+struct OperatingPoint {
+  std::uint8_t quality = 0;
+  std::uint8_t layers = 1;
+  bool operator==(const OperatingPoint&) const = default;
+};
+
+// Steps between the operating point that a subscriber asked for and the base layer of the coarsest quality.
+// Layers are dropped first, then quality. update() is called with every frame and says whether the subscriber
+// is behind. Time spent behind adds up as strain; time spent not behind reduces it half as fast, so that a
+// single delay counts for little.
+//
+// Step down: when the strain reaches kPatience, to the best point that the recent throughput can carry.
+// Step up: one point at a time, after a period in which the subscriber was hardly behind. If a step up fails
+// within kTrial, the wait before the next one doubles. The wait is bounded so that the way from the lowest
+// point to the best takes 3 s at most. With a single point nothing changes.
+//
+// Not thread-safe. Reads no clock: all times are arguments.
+class LinkAdaptation {
+ public:
+  static constexpr std::chrono::milliseconds kPatience{200}, kTrial{1000};
+  // Bounds of the wait before the first step up after a step down; kClimb is the wait after a successful
+  // step.
+  static constexpr std::chrono::milliseconds kShortestWait{500}, kLongestWait{1500}, kClimb{250};
+  // Strain that dropping frames adds, however many are dropped at once.
+  static constexpr std::chrono::milliseconds kDropStrain{100};
+  // Bit rate of a quality relative to the next finer one. Measured: less for calm cloth, more for a flag.
+  static constexpr double kCoarserRate = 0.7;
+
+  // `best` is the point that the subscriber asked for; the stream has `qualities` qualities.
+  LinkAdaptation(OperatingPoint best, std::uint8_t qualities);
+
+  const OperatingPoint& point() const { return points_[step_]; }
+
+  // Records a frame of the subscriber's quality, also if the subscriber does not receive its layer.
+  void made(std::uint8_t quality, std::uint8_t layer, std::size_t bytes, Clock::time_point now);
+  // Records bytes that the subscriber acknowledged.
+  void delivered(std::size_t bytes) { delivered_ += bytes; }
+  // Records that frames were dropped because they waited too long.
+  void dropped(Clock::time_point now) { strain(kDropStrain, now); }
+  // Call at least with each frame. `behind`: something waits for the subscriber. Returns whether the point
+  // has changed.
+  bool update(bool behind, Clock::time_point now);
+
+ private:
+  // Adds strain. `since` is its beginning if there was none before.
+  void strain(Clock::duration more, Clock::time_point since);
+  void stepDown(Clock::time_point now);
+  void stepUp(Clock::time_point now);
+  double bytesPerSecond(const OperatingPoint& point) const;
+
+  std::vector<OperatingPoint> points_;  // the best first
+  std::size_t step_ = 0;
+
+  std::array<double, codec::kMaxTemporalLayers> rates_{};  // bytes/s of each layer in ratesQuality_
+  std::uint8_t ratesQuality_ = 0;
+  std::optional<Clock::time_point> newestMade_;
+
+  std::optional<Clock::time_point> newestUpdate_;
+  Clock::duration strain_{}, calm_{};
+  Clock::time_point strainedSince_{};
+  std::size_t delivered_ = 0;  // bytes since strainedSince_
+  Clock::duration wait_ = kShortestWait, backOff_ = kShortestWait;
+  std::optional<Clock::time_point> steppedUp_;  // newest step up
+};
+
+}  // namespace clothstream::delivery

@@ -1,0 +1,295 @@
+// SPDX-License-Identifier: MIT
+#include "server/delivery/mailbox.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "clothstream/v1/session.pb.h"
+
+namespace clothstream::delivery {
+namespace {
+
+std::size_t costOf(const std::vector<std::byte>& message) {
+  return message.size() + Mailbox::kMessageOverhead;
+}
+
+SharedBytes messageOf(const OperatingPoint& point) {
+  v1::ServerMessage message;
+  message.mutable_operating_point()->set_quality(point.quality);
+  message.mutable_operating_point()->set_temporal_layers(point.layers);
+  return serialise(message);
+}
+
+}  // namespace
+
+bool Mailbox::push(Control& control, SharedBytes message) {
+  if (closed_) return true;
+  if (!control.messages.empty() && control.bytes + costOf(*message) > kMaxControlBytes) return false;
+  control.bytes += costOf(*message);
+  control.messages.push_back(std::move(message));
+  return true;
+}
+
+SharedBytes Mailbox::pop(Control& control) {
+  SharedBytes message = std::move(control.messages.front());
+  control.messages.pop_front();
+  control.bytes -= costOf(*message);
+  return message;
+}
+
+bool Mailbox::reply(SharedBytes message) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (!push(replies_, std::move(message))) return false;
+    endpointWaits_ = false;
+  }
+  wake();
+  return true;
+}
+
+bool Mailbox::announce(SharedBytes message) {
+  bool ready = false;
+  {
+    const std::lock_guard lock(mutex_);
+    if (!push(announcements_, std::move(message))) return false;
+    ready = streaming_;
+    if (ready) endpointWaits_ = false;
+  }
+  if (ready) wake();
+  return true;
+}
+
+void Mailbox::subscribe(std::shared_ptr<const DescriptionChunks> description, const StreamShape& shape,
+                        telemetry::SceneMetrics& metrics, OperatingPoint wanted) {
+  {
+    const std::lock_guard lock(mutex_);
+    description_ = std::move(description);
+    streaming_ = !description_;
+    shape_ = shape;
+    const auto coarsest = static_cast<std::uint8_t>(shape.qualities - 1);
+    adaptation_ = LinkAdaptation({std::min(wanted.quality, coarsest), std::min(wanted.layers, shape.layers)},
+                                 shape.qualities);
+    reported_ = {0, shape.layers};
+    quality_ = adaptation_.point().quality;
+    metrics_ = &metrics;
+    endpointWaits_ = false;
+  }
+  wake();
+}
+
+void Mailbox::deliver(const PublishedFrame& frame) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (!streaming_ || closed_ || (frame.repeated && !needsKey_)) return;
+    adapt(frame.complete);
+    if (frame.quality == quality_)
+      adaptation_.made(frame.quality, frame.layer, frame.message->size(), frame.complete);
+    else if (!frame.key || (shape_.qualities > 1 && frame.quality != chosenQuality()))
+      return;
+    if (!hold(frame) || !hasRoom()) return;
+    endpointWaits_ = false;
+  }
+  wake();
+}
+
+std::uint8_t Mailbox::chosenQuality() const {
+  return shape_.qualities > 1 ? adaptation_.point().quality : quality_;
+}
+
+void Mailbox::adapt(Clock::time_point now) {
+  const bool behind = !held_.empty() || (needsKey_ && !(endpointWaits_ && hasRoom()));
+  const OperatingPoint before = adaptation_.point();
+  if (!adaptation_.update(behind, now)) return;
+  const OperatingPoint after = adaptation_.point();
+  const bool up = after.quality < before.quality || after.layers > before.layers;
+  (up ? metrics_->stepsUp : metrics_->stepsDown).add();
+  if (after.layers < before.layers) dropHeld(after.layers);
+}
+
+bool Mailbox::hold(const PublishedFrame& frame) {
+  if (decodable_ && frame.tick <= *decodable_) return false;
+  if (frame.key) {
+    dropHeld(0);
+    chain_ = {};
+    quality_ = frame.quality;
+    needsKey_ = requestsKey_ = false;
+  } else if (frame.layer >= adaptation_.point().layers) {
+    metrics_->framesThinned.add();
+    return false;
+  } else if (needsKey_ || std::ranges::find(chain_, frame.referenceTick) == chain_.end()) {
+    needsKey_ = needsKey_ || frame.layer == 0;
+    countDropped(1);
+    return false;
+  } else if (!makeRoom(frame)) {
+    countDropped(1);
+    return false;
+  }
+  held_.push_back(frame);
+  heldBytes_ += frame.message->size();
+  chain_[frame.layer] = frame.tick;
+  return true;
+}
+
+bool Mailbox::makeRoom(const PublishedFrame& frame) {
+  const auto fits = [&] {
+    return held_.empty() || (held_.size() < kMaxHeld && heldBytes_ + frame.message->size() <= kMaxHeldBytes);
+  };
+  if (fits()) return true;
+  adaptation_.dropped(frame.complete);
+  for (std::uint8_t layer = shape_.layers; --layer > 0;) {
+    if (layer == frame.layer) return false;
+    dropHeld(layer);
+    if (fits()) return true;
+  }
+  dropHeld(0);
+  needsKey_ = true;
+  return false;
+}
+
+void Mailbox::dropHeld(std::uint8_t layer) {
+  countDropped(std::erase_if(held_, [&](const PublishedFrame& frame) {
+    if (frame.layer < layer) return false;
+    heldBytes_ -= frame.message->size();
+    chain_[frame.layer].reset();
+    return true;
+  }));
+}
+
+RequestedFrames Mailbox::requested(Clock::time_point now) {
+  const std::lock_guard lock(mutex_);
+  RequestedFrames requested;
+  if (!streaming_ || closed_) return requested;
+  adapt(now);
+  const auto add = [&](std::uint8_t quality, bool key) {
+    const auto bit = static_cast<std::uint8_t>(1u << quality);
+    requested |= {.qualities = bit, .keyFrames = key ? bit : std::uint8_t{0}};
+  };
+  if (!needsKey_) add(quality_, requestsKey_);
+  if (needsKey_ ? endpointWaits_ && hasRoom() : chosenQuality() != quality_) add(chosenQuality(), true);
+  return requested;
+}
+
+std::uint8_t Mailbox::needsKeyFrame() const {
+  const std::lock_guard lock(mutex_);
+  if (!streaming_ || closed_ || !needsKey_ || !endpointWaits_ || !hasRoom()) return 0;
+  return static_cast<std::uint8_t>(1u << chosenQuality());
+}
+
+bool Mailbox::acknowledge(std::uint64_t tick, Clock::time_point now) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (tick > newestSent_) return false;
+    if (!sent_.empty() && sent_.front().tick <= tick) leavesOut_ = sent_.front().tick < tick;
+    while (!sent_.empty() && sent_.front().tick <= tick) {
+      adaptation_.delivered(sent_.front().bytes);
+      // A minimum that grows slowly (by half in about 200 frames), so that a longer route is noticed.
+      if (roundTrip_) *roundTrip_ *= 1.002;
+      if (sent_.front().tick == tick) {
+        const double sample = schedule::seconds(now - sent_.front().time);
+        roundTrip_ = roundTrip_ ? std::min(sample, *roundTrip_) : sample;
+      }
+      sent_.pop_front();
+    }
+    if (held_.empty() || !hasRoom()) return true;
+    endpointWaits_ = false;
+  }
+  wake();
+  return true;
+}
+
+void Mailbox::restart() {
+  const std::lock_guard lock(mutex_);
+  dropHeld(0);
+  sent_.clear();
+  decodable_.reset();
+  leavesOut_ = false;
+  needsKey_ = true;
+}
+
+void Mailbox::requestKeyFrame() {
+  const std::lock_guard lock(mutex_);
+  requestsKey_ = true;
+}
+
+void Mailbox::close(SharedBytes last) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (closed_) return;
+    closed_ = true;
+    held_.clear();
+    heldBytes_ = 0;
+    description_.reset();
+    announcements_ = {};
+    // Queued replies are still sent. Their memory stays bounded if the peer does not read them.
+    if (last) {
+      replies_.bytes += costOf(*last);
+      replies_.messages.push_back(std::move(last));
+    }
+  }
+  wake();
+}
+
+bool Mailbox::closed() const {
+  const std::lock_guard lock(mutex_);
+  return closed_;
+}
+
+std::optional<SharedBytes> Mailbox::next(Clock::time_point now) {
+  const std::lock_guard lock(mutex_);
+  std::optional<SharedBytes> message = take(now);
+  endpointWaits_ = !message;
+  return message;
+}
+
+std::optional<SharedBytes> Mailbox::take(Clock::time_point now) {
+  if (!replies_.messages.empty()) return pop(replies_);
+  if (closed_) return std::nullopt;
+  if (description_) {
+    SharedBytes chunk = description_->chunk(nextChunk_++);
+    if (nextChunk_ == description_->count()) {
+      description_.reset();
+      streaming_ = true;
+    }
+    return chunk;
+  }
+  if (!streaming_) return std::nullopt;
+  if (!announcements_.messages.empty()) return pop(announcements_);
+  if (held_.empty() || !hasRoom()) return std::nullopt;
+  const OperatingPoint point{held_.front().quality, adaptation_.point().layers};
+  if (point != reported_) {
+    reported_ = point;
+    return messageOf(point);
+  }
+
+  const PublishedFrame frame = std::move(held_.front());
+  held_.pop_front();
+  heldBytes_ -= frame.message->size();
+  sent_.push_back({frame.tick, frame.message->size(), now});
+  decodable_ = newestSent_ = frame.tick;
+  metrics_->framesTaken.add();
+  metrics_->send.record(schedule::seconds(now - frame.complete));
+  return frame.message;
+}
+
+std::size_t Mailbox::window() const {
+  const int leftOut = shape_.layers - adaptation_.point().layers;
+  const double inFlight = std::ceil(roundTrip_.value_or(0) * (shape_.rate >> leftOut)) + (leavesOut_ ? 1 : 0);
+  return kMinWindow + static_cast<std::size_t>(std::min(inFlight, double{kMaxWindow - kMinWindow}));
+}
+
+void Mailbox::countDropped(std::size_t frames) {
+  if (metrics_ != nullptr) metrics_->framesDropped.add(frames);
+}
+
+void Mailbox::wake() {
+  const std::lock_guard lock(wakeMutex_);
+  if (wake_) wake_();
+}
+
+void Mailbox::silence() {
+  const std::lock_guard lock(wakeMutex_);
+  wake_ = nullptr;
+}
+
+}  // namespace clothstream::delivery

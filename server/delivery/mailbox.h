@@ -1,0 +1,153 @@
+// SPDX-License-Identifier: MIT
+// Send queue of one peer: control messages first, then the newest frames that it can decode and has room for.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+
+#include "server/delivery/description_chunks.h"
+#include "server/delivery/envelope.h"
+#include "server/delivery/link_adaptation.h"
+#include "server/delivery/published_frame.h"
+#include "server/telemetry/metrics.h"
+
+namespace clothstream::delivery {
+
+// Thread-safe.
+//
+// Memory per subscriber: replies and announcements of at most kMaxControlBytes each (or one larger message),
+// kMaxHeld frames of at most kMaxHeldBytes in all (or one larger frame), and one description. Frames and
+// description are shared with the other subscribers.
+//
+// Room for frames: at most window() frames are sent and not acknowledged. The window is 2, plus 1 for a peer
+// that acknowledges several frames at once, plus the frames sent in one round-trip time. The round-trip time
+// is the recent minimum of the time from sending a frame to its acknowledgement. A minimum is used because a
+// queue on the way must not enlarge the window that feeds it.
+//
+// A predicted frame is sent only if the frame that it refers to was sent. For a subscriber without room, up
+// to kMaxHeld frames are held. If more arrive, frames of the highest layer are dropped first, because no
+// other layer needs them. If the base layer alone is too much, all held frames are dropped, and the
+// subscriber continues with the next key frame. It asks for that key frame once it has room and its endpoint
+// waits for something to write. A peer that does not read therefore asks for nothing.
+//
+// LinkAdaptation chooses layers and quality; the peer gets an OperatingPoint message when they change. A new
+// quality begins with a key frame; until then the former quality continues. A subscriber that was sent a tick
+// in one quality never gets a key frame of the same tick in another one, because decoders reject it as stale.
+class Mailbox {
+ public:
+  static constexpr std::size_t kMaxControlBytes = 256 * 1024;
+  // Bytes counted for each control message in addition to its size.
+  static constexpr std::size_t kMessageOverhead = 128;
+  static constexpr std::size_t kMaxHeld = 3;
+  static constexpr std::size_t kMaxHeldBytes = 1024 * 1024;
+  static constexpr std::size_t kMinWindow = 2;
+  static constexpr std::size_t kMaxWindow = 24;
+
+  // `wake` is called, from any thread, when next() may have something or closed() became true. It must not
+  // block.
+  explicit Mailbox(std::function<void()> wake) : wake_(std::move(wake)) {}
+
+  // Queues an answer to this peer. Returns false if there is no room: the peer sends requests and does not
+  // read the answers.
+  [[nodiscard]] bool reply(SharedBytes message);
+  // Queues a message that everybody in the scene gets; it is sent after the description. Returns false if
+  // there is no room.
+  [[nodiscard]] bool announce(SharedBytes message);
+
+  // Starts sending frames: the description first, unless it is null because the peer has it already. `wanted`
+  // is limited to what the stream has. `metrics` must outlive the mailbox.
+  void subscribe(std::shared_ptr<const DescriptionChunks> description, const StreamShape& shape,
+                 telemetry::SceneMetrics& metrics, OperatingPoint wanted = {0, codec::kMaxTemporalLayers});
+  void deliver(const PublishedFrame& frame);
+  // Returns what the subscriber asks of the next frame. Call it whenever a frame is made, because it also
+  // measures the time in which the subscriber gets no frames.
+  RequestedFrames requested(Clock::time_point now);
+  // Returns the quality, as a bit, in which the subscriber needs a key frame to continue and has room for it;
+  // 0 if it needs none. May be called while no frames are made.
+  std::uint8_t needsKeyFrame() const;
+
+  // The peer has decoded this tick. Returns false if the tick was never sent.
+  [[nodiscard]] bool acknowledge(std::uint64_t tick, Clock::time_point now);
+  // The peer cannot continue decoding: it restarts with a key frame.
+  void restart();
+  // The peer continues decoding and asks for a key frame soon.
+  void requestKeyFrame();
+
+  // Accepts no more frames and announcements, and drops those that were not sent. `last` is the last message,
+  // or null. Only the first call counts.
+  void close(SharedBytes last);
+  bool closed() const;
+
+  // Returns the next message to write, or nothing.
+  std::optional<SharedBytes> next(Clock::time_point now);
+
+  // Calls `wake`, unless silence() has returned.
+  void wake();
+  // `wake` is not called any more after the return. The caller must hold no lock that `wake` takes.
+  void silence();
+
+ private:
+  struct Sent {
+    std::uint64_t tick;
+    std::size_t bytes;
+    Clock::time_point time;
+  };
+  struct Control {
+    std::deque<SharedBytes> messages;
+    std::size_t bytes = 0;
+  };
+
+  std::optional<SharedBytes> take(Clock::time_point now);
+  bool push(Control& control, SharedBytes message);
+  static SharedBytes pop(Control& control);
+  bool hasRoom() const { return sent_.size() < window(); }
+  std::size_t window() const;
+  // Quality that the adaptation chose; the present one if the stream has a single quality.
+  std::uint8_t chosenQuality() const;
+  void adapt(Clock::time_point now);
+  // Queues a frame. Returns false if its layer is left out, it cannot be decoded, or there is no room.
+  bool hold(const PublishedFrame& frame);
+  // Drops held frames, the highest layer first, until `frame` fits. Returns false if `frame` itself must be
+  // dropped.
+  bool makeRoom(const PublishedFrame& frame);
+  // Drops the held frames of this layer and the layers above it.
+  void dropHeld(std::uint8_t layer);
+  void countDropped(std::size_t frames);
+
+  mutable std::mutex mutex_;
+  bool closed_ = false;
+  bool endpointWaits_ = false;  // next() returned nothing, and nothing has arrived since
+  Control replies_, announcements_;
+
+  std::shared_ptr<const DescriptionChunks> description_;
+  std::size_t nextChunk_ = 0;
+
+  telemetry::SceneMetrics* metrics_ = nullptr;
+  StreamShape shape_;
+  LinkAdaptation adaptation_{{}, 1};
+  OperatingPoint reported_;  // newest one sent to the peer
+  bool streaming_ = false;   // the description is sent
+  bool needsKey_ = true;
+  bool requestsKey_ = false;  // the peer asked for a key frame and continues without it
+  std::uint8_t quality_ = 0;
+  // Tick of the newest frame of each layer that is held, or else was sent.
+  std::array<std::optional<std::uint64_t>, codec::kMaxTemporalLayers> chain_;
+  std::deque<PublishedFrame> held_;
+  std::size_t heldBytes_ = 0;
+  std::deque<Sent> sent_;  // frames that are not acknowledged
+  std::uint64_t newestSent_ = 0;
+  std::optional<std::uint64_t> decodable_;  // newest tick sent since the last restart()
+  bool leavesOut_ = false;                  // the newest acknowledgement covered more than one frame
+  std::optional<double> roundTrip_;         // s
+
+  std::mutex wakeMutex_;
+  std::function<void()> wake_;
+};
+
+}  // namespace clothstream::delivery

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: MIT
+// Subscribers of a scene: the mailboxes that its frames and announcements go to.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <vector>
+
+#include "server/delivery/mailbox.h"
+
+namespace clothstream::delivery {
+
+// The only list of a scene's mailboxes. Simulated scenes and played recordings publish to it. Thread-safe;
+// publish() belongs to one thread.
+class Subscribers {
+ public:
+  // `tap`, if any, gets a copy of everything that is sent to all subscribers: announcements, and of each tick
+  // the first frame in the finest quality. It is called on the publishing thread and must not block.
+  explicit Subscribers(std::function<void(const SharedBytes&)> tap = {}) : tap_(std::move(tap)) {}
+
+  // `participant` is the number by which find() knows the mailbox; 0 for none.
+  void add(std::shared_ptr<Mailbox> mailbox, std::uint64_t participant = 0);
+  void remove(const Mailbox& mailbox);
+  std::size_t size() const;
+
+  // Participant of this mailbox; 0 if the mailbox is not in the list.
+  std::uint64_t participantOf(const Mailbox& mailbox) const;
+  // Mailbox of this participant; null if the participant is disconnected.
+  std::shared_ptr<Mailbox> find(std::uint64_t participant) const;
+
+  void publish(const PublishedFrame& frame);
+  // Closes the mailbox of every subscriber that has no room for the message.
+  void announce(const SharedBytes& message);
+  // Closes every mailbox with this last message, and removes them all.
+  void closeAll(const SharedBytes& last);
+  // What all subscribers together ask of the next frame. Call it whenever a frame is made.
+  RequestedFrames requested(Clock::time_point now) const;
+  // Qualities, as bits, in which a subscriber needs a key frame; see Mailbox::needsKeyFrame().
+  std::uint8_t needsKeyFrame() const;
+
+ private:
+  struct Subscriber {
+    std::shared_ptr<Mailbox> mailbox;
+    std::uint64_t participant = 0;
+  };
+
+  const std::function<void(const SharedBytes&)> tap_;
+  mutable std::mutex mutex_;
+  std::vector<Subscriber> subscribers_;
+  // Used by publish() alone. It avoids waking mailboxes under the lock and allocating for every frame.
+  std::vector<Subscriber> receivers_;
+};
+
+}  // namespace clothstream::delivery

@@ -1,0 +1,330 @@
+// SPDX-License-Identifier: MIT
+#include "server/hosting/device_thread.h"
+
+#include <algorithm>
+#include <exception>
+#include <stdexcept>
+#include <utility>
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include "clothstream/v1/session.pb.h"
+#include "server/delivery/envelope.h"
+
+namespace clothstream::hosting {
+namespace {
+
+// Interval at which a paused scene looks for subscribers that need a key frame.
+constexpr std::chrono::milliseconds kPausedFramePeriod{50};
+
+}  // namespace
+
+DeviceThread::DeviceThread(const vulkan::DeviceOptions& device,
+                           const std::vector<std::shared_ptr<scene::LiveScene>>& scenes,
+                           delivery::FramePublisher& publisher, telemetry::ServerMetrics& metrics,
+                           bool runAlways, double reportRate)
+    : options_(device),
+      publisher_(publisher),
+      metrics_(metrics),
+      runAlways_(runAlways),
+      reportRate_(reportRate),
+      loader_(publisher.workers(), [this] { wake(); }) {
+  std::promise<void> ready;
+  std::future<void> isReady = ready.get_future();
+  thread_ = std::thread([this, &scenes, ready = std::move(ready)]() mutable { run(scenes, ready); });
+  try {
+    isReady.get();
+  } catch (...) {
+    thread_.join();
+    throw;
+  }
+}
+
+DeviceThread::~DeviceThread() {
+  {
+    const std::lock_guard lock(mutex_);
+    stopping_ = true;
+  }
+  changed_.notify_all();
+  thread_.join();
+}
+
+void DeviceThread::wake() {
+  {
+    const std::lock_guard lock(mutex_);
+    woken_ = true;
+  }
+  changed_.notify_all();
+}
+
+void DeviceThread::simulateDeviceLoss() {
+  {
+    const std::lock_guard lock(mutex_);
+    loseDevice_ = true;
+  }
+  changed_.notify_all();
+}
+
+vulkan::DeviceInfo DeviceThread::info() const {
+  const std::lock_guard lock(mutex_);
+  return info_;
+}
+
+std::future<void> DeviceThread::post(std::packaged_task<void()> task) {
+  std::future<void> done = task.get_future();
+  {
+    const std::lock_guard lock(mutex_);
+    tasks_.push_back(std::move(task));
+  }
+  wake();
+  return done;
+}
+
+std::future<void> DeviceThread::add(std::shared_ptr<scene::LiveScene> scene) {
+  std::promise<void> added;
+  std::future<void> whenAdded = added.get_future();
+  post(std::packaged_task<void()>([this, scene = std::move(scene), added = std::move(added)]() mutable {
+    if (!device_)
+      return added.set_exception(std::make_exception_ptr(std::runtime_error("there is no device")));
+    runs_.push_back(std::make_unique<Run>(std::move(scene)));
+    runs_.back()->whenAdded = std::move(added);
+  }));
+  return whenAdded;
+}
+
+std::future<void> DeviceThread::remove(std::shared_ptr<scene::LiveScene> scene) {
+  return post(std::packaged_task<void()>([this, scene = std::move(scene)] {
+    // Waiting frames refer to the scene.
+    publisher_.drain();
+    std::erase_if(runs_, [&](const auto& run) { return run->scene == scene; });
+  }));
+}
+
+void DeviceThread::runTasks() {
+  std::vector<std::packaged_task<void()>> tasks;
+  {
+    const std::lock_guard lock(mutex_);
+    tasks.swap(tasks_);
+  }
+  for (std::packaged_task<void()>& task : tasks) task();
+}
+
+void DeviceThread::run(const std::vector<std::shared_ptr<scene::LiveScene>>& scenes,
+                       std::promise<void>& ready) {
+  try {
+    if (!scenes.empty()) {
+      device_ = std::make_unique<vulkan::Device>(options_);
+      for (const auto& scene : scenes) runs_.push_back(std::make_unique<Run>(scene));
+      scene::LiveScene& first = *runs_.front()->scene;
+      runs_.front()->host = std::make_unique<scene::SceneHost>(*device_, first, publisher_, reportRate_);
+      info_ = device_->info();
+    }
+  } catch (...) {
+    runs_.clear();
+    device_.reset();
+    ready.set_exception(std::current_exception());
+    return;
+  }
+  ready.set_value();
+
+  while (waitForWork()) {
+    try {
+      runTasks();
+      takeLoadedScenes();
+      startAndStopScenes();
+      encodePausedFrames();
+      runDueTicks();
+    } catch (const std::exception& failure) {
+      rebuildDevice(failure.what());
+    }
+  }
+  publisher_.drain();
+  loader_.abandon();
+  runs_.clear();
+  device_.reset();
+}
+
+bool DeviceThread::waitForWork() {
+  Clock::time_point due = Clock::time_point::max();
+  for (const auto& run : runs_) due = std::min(due, run->due());
+  const auto something = [&] { return stopping_ || woken_ || loseDevice_; };
+
+  std::unique_lock lock(mutex_);
+  if (due != Clock::time_point::max())
+    changed_.wait_until(lock, due, something);
+  else
+    changed_.wait(lock, something);
+  woken_ = false;
+  return !stopping_;
+}
+
+void DeviceThread::takeLoadedScenes() {
+  for (const auto& run : runs_)
+    if (run->loading.valid() && run->loading.wait_for(std::chrono::seconds(0)) == std::future_status::ready)
+      take(*run);
+  std::erase_if(runs_, [](const auto& run) { return run->refused; });
+}
+
+void DeviceThread::take(Run& run) {
+  try {
+    if (run.host)
+      run.host->rebuild(run.loading.get(), "a tick failed");
+    else
+      run.host = std::make_unique<scene::SceneHost>(run.loading.get(), *run.scene, publisher_, reportRate_);
+    if (run.whenAdded) run.whenAdded->set_value();
+    run.whenAdded.reset();
+  } catch (const vulkan::DeviceLost&) {
+    throw;
+  } catch (const std::exception& failure) {
+    run.refused = run.whenAdded.has_value();
+    if (run.refused)
+      run.whenAdded->set_exception(std::current_exception());
+    else if (run.host && !std::exchange(run.rebuildFailed, true))
+      spdlog::error("{}: cannot be rebuilt: {}; trying again", run.scene->name(), failure.what());
+    else
+      dismiss(run, failure.what());
+  }
+}
+
+void DeviceThread::dismiss(Run& run, const std::string& why) {
+  const std::string text = fmt::format("the device cannot run the scene '{}': {}", run.scene->name(), why);
+  spdlog::error("{}", text);
+  run.host.reset();
+  run.failed.reset();
+  scene::LiveScene& scene = *run.scene;
+  scene.roster.dismiss(delivery::error(v1::ERROR_CODE_RESOURCE_EXHAUSTED, text, true));
+  // For participants that have joined again already.
+  scene.subscribers.announce(delivery::parametersChanged(scene.restart(), 1));
+}
+
+void DeviceThread::startAndStopScenes() {
+  for (const auto& run : runs_) {
+    const scene::LiveScene& scene = *run->scene;
+    const bool inUse = scene.subscribers.size() > 0;
+    const bool ready = run->host && run->host->isReady();
+    if ((inUse || run->host || run->whenAdded) && !ready && !run->loading.valid())
+      run->loading = loader_.load(*device_, scene.start());
+    const bool stopped = scene.paused && !scene.resetRequested && !(ready && run->host->owesFrame());
+    const bool wanted = ready && !stopped && (runAlways_ || inUse);
+    if (wanted && !run->running) {
+      run->pacer.start(Clock::now());
+      run->slow.restart();
+    }
+    const bool paused = ready && inUse && !wanted;
+    if (ready && !wanted && (run->running || (run->paused && !paused))) run->host->releaseCoarseEncoders();
+    run->running = wanted;
+    run->paused = paused;
+    run->scene->running = wanted;
+  }
+}
+
+void DeviceThread::encodePausedFrames() {
+  const Clock::time_point now = Clock::now();
+  for (const auto& run : runs_) {
+    if (!run->paused || now < run->nextPausedFrame) continue;
+    run->nextPausedFrame = now + kPausedFramePeriod;
+    survives(*run, [&] { run->host->encodePausedFrame(now); });
+  }
+}
+
+void DeviceThread::runDueTicks() {
+  {
+    const std::lock_guard lock(mutex_);
+    if (std::exchange(loseDevice_, false)) throw vulkan::DeviceLost("the loss of the device is simulated");
+  }
+  schedules_.clear();
+  for (const auto& run : runs_) schedules_.push_back(run.get());
+  Clock::time_point before = Clock::now();
+  schedule::scheduleTicks(schedules_, before, chosen_);
+  for (schedule::TickSchedule* due : chosen_) {
+    Run& run = static_cast<Run&>(*due);
+    run.begun = survives(run, [&] { begin(run, Clock::now()); });
+  }
+  for (schedule::TickSchedule* due : chosen_) {
+    Run& run = static_cast<Run&>(*due);
+    if (!run.begun || !survives(run, [&] { run.host->finish(); })) continue;
+    const Clock::time_point after = Clock::now();
+    run.tickEnded(after - before, after);
+    before = after;
+  }
+}
+
+bool DeviceThread::survives(Run& run, const std::function<void()>& partOfTick) {
+  try {
+    partOfTick();
+    return true;
+  } catch (const vulkan::DeviceLost&) {
+    throw;
+  } catch (const std::exception& failure) {
+    rebuildScene(run, failure.what());
+    return false;
+  }
+}
+
+void DeviceThread::rebuildScene(Run& run, const std::string& reason) {
+  spdlog::error("{}: a tick failed: {}", run.scene->name(), reason);
+  publisher_.drain();
+  device_->drain();
+  const std::uint64_t ticks = run.host->tick();
+  if (run.failed && ticks - *run.failed < run.scene->start().simulationRate) return dismiss(run, reason);
+  run.failed = ticks;
+  run.rebuildFailed = false;
+  run.host->release();
+  wake();
+}
+
+void DeviceThread::begin(Run& run, Clock::time_point now) {
+  const schedule::Pacer::Start start = run.pacer.begin(now, run.catchUp);
+  scene::LiveScene& scene = *run.scene;
+  scene.metrics.lateness.record(schedule::seconds(start.lateness));
+  if (start.late) scene.metrics.lateTicks.add();
+  scene.metrics.slippedTicks.add(run.wholeSlippedTicks(start.slippedTicks));
+  if (const std::optional<double> speed = run.slow.note(now, start.slippedTicks)) {
+    const std::string text = fmt::format(
+        "simulated time runs at {:.0f} % of real time: the device cannot keep {} ticks/s with {} substeps",
+        *speed * 100, scene.start().simulationRate, scene.start().substeps);
+    spdlog::warn("{}: {}", scene.name(), text);
+    scene.subscribers.announce(delivery::notice(v1::NOTICE_KIND_RUNNING_SLOW, text, run.host->tick()));
+  }
+  run.host->begin(now);
+}
+
+void DeviceThread::rebuildDevice(const std::string& reason) {
+  spdlog::error("device: {}; rebuilding it and every scene", reason);
+  // Frames of the old device are published first, because they use its memory.
+  publisher_.drain();
+  loader_.abandon();
+  for (const auto& run : runs_) run->loading = {};
+  do {
+    runTasks();
+    std::unique_lock lock(mutex_);
+    if (changed_.wait_until(lock, nextRebuild_, [&] { return stopping_; })) return;
+    nextRebuild_ = Clock::now() + std::chrono::seconds(1);
+  } while (!tryRebuildDevice());
+}
+
+bool DeviceThread::tryRebuildDevice() {
+  for (const auto& run : runs_)
+    if (run->host) run->host->release();
+  device_.reset();
+  try {
+    device_ = std::make_unique<vulkan::Device>(options_);
+    for (const auto& run : runs_)
+      if (run->host)
+        run->host->rebuild(
+            std::make_unique<scene::SceneOnDevice>(*device_, run->scene->start(), publisher_.workers()),
+            "the device was lost");
+  } catch (const std::exception& failure) {
+    spdlog::error("device: {}; trying again", failure.what());
+    return false;
+  }
+  metrics_.deviceRebuilds.add();
+  for (const auto& run : runs_) run->pacer.start(Clock::now());
+  spdlog::info("device: {} runs {} scenes again", device_->info().name, runs_.size());
+  const std::lock_guard lock(mutex_);
+  info_ = device_->info();
+  return true;
+}
+
+}  // namespace clothstream::hosting

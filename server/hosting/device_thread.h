@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: MIT
+// Thread that owns the device and runs the ticks of every scene when they are due.
+#pragma once
+
+#include <cmath>
+#include <condition_variable>
+#include <cstdint>
+#include <functional>
+#include <future>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "server/delivery/frame_publisher.h"
+#include "server/scene/live_scene.h"
+#include "server/scene/scene_host.h"
+#include "server/scene/scene_loader.h"
+#include "server/schedule/slow_watch.h"
+#include "server/schedule/tick_scheduler.h"
+#include "server/telemetry/metrics.h"
+#include "server/vulkan/device.h"
+
+namespace clothstream::hosting {
+
+using schedule::Clock;
+
+// Thread-safe.
+//
+// Ticks that are due together are all submitted before the first is waited for. A scene is loaded onto the
+// device when it is first joined, on another thread while other scenes run. It sleeps while it has no
+// subscribers.
+//
+// Device loss: a new device is created, and every scene continues from its newest snapshot on the CPU. This
+// is tried once a second until it succeeds. If a tick fails in another way, only its scene is rebuilt like
+// this. A scene is given up if a tick fails again within a simulated second, or if rebuilding it fails twice:
+// all participants are dismissed, and the next join starts it from the beginning.
+class DeviceThread {
+ public:
+  // Returns when the device and the first scene are ready. Without scenes there is no device, and none can be
+  // added. All arguments must outlive the thread. Throws what the device or the first scene throws.
+  DeviceThread(const vulkan::DeviceOptions& device,
+               const std::vector<std::shared_ptr<scene::LiveScene>>& scenes,
+               delivery::FramePublisher& publisher, telemetry::ServerMetrics& metrics, bool runAlways,
+               double reportRate);
+  // Ends after the ticks in flight.
+  ~DeviceThread();
+  DeviceThread(const DeviceThread&) = delete;
+  DeviceThread& operator=(const DeviceThread&) = delete;
+
+  // Call after a subscriber joined or left, or a scene was paused, resumed or reset.
+  void wake();
+
+  // Loads a scene and adds it. The future is ready when the scene is. It throws what the device or the scene
+  // throws, or std::future_error if the thread ends first; then nothing has changed.
+  std::future<void> add(std::shared_ptr<scene::LiveScene> scene);
+  // The future is ready when the scene is no longer used.
+  std::future<void> remove(std::shared_ptr<scene::LiveScene> scene);
+
+  vulkan::DeviceInfo info() const;
+
+  // Treats the device as lost before the next tick. For tests.
+  void simulateDeviceLoss();
+
+ private:
+  struct Run : schedule::TickSchedule {
+    explicit Run(std::shared_ptr<scene::LiveScene> live)
+        : TickSchedule(live->start().simulationRate), scene(std::move(live)) {}
+    // Adds slipped ticks, and returns the whole ticks that are not counted yet.
+    std::uint64_t wholeSlippedTicks(double ticks) {
+      slipped += ticks;
+      const double whole = std::floor(slipped);
+      slipped -= whole;
+      return static_cast<std::uint64_t>(whole);
+    }
+
+    // Time at which the scene next needs the thread.
+    Clock::time_point due() const {
+      if (running) return pacer.due();
+      return paused ? nextPausedFrame : Clock::time_point::max();
+    }
+
+    std::shared_ptr<scene::LiveScene> scene;
+    scene::SceneLoader::Future loading;           // valid while it is loaded
+    std::unique_ptr<scene::SceneHost> host;       // once it is loaded
+    std::optional<std::promise<void>> whenAdded;  // set by add(), until the scene is ready
+    bool refused = false;                         // added, but cannot run
+    bool begun = false;                           // the current tick
+    bool paused = false;                          // while it has subscribers
+    Clock::time_point nextPausedFrame{};          // next check for subscribers that need a key frame
+    std::optional<std::uint64_t> failed;          // tick count at the newest failure
+    bool rebuildFailed = false;                   // since the newest failure
+    schedule::SlowWatch slow;
+    double slipped = 0;  // ticks that are not counted yet, below 1
+  };
+
+  void run(const std::vector<std::shared_ptr<scene::LiveScene>>& scenes, std::promise<void>& ready);
+  std::future<void> post(std::packaged_task<void()> task);
+  void runTasks();
+  // Returns false when the thread must end.
+  bool waitForWork();
+  void startAndStopScenes();
+  // Creates the hosts of loaded scenes.
+  void takeLoadedScenes();
+  // Throws vulkan::DeviceLost.
+  void take(Run& run);
+  // Gives the scene up and dismisses its participants.
+  void dismiss(Run& run, const std::string& why);
+  // Encodes frames of paused scenes for subscribers that need a key frame.
+  void encodePausedFrames();
+  void runDueTicks();
+  // Runs a part of a tick. Returns false if it failed; the scene is then rebuilt. Throws vulkan::DeviceLost.
+  bool survives(Run& run, const std::function<void()>& partOfTick);
+  void rebuildScene(Run& run, const std::string& reason);
+  void begin(Run& run, Clock::time_point now);
+  void rebuildDevice(const std::string& reason);
+  bool tryRebuildDevice();
+
+  const vulkan::DeviceOptions options_;
+  delivery::FramePublisher& publisher_;
+  telemetry::ServerMetrics& metrics_;
+  const bool runAlways_;
+  const double reportRate_;
+
+  mutable std::mutex mutex_;
+  std::condition_variable changed_;
+  // Initially woken, because a scene may run without subscribers.
+  bool stopping_ = false, woken_ = true, loseDevice_ = false;
+  vulkan::DeviceInfo info_;
+  std::vector<std::packaged_task<void()>> tasks_;
+
+  // Owned by the thread.
+  std::unique_ptr<vulkan::Device> device_;
+  std::vector<std::unique_ptr<Run>> runs_;
+  std::vector<schedule::TickSchedule*> schedules_, chosen_;  // of runs_
+  scene::SceneLoader loader_;                                // for device_
+  Clock::time_point nextRebuild_{};                          // earliest time of the next rebuild
+
+  std::thread thread_;
+};
+
+}  // namespace clothstream::hosting

@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: MIT
+// A connected peer, as the server that admitted it sees it.
+#pragma once
+
+#include "server/delivery/envelope.h"
+#include "server/schedule/clock.h"
+
+namespace clothstream::hosting {
+
+// Thread-safe.
+class Peer {
+ public:
+  virtual ~Peer() = default;
+
+  // Closes the connection with this last message. The peer leaves its scene for good.
+  virtual void close(delivery::SharedBytes last) = 0;
+  // Disconnects the peer if it has been silent for too long. Called about once a second.
+  virtual void checkSilence(schedule::Clock::time_point now) = 0;
+};
+
+}  // namespace clothstream::hosting

@@ -1,0 +1,203 @@
+// SPDX-License-Identifier: MIT
+#include "server/hosting/scene_maker.h"
+
+#include <algorithm>
+#include <exception>
+#include <memory>
+#include <utility>
+
+#include <boost/asio/post.hpp>
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include "clothstream/v1/session.pb.h"
+#include "server/hosting/server_state.h"
+#include "server/messages/scene_file.h"
+#include "server/messages/scene_message.h"
+#include "server/messages/validation.h"
+
+namespace clothstream::hosting {
+namespace {
+
+tl::unexpected<v1::Error> refused(v1::ErrorCode code, std::string text) {
+  v1::Error error;
+  error.set_code(code);
+  error.set_text(std::move(text));
+  return tl::unexpected(std::move(error));
+}
+
+tl::expected<model::Scene, v1::Error> checked(messages::Result<model::Scene> scene) {
+  if (!scene) return refused(scene.error().code, "createScene.scene: " + scene.error().text);
+  return std::move(*scene);
+}
+
+// Returns the result of `work`. An exception, such as for a mesh that is too large for the memory, becomes an
+// error for the peer that asked.
+template <class Work>
+auto attempt(const char* call, const Work& work) -> decltype(work()) {
+  try {
+    return work();
+  } catch (const std::exception& failure) {
+    spdlog::error("{}: {}", call, failure.what());
+    return refused(v1::ERROR_CODE_RESOURCE_EXHAUSTED,
+                   fmt::format("{}: failed on the server: {}", call, failure.what()));
+  }
+}
+
+}  // namespace
+
+void SceneMaker::create(v1::CreateSceneRequest request, std::optional<UploadedContent> uploaded,
+                        CreateDone done) {
+  if (++waiting_ > kMostWaiting) {
+    --waiting_;
+    return done(
+        refused(v1::ERROR_CODE_RESOURCE_EXHAUSTED,
+                fmt::format("createScene: {} scenes wait to be created; try again later", kMostWaiting)));
+  }
+  boost::asio::post(thread_, [this, request = std::move(request), uploaded = std::move(uploaded),
+                              done = std::move(done)]() mutable {
+    --waiting_;
+    static const std::string nothing;
+    auto made =
+        attempt("createScene", [&] { return createNow(request, uploaded ? uploaded->bytes : nothing); });
+    uploaded.reset();  // before the answer, so that the peer may upload again at once
+    done(std::move(made));
+  });
+}
+
+void SceneMaker::remove(v1::DeleteSceneRequest request, DeleteDone done) {
+  boost::asio::post(thread_, [this, request = std::move(request), done = std::move(done)] {
+    done(attempt("deleteScene", [&] { return removeNow(request); }));
+  });
+}
+
+tl::expected<std::shared_ptr<scene::Journal>, v1::Error> SceneMaker::journalOf(
+    const std::string& name) const {
+  const std::shared_ptr<scene::LiveScene> scene = server_.find(name);
+  if (!scene) return tl::unexpected(server_.noSuchScene(name));
+  if (scene->source)
+    return refused(v1::ERROR_CODE_INVALID_ARGUMENT,
+                   fmt::format("startRecording: '{}' is a recording that is played", scene->name()));
+  if (!scene->journal) return refused(scene::noJournalError().code, scene::noJournalError().text);
+  return scene->journal;
+}
+
+void SceneMaker::startRecording(v1::StartRecordingRequest request, StartRecordingDone done) {
+  boost::asio::post(thread_, [this, request = std::move(request), done = std::move(done)] {
+    done(attempt("startRecording", [&] { return startNow(request); }));
+  });
+}
+
+void SceneMaker::stopRecording(v1::StopRecordingRequest request, StopRecordingDone done) {
+  boost::asio::post(thread_, [this, request = std::move(request), done = std::move(done)] {
+    done(attempt("stopRecording", [&] { return stopNow(request); }));
+  });
+}
+
+tl::expected<v1::StartRecordingResponse, v1::Error> SceneMaker::startNow(
+    const v1::StartRecordingRequest& request) const {
+  const auto journal = journalOf(request.scene());
+  if (!journal) return tl::unexpected(journal.error());
+  auto file = (*journal)->start(request.name());
+  if (!file) return refused(file.error().code, std::move(file.error().text));
+  v1::StartRecordingResponse response;
+  response.set_file(std::move(*file));
+  return response;
+}
+
+tl::expected<v1::StopRecordingResponse, v1::Error> SceneMaker::stopNow(
+    const v1::StopRecordingRequest& request) const {
+  const auto journal = journalOf(request.scene());
+  if (!journal) return tl::unexpected(journal.error());
+  auto stopped = (*journal)->stop();
+  if (!stopped) return refused(stopped.error().code, std::move(stopped.error().text));
+  return std::move(*stopped);
+}
+
+tl::expected<model::Scene, v1::Error> SceneMaker::definitionOf(const v1::CreateSceneRequest& request,
+                                                               const std::string& uploaded) const {
+  switch (request.source_case()) {
+    case v1::CreateSceneRequest::kScene:
+      return checked(messages::toScene(request.scene()));
+    case v1::CreateSceneRequest::kUploadedContentId: {
+      v1::Scene message;
+      if (!message.ParseFromString(uploaded))
+        return refused(v1::ERROR_CODE_MALFORMED_MESSAGE,
+                       "createScene: the uploaded content is not a Scene message");
+      return checked(messages::toScene(message));
+    }
+    case v1::CreateSceneRequest::kNamed:
+      if (const std::shared_ptr<scene::LiveScene> live = server_.find(request.named())) return live->start();
+      if (std::ranges::count(messages::namedScenes(), request.named()) > 0)
+        return checked(messages::loadScene(request.named()));
+      return tl::unexpected(server_.noSuchScene(request.named()));
+    default:
+      return refused(v1::ERROR_CODE_INVALID_ARGUMENT,
+                     "createScene: must have one of \"scene\", \"uploadedContentId\" and \"named\"");
+  }
+}
+
+tl::expected<v1::CreateSceneResponse, v1::Error> SceneMaker::createNow(const v1::CreateSceneRequest& request,
+                                                                       const std::string& uploaded) {
+  auto definition = definitionOf(request, uploaded);
+  if (!definition) return tl::unexpected(std::move(definition).error());
+  if (!request.name().empty()) {
+    messages::Checks checks;
+    definition->name = checks.name(messages::Path("createScene.name"), request.name());
+    if (auto named = std::move(checks).result(true); !named)
+      return refused(named.error().code, named.error().text);
+  }
+  const std::uint32_t most = server_.options.maxParticipants;
+  if (request.max_participants() > most)
+    return refused(v1::ERROR_CODE_INVALID_ARGUMENT,
+                   fmt::format("createScene.maxParticipants = {}: must be at most {}, the server's maximum",
+                               request.max_participants(), most));
+  const std::vector<std::shared_ptr<scene::LiveScene>> scenes = server_.scenesNow();
+  const auto created = static_cast<std::uint32_t>(
+      std::ranges::count_if(scenes, [](const auto& scene) { return scene->created; }));
+  if (created >= server_.options.maxCreatedScenes)
+    return refused(v1::ERROR_CODE_RESOURCE_EXHAUSTED,
+                   fmt::format("the server has {} created scenes, its maximum: delete one first", created));
+  if (std::ranges::any_of(scenes, [&](const auto& scene) { return scene->name() == definition->name; }))
+    return refused(
+        v1::ERROR_CODE_INVALID_ARGUMENT,
+        fmt::format("createScene: a scene '{}' exists already; choose another name", definition->name));
+  std::shared_ptr<scene::Journal> journal =
+      server_.options.journals ? server_.options.journals(*definition) : nullptr;
+  const auto scene =
+      std::make_shared<scene::LiveScene>(std::move(*definition), true, std::move(journal),
+                                         request.max_participants() > 0 ? request.max_participants() : most);
+  try {
+    server_.device.add(scene).get();
+  } catch (const std::exception& failure) {
+    return refused(v1::ERROR_CODE_RESOURCE_EXHAUSTED,
+                   fmt::format("createScene: the device cannot run it: {}", failure.what()));
+  }
+  server_.insert(scene);
+  spdlog::info("{}: created, {} vertices", scene->name(), scene->start().nodeCount());
+  v1::CreateSceneResponse response;
+  *response.mutable_scene() = summaryOf(*scene);
+  return response;
+}
+
+tl::expected<v1::DeleteSceneResponse, v1::Error> SceneMaker::removeNow(
+    const v1::DeleteSceneRequest& request) {
+  const std::shared_ptr<scene::LiveScene> scene =
+      request.name().empty() ? nullptr : server_.find(request.name());
+  if (!scene) return tl::unexpected(server_.noSuchScene(request.name()));
+  if (!scene->created)
+    return refused(
+        v1::ERROR_CODE_INVALID_ARGUMENT,
+        fmt::format("deleteScene.name = \"{}\": must be of a scene that was created; the server started "
+                    "with this one",
+                    request.name()));
+  server_.erase(*scene);
+  scene->roster.close(delivery::notice(v1::NOTICE_KIND_SCENE_DELETED,
+                                       fmt::format("the scene '{}' was deleted", scene->name()),
+                                       scene->tick.load()));
+  server_.device.remove(scene).wait();
+  spdlog::info("{}: deleted", scene->name());
+  return v1::DeleteSceneResponse();
+}
+
+}  // namespace clothstream::hosting

@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: MIT
+// Creates and deletes scenes, and starts and stops recordings, while the server runs.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+
+#include <boost/asio/thread_pool.hpp>
+#include <tl/expected.hpp>
+
+#include "server/hosting/scene_server.h"
+#include "server/hosting/upload_budget.h"
+
+namespace clothstream::hosting {
+
+// Thread-safe. Does one request at a time, on a worker thread: checking a large mesh and loading a scene take
+// seconds. The caller has checked that the peer may do what it asks for.
+class SceneMaker {
+ public:
+  explicit SceneMaker(SceneServer::State& server) : server_(server), thread_(1) {}
+  // Finishes the requests that wait.
+  ~SceneMaker() { thread_.join(); }
+  SceneMaker(const SceneMaker&) = delete;
+  SceneMaker& operator=(const SceneMaker&) = delete;
+
+  // Scenes that may wait to be created.
+  static constexpr std::uint32_t kMostWaiting = 64;
+
+  // `uploaded` is the content that `request` names, if it names one. Its reservation ends before the answer.
+  void create(v1::CreateSceneRequest request, std::optional<UploadedContent> uploaded, CreateDone done);
+  void remove(v1::DeleteSceneRequest request, DeleteDone done);
+  // Both block the worker thread on the disk.
+  void startRecording(v1::StartRecordingRequest request, StartRecordingDone done);
+  void stopRecording(v1::StopRecordingRequest request, StopRecordingDone done);
+
+ private:
+  tl::expected<v1::CreateSceneResponse, v1::Error> createNow(const v1::CreateSceneRequest& request,
+                                                             const std::string& uploaded);
+  tl::expected<model::Scene, v1::Error> definitionOf(const v1::CreateSceneRequest& request,
+                                                     const std::string& uploaded) const;
+  tl::expected<std::shared_ptr<scene::Journal>, v1::Error> journalOf(const std::string& scene) const;
+  tl::expected<v1::DeleteSceneResponse, v1::Error> removeNow(const v1::DeleteSceneRequest& request);
+  tl::expected<v1::StartRecordingResponse, v1::Error> startNow(
+      const v1::StartRecordingRequest& request) const;
+  tl::expected<v1::StopRecordingResponse, v1::Error> stopNow(const v1::StopRecordingRequest& request) const;
+
+  SceneServer::State& server_;
+  std::atomic<std::uint32_t> waiting_ = 0;  // scenes to be created
+  boost::asio::thread_pool thread_;
+};
+
+}  // namespace clothstream::hosting

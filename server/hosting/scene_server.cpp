@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: MIT
+#include "server/hosting/scene_server.h"
+
+#include <algorithm>
+#include <cassert>
+#include <stdexcept>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "clothstream/v1/session.pb.h"
+#include "server/hosting/server_state.h"
+
+namespace clothstream::hosting {
+
+SceneServer::SceneServer(std::vector<model::Scene> scenes, ServerOptions options) {
+  assert(options.maxParticipants <= kMostParticipants);
+  bool found = false;
+  std::string known;
+  for (const model::Scene& scene : scenes) {
+    found |= scene.name == options.defaultScene;
+    known += (known.empty() ? "" : ", ") + scene.name;
+  }
+  if (!found)
+    throw std::runtime_error(
+        fmt::format("there is no scene '{}'; there are {}", options.defaultScene, known));
+  // The first scene is loaded when the constructor returns.
+  std::ranges::stable_partition(
+      scenes, [&](const model::Scene& scene) { return scene.name == options.defaultScene; });
+  state_ = std::make_unique<State>(std::move(scenes), std::move(options));
+}
+
+SceneServer::SceneServer(std::string name, std::shared_ptr<scene::FrameSource> source,
+                         ServerOptions options) {
+  options.defaultScene = name;
+  auto played =
+      std::make_shared<scene::LiveScene>(std::move(name), std::move(source), options.maxParticipants);
+  state_ = std::make_unique<State>(std::move(played), std::move(options));
+}
+
+SceneServer::~SceneServer() {
+  stop();
+}
+
+v1::ListScenesResponse SceneServer::listScenes() const {
+  return state_->listScenes();
+}
+
+tl::expected<v1::GetSceneResponse, v1::Error> SceneServer::getScene(
+    const v1::GetSceneRequest& request) const {
+  return state_->getScene(request);
+}
+
+void SceneServer::createScene(const v1::CreateSceneRequest& request, CreateDone done) {
+  if (request.source_case() == v1::CreateSceneRequest::kUploadedContentId) {
+    v1::Error error;
+    error.set_code(v1::ERROR_CODE_NOT_FOUND);
+    error.set_text("createScene.uploadedContentId: upload the scene and create it in the same stream");
+    return done(tl::unexpected(std::move(error)));
+  }
+  state_->maker.create(request, {}, std::move(done));
+}
+
+void SceneServer::deleteScene(const v1::DeleteSceneRequest& request, DeleteDone done) {
+  if (const auto may = state_->mayFromOutside(request.name(), scene::Action::deleteScene); !may)
+    return done(tl::unexpected(toMessage(may.error())));
+  state_->maker.remove(request, std::move(done));
+}
+
+void SceneServer::startRecording(const v1::StartRecordingRequest& request, StartRecordingDone done) {
+  if (const auto may = state_->mayFromOutside(request.scene(), scene::Action::recordScene); !may)
+    return done(tl::unexpected(toMessage(may.error())));
+  state_->maker.startRecording(request, std::move(done));
+}
+
+void SceneServer::stopRecording(const v1::StopRecordingRequest& request, StopRecordingDone done) {
+  if (const auto may = state_->mayFromOutside(request.scene(), scene::Action::recordScene); !may)
+    return done(tl::unexpected(toMessage(may.error())));
+  state_->maker.stopRecording(request, std::move(done));
+}
+
+tl::expected<v1::ControlSceneResponse, v1::Error> SceneServer::controlScene(
+    const v1::ControlSceneRequest& request) {
+  if (const auto may = state_->mayFromOutside(request.name(), scene::Action::controlScene); !may)
+    return tl::unexpected(toMessage(may.error()));
+  return state_->controlScene(request, 0);
+}
+
+void SceneServer::stop() {
+  state_->stop();
+}
+
+vulkan::DeviceInfo SceneServer::deviceInfo() const {
+  return state_->device.info();
+}
+
+const std::string& SceneServer::defaultScene() const {
+  return state_->options.defaultScene;
+}
+
+std::string SceneServer::report() const {
+  std::string text;
+  for (const auto& scene : state_->scenesNow())
+    if (scene->metrics.ticks.value() + scene->metrics.frames.value() > 0)
+      text += telemetry::table(scene->name(), scene->metrics);
+  return text + telemetry::table(state_->metrics);
+}
+
+}  // namespace clothstream::hosting

@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: MIT
+// The scenes of a server: named, simulated on one device, and joined by sessions.
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <tl/expected.hpp>
+
+#include "server/delivery/wire_types.h"
+#include "server/messages/limits.h"
+#include "server/model/scene.h"
+#include "server/scene/roster.h"
+#include "server/simulation/collision/moving_collider.h"
+#include "server/vulkan/device.h"
+
+namespace clothstream::scene {
+class FrameSource;
+class Journal;
+}  // namespace clothstream::scene
+
+namespace clothstream::hosting {
+
+// Participants of a scene whose colliders the simulation has room for.
+inline constexpr std::uint32_t kMostParticipants =
+    (simulation::kMaxColliders - messages::limits::kMaxColliders) /
+    messages::limits::kMaxParticipantColliders;
+
+struct ServerOptions {
+  vulkan::DeviceOptions device;
+  // Scene of peers that name none. Must be one of the scenes.
+  std::string defaultScene;
+  // Sent to clients in Welcome.
+  std::string serverName = "clothstream-server";
+  // Scenes without subscribers keep running: the default scene from the start, others once they were joined.
+  bool runAlways = false;
+  // Frames per second of each scene that carry a simulation report; 0 for none.
+  double reportRate = 4;
+  std::uint32_t maxConnections = 1024;
+  // Limit for each scene, disconnected participants included. At most kMostParticipants. A peer that creates
+  // a scene may set a lower limit.
+  std::uint32_t maxParticipants = scene::kDefaultMaxParticipants;
+  // Scenes that peers may create, in addition to those that the server starts with.
+  std::uint32_t maxCreatedScenes = 16;
+  // Threads that predict large frames on the CPU; 0 means automatic (EncoderThreads).
+  std::uint32_t encoderThreads = 0;
+  // Limit of the uploads of all peers together, in bytes.
+  std::size_t maxUploadBytes = std::size_t{256} << 20;
+  // Returns the journal of a scene, or null for none. May be empty.
+  std::function<std::shared_ptr<scene::Journal>(const model::Scene&)> journals{};
+  // A peer that sends nothing for this long is disconnected.
+  std::chrono::milliseconds silence{30'000};
+  scene::ReconnectGrace reconnectGrace{};
+  scene::Permissions participantsMay{};
+  // Peers outside a scene may always pause, reset, record and delete it. If false, only while it has no
+  // owner.
+  bool outsideControl = true;
+};
+
+// Called once, on any thread. Must not block.
+using CreateDone = std::function<void(tl::expected<v1::CreateSceneResponse, v1::Error>)>;
+using StartRecordingDone = std::function<void(tl::expected<v1::StartRecordingResponse, v1::Error>)>;
+using StopRecordingDone = std::function<void(tl::expected<v1::StopRecordingResponse, v1::Error>)>;
+using DeleteDone = std::function<void(tl::expected<v1::DeleteSceneResponse, v1::Error>)>;
+
+// Thread-safe. Has three threads: one owns the device and runs the ticks of all scenes, one encodes and
+// publishes frames, one creates scenes.
+class SceneServer {
+ public:
+  // The scenes must be valid (server/messages) and their names unique. Throws vulkan::DeviceError, or
+  // std::runtime_error if the device has no room for the default scene, or if the default scene is not among
+  // the scenes (the text lists them).
+  SceneServer(std::vector<model::Scene> scenes, ServerOptions options);
+  // Server of one scene that is not simulated; it is the default scene. Needs no device and can create no
+  // other scenes.
+  SceneServer(std::string name, std::shared_ptr<scene::FrameSource> source, ServerOptions options);
+  // Stops. Every session must have ended.
+  ~SceneServer();
+  SceneServer(const SceneServer&) = delete;
+  SceneServer& operator=(const SceneServer&) = delete;
+
+  // Unary calls of peers that are not in a stream.
+  v1::ListScenesResponse listScenes() const;
+  tl::expected<v1::GetSceneResponse, v1::Error> getScene(const v1::GetSceneRequest& request) const;
+  // Refuses a request for uploaded content, because uploads need a stream.
+  void createScene(const v1::CreateSceneRequest& request, CreateDone done);
+  void deleteScene(const v1::DeleteSceneRequest& request, DeleteDone done);
+  void startRecording(const v1::StartRecordingRequest& request, StartRecordingDone done);
+  void stopRecording(const v1::StopRecordingRequest& request, StopRecordingDone done);
+  tl::expected<v1::ControlSceneResponse, v1::Error> controlScene(const v1::ControlSceneRequest& request);
+
+  // Announces that the server stops, and closes every session, present and future.
+  void stop();
+
+  // Device in use, also after it was rebuilt.
+  vulkan::DeviceInfo deviceInfo() const;
+  const std::string& defaultScene() const;
+
+  // Histograms and counters since the start, as a table for people.
+  std::string report() const;
+
+  // For sessions and tests.
+  struct State;
+  State& state() { return *state_; }
+
+ private:
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace clothstream::hosting

@@ -1,0 +1,220 @@
+// SPDX-License-Identifier: MIT
+#include "server/hosting/server_state.h"
+
+#include <algorithm>
+#include <thread>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "clothstream/v1/session.pb.h"
+#include "server/messages/description.h"
+#include "server/messages/scene_message.h"
+
+namespace clothstream::hosting {
+namespace {
+
+std::vector<std::shared_ptr<scene::LiveScene>> liveScenes(std::vector<model::Scene> definitions,
+                                                          const ServerOptions& options) {
+  std::vector<std::shared_ptr<scene::LiveScene>> scenes;
+  scenes.reserve(definitions.size());
+  for (model::Scene& definition : definitions) {
+    std::shared_ptr<scene::Journal> journal = options.journals ? options.journals(definition) : nullptr;
+    scenes.push_back(std::make_shared<scene::LiveScene>(std::move(definition), false, std::move(journal),
+                                                        options.maxParticipants));
+  }
+  return scenes;
+}
+
+// First number of the viewers of a recording, so that they differ from the participants in it.
+constexpr std::uint64_t kFirstViewer = std::uint64_t{1} << 32;
+
+delivery::SharedBytes stoppingNotice() {
+  return delivery::notice(v1::NOTICE_KIND_SERVER_STOPPING, "the server is stopping", 0);
+}
+
+messages::Result<void> controlSource(scene::LiveScene& scene, const v1::ControlSceneRequest& request) {
+  if (scene.source) return scene.source->control(request);
+  const char* what = request.has_seek()    ? "seek"
+                     : request.has_speed() ? "speed"
+                     : request.has_loop()  ? "loop"
+                                           : nullptr;
+  if (what == nullptr) return {};
+  return tl::unexpected(messages::FieldError{
+      v1::ERROR_CODE_INVALID_ARGUMENT,
+      fmt::format("controlScene.{}: only a played recording supports it; '{}' is simulated", what,
+                  scene.name())});
+}
+
+}  // namespace
+
+v1::Error toMessage(const messages::FieldError& error) {
+  v1::Error message;
+  message.set_code(error.code);
+  message.set_text(error.text);
+  return message;
+}
+
+v1::SceneSummary summaryOf(const scene::LiveScene& scene) {
+  v1::SceneSummary summary = messages::toSummary(scene.start());
+  if (scene.source) {
+    const v1::StreamDescription& played = scene.source->description();
+    std::uint32_t vertices = 0;
+    for (const v1::ClothDescription& cloth : played.cloths()) vertices += cloth.vertex_count();
+    summary.set_vertex_count(vertices);
+    summary.set_cloth_count(static_cast<std::uint32_t>(played.cloths_size()));
+    summary.set_description(played.definition().description());
+    *summary.mutable_playback() = scene.source->playback();
+  }
+  summary.set_participants(static_cast<std::uint32_t>(scene.subscribers.size()));
+  summary.set_max_participants(scene.maxParticipants);
+  summary.set_running(scene.running);
+  summary.set_paused(scene.paused);
+  summary.set_created(scene.created);
+  summary.set_recorded(scene.journal && scene.journal->active());
+  return summary;
+}
+
+SceneServer::State::State(std::vector<model::Scene> definitions, ServerOptions options_)
+    : options(std::move(options_)),
+      uploads(options.maxUploadBytes),
+      scenes(liveScenes(std::move(definitions), options)),
+      publisher(
+          (scenes.size() + options.maxCreatedScenes) * codec::kMaxQualities * encode::FrameEncoder::kSlots,
+          [this] {
+            for (const auto& peer : peersNow()) peer->checkSilence(Clock::now());
+            for (const auto& scene : scenesNow()) scene->roster.expire(Clock::now());
+          },
+          options.encoderThreads > 0 ? options.encoderThreads
+                                     : encode::EncoderThreads::suitedTo(std::thread::hardware_concurrency())),
+      device(options.device, scenes, publisher, metrics, options.runAlways, options.reportRate),
+      maker(*this) {}
+
+SceneServer::State::State(std::shared_ptr<scene::LiveScene> played, ServerOptions options_)
+    : State(std::vector<model::Scene>{}, std::move(options_)) {
+  participants = kFirstViewer;
+  played->source->begin(*played);
+  insert(std::move(played));
+}
+
+std::string SceneServer::State::deviceNameOf(const scene::LiveScene& scene) const {
+  return scene.source ? scene.source->deviceName() : device.info().name;
+}
+
+void SceneServer::State::wake(const scene::LiveScene& scene) {
+  if (scene.source)
+    scene.source->wake();
+  else
+    device.wake();
+}
+
+std::shared_ptr<scene::LiveScene> SceneServer::State::find(const std::string& name) const {
+  for (const auto& scene : scenesNow())
+    if (scene->name() == (name.empty() ? options.defaultScene : name)) return scene;
+  return nullptr;
+}
+
+std::vector<std::shared_ptr<scene::LiveScene>> SceneServer::State::scenesNow() const {
+  const std::lock_guard lock(mutex);
+  return scenes;
+}
+
+void SceneServer::State::insert(std::shared_ptr<scene::LiveScene> scene) {
+  const std::lock_guard lock(mutex);
+  scenes.push_back(std::move(scene));
+}
+
+void SceneServer::State::erase(const scene::LiveScene& scene) {
+  const std::lock_guard lock(mutex);
+  std::erase_if(scenes, [&](const auto& known) { return known.get() == &scene; });
+}
+
+v1::Error SceneServer::State::noSuchScene(const std::string& name) const {
+  std::string known;
+  for (const auto& scene : scenesNow()) known += (known.empty() ? "" : ", ") + scene->name();
+  v1::Error error;
+  error.set_code(v1::ERROR_CODE_NOT_FOUND);
+  error.set_text(fmt::format("there is no scene '{:.64}'; there are {}", name, known));
+  return error;
+}
+
+delivery::SharedBytes SceneServer::State::admit(const std::shared_ptr<Peer>& peer) {
+  const std::lock_guard lock(mutex);
+  if (stopping) return stoppingNotice();
+  std::erase_if(peers, [](const auto& known) { return known.expired(); });
+  if (peers.size() >= options.maxConnections) {
+    metrics.refusedConnections.add();
+    return delivery::error(
+        v1::ERROR_CODE_RESOURCE_EXHAUSTED,
+        fmt::format("the server has {} connections, its maximum; try again later", peers.size()), true);
+  }
+  metrics.connections.add();
+  peers.push_back(peer);
+  return nullptr;
+}
+
+std::vector<std::shared_ptr<Peer>> SceneServer::State::peersNow() const {
+  const std::lock_guard lock(mutex);
+  std::vector<std::shared_ptr<Peer>> now;
+  for (const auto& peer : peers)
+    if (auto alive = peer.lock()) now.push_back(std::move(alive));
+  return now;
+}
+
+void SceneServer::State::stop() {
+  {
+    const std::lock_guard lock(mutex);
+    stopping = true;
+  }
+  for (const auto& peer : peersNow()) peer->close(stoppingNotice());
+}
+
+v1::ListScenesResponse SceneServer::State::listScenes() const {
+  v1::ListScenesResponse response;
+  for (const auto& scene : scenesNow()) *response.add_scenes() = summaryOf(*scene);
+  return response;
+}
+
+tl::expected<v1::GetSceneResponse, v1::Error> SceneServer::State::getScene(
+    const v1::GetSceneRequest& request) const {
+  const std::shared_ptr<scene::LiveScene> scene = find(request.name());
+  if (!scene) return tl::unexpected(noSuchScene(request.name()));
+  v1::GetSceneResponse response;
+  *response.mutable_scene() =
+      scene->source ? scene->source->description().definition() : messages::toMessage(scene->definition());
+  return response;
+}
+
+messages::Result<void> SceneServer::State::mayFromOutside(const std::string& name,
+                                                          scene::Action action) const {
+  const std::shared_ptr<scene::LiveScene> scene = find(name);
+  if (options.outsideControl || !scene || !scene->roster.owned()) return {};
+  messages::Result<void> permitted = scene::permit(scene::Role::none, action, options.participantsMay);
+  if (!permitted)
+    permitted.error().text += fmt::format(", because you are not in the scene '{}'", scene->name());
+  return permitted;
+}
+
+tl::expected<v1::ControlSceneResponse, v1::Error> SceneServer::State::controlScene(
+    const v1::ControlSceneRequest& request, std::uint64_t participant) {
+  const std::shared_ptr<scene::LiveScene> scene = find(request.name());
+  if (!scene) return tl::unexpected(noSuchScene(request.name()));
+  if (const auto controlled = controlSource(*scene, request); !controlled)
+    return tl::unexpected(toMessage(controlled.error()));
+  if (request.has_paused() && scene->paused.exchange(request.paused()) != request.paused())
+    scene->subscribers.announce(request.paused()
+                                    ? scene::pausedNotice(*scene, participant)
+                                    : delivery::notice(v1::NOTICE_KIND_SCENE_RESUMED, "the scene is resumed",
+                                                       scene->tick.load(), participant));
+  if (request.reset()) {
+    scene->resetRequested = true;
+    scene->subscribers.announce(
+        delivery::notice(v1::NOTICE_KIND_SCENE_RESET, "the scene is reset", scene->tick.load(), participant));
+  }
+  wake(*scene);
+  v1::ControlSceneResponse response;
+  *response.mutable_scene() = summaryOf(*scene);
+  return response;
+}
+
+}  // namespace clothstream::hosting

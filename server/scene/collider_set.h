@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: MIT
+// Colliders of a scene from tick to tick: the scene's own and the participants'.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <tuple>
+#include <vector>
+
+#include "server/delivery/wire_types.h"
+#include "server/model/input.h"
+#include "server/model/scene.h"
+#include "server/simulation/collision/moving_collider.h"
+
+namespace clothstream::scene {
+
+// Limits of a collider's motion in one tick: speed in m/s, and rotation as the cosine of half the angle (120
+// degrees). A collider that was moved by a message and exceeds a limit is not swept: it appears at its new
+// pose, at rest.
+inline constexpr float kMaxColliderSpeed = 30;
+inline constexpr float kMaxColliderTurn = 0.5f;
+
+// Belongs to the device's thread. The order does not depend on the order of arrival: the scene's colliders as
+// defined, then the participants' by participant number and id.
+class ColliderSet {
+ public:
+  // Starts at simulated time 0.
+  explicit ColliderSet(const model::Scene& scene);
+
+  // Sets all colliders of this participant. A known id moves to its new pose over the next tick, a new one
+  // appears at rest, and a missing one is removed.
+  void place(std::uint64_t participant, std::span<const model::ParticipantCollider> colliders);
+
+  // Advances to the end of the next tick, in seconds of simulated time. Writes all colliders, each with its
+  // start and end pose, to `colliders`.
+  void advance(const model::Scene& scene, double endSeconds,
+               std::vector<simulation::MovingCollider>& colliders);
+
+  // A collider of the scene has participant 0, and its index in the scene as id.
+  struct Identity {
+    std::uint64_t participant;
+    std::uint32_t id;
+    bool operator<(const Identity& other) const {
+      return std::tie(participant, id) < std::tie(other.participant, other.id);
+    }
+  };
+  // Identity of the collider that the newest advance() wrote at `index`.
+  Identity identity(std::size_t index) const;
+
+  // Replaces the colliders of `frame` by the present ones. `scene` must be that of the newest advance().
+  void write(const model::Scene& scene, v1::Frame& frame) const;
+
+ private:
+  struct Placed {
+    std::uint64_t participant;
+    model::ParticipantCollider now;
+    model::Pose before;
+  };
+
+  std::vector<model::Pose> scenePoses_;
+  std::vector<Placed> colliders_;
+};
+
+}  // namespace clothstream::scene

@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: MIT
+#include "server/scene/frame_source.h"
+
+#include <utility>
+
+#include "clothstream/v1/session.pb.h"
+
+namespace clothstream::scene {
+
+delivery::SharedBytes playbackMessage(const FrameSource& source) {
+  v1::ServerMessage message;
+  *message.mutable_playback() = source.playback();
+  return delivery::serialise(message);
+}
+
+delivery::SharedBytes parametersMessage(const FrameSource& source, std::uint64_t tick) {
+  v1::ParameterChange parameters = source.parameters();
+  return parameters.ByteSizeLong() == 0 ? nullptr : delivery::parametersChanged(std::move(parameters), tick);
+}
+
+}  // namespace clothstream::scene

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: MIT
+// Source of a scene's frames that is not a simulation, such as a recording that is played.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "server/delivery/envelope.h"
+#include "server/messages/field_error.h"
+
+namespace clothstream::scene {
+
+class LiveScene;
+
+// Thread-safe.
+class FrameSource {
+ public:
+  virtual ~FrameSource() = default;
+
+  // Description of all its frames. Constant.
+  virtual const v1::StreamDescription& description() const = 0;
+  // Name of the device that simulated the frames.
+  virtual std::string deviceName() const = 0;
+
+  // Publishes to the scene's subscribers from now until end() has returned. Called once.
+  virtual void begin(LiveScene& scene) = 0;
+  virtual void end() = 0;
+  // A subscriber joined or left, or the scene was paused or resumed.
+  virtual void wake() = 0;
+
+  // Applies seek, speed, loop and reset of the request: all of them, or none and an error.
+  [[nodiscard]] virtual messages::Result<void> control(const v1::ControlSceneRequest& request) = 0;
+  // Present position and settings.
+  virtual v1::Playback playback() const = 0;
+  // Parameters in force at the present position; empty if none are known.
+  virtual v1::ParameterChange parameters() const = 0;
+};
+
+// Message with the source's position and settings.
+delivery::SharedBytes playbackMessage(const FrameSource& source);
+
+// Message with the parameters in force at the present position; null if none are known.
+delivery::SharedBytes parametersMessage(const FrameSource& source, std::uint64_t tick);
+
+}  // namespace clothstream::scene

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: MIT
+// Grabs of the participants and poses of the attachments, from tick to tick.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "server/delivery/wire_types.h"
+#include "server/model/input.h"
+#include "server/model/scene.h"
+#include "server/simulation/cloth_simulation.h"
+
+namespace clothstream::scene {
+
+// Belongs to the device's thread.
+class GrabsAndAttachments {
+ public:
+  explicit GrabsAndAttachments(const model::Scene& scene);
+
+  // Sets all grabs of this participant. A known id moves to its new pose over the next tick, a new one starts
+  // at the beginning of that tick, and a missing one is released. Attachments move to their pose and stay
+  // there. A new grab has no effect while there are kMaxGrabs grabs.
+  void place(std::uint64_t participant, std::span<const model::Grab> grabs,
+             std::span<const model::AttachmentPose> attachments);
+
+  // Writes grabs and attachments of the next tick, which ends at this simulated time in seconds.
+  void advance(const model::Scene& scene, double endSeconds, simulation::TickInputs& inputs);
+
+  // Adds events for the grabs of the newest tick, which is complete. `grabs` is the simulation's result.
+  void addEvents(std::span<const simulation::GrabStatus> grabs, v1::TickEvents& events);
+
+  // Returns whether a grab holds cloth.
+  bool anyGrabHolds() const;
+
+  // Restarts every grab, because the device has lost the vertices that it held.
+  void restartGrabs();
+
+ private:
+  // Entry at the index of TickInputs::grabs.
+  struct Slot {
+    std::uint64_t participant = 0;
+    model::Grab now;
+    model::Pose before;
+    enum class Phase : std::uint8_t { empty, takes, holds, ends } phase = Phase::empty;
+    // Vertices held after the newest tick; nothing before the grab's first tick.
+    std::optional<std::uint32_t> vertices = {};
+  };
+
+  Slot* find(std::uint64_t participant, std::uint32_t id);
+
+  std::vector<std::optional<model::Pose>> moved_;  // poses of the attachments that were moved by a message
+  std::vector<Slot> slots_;
+  std::vector<std::pair<std::uint64_t, std::uint32_t>> released_;  // in the current tick: participant, id
+};
+
+}  // namespace clothstream::scene

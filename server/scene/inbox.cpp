@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: MIT
+#include "server/scene/inbox.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace clothstream::scene {
+
+void Inbox::postPoses(std::uint64_t participant, model::ParticipantPoses poses, Clock::time_point arrival,
+                      PoseTime time) {
+  const std::lock_guard lock(mutex_);
+  const auto last = std::ranges::find(inputs_.poses, participant, &Poses::participant);
+  if (last == inputs_.poses.end()) {
+    inputs_.poses.push_back({.participant = participant, .now = {std::move(poses), arrival, time}});
+    return;
+  }
+  // The order is that of arrival, so that the later pose of an attachment counts.
+  std::vector<model::AttachmentPose>& before = last->now.poses.attachments;
+  poses.attachments.insert(poses.attachments.begin(), before.begin(), before.end());
+  if (poses.attachments.size() > kMaxAttachmentPoses)
+    poses.attachments.erase(poses.attachments.begin(), poses.attachments.end() - kMaxAttachmentPoses);
+  if (!time.trueAt) {
+    last->earlier.clear();
+  } else {
+    if (last->earlier.size() == kMaxEarlierPoses) last->earlier.erase(last->earlier.begin());
+    before.clear();
+    last->earlier.push_back(std::move(last->now));
+  }
+  last->now = {std::move(poses), arrival, time};
+}
+
+bool Inbox::postChange(AcceptedChange change) {
+  const std::lock_guard lock(mutex_);
+  if (inputs_.changes.size() >= kMaxChanges) return false;
+  inputs_.changes.push_back(std::move(change));
+  return true;
+}
+
+void Inbox::dropChanges() {
+  const std::lock_guard lock(mutex_);
+  inputs_.changes.clear();
+}
+
+void Inbox::dropPoses() {
+  const std::lock_guard lock(mutex_);
+  inputs_.poses.clear();
+}
+
+void Inbox::keepColliderChanges() {
+  const std::lock_guard lock(mutex_);
+  for (AcceptedChange& accepted : inputs_.changes) {
+    accepted.change = {.colliders = std::move(accepted.change.colliders)};
+    v1::ParameterChange kept;
+    kept.mutable_colliders()->Swap(accepted.message.mutable_colliders());
+    accepted.message = std::move(kept);
+  }
+  std::erase_if(inputs_.changes,
+                [](const AcceptedChange& accepted) { return accepted.change.colliders.empty(); });
+}
+
+void Inbox::forEachChange(const std::function<void(const model::ParameterChange&)>& visit) {
+  const std::lock_guard lock(mutex_);
+  for (const AcceptedChange& accepted : inputs_.changes) visit(accepted.change);
+}
+
+void Inbox::drain(Inputs& out) {
+  out.changes.clear();
+  out.poses.clear();
+  const std::lock_guard lock(mutex_);
+  std::swap(out, inputs_);
+}
+
+}  // namespace clothstream::scene

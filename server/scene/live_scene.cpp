@@ -1,0 +1,159 @@
+// SPDX-License-Identifier: MIT
+#include "server/scene/live_scene.h"
+
+#include <algorithm>
+#include <utility>
+#include <vector>
+
+#include "clothstream/v1/session.pb.h"
+#include "server/encode/frame_encoder.h"
+#include "server/messages/client_message.h"
+#include "server/messages/description.h"
+#include "server/messages/limits.h"
+#include "server/messages/scene_message.h"
+
+namespace clothstream::scene {
+namespace {
+
+static_assert(messages::limits::kMaxTemporalLayers == codec::kMaxTemporalLayers &&
+              messages::limits::kMaxQualities == codec::kMaxQualities);
+
+v1::ParameterChange allParameters(const model::Scene& scene) {
+  std::vector<double> areas;
+  for (const model::Cloth& cloth : scene.cloths) areas.push_back(model::areaOf(cloth));
+  return messages::allParameters(messages::toMessageWithoutMeshes(scene), areas);
+}
+
+model::Scene nameAndRates(std::string name, const v1::StreamDescription& description) {
+  model::Scene scene;
+  scene.name = std::move(name);
+  scene.simulationRate = description.simulation_rate();
+  scene.streamRate = description.stream_rate();
+  return scene;
+}
+
+// Copies everything that subscribers are sent into the journal.
+std::function<void(const delivery::SharedBytes&)> tapOf(const std::shared_ptr<Journal>& journal) {
+  if (!journal) return {};
+  return [journal](const delivery::SharedBytes& message) { journal->sent(message); };
+}
+
+std::shared_ptr<const std::string> clothsOf(const v1::StreamDescription& description) {
+  v1::StreamDescription cloths;
+  *cloths.mutable_cloths() = description.cloths();
+  return std::make_shared<const std::string>(cloths.SerializeAsString());
+}
+
+}  // namespace
+
+LiveScene::LiveScene(model::Scene definition, bool wasCreated, std::shared_ptr<Journal> kept,
+                     std::uint32_t most)
+    : created(wasCreated),
+      maxParticipants(most),
+      journal(std::move(kept)),
+      subscribers(tapOf(journal)),
+      roster(subscribers, inbox, journal.get()),
+      start_(std::move(definition)),
+      cloths_(std::make_shared<const std::string>(messages::clothsOfDescription(start_).SerializeAsString())),
+      definition_(start_) {}
+
+LiveScene::LiveScene(std::string name, std::shared_ptr<FrameSource> from, std::uint32_t most)
+    : created(false),
+      maxParticipants(most),
+      source(std::move(from)),
+      roster(subscribers, inbox, nullptr),
+      start_(nameAndRates(std::move(name), source->description())),
+      cloths_(clothsOf(source->description())),
+      definition_(start_) {}
+
+LiveScene::~LiveScene() {
+  if (source) source->end();
+}
+
+model::Scene LiveScene::definition() const {
+  const std::lock_guard lock(mutex_);
+  return definition_;
+}
+
+messages::Result<void> LiveScene::change(std::uint64_t participant, const v1::ParameterChange& message) {
+  if (source)
+    return tl::unexpected(messages::FieldError{
+        v1::ERROR_CODE_INVALID_ARGUMENT,
+        "parameter_change: '" + name() + "' is a recording that is played; its parameters cannot be changed"});
+  const std::lock_guard lock(mutex_);
+  messages::Result<model::ParameterChange> change = messages::toParameterChange(message, definition_);
+  if (!change) return tl::unexpected(std::move(change).error());
+  model::Scene changed = definition_;
+  model::applyChange(changed, *change);
+  v1::ParameterChange announced = message;
+  if (std::ranges::any_of(change->cloths,
+                          [](const model::ClothChange& cloth) { return cloth.material.has_value(); }))
+    *announced.mutable_cloths() = allParameters(changed).cloths();
+  if (!inbox.postChange({participant, *change, std::move(announced)}))
+    return tl::unexpected(
+        messages::FieldError{v1::ERROR_CODE_RESOURCE_EXHAUSTED,
+                             "parameter_change: too many changes for one tick; send it again later"});
+  definition_ = std::move(changed);
+  description_.reset();
+  return {};
+}
+
+std::uint32_t LiveScene::codec() const {
+  return source ? source->description().codec() : encode::codecOf(start_);
+}
+
+delivery::StreamShape LiveScene::shape() const {
+  if (!source)
+    return {.rate = start_.streamRate,
+            .layers = start_.stream.temporalLayers,
+            .qualities = start_.stream.qualities};
+  const std::uint32_t layers = source->description().temporal_layers();
+  return {.rate = start_.streamRate, .layers = static_cast<std::uint8_t>(std::max(layers, 1u))};
+}
+
+v1::ParameterChange LiveScene::resetParameters() {
+  const std::lock_guard lock(mutex_);
+  inbox.keepColliderChanges();
+  definition_.environment = start_.environment;
+  definition_.cloths = start_.cloths;
+  description_.reset();
+  return allParameters(start_);
+}
+
+v1::ParameterChange LiveScene::restart() {
+  const std::lock_guard lock(mutex_);
+  inbox.dropChanges();
+  definition_ = start_;
+  description_.reset();
+  tick = 0;
+  resetRequested = false;
+  return allParameters(start_);
+}
+
+v1::ParameterChange LiveScene::revertTo(const model::Scene& applied) {
+  const std::lock_guard lock(mutex_);
+  definition_ = applied;
+  inbox.forEachChange([&](const model::ParameterChange& change) { model::applyChange(definition_, change); });
+  description_.reset();
+  return allParameters(applied);
+}
+
+std::shared_ptr<const delivery::DescriptionChunks> LiveScene::description() {
+  const std::lock_guard lock(mutex_);
+  if (description_) return description_;
+  const double seconds = static_cast<double>(tick.load()) * definition_.tickSeconds();
+  v1::StreamDescription message =
+      source ? source->description()
+             : messages::descriptionWithoutCloths(definition_, kEpoch, codec(), seconds);
+  message.set_scene(name());
+  message.clear_cloths();
+  return description_ = std::make_shared<const delivery::DescriptionChunks>(++contents_, cloths_,
+                                                                            message.SerializeAsString());
+}
+
+delivery::SharedBytes pausedNotice(const LiveScene& scene, std::uint64_t participant) {
+  return delivery::notice(v1::NOTICE_KIND_SCENE_PAUSED, "the scene is paused", scene.tick.load(),
+                          participant);
+}
+
+}  // namespace clothstream::scene

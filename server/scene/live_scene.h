@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: MIT
+// A scene that participants share: definition, inbox, subscribers, roster, metrics.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <string>
+
+#include "server/delivery/subscribers.h"
+#include "server/messages/field_error.h"
+#include "server/model/scene.h"
+#include "server/scene/frame_source.h"
+#include "server/scene/inbox.h"
+#include "server/scene/journal.h"
+#include "server/scene/roster.h"
+#include "server/telemetry/metrics.h"
+
+namespace clothstream::scene {
+
+// Thread-safe. The endpoints' threads and the device's thread meet here.
+class LiveScene {
+ public:
+  // A simulated scene. `definition` must be valid. `created`: a peer created it while the server runs.
+  // `journal` gets everything that happens in the scene; it may be null. `maxParticipants` includes
+  // disconnected ones.
+  explicit LiveScene(model::Scene definition, bool created = false,
+                     std::shared_ptr<Journal> journal = nullptr,
+                     std::uint32_t maxParticipants = kDefaultMaxParticipants);
+  // A scene that is not simulated. The caller starts the source. start() and definition() hold only name and
+  // rates.
+  LiveScene(std::string name, std::shared_ptr<FrameSource> source,
+            std::uint32_t maxParticipants = kDefaultMaxParticipants);
+  ~LiveScene();
+
+  const std::string& name() const { return start_.name; }
+  // Definition at the start.
+  const model::Scene& start() const { return start_; }
+  // Codec and shape of the stream.
+  std::uint32_t codec() const;
+  delivery::StreamShape shape() const;
+  // Definition with all accepted changes, those of the next tick included.
+  model::Scene definition() const;
+
+  // Puts the change into the inbox, or returns what is wrong with it.
+  messages::Result<void> change(std::uint64_t participant, const v1::ParameterChange& message);
+  // Resets environment and cloths to the start, and drops waiting changes of them. Returns the change that
+  // announces it.
+  v1::ParameterChange resetParameters();
+
+  // Resets everything to the start, because a new simulation begins; drops all waiting changes. Returns the
+  // change that announces it.
+  v1::ParameterChange restart();
+
+  // Sets the definition to `applied` plus the waiting changes. Returns the change that announces `applied`.
+  v1::ParameterChange revertTo(const model::Scene& applied);
+
+  // Description for a peer that joins now. The peer must be a subscriber already, so that it misses no
+  // change.
+  std::shared_ptr<const delivery::DescriptionChunks> description();
+
+  // Epoch of the stream; a server has only one.
+  static constexpr std::uint32_t kEpoch = 1;
+
+  const bool created;
+  const std::uint32_t maxParticipants;
+  const std::shared_ptr<Journal> journal;     // null: none is kept
+  const std::shared_ptr<FrameSource> source;  // null: the scene is simulated
+  std::atomic<bool> paused{false};            // no ticks, except for the first frame after a reset
+  std::atomic<bool> resetRequested{false};    // taken at the next tick
+
+  Inbox inbox;
+  delivery::Subscribers subscribers;
+  Roster roster;
+  telemetry::SceneMetrics metrics;
+
+  // Written by the device's thread, or by the source.
+  std::atomic<bool> running{false};
+  std::atomic<std::uint64_t> tick{0};  // newest complete one
+
+ private:
+  const model::Scene start_;
+  const std::shared_ptr<const std::string> cloths_;  // part of all descriptions
+
+  mutable std::mutex mutex_;
+  model::Scene definition_;
+  std::shared_ptr<const delivery::DescriptionChunks> description_;  // null after a change of the definition
+  std::uint64_t contents_ = 0;                                      // content ids given
+};
+
+// Notice that a scene is paused; `participant` as for delivery::notice().
+delivery::SharedBytes pausedNotice(const LiveScene& scene, std::uint64_t participant = 0);
+
+}  // namespace clothstream::scene

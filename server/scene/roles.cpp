@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: MIT
+#include "server/scene/roles.h"
+
+#include <fmt/format.h>
+
+#include "clothstream/v1/session.pb.h"
+
+namespace clothstream::scene {
+namespace {
+
+// Field of the wire, as in the JSON form that all errors use.
+const char* nameOf(Action action) {
+  switch (action) {
+    case Action::collide:
+      return "colliderPoses.colliders";
+    case Action::grab:
+      return "colliderPoses.grabs";
+    case Action::moveAttachments:
+      return "colliderPoses.attachments";
+    case Action::changeEnvironment:
+      return "parameterChange: gravity, wind, gust and airDensity";
+    case Action::changeCloths:
+      return "parameterChange.cloths";
+    case Action::changeColliders:
+      return "parameterChange.colliders";
+    case Action::controlScene:
+      return "controlScene";
+    case Action::deleteScene:
+      return "deleteScene";
+    case Action::recordScene:
+      return "startRecording, stopRecording";
+    case Action::setRole:
+      return "setRole";
+    case Action::removeParticipant:
+      return "removeParticipant";
+  }
+  return "";
+}
+
+}  // namespace
+
+Role roleFor(Action action, const Permissions& participants) {
+  const auto changed = [](bool byParticipants) { return byParticipants ? Role::participant : Role::owner; };
+  switch (action) {
+    case Action::collide:
+    case Action::grab:
+    case Action::moveAttachments:
+      return Role::participant;
+    case Action::changeEnvironment:
+      return changed(participants.environment);
+    case Action::changeCloths:
+      return changed(participants.cloths);
+    case Action::changeColliders:
+      return changed(participants.colliders);
+    case Action::controlScene:
+    case Action::deleteScene:
+    case Action::recordScene:
+    case Action::setRole:
+    case Action::removeParticipant:
+      return Role::owner;
+  }
+  return Role::owner;
+}
+
+Role fromMessage(v1::Role role) {
+  switch (role) {
+    case v1::ROLE_VIEWER:
+      return Role::viewer;
+    case v1::ROLE_PARTICIPANT:
+      return Role::participant;
+    case v1::ROLE_OWNER:
+      return Role::owner;
+    default:
+      return Role::none;
+  }
+}
+
+v1::Role toMessage(Role role) {
+  return static_cast<v1::Role>(role);
+}
+
+const char* nameOf(Role role) {
+  switch (role) {
+    case Role::viewer:
+      return "viewer";
+    case Role::participant:
+      return "participant";
+    case Role::owner:
+      return "owner";
+    case Role::none:
+      break;
+  }
+  return "none";
+}
+
+messages::Result<void> permit(Role role, Action action, const Permissions& participants) {
+  const Role needed = roleFor(action, participants);
+  if (role >= needed) return {};
+  return tl::unexpected(messages::FieldError{
+      v1::ERROR_CODE_PERMISSION_DENIED,
+      fmt::format("{}: requires the role {}; yours is {}", nameOf(action), nameOf(needed), nameOf(role))});
+}
+
+messages::Result<void> permit(Role role, const v1::ColliderPoses& message, const Permissions& participants) {
+  messages::Result<void> permitted;
+  if (!message.colliders().empty() || !message.hands().empty())
+    permitted = permit(role, Action::collide, participants);
+  if (permitted && !message.grabs().empty()) permitted = permit(role, Action::grab, participants);
+  if (permitted && !message.attachments().empty())
+    permitted = permit(role, Action::moveAttachments, participants);
+  return permitted;
+}
+
+messages::Result<void> permit(Role role, const v1::ParameterChange& message,
+                              const Permissions& participants) {
+  messages::Result<void> permitted;
+  if (!message.cloths().empty()) permitted = permit(role, Action::changeCloths, participants);
+  if (permitted && !message.colliders().empty())
+    permitted = permit(role, Action::changeColliders, participants);
+  const bool environment =
+      message.has_gravity() || message.has_wind() || message.has_air_density() || message.has_gust();
+  // An empty change is announced to everybody as well.
+  const bool nothing = message.cloths().empty() && message.colliders().empty();
+  if (permitted && (environment || nothing))
+    permitted = permit(role, Action::changeEnvironment, participants);
+  return permitted;
+}
+
+}  // namespace clothstream::scene

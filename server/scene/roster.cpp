@@ -1,0 +1,364 @@
+// SPDX-License-Identifier: MIT
+#include "server/scene/roster.h"
+
+#include <algorithm>
+#include <chrono>
+#include <random>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "clothstream/v1/session.pb.h"
+
+namespace clothstream::scene {
+namespace {
+
+using delivery::Mailbox;
+using delivery::SharedBytes;
+
+// 128 random bits from the system, so that the token cannot be guessed.
+std::string makeToken() {
+  std::random_device random;
+  std::string token;
+  while (token.size() < Roster::kTokenBytes) {
+    const std::uint32_t word = random();
+    for (int shift = 0; shift < 32; shift += 8) token += static_cast<char>(word >> shift);
+  }
+  return token;
+}
+
+// Constant-time comparison.
+bool sameToken(const std::string& one, const std::string& other) {
+  if (one.size() != other.size()) return false;
+  unsigned different = 0;
+  for (std::size_t i = 0; i < one.size(); ++i)
+    different |= static_cast<unsigned char>(one[i]) ^ static_cast<unsigned char>(other[i]);
+  return different == 0;
+}
+
+PoseTime poseTime(const v1::ColliderPoses& message, Clock::time_point arrival) {
+  PoseTime time{.clientTimeUs = message.client_time_us()};
+  if (message.server_time_us() == 0) return time;
+  if (time.clientTimeUs == 0) time.clientTimeUs = message.server_time_us();
+  // The difference of two unsigned times, read as signed, is right whichever of them is ahead.
+  const std::chrono::microseconds ahead(
+      static_cast<std::int64_t>(message.server_time_us() - schedule::microseconds(arrival)));
+  if (ahead > Roster::kMostAhead) return time;
+  time.trueAt = arrival + std::max<std::chrono::microseconds>(ahead, -Roster::kMostBehind);
+  return time;
+}
+
+v1::LeaveReason toMessage(LeaveReason reason) {
+  switch (reason) {
+    case LeaveReason::left:
+      return v1::LEAVE_REASON_LEFT;
+    case LeaveReason::timedOut:
+      return v1::LEAVE_REASON_TIMED_OUT;
+    case LeaveReason::removed:
+      return v1::LEAVE_REASON_REMOVED;
+  }
+  return v1::LEAVE_REASON_UNSPECIFIED;
+}
+
+}  // namespace
+
+void write(const Participant& participant, v1::Participant& message) {
+  message.set_id(participant.id);
+  message.set_display_name(participant.displayName);
+  message.set_client_name(participant.clientName);
+  message.set_role(toMessage(participant.role));
+  message.set_away(participant.away);
+}
+
+Roster::Entries::iterator Roster::find(const Mailbox& mailbox) {
+  return std::ranges::find(entries_, subscribers_.participantOf(mailbox),
+                           [](const Entry& entry) { return entry.participant.id; });
+}
+
+Roster::Entries::iterator Roster::find(const std::string& token) {
+  auto found = entries_.end();
+  for (auto entry = entries_.begin(); entry != entries_.end(); ++entry)
+    if (sameToken(entry->token, token)) found = entry;
+  return found;
+}
+
+Role Roster::roleOf(const Mailbox& mailbox) const {
+  const std::lock_guard lock(mutex_);
+  const std::uint64_t id = subscribers_.participantOf(mailbox);
+  for (const Entry& entry : entries_)
+    if (entry.participant.id == id) return entry.participant.role;
+  return Role::none;
+}
+
+tl::expected<Roster::Admission, Roster::Refusal> Roster::join(const JoinRequest& request,
+                                                              const std::shared_ptr<Mailbox>& mailbox,
+                                                              std::atomic<std::uint64_t>& ids,
+                                                              std::size_t limit, Clock::time_point now) {
+  const std::lock_guard lock(mutex_);
+  if (closed_) return tl::unexpected(Refusal::closed);
+  // A participant whose grace period is over has lost its place, even if expire() was not called since.
+  const auto known = find(request.token);
+  if (known != entries_.end() && (!known->participant.away || now < known->placeExpires)) {
+    if (request.attempt < known->attempt) return tl::unexpected(Refusal::late);
+    known->attempt = request.attempt;
+    return resume(*known, mailbox, now);
+  }
+  if (entries_.size() >= limit && !makeRoom(now)) return tl::unexpected(Refusal::full);
+
+  const bool isOwned =
+      std::ranges::any_of(entries_, [](const Entry& entry) { return entry.participant.role == Role::owner; });
+  Entry entry;
+  entry.token = makeToken();
+  entry.attempt = request.attempt;
+  entry.participant = {.id = ++ids,
+                       .displayName = request.displayName,
+                       .clientName = request.clientName,
+                       .role = request.role == Role::viewer ? Role::viewer
+                               : isOwned                    ? Role::participant
+                                                            : Role::owner};
+  if (journal_) journal_->joined(entry.participant.id, request.clientName, request.displayName);
+  // Announced to the others first: the new participant's Welcome says it.
+  announce(Presence::joined, entry.participant);
+  subscribers_.add(mailbox, entry.participant.id);
+  entries_.push_back(std::move(entry));
+  return admissionOf(entries_.back(), false);
+}
+
+Roster::Admission Roster::resume(Entry& entry, const std::shared_ptr<Mailbox>& mailbox,
+                                 Clock::time_point now) {
+  if (const std::shared_ptr<Mailbox> former = subscribers_.find(entry.participant.id)) {
+    subscribers_.remove(*former);
+    former->close(delivery::error(v1::ERROR_CODE_TAKEN_OVER,
+                                  "another connection used this participant's token and took over", true));
+  }
+  const bool wasAway = std::exchange(entry.participant.away, false);
+  if (wasAway) announce(Presence::returned, entry.participant);
+  subscribers_.add(mailbox, entry.participant.id);
+  if (!entry.posed && !(entry.poses.colliders.empty() && entry.poses.grabs.empty())) {
+    inbox_.postPoses(entry.participant.id, entry.poses, now);
+    entry.posed = true;
+  }
+  return admissionOf(entry, true);
+}
+
+Roster::Admission Roster::admissionOf(const Entry& entry, bool resumed) const {
+  Admission admission{.id = entry.participant.id,
+                      .role = entry.participant.role,
+                      .token = entry.token,
+                      .resumed = resumed,
+                      .participants = {}};
+  for (const Entry& other : entries_) admission.participants.push_back(other.participant);
+  return admission;
+}
+
+void Roster::leave(const Mailbox& mailbox, LeaveReason reason, Clock::time_point now) {
+  const std::lock_guard lock(mutex_);
+  if (const auto entry = find(mailbox); entry != entries_.end()) erase(entry, reason, 0, now);
+}
+
+void Roster::disconnect(const Mailbox& mailbox, const ReconnectGrace& grace, Clock::time_point now) {
+  const std::lock_guard lock(mutex_);
+  const auto entry = find(mailbox);
+  if (entry == entries_.end()) return;
+  if (grace.place <= Clock::duration::zero()) {
+    erase(entry, LeaveReason::timedOut, 0, now);
+    return;
+  }
+  subscribers_.remove(mailbox);
+  entry->participant.away = true;
+  entry->posesExpire = now + std::min(grace.poses, grace.place);
+  entry->placeExpires = now + grace.place;
+  announce(Presence::disconnected, entry->participant);
+}
+
+void Roster::expire(Clock::time_point now) {
+  const std::lock_guard lock(mutex_);
+  for (auto entry = entries_.begin(); entry != entries_.end();) {
+    const bool away = entry->participant.away;
+    if (away && now >= entry->posesExpire) removePoses(*entry, now);
+    if (away && now >= entry->placeExpires)
+      entry = erase(entry, LeaveReason::timedOut, 0, now);
+    else
+      ++entry;
+  }
+}
+
+void Roster::removePoses(Entry& entry, Clock::time_point now) {
+  if (entry.posed) inbox_.postPoses(entry.participant.id, {}, now);
+  entry.posed = false;
+}
+
+bool Roster::makeRoom(Clock::time_point now) {
+  const auto longestAway = std::ranges::min_element(entries_, {}, [](const Entry& entry) {
+    return entry.participant.away ? entry.placeExpires : Clock::time_point::max();
+  });
+  if (longestAway == entries_.end() || !longestAway->participant.away) return false;
+  erase(longestAway, LeaveReason::timedOut, 0, now);
+  return true;
+}
+
+Roster::Entries::iterator Roster::erase(Entries::iterator entry, LeaveReason reason, std::uint64_t by,
+                                        Clock::time_point now) {
+  removePoses(*entry, now);
+  if (const std::shared_ptr<Mailbox> mailbox = subscribers_.find(entry->participant.id))
+    subscribers_.remove(*mailbox);
+  const Participant participant = std::move(entry->participant);
+  const auto next = entries_.erase(entry);
+  if (journal_) journal_->left(participant.id);
+  announceLeft(participant, reason, by);
+  ensureOwner(now);
+  return next;
+}
+
+void Roster::ensureOwner(Clock::time_point now) {
+  const auto has = [](Role role) {
+    return [role](const Entry& entry) { return entry.participant.role == role; };
+  };
+  if (std::ranges::any_of(entries_, has(Role::owner))) return;
+  // Connected participants come before those who are away.
+  auto heir = std::ranges::find_if(entries_, [](const Entry& entry) {
+    return !entry.participant.away && entry.participant.role == Role::participant;
+  });
+  if (heir == entries_.end()) heir = std::ranges::find_if(entries_, has(Role::participant));
+  if (heir != entries_.end()) changeRole(*heir, Role::owner, 0, now);
+}
+
+void Roster::changeRole(Entry& entry, Role role, std::uint64_t by, Clock::time_point now) {
+  entry.participant.role = role;
+  if (role == Role::viewer) {
+    removePoses(entry, now);
+    entry.poses = {};
+  }
+  announce(Presence::roleChanged, entry.participant, by);
+}
+
+void Roster::clear() {
+  if (journal_)
+    for (const Entry& entry : entries_) journal_->left(entry.participant.id);
+  entries_.clear();
+  inbox_.dropPoses();
+}
+
+void Roster::dismiss(const SharedBytes& last) {
+  const std::lock_guard lock(mutex_);
+  subscribers_.closeAll(last);
+  clear();
+}
+
+void Roster::close(const SharedBytes& last) {
+  const std::lock_guard lock(mutex_);
+  closed_ = true;
+  subscribers_.closeAll(last);
+  clear();
+}
+
+std::size_t Roster::size() const {
+  const std::lock_guard lock(mutex_);
+  return entries_.size();
+}
+
+std::size_t Roster::away() const {
+  const std::lock_guard lock(mutex_);
+  return static_cast<std::size_t>(
+      std::ranges::count_if(entries_, [](const Entry& entry) { return entry.participant.away; }));
+}
+
+bool Roster::owned() const {
+  const std::lock_guard lock(mutex_);
+  return std::ranges::any_of(entries_,
+                             [](const Entry& entry) { return entry.participant.role == Role::owner; });
+}
+
+messages::Result<void> Roster::post(const Mailbox& mailbox, const v1::ColliderPoses& message,
+                                    model::ParticipantPoses poses, const Permissions& permissions,
+                                    Clock::time_point arrival) {
+  const std::lock_guard lock(mutex_);
+  const auto entry = find(mailbox);
+  if (entry == entries_.end()) return {};
+  if (auto permitted = permit(entry->participant.role, message, permissions); !permitted) return permitted;
+  entry->posed = true;
+  entry->poses = {.colliders = poses.colliders, .grabs = poses.grabs, .wantsContacts = poses.wantsContacts};
+  inbox_.postPoses(entry->participant.id, std::move(poses), arrival, poseTime(message, arrival));
+  return {};
+}
+
+messages::Result<Roster::Entries::iterator> Roster::target(const char* field, std::uint64_t id) {
+  const auto entry =
+      std::ranges::find_if(entries_, [&](const Entry& known) { return known.participant.id == id; });
+  if (entry != entries_.end()) return entry;
+  return tl::unexpected(messages::FieldError{
+      v1::ERROR_CODE_NOT_FOUND,
+      fmt::format("{}.participantId = {}: there is no such participant in this scene", field, id)});
+}
+
+messages::Result<void> Roster::setRole(const Mailbox& by, const v1::SetRole& message, Clock::time_point now) {
+  const std::lock_guard lock(mutex_);
+  const auto owner = find(by);
+  if (owner == entries_.end()) return {};
+  if (auto permitted = permit(owner->participant.role, Action::setRole, {}); !permitted) return permitted;
+  if (message.role() < v1::ROLE_VIEWER || message.role() > v1::ROLE_OWNER)
+    return tl::unexpected(messages::FieldError{
+        v1::ERROR_CODE_INVALID_ARGUMENT,
+        fmt::format("setRole.role = {}: must be ROLE_VIEWER, ROLE_PARTICIPANT or ROLE_OWNER",
+                    static_cast<int>(message.role()))});
+  const auto entry = target("setRole", message.participant_id());
+  if (!entry) return tl::unexpected(entry.error());
+  const Role role = fromMessage(message.role());
+  if ((*entry)->participant.role == role) return {};
+  const auto owners = std::ranges::count_if(
+      entries_, [](const Entry& other) { return other.participant.role == Role::owner; });
+  if ((*entry)->participant.role == Role::owner && owners == 1)
+    return tl::unexpected(messages::FieldError{
+        v1::ERROR_CODE_INVALID_ARGUMENT,
+        "setRole: the only owner of a scene cannot give up the role; make another participant owner first"});
+  changeRole(**entry, role, owner->participant.id, now);
+  return {};
+}
+
+messages::Result<void> Roster::remove(const Mailbox& by, const v1::RemoveParticipant& message,
+                                      Clock::time_point now) {
+  const std::lock_guard lock(mutex_);
+  const auto owner = find(by);
+  if (owner == entries_.end()) return {};
+  if (auto permitted = permit(owner->participant.role, Action::removeParticipant, {}); !permitted)
+    return permitted;
+  const auto entry = target("removeParticipant", message.participant_id());
+  if (!entry) return tl::unexpected(entry.error());
+  if (const std::shared_ptr<Mailbox> mailbox = subscribers_.find((*entry)->participant.id))
+    mailbox->close(
+        delivery::error(v1::ERROR_CODE_REMOVED, "an owner removed this participant from the scene", true));
+  erase(*entry, LeaveReason::removed, owner->participant.id, now);
+  return {};
+}
+
+void Roster::announce(Presence presence, const Participant& participant, std::uint64_t by) {
+  v1::ServerMessage message;
+  message.mutable_presence()->set_kind([&] {
+    switch (presence) {
+      case Presence::joined:
+        return v1::PRESENCE_KIND_JOINED;
+      case Presence::roleChanged:
+        return v1::PRESENCE_KIND_ROLE_CHANGED;
+      case Presence::disconnected:
+        return v1::PRESENCE_KIND_DISCONNECTED;
+      case Presence::returned:
+        return v1::PRESENCE_KIND_RETURNED;
+    }
+    return v1::PRESENCE_KIND_UNSPECIFIED;
+  }());
+  write(participant, *message.mutable_presence()->mutable_participant());
+  message.mutable_presence()->set_by_participant_id(by);
+  subscribers_.announce(delivery::serialise(message));
+}
+
+void Roster::announceLeft(const Participant& participant, LeaveReason reason, std::uint64_t by) {
+  v1::ServerMessage message;
+  v1::Presence& presence = *message.mutable_presence();
+  presence.set_kind(v1::PRESENCE_KIND_LEFT);
+  write(participant, *presence.mutable_participant());
+  presence.set_reason(toMessage(reason));
+  presence.set_by_participant_id(by);
+  subscribers_.announce(delivery::serialise(message));
+}
+
+}  // namespace clothstream::scene

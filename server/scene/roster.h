@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: MIT
+// Participants of a scene: roles, presence, and reconnection.
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include <tl/expected.hpp>
+
+#include "server/delivery/subscribers.h"
+#include "server/messages/field_error.h"
+#include "server/model/input.h"
+#include "server/scene/inbox.h"
+#include "server/scene/journal.h"
+#include "server/scene/roles.h"
+#include "server/schedule/clock.h"
+
+namespace clothstream::scene {
+
+// Grace periods after a participant's connection is lost. Its colliders and grabs stay for `poses`, its place
+// in the scene for `place`.
+struct ReconnectGrace {
+  Clock::duration place = std::chrono::seconds(60);
+  Clock::duration poses = std::chrono::seconds(2);
+};
+
+// Participants of a scene, disconnected ones included, unless the server or the scene sets another limit.
+inline constexpr std::uint32_t kDefaultMaxParticipants = 64;
+
+struct Participant {
+  std::uint64_t id = 0;
+  std::string displayName, clientName;
+  Role role = Role::none;
+  bool away = false;  // disconnected; it may come back
+};
+void write(const Participant& participant, v1::Participant& message);
+
+enum class LeaveReason : std::uint8_t { left, timedOut, removed };
+
+// Thread-safe. The subscribers hold the mailboxes of all connected participants; a participant that is away
+// has none. A connection is identified by its mailbox. If its participant is gone, or was taken over by
+// another connection, calls for that mailbox have no effect.
+//
+// A scene with participants other than viewers has an owner: the first to join. When the last owner leaves,
+// the participant that has been there longest becomes the owner.
+class Roster {
+ public:
+  static constexpr std::size_t kTokenBytes = 16;
+  // Accepted range of pose times. Later times count as unknown, earlier ones as kMostBehind.
+  static constexpr std::chrono::milliseconds kMostAhead{100}, kMostBehind{10'000};
+
+  // All must outlive the roster. `journal` may be null.
+  Roster(delivery::Subscribers& subscribers, Inbox& inbox, Journal* journal)
+      : subscribers_(subscribers), inbox_(inbox), journal_(journal) {}
+
+  struct JoinRequest {
+    std::string clientName, displayName;
+    Role role = Role::none;     // requested
+    std::string token;          // of a participant that reconnects; else empty
+    std::uint32_t attempt = 0;  // grows with each connection of the participant
+  };
+  struct Admission {
+    std::uint64_t id = 0;
+    Role role = Role::none;
+    std::string token;
+    bool resumed = false;
+    std::vector<Participant> participants;  // all, in the order in which they joined
+  };
+  enum class Refusal : std::uint8_t { full, closed, late };
+
+  // Adds the mailbox to the subscribers. A request with the token of a participant resumes that participant
+  // and closes its former connection; it is refused as late if that connection has a higher attempt number.
+  // Other requests get the next number of `ids`. They are refused as full if `limit` participants are there
+  // and none of them is away. Of those away, the one disconnected longest is evicted.
+  [[nodiscard]] tl::expected<Admission, Refusal> join(const JoinRequest& request,
+                                                      const std::shared_ptr<delivery::Mailbox>& mailbox,
+                                                      std::atomic<std::uint64_t>& ids, std::size_t limit,
+                                                      Clock::time_point now);
+  // Removes the participant for good.
+  void leave(const delivery::Mailbox& mailbox, LeaveReason reason, Clock::time_point now);
+  // The connection is lost: the participant is away and may come back.
+  void disconnect(const delivery::Mailbox& mailbox, const ReconnectGrace& grace, Clock::time_point now);
+  // Removes poses and places whose grace period is over. Call it about once a second.
+  void expire(Clock::time_point now);
+  // Removes all participants, with this as their last message, and drops the poses that no tick has used.
+  void dismiss(const delivery::SharedBytes& last);
+  // Same as dismiss(), and refuses every later join().
+  void close(const delivery::SharedBytes& last);
+
+  // Number of participants, those away included; number of those away.
+  std::size_t size() const;
+  std::size_t away() const;
+  // Returns whether the scene has an owner, who may be away.
+  bool owned() const;
+
+  // Puts the participant's poses into the inbox. `poses` is the content of `message`. Returns an error if the
+  // role is too low.
+  [[nodiscard]] messages::Result<void> post(const delivery::Mailbox& mailbox,
+                                            const v1::ColliderPoses& message, model::ParticipantPoses poses,
+                                            const Permissions& permissions, Clock::time_point arrival);
+  // Calls permit() with the participant's role. `What` is an Action or a message.
+  template <typename What>
+  [[nodiscard]] messages::Result<void> permits(const delivery::Mailbox& mailbox, const What& what,
+                                               const Permissions& permissions) const {
+    return permit(roleOf(mailbox), what, permissions);
+  }
+
+  // Requests of an owner. They return NOT_FOUND if there is no such participant.
+  [[nodiscard]] messages::Result<void> setRole(const delivery::Mailbox& by, const v1::SetRole& message,
+                                               Clock::time_point now);
+  [[nodiscard]] messages::Result<void> remove(const delivery::Mailbox& by,
+                                              const v1::RemoveParticipant& message, Clock::time_point now);
+
+ private:
+  struct Entry {
+    Participant participant;
+    std::string token;
+    std::uint32_t attempt = 0;                        // of the newest connection
+    model::ParticipantPoses poses;                    // the newest, without attachments
+    bool posed = false;                               // the scene may have colliders or grabs of it
+    Clock::time_point posesExpire{}, placeExpires{};  // while it is away
+  };
+  using Entries = std::vector<Entry>;
+  enum class Presence : std::uint8_t { joined, roleChanged, disconnected, returned };
+
+  // Both return end() if there is none.
+  Entries::iterator find(const delivery::Mailbox& mailbox);
+  Entries::iterator find(const std::string& token);
+  Role roleOf(const delivery::Mailbox& mailbox) const;
+  // Participant that an owner's request names in `field`.
+  messages::Result<Entries::iterator> target(const char* field, std::uint64_t id);
+  Admission resume(Entry& entry, const std::shared_ptr<delivery::Mailbox>& mailbox, Clock::time_point now);
+  // Evicts the participant that has been away longest. Returns false if nobody is away.
+  bool makeRoom(Clock::time_point now);
+  // Returns the next entry. `by` is the participant that caused it, or 0.
+  Entries::iterator erase(Entries::iterator entry, LeaveReason reason, std::uint64_t by,
+                          Clock::time_point now);
+  void removePoses(Entry& entry, Clock::time_point now);
+  void changeRole(Entry& entry, Role role, std::uint64_t by, Clock::time_point now);
+  // Gives the scene an owner if it has none.
+  void ensureOwner(Clock::time_point now);
+  Admission admissionOf(const Entry& entry, bool resumed) const;
+  void clear();
+  void announce(Presence presence, const Participant& participant, std::uint64_t by = 0);
+  void announceLeft(const Participant& participant, LeaveReason reason, std::uint64_t by);
+
+  delivery::Subscribers& subscribers_;
+  Inbox& inbox_;
+  Journal* const journal_;
+
+  mutable std::mutex mutex_;  // held during announcements, so that all subscribers get them in the same order
+  Entries entries_;           // in the order in which they joined
+  bool closed_ = false;
+};
+
+}  // namespace clothstream::scene

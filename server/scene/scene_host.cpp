@@ -1,0 +1,427 @@
+// SPDX-License-Identifier: MIT
+#include "server/scene/scene_host.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <utility>
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include "clothstream/v1/session.pb.h"
+#include "server/messages/description.h"
+#include "server/model/wind.h"
+
+namespace clothstream::scene {
+namespace {
+
+// After a change of solver, the excess length of springs shrinks as exp(-t / kEaseTime) for kEaseSeconds.
+constexpr double kEaseSeconds = 0.5, kEaseTime = 0.1;
+constexpr std::uint32_t kCheckpointSeconds = 1, kSnapshotSeconds = 5;
+// Maximum number of poses whose latency one frame measures; one for each participant and tick.
+constexpr std::size_t kMaxPoseArrivals = 256;
+
+}  // namespace
+
+SceneHost::SceneHost(vulkan::Device& device, LiveScene& scene, delivery::FramePublisher& publisher,
+                     double reportRate)
+    : SceneHost(std::make_unique<SceneOnDevice>(device, scene.start(), publisher.workers()), scene, publisher,
+                reportRate) {}
+
+SceneHost::SceneHost(std::unique_ptr<SceneOnDevice> loaded, LiveScene& scene,
+                     delivery::FramePublisher& publisher, double reportRate)
+    : live_(scene),
+      publisher_(publisher),
+      rate_(scene.start().simulationRate),
+      ticksAFrame_(rate_ / scene.start().streamRate),
+      ticksAReport_(reportRate > 0 ? static_cast<std::uint64_t>(std::ceil(rate_ / reportRate)) : 0),
+      scene_(scene.start()),
+      colliders_(scene_),
+      grabs_(scene_),
+      easeUntil_(scene_.cloths.size(), 0),
+      onDevice_(std::move(loaded)) {
+  newestState_ = onDevice_->start;
+  if (live_.journal && live_.journal->due())
+    live_.journal->begin(onDevice_->device.info(), scene_,
+                         messages::toDescription(scene_, LiveScene::kEpoch, live_.codec(), 0),
+                         onDevice_->start, onDevice_->start);
+}
+
+SceneHost::~SceneHost() {
+  if (live_.journal) live_.journal->end();
+}
+
+void SceneHost::begin(Clock::time_point now) {
+  tickStart_ = now;
+  beginJournal();
+  if (live_.resetRequested.exchange(false)) reset();
+  endEasing();
+  applyInputs();
+  const double endSeconds = static_cast<double>(tick_ + 1) * scene_.tickSeconds();
+  colliders_.advance(scene_, endSeconds, tickInputs_.colliders);
+  grabs_.advance(scene_, endSeconds, tickInputs_);
+  tickInputs_.reportsContacts = contacts_.requested();
+  tickInputs_.environment = model::environmentAt(scene_, tick_);
+
+  SceneOnDevice& on = *onDevice_;
+  on.recorder.begin();
+  recordRecovery();
+  // The first tick of a recording keeps a checkpoint, so that no rollback goes back to before it.
+  keepsState_ = sinceHealthy_ > 0 && (journalBegan_ || every(kCheckpointSeconds));
+  if (keepsState_) on.simulation.recordCheckpoint(on.recorder);
+  on.simulation.recordTick(on.recorder, tickInputs_);
+  hasFrame_ = (tick_ + 1) % ticksAFrame_ == 0;
+  if (hasFrame_) {
+    owesFrame_ = false;
+    recordFrame(now);
+  }
+  savesState_ = sinceHealthy_ > 0 && every(kSnapshotSeconds);
+  if (savesState_) on.simulation.recordSaveState(on.recorder);
+  submitted_ = on.device.submit(on.recorder);
+}
+
+void SceneHost::beginJournal() {
+  journalBegan_ = false;
+  if (!live_.journal || !live_.journal->due() || recovery_ != Recovery::none || sinceHealthy_ == 0) return;
+  SceneOnDevice& on = *onDevice_;
+  on.recorder.begin();
+  on.simulation.recordSaveState(on.recorder);
+  on.device.wait(on.device.submit(on.recorder));
+  // Frames of earlier ticks must not become part of the recording.
+  publisher_.drain();
+  // The state does not contain the vertices that grabs hold.
+  if (grabs_.anyGrabHolds()) grabs_.restartGrabs();
+  const double seconds = static_cast<double>(tick_) * scene_.tickSeconds();
+  live_.journal->begin(on.device.info(), scene_,
+                       messages::toDescription(scene_, LiveScene::kEpoch, live_.codec(), seconds),
+                       on.simulation.collectState(tick_), on.start);
+  journalBegan_ = true;
+  sinceKeyFrame_ = kFramesAKeyFrame;
+}
+
+void SceneHost::announceRecording() {
+  if (!live_.journal || live_.journal->active() == recorded_) return;
+  recorded_ = !recorded_;
+  live_.subscribers.announce(recorded_ ? recordingNotice(tick_)
+                                       : delivery::notice(v1::NOTICE_KIND_RECORDING_STOPPED,
+                                                          "the recording of the scene has stopped", tick_));
+}
+
+void SceneHost::reset() {
+  recovery_ = Recovery::reset;
+  owesFrame_ = true;
+  sinceHealthy_ = 0;
+  newestState_ = onDevice_->start;
+  newestState_.tick = tick_;
+}
+
+void SceneHost::applyInputs() {
+  live_.inbox.drain(inputs_);
+  std::string problem;
+  for (const AcceptedChange& accepted : inputs_.changes) {
+    if (!apply(accepted.change, problem)) continue;
+    live_.subscribers.announce(
+        delivery::parametersChanged(accepted.message, tick_ + 1, accepted.participant));
+  }
+  if (!problem.empty()) revertChanges(problem);
+  for (Poses& poses : inputs_.poses) {
+    const model::ParticipantPoses& now = poses.now.poses;
+    const bool moves = !now.colliders.empty() || !now.grabs.empty() || !now.attachments.empty();
+    if (moves && poseArrivals_.size() < kMaxPoseArrivals) poseArrivals_.push_back(poses.now.arrival);
+    poses_.add(std::move(poses));
+  }
+  poses_.place(tickStart_, [this](std::uint64_t participant, const model::ParticipantPoses& poses) {
+    colliders_.place(participant, poses.colliders);
+    grabs_.place(participant, poses.grabs, poses.attachments);
+    contacts_.request(participant, poses.wantsContacts);
+  });
+}
+
+bool SceneHost::apply(const model::ParameterChange& change, std::string& problem) {
+  model::Scene changed = scene_;
+  model::applyChange(changed, change);
+  easeSolverChanges(changed);
+  if (!change.cloths.empty()) {
+    try {
+      setCloths(changed.cloths);
+    } catch (const vulkan::DeviceLost&) {
+      throw;
+    } catch (const std::runtime_error& noRoom) {
+      problem = noRoom.what();
+      return false;
+    }
+  }
+  scene_ = std::move(changed);
+  return true;
+}
+
+void SceneHost::easeSolverChanges(model::Scene& changed) {
+  const auto part = static_cast<float>(changed.substepSeconds() / kEaseTime);
+  for (std::size_t i = 0; i < changed.cloths.size(); ++i) {
+    model::Solver& solver = changed.cloths[i].solver;
+    if (solver.kind != scene_.cloths[i].solver.kind)
+      easeUntil_[i] = tick_ + static_cast<std::uint64_t>(std::ceil(kEaseSeconds * rate_));
+    if (easeUntil_[i] > tick_) solver.correctionFraction = std::min(part, model::correctionFraction(solver));
+  }
+}
+
+void SceneHost::endEasing() {
+  bool ended = false;
+  for (std::size_t i = 0; i < easeUntil_.size(); ++i) {
+    if (easeUntil_[i] != tick_ || !scene_.cloths[i].solver.correctionFraction) continue;
+    scene_.cloths[i].solver.correctionFraction.reset();
+    ended = true;
+  }
+  if (ended) setCloths(scene_.cloths);
+}
+
+void SceneHost::setCloths(const std::vector<model::Cloth>& cloths) {
+  onDevice_->simulation.setCloths(cloths);
+  clothsChanged_ = true;
+}
+
+void SceneHost::revertChanges(const std::string& reason) {
+  const std::string text = fmt::format("a parameter change was undone: {}", reason);
+  spdlog::warn("{}: tick {}: {}", live_.name(), tick_, text);
+  live_.subscribers.announce(delivery::parametersChanged(live_.revertTo(scene_), tick_ + 1));
+  live_.subscribers.announce(delivery::notice(v1::NOTICE_KIND_CHANGE_UNDONE, text, tick_));
+}
+
+void SceneHost::recordRecovery() {
+  SceneOnDevice& on = *onDevice_;
+  recovered_ = recovery_;
+  if (recovery_ == Recovery::none) return;
+  if (recovery_ == Recovery::rollback) on.simulation.recordRollback(on.recorder);
+  if (recovery_ == Recovery::reset) on.simulation.recordRestoreState(on.recorder, on.start);
+  on.encoders.forgetHistory();
+  recovery_ = Recovery::none;
+}
+
+void SceneHost::chooseEncoders(Clock::time_point now) {
+  frame_.recorded.clear();
+  delivery::RequestedFrames requested = live_.subscribers.requested(now);
+  const bool isRecorded = live_.journal && live_.journal->active();
+  if (isRecorded) requested.qualities |= 1;
+  encode::QualityEncoders& encoders = onDevice_->encoders;
+  for (std::uint8_t quality = 0; quality < encoders.count(); ++quality) {
+    if ((requested.qualities >> quality & 1) == 0) {
+      encoders.unwanted(quality, now);
+      continue;
+    }
+    encode::FrameEncoder* const encoder = encoders.wanted(quality, now);
+    if (encoder == nullptr) continue;
+    if (!encoder->canRecord()) {
+      live_.metrics.skippedFrames.add();
+      continue;
+    }
+    const bool due = isRecorded && quality == 0 && sinceKeyFrame_ + 1 >= kFramesAKeyFrame;
+    const bool keyRequested =
+        (requested.keyFrames >> quality & 1) != 0 && now - lastKeyFrame_[quality] >= kKeyFrameInterval;
+    frame_.recorded.push_back({.encoder = encoder, .quality = quality, .key = due || keyRequested});
+  }
+}
+
+void SceneHost::recordFrame(Clock::time_point now) {
+  chooseEncoders(now);
+  hasFrame_ = !frame_.recorded.empty();
+  if (!hasFrame_) return;
+  SceneOnDevice& on = *onDevice_;
+  if (scene_.stream.normals == model::Normals::octahedral) on.simulation.recordNormals(on.recorder);
+  hasReport_ = ticksAReport_ > 0 && tick_ + 1 >= nextReport_;
+  if (hasReport_) {
+    on.simulation.recordReport(on.recorder, tickInputs_);
+    nextReport_ = tick_ + 1 + ticksAReport_;
+  }
+  ++sinceKeyFrame_;
+  for (delivery::CompleteFrame::Recorded& recorded : frame_.recorded) {
+    recorded.frame = recorded.encoder->record(on.recorder, tick_ + 1, recorded.key);
+    if (recorded.frame.kind != codec::PacketKind::key) continue;
+    lastKeyFrame_[recorded.quality] = now;
+    if (recorded.quality == 0) sinceKeyFrame_ = 0;
+  }
+  // Key frames first: a subscriber that changes its quality must get the new quality's key frame before the
+  // former quality's frame of the same tick.
+  std::ranges::partition(frame_.recorded, [](const delivery::CompleteFrame::Recorded& recorded) {
+    return recorded.frame.kind == codec::PacketKind::key;
+  });
+  describeFrame(tickStart_);
+  std::swap(frame_.poseArrivals, poseArrivals_);
+  poseArrivals_.clear();
+}
+
+void SceneHost::describeFrame(Clock::time_point start) {
+  frame_.subscribers = &live_.subscribers;
+  frame_.metrics = &live_.metrics;
+  frame_.repeated = false;
+  frame_.fields->set_tick_time_us(schedule::microseconds(start));
+  colliders_.write(scene_, *frame_.fields);
+}
+
+void SceneHost::encodePausedFrame(Clock::time_point now) {
+  // The next tick replaces the present state.
+  if (recovery_ != Recovery::none) return;
+  SceneOnDevice& on = *onDevice_;
+  const std::uint8_t needed = live_.subscribers.needsKeyFrame();
+  frame_.recorded.clear();
+  for (std::uint8_t quality = 0; quality < on.encoders.count(); ++quality) {
+    if ((needed >> quality & 1) == 0 || now - lastKeyFrame_[quality] < kKeyFrameInterval) continue;
+    encode::FrameEncoder* const encoder = on.encoders.wanted(quality, now);
+    if (encoder == nullptr || !encoder->canRecord()) continue;
+    frame_.recorded.push_back({.encoder = encoder, .quality = quality, .key = true});
+  }
+  if (frame_.recorded.empty()) return;
+  on.recorder.begin();
+  if (scene_.stream.normals == model::Normals::octahedral) on.simulation.recordNormals(on.recorder);
+  for (delivery::CompleteFrame::Recorded& recorded : frame_.recorded) {
+    // The subscribers now hold different newest frames. The next frame is therefore a key frame.
+    recorded.encoder->forgetHistory();
+    recorded.frame = recorded.encoder->record(on.recorder, tick_, true);
+    recorded.encoder->forgetHistory();
+    lastKeyFrame_[recorded.quality] = now;
+  }
+  on.simulation.recordSaveState(on.recorder);
+  on.device.wait(on.device.submit(on.recorder));
+  const simulation::TickStatus status = simulation::statusOf(on.simulation.collectState(tick_));
+  describeFrame(now);
+  frame_.repeated = true;
+  frame_.fields->clear_report();
+  frame_.poseArrivals.clear();
+  frame_.discarded = !status.healthy;
+  frame_.fields->set_state_hash(status.stateHash);
+  frame_.deviceDone = Clock::now();
+  publisher_.push(frame_);
+}
+
+void SceneHost::finish() {
+  SceneOnDevice& on = *onDevice_;
+  on.device.wait(submitted_);
+  const Clock::time_point done = Clock::now();
+  status_ = on.simulation.status();
+  ++tick_;
+  if (live_.journal)
+    live_.journal->ticked({.tick = tick_,
+                           .status = status_,
+                           .recovery = recovered_,
+                           .keepsState = keepsState_,
+                           .clothsChanged = clothsChanged_,
+                           .scene = scene_,
+                           .inputs = tickInputs_,
+                           .colliders = colliders_});
+  clothsChanged_ = false;
+  if (status_.healthy) {
+    ++sinceHealthy_;
+    live_.tick = tick_;
+    if (savesState_) newestState_ = on.simulation.collectState(tick_);
+    if (savesState_ && live_.journal) live_.journal->saved(newestState_, grabs_.anyGrabHolds());
+  }
+  telemetry::SceneMetrics& metrics = live_.metrics;
+  double total = 0, report = 0;
+  for (const vulkan::StageTime& stage : on.recorder.stageTimes()) {
+    metrics.device.record(stage.stage, stage.seconds);
+    total += stage.seconds;
+    if (stage.stage == "report") report = stage.seconds;
+  }
+  if (hasFrame_) {
+    if (hasReport_)
+      writeReport(total - report);
+    else
+      frame_.fields->clear_report();
+    frame_.discarded = !status_.healthy;
+    frame_.fields->set_state_hash(status_.stateHash);
+    frame_.deviceDone = done;
+    publisher_.push(frame_);
+  }
+  announceEvents();
+  announceRecording();
+  if (!status_.healthy) recover();
+
+  metrics.ticks.add();
+  metrics.crowdedBalls.add(status_.crowded);
+  metrics.tick.record(schedule::seconds(done - tickStart_));
+  metrics.deviceTotal.record(total);
+}
+
+void SceneHost::writeReport(double deviceSeconds) {
+  v1::SimulationReport& message = *frame_.fields->mutable_report();
+  message.Clear();
+  message.set_device_seconds(deviceSeconds);
+  for (const simulation::ClothReport& report : onDevice_->simulation.report()) {
+    v1::ClothReport& cloth = *message.add_cloths();
+    cloth.set_strain_max(report.strainMax);
+    cloth.set_strain_p99(report.strainP99);
+    cloth.set_strain_mean(report.strainMean);
+    cloth.set_kinetic_energy(report.kineticEnergy);
+    cloth.set_elastic_energy(report.elasticEnergy);
+    cloth.set_gravity_energy(report.gravityEnergy);
+    cloth.set_active_constraints(report.activeConstraints);
+    cloth.set_iterations(report.iterations);
+    cloth.set_residual(report.residual);
+    cloth.set_penetration(report.penetration);
+  }
+}
+
+void SceneHost::announceEvents() {
+  v1::ServerMessage message;
+  v1::TickEvents& events = *message.mutable_tick_events();
+  grabs_.addEvents(onDevice_->simulation.grabs(), events);
+  contacts_.addEvents(tick_, scene_, colliders_, onDevice_->simulation.contacts(), events);
+  if (events.grabs().empty() && events.contacts().empty()) return;
+  events.set_tick(tick_);
+  live_.subscribers.announce(delivery::serialise(message));
+}
+
+void SceneHost::recover() {
+  const bool repeated = lastRecovery_ && tick_ - *lastRecovery_ <= rate_;
+  lastRecovery_ = tick_;
+  sinceHealthy_ = 0;
+  std::string text;
+  if (repeated) {
+    recovery_ = Recovery::reset;
+    live_.metrics.resets.add();
+    text =
+        "the simulation became unstable twice within a second: it continues from its start, with the start's "
+        "parameters";
+    const v1::ParameterChange start = live_.resetParameters();
+    scene_.environment = live_.start().environment;
+    scene_.cloths = live_.start().cloths;
+    setCloths(scene_.cloths);
+    live_.subscribers.announce(delivery::parametersChanged(start, tick_ + 1));
+  } else {
+    recovery_ = Recovery::rollback;
+    live_.metrics.rollbacks.add();
+    text = "the simulation became unstable: it continues from its newest healthy state, at most a second old";
+  }
+  if (!recoveryNotices_.take(Clock::now())) return;
+  spdlog::warn("{}: tick {}: {}", live_.name(), tick_, text);
+  live_.subscribers.announce(delivery::notice(v1::NOTICE_KIND_ROLLED_BACK, text, tick_));
+}
+
+void SceneHost::releaseCoarseEncoders() {
+  publisher_.drain();
+  onDevice_->encoders.drop();
+}
+
+void SceneHost::release() {
+  onDevice_.reset();
+}
+
+void SceneHost::rebuild(std::unique_ptr<SceneOnDevice> loaded, std::string_view why) {
+  SceneOnDevice& fresh = *loaded;
+  fresh.simulation.setCloths(scene_.cloths);
+  fresh.recorder.begin();
+  fresh.simulation.recordRestoreState(fresh.recorder, newestState_);
+  fresh.device.wait(fresh.device.submit(fresh.recorder));
+  onDevice_ = std::move(loaded);
+  grabs_.restartGrabs();
+  recovery_ = Recovery::none;
+  sinceHealthy_ = 0;
+  if (live_.journal) live_.journal->restored(tick_, newestState_);
+  live_.subscribers.announce(
+      delivery::notice(v1::NOTICE_KIND_DEVICE_REBUILT,
+                       fmt::format("{}; the scene goes on from {:.1f} s before", why,
+                                   static_cast<double>(tick_ - newestState_.tick) / rate_),
+                       tick_));
+}
+
+}  // namespace clothstream::scene

@@ -1,0 +1,153 @@
+// SPDX-License-Identifier: MIT
+// Runs one scene on the device: ticks, frames, checkpoints, and recovery from failures.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "server/delivery/frame_publisher.h"
+#include "server/scene/collider_set.h"
+#include "server/scene/contact_log.h"
+#include "server/scene/grabs_and_attachments.h"
+#include "server/scene/live_scene.h"
+#include "server/scene/pose_history.h"
+#include "server/scene/scene_on_device.h"
+#include "server/schedule/token_bucket.h"
+#include "server/simulation/cloth_simulation.h"
+#include "server/vulkan/device.h"
+
+namespace clothstream::scene {
+
+// Belongs to the device's thread. A tick is begin(), then finish(); the device works between the two. Tick n
+// ends at the simulated time n / simulation rate. Tick numbers only grow, also after the state went back.
+//
+// Recovery bounds the loss. Every second of healthy ticks a checkpoint is kept on the device; an unhealthy
+// state goes back to it. Every five seconds a snapshot is kept on the CPU; after a device loss the scene
+// continues from it. A state that becomes unhealthy twice within a second goes back to the scene's start,
+// with the start's parameters.
+class SceneHost {
+ public:
+  // Minimum interval between requested key frames of one quality. One key frame serves all subscribers.
+  static constexpr std::chrono::milliseconds kKeyFrameInterval{100};
+
+  // While the scene is recorded, at least one frame in this many is a key frame.
+  static constexpr std::uint32_t kFramesAKeyFrame = 24;
+
+  // Frames per second that carry a simulation report.
+  static constexpr double kReportRate = 4;
+
+  // All arguments must outlive the host. With `reportRate` 0 no frame carries a report. Throws
+  // std::runtime_error if the device has no room for the scene.
+  SceneHost(vulkan::Device& device, LiveScene& scene, delivery::FramePublisher& publisher,
+            double reportRate = kReportRate);
+  // `loaded` holds the scene's start.
+  SceneHost(std::unique_ptr<SceneOnDevice> loaded, LiveScene& scene, delivery::FramePublisher& publisher,
+            double reportRate);
+  ~SceneHost();
+
+  LiveScene& scene() { return live_; }
+
+  // Drains the inbox, records the next tick and submits it. Throws vulkan::DeviceLost.
+  void begin(Clock::time_point now);
+  // Waits for the tick, and hands its frame to the publisher. Throws vulkan::DeviceLost.
+  void finish();
+
+  // While the scene is paused: encodes the present state as a key frame for subscribers that need one to
+  // continue. Runs no tick; other subscribers get nothing. Call it repeatedly. Throws vulkan::DeviceLost.
+  void encodePausedFrame(Clock::time_point now);
+
+  // Releases the encoders of the coarser qualities, when the scene is paused or has no subscribers.
+  void releaseCoarseEncoders();
+
+  // Releases everything on the device. After that only rebuild() and isReady() may be called.
+  void release();
+  bool isReady() const { return onDevice_ != nullptr; }
+  // Continues from the newest snapshot. `loaded` holds the scene's start. `why` begins the notice to the
+  // subscribers, such as "the device was lost".
+  void rebuild(std::unique_ptr<SceneOnDevice> loaded, std::string_view why);
+
+  // Newest complete tick, and its status.
+  std::uint64_t tick() const { return tick_; }
+  simulation::TickStatus status() const { return status_; }
+  // Returns whether the cloths were reset and no frame has shown it yet.
+  bool owesFrame() const { return owesFrame_; }
+
+ private:
+  // The next tick starts from the scene's start.
+  void reset();
+  // If a journal is due and the state can be recorded, gives it the state before the next tick. Throws
+  // vulkan::DeviceLost.
+  void beginJournal();
+  // Announces that a recording started or stopped.
+  void announceRecording();
+  void applyInputs();
+  // Returns false and changes nothing if the device has no room for the change; `problem` says why.
+  bool apply(const model::ParameterChange& change, std::string& problem);
+  // Announces that changes were undone.
+  void revertChanges(const std::string& reason);
+  // Limits the correction of cloths whose solver changed: springs that are too long shrink over kEaseSeconds.
+  void easeSolverChanges(model::Scene& changed);
+  void endEasing();
+  void setCloths(const std::vector<model::Cloth>& cloths);
+  void recordRecovery();
+  // Chooses the encoders of the current frame: those of requested qualities that have a free slot.
+  void chooseEncoders(Clock::time_point now);
+  void recordFrame(Clock::time_point now);
+  // Sets the fields of the current frame, except its report and state hash.
+  void describeFrame(Clock::time_point start);
+  void writeReport(double deviceSeconds);
+  void announceEvents();
+  void recover();
+  bool every(std::uint32_t seconds) const { return sinceHealthy_ % (std::uint64_t{seconds} * rate_) == 0; }
+
+  LiveScene& live_;
+  delivery::FramePublisher& publisher_;
+  const std::uint32_t rate_;          // ticks/s
+  const std::uint32_t ticksAFrame_;   // simulation rate / stream rate
+  const std::uint64_t ticksAReport_;  // minimum; 0: no reports
+
+  model::Scene scene_;  // with the current tick's parameters
+  ColliderSet colliders_;
+  GrabsAndAttachments grabs_;
+  ContactLog contacts_;
+  Inputs inputs_;
+  PoseHistory poses_;
+  simulation::TickInputs tickInputs_;
+  std::vector<Clock::time_point> poseArrivals_;  // of poses that no frame has shown yet
+
+  std::vector<std::uint64_t> easeUntil_;  // tick, for each cloth
+
+  std::uint64_t tick_ = 0;
+  simulation::TickStatus status_;
+  Recovery recovery_ = Recovery::none;         // before the next tick
+  Recovery recovered_ = Recovery::none;        // before the current tick
+  bool keepsState_ = false;                    // the current tick keeps a checkpoint
+  bool journalBegan_ = false;                  // before the current tick
+  bool recorded_ = false;                      // announced to the subscribers
+  bool clothsChanged_ = false;                 // since the newest complete tick
+  std::optional<std::uint64_t> lastRecovery_;  // tick
+  std::uint64_t sinceHealthy_ = 0;             // healthy ticks since the start or the newest recovery
+  schedule::TokenBucket recoveryNotices_{1, 5};
+
+  simulation::StateSnapshot newestState_;
+  bool savesState_ = false;  // the current tick saves a snapshot
+
+  Clock::time_point tickStart_{};
+  std::array<Clock::time_point, codec::kMaxQualities> lastKeyFrame_{};
+  std::uint32_t sinceKeyFrame_ = 0;  // frames of the finest quality
+  vulkan::TimelineValue submitted_ = 0;
+  bool hasFrame_ = false;   // the current tick
+  bool hasReport_ = false;  // the current frame
+  bool owesFrame_ = false;
+  std::uint64_t nextReport_ = 0;  // tick
+  delivery::CompleteFrame frame_;
+
+  std::unique_ptr<SceneOnDevice> onDevice_;
+};
+
+}  // namespace clothstream::scene

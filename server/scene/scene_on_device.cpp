@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: MIT
+#include "server/scene/scene_on_device.h"
+
+#include <cstddef>
+#include <cstdint>
+#include <stdexcept>
+#include <vector>
+
+#include "server/scene/live_scene.h"
+
+namespace clothstream::scene {
+
+SceneOnDevice::SceneOnDevice(vulkan::Device& device_, const model::Scene& scene, codec::Workers& workers,
+                             const std::stop_token& stop)
+    : device(device_),
+      simulation(device_, scene),
+      encoders(device_, simulation, encode::streamLayout(scene, LiveScene::kEpoch), &workers),
+      recorder(device_) {
+  recorder.begin();
+  simulation.recordSaveState(recorder);
+  submitAndWait();
+  start = simulation.collectState(0);
+  warmUp(scene, stop);
+}
+
+void SceneOnDevice::submitAndWait() {
+  device.wait(device.submit(recorder));
+}
+
+void SceneOnDevice::warmUp(const model::Scene& scene, const std::stop_token& stop) {
+  simulation::TickInputs inputs{scene.environment, {}};
+  recorder.beginRehearsal();
+  for (int tick = 0; tick < 2; ++tick) {
+    simulation.recordTick(recorder, inputs);
+    simulation.recordReport(recorder, inputs);
+    if (scene.stream.normals == model::Normals::octahedral) simulation.recordNormals(recorder);
+    inputs.colliders.emplace_back();
+    inputs.grabs.emplace_back();
+  }
+  submitAndWait();
+  // One submission for each kernel, so that other scenes can use the device between two of them.
+  for (const vulkan::Bindings* bindings : recorder.rehearsed()) {
+    if (stop.stop_requested()) throw std::runtime_error("loading was stopped");
+    recorder.begin();
+    recorder.touch(*bindings);
+    submitAndWait();
+  }
+
+  encode::FrameEncoder& encoder = encoders.finest();
+  std::vector<std::byte> packet(encoder.packetBound());
+  for (std::uint64_t tick = 1; tick <= 2; ++tick) {
+    recorder.begin();
+    const encode::RecordedFrame frame = encoder.record(recorder, tick, false);
+    submitAndWait();
+    encoder.entropyCode(frame, packet);
+  }
+  encoder.forgetHistory();
+  recorder.begin();
+  simulation.recordRestoreState(recorder, start);
+  submitAndWait();
+}
+
+}  // namespace clothstream::scene

@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: MIT
+// One peer of the server: serialised ClientMessages in, serialised ServerMessages out.
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <span>
+#include <string>
+
+#include <tl/expected.hpp>
+
+#include "server/delivery/envelope.h"
+#include "server/hosting/peer.h"
+#include "server/hosting/scene_server.h"
+#include "server/messages/field_error.h"
+#include "server/messages/limits.h"
+#include "server/scene/roles.h"
+#include "server/schedule/clock.h"
+#include "server/schedule/token_bucket.h"
+#include "server/session/upload.h"
+
+namespace clothstream::delivery {
+class Mailbox;
+}
+namespace clothstream::scene {
+class LiveScene;
+}
+
+namespace clothstream::session {
+
+using schedule::Clock;
+using schedule::TokenBucket;
+
+// Largest serialised ClientMessage. Endpoints refuse larger ones before they allocate memory for them.
+inline constexpr std::size_t kMaxClientMessageBytes = messages::limits::kMaxClientMessageBytes;
+
+// Thread-safe. An endpoint opens one for each peer, feeds it what arrives, and writes what next() returns,
+// one write in flight. When the write is done it calls next() again. If there is nothing it waits for `wake`.
+//
+// An invalid message is answered by an Error to this peer alone. Every refused message counts against a
+// budget that refills with time; bytes that are no message at all count as 60. A peer that exceeds the budget
+// is disconnected.
+class Session final : public hosting::Peer, public std::enable_shared_from_this<Session> {
+ public:
+  // Admits the peer to the server, or refuses it with a last message. `wake` is called, from any thread, when
+  // next() may have something or finished() became true; it must not block. `peer` names the peer in logs.
+  // The server must outlive the session.
+  //
+  // The session ends when the returned pointer is released. The peer is then disconnected, unless it has
+  // left: its participant stays for the grace period. `wake` is not called after that, so the releasing
+  // thread must hold no lock that `wake` takes.
+  static std::shared_ptr<Session> open(hosting::SceneServer& server, std::string peer,
+                                       std::function<void()> wake);
+
+  // Handles one ClientMessage.
+  void receive(std::span<const std::byte> message);
+
+  // The peer has said goodbye: it leaves the scene for good.
+  void leave();
+
+  // Returns the next message to write: control messages first, then the newest frame that the peer can decode
+  // and has room for (see delivery::Mailbox).
+  std::optional<delivery::SharedBytes> next();
+
+  // Returns whether the peer must be closed once next() has nothing more: after a fatal error, when the
+  // server stops, or when the peer does not read. The endpoint gives the last writes about a second. The last
+  // message says why: a fatal Error, or the Notice that the server stops.
+  bool finished() const;
+
+  void close(delivery::SharedBytes last) override;
+  void checkSilence(Clock::time_point now) override;
+
+ private:
+  Session(hosting::SceneServer::State& server, std::string peer, std::function<void()> wake);
+  void end();
+
+  void dispatch(const v1::ClientMessage& message, Clock::time_point now);
+  void hello(const v1::Hello& message);
+  void poses(const v1::ColliderPoses& message, Clock::time_point now);
+  void create(const v1::CreateSceneRequest& request);
+  // Returns a function that answers the current message when its result is known.
+  template <typename Response>
+  std::function<void(tl::expected<Response, v1::Error>)> answering(Response* (v1::ServerMessage::*body)());
+  void answer(v1::ServerMessage& message);
+  void refuse(const messages::FieldError& reason, double cost = 1);
+  void refuseUnless(const messages::Result<void>& done);
+  void fail(v1::ErrorCode code, std::string text);
+  // Takes a token, or refuses the message.
+  bool allowed(TokenBucket& bucket, const char* what);
+  // Checks whether this peer may do this to the scene of this name. Returns its participant number there, 0
+  // if it is outside the scene, or nothing if the request was refused.
+  std::optional<std::uint64_t> actor(const std::string& scene, scene::Action action);
+  enum class DisconnectReason : std::uint8_t { left, removed, lost };
+  void disconnect(DisconnectReason reason);
+  // Both need the lock.
+  void closeLocked(delivery::SharedBytes last, DisconnectReason reason);
+
+  hosting::SceneServer::State& server_;
+  const std::string peer_;
+  const std::shared_ptr<delivery::Mailbox> mailbox_;
+  std::atomic<Clock::time_point> lastHeard_;
+
+  std::mutex mutex_;  // protects all below
+  std::shared_ptr<scene::LiveScene> scene_;
+  std::uint64_t participant_ = 0;
+  Upload upload_;
+  // Of the current message.
+  std::uint64_t requestId_ = 0;
+  Clock::time_point now_{};
+
+  TokenBucket poseRate_{480, 120};
+  TokenBucket changeRate_{60, 30};
+  TokenBucket keyFrameRate_{10, 5};
+  TokenBucket pingRate_{20, 150};  // clients send many pings at the start
+  TokenBucket queryRate_{20, 20};
+  TokenBucket controlRate_{10, 10};
+  TokenBucket messageRate_{1000, 500};  // messages of all kinds
+  TokenBucket offences_{100, 500};
+  TokenBucket errorRate_{50, 50};  // Error messages; further refusals are only counted
+};
+
+}  // namespace clothstream::session

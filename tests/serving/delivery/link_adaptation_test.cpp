@@ -1,0 +1,231 @@
+// SPDX-License-Identifier: MIT
+// What subscribers get over links that become too slow and recover, in simulated time.
+#include "server/delivery/link_adaptation.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <functional>
+#include <random>
+
+#include <gtest/gtest.h>
+
+#include "tests/serving/delivery/simulated_link.h"
+
+namespace clothstream::delivery {
+namespace {
+
+using namespace schedule;
+
+using namespace std::chrono_literals;
+
+constexpr StreamShape kLayered{.rate = 72, .layers = 3, .qualities = 3};
+
+// Bytes/s of what is sent at a point.
+double rateAt(const SimulatedScene& scene, const OperatingPoint& point) {
+  return scene.fullRate() * std::pow(SimulatedScene::kPartOfFiner, point.quality) /
+         (1 << (kLayered.layers - point.layers));
+}
+
+// Until it holds, in steps of 10 ms; one more than the limit where it does not by then.
+Clock::duration timeUntil(SimulatedScene& scene, const std::function<bool()>& holds, Clock::duration limit) {
+  Clock::duration time{};
+  for (; !holds() && time <= limit; time += 10ms) scene.pass(10ms);
+  return time;
+}
+
+std::uint64_t stepsOf(const SimulatedLink& link) {
+  return link.metrics.stepsDown.value() + link.metrics.stepsUp.value();
+}
+
+TEST(LinkAdaptation, FastLinkGetsTheFullStreamAndNothingElseIsEncoded) {
+  SimulatedScene scene(kLayered);
+  SimulatedLink& link = scene.join();
+  scene.pass(20s);
+  EXPECT_EQ(link.given, (OperatingPoint{0, 3}));
+  EXPECT_EQ(stepsOf(link), 0u);
+  // Those on their way are not there yet.
+  EXPECT_GE(link.arrived.size() + 2, scene.frames());
+  EXPECT_EQ(scene.encoded, (std::array<std::uint64_t, 4>{scene.frames(), 0, 0, 0}));
+}
+
+// Of what the whole stream takes, the part that the link carries from a time on.
+class SlowLink : public testing::TestWithParam<double> {};
+INSTANTIATE_TEST_SUITE_P(Parts, SlowLink, testing::Values(0.9, 0.7, 0.5, 0.3, 0.2, 0.1),
+                         [](const auto& part) { return std::to_string(std::lround(100 * part.param)); });
+
+TEST_P(SlowLink, StepsDownWithinHalfASecondAndRecoversWithinThree) {
+  SimulatedScene scene(kLayered);
+  SimulatedLink& link = scene.join();
+  scene.pass(2s);
+  for (const Clock::duration slow : {2s, 5s, 30s, 61s}) {
+    link.bytesPerSecond = GetParam() * scene.fullRate();
+    // Of a link that is hardly too slow it takes a while until anything waits.
+    const Clock::duration limit = GetParam() > 0.7 ? 1s : 500ms;
+    const Clock::duration down = timeUntil(
+        scene, [&] { return rateAt(scene, link.given) <= link.bytesPerSecond; }, limit);
+    EXPECT_LE(down, limit);
+    scene.pass(slow - down);
+
+    link.bytesPerSecond = 1e9;
+    // For good: an attempt that was under way may still fail of what waits.
+    Clock::duration up{};
+    for (Clock::duration time{}; time <= 3s; time += 10ms) {
+      if (link.given != OperatingPoint{0, 3}) up = time + 10ms;
+      scene.pass(10ms);
+    }
+    EXPECT_LE(up, 3s);
+    std::printf("to %.0f %% for %.0f s: down within %.0f ms, up again within %.0f ms\n", 100 * GetParam(),
+                seconds(slow), 1000 * seconds(down), 1000 * seconds(up));
+    scene.pass(1s);  // what waited has arrived
+    const std::size_t before = link.arrived.size();
+    scene.pass(2s);
+    EXPECT_EQ(link.arrived.size() - before, 144u);
+  }
+}
+
+TEST_P(SlowLink, DoesNotOscillate) {
+  SimulatedScene scene(kLayered);
+  SimulatedLink& link = scene.join();
+  scene.pass(2s);
+  link.bytesPerSecond = GetParam() * scene.fullRate();
+  scene.pass(5s);
+  const std::size_t arrivedBefore = link.arrived.size();
+  // Attempts to go up that failed: from up to down, in however many steps.
+  std::uint64_t attempts = 0;
+  bool rises = false;
+  OperatingPoint before = link.given;
+  for (const Clock::time_point end = scene.now + 60s; scene.now < end; before = link.given) {
+    scene.pass(10ms);
+    if (link.given == before) continue;
+    const bool up = link.given.quality < before.quality || link.given.layers > before.layers;
+    attempts += rises && !up;
+    rises = up;
+  }
+  EXPECT_LE(attempts, static_cast<std::uint64_t>(60s / LinkAdaptation::kLongestWait) + 2);
+  double bytes = 0;
+  Clock::duration oldest{};
+  for (std::size_t i = arrivedBefore; i < link.arrived.size(); ++i) {
+    bytes += SimulatedScene::kFrameBytes * std::pow(SimulatedScene::kPartOfFiner, link.arrived[i].quality);
+    oldest = std::max(oldest, link.arrived[i].age);
+  }
+  std::printf("of a link of %.0f %%: %.0f %% used, %.1f frames/s, the oldest %.0f ms, %llu attempts\n",
+              100 * GetParam(), 100 * bytes / 60 / link.bytesPerSecond,
+              static_cast<double>(link.arrived.size() - arrivedBefore) / 60, 1000 * seconds(oldest),
+              static_cast<unsigned long long>(attempts));
+}
+
+TEST(LinkAdaptation, DeadLinkReturnsAtTheLowestPoint) {
+  SimulatedScene scene(kLayered);
+  SimulatedLink& link = scene.join();
+  scene.pass(2s);
+  link.bytesPerSecond = 0;
+  scene.pass(10s);
+  // Nobody gets anything: nothing is encoded.
+  const auto before = scene.encoded;
+  scene.pass(5s);
+  EXPECT_EQ(scene.encoded, before);
+  link.bytesPerSecond = 1e9;
+  scene.pass(100ms);
+  EXPECT_EQ(link.given, (OperatingPoint{2, 1}));
+  scene.pass(2900ms);
+  EXPECT_EQ(link.given, (OperatingPoint{0, 3}));
+}
+
+TEST(LinkAdaptation, RecoversWithinThreeSecondsOverTheMaximumNumberOfPoints) {
+  SimulatedScene scene({.rate = 72, .layers = codec::kMaxTemporalLayers, .qualities = codec::kMaxQualities});
+  SimulatedLink& link = scene.join();
+  for (const double part : {0.02, 0.07, 0.12, 0.2}) {
+    scene.pass(2s);
+    link.bytesPerSecond = part * scene.fullRate();
+    scene.pass(20s);
+    EXPECT_EQ(link.given.layers, 1) << part;
+    link.bytesPerSecond = 1e9;
+    EXPECT_LE(timeUntil(
+                  scene,
+                  [&] {
+                    return link.given == OperatingPoint{0, 3};
+                  },
+                  3s),
+              3s)
+        << part;
+  }
+}
+
+TEST(LinkAdaptation, SingleDelayChangesNothing) {
+  SimulatedScene scene({.rate = 72, .layers = 1, .qualities = 3});
+  SimulatedLink& link = scene.join();
+  scene.pass(2s);
+  for (int i = 0; i < 20; ++i) {
+    link.bytesPerSecond = 0;
+    scene.pass(60ms);
+    link.bytesPerSecond = 1e9;
+    scene.pass(940ms);
+  }
+  EXPECT_EQ(stepsOf(link), 0u);
+}
+
+// As of a wireless link that now and then tries again: one frame of seven is up to 35 ms late, and its
+// acknowledgement.
+TEST(LinkAdaptation, JitterChangesNothing) {
+  SimulatedScene scene({.rate = 72, .layers = 1, .qualities = 3});
+  SimulatedLink& link = scene.join();
+  std::minstd_rand random(1);
+  for (int i = 0; i < 6000; ++i) {
+    link.latency = random() % 7 == 0 ? std::chrono::milliseconds(20 + random() % 16) : 2ms;
+    scene.pass(std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(1.0 / 72)));
+  }
+  EXPECT_EQ(stepsOf(link), 0u);
+  EXPECT_LE(link.metrics.framesDropped.value(), 6000 / 1000);
+}
+
+TEST(LinkAdaptation, SubscribersDoNotInfluenceEachOther) {
+  SimulatedScene scene(kLayered);
+  SimulatedLink& fast = scene.join();
+  SimulatedLink& slow = scene.join();
+  SimulatedLink& slower = scene.join();
+  scene.pass(2s);
+  slow.bytesPerSecond = 0.4 * scene.fullRate();
+  slower.bytesPerSecond = 0.12 * scene.fullRate();
+  scene.pass(30s);
+  EXPECT_EQ(fast.given, (OperatingPoint{0, 3}));
+  EXPECT_GE(fast.arrived.size() + 2, scene.frames());
+  EXPECT_LT(slow.given.layers, 3);
+  EXPECT_EQ(slower.given.layers, 1);
+  EXPECT_EQ(std::ranges::count_if(fast.arrived, [](const auto& frame) { return frame.quality > 0; }), 0);
+}
+
+TEST(LinkAdaptation, SendsAtMostTheRequestedPoint) {
+  SimulatedScene scene(kLayered);
+  SimulatedLink& link = scene.join({1, 2});
+  scene.pass(5s);
+  EXPECT_EQ(link.given, (OperatingPoint{1, 2}));
+  EXPECT_NEAR(static_cast<double>(link.arrived.size()), 180, 4);
+  EXPECT_EQ(scene.encoded[0], 0u);
+  link.bytesPerSecond = 0.05 * scene.fullRate();
+  scene.pass(5s);
+  EXPECT_EQ(link.given, (OperatingPoint{2, 1}));
+  link.bytesPerSecond = 1e9;
+  scene.pass(3s);
+  EXPECT_EQ(link.given, (OperatingPoint{1, 2}));
+
+  // More than there is: the nearest that there is.
+  SimulatedScene plain({.rate = 72, .layers = 1, .qualities = 2});
+  SimulatedLink& coarse = plain.join({3, 3});
+  plain.pass(1s);
+  EXPECT_EQ(coarse.given, (OperatingPoint{1, 1}));
+}
+
+TEST(LinkAdaptation, DropsFramesWithOneLayerAndOneQuality) {
+  SimulatedScene scene({.rate = 72, .layers = 1, .qualities = 1});
+  SimulatedLink& link = scene.join();
+  scene.pass(2s);
+  link.bytesPerSecond = 0.3 * scene.fullRate();
+  scene.pass(10s);
+  EXPECT_EQ(stepsOf(link), 0u);
+  EXPECT_GT(link.metrics.framesDropped.value(), 200u);
+  EXPECT_GT(link.arrived.size(), 144u + 150u);
+}
+
+}  // namespace
+}  // namespace clothstream::delivery

@@ -1,0 +1,427 @@
+// SPDX-License-Identifier: MIT
+// What a subscriber is sent, in which order, and what it costs when it does not read.
+#include "server/delivery/mailbox.h"
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "proto/codec/temporal_layers.h"
+
+namespace clothstream::delivery {
+namespace {
+
+using namespace schedule;
+
+using std::chrono::milliseconds;
+
+SharedBytes bytes(std::size_t size) {
+  return std::make_shared<std::vector<std::byte>>(size);
+}
+
+class MailboxTest : public ::testing::Test {
+ protected:
+  MailboxTest() : mailbox([this] { ++wakes; }) {}
+
+  // Description of one chunk, which is taken at once.
+  void join() {
+    mailbox.subscribe(description(1), shape, metrics);
+    ASSERT_TRUE(mailbox.next(now));
+    ASSERT_FALSE(mailbox.next(now));
+  }
+  static std::shared_ptr<const DescriptionChunks> description(std::size_t bytes) {
+    return std::make_shared<const DescriptionChunks>(1, std::make_shared<const std::string>(bytes, 'g'),
+                                                     "rest");
+  }
+  bool wantsKeyFrame() { return mailbox.requested(now).keyFrames != 0; }
+  PublishedFrame frame(std::uint64_t tick, bool key = false) {
+    return {.message = bytes(100), .tick = tick, .key = key, .referenceTick = tick - 1, .complete = now};
+  }
+  // Ticks of the frames that next() gives until it has no more.
+  std::vector<std::uint64_t> taken(const std::vector<PublishedFrame>& published) {
+    std::vector<std::uint64_t> ticks;
+    while (const auto message = mailbox.next(now))
+      for (const PublishedFrame& candidate : published)
+        if (candidate.message == *message) ticks.push_back(candidate.tick);
+    return ticks;
+  }
+
+  StreamShape shape{.rate = 72};
+  Clock::time_point now = Clock::time_point(std::chrono::hours(1));
+  telemetry::SceneMetrics metrics;
+  int wakes = 0;
+  Mailbox mailbox;
+};
+
+using Ticks = std::vector<std::uint64_t>;
+
+TEST_F(MailboxTest, SendsRepliesThenDescriptionThenAnnouncementsThenFrames) {
+  const SharedBytes welcome = bytes(1), told = bytes(4), pong = bytes(5);
+  ASSERT_TRUE(mailbox.reply(welcome));
+  const auto content = description(256 * 1024);
+  ASSERT_EQ(content->count(), 2u);
+  mailbox.subscribe(content, shape, metrics);
+  ASSERT_TRUE(mailbox.announce(told));
+  EXPECT_FALSE(wantsKeyFrame());
+  mailbox.deliver(frame(1, true));  // before the description is out, a frame would be of no use
+  EXPECT_EQ(mailbox.next(now), welcome);
+  EXPECT_EQ(**mailbox.next(now), *content->chunk(0));
+  ASSERT_TRUE(mailbox.reply(pong));
+  EXPECT_EQ(mailbox.next(now), pong);
+  EXPECT_EQ(**mailbox.next(now), *content->chunk(1));
+  EXPECT_EQ(mailbox.next(now), told);
+  EXPECT_FALSE(mailbox.next(now));
+  EXPECT_TRUE(wantsKeyFrame());
+  const PublishedFrame key = frame(2, true);
+  mailbox.deliver(key);
+  EXPECT_EQ(mailbox.next(now), key.message);
+}
+
+TEST_F(MailboxTest, StartsWithAKeyFrame) {
+  join();
+  mailbox.deliver(frame(5));
+  EXPECT_FALSE(mailbox.next(now));
+  EXPECT_TRUE(wantsKeyFrame());
+  mailbox.deliver(frame(6, true));
+  EXPECT_FALSE(wantsKeyFrame());
+  EXPECT_TRUE(mailbox.next(now));
+}
+
+TEST_F(MailboxTest, SendsTwoFramesWithoutAcknowledgement) {
+  join();
+  const std::vector<PublishedFrame> frames{frame(1, true), frame(2), frame(3), frame(4)};
+  mailbox.deliver(frames[0]);
+  mailbox.deliver(frames[1]);
+  EXPECT_EQ(taken(frames), (Ticks{1, 2}));
+  mailbox.deliver(frames[2]);
+  mailbox.deliver(frames[3]);
+  EXPECT_EQ(taken(frames), Ticks{});
+  EXPECT_TRUE(mailbox.acknowledge(1, now));
+  EXPECT_EQ(taken(frames), (Ticks{3}));
+  EXPECT_TRUE(mailbox.acknowledge(3, now));  // of the newest, for all before it
+  EXPECT_EQ(taken(frames), (Ticks{4}));
+}
+
+TEST_F(MailboxTest, RefusesAcknowledgementOfUnsentFrame) {
+  join();
+  mailbox.deliver(frame(1, true));
+  EXPECT_FALSE(mailbox.acknowledge(1, now));
+  ASSERT_TRUE(mailbox.next(now));
+  EXPECT_TRUE(mailbox.acknowledge(1, now));
+  EXPECT_FALSE(mailbox.acknowledge(2, now));
+}
+
+TEST_F(MailboxTest, WindowGrowsWithTheMinimumRoundTripTime) {
+  join();
+  std::uint64_t tick = 0;
+  const auto inFlight = [&] {
+    std::vector<PublishedFrame> frames;
+    Ticks ticks;
+    for (int i = 0; i < 40; ++i) {
+      mailbox.deliver(frame(++tick, i == 0));
+      if (mailbox.next(now)) ticks.push_back(tick);
+    }
+    return ticks;
+  };
+  EXPECT_EQ(inFlight().size(), Mailbox::kMinWindow);
+  // 50 ms at 72 frames/s are 3.6 frames.
+  mailbox.restart();
+  mailbox.deliver(frame(++tick, true));
+  ASSERT_TRUE(mailbox.next(now));
+  now += milliseconds(50);
+  ASSERT_TRUE(mailbox.acknowledge(tick, now));
+  const Ticks sent = inFlight();
+  EXPECT_EQ(sent.size(), Mailbox::kMinWindow + 4);
+
+  // A queue on the way makes the next round trip ten times as long: the window hardly moves.
+  now += milliseconds(500);
+  ASSERT_TRUE(mailbox.acknowledge(sent.back(), now));
+  mailbox.restart();
+  EXPECT_EQ(inFlight().size(), Mailbox::kMinWindow + 4);
+}
+
+// Its acknowledgements come a frame later than those of who acknowledges each.
+TEST_F(MailboxTest, WindowGrowsByOneIfEverySecondFrameIsAcknowledged) {
+  join();
+  std::uint64_t tick = 0;
+  const auto inFlight = [&] {
+    std::size_t sent = 0;
+    for (int i = 0; i < 10; ++i) {
+      mailbox.deliver(frame(++tick, i == 0));
+      if (mailbox.next(now)) ++sent;
+    }
+    return sent;
+  };
+  const auto afterRoundTrips = [&](std::uint64_t framesEach) {
+    mailbox.restart();
+    for (int i = 0; i < 4; ++i) {
+      for (std::uint64_t frames = 0; frames < framesEach; ++frames) {
+        mailbox.deliver(frame(++tick, i == 0 && frames == 0));
+        EXPECT_TRUE(mailbox.next(now));
+      }
+      now += milliseconds(1);
+      EXPECT_TRUE(mailbox.acknowledge(tick, now));
+    }
+    return inFlight();
+  };
+  EXPECT_EQ(afterRoundTrips(1), Mailbox::kMinWindow + 1);  // 1 ms is less than a frame
+  EXPECT_EQ(afterRoundTrips(2), Mailbox::kMinWindow + 2);
+  EXPECT_EQ(afterRoundTrips(1), Mailbox::kMinWindow + 1);
+}
+
+TEST_F(MailboxTest, LimitsFramesInFlightToTheLargestWindow) {
+  join();
+  mailbox.deliver(frame(1, true));
+  ASSERT_TRUE(mailbox.next(now));
+  now += std::chrono::seconds(10);
+  ASSERT_TRUE(mailbox.acknowledge(1, now));
+  std::size_t inFlight = 0;
+  for (std::uint64_t tick = 2; tick < 100; ++tick) {
+    mailbox.deliver(frame(tick, tick == 2));
+    inFlight += mailbox.next(now).has_value();
+  }
+  EXPECT_EQ(inFlight, Mailbox::kMaxWindow);
+}
+
+TEST_F(MailboxTest, PeerThatDoesNotReadRequestsNothing) {
+  join();
+  std::vector<PublishedFrame> frames;
+  for (std::uint64_t tick = 1; tick <= 20; ++tick) {
+    mailbox.deliver(frames.emplace_back(frame(tick, tick == 1)));
+    // There is room, and three frames were held at most: but the endpoint has not come to ask since it was
+    // woken.
+    EXPECT_FALSE(wantsKeyFrame());
+  }
+  EXPECT_EQ(metrics.framesDropped.value(), 20u);
+  for (const PublishedFrame& each : frames) EXPECT_EQ(each.message.use_count(), 1) << each.tick;
+  EXPECT_FALSE(mailbox.next(now));
+  EXPECT_TRUE(wantsKeyFrame());
+}
+
+TEST_F(MailboxTest, HoldsALimitedNumberOfFrames) {
+  join();
+  std::vector<PublishedFrame> frames{frame(1, true), frame(2)};
+  for (const PublishedFrame& each : frames) mailbox.deliver(each);
+  ASSERT_EQ(taken(frames), (Ticks{1, 2}));
+  for (std::uint64_t tick = 3; tick <= 5; ++tick) mailbox.deliver(frames.emplace_back(frame(tick)));
+  for (const PublishedFrame& each : frames)
+    EXPECT_EQ(each.message.use_count(), each.tick < 3 ? 1 : 2) << each.tick;
+  // One too many: all that is held goes, and nobody is asked for a key frame as long as there is no room for
+  // it.
+  mailbox.deliver(frames.emplace_back(frame(6)));
+  for (const PublishedFrame& each : frames) EXPECT_EQ(each.message.use_count(), 1) << each.tick;
+  EXPECT_EQ(metrics.framesDropped.value(), 4u);
+  EXPECT_FALSE(wantsKeyFrame());
+  ASSERT_TRUE(mailbox.acknowledge(2, now));
+  EXPECT_TRUE(wantsKeyFrame());
+  EXPECT_EQ(taken(frames), Ticks{});
+  mailbox.deliver(frames.emplace_back(frame(7, true)));
+  EXPECT_EQ(taken(frames), Ticks{7});
+}
+
+TEST_F(MailboxTest, SendsOnlyFramesWhoseReferenceWasSent) {
+  join();
+  std::vector<PublishedFrame> frames{frame(1, true), frame(2)};
+  frames.push_back(frame(4));  // refers to 3, which never came
+  frames.push_back(frame(5));
+  for (const PublishedFrame& each : frames) {
+    mailbox.deliver(each);
+    if (each.tick <= 2) {
+      EXPECT_EQ(taken(frames), Ticks{each.tick});
+    }
+    (void)mailbox.acknowledge(each.tick, now);
+  }
+  EXPECT_EQ(taken(frames), Ticks{});
+  EXPECT_TRUE(wantsKeyFrame());
+}
+
+TEST_F(MailboxTest, KeyFrameReplacesHeldFrames) {
+  join();
+  std::vector<PublishedFrame> frames{frame(1, true), frame(2), frame(3), frame(4, true)};
+  for (const PublishedFrame& each : frames) {
+    mailbox.deliver(each);
+    if (each.tick == 2) {
+      EXPECT_EQ(taken(frames), (Ticks{1, 2}));
+    }
+  }
+  ASSERT_TRUE(mailbox.acknowledge(2, now));
+  EXPECT_EQ(taken(frames), Ticks{4});
+}
+
+TEST_F(MailboxTest, RestartBeginsWithAKeyFrame) {
+  join();
+  std::vector<PublishedFrame> frames{frame(1, true), frame(2), frame(3)};
+  for (const PublishedFrame& each : frames) mailbox.deliver(each);
+  EXPECT_EQ(taken(frames), (Ticks{1, 2}));
+  mailbox.restart();
+  EXPECT_TRUE(wantsKeyFrame());
+  EXPECT_EQ(taken(frames), Ticks{});
+  mailbox.deliver(frames.emplace_back(frame(4)));
+  mailbox.deliver(frames.emplace_back(frame(5, true)));
+  EXPECT_EQ(taken(frames), Ticks{5});
+}
+
+TEST_F(MailboxTest, KeepsSendingFramesUntilTheRequestedKeyFrame) {
+  join();
+  std::vector<PublishedFrame> frames{frame(1, true), frame(2), frame(3)};
+  mailbox.deliver(frames[0]);
+  EXPECT_FALSE(wantsKeyFrame());
+  mailbox.requestKeyFrame();
+  EXPECT_TRUE(wantsKeyFrame());
+  mailbox.deliver(frames[1]);
+  EXPECT_TRUE(wantsKeyFrame());
+  EXPECT_EQ(taken(frames), (Ticks{1, 2}));
+  ASSERT_TRUE(mailbox.acknowledge(2, now));
+  mailbox.deliver(frames.emplace_back(frame(4, true)));
+  EXPECT_FALSE(wantsKeyFrame());
+  EXPECT_EQ(taken(frames), Ticks{4});
+}
+
+TEST_F(MailboxTest, LimitsControlMessages) {
+  std::size_t accepted = 0;
+  while (mailbox.reply(bytes(1024))) ++accepted;
+  EXPECT_EQ(accepted, Mailbox::kMaxControlBytes / (1024 + Mailbox::kMessageOverhead));
+  ASSERT_TRUE(mailbox.next(now));
+  EXPECT_TRUE(mailbox.reply(bytes(1024)));
+}
+
+TEST_F(MailboxTest, AcceptsOneMessageLargerThanTheLimit) {
+  EXPECT_TRUE(mailbox.reply(bytes(Mailbox::kMaxControlBytes * 2)));
+  EXPECT_FALSE(mailbox.reply(bytes(1)));
+}
+
+TEST_F(MailboxTest, LimitsHeldBytes) {
+  join();
+  const auto large = [&](std::uint64_t tick, std::size_t size) {
+    PublishedFrame made = frame(tick, tick == 1);
+    made.message = bytes(size);
+    return made;
+  };
+  // One alone may be larger than the bound.
+  std::vector<PublishedFrame> frames{large(1, 2 * Mailbox::kMaxHeldBytes), large(2, 1)};
+  for (const PublishedFrame& each : frames) mailbox.deliver(each);
+  EXPECT_EQ(frames[0].message.use_count(), 1);
+  EXPECT_EQ(metrics.framesDropped.value(), 2u);
+  frames = {large(1, Mailbox::kMaxHeldBytes / 2), large(2, Mailbox::kMaxHeldBytes / 2), large(3, 1)};
+  for (const PublishedFrame& each : frames) mailbox.deliver(each);
+  for (const PublishedFrame& each : frames) EXPECT_EQ(each.message.use_count(), 1) << each.tick;
+  EXPECT_EQ(metrics.framesDropped.value(), 5u);
+}
+
+TEST_F(MailboxTest, DropsTheHighestLayerFirstAndBreaksNoReference) {
+  shape.layers = 3;
+  join();
+  // Ticks from 1 on, of layers 0 2 1 2; who reads nothing holds three.
+  const auto layered = [&](std::uint64_t tick) {
+    PublishedFrame made = frame(tick, tick == 1);
+    made.layer = codec::layerOf(tick - 1, 3);
+    made.referenceTick = made.layer == 0 ? tick - 4 : made.layer == 1 ? tick - 2 : tick - 1;
+    return made;
+  };
+  std::vector<PublishedFrame> frames;
+  for (std::uint64_t tick = 1; tick <= 4; ++tick) mailbox.deliver(frames.emplace_back(layered(tick)));
+  // 4 is itself of the highest layer; 5, of the base, makes 2 go.
+  mailbox.deliver(frames.emplace_back(layered(5)));
+  EXPECT_EQ(metrics.framesDropped.value(), 2u);
+  EXPECT_EQ(taken(frames), (Ticks{1, 3}));
+  ASSERT_TRUE(mailbox.acknowledge(3, now));
+  EXPECT_EQ(taken(frames), Ticks{5});
+  EXPECT_FALSE(wantsKeyFrame());
+}
+
+TEST_F(MailboxTest, SendsTheRequestedLayersAndQualityAndReportsThem) {
+  shape = {.rate = 72, .layers = 3, .qualities = 2};
+  mailbox.subscribe(nullptr, shape, metrics, {.quality = 1, .layers = 1});
+  EXPECT_FALSE(mailbox.next(now));
+  EXPECT_EQ(mailbox.requested(now).keyFrames, 0b10);
+  mailbox.deliver(frame(1, true));  // of quality 0
+  EXPECT_FALSE(mailbox.next(now));
+  PublishedFrame wanted = frame(2, true);
+  wanted.quality = 1;
+  mailbox.deliver(wanted);
+  v1::ServerMessage told;
+  const auto first = mailbox.next(now);
+  ASSERT_TRUE(first && told.ParseFromArray((*first)->data(), static_cast<int>((*first)->size())));
+  EXPECT_EQ(told.operating_point().quality(), 1u);
+  EXPECT_EQ(told.operating_point().temporal_layers(), 1u);
+  EXPECT_EQ(mailbox.next(now), wanted.message);
+  PublishedFrame upper = frame(3);
+  upper.quality = upper.layer = 1;
+  mailbox.deliver(upper);
+  EXPECT_FALSE(mailbox.next(now));
+  EXPECT_EQ(metrics.framesThinned.value(), 1u);
+  const RequestedFrames requested = mailbox.requested(now);
+  EXPECT_EQ(requested.qualities, 0b10);
+  EXPECT_EQ(requested.keyFrames, 0);
+}
+
+TEST_F(MailboxTest, SendsNoTickInTwoQualities) {
+  shape = {.rate = 72, .layers = 1, .qualities = 2};
+  mailbox.subscribe(nullptr, shape, metrics);
+  EXPECT_FALSE(mailbox.next(now));
+  const std::vector<PublishedFrame> fine{frame(1, true), frame(2), frame(3), frame(4)};
+  for (std::size_t i = 0; i < 3; ++i) mailbox.deliver(fine[i]);
+  EXPECT_EQ(taken(fine), (Ticks{1, 2}));
+  now += LinkAdaptation::kPatience;
+  EXPECT_EQ(mailbox.requested(now).keyFrames, 0b10);  // it is behind
+  ASSERT_TRUE(mailbox.acknowledge(2, now));
+  EXPECT_EQ(taken(fine), Ticks{3});
+  mailbox.deliver(fine[3]);
+  EXPECT_EQ(taken(fine), Ticks{4});
+
+  PublishedFrame same = frame(4, true), next = frame(5, true);
+  same.quality = next.quality = 1;
+  ASSERT_TRUE(mailbox.acknowledge(4, now));
+  mailbox.deliver(same);
+  EXPECT_FALSE(mailbox.next(now));
+  EXPECT_EQ(mailbox.requested(now).keyFrames, 0b10);
+  mailbox.deliver(next);
+  EXPECT_EQ(taken({same, next}), Ticks{5});
+}
+
+TEST_F(MailboxTest, RestartedPeerMayReceiveATickTwice) {
+  join();
+  const PublishedFrame first = frame(1, true);
+  PublishedFrame again = frame(1, true);
+  again.repeated = true;
+  mailbox.deliver(first);
+  EXPECT_EQ(taken({first}), Ticks{1});
+  mailbox.restart();
+  mailbox.deliver(again);
+  EXPECT_EQ(taken({again}), Ticks{1});
+}
+
+TEST_F(MailboxTest, ClosedMailboxSendsItsLastMessageAndAcceptsNoMore) {
+  join();
+  mailbox.deliver(frame(1, true));
+  ASSERT_TRUE(mailbox.announce(bytes(1)));
+  const SharedBytes last = bytes(7);
+  mailbox.close(last);
+  EXPECT_TRUE(mailbox.closed());
+  EXPECT_TRUE(mailbox.reply(bytes(1)));
+  mailbox.close(bytes(8));
+  EXPECT_EQ(mailbox.next(now), last);
+  EXPECT_FALSE(mailbox.next(now));
+}
+
+TEST_F(MailboxTest, WakesOnlyIfAMessageCanBeTaken) {
+  join();
+  wakes = 0;
+  mailbox.deliver(frame(1, true));
+  mailbox.deliver(frame(2));
+  EXPECT_EQ(wakes, 2);
+  ASSERT_TRUE(mailbox.next(now));
+  ASSERT_TRUE(mailbox.next(now));
+  mailbox.deliver(frame(3));  // no room
+  EXPECT_EQ(wakes, 2);
+  ASSERT_TRUE(mailbox.acknowledge(1, now));
+  EXPECT_EQ(wakes, 3);
+  mailbox.silence();
+  mailbox.close(bytes(1));
+  EXPECT_EQ(wakes, 3);
+}
+
+}  // namespace
+}  // namespace clothstream::delivery

@@ -1,0 +1,207 @@
+// SPDX-License-Identifier: MIT
+// A scene's frames through mailboxes over links of chosen speeds, in simulated time: no thread, no network.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "clients/core/stream/frame_feedback.h"
+#include "proto/codec/temporal_layers.h"
+#include "server/delivery/mailbox.h"
+
+namespace clothstream::delivery {
+
+using schedule::seconds;
+
+// One subscriber behind a link that carries so many bytes/s, each message `latency` late, but none before one
+// that went before it. Its endpoint writes without ever waiting, as into a large buffer. It acknowledges as
+// clients do, and fails the test when it gets a frame that it cannot decode.
+class SimulatedLink {
+ public:
+  SimulatedLink(const StreamShape& shape, OperatingPoint wanted, Clock::time_point now)
+      : given{0, shape.layers}, arrived_(given) {
+    mailbox->subscribe(nullptr, shape, metrics, wanted);
+    EXPECT_FALSE(mailbox->next(now));
+  }
+
+  void deliver(const PublishedFrame& frame) {
+    published_[frame.message.get()] = frame;
+    mailbox->deliver(frame);
+  }
+  void pass(Clock::duration time, Clock::time_point now) {
+    const double carried = bytesPerSecond * seconds(time);
+    budget_ = std::min(budget_ + carried, carried + kBurst);
+    while (const auto message = mailbox->next(now)) {
+      if (const auto told = pointIn(*message)) given = *told;
+      queue_.push_back(*message);
+    }
+    while (!queue_.empty() && static_cast<double>(queue_.front()->size()) <= budget_) {
+      budget_ -= static_cast<double>(queue_.front()->size());
+      arriving_.push_back({now + latency, queue_.front()});
+      queue_.pop_front();
+    }
+    for (; !arriving_.empty() && arriving_.front().time <= now; arriving_.pop_front())
+      arrive(arriving_.front().message, now);
+    for (; !acks_.empty() && acks_.front().time <= now; acks_.pop_front())
+      EXPECT_TRUE(mailbox->acknowledge(acks_.front().tick, now));
+  }
+
+  struct Arrived {
+    std::uint64_t tick;
+    std::uint8_t quality, layer;
+    Clock::duration age;
+  };
+
+  double bytesPerSecond = 1e9;
+  Clock::duration latency = std::chrono::milliseconds(10);
+  telemetry::SceneMetrics metrics;
+  const std::shared_ptr<Mailbox> mailbox = std::make_shared<Mailbox>([] {});
+  std::vector<Arrived> arrived;
+  OperatingPoint given;  // that the mailbox told last; it need not have arrived
+
+ private:
+  static constexpr double kBurst = 2000;  // bytes that an idle link takes at once
+  struct Arriving {
+    Clock::time_point time;
+    SharedBytes message;
+  };
+  struct Ack {
+    Clock::time_point time;
+    std::uint64_t tick;
+  };
+
+  // Nothing where it is a frame.
+  std::optional<OperatingPoint> pointIn(const SharedBytes& message) const {
+    if (published_.contains(message.get())) return std::nullopt;
+    v1::ServerMessage parsed;
+    EXPECT_TRUE(parsed.ParseFromArray(message->data(), static_cast<int>(message->size())));
+    EXPECT_TRUE(parsed.has_operating_point());
+    return OperatingPoint{static_cast<std::uint8_t>(parsed.operating_point().quality()),
+                          static_cast<std::uint8_t>(parsed.operating_point().temporal_layers())};
+  }
+
+  void arrive(const SharedBytes& message, Clock::time_point now) {
+    if (const auto told = pointIn(message)) {
+      arrived_ = *told;
+      return;
+    }
+    const PublishedFrame& frame = published_.at(message.get());
+    // What is not newer is stale to a decoder.
+    if (!arrived.empty()) {
+      ASSERT_GT(frame.tick, arrived.back().tick);
+    }
+    if (frame.key) {
+      decoded_.clear();
+    } else {
+      ASSERT_EQ(frame.quality, quality_) << "tick " << frame.tick;
+      ASSERT_TRUE(decoded_.find(frame.referenceTick)) << "tick " << frame.tick;
+    }
+    ASSERT_EQ(frame.quality, arrived_.quality) << "tick " << frame.tick;
+    ASSERT_LT(frame.layer, arrived_.layers) << "tick " << frame.tick;
+    quality_ = frame.quality;
+    decoded_.hold(frame.layer, frame.tick);
+    arrived.push_back({frame.tick, frame.quality, frame.layer, now - frame.complete});
+    if (acknowledgement_.due(static_cast<std::uint64_t>(1e6 * seconds(now.time_since_epoch()))))
+      acks_.push_back({now + latency, frame.tick});
+  }
+
+  OperatingPoint arrived_;
+  double budget_ = 0;
+  std::deque<SharedBytes> queue_;
+  std::deque<Arriving> arriving_;
+  std::deque<Ack> acks_;
+  // By message, which is kept: no other has its place in memory.
+  std::map<const void*, PublishedFrame> published_;
+  codec::HeldFrames decoded_;
+  client::Acknowledgement acknowledgement_;
+  std::uint8_t quality_ = 0;
+};
+
+// Encodes what somebody wants, as SceneHost does it.
+class SimulatedScene {
+ public:
+  static constexpr std::size_t kFrameBytes = 1000;  // of quality 0
+  static constexpr double kPartOfFiner = 0.62;      // of a quality's bytes the next one takes
+
+  explicit SimulatedScene(const StreamShape& shape) : shape_(shape) {}
+
+  SimulatedLink& join(OperatingPoint wanted = {0, codec::kMaxTemporalLayers}) {
+    return *links_.emplace_back(std::make_unique<SimulatedLink>(shape_, wanted, now));
+  }
+  // Of all frames of the finest quality.
+  double fullRate() const { return static_cast<double>(kFrameBytes) * shape_.rate; }
+
+  void pass(Clock::duration time) {
+    for (const Clock::time_point end = now + time; now < end;) {
+      now += kStep;
+      if (now >= due_) {
+        due_ += std::chrono::nanoseconds(1'000'000'000) / shape_.rate;
+        makeFrame();
+      }
+      for (const auto& link : links_) link->pass(kStep, now);
+    }
+  }
+  std::uint64_t frames() const { return tick_; }
+  // That were encoded of each quality.
+  std::array<std::uint64_t, codec::kMaxQualities> encoded{};
+
+  Clock::time_point now = Clock::time_point(std::chrono::hours(1));
+
+ private:
+  static constexpr std::chrono::milliseconds kStep{1}, kKeyFrameInterval{100};
+  struct Encoder {
+    bool alive = false;
+    std::uint64_t sinceKey = 0;
+    codec::HeldFrames held;
+    Clock::time_point lastKey{};
+  };
+
+  void makeFrame() {
+    ++tick_;
+    RequestedFrames requested;
+    for (const auto& link : links_) requested |= link->mailbox->requested(now);
+    double bytes = kFrameBytes;
+    for (std::uint8_t quality = 0; quality < shape_.qualities; ++quality, bytes *= kPartOfFiner) {
+      Encoder& encoder = encoders_[quality];
+      const bool wanted = (requested.qualities >> quality & 1) != 0;
+      const bool asked =
+          (requested.keyFrames >> quality & 1) != 0 && now - encoder.lastKey >= kKeyFrameInterval;
+      const bool key = wanted && (asked || !encoder.alive);
+      encoder.alive = wanted;
+      if (!wanted) continue;
+      ++encoded[quality];
+      if (key) {
+        encoder.sinceKey = 0;
+        encoder.held.clear();
+        encoder.lastKey = now;
+      }
+      const std::uint8_t layer = codec::layerOf(encoder.sinceKey++, shape_.layers);
+      const PublishedFrame frame{
+          .message = std::make_shared<std::vector<std::byte>>(static_cast<std::size_t>(bytes)),
+          .tick = tick_,
+          .key = key,
+          .referenceTick = key ? 0 : *encoder.held.tick(encoder.held.referenceOf(layer)),
+          .quality = quality,
+          .layer = layer,
+          .complete = now};
+      encoder.held.hold(layer, tick_);
+      for (const auto& link : links_) link->deliver(frame);
+    }
+  }
+
+  const StreamShape shape_;
+  std::vector<std::unique_ptr<SimulatedLink>> links_;
+  std::array<Encoder, codec::kMaxQualities> encoders_;
+  Clock::time_point due_ = now;
+  std::uint64_t tick_ = 0;
+};
+
+}  // namespace clothstream::delivery

@@ -1,0 +1,510 @@
+// SPDX-License-Identifier: MIT
+// Scenes that peers create, delete, pause and put back to their start.
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <future>
+#include <latch>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <thread>
+#include <utility>
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "server/messages/scene_message.h"
+#include "tests/model/meshes.h"
+#include "tests/serving/server_test.h"
+
+namespace clothstream::hosting {
+namespace {
+
+using namespace schedule;
+using namespace delivery;
+using namespace scene;
+
+using testing::HasSubstr;
+using testing::StartsWith;
+using tests::TestPeer;
+using Body = v1::ServerMessage;
+
+#define START(...)    \
+  start(__VA_ARGS__); \
+  if (IsSkipped()) return
+
+using ScenesTest = tests::ServerTest;
+
+// A cloth of any triangles, as a client would describe it.
+v1::Scene discScene(std::uint32_t rings) {
+  model::Scene scene = tests::smallScene("disc");
+  scene.cloths[0].mesh = std::make_shared<const model::Mesh>(model::makeMesh(model::disc(rings, 0.5f)));
+  scene.cloths[0].mass = 0.2f;
+  scene.cloths[0].pins.clear();
+  scene.cloths[0].pinnedVertices = {0};
+  scene.substeps = 30;
+  return messages::toMessage(scene);
+}
+
+v1::ClientMessage piece(const std::string& content, std::uint32_t index, std::uint32_t count,
+                        std::size_t bytesAPiece) {
+  v1::ClientMessage message;
+  v1::Chunk& chunk = *message.mutable_upload();
+  chunk.set_content_id(9);
+  chunk.set_kind(v1::CONTENT_KIND_SCENE);
+  chunk.set_index(index);
+  chunk.set_count(count);
+  chunk.set_total_bytes(content.size());
+  chunk.set_data(content.substr(index * bytesAPiece, bytesAPiece));
+  return message;
+}
+
+void upload(TestPeer& peer, const std::string& content) {
+  constexpr std::size_t kBytes = 40'000;
+  const auto count = static_cast<std::uint32_t>((content.size() + kBytes - 1) / kBytes);
+  for (std::uint32_t i = 0; i < count; ++i) peer.send(piece(content, i, count, kBytes));
+}
+
+v1::ServerMessage ask(TestPeer& peer, v1::ClientMessage message) {
+  message.set_request_id(77);
+  peer.send(message);
+  return peer.readUntil([](const v1::ServerMessage& answer) { return answer.request_id() == 77; });
+}
+
+v1::ServerMessage createUploaded(TestPeer& peer, const std::string& name = "") {
+  v1::ClientMessage message;
+  message.mutable_create_scene()->set_uploaded_content_id(9);
+  message.mutable_create_scene()->set_name(name);
+  return ask(peer, message);
+}
+
+v1::ServerMessage createNamed(TestPeer& peer, const std::string& named, const std::string& name) {
+  v1::ClientMessage message;
+  message.mutable_create_scene()->set_named(named);
+  message.mutable_create_scene()->set_name(name);
+  return ask(peer, message);
+}
+
+v1::ServerMessage deleteScene(TestPeer& peer, const std::string& name) {
+  v1::ClientMessage message;
+  message.mutable_delete_scene()->set_name(name);
+  return ask(peer, message);
+}
+
+v1::ServerMessage control(TestPeer& peer, const std::string& name, std::optional<bool> paused, bool reset) {
+  v1::ClientMessage message;
+  message.mutable_control_scene()->set_name(name);
+  if (paused) message.mutable_control_scene()->set_paused(*paused);
+  message.mutable_control_scene()->set_reset(reset);
+  return ask(peer, message);
+}
+
+TEST_F(ScenesTest, CreatesAndJoinsASceneUploadedInChunks) {
+  START();
+  const v1::Scene scene = discScene(40);
+  const std::string content = scene.SerializeAsString();
+  ASSERT_GT(content.size(), 100'000u);
+  TestPeer maker(server());
+  upload(maker, content);
+  const v1::ServerMessage made = createUploaded(maker);
+  ASSERT_TRUE(made.has_create_scene()) << made.DebugString();
+  EXPECT_EQ(made.create_scene().scene().name(), "disc");
+  EXPECT_EQ(made.create_scene().scene().vertex_count(), 4921u);
+  EXPECT_TRUE(made.create_scene().scene().created());
+
+  TestPeer peer(server());
+  peer.join("disc");
+  peer.readFrames(3);
+  EXPECT_EQ(peer.description().cloths(0).vertex_count(), 4921u);
+  EXPECT_EQ(peer.decoder().positions().size(), 3 * 4921u);
+  // It is the scene that was sent: its own message says the same.
+  EXPECT_EQ(peer.description().cloths(0).triangles().size(), 3 * sizeof(std::uint32_t) * 6 * 40 * 40);
+
+  // The content went with the call.
+  EXPECT_EQ(createUploaded(maker, "again").error().code(), v1::ERROR_CODE_NOT_FOUND);
+}
+
+TEST_F(ScenesTest, CreatedSceneLivesUntilDeleted) {
+  START();
+  TestPeer maker(server());
+  ASSERT_TRUE(createNamed(maker, "small", "mine").has_create_scene());
+  EXPECT_EQ(server().listScenes().scenes_size(), 3);
+  EXPECT_THAT(createNamed(maker, "small", "mine").error().text(), HasSubstr("already"));
+  EXPECT_EQ(createNamed(maker, "nowhere", "x").error().code(), v1::ERROR_CODE_NOT_FOUND);
+  EXPECT_THAT(createNamed(maker, "small", "No Name").error().text(), StartsWith("createScene.name = "));
+  EXPECT_THAT(createNamed(maker, "../../etc/passwd", "x").error().text(), HasSubstr("there is no scene"));
+
+  TestPeer inside(server()), outside(server());
+  inside.join("mine");
+  outside.join("small");
+  ASSERT_TRUE(deleteScene(maker, "mine").has_delete_scene());
+  const v1::ServerMessage last = inside.readToTheEnd();
+  EXPECT_EQ(last.notice().kind(), v1::NOTICE_KIND_SCENE_DELETED);
+  EXPECT_EQ(server().listScenes().scenes_size(), 2);
+  outside.readFrames(3);
+  EXPECT_EQ(deleteScene(maker, "mine").error().code(), v1::ERROR_CODE_NOT_FOUND);
+  EXPECT_THAT(deleteScene(maker, "small").error().text(), HasSubstr("must be of a scene that was created"));
+  // The name is free again.
+  EXPECT_TRUE(createNamed(maker, "small", "mine").has_create_scene());
+  TestPeer again(server());
+  again.join("mine");
+}
+
+TEST_F(ScenesTest, LimitsCreatedScenes) {
+  ServerOptions options;
+  options.maxCreatedScenes = 1;
+  START(options);
+  TestPeer maker(server());
+  ASSERT_TRUE(createNamed(maker, "small", "one").has_create_scene());
+  EXPECT_EQ(createNamed(maker, "small", "two").error().code(), v1::ERROR_CODE_RESOURCE_EXHAUSTED);
+  ASSERT_TRUE(deleteScene(maker, "one").has_delete_scene());
+  EXPECT_TRUE(createNamed(maker, "small", "two").has_create_scene());
+}
+
+TEST_F(ScenesTest, InvalidSceneIsRefusedWithTheReason) {
+  START();
+  TestPeer maker(server());
+  v1::Scene scene = discScene(3);
+  scene.mutable_cloths(0)->mutable_structural()->set_stiffness(-1);
+  upload(maker, scene.SerializeAsString());
+  const v1::ServerMessage refused = createUploaded(maker);
+  EXPECT_EQ(refused.error().code(), v1::ERROR_CODE_INVALID_ARGUMENT);
+  EXPECT_THAT(refused.error().text(),
+              StartsWith("createScene.scene: cloths[0].structural.stiffness = -1: must be"));
+  EXPECT_FALSE(refused.error().fatal());
+
+  scene = discScene(3);
+  scene.mutable_cloths(0)->mutable_mesh()->Clear();
+  scene.mutable_cloths(0)->mutable_mesh()->set_file("/etc/passwd");
+  upload(maker, scene.SerializeAsString());
+  EXPECT_TRUE(createUploaded(maker).has_error());
+  upload(maker, std::string(100, '\xff'));
+  EXPECT_EQ(createUploaded(maker).error().code(), v1::ERROR_CODE_MALFORMED_MESSAGE);
+  EXPECT_EQ(ask(maker,
+                [] {
+                  v1::ClientMessage message;
+                  message.mutable_create_scene();
+                  return message;
+                }())
+                .error()
+                .code(),
+            v1::ERROR_CODE_INVALID_ARGUMENT);
+  EXPECT_EQ(server().listScenes().scenes_size(), 2);
+}
+
+TEST_F(ScenesTest, InvalidChunksAreRefusedAndDropTheUpload) {
+  ServerOptions options;
+  options.maxUploadBytes = 1000;
+  START(options);
+  TestPeer maker(server());
+  const std::string content(600, '\xff');
+  const auto refusal = [&](const v1::ClientMessage& message) {
+    maker.send(message);
+    return maker.readUntil(Body::kError).error().text();
+  };
+  EXPECT_THAT(refusal(piece(content, 1, 3, 200)), StartsWith("upload.index = 1"));
+  maker.send(piece(content, 0, 3, 200));
+  EXPECT_THAT(refusal(piece(content, 2, 3, 200)), StartsWith("upload.index = 2"));
+  v1::ClientMessage wrong = piece(content, 0, 1, 600);
+  wrong.mutable_upload()->set_total_bytes(601);
+  EXPECT_THAT(refusal(wrong), StartsWith("upload.data: makes 600 bytes of the 601"));
+  wrong = piece(content, 0, 2, 200);
+  wrong.mutable_upload()->set_kind(v1::CONTENT_KIND_STREAM_DESCRIPTION);
+  EXPECT_THAT(refusal(wrong), StartsWith("upload.kind = 1"));
+  wrong = piece(content, 0, 2, 200);
+  wrong.mutable_upload()->set_total_bytes(std::uint64_t{1} << 40);
+  EXPECT_THAT(refusal(wrong), StartsWith("upload.totalBytes = "));
+  EXPECT_EQ(createUploaded(maker).error().code(), v1::ERROR_CODE_NOT_FOUND);
+
+  // What one peer holds, another cannot; what it gives back, it can.
+  maker.send(piece(content, 0, 2, 300));
+  maker.send(piece(content, 1, 2, 300));
+  TestPeer other(server());
+  other.send(piece(content, 0, 1, 600));
+  EXPECT_EQ(other.readUntil(Body::kError).error().code(), v1::ERROR_CODE_RESOURCE_EXHAUSTED);
+  maker.vanish();
+  other.send(piece(content, 0, 1, 600));
+  EXPECT_EQ(createUploaded(other).error().code(), v1::ERROR_CODE_MALFORMED_MESSAGE);
+}
+
+TEST_F(ScenesTest, UploadOccupiesTheBudgetUntilAnswered) {
+  ServerOptions options;
+  const v1::Scene scene = discScene(40);
+  const std::string content = scene.SerializeAsString();
+  options.maxUploadBytes = content.size() + content.size() / 2;
+  std::latch refused(1);
+  options.journals = [&](const model::Scene& made) {
+    if (made.name == scene.name()) refused.wait();
+    return nullptr;
+  };
+  START(options);
+  TestPeer maker(server());
+  upload(maker, content);
+  v1::ClientMessage create;
+  create.set_request_id(77);
+  create.mutable_create_scene()->set_uploaded_content_id(9);
+  maker.send(create);
+  // It is being made now, and is not done before this is refused.
+  upload(maker, content);
+  EXPECT_EQ(maker.readUntil(Body::kError).error().code(), v1::ERROR_CODE_RESOURCE_EXHAUSTED);
+  refused.count_down();
+  const v1::ServerMessage made =
+      maker.readUntil([](const v1::ServerMessage& answer) { return answer.request_id() == 77; });
+  EXPECT_TRUE(made.has_create_scene()) << made.DebugString();
+  upload(maker, content);
+  EXPECT_TRUE(createUploaded(maker, "again").has_create_scene());
+}
+
+TEST_F(ScenesTest, LimitsScenesWaitingToBeCreated) {
+  ServerOptions options;
+  options.maxCreatedScenes = 1;
+  START(options);
+  constexpr int kAsked = 200;
+  std::latch answered(kAsked);
+  std::atomic<int> refused = 0;
+  v1::CreateSceneRequest request;
+  *request.mutable_scene() = discScene(60);
+  for (int i = 0; i < kAsked; ++i) {
+    server().createScene(request, [&](const auto& answer) {
+      if (!answer && answer.error().text().find("wait to be created") != std::string::npos) {
+        EXPECT_EQ(answer.error().code(), v1::ERROR_CODE_RESOURCE_EXHAUSTED);
+        ++refused;
+      }
+      answered.count_down();
+    });
+  }
+  answered.wait();
+  EXPECT_GT(refused, 0);
+}
+
+TEST_F(ScenesTest, SceneHasItsOwnParticipantLimit) {
+  ServerOptions options;
+  options.maxParticipants = 5;
+  START(options);
+  TestPeer maker(server());
+  v1::ClientMessage message;
+  v1::CreateSceneRequest& create = *message.mutable_create_scene();
+  create.set_named("small");
+  create.set_name("duet");
+  create.set_max_participants(6);
+  EXPECT_THAT(ask(maker, message).error().text(),
+              StartsWith("createScene.maxParticipants = 6: must be at most 5"));
+  create.set_max_participants(2);
+  EXPECT_EQ(ask(maker, message).create_scene().scene().max_participants(), 2u);
+  EXPECT_EQ(createNamed(maker, "small", "usual").create_scene().scene().max_participants(), 5u);
+
+  TestPeer first(server()), second(server()), third(server());
+  first.join("duet");
+  second.join("duet");
+  third.hello("duet");
+  EXPECT_THAT(third.readToTheEnd().error().text(), HasSubstr("'duet' has 2 participants"));
+}
+
+// One whose files make trouble that nobody has thought of.
+class TroubledJournal : public Journal {
+ public:
+  messages::Result<std::string> start(const std::string&) override { throw std::runtime_error("no start"); }
+  messages::Result<v1::StopRecordingResponse> stop() override { throw std::runtime_error("no stop"); }
+  bool active() const override { return false; }
+  bool due() const override { return false; }
+  void begin(const vulkan::DeviceInfo&, const model::Scene&, const v1::StreamDescription&,
+             const simulation::StateSnapshot&, const simulation::StateSnapshot&) override {}
+  void ticked(const AppliedTick&) override {}
+  void saved(const simulation::StateSnapshot&, bool) override {}
+  void restored(std::uint64_t, const simulation::StateSnapshot&) override {}
+  void end() override {}
+  void sent(const SharedBytes&) override {}
+  void joined(std::uint64_t, const std::string&, const std::string&) override {}
+  void left(std::uint64_t) override {}
+};
+
+TEST_F(ScenesTest, RecordingExceptionsBecomeErrors) {
+  ServerOptions options;
+  options.journals = [](const model::Scene&) { return std::make_shared<TroubledJournal>(); };
+  START(std::move(options));
+  TestPeer peer(server());
+  peer.join();
+  v1::ClientMessage message;
+  message.mutable_start_recording();
+  EXPECT_EQ(ask(peer, message).error().text(), "startRecording: failed on the server: no start");
+  message.mutable_stop_recording();
+  EXPECT_EQ(ask(peer, message).error().text(), "stopRecording: failed on the server: no stop");
+  ASSERT_TRUE(createNamed(peer, "small", "mine").has_create_scene());
+  EXPECT_TRUE(deleteScene(peer, "mine").has_delete_scene());
+}
+
+TEST_F(ScenesTest, PausedSceneStandsStillAndContinues) {
+  START();
+  TestPeer peer(server()), other(server());
+  peer.join();
+  other.join("other");
+  ASSERT_TRUE(control(other, "small", true, false).control_scene().scene().paused());
+  peer.readUntil(
+      [](const v1::ServerMessage& m) { return m.notice().kind() == v1::NOTICE_KIND_SCENE_PAUSED; });
+  // Whatever was on its way when the pause began is there after a few ticks of another scene.
+  other.readFrames(4);
+  const std::uint64_t ticks = metrics().ticks.value();
+  other.readFrames(10);
+  EXPECT_EQ(metrics().ticks.value(), ticks);
+  EXPECT_FALSE(server().listScenes().scenes(0).running());
+  // Told to who comes now, too.
+  TestPeer late(server());
+  late.hello();
+  late.readUntil(
+      [](const v1::ServerMessage& m) { return m.notice().kind() == v1::NOTICE_KIND_SCENE_PAUSED; });
+  // And what the cloth is like.
+  late.readFrames(1);
+  EXPECT_EQ(late.frames().back().tick, ticks);
+  EXPECT_EQ(metrics().ticks.value(), ticks);
+
+  ASSERT_FALSE(control(other, "small", false, false).control_scene().scene().paused());
+  peer.readUntil(
+      [](const v1::ServerMessage& m) { return m.notice().kind() == v1::NOTICE_KIND_SCENE_RESUMED; });
+  peer.readFrames(5);
+  EXPECT_LT(peer.frames().back().tick, ticks + 20);
+  late.readFrames(5);
+  EXPECT_LT(late.frames().back().tick, ticks + 20);
+  EXPECT_EQ(control(other, "nowhere", true, false).error().code(), v1::ERROR_CODE_NOT_FOUND);
+}
+
+TEST_F(ScenesTest, ResetSceneRestartsWithItsPresentParameters) {
+  START();
+  TestPeer peer(server());
+  peer.join();
+  v1::ParameterChange change;
+  change.mutable_gravity()->mutable_value();  // none
+  peer.change(change);
+  peer.readFrames(20);
+  const auto lowest = [&] {
+    float y = 1e9f;
+    for (std::size_t i = 1; i < peer.decoder().positions().size(); i += 3)
+      y = std::min(y, peer.decoder().positions()[i]);
+    return y;
+  };
+  ASSERT_TRUE(control(peer, "", std::nullopt, true).has_control_scene());
+  peer.readUntil([](const v1::ServerMessage& m) { return m.notice().kind() == v1::NOTICE_KIND_SCENE_RESET; });
+  peer.readFrames(3);
+  // At rest and without gravity, but for the ball that pushes it.
+  EXPECT_NEAR(lowest(), -1.1f, 0.02f);
+  EXPECT_EQ(peer.description().definition().name(), "small");
+  EXPECT_EQ(server().getScene({}).value().scene().environment().gravity().y(), 0);
+}
+
+TEST_F(ScenesTest, ResetOfAPausedSceneIsShown) {
+  model::Scene sparse = tests::smallScene("sparse");  // of frames
+  sparse.simulationRate = 60;
+  sparse.streamRate = 20;
+  sparse.colliders.clear();
+  sparse.environment.wind = model::Vec3(0, 0, 5);
+  START({}, {sparse});
+  TestPeer peer(server()), other(server());
+  peer.join("sparse");
+  const auto farthest = [&] {  // from the plane in which it starts
+    float z = 0;
+    for (std::size_t i = 2; i < peer.decoder().positions().size(); i += 3)
+      z = std::max(z, std::abs(peer.decoder().positions()[i]));
+    return z;
+  };
+  other.join("other");
+  peer.readFrames(20);
+  control(other, "sparse", true, false);
+  peer.readUntil(
+      [](const v1::ServerMessage& m) { return m.notice().kind() == v1::NOTICE_KIND_SCENE_PAUSED; });
+  // Whatever was on its way when the pause began is there after a few ticks of another scene.
+  other.readFrames(4);
+  const telemetry::SceneMetrics& metrics = server().state().find("sparse")->metrics;
+  const std::uint64_t ticks = metrics.ticks.value();
+  const float before = farthest();
+
+  control(other, "sparse", std::nullopt, true);
+  peer.readUntil([](const v1::ServerMessage& m) { return m.notice().kind() == v1::NOTICE_KIND_SCENE_RESET; });
+  while (peer.frames().back().tick <= ticks) peer.readFrames(1);
+  const std::uint64_t shown = peer.frames().back().tick;
+  EXPECT_EQ(shown % 3, 0u);
+  EXPECT_LE(shown, ticks + 3);
+  // At most three ticks of wind, after a second of it before.
+  EXPECT_LT(farthest(), before / 10);
+  other.readFrames(4);
+  EXPECT_EQ(metrics.ticks.value(), shown);
+  EXPECT_FALSE(server().state().find("sparse")->running);
+}
+
+// What it takes to be made ready is many times what a tick of the others takes: tables of 590,000
+// constraints.
+model::Scene heavyScene() {
+  model::Scene heavy = tests::smallScene("heavy");
+  model::Cloth& cloth = heavy.cloths[0];
+  cloth.grid.rows = cloth.grid.columns = 256;
+  cloth.pins[0].lastColumn = 255;
+  cloth.solver.kind = model::SolverKind::constraint;
+  heavy.substeps = 1;
+  return heavy;
+}
+
+// Quick, so that it has many ticks even in what a fast machine takes.
+model::Scene lightScene() {
+  model::Scene light = tests::smallScene("light");
+  light.simulationRate = light.streamRate = 200;
+  light.substeps = 3;
+  return light;
+}
+
+// The light one runs, and somebody asks for the heavy one.
+class HeavySceneTest : public tests::ServerTest {
+ protected:
+  void SetUp() override {
+    START({}, {heavyScene(), lightScene()});
+    light = std::make_unique<TestPeer>(server());
+    heavy = std::make_unique<TestPeer>(server());
+    light->join("light");
+    heavy->hello("heavy");
+  }
+  bool heavyRuns() { return server().state().find("heavy")->running; }
+
+  std::unique_ptr<TestPeer> light, heavy;
+};
+
+TEST_F(HeavySceneTest, OtherScenesContinueWhileItLoads) {
+  const Clock::time_point asked = Clock::now();
+  Clock::time_point last = asked;
+  Clock::duration longest{};
+  int frames = 0;
+  for (; !heavyRuns(); ++frames) {
+    light->readFrames(1);
+    const Clock::time_point now = Clock::now();
+    longest = std::max(longest, now - std::exchange(last, now));
+  }
+  fmt::print("made ready in {:.0f} ms; another scene's {} frames meanwhile at most {:.0f} ms apart\n",
+             1e3 * seconds(last - asked), frames, 1e3 * seconds(longest));
+  // Two can be on their way, and one tick in flight, when it begins.
+  EXPECT_GE(frames, 8);
+  heavy->readFrames(1);
+}
+
+TEST_F(HeavySceneTest, IsLoadedAgainAfterADeviceLoss) {
+  light->readFrames(2);
+  server().state().device.simulateDeviceLoss();
+  light->readUntil(
+      [](const v1::ServerMessage& m) { return m.notice().kind() == v1::NOTICE_KIND_DEVICE_REBUILT; });
+  heavy->readFrames(1);
+  light->readFrames(3);
+}
+
+TEST_F(HeavySceneTest, ServerStopsWhileItLoads) {
+  light->readFrames(2);
+  v1::CreateSceneRequest request;
+  request.set_named("heavy");
+  request.set_name("heavier");
+  std::promise<void> answered;
+  server().createScene(request, [&](const auto&) { answered.set_value(); });
+  light->vanish();
+  heavy->vanish();
+  stop();
+  answered.get_future().get();
+}
+
+}  // namespace
+}  // namespace clothstream::hosting

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: MIT
+// A scene's definition, and what becomes of it where its simulation goes back.
+#include "server/scene/live_scene.h"
+
+#include <utility>
+
+#include <gtest/gtest.h>
+
+#include "tests/serving/small_scene.h"
+
+namespace clothstream::scene {
+namespace {
+
+using tests::smallScene;
+
+TEST(LiveScene, RestartRestoresTheStart) {
+  model::Scene scene = smallScene();
+  scene.colliders[0].motion.keys.clear();
+  LiveScene live(std::move(scene));
+  v1::ParameterChange change;
+  change.mutable_wind()->mutable_value()->set_x(3);
+  v1::ColliderChange& ball = *change.add_colliders();
+  ball.set_name("ball");
+  ball.mutable_position()->set_y(7);
+  ASSERT_TRUE(live.change(1, change));
+  live.tick = 50;
+  live.resetRequested = true;
+  EXPECT_EQ(live.restart().wind().value().x(), 0);
+  EXPECT_EQ(live.definition().environment.wind, live.start().environment.wind);
+  EXPECT_EQ(live.definition().colliders[0].pose.position, live.start().colliders[0].pose.position);
+  Inputs waiting;
+  live.inbox.drain(waiting);
+  EXPECT_TRUE(waiting.changes.empty());
+  EXPECT_EQ(live.tick, 0u);
+  EXPECT_FALSE(live.resetRequested);
+}
+
+TEST(LiveScene, RevertKeepsAppliedAndWaitingChanges) {
+  LiveScene live(smallScene());
+  v1::ParameterChange waiting;
+  waiting.mutable_wind()->mutable_value()->set_x(3);
+  ASSERT_TRUE(live.change(1, waiting));
+  model::Scene now = smallScene();
+  now.cloths[0].thickness = 0.02f;
+  const v1::ParameterChange said = live.revertTo(now);
+  EXPECT_EQ(said.cloths(0).thickness(), 0.02f);
+  EXPECT_TRUE(said.cloths(0).solver().has_mass_spring());
+  EXPECT_EQ(said.wind().value().x(), 0);
+  EXPECT_EQ(live.definition().cloths[0].thickness, 0.02f);
+  EXPECT_EQ(live.definition().environment.wind.x(), 3);
+}
+
+}  // namespace
+}  // namespace clothstream::scene

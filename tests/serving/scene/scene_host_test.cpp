@@ -1,0 +1,348 @@
+// SPDX-License-Identifier: MIT
+// A scene's ticks, one at a time: inputs, determinism, and the ways back when something went wrong.
+#include "server/scene/scene_host.h"
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+#include <unistd.h>
+
+#include "server/step/step.h"
+#include "tests/serving/scene/hosted_scene.h"
+
+namespace clothstream::scene {
+namespace {
+
+using namespace schedule;
+
+using model::Vec3;
+using tests::gravity;
+using tests::handAt;
+using tests::HostedScene;
+using tests::smallScene;
+using tests::wind;
+
+class SceneHostTest : public tests::GpuTest {};
+
+TEST_F(SceneHostTest, SameInputsGiveTheSameStatesForAnySubscribers) {
+  const auto simulate = [](std::size_t subscribers) {
+    HostedScene hosted(smallScene(), subscribers);
+    for (int tick = 0; tick < 60; ++tick) {
+      if (tick == 10) hosted.change(wind(3));
+      const float z = 0.01f * static_cast<float>(tick) - 0.3f;
+      hosted.live.inbox.postPoses(
+          9,
+          {.colliders = {handAt(1, 0.1f, -0.6f, z)},
+           .grabs = {{.id = 1, .pose = {model::Vec3(0, -0.4f, z), model::Quaternion::Identity()}}}},
+          hosted.now);
+      // Who asks for key frames changes what is sent, not what is simulated.
+      if (tick % 7 == 0) hosted.mailboxes.back()->restart();
+      hosted.tick();
+    }
+    return hosted.stateHashes();
+  };
+  const std::vector<std::uint64_t> alone = simulate(1);
+  EXPECT_EQ(alone.size(), 60u);
+  EXPECT_EQ(simulate(4), alone);
+}
+
+TEST_F(SceneHostTest, HandIsPlacedAtTheTimeOfTheTick) {
+  HostedScene hosted;
+  const auto pose = [&](std::chrono::milliseconds beyondTick, float x) {
+    const Clock::time_point trueAt = hosted.now + std::chrono::seconds(1) + beyondTick;
+    hosted.live.inbox.postPoses(9, {.colliders = {handAt(1, x, 5, 0)}}, hosted.now,
+                                {.trueAt = trueAt, .clientTimeUs = microseconds(trueAt)});
+  };
+  pose(std::chrono::milliseconds(-30), 1);
+  pose(std::chrono::milliseconds(10), 1.4f);
+  hosted.tick();
+  ASSERT_EQ(hosted.frames.back().colliders_size(), 2);
+  EXPECT_NEAR(hosted.frames.back().colliders(1).position().x(), 1.3f, 1e-5f);
+  hosted.tick();  // a second later
+  EXPECT_EQ(hosted.frames.back().colliders(1).position().x(), 1.4f);
+}
+
+TEST_F(SceneHostTest, ChangeActsAndIsAnnouncedAtTheNextTick) {
+  HostedScene changed, unchanged;
+  changed.ticks(5);
+  unchanged.ticks(5);
+  v1::ParameterChange message;
+  message.mutable_gravity()->mutable_value()->set_y(-2);
+  ASSERT_TRUE(changed.live.change(42, message));
+  EXPECT_EQ(changed.live.definition().environment.gravity.y(), -2);
+  changed.tick();
+  unchanged.tick();
+  EXPECT_EQ(changed.frames[4].state_hash(), unchanged.frames[4].state_hash());
+  EXPECT_NE(changed.frames[5].state_hash(), unchanged.frames[5].state_hash());
+  ASSERT_EQ(changed.told.size(), 1u);
+  ASSERT_TRUE(changed.told[0].has_parameter_changed());
+  EXPECT_EQ(changed.told[0].parameter_changed().participant_id(), 42u);
+  EXPECT_EQ(changed.told[0].parameter_changed().tick(), 6u);
+  EXPECT_EQ(changed.told[0].parameter_changed().change().gravity().value().y(), -2);
+}
+
+// A grab at the middle of the lower edge is told of when it takes hold, when it slips and when it lets go.
+TEST_F(SceneHostTest, AnnouncesGrabEvents) {
+  HostedScene hosted;
+  const auto grabAt = [&](Vec3 place) {
+    hosted.live.inbox.postPoses(
+        7, {.grabs = {{.id = 3, .pose = {place, model::Quaternion::Identity()}, .radius = 0.06f}}},
+        hosted.now);
+    hosted.tick();
+  };
+  const auto newest = [&] {
+    v1::TickEvents events = hosted.told.empty() ? v1::TickEvents() : hosted.told.back().tick_events();
+    hosted.told.clear();
+    return events;
+  };
+  grabAt(Vec3(0.05f, -1.1f, 0));
+  const v1::TickEvents taken = newest();
+  ASSERT_EQ(taken.grabs_size(), 1);
+  EXPECT_EQ(taken.tick(), 1u);
+  EXPECT_EQ(taken.grabs(0).participant_id(), 7u);
+  EXPECT_EQ(taken.grabs(0).grab_id(), 3u);
+  EXPECT_EQ(taken.grabs(0).kind(), v1::GRAB_EVENT_KIND_TAKEN);
+  EXPECT_EQ(taken.grabs(0).vertices(), 1u);
+  hosted.ticks(3);
+  EXPECT_EQ(newest().grabs_size(), 0);
+  grabAt(Vec3(0.05f, -1.1f, 3));
+  const v1::TickEvents slipped = newest();
+  ASSERT_EQ(slipped.grabs_size(), 1);
+  EXPECT_EQ(slipped.grabs(0).kind(), v1::GRAB_EVENT_KIND_SLIPPED);
+  EXPECT_EQ(slipped.grabs(0).vertices(), 0u);
+  hosted.live.inbox.postPoses(7, {}, hosted.now);
+  hosted.tick();
+  const v1::TickEvents released = newest();
+  ASSERT_EQ(released.grabs_size(), 1);
+  EXPECT_EQ(released.grabs(0).kind(), v1::GRAB_EVENT_KIND_RELEASED);
+
+  // Where there is nothing to take hold of.
+  grabAt(Vec3(10, 0, 0));
+  const v1::TickEvents nothing = newest();
+  ASSERT_EQ(nothing.grabs_size(), 1);
+  EXPECT_EQ(nothing.grabs(0).kind(), v1::GRAB_EVENT_KIND_TAKEN);
+  EXPECT_EQ(nothing.grabs(0).vertices(), 0u);
+}
+
+// A hand in the sheet for ten ticks, then gone. The scene's ball swings through it too.
+TEST_F(SceneHostTest, AnnouncesContactsIfRequested) {
+  model::Scene scene = smallScene();
+  scene.colliders[0].motion.keys.clear();
+  scene.colliders[0].pose.position = Vec3(0, -0.5f, 3);
+  HostedScene hosted(scene);
+  const auto contacts = [&] {
+    std::vector<v1::ContactEvent> events;
+    for (const v1::ServerMessage& message : hosted.told)
+      events.insert(events.end(), message.tick_events().contacts().begin(),
+                    message.tick_events().contacts().end());
+    hosted.told.clear();
+    return events;
+  };
+  const auto touch = [&](bool wants) {
+    hosted.live.inbox.postPoses(7, {.colliders = {handAt(4, 0, -0.6f, 0.05f)}, .wantsContacts = wants},
+                                hosted.now);
+    hosted.ticks(10);
+    hosted.live.inbox.postPoses(7, {.colliders = {handAt(4, 5)}, .wantsContacts = wants}, hosted.now);
+    hosted.ticks(5);
+  };
+  touch(false);
+  EXPECT_TRUE(contacts().empty());
+  touch(true);
+  const std::vector<v1::ContactEvent> events = contacts();
+  ASSERT_GE(events.size(), 2u);
+  EXPECT_EQ(events.size() % 2, 0u);
+  for (std::size_t i = 0; i < events.size(); ++i) {
+    EXPECT_EQ(events[i].kind(), i % 2 == 0 ? v1::CONTACT_EVENT_KIND_BEGAN : v1::CONTACT_EVENT_KIND_ENDED);
+    EXPECT_EQ(events[i].participant_id(), 7u);
+    EXPECT_EQ(events[i].collider_id(), 4u);
+    EXPECT_EQ(events[i].collider(), "");
+    EXPECT_EQ(events[i].cloth(), "sheet");
+    EXPECT_GT(events[i].impulse(), 0);
+  }
+  EXPECT_GT(events[1].seconds(), 0);
+  EXPECT_LE(events[1].seconds(), 10.0f / 40 + 1e-6f);
+  // Whoever leaves wants nothing any more.
+  hosted.live.inbox.postPoses(7, {}, hosted.now);
+  hosted.tick();
+  hosted.live.inbox.postPoses(8, {.colliders = {handAt(1, 0, -0.6f, 0.05f)}}, hosted.now);
+  hosted.ticks(5);
+  EXPECT_TRUE(contacts().empty());
+}
+
+TEST_F(SceneHostTest, SpringChangesReachTheDevice) {
+  HostedScene changed, unchanged;
+  model::ParameterChange softer;
+  softer.cloths.emplace_back().structural = model::Spring{1, 0.001f};
+  changed.tick();
+  changed.change(softer);
+  changed.ticks(2);
+  unchanged.ticks(3);
+  ASSERT_EQ(changed.frames.size(), 3u);
+  ASSERT_EQ(unchanged.frames.size(), 3u);
+  EXPECT_NE(changed.frames[2].state_hash(), unchanged.frames[2].state_hash());
+}
+
+TEST_F(SceneHostTest, UnhealthyStateIsNotSentAndRollsBack) {
+  HostedScene hosted;
+  hosted.ticks(90);  // 40 ticks/s: the state was kept at 40 and at 80
+  ASSERT_EQ(hosted.frames.size(), 90u);
+  hosted.change(gravity(-1e30f));  // no message could say this
+  hosted.tick();
+  EXPECT_FALSE(hosted.host.status().healthy);
+  EXPECT_EQ(hosted.frames.size(), 90u);
+  ASSERT_EQ(hosted.told.size(), 2u);  // the change, and the notice
+  EXPECT_EQ(hosted.told[1].notice().kind(), v1::NOTICE_KIND_ROLLED_BACK);
+  EXPECT_EQ(hosted.live.metrics.rollbacks.value(), 1u);
+
+  hosted.change(gravity(-9.81f));
+  hosted.tick();
+  EXPECT_TRUE(hosted.host.status().healthy);
+  ASSERT_EQ(hosted.frames.size(), 91u);
+  EXPECT_TRUE(hosted.keys.back());
+  EXPECT_EQ(hosted.decoder->tick(), 92u);  // ticks count on
+  hosted.tick();
+  EXPECT_FALSE(hosted.keys.back());
+  EXPECT_EQ(hosted.live.metrics.resets.value(), 0u);
+}
+
+TEST_F(SceneHostTest, SecondUnhealthyStateResetsStateAndParameters) {
+  HostedScene hosted;
+  hosted.ticks(50);
+  hosted.change(gravity(-1e30f));
+  hosted.change(wind(1));
+  hosted.ticks(2);  // the second from the checkpoint, with the same gravity
+  EXPECT_EQ(hosted.live.metrics.rollbacks.value(), 1u);
+  EXPECT_EQ(hosted.live.metrics.resets.value(), 1u);
+  hosted.ticks(30);
+  EXPECT_TRUE(hosted.host.status().healthy);
+  EXPECT_EQ(hosted.frames.size(), 80u);
+  EXPECT_EQ(hosted.live.definition().environment.wind, Vec3(0, 0, 0));
+  const v1::ServerMessage& reset = hosted.told.at(hosted.told.size() - 2);
+  ASSERT_TRUE(reset.has_parameter_changed());
+  EXPECT_EQ(reset.parameter_changed().participant_id(), 0u);
+  EXPECT_NEAR(reset.parameter_changed().change().gravity().value().y(), -9.81, 1e-6);
+  EXPECT_EQ(hosted.told.back().notice().kind(), v1::NOTICE_KIND_ROLLED_BACK);
+}
+
+TEST_F(SceneHostTest, ContinuesOnAnotherDeviceFromTheNewestSnapshot) {
+  HostedScene hosted;
+  hosted.ticks(210);  // 40 ticks/s: saved with tick 201
+  hosted.host.release();
+  vulkan::Device another(vulkan::DeviceOptions{.validation = true});
+  hosted.host.rebuild(std::make_unique<SceneOnDevice>(another, hosted.live.start(), hosted.packer.workers()),
+                      "the device was lost");
+  hosted.tick();
+  ASSERT_EQ(hosted.told.size(), 1u);
+  EXPECT_EQ(hosted.told[0].notice().kind(), v1::NOTICE_KIND_DEVICE_REBUILT);
+  EXPECT_TRUE(hosted.keys.back());
+  EXPECT_EQ(hosted.decoder->tick(), 211u);
+
+  // A scene of its own that was put into the state of tick 201, and sees the same collider, comes to the same
+  // bits.
+  simulation::ClothSimulation simulation(another, hosted.live.start());
+  ColliderSet colliders(hosted.live.start());
+  simulation::TickInputs inputs{.environment = hosted.live.start().environment, .colliders = {}};
+  vulkan::Recorder recorder(another);
+  const auto tick = [&](int number) {
+    colliders.advance(hosted.live.start(), number * hosted.live.start().tickSeconds(), inputs.colliders);
+    recorder.begin();
+    simulation.recordTick(recorder, inputs);
+    simulation.recordSaveState(recorder);
+    tests::submitAndWait(another, recorder);
+  };
+  for (int number = 1; number <= 201; ++number) tick(number);
+  EXPECT_EQ(simulation.status().stateHash, hosted.frames.at(200).state_hash());
+  const simulation::StateSnapshot saved = simulation.collectState(201);
+  for (int number = 202; number <= 210; ++number) tick(number);
+  recorder.begin();
+  simulation.recordRestoreState(recorder, saved);
+  tests::submitAndWait(another, recorder);
+  tick(211);
+  EXPECT_EQ(simulation.status().stateHash, hosted.frames.back().state_hash());
+  hosted.packer.drain();
+  hosted.host.release();  // before its device
+}
+
+// How far the lowest node of any column hangs below where it would if no spring were stretched, and where all
+// are.
+double stretchedBy(const std::vector<float>& positions, std::vector<float>* heights = nullptr) {
+  double most = 0;
+  for (std::size_t column = 0; column < 10; ++column) {
+    double length = 0;
+    for (std::size_t row = 0; row + 1 < 12; ++row) {
+      const float* a = positions.data() + 3 * (10 * row + column);
+      const float* b = a + 30;
+      length += std::hypot(double{b[0]} - a[0], double{b[1]} - a[1], double{b[2]} - a[2]);
+    }
+    most = std::max(most, length - 1.1);
+    if (heights != nullptr) heights->push_back(positions[3 * (110 + column) + 1]);
+  }
+  return most;
+}
+
+// Soft springs hang stretched by S of a metre. At once, that would be gone within a tick; gently it fades
+// as exp(-t / 0.1 s), which is at most a quarter of it in a tick of 25 ms, besides what moves anyway.
+TEST_F(SceneHostTest, SolverChangeActsAtTheNextTickWithoutAJump) {
+  model::Scene scene = smallScene();
+  scene.colliders.clear();
+  scene.cloths[0].damping = 3;
+  scene.cloths[0].structural.stiffness = 0.7f;
+  scene.cloths[0].shear.stiffness = 0.5f;
+  HostedScene hosted(scene);
+  hosted.ticks(120);
+  const auto lowest = [&] {
+    std::vector<float> heights;
+    const std::vector<float> positions(hosted.decoder->positions().begin(),
+                                       hosted.decoder->positions().end());
+    stretchedBy(positions, &heights);
+    return heights;
+  };
+  const auto stretch = [&] {
+    return stretchedBy({hosted.decoder->positions().begin(), hosted.decoder->positions().end()});
+  };
+  const double before = stretch();
+  ASSERT_GT(before, 0.2);
+  model::ParameterChange change;
+  model::Solver constraint;
+  constraint.kind = model::SolverKind::constraint;
+  change.cloths = {{.name = "sheet", .solver = constraint}};
+  hosted.change(change);
+  std::vector<float> was = lowest();
+  for (int tick = 0; tick < 40; ++tick) {
+    hosted.tick();
+    const std::vector<float> now = lowest();
+    for (std::size_t i = 0; i < now.size(); ++i)
+      ASSERT_LT(std::abs(now[i] - was[i]), 0.25 * before + 0.02) << "tick " << tick;
+    was = now;
+  }
+  EXPECT_TRUE(hosted.host.status().healthy);
+  EXPECT_LT(stretch(), 0.02);
+  ASSERT_FALSE(hosted.told.empty());
+  EXPECT_EQ(hosted.told.back().parameter_changed().participant_id(), 5u);
+}
+
+TEST_F(SceneHostTest, StatesEqualThoseOfTheStepCommand) {
+  const std::filesystem::path out =
+      std::filesystem::temp_directory_path() / ("clothstream-stepped-" + std::to_string(getpid()) + ".f32");
+  ASSERT_EQ(step::run(tests::device(), smallScene(), {.ticks = 30, .out = out}, [] { return false; }),
+            step::Outcome::complete);
+  const auto said = nlohmann::json::parse(std::ifstream(out.string() + ".json"));
+  std::filesystem::remove(out);
+  std::filesystem::remove(out.string() + ".json");
+  HostedScene hosted;
+  hosted.ticks(30);
+  ASSERT_EQ(hosted.frames.size(), 30u);
+  for (std::size_t i = 0; i < 30; ++i)
+    EXPECT_EQ(said["hashes"][i + 1], fmt::format("{:016x}", hosted.frames[i].state_hash()))
+        << "tick " << i + 1;
+}
+
+}  // namespace
+}  // namespace clothstream::scene

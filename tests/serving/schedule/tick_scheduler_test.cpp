@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: MIT
+// Scenes of known cost on a device that nothing interrupts, on a clock of the test's own.
+#include "server/schedule/tick_scheduler.h"
+
+#include <algorithm>
+#include <memory>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace clothstream::schedule {
+namespace {
+
+using namespace std::chrono_literals;
+
+struct SimulatedScene {
+  SimulatedScene(std::uint32_t rate, Clock::duration tick) : turn(rate), cost(tick) {
+    turn.running = true;
+    turn.pacer.start({});
+  }
+  TickSchedule turn;
+  Clock::duration cost;
+  int ticks = 0;
+  double slipped = 0;
+  Clock::duration worstLateness{};
+};
+
+class TickSchedulerTest : public ::testing::Test {
+ protected:
+  SimulatedScene& add(std::uint32_t rate, Clock::duration cost) {
+    return *scenes_.emplace_back(std::make_unique<SimulatedScene>(rate, cost));
+  }
+
+  // As the device's thread does it.
+  void run(Clock::duration time) {
+    std::vector<TickSchedule*> turns, chosen;
+    for (const auto& scene : scenes_) turns.push_back(&scene->turn);
+    for (Clock::time_point now{}; now < Clock::time_point{} + time;) {
+      scheduleTicks(turns, now, chosen);
+      if (chosen.empty()) {
+        now = (*std::ranges::min_element(turns, {}, [](const TickSchedule* turn) {
+                return turn->pacer.due();
+              }))->pacer.due();
+        continue;
+      }
+      for (TickSchedule* turn : chosen) {
+        SimulatedScene& scene = sceneOf(turn);
+        const Pacer::Start start = turn->pacer.begin(now, turn->catchUp);
+        scene.slipped += start.slippedTicks;
+        scene.worstLateness = std::max(scene.worstLateness, start.lateness);
+        ++scene.ticks;
+      }
+      for (TickSchedule* turn : chosen) {
+        now += sceneOf(turn).cost;
+        turn->tickEnded(sceneOf(turn).cost, now);
+      }
+    }
+  }
+
+ private:
+  SimulatedScene& sceneOf(const TickSchedule* turn) {
+    return **std::ranges::find_if(scenes_, [&](const auto& scene) { return &scene->turn == turn; });
+  }
+
+  std::vector<std::unique_ptr<SimulatedScene>> scenes_;
+};
+
+TEST_F(TickSchedulerTest, HeavySceneUsesTheTimeThatOthersLeave) {
+  std::vector<SimulatedScene*> light;
+  for (int i = 0; i < 8; ++i) light.push_back(&add(72, 1ms));
+  SimulatedScene& heavy = add(72, 50ms);
+  run(10s);
+  for (const SimulatedScene* scene : light) {
+    EXPECT_GE(scene->ticks, 0.99 * 720);
+    // Its first tick is not known to be long.
+    EXPECT_LE(scene->slipped, 50.0 / 1000 * 72);
+    EXPECT_LE(scene->worstLateness, 50ms + 14ms + 8ms);
+  }
+  const double left = 1 - 8 * 0.001 * 72;
+  EXPECT_GE(heavy.ticks, 0.9 * left * 10 / 0.050);
+  EXPECT_LE(heavy.ticks, 1.0 * left * 10 / 0.050 + 1);
+}
+
+TEST_F(TickSchedulerTest, SingleSceneIsNotDelayed) {
+  SimulatedScene& heavy = add(72, 50ms);
+  run(10s);
+  EXPECT_EQ(heavy.ticks, 200);
+}
+
+TEST_F(TickSchedulerTest, HeavySceneGetsAnEqualShareOfASlowDevice) {
+  std::vector<SimulatedScene*> light;
+  for (int i = 0; i < 9; ++i) light.push_back(&add(72, 3ms));  // nearly twice what there is
+  SimulatedScene& heavy = add(72, 50ms);
+  run(10s);
+  EXPECT_NEAR(heavy.ticks, 10 / (10 * 0.050), 3);
+  const auto [least, most] = std::ranges::minmax(light, {}, &SimulatedScene::ticks);
+  EXPECT_GE(least->ticks, 0.95 * most->ticks);
+  EXPECT_GE(least->ticks, 0.9 * (10 - heavy.ticks * 0.050) / (9 * 0.003));
+}
+
+TEST_F(TickSchedulerTest, HeavyScenesAlternate) {
+  SimulatedScene& light = add(72, 1ms);
+  SimulatedScene &first = add(72, 40ms), &second = add(30, 40ms);
+  run(10s);
+  EXPECT_GE(light.ticks, 0.99 * 720);
+  EXPECT_NEAR(first.ticks, second.ticks, 2);
+  EXPECT_GE(first.ticks + second.ticks, 0.9 * (1 - 0.072) * 10 / 0.040);
+}
+
+TEST_F(TickSchedulerTest, SleepingScenesDoNotCount) {
+  SimulatedScene& resting = add(72, 1ms);
+  resting.turn.running = false;
+  SimulatedScene& heavy = add(72, 50ms);
+  run(1s);
+  EXPECT_EQ(resting.ticks, 0);
+  EXPECT_EQ(heavy.ticks, 20);
+}
+
+TEST_F(TickSchedulerTest, EarliestTickStartsFirstWithoutHeavyScenes) {
+  SimulatedScene &slow = add(30, 2ms), &quick = add(90, 2ms);
+  run(10s);
+  EXPECT_EQ(slow.ticks, 300);
+  EXPECT_EQ(quick.ticks, 900);
+  EXPECT_LE(quick.worstLateness, 4ms);
+}
+
+}  // namespace
+}  // namespace clothstream::schedule

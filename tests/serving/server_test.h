@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: MIT
+// A server with small scenes on whatever device there is, for tests of what peers see of it.
+#pragma once
+
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "server/hosting/scene_server.h"
+#include "server/hosting/server_state.h"
+#include "tests/serving/small_scene.h"
+#include "tests/serving/test_peer.h"
+#include "tests/vulkan/gpu_test.h"
+
+namespace clothstream::tests {
+
+// Skips its tests, with the reason, where there is no device.
+class ServerTest : public ::testing::Test {
+ protected:
+  // The scenes "small", which is the default, "other", and these. Once a test.
+  void start(hosting::ServerOptions options = {}, const std::vector<model::Scene>& more = {}) {
+    options.defaultScene = "small";
+    std::vector scenes{smallScene("small"), smallScene("other")};
+    scenes.insert(scenes.end(), more.begin(), more.end());
+    try {
+      server_ = std::make_unique<hosting::SceneServer>(std::move(scenes), std::move(options));
+    } catch (const vulkan::DeviceError& error) {
+      GTEST_SKIP() << error.what();
+    }
+  }
+
+  hosting::SceneServer& server() { return *server_; }
+  void stop() { server_.reset(); }
+  telemetry::SceneMetrics& metrics() { return server_->state().scenes.front()->metrics; }
+
+ private:
+  std::unique_ptr<hosting::SceneServer> server_;
+};
+
+}  // namespace clothstream::tests

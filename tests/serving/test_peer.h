@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: MIT
+// A client inside the process, as a endpoint would hold it: serialised messages through a Connection, frames
+// decoded.
+#pragma once
+
+#include <chrono>
+#include <condition_variable>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "clothstream/v1/session.pb.h"
+#include "proto/codec/decoder.h"
+#include "server/hosting/scene_server.h"
+#include "server/session/session.h"
+
+namespace clothstream::tests {
+
+// A frame as it was received and decoded.
+struct SeenFrame {
+  std::uint64_t tick = 0;
+  bool key = false;
+  std::uint8_t quality = 0, layer = 0;
+  std::uint64_t stateHash = 0;
+  delivery::SharedBytes message;
+  std::vector<v1::ColliderState> colliders;
+};
+
+// Belongs to one thread. Reads only inside its functions, which fail the test (and throw) after kPatience.
+class TestPeer {
+ public:
+  static constexpr std::chrono::seconds kPatience{60};
+
+  explicit TestPeer(hosting::SceneServer& server, std::string name = "test");
+
+  void send(const v1::ClientMessage& message);
+  void sendBytes(const std::string& bytes);
+  void hello(const std::string& scene = "");
+  void hello(const v1::Hello& hello);
+  void poses(const std::vector<std::pair<std::uint32_t, float>>& idsAndXs);
+  void change(const v1::ParameterChange& change);
+
+  // Says hello and reads until the first frame is decoded.
+  void join(const std::string& scene = "");
+
+  // Reads on until this holds of the message last read; returns it.
+  v1::ServerMessage readUntil(const std::function<bool(const v1::ServerMessage&)>& wanted);
+  v1::ServerMessage readUntil(v1::ServerMessage::BodyCase body);
+  // Reads on until so many more frames are decoded.
+  void readFrames(std::size_t count);
+  // Reads on until the connection is finished and has no more; returns the last message.
+  v1::ServerMessage readToTheEnd();
+
+  bool finished() const { return connection_->finished(); }
+  // As if the other end had vanished; it may be held.
+  void vanish() { connection_.reset(); }
+  // Goes on with the description that the other holds, which can decode no more.
+  void inherit(TestPeer& other) {
+    description_ = other.description_;
+    decoder_ = std::move(other.decoder_);
+  }
+  // Says goodbye.
+  void leave() {
+    connection_->leave();
+    connection_.reset();
+  }
+
+  const v1::Welcome& welcome() const { return welcome_; }
+  const v1::StreamDescription& description() const { return description_; }
+  const std::vector<SeenFrame>& frames() const { return frames_; }
+  const codec::Decoder& decoder() const { return *decoder_; }
+
+  bool acknowledges = true;
+
+ private:
+  std::optional<v1::ServerMessage> read();
+  void see(const v1::ServerMessage& message, const delivery::SharedBytes& bytes);
+  void seeChunk(const v1::Chunk& chunk);
+  void seeFrame(const v1::Frame& frame, const delivery::SharedBytes& bytes);
+
+  std::mutex mutex_;
+  std::condition_variable woken_;
+  bool awake_ = false;
+
+  v1::Welcome welcome_;
+  std::string content_;
+  v1::StreamDescription description_;
+  std::unique_ptr<codec::Decoder> decoder_;
+  std::vector<SeenFrame> frames_;
+
+  std::shared_ptr<session::Session> connection_;
+};
+
+}  // namespace clothstream::tests
