@@ -12,7 +12,7 @@
 
 namespace clothstream::messages {
 
-// Number of capsules per hand: three bones of the thumb, four of each finger (the first one lies in the
+// Number of capsules per hand: three bones of the thumb, four of each finger (the first one is in the
 // palm), and one from the wrist to the middle finger.
 inline constexpr std::size_t kHandBones = 20;
 // Id of the first bone of the left hand. Ids of the right hand start 32 higher.
