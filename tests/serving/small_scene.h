@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The scene of the stream's tests: small enough for any machine, and nothing in it is still.
+// Test scene: small enough for any machine, and everything in it moves.
 #pragma once
 
 #include <cstdint>
@@ -36,7 +36,7 @@ inline model::Scene smallScene(std::string name = "small") {
   scene.name = std::move(name);
   scene.simulationRate = scene.streamRate = 40;
   scene.substeps = 12;
-  scene.stream.qualities = 1;  // so that who reads slowly gets what others get
+  scene.stream.qualities = 1;  // so that slow readers get the same packets
   scene.cloths = {cloth};
   scene.colliders = {ball};
   return scene;

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A client inside the process, as a endpoint would hold it: serialised messages through a Connection, frames
-// decoded.
+// A client inside the process: serialised messages through a Session, decoded frames.
 #pragma once
 
 #include <chrono>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Frames of a scene host: who gets which, key frames, what stands in them.
+// Frames of a scene host: receivers, key frames, content.
 #include <algorithm>
 #include <cmath>
 #include <memory>
@@ -37,7 +37,7 @@ TEST_F(SceneFramesTest, StreamsOneFramePerTickStartingWithAKeyFrame) {
 // When a subscriber takes what there is for it.
 enum class Endpoint : std::uint8_t { asked, quick };  // when it is asked to; as soon as there is something
 
-// Another subscriber of a hosted scene, which wants a quality of its own.
+// A further subscriber of a hosted scene, with its own quality.
 class QualitySubscriber {
  public:
   QualitySubscriber(HostedScene& hosted, std::uint8_t quality, Endpoint endpoint = Endpoint::asked)
@@ -52,7 +52,7 @@ class QualitySubscriber {
   }
   ~QualitySubscriber() { hosted_.live.subscribers.remove(*mailbox_); }
 
-  // Takes and acknowledges all that there is.
+  // Takes and acknowledges all waiting messages.
   void read() {
     std::size_t before = 0;
     do {

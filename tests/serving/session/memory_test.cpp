@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What a client that never reads can cost the server.
+// Memory cost of clients that never read.
 #include <cstdio>
 #include <memory>
 #include <thread>
@@ -22,7 +22,7 @@ using tests::allocatedBytes;
 using tests::kMostBytesAClient;
 using tests::TestPeer;
 
-// 10,000 nodes that fall, so soft that a tick takes little.
+// 10,000 falling nodes, soft so that a tick is cheap.
 model::Scene largeScene() {
   model::Scene scene = tests::smallScene("large");
   model::Cloth& cloth = scene.cloths.front();
@@ -37,7 +37,7 @@ model::Scene largeScene() {
   return scene;
 }
 
-// All that a client may have the server keep for it.
+// Sends everything that the server keeps for a client.
 void sendAllThereIs(TestPeer& peer, int round) {
   v1::ClientMessage ping;
   ping.mutable_ping()->set_client_time_us(1);

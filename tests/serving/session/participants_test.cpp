@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Roles, presence and coming back, as peers see them.
+// Roles, presence and reconnection, as peers see them.
 #include <algorithm>
 #include <chrono>
 #include <set>
