@@ -317,7 +317,7 @@ TEST_F(RosterTest, LaterReconnectRestoresCollidersAndGrabs) {
   EXPECT_THAT(inputs(), ElementsAre("1: 1 colliders, 1 grabs"));
 }
 
-TEST_F(RosterTest, ReconnectAfterTheGracePeriodIsANewJoin) {
+TEST_F(RosterTest, ReconnectAfterTheGracePeriodJoinsAgain) {
   const Member lost = join();
   lose(lost);
   now += 60s;  // expire() was not called yet

@@ -160,7 +160,7 @@ TEST_F(SceneFramesTest, FastReaderGetsEachTickInOneQualityAcrossAChange) {
   EXPECT_EQ(quick.qualities, (std::vector<std::uint8_t>{0, 0, 0, 1}));
 }
 
-TEST_F(SceneFramesTest, LateJoinerOfAPausedSceneGetsTheNewestTickAndNothingElseChanges) {
+TEST_F(SceneFramesTest, LateJoinerOfAPausedSceneGetsTheNewestTick) {
   model::Scene scene = smallScene();
   scene.stream.qualities = 2;
   HostedScene through(scene), hosted(scene);
