@@ -11,8 +11,7 @@
 
 namespace clothstream::tests {
 
-// 12 x 10 nodes hung by their first row, a ball beside them that moves by itself. 40 ticks and frames a
-// second.
+// 12 x 10 nodes that hang by their first row, and a moving ball next to them. 40 ticks and frames per second.
 inline model::Scene smallScene(std::string name = "small") {
   model::Cloth cloth;
   cloth.name = "sheet";

@@ -208,8 +208,7 @@ TEST_F(MailboxTest, HoldsALimitedNumberOfFrames) {
   for (std::uint64_t tick = 3; tick <= 5; ++tick) mailbox.deliver(frames.emplace_back(frame(tick)));
   for (const PublishedFrame& each : frames)
     EXPECT_EQ(each.message.use_count(), each.tick < 3 ? 1 : 2) << each.tick;
-  // One too many: all that is held goes, and nobody is asked for a key frame as long as there is no room for
-  // it.
+  // One frame too many: all held frames are dropped. No key frame is requested while there is no room for it.
   mailbox.deliver(frames.emplace_back(frame(6)));
   for (const PublishedFrame& each : frames) EXPECT_EQ(each.message.use_count(), 1) << each.tick;
   EXPECT_EQ(metrics.framesDropped.value(), 4u);

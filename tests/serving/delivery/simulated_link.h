@@ -23,8 +23,8 @@ namespace clothstream::delivery {
 using schedule::seconds;
 
 // One subscriber behind a link of limited rate and latency that keeps the order of messages. Its endpoint
-// writes without waiting, as into a large buffer. It acknowledges as clients do, and fails the test if it gets
-// a frame that it cannot decode.
+// writes without waiting, as into a large buffer. It acknowledges as clients do, and fails the test if it
+// gets a frame that it cannot decode.
 class SimulatedLink {
  public:
   SimulatedLink(const StreamShape& shape, OperatingPoint wanted, Clock::time_point now)

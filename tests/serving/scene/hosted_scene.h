@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A scene host without a server; the only other thread is the publisher's. Runs single ticks and decodes frames.
+// A scene host without a server; the only other thread is the publisher's. Runs single ticks and decodes
+// frames.
 #pragma once
 
 #include <chrono>

@@ -73,7 +73,7 @@ class QualitySubscriber {
   std::vector<std::uint64_t> stateHashes;
 
  private:
-  // Decodes what comes, and compares it with what the server holds.
+  // Decodes each frame, and compares it with the server's reconstruction.
   void take() {
     while (const auto message = mailbox_->next(hosted_.now)) {
       v1::ServerMessage parsed;
@@ -171,7 +171,7 @@ TEST_F(SceneFramesTest, LateJoinerOfAPausedSceneGetsTheNewestTick) {
     hosted.host.encodePausedFrame(hosted.now);
     hosted.packer.drain();
   };
-  hosted.mailboxes[0]->requestKeyFrame();  // and does without it: nobody lacks anything
+  hosted.mailboxes[0]->requestKeyFrame();  // and continues without it: no key frame is needed
   show();
   EXPECT_EQ(hosted.live.metrics.frames.value(), 20u);
   {
@@ -276,7 +276,7 @@ TEST_F(SceneFramesTest, OneKeyFrameServesAllRequestsAndRespectsTheInterval) {
   EXPECT_EQ(hosted.live.metrics.keyFrames.value(), 3u);
 }
 
-// What it says is what can be seen of the frame: two ends of a spring of 0.1 m, each off by the codec's error
+// The report agrees with the decoded frame: two ends of a spring of 0.1 m, each off by the codec's error
 // along three axes.
 TEST_F(SceneFramesTest, SendsFourReportsPerSecond) {
   HostedScene hosted;

@@ -88,7 +88,7 @@ TEST_F(SceneHostTest, ChangeActsAndIsAnnouncedAtTheNextTick) {
   EXPECT_EQ(changed.told[0].parameter_changed().change().gravity().value().y(), -2);
 }
 
-// A grab at the middle of the lower edge is told of when it takes hold, when it slips and when it lets go.
+// Events of a grab at the middle of the lower edge: taken, slipped, released.
 TEST_F(SceneHostTest, AnnouncesGrabEvents) {
   HostedScene hosted;
   const auto grabAt = [&](Vec3 place) {
@@ -244,8 +244,7 @@ TEST_F(SceneHostTest, ContinuesOnAnotherDeviceFromTheNewestSnapshot) {
   EXPECT_TRUE(hosted.keys.back());
   EXPECT_EQ(hosted.decoder->tick(), 211u);
 
-  // A scene of its own that was put into the state of tick 201, and sees the same collider, comes to the same
-  // bits.
+  // A separate scene that starts from the state of tick 201, with the same collider, gets the same bits.
   simulation::ClothSimulation simulation(another, hosted.live.start());
   ColliderSet colliders(hosted.live.start());
   simulation::TickInputs inputs{.environment = hosted.live.start().environment, .colliders = {}};

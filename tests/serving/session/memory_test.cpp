@@ -32,7 +32,7 @@ model::Scene largeScene() {
   cloth.pins.clear();
   scene.substeps = 2;
   scene.stream.temporalLayers = 3;
-  // What an encoder of another quality takes, all who get that share.
+  // One quality, because the encoders of further qualities would be counted as well.
   scene.stream.qualities = 1;
   return scene;
 }
@@ -58,7 +58,7 @@ void sendAllThereIs(TestPeer& peer, int round) {
   for (const v1::ClientMessage& message : {ping, poses, wind, question}) peer.send(message);
 }
 
-// Of clients that read nothing at all, or nothing any more after their first frame: what each then adds.
+// Clients that read nothing at all, or nothing after their first frame.
 class ClientThatDoesNotRead : public testing::TestWithParam<bool> {};
 INSTANTIATE_TEST_SUITE_P(Memory, ClientThatDoesNotRead, testing::Bool(),
                          [](const auto& reads) { return reads.param ? "AnyMore" : "AtAll"; });
