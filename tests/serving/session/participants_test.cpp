@@ -284,7 +284,7 @@ TEST_F(ParticipantsTest, ReconnectSendsAChangedDescription) {
   EXPECT_EQ(back.description().definition().environment().wind().x(), 3);
 }
 
-TEST_F(ParticipantsTest, UnknownTokenCreatesANewParticipant) {
+TEST_F(ParticipantsTest, UnknownTokenCreatesAParticipant) {
   START();
   TestPeer peer(server());
   v1::Hello hello;
