@@ -36,7 +36,7 @@ class Subscribers {
   void announce(const SharedBytes& message);
   // Closes every mailbox with this last message, and removes them all.
   void closeAll(const SharedBytes& last);
-  // What all subscribers together ask of the next frame. Call it whenever a frame is made.
+  // Frames that all subscribers together request. Call it whenever a frame is made.
   RequestedFrames requested(Clock::time_point now) const;
   // Qualities, as bits, in which a subscriber needs a key frame; see Mailbox::needsKeyFrame().
   std::uint8_t needsKeyFrame() const;

@@ -14,7 +14,7 @@
 
 namespace clothstream::scene {
 
-// What happened to the state before a tick: nothing, back to the newest checkpoint on the device, or back to
+// Recovery of the state before a tick: none, back to the newest checkpoint on the device, or back to
 // the scene's start.
 enum class Recovery : std::uint8_t { none, rollback, reset };
 

@@ -82,7 +82,7 @@ void PoseHistory::prune(Track& track, Clock::time_point time) {
 void PoseHistory::placeAt(Track& track, Clock::time_point time) {
   const std::vector<Entry>& entries = track.entries;
   const auto after = std::ranges::upper_bound(entries, time, {}, &Entry::trueAt);
-  // Which colliders and grabs exist follows the newest pose at or before `time`, or else the first pose.
+  // The newest pose at or before `time`, or else the first pose, says which colliders and grabs exist.
   const Entry& now = after == entries.begin() ? entries.front() : *(after - 1);
   placed_.colliders = now.colliders;
   placed_.grabs = now.grabs;

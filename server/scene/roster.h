@@ -128,14 +128,14 @@ class Roster {
   using Entries = std::vector<Entry>;
   enum class Presence : std::uint8_t { joined, roleChanged, disconnected, returned };
 
-  // Both return end() if there is none.
+  // Both return end() if nothing is found.
   Entries::iterator find(const delivery::Mailbox& mailbox);
   Entries::iterator find(const std::string& token);
   Role roleOf(const delivery::Mailbox& mailbox) const;
   // Participant that an owner's request names in `field`.
   messages::Result<Entries::iterator> target(const char* field, std::uint64_t id);
   Admission resume(Entry& entry, const std::shared_ptr<delivery::Mailbox>& mailbox, Clock::time_point now);
-  // Evicts the participant that has been away longest. Returns false if nobody is away.
+  // Evicts the participant that has been away longest. Returns false if all are connected.
   bool makeRoom(Clock::time_point now);
   // Returns the next entry. `by` is the participant that caused it, or 0.
   Entries::iterator erase(Entries::iterator entry, LeaveReason reason, std::uint64_t by,

@@ -109,7 +109,7 @@ class Session final : public hosting::Peer, public std::enable_shared_from_this<
   std::shared_ptr<scene::LiveScene> scene_;
   std::uint64_t participant_ = 0;
   Upload upload_;
-  // Of the current message.
+  // Request id and arrival of the current message.
   std::uint64_t requestId_ = 0;
   Clock::time_point now_{};
 

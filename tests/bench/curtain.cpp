@@ -13,10 +13,10 @@
 #include <fmt/format.h>
 
 #include "clients/core/core.h"
-#include "server/messages/scene_file.h"
-#include "server/session/session.h"
 #include "server/hosting/scene_server.h"
 #include "server/hosting/server_state.h"
+#include "server/messages/scene_file.h"
+#include "server/session/session.h"
 #include "tests/bench/simulated.h"
 #include "tests/bench/suite.h"
 
@@ -34,11 +34,11 @@ constexpr std::chrono::microseconds kPoseInterval{1'000'000 / 90};
 class Viewer {
  public:
   explicit Viewer(hosting::SceneServer& server)
-      : connection_(server, "bench", [this] {
+      : session_(session::Session::open(server, "bench", [this] {
           const std::lock_guard lock(mutex_);
           awake_ = true;
           woken_.notify_one();
-        }) {}
+        })) {}
 
   void watchUntil(Clock::time_point end) {
     for (Clock::time_point now = Clock::now(); now < end; now = Clock::now()) {
@@ -47,10 +47,10 @@ class Viewer {
         nextPose_ = std::max(nextPose_ + kPoseInterval, now);
       }
       cs_update(core_.get(), microseconds(now));
-      while (const auto message = connection_.next()) receive(**message);
+      while (const auto message = session_->next()) receive(**message);
       std::size_t size = 0;
       while (const std::uint8_t* message = cs_next_outgoing(core_.get(), &size))
-        connection_.receive(std::as_bytes(std::span(message, size)));
+        session_->receive(std::as_bytes(std::span(message, size)));
       std::unique_lock lock(mutex_);
       woken_.wait_until(lock, std::min(nextPose_, end), [this] { return awake_; });
       awake_ = false;
@@ -88,7 +88,7 @@ class Viewer {
   bool awake_ = false;
   Clock::time_point nextPose_{};
   std::unique_ptr<cs_client, void (*)(cs_client*)> core_{cs_create("", "bench"), &cs_destroy};
-  session::Session connection_;
+  std::shared_ptr<session::Session> session_;
 };
 
 void checkFrames(const cs_statistics& seen) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// How much memory this process holds.
+// Memory allocated by this process.
 #pragma once
 
 #include <cstddef>
@@ -7,13 +7,13 @@
 #include <malloc.h>
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-// gcc has no header for it.
+// gcc has no header that declares it.
 extern "C" std::size_t __sanitizer_get_current_allocated_bytes();
 #endif
 
 namespace clothstream::tests {
 
-// Promised of a client, beside what it uploads and what all share.
+// Promised limit for one client, in bytes, without its uploads and what all clients share.
 inline constexpr double kMostBytesAClient = 4 << 20;
 
 inline double allocatedBytes() {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A server with small scenes on whatever device there is, for tests of what peers see of it.
+// A server with small scenes on the available device, for tests from a peer's view.
 #pragma once
 
 #include <memory>
@@ -16,7 +16,7 @@
 
 namespace clothstream::tests {
 
-// Skips its tests, with the reason, where there is no device.
+// Skips its tests, with the reason, if there is no device.
 class ServerTest : public ::testing::Test {
  protected:
   // The scenes "small", which is the default, "other", and these. Once a test.

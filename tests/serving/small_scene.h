@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The scene of the stream's tests: small enough for any machine, and nothing in it is still.
+// Test scene: small enough for any machine, and everything in it moves.
 #pragma once
 
 #include <cstdint>
@@ -11,8 +11,7 @@
 
 namespace clothstream::tests {
 
-// 12 x 10 nodes hung by their first row, a ball beside them that moves by itself. 40 ticks and frames a
-// second.
+// 12 x 10 nodes that hang by their first row, and a moving ball next to them. 40 ticks and frames per second.
 inline model::Scene smallScene(std::string name = "small") {
   model::Cloth cloth;
   cloth.name = "sheet";
@@ -36,7 +35,7 @@ inline model::Scene smallScene(std::string name = "small") {
   scene.name = std::move(name);
   scene.simulationRate = scene.streamRate = 40;
   scene.substeps = 12;
-  scene.stream.qualities = 1;  // so that who reads slowly gets what others get
+  scene.stream.qualities = 1;  // so that slow readers get the same packets
   scene.cloths = {cloth};
   scene.colliders = {ball};
   return scene;

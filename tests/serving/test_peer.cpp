@@ -70,11 +70,12 @@ void TestPeer::join(const std::string& scene) {
 std::optional<v1::ServerMessage> TestPeer::read() {
   const auto deadline = std::chrono::steady_clock::now() + kPatience;
   for (;;) {
-    const bool finished = connection_->finished();  // asked first: what came before it is still to be read
+    const bool finished =
+        connection_->finished();  // before next(), because earlier messages must still be read
     if (const std::optional<delivery::SharedBytes> bytes = connection_->next()) {
       v1::ServerMessage message;
       if (!message.ParseFromArray((*bytes)->data(), static_cast<int>((*bytes)->size())))
-        throw std::runtime_error("what came is no ServerMessage");
+        throw std::runtime_error("the bytes are not a ServerMessage");
       see(message, *bytes);
       return message;
     }
@@ -153,7 +154,7 @@ void TestPeer::seeChunk(const v1::Chunk& chunk) {
 void TestPeer::seeFrame(const v1::Frame& frame, const delivery::SharedBytes& bytes) {
   ASSERT_TRUE(decoder_) << "a frame came before its description";
   const auto packet = std::as_bytes(std::span(frame.packet()));
-  // Whatever was dropped on the way, what comes can be decoded, and is what the server says it is.
+  // Every frame can be decoded, whichever frames were dropped, and has the hash that the server sent.
   ASSERT_EQ(decoder_->decode(packet), codec::DecodeResult::ok);
   ASSERT_EQ(decoder_->reconstructionHash(), frame.reconstruction_hash());
   EXPECT_LE(frame.tick_time_us(), frame.packet_time_us());

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A client inside the process, as a endpoint would hold it: serialised messages through a Connection, frames
-// decoded.
+// A client inside the process: serialised messages through a Session, decoded frames.
 #pragma once
 
 #include <chrono>
@@ -50,7 +49,7 @@ class TestPeer {
   // Reads on until this holds of the message last read; returns it.
   v1::ServerMessage readUntil(const std::function<bool(const v1::ServerMessage&)>& wanted);
   v1::ServerMessage readUntil(v1::ServerMessage::BodyCase body);
-  // Reads on until so many more frames are decoded.
+  // Reads until this number of further frames is decoded.
   void readFrames(std::size_t count);
   // Reads on until the connection is finished and has no more; returns the last message.
   v1::ServerMessage readToTheEnd();

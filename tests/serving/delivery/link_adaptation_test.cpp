@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What subscribers get over links that become too slow and recover, in simulated time.
+// Subscribers on links that become too slow and recover, in simulated time.
 #include "server/delivery/link_adaptation.h"
 
 #include <algorithm>
@@ -21,7 +21,7 @@ using namespace std::chrono_literals;
 
 constexpr StreamShape kLayered{.rate = 72, .layers = 3, .qualities = 3};
 
-// Bytes/s of what is sent at a point.
+// Rate of an operating point, in bytes/s.
 double rateAt(const SimulatedScene& scene, const OperatingPoint& point) {
   return scene.fullRate() * std::pow(SimulatedScene::kPartOfFiner, point.quality) /
          (1 << (kLayered.layers - point.layers));
@@ -44,12 +44,12 @@ TEST(LinkAdaptation, FastLinkGetsTheFullStreamAndNothingElseIsEncoded) {
   scene.pass(20s);
   EXPECT_EQ(link.given, (OperatingPoint{0, 3}));
   EXPECT_EQ(stepsOf(link), 0u);
-  // Those on their way are not there yet.
+  // Frames in flight have not arrived yet.
   EXPECT_GE(link.arrived.size() + 2, scene.frames());
   EXPECT_EQ(scene.encoded, (std::array<std::uint64_t, 4>{scene.frames(), 0, 0, 0}));
 }
 
-// Of what the whole stream takes, the part that the link carries from a time on.
+// Throughput of the link from a time on, as a part of the full stream's rate.
 class SlowLink : public testing::TestWithParam<double> {};
 INSTANTIATE_TEST_SUITE_P(Parts, SlowLink, testing::Values(0.9, 0.7, 0.5, 0.3, 0.2, 0.1),
                          [](const auto& part) { return std::to_string(std::lround(100 * part.param)); });
@@ -60,7 +60,7 @@ TEST_P(SlowLink, StepsDownWithinHalfASecondAndRecoversWithinThree) {
   scene.pass(2s);
   for (const Clock::duration slow : {2s, 5s, 30s, 61s}) {
     link.bytesPerSecond = GetParam() * scene.fullRate();
-    // Of a link that is hardly too slow it takes a while until anything waits.
+    // On a link that is only slightly too slow, a queue takes a while to build up.
     const Clock::duration limit = GetParam() > 0.7 ? 1s : 500ms;
     const Clock::duration down = timeUntil(
         scene, [&] { return rateAt(scene, link.given) <= link.bytesPerSecond; }, limit);
@@ -68,7 +68,7 @@ TEST_P(SlowLink, StepsDownWithinHalfASecondAndRecoversWithinThree) {
     scene.pass(slow - down);
 
     link.bytesPerSecond = 1e9;
-    // For good: an attempt that was under way may still fail of what waits.
+    // Permanently: a running attempt may still fail because of the queue.
     Clock::duration up{};
     for (Clock::duration time{}; time <= 3s; time += 10ms) {
       if (link.given != OperatingPoint{0, 3}) up = time + 10ms;
@@ -77,7 +77,7 @@ TEST_P(SlowLink, StepsDownWithinHalfASecondAndRecoversWithinThree) {
     EXPECT_LE(up, 3s);
     std::printf("to %.0f %% for %.0f s: down within %.0f ms, up again within %.0f ms\n", 100 * GetParam(),
                 seconds(slow), 1000 * seconds(down), 1000 * seconds(up));
-    scene.pass(1s);  // what waited has arrived
+    scene.pass(1s);  // the queue has arrived
     const std::size_t before = link.arrived.size();
     scene.pass(2s);
     EXPECT_EQ(link.arrived.size() - before, 144u);
@@ -91,7 +91,7 @@ TEST_P(SlowLink, DoesNotOscillate) {
   link.bytesPerSecond = GetParam() * scene.fullRate();
   scene.pass(5s);
   const std::size_t arrivedBefore = link.arrived.size();
-  // Attempts to go up that failed: from up to down, in however many steps.
+  // Failed attempts: a step up, followed by steps down.
   std::uint64_t attempts = 0;
   bool rises = false;
   OperatingPoint before = link.given;
@@ -121,7 +121,7 @@ TEST(LinkAdaptation, DeadLinkReturnsAtTheLowestPoint) {
   scene.pass(2s);
   link.bytesPerSecond = 0;
   scene.pass(10s);
-  // Nobody gets anything: nothing is encoded.
+  // No subscriber receives frames, so nothing is encoded.
   const auto before = scene.encoded;
   scene.pass(5s);
   EXPECT_EQ(scene.encoded, before);
@@ -209,7 +209,7 @@ TEST(LinkAdaptation, SendsAtMostTheRequestedPoint) {
   scene.pass(3s);
   EXPECT_EQ(link.given, (OperatingPoint{1, 2}));
 
-  // More than there is: the nearest that there is.
+  // Out of range: the nearest available point.
   SimulatedScene plain({.rate = 72, .layers = 1, .qualities = 2});
   SimulatedLink& coarse = plain.join({3, 3});
   plain.pass(1s);

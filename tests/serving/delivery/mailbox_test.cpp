@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What a subscriber is sent, in which order, and what it costs when it does not read.
+// Order of the messages to a subscriber, and the cost of one that does not read.
 #include "server/delivery/mailbox.h"
 
 #include <memory>
@@ -25,7 +25,7 @@ class MailboxTest : public ::testing::Test {
  protected:
   MailboxTest() : mailbox([this] { ++wakes; }) {}
 
-  // Description of one chunk, which is taken at once.
+  // Subscribes with a description of one chunk, and takes it.
   void join() {
     mailbox.subscribe(description(1), shape, metrics);
     ASSERT_TRUE(mailbox.next(now));
@@ -39,7 +39,7 @@ class MailboxTest : public ::testing::Test {
   PublishedFrame frame(std::uint64_t tick, bool key = false) {
     return {.message = bytes(100), .tick = tick, .key = key, .referenceTick = tick - 1, .complete = now};
   }
-  // Ticks of the frames that next() gives until it has no more.
+  // Ticks of the frames that next() returns until it has no more.
   std::vector<std::uint64_t> taken(const std::vector<PublishedFrame>& published) {
     std::vector<std::uint64_t> ticks;
     while (const auto message = mailbox.next(now))
@@ -65,7 +65,7 @@ TEST_F(MailboxTest, SendsRepliesThenDescriptionThenAnnouncementsThenFrames) {
   mailbox.subscribe(content, shape, metrics);
   ASSERT_TRUE(mailbox.announce(told));
   EXPECT_FALSE(wantsKeyFrame());
-  mailbox.deliver(frame(1, true));  // before the description is out, a frame would be of no use
+  mailbox.deliver(frame(1, true));  // a frame before the description is useless
   EXPECT_EQ(mailbox.next(now), welcome);
   EXPECT_EQ(**mailbox.next(now), *content->chunk(0));
   ASSERT_TRUE(mailbox.reply(pong));
@@ -100,7 +100,7 @@ TEST_F(MailboxTest, SendsTwoFramesWithoutAcknowledgement) {
   EXPECT_EQ(taken(frames), Ticks{});
   EXPECT_TRUE(mailbox.acknowledge(1, now));
   EXPECT_EQ(taken(frames), (Ticks{3}));
-  EXPECT_TRUE(mailbox.acknowledge(3, now));  // of the newest, for all before it
+  EXPECT_TRUE(mailbox.acknowledge(3, now));  // of the newest, which covers all before it
   EXPECT_EQ(taken(frames), (Ticks{4}));
 }
 
@@ -142,7 +142,7 @@ TEST_F(MailboxTest, WindowGrowsWithTheMinimumRoundTripTime) {
   EXPECT_EQ(inFlight().size(), Mailbox::kMinWindow + 4);
 }
 
-// Its acknowledgements come a frame later than those of who acknowledges each.
+// Its acknowledgements arrive one frame later than those of a peer that acknowledges each frame.
 TEST_F(MailboxTest, WindowGrowsByOneIfEverySecondFrameIsAcknowledged) {
   join();
   std::uint64_t tick = 0;
@@ -208,8 +208,7 @@ TEST_F(MailboxTest, HoldsALimitedNumberOfFrames) {
   for (std::uint64_t tick = 3; tick <= 5; ++tick) mailbox.deliver(frames.emplace_back(frame(tick)));
   for (const PublishedFrame& each : frames)
     EXPECT_EQ(each.message.use_count(), each.tick < 3 ? 1 : 2) << each.tick;
-  // One too many: all that is held goes, and nobody is asked for a key frame as long as there is no room for
-  // it.
+  // One frame too many: all held frames are dropped. No key frame is requested while there is no room for it.
   mailbox.deliver(frames.emplace_back(frame(6)));
   for (const PublishedFrame& each : frames) EXPECT_EQ(each.message.use_count(), 1) << each.tick;
   EXPECT_EQ(metrics.framesDropped.value(), 4u);

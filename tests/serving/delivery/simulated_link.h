@@ -21,9 +21,9 @@ namespace clothstream::delivery {
 
 using schedule::seconds;
 
-// One subscriber behind a link that carries so many bytes/s, each message `latency` late, but none before one
-// that went before it. Its endpoint writes without ever waiting, as into a large buffer. It acknowledges as
-// clients do, and fails the test when it gets a frame that it cannot decode.
+// One subscriber behind a link of limited rate and latency that keeps the order of messages. Its endpoint
+// writes without waiting, as into a large buffer. It acknowledges as clients do, and fails the test if it
+// gets a frame that it cannot decode.
 class SimulatedLink {
  public:
   SimulatedLink(const StreamShape& shape, OperatingPoint wanted, Clock::time_point now)
@@ -65,7 +65,7 @@ class SimulatedLink {
   telemetry::SceneMetrics metrics;
   const std::shared_ptr<Mailbox> mailbox = std::make_shared<Mailbox>([] {});
   std::vector<Arrived> arrived;
-  OperatingPoint given;  // that the mailbox told last; it need not have arrived
+  OperatingPoint given;  // newest one that the mailbox sent; it may not have arrived
 
  private:
   static constexpr double kBurst = 2000;  // bytes that an idle link takes at once
@@ -78,7 +78,7 @@ class SimulatedLink {
     std::uint64_t tick;
   };
 
-  // Nothing where it is a frame.
+  // Returns nothing for a frame.
   std::optional<OperatingPoint> pointIn(const SharedBytes& message) const {
     if (published_.contains(message.get())) return std::nullopt;
     v1::ServerMessage parsed;
@@ -94,7 +94,7 @@ class SimulatedLink {
       return;
     }
     const PublishedFrame& frame = published_.at(message.get());
-    // What is not newer is stale to a decoder.
+    // Decoders reject frames that are not newer.
     if (!arrived.empty()) {
       ASSERT_GT(frame.tick, arrived.back().tick);
     }
@@ -125,7 +125,7 @@ class SimulatedLink {
   std::uint8_t quality_ = 0;
 };
 
-// Encodes what somebody wants, as SceneHost does it.
+// Encodes the requested frames, as SceneHost does.
 class SimulatedScene {
  public:
   static constexpr std::size_t kFrameBytes = 1000;  // of quality 0
@@ -136,7 +136,7 @@ class SimulatedScene {
   SimulatedLink& join(OperatingPoint wanted = {0, codec::kMaxTemporalLayers}) {
     return *links_.emplace_back(std::make_unique<SimulatedLink>(shape_, wanted, now));
   }
-  // Of all frames of the finest quality.
+  // Bytes of all frames in the finest quality.
   double fullRate() const { return static_cast<double>(kFrameBytes) * shape_.rate; }
 
   void pass(Clock::duration time) {
@@ -150,7 +150,7 @@ class SimulatedScene {
     }
   }
   std::uint64_t frames() const { return tick_; }
-  // That were encoded of each quality.
+  // Number of encoded frames for each quality.
   std::array<std::uint64_t, codec::kMaxQualities> encoded{};
 
   Clock::time_point now = Clock::time_point(std::chrono::hours(1));

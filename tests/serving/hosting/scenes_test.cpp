@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Scenes that peers create, delete, pause and put back to their start.
+// Scenes that peers create, delete, pause and reset.
 #include <algorithm>
 #include <atomic>
 #include <chrono>
@@ -38,7 +38,7 @@ using Body = v1::ServerMessage;
 
 using ScenesTest = tests::ServerTest;
 
-// A cloth of any triangles, as a client would describe it.
+// A cloth with a triangle mesh, as a client describes it.
 v1::Scene discScene(std::uint32_t rings) {
   model::Scene scene = tests::smallScene("disc");
   scene.cloths[0].mesh = std::make_shared<const model::Mesh>(model::makeMesh(model::disc(rings, 0.5f)));
@@ -120,10 +120,10 @@ TEST_F(ScenesTest, CreatesAndJoinsASceneUploadedInChunks) {
   peer.readFrames(3);
   EXPECT_EQ(peer.description().cloths(0).vertex_count(), 4921u);
   EXPECT_EQ(peer.decoder().positions().size(), 3 * 4921u);
-  // It is the scene that was sent: its own message says the same.
+  // The scene equals the uploaded one, because its message is the same.
   EXPECT_EQ(peer.description().cloths(0).triangles().size(), 3 * sizeof(std::uint32_t) * 6 * 40 * 40);
 
-  // The content went with the call.
+  // The content was consumed by the call.
   EXPECT_EQ(createUploaded(maker, "again").error().code(), v1::ERROR_CODE_NOT_FOUND);
 }
 
@@ -219,7 +219,7 @@ TEST_F(ScenesTest, InvalidChunksAreRefusedAndDropTheUpload) {
   EXPECT_THAT(refusal(wrong), StartsWith("upload.totalBytes = "));
   EXPECT_EQ(createUploaded(maker).error().code(), v1::ERROR_CODE_NOT_FOUND);
 
-  // What one peer holds, another cannot; what it gives back, it can.
+  // Memory that one peer has reserved is not available to another until it is released.
   maker.send(piece(content, 0, 2, 300));
   maker.send(piece(content, 1, 2, 300));
   TestPeer other(server());
@@ -247,7 +247,7 @@ TEST_F(ScenesTest, UploadOccupiesTheBudgetUntilAnswered) {
   create.set_request_id(77);
   create.mutable_create_scene()->set_uploaded_content_id(9);
   maker.send(create);
-  // It is being made now, and is not done before this is refused.
+  // The scene is being created, and is not ready before this request is refused.
   upload(maker, content);
   EXPECT_EQ(maker.readUntil(Body::kError).error().code(), v1::ERROR_CODE_RESOURCE_EXHAUSTED);
   refused.count_down();
@@ -303,7 +303,7 @@ TEST_F(ScenesTest, SceneHasItsOwnParticipantLimit) {
   EXPECT_THAT(third.readToTheEnd().error().text(), HasSubstr("'duet' has 2 participants"));
 }
 
-// One whose files make trouble that nobody has thought of.
+// A journal whose functions throw.
 class TroubledJournal : public Journal {
  public:
   messages::Result<std::string> start(const std::string&) override { throw std::runtime_error("no start"); }
@@ -350,12 +350,12 @@ TEST_F(ScenesTest, PausedSceneStandsStillAndContinues) {
   other.readFrames(10);
   EXPECT_EQ(metrics().ticks.value(), ticks);
   EXPECT_FALSE(server().listScenes().scenes(0).running());
-  // Told to who comes now, too.
+  // Also announced to a peer that joins now.
   TestPeer late(server());
   late.hello();
   late.readUntil(
       [](const v1::ServerMessage& m) { return m.notice().kind() == v1::NOTICE_KIND_SCENE_PAUSED; });
-  // And what the cloth is like.
+  // The shape of the cloth is kept as well.
   late.readFrames(1);
   EXPECT_EQ(late.frames().back().tick, ticks);
   EXPECT_EQ(metrics().ticks.value(), ticks);
@@ -432,8 +432,7 @@ TEST_F(ScenesTest, ResetOfAPausedSceneIsShown) {
   EXPECT_FALSE(server().state().find("sparse")->running);
 }
 
-// What it takes to be made ready is many times what a tick of the others takes: tables of 590,000
-// constraints.
+// A scene that takes many times longer to load than a tick of the others: tables of 590,000 constraints.
 model::Scene heavyScene() {
   model::Scene heavy = tests::smallScene("heavy");
   model::Cloth& cloth = heavy.cloths[0];
@@ -444,7 +443,7 @@ model::Scene heavyScene() {
   return heavy;
 }
 
-// Quick, so that it has many ticks even in what a fast machine takes.
+// A fast scene, so that it runs many ticks during the loading, also on a fast machine.
 model::Scene lightScene() {
   model::Scene light = tests::smallScene("light");
   light.simulationRate = light.streamRate = 200;
@@ -452,7 +451,7 @@ model::Scene lightScene() {
   return light;
 }
 
-// The light one runs, and somebody asks for the heavy one.
+// The light scene runs while a peer asks for the heavy one.
 class HeavySceneTest : public tests::ServerTest {
  protected:
   void SetUp() override {
@@ -479,7 +478,7 @@ TEST_F(HeavySceneTest, OtherScenesContinueWhileItLoads) {
   }
   fmt::print("made ready in {:.0f} ms; another scene's {} frames meanwhile at most {:.0f} ms apart\n",
              1e3 * seconds(last - asked), frames, 1e3 * seconds(longest));
-  // Two can be on their way, and one tick in flight, when it begins.
+  // Two frames and one tick may be in flight at the beginning.
   EXPECT_GE(frames, 8);
   heavy->readFrames(1);
 }

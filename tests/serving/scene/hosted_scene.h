@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A scene host without a server or threads beyond the packer's: its ticks one at a time, its frames decoded.
+// A scene host without a server; the only other thread is the publisher's. Runs single ticks and decodes
+// frames.
 #pragma once
 
 #include <chrono>
@@ -39,7 +40,7 @@ class HostedScene {
   }
   ~HostedScene() { packer.drain(); }
 
-  // One tick, its frame packed and read by all.
+  // Runs one tick; all subscribers read its frame.
   void tick() {
     now += std::chrono::seconds(1);  // so that no key frame has to wait
     host.begin(now);
@@ -65,7 +66,7 @@ class HostedScene {
     ASSERT_TRUE(live.inbox.postChange({.participant = 5, .change = std::move(change)}));
   }
 
-  // Of all frames.
+  // State hashes of all frames.
   std::vector<std::uint64_t> stateHashes() const {
     std::vector<std::uint64_t> hashes;
     for (const v1::Frame& frame : frames) hashes.push_back(frame.state_hash());

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// From a participant's message to the colliders of a tick.
+// Path from a participant's message to the colliders of a tick.
 #include <cmath>
 
 #include <gmock/gmock.h>
@@ -31,7 +31,7 @@ model::Scene sceneWithBall() {
   return scene;
 }
 
-// A rod that moves by itself and one that goes with the ball.
+// A rod with its own motion, and one attached to the ball.
 model::Scene sceneWithAttachments() {
   model::Scene scene = sceneWithBall();
   model::Cloth& cloth = scene.cloths.emplace_back();
@@ -152,8 +152,7 @@ TEST_F(ColliderSetTest, WritesAllCollidersWithTheirParticipant) {
   EXPECT_EQ(states[1].position().x(), 0.5f);
 }
 
-// Attachments stay where they are put: a message that says nothing of one does not take back what an earlier
-// one said.
+// Attachments stay at their pose: a message without an attachment does not undo an earlier one.
 TEST(Inbox, KeepsAttachmentPoses) {
   Inbox inbox;
   const auto put = [](std::size_t attachment, float x) {
@@ -210,7 +209,7 @@ TEST(GrabsAndAttachments, GrabStartsHoldsAndReleases) {
   EXPECT_EQ(tick.grabs[0].end.position.x(), 0.1f);
   holds.advance(scene, 0.03, tick);  // no news: at rest
   EXPECT_EQ(tick.grabs[0].start.position.x(), 0.1f);
-  // The device forgot; what was held before is held again.
+  // The device lost its state, so that the grab starts again.
   holds.restartGrabs();
   holds.advance(scene, 0.04, tick);
   EXPECT_EQ(tick.grabs[0].state, State::takes);

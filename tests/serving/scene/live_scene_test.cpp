@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A scene's definition, and what becomes of it where its simulation goes back.
+// Definition of a scene after its simulation was reset or reverted.
 #include "server/scene/live_scene.h"
 
 #include <utility>

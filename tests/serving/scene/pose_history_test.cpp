@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Where a hand is at a tick's time.
+// Pose of a hand at the time of a tick.
 #include "server/scene/pose_history.h"
 
 #include <cmath>
@@ -24,7 +24,7 @@ constexpr std::uint64_t kAda = 7;
 
 class PoseHistoryTest : public ::testing::Test {
  protected:
-  // Says that hand 1 is at x, and a grab with it, `ms` after the test began.
+  // Posts hand 1 and a grab at x, `ms` after the start of the test.
   void say(double ms, float place, std::uint64_t participant = kAda) {
     say(ms, handAt(1, place), participant);
   }
@@ -35,10 +35,10 @@ class PoseHistoryTest : public ::testing::Test {
     inbox.postPoses(participant, std::move(poses), at(ms),
                     {.trueAt = at(ms), .clientTimeUs = static_cast<std::uint64_t>(1e6 + ms * 1000)});
   }
-  // As somebody who knows no time says it.
+  // Posts a pose without a time.
   void sayNow(float place) { inbox.postPoses(kAda, {.colliders = {handAt(1, place)}}, begin); }
 
-  // What a tick at that time places.
+  // Places the poses of a tick at that time.
   void tick(double ms) {
     placed.clear();
     inbox.drain(inputs);
@@ -47,7 +47,7 @@ class PoseHistoryTest : public ::testing::Test {
       placed[participant] = poses;
     });
   }
-  // Where that has the hand; the grab goes with it.
+  // Returns the x of the hand at that time; the grab must have the same x.
   float xAt(double ms) {
     tick(ms);
     if (placed.contains(kAda) && !placed[kAda].colliders.empty()) {
@@ -139,7 +139,7 @@ TEST_F(PoseHistoryTest, DoesNotExtrapolateDistantOrFastPoses) {
   EXPECT_EQ(xAt(111), 0.1f);
   say(110, 0.1f + 30 * 0.009f + 0.001f);  // above 30 m/s: a jump
   EXPECT_FLOAT_EQ(xAt(115), 0.371f);
-  // Of a jump ahead nothing is seen before its time.
+  // A jump is not visible before its time.
   say(125, 5);
   EXPECT_FLOAT_EQ(xAt(124), 0.371f);
   EXPECT_EQ(xAt(125), 5);
@@ -151,11 +151,11 @@ TEST_F(PoseHistoryTest, NewestPoseActsAtOnce) {
   EXPECT_NEAR(xAt(10), 0.1f, 1e-6f);
   say(20, 0.9f);  // late
   EXPECT_NEAR(xAt(20), 0.2f, 1e-6f);
-  // Said later, of an earlier time: the client's notion of the server's clock was set right.
+  // Sent later with an earlier time: the client corrected its estimate of the server's clock.
   inbox.postPoses(kAda, {.colliders = {handAt(1, 0.5f)}}, at(21),
                   {.trueAt = at(21), .clientTimeUs = 1'040'000});
   EXPECT_EQ(xAt(21), 0.5f);
-  // The first word of all, though it is of the time to come.
+  // The first pose acts at once, although its time is in the future.
   say(90, 8, 2);
   tick(50);
   EXPECT_EQ(placed[2].colliders.front().pose.position.x(), 8);
@@ -170,7 +170,7 @@ TEST_F(PoseHistoryTest, IgnoresLatePosesAndReplacesRepeatedOnes) {
   EXPECT_NEAR(xAt(28), 0.28f, 1e-6f);
   EXPECT_NEAR(xAt(30), 0.3f, 1e-6f);
   EXPECT_NEAR(xAt(35), 0.35f, 0.004f);  // at 10 m/s
-  // A client whose clock stepped back by far is no late message.
+  // A pose of a client whose clock was set back far is not late.
   inbox.postPoses(kAda, {.colliders = {handAt(1, 2)}}, at(60), {.trueAt = at(60), .clientTimeUs = 5});
   EXPECT_EQ(xAt(60), 2);
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Who takes part in a scene: roles, presence, and places that are kept, with a clock of the test's own.
+// Participants of a scene: roles, presence and reconnection, with a simulated clock.
 #include "server/scene/roster.h"
 
 #include <atomic>
@@ -25,7 +25,7 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::SizeIs;
 
-// ---- What each role may do
+// ---- Permissions
 
 struct ActionCase {
   Action action;
@@ -108,7 +108,7 @@ struct Member {
       messages.emplace_back().ParseFromArray((*bytes)->data(), static_cast<int>((*bytes)->size()));
     return messages;
   }
-  // Such as "joined 2", "left 2 timed out", "role 3 owner by 1".
+  // Presence messages as text: "joined 2", "left 2 timed out", "role 3 owner by 1".
   std::vector<std::string> heard() {
     std::vector<std::string> lines;
     for (const v1::ServerMessage& message : read()) {
@@ -171,7 +171,7 @@ class RosterTest : public ::testing::Test {
     model::ParticipantPoses poses{.colliders = {tests::handAt(1, x)}, .grabs = {{.id = 4}}};
     return roster.post(*member.mailbox, message, poses, {}, now);
   }
-  // What the next tick gets, such as "1: 1 colliders, 1 grabs".
+  // Inputs of the next tick as text: "1: 1 colliders, 1 grabs".
   std::vector<std::string> inputs() {
     Inputs drained;
     inbox.drain(drained);
@@ -227,7 +227,7 @@ TEST_F(RosterTest, DismissDropsWaitingPoses) {
   poses.attachments.push_back({});
   EXPECT_TRUE(roster.post(*member.mailbox, {}, poses, {}, now));
   roster.dismiss(nullptr);
-  EXPECT_TRUE(roster.post(*member.mailbox, {}, poses, {}, now));  // was on its way
+  EXPECT_TRUE(roster.post(*member.mailbox, {}, poses, {}, now));  // sent before the dismissal
   Inputs drained;
   inbox.drain(drained);
   EXPECT_TRUE(drained.poses.empty());
@@ -261,7 +261,7 @@ TEST_F(RosterTest, LongestPresentParticipantSucceedsTheLastOwner) {
   viewer.heard();
   leave(owner);
   EXPECT_THAT(viewer.heard(), ElementsAre("left 1", "role 4 owner"));
-  leave(present);  // the one who is away is better than nobody
+  leave(present);  // the only candidate is away
   EXPECT_THAT(viewer.heard(), ElementsAre("left 4", "role 3 owner"));
   pass(60s);
   EXPECT_THAT(viewer.heard(), ElementsAre("left 3 timed out"));
@@ -311,16 +311,16 @@ TEST_F(RosterTest, LaterReconnectRestoresCollidersAndGrabs) {
   lose(lost);
   pass(59999ms);
   EXPECT_THAT(inputs(), ElementsAre("1: 0 colliders, 0 grabs"));
-  const Member back = join(Role::viewer, lost.admission.token);  // as it was, whatever it asks for
+  const Member back = join(Role::viewer, lost.admission.token);  // the role is kept, whatever is requested
   EXPECT_TRUE(back.admission.resumed);
   EXPECT_EQ(back.admission.role, Role::owner);
   EXPECT_THAT(inputs(), ElementsAre("1: 1 colliders, 1 grabs"));
 }
 
-TEST_F(RosterTest, ReconnectAfterTheGracePeriodIsANewJoin) {
+TEST_F(RosterTest, ReconnectAfterTheGracePeriodJoinsAgain) {
   const Member lost = join();
   lose(lost);
-  now += 60s;  // nobody has noticed yet
+  now += 60s;  // expire() was not called yet
   const Member late = comeBack(lost);
   EXPECT_FALSE(late.admission.resumed);
   EXPECT_EQ(late.admission.id, 2u);
@@ -360,7 +360,7 @@ TEST_F(RosterTest, SecondConnectionTakesOverAndClosesTheFirst) {
   ASSERT_EQ(last.size(), 1u);
   EXPECT_EQ(last[0].error().code(), v1::ERROR_CODE_TAKEN_OVER);
   EXPECT_TRUE(last[0].error().fatal());
-  // What the old connection still does changes nothing.
+  // Calls of the old connection have no effect.
   EXPECT_TRUE(pose(old, 3).has_value());
   EXPECT_FALSE(roster.permits(*old.mailbox, Action::collide, {}).has_value());
   lose(old);

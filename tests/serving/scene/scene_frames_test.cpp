@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Frames of a scene host: who gets which, key frames, what stands in them.
+// Frames of a scene host: receivers, key frames, content.
 #include <algorithm>
 #include <cmath>
 #include <memory>
@@ -37,7 +37,7 @@ TEST_F(SceneFramesTest, StreamsOneFramePerTickStartingWithAKeyFrame) {
 // When a subscriber takes what there is for it.
 enum class Endpoint : std::uint8_t { asked, quick };  // when it is asked to; as soon as there is something
 
-// Another subscriber of a hosted scene, which wants a quality of its own.
+// A further subscriber of a hosted scene, with its own quality.
 class QualitySubscriber {
  public:
   QualitySubscriber(HostedScene& hosted, std::uint8_t quality, Endpoint endpoint = Endpoint::asked)
@@ -52,7 +52,7 @@ class QualitySubscriber {
   }
   ~QualitySubscriber() { hosted_.live.subscribers.remove(*mailbox_); }
 
-  // Takes and acknowledges all that there is.
+  // Takes and acknowledges all waiting messages.
   void read() {
     std::size_t before = 0;
     do {
@@ -73,7 +73,7 @@ class QualitySubscriber {
   std::vector<std::uint64_t> stateHashes;
 
  private:
-  // Decodes what comes, and compares it with what the server holds.
+  // Decodes each frame, and compares it with the server's reconstruction.
   void take() {
     while (const auto message = mailbox_->next(hosted_.now)) {
       v1::ServerMessage parsed;
@@ -160,7 +160,7 @@ TEST_F(SceneFramesTest, FastReaderGetsEachTickInOneQualityAcrossAChange) {
   EXPECT_EQ(quick.qualities, (std::vector<std::uint8_t>{0, 0, 0, 1}));
 }
 
-TEST_F(SceneFramesTest, LateJoinerOfAPausedSceneGetsTheNewestTickAndNothingElseChanges) {
+TEST_F(SceneFramesTest, LateJoinerOfAPausedSceneGetsTheNewestTick) {
   model::Scene scene = smallScene();
   scene.stream.qualities = 2;
   HostedScene through(scene), hosted(scene);
@@ -171,7 +171,7 @@ TEST_F(SceneFramesTest, LateJoinerOfAPausedSceneGetsTheNewestTickAndNothingElseC
     hosted.host.encodePausedFrame(hosted.now);
     hosted.packer.drain();
   };
-  hosted.mailboxes[0]->requestKeyFrame();  // and does without it: nobody lacks anything
+  hosted.mailboxes[0]->requestKeyFrame();  // and continues without it: no key frame is needed
   show();
   EXPECT_EQ(hosted.live.metrics.frames.value(), 20u);
   {
@@ -276,7 +276,7 @@ TEST_F(SceneFramesTest, OneKeyFrameServesAllRequestsAndRespectsTheInterval) {
   EXPECT_EQ(hosted.live.metrics.keyFrames.value(), 3u);
 }
 
-// What it says is what can be seen of the frame: two ends of a spring of 0.1 m, each off by the codec's error
+// The report agrees with the decoded frame: two ends of a spring of 0.1 m, each off by the codec's error
 // along three axes.
 TEST_F(SceneFramesTest, SendsFourReportsPerSecond) {
   HostedScene hosted;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A scene's ticks, one at a time: inputs, determinism, and the ways back when something went wrong.
+// Ticks of a scene, one at a time: inputs, determinism, and recovery.
 #include "server/scene/scene_host.h"
 
 #include <algorithm>
@@ -42,7 +42,7 @@ TEST_F(SceneHostTest, SameInputsGiveTheSameStatesForAnySubscribers) {
           {.colliders = {handAt(1, 0.1f, -0.6f, z)},
            .grabs = {{.id = 1, .pose = {model::Vec3(0, -0.4f, z), model::Quaternion::Identity()}}}},
           hosted.now);
-      // Who asks for key frames changes what is sent, not what is simulated.
+      // Key-frame requests change what is sent, not what is simulated.
       if (tick % 7 == 0) hosted.mailboxes.back()->restart();
       hosted.tick();
     }
@@ -88,7 +88,7 @@ TEST_F(SceneHostTest, ChangeActsAndIsAnnouncedAtTheNextTick) {
   EXPECT_EQ(changed.told[0].parameter_changed().change().gravity().value().y(), -2);
 }
 
-// A grab at the middle of the lower edge is told of when it takes hold, when it slips and when it lets go.
+// Events of a grab at the middle of the lower edge: taken, slipped, released.
 TEST_F(SceneHostTest, AnnouncesGrabEvents) {
   HostedScene hosted;
   const auto grabAt = [&](Vec3 place) {
@@ -168,7 +168,7 @@ TEST_F(SceneHostTest, AnnouncesContactsIfRequested) {
   }
   EXPECT_GT(events[1].seconds(), 0);
   EXPECT_LE(events[1].seconds(), 10.0f / 40 + 1e-6f);
-  // Whoever leaves wants nothing any more.
+  // A participant that leaves no longer requests events.
   hosted.live.inbox.postPoses(7, {}, hosted.now);
   hosted.tick();
   hosted.live.inbox.postPoses(8, {.colliders = {handAt(1, 0, -0.6f, 0.05f)}}, hosted.now);
@@ -244,8 +244,7 @@ TEST_F(SceneHostTest, ContinuesOnAnotherDeviceFromTheNewestSnapshot) {
   EXPECT_TRUE(hosted.keys.back());
   EXPECT_EQ(hosted.decoder->tick(), 211u);
 
-  // A scene of its own that was put into the state of tick 201, and sees the same collider, comes to the same
-  // bits.
+  // A separate scene that starts from the state of tick 201, with the same collider, gets the same bits.
   simulation::ClothSimulation simulation(another, hosted.live.start());
   ColliderSet colliders(hosted.live.start());
   simulation::TickInputs inputs{.environment = hosted.live.start().environment, .colliders = {}};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// When ticks are due, when a scene is called slow, how often things may happen.
+// Due times of ticks, detection of slow scenes, rate limits.
 #include <gtest/gtest.h>
 
 #include "server/schedule/pacer.h"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Scenes of known cost on a device that nothing interrupts, on a clock of the test's own.
+// Scenes of known cost on a device without preemption, with a simulated clock.
 #include "server/schedule/tick_scheduler.h"
 
 #include <algorithm>
@@ -31,7 +31,7 @@ class TickSchedulerTest : public ::testing::Test {
     return *scenes_.emplace_back(std::make_unique<SimulatedScene>(rate, cost));
   }
 
-  // As the device's thread does it.
+  // Runs the scenes like the device's thread.
   void run(Clock::duration time) {
     std::vector<TickSchedule*> turns, chosen;
     for (const auto& scene : scenes_) turns.push_back(&scene->turn);

@@ -168,8 +168,7 @@ TEST_F(JoinTest, PeerThatNeverReadsDoesNotDelayOthers) {
   reader.readFrames(80);  // 2 s
   for (std::size_t i = 1; i < 80; ++i) EXPECT_FALSE(reader.frames()[reader.frames().size() - i].key);
   EXPECT_EQ(metrics().keyFrames.value(), keys);
-  // Of 80 frames only those that the reader holds itself are alive, and the few that are held back for the
-  // other.
+  // Only the frames that the reader keeps, and the few that are held for the other peer, are alive.
   std::size_t held = 0;
   for (const SeenFrame& frame : reader.frames()) held += frame.message.use_count() > 1;
   EXPECT_LE(held, Mailbox::kMaxHeld + 1);
@@ -321,7 +320,7 @@ TEST_F(JoinTest, UnhealthyStateIsAnnouncedAndTheStreamContinues) {
   START();
   TestPeer peer(server());
   peer.join();
-  // What no message can say: it goes bad, goes back, goes bad again, and starts anew.
+  // A value that no message can have: the state becomes unhealthy, rolls back, and is reset.
   ASSERT_TRUE(server().state().scenes.front()->inbox.postChange({.change = tests::gravity(-1e30f)}));
   EXPECT_EQ(peer.readUntil(Body::kNotice).notice().kind(), v1::NOTICE_KIND_ROLLED_BACK);
   peer.readUntil(Body::kNotice);
@@ -379,7 +378,7 @@ TEST_F(JoinTest, FullSceneAndFullServerRefuseWithTheReason) {
   fifth.join();
 }
 
-// Of a scene whose stream has layers and qualities.
+// A scene whose stream has layers and qualities.
 class QualityTest : public ::testing::Test {
  protected:
   void SetUp() override {
@@ -482,7 +481,7 @@ TEST_F(JoinTest, ReportShowsTheStagesOfATick) {
   for (const char* part :
        {"scene small", "tick", "device", "advance", "entropy coding", "send", "connections 1"})
     EXPECT_THAT(report, HasSubstr(part));
-  EXPECT_THAT(report, testing::Not(HasSubstr("scene other")));  // nobody was in it
+  EXPECT_THAT(report, testing::Not(HasSubstr("scene other")));  // it never had subscribers
 }
 
 TEST(SceneServer, MissingDefaultSceneErrorListsTheScenes) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What a client that never reads can cost the server.
+// Memory cost of clients that never read.
 #include <cstdio>
 #include <memory>
 #include <thread>
@@ -22,7 +22,7 @@ using tests::allocatedBytes;
 using tests::kMostBytesAClient;
 using tests::TestPeer;
 
-// 10,000 nodes that fall, so soft that a tick takes little.
+// 10,000 falling nodes, soft so that a tick is cheap.
 model::Scene largeScene() {
   model::Scene scene = tests::smallScene("large");
   model::Cloth& cloth = scene.cloths.front();
@@ -32,12 +32,12 @@ model::Scene largeScene() {
   cloth.pins.clear();
   scene.substeps = 2;
   scene.stream.temporalLayers = 3;
-  // What an encoder of another quality takes, all who get that share.
+  // One quality, because the encoders of further qualities would be counted as well.
   scene.stream.qualities = 1;
   return scene;
 }
 
-// All that a client may have the server keep for it.
+// Sends everything that the server keeps for a client.
 void sendAllThereIs(TestPeer& peer, int round) {
   v1::ClientMessage ping;
   ping.mutable_ping()->set_client_time_us(1);
@@ -58,7 +58,7 @@ void sendAllThereIs(TestPeer& peer, int round) {
   for (const v1::ClientMessage& message : {ping, poses, wind, question}) peer.send(message);
 }
 
-// Of clients that read nothing at all, or nothing any more after their first frame: what each then adds.
+// Clients that read nothing at all, or nothing after their first frame.
 class ClientThatDoesNotRead : public testing::TestWithParam<bool> {};
 INSTANTIATE_TEST_SUITE_P(Memory, ClientThatDoesNotRead, testing::Bool(),
                          [](const auto& reads) { return reads.param ? "AnyMore" : "AtAll"; });

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Whatever a peer sends, it gets a clear error, and the others never notice.
+// Invalid messages get a clear error and do not affect other peers.
 #include <limits>
 
 #include <gmock/gmock.h>

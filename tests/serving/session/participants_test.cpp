@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Roles, presence and coming back, as peers see them.
+// Roles, presence and reconnection, as peers see them.
 #include <algorithm>
 #include <chrono>
 #include <set>
@@ -36,7 +36,7 @@ class ParticipantsTest : public tests::ServerTest {
     peer.hello(hello);
     peer.readFrames(1);
   }
-  // What it says when it comes back as `lost`, holding the description that this one had.
+  // Hello of a client that reconnects as `lost` with that client's description.
   static v1::Hello returning(const TestPeer& lost) {
     v1::Hello hello;
     hello.set_resume_token(lost.welcome().resume_token());
@@ -201,7 +201,7 @@ TEST_F(ParticipantsTest, OnlyOwnersControlASceneWithoutOutsideControl) {
   START(options);
   v1::ControlSceneRequest reset;
   reset.set_reset(true);
-  EXPECT_TRUE(server().controlScene(reset).has_value());  // nobody owns it
+  EXPECT_TRUE(server().controlScene(reset).has_value());  // it has no owner
   TestPeer owner(server()), stranger(server());
   join(owner, "Ada");
   const auto refused = server().controlScene(reset);
@@ -284,7 +284,7 @@ TEST_F(ParticipantsTest, ReconnectSendsAChangedDescription) {
   EXPECT_EQ(back.description().definition().environment().wind().x(), 3);
 }
 
-TEST_F(ParticipantsTest, UnknownTokenJoinsAsANewParticipant) {
+TEST_F(ParticipantsTest, UnknownTokenCreatesAParticipant) {
   START();
   TestPeer peer(server());
   v1::Hello hello;
