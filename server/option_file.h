@@ -20,11 +20,11 @@ struct FileEntry {
   int line = 0;                     // line of the key, from 1
 };
 
-// Parses comments, bare and quoted keys, strings on one line, numbers, booleans, and arrays of these. Tables,
-// dates and multi-line strings are errors. Throws OptionError "NAME:LINE: ...".
+// Parses TOML. Values are strings, numbers, booleans, and arrays of these; tables and dates are errors. Throws
+// OptionError "NAME:LINE: ...".
 std::vector<FileEntry> parseOptionFile(std::string_view text, const std::string& name);
 
-// TOML string in double quotes.
+// TOML string in quotes.
 std::string tomlString(std::string_view text);
 
 }  // namespace clothstream
