@@ -161,7 +161,8 @@ void SceneHost::changeGently(model::Scene& changed) {
     model::Solver& solver = changed.cloths[i].solver;
     if (solver.kind != scene_.cloths[i].solver.kind)
       gentleUntil_[i] = tick_ + static_cast<std::uint64_t>(std::ceil(kGentleSeconds * rate_));
-    if (gentleUntil_[i] > tick_) solver.correctionFraction = std::min(part, model::correctionFraction(solver));
+    if (gentleUntil_[i] > tick_)
+      solver.correctionFraction = std::min(part, model::correctionFraction(solver));
   }
 }
 
