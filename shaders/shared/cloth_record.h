@@ -71,8 +71,8 @@ static_assert(sizeof(ClothRecord) == CLOTHSTREAM_CLOTH_TEXELS * sizeof(vec4) &&
 
 // `kind`: 0 structural, 1 shear, 2 bend.
 XpbdSpringRecord xpbdSpringAt(samplerBuffer table, uint cloth, uint kind) {
-  vec4 texel = texelFetch(
-      table, CLOTHSTREAM_CLOTH_TEXELS * int(cloth) + CLOTHSTREAM_CLOTH_XPBD_TEXEL + int(kind));
+  vec4 texel =
+      texelFetch(table, CLOTHSTREAM_CLOTH_TEXELS * int(cloth) + CLOTHSTREAM_CLOTH_XPBD_TEXEL + int(kind));
   return XpbdSpringRecord(CLOTHSTREAM_FLOATS(texel));
 }
 
