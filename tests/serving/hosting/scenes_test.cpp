@@ -210,7 +210,7 @@ TEST_F(ScenesTest, InvalidChunksAreRefusedAndDropTheUpload) {
   EXPECT_THAT(refusal(piece(content, 2, 3, 200)), StartsWith("upload.index = 2"));
   v1::ClientMessage wrong = piece(content, 0, 1, 600);
   wrong.mutable_upload()->set_total_bytes(601);
-  EXPECT_THAT(refusal(wrong), StartsWith("upload.data: makes 600 bytes of the 601"));
+  EXPECT_THAT(refusal(wrong), StartsWith("upload.data: 600 bytes in all; upload.totalBytes is 601"));
   wrong = piece(content, 0, 2, 200);
   wrong.mutable_upload()->set_kind(v1::CONTENT_KIND_STREAM_DESCRIPTION);
   EXPECT_THAT(refusal(wrong), StartsWith("upload.kind = 1"));
