@@ -260,23 +260,24 @@ void Playback::publishFrame(scene::LiveScene& scene, RecordedStream::Told& told)
   codec::PacketHeader& header = told.header;
   header.tick += shift_;
   for (std::size_t i = 0; i < header.referenceCount; ++i) header.references[i] += shift_;
-  const auto parsed = codec::parsePacket(std::as_bytes(std::span(frame.packet())));
+  const std::string recorded = std::move(*frame.mutable_packet());
+  frame.clear_packet();
+  const auto parsed = codec::parsePacket(std::as_bytes(std::span(recorded)));
   std::vector<std::byte> packet(codec::headerBound(header) + parsed->body.size());
   const std::size_t headerBytes = codec::writeHeader(header, packet);
   std::ranges::copy(parsed->body, packet.begin() + static_cast<std::ptrdiff_t>(headerBytes));
-  frame.mutable_packet()->assign(reinterpret_cast<const char*>(packet.data()),
-                                 headerBytes + parsed->body.size());
+  packet.resize(headerBytes + parsed->body.size());
   const Clock::time_point now = Clock::now();
   frame.set_tick_time_us(schedule::microseconds(now));
   frame.set_packet_time_us(schedule::microseconds(now));
 
   const delivery::PublishedFrame published =
-      delivery::publishedFrame(header, delivery::serialise(told.message), now);
+      delivery::publishedFrame(header, delivery::serialiseFrame(frame, packet), now);
   newest_ = header.tick;
   scene.tick = header.tick;
   scene.metrics.frames.add();
   if (published.key) scene.metrics.keyFrames.add();
-  scene.metrics.packetBytes.add(frame.packet().size());
+  scene.metrics.packetBytes.add(packet.size());
   moveTo(told.time);
   scene.subscribers.publish(published);
 }

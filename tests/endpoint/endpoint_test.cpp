@@ -13,7 +13,7 @@
 
 #include "tests/endpoint/small_server.h"
 #include "tests/endpoint/transport.h"
-#include "tests/stream/allocated_bytes.h"
+#include "tests/serving/allocated_bytes.h"
 
 namespace clothstream::tests {
 namespace {

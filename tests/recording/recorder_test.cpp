@@ -113,7 +113,8 @@ void happen(RecordedScene& recorded) {
   recorded.ticks(30);  // gently at first, then hard
   recorded.live.inbox.postPoses(9, {}, recorded.now);
   model::ParameterChange heavier;
-  heavier.cloths = {{.name = "sheet", .damping = 0.7f, .arealMass = 0.3f}};
+  heavier.cloths = {
+      {.name = "sheet", .numbers = {{parameters::ClothNumber::damping, 0.7f}}, .arealMass = 0.3f}};
   heavier.colliders = {{.name = "ball", .position = model::Vec3(0.2f, -0.4f, 0.1f)}};
   recorded.change(heavier);
   recorded.ticks(40);
@@ -289,7 +290,7 @@ TEST_F(RecorderTest, ContinuesFromTheNextStateAfterALostChunk) {
   recorded.ticks(100);
   // This change is in the part that will be lost. The next state does not show it.
   model::ParameterChange change;
-  change.cloths.push_back({.damping = 2.0f});
+  change.cloths.push_back({.numbers = {{parameters::ClothNumber::damping, 2.0f}}});
   recorded.change(change);
   recorded.ticks(150);
   auto reader = RecordingReader::open(recorded.finish());

@@ -99,7 +99,7 @@ TEST_F(SceneJournalTest, ResimulatesARecordingThatStartsInTheMiddle) {
   grab(true);
   ticks(30);
   model::ParameterChange change = tests::wind(2);
-  change.cloths.push_back({.damping = 1.5f});
+  change.cloths.push_back({.numbers = {{parameters::ClothNumber::damping, 1.5f}}});
   ASSERT_TRUE(live->inbox.postChange({.participant = 3, .change = change}));
   ticks(5);
   const auto file = journal->start("mid");

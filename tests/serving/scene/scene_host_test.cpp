@@ -179,7 +179,8 @@ TEST_F(SceneHostTest, AnnouncesContactsIfRequested) {
 TEST_F(SceneHostTest, SpringChangesReachTheDevice) {
   HostedScene changed, unchanged;
   model::ParameterChange softer;
-  softer.cloths.emplace_back().structural = model::Spring{1, 0.001f};
+  softer.cloths.push_back({.numbers = {{parameters::ClothNumber::structuralStiffness, 1.0f},
+                                       {parameters::ClothNumber::structuralDamping, 0.001f}}});
   changed.tick();
   changed.change(softer);
   changed.ticks(2);
