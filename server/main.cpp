@@ -18,6 +18,7 @@
 
 #include "server/endpoint/grpc/grpc_endpoint.h"
 #include "server/endpoint/web/web_endpoint.h"
+#include "server/hosting/scene_server.h"
 #include "server/messages/scene_file.h"
 #include "server/messages/scene_message.h"
 #include "server/model/material.h"
@@ -26,7 +27,6 @@
 #include "server/recording/recordings.h"
 #include "server/recording/resimulate.h"
 #include "server/simulation/software_threads.h"
-#include "server/hosting/scene_server.h"
 #include "server/telemetry/log.h"
 #include "server/vulkan/device.h"
 
@@ -213,8 +213,8 @@ int play(const ProgramOptions& options, const Signals& signals) {
   const std::string intro = fmt::format("plays   {}, {:.1f} s of {}, recorded on {}\n", options.recording,
                                         recording->length(), scene, recording->device());
   hosting::SceneServer server(scene,
-                             std::make_shared<recording::Playback>(std::move(*recording), options.playback),
-                             sharedOptions(options, scene));
+                              std::make_shared<recording::Playback>(std::move(*recording), options.playback),
+                              sharedOptions(options, scene));
   openEndpoints(server, options, signals, intro, [&] { return server.report(); });
   return 0;
 }

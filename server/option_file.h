@@ -20,8 +20,8 @@ struct FileEntry {
   int line = 0;                     // line of the key, from 1
 };
 
-// Parses TOML. Values are strings, numbers, booleans, and arrays of these; tables and dates are errors. Throws
-// OptionError "NAME:LINE: ...".
+// Parses TOML. Values are strings, numbers, booleans, and arrays of these; tables and dates are errors.
+// Throws OptionError "NAME:LINE: ...".
 std::vector<FileEntry> parseOptionFile(std::string_view text, const std::string& name);
 
 // TOML string in quotes.

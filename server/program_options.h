@@ -12,8 +12,8 @@
 
 #include "server/model/scene.h"
 #include "server/recording/playback.h"
-#include "server/step/step.h"
 #include "server/scene/roles.h"
+#include "server/step/step.h"
 
 namespace clothstream {
 
@@ -43,7 +43,7 @@ struct ProgramOptions {
   std::chrono::duration<double> hold{60};  // reconnect grace
   std::uint32_t maxParticipants = 64;
   scene::Permissions participantsMay;  // what a participant may change in a scene that another one owns
-  bool ownersAlone = false;             // only an owner controls a scene that has one
+  bool ownersAlone = false;            // only an owner controls a scene that has one
 
   // Network.
   std::string host = "127.0.0.1";

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: MIT
-// fmt and spdlog, compiled once from Debian's headers. Header-only use doubles the compile time of every source,
-// and Debian's shared libraries are not available on machines that programs are carried to.
+// fmt and spdlog, compiled once from Debian's headers. Header-only use doubles the compile time of every
+// source, and Debian's shared libraries are not available on machines that programs are carried to.
 #include <fmt/format-inl.h>
-
 #include <spdlog/common-inl.h>
 #include <spdlog/details/backtracer-inl.h>
 #include <spdlog/details/log_msg-inl.h>
@@ -35,4 +34,5 @@ template void vformat_to(buffer<char>&, string_view, basic_format_args<FMT_BUFFE
 template class spdlog::sinks::ansicolor_sink<spdlog::details::console_mutex>;
 template class spdlog::sinks::ansicolor_stdout_sink<spdlog::details::console_mutex>;
 template class spdlog::sinks::ansicolor_stderr_sink<spdlog::details::console_mutex>;
-template std::shared_ptr<spdlog::logger> spdlog::stderr_color_mt<spdlog::synchronous_factory>(const std::string&, spdlog::color_mode);
+template std::shared_ptr<spdlog::logger> spdlog::stderr_color_mt<spdlog::synchronous_factory>(
+    const std::string&, spdlog::color_mode);

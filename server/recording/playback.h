@@ -11,8 +11,8 @@
 #include <thread>
 
 #include "server/recording/recorded_stream.h"
-#include "server/schedule/clock.h"
 #include "server/scene/frame_source.h"
+#include "server/schedule/clock.h"
 
 namespace clothstream::recording {
 

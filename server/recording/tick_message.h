@@ -9,8 +9,8 @@
 
 #include "clothstream/v1/recording.pb.h"
 #include "server/model/scene.h"
-#include "server/simulation/cloth_simulation.h"
 #include "server/scene/journal.h"
+#include "server/simulation/cloth_simulation.h"
 
 namespace clothstream::recording {
 

@@ -77,9 +77,10 @@ model::Scene LiveScene::definition() const {
 
 messages::Result<void> LiveScene::change(std::uint64_t participant, const v1::ParameterChange& message) {
   if (source)
-    return tl::unexpected(messages::FieldError{
-        v1::ERROR_CODE_INVALID_ARGUMENT,
-        "parameter_change: '" + name() + "' is a recording that is played; its parameters cannot be changed"});
+    return tl::unexpected(
+        messages::FieldError{v1::ERROR_CODE_INVALID_ARGUMENT,
+                             "parameter_change: '" + name() +
+                                 "' is a recording that is played; its parameters cannot be changed"});
   const std::lock_guard lock(mutex_);
   messages::Result<model::ParameterChange> change = messages::toParameterChange(message, definition_);
   if (!change) return tl::unexpected(std::move(change).error());

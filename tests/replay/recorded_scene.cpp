@@ -14,8 +14,8 @@
 
 #include "server/messages/scene_file.h"
 #include "server/recording/recorder.h"
-#include "server/simulation/state_snapshot.h"
 #include "server/scene/scene_host.h"
+#include "server/simulation/state_snapshot.h"
 
 namespace clothstream::replay {
 namespace {
