@@ -17,18 +17,18 @@
 #include <spdlog/spdlog-inl.h>
 
 // Templates that fmt declares `extern`, or whose definitions only format-inl.h has.
-namespace fmt::inline v9::detail {
-
-template auto dragonbox::to_decimal(float x) noexcept -> dragonbox::decimal_fp<float>;
-template auto dragonbox::to_decimal(double x) noexcept -> dragonbox::decimal_fp<double>;
-template locale_ref::locale_ref(const std::locale& locale);
-template auto locale_ref::get<std::locale>() const -> std::locale;
-template auto thousands_sep_impl(locale_ref) -> thousands_sep_result<char>;
-template auto decimal_point_impl(locale_ref) -> char;
-template void buffer<char>::append(const char*, const char*);
-template void vformat_to(buffer<char>&, string_view, basic_format_args<FMT_BUFFER_CONTEXT(char)>, locale_ref);
-
-}  // namespace fmt::inline v9::detail
+template auto fmt::detail::dragonbox::to_decimal(float x) noexcept
+    -> fmt::detail::dragonbox::decimal_fp<float>;
+template auto fmt::detail::dragonbox::to_decimal(double x) noexcept
+    -> fmt::detail::dragonbox::decimal_fp<double>;
+template fmt::detail::locale_ref::locale_ref(const std::locale& locale);
+template auto fmt::detail::locale_ref::get<std::locale>() const -> std::locale;
+template auto fmt::detail::thousands_sep_impl(fmt::detail::locale_ref)
+    -> fmt::detail::thousands_sep_result<char>;
+template auto fmt::detail::decimal_point_impl(fmt::detail::locale_ref) -> char;
+template void fmt::detail::buffer<char>::append(const char*, const char*);
+template void fmt::detail::vformat_to(fmt::detail::buffer<char>&, fmt::string_view, fmt::format_args,
+                                      fmt::detail::locale_ref);
 
 // Colour sinks with and without a lock.
 template class spdlog::sinks::ansicolor_sink<spdlog::details::console_mutex>;
