@@ -198,7 +198,7 @@ TEST_F(MeshFile, NamesFilesThatAreNotMeshes) {
   };
   expectRefused(folder_ / "none.obj", "there is no such file");
   expectRefused(folder_, "is not a file");
-  expectRefused(write("cloth.fbx", "x"), ".obj, .gltf and .glb are");
+  expectRefused(write("cloth.fbx", "x"), ".obj, .gltf or .glb");
   expectRefused(write("large.obj", std::string(101, ' ')), "has 101 bytes; at most 100");
 }
 

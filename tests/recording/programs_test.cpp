@@ -313,7 +313,7 @@ TEST_F(RecordingPrograms, StartAndStopRecordingsForClients) {
   EXPECT_EQ(stopped.code, 0) << stopped.errors;
   EXPECT_THAT(stopped.output, HasSubstr("mine.mcap: "));
   EXPECT_THAT(ask({"start-recording", "small", "--name", "mine"}).errors,
-              HasSubstr("already; choose another name"));
+              HasSubstr("already exists; choose another name"));
   const Ended again = run({CLOTHSTREAM_SERVER, "resimulate", serversRecording()});
   EXPECT_EQ(again.code, 0) << again.output << again.errors;
 

@@ -179,7 +179,7 @@ TEST_F(SceneJournalTest, RefusesImpossibleRequests) {
   ASSERT_TRUE(journal->start("one"));
   EXPECT_THAT(journal->start("two").error().text, HasSubstr("is already being recorded to one.mcap"));
   // The scene did not run in between.
-  EXPECT_THAT(journal->stop().error().text, HasSubstr("did not run"));
+  EXPECT_THAT(journal->stop().error().text, HasSubstr("has not run since"));
   EXPECT_FALSE(std::filesystem::exists(pathOf("one.mcap")));
 
   ASSERT_TRUE(journal->start("one"));
