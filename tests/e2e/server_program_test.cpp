@@ -385,7 +385,7 @@ TEST_F(ServerOptions, NamesTheLineOfASyntaxError) {
   refuses("port = 1 scene = 2\n", "2: ");
   refuses("port = [1, 2]\n", "2: port: use one value, not an array");
   refuses("stop = 2026-01-01\n", "2: stop: use a string, a number, true, false, or an array of these");
-  refuses("allow-origin = [\n\"a\"\n", "4: ");
+  refuses("allow-origin = [\n\"a\"\n", "3: ");
   expectError(run({"--config", "/nowhere/server.toml"}), "--config: cannot read /nowhere/server.toml");
 }
 
