@@ -1,6 +1,6 @@
 # Run by ctest: adds each GoogleTest suite of `program` as one test with `labels` and `environment`. A process for each suite
 # starts the device once, where a process for each test would take twice the time. Tests whose names match a pattern of the
-# environment variable CLOTHSTREAM_LEAVE_OUT (separated by colons, with wildcards) are not run.
+# environment variable LEAVE_OUT_TESTS (separated by colons, with wildcards) are not run.
 if(NOT EXISTS ${program})
   add_test(${name}_is_not_built ${program})
   return()
@@ -11,8 +11,8 @@ if(NOT result EQUAL 0)
   message(FATAL_ERROR "${program} --gtest_list_tests failed: ${result}\n${listing}")
 endif()
 set(leftOut "")
-if(DEFINED ENV{CLOTHSTREAM_LEAVE_OUT})
-  set(leftOut "-$ENV{CLOTHSTREAM_LEAVE_OUT}")
+if(DEFINED ENV{LEAVE_OUT_TESTS})
+  set(leftOut "-$ENV{LEAVE_OUT_TESTS}")
 endif()
 # A suite's line is its name and a dot; a comment follows for parametrised and typed suites.
 string(REGEX MATCHALL "(^|\n)[A-Za-z0-9_/]+\\." suites "${listing}")

@@ -19,15 +19,15 @@ server/messages    | server/model server/meshes proto/parameters clothstream
 server/encode      | server/model server/simulation server/vulkan proto/codec shaders
 server/schedule    |
 server/delivery    | server/schedule server/encode server/messages server/telemetry proto/codec clothstream
-server/scene       | server/delivery server/schedule server/model server/vulkan server/simulation server/encode server/messages server/telemetry proto/codec clothstream
+server/scene       | server/delivery server/schedule server/model server/vulkan server/simulation server/encode server/messages server/telemetry clothstream
 server/hosting     | server/scene server/delivery server/schedule server/model server/vulkan server/simulation server/messages server/telemetry clothstream
 server/session     | server/hosting server/scene server/delivery server/schedule server/messages proto/codec clothstream
 server/recording   | proto/parameters server/model server/vulkan server/simulation server/messages server/scene server/delivery server/schedule proto/codec proto/recording clothstream
 server/step        | server/model server/vulkan server/simulation server/messages
-server/endpoint/grpc         | server/session server/hosting server/delivery server/telemetry clothstream grpc/health
-server/endpoint/web         | server/session server/hosting server/delivery server/telemetry clothstream
+server/endpoint/grpc | server/session server/hosting server/delivery clothstream grpc/health
+server/endpoint/web | server/session server/hosting server/delivery clothstream
 clients/core       | proto/codec proto/parameters
-clients/core/stream | clients/core/core.h clients/core/wire proto/codec proto/parameters
+clients/core/stream | clients/core/core.h clients/core/wire proto/codec
 clients/core/wire  | clients/core/core.h proto/codec proto/parameters
 clients/grpc       | clients/core clothstream
 clients/library    | clients/core clients/grpc

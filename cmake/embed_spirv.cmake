@@ -1,4 +1,4 @@
-# Turns the binary SPIRV into the C++ header HEADER with the array clothstream::kernels::NAME.
+# Writes the binary SPIRV as the array clothstream::kernels::NAME to the C++ header HEADER.
 file(READ ${SPIRV} bytes HEX)
 string(REGEX REPLACE "(..)(..)(..)(..)" "0x\\4\\3\\2\\1," words "${bytes}")
 string(REGEX REPLACE "(0x........,0x........,0x........,0x........,0x........,0x........,0x........,0x........,)" "\\1\n" words "${words}")

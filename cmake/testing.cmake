@@ -10,8 +10,8 @@ elseif(CLOTHSTREAM_SANITIZE)
   set(CLOTHSTREAM_SANITIZER_ENVIRONMENT "LSAN_OPTIONS=suppressions=${PROJECT_SOURCE_DIR}/tests/lsan.supp")
 endif()
 
-# Every test program reuses this precompiled header, so all are compiled with -pthread, as gRPC asks. Tests are compiled with -O1, which takes two thirds of the
-# time of -O3: the libraries under test keep -O3.
+# Every test program reuses this precompiled header, so all are compiled with -pthread, which gRPC requires. Tests are
+# compiled with -O1, in two thirds of the time of -O3. The libraries under test keep -O3.
 add_executable(clothstream_test_header EXCLUDE_FROM_ALL ${PROJECT_SOURCE_DIR}/cmake/libraries/testing.cpp)
 target_link_libraries(clothstream_test_header PRIVATE clothstream_options GTest::gtest GTest::gmock GTest::gtest_main)
 target_compile_options(clothstream_test_header PRIVATE -pthread $<$<CONFIG:Release>:-O1>)

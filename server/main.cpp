@@ -1,15 +1,19 @@
 // SPDX-License-Identifier: MIT
 // clothstream-server: simulates scenes on a Vulkan device and serves them through two endpoints.
 #include <algorithm>
+#include <chrono>
 #include <csignal>
 #include <cstdint>
 #include <cstdio>
+#include <ctime>
 #include <exception>
 #include <filesystem>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <variant>
 #include <vector>
 
@@ -33,8 +37,8 @@
 namespace clothstream {
 namespace {
 
-// Blocks SIGINT, SIGTERM and SIGUSR1 in every thread; wait() takes them. Must be created before other
-// threads.
+// Blocks SIGINT, SIGTERM and SIGUSR1 in every thread; wait() takes them. Must be created before any other
+// thread.
 class Signals {
  public:
   Signals() {
@@ -148,6 +152,7 @@ std::string localAddress(const std::string& host, std::uint16_t port) {
                                              : fmt::format("[{}]:{}", host, port);
 }
 
+// Returns after SIGINT, SIGTERM or --seconds. Prints the report on SIGUSR1.
 void waitForStop(const Signals& signals, const ProgramOptions& options,
                  const std::function<std::string()>& report) {
   using Clock = std::chrono::steady_clock;
@@ -259,7 +264,7 @@ bool isInterrupted(const Signals& signals) {
   return signal == SIGINT || signal == SIGTERM;
 }
 
-// Prints the share done on standard error, once per second.
+// Prints the completed share on standard error, at most once per second.
 class Progress {
  public:
   void show(double part) {

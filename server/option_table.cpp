@@ -13,7 +13,7 @@ namespace clothstream {
 namespace {
 
 constexpr std::string_view kEnvironmentPrefix = "CLOTHSTREAM_";
-// Variables of the Vulkan layer, the systemd unit and the tests that share the prefix.
+// Variables with this prefix that are not options: of the Vulkan layer, the systemd unit and the tests.
 constexpr std::string_view kForeignVariables[] = {"VALIDATION", "LOSE_DEVICE", "OPTIONS", "SERVER",
                                                   "RECORDING",  "SCREENSHOTS", "SANITIZE"};
 constexpr std::size_t kPageColumns = 118;
@@ -46,7 +46,7 @@ std::vector<std::string> splitAtCommas(const std::string& text) {
   return parts;
 }
 
-// TOML numbers have no leading zeros and no other base than ten.
+// Decimal numbers are written as given, hexadecimal ones and all other values in quotes.
 std::string tomlValue(const std::string& value, bool isNumber) {
   return isNumber && checkNumber({}, false)(value).empty() && !value.starts_with("0x") ? value
                                                                                        : tomlString(value);

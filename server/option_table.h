@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
-// One table of options. The command line, --help, the documentation page, option files, environment variables
-// and
-// --print-config are all made from its rows.
+// One table of options. Its rows define the command line, --help, the documentation page, option files,
+// environment variables and --print-config.
 #pragma once
 
 #include <chrono>
@@ -60,9 +59,9 @@ class OptionTable {
  public:
   explicit OptionTable(CLI::App& program);
 
-  // Options that follow belong to this group of the program, and may come from every source.
+  // Starts a group of the program's options. They may come from every source.
   void group(const char* name);
-  // Options that follow belong to a command, and come from the command line alone.
+  // Starts the options of a command. They come from the command line only.
   CLI::App& command(const char* name, const char* help);
 
   // `store` keeps its value if no source sets the option. It must outlive the table.
@@ -79,14 +78,14 @@ class OptionTable {
   CLI::Option* list(const char* name, std::vector<T>& store, const char* type, const std::string& help,
                     Check check = {});
   CLI::Option* flag(const char* name, bool& store, const std::string& help);
-  // A flag of the command line alone, which does something else than serving.
+  // A flag of the command line that is done instead of serving, such as --list-devices.
   CLI::Option* action(const char* name, bool& store, const std::string& help);
-  // A positional word of a command.
+  // A required positional argument of a command.
   CLI::Option* word(const char* name, std::string& store, const std::string& help);
 
   // Sets a default that differs between machines as --help and the documentation show it.
   void showDefault(const CLI::Option* option, const char* text);
-  // Two options of which one source gives at most one. The stronger source wins.
+  // Makes two options exclusive. One source may set only one of them. Of two sources, the stronger one wins.
   void exclude(CLI::Option* first, CLI::Option* second);
 
   // Called after the command line was parsed: gives the options that are still unset their values from the

@@ -96,7 +96,7 @@ void addParticipantOptions(OptionTable& table, Parsed& parsed) {
       ->default_str("environment,cloths,colliders");
   table.showDefault(changeable, "environment,cloths,colliders");
   table.flag("--owners-alone", options.ownersAlone,
-             "Only its owners may pause, reset and delete a scene that has an owner");
+             "Only its owners may pause, reset, record and delete a scene that has an owner");
 }
 
 void addNetworkOptions(OptionTable& table, ProgramOptions& options) {

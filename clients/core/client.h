@@ -126,7 +126,7 @@ class Client {
   void send(std::string message);
 
   cs_state state_ = CS_STATE_JOINING;
-  bool welcomed_ = false;  // on the current connection
+  bool welcomed_ = false;  // whether Welcome has arrived on the current connection
   bool resumed_ = false;
   std::uint32_t errorCode_ = 0;
   std::string errorText_;
@@ -142,18 +142,18 @@ class Client {
   Description description_;
   std::unique_ptr<codec::Decoder> decoder_;
   Frame frame_;
-  OperatingPoint point_, formerPoint_;  // now, and at the newest frame
+  OperatingPoint point_, formerPoint_;  // current one, and that of the newest frame
   Acknowledgement acknowledgement_;
   KeyFrameRequest keyFrameRequest_;
   FrameStatistics statistics_;
   ServerClock clock_;
   Outbox outbox_;
-  Poses poses_;         // this participant's
+  Poses poses_;         // poses of this participant
   bool posed_ = false;  // whether the program has set a pose
   std::uint64_t lastRequestId_ = 0;
   std::uint64_t (*nowUs_)() = nullptr;
   double decodeMs_ = 0;
-  cs_stage_statistics stages_{};  // newest frame
+  cs_stage_statistics stages_{};  // members about the newest frame
   std::unique_ptr<PlayOut> playOut_;
   std::vector<std::string> scenes_;
   TickEvents events_;

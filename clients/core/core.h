@@ -104,8 +104,8 @@ void cs_want(cs_client* client, uint32_t quality, uint32_t temporal_layers) CS_N
  * WebAssembly module does not export this function. */
 void cs_set_clock(cs_client* client, uint64_t (*now_us)(void)) CS_NOEXCEPT;
 
-/* Processes one ServerMessage. Returns a set of CS_EVENT bits. A malformed message leads to CS_STATE_FAILED.
- */
+/* Processes one ServerMessage and returns a set of CS_EVENT bits. A malformed message leads to
+ * CS_STATE_FAILED. */
 uint32_t cs_receive(cs_client* client, const uint8_t* message, size_t bytes, uint64_t now_us) CS_NOEXCEPT;
 /* Creates pings when they are due. Call at least ten times a second. A longer pause between two calls does
  * not count as silence of the server. */
@@ -128,8 +128,8 @@ int cs_resumed(const cs_client* client) CS_NOEXCEPT;
 cs_state cs_get_state(const cs_client* client) CS_NOEXCEPT;
 /* Returns the last error as a sentence; "" if there was none. */
 const char* cs_error_text(const cs_client* client) CS_NOEXCEPT;
-/* Returns the server's ErrorCode (session.proto) of the last error; 0 if the client itself found the error.
- */
+/* Returns the server's ErrorCode (session.proto) of the last error; 0 if the client itself found the
+ * error. */
 uint32_t cs_error_code(const cs_client* client) CS_NOEXCEPT;
 /* Returns the text of the last CS_EVENT_NOTICE; "" if there was none. */
 const char* cs_notice_text(const cs_client* client) CS_NOEXCEPT;
@@ -245,7 +245,7 @@ typedef enum cs_shown {
   CS_SHOWN_NOTHING = 0, /* no frame arrived yet: rest positions */
   CS_SHOWN_FRAME = 1,   /* a frame at exactly its time, bit for bit */
   CS_SHOWN_BETWEEN = 2, /* interpolated linearly between two frames */
-  CS_SHOWN_LED_ON = 3,  /* extrapolated beyond the newest frame */
+  CS_SHOWN_LED_ON = 3,  /* extrapolated (led on) beyond the newest frame */
   CS_SHOWN_HELD = 4     /* the nearest frame, held at another time */
 } cs_shown;
 
@@ -263,8 +263,8 @@ typedef struct cs_played {
  * but at least 3. A collider takes about 120 bytes per frame. Fails, and changes nothing, if a version or a
  * number is not allowed. */
 int cs_set_play_out(cs_client* client, const cs_play_out_options* options) CS_NOEXCEPT;
-/* Fills in the defaults: 32 frames, adaptive delay of 0 to 250 ms, extrapolation for 30 ms. Sets the version.
- */
+/* Fills in the version and the defaults: 32 frames, adaptive delay of 0 to 250 ms, extrapolation for
+ * 30 ms. */
 void cs_default_play_out(cs_play_out_options* out) CS_NOEXCEPT;
 /* Chooses what to show at display_time_us, which may be later than now_us. If display times grow from call to
  * call, server_time_us never goes back unless a clock jumps. The newest frame is held until the delay is
@@ -299,8 +299,8 @@ int cs_get_played_collider(const cs_client* client, uint32_t index, cs_collider*
 typedef struct cs_own_collider {
   uint32_t shape; /* cs_shape */
   float position[3];
-  float orientation[4]; /* quaternion x y z w; all zero means no rotation */
-  float radius, length, size[3];
+  float orientation[4];          /* quaternion x y z w; all zero means no rotation */
+  float radius, length, size[3]; /* m; numbers that the shape does not have are ignored */
 } cs_own_collider;
 
 /* Grab of this participant (Grab in session.proto). NaN means the server's default. */
@@ -395,7 +395,7 @@ typedef struct cs_cloth_parameters {
 
 /* Solver.kind of scene.proto. */
 typedef enum cs_solver {
-  CS_SOLVER_AS_IS = 0,
+  CS_SOLVER_AS_IS = 0, /* in a change: keeps the solver */
   CS_SOLVER_MASS_SPRING = 1,
   CS_SOLVER_CONSTRAINT = 2,
   CS_SOLVER_ACAD = 3,
@@ -416,9 +416,9 @@ typedef struct cs_cloth_settings {
   uint32_t solver;                        /* cs_solver, or a newer kind */
   int32_t bend_constraints;               /* 0 or 1; constraint solvers */
   uint32_t iterations;                    /* all solvers except mass-spring */
-  float tolerance;                        /* constraint solvers and implicit Euler */
-  float compliance;                       /* m/N; constraint solvers and XPBD; NaN: server's default */
-  float activation;                       /* CS_SOLVER_ACAD */
+  float tolerance;                        /* relative residual; constraint solvers and implicit Euler */
+  float compliance;       /* m/N; constraint solvers and XPBD; read as NaN: server's default */
+  float activation;       /* fraction of the rest length; CS_SOLVER_ACAD */
   int32_t assembled;      /* 1 if the solver multiplies assembled matrices, else 0; CS_SOLVER_CONSTRAINT */
   float dihedral_bending; /* N m */
   /* Self-collision: ball radius (m) and friction. Tethers: slack as a fraction of the length. They can be
@@ -455,8 +455,8 @@ void cs_keep_cloth_settings(cs_cloth_settings* out) CS_NOEXCEPT;
  * else the defaults of scene.proto. Fails before the description, for an unknown version and for an unknown
  * cloth. */
 int cs_change_cloth(cs_client* client, const char* cloth, const cs_cloth_settings* settings) CS_NOEXCEPT;
-/* Applies a material (see cs_material) to a cloth: springs, damping, drag, lift, friction, mass and solver.
- */
+/* Applies a material (see cs_material) to a cloth: springs, damping, drag, lift, friction, mass and
+ * solver. */
 void cs_set_material(cs_client* client, const char* cloth, const char* material) CS_NOEXCEPT;
 /* Changes position (m) and radius (m) of a collider of the scene. Both pointers may be NULL. */
 void cs_set_collider(cs_client* client, const char* collider, const float* position3,
@@ -529,7 +529,8 @@ void cs_request_key_frame(cs_client* client, uint64_t now_us) CS_NOEXCEPT;
 
 /* Fails if the scene is not a recording, or its state is not known yet. */
 int cs_get_playback(const cs_client* client, uint64_t now_us, cs_playback* out) CS_NOEXCEPT;
-/* Requests that affect all participants. They are ignored before CS_STATE_JOINED. */
+/* The functions below send requests that affect all participants. They do nothing before CS_STATE_JOINED. */
+
 /* Pauses or resumes the clock of any scene. */
 void cs_pause(cs_client* client, int paused) CS_NOEXCEPT;
 /* Recordings only: continues at `seconds` from the start, 0 to the length. */
@@ -567,8 +568,8 @@ typedef struct cs_stage_statistics {
   /* Play-out; 0 if it is off. */
   uint32_t frames_waiting; /* frames that arrived before their display time */
   uint64_t late_frames;    /* frames that arrived after their display time */
-  double led_on_ms,
-      held_ms; /* display time that was extrapolated, and that was held, beyond the newest frame */
+  /* Display time beyond the newest frame: with an extrapolated frame, and with a held frame. */
+  double led_on_ms, held_ms;
   double delay_ms, wanted_delay_ms; /* current delay, and the delay it moves towards */
   /* Newest decoded frame; 0 before the first pong, except decode_ms. */
   double server_ms;      /* from the start of the tick to the complete packet, on the server */

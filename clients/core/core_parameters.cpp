@@ -51,7 +51,7 @@ ClothNumbers changed(const cs_cloth_settings& settings, const ClothNumbers& now)
   return change;
 }
 
-// Defaults of scene.proto.
+// Settings of a solver that this scene has not had, as in scene.proto.
 Solver defaultSolver(std::uint32_t kind) {
   Solver solver;
   solver.kind = kind;

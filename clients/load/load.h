@@ -15,13 +15,13 @@ namespace clothstream::load {
 struct LoadOptions {
   std::string scene;  // empty: the server's default
   std::uint32_t participants = 10;
-  std::uint32_t decoders = 0;  // of these; the others acknowledge frames without decoding
-  std::uint32_t viewers = 0;   // of these, the last ones; they send no poses
+  std::uint32_t decoders = 0;  // participants that decode; the others only acknowledge frames
+  std::uint32_t viewers = 0;   // participants that send no poses; the last ones to join
   std::uint32_t slow = 0;      // slow readers in addition to the participants
   double slowBytesPerSecond = 20'000;
   std::uint32_t hostileClients = 0;  // in addition to the others
   double joinsPerSecond = 100;       // until all have joined
-  double leavesPerSecond = 0;        // after that; each is replaced
+  double leavesPerSecond = 0;        // after all have joined; each is replaced
   double seconds = 10;               // after all have joined
 };
 

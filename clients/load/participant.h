@@ -27,7 +27,7 @@ struct ParticipantOptions {
   std::string scene, name;
   bool decodes = true;  // otherwise it reads only the packet headers
   bool moves = true;    // whether it moves a sphere on an orbit
-  double phase = 0;     // of the orbit, turns
+  double phase = 0;     // start of the orbit, revolutions
   // Reading rate; 0: unlimited.
   double bytesPerSecond = 0;
 };

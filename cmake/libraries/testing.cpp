@@ -1,2 +1,2 @@
 // SPDX-License-Identifier: MIT
-// Owner of the precompiled header that all test programs share (cmake/options.cmake).
+// Owner of the precompiled header that all test programs share (cmake/testing.cmake).

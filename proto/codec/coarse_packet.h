@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Coarse packets: a sixteenth of the vertices, for clients that are far away or weak. The data of the two
-// finest levels is removed.
+// Coarse packets have only a sixteenth of the vertices, for clients that show the cloth from far away or have
+// little computing power. The data of the two finest levels is removed.
 #pragma once
 
 #include <cstddef>
@@ -14,7 +14,7 @@ namespace clothstream::codec {
 enum class Detail : std::uint8_t { full, coarse };
 
 // Writes the part of a packet that Detail::coarse needs and returns its size in bytes. `out` is at least as
-// large as `packet` and may be the same memory. Returns 0 if the bytes are no packet.
+// large as `packet` and may be the same memory. Returns 0 if the bytes are not a packet.
 std::size_t makeCoarsePacket(std::span<const std::byte> packet, std::span<std::byte> out);
 
 }  // namespace clothstream::codec

@@ -16,7 +16,7 @@ namespace clothstream::codec {
 
 enum class DecodeResult : std::uint8_t {
   ok,
-  malformed,         // no packet of this stream's codec; the decoder is unchanged
+  malformed,         // not a valid packet of this stream's codec
   wrongEpoch,        // packet of another description
   missingReference,  // the reference was not decoded or is no longer held: request a key frame, or
                      // skip the packet if its layer is above the base
@@ -32,17 +32,19 @@ class Decoder {
   Decoder(const Decoder&) = delete;
   Decoder& operator=(const Decoder&) = delete;
 
+  // A result other than `ok` leaves the decoder unchanged.
   [[nodiscard]] DecodeResult decode(std::span<const std::byte> packet);
 
-  // Tick of the newest decoded frame. Undefined before the first frame, like everything below.
+  // Tick of the newest decoded frame. Like positions, normals and hash it is undefined before the first
+  // frame.
   std::uint64_t tick() const;
   bool hasFrame() const;
 
   // Positions in metres, 3 floats a vertex, cloth after cloth. Valid until the next decode. With
   // Detail::coarse the positions of other vertices are interpolated, without a promise about their error.
   std::span<const float> positions() const;
-  // Unit normals, 3 floats a vertex: as sent, or computed from the positions if the stream sends none. The
-  // first call after a decode does the work.
+  // Unit normals, 3 floats a vertex: as sent, or computed from the positions if the stream sends none or with
+  // Detail::coarse. Valid until the next decode. The first call after a decode does the work.
   std::span<const float> normals() const;
   // 64-bit hash of the reconstruction (FRAME_FORMAT.md). Equals the server's hash, except with
   // Detail::coarse.

@@ -46,7 +46,7 @@ struct ParsedPacket {
   std::span<const std::byte> body;
 };
 
-// nullopt if the bytes are no packet of this version or the sections do not fill it exactly.
+// nullopt if the bytes are not a packet of this version, or if the sections do not fill it exactly.
 [[nodiscard]] std::optional<ParsedPacket> parsePacket(std::span<const std::byte> bytes);
 
 // Upper bound of the bytes that writeHeader() writes.

@@ -12,7 +12,7 @@ namespace clothstream::codec {
 
 enum class NormalMode : std::uint8_t { none = 0, octahedral = 1 };
 
-// Vertices of a grid are row-major. Rows and columns are both zero for a cloth that is no grid.
+// Vertices of a grid are row-major. Rows and columns are both zero for a cloth that is not a grid.
 struct ClothLayout {
   std::uint32_t vertexCount = 0;
   std::uint32_t rows = 0, columns = 0;

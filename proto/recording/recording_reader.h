@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: MIT
-// Reader of recordings, message by message, from any time on.
+// Reader of recordings: message by message, starting at any time.
 #pragma once
 
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>

@@ -32,7 +32,7 @@ SharedBytes parametersChanged(v1::ParameterChange change, std::uint64_t tick, st
 // `requestId` is that of the message being answered.
 SharedBytes error(v1::ErrorCode code, std::string text, bool fatal, std::uint64_t requestId = 0);
 
-// Last message to a peer that does not read what it is sent. The peer may reconnect.
+// Last message to a peer that does not read its messages. The peer may reconnect.
 SharedBytes tooSlow();
 
 }  // namespace clothstream::delivery

@@ -44,7 +44,7 @@ struct CompleteFrame {
   std::unique_ptr<v1::Frame> fields;
 };
 
-// Has a thread that encodes and publishes. push() and drain() belong to the device's thread.
+// Owns the thread that encodes and publishes. push() and drain() belong to the device's thread.
 class FramePublisher {
  public:
   // At most `capacity` frames wait: the number of slots in all encoders. `everySecond` is called about once a

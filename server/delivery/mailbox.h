@@ -10,6 +10,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <utility>
 
 #include "server/delivery/description_chunks.h"
 #include "server/delivery/envelope.h"
@@ -56,8 +57,8 @@ class Mailbox {
   // Queues an answer to this peer. Returns false if there is no room: the peer sends requests and does not
   // read the answers.
   [[nodiscard]] bool reply(SharedBytes message);
-  // Queues a message that everybody in the scene gets; it is sent after the description. Returns false if
-  // there is no room.
+  // Queues a message that all subscribers of the scene get; it is sent after the description. Returns false
+  // if there is no room.
   [[nodiscard]] bool announce(SharedBytes message);
 
   // Starts sending frames: the description first, unless it is null because the peer has it already. `wanted`

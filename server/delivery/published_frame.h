@@ -37,11 +37,11 @@ inline PublishedFrame publishedFrame(const codec::PacketHeader& header, SharedBy
           .complete = complete};
 }
 
-// Frames that a scene's stream consists of.
+// Rate, temporal layers and qualities of a scene's stream.
 struct StreamShape {
   std::uint32_t rate = 0;  // frames/s, all layers together
   std::uint8_t layers = 1;
-  // Quality levels available for each frame. 1 means that each frame has a single quality, whichever it is.
+  // Number of qualities of each frame. 1 means a single quality, which may have any number.
   std::uint8_t qualities = 1;
 };
 

@@ -28,9 +28,9 @@ class DevicePredictor {
   // True for one temporal layer, if the device's buffers and dispatches are large enough.
   static bool supports(const vulkan::Device& device, const codec::StreamLayout& layout);
 
+  // Weights in the frame, if it is not at rest, and weights after it.
   struct FrameWeights {
-    const codec::hierarchical::Weights *used,
-        *left;  // weights in the frame (if it is not at rest), and weights after it
+    const codec::hierarchical::Weights *used, *left;
   };
   // Records the frame that comes `sinceKey` frames after its key frame. Without `weights` it uses those that
   // its reference left. `chunks` are summed up.
@@ -78,7 +78,7 @@ class DevicePredictor {
   vulkan::Buffer faces_, facesUpload_, facesOf_, facesOfUpload_;  // only with normals
   std::array<Slot, kFrameSlots> slots_;
   vulkan::Kernel quantise_, predictPhase_, predictSmallPhases_, sumProducts_, predictNormals_, finish_;
-  // Indexed by the present positions and then the turn; by the turn and then the slot; or by the turn.
+  // Indexed by the present positions and then turn_; by turn_ and then the slot; or by turn_.
   std::vector<vulkan::Bindings> quantiseBindings_, phaseBindings_, smallPhaseBindings_, sumBindings_,
       normalBindings_, finishBindings_;
 

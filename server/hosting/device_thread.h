@@ -30,8 +30,8 @@ using schedule::Clock;
 // Thread-safe.
 //
 // Ticks that are due together are all submitted before the first is waited for. A scene is loaded onto the
-// device when it is first joined, on another thread while other scenes run. It sleeps while it has no
-// subscribers.
+// device when it is first joined, on another thread while other scenes run. A scene without subscribers
+// sleeps.
 //
 // Device loss: a new device is created, and every scene continues from its newest snapshot on the CPU. This
 // is tried once a second until it succeeds. If a tick fails in another way, only its scene is rebuilt like
@@ -87,7 +87,7 @@ class DeviceThread {
     std::unique_ptr<scene::SceneHost> host;       // once it is loaded
     std::optional<std::promise<void>> whenAdded;  // set by add(), until the scene is ready
     bool refused = false;                         // added, but cannot run
-    bool begun = false;                           // the current tick
+    bool begun = false;                           // the current tick has begun
     bool paused = false;                          // while it has subscribers
     Clock::time_point nextPausedFrame{};          // next check for subscribers that need a key frame
     std::optional<std::uint64_t> failed;          // tick count at the newest failure

@@ -46,13 +46,12 @@ auto attempt(const char* call, const Work& work) -> decltype(work()) {
 
 }  // namespace
 
-void SceneMaker::create(v1::CreateSceneRequest request, std::optional<UploadedContent> uploaded,
-                        CreateDone done) {
+tl::expected<void, v1::Error> SceneMaker::create(v1::CreateSceneRequest request,
+                                                 std::optional<UploadedContent> uploaded, CreateDone done) {
   if (++waiting_ > kMostWaiting) {
     --waiting_;
-    return done(
-        refused(v1::ERROR_CODE_RESOURCE_EXHAUSTED,
-                fmt::format("createScene: {} scenes wait to be created; try again later", kMostWaiting)));
+    return refused(v1::ERROR_CODE_RESOURCE_EXHAUSTED,
+                   fmt::format("createScene: {} scenes wait to be created; try again later", kMostWaiting));
   }
   boost::asio::post(thread_, [this, request = std::move(request), uploaded = std::move(uploaded),
                               done = std::move(done)]() mutable {
@@ -63,6 +62,7 @@ void SceneMaker::create(v1::CreateSceneRequest request, std::optional<UploadedCo
     uploaded.reset();  // before the answer, so that the peer may upload again at once
     done(std::move(made));
   });
+  return {};
 }
 
 void SceneMaker::remove(v1::DeleteSceneRequest request, DeleteDone done) {

@@ -5,6 +5,7 @@
 #include <atomic>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 
@@ -16,8 +17,8 @@
 
 namespace clothstream::hosting {
 
-// Thread-safe. Does one request at a time, on a worker thread: checking a large mesh and loading a scene take
-// seconds. The caller has checked that the peer may do what it asks for.
+// Thread-safe. Does one request at a time, on a worker thread, which also calls each `done`: checking a large
+// mesh and loading a scene take seconds. The caller has checked that the peer may do what it asks for.
 class SceneMaker {
  public:
   explicit SceneMaker(SceneServer::State& server) : server_(server), thread_(1) {}
@@ -26,11 +27,14 @@ class SceneMaker {
   SceneMaker(const SceneMaker&) = delete;
   SceneMaker& operator=(const SceneMaker&) = delete;
 
-  // Scenes that may wait to be created.
+  // Maximum number of scenes that wait to be created.
   static constexpr std::uint32_t kMostWaiting = 64;
 
   // `uploaded` is the content that `request` names, if it names one. Its reservation ends before the answer.
-  void create(v1::CreateSceneRequest request, std::optional<UploadedContent> uploaded, CreateDone done);
+  // While kMostWaiting scenes wait it returns an error, and `done` is not called.
+  [[nodiscard]] tl::expected<void, v1::Error> create(v1::CreateSceneRequest request,
+                                                     std::optional<UploadedContent> uploaded,
+                                                     CreateDone done);
   void remove(v1::DeleteSceneRequest request, DeleteDone done);
   // Both block the worker thread on the disk.
   void startRecording(v1::StartRecordingRequest request, StartRecordingDone done);

@@ -58,7 +58,8 @@ void SceneServer::createScene(const v1::CreateSceneRequest& request, CreateDone 
     error.set_text("createScene.uploadedContentId: upload the scene and create it in the same stream");
     return done(tl::unexpected(std::move(error)));
   }
-  state_->maker.create(request, {}, std::move(done));
+  if (auto accepted = state_->maker.create(request, {}, done); !accepted)
+    done(tl::unexpected(std::move(accepted.error())));
 }
 
 void SceneServer::deleteScene(const v1::DeleteSceneRequest& request, DeleteDone done) {

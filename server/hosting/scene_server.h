@@ -57,7 +57,7 @@ struct ServerOptions {
   std::chrono::milliseconds silence{30'000};
   scene::ReconnectGrace reconnectGrace{};
   scene::Permissions participantsMay{};
-  // Peers outside a scene may always pause, reset, record and delete it. If false, only while it has no
+  // True: peers outside a scene may always pause, reset, record and delete it. False: only while it has no
   // owner.
   bool outsideControl = true;
 };
@@ -68,8 +68,8 @@ using StartRecordingDone = std::function<void(tl::expected<v1::StartRecordingRes
 using StopRecordingDone = std::function<void(tl::expected<v1::StopRecordingResponse, v1::Error>)>;
 using DeleteDone = std::function<void(tl::expected<v1::DeleteSceneResponse, v1::Error>)>;
 
-// Thread-safe. Has three threads: one owns the device and runs the ticks of all scenes, one encodes and
-// publishes frames, one creates scenes.
+// Thread-safe. DeviceThread runs the ticks of all scenes, FramePublisher encodes and publishes frames,
+// SceneMaker creates scenes and SceneLoader loads them: one thread each. EncoderThreads may add more.
 class SceneServer {
  public:
   // The scenes must be valid (server/messages) and their names unique. Throws vulkan::DeviceError, or

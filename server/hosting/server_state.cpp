@@ -26,7 +26,7 @@ std::vector<std::shared_ptr<scene::LiveScene>> liveScenes(std::vector<model::Sce
   return scenes;
 }
 
-// First number of the viewers of a recording, so that they differ from the participants in it.
+// Viewers of a recording have numbers above this one, so that they differ from the participants in it.
 constexpr std::uint64_t kFirstViewer = std::uint64_t{1} << 32;
 
 delivery::SharedBytes stoppingNotice() {

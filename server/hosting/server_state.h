@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What sessions use of a server: scenes, peers, and requests about scenes.
+// State of a server that its sessions use: scenes, peers, and requests about scenes.
 #pragma once
 
 #include <atomic>
@@ -58,7 +58,7 @@ struct SceneServer::State {
   const ServerOptions options;
   telemetry::ServerMetrics metrics;
   UploadBudget uploads;
-  std::atomic<std::uint64_t> participants{0};  // numbers given
+  std::atomic<std::uint64_t> participants{0};  // newest participant number
 
   mutable std::mutex mutex;  // protects the next three
   std::vector<std::shared_ptr<scene::LiveScene>> scenes;

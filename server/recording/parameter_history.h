@@ -34,8 +34,8 @@ class ParameterHistory {
 
   std::vector<std::size_t> chunks_;  // chunks that hold changes
   std::size_t stride_ = 1;
-  std::vector<std::string>
-      kept_;               // serialised snapshots from before the chunks 0, stride, 2 stride, ... of these
+  // Serialised snapshots from before the chunks 0, stride, 2 stride, ... of these.
+  std::vector<std::string> kept_;
   std::size_t bytes_ = 0;  // size of the snapshots
 };
 

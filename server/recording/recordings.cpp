@@ -2,6 +2,7 @@
 // Creates the journals of a server's scenes.
 #include "server/recording/recordings.h"
 
+#include <cerrno>
 #include <stdexcept>
 
 #include <fmt/format.h>

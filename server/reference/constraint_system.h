@@ -46,8 +46,8 @@ class ConstraintSystem {
   std::vector<Eigen::Vector3d> moves(const Eigen::VectorXd& multipliers) const;
 
  private:
-  Eigen::SparseMatrix<double> jacobian_;  // a row a constraint, three columns a node
-  Eigen::VectorXd inverseMasses_;         // three a node
+  Eigen::SparseMatrix<double> jacobian_;  // one row per constraint, three columns per node
+  Eigen::VectorXd inverseMasses_;         // three per node
   Eigen::VectorXd side_;
   double compliance_;
 };

@@ -17,7 +17,7 @@ class FrameSource {
  public:
   virtual ~FrameSource() = default;
 
-  // Description of all its frames. Constant.
+  // Description of the stream. Constant.
   virtual const v1::StreamDescription& description() const = 0;
   // Name of the device that simulated the frames.
   virtual std::string deviceName() const = 0;

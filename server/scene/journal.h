@@ -39,14 +39,15 @@ class Journal {
   virtual bool active() const = 0;
   // Returns whether begin() is to be called before the next tick. Any thread.
   virtual bool due() const = 0;
-  // Starts a recording under this name (empty: any name) and returns its file's name; stops it. Both may
-  // block on a disk, so they must not be called on the device's thread. By default both return an error.
+  // start() starts a recording with this name (empty: any name) and returns the name of its file. stop() ends
+  // it. Both may block on a disk, so they must not be called on the device's thread. By default both return
+  // an error.
   [[nodiscard]] virtual messages::Result<std::string> start(const std::string& name);
   [[nodiscard]] virtual messages::Result<v1::StopRecordingResponse> stop();
 
-  // The following four belong to the device's thread.
+  // The following five belong to the device's thread.
   // Called when due: the scene before the next tick, the description of its stream, its state, and the state
-  // that a reset returns to.
+  // that a reset returns to. Both states are one object if the scene is at its start.
   virtual void begin(const vulkan::DeviceInfo& device, const model::Scene& scene,
                      const v1::StreamDescription& description, const simulation::StateSnapshot& state,
                      const simulation::StateSnapshot& start) = 0;
@@ -58,7 +59,7 @@ class Journal {
   // The simulation ended. Another one may begin at the scene's start.
   virtual void end() = 0;
 
-  // Any thread. A message that all subscribers are sent.
+  // The following belong to any thread. sent() gets each message that is sent to all subscribers.
   virtual void sent(const delivery::SharedBytes& message) = 0;
   virtual void joined(std::uint64_t participant, const std::string& clientName,
                       const std::string& displayName) = 0;

@@ -77,10 +77,9 @@ model::Scene LiveScene::definition() const {
 
 messages::Result<void> LiveScene::change(std::uint64_t participant, const v1::ParameterChange& message) {
   if (source)
-    return tl::unexpected(
-        messages::FieldError{v1::ERROR_CODE_INVALID_ARGUMENT,
-                             "parameter_change: '" + name() +
-                                 "' is a recording that is played; its parameters cannot be changed"});
+    return tl::unexpected(messages::FieldError{
+        v1::ERROR_CODE_INVALID_ARGUMENT,
+        "parameterChange: '" + name() + "' is a recording that is played; its parameters cannot be changed"});
   const std::lock_guard lock(mutex_);
   messages::Result<model::ParameterChange> change = messages::toParameterChange(message, definition_);
   if (!change) return tl::unexpected(std::move(change).error());
@@ -93,7 +92,7 @@ messages::Result<void> LiveScene::change(std::uint64_t participant, const v1::Pa
   if (!inbox.postChange({participant, *change, std::move(announced)}))
     return tl::unexpected(
         messages::FieldError{v1::ERROR_CODE_RESOURCE_EXHAUSTED,
-                             "parameter_change: too many changes for one tick; send it again later"});
+                             "parameterChange: too many changes for one tick; send it again later"});
   definition_ = std::move(changed);
   description_.reset();
   return {};

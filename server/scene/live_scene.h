@@ -65,7 +65,7 @@ class LiveScene {
 
   const bool created;
   const std::uint32_t maxParticipants;
-  const std::shared_ptr<Journal> journal;     // null: none is kept
+  const std::shared_ptr<Journal> journal;     // null: the scene has none
   const std::shared_ptr<FrameSource> source;  // null: the scene is simulated
   std::atomic<bool> paused{false};            // no ticks, except for the first frame after a reset
   std::atomic<bool> resetRequested{false};    // taken at the next tick
@@ -86,7 +86,7 @@ class LiveScene {
   mutable std::mutex mutex_;
   model::Scene definition_;
   std::shared_ptr<const delivery::DescriptionChunks> description_;  // null after a change of the definition
-  std::uint64_t contents_ = 0;                                      // content ids given
+  std::uint64_t contents_ = 0;                                      // newest content id
 };
 
 // Notice that a scene is paused; `participant` as for delivery::notice().

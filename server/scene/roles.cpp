@@ -8,7 +8,7 @@
 namespace clothstream::scene {
 namespace {
 
-// Field of the wire, as in the JSON form that all errors use.
+// Fields of the message, in the JSON form that all errors use.
 const char* nameOf(Action action) {
   switch (action) {
     case Action::collide:
@@ -119,7 +119,7 @@ messages::Result<void> permit(Role role, const v1::ParameterChange& message,
     permitted = permit(role, Action::changeColliders, participants);
   const bool environment =
       message.has_gravity() || message.has_wind() || message.has_air_density() || message.has_gust();
-  // An empty change is announced to everybody as well.
+  // An empty change is announced to all subscribers as well.
   const bool nothing = message.cloths().empty() && message.colliders().empty();
   if (permitted && (environment || nothing))
     permitted = permit(role, Action::changeEnvironment, participants);

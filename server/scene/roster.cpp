@@ -40,7 +40,7 @@ PoseTime poseTime(const v1::ColliderPoses& message, Clock::time_point arrival) {
   PoseTime time{.clientTimeUs = message.client_time_us()};
   if (message.server_time_us() == 0) return time;
   if (time.clientTimeUs == 0) time.clientTimeUs = message.server_time_us();
-  // The difference of two unsigned times, read as signed, is right whichever of them is ahead.
+  // The difference of two unsigned times, read as signed, is correct for both orders.
   const std::chrono::microseconds ahead(
       static_cast<std::int64_t>(message.server_time_us() - schedule::microseconds(arrival)));
   if (ahead > Roster::kMostAhead) return time;
@@ -117,7 +117,7 @@ tl::expected<Roster::Admission, Roster::Refusal> Roster::join(const JoinRequest&
                                : isOwned                    ? Role::participant
                                                             : Role::owner};
   if (journal_) journal_->joined(entry.participant.id, request.clientName, request.displayName);
-  // Announced to the others first: the new participant's Welcome says it.
+  // Announced before the new participant subscribes, because its Welcome already contains itself.
   announce(Presence::joined, entry.participant);
   subscribers_.add(mailbox, entry.participant.id);
   entries_.push_back(std::move(entry));

@@ -43,8 +43,8 @@ void write(const Participant& participant, v1::Participant& message);
 enum class LeaveReason : std::uint8_t { left, timedOut, removed };
 
 // Thread-safe. The subscribers hold the mailboxes of all connected participants; a participant that is away
-// has none. A connection is identified by its mailbox. If its participant is gone, or was taken over by
-// another connection, calls for that mailbox have no effect.
+// has none. A session is identified by its mailbox. If its participant is gone, or was taken over by another
+// session, calls for that mailbox have no effect.
 //
 // A scene with participants other than viewers has an owner: the first to join. When the last owner leaves,
 // the participant that has been there longest becomes the owner.
@@ -74,9 +74,9 @@ class Roster {
   enum class Refusal : std::uint8_t { full, closed, late };
 
   // Adds the mailbox to the subscribers. A request with the token of a participant resumes that participant
-  // and closes its former connection; it is refused as late if that connection has a higher attempt number.
-  // Other requests get the next number of `ids`. They are refused as full if `limit` participants are there
-  // and none of them is away. Of those away, the one disconnected longest is evicted.
+  // and closes its former session; it is refused as late if that session has a higher attempt number.
+  // Other requests get the next number of `ids`. If there are `limit` participants, the one that has been
+  // away longest is evicted; if none is away, the request is refused as full.
   [[nodiscard]] tl::expected<Admission, Refusal> join(const JoinRequest& request,
                                                       const std::shared_ptr<delivery::Mailbox>& mailbox,
                                                       std::atomic<std::uint64_t>& ids, std::size_t limit,
@@ -92,7 +92,7 @@ class Roster {
   // Same as dismiss(), and refuses every later join().
   void close(const delivery::SharedBytes& last);
 
-  // Number of participants, those away included; number of those away.
+  // Number of all participants, and of those that are away.
   std::size_t size() const;
   std::size_t away() const;
   // Returns whether the scene has an owner, who may be away.
@@ -120,7 +120,7 @@ class Roster {
   struct Entry {
     Participant participant;
     std::string token;
-    std::uint32_t attempt = 0;                        // of the newest connection
+    std::uint32_t attempt = 0;                        // of the newest session
     model::ParticipantPoses poses;                    // the newest, without attachments
     bool posed = false;                               // the scene may have colliders or grabs of it
     Clock::time_point posesExpire{}, placeExpires{};  // while it is away

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <chrono>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -35,10 +36,10 @@ class SceneHost {
   // Minimum interval between requested key frames of one quality. One key frame serves all subscribers.
   static constexpr std::chrono::milliseconds kKeyFrameInterval{100};
 
-  // While the scene is recorded, at least one frame in this many is a key frame.
+  // While the scene is recorded, at least one of this many frames is a key frame.
   static constexpr std::uint32_t kFramesAKeyFrame = 24;
 
-  // Frames per second that carry a simulation report.
+  // Default number of frames per second that carry a simulation report.
   static constexpr double kReportRate = 4;
 
   // All arguments must outlive the host. With `reportRate` 0 no frame carries a report. Throws

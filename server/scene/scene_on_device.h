@@ -13,7 +13,7 @@
 
 namespace clothstream::scene {
 
-// Belongs to any one thread at a time. Other threads may use the device meanwhile.
+// Belongs to one thread at a time. Other threads may use the device at the same time.
 struct SceneOnDevice {
   // Uploads the scene, runs every kernel once and restores the start state. `device` and `workers` must
   // outlive it. Takes up to seconds, but occupies the device only for short times. Throws std::runtime_error

@@ -21,7 +21,8 @@ using delivery::SharedBytes;
 using scene::Action;
 
 constexpr double kMalformedCost = 60;
-// Bounds the memory of a peer that does not read. Scenes with large meshes need the unary call.
+// Largest answer in a stream; it bounds the memory that a peer costs. Scenes with large meshes need the unary
+// call.
 constexpr std::size_t kMaxAnswerBytes = 1024 * 1024;
 
 }  // namespace
@@ -37,7 +38,8 @@ std::shared_ptr<Session> Session::open(hosting::SceneServer& server, std::string
                                        std::function<void()> wake) {
   std::shared_ptr<Session> session(new Session(server.state(), std::move(peer), std::move(wake)));
   if (SharedBytes refusal = server.state().admit(session)) session->close(std::move(refusal));
-  // The server's peers and pending answers hold the session itself. The endpoint's pointer ends it.
+  // The server and pending answers may keep the session alive for a moment. Only the endpoint's pointer ends
+  // it.
   return {session.get(), [session](Session*) mutable {
             session->end();
             session.reset();
@@ -261,8 +263,10 @@ void Session::create(const v1::CreateSceneRequest& request) {
     if (!taken) return refuse(taken.error());
     uploaded = std::move(*taken);
   }
-  server_.maker.create(request, std::move(uploaded),
-                       answering<v1::CreateSceneResponse>(&v1::ServerMessage::mutable_create_scene));
+  const auto accepted =
+      server_.maker.create(request, std::move(uploaded),
+                           answering<v1::CreateSceneResponse>(&v1::ServerMessage::mutable_create_scene));
+  if (!accepted) refuse({accepted.error().code(), accepted.error().text()});
 }
 
 void Session::poses(const v1::ColliderPoses& message, Clock::time_point now) {

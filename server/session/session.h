@@ -43,7 +43,7 @@ inline constexpr std::size_t kMaxClientMessageBytes = messages::limits::kMaxClie
 // one write in flight. When the write is done it calls next() again. If there is nothing it waits for `wake`.
 //
 // An invalid message is answered by an Error to this peer alone. Every refused message counts against a
-// budget that refills with time; bytes that are no message at all count as 60. A peer that exceeds the budget
+// budget that refills with time; bytes that are not a message count as 60. A peer that exceeds the budget
 // is disconnected.
 class Session final : public hosting::Peer, public std::enable_shared_from_this<Session> {
  public:
@@ -51,13 +51,13 @@ class Session final : public hosting::Peer, public std::enable_shared_from_this<
   // next() may have something or finished() became true; it must not block. `peer` names the peer in logs.
   // The server must outlive the session.
   //
-  // The session ends when the returned pointer is released. The peer is then disconnected, unless it has
-  // left: its participant stays for the grace period. `wake` is not called after that, so the releasing
-  // thread must hold no lock that `wake` takes.
+  // The session ends when the returned pointer is released. A peer that has not left is then disconnected:
+  // its participant stays for the grace period. The release waits for a running `wake`, so the releasing
+  // thread must hold no lock that `wake` takes. `wake` is not called after it.
   static std::shared_ptr<Session> open(hosting::SceneServer& server, std::string peer,
                                        std::function<void()> wake);
 
-  // Handles one ClientMessage.
+  // Handles one serialised ClientMessage.
   void receive(std::span<const std::byte> message);
 
   // The peer has said goodbye: it leaves the scene for good.
@@ -68,8 +68,9 @@ class Session final : public hosting::Peer, public std::enable_shared_from_this<
   std::optional<delivery::SharedBytes> next();
 
   // Returns whether the peer must be closed once next() has nothing more: after a fatal error, when the
-  // server stops, or when the peer does not read. The endpoint gives the last writes about a second. The last
-  // message says why: a fatal Error, or the Notice that the server stops.
+  // server stops, or when the peer does not read. The endpoint then bounds the time of the last writes (1 to
+  // 2 s). The last message says why: a fatal Error, or a Notice that the server stops or the scene is
+  // deleted.
   bool finished() const;
 
   void close(delivery::SharedBytes last) override;
@@ -79,6 +80,7 @@ class Session final : public hosting::Peer, public std::enable_shared_from_this<
   Session(hosting::SceneServer::State& server, std::string peer, std::function<void()> wake);
   void end();
 
+  // All following functions need the lock.
   void dispatch(const v1::ClientMessage& message, Clock::time_point now);
   void hello(const v1::Hello& message);
   void poses(const v1::ColliderPoses& message, Clock::time_point now);
@@ -97,7 +99,6 @@ class Session final : public hosting::Peer, public std::enable_shared_from_this<
   std::optional<std::uint64_t> actor(const std::string& scene, scene::Action action);
   enum class DisconnectReason : std::uint8_t { left, removed, lost };
   void disconnect(DisconnectReason reason);
-  // Both need the lock.
   void closeLocked(delivery::SharedBytes last, DisconnectReason reason);
 
   hosting::SceneServer::State& server_;

@@ -26,7 +26,7 @@ namespace clothstream::simulation {
 // a barrier, so that it sees earlier work of its recording and of earlier recordings.
 //
 // A tick:   recordTick -> (submit, wait) -> status
-// Same inputs give the same bits, on every conforming device, whatever the options.
+// The same inputs give the same bits on every conforming device and with all options.
 
 // Inputs of one tick. All values are validated before.
 struct TickInputs {
@@ -62,7 +62,7 @@ struct SimulationOptions {
 
 class ClothSimulation {
  public:
-  // The scene must be valid (messages/validate). Throws std::runtime_error if the device has too little
+  // The scene must be valid (server/messages). Throws std::runtime_error if the device has too little
   // memory.
   ClothSimulation(const vulkan::Device& device, const model::Scene& scene, SimulationOptions options = {});
   ~ClothSimulation();

@@ -39,8 +39,8 @@ struct XpbdTables {
   };
 
   std::vector<XpbdTile> tiles;
-  TileRange wholeGrids{}, wholeMeshes{},
-      nodes{};  // ranges of `tiles`; a tile of `nodes` has XpbdCut::partWorkgroup nodes
+  // Ranges of `tiles`. A tile of `nodes` has XpbdCut::partWorkgroup nodes.
+  TileRange wholeGrids{}, wholeMeshes{}, nodes{};
   std::array<TileRange, kGridPasses> partGrids{};
   std::vector<shared::ColourRecord> colours;  // of meshes that one workgroup corrects
   std::vector<shared::XpbdLinkRecord> links;  // of all meshes, colour by colour

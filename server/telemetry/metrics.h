@@ -36,7 +36,7 @@ struct SceneMetrics {
   Counter slippedTicks;      // ticks by which simulated time fell behind real time
   Counter frames;            // packets encoded
   Counter keyFrames;         // packets that are key frames
-  Counter packetBytes;       // bytes of all packets; subscribers do not multiply them
+  Counter packetBytes;       // bytes of all packets, each counted once for all subscribers
   Counter skippedFrames;     // frames not encoded because the encoder was behind, per quality
   Counter framesTaken;       // frames taken by endpoints, per subscriber
   Counter framesDropped;     // frames not sent because the subscriber was behind, per subscriber

@@ -46,8 +46,8 @@ struct Bindings::Handles {
 struct Recorder::Handles {
   vk::raii::CommandPool pool = nullptr;
   vk::raii::CommandBuffer commands = nullptr;
-  vk::raii::QueryPool timestamps =
-      nullptr;  // mark i begins stage marks_[i]; one more mark ends the last stage
+  // Mark i begins stage marks_[i]; one more mark ends the last stage.
+  vk::raii::QueryPool timestamps = nullptr;
 };
 
 }  // namespace clothstream::vulkan

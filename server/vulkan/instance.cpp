@@ -62,7 +62,7 @@ vk::DebugUtilsMessengerCreateInfoEXT messengerInfo() {
 }
 
 // One for each processor this process may use. Measured: ms from submission to completion of ten dependent
-// dispatches that gather 12 neighbours a node (lavapipe of Mesa 22.3.6, two processors, others using less
+// dispatches that gather 12 neighbours per node (lavapipe of Mesa 22.3.6, two processors, others using less
 // than 0.12 of one; median of at least six medians):
 //   threads     0 (inline)   1      2      3
 //   32 x 32       0.52      1.4    1.2    0.85

@@ -70,7 +70,7 @@ class Bindings {
   Bindings& operator=(Bindings&&) noexcept;
 
   const Kernel& kernel() const { return *kernel_; }
-  // For this room alone (handles.h).
+  // Only for this folder (handles.h).
   struct Handles;
   const Handles& handles() const { return *handles_; }
 

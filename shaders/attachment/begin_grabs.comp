@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Beginning grabs grab the nodes within their radius. If there is none, they grab the nearest node within
+// Beginning grabs grab the nodes within their radius. Without such a node they grab the nearest node within
 // reach.
 #version 450
 #extension GL_GOOGLE_include_directive : require

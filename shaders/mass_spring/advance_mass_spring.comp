@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// One substep of the mass-spring model for every node of a scene.
+// One substep of the mass-spring model for every node of a scene's grids.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Measures how deep free nodes lie in a collider at the tick's end; an invocation handles kReportDepths
+// Measures the depth of free nodes inside colliders at the tick's end; an invocation handles kReportDepths
 // nodes. The deepest node of a cloth follows from an atomic maximum of the depths' bits, which order as the
 // depths do. The order of the invocations does not matter.
 #version 450

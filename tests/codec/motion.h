@@ -21,7 +21,7 @@ MotionFrame sampleMotion(const StreamLayout& layout, std::uint64_t tick, float a
 // result depends only on the seed.
 MotionFrame scatter(const StreamLayout& layout, std::uint32_t seed, float extent);
 
-// Odd-sized grids, a grid of one row, a grid of one vertex and a cloth that is no grid.
+// Odd-sized grids, a grid of one row, a grid of one vertex and a cloth that is not a grid.
 StreamLayout mixedLayout(NormalMode normals, std::uint8_t codec = kCodecHierarchical);
 
 // Angle between vectors of any length.

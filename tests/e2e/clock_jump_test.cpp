@@ -87,8 +87,8 @@ class ClockJump : public RunningServer {
     EXPECT_EQ(process.waitForEnd(kPatience), code) << process.errors();
     return process.output();
   }
-  // Time by which the server's clock is ahead, from the name that the server chooses for a recording. The
-  // recording itself fails, since the scene has no participants.
+  // Returns how far the server's clock is ahead, from the name that the server chooses for a recording. The
+  // recording itself fails, because the scene has no participants.
   std::chrono::seconds ahead() const {
     const std::string name = ask({"start-recording", "small_with_normals"});
     ask({"stop-recording", "small_with_normals"}, 4);

@@ -98,8 +98,8 @@ TEST_F(ImpairedLink, KeepsConnectionThroughStallOfOneSecond) {
   EXPECT_EQ(cuts_, 0);
 }
 
-// The promise is to reduce the rate within 500 ms and to restore it within 3 s; tests/stream checks that with
-// a simulated clock. Here five times as long is allowed for a busy machine.
+// The promise is to reduce the rate within 500 ms and to restore it within 3 s; tests/serving/delivery
+// checks that with a simulated clock. Here five times as long is allowed for a busy machine.
 TEST_F(ImpairedLink, SendsLessOverNarrowLink) {
   const auto client = joinThroughLink();
   ASSERT_TRUE(streams(*client, 60));

@@ -41,9 +41,9 @@ constexpr const char* kScene = R"({
 struct Seen {
   std::mutex mutex;
   std::uint64_t frames = 0, firstTick = 0, newestTick = 0;
-  std::uint64_t keyFramesAtFirst = 0;  // key frames that were decoded when the first frame was there
+  std::uint64_t keyFramesAtFirst = 0;  // decoded key frames when the first frame arrived
   std::uint64_t joins = 0,
-                tickAtJoin = 0;  // other clients that joined; the newest tick when the last one did
+                tickAtJoin = 0;  // other clients that joined; newest tick when the last of them joined
   bool matches = true;           // every frame equals the server's reconstruction
   std::uint32_t quality = 0;
   Clock::time_point first{};

@@ -60,7 +60,7 @@ class LostDevice : public RunningServer {
 // Most ticks between the last frame before a failure and the first one after it: 0.1 s of the scene.
 constexpr std::uint64_t kMostTicksSkipped = 12;
 
-// A client of a scene, and what must not happen to it.
+// A client of a scene. Counts cuts, restarts, skipped ticks and frames that do not match.
 struct Watcher {
   std::unique_ptr<GrpcClient> join(const std::string& address, const std::string& scene = "") {
     GrpcClientOptions options;

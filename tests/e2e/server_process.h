@@ -25,13 +25,14 @@ class ServerProcess {
   ServerProcess(const ServerProcess&) = delete;
   ServerProcess& operator=(const ServerProcess&) = delete;
 
-  // Reads on until a line contains `text`; returns the line.
+  // Reads until a line contains `text`, and returns that line.
   std::string lineWith(const std::string& text);
   // Port in the line "page    http://127.0.0.1:8080/" or "gRPC    127.0.0.1:50051".
   std::uint16_t portIn(const std::string& line) const;
 
   void signal(int number) const;
-  // Reads to the end. Returns the program's exit code, or minus the signal that ended it.
+  // Reads to the end of the output. Returns the program's exit code, or the negative number of the signal
+  // that ended it.
   int exitCode();
   // Standard output and standard error so far, in order of arrival.
   const std::string& output() const { return output_; }

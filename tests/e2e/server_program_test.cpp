@@ -137,7 +137,7 @@ std::vector<float> numbersIn(const std::filesystem::path& path) {
   return numbers;
 }
 
-// Two runs write the same states, also when the second one writes fewer of them.
+// Two runs write the same states, also if the second run writes fewer states.
 TEST_F(ServerProgram, StepWritesAFileWithADescription) {
   const std::filesystem::path whole = sceneFile().replace_filename("whole.f32");
   const std::filesystem::path some = sceneFile().replace_filename("some.f32");

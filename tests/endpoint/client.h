@@ -29,7 +29,7 @@ class Client {
   virtual std::optional<std::string> receive() = 0;
   // How the server ended the stream. Call it after receive() returned nullopt.
   virtual StreamEnd end() = 0;
-  // Says goodbye in the way of the endpoint.
+  // Leaves with the goodbye of the transport: a half-closed gRPC stream or a close frame.
   virtual void leave() = 0;
   // Breaks the connection without a goodbye.
   virtual void disconnect() = 0;

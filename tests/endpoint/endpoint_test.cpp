@@ -171,7 +171,7 @@ TEST_P(Endpoint, SkipsFramesForSlowReaderWithoutDelayingOthers) {
     if (slow.viewer.last.has_frame() && slow.viewer.tick() < now) ++stale;
     return slow.viewer.tick() >= now;
   }));
-  EXPECT_LE(stale, 6U);  // two, and one more for each 33 ms of round-trip time on a busy machine
+  EXPECT_LE(stale, 6U);  // two, and one for each 33 ms of round-trip time on a busy machine
   EXPECT_TRUE(slow.see(10));
 }
 

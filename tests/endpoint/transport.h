@@ -36,9 +36,9 @@ class Transport {
   // Port of the open endpoint.
   virtual std::uint16_t port() const = 0;
 
-  // With `smallBuffer`, the client takes only a few KiB that it has not read.
+  // With `smallBuffer`, the client's system buffers only a few KiB of unread data.
   virtual std::unique_ptr<Client> connect(bool smallBuffer = false) = 0;
-  // Keeps a client alive that reads nothing. Does nothing where the transport itself answers pings.
+  // Keeps a client that reads nothing from counting as vanished. Does nothing if the transport answers pings.
   virtual void keepAlive(Client&) {}
   // Whether the endpoint accepts one more connection.
   virtual bool hasRoom() = 0;

@@ -19,9 +19,10 @@ std::string hello(const std::string& scene = "");
 std::string ping(std::uint64_t clientTimeUs = 1);
 // One sphere collider of radius 0.2 m with id 1, or no collider without `x` (m).
 std::string colliderPose(std::optional<float> x);
-// This many bytes that are not a ClientMessage.
+// `bytes` bytes that are not a ClientMessage.
 std::string garbage(std::size_t bytes);
 
+// Decodes the messages of one stream.
 class Viewer {
  public:
   // Takes one serialised ServerMessage. Returns the answer of a well-behaved client, if any: a FrameAck or a

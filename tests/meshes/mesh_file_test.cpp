@@ -136,7 +136,7 @@ void expectSheet(const tl::expected<MeshSource, std::string>& source) {
   EXPECT_EQ(source->vertices[2], Vec3(-1, 3, 3));  // (1, 1, 0) mirrored, doubled, moved
   ASSERT_EQ(source->faces.size(), 2u);
   EXPECT_THAT(source->faces[0].vertices,
-              testing::ElementsAre(2, 1, 0, 0));  // turned, for the mirror turns it
+              testing::ElementsAre(2, 1, 0, 0));  // reversed, because the mirror reverses the orientation
   EXPECT_EQ(source->uvs[2], model::Uv(1, 0));     // glTF's v runs down
   ASSERT_EQ(source->parts.size(), 1u);
   EXPECT_EQ(source->parts[0].name, "linen");

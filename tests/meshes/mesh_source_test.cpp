@@ -89,7 +89,7 @@ TEST(BuildMesh, PlacesNeighboursCloseInMemory) {
   double reach = 0;
   for (const model::SpringLink& link : built->mesh.links) reach += link.b - link.a;
   reach /= static_cast<double>(built->mesh.links.size());
-  EXPECT_LT(reach, built->mesh.nodeCount() / 20.0);  // by lot it is a third of the nodes
+  EXPECT_LT(reach, built->mesh.nodeCount() / 20.0);  // a random order gives a third of the nodes
 }
 
 TEST(BuildMesh, KeepsItsOwnOrder) {

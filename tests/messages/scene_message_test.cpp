@@ -219,9 +219,9 @@ v1::Attachment& attachment(v1::Scene& scene, const char* name) {
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
 struct BadScene {
-  const char* error;  // what the text starts with
+  const char* error;  // start of the error text
   std::function<void(v1::Scene&)> spoil;
-  const char* allowed = "must";  // what it says further on
+  const char* allowed = "must";  // a later part of the error text
 };
 
 v1::Cloth& cloth(v1::Scene& scene) {

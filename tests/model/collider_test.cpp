@@ -61,7 +61,7 @@ TEST(PoseAt, InterpolatesOrientations) {
 
 TEST(PoseAt, RotatesAlongTheShorterPath) {
   Collider collider = moving();
-  collider.motion.keys[1].orientation.coeffs() *= -1;  // the same turn
+  collider.motion.keys[1].orientation.coeffs() *= -1;  // the same rotation
   EXPECT_NEAR(angleAt(collider, 0.5), 45, 1e-4);
 }
 

@@ -71,7 +71,7 @@ TEST(ConvexHull, RefusesAnOpenSurface) {
 
 TEST(ConvexHull, RefusesADent) {
   Parts parts = pyramid();
-  parts.vertices[4] = Vec3(0, -0.2f, 0);  // above the base no more
+  parts.vertices[4] = Vec3(0, -0.2f, 0);  // below the base
   EXPECT_THAT(problemOf(parts).text, HasSubstr("must be convex"));
 }
 

@@ -92,7 +92,7 @@ assert.equal(indexedMessages, statistics.messageCount);
 const facts = {};
 for await (const { metadata } of indexed.readMetadata({ name: "clothstream" }))
   Object.assign(facts, Object.fromEntries(metadata));
-assert.ok(Object.keys(facts).length > 0, "its facts are found");
+assert.ok(Object.keys(facts).length > 0, "the metadata is found");
 
 const found = Object.fromEntries(Object.keys(schemaOf).map((topic) => [topic, { messages: 0, bytes: 0 }]));
 for (const [id, count] of counts) found[topics.get(id)] = { messages: Number(count), bytes: sizes.get(id) };

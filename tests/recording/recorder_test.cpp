@@ -110,7 +110,7 @@ void happen(RecordedScene& recorded) {
   model::Solver constraint;
   constraint.kind = model::SolverKind::constraint;
   recorded.change({.cloths = {{.solver = constraint}}});
-  recorded.ticks(30);  // gently at first, then hard
+  recorded.ticks(30);  // longer than the correction fraction applies (0.5 s)
   recorded.live.inbox.postPoses(9, {}, recorded.now);
   model::ParameterChange heavier;
   heavier.cloths = {

@@ -17,8 +17,7 @@ model::Cloth patch(float friction) {
   return cloth;
 }
 
-// Collides with a sphere that stands still, or moves with this velocity, as if each node had been in its
-// place before.
+// Collides with a sphere that rests or moves with the given velocity. The nodes have not moved before.
 void collideWithSphere(ReferenceCloth& cloth, const Vec3& centre, const Vec3& velocity, float radius,
                        double friction) {
   const ColliderStep step{.before = {centre}, .after = {centre}, .velocity = velocity, .spin = Vec3::Zero()};
@@ -67,7 +66,7 @@ TEST(ReferenceCollision, LeavesTheVelocityOfNodesThatLeave) {
   EXPECT_EQ(cloth.velocities()[0], Vec3(3, 2, 0));
 }
 
-// The top of a sphere of 1 km is a plane; gravity is tilted instead of it.
+// The top of a sphere of 1 km is nearly a plane. Gravity is tilted instead of the plane.
 double slideOn(double slope, float friction, double seconds) {
   ReferenceCloth cloth(patch(friction));
   for (Vec3& position : cloth.positions()) position = Vec3(position.x(), 0.01, position.y() + 0.05);
@@ -102,8 +101,8 @@ TEST(ReferenceTick, MovesASphereInAStraightLineOverItsSubsteps) {
   ReferenceSimulation simulation(scene);
   const TickInputs inputs{kWeightless, {{model::Sphere{0.5f}, {Vec3(0, 0, 0)}, {Vec3(0, 0, 4)}, 1}}};
   ReferenceCloth& cloth = simulation.cloths()[0];
-  // Where substep 2 ends the sphere is at z = 3: a node just in front of its pole is pushed then, and by no
-  // other.
+  // At the end of substep 2 the sphere is at z = 3. Only this substep pushes a node just in front of its
+  // pole.
   cloth.positions()[0] = Vec3(0, 0, 3.505);
   for (std::uint32_t substep = 0; substep < 2; ++substep) {
     simulation.substep(inputs, substep);
@@ -111,7 +110,7 @@ TEST(ReferenceTick, MovesASphereInAStraightLineOverItsSubsteps) {
   }
   simulation.substep(inputs, 2);
   EXPECT_NEAR(cloth.positions()[0].z(), 3.51, 1e-8);
-  // It took the sphere's speed, 4 m in a tick, and stays in front of it.
+  // The node has the speed of the sphere, 4 m per tick, and stays in front of it.
   simulation.substep(inputs, 3);
   EXPECT_NEAR(cloth.positions()[0].z(), 4.51, 1e-6);
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Contact of a way with each shape, by geometry that can be done in the head.
+// Contact of a moving point with each shape, compared with simple geometry.
 #include "server/reference/contact.h"
 
 #include <cmath>
@@ -68,12 +68,13 @@ TEST(ReferenceContact, KeepsTheClothsThickness) {
 }
 
 TEST(ReferenceContact, FollowsTheMotionAndRotationOfTheShape) {
-  // The box comes to the point, which stands still.
+  // The box moves to the point, which rests.
   ColliderStep step;
   step.before = {Vec3(-5, 0, 0), Quaternion::Identity()};
   step.after = {Vec3(5, 0, 0), Quaternion::Identity()};
   expectContact(contactOf(kBox, 0, step, Vec3::Zero(), Vec3::Zero()), Vec3::UnitX(), 6);
-  // A rod that turns by 90 degrees sweeps over the point: in its frame that goes from Y to X.
+  // A rod rotates by 90 degrees and sweeps over the point. In the frame of the rod the point moves from Y to
+  // X.
   const model::Shape rod = model::Capsule{.radius = 0.1f, .length = 4};
   const double half = std::sqrt(0.5);
   step.before = {Vec3::Zero(), Quaternion(half, 0, 0, half)};  // along -X

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Materials bend as strips of them do in the laboratory.
+// Materials bend as strips of cloth do in the laboratory.
 #include "server/model/material.h"
 
 #include <cmath>
@@ -11,9 +11,9 @@
 namespace clothstream::reference {
 namespace {
 
-// ASTM D1388, turned round: twice the bending length of a strip, in `parts`, sticks out over an edge. How far
-// below the horizontal the line from the edge to its end lies when it has come to rest, degrees. Implicit
-// Euler finds that however stiff the springs are.
+// ASTM D1388 in reverse: a strip of `parts` parts sticks out over an edge by twice its bending length.
+// Returns the angle in degrees between the horizontal and the line from the edge to the end of the strip at
+// rest. Implicit Euler is stable for springs of any stiffness.
 double sag(const model::Material& material, std::uint32_t parts) {
   const double part = 2 * model::bendingLength(material) / parts;
   model::Cloth strip;

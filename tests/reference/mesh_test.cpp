@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Meshes in the reference: the forces of a grid given as one, and normals.
+// Meshes in the reference: the forces of a grid that is given as a mesh, and normals.
 #include <cmath>
 
 #include <gtest/gtest.h>
@@ -49,8 +49,8 @@ TEST(ReferenceMesh, HasTheNormalsOfItsTriangles) {
   model.mesh = std::make_shared<const model::Mesh>(model::makeMesh(dome));
   const ReferenceCloth cloth(model);
   const std::vector<Vec3> normals = cloth.normals();
-  // On a unit sphere a node is its own normal; an area's mean is a degree off where triangles lie to one
-  // side.
+  // On a unit sphere the normal of a node equals its position. The mean over the triangles is off by a degree
+  // if they lie on one side of the node.
   for (std::size_t i = 0; i < normals.size(); ++i)
     EXPECT_GT(normals[i].dot(cloth.positions()[i]), std::cos(0.05)) << i;
   EXPECT_NEAR(normals[0].y(), 1, 1e-6);

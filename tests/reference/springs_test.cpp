@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The reference against closed forms: free fall, one spring, a hanging column, and what must be conserved.
+// The reference compared with closed forms (free fall, one spring, a hanging column) and conservation laws.
 #include <Eigen/Geometry>
 #include <cmath>
 #include <numbers>
@@ -28,14 +28,15 @@ TEST(ReferenceFreeFall, IsThatOfTheIntegrator) {
   const double g = environment.gravity.y(), h = 0.001;
   const int n = 1000;
   for (const Integrator integrator : {Integrator::semiImplicitEuler, Integrator::explicitEuler}) {
-    // Explicit Euler would blow up what little the rounding of rest positions to float leaves in the springs.
+    // Explicit Euler would amplify the small stretch that the rounding of rest positions leaves in the
+    // springs.
     ReferenceCloth cloth(integrator == Integrator::explicitEuler ? withoutSprings(sheet(6, 5))
                                                                  : sheetWithAllSprings(6, 5));
     const std::vector<Vec3> start(cloth.positions().begin(), cloth.positions().end());
     for (int i = 0; i < n; ++i) cloth.integrate(environment, integrator, h);
     // Sum of the velocities 1..n, or 0..n-1, times h.
     const double fallen = 0.5 * g * h * h * n * (integrator == Integrator::semiImplicitEuler ? n + 1 : n - 1);
-    // By that rounding, some 1e-8 m, the springs of the other swing.
+    // With the other integrator the springs swing by that rounding, some 1e-8 m.
     for (std::size_t i = 0; i < start.size(); ++i)
       EXPECT_LT((cloth.positions()[i] - start[i] - Vec3(0, fallen, 0)).norm(), 1e-6);
   }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The stability bound of server/model against what the reference does.
+// The stability bound of server/model compared with runs of the reference.
 #include <cmath>
 #include <complex>
 
@@ -23,8 +23,8 @@ model::Scene stretched(Integrator integrator) {
   return scene;
 }
 
-// By 5 % in the plane and shaken a little; two nodes of its rim, as far as bend springs reach, are held, so
-// that the rest is in balance.
+// Stretches the cloth by 5 % in its plane and displaces its nodes by up to 1e-6 m. The two outer rows and
+// columns on each side are pinned, because bend springs reach that far. The other nodes are in balance.
 ReferenceCloth stretchedCloth(model::Cloth model) {
   const std::uint32_t row = model.grid.rows - 1, column = model.grid.columns - 1;
   model.pins = {{.firstRow = 0, .lastRow = 1, .firstColumn = 0, .lastColumn = column},
@@ -42,7 +42,7 @@ double energyAfter(ReferenceCloth& cloth, Integrator integrator, double h, int s
   return cloth.kineticEnergy();
 }
 
-// A hundred thousand times what the shaking put in, or no number any more.
+// The energy is a hundred thousand times that of the displacement, or is not finite.
 bool diverges(double energy) {
   return !(energy < 1e-3);
 }
@@ -92,7 +92,7 @@ TEST(StabilityBound, IsBelowTheTrueLimit) {
   const double bound = scene.tickSeconds() / substeps;
   const double limit = 2 / std::sqrt(largestEigenvalue(stretchedCloth(scene.cloths[0])));
   EXPECT_LT(bound, limit);
-  EXPECT_GT(bound, 0.5 * limit);  // of use, too: within a factor of two
+  EXPECT_GT(bound, 0.5 * limit);  // the bound is within a factor of two of the limit
   ReferenceCloth below = stretchedCloth(scene.cloths[0]), above = below;
   EXPECT_LT(energyAfter(below, scene.integrator, 0.98 * limit, 5000), 1e-6);
   EXPECT_TRUE(diverges(energyAfter(above, scene.integrator, 1.1 * limit, 1000)));
@@ -103,7 +103,7 @@ TEST(StabilityBound, IsBelowTheTrueLimitOfRungeKutta) {
   for (model::Spring* spring : {&scene.cloths[0].structural, &scene.cloths[0].shear, &scene.cloths[0].bend})
     spring->damping = 0;
   const double bound = scene.tickSeconds() / model::stableSubsteps(scene);
-  // On the imaginary axis the method bears 2 sqrt(2).
+  // On the imaginary axis the method is stable up to 2 sqrt(2).
   const double limit = 2 * std::sqrt(2.0) / std::sqrt(largestEigenvalue(stretchedCloth(scene.cloths[0])));
   EXPECT_LT(bound, limit);
   EXPECT_GT(bound, 0.5 * limit);
@@ -122,7 +122,8 @@ TEST(StabilityBound, LiesWithinTheRegionOfRungeKutta) {
     }
 }
 
-// Against the exact swing of a spring the error after a given time falls by 2^4 where the step is halved.
+// Compared with the exact motion of a spring, the error after a given time falls by 2^4 if the step is
+// halved.
 TEST(RungeKutta, ErrsWithTheFourthPowerOfTheStep) {
   model::Cloth model = sheetWithAllSprings(2, 2);
   model.shear = model.bend = {};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Memory allocated by this process.
+// Measures the memory that this process has allocated.
 #pragma once
 
 #include <cstddef>
@@ -13,7 +13,8 @@ extern "C" std::size_t __sanitizer_get_current_allocated_bytes();
 
 namespace clothstream::tests {
 
-// Promised limit for one client, in bytes, without its uploads and what all clients share.
+// Promised limit of the memory for one client, bytes. Uploads and data that all clients share are not
+// included.
 inline constexpr double kMostBytesAClient = 4 << 20;
 
 inline double allocatedBytes() {

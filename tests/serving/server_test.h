@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A server with small scenes on the available device, for tests from a peer's view.
+// Fixture: a server with small scenes on the available device, tested through its peers.
 #pragma once
 
 #include <memory>
@@ -16,10 +16,10 @@
 
 namespace clothstream::tests {
 
-// Skips its tests, with the reason, if there is no device.
+// Skips the test, with the reason, if there is no device.
 class ServerTest : public ::testing::Test {
  protected:
-  // The scenes "small", which is the default, "other", and these. Once a test.
+  // Starts the server with the scenes "small" (the default), "other" and `more`. Call it once per test.
   void start(hosting::ServerOptions options = {}, const std::vector<model::Scene>& more = {}) {
     options.defaultScene = "small";
     std::vector scenes{smallScene("small"), smallScene("other")};

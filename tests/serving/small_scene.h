@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Test scene: small enough for any machine, and everything in it moves.
+// Test scene that any machine simulates in real time. Its cloth and its collider move.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A client inside the process.
+// Reads messages, assembles the description and decodes frames.
 #include "tests/serving/test_peer.h"
 
 #include <cstring>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A client inside the process: serialised messages through a Session, decoded frames.
+// A client in the same process: exchanges serialised messages with a Session and decodes its frames.
 #pragma once
 
 #include <chrono>
@@ -19,7 +19,7 @@
 
 namespace clothstream::tests {
 
-// A frame as it was received and decoded.
+// A received and decoded frame.
 struct SeenFrame {
   std::uint64_t tick = 0;
   bool key = false;
@@ -29,7 +29,8 @@ struct SeenFrame {
   std::vector<v1::ColliderState> colliders;
 };
 
-// Belongs to one thread. Reads only inside its functions, which fail the test (and throw) after kPatience.
+// Belongs to one thread. Reads only while a function waits. Such a function throws std::runtime_error after
+// kPatience.
 class TestPeer {
  public:
   static constexpr std::chrono::seconds kPatience{60};
@@ -46,18 +47,19 @@ class TestPeer {
   // Says hello and reads until the first frame is decoded.
   void join(const std::string& scene = "");
 
-  // Reads on until this holds of the message last read; returns it.
+  // Reads until `wanted` returns true for a message, and returns that message.
   v1::ServerMessage readUntil(const std::function<bool(const v1::ServerMessage&)>& wanted);
   v1::ServerMessage readUntil(v1::ServerMessage::BodyCase body);
-  // Reads until this number of further frames is decoded.
+  // Reads until `count` more frames are decoded.
   void readFrames(std::size_t count);
-  // Reads on until the connection is finished and has no more; returns the last message.
+  // Reads until the session is finished and has no more messages. Returns the last message.
   v1::ServerMessage readToTheEnd();
 
   bool finished() const { return connection_->finished(); }
-  // As if the other end had vanished; it may be held.
+  // Ends without a goodbye, like a lost connection. The server keeps the participant's place for the grace
+  // period.
   void vanish() { connection_.reset(); }
-  // Goes on with the description that the other holds, which can decode no more.
+  // Takes over the description and decoder of `other`, which cannot decode frames afterwards.
   void inherit(TestPeer& other) {
     description_ = other.description_;
     decoder_ = std::move(other.decoder_);

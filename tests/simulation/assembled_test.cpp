@@ -82,8 +82,8 @@ void expectLikeSolution(model::Scene scene, unsigned seed, simulation::Simulatio
       EXPECT_LE(solve.residual, compared.tolerance);
     }
   }
-  // Without the solve, or with an iteration less where few are made, it would be elsewhere: the comparison
-  // can fail.
+  // Without the solve, or with one iteration less if there are few, the nodes would be elsewhere. So the
+  // comparison can fail.
   for (model::Cloth& cloth : scene.cloths)
     if (compared.iterations < kSolveIterations)
       --cloth.solver.iterations;
@@ -125,7 +125,7 @@ TEST_F(Assembled, MoveMeshesAsTheReference) {
   expectLikeSolution(sceneOf({assembled(calmCloth(6, 9)), disc(7)}), 7);
 }
 
-// Attached nodes move at a speed of their own, which is part of b.
+// Attached nodes have a prescribed velocity, which is part of b.
 TEST_F(Assembled, FollowAttachmentsAsTheReference) {
   model::Cloth cloth = assembled(calmCloth(8, 7));
   model::Attachment rod;
@@ -141,7 +141,8 @@ TEST_F(Assembled, MoveNodesAsTheReferenceWithSeveralWorkgroups) {
   expectLikeSolution(sceneOf({assembled(calmCloth(21, 26)), disc(7)}), 9, {.solveWholeNodes = 0});
 }
 
-// The same iterates, not just the same limit: [Va21] Eq. 12-17. Few enough that rounding has not grown.
+// Both paths have the same iterates, not only the same limit ([Va21] Eq. 12-17). There are so few iterations
+// that rounding has not grown.
 TEST_F(Assembled, MoveAsFarAsTheReferenceInFewIterations) {
   for (const std::uint32_t wholeNodes : {1'000'000u, 0u})
     for (const std::uint32_t iterations : {1u, 2u, 4u}) {
@@ -209,8 +210,8 @@ TEST_F(Assembled, KeepPinnedNodesInPlace) {
   }
 }
 
-// [Va21]'s system, singular, and in general without a solution: few iterations hold a sheet. More of them
-// throw its nodes about, in double precision too.
+// [Va21]'s system is singular and in general has no solution. A few iterations hold a sheet. With more
+// iterations its nodes become unstable, in double precision too.
 TEST_F(Assembled, HoldASheetWithoutComplianceInFewIterations) {
   model::Cloth cloth = assembled(calmCloth(20, 20), true);
   cloth.pins = {topRow(cloth)};
@@ -274,7 +275,7 @@ TEST_F(Assembled, ReportTheSameForEveryPartitionOfWork) {
       }
 }
 
-// More iterations than a dispatch may make where one workgroup solves.
+// More iterations than one dispatch may make if a single workgroup solves.
 TEST_F(Assembled, GiveTheSameBitsInSeveralDispatches) {
   model::Cloth cloth = assembled(calmCloth(37, 29), true);
   cloth.pins = {topRow(cloth)};
@@ -296,13 +297,13 @@ TEST_F(Assembled, GiveTheSameHashesInRunsOfAThousandTicks) {
   expectSameThousandTicks(scene, passingBall, {.workgroupSize = 16, .solveWholeNodes = 0});
 }
 
-// The same number on every device.
+// The hash is the same on every device.
 TEST_F(Assembled, ReachTheHashOfEveryOtherDevice) {
   EXPECT_EQ(hashAfter(systems(), passingBall, 12, {.solveWholeNodes = 700}), 0x2cdc132fea593d4cu);
 }
 
-// Back and forth: the state stays to the bit, and goes on to the bit as one that always had this path would
-// from the same state.
+// The path changes and changes back. The state keeps every bit. The motion then has the same bits as that of
+// a scene that always had this path and continues from the same state.
 TEST_F(Assembled, ReplaceTheMatrixFreePathWithoutAJump) {
   model::Scene scene = sceneOf({assembled(calmCloth(14, 11)), disc(5)});
   scene.cloths[0].pins = {topRow(scene.cloths[0])};

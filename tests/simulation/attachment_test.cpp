@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What holds cloth: attachments, tethers, grabs.
+// Attachments, tethers and grabs.
 #include <algorithm>
 #include <cmath>
 
@@ -33,7 +33,7 @@ Grab taking(const Vec3& at, float radius) {
   return {.state = Grab::State::takes, .start = moved(at), .end = moved(at), .radius = radius};
 }
 
-// The same grab, on its way to another place.
+// The same grab, which moves to another place in the next tick.
 Grab onTheWay(const Grab& grab, const Vec3& to) {
   Grab next = grab;
   next.state = Grab::State::holds;
@@ -42,7 +42,7 @@ Grab onTheWay(const Grab& grab, const Vec3& to) {
   return next;
 }
 
-// Nothing between its nodes, and nothing that pulls at them.
+// A cloth without springs, damping and gravity.
 model::Scene dust(std::uint32_t rows, std::uint32_t columns) {
   model::Scene scene = sceneOf({calmCloth(rows, columns)});
   model::Cloth& cloth = scene.cloths[0];
@@ -135,7 +135,7 @@ TEST_F(Attachments, KeepNodesAtTheirFrameAgainstEveryForce) {
         EXPECT_LT((state.positions[node] - place).norm(), 20 * kRounding) << tick;
       }
     }
-    // The cloth came along.
+    // The cloth has followed.
     EXPECT_GT(running.state().positions[44].z(), -2);
     EXPECT_LT(running.state().positions[44].z(), -0.1f);
   }
@@ -156,8 +156,8 @@ TEST_F(Attachments, FollowAJumpingFrameAtThirtyMetresPerSecond) {
   EXPECT_NEAR(running.state().velocities[0].norm(), 0, 1e-4);
 }
 
-// Hung by two corners, of springs so weak that they would let it fall: no node gets farther from either
-// corner than the way along the cloth.
+// The cloth hangs by two corners and has springs that are too weak to hold it. No node gets farther from
+// either corner than the distance along the cloth.
 TEST_F(Attachments, TethersLimitTheStretchOfWeakSprings) {
   const auto farthestOf = [](bool tethered, std::size_t which) {
     model::Cloth cloth = calmCloth(17, 17);
@@ -267,7 +267,7 @@ TEST_F(Attachments, ReleasedNodesAreFreeAndCanBeGrabbedAgain) {
   EXPECT_NEAR(running.state().positions[4].z() - centre.z(), 0.02, 1e-4);
   inputs.grabs = {taking(running.state().positions[4], 0.001f), taking(running.state().positions[4], 0.001f)};
   running.tick(inputs);
-  // One node, two hands: the first has it.
+  // Two hands grab one node. The first one holds it.
   EXPECT_EQ(running.grabs()[0].taken, 1u);
   EXPECT_EQ(running.grabs()[1].taken, 0u);
   EXPECT_NEAR(running.state().velocities[4].norm(), 0, 1e-4);

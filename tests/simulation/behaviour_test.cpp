@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What physics says of whole runs: falling, momentum, pins, spheres, and the reference over 200 ticks.
+// Physics of whole runs: falling, momentum, pins, spheres, and a comparison with the reference over 200
+// ticks.
 #include <algorithm>
 #include <cmath>
 
@@ -169,7 +170,8 @@ TEST_F(Behaviour, AClothDroppedOnASphereRestsOnItsSurface) {
   EXPECT_LT(deepest, 1e-5 * radius);
 }
 
-// A node that rests on a huge sphere that moves sideways: with friction it goes along, without it stays.
+// A node rests on a huge sphere that moves sideways. With friction it moves with the sphere; without friction
+// it stays.
 TEST_F(Behaviour, FrictionCarriesAClothAlongWithASphere) {
   const float radius = 100;
   const auto carried = [&](float friction) {

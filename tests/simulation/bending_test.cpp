@@ -82,7 +82,7 @@ TEST_F(DihedralBending, MovesGridsAndMeshesAsTheReference) {
   EXPECT_LT(largestSpeedDifference(running.state(), reference), error);
   EXPECT_LT(largestDistance(running.state(), reference), h * error + kRounding);
 
-  // Without hinges it would be elsewhere: the comparison can fail.
+  // Without hinges the nodes would be elsewhere, so the comparison can fail.
   model::Scene limp = scene;
   for (model::Cloth& cloth : limp.cloths) cloth.dihedralBending = 0;
   reference::ReferenceSimulation other(limp);
@@ -128,7 +128,7 @@ TEST_F(DihedralBending, BendsACantileverAsBeamsBend) {
   EXPECT_NEAR(-tip, expected, 0.02 * expected);
 }
 
-// As large as the bound allows: what goes in does not grow.
+// The rigidity is at its bound. The energy does not grow.
 TEST_F(DihedralBending, IsStableAtItsBound) {
   model::Cloth sheet = looseGrid(0.05f);
   sheet.damping = 0;
@@ -155,7 +155,8 @@ TEST_F(DihedralBending, IsStableAtItsBound) {
   EXPECT_LT(energy(running.state()), 10 * before);
 }
 
-// With every solver, switched on while it runs: the state stays, and goes on as one that always had it.
+// Dihedral bending is switched on in motion, with every solver. The state keeps every bit, and the motion is
+// that of a scene that always had it.
 TEST_F(DihedralBending, CanComeAndGoWhileItRuns) {
   for (const SolverKind kind : {SolverKind::massSpring, SolverKind::constraint, SolverKind::acad,
                                 SolverKind::xpbd, SolverKind::implicitEuler}) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Cloth against every shape: slopes, spin, speed, and lists of what is near that cannot be seen in the state.
+// Cloth against every shape: slopes, spin and high speed. Lists of near colliders do not change the result.
 #include <algorithm>
 #include <cmath>
 
@@ -19,7 +19,7 @@ MovingCollider resting(const model::Shape& shape, const model::Pose& pose) {
   return {shape, pose, pose, 1};
 }
 
-// Lies flat, at this height.
+// A flat cloth at this height.
 model::Cloth lyingCloth(std::uint32_t rows, std::uint32_t columns, float height) {
   model::Cloth cloth = calmCloth(rows, columns);
   cloth.grid.pose = {model::Vec3(0, height, -cloth.grid.height / 2), turned(-90, model::Vec3::UnitX())};
@@ -90,12 +90,12 @@ TEST_F(Collision, SpinCarriesTheCloth) {
   }
 }
 
-// 25 m/s are 35 mm in a substep: several times the thickness of what flies here. Whatever is hit is carried
-// in front of it, and nothing is passed through.
+// At 25 m/s a shape moves 35 mm in a substep, several times its thickness. It must carry the nodes that it
+// hits in front of it, and pass through none.
 TEST_F(Collision, AFastThinShapeDoesNotPassThroughTheCloth) {
   model::Scene scene = sceneOf({calmCloth(33, 33)});
   model::Cloth& cloth = scene.cloths[0];
-  cloth.structural = cloth.shear = cloth.bend = {};  // dust: nothing pulls a node along but what hits it
+  cloth.structural = cloth.shear = cloth.bend = {};  // dust: only contacts move a node
   scene.environment.gravity = model::Vec3::Zero();
   const model::Shape shapes[] = {model::Sphere{0.01f}, model::Capsule{.radius = 0.005f, .length = 0.3f},
                                  model::Box{model::Vec3(0.3f, 0.3f, 0.01f)}, octahedron()};
@@ -112,7 +112,7 @@ TEST_F(Collision, AFastThinShapeDoesNotPassThroughTheCloth) {
     const reference::Pose start = reference::toPose(at(0)), end = reference::toPose(at(4));
     int hit = 0, untouched = 0;
     for (std::size_t i = 0; i < before.size(); ++i) {
-      // Along its way the shape comes as near as this to where the node was.
+      // `nearest` is the smallest distance from the moving shape to the first position of the node.
       double nearest = 1;
       for (int k = 0; k <= 4000; ++k)
         nearest = std::min(nearest, reference::heightOver(shape, reference::between(start, end, k / 4000.0),
@@ -188,7 +188,7 @@ TEST_F(Collision, NodesStayOutsideEveryShapeAndComeToRest) {
   }
 }
 
-// ---- Lists of what is near
+// ---- Lists of near colliders
 
 // Shapes of all kinds in a cloud around the cloth, from its position to 10 cm away.
 std::vector<MovingCollider> cloud(std::size_t count, float size, unsigned seed) {
@@ -225,9 +225,9 @@ TEST_F(Collision, FarCollidersChangeNoBit) {
   }
 }
 
-// Lists are made for runs of 64 nodes. With a rag of 21 before it, a cloth's nodes fall into other runs, one
-// of which reaches from the rag to the cloth: lists that run over, nodes that leave the box that their list
-// is good for, lists that serve, all give the same.
+// Each run of 64 nodes has a list. A rag of 21 nodes before the cloth shifts its nodes into other runs, and
+// one run then holds nodes of both. The result is the same for lists that overflow, for nodes that leave the
+// box of their list, and for lists that are valid.
 TEST_F(Collision, ListsOfNearCollidersChangeNoBit) {
   const model::Cloth cloth = calmCloth(37, 29);
   model::Cloth rag = calmCloth(3, 7);
@@ -274,8 +274,8 @@ TEST_F(Collision, TheMaximumNumberOfCollidersActsAsInTheReference) {
   EXPECT_GT(largestDistance(simulation::restState(scene.cloths), reference), 0.001);
 }
 
-// Cloth that falls on the ground and comes to rest got back the impulse of gravity: M g t. The test covers
-// every kernel that collides.
+// A cloth that falls on the ground and comes to rest has received the impulse of gravity, M g t, from it. The
+// test covers every kernel that collides.
 TEST_F(Collision, ReportsTheImpulsesOfColliders) {
   using enum model::SolverKind;
   struct Kernel {
@@ -298,13 +298,13 @@ TEST_F(Collision, ReportsTheImpulsesOfColliders) {
     if (kernel.solver == xpbd) cloth.solver.iterations = 1;
     if (kernel.isMesh) cloth = model::asMesh(cloth);
     if (kernel.selfCollides) cloth.selfCollision = model::SelfCollision{.radius = 0.008f};
-    // Another, far above, that touches nothing.
+    // Another cloth far above, which touches nothing.
     model::Cloth above = lyingCloth(3, 3, 50);
     above.name = "above";
     model::Scene scene = sceneOf({above, cloth});
     scene.integrator = kernel.integrator;
     Running running(scene), untold(scene);
-    // Far below, and never touched.
+    // The sphere is far below and never touched.
     simulation::TickInputs inputs =
         inputsOf(scene, {resting(model::Sphere{0.1f}, {model::Vec3(0, -9, 0), model::Quaternion::Identity()}),
                          resting(model::Plane{}, {})});
@@ -320,7 +320,7 @@ TEST_F(Collision, ReportsTheImpulsesOfColliders) {
         EXPECT_EQ(contact.cloth, 1u);
         impulse += contact.impulse;
       }
-      // It falls 64 ms, four ticks and a half.
+      // The cloth falls for 64 ms, which is four and a half ticks.
       if (tick == 3) {
         EXPECT_EQ(impulse, 0);
       }

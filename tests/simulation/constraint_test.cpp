@@ -83,7 +83,7 @@ void expectLikeReference(model::Scene scene, unsigned seed, simulation::Simulati
     EXPECT_GT(solve.iterations, 1u);
     EXPECT_LT(solve.iterations, kSolveIterations);
   }
-  // Without the solve it would be elsewhere: the comparison can fail.
+  // Without the solve the nodes would be elsewhere, so the comparison can fail.
   for (model::Cloth& cloth : scene.cloths) cloth.solver.compliance = 1;
   reference::ReferenceSimulation soft(scene);
   setState(soft, start);
@@ -102,7 +102,7 @@ TEST_F(Constraints, MoveNodesAsTheReferenceOnEveryShapeOfGrid) {
   }
 }
 
-// As after a change of solver.
+// A partial correction, as after a change of solver.
 TEST_F(Constraints, MoveNodesAsTheReferenceWithPartialCorrection) {
   model::Cloth cloth = constrained(9, 8);
   cloth.solver.correctionFraction = 0.125f;
@@ -130,8 +130,8 @@ TEST_F(Constraints, MoveNodesAsTheReferenceWithSeveralWorkgroups) {
   expectLikeReference(sceneOf({constrained(21, 26, true), disc}), 9, {.solveWholeNodes = 0});
 }
 
-// [Va21]'s system, which is singular, and more equations than unknowns: in this form least squares, which
-// have a solution.
+// [Va21]'s system is singular and has more equations than unknowns. In this form it is a least-squares
+// problem, which has a solution.
 TEST_F(Constraints, ConvergeWithoutCompliance) {
   model::Scene scene = swing(20, 10, 200);
   model::Solver& solver = scene.cloths.front().solver;
@@ -151,7 +151,7 @@ TEST_F(Constraints, AreSolvedIndependentlyForEachCloth) {
   expectLikeReference(sceneOf({constrained(6, 9), second}), 6);
 }
 
-// Multipliers act on both ends alike, to the bit but for the sums' rounding.
+// A multiplier acts on both ends of a spring with the same bits. Only the sums are rounded.
 TEST_F(Constraints, KeepAFreeClothsMomentum) {
   model::Cloth cloth = constrained(20, 20);
   cloth.damping = 0;
@@ -171,7 +171,7 @@ TEST_F(Constraints, KeepAFreeClothsMomentum) {
   EXPECT_LT((momentum(running.state()) - momentum(start)).norm(), 1e-6 * flow * 200);
 }
 
-// The sheet swings down from horizontal, the hardest part of its life; 0.8 s.
+// The sheet swings down from horizontal for 0.8 s, which is the hardest part of its motion.
 TEST_F(Constraints, HoldASwingingSheet) {
   const model::Scene scene = swing(32, 10, 20);
   Running running(scene);
@@ -211,7 +211,7 @@ TEST_F(Constraints, LeaveNoNodeInsideASphere) {
     if (masses[i] > 0)
       nearest = std::min(nearest, (state.positions[i] - ball.start.position).cast<double>().norm());
   EXPECT_GT(nearest, distance * (1 - 1e-5));
-  EXPECT_LT(nearest, distance * 1.01);  // and it does touch it
+  EXPECT_LT(nearest, distance * 1.01);  // the sheet does touch the sphere
 }
 
 TEST_F(Constraints, DoNotChangeAMassSpringClothInTheSameScene) {
@@ -238,9 +238,9 @@ model::Cloth adaptive(std::uint32_t rows, std::uint32_t columns) {
   return cloth;
 }
 
-// [Va21] Fig. 15: steps of 0.016 s and springs of 200 N/m; the paper gives no node's mass: 0.05 kg here, with
-// which 2 (4 + 4 + 4) ks h^2 / m = 24.6 where explicit springs bear 4. A sheet hung by two corners, and a
-// ball under it.
+// [Va21] Fig. 15: steps of 0.016 s and springs of 200 N/m. The paper gives no mass of a node.
+// 2 (4 + 4 + 4) ks h^2 / m is 24.6 with 0.05 kg; explicit springs are stable up to 4. A sheet hangs by two
+// corners above a ball.
 model::Scene figure15(model::SolverKind solver) {
   model::Cloth cloth;
   cloth.name = "sheet";
@@ -277,7 +277,7 @@ TEST_F(Adaptive, MoveNodesAsTheReference) {
   reference::ReferenceSimulation reference(scene);
   setState(reference, start);
   reference.tick(referenceInputs(inputsOf(scene)));
-  // Forces on top as in the kernels' tests, far below.
+  // The rounding of forces (kernels_test.cpp) is far smaller.
   const double tolerance = errorOfSolve(solve.constraints);
   EXPECT_LT(largestDistance(running.state(), reference), tolerance);
 }
@@ -286,7 +286,7 @@ TEST_F(Adaptive, EqualMassSpringClothToTheBitWithoutStretch) {
   model::Cloth cloth = adaptive(13, 12);
   cloth.pins = {topRow(cloth)};
   model::Scene held = sceneOf({cloth});
-  held.environment.gravity = model::Vec3(0, -1, 0);  // under which it stretches by 3 %
+  held.environment.gravity = model::Vec3(0, -1, 0);  // stretches the cloth by 3 %
   model::Scene free = held;
   free.cloths.front().solver.kind = model::SolverKind::massSpring;
   const simulation::MovingCollider ball{
@@ -310,7 +310,7 @@ TEST_F(Adaptive, HoldASheetWhereMassSpringDiverges) {
       model::Sphere{0.5f}, {model::Vec3(0, -1.5f, 0.4f)}, {model::Vec3(0, -1.5f, 0.4f)}, 1};
   Running running(scene);
   for (int tick = 0; tick < 186; ++tick) ASSERT_TRUE(running.tick(inputsOf(scene, {ball})).healthy) << tick;
-  // It is far from calm, as in the paper, but it is a cloth still: half as long again at most.
+  // The cloth is far from calm, as in the paper, but stretches by at most a half.
   const NodeState state = running.state();
   EXPECT_LT(strainOf(scene, state).mean, 0.5);
   for (const model::Vec3& p : state.positions) EXPECT_LT(p.norm(), 1.5f * 4.7f);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The same inputs give the same bits: however the work is cut, in whatever company, on whichever device.
+// The same inputs give the same bits for every partition of the work, next to other cloths, and on every
+// device.
 #include <cmath>
 #include <set>
 
@@ -15,8 +16,8 @@ using simulation::StateSnapshot;
 using simulation::TickInputs;
 using simulation::TickStatus;
 
-// Everything at once: two sizes, wind, friction, damping, pins, a sphere that comes through, and one of every
-// other shape, of which some turn.
+// Everything at once: cloths of two sizes, wind, friction, damping and pins. A sphere passes through, and
+// there is a collider of every other shape; some of them rotate.
 model::Scene busyScene() {
   model::Cloth curtain = calmCloth(37, 29);
   curtain.pins = {topRow(curtain)};
@@ -68,8 +69,8 @@ TEST_F(Determinism, GivesTheSameHashesInRunsOfAThousandTicks) {
   }
 }
 
-// The same number on every device: one that fails here cannot take over another's scene, nor replay its
-// recordings.
+// The hash is the same on every device. A device that fails here can neither continue the scenes of another
+// device nor replay its recordings.
 TEST_F(Determinism, TheHashAfterOneHundredTicksIsThatOfEveryOtherDevice) {
   const model::Scene scene = busyScene();
   Running running(scene);

@@ -22,7 +22,7 @@ model::Cloth implicitCloth(model::Cloth cloth) {
   return cloth;
 }
 
-// Far beyond what explicit springs bear: h^2 k / m = 7.7 a structural spring.
+// Far beyond the stability of explicit springs: h^2 k / m is 7.7 for a structural spring.
 model::Cloth stiffCloth(std::uint32_t rows, std::uint32_t columns) {
   model::Cloth cloth = implicitCloth(calmCloth(rows, columns));
   cloth.structural = {400, 0.5f};
@@ -109,7 +109,7 @@ void expectLikeReference(model::Cloth cloth, std::uint32_t rate, unsigned seed) 
   EXPECT_LT(largestSpeedDifference(state, reference), error);
   EXPECT_LT(largestDistance(state, reference), h * error + kRounding * 2);
 
-  // The forces' own step would be elsewhere: the comparison can fail.
+  // An explicit step would end elsewhere, so the comparison can fail.
   model::Scene explicitly = scene;
   explicitly.cloths.front().solver.kind = model::SolverKind::massSpring;
   reference::ReferenceSimulation other(explicitly);
@@ -139,9 +139,9 @@ TEST_F(ImplicitEuler, MovesMeshesAsTheReference) {
   expectLikeReference(disc, 72, 6);
 }
 
-// Two nodes that hang from two pinned ones by springs along y alone: x'' = -omega^2 x for their stretch, for
-// which implicit Euler is  v' = (v - h omega^2 x) / (1 + h^2 omega^2),  x' = x + h v'. omega h = 3; explicit
-// springs bear 2.
+// Two nodes hang from two pinned nodes by springs along y. Their stretch x obeys x'' = -omega^2 x, and
+// implicit Euler gives v' = (v - h omega^2 x) / (1 + h^2 omega^2), x' = x + h v'. Here omega h = 3; explicit
+// springs are stable up to 2.
 TEST_F(ImplicitEuler, SwingsASpringAsTheFormulaDoes) {
   model::Cloth cloth = implicitCloth(calmCloth(2, 2));
   const double h = 1.0 / 72, omega = 3 / h;
@@ -171,7 +171,7 @@ TEST_F(ImplicitEuler, SwingsASpringAsTheFormulaDoes) {
   }
 }
 
-// However long the step: where it comes to rest, the springs carry the weight.
+// When the cloth has come to rest, the springs carry the weight, for every length of the step.
 TEST_F(ImplicitEuler, HangsWhereForcesBalance) {
   model::Cloth cloth = stiffCloth(12, 12);
   cloth.pins = {topRow(cloth)};
@@ -190,11 +190,11 @@ TEST_F(ImplicitEuler, HangsWhereForcesBalance) {
     if (hung.inverseMasses()[i] > 0)
       most = std::max(most, (forces[i] * hung.inverseMasses()[i] + reference::Vec3(0, -9.81, 0)).norm());
   EXPECT_LT(most, 0.01 * 9.81);
-  EXPECT_GT(hung.strain().max, 0.001);  // they do carry it
+  EXPECT_GT(hung.strain().max, 0.001);  // the springs are stretched
 }
 
-// Corrections are exchanged between a spring's ends, to the bit but for the sums' rounding and what the solve
-// leaves.
+// A correction acts on both ends of a spring with opposite sign. Only the rounding of sums and the residual
+// of the solve remain.
 TEST_F(ImplicitEuler, KeepsAFreeClothsMomentum) {
   model::Cloth cloth = stiffCloth(20, 20);
   cloth.damping = 0;
@@ -238,7 +238,7 @@ TEST_F(ImplicitEuler, HoldsASheetWhereMassSpringDiverges) {
   }
 }
 
-// Far stiffer than so few iterations solve: it lags, and does not blow up.
+// The cloth is too stiff for so few iterations. Its motion lags but stays bounded.
 TEST_F(ImplicitEuler, StaysCalmIfTheSolveEndsEarly) {
   model::Cloth cloth = stiffCloth(24, 24);
   cloth.structural.stiffness = 4000;
@@ -250,7 +250,8 @@ TEST_F(ImplicitEuler, StaysCalmIfTheSolveEndsEarly) {
   for (int tick = 0; tick < 216; ++tick) ASSERT_TRUE(running.tick(inputsOf(scene)).healthy) << tick;
   reference::ReferenceSimulation reference(scene);
   setState(reference, running.state());
-  // It cannot gain more than its potential energy at the start, which is at most that of its whole height.
+  // The cloth cannot gain more than its potential energy at the start, which is at most that of its whole
+  // height.
   const reference::ReferenceCloth& hung = reference.cloths().front();
   EXPECT_LT(hung.kineticEnergy(), 0.01 * 576 * 9.81 * 0.46);
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Where a cloth passes through itself or through another.
+// Counts the places where a cloth passes through itself or through another cloth.
 #include "tests/simulation/intersections.h"
 
 #include <Eigen/Dense>

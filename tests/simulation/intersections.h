@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Where a cloth passes through itself or through another.
+// Counts the places where a cloth passes through itself or through another cloth.
 #pragma once
 
 #include <cstddef>
@@ -9,8 +9,8 @@
 
 namespace clothstream::tests {
 
-// How often an edge of one triangle pierces another triangle of the scene with which it has no node in
-// common.
+// Number of times that an edge of one triangle pierces another triangle of the scene. Triangles with a common
+// node do not count.
 std::size_t intersections(const model::Scene& scene, std::span<const model::Vec3> positions);
 
 }  // namespace clothstream::tests

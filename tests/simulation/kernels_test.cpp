@@ -11,9 +11,9 @@ namespace {
 
 using simulation::NodeState;
 
-// m/s; every state here moves slower.
+// Upper bound of the speeds in these tests, m/s.
 constexpr double kSpeed = 3;
-// How far from 1 a normal's length may be: the error of reciprocalSquareRoot, and three roundings.
+// Largest difference of a normal's length from 1: the error of reciprocalSquareRoot, and three roundings.
 constexpr double kUnitLength = 7e-7 + 3 * kRounding;
 
 struct Expectation {
@@ -54,7 +54,7 @@ class Kernels : public GpuTest {
     const NodeState state = running.state();
     EXPECT_LT(largestSpeedDifference(state, reference), speed);
     EXPECT_LT(largestDistance(state, reference), distance);
-    // Both moved by far more than that: the comparison can fail.
+    // Both have moved much farther than the tolerance, so the comparison can fail.
     setState(reference, start);
     EXPECT_GT(largestSpeedDifference(state, reference), 1000 * speed);
   }
@@ -70,8 +70,8 @@ TEST_F(Kernels, SpringsPullAsInTheReferenceOnEveryShapeOfGrid) {
   }
 }
 
-// A grid given as a mesh, and a disc whose lightest node is no lighter than a grid's; grids before and
-// between.
+// A grid that is given as a mesh, and a disc whose nodes are at least as heavy as those of a grid. Grids are
+// before and between them.
 TEST_F(Kernels, MeshesPullAsInTheReference) {
   expectLikeReference(sceneOf({model::asMesh(calmCloth(17, 23))}), {}, 21);
   expectLikeReference(sceneOf({discCloth(11)}), {}, 22);

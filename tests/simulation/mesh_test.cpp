@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Meshes over time: the motion of a grid given as one, repetition to the bit, changes while it runs.
+// Meshes over several ticks: the motion of a grid that is given as a mesh, the same bits in every run, and
+// changes while it runs.
 #include <cmath>
 
 #include <gtest/gtest.h>
@@ -41,7 +42,7 @@ TEST_F(Meshes, MoveAsTheEquivalentGrid) {
   }
   const auto nodes = static_cast<double>(a.positions.size());
   EXPECT_LT(std::sqrt(difference / nodes), bound);
-  EXPECT_GT(std::sqrt(motion / nodes), 10 * bound);  // it moved by far more: the comparison can fail
+  EXPECT_GT(std::sqrt(motion / nodes), 10 * bound);  // the motion is far larger, so the comparison can fail
 }
 
 model::Scene discs() {

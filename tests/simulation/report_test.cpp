@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The report of a tick: what it says against the reference in double precision, its bits, and that it changes
-// nothing.
+// The report of a tick: its values compared with the double-precision reference, its bits, and that it does
+// not change the simulation.
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -38,7 +38,7 @@ void expectAsReference(const ClothReport& report, const reference::ReferenceClot
   constexpr double kAdds = 400 * kRounding, kTerm = 1e-5;
   EXPECT_NEAR(report.strainMax, strain.max, kStretch + 2e-6 * std::abs(strain.max));
   EXPECT_NEAR(report.strainMean, strain.mean, kStretch + (kAdds + kTerm) * strain.mean);
-  // The bin's upper end, but never above the largest.
+  // Upper end of the bin, but at most the largest strain.
   EXPECT_GE(report.strainP99, strain.p99 - kStretch - 2e-6 * std::abs(strain.p99));
   EXPECT_LE(report.strainP99, std::max(strain.p99 * (1 + 1.0 / 32), 1e-6) + kStretch + 2e-6);
   EXPECT_LE(report.strainP99, report.strainMax);
@@ -95,7 +95,7 @@ TEST_F(Report, MatchesTheReferenceOnRandomStates) {
   }
 }
 
-// Stiffness counts whether a spring is a force or a constraint; what a solve says belongs to its cloth.
+// The elastic energy uses the stiffness of forces and of constraints. Results of a solve belong to its cloth.
 TEST_F(Report, HasTheSolverResultsOfEachCloth) {
   model::Scene scene = reportedScene();
   scene.cloths[1].solver.kind = model::SolverKind::acad;
@@ -123,8 +123,8 @@ TEST_F(Report, HasTheSolverResultsOfEachCloth) {
   for (const std::size_t i : {0, 2, 4}) EXPECT_EQ(reports[i].activeConstraints + reports[i].iterations, 0u);
 }
 
-// A plane through the shape comes after it, and puts nodes where they lie deep in the shape. More colliders
-// than a list of what is near holds say the same.
+// A plane through the shape is handled after it and leaves nodes deep inside the shape. With more colliders
+// than a list of near colliders holds, the result is the same.
 TEST_F(Report, FindsTheDeepestPenetrationIntoEveryShape) {
   const model::Shape shapes[] = {model::Sphere{0.1f}, model::Capsule{.radius = 0.06f, .length = 0.2f},
                                  model::Box{model::Vec3(0.2f, 0.15f, 0.1f)}, octahedron(), model::Plane{}};

@@ -18,7 +18,7 @@ namespace clothstream::tests {
 
 // Half a unit in the last place, relative.
 inline constexpr double kRounding = 1.0 / (1 << 24);
-// m; further from the origin than any node of these tests.
+// m; all nodes of these tests are nearer to the origin.
 inline constexpr double kExtent = 4;
 
 // Settings of solvers whose results are compared.
@@ -57,7 +57,7 @@ double largestSpeedDifference(const simulation::NodeState& state,
 // Strain of the first cloth.
 reference::Strain strainOf(const model::Scene& scene, const simulation::NodeState& state);
 
-// A simulation and what it takes to run it.
+// A simulation with the objects that it needs to run.
 class Running {
  public:
   explicit Running(const model::Scene& scene, simulation::SimulationOptions options = {},
@@ -72,7 +72,7 @@ class Running {
   std::vector<shared::SolveRecord> solves() const { return simulation_.solves(); }
   std::vector<simulation::ContactStatus> contacts() const { return simulation_.contacts(); }
   std::vector<simulation::GrabStatus> grabs() const { return simulation_.grabs(); }
-  // A tick, and what its end is like.
+  // Runs one tick with a report. Returns the reports of all cloths.
   std::vector<simulation::ClothReport> tickAndReport(const simulation::TickInputs& inputs);
   void setCloths(std::span<const model::Cloth> cloths) { simulation_.setCloths(cloths); }
   void checkpoint();
@@ -106,8 +106,8 @@ Reports expectSameReports(const model::Scene& scene, InputsAt inputs,
 std::uint64_t hashAfter(const model::Scene& scene, InputsAt inputs, int ticks,
                         const simulation::SimulationOptions& options = {});
 
-// Gives a running scene the cloths of another. The state stays to the bit. It then continues, to the bit, as
-// a simulation that always had these cloths would continue from that state.
+// Gives a running scene the cloths of `changed`. Expects that the state keeps every bit, and that the motion
+// then has the same bits as that of a simulation that always had these cloths and continues from that state.
 void expectGoesOnAsAlways(Running& changing, const model::Scene& changed,
                           const simulation::TickInputs& inputs, int ticks);
 

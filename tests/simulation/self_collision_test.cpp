@@ -88,7 +88,7 @@ NodeState folded(const model::Scene& scene, std::uint32_t panel, float gap, floa
 
 // ---- Lists of neighbours
 
-// The stage alone, on a state as it is.
+// Runs only the self-collision stage, on a given state.
 class Lists {
  public:
   Lists(const model::Scene& scene, const NodeState& state, std::uint32_t workgroupSize = 64)
@@ -235,7 +235,7 @@ TEST_F(SelfCollision, SkippedCrowdsAreReportedAndHarmless) {
   const TickStatus status = running.tick(inputsOf(scene));
   EXPECT_GE(status.crowded, scene.nodeCount());
   EXPECT_TRUE(status.healthy);
-  // Nor does what is no number lead it astray.
+  // Positions and velocities that are not finite are reported, too.
   state.positions[5].x() = std::numeric_limits<float>::quiet_NaN();
   state.positions[70].y() = std::numeric_limits<float>::infinity();
   state.velocities[90].z() = -std::numeric_limits<float>::infinity();
@@ -243,7 +243,7 @@ TEST_F(SelfCollision, SkippedCrowdsAreReportedAndHarmless) {
   EXPECT_FALSE(running.tick(inputsOf(scene)).healthy);
 }
 
-// ---- What they do
+// ---- Effects of contacts
 
 // From a random state on the device and in the reference; farther apart than the tolerance without contacts.
 void expectLikeReference(const model::Scene& scene, double tolerance) {
@@ -283,7 +283,8 @@ TEST_F(SelfCollision, MovesNodesAsTheReferenceWithForces) {
   expectLikeReference(heap(model::SolverKind::massSpring), 5e-6);
 }
 
-// Solved as far as floats go: what a solve leaves, a tick of contacts makes a hundred times as large.
+// The solve converges to float precision, because a tick of contacts amplifies its remaining error a
+// hundredfold.
 TEST_F(SelfCollision, MovesNodesAsTheReferenceWithAdaptiveConstraints) {
   model::Scene scene = heap(model::SolverKind::acad);
   for (model::Cloth& cloth : scene.cloths) {
@@ -293,8 +294,8 @@ TEST_F(SelfCollision, MovesNodesAsTheReferenceWithAdaptiveConstraints) {
   expectLikeReference(scene, 5e-6);
 }
 
-// One substep: from here springs throw nodes about, and what a solve leaves grows fast. It leaves 1e-5 of
-// some thousand springs' errors of 0.014 m: 5e-6 m, and more of it at a single node.
+// Only one substep, because the remaining error of a solve grows fast from this state. It is 1e-5 of the
+// errors of some thousand springs of 0.014 m each: 5e-6 m, and more at a single node.
 TEST_F(SelfCollision, MovesNodesAsTheReferenceWithConstraints) {
   model::Scene scene = heap(model::SolverKind::constraint);
   scene.simulationRate = 720;
@@ -307,7 +308,7 @@ TEST_F(SelfCollision, MovesNodesAsTheReferenceWithConstraints) {
 }
 
 TEST_F(SelfCollision, ASheetAtRestIsNoNeighbourOfItself) {
-  // As large as balls may be: their neighbours reach two nodes far.
+  // The largest balls that are allowed. Their neighbours are up to two nodes away.
   model::Scene scene = withoutGravity(sceneOf({calmCloth(9, 9)}));
   Running without(scene);
   scene.cloths[0] = withBalls(scene.cloths[0], kSpacing);
@@ -354,8 +355,8 @@ TEST_F(SelfCollision, KeepsMomentum) {
   running.restore(state);
   for (int tick = 0; tick < 20; ++tick) running.tick(inputsOf(scene));
   const NodeState after = running.state();
-  // Each of 200 substeps rounds each velocity a few times, to 2^-25 of about 1 m/s, in random directions;
-  // were all in one, it would be 200 * 5 * 3e-8 = 3e-5 of it.
+  // Each of 200 substeps rounds each velocity a few times, to 2^-25 of about 1 m/s, in random directions. If
+  // all had the same direction, the sum would be 200 * 5 * 3e-8 = 3e-5 of it.
   EXPECT_LT((momentum(after, 0, 481) - before).norm(), 3e-5 * before.norm());
   EXPECT_GT(momentum(after, 0, 400).norm(), 0.3 * before.norm());  // they met
   EXPECT_EQ(intersections(scene, after.positions), 0u);
@@ -424,7 +425,7 @@ TEST_F(SelfCollision, FoldsOnTheFloorStayAStack) {
   }
 }
 
-// Boxes push it together from both sides.
+// Boxes push the curtain together from both sides.
 TEST_F(SelfCollision, APushedCurtainFoldsWithoutPassingThroughItself) {
   model::Cloth cloth = calmCloth(24, 60);
   cloth.structural = {100, 0.05f};
@@ -458,7 +459,7 @@ TEST_F(SelfCollision, APushedCurtainFoldsWithoutPassingThroughItself) {
   }
 }
 
-// A small sheet on one that is pinned everywhere, gravity leaning over: as on a slope of that angle.
+// A small sheet lies on a sheet that is pinned everywhere. Tilted gravity acts like a slope of that angle.
 double slideOn(double slope, float friction, int ticks) {
   model::Cloth lower = withBalls(flat(calmCloth(40, 80), 0), kSpacing, friction);
   lower.pins = {
@@ -476,17 +477,17 @@ double slideOn(double slope, float friction, int ticks) {
     for (std::size_t i = 3200; i < state.positions.size(); ++i) sum += state.positions[i].x();
     return sum / 144;
   };
-  for (int tick = 0; tick < 36; ++tick) running.tick(inputsOf(scene));  // it settles
+  for (int tick = 0; tick < 36; ++tick) running.tick(inputsOf(scene));  // the sheet settles
   const double start = middle();
   for (int tick = 0; tick < ticks; ++tick) running.tick(inputsOf(scene));
   return middle() - start;
 }
 
-// Coulomb: it sticks where friction is at least the slope's tangent; else it slides no faster than with
-// g (sin a - mu cos a), for the hollows between balls can only hold it back.
+// Coulomb friction: the sheet sticks if friction is at least the slope's tangent. Otherwise it accelerates by
+// at most g (sin a - mu cos a), because the hollows between balls can only slow it down.
 TEST_F(SelfCollision, FrictionHoldsASheetOnASheetUpToItsAngle) {
   const double slope = std::atan(0.45);
-  // It creeps while it rocks in its hollows; no ball leaves its own in half a second.
+  // The sheet creeps while it rocks in the hollows. No ball leaves its hollow in half a second.
   EXPECT_LT(std::abs(slideOn(slope, 0.5f, 36)), kSpacing / 4);
   // From the end of its first half second to that of the second.
   const double most = 0.5 * 9.81 * (std::sin(slope) - 0.2 * std::cos(slope)) * (1 - 0.25);
@@ -515,7 +516,7 @@ TEST_F(SelfCollision, GivesTheSameHashesInRunsOfAThousandTicks) {
     ASSERT_EQ(narrow.tick(inputs).stateHash, status.stateHash) << "tick " << tick;
     ASSERT_EQ(wide.tick(inputs).stateHash, status.stateHash) << "tick " << tick;
   }
-  // And from a state that was saved.
+  // The same from a saved state.
   Running other(scene);
   other.restore(usual.save());
   EXPECT_EQ(other.tick(inputs).stateHash, usual.tick(inputs).stateHash);

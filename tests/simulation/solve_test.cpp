@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Linear systems on the device: the same bits whoever solves them, in whatever pieces.
+// Linear systems on the device: the same bits for every partition of the work.
 #include <utility>
 
 #include <gtest/gtest.h>
@@ -18,7 +18,7 @@ model::Cloth named(const char* name, model::Cloth cloth, model::SolverKind kind)
   return cloth;
 }
 
-// A grid and a mesh of each kind, so soft that ACAD has something to hold; and a ball.
+// A grid and a mesh for each solver, so soft that ACAD activates constraints, and a ball.
 model::Scene solvedScene() {
   using enum model::SolverKind;
   model::Scene scene = sceneOf(
@@ -67,7 +67,7 @@ TEST_F(Solve, GivesTheSameHashesInRunsOfAThousandTicks) {
   expectSameThousandTicks(scene, passingBall, {.workgroupSize = 16, .solveWholeNodes = 0});
 }
 
-// The same number on every device.
+// The hash is the same on every device.
 TEST_F(Solve, ReachesTheHashOfEveryOtherDevice) {
   EXPECT_EQ(hashAfter(solvedScene(), passingBall, 12, {.solveWholeNodes = 700}), 0x8238f727263d17eau);
 }

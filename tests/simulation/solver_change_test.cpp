@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Cloths that get another solver while they move: no jump, and from there on the motion that the new solver
-// makes.
+// Changes of solver in motion: no jump, and from then on the motion of the new solver.
 #include <algorithm>
 #include <cmath>
 #include <optional>
@@ -58,8 +57,8 @@ float largestStrain(const model::Cloth& cloth, const NodeState& state) {
   return largest;
 }
 
-// Every solver after every other, and back: the state stays to the bit, and goes on to the bit as one that
-// had this solver from its start would from the same state.
+// Every solver replaces every other. The state keeps every bit. The motion then has the same bits as that of
+// a scene that always had the new solver and continues from the same state.
 TEST_F(SolverChange, ContinuesAsIfTheClothAlwaysHadTheSolver) {
   const model::Scene scene = softScene();
   const simulation::TickInputs inputs = inputsWithBall(scene);
@@ -94,7 +93,7 @@ TEST_F(SolverChange, ChangesTheStrainAsTheSolverPromises) {
   ASSERT_GT(asForces, 0.3f);
   changeTo(SolverKind::acad);
   run(150);
-  EXPECT_LT(largestStrain(scene.cloths[0], running.state()), 0.13f);  // 10 %, and 3 while it moves (docs)
+  EXPECT_LT(largestStrain(scene.cloths[0], running.state()), 0.13f);  // 10 %, and 3 % in motion
   changeTo(SolverKind::constraint);
   run(150);
   EXPECT_LT(largestStrain(scene.cloths[0], running.state()), 0.02f);
@@ -124,8 +123,8 @@ TEST_F(SolverChange, KeepsTheStateIfSettingsOrThicknessChange) {
     EXPECT_GT((state.positions[i] - model::Vec3(0, -0.15f, 0.03f)).norm(), 0.06f - 1e-6f);
 }
 
-// Whichever buffer holds the state, in the checkpoint too, under every solver: it goes on to the bit as one
-// that always had these masses would.
+// For every solver, and for each buffer that can hold the state or the checkpoint: the motion has the same
+// bits as that of a scene that always had these masses.
 TEST_F(SolverChange, ContinuesAsIfTheClothAlwaysHadTheMasses) {
   const model::Scene light = softScene();
   const simulation::TickInputs inputs = inputsWithBall(light);
@@ -151,7 +150,7 @@ TEST_F(SolverChange, ContinuesAsIfTheClothAlwaysHadTheMasses) {
   }
 }
 
-// Balls of another size and friction, alike and not; tethers of another length.
+// Balls get another size and friction, equal for both cloths or not. Tethers get another length.
 TEST_F(SolverChange, ContinuesAsIfTheClothAlwaysHadSelfCollisionAndTethers) {
   model::Scene scene = softScene();
   for (model::Cloth& cloth : scene.cloths) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Saving, restoring, rolling back, and noticing that a state has gone bad.
+// Saving, restoring and rolling back states, and detection of invalid states.
 #include <cmath>
 #include <limits>
 #include <stdexcept>
@@ -111,7 +111,7 @@ TEST_F(State, DetectsBadNumbersInTheSameTickAndRollsBack) {
     const StateSnapshot good = running.save();
     running.checkpoint();
     NodeState spoilt = simulation::unpack(good);
-    // The last node's last component: the whole state is looked at.
+    // The last component of the last node, which shows that the whole state is checked.
     spoilt.positions.back().z() = number;
     running.restore(spoilt);
     EXPECT_FALSE(running.tick(inputs(4)).healthy) << number;
@@ -123,7 +123,7 @@ TEST_F(State, DetectsBadNumbersInTheSameTickAndRollsBack) {
 }
 
 TEST_F(State, RollsBackADivergingState) {
-  // Far beyond the stability bound: it explodes within some ticks.
+  // The scene is far beyond the stability bound, so its motion diverges within a few ticks.
   model::Scene stiff = sceneOf({calmCloth(16, 16)});
   stiff.cloths[0].structural.stiffness = 1e5f;
   std::mt19937 random(1);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Extended position-based dynamics: kernels against the double-precision reference, and what it must keep.
+// Extended position-based dynamics: kernels compared with the double-precision reference, and invariants.
 #include <algorithm>
 #include <cmath>
 
@@ -52,7 +52,7 @@ void expectCorrectedLikeReference(model::Scene scene, unsigned seed,
                                   simulation::SimulationOptions options = {}) {
   scene.substeps = 1;
   scene.simulationRate = 720;
-  // Far beyond what springs as forces bear: a sweep then moves nodes by much of what they are off.
+  // Far beyond the stability of spring forces. A sweep then corrects a large part of each error.
   for (model::Cloth& cloth : scene.cloths)
     for (model::Spring* spring : {&cloth.structural, &cloth.shear, &cloth.bend}) spring->stiffness *= 30;
   std::mt19937 random(seed);
@@ -79,7 +79,7 @@ void expectCorrectedLikeReference(model::Scene scene, unsigned seed,
   EXPECT_LT(largestDistance(state, expected), tolerance);
   EXPECT_LT(largestSpeedDifference(state, expected), 720 * tolerance);
 
-  // It would see a sweep too many, and a little less stiffness.
+  // The comparison would detect one more sweep, or slightly less stiffness.
   model::Scene other = scene;
   for (model::Cloth& cloth : other.cloths) ++cloth.solver.iterations;
   EXPECT_GT(largestDistance(state, referenceAfter(other)), 2 * tolerance);
@@ -192,15 +192,15 @@ TEST_F(Xpbd, KeepsAFreeClothsMomentum) {
   const NodeState end = running.state();
   EXPECT_LT((sumOf(end.velocities) - sumOf(start.velocities)).cwiseAbs().maxCoeff(),
             6 * std::sqrt(roundings) * rounding);
-  // And it has not just stood still.
+  // The cloth has moved.
   double change = 0;
   for (std::size_t i = 0; i < end.velocities.size(); ++i)
     change += double{(end.velocities[i] - start.velocities[i]).norm()};
   EXPECT_GT(change, 10);
 }
 
-// Velocities are not taken from rounded places: what nothing corrects falls as gravity says, however short
-// the substep.
+// Velocities are not computed from rounded positions. Without corrections a cloth falls as gravity says, for
+// every length of the substep.
 TEST_F(Xpbd, FallsExactlyWithoutStretch) {
   model::Cloth cloth = corrected(calmCloth(8, 8));
   cloth.damping = 0;
@@ -264,7 +264,7 @@ TEST_F(Xpbd, LeavesNoNodeInsideASphere) {
     if (masses[i] > 0)
       nearest = std::min(nearest, (state.positions[i] - ball.start.position).cast<double>().norm());
   EXPECT_GT(nearest, distance * (1 - 1e-5));
-  EXPECT_LT(nearest, distance * 1.01);  // and it does touch it
+  EXPECT_LT(nearest, distance * 1.01);  // the sheet does touch the sphere
 }
 
 // A cloth of each solver, a mesh, several sweeps, a ball.
@@ -287,7 +287,7 @@ model::Scene mixedScene() {
   return scene;
 }
 
-// Leaves out those that conjugate gradients solve: their own tests have them.
+// Omits the solvers that use conjugate gradients; other tests cover these.
 void eraseSystems(model::Scene& scene) {
   std::erase_if(scene.cloths, [](const model::Cloth& cloth) {
     return cloth.solver.kind == model::SolverKind::constraint || cloth.solver.kind == model::SolverKind::acad;
@@ -313,7 +313,7 @@ TEST_F(Xpbd, GivesTheSameHashesInRunsOfAThousandTicks) {
   expectSameThousandTicks(scene, passingBall, {.workgroupSize = 16, .xpbdWholeNodes = 0});
 }
 
-// The same number on every device.
+// The hash is the same on every device.
 TEST_F(Xpbd, ReachesTheHashOfEveryOtherDevice) {
   model::Scene scene = mixedScene();
   eraseSystems(scene);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Buffers, kernels and recordings: what goes in comes out, in order.
+// Buffers, kernels and recordings: correct content and correct order.
 #include <bit>
 #include <numeric>
 #include <string>
@@ -94,7 +94,7 @@ TEST_F(ComputeTest, KernelGetsSpecialisationPushConstantsAndWorkgroupSize) {
     std::uint32_t count;
     float factor;
   };
-  constexpr std::uint32_t kCount = 100;  // no multiple of a workgroup
+  constexpr std::uint32_t kCount = 100;  // not a multiple of the workgroup size
   for (const std::uint32_t workgroupSize : {1u, 8u, 64u, 128u}) {
     const Kernel kernel(tests::device(), {.name = "add_scaled",
                                           .spirv = kernels::add_scaled,
@@ -269,7 +269,7 @@ TEST_F(ComputeTest, StageTimesAddUpByNameAndFitIntoTheWaiting) {
   EXPECT_EQ(times[1].stage, "light");
   EXPECT_GT(times[0].seconds, 0);
   EXPECT_GE(times[1].seconds, 0);
-  // Both clocks count real time; a thousandth is more than they drift apart.
+  // Both clocks count real time. They drift apart by less than a thousandth.
   EXPECT_LE(times[0].seconds + times[1].seconds, waited.count() * 1.001);
 }
 

@@ -26,7 +26,7 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::Not;
 
-// Sets or removes a variable of the environment for as long as it lives.
+// Sets or removes an environment variable. The destructor restores the old value.
 class Environment {
  public:
   Environment(const char* name, const std::optional<std::string>& value) : name_(name) {
@@ -67,8 +67,8 @@ std::size_t threadsRunning() {
   return static_cast<std::size_t>(std::distance(begin(tasks), end(tasks)));
 }
 
-// Threads of this process that a device with these options adds. A thread that was joined is listed until the
-// kernel has buried it, so that the count is waited for to be what it was.
+// Number of threads that a device with these options adds to this process. The kernel lists a joined thread
+// for a moment, so the function waits until the count is back at its first value.
 std::size_t threadsAddedBy(const DeviceOptions& options) {
   const std::size_t before = threadsRunning();
   std::size_t during = 0;
@@ -173,7 +173,7 @@ TEST(DeviceErrors, NameWhatToInstallWithoutADriver) {
 }
 
 TEST(DeviceErrors, NameWhatToInstallWithoutALoader) {
-  // A program's library path is read when it starts: the child starts with files in the way of the real
+  // The library path is read when a program starts. So a child process starts with files that hide the real
   // loader.
   const std::filesystem::path directory =
       std::filesystem::path(::testing::TempDir()) / "clothstream_no_loader";

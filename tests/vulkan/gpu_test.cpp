@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What tests on a Vulkan device share: the device, a way to run work on it, and validation that fails tests.
+// Shared by tests on a Vulkan device: the device, functions that run work on it, and failure on validation
+// messages.
 #include "tests/vulkan/gpu_test.h"
 
 #include <algorithm>

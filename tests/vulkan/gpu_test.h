@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What tests on a Vulkan device share: the device, a way to run work on it, and validation that fails tests.
+// Shared by tests on a Vulkan device: the device, functions that run work on it, and failure on validation
+// messages.
 #pragma once
 
 #include <functional>
@@ -13,16 +14,16 @@
 
 namespace clothstream::tests {
 
-// Linking `clothstream_gpu_test` makes a test fail when the validation layer says anything while it runs, and
-// the program when closing the shared device makes it speak (something still lives on it). The shared device
-// always validates; devices that tests open themselves do so under ctest, which sets
+// In programs that link `clothstream_gpu_test`, a message of the validation layer fails the running test. A
+// message while the shared device is closed fails the program, because an object on it was not destroyed. The
+// shared device always validates. Devices that tests open do so under ctest, which sets
 // CLOTHSTREAM_VALIDATION=1.
 
 // The device of this test program. The first call opens it; it closes after the last test. Throws
 // vulkan::DeviceError if no device is usable.
 vulkan::Device& device();
 
-// Skips its tests, with the reason, if there is no device.
+// Skips the test, with the reason, if there is no device.
 class GpuTest : public ::testing::Test {
  protected:
   void SetUp() override;
@@ -31,7 +32,7 @@ class GpuTest : public ::testing::Test {
 // Submits the recording and waits for it. Throws std::runtime_error if it takes longer than a minute.
 void submitAndWait(vulkan::Device& device, vulkan::Recorder& recorder);
 
-// Records by `record` on the shared device, submits and waits.
+// Records with `record` on the shared device, submits and waits.
 void run(const std::function<void(vulkan::Recorder&)>& record);
 
 // Returns the messages of the validation layer since the test began or the last call. The caller expects

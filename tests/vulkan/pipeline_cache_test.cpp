@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The pipeline cache on disk: kept, used again, and replaced where it is no good.
+// The pipeline cache on disk: written, used again, and replaced if it is invalid.
 #include <algorithm>
 #include <cstring>
 #include <filesystem>
@@ -19,7 +19,7 @@
 namespace clothstream::vulkan {
 namespace {
 
-// File: magic (8 bytes), size and FNV-1a of what follows (8 bytes each), then Vulkan's header, whose UUID is
+// File: magic (8 bytes), size and FNV-1a of the rest (8 bytes each), then Vulkan's header, whose UUID is
 // at 16.
 constexpr std::size_t kFileHeaderBytes = 24;
 constexpr std::size_t kUuidOffset = kFileHeaderBytes + 16;
@@ -32,8 +32,8 @@ class PipelineCacheTest : public tests::GpuTest {
   }
   void TearDown() override { std::filesystem::remove_all(directory_.parent_path()); }
 
-  // Opens a device with the cache, makes a kernel, closes it; returns the bytes that the device took from the
-  // cache.
+  // Opens a device with the cache, creates a kernel and closes the device. Returns the number of bytes that
+  // the device took from the cache.
   std::size_t useCache() const {
     const Device device({.cacheDirectory = directory_});
     const Kernel kernel(device, {.name = "count_up",
@@ -60,7 +60,7 @@ class PipelineCacheTest : public tests::GpuTest {
         .write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
   }
 
-  // The present file is ignored, and good again afterwards.
+  // The file is ignored, and valid again afterwards.
   void expectReplaced() const {
     EXPECT_EQ(useCache(), 0u);
     EXPECT_GT(useCache(), 0u);

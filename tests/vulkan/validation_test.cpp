@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Validation is really on: planted mistakes are reported, and correct work is not.
+// Validation is active: deliberate mistakes are reported, and correct work is not.
 #include <array>
 #include <memory>
 #include <utility>
@@ -22,8 +22,7 @@ using ::testing::IsEmpty;
 
 constexpr std::uint32_t kCount = 256;
 
-// Two dispatches of which the second reads what the first writes, on a device that validates whatever the
-// environment.
+// Two dispatches on a device that always validates. The second reads the buffer that the first writes.
 class ValidationTest : public tests::GpuTest {
  protected:
   void SetUp() override {

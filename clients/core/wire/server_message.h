@@ -48,7 +48,7 @@ struct Welcome {
   std::uint32_t protocolVersion = 0, codec = 0;
   std::uint64_t participantId = 0;
   std::string scene, serverName, deviceName;
-  std::uint64_t contentId = 0;  // description's
+  std::uint64_t contentId = 0;  // content id of the description
   std::uint32_t role = 0;
   std::string token;
   bool resumed = false;

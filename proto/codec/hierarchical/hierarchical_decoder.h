@@ -25,7 +25,7 @@ class HierarchicalDecoder {
   [[nodiscard]] bool allocate(const StreamLayout& layout, Detail detail);
 
   // Takes the newest frame of `referenceLayer` as the reference of a predicted frame. False if the sections
-  // are no frame of this layout; the decoder is then as it was before.
+  // are not a frame of this layout; then the decoder is unchanged.
   [[nodiscard]] bool decode(const ParsedPacket& packet, std::uint8_t referenceLayer);
   // Positions and normals of the newest frame, 3 floats a vertex.
   void writePositions(float* out) const;

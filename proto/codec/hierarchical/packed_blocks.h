@@ -50,7 +50,7 @@ struct GroupResiduals {
   std::size_t count = 0;
 };
 
-// False if the bytes are no group. `in` may end anywhere.
+// False if the bytes are not a group. `in` may end anywhere.
 [[nodiscard]] bool readGroup(BitReader& in, const GroupResiduals& residuals);
 
 }  // namespace clothstream::codec::hierarchical

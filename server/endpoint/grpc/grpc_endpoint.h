@@ -16,12 +16,12 @@ namespace clothstream::endpoint {
 struct GrpcEndpointOptions {
   std::string host = "127.0.0.1";
   std::uint16_t port = 50051;  // 0: a free port
-  // Most Join streams at a time. Further ones end with RESOURCE_EXHAUSTED.
+  // Maximum number of open Join streams. Further ones end with RESOURCE_EXHAUSTED.
   std::size_t maxStreams = 256;
 };
 
 // Join forwards the bytes of a session::Session unchanged. SceneServer answers the unary calls. When a
-// connection finishes, its stream ends with the status that matches the last Error. A client that vanishes is
+// session finishes, its stream ends with the status that matches the last Error. A client that vanishes is
 // found within 5 s.
 //
 // The endpoint has one thread for all calls; only reflection runs on threads of gRPC. Create and destroy the

@@ -46,7 +46,7 @@ void JoinStream::onBegun(bool ok) {
   ++endpoint_.streams;
   isCounted_ = true;
   // A wake may come from any thread, so it must not own the stream. Dropping the last owner inside a wake
-  // would deadlock: the connection's destructor waits for that wake to return.
+  // would deadlock: the release of the session waits for that wake to return.
   std::weak_ptr<JoinStream> weak = std::static_pointer_cast<JoinStream>(shared_from_this());
   auto wake = [&loop = *endpoint_.loop, weak, posted = std::make_shared<std::atomic<bool>>(false)] {
     if (posted->exchange(true)) return;
@@ -135,7 +135,7 @@ void JoinStream::onEnded(bool) {
 }
 
 void JoinStream::close(const grpc::Status& status) {
-  // The last message of a finished connection may still wait, and it gives a more specific status.
+  // The last message of a finished session may still wait, and it gives a more specific status.
   if (connection_ && connection_->finished())
     pump();
   else

@@ -33,7 +33,7 @@ class JoinStream final : public Call {
   void read();
   // Writes the next message unless a write is under way. Ends the stream after the last message.
   void pump();
-  // Drops the connection and ends the stream after the write that is under way. Only the first call's status
+  // Releases the session and ends the stream after the write that is under way. Only the first call's status
   // counts.
   void finish(const grpc::Status& status);
   void cancelSoon();
@@ -42,8 +42,7 @@ class JoinStream final : public Call {
   Service& service_;
   grpc::ServerAsyncReaderWriter<grpc::ByteBuffer, grpc::ByteBuffer> io_{&context_};
   std::shared_ptr<session::Session> connection_;  // nullptr while the stream closes
-  // Connection of a client that sends nothing more. The end of the call tells a goodbye from a lost
-  // connection.
+  // Session of a client that sends nothing more. The end of the call tells a goodbye from a lost connection.
   std::shared_ptr<session::Session> departing_;
   grpc::ByteBuffer incoming_;
   delivery::SharedBytes lastMessage_;

@@ -11,7 +11,7 @@ namespace clothstream::endpoint {
 
 grpc::Status statusOf(const v1::Error& error);
 
-// Status for a finished connection, from its last message: a fatal Error, a notice that the scene was
+// Status for a finished session, from its last message: a fatal Error, a notice that the scene was
 // deleted, or else UNAVAILABLE because the server stops.
 grpc::Status closingStatus(const delivery::SharedBytes& lastMessage);
 

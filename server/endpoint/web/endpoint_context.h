@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// State that the sessions of one endpoint share. Belongs to the endpoint's io thread.
+// State that all sockets of one endpoint share. Belongs to the endpoint's io thread.
 #pragma once
 
 #include <cstddef>

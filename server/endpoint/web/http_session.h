@@ -2,6 +2,7 @@
 // One HTTP connection: answers requests for the page until it closes, times out or becomes a WebSocket.
 #pragma once
 
+#include <cstddef>
 #include <memory>
 #include <optional>
 #include <string_view>

@@ -43,7 +43,7 @@ std::string_view closeText(std::string_view text) {
   return text.substr(0, size);
 }
 
-// Close reason of a finished connection, from its last message.
+// Close reason of a finished session, from its last message.
 ws::close_reason reasonOf(const delivery::SharedBytes& last) {
   const auto reason = [](ws::close_code code, const std::string& why) {
     const std::string_view text = closeText(why);
@@ -85,8 +85,8 @@ void StreamSession::accept(http::request<http::empty_body>&& request) {
 void StreamSession::open() {
   if (endpoint_.stopping) return;
   endpoint_.streams.insert(shared_from_this());
-  // A wake may come from any thread, so it must not own the session. Dropping the last owner inside a wake
-  // would deadlock: the connection's destructor waits for that wake to return.
+  // A wake may come from any thread, so it must not own the stream. Dropping the last owner inside a wake
+  // would deadlock: the release of session::Session waits for that wake to return.
   auto wake = [&io = endpoint_.io, weak = weak_from_this(),
                posted = std::make_shared<std::atomic<bool>>(false)] {
     if (posted->exchange(true)) return;

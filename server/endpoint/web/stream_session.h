@@ -28,10 +28,10 @@ class StreamSession : public std::enable_shared_from_this<StreamSession> {
 
   void accept(boost::beast::http::request<boost::beast::http::empty_body>&& request);
 
-  // Starts the closing handshake. The session ends after it, at most kClosingTimeout later.
+  // Starts the closing handshake. The stream ends after it, at most kClosingTimeout later.
   void close(const boost::beast::websocket::close_reason& reason);
 
-  // Drops the connection. Its `wake` is not called after this returns.
+  // Releases the session. Its `wake` is not called after this returns.
   void leave() { connection_.reset(); }
 
  private:
@@ -41,7 +41,7 @@ class StreamSession : public std::enable_shared_from_this<StreamSession> {
   // Writes the next message unless a write is under way.
   void pump();
   void onWritten(boost::beast::error_code error);
-  // Ends the session after kClosingTimeout, whatever the client does.
+  // Ends the stream after kClosingTimeout, even if the client does not answer.
   void endSoon();
   void end();
 

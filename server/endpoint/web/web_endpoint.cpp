@@ -60,7 +60,7 @@ void sendFresh(tcp::socket& socket) {
 }  // namespace
 
 struct WebEndpoint::State {
-  WebEndpointContext context;  // outlives the sessions, which are destroyed with `io`
+  WebEndpointContext context;  // outlives the sockets, which are destroyed with `io`
   net::io_context io{1};
   tcp::acceptor acceptor;
   net::steady_timer timer{io};
@@ -110,7 +110,7 @@ struct WebEndpoint::State {
     timer.async_wait([this](boost::system::error_code cancelled) {
       if (!cancelled) io.stop();
     });
-    const auto open = context.streams;  // a copy, since close() may remove a session
+    const auto open = context.streams;  // a copy, since close() may remove a stream
     for (const auto& session : open)
       session->close({boost::beast::websocket::close_code::going_away, "the server is stopping"});
   }

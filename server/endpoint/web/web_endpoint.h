@@ -20,7 +20,7 @@ struct WebEndpointOptions {
   std::uint16_t port = 8080;  // 0: a free port
   // Directory of the page. Empty: only /stream and /healthz.
   std::filesystem::path pageDirectory;
-  // Most connections at a time, HTTP and WebSocket. Further ones are answered with 503.
+  // Maximum number of open connections, HTTP and WebSocket. Further ones are answered with 503.
   std::size_t maxConnections = 256;
   // Origins of other pages that may open /stream, such as "https://example.org"; "*" allows every page. The
   // endpoint's own page and clients that send no origin are always allowed.

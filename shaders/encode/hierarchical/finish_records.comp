@@ -42,8 +42,8 @@ void finishRecord(uint slot) {
   made[rowAt(kRowCurvature, slot)] = uvec4(pack(curvature, before), sum.w + 4 * node.w);
 }
 
-// Writes cannot race: one invocation a slot, and one a weight; nodes are only read. The workgroup adds up in
-// shared memory first.
+// Writes cannot race: one invocation per slot, and one per weight; nodes are only read. The workgroup adds up
+// in shared memory first.
 void main() {
   if (gl_LocalInvocationIndex == 0) {
     hashLow = 0;

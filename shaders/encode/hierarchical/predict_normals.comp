@@ -98,7 +98,7 @@ uvec3 axesOf(uint top) {
   return uvec3((top + 1) % 3, (top + 2) % 3, top);
 }
 
-// Writes cannot race: one invocation a vertex.
+// Writes cannot race: one invocation per vertex.
 void main() {
   uint vertex = gl_GlobalInvocationID.x;
   if (vertex >= push.vertexCount) {

@@ -57,7 +57,7 @@ int quantise(float x) {
   return isNegative ? -int(magnitude) : int(magnitude);
 }
 
-// Writes cannot race: one invocation a slot. The workgroup adds up in shared memory first.
+// Writes cannot race: one invocation per slot. The workgroup adds up in shared memory first.
 void main() {
   if (gl_LocalInvocationIndex == 0) {
     moved = 0;

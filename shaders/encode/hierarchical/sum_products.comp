@@ -79,7 +79,7 @@ float sumOf(uint count, uint i, uint j) {
   return all_;
 }
 
-// Writes cannot race: in shared memory one invocation a slot, then one a product.
+// Writes cannot race: in shared memory one invocation per slot, then one per product.
 void main() {
   uvec4 chunk = fittedChunks[gl_WorkGroupID.x];
   uint count = chunk.y - chunk.x;

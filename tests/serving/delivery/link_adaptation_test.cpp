@@ -27,7 +27,8 @@ double rateAt(const SimulatedScene& scene, const OperatingPoint& point) {
          (1 << (kLayered.layers - point.layers));
 }
 
-// Until it holds, in steps of 10 ms; one more than the limit where it does not by then.
+// Advances in steps of 10 ms until `holds` returns true. Returns the time taken, or more than the limit if
+// `holds` stays false.
 Clock::duration timeUntil(SimulatedScene& scene, const std::function<bool()>& holds, Clock::duration limit) {
   Clock::duration time{};
   for (; !holds() && time <= limit; time += 10ms) scene.pass(10ms);
@@ -165,8 +166,8 @@ TEST(LinkAdaptation, SingleDelayChangesNothing) {
   EXPECT_EQ(stepsOf(link), 0u);
 }
 
-// As of a wireless link that now and then tries again: one frame of seven is up to 35 ms late, and its
-// acknowledgement.
+// A wireless link that sometimes repeats a transmission: one frame in seven and its acknowledgement have a
+// latency of up to 35 ms.
 TEST(LinkAdaptation, JitterChangesNothing) {
   SimulatedScene scene({.rate = 72, .layers = 1, .qualities = 3});
   SimulatedLink& link = scene.join();
@@ -209,7 +210,7 @@ TEST(LinkAdaptation, SendsAtMostTheRequestedPoint) {
   scene.pass(3s);
   EXPECT_EQ(link.given, (OperatingPoint{1, 2}));
 
-  // Out of range: the nearest available point.
+  // A requested point out of range gives the nearest available point.
   SimulatedScene plain({.rate = 72, .layers = 1, .qualities = 2});
   SimulatedLink& coarse = plain.join({3, 3});
   plain.pass(1s);

@@ -100,7 +100,7 @@ TEST_F(MailboxTest, SendsTwoFramesWithoutAcknowledgement) {
   EXPECT_EQ(taken(frames), Ticks{});
   EXPECT_TRUE(mailbox.acknowledge(1, now));
   EXPECT_EQ(taken(frames), (Ticks{3}));
-  EXPECT_TRUE(mailbox.acknowledge(3, now));  // of the newest, which covers all before it
+  EXPECT_TRUE(mailbox.acknowledge(3, now));  // acknowledges all earlier frames too
   EXPECT_EQ(taken(frames), (Ticks{4}));
 }
 
@@ -126,7 +126,7 @@ TEST_F(MailboxTest, WindowGrowsWithTheMinimumRoundTripTime) {
     return ticks;
   };
   EXPECT_EQ(inFlight().size(), Mailbox::kMinWindow);
-  // 50 ms at 72 frames/s are 3.6 frames.
+  // A round trip of 50 ms takes 3.6 frames at 72 frames per second.
   mailbox.restart();
   mailbox.deliver(frame(++tick, true));
   ASSERT_TRUE(mailbox.next(now));
@@ -135,14 +135,15 @@ TEST_F(MailboxTest, WindowGrowsWithTheMinimumRoundTripTime) {
   const Ticks sent = inFlight();
   EXPECT_EQ(sent.size(), Mailbox::kMinWindow + 4);
 
-  // A queue on the way makes the next round trip ten times as long: the window hardly moves.
+  // A queue on the link makes the next round trip ten times as long. The window does not grow.
   now += milliseconds(500);
   ASSERT_TRUE(mailbox.acknowledge(sent.back(), now));
   mailbox.restart();
   EXPECT_EQ(inFlight().size(), Mailbox::kMinWindow + 4);
 }
 
-// Its acknowledgements arrive one frame later than those of a peer that acknowledges each frame.
+// The acknowledgements of such a peer arrive one frame later than those of a peer that acknowledges each
+// frame.
 TEST_F(MailboxTest, WindowGrowsByOneIfEverySecondFrameIsAcknowledged) {
   join();
   std::uint64_t tick = 0;
@@ -166,7 +167,7 @@ TEST_F(MailboxTest, WindowGrowsByOneIfEverySecondFrameIsAcknowledged) {
     }
     return inFlight();
   };
-  EXPECT_EQ(afterRoundTrips(1), Mailbox::kMinWindow + 1);  // 1 ms is less than a frame
+  EXPECT_EQ(afterRoundTrips(1), Mailbox::kMinWindow + 1);  // 1 ms is shorter than a frame interval
   EXPECT_EQ(afterRoundTrips(2), Mailbox::kMinWindow + 2);
   EXPECT_EQ(afterRoundTrips(1), Mailbox::kMinWindow + 1);
 }
@@ -190,8 +191,8 @@ TEST_F(MailboxTest, PeerThatDoesNotReadRequestsNothing) {
   std::vector<PublishedFrame> frames;
   for (std::uint64_t tick = 1; tick <= 20; ++tick) {
     mailbox.deliver(frames.emplace_back(frame(tick, tick == 1)));
-    // There is room, and three frames were held at most: but the endpoint has not come to ask since it was
-    // woken.
+    // The window has room and at most three frames are held. But the endpoint has not called next() since it
+    // was woken, so no key frame is requested.
     EXPECT_FALSE(wantsKeyFrame());
   }
   EXPECT_EQ(metrics.framesDropped.value(), 20u);
@@ -298,7 +299,7 @@ TEST_F(MailboxTest, LimitsHeldBytes) {
     made.message = bytes(size);
     return made;
   };
-  // One alone may be larger than the bound.
+  // A single frame is dropped too if it is larger than the limit.
   std::vector<PublishedFrame> frames{large(1, 2 * Mailbox::kMaxHeldBytes), large(2, 1)};
   for (const PublishedFrame& each : frames) mailbox.deliver(each);
   EXPECT_EQ(frames[0].message.use_count(), 1);
@@ -312,7 +313,7 @@ TEST_F(MailboxTest, LimitsHeldBytes) {
 TEST_F(MailboxTest, DropsTheHighestLayerFirstAndBreaksNoReference) {
   shape.layers = 3;
   join();
-  // Ticks from 1 on, of layers 0 2 1 2; who reads nothing holds three.
+  // Ticks from 1 have the layers 0 2 1 2. A mailbox without a reader holds three frames.
   const auto layered = [&](std::uint64_t tick) {
     PublishedFrame made = frame(tick, tick == 1);
     made.layer = codec::layerOf(tick - 1, 3);
@@ -321,7 +322,7 @@ TEST_F(MailboxTest, DropsTheHighestLayerFirstAndBreaksNoReference) {
   };
   std::vector<PublishedFrame> frames;
   for (std::uint64_t tick = 1; tick <= 4; ++tick) mailbox.deliver(frames.emplace_back(layered(tick)));
-  // 4 is itself of the highest layer; 5, of the base, makes 2 go.
+  // Frame 4 is dropped because it has the highest layer. Frame 5 has the base layer and displaces frame 2.
   mailbox.deliver(frames.emplace_back(layered(5)));
   EXPECT_EQ(metrics.framesDropped.value(), 2u);
   EXPECT_EQ(taken(frames), (Ticks{1, 3}));
@@ -335,7 +336,7 @@ TEST_F(MailboxTest, SendsTheRequestedLayersAndQualityAndReportsThem) {
   mailbox.subscribe(nullptr, shape, metrics, {.quality = 1, .layers = 1});
   EXPECT_FALSE(mailbox.next(now));
   EXPECT_EQ(mailbox.requested(now).keyFrames, 0b10);
-  mailbox.deliver(frame(1, true));  // of quality 0
+  mailbox.deliver(frame(1, true));  // quality 0
   EXPECT_FALSE(mailbox.next(now));
   PublishedFrame wanted = frame(2, true);
   wanted.quality = 1;
@@ -364,7 +365,7 @@ TEST_F(MailboxTest, SendsNoTickInTwoQualities) {
   for (std::size_t i = 0; i < 3; ++i) mailbox.deliver(fine[i]);
   EXPECT_EQ(taken(fine), (Ticks{1, 2}));
   now += LinkAdaptation::kPatience;
-  EXPECT_EQ(mailbox.requested(now).keyFrames, 0b10);  // it is behind
+  EXPECT_EQ(mailbox.requested(now).keyFrames, 0b10);  // the subscriber is behind, so it shall get quality 1
   ASSERT_TRUE(mailbox.acknowledge(2, now));
   EXPECT_EQ(taken(fine), Ticks{3});
   mailbox.deliver(fine[3]);
@@ -413,7 +414,7 @@ TEST_F(MailboxTest, WakesOnlyIfAMessageCanBeTaken) {
   EXPECT_EQ(wakes, 2);
   ASSERT_TRUE(mailbox.next(now));
   ASSERT_TRUE(mailbox.next(now));
-  mailbox.deliver(frame(3));  // no room
+  mailbox.deliver(frame(3));  // the window has no room
   EXPECT_EQ(wakes, 2);
   ASSERT_TRUE(mailbox.acknowledge(1, now));
   EXPECT_EQ(wakes, 3);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A scene's frames through mailboxes over links of chosen speeds, in simulated time: no thread, no network.
+// Sends the frames of a scene through mailboxes over links of given rates. Time is simulated; there is no
+// thread and no network.
 #pragma once
 
 #include <array>
@@ -65,7 +66,7 @@ class SimulatedLink {
   telemetry::SceneMetrics metrics;
   const std::shared_ptr<Mailbox> mailbox = std::make_shared<Mailbox>([] {});
   std::vector<Arrived> arrived;
-  OperatingPoint given;  // newest one that the mailbox sent; it may not have arrived
+  OperatingPoint given;  // newest point that the mailbox sent; it may still be on the link
 
  private:
   static constexpr double kBurst = 2000;  // bytes that an idle link takes at once
@@ -78,7 +79,7 @@ class SimulatedLink {
     std::uint64_t tick;
   };
 
-  // Returns nothing for a frame.
+  // Operating point of a message; nullopt for a frame.
   std::optional<OperatingPoint> pointIn(const SharedBytes& message) const {
     if (published_.contains(message.get())) return std::nullopt;
     v1::ServerMessage parsed;
@@ -118,7 +119,7 @@ class SimulatedLink {
   std::deque<SharedBytes> queue_;
   std::deque<Arriving> arriving_;
   std::deque<Ack> acks_;
-  // By message, which is kept: no other has its place in memory.
+  // Indexed by the address of the message, which is unique because the messages are kept.
   std::map<const void*, PublishedFrame> published_;
   codec::HeldFrames decoded_;
   client::Acknowledgement acknowledgement_;
@@ -129,7 +130,7 @@ class SimulatedLink {
 class SimulatedScene {
  public:
   static constexpr std::size_t kFrameBytes = 1000;  // of quality 0
-  static constexpr double kPartOfFiner = 0.62;      // of a quality's bytes the next one takes
+  static constexpr double kPartOfFiner = 0.62;      // bytes of a quality, divided by those of the next finer
 
   explicit SimulatedScene(const StreamShape& shape) : shape_(shape) {}
 

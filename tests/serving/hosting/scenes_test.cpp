@@ -16,6 +16,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "server/hosting/scene_maker.h"
 #include "server/messages/scene_message.h"
 #include "tests/model/meshes.h"
 #include "tests/serving/server_test.h"
@@ -100,6 +101,26 @@ v1::ServerMessage control(TestPeer& peer, const std::string& name, std::optional
   if (paused) message.mutable_control_scene()->set_paused(*paused);
   message.mutable_control_scene()->set_reset(reset);
   return ask(peer, message);
+}
+
+TEST_F(ScenesTest, RefusesCreateSceneAtOnceWhileTooManyScenesWait) {
+  START();
+  std::promise<void> began;
+  std::latch mayEnd(1);
+  v1::CreateSceneRequest unknown;
+  unknown.set_named("no such scene");
+  server().createScene(unknown, [&](const auto&) {
+    began.set_value();
+    mayEnd.wait();  // the maker's thread stays busy, so all others wait
+  });
+  began.get_future().wait();
+  for (std::uint32_t i = 0; i < SceneMaker::kMostWaiting; ++i)
+    server().createScene(unknown, [](const auto&) {});
+  TestPeer peer(server());
+  const v1::ServerMessage answer = createNamed(peer, "folds", "late");
+  EXPECT_EQ(answer.error().code(), v1::ERROR_CODE_RESOURCE_EXHAUSTED);
+  EXPECT_THAT(answer.error().text(), HasSubstr("64 scenes wait to be created; try again later"));
+  mayEnd.count_down();
 }
 
 TEST_F(ScenesTest, CreatesAndJoinsASceneUploadedInChunks) {
@@ -344,7 +365,7 @@ TEST_F(ScenesTest, PausedSceneStandsStillAndContinues) {
   ASSERT_TRUE(control(other, "small", true, false).control_scene().scene().paused());
   peer.readUntil(
       [](const v1::ServerMessage& m) { return m.notice().kind() == v1::NOTICE_KIND_SCENE_PAUSED; });
-  // Whatever was on its way when the pause began is there after a few ticks of another scene.
+  // Frames in flight at the start of the pause arrive within a few ticks of another scene.
   other.readFrames(4);
   const std::uint64_t ticks = metrics().ticks.value();
   other.readFrames(10);
@@ -375,7 +396,7 @@ TEST_F(ScenesTest, ResetSceneRestartsWithItsPresentParameters) {
   TestPeer peer(server());
   peer.join();
   v1::ParameterChange change;
-  change.mutable_gravity()->mutable_value();  // none
+  change.mutable_gravity()->mutable_value();  // zero gravity
   peer.change(change);
   peer.readFrames(20);
   const auto lowest = [&] {
@@ -387,14 +408,14 @@ TEST_F(ScenesTest, ResetSceneRestartsWithItsPresentParameters) {
   ASSERT_TRUE(control(peer, "", std::nullopt, true).has_control_scene());
   peer.readUntil([](const v1::ServerMessage& m) { return m.notice().kind() == v1::NOTICE_KIND_SCENE_RESET; });
   peer.readFrames(3);
-  // At rest and without gravity, but for the ball that pushes it.
+  // The cloth is at rest without gravity, except where the ball pushes it.
   EXPECT_NEAR(lowest(), -1.1f, 0.02f);
   EXPECT_EQ(peer.description().definition().name(), "small");
   EXPECT_EQ(server().getScene({}).value().scene().environment().gravity().y(), 0);
 }
 
 TEST_F(ScenesTest, ResetOfAPausedSceneIsShown) {
-  model::Scene sparse = tests::smallScene("sparse");  // of frames
+  model::Scene sparse = tests::smallScene("sparse");  // streams every third tick
   sparse.simulationRate = 60;
   sparse.streamRate = 20;
   sparse.colliders.clear();
@@ -402,7 +423,7 @@ TEST_F(ScenesTest, ResetOfAPausedSceneIsShown) {
   START({}, {sparse});
   TestPeer peer(server()), other(server());
   peer.join("sparse");
-  const auto farthest = [&] {  // from the plane in which it starts
+  const auto farthest = [&] {  // largest distance from the plane of the start
     float z = 0;
     for (std::size_t i = 2; i < peer.decoder().positions().size(); i += 3)
       z = std::max(z, std::abs(peer.decoder().positions()[i]));
@@ -413,7 +434,7 @@ TEST_F(ScenesTest, ResetOfAPausedSceneIsShown) {
   control(other, "sparse", true, false);
   peer.readUntil(
       [](const v1::ServerMessage& m) { return m.notice().kind() == v1::NOTICE_KIND_SCENE_PAUSED; });
-  // Whatever was on its way when the pause began is there after a few ticks of another scene.
+  // Frames in flight at the start of the pause arrive within a few ticks of another scene.
   other.readFrames(4);
   const telemetry::SceneMetrics& metrics = server().state().find("sparse")->metrics;
   const std::uint64_t ticks = metrics.ticks.value();
@@ -425,14 +446,14 @@ TEST_F(ScenesTest, ResetOfAPausedSceneIsShown) {
   const std::uint64_t shown = peer.frames().back().tick;
   EXPECT_EQ(shown % 3, 0u);
   EXPECT_LE(shown, ticks + 3);
-  // At most three ticks of wind, after a second of it before.
+  // The wind has acted for at most three ticks, compared with a second before the pause.
   EXPECT_LT(farthest(), before / 10);
   other.readFrames(4);
   EXPECT_EQ(metrics.ticks.value(), shown);
   EXPECT_FALSE(server().state().find("sparse")->running);
 }
 
-// A scene that takes many times longer to load than a tick of the others: tables of 590,000 constraints.
+// A scene with tables of 590,000 constraints. Loading it takes many times longer than a tick of the others.
 model::Scene heavyScene() {
   model::Scene heavy = tests::smallScene("heavy");
   model::Cloth& cloth = heavy.cloths[0];
@@ -443,7 +464,7 @@ model::Scene heavyScene() {
   return heavy;
 }
 
-// A fast scene, so that it runs many ticks during the loading, also on a fast machine.
+// A scene with many ticks per second, so that several of them fall into the loading, also on a fast machine.
 model::Scene lightScene() {
   model::Scene light = tests::smallScene("light");
   light.simulationRate = light.streamRate = 200;
@@ -451,7 +472,7 @@ model::Scene lightScene() {
   return light;
 }
 
-// The light scene runs while a peer asks for the heavy one.
+// The light scene runs while a peer joins the heavy one.
 class HeavySceneTest : public tests::ServerTest {
  protected:
   void SetUp() override {

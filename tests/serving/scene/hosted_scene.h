@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A scene host without a server; the only other thread is the publisher's. Runs single ticks and decodes
-// frames.
+// A scene host without a server. Runs single ticks and decodes their frames. The only other thread is that of
+// the publisher.
 #pragma once
 
 #include <chrono>

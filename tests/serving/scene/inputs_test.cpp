@@ -69,7 +69,7 @@ TEST_F(ColliderSetTest, ColliderAppearsAtRestAndMovesInAStraightLine) {
   advance();
   EXPECT_EQ(moving[1].start.position, Vec3(0.5f, 0, 0));
   EXPECT_EQ(moving[1].end.position, Vec3(0.6f, 0, 0));
-  advance();  // no news: at rest
+  advance();  // without a new pose the collider rests
   EXPECT_EQ(moving[1].start.position, Vec3(0.6f, 0, 0));
   EXPECT_EQ(moving[1].end.position, Vec3(0.6f, 0, 0));
 }
@@ -77,7 +77,7 @@ TEST_F(ColliderSetTest, ColliderAppearsAtRestAndMovesInAStraightLine) {
 TEST_F(ColliderSetTest, JumpIsNotSwept) {
   colliders.place(7, std::vector{handAt(1, 0)});
   advance();
-  // 30 m/s are 0.3 m in a tick of 10 ms.
+  // A faster motion than 30 m/s is a jump: 0.3 m in a tick of 10 ms.
   colliders.place(7, std::vector{handAt(1, 0.31f)});
   EXPECT_EQ(advance()[1].start.position, Vec3(0.31f, 0, 0));
   colliders.place(7, std::vector{handAt(1, 0.6f)});
@@ -207,14 +207,14 @@ TEST(GrabsAndAttachments, GrabStartsHoldsAndReleases) {
   EXPECT_EQ(tick.grabs[0].state, State::holds);
   EXPECT_EQ(tick.grabs[0].start.position.x(), 0);
   EXPECT_EQ(tick.grabs[0].end.position.x(), 0.1f);
-  holds.advance(scene, 0.03, tick);  // no news: at rest
+  holds.advance(scene, 0.03, tick);  // without a new pose the grab rests
   EXPECT_EQ(tick.grabs[0].start.position.x(), 0.1f);
-  // The device lost its state, so that the grab starts again.
+  // The device lost its state, so the grabs start again.
   holds.restartGrabs();
   holds.advance(scene, 0.04, tick);
   EXPECT_EQ(tick.grabs[0].state, State::takes);
   EXPECT_EQ(tick.grabs[1].state, State::takes);
-  // Its place is free for a tick before it is another's.
+  // The index of a released grab is free for one tick before another grab gets it.
   holds.place(7, {}, {});
   holds.place(9, std::vector{grabAt(5, 3)}, {});
   holds.advance(scene, 0.05, tick);

@@ -38,7 +38,7 @@ class PoseHistoryTest : public ::testing::Test {
   // Posts a pose without a time.
   void sayNow(float place) { inbox.postPoses(kAda, {.colliders = {handAt(1, place)}}, begin); }
 
-  // Places the poses of a tick at that time.
+  // Places the poses for a tick at this time.
   void tick(double ms) {
     placed.clear();
     inbox.drain(inputs);
@@ -47,7 +47,7 @@ class PoseHistoryTest : public ::testing::Test {
       placed[participant] = poses;
     });
   }
-  // Returns the x of the hand at that time; the grab must have the same x.
+  // Returns the x of the hand at this time. Expects the same x of the grab.
   float xAt(double ms) {
     tick(ms);
     if (placed.contains(kAda) && !placed[kAda].colliders.empty()) {
@@ -65,7 +65,7 @@ class PoseHistoryTest : public ::testing::Test {
   Inputs inputs;
   PoseHistory history;
   std::map<std::uint64_t, model::ParticipantPoses> placed;
-  float x = std::nanf("");  // of the tick last asked
+  float x = std::nanf("");  // newest result of xAt()
 };
 
 TEST_F(PoseHistoryTest, InterpolatesBetweenPoses) {
@@ -88,7 +88,7 @@ TEST_F(PoseHistoryTest, InterpolatesRotationTheShorterWay) {
   };
   say(0, turned(20));
   model::ParticipantCollider other = turned(40);
-  other.pose.orientation.coeffs() *= -1;  // the same turn
+  other.pose.orientation.coeffs() *= -1;  // the same rotation
   say(10, other);
   const auto degrees = [&](double ms) {
     tick(ms);
@@ -98,12 +98,12 @@ TEST_F(PoseHistoryTest, InterpolatesRotationTheShorterWay) {
   };
   EXPECT_NEAR(degrees(5), 30, 0.1f);
   EXPECT_NEAR(degrees(10), 40, 0.01f);
-  EXPECT_GT(degrees(15), 44);  // led on
+  EXPECT_GT(degrees(15), 44);  // extrapolated
   EXPECT_LT(degrees(30), 75);
 }
 
-// A hand at 1 m/s whose poses arrive 12 ms after they were true is within 8 mm of where it really is; without
-// times it would be 12 to 25 mm behind.
+// The poses of a hand at 1 m/s arrive 12 ms after their time. The extrapolated hand is within 8 mm of its
+// true position. Without times it would be 12 to 25 mm behind.
 TEST_F(PoseHistoryTest, ExtrapolatesOverTheArrivalDelay) {
   double next = 0;
   for (double now = 100; now < 500; now += 8) {
@@ -118,7 +118,7 @@ TEST_F(PoseHistoryTest, ExtrapolatesThenReturnsToTheNewestPose) {
   say(10, 0.01f);  // 1 m/s
   EXPECT_NEAR(xAt(20), 0.02f, 0.002f);
   EXPECT_NEAR(xAt(30), 0.03f, 0.006f);
-  // The farthest, a third of the time; from there it comes back.
+  // The largest distance is at a third of the time. From then on the hand returns.
   EXPECT_NEAR(xAt(60), 0.01f + 0.15f * 4 / 27, 1e-5f);
   EXPECT_LT(xAt(61), 0.01f + 0.15f * 4 / 27);
   float before = x;
@@ -147,7 +147,7 @@ TEST_F(PoseHistoryTest, DoesNotExtrapolateDistantOrFastPoses) {
 
 TEST_F(PoseHistoryTest, NewestPoseActsAtOnce) {
   say(0, 0);
-  say(30, 0.3f);  // of the time to come
+  say(30, 0.3f);  // its time is in the future
   EXPECT_NEAR(xAt(10), 0.1f, 1e-6f);
   say(20, 0.9f);  // late
   EXPECT_NEAR(xAt(20), 0.2f, 1e-6f);

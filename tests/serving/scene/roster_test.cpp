@@ -30,7 +30,7 @@ using ::testing::SizeIs;
 struct ActionCase {
   Action action;
   Role needed;      // if participants may change all parameters
-  Role restricted;  // if they may change none
+  Role restricted;  // if participants may change none
 };
 
 TEST(Roles, EachActionRequiresItsRole) {

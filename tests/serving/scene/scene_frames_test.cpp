@@ -34,8 +34,8 @@ TEST_F(SceneFramesTest, StreamsOneFramePerTickStartingWithAKeyFrame) {
   EXPECT_EQ(hosted.live.metrics.ticks.value(), 20u);
 }
 
-// When a subscriber takes what there is for it.
-enum class Endpoint : std::uint8_t { asked, quick };  // when it is asked to; as soon as there is something
+// When a subscriber takes its messages: in read() only, or as soon as the mailbox wakes it.
+enum class Endpoint : std::uint8_t { asked, quick };
 
 // A further subscriber of a hosted scene, with its own quality.
 class QualitySubscriber {
@@ -69,7 +69,7 @@ class QualitySubscriber {
 
   std::uint64_t tick() const { return decoder_->tick(); }
 
-  std::vector<std::uint8_t> qualities;  // of the frames that came
+  std::vector<std::uint8_t> qualities;  // of the received frames
   std::vector<std::uint64_t> stateHashes;
 
  private:
@@ -101,7 +101,7 @@ TEST_F(SceneFramesTest, EncodesEachRequestedQualityOnce) {
   EXPECT_EQ(packets(), 5u);
   {
     QualitySubscriber first(hosted, 1), second(hosted, 1);
-    // Its encoder is made meanwhile.
+    // The encoder of quality 1 is made meanwhile.
     for (const auto end = Clock::now() + std::chrono::seconds(60);
          first.qualities.empty() && Clock::now() < end;) {
       hosted.tick();
@@ -144,7 +144,7 @@ TEST_F(SceneFramesTest, FastReaderGetsEachTickInOneQualityAcrossAChange) {
   model::Scene scene = smallScene();
   scene.stream.qualities = 2;
   HostedScene hosted(std::move(scene), 0);
-  QualitySubscriber coarse(hosted, 1);  // for whom its encoder is made
+  QualitySubscriber coarse(hosted, 1);  // makes the server create the encoder of quality 1
   for (const auto end = Clock::now() + std::chrono::seconds(60);
        coarse.qualities.empty() && Clock::now() < end;) {
     hosted.tick();
@@ -171,7 +171,7 @@ TEST_F(SceneFramesTest, LateJoinerOfAPausedSceneGetsTheNewestTick) {
     hosted.host.encodePausedFrame(hosted.now);
     hosted.packer.drain();
   };
-  hosted.mailboxes[0]->requestKeyFrame();  // and continues without it: no key frame is needed
+  hosted.mailboxes[0]->requestKeyFrame();  // can decode without one, so the request waits
   show();
   EXPECT_EQ(hosted.live.metrics.frames.value(), 20u);
   {
@@ -233,7 +233,7 @@ TEST_F(SceneFramesTest, DecodedFrameIsWithinMaxErrorOfTheState) {
   HostedScene hosted;
   hosted.ticks(10);
   vulkan::Recorder recorder(tests::device());
-  // Same scene, same ticks, straight on the simulation.
+  // The same ticks of the same scene, simulated without a host.
   simulation::ClothSimulation simulation(tests::device(), hosted.live.start());
   ColliderSet colliders(hosted.live.start());
   simulation::TickInputs inputs{.environment = hosted.live.start().environment, .colliders = {}};
@@ -264,7 +264,7 @@ TEST_F(SceneFramesTest, OneKeyFrameServesAllRequestsAndRespectsTheInterval) {
   EXPECT_TRUE(hosted.keys.back());
   EXPECT_EQ(hosted.live.metrics.keyFrames.value(), 2u);
 
-  // Asked again within the interval: the frames until its end are predicted.
+  // A second request within the interval waits: the frames until the end of the interval are predicted.
   hosted.mailboxes.back()->restart();
   for (int millisecondsLater = 25; millisecondsLater < 100; millisecondsLater += 25) {
     hosted.host.begin(hosted.now + std::chrono::milliseconds(millisecondsLater));
@@ -276,8 +276,8 @@ TEST_F(SceneFramesTest, OneKeyFrameServesAllRequestsAndRespectsTheInterval) {
   EXPECT_EQ(hosted.live.metrics.keyFrames.value(), 3u);
 }
 
-// The report agrees with the decoded frame: two ends of a spring of 0.1 m, each off by the codec's error
-// along three axes.
+// The strain in the report agrees with the decoded frame. Tolerance: both ends of a spring of 0.1 m have the
+// codec's error along three axes.
 TEST_F(SceneFramesTest, SendsFourReportsPerSecond) {
   HostedScene hosted;
   hosted.ticks(21);

@@ -123,7 +123,7 @@ TEST_F(SceneHostTest, AnnouncesGrabEvents) {
   ASSERT_EQ(released.grabs_size(), 1);
   EXPECT_EQ(released.grabs(0).kind(), v1::GRAB_EVENT_KIND_RELEASED);
 
-  // Where there is nothing to take hold of.
+  // A grab far from the cloth takes no node.
   grabAt(Vec3(10, 0, 0));
   const v1::TickEvents nothing = newest();
   ASSERT_EQ(nothing.grabs_size(), 1);
@@ -131,7 +131,7 @@ TEST_F(SceneHostTest, AnnouncesGrabEvents) {
   EXPECT_EQ(nothing.grabs(0).vertices(), 0u);
 }
 
-// A hand in the sheet for ten ticks, then gone. The scene's ball swings through it too.
+// A hand is in the sheet for ten ticks and then moves away. The scene's ball does not touch the sheet.
 TEST_F(SceneHostTest, AnnouncesContactsIfRequested) {
   model::Scene scene = smallScene();
   scene.colliders[0].motion.keys.clear();
@@ -192,9 +192,9 @@ TEST_F(SceneHostTest, SpringChangesReachTheDevice) {
 
 TEST_F(SceneHostTest, UnhealthyStateIsNotSentAndRollsBack) {
   HostedScene hosted;
-  hosted.ticks(90);  // 40 ticks/s: the state was kept at 40 and at 80
+  hosted.ticks(90);  // 40 ticks/s: the state was saved at ticks 40 and 80
   ASSERT_EQ(hosted.frames.size(), 90u);
-  hosted.change(gravity(-1e30f));  // no message could say this
+  hosted.change(gravity(-1e30f));  // messages cannot carry this value
   hosted.tick();
   EXPECT_FALSE(hosted.host.status().healthy);
   EXPECT_EQ(hosted.frames.size(), 90u);
@@ -207,7 +207,7 @@ TEST_F(SceneHostTest, UnhealthyStateIsNotSentAndRollsBack) {
   EXPECT_TRUE(hosted.host.status().healthy);
   ASSERT_EQ(hosted.frames.size(), 91u);
   EXPECT_TRUE(hosted.keys.back());
-  EXPECT_EQ(hosted.decoder->tick(), 92u);  // ticks count on
+  EXPECT_EQ(hosted.decoder->tick(), 92u);  // the numbers of ticks continue
   hosted.tick();
   EXPECT_FALSE(hosted.keys.back());
   EXPECT_EQ(hosted.live.metrics.resets.value(), 0u);
@@ -218,7 +218,7 @@ TEST_F(SceneHostTest, SecondUnhealthyStateResetsStateAndParameters) {
   hosted.ticks(50);
   hosted.change(gravity(-1e30f));
   hosted.change(wind(1));
-  hosted.ticks(2);  // the second from the checkpoint, with the same gravity
+  hosted.ticks(2);  // the second tick starts from the checkpoint, with the same gravity
   EXPECT_EQ(hosted.live.metrics.rollbacks.value(), 1u);
   EXPECT_EQ(hosted.live.metrics.resets.value(), 1u);
   hosted.ticks(30);
@@ -270,8 +270,8 @@ TEST_F(SceneHostTest, ContinuesOnAnotherDeviceFromTheNewestSnapshot) {
   hosted.host.release();  // before its device
 }
 
-// How far the lowest node of any column hangs below where it would if no spring were stretched, and where all
-// are.
+// Returns the largest stretch of a column, m: its length along the springs minus its length at rest. Appends
+// the heights of the lowest row to `heights`.
 double stretchedBy(const std::vector<float>& positions, std::vector<float>* heights = nullptr) {
   double most = 0;
   for (std::size_t column = 0; column < 10; ++column) {
@@ -287,8 +287,8 @@ double stretchedBy(const std::vector<float>& positions, std::vector<float>* heig
   return most;
 }
 
-// Soft springs hang stretched by S of a metre. At once, that would be gone within a tick; gently it fades
-// as exp(-t / 0.1 s), which is at most a quarter of it in a tick of 25 ms, besides what moves anyway.
+// Soft springs hang stretched by S metres. The correction fraction makes the stretch decay as exp(-t / 0.1
+// s): a tick of 25 ms removes less than a quarter of S. The nodes' other motion adds at most 2 cm.
 TEST_F(SceneHostTest, SolverChangeActsAtTheNextTickWithoutAJump) {
   model::Scene scene = smallScene();
   scene.colliders.clear();

@@ -37,7 +37,7 @@ TEST(Pacer, CatchesUpOneTickAndSlipsTheRest) {
   Pacer pacer(100);
   pacer.start(kStart);
   pacer.begin(kStart);
-  // 35 ms behind the tick that was due at 10 ms: one period of that may be caught up, 25 ms are given up.
+  // This is 35 ms after the tick was due (10 ms). One period may be caught up; 25 ms are given up.
   const Clock::time_point now = kStart + milliseconds(45);
   const Pacer::Start start = pacer.begin(now);
   EXPECT_EQ(start.lateness, milliseconds(35));
@@ -51,10 +51,10 @@ TEST(Pacer, CatchesUpOneTickAndSlipsTheRest) {
 TEST(SlowWatch, ReportsASlowSceneAtMostEveryTenSeconds) {
   SlowWatch watch;
   int told = 0;
-  // 20 s in which every tick of 10 ms takes 20: half of real time.
+  // For 20 s every tick of 10 ms takes 20 ms, which is half of real time.
   for (int tick = 0; tick < 1'000; ++tick)
     if (const auto speed = watch.note(kStart + milliseconds(20) * tick, tick == 0 ? 0 : 1)) {
-      EXPECT_NEAR(*speed, 0.5, 0.01);  // the first stretch starts with a tick that gave up nothing
+      EXPECT_NEAR(*speed, 0.5, 0.01);  // the first interval starts with a tick without slip
       ++told;
     }
   EXPECT_EQ(told, 2);  // after 2 s, and more than 10 s later
@@ -62,7 +62,7 @@ TEST(SlowWatch, ReportsASlowSceneAtMostEveryTenSeconds) {
 
 TEST(SlowWatch, IgnoresSmallSlowdowns) {
   SlowWatch watch;
-  // Every tick of 10 ms takes 10.3: 97 % of real time.
+  // Every tick of 10 ms takes 10.3 ms, which is 97 % of real time.
   for (int tick = 0; tick < 1'000; ++tick)
     EXPECT_FALSE(watch.note(kStart + std::chrono::microseconds(10'300) * tick, 0.03)) << tick;
 }
@@ -78,11 +78,11 @@ TEST(TokenBucket, AllowsABurstThenTheRate) {
   int taken = 0;
   for (int i = 0; i < 20; ++i) taken += bucket.take(kStart);
   EXPECT_EQ(taken, 5);
-  // 2 s in steps of 10 ms: 20 more.
+  // In 2 s the rate allows 20 more.
   taken = 0;
   for (int i = 1; i <= 200; ++i) taken += bucket.take(kStart + milliseconds(10) * i);
   EXPECT_NEAR(taken, 20, 1);
-  // However long it rested, no more than the burst.
+  // A long pause allows no more than the burst.
   taken = 0;
   for (int i = 0; i < 20; ++i) taken += bucket.take(kStart + hours(1));
   EXPECT_EQ(taken, 5);

@@ -31,7 +31,7 @@ class TickSchedulerTest : public ::testing::Test {
     return *scenes_.emplace_back(std::make_unique<SimulatedScene>(rate, cost));
   }
 
-  // Runs the scenes like the device's thread.
+  // Runs the scenes as the device thread does.
   void run(Clock::duration time) {
     std::vector<TickSchedule*> turns, chosen;
     for (const auto& scene : scenes_) turns.push_back(&scene->turn);
@@ -72,7 +72,7 @@ TEST_F(TickSchedulerTest, HeavySceneUsesTheTimeThatOthersLeave) {
   run(10s);
   for (const SimulatedScene* scene : light) {
     EXPECT_GE(scene->ticks, 0.99 * 720);
-    // Its first tick is not known to be long.
+    // The first tick of the heavy scene is not yet known to be long.
     EXPECT_LE(scene->slipped, 50.0 / 1000 * 72);
     EXPECT_LE(scene->worstLateness, 50ms + 14ms + 8ms);
   }
@@ -89,7 +89,7 @@ TEST_F(TickSchedulerTest, SingleSceneIsNotDelayed) {
 
 TEST_F(TickSchedulerTest, HeavySceneGetsAnEqualShareOfASlowDevice) {
   std::vector<SimulatedScene*> light;
-  for (int i = 0; i < 9; ++i) light.push_back(&add(72, 3ms));  // nearly twice what there is
+  for (int i = 0; i < 9; ++i) light.push_back(&add(72, 3ms));  // together nearly twice the time of the device
   SimulatedScene& heavy = add(72, 50ms);
   run(10s);
   EXPECT_NEAR(heavy.ticks, 10 / (10 * 0.050), 3);

@@ -23,14 +23,14 @@ using tests::SeenFrame;
 using tests::TestPeer;
 using Body = v1::ServerMessage;
 
-// Skips the rest of a test that found no device.
+// Starts the server. Leaves the test if there is no device.
 #define START(...)    \
   start(__VA_ARGS__); \
   if (IsSkipped()) return
 
 using JoinTest = tests::ServerTest;
 
-// The collider that a participant has in a frame; nullptr if it has none.
+// Collider of a participant in a frame; nullptr if there is none.
 const v1::ColliderState* colliderOf(const SeenFrame& frame, std::uint64_t participant) {
   const auto found = std::ranges::find(frame.colliders, participant, &v1::ColliderState::participant_id);
   return found == frame.colliders.end() ? nullptr : &*found;
@@ -58,7 +58,7 @@ TEST_F(JoinTest, SendsWelcomeDescriptionAndFramesFromAKeyFrame) {
     EXPECT_GT(peer.frames()[i].tick, peer.frames()[i - 1].tick);
     states.insert(peer.frames()[i].stateHash);
   }
-  EXPECT_EQ(states.size(), 20u);  // it moves
+  EXPECT_EQ(states.size(), 20u);  // the cloth moves
 }
 
 TEST_F(JoinTest, AllPeersGetTheSameBytesAndALateJoinerTheSameShape) {
@@ -68,7 +68,7 @@ TEST_F(JoinTest, AllPeersGetTheSameBytesAndALateJoinerTheSameShape) {
   early.readFrames(10);
   TestPeer late(server());
   late.join();
-  // In turn, so that neither falls behind.
+  // Both read alternately, so that neither falls behind.
   for (int i = 0; i < 5; ++i)
     for (TestPeer* peer : {&early, &late}) peer->readFrames(1);
   std::size_t both = 0;
@@ -161,14 +161,14 @@ TEST_F(JoinTest, PeerThatNeverReadsDoesNotDelayOthers) {
   TestPeer reader(server()), dead(server());
   reader.join();
   dead.hello();
-  // Its endpoint writes what there is for a while, and then no more.
+  // The endpoint of `dead` sends one frame and then nothing more.
   dead.readFrames(1);
   dead.acknowledges = false;
   const std::uint64_t keys = metrics().keyFrames.value();
   reader.readFrames(80);  // 2 s
   for (std::size_t i = 1; i < 80; ++i) EXPECT_FALSE(reader.frames()[reader.frames().size() - i].key);
   EXPECT_EQ(metrics().keyFrames.value(), keys);
-  // Only the frames that the reader keeps, and the few that are held for the other peer, are alive.
+  // The server holds only a few frames, for the other peer. All others belong to the reader alone.
   std::size_t held = 0;
   for (const SeenFrame& frame : reader.frames()) held += frame.message.use_count() > 1;
   EXPECT_LE(held, Mailbox::kMaxHeld + 1);
@@ -186,7 +186,7 @@ TEST_F(JoinTest, PeerThatNeverAcknowledgesGetsTwoFrames) {
   v1::ClientMessage ping;
   ping.mutable_ping();
   mute.send(ping);
-  mute.readUntil(Body::kPong);  // nothing else is there to be read
+  mute.readUntil(Body::kPong);  // no other message waits
   EXPECT_EQ(mute.frames().size(), 2u);
 }
 
@@ -198,12 +198,12 @@ TEST_F(JoinTest, SlowReaderGetsOnlyDecodableFrames) {
   slow.hello();
   slow.readFrames(2);
   for (int round = 0; round < 4; ++round) {
-    reader.readFrames(12);  // 300 ms in which it falls behind more than is held back
+    reader.readFrames(12);  // 300 ms, in which `slow` falls behind by more frames than its mailbox holds
     v1::ClientMessage ack;
     ack.mutable_frame_ack()->set_tick(slow.frames().back().tick);
     slow.send(ack);
     const std::size_t before = slow.frames().size();
-    slow.readFrames(2);  // decoded, and compared with the server's hash, as they are read
+    slow.readFrames(2);  // also decodes them and compares the hashes
     EXPECT_TRUE(slow.frames()[before].key);
     EXPECT_FALSE(slow.frames()[before + 1].key);
   }
@@ -222,7 +222,8 @@ TEST_F(JoinTest, SendsAKeyFrameOnRequest) {
   EXPECT_TRUE(peer.frames().back().key);
 }
 
-// Its core tells times of the server's clock by its own: after a step of that both are off until it notices.
+// A client core derives times of the server's clock from its own clock. After a step of that clock both times
+// are wrong until the core notices.
 TEST_F(JoinTest, ClientClockJumpOfAnHourKeepsItsColliders) {
   START();
   TestPeer peer(server());
@@ -238,14 +239,14 @@ TEST_F(JoinTest, ClientClockJumpOfAnHourKeepsItsColliders) {
   constexpr std::int64_t kHour = 3'600'000'000;  // us
   float x = 0;
   for (const std::int64_t off : {std::int64_t{0}, kHour, -kHour, std::int64_t{0}}) {
-    x += 5;  // a jump, which is not led on
+    x += 5;  // a jump, which is not extrapolated
     hand.mutable_pose()->mutable_position()->set_x(x);
     const auto now = static_cast<std::int64_t>(microseconds(Clock::now()));
     message.mutable_collider_poses()->set_client_time_us(static_cast<std::uint64_t>(now + 2 * kHour + off));
     message.mutable_collider_poses()->set_server_time_us(
         static_cast<std::uint64_t>(std::max<std::int64_t>(1, now + off)));
     peer.send(message);
-    // At once: with what is on its way, and the tick that takes it.
+    // The pose acts at once: after the frames in flight and the tick that applies it.
     for (int frames = 0; frames < 8 && shownAt() != x; ++frames) peer.readFrames(1);
     EXPECT_EQ(shownAt(), x) << off;
   }
@@ -320,7 +321,7 @@ TEST_F(JoinTest, UnhealthyStateIsAnnouncedAndTheStreamContinues) {
   START();
   TestPeer peer(server());
   peer.join();
-  // A value that no message can have: the state becomes unhealthy, rolls back, and is reset.
+  // Messages cannot carry this value. The state becomes unhealthy, is rolled back, and then reset.
   ASSERT_TRUE(server().state().scenes.front()->inbox.postChange({.change = tests::gravity(-1e30f)}));
   EXPECT_EQ(peer.readUntil(Body::kNotice).notice().kind(), v1::NOTICE_KIND_ROLLED_BACK);
   peer.readUntil(Body::kNotice);
@@ -378,7 +379,7 @@ TEST_F(JoinTest, FullSceneAndFullServerRefuseWithTheReason) {
   fifth.join();
 }
 
-// A scene whose stream has layers and qualities.
+// A server with a scene whose stream has two temporal layers and three qualities.
 class QualityTest : public ::testing::Test {
  protected:
   void SetUp() override {
@@ -408,7 +409,7 @@ TEST_F(QualityTest, EachPeerGetsTheRequestedQuality) {
   TestPeer fine(*server), coarse(*server), coarser(*server);
   fine.hello(wanting(0));
   coarse.hello(wanting(1));
-  coarser.hello(wanting(3));  // more than there is
+  coarser.hello(wanting(3));  // coarser than the stream's coarsest
   for (int i = 0; i < 10; ++i)
     for (TestPeer* peer : {&fine, &coarse, &coarser}) peer->readFrames(1);
   EXPECT_EQ(fine.description().qualities(), 3u);
@@ -416,7 +417,7 @@ TEST_F(QualityTest, EachPeerGetsTheRequestedQuality) {
   std::uint8_t quality = 0;
   for (const TestPeer* peer : {&fine, &coarse, &coarser}) {
     EXPECT_EQ(peer->frames().front().quality, quality);
-    // A test on a busy machine may be a slow link.
+    // On a busy machine link adaptation may lower the quality.
     for (const SeenFrame& frame : peer->frames()) EXPECT_GE(frame.quality, quality);
     ++quality;
   }
@@ -481,7 +482,7 @@ TEST_F(JoinTest, ReportShowsTheStagesOfATick) {
   for (const char* part :
        {"scene small", "tick", "device", "advance", "entropy coding", "send", "connections 1"})
     EXPECT_THAT(report, HasSubstr(part));
-  EXPECT_THAT(report, testing::Not(HasSubstr("scene other")));  // it never had subscribers
+  EXPECT_THAT(report, testing::Not(HasSubstr("scene other")));  // scene "other" never had subscribers
 }
 
 TEST(SceneServer, MissingDefaultSceneErrorListsTheScenes) {

@@ -22,7 +22,7 @@ using tests::allocatedBytes;
 using tests::kMostBytesAClient;
 using tests::TestPeer;
 
-// 10,000 falling nodes, soft so that a tick is cheap.
+// 10,000 falling nodes with soft springs, so that few substeps suffice.
 model::Scene largeScene() {
   model::Scene scene = tests::smallScene("large");
   model::Cloth& cloth = scene.cloths.front();
@@ -37,7 +37,7 @@ model::Scene largeScene() {
   return scene;
 }
 
-// Sends everything that the server keeps for a client.
+// Sends a message of each kind that makes the server keep data for the client.
 void sendAllThereIs(TestPeer& peer, int round) {
   v1::ClientMessage ping;
   ping.mutable_ping()->set_client_time_us(1);
@@ -74,7 +74,7 @@ TEST_P(ClientThatDoesNotRead, CostsAtMostThePromisedMemory) {
   }
   const auto wait = [] { std::this_thread::sleep_for(std::chrono::milliseconds(50)); };  // two ticks
   TestPeer first(*server);
-  first.join();  // so that what the scene takes is there
+  first.join();  // so that the scene has allocated its memory
 
   constexpr int kClients = 6, kRounds = 60;
   std::vector<std::unique_ptr<TestPeer>> clients;
@@ -86,7 +86,7 @@ TEST_P(ClientThatDoesNotRead, CostsAtMostThePromisedMemory) {
   if (GetParam())
     for (int i = 0; i < kClients; ++i) add()->join();
   const double before = allocatedBytes();
-  // Each is promised another description, since the parameters are others.
+  // Each client gets a separate description, because the parameters change between them.
   if (!GetParam())
     for (int i = 0; i < kClients; ++i) {
       TestPeer& client = *add();
@@ -103,8 +103,7 @@ TEST_P(ClientThatDoesNotRead, CostsAtMostThePromisedMemory) {
   EXPECT_LT(each, kMostBytesAClient);
 }
 
-// The sum of the bounds, of frames and answers as large as they may be: nothing that a client sends or leaves
-// unread adds to it.
+// A mailbox filled to all of its limits takes no more than their sum.
 TEST(Memory, MailboxStaysWithinItsLimits) {
   telemetry::SceneMetrics metrics;
   constexpr int kMailboxes = 4;
@@ -114,7 +113,7 @@ TEST(Memory, MailboxStaysWithinItsLimits) {
     const auto& mailbox = mailboxes.emplace_back(std::make_shared<Mailbox>([] {}));
     mailbox->subscribe(nullptr, {.rate = 72}, metrics);
     const auto message = [](std::size_t bytes) { return std::make_shared<std::vector<std::byte>>(bytes); };
-    // Small ones, which cost more than their bytes.
+    // Small messages, whose overhead is larger than their bytes.
     while (mailbox->reply(message(8))) {
     }
     while (mailbox->announce(message(8))) {

@@ -18,7 +18,7 @@ using testing::HasSubstr;
 using tests::TestPeer;
 using Body = v1::ServerMessage;
 
-// A bystander joins first; after each test it must have gone on undisturbed.
+// A bystander joins first. After each test it must still receive frames, and must have got no error.
 class MisbehaviourTest : public tests::ServerTest {
  protected:
   void SetUp() override {

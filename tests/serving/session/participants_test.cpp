@@ -22,7 +22,7 @@ using testing::HasSubstr;
 using tests::TestPeer;
 using Body = v1::ServerMessage;
 
-// Skips the rest of a test that found no device.
+// Starts the server. Leaves the test if there is no device.
 #define START(...)    \
   start(__VA_ARGS__); \
   if (IsSkipped()) return
@@ -49,7 +49,7 @@ class ParticipantsTest : public tests::ServerTest {
             [&](const Body& message) { return message.has_presence() && message.presence().kind() == kind; })
         .presence();
   }
-  // The answer to a message that is refused.
+  // Sends a message and returns the error that answers it.
   static v1::Error refusal(TestPeer& peer, v1::ClientMessage message) {
     message.set_request_id(99);
     peer.send(message);
@@ -108,7 +108,7 @@ TEST_F(ParticipantsTest, ForbiddenActionIsRefusedAndChangesNothing) {
   struct Asked {
     const char* what;
     v1::ClientMessage message;
-    const char* role;  // that it takes
+    const char* role;  // required role
   };
   std::vector<Asked> asked(10);
   asked[0] = {"colliderPoses.colliders", {}, "participant"};
@@ -188,7 +188,7 @@ TEST_F(ParticipantsTest, PauseIsAnnouncedWithItsOwner) {
   const v1::Notice notice = viewer.readUntil(Body::kNotice).notice();
   EXPECT_EQ(notice.kind(), v1::NOTICE_KIND_SCENE_PAUSED);
   EXPECT_EQ(notice.participant_id(), owner.welcome().participant_id());
-  // From outside, as `clothstream resume` does it.
+  // A request from outside the scene, as `clothstream resume` sends it.
   v1::ControlSceneRequest goOn;
   goOn.set_paused(false);
   ASSERT_TRUE(server().controlScene(goOn).has_value());
@@ -201,7 +201,7 @@ TEST_F(ParticipantsTest, OnlyOwnersControlASceneWithoutOutsideControl) {
   START(options);
   v1::ControlSceneRequest reset;
   reset.set_reset(true);
-  EXPECT_TRUE(server().controlScene(reset).has_value());  // it has no owner
+  EXPECT_TRUE(server().controlScene(reset).has_value());  // the scene has no owner
   TestPeer owner(server()), stranger(server());
   join(owner, "Ada");
   const auto refused = server().controlScene(reset);
@@ -257,7 +257,7 @@ TEST_F(ParticipantsTest, ReconnectResumesTheParticipantWithAKeyFrame) {
   EXPECT_EQ(welcome.participant_id(), id);
   EXPECT_EQ(welcome.description_content_id(), lost.welcome().description_content_id());
   EXPECT_EQ(welcome.participants(1).display_name(), "Ben");
-  // Nothing changed: no description, and the first frame needs none before it.
+  // The description has not changed, so it is not sent again. The next message is a frame.
   EXPECT_TRUE(back.readUntil([](const Body& message) { return message.has_frame() || message.has_chunk(); })
                   .has_frame());
   EXPECT_TRUE(back.frames().front().key);
