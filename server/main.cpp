@@ -212,7 +212,7 @@ int play(const ProgramOptions& options, const Signals& signals) {
   if (options.playback.from > recording->length())
     throw std::runtime_error(fmt::format("--from: {} s is after the end of {}; use 0 to {:.3f}",
                                          options.playback.from, options.recording, recording->length()));
-  if (recording->cut())
+  if (recording->truncated())
     spdlog::warn("{} is truncated or damaged at its end; the readable part is played", options.recording);
   const std::string scene = recording->scene();
   const std::string intro = fmt::format("plays   {}, {:.1f} s of {}, recorded on {}\n", options.recording,

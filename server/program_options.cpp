@@ -83,7 +83,7 @@ void addParticipantOptions(OptionTable& table, Parsed& parsed) {
   table.group("Participants");
   table.number("--hold", options.hold, {.min = 0, .max = 3600, .type = "SECONDS"},
                "Reconnect grace: seconds for which a disconnected participant keeps its place. 0 means none");
-  table.number("--max-participants", options.maxParticipants, {.min = 1, .max = hosting::kMostParticipants},
+  table.number("--max-participants", options.maxParticipants, {.min = 1, .max = hosting::kMaxParticipants},
                "Participants per scene. When the scene is full, the participant that has been disconnected "
                "longest is evicted");
   CLI::Option* changeable = table.list(

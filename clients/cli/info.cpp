@@ -112,14 +112,14 @@ std::string mebibytes(std::uint64_t bytes) {
 
 std::string toText(const RecordingReader& reader, const RecordingFigures& figures, const std::string& damage,
                    const InfoOptions& options) {
-  const auto fact = [&](const char* name) { return printable(reader.fact(name)); };
+  const auto value = [&](const char* name) { return printable(reader.metadata(name)); };
   std::string text = fmt::format(
       "file      {}, {}, {} chunks\nscene     {}, started {}, {:.1f} s, {} vertices\nserver    {}\ndevice    "
       "{}; {}; "
       "processor {}\nstream    {} ticks/s, {} frames/s, codec {}, max error {} m\n",
-      options.recording, mebibytes(reader.mcap().bytes()), reader.mcap().chunks().size(), fact("scene"),
-      fact("started"), seconds(reader), fact("vertices"), fact("server"), fact("device"), fact("driver"),
-      fact("processor"), fact("simulation_rate"), fact("stream_rate"), fact("codec"), fact("max_error"));
+      options.recording, mebibytes(reader.mcap().bytes()), reader.mcap().chunks().size(), value("scene"),
+      value("started"), seconds(reader), value("vertices"), value("server"), value("device"), value("driver"),
+      value("processor"), value("simulation_rate"), value("stream_rate"), value("codec"), value("max_error"));
   for (std::size_t i = 0; i < figures.channels.size(); ++i) {
     const ChannelFigures& channel = figures.channels[i];
     if (channel.messages == 0) continue;
@@ -143,7 +143,7 @@ std::string toJson(const RecordingReader& reader, const RecordingFigures& figure
                               {"bytes", reader.mcap().bytes()},
                               {"chunks", reader.mcap().chunks().size()},
                               {"seconds", seconds(reader)},
-                              {"facts", reader.facts()}};
+                              {"facts", reader.metadata()}};
   for (std::size_t i = 0; i < figures.channels.size(); ++i) {
     nlohmann::ordered_json channel{{"messages", figures.channels[i].messages}};
     if (!options.quick) channel["bytes"] = figures.channels[i].bytes;

@@ -29,7 +29,7 @@ using SteadyClock = std::chrono::steady_clock;
 
 constexpr std::chrono::milliseconds kInterval{50};
 // Requests a key frame early, since it arrives some frames later.
-constexpr std::uint32_t kAskAfterFrames = recording::kFramesAKeyFrame - 8;
+constexpr std::uint32_t kAskAfterFrames = recording::kMaxKeyFrameDistance - 8;
 
 // Thread-safe: the stream's thread adds messages, the waiting thread closes chunks.
 class StreamFile {

@@ -69,7 +69,7 @@ class Recovery {
                            recording::OutputFile& out) {
     auto writer = orError(kNotWritten, recording::RecordingWriter::begin(
                                            [&](std::string_view bytes) { return out.write(bytes); },
-                                           mcap.library() + "; clothstream recover", damaged.facts()));
+                                           mcap.library() + "; clothstream recover", damaged.metadata()));
     if (!writer) return tl::unexpected(writer.error());
     Recovered recovered;
     Progress progress("recover", static_cast<std::uint32_t>(mcap.chunks().size()));

@@ -40,7 +40,7 @@ inline constexpr std::uint64_t kMaxChunkBytes = std::uint64_t{320} << 20;
 inline constexpr std::uint64_t kMaxSummaryBytes = std::uint64_t{256} << 20;
 inline constexpr std::uint64_t kMaxPlainRecordBytes = std::uint64_t{16} << 20;  // schema, channel, metadata
 
-using Facts = std::map<std::string, std::string>;
+using Metadata = std::map<std::string, std::string>;
 
 // CRC-32 as in zip files, continued from `before`.
 inline std::uint32_t crcOf(std::string_view bytes, std::uint32_t before = 0) {

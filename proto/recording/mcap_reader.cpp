@@ -50,15 +50,15 @@ std::optional<ChunkHead> parseChunk(std::string_view content) {
   return head;
 }
 
-std::optional<Facts> parseMap(std::string_view entries) {
-  Facts facts;
+std::optional<Metadata> parseMap(std::string_view entries) {
+  Metadata metadata;
   ByteReader reader(entries);
   while (reader.left() > 0) {
     std::string key(reader.text());
-    facts[std::move(key)] = std::string(reader.text());
+    metadata[std::move(key)] = std::string(reader.text());
   }
   if (!reader.ok()) return std::nullopt;
-  return facts;
+  return metadata;
 }
 
 }  // namespace
@@ -72,7 +72,7 @@ struct McapReader::State {
   std::map<std::uint16_t, ReadSchema> schemas;
   std::vector<ChunkPlace> chunks;
   std::optional<Statistics> statistics;
-  std::map<std::string, Facts> facts;
+  std::map<std::string, Metadata> metadata;
   std::uint64_t dataEnd = 0;
   std::uint64_t summaryStart = 0;  // only if there is an index
 
@@ -87,10 +87,10 @@ struct McapReader::State {
   bool takeSummaryRecord(Opcode opcode, std::string_view content);
   bool takeChunkIndex(std::string_view content);
   bool takeStatistics(std::string_view content);
-  bool takeFactIndex(std::string_view content);
+  bool takeMetadataIndex(std::string_view content);
   bool takeSchema(std::string_view content);
   bool takeChannel(std::string_view content);
-  bool takeFacts(std::string_view content);
+  bool takeMetadata(std::string_view content);
   void scan();
   bool scanChunk(const Record& record);
   Done parseMessages(const ChunkHead& head);
@@ -157,12 +157,12 @@ bool McapReader::State::takeChannel(std::string_view content) {
   return reader.ok();
 }
 
-bool McapReader::State::takeFacts(std::string_view content) {
+bool McapReader::State::takeMetadata(std::string_view content) {
   ByteReader reader(content);
   std::string name(reader.text());
-  std::optional<Facts> map = parseMap(reader.text());
+  std::optional<Metadata> map = parseMap(reader.text());
   if (!reader.ok() || !map) return false;
-  facts.insert_or_assign(std::move(name), std::move(*map));
+  metadata.insert_or_assign(std::move(name), std::move(*map));
   return true;
 }
 
@@ -206,13 +206,13 @@ bool McapReader::State::takeStatistics(std::string_view content) {
   return reader.ok() && counts.ok();
 }
 
-bool McapReader::State::takeFactIndex(std::string_view content) {
+bool McapReader::State::takeMetadataIndex(std::string_view content) {
   ByteReader reader(content);
   const auto offset = reader.number<std::uint64_t>();
   const std::optional<Record> record = reader.ok() ? recordAt(offset) : std::nullopt;
   std::string bytes;
   return record && record->opcode == Opcode::metadata &&
-         this->content(*record, kMaxPlainRecordBytes, bytes) && takeFacts(bytes);
+         this->content(*record, kMaxPlainRecordBytes, bytes) && takeMetadata(bytes);
 }
 
 bool McapReader::State::takeSummaryRecord(Opcode opcode, std::string_view content) {
@@ -226,7 +226,7 @@ bool McapReader::State::takeSummaryRecord(Opcode opcode, std::string_view conten
     case Opcode::statistics:
       return takeStatistics(content);
     case Opcode::metadataIndex:
-      return takeFactIndex(content);
+      return takeMetadataIndex(content);
     default:
       return true;
   }
@@ -302,7 +302,7 @@ void McapReader::State::scan() {
       taken = content(*record, kMaxPlainRecordBytes, bytes);
       if (taken && record->opcode == Opcode::schema) taken = takeSchema(bytes);
       if (taken && record->opcode == Opcode::channel) taken = takeChannel(bytes);
-      if (taken && record->opcode == Opcode::metadata) taken = takeFacts(bytes);
+      if (taken && record->opcode == Opcode::metadata) taken = takeMetadata(bytes);
     }
     if (!taken) return;
     dataEnd = offset = record->end();
@@ -355,9 +355,9 @@ std::uint64_t McapReader::dataEnd() const {
   return state_->dataEnd;
 }
 
-const Facts* McapReader::facts(const std::string& name) const {
-  const auto found = state_->facts.find(name);
-  return found == state_->facts.end() ? nullptr : &found->second;
+const Metadata* McapReader::metadata(const std::string& name) const {
+  const auto found = state_->metadata.find(name);
+  return found == state_->metadata.end() ? nullptr : &found->second;
 }
 
 std::size_t McapReader::chunkAt(std::uint64_t time) const {

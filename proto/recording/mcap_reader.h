@@ -68,7 +68,7 @@ class McapReader {
   std::span<const ChunkPlace> chunks() const;
   // Statistics from the file.
   const std::optional<Statistics>& statistics() const;
-  const Facts* facts(const std::string& name) const;
+  const Metadata* metadata(const std::string& name) const;
   std::uint64_t bytes() const;
 
   // Last chunk that starts at or before `time`; otherwise the first chunk.

@@ -22,9 +22,9 @@ void appendRecord(std::string& out, Opcode opcode, std::string_view content) {
   out += content;
 }
 
-std::string mapOf(const Facts& facts) {
+std::string mapOf(const Metadata& metadata) {
   std::string entries, out;
-  for (const auto& [key, value] : facts) {
+  for (const auto& [key, value] : metadata) {
     appendText(entries, key);
     appendText(entries, value);
   }
@@ -80,8 +80,8 @@ struct McapWriter::State {
   std::uint64_t offset = 0;
   std::uint32_t crc = 0;  // of all bytes so far, or of the bytes of the summary
 
-  std::vector<std::string> schemas, channels, chunkIndexes, factIndexes;  // contents of records
-  std::string offsets;                                                    // records
+  std::vector<std::string> schemas, channels, chunkIndexes, metadataIndexes;  // contents of records
+  std::string offsets;                                                        // records
   std::uint64_t messages = 0;
   std::uint64_t firstTime = 0, lastTime = 0;  // of all messages, in ns
   std::map<std::uint16_t, std::uint64_t> counts;
@@ -124,7 +124,7 @@ tl::expected<std::uint16_t, std::string> McapWriter::addChannel(std::string_view
   appendNumber(channelContent, id);
   appendText(channelContent, topic);
   appendText(channelContent, "protobuf");
-  channelContent += mapOf(Facts{});
+  channelContent += mapOf(Metadata{});
   // Schemas stand outside of chunks, so that losing a chunk does not affect the meaning of others.
   return s.put(Opcode::schema, schemaContent)
       .and_then([&] { return s.put(Opcode::channel, channelContent); })
@@ -135,12 +135,12 @@ tl::expected<std::uint16_t, std::string> McapWriter::addChannel(std::string_view
       });
 }
 
-Written McapWriter::addFacts(std::string_view name, const Facts& facts) {
+Written McapWriter::addMetadata(std::string_view name, const Metadata& metadata) {
   State& s = *state_;
   std::string content;
   appendText(content, name);
-  content += mapOf(facts);
-  std::string& index = s.factIndexes.emplace_back();
+  content += mapOf(metadata);
+  std::string& index = s.metadataIndexes.emplace_back();
   appendNumber(index, s.offset);
   appendNumber(index, std::uint64_t{kRecordHead + content.size()});
   appendText(index, name);
@@ -220,7 +220,7 @@ std::string McapWriter::State::statistics() const {
   appendNumber(out, static_cast<std::uint16_t>(schemas.size()));
   appendNumber(out, static_cast<std::uint32_t>(channels.size()));
   appendNumber(out, std::uint32_t{0});  // attachments
-  appendNumber(out, static_cast<std::uint32_t>(factIndexes.size()));
+  appendNumber(out, static_cast<std::uint32_t>(metadataIndexes.size()));
   appendNumber(out, static_cast<std::uint32_t>(chunkIndexes.size()));
   appendNumber(out, firstTime);
   appendNumber(out, lastTime);
@@ -235,7 +235,7 @@ Written McapWriter::State::writeSummary() {
       .and_then([&] { return put(Opcode::channel, channels); })
       .and_then([&] { return put(Opcode::statistics, std::vector{statistics()}); })
       .and_then([&] { return put(Opcode::chunkIndex, chunkIndexes); })
-      .and_then([&] { return put(Opcode::metadataIndex, factIndexes); })
+      .and_then([&] { return put(Opcode::metadataIndex, metadataIndexes); })
       .and_then([&] {
         const std::uint64_t offsetsStart = offset;
         std::string footer;

@@ -44,7 +44,7 @@ class McapWriter {
   // Returns the channel's number. A channel must be added before its messages.
   [[nodiscard]] tl::expected<std::uint16_t, std::string> addChannel(std::string_view topic,
                                                                     const Schema& schema);
-  [[nodiscard]] Written addFacts(std::string_view name, const Facts& facts);
+  [[nodiscard]] Written addMetadata(std::string_view name, const Metadata& metadata);
   // A time before that of the last message is raised to it, so that messages are ordered by time.
   [[nodiscard]] Written write(std::uint16_t channel, std::uint64_t logTimeNs, std::string_view message);
   // Passes everything written so far to the sink.

@@ -38,11 +38,11 @@ tl::expected<RecordingReader, std::string> RecordingReader::open(std::unique_ptr
     const auto known = std::ranges::find(kTopicNames, channel.topic);
     if (known != kTopicNames.end()) reader.topics_[id] = static_cast<Topic>(known - kTopicNames.begin());
   }
-  const Facts* facts = reader.mcap_.facts(std::string(kFactsName));
-  if (facts == nullptr || reader.topics_.empty())
+  const Metadata* metadata = reader.mcap_.metadata(std::string(kMetadataName));
+  if (metadata == nullptr || reader.topics_.empty())
     return tl::unexpected(fmt::format(
         "{} is an MCAP file, but no recording of clothstream: its metadata is missing", reader.name_));
-  reader.facts_ = *facts;
+  reader.metadata_ = *metadata;
   if (cutFiles == CutFiles::refused && !reader.mcap_.indexed())
     return tl::unexpected(
         fmt::format("{} is truncated or damaged at its end: `clothstream recover {} OUT` makes a complete "
@@ -57,10 +57,10 @@ tl::expected<void, std::string> RecordingReader::check() {
   return {};
 }
 
-const std::string& RecordingReader::fact(const std::string& name) const {
+const std::string& RecordingReader::metadata(const std::string& name) const {
   static const std::string kUnknown = "unknown";
-  const auto found = facts_.find(name);
-  return found == facts_.end() ? kUnknown : found->second;
+  const auto found = metadata_.find(name);
+  return found == metadata_.end() ? kUnknown : found->second;
 }
 
 std::optional<Topic> RecordingReader::topicOf(std::uint16_t channel) const {

@@ -41,9 +41,9 @@ class RecordingReader {
   const McapReader& mcap() const { return mcap_; }
   [[nodiscard]] tl::expected<void, std::string> check();
   // Metadata: the machine and the program that made the recording.
-  const Facts& facts() const { return facts_; }
+  const Metadata& metadata() const { return metadata_; }
   // Value of a metadata entry; "unknown" if it is missing.
-  const std::string& fact(const std::string& name) const;
+  const std::string& metadata(const std::string& name) const;
   std::optional<Topic> topicOf(std::uint16_t channel) const;
   // Times of the first and the last message, ns.
   std::uint64_t start() const;
@@ -71,7 +71,7 @@ class RecordingReader {
 
   McapReader mcap_;
   std::string name_;
-  Facts facts_;
+  Metadata metadata_;
   std::map<std::uint16_t, Topic> topics_;
 
   std::size_t chunk_ = 0, message_ = 0;  // next chunk and message

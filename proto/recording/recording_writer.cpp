@@ -58,7 +58,7 @@ Schema schemaOf(const protobuf::Descriptor& type) {
 }  // namespace
 
 tl::expected<RecordingWriter, std::string> RecordingWriter::begin(Sink sink, std::string_view writer,
-                                                                  const Facts& facts) {
+                                                                  const Metadata& metadata) {
   RecordingWriter recording(std::move(sink));
   if (Written begun = recording.mcap_.begin(writer); !begun) return tl::unexpected(begun.error());
   for (std::size_t i = 0; i < kTopicNames.size(); ++i) {
@@ -66,7 +66,7 @@ tl::expected<RecordingWriter, std::string> RecordingWriter::begin(Sink sink, std
     if (!channel) return tl::unexpected(channel.error());
     recording.channels_[i] = *channel;
   }
-  if (Written added = recording.mcap_.addFacts(kFactsName, facts); !added)
+  if (Written added = recording.mcap_.addMetadata(kMetadataName, metadata); !added)
     return tl::unexpected(added.error());
   return recording;
 }

@@ -19,7 +19,7 @@ class RecordingWriter {
  public:
   // `writer` is the program's name and version.
   [[nodiscard]] static tl::expected<RecordingWriter, std::string> begin(Sink sink, std::string_view writer,
-                                                                        const Facts& facts);
+                                                                        const Metadata& metadata);
 
   // Writes a serialised message of the topic's type.
   [[nodiscard]] Written write(Topic topic, std::uint64_t time, std::string_view message);

@@ -32,10 +32,10 @@ constexpr std::string_view nameOf(Topic topic) {
 
 // Maximum distance in frames between key frames. The writer of a recording requests key frames at this
 // interval.
-inline constexpr std::uint32_t kFramesAKeyFrame = 24;
+inline constexpr std::uint32_t kMaxKeyFrameDistance = 24;
 
 // Name of the metadata record: machine and program that made the recording. docs/recording.md lists its
 // entries.
-inline constexpr std::string_view kFactsName = "clothstream";
+inline constexpr std::string_view kMetadataName = "clothstream";
 
 }  // namespace clothstream::recording

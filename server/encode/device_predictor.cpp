@@ -77,8 +77,8 @@ static_assert(shared::kClasses == codec::hierarchical::kWeightClasses &&
               shared::kClassFeatures == codec::hierarchical::kFeatures &&
               shared::kFeatureProducts == codec::hierarchical::kProducts &&
               shared::kChunkSlots == codec::hierarchical::kChunk &&
-              shared::kMostMagnitude == codec::hierarchical::kMaxMagnitude &&
-              shared::kMostStillFrames == codec::hierarchical::kStillFrames &&
+              shared::kMaxMagnitude == codec::hierarchical::kMaxMagnitude &&
+              shared::kMaxStillFrames == codec::hierarchical::kStillFrames &&
               shared::kRestsInTurn == codec::hierarchical::kRestsAtOnce);
 
 }  // namespace

@@ -48,10 +48,10 @@ auto attempt(const char* call, const Work& work) -> decltype(work()) {
 
 tl::expected<void, v1::Error> SceneMaker::create(v1::CreateSceneRequest request,
                                                  std::optional<UploadedContent> uploaded, CreateDone done) {
-  if (++waiting_ > kMostWaiting) {
+  if (++waiting_ > kMaxWaiting) {
     --waiting_;
     return refused(v1::ERROR_CODE_RESOURCE_EXHAUSTED,
-                   fmt::format("createScene: {} scenes wait to be created; try again later", kMostWaiting));
+                   fmt::format("createScene: {} scenes wait to be created; try again later", kMaxWaiting));
   }
   boost::asio::post(thread_, [this, request = std::move(request), uploaded = std::move(uploaded),
                               done = std::move(done)]() mutable {

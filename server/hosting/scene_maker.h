@@ -28,10 +28,10 @@ class SceneMaker {
   SceneMaker& operator=(const SceneMaker&) = delete;
 
   // Maximum number of scenes that wait to be created.
-  static constexpr std::uint32_t kMostWaiting = 64;
+  static constexpr std::uint32_t kMaxWaiting = 64;
 
   // `uploaded` is the content that `request` names, if it names one. Its reservation ends before the answer.
-  // While kMostWaiting scenes wait it returns an error, and `done` is not called.
+  // While kMaxWaiting scenes wait it returns an error, and `done` is not called.
   [[nodiscard]] tl::expected<void, v1::Error> create(v1::CreateSceneRequest request,
                                                      std::optional<UploadedContent> uploaded,
                                                      CreateDone done);

@@ -14,7 +14,7 @@
 namespace clothstream::hosting {
 
 SceneServer::SceneServer(std::vector<model::Scene> scenes, ServerOptions options) {
-  assert(options.maxParticipants <= kMostParticipants);
+  assert(options.maxParticipants <= kMaxParticipants);
   bool found = false;
   std::string known;
   for (const model::Scene& scene : scenes) {

@@ -27,7 +27,7 @@ class Journal;
 namespace clothstream::hosting {
 
 // Participants of a scene whose colliders the simulation has room for.
-inline constexpr std::uint32_t kMostParticipants =
+inline constexpr std::uint32_t kMaxParticipants =
     (simulation::kMaxColliders - messages::limits::kMaxColliders) /
     messages::limits::kMaxParticipantColliders;
 
@@ -42,7 +42,7 @@ struct ServerOptions {
   // Frames per second of each scene that carry a simulation report; 0 for none.
   double reportRate = 4;
   std::uint32_t maxConnections = 1024;
-  // Limit for each scene, disconnected participants included. At most kMostParticipants. A peer that creates
+  // Limit for each scene, disconnected participants included. At most kMaxParticipants. A peer that creates
   // a scene may set a lower limit.
   std::uint32_t maxParticipants = scene::kDefaultMaxParticipants;
   // Scenes that peers may create, in addition to those that the server starts with.

@@ -27,9 +27,9 @@ std::int64_t valueAt(std::uint64_t turn, std::uint64_t stream) {
 }
 
 // Interpolates between the values of two consecutive periods.
-std::int64_t noise(std::uint64_t tick, std::uint64_t ticksATurn, std::uint64_t stream) {
-  const std::uint64_t turn = tick / ticksATurn;
-  const auto part = static_cast<std::int64_t>((tick % ticksATurn) * kOne / ticksATurn);
+std::int64_t noise(std::uint64_t tick, std::uint64_t ticksPerTurn, std::uint64_t stream) {
+  const std::uint64_t turn = tick / ticksPerTurn;
+  const auto part = static_cast<std::int64_t>((tick % ticksPerTurn) * kOne / ticksPerTurn);
   const std::int64_t smooth = part * part / kOne * (3 * kOne - 2 * part) / kOne;
   const std::int64_t from = valueAt(turn, stream), to = valueAt(turn + 1, stream);
   return from + (to - from) * smooth / kOne;

@@ -42,8 +42,8 @@ std::string shaderHash() {
   return CLOTHSTREAM_SHADER_HASH;
 }
 
-Facts metadataOf(const std::string& serverName, const vulkan::DeviceInfo& device, const model::Scene& scene,
-                 const v1::StreamDescription& description) {
+Metadata metadataOf(const std::string& serverName, const vulkan::DeviceInfo& device,
+                    const model::Scene& scene, const v1::StreamDescription& description) {
   return {{"server", serverName},
           {"scene", scene.name},
           {"started", fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr)))},

@@ -12,8 +12,8 @@
 namespace clothstream::recording {
 
 // docs/recording.md lists the names.
-Facts metadataOf(const std::string& serverName, const vulkan::DeviceInfo& device, const model::Scene& scene,
-                 const v1::StreamDescription& description);
+Metadata metadataOf(const std::string& serverName, const vulkan::DeviceInfo& device,
+                    const model::Scene& scene, const v1::StreamDescription& description);
 
 // Processor features of this machine that software Vulkan devices depend on, separated by spaces.
 std::string processorFeatures();

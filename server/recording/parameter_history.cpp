@@ -17,8 +17,9 @@ bool applyChunk(RecordingReader& reader, std::size_t chunk, std::uint64_t time,
   const auto messages = reader.messages(chunk, Topic::parameters);
   if (!messages) return false;  // playback reports the damage
   v1::ParameterChanged message;
-  for (const RecordedMessage& told : *messages)
-    if (told.time <= time && message.ParseFromArray(told.bytes.data(), static_cast<int>(told.bytes.size())))
+  for (const RecordedMessage& recorded : *messages)
+    if (recorded.time <= time &&
+        message.ParseFromArray(recorded.bytes.data(), static_cast<int>(recorded.bytes.size())))
       parameters.apply(message.change());
   return !messages->empty();
 }

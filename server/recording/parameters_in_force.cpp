@@ -73,11 +73,11 @@ void ParametersInForce::apply(const v1::ParameterChange& change) {
   environment.clear_cloths();
   environment.clear_colliders();
   overwrite(environment, now_);
-  for (const v1::ClothChange& told : change.cloths())
+  for (const v1::ClothChange& clothChange : change.cloths())
     for (v1::ClothChange& cloth : *now_.mutable_cloths())
-      if (told.name().empty() || told.name() == cloth.name()) {
+      if (clothChange.name().empty() || clothChange.name() == cloth.name()) {
         const std::string name = cloth.name();
-        overwrite(told, cloth);
+        overwrite(clothChange, cloth);
         cloth.set_name(name);
       }
 }

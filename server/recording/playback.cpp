@@ -21,7 +21,7 @@ using namespace std::chrono_literals;
 
 // Interval between checks for key-frame requests while playback is stopped.
 constexpr auto kLookAgain = 20ms;
-constexpr auto kTellPeriod = 1s;
+constexpr auto kAnnouncementPeriod = 1s;
 // Maximum delay that playback catches up; a longer delay shifts the schedule.
 constexpr auto kMaxLateness = 250ms;
 // Maximum number of messages per step, so that control requests are handled in between.
@@ -41,7 +41,7 @@ Playback::Playback(RecordedStream recording, const PlaybackOptions& options)
       loop_(options.loop),
       parameters_(recording.description()),
       recording_(std::move(recording)),
-      ticksAFrame_(std::max(1u, description().simulation_rate() / description().stream_rate())) {}
+      ticksPerFrame_(std::max(1u, description().simulation_rate() / description().stream_rate())) {}
 
 Playback::~Playback() {
   end();
@@ -134,8 +134,8 @@ std::optional<Playback::Clock::time_point> Playback::step(scene::LiveScene& scen
   const bool flows = here && !asleep_ && !paused_;
   scene.running = flows;
   if (flows) flow(scene, now);
-  if (here && (announcementDue_ || (flows && now >= nextTold_))) {
-    nextTold_ = now + kTellPeriod;
+  if (here && (announcementDue_ || (flows && now >= nextAnnouncement_))) {
+    nextAnnouncement_ = now + kAnnouncementPeriod;
     tell(scene);
   }
   if (!here) return std::nullopt;
@@ -170,11 +170,12 @@ void Playback::jump(scene::LiveScene& scene, double seconds, Clock::time_point n
   moveTo(seconds);
   for (;;) {
     RecordedStream::Next next = recording_.next();
-    if (auto* told = std::get_if<RecordedStream::Told>(&next); told != nullptr && told->isFrame()) {
-      const bool begins = newest_ == 0 && told->header.tick <= kMaxFirstTick;
-      shift_ = begins ? 0 : newest_ + ticksAFrame_ - told->header.tick;
-      tellParameters(scene, *told);
-      publishFrame(scene, *told);
+    if (auto* timed = std::get_if<RecordedStream::TimedMessage>(&next);
+        timed != nullptr && timed->isFrame()) {
+      const bool begins = newest_ == 0 && timed->header.tick <= kMaxFirstTick;
+      shift_ = begins ? 0 : newest_ + ticksPerFrame_ - timed->header.tick;
+      announceParameters(scene, *timed);
+      publishFrame(scene, *timed);
       break;
     }
     if (std::holds_alternative<RecordedStream::End>(next)) {
@@ -193,7 +194,7 @@ Playback::Clock::time_point Playback::due(double seconds) const {
 }
 
 double Playback::timeOf(const RecordedStream::Next& next) const {
-  if (const auto* told = std::get_if<RecordedStream::Told>(&next)) return told->time;
+  if (const auto* timed = std::get_if<RecordedStream::TimedMessage>(&next)) return timed->time;
   if (const auto* lost = std::get_if<RecordedStream::Lost>(&next)) return lost->start;
   return recording_.length() + 1.0 / recording_.description().stream_rate();
 }
@@ -234,30 +235,30 @@ void Playback::publish(scene::LiveScene& scene, RecordedStream::Next& next) {
     scene.subscribers.announce(delivery::notice(v1::NOTICE_KIND_RECORDING_DAMAGED, text, newest_));
     return;
   }
-  auto& told = std::get<RecordedStream::Told>(next);
-  if (told.isFrame()) {
+  auto& timed = std::get<RecordedStream::TimedMessage>(next);
+  if (timed.isFrame()) {
     // A frame that refers to the previous one has a larger tick. A key frame in a file from another program
     // may not.
-    const std::uint64_t tick = told.header.tick + shift_;
-    if (tick <= newest_ || tick - newest_ > kMaxTickStep) shift_ += newest_ + ticksAFrame_ - tick;
-    return publishFrame(scene, told);
+    const std::uint64_t tick = timed.header.tick + shift_;
+    if (tick <= newest_ || tick - newest_ > kMaxTickStep) shift_ += newest_ + ticksPerFrame_ - tick;
+    return publishFrame(scene, timed);
   }
-  if (told.message.has_parameter_changed()) {
-    v1::ParameterChanged& changed = *told.message.mutable_parameter_changed();
+  if (timed.message.has_parameter_changed()) {
+    v1::ParameterChanged& changed = *timed.message.mutable_parameter_changed();
     changed.set_tick(changed.tick() + shift_);
     const std::lock_guard lock(mutex_);
     parameters_.apply(changed.change());
   }
-  if (told.message.has_tick_events())
-    told.message.mutable_tick_events()->set_tick(told.message.tick_events().tick() + shift_);
-  if (told.message.has_notice())
-    told.message.mutable_notice()->set_tick(told.message.notice().tick() + shift_);
-  scene.subscribers.announce(delivery::serialise(told.message));
+  if (timed.message.has_tick_events())
+    timed.message.mutable_tick_events()->set_tick(timed.message.tick_events().tick() + shift_);
+  if (timed.message.has_notice())
+    timed.message.mutable_notice()->set_tick(timed.message.notice().tick() + shift_);
+  scene.subscribers.announce(delivery::serialise(timed.message));
 }
 
-void Playback::publishFrame(scene::LiveScene& scene, RecordedStream::Told& told) {
-  v1::Frame& frame = *told.message.mutable_frame();
-  codec::PacketHeader& header = told.header;
+void Playback::publishFrame(scene::LiveScene& scene, RecordedStream::TimedMessage& timed) {
+  v1::Frame& frame = *timed.message.mutable_frame();
+  codec::PacketHeader& header = timed.header;
   header.tick += shift_;
   for (std::size_t i = 0; i < header.referenceCount; ++i) header.references[i] += shift_;
   const std::string recorded = std::move(*frame.mutable_packet());
@@ -278,7 +279,7 @@ void Playback::publishFrame(scene::LiveScene& scene, RecordedStream::Told& told)
   scene.metrics.frames.add();
   if (published.key) scene.metrics.keyFrames.add();
   scene.metrics.packetBytes.add(packet.size());
-  moveTo(told.time);
+  moveTo(timed.time);
   scene.subscribers.publish(published);
 }
 
@@ -287,7 +288,7 @@ void Playback::tell(scene::LiveScene& scene) {
   scene.subscribers.announce(scene::playbackMessage(*this));
 }
 
-void Playback::tellParameters(scene::LiveScene& scene, const RecordedStream::Told& frame) {
+void Playback::announceParameters(scene::LiveScene& scene, const RecordedStream::TimedMessage& frame) {
   ParametersInForce there = recording_.parametersAt(frame.time);  // may read the file
   {
     const std::lock_guard lock(mutex_);

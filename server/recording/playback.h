@@ -63,11 +63,11 @@ class Playback : public scene::FrameSource {
   Clock::time_point due(double seconds) const;
   double timeOf(const RecordedStream::Next& next) const;
   void publish(scene::LiveScene& scene, RecordedStream::Next& next);
-  void publishFrame(scene::LiveScene& scene, RecordedStream::Told& frame);
+  void publishFrame(scene::LiveScene& scene, RecordedStream::TimedMessage& timed);
   void reachEnd(scene::LiveScene& scene, Clock::time_point now);
   void tell(scene::LiveScene& scene);
   // Announces the parameters in effect at this frame.
-  void tellParameters(scene::LiveScene& scene, const RecordedStream::Told& frame);
+  void announceParameters(scene::LiveScene& scene, const RecordedStream::TimedMessage& frame);
   void moveTo(double seconds);
 
   mutable std::mutex mutex_;  // protects the members down to parameters_
@@ -80,11 +80,11 @@ class Playback : public scene::FrameSource {
 
   // Used by step() only.
   RecordedStream recording_;
-  const std::uint64_t ticksAFrame_;
+  const std::uint64_t ticksPerFrame_;
   std::optional<RecordedStream::Next> next_;
   bool asleep_ = true, atEnd_ = false;
   bool announcementDue_ = false;  // the state changed and must be announced
-  Clock::time_point origin_{}, nextTold_{};
+  Clock::time_point origin_{}, nextAnnouncement_{};
   double originPosition_ = 0;      // position in the recording at the origin, s
   std::uint64_t shift_ = 0;        // sent tick minus recorded tick, modulo 2^64
   std::uint64_t newest_ = 0;       // newest tick sent

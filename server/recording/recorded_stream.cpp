@@ -85,7 +85,7 @@ RecordedStream::Next RecordedStream::next() {
       continue;
     }
     if (!*message) break;
-    held_ = told(**message);
+    held_ = timedMessage(**message);
   }
   // A loss ends at the next frame that can be decoded.
   if (lost_ && (!held_ || held_->isFrame())) {
@@ -114,52 +114,52 @@ ParametersInForce RecordedStream::parametersAt(double seconds) {
   return parameters_.at(timeAt(seconds), reader_);
 }
 
-std::optional<RecordedStream::Told> RecordedStream::told(const RecordedMessage& message) {
-  Told told{.time = secondsAt(message.time)};
+std::optional<RecordedStream::TimedMessage> RecordedStream::timedMessage(const RecordedMessage& message) {
+  TimedMessage timed{.time = secondsAt(message.time)};
   switch (message.topic) {
     case Topic::frames:
       return frame(message);
     case Topic::parameters:
-      if (parse(message.bytes, told.message.mutable_parameter_changed())) return told;
+      if (parse(message.bytes, timed.message.mutable_parameter_changed())) return timed;
       break;
     case Topic::events:
-      if (parse(message.bytes, told.message.mutable_tick_events())) return told;
+      if (parse(message.bytes, timed.message.mutable_tick_events())) return timed;
       break;
     case Topic::notices:
-      if (!parse(message.bytes, told.message.mutable_notice())) break;
-      if (isOfScene(told.message.notice().kind())) return told;
+      if (!parse(message.bytes, timed.message.mutable_notice())) break;
+      if (isOfScene(timed.message.notice().kind())) return timed;
       return std::nullopt;
     default:
       return std::nullopt;
   }
-  lose(told.time, "a message in it cannot be read");
+  lose(timed.time, "a message in it cannot be read");
   return std::nullopt;
 }
 
-std::optional<RecordedStream::Told> RecordedStream::frame(const RecordedMessage& message) {
-  Told told{.time = secondsAt(message.time)};
+std::optional<RecordedStream::TimedMessage> RecordedStream::frame(const RecordedMessage& message) {
+  TimedMessage timed{.time = secondsAt(message.time)};
   const auto refuse = [&](const char* reason) {
-    lose(told.time, reason);
+    lose(timed.time, reason);
     return std::nullopt;
   };
-  if (!parse(message.bytes, told.message.mutable_frame())) return refuse("a frame in it cannot be read");
-  const auto packet = codec::parsePacket(std::as_bytes(std::span(told.message.frame().packet())));
+  if (!parse(message.bytes, timed.message.mutable_frame())) return refuse("a frame in it cannot be read");
+  const auto packet = codec::parsePacket(std::as_bytes(std::span(timed.message.frame().packet())));
   if (!packet || packet->header.epoch != description_.epoch() ||
       packet->header.codec != description_.codec() ||
       packet->header.temporalLayer >= std::max(description_.temporal_layers(), 1u))
     return refuse("a frame in it does not belong to its stream");
-  told.header = packet->header;
-  const bool key = told.header.kind == codec::PacketKind::key;
-  if (!key && (!newest_ || told.header.referenceCount != 1 || !decoded_.find(told.header.references[0]) ||
-               told.header.tick - *newest_ > kMaxTickStep)) {
+  timed.header = packet->header;
+  const bool key = timed.header.kind == codec::PacketKind::key;
+  if (!key && (!newest_ || timed.header.referenceCount != 1 || !decoded_.find(timed.header.references[0]) ||
+               timed.header.tick - *newest_ > kMaxTickStep)) {
     if (sought_ && !lost_) return std::nullopt;
     return refuse("a frame that other frames refer to is missing");
   }
   if (key) decoded_.clear();
-  decoded_.hold(told.header.temporalLayer, told.header.tick);
-  newest_ = told.header.tick;
+  decoded_.hold(timed.header.temporalLayer, timed.header.tick);
+  newest_ = timed.header.tick;
   sought_ = false;
-  return told;
+  return timed;
 }
 
 }  // namespace clothstream::recording

@@ -35,13 +35,13 @@ class RecordedStream {
   const v1::StreamDescription& description() const { return description_; }
   // Name of the recorded scene, out of [a-z0-9_-]; "recording" if the name is invalid.
   const std::string& scene() const { return scene_; }
-  const std::string& device() const { return reader_.fact("device"); }
+  const std::string& device() const { return reader_.metadata("device"); }
   // True if the end of the file is missing.
-  bool cut() const { return !reader_.mcap().indexed(); }
+  bool truncated() const { return !reader_.mcap().indexed(); }
   // Length in seconds.
   double length() const { return secondsAt(reader_.end()); }
 
-  struct Told {
+  struct TimedMessage {
     double time = 0;              // s from the start of the recording
     v1::ServerMessage message{};  // message as sent
     bool isFrame() const { return message.has_frame(); }
@@ -52,7 +52,7 @@ class RecordedStream {
     std::string reason;
   };
   struct End {};
-  using Next = std::variant<End, Told, Lost>;
+  using Next = std::variant<End, TimedMessage, Lost>;
 
   // Returns the next message, loss or end.
   [[nodiscard]] Next next();
@@ -67,8 +67,8 @@ class RecordedStream {
   std::uint64_t timeAt(double seconds) const;
   void lose(double from, std::string reason);
   // nullopt if the message is not played.
-  std::optional<Told> told(const RecordedMessage& message);
-  std::optional<Told> frame(const RecordedMessage& message);
+  std::optional<TimedMessage> timedMessage(const RecordedMessage& message);
+  std::optional<TimedMessage> frame(const RecordedMessage& message);
 
   RecordingReader reader_;
   v1::StreamDescription description_;
@@ -78,7 +78,7 @@ class RecordedStream {
   codec::HeldFrames decoded_;            // valid while newest_ is set
   bool sought_ = true;                   // no frame since the last seek, so undecodable frames are not a loss
   std::optional<Lost> lost_;             // loss that next() has not returned yet
-  std::optional<Told> held_;             // message after the loss
+  std::optional<TimedMessage> held_;     // message after the loss
 };
 
 }  // namespace clothstream::recording

@@ -28,7 +28,7 @@ constexpr int kMaxSameNames = 100;
 // Creates a file with the next free name. Existing files are kept.
 using Created = tl::expected<std::pair<OutputFile, std::string>, std::string>;
 
-Created createAnew(const std::filesystem::path& directory, const std::string& scene) {
+Created createNew(const std::filesystem::path& directory, const std::string& scene) {
   const std::string stem = fmt::format("{}-{:%Y%m%dT%H%M%SZ}", scene, fmt::gmtime(std::time(nullptr)));
   for (int i = 1;; ++i) {
     const std::string path =
@@ -56,8 +56,7 @@ Created createNamed(const std::filesystem::path& directory, const std::string& n
 tl::expected<std::shared_ptr<Recorder>, std::string> Recorder::create(RecorderOptions options,
                                                                       const std::string& scene,
                                                                       const std::string& name) {
-  Created created =
-      name.empty() ? createAnew(options.directory, scene) : createNamed(options.directory, name);
+  Created created = name.empty() ? createNew(options.directory, scene) : createNamed(options.directory, name);
   if (!created) {
     spdlog::warn("{}: not recorded: {}", scene, created.error());
     return tl::unexpected(name.empty() ? std::string("no file can be created on the server")
@@ -105,22 +104,22 @@ void Recorder::begin(const vulkan::DeviceInfo& device, const model::Scene& scene
   saved(state, false);
   if (&start != &state) put(start, false, true);
   thread_ = std::thread(
-      [this, name = scene.name, facts = metadataOf(options_.serverName, device, scene, description)] {
-        run(name, facts);
+      [this, name = scene.name, metadata = metadataOf(options_.serverName, device, scene, description)] {
+        run(name, metadata);
       });
 }
 
 void Recorder::ticked(const scene::AppliedTick& tick) {
   if (!active()) return;
-  scene::AppliedTick told = tick;
-  told.clothsChanged |= std::exchange(tellsCloths_, false);
-  write(told, tick_);
+  scene::AppliedTick recordedTick = tick;
+  recordedTick.clothsChanged |= std::exchange(describeCloths_, false);
+  write(recordedTick, tick_);
   put(Topic::ticks, tick_);
 }
 
 void Recorder::saved(const simulation::StateSnapshot& state, bool grabsHold) {
   put(state, grabsHold, false);
-  tellsCloths_ = true;
+  describeCloths_ = true;
 }
 
 void Recorder::put(const simulation::StateSnapshot& state, bool grabsHold, bool start) {
@@ -155,15 +154,15 @@ void Recorder::sent(const delivery::SharedBytes& message) {
 
 void Recorder::joined(std::uint64_t participant, const std::string& clientName,
                       const std::string& displayName) {
-  tellParticipant(participant, v1::PARTICIPANT_EVENT_KIND_JOINED, clientName, displayName);
+  writeParticipant(participant, v1::PARTICIPANT_EVENT_KIND_JOINED, clientName, displayName);
 }
 
 void Recorder::left(std::uint64_t participant) {
-  tellParticipant(participant, v1::PARTICIPANT_EVENT_KIND_LEFT, {}, {});
+  writeParticipant(participant, v1::PARTICIPANT_EVENT_KIND_LEFT, {}, {});
 }
 
-void Recorder::tellParticipant(std::uint64_t participant, v1::ParticipantEventKind kind,
-                               const std::string& clientName, const std::string& displayName) {
+void Recorder::writeParticipant(std::uint64_t participant, v1::ParticipantEventKind kind,
+                                const std::string& clientName, const std::string& displayName) {
   v1::ParticipantEvent event;
   event.set_participant_id(participant);
   event.set_kind(kind);
@@ -192,14 +191,14 @@ void Recorder::push(std::variant<Own, delivery::SharedBytes> what, std::size_t b
   changed_.notify_all();
 }
 
-void Recorder::run(const std::string& sceneName, const Facts& facts) {
+void Recorder::run(const std::string& sceneName, const Metadata& metadata) {
   std::unique_ptr<OutputFile> file;
   {
     const std::lock_guard lock(mutex_);
     file = std::move(file_);
   }
   if (!file) {
-    Created created = createAnew(options_.directory, sceneName);
+    Created created = createNew(options_.directory, sceneName);
     if (!created) return fail(created.error());
     file = std::make_unique<OutputFile>(std::move(created->first));
     const std::lock_guard lock(mutex_);
@@ -208,7 +207,7 @@ void Recorder::run(const std::string& sceneName, const Facts& facts) {
   const std::string path = this->path();
   spdlog::info("{}: recorded to {}", sceneName, path);
   auto writer = RecordingWriter::begin([&](std::string_view bytes) { return file->write(bytes); },
-                                       options_.serverName, facts);
+                                       options_.serverName, metadata);
   if (!writer) return fail(writer.error());
   const auto written = writeAll(*writer);
   // Finishes the file also after an error that is not the disk's, so that it is complete.

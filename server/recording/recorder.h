@@ -81,10 +81,10 @@ class Recorder : public scene::Journal {
 
   void put(Topic topic, const google::protobuf::MessageLite& message);
   void push(std::variant<Own, delivery::SharedBytes> what, std::size_t bytes);
-  void tellParticipant(std::uint64_t participant, v1::ParticipantEventKind kind,
-                       const std::string& clientName, const std::string& displayName);
+  void writeParticipant(std::uint64_t participant, v1::ParticipantEventKind kind,
+                        const std::string& clientName, const std::string& displayName);
   void put(const simulation::StateSnapshot& state, bool grabsHold, bool start);
-  void run(const std::string& sceneName, const Facts& facts);
+  void run(const std::string& sceneName, const Metadata& metadata);
   // Writes until the recording ends, or until an error, which it returns.
   [[nodiscard]] Written writeAll(RecordingWriter& writer);
   void fail(const std::string& reason);
@@ -104,9 +104,9 @@ class Recorder : public scene::Journal {
   std::size_t waitingBytes_ = 0;
   bool overflowed_ = false;
 
-  v1::RecordedTick tick_;    // reused; device thread only
-  bool tellsCloths_ = true;  // write the cloths with the next tick; device thread only
-  std::thread thread_;       // runs after begin()
+  v1::RecordedTick tick_;       // reused; device thread only
+  bool describeCloths_ = true;  // write the cloths with the next tick; device thread only
+  std::thread thread_;          // runs after begin()
 };
 
 }  // namespace clothstream::recording

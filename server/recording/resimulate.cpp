@@ -228,8 +228,8 @@ tl::expected<Resimulation, std::string> resimulate(const ResimulateOptions& opti
   auto reader = RecordingReader::open(options.path);
   if (!reader) return tl::unexpected(reader.error());
   Resimulation result;
-  result.scene = reader->fact("scene");
-  result.recordedOn = fmt::format("{} ({})", reader->fact("device"), reader->fact("driver"));
+  result.scene = reader->metadata("scene");
+  result.recordedOn = fmt::format("{} ({})", reader->metadata("device"), reader->metadata("driver"));
   if (Done done = replay(*reader, options, result); !done)
     return broken("{} cannot be simulated again: {}", options.path, done.error());
   return result;

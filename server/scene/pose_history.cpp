@@ -67,7 +67,7 @@ void PoseHistory::add(Track& track, TimedPoses&& poses) {
   } else {
     entries.clear();
   }
-  if (entries.size() == kMostPoses) entries.erase(entries.begin());
+  if (entries.size() == kMaxPoses) entries.erase(entries.begin());
   entries.push_back(std::move(entry));
 }
 

@@ -22,10 +22,10 @@ namespace clothstream::scene {
 // own clock: late ones are dropped, and one of the same time replaces the older one. Attachments and
 // wantsContacts are not part of the history: they act at once.
 //
-// Belongs to the device's thread. Bounded: kMostPoses for each participant.
+// Belongs to the device's thread. Bounded: kMaxPoses for each participant.
 class PoseHistory {
  public:
-  static constexpr std::size_t kMostPoses = 32;
+  static constexpr std::size_t kMaxPoses = 32;
   static constexpr std::chrono::milliseconds kGapTime{150};
   // Range of the time between two poses from which a motion is derived.
   static constexpr std::chrono::milliseconds kShortestStep{4}, kLongestStep{100};

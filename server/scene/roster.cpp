@@ -43,8 +43,8 @@ PoseTime poseTime(const v1::ColliderPoses& message, Clock::time_point arrival) {
   // The difference of two unsigned times, read as signed, is correct for both orders.
   const std::chrono::microseconds ahead(
       static_cast<std::int64_t>(message.server_time_us() - schedule::microseconds(arrival)));
-  if (ahead > Roster::kMostAhead) return time;
-  time.trueAt = arrival + std::max<std::chrono::microseconds>(ahead, -Roster::kMostBehind);
+  if (ahead > Roster::kMaxAhead) return time;
+  time.trueAt = arrival + std::max<std::chrono::microseconds>(ahead, -Roster::kMaxBehind);
   return time;
 }
 

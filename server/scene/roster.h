@@ -51,8 +51,8 @@ enum class LeaveReason : std::uint8_t { left, timedOut, removed };
 class Roster {
  public:
   static constexpr std::size_t kTokenBytes = 16;
-  // Accepted range of pose times. Later times count as unknown, earlier ones as kMostBehind.
-  static constexpr std::chrono::milliseconds kMostAhead{100}, kMostBehind{10'000};
+  // Accepted range of pose times. Later times count as unknown, earlier ones as kMaxBehind.
+  static constexpr std::chrono::milliseconds kMaxAhead{100}, kMaxBehind{10'000};
 
   // All must outlive the roster. `journal` may be null.
   Roster(delivery::Subscribers& subscribers, Inbox& inbox, Journal* journal)

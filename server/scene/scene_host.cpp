@@ -34,8 +34,8 @@ SceneHost::SceneHost(std::unique_ptr<SceneOnDevice> loaded, LiveScene& scene,
     : live_(scene),
       publisher_(publisher),
       rate_(scene.start().simulationRate),
-      ticksAFrame_(rate_ / scene.start().streamRate),
-      ticksAReport_(reportRate > 0 ? static_cast<std::uint64_t>(std::ceil(rate_ / reportRate)) : 0),
+      ticksPerFrame_(rate_ / scene.start().streamRate),
+      ticksPerReport_(reportRate > 0 ? static_cast<std::uint64_t>(std::ceil(rate_ / reportRate)) : 0),
       scene_(scene.start()),
       colliders_(scene_),
       grabs_(scene_),
@@ -71,7 +71,7 @@ void SceneHost::begin(Clock::time_point now) {
   keepsState_ = sinceHealthy_ > 0 && (journalBegan_ || every(kCheckpointSeconds));
   if (keepsState_) on.simulation.recordCheckpoint(on.recorder);
   on.simulation.recordTick(on.recorder, tickInputs_);
-  hasFrame_ = (tick_ + 1) % ticksAFrame_ == 0;
+  hasFrame_ = (tick_ + 1) % ticksPerFrame_ == 0;
   if (hasFrame_) {
     owesFrame_ = false;
     recordFrame(now);
@@ -97,7 +97,7 @@ void SceneHost::beginJournal() {
                        messages::toDescription(scene_, LiveScene::kEpoch, live_.codec(), seconds),
                        on.simulation.collectState(tick_), on.start);
   journalBegan_ = true;
-  sinceKeyFrame_ = kFramesAKeyFrame;
+  sinceKeyFrame_ = kMaxKeyFrameDistance;
 }
 
 void SceneHost::announceRecording() {
@@ -215,7 +215,7 @@ void SceneHost::chooseEncoders(Clock::time_point now) {
       live_.metrics.skippedFrames.add();
       continue;
     }
-    const bool due = isRecorded && quality == 0 && sinceKeyFrame_ + 1 >= kFramesAKeyFrame;
+    const bool due = isRecorded && quality == 0 && sinceKeyFrame_ + 1 >= kMaxKeyFrameDistance;
     const bool keyRequested =
         (requested.keyFrames >> quality & 1) != 0 && now - lastKeyFrame_[quality] >= kKeyFrameInterval;
     frame_.recorded.push_back({.encoder = encoder, .quality = quality, .key = due || keyRequested});
@@ -228,10 +228,10 @@ void SceneHost::recordFrame(Clock::time_point now) {
   if (!hasFrame_) return;
   SceneOnDevice& on = *onDevice_;
   if (scene_.stream.normals == model::Normals::octahedral) on.simulation.recordNormals(on.recorder);
-  hasReport_ = ticksAReport_ > 0 && tick_ + 1 >= nextReport_;
+  hasReport_ = ticksPerReport_ > 0 && tick_ + 1 >= nextReport_;
   if (hasReport_) {
     on.simulation.recordReport(on.recorder, tickInputs_);
-    nextReport_ = tick_ + 1 + ticksAReport_;
+    nextReport_ = tick_ + 1 + ticksPerReport_;
   }
   ++sinceKeyFrame_;
   for (delivery::CompleteFrame::Recorded& recorded : frame_.recorded) {

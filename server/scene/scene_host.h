@@ -37,7 +37,7 @@ class SceneHost {
   static constexpr std::chrono::milliseconds kKeyFrameInterval{100};
 
   // While the scene is recorded, at least one of this many frames is a key frame.
-  static constexpr std::uint32_t kFramesAKeyFrame = 24;
+  static constexpr std::uint32_t kMaxKeyFrameDistance = 24;
 
   // Default number of frames per second that carry a simulation report.
   static constexpr double kReportRate = 4;
@@ -108,9 +108,9 @@ class SceneHost {
 
   LiveScene& live_;
   delivery::FramePublisher& publisher_;
-  const std::uint32_t rate_;          // ticks/s
-  const std::uint32_t ticksAFrame_;   // simulation rate / stream rate
-  const std::uint64_t ticksAReport_;  // minimum; 0: no reports
+  const std::uint32_t rate_;            // ticks/s
+  const std::uint32_t ticksPerFrame_;   // simulation rate / stream rate
+  const std::uint64_t ticksPerReport_;  // minimum; 0: no reports
 
   model::Scene scene_;  // with the current tick's parameters
   ColliderSet colliders_;

@@ -367,7 +367,7 @@ void ClothSimulation::Pipeline::recordSubsteps(vulkan::Recorder& recorder, const
                            .reserved1 = 0,
                            .reserved2 = 0};
   if (attachments && attachments->aims()) {
-    recorder.beginStage("hold");
+    recorder.beginStage("attachments");
     recorder.barrier();
     attachments->recordAim(recorder, present, tickRate);
   }

@@ -142,7 +142,7 @@ Contact findContact(Collider collider, ColliderFrame frame, vec3 from, vec3 to) 
 void reportContact(uint contact, vec3 gained, float inverseMass) {
   precise float squared = max(dotProduct(gained, gained), 1e-30);
   precise float impulse = (squared * reciprocalSquareRoot(squared)) * reciprocal(inverseMass);
-  precise float units = (impulse < kMostImpulse ? impulse : kMostImpulse) * kImpulseUnits;
+  precise float units = (impulse < kMaxImpulse ? impulse : kMaxImpulse) * kImpulseUnits;
   atomicAdd(contactImpulses[contact], uint(units) + 1);
 }
 

@@ -70,7 +70,7 @@ struct CollisionPush {
 // impulse in units of 1 / kImpulseUnits N s, plus one for each contact. 0: they do not touch.
 const float kImpulseUnits = 1e6f;
 // The largest impulse that one contact adds, N s.
-const float kMostImpulse = 1000;
+const float kMaxImpulse = 1000;
 
 struct GatherPush {
   uint32_t nodeCount;

@@ -24,7 +24,7 @@ using model::ConstraintPath;
 constexpr std::uint32_t kSubsteps = 10, kFew = 20, kMany = 40;
 constexpr ConstraintPath kPaths[] = {ConstraintPath::matrixFree, ConstraintPath::assembled};
 // Allowed strain while the sheet swings, and mean strain when it hangs; see docs/simulation.md.
-constexpr double kMostStrain = 0.05, kMeanStrain = 0.001;
+constexpr double kMaxStrain = 0.05, kMeanStrain = 0.001;
 
 // Every solve runs all its iterations.
 model::Scene sheetOf(std::uint32_t size, bool bend, ConstraintPath path, std::uint32_t iterations) {
@@ -87,7 +87,7 @@ void checkStrain(const model::Cloth& cloth, Simulated& simulated, std::uint32_t 
     if (solve.iterations != iterations)
       throw std::runtime_error(fmt::format("a solve took {} iterations", solve.iterations));
   const Samples strains = structuralStrains(cloth, simulated.state());
-  if (!(strains.quantile(1) <= kMostStrain && std::abs(strains.mean()) <= kMeanStrain))
+  if (!(strains.quantile(1) <= kMaxStrain && std::abs(strains.mean()) <= kMeanStrain))
     throw std::runtime_error(
         fmt::format("springs are stretched by {}, by {} in the mean", strains.quantile(1), strains.mean()));
 }

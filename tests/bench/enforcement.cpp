@@ -23,7 +23,7 @@ constexpr std::uint32_t kSubsteps = 10, kIterations = 20;
 // written; five vectors are read and four written. A copy reads one and writes one.
 constexpr double kTexelsMoved = 5 + 9, kTexelsOfACopy = 2;
 // Allowed strain while the sheet swings, and mean strain when it hangs; see docs/simulation.md.
-constexpr double kMostStrain = 0.05, kMeanStrain = 0.001;
+constexpr double kMaxStrain = 0.05, kMeanStrain = 0.001;
 
 simulation::SimulationOptions optionsOf(const Settings& settings, bool whole) {
   return {.rowsPerInvocation = settings.rowsPerInvocation,
@@ -68,7 +68,7 @@ Rows measureSize(vulkan::Device& device, const Settings& settings, std::uint32_t
       if (solve.iterations != kIterations)
         throw std::runtime_error(fmt::format("a solve took {} iterations", solve.iterations));
     const Samples strains = structuralStrains(cloth, one->state());
-    if (!(strains.quantile(1) <= kMostStrain && std::abs(strains.mean()) <= kMeanStrain))
+    if (!(strains.quantile(1) <= kMaxStrain && std::abs(strains.mean()) <= kMeanStrain))
       throw std::runtime_error(
           fmt::format("springs are stretched by {}, by {} in the mean", strains.quantile(1), strains.mean()));
     constexpr double kRounds = kSubsteps * kIterations;

@@ -91,7 +91,7 @@ class Viewer {
 
 // Checks that the viewer has the last parameters and stands at the right frame.
 void check(std::uint32_t frame, const v1::Playback& playback, const v1::ParameterChange& sent, bool sliders) {
-  const std::uint32_t key = frame / kFramesAKeyFrame * kFramesAKeyFrame;
+  const std::uint32_t key = frame / kMaxKeyFrameDistance * kMaxKeyFrameDistance;
   if (std::abs(playback.position() * kSampleRate - key) > 0.01)
     throw std::runtime_error(fmt::format("a seek to frame {} led to {} s", frame, playback.position()));
   if (!sliders) return;

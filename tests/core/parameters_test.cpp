@@ -305,7 +305,7 @@ TEST(ClothSettings, CarryEveryNumberOfTheTable) {
 // A solver that is selected again keeps its previous settings, also if this client does not know its kind.
 TEST(ClothSettings, KeepSettingsOfPreviousSolvers) {
   JoinedClient joined;
-  const auto told = [&](const v1::Solver& solver, std::uint64_t participant) {
+  const auto receive = [&](const v1::Solver& solver, std::uint64_t participant) {
     v1::ServerMessage message;
     message.mutable_parameter_changed()->set_participant_id(participant);
     *message.mutable_parameter_changed()->mutable_change()->add_cloths()->mutable_solver() = solver;
@@ -318,15 +318,15 @@ TEST(ClothSettings, KeepSettingsOfPreviousSolvers) {
   massSpring.mutable_mass_spring();
   unknown.GetReflection()->MutableUnknownFields(&unknown)->AddLengthDelimited(9)->assign(
       "\x0d\x01\x02\x03\x04");
-  told(constraint, 42);
+  receive(constraint, 42);
   EXPECT_EQ(cs_parameters_participant(joined.client.get()), cs_participant_id(joined.client.get()));
-  told(unknown, 3);
+  receive(unknown, 3);
   EXPECT_EQ(cs_parameters_participant(joined.client.get()), 3u);
   cs_cloth_settings now{};
   now.version = CS_CLOTH_SETTINGS_VERSION;
   ASSERT_EQ(cs_get_cloth_settings(joined.client.get(), 0, &now), 1);
   EXPECT_EQ(now.solver, 9u);
-  told(massSpring, 3);
+  receive(massSpring, 3);
 
   cs_cloth_settings change;
   cs_keep_cloth_settings(&change);

@@ -86,7 +86,7 @@ bool isInTime(const JitteredRun::Shown& one) {
 }
 
 // Codec error plus the error of linear interpolation on the wave: h^2 / 8 times its curvature.
-const double kMostError = std::sqrt(3.0) * 0.0005 + 0.05 * 0.1 * 0.1 / 8 + 1e-6;
+const double kMaxError = std::sqrt(3.0) * 0.0005 + 0.05 * 0.1 * 0.1 / 8 + 1e-6;
 
 TEST(PlayOut, ShowsTrueMotionDespiteJitter) {
   const auto uniform = [](std::mt19937& random, double) {
@@ -108,7 +108,7 @@ TEST(PlayOut, ShowsTrueMotionDespiteJitter) {
         if (isInTime(shown[i])) {
           ++inTime;
           error = std::max(error, shown[i].error);
-          ASSERT_LE(shown[i].error, kMostError) << shown[i].ms;
+          ASSERT_LE(shown[i].error, kMaxError) << shown[i].ms;
         }
         const auto passed =
             static_cast<double>(shown[i].played.server_time_us - shown[i - 1].played.server_time_us);

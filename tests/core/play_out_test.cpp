@@ -217,7 +217,7 @@ TEST(PlayOut, KeepsFewerLargeFrames) {
   constexpr std::uint32_t kSide = 1500;
   description.layout.cloths.push_back({kSide * kSide, kSide, kSide});
   const Floats positions(3 * kSide * kSide);
-  const std::uint64_t fit = PlayOut::kMostBytes / (positions.size() * sizeof(float));
+  const std::uint64_t fit = PlayOut::kMaxBytes / (positions.size() * sizeof(float));
   ASSERT_LT(fit, defaultPlayOut().frames);
   PlayOut playOut(chosenDelay(0));
   playOut.begin(description);

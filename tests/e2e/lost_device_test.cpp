@@ -58,7 +58,7 @@ class LostDevice : public RunningServer {
 };
 
 // Most ticks between the last frame before a failure and the first one after it: 0.1 s of the scene.
-constexpr std::uint64_t kMostTicksSkipped = 12;
+constexpr std::uint64_t kMaxTicksSkipped = 12;
 
 // A client of a scene. Counts cuts, restarts, skipped ticks and frames that do not match.
 struct Watcher {
@@ -99,7 +99,7 @@ struct Watcher {
   }
   void expectNothingWrong() const {
     EXPECT_EQ(mismatches, 0u);
-    EXPECT_LE(ticksSkipped, kMostTicksSkipped);
+    EXPECT_LE(ticksSkipped, kMaxTicksSkipped);
     EXPECT_EQ(stepsBack, 0);
     EXPECT_EQ(cuts, 0);
   }

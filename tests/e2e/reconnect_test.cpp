@@ -27,10 +27,10 @@ using Clock = std::chrono::steady_clock;
 
 // Most attempts that may fail after the link is restored: one that was under way, and on a busy machine a few
 // that take longer than the client waits.
-constexpr std::uint64_t kMostFailedAttempts = 4;
+constexpr std::uint64_t kMaxFailedAttempts = 4;
 // Most ticks from the server's notice that a participant has returned to that participant's first frame: 0.25
 // s of the scene.
-constexpr std::uint64_t kMostTicksUntilFrame = 30;
+constexpr std::uint64_t kMaxTicksUntilFrame = 30;
 
 // Events that a client has received. A cut is a lost connection or a failed attempt to reconnect.
 struct Seen {
@@ -95,7 +95,7 @@ class Reconnect : public RunningServer {
         "attempts\n",
         what, static_cast<long long>(outage.count()),
         static_cast<long long>(std::chrono::duration_cast<std::chrono::milliseconds>(took).count()), failed);
-    EXPECT_LE(failed, kMostFailedAttempts);
+    EXPECT_LE(failed, kMaxFailedAttempts);
     EXPECT_EQ(seen.keyFramesAfterReturn, 1u) << "the first frame is a key frame";
     EXPECT_EQ(seen.resumed, 1u);
     EXPECT_EQ(seen.id, id);
@@ -132,7 +132,7 @@ TEST_F(Reconnect, ResumesAsTheSameParticipant) {
     EXPECT_TRUE(eventually(watcherSeesCollider));
     const std::uint64_t until = seen.tickAfterReturn, from = watcherSeen.tickAtReturnOfOther;
     std::printf("the first frame is %ld ticks after the return\n", static_cast<long>(until - from));
-    EXPECT_LE(until, from + kMostTicksUntilFrame);
+    EXPECT_LE(until, from + kMaxTicksUntilFrame);
   }
   EXPECT_FALSE(client->ended());
   client->visit([](cs_client* core) {

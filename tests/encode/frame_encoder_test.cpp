@@ -113,13 +113,13 @@ TEST_F(FrameEncoderSlots, AreFreedByEntropyCodingOnAnotherThread) {
   ASSERT_EQ(frames.size(), encode::FrameEncoder::kSlots);
 
   std::vector<std::vector<std::byte>> packets(frames.size());
-  std::thread packer([&] {
+  std::thread publisher([&] {
     for (std::size_t i = 0; i < frames.size(); ++i) {
       packets[i].resize(encoding.encoder.packetBound());
       packets[i].resize(encoding.encoder.entropyCode(frames[i], packets[i]).bytes);
     }
   });
-  packer.join();
+  publisher.join();
   EXPECT_TRUE(encoding.encoder.canRecord());
   const auto decoder = codec::Decoder::make(encoding.layout);
   for (std::size_t i = 0; i < frames.size(); ++i) {

@@ -180,7 +180,7 @@ TEST_F(PlaybackTest, SendsEveryFrameWhenItIsDue) {
   for (std::size_t i = 0; i < kSampleFrames; ++i) {
     EXPECT_EQ(frameOf(viewer->frames[i]), i);
     EXPECT_EQ(viewer->frames[i].tick, i + 1);
-    EXPECT_EQ(viewer->frames[i].key, i % kFramesAKeyFrame == 0);
+    EXPECT_EQ(viewer->frames[i].key, i % kMaxKeyFrameDistance == 0);
   }
   EXPECT_EQ(scene->metrics.framesDropped.value(), 0u);
 }
@@ -226,7 +226,7 @@ TEST_F(PlaybackTest, SeekContinuesFromThePreviousKeyFrame) {
     ASSERT_GT(viewer->frames.size(), before) << to;
     const Seen& first = viewer->frames[before];
     const auto sought = static_cast<std::size_t>(std::floor(to * kSampleRate + 1e-6));
-    EXPECT_EQ(frameOf(first), sought / kFramesAKeyFrame * kFramesAKeyFrame) << to;
+    EXPECT_EQ(frameOf(first), sought / kMaxKeyFrameDistance * kMaxKeyFrameDistance) << to;
     EXPECT_TRUE(first.key);
     EXPECT_EQ(first.tick, tick + 1);
     EXPECT_NEAR(playback->playback().position(), static_cast<double>(frameOf(first)) / kSampleRate, 1e-6);
@@ -492,7 +492,7 @@ TEST_F(PlaybackTest, PlaysTheRestOfADamagedFileAndReportsTheLoss) {
   const auto first = static_cast<std::size_t>(
       std::llround(1e-9 * static_cast<double>(place.start - kSampleStart) * kSampleRate));
   EXPECT_EQ(missing.front(), first);
-  EXPECT_EQ((missing.back() + 1) % kFramesAKeyFrame, 0u);
+  EXPECT_EQ((missing.back() + 1) % kMaxKeyFrameDistance, 0u);
   EXPECT_EQ(missing.back() - missing.front() + 1, missing.size());
   EXPECT_EQ(viewer->frames.size() + missing.size(), kSampleFrames);
   EXPECT_EQ(viewer->notices[0].text(),
@@ -510,7 +510,7 @@ TEST_F(PlaybackTest, PlaysATruncatedFileToItsEnd) {
   std::string bytes = sampleRecording(kSampleFrames);
   const auto place = readerOf(bytes).mcap().chunks()[8];
   bytes.resize(place.offset + place.length / 2);
-  EXPECT_TRUE(streamOf(bytes).cut());
+  EXPECT_TRUE(streamOf(bytes).truncated());
   play(bytes);
   join();
   pass(kLength);

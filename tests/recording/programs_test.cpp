@@ -131,7 +131,7 @@ TEST_F(RecordingPrograms, RecordAStreamCompletelyWithKeyFrames) {
     ++frames;
   }
   EXPECT_GT(frames, 30u);
-  EXPECT_LT(farthest, kFramesAKeyFrame);
+  EXPECT_LT(farthest, kMaxKeyFrameDistance);
 
   const Ended again = clothstream({"record", "-o", path, "--server", address_, "--seconds", "1"});
   EXPECT_EQ(again.code, 6);

@@ -39,16 +39,16 @@ class RecordedScene {
   explicit RecordedScene(RecorderOptions options, model::Scene scene = smallScene())
       : recorder(std::make_shared<Recorder>(std::move(options))),
         live(std::move(scene), false, recorder),
-        packer(encode::FrameEncoder::kSlots, [] {}),
-        host(std::make_unique<scene::SceneHost>(tests::device(), live, packer)) {}
-  ~RecordedScene() { packer.drain(); }
+        publisher(encode::FrameEncoder::kSlots, [] {}),
+        host(std::make_unique<scene::SceneHost>(tests::device(), live, publisher)) {}
+  ~RecordedScene() { publisher.drain(); }
 
   void ticks(int count) {
     for (int i = 0; i < count; ++i) {
       now += std::chrono::seconds(1);
       host->begin(now);
       host->finish();
-      packer.drain();
+      publisher.drain();
       hashes.push_back(host->status().stateHash);
     }
   }
@@ -57,7 +57,7 @@ class RecordedScene {
   }
   // Ends the recording and returns its path.
   std::string finish() {
-    packer.drain();
+    publisher.drain();
     host.reset();
     const std::string path = recorder->path();
     while (recorder->state() == Recorder::State::running) std::this_thread::yield();
@@ -66,7 +66,7 @@ class RecordedScene {
 
   std::shared_ptr<Recorder> recorder;
   scene::LiveScene live;
-  delivery::FramePublisher packer;
+  delivery::FramePublisher publisher;
   std::unique_ptr<scene::SceneHost> host;
   Clock::time_point now = Clock::now();
   std::vector<std::uint64_t> hashes;
@@ -152,7 +152,7 @@ TEST_F(RecorderTest, ContinuesAfterItsDeviceWasLost) {
   vulkan::Device another;
   recorded.host->release();
   recorded.host->rebuild(
-      std::make_unique<scene::SceneOnDevice>(another, recorded.live.start(), recorded.packer.workers()),
+      std::make_unique<scene::SceneOnDevice>(another, recorded.live.start(), recorded.publisher.workers()),
       "the device was lost");
   recorded.change(wind(2));
   recorded.ticks(30);
@@ -181,9 +181,9 @@ TEST_F(RecorderTest, HoldsTheStreamAndRegularKeyFrames) {
   auto reader = RecordingReader::open(recorded.finish());
   ASSERT_TRUE(reader.has_value()) << reader.error();
   EXPECT_TRUE(reader->check().has_value());
-  EXPECT_EQ(reader->fact("scene"), "small");
-  EXPECT_EQ(reader->fact("server"), "test");
-  EXPECT_NE(reader->fact("driver"), "unknown");
+  EXPECT_EQ(reader->metadata("scene"), "small");
+  EXPECT_EQ(reader->metadata("server"), "test");
+  EXPECT_NE(reader->metadata("driver"), "unknown");
   EXPECT_EQ(reader->description()->scene(), "small");
   std::array<std::size_t, kTopicNames.size()> counts{};
   std::size_t sinceKey = 0, farthest = 0;
@@ -199,7 +199,7 @@ TEST_F(RecorderTest, HoldsTheStreamAndRegularKeyFrames) {
   EXPECT_EQ(count(Topic::checkpoints), 2u);  // at the start, and after five seconds
   EXPECT_EQ(count(Topic::participants), 2u);
   EXPECT_EQ(count(Topic::reports), 25u);
-  EXPECT_LT(farthest, kFramesAKeyFrame);
+  EXPECT_LT(farthest, kMaxKeyFrameDistance);
 }
 
 TEST_F(RecorderTest, FindsAndMeasuresADifferingTick) {
@@ -211,7 +211,7 @@ TEST_F(RecorderTest, FindsAndMeasuresADifferingTick) {
   {
     auto file = OutputFile::create(path);
     auto writer = RecordingWriter::begin([&](std::string_view bytes) { return file->write(bytes); }, "test",
-                                         reader->facts());
+                                         reader->metadata());
     ASSERT_TRUE(writer.has_value());
     for (auto message = reader->next(); *message; message = reader->next()) {
       std::string bytes((*message)->bytes);
@@ -244,7 +244,7 @@ TEST_F(RecorderTest, RefusesBytesThatAreNoTickOfTheScene) {
     const std::string path = (directory_.path() / name).string();
     auto file = OutputFile::create(path);
     auto writer = RecordingWriter::begin([&](std::string_view bytes) { return file->write(bytes); }, "test",
-                                         reader->facts());
+                                         reader->metadata());
     reader->rewind();
     for (auto message = reader->next(); *message; message = reader->next()) {
       std::string bytes((*message)->bytes);
@@ -302,7 +302,7 @@ TEST_F(RecorderTest, ContinuesFromTheNextStateAfterALostChunk) {
           bytes += more;
           return Written();
         },
-        "test", reader->facts());
+        "test", reader->metadata());
     ASSERT_TRUE(writer.has_value());
     std::uint64_t ticks = 0;
     for (auto message = reader->next(); *message; message = reader->next()) {

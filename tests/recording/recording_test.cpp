@@ -30,8 +30,8 @@ std::uint64_t tickOf(std::string_view bytes) {
 TEST(Recording, RoundTrips) {
   RecordingReader reader = readerOf(sampleRecording(kSampleFrames));
   EXPECT_TRUE(reader.check().has_value());
-  EXPECT_EQ(reader.fact("scene"), "sample");
-  EXPECT_EQ(reader.fact("driver"), "unknown");
+  EXPECT_EQ(reader.metadata("scene"), "sample");
+  EXPECT_EQ(reader.metadata("driver"), "unknown");
   EXPECT_EQ(reader.description()->scene(), "sample");
   EXPECT_EQ(reader.start(), sampleTime(0));
   EXPECT_EQ(reader.end(), sampleTime(kSampleFrames - 1));
@@ -78,7 +78,7 @@ TEST(Recording, SeeksToThePreviousKeyFrame) {
     const auto message = reader.next();
     ASSERT_TRUE(message && *message);
     EXPECT_EQ((*message)->topic, Topic::frames);
-    EXPECT_EQ(tickOf((*message)->bytes), frame / kFramesAKeyFrame * kFramesAKeyFrame + 1);
+    EXPECT_EQ(tickOf((*message)->bytes), frame / kMaxKeyFrameDistance * kMaxKeyFrameDistance + 1);
   }
   ASSERT_TRUE(reader.seek(0));
   EXPECT_EQ((*reader.next())->topic, Topic::description);
@@ -200,7 +200,7 @@ TEST(Recording, PassesOnTheSinksErrorAndStopsWriting) {
     return {};
   });
   ASSERT_TRUE(writer.begin("test"));
-  EXPECT_EQ(writer.addFacts("a", {}).error(), "no room");
+  EXPECT_EQ(writer.addMetadata("a", {}).error(), "no room");
   EXPECT_EQ(writer.write(1, 0, "x").error(), "no room");
   EXPECT_EQ(writer.finish().error(), "no room");
   EXPECT_EQ(calls, 3u);
@@ -230,7 +230,7 @@ TEST(Recording, SeeksToThePreviousKeyFrameInALongRecording) {
     const auto frame = static_cast<std::uint32_t>(random() % kMinutes);
     ASSERT_TRUE(reader->seek(sampleTime(frame)));
     const auto message = reader->next();
-    ASSERT_EQ(tickOf((*message)->bytes), frame / kFramesAKeyFrame * kFramesAKeyFrame + 1);
+    ASSERT_EQ(tickOf((*message)->bytes), frame / kMaxKeyFrameDistance * kMaxKeyFrameDistance + 1);
   }
 }
 

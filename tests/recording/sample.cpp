@@ -75,7 +75,7 @@ void write(const Sink& sink, std::uint32_t frames, const codec::StreamLayout& la
   for (std::uint32_t i = 0; i < frames; ++i) {
     if (sliders && i > 0 && i % kFramesAChange == 0)
       must(writer->write(Topic::parameters, sampleTime(i), sliderMoved(i).SerializeAsString()));
-    const bool key = i % kFramesAKeyFrame == 0;
+    const bool key = i % kMaxKeyFrameDistance == 0;
     const std::size_t bytes =
         encoder->encode(i + 1, key ? codec::PacketKind::key : codec::PacketKind::predicted,
                         motion[i % motion.size()].positions, {}, packet);

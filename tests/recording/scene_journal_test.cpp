@@ -36,25 +36,25 @@ class SceneJournalTest : public tests::GpuTest {
     make({});
   }
   void TearDown() override {
-    if (packer) packer->drain();
+    if (publisher) publisher->drain();
     host.reset();
   }
   void make(RecorderOptions options, bool always = false) {
-    if (packer) packer->drain();
+    if (publisher) publisher->drain();
     host.reset();
     options.directory = directory.path();
     options.serverName = "test";
     journal = std::make_shared<SceneJournal>("small", options, always);
     live = std::make_unique<scene::LiveScene>(tests::smallScene(), false, journal);
-    packer = std::make_unique<delivery::FramePublisher>(encode::FrameEncoder::kSlots, [] {});
-    host = std::make_unique<scene::SceneHost>(tests::device(), *live, *packer);
+    publisher = std::make_unique<delivery::FramePublisher>(encode::FrameEncoder::kSlots, [] {});
+    host = std::make_unique<scene::SceneHost>(tests::device(), *live, *publisher);
   }
   void ticks(int count) {
     for (int i = 0; i < count; ++i) {
       now += std::chrono::seconds(1);
       host->begin(now);
       host->finish();
-      packer->drain();
+      publisher->drain();
     }
   }
   void grab(bool holds) {
@@ -90,7 +90,7 @@ class SceneJournalTest : public tests::GpuTest {
   e2e::TemporaryDirectory directory;
   std::shared_ptr<SceneJournal> journal;
   std::unique_ptr<scene::LiveScene> live;
-  std::unique_ptr<delivery::FramePublisher> packer;
+  std::unique_ptr<delivery::FramePublisher> publisher;
   std::unique_ptr<scene::SceneHost> host;
   schedule::Clock::time_point now = schedule::Clock::now();
 };
@@ -112,7 +112,7 @@ TEST_F(SceneJournalTest, ResimulatesARecordingThatStartsInTheMiddle) {
   ticks(20);
   live->resetRequested = true;
   ticks(20);
-  packer->drain();
+  publisher->drain();
   const auto stopped = journal->stop();
   ASSERT_TRUE(stopped) << stopped.error().text;
   EXPECT_EQ(stopped->file(), "mid.mcap");
@@ -151,7 +151,7 @@ TEST_F(SceneJournalTest, OmitsFramesOfAPausedScene) {
   }
   now += std::chrono::seconds(1);
   host->encodePausedFrame(now);
-  packer->drain();
+  publisher->drain();
   EXPECT_EQ(live->metrics.frames.value(), frames + 1);
   EXPECT_TRUE(late->next(now));
   ticks(10);
@@ -227,7 +227,7 @@ TEST_F(SceneJournalTest, ContinuesInAnotherFileAtTheLimit) {
   // Participants are not notified of the files in between.
   EXPECT_THAT(kinds, ::testing::ElementsAre(v1::NOTICE_KIND_RECORDING_STARTED));
   live->subscribers.remove(*mailbox);
-  packer->drain();
+  publisher->drain();
   host.reset();
   while (journal->counts().running > 0) std::this_thread::yield();
   std::uint64_t all = 0;
@@ -272,10 +272,10 @@ TEST_F(SceneJournalTest, SplitsTheFileWhenNoGrabIsHeldOrAGrabLasts) {
 // The device's thread gives up a scene whose ticks fail. A later participant gets another host.
 TEST_F(SceneJournalTest, RecordsTheNextHostOfAScene) {
   const auto another = [&] {
-    packer->drain();
+    publisher->drain();
     host.reset();
     EXPECT_FALSE(journal->active());
-    host = std::make_unique<scene::SceneHost>(tests::device(), *live, *packer);
+    host = std::make_unique<scene::SceneHost>(tests::device(), *live, *publisher);
   };
   ticks(1);
   ASSERT_TRUE(journal->start("before"));
@@ -303,7 +303,7 @@ TEST_F(SceneJournalTest, RecordsTheNextHostOfAScene) {
   another();
   ticks(7);
   EXPECT_TRUE(journal->active());
-  packer->drain();
+  publisher->drain();
   host.reset();
   while (journal->counts().running > 0) std::this_thread::yield();
   EXPECT_EQ(journal->counts().complete, 2u);
@@ -329,16 +329,16 @@ TEST_F(SceneJournalTest, CountsRecordingsOfRemovedScenesWithoutKeepingThem) {
   Recordings recordings({.directory = directory.path(), .serverName = "test"}, true);
   std::weak_ptr<scene::Journal> gone;
   for (int scene = 1; scene <= 3; ++scene) {
-    packer->drain();
+    publisher->drain();
     host.reset();
     live.reset();
     auto added = recordings.add("small");
     EXPECT_TRUE(gone.expired());
     gone = added;
     live = std::make_unique<scene::LiveScene>(tests::smallScene(), true, std::move(added));
-    host = std::make_unique<scene::SceneHost>(tests::device(), *live, *packer);
+    host = std::make_unique<scene::SceneHost>(tests::device(), *live, *publisher);
     ticks(3);
-    packer->drain();
+    publisher->drain();
     host.reset();
     const auto complete = fmt::format("running 0  complete {}  failed 0", scene);
     while (recordings.report().find(complete) == std::string::npos) std::this_thread::yield();

@@ -63,9 +63,9 @@ std::string recordScene(vulkan::Device& device, const std::string& name,
   const model::Vec3 wind = scene->environment.wind;
   const auto recorder = std::make_shared<recording::Recorder>(
       recording::RecorderOptions{.directory = directory, .serverName = "clothstream replay"});
-  delivery::FramePublisher packer(encode::FrameEncoder::kSlots, [] {});
+  delivery::FramePublisher publisher(encode::FrameEncoder::kSlots, [] {});
   scene::LiveScene live(std::move(*scene), false, recorder);
-  auto host = std::make_unique<scene::SceneHost>(device, live, packer);
+  auto host = std::make_unique<scene::SceneHost>(device, live, publisher);
   model::Vec3 centre = model::Vec3::Zero();
   const std::vector<model::Vec3> rest = model::restPositions(live.start().cloths.front());
   for (const model::Vec3& node : rest) centre += node / static_cast<float>(rest.size());
@@ -82,7 +82,7 @@ std::string recordScene(vulkan::Device& device, const std::string& name,
     now += std::chrono::nanoseconds(1'000'000'000 / rate);
     host->begin(now);
     host->finish();
-    packer.drain();
+    publisher.drain();
   }
   host.reset();
   while (recorder->state() == recording::Recorder::State::running) std::this_thread::yield();

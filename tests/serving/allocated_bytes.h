@@ -15,7 +15,7 @@ namespace clothstream::tests {
 
 // Promised limit of the memory for one client, bytes. Uploads and data that all clients share are not
 // included.
-inline constexpr double kMostBytesAClient = 4 << 20;
+inline constexpr double kMaxBytesAClient = 4 << 20;
 
 inline double allocatedBytes() {
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)

@@ -13,7 +13,7 @@
 namespace clothstream::tests {
 
 TestPeer::TestPeer(hosting::SceneServer& server, std::string name)
-    : connection_(session::Session::open(server, std::move(name), [this] {
+    : session_(session::Session::open(server, std::move(name), [this] {
         const std::lock_guard lock(mutex_);
         awake_ = true;
         woken_.notify_all();
@@ -24,7 +24,7 @@ void TestPeer::send(const v1::ClientMessage& message) {
 }
 
 void TestPeer::sendBytes(const std::string& bytes) {
-  connection_->receive(std::as_bytes(std::span(bytes)));
+  session_->receive(std::as_bytes(std::span(bytes)));
 }
 
 void TestPeer::hello(const std::string& scene) {
@@ -70,9 +70,8 @@ void TestPeer::join(const std::string& scene) {
 std::optional<v1::ServerMessage> TestPeer::read() {
   const auto deadline = std::chrono::steady_clock::now() + kPatience;
   for (;;) {
-    const bool finished =
-        connection_->finished();  // before next(), because earlier messages must still be read
-    if (const std::optional<delivery::SharedBytes> bytes = connection_->next()) {
+    const bool finished = session_->finished();  // before next(), because earlier messages must still be read
+    if (const std::optional<delivery::SharedBytes> bytes = session_->next()) {
       v1::ServerMessage message;
       if (!message.ParseFromArray((*bytes)->data(), static_cast<int>((*bytes)->size())))
         throw std::runtime_error("the bytes are not a ServerMessage");

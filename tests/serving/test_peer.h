@@ -55,10 +55,10 @@ class TestPeer {
   // Reads until the session is finished and has no more messages. Returns the last message.
   v1::ServerMessage readToTheEnd();
 
-  bool finished() const { return connection_->finished(); }
+  bool finished() const { return session_->finished(); }
   // Ends without a goodbye, like a lost connection. The server keeps the participant's place for the grace
   // period.
-  void vanish() { connection_.reset(); }
+  void vanish() { session_.reset(); }
   // Takes over the description and decoder of `other`, which cannot decode frames afterwards.
   void inherit(TestPeer& other) {
     description_ = other.description_;
@@ -66,8 +66,8 @@ class TestPeer {
   }
   // Says goodbye.
   void leave() {
-    connection_->leave();
-    connection_.reset();
+    session_->leave();
+    session_.reset();
   }
 
   const v1::Welcome& welcome() const { return welcome_; }
@@ -93,7 +93,7 @@ class TestPeer {
   std::unique_ptr<codec::Decoder> decoder_;
   std::vector<SeenFrame> frames_;
 
-  std::shared_ptr<session::Session> connection_;
+  std::shared_ptr<session::Session> session_;
 };
 
 }  // namespace clothstream::tests

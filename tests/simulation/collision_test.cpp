@@ -303,7 +303,7 @@ TEST_F(Collision, ReportsTheImpulsesOfColliders) {
     above.name = "above";
     model::Scene scene = sceneOf({above, cloth});
     scene.integrator = kernel.integrator;
-    Running running(scene), untold(scene);
+    Running running(scene), silent(scene);
     // The sphere is far below and never touched.
     simulation::TickInputs inputs =
         inputsOf(scene, {resting(model::Sphere{0.1f}, {model::Vec3(0, -9, 0), model::Quaternion::Identity()}),
@@ -311,8 +311,8 @@ TEST_F(Collision, ReportsTheImpulsesOfColliders) {
     double impulse = 0;
     for (int tick = 0; tick < 36; ++tick) {
       inputs.reportsContacts = false;
-      const std::uint64_t expected = untold.tick(inputs).stateHash;
-      EXPECT_TRUE(untold.contacts().empty());
+      const std::uint64_t expected = silent.tick(inputs).stateHash;
+      EXPECT_TRUE(silent.contacts().empty());
       inputs.reportsContacts = true;
       EXPECT_EQ(running.tick(inputs).stateHash, expected);
       for (const simulation::ContactStatus& contact : running.contacts()) {

@@ -11,8 +11,8 @@
 namespace clothstream::client {
 namespace {
 
-constexpr double kMostDelayMs = 10'000, kMostLeadMs = 1000;
-constexpr std::uint32_t kMostFrames = 256;
+constexpr double kMaxDelayMs = 10'000, kMaxLeadMs = 1000;
+constexpr std::uint32_t kMaxFrames = 256;
 
 // Returns false for NaN.
 bool isWithin(double number, double most) {
@@ -25,7 +25,7 @@ bool isUnit(float squared) {
 
 // A collider that moves or turns more than this between two frames has jumped, by the server's rule
 // (docs/protocol.md). A jump is not interpolated.
-constexpr float kMostSpeed = 30;      // m/s
+constexpr float kMaxSpeed = 30;       // m/s
 constexpr float kLeastCosine = 0.5f;  // cosine of half the angle
 
 bool isSame(const Collider& a, const Collider& b) {
@@ -43,7 +43,7 @@ void move(Collider& moved, const Collider& from, const Collider& to, bool isAtTo
     squared += way[axis] * way[axis];
   }
   // Also rejects infinity and NaN.
-  if (!(squared <= kMostSpeed * kMostSpeed * seconds * seconds)) return;
+  if (!(squared <= kMaxSpeed * kMaxSpeed * seconds * seconds)) return;
   for (std::size_t axis = 0; axis < 3; ++axis) moved.position[axis] += way[axis] * fraction;
 
   for (std::size_t i = 0; i < 4; ++i) cosine += from.orientation[i] * to.orientation[i];
@@ -63,10 +63,10 @@ void move(Collider& moved, const Collider& from, const Collider& to, bool isAtTo
 
 bool isAllowed(const cs_play_out_options& options) {
   return options.version == CS_PLAY_OUT_OPTIONS_VERSION && options.frames >= PlayOut::kFewestFrames &&
-         options.frames <= kMostFrames &&
-         (std::isnan(options.delay_ms) || isWithin(options.delay_ms, kMostDelayMs)) &&
-         isWithin(options.most_delay_ms, kMostDelayMs) &&
-         isWithin(options.least_delay_ms, options.most_delay_ms) && isWithin(options.lead_ms, kMostLeadMs);
+         options.frames <= kMaxFrames &&
+         (std::isnan(options.delay_ms) || isWithin(options.delay_ms, kMaxDelayMs)) &&
+         isWithin(options.most_delay_ms, kMaxDelayMs) &&
+         isWithin(options.least_delay_ms, options.most_delay_ms) && isWithin(options.lead_ms, kMaxLeadMs);
 }
 
 void PlayOut::begin(const Description& description) {
@@ -75,7 +75,7 @@ void PlayOut::begin(const Description& description) {
   frameUs_ = 1e6 / description.streamRate;
   const std::size_t vertexBytes = (sendsNormals_ ? 6 : 3) * sizeof(float);
   const std::size_t vertices = std::max<std::size_t>(layout.vertexCount(), 1);
-  const std::size_t fit = kMostBytes / (vertices * vertexBytes);
+  const std::size_t fit = kMaxBytes / (vertices * vertexBytes);
   frames_.assign(std::clamp<std::size_t>(fit, kFewestFrames, options_.frames), {});
   positions_ = {};
   normals_ = {};

@@ -28,7 +28,7 @@ struct DisplayableFrame {
 // Memory for a frame is allocated when first needed; a full ring allocates no more.
 class PlayOut {
  public:
-  static constexpr std::size_t kMostBytes = 256 * 1024 * 1024, kFewestFrames = 3;
+  static constexpr std::size_t kMaxBytes = 256 * 1024 * 1024, kFewestFrames = 3;
 
   explicit PlayOut(const cs_play_out_options& options) : options_(options) {}
 

@@ -53,7 +53,7 @@ bool ServerClock::contradicts(const Exchange& exchange) const {
 
 void ServerClock::add(const Exchange& exchange) {
   exchanges_.push_back(exchange);
-  while (exchanges_.size() > kMostExchanges || since(exchanges_.front().atUs, exchange.atUs) > kWindowUs)
+  while (exchanges_.size() > kMaxExchanges || since(exchanges_.front().atUs, exchange.atUs) > kWindowUs)
     exchanges_.pop_front();
 }
 

@@ -46,7 +46,7 @@ class ServerClock {
   static constexpr double kSlew = 0.02, kJumpUs = 50'000;
 
  private:
-  static constexpr std::size_t kPending = 64, kRecent = 16, kMostExchanges = 1024, kSuspects = 4;
+  static constexpr std::size_t kPending = 64, kRecent = 16, kMaxExchanges = 1024, kSuspects = 4;
   static constexpr std::uint64_t kFirstIntervalUs = 10'000, kIntervalUs = 250'000;
   static constexpr double kWindowUs = 240e6;
   static constexpr std::size_t kBurst = 64;  // fast pings at the start and after a jump

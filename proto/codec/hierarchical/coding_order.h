@@ -35,31 +35,31 @@ using Nearest = std::array<std::uint32_t, 4>;
 
 // Vertices of one rank are coded together, over all cloths; higher ranks come first. A level of a grid has
 // vertices that are new in both directions, then vertices that are new in one. The levels of a mesh alternate
-// between the two. Each of these may be coded in up to kMostParts parts.
+// between the two. Each of these may be coded in up to kMaxParts parts.
 using Rank = std::uint32_t;
-inline constexpr std::uint32_t kMostParts = 4, kLevels = 32, kMostCorners = 16;
+inline constexpr std::uint32_t kMaxParts = 4, kLevels = 32, kMaxCorners = 16;
 constexpr Rank rankOf(std::uint32_t level, bool newInBoth, std::uint32_t part) {
-  return 2 * kMostParts * level + (newInBoth ? kMostParts : 0) + kMostParts - 1 - part;
+  return 2 * kMaxParts * level + (newInBoth ? kMaxParts : 0) + kMaxParts - 1 - part;
 }
 // Rank of a corner. Corners come before all levels, and each is predicted from the corners before it.
 constexpr Rank rankOfCorner(std::uint32_t corner) {
-  return 2 * kMostParts * kLevels + kMostCorners - 1 - corner;
+  return 2 * kMaxParts * kLevels + kMaxCorners - 1 - corner;
 }
-inline constexpr Rank kRanks = 2 * kMostParts * kLevels + kMostCorners;
+inline constexpr Rank kRanks = 2 * kMaxParts * kLevels + kMaxCorners;
 
 // Set of weights that predicts the vertices of a rank: 0 and 1 for the finest level, 2 and 3 for the next, 4
 // and 5 for all coarser ones. The first of each pair is for vertices that are new in both directions.
 // kWeightClasses means no weights.
 constexpr std::uint32_t weightClassOf(Rank rank) {
-  const std::uint32_t level = rank / (2 * kMostParts);
+  const std::uint32_t level = rank / (2 * kMaxParts);
   if (level >= kLevels) return kWeightClasses;
-  return 2 * std::min(level, 2u) + (rank % (2 * kMostParts) < kMostParts ? 1 : 0);
+  return 2 * std::min(level, 2u) + (rank % (2 * kMaxParts) < kMaxParts ? 1 : 0);
 }
 // Coarse vertices are the corners and the vertices of levels from this one up. Nothing of a coarse vertex
 // depends on a vertex that is not coarse.
 inline constexpr std::uint32_t kCoarseLevel = 2;
 constexpr bool isCoarse(Rank rank) {
-  return rank / (2 * kMostParts) >= kCoarseLevel;
+  return rank / (2 * kMaxParts) >= kCoarseLevel;
 }
 
 // Indexed by vertex of the cloth. `neighbours` and `nearest` name vertices of the cloth too; kNoVertex is the

@@ -66,7 +66,7 @@ void scale(const ChunkScratch& scratch, std::size_t count, const ScaleModel& mod
 
 // With workers: number of vertices that are encoded before they are written, maximum number of pieces, and
 // minimum vertices of a piece.
-constexpr std::uint32_t kBatch = 256 * kChunk, kMostPieces = 16, kLeastPiece = 8 * kChunk;
+constexpr std::uint32_t kBatch = 256 * kChunk, kMaxPieces = 16, kLeastPiece = 8 * kChunk;
 
 }  // namespace
 
@@ -86,7 +86,7 @@ struct HierarchicalEncoder::State {
       std::abort();  // memory is out, as in any other allocation here
     fitted.emplace(predictor.hierarchy());
     plan.emplace(predictor.hierarchy(), layout.temporalLayers, options.weightLag);
-    scratches.resize(workers != nullptr ? kMostPieces : 1);
+    scratches.resize(workers != nullptr ? kMaxPieces : 1);
     encoded.resize(batch / kChunk);
   }
 
@@ -336,7 +336,7 @@ bool HierarchicalEncoder::State::goesOnResting(std::uint32_t slot, const Predict
 
 template <typename Piece>
 void HierarchicalEncoder::State::share(std::uint32_t count, std::uint32_t least, const Piece& piece) {
-  const std::uint32_t pieces = workers == nullptr ? 1 : std::clamp(count / least, 1u, kMostPieces);
+  const std::uint32_t pieces = workers == nullptr ? 1 : std::clamp(count / least, 1u, kMaxPieces);
   if (pieces == 1) return piece(0, 0, count);
   const auto at = [&](std::uint32_t i) {
     return static_cast<std::uint32_t>(std::uint64_t{count} * i / pieces);

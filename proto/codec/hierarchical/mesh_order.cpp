@@ -76,7 +76,7 @@ class MeshOrder {
     std::vector<Level> levels(1);
     for (std::uint32_t v = 0; v < count_; ++v) levels[0].vertices.push_back(v);
     levels[0].graph = edgesOf(cloth);
-    while (levels.size() < kMaxMeshLevels && levels.back().vertices.size() > kMostCorners) {
+    while (levels.size() < kMaxMeshLevels && levels.back().vertices.size() > kMaxCorners) {
       Level coarse = coarserThan(levels.back());
       if (coarse.vertices.size() == levels.back().vertices.size()) break;
       levels.push_back(std::move(coarse));
@@ -206,7 +206,7 @@ class MeshOrder {
   // Adds a few vertices, each predicted from those before it; or many without any neighbours, predicted from
   // nothing.
   void addCoarsest(std::span<const std::uint32_t> vertices) {
-    const bool few = vertices.size() <= kMostCorners;
+    const bool few = vertices.size() <= kMaxCorners;
     std::vector<std::uint32_t> before;
     for (const std::uint32_t v : vertices) {
       const std::span<const std::uint32_t> all = before;

@@ -33,11 +33,11 @@ struct GroupNumbers {
 };
 
 // Maximum bits of a number below 2^31, and of the mode of a block and component.
-inline constexpr std::size_t kMostNumberBits = 76, kMostModeBits = 26;
+inline constexpr std::size_t kMaxNumberBits = 76, kMaxModeBits = 26;
 // Maximum bytes of the groups of this many vertices.
 constexpr std::size_t groupsBound(std::size_t components, std::size_t vertices) {
   const std::size_t blocks = vertices / kBlockVertices + 1, groups = vertices / kGroupVertices + 1;
-  return components * (blocks * kMostModeBits + vertices * kMostNumberBits) / 8 + 2 * groups;
+  return components * (blocks * kMaxModeBits + vertices * kMaxNumberBits) / 8 + 2 * groups;
 }
 
 // `out` is at a whole byte before and after the call.

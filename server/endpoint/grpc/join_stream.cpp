@@ -55,7 +55,7 @@ void JoinStream::onBegun(bool ok) {
       if (const auto self = weak.lock()) self->pump();
     });
   };
-  connection_ = session::Session::open(endpoint_.server, "grpc " + context_.peer(), std::move(wake));
+  session_ = session::Session::open(endpoint_.server, "grpc " + context_.peer(), std::move(wake));
   read();
   pump();
 }
@@ -65,24 +65,24 @@ void JoinStream::read() {
 }
 
 void JoinStream::onRead(bool ok) {
-  if (!connection_) return;
+  if (!session_) return;
   if (!ok) {
-    departing_ = std::move(connection_);
+    departing_ = std::move(session_);
     return finish(grpc::Status::OK);
   }
   grpc::Slice bytes;
   if (!incoming_.DumpToSingleSlice(&bytes).ok())
     return finish({grpc::StatusCode::INTERNAL, "cannot read the message"});
-  connection_->receive(std::as_bytes(std::span(bytes.begin(), bytes.size())));
+  session_->receive(std::as_bytes(std::span(bytes.begin(), bytes.size())));
   read();
 }
 
 void JoinStream::pump() {
-  if (!connection_) return;
-  const bool finished = connection_->finished();  // checked before next(), so that no message is lost
+  if (!session_) return;
+  const bool finished = session_->finished();  // checked before next(), so that no message is lost
   if (isWriting_) {
     if (finished) cancelSoon();
-  } else if (std::optional<delivery::SharedBytes> message = connection_->next()) {
+  } else if (std::optional<delivery::SharedBytes> message = session_->next()) {
     lastMessage_ = std::move(*message);
     isWriting_ = true;
     io_.Write(sharedBuffer(lastMessage_), begin(written_));
@@ -105,7 +105,7 @@ void JoinStream::onWritten(bool ok) {
 void JoinStream::finish(const grpc::Status& status) {
   if (closing_) return;
   closing_ = status;
-  connection_.reset();
+  session_.reset();
   if (hasEnded_) return;
   if (isWriting_)
     cancelSoon();
@@ -136,7 +136,7 @@ void JoinStream::onEnded(bool) {
 
 void JoinStream::close(const grpc::Status& status) {
   // The last message of a finished session may still wait, and it gives a more specific status.
-  if (connection_ && connection_->finished())
+  if (session_ && session_->finished())
     pump();
   else
     finish(status);

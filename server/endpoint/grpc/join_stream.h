@@ -41,7 +41,7 @@ class JoinStream final : public Call {
 
   Service& service_;
   grpc::ServerAsyncReaderWriter<grpc::ByteBuffer, grpc::ByteBuffer> io_{&context_};
-  std::shared_ptr<session::Session> connection_;  // nullptr while the stream closes
+  std::shared_ptr<session::Session> session_;  // nullptr while the stream closes
   // Session of a client that sends nothing more. The end of the call tells a goodbye from a lost connection.
   std::shared_ptr<session::Session> departing_;
   grpc::ByteBuffer incoming_;

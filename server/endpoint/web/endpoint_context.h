@@ -18,7 +18,7 @@ class SceneServer;
 
 namespace clothstream::endpoint {
 
-class StreamSession;
+class WebSocketStream;
 
 struct WebEndpointContext {
   hosting::SceneServer& server;
@@ -27,7 +27,7 @@ struct WebEndpointContext {
   const std::vector<std::string> allowedOrigins;
   const std::size_t maxConnections;
   std::size_t connections = 0;
-  std::unordered_set<std::shared_ptr<StreamSession>> streams;
+  std::unordered_set<std::shared_ptr<WebSocketStream>> streams;
   bool stopping = false;
 };
 

@@ -16,8 +16,8 @@
 #include <sys/socket.h>
 
 #include "server/endpoint/web/endpoint_context.h"
-#include "server/endpoint/web/http_session.h"
-#include "server/endpoint/web/stream_session.h"
+#include "server/endpoint/web/http_connection.h"
+#include "server/endpoint/web/web_socket_stream.h"
 
 namespace clothstream::endpoint {
 namespace {
@@ -96,7 +96,7 @@ struct WebEndpoint::State {
       }
       if (context.connections < context.maxConnections + kAnsweredBeyondLimit) {
         sendFresh(socket);
-        std::make_shared<HttpSession>(std::move(socket), context)->read();
+        std::make_shared<HttpConnection>(std::move(socket), context)->read();
       }
       accept();
     });

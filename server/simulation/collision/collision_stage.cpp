@@ -59,7 +59,7 @@ CollisionStage::CollisionStage(const vulkan::Device& device, std::uint32_t nodeC
             vulkan::Bindings(device, kernel_, {positions[1], velocities[1], &bounds_, &nearLists_})} {}
 
 void CollisionStage::recordInputs(vulkan::Recorder& recorder, std::span<const MovingCollider> colliders,
-                                  bool tells) {
+                                  bool reportsContacts) {
   fill(tables_, colliders);
   count_ = static_cast<std::uint32_t>(colliders.size());
   slot_ = 1 - slot_;
@@ -67,7 +67,7 @@ void CollisionStage::recordInputs(vulkan::Recorder& recorder, std::span<const Mo
   std::size_t offset = upload(recorder, tables_.records, through, 0, colliders_, 0);
   offset = upload(recorder, tables_.planes, through, offset, colliders_, offset);
   upload(recorder, tables_.bounds, through, offset, bounds_, 0);
-  reportsContacts_ = tells && count_ > 0;
+  reportsContacts_ = reportsContacts && count_ > 0;
   if (reportsContacts_) recorder.fill(contactImpulses_, 0, contactBytes());
 }
 
@@ -79,13 +79,13 @@ void CollisionStage::recordContacts(vulkan::Recorder& recorder) {
 }
 
 std::vector<ContactStatus> CollisionStage::contacts() const {
-  std::vector<ContactStatus> told;
-  if (!reportsContacts_) return told;
+  std::vector<ContactStatus> statuses;
+  if (!reportsContacts_) return statuses;
   const auto units = contactReadbacks_[slot_].mapped<const std::uint32_t>();
   for (std::uint32_t i = 0; i < count_ * clothCount_; ++i)
     if (units[i] != 0)
-      told.push_back({i / clothCount_, i % clothCount_, units[i] / double{shared::kImpulseUnits}});
-  return told;
+      statuses.push_back({i / clothCount_, i % clothCount_, units[i] / double{shared::kImpulseUnits}});
+  return statuses;
 }
 
 void CollisionStage::recordGather(vulkan::Recorder& recorder, std::uint32_t present, float tickSeconds,

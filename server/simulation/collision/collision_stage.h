@@ -29,7 +29,8 @@ class CollisionStage {
 
   // Uploads the colliders of the next tick. At most one tick may be in flight. `reportsContacts`: count their
   // contacts.
-  void recordInputs(vulkan::Recorder& recorder, std::span<const MovingCollider> colliders, bool tells);
+  void recordInputs(vulkan::Recorder& recorder, std::span<const MovingCollider> colliders,
+                    bool reportsContacts);
 
   // Lists the colliders that nodes may touch within `tickSeconds`. The state is in the buffers `present`, and
   // no cloth is thicker than `thickness`. The caller records stage and barrier. Records nothing if there are

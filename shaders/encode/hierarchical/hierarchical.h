@@ -35,8 +35,8 @@ const uint32_t kClassFeatures = 16;
 const uint32_t kClassWeights = 96;  // of all classes
 const uint32_t kFeatureProducts = 152;
 const uint32_t kChunkSlots = 64;
-const uint32_t kMostMagnitude = 31;
-const uint32_t kMostStillFrames = 3;
+const uint32_t kMaxMagnitude = 31;
+const uint32_t kMaxStillFrames = 3;
 const uint32_t kRestsInTurn = 64;
 
 struct PredictPush {

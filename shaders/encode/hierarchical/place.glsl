@@ -50,7 +50,7 @@ uint scaleOf(ScaleWeights w, Prediction p, uint lastMagnitudes, uint component, 
 // start in turn, a limited number per frame.
 bool startsToRest(uint slot, PastVertex before) {
   ivec4 target = wanted[slot];
-  if (isKey() || target.w < kMostStillFrames || rests(before.node) ||
+  if (isKey() || target.w < kMaxStillFrames || rests(before.node) ||
       !isPromised(target.xyz - ivec3(before.node.xyz))) {
     return false;
   }
@@ -89,7 +89,7 @@ void place(uint slot, uint weightClass) {
     residual = ivec3(0);
     position = last;
   }
-  ivec3 magnitudes = min(abs(residual), ivec3(kMostMagnitude));
+  ivec3 magnitudes = min(abs(residual), ivec3(kMaxMagnitude));
   uint resting = !isKey() && position == last ? 1u << 24 : 0u;
   made[slot] = uvec4(uvec3(position), uint(magnitudes.x | magnitudes.y << 8 | magnitudes.z << 16) | resting);
   writeRecord(slot, p, before, position);

@@ -69,7 +69,7 @@ void main() {
     vec3 p = texelFetch(positions, int(slotTable[slot])).xyz;
     ivec3 q = ivec3(quantise(p.x), quantise(p.y), quantise(p.z));
     ivec4 before = wanted[slot];
-    uint still = q == before.xyz ? min(uint(before.w) + 1, kMostStillFrames) : 0;
+    uint still = q == before.xyz ? min(uint(before.w) + 1, kMaxStillFrames) : 0;
     wanted[slot] = ivec4(q, int(still));
     if (!isKey()) {
       uvec4 reference = past[slot];
@@ -77,7 +77,7 @@ void main() {
       if (!serves) {
         atomicOr(moved, 1);
       }
-      if (serves && still == kMostStillFrames && !rests(reference)) {
+      if (serves && still == kMaxStillFrames && !rests(reference)) {
         atomicAdd(restWishes, 1);
       }
     }

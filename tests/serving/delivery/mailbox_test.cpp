@@ -58,12 +58,12 @@ class MailboxTest : public ::testing::Test {
 using Ticks = std::vector<std::uint64_t>;
 
 TEST_F(MailboxTest, SendsRepliesThenDescriptionThenAnnouncementsThenFrames) {
-  const SharedBytes welcome = bytes(1), told = bytes(4), pong = bytes(5);
+  const SharedBytes welcome = bytes(1), announcement = bytes(4), pong = bytes(5);
   ASSERT_TRUE(mailbox.reply(welcome));
   const auto content = description(256 * 1024);
   ASSERT_EQ(content->count(), 2u);
   mailbox.subscribe(content, shape, metrics);
-  ASSERT_TRUE(mailbox.announce(told));
+  ASSERT_TRUE(mailbox.announce(announcement));
   EXPECT_FALSE(wantsKeyFrame());
   mailbox.deliver(frame(1, true));  // a frame before the description is useless
   EXPECT_EQ(mailbox.next(now), welcome);
@@ -71,7 +71,7 @@ TEST_F(MailboxTest, SendsRepliesThenDescriptionThenAnnouncementsThenFrames) {
   ASSERT_TRUE(mailbox.reply(pong));
   EXPECT_EQ(mailbox.next(now), pong);
   EXPECT_EQ(**mailbox.next(now), *content->chunk(1));
-  EXPECT_EQ(mailbox.next(now), told);
+  EXPECT_EQ(mailbox.next(now), announcement);
   EXPECT_FALSE(mailbox.next(now));
   EXPECT_TRUE(wantsKeyFrame());
   const PublishedFrame key = frame(2, true);
@@ -341,11 +341,11 @@ TEST_F(MailboxTest, SendsTheRequestedLayersAndQualityAndReportsThem) {
   PublishedFrame wanted = frame(2, true);
   wanted.quality = 1;
   mailbox.deliver(wanted);
-  v1::ServerMessage told;
+  v1::ServerMessage parsed;
   const auto first = mailbox.next(now);
-  ASSERT_TRUE(first && told.ParseFromArray((*first)->data(), static_cast<int>((*first)->size())));
-  EXPECT_EQ(told.operating_point().quality(), 1u);
-  EXPECT_EQ(told.operating_point().temporal_layers(), 1u);
+  ASSERT_TRUE(first && parsed.ParseFromArray((*first)->data(), static_cast<int>((*first)->size())));
+  EXPECT_EQ(parsed.operating_point().quality(), 1u);
+  EXPECT_EQ(parsed.operating_point().temporal_layers(), 1u);
   EXPECT_EQ(mailbox.next(now), wanted.message);
   PublishedFrame upper = frame(3);
   upper.quality = upper.layer = 1;

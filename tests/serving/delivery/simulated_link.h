@@ -41,7 +41,7 @@ class SimulatedLink {
     const double carried = bytesPerSecond * seconds(time);
     budget_ = std::min(budget_ + carried, carried + kBurst);
     while (const auto message = mailbox->next(now)) {
-      if (const auto told = pointIn(*message)) given = *told;
+      if (const auto point = pointIn(*message)) given = *point;
       queue_.push_back(*message);
     }
     while (!queue_.empty() && static_cast<double>(queue_.front()->size()) <= budget_) {
@@ -90,8 +90,8 @@ class SimulatedLink {
   }
 
   void arrive(const SharedBytes& message, Clock::time_point now) {
-    if (const auto told = pointIn(message)) {
-      arrived_ = *told;
+    if (const auto point = pointIn(message)) {
+      arrived_ = *point;
       return;
     }
     const PublishedFrame& frame = published_.at(message.get());

@@ -114,7 +114,7 @@ TEST_F(ScenesTest, RefusesCreateSceneAtOnceWhileTooManyScenesWait) {
     mayEnd.wait();  // the maker's thread stays busy, so all others wait
   });
   began.get_future().wait();
-  for (std::uint32_t i = 0; i < SceneMaker::kMostWaiting; ++i)
+  for (std::uint32_t i = 0; i < SceneMaker::kMaxWaiting; ++i)
     server().createScene(unknown, [](const auto&) {});
   TestPeer peer(server());
   const v1::ServerMessage answer = createNamed(peer, "folds", "late");

@@ -28,7 +28,9 @@ namespace clothstream::tests {
 class HostedScene {
  public:
   explicit HostedScene(model::Scene scene = smallScene(), std::size_t subscribers = 1)
-      : live(std::move(scene)), packer(encode::FrameEncoder::kSlots, [] {}), host(device(), live, packer) {
+      : live(std::move(scene)),
+        publisher(encode::FrameEncoder::kSlots, [] {}),
+        host(device(), live, publisher) {
     for (std::size_t i = 0; i < subscribers; ++i) {
       mailboxes.push_back(std::make_shared<delivery::Mailbox>([] {}));
       live.subscribers.add(mailboxes.back());
@@ -38,14 +40,14 @@ class HostedScene {
     }
     decoder = codec::Decoder::make(encode::streamLayout(live.start(), scene::LiveScene::kEpoch));
   }
-  ~HostedScene() { packer.drain(); }
+  ~HostedScene() { publisher.drain(); }
 
   // Runs one tick; all subscribers read its frame.
   void tick() {
     now += std::chrono::seconds(1);  // so that no key frame has to wait
     host.begin(now);
     host.finish();
-    packer.drain();
+    publisher.drain();
     for (const auto& mailbox : mailboxes)
       while (const auto message = mailbox->next(now)) {
         v1::ServerMessage parsed;
@@ -54,7 +56,7 @@ class HostedScene {
           if (mailbox == mailboxes.front()) see(parsed.frame());
           ASSERT_TRUE(mailbox->acknowledge(host.tick(), now));
         } else if (mailbox == mailboxes.front()) {
-          told.push_back(parsed);
+          announced.push_back(parsed);
         }
       }
   }
@@ -74,14 +76,14 @@ class HostedScene {
   }
 
   scene::LiveScene live;
-  delivery::FramePublisher packer;
+  delivery::FramePublisher publisher;
   scene::SceneHost host;
   std::vector<std::shared_ptr<delivery::Mailbox>> mailboxes;
   std::unique_ptr<codec::Decoder> decoder;
   schedule::Clock::time_point now = schedule::Clock::now();
   std::vector<v1::Frame> frames;
   std::vector<bool> keys;
-  std::vector<v1::ServerMessage> told;
+  std::vector<v1::ServerMessage> announced;
 
  private:
   void see(const v1::Frame& frame) {

@@ -450,10 +450,10 @@ TEST_F(RosterTest, RemovedParticipantCannotResume) {
   EXPECT_EQ(inputs().front(), "2: 0 colliders, 0 grabs");
   EXPECT_EQ(other.read().back().error().code(), v1::ERROR_CODE_REMOVED);
   EXPECT_TRUE(other.mailbox->closed());
-  const auto told = owner.read();
-  ASSERT_EQ(told.size(), 2u);
-  EXPECT_EQ(told[0].presence().reason(), v1::LEAVE_REASON_REMOVED);
-  EXPECT_EQ(told[0].presence().by_participant_id(), 1u);
+  const auto announced = owner.read();
+  ASSERT_EQ(announced.size(), 2u);
+  EXPECT_EQ(announced[0].presence().reason(), v1::LEAVE_REASON_REMOVED);
+  EXPECT_EQ(announced[0].presence().by_participant_id(), 1u);
   EXPECT_FALSE(comeBack(other).admission.resumed);
   EXPECT_FALSE(comeBack(away).admission.resumed);
 }

@@ -169,7 +169,7 @@ TEST_F(SceneFramesTest, LateJoinerOfAPausedSceneGetsTheNewestTick) {
   const auto show = [&] {
     hosted.now += std::chrono::seconds(1);
     hosted.host.encodePausedFrame(hosted.now);
-    hosted.packer.drain();
+    hosted.publisher.drain();
   };
   hosted.mailboxes[0]->requestKeyFrame();  // can decode without one, so the request waits
   show();
@@ -206,7 +206,7 @@ TEST_F(SceneFramesTest, LateJoinerOfAPausedSceneGetsTheNewestTick) {
 TEST_F(SceneFramesTest, ScenePausedBeforeItsFirstTickShowsItsStart) {
   HostedScene hosted(smallScene());
   hosted.host.encodePausedFrame(hosted.now);
-  hosted.packer.drain();
+  hosted.publisher.drain();
   const auto message = hosted.mailboxes[0]->next(hosted.now);
   ASSERT_TRUE(message);
   v1::ServerMessage parsed;
@@ -270,7 +270,7 @@ TEST_F(SceneFramesTest, OneKeyFrameServesAllRequestsAndRespectsTheInterval) {
     hosted.host.begin(hosted.now + std::chrono::milliseconds(millisecondsLater));
     hosted.host.finish();
   }
-  hosted.packer.drain();
+  hosted.publisher.drain();
   EXPECT_EQ(hosted.live.metrics.keyFrames.value(), 2u);
   hosted.tick();
   EXPECT_EQ(hosted.live.metrics.keyFrames.value(), 3u);

@@ -81,11 +81,11 @@ TEST_F(SceneHostTest, ChangeActsAndIsAnnouncedAtTheNextTick) {
   unchanged.tick();
   EXPECT_EQ(changed.frames[4].state_hash(), unchanged.frames[4].state_hash());
   EXPECT_NE(changed.frames[5].state_hash(), unchanged.frames[5].state_hash());
-  ASSERT_EQ(changed.told.size(), 1u);
-  ASSERT_TRUE(changed.told[0].has_parameter_changed());
-  EXPECT_EQ(changed.told[0].parameter_changed().participant_id(), 42u);
-  EXPECT_EQ(changed.told[0].parameter_changed().tick(), 6u);
-  EXPECT_EQ(changed.told[0].parameter_changed().change().gravity().value().y(), -2);
+  ASSERT_EQ(changed.announced.size(), 1u);
+  ASSERT_TRUE(changed.announced[0].has_parameter_changed());
+  EXPECT_EQ(changed.announced[0].parameter_changed().participant_id(), 42u);
+  EXPECT_EQ(changed.announced[0].parameter_changed().tick(), 6u);
+  EXPECT_EQ(changed.announced[0].parameter_changed().change().gravity().value().y(), -2);
 }
 
 // Events of a grab at the middle of the lower edge: taken, slipped, released.
@@ -98,8 +98,9 @@ TEST_F(SceneHostTest, AnnouncesGrabEvents) {
     hosted.tick();
   };
   const auto newest = [&] {
-    v1::TickEvents events = hosted.told.empty() ? v1::TickEvents() : hosted.told.back().tick_events();
-    hosted.told.clear();
+    v1::TickEvents events =
+        hosted.announced.empty() ? v1::TickEvents() : hosted.announced.back().tick_events();
+    hosted.announced.clear();
     return events;
   };
   grabAt(Vec3(0.05f, -1.1f, 0));
@@ -139,10 +140,10 @@ TEST_F(SceneHostTest, AnnouncesContactsIfRequested) {
   HostedScene hosted(scene);
   const auto contacts = [&] {
     std::vector<v1::ContactEvent> events;
-    for (const v1::ServerMessage& message : hosted.told)
+    for (const v1::ServerMessage& message : hosted.announced)
       events.insert(events.end(), message.tick_events().contacts().begin(),
                     message.tick_events().contacts().end());
-    hosted.told.clear();
+    hosted.announced.clear();
     return events;
   };
   const auto touch = [&](bool wants) {
@@ -198,8 +199,8 @@ TEST_F(SceneHostTest, UnhealthyStateIsNotSentAndRollsBack) {
   hosted.tick();
   EXPECT_FALSE(hosted.host.status().healthy);
   EXPECT_EQ(hosted.frames.size(), 90u);
-  ASSERT_EQ(hosted.told.size(), 2u);  // the change, and the notice
-  EXPECT_EQ(hosted.told[1].notice().kind(), v1::NOTICE_KIND_ROLLED_BACK);
+  ASSERT_EQ(hosted.announced.size(), 2u);  // the change, and the notice
+  EXPECT_EQ(hosted.announced[1].notice().kind(), v1::NOTICE_KIND_ROLLED_BACK);
   EXPECT_EQ(hosted.live.metrics.rollbacks.value(), 1u);
 
   hosted.change(gravity(-9.81f));
@@ -225,11 +226,11 @@ TEST_F(SceneHostTest, SecondUnhealthyStateResetsStateAndParameters) {
   EXPECT_TRUE(hosted.host.status().healthy);
   EXPECT_EQ(hosted.frames.size(), 80u);
   EXPECT_EQ(hosted.live.definition().environment.wind, Vec3(0, 0, 0));
-  const v1::ServerMessage& reset = hosted.told.at(hosted.told.size() - 2);
+  const v1::ServerMessage& reset = hosted.announced.at(hosted.announced.size() - 2);
   ASSERT_TRUE(reset.has_parameter_changed());
   EXPECT_EQ(reset.parameter_changed().participant_id(), 0u);
   EXPECT_NEAR(reset.parameter_changed().change().gravity().value().y(), -9.81, 1e-6);
-  EXPECT_EQ(hosted.told.back().notice().kind(), v1::NOTICE_KIND_ROLLED_BACK);
+  EXPECT_EQ(hosted.announced.back().notice().kind(), v1::NOTICE_KIND_ROLLED_BACK);
 }
 
 TEST_F(SceneHostTest, ContinuesOnAnotherDeviceFromTheNewestSnapshot) {
@@ -237,11 +238,12 @@ TEST_F(SceneHostTest, ContinuesOnAnotherDeviceFromTheNewestSnapshot) {
   hosted.ticks(210);  // 40 ticks/s: saved with tick 201
   hosted.host.release();
   vulkan::Device another(vulkan::DeviceOptions{.validation = true});
-  hosted.host.rebuild(std::make_unique<SceneOnDevice>(another, hosted.live.start(), hosted.packer.workers()),
-                      "the device was lost");
+  hosted.host.rebuild(
+      std::make_unique<SceneOnDevice>(another, hosted.live.start(), hosted.publisher.workers()),
+      "the device was lost");
   hosted.tick();
-  ASSERT_EQ(hosted.told.size(), 1u);
-  EXPECT_EQ(hosted.told[0].notice().kind(), v1::NOTICE_KIND_DEVICE_REBUILT);
+  ASSERT_EQ(hosted.announced.size(), 1u);
+  EXPECT_EQ(hosted.announced[0].notice().kind(), v1::NOTICE_KIND_DEVICE_REBUILT);
   EXPECT_TRUE(hosted.keys.back());
   EXPECT_EQ(hosted.decoder->tick(), 211u);
 
@@ -266,7 +268,7 @@ TEST_F(SceneHostTest, ContinuesOnAnotherDeviceFromTheNewestSnapshot) {
   tests::submitAndWait(another, recorder);
   tick(211);
   EXPECT_EQ(simulation.status().stateHash, hosted.frames.back().state_hash());
-  hosted.packer.drain();
+  hosted.publisher.drain();
   hosted.host.release();  // before its device
 }
 
@@ -324,8 +326,8 @@ TEST_F(SceneHostTest, SolverChangeActsAtTheNextTickWithoutAJump) {
   }
   EXPECT_TRUE(hosted.host.status().healthy);
   EXPECT_LT(stretch(), 0.02);
-  ASSERT_FALSE(hosted.told.empty());
-  EXPECT_EQ(hosted.told.back().parameter_changed().participant_id(), 5u);
+  ASSERT_FALSE(hosted.announced.empty());
+  EXPECT_EQ(hosted.announced.back().parameter_changed().participant_id(), 5u);
 }
 
 TEST_F(SceneHostTest, StatesEqualThoseOfTheStepCommand) {

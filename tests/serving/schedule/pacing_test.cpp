@@ -50,14 +50,14 @@ TEST(Pacer, CatchesUpOneTickAndSlipsTheRest) {
 
 TEST(SlowWatch, ReportsASlowSceneAtMostEveryTenSeconds) {
   SlowWatch watch;
-  int told = 0;
+  int reports = 0;
   // For 20 s every tick of 10 ms takes 20 ms, which is half of real time.
   for (int tick = 0; tick < 1'000; ++tick)
     if (const auto speed = watch.note(kStart + milliseconds(20) * tick, tick == 0 ? 0 : 1)) {
       EXPECT_NEAR(*speed, 0.5, 0.01);  // the first interval starts with a tick without slip
-      ++told;
+      ++reports;
     }
-  EXPECT_EQ(told, 2);  // after 2 s, and more than 10 s later
+  EXPECT_EQ(reports, 2);  // after 2 s, and more than 10 s later
 }
 
 TEST(SlowWatch, IgnoresSmallSlowdowns) {

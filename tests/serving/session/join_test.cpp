@@ -286,10 +286,10 @@ TEST_F(JoinTest, ParameterChangeIsAnnouncedAndPartOfLaterDescriptions) {
   change.mutable_colliders(0)->mutable_position()->set_y(3);
   changer.change(change);
   for (TestPeer* peer : {&changer, &watcher}) {
-    const v1::ParameterChanged told = peer->readUntil(Body::kParameterChanged).parameter_changed();
-    EXPECT_EQ(told.participant_id(), changer.welcome().participant_id());
-    EXPECT_EQ(told.change().wind().value().x(), 4);
-    peer->readUntil([&](const Body&) { return peer->frames().back().tick >= told.tick(); });
+    const v1::ParameterChanged changed = peer->readUntil(Body::kParameterChanged).parameter_changed();
+    EXPECT_EQ(changed.participant_id(), changer.welcome().participant_id());
+    EXPECT_EQ(changed.change().wind().value().x(), 4);
+    peer->readUntil([&](const Body&) { return peer->frames().back().tick >= changed.tick(); });
     EXPECT_EQ(colliderOf(peer->frames().back(), 0)->position().y(), 3);
   }
   TestPeer late(server());
@@ -306,15 +306,15 @@ TEST_F(JoinTest, MaterialChangeIsAnnouncedWithTheDerivedParameters) {
   v1::ParameterChange change;
   change.add_cloths()->set_material("wool");
   changer.change(change);
-  const v1::ParameterChanged told = changer.readUntil(Body::kParameterChanged).parameter_changed();
-  const v1::ClothChange& cloth = told.change().cloths(0);
+  const v1::ParameterChanged changed = changer.readUntil(Body::kParameterChanged).parameter_changed();
+  const v1::ClothChange& cloth = changed.change().cloths(0);
   const model::Material& wool = *model::findMaterial("wool");
   EXPECT_EQ(cloth.material(), "wool");
   EXPECT_EQ(cloth.structural().stiffness(), wool.tension);
   EXPECT_EQ(cloth.friction(), wool.friction);
   EXPECT_FLOAT_EQ(cloth.areal_mass(), wool.arealMass);
   EXPECT_TRUE(cloth.solver().has_xpbd());
-  changer.readUntil([&](const Body&) { return changer.frames().back().tick >= told.tick(); });
+  changer.readUntil([&](const Body&) { return changer.frames().back().tick >= changed.tick(); });
 }
 
 TEST_F(JoinTest, UnhealthyStateIsAnnouncedAndTheStreamContinues) {

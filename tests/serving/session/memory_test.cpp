@@ -19,7 +19,7 @@ using namespace delivery;
 using namespace hosting;
 
 using tests::allocatedBytes;
-using tests::kMostBytesAClient;
+using tests::kMaxBytesAClient;
 using tests::TestPeer;
 
 // 10,000 falling nodes with soft springs, so that few substeps suffice.
@@ -100,7 +100,7 @@ TEST_P(ClientThatDoesNotRead, CostsAtMostThePromisedMemory) {
   }
   const double each = (allocatedBytes() - before) / kClients;
   std::printf("a client that does not read: %.0f KiB\n", each / 1024);
-  EXPECT_LT(each, kMostBytesAClient);
+  EXPECT_LT(each, kMaxBytesAClient);
 }
 
 // A mailbox filled to all of its limits takes no more than their sum.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "server/endpoint/web/stream_session.h"
+#include "server/endpoint/web/web_socket_stream.h"
 
 #include <algorithm>
 #include <chrono>
@@ -60,8 +60,8 @@ ws::close_reason reasonOf(const delivery::SharedBytes& last) {
 
 }  // namespace
 
-StreamSession::StreamSession(beast::tcp_stream&& socket, WebEndpointContext& endpoint,
-                             std::unique_ptr<ConnectionSlot> slot)
+WebSocketStream::WebSocketStream(beast::tcp_stream&& socket, WebEndpointContext& endpoint,
+                                 std::unique_ptr<ConnectionSlot> slot)
     : endpoint_(endpoint), slot_(std::move(slot)), socket_(std::move(socket)), closingTimer_(endpoint.io) {
   socket_.binary(true);
   socket_.auto_fragment(false);
@@ -69,7 +69,7 @@ StreamSession::StreamSession(beast::tcp_stream&& socket, WebEndpointContext& end
   socket_.set_option(ws::stream_base::timeout{kHandshakeTimeout, kIdleTimeout, true});
 }
 
-void StreamSession::accept(http::request<http::empty_body>&& request) {
+void WebSocketStream::accept(http::request<http::empty_body>&& request) {
   request_ = std::move(request);
   const bool speaksOurs =
       http::token_list(request_[http::field::sec_websocket_protocol]).exists(kSubprotocol);
@@ -82,7 +82,7 @@ void StreamSession::accept(http::request<http::empty_body>&& request) {
   });
 }
 
-void StreamSession::open() {
+void WebSocketStream::open() {
   if (endpoint_.stopping) return;
   endpoint_.streams.insert(shared_from_this());
   // A wake may come from any thread, so it must not own the stream. Dropping the last owner inside a wake
@@ -95,34 +95,34 @@ void StreamSession::open() {
       if (const auto self = weak.lock()) self->pump();
     });
   };
-  connection_ = session::Session::open(endpoint_.server, peerOf(socket_.next_layer()), std::move(wake));
+  session_ = session::Session::open(endpoint_.server, peerOf(socket_.next_layer()), std::move(wake));
   read();
   pump();
 }
 
-void StreamSession::read() {
+void WebSocketStream::read() {
   socket_.async_read(
       incoming_, [self = shared_from_this()](beast::error_code error, std::size_t) { self->onRead(error); });
 }
 
-void StreamSession::onRead(beast::error_code error) {
+void WebSocketStream::onRead(beast::error_code error) {
   // Only a close frame is a goodbye. All other errors mean a lost connection.
-  if (error == ws::error::closed && connection_) connection_->leave();
+  if (error == ws::error::closed && session_) session_->leave();
   if (error) return end();
-  if (closing_ || !connection_) return;
+  if (closing_ || !session_) return;
   if (socket_.got_text())
     return close({ws::close_code::unknown_data, "messages must be binary, one ClientMessage each"});
-  connection_->receive({static_cast<const std::byte*>(incoming_.cdata().data()), incoming_.size()});
+  session_->receive({static_cast<const std::byte*>(incoming_.cdata().data()), incoming_.size()});
   incoming_.consume(incoming_.size());
   read();
 }
 
-void StreamSession::pump() {
-  if (closing_ || !connection_) return;
-  const bool finished = connection_->finished();  // checked before next(), so that no message is lost
+void WebSocketStream::pump() {
+  if (closing_ || !session_) return;
+  const bool finished = session_->finished();  // checked before next(), so that no message is lost
   if (writing_) {
     if (finished) endSoon();
-  } else if (std::optional<delivery::SharedBytes> message = connection_->next()) {
+  } else if (std::optional<delivery::SharedBytes> message = session_->next()) {
     outgoing_ = std::move(*message);
     writing_ = true;
     socket_.async_write(
@@ -133,7 +133,7 @@ void StreamSession::pump() {
   }
 }
 
-void StreamSession::onWritten(beast::error_code error) {
+void WebSocketStream::onWritten(beast::error_code error) {
   writing_ = false;
   // A close frame or a timeout aborted the write. The read that is under way reports which.
   if (error == boost::asio::error::operation_aborted) return;
@@ -141,14 +141,14 @@ void StreamSession::onWritten(beast::error_code error) {
   pump();
 }
 
-void StreamSession::close(const ws::close_reason& reason) {
+void WebSocketStream::close(const ws::close_reason& reason) {
   if (std::exchange(closing_, true)) return;
   leave();
   endSoon();
   socket_.async_close(reason, [self = shared_from_this()](beast::error_code) { self->end(); });
 }
 
-void StreamSession::endSoon() {
+void WebSocketStream::endSoon() {
   if (std::exchange(ending_, true)) return;
   closingTimer_.expires_after(kClosingTimeout);
   closingTimer_.async_wait([self = shared_from_this()](beast::error_code error) {
@@ -156,7 +156,7 @@ void StreamSession::endSoon() {
   });
 }
 
-void StreamSession::end() {
+void WebSocketStream::end() {
   closing_ = true;
   leave();
   closingTimer_.cancel();

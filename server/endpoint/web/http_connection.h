@@ -22,9 +22,9 @@ namespace clothstream::endpoint {
 inline constexpr std::size_t kMaxHeaderBytes = 16 * 1024;
 
 // Lives while an operation of its socket is pending. Belongs to the io thread.
-class HttpSession : public std::enable_shared_from_this<HttpSession> {
+class HttpConnection : public std::enable_shared_from_this<HttpConnection> {
  public:
-  HttpSession(boost::asio::ip::tcp::socket&& socket, WebEndpointContext& endpoint);
+  HttpConnection(boost::asio::ip::tcp::socket&& socket, WebEndpointContext& endpoint);
 
   void read();
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "server/endpoint/web/http_session.h"
+#include "server/endpoint/web/http_connection.h"
 
 #include <algorithm>
 #include <chrono>
@@ -9,7 +9,7 @@
 #include <boost/beast/http/write.hpp>
 #include <boost/beast/websocket/rfc6455.hpp>
 
-#include "server/endpoint/web/stream_session.h"
+#include "server/endpoint/web/web_socket_stream.h"
 
 namespace clothstream::endpoint {
 namespace {
@@ -55,13 +55,13 @@ bool originAllowed(const Request& request, const std::vector<std::string>& allow
 
 }  // namespace
 
-HttpSession::HttpSession(boost::asio::ip::tcp::socket&& socket, WebEndpointContext& endpoint)
+HttpConnection::HttpConnection(boost::asio::ip::tcp::socket&& socket, WebEndpointContext& endpoint)
     : endpoint_(endpoint),
       slot_(std::make_unique<ConnectionSlot>(endpoint)),
       beyondLimit_(endpoint.connections > endpoint.maxConnections),
       socket_(std::move(socket)) {}
 
-void HttpSession::read() {
+void HttpConnection::read() {
   parser_.emplace();
   parser_->header_limit(kMaxHeaderBytes);
   socket_.expires_after(kRequestTimeout);
@@ -70,7 +70,7 @@ void HttpSession::read() {
       [self = shared_from_this()](beast::error_code error, std::size_t) { self->onHeader(error); });
 }
 
-void HttpSession::onHeader(beast::error_code error) {
+void HttpConnection::onHeader(beast::error_code error) {
   const auto refuse = [this](http::status status, std::string_view text) {
     Response response = plainAnswer(parser_->get(), status, text);
     response.keep_alive(false);
@@ -92,7 +92,7 @@ void HttpSession::onHeader(beast::error_code error) {
   write(answer(parser_->get()));
 }
 
-void HttpSession::answerStream(const Request& request) {
+void HttpConnection::answerStream(const Request& request) {
   if (!beast::websocket::is_upgrade(request)) {
     Response response =
         plainAnswer(request, http::status::upgrade_required, "/stream accepts only WebSocket connections.\n");
@@ -105,11 +105,11 @@ void HttpSession::answerStream(const Request& request) {
         "Pages of this origin may not open /stream. The server option --allow-origin allows them.\n"));
   }
   socket_.expires_never();  // the WebSocket sets its own timeouts
-  std::make_shared<StreamSession>(std::move(socket_), endpoint_, std::move(slot_))
+  std::make_shared<WebSocketStream>(std::move(socket_), endpoint_, std::move(slot_))
       ->accept(parser_->release());
 }
 
-HttpSession::Response HttpSession::answer(const Request& request) const {
+HttpConnection::Response HttpConnection::answer(const Request& request) const {
   if (request.method() != http::verb::get && request.method() != http::verb::head) {
     Response response =
         plainAnswer(request, http::status::method_not_allowed, "Only GET and HEAD are allowed.\n");
@@ -124,7 +124,7 @@ HttpSession::Response HttpSession::answer(const Request& request) const {
       endpoint_.page.empty() ? "This server has no page; /stream is open.\n" : "There is no such file.\n");
 }
 
-HttpSession::Response HttpSession::answerFile(const Request& request, const PageFile& file) const {
+HttpConnection::Response HttpConnection::answerFile(const Request& request, const PageFile& file) const {
   const bool known = view(request[http::field::if_none_match]).find(file.entityTag) != std::string_view::npos;
   Response response{known ? http::status::not_modified : http::status::ok, request.version()};
   // File names do not change between builds. So a browser may cache a file but must revalidate it.
@@ -138,7 +138,7 @@ HttpSession::Response HttpSession::answerFile(const Request& request, const Page
   return response;
 }
 
-void HttpSession::write(Response&& response) {
+void HttpConnection::write(Response&& response) {
   response_ = std::move(response);
   response_.set(http::field::server, "clothstream");
   if (response_.result() != http::status::not_modified) response_.content_length(response_.body().size());
@@ -149,7 +149,7 @@ void HttpSession::write(Response&& response) {
   });
 }
 
-void HttpSession::onWritten(beast::error_code error) {
+void HttpConnection::onWritten(beast::error_code error) {
   if (error) return;
   if (response_.keep_alive()) return read();
   socket_.socket().shutdown(boost::asio::ip::tcp::socket::shutdown_send, error);
@@ -159,7 +159,7 @@ void HttpSession::onWritten(beast::error_code error) {
 
 // Reads the rest of the request: closing a socket with unread bytes resets the connection, and the reset may
 // overtake the response.
-void HttpSession::drain() {
+void HttpConnection::drain() {
   buffer_.clear();
   socket_.async_read_some(buffer_.prepare(kMaxHeaderBytes),
                           [self = shared_from_this()](beast::error_code error, std::size_t) {

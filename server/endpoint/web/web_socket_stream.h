@@ -21,10 +21,10 @@ namespace clothstream::endpoint {
 
 // Belongs to the io thread. Lives while the endpoint's `streams` contains it or an operation of its socket is
 // pending.
-class StreamSession : public std::enable_shared_from_this<StreamSession> {
+class WebSocketStream : public std::enable_shared_from_this<WebSocketStream> {
  public:
-  StreamSession(boost::beast::tcp_stream&& socket, WebEndpointContext& endpoint,
-                std::unique_ptr<ConnectionSlot> slot);
+  WebSocketStream(boost::beast::tcp_stream&& socket, WebEndpointContext& endpoint,
+                  std::unique_ptr<ConnectionSlot> slot);
 
   void accept(boost::beast::http::request<boost::beast::http::empty_body>&& request);
 
@@ -32,7 +32,7 @@ class StreamSession : public std::enable_shared_from_this<StreamSession> {
   void close(const boost::beast::websocket::close_reason& reason);
 
   // Releases the session. Its `wake` is not called after this returns.
-  void leave() { connection_.reset(); }
+  void leave() { session_.reset(); }
 
  private:
   void open();
@@ -51,7 +51,7 @@ class StreamSession : public std::enable_shared_from_this<StreamSession> {
   boost::beast::websocket::stream<boost::beast::tcp_stream, false> socket_;
   boost::beast::http::request<boost::beast::http::empty_body> request_;
   boost::beast::flat_buffer incoming_;
-  std::shared_ptr<session::Session> connection_;
+  std::shared_ptr<session::Session> session_;
   delivery::SharedBytes outgoing_;
   boost::asio::steady_timer closingTimer_;
   bool ending_ = false;  // closingTimer_ runs
