@@ -22,6 +22,8 @@ function(clothstream_add_kernels target)
       DEPENDS ${spirv} ${PROJECT_SOURCE_DIR}/cmake/embed_spirv.cmake VERBATIM)
     list(APPEND headers ${header})
   endforeach()
+  # As sources of `target` alone, kernels would wait until the libraries that it links are built.
+  add_custom_target(${target}_kernels DEPENDS ${headers})
   target_sources(${target} PRIVATE ${headers})
   target_include_directories(${target} PRIVATE ${out})
 endfunction()
