@@ -22,9 +22,9 @@ SceneLoader::~SceneLoader() {
 SceneLoader::Future SceneLoader::load(vulkan::Device& device, const model::Scene& scene) {
   std::packaged_task<std::unique_ptr<SceneOnDevice>()> task([this, &device, scene, stop = stop_.get_token()] {
     if (stop.stop_requested()) throw std::runtime_error("loading was stopped");
-    const Clock::time_point before = Clock::now();
+    const schedule::Clock::time_point before = schedule::Clock::now();
     auto loaded = std::make_unique<SceneOnDevice>(device, scene, workers_, stop);
-    spdlog::debug("{}: loaded in {:.2f} s", scene.name, schedule::seconds(Clock::now() - before));
+    spdlog::debug("{}: loaded in {:.2f} s", scene.name, schedule::seconds(schedule::Clock::now() - before));
     return loaded;
   });
   Future loaded = task.get_future();
