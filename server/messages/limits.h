@@ -26,6 +26,7 @@ inline constexpr std::size_t kMaxHullParts = 128;
 inline constexpr std::uint32_t kMinGridNodes = 2;  // per row or column
 inline constexpr std::uint32_t kMaxGridNodes = 8192;
 inline constexpr std::uint64_t kMaxNodes = 16'777'216;  // per scene
+inline constexpr std::uint32_t kMaxNodeSprings = 1024;  // of one node of a mesh
 inline constexpr std::size_t kMaxNameLength = 64;
 inline constexpr std::size_t kMaxTextBytes = 1024;
 inline constexpr std::size_t kMaxLabelBytes = 64;
