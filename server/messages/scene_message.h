@@ -13,6 +13,7 @@
 #include "server/messages/validation.h"
 #include "server/model/material.h"
 #include "server/model/scene.h"
+#include "server/model/stability.h"
 
 namespace clothstream::messages {
 
@@ -47,7 +48,8 @@ std::optional<std::string> unfitSolver(const model::Scene& scene, const model::C
 // Error text if the dihedral bending of the scene's cloths cannot be used; nullopt if it can.
 std::optional<std::string> unfitBending(const model::Scene& scene);
 
-// Error text if the integrator is not stable with the scene's substeps; nullopt if it is.
-std::optional<std::string> instability(const model::Scene& scene);
+// Error text if the integrator is not stable with the scene's substeps; nullopt if it is. `bound` is of this
+// scene before any change of its parameters.
+std::optional<std::string> instability(const model::Scene& scene, const model::StabilityBound& bound);
 
 }  // namespace clothstream::messages

@@ -54,6 +54,7 @@ LiveScene::LiveScene(model::Scene definition, bool wasCreated, std::shared_ptr<J
       subscribers(tapOf(journal)),
       roster(subscribers, inbox, journal.get()),
       start_(std::move(definition)),
+      stability_(start_),
       cloths_(std::make_shared<const std::string>(messages::clothsOfDescription(start_).SerializeAsString())),
       definition_(start_) {}
 
@@ -63,6 +64,7 @@ LiveScene::LiveScene(std::string name, std::shared_ptr<FrameSource> from, std::u
       source(std::move(from)),
       roster(subscribers, inbox, nullptr),
       start_(nameAndRates(std::move(name), source->description())),
+      stability_(start_),
       cloths_(clothsOf(source->description())),
       definition_(start_) {}
 
@@ -81,7 +83,8 @@ messages::Result<void> LiveScene::change(std::uint64_t participant, const v1::Pa
         v1::ERROR_CODE_INVALID_ARGUMENT,
         "parameterChange: '" + name() + "' is a recording that is played; its parameters cannot be changed"});
   const std::lock_guard lock(mutex_);
-  messages::Result<model::ParameterChange> change = messages::toParameterChange(message, definition_);
+  messages::Result<model::ParameterChange> change =
+      messages::toParameterChange(message, definition_, stability_);
   if (!change) return tl::unexpected(std::move(change).error());
   model::Scene changed = definition_;
   model::applyChange(changed, *change);

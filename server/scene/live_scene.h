@@ -11,6 +11,7 @@
 #include "server/delivery/subscribers.h"
 #include "server/messages/field_error.h"
 #include "server/model/scene.h"
+#include "server/model/stability.h"
 #include "server/scene/frame_source.h"
 #include "server/scene/inbox.h"
 #include "server/scene/journal.h"
@@ -81,6 +82,7 @@ class LiveScene {
 
  private:
   const model::Scene start_;
+  const model::StabilityBound stability_;            // of start_
   const std::shared_ptr<const std::string> cloths_;  // part of all descriptions
 
   mutable std::mutex mutex_;
