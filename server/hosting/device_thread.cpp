@@ -135,6 +135,7 @@ void DeviceThread::run(const std::vector<std::shared_ptr<scene::LiveScene>>& sce
       startAndStopScenes();
       encodePausedFrames();
       runDueTicks();
+      runSlice();
     } catch (const std::exception& failure) {
       rebuildDevice(failure.what());
     }
@@ -191,6 +192,7 @@ void DeviceThread::dismiss(Run& run, const std::string& why) {
   const std::string text = fmt::format("the device cannot run the scene '{}': {}", run.scene->name(), why);
   spdlog::error("{}", text);
   run.host.reset();
+  run.begun = false;
   run.failed.reset();
   scene::LiveScene& scene = *run.scene;
   scene.roster.dismiss(delivery::error(v1::ERROR_CODE_RESOURCE_EXHAUSTED, text, true));
@@ -200,6 +202,7 @@ void DeviceThread::dismiss(Run& run, const std::string& why) {
 
 void DeviceThread::startAndStopScenes() {
   for (const auto& run : runs_) {
+    if (run->begun) continue;
     const scene::LiveScene& scene = *run->scene;
     const bool inUse = scene.subscribers.size() > 0;
     const bool ready = run->host && run->host->isReady();
@@ -234,20 +237,41 @@ void DeviceThread::runDueTicks() {
     if (std::exchange(loseDevice_, false)) throw vulkan::DeviceLost("the loss of the device is simulated");
   }
   schedules_.clear();
-  for (const auto& run : runs_) schedules_.push_back(run.get());
+  for (const auto& run : runs_)
+    if (!run->begun) schedules_.push_back(run.get());
   Clock::time_point before = Clock::now();
   schedule::scheduleTicks(schedules_, before, chosen_);
   for (schedule::TickSchedule* due : chosen_) {
     Run& run = static_cast<Run&>(*due);
+    run.used = {};
     run.begun = survives(run, [&] { begin(run, Clock::now()); });
   }
   for (schedule::TickSchedule* due : chosen_) {
     Run& run = static_cast<Run&>(*due);
-    if (!run.begun || !survives(run, [&] { run.host->finish(); })) continue;
-    const Clock::time_point after = Clock::now();
-    run.tickEnded(after - before, after);
-    before = after;
+    if (!run.begun || !survives(run, [&] { run.host->waitForSlice(); })) continue;
+    endSlice(run, std::exchange(before, Clock::now()));
   }
+}
+
+void DeviceThread::runSlice() {
+  // The scene that has used the least time for its tick.
+  Run* next = nullptr;
+  for (const auto& run : runs_)
+    if (run->begun && (next == nullptr || run->used < next->used)) next = run.get();
+  if (next == nullptr) return;
+  const Clock::time_point before = Clock::now();
+  const bool survived = survives(*next, [&] {
+    next->host->submitSlice();
+    next->host->waitForSlice();
+  });
+  if (survived) endSlice(*next, before);
+}
+
+void DeviceThread::endSlice(Run& run, Clock::time_point before) {
+  run.used += Clock::now() - before;
+  if (run.host->hasSlices() || !survives(run, [&] { run.host->finish(); })) return;
+  run.begun = false;
+  run.tickEnded(run.used, Clock::now());
 }
 
 bool DeviceThread::survives(Run& run, const std::function<void()>& partOfTick) {
@@ -270,6 +294,7 @@ void DeviceThread::rebuildScene(Run& run, const std::string& reason) {
   if (run.failed && ticks - *run.failed < run.scene->start().simulationRate) return dismiss(run, reason);
   run.failed = ticks;
   run.rebuildFailed = false;
+  run.begun = false;
   run.host->release();
   wake();
 }
@@ -295,7 +320,10 @@ void DeviceThread::rebuildDevice(const std::string& reason) {
   // Frames of the old device are published first, because they use its memory.
   publisher_.drain();
   loader_.abandon();
-  for (const auto& run : runs_) run->loading = {};
+  for (const auto& run : runs_) {
+    run->loading = {};
+    run->begun = false;
+  }
   do {
     runTasks();
     std::unique_lock lock(mutex_);

@@ -29,9 +29,10 @@ using schedule::Clock;
 
 // Thread-safe.
 //
-// Ticks that are due together are all submitted before the first is waited for. A scene is loaded onto the
-// device when it is first joined, on another thread while other scenes run. A scene without subscribers
-// sleeps.
+// Ticks that are due together are all submitted before the first is waited for. Between the slices of a long
+// tick, those that became due run, scenes are added and removed, and the thread can end. A scene is loaded
+// onto the device when it is first joined, on another thread while other scenes run. A scene without
+// subscribers sleeps.
 //
 // Device loss: a new device is created, and every scene continues from its newest snapshot on the CPU. This
 // is tried once a second until it succeeds. If a tick fails in another way, only its scene is rebuilt like
@@ -78,6 +79,7 @@ class DeviceThread {
 
     // Time at which the scene next needs the thread.
     Clock::time_point due() const {
+      if (begun) return {};  // now
       if (running) return pacer.due();
       return paused ? nextPausedFrame : Clock::time_point::max();
     }
@@ -87,7 +89,8 @@ class DeviceThread {
     std::unique_ptr<scene::SceneHost> host;       // once it is loaded
     std::optional<std::promise<void>> whenAdded;  // set by add(), until the scene is ready
     bool refused = false;                         // added, but cannot run
-    bool begun = false;                           // the current tick has begun
+    bool begun = false;                           // the current tick has begun, and is not finished
+    Clock::duration used{};                       // time of the current tick on the device
     bool paused = false;                          // while it has subscribers
     Clock::time_point nextPausedFrame{};          // next check for subscribers that need a key frame
     std::optional<std::uint64_t> failed;          // tick count at the newest failure
@@ -111,6 +114,10 @@ class DeviceThread {
   // Encodes frames of paused scenes for subscribers that need a key frame.
   void encodePausedFrames();
   void runDueTicks();
+  // Runs one slice of a tick that has begun and takes longer than a slice.
+  void runSlice();
+  // Accounts for the time since `before`, and finishes the tick if it has no more slices.
+  void endSlice(Run& run, Clock::time_point before);
   // Runs a part of a tick. Returns false if it failed; the scene is then rebuilt. Throws vulkan::DeviceLost.
   bool survives(Run& run, const std::function<void()>& partOfTick);
   void rebuildScene(Run& run, const std::string& reason);

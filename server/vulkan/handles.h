@@ -3,6 +3,8 @@
 // bindings compile slowly.
 #pragma once
 
+#include <vector>
+
 #include <vulkan/vulkan_raii.hpp>
 
 #include "server/vulkan/buffer.h"
@@ -45,7 +47,10 @@ struct Bindings::Handles {
 
 struct Recorder::Handles {
   vk::raii::CommandPool pool = nullptr;
-  vk::raii::CommandBuffer commands = nullptr;
+  std::vector<vk::raii::CommandBuffer> slices;
+  std::uint32_t used = 0;                    // slices of the present recording
+  std::vector<vk::CommandBuffer> submitted;  // newest submission, to reuse its memory
+  vk::raii::CommandBuffer& current() { return slices[used - 1]; }
   // Mark i begins stage marks_[i]; one more mark ends the last stage.
   vk::raii::QueryPool timestamps = nullptr;
 };
