@@ -27,9 +27,9 @@ inline constexpr Setting kTolerance{.range = {0, 1}, .initial = 0.001f};
 inline constexpr Setting kCompliance{.unit = "m/N", .range = {0, 1}};
 inline constexpr Setting kActivation{.range = {0, 10}, .initial = 0.1f};  // fraction of a length
 
-// Environment. `initial` of the gravity is its Y component; the others are 0.
+// Environment. `initial` of the gravity is that of its Y component, which points up. The X and Z components
+// are 0 by default.
 inline constexpr Setting kGravity{.unit = "m/s^2", .range = {-1000, 1000}, .initial = -9.81f};
-
 inline constexpr Setting kWind{.unit = "m/s", .range = {-100, 100}};
 inline constexpr Setting kAirDensity{.unit = "kg/m^3", .range = {0, 100}, .initial = 1.2f};
 inline constexpr Setting kGustStrength{.unit = "m/s", .range = {0, 100}};
