@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Adds the options of `clothstream set`. The table of parameters gives those of a cloth's numbers.
+// Adds the options of `clothstream set`. The table of parameters gives those of a cloth's numbers, and the
+// ranges of the others.
 #include "clients/cli/set_options.h"
 
 #include <map>
@@ -8,15 +9,25 @@
 #include <fmt/format.h>
 
 #include "proto/parameters/cloth_parameters.h"
+#include "proto/parameters/settings.h"
 
 namespace clothstream::cli {
 namespace {
 
+// Range with its unit, such as "0 to 10 m".
+template <typename Parameter>
+std::string rangeOf(const Parameter& parameter) {
+  return fmt::format("{:g} to {:g}{}{}", parameter.range.min, parameter.range.max,
+                     parameter.unit.empty() ? "" : " ", parameter.unit);
+}
+
+std::string rangeOf(const parameters::Count& count) {
+  return fmt::format("{} to {}", count.min, count.max);
+}
+
 void addNumber(CLI::App& app, const parameters::ClothParameter& parameter, cs_cloth_settings& settings) {
-  const std::string unit = parameter.unit.empty() ? "" : fmt::format(" {}", parameter.unit);
-  app.add_option(
-         fmt::format("--{}", parameter.option), settingOf(settings, parameter.number),
-         fmt::format("{}, {:g} to {:g}{}", parameter.help, parameter.range.min, parameter.range.max, unit))
+  app.add_option(fmt::format("--{}", parameter.option), settingOf(settings, parameter.number),
+                 fmt::format("{}, {}", parameter.help, rangeOf(parameter)))
       ->group(std::string(parameter.optionGroup));
 }
 
@@ -40,14 +51,19 @@ void addSetOptions(CLI::App& app, SetOptions& options) {
       ->transform(CLI::CheckedTransformer(solvers, CLI::ignore_case))
       ->group(solver);
   app.add_option("--iterations", settings.iterations,
-                 "Maximum iterations per substep, 1 to 10000; xpbd: 1 to 1000")
+                 fmt::format("Maximum iterations per substep, {}; xpbd: {}", rangeOf(parameters::kIterations),
+                             rangeOf(parameters::kXpbdIterations)))
       ->check(CLI::PositiveNumber)
       ->group(solver);
-  app.add_option("--tolerance", settings.tolerance, "Maximum residual relative to its start, 0 to 1")
+  app.add_option("--tolerance", settings.tolerance,
+                 fmt::format("Maximum residual relative to its start, {}", rangeOf(parameters::kTolerance)))
       ->group(solver);
-  app.add_option("--compliance", settings.compliance, "Compliance of constraints, 0 to 1 m/N")->group(solver);
+  app.add_option("--compliance", settings.compliance,
+                 fmt::format("Compliance of constraints, {}", rangeOf(parameters::kCompliance)))
+      ->group(solver);
   app.add_option("--activation", settings.activation,
-                 "For acad: stretch at which a spring becomes a constraint, 0 to 10")
+                 fmt::format("For acad: stretch at which a spring becomes a constraint, {}",
+                             rangeOf(parameters::kActivation)))
       ->group(solver);
   app.add_option("--bend-constraints", settings.bend_constraints,
                  "1: bend springs are constraints too; 0: they are not")
@@ -64,22 +80,25 @@ void addSetOptions(CLI::App& app, SetOptions& options) {
       ->group("Material");
 
   const char* environment = "Environment";
-  app.add_option("--gravity", options.gravity, "X,Y,Z, each -1000 to 1000 m/s^2")
+  app.add_option("--gravity", options.gravity, fmt::format("X,Y,Z, each {}", rangeOf(parameters::kGravity)))
       ->delimiter(',')
       ->expected(3)
       ->group(environment);
-  app.add_option("--wind", options.wind, "X,Y,Z, each -100 to 100 m/s")
+  app.add_option("--wind", options.wind, fmt::format("X,Y,Z, each {}", rangeOf(parameters::kWind)))
       ->delimiter(',')
       ->expected(3)
       ->group(environment);
   app.add_option(
          "--gust", options.gust,
-         "STRENGTH[,SECONDS]: maximum deviation of the wind, 0 to 100 m/s, and its duration, 0.01 to 3600 s; "
-         "default 2 s")
+         fmt::format(
+             "STRENGTH[,SECONDS]: maximum deviation of the wind, {}, and its duration, {}; default {:g} s",
+             rangeOf(parameters::kGustStrength), rangeOf(parameters::kGustSeconds),
+             parameters::kGustSeconds.initial))
       ->delimiter(',')
       ->expected(1, 2)
       ->group(environment);
-  app.add_option("--air-density", options.airDensity, "Density of the air, 0 to 100 kg/m^3")
+  app.add_option("--air-density", options.airDensity,
+                 fmt::format("Density of the air, {}", rangeOf(parameters::kAirDensity)))
       ->group(environment);
 }
 

@@ -10,8 +10,6 @@
 
 namespace clothstream::client {
 
-namespace {}  // namespace
-
 Client::Client(Hello hello) : hello_(std::move(hello)) {
   sendHello();
 }
@@ -19,14 +17,12 @@ Client::Client(Hello hello) : hello_(std::move(hello)) {
 void Client::sendHello() {
   std::string hello;
   writeHello(hello, ++lastRequestId_, hello_);
-  // The outbox is empty, so there is room.
-  static_cast<void>(outbox_.addControl(std::move(hello)));
+  outbox_.setHello(std::move(hello));
 }
 
 void Client::want(const OperatingPoint& atMost) {
   hello_.wanted = atMost;
-  outbox_.clear();
-  sendHello();
+  if (outbox_.helloWaits()) sendHello();
 }
 
 void Client::connecting(std::uint64_t nowUs) {

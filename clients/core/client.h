@@ -36,7 +36,7 @@ class Client {
   std::uint64_t connectAtUs() const;
   const std::string* nextOutgoing();
 
-  // Call before the first message is sent.
+  // Has no effect on the current connection if its Hello is sent already.
   void want(const OperatingPoint& atMost);
 
   void setClock(std::uint64_t (*nowUs)()) { nowUs_ = nowUs; }

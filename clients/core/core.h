@@ -96,9 +96,9 @@ cs_client* cs_create_as(const char* scene, const char* client_name, const char* 
                         uint32_t role) CS_NOEXCEPT;
 /* Frees the client and all pointers it returned. NULL is allowed. */
 void cs_destroy(cs_client* client) CS_NOEXCEPT;
-/* Limits what the server sends. Call before the first cs_next_outgoing.
- * quality: best quality level, 0 to 3; 0 is the finest and the default.
- * temporal_layers: 1 to 3; 0 means all and is the default. */
+/* Limits what the server sends. Call before the first cs_next_outgoing. A later call does not affect the
+ * current connection; it takes effect at the next one. quality: best quality level, 0 to 3; 0 is the finest
+ * and the default. temporal_layers: 1 to 3; 0 means all and is the default. */
 void cs_want(cs_client* client, uint32_t quality, uint32_t temporal_layers) CS_NOEXCEPT;
 /* Sets a monotonic clock in microseconds for measuring decode_ms. NULL disables the measurement. The
  * WebAssembly module does not export this function. */
@@ -405,7 +405,8 @@ typedef enum cs_solver {
 
 /* Cloth parameters that can change while the scene runs. In a change, these values keep a parameter: NaN for
  * a float, 0 for solver and iterations, -1 for bend_constraints and assembled. cs_get_cloth_settings uses the
- * same values for parameters that are not known or that the cloth does not have. */
+ * same values for parameters that are not known, or that the cloth or its solver does not have. A compliance
+ * that was set cannot be set back to the server's default with cs_change_cloth. */
 #define CS_CLOTH_SETTINGS_VERSION 1u
 typedef struct cs_cloth_settings {
   uint32_t version;                       /* CS_CLOTH_SETTINGS_VERSION */

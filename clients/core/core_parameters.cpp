@@ -7,6 +7,7 @@
 
 #include "clients/core/core.h"
 #include "clients/core/core_handle.h"
+#include "proto/parameters/apply_change.h"
 
 using namespace clothstream::client;
 using clothstream::parameters::ClothNumber;
@@ -55,7 +56,7 @@ ClothNumbers changed(const cs_cloth_settings& settings, const ClothNumbers& now)
 Solver defaultSolver(std::uint32_t kind) {
   Solver solver;
   solver.kind = kind;
-  if (kind == CS_SOLVER_XPBD) solver.iterations = 1;
+  if (kind == CS_SOLVER_XPBD) solver.iterations = clothstream::parameters::kXpbdIterations.initial;
   return solver;
 }
 
@@ -129,7 +130,7 @@ int cs_get_cloth_settings(const cs_client* client, uint32_t index, cs_cloth_sett
   if (!constrained) return 1;
   out->bend_constraints = parameters.solver.bendConstraints ? 1 : 0;
   if (out->solver == CS_SOLVER_CONSTRAINT) out->assembled = parameters.solver.path == kAssembled ? 1 : 0;
-  out->activation = parameters.solver.activation;
+  if (out->solver == CS_SOLVER_ACAD) out->activation = parameters.solver.activation;
   return 1;
 }
 
@@ -193,7 +194,8 @@ int cs_change_cloth(cs_client* client, const char* cloth, const cs_cloth_setting
   ParameterChange change;
   const std::string_view name = cloth;
   for (const Cloth& present : client->client.description().cloths)
-    if (name.empty() || name == present.name) change.cloths.push_back(changeOf(present, *settings));
+    if (clothstream::parameters::isFor(name, present.name))
+      change.cloths.push_back(changeOf(present, *settings));
   if (change.cloths.empty()) return 0;
   client->client.change(change);
   return 1;

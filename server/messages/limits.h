@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Limits of values from outside. proto/parameters/cloth_parameters.h has the limits of a cloth's numbers.
+// Limits of values from outside. proto/parameters has the limits of parameters that can change while a scene
+// runs.
 #pragma once
 
 #include <cstddef>
@@ -33,9 +34,6 @@ inline constexpr std::size_t kMaxTextBytes = 1024;
 inline constexpr std::size_t kMaxLabelBytes = 64;
 
 inline constexpr Range kPosition{-1000, 1000};    // m
-inline constexpr Range kGravity{-1000, 1000};     // m/s^2
-inline constexpr Range kWind{-100, 100};          // m/s
-inline constexpr Range kAirDensity{0, 100};       // kg/m^3
 inline constexpr Range kGridLength{0.001, 1000};  // m
 inline constexpr double kMinSpacing = 0.0001;     // m; also of a mesh's edges
 inline constexpr Range kScale{1e-6, 1e6};         // m per unit
@@ -43,8 +41,6 @@ inline constexpr Range kWeldDistance{0, 0.1};     // m
 inline constexpr Range kRegionLength{0, 1000};    // m
 inline constexpr Range kMass{1e-6, 1e6};          // kg
 inline constexpr Range kArealMass{1e-4, 1000};    // kg/m^2
-inline constexpr Range kGustStrength{0, 100};     // m/s
-inline constexpr Range kGustSeconds{0.01, 3600};  // s
 inline constexpr Range kFriction = parameters::kFriction;
 inline constexpr Range kRadius{0.001, 1000};           // m
 inline constexpr Range kShapeLength{0, 1000};          // m
@@ -58,15 +54,10 @@ inline constexpr Range kMotionTime{0, 86400};          // s
 inline constexpr Range kMaxError{0.00001, 0.1};        // m
 inline constexpr std::uint32_t kMaxTemporalLayers = 3;
 inline constexpr std::uint32_t kMaxQualities = 4;
-inline constexpr Range kCompliance{0, 1};  // m/N
-inline constexpr Range kTolerance{0, 1};
-inline constexpr Range kActivation{0, 10};        // fraction of a length
-inline constexpr Range kGrabRadius{0.001, 1};     // m
-inline constexpr Range kGrabReach{0, 1};          // m
-inline constexpr Range kGrabForce{0.001, 1e6};    // N
-inline constexpr Range kSlipDistance{0.001, 10};  // m
-inline constexpr std::uint32_t kMaxIterations = 10'000;
-inline constexpr std::uint32_t kMaxXpbdIterations = 1'000;
+inline constexpr Range kGrabRadius{0.001, 1};                // m
+inline constexpr Range kGrabReach{0, 1};                     // m
+inline constexpr Range kGrabForce{0.001, 1e6};               // N
+inline constexpr Range kSlipDistance{0.001, 10};             // m
 inline constexpr std::uint32_t kMaxSolverNodes = 1'048'576;  // per cloth
 inline constexpr std::uint64_t kMaxAssembledNodes = 65'536;  // per scene, in cloths with an assembled system
 inline constexpr std::uint64_t kMaxAssembledEntries =

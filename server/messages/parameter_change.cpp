@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: MIT
-// Converts parameter changes of clients and checks them against their scene.
+// Converts parameter changes of clients and checks them against their scene. Applies changes to messages.
 #include <algorithm>
 #include <vector>
 
 #include <fmt/format.h>
+#include <google/protobuf/descriptor.h>
+#include <google/protobuf/message.h>
 
+#include "proto/parameters/apply_change.h"
 #include "server/messages/client_message.h"
 #include "server/messages/cloth_numbers.h"
 #include "server/messages/limits.h"
@@ -19,7 +22,7 @@ namespace {
 std::vector<const model::Cloth*> addressed(const model::Scene& scene, const std::string& name) {
   std::vector<const model::Cloth*> cloths;
   for (const model::Cloth& cloth : scene.cloths)
-    if (name.empty() || name == cloth.name) cloths.push_back(&cloth);
+    if (parameters::isFor(name, cloth.name)) cloths.push_back(&cloth);
   return cloths;
 }
 
@@ -85,6 +88,18 @@ model::ColliderChange toColliderChange(Checks& checks, const Path& path, const v
   return change;
 }
 
+// Every field replaces as a whole, so that a zero, which is not on the wire, replaces too.
+void overwrite(const google::protobuf::Message& with, google::protobuf::Message& all) {
+  std::vector<const google::protobuf::FieldDescriptor*> fields;
+  with.GetReflection()->ListFields(with, &fields);
+  for (const auto* field : fields) {
+    const bool isKept = field->containing_type() == v1::ClothChange::descriptor() &&
+                        !parameters::isReplaced(static_cast<std::uint32_t>(field->number()));
+    if (!field->is_repeated() && !isKept) all.GetReflection()->ClearField(&all, field);
+  }
+  all.MergeFrom(with);
+}
+
 }  // namespace
 
 Result<model::ParameterChange> toParameterChange(const v1::ParameterChange& message,
@@ -94,11 +109,13 @@ Result<model::ParameterChange> toParameterChange(const v1::ParameterChange& mess
   const Path path("parameterChange");
   model::ParameterChange change;
   if (message.has_gravity())
-    change.gravity = toVec3(checks, path / "gravity" / "value", message.gravity().value(), limits::kGravity);
+    change.gravity =
+        toVec3(checks, path / "gravity" / "value", message.gravity().value(), parameters::kGravity.range);
   if (message.has_wind())
-    change.wind = toVec3(checks, path / "wind" / "value", message.wind().value(), limits::kWind);
+    change.wind = toVec3(checks, path / "wind" / "value", message.wind().value(), parameters::kWind.range);
   if (message.has_air_density())
-    change.airDensity = checks.number(path / "airDensity", message.air_density(), limits::kAirDensity);
+    change.airDensity =
+        checks.number(path / "airDensity", message.air_density(), parameters::kAirDensity.range);
   if (message.has_gust()) change.gust = toGust(checks, path / "gust", message.gust());
   checks.count(path / "cloths", static_cast<std::size_t>(message.cloths_size()), 0, limits::kMaxCloths);
   checks.count(path / "colliders", static_cast<std::size_t>(message.colliders_size()), 0,
@@ -117,6 +134,20 @@ Result<model::ParameterChange> toParameterChange(const v1::ParameterChange& mess
       checks.fail(path, "", fmt::format("with substeps = {}, {}", scene.substeps, *error));
   }
   return std::move(checks).result(std::move(change));
+}
+
+void applyChange(const v1::ParameterChange& change, v1::ParameterChange& all) {
+  v1::ParameterChange environment = change;
+  environment.clear_cloths();
+  environment.clear_colliders();
+  overwrite(environment, all);
+  for (const v1::ClothChange& clothChange : change.cloths())
+    for (v1::ClothChange& cloth : *all.mutable_cloths())
+      if (parameters::isFor(clothChange.name(), cloth.name())) {
+        const std::string name = cloth.name();
+        overwrite(clothChange, cloth);
+        cloth.set_name(name);
+      }
 }
 
 }  // namespace clothstream::messages

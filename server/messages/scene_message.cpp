@@ -23,6 +23,9 @@
 namespace clothstream::messages {
 namespace {
 
+using parameters::kIterations;
+using parameters::kXpbdIterations;
+
 model::Integrator toIntegrator(Checks& checks, const Path& path, v1::Integrator message) {
   switch (message) {
     case v1::INTEGRATOR_UNSPECIFIED:
@@ -71,10 +74,11 @@ model::Normals toNormals(Checks& checks, const Path& path, v1::Normals message) 
 model::Environment toEnvironment(Checks& checks, const Path& path, const v1::Environment& message) {
   model::Environment environment;
   if (message.has_gravity())
-    environment.gravity = toVec3(checks, path / "gravity", message.gravity(), limits::kGravity);
-  environment.wind = toVec3(checks, path / "wind", message.wind(), limits::kWind);
+    environment.gravity = toVec3(checks, path / "gravity", message.gravity(), parameters::kGravity.range);
+  environment.wind = toVec3(checks, path / "wind", message.wind(), parameters::kWind.range);
   if (message.has_air_density())
-    environment.airDensity = checks.number(path / "airDensity", message.air_density(), limits::kAirDensity);
+    environment.airDensity =
+        checks.number(path / "airDensity", message.air_density(), parameters::kAirDensity.range);
   environment.gust = toGust(checks, path / "gust", message.gust());
   return environment;
 }
@@ -104,16 +108,18 @@ model::Grid toGrid(Checks& checks, const Path& path, const v1::Grid& message) {
 template <typename Message>
 void readIterations(Checks& checks, const Path& path, const Message& message, model::Solver& solver) {
   if (message.has_iterations())
-    solver.iterations = checks.integer(path / "iterations", message.iterations(), 1, limits::kMaxIterations);
+    solver.iterations =
+        checks.integer(path / "iterations", message.iterations(), kIterations.min, kIterations.max);
   if (message.has_tolerance())
-    solver.tolerance = checks.number(path / "tolerance", message.tolerance(), limits::kTolerance);
+    solver.tolerance = checks.number(path / "tolerance", message.tolerance(), parameters::kTolerance.range);
 }
 
 void readConstraint(Checks& checks, const Path& path, const v1::ConstraintSolver& message,
                     model::Solver& solver) {
   solver.bendConstraints = message.bend_constraints();
   if (message.has_compliance())
-    solver.compliance = checks.number(path / "compliance", message.compliance(), limits::kCompliance);
+    solver.compliance =
+        checks.number(path / "compliance", message.compliance(), parameters::kCompliance.range);
   readIterations(checks, path, message, solver);
   switch (message.path()) {
     case v1::CONSTRAINT_PATH_UNSPECIFIED:
@@ -400,9 +406,9 @@ void checkSize(Checks& checks, const model::Scene& scene) {
 
 model::Gust toGust(Checks& checks, const Path& path, const v1::Gust& message) {
   model::Gust gust;
-  gust.strength = checks.number(path / "strength", message.strength(), limits::kGustStrength);
+  gust.strength = checks.number(path / "strength", message.strength(), parameters::kGustStrength.range);
   if (message.has_seconds())
-    gust.seconds = checks.number(path / "seconds", message.seconds(), limits::kGustSeconds);
+    gust.seconds = checks.number(path / "seconds", message.seconds(), parameters::kGustSeconds.range);
   return gust;
 }
 
@@ -427,17 +433,18 @@ model::Solver toSolver(Checks& checks, const Path& path, const v1::Solver& messa
     const Path at = path / "acad";
     solver.kind = model::SolverKind::acad;
     if (acad.has_activation())
-      solver.activation = checks.number(at / "activation", acad.activation(), limits::kActivation);
+      solver.activation = checks.number(at / "activation", acad.activation(), parameters::kActivation.range);
     readConstraint(checks, at / "constraint", acad.constraint(), solver);
   } else if (message.has_xpbd()) {
     const v1::XpbdSolver& xpbd = message.xpbd();
     const Path at = path / "xpbd";
     solver.kind = model::SolverKind::xpbd;
-    solver.iterations = xpbd.has_iterations() ? checks.integer(at / "iterations", xpbd.iterations(), 1,
-                                                               limits::kMaxXpbdIterations)
-                                              : 1;
+    solver.iterations = kXpbdIterations.initial;
+    if (xpbd.has_iterations())
+      solver.iterations =
+          checks.integer(at / "iterations", xpbd.iterations(), kXpbdIterations.min, kXpbdIterations.max);
     if (xpbd.has_compliance())
-      solver.compliance = checks.number(at / "compliance", xpbd.compliance(), limits::kCompliance);
+      solver.compliance = checks.number(at / "compliance", xpbd.compliance(), parameters::kCompliance.range);
   } else if (message.has_implicit_euler()) {
     solver.kind = model::SolverKind::implicitEuler;
     readIterations(checks, path / "implicitEuler", message.implicit_euler(), solver);

@@ -31,6 +31,10 @@ v1::Normals toMessage(model::Normals normals);
 // All parameters of environment and cloths as one change. `areas` are the areas of the cloths in m²; a cloth
 // with a missing area or 0 gets no areal mass.
 v1::ParameterChange allParameters(const v1::Scene& scene, std::span<const double> areas);
+// Applies a change to the result of allParameters(), as model::applyChange() applies it to a scene. Safe for
+// any messages: fields that this release does not know are kept, and changes of unknown cloths and of
+// colliders are ignored.
+void applyChange(const v1::ParameterChange& change, v1::ParameterChange& all);
 
 // Solver of a cloth. unfitSolver() checks whether it suits the cloth.
 model::Solver toSolver(Checks& checks, const Path& path, const v1::Solver& message);

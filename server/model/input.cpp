@@ -5,17 +5,15 @@
 #include <algorithm>
 #include <cassert>
 
+#include "proto/parameters/apply_change.h"
 #include "server/model/material.h"
 
 namespace clothstream::model {
 namespace {
 
-template <typename T>
-void assign(T& field, const std::optional<T>& value) {
-  if (value) field = *value;
-}
+using parameters::assign;
 
-void apply(Cloth& cloth, const ClothChange& change) {
+void apply(const ClothChange& change, Cloth& cloth) {
   if (change.material) makeOf(*findMaterial(*change.material), cloth);
   parameters::applyNumbers(
       change.numbers, [&](parameters::ClothNumber number) { return parameters::memberOf(cloth, number); });
@@ -24,7 +22,7 @@ void apply(Cloth& cloth, const ClothChange& change) {
 }
 
 // A motion that ends leaves the part of the pose that does not change at the pose of the scene.
-void apply(Collider& collider, const ColliderChange& change) {
+void apply(const ColliderChange& change, Collider& collider) {
   if (change.position || change.orientation) collider.motion.keys.clear();
   assign(collider.pose.position, change.position);
   assign(collider.pose.orientation, change.orientation);
@@ -37,17 +35,12 @@ void apply(Collider& collider, const ColliderChange& change) {
 }  // namespace
 
 void applyChange(Scene& scene, const ParameterChange& change) {
-  assign(scene.environment.gravity, change.gravity);
-  assign(scene.environment.wind, change.wind);
-  assign(scene.environment.airDensity, change.airDensity);
-  assign(scene.environment.gust, change.gust);
-  for (const ClothChange& clothChange : change.cloths)
-    for (Cloth& cloth : scene.cloths)
-      if (clothChange.name.empty() || clothChange.name == cloth.name) apply(cloth, clothChange);
+  parameters::applyChange(change, scene.environment, scene.cloths,
+                          [](const ClothChange& clothChange, Cloth& cloth) { apply(clothChange, cloth); });
   for (const ColliderChange& colliderChange : change.colliders) {
     const auto collider = std::ranges::find(scene.colliders, colliderChange.name, &Collider::name);
     assert(collider != scene.colliders.end());
-    apply(*collider, colliderChange);
+    apply(colliderChange, *collider);
   }
 }
 

@@ -161,7 +161,7 @@ void makeOf(const Material& material, Cloth& cloth) {
   cloth.friction = material.friction;
   cloth.solver = Solver();
   cloth.solver.kind = SolverKind::xpbd;
-  cloth.solver.iterations = 1;
+  cloth.solver.iterations = parameters::kXpbdIterations.initial;
 }
 
 }  // namespace clothstream::model

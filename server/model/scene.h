@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "proto/parameters/cloth_parameters.h"
+#include "proto/parameters/settings.h"
 #include "server/model/collider.h"
 #include "server/model/pose.h"
 
@@ -72,10 +73,10 @@ struct Solver {
   // solvers absent means kRelativeCompliance * h^2 / m.
   std::optional<float> compliance;
   // Per substep: maximum conjugate gradient iterations; for xpbd the rounds through all springs.
-  std::uint32_t iterations = 20;
-  float tolerance = 0.001f;  // maximum norm of the residual, relative to its start
+  std::uint32_t iterations = parameters::kIterations.initial;
+  float tolerance = parameters::kTolerance.initial;  // maximum norm of the residual, relative to its start
   // For acad: maximum stretch that a substep may give a spring, as a fraction of its length.
-  float activation = 0.1f;
+  float activation = parameters::kActivation.initial;
   // Fraction of an existing length error that a substep corrects (Baumgarte stabilisation). The error is
   // stretch; for `constraint` also compression. The correction gives the nodes speed. Absent means 1 for
   // `constraint` and kCorrectionFraction for acad.
@@ -172,15 +173,15 @@ struct Cloth {
 
 // Variation of the wind; wind.h describes it.
 struct Gust {
-  float strength = 0;  // maximum deviation of each component, m/s; 0: no gusts
-  float seconds = 2;   // time between two turning points of a component
+  float strength = parameters::kGustStrength.initial;  // maximum deviation of each component; 0: no gusts
+  float seconds = parameters::kGustSeconds.initial;    // time between two turning points of a component
 };
 
 struct Environment {
-  Vec3 gravity = Vec3(0, -9.81f, 0);
+  Vec3 gravity = Vec3(0, parameters::kGravity.initial, 0);
   Vec3 wind = Vec3::Zero();  // m/s; in a scene the mean, in a tick the wind at its time
-  float airDensity = 1.2f;   // kg/m^3; 0 switches drag and lift off
-  Gust gust = {};            // in a scene only
+  float airDensity = parameters::kAirDensity.initial;  // 0 switches drag and lift off
+  Gust gust = {};                                      // in a scene only
 };
 
 enum class Integrator : std::uint8_t { semiImplicitEuler, explicitEuler, rungeKutta4 };

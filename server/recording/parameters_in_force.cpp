@@ -8,17 +8,11 @@
 #include <string>
 #include <vector>
 
-#include <google/protobuf/descriptor.h>
-#include <google/protobuf/message.h>
-
-#include "proto/parameters/cloth_parameters.h"
 #include "server/messages/scene_message.h"
 #include "server/model/scene.h"
 
 namespace clothstream::recording {
 namespace {
-
-using google::protobuf::FieldDescriptor;
 
 // Area in m²; 0 if it is unknown.
 double areaOf(const v1::Cloth& cloth, const v1::ClothDescription& described) {
@@ -38,25 +32,6 @@ double areaOf(const v1::Cloth& cloth, const v1::ClothDescription& described) {
   return area;
 }
 
-// True if a change leaves what it does not give: a group that the table keeps. Every other field is replaced
-// as a whole, so that a zero, which is not on the wire, replaces too.
-bool isKept(const FieldDescriptor& field) {
-  const auto number = static_cast<std::uint32_t>(field.number());
-  return field.containing_type() == v1::ClothChange::descriptor() &&
-         std::ranges::any_of(parameters::kClothParameters, [&](const parameters::ClothParameter& parameter) {
-           return parameter.group != nullptr && parameter.group->field.inChange == number &&
-                  !parameter.group->isReplaced;
-         });
-}
-
-void overwrite(const google::protobuf::Message& with, google::protobuf::Message& all) {
-  std::vector<const FieldDescriptor*> fields;
-  with.GetReflection()->ListFields(with, &fields);
-  for (const FieldDescriptor* field : fields)
-    if (!field->is_repeated() && !isKept(*field)) all.GetReflection()->ClearField(&all, field);
-  all.MergeFrom(with);
-}
-
 }  // namespace
 
 ParametersInForce::ParametersInForce(const v1::StreamDescription& description) {
@@ -69,17 +44,7 @@ ParametersInForce::ParametersInForce(const v1::StreamDescription& description) {
 }
 
 void ParametersInForce::apply(const v1::ParameterChange& change) {
-  v1::ParameterChange environment = change;
-  environment.clear_cloths();
-  environment.clear_colliders();
-  overwrite(environment, now_);
-  for (const v1::ClothChange& clothChange : change.cloths())
-    for (v1::ClothChange& cloth : *now_.mutable_cloths())
-      if (clothChange.name().empty() || clothChange.name() == cloth.name()) {
-        const std::string name = cloth.name();
-        overwrite(clothChange, cloth);
-        cloth.set_name(name);
-      }
+  messages::applyChange(change, now_);
 }
 
 }  // namespace clothstream::recording

@@ -28,6 +28,39 @@ TEST(Joining, SendsOnlyHelloFirst) {
   EXPECT_NE(messages[0].request_id(), 0u);
 }
 
+TEST(Joining, SendsTheWantedOperatingPointWithoutLosingRequests) {
+  ClientUnderTest client;
+  cs_list_scenes(client.get());
+  cs_want(client.get(), 2, 1);
+  const auto sent = client.outgoing();
+  ASSERT_THAT(sent, SizeIs(2));
+  EXPECT_EQ(sent[0].hello().quality(), 2u);
+  EXPECT_EQ(sent[0].hello().temporal_layer(), 0u);
+  EXPECT_TRUE(sent[1].has_list_scenes());
+}
+
+// The server ends a connection with two Hellos.
+TEST(Joining, SendsALaterWantedOperatingPointWithTheNextConnection) {
+  ClientUnderTest client;
+  client.outgoing();
+  cs_want(client.get(), 1, 0);
+  EXPECT_THAT(client.outgoing(), SizeIs(0));
+  client.join(ScriptedServer());
+  cs_list_scenes(client.get());
+  cs_want(client.get(), 2, 0);
+  const auto sent = client.outgoing();
+  ASSERT_THAT(sent, SizeIs(1));
+  EXPECT_TRUE(sent[0].has_list_scenes());
+
+  cs_disconnected(client.get(), 0);
+  cs_want(client.get(), 3, 0);
+  EXPECT_THAT(client.outgoing(), SizeIs(0));
+  cs_connecting(client.get(), 0);
+  const auto again = client.outgoing();
+  ASSERT_THAT(again, SizeIs(1));
+  EXPECT_EQ(again[0].hello().quality(), 3u);
+}
+
 TEST(Joining, IsJoinedWhenTheDescriptionIsComplete) {
   ScriptedServer server;
   ClientUnderTest client;

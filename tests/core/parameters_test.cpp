@@ -270,6 +270,52 @@ TEST(ClothSettings, IncludeIterationsAndToleranceOfImplicitEuler) {
   EXPECT_EQ(sent.tolerance(), 0.25f);
 }
 
+// Settings that the current solver does not have read as the values that keep them.
+TEST(ClothSettings, OmitSettingsThatTheSolverDoesNotHave) {
+  struct Row {
+    cs_solver kind;
+    bool iterations, tolerance, compliance, activation, bendConstraints, assembled;
+  };
+  for (const Row& row : {Row{CS_SOLVER_MASS_SPRING, false, false, false, false, false, false},
+                         Row{CS_SOLVER_CONSTRAINT, true, true, true, false, true, true},
+                         Row{CS_SOLVER_ACAD, true, true, true, true, true, false},
+                         Row{CS_SOLVER_XPBD, true, false, true, false, false, false},
+                         Row{CS_SOLVER_IMPLICIT_EULER, true, true, false, false, false, false}}) {
+    SCOPED_TRACE(row.kind);
+    v1::ServerMessage message;
+    v1::Solver& solver =
+        *message.mutable_parameter_changed()->mutable_change()->add_cloths()->mutable_solver();
+    switch (row.kind) {
+      case CS_SOLVER_CONSTRAINT:
+        solver.mutable_constraint()->set_compliance(0.5f);
+        break;
+      case CS_SOLVER_ACAD:
+        solver.mutable_acad()->mutable_constraint()->set_compliance(0.5f);
+        break;
+      case CS_SOLVER_XPBD:
+        solver.mutable_xpbd()->set_compliance(0.5f);
+        break;
+      case CS_SOLVER_IMPLICIT_EULER:
+        solver.mutable_implicit_euler();
+        break;
+      default:
+        solver.mutable_mass_spring();
+    }
+    JoinedClient joined;
+    joined.client.receive(message.SerializeAsString());
+    cs_cloth_settings now{};
+    now.version = CS_CLOTH_SETTINGS_VERSION;
+    ASSERT_EQ(cs_get_cloth_settings(joined.client.get(), 0, &now), 1);
+    EXPECT_EQ(now.solver, static_cast<std::uint32_t>(row.kind));
+    EXPECT_EQ(now.iterations != 0, row.iterations);
+    EXPECT_EQ(!std::isnan(now.tolerance), row.tolerance);
+    EXPECT_EQ(!std::isnan(now.compliance), row.compliance);
+    EXPECT_EQ(!std::isnan(now.activation), row.activation);
+    EXPECT_EQ(now.bend_constraints != -1, row.bendConstraints);
+    EXPECT_EQ(now.assembled != -1, row.assembled);
+  }
+}
+
 // Each number of the table is sent, and read back from the change that the server announces.
 TEST(ClothSettings, CarryEveryNumberOfTheTable) {
   for (const parameters::ClothParameter& parameter : parameters::kClothParameters) {

@@ -186,6 +186,14 @@ TEST_P(EveryNumber, IsPartOfAChangeThatHoldsAll) {
   EXPECT_EQ(*parameters::memberOf(scene_.cloths[0], GetParam().number), allowed());
 }
 
+TEST_P(EveryNumber, ChangesTheMessageWithAllParametersLikeTheScene) {
+  const v1::ParameterChange message = changeTo(allowed());
+  v1::ParameterChange all = allParameters(toMessage(scene_), {});
+  applyChange(message, all);
+  model::applyChange(scene_, toParameterChange(message, scene_).value());
+  EXPECT_EQ(all.DebugString(), allParameters(toMessage(scene_), {}).DebugString());
+}
+
 TEST_P(EveryNumber, IsRefusedOutsideItsRange) {
   for (const float value : {static_cast<float>(GetParam().range.min) - 0.001f,
                             static_cast<float>(maximum()) * 1.01f, std::numeric_limits<float>::quiet_NaN()}) {

@@ -259,6 +259,35 @@ TEST_F(ToParameterChange, RefusesUnknownAndUnusableMaterials) {
   EXPECT_THAT(error(), StartsWith("parameterChange.gust.seconds = 0:"));
 }
 
+TEST_F(ToParameterChange, ChangesTheMessageWithAllParametersLikeTheScene) {
+  const double areas[] = {model::areaOf(scene_.cloths[0])};
+  v1::ParameterChange all = allParameters(toMessage(scene_), areas);
+  message_.mutable_gravity()->mutable_value();  // zero
+  message_.mutable_wind()->mutable_value()->set_z(2);
+  message_.set_air_density(0);
+  message_.mutable_gust()->set_strength(1);
+  message_.mutable_gust()->set_seconds(3);
+  v1::ClothChange& everyCloth = *message_.add_cloths();
+  everyCloth.set_areal_mass(0.5f);
+  model::Solver solver;
+  solver.kind = model::SolverKind::xpbd;
+  solver.compliance = 0;
+  *everyCloth.mutable_solver() = toMessage(solver);
+  v1::ClothChange& sheet = *message_.add_cloths();
+  sheet.set_name("sheet");
+  sheet.set_drag(0.25f);
+  applyChange(message_, all);
+  model::applyChange(scene_, toParameterChange(message_, scene_).value());
+  EXPECT_EQ(all.DebugString(), allParameters(toMessage(scene_), areas).DebugString());
+
+  message_.Clear();
+  message_.add_cloths()->set_name("unknown");
+  message_.add_colliders()->set_name("ball");
+  const std::string before = all.DebugString();
+  applyChange(message_, all);
+  EXPECT_EQ(all.DebugString(), before);
+}
+
 TEST_F(ToParameterChange, ChecksTheCombinedChange) {
   message_.add_cloths()->mutable_structural()->set_stiffness(20000);
   message_.add_cloths()->mutable_structural()->set_stiffness(10);

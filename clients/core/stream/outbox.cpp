@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Order of messages: control, acknowledgement, poses.
+// Order of messages: Hello, control, acknowledgement, poses.
 #include "clients/core/stream/outbox.h"
-
-#include <utility>
 
 namespace clothstream::client {
 
@@ -13,13 +11,17 @@ bool Outbox::addControl(std::string message) {
 }
 
 void Outbox::clear() {
+  hello_.clear();
   control_.clear();
   poses_.clear();
   ackTick_.reset();
 }
 
 const std::string* Outbox::next() {
-  if (!control_.empty()) {
+  if (!hello_.empty()) {
+    taken_.swap(hello_);
+    hello_.clear();
+  } else if (!control_.empty()) {
     taken_ = std::move(control_.front());
     control_.pop_front();
   } else if (ackTick_) {

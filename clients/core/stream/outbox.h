@@ -6,17 +6,22 @@
 #include <deque>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "clients/core/wire/client_message.h"
 
 namespace clothstream::client {
 
-// Keeps only the newest acknowledgement and the newest poses. Control messages are sent first, in order.
+// Keeps only the newest acknowledgement and the newest poses. Hello is sent first, then the control messages
+// in order.
 class Outbox {
  public:
   // Limit of waiting control messages. At the limit the transport has stopped sending.
   static constexpr std::size_t kMaxControl = 256;
 
+  // Replaces a Hello that waits.
+  void setHello(std::string hello) { hello_ = std::move(hello); }
+  bool helloWaits() const { return !hello_.empty(); }
   // Returns false if the queue is full.
   [[nodiscard]] bool addControl(std::string message);
   void setAck(std::uint64_t tick) { ackTick_ = tick; }
@@ -28,6 +33,7 @@ class Outbox {
   const std::string* next();
 
  private:
+  std::string hello_;  // empty if none waits
   std::deque<std::string> control_;
   std::string poses_;  // empty if none wait
   std::optional<std::uint64_t> ackTick_;

@@ -10,6 +10,7 @@
 
 #include "proto/codec/packet_header.h"
 #include "proto/codec/vertex_normals.h"
+#include "proto/parameters/apply_change.h"
 
 namespace clothstream::client {
 namespace {
@@ -294,17 +295,9 @@ const Hull* hullOf(const Collider& collider, const Description& description) {
 }
 
 void apply(const ParameterChange& change, Description& description) {
-  Environment& environment = description.environment;
-  environment.gravity = change.gravity.value_or(environment.gravity);
-  environment.wind = change.wind.value_or(environment.wind);
-  environment.airDensity = change.airDensity.value_or(environment.airDensity);
-  environment.gust = change.gust.value_or(environment.gust);
-  for (const ClothChange& clothChange : change.cloths) {
-    for (Cloth& cloth : description.cloths) {
-      if (!clothChange.name.empty() && clothChange.name != cloth.name) continue;
-      apply(clothChange, cloth.parameters);
-    }
-  }
+  parameters::applyChange(
+      change, description.environment, description.cloths,
+      [](const ClothChange& clothChange, Cloth& cloth) { apply(clothChange, cloth.parameters); });
 }
 
 std::string decodedCodecs() {

@@ -31,9 +31,9 @@ struct Cloth {
 };
 
 struct Environment {
-  Vec3 gravity{0, -9.81f, 0};
+  Vec3 gravity{0, parameters::kGravity.initial, 0};
   Vec3 wind{};
-  float airDensity = 1.2f;
+  float airDensity = parameters::kAirDensity.initial;
   Gust gust;
 };
 

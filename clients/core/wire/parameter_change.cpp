@@ -2,6 +2,8 @@
 // Reads, writes and applies parameter changes. The table of parameters gives the fields of a cloth's numbers.
 #include "clients/core/wire/parameter_change.h"
 
+#include "proto/parameters/apply_change.h"
+
 namespace clothstream::client {
 namespace {
 
@@ -292,7 +294,7 @@ ClothNumbers ClothParameters::defaultNumbers() {
 void apply(const ClothChange& change, ClothParameters& cloth) {
   parameters::applyNumbers(change.numbers,
                            [&](parameters::ClothNumber number) { return &cloth.numbers[number]; });
-  cloth.material = change.material.value_or(cloth.material);
+  parameters::assign(cloth.material, change.material);
   if (!change.solver) return;
   cloth.solver = *change.solver;
   if (cloth.solvers.size() < kMaxSolvers) cloth.solvers[cloth.solver.kind] = cloth.solver;

@@ -15,6 +15,7 @@
 #include "clients/core/core.h"
 #include "clients/core/wire/wire.h"
 #include "proto/parameters/cloth_parameters.h"
+#include "proto/parameters/settings.h"
 
 namespace clothstream::client {
 
@@ -24,17 +25,17 @@ inline constexpr std::uint32_t kMatrixFree = 1, kAssembled = 2;
 struct Solver {
   std::uint32_t kind = CS_SOLVER_MASS_SPRING;  // number of the field in Solver.kind
   bool bendConstraints = false;
-  std::uint32_t iterations = 20;
-  float tolerance = 0.001f;
+  std::uint32_t iterations = parameters::kIterations.initial;
+  float tolerance = parameters::kTolerance.initial;
   std::optional<float> compliance;
-  float activation = 0.1f;
+  float activation = parameters::kActivation.initial;
   std::uint32_t path = kMatrixFree;
   std::string settings;  // message of the kind as received
 };
 
 struct Gust {
-  float strength = 0;  // m/s
-  float seconds = 2;
+  float strength = parameters::kGustStrength.initial;
+  float seconds = parameters::kGustSeconds.initial;
 };
 
 // Current parameters of a cloth.

@@ -8,6 +8,7 @@
 
 #include <gtest/gtest.h>
 
+#include "clothstream/v1/session.pb.h"
 #include "proto/codec/temporal_layers.h"
 
 namespace clothstream::delivery {

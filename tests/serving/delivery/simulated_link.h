@@ -15,6 +15,7 @@
 #include <gtest/gtest.h>
 
 #include "clients/core/stream/frame_feedback.h"
+#include "clothstream/v1/session.pb.h"
 #include "proto/codec/temporal_layers.h"
 #include "server/delivery/mailbox.h"
 

@@ -105,22 +105,23 @@ v1::ServerMessage control(TestPeer& peer, const std::string& name, std::optional
 
 TEST_F(ScenesTest, RefusesCreateSceneAtOnceWhileTooManyScenesWait) {
   START();
-  std::promise<void> began;
-  std::latch mayEnd(1);
+  // The maker's thread may use both after the end of the test.
+  const auto began = std::make_shared<std::promise<void>>();
+  std::promise<void> mayEnd;
   v1::CreateSceneRequest unknown;
   unknown.set_named("no such scene");
-  server().createScene(unknown, [&](const auto&) {
-    began.set_value();
-    mayEnd.wait();  // the maker's thread stays busy, so all others wait
+  server().createScene(unknown, [began, end = mayEnd.get_future().share()](const auto&) {
+    began->set_value();
+    end.wait();  // the maker's thread stays busy, so all others wait
   });
-  began.get_future().wait();
+  began->get_future().wait();
   for (std::uint32_t i = 0; i < SceneMaker::kMaxWaiting; ++i)
     server().createScene(unknown, [](const auto&) {});
   TestPeer peer(server());
   const v1::ServerMessage answer = createNamed(peer, "folds", "late");
   EXPECT_EQ(answer.error().code(), v1::ERROR_CODE_RESOURCE_EXHAUSTED);
   EXPECT_THAT(answer.error().text(), HasSubstr("64 scenes wait to be created; try again later"));
-  mayEnd.count_down();
+  mayEnd.set_value();
 }
 
 TEST_F(ScenesTest, CreatesAndJoinsASceneUploadedInChunks) {
