@@ -190,7 +190,7 @@ TEST_P(EveryNumber, ChangesTheMessageWithAllParametersLikeTheScene) {
   const v1::ParameterChange message = changeTo(allowed());
   v1::ParameterChange all = allParameters(toMessage(scene_), {});
   applyChange(message, all);
-  model::applyChange(scene_, toParameterChange(message, scene_).value());
+  model::applyChange(scene_, toParameterChange(message, scene_, model::StabilityBound(scene_)).value());
   EXPECT_EQ(all.DebugString(), allParameters(toMessage(scene_), {}).DebugString());
 }
 

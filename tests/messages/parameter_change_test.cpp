@@ -277,7 +277,7 @@ TEST_F(ToParameterChange, ChangesTheMessageWithAllParametersLikeTheScene) {
   sheet.set_name("sheet");
   sheet.set_drag(0.25f);
   applyChange(message_, all);
-  model::applyChange(scene_, toParameterChange(message_, scene_).value());
+  model::applyChange(scene_, toParameterChange(message_, scene_, model::StabilityBound(scene_)).value());
   EXPECT_EQ(all.DebugString(), allParameters(toMessage(scene_), areas).DebugString());
 
   message_.Clear();
