@@ -6,8 +6,8 @@ foreach(kernel IN LISTS KERNELS)
 endforeach()
 string(SHA256 hash "${hashes}")
 string(SUBSTRING ${hash} 0 16 hash)
-file(CONFIGURE OUTPUT ${HEADER} @ONLY CONTENT "#pragma once
+file(WRITE ${HEADER} "#pragma once
 namespace clothstream::kernels {
-inline constexpr const char* kShaderHash = \"@hash@\";
+inline constexpr const char* kShaderHash = \"${hash}\";
 }
 ")

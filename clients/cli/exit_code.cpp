@@ -10,7 +10,7 @@
 namespace clothstream::cli {
 
 std::string exitCodeHelp() {
-  constexpr std::size_t kColumns = 108;
+  constexpr std::size_t kColumns = 107;
   std::string text;
   for (const ExitMeaning& meaning : kExitMeanings)
     text += fmt::format("{}{:d} {}", text.empty() ? "Exit codes: " : "; ", static_cast<int>(meaning.code),

@@ -36,7 +36,7 @@ inline constexpr ExitMeaning kExitMeanings[] = {
     {kUnreadable, "a file cannot be read or is damaged"},
 };
 
-// Text for --help, in lines of at most 108 columns.
+// Text for --help, in lines of at most 107 columns.
 std::string exitCodeHelp();
 
 constexpr ExitCode exitCodeOf(Failure::Kind kind) {

@@ -177,6 +177,7 @@ template <typename T>
 CLI::Option* OptionTable::choice(const char* name, std::optional<T>& store,
                                  const std::map<std::string, T>& choices, const std::string& help) {
   std::vector<std::string> names;
+  names.reserve(choices.size());
   for (const auto& [choice, value] : choices) names.push_back(choice);
   CLI::Option* option = app_->add_option_function<std::string>(
       name,
