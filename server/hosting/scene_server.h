@@ -15,6 +15,8 @@
 #include "server/delivery/wire_types.h"
 #include "server/messages/limits.h"
 #include "server/model/scene.h"
+#include "server/scene/defaults.h"
+#include "server/scene/roles.h"
 #include "server/scene/roster.h"
 #include "server/simulation/collision/moving_collider.h"
 #include "server/vulkan/device.h"
@@ -40,7 +42,7 @@ struct ServerOptions {
   // Scenes without subscribers keep running: the default scene from the start, others once they were joined.
   bool runAlways = false;
   // Frames per second of each scene that carry a simulation report; 0 for none.
-  double reportRate = 4;
+  double reportRate = scene::kDefaultReportRate;
   std::uint32_t maxConnections = 1024;
   // Limit for each scene, disconnected participants included. At most kMaxParticipants. A peer that creates
   // a scene may set a lower limit.

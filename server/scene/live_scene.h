@@ -11,6 +11,7 @@
 #include "server/delivery/subscribers.h"
 #include "server/messages/field_error.h"
 #include "server/model/scene.h"
+#include "server/scene/defaults.h"
 #include "server/scene/frame_source.h"
 #include "server/scene/inbox.h"
 #include "server/scene/journal.h"
