@@ -22,13 +22,13 @@ server/delivery    | server/schedule server/encode server/messages server/teleme
 server/scene       | server/delivery server/schedule server/model server/vulkan server/simulation server/encode server/messages server/telemetry clothstream
 server/hosting     | server/scene server/delivery server/schedule server/model server/vulkan server/simulation server/messages server/telemetry clothstream
 server/session     | server/hosting server/scene server/delivery server/schedule server/messages proto/codec clothstream
-server/recording   | proto/parameters server/model server/vulkan server/simulation server/messages server/scene server/schedule proto/codec proto/recording clothstream
+server/recording   | server/model server/vulkan server/simulation server/messages server/scene server/schedule proto/codec proto/recording clothstream
 server/step        | server/model server/vulkan server/simulation server/messages
 server/endpoint/grpc | server/session server/hosting server/delivery clothstream grpc/health
 server/endpoint/web | server/session clothstream
 server/options     | server/hosting server/recording server/step server/scene server/model
 server/main.cpp    | server/options server/endpoint server/hosting server/recording server/step server/simulation server/messages server/model server/telemetry server/vulkan
-clients/core       | proto/codec
+clients/core       | proto/codec proto/parameters
 clients/core/stream | clients/core/core.h clients/core/wire proto/codec
 clients/core/wire  | clients/core/core.h proto/codec proto/parameters
 clients/grpc       | clients/core clothstream
