@@ -90,7 +90,7 @@ class SceneServer {
   v1::ListScenesResponse listScenes() const;
   tl::expected<v1::GetSceneResponse, v1::Error> getScene(const v1::GetSceneRequest& request) const;
   // Refuses a request for uploaded content, because uploads need a stream.
-  void createScene(const v1::CreateSceneRequest& request, CreateDone done);
+  void createScene(const v1::CreateSceneRequest& request, const CreateDone& done);
   void deleteScene(const v1::DeleteSceneRequest& request, DeleteDone done);
   void startRecording(const v1::StartRecordingRequest& request, StartRecordingDone done);
   void stopRecording(const v1::StopRecordingRequest& request, StopRecordingDone done);
