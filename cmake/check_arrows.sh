@@ -24,8 +24,8 @@ server/hosting     | server/scene server/delivery server/schedule server/model s
 server/session     | server/hosting server/scene server/delivery server/schedule server/messages proto/codec clothstream
 server/recording   | server/model server/vulkan server/simulation server/messages server/scene server/schedule proto/codec proto/recording clothstream
 server/step        | server/model server/vulkan server/simulation server/messages
-server/endpoint/grpc | server/session server/hosting server/delivery clothstream grpc/health
-server/endpoint/web | server/session clothstream
+server/endpoint/grpc | server/session server/hosting clothstream grpc/health
+server/endpoint/web | server/session
 server/options     | server/hosting server/recording server/step server/scene server/model
 server/main.cpp    | server/options server/endpoint server/hosting server/recording server/step server/simulation server/messages server/model server/telemetry server/vulkan
 clients/core       | proto/codec proto/parameters

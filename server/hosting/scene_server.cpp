@@ -95,10 +95,6 @@ vulkan::DeviceInfo SceneServer::deviceInfo() const {
   return state_->device.info();
 }
 
-const std::string& SceneServer::defaultScene() const {
-  return state_->options.defaultScene;
-}
-
 std::string SceneServer::report() const {
   std::string text;
   for (const auto& scene : state_->scenesNow())

@@ -101,7 +101,6 @@ class SceneServer {
 
   // Device in use, also after it was rebuilt.
   vulkan::DeviceInfo deviceInfo() const;
-  const std::string& defaultScene() const;
 
   // Histograms and counters since the start, as a table for people.
   std::string report() const;

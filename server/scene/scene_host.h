@@ -49,8 +49,6 @@ class SceneHost {
             double reportRate);
   ~SceneHost();
 
-  LiveScene& scene() { return live_; }
-
   // Drains the inbox, records the next tick and submits it. Throws vulkan::DeviceLost.
   void begin(Clock::time_point now);
   // Waits for the tick, and hands its frame to the publisher. Throws vulkan::DeviceLost.
