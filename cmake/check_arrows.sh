@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
-# Fails if a file includes something that its room must not see, or if headers of a room include each other
-# (docs/architecture.md: arrows point down only).
+# Fails if a file includes something that its room must not see, if an arrow is not used, if a folder belongs to no
+# room, or if headers include each other (docs/architecture.md: arrows point down only).
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
-# room | the rooms of ours that it sees, in addition to itself
+# room | the rooms of ours that it sees, in addition to itself. A file belongs to the longest room that contains it.
 readonly ARROWS='
 proto/parameters   |
 server/model       | proto/parameters
@@ -22,10 +22,12 @@ server/delivery    | server/schedule server/encode server/messages server/teleme
 server/scene       | server/delivery server/schedule server/model server/vulkan server/simulation server/encode server/messages server/telemetry clothstream
 server/hosting     | server/scene server/delivery server/schedule server/model server/vulkan server/simulation server/messages server/telemetry clothstream
 server/session     | server/hosting server/scene server/delivery server/schedule server/messages proto/codec clothstream
-server/recording   | proto/parameters server/model server/vulkan server/simulation server/messages server/scene server/delivery server/schedule proto/codec proto/recording clothstream
+server/recording   | server/model server/vulkan server/simulation server/messages server/scene server/schedule proto/codec proto/recording clothstream
 server/step        | server/model server/vulkan server/simulation server/messages
-server/endpoint/grpc | server/session server/hosting server/delivery clothstream grpc/health
-server/endpoint/web | server/session server/hosting server/delivery clothstream
+server/endpoint/grpc | server/session server/hosting clothstream grpc/health
+server/endpoint/web | server/session
+server/options     | server/hosting server/recording server/step server/scene server/model
+server/main.cpp    | server/options server/endpoint server/hosting server/recording server/step server/simulation server/messages server/model server/telemetry server/vulkan
 clients/core       | proto/codec proto/parameters
 clients/core/stream | clients/core/core.h clients/core/wire proto/codec
 clients/core/wire  | clients/core/core.h proto/codec proto/parameters
@@ -46,40 +48,76 @@ readonly OUTSIDE='
 failed=0
 complain() { printf 'arrows: %s\n' "$*" && failed=1; }
 
-while IFS='|' read -r room seen; do
-  room=$(echo "$room" | xargs)
-  [ -n "$room" ] && [ -d "$room" ] || continue
-  while IFS=: read -r file line include; do
-    target=$(sed -E 's/.*"([^"]+)".*/\1/' <<<"$include")
-    case "$target" in kernels/*) continue ;; esac
-    allowed=no
-    for prefix in "$room" $seen; do
-      case "$target" in "$prefix" | "$prefix"/*) allowed=yes ;; esac
-    done
-    [ $allowed = yes ] || complain "$file:$line: $room must not see $target"
-  done < <(grep -rnE '^#include "' --include='*.h' --include='*.cpp' "$room" || true)
-done <<<"$ARROWS"
+# Every source of the rooms, generated and installed files left out, and its includes as FILE:LINE:#include ...
+sources=$(find server clients proto -name node_modules -prune -o \( -name '*.h' -o -name '*.cpp' \) -print | sort)
+includes=$(xargs grep -nHE '^#include ["<]' <<<"$sources")
 
-while IFS='|' read -r header rooms; do
-  header=$(echo "$header" | xargs)
-  [ -n "$header" ] || continue
-  while IFS=: read -r file line _; do
-    allowed=no
-    for room in $rooms; do
-      case "$file" in "$room"/*) allowed=yes ;; esac
-    done
-    [ $allowed = yes ] || complain "$file:$line: only ${rooms# } may include $header...>"
-  done < <(grep -rnF "#include $header" --include='*.h' --include='*.cpp' server clients proto || true)
-done <<<"$OUTSIDE"
+awk -v arrows="$ARROWS" -v outside="$OUTSIDE" '
+  function complain(text) { print "arrows: " text; failed = 1 }
+  # Returns whether `path` is `place` or lies in it.
+  function within(path, place) { return path == place || index(path, place "/") == 1 }
+  function roomOf(file,    room, best) {
+    for (room in seen) if (within(file, room) && length(room) > length(best)) best = room
+    return best
+  }
+  # Splits lines of "name | places" into places[name].
+  function readTable(text, places,    lines, count, i, parts) {
+    count = split(text, lines, "\n")
+    for (i = 1; i <= count; ++i) {
+      if (split(lines[i], parts, "|") < 2) continue
+      gsub(/ /, "", parts[1])
+      places[parts[1]] = parts[2]
+    }
+  }
+  function checkArrow(room, target,    places, count, i, allowed) {
+    count = split(seen[room], places, " ")
+    for (i = 1; i <= count; ++i) if (within(target, places[i])) allowed = used[room, places[i]] = 1
+    return allowed || within(target, room)
+  }
+  function checkOutside(room, header,    prefix, places, count, i) {
+    for (prefix in takers) {
+      if (index(header, prefix) != 1) continue
+      count = split(takers[prefix], places, " ")
+      for (i = 1; i <= count; ++i) if (places[i] == room) return
+      complain($1 ":" $2 ": only" takers[prefix] " may include " prefix "...>")
+    }
+  }
+  BEGIN { FS = ":"; readTable(arrows, seen); readTable(outside, takers) }
+  NF == 1 {
+    folder = $1
+    sub(/\/[^\/]*$/, "", folder)
+    room = roomOf($1)
+    holds[room] = 1
+    if (room == "" && !(folder in homeless)) {
+      homeless[folder] = 1
+      complain(folder " belongs to no room; add it to the list in cmake/check_arrows.sh")
+    }
+    next
+  }
+  {
+    room = roomOf($1)
+    header = $3
+    for (i = 4; i <= NF; ++i) header = header ":" $i
+    sub(/^#include /, "", header)
+    checkOutside(room, header)
+    if (room == "" || header !~ /^"/) next
+    split(header, parts, "\"")
+    if (parts[2] !~ /^kernels\// && !checkArrow(room, parts[2])) complain($1 ":" $2 ": " room " must not see " parts[2])
+  }
+  END {
+    for (room in seen) {
+      if (!(room in holds)) complain(room " is in the list of cmake/check_arrows.sh, but has no sources; remove it")
+      count = split(seen[room], places, " ")
+      for (i = 1; i <= count; ++i)
+        if (!((room, places[i]) in used)) complain("the arrow " room " -> " places[i] " is not used; remove it")
+    }
+    exit failed
+  }' <<<"$sources
+$includes" || failed=1
 
-# Headers inside a room form no cycle; an upward arrow always closes one.
-while IFS='|' read -r room _; do
-  room=$(echo "$room" | xargs)
-  case "$room" in server/* | clients/core) ;; *) continue ;; esac
-  edges=$(grep -rE "^#include \"$room/[^\"]+\.h\"" --include='*.h' "$room" |
-    sed -E 's/^([^:]+):#include "([^"]+)".*/\2 \1/' || true)
-  cycle=$(tsort <<<"$edges" 2>&1 >/dev/null | sed -n 's/^tsort: \(.*\.h\)$/\1/p' | tr '\n' ' ' || true)
-  [ -z "$cycle" ] || complain "$room: these headers include each other: $cycle"
-done <<<"$ARROWS"
+# No header includes itself by way of others.
+edges=$(sed -nE 's/^([^:]+\.h):[0-9]+:#include "([^"]+\.h)".*/\2 \1/p' <<<"$includes")
+cycle=$(tsort <<<"$edges" 2>&1 >/dev/null | sed -n 's/^tsort: \(.*\.h\)$/\1/p' | tr '\n' ' ' || true)
+[ -z "$cycle" ] || complain "these headers include each other: $cycle"
 
 exit $failed

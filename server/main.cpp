@@ -26,11 +26,12 @@
 #include "server/messages/scene_file.h"
 #include "server/messages/scene_message.h"
 #include "server/model/material.h"
-#include "server/program_options.h"
+#include "server/options/program_options.h"
 #include "server/recording/playback.h"
 #include "server/recording/recordings.h"
 #include "server/recording/resimulate.h"
 #include "server/simulation/software_threads.h"
+#include "server/step/step.h"
 #include "server/telemetry/log.h"
 #include "server/vulkan/device.h"
 
@@ -49,6 +50,8 @@ class Signals {
     std::signal(SIGXFSZ, SIG_IGN);  // a file at its size limit is reported like a full disk
   }
 
+  // Returns the next signal.
+  int wait() const { return std::max(0, sigwaitinfo(&set_, nullptr)); }
   // Returns the next signal, or 0 after `timeout`.
   int wait(std::chrono::nanoseconds timeout) const {
     const auto wholeSeconds = std::chrono::duration_cast<std::chrono::seconds>(timeout);
@@ -61,13 +64,9 @@ class Signals {
   sigset_t set_{};
 };
 
-constexpr const char* kServerName = "clothstream-server " CLOTHSTREAM_VERSION;
-
 // `nodes` is the size of the scene that the device will simulate.
 vulkan::DeviceOptions deviceOptions(const ProgramOptions& options, std::uint32_t nodes) {
-  return simulation::suitedTo(nodes, {.select = options.device,
-                                      .softwareThreads = options.softwareThreads,
-                                      .cacheDirectory = options.cacheDirectory});
+  return simulation::suitedTo(nodes, options.server.device);
 }
 
 std::string describe(const vulkan::DeviceInfo& device) {
@@ -131,7 +130,7 @@ std::vector<model::Scene> loadScenes(const ProgramOptions& options) {
     scenes.push_back(std::move(scene));
   }
   for (model::Scene& scene : scenes)
-    if (scene.name == options.scene) scene = adjusted(std::move(scene), options);
+    if (scene.name == options.server.defaultScene) scene = adjusted(std::move(scene), options);
   return scenes;
 }
 
@@ -156,19 +155,14 @@ std::string localAddress(const std::string& host, std::uint16_t port) {
 void waitForStop(const Signals& signals, const ProgramOptions& options,
                  const std::function<std::string()>& report) {
   using Clock = std::chrono::steady_clock;
-  constexpr std::chrono::hours kLong{24 * 365};
-  const Clock::time_point end =
-      Clock::now() +
-      (options.stopAfter ? std::chrono::duration_cast<Clock::duration>(*options.stopAfter) : kLong);
-  for (;;) {
-    const Clock::duration left = end - Clock::now();
-    const int signal = left > Clock::duration::zero() ? signals.wait(left) : 0;
-    if (signal == SIGUSR1) {
-      fmt::print("{}", report());
-      std::fflush(stdout);
-    } else if (signal != 0 || Clock::now() >= end) {
-      return;
-    }
+  std::optional<Clock::time_point> end;
+  if (options.stopAfter) end = Clock::now() + *options.stopAfter;
+  while (!end || Clock::now() < *end) {
+    const int signal = end ? signals.wait(*end - Clock::now()) : signals.wait();
+    if (signal == SIGINT || signal == SIGTERM) return;
+    if (signal != SIGUSR1) continue;
+    fmt::print("{}", report());
+    std::fflush(stdout);
   }
 }
 
@@ -195,17 +189,6 @@ void openEndpoints(hosting::SceneServer& server, const ProgramOptions& options, 
   fmt::print("{}", report());
 }
 
-// Options that apply both to simulated scenes and to a recording.
-hosting::ServerOptions sharedOptions(const ProgramOptions& options, const std::string& defaultScene) {
-  return {.device = {},
-          .defaultScene = defaultScene,
-          .serverName = kServerName,
-          .maxParticipants = options.maxParticipants,
-          .reconnectGrace = {.place = std::chrono::duration_cast<schedule::Clock::duration>(options.hold)},
-          .participantsMay = options.participantsMay,
-          .outsideControl = !options.ownersAlone};
-}
-
 int play(const ProgramOptions& options, const Signals& signals) {
   auto recording = recording::RecordedStream::open(options.recording);
   if (!recording) throw std::runtime_error(recording.error());
@@ -217,9 +200,8 @@ int play(const ProgramOptions& options, const Signals& signals) {
   const std::string scene = recording->scene();
   const std::string intro = fmt::format("plays   {}, {:.1f} s of {}, recorded on {}\n", options.recording,
                                         recording->length(), scene, recording->device());
-  hosting::SceneServer server(scene,
-                              std::make_shared<recording::Playback>(std::move(*recording), options.playback),
-                              sharedOptions(options, scene));
+  hosting::SceneServer server(
+      scene, std::make_shared<recording::Playback>(std::move(*recording), options.playback), options.server);
   openEndpoints(server, options, signals, intro, [&] { return server.report(); });
   return 0;
 }
@@ -239,14 +221,10 @@ int serve(const ProgramOptions& options, const Signals& signals) {
                                    .serverName = kServerName,
                                    .maxBytes = static_cast<std::uint64_t>(options.recordLimitMb * 1e6)},
         !options.recordsOnRequest);
-  const auto first = std::ranges::find(scenes, options.scene, &model::Scene::name);
+  const auto first = std::ranges::find(scenes, options.server.defaultScene, &model::Scene::name);
   const std::uint32_t nodes = first == scenes.end() ? 0 : first->nodeCount();
-  hosting::ServerOptions serverOptions = sharedOptions(options, options.scene);
+  hosting::ServerOptions serverOptions = options.server;
   serverOptions.device = deviceOptions(options, nodes);
-  serverOptions.runAlways = options.alwaysRun;
-  serverOptions.reportRate = options.reportRate;
-  serverOptions.maxCreatedScenes = options.maxCreatedScenes;
-  serverOptions.encoderThreads = options.encoderThreads;
   serverOptions.journals = [&](const model::Scene& scene) {
     return recordings ? recordings->add(scene.name) : nullptr;
   };
@@ -256,8 +234,6 @@ int serve(const ProgramOptions& options, const Signals& signals) {
                 fmt::format("device  {}\nscenes  {}\n", describe(server.deviceInfo()), sceneList), report);
   return 0;
 }
-
-constexpr int kInterrupted = 130;  // exit code of shells for SIGINT
 
 bool isInterrupted(const Signals& signals) {
   const int signal = signals.wait(std::chrono::nanoseconds(0));
@@ -293,7 +269,7 @@ int resimulate(const ProgramOptions& options, const Signals& signals) {
 }
 
 int runSteps(const ProgramOptions& options, const Signals& signals) {
-  const model::Scene scene = adjusted(loaded(messages::loadScene(options.scene)), options);
+  const model::Scene scene = adjusted(loaded(messages::loadScene(options.server.defaultScene)), options);
   vulkan::Device device(deviceOptions(options, scene.nodeCount()));
   step::StepOptions stepOptions = options.step;
   stepOptions.serverName = kServerName;

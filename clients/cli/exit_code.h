@@ -2,6 +2,8 @@
 // Exit codes of the program and their text in --help.
 #pragma once
 
+#include <string>
+
 #include "clients/grpc/failure.h"
 
 namespace clothstream::cli {
@@ -17,14 +19,25 @@ enum ExitCode : int {
   kUnreadable = 7,
 };
 
-inline constexpr const char* kExitCodes =
-    "Exit codes: 0 success; 1 --hash found a frame that differs from the server's, or encode one that breaks "
-    "its\n"
-    "promise; 2 wrong arguments; 3 no server answers; 4 the server refuses (unknown scene, value not "
-    "allowed);\n"
-    "5 the stream was lost; 6 a file cannot be written, or writing was interrupted; 7 a file cannot be read "
-    "or is\n"
-    "damaged.";
+struct ExitMeaning {
+  ExitCode code;
+  const char* text;
+};
+
+inline constexpr ExitMeaning kExitMeanings[] = {
+    {kOk, "success"},
+    {kHashMismatch,
+     "--hash found a frame that differs from the server's, or encode one that breaks its promise"},
+    {kUsage, "wrong arguments"},
+    {kUnreachable, "no server answers"},
+    {kRefused, "the server refuses (unknown scene, value not allowed)"},
+    {kLost, "the stream was lost"},
+    {kNotWritten, "a file cannot be written, or writing was interrupted"},
+    {kUnreadable, "a file cannot be read or is damaged"},
+};
+
+// Text for --help, in lines of at most 107 columns.
+std::string exitCodeHelp();
 
 constexpr ExitCode exitCodeOf(Failure::Kind kind) {
   switch (kind) {

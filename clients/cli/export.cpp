@@ -54,7 +54,7 @@ tl::expected<std::uint32_t, Error> forEachFrame(const ExportOptions& options, co
 
 tl::expected<std::uint32_t, Error> writeGltf(const ExportOptions& options) {
   GltfAnimation animation;
-  const auto frames = forEachFrame(options, [&](const cs_client* client, double seconds) -> Done {
+  auto frames = forEachFrame(options, [&](const cs_client* client, double seconds) -> Done {
     if (animation.frames() == kMaxGltfFrames)
       return makeError(
           kUsage,

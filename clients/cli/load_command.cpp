@@ -132,7 +132,6 @@ std::string text(load::LoadReport& report, std::optional<double> serverCpu) {
 
 void LoadCommand::add(CLI::App& app) {
   command_ = app.add_subcommand("load", "Run a load test with many participants and print what they receive");
-  command_->footer(kExitCodes);
   command_->add_option(
       "ADDRESS", address_,
       "HOST or HOST:PORT of the server's gRPC endpoint, default 127.0.0.1:50051; with --web, of its web "

@@ -8,6 +8,7 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
+#include "clients/cli/exit_code.h"
 #include "clients/cli/join.h"
 #include "clients/cli/list.h"
 #include "clients/cli/load_command.h"
@@ -53,7 +54,6 @@ std::string addressOf(const std::string& text) {
 
 int run(int argc, char** argv) {
   CLI::App app("Follows and records scenes of a clothstream-server; encodes motion files.", "clothstream");
-  app.footer(kExitCodes);
   app.require_subcommand(1);
   app.set_version_flag("--version", CLOTHSTREAM_VERSION);
 
@@ -62,7 +62,6 @@ int run(int argc, char** argv) {
   std::vector<std::string> colliders;
   CLI::App& joinCommand =
       *app.add_subcommand("join", "Join a scene, show the stream, print a summary at the end");
-  joinCommand.footer(kExitCodes);
   joinCommand.add_option("ADDRESS", address, "HOST or HOST:PORT of the server")->capture_default_str();
   joinCommand.add_option("--scene", joinOptions.scene, "Scene to join; default: the server's default scene");
   std::string role;
@@ -103,12 +102,10 @@ int run(int argc, char** argv) {
   SetOptions setOptions;
   CLI::App& setCommand = *app.add_subcommand("set", "Change parameters of a running scene");
   addSetOptions(setCommand, setOptions);
-  setCommand.footer(kExitCodes);
   setCommand.add_option("ADDRESS", address, "HOST or HOST:PORT of the server")->capture_default_str();
 
   ListOptions listOptions;
   CLI::App& listCommand = *app.add_subcommand("list", "List the scenes of a server");
-  listCommand.footer(kExitCodes);
   listCommand.add_option("ADDRESS", address, "HOST or HOST:PORT of the server")->capture_default_str();
   listCommand.add_flag("--json", listOptions.json, "Print a JSON array");
 
@@ -123,6 +120,9 @@ int run(int argc, char** argv) {
 
   LoadCommand loadCommand;
   loadCommand.add(app);
+
+  app.footer(exitCodeHelp());
+  for (CLI::App* command : app.get_subcommands({})) command->footer(exitCodeHelp());
 
   try {
     app.parse(argc, argv);

@@ -11,7 +11,6 @@ namespace clothstream::cli {
 void MotionCommands::add(CLI::App& app) {
   encode_ =
       app.add_subcommand("encode", "Encode the motion of a grid in a file, as a server would stream it");
-  encode_->footer(kExitCodes);
   encode_
       ->add_option("MOTION", encodeOptions_.motion,
                    "Motion file: int32 columns, rows, frames, 0; then per frame float32 positions and "
@@ -47,7 +46,6 @@ void MotionCommands::add(CLI::App& app) {
   encode_->add_flag("--json", encodeOptions_.json, "Print the summary as one JSON object");
 
   decode_ = app.add_subcommand("decode", "Decode a file that encode wrote");
-  decode_->footer(kExitCodes);
   decode_->add_option("OUT", decodeOptions_.recording, "File that encode wrote")->required();
   decode_
       ->add_option("FRAMES", decodeOptions_.out,

@@ -7,7 +7,6 @@ namespace clothstream::cli {
 
 void RecordingCommands::add(CLI::App& app, std::string& address) {
   record_ = app.add_subcommand("record", "Join a scene and write its stream to a file (MCAP)");
-  record_->footer(kExitCodes);
   record_->add_option("SCENE", recordOptions_.scene, "Scene; default: the server's default scene");
   record_->add_option("-o,--output", recordOptions_.output, "File to write; must not exist")
       ->type_name("FILE")
@@ -19,20 +18,17 @@ void RecordingCommands::add(CLI::App& app, std::string& address) {
   record_->add_option("--server", address, "HOST or HOST:PORT of the server")->capture_default_str();
 
   info_ = app.add_subcommand("info", "Show the content of a recording and check all of it");
-  info_->footer(kExitCodes);
   info_->add_option("FILE", infoOptions_.recording, "The recording")->required();
   info_->add_flag("--quick", infoOptions_.quick, "Read only the index and check nothing else");
   info_->add_flag("--json", infoOptions_.json, "Print one JSON object");
 
   recover_ =
       app.add_subcommand("recover", "Write a complete recording from the readable parts of a damaged one");
-  recover_->footer(kExitCodes);
   recover_->add_option("FILE", recoverOptions_.recording, "Damaged recording; it is not changed")->required();
   recover_->add_option("OUT", recoverOptions_.out, "Recording to write; must not exist")->required();
 
   export_ =
       app.add_subcommand("export", "Write the frames of a recording as an animated glTF or as OBJ files");
-  export_->footer(kExitCodes);
   export_->add_option("FILE", exportOptions_.recording, "The recording")->required();
   export_
       ->add_option("OUT", exportOptions_.out,

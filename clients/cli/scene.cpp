@@ -39,11 +39,7 @@ ExitCode done(const tl::expected<void, Failure>& result) {
 }  // namespace
 
 void SceneCommands::add(CLI::App& app, std::string& address) {
-  const auto command = [&](const char* name, const char* what) {
-    CLI::App* added = app.add_subcommand(name, what);
-    added->footer(kExitCodes);
-    return added;
-  };
+  const auto command = [&](const char* name, const char* what) { return app.add_subcommand(name, what); };
   const auto takesAddress = [&](CLI::App* added) {
     added->add_option("--server", address, "HOST or HOST:PORT of the server")->capture_default_str();
   };

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <cassert>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -290,6 +291,7 @@ auto& settingOf(Settings& settings, ClothNumber number) {
     if (row.parameter.number == number) found = row.setting(settings);
   };
   std::apply([&](const auto&... rows) { (look(rows), ...); }, kClothTable);
+  assert(found != nullptr);
   return *found;
 }
 

@@ -72,13 +72,16 @@ void SceneMaker::remove(v1::DeleteSceneRequest request, DeleteDone done) {
 }
 
 tl::expected<std::shared_ptr<scene::Journal>, v1::Error> SceneMaker::journalOf(
-    const std::string& name) const {
+    const std::string& call, const std::string& name) const {
   const std::shared_ptr<scene::LiveScene> scene = server_.find(name);
   if (!scene) return tl::unexpected(server_.noSuchScene(name));
   if (scene->source)
     return refused(v1::ERROR_CODE_INVALID_ARGUMENT,
-                   fmt::format("startRecording: '{}' is a recording that is played", scene->name()));
-  if (!scene->journal) return refused(scene::noJournalError().code, scene::noJournalError().text);
+                   fmt::format("{}: '{}' is a recording that is played", call, scene->name()));
+  if (!scene->journal) {
+    messages::FieldError error = scene::noJournalError(call);
+    return refused(error.code, std::move(error.text));
+  }
   return scene->journal;
 }
 
@@ -96,7 +99,7 @@ void SceneMaker::stopRecording(v1::StopRecordingRequest request, StopRecordingDo
 
 tl::expected<v1::StartRecordingResponse, v1::Error> SceneMaker::startNow(
     const v1::StartRecordingRequest& request) const {
-  const auto journal = journalOf(request.scene());
+  const auto journal = journalOf("startRecording", request.scene());
   if (!journal) return tl::unexpected(journal.error());
   auto file = (*journal)->start(request.name());
   if (!file) return refused(file.error().code, std::move(file.error().text));
@@ -107,7 +110,7 @@ tl::expected<v1::StartRecordingResponse, v1::Error> SceneMaker::startNow(
 
 tl::expected<v1::StopRecordingResponse, v1::Error> SceneMaker::stopNow(
     const v1::StopRecordingRequest& request) const {
-  const auto journal = journalOf(request.scene());
+  const auto journal = journalOf("stopRecording", request.scene());
   if (!journal) return tl::unexpected(journal.error());
   auto stopped = (*journal)->stop();
   if (!stopped) return refused(stopped.error().code, std::move(stopped.error().text));

@@ -45,7 +45,8 @@ class SceneMaker {
                                                              const std::string& uploaded);
   tl::expected<model::Scene, v1::Error> definitionOf(const v1::CreateSceneRequest& request,
                                                      const std::string& uploaded) const;
-  tl::expected<std::shared_ptr<scene::Journal>, v1::Error> journalOf(const std::string& scene) const;
+  tl::expected<std::shared_ptr<scene::Journal>, v1::Error> journalOf(const std::string& call,
+                                                                     const std::string& scene) const;
   tl::expected<v1::DeleteSceneResponse, v1::Error> removeNow(const v1::DeleteSceneRequest& request);
   tl::expected<v1::StartRecordingResponse, v1::Error> startNow(
       const v1::StartRecordingRequest& request) const;

@@ -25,8 +25,8 @@ SceneServer::SceneServer(std::vector<model::Scene> scenes, ServerOptions options
     throw std::runtime_error(
         fmt::format("there is no scene '{}'; there are {}", options.defaultScene, known));
   // The first scene is loaded when the constructor returns.
-  std::ranges::stable_partition(
-      scenes, [&](const model::Scene& scene) { return scene.name == options.defaultScene; });
+  std::stable_partition(scenes.begin(), scenes.end(),
+                        [&](const model::Scene& scene) { return scene.name == options.defaultScene; });
   state_ = std::make_unique<State>(std::move(scenes), std::move(options));
 }
 
@@ -51,7 +51,7 @@ tl::expected<v1::GetSceneResponse, v1::Error> SceneServer::getScene(
   return state_->getScene(request);
 }
 
-void SceneServer::createScene(const v1::CreateSceneRequest& request, CreateDone done) {
+void SceneServer::createScene(const v1::CreateSceneRequest& request, const CreateDone& done) {
   if (request.source_case() == v1::CreateSceneRequest::kUploadedContentId) {
     v1::Error error;
     error.set_code(v1::ERROR_CODE_NOT_FOUND);
@@ -93,10 +93,6 @@ void SceneServer::stop() {
 
 vulkan::DeviceInfo SceneServer::deviceInfo() const {
   return state_->device.info();
-}
-
-const std::string& SceneServer::defaultScene() const {
-  return state_->options.defaultScene;
 }
 
 std::string SceneServer::report() const {

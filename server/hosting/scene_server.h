@@ -15,6 +15,8 @@
 #include "server/delivery/wire_types.h"
 #include "server/messages/limits.h"
 #include "server/model/scene.h"
+#include "server/scene/defaults.h"
+#include "server/scene/roles.h"
 #include "server/scene/roster.h"
 #include "server/simulation/collision/moving_collider.h"
 #include "server/vulkan/device.h"
@@ -40,7 +42,7 @@ struct ServerOptions {
   // Scenes without subscribers keep running: the default scene from the start, others once they were joined.
   bool runAlways = false;
   // Frames per second of each scene that carry a simulation report; 0 for none.
-  double reportRate = 4;
+  double reportRate = scene::kDefaultReportRate;
   std::uint32_t maxConnections = 1024;
   // Limit for each scene, disconnected participants included. At most kMaxParticipants. A peer that creates
   // a scene may set a lower limit.
@@ -88,7 +90,7 @@ class SceneServer {
   v1::ListScenesResponse listScenes() const;
   tl::expected<v1::GetSceneResponse, v1::Error> getScene(const v1::GetSceneRequest& request) const;
   // Refuses a request for uploaded content, because uploads need a stream.
-  void createScene(const v1::CreateSceneRequest& request, CreateDone done);
+  void createScene(const v1::CreateSceneRequest& request, const CreateDone& done);
   void deleteScene(const v1::DeleteSceneRequest& request, DeleteDone done);
   void startRecording(const v1::StartRecordingRequest& request, StartRecordingDone done);
   void stopRecording(const v1::StopRecordingRequest& request, StopRecordingDone done);
@@ -99,7 +101,6 @@ class SceneServer {
 
   // Device in use, also after it was rebuilt.
   vulkan::DeviceInfo deviceInfo() const;
-  const std::string& defaultScene() const;
 
   // Histograms and counters since the start, as a table for people.
   std::string report() const;

@@ -16,7 +16,6 @@ using google::protobuf::Message;
 using parameters::ClothNumber;
 using parameters::ClothNumbers;
 using parameters::ClothParameter;
-using parameters::Group;
 using parameters::kClothParameters;
 using parameters::WireField;
 

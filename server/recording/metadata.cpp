@@ -8,6 +8,8 @@
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 
+#include "kernels/shader_hash.h"
+
 namespace clothstream::recording {
 namespace {
 
@@ -38,10 +40,6 @@ std::string processorFeatures() {
 #endif
 }
 
-std::string shaderHash() {
-  return CLOTHSTREAM_SHADER_HASH;
-}
-
 Metadata metadataOf(const std::string& serverName, const vulkan::DeviceInfo& device,
                     const model::Scene& scene, const v1::StreamDescription& description) {
   return {{"server", serverName},
@@ -52,7 +50,7 @@ Metadata metadataOf(const std::string& serverName, const vulkan::DeviceInfo& dev
           {"vulkan", device.apiVersion},
           {"processor", processorFeatures()},
           {"software_vector_bits", setting("LP_NATIVE_VECTOR_WIDTH")},
-          {"shaders", shaderHash()},
+          {"shaders", kernels::kShaderHash},
           {"codec", fmt::format("{}", description.codec())},
           {"max_error", fmt::format("{}", description.max_error())},
           {"vertices", fmt::format("{}", scene.nodeCount())},

@@ -18,7 +18,4 @@ Metadata metadataOf(const std::string& serverName, const vulkan::DeviceInfo& dev
 // Processor features of this machine that software Vulkan devices depend on, separated by spaces.
 std::string processorFeatures();
 
-// Hash of the sources of all kernels in this program.
-std::string shaderHash();
-
 }  // namespace clothstream::recording

@@ -28,7 +28,7 @@ struct PlaybackOptions {
 // frame is a key frame with the next tick. References between frames are relative, so they stay valid.
 // Playback stops while the scene has no participants, and until the first one can receive a frame. A client
 // that needs a key frame gets the next recorded one, or, while the scene is paused, the previous one.
-class Playback : public scene::FrameSource {
+class Playback final : public scene::FrameSource {
  public:
   Playback(RecordedStream recording, const PlaybackOptions& options);
   ~Playback() override;

@@ -35,7 +35,7 @@ struct RecorderOptions {
 
 // Journal of one recording. Thread-safe. Creates the file SCENE-TIME.mcap when the scene starts to run. An
 // error ends the recording and is logged; it does not affect the scene.
-class Recorder : public scene::Journal {
+class Recorder final : public scene::Journal {
  public:
   explicit Recorder(RecorderOptions options) : options_(std::move(options)) {}
   // Creates the file immediately, with this name if it is not empty. The error says why that is impossible,

@@ -6,17 +6,18 @@
 namespace clothstream::scene {
 
 messages::Result<std::string> Journal::start(const std::string&) {
-  return tl::unexpected(noJournalError());
+  return tl::unexpected(noJournalError("startRecording"));
 }
 
 messages::Result<v1::StopRecordingResponse> Journal::stop() {
-  return tl::unexpected(noJournalError());
+  return tl::unexpected(noJournalError("stopRecording"));
 }
 
-messages::FieldError noJournalError() {
-  return {v1::ERROR_CODE_INVALID_ARGUMENT,
-          "startRecording: this server takes no recordings on request; start it with clothstream-server "
-          "--recordings DIR"};
+messages::FieldError noJournalError(const std::string& call) {
+  return {
+      v1::ERROR_CODE_INVALID_ARGUMENT,
+      call +
+          ": this server takes no recordings on request; start it with clothstream-server --recordings DIR"};
 }
 
 delivery::SharedBytes recordingNotice(std::uint64_t tick) {

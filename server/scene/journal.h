@@ -66,8 +66,8 @@ class Journal {
   virtual void left(std::uint64_t participant) = 0;
 };
 
-// Error for a request to record a scene that has no journal.
-messages::FieldError noJournalError();
+// Error for a request, such as "startRecording", that needs the journal of a scene that has none.
+messages::FieldError noJournalError(const std::string& call);
 
 // Notice that a scene is being recorded.
 delivery::SharedBytes recordingNotice(std::uint64_t tick);

@@ -12,6 +12,7 @@
 #include "server/messages/field_error.h"
 #include "server/model/scene.h"
 #include "server/model/stability.h"
+#include "server/scene/defaults.h"
 #include "server/scene/frame_source.h"
 #include "server/scene/inbox.h"
 #include "server/scene/journal.h"

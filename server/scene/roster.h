@@ -29,9 +29,6 @@ struct ReconnectGrace {
   Clock::duration poses = std::chrono::seconds(2);
 };
 
-// Participants of a scene, disconnected ones included, unless the server or the scene sets another limit.
-inline constexpr std::uint32_t kDefaultMaxParticipants = 64;
-
 struct Participant {
   std::uint64_t id = 0;
   std::string displayName, clientName;

@@ -261,9 +261,10 @@ void SceneHost::recordFrame(Clock::time_point now) {
   }
   // Key frames first: a subscriber that changes its quality must get the new quality's key frame before the
   // former quality's frame of the same tick.
-  std::ranges::partition(frame_.recorded, [](const delivery::CompleteFrame::Recorded& recorded) {
-    return recorded.frame.kind == codec::PacketKind::key;
-  });
+  std::partition(frame_.recorded.begin(), frame_.recorded.end(),
+                 [](const delivery::CompleteFrame::Recorded& recorded) {
+                   return recorded.frame.kind == codec::PacketKind::key;
+                 });
   describeFrame(tickStart_);
   std::swap(frame_.poseArrivals, poseArrivals_);
   poseArrivals_.clear();

@@ -14,6 +14,7 @@
 #include "server/delivery/frame_publisher.h"
 #include "server/scene/collider_set.h"
 #include "server/scene/contact_log.h"
+#include "server/scene/defaults.h"
 #include "server/scene/grabs_and_attachments.h"
 #include "server/scene/live_scene.h"
 #include "server/scene/pose_history.h"
@@ -43,19 +44,14 @@ class SceneHost {
   // While the scene is recorded, at least one of this many frames is a key frame.
   static constexpr std::uint32_t kMaxKeyFrameDistance = 24;
 
-  // Default number of frames per second that carry a simulation report.
-  static constexpr double kReportRate = 4;
-
   // All arguments must outlive the host. With `reportRate` 0 no frame carries a report. Throws
   // std::runtime_error if the device has no room for the scene.
   SceneHost(vulkan::Device& device, LiveScene& scene, delivery::FramePublisher& publisher,
-            double reportRate = kReportRate);
+            double reportRate = kDefaultReportRate);
   // `loaded` holds the scene's start.
   SceneHost(std::unique_ptr<SceneOnDevice> loaded, LiveScene& scene, delivery::FramePublisher& publisher,
             double reportRate);
   ~SceneHost();
-
-  LiveScene& scene() { return live_; }
 
   static constexpr std::chrono::milliseconds kSliceTime{10};
 

@@ -61,16 +61,6 @@ double bytesOfAssembly(const model::Cloth& cloth) {
          static_cast<double>(model::systemEntries(cloth)) * 12;
 }
 
-// Compares one substep that is solved to the end with the reference, as in suite enforcement. Returns its
-// iterations.
-std::uint32_t check(vulkan::Device& device, const Settings& settings, model::Scene scene) {
-  const double allowed = solveToTheEnd(scene);
-  Simulated simulated(device, scene,
-                      {.workgroupSize = settings.workgroupSize, .solveWholeNodes = settings.solveWholeNodes});
-  simulated.check({scene.environment, {}}, allowed);
-  return simulated.solves().front().iterations;
-}
-
 // A path with few and with many iterations; the difference is the cost of iterations. Uses minimum times,
 // since a difference of medians would contain disturbances of the machine.
 struct Contender {
@@ -97,7 +87,9 @@ Rows measureSize(vulkan::Device& device, const Settings& settings, std::uint32_t
   std::array<Contender, 2> contenders;
   std::vector<Simulated*> all;
   for (std::size_t i = 0; i < contenders.size(); ++i) {
-    const std::uint32_t iterations = check(device, settings, sheetOf(size, bend, kPaths[i], kFew));
+    const std::uint32_t iterations = checkWithReference(
+        device, sheetOf(size, bend, kPaths[i], kFew),
+        {.workgroupSize = settings.workgroupSize, .solveWholeNodes = settings.solveWholeNodes});
     const auto make = [&](std::uint32_t most) {
       auto made = std::make_unique<Simulated>(
           device, sheetOf(size, bend, kPaths[i], most),

@@ -31,12 +31,6 @@ simulation::SimulationOptions optionsOf(const Settings& settings, bool whole) {
           .solveWholeNodes = whole ? ~0u : 0u};
 }
 
-// Compares one substep that is solved to the end with the reference.
-void check(vulkan::Device& device, const Settings& settings, model::Scene scene, bool whole) {
-  const double allowed = solveToTheEnd(scene);
-  Simulated(device, scene, optionsOf(settings, whole)).check({scene.environment, {}}, allowed);
-}
-
 Rows measureSize(vulkan::Device& device, const Settings& settings, std::uint32_t size) {
   const model::Scene scene = hungSheet(size,
                                        {.kind = model::SolverKind::constraint,
@@ -50,7 +44,7 @@ Rows measureSize(vulkan::Device& device, const Settings& settings, std::uint32_t
   // Both alternate, so that disturbances of the machine affect them alike.
   std::vector<std::unique_ptr<Simulated>> both;
   for (const bool whole : {true, false}) {
-    if (size <= 32) check(device, settings, scene, whole);
+    if (size <= 32) checkWithReference(device, scene, optionsOf(settings, whole));
     both.push_back(std::make_unique<Simulated>(device, scene, optionsOf(settings, whole)));
     both.back()->tick(inputs);
     both.back()->forgetTimes();

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// clothstream-bench-recording: time to open a recording of an hour for playback, and to seek in it until the
-// viewer has the key frame and its parameters. Also for recordings with constant parameter changes, and for
-// truncated files. The exit status is 1 if a seek leads to a wrong place.
+// clothstream-bench-recording: time to open a recording for playback, and to seek in it until the viewer has
+// the key frame and its parameters. Also for recordings with constant parameter changes, and for truncated
+// files. The exit status is 1 if a seek leads to a wrong place, and 2 for wrong arguments.
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -17,6 +17,7 @@
 #include <string>
 #include <vector>
 
+#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
 #include "clothstream/v1/session.pb.h"
@@ -35,8 +36,10 @@ using namespace clothstream;
 using namespace clothstream::recording;
 using Clock = std::chrono::steady_clock;
 
-constexpr std::uint32_t kHour = 3600 * kSampleRate;
-constexpr int kSeeks = 2000;
+struct Options {
+  std::uint32_t minutes = 60;  // length of each recording
+  std::uint32_t seeks = 2000;  // in each recording
+};
 
 template <typename Value>
 Value got(tl::expected<Value, std::string> value) {
@@ -102,8 +105,9 @@ void check(std::uint32_t frame, const v1::Playback& playback, const v1::Paramete
         fmt::format("a seek to frame {} sent wrong parameters: {}", frame, sent.ShortDebugString()));
 }
 
-// Measures a recording of `frames` frames that is played to one viewer.
-void measure(const std::string& name, const std::string& path, std::uint32_t frames, bool sliders) {
+// Measures `seekCount` seeks in a recording of `frames` frames that is played to one viewer.
+void measure(const std::string& name, const std::string& path, std::uint32_t frames, bool sliders,
+             std::uint32_t seekCount) {
   const auto opening = Clock::now();
   RecordedStream recording = got(RecordedStream::open(path));
   const double openMs = millisecondsSince(opening);
@@ -115,7 +119,7 @@ void measure(const std::string& name, const std::string& path, std::uint32_t fra
   std::mt19937 random(2);
   std::vector<double> seeks;
   double mostProcessorMs = 0;
-  for (int i = 0; i < kSeeks; ++i) {
+  for (std::uint32_t i = 0; i < seekCount; ++i) {
     const auto frame = static_cast<std::uint32_t>(random() % frames);
     v1::ControlSceneRequest request;
     // Never before the frame, whatever the rounding.
@@ -147,33 +151,53 @@ std::uint32_t cut(const std::string& path) {
       std::llround(1e-9 * static_cast<double>(last.start - kSampleStart) * kSampleRate));
 }
 
-void measure() {
-  fmt::print("{:<32}{:>8}{:>10}{:>10}{:>10}{:>10}{:>10}\n", fmt::format("an hour; {} seeks each, ms", kSeeks),
-             "MiB", "open", "median", "p99", "most", "processor");
+void measure(const Options& options) {
+  const std::uint32_t frames = 60 * options.minutes * kSampleRate;
+  fmt::print("{:<32}{:>8}{:>10}{:>10}{:>10}{:>10}{:>10}\n",
+             fmt::format("{} min; {} seeks each, ms", options.minutes, options.seeks), "MiB", "open",
+             "median", "p99", "most", "processor");
   const e2e::TemporaryDirectory directory;
   const auto measureOne = [&](const std::string& name, bool sliders, const auto& write) {
-    const std::string path = (directory.path() / "hour.mcap").string();
+    const std::string path = (directory.path() / "bench.mcap").string();
     {
       OutputFile file = got(OutputFile::create(path));
       write([&](std::string_view bytes) { return file.write(bytes); });
     }
-    measure(name, path, kHour, sliders);
-    measure(name + ", cut", path, cut(path), sliders);
+    measure(name, path, frames, sliders, options.seeks);
+    measure(name + ", cut", path, cut(path), sliders, options.seeks);
     std::filesystem::remove(path);
   };
-  measureOne("42 vertices", false, [](const Sink& sink) { writeSample(sink, kHour); });
-  measureOne("42 vertices, sliders", true, [](const Sink& sink) { writeSampleWithSliders(sink, kHour); });
+  measureOne("42 vertices", false, [&](const Sink& sink) { writeSample(sink, frames); });
+  measureOne("42 vertices, sliders", true, [&](const Sink& sink) { writeSampleWithSliders(sink, frames); });
   codec::StreamLayout large = sampleLayout();
   large.cloths = {{.vertexCount = 4096, .rows = 64, .columns = 64}};
   measureOne("4,096 vertices, sliders", true,
-             [&](const Sink& sink) { writeSampleWithSliders(sink, kHour, large); });
+             [&](const Sink& sink) { writeSampleWithSliders(sink, frames, large); });
 }
 
 }  // namespace
 
-int main() {
+int main(int argc, char** argv) {
+  CLI::App app{
+      "Measures the time to open recordings for playback and to seek in them. Checks where each seek leads.",
+      "clothstream-bench-recording"};
+  app.footer(
+      "Exit status: 0 if every seek led to the right place, 1 otherwise or for an error, 2 for wrong "
+      "arguments.");
+  Options options;
+  app.add_option("--minutes", options.minutes, "Length of each recording")
+      ->check(CLI::Range(1, 600))
+      ->capture_default_str();
+  app.add_option("--seeks", options.seeks, "Seeks in each recording")
+      ->check(CLI::Range(1, 1'000'000))
+      ->capture_default_str();
   try {
-    measure();
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
+  try {
+    measure(options);
     return 0;
   } catch (const std::exception& error) {
     std::fprintf(stderr, "clothstream-bench-recording: %s\n", error.what());

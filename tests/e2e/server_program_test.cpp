@@ -5,6 +5,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <sstream>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -74,6 +75,10 @@ TEST_F(ServerProgram, PrintsDeviceScenesAndAddressesAndStreams) {
 
 TEST_F(ServerProgram, StopsAfterSecondsAndOnInterrupt) {
   EXPECT_EQ(ServerProcess(options({"--seconds", "0.2"})).exitCode(), 0);
+  ServerProcess longest(options({"--seconds", "1e9"}));
+  longest.lineWith("gRPC");
+  longest.signal(SIGTERM);
+  EXPECT_EQ(longest.exitCode(), 0) << longest.output();
   ServerProcess interrupted(options());
   interrupted.lineWith("gRPC");
   interrupted.signal(SIGINT);
@@ -332,6 +337,96 @@ TEST_F(ServerOptions, PrintedConfigurationReadsBackUnchanged) {
   const Result defaults = run({"--print-config"});
   EXPECT_EQ(run({"--config", file(defaults.output), "--print-config"}).output, defaults.output);
   EXPECT_EQ(run({"--config", "deploy/server.toml", "--print-config"}).output, defaults.output);
+}
+
+TEST_F(ServerOptions, PrintedConfigurationReadsBackWithEveryOptionSet) {
+  const Result defaults = run({"--print-config"});
+  for (const char* directory : {"--record", "--recordings"}) {
+    const Result first = run({"--scene=a \"scene\" \\ 'of' mine",
+                              "--scene-file=one.json",
+                              "--scene-file=two, three.json",
+                              "--rate=50",
+                              "--substeps=16",
+                              "--max-error=.5e-3",
+                              "--normals=Octahedral",
+                              "--coding=packed",
+                              "--temporal-layers=2",
+                              "--qualities=3",
+                              "--always-run",
+                              "--reports=0.25",
+                              std::string(directory) + "=line\nand\ttab",
+                              "--record-limit=1e9",
+                              "--max-created-scenes=0",
+                              "--encoder-threads=7",
+                              "--hold=0.000001",
+                              "--max-participants=12",
+                              "--participants-change=cloths,colliders",
+                              "--owners-alone",
+                              "--host=::",
+                              "--port=0",
+                              "--grpc-port=65535",
+                              "--page=# no comment",
+                              "--allow-origin=https://a.example",
+                              "--allow-origin=https://b.example",
+                              "--device=1",
+                              "--software-threads=0",
+                              "--cache-dir",
+                              "",
+                              "--log-level=off",
+                              "--seconds=1e9",
+                              "--print-config"});
+    ASSERT_EQ(first.exitCode, 0) << first.output;
+    for (const char* line :
+         {"\nmax-error = 0.0005\n", "\nrecord-limit = 1000000000\n", "\nhold = 1e-06\n", "\nreports = 0.25\n",
+          "\nseconds = 1000000000\n", "\nscene-file = [\"one.json\", \"two, three.json\"]\n",
+          "\nparticipants-change = [\"cloths\", \"colliders\"]\n", "\ndevice = \"1\"\n"})
+      EXPECT_THAT(first.output, HasSubstr(line));
+    const std::string excluded = directory == std::string("--record") ? "recordings" : "record";
+    std::istringstream lines(defaults.output);
+    for (std::string line; std::getline(lines, line);) {
+      const bool isOption = line.find(" = ") != std::string::npos || line.ends_with(" is not set");
+      if (isOption && line != "# " + excluded + " is not set") {
+        EXPECT_THAT("\n" + first.output, testing::Not(HasSubstr("\n" + line + "\n"))) << "keeps its default";
+      }
+    }
+    const Result second = run({"--config", file(first.output), "--print-config"});
+    EXPECT_EQ(second.exitCode, 0);
+    EXPECT_EQ(second.output, first.output);
+  }
+}
+
+TEST_F(ServerOptions, RefusesNumbersThatAreNotDecimal) {
+  const std::string hint = "use 0 to 65535, in decimal digits without spaces or leading zeros";
+  for (const char* text :
+       {"0755", "0x10", "0b1", "+5", "5e", "1.5", "1e3", "1_000", "-", "99999999999999999999x"}) {
+    const std::string problem = std::string(text) + " is not a port; " + hint;
+    expectError(run({"--port", text}), "--port: " + problem);
+    expectError(run({}, {std::string("CLOTHSTREAM_PORT=") + text}), "CLOTHSTREAM_PORT: " + problem);
+    const std::string config = file("port = '" + std::string(text) + "'\n");
+    expectError(run({"--config", config}), config + ":1: port: " + problem);
+  }
+  expectError(run({"--port", " 5"}), "--port: ' 5' is not a port; " + hint);
+  expectError(run({"--port", "5 "}), "--port: '5 ' is not a port; " + hint);
+  expectError(run({"--port", ""}), "--port: '' is not a port; " + hint);
+  expectError(run({"--hold", "007"}), "--hold: 007 is not a number; use 0 to 3600, in decimal digits");
+  expectError(run({"--hold", "0x1p3"}), "--hold: 0x1p3 is not a number; use 0 to 3600, in decimal digits");
+  expectError(run({"--config", file("port = 0755\n")}), ":1: ");
+  EXPECT_THAT(run({"--port", "0", "--hold", "0.5", "--print-config"}).output,
+              testing::AllOf(HasSubstr("\nport = 0\n"), HasSubstr("\nhold = 0.5\n")));
+}
+
+TEST_F(ServerOptions, RefusesInfiniteAndTooLargeNumbers) {
+  const std::string range = "use more than 0, at most 1000000000";
+  for (const char* text : {"inf", "-inf", "nan", "infinity"}) {
+    expectError(run({"--seconds", text}), std::string("--seconds: ") + text + " is not a number; " + range);
+    expectError(run({"--max-error", text}), std::string("--max-error: ") + text + " is not a number");
+  }
+  for (const char* text : {"1e10", "1e300", "1e999", "0", "-1"})
+    expectError(run({"--seconds", text}), std::string("--seconds: ") + text + " is out of range; " + range);
+  const std::string config = file("seconds = inf\n");
+  expectError(run({"--config", config}), config + ":1: seconds: inf is not a number; " + range);
+  expectError(run({"--substeps", "99999999999999999999"}),
+              "--substeps: 99999999999999999999 is out of range; use 1 to 256");
 }
 
 TEST_F(ServerOptions, StrongerOfTwoExclusiveOptionsWins) {

@@ -289,7 +289,10 @@ TEST_F(RecordingPrograms, PlayARecordingToClients) {
   EXPECT_THAT(clothstream({"set", address_, "--wind", "1,0,0"}).errors,
               HasSubstr("a recording that is played"));
   EXPECT_THAT(control({"create", "--named", "flag"}).errors, HasSubstr("there is no device"));
-  EXPECT_THAT(control({"start-recording", "sample"}).errors, HasSubstr("is a recording that is played"));
+  EXPECT_THAT(control({"start-recording", "sample"}).errors,
+              HasSubstr("startRecording: 'sample' is a recording that is played"));
+  EXPECT_THAT(control({"stop-recording", "sample"}).errors,
+              HasSubstr("stopRecording: 'sample' is a recording that is played"));
   server_->signal(SIGTERM);
   EXPECT_EQ(server_->waitForEnd(kPatience), 0);
 }

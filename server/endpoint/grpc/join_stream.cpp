@@ -87,7 +87,7 @@ void JoinStream::pump() {
     isWriting_ = true;
     io_.Write(sharedBuffer(lastMessage_), begin(written_));
   } else if (finished) {
-    finish(closingStatus(lastMessage_));
+    finish(statusOf(session::closingOf(lastMessage_)));
   }
 }
 

@@ -37,14 +37,16 @@ grpc::Status statusOf(const v1::Error& error) {
   return {codeOf(error.code()), error.text()};
 }
 
-grpc::Status closingStatus(const delivery::SharedBytes& lastMessage) {
-  v1::ServerMessage message;
-  if (lastMessage && message.ParseFromArray(lastMessage->data(), static_cast<int>(lastMessage->size()))) {
-    if (message.error().fatal()) return statusOf(message.error());
-    if (message.notice().kind() == v1::NOTICE_KIND_SCENE_DELETED)
-      return {grpc::StatusCode::NOT_FOUND, message.notice().text()};
+grpc::Status statusOf(const session::Closing& closing) {
+  switch (closing.reason) {
+    case session::Closing::Reason::error:
+      return statusOf(closing.error);
+    case session::Closing::Reason::sceneDeleted:
+      return {grpc::StatusCode::NOT_FOUND, closing.text};
+    case session::Closing::Reason::serverStopping:
+      break;
   }
-  return {grpc::StatusCode::UNAVAILABLE, "the server is stopping"};
+  return {grpc::StatusCode::UNAVAILABLE, closing.text};
 }
 
 }  // namespace clothstream::endpoint

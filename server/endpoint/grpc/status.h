@@ -5,14 +5,13 @@
 #include <grpcpp/support/status.h>
 
 #include "clothstream/v1/session.pb.h"
-#include "server/delivery/envelope.h"
+#include "server/session/closing.h"
 
 namespace clothstream::endpoint {
 
 grpc::Status statusOf(const v1::Error& error);
 
-// Status for a finished session, from its last message: a fatal Error, a notice that the scene was
-// deleted, or else UNAVAILABLE because the server stops.
-grpc::Status closingStatus(const delivery::SharedBytes& lastMessage);
+// NOT_FOUND for a deleted scene, UNAVAILABLE if the server stops.
+grpc::Status statusOf(const session::Closing& closing);
 
 }  // namespace clothstream::endpoint

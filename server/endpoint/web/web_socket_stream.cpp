@@ -11,7 +11,7 @@
 #include <boost/beast/http/rfc7230.hpp>
 #include <fmt/format.h>
 
-#include "clothstream/v1/session.pb.h"
+#include "server/session/closing.h"
 
 namespace clothstream::endpoint {
 namespace {
@@ -43,19 +43,11 @@ std::string_view closeText(std::string_view text) {
   return text.substr(0, size);
 }
 
-// Close reason of a finished session, from its last message.
-ws::close_reason reasonOf(const delivery::SharedBytes& last) {
-  const auto reason = [](ws::close_code code, const std::string& why) {
-    const std::string_view text = closeText(why);
-    return ws::close_reason(code, beast::string_view(text.data(), text.size()));
-  };
-  v1::ServerMessage message;
-  if (last && message.ParseFromArray(last->data(), static_cast<int>(last->size()))) {
-    if (message.error().fatal()) return reason(ws::close_code::policy_error, message.error().text());
-    if (message.notice().kind() == v1::NOTICE_KIND_SCENE_DELETED)
-      return reason(ws::close_code::going_away, message.notice().text());
-  }
-  return {ws::close_code::going_away, "the server is stopping"};
+ws::close_reason reasonOf(const session::Closing& closing) {
+  const std::string_view text = closeText(closing.text);
+  const bool isError = closing.reason == session::Closing::Reason::error;
+  return {isError ? ws::close_code::policy_error : ws::close_code::going_away,
+          beast::string_view(text.data(), text.size())};
 }
 
 }  // namespace
@@ -129,7 +121,7 @@ void WebSocketStream::pump() {
         boost::asio::buffer(outgoing_->data(), outgoing_->size()),
         [self = shared_from_this()](beast::error_code error, std::size_t) { self->onWritten(error); });
   } else if (finished) {
-    close(reasonOf(outgoing_));
+    close(reasonOf(session::closingOf(outgoing_)));
   }
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Rows of the server's table of options.
-#include "server/program_options.h"
+#include "server/options/program_options.h"
 
 #include <algorithm>
 #include <cstdio>
@@ -9,7 +9,8 @@
 #include <unistd.h>
 
 #include "server/hosting/scene_server.h"
-#include "server/option_table.h"
+#include "server/options/option_table.h"
+#include "server/scene/roles.h"
 
 namespace clothstream {
 namespace {
@@ -33,13 +34,14 @@ struct Parsed {
   ProgramOptions options;
   std::vector<std::string> changeable;
   std::string record, recordings, config;
+  bool ownersAlone = false;
   bool listDevices = false, listMaterials = false, printConfig = false, printMarkdown = false;
 };
 
 void addSceneOptions(OptionTable& table, Parsed& parsed) {
   ProgramOptions& options = parsed.options;
   table.group("Scenes");
-  table.text("--scene", options.scene, "NAME", "Default scene, for clients that name none");
+  table.text("--scene", options.server.defaultScene, "NAME", "Default scene, for clients that name none");
   table.list("--scene-file", options.sceneFiles, "FILE",
              "Additional scene as a JSON file; may be repeated. Replaces a built-in scene of the same name");
   table.number("--rate", options.rate, kRate, "Ticks per second of --scene, instead of the scene's own rate");
@@ -60,9 +62,9 @@ void addSceneOptions(OptionTable& table, Parsed& parsed) {
   table.number("--qualities", options.qualities, {.min = 1, .max = 4},
                "Quality levels of --scene. Clients with slow links receive coarser ones");
   table.flag(
-      "--always-run", options.alwaysRun,
+      "--always-run", options.server.runAlways,
       "Keep simulating without clients: --scene from the start, other scenes after their first client");
-  table.number("--reports", options.reportRate, {.min = 0, .max = 1000},
+  table.number("--reports", options.server.reportRate, {.min = 0, .max = 1000},
                "Simulation reports per second (strain, energy, ...). 0 sends none");
   CLI::Option* record = table.text("--record", parsed.record, "DIR",
                                    "Record every running scene, each to its own file in this directory");
@@ -70,20 +72,30 @@ void addSceneOptions(OptionTable& table, Parsed& parsed) {
                                    "Record scenes when a client asks for it, to files in this directory"));
   table.number("--record-limit", options.recordLimitMb, {.min = 0, .max = 1e9, .type = "MEGABYTES"},
                "Start a new file when a recording reaches this many megabytes. 0 means no limit");
-  table.number("--max-created-scenes", options.maxCreatedScenes, {.min = 0, .max = 1000},
+  table.number("--max-created-scenes", options.server.maxCreatedScenes, {.min = 0, .max = 1000},
                "Scenes that clients may create in addition. 0 allows none");
-  table.number("--encoder-threads", options.encoderThreads, kThreads,
+  table.number("--encoder-threads", options.server.encoderThreads, kThreads,
                "CPU threads that predict large frames where the device does not. 0 means a quarter of the "
                "processors, at most 8");
   table.action("--list-materials", parsed.listMaterials, "List the materials of cloths, and exit");
 }
 
+// Value of --participants-change.
+std::string toText(const scene::Permissions& permissions) {
+  std::vector<std::string> words;
+  if (permissions.environment) words.push_back("environment");
+  if (permissions.cloths) words.push_back("cloths");
+  if (permissions.colliders) words.push_back("colliders");
+  return words.empty() ? "none" : fmt::format("{}", fmt::join(words, ","));
+}
+
 void addParticipantOptions(OptionTable& table, Parsed& parsed) {
   ProgramOptions& options = parsed.options;
   table.group("Participants");
-  table.number("--hold", options.hold, {.min = 0, .max = 3600, .type = "SECONDS"},
+  table.number("--hold", options.server.reconnectGrace.place, {.min = 0, .max = 3600, .type = "SECONDS"},
                "Reconnect grace: seconds for which a disconnected participant keeps its place. 0 means none");
-  table.number("--max-participants", options.maxParticipants, {.min = 1, .max = hosting::kMaxParticipants},
+  table.number("--max-participants", options.server.maxParticipants,
+               {.min = 1, .max = hosting::kMaxParticipants},
                "Participants per scene. When the scene is full, the participant that has been disconnected "
                "longest is evicted");
   CLI::Option* changeable = table.list(
@@ -91,11 +103,12 @@ void addParticipantOptions(OptionTable& table, Parsed& parsed) {
       "Parameters that participants may change in a scene that another participant owns: a comma-separated "
       "list of environment, cloths and colliders, or none",
       checkChoice({"environment", "cloths", "colliders", "none"}));
+  const std::string changeableByDefault = toText(options.server.participantsMay);
   changeable->delimiter(',')
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll)
-      ->default_str("environment,cloths,colliders");
-  table.showDefault(changeable, "environment,cloths,colliders");
-  table.flag("--owners-alone", options.ownersAlone,
+      ->default_str(changeableByDefault);
+  table.showDefault(changeable, changeableByDefault.c_str());
+  table.flag("--owners-alone", parsed.ownersAlone,
              "Only its owners may pause, reset, record and delete a scene that has an owner");
 }
 
@@ -110,11 +123,11 @@ void addNetworkOptions(OptionTable& table, ProgramOptions& options) {
 }
 
 void addDeviceOptions(OptionTable& table, ProgramOptions& options) {
-  table.text("--device", options.device, "DEVICE",
+  table.text("--device", options.server.device.select, "DEVICE",
              "Index of a Vulkan device, or part of its name. By default the best device is used");
-  table.number("--software-threads", options.softwareThreads, kThreads,
+  table.number("--software-threads", options.server.device.softwareThreads, kThreads,
                "Threads of a software device in addition to the waiting one. By default chosen for --scene");
-  table.showDefault(table.text("--cache-dir", options.cacheDirectory, "DIR",
+  table.showDefault(table.text("--cache-dir", options.server.device.cacheDirectory, "DIR",
                                "Directory for compiled kernels; '' disables the cache"),
                     "$XDG_CACHE_HOME/clothstream or $HOME/.cache/clothstream");
 }
@@ -123,8 +136,8 @@ void addProgramOptions(OptionTable& table, Parsed& parsed) {
   table.group("Program");
   table.text("--log-level", parsed.options.logLevel, "LEVEL", "trace, debug, info, warning, error or off",
              checkChoice({"trace", "debug", "info", "warning", "error", "off"}, {"warn", "err", "critical"}));
-  table.number("--seconds", parsed.options.stopAfter, {.min = 0, .type = "SECONDS", .aboveMin = true},
-               "Stop after this time");
+  table.number("--seconds", parsed.options.stopAfter,
+               {.min = 0, .max = 1e9, .type = "SECONDS", .aboveMin = true}, "Stop after this time");
   table.text("--config", parsed.config, "FILE", "Read options from this TOML file");
   table.action("--print-config", parsed.printConfig, "Print the effective options as a TOML file, and exit");
   table.action("--help-markdown", parsed.printMarkdown, "Print this help as a page of Markdown, and exit");
@@ -140,7 +153,7 @@ CLI::App& addPrintSceneCommand(OptionTable& table, ProgramOptions& options) {
 CLI::App& addStepCommand(OptionTable& table, ProgramOptions& options) {
   CLI::App& command =
       table.command("step", "Run a scene without clock or network, and write its states to a file");
-  table.text("--scene", options.scene, "NAME", "Name of a scene, or a JSON file")
+  table.text("--scene", options.server.defaultScene, "NAME", "Name of a scene, or a JSON file")
       ->required()
       ->default_str("");
   table.showDefault(command.get_option("--scene"), "");
@@ -152,13 +165,14 @@ CLI::App& addStepCommand(OptionTable& table, ProgramOptions& options) {
   table.number("--substeps", options.substeps, kSubsteps,
                "Integration steps per tick, instead of the scene's own number");
   addDeviceOptions(table, options);
-  command.footer(
+  command.footer(fmt::format(
       "The file holds frames of little-endian float32, six per node: position and velocity. FILE.json has "
       "the\n"
       "shape of the array, and reports of the simulation. In Python:\n"
       "  numpy.fromfile(FILE, '<f4').reshape(json.load(open(FILE + '.json'))['shape'])\n"
-      "Exit code: 0 if all ticks ran, 1 for an error or a state with infinite or undefined numbers, 130 if\n"
-      "interrupted.");
+      "Exit code: 0 if all ticks ran, 1 for an error or a state with infinite or undefined numbers, {} if\n"
+      "interrupted.",
+      kInterrupted));
   return command;
 }
 
@@ -167,9 +181,10 @@ CLI::App& addResimulateCommand(OptionTable& table, ProgramOptions& options) {
       table.command("resimulate", "Simulate a recording again, and compare each state with the recorded one");
   table.word("FILE", options.recording, "Recording that --record wrote");
   addDeviceOptions(table, options);
-  command.footer(
-      "Exit code: 0 if every state is bitwise equal, 1 for an error, a difference or a missing part, 130 if\n"
-      "interrupted.");
+  command.footer(fmt::format(
+      "Exit code: 0 if every state is bitwise equal, 1 for an error, a difference or a missing part, {} if\n"
+      "interrupted.",
+      kInterrupted));
   return command;
 }
 
@@ -193,7 +208,7 @@ std::string configFile(const Parsed& parsed) {
   return parsed.config.empty() && fromEnvironment != nullptr ? fromEnvironment : parsed.config;
 }
 
-scene::Permissions permissions(const std::vector<std::string>& changeable) {
+scene::Permissions toPermissions(const std::vector<std::string>& changeable) {
   const auto has = [&](const char* what) { return std::ranges::find(changeable, what) != changeable.end(); };
   if (has("none") && changeable.size() > 1)
     throw OptionError("--participants-change: 'none' excludes the other values; use it alone");
@@ -227,11 +242,11 @@ void printMarkdown(const OptionTable& table) {
 std::variant<ProgramOptions, int> parseOptions(int argc, const char* const* argv) {
   Parsed parsed;
   ProgramOptions& options = parsed.options;
-  options.cacheDirectory = defaultCacheDirectory();
+  options.server.device.cacheDirectory = defaultCacheDirectory();
 
   CLI::App app{"Simulates cloth with Vulkan and streams it to browsers and gRPC clients.",
                "clothstream-server"};
-  app.set_version_flag("--version", "clothstream-server " CLOTHSTREAM_VERSION);
+  app.set_version_flag("--version", kServerName);
   app.get_formatter()->column_width(34);
   app.footer(
       "Options may also come from a TOML file (--config FILE, grpc-port = 50052) or from the environment\n"
@@ -254,7 +269,8 @@ std::variant<ProgramOptions, int> parseOptions(int argc, const char* const* argv
   try {
     app.parse(argc, argv);
     options.warnings = table.applySources(environ, configFile(parsed));
-    if (!parsed.changeable.empty()) options.participantsMay = permissions(parsed.changeable);
+    if (!parsed.changeable.empty()) options.server.participantsMay = toPermissions(parsed.changeable);
+    if (parsed.ownersAlone) options.server.outsideControl = false;
   } catch (const CLI::ExtrasError&) {
     fmt::print(stderr, "{}\nRun with --help for more information.\n",
                table.unexpected(app.remaining(true).front()));

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Option files: toml++ parses them, this file checks that they are flat.
-#include "server/option_file.h"
+#include "server/options/option_file.h"
 
 #include <algorithm>
 #include <sstream>

@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: MIT
 // Rows, sources and pages of the table of options.
-#include "server/option_table.h"
+#include "server/options/option_table.h"
 
 #include <algorithm>
 #include <cctype>
-#include <cstdint>
+#include <charconv>
+#include <cmath>
 #include <fstream>
 #include <iterator>
 #include <sstream>
+#include <system_error>
 
 namespace clothstream {
 namespace {
@@ -46,10 +48,19 @@ std::vector<std::string> splitAtCommas(const std::string& text) {
   return parts;
 }
 
-// Decimal numbers are written as given, hexadecimal ones and all other values in quotes.
-std::string tomlValue(const std::string& value, bool isNumber) {
-  return isNumber && checkNumber({}, false)(value).empty() && !value.starts_with("0x") ? value
-                                                                                       : tomlString(value);
+// Returns nothing if the text is not a decimal number. A number that is too large is infinite.
+std::optional<double> parseNumber(std::string_view text, bool whole) {
+  constexpr std::string_view kDigits = "0123456789";
+  const std::string_view digits = text.substr(text.starts_with('-') ? 1 : 0);
+  const bool leadingZero =
+      digits.size() > 1 && digits[0] == '0' && std::isdigit(static_cast<unsigned char>(digits[1])) != 0;
+  if (leadingZero || digits.find_first_not_of(whole ? kDigits : "0123456789.eE+-") != std::string_view::npos)
+    return {};
+  double value = 0;
+  const char* const end = text.data() + text.size();
+  const auto [rest, error] = std::from_chars(text.data(), end, value);
+  if (rest != end || error == std::errc::invalid_argument) return {};
+  return error == std::errc::result_out_of_range ? std::numeric_limits<double>::infinity() : value;
 }
 
 void appendWrapped(std::string& page, std::string_view indent, const std::string& text) {
@@ -70,27 +81,27 @@ void appendWrapped(std::string& page, std::string_view indent, const std::string
 
 std::string toText(const NumberRange& range) {
   const bool hasMax = range.max < std::numeric_limits<double>::infinity();
+  if (hasMax && range.aboveMin)
+    return fmt::format("more than {:.10g}, at most {:.10g}", range.min, range.max);
   if (hasMax) return fmt::format("{:.10g} to {:.10g}", range.min, range.max);
-  if (range.aboveMin) return fmt::format("more than {:.10g}", range.min);
   return range.min > -std::numeric_limits<double>::infinity() ? fmt::format("{:.10g} or more", range.min)
                                                               : "";
 }
 
 Check checkNumber(const NumberRange& range, bool whole) {
   return [range, whole](const std::string& text) -> std::string {
-    double value = 0;
-    std::int64_t integer = 0;
-    const bool parsed =
-        whole ? CLI::detail::lexical_cast(text, integer) : CLI::detail::lexical_cast(text, value);
-    if (whole) value = static_cast<double>(integer);
-    const bool inRange = value >= range.min && value <= range.max && !(range.aboveMin && value == range.min);
-    if (parsed && inRange) return {};
+    const std::optional<double> value = parseNumber(text, whole);
+    if (value && std::isfinite(*value) && *value >= range.min && *value <= range.max &&
+        !(range.aboveMin && *value == range.min))
+      return {};
     const char* noun = range.noun != nullptr ? range.noun : whole ? "a whole number" : "a number";
     const std::string problem =
-        parsed && range.noun == nullptr ? "is out of range" : fmt::format("is not {}", noun);
+        value && range.noun == nullptr ? "is out of range" : fmt::format("is not {}", noun);
     const std::string allowed = toText(range);
-    return fmt::format("{} {}; use {}", text.empty() ? "''" : text, problem,
-                       allowed.empty() ? noun : allowed);
+    const bool quoted = text.empty() || text.find(' ') != std::string::npos;
+    return fmt::format("{} {}; use {}{}", quoted ? fmt::format("'{}'", text) : text, problem,
+                       allowed.empty() ? noun : allowed,
+                       value ? "" : ", in decimal digits without spaces or leading zeros");
   };
 }
 
@@ -126,22 +137,21 @@ CLI::App& OptionTable::command(const char* name, const char* help) {
 }
 
 CLI::Option* OptionTable::flag(const char* name, bool& store, const std::string& help) {
-  return addRow(Kind::flag, app_->add_flag(name, store), help, "", nullptr,
+  return addRow(Kind::flag, app_->add_flag(name, store), help, nullptr,
                 checkChoice({"true", "false"}, {"1", "0", "yes", "no", "on", "off"}));
 }
 
 CLI::Option* OptionTable::action(const char* name, bool& store, const std::string& help) {
-  return addRow(Kind::action, app_->add_flag(name, store), help, "", nullptr, {});
+  return addRow(Kind::action, app_->add_flag(name, store), help, nullptr, {});
 }
 
 CLI::Option* OptionTable::word(const char* name, std::string& store, const std::string& help) {
-  return addRow(Kind::word, app_->add_option(name, store)->required(), help, "", nullptr, {});
+  return addRow(Kind::word, app_->add_option(name, store)->required(), help, nullptr, {});
 }
 
-CLI::Option* OptionTable::addRow(Kind kind, CLI::Option* option, const std::string& help,
-                                 const std::string& allowed, const char* type, Check check) {
-  const bool addsRange = !allowed.empty() && kind == Kind::number;
-  option->description(addsRange ? fmt::format("{}. Range: {}", help, allowed) : help)->group(group_);
+CLI::Option* OptionTable::addRow(Kind kind, CLI::Option* option, const std::string& help, const char* type,
+                                 Check check, const std::string& range) {
+  option->description(range.empty() ? help : fmt::format("{}. Range: {}", help, range))->group(group_);
   if (type != nullptr) option->type_name(type);
   if (check && kind != Kind::flag) option->check(check);
   rows_.push_back({.kind = kind,
@@ -149,7 +159,7 @@ CLI::Option* OptionTable::addRow(Kind kind, CLI::Option* option, const std::stri
                    .option = option,
                    .name = option->get_single_name(),
                    .help = help,
-                   .allowed = addsRange ? allowed : "",
+                   .range = range,
                    .check = std::move(check),
                    .documentedDefault = option->get_default_str()});
   return option;
@@ -273,7 +283,8 @@ std::string OptionTable::toToml() const {
     std::vector<std::string> values = row.option->results();
     if (values.empty() && !fallback.empty())
       values = row.kind == Kind::list ? splitAtCommas(fallback) : std::vector<std::string>{fallback};
-    for (std::string& value : values) value = tomlValue(value, row.kind == Kind::number);
+    for (std::string& value : values)
+      value = row.kind == Kind::number ? fmt::format("{}", *parseNumber(value, false)) : tomlString(value);
     if (values.empty())
       toml += fmt::format("# {} is not set\n", row.name);
     else if (row.kind == Kind::list)
@@ -289,7 +300,7 @@ void OptionTable::describe(std::string& page, const Row& row) const {
   if (row.kind != Kind::word && !row.option->get_type_name().empty() && row.option->get_type_size() > 0)
     heading += ' ' + row.option->get_type_name();
   std::string text = fmt::format("- `{}`: {}.", heading, row.help);
-  if (!row.allowed.empty()) text += fmt::format(" Range: {}.", row.allowed);
+  if (!row.range.empty()) text += fmt::format(" Range: {}.", row.range);
   if (!row.documentedDefault.empty()) text += fmt::format(" Default: `{}`.", row.documentedDefault);
   if (row.option->get_required()) text += " Required.";
   std::string wrapped;

@@ -18,11 +18,11 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
-#include "server/option_file.h"
+#include "server/options/option_file.h"
 
 namespace clothstream {
 
-// Range of a numeric option, both ends included, and its name in --help.
+// Range of a numeric option, both ends included, and its name in --help. Infinite numbers are never allowed.
 struct NumberRange {
   double min = -std::numeric_limits<double>::infinity();
   double max = std::numeric_limits<double>::infinity();
@@ -34,6 +34,8 @@ struct NumberRange {
 // Returns an error for a value that is not allowed, empty for one that is.
 using Check = std::function<std::string(const std::string&)>;
 
+// Numbers are decimal, such as 12, -3, .5 and 2.5e-3. Spaces, a plus sign, leading zeros and prefixes such as
+// 0x are errors.
 Check checkNumber(const NumberRange& range, bool whole);
 // One of `choices`, case ignored; `also` are accepted but not shown.
 Check checkChoice(std::vector<std::string> choices, std::vector<std::string> also = {});
@@ -50,10 +52,25 @@ struct ValueOf {
 };
 template <typename T>
 struct ValueOf<std::optional<T>> : ValueOf<T> {};
-template <typename Rep>
-struct ValueOf<std::chrono::duration<Rep>> {
-  using type = Rep;
+template <typename Rep, typename Period>
+struct ValueOf<std::chrono::duration<Rep, Period>> {
+  using type = double;  // seconds
 };
+
+// Stores a value of type ValueOf<Store>.
+template <typename Store, typename Value>
+void assign(Store& store, Value value) {
+  store = value;
+}
+template <typename Rep, typename Period>
+void assign(std::chrono::duration<Rep, Period>& store, double seconds) {
+  using Duration = std::chrono::duration<Rep, Period>;
+  store = std::chrono::duration_cast<Duration>(std::chrono::duration<double>(seconds));
+}
+template <typename T, typename Value>
+void assign(std::optional<T>& store, Value value) {
+  assign(store.emplace(), value);
+}
 
 class OptionTable {
  public:
@@ -64,7 +81,8 @@ class OptionTable {
   // Starts the options of a command. They come from the command line only.
   CLI::App& command(const char* name, const char* help);
 
-  // `store` keeps its value if no source sets the option. It must outlive the table.
+  // `store` keeps its value if no source sets the option. It must outlive the table. A duration is given in
+  // seconds.
   template <typename Store>
   CLI::Option* number(const char* name, Store& store, const NumberRange& range, const std::string& help);
   template <typename Store>
@@ -107,15 +125,16 @@ class OptionTable {
     CLI::App* app;
     CLI::Option* option;
     std::string name;  // without dashes
-    std::string help, allowed;
+    std::string help;
+    std::string range;  // of a number, for people
     Check check;
     std::string documentedDefault;
     CLI::Option* excludes = nullptr;
     Source source = Source::unset;
   };
 
-  CLI::Option* addRow(Kind kind, CLI::Option* option, const std::string& help, const std::string& allowed,
-                      const char* type, Check check);
+  CLI::Option* addRow(Kind kind, CLI::Option* option, const std::string& help, const char* type, Check check,
+                      const std::string& range = "");
   bool isConfigurable(const Row& row) const;
   std::vector<std::string> configurableNames() const;
   Row* find(const CLI::Option* option);
@@ -136,13 +155,13 @@ CLI::Option* OptionTable::number(const char* name, Store& store, const NumberRan
                                  const std::string& help) {
   using Value = typename ValueOf<Store>::type;
   CLI::Option* option =
-      app_->add_option_function<Value>(name, [&store](const Value& value) { store = Store(value); });
+      app_->add_option_function<Value>(name, [&store](const Value& value) { assign(store, value); });
   if constexpr (requires { store.count(); })
-    option->default_str(fmt::format("{}", store.count()));
+    option->default_str(fmt::format("{}", std::chrono::duration<double>(store).count()));
   else if constexpr (!requires { store.has_value(); })
     option->default_str(fmt::format("{}", store));
-  return addRow(Kind::number, option, help, toText(range), range.type,
-                checkNumber(range, std::integral<Value>));
+  return addRow(Kind::number, option, help, range.type, checkNumber(range, std::integral<Value>),
+                toText(range));
 }
 
 template <typename Store>
@@ -151,19 +170,19 @@ CLI::Option* OptionTable::text(const char* name, Store& store, const char* type,
   CLI::Option* option =
       app_->add_option_function<std::string>(name, [&store](const std::string& value) { store = value; });
   option->default_str(std::string(store));
-  return addRow(Kind::text, option, help, "", type, std::move(check));
+  return addRow(Kind::text, option, help, type, std::move(check));
 }
 
 template <typename T>
 CLI::Option* OptionTable::choice(const char* name, std::optional<T>& store,
                                  const std::map<std::string, T>& choices, const std::string& help) {
   std::vector<std::string> names;
+  names.reserve(choices.size());
   for (const auto& [choice, value] : choices) names.push_back(choice);
   CLI::Option* option = app_->add_option_function<std::string>(
       name,
       [&store, choices](const std::string& value) { store = choices.at(CLI::detail::to_lower(value)); });
-  return addRow(Kind::text, option, help, fmt::format("{}", fmt::join(names, " or ")), "NAME",
-                checkChoice(names));
+  return addRow(Kind::text, option, help, "NAME", checkChoice(names));
 }
 
 template <typename T>
@@ -171,7 +190,7 @@ CLI::Option* OptionTable::list(const char* name, std::vector<T>& store, const ch
                                const std::string& help, Check check) {
   CLI::Option* option = app_->add_option_function<std::vector<std::string>>(
       name, [&store](const std::vector<std::string>& values) { store.assign(values.begin(), values.end()); });
-  return addRow(Kind::list, option, help, "", type, std::move(check));
+  return addRow(Kind::list, option, help, type, std::move(check));
 }
 
 }  // namespace clothstream

@@ -10,40 +10,36 @@
 #include <variant>
 #include <vector>
 
+#include "server/hosting/scene_server.h"
 #include "server/model/scene.h"
 #include "server/recording/playback.h"
-#include "server/scene/roles.h"
 #include "server/step/step.h"
 
 namespace clothstream {
+
+inline constexpr const char* kServerName = "clothstream-server " CLOTHSTREAM_VERSION;
+
+// Exit code after SIGINT or SIGTERM, as shells use it.
+inline constexpr int kInterrupted = 130;
 
 enum class Command { serve, play, resimulate, step, printScene, listDevices, listMaterials };
 
 struct ProgramOptions {
   Command command = Command::serve;
 
-  // Scenes.
-  std::string scene = "curtain";  // default scene of the server; the scene of `step`
+  // Scenes, participants and device. `defaultScene` is also the scene of `step`; `device` is also the device
+  // of `step` and `resimulate`.
+  hosting::ServerOptions server{.device = {}, .defaultScene = "curtain", .serverName = kServerName};
   std::vector<std::filesystem::path> sceneFiles;
-  // Overrides for the scene above; unset keeps the scene's own value.
+  // Overrides for the default scene; unset keeps the scene's own value.
   std::optional<std::uint32_t> rate, substeps;
   std::optional<float> maxError;
   std::optional<model::Normals> normals;
   std::optional<model::Coding> coding;
   std::optional<std::uint32_t> temporalLayers, qualities;
-  bool alwaysRun = false;
-  double reportRate = 4;  // reports per second, 0 to 1000
-  std::uint32_t maxCreatedScenes = 16;
-  std::uint32_t encoderThreads = 0;       // 0 means automatic
   std::filesystem::path recordDirectory;  // empty: nothing is recorded
   bool recordsOnRequest = false;          // record only scenes that clients ask for
   double recordLimitMb = 0;               // megabytes per file; 0 means no limit
-
-  // Participants.
-  std::chrono::duration<double> hold{60};  // reconnect grace
-  std::uint32_t maxParticipants = 64;
-  scene::Permissions participantsMay;  // what a participant may change in a scene that another one owns
-  bool ownersAlone = false;            // only an owner controls a scene that has one
 
   // Network.
   std::string host = "127.0.0.1";
@@ -51,14 +47,9 @@ struct ProgramOptions {
   std::filesystem::path page;  // empty: the directory next to the program, if it exists
   std::vector<std::string> allowedOrigins;
 
-  // Device.
-  std::string device;  // index or part of a name; empty: the best
-  std::optional<std::uint32_t> softwareThreads;
-  std::filesystem::path cacheDirectory;  // empty: no cache
-
   // Program.
   std::string logLevel = "info";
-  std::optional<std::chrono::duration<double>> stopAfter;
+  std::optional<std::chrono::nanoseconds> stopAfter;
   std::vector<std::string> warnings;  // about environment variables, for the log
 
   // Commands.
