@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <exception>
 #include <memory>
+#include <span>
 #include <utility>
 
 #include <boost/asio/post.hpp>
@@ -12,6 +13,8 @@
 
 #include "clothstream/v1/session.pb.h"
 #include "server/hosting/server_state.h"
+#include "server/messages/limits.h"
+#include "server/messages/parsed_size.h"
 #include "server/messages/scene_file.h"
 #include "server/messages/scene_message.h"
 #include "server/messages/validation.h"
@@ -124,6 +127,13 @@ tl::expected<model::Scene, v1::Error> SceneMaker::definitionOf(const v1::CreateS
       return checked(messages::toScene(request.scene()));
     case v1::CreateSceneRequest::kUploadedContentId: {
       v1::Scene message;
+      if (!messages::parsedSize(*v1::Scene::descriptor(), std::as_bytes(std::span(uploaded)),
+                                messages::limits::kMaxParsedBytes))
+        return refused(
+            v1::ERROR_CODE_INVALID_ARGUMENT,
+            fmt::format("createScene: the uploaded content is not a Scene message, or would need more than "
+                        "{} bytes of memory: send fewer elements",
+                        messages::limits::kMaxParsedBytes));
       if (!message.ParseFromString(uploaded))
         return refused(v1::ERROR_CODE_MALFORMED_MESSAGE,
                        "createScene: the uploaded content is not a Scene message");
@@ -135,7 +145,7 @@ tl::expected<model::Scene, v1::Error> SceneMaker::definitionOf(const v1::CreateS
         return checked(messages::loadScene(request.named()));
       return tl::unexpected(server_.noSuchScene(request.named()));
     default:
-      return refused(v1::ERROR_CODE_INVALID_ARGUMENT,
+      return refused(v1::ERROR_CODE_MALFORMED_MESSAGE,
                      "createScene: must have one of \"scene\", \"uploadedContentId\" and \"named\"");
   }
 }

@@ -41,6 +41,8 @@ class SceneHost {
   // Minimum interval between requested key frames of one quality. One key frame serves all subscribers.
   static constexpr std::chrono::milliseconds kKeyFrameInterval{100};
 
+  static constexpr std::chrono::milliseconds kSliceTime{10};
+
   // While the scene is recorded, at least one of this many frames is a key frame.
   static constexpr std::uint32_t kMaxKeyFrameDistance = 24;
 
@@ -52,8 +54,6 @@ class SceneHost {
   SceneHost(std::unique_ptr<SceneOnDevice> loaded, LiveScene& scene, delivery::FramePublisher& publisher,
             double reportRate);
   ~SceneHost();
-
-  static constexpr std::chrono::milliseconds kSliceTime{10};
 
   // Drains the inbox, records the next tick and submits its first slice. Throws vulkan::DeviceLost.
   void begin(Clock::time_point now);
