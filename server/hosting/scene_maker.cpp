@@ -130,7 +130,7 @@ tl::expected<model::Scene, v1::Error> SceneMaker::definitionOf(const v1::CreateS
       if (!messages::parsedSize(*v1::Scene::descriptor(), std::as_bytes(std::span(uploaded)),
                                 messages::limits::kMaxParsedBytes))
         return refused(
-            v1::ERROR_CODE_INVALID_ARGUMENT,
+            v1::ERROR_CODE_MALFORMED_MESSAGE,
             fmt::format("createScene: the uploaded content is not a Scene message, or would need more than "
                         "{} bytes of memory: send fewer elements",
                         messages::limits::kMaxParsedBytes));
@@ -145,7 +145,7 @@ tl::expected<model::Scene, v1::Error> SceneMaker::definitionOf(const v1::CreateS
         return checked(messages::loadScene(request.named()));
       return tl::unexpected(server_.noSuchScene(request.named()));
     default:
-      return refused(v1::ERROR_CODE_MALFORMED_MESSAGE,
+      return refused(v1::ERROR_CODE_INVALID_ARGUMENT,
                      "createScene: must have one of \"scene\", \"uploadedContentId\" and \"named\"");
   }
 }
