@@ -176,6 +176,7 @@ void openEndpoints(hosting::SceneServer& server, const ProgramOptions& options, 
     const endpoint::WebEndpoint web(server, {.host = options.host,
                                              .port = options.port,
                                              .pageDirectory = page,
+                                             .publicNames = options.publicNames,
                                              .allowedOrigins = options.allowedOrigins});
     const endpoint::GrpcEndpoint rpc(server, {.host = options.host, .port = options.grpcPort});
 

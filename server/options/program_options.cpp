@@ -118,6 +118,10 @@ void addNetworkOptions(OptionTable& table, ProgramOptions& options) {
   table.number("--port", options.port, kPort, "Port of the page and the WebSocket. 0 picks a free port");
   table.number("--grpc-port", options.grpcPort, kPort, "Port of gRPC. 0 picks a free port");
   table.text("--page", options.page, "DIR", "Directory of the page, instead of the one next to the program");
+  table.list(
+      "--public-name", options.publicNames, "NAME",
+      "Name under which browsers reach the page, such as cloth.example.org; may be repeated. Addresses, "
+      "localhost and the name of the machine are always allowed");
   table.list("--allow-origin", options.allowedOrigins, "ORIGIN",
              "Origin of another page that may connect, such as https://example.org; may be repeated");
 }

@@ -10,6 +10,7 @@
 
 #include <boost/asio/io_context.hpp>
 
+#include "server/endpoint/web/host_names.h"
 #include "server/endpoint/web/page.h"
 
 namespace clothstream::hosting {
@@ -24,6 +25,7 @@ struct WebEndpointContext {
   hosting::SceneServer& server;
   boost::asio::io_context& io;
   const Page page;
+  const HostNames names;
   const std::vector<std::string> allowedOrigins;
   const std::size_t maxConnections;
   std::size_t connections = 0;

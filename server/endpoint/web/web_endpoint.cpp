@@ -68,8 +68,12 @@ struct WebEndpoint::State {
   std::thread thread;
 
   State(hosting::SceneServer& server, const WebEndpointOptions& options)
-      : context{server, io,   Page(options.pageDirectory), options.allowedOrigins, options.maxConnections, 0,
-                {},     false},
+      : context{.server = server,
+                .io = io,
+                .page = Page(options.pageDirectory),
+                .names = HostNames(options.publicNames),
+                .allowedOrigins = options.allowedOrigins,
+                .maxConnections = options.maxConnections},
         acceptor(listen(io, options.host, options.port)),
         port(acceptor.local_endpoint().port()) {
     accept();
