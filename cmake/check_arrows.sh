@@ -7,20 +7,21 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 # room | the rooms of ours that it sees, in addition to itself. A file belongs to the longest room that contains it.
 readonly ARROWS='
 proto/parameters   |
+proto/text         |
 server/model       | proto/parameters
 server/vulkan      |
 proto/codec        |
 proto/recording    | proto/codec clothstream
 server/reference   | server/model
-server/telemetry   |
+server/telemetry   | proto/text
 server/simulation  | server/model server/vulkan shaders
 server/meshes      | server/model
-server/messages    | server/model server/meshes proto/parameters clothstream
+server/messages    | server/model server/meshes proto/parameters proto/text clothstream
 server/encode      | server/model server/simulation server/vulkan proto/codec shaders
 server/schedule    |
 server/delivery    | server/schedule server/encode server/messages server/telemetry proto/codec clothstream
 server/scene       | server/delivery server/schedule server/model server/vulkan server/simulation server/encode server/messages server/telemetry clothstream
-server/hosting     | server/scene server/delivery server/schedule server/model server/vulkan server/simulation server/messages server/telemetry clothstream
+server/hosting     | proto/text server/scene server/delivery server/schedule server/model server/vulkan server/simulation server/messages server/telemetry clothstream
 server/session     | server/hosting server/scene server/delivery server/schedule server/messages proto/codec clothstream
 server/recording   | server/model server/vulkan server/simulation server/messages server/scene server/schedule proto/codec proto/recording clothstream
 server/step        | server/model server/vulkan server/simulation server/messages
@@ -35,7 +36,7 @@ clients/grpc       | clients/core clothstream
 clients/library    | clients/core clients/grpc
 clients/files      | proto/codec clothstream
 clients/load       | clients/core clients/grpc proto/codec clothstream
-clients/cli        | clients/core clients/grpc clients/files clients/load proto/codec proto/parameters proto/recording clothstream
+clients/cli        | proto/text clients/core clients/grpc clients/files clients/load proto/codec proto/parameters proto/recording clothstream
 '
 # rooms that may include these headers
 readonly OUTSIDE='

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "clothstream/v1/session.pb.h"
+#include "proto/text/printable.h"
 #include "server/messages/description.h"
 #include "server/messages/scene_message.h"
 
@@ -134,7 +135,7 @@ v1::Error SceneServer::State::noSuchScene(const std::string& name) const {
   for (const auto& scene : scenesNow()) known += (known.empty() ? "" : ", ") + scene->name();
   v1::Error error;
   error.set_code(v1::ERROR_CODE_NOT_FOUND);
-  error.set_text(fmt::format("there is no scene '{:.64}'; there are {}", name, known));
+  error.set_text(fmt::format("there is no scene '{:.64}'; there are {}", printable(name), known));
   return error;
 }
 
