@@ -143,7 +143,7 @@ TEST(Hostile, SkipsKnownFieldsWithAnotherWireType) {
   EXPECT_EQ(std::string(read.packet), sent.packet());
 }
 
-TEST(Interface, NoExceptionLeavesIt) {
+TEST(Interface, ReturnsErrorsInsteadOfExceptions) {
 #ifdef __SANITIZE_ADDRESS__
   GTEST_SKIP() << "the sanitizer's allocator ends the program";
 #endif

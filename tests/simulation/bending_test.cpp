@@ -157,7 +157,7 @@ TEST_F(DihedralBending, IsStableAtItsBound) {
 
 // Dihedral bending is switched on in motion, with every solver. The state keeps every bit, and the motion is
 // that of a scene that always had it.
-TEST_F(DihedralBending, CanComeAndGoWhileItRuns) {
+TEST_F(DihedralBending, StartsAndStopsWhileItRuns) {
   for (const SolverKind kind : {SolverKind::massSpring, SolverKind::constraint, SolverKind::acad,
                                 SolverKind::xpbd, SolverKind::implicitEuler}) {
     SCOPED_TRACE(static_cast<int>(kind));
