@@ -248,7 +248,7 @@ void DeviceThread::runDueTicks() {
   }
   for (schedule::TickSchedule* due : chosen_) {
     Run& run = static_cast<Run&>(*due);
-    if (!run.begun || !survives(run, [&] { run.host->waitForSlice(); })) continue;
+    if (!run.begun || !survives(run, [&] { run.host->waitForSlice(before); })) continue;
     endSlice(run, std::exchange(before, Clock::now()));
   }
 }

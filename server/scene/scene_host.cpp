@@ -85,12 +85,14 @@ void SceneHost::begin(Clock::time_point now) {
 
 void SceneHost::submitSlice() {
   submittedAt_ = Clock::now();
+  sliceInFlight_ = true;
   submitted_ = onDevice_->device.submitSlice(onDevice_->recorder, nextSlice_++);
 }
 
-void SceneHost::waitForSlice() {
+void SceneHost::waitForSlice(Clock::time_point deviceFree) {
+  if (!std::exchange(sliceInFlight_, false)) return;
   onDevice_->device.wait(submitted_);
-  longestSlice_ = std::max(longestSlice_, Clock::now() - submittedAt_);
+  longestSlice_ = std::max(longestSlice_, Clock::now() - std::max(submittedAt_, deviceFree));
 }
 
 void SceneHost::adaptSlices() {

@@ -59,8 +59,9 @@ class SceneHost {
   void begin(Clock::time_point now);
   // Returns whether slices of the tick are not submitted yet.
   bool hasSlices() const { return nextSlice_ < onDevice_->recorder.sliceCount(); }
-  // Waits for the submitted slice. Throws vulkan::DeviceLost.
-  void waitForSlice();
+  // Waits for the submitted slice. The device was busy with other scenes until `deviceFree`. Throws
+  // vulkan::DeviceLost.
+  void waitForSlice(Clock::time_point deviceFree = {});
   // Submits the next slice. Throws vulkan::DeviceLost.
   void submitSlice();
   // Runs the rest of the tick, and hands its frame to the publisher. Throws vulkan::DeviceLost.
@@ -152,6 +153,7 @@ class SceneHost {
   std::array<Clock::time_point, codec::kMaxQualities> lastKeyFrame_{};
   std::uint32_t sinceKeyFrame_ = 0;  // frames of the finest quality
   std::uint32_t nextSlice_ = 0;
+  bool sliceInFlight_ = false;
   vulkan::TimelineValue submitted_ = 0;
   Clock::time_point submittedAt_{};
   Clock::duration longestSlice_{};  // of the current tick
