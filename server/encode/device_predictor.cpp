@@ -154,11 +154,11 @@ void DevicePredictor::makeNormals(const vulkan::Device& device, const codec::Str
   fill(tables.facesOf, facesOf_, facesOfUpload_);
   for (Slot& slot : slots_)
     slot.normalResiduals = Buffer(device, BufferPurpose::readback, vertices_ * sizeof(std::uint32_t));
-  for (std::uint32_t turn = 0; turn < 2; ++turn) {
+  for (std::uint32_t referenceIndex = 0; referenceIndex < 2; ++referenceIndex) {
     for (const Slot& slot : slots_) {
       normalBindings_.emplace_back(
           device, predictNormals_,
-          std::initializer_list<const Buffer*>{&simulation_.normals(), &moments_[1 - turn], &faces_,
+          std::initializer_list<const Buffer*>{&simulation_.normals(), &moments_[1 - referenceIndex], &faces_,
                                                &facesOf_, &sentNormals_, &slot.normalResiduals});
     }
   }
@@ -185,8 +185,8 @@ void DevicePredictor::makeBindings(const vulkan::Device& device) {
                                                &wanted_, &status_});
     }
   }
-  for (std::uint32_t turn = 0; turn < 2; ++turn) {
-    const Buffer &past = moments_[turn], &made = moments_[1 - turn];
+  for (std::uint32_t referenceIndex = 0; referenceIndex < 2; ++referenceIndex) {
+    const Buffer &past = moments_[referenceIndex], &made = moments_[1 - referenceIndex];
     for (const Slot& slot : slots_) {
       for (const bool isSmall : {false, true}) {
         (isSmall ? smallPhaseBindings_ : phaseBindings_)
@@ -261,24 +261,24 @@ void DevicePredictor::record(vulkan::Recorder& recorder, std::uint32_t slot, std
   auto chunk = to.chunks.mapped<Row>().begin();
   for (const Phase& fitted : chunks) *chunk++ = {fitted.begin, fitted.end, fitted.weightClass, 0};
 
-  const std::uint32_t turn = turn_;
+  const std::uint32_t referenceIndex = referenceIndex_;
   recorder.barrier();
-  recorder.dispatch(quantiseBindings_[2 * simulation_.presentIndex() + turn], push_, vertices_);
+  recorder.dispatch(quantiseBindings_[2 * simulation_.presentIndex() + referenceIndex], push_, vertices_);
   for (const Step& step : steps_) {
     recorder.barrier();
     push_.firstPhase = step.firstPhase;
     push_.endPhase = step.endPhase;
     const std::vector<vulkan::Bindings>& bindings = step.isSmall ? smallPhaseBindings_ : phaseBindings_;
-    recorder.dispatch(bindings[kFrameSlots * turn + slot], push_, step.vertices);
+    recorder.dispatch(bindings[kFrameSlots * referenceIndex + slot], push_, step.vertices);
   }
   recorder.barrier();
-  recorder.dispatch(sumBindings_[kFrameSlots * turn + slot], push_, kWorkgroupSize * chunks.size());
-  if (hasNormals_) recorder.dispatch(normalBindings_[kFrameSlots * turn + slot], push_, vertices_);
+  recorder.dispatch(sumBindings_[kFrameSlots * referenceIndex + slot], push_, kWorkgroupSize * chunks.size());
+  if (hasNormals_) recorder.dispatch(normalBindings_[kFrameSlots * referenceIndex + slot], push_, vertices_);
   recorder.barrier();  // the next kernel changes the weights
-  recorder.dispatch(finishBindings_[turn], push_, std::max(vertices_, shared::kClassWeights));
+  recorder.dispatch(finishBindings_[referenceIndex], push_, std::max(vertices_, shared::kClassWeights));
   recorder.barrier();
   recorder.copy(status_, to.status, status_.bytes());
-  turn_ = 1 - turn;
+  referenceIndex_ = 1 - referenceIndex;
 }
 
 const shared::SlotStatus& DevicePredictor::status(std::uint32_t slot) const {

@@ -78,12 +78,13 @@ class DevicePredictor {
   vulkan::Buffer faces_, facesUpload_, facesOf_, facesOfUpload_;  // only with normals
   std::array<Slot, kFrameSlots> slots_;
   vulkan::Kernel quantise_, predictPhase_, predictSmallPhases_, sumProducts_, predictNormals_, finish_;
-  // Indexed by the present positions and then turn_; by turn_ and then the slot; or by turn_.
+  // Indexed by the present positions and then referenceIndex_; by referenceIndex_ and then the slot; or by
+  // referenceIndex_.
   std::vector<vulkan::Bindings> quantiseBindings_, phaseBindings_, smallPhaseBindings_, sumBindings_,
       normalBindings_, finishBindings_;
 
   shared::PredictPush push_{};
-  std::uint32_t turn_ = 0;  // index of the reference's moment
+  std::uint32_t referenceIndex_ = 0;  // index of the reference's moment
   bool started_ = false;
 };
 

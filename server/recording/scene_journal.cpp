@@ -68,7 +68,7 @@ void SceneJournal::replace(std::shared_ptr<Recorder> next, bool continues) {
     current_->joined(participant, names.first, names.second);
 }
 
-messages::Result<void> SceneJournal::isFree() {
+messages::Result<void> SceneJournal::requireNoRecording() {
   if (current_ && current_->state() == Recorder::State::failed) replace(nullptr);
   if (!current_) return {};
   return refused(v1::ERROR_CODE_INVALID_ARGUMENT,
@@ -85,14 +85,14 @@ messages::Result<std::string> SceneJournal::start(const std::string& name) {
                     kMaxNameLength));
   {
     const std::lock_guard lock(mutex_);
-    if (auto free = isFree(); !free) return tl::unexpected(std::move(free).error());
+    if (auto free = requireNoRecording(); !free) return tl::unexpected(std::move(free).error());
   }
   // The device thread takes the lock and must not wait for a disk, so the file is created without it. If
   // another request was faster, the file is deleted.
   auto recorder = Recorder::create(options_, scene_, name);
   if (!recorder) return refused(v1::ERROR_CODE_RESOURCE_EXHAUSTED, "startRecording: " + recorder.error());
   const std::lock_guard lock(mutex_);
-  if (auto free = isFree(); !free) return tl::unexpected(std::move(free).error());
+  if (auto free = requireNoRecording(); !free) return tl::unexpected(std::move(free).error());
   std::string file = fileOf(**recorder);
   replace(std::move(*recorder));
   return file;

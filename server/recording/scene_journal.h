@@ -54,8 +54,9 @@ class SceneJournal : public scene::Journal {
 
  private:
   std::shared_ptr<Recorder> current() const;
-  // The caller must hold the lock for the following functions. Refuses if a recording runs.
-  [[nodiscard]] messages::Result<void> isFree();
+  // The caller must hold the lock for the following functions.
+  // Drops a recording that failed, and refuses if one runs.
+  [[nodiscard]] messages::Result<void> requireNoRecording();
   // `continues`: the recording continues in another file.
   void replace(std::shared_ptr<Recorder> next, bool continues = false);
 

@@ -186,7 +186,7 @@ TEST(Contacts, AreReportedOnRequest) {
   EXPECT_EQ(cs_get_state(joined.client.get()), CS_STATE_FAILED);
 }
 
-TEST(Attachments, AreSentOnceWithTheirLastPose) {
+TEST(AttachmentPoses, AreSentOnceWithTheirLastValue) {
   JoinedClient joined;
   const float first[] = {1, 0, 0}, second[] = {2, 0, 0}, turned[] = {0, 0, 0, 1};
   cs_move_attachment(joined.client.get(), "rod", first, nullptr, 1);

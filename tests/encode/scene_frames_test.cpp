@@ -6,12 +6,12 @@
 namespace clothstream::tests {
 namespace {
 
-class NamedScene : public GpuTest, public testing::WithParamInterface<std::string> {};
-INSTANTIATE_TEST_SUITE_P(All, NamedScene, testing::ValuesIn(messages::namedScenes()),
+class FramesOfNamedScene : public GpuTest, public testing::WithParamInterface<std::string> {};
+INSTANTIATE_TEST_SUITE_P(All, FramesOfNamedScene, testing::ValuesIn(messages::namedScenes()),
                          [](const auto& name) { return name.param; });
 
 // Encoding checks each frame, packet and vertex.
-TEST_P(NamedScene, KeepsItsMaxErrorForSixSeconds) {
+TEST_P(FramesOfNamedScene, KeepsItsMaxErrorForSixSeconds) {
   const model::Scene scene = *messages::loadScene(GetParam());
   Encoding encoding(scene);
   const std::uint64_t ticks = 6 * scene.simulationRate;
