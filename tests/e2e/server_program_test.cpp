@@ -366,6 +366,7 @@ TEST_F(ServerOptions, PrintedConfigurationReadsBackWithEveryOptionSet) {
                               "--port=0",
                               "--grpc-port=65535",
                               "--page=# no comment",
+                              "--public-name=cloth.example.org",
                               "--allow-origin=https://a.example",
                               "--allow-origin=https://b.example",
                               "--device=1",

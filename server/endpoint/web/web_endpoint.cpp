@@ -73,7 +73,8 @@ struct WebEndpoint::State {
                 .page = Page(options.pageDirectory),
                 .names = HostNames(options.publicNames),
                 .allowedOrigins = options.allowedOrigins,
-                .maxConnections = options.maxConnections},
+                .maxConnections = options.maxConnections,
+                .streams = {}},
         acceptor(listen(io, options.host, options.port)),
         port(acceptor.local_endpoint().port()) {
     accept();
