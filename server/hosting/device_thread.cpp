@@ -17,16 +17,18 @@ namespace {
 
 // Interval at which a paused scene looks for subscribers that need a key frame.
 constexpr std::chrono::milliseconds kPausedFramePeriod{50};
+constexpr int kMaxDeviceLosses = 2;
 
 }  // namespace
 
 DeviceThread::DeviceThread(const vulkan::DeviceOptions& device,
                            const std::vector<std::shared_ptr<scene::LiveScene>>& scenes,
                            delivery::FramePublisher& publisher, telemetry::ServerMetrics& metrics,
-                           bool runAlways, double reportRate)
+                           scene::Budget& budget, bool runAlways, double reportRate)
     : options_(device),
       publisher_(publisher),
       metrics_(metrics),
+      budget_(budget),
       runAlways_(runAlways),
       reportRate_(reportRate),
       loader_(publisher.workers(), [this] { wake(); }) {
@@ -115,6 +117,8 @@ void DeviceThread::run(const std::vector<std::shared_ptr<scene::LiveScene>>& sce
   try {
     if (!scenes.empty()) {
       device_ = std::make_unique<vulkan::Device>(options_);
+      meter_ = std::make_unique<simulation::SpeedMeter>(*device_);
+      budget_.setSpeed(meter_->measure());
       for (const auto& scene : scenes) runs_.push_back(std::make_unique<Run>(scene));
       scene::LiveScene& first = *runs_.front()->scene;
       runs_.front()->host = std::make_unique<scene::SceneHost>(*device_, first, publisher_, reportRate_);
@@ -122,6 +126,7 @@ void DeviceThread::run(const std::vector<std::shared_ptr<scene::LiveScene>>& sce
     }
   } catch (...) {
     runs_.clear();
+    meter_.reset();
     device_.reset();
     ready.set_exception(std::current_exception());
     return;
@@ -143,6 +148,7 @@ void DeviceThread::run(const std::vector<std::shared_ptr<scene::LiveScene>>& sce
   publisher_.drain();
   loader_.abandon();
   runs_.clear();
+  meter_.reset();
   device_.reset();
 }
 
@@ -200,9 +206,35 @@ void DeviceThread::dismiss(Run& run, const std::string& why) {
   scene.subscribers.announce(delivery::parametersChanged(scene.restart(), 1));
 }
 
+void DeviceThread::checkPrice(Run& run) {
+  const model::DeviceSpeed priced = budget_.speed();
+  const double price = run.scene->tickWork(run.host->colliders()).seconds(priced);
+  const double seconds = schedule::seconds(run.used);
+  if (!run.price.note(seconds, price)) return;
+  const model::DeviceSpeed now = meter_->measure();
+  const double slowdown = std::max(now.nodeStepSeconds / priced.nodeStepSeconds,
+                                   now.dispatchSeconds / priced.dispatchSeconds);
+  if (run.price.isExcessive(slowdown))
+    quarantine(run, fmt::format("a tick took {:.3f} s, and its price is {:.3f} s", seconds, price));
+}
+
+void DeviceThread::quarantine(Run& run, const std::string& why) {
+  const std::string text = fmt::format("the scene '{}' is stopped because it harms other scenes: {}",
+                                       run.scene->name(), why);
+  spdlog::error("{}", text);
+  metrics_.quarantines.add();
+  publisher_.drain();
+  run.host.reset();
+  run.begun = false;
+  run.running = run.paused = false;
+  run.scene->running = false;
+  run.quarantined = true;
+  run.scene->quarantine(text);
+}
+
 void DeviceThread::startAndStopScenes() {
   for (const auto& run : runs_) {
-    if (run->begun) continue;
+    if (run->begun || run->quarantined) continue;
     const scene::LiveScene& scene = *run->scene;
     const bool inUse = scene.subscribers.size() > 0;
     const bool ready = run->host && run->host->isReady();
@@ -272,6 +304,7 @@ void DeviceThread::endSlice(Run& run, Clock::time_point before) {
   if (run.host->hasSlices() || !survives(run, [&] { run.host->finish(); })) return;
   run.begun = false;
   run.tickEnded(run.used, Clock::now());
+  checkPrice(run);
 }
 
 bool DeviceThread::survives(Run& run, const std::function<void()>& partOfTick) {
@@ -279,6 +312,7 @@ bool DeviceThread::survives(Run& run, const std::function<void()>& partOfTick) {
     partOfTick();
     return true;
   } catch (const vulkan::DeviceLost&) {
+    ++run.deviceLosses;
     throw;
   } catch (const std::exception& failure) {
     rebuildScene(run, failure.what());
@@ -323,6 +357,8 @@ void DeviceThread::rebuildDevice(const std::string& reason) {
   for (const auto& run : runs_) {
     run->loading = {};
     run->begun = false;
+    if (run->deviceLosses >= kMaxDeviceLosses && !run->quarantined)
+      quarantine(*run, "the device was lost twice while it ran");
   }
   do {
     runTasks();
@@ -335,9 +371,11 @@ void DeviceThread::rebuildDevice(const std::string& reason) {
 bool DeviceThread::tryRebuildDevice() {
   for (const auto& run : runs_)
     if (run->host) run->host->release();
+  meter_.reset();
   device_.reset();
   try {
     device_ = std::make_unique<vulkan::Device>(options_);
+    meter_ = std::make_unique<simulation::SpeedMeter>(*device_);
     for (const auto& run : runs_)
       if (run->host)
         run->host->rebuild(

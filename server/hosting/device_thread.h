@@ -15,11 +15,14 @@
 #include <vector>
 
 #include "server/delivery/frame_publisher.h"
+#include "server/scene/budget.h"
 #include "server/scene/live_scene.h"
 #include "server/scene/scene_host.h"
 #include "server/scene/scene_loader.h"
+#include "server/schedule/price_watch.h"
 #include "server/schedule/slow_watch.h"
 #include "server/schedule/tick_scheduler.h"
+#include "server/simulation/speed_meter.h"
 #include "server/telemetry/metrics.h"
 #include "server/vulkan/device.h"
 
@@ -38,14 +41,17 @@ using schedule::Clock;
 // is tried once a second until it succeeds. If a tick fails in another way, only its scene is rebuilt like
 // this. A scene is given up if a tick fails again within a simulated second, or if rebuilding it fails twice:
 // all participants are dismissed, and the next join starts it from the beginning.
+//
+// A scene is put into quarantine if it takes far more than its price (schedule::PriceWatch), or if the device
+// is lost for a second time while the thread waits for this scene's work.
 class DeviceThread {
  public:
-  // Returns when the device and the first scene are ready. Without scenes there is no device, and none can be
+  // Returns when the device and the first scene are ready, and the budget knows the device's speed. Without scenes there is no device, and none can be
   // added. All arguments must outlive the thread. Throws what the device or the first scene throws.
   DeviceThread(const vulkan::DeviceOptions& device,
                const std::vector<std::shared_ptr<scene::LiveScene>>& scenes,
-               delivery::FramePublisher& publisher, telemetry::ServerMetrics& metrics, bool runAlways,
-               double reportRate);
+               delivery::FramePublisher& publisher, telemetry::ServerMetrics& metrics, scene::Budget& budget,
+               bool runAlways, double reportRate);
   // Ends after the ticks in flight.
   ~DeviceThread();
   DeviceThread(const DeviceThread&) = delete;
@@ -88,6 +94,7 @@ class DeviceThread {
     scene::SceneLoader::Future loading;           // valid while it is loaded
     std::unique_ptr<scene::SceneHost> host;       // once it is loaded
     std::optional<std::promise<void>> whenAdded;  // set by add(), until the scene is ready
+    bool quarantined = false;
     bool refused = false;                         // added, but cannot run
     bool begun = false;                           // the current tick has begun, and is not finished
     Clock::duration used{};                       // time of the current tick on the device
@@ -95,7 +102,9 @@ class DeviceThread {
     Clock::time_point nextPausedFrame{};          // next check for subscribers that need a key frame
     std::optional<std::uint64_t> failed;          // tick count at the newest failure
     bool rebuildFailed = false;                   // since the newest failure
+    int deviceLosses = 0;                         // while the thread waited for this scene
     schedule::SlowWatch slow;
+    schedule::PriceWatch price;
     double slipped = 0;  // ticks that are not counted yet, below 1
   };
 
@@ -109,6 +118,9 @@ class DeviceThread {
   void takeLoadedScenes();
   // Throws vulkan::DeviceLost.
   void take(Run& run);
+  // Puts the scene into quarantine if it takes far more than its price. Throws vulkan::DeviceLost.
+  void checkPrice(Run& run);
+  void quarantine(Run& run, const std::string& why);
   // Gives the scene up and dismisses its participants.
   void dismiss(Run& run, const std::string& why);
   // Encodes frames of paused scenes for subscribers that need a key frame.
@@ -118,7 +130,8 @@ class DeviceThread {
   void runSlice();
   // Accounts for the time since `before`, and finishes the tick if it has no more slices.
   void endSlice(Run& run, Clock::time_point before);
-  // Runs a part of a tick. Returns false if it failed; the scene is then rebuilt. Throws vulkan::DeviceLost.
+  // Runs a part of a tick. Returns false if it failed; the scene is then rebuilt. Throws vulkan::DeviceLost,
+  // and counts that as the scene's.
   bool survives(Run& run, const std::function<void()>& partOfTick);
   void rebuildScene(Run& run, const std::string& reason);
   void begin(Run& run, Clock::time_point now);
@@ -128,6 +141,7 @@ class DeviceThread {
   const vulkan::DeviceOptions options_;
   delivery::FramePublisher& publisher_;
   telemetry::ServerMetrics& metrics_;
+  scene::Budget& budget_;
   const bool runAlways_;
   const double reportRate_;
 
@@ -140,6 +154,7 @@ class DeviceThread {
 
   // Owned by the thread.
   std::unique_ptr<vulkan::Device> device_;
+  std::unique_ptr<simulation::SpeedMeter> meter_;  // of device_
   std::vector<std::unique_ptr<Run>> runs_;
   std::vector<schedule::TickSchedule*> schedules_, chosen_;  // of runs_
   scene::SceneLoader loader_;                                // for device_

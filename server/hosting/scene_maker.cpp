@@ -179,7 +179,10 @@ tl::expected<v1::CreateSceneResponse, v1::Error> SceneMaker::createNow(const v1:
       server_.options.journals ? server_.options.journals(*definition) : nullptr;
   const auto scene =
       std::make_shared<scene::LiveScene>(std::move(*definition), true, std::move(journal),
-                                         request.max_participants() > 0 ? request.max_participants() : most);
+                                         request.max_participants() > 0 ? request.max_participants() : most,
+                                         server_.budget);
+  if (auto charged = scene->charge(); !charged)
+    return refused(charged.error().code, std::move(charged.error().text));
   try {
     server_.device.add(scene).get();
   } catch (const std::exception& failure) {

@@ -15,6 +15,7 @@
 #include "server/delivery/wire_types.h"
 #include "server/messages/limits.h"
 #include "server/model/scene.h"
+#include "server/scene/budget.h"
 #include "server/scene/defaults.h"
 #include "server/scene/roles.h"
 #include "server/scene/roster.h"
@@ -49,6 +50,8 @@ struct ServerOptions {
   std::uint32_t maxParticipants = scene::kDefaultMaxParticipants;
   // Scenes that peers may create, in addition to those that the server starts with.
   std::uint32_t maxCreatedScenes = 16;
+  // What participants may add by creating scenes and changing parameters.
+  scene::BudgetLimits budget{};
   // Threads that predict large frames on the CPU; 0 means automatic (EncoderThreads).
   std::uint32_t encoderThreads = 0;
   // Limit of the uploads of all peers together, in bytes.

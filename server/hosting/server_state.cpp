@@ -16,13 +16,14 @@ namespace clothstream::hosting {
 namespace {
 
 std::vector<std::shared_ptr<scene::LiveScene>> liveScenes(std::vector<model::Scene> definitions,
-                                                          const ServerOptions& options) {
+                                                          const ServerOptions& options,
+                                                          const std::shared_ptr<scene::Budget>& budget) {
   std::vector<std::shared_ptr<scene::LiveScene>> scenes;
   scenes.reserve(definitions.size());
   for (model::Scene& definition : definitions) {
     std::shared_ptr<scene::Journal> journal = options.journals ? options.journals(definition) : nullptr;
     scenes.push_back(std::make_shared<scene::LiveScene>(std::move(definition), false, std::move(journal),
-                                                        options.maxParticipants));
+                                                        options.maxParticipants, budget));
   }
   return scenes;
 }
@@ -79,7 +80,8 @@ v1::SceneSummary summaryOf(const scene::LiveScene& scene) {
 SceneServer::State::State(std::vector<model::Scene> definitions, ServerOptions options_)
     : options(std::move(options_)),
       uploads(options.maxUploadBytes),
-      scenes(liveScenes(std::move(definitions), options)),
+      budget(std::make_shared<scene::Budget>(options.budget)),
+      scenes(liveScenes(std::move(definitions), options, budget)),
       publisher(
           (scenes.size() + options.maxCreatedScenes) * codec::kMaxQualities * encode::FrameEncoder::kSlots,
           [this] {
@@ -88,7 +90,7 @@ SceneServer::State::State(std::vector<model::Scene> definitions, ServerOptions o
           },
           options.encoderThreads > 0 ? options.encoderThreads
                                      : encode::EncoderThreads::suitedTo(std::thread::hardware_concurrency())),
-      device(options.device, scenes, publisher, metrics, options.runAlways, options.reportRate),
+      device(options.device, scenes, publisher, metrics, *budget, options.runAlways, options.reportRate),
       maker(*this) {}
 
 SceneServer::State::State(std::shared_ptr<scene::LiveScene> played, ServerOptions options_)

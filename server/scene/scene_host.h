@@ -84,6 +84,8 @@ class SceneHost {
   // Newest complete tick, and its status.
   std::uint64_t tick() const { return tick_; }
   simulation::TickStatus status() const { return status_; }
+  // Colliders of the newest tick, those of participants included.
+  std::size_t colliders() const { return tickInputs_.colliders.size(); }
   // Returns whether the cloths were reset and no frame has shown it yet.
   bool owesFrame() const { return owesFrame_; }
 

@@ -2,6 +2,7 @@
 #include "server/endpoint/web/web_endpoint.h"
 
 #include <chrono>
+#include <exception>
 #include <stdexcept>
 #include <thread>
 #include <utility>
@@ -13,6 +14,7 @@
 #include <boost/asio/steady_timer.hpp>
 #include <fmt/format.h>
 #include <netinet/tcp.h>
+#include <spdlog/spdlog.h>
 #include <sys/socket.h>
 
 #include "server/endpoint/web/endpoint_context.h"
@@ -78,7 +80,7 @@ struct WebEndpoint::State {
         acceptor(listen(io, options.host, options.port)),
         port(acceptor.local_endpoint().port()) {
     accept();
-    thread = std::thread([this] { io.run(); });
+    thread = std::thread([this] { run(); });
   }
 
   ~State() {
@@ -87,6 +89,16 @@ struct WebEndpoint::State {
     // No wake may reach `io` during its destruction.
     for (const auto& session : context.streams) session->leave();
     context.streams.clear();
+  }
+
+  // An exception, such as for a lack of memory, ends the handler of one socket and not the endpoint.
+  void run() {
+    for (;;) try {
+        io.run();
+        return;
+      } catch (const std::exception& failure) {
+        spdlog::error("page: {}", failure.what());
+      }
   }
 
   void accept() {
