@@ -17,7 +17,6 @@ namespace {
 
 // Interval at which a paused scene looks for subscribers that need a key frame.
 constexpr std::chrono::milliseconds kPausedFramePeriod{50};
-constexpr int kMaxDeviceLosses = 2;
 
 }  // namespace
 
@@ -117,8 +116,7 @@ void DeviceThread::run(const std::vector<std::shared_ptr<scene::LiveScene>>& sce
   try {
     if (!scenes.empty()) {
       device_ = std::make_unique<vulkan::Device>(options_);
-      meter_ = std::make_unique<simulation::SpeedMeter>(*device_);
-      budget_.setSpeed(meter_->measure());
+      measureSpeed();
       for (const auto& scene : scenes) runs_.push_back(std::make_unique<Run>(scene));
       scene::LiveScene& first = *runs_.front()->scene;
       runs_.front()->host = std::make_unique<scene::SceneHost>(*device_, first, publisher_, reportRate_);
@@ -206,14 +204,19 @@ void DeviceThread::dismiss(Run& run, const std::string& why) {
   scene.subscribers.announce(delivery::parametersChanged(scene.restart(), 1));
 }
 
+void DeviceThread::measureSpeed() {
+  meter_ = std::make_unique<simulation::SpeedMeter>(*device_);
+  speed_ = meter_->measure();
+  budget_.setSpeed(speed_);
+}
+
 void DeviceThread::checkPrice(Run& run) {
-  const model::DeviceSpeed priced = budget_.speed();
-  const double price = run.scene->tickWork(run.host->colliders()).seconds(priced);
+  const double price = run.scene->tickWork(run.host->colliders()).seconds(budget_.speed());
   const double seconds = schedule::seconds(run.used);
   if (!run.price.note(seconds, price)) return;
   const model::DeviceSpeed now = meter_->measure();
-  const double slowdown = std::max(now.nodeStepSeconds / priced.nodeStepSeconds,
-                                   now.dispatchSeconds / priced.dispatchSeconds);
+  const double slowdown =
+      std::max(now.nodeStepSeconds / speed_.nodeStepSeconds, now.dispatchSeconds / speed_.dispatchSeconds);
   if (run.price.isExcessive(slowdown))
     quarantine(run, fmt::format("a tick took {:.3f} s, and its price is {:.3f} s", seconds, price));
 }
@@ -312,7 +315,9 @@ bool DeviceThread::survives(Run& run, const std::function<void()>& partOfTick) {
     partOfTick();
     return true;
   } catch (const vulkan::DeviceLost&) {
-    ++run.deviceLosses;
+    const Clock::time_point now = Clock::now();
+    run.lostDeviceTwice = run.lostDevice && now - *run.lostDevice < kLossWindow;
+    run.lostDevice = now;
     throw;
   } catch (const std::exception& failure) {
     rebuildScene(run, failure.what());
@@ -357,7 +362,7 @@ void DeviceThread::rebuildDevice(const std::string& reason) {
   for (const auto& run : runs_) {
     run->loading = {};
     run->begun = false;
-    if (run->deviceLosses >= kMaxDeviceLosses && !run->quarantined)
+    if (std::exchange(run->lostDeviceTwice, false))
       quarantine(*run, "the device was lost twice while it ran");
   }
   do {
@@ -375,7 +380,7 @@ bool DeviceThread::tryRebuildDevice() {
   device_.reset();
   try {
     device_ = std::make_unique<vulkan::Device>(options_);
-    meter_ = std::make_unique<simulation::SpeedMeter>(*device_);
+    measureSpeed();
     for (const auto& run : runs_)
       if (run->host)
         run->host->rebuild(

@@ -43,9 +43,11 @@ using schedule::Clock;
 // all participants are dismissed, and the next join starts it from the beginning.
 //
 // A scene is put into quarantine if it takes far more than its price (schedule::PriceWatch), or if the device
-// is lost for a second time while the thread waits for this scene's work.
+// is lost twice within kLossWindow while the thread runs this scene.
 class DeviceThread {
  public:
+  static constexpr std::chrono::seconds kLossWindow{60};
+
   // Returns when the device and the first scene are ready, and the budget knows the device's speed. Without scenes there is no device, and none can be
   // added. All arguments must outlive the thread. Throws what the device or the first scene throws.
   DeviceThread(const vulkan::DeviceOptions& device,
@@ -102,7 +104,8 @@ class DeviceThread {
     Clock::time_point nextPausedFrame{};          // next check for subscribers that need a key frame
     std::optional<std::uint64_t> failed;          // tick count at the newest failure
     bool rebuildFailed = false;                   // since the newest failure
-    int deviceLosses = 0;                         // while the thread waited for this scene
+    std::optional<Clock::time_point> lostDevice;  // newest loss while the thread ran this scene
+    bool lostDeviceTwice = false;                 // within kLossWindow
     schedule::SlowWatch slow;
     schedule::PriceWatch price;
     double slipped = 0;  // ticks that are not counted yet, below 1
@@ -118,6 +121,8 @@ class DeviceThread {
   void takeLoadedScenes();
   // Throws vulkan::DeviceLost.
   void take(Run& run);
+  // Gives the speed of a new device to the budget.
+  void measureSpeed();
   // Puts the scene into quarantine if it takes far more than its price. Throws vulkan::DeviceLost.
   void checkPrice(Run& run);
   void quarantine(Run& run, const std::string& why);
@@ -155,6 +160,7 @@ class DeviceThread {
   // Owned by the thread.
   std::unique_ptr<vulkan::Device> device_;
   std::unique_ptr<simulation::SpeedMeter> meter_;  // of device_
+  model::DeviceSpeed speed_;                       // of device_ when it was new
   std::vector<std::unique_ptr<Run>> runs_;
   std::vector<schedule::TickSchedule*> schedules_, chosen_;  // of runs_
   scene::SceneLoader loader_;                                // for device_

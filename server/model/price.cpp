@@ -24,14 +24,14 @@ constexpr double kPrepare = 2, kIteration = 0.5, kActive = 0.25;
 constexpr double kFillPair = 0.6, kMultiplyPair = 0.22;
 constexpr double kCorrection = 0.45;  // of a spring, with xpbd
 // Of a node, in each tick and in each frame. The frame includes entropy coding on the host.
-constexpr double kTick = 2, kFrame = 15;
-constexpr double kTickDispatches = 10, kFrameDispatches = 30;
+constexpr double kTick = 2, kFrame = 8;
+constexpr double kTickDispatches = 6, kFrameDispatches = 12;
 
 // Nodes of the largest cloth that one workgroup simulates on a software device (SolveStage, XpbdStage).
 constexpr std::uint32_t kGroupSolve = 4096, kGroupGrid = 2048, kGroupMesh = 8192;
 
 // Bytes on device and host, measured like the weights.
-constexpr std::uint64_t kSceneBytes = 8 << 20;
+constexpr double kSceneBytes = 8e6;
 constexpr double kNodeBytes = 1200, kSpringBytes = 64, kMeshNodeBytes = 400;
 constexpr double kSelfCollisionBytes = 600, kHingeBytes = 200, kSystemBytes = 64, kPairBytes = 40;
 
@@ -134,7 +134,7 @@ Work PriceModel::work(const Scene& scene, std::size_t colliderCount) const {
   return work;
 }
 
-std::uint64_t PriceModel::bytes(const Scene& scene) const {
+double PriceModel::bytes(const Scene& scene) const {
   assert(scene.cloths.size() == cloths_.size());
   double bytes = kSceneBytes;
   for (std::size_t i = 0; i < cloths_.size(); ++i) {
@@ -149,7 +149,7 @@ std::uint64_t PriceModel::bytes(const Scene& scene) const {
     if (isSystem(cloth.solver.kind) || cloth.solver.kind == SolverKind::xpbd) bytes += kSystemBytes * springs;
     if (isAssembled(cloth.solver)) bytes += kPairBytes * static_cast<double>(counts.pairs);
   }
-  return static_cast<std::uint64_t>(bytes);
+  return bytes;
 }
 
 }  // namespace clothstream::model

@@ -56,7 +56,7 @@ class PriceModel {
   Work work(const Scene& scene, std::size_t colliders) const;
   Work work(const Scene& scene) const { return work(scene, scene.colliders.size()); }
   // Memory on the device and on the host, in bytes.
-  std::uint64_t bytes(const Scene& scene) const;
+  double bytes(const Scene& scene) const;
 
  private:
   // Counts of one cloth.

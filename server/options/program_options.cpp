@@ -38,6 +38,18 @@ struct Parsed {
   bool listDevices = false, listMaterials = false, printConfig = false, printMarkdown = false;
 };
 
+void addBudgetOptions(OptionTable& table, scene::BudgetLimits& budget) {
+  const NumberRange loads{.min = 0, .max = 1e6, .type = "LOAD"};
+  const NumberRange megabytes{.min = 0, .max = 1e9, .type = "MEGABYTES"};
+  table.number("--max-load", budget.load, loads,
+               "Seconds of the device's time a second that clients may take in all by creating scenes and changing "
+               "parameters, by estimate. 1 is all that the device has");
+  table.number("--max-scene-load", budget.sceneLoad, loads, "The same for one scene");
+  table.number("--max-memory", budget.megabytes, megabytes,
+               "Memory that clients may take in all by creating scenes and changing parameters, by estimate");
+  table.number("--max-scene-memory", budget.sceneMegabytes, megabytes, "The same for one scene");
+}
+
 void addSceneOptions(OptionTable& table, Parsed& parsed) {
   ProgramOptions& options = parsed.options;
   table.group("Scenes");
@@ -74,6 +86,7 @@ void addSceneOptions(OptionTable& table, Parsed& parsed) {
                "Start a new file when a recording reaches this many megabytes. 0 means no limit");
   table.number("--max-created-scenes", options.server.maxCreatedScenes, {.min = 0, .max = 1000},
                "Scenes that clients may create in addition. 0 allows none");
+  addBudgetOptions(table, options.server.budget);
   table.number("--encoder-threads", options.server.encoderThreads, kThreads,
                "CPU threads that predict large frames where the device does not. 0 means a quarter of the "
                "processors, at most 8");

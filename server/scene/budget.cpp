@@ -10,7 +10,7 @@
 namespace clothstream::scene {
 namespace {
 
-constexpr double kMib = 1 << 20;
+constexpr double kMegabyte = 1e6;
 
 // Largest number from 1 to `most` that fits, or 0. A larger number never fits if a smaller one does not.
 std::uint32_t largest(std::uint32_t most, const std::function<bool(std::uint32_t)>& fits) {
@@ -69,7 +69,7 @@ Charge::Charge(std::shared_ptr<Budget> budget, const model::Scene& scene, bool f
     : budget_(std::move(budget)), model_(scene), made_(free) {
   if (!free) return;
   freeWork_ = model_.work(scene);
-  freeBytes_ = model_.bytes(scene);
+  freeMegabytes_ = model_.bytes(scene) / kMegabyte;
 }
 
 Charge::~Charge() {
@@ -79,13 +79,13 @@ Charge::~Charge() {
 
 Charge::Amount Charge::priceOf(const model::Scene& scene) const {
   const double seconds = model_.work(scene).seconds(budget_->speed_) - freeWork_.seconds(budget_->speed_);
-  const std::uint64_t bytes = model_.bytes(scene);
-  return {.load = std::max(0.0, seconds) * scene.simulationRate, .bytes = bytes - std::min(bytes, freeBytes_)};
+  return {.load = std::max(0.0, seconds) * scene.simulationRate,
+          .megabytes = std::max(0.0, model_.bytes(scene) / kMegabyte - freeMegabytes_)};
 }
 
 void Charge::replace(const Amount& next) {
   budget_->load_ += next.load - charged_.load;
-  budget_->bytes_ += next.bytes - charged_.bytes;
+  budget_->megabytes_ += next.megabytes - charged_.megabytes;
   charged_ = next;
 }
 
@@ -102,27 +102,25 @@ messages::Result<void> Charge::charge(const std::string& path, const model::Scen
     return tl::unexpected(messages::FieldError{v1::ERROR_CODE_RESOURCE_EXHAUSTED, path + ": " + std::move(text)});
   };
   // What costs no more than before is always allowed.
-  const double otherLoads = std::max(0.0, budget_->load_ - charged_.load);
-  const double roomForLoad = std::max(0.0, std::min(limits.sceneLoad, limits.load - otherLoads));
+  const double freeLoad = std::max(0.0, limits.load - (budget_->load_ - charged_.load));
+  const double roomForLoad = std::min(limits.sceneLoad, freeLoad);
   if (price.load > charged_.load && price.load > roomForLoad) {
     const auto loadOf = [&](const model::Scene& other) { return priceOf(other).load; };
     return refuse(fmt::format(
-        "would take {:.2f} of the device's time, by estimate; one scene may take {:.2f} (--max-scene-load), and "
-        "{:.2f} of {:.2f} (--max-load) is free: {}",
-        price.load, limits.sceneLoad, std::max(0.0, limits.load - otherLoads), limits.load,
+        "would take {:.2f} s of the device's time a second, by estimate; one scene may take {:.2f} s "
+        "(--max-scene-load), and {:.2f} s of {:.2f} s (--max-load) are free: {}",
+        price.load, limits.sceneLoad, freeLoad, limits.load,
         whatFits(scene, made_, price.load, roomForLoad, loadOf)));
   }
-  const std::uint64_t otherBytes = budget_->bytes_ - charged_.bytes;
-  const std::uint64_t freeBytes = limits.bytes - std::min(limits.bytes, otherBytes);
-  const std::uint64_t roomForBytes = std::min(limits.sceneBytes, freeBytes);
-  if (price.bytes > charged_.bytes && price.bytes > roomForBytes)
+  const double free = std::max(0.0, limits.megabytes - (budget_->megabytes_ - charged_.megabytes));
+  const double room = std::min(limits.sceneMegabytes, free);
+  if (price.megabytes > charged_.megabytes && price.megabytes > room)
     return refuse(fmt::format(
-        "would take {:.0f} MiB of memory, by estimate; one scene may take {:.0f} (--max-scene-memory), and {:.0f} "
+        "would take {:.0f} MB of memory, by estimate; one scene may take {:.0f} (--max-scene-memory), and {:.0f} "
         "of {:.0f} (--max-memory) are free: {}",
-        static_cast<double>(price.bytes) / kMib, static_cast<double>(limits.sceneBytes) / kMib,
-        static_cast<double>(freeBytes) / kMib, static_cast<double>(limits.bytes) / kMib,
+        price.megabytes, limits.sceneMegabytes, free, limits.megabytes,
         made_ ? "nothing more would fit"
-              : fmt::format("about {} nodes would fit", scene.nodeCount() * roomForBytes / price.bytes)));
+              : fmt::format("about {:.0f} nodes would fit", scene.nodeCount() * room / price.megabytes)));
   replace(price);
   made_ = true;
   return {};

@@ -2,7 +2,7 @@
 // Device time and memory that participants may add to what the server started with.
 #pragma once
 
-#include <cstdint>
+#include <cstddef>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -13,11 +13,12 @@
 
 namespace clothstream::scene {
 
-// A load is the price of a scene's ticks in seconds of the device's time per second. 0.5: half of the device.
+// Memory is counted on device and host together. A load is the price of a scene's ticks in seconds of the device's time per second. 1: a
+// device that does nothing else can just run it in real time.
 struct BudgetLimits {
   // Of one scene, and of all scenes together.
-  double sceneLoad = 0.5, load = 0.5;
-  std::uint64_t sceneBytes = std::uint64_t{256} << 20, bytes = std::uint64_t{256} << 20;
+  double sceneLoad = 1, load = 1;
+  double sceneMegabytes = 256, megabytes = 256;
 };
 
 // Thread-safe.
@@ -35,8 +36,7 @@ class Budget {
   const BudgetLimits limits_;
   mutable std::mutex mutex_;
   model::DeviceSpeed speed_;
-  double load_ = 0;          // of all charges
-  std::uint64_t bytes_ = 0;  // of all charges
+  double load_ = 0, megabytes_ = 0;  // of all charges
 };
 
 // What one scene is charged, from its construction on. Not thread-safe.
@@ -61,8 +61,7 @@ class Charge {
 
  private:
   struct Amount {
-    double load = 0;
-    std::uint64_t bytes = 0;
+    double load = 0, megabytes = 0;
   };
   Amount priceOf(const model::Scene& scene) const;  // the budget's mutex is held
   void replace(const Amount& next);  // the budget's mutex is held
@@ -70,7 +69,7 @@ class Charge {
   const std::shared_ptr<Budget> budget_;
   const model::PriceModel model_;
   model::Work freeWork_;
-  std::uint64_t freeBytes_ = 0;
+  double freeMegabytes_ = 0;
   Amount charged_;
   bool made_;  // the scene exists: its shape and substeps stay
 };

@@ -325,7 +325,8 @@ void SolveStage::Systems::recordPrepare(vulkan::Recorder& recorder, const Group&
   }
   recorder.dispatch(group.check[from], push, all);
   recorder.barrier();
-  recorder.dispatchIndirect(group.prepare[from], push, groupSizes, group.firstSize * sizeof(std::uint32_t));
+  recorder.dispatchIndirect(group.prepare[from], push, groupSizes, group.firstSize * sizeof(std::uint32_t),
+                            all);
 }
 
 void SolveStage::Systems::recordSmall(vulkan::Recorder& recorder, const Group& group,
@@ -341,7 +342,9 @@ void SolveStage::Systems::recordSmall(vulkan::Recorder& recorder, const Group& g
                                                 .endIteration = end,
                                                 .firstChunk = 0,
                                                 .nextGroup = 0},
-                              groupSizes, (group.firstSize + kSmallSystems) * sizeof(std::uint32_t));
+                              groupSizes, (group.firstSize + kSmallSystems) * sizeof(std::uint32_t),
+                              std::uint64_t{group.on.smallSystems} * group.on.smallChunks * workgroup *
+                                  (end - first));
     first = end;
   }
 }
@@ -353,6 +356,7 @@ void SolveStage::Systems::recordLarge(vulkan::Recorder& recorder, const Group& g
   const auto number = [&](std::uint32_t iteration) {
     return group.firstSize + kIteration + kSize * iteration;
   };
+  const std::uint64_t most = std::uint64_t{on.endChunk - on.firstLargeChunk} * workgroup;
   shared::SolvePush push{.nodes = nodes,
                          .firstSystem = 0,
                          .firstIteration = 0,
@@ -363,13 +367,13 @@ void SolveStage::Systems::recordLarge(vulkan::Recorder& recorder, const Group& g
     const std::size_t size = number(iteration) * sizeof(std::uint32_t);
     push.nextGroup = number(iteration + 1);
     recorder.barrier();
-    recorder.dispatchIndirect(group.multiply[from], push, groupSizes, size);
+    recorder.dispatchIndirect(group.multiply[from], push, groupSizes, size, most);
     recorder.barrier();
-    recorder.dispatchIndirect(group.update[from], push, groupSizes, size);
+    recorder.dispatchIndirect(group.update[from], push, groupSizes, size, most);
   }
   recorder.barrier();
   recorder.dispatchIndirect(group.measure[from], push, groupSizes,
-                            number(on.iterations) * sizeof(std::uint32_t));
+                            number(on.iterations) * sizeof(std::uint32_t), most);
 }
 
 void SolveStage::record(vulkan::Recorder& recorder, std::uint32_t from,
@@ -389,12 +393,12 @@ void SolveStage::record(vulkan::Recorder& recorder, std::uint32_t from,
                                  .reserved = 0};
     recorder.barrier();
     // Nodes that ACAD leaves alone stay in place, unless they may collide.
+    const std::uint64_t threads = std::uint64_t{group.on.endChunk - group.on.firstChunk} * all.workgroup;
     if (isAdaptive(group.on) && collision.colliderCount == 0)
       recorder.dispatchIndirect(group.apply[from], push, all.groupSizes,
-                                group.firstSize * sizeof(std::uint32_t));
+                                group.firstSize * sizeof(std::uint32_t), threads);
     else
-      recorder.dispatch(group.apply[from], push,
-                        std::uint64_t{group.on.endChunk - group.on.firstChunk} * all.workgroup);
+      recorder.dispatch(group.apply[from], push, threads);
   }
 }
 

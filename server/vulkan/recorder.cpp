@@ -124,10 +124,10 @@ void Recorder::dispatchBytes(const Bindings& bindings, const void* push, std::ui
 }
 
 void Recorder::dispatchIndirectBytes(const Bindings& bindings, const void* push, std::uint32_t pushBytes,
-                                     const Buffer& groups, std::size_t offset) {
+                                     const Buffer& groups, std::size_t offset, std::uint64_t most) {
   assert(offset % 4 == 0 && offset + sizeof(VkDispatchIndirectCommand) <= groups.bytes());
   if (rehearses_) return note(bindings);
-  count(kIndirectInvocations);
+  count(most);
   bind(bindings, push, pushBytes);
   handles_->current().dispatchIndirect(*groups.handles().buffer, offset);
 }

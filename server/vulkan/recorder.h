@@ -31,10 +31,8 @@ class Recorder {
 
   // Divides recordings, from the next begin() on, into slices that can be submitted one by one, so that other
   // work can run between them. A slice ends before the first dispatch that would exceed `invocations` in all,
-  // and has one dispatch at least. An indirect dispatch counts as kIndirectInvocations. By default a
-  // recording has one slice.
+  // and has one dispatch at least. By default a recording has one slice.
   void sliceAfter(std::uint64_t invocations) { sliceInvocations_ = invocations; }
-  static constexpr std::uint64_t kIndirectInvocations = 16'384;
   std::uint32_t sliceCount() const;
 
   // Clears the recording. Earlier submissions of all its slices that were submitted must be complete.
@@ -67,12 +65,12 @@ class Recorder {
   }
 
   // Runs as many workgroups as three 32-bit numbers (x, y, z) in `groups` say at run time. `groups` must be a
-  // buffer with purpose `indirect`.
+  // buffer with purpose `indirect`. `most` is the number of invocations that slices count for it.
   template <typename Push>
   void dispatchIndirect(const Bindings& bindings, const Push& push, const Buffer& groups,
-                        std::size_t offset = 0) {
+                        std::size_t offset, std::uint64_t most) {
     static_assert(std::is_trivially_copyable_v<Push>);
-    dispatchIndirectBytes(bindings, &push, sizeof(Push), groups, offset);
+    dispatchIndirectBytes(bindings, &push, sizeof(Push), groups, offset, most);
   }
 
   // Makes earlier work (kernels, copies, fills, dispatch sizes) visible to later work. No barrier is needed
@@ -98,7 +96,7 @@ class Recorder {
   void dispatchBytes(const Bindings& bindings, const void* push, std::uint32_t pushBytes,
                      std::uint64_t threads);
   void dispatchIndirectBytes(const Bindings& bindings, const void* push, std::uint32_t pushBytes,
-                             const Buffer& groups, std::size_t offset);
+                             const Buffer& groups, std::size_t offset, std::uint64_t most);
   // Counts a dispatch, and ends the slice before it if it is full.
   void count(std::uint64_t invocations);
   void beginSlice();

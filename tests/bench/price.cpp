@@ -105,8 +105,8 @@ Rows runPrice(vulkan::Device& device, const Settings& settings) {
                       {"price_ms", price * 1e3},
                       {"tick_ms", measured * 1e3},
                       {"price_over_tick", price / measured},
-                      {"price_mib", static_cast<double>(model.bytes(scene)) / (1 << 20)},
-                      {"device_mib", static_cast<double>(bytes) / (1 << 20)}});
+                      {"price_mb", model.bytes(scene) / 1e6},
+                      {"device_mb", static_cast<double>(bytes) / 1e6}});
     }
   return rows;
 }

@@ -272,7 +272,7 @@ TEST_F(ComputeTest, DeviceDecidesTheSizeOfAnIndirectDispatch) {
     recorder.fill(groups, 2, 4, 4);
     recorder.fill(b, 0, b.bytes());
     recorder.barrier();
-    recorder.dispatchIndirect(bindings, kCount, groups, 4);  // 2 x 1 x 1 workgroups of 64
+    recorder.dispatchIndirect(bindings, kCount, groups, 4, 128);  // 2 x 1 x 1 workgroups of 64
   });
   std::vector<std::uint32_t> expected = countedUp(kCount, 1);
   std::fill(expected.begin() + 128, expected.end(), 0u);
