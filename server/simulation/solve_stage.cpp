@@ -55,17 +55,21 @@ std::uint32_t solveWorkgroup(const vulkan::Device& device, std::uint32_t wanted)
   return std::bit_floor(std::min({wanted, kSolveLanes, device.limits().maxWorkgroupInvocations}));
 }
 
+// Nodes times iterations that one workgroup computes in about 10 ms. A dispatch cannot be cut into slices.
+constexpr std::uint32_t kSoftwareDispatch = 1 << 18, kGpuDispatch = 1 << 20;
+
 // lavapipe allows an invocation 65,535 loop rounds, over all loops together. Beyond that it ends each loop
 // after one round.
 std::uint32_t iterationsPerDispatch(const vulkan::Device& device, const SolveGroup& group,
                                     std::uint32_t listed, std::uint32_t workgroup) {
-  if (!device.isSoftware()) return ~0u;
+  const std::uint32_t nodes = std::max(1u, group.smallChunks * kSolveLanes);
+  if (!device.isSoftware()) return std::max(1u, kGpuDispatch / nodes);
   const std::uint32_t tree = 2 * kSolveLanes / workgroup + 16;
   const std::uint32_t walks = kSolveLanes / workgroup;
   const std::uint32_t walk = group.mesh ? CLOTHSTREAM_SOLVE_WALK * (listed + 2) + 2 : 1;
   const std::uint32_t chunk = walks * (walk + 2) + tree;
   const std::uint32_t iteration = group.smallChunks * (chunk + 2) + tree + group.smallChunks;
-  return std::max(1u, (65'535 - 2 * iteration) / iteration);
+  return std::max(1u, std::min((65'535 - 2 * iteration) / iteration, kSoftwareDispatch / nodes));
 }
 
 }  // namespace
@@ -343,7 +347,7 @@ void SolveStage::Systems::recordSmall(vulkan::Recorder& recorder, const Group& g
                                                 .firstChunk = 0,
                                                 .nextGroup = 0},
                               groupSizes, (group.firstSize + kSmallSystems) * sizeof(std::uint32_t),
-                              std::uint64_t{group.on.smallSystems} * group.on.smallChunks * workgroup *
+                              std::uint64_t{group.on.smallSystems} * group.on.smallChunks * kSolveLanes *
                                   (end - first));
     first = end;
   }
