@@ -222,8 +222,8 @@ void DeviceThread::checkPrice(Run& run) {
 }
 
 void DeviceThread::quarantine(Run& run, const std::string& why) {
-  const std::string text = fmt::format("the scene '{}' is stopped because it harms other scenes: {}",
-                                       run.scene->name(), why);
+  const std::string text =
+      fmt::format("the scene '{}' is stopped because it harms other scenes: {}", run.scene->name(), why);
   spdlog::error("{}", text);
   metrics_.quarantines.add();
   publisher_.drain();

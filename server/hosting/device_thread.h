@@ -48,8 +48,9 @@ class DeviceThread {
  public:
   static constexpr std::chrono::seconds kLossWindow{60};
 
-  // Returns when the device and the first scene are ready, and the budget knows the device's speed. Without scenes there is no device, and none can be
-  // added. All arguments must outlive the thread. Throws what the device or the first scene throws.
+  // Returns when the device and the first scene are ready, and the budget knows the device's speed. Without
+  // scenes there is no device, and none can be added. All arguments must outlive the thread. Throws what the
+  // device or the first scene throws.
   DeviceThread(const vulkan::DeviceOptions& device,
                const std::vector<std::shared_ptr<scene::LiveScene>>& scenes,
                delivery::FramePublisher& publisher, telemetry::ServerMetrics& metrics, scene::Budget& budget,

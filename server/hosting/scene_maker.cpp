@@ -124,7 +124,7 @@ tl::expected<model::Scene, v1::Error> SceneMaker::definitionOf(const v1::CreateS
                                                                const std::string& uploaded) const {
   switch (request.source_case()) {
     case v1::CreateSceneRequest::kScene:
-      return checked(messages::toScene(request.scene()));
+      return checked(messages::toScene(request.scene(), {}, server_.options.maxSceneNodes));
     case v1::CreateSceneRequest::kUploadedContentId: {
       v1::Scene message;
       if (!messages::parsedSize(*v1::Scene::descriptor(), std::as_bytes(std::span(uploaded)),
@@ -137,7 +137,7 @@ tl::expected<model::Scene, v1::Error> SceneMaker::definitionOf(const v1::CreateS
       if (!message.ParseFromString(uploaded))
         return refused(v1::ERROR_CODE_MALFORMED_MESSAGE,
                        "createScene: the uploaded content is not a Scene message");
-      return checked(messages::toScene(message));
+      return checked(messages::toScene(message, {}, server_.options.maxSceneNodes));
     }
     case v1::CreateSceneRequest::kNamed:
       if (const std::shared_ptr<scene::LiveScene> live = server_.find(request.named())) return live->start();
@@ -177,10 +177,9 @@ tl::expected<v1::CreateSceneResponse, v1::Error> SceneMaker::createNow(const v1:
         fmt::format("createScene: a scene '{}' exists already; choose another name", definition->name));
   std::shared_ptr<scene::Journal> journal =
       server_.options.journals ? server_.options.journals(*definition) : nullptr;
-  const auto scene =
-      std::make_shared<scene::LiveScene>(std::move(*definition), true, std::move(journal),
-                                         request.max_participants() > 0 ? request.max_participants() : most,
-                                         server_.budget);
+  const auto scene = std::make_shared<scene::LiveScene>(
+      std::move(*definition), true, std::move(journal),
+      request.max_participants() > 0 ? request.max_participants() : most, server_.budget);
   if (auto charged = scene->charge(); !charged)
     return refused(charged.error().code, std::move(charged.error().text));
   try {

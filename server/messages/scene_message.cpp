@@ -386,12 +386,23 @@ void checkAttachments(Checks& checks, const model::Scene& scene) {
   checks.count(Path("attachments"), names.size(), 0, limits::kMaxAttachments);
 }
 
+std::string tooManyNodes(std::uint64_t nodes, std::uint64_t most) {
+  return fmt::format("have {} nodes in all; must have at most {}", nodes, most);
+}
+
+// Nodes of grids and vertices of meshes inside the message.
+std::uint64_t statedNodes(const v1::Scene& message) {
+  std::uint64_t nodes = 0;
+  for (const v1::Cloth& cloth : message.cloths())
+    nodes += std::uint64_t{cloth.grid().rows()} * cloth.grid().columns() +
+             static_cast<std::uint64_t>(cloth.mesh().positions_size()) / 3;
+  return nodes;
+}
+
 void checkSize(Checks& checks, const model::Scene& scene) {
   std::uint64_t nodes = 0;
   for (const model::Cloth& cloth : scene.cloths) nodes += cloth.nodeCount();
-  if (nodes > limits::kMaxNodes)
-    checks.fail(Path("cloths"), "",
-                fmt::format("have {} nodes in all; must have at most {}", nodes, limits::kMaxNodes));
+  if (nodes > limits::kMaxNodes) checks.fail(Path("cloths"), "", tooManyNodes(nodes, limits::kMaxNodes));
   std::size_t bytes = 0;
   for (const model::Cloth& cloth : scene.cloths) bytes += geometryBytes(cloth);
   if (bytes > limits::kMaxGeometryBytes)
@@ -512,10 +523,12 @@ std::optional<std::string> instability(const model::Scene& scene, const model::S
       limits::kMaxSubsteps);
 }
 
-Result<model::Scene> toScene(const v1::Scene& message, const MeshReader& readMesh) {
+Result<model::Scene> toScene(const v1::Scene& message, const MeshReader& readMesh, std::uint64_t maxNodes) {
   Checks checks;
   const Path root;
   model::Scene scene;
+  if (const std::uint64_t nodes = statedNodes(message); nodes > maxNodes)
+    checks.fail(root / "cloths", "", tooManyNodes(nodes, maxNodes));
   scene.name = checks.name(root / "name", message.name());
   scene.description = checks.text(root / "description", message.description());
   if (message.has_simulation_rate()) scene.simulationRate = message.simulation_rate();

@@ -2,6 +2,7 @@
 // Converts scenes between their message and the model.
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <span>
 #include <string>
@@ -9,6 +10,7 @@
 #include "clothstream/v1/scene.pb.h"
 #include "clothstream/v1/session.pb.h"
 #include "server/messages/field_error.h"
+#include "server/messages/limits.h"
 #include "server/messages/mesh_message.h"
 #include "server/messages/validation.h"
 #include "server/model/material.h"
@@ -19,8 +21,10 @@ namespace clothstream::messages {
 
 // Applies the defaults of scene.proto and checks everything: ranges, unique names, pins inside their grid,
 // meshes, rates, the number of nodes, and that the integrator is stable with these substeps. Refuses mesh
-// files if there is no reader.
-[[nodiscard]] Result<model::Scene> toScene(const v1::Scene& message, const MeshReader& readMesh = {});
+// files if there is no reader. Refuses more than `maxNodes` nodes, or vertices of meshes before they are
+// welded, at once; everything else takes time and memory in proportion to them.
+[[nodiscard]] Result<model::Scene> toScene(const v1::Scene& message, const MeshReader& readMesh = {},
+                                           std::uint64_t maxNodes = limits::kMaxNodes);
 
 // Sets every field, defaults included, and writes whole meshes. toScene() of the result returns the same
 // scene.

@@ -124,13 +124,15 @@ Work PriceModel::work(const Scene& scene, std::size_t colliderCount) const {
     if (cloth.dihedralBending != 0) step += kHinge * static_cast<double>(counts.hinges);
     if (cloth.selfCollision) step += kSelfCollision * nodes;
     step += kCollider * colliders * nodes;
-    work.nodeSteps += substeps * step + nodes * (kTick + kFrame * framesPerTick + kGatherCollider * colliders);
+    work.nodeSteps +=
+        substeps * step + nodes * (kTick + kFrame * framesPerTick + kGatherCollider * colliders);
     work += solverWork(scene, cloth, counts);
   }
   if (scene.integrator == Integrator::rungeKutta4) work.dispatches += 11 * substeps;
   const auto any = [&](auto has) { return std::ranges::any_of(scene.cloths, has) ? 1.0 : 0.0; };
   work.dispatches += 3 * substeps * any([](const Cloth& cloth) { return cloth.dihedralBending != 0; });
-  work.dispatches += (6 + 4 * substeps) * any([](const Cloth& cloth) { return cloth.selfCollision.has_value(); });
+  work.dispatches +=
+      (6 + 4 * substeps) * any([](const Cloth& cloth) { return cloth.selfCollision.has_value(); });
   return work;
 }
 

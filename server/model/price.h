@@ -63,7 +63,7 @@ class PriceModel {
   struct ClothCounts {
     std::uint64_t nodes = 0;
     std::array<std::uint64_t, kSpringKinds> springs{};
-    std::uint64_t pairs = 0;       // sum over nodes of the squared number of their structural and shear springs
+    std::uint64_t pairs = 0;  // sum over nodes of the squared number of their structural and shear springs
     std::uint32_t mostAtNode = 0;  // of these springs
     std::uint64_t hinges = 0;
     std::uint64_t allSprings() const { return springs[0] + springs[1] + springs[2]; }

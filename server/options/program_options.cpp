@@ -41,9 +41,10 @@ struct Parsed {
 void addBudgetOptions(OptionTable& table, scene::BudgetLimits& budget) {
   const NumberRange loads{.min = 0, .max = 1e6, .type = "LOAD"};
   const NumberRange megabytes{.min = 0, .max = 1e9, .type = "MEGABYTES"};
-  table.number("--max-load", budget.load, loads,
-               "Seconds of the device's time a second that clients may take in all by creating scenes and changing "
-               "parameters, by estimate. 1 is all that the device has");
+  table.number(
+      "--max-load", budget.load, loads,
+      "Seconds of the device's time a second that clients may take in all by creating scenes and changing "
+      "parameters, by estimate. 1 is all that the device has");
   table.number("--max-scene-load", budget.sceneLoad, loads, "The same for one scene");
   table.number("--max-memory", budget.megabytes, megabytes,
                "Memory that clients may take in all by creating scenes and changing parameters, by estimate");
@@ -86,6 +87,8 @@ void addSceneOptions(OptionTable& table, Parsed& parsed) {
                "Start a new file when a recording reaches this many megabytes. 0 means no limit");
   table.number("--max-created-scenes", options.server.maxCreatedScenes, {.min = 0, .max = 1000},
                "Scenes that clients may create in addition. 0 allows none");
+  table.number("--max-scene-nodes", options.server.maxSceneNodes, {.min = 4, .max = 16'777'216},
+               "Nodes of a scene that clients create");
   addBudgetOptions(table, options.server.budget);
   table.number("--encoder-threads", options.server.encoderThreads, kThreads,
                "CPU threads that predict large frames where the device does not. 0 means a quarter of the "

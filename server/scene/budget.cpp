@@ -99,7 +99,8 @@ messages::Result<void> Charge::charge(const std::string& path, const model::Scen
   const BudgetLimits& limits = budget_->limits_;
   const Amount price = priceOf(scene);
   const auto refuse = [&](std::string text) {
-    return tl::unexpected(messages::FieldError{v1::ERROR_CODE_RESOURCE_EXHAUSTED, path + ": " + std::move(text)});
+    return tl::unexpected(
+        messages::FieldError{v1::ERROR_CODE_RESOURCE_EXHAUSTED, path + ": " + std::move(text)});
   };
   // What costs no more than before is always allowed.
   const double freeLoad = std::max(0.0, limits.load - (budget_->load_ - charged_.load));
@@ -116,7 +117,8 @@ messages::Result<void> Charge::charge(const std::string& path, const model::Scen
   const double room = std::min(limits.sceneMegabytes, free);
   if (price.megabytes > charged_.megabytes && price.megabytes > room)
     return refuse(fmt::format(
-        "would take {:.0f} MB of memory, by estimate; one scene may take {:.0f} (--max-scene-memory), and {:.0f} "
+        "would take {:.0f} MB of memory, by estimate; one scene may take {:.0f} (--max-scene-memory), and "
+        "{:.0f} "
         "of {:.0f} (--max-memory) are free: {}",
         price.megabytes, limits.sceneMegabytes, free, limits.megabytes,
         made_ ? "nothing more would fit"

@@ -13,8 +13,8 @@
 
 namespace clothstream::scene {
 
-// Memory is counted on device and host together. A load is the price of a scene's ticks in seconds of the device's time per second. 1: a
-// device that does nothing else can just run it in real time.
+// Memory is counted on device and host together. A load is the price of a scene's ticks in seconds of the
+// device's time per second. 1: a device that does nothing else can just run it in real time.
 struct BudgetLimits {
   // Of one scene, and of all scenes together.
   double sceneLoad = 1, load = 1;
@@ -64,7 +64,7 @@ class Charge {
     double load = 0, megabytes = 0;
   };
   Amount priceOf(const model::Scene& scene) const;  // the budget's mutex is held
-  void replace(const Amount& next);  // the budget's mutex is held
+  void replace(const Amount& next);                 // the budget's mutex is held
 
   const std::shared_ptr<Budget> budget_;
   const model::PriceModel model_;

@@ -10,8 +10,8 @@
 
 #include "server/delivery/subscribers.h"
 #include "server/messages/field_error.h"
-#include "server/model/scene.h"
 #include "server/model/price.h"
+#include "server/model/scene.h"
 #include "server/model/stability.h"
 #include "server/scene/budget.h"
 #include "server/scene/defaults.h"
@@ -28,8 +28,8 @@ class LiveScene {
  public:
   // A simulated scene. `definition` must be valid. `created`: a peer created it while the server runs.
   // `journal` gets everything that happens in the scene; it may be null. `maxParticipants` includes
-  // disconnected ones. A created scene is charged to `budget` by charge(), other scenes only for changes; null
-  // means a budget of its own.
+  // disconnected ones. A created scene is charged to `budget` by charge(), other scenes only for changes;
+  // null means a budget of its own.
   explicit LiveScene(model::Scene definition, bool created = false,
                      std::shared_ptr<Journal> journal = nullptr,
                      std::uint32_t maxParticipants = kDefaultMaxParticipants,

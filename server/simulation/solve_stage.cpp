@@ -339,16 +339,16 @@ void SolveStage::Systems::recordSmall(vulkan::Recorder& recorder, const Group& g
   for (std::uint32_t first = 0; first < group.on.iterations;) {
     const std::uint32_t end = first + std::min(group.iterationsPerDispatch, group.on.iterations - first);
     recorder.barrier();
-    recorder.dispatchIndirect(group.whole[from],
-                              shared::SolvePush{.nodes = nodes,
-                                                .firstSystem = group.on.firstSystem,
-                                                .firstIteration = first,
-                                                .endIteration = end,
-                                                .firstChunk = 0,
-                                                .nextGroup = 0},
-                              groupSizes, (group.firstSize + kSmallSystems) * sizeof(std::uint32_t),
-                              std::uint64_t{group.on.smallSystems} * group.on.smallChunks * kSolveLanes *
-                                  (end - first));
+    recorder.dispatchIndirect(
+        group.whole[from],
+        shared::SolvePush{.nodes = nodes,
+                          .firstSystem = group.on.firstSystem,
+                          .firstIteration = first,
+                          .endIteration = end,
+                          .firstChunk = 0,
+                          .nextGroup = 0},
+        groupSizes, (group.firstSize + kSmallSystems) * sizeof(std::uint32_t),
+        std::uint64_t{group.on.smallSystems} * group.on.smallChunks * kSolveLanes * (end - first));
     first = end;
   }
 }

@@ -74,9 +74,8 @@ model::DeviceSpeed SpeedMeter::measure() {
   const double many = many_.measure();
   // At least half of the time is the nodes', also if a disturbance has lengthened the few nodes' tick.
   const double forNodes = std::max(many - kManySubsteps * dispatch, many / 2);
-  return {.nodeStepSeconds = forNodes / nodes,
-          .dispatchSeconds = dispatch,
-          .workgroupFactor = workgroupFactor_};
+  return {
+      .nodeStepSeconds = forNodes / nodes, .dispatchSeconds = dispatch, .workgroupFactor = workgroupFactor_};
 }
 
 }  // namespace clothstream::simulation

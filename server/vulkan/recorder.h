@@ -67,8 +67,8 @@ class Recorder {
   // Runs as many workgroups as three 32-bit numbers (x, y, z) in `groups` say at run time. `groups` must be a
   // buffer with purpose `indirect`. `most` is the number of invocations that slices count for it.
   template <typename Push>
-  void dispatchIndirect(const Bindings& bindings, const Push& push, const Buffer& groups,
-                        std::size_t offset, std::uint64_t most) {
+  void dispatchIndirect(const Bindings& bindings, const Push& push, const Buffer& groups, std::size_t offset,
+                        std::uint64_t most) {
     static_assert(std::is_trivially_copyable_v<Push>);
     dispatchIndirectBytes(bindings, &push, sizeof(Push), groups, offset, most);
   }

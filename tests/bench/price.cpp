@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: MIT
 // Suite price: the price of a tick, computed from the scene, and the tick that was measured.
+#include "server/model/price.h"
+
 #include <memory>
 #include <string>
 #include <vector>
 
-#include "server/model/price.h"
 #include "server/simulation/speed_meter.h"
 #include "tests/bench/hung_cloth.h"
 #include "tests/bench/simulated.h"

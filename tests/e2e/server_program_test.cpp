@@ -357,6 +357,7 @@ TEST_F(ServerOptions, PrintedConfigurationReadsBackWithEveryOptionSet) {
                               std::string(directory) + "=line\nand\ttab",
                               "--record-limit=1e9",
                               "--max-created-scenes=0",
+                              "--max-scene-nodes=10000",
                               "--max-load=2",
                               "--max-scene-load=0.25",
                               "--max-memory=1000",

@@ -236,8 +236,8 @@ TEST(BuildMesh, RefusesTooManySpringsAtAVertex) {
               AllOf(HasSubstr("vertex 0"), HasSubstr("more than 100 springs")));
 }
 
-// Cell indices that differ only above bit 20 must not collide. They did, and this mesh took 8 to 23 s. Processor
-// time does not depend on other programs; this takes 0.1 s.
+// Cell indices that differ only above bit 20 must not collide. They did, and this mesh took 8 to 23 s.
+// Processor time does not depend on other programs; this takes 0.1 s.
 TEST(BuildMesh, WeldsVerticesWithEqualLowBitsInLinearTime) {
   constexpr int kSide = 256;
   MeshSource source;

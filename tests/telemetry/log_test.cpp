@@ -15,7 +15,6 @@ namespace {
 
 using testing::HasSubstr;
 
-
 TEST(Printable, EscapesControlCharactersAndKeepsOtherText) {
   for (const char* text :
        {"", "cloth", "\xc3\xa9t\xc3\xa9", "\xf0\x9f\xa7\xb5", "\xe2\x82\xac", "\xc2\xa0"}) {

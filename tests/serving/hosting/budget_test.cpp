@@ -22,8 +22,8 @@
 namespace clothstream::scene {
 namespace {
 
-using tests::TestPeer;
 using ::testing::HasSubstr;
+using tests::TestPeer;
 
 // 1 microsecond a node-step and nothing for a dispatch.
 constexpr model::DeviceSpeed kSpeed{.nodeStepSeconds = 1e-6, .dispatchSeconds = 0, .workgroupFactor = 1};

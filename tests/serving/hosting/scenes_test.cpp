@@ -152,6 +152,25 @@ TEST_F(ScenesTest, CreatesAndJoinsASceneUploadedInChunks) {
 }
 
 // Six million empty pins are 12 MB of bytes, and were parsed to more than 400 MB before they were counted.
+TEST_F(ScenesTest, RefusesTooManyNodes) {
+  ServerOptions options;
+  options.maxSceneNodes = 100;
+  START(options);
+  TestPeer maker(server());
+  v1::ClientMessage message;
+  v1::Scene& scene = *message.mutable_create_scene()->mutable_scene();
+  scene = messages::toMessage(tests::smallScene("mine"));
+  EXPECT_THAT(ask(maker, message).error().text(),
+              HasSubstr("cloths: have 120 nodes in all; must have at most 100"));
+  // 4 rings have 61 vertices, and 5 have 91; two such cloths are too many.
+  scene = discScene(5);
+  *scene.add_cloths() = scene.cloths(0);
+  EXPECT_THAT(ask(maker, message).error().text(),
+              HasSubstr("cloths: have 182 nodes in all; must have at most 100"));
+  scene.mutable_cloths()->RemoveLast();
+  EXPECT_TRUE(ask(maker, message).has_create_scene());
+}
+
 TEST_F(ScenesTest, RefusesUploadThatNeedsTooMuchMemory) {
   START();
   constexpr int kPins = 6'000'000;
@@ -175,7 +194,7 @@ TEST_F(ScenesTest, RefusesUploadThatNeedsTooMuchMemory) {
   upload(maker, content);
   const v1::Error error = createUploaded(maker).error();
   EXPECT_EQ(error.code(), v1::ERROR_CODE_MALFORMED_MESSAGE);
-  EXPECT_THAT(error.text(), HasSubstr("536870912 bytes of memory"));
+  EXPECT_THAT(error.text(), HasSubstr("134217728 bytes of memory"));
 }
 
 TEST_F(ScenesTest, CreatedSceneLivesUntilDeleted) {
