@@ -74,7 +74,8 @@ std::string answerOf(const grpc::Status& status) {
 class Answers {
  public:
   void add(const grpc::Status& status) {
-    ++counts_[status.ok() ? "accepted" : fmt::format("refused with code {}", static_cast<int>(status.error_code()))];
+    ++counts_[status.ok() ? "accepted"
+                          : fmt::format("refused with code {}", static_cast<int>(status.error_code()))];
   }
   std::string text() const {
     std::string text;
@@ -202,8 +203,8 @@ std::string upload(Stub& stub, const std::string& content) {
     const auto seconds = [](Clock::duration time) { return std::chrono::duration<double>(time).count(); };
     const std::string what = answer.has_error() ? "refused: " + brief(answer.error().text()) : "accepted";
     context.TryCancel();
-    return fmt::format("{} ({:.2f} s for {} bytes, then {:.2f} s)", what, seconds(uploaded - start), content.size(),
-                       seconds(Clock::now() - uploaded));
+    return fmt::format("{} ({:.2f} s for {} bytes, then {:.2f} s)", what, seconds(uploaded - start),
+                       content.size(), seconds(Clock::now() - uploaded));
   }
   return "the stream was closed: " + brief(stream->Finish().error_message());
 }
@@ -223,7 +224,8 @@ int connectTo(const std::string& address) {
 }
 
 // Opens connections, sends each `first`, and holds them open. Returns how many stay open.
-std::string holdConnections(const Target& target, const std::string& address, int count, const std::string& first) {
+std::string holdConnections(const Target& target, const std::string& address, int count,
+                            const std::string& first) {
   std::vector<int> files;
   for (int i = 0; i < count; ++i) {
     const int file = connectTo(address);
@@ -472,7 +474,8 @@ std::string rebinding(const Target& target) {
   const int file = connectTo(target.web);
   const std::string request =
       "GET /stream HTTP/1.1\r\nHost: evil.example\r\nOrigin: http://evil.example\r\nUpgrade: websocket\r\n"
-      "Connection: Upgrade\r\nSec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n";
+      "Connection: Upgrade\r\nSec-WebSocket-Version: 13\r\nSec-WebSocket-Key: "
+      "dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n";
   ::send(file, request.data(), request.size(), MSG_NOSIGNAL);
   std::string answer(200, '\0');
   const ssize_t got = ::recv(file, answer.data(), answer.size(), 0);

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: MIT
 // clothstream-attack: attacks a server that it starts, while an honest client watches a scene of it.
-#include <sys/resource.h>
-
 #include <algorithm>
 #include <atomic>
 #include <chrono>
@@ -18,6 +16,7 @@
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
+#include <sys/resource.h>
 
 #include "clients/grpc/grpc_client.h"
 #include "tests/attack/attacks.h"
@@ -141,10 +140,12 @@ Result run(const std::string& self, const std::string& server, const Attack& att
 }
 
 void print(const Attack& attack, const Result& result) {
-  fmt::print("{:<18} {} frames/s {:5.1f} -> {:5.1f}  gap {:.3f} s  memory {:4.0f} + {:3.0f} MB  end {:.1f} s\n    {}\n",
-             attack.name, result.reached() ? "ok    " : "FAILED", result.before.framesPerSecond,
-             result.during.framesPerSecond, result.during.longestGap, result.startMegabytes,
-             std::max(0.0, result.peakMegabytes - result.startMegabytes), result.endSeconds, result.answer);
+  fmt::print(
+      "{:<18} {} frames/s {:5.1f} -> {:5.1f}  gap {:.3f} s  memory {:4.0f} + {:3.0f} MB  end {:.1f} s\n    "
+      "{}\n",
+      attack.name, result.reached() ? "ok    " : "FAILED", result.before.framesPerSecond,
+      result.during.framesPerSecond, result.during.longestGap, result.startMegabytes,
+      std::max(0.0, result.peakMegabytes - result.startMegabytes), result.endSeconds, result.answer);
   std::fflush(stdout);
 }
 
@@ -154,7 +155,8 @@ void print(const Attack& attack, const Result& result) {
 int main(int argc, char** argv) {
   using namespace clothstream;
   CLI::App app{
-      "Attacks a server that it starts, and prints what an honest client sees meanwhile. Exit code 1 if a goal is "
+      "Attacks a server that it starts, and prints what an honest client sees meanwhile. Exit code 1 if a "
+      "goal is "
       "missed: 90 % of the frames, no gap above 0.25 s, at most 256 MiB more memory, an end within 10 s."};
   std::string server, perform, grpc, web;
   std::vector<std::string> only;
@@ -167,7 +169,9 @@ int main(int argc, char** argv) {
   }
   app.add_option("attacks", only, list)->check(CLI::IsMember(names));
   app.add_option("--server", server, "Program of the server");
-  app.add_option("--seconds", seconds, "Seconds of each attack")->check(CLI::Range(1, 600))->capture_default_str();
+  app.add_option("--seconds", seconds, "Seconds of each attack")
+      ->check(CLI::Range(1, 600))
+      ->capture_default_str();
   // The program runs itself to attack, so that the honest client has a process of its own.
   app.add_option("--perform", perform)->group("");
   app.add_option("--grpc", grpc)->group("");
