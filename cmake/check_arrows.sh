@@ -25,8 +25,9 @@ server/hosting     | proto/text server/scene server/delivery server/schedule ser
 server/session     | server/hosting server/scene server/delivery server/schedule server/messages proto/codec clothstream
 server/recording   | server/model server/vulkan server/simulation server/messages server/scene server/schedule proto/codec proto/recording clothstream
 server/step        | server/model server/vulkan server/simulation server/messages
-server/endpoint/grpc | server/session server/hosting clothstream grpc/health
-server/endpoint/web | server/session
+server/endpoint/listen | server/schedule
+server/endpoint/grpc | server/endpoint/listen server/session server/hosting server/schedule server/telemetry clothstream grpc/health
+server/endpoint/web | server/endpoint/listen server/session server/hosting server/schedule
 server/options     | server/hosting server/recording server/step server/scene server/model
 server/main.cpp    | server/options server/endpoint server/hosting server/recording server/step server/simulation server/messages server/model server/telemetry server/vulkan
 clients/core       | proto/codec proto/parameters

@@ -62,6 +62,8 @@ struct ServerOptions {
   std::function<std::shared_ptr<scene::Journal>(const model::Scene&)> journals{};
   // A peer that sends nothing for this long is disconnected.
   std::chrono::milliseconds silence{30'000};
+  // The same before it has joined a scene; at most `silence`.
+  std::chrono::milliseconds helloTimeout{10'000};
   scene::ReconnectGrace reconnectGrace{};
   scene::Permissions participantsMay{};
   // True: peers outside a scene may always pause, reset, record and delete it. False: only while it has no

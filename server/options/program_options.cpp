@@ -140,6 +140,15 @@ void addNetworkOptions(OptionTable& table, ProgramOptions& options) {
       "localhost and the name of the machine are always allowed");
   table.list("--allow-origin", options.allowedOrigins, "ORIGIN",
              "Origin of another page that may connect, such as https://example.org; may be repeated");
+  table.number("--max-connections", options.maxConnections, {.min = 1, .max = 100'000},
+               "Connections to each port at a time");
+  table.number(
+      "--max-connections-per-address", options.maxConnectionsPerAddress, {.min = 1, .max = 100'000},
+      "Connections of one address to each port at a time. Programs on this machine have no such limit");
+  table.number("--connections-per-second", options.connectionsPerSecond, {.min = 1, .max = 1e6},
+               "New connections to each port per second, with a burst of as many");
+  table.number("--hello-timeout", options.server.helloTimeout, {.min = 1, .max = 30, .type = "SECONDS"},
+               "Seconds of silence after which a connection that has not joined a scene is closed");
 }
 
 void addDeviceOptions(OptionTable& table, ProgramOptions& options) {

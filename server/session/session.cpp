@@ -350,14 +350,19 @@ void Session::leave() {
 
 void Session::checkSilence(Clock::time_point now) {
   // A mailbox without room, which the scene's subscribers closed, is noticed here too.
-  const bool silent = now - lastHeard_.load() > server_.options.silence;
-  if (!silent && !mailbox_->closed()) return;
+  const hosting::ServerOptions& options = server_.options;
+  const std::chrono::milliseconds beforeHello = std::min(options.helloTimeout, options.silence);
+  const Clock::duration silence = now - lastHeard_.load();
+  if (silence <= beforeHello && !mailbox_->closed()) return;
   const std::lock_guard lock(mutex_);
+  const std::chrono::milliseconds allowed = scene_ ? options.silence : beforeHello;
+  if (silence <= allowed && !mailbox_->closed()) return;
   now_ = now;
   if (!mailbox_->closed()) {
     server_.metrics.droppedConnections.add();
-    const std::string text = fmt::format("the client was silent for {} s: acknowledge frames, or send pings",
-                                         schedule::seconds(server_.options.silence));
+    const std::string text =
+        fmt::format("the client was silent for {} s: {}", schedule::seconds(allowed),
+                    scene_ ? "acknowledge frames, or send pings" : "send hello soon after connecting");
     spdlog::info("{}: disconnected: {}", peer_, text);
     mailbox_->close(delivery::error(v1::ERROR_CODE_CUT_OFF, text, true));
   }

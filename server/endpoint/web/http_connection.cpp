@@ -55,9 +55,10 @@ bool originAllowed(const Request& request, const std::vector<std::string>& allow
 
 }  // namespace
 
-HttpConnection::HttpConnection(boost::asio::ip::tcp::socket&& socket, WebEndpointContext& endpoint)
+HttpConnection::HttpConnection(boost::asio::ip::tcp::socket&& socket, WebEndpointContext& endpoint,
+                               Admission::Ticket ticket)
     : endpoint_(endpoint),
-      slot_(std::make_unique<ConnectionSlot>(endpoint)),
+      slot_(std::make_unique<ConnectionSlot>(endpoint, std::move(ticket))),
       beyondLimit_(endpoint.connections > endpoint.maxConnections),
       socket_(std::move(socket)) {}
 
