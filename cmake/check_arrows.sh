@@ -27,7 +27,7 @@ server/recording   | server/model server/vulkan server/simulation server/message
 server/step        | server/model server/vulkan server/simulation server/messages
 server/endpoint/listen | server/schedule
 server/endpoint/grpc | server/endpoint/listen server/session server/hosting server/schedule server/telemetry clothstream grpc/health
-server/endpoint/web | server/endpoint/listen server/session server/hosting server/schedule
+server/endpoint/web | server/endpoint/listen server/session server/hosting
 server/options     | server/hosting server/recording server/step server/scene server/model
 server/main.cpp    | server/options server/endpoint server/hosting server/recording server/step server/simulation server/messages server/model server/telemetry server/vulkan
 clients/core       | proto/codec proto/parameters
