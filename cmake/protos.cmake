@@ -24,6 +24,10 @@ target_link_libraries(clothstream_protos PUBLIC
 
 if(CLOTHSTREAM_RPC)
   find_package(gRPC CONFIG REQUIRED)
+  if(gRPC_VERSION VERSION_LESS 1.60)
+    message(STATUS "gRPC ${gRPC_VERSION} has published weaknesses (SECURITY.md): do not let the server's gRPC port face the open "
+      "internet")
+  endif()
   set(generateService --grpc_out=${protoOut} --plugin=protoc-gen-grpc=$<TARGET_FILE:gRPC::grpc_cpp_plugin>)
   set(stem ${protoOut}/clothstream/v1/session)
   add_custom_command(OUTPUT ${stem}.grpc.pb.cc ${stem}.grpc.pb.h

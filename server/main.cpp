@@ -5,6 +5,7 @@
 #include <csignal>
 #include <cstdint>
 #include <cstdio>
+#include <cstdlib>
 #include <ctime>
 #include <exception>
 #include <filesystem>
@@ -12,7 +13,9 @@
 #include <memory>
 #include <optional>
 #include <stdexcept>
+#include <stop_token>
 #include <string>
+#include <thread>
 #include <utility>
 #include <variant>
 #include <vector>
@@ -62,6 +65,31 @@ class Signals {
 
  private:
   sigset_t set_{};
+};
+
+// Ends the process while it lives: when the time is over, or at the next SIGINT or SIGTERM. The kernel then
+// closes files and connections; recordings stay readable.
+class EndGuard {
+ public:
+  EndGuard(const Signals& signals, std::chrono::nanoseconds time)
+      : thread_([&signals, time](const std::stop_token& stop) {
+          using Clock = std::chrono::steady_clock;
+          constexpr std::chrono::milliseconds kInterval{20};
+          for (const auto end = Clock::now() + time; Clock::now() < end && !stop.stop_requested();) {
+            const int signal = signals.wait(kInterval);
+            if (signal == SIGINT || signal == SIGTERM) endNow("another signal came");
+          }
+          if (!stop.stop_requested()) endNow("the device or the disk does not answer");
+        }) {}
+
+ private:
+  [[noreturn]] static void endNow(const char* why) {
+    spdlog::error("ending at once: {}", why);
+    spdlog::default_logger()->flush();
+    std::_Exit(1);
+  }
+
+  std::jthread thread_;
 };
 
 // `nodes` is the size of the scene that the device will simulate.
@@ -167,8 +195,11 @@ void waitForStop(const Signals& signals, const ProgramOptions& options,
 }
 
 // Serves through both endpoints until a signal or --seconds ends it. `intro` is printed before the addresses.
-void openEndpoints(hosting::SceneServer& server, const ProgramOptions& options, const Signals& signals,
-                   const std::string& intro, const std::function<std::string()>& report) {
+// Returns what limits the time until the process ends.
+[[nodiscard]] std::unique_ptr<EndGuard> openEndpoints(hosting::SceneServer& server, const ProgramOptions& options,
+                                                      const Signals& signals, const std::string& intro,
+                                                      const std::function<std::string()>& report) {
+  std::unique_ptr<EndGuard> guard;
   {
     const std::filesystem::path page = options.page.empty() ? pageNextToProgram() : options.page;
     if (page.empty())
@@ -192,9 +223,11 @@ void openEndpoints(hosting::SceneServer& server, const ProgramOptions& options, 
     std::fflush(stdout);
     waitForStop(signals, options, report);
     spdlog::info("stopping");
+    guard = std::make_unique<EndGuard>(signals, options.drain);
     server.stop();
   }
   fmt::print("{}", report());
+  return guard;
 }
 
 int play(const ProgramOptions& options, const Signals& signals) {
@@ -208,10 +241,15 @@ int play(const ProgramOptions& options, const Signals& signals) {
   const std::string scene = recording->scene();
   const std::string intro = fmt::format("plays   {}, {:.1f} s of {}, recorded on {}\n", options.recording,
                                         recording->length(), scene, recording->device());
+  std::unique_ptr<EndGuard> guard;  // outlives the server
   hosting::SceneServer server(
       scene, std::make_shared<recording::Playback>(std::move(*recording), options.playback), options.server);
-  openEndpoints(server, options, signals, intro, [&] { return server.report(); });
+  guard = openEndpoints(server, options, signals, intro, [&] { return server.report(); });
   return 0;
+}
+
+std::uint64_t bytesOf(double megabytes) {
+  return static_cast<std::uint64_t>(megabytes * 1e6);
 }
 
 int serve(const ProgramOptions& options, const Signals& signals) {
@@ -221,13 +259,18 @@ int serve(const ProgramOptions& options, const Signals& signals) {
     sceneList +=
         fmt::format("{}{} ({} vertices)", sceneList.empty() ? "" : ", ", scene.name, scene.nodeCount());
 
+  std::unique_ptr<EndGuard> guard;  // outlives everything that may not end
   // Outlives the scenes, because it waits for their last records.
   std::optional<recording::Recordings> recordings;
   if (!options.recordDirectory.empty())
     recordings.emplace(
         recording::RecorderOptions{.directory = options.recordDirectory,
                                    .serverName = kServerName,
-                                   .maxBytes = static_cast<std::uint64_t>(options.recordLimitMb * 1e6)},
+                                   .maxBytes = bytesOf(options.recordLimitMb),
+                                   .disk = std::make_shared<recording::DiskShare>(
+                                       options.recordDirectory,
+                                       recording::DiskLimits{.maxBytes = bytesOf(options.recordingsLimitMb),
+                                                             .minFreeBytes = bytesOf(options.keepFreeMb)})},
         !options.recordsOnRequest);
   const auto first = std::ranges::find(scenes, options.server.defaultScene, &model::Scene::name);
   const std::uint32_t nodes = first == scenes.end() ? 0 : first->nodeCount();
@@ -238,8 +281,8 @@ int serve(const ProgramOptions& options, const Signals& signals) {
   };
   hosting::SceneServer server(std::move(scenes), std::move(serverOptions));
   const auto report = [&] { return server.report() + (recordings ? recordings->report() : ""); };
-  openEndpoints(server, options, signals,
-                fmt::format("device  {}\nscenes  {}\n", describe(server.deviceInfo()), sceneList), report);
+  guard = openEndpoints(server, options, signals,
+                        fmt::format("device  {}\nscenes  {}\n", describe(server.deviceInfo()), sceneList), report);
   return 0;
 }
 

@@ -49,6 +49,36 @@ auto attempt(const char* call, const Work& work) -> decltype(work()) {
 
 }  // namespace
 
+SceneMaker::SceneMaker(SceneServer::State& server) : server_(server) {
+  boost::asio::post(thread_, [this] { expireLater(); });
+}
+
+SceneMaker::~SceneMaker() {
+  boost::asio::post(thread_, [this] {
+    ended_ = true;
+    expiry_.cancel();
+  });
+  thread_.join();
+}
+
+void SceneMaker::expireLater() {
+  const std::chrono::milliseconds lifetime = server_.options.sceneLifetime;
+  if (lifetime.count() == 0 || ended_) return;
+  constexpr std::chrono::milliseconds kInterval{1000};
+  expiry_.expires_after(std::min(lifetime, kInterval));
+  expiry_.async_wait([this, lifetime](const boost::system::error_code& cancelled) {
+    if (cancelled) return;
+    for (const auto& scene : server_.scenesNow()) {
+      if (!scene->created || !scene->hasBeenEmptyFor(lifetime, Clock::now())) continue;
+      v1::DeleteSceneRequest request;
+      request.set_name(scene->name());
+      spdlog::info("{}: nobody has used it for {} s", scene->name(), schedule::seconds(lifetime));
+      attempt("deleteScene", [&] { return removeNow(request); });
+    }
+    expireLater();
+  });
+}
+
 tl::expected<void, v1::Error> SceneMaker::create(v1::CreateSceneRequest request,
                                                  std::optional<UploadedContent> uploaded, CreateDone done) {
   if (++waiting_ > kMaxWaiting) {

@@ -9,6 +9,7 @@
 #include <optional>
 #include <string>
 
+#include <boost/asio/steady_timer.hpp>
 #include <boost/asio/thread_pool.hpp>
 #include <tl/expected.hpp>
 
@@ -21,9 +22,9 @@ namespace clothstream::hosting {
 // mesh and loading a scene take seconds. The caller has checked that the peer may do what it asks for.
 class SceneMaker {
  public:
-  explicit SceneMaker(SceneServer::State& server) : server_(server), thread_(1) {}
+  explicit SceneMaker(SceneServer::State& server);
   // Finishes the requests that wait.
-  ~SceneMaker() { thread_.join(); }
+  ~SceneMaker();
   SceneMaker(const SceneMaker&) = delete;
   SceneMaker& operator=(const SceneMaker&) = delete;
 
@@ -52,9 +53,14 @@ class SceneMaker {
       const v1::StartRecordingRequest& request) const;
   tl::expected<v1::StopRecordingResponse, v1::Error> stopNow(const v1::StopRecordingRequest& request) const;
 
+  // Deletes created scenes that nobody uses, from time to time.
+  void expireLater();
+
   SceneServer::State& server_;
   std::atomic<std::uint32_t> waiting_ = 0;  // scenes to be created
-  boost::asio::thread_pool thread_;
+  boost::asio::thread_pool thread_{1};
+  boost::asio::steady_timer expiry_{thread_};
+  bool ended_ = false;  // belongs to the thread, like expiry_
 };
 
 }  // namespace clothstream::hosting

@@ -52,6 +52,8 @@ struct ServerOptions {
   std::uint32_t maxCreatedScenes = 16;
   // Nodes of a scene that a peer creates.
   std::uint64_t maxSceneNodes = 262'144;
+  // A created scene is deleted when it has had no participant for this long; 0: never.
+  std::chrono::milliseconds sceneLifetime{3'600'000};
   // What participants may add by creating scenes and changing parameters.
   scene::BudgetLimits budget{};
   // Threads that predict large frames on the CPU; 0 means automatic (EncoderThreads).

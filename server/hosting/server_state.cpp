@@ -178,13 +178,25 @@ v1::ListScenesResponse SceneServer::State::listScenes() const {
   return response;
 }
 
-tl::expected<v1::GetSceneResponse, v1::Error> SceneServer::State::getScene(
-    const v1::GetSceneRequest& request) const {
+tl::expected<v1::GetSceneResponse, v1::Error> SceneServer::State::getScene(const v1::GetSceneRequest& request,
+                                                                           std::size_t maxBytes) const {
   const std::shared_ptr<scene::LiveScene> scene = find(request.name());
   if (!scene) return tl::unexpected(noSuchScene(request.name()));
+  const auto tooLarge = [&](const char* qualifier, std::size_t bytes) {
+    return tl::unexpected(toMessage(
+        {v1::ERROR_CODE_RESOURCE_EXHAUSTED,
+         fmt::format("getScene: '{}' takes {}{} bytes, and answers in a stream have at most {}: use the unary "
+                     "call",
+                     scene->name(), qualifier, bytes, maxBytes)}));
+  };
+  std::size_t positions = 0;
+  for (const model::Cloth& cloth : scene->start().cloths)
+    if (cloth.mesh) positions += 3 * sizeof(float) * cloth.nodeCount();
+  if (positions > maxBytes) return tooLarge("at least ", positions);
   v1::GetSceneResponse response;
   *response.mutable_scene() =
       scene->source ? scene->source->description().definition() : messages::toMessage(scene->definition());
+  if (const std::size_t bytes = response.ByteSizeLong(); bytes > maxBytes) return tooLarge("", bytes);
   return response;
 }
 

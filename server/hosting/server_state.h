@@ -3,7 +3,9 @@
 #pragma once
 
 #include <atomic>
+#include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -47,7 +49,10 @@ struct SceneServer::State {
   // Wakes the thread that makes the scene's frames, after a change of its subscribers or its clock.
   void wake(const scene::LiveScene& scene);
   v1::ListScenesResponse listScenes() const;
-  tl::expected<v1::GetSceneResponse, v1::Error> getScene(const v1::GetSceneRequest& request) const;
+  // Refuses a definition of more than `maxBytes`. If its meshes are larger, that takes no time.
+  tl::expected<v1::GetSceneResponse, v1::Error> getScene(
+      const v1::GetSceneRequest& request,
+      std::size_t maxBytes = std::numeric_limits<std::size_t>::max()) const;
   // Pauses, resumes, resets or seeks a scene. `participant` asks; 0 means a peer outside the scene. The
   // caller has checked that the peer may do so.
   tl::expected<v1::ControlSceneResponse, v1::Error> controlScene(const v1::ControlSceneRequest& request,

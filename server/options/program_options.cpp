@@ -85,10 +85,16 @@ void addSceneOptions(OptionTable& table, Parsed& parsed) {
                                    "Record scenes when a client asks for it, to files in this directory"));
   table.number("--record-limit", options.recordLimitMb, {.min = 0, .max = 1e9, .type = "MEGABYTES"},
                "Start a new file when a recording reaches this many megabytes. 0 means no limit");
+  table.number("--recordings-limit", options.recordingsLimitMb, {.min = 0, .max = 1e9, .type = "MEGABYTES"},
+               "Stop recording when all recordings in the directory take this many megabytes. 0 means no limit");
+  table.number("--keep-free", options.keepFreeMb, {.min = 0, .max = 1e9, .type = "MEGABYTES"},
+               "Stop recording when the disk has this many megabytes left");
   table.number("--max-created-scenes", options.server.maxCreatedScenes, {.min = 0, .max = 1000},
                "Scenes that clients may create in addition. 0 allows none");
   table.number("--max-scene-nodes", options.server.maxSceneNodes, {.min = 4, .max = 16'777'216},
                "Nodes of a scene that clients create");
+  table.number("--scene-lifetime", options.server.sceneLifetime, {.min = 0, .max = 1e6, .type = "SECONDS"},
+               "Seconds without participants after which a scene that a client created is deleted. 0 keeps it");
   addBudgetOptions(table, options.server.budget);
   table.number("--encoder-threads", options.server.encoderThreads, kThreads,
                "CPU threads that predict large frames where the device does not. 0 means a quarter of the "
@@ -167,6 +173,9 @@ void addProgramOptions(OptionTable& table, Parsed& parsed) {
              checkChoice({"trace", "debug", "info", "warning", "error", "off"}, {"warn", "err", "critical"}));
   table.number("--seconds", parsed.options.stopAfter,
                {.min = 0, .max = 1e9, .type = "SECONDS", .aboveMin = true}, "Stop after this time");
+  table.number("--drain", parsed.options.drain, {.min = 0.1, .max = 600, .type = "SECONDS"},
+               "Seconds after SIGINT or SIGTERM within which the server ends, even if the device or the disk does "
+               "not answer. A second signal ends it at once");
   table.text("--config", parsed.config, "FILE", "Read options from this TOML file");
   table.action("--print-config", parsed.printConfig, "Print the effective options as a TOML file, and exit");
   table.action("--help-markdown", parsed.printMarkdown, "Print this help as a page of Markdown, and exit");

@@ -40,6 +40,8 @@ struct ProgramOptions {
   std::filesystem::path recordDirectory;  // empty: nothing is recorded
   bool recordsOnRequest = false;          // record only scenes that clients ask for
   double recordLimitMb = 0;               // megabytes per file; 0 means no limit
+  double recordingsLimitMb = 10'000;      // megabytes of all recordings in the directory; 0 means no limit
+  double keepFreeMb = 1000;               // megabytes of the disk that recordings leave free
 
   // Network.
   std::string host = "127.0.0.1";
@@ -53,6 +55,7 @@ struct ProgramOptions {
   // Program.
   std::string logLevel = "info";
   std::optional<std::chrono::nanoseconds> stopAfter;
+  std::chrono::milliseconds drain{10'000};  // after a signal, until the process ends
   std::vector<std::string> warnings;  // about environment variables, for the log
 
   // Commands.

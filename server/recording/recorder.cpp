@@ -57,6 +57,11 @@ Created createNamed(const std::filesystem::path& directory, const std::string& n
 tl::expected<std::shared_ptr<Recorder>, std::string> Recorder::create(RecorderOptions options,
                                                                       const std::string& scene,
                                                                       const std::string& name) {
+  if (options.disk)
+    if (auto room = options.disk->check(); !room) {
+      spdlog::warn("{}: not recorded: {}", scene, room.error());
+      return tl::unexpected(std::move(room.error()));
+    }
   Created created = name.empty() ? createNew(options.directory, scene) : createNamed(options.directory, name);
   if (!created) {
     spdlog::warn("{}: not recorded: {}", scene, created.error());
@@ -203,6 +208,8 @@ void Recorder::run(const std::string& sceneName, const Metadata& metadata) {
     file = std::move(file_);
   }
   if (!file) {
+    if (options_.disk)
+      if (const auto room = options_.disk->check(); !room) return fail(room.error());
     Created created = createNew(options_.directory, sceneName);
     if (!created) return fail(created.error());
     file = std::make_unique<OutputFile>(std::move(created->first));
@@ -262,6 +269,8 @@ Written Recorder::writeAll(RecordingWriter& writer) {
     taken.clear();
     if (ends) return {};
     if (SteadyClock::now() >= due) {
+      if (options_.disk)
+        if (auto room = options_.disk->check(); !room) return room;
       if (auto closed = writer.closeChunk(); !closed) return closed;
       due = SteadyClock::time_point::max();
     }

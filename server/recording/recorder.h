@@ -18,6 +18,7 @@
 #include "proto/recording/clock.h"
 #include "proto/recording/file.h"
 #include "proto/recording/recording_writer.h"
+#include "server/recording/disk_share.h"
 #include "server/scene/journal.h"
 
 namespace clothstream::recording {
@@ -28,6 +29,8 @@ struct RecorderOptions {
   // File size after which the recording continues in another file; 0: never. While grabs hold cloth the
   // switch is delayed, up to an eighth of this size.
   std::uint64_t maxBytes = 0;
+  // Checked before a file is created and while it is written; null: no limit.
+  std::shared_ptr<DiskShare> disk = nullptr;
   // Maximum size of the queue. The recording ends if it overflows, because the scene does not wait for a
   // disk.
   std::size_t maxWaitingBytes = std::size_t{64} << 20;

@@ -109,6 +109,11 @@ messages::Result<void> LiveScene::change(std::uint64_t participant, const v1::Pa
         v1::ERROR_CODE_INVALID_ARGUMENT,
         "parameterChange: '" + name() + "' is a recording that is played; its parameters cannot be changed"});
   const std::lock_guard lock(mutex_);
+  // Each change is sent to all participants.
+  if (!changes_.take(Clock::now()))
+    return tl::unexpected(messages::FieldError{
+        v1::ERROR_CODE_RESOURCE_EXHAUSTED,
+        "parameterChange: too many changes of '" + name() + "' in one second; send it again later"});
   messages::Result<model::ParameterChange> change =
       messages::toParameterChange(message, definition_, stability_);
   if (!change) return tl::unexpected(std::move(change).error());
@@ -185,6 +190,15 @@ std::shared_ptr<const delivery::DescriptionChunks> LiveScene::description() {
   message.clear_cloths();
   return description_ = std::make_shared<const delivery::DescriptionChunks>(++contents_, cloths_,
                                                                             message.SerializeAsString());
+}
+
+bool LiveScene::hasBeenEmptyFor(std::chrono::milliseconds time, Clock::time_point now) {
+  if (roster.size() > 0) {
+    emptySince_.reset();
+    return false;
+  }
+  if (!emptySince_) emptySince_ = now;
+  return now - *emptySince_ >= time;
 }
 
 delivery::SharedBytes pausedNotice(const LiveScene& scene, std::uint64_t participant) {

@@ -3,9 +3,12 @@
 #pragma once
 
 #include <atomic>
+#include <chrono>
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 
 #include "server/delivery/subscribers.h"
@@ -19,6 +22,7 @@
 #include "server/scene/inbox.h"
 #include "server/scene/journal.h"
 #include "server/scene/roster.h"
+#include "server/schedule/token_bucket.h"
 #include "server/telemetry/metrics.h"
 
 namespace clothstream::scene {
@@ -77,6 +81,9 @@ class LiveScene {
   // change.
   std::shared_ptr<const delivery::DescriptionChunks> description();
 
+  // Parameter changes of all participants together.
+  static constexpr double kChangesPerSecond = 240;
+
   // Epoch of the stream; a server has only one.
   static constexpr std::uint32_t kEpoch = 1;
 
@@ -92,6 +99,9 @@ class LiveScene {
   Roster roster;
   telemetry::SceneMetrics metrics;
 
+  // Returns whether nobody has taken part, not even disconnected, for this long. Belongs to one thread.
+  bool hasBeenEmptyFor(std::chrono::milliseconds time, Clock::time_point now);
+
   // Written by the device's thread, or by the source.
   std::atomic<bool> running{false};
   std::atomic<std::uint64_t> tick{0};  // newest complete one
@@ -105,6 +115,8 @@ class LiveScene {
   model::Scene definition_;
   Charge charge_;  // of definition_
   std::string quarantined_;
+  schedule::TokenBucket changes_{kChangesPerSecond, kChangesPerSecond};
+  std::optional<Clock::time_point> emptySince_;  // of the newest call of hasBeenEmptyFor()
   std::shared_ptr<const delivery::DescriptionChunks> description_;  // null after a change of the definition
   std::uint64_t contents_ = 0;                                      // newest content id
 };

@@ -112,15 +112,10 @@ void Session::dispatch(const v1::ClientMessage& message, Clock::time_point now) 
     }
     case Body::kGetScene: {
       if (!allowed(queryRate_, "questions")) return;
-      auto found = server_.getScene(message.get_scene());
+      auto found = server_.getScene(message.get_scene(), kMaxAnswerBytes);
       if (!found) return refuse({found.error().code(), found.error().text()});
       v1::ServerMessage scene;
       *scene.mutable_get_scene() = std::move(*found);
-      if (const std::size_t bytes = scene.ByteSizeLong(); bytes > kMaxAnswerBytes)
-        return refuse({v1::ERROR_CODE_RESOURCE_EXHAUSTED,
-                       fmt::format("getScene: '{}' takes {} bytes, and answers in a stream have at most {}: "
-                                   "use the unary call",
-                                   message.get_scene().name(), bytes, kMaxAnswerBytes)});
       return answer(scene);
     }
     case Body::kUpload:

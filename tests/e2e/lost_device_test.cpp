@@ -185,6 +185,30 @@ TEST_F(LostDevice, SceneThatLosesTheDeviceTwiceIsStoppedAndOthersContinue) {
   EXPECT_THAT(server_->output(), HasSubstr("scenes in quarantine 1"));
 }
 
+TEST_F(LostDevice, ServerEndsAlthoughTheDeviceHangs) {
+  for (const bool again : {false, true}) {
+    Arguments arguments = kSmallScene;
+    arguments.insert(arguments.end(), {"--drain", again ? "600" : "1"});
+    startServer(arguments);
+    if (address_.empty()) return;
+    Watcher watcher;
+    auto client = watcher.join(address_);
+    ASSERT_TRUE(watcher.seesMore(10));
+    fail("hang");
+    ASSERT_TRUE(hasFailed());
+    server_->signal(SIGTERM);
+    if (again) {
+      ASSERT_TRUE(eventually([&] { return client->ended().has_value(); }));
+      server_->signal(SIGTERM);
+    }
+    EXPECT_EQ(server_->waitForEnd(kPatience), 1);
+    EXPECT_THAT(server_->errors(),
+                HasSubstr(again ? "ending at once: another signal came"
+                                : "ending at once: the device or the disk does not answer"));
+    server_.reset();
+  }
+}
+
 TEST_F(LostDevice, FailedTickAffectsItsSceneOnly) {
   Arguments scenes = kSmallScene;
   scenes.insert(scenes.end(), {"--scene-file", "tests/e2e/small_with_normals.json"});

@@ -356,8 +356,11 @@ TEST_F(ServerOptions, PrintedConfigurationReadsBackWithEveryOptionSet) {
                               "--reports=0.25",
                               std::string(directory) + "=line\nand\ttab",
                               "--record-limit=1e9",
+                              "--recordings-limit=500",
+                              "--keep-free=0",
                               "--max-created-scenes=0",
                               "--max-scene-nodes=10000",
+                              "--scene-lifetime=0",
                               "--max-load=2",
                               "--max-scene-load=0.25",
                               "--max-memory=1000",
@@ -384,6 +387,7 @@ TEST_F(ServerOptions, PrintedConfigurationReadsBackWithEveryOptionSet) {
                               "",
                               "--log-level=off",
                               "--seconds=1e9",
+                              "--drain=2.5",
                               "--print-config"});
     ASSERT_EQ(first.exitCode, 0) << first.output;
     for (const char* line :

@@ -4,8 +4,11 @@
 
 #include <algorithm>
 #include <csignal>
+#include <filesystem>
+#include <fstream>
 #include <memory>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include <gmock/gmock.h>
@@ -372,6 +375,46 @@ TEST_F(RecorderTest, FullDiskEndsTheRecordingButNotTheScene) {
     if ((*message)->topic == Topic::frames) ++frames;
   EXPECT_GT(frames, 0u);
   EXPECT_LT(frames, hashes.size());
+}
+
+TEST_F(RecorderTest, RecordingsStayWithinTheirShareOfTheDisk) {
+  constexpr std::uint64_t kMaxBytes = 300'000;
+  RecorderOptions limited = options();
+  limited.disk = std::make_shared<DiskShare>(directory_.path(), DiskLimits{.maxBytes = kMaxBytes});
+  std::string path;
+  {
+    RecordedScene recorded(limited);
+    while (recorded.recorder->state() == Recorder::State::running) recorded.ticks(1);
+    EXPECT_EQ(recorded.recorder->state(), Recorder::State::failed);
+    recorded.ticks(10);
+    path = recorded.recorder->path();
+  }
+  // The file is complete. Checks happen a few times a second, and much may be written in between.
+  auto reader = RecordingReader::open(path);
+  ASSERT_TRUE(reader.has_value()) << reader.error();
+  EXPECT_TRUE(reader->check().has_value());
+  EXPECT_GE(std::filesystem::file_size(path), kMaxBytes);
+  const auto refused = Recorder::create(limited, "small", "");
+  ASSERT_FALSE(refused.has_value());
+  EXPECT_THAT(refused.error(), HasSubstr("of 0.3 MB (--recordings-limit)"));
+  std::filesystem::remove(path);
+  std::this_thread::sleep_for(DiskShare::kInterval);
+  EXPECT_TRUE(Recorder::create(limited, "small", "").has_value());
+}
+
+TEST_F(RecorderTest, EmptyFilesCountAndOtherFilesDoNot) {
+  DiskShare share(directory_.path(), {.maxBytes = 8192});
+  for (const char* name : {"a.txt", "b.mcap", "c.mcap"}) std::ofstream(directory_.path() / name) << "x";
+  const auto room = share.check();
+  ASSERT_FALSE(room.has_value());
+  EXPECT_THAT(room.error(), HasSubstr("the recordings take"));
+}
+
+TEST_F(RecorderTest, LeavesSpaceOnTheDisk) {
+  DiskShare share(directory_.path(), {.minFreeBytes = std::uint64_t{1} << 62});
+  const auto room = share.check();
+  ASSERT_FALSE(room.has_value());
+  EXPECT_THAT(room.error(), HasSubstr("stay free (--keep-free)"));
 }
 
 TEST_F(RecorderTest, SlowDiskCompletesTheRecordingAndKeepsTheScene) {

@@ -27,7 +27,7 @@ Acceptor::Acceptor(const std::string& host, std::uint16_t port, const Connection
                    std::unique_ptr<grpc::experimental::ExternalConnectionAcceptor> to,
                    telemetry::ServerMetrics& metrics)
     : acceptor_(listen(io_, host, port, "--grpc-port")),
-      port_(acceptor_.local_endpoint().port()),
+      address_(acceptor_.local_endpoint()),
       maxConnections_(limits.connections),
       admission_(limits),
       to_(std::move(to)),

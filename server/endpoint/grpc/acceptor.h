@@ -30,7 +30,9 @@ class Acceptor {
   Acceptor(const Acceptor&) = delete;
   Acceptor& operator=(const Acceptor&) = delete;
 
-  std::uint16_t port() const { return port_; }
+  std::uint16_t port() const { return address_.port(); }
+  // Returns whether only programs of this machine can connect.
+  bool isLoopback() const { return address_.address().is_loopback(); }
   // Call it when the server has started.
   void start();
 
@@ -50,7 +52,7 @@ class Acceptor {
   boost::asio::io_context io_{1};
   boost::asio::ip::tcp::acceptor acceptor_;
   boost::asio::steady_timer pause_{io_}, check_{io_};
-  const std::uint16_t port_;
+  const boost::asio::ip::tcp::endpoint address_;
   const std::size_t maxConnections_;
   Admission admission_;
   std::list<Connection> connections_;

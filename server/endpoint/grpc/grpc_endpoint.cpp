@@ -2,6 +2,7 @@
 #include "server/endpoint/grpc/grpc_endpoint.h"
 
 #include <chrono>
+#include <cstdio>
 #include <functional>
 #include <future>
 #include <memory>
@@ -13,10 +14,12 @@
 #include <boost/asio/thread_pool.hpp>
 #include <grpc/compression.h>
 #include <grpcpp/ext/proto_server_reflection_plugin.h>
+#include <grpcpp/grpcpp.h>
 #include <grpcpp/resource_quota.h>
 #include <grpcpp/security/server_credentials.h>
 #include <grpcpp/server.h>
 #include <grpcpp/server_builder.h>
+#include <spdlog/spdlog.h>
 
 #include "server/endpoint/grpc/acceptor.h"
 #include "server/endpoint/grpc/call.h"
@@ -66,6 +69,15 @@ void configure(grpc::ServerBuilder& builder) {
   builder.SetResourceQuota(quota);
 }
 
+// Returns whether this gRPC has weaknesses by which a peer can end the process or exhaust its memory:
+// CVE-2023-1428, CVE-2023-33953, CVE-2023-4785 and CVE-2023-44487, the last of which 1.60 limits.
+bool hasWeaknesses() {
+  constexpr int kMendedMinor = 60;
+  int major = 0, minor = 0;
+  return std::sscanf(grpc::Version().c_str(), "%d.%d", &major, &minor) != 2 ||
+         (major == 1 && minor < kMendedMinor);
+}
+
 }  // namespace
 
 struct GrpcEndpoint::State {
@@ -96,6 +108,11 @@ struct GrpcEndpoint::State {
     context.emplace(GrpcEndpointContext{scenes, loop, options.maxStreams});
     offerService(*context, service, slowCalls);
     offerHealth(*context, health);
+    if (hasWeaknesses() && !acceptor->isLoopback())
+      spdlog::warn(
+          "gRPC {} has published weaknesses by which a peer can stop the server (SECURITY.md): listen on "
+          "127.0.0.1, or build with gRPC 1.60 or newer",
+          grpc::Version());
     loop->start();
     acceptor->start();
   }

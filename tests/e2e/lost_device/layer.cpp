@@ -2,7 +2,8 @@
 // Vulkan layer that simulates a lost device. CLOTHSTREAM_LOSE_DEVICE names a file. At the first submission
 // after the file appears, the layer removes the file and the device is lost. From then on its queues and
 // semaphores return VK_ERROR_DEVICE_LOST; other devices work. If the file contains "memory N", the next N
-// submissions fail with VK_ERROR_OUT_OF_HOST_MEMORY instead. Default N is 1.
+// submissions fail with VK_ERROR_OUT_OF_HOST_MEMORY instead. Default N is 1. If it contains "hang", the
+// submission does not return.
 #include <atomic>
 #include <cstdlib>
 #include <cstring>
@@ -48,6 +49,7 @@ struct Device {
       int count = 1;
       file >> word;
       if (int given = 0; file >> given) count = given;
+      while (word == "hang") pause();
       if (word == "memory")
         failing = count;
       else

@@ -223,6 +223,27 @@ TEST_F(ScenesTest, CreatedSceneLivesUntilDeleted) {
   again.join("mine");
 }
 
+TEST_F(ScenesTest, DeletesCreatedSceneThatNobodyUses) {
+  ServerOptions options;
+  options.sceneLifetime = std::chrono::milliseconds(300);
+  options.reconnectGrace.place = std::chrono::seconds(0);
+  START(options);
+  TestPeer maker(server());
+  ASSERT_TRUE(createNamed(maker, "small", "used").has_create_scene());
+  TestPeer user(server());
+  user.join("used");
+  ASSERT_TRUE(createNamed(maker, "small", "unused").has_create_scene());
+  const auto scenes = [&] { return server().listScenes().scenes_size(); };
+  while (scenes() > 3) user.readFrames(1);
+  user.readFrames(40);  // a second of the scene
+  EXPECT_EQ(scenes(), 3);
+  user.leave();
+  const auto end = std::chrono::steady_clock::now() + TestPeer::kPatience;
+  while (scenes() > 2 && std::chrono::steady_clock::now() < end)
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  EXPECT_EQ(scenes(), 2);
+}
+
 TEST_F(ScenesTest, LimitsCreatedScenes) {
   ServerOptions options;
   options.maxCreatedScenes = 1;

@@ -35,6 +35,23 @@ TEST(LiveScene, RestartRestoresTheStart) {
   EXPECT_FALSE(live.resetRequested);
 }
 
+TEST(LiveScene, LimitsChangesPerSecond) {
+  LiveScene live(smallScene());
+  v1::ParameterChange change;
+  change.mutable_wind()->mutable_value()->set_x(3);
+  int accepted = 0;
+  messages::Result<void> result;
+  Inputs applied;
+  while (accepted < 10'000 && (result = live.change(1, change))) {
+    ++accepted;
+    live.inbox.drain(applied);
+  }
+  EXPECT_GE(accepted, static_cast<int>(LiveScene::kChangesPerSecond));
+  ASSERT_FALSE(result);
+  EXPECT_EQ(result.error().text,
+            "parameterChange: too many changes of 'small' in one second; send it again later");
+}
+
 TEST(LiveScene, RevertKeepsAppliedAndWaitingChanges) {
   LiveScene live(smallScene());
   v1::ParameterChange waiting;
