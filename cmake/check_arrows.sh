@@ -7,25 +7,27 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 # room | the rooms of ours that it sees, in addition to itself. A file belongs to the longest room that contains it.
 readonly ARROWS='
 proto/parameters   |
+proto/text         |
 server/model       | proto/parameters
 server/vulkan      |
 proto/codec        |
 proto/recording    | proto/codec clothstream
 server/reference   | server/model
-server/telemetry   |
+server/telemetry   | proto/text
 server/simulation  | server/model server/vulkan shaders
 server/meshes      | server/model
-server/messages    | server/model server/meshes proto/parameters clothstream
+server/messages    | server/model server/meshes proto/parameters proto/text clothstream
 server/encode      | server/model server/simulation server/vulkan proto/codec shaders
 server/schedule    |
 server/delivery    | server/schedule server/encode server/messages server/telemetry proto/codec clothstream
 server/scene       | server/delivery server/schedule server/model server/vulkan server/simulation server/encode server/messages server/telemetry clothstream
-server/hosting     | server/scene server/delivery server/schedule server/model server/vulkan server/simulation server/messages server/telemetry clothstream
+server/hosting     | proto/text server/scene server/delivery server/schedule server/model server/vulkan server/simulation server/messages server/telemetry clothstream
 server/session     | server/hosting server/scene server/delivery server/schedule server/messages proto/codec clothstream
 server/recording   | server/model server/vulkan server/simulation server/messages server/scene server/schedule proto/codec proto/recording clothstream
 server/step        | server/model server/vulkan server/simulation server/messages
-server/endpoint/grpc | server/session server/hosting clothstream grpc/health
-server/endpoint/web | server/session
+server/endpoint/listen | server/schedule
+server/endpoint/grpc | server/endpoint/listen server/session server/hosting server/schedule server/telemetry clothstream grpc/health
+server/endpoint/web | server/endpoint/listen server/session server/hosting
 server/options     | server/hosting server/recording server/step server/scene server/model
 server/main.cpp    | server/options server/endpoint server/hosting server/recording server/step server/simulation server/messages server/model server/telemetry server/vulkan
 clients/core       | proto/codec proto/parameters
@@ -35,7 +37,7 @@ clients/grpc       | clients/core clothstream
 clients/library    | clients/core clients/grpc
 clients/files      | proto/codec clothstream
 clients/load       | clients/core clients/grpc proto/codec clothstream
-clients/cli        | clients/core clients/grpc clients/files clients/load proto/codec proto/parameters proto/recording clothstream
+clients/cli        | proto/text clients/core clients/grpc clients/files clients/load proto/codec proto/parameters proto/recording clothstream
 '
 # rooms that may include these headers
 readonly OUTSIDE='

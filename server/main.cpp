@@ -173,11 +173,19 @@ void openEndpoints(hosting::SceneServer& server, const ProgramOptions& options, 
     const std::filesystem::path page = options.page.empty() ? pageNextToProgram() : options.page;
     if (page.empty())
       spdlog::warn("no page found next to the program: build the target clothstream_page, or use --page DIR");
+    const endpoint::ConnectionLimits limits{.connectionsPerAddress = options.maxConnectionsPerAddress,
+                                            .connectionsPerSecond = options.connectionsPerSecond};
     const endpoint::WebEndpoint web(server, {.host = options.host,
                                              .port = options.port,
                                              .pageDirectory = page,
+                                             .maxConnections = options.maxConnections,
+                                             .connections = limits,
+                                             .publicNames = options.publicNames,
                                              .allowedOrigins = options.allowedOrigins});
-    const endpoint::GrpcEndpoint rpc(server, {.host = options.host, .port = options.grpcPort});
+    const endpoint::GrpcEndpoint rpc(server, {.host = options.host,
+                                              .port = options.grpcPort,
+                                              .maxStreams = options.maxConnections,
+                                              .connections = limits});
 
     fmt::print("{}page    http://{}/\ngRPC    {}\n", intro, localAddress(options.host, web.port()),
                localAddress(options.host, rpc.port()));

@@ -13,6 +13,7 @@
 #include "clients/cli/played_recording.h"
 #include "clients/cli/progress.h"
 #include "clients/cli/signals.h"
+#include "proto/text/printable.h"
 
 namespace clothstream::cli {
 namespace {
@@ -30,22 +31,6 @@ struct RecordingFigures {
   std::string damage;  // first damage found; empty: none
   std::optional<cs_statistics> stream;
 };
-
-// Escapes control characters as \\xNN, so that text from a file cannot control a terminal. Keeps other UTF-8.
-std::string printable(const std::string& text) {
-  std::string shown;
-  for (std::size_t i = 0; i < text.size(); ++i) {
-    const auto byte = static_cast<unsigned char>(text[i]);
-    const bool isC1 = byte == 0xc2 && i + 1 < text.size() && static_cast<unsigned char>(text[i + 1]) < 0xa0;
-    if (isC1)
-      shown += fmt::format("\\x{:02x}", static_cast<unsigned char>(text[++i]));
-    else if (byte < 0x20 || byte == 0x7f)
-      shown += fmt::format("\\x{:02x}", byte);
-    else
-      shown += text[i];
-  }
-  return shown;
-}
 
 double seconds(const RecordingReader& reader) {
   return static_cast<double>(reader.end() - reader.start()) * 1e-9;

@@ -14,6 +14,7 @@
 #include "clients/cli/report.h"
 #include "clients/cli/signals.h"
 #include "clients/grpc/grpc_client.h"
+#include "proto/text/printable.h"
 
 namespace clothstream::cli {
 namespace {
@@ -57,7 +58,7 @@ class Listener {
  private:
   void say(const std::string& text) const {
     line_.clear();
-    fmt::print(stderr, "clothstream: {}\n", text);
+    fmt::print(stderr, "clothstream: {}\n", printable(text));
   }
 
   void sayParticipants(cs_client* client) const {

@@ -5,7 +5,9 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "clients/cli/error.h"
 #include "clients/grpc/scene_list.h"
+#include "proto/text/printable.h"
 
 namespace clothstream::cli {
 namespace {
@@ -29,8 +31,9 @@ std::string json(const std::vector<SceneSummary>& scenes) {
 void printTable(const std::vector<SceneSummary>& scenes) {
   fmt::print("{:<20} {:>9} {:>7} {:>13}  {}\n", "SCENE", "VERTICES", "CLOTHS", "PARTICIPANTS", "DESCRIPTION");
   for (const SceneSummary& scene : scenes)
-    fmt::print("{:<20} {:>9} {:>7} {:>13}  {}\n", scene.name, scene.vertexCount, scene.clothCount,
-               fmt::format("{} of {}", scene.participants, scene.maxParticipants), scene.description);
+    fmt::print("{:<20} {:>9} {:>7} {:>13}  {}\n", printable(scene.name), scene.vertexCount, scene.clothCount,
+               fmt::format("{} of {}", scene.participants, scene.maxParticipants),
+               printable(scene.description));
 }
 
 }  // namespace
@@ -38,8 +41,7 @@ void printTable(const std::vector<SceneSummary>& scenes) {
 ExitCode list(const ListOptions& options) {
   const auto scenes = listScenes(options.address);
   if (!scenes) {
-    fmt::print(stderr, "clothstream: {}\n", scenes.error().text);
-    return exitCodeOf(scenes.error().kind);
+    return printError(exitCodeOf(scenes.error().kind), scenes.error().text);
   }
   if (options.json)
     fmt::print("{}\n", json(*scenes));

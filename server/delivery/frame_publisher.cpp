@@ -2,8 +2,11 @@
 #include "server/delivery/frame_publisher.h"
 
 #include <cassert>
+#include <exception>
 #include <span>
 #include <utility>
+
+#include <spdlog/spdlog.h>
 
 #include "clothstream/v1/session.pb.h"
 
@@ -73,9 +76,14 @@ void FramePublisher::run() {
 
 void FramePublisher::encode() {
   for (const CompleteFrame::Recorded& recorded : frame_.recorded) {
-    packet_.resize(recorded.encoder->packetBound());
-    const encode::EncodedFrame encoded = recorded.encoder->entropyCode(recorded.frame, packet_);
-    if (!frame_.discarded) publish(recorded, encoded);
+    try {
+      packet_.resize(recorded.encoder->packetBound());
+      const encode::EncodedFrame encoded = recorded.encoder->entropyCode(recorded.frame, packet_);
+      if (!frame_.discarded) publish(recorded, encoded);
+    } catch (const std::exception& failure) {
+      // Such as a lack of memory. Clients miss the frame and request a key frame.
+      spdlog::error("a frame of tick {} could not be published: {}", recorded.frame.tick, failure.what());
+    }
   }
 }
 

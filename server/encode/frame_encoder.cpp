@@ -127,9 +127,12 @@ void FrameEncoder::forgetHistory() {
 }
 
 EncodedFrame FrameEncoder::entropyCode(const RecordedFrame& frame, std::span<std::byte> out) {
-  const EncodedFrame encoded = state_->stage->entropyCode(frame, out);
-  state_->taken[frame.slot].store(false, std::memory_order_release);
-  return encoded;
+  // The slot becomes free also if the stage throws.
+  const struct Release {
+    std::atomic<bool>& taken;
+    ~Release() { taken.store(false, std::memory_order_release); }
+  } release{state_->taken[frame.slot]};
+  return state_->stage->entropyCode(frame, out);
 }
 
 std::size_t FrameEncoder::packetBound() const {

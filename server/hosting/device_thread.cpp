@@ -23,10 +23,11 @@ constexpr std::chrono::milliseconds kPausedFramePeriod{50};
 DeviceThread::DeviceThread(const vulkan::DeviceOptions& device,
                            const std::vector<std::shared_ptr<scene::LiveScene>>& scenes,
                            delivery::FramePublisher& publisher, telemetry::ServerMetrics& metrics,
-                           bool runAlways, double reportRate)
+                           scene::Budget& budget, bool runAlways, double reportRate)
     : options_(device),
       publisher_(publisher),
       metrics_(metrics),
+      budget_(budget),
       runAlways_(runAlways),
       reportRate_(reportRate),
       loader_(publisher.workers(), [this] { wake(); }) {
@@ -115,6 +116,7 @@ void DeviceThread::run(const std::vector<std::shared_ptr<scene::LiveScene>>& sce
   try {
     if (!scenes.empty()) {
       device_ = std::make_unique<vulkan::Device>(options_);
+      measureSpeed();
       for (const auto& scene : scenes) runs_.push_back(std::make_unique<Run>(scene));
       scene::LiveScene& first = *runs_.front()->scene;
       runs_.front()->host = std::make_unique<scene::SceneHost>(*device_, first, publisher_, reportRate_);
@@ -122,6 +124,7 @@ void DeviceThread::run(const std::vector<std::shared_ptr<scene::LiveScene>>& sce
     }
   } catch (...) {
     runs_.clear();
+    meter_.reset();
     device_.reset();
     ready.set_exception(std::current_exception());
     return;
@@ -135,6 +138,7 @@ void DeviceThread::run(const std::vector<std::shared_ptr<scene::LiveScene>>& sce
       startAndStopScenes();
       encodePausedFrames();
       runDueTicks();
+      runSlice();
     } catch (const std::exception& failure) {
       rebuildDevice(failure.what());
     }
@@ -142,6 +146,7 @@ void DeviceThread::run(const std::vector<std::shared_ptr<scene::LiveScene>>& sce
   publisher_.drain();
   loader_.abandon();
   runs_.clear();
+  meter_.reset();
   device_.reset();
 }
 
@@ -191,6 +196,7 @@ void DeviceThread::dismiss(Run& run, const std::string& why) {
   const std::string text = fmt::format("the device cannot run the scene '{}': {}", run.scene->name(), why);
   spdlog::error("{}", text);
   run.host.reset();
+  run.begun = false;
   run.failed.reset();
   scene::LiveScene& scene = *run.scene;
   scene.roster.dismiss(delivery::error(v1::ERROR_CODE_RESOURCE_EXHAUSTED, text, true));
@@ -198,8 +204,40 @@ void DeviceThread::dismiss(Run& run, const std::string& why) {
   scene.subscribers.announce(delivery::parametersChanged(scene.restart(), 1));
 }
 
+void DeviceThread::measureSpeed() {
+  meter_ = std::make_unique<simulation::SpeedMeter>(*device_);
+  speed_ = meter_->measure();
+  budget_.setSpeed(speed_);
+}
+
+void DeviceThread::checkPrice(Run& run) {
+  const double price = run.scene->tickWork(run.host->colliders()).seconds(budget_.speed());
+  const double seconds = schedule::seconds(run.used);
+  if (!run.price.note(seconds, price)) return;
+  const model::DeviceSpeed now = meter_->measure();
+  const double slowdown =
+      std::max(now.nodeStepSeconds / speed_.nodeStepSeconds, now.dispatchSeconds / speed_.dispatchSeconds);
+  if (run.price.isExcessive(slowdown))
+    quarantine(run, fmt::format("a tick took {:.3f} s, and its price is {:.3f} s", seconds, price));
+}
+
+void DeviceThread::quarantine(Run& run, const std::string& why) {
+  const std::string text =
+      fmt::format("the scene '{}' is stopped because it harms other scenes: {}", run.scene->name(), why);
+  spdlog::error("{}", text);
+  metrics_.quarantines.add();
+  publisher_.drain();
+  run.host.reset();
+  run.begun = false;
+  run.running = run.paused = false;
+  run.scene->running = false;
+  run.quarantined = true;
+  run.scene->quarantine(text);
+}
+
 void DeviceThread::startAndStopScenes() {
   for (const auto& run : runs_) {
+    if (run->begun || run->quarantined) continue;
     const scene::LiveScene& scene = *run->scene;
     const bool inUse = scene.subscribers.size() > 0;
     const bool ready = run->host && run->host->isReady();
@@ -234,20 +272,42 @@ void DeviceThread::runDueTicks() {
     if (std::exchange(loseDevice_, false)) throw vulkan::DeviceLost("the loss of the device is simulated");
   }
   schedules_.clear();
-  for (const auto& run : runs_) schedules_.push_back(run.get());
+  for (const auto& run : runs_)
+    if (!run->begun) schedules_.push_back(run.get());
   Clock::time_point before = Clock::now();
   schedule::scheduleTicks(schedules_, before, chosen_);
   for (schedule::TickSchedule* due : chosen_) {
     Run& run = static_cast<Run&>(*due);
+    run.used = {};
     run.begun = survives(run, [&] { begin(run, Clock::now()); });
   }
   for (schedule::TickSchedule* due : chosen_) {
     Run& run = static_cast<Run&>(*due);
-    if (!run.begun || !survives(run, [&] { run.host->finish(); })) continue;
-    const Clock::time_point after = Clock::now();
-    run.tickEnded(after - before, after);
-    before = after;
+    if (!run.begun || !survives(run, [&] { run.host->waitForSlice(before); })) continue;
+    endSlice(run, std::exchange(before, Clock::now()));
   }
+}
+
+void DeviceThread::runSlice() {
+  // The scene that has used the least time for its tick.
+  Run* next = nullptr;
+  for (const auto& run : runs_)
+    if (run->begun && (next == nullptr || run->used < next->used)) next = run.get();
+  if (next == nullptr) return;
+  const Clock::time_point before = Clock::now();
+  const bool survived = survives(*next, [&] {
+    next->host->submitSlice();
+    next->host->waitForSlice();
+  });
+  if (survived) endSlice(*next, before);
+}
+
+void DeviceThread::endSlice(Run& run, Clock::time_point before) {
+  run.used += Clock::now() - before;
+  if (run.host->hasSlices() || !survives(run, [&] { run.host->finish(); })) return;
+  run.begun = false;
+  run.tickEnded(run.used, Clock::now());
+  checkPrice(run);
 }
 
 bool DeviceThread::survives(Run& run, const std::function<void()>& partOfTick) {
@@ -255,6 +315,9 @@ bool DeviceThread::survives(Run& run, const std::function<void()>& partOfTick) {
     partOfTick();
     return true;
   } catch (const vulkan::DeviceLost&) {
+    const Clock::time_point now = Clock::now();
+    run.lostDeviceTwice = run.lostDevice && now - *run.lostDevice < kLossWindow;
+    run.lostDevice = now;
     throw;
   } catch (const std::exception& failure) {
     rebuildScene(run, failure.what());
@@ -270,6 +333,7 @@ void DeviceThread::rebuildScene(Run& run, const std::string& reason) {
   if (run.failed && ticks - *run.failed < run.scene->start().simulationRate) return dismiss(run, reason);
   run.failed = ticks;
   run.rebuildFailed = false;
+  run.begun = false;
   run.host->release();
   wake();
 }
@@ -295,7 +359,12 @@ void DeviceThread::rebuildDevice(const std::string& reason) {
   // Frames of the old device are published first, because they use its memory.
   publisher_.drain();
   loader_.abandon();
-  for (const auto& run : runs_) run->loading = {};
+  for (const auto& run : runs_) {
+    run->loading = {};
+    run->begun = false;
+    if (std::exchange(run->lostDeviceTwice, false))
+      quarantine(*run, "the device was lost twice while it ran");
+  }
   do {
     runTasks();
     std::unique_lock lock(mutex_);
@@ -307,9 +376,11 @@ void DeviceThread::rebuildDevice(const std::string& reason) {
 bool DeviceThread::tryRebuildDevice() {
   for (const auto& run : runs_)
     if (run->host) run->host->release();
+  meter_.reset();
   device_.reset();
   try {
     device_ = std::make_unique<vulkan::Device>(options_);
+    measureSpeed();
     for (const auto& run : runs_)
       if (run->host)
         run->host->rebuild(

@@ -15,11 +15,14 @@
 #include <vector>
 
 #include "server/delivery/frame_publisher.h"
+#include "server/scene/budget.h"
 #include "server/scene/live_scene.h"
 #include "server/scene/scene_host.h"
 #include "server/scene/scene_loader.h"
+#include "server/schedule/price_watch.h"
 #include "server/schedule/slow_watch.h"
 #include "server/schedule/tick_scheduler.h"
+#include "server/simulation/speed_meter.h"
 #include "server/telemetry/metrics.h"
 #include "server/vulkan/device.h"
 
@@ -29,22 +32,29 @@ using schedule::Clock;
 
 // Thread-safe.
 //
-// Ticks that are due together are all submitted before the first is waited for. A scene is loaded onto the
-// device when it is first joined, on another thread while other scenes run. A scene without subscribers
-// sleeps.
+// Ticks that are due together are all submitted before the first is waited for. Between the slices of a long
+// tick, those that became due run, scenes are added and removed, and the thread can end. A scene is loaded
+// onto the device when it is first joined, on another thread while other scenes run. A scene without
+// subscribers sleeps.
 //
 // Device loss: a new device is created, and every scene continues from its newest snapshot on the CPU. This
 // is tried once a second until it succeeds. If a tick fails in another way, only its scene is rebuilt like
 // this. A scene is given up if a tick fails again within a simulated second, or if rebuilding it fails twice:
 // all participants are dismissed, and the next join starts it from the beginning.
+//
+// A scene is put into quarantine if it takes far more than its price (schedule::PriceWatch), or if the device
+// is lost twice within kLossWindow while the thread runs this scene.
 class DeviceThread {
  public:
-  // Returns when the device and the first scene are ready. Without scenes there is no device, and none can be
-  // added. All arguments must outlive the thread. Throws what the device or the first scene throws.
+  static constexpr std::chrono::seconds kLossWindow{60};
+
+  // Returns when the device and the first scene are ready, and the budget knows the device's speed. Without
+  // scenes there is no device, and none can be added. All arguments must outlive the thread. Throws what the
+  // device or the first scene throws.
   DeviceThread(const vulkan::DeviceOptions& device,
                const std::vector<std::shared_ptr<scene::LiveScene>>& scenes,
-               delivery::FramePublisher& publisher, telemetry::ServerMetrics& metrics, bool runAlways,
-               double reportRate);
+               delivery::FramePublisher& publisher, telemetry::ServerMetrics& metrics, scene::Budget& budget,
+               bool runAlways, double reportRate);
   // Ends after the ticks in flight.
   ~DeviceThread();
   DeviceThread(const DeviceThread&) = delete;
@@ -78,6 +88,7 @@ class DeviceThread {
 
     // Time at which the scene next needs the thread.
     Clock::time_point due() const {
+      if (begun) return {};  // now
       if (running) return pacer.due();
       return paused ? nextPausedFrame : Clock::time_point::max();
     }
@@ -86,13 +97,18 @@ class DeviceThread {
     scene::SceneLoader::Future loading;           // valid while it is loaded
     std::unique_ptr<scene::SceneHost> host;       // once it is loaded
     std::optional<std::promise<void>> whenAdded;  // set by add(), until the scene is ready
+    bool quarantined = false;
     bool refused = false;                         // added, but cannot run
-    bool begun = false;                           // the current tick has begun
+    bool begun = false;                           // the current tick has begun, and is not finished
+    Clock::duration used{};                       // time of the current tick on the device
     bool paused = false;                          // while it has subscribers
     Clock::time_point nextPausedFrame{};          // next check for subscribers that need a key frame
     std::optional<std::uint64_t> failed;          // tick count at the newest failure
     bool rebuildFailed = false;                   // since the newest failure
+    std::optional<Clock::time_point> lostDevice;  // newest loss while the thread ran this scene
+    bool lostDeviceTwice = false;                 // within kLossWindow
     schedule::SlowWatch slow;
+    schedule::PriceWatch price;
     double slipped = 0;  // ticks that are not counted yet, below 1
   };
 
@@ -106,12 +122,22 @@ class DeviceThread {
   void takeLoadedScenes();
   // Throws vulkan::DeviceLost.
   void take(Run& run);
+  // Gives the speed of a new device to the budget.
+  void measureSpeed();
+  // Puts the scene into quarantine if it takes far more than its price. Throws vulkan::DeviceLost.
+  void checkPrice(Run& run);
+  void quarantine(Run& run, const std::string& why);
   // Gives the scene up and dismisses its participants.
   void dismiss(Run& run, const std::string& why);
   // Encodes frames of paused scenes for subscribers that need a key frame.
   void encodePausedFrames();
   void runDueTicks();
-  // Runs a part of a tick. Returns false if it failed; the scene is then rebuilt. Throws vulkan::DeviceLost.
+  // Runs one slice of a tick that has begun and takes longer than a slice.
+  void runSlice();
+  // Accounts for the time since `before`, and finishes the tick if it has no more slices.
+  void endSlice(Run& run, Clock::time_point before);
+  // Runs a part of a tick. Returns false if it failed; the scene is then rebuilt. Throws vulkan::DeviceLost,
+  // and counts that as the scene's.
   bool survives(Run& run, const std::function<void()>& partOfTick);
   void rebuildScene(Run& run, const std::string& reason);
   void begin(Run& run, Clock::time_point now);
@@ -121,6 +147,7 @@ class DeviceThread {
   const vulkan::DeviceOptions options_;
   delivery::FramePublisher& publisher_;
   telemetry::ServerMetrics& metrics_;
+  scene::Budget& budget_;
   const bool runAlways_;
   const double reportRate_;
 
@@ -133,6 +160,8 @@ class DeviceThread {
 
   // Owned by the thread.
   std::unique_ptr<vulkan::Device> device_;
+  std::unique_ptr<simulation::SpeedMeter> meter_;  // of device_
+  model::DeviceSpeed speed_;                       // of device_ when it was new
   std::vector<std::unique_ptr<Run>> runs_;
   std::vector<schedule::TickSchedule*> schedules_, chosen_;  // of runs_
   scene::SceneLoader loader_;                                // for device_

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <exception>
 #include <memory>
+#include <span>
 #include <utility>
 
 #include <boost/asio/post.hpp>
@@ -12,6 +13,8 @@
 
 #include "clothstream/v1/session.pb.h"
 #include "server/hosting/server_state.h"
+#include "server/messages/limits.h"
+#include "server/messages/parsed_size.h"
 #include "server/messages/scene_file.h"
 #include "server/messages/scene_message.h"
 #include "server/messages/validation.h"
@@ -121,13 +124,20 @@ tl::expected<model::Scene, v1::Error> SceneMaker::definitionOf(const v1::CreateS
                                                                const std::string& uploaded) const {
   switch (request.source_case()) {
     case v1::CreateSceneRequest::kScene:
-      return checked(messages::toScene(request.scene()));
+      return checked(messages::toScene(request.scene(), {}, server_.options.maxSceneNodes));
     case v1::CreateSceneRequest::kUploadedContentId: {
       v1::Scene message;
+      if (!messages::parsedSize(*v1::Scene::descriptor(), std::as_bytes(std::span(uploaded)),
+                                messages::limits::kMaxParsedBytes))
+        return refused(
+            v1::ERROR_CODE_MALFORMED_MESSAGE,
+            fmt::format("createScene: the uploaded content is not a Scene message, or would need more than "
+                        "{} bytes of memory: send fewer elements",
+                        messages::limits::kMaxParsedBytes));
       if (!message.ParseFromString(uploaded))
         return refused(v1::ERROR_CODE_MALFORMED_MESSAGE,
                        "createScene: the uploaded content is not a Scene message");
-      return checked(messages::toScene(message));
+      return checked(messages::toScene(message, {}, server_.options.maxSceneNodes));
     }
     case v1::CreateSceneRequest::kNamed:
       if (const std::shared_ptr<scene::LiveScene> live = server_.find(request.named())) return live->start();
@@ -167,9 +177,11 @@ tl::expected<v1::CreateSceneResponse, v1::Error> SceneMaker::createNow(const v1:
         fmt::format("createScene: a scene '{}' exists already; choose another name", definition->name));
   std::shared_ptr<scene::Journal> journal =
       server_.options.journals ? server_.options.journals(*definition) : nullptr;
-  const auto scene =
-      std::make_shared<scene::LiveScene>(std::move(*definition), true, std::move(journal),
-                                         request.max_participants() > 0 ? request.max_participants() : most);
+  const auto scene = std::make_shared<scene::LiveScene>(
+      std::move(*definition), true, std::move(journal),
+      request.max_participants() > 0 ? request.max_participants() : most, server_.budget);
+  if (auto charged = scene->charge(); !charged)
+    return refused(charged.error().code, std::move(charged.error().text));
   try {
     server_.device.add(scene).get();
   } catch (const std::exception& failure) {

@@ -15,6 +15,7 @@
 #include "server/delivery/wire_types.h"
 #include "server/messages/limits.h"
 #include "server/model/scene.h"
+#include "server/scene/budget.h"
 #include "server/scene/defaults.h"
 #include "server/scene/roles.h"
 #include "server/scene/roster.h"
@@ -49,14 +50,20 @@ struct ServerOptions {
   std::uint32_t maxParticipants = scene::kDefaultMaxParticipants;
   // Scenes that peers may create, in addition to those that the server starts with.
   std::uint32_t maxCreatedScenes = 16;
+  // Nodes of a scene that a peer creates.
+  std::uint64_t maxSceneNodes = 262'144;
+  // What participants may add by creating scenes and changing parameters.
+  scene::BudgetLimits budget{};
   // Threads that predict large frames on the CPU; 0 means automatic (EncoderThreads).
   std::uint32_t encoderThreads = 0;
   // Limit of the uploads of all peers together, in bytes.
-  std::size_t maxUploadBytes = std::size_t{256} << 20;
+  std::size_t maxUploadBytes = std::size_t{64} << 20;
   // Returns the journal of a scene, or null for none. May be empty.
   std::function<std::shared_ptr<scene::Journal>(const model::Scene&)> journals{};
   // A peer that sends nothing for this long is disconnected.
   std::chrono::milliseconds silence{30'000};
+  // The same before it has joined a scene; at most `silence`.
+  std::chrono::milliseconds helloTimeout{10'000};
   scene::ReconnectGrace reconnectGrace{};
   scene::Permissions participantsMay{};
   // True: peers outside a scene may always pause, reset, record and delete it. False: only while it has no

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "clothstream/v1/session.pb.h"
+#include "proto/text/printable.h"
 #include "server/messages/description.h"
 #include "server/messages/scene_message.h"
 
@@ -15,13 +16,14 @@ namespace clothstream::hosting {
 namespace {
 
 std::vector<std::shared_ptr<scene::LiveScene>> liveScenes(std::vector<model::Scene> definitions,
-                                                          const ServerOptions& options) {
+                                                          const ServerOptions& options,
+                                                          const std::shared_ptr<scene::Budget>& budget) {
   std::vector<std::shared_ptr<scene::LiveScene>> scenes;
   scenes.reserve(definitions.size());
   for (model::Scene& definition : definitions) {
     std::shared_ptr<scene::Journal> journal = options.journals ? options.journals(definition) : nullptr;
     scenes.push_back(std::make_shared<scene::LiveScene>(std::move(definition), false, std::move(journal),
-                                                        options.maxParticipants));
+                                                        options.maxParticipants, budget));
   }
   return scenes;
 }
@@ -78,7 +80,8 @@ v1::SceneSummary summaryOf(const scene::LiveScene& scene) {
 SceneServer::State::State(std::vector<model::Scene> definitions, ServerOptions options_)
     : options(std::move(options_)),
       uploads(options.maxUploadBytes),
-      scenes(liveScenes(std::move(definitions), options)),
+      budget(std::make_shared<scene::Budget>(options.budget)),
+      scenes(liveScenes(std::move(definitions), options, budget)),
       publisher(
           (scenes.size() + options.maxCreatedScenes) * codec::kMaxQualities * encode::FrameEncoder::kSlots,
           [this] {
@@ -87,7 +90,7 @@ SceneServer::State::State(std::vector<model::Scene> definitions, ServerOptions o
           },
           options.encoderThreads > 0 ? options.encoderThreads
                                      : encode::EncoderThreads::suitedTo(std::thread::hardware_concurrency())),
-      device(options.device, scenes, publisher, metrics, options.runAlways, options.reportRate),
+      device(options.device, scenes, publisher, metrics, *budget, options.runAlways, options.reportRate),
       maker(*this) {}
 
 SceneServer::State::State(std::shared_ptr<scene::LiveScene> played, ServerOptions options_)
@@ -134,7 +137,7 @@ v1::Error SceneServer::State::noSuchScene(const std::string& name) const {
   for (const auto& scene : scenesNow()) known += (known.empty() ? "" : ", ") + scene->name();
   v1::Error error;
   error.set_code(v1::ERROR_CODE_NOT_FOUND);
-  error.set_text(fmt::format("there is no scene '{:.64}'; there are {}", name, known));
+  error.set_text(fmt::format("there is no scene '{:.64}'; there are {}", printable(name), known));
   return error;
 }
 

@@ -16,6 +16,7 @@
 #include "server/hosting/scene_maker.h"
 #include "server/hosting/scene_server.h"
 #include "server/hosting/upload_budget.h"
+#include "server/scene/budget.h"
 #include "server/scene/live_scene.h"
 #include "server/telemetry/metrics.h"
 
@@ -58,6 +59,7 @@ struct SceneServer::State {
   const ServerOptions options;
   telemetry::ServerMetrics metrics;
   UploadBudget uploads;
+  const std::shared_ptr<scene::Budget> budget;
   std::atomic<std::uint64_t> participants{0};  // newest participant number
 
   mutable std::mutex mutex;  // protects the next three

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numeric>
 #include <optional>
+#include <random>
 #include <tuple>
 #include <unordered_map>
 
@@ -75,26 +76,53 @@ Problem place(const MeshSource& source, const MeshOptions& options, const MeshLi
   return std::nullopt;
 }
 
-// Coordinates wrap at 21 bits per axis. Cells that share a key cost time only.
-std::uint64_t cellKey(std::int64_t x, std::int64_t y, std::int64_t z) {
-  constexpr std::int64_t kMask = (1 << 21) - 1;
-  return static_cast<std::uint64_t>((x & kMask) | (y & kMask) << 21 | (z & kMask) << 42);
-}
+// Cell of the grid that finds close vertices.
+struct Cell {
+  std::int64_t x, y, z;
+  bool operator==(const Cell&) const = default;
+};
+
+// Seeded at random, so that no mesh can be made whose cells have equal hashes.
+class CellHash {
+ public:
+  CellHash() {
+    std::random_device random;
+    seed_ = std::uint64_t{random()} << 32 | random();
+  }
+  std::size_t operator()(const Cell& cell) const {
+    std::uint64_t hash = seed_;
+    for (const std::int64_t part : {cell.x, cell.y, cell.z})
+      hash = mixed(hash ^ static_cast<std::uint64_t>(part));
+    return hash;
+  }
+
+ private:
+  // Finaliser of SplitMix64 (Steele, Lea and Flood, 2014).
+  static std::uint64_t mixed(std::uint64_t value) {
+    value += 0x9E3779B97F4A7C15;
+    value = (value ^ value >> 30) * 0xBF58476D1CE4E5B9;
+    value = (value ^ value >> 27) * 0x94D049BB133111EB;
+    return value ^ value >> 31;
+  }
+
+  std::uint64_t seed_;
+};
 
 // Minimum size of a cell in metres. It keeps cell indices within 64 bits.
 constexpr double kSmallestCell = 1e-9;
 
 // For each vertex the first earlier vertex within the distance, or else itself. Cells are larger than the
-// distance, so that a close vertex is usually in the same cell.
+// distance, so that a close vertex is usually in the same cell. The vertices of a cell are farther apart than
+// the distance, so a cell has only a few, and the time is linear in the number of vertices.
 std::vector<std::uint32_t> weld(const std::vector<Vec3>& positions, float distance) {
   std::vector<std::uint32_t> first(positions.size());
   std::iota(first.begin(), first.end(), 0u);
   if (distance <= 0) return first;
-  const double reach = distance, cell = std::max(4 * reach, kSmallestCell);
+  const double reach = distance, cell = std::max(2 * reach, kSmallestCell);
   const auto cellOf = [&](double coordinate) {
     return static_cast<std::int64_t>(std::floor(coordinate / cell));
   };
-  std::unordered_multimap<std::uint64_t, std::uint32_t> cells;
+  std::unordered_multimap<Cell, std::uint32_t, CellHash> cells;
   cells.reserve(positions.size());
   for (std::uint32_t i = 0; i < positions.size(); ++i) {
     const Eigen::Vector3d p = positions[i].cast<double>();
@@ -102,13 +130,13 @@ std::vector<std::uint32_t> weld(const std::vector<Vec3>& positions, float distan
     for (std::int64_t x = cellOf(p.x() - reach); x <= cellOf(p.x() + reach); ++x)
       for (std::int64_t y = cellOf(p.y() - reach); y <= cellOf(p.y() + reach); ++y)
         for (std::int64_t z = cellOf(p.z() - reach); z <= cellOf(p.z() + reach); ++z) {
-          const auto [begin, end] = cells.equal_range(cellKey(x, y, z));
+          const auto [begin, end] = cells.equal_range({x, y, z});
           for (auto it = begin; it != end; ++it)
             if ((positions[it->second] - positions[i]).norm() <= distance)
               nearest = std::min(nearest, it->second);
         }
     first[i] = nearest;
-    if (nearest == i) cells.emplace(cellKey(cellOf(p.x()), cellOf(p.y()), cellOf(p.z())), i);
+    if (nearest == i) cells.emplace(Cell{cellOf(p.x()), cellOf(p.y()), cellOf(p.z())}, i);
   }
   return first;
 }
@@ -172,15 +200,18 @@ Problem checkFace(const MeshSource& source, std::size_t f, const Numbering& numb
     for (std::uint32_t other = corner + 1; other < face.cornerCount; ++other) {
       const std::uint32_t a = numbering.nodeOfVertex[face.vertices[corner]];
       const std::uint32_t b = numbering.nodeOfVertex[face.vertices[other]];
-      const std::string what = fmt::format("face {} is degenerate: its vertices {} and {}", f,
-                                           face.vertices[corner], face.vertices[other]);
+      const auto what = [&] {
+        return fmt::format("face {} is degenerate: its vertices {} and {}", f, face.vertices[corner],
+                           face.vertices[other]);
+      };
       if (a == b)
         return fmt::format(
-            "{} are the same node; delete the face, or make weldDistance smaller than their distance", what);
+            "{} are the same node; delete the face, or make weldDistance smaller than their distance",
+            what());
       const float length = (positions[a] - positions[b]).norm();
       if (length < minEdge)
-        return fmt::format("{} lie {:g} m apart; at least {:g} is needed: merge them, or set the scale", what,
-                           length, minEdge);
+        return fmt::format("{} lie {:g} m apart; at least {:g} is needed: merge them, or set the scale",
+                           what(), length, minEdge);
     }
   return std::nullopt;
 }
@@ -276,6 +307,18 @@ Problem checkEdges(const model::MeshShape& shape, const std::vector<std::size_t>
   return std::nullopt;
 }
 
+// Colouring the springs takes time and memory in proportion to the springs of a node.
+Problem checkSprings(const model::Mesh& mesh, const std::vector<std::uint32_t>& vertexOfNode,
+                     std::uint32_t maxNodeSprings) {
+  std::vector<std::uint32_t> springs(mesh.nodeCount(), 0);
+  for (const model::SpringLink& link : mesh.links)
+    for (const std::uint32_t node : {link.a, link.b})
+      if (++springs[node] > maxNodeSprings)
+        return fmt::format("vertex {} has more than {} springs: divide the faces around it",
+                           vertexOfNode[node], maxNodeSprings);
+  return std::nullopt;
+}
+
 std::vector<model::Submesh> submeshes(const MeshSource& source,
                                       const std::vector<std::size_t>& faceOfTriangle) {
   std::vector<model::Submesh> found;
@@ -317,7 +360,10 @@ tl::expected<BuiltMesh, std::string> buildMesh(const MeshSource& source, const M
   if (Problem problem = checkEdges(shape, faceOfTriangle, numbering.vertexOfNode))
     return tl::unexpected(std::move(*problem));
   shape.submeshes = submeshes(source, faceOfTriangle);
-  return BuiltMesh{model::makeMesh(std::move(shape)), std::move(numbering.nodeOfVertex)};
+  BuiltMesh built{model::makeMesh(std::move(shape)), std::move(numbering.nodeOfVertex)};
+  if (Problem problem = checkSprings(built.mesh, numbering.vertexOfNode, limits.maxNodeSprings))
+    return tl::unexpected(std::move(*problem));
+  return built;
 }
 
 }  // namespace clothstream::meshes

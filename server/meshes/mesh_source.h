@@ -38,6 +38,7 @@ struct MeshLimits {
   std::uint64_t maxVertices = 0;  // the limit of faces is twice as many
   float maxCoordinate = 0;        // m, on each axis
   float minEdge = 0;              // m
+  std::uint32_t maxNodeSprings = 0;
 };
 
 struct MeshOptions {

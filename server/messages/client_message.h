@@ -11,6 +11,7 @@
 #include "clothstream/v1/session.pb.h"
 #include "server/messages/field_error.h"
 #include "server/model/input.h"
+#include "server/model/stability.h"
 
 namespace clothstream::messages {
 
@@ -42,8 +43,9 @@ struct Joining {
                                                       const model::Scene& scene);
 
 // Refuses a change that cannot be applied to this scene as a whole: if a name does not exist, a value is out
-// of range, or the scene would be unstable with its substeps.
+// of range, or the scene would be unstable with its substeps. `bound` is of this scene before any change.
 [[nodiscard]] Result<model::ParameterChange> toParameterChange(const v1::ParameterChange& message,
-                                                               const model::Scene& scene);
+                                                               const model::Scene& scene,
+                                                               const model::StabilityBound& bound);
 
 }  // namespace clothstream::messages

@@ -14,7 +14,8 @@ namespace {
 
 constexpr meshes::MeshLimits kMeshLimits{.maxVertices = limits::kMaxNodes,
                                          .maxCoordinate = static_cast<float>(limits::kPosition.max),
-                                         .minEdge = static_cast<float>(limits::kMinSpacing)};
+                                         .minEdge = static_cast<float>(limits::kMinSpacing),
+                                         .maxNodeSprings = limits::kMaxNodeSprings};
 
 void checkWhole(Checks& checks, const Path& path, int size, int each) {
   if (size % each != 0)

@@ -103,7 +103,8 @@ void overwrite(const google::protobuf::Message& with, google::protobuf::Message&
 }  // namespace
 
 Result<model::ParameterChange> toParameterChange(const v1::ParameterChange& message,
-                                                 const model::Scene& scene) {
+                                                 const model::Scene& scene,
+                                                 const model::StabilityBound& bound) {
   Checks checks;
   const Path path("parameterChange");
   model::ParameterChange change;
@@ -129,7 +130,7 @@ Result<model::ParameterChange> toParameterChange(const v1::ParameterChange& mess
     model::applyChange(changed, change);
     checkSolvers(checks, path, changed, change);
     if (const auto error = unfitBending(changed)) checks.fail(path / "cloths[].dihedralBending", "", *error);
-    if (const auto error = instability(changed))
+    if (const auto error = instability(changed, bound))
       checks.fail(path, "", fmt::format("with substeps = {}, {}", scene.substeps, *error));
   }
   return std::move(checks).result(std::move(change));

@@ -14,6 +14,7 @@
 #include "server/messages/shapes.h"
 #include "server/messages/validation.h"
 #include "server/messages/vectors.h"
+#include "server/model/hinges.h"
 #include "server/model/material.h"
 #include "server/model/mesh.h"
 #include "server/model/springs.h"
@@ -232,7 +233,6 @@ void readAttachments(Checks& checks, const Path& path, const v1::Cloth& message,
   for (int i = 0; i < message.attachments_size() && !checks.failed(); ++i)
     cloth.attachments.push_back(
         toAttachment(checks, path.at("attachments", i), message.attachments(i), cloth, nodeOfVertex));
-  if (!checks.failed() && !cloth.attachments.empty()) checkAttached(checks, path, cloth);
 }
 
 // Self-collision and tethers with their defaults, if the message has them.
@@ -347,6 +347,27 @@ void checkSelfCollision(Checks& checks, const model::Scene& scene) {
                           limits::kMaxSelfCollisionNodes, scene.nodeCount()));
 }
 
+// Selecting nodes takes time for every node of a range, and for every node and region. Checked before any
+// node is selected.
+void checkSelections(Checks& checks, const model::Scene& scene) {
+  std::uint64_t tests = 0;
+  for (const model::Cloth& cloth : scene.cloths) {
+    const auto add = [&](const std::vector<model::GridRange>& ranges,
+                         const std::vector<model::Region>& regions) {
+      for (const model::GridRange& range : ranges) tests += range.nodeCount();
+      tests += std::uint64_t{cloth.nodeCount()} * regions.size();
+    };
+    add(cloth.pins, cloth.pinnedRegions);
+    for (const model::Attachment& attachment : cloth.attachments) add(attachment.ranges, attachment.regions);
+  }
+  if (tests > limits::kMaxSelectionTests)
+    checks.fail(
+        Path("cloths"), "",
+        fmt::format("have pins and attachments that select nodes in {} steps, one for each node of a range, "
+                    "and for each region and node; must have at most {}: use fewer regions",
+                    tests, limits::kMaxSelectionTests));
+}
+
 // Checks the attachments of all cloths together: unique names, number, and colliders that exist.
 void checkAttachments(Checks& checks, const model::Scene& scene) {
   std::unordered_set<std::string_view> names;
@@ -365,12 +386,23 @@ void checkAttachments(Checks& checks, const model::Scene& scene) {
   checks.count(Path("attachments"), names.size(), 0, limits::kMaxAttachments);
 }
 
+std::string tooManyNodes(std::uint64_t nodes, std::uint64_t most) {
+  return fmt::format("have {} nodes in all; must have at most {}", nodes, most);
+}
+
+// Nodes of grids and vertices of meshes inside the message.
+std::uint64_t statedNodes(const v1::Scene& message) {
+  std::uint64_t nodes = 0;
+  for (const v1::Cloth& cloth : message.cloths())
+    nodes += std::uint64_t{cloth.grid().rows()} * cloth.grid().columns() +
+             static_cast<std::uint64_t>(cloth.mesh().positions_size()) / 3;
+  return nodes;
+}
+
 void checkSize(Checks& checks, const model::Scene& scene) {
   std::uint64_t nodes = 0;
   for (const model::Cloth& cloth : scene.cloths) nodes += cloth.nodeCount();
-  if (nodes > limits::kMaxNodes)
-    checks.fail(Path("cloths"), "",
-                fmt::format("have {} nodes in all; must have at most {}", nodes, limits::kMaxNodes));
+  if (nodes > limits::kMaxNodes) checks.fail(Path("cloths"), "", tooManyNodes(nodes, limits::kMaxNodes));
   std::size_t bytes = 0;
   for (const model::Cloth& cloth : scene.cloths) bytes += geometryBytes(cloth);
   if (bytes > limits::kMaxGeometryBytes)
@@ -468,14 +500,14 @@ std::optional<std::string> unfitBending(const model::Scene& scene) {
   if (nodes == 0) return std::nullopt;
   if (scene.integrator != model::Integrator::semiImplicitEuler)
     return "must be 0: other values need INTEGRATOR_SEMI_IMPLICIT_EULER";
-  if (nodes > limits::kMaxSolverNodes)
+  if (nodes > model::kMaxBendingNodes)
     return fmt::format("must be 0 but for cloths of at most {} nodes in all; here they have {}",
-                       limits::kMaxSolverNodes, nodes);
+                       model::kMaxBendingNodes, nodes);
   return std::nullopt;
 }
 
-std::optional<std::string> instability(const model::Scene& scene) {
-  const std::uint32_t needed = model::stableSubsteps(scene);
+std::optional<std::string> instability(const model::Scene& scene, const model::StabilityBound& bound) {
+  const std::uint32_t needed = bound.substeps(scene);
   if (needed != 0 && needed <= scene.substeps) return std::nullopt;
   if (needed != 0)
     return fmt::format("this scene needs at least {} with its springs, masses and rate", needed);
@@ -491,10 +523,12 @@ std::optional<std::string> instability(const model::Scene& scene) {
       limits::kMaxSubsteps);
 }
 
-Result<model::Scene> toScene(const v1::Scene& message, const MeshReader& readMesh) {
+Result<model::Scene> toScene(const v1::Scene& message, const MeshReader& readMesh, std::uint64_t maxNodes) {
   Checks checks;
   const Path root;
   model::Scene scene;
+  if (const std::uint64_t nodes = statedNodes(message); nodes > maxNodes)
+    checks.fail(root / "cloths", "", tooManyNodes(nodes, maxNodes));
   scene.name = checks.name(root / "name", message.name());
   scene.description = checks.text(root / "description", message.description());
   if (message.has_simulation_rate()) scene.simulationRate = message.simulation_rate();
@@ -513,17 +547,22 @@ Result<model::Scene> toScene(const v1::Scene& message, const MeshReader& readMes
   for (int i = 0; i < message.colliders_size() && !checks.failed(); ++i)
     scene.colliders.push_back(toCollider(checks, root.at("colliders", i), message.colliders(i)));
   scene.stream = toStreamSettings(checks, root / "stream", message.stream());
+  // Sizes first: the other checks take time in proportion to them.
+  checkSize(checks, scene);
+  if (!checks.failed()) checkSelections(checks, scene);
+  for (std::size_t i = 0; i < scene.cloths.size() && !checks.failed(); ++i)
+    if (!scene.cloths[i].attachments.empty())
+      checkAttached(checks, root.at("cloths", static_cast<int>(i)), scene.cloths[i]);
   if (!message.stream().has_max_error() && !checks.failed())
     scene.stream.maxError = model::suitedMaxError(scene);
   checkUnique(checks, "cloths", scene.cloths);
   checkUnique(checks, "colliders", scene.colliders);
   checkAttachments(checks, scene);
-  checkSize(checks, scene);
   checkSolvers(checks, scene);
   checkSelfCollision(checks, scene);
   if (const auto error = unfitBending(scene)) checks.fail(Path("cloths[].dihedralBending"), "", *error);
   if (!checks.failed())
-    if (const auto error = instability(scene))
+    if (const auto error = instability(scene, model::StabilityBound(scene)))
       checks.fail(root / "substeps", fmt::format("{}", scene.substeps), *error);
   return std::move(checks).result(std::move(scene));
 }

@@ -2,6 +2,7 @@
 // Converts scenes between their message and the model.
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <span>
 #include <string>
@@ -9,17 +10,21 @@
 #include "clothstream/v1/scene.pb.h"
 #include "clothstream/v1/session.pb.h"
 #include "server/messages/field_error.h"
+#include "server/messages/limits.h"
 #include "server/messages/mesh_message.h"
 #include "server/messages/validation.h"
 #include "server/model/material.h"
 #include "server/model/scene.h"
+#include "server/model/stability.h"
 
 namespace clothstream::messages {
 
 // Applies the defaults of scene.proto and checks everything: ranges, unique names, pins inside their grid,
 // meshes, rates, the number of nodes, and that the integrator is stable with these substeps. Refuses mesh
-// files if there is no reader.
-[[nodiscard]] Result<model::Scene> toScene(const v1::Scene& message, const MeshReader& readMesh = {});
+// files if there is no reader. Refuses more than `maxNodes` nodes, or vertices of meshes before they are
+// welded, at once; everything else takes time and memory in proportion to them.
+[[nodiscard]] Result<model::Scene> toScene(const v1::Scene& message, const MeshReader& readMesh = {},
+                                           std::uint64_t maxNodes = limits::kMaxNodes);
 
 // Sets every field, defaults included, and writes whole meshes. toScene() of the result returns the same
 // scene.
@@ -51,7 +56,8 @@ std::optional<std::string> unfitSolver(const model::Scene& scene, const model::C
 // Error text if the dihedral bending of the scene's cloths cannot be used; nullopt if it can.
 std::optional<std::string> unfitBending(const model::Scene& scene);
 
-// Error text if the integrator is not stable with the scene's substeps; nullopt if it is.
-std::optional<std::string> instability(const model::Scene& scene);
+// Error text if the integrator is not stable with the scene's substeps; nullopt if it is. `bound` is of this
+// scene before any change of its parameters.
+std::optional<std::string> instability(const model::Scene& scene, const model::StabilityBound& bound);
 
 }  // namespace clothstream::messages

@@ -7,6 +7,8 @@
 
 #include <fmt/format.h>
 
+#include "proto/text/printable.h"
+
 namespace clothstream::messages {
 namespace {
 
@@ -57,8 +59,7 @@ const std::string& Checks::name(const Path& path, const std::string& value) {
 }
 
 const std::string& Checks::text(const Path& path, const std::string& value) {
-  const auto control = [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; };
-  if (value.size() > limits::kMaxTextBytes || std::ranges::any_of(value, control))
+  if (value.size() > limits::kMaxTextBytes || hasControlCharacters(value))
     fail(path, inQuotes(value),
          fmt::format("must be one line of at most {} bytes without control characters",
                      limits::kMaxTextBytes));
@@ -66,18 +67,7 @@ const std::string& Checks::text(const Path& path, const std::string& value) {
 }
 
 const std::string& Checks::label(const Path& path, const std::string& value) {
-  const auto at = [&](std::size_t i) { return i < value.size() ? static_cast<unsigned char>(value[i]) : 0u; };
-  bool control = false;
-  for (std::size_t i = 0; i < value.size(); ++i) {
-    control |= at(i) < 0x20 || at(i) == 0x7f;
-    control |= at(i) == 0xc2 && at(i + 1) < 0xa0;  // U+0080 to U+009F
-    // U+200E, U+200F, U+2028 to U+202E, U+2066 to U+2069: direction marks and line separators.
-    if (at(i) != 0xe2) continue;
-    const unsigned second = at(i + 1), third = at(i + 2);
-    control |= second == 0x80 && (third == 0x8e || third == 0x8f || (third >= 0xa8 && third <= 0xae));
-    control |= second == 0x81 && third >= 0xa6 && third <= 0xa9;
-  }
-  if (control || value.size() > limits::kMaxLabelBytes)
+  if (value.size() > limits::kMaxLabelBytes || hasControlCharacters(value))
     fail(path, inQuotes(value),
          fmt::format("must be at most {} bytes of UTF-8 without control characters", limits::kMaxLabelBytes));
   return value;

@@ -11,6 +11,9 @@
 
 namespace clothstream::model {
 
+// Maximum number of nodes of all cloths with dihedral bending in a scene.
+inline constexpr std::uint32_t kMaxBendingNodes = 1'048'576;
+
 // Edge from a to b between the triangles (a, b, c) and (b, a, d), which are faces or halves of quads.
 struct Hinge {
   std::array<std::uint32_t, 4> nodes;  // a, b, c, d

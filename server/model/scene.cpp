@@ -100,11 +100,6 @@ void choose(const Cloth& cloth, const std::vector<GridRange>& ranges,
 
 }  // namespace
 
-bool GridRange::contains(std::uint32_t row, std::uint32_t column) const {
-  return row >= firstRow && row <= lastRow && (row - firstRow) % rowStep == 0 &&  //
-         column >= firstColumn && column <= lastColumn && (column - firstColumn) % columnStep == 0;
-}
-
 bool Region::contains(const Vec3& point) const {
   const Eigen::Vector3d away = (point.cast<double>() - centre.cast<double>()).cwiseAbs();
   if (radius) return away.squaredNorm() <= double{*radius} * double{*radius};

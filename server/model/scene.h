@@ -28,7 +28,9 @@ struct GridRange {
   std::uint32_t firstRow = 0, lastRow = 0, rowStep = 1;
   std::uint32_t firstColumn = 0, lastColumn = 0, columnStep = 1;
 
-  bool contains(std::uint32_t row, std::uint32_t column) const;
+  std::uint64_t nodeCount() const {
+    return (std::uint64_t{lastRow - firstRow} / rowStep + 1) * ((lastColumn - firstColumn) / columnStep + 1);
+  }
 };
 
 // rows x columns nodes, row-major. With the identity pose the grid hangs in the XY plane. Columns run along

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <bit>
 #include <cassert>
+#include <unordered_map>
 
 #include "server/model/mesh.h"
 
@@ -92,28 +93,36 @@ class GridColours {
   SpringColours colours_;
 };
 
-// Colours in use at each node.
+// Colours in use at each node, as sets of 64. Most nodes need only the first set, so the others are stored
+// sparsely: the memory is linear in the number of nodes and springs.
 class ColoursAtNodes {
  public:
-  explicit ColoursAtNodes(std::uint32_t nodes) : nodes_(nodes) {}
+  explicit ColoursAtNodes(std::uint32_t nodes) : first_(nodes, 0) {}
 
   // Returns the first colour that is free at both nodes, and marks it as used at both.
   std::uint32_t takeFirstFree(std::uint32_t a, std::uint32_t b) {
     for (std::uint32_t word = 0;; ++word) {
-      if (word == words_.size()) words_.emplace_back(nodes_, 0);
-      std::vector<std::uint64_t>& sets = words_[word];
-      const std::uint64_t taken = sets[a] | sets[b];
+      const std::uint64_t taken = setOf(a, word) | setOf(b, word);
       if (taken == ~std::uint64_t{0}) continue;
       const auto bit = static_cast<std::uint32_t>(std::countr_one(taken));
-      sets[a] |= std::uint64_t{1} << bit;
-      sets[b] |= std::uint64_t{1} << bit;
+      for (const std::uint32_t node : {a, b})
+        (word == 0 ? first_[node] : others_[key(node, word)]) |= std::uint64_t{1} << bit;
       return 64 * word + bit;
     }
   }
 
  private:
-  std::uint32_t nodes_;
-  std::vector<std::vector<std::uint64_t>> words_;  // 64 colours per word, one word per node
+  static std::uint64_t key(std::uint32_t node, std::uint32_t word) {
+    return std::uint64_t{node} << 32 | word;
+  }
+  std::uint64_t setOf(std::uint32_t node, std::uint32_t word) const {
+    if (word == 0) return first_[node];
+    const auto found = others_.find(key(node, word));
+    return found == others_.end() ? 0 : found->second;
+  }
+
+  std::vector<std::uint64_t> first_;
+  std::unordered_map<std::uint64_t, std::uint64_t> others_;
 };
 
 SpringColours meshColours(const Mesh& mesh) {

@@ -24,6 +24,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <ranges>
+#include <tuple>
 #include <vector>
 
 #include "server/model/hinges.h"
@@ -32,15 +34,11 @@
 namespace clothstream::model {
 namespace {
 
-// Number of springs of each kind at a node, and 1 / mass.
-struct NodeSprings {
-  std::uint32_t structural, shear, bend;
-  double perMass;
+using NodeSprings = StabilityBound::NodeSprings;
 
-  bool sameCounts(const NodeSprings& other) const {
-    return structural == other.structural && shear == other.shear && bend == other.bend;
-  }
-};
+bool sameCounts(const NodeSprings& one, const NodeSprings& two) {
+  return one.structural == two.structural && one.shear == two.shear && one.bend == two.bend;
+}
 
 // Number of neighbours at a distance of `step` before and after an index.
 std::uint32_t neighbours(std::uint32_t index, std::uint32_t count, std::uint32_t step) {
@@ -51,7 +49,7 @@ std::uint32_t neighbours(std::uint32_t index, std::uint32_t count, std::uint32_t
 // only its combination.
 std::vector<NodeSprings> gridSprings(const Cloth& cloth) {
   const std::uint32_t rows = cloth.grid.rows, columns = cloth.grid.columns;
-  const double perMass = cloth.grid.nodeCount() / double{cloth.mass};
+  const double perMass = cloth.grid.nodeCount();
   const auto at = [&](std::uint32_t row, std::uint32_t column) -> NodeSprings {
     return {neighbours(row, rows, 1) + neighbours(column, columns, 1),
             neighbours(row, rows, 1) * neighbours(column, columns, 1),
@@ -62,18 +60,14 @@ std::vector<NodeSprings> gridSprings(const Cloth& cloth) {
   };
   const NodeSprings most{atMost(rows, 1) + atMost(columns, 1), atMost(rows, 1) * atMost(columns, 1),
                          atMost(rows, 2) + atMost(columns, 2), perMass};
-  const bool pinnedSingly =
-      !cloth.pinnedVertices.empty() || !cloth.pinnedRegions.empty() || !cloth.attachments.empty();
-  const std::vector<std::uint8_t> pinned = pinnedSingly ? pinnedNodes(cloth) : std::vector<std::uint8_t>();
+  const std::vector<std::uint8_t> pinned = pinnedNodes(cloth);
   std::vector<NodeSprings> found;
   for (std::uint32_t row = 0; row < rows; ++row)
     for (std::uint32_t column = 0; column < columns; ++column) {
+      if (pinned[row * columns + column] != 0) continue;
       const NodeSprings node = at(row, column);
-      if (std::ranges::any_of(found, [&](const NodeSprings& f) { return f.sameCounts(node); })) continue;
-      if (std::ranges::any_of(cloth.pins, [&](const GridRange& pins) { return pins.contains(row, column); }))
-        continue;
-      if (pinnedSingly && pinned[row * columns + column] != 0) continue;
-      if (node.sameCounts(most)) return {most};
+      if (std::ranges::any_of(found, [&](const NodeSprings& f) { return sameCounts(f, node); })) continue;
+      if (sameCounts(node, most)) return {most};
       found.push_back(node);
     }
   return found;
@@ -83,7 +77,7 @@ std::vector<NodeSprings> gridSprings(const Cloth& cloth) {
 std::vector<NodeSprings> meshSprings(const Cloth& cloth) {
   std::vector<NodeSprings> nodes;
   nodes.reserve(cloth.nodeCount());
-  for (const double mass : nodeMasses(cloth)) nodes.push_back({0, 0, 0, 1 / mass});
+  for (const double share : cloth.mesh->shares) nodes.push_back({0, 0, 0, 1 / share});
   for (const SpringLink& link : cloth.mesh->links)
     for (const std::uint32_t node : {link.a, link.b})
       ++(link.kind == SpringKind::structural ? nodes[node].structural
@@ -91,39 +85,38 @@ std::vector<NodeSprings> meshSprings(const Cloth& cloth) {
                                              : nodes[node].bend);
   const std::vector<std::uint8_t> pinned = pinnedNodes(cloth);
   std::vector<NodeSprings> found;
-  for (std::size_t i = 0; i < nodes.size(); ++i) {
-    if (pinned[i] != 0) continue;
-    const auto same =
-        std::ranges::find_if(found, [&](const NodeSprings& f) { return f.sameCounts(nodes[i]); });
-    if (same == found.end())
-      found.push_back(nodes[i]);
-    else
-      same->perMass = std::max(same->perMass, nodes[i].perMass);
-  }
+  for (std::size_t i = 0; i < nodes.size(); ++i)
+    if (pinned[i] == 0) found.push_back(nodes[i]);
+  // The lightest node of each combination comes first.
+  std::ranges::sort(found, {}, [](const NodeSprings& node) {
+    return std::tuple(node.structural, node.shear, node.bend, -node.perMass);
+  });
+  const auto others = std::ranges::unique(found, sameCounts);
+  found.erase(others.begin(), others.end());
   return found;
 }
 
-// Maximum area of a node divided by its mass, m^2/kg. A grid node has at most six triangles, each of half a
-// cell, and a third of each belongs to the node.
-double areaPerMass(const Cloth& cloth) {
+// Maximum area of a node divided by its share of the mass, m^2. A grid node has at most six triangles, each
+// of half a cell, and a third of each belongs to the node.
+double areaPerShare(const Cloth& cloth) {
   if (!cloth.mesh) {
     const GridSpacing lengths = spacing(cloth.grid);
-    return double{lengths.column} * lengths.row * cloth.grid.nodeCount() / cloth.mass;
+    return double{lengths.column} * lengths.row * cloth.grid.nodeCount();
   }
   double most = 0;
   for (std::size_t i = 0; i < cloth.mesh->areas.size(); ++i)
     most = std::max(most, cloth.mesh->areas[i] / cloth.mesh->shares[i]);
-  return most / cloth.mass;
+  return most;
 }
 
 // Maximum rate in 1/s at which air can slow a node. The force on a triangle is 0.5 rho (C_D |N.u| u + C_L
 // ...), a function of the mean velocity of its three nodes. The symmetric part of its derivative is at most
 // 0.5 rho (2 C_D + C_L) |N| |u|. Each node gets a third of it, so a row sums to 0.5 rho (2 C_D + C_L) |u|
 // area / m.
-double airDamping(const Cloth& cloth, const Environment& environment) {
+double airDamping(const Cloth& cloth, double areaPerShare, const Environment& environment) {
   const double gust = std::sqrt(3.0) * environment.gust.strength;
   const double speed = environment.wind.cast<double>().norm() + gust + kAirSpeed;
-  return 0.5 * environment.airDensity * (2.0 * cloth.drag + cloth.lift) * speed * areaPerMass(cloth);
+  return 0.5 * environment.airDensity * (2.0 * cloth.drag + cloth.lift) * speed * areaPerShare / cloth.mass;
 }
 
 // Whether semi-implicit Euler with step h is stable: s + 2c < 4.
@@ -163,39 +156,58 @@ bool explicitStable(const Cloth& cloth, const NodeSprings& node, double air, dou
          h * (2 * dashpots * node.perMass + cloth.damping + air) < 2;
 }
 
-// Minimum number of substeps, at least `atLeast`; 0 if no number is stable. Smaller steps only make the
-// criteria easier to meet. Constraints and the springs of implicit Euler are solved implicitly and set no
-// bound. Springs of xpbd are also damped implicitly.
-std::uint32_t stableSubsteps(const Scene& scene, Cloth cloth, std::uint32_t atLeast) {
+// The cloth as far as its solver integrates it explicitly. Constraints and the springs of implicit Euler are
+// solved implicitly and set no bound. Springs of xpbd are also damped implicitly.
+Cloth explicitPart(Cloth cloth) {
   if (isConstraint(cloth.solver, SpringKind::structural))
     cloth.structural.stiffness = cloth.shear.stiffness = 0;
   if (isConstraint(cloth.solver, SpringKind::bend)) cloth.bend.stiffness = 0;
   if (cloth.solver.kind == SolverKind::implicitEuler || cloth.solver.kind == SolverKind::xpbd)
     cloth.structural = cloth.shear = cloth.bend = {};
-  const double air = airDamping(cloth, scene.environment);
-  const double bending = cloth.dihedralBending > 0 ? cloth.dihedralBending * bendingRate(cloth) : 0;
-  const std::vector<NodeSprings> combinations = cloth.mesh ? meshSprings(cloth) : gridSprings(cloth);
-  const auto stable = scene.integrator == Integrator::semiImplicitEuler ? semiImplicitStable
-                      : scene.integrator == Integrator::rungeKutta4     ? rungeKuttaStable
-                                                                        : explicitStable;
-  for (std::uint32_t substeps = atLeast; substeps <= kMaxSubsteps; ++substeps) {
-    const double h = scene.tickSeconds() / substeps;
-    if (std::ranges::all_of(combinations,
-                            [&](const NodeSprings& node) { return stable(cloth, node, air, bending, h); }))
-      return substeps;
-  }
-  return 0;
+  return cloth;
 }
 
 }  // namespace
 
-std::uint32_t stableSubsteps(const Scene& scene) {
-  std::uint32_t substeps = 1;
+StabilityBound::StabilityBound(const Scene& scene) {
   for (const Cloth& cloth : scene.cloths) {
-    substeps = stableSubsteps(scene, cloth, substeps);
-    if (substeps == 0) return 0;
+    Cloth ofOneKilogram = cloth;
+    ofOneKilogram.mass = 1;
+    const bool mayBend =
+        scene.integrator == Integrator::semiImplicitEuler && cloth.nodeCount() <= kMaxBendingNodes;
+    cloths_.push_back({.nodes = cloth.mesh ? meshSprings(cloth) : gridSprings(cloth),
+                       .areaPerShare = areaPerShare(cloth),
+                       .bendingRate = mayBend ? bendingRate(ofOneKilogram) : 0});
+  }
+}
+
+std::uint32_t StabilityBound::substeps(const Scene& scene) const {
+  const auto stable = scene.integrator == Integrator::semiImplicitEuler ? semiImplicitStable
+                      : scene.integrator == Integrator::rungeKutta4     ? rungeKuttaStable
+                                                                        : explicitStable;
+  // Smaller steps only make the criteria easier to meet.
+  std::uint32_t substeps = 1;
+  for (std::size_t i = 0; i < cloths_.size(); ++i) {
+    const ClothBound& bound = cloths_[i];
+    const Cloth cloth = explicitPart(scene.cloths[i]);
+    const double air = airDamping(cloth, bound.areaPerShare, scene.environment);
+    const double bending = cloth.dihedralBending * bound.bendingRate / cloth.mass;
+    const auto stableAt = [&](double h) {
+      return std::ranges::all_of(bound.nodes, [&](NodeSprings node) {
+        node.perMass /= cloth.mass;
+        return stable(cloth, node, air, bending, h);
+      });
+    };
+    substeps = *std::ranges::partition_point(
+        std::views::iota(substeps, kMaxSubsteps + 1),
+        [&](std::uint32_t count) { return !stableAt(scene.tickSeconds() / count); });
+    if (substeps > kMaxSubsteps) return 0;
   }
   return substeps;
+}
+
+std::uint32_t stableSubsteps(const Scene& scene) {
+  return StabilityBound(scene).substeps(scene);
 }
 
 }  // namespace clothstream::model

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <vector>
 
 #include "server/model/scene.h"
 
@@ -17,11 +18,36 @@ inline constexpr float kAirSpeed = 10;
 // overstretched beyond it.
 inline constexpr float kTensionStrain = 0.1f;
 
-// Minimum number of substeps per tick, 1 to kMaxSubsteps, with which the scene's integrator is stable for
-// every cloth at the scene's simulation rate. 0 if kMaxSubsteps are not enough. For semi-implicit Euler this
-// is a bound, not an estimate: it holds for every shape of the cloth. The .cpp derives it with Gershgorin's
-// circle theorem for M^-1 K and M^-1 C. Explicit Euler always needs Cloth::damping too: dashpots act along
-// springs only, and motion across them is unstable.
+// Bound on the time step of the cloths of a scene. The constructor takes time linear in nodes, springs and
+// pins; substeps() only depends on the few kinds of nodes that it found, so parameters can be checked often.
+class StabilityBound {
+ public:
+  explicit StabilityBound(const Scene& scene);
+
+  // Minimum number of substeps per tick, 1 to kMaxSubsteps, with which the scene's integrator is stable for
+  // every cloth at the scene's simulation rate. 0 if kMaxSubsteps are not enough. `scene` is the scene of the
+  // constructor, whose parameters may have changed since. For semi-implicit Euler this is a bound, not an
+  // estimate: it holds for every shape of the cloth. The .cpp derives it with Gershgorin's circle theorem for
+  // M^-1 K and M^-1 C. Explicit Euler always needs Cloth::damping too: dashpots act along springs only, and
+  // motion across them is unstable.
+  std::uint32_t substeps(const Scene& scene) const;
+
+  // Number of springs of each kind at a node.
+  struct NodeSprings {
+    std::uint32_t structural, shear, bend;
+    double perMass;  // mass of the cloth divided by the mass of the lightest such node
+  };
+
+ private:
+  struct ClothBound {
+    std::vector<NodeSprings> nodes;  // every combination of counts at nodes that are not pinned
+    double areaPerShare;             // largest area of a node divided by its share of the mass, m^2
+    double bendingRate;              // bendingRate() of a cloth of 1 kg
+  };
+  std::vector<ClothBound> cloths_;
+};
+
+// StabilityBound(scene).substeps(scene).
 std::uint32_t stableSubsteps(const Scene& scene);
 
 }  // namespace clothstream::model

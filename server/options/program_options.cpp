@@ -38,6 +38,19 @@ struct Parsed {
   bool listDevices = false, listMaterials = false, printConfig = false, printMarkdown = false;
 };
 
+void addBudgetOptions(OptionTable& table, scene::BudgetLimits& budget) {
+  const NumberRange loads{.min = 0, .max = 1e6, .type = "LOAD"};
+  const NumberRange megabytes{.min = 0, .max = 1e9, .type = "MEGABYTES"};
+  table.number(
+      "--max-load", budget.load, loads,
+      "Seconds of the device's time a second that clients may take in all by creating scenes and changing "
+      "parameters, by estimate. 1 is all that the device has");
+  table.number("--max-scene-load", budget.sceneLoad, loads, "The same for one scene");
+  table.number("--max-memory", budget.megabytes, megabytes,
+               "Memory that clients may take in all by creating scenes and changing parameters, by estimate");
+  table.number("--max-scene-memory", budget.sceneMegabytes, megabytes, "The same for one scene");
+}
+
 void addSceneOptions(OptionTable& table, Parsed& parsed) {
   ProgramOptions& options = parsed.options;
   table.group("Scenes");
@@ -74,6 +87,9 @@ void addSceneOptions(OptionTable& table, Parsed& parsed) {
                "Start a new file when a recording reaches this many megabytes. 0 means no limit");
   table.number("--max-created-scenes", options.server.maxCreatedScenes, {.min = 0, .max = 1000},
                "Scenes that clients may create in addition. 0 allows none");
+  table.number("--max-scene-nodes", options.server.maxSceneNodes, {.min = 4, .max = 16'777'216},
+               "Nodes of a scene that clients create");
+  addBudgetOptions(table, options.server.budget);
   table.number("--encoder-threads", options.server.encoderThreads, kThreads,
                "CPU threads that predict large frames where the device does not. 0 means a quarter of the "
                "processors, at most 8");
@@ -118,8 +134,21 @@ void addNetworkOptions(OptionTable& table, ProgramOptions& options) {
   table.number("--port", options.port, kPort, "Port of the page and the WebSocket. 0 picks a free port");
   table.number("--grpc-port", options.grpcPort, kPort, "Port of gRPC. 0 picks a free port");
   table.text("--page", options.page, "DIR", "Directory of the page, instead of the one next to the program");
+  table.list(
+      "--public-name", options.publicNames, "NAME",
+      "Name under which browsers reach the page, such as cloth.example.org; may be repeated. Addresses, "
+      "localhost and the name of the machine are always allowed");
   table.list("--allow-origin", options.allowedOrigins, "ORIGIN",
              "Origin of another page that may connect, such as https://example.org; may be repeated");
+  table.number("--max-connections", options.maxConnections, {.min = 1, .max = 100'000},
+               "Connections to each port at a time");
+  table.number(
+      "--max-connections-per-address", options.maxConnectionsPerAddress, {.min = 1, .max = 100'000},
+      "Connections of one address to each port at a time. Programs on this machine have no such limit");
+  table.number("--connections-per-second", options.connectionsPerSecond, {.min = 1, .max = 1e6},
+               "New connections to each port per second, with a burst of as many");
+  table.number("--hello-timeout", options.server.helloTimeout, {.min = 1, .max = 30, .type = "SECONDS"},
+               "Seconds of silence after which a connection that has not joined a scene is closed");
 }
 
 void addDeviceOptions(OptionTable& table, ProgramOptions& options) {

@@ -45,7 +45,10 @@ struct ProgramOptions {
   std::string host = "127.0.0.1";
   std::uint16_t port = 8080, grpcPort = 50051;
   std::filesystem::path page;  // empty: the directory next to the program, if it exists
-  std::vector<std::string> allowedOrigins;
+  std::vector<std::string> publicNames, allowedOrigins;
+  // Of each endpoint.
+  std::uint32_t maxConnections = 256, maxConnectionsPerAddress = 64;
+  double connectionsPerSecond = 200;
 
   // Program.
   std::string logLevel = "info";

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <exception>
 #include <span>
 #include <utility>
 #include <vector>
@@ -22,6 +23,8 @@ using namespace std::chrono_literals;
 // Interval between checks for key-frame requests while playback is stopped.
 constexpr auto kLookAgain = 20ms;
 constexpr auto kAnnouncementPeriod = 1s;
+// Pause after a step that failed.
+constexpr auto kRetryPeriod = 1s;
 // Maximum delay that playback catches up; a longer delay shifts the schedule.
 constexpr auto kMaxLateness = 250ms;
 // Maximum number of messages per step, so that control requests are handled in between.
@@ -75,7 +78,14 @@ v1::ParameterChange Playback::parameters() const {
 
 void Playback::run(scene::LiveScene& scene) {
   for (;;) {
-    const std::optional<Clock::time_point> next = step(scene, Clock::now());
+    std::optional<Clock::time_point> next;
+    try {
+      next = step(scene, Clock::now());
+    } catch (const std::exception& failure) {
+      // Such as a lack of memory.
+      spdlog::error("{}: playing failed: {}; trying again", scene.name(), failure.what());
+      next = Clock::now() + kRetryPeriod;
+    }
     std::unique_lock lock(mutex_);
     const auto something = [&] { return woken_ || stopping_; };
     if (next)

@@ -4,6 +4,7 @@
 
 #include <chrono>
 #include <ctime>
+#include <exception>
 #include <utility>
 
 #include <fmt/chrono.h>
@@ -105,7 +106,11 @@ void Recorder::begin(const vulkan::DeviceInfo& device, const model::Scene& scene
   if (&start != &state) put(start, false, true);
   thread_ = std::thread(
       [this, name = scene.name, metadata = metadataOf(options_.serverName, device, scene, description)] {
-        run(name, metadata);
+        try {
+          run(name, metadata);
+        } catch (const std::exception& failure) {
+          fail(failure.what());
+        }
       });
 }
 

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "clothstream/v1/session.pb.h"
+#include "server/delivery/envelope.h"
 #include "server/encode/frame_encoder.h"
 #include "server/messages/client_message.h"
 #include "server/messages/description.h"
@@ -47,15 +48,17 @@ std::shared_ptr<const std::string> clothsOf(const v1::StreamDescription& descrip
 }  // namespace
 
 LiveScene::LiveScene(model::Scene definition, bool wasCreated, std::shared_ptr<Journal> kept,
-                     std::uint32_t most)
+                     std::uint32_t most, std::shared_ptr<Budget> budget)
     : created(wasCreated),
       maxParticipants(most),
       journal(std::move(kept)),
       subscribers(tapOf(journal)),
       roster(subscribers, inbox, journal.get()),
       start_(std::move(definition)),
+      stability_(start_),
       cloths_(std::make_shared<const std::string>(messages::clothsOfDescription(start_).SerializeAsString())),
-      definition_(start_) {}
+      definition_(start_),
+      charge_(budget ? std::move(budget) : std::make_shared<Budget>(), start_, !created) {}
 
 LiveScene::LiveScene(std::string name, std::shared_ptr<FrameSource> from, std::uint32_t most)
     : created(false),
@@ -63,8 +66,10 @@ LiveScene::LiveScene(std::string name, std::shared_ptr<FrameSource> from, std::u
       source(std::move(from)),
       roster(subscribers, inbox, nullptr),
       start_(nameAndRates(std::move(name), source->description())),
+      stability_(start_),
       cloths_(clothsOf(source->description())),
-      definition_(start_) {}
+      definition_(start_),
+      charge_(std::make_shared<Budget>(), start_, true) {}
 
 LiveScene::~LiveScene() {
   if (source) source->end();
@@ -75,24 +80,52 @@ model::Scene LiveScene::definition() const {
   return definition_;
 }
 
+messages::Result<void> LiveScene::charge() {
+  const std::lock_guard lock(mutex_);
+  return charge_.charge("createScene.scene", definition_);
+}
+
+model::Work LiveScene::tickWork(std::size_t colliders) const {
+  const std::lock_guard lock(mutex_);
+  return charge_.work(definition_, colliders);
+}
+
+void LiveScene::quarantine(const std::string& why) {
+  {
+    const std::lock_guard lock(mutex_);
+    quarantined_ = why;
+  }
+  roster.close(delivery::error(v1::ERROR_CODE_RESOURCE_EXHAUSTED, why, true));
+}
+
+std::string LiveScene::quarantined() const {
+  const std::lock_guard lock(mutex_);
+  return quarantined_;
+}
+
 messages::Result<void> LiveScene::change(std::uint64_t participant, const v1::ParameterChange& message) {
   if (source)
     return tl::unexpected(messages::FieldError{
         v1::ERROR_CODE_INVALID_ARGUMENT,
         "parameterChange: '" + name() + "' is a recording that is played; its parameters cannot be changed"});
   const std::lock_guard lock(mutex_);
-  messages::Result<model::ParameterChange> change = messages::toParameterChange(message, definition_);
+  messages::Result<model::ParameterChange> change =
+      messages::toParameterChange(message, definition_, stability_);
   if (!change) return tl::unexpected(std::move(change).error());
   model::Scene changed = definition_;
   model::applyChange(changed, *change);
+  if (const auto charged = charge_.charge("parameterChange", changed); !charged)
+    return tl::unexpected(charged.error());
   v1::ParameterChange announced = message;
   if (std::ranges::any_of(change->cloths,
                           [](const model::ClothChange& cloth) { return cloth.material.has_value(); }))
     *announced.mutable_cloths() = allParameters(changed).cloths();
-  if (!inbox.postChange({participant, *change, std::move(announced)}))
+  if (!inbox.postChange({participant, *change, std::move(announced)})) {
+    charge_.restore(definition_);
     return tl::unexpected(
         messages::FieldError{v1::ERROR_CODE_RESOURCE_EXHAUSTED,
                              "parameterChange: too many changes for one tick; send it again later"});
+  }
   definition_ = std::move(changed);
   description_.reset();
   return {};
@@ -116,6 +149,7 @@ v1::ParameterChange LiveScene::resetParameters() {
   inbox.keepColliderChanges();
   definition_.environment = start_.environment;
   definition_.cloths = start_.cloths;
+  charge_.restore(definition_);
   description_.reset();
   return allParameters(start_);
 }
@@ -124,6 +158,7 @@ v1::ParameterChange LiveScene::restart() {
   const std::lock_guard lock(mutex_);
   inbox.dropChanges();
   definition_ = start_;
+  charge_.restore(definition_);
   description_.reset();
   tick = 0;
   resetRequested = false;
@@ -134,6 +169,7 @@ v1::ParameterChange LiveScene::revertTo(const model::Scene& applied) {
   const std::lock_guard lock(mutex_);
   definition_ = applied;
   inbox.forEachChange([&](const model::ParameterChange& change) { model::applyChange(definition_, change); });
+  charge_.restore(definition_);
   description_.reset();
   return allParameters(applied);
 }

@@ -10,7 +10,10 @@
 
 #include "server/delivery/subscribers.h"
 #include "server/messages/field_error.h"
+#include "server/model/price.h"
 #include "server/model/scene.h"
+#include "server/model/stability.h"
+#include "server/scene/budget.h"
 #include "server/scene/defaults.h"
 #include "server/scene/frame_source.h"
 #include "server/scene/inbox.h"
@@ -25,10 +28,12 @@ class LiveScene {
  public:
   // A simulated scene. `definition` must be valid. `created`: a peer created it while the server runs.
   // `journal` gets everything that happens in the scene; it may be null. `maxParticipants` includes
-  // disconnected ones.
+  // disconnected ones. A created scene is charged to `budget` by charge(), other scenes only for changes;
+  // null means a budget of its own.
   explicit LiveScene(model::Scene definition, bool created = false,
                      std::shared_ptr<Journal> journal = nullptr,
-                     std::uint32_t maxParticipants = kDefaultMaxParticipants);
+                     std::uint32_t maxParticipants = kDefaultMaxParticipants,
+                     std::shared_ptr<Budget> budget = nullptr);
   // A scene that is not simulated. The caller starts the source. start() and definition() hold only name and
   // rates.
   LiveScene(std::string name, std::shared_ptr<FrameSource> source,
@@ -43,6 +48,17 @@ class LiveScene {
   delivery::StreamShape shape() const;
   // Definition with all accepted changes, those of the next tick included.
   model::Scene definition() const;
+
+  // Charges a created scene before it first runs, or returns why it exceeds the budget.
+  messages::Result<void> charge();
+  // Price of a tick with the accepted changes and this number of colliders.
+  model::Work tickWork(std::size_t colliders) const;
+
+  // Ends the scene for good because it harms others: `why` is the last message to its participants, and every
+  // later join is refused with it.
+  void quarantine(const std::string& why);
+  // Empty if the scene is not in quarantine.
+  std::string quarantined() const;
 
   // Puts the change into the inbox, or returns what is wrong with it.
   messages::Result<void> change(std::uint64_t participant, const v1::ParameterChange& message);
@@ -82,10 +98,13 @@ class LiveScene {
 
  private:
   const model::Scene start_;
+  const model::StabilityBound stability_;            // of start_
   const std::shared_ptr<const std::string> cloths_;  // part of all descriptions
 
   mutable std::mutex mutex_;
   model::Scene definition_;
+  Charge charge_;  // of definition_
+  std::string quarantined_;
   std::shared_ptr<const delivery::DescriptionChunks> description_;  // null after a change of the definition
   std::uint64_t contents_ = 0;                                      // newest content id
 };

@@ -78,7 +78,28 @@ void SceneHost::begin(Clock::time_point now) {
   }
   savesState_ = sinceHealthy_ > 0 && every(kSnapshotSeconds);
   if (savesState_) on.simulation.recordSaveState(on.recorder);
-  submitted_ = on.device.submit(on.recorder);
+  nextSlice_ = 0;
+  longestSlice_ = {};
+  submitSlice();
+}
+
+void SceneHost::submitSlice() {
+  submittedAt_ = Clock::now();
+  sliceInFlight_ = true;
+  submitted_ = onDevice_->device.submitSlice(onDevice_->recorder, nextSlice_++);
+}
+
+void SceneHost::waitForSlice(Clock::time_point deviceFree) {
+  if (!std::exchange(sliceInFlight_, false)) return;
+  onDevice_->device.wait(submitted_);
+  longestSlice_ = std::max(longestSlice_, Clock::now() - std::max(submittedAt_, deviceFree));
+}
+
+void SceneHost::adaptSlices() {
+  SceneOnDevice& on = *onDevice_;
+  const std::uint32_t slices = on.recorder.sliceCount();
+  const double scale = schedule::seconds(kSliceTime) / schedule::seconds(longestSlice_);
+  if (scale < 1 || slices > 1) on.scaleSlices(scale);
 }
 
 void SceneHost::beginJournal() {
@@ -296,7 +317,8 @@ void SceneHost::encodePausedFrame(Clock::time_point now) {
 
 void SceneHost::finish() {
   SceneOnDevice& on = *onDevice_;
-  on.device.wait(submitted_);
+  for (waitForSlice(); hasSlices(); waitForSlice()) submitSlice();
+  adaptSlices();
   const Clock::time_point done = Clock::now();
   status_ = on.simulation.status();
   ++tick_;

@@ -28,6 +28,10 @@ namespace clothstream::scene {
 // Belongs to the device's thread. A tick is begin(), then finish(); the device works between the two. Tick n
 // ends at the simulated time n / simulation rate. Tick numbers only grow, also after the state went back.
 //
+// A tick that takes longer than kSliceTime is submitted in slices of about this time, so that ticks of other
+// scenes can run in between, and so that it can be dropped: begin() submits the first slice, waitForSlice()
+// waits for it, and submitSlice() submits the next one as long as hasSlices().
+//
 // Recovery bounds the loss. Every second of healthy ticks a checkpoint is kept on the device; an unhealthy
 // state goes back to it. Every five seconds a snapshot is kept on the CPU; after a device loss the scene
 // continues from it. A state that becomes unhealthy twice within a second goes back to the scene's start,
@@ -36,6 +40,8 @@ class SceneHost {
  public:
   // Minimum interval between requested key frames of one quality. One key frame serves all subscribers.
   static constexpr std::chrono::milliseconds kKeyFrameInterval{100};
+
+  static constexpr std::chrono::milliseconds kSliceTime{10};
 
   // While the scene is recorded, at least one of this many frames is a key frame.
   static constexpr std::uint32_t kMaxKeyFrameDistance = 24;
@@ -49,9 +55,16 @@ class SceneHost {
             double reportRate);
   ~SceneHost();
 
-  // Drains the inbox, records the next tick and submits it. Throws vulkan::DeviceLost.
+  // Drains the inbox, records the next tick and submits its first slice. Throws vulkan::DeviceLost.
   void begin(Clock::time_point now);
-  // Waits for the tick, and hands its frame to the publisher. Throws vulkan::DeviceLost.
+  // Returns whether slices of the tick are not submitted yet.
+  bool hasSlices() const { return nextSlice_ < onDevice_->recorder.sliceCount(); }
+  // Waits for the submitted slice. The device was busy with other scenes until `deviceFree`. Throws
+  // vulkan::DeviceLost.
+  void waitForSlice(Clock::time_point deviceFree = {});
+  // Submits the next slice. Throws vulkan::DeviceLost.
+  void submitSlice();
+  // Runs the rest of the tick, and hands its frame to the publisher. Throws vulkan::DeviceLost.
   void finish();
 
   // While the scene is paused: encodes the present state as a key frame for subscribers that need one to
@@ -71,6 +84,8 @@ class SceneHost {
   // Newest complete tick, and its status.
   std::uint64_t tick() const { return tick_; }
   simulation::TickStatus status() const { return status_; }
+  // Colliders of the newest tick, those of participants included.
+  std::size_t colliders() const { return tickInputs_.colliders.size(); }
   // Returns whether the cloths were reset and no frame has shown it yet.
   bool owesFrame() const { return owesFrame_; }
 
@@ -97,6 +112,8 @@ class SceneHost {
   void recordFrame(Clock::time_point now);
   // Sets the fields of the current frame, except its report and state hash.
   void describeFrame(Clock::time_point start);
+  // Chooses the size of the slices of the next tick from those of this one.
+  void adaptSlices();
   void writeReport(double deviceSeconds);
   void announceEvents();
   void recover();
@@ -137,9 +154,13 @@ class SceneHost {
   Clock::time_point tickStart_{};
   std::array<Clock::time_point, codec::kMaxQualities> lastKeyFrame_{};
   std::uint32_t sinceKeyFrame_ = 0;  // frames of the finest quality
+  std::uint32_t nextSlice_ = 0;
+  bool sliceInFlight_ = false;
   vulkan::TimelineValue submitted_ = 0;
-  bool hasFrame_ = false;   // the current tick
-  bool hasReport_ = false;  // the current frame
+  Clock::time_point submittedAt_{};
+  Clock::duration longestSlice_{};  // of the current tick
+  bool hasFrame_ = false;           // the current tick
+  bool hasReport_ = false;          // the current frame
   bool owesFrame_ = false;
   std::uint64_t nextReport_ = 0;  // tick
   delivery::CompleteFrame frame_;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "server/scene/scene_on_device.h"
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <stdexcept>
@@ -9,18 +10,34 @@
 #include "server/scene/live_scene.h"
 
 namespace clothstream::scene {
+namespace {
+
+// Kernel invocations of a slice before its time was measured, with 10 to 20 ns each on two processors and the
+// least that a slice may have.
+constexpr double kFirstSlice = 1 << 19, kMinSlice = 1 << 12, kMaxSlice = 1e15;
+// A GPU is faster by at least this factor.
+constexpr double kGpuFactor = 64;
+
+}  // namespace
 
 SceneOnDevice::SceneOnDevice(vulkan::Device& device_, const model::Scene& scene, codec::Workers& workers,
                              const std::stop_token& stop)
     : device(device_),
       simulation(device_, scene),
       encoders(device_, simulation, encode::streamLayout(scene, LiveScene::kEpoch), &workers),
-      recorder(device_) {
+      recorder(device_),
+      sliceInvocations_(device_.isSoftware() ? kFirstSlice : kGpuFactor * kFirstSlice) {
+  recorder.sliceAfter(static_cast<std::uint64_t>(sliceInvocations_));
   recorder.begin();
   simulation.recordSaveState(recorder);
   submitAndWait();
   start = simulation.collectState(0);
   warmUp(scene, stop);
+}
+
+void SceneOnDevice::scaleSlices(double factor) {
+  sliceInvocations_ = std::clamp(sliceInvocations_ * std::clamp(factor, 0.5, 1.25), kMinSlice, kMaxSlice);
+  recorder.sliceAfter(static_cast<std::uint64_t>(sliceInvocations_));
 }
 
 void SceneOnDevice::submitAndWait() {

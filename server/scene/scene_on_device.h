@@ -27,7 +27,11 @@ struct SceneOnDevice {
   vulkan::Recorder recorder;
   simulation::StateSnapshot start;
 
+  // Makes the slices of the following recordings larger or smaller by about this factor.
+  void scaleSlices(double factor);
+
  private:
+  double sliceInvocations_;
   void submitAndWait();
   // Runs everything that a tick and a frame may need. Software devices compile a kernel when it first runs,
   // which takes up to tenths of a second. Leaves the start state.

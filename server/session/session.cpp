@@ -2,6 +2,7 @@
 #include "server/session/session.h"
 
 #include <algorithm>
+#include <exception>
 #include <utility>
 
 #include <fmt/format.h>
@@ -62,10 +63,16 @@ void Session::receive(std::span<const std::byte> bytes) {
   now_ = now;
   requestId_ = 0;
   if (!allowed(messageRate_, "messages")) return;
-  const messages::Result<v1::ClientMessage> message = messages::parseClientMessage(bytes);
-  if (!message) return refuse(message.error(), kMalformedCost);
-  requestId_ = message->request_id();
-  dispatch(*message, now);
+  try {
+    const messages::Result<v1::ClientMessage> message = messages::parseClientMessage(bytes);
+    if (!message) return refuse(message.error(), kMalformedCost);
+    requestId_ = message->request_id();
+    dispatch(*message, now);
+  } catch (const std::exception& failure) {
+    // Such as a lack of memory. It must end neither the thread of the endpoint nor other sessions.
+    spdlog::error("{}: a message failed: {}", peer_, failure.what());
+    fail(v1::ERROR_CODE_RESOURCE_EXHAUSTED, "the server could not handle the message; try again later");
+  }
 }
 
 template <typename Response>
@@ -194,6 +201,8 @@ void Session::hello(const v1::Hello& message) {
     const v1::Error error = server_.noSuchScene(joining->scene);
     return fail(error.code(), error.text());
   }
+  if (const std::string why = scene->quarantined(); !why.empty())
+    return fail(v1::ERROR_CODE_RESOURCE_EXHAUSTED, why);
   // All subscribers share one stream, which has one codec.
   if (std::ranges::find(message.codecs(), scene->codec()) == message.codecs().end())
     return fail(
@@ -206,7 +215,7 @@ void Session::hello(const v1::Hello& message) {
                                        .attempt = message.attempt()},
                                       mailbox_, server_.participants, scene->maxParticipants, now_);
   if (!admission && admission.error() == scene::Roster::Refusal::closed)
-    return fail(v1::ERROR_CODE_NOT_FOUND, fmt::format("'{}' was just deleted", scene->name()));
+    return fail(v1::ERROR_CODE_NOT_FOUND, fmt::format("'{}' was just closed", scene->name()));
   if (!admission && admission.error() == scene::Roster::Refusal::late)
     return fail(v1::ERROR_CODE_TAKEN_OVER, "this participant has a newer connection");
   if (!admission)
@@ -341,14 +350,19 @@ void Session::leave() {
 
 void Session::checkSilence(Clock::time_point now) {
   // A mailbox without room, which the scene's subscribers closed, is noticed here too.
-  const bool silent = now - lastHeard_.load() > server_.options.silence;
-  if (!silent && !mailbox_->closed()) return;
+  const hosting::ServerOptions& options = server_.options;
+  const std::chrono::milliseconds beforeHello = std::min(options.helloTimeout, options.silence);
+  const Clock::duration silence = now - lastHeard_.load();
+  if (silence <= beforeHello && !mailbox_->closed()) return;
   const std::lock_guard lock(mutex_);
+  const std::chrono::milliseconds allowed = scene_ ? options.silence : beforeHello;
+  if (silence <= allowed && !mailbox_->closed()) return;
   now_ = now;
   if (!mailbox_->closed()) {
     server_.metrics.droppedConnections.add();
-    const std::string text = fmt::format("the client was silent for {} s: acknowledge frames, or send pings",
-                                         schedule::seconds(server_.options.silence));
+    const std::string text =
+        fmt::format("the client was silent for {} s: {}", schedule::seconds(allowed),
+                    scene_ ? "acknowledge frames, or send pings" : "send hello soon after connecting");
     spdlog::info("{}: disconnected: {}", peer_, text);
     mailbox_->close(delivery::error(v1::ERROR_CODE_CUT_OFF, text, true));
   }

@@ -55,17 +55,21 @@ std::uint32_t solveWorkgroup(const vulkan::Device& device, std::uint32_t wanted)
   return std::bit_floor(std::min({wanted, kSolveLanes, device.limits().maxWorkgroupInvocations}));
 }
 
+// Nodes times iterations that one workgroup computes in about 10 ms. A dispatch cannot be cut into slices.
+constexpr std::uint32_t kSoftwareDispatch = 1 << 18, kGpuDispatch = 1 << 20;
+
 // lavapipe allows an invocation 65,535 loop rounds, over all loops together. Beyond that it ends each loop
 // after one round.
 std::uint32_t iterationsPerDispatch(const vulkan::Device& device, const SolveGroup& group,
                                     std::uint32_t listed, std::uint32_t workgroup) {
-  if (!device.isSoftware()) return ~0u;
+  const std::uint32_t nodes = std::max(1u, group.smallChunks * kSolveLanes);
+  if (!device.isSoftware()) return std::max(1u, kGpuDispatch / nodes);
   const std::uint32_t tree = 2 * kSolveLanes / workgroup + 16;
   const std::uint32_t walks = kSolveLanes / workgroup;
   const std::uint32_t walk = group.mesh ? CLOTHSTREAM_SOLVE_WALK * (listed + 2) + 2 : 1;
   const std::uint32_t chunk = walks * (walk + 2) + tree;
   const std::uint32_t iteration = group.smallChunks * (chunk + 2) + tree + group.smallChunks;
-  return std::max(1u, (65'535 - 2 * iteration) / iteration);
+  return std::max(1u, std::min((65'535 - 2 * iteration) / iteration, kSoftwareDispatch / nodes));
 }
 
 }  // namespace
@@ -325,7 +329,8 @@ void SolveStage::Systems::recordPrepare(vulkan::Recorder& recorder, const Group&
   }
   recorder.dispatch(group.check[from], push, all);
   recorder.barrier();
-  recorder.dispatchIndirect(group.prepare[from], push, groupSizes, group.firstSize * sizeof(std::uint32_t));
+  recorder.dispatchIndirect(group.prepare[from], push, groupSizes, group.firstSize * sizeof(std::uint32_t),
+                            all);
 }
 
 void SolveStage::Systems::recordSmall(vulkan::Recorder& recorder, const Group& group,
@@ -334,14 +339,16 @@ void SolveStage::Systems::recordSmall(vulkan::Recorder& recorder, const Group& g
   for (std::uint32_t first = 0; first < group.on.iterations;) {
     const std::uint32_t end = first + std::min(group.iterationsPerDispatch, group.on.iterations - first);
     recorder.barrier();
-    recorder.dispatchIndirect(group.whole[from],
-                              shared::SolvePush{.nodes = nodes,
-                                                .firstSystem = group.on.firstSystem,
-                                                .firstIteration = first,
-                                                .endIteration = end,
-                                                .firstChunk = 0,
-                                                .nextGroup = 0},
-                              groupSizes, (group.firstSize + kSmallSystems) * sizeof(std::uint32_t));
+    recorder.dispatchIndirect(
+        group.whole[from],
+        shared::SolvePush{.nodes = nodes,
+                          .firstSystem = group.on.firstSystem,
+                          .firstIteration = first,
+                          .endIteration = end,
+                          .firstChunk = 0,
+                          .nextGroup = 0},
+        groupSizes, (group.firstSize + kSmallSystems) * sizeof(std::uint32_t),
+        std::uint64_t{group.on.smallSystems} * group.on.smallChunks * kSolveLanes * (end - first));
     first = end;
   }
 }
@@ -353,6 +360,7 @@ void SolveStage::Systems::recordLarge(vulkan::Recorder& recorder, const Group& g
   const auto number = [&](std::uint32_t iteration) {
     return group.firstSize + kIteration + kSize * iteration;
   };
+  const std::uint64_t most = std::uint64_t{on.endChunk - on.firstLargeChunk} * workgroup;
   shared::SolvePush push{.nodes = nodes,
                          .firstSystem = 0,
                          .firstIteration = 0,
@@ -363,13 +371,13 @@ void SolveStage::Systems::recordLarge(vulkan::Recorder& recorder, const Group& g
     const std::size_t size = number(iteration) * sizeof(std::uint32_t);
     push.nextGroup = number(iteration + 1);
     recorder.barrier();
-    recorder.dispatchIndirect(group.multiply[from], push, groupSizes, size);
+    recorder.dispatchIndirect(group.multiply[from], push, groupSizes, size, most);
     recorder.barrier();
-    recorder.dispatchIndirect(group.update[from], push, groupSizes, size);
+    recorder.dispatchIndirect(group.update[from], push, groupSizes, size, most);
   }
   recorder.barrier();
   recorder.dispatchIndirect(group.measure[from], push, groupSizes,
-                            number(on.iterations) * sizeof(std::uint32_t));
+                            number(on.iterations) * sizeof(std::uint32_t), most);
 }
 
 void SolveStage::record(vulkan::Recorder& recorder, std::uint32_t from,
@@ -389,12 +397,12 @@ void SolveStage::record(vulkan::Recorder& recorder, std::uint32_t from,
                                  .reserved = 0};
     recorder.barrier();
     // Nodes that ACAD leaves alone stay in place, unless they may collide.
+    const std::uint64_t threads = std::uint64_t{group.on.endChunk - group.on.firstChunk} * all.workgroup;
     if (isAdaptive(group.on) && collision.colliderCount == 0)
       recorder.dispatchIndirect(group.apply[from], push, all.groupSizes,
-                                group.firstSize * sizeof(std::uint32_t));
+                                group.firstSize * sizeof(std::uint32_t), threads);
     else
-      recorder.dispatch(group.apply[from], push,
-                        std::uint64_t{group.on.endChunk - group.on.firstChunk} * all.workgroup);
+      recorder.dispatch(group.apply[from], push, threads);
   }
 }
 

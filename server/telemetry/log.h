@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Configures spdlog's default logger, which writes lines to standard error.
+// Configures spdlog's default logger, which writes lines to standard error. Control characters in a message
+// are written as \\xNN.
 #pragma once
 
 #include <string>

@@ -62,7 +62,8 @@ std::string table(const ServerMetrics& m) {
                      {"refused", m.refusedConnections.value()},
                      {"dropped", m.droppedConnections.value()},
                      {"rejected messages", m.rejectedMessages.value()},
-                     {"device rebuilds", m.deviceRebuilds.value()}});
+                     {"device rebuilds", m.deviceRebuilds.value()},
+                     {"scenes in quarantine", m.quarantines.value()}});
   return text;
 }
 

@@ -56,6 +56,7 @@ struct ServerMetrics {
   Counter droppedConnections;  // connections closed because they were silent, too slow or abusive
   Counter rejectedMessages;    // messages answered by an Error before the client joined
   Counter deviceRebuilds;
+  Counter quarantines;  // scenes stopped because they harmed others
 };
 
 // One line per histogram (count, p50, p90, p99 and maximum in milliseconds), then lines of counters.

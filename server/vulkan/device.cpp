@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cassert>
 #include <cstring>
 #include <fstream>
 #include <iterator>
@@ -155,17 +156,31 @@ Device::~Device() {
 
 TimelineValue Device::submit(Recorder& recorder) {
   recorder.finish();
-  const vk::CommandBuffer commands = *recorder.handles().commands;
+  return submit(recorder, 0, recorder.sliceCount());
+}
+
+TimelineValue Device::submitSlice(Recorder& recorder, std::uint32_t slice) {
+  recorder.finish();
+  assert(slice < recorder.sliceCount());
+  return submit(recorder, slice, slice + 1);
+}
+
+TimelineValue Device::submit(const Recorder& recorder, std::uint32_t first, std::uint32_t end) {
+  Recorder::Handles& recording = recorder.handles();
+  recording.submitted.clear();
+  for (std::uint32_t slice = first; slice < end; ++slice)
+    recording.submitted.push_back(*recording.slices[slice]);
   const std::lock_guard lock(submitting_);
   const TimelineValue value = submitted_ + 1;
   const vk::TimelineSemaphoreSubmitInfo timeline{.signalSemaphoreValueCount = 1,
                                                  .pSignalSemaphoreValues = &value};
   try {
-    handles_->queue.submit(vk::SubmitInfo{.pNext = &timeline,
-                                          .commandBufferCount = 1,
-                                          .pCommandBuffers = &commands,
-                                          .signalSemaphoreCount = 1,
-                                          .pSignalSemaphores = &*handles_->timeline});
+    handles_->queue.submit(
+        vk::SubmitInfo{.pNext = &timeline,
+                       .commandBufferCount = static_cast<std::uint32_t>(recording.submitted.size()),
+                       .pCommandBuffers = recording.submitted.data(),
+                       .signalSemaphoreCount = 1,
+                       .pSignalSemaphores = &*handles_->timeline});
   } catch (const vk::DeviceLostError&) {
     throw DeviceLost(kLost);
   }
@@ -190,6 +205,10 @@ void Device::drain() {
     last = submitted_;
   }
   wait(last);
+}
+
+std::uint64_t Device::allocatedBytes() const {
+  return handles_->allocatedBytes;
 }
 
 TimelineValue Device::completed() const {

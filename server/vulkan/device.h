@@ -87,6 +87,8 @@ class Device {
   // Submits a finished recording to the queue. Returns the timeline value that is reached when it is done.
   // The recorder must not begin again before that. Submissions of one thread run in order. Throws DeviceLost.
   TimelineValue submit(Recorder& recorder);
+  // Submits one slice of a recording. The slices must be submitted in order, each once.
+  TimelineValue submitSlice(Recorder& recorder, std::uint32_t slice);
 
   // Returns false on timeout. Throws DeviceLost.
   bool wait(TimelineValue value, std::chrono::nanoseconds timeout = std::chrono::nanoseconds::max()) const;
@@ -101,11 +103,16 @@ class Device {
   // Bytes of pipeline cache that were loaded from DeviceOptions::cacheDirectory.
   std::size_t pipelineCacheLoaded() const { return pipelineCacheLoaded_; }
 
+  // Memory of all buffers on the device, in bytes.
+  std::uint64_t allocatedBytes() const;
+
   // Only for this folder (handles.h).
   struct Handles;
   const Handles& handles() const { return *handles_; }
 
  private:
+  TimelineValue submit(const Recorder& recorder, std::uint32_t first, std::uint32_t end);
+
   std::unique_ptr<Handles> handles_;
   std::size_t pipelineCacheLoaded_ = 0;
   std::mutex submitting_;  // guards the queue and submitted_

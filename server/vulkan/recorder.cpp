@@ -30,11 +30,6 @@ Recorder::Recorder(const Device& device) : device_(&device), handles_(std::make_
   const vk::raii::Device& vulkan = device.handles().device;
   handles_->pool = vk::raii::CommandPool(
       vulkan, vk::CommandPoolCreateInfo{.queueFamilyIndex = device.handles().queueFamily});
-  vk::raii::CommandBuffers all(vulkan,
-                               vk::CommandBufferAllocateInfo{.commandPool = *handles_->pool,
-                                                             .level = vk::CommandBufferLevel::ePrimary,
-                                                             .commandBufferCount = 1});
-  handles_->commands = std::move(all.front());
   const std::uint32_t bits =
       device.handles().physical.getQueueFamilyProperties()[device.handles().queueFamily].timestampValidBits;
   if (bits > 0)
@@ -46,13 +41,46 @@ Recorder::Recorder(const Device& device) : device_(&device), handles_(std::make_
   times_.reserve(kMaxStages);
 }
 
+std::uint32_t Recorder::sliceCount() const {
+  return handles_->used;
+}
+
 void Recorder::begin() {
   handles_->pool.reset();
-  handles_->commands.begin(vk::CommandBufferBeginInfo{});
-  if (*handles_->timestamps) handles_->commands.resetQueryPool(*handles_->timestamps, 0, kMaxMarks + 1);
+  handles_->used = 0;
+  beginSlice();
+  if (*handles_->timestamps) handles_->current().resetQueryPool(*handles_->timestamps, 0, kMaxMarks + 1);
   marks_.clear();
   open_ = true;
   rehearses_ = false;
+}
+
+void Recorder::beginSlice() {
+  if (handles_->used == handles_->slices.size()) {
+    vk::raii::CommandBuffers all(device_->handles().device,
+                                 vk::CommandBufferAllocateInfo{.commandPool = *handles_->pool,
+                                                               .level = vk::CommandBufferLevel::ePrimary,
+                                                               .commandBufferCount = 1});
+    handles_->slices.push_back(std::move(all.front()));
+  }
+  ++handles_->used;
+  invocations_ = 0;
+  handles_->current().begin(vk::CommandBufferBeginInfo{});
+}
+
+void Recorder::endSlice() {
+  const vk::MemoryBarrier memory{.srcAccessMask = kWrites, .dstAccessMask = kUses | Access::eHostRead};
+  handles_->current().pipelineBarrier(kWork, kWork | Stage::eDrawIndirect | Stage::eHost, {}, memory, nullptr,
+                                      nullptr);
+  handles_->current().end();
+}
+
+void Recorder::count(std::uint64_t invocations) {
+  if (invocations_ > 0 && invocations_ + invocations > sliceInvocations_) {
+    endSlice();
+    beginSlice();
+  }
+  invocations_ += invocations;
 }
 
 void Recorder::beginRehearsal() {
@@ -74,8 +102,8 @@ void Recorder::beginStage(std::string_view stage) {
 
 void Recorder::mark() {
   if (*handles_->timestamps)
-    handles_->commands.writeTimestamp(Stage::eBottomOfPipe, *handles_->timestamps,
-                                      static_cast<std::uint32_t>(marks_.size()));
+    handles_->current().writeTimestamp(Stage::eBottomOfPipe, *handles_->timestamps,
+                                       static_cast<std::uint32_t>(marks_.size()));
 }
 
 void Recorder::dispatchBytes(const Bindings& bindings, const void* push, std::uint32_t pushBytes,
@@ -90,47 +118,49 @@ void Recorder::dispatchBytes(const Bindings& bindings, const void* push, std::ui
         "kernel {}: {} invocations are {} workgroups of {}, more than the {} that {} runs at once; make the "
         "workgroups larger or the invocations fewer",
         kernel.name(), threads, groups, kernel.workgroupSize(), most, device_->info().name));
+  count(threads);
   bind(bindings, push, pushBytes);
-  handles_->commands.dispatch(static_cast<std::uint32_t>(groups), 1, 1);
+  handles_->current().dispatch(static_cast<std::uint32_t>(groups), 1, 1);
 }
 
 void Recorder::dispatchIndirectBytes(const Bindings& bindings, const void* push, std::uint32_t pushBytes,
-                                     const Buffer& groups, std::size_t offset) {
+                                     const Buffer& groups, std::size_t offset, std::uint64_t most) {
   assert(offset % 4 == 0 && offset + sizeof(VkDispatchIndirectCommand) <= groups.bytes());
   if (rehearses_) return note(bindings);
+  count(most);
   bind(bindings, push, pushBytes);
-  handles_->commands.dispatchIndirect(*groups.handles().buffer, offset);
+  handles_->current().dispatchIndirect(*groups.handles().buffer, offset);
 }
 
 void Recorder::touch(const Bindings& bindings) {
   const std::vector<std::byte> push(bindings.kernel().pushConstantBytes());
   bind(bindings, push.data(), bindings.kernel().pushConstantBytes());
-  handles_->commands.dispatch(0, 1, 1);
+  handles_->current().dispatch(0, 1, 1);
 }
 
 void Recorder::bind(const Bindings& bindings, const void* push, std::uint32_t pushBytes) {
   const Kernel& kernel = bindings.kernel();
   assert(open_ && pushBytes == kernel.pushConstantBytes());
-  handles_->commands.bindPipeline(vk::PipelineBindPoint::eCompute, *kernel.handles().pipeline);
+  handles_->current().bindPipeline(vk::PipelineBindPoint::eCompute, *kernel.handles().pipeline);
   if (*bindings.handles().set)
-    handles_->commands.bindDescriptorSets(vk::PipelineBindPoint::eCompute, *kernel.handles().layout, 0,
-                                          *bindings.handles().set, nullptr);
+    handles_->current().bindDescriptorSets(vk::PipelineBindPoint::eCompute, *kernel.handles().layout, 0,
+                                           *bindings.handles().set, nullptr);
   if (pushBytes > 0)
-    handles_->commands.pushConstants<std::byte>(*kernel.handles().layout, vk::ShaderStageFlagBits::eCompute,
-                                                0, {pushBytes, static_cast<const std::byte*>(push)});
+    handles_->current().pushConstants<std::byte>(*kernel.handles().layout, vk::ShaderStageFlagBits::eCompute,
+                                                 0, {pushBytes, static_cast<const std::byte*>(push)});
 }
 
 void Recorder::barrier() {
   assert(open_);
   const vk::MemoryBarrier memory{.srcAccessMask = kWrites, .dstAccessMask = kUses};
-  handles_->commands.pipelineBarrier(kWork, kWork | Stage::eDrawIndirect, {}, memory, nullptr, nullptr);
+  handles_->current().pipelineBarrier(kWork, kWork | Stage::eDrawIndirect, {}, memory, nullptr, nullptr);
 }
 
 void Recorder::copy(const Buffer& from, const Buffer& to, std::size_t bytes, std::size_t fromOffset,
                     std::size_t toOffset) {
   assert(open_ && fromOffset + bytes <= from.bytes() && toOffset + bytes <= to.bytes());
   if (bytes == 0) return;
-  handles_->commands.copyBuffer(
+  handles_->current().copyBuffer(
       *from.handles().buffer, *to.handles().buffer,
       vk::BufferCopy{.srcOffset = fromOffset, .dstOffset = toOffset, .size = bytes});
 }
@@ -138,16 +168,13 @@ void Recorder::copy(const Buffer& from, const Buffer& to, std::size_t bytes, std
 void Recorder::fill(const Buffer& buffer, std::uint32_t value, std::size_t bytes, std::size_t offset) {
   assert(open_ && bytes % 4 == 0 && offset % 4 == 0 && offset + bytes <= buffer.bytes());
   if (bytes == 0) return;
-  handles_->commands.fillBuffer(*buffer.handles().buffer, offset, bytes, value);
+  handles_->current().fillBuffer(*buffer.handles().buffer, offset, bytes, value);
 }
 
 void Recorder::finish() {
   if (!open_) return;
   if (!marks_.empty()) mark();
-  const vk::MemoryBarrier memory{.srcAccessMask = kWrites, .dstAccessMask = kUses | Access::eHostRead};
-  handles_->commands.pipelineBarrier(kWork, kWork | Stage::eDrawIndirect | Stage::eHost, {}, memory, nullptr,
-                                     nullptr);
-  handles_->commands.end();
+  endSlice();
   open_ = false;
 }
 

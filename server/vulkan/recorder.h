@@ -20,7 +20,7 @@ struct StageTime {
   double seconds = 0;
 };
 
-// A reusable command buffer with its timestamps. Belongs to one thread at a time. Allocates no memory after
+// Reusable command buffers with their timestamps. Belongs to one thread at a time. Allocates no memory after
 // its longest recording.
 class Recorder {
  public:
@@ -29,7 +29,13 @@ class Recorder {
   Recorder(Recorder&&) noexcept;
   Recorder& operator=(Recorder&&) noexcept;
 
-  // Clears the recording. An earlier submission must be complete.
+  // Divides recordings, from the next begin() on, into slices that can be submitted one by one, so that other
+  // work can run between them. A slice ends before the first dispatch that would exceed `invocations` in all,
+  // and has one dispatch at least. By default a recording has one slice.
+  void sliceAfter(std::uint64_t invocations) { sliceInvocations_ = invocations; }
+  std::uint32_t sliceCount() const;
+
+  // Clears the recording. Earlier submissions of all its slices that were submitted must be complete.
   void begin();
 
   // Begins a rehearsal: the following dispatches do not run; their kernels are noted.
@@ -59,12 +65,12 @@ class Recorder {
   }
 
   // Runs as many workgroups as three 32-bit numbers (x, y, z) in `groups` say at run time. `groups` must be a
-  // buffer with purpose `indirect`.
+  // buffer with purpose `indirect`. `most` is the number of invocations that slices count for it.
   template <typename Push>
-  void dispatchIndirect(const Bindings& bindings, const Push& push, const Buffer& groups,
-                        std::size_t offset = 0) {
+  void dispatchIndirect(const Bindings& bindings, const Push& push, const Buffer& groups, std::size_t offset,
+                        std::uint64_t most) {
     static_assert(std::is_trivially_copyable_v<Push>);
-    dispatchIndirectBytes(bindings, &push, sizeof(Push), groups, offset);
+    dispatchIndirectBytes(bindings, &push, sizeof(Push), groups, offset, most);
   }
 
   // Makes earlier work (kernels, copies, fills, dispatch sizes) visible to later work. No barrier is needed
@@ -84,13 +90,17 @@ class Recorder {
   // recordings.
   void finish();
   struct Handles;
-  const Handles& handles() const { return *handles_; }
+  Handles& handles() const { return *handles_; }
 
  private:
   void dispatchBytes(const Bindings& bindings, const void* push, std::uint32_t pushBytes,
                      std::uint64_t threads);
   void dispatchIndirectBytes(const Bindings& bindings, const void* push, std::uint32_t pushBytes,
-                             const Buffer& groups, std::size_t offset);
+                             const Buffer& groups, std::size_t offset, std::uint64_t most);
+  // Counts a dispatch, and ends the slice before it if it is full.
+  void count(std::uint64_t invocations);
+  void beginSlice();
+  void endSlice();
   void note(const Bindings& bindings);
   void bind(const Bindings& bindings, const void* push, std::uint32_t pushBytes);
   void mark();
@@ -102,6 +112,7 @@ class Recorder {
   std::vector<std::uint64_t> ticks_;
   std::vector<StageTime> times_;
   std::vector<const Bindings*> rehearsed_;
+  std::uint64_t sliceInvocations_ = ~std::uint64_t{0}, invocations_ = 0;  // limit, and of the current slice
   bool open_ = false, rehearses_ = false;
 };
 

@@ -47,6 +47,8 @@ constexpr std::array kSuites{
                  &bench::runCodec},
     bench::Suite{"codec_device", "cost of key and predicted frames of a hung cloth on the device",
                  &bench::runCodecDevice},
+    bench::Suite{"price", "the computed price of a tick, and the measured tick, for every solver",
+                 &bench::runPrice},
 };
 
 }  // namespace

@@ -56,5 +56,6 @@ Rows runColliders(vulkan::Device& device, const Settings& settings);
 Rows runSelfCollision(vulkan::Device& device, const Settings& settings);
 Rows runCodec(vulkan::Device& device, const Settings& settings);
 Rows runCodecDevice(vulkan::Device& device, const Settings& settings);
+Rows runPrice(vulkan::Device& device, const Settings& settings);
 
 }  // namespace clothstream::bench

@@ -2,9 +2,11 @@
 // Tests of the gRPC endpoint only: unary calls, health checks, reflection, statuses.
 #include "server/endpoint/grpc/grpc_endpoint.h"
 
+#include <atomic>
 #include <chrono>
 #include <cstddef>
 #include <memory>
+#include <thread>
 #include <vector>
 
 #include <fmt/format.h>
@@ -17,6 +19,7 @@
 
 #include "clothstream/v1/session.grpc.pb.h"
 #include "grpc/health/v1/health.pb.h"
+#include "server/endpoint/grpc/call_rate.h"
 #include "tests/endpoint/rpc_client.h"
 #include "tests/endpoint/small_server.h"
 
@@ -227,6 +230,84 @@ TEST_F(GrpcEndpoint, ClosesConnectionThatDoesNotAnswerPingsWithinFiveSeconds) {
   EXPECT_LE(received, 0) << "still open";
   EXPECT_LT(std::chrono::steady_clock::now() - from, std::chrono::seconds(5));
   ::close(socket);
+}
+
+TEST(CallRateTest, LimitsCallsOfAnAddressWithoutItsPort) {
+  endpoint::CallRate rate;
+  const schedule::Clock::time_point now{std::chrono::hours(1)};
+  const auto callsAllowed = [&](const std::string& peer) {
+    int calls = 0;
+    while (calls < 1000 && rate.take(peer, now)) ++calls;
+    return calls;
+  };
+  constexpr int kAtOnce = 2 * static_cast<int>(endpoint::CallRate::kCallsPerSecond);
+  EXPECT_EQ(callsAllowed("ipv4:192.0.2.1:50000"), kAtOnce);
+  EXPECT_EQ(callsAllowed("ipv4:192.0.2.1:50001"), 0);
+  EXPECT_EQ(callsAllowed("ipv4:192.0.2.2:50000"), kAtOnce);
+  EXPECT_EQ(callsAllowed("ipv6:%5B2001:db8::1%5D:50000"), kAtOnce);
+  EXPECT_EQ(callsAllowed("ipv6:%5B2001:db8::2%5D:50001"), 0) << "the same first 64 bits";
+  EXPECT_TRUE(rate.take("ipv4:192.0.2.1:50000", now + std::chrono::seconds(1)));
+}
+
+TEST_F(GrpcEndpoint, RefusesTooManyCalls) {
+  const auto stub = v1::ClothStream::NewStub(channelTo(port()));
+  std::atomic<bool> refused = false;
+  std::vector<std::jthread> callers;
+  for (int i = 0; i < 8; ++i)
+    callers.emplace_back([&] {
+      for (int calls = 0; calls < 1000 && !refused; ++calls) {
+        grpc::ClientContext context;
+        v1::ListScenesResponse response;
+        const grpc::Status status = stub->ListScenes(&context, {}, &response);
+        if (status.ok()) continue;
+        EXPECT_EQ(status.error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
+        EXPECT_EQ(status.error_message(), "too many calls: try again in a second");
+        refused = true;
+      }
+    });
+  callers.clear();
+  EXPECT_TRUE(refused);
+  Joined viewer = join();
+  EXPECT_TRUE(viewer.see(2));
+}
+
+TEST_F(GrpcEndpoint, RefusesSilentConnectionsBeyondLimitAndFreesTheirPlaces) {
+  endpoint::GrpcEndpointOptions options;
+  options.maxStreams = 1;
+  open(options);
+  Joined viewer = join();
+  const auto connect = [&] {
+    const int socket = ::socket(AF_INET, SOCK_STREAM, 0);
+    sockaddr_in to{};
+    to.sin_family = AF_INET;
+    to.sin_port = htons(port());
+    to.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    EXPECT_EQ(::connect(socket, reinterpret_cast<const sockaddr*>(&to), sizeof to), 0);
+    return socket;
+  };
+  // gRPC greets an accepted connection with a SETTINGS frame; a refused one is closed.
+  const auto isAccepted = [](int socket) {
+    pollfd readable{socket, POLLIN, 0};
+    char byte;
+    return ::poll(&readable, 1, 20'000) == 1 && ::recv(socket, &byte, 1, MSG_PEEK) == 1;
+  };
+  std::vector<int> silent;
+  for (int i = 0; i < 64; ++i) silent.push_back(connect());  // beside the viewer's
+  for (const int socket : silent) EXPECT_TRUE(isAccepted(socket));
+  const int refused = connect();
+  EXPECT_FALSE(isAccepted(refused));
+  ::close(refused);
+  EXPECT_TRUE(viewer.see(2));
+  for (const int socket : silent) ::close(socket);
+  const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+  bool accepted = false;
+  while (!accepted && std::chrono::steady_clock::now() < end) {
+    const int next = connect();
+    accepted = isAccepted(next);
+    ::close(next);
+  }
+  EXPECT_TRUE(accepted);
+  EXPECT_TRUE(viewer.see(2));
 }
 
 TEST_F(GrpcEndpoint, RefusesStreamBeyondLimit) {

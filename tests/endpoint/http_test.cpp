@@ -61,9 +61,17 @@ TEST_F(HttpEndpoint, ServesThePage) {
 TEST_F(HttpEndpoint, AnswersSeveralRequestsOnOneConnection) {
   HttpClient client(endpoint_->port());
   for (int i = 0; i < 3; ++i) EXPECT_EQ(client.get("/").result(), http::status::ok);
-  client.send("GET / HTTP/1.1\r\nHost: a\r\n\r\nGET /healthz HTTP/1.1\r\nHost: a\r\n\r\n");
+  client.send("GET / HTTP/1.1\r\nHost: localhost\r\n\r\nGET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n");
   EXPECT_EQ(client.readResponse().body(), "<html>cloth</html>");
   EXPECT_EQ(client.readResponse().body(), "ok");
+}
+
+TEST_F(HttpEndpoint, RefusesNamesThatItDoesNotHave) {
+  HttpClient client(endpoint_->port());
+  client.send("GET / HTTP/1.1\r\nHost: evil.example:8080\r\n\r\n");
+  const Response refused = client.readResponse();
+  EXPECT_EQ(refused.result(), http::status::misdirected_request);
+  EXPECT_THAT(refused.body(), HasSubstr("--public-name"));
 }
 
 TEST_F(HttpEndpoint, AnswersHeadWithSizeButNoContent) {
@@ -106,7 +114,8 @@ TEST_F(HttpEndpoint, NamesAllowedMethodsWhenItRefusesAnother) {
 
 TEST_F(HttpEndpoint, RefusesBodyWithoutReadingIt) {
   HttpClient client(endpoint_->port());
-  client.send("POST / HTTP/1.1\r\nHost: a\r\nContent-Length: 1000000\r\n\r\n" + std::string(20'000, 'x'));
+  client.send("POST / HTTP/1.1\r\nHost: localhost\r\nContent-Length: 1000000\r\n\r\n" +
+              std::string(20'000, 'x'));
   EXPECT_EQ(client.readResponse().result(), http::status::payload_too_large);
   EXPECT_EQ(get("/", "Transfer-Encoding: chunked\r\n", "POST").result(), http::status::payload_too_large);
 }
@@ -126,7 +135,7 @@ TEST_F(HttpEndpoint, ClosesConnectionAfterBadRequest) {
 
 TEST_F(HttpEndpoint, ClosesAConnectionThatNeverFinishesItsHeader) {
   HttpClient client(endpoint_->port());
-  client.send("GET / HTTP/1.1\r\nHost: a\r\n");
+  client.send("GET / HTTP/1.1\r\nHost: localhost\r\n");
   EXPECT_TRUE(client.closes());  // only the server's timeout ends this wait
 }
 

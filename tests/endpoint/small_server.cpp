@@ -34,6 +34,7 @@ model::Scene sheet(std::string name, std::uint32_t side) {
 void SmallServer::SetUp() {
   telemetry::setUpLog("warning");
   hosting::ServerOptions options;
+  options.budget = {.sceneLoad = 1e9, .load = 1e9, .sceneMegabytes = 1e9, .megabytes = 1e9};
   options.defaultScene = "small";
   try {
     server_ = std::make_unique<hosting::SceneServer>(

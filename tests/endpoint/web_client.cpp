@@ -72,7 +72,7 @@ void HttpClient::shutdownSend() {
 
 WebSocketClient::WebSocketClient(std::uint16_t port, const Handshake& handshake) : stream_(io_) {
   connect(io_, stream_.next_layer(), port, handshake.receiveBufferBytes);
-  const std::string host = "127.0.0.1:" + std::to_string(port);
+  const std::string host = handshake.host.empty() ? "127.0.0.1:" + std::to_string(port) : handshake.host;
   stream_.binary(true);
   stream_.read_message_max(0);
   stream_.set_option(websocket::stream_base::decorator([&](websocket::request_type& request) {

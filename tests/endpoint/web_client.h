@@ -60,6 +60,7 @@ class WebSocketClient final : public Client {
  public:
   struct Handshake {
     std::string origin = {};
+    std::string host = {};  // empty: the address
     std::string subprotocol = {};
     int receiveBufferBytes = 0;  // 0: the default of the system
   };

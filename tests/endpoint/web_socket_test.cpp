@@ -63,6 +63,22 @@ TEST_F(WebSocketEndpoint, RefusesPagesOfOtherOriginsUnlessAllowed) {
     EXPECT_THAT([&] { connect(origin); }, ThrowsMessage<ClientError>("declined with 403")) << origin;
 }
 
+// The page of a name whose address is changed to this server's, which is of the same origin.
+TEST_F(WebSocketEndpoint, RefusesNamesThatItDoesNotHave) {
+  endpoint::WebEndpointOptions options;
+  options.publicNames = {"cloth.example.org"};
+  open(options);
+  const auto connect = [&](const std::string& name) {
+    WebSocketClient::Handshake handshake;
+    handshake.host = name + ":" + std::to_string(port());
+    handshake.origin = "http://" + handshake.host;
+    WebSocketClient(port(), handshake);
+  };
+  EXPECT_NO_THROW(connect("localhost"));
+  EXPECT_NO_THROW(connect("cloth.example.org"));
+  EXPECT_THAT([&] { connect("evil.example"); }, ThrowsMessage<ClientError>("declined with 421"));
+}
+
 TEST_F(WebSocketEndpoint, ClosesOnTextMessage) {
   Joined other = join();
   Joined client = join();

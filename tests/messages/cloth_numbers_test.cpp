@@ -157,7 +157,7 @@ class EveryNumber : public testing::TestWithParam<ClothParameter> {
 
 TEST_P(EveryNumber, ChangesItsMemberOnly) {
   const float value = allowed();
-  const auto change = toParameterChange(changeTo(value), scene_);
+  const auto change = toParameterChange(changeTo(value), scene_, model::StabilityBound(scene_));
   ASSERT_TRUE(change) << change.error().text;
   model::Scene changed = scene_;
   model::applyChange(changed, *change);
@@ -182,7 +182,7 @@ TEST_P(EveryNumber, IsPartOfAChangeThatHoldsAll) {
   *parameters::memberOf(changed.cloths[0], GetParam().number) = allowed();
   v1::ParameterChange all;
   copyNumbers(toMessage(changed).cloths(0), *all.add_cloths());
-  model::applyChange(scene_, toParameterChange(all, scene_).value());
+  model::applyChange(scene_, toParameterChange(all, scene_, model::StabilityBound(scene_)).value());
   EXPECT_EQ(*parameters::memberOf(scene_.cloths[0], GetParam().number), allowed());
 }
 
@@ -190,14 +190,14 @@ TEST_P(EveryNumber, ChangesTheMessageWithAllParametersLikeTheScene) {
   const v1::ParameterChange message = changeTo(allowed());
   v1::ParameterChange all = allParameters(toMessage(scene_), {});
   applyChange(message, all);
-  model::applyChange(scene_, toParameterChange(message, scene_).value());
+  model::applyChange(scene_, toParameterChange(message, scene_, model::StabilityBound(scene_)).value());
   EXPECT_EQ(all.DebugString(), allParameters(toMessage(scene_), {}).DebugString());
 }
 
 TEST_P(EveryNumber, IsRefusedOutsideItsRange) {
   for (const float value : {static_cast<float>(GetParam().range.min) - 0.001f,
                             static_cast<float>(maximum()) * 1.01f, std::numeric_limits<float>::quiet_NaN()}) {
-    const auto change = toParameterChange(changeTo(value), scene_);
+    const auto change = toParameterChange(changeTo(value), scene_, model::StabilityBound(scene_));
     ASSERT_FALSE(change) << value;
     EXPECT_THAT(change.error().text,
                 testing::HasSubstr(fmt::format(" = {}: must be a finite number from {:g} to ", value,

@@ -17,7 +17,7 @@ using testing::StartsWith;
 class ToParameterChange : public testing::Test {
  protected:
   std::string error() const {
-    const auto change = toParameterChange(message_, scene_);
+    const auto change = toParameterChange(message_, scene_, model::StabilityBound(scene_));
     return change ? "no error" : change.error().text;
   }
 
@@ -48,14 +48,14 @@ TEST_F(ToParameterChange, AcceptsSizesOfTheShape) {
   change.mutable_size()->set_y(2);
   change.mutable_size()->set_z(3);
   change.set_friction(2);
-  model::applyChange(scene_, toParameterChange(message_, scene_).value());
+  model::applyChange(scene_, toParameterChange(message_, scene_, model::StabilityBound(scene_)).value());
   EXPECT_EQ(std::get<model::Box>(scene_.colliders[0].shape).size, model::Vec3(1, 2, 3));
   EXPECT_EQ(scene_.colliders[0].friction, 2);
   scene_.colliders[0].shape = model::Capsule{};
   change.clear_size();
   change.set_length(0.7f);
   change.set_radius(0.2f);
-  model::applyChange(scene_, toParameterChange(message_, scene_).value());
+  model::applyChange(scene_, toParameterChange(message_, scene_, model::StabilityBound(scene_)).value());
   EXPECT_EQ(std::get<model::Capsule>(scene_.colliders[0].shape).length, 0.7f);
   EXPECT_EQ(std::get<model::Capsule>(scene_.colliders[0].shape).radius, 0.2f);
 }
@@ -75,7 +75,7 @@ TEST_F(ToParameterChange, ChangesSelfCollisionAndTethersOfClothsThatHaveThem) {
   change.mutable_self_collision()->set_radius(10);
   EXPECT_THAT(error(), StartsWith("parameterChange.cloths[0].selfCollision.radius = 10: must be"));
   change.mutable_self_collision()->clear_radius();
-  model::applyChange(scene_, toParameterChange(message_, scene_).value());
+  model::applyChange(scene_, toParameterChange(message_, scene_, model::StabilityBound(scene_)).value());
   EXPECT_EQ(scene_.cloths[0].selfCollision->radius, 0.01f);
   EXPECT_EQ(scene_.cloths[0].selfCollision->friction, 1);
   EXPECT_EQ(scene_.cloths[0].tethers->slack, 0.5f);
@@ -128,7 +128,7 @@ TEST_F(ToParameterChange, CarriesEveryField) {
   collider.mutable_position()->set_x(3);
   collider.mutable_orientation()->set_y(1);
   collider.set_radius(0.5f);
-  const auto change = toParameterChange(message_, scene_);
+  const auto change = toParameterChange(message_, scene_, model::StabilityBound(scene_));
   ASSERT_TRUE(change) << change.error().text;
   applyChange(scene_, *change);
   EXPECT_EQ(scene_.environment.gravity, model::Vec3(0, -1.5f, 0));
@@ -154,7 +154,7 @@ TEST_F(ToParameterChange, CarriesEveryField) {
 
 TEST_F(ToParameterChange, LeavesOutWhatIsAbsent) {
   message_.add_cloths();
-  const auto change = toParameterChange(message_, scene_);
+  const auto change = toParameterChange(message_, scene_, model::StabilityBound(scene_));
   ASSERT_TRUE(change) << change.error().text;
   EXPECT_FALSE(change->gravity || change->wind || change->airDensity);
   EXPECT_FALSE(change->cloths[0].numbers.hasAnyOf(parameters::kStructural) ||
@@ -164,7 +164,8 @@ TEST_F(ToParameterChange, LeavesOutWhatIsAbsent) {
 TEST_F(ToParameterChange, ListsTheNamesOfTheScene) {
   message_.add_cloths()->set_name("rug");
   EXPECT_THAT(error(), StartsWith("parameterChange.cloths[0].name = \"rug\": must be one of sheet"));
-  EXPECT_EQ(toParameterChange(message_, scene_).error().code, v1::ERROR_CODE_NOT_FOUND);
+  EXPECT_EQ(toParameterChange(message_, scene_, model::StabilityBound(scene_)).error().code,
+            v1::ERROR_CODE_NOT_FOUND);
   message_.clear_cloths();
   message_.add_colliders();
   EXPECT_THAT(error(), StartsWith("parameterChange.colliders[0].name = \"\": must be one of ball"));
@@ -197,7 +198,7 @@ TEST_F(ToParameterChange, RefusesSolversThatTheSceneCannotUse) {
   v1::ClothChange& cloth = *message_.add_cloths();
   cloth.mutable_structural()->set_stiffness(20000);
   cloth.mutable_solver()->mutable_constraint();
-  const auto change = toParameterChange(message_, scene_);
+  const auto change = toParameterChange(message_, scene_, model::StabilityBound(scene_));
   ASSERT_TRUE(change) << change.error().text;
   applyChange(scene_, *change);
   message_.Clear();
@@ -222,7 +223,7 @@ TEST_F(ToParameterChange, MakesClothsOfAMaterial) {
   cloth.set_material("denim");
   cloth.set_areal_mass(0.5f);
   cloth.mutable_bend()->set_stiffness(7);
-  const auto change = toParameterChange(message_, scene_);
+  const auto change = toParameterChange(message_, scene_, model::StabilityBound(scene_));
   ASSERT_TRUE(change) << change.error().text;
   applyChange(scene_, *change);
   EXPECT_EQ(scene_.cloths[0].material, "denim");
@@ -276,7 +277,7 @@ TEST_F(ToParameterChange, ChangesTheMessageWithAllParametersLikeTheScene) {
   sheet.set_name("sheet");
   sheet.set_drag(0.25f);
   applyChange(message_, all);
-  model::applyChange(scene_, toParameterChange(message_, scene_).value());
+  model::applyChange(scene_, toParameterChange(message_, scene_, model::StabilityBound(scene_)).value());
   EXPECT_EQ(all.DebugString(), allParameters(toMessage(scene_), areas).DebugString());
 
   message_.Clear();

@@ -274,6 +274,28 @@ const BadScene kBadScenes[] = {
      "one or the other"},
     {"cloths[0].attachments[0].motion.keys: has 1 elements",
      [](v1::Scene& s) { attachment(s, "rod").mutable_motion()->add_keys(); }},
+    {"cloths: have pins and attachments that select nodes in 83886080 steps",
+     [](v1::Scene& s) {
+       grid(s).set_rows(8192);
+       grid(s).set_columns(1024);
+       grid(s).set_height(1000);
+       grid(s).set_width(1000);
+       for (int i = 0; i < 10; ++i) {
+         v1::GridRange& all = *cloth(s).add_pins();
+         all.set_last_row(8191);
+         all.set_last_column(1023);
+       }
+     },
+     "must have at most 67108864"},
+    {"cloths: have 67108864 nodes in all",
+     [](v1::Scene& s) {
+       grid(s).set_rows(8192);
+       grid(s).set_columns(8192);
+       grid(s).set_height(1000);
+       grid(s).set_width(1000);
+       attachment(s, "rod").add_regions()->set_radius(1);
+     },
+     "must have at most 16777216"},
     {"cloths[0].tethers.slack = 2:", [](v1::Scene& s) { cloth(s).mutable_tethers()->set_slack(2); }},
     {"simulationRate = 0:", [](v1::Scene& s) { s.set_simulation_rate(0); }, "from 1 to 1000"},
     {"simulationRate = 1001:", [](v1::Scene& s) { s.set_simulation_rate(1001); }},

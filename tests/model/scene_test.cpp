@@ -44,10 +44,8 @@ TEST(PinnedNodes, FollowRangesWithSteps) {
                                               0, 0, 0, 0, 0, 0, 0,  //
                                               0, 0, 0, 0, 0, 0, 1};
   EXPECT_EQ(pinnedNodes(cloth), expected);
-  for (std::uint32_t row = 0; row < 4; ++row)
-    for (std::uint32_t column = 0; column < 7; ++column)
-      EXPECT_EQ(cloth.pins[0].contains(row, column) || cloth.pins[1].contains(row, column),
-                expected[row * 7 + column] == 1);
+  EXPECT_EQ(cloth.pins[0].nodeCount(), 3u);
+  EXPECT_EQ(cloth.pins[1].nodeCount(), 2u);
 }
 
 TEST(PinnedNodes, AreEmptyWithoutRanges) {

@@ -56,6 +56,23 @@ TEST(StableSubsteps, IgnorePinnedNodes) {
   EXPECT_EQ(stableSubsteps(scene), substepsFor(3 * 500));
 }
 
+// The bound is made once for a scene and asked after each change of its parameters.
+TEST(StabilityBound, HoldsForChangedParameters) {
+  Scene scene = sheet(10, 10);
+  const StabilityBound bound(scene);
+  EXPECT_EQ(bound.substeps(scene), substepsFor(4 * 500));
+  Cloth& cloth = scene.cloths[0];
+  cloth.shear.stiffness = 300;
+  EXPECT_EQ(bound.substeps(scene), substepsFor(4 * 500 + 4 * 300));
+  cloth.mass /= 4;
+  EXPECT_EQ(bound.substeps(scene), substepsFor(4 * (4 * 500 + 4 * 300)));
+  cloth.dihedralBending = 1;
+  EXPECT_EQ(bound.substeps(scene), stableSubsteps(scene));
+  EXPECT_GT(bound.substeps(scene), substepsFor(4 * (4 * 500 + 4 * 300)));
+  cloth.structural.stiffness = 1e9f;
+  EXPECT_EQ(bound.substeps(scene), 0u);
+}
+
 TEST(StableSubsteps, GrowWithDampingOfSpringsOfNodesAndOfTheAir) {
   const std::uint32_t bare = stableSubsteps(sheet(10, 10));
   Scene dashpots = sheet(10, 10), damped = sheet(10, 10), windy = sheet(10, 10);

@@ -251,7 +251,7 @@ TEST_F(RecordingPrograms, EscapeControlCharactersOfOtherPrograms) {
   ASSERT_TRUE(writer && writer->finish());
   std::ofstream(path, std::ios::binary) << bytes;
   const Ended info = clothstream({"info", "--quick", path});
-  EXPECT_THAT(info.output, HasSubstr("scene     a\\x1b[2J\\x9b1mb, "));
+  EXPECT_THAT(info.output, HasSubstr("scene     a\\x1b[2J\\xc2\\x9b1mb, "));
   EXPECT_THAT(info.output, HasSubstr("Gerät"));
 }
 

@@ -19,9 +19,15 @@ namespace clothstream::tests {
 // Skips the test, with the reason, if there is no device.
 class ServerTest : public ::testing::Test {
  protected:
+  // Load and memory without a limit.
+  static constexpr scene::BudgetLimits kNoLimits{
+      .sceneLoad = 1e9, .load = 1e9, .sceneMegabytes = 1e9, .megabytes = 1e9};
+
   // Starts the server with the scenes "small" (the default), "other" and `more`. Call it once per test.
-  void start(hosting::ServerOptions options = {}, const std::vector<model::Scene>& more = {}) {
+  void start(hosting::ServerOptions options = {}, const std::vector<model::Scene>& more = {},
+             const scene::BudgetLimits& budget = kNoLimits) {
     options.defaultScene = "small";
+    options.budget = budget;
     std::vector scenes{smallScene("small"), smallScene("other")};
     scenes.insert(scenes.end(), more.begin(), more.end());
     try {

@@ -184,6 +184,40 @@ TEST_F(ComputeTest, RecordingsSeeTheWorkOfEarlierOnesWithoutWaiting) {
   EXPECT_EQ(contents<std::uint32_t>(readback), countedUp(kCount, 2));
 }
 
+// Each dispatch depends on the one before, also across slices and with other recordings in between.
+TEST_F(ComputeTest, SlicesGiveTheResultOfTheWholeRecording) {
+  constexpr std::uint32_t kCount = 256, kSteps = 10;
+  const Buffer upload = uploadOf(countedFrom(0, kCount));
+  const Buffer a(tests::device(), BufferPurpose::state, upload.bytes());
+  const Buffer b(tests::device(), BufferPurpose::state, upload.bytes());
+  const Buffer other(tests::device(), BufferPurpose::readback, upload.bytes());
+  const Kernel kernel = countUp();
+  const Bindings there(tests::device(), kernel, {&a, &b});
+  const Bindings back(tests::device(), kernel, {&b, &a});
+  Recorder recorder(tests::device()), between(tests::device());
+  for (const auto& [limit, slices] : {std::pair{1u, kSteps}, {3 * kCount, 4u}, {kSteps * kCount, 1u}}) {
+    const Buffer readback(tests::device(), BufferPurpose::readback, upload.bytes());
+    recorder.sliceAfter(limit);
+    recorder.begin();
+    recorder.copy(upload, a, upload.bytes());
+    for (std::uint32_t step = 0; step < kSteps; ++step) {
+      recorder.barrier();
+      recorder.dispatch(step % 2 == 0 ? there : back, kCount, kCount);
+    }
+    recorder.barrier();
+    recorder.copy(a, readback, readback.bytes());
+    ASSERT_EQ(recorder.sliceCount(), slices);
+    for (std::uint32_t slice = 0; slice < slices; ++slice) {
+      const TimelineValue submitted = tests::device().submitSlice(recorder, slice);
+      between.begin();
+      between.fill(other, slice, other.bytes());
+      tests::submitAndWait(tests::device(), between);
+      EXPECT_GE(tests::device().completed(), submitted);
+    }
+    EXPECT_EQ(contents<std::uint32_t>(readback), countedUp(kCount, kSteps));
+  }
+}
+
 TEST_F(ComputeTest, RecordingRunsAgainWhenItIsSubmittedAgain) {
   constexpr std::uint32_t kCount = 64;
   const Buffer a = uploadOf(countedFrom(0, kCount));
@@ -238,7 +272,7 @@ TEST_F(ComputeTest, DeviceDecidesTheSizeOfAnIndirectDispatch) {
     recorder.fill(groups, 2, 4, 4);
     recorder.fill(b, 0, b.bytes());
     recorder.barrier();
-    recorder.dispatchIndirect(bindings, kCount, groups, 4);  // 2 x 1 x 1 workgroups of 64
+    recorder.dispatchIndirect(bindings, kCount, groups, 4, 128);  // 2 x 1 x 1 workgroups of 64
   });
   std::vector<std::uint32_t> expected = countedUp(kCount, 1);
   std::fill(expected.begin() + 128, expected.end(), 0u);

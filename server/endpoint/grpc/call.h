@@ -11,6 +11,7 @@
 #include <grpcpp/server_context.h>
 #include <grpcpp/support/status.h>
 
+#include "server/endpoint/grpc/call_rate.h"
 #include "server/endpoint/grpc/completion_loop.h"
 
 namespace clothstream::hosting {
@@ -28,6 +29,7 @@ struct GrpcEndpointContext {
   const std::size_t maxStreams;
   std::size_t streams = 0;  // open Join streams, without refused ones
   std::size_t watches = 0;  // open health watches
+  CallRate callRate = {};
   std::unordered_set<std::shared_ptr<Call>> calls = {};
   std::size_t callsMade = 0;               // number of these that a client has made
   grpc::Status refusal = {};               // status for new calls; OK accepts them

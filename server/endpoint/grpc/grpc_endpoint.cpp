@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "server/endpoint/grpc/grpc_endpoint.h"
 
-#include <cerrno>
 #include <chrono>
-#include <cstring>
 #include <functional>
 #include <future>
 #include <memory>
@@ -13,20 +11,18 @@
 
 #include <absl/synchronization/mutex.h>
 #include <boost/asio/thread_pool.hpp>
-#include <fmt/format.h>
 #include <grpc/compression.h>
 #include <grpcpp/ext/proto_server_reflection_plugin.h>
 #include <grpcpp/resource_quota.h>
 #include <grpcpp/security/server_credentials.h>
 #include <grpcpp/server.h>
 #include <grpcpp/server_builder.h>
-#include <netdb.h>
-#include <sys/socket.h>
-#include <unistd.h>
 
+#include "server/endpoint/grpc/acceptor.h"
 #include "server/endpoint/grpc/call.h"
 #include "server/endpoint/grpc/health.h"
 #include "server/endpoint/grpc/service.h"
+#include "server/hosting/server_state.h"
 #include "server/session/session.h"
 
 namespace clothstream::endpoint {
@@ -39,7 +35,10 @@ constexpr auto kStopTimeout = 1s;
 constexpr int kPingAfterMs = 2000;
 constexpr int kPingTimeoutMs = 2000;
 constexpr int kMinClientPingIntervalMs = 1000;
-constexpr int kMaxIdleConnectionMs = 300'000;
+constexpr int kMaxIdleConnectionMs = 60'000;
+constexpr int kHandshakeTimeoutMs = 10'000;
+// Connections beyond the limit of streams, whose streams get an answer with the reason.
+constexpr std::size_t kAnsweredBeyondLimit = 64;
 constexpr std::size_t kMaxMemory = std::size_t{256} << 20;
 constexpr int kMaxThreads = 16;
 constexpr int kMaxStreamsPerConnection = 64;
@@ -47,14 +46,13 @@ constexpr int kMaxStreamsPerConnection = 64;
 void configure(grpc::ServerBuilder& builder) {
   // Debian's build of gRPC checks its own locks for deadlocks, which costs about 4 % of a busy process.
   absl::SetMutexDeadlockDetectionMode(absl::OnDeadlockCycle::kIgnore);
-  // Without this a second server could share the port, and each would get half of the clients.
-  builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, kPingAfterMs);
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, kPingTimeoutMs);
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_PERMIT_WITHOUT_CALLS, 1);
   builder.AddChannelArgument(GRPC_ARG_HTTP2_MAX_PINGS_WITHOUT_DATA, 0);
   builder.AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS, kMinClientPingIntervalMs);
   builder.AddChannelArgument(GRPC_ARG_MAX_CONNECTION_IDLE_MS, kMaxIdleConnectionMs);
+  builder.AddChannelArgument(GRPC_ARG_SERVER_HANDSHAKE_TIMEOUT_MS, kHandshakeTimeoutMs);
   builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS, kMaxStreamsPerConnection);
   // Completes a write only after the transport has sent it, not when a buffer has taken it.
   builder.AddChannelArgument(GRPC_ARG_HTTP2_WRITE_BUFFER_SIZE, 1);
@@ -68,32 +66,12 @@ void configure(grpc::ServerBuilder& builder) {
   builder.SetResourceQuota(quota);
 }
 
-// gRPC reports only that it cannot listen. A second bind finds the reason.
-std::string whyNotListening(const std::string& host, std::uint16_t port) {
-  const addrinfo hints{AI_PASSIVE, AF_UNSPEC, SOCK_STREAM, 0, 0, nullptr, nullptr, nullptr};
-  addrinfo* found = nullptr;
-  if (const int error = ::getaddrinfo(host.c_str(), std::to_string(port).c_str(), &hints, &found); error != 0)
-    return fmt::format("cannot listen on host '{}': {}", host, ::gai_strerror(error));
-  const int probe = ::socket(found->ai_family, found->ai_socktype, found->ai_protocol);
-  const int error = ::bind(probe, found->ai_addr, found->ai_addrlen) == 0 ? EADDRINUSE : errno;
-  ::close(probe);
-  ::freeaddrinfo(found);
-  if (error == EADDRINUSE)
-    return fmt::format("port {} on {} is already in use: choose another with --grpc-port", port, host);
-  return fmt::format("cannot listen on port {} of {}: {}", port, host, std::strerror(error));
-}
-
-std::string addressOf(const std::string& host, std::uint16_t port) {
-  const bool isIpv6 = host.find(':') != std::string::npos;
-  return isIpv6 ? fmt::format("[{}]:{}", host, port) : fmt::format("{}:{}", host, port);
-}
-
 }  // namespace
 
 struct GrpcEndpoint::State {
   Service service;
   HealthService health;
-  int port = 0;
+  std::unique_ptr<Acceptor> acceptor;
   std::unique_ptr<grpc::Server> server;
   std::optional<GrpcEndpointContext> context;
   boost::asio::thread_pool slowCalls{1};  // for calls that take longer than a frame may wait
@@ -102,20 +80,29 @@ struct GrpcEndpoint::State {
     grpc::reflection::InitProtoReflectionServerBuilderPlugin();
     grpc::ServerBuilder builder;
     configure(builder);
-    builder.AddListeningPort(addressOf(options.host, options.port), grpc::InsecureServerCredentials(), &port);
+    ConnectionLimits limits = options.connections;
+    limits.connections = options.maxStreams + kAnsweredBeyondLimit;
+    acceptor = std::make_unique<Acceptor>(
+        options.host, options.port, limits,
+        builder.experimental().AddExternalConnectionAcceptor(
+            grpc::ServerBuilder::experimental_type::ExternalConnectionType::FROM_FD,
+            grpc::InsecureServerCredentials()),
+        scenes.state().metrics);
     builder.RegisterService(&service);
     builder.RegisterService(&health);
     const auto loop = std::make_shared<CompletionLoop>(builder.AddCompletionQueue());
     server = builder.BuildAndStart();
-    if (!server || port == 0) throw std::runtime_error(whyNotListening(options.host, options.port));
+    if (!server) throw std::runtime_error("gRPC cannot start a server");
     context.emplace(GrpcEndpointContext{scenes, loop, options.maxStreams});
     offerService(*context, service, slowCalls);
     offerHealth(*context, health);
     loop->start();
+    acceptor->start();
   }
 
   ~State() {
     if (!context) return;
+    acceptor.reset();
     const auto deadline = std::chrono::system_clock::now() + kStopTimeout;
     context->loop->post([this] { stopCalls(); });
     // Waits for the calls before Shutdown(): it pings the client and closes the connection after the answer.
@@ -155,7 +142,7 @@ GrpcEndpoint::GrpcEndpoint(hosting::SceneServer& server, const GrpcEndpointOptio
 GrpcEndpoint::~GrpcEndpoint() = default;
 
 std::uint16_t GrpcEndpoint::port() const {
-  return static_cast<std::uint16_t>(state_->port);
+  return state_->acceptor->port();
 }
 
 }  // namespace clothstream::endpoint

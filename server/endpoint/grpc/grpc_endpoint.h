@@ -7,6 +7,8 @@
 #include <memory>
 #include <string>
 
+#include "server/endpoint/listen/admission.h"
+
 namespace clothstream::hosting {
 class SceneServer;
 }
@@ -18,6 +20,8 @@ struct GrpcEndpointOptions {
   std::uint16_t port = 50051;  // 0: a free port
   // Maximum number of open Join streams. Further ones end with RESOURCE_EXHAUSTED.
   std::size_t maxStreams = 256;
+  // `connections` is ignored: it follows from maxStreams.
+  ConnectionLimits connections{};
 };
 
 // Join forwards the bytes of a session::Session unchanged. SceneServer answers the unary calls. When a

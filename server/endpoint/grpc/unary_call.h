@@ -40,6 +40,8 @@ class UnaryCall final : public Call {
     endpoint::await<UnaryCall>(endpoint_, take_, handler_);
     made();
     if (!endpoint_.refusal.ok()) return finish(endpoint_.refusal);
+    if (!endpoint_.callRate.take(context_.peer(), schedule::Clock::now()))
+      return finish({grpc::StatusCode::RESOURCE_EXHAUSTED, "too many calls: try again in a second"});
     std::weak_ptr<UnaryCall> weak = std::static_pointer_cast<UnaryCall>(shared_from_this());
     handler_(request_,
              [weak = std::move(weak), loop = endpoint_.loop](tl::expected<Response, v1::Error> answer) {

@@ -6,10 +6,13 @@
 #include <memory>
 #include <string>
 #include <unordered_set>
+#include <utility>
 #include <vector>
 
 #include <boost/asio/io_context.hpp>
 
+#include "server/endpoint/listen/admission.h"
+#include "server/endpoint/web/host_names.h"
 #include "server/endpoint/web/page.h"
 
 namespace clothstream::hosting {
@@ -24,6 +27,7 @@ struct WebEndpointContext {
   hosting::SceneServer& server;
   boost::asio::io_context& io;
   const Page page;
+  const HostNames names;
   const std::vector<std::string> allowedOrigins;
   const std::size_t maxConnections;
   std::size_t connections = 0;
@@ -34,13 +38,17 @@ struct WebEndpointContext {
 // Counts one connection while it lives. Passes to the WebSocket when HTTP is upgraded.
 class ConnectionSlot {
  public:
-  explicit ConnectionSlot(WebEndpointContext& endpoint) : endpoint_(endpoint) { ++endpoint_.connections; }
+  ConnectionSlot(WebEndpointContext& endpoint, Admission::Ticket ticket)
+      : endpoint_(endpoint), ticket_(std::move(ticket)) {
+    ++endpoint_.connections;
+  }
   ~ConnectionSlot() { --endpoint_.connections; }
   ConnectionSlot(const ConnectionSlot&) = delete;
   ConnectionSlot& operator=(const ConnectionSlot&) = delete;
 
  private:
   WebEndpointContext& endpoint_;
+  const Admission::Ticket ticket_;
 };
 
 }  // namespace clothstream::endpoint

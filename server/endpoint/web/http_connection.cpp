@@ -55,9 +55,10 @@ bool originAllowed(const Request& request, const std::vector<std::string>& allow
 
 }  // namespace
 
-HttpConnection::HttpConnection(boost::asio::ip::tcp::socket&& socket, WebEndpointContext& endpoint)
+HttpConnection::HttpConnection(boost::asio::ip::tcp::socket&& socket, WebEndpointContext& endpoint,
+                               Admission::Ticket ticket)
     : endpoint_(endpoint),
-      slot_(std::make_unique<ConnectionSlot>(endpoint)),
+      slot_(std::make_unique<ConnectionSlot>(endpoint, std::move(ticket))),
       beyondLimit_(endpoint.connections > endpoint.maxConnections),
       socket_(std::move(socket)) {}
 
@@ -87,6 +88,10 @@ void HttpConnection::onHeader(beast::error_code error) {
     return refuse(http::status::service_unavailable, "The server has no free connection; try again later.\n");
   if (parser_->chunked() || parser_->content_length().value_or(0) > 0)
     return refuse(http::status::payload_too_large, "Requests must not have a body.\n");
+  if (!endpoint_.names.contains(view(parser_->get()[http::field::host])))
+    return refuse(
+        http::status::misdirected_request,
+        "This server does not have the name of the Host field. The server option --public-name adds it.\n");
   const std::string_view target = view(parser_->get().target());
   if (target.substr(0, target.find('?')) == "/stream") return answerStream(parser_->get());
   write(answer(parser_->get()));

@@ -24,7 +24,8 @@ inline constexpr std::size_t kMaxHeaderBytes = 16 * 1024;
 // Lives while an operation of its socket is pending. Belongs to the io thread.
 class HttpConnection : public std::enable_shared_from_this<HttpConnection> {
  public:
-  HttpConnection(boost::asio::ip::tcp::socket&& socket, WebEndpointContext& endpoint);
+  HttpConnection(boost::asio::ip::tcp::socket&& socket, WebEndpointContext& endpoint,
+                 Admission::Ticket ticket);
 
   void read();
 

@@ -2,22 +2,23 @@
 #include "server/endpoint/web/web_endpoint.h"
 
 #include <chrono>
-#include <stdexcept>
+#include <exception>
 #include <thread>
 #include <utility>
 
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
-#include <boost/asio/ip/v6_only.hpp>
 #include <boost/asio/post.hpp>
 #include <boost/asio/steady_timer.hpp>
-#include <fmt/format.h>
 #include <netinet/tcp.h>
+#include <spdlog/spdlog.h>
 #include <sys/socket.h>
 
+#include "server/endpoint/listen/listen.h"
 #include "server/endpoint/web/endpoint_context.h"
 #include "server/endpoint/web/http_connection.h"
 #include "server/endpoint/web/web_socket_stream.h"
+#include "server/hosting/server_state.h"
 
 namespace clothstream::endpoint {
 namespace {
@@ -33,22 +34,10 @@ constexpr int kUnsentBytes = 16 * 1024;
 constexpr auto kStopTimeout = 1s;
 constexpr auto kAcceptPause = 100ms;
 
-tcp::acceptor listen(net::io_context& io, const std::string& host, std::uint16_t port) {
-  boost::system::error_code error;
-  const auto refuse = [&](const std::string& what) -> std::runtime_error { return std::runtime_error(what); };
-  const auto found = tcp::resolver(io).resolve(host, std::to_string(port), tcp::resolver::passive, error);
-  if (error) throw refuse(fmt::format("cannot listen on host '{}': {}", host, error.message()));
-  const tcp::endpoint endpoint = *found.begin();
-  tcp::acceptor acceptor(io);
-  acceptor.open(endpoint.protocol(), error);
-  if (!error) acceptor.set_option(tcp::acceptor::reuse_address(true), error);
-  if (!error && endpoint.address().is_v6()) acceptor.set_option(net::ip::v6_only(false), error);
-  if (!error) acceptor.bind(endpoint, error);
-  if (!error) acceptor.listen(net::socket_base::max_listen_connections, error);
-  if (error == net::error::address_in_use)
-    throw refuse(fmt::format("port {} on {} is already in use: choose another with --port", port, host));
-  if (error) throw refuse(fmt::format("cannot listen on port {} of {}: {}", port, host, error.message()));
-  return acceptor;
+ConnectionLimits limitsOf(const WebEndpointOptions& options) {
+  ConnectionLimits limits = options.connections;
+  limits.connections = options.maxConnections + kAnsweredBeyondLimit;
+  return limits;
 }
 
 void sendFresh(tcp::socket& socket) {
@@ -61,6 +50,7 @@ void sendFresh(tcp::socket& socket) {
 
 struct WebEndpoint::State {
   WebEndpointContext context;  // outlives the sockets, which are destroyed with `io`
+  Admission admission;
   net::io_context io{1};
   tcp::acceptor acceptor;
   net::steady_timer timer{io};
@@ -68,12 +58,18 @@ struct WebEndpoint::State {
   std::thread thread;
 
   State(hosting::SceneServer& server, const WebEndpointOptions& options)
-      : context{server, io,   Page(options.pageDirectory), options.allowedOrigins, options.maxConnections, 0,
-                {},     false},
-        acceptor(listen(io, options.host, options.port)),
+      : context{.server = server,
+                .io = io,
+                .page = Page(options.pageDirectory),
+                .names = HostNames(options.publicNames),
+                .allowedOrigins = options.allowedOrigins,
+                .maxConnections = options.maxConnections,
+                .streams = {}},
+        admission(limitsOf(options)),
+        acceptor(listen(io, options.host, options.port, "--port")),
         port(acceptor.local_endpoint().port()) {
     accept();
-    thread = std::thread([this] { io.run(); });
+    thread = std::thread([this] { run(); });
   }
 
   ~State() {
@@ -82,6 +78,16 @@ struct WebEndpoint::State {
     // No wake may reach `io` during its destruction.
     for (const auto& session : context.streams) session->leave();
     context.streams.clear();
+  }
+
+  // An exception, such as for a lack of memory, ends the handler of one socket and not the endpoint.
+  void run() {
+    for (;;) try {
+        io.run();
+        return;
+      } catch (const std::exception& failure) {
+        spdlog::error("page: {}", failure.what());
+      }
   }
 
   void accept() {
@@ -94,12 +100,19 @@ struct WebEndpoint::State {
         });
         return;
       }
-      if (context.connections < context.maxConnections + kAnsweredBeyondLimit) {
-        sendFresh(socket);
-        std::make_shared<HttpConnection>(std::move(socket), context)->read();
-      }
+      serve(std::move(socket));
       accept();
     });
+  }
+
+  void serve(tcp::socket socket) {
+    boost::system::error_code error;
+    const tcp::endpoint peer = socket.remote_endpoint(error);
+    if (error) return;  // it has gone already
+    auto ticket = admission.admit(peer.address(), schedule::Clock::now());
+    if (!ticket) return context.server.state().metrics.refusedConnections.add();
+    sendFresh(socket);
+    std::make_shared<HttpConnection>(std::move(socket), context, std::move(*ticket))->read();
   }
 
   void stop() {

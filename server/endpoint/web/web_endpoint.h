@@ -9,6 +9,8 @@
 #include <string>
 #include <vector>
 
+#include "server/endpoint/listen/admission.h"
+
 namespace clothstream::hosting {
 class SceneServer;
 }
@@ -22,6 +24,11 @@ struct WebEndpointOptions {
   std::filesystem::path pageDirectory;
   // Maximum number of open connections, HTTP and WebSocket. Further ones are answered with 503.
   std::size_t maxConnections = 256;
+  // `connections` is ignored: it follows from maxConnections.
+  ConnectionLimits connections{};
+  // Names, in addition to those of this machine and to addresses, under which browsers reach the endpoint
+  // (HostNames). Requests for other names are answered with 421.
+  std::vector<std::string> publicNames;
   // Origins of other pages that may open /stream, such as "https://example.org"; "*" allows every page. The
   // endpoint's own page and clients that send no origin are always allowed.
   std::vector<std::string> allowedOrigins;

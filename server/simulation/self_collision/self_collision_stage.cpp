@@ -256,7 +256,7 @@ void SelfCollisionStage::recordContacts(vulkan::Recorder& recorder, std::uint32_
   recorder.barrier();
   recorder.dispatch(contactKernels_[several_]->count.on[state], push, nodeCount_);
   recorder.barrier();
-  recorder.dispatchIndirect(contactKernels_[several_]->resolve.on[state], push, groups_);
+  recorder.dispatchIndirect(contactKernels_[several_]->resolve.on[state], push, groups_, 0, nodeCount_);
 }
 
 void SelfCollisionStage::recordReport(vulkan::Recorder& recorder, std::uint32_t slot) const {

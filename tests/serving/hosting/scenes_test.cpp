@@ -14,6 +14,8 @@
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
+#include <google/protobuf/io/coded_stream.h>
+#include <google/protobuf/io/zero_copy_stream_impl_lite.h>
 #include <gtest/gtest.h>
 
 #include "server/hosting/scene_maker.h"
@@ -147,6 +149,52 @@ TEST_F(ScenesTest, CreatesAndJoinsASceneUploadedInChunks) {
 
   // The content was consumed by the call.
   EXPECT_EQ(createUploaded(maker, "again").error().code(), v1::ERROR_CODE_NOT_FOUND);
+}
+
+// Six million empty pins are 12 MB of bytes, and were parsed to more than 400 MB before they were counted.
+TEST_F(ScenesTest, RefusesTooManyNodes) {
+  ServerOptions options;
+  options.maxSceneNodes = 100;
+  START(options);
+  TestPeer maker(server());
+  v1::ClientMessage message;
+  v1::Scene& scene = *message.mutable_create_scene()->mutable_scene();
+  scene = messages::toMessage(tests::smallScene("mine"));
+  EXPECT_THAT(ask(maker, message).error().text(),
+              HasSubstr("cloths: have 120 nodes in all; must have at most 100"));
+  // 4 rings have 61 vertices, and 5 have 91; two such cloths are too many.
+  scene = discScene(5);
+  *scene.add_cloths() = scene.cloths(0);
+  EXPECT_THAT(ask(maker, message).error().text(),
+              HasSubstr("cloths: have 182 nodes in all; must have at most 100"));
+  scene.mutable_cloths()->RemoveLast();
+  EXPECT_TRUE(ask(maker, message).has_create_scene());
+}
+
+TEST_F(ScenesTest, RefusesUploadThatNeedsTooMuchMemory) {
+  START();
+  constexpr int kPins = 6'000'000;
+  std::string cloth, content;
+  {
+    google::protobuf::io::StringOutputStream bytes(&cloth);
+    google::protobuf::io::CodedOutputStream out(&bytes);
+    for (int i = 0; i < kPins; ++i) {
+      out.WriteTag(v1::Cloth::kPinsFieldNumber << 3 | 2);
+      out.WriteVarint32(0);
+    }
+  }
+  {
+    google::protobuf::io::StringOutputStream bytes(&content);
+    google::protobuf::io::CodedOutputStream out(&bytes);
+    out.WriteTag(v1::Scene::kClothsFieldNumber << 3 | 2);
+    out.WriteVarint32(static_cast<std::uint32_t>(cloth.size()));
+    out.WriteString(cloth);
+  }
+  TestPeer maker(server());
+  upload(maker, content);
+  const v1::Error error = createUploaded(maker).error();
+  EXPECT_EQ(error.code(), v1::ERROR_CODE_MALFORMED_MESSAGE);
+  EXPECT_THAT(error.text(), HasSubstr("134217728 bytes of memory"));
 }
 
 TEST_F(ScenesTest, CreatedSceneLivesUntilDeleted) {

@@ -53,6 +53,34 @@ TEST_F(SceneHostTest, SameInputsGiveTheSameStatesForAnySubscribers) {
   EXPECT_EQ(simulate(4), alone);
 }
 
+TEST_F(SceneHostTest, SlicesOfATickGiveTheSameStates) {
+  model::Scene scene = smallScene();
+  model::Cloth& cloth = scene.cloths.front();
+  cloth.grid.rows = cloth.grid.columns = 128;
+  cloth.mass = 0.001f * static_cast<float>(cloth.nodeCount());
+  const auto simulate = [&](double sliceScale, std::uint32_t& slices) {
+    LiveScene live(scene);
+    delivery::FramePublisher publisher(encode::FrameEncoder::kSlots, [] {});
+    auto loaded = std::make_unique<SceneOnDevice>(tests::device(), scene, publisher.workers());
+    for (int i = 0; i < 20; ++i) loaded->scaleSlices(sliceScale);
+    SceneHost host(std::move(loaded), live, publisher, 0);
+    std::vector<std::uint64_t> states;
+    for (int tick = 0; tick < 3; ++tick) {
+      for (host.begin(Clock::now()); host.hasSlices(); ++slices) {
+        host.waitForSlice();
+        host.submitSlice();
+      }
+      host.finish();
+      states.push_back(host.status().stateHash);
+    }
+    return states;
+  };
+  std::uint32_t many = 0, none = 0;
+  EXPECT_EQ(simulate(0, many), simulate(2, none));
+  EXPECT_GT(many, scene.substeps);
+  EXPECT_EQ(none, 0u);
+}
+
 TEST_F(SceneHostTest, HandIsPlacedAtTheTimeOfTheTick) {
   HostedScene hosted;
   const auto pose = [&](std::chrono::milliseconds beyondTick, float x) {

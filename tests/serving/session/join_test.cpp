@@ -345,6 +345,19 @@ TEST_F(JoinTest, LostDeviceIsReplacedAndTheStreamContinues) {
   EXPECT_EQ(server().state().metrics.deviceRebuilds.value(), 1u);
 }
 
+TEST_F(JoinTest, PeerThatDoesNotSayHelloIsDisconnected) {
+  ServerOptions options;
+  options.helloTimeout = std::chrono::milliseconds(300);
+  START(options);
+  TestPeer reader(server()), stranger(server());
+  reader.join();
+  while (!stranger.finished()) reader.readFrames(1);
+  const v1::Error error = stranger.readToTheEnd().error();
+  EXPECT_THAT(error.text(), HasSubstr("the client was silent for 0.3 s: send hello soon after connecting"));
+  EXPECT_TRUE(error.fatal());
+  EXPECT_FALSE(reader.finished());
+}
+
 TEST_F(JoinTest, SilentPeerIsDisconnected) {
   ServerOptions options;
   options.silence = std::chrono::milliseconds(300);

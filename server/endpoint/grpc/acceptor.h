@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: MIT
+// Accepts the connections of a gRPC server, which itself has no limit of connections.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <list>
+#include <memory>
+#include <string>
+#include <thread>
+
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <grpcpp/server_builder.h>
+
+#include "server/endpoint/listen/admission.h"
+#include "server/telemetry/metrics.h"
+
+namespace clothstream::endpoint {
+
+class Acceptor {
+ public:
+  // Listens when it returns, and throws what listen() throws. `to` gets the connections.
+  Acceptor(const std::string& host, std::uint16_t port, const ConnectionLimits& limits,
+           std::unique_ptr<grpc::experimental::ExternalConnectionAcceptor> to, telemetry::ServerMetrics& metrics);
+  // Stops to accept; open connections stay.
+  ~Acceptor();
+  Acceptor(const Acceptor&) = delete;
+  Acceptor& operator=(const Acceptor&) = delete;
+
+  std::uint16_t port() const { return port_; }
+  // Call it when the server has started.
+  void start();
+
+ private:
+  // A connection, whose descriptor gRPC owns. Ours is a copy, which shows when the connection has ended.
+  struct Connection {
+    int copy;
+    Admission::Ticket ticket;
+  };
+
+  void accept();
+  void accepted(boost::asio::ip::tcp::socket socket);
+  void checkLater();
+  // Frees the places of connections that have ended.
+  void forgetEnded();
+
+  boost::asio::io_context io_{1};
+  boost::asio::ip::tcp::acceptor acceptor_;
+  boost::asio::steady_timer pause_{io_}, check_{io_};
+  const std::uint16_t port_;
+  const std::size_t maxConnections_;
+  Admission admission_;
+  std::list<Connection> connections_;
+  const std::unique_ptr<grpc::experimental::ExternalConnectionAcceptor> to_;
+  telemetry::ServerMetrics& metrics_;
+  std::thread thread_;
+};
+
+}  // namespace clothstream::endpoint

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: MIT
+// Decides which connections an endpoint accepts.
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <string>
+
+#include <boost/asio/ip/address.hpp>
+#include <tl/expected.hpp>
+
+#include "server/schedule/clock.h"
+
+namespace clothstream::endpoint {
+
+struct ConnectionLimits {
+  std::size_t connections = 256;           // open at a time
+  std::size_t connectionsPerAddress = 64;  // of one address
+  double connectionsPerSecond = 200;       // new ones, with a burst of as many
+};
+
+// Addresses with the same key share their limits. Empty for loopback.
+std::string addressKey(boost::asio::ip::address address);
+
+// Thread-safe. Addresses of IPv6 count by their first 64 bits, because one peer usually has all addresses that
+// begin with them. All programs of this machine share the loopback addresses, which therefore have no limit of
+// their own.
+class Admission {
+ public:
+  enum class Refusal { connections, connectionsOfAddress, rate };
+
+  // Counts one connection while it lives. It may outlive the Admission.
+  class Ticket {
+   public:
+    Ticket(Ticket&&) noexcept = default;
+    Ticket& operator=(Ticket&&) = delete;
+    ~Ticket();
+
+   private:
+    friend class Admission;
+    struct Counts;
+    Ticket(std::shared_ptr<Counts> counts, std::string address)
+        : counts_(std::move(counts)), address_(std::move(address)) {}
+    std::shared_ptr<Counts> counts_;  // null after a move
+    std::string address_;             // empty for loopback
+  };
+
+  explicit Admission(const ConnectionLimits& limits);
+  ~Admission();
+
+  tl::expected<Ticket, Refusal> admit(const boost::asio::ip::address& address, schedule::Clock::time_point now);
+  std::size_t connections() const;
+
+ private:
+  const std::shared_ptr<Ticket::Counts> counts_;
+};
+
+}  // namespace clothstream::endpoint

@@ -1,0 +1,157 @@
+// SPDX-License-Identifier: MIT
+#include "server/model/price.h"
+
+#include <algorithm>
+#include <array>
+#include <cassert>
+
+#include "server/model/mesh.h"
+#include "server/model/springs.h"
+
+namespace clothstream::model {
+namespace {
+
+// Weights in node-steps, fitted to ticks of 16x16 to 256x256 nodes on software Vulkan with two processors.
+// A node of a grid has six springs.
+constexpr double kNode = 0.4, kSpring = 0.1, kMeshFactor = 2;
+constexpr double kRungeKutta = 14;  // as a factor
+constexpr double kAir = 0.5, kHinge = 2, kSelfCollision = 20;
+// Of a node and a collider. A third of the nodes are taken to be near each collider.
+constexpr double kCollider = 0.5, kGatherCollider = 0.1;
+// Of a spring of the linear system. ACAD is taken to have a quarter of its springs active.
+constexpr double kPrepare = 2, kIteration = 0.5, kActive = 0.25;
+// Of a pair of springs that share a node, in an assembled system.
+constexpr double kFillPair = 0.6, kMultiplyPair = 0.22;
+constexpr double kCorrection = 0.45;  // of a spring, with xpbd
+// Of a node, in each tick and in each frame. The frame includes entropy coding on the host.
+constexpr double kTick = 2, kFrame = 8;
+constexpr double kTickDispatches = 6, kFrameDispatches = 12;
+
+// Nodes of the largest cloth that one workgroup simulates on a software device (SolveStage, XpbdStage).
+constexpr std::uint32_t kGroupSolve = 4096, kGroupGrid = 2048, kGroupMesh = 8192;
+
+// Bytes on device and host, measured like the weights.
+constexpr double kSceneBytes = 8e6;
+constexpr double kNodeBytes = 1200, kSpringBytes = 64, kMeshNodeBytes = 400;
+constexpr double kSelfCollisionBytes = 600, kHingeBytes = 200, kSystemBytes = 64, kPairBytes = 40;
+
+bool isSystem(SolverKind kind) {
+  return kind == SolverKind::constraint || kind == SolverKind::acad || kind == SolverKind::implicitEuler;
+}
+
+}  // namespace
+
+PriceModel::ClothCounts PriceModel::countsOf(const Grid& grid) {
+  const std::uint64_t rows = grid.rows, columns = grid.columns, nodes = rows * columns;
+  ClothCounts counts{.nodes = nodes, .mostAtNode = 8};
+  counts.springs[0] = rows * (columns - 1) + columns * (rows - 1);
+  counts.springs[1] = 2 * (rows - 1) * (columns - 1);
+  counts.springs[2] = rows * (columns - std::min<std::uint64_t>(columns, 2)) +
+                      columns * (rows - std::min<std::uint64_t>(rows, 2));
+  counts.pairs = nodes * counts.mostAtNode * counts.mostAtNode;
+  // A quad has two hinges for each way to split it.
+  counts.hinges = 6 * nodes;
+  return counts;
+}
+
+PriceModel::PriceModel(const Scene& scene) {
+  for (const Cloth& cloth : scene.cloths) {
+    if (!cloth.mesh) {
+      cloths_.push_back(countsOf(cloth.grid));
+      continue;
+    }
+    ClothCounts counts{.nodes = cloth.nodeCount(), .hinges = 3 * cloth.mesh->shape.triangles.size()};
+    std::vector<std::uint32_t> springsAt(cloth.nodeCount());
+    for (const SpringLink& link : cloth.mesh->links) {
+      ++counts.springs[static_cast<std::size_t>(link.kind)];
+      if (link.kind == SpringKind::bend) continue;
+      ++springsAt[link.a];
+      ++springsAt[link.b];
+    }
+    for (const std::uint32_t springs : springsAt) {
+      counts.pairs += std::uint64_t{springs} * springs;
+      counts.mostAtNode = std::max(counts.mostAtNode, springs);
+    }
+    cloths_.push_back(counts);
+  }
+}
+
+Work PriceModel::solverWork(const Scene& scene, const Cloth& cloth, const ClothCounts& counts) const {
+  const Solver& solver = cloth.solver;
+  const double iterations = solver.iterations;
+  const double mesh = cloth.mesh ? kMeshFactor : 1;
+  const double all = static_cast<double>(counts.allSprings());
+  Work work;
+  if (solver.kind == SolverKind::xpbd) {
+    const bool group = counts.nodes <= (cloth.mesh ? kGroupMesh : kGroupGrid);
+    (group ? work.groupNodeSteps : work.nodeSteps) = mesh * kCorrection * all * iterations;
+    work.dispatches = group ? 2 : 1 + iterations * (cloth.mesh ? 2.0 * counts.mostAtNode : 3);
+  } else if (isSystem(solver.kind)) {
+    const bool bend = solver.kind == SolverKind::implicitEuler || solver.bendConstraints;
+    const double constraints = bend ? all : static_cast<double>(counts.springs[0] + counts.springs[1]);
+    const bool group = counts.nodes <= kGroupSolve;
+    const double active = solver.kind == SolverKind::acad ? kActive : 1;
+    double prepare = mesh * kPrepare * constraints, iterate = mesh * kIteration * constraints * iterations;
+    if (isAssembled(solver)) {
+      const double pairs = static_cast<double>(counts.pairs) * (bend ? 2.25 : 1);
+      prepare += kFillPair * pairs;
+      iterate = kMultiplyPair * pairs * iterations;
+    }
+    work.nodeSteps = active * prepare;
+    (group ? work.groupNodeSteps : work.nodeSteps) += active * iterate;
+    work.dispatches = group ? 5 : 4 + 2 * iterations;
+  }
+  work.scale(scene.substeps);
+  return work;
+}
+
+Work PriceModel::work(const Scene& scene, std::size_t colliderCount) const {
+  assert(scene.cloths.size() == cloths_.size());
+  const double substeps = scene.substeps;
+  const auto colliders = static_cast<double>(colliderCount);
+  const double framesPerTick = static_cast<double>(scene.streamRate) / scene.simulationRate;
+  Work work{.nodeSteps = 0,
+            .groupNodeSteps = 0,
+            .dispatches = kTickDispatches + kFrameDispatches * framesPerTick + substeps};
+  for (std::size_t i = 0; i < cloths_.size(); ++i) {
+    const Cloth& cloth = scene.cloths[i];
+    const ClothCounts& counts = cloths_[i];
+    const auto nodes = static_cast<double>(counts.nodes);
+    double step = kNode * nodes + kSpring * static_cast<double>(counts.allSprings());
+    if (cloth.mesh) step *= kMeshFactor;
+    if (scene.integrator == Integrator::rungeKutta4) step *= kRungeKutta;
+    if (scene.environment.airDensity != 0 && (cloth.drag != 0 || cloth.lift != 0)) step += kAir * nodes;
+    if (cloth.dihedralBending != 0) step += kHinge * static_cast<double>(counts.hinges);
+    if (cloth.selfCollision) step += kSelfCollision * nodes;
+    step += kCollider * colliders * nodes;
+    work.nodeSteps +=
+        substeps * step + nodes * (kTick + kFrame * framesPerTick + kGatherCollider * colliders);
+    work += solverWork(scene, cloth, counts);
+  }
+  if (scene.integrator == Integrator::rungeKutta4) work.dispatches += 11 * substeps;
+  const auto any = [&](auto has) { return std::ranges::any_of(scene.cloths, has) ? 1.0 : 0.0; };
+  work.dispatches += 3 * substeps * any([](const Cloth& cloth) { return cloth.dihedralBending != 0; });
+  work.dispatches +=
+      (6 + 4 * substeps) * any([](const Cloth& cloth) { return cloth.selfCollision.has_value(); });
+  return work;
+}
+
+double PriceModel::bytes(const Scene& scene) const {
+  assert(scene.cloths.size() == cloths_.size());
+  double bytes = kSceneBytes;
+  for (std::size_t i = 0; i < cloths_.size(); ++i) {
+    const Cloth& cloth = scene.cloths[i];
+    const ClothCounts& counts = cloths_[i];
+    const auto nodes = static_cast<double>(counts.nodes);
+    const auto springs = static_cast<double>(counts.allSprings());
+    bytes += kNodeBytes * nodes + kSpringBytes * springs;
+    if (cloth.mesh) bytes += kMeshNodeBytes * nodes;
+    if (cloth.selfCollision) bytes += kSelfCollisionBytes * nodes;
+    if (cloth.dihedralBending != 0) bytes += kHingeBytes * static_cast<double>(counts.hinges);
+    if (isSystem(cloth.solver.kind) || cloth.solver.kind == SolverKind::xpbd) bytes += kSystemBytes * springs;
+    if (isAssembled(cloth.solver)) bytes += kPairBytes * static_cast<double>(counts.pairs);
+  }
+  return bytes;
+}
+
+}  // namespace clothstream::model

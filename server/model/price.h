@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: MIT
+// Price of a scene: time on the device and memory, computed before the scene is made or changed.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "server/model/scene.h"
+#include "server/model/springs.h"
+
+namespace clothstream::model {
+
+// Speed of a device, as simulation::SpeedMeter measures it.
+struct DeviceSpeed {
+  double nodeStepSeconds = 0;  // one node in one substep of a large grid that only springs move
+  double dispatchSeconds = 0;  // a kernel call that waits for the one before it
+  double workgroupFactor = 1;  // time of work in one workgroup, relative to the same work on the whole device
+};
+
+// Work of one tick.
+struct Work {
+  double nodeSteps = 0;       // over the whole device, in node-steps (DeviceSpeed)
+  double groupNodeSteps = 0;  // in single workgroups
+  double dispatches = 0;
+
+  Work& operator+=(const Work& other) {
+    nodeSteps += other.nodeSteps;
+    groupNodeSteps += other.groupNodeSteps;
+    dispatches += other.dispatches;
+    return *this;
+  }
+  void scale(double factor) {
+    nodeSteps *= factor;
+    groupNodeSteps *= factor;
+    dispatches *= factor;
+  }
+  double seconds(const DeviceSpeed& speed) const {
+    return (nodeSteps + groupNodeSteps * speed.workgroupFactor) * speed.nodeStepSeconds +
+           dispatches * speed.dispatchSeconds;
+  }
+};
+
+// The constructor takes time linear in nodes and springs; the other functions only depend on the number of
+// cloths, so parameters can be priced often.
+//
+// Solvers that end early are priced with all their iterations. The weights in the .cpp are fitted to measured
+// ticks (clothstream-bench price).
+class PriceModel {
+ public:
+  explicit PriceModel(const Scene& scene);
+
+  // Work of a tick and its frame. `scene` is the scene of the constructor, whose parameters may have changed
+  // since. `colliders` includes those of participants.
+  Work work(const Scene& scene, std::size_t colliders) const;
+  Work work(const Scene& scene) const { return work(scene, scene.colliders.size()); }
+  // Memory on the device and on the host, in bytes.
+  double bytes(const Scene& scene) const;
+
+ private:
+  // Counts of one cloth.
+  struct ClothCounts {
+    std::uint64_t nodes = 0;
+    std::array<std::uint64_t, kSpringKinds> springs{};
+    std::uint64_t pairs = 0;  // sum over nodes of the squared number of their structural and shear springs
+    std::uint32_t mostAtNode = 0;  // of these springs
+    std::uint64_t hinges = 0;
+    std::uint64_t allSprings() const { return springs[0] + springs[1] + springs[2]; }
+  };
+  static ClothCounts countsOf(const Grid& grid);
+  Work solverWork(const Scene& scene, const Cloth& cloth, const ClothCounts& counts) const;
+
+  std::vector<ClothCounts> cloths_;
+};
+
+}  // namespace clothstream::model

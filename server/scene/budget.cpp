@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: MIT
+#include "server/scene/budget.h"
+
+#include <algorithm>
+#include <functional>
+#include <utility>
+
+#include <fmt/format.h>
+
+namespace clothstream::scene {
+namespace {
+
+constexpr double kMegabyte = 1e6;
+
+// Largest number from 1 to `most` that fits, or 0. A larger number never fits if a smaller one does not.
+std::uint32_t largest(std::uint32_t most, const std::function<bool(std::uint32_t)>& fits) {
+  std::uint32_t low = 0, high = most;
+  while (low < high) {
+    const std::uint32_t middle = high - (high - low) / 2;
+    if (fits(middle))
+      low = middle;
+    else
+      high = middle - 1;
+  }
+  return low;
+}
+
+// The mildest reduction with which the load fits: iterations, then substeps, then nodes. Of a scene that is
+// made already, only the iterations can change.
+std::string whatFits(const model::Scene& scene, bool made, double load, double room,
+                     const std::function<double(const model::Scene&)>& loadOf) {
+  model::Scene smaller = scene;
+  std::uint32_t iterations = 1;
+  for (const model::Cloth& cloth : scene.cloths)
+    if (cloth.solver.kind != model::SolverKind::massSpring)
+      iterations = std::max(iterations, cloth.solver.iterations);
+  const auto withIterations = [&](std::uint32_t most) {
+    for (std::size_t i = 0; i < scene.cloths.size(); ++i)
+      smaller.cloths[i].solver.iterations = std::min(scene.cloths[i].solver.iterations, most);
+    return loadOf(smaller) <= room;
+  };
+  if (const std::uint32_t fit = largest(iterations - 1, withIterations); fit > 0)
+    return fmt::format("at most {} iterations would fit", fit);
+  if (made) return "nothing more would fit";
+  smaller = scene;
+  const auto withSubsteps = [&](std::uint32_t most) {
+    smaller.substeps = most;
+    return loadOf(smaller) <= room;
+  };
+  if (const std::uint32_t fit = largest(scene.substeps - 1, withSubsteps); fit > 0)
+    return fmt::format("at most {} substeps would fit", fit);
+  const auto nodes = static_cast<std::uint64_t>(scene.nodeCount() * room / load);
+  return nodes > 0 ? fmt::format("about {} nodes would fit", nodes) : std::string("nothing would fit");
+}
+
+}  // namespace
+
+void Budget::setSpeed(const model::DeviceSpeed& speed) {
+  const std::lock_guard lock(mutex_);
+  speed_ = speed;
+}
+
+model::DeviceSpeed Budget::speed() const {
+  const std::lock_guard lock(mutex_);
+  return speed_;
+}
+
+Charge::Charge(std::shared_ptr<Budget> budget, const model::Scene& scene, bool free)
+    : budget_(std::move(budget)), model_(scene), made_(free) {
+  if (!free) return;
+  freeWork_ = model_.work(scene);
+  freeMegabytes_ = model_.bytes(scene) / kMegabyte;
+}
+
+Charge::~Charge() {
+  const std::lock_guard lock(budget_->mutex_);
+  replace({});
+}
+
+Charge::Amount Charge::priceOf(const model::Scene& scene) const {
+  const double seconds = model_.work(scene).seconds(budget_->speed_) - freeWork_.seconds(budget_->speed_);
+  return {.load = std::max(0.0, seconds) * scene.simulationRate,
+          .megabytes = std::max(0.0, model_.bytes(scene) / kMegabyte - freeMegabytes_)};
+}
+
+void Charge::replace(const Amount& next) {
+  budget_->load_ += next.load - charged_.load;
+  budget_->megabytes_ += next.megabytes - charged_.megabytes;
+  charged_ = next;
+}
+
+void Charge::restore(const model::Scene& scene) {
+  const std::lock_guard lock(budget_->mutex_);
+  replace(priceOf(scene));
+}
+
+messages::Result<void> Charge::charge(const std::string& path, const model::Scene& scene) {
+  const std::lock_guard lock(budget_->mutex_);
+  const BudgetLimits& limits = budget_->limits_;
+  const Amount price = priceOf(scene);
+  const auto refuse = [&](std::string text) {
+    return tl::unexpected(
+        messages::FieldError{v1::ERROR_CODE_RESOURCE_EXHAUSTED, path + ": " + std::move(text)});
+  };
+  // What costs no more than before is always allowed.
+  const double freeLoad = std::max(0.0, limits.load - (budget_->load_ - charged_.load));
+  const double roomForLoad = std::min(limits.sceneLoad, freeLoad);
+  if (price.load > charged_.load && price.load > roomForLoad) {
+    const auto loadOf = [&](const model::Scene& other) { return priceOf(other).load; };
+    return refuse(fmt::format(
+        "would take {:.2f} s of the device's time a second, by estimate; one scene may take {:.2f} s "
+        "(--max-scene-load), and {:.2f} s of {:.2f} s (--max-load) are free: {}",
+        price.load, limits.sceneLoad, freeLoad, limits.load,
+        whatFits(scene, made_, price.load, roomForLoad, loadOf)));
+  }
+  const double free = std::max(0.0, limits.megabytes - (budget_->megabytes_ - charged_.megabytes));
+  const double room = std::min(limits.sceneMegabytes, free);
+  if (price.megabytes > charged_.megabytes && price.megabytes > room)
+    return refuse(fmt::format(
+        "would take {:.0f} MB of memory, by estimate; one scene may take {:.0f} (--max-scene-memory), and "
+        "{:.0f} "
+        "of {:.0f} (--max-memory) are free: {}",
+        price.megabytes, limits.sceneMegabytes, free, limits.megabytes,
+        made_ ? "nothing more would fit"
+              : fmt::format("about {:.0f} nodes would fit", scene.nodeCount() * room / price.megabytes)));
+  replace(price);
+  made_ = true;
+  return {};
+}
+
+}  // namespace clothstream::scene

@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: MIT
+// Device time and memory that participants may add to what the server started with.
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <mutex>
+#include <string>
+
+#include "server/messages/field_error.h"
+#include "server/model/price.h"
+#include "server/model/scene.h"
+
+namespace clothstream::scene {
+
+// Memory is counted on device and host together. A load is the price of a scene's ticks in seconds of the
+// device's time per second. 1: a device that does nothing else can just run it in real time.
+struct BudgetLimits {
+  // Of one scene, and of all scenes together.
+  double sceneLoad = 1, load = 1;
+  double sceneMegabytes = 256, megabytes = 256;
+};
+
+// Thread-safe.
+class Budget {
+ public:
+  explicit Budget(const BudgetLimits& limits = {}) : limits_(limits) {}
+
+  // Until the speed is known, time costs nothing.
+  void setSpeed(const model::DeviceSpeed& speed);
+  model::DeviceSpeed speed() const;
+
+ private:
+  friend class Charge;
+
+  const BudgetLimits limits_;
+  mutable std::mutex mutex_;
+  model::DeviceSpeed speed_;
+  double load_ = 0, megabytes_ = 0;  // of all charges
+};
+
+// What one scene is charged, from its construction on. Not thread-safe.
+class Charge {
+ public:
+  // `free`: the scene costs nothing as it is now; only changes that make it more expensive are charged.
+  Charge(std::shared_ptr<Budget> budget, const model::Scene& scene, bool free);
+  ~Charge();
+  Charge(const Charge&) = delete;
+  Charge& operator=(const Charge&) = delete;
+
+  // Charges the scene as it will be. If that exceeds the budget, changes nothing and returns an error that
+  // names price, budget and what would fit. `path` begins its text.
+  messages::Result<void> charge(const std::string& path, const model::Scene& scene);
+  // Charges the scene with parameters that it had before, also beyond the budget.
+  void restore(const model::Scene& scene);
+
+  // Work of a tick of the charged scene with this number of colliders.
+  model::Work work(const model::Scene& scene, std::size_t colliders) const {
+    return model_.work(scene, colliders);
+  }
+
+ private:
+  struct Amount {
+    double load = 0, megabytes = 0;
+  };
+  Amount priceOf(const model::Scene& scene) const;  // the budget's mutex is held
+  void replace(const Amount& next);                 // the budget's mutex is held
+
+  const std::shared_ptr<Budget> budget_;
+  const model::PriceModel model_;
+  model::Work freeWork_;
+  double freeMegabytes_ = 0;
+  Amount charged_;
+  bool made_;  // the scene exists: its shape and substeps stay
+};
+
+}  // namespace clothstream::scene

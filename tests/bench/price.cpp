@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: MIT
+// Suite price: the price of a tick, computed from the scene, and the tick that was measured.
+#include "server/model/price.h"
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "server/simulation/speed_meter.h"
+#include "tests/bench/hung_cloth.h"
+#include "tests/bench/simulated.h"
+#include "tests/bench/suite.h"
+
+namespace clothstream::bench {
+namespace {
+
+using enum model::SolverKind;
+
+struct Case {
+  const char* method;
+  model::Solver solver{};
+  model::Integrator integrator = model::Integrator::semiImplicitEuler;
+  bool air = false, bending = false, selfCollision = false;
+  std::uint32_t colliders = 0;
+};
+
+// Solvers that may end early never do: the tolerance is 0.
+std::vector<Case> cases() {
+  std::vector<Case> all = {{"mass_spring"},
+                           {.method = "runge_kutta", .integrator = model::Integrator::rungeKutta4},
+                           {.method = "air", .air = true},
+                           {.method = "dihedral", .bending = true},
+                           {.method = "self_collision", .selfCollision = true},
+                           {.method = "1 collider", .colliders = 1},
+                           {.method = "8 colliders", .colliders = 8},
+                           {.method = "64 colliders", .colliders = 64}};
+  const auto solver = [&](const char* method, model::SolverKind kind, std::uint32_t iterations) {
+    all.push_back({.method = method});
+    all.back().solver.kind = kind;
+    all.back().solver.iterations = iterations;
+    all.back().solver.tolerance = 0;
+  };
+  for (const std::uint32_t iterations : {5u, 50u}) {
+    solver("constraint", constraint, iterations);
+    solver("acad", acad, iterations);
+    solver("implicit_euler", implicitEuler, iterations);
+    solver("assembled", constraint, iterations);
+    all.back().solver.path = model::ConstraintPath::assembled;
+  }
+  for (const std::uint32_t iterations : {1u, 10u}) solver("xpbd", xpbd, iterations);
+  return all;
+}
+
+model::Scene sceneOf(const Case& experiment, std::uint32_t size) {
+  model::Scene scene = hungSheet(size, experiment.solver, 8);
+  model::Cloth& cloth = scene.cloths.front();
+  const double h = scene.substepSeconds();
+  const auto bearable = static_cast<float>(0.1 * double{cloth.nodeMass()} / (h * h));
+  cloth.structural.stiffness = bearable;
+  cloth.shear.stiffness = bearable / 2;
+  cloth.bend.stiffness = bearable / 10;
+  scene.integrator = experiment.integrator;
+  scene.environment.airDensity = experiment.air ? 1.2f : 0;
+  cloth.drag = cloth.lift = experiment.air ? 1.0f : 0;
+  cloth.dihedralBending = experiment.bending ? 1e-9f : 0;
+  if (experiment.selfCollision)
+    cloth.selfCollision = model::SelfCollision{.radius = 0.4f / static_cast<float>(size)};
+  for (std::uint32_t i = 0; i < experiment.colliders; ++i) {
+    model::Collider collider;
+    collider.name = std::to_string(i);
+    collider.shape = model::Sphere{.radius = 0.3f};
+    collider.pose.position = model::Vec3(0, -0.5f, 0.3f);
+    scene.colliders.push_back(collider);
+  }
+  return scene;
+}
+
+}  // namespace
+
+Rows runPrice(vulkan::Device& device, const Settings& settings) {
+  std::vector<std::uint32_t> sizes = {16, 32, 64, 128, 256};
+  if (settings.size) sizes = {*settings.size};
+  simulation::SpeedMeter meter(device);
+  Rows rows;
+  for (const std::uint32_t size : sizes)
+    for (const Case& experiment : cases()) {
+      const model::Scene scene = sceneOf(experiment, size);
+      const std::uint64_t before = device.allocatedBytes();
+      Simulated simulated(device, scene, {});
+      const std::uint64_t bytes = device.allocatedBytes() - before;
+      const model::DeviceSpeed speed = meter.measure();
+      const int ticks = size < 128 ? 10 : 4;
+      for (int tick = -1; tick < ticks; ++tick) {
+        if (tick == 0) simulated.forgetTimes();
+        simulated.tick(simulation::inputsAt(scene, static_cast<std::uint64_t>(tick + 1)));
+      }
+      const double measured = simulated.wall().median();
+      const model::PriceModel model(scene);
+      const double price = model.work(scene).seconds(speed);
+      rows.push_back({{"suite", "price"},
+                      {"method", experiment.method},
+                      {"size", size},
+                      {"iterations", experiment.solver.iterations},
+                      {"node_step_ns", speed.nodeStepSeconds * 1e9},
+                      {"dispatch_us", speed.dispatchSeconds * 1e6},
+                      {"price_ms", price * 1e3},
+                      {"tick_ms", measured * 1e3},
+                      {"price_over_tick", price / measured},
+                      {"price_mb", model.bytes(scene) / 1e6},
+                      {"device_mb", static_cast<double>(bytes) / 1e6}});
+    }
+  return rows;
+}
+
+}  // namespace clothstream::bench

@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: MIT
+#include "server/endpoint/listen/admission.h"
+
+#include <chrono>
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+namespace clothstream::endpoint {
+namespace {
+
+using Refusal = Admission::Refusal;
+
+const schedule::Clock::time_point kNow{std::chrono::hours(1)};
+
+boost::asio::ip::address address(const char* text) {
+  return boost::asio::ip::make_address(text);
+}
+
+TEST(AdmissionTest, LimitsConnectionsInAllAndCountsEndedOnesNoMore) {
+  Admission admission({.connections = 2});
+  auto first = admission.admit(address("127.0.0.1"), kNow);
+  ASSERT_TRUE(first);
+  {
+    const auto second = admission.admit(address("192.0.2.1"), kNow);
+    ASSERT_TRUE(second);
+    EXPECT_EQ(admission.admit(address("192.0.2.2"), kNow).error(), Refusal::connections);
+    EXPECT_EQ(admission.connections(), 2U);
+  }
+  EXPECT_EQ(admission.connections(), 1U);
+  EXPECT_TRUE(admission.admit(address("192.0.2.2"), kNow));
+}
+
+TEST(AdmissionTest, LimitsConnectionsOfAnAddressButNotOfThisMachine) {
+  Admission admission({.connections = 100, .connectionsPerAddress = 2});
+  std::vector<Admission::Ticket> open;
+  const auto admit = [&](const char* from) {
+    auto ticket = admission.admit(address(from), kNow);
+    if (ticket) open.push_back(std::move(*ticket));
+    return ticket.has_value();
+  };
+  EXPECT_TRUE(admit("192.0.2.1") && admit("192.0.2.1"));
+  EXPECT_EQ(admission.admit(address("192.0.2.1"), kNow).error(), Refusal::connectionsOfAddress);
+  EXPECT_FALSE(admit("::ffff:192.0.2.1")) << "the same address, mapped to IPv6";
+  EXPECT_TRUE(admit("192.0.2.2"));
+  EXPECT_TRUE(admit("2001:db8::1") && admit("2001:db8::2"));
+  EXPECT_FALSE(admit("2001:db8::3")) << "the same first 64 bits";
+  EXPECT_TRUE(admit("2001:db8:0:1::3"));
+  for (int i = 0; i < 10; ++i) EXPECT_TRUE(admit(i % 2 == 0 ? "127.0.0.1" : "::1"));
+  open.clear();
+  EXPECT_TRUE(admit("192.0.2.1"));
+}
+
+TEST(AdmissionTest, LimitsNewConnectionsPerSecond) {
+  Admission admission({.connectionsPerSecond = 10});
+  for (int i = 0; i < 10; ++i) EXPECT_TRUE(admission.admit(address("127.0.0.1"), kNow)) << i;
+  EXPECT_EQ(admission.admit(address("127.0.0.1"), kNow).error(), Refusal::rate);
+  EXPECT_TRUE(admission.admit(address("127.0.0.1"), kNow + std::chrono::milliseconds(150)));
+  EXPECT_FALSE(admission.admit(address("127.0.0.1"), kNow + std::chrono::milliseconds(150)));
+}
+
+TEST(AdmissionTest, TicketMayOutliveTheAdmission) {
+  auto admission = std::make_unique<Admission>(ConnectionLimits{});
+  auto ticket = admission->admit(address("192.0.2.1"), kNow);
+  admission.reset();
+  EXPECT_TRUE(ticket);
+}
+
+}  // namespace
+}  // namespace clothstream::endpoint

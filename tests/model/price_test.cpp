@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: MIT
+// Price of a scene, without a device.
+#include "server/model/price.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/model/meshes.h"
+
+namespace clothstream::model {
+namespace {
+
+constexpr DeviceSpeed kSpeed{.nodeStepSeconds = 1e-8, .dispatchSeconds = 1e-5, .workgroupFactor = 2};
+
+Scene sheet(std::uint32_t size, SolverKind kind = SolverKind::massSpring) {
+  Cloth cloth;
+  cloth.name = "sheet";
+  cloth.grid = {.rows = size, .columns = size, .width = 1, .height = 1, .pose = {}};
+  cloth.mass = 1;
+  cloth.solver.kind = kind;
+  Scene scene;
+  scene.name = "sheet";
+  scene.cloths = {cloth};
+  return scene;
+}
+
+double secondsOf(const Scene& scene) {
+  return PriceModel(scene).work(scene).seconds(kSpeed);
+}
+
+TEST(Price, TimeGrowsWithNodesSubstepsIterationsAndColliders) {
+  const Scene plain = sheet(100);
+  const double before = secondsOf(plain);
+  EXPECT_GT(before, 0);
+  Scene scene = plain;
+  scene.substeps *= 2;
+  // Frames cost the same.
+  EXPECT_GT(secondsOf(scene) / before, 1.3);
+  EXPECT_LT(secondsOf(scene) / before, 2);
+  EXPECT_NEAR(secondsOf(sheet(200)) / before, 4, 0.5);
+  scene = plain;
+  scene.colliders.resize(10);
+  EXPECT_GT(secondsOf(scene), 2 * before);
+  scene = plain;
+  scene.cloths[0].selfCollision = SelfCollision{.radius = 0.001f};
+  EXPECT_GT(secondsOf(scene), 5 * before);
+  for (const SolverKind kind :
+       {SolverKind::constraint, SolverKind::acad, SolverKind::xpbd, SolverKind::implicitEuler}) {
+    Scene few = sheet(100, kind), many = sheet(100, kind);
+    few.cloths[0].solver.iterations = 10;
+    many.cloths[0].solver.iterations = 1000;
+    EXPECT_GT(secondsOf(few), before);
+    EXPECT_GT(secondsOf(many), 30 * secondsOf(few)) << static_cast<int>(kind);
+  }
+}
+
+// The scene that stopped every other scene for good before scenes had a price.
+TEST(Price, HostileSceneCostsManyTimesTheDevice) {
+  Scene scene = sheet(512, SolverKind::constraint);
+  scene.cloths[0].solver.iterations = 10'000;
+  scene.cloths[0].solver.tolerance = 0;
+  scene.substeps = 64;
+  EXPECT_GT(secondsOf(scene) * scene.simulationRate, 10'000);
+}
+
+TEST(Price, MeshOfQuadsCostsAboutAsMuchAsTheGrid) {
+  const Scene grid = sheet(40, SolverKind::constraint);
+  Scene mesh = grid;
+  mesh.cloths[0] = asMesh(grid.cloths[0]);
+  ASSERT_EQ(mesh.nodeCount(), grid.nodeCount());
+  EXPECT_NEAR(secondsOf(mesh) / secondsOf(grid), 2, 0.5);  // kMeshFactor
+  EXPECT_GT(PriceModel(mesh).bytes(mesh), PriceModel(grid).bytes(grid));
+}
+
+TEST(Price, MemoryOfAssembledSystemGrowsWithPairsOfSprings) {
+  Scene scene = sheet(64, SolverKind::constraint);
+  const double free = PriceModel(scene).bytes(scene);
+  scene.cloths[0].solver.path = ConstraintPath::assembled;
+  EXPECT_GT(PriceModel(scene).bytes(scene), free + 4096 * 64 * 20.0);
+}
+
+}  // namespace
+}  // namespace clothstream::model
