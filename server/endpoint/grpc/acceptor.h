@@ -23,7 +23,8 @@ class Acceptor {
  public:
   // Listens when it returns, and throws what listen() throws. `to` gets the connections.
   Acceptor(const std::string& host, std::uint16_t port, const ConnectionLimits& limits,
-           std::unique_ptr<grpc::experimental::ExternalConnectionAcceptor> to, telemetry::ServerMetrics& metrics);
+           std::unique_ptr<grpc::experimental::ExternalConnectionAcceptor> to,
+           telemetry::ServerMetrics& metrics);
   // Stops to accept; open connections stay.
   ~Acceptor();
   Acceptor(const Acceptor&) = delete;

@@ -22,9 +22,9 @@ struct ConnectionLimits {
 // Addresses with the same key share their limits. Empty for loopback.
 std::string addressKey(boost::asio::ip::address address);
 
-// Thread-safe. Addresses of IPv6 count by their first 64 bits, because one peer usually has all addresses that
-// begin with them. All programs of this machine share the loopback addresses, which therefore have no limit of
-// their own.
+// Thread-safe. Addresses of IPv6 count by their first 64 bits, because one peer usually has all addresses
+// that begin with them. All programs of this machine share the loopback addresses, which therefore have no
+// limit of their own.
 class Admission {
  public:
   enum class Refusal { connections, connectionsOfAddress, rate };
@@ -48,7 +48,8 @@ class Admission {
   explicit Admission(const ConnectionLimits& limits);
   ~Admission();
 
-  tl::expected<Ticket, Refusal> admit(const boost::asio::ip::address& address, schedule::Clock::time_point now);
+  tl::expected<Ticket, Refusal> admit(const boost::asio::ip::address& address,
+                                      schedule::Clock::time_point now);
   std::size_t connections() const;
 
  private:

@@ -13,7 +13,7 @@ namespace clothstream::endpoint {
 // `host` is an address or a name of this machine; port 0 picks a free one. Throws std::runtime_error with
 // advice if the port is in use (`option` is the command line's option that chooses it) or the host is not an
 // address of this machine.
-boost::asio::ip::tcp::acceptor listen(boost::asio::io_context& io, const std::string& host, std::uint16_t port,
-                                      const char* option);
+boost::asio::ip::tcp::acceptor listen(boost::asio::io_context& io, const std::string& host,
+                                      std::uint16_t port, const char* option);
 
 }  // namespace clothstream::endpoint
