@@ -14,10 +14,11 @@
 namespace clothstream::scene {
 
 // Memory is counted on device and host together. A load is the price of a scene's ticks in seconds of the
-// device's time per second. 1: a device that does nothing else can just run it in real time.
+// device's time per second. The default is above 1, because most solvers end long before their last
+// iteration, and because a scene that is too slow only slows itself down.
 struct BudgetLimits {
   // Of one scene, and of all scenes together.
-  double sceneLoad = 1, load = 1;
+  double sceneLoad = 4, load = 4;
   double sceneMegabytes = 256, megabytes = 256;
 };
 
