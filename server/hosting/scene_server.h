@@ -52,7 +52,7 @@ struct ServerOptions {
   std::uint32_t maxCreatedScenes = 16;
   // Nodes of a scene that a peer creates.
   std::uint64_t maxSceneNodes = 262'144;
-  // What participants may add by creating scenes and changing parameters.
+  // Limits what participants add by creating scenes and changing parameters.
   scene::BudgetLimits budget{};
   // Threads that predict large frames on the CPU; 0 means automatic (EncoderThreads).
   std::uint32_t encoderThreads = 0;

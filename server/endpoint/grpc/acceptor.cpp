@@ -63,7 +63,7 @@ void Acceptor::accept() {
       accept();  // first, so that it goes on if accepted() throws
       return accepted(std::move(socket));
     }
-    // Such as no free descriptor; an immediate retry would only spin.
+    // For example, no descriptor is free. An immediate retry would only spin.
     pause_.expires_after(kAcceptPause);
     pause_.async_wait([this](boost::system::error_code cancelled) {
       if (!cancelled) accept();
