@@ -81,7 +81,7 @@ void FramePublisher::encode() {
       const encode::EncodedFrame encoded = recorded.encoder->entropyCode(recorded.frame, packet_);
       if (!frame_.discarded) publish(recorded, encoded);
     } catch (const std::exception& failure) {
-      // Such as a lack of memory. Clients miss the frame and request a key frame.
+      // For example, memory ran out. Clients miss the frame and request a key frame.
       spdlog::error("a frame of tick {} could not be published: {}", recorded.frame.tick, failure.what());
     }
   }

@@ -54,7 +54,7 @@ struct ServerOptions {
   std::uint64_t maxSceneNodes = 262'144;
   // A created scene is deleted when it has had no participant for this long; 0: never.
   std::chrono::milliseconds sceneLifetime{3'600'000};
-  // What participants may add by creating scenes and changing parameters.
+  // Limits what participants add by creating scenes and changing parameters.
   scene::BudgetLimits budget{};
   // Threads that predict large frames on the CPU; 0 means automatic (EncoderThreads).
   std::uint32_t encoderThreads = 0;

@@ -16,14 +16,14 @@ namespace {
 constexpr double kNode = 0.4, kSpring = 0.1, kMeshFactor = 2;
 constexpr double kRungeKutta = 14;  // as a factor
 constexpr double kAir = 0.5, kHinge = 2, kSelfCollision = 20;
-// Of a node and a collider. A third of the nodes are taken to be near each collider.
+// Each node and collider costs these. A third of the nodes are assumed to be near each collider.
 constexpr double kCollider = 0.5, kGatherCollider = 0.1;
-// Of a spring of the linear system. ACAD is taken to have a quarter of its springs active.
+// Each spring of the linear system costs these. ACAD is assumed to have a quarter of its springs active.
 constexpr double kPrepare = 2, kIteration = 0.5, kActive = 0.25;
-// Of a pair of springs that share a node, in an assembled system.
+// Each pair of springs that share a node costs these in an assembled system.
 constexpr double kFillPair = 0.6, kMultiplyPair = 0.22;
 constexpr double kCorrection = 0.45;  // of a spring, with xpbd
-// Of a node, in each tick and in each frame. The frame includes entropy coding on the host.
+// Each node costs these in a tick and in a frame. The frame includes entropy coding on the host.
 constexpr double kTick = 2, kFrame = 8;
 constexpr double kTickDispatches = 6, kFrameDispatches = 12;
 

@@ -48,7 +48,7 @@ struct ProgramOptions {
   std::uint16_t port = 8080, grpcPort = 50051;
   std::filesystem::path page;  // empty: the directory next to the program, if it exists
   std::vector<std::string> publicNames, allowedOrigins;
-  // Of each endpoint.
+  // These limits hold for each endpoint.
   std::uint32_t maxConnections = 256, maxConnectionsPerAddress = 64;
   double connectionsPerSecond = 200;
 

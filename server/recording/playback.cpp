@@ -82,7 +82,7 @@ void Playback::run(scene::LiveScene& scene) {
     try {
       next = step(scene, Clock::now());
     } catch (const std::exception& failure) {
-      // Such as a lack of memory.
+      // For example, memory ran out.
       spdlog::error("{}: playing failed: {}; trying again", scene.name(), failure.what());
       next = Clock::now() + kRetryPeriod;
     }

@@ -102,7 +102,7 @@ messages::Result<void> Charge::charge(const std::string& path, const model::Scen
     return tl::unexpected(
         messages::FieldError{v1::ERROR_CODE_RESOURCE_EXHAUSTED, path + ": " + std::move(text)});
   };
-  // What costs no more than before is always allowed.
+  // A price that is no higher than before is always allowed.
   const double freeLoad = std::max(0.0, limits.load - (budget_->load_ - charged_.load));
   const double roomForLoad = std::min(limits.sceneLoad, freeLoad);
   if (price.load > charged_.load && price.load > roomForLoad) {
@@ -118,8 +118,7 @@ messages::Result<void> Charge::charge(const std::string& path, const model::Scen
   if (price.megabytes > charged_.megabytes && price.megabytes > room)
     return refuse(fmt::format(
         "would take {:.0f} MB of memory, by estimate; one scene may take {:.0f} (--max-scene-memory), and "
-        "{:.0f} "
-        "of {:.0f} (--max-memory) are free: {}",
+        "{:.0f} of {:.0f} (--max-memory) are free: {}",
         price.megabytes, limits.sceneMegabytes, free, limits.megabytes,
         made_ ? "nothing more would fit"
               : fmt::format("about {:.0f} nodes would fit", scene.nodeCount() * room / price.megabytes)));

@@ -14,10 +14,11 @@
 namespace clothstream::scene {
 
 // Memory is counted on device and host together. A load is the price of a scene's ticks in seconds of the
-// device's time per second. 1: a device that does nothing else can just run it in real time.
+// device's time per second. The default is above 1, because most solvers end long before their last
+// iteration, and because a scene that is too slow only slows itself down.
 struct BudgetLimits {
-  // Of one scene, and of all scenes together.
-  double sceneLoad = 1, load = 1;
+  // The first of each pair limits one scene, the second all scenes together.
+  double sceneLoad = 4, load = 4;
   double sceneMegabytes = 256, megabytes = 256;
 };
 
@@ -39,7 +40,7 @@ class Budget {
   double load_ = 0, megabytes_ = 0;  // of all charges
 };
 
-// What one scene is charged, from its construction on. Not thread-safe.
+// Charges one scene to the budget while it lives. Not thread-safe.
 class Charge {
  public:
   // `free`: the scene costs nothing as it is now; only changes that make it more expensive are charged.

@@ -69,7 +69,7 @@ void Session::receive(std::span<const std::byte> bytes) {
     requestId_ = message->request_id();
     dispatch(*message, now);
   } catch (const std::exception& failure) {
-    // Such as a lack of memory. It must end neither the thread of the endpoint nor other sessions.
+    // For example, memory ran out. That must end neither the endpoint's thread nor other sessions.
     spdlog::error("{}: a message failed: {}", peer_, failure.what());
     fail(v1::ERROR_CODE_RESOURCE_EXHAUSTED, "the server could not handle the message; try again later");
   }

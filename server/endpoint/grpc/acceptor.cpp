@@ -2,11 +2,13 @@
 #include "server/endpoint/grpc/acceptor.h"
 
 #include <chrono>
+#include <exception>
 #include <utility>
 #include <vector>
 
 #include <fcntl.h>
 #include <poll.h>
+#include <spdlog/spdlog.h>
 #include <unistd.h>
 
 #include "server/endpoint/listen/listen.h"
@@ -42,16 +44,26 @@ Acceptor::~Acceptor() {
 void Acceptor::start() {
   accept();
   checkLater();
-  thread_ = std::thread([this] { io_.run(); });
+  thread_ = std::thread([this] { run(); });
+}
+
+// An exception, such as for a lack of memory, ends the acceptance of one connection and not the endpoint.
+void Acceptor::run() {
+  for (;;) try {
+      io_.run();
+      return;
+    } catch (const std::exception& failure) {
+      spdlog::error("gRPC: a connection was not accepted: {}", failure.what());
+    }
 }
 
 void Acceptor::accept() {
   acceptor_.async_accept([this](boost::system::error_code error, tcp::socket socket) {
     if (!error) {
-      accepted(std::move(socket));
-      return accept();
+      accept();  // first, so that it goes on if accepted() throws
+      return accepted(std::move(socket));
     }
-    // Such as no free descriptor; an immediate retry would only spin.
+    // For example, no descriptor is free. An immediate retry would only spin.
     pause_.expires_after(kAcceptPause);
     pause_.async_wait([this](boost::system::error_code cancelled) {
       if (!cancelled) accept();
@@ -68,9 +80,12 @@ void Acceptor::accepted(tcp::socket socket) {
   if (!ticket) return metrics_.refusedConnections.add();
   socket.set_option(tcp::no_delay(true), error);
   socket.non_blocking(true, error);
-  const int copy = ::fcntl(socket.native_handle(), F_DUPFD_CLOEXEC, 0);
-  if (copy < 0) return metrics_.refusedConnections.add();
-  connections_.push_back({copy, std::move(*ticket)});
+  connections_.push_back({-1, std::move(*ticket)});
+  connections_.back().copy = ::fcntl(socket.native_handle(), F_DUPFD_CLOEXEC, 0);
+  if (connections_.back().copy < 0) {
+    connections_.pop_back();
+    return metrics_.refusedConnections.add();
+  }
   grpc::experimental::ExternalConnectionAcceptor::NewConnectionParameters connection;
   connection.fd = socket.release();
   to_->HandleNewConnection(&connection);

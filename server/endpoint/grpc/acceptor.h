@@ -43,6 +43,7 @@ class Acceptor {
     Admission::Ticket ticket;
   };
 
+  void run();
   void accept();
   void accepted(boost::asio::ip::tcp::socket socket);
   void checkLater();

@@ -100,8 +100,8 @@ struct WebEndpoint::State {
         });
         return;
       }
+      accept();  // first, so that it goes on if serve() throws
       serve(std::move(socket));
-      accept();
     });
   }
 

@@ -55,7 +55,7 @@ TEST(BudgetTest, RefusesSceneAboveItsLimitAndNamesIterationsThatFit) {
   EXPECT_THAT(refused.error().text, HasSubstr("createScene.scene: would take "));
   EXPECT_THAT(refused.error().text, HasSubstr("(--max-scene-load)"));
   EXPECT_THAT(refused.error().text, HasSubstr("at most 17 iterations would fit"));
-  // What the error promises holds.
+  // The number of iterations that the error names fits.
   EXPECT_TRUE(charge.charge("createScene.scene", small));
 }
 
