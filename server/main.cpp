@@ -26,6 +26,7 @@
 #include "server/messages/scene_file.h"
 #include "server/messages/scene_message.h"
 #include "server/model/material.h"
+#include "server/monitoring/monitoring_endpoint.h"
 #include "server/options/program_options.h"
 #include "server/recording/playback.h"
 #include "server/recording/recordings.h"
@@ -166,9 +167,46 @@ void waitForStop(const Signals& signals, const ProgramOptions& options,
   }
 }
 
+// Opens the endpoint for operators, before the scenes are loaded, and prints its address. Null without
+// --metrics-port.
+std::unique_ptr<monitoring::MonitoringEndpoint> openMonitoring(const ProgramOptions& options) {
+  if (!options.metricsPort) return nullptr;
+  auto endpoint = std::make_unique<monitoring::MonitoringEndpoint>(
+      monitoring::MonitoringOptions{.host = options.metricsHost,
+                                    .port = *options.metricsPort,
+                                    .version = CLOTHSTREAM_VERSION,
+                                    .publicNames = options.publicNames});
+  fmt::print("metrics http://{}/metrics\n", localAddress(options.metricsHost, endpoint->port()));
+  std::fflush(stdout);
+  return endpoint;
+}
+
+// Shows a server to the operators while this lives.
+class Monitored {
+ public:
+  // `endpoint` may be null.
+  Monitored(monitoring::MonitoringEndpoint* endpoint, hosting::SceneServer& server) : endpoint_(endpoint) {
+    if (endpoint_ != nullptr) endpoint_->started(server);
+  }
+  ~Monitored() {
+    if (endpoint_ != nullptr) endpoint_->stopped();
+  }
+  Monitored(const Monitored&) = delete;
+  Monitored& operator=(const Monitored&) = delete;
+
+  void stopping() const {
+    if (endpoint_ != nullptr) endpoint_->stopping();
+  }
+
+ private:
+  monitoring::MonitoringEndpoint* const endpoint_;
+};
+
 // Serves through both endpoints until a signal or --seconds ends it. `intro` is printed before the addresses.
+// `monitoring` may be null.
 void openEndpoints(hosting::SceneServer& server, const ProgramOptions& options, const Signals& signals,
-                   const std::string& intro, const std::function<std::string()>& report) {
+                   monitoring::MonitoringEndpoint* monitoring, const std::string& intro,
+                   const std::function<std::string()>& report) {
   {
     const std::filesystem::path page = options.page.empty() ? pageNextToProgram() : options.page;
     if (page.empty())
@@ -183,14 +221,17 @@ void openEndpoints(hosting::SceneServer& server, const ProgramOptions& options, 
     fmt::print("{}page    http://{}/\ngRPC    {}\n", intro, localAddress(options.host, web.port()),
                localAddress(options.host, rpc.port()));
     std::fflush(stdout);
+    const Monitored monitored(monitoring, server);
     waitForStop(signals, options, report);
     spdlog::info("stopping");
+    monitored.stopping();
     server.stop();
   }
   fmt::print("{}", report());
 }
 
 int play(const ProgramOptions& options, const Signals& signals) {
+  const auto monitoring = openMonitoring(options);
   auto recording = recording::RecordedStream::open(options.recording);
   if (!recording) throw std::runtime_error(recording.error());
   if (options.playback.from > recording->length())
@@ -203,11 +244,12 @@ int play(const ProgramOptions& options, const Signals& signals) {
                                         recording->length(), scene, recording->device());
   hosting::SceneServer server(
       scene, std::make_shared<recording::Playback>(std::move(*recording), options.playback), options.server);
-  openEndpoints(server, options, signals, intro, [&] { return server.report(); });
+  openEndpoints(server, options, signals, monitoring.get(), intro, [&] { return server.report(); });
   return 0;
 }
 
 int serve(const ProgramOptions& options, const Signals& signals) {
+  const auto monitoring = openMonitoring(options);
   std::vector<model::Scene> scenes = loadScenes(options);
   std::string sceneList;
   for (const model::Scene& scene : scenes)
@@ -231,7 +273,7 @@ int serve(const ProgramOptions& options, const Signals& signals) {
   };
   hosting::SceneServer server(std::move(scenes), std::move(serverOptions));
   const auto report = [&] { return server.report() + (recordings ? recordings->report() : ""); };
-  openEndpoints(server, options, signals,
+  openEndpoints(server, options, signals, monitoring.get(),
                 fmt::format("device  {}\nscenes  {}\n", describe(server.deviceInfo()), sceneList), report);
   return 0;
 }
@@ -320,7 +362,8 @@ int main(int argc, char** argv) {
     if (const int* code = std::get_if<int>(&parsed)) return *code;
     const ProgramOptions& options = std::get<ProgramOptions>(parsed);
     const Signals signals;
-    telemetry::setUpLog(options.logLevel);
+    telemetry::setUpLog(options.logLevel, options.logFormat == "json" ? telemetry::LogFormat::json
+                                                                      : telemetry::LogFormat::text);
     for (const std::string& warning : options.warnings) spdlog::warn("{}", warning);
     return run(options, signals);
   } catch (const std::exception& error) {

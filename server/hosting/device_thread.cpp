@@ -11,6 +11,7 @@
 
 #include "clothstream/v1/session.pb.h"
 #include "server/delivery/envelope.h"
+#include "server/telemetry/log.h"
 
 namespace clothstream::hosting {
 namespace {
@@ -147,6 +148,8 @@ void DeviceThread::run(const std::vector<std::shared_ptr<scene::LiveScene>>& sce
 }
 
 bool DeviceThread::waitForWork() {
+  deviceMemory_ = device_ ? device_->allocatedBytes() : 0;
+  lastAnswer_ = Clock::now();
   Clock::time_point due = Clock::time_point::max();
   for (const auto& run : runs_) due = std::min(due, run->due());
   const auto something = [&] { return stopping_ || woken_ || loseDevice_; };
@@ -182,7 +185,8 @@ void DeviceThread::take(Run& run) {
     if (run.refused)
       run.whenAdded->set_exception(std::current_exception());
     else if (run.host && !std::exchange(run.rebuildFailed, true))
-      spdlog::error("{}: cannot be rebuilt: {}; trying again", run.scene->name(), failure.what());
+      telemetry::log({run.scene->name()}, spdlog::level::err, "cannot be rebuilt: {}; trying again",
+                     failure.what());
     else
       dismiss(run, failure.what());
   }
@@ -287,7 +291,7 @@ bool DeviceThread::survives(Run& run, const std::function<void()>& partOfTick) {
 }
 
 void DeviceThread::rebuildScene(Run& run, const std::string& reason) {
-  spdlog::error("{}: a tick failed: {}", run.scene->name(), reason);
+  telemetry::log({run.scene->name()}, spdlog::level::err, "a tick failed: {}", reason);
   publisher_.drain();
   device_->drain();
   const std::uint64_t ticks = run.host->tick();
@@ -309,7 +313,7 @@ void DeviceThread::begin(Run& run, Clock::time_point now) {
     const std::string text = fmt::format(
         "simulated time runs at {:.0f} % of real time: the device cannot keep {} ticks/s with {} substeps",
         *speed * 100, scene.start().simulationRate, scene.start().substeps);
-    spdlog::warn("{}: {}", scene.name(), text);
+    telemetry::log({scene.name()}, spdlog::level::warn, "{}", text);
     scene.subscribers.announce(delivery::notice(v1::NOTICE_KIND_RUNNING_SLOW, text, run.host->tick()));
   }
   run.host->begin(now);

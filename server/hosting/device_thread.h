@@ -2,6 +2,7 @@
 // Thread that owns the device and runs the ticks of every scene when they are due.
 #pragma once
 
+#include <atomic>
 #include <cmath>
 #include <condition_variable>
 #include <cstdint>
@@ -61,6 +62,11 @@ class DeviceThread {
   std::future<void> remove(std::shared_ptr<scene::LiveScene> scene);
 
   vulkan::DeviceInfo info() const;
+
+  // Time at which the thread last looked for work. It does so after each wake().
+  Clock::time_point lastAnswer() const { return lastAnswer_; }
+  // Memory of all buffers on the device at that time, in bytes.
+  std::uint64_t deviceMemory() const { return deviceMemory_; }
 
   // Treats the device as lost before the next tick. For tests.
   void simulateDeviceLoss();
@@ -137,6 +143,10 @@ class DeviceThread {
   bool stopping_ = false, woken_ = true, loseDevice_ = false;
   vulkan::DeviceInfo info_;
   std::vector<std::packaged_task<void()>> tasks_;
+
+  // Written by the thread alone.
+  std::atomic<Clock::time_point> lastAnswer_{Clock::now()};
+  std::atomic<std::uint64_t> deviceMemory_{0};
 
   // Owned by the thread.
   std::unique_ptr<vulkan::Device> device_;

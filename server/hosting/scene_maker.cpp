@@ -18,6 +18,7 @@
 #include "server/messages/scene_file.h"
 #include "server/messages/scene_message.h"
 #include "server/messages/validation.h"
+#include "server/telemetry/log.h"
 
 namespace clothstream::hosting {
 namespace {
@@ -187,7 +188,7 @@ tl::expected<v1::CreateSceneResponse, v1::Error> SceneMaker::createNow(const v1:
                    fmt::format("createScene: the device cannot run it: {}", failure.what()));
   }
   server_.insert(scene);
-  spdlog::info("{}: created, {} vertices", scene->name(), scene->start().nodeCount());
+  telemetry::log({scene->name()}, spdlog::level::info, "created, {} vertices", scene->start().nodeCount());
   v1::CreateSceneResponse response;
   *response.mutable_scene() = summaryOf(*scene);
   return response;
@@ -209,7 +210,7 @@ tl::expected<v1::DeleteSceneResponse, v1::Error> SceneMaker::removeNow(
                                        fmt::format("the scene '{}' was deleted", scene->name()),
                                        scene->tick.load()));
   server_.device.remove(scene).wait();
-  spdlog::info("{}: deleted", scene->name());
+  telemetry::log({scene->name()}, spdlog::level::info, "deleted");
   return v1::DeleteSceneResponse();
 }
 

@@ -141,7 +141,10 @@ v1::Error SceneServer::State::noSuchScene(const std::string& name) const {
 
 delivery::SharedBytes SceneServer::State::admit(const std::shared_ptr<Peer>& peer) {
   const std::lock_guard lock(mutex);
-  if (stopping) return stoppingNotice();
+  if (stopping) {
+    metrics.refusedWhileStopping.add();
+    return stoppingNotice();
+  }
   std::erase_if(peers, [](const auto& known) { return known.expired(); });
   if (peers.size() >= options.maxConnections) {
     metrics.refusedConnections.add();

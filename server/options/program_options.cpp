@@ -124,6 +124,10 @@ void addNetworkOptions(OptionTable& table, ProgramOptions& options) {
       "localhost and the name of the machine are always allowed");
   table.list("--allow-origin", options.allowedOrigins, "ORIGIN",
              "Origin of another page that may connect, such as https://example.org; may be repeated");
+  table.number("--metrics-port", options.metricsPort, kPort,
+               "Port of /metrics, /healthz and /readyz for operators. 0 picks a free port. By default there "
+               "is none");
+  table.text("--metrics-host", options.metricsHost, "ADDRESS", "Address to listen on with --metrics-port");
 }
 
 void addDeviceOptions(OptionTable& table, ProgramOptions& options) {
@@ -140,6 +144,8 @@ void addProgramOptions(OptionTable& table, Parsed& parsed) {
   table.group("Program");
   table.text("--log-level", parsed.options.logLevel, "LEVEL", "trace, debug, info, warning, error or off",
              checkChoice({"trace", "debug", "info", "warning", "error", "off"}, {"warn", "err", "critical"}));
+  table.text("--log-format", parsed.options.logFormat, "FORMAT",
+             "text, or json: one JSON object per line of the log", checkChoice({"text", "json"}));
   table.number("--seconds", parsed.options.stopAfter,
                {.min = 0, .max = 1e9, .type = "SECONDS", .aboveMin = true}, "Stop after this time");
   table.text("--config", parsed.config, "FILE", "Read options from this TOML file");
@@ -289,6 +295,7 @@ std::variant<ProgramOptions, int> parseOptions(int argc, const char* const* argv
   if (parsed.printMarkdown) return printMarkdown(table), 0;
 
   options.logLevel = CLI::detail::to_lower(options.logLevel);
+  options.logFormat = CLI::detail::to_lower(options.logFormat);
   options.recordsOnRequest = !parsed.recordings.empty();
   options.recordDirectory = options.recordsOnRequest ? parsed.recordings : parsed.record;
   options.command = step.parsed()          ? Command::step

@@ -46,9 +46,11 @@ struct ProgramOptions {
   std::uint16_t port = 8080, grpcPort = 50051;
   std::filesystem::path page;  // empty: the directory next to the program, if it exists
   std::vector<std::string> publicNames, allowedOrigins;
+  std::string metricsHost = "127.0.0.1";
+  std::optional<std::uint16_t> metricsPort;  // unset: no monitoring
 
   // Program.
-  std::string logLevel = "info";
+  std::string logLevel = "info", logFormat = "text";
   std::optional<std::chrono::nanoseconds> stopAfter;
   std::vector<std::string> warnings;  // about environment variables, for the log
 

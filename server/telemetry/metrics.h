@@ -52,9 +52,10 @@ struct SceneMetrics {
 
 struct ServerMetrics {
   Counter connections;
-  Counter refusedConnections;
-  Counter droppedConnections;  // connections closed because they were silent, too slow or abusive
-  Counter rejectedMessages;    // messages answered by an Error before the client joined
+  Counter refusedConnections;    // because there were too many
+  Counter refusedWhileStopping;  // because the server was stopping
+  Counter droppedConnections;    // connections closed because they were silent, too slow or abusive
+  Counter rejectedMessages;      // messages answered by an Error before the client joined
   Counter deviceRebuilds;
 };
 

@@ -63,7 +63,7 @@ Buffer::Buffer(Buffer&&) noexcept = default;
 Buffer& Buffer::operator=(Buffer&&) noexcept = default;
 
 Buffer::Buffer(const Device& device, BufferPurpose purpose, std::size_t bytes)
-    : bytes_(bytes), handles_(std::make_unique<Handles>()) {
+    : bytes_(bytes), handles_(std::make_unique<Handles>(device)) {
   assert(bytes > 0);
   const bool texels = purpose == BufferPurpose::texels;
   const bool mapped = purpose == BufferPurpose::upload || purpose == BufferPurpose::readback;
@@ -85,6 +85,8 @@ Buffer::Buffer(const Device& device, BufferPurpose purpose, std::size_t bytes)
     handles_->memory = vk::raii::DeviceMemory(
         vulkan, vk::MemoryAllocateInfo{.allocationSize = needs.size,
                                        .memoryTypeIndex = memoryType(device, needs.memoryTypeBits, traits)});
+    handles_->bytes = needs.size;
+    *handles_->allocatedBytes += needs.size;
     handles_->buffer.bindMemory(*handles_->memory, 0);
     if (mapped) mapped_ = handles_->memory.mapMemory(0, VK_WHOLE_SIZE);
     if (texels)

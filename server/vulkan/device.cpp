@@ -207,6 +207,10 @@ void Device::drain() {
   wait(last);
 }
 
+std::uint64_t Device::allocatedBytes() const {
+  return handles_->allocatedBytes;
+}
+
 TimelineValue Device::completed() const {
   try {
     return handles_->timeline.getCounterValue();

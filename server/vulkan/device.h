@@ -103,6 +103,9 @@ class Device {
   // Bytes of pipeline cache that were loaded from DeviceOptions::cacheDirectory.
   std::size_t pipelineCacheLoaded() const { return pipelineCacheLoaded_; }
 
+  // Memory of all buffers on the device, in bytes.
+  std::uint64_t allocatedBytes() const;
+
   // Only for this folder (handles.h).
   struct Handles;
   const Handles& handles() const { return *handles_; }

@@ -3,6 +3,8 @@
 // bindings compile slowly.
 #pragma once
 
+#include <atomic>
+#include <cstdint>
 #include <vector>
 
 #include <vulkan/vulkan_raii.hpp>
@@ -24,11 +26,19 @@ struct Device::Handles {
   vk::raii::Semaphore timeline = nullptr;
   vk::raii::PipelineCache pipelineCache = nullptr;
   std::uint32_t queueFamily = 0;
+  mutable std::atomic<std::uint64_t> allocatedBytes{0};
 
   bool validates() const { return *messenger != vk::DebugUtilsMessengerEXT{}; }
 };
 
 struct Buffer::Handles {
+  explicit Handles(const Device& of) : allocatedBytes(&of.handles().allocatedBytes) {}
+  ~Handles() { *allocatedBytes -= bytes; }
+  Handles(const Handles&) = delete;
+  Handles& operator=(const Handles&) = delete;
+
+  std::atomic<std::uint64_t>* allocatedBytes;  // of the device
+  std::uint64_t bytes = 0;                     // of `memory`
   vk::raii::DeviceMemory memory = nullptr;
   vk::raii::Buffer buffer = nullptr;
   vk::raii::BufferView texelView = nullptr;

@@ -369,11 +369,14 @@ TEST_F(ServerOptions, PrintedConfigurationReadsBackWithEveryOptionSet) {
                               "--public-name=cloth.example.org",
                               "--allow-origin=https://a.example",
                               "--allow-origin=https://b.example",
+                              "--metrics-port=0",
+                              "--metrics-host=::1",
                               "--device=1",
                               "--software-threads=0",
                               "--cache-dir",
                               "",
                               "--log-level=off",
+                              "--log-format=json",
                               "--seconds=1e9",
                               "--print-config"});
     ASSERT_EQ(first.exitCode, 0) << first.output;
