@@ -22,14 +22,15 @@ server/schedule    |
 server/delivery    | server/schedule server/encode server/messages server/telemetry proto/codec clothstream
 server/scene       | server/delivery server/schedule server/model server/vulkan server/simulation server/encode server/messages server/telemetry clothstream
 server/hosting     | proto/text server/scene server/delivery server/schedule server/model server/vulkan server/simulation server/messages server/telemetry clothstream
-server/session     | server/hosting server/scene server/delivery server/schedule server/messages proto/codec clothstream
-server/recording   | server/model server/vulkan server/simulation server/messages server/scene server/schedule proto/codec proto/recording clothstream
+server/session     | server/hosting server/scene server/delivery server/schedule server/messages server/telemetry proto/codec clothstream
+server/recording   | server/model server/vulkan server/simulation server/messages server/scene server/schedule server/telemetry proto/codec proto/recording clothstream
 server/step        | server/model server/vulkan server/simulation server/messages
-server/endpoint/listen | server/schedule
+server/endpoint/listen | server/schedule server/telemetry
 server/endpoint/grpc | server/endpoint/listen server/session server/hosting server/schedule server/telemetry clothstream grpc/health
 server/endpoint/web | server/endpoint/listen server/session server/hosting
+server/monitoring  | server/hosting server/scene server/telemetry server/endpoint/listen server/endpoint/web
 server/options     | server/hosting server/recording server/step server/scene server/model
-server/main.cpp    | server/options server/endpoint server/hosting server/recording server/step server/simulation server/messages server/model server/telemetry server/vulkan
+server/main.cpp    | server/options server/endpoint server/monitoring server/hosting server/recording server/step server/simulation server/messages server/model server/telemetry server/vulkan
 clients/core       | proto/codec proto/parameters
 clients/core/stream | clients/core/core.h clients/core/wire proto/codec
 clients/core/wire  | clients/core/core.h proto/codec proto/parameters
@@ -43,7 +44,8 @@ clients/cli        | proto/text clients/core clients/grpc clients/files clients/
 readonly OUTSIDE='
 <vulkan/           | server/vulkan server/simulation server/encode
 <grpcpp/           | server/endpoint/grpc clients/grpc clients/load
-<boost/beast       | server/endpoint/web clients/load
+<boost/beast       | server/endpoint/web server/monitoring clients/load
+<prometheus/       | server/monitoring
 <Eigen/            | server/model server/reference
 '
 

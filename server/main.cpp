@@ -29,6 +29,7 @@
 #include "server/messages/scene_file.h"
 #include "server/messages/scene_message.h"
 #include "server/model/material.h"
+#include "server/monitoring/monitoring_endpoint.h"
 #include "server/options/program_options.h"
 #include "server/recording/playback.h"
 #include "server/recording/recordings.h"
@@ -194,10 +195,47 @@ void waitForStop(const Signals& signals, const ProgramOptions& options,
   }
 }
 
+// Opens the endpoint for operators, before the scenes are loaded, and prints its address. Null without
+// --metrics-port.
+std::unique_ptr<monitoring::MonitoringEndpoint> openMonitoring(const ProgramOptions& options) {
+  if (!options.metricsPort) return nullptr;
+  auto endpoint = std::make_unique<monitoring::MonitoringEndpoint>(
+      monitoring::MonitoringOptions{.host = options.metricsHost,
+                                    .port = *options.metricsPort,
+                                    .version = CLOTHSTREAM_VERSION,
+                                    .publicNames = options.publicNames});
+  fmt::print("metrics http://{}/metrics\n", localAddress(options.metricsHost, endpoint->port()));
+  std::fflush(stdout);
+  return endpoint;
+}
+
+// Shows a server to the operators while this lives.
+class Monitored {
+ public:
+  // `endpoint` may be null.
+  Monitored(monitoring::MonitoringEndpoint* endpoint, hosting::SceneServer& server) : endpoint_(endpoint) {
+    if (endpoint_ != nullptr) endpoint_->started(server);
+  }
+  ~Monitored() {
+    if (endpoint_ != nullptr) endpoint_->stopped();
+  }
+  Monitored(const Monitored&) = delete;
+  Monitored& operator=(const Monitored&) = delete;
+
+  void stopping() const {
+    if (endpoint_ != nullptr) endpoint_->stopping();
+  }
+
+ private:
+  monitoring::MonitoringEndpoint* const endpoint_;
+};
+
 // Serves through both endpoints until a signal or --seconds ends it. `intro` is printed before the addresses.
-// Returns what limits the time until the process ends.
-[[nodiscard]] std::unique_ptr<EndGuard> openEndpoints(hosting::SceneServer& server, const ProgramOptions& options,
-                                                      const Signals& signals, const std::string& intro,
+// `monitoring` may be null. Returns what limits the time until the process ends.
+[[nodiscard]] std::unique_ptr<EndGuard> openEndpoints(hosting::SceneServer& server,
+                                                      const ProgramOptions& options, const Signals& signals,
+                                                      monitoring::MonitoringEndpoint* monitoring,
+                                                      const std::string& intro,
                                                       const std::function<std::string()>& report) {
   std::unique_ptr<EndGuard> guard;
   {
@@ -221,9 +259,11 @@ void waitForStop(const Signals& signals, const ProgramOptions& options,
     fmt::print("{}page    http://{}/\ngRPC    {}\n", intro, localAddress(options.host, web.port()),
                localAddress(options.host, rpc.port()));
     std::fflush(stdout);
+    const Monitored monitored(monitoring, server);
     waitForStop(signals, options, report);
     spdlog::info("stopping");
     guard = std::make_unique<EndGuard>(signals, options.drain);
+    monitored.stopping();
     server.stop();
   }
   fmt::print("{}", report());
@@ -231,6 +271,7 @@ void waitForStop(const Signals& signals, const ProgramOptions& options,
 }
 
 int play(const ProgramOptions& options, const Signals& signals) {
+  const auto monitoring = openMonitoring(options);
   auto recording = recording::RecordedStream::open(options.recording);
   if (!recording) throw std::runtime_error(recording.error());
   if (options.playback.from > recording->length())
@@ -244,7 +285,7 @@ int play(const ProgramOptions& options, const Signals& signals) {
   std::unique_ptr<EndGuard> guard;  // outlives the server
   hosting::SceneServer server(
       scene, std::make_shared<recording::Playback>(std::move(*recording), options.playback), options.server);
-  guard = openEndpoints(server, options, signals, intro, [&] { return server.report(); });
+  guard = openEndpoints(server, options, signals, monitoring.get(), intro, [&] { return server.report(); });
   return 0;
 }
 
@@ -253,6 +294,7 @@ std::uint64_t bytesOf(double megabytes) {
 }
 
 int serve(const ProgramOptions& options, const Signals& signals) {
+  const auto monitoring = openMonitoring(options);
   std::vector<model::Scene> scenes = loadScenes(options);
   std::string sceneList;
   for (const model::Scene& scene : scenes)
@@ -264,13 +306,13 @@ int serve(const ProgramOptions& options, const Signals& signals) {
   std::optional<recording::Recordings> recordings;
   if (!options.recordDirectory.empty())
     recordings.emplace(
-        recording::RecorderOptions{.directory = options.recordDirectory,
-                                   .serverName = kServerName,
-                                   .maxBytes = bytesOf(options.recordLimitMb),
-                                   .disk = std::make_shared<recording::DiskShare>(
-                                       options.recordDirectory,
-                                       recording::DiskLimits{.maxBytes = bytesOf(options.recordingsLimitMb),
-                                                             .minFreeBytes = bytesOf(options.keepFreeMb)})},
+        recording::RecorderOptions{
+            .directory = options.recordDirectory,
+            .serverName = kServerName,
+            .maxBytes = bytesOf(options.recordLimitMb),
+            .disk = std::make_shared<recording::DiskShare>(
+                options.recordDirectory, recording::DiskLimits{.maxBytes = bytesOf(options.recordingsLimitMb),
+                                                               .minFreeBytes = bytesOf(options.keepFreeMb)})},
         !options.recordsOnRequest);
   const auto first = std::ranges::find(scenes, options.server.defaultScene, &model::Scene::name);
   const std::uint32_t nodes = first == scenes.end() ? 0 : first->nodeCount();
@@ -281,8 +323,9 @@ int serve(const ProgramOptions& options, const Signals& signals) {
   };
   hosting::SceneServer server(std::move(scenes), std::move(serverOptions));
   const auto report = [&] { return server.report() + (recordings ? recordings->report() : ""); };
-  guard = openEndpoints(server, options, signals,
-                        fmt::format("device  {}\nscenes  {}\n", describe(server.deviceInfo()), sceneList), report);
+  guard = openEndpoints(server, options, signals, monitoring.get(),
+                        fmt::format("device  {}\nscenes  {}\n", describe(server.deviceInfo()), sceneList),
+                        report);
   return 0;
 }
 
@@ -370,7 +413,8 @@ int main(int argc, char** argv) {
     if (const int* code = std::get_if<int>(&parsed)) return *code;
     const ProgramOptions& options = std::get<ProgramOptions>(parsed);
     const Signals signals;
-    telemetry::setUpLog(options.logLevel);
+    telemetry::setUpLog(options.logLevel, options.logFormat == "json" ? telemetry::LogFormat::json
+                                                                      : telemetry::LogFormat::text);
     for (const std::string& warning : options.warnings) spdlog::warn("{}", warning);
     return run(options, signals);
   } catch (const std::exception& error) {

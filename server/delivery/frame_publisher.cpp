@@ -47,6 +47,11 @@ void FramePublisher::drain() {
   changed_.wait(lock, [&] { return waiting_ == 0 && !busy_; });
 }
 
+std::size_t FramePublisher::waiting() const {
+  const std::lock_guard lock(mutex_);
+  return waiting_;
+}
+
 void FramePublisher::run() {
   Clock::time_point nextCall = Clock::now() + std::chrono::seconds(1);
   for (;;) {

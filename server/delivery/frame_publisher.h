@@ -60,6 +60,8 @@ class FramePublisher {
   void push(CompleteFrame& frame);
   // Returns when every frame is published. No encoder and no scene of a pushed frame is used after that.
   void drain();
+  // Number of frames that wait. Any thread.
+  std::size_t waiting() const;
   // Workers for the encoders of the frames that will be pushed.
   codec::Workers& workers() { return workers_; }
 
@@ -70,7 +72,7 @@ class FramePublisher {
 
   std::function<void()> everySecond_;
   encode::EncoderThreads workers_;
-  std::mutex mutex_;
+  mutable std::mutex mutex_;
   std::condition_variable changed_;
   std::vector<CompleteFrame> ring_;
   std::size_t first_ = 0, waiting_ = 0;

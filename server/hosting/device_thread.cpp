@@ -11,6 +11,7 @@
 
 #include "clothstream/v1/session.pb.h"
 #include "server/delivery/envelope.h"
+#include "server/telemetry/log.h"
 
 namespace clothstream::hosting {
 namespace {
@@ -151,8 +152,12 @@ void DeviceThread::run(const std::vector<std::shared_ptr<scene::LiveScene>>& sce
 }
 
 bool DeviceThread::waitForWork() {
+  deviceMemory_ = device_ ? device_->allocatedBytes() : 0;
+  lastAnswer_ = Clock::now();
   Clock::time_point due = Clock::time_point::max();
-  for (const auto& run : runs_) due = std::min(due, run->due());
+  const Clock::time_point guestsFrom = scheduler_.guestsFrom(schedules(), lastAnswer_);
+  for (const auto& run : runs_)
+    due = std::min(due, run->guest && run->running ? std::max(run->due(), guestsFrom) : run->due());
   const auto something = [&] { return stopping_ || woken_ || loseDevice_; };
 
   std::unique_lock lock(mutex_);
@@ -186,7 +191,8 @@ void DeviceThread::take(Run& run) {
     if (run.refused)
       run.whenAdded->set_exception(std::current_exception());
     else if (run.host && !std::exchange(run.rebuildFailed, true))
-      spdlog::error("{}: cannot be rebuilt: {}; trying again", run.scene->name(), failure.what());
+      telemetry::log({run.scene->name()}, spdlog::level::err, "cannot be rebuilt: {}; trying again",
+                     failure.what());
     else
       dismiss(run, failure.what());
   }
@@ -266,16 +272,19 @@ void DeviceThread::encodePausedFrames() {
   }
 }
 
+std::span<schedule::TickSchedule* const> DeviceThread::schedules() {
+  schedules_.clear();
+  for (const auto& run : runs_) schedules_.push_back(run.get());
+  return schedules_;
+}
+
 void DeviceThread::runDueTicks() {
   {
     const std::lock_guard lock(mutex_);
     if (std::exchange(loseDevice_, false)) throw vulkan::DeviceLost("the loss of the device is simulated");
   }
-  schedules_.clear();
-  for (const auto& run : runs_)
-    if (!run->begun) schedules_.push_back(run.get());
   Clock::time_point before = Clock::now();
-  schedule::scheduleTicks(schedules_, before, chosen_);
+  scheduler_.choose(schedules(), before, chosen_);
   for (schedule::TickSchedule* due : chosen_) {
     Run& run = static_cast<Run&>(*due);
     run.used = {};
@@ -289,12 +298,14 @@ void DeviceThread::runDueTicks() {
 }
 
 void DeviceThread::runSlice() {
-  // The scene that has used the least time for its tick.
+  const Clock::time_point before = Clock::now();
+  const bool guestsRun = scheduler_.guestsFrom(schedules(), before) <= before;
+  // The scene whose previous slice ended first.
   Run* next = nullptr;
   for (const auto& run : runs_)
-    if (run->begun && (next == nullptr || run->used < next->used)) next = run.get();
+    if (run->begun && (guestsRun || !run->guest) && (next == nullptr || run->served < next->served))
+      next = run.get();
   if (next == nullptr) return;
-  const Clock::time_point before = Clock::now();
   const bool survived = survives(*next, [&] {
     next->host->submitSlice();
     next->host->waitForSlice();
@@ -303,7 +314,10 @@ void DeviceThread::runSlice() {
 }
 
 void DeviceThread::endSlice(Run& run, Clock::time_point before) {
-  run.used += Clock::now() - before;
+  run.served = Clock::now();
+  const Clock::duration time = run.served - before;
+  run.used += time;
+  scheduler_.used(run, time);
   if (run.host->hasSlices() || !survives(run, [&] { run.host->finish(); })) return;
   run.begun = false;
   run.tickEnded(run.used, Clock::now());
@@ -326,7 +340,7 @@ bool DeviceThread::survives(Run& run, const std::function<void()>& partOfTick) {
 }
 
 void DeviceThread::rebuildScene(Run& run, const std::string& reason) {
-  spdlog::error("{}: a tick failed: {}", run.scene->name(), reason);
+  telemetry::log({run.scene->name()}, spdlog::level::err, "a tick failed: {}", reason);
   publisher_.drain();
   device_->drain();
   const std::uint64_t ticks = run.host->tick();
@@ -348,7 +362,7 @@ void DeviceThread::begin(Run& run, Clock::time_point now) {
     const std::string text = fmt::format(
         "simulated time runs at {:.0f} % of real time: the device cannot keep {} ticks/s with {} substeps",
         *speed * 100, scene.start().simulationRate, scene.start().substeps);
-    spdlog::warn("{}: {}", scene.name(), text);
+    telemetry::log({scene.name()}, spdlog::level::warn, "{}", text);
     scene.subscribers.announce(delivery::notice(v1::NOTICE_KIND_RUNNING_SLOW, text, run.host->tick()));
   }
   run.host->begin(now);

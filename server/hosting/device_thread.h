@@ -2,6 +2,7 @@
 // Thread that owns the device and runs the ticks of every scene when they are due.
 #pragma once
 
+#include <atomic>
 #include <cmath>
 #include <condition_variable>
 #include <cstdint>
@@ -10,6 +11,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <span>
 #include <string>
 #include <thread>
 #include <vector>
@@ -71,13 +73,18 @@ class DeviceThread {
 
   vulkan::DeviceInfo info() const;
 
+  // Time at which the thread last looked for work. It does so after each wake().
+  Clock::time_point lastAnswer() const { return lastAnswer_; }
+  // Memory of all buffers on the device at that time, in bytes.
+  std::uint64_t deviceMemory() const { return deviceMemory_; }
+
   // Treats the device as lost before the next tick. For tests.
   void simulateDeviceLoss();
 
  private:
   struct Run : schedule::TickSchedule {
     explicit Run(std::shared_ptr<scene::LiveScene> live)
-        : TickSchedule(live->start().simulationRate), scene(std::move(live)) {}
+        : TickSchedule(live->start().simulationRate, live->created), scene(std::move(live)) {}
     // Adds slipped ticks, and returns the whole ticks that are not counted yet.
     std::uint64_t wholeSlippedTicks(double ticks) {
       slipped += ticks;
@@ -99,8 +106,8 @@ class DeviceThread {
     std::optional<std::promise<void>> whenAdded;  // set by add(), until the scene is ready
     bool quarantined = false;
     bool refused = false;                         // added, but cannot run
-    bool begun = false;                           // the current tick has begun, and is not finished
     Clock::duration used{};                       // time of the current tick on the device
+    Clock::time_point served{};                   // end of the newest slice
     bool paused = false;                          // while it has subscribers
     Clock::time_point nextPausedFrame{};          // next check for subscribers that need a key frame
     std::optional<std::uint64_t> failed;          // tick count at the newest failure
@@ -131,6 +138,8 @@ class DeviceThread {
   void dismiss(Run& run, const std::string& why);
   // Encodes frames of paused scenes for subscribers that need a key frame.
   void encodePausedFrames();
+  // Of all scenes, until the next call.
+  std::span<schedule::TickSchedule* const> schedules();
   void runDueTicks();
   // Runs one slice of a tick that has begun and takes longer than a slice.
   void runSlice();
@@ -158,11 +167,16 @@ class DeviceThread {
   vulkan::DeviceInfo info_;
   std::vector<std::packaged_task<void()>> tasks_;
 
+  // Written by the thread alone.
+  std::atomic<Clock::time_point> lastAnswer_{Clock::now()};
+  std::atomic<std::uint64_t> deviceMemory_{0};
+
   // Owned by the thread.
   std::unique_ptr<vulkan::Device> device_;
   std::unique_ptr<simulation::SpeedMeter> meter_;  // of device_
   model::DeviceSpeed speed_;                       // of device_ when it was new
   std::vector<std::unique_ptr<Run>> runs_;
+  schedule::TickScheduler scheduler_{scene::SceneHost::kSliceTime};
   std::vector<schedule::TickSchedule*> schedules_, chosen_;  // of runs_
   scene::SceneLoader loader_;                                // for device_
   Clock::time_point nextRebuild_{};                          // earliest time of the next rebuild

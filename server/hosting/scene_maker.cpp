@@ -18,6 +18,7 @@
 #include "server/messages/scene_file.h"
 #include "server/messages/scene_message.h"
 #include "server/messages/validation.h"
+#include "server/telemetry/log.h"
 
 namespace clothstream::hosting {
 namespace {
@@ -198,9 +199,11 @@ tl::expected<v1::CreateSceneResponse, v1::Error> SceneMaker::createNow(const v1:
   const std::vector<std::shared_ptr<scene::LiveScene>> scenes = server_.scenesNow();
   const auto created = static_cast<std::uint32_t>(
       std::ranges::count_if(scenes, [](const auto& scene) { return scene->created; }));
-  if (created >= server_.options.maxCreatedScenes)
+  if (created >= server_.options.maxCreatedScenes) {
+    server_.metrics.refuse(telemetry::Refusal::createdScenes);
     return refused(v1::ERROR_CODE_RESOURCE_EXHAUSTED,
                    fmt::format("the server has {} created scenes, its maximum: delete one first", created));
+  }
   if (std::ranges::any_of(scenes, [&](const auto& scene) { return scene->name() == definition->name; }))
     return refused(
         v1::ERROR_CODE_INVALID_ARGUMENT,
@@ -210,8 +213,10 @@ tl::expected<v1::CreateSceneResponse, v1::Error> SceneMaker::createNow(const v1:
   const auto scene = std::make_shared<scene::LiveScene>(
       std::move(*definition), true, std::move(journal),
       request.max_participants() > 0 ? request.max_participants() : most, server_.budget);
-  if (auto charged = scene->charge(); !charged)
+  if (auto charged = scene->charge(); !charged) {
+    server_.metrics.refuse(telemetry::Refusal::budget);
     return refused(charged.error().code, std::move(charged.error().text));
+  }
   try {
     server_.device.add(scene).get();
   } catch (const std::exception& failure) {
@@ -219,7 +224,7 @@ tl::expected<v1::CreateSceneResponse, v1::Error> SceneMaker::createNow(const v1:
                    fmt::format("createScene: the device cannot run it: {}", failure.what()));
   }
   server_.insert(scene);
-  spdlog::info("{}: created, {} vertices", scene->name(), scene->start().nodeCount());
+  telemetry::log({scene->name()}, spdlog::level::info, "created, {} vertices", scene->start().nodeCount());
   v1::CreateSceneResponse response;
   *response.mutable_scene() = summaryOf(*scene);
   return response;
@@ -241,7 +246,8 @@ tl::expected<v1::DeleteSceneResponse, v1::Error> SceneMaker::removeNow(
                                        fmt::format("the scene '{}' was deleted", scene->name()),
                                        scene->tick.load()));
   server_.device.remove(scene).wait();
-  spdlog::info("{}: deleted", scene->name());
+  scene->discharge();
+  telemetry::log({scene->name()}, spdlog::level::info, "deleted");
   return v1::DeleteSceneResponse();
 }
 

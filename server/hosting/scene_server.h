@@ -114,7 +114,7 @@ class SceneServer {
   // Histograms and counters since the start, as a table for people.
   std::string report() const;
 
-  // For sessions and tests.
+  // For sessions, monitoring and tests.
   struct State;
   State& state() { return *state_; }
 

@@ -143,10 +143,13 @@ v1::Error SceneServer::State::noSuchScene(const std::string& name) const {
 
 delivery::SharedBytes SceneServer::State::admit(const std::shared_ptr<Peer>& peer) {
   const std::lock_guard lock(mutex);
-  if (stopping) return stoppingNotice();
+  if (stopping) {
+    metrics.refuse(telemetry::Refusal::stopping);
+    return stoppingNotice();
+  }
   std::erase_if(peers, [](const auto& known) { return known.expired(); });
   if (peers.size() >= options.maxConnections) {
-    metrics.refusedConnections.add();
+    metrics.refuse(telemetry::Refusal::connections);
     return delivery::error(
         v1::ERROR_CODE_RESOURCE_EXHAUSTED,
         fmt::format("the server has {} connections, its maximum; try again later", peers.size()), true);
@@ -185,9 +188,10 @@ tl::expected<v1::GetSceneResponse, v1::Error> SceneServer::State::getScene(const
   const auto tooLarge = [&](const char* qualifier, std::size_t bytes) {
     return tl::unexpected(toMessage(
         {v1::ERROR_CODE_RESOURCE_EXHAUSTED,
-         fmt::format("getScene: '{}' takes {}{} bytes, and answers in a stream have at most {}: use the unary "
-                     "call",
-                     scene->name(), qualifier, bytes, maxBytes)}));
+         fmt::format(
+             "getScene: '{}' takes {}{} bytes, and answers in a stream have at most {}: use the unary "
+             "call",
+             scene->name(), qualifier, bytes, maxBytes)}));
   };
   std::size_t positions = 0;
   for (const model::Cloth& cloth : scene->start().cloths)

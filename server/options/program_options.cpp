@@ -85,16 +85,18 @@ void addSceneOptions(OptionTable& table, Parsed& parsed) {
                                    "Record scenes when a client asks for it, to files in this directory"));
   table.number("--record-limit", options.recordLimitMb, {.min = 0, .max = 1e9, .type = "MEGABYTES"},
                "Start a new file when a recording reaches this many megabytes. 0 means no limit");
-  table.number("--recordings-limit", options.recordingsLimitMb, {.min = 0, .max = 1e9, .type = "MEGABYTES"},
-               "Stop recording when all recordings in the directory take this many megabytes. 0 means no limit");
+  table.number(
+      "--recordings-limit", options.recordingsLimitMb, {.min = 0, .max = 1e9, .type = "MEGABYTES"},
+      "Stop recording when all recordings in the directory take this many megabytes. 0 means no limit");
   table.number("--keep-free", options.keepFreeMb, {.min = 0, .max = 1e9, .type = "MEGABYTES"},
                "Stop recording when the disk has this many megabytes left");
   table.number("--max-created-scenes", options.server.maxCreatedScenes, {.min = 0, .max = 1000},
                "Scenes that clients may create in addition. 0 allows none");
   table.number("--max-scene-nodes", options.server.maxSceneNodes, {.min = 4, .max = 16'777'216},
                "Nodes of a scene that clients create");
-  table.number("--scene-lifetime", options.server.sceneLifetime, {.min = 0, .max = 1e6, .type = "SECONDS"},
-               "Seconds without participants after which a scene that a client created is deleted. 0 keeps it");
+  table.number(
+      "--scene-lifetime", options.server.sceneLifetime, {.min = 0, .max = 1e6, .type = "SECONDS"},
+      "Seconds without participants after which a scene that a client created is deleted. 0 keeps it");
   addBudgetOptions(table, options.server.budget);
   table.number("--encoder-threads", options.server.encoderThreads, kThreads,
                "CPU threads that predict large frames where the device does not. 0 means a quarter of the "
@@ -155,6 +157,10 @@ void addNetworkOptions(OptionTable& table, ProgramOptions& options) {
                "New connections to each port per second, with a burst of as many");
   table.number("--hello-timeout", options.server.helloTimeout, {.min = 1, .max = 30, .type = "SECONDS"},
                "Seconds of silence after which a connection that has not joined a scene is closed");
+  table.number("--metrics-port", options.metricsPort, kPort,
+               "Port of /metrics, /healthz and /readyz for operators. 0 picks a free port. By default there "
+               "is none");
+  table.text("--metrics-host", options.metricsHost, "ADDRESS", "Address to listen on with --metrics-port");
 }
 
 void addDeviceOptions(OptionTable& table, ProgramOptions& options) {
@@ -171,11 +177,14 @@ void addProgramOptions(OptionTable& table, Parsed& parsed) {
   table.group("Program");
   table.text("--log-level", parsed.options.logLevel, "LEVEL", "trace, debug, info, warning, error or off",
              checkChoice({"trace", "debug", "info", "warning", "error", "off"}, {"warn", "err", "critical"}));
+  table.text("--log-format", parsed.options.logFormat, "FORMAT",
+             "text, or json: one JSON object per line of the log", checkChoice({"text", "json"}));
   table.number("--seconds", parsed.options.stopAfter,
                {.min = 0, .max = 1e9, .type = "SECONDS", .aboveMin = true}, "Stop after this time");
-  table.number("--drain", parsed.options.drain, {.min = 0.1, .max = 600, .type = "SECONDS"},
-               "Seconds after SIGINT or SIGTERM within which the server ends, even if the device or the disk does "
-               "not answer. A second signal ends it at once");
+  table.number(
+      "--drain", parsed.options.drain, {.min = 0.1, .max = 600, .type = "SECONDS"},
+      "Seconds after SIGINT or SIGTERM within which the server ends, even if the device or the disk does "
+      "not answer. A second signal ends it at once");
   table.text("--config", parsed.config, "FILE", "Read options from this TOML file");
   table.action("--print-config", parsed.printConfig, "Print the effective options as a TOML file, and exit");
   table.action("--help-markdown", parsed.printMarkdown, "Print this help as a page of Markdown, and exit");
@@ -323,6 +332,7 @@ std::variant<ProgramOptions, int> parseOptions(int argc, const char* const* argv
   if (parsed.printMarkdown) return printMarkdown(table), 0;
 
   options.logLevel = CLI::detail::to_lower(options.logLevel);
+  options.logFormat = CLI::detail::to_lower(options.logFormat);
   options.recordsOnRequest = !parsed.recordings.empty();
   options.recordDirectory = options.recordsOnRequest ? parsed.recordings : parsed.record;
   options.command = step.parsed()          ? Command::step

@@ -51,12 +51,14 @@ struct ProgramOptions {
   // These limits hold for each endpoint.
   std::uint32_t maxConnections = 256, maxConnectionsPerAddress = 64;
   double connectionsPerSecond = 200;
+  std::string metricsHost = "127.0.0.1";
+  std::optional<std::uint16_t> metricsPort;  // unset: no monitoring
 
   // Program.
-  std::string logLevel = "info";
+  std::string logLevel = "info", logFormat = "text";
   std::optional<std::chrono::nanoseconds> stopAfter;
   std::chrono::milliseconds drain{10'000};  // after a signal, until the process ends
-  std::vector<std::string> warnings;  // about environment variables, for the log
+  std::vector<std::string> warnings;        // about environment variables, for the log
 
   // Commands.
   step::StepOptions step;

@@ -28,10 +28,11 @@ tl::expected<void, std::string> DiskShare::look() const {
   std::error_code problem;
   const std::filesystem::space_info space = std::filesystem::space(directory_, problem);
   if (!problem && space.available < limits_.minFreeBytes)
-    return tl::unexpected(fmt::format("the disk of the recordings has {:.0f} MB left, and {:.0f} MB stay free "
-                                      "(--keep-free)",
-                                      static_cast<double>(space.available) / kMegabyte,
-                                      static_cast<double>(limits_.minFreeBytes) / kMegabyte));
+    return tl::unexpected(
+        fmt::format("the disk of the recordings has {:.0f} MB left, and {:.0f} MB stay free "
+                    "(--keep-free)",
+                    static_cast<double>(space.available) / kMegabyte,
+                    static_cast<double>(limits_.minFreeBytes) / kMegabyte));
   if (limits_.maxBytes == 0) return {};
   std::uint64_t bytes = 0;
   for (auto file = std::filesystem::directory_iterator(directory_, problem);

@@ -11,9 +11,9 @@
 #include <vector>
 
 #include <fmt/format.h>
-#include <spdlog/spdlog.h>
 
 #include "server/scene/live_scene.h"
+#include "server/telemetry/log.h"
 
 namespace clothstream::recording {
 namespace {
@@ -241,7 +241,7 @@ void Playback::publish(scene::LiveScene& scene, RecordedStream::Next& next) {
     const std::string text = fmt::format(
         "the recording is damaged: {:.2f} s to {:.2f} s of it cannot be shown", lost->start, lost->end);
     if (lossesLogged_.insert(lost->start).second)
-      spdlog::warn("{}: {}: {}", scene.name(), text, lost->reason);
+      telemetry::log({scene.name()}, spdlog::level::warn, "{}: {}", text, lost->reason);
     scene.subscribers.announce(delivery::notice(v1::NOTICE_KIND_RECORDING_DAMAGED, text, newest_));
     return;
   }

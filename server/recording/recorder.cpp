@@ -15,6 +15,7 @@
 #include "server/messages/scene_message.h"
 #include "server/recording/metadata.h"
 #include "server/recording/tick_message.h"
+#include "server/telemetry/log.h"
 
 namespace clothstream::recording {
 namespace {
@@ -64,7 +65,7 @@ tl::expected<std::shared_ptr<Recorder>, std::string> Recorder::create(RecorderOp
     }
   Created created = name.empty() ? createNew(options.directory, scene) : createNamed(options.directory, name);
   if (!created) {
-    spdlog::warn("{}: not recorded: {}", scene, created.error());
+    telemetry::log({scene}, spdlog::level::warn, "not recorded: {}", created.error());
     return tl::unexpected(name.empty() ? std::string("no file can be created on the server")
                                        : created.error());
   }
@@ -217,7 +218,7 @@ void Recorder::run(const std::string& sceneName, const Metadata& metadata) {
     path_ = created->second;
   }
   const std::string path = this->path();
-  spdlog::info("{}: recorded to {}", sceneName, path);
+  telemetry::log({sceneName}, spdlog::level::info, "recorded to {}", path);
   auto writer = RecordingWriter::begin([&](std::string_view bytes) { return file->write(bytes); },
                                        options_.serverName, metadata);
   if (!writer) return fail(writer.error());
@@ -229,8 +230,8 @@ void Recorder::run(const std::string& sceneName, const Metadata& metadata) {
     return fail(fmt::format("{}; read the rest of the recording after `clothstream recover {} OUT`",
                             finished.error(), path));
   if (!written) return fail(fmt::format("{}; {} ends there", written.error(), path));
-  spdlog::info("{}: the recording {} is complete, {:.1f} MiB", sceneName, path,
-               static_cast<double>(writer->bytes()) / (1 << 20));
+  telemetry::log({sceneName}, spdlog::level::info, "the recording {} is complete, {:.1f} MiB", path,
+                 static_cast<double>(writer->bytes()) / (1 << 20));
   state_ = State::complete;
 }
 

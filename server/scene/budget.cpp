@@ -73,6 +73,10 @@ Charge::Charge(std::shared_ptr<Budget> budget, const model::Scene& scene, bool f
 }
 
 Charge::~Charge() {
+  release();
+}
+
+void Charge::release() {
   const std::lock_guard lock(budget_->mutex_);
   replace({});
 }

@@ -54,6 +54,8 @@ class Charge {
   messages::Result<void> charge(const std::string& path, const model::Scene& scene);
   // Charges the scene with parameters that it had before, also beyond the budget.
   void restore(const model::Scene& scene);
+  // Gives the charge back.
+  void release();
 
   // Work of a tick of the charged scene with this number of colliders.
   model::Work work(const model::Scene& scene, std::size_t colliders) const {

@@ -63,6 +63,11 @@ void Inbox::forEachChange(const std::function<void(const model::ParameterChange&
   for (const AcceptedChange& accepted : inputs_.changes) visit(accepted.change);
 }
 
+Inbox::Depth Inbox::depth() const {
+  const std::lock_guard lock(mutex_);
+  return {inputs_.changes.size(), inputs_.poses.size()};
+}
+
 void Inbox::drain(Inputs& out) {
   out.changes.clear();
   out.poses.clear();

@@ -72,12 +72,18 @@ class Inbox {
   // Visits the waiting changes, oldest first. `visit` must not call this inbox.
   void forEachChange(const std::function<void(const model::ParameterChange&)>& visit);
 
+  // Numbers of waiting changes, and of participants with waiting poses.
+  struct Depth {
+    std::size_t changes = 0, poses = 0;
+  };
+  Depth depth() const;
+
   // Moves everything to `out` and drops the former contents of `out`. The two swap their memory, so that
   // nothing is allocated.
   void drain(Inputs& out);
 
  private:
-  std::mutex mutex_;
+  mutable std::mutex mutex_;
   Inputs inputs_;
 };
 

@@ -85,6 +85,11 @@ messages::Result<void> LiveScene::charge() {
   return charge_.charge("createScene.scene", definition_);
 }
 
+void LiveScene::discharge() {
+  const std::lock_guard lock(mutex_);
+  charge_.release();
+}
+
 model::Work LiveScene::tickWork(std::size_t colliders) const {
   const std::lock_guard lock(mutex_);
   return charge_.work(definition_, colliders);

@@ -55,6 +55,8 @@ class LiveScene {
 
   // Charges a created scene before it first runs, or returns why it exceeds the budget.
   messages::Result<void> charge();
+  // Gives the charge back, because the scene has been deleted. Others may hold the object for longer.
+  void discharge();
   // Price of a tick with the accepted changes and this number of colliders.
   model::Work tickWork(std::size_t colliders) const;
 
@@ -116,7 +118,7 @@ class LiveScene {
   Charge charge_;  // of definition_
   std::string quarantined_;
   schedule::TokenBucket changes_{kChangesPerSecond, kChangesPerSecond};
-  std::optional<Clock::time_point> emptySince_;  // of the newest call of hasBeenEmptyFor()
+  std::optional<Clock::time_point> emptySince_;                     // of the newest call of hasBeenEmptyFor()
   std::shared_ptr<const delivery::DescriptionChunks> description_;  // null after a change of the definition
   std::uint64_t contents_ = 0;                                      // newest content id
 };

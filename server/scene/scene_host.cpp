@@ -7,11 +7,11 @@
 #include <utility>
 
 #include <fmt/format.h>
-#include <spdlog/spdlog.h>
 
 #include "clothstream/v1/session.pb.h"
 #include "server/messages/description.h"
 #include "server/model/wind.h"
+#include "server/telemetry/log.h"
 
 namespace clothstream::scene {
 namespace {
@@ -204,7 +204,7 @@ void SceneHost::setCloths(const std::vector<model::Cloth>& cloths) {
 
 void SceneHost::revertChanges(const std::string& reason) {
   const std::string text = fmt::format("a parameter change was undone: {}", reason);
-  spdlog::warn("{}: tick {}: {}", live_.name(), tick_, text);
+  telemetry::log({live_.name()}, spdlog::level::warn, "tick {}: {}", tick_, text);
   live_.subscribers.announce(delivery::parametersChanged(live_.revertTo(scene_), tick_ + 1));
   live_.subscribers.announce(delivery::notice(v1::NOTICE_KIND_CHANGE_UNDONE, text, tick_));
 }
@@ -416,7 +416,7 @@ void SceneHost::recover() {
     text = "the simulation became unstable: it continues from its newest healthy state, at most a second old";
   }
   if (!recoveryNotices_.take(Clock::now())) return;
-  spdlog::warn("{}: tick {}: {}", live_.name(), tick_, text);
+  telemetry::log({live_.name()}, spdlog::level::warn, "tick {}: {}", tick_, text);
   live_.subscribers.announce(delivery::notice(v1::NOTICE_KIND_ROLLED_BACK, text, tick_));
 }
 

@@ -6,9 +6,9 @@
 #include <utility>
 
 #include <boost/asio/post.hpp>
-#include <spdlog/spdlog.h>
 
 #include "server/schedule/clock.h"
+#include "server/telemetry/log.h"
 
 namespace clothstream::scene {
 
@@ -24,7 +24,8 @@ SceneLoader::Future SceneLoader::load(vulkan::Device& device, const model::Scene
     if (stop.stop_requested()) throw std::runtime_error("loading was stopped");
     const schedule::Clock::time_point before = schedule::Clock::now();
     auto loaded = std::make_unique<SceneOnDevice>(device, scene, workers_, stop);
-    spdlog::debug("{}: loaded in {:.2f} s", scene.name, schedule::seconds(schedule::Clock::now() - before));
+    telemetry::log({scene.name}, spdlog::level::debug, "loaded in {:.2f} s",
+                   schedule::seconds(schedule::Clock::now() - before));
     return loaded;
   });
   Future loaded = task.get_future();

@@ -35,23 +35,16 @@ class Periods {
   const TickSchedule* fastest_ = nullptr;
 };
 
-}  // namespace
-
-void TickSchedule::tickEnded(Clock::duration time, Clock::time_point now) {
-  cost = cost == Clock::duration::zero() ? time : cost + (time - cost) / kAveragedTicks;
-  ended = now;
-}
-
-void scheduleTicks(std::span<TickSchedule* const> schedules, Clock::time_point now,
-                   std::vector<TickSchedule*>& chosen) {
-  chosen.clear();
+// Chooses among scenes of equal rights, and appends to `chosen`.
+void chooseAmongEquals(std::span<TickSchedule* const> schedules, Clock::time_point now,
+                       std::vector<TickSchedule*>& chosen) {
   const Periods periods(schedules);
   TickSchedule* nextLong = nullptr;
   Clock::duration longest{};
   const auto count = std::ranges::count_if(schedules, &TickSchedule::running);
   for (TickSchedule* schedule : schedules) {
     schedule->catchUp = {};
-    if (!schedule->running) continue;
+    if (!schedule->running || schedule->begun) continue;
     const bool due = schedule->pacer.due() <= now;
     if (!periods.isLong(*schedule)) {
       if (due) chosen.push_back(schedule);
@@ -66,6 +59,57 @@ void scheduleTicks(std::span<TickSchedule* const> schedules, Clock::time_point n
     if (!periods.isLong(*schedule)) schedule->catchUp = std::min<Clock::duration>(2 * longest, kMaxCatchUp);
   if (nextLong != nullptr && (chosen.empty() || now - nextLong->ended >= count * nextLong->cost))
     chosen.push_back(nextLong);
+}
+
+}  // namespace
+
+void TickSchedule::tickEnded(Clock::duration time, Clock::time_point now) {
+  cost = cost == Clock::duration::zero() ? time : cost + (time - cost) / kAveragedTicks;
+  ended = now;
+}
+
+void TickScheduler::choose(std::span<TickSchedule* const> schedules, Clock::time_point now,
+                           std::vector<TickSchedule*>& chosen) {
+  chosen.clear();
+  std::vector<TickSchedule*> own, guests;
+  for (TickSchedule* schedule : schedules) (schedule->guest ? guests : own).push_back(schedule);
+  if (std::ranges::none_of(own, &TickSchedule::running)) return chooseAmongEquals(schedules, now, chosen);
+  chooseAmongEquals(own, now, chosen);
+  if (std::ranges::none_of(guests, &TickSchedule::running)) return;
+  for (TickSchedule* schedule : own)
+    schedule->catchUp = std::min<Clock::duration>(std::max(schedule->catchUp, 2 * slice_), kMaxCatchUp);
+  std::vector<TickSchedule*> due;
+  chooseAmongEquals(guests, now, due);
+  if (!due.empty() && guestsFrom(schedules, now) <= now) chosen.push_back(due.front());
+}
+
+Clock::time_point TickScheduler::guestsFrom(std::span<TickSchedule* const> schedules, Clock::time_point now) {
+  std::int64_t others = 0;
+  Clock::time_point nextDue = Clock::time_point::max();
+  Clock::duration gap{};  // that the next slice of a guest may need
+  for (const TickSchedule* schedule : schedules) {
+    if (!schedule->running) continue;
+    if (schedule->guest) {
+      const bool isShort = schedule->cost > Clock::duration::zero() && schedule->cost < slice_;
+      gap = std::max(gap, isShort ? schedule->cost : slice_);
+    } else {
+      ++others;
+      nextDue = std::min(nextDue, schedule->begun ? now : schedule->pacer.due());
+    }
+  }
+  grant(now, others);
+  if (others == 0 || excess_ <= Clock::duration::zero() || now + gap <= nextDue) return now;
+  return now + excess_ * (others + 1);
+}
+
+void TickScheduler::used(const TickSchedule& schedule, Clock::duration time) {
+  if (schedule.guest) excess_ += time;
+}
+
+// Guests may save at most one slice of their share.
+void TickScheduler::grant(Clock::time_point now, std::int64_t others) {
+  if (now > granted_) excess_ = std::max(excess_ - (now - granted_) / (others + 1), -slice_);
+  granted_ = std::max(granted_, now);
 }
 
 }  // namespace clothstream::schedule

@@ -13,6 +13,7 @@
 #include "server/delivery/mailbox.h"
 #include "server/hosting/server_state.h"
 #include "server/messages/client_message.h"
+#include "server/telemetry/log.h"
 
 namespace clothstream::session {
 namespace {
@@ -253,10 +254,10 @@ void Session::hello(const v1::Hello& message) {
   if (scene->journal && scene->journal->active() && !mailbox_->announce(scene::recordingNotice(scene->tick)))
     return closeLocked(delivery::tooSlow(), DisconnectReason::lost);
   server_.wake(*scene);
-  spdlog::info("{}: {} {} as participant {}, {} ({}); {} in it", scene->name(), peer_,
-               admission->resumed ? "came back" : "joined", participant_, scene::nameOf(admission->role),
-               joining->clientName.empty() ? "unnamed client" : joining->clientName,
-               scene->subscribers.size());
+  telemetry::log(
+      {scene->name(), participant_}, spdlog::level::info, "{} {} as participant {}, {} ({}); {} in it", peer_,
+      admission->resumed ? "came back" : "joined", participant_, scene::nameOf(admission->role),
+      joining->clientName.empty() ? "unnamed client" : joining->clientName, scene->subscribers.size());
 }
 
 void Session::create(const v1::CreateSceneRequest& request) {
@@ -380,8 +381,8 @@ void Session::disconnect(DisconnectReason reason) {
         *mailbox_, reason == DisconnectReason::left ? scene::LeaveReason::left : scene::LeaveReason::removed,
         now_);
   server_.wake(*scene_);
-  spdlog::info("{}: {} {}; {} in it", scene_->name(), peer_,
-               reason == DisconnectReason::lost ? "was disconnected" : "left", scene_->subscribers.size());
+  telemetry::log({scene_->name(), participant_}, spdlog::level::info, "{} {}; {} in it", peer_,
+                 reason == DisconnectReason::lost ? "was disconnected" : "left", scene_->subscribers.size());
   scene_ = nullptr;
 }
 

@@ -19,6 +19,8 @@ namespace bh = boost::histogram;
 
 constexpr double kShortest = 1e-6, kLongest = 1e3;
 constexpr unsigned kBinsPerDecade = 48, kDecades = 9;
+// Bins below the first bound of kBucketBounds, and between two bounds.
+constexpr std::size_t kBinsBelowFirstBound = kBinsPerDecade, kBinsPerBucket = kBinsPerDecade / 3;
 
 using Axis = bh::axis::regular<double, bh::axis::transform::log>;
 using Storage = bh::dense_storage<bh::accumulators::thread_safe<std::uint64_t>>;
@@ -28,7 +30,15 @@ using Storage = bh::dense_storage<bh::accumulators::thread_safe<std::uint64_t>>;
 struct Histogram::Bins {
   bh::histogram<std::tuple<Axis>, Storage> counts =
       bh::make_histogram_with(Storage(), Axis(kBinsPerDecade* kDecades, kShortest, kLongest));
-  std::atomic<double> max{0};
+  std::atomic<double> max{0}, sum{0};
+
+  // A copy is a snapshot while other threads record. Its first and its last count are of values outside the
+  // axis.
+  std::vector<std::uint64_t> snapshot() const {
+    std::vector<std::uint64_t> now;
+    for (int bin = -1; bin <= counts.axis().size(); ++bin) now.push_back(counts.at(bin).load());
+    return now;
+  }
 };
 
 Histogram::Histogram() : bins_(std::make_unique<Bins>()) {}
@@ -36,6 +46,7 @@ Histogram::~Histogram() = default;
 
 void Histogram::record(double seconds) {
   bins_->counts(std::clamp(seconds, kShortest, kLongest));
+  bins_->sum.fetch_add(std::max(seconds, 0.0), std::memory_order_relaxed);
   double max = bins_->max.load(std::memory_order_relaxed);
   while (seconds > max && !bins_->max.compare_exchange_weak(max, seconds, std::memory_order_relaxed)) {
   }
@@ -43,10 +54,7 @@ void Histogram::record(double seconds) {
 
 Summary Histogram::summary() const {
   const Axis& axis = bins_->counts.axis();
-  // Copying the counts takes a snapshot while other threads record. Bin -1 and the last bin count values
-  // outside the axis.
-  std::vector<std::uint64_t> counts;
-  for (int bin = -1; bin <= axis.size(); ++bin) counts.push_back(bins_->counts.at(bin).load());
+  const std::vector<std::uint64_t> counts = bins_->snapshot();
 
   Summary summary;
   for (const std::uint64_t count : counts) summary.count += count;
@@ -70,6 +78,21 @@ Summary Histogram::summary() const {
   return summary;
 }
 
+Buckets Histogram::buckets() const {
+  Buckets buckets;
+  const std::vector<std::uint64_t> counts = bins_->snapshot();
+  std::size_t bin = 0;
+  for (std::size_t i = 0; i < buckets.cumulative.size(); ++i) {
+    // Index 0 has the values below the axis.
+    for (const std::size_t end = 1 + kBinsBelowFirstBound + i * kBinsPerBucket; bin < end; ++bin)
+      buckets.count += counts[bin];
+    buckets.cumulative[i] = buckets.count;
+  }
+  for (; bin < counts.size(); ++bin) buckets.count += counts[bin];
+  buckets.sum = bins_->sum.load(std::memory_order_relaxed);
+  return buckets;
+}
+
 void StageHistograms::record(std::string_view stage, double seconds) {
   const std::lock_guard lock(mutex_);
   auto found = std::ranges::find(stages_, stage, [](const auto& entry) { return entry.first; });
@@ -81,6 +104,13 @@ std::vector<std::pair<std::string_view, Summary>> StageHistograms::summaries() c
   const std::lock_guard lock(mutex_);
   std::vector<std::pair<std::string_view, Summary>> all;
   for (const auto& [stage, histogram] : stages_) all.emplace_back(stage, histogram->summary());
+  return all;
+}
+
+std::vector<std::pair<std::string_view, Buckets>> StageHistograms::buckets() const {
+  const std::lock_guard lock(mutex_);
+  std::vector<std::pair<std::string_view, Buckets>> all;
+  for (const auto& [stage, histogram] : stages_) all.emplace_back(stage, histogram->buckets());
   return all;
 }
 

@@ -2,11 +2,14 @@
 // Creates the default logger.
 #include "server/telemetry/log.h"
 
+#include <chrono>
 #include <memory>
 #include <stdexcept>
 #include <string>
 #include <utility>
 
+#include <fmt/chrono.h>
+#include <nlohmann/json.hpp>
 #include <spdlog/pattern_formatter.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
@@ -16,21 +19,57 @@
 namespace clothstream::telemetry {
 namespace {
 
+// Subject of the line that this thread writes. Sinks format a line on the thread that logs it.
+thread_local LogSubject subjectOfThread;
+
 // The text of a log line. Names and texts from clients cannot forge lines or control the terminal.
 class PrintableText final : public spdlog::custom_flag_formatter {
  public:
   void format(const spdlog::details::log_msg& message, const std::tm&, spdlog::memory_buf_t& line) override {
-    const std::string text = printable({message.payload.data(), message.payload.size()});
-    line.append(text.data(), text.data() + text.size());
+    if (!subjectOfThread.scene.empty()) append(line, printable(subjectOfThread.scene) + ": ");
+    append(line, printable({message.payload.data(), message.payload.size()}));
   }
   std::unique_ptr<spdlog::custom_flag_formatter> clone() const override {
     return spdlog::details::make_unique<PrintableText>();
+  }
+
+ private:
+  static void append(spdlog::memory_buf_t& line, const std::string& text) {
+    line.append(text.data(), text.data() + text.size());
+  }
+};
+
+// RFC 3339 in UTC with milliseconds, such as 2026-11-23T20:15:00.125Z.
+std::string toText(std::chrono::system_clock::time_point time) {
+  const auto milliseconds = std::chrono::floor<std::chrono::milliseconds>(time);
+  const auto seconds = std::chrono::floor<std::chrono::seconds>(milliseconds);
+  return fmt::format("{:%Y-%m-%dT%H:%M:%S}.{:03}Z",
+                     fmt::gmtime(std::chrono::system_clock::to_time_t(seconds)),
+                     (milliseconds - seconds).count());
+}
+
+class JsonLine final : public spdlog::formatter {
+ public:
+  void format(const spdlog::details::log_msg& message, spdlog::memory_buf_t& line) override {
+    const spdlog::string_view_t level = spdlog::level::to_string_view(message.level);
+    nlohmann::ordered_json object{{"time", toText(message.time)},
+                                  {"level", std::string(level.data(), level.size())},
+                                  {"message", printable({message.payload.data(), message.payload.size()})}};
+    if (!subjectOfThread.scene.empty()) object["scene"] = printable(subjectOfThread.scene);
+    if (subjectOfThread.participant != 0) object["participant"] = subjectOfThread.participant;
+    // Other characters than ASCII are escaped, and invalid UTF-8 is replaced.
+    const std::string text =
+        object.dump(-1, ' ', true, nlohmann::ordered_json::error_handler_t::replace) + '\n';
+    line.append(text.data(), text.data() + text.size());
+  }
+  std::unique_ptr<spdlog::formatter> clone() const override {
+    return spdlog::details::make_unique<JsonLine>();
   }
 };
 
 }  // namespace
 
-void setUpLog(const std::string& level) {
+void setUpLog(const std::string& level, LogFormat format) {
   const spdlog::level::level_enum parsed = spdlog::level::from_str(level);
   // from_str() returns `off` for unknown names.
   if (parsed == spdlog::level::off && level != "off")
@@ -40,11 +79,21 @@ void setUpLog(const std::string& level) {
   // A new logger, instead of a new sink, allows repeated calls in tests.
   auto logger = std::make_shared<spdlog::logger>("", std::make_shared<spdlog::sinks::stderr_color_sink_mt>());
   logger->set_level(parsed);
-  auto formatter = std::make_unique<spdlog::pattern_formatter>();
-  formatter->add_flag<PrintableText>('V').set_pattern("%H:%M:%S.%e %^%l%$ %V");
-  logger->set_formatter(std::move(formatter));
+  if (format == LogFormat::json) {
+    logger->set_formatter(std::make_unique<JsonLine>());
+  } else {
+    auto formatter = std::make_unique<spdlog::pattern_formatter>();
+    formatter->add_flag<PrintableText>('V').set_pattern("%H:%M:%S.%e %^%l%$ %V");
+    logger->set_formatter(std::move(formatter));
+  }
   logger->flush_on(spdlog::level::warn);
   spdlog::set_default_logger(std::move(logger));
+}
+
+void writeLog(const LogSubject& subject, spdlog::level::level_enum level, std::string_view message) {
+  subjectOfThread = subject;
+  spdlog::log(level, spdlog::string_view_t(message.data(), message.size()));
+  subjectOfThread = {};
 }
 
 }  // namespace clothstream::telemetry

@@ -59,11 +59,13 @@ std::string table(const std::string& scene, const SceneMetrics& m) {
 std::string table(const ServerMetrics& m) {
   std::string text = "server\n";
   addCounters(text, {{"connections", m.connections.value()},
-                     {"refused", m.refusedConnections.value()},
                      {"dropped", m.droppedConnections.value()},
                      {"rejected messages", m.rejectedMessages.value()},
                      {"device rebuilds", m.deviceRebuilds.value()},
                      {"scenes in quarantine", m.quarantines.value()}});
+  for (std::size_t i = 0; i < kRefusalNames.size(); ++i)
+    if (m.refusals[i].value() > 0)
+      addCounters(text, {{fmt::format("refused: {}", kRefusalNames[i]), m.refusals[i].value()}});
   return text;
 }
 

@@ -2,9 +2,12 @@
 // Counters and timings of scenes and of the server, and their report as text.
 #pragma once
 
+#include <array>
 #include <atomic>
+#include <cstddef>
 #include <cstdint>
 #include <string>
+#include <string_view>
 
 #include "server/telemetry/histogram.h"
 
@@ -50,9 +53,27 @@ struct SceneMetrics {
   Counter joins;
 };
 
+// Why a connection or a request was refused.
+enum class Refusal : std::uint8_t {
+  connections,           // too many are open
+  connectionsOfAddress,  // too many of this address are open
+  connectionRate,        // too many new ones per second
+  connectionRateOfAddress,
+  stopping,       // the server stops
+  callRate,       // too many calls per second from one address
+  createdScenes,  // too many scenes exist
+  budget,         // the price of a scene exceeds what is left
+};
+// Names for metrics and reports, in the order of Refusal.
+inline constexpr std::array<std::string_view, 8> kRefusalNames{
+    "connections", "connections of address", "connection rate", "connection rate of address", "stopping",
+    "call rate",   "created scenes",         "budget"};
+
 struct ServerMetrics {
+  void refuse(Refusal reason) { refusals[static_cast<std::size_t>(reason)].add(); }
+
   Counter connections;
-  Counter refusedConnections;
+  std::array<Counter, kRefusalNames.size()> refusals;  // by Refusal
   Counter droppedConnections;  // connections closed because they were silent, too slow or abusive
   Counter rejectedMessages;    // messages answered by an Error before the client joined
   Counter deviceRebuilds;

@@ -11,7 +11,7 @@
 namespace clothstream::endpoint {
 namespace {
 
-using Refusal = Admission::Refusal;
+using telemetry::Refusal;
 
 const schedule::Clock::time_point kNow{std::chrono::hours(1)};
 
@@ -56,9 +56,19 @@ TEST(AdmissionTest, LimitsConnectionsOfAnAddressButNotOfThisMachine) {
 TEST(AdmissionTest, LimitsNewConnectionsPerSecond) {
   Admission admission({.connectionsPerSecond = 10});
   for (int i = 0; i < 10; ++i) EXPECT_TRUE(admission.admit(address("127.0.0.1"), kNow)) << i;
-  EXPECT_EQ(admission.admit(address("127.0.0.1"), kNow).error(), Refusal::rate);
+  EXPECT_EQ(admission.admit(address("127.0.0.1"), kNow).error(), Refusal::connectionRate);
   EXPECT_TRUE(admission.admit(address("127.0.0.1"), kNow + std::chrono::milliseconds(150)));
   EXPECT_FALSE(admission.admit(address("127.0.0.1"), kNow + std::chrono::milliseconds(150)));
+}
+
+TEST(AdmissionTest, OneAddressDoesNotTakeTheConnectionsPerSecondOfOthers) {
+  Admission admission({.connectionsPerSecond = 10, .connectionsPerSecondOfAddress = 4});
+  for (int i = 0; i < 4; ++i) EXPECT_TRUE(admission.admit(address("192.0.2.1"), kNow)) << i;
+  for (int i = 0; i < 100; ++i)
+    EXPECT_EQ(admission.admit(address("192.0.2.1"), kNow).error(), Refusal::connectionRateOfAddress);
+  for (int i = 0; i < 4; ++i) EXPECT_TRUE(admission.admit(address("192.0.2.2"), kNow)) << i;
+  EXPECT_TRUE(admission.admit(address("192.0.2.1"), kNow + std::chrono::milliseconds(300)));
+  for (int i = 0; i < 3; ++i) EXPECT_TRUE(admission.admit(address("::1"), kNow)) << i;
 }
 
 TEST(AdmissionTest, TicketMayOutliveTheAdmission) {

@@ -33,12 +33,12 @@ model::Scene sheet(std::string name, std::uint32_t side) {
 
 void SmallServer::SetUp() {
   telemetry::setUpLog("warning");
-  hosting::ServerOptions options;
-  options.budget = {.sceneLoad = 1e9, .load = 1e9, .sceneMegabytes = 1e9, .megabytes = 1e9};
-  options.defaultScene = "small";
+  hosting::ServerOptions serverOptions = options();
+  serverOptions.budget = {.sceneLoad = 1e9, .load = 1e9, .sceneMegabytes = 1e9, .megabytes = 1e9};
+  serverOptions.defaultScene = "small";
   try {
     server_ = std::make_unique<hosting::SceneServer>(
-        std::vector{sheet("small", 8), sheet("other", 8), sheet("large", 128)}, options);
+        std::vector{sheet("small", 8), sheet("other", 8), sheet("large", 128)}, std::move(serverOptions));
   } catch (const vulkan::DeviceError& error) {
     GTEST_SKIP() << error.what();
   }

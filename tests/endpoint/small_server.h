@@ -16,6 +16,8 @@ class SmallServer : public ::testing::Test {
   void SetUp() override;
   void TearDown() override;
 
+  // Options of the server, except for its default scene.
+  virtual hosting::ServerOptions options() { return {}; }
   // Scenes: "small" (the default) and "other" with 8 x 8 nodes each, "large" with 128 x 128. Each hangs by
   // two corners and streams 30 frames a second.
   hosting::SceneServer& server() { return *server_; }

@@ -2,10 +2,14 @@
 // Text from outside cannot control a terminal or forge lines of the log.
 #include "server/telemetry/log.h"
 
+#include <functional>
+#include <sstream>
 #include <string>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 #include <spdlog/spdlog.h>
 
 #include "proto/text/printable.h"
@@ -42,6 +46,49 @@ TEST(Log, WritesOneLineForAMessageFromOutside) {
   const std::string written = testing::internal::GetCapturedStderr();
   EXPECT_THAT(written, HasSubstr("info eve\\x0a12:00:00.000 error the disk is full\\x1b[2J joined\n"));
   EXPECT_EQ(written.find('\n'), written.size() - 1);
+}
+
+std::string written(LogFormat format, const std::function<void()>& write) {
+  setUpLog("info", format);
+  testing::internal::CaptureStderr();
+  write();
+  spdlog::default_logger()->flush();
+  std::string text = testing::internal::GetCapturedStderr();
+  setUpLog("info");
+  return text;
+}
+
+TEST(Log, BeginsATextLineWithTheSceneThatItIsAbout) {
+  const std::string text = written(LogFormat::text, [] {
+    log({"flag", 3}, spdlog::level::info, "{} joined", "eve");
+    log({"flag"}, spdlog::level::debug, "not shown");
+    spdlog::info("about no scene");
+  });
+  EXPECT_THAT(text, HasSubstr(" info flag: eve joined\n"));
+  EXPECT_THAT(text, HasSubstr(" info about no scene\n"));
+  EXPECT_THAT(text, testing::Not(HasSubstr("not shown")));
+}
+
+TEST(Log, WritesOneJsonObjectForEachMessage) {
+  const std::string text = written(LogFormat::json, [] {
+    log({"fl\"ag\\", 3}, spdlog::level::warn, "{} joined", "eve\n{\"level\":\"error\"}\x1b[2J\xc2\x9b");
+    spdlog::info("invalid \xff UTF-8 and {}", "\xf0\x9f\xa7\xb5");
+    log({"flag"}, spdlog::level::debug, "not shown");
+  });
+  for (const char c : text) EXPECT_TRUE(c == '\n' || (c >= 0x20 && c < 0x7f)) << text;
+  std::istringstream lines(text);
+  std::vector<nlohmann::json> objects;
+  for (std::string line; std::getline(lines, line);) objects.push_back(nlohmann::json::parse(line));
+  ASSERT_EQ(objects.size(), 2u);
+  EXPECT_THAT(objects[0]["time"].get<std::string>(),
+              testing::MatchesRegex("20..-..-..T..:..:..[.][0-9][0-9][0-9]Z"));
+  EXPECT_EQ(objects[0]["level"], "warning");
+  EXPECT_EQ(objects[0]["message"], "eve\\x0a{\"level\":\"error\"}\\x1b[2J\\xc2\\x9b joined");
+  EXPECT_EQ(objects[0]["scene"], "fl\"ag\\");
+  EXPECT_EQ(objects[0]["participant"], 3);
+  EXPECT_EQ(objects[1]["message"], "invalid \ufffd UTF-8 and \xf0\x9f\xa7\xb5");
+  EXPECT_FALSE(objects[1].contains("scene"));
+  EXPECT_FALSE(objects[1].contains("participant"));
 }
 
 }  // namespace

@@ -77,14 +77,14 @@ void Acceptor::accepted(tcp::socket socket) {
   if (error) return;  // it has gone already
   if (connections_.size() >= maxConnections_) forgetEnded();
   auto ticket = admission_.admit(peer.address(), schedule::Clock::now());
-  if (!ticket) return metrics_.refusedConnections.add();
+  if (!ticket) return metrics_.refuse(ticket.error());
   socket.set_option(tcp::no_delay(true), error);
   socket.non_blocking(true, error);
   connections_.push_back({-1, std::move(*ticket)});
   connections_.back().copy = ::fcntl(socket.native_handle(), F_DUPFD_CLOEXEC, 0);
   if (connections_.back().copy < 0) {
     connections_.pop_back();
-    return metrics_.refusedConnections.add();
+    return metrics_.refuse(telemetry::Refusal::connections);
   }
   grpc::experimental::ExternalConnectionAcceptor::NewConnectionParameters connection;
   connection.fd = socket.release();

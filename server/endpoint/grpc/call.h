@@ -13,6 +13,7 @@
 
 #include "server/endpoint/grpc/call_rate.h"
 #include "server/endpoint/grpc/completion_loop.h"
+#include "server/telemetry/metrics.h"
 
 namespace clothstream::hosting {
 class SceneServer;
@@ -25,6 +26,7 @@ class Call;
 // Belongs to the loop's thread; only the loop itself may be used by others.
 struct GrpcEndpointContext {
   hosting::SceneServer& server;
+  telemetry::ServerMetrics& metrics;
   const std::shared_ptr<CompletionLoop> loop;
   const std::size_t maxStreams;
   std::size_t streams = 0;  // open Join streams, without refused ones

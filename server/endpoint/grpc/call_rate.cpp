@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "server/endpoint/grpc/call_rate.h"
 
-#include "server/endpoint/listen/admission.h"
-
 namespace clothstream::endpoint {
 namespace {
 
@@ -20,11 +18,8 @@ boost::asio::ip::address addressIn(const std::string& peer) {
 
 }  // namespace
 
-bool CallRate::take(const std::string& peer, schedule::Clock::time_point now) {
-  if (buckets_.size() > kMaxAddresses) buckets_.clear();
-  const auto [entry, isNew] =
-      buckets_.try_emplace(addressKey(addressIn(peer)), kCallsPerSecond, 2 * kCallsPerSecond);
-  return entry->second.take(now);
+bool CallRate::take(const std::string& peer, schedule::Clock::time_point now, double cost) {
+  return rate_.take(addressKey(addressIn(peer)), now, cost);
 }
 
 }  // namespace clothstream::endpoint

@@ -2,29 +2,26 @@
 // Limits the calls with one response that a peer makes.
 #pragma once
 
-#include <cstddef>
 #include <string>
-#include <unordered_map>
 
-#include "server/schedule/token_bucket.h"
+#include "server/endpoint/listen/address_rate.h"
 
 namespace clothstream::endpoint {
 
-// Counts per address, as Admission does; programs of this machine share one count. Not thread-safe.
+// Programs of this machine share one limit. Not thread-safe.
 class CallRate {
  public:
   // Per second, with twice as many at once.
   static constexpr double kCallsPerSecond = 100;
+  // A call that reads or makes a whole scene counts as this many.
+  static constexpr double kSceneCost = 10;
 
   // `peer` is the address as gRPC writes it, such as ipv4:192.0.2.1:50000. Returns false if the call is too
   // many.
-  bool take(const std::string& peer, schedule::Clock::time_point now);
+  bool take(const std::string& peer, schedule::Clock::time_point now, double cost = 1);
 
  private:
-  // Beyond this number of addresses, counting starts again.
-  static constexpr std::size_t kMaxAddresses = 4096;
-
-  std::unordered_map<std::string, schedule::TokenBucket> buckets_;
+  AddressRate rate_{kCallsPerSecond, 2 * kCallsPerSecond};
 };
 
 }  // namespace clothstream::endpoint

@@ -105,7 +105,7 @@ struct GrpcEndpoint::State {
     const auto loop = std::make_shared<CompletionLoop>(builder.AddCompletionQueue());
     server = builder.BuildAndStart();
     if (!server) throw std::runtime_error("gRPC cannot start a server");
-    context.emplace(GrpcEndpointContext{scenes, loop, options.maxStreams});
+    context.emplace(GrpcEndpointContext{scenes, scenes.state().metrics, loop, options.maxStreams});
     offerService(*context, service, slowCalls);
     offerHealth(*context, health);
     if (hasWeaknesses() && !acceptor->isLoopback())

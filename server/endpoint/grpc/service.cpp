@@ -17,12 +17,16 @@ void offerService(GrpcEndpointContext& endpoint, Service& service, boost::asio::
         [&server](const auto&, auto answer) { answer(server.listScenes()); });
   // Slow, since a scene may contain a mesh of millions of vertices.
   offer(
-      endpoint, service, &Service::RequestGetScene, [&server, &slowCalls](const auto& request, auto answer) {
+      endpoint, service, &Service::RequestGetScene,
+      [&server, &slowCalls](const auto& request, auto answer) {
         boost::asio::post(
             slowCalls, [&server, request, answer = std::move(answer)] { answer(server.getScene(request)); });
-      });
-  offer(endpoint, service, &Service::RequestCreateScene,
-        [&server](const auto& request, auto answer) { server.createScene(request, std::move(answer)); });
+      },
+      CallRate::kSceneCost);
+  offer(
+      endpoint, service, &Service::RequestCreateScene,
+      [&server](const auto& request, auto answer) { server.createScene(request, std::move(answer)); },
+      CallRate::kSceneCost);
   offer(endpoint, service, &Service::RequestDeleteScene,
         [&server](const auto& request, auto answer) { server.deleteScene(request, std::move(answer)); });
   offer(endpoint, service, &Service::RequestControlScene,

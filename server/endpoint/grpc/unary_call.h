@@ -27,8 +27,9 @@ class UnaryCall final : public Call {
   using Answer = std::function<void(tl::expected<Response, v1::Error>)>;
   using Handler = std::function<void(const Request&, Answer)>;
 
-  UnaryCall(GrpcEndpointContext& endpoint, Take take, Handler handler)
-      : Call(endpoint), take_(std::move(take)), handler_(std::move(handler)) {}
+  // `cost`: number of calls that one of these counts as (CallRate).
+  UnaryCall(GrpcEndpointContext& endpoint, Take take, Handler handler, double cost)
+      : Call(endpoint), take_(std::move(take)), handler_(std::move(handler)), cost_(cost) {}
 
   void await() {
     take_(&context_, &request_, &writer_, &endpoint_.loop->queue(), &endpoint_.loop->queue(), begin(begun_));
@@ -37,11 +38,13 @@ class UnaryCall final : public Call {
  private:
   void onBegun(bool ok) {
     if (!ok) return over();
-    endpoint::await<UnaryCall>(endpoint_, take_, handler_);
+    endpoint::await<UnaryCall>(endpoint_, take_, handler_, cost_);
     made();
     if (!endpoint_.refusal.ok()) return finish(endpoint_.refusal);
-    if (!endpoint_.callRate.take(context_.peer(), schedule::Clock::now()))
+    if (!endpoint_.callRate.take(context_.peer(), schedule::Clock::now(), cost_)) {
+      endpoint_.metrics.refuse(telemetry::Refusal::callRate);
       return finish({grpc::StatusCode::RESOURCE_EXHAUSTED, "too many calls: try again in a second"});
+    }
     std::weak_ptr<UnaryCall> weak = std::static_pointer_cast<UnaryCall>(shared_from_this());
     handler_(request_,
              [weak = std::move(weak), loop = endpoint_.loop](tl::expected<Response, v1::Error> answer) {
@@ -66,6 +69,7 @@ class UnaryCall final : public Call {
 
   const Take take_;
   const Handler handler_;
+  const double cost_;
   Request request_;
   Response response_;
   Writer writer_{&context_};
@@ -73,13 +77,14 @@ class UnaryCall final : public Call {
   Step<UnaryCall> begun_{*this, &UnaryCall::onBegun}, finished_{*this, &UnaryCall::onFinished};
 };
 
-// Answers calls of a method of `service` while the endpoint is open. `take` is its Request... function.
+// Answers calls of a method of `service` while the endpoint is open. `take` is its Request... function,
+// `cost` the number of calls that one counts as (CallRate).
 template <typename Service, typename Method, typename Request, typename Response, typename Handler>
 void offer(GrpcEndpointContext& endpoint, Service& service,
            void (Method::*take)(grpc::ServerContext*, Request*, grpc::ServerAsyncResponseWriter<Response>*,
                                 grpc::CompletionQueue*, grpc::ServerCompletionQueue*, void*),
-           Handler handler) {
-  await<UnaryCall<Request, Response>>(endpoint, std::bind_front(take, &service), std::move(handler));
+           Handler handler, double cost = 1) {
+  await<UnaryCall<Request, Response>>(endpoint, std::bind_front(take, &service), std::move(handler), cost);
 }
 
 }  // namespace clothstream::endpoint

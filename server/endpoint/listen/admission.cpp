@@ -5,37 +5,28 @@
 #include <mutex>
 #include <unordered_map>
 
+#include "server/endpoint/listen/address_rate.h"
 #include "server/schedule/token_bucket.h"
 
 namespace clothstream::endpoint {
 namespace {
 
 namespace ip = boost::asio::ip;
-
-constexpr std::size_t kPrefixBytes = 8;
+using telemetry::Refusal;
 
 }  // namespace
-
-std::string addressKey(ip::address address) {
-  if (address.is_v6() && address.to_v6().is_v4_mapped())
-    address = ip::make_address_v4(ip::v4_mapped, address.to_v6());
-  if (address.is_loopback()) return {};
-  if (address.is_v4()) {
-    const auto bytes = address.to_v4().to_bytes();
-    return {bytes.begin(), bytes.end()};
-  }
-  const auto bytes = address.to_v6().to_bytes();
-  return {bytes.begin(), bytes.begin() + kPrefixBytes};
-}
 
 // The table has an entry for each address with open connections only, so the limit of connections bounds it.
 struct Admission::Ticket::Counts {
   explicit Counts(const ConnectionLimits& of)
-      : limits(of), rate(of.connectionsPerSecond, std::max(1.0, of.connectionsPerSecond)) {}
+      : limits(of),
+        rate(of.connectionsPerSecond, std::max(1.0, of.connectionsPerSecond)),
+        rateOfAddress(of.connectionsPerSecondOfAddress, std::max(1.0, of.connectionsPerSecondOfAddress)) {}
 
   const ConnectionLimits limits;
   std::mutex mutex;
   schedule::TokenBucket rate;
+  AddressRate rateOfAddress;
   std::size_t connections = 0;
   std::unordered_map<std::string, std::size_t> ofAddress;
 };
@@ -53,7 +44,7 @@ Admission::Admission(const ConnectionLimits& limits) : counts_(std::make_shared<
 
 Admission::~Admission() = default;
 
-tl::expected<Admission::Ticket, Admission::Refusal> Admission::admit(const ip::address& address,
+tl::expected<Admission::Ticket, telemetry::Refusal> Admission::admit(const ip::address& address,
                                                                      schedule::Clock::time_point now) {
   Ticket::Counts& counts = *counts_;
   std::string key = addressKey(address);
@@ -64,7 +55,10 @@ tl::expected<Admission::Ticket, Admission::Refusal> Admission::admit(const ip::a
     if (entry != counts.ofAddress.end() && entry->second >= counts.limits.connectionsPerAddress)
       return tl::unexpected(Refusal::connectionsOfAddress);
   }
-  if (!counts.rate.take(now)) return tl::unexpected(Refusal::rate);
+  // First, so that one address does not take the connections per second of the others.
+  if (!key.empty() && !counts.rateOfAddress.take(key, now))
+    return tl::unexpected(Refusal::connectionRateOfAddress);
+  if (!counts.rate.take(now)) return tl::unexpected(Refusal::connectionRate);
   ++counts.connections;
   if (!key.empty()) ++counts.ofAddress[key];
   return Ticket(counts_, std::move(key));

@@ -10,25 +10,23 @@
 #include <tl/expected.hpp>
 
 #include "server/schedule/clock.h"
+#include "server/telemetry/metrics.h"
 
 namespace clothstream::endpoint {
 
 struct ConnectionLimits {
   std::size_t connections = 256;           // open at a time
   std::size_t connectionsPerAddress = 64;  // of one address
-  double connectionsPerSecond = 200;       // new ones, with a burst of as many
+  // New connections, with a burst of as many.
+  double connectionsPerSecond = 200;
+  double connectionsPerSecondOfAddress = 20;
 };
-
-// Addresses with the same key share their limits. Empty for loopback.
-std::string addressKey(boost::asio::ip::address address);
 
 // Thread-safe. Addresses of IPv6 count by their first 64 bits, because one peer usually has all addresses
 // that begin with them. All programs of this machine share the loopback addresses, which therefore have no
 // limit of their own.
 class Admission {
  public:
-  enum class Refusal { connections, connectionsOfAddress, rate };
-
   // Counts one connection while it lives. It may outlive the Admission.
   class Ticket {
    public:
@@ -48,8 +46,8 @@ class Admission {
   explicit Admission(const ConnectionLimits& limits);
   ~Admission();
 
-  tl::expected<Ticket, Refusal> admit(const boost::asio::ip::address& address,
-                                      schedule::Clock::time_point now);
+  tl::expected<Ticket, telemetry::Refusal> admit(const boost::asio::ip::address& address,
+                                                 schedule::Clock::time_point now);
   std::size_t connections() const;
 
  private:

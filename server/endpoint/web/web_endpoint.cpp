@@ -110,7 +110,7 @@ struct WebEndpoint::State {
     const tcp::endpoint peer = socket.remote_endpoint(error);
     if (error) return;  // it has gone already
     auto ticket = admission.admit(peer.address(), schedule::Clock::now());
-    if (!ticket) return context.server.state().metrics.refusedConnections.add();
+    if (!ticket) return context.server.state().metrics.refuse(ticket.error());
     sendFresh(socket);
     std::make_shared<HttpConnection>(std::move(socket), context, std::move(*ticket))->read();
   }

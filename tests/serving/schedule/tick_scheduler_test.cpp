@@ -14,46 +14,68 @@ namespace {
 using namespace std::chrono_literals;
 
 struct SimulatedScene {
-  SimulatedScene(std::uint32_t rate, Clock::duration tick) : turn(rate), cost(tick) {
+  SimulatedScene(std::uint32_t rate, Clock::duration tick, bool guest) : turn(rate, guest), cost(tick) {
     turn.running = true;
     turn.pacer.start({});
   }
   TickSchedule turn;
-  Clock::duration cost;
+  Clock::duration cost, used{};
+  Clock::time_point served{};
   int ticks = 0;
   double slipped = 0;
   Clock::duration worstLateness{};
 };
 
+constexpr Clock::duration kSlice = 10ms;
+
 class TickSchedulerTest : public ::testing::Test {
  protected:
-  SimulatedScene& add(std::uint32_t rate, Clock::duration cost) {
-    return *scenes_.emplace_back(std::make_unique<SimulatedScene>(rate, cost));
+  // A tick of a guest takes slices of kSlice, other ticks are not interrupted.
+  SimulatedScene& add(std::uint32_t rate, Clock::duration cost, bool guest = false) {
+    return *scenes_.emplace_back(std::make_unique<SimulatedScene>(rate, cost, guest));
   }
 
   // Runs the scenes as the device thread does.
   void run(Clock::duration time) {
+    TickScheduler scheduler(kSlice);
     std::vector<TickSchedule*> turns, chosen;
     for (const auto& scene : scenes_) turns.push_back(&scene->turn);
-    for (Clock::time_point now{}; now < Clock::time_point{} + time;) {
-      scheduleTicks(turns, now, chosen);
-      if (chosen.empty()) {
-        now = (*std::ranges::min_element(turns, {}, [](const TickSchedule* turn) {
-                return turn->pacer.due();
-              }))->pacer.due();
-        continue;
+    Clock::time_point now{};
+    const auto runSlice = [&](SimulatedScene& scene) {
+      const Clock::duration left = scene.cost - scene.used;
+      const Clock::duration slice = scene.turn.guest ? std::min(left, kSlice) : left;
+      now += slice;
+      scene.used += slice;
+      scene.served = now;
+      scheduler.used(scene.turn, slice);
+      scene.turn.begun = scene.used < scene.cost;
+      if (!scene.turn.begun) scene.turn.tickEnded(scene.used, now);
+    };
+    for (;;) {
+      Clock::time_point due = Clock::time_point::max();
+      for (const TickSchedule* turn : turns) {
+        if (!turn->running) continue;
+        const Clock::time_point own = turn->begun ? now : turn->pacer.due();
+        due = std::min(due, turn->guest ? std::max(own, scheduler.guestsFrom(turns, now)) : own);
       }
+      now = std::max(now, due);
+      if (now >= Clock::time_point{} + time) return;
+      scheduler.choose(turns, now, chosen);
       for (TickSchedule* turn : chosen) {
         SimulatedScene& scene = sceneOf(turn);
         const Pacer::Start start = turn->pacer.begin(now, turn->catchUp);
         scene.slipped += start.slippedTicks;
         scene.worstLateness = std::max(scene.worstLateness, start.lateness);
+        scene.used = {};
         ++scene.ticks;
       }
-      for (TickSchedule* turn : chosen) {
-        now += sceneOf(turn).cost;
-        turn->tickEnded(sceneOf(turn).cost, now);
-      }
+      for (TickSchedule* turn : chosen) runSlice(sceneOf(turn));
+      const bool guestsRun = scheduler.guestsFrom(turns, now) <= now;
+      SimulatedScene* next = nullptr;
+      for (const auto& scene : scenes_)
+        if (scene->turn.begun && guestsRun && (next == nullptr || scene->served < next->served))
+          next = scene.get();
+      if (next != nullptr) runSlice(*next);
     }
   }
 
@@ -122,6 +144,37 @@ TEST_F(TickSchedulerTest, EarliestTickStartsFirstWithoutHeavyScenes) {
   EXPECT_EQ(slow.ticks, 300);
   EXPECT_EQ(quick.ticks, 900);
   EXPECT_LE(quick.worstLateness, 4ms);
+}
+
+TEST_F(TickSchedulerTest, GuestsTakeNoFramesFromOtherScenes) {
+  SimulatedScene& own = add(72, 4ms);
+  std::vector<SimulatedScene*> guests;
+  for (int i = 0; i < 15; ++i) guests.push_back(&add(72, i < 14 ? 30ms : 3s, true));
+  run(30s);
+  EXPECT_EQ(own.slipped, 0);
+  EXPECT_GE(own.ticks, 30 * 72 - 3);
+  EXPECT_LE(own.worstLateness, 2 * kSlice);
+  Clock::duration used{};
+  for (const SimulatedScene* guest : guests) {
+    EXPECT_GE(guest->ticks, 1);
+    used += guest->ticks * guest->cost;
+  }
+  // Half of the device is theirs.
+  EXPECT_GE(used, 30s / 2 - 3s);
+}
+
+TEST_F(TickSchedulerTest, GuestsUseTheTimeThatOtherScenesLeave) {
+  for (int i = 0; i < 3; ++i) add(72, 1ms);
+  SimulatedScene& guest = add(1000, 2ms, true);
+  run(10s);
+  EXPECT_GE(guest.ticks * guest.cost, 0.6 * 10s) << "its share is 0.25";
+}
+
+TEST_F(TickSchedulerTest, GuestsHaveTheWholeDeviceWithoutOtherScenes) {
+  SimulatedScene &first = add(72, 40ms, true), &second = add(72, 40ms, true);
+  run(10s);
+  EXPECT_NEAR(first.ticks, second.ticks, 2);
+  EXPECT_GE(first.ticks + second.ticks, 249);
 }
 
 }  // namespace

@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: MIT
+#include "server/endpoint/listen/address_rate.h"
+
+namespace clothstream::endpoint {
+namespace {
+
+namespace ip = boost::asio::ip;
+
+constexpr std::size_t kPrefixBytes = 8;
+
+}  // namespace
+
+std::string addressKey(ip::address address) {
+  if (address.is_v6() && address.to_v6().is_v4_mapped())
+    address = ip::make_address_v4(ip::v4_mapped, address.to_v6());
+  if (address.is_loopback()) return {};
+  if (address.is_v4()) {
+    const auto bytes = address.to_v4().to_bytes();
+    return {bytes.begin(), bytes.end()};
+  }
+  const auto bytes = address.to_v6().to_bytes();
+  return {bytes.begin(), bytes.begin() + kPrefixBytes};
+}
+
+bool AddressRate::take(const std::string& key, schedule::Clock::time_point now, double cost) {
+  if (buckets_.size() > kMaxAddresses) buckets_.clear();
+  return buckets_.try_emplace(key, perSecond_, burst_).first->second.take(now, cost);
+}
+
+}  // namespace clothstream::endpoint

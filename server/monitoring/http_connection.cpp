@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: MIT
+#include "server/monitoring/http_connection.h"
+
+#include <utility>
+
+#include <boost/beast/http/read.hpp>
+#include <boost/beast/http/write.hpp>
+
+namespace clothstream::monitoring {
+namespace {
+
+namespace beast = boost::beast;
+namespace http = beast::http;
+
+std::string_view view(beast::string_view text) {
+  return {text.data(), text.size()};
+}
+
+}  // namespace
+
+HttpConnection::HttpConnection(boost::asio::ip::tcp::socket&& socket, HttpContext& context)
+    : context_(context), socket_(std::move(socket)) {
+  ++context_.connections;
+  parser_.header_limit(kMaxHeaderBytes);
+}
+
+HttpConnection::~HttpConnection() {
+  --context_.connections;
+}
+
+void HttpConnection::read() {
+  socket_.expires_after(kRequestTimeout);
+  http::async_read_header(
+      socket_, buffer_, parser_,
+      [self = shared_from_this()](beast::error_code error, std::size_t) { self->onHeader(error); });
+}
+
+void HttpConnection::onHeader(beast::error_code error) {
+  if (error == http::error::header_limit || error == http::error::buffer_overflow)
+    return write(
+        {.status = http::status::request_header_fields_too_large, .body = "The header is too large.\n"});
+  // All other values of http::error mean a malformed request, except the end of the connection.
+  if (error.category() == http::make_error_code(http::error::end_of_stream).category() &&
+      error != http::error::end_of_stream && error != http::error::partial_message)
+    return write({.status = http::status::bad_request, .body = "This is not an HTTP request.\n"});
+  if (!error) write(answer());
+}
+
+Answer HttpConnection::answer() const {
+  const auto& request = parser_.get();
+  if (parser_.chunked() || parser_.content_length().value_or(0) > 0)
+    return {.status = http::status::payload_too_large, .body = "Requests must not have a body.\n"};
+  if (!context_.names.contains(view(request[http::field::host])))
+    return {.status = http::status::misdirected_request,
+            .body =
+                "This server does not have the name of the Host field. The server option --public-name "
+                "adds it.\n"};
+  if (request.method() != http::verb::get && request.method() != http::verb::head)
+    return {.status = http::status::method_not_allowed, .body = "Only GET and HEAD are allowed.\n"};
+  const std::string_view target = view(request.target());
+  return context_.answer(target.substr(0, target.find('?')));
+}
+
+void HttpConnection::write(Answer&& answer) {
+  response_ = {answer.status, 11};
+  response_.set(http::field::server, "clothstream");
+  response_.set(http::field::content_type, answer.contentType);
+  response_.set(http::field::cache_control, "no-store");
+  if (answer.status == http::status::method_not_allowed) response_.set(http::field::allow, "GET, HEAD");
+  response_.keep_alive(false);
+  response_.content_length(answer.body.size());
+  if (parser_.get().method() != http::verb::head) response_.body() = std::move(answer.body);
+  socket_.expires_after(kResponseTimeout);
+  http::async_write(socket_, response_, [self = shared_from_this()](beast::error_code error, std::size_t) {
+    if (!error) self->close();
+  });
+}
+
+void HttpConnection::close() {
+  beast::error_code ignored;
+  socket_.socket().shutdown(boost::asio::ip::tcp::socket::shutdown_send, ignored);
+  socket_.expires_after(kCloseTimeout);
+  drain();
+}
+
+// Reads the rest of the request: closing a socket with unread bytes resets the connection, and the reset may
+// overtake the response.
+void HttpConnection::drain() {
+  buffer_.clear();
+  socket_.async_read_some(buffer_.prepare(kMaxHeaderBytes),
+                          [self = shared_from_this()](beast::error_code error, std::size_t) {
+                            if (!error) self->drain();
+                          });
+}
+
+}  // namespace clothstream::monitoring

@@ -1,0 +1,192 @@
+// SPDX-License-Identifier: MIT
+#include "server/monitoring/metric_families.h"
+
+#include <cstdint>
+#include <string_view>
+#include <utility>
+
+#include "server/hosting/server_state.h"
+#include "server/monitoring/process_usage.h"
+#include "server/telemetry/histogram.h"
+
+namespace clothstream::monitoring {
+namespace {
+
+using prometheus::ClientMetric;
+using prometheus::MetricFamily;
+using prometheus::MetricType;
+using scene::LiveScene;
+using Labels = std::vector<ClientMetric::Label>;
+using Metrics = telemetry::SceneMetrics;
+
+MetricFamily& add(Families& families, MetricType type, std::string name, std::string help) {
+  families.push_back({std::move(name), std::move(help), type, {}});
+  return families.back();
+}
+
+// Adds a sample of a counter or a gauge.
+void addSample(MetricFamily& family, double value, Labels labels = {}) {
+  ClientMetric& sample = family.metric.emplace_back();
+  sample.label = std::move(labels);
+  (family.type == MetricType::Counter ? sample.counter.value : sample.gauge.value) = value;
+}
+
+void addSample(MetricFamily& family, const telemetry::Buckets& buckets, Labels labels) {
+  if (buckets.count == 0) return;
+  ClientMetric& sample = family.metric.emplace_back();
+  sample.label = std::move(labels);
+  sample.histogram.sample_count = buckets.count;
+  sample.histogram.sample_sum = buckets.sum;
+  for (std::size_t i = 0; i < buckets.cumulative.size(); ++i)
+    sample.histogram.bucket.push_back({buckets.cumulative[i], telemetry::kBucketBounds[i]});
+}
+
+struct HistogramRow {
+  const char* name;
+  const char* help;
+  telemetry::Histogram telemetry::SceneMetrics::*histogram;
+};
+
+constexpr HistogramRow kSceneHistograms[] = {
+    {"tick_seconds", "Time from the start of a tick to its status on the CPU.", &Metrics::tick},
+    {"tick_lateness_seconds", "Start of a tick behind its due time.", &Metrics::lateness},
+    {"device_seconds", "Time of all stages of a tick on the device.", &Metrics::deviceTotal},
+    {"encode_seconds", "Time from the end of a tick on the device to its packet.", &Metrics::encode},
+    {"send_seconds", "Time from a packet to the moment an endpoint takes it.", &Metrics::send},
+    {"input_to_packet_seconds", "Time from the arrival of a pose to the packet that shows its effect.",
+     &Metrics::inputToPacket},
+};
+
+struct CounterRow {
+  const char* name;
+  const char* help;
+  telemetry::Counter telemetry::SceneMetrics::*counter;
+};
+
+constexpr CounterRow kSceneCounters[] = {
+    {"ticks_total", "Ticks simulated.", &Metrics::ticks},
+    {"late_ticks_total", "Ticks that started more than a quarter of a period late.", &Metrics::lateTicks},
+    {"slipped_ticks_total", "Ticks by which simulated time fell behind real time.", &Metrics::slippedTicks},
+    {"frames_total", "Packets encoded.", &Metrics::frames},
+    {"key_frames_total", "Packets that are key frames.", &Metrics::keyFrames},
+    {"packet_bytes_total", "Bytes of all packets, each counted once for all subscribers.",
+     &Metrics::packetBytes},
+    {"skipped_frames_total", "Frames not encoded because the encoder was behind.", &Metrics::skippedFrames},
+    {"taken_frames_total", "Frames taken by endpoints, per subscriber.", &Metrics::framesTaken},
+    {"dropped_frames_total", "Frames not sent because the subscriber was behind, per subscriber.",
+     &Metrics::framesDropped},
+    {"thinned_frames_total", "Frames of temporal layers that the subscriber skips, per subscriber.",
+     &Metrics::framesThinned},
+    {"steps_down_total", "Subscribers moved to fewer layers or a coarser quality.", &Metrics::stepsDown},
+    {"steps_up_total", "Subscribers moved to more layers or a finer quality.", &Metrics::stepsUp},
+    {"rollbacks_total", "Returns to the last good state.", &Metrics::rollbacks},
+    {"resets_total", "Returns to the initial state.", &Metrics::resets},
+    {"crowded_balls_total", "Full neighbour lists, and balls with too many contacts, in self-collision.",
+     &Metrics::crowdedBalls},
+    {"rejected_messages_total", "Messages answered by an error.", &Metrics::rejectedMessages},
+    {"joins_total", "Joins, reconnections included.", &Metrics::joins},
+};
+
+struct GaugeRow {
+  const char* name;
+  const char* help;
+  std::size_t (*of)(const LiveScene&);
+};
+
+constexpr GaugeRow kSceneGauges[] = {
+    {"participants", "Participants, disconnected ones included.",
+     [](const LiveScene& scene) { return scene.roster.size(); }},
+    {"away_participants", "Participants that are disconnected and may come back.",
+     [](const LiveScene& scene) { return scene.roster.away(); }},
+    {"subscribers", "Connections that receive frames.",
+     [](const LiveScene& scene) { return scene.subscribers.size(); }},
+    {"running", "1 while ticks run, else 0.",
+     [](const LiveScene& scene) { return std::size_t{scene.running}; }},
+    {"paused", "1 while the scene is paused, else 0.",
+     [](const LiveScene& scene) { return std::size_t{scene.paused}; }},
+    {"waiting_changes", "Parameter changes that wait for the next tick.",
+     [](const LiveScene& scene) { return scene.inbox.depth().changes; }},
+    {"waiting_poses", "Participants whose poses wait for the next tick.",
+     [](const LiveScene& scene) { return scene.inbox.depth().poses; }},
+};
+
+}  // namespace
+
+Families programFamilies(const std::string& version, const std::string& device) {
+  Families families;
+  addSample(add(families, MetricType::Gauge, "clothstream_build_info",
+                "Always 1. The labels are the version of the server and the name of the device."),
+            1, {{"version", version}, {"device", device}});
+  const auto gauge = [&](const char* name, const char* help, std::uint64_t value) {
+    addSample(add(families, MetricType::Gauge, name, help), static_cast<double>(value));
+  };
+  const ProcessUsage usage = processUsage();
+  gauge("clothstream_process_resident_memory_bytes", "Resident memory of the process.", usage.residentBytes);
+  gauge("clothstream_process_open_descriptors", "Open file descriptors of the process.",
+        usage.openDescriptors);
+  gauge("clothstream_process_threads", "Threads of the process.", usage.threads);
+  return families;
+}
+
+Families serverFamilies(hosting::SceneServer& server) {
+  const hosting::SceneServer::State& state = server.state();
+  const telemetry::ServerMetrics& metrics = state.metrics;
+  Families families;
+  const auto gauge = [&](const char* name, const char* help, double value) {
+    addSample(add(families, MetricType::Gauge, name, help), value);
+  };
+  const auto counter = [&](const char* name, const char* help, const telemetry::Counter& counted) {
+    addSample(add(families, MetricType::Counter, name, help), static_cast<double>(counted.value()));
+  };
+  gauge("clothstream_scenes", "Scenes of the server.", static_cast<double>(state.scenesNow().size()));
+  gauge("clothstream_open_connections", "Open connections.", static_cast<double>(state.peersNow().size()));
+  counter("clothstream_connections_total", "Connections admitted.", metrics.connections);
+  MetricFamily& refusals = add(families, MetricType::Counter, "clothstream_refusals_total",
+                               "Connections, calls and scenes refused, by reason.");
+  for (std::size_t i = 0; i < telemetry::kRefusalNames.size(); ++i)
+    addSample(refusals, static_cast<double>(metrics.refusals[i].value()),
+              {{"reason", std::string(telemetry::kRefusalNames[i])}});
+  counter("clothstream_dropped_connections_total",
+          "Connections closed because they were silent, too slow or abusive.", metrics.droppedConnections);
+  counter("clothstream_rejected_messages_total", "Messages answered by an error before the client joined.",
+          metrics.rejectedMessages);
+  counter("clothstream_device_rebuilds_total", "New devices after the device was lost.",
+          metrics.deviceRebuilds);
+  counter("clothstream_quarantines_total", "Scenes stopped because they harmed others.", metrics.quarantines);
+  gauge("clothstream_device_memory_bytes", "Memory of all buffers on the device.",
+        static_cast<double>(state.device.deviceMemory()));
+  gauge("clothstream_device_silence_seconds", "Time since the last answer of the device thread.",
+        schedule::seconds(schedule::Clock::now() - state.device.lastAnswer()));
+  gauge("clothstream_publisher_waiting_frames", "Frames that wait for the encoder thread.",
+        static_cast<double>(state.publisher.waiting()));
+  return families;
+}
+
+Families sceneFamilies(const std::vector<std::shared_ptr<LiveScene>>& scenes) {
+  const std::string prefix = "clothstream_scene_";
+  Families families;
+  for (const HistogramRow& row : kSceneHistograms) {
+    MetricFamily& family = add(families, MetricType::Histogram, prefix + row.name, row.help);
+    for (const auto& scene : scenes)
+      addSample(family, (scene->metrics.*row.histogram).buckets(), {{"scene", scene->name()}});
+  }
+  MetricFamily& stages = add(families, MetricType::Histogram, prefix + "device_stage_seconds",
+                             "Time of one stage of a tick on the device.");
+  for (const auto& scene : scenes)
+    for (const auto& [stage, buckets] : scene->metrics.device.buckets())
+      addSample(stages, buckets, {{"scene", scene->name()}, {"stage", std::string(stage)}});
+  for (const CounterRow& row : kSceneCounters) {
+    MetricFamily& family = add(families, MetricType::Counter, prefix + row.name, row.help);
+    for (const auto& scene : scenes)
+      addSample(family, static_cast<double>((scene->metrics.*row.counter).value()),
+                {{"scene", scene->name()}});
+  }
+  for (const GaugeRow& row : kSceneGauges) {
+    MetricFamily& family = add(families, MetricType::Gauge, prefix + row.name, row.help);
+    for (const auto& scene : scenes)
+      addSample(family, static_cast<double>(row.of(*scene)), {{"scene", scene->name()}});
+  }
+  return families;
+}
+
+}  // namespace clothstream::monitoring

@@ -1,0 +1,159 @@
+// SPDX-License-Identifier: MIT
+#include "server/monitoring/monitoring_endpoint.h"
+
+#include <cstddef>
+#include <iterator>
+#include <mutex>
+#include <string_view>
+#include <thread>
+#include <utility>
+
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <fmt/format.h>
+#include <prometheus/text_serializer.h>
+
+#include "server/endpoint/listen/listen.h"
+#include "server/hosting/server_state.h"
+#include "server/monitoring/http_connection.h"
+#include "server/monitoring/metric_families.h"
+
+namespace clothstream::monitoring {
+namespace {
+
+namespace net = boost::asio;
+namespace http = boost::beast::http;
+using net::ip::tcp;
+using namespace std::chrono_literals;
+
+constexpr auto kAcceptPause = 100ms;
+constexpr int kProbes = 5;  // of the device thread in MonitoringOptions::deviceSilence
+
+void append(Families& families, Families more) {
+  families.insert(families.end(), std::make_move_iterator(more.begin()), std::make_move_iterator(more.end()));
+}
+
+}  // namespace
+
+struct MonitoringEndpoint::State {
+  enum class Phase : std::uint8_t { starting, serving, stopping };
+
+  const std::string version;
+  const std::chrono::milliseconds deviceSilence;
+
+  std::mutex mutex;  // protects the next two
+  Phase phase = Phase::starting;
+  hosting::SceneServer* server = nullptr;
+
+  // Belong to the thread. The context outlives the sockets, which are destroyed with `io`.
+  HttpContext context;
+  net::io_context io{1};
+  tcp::acceptor acceptor;
+  net::steady_timer acceptTimer{io}, probeTimer{io};
+  std::uint16_t port;
+  std::thread thread;
+
+  explicit State(const MonitoringOptions& options)
+      : version(options.version),
+        deviceSilence(options.deviceSilence),
+        context{.names = endpoint::HostNames(options.publicNames),
+                .answer = [this](std::string_view target) { return answer(target); }},
+        acceptor(endpoint::listen(io, options.host, options.port, "--metrics-port")),
+        port(acceptor.local_endpoint().port()) {
+    accept();
+    probe();
+    thread = std::thread([this] { io.run(); });
+  }
+
+  ~State() {
+    io.stop();
+    thread.join();
+  }
+
+  void accept() {
+    acceptor.async_accept([this](boost::system::error_code error, tcp::socket socket) {
+      if (error) {  // such as no free descriptor; an immediate retry would only spin
+        acceptTimer.expires_after(kAcceptPause);
+        acceptTimer.async_wait([this](boost::system::error_code) { accept(); });
+        return;
+      }
+      if (context.connections < HttpContext::kMaxConnections)
+        std::make_shared<HttpConnection>(std::move(socket), context)->read();
+      accept();
+    });
+  }
+
+  // Wakes the device thread, which otherwise sleeps while no scene runs.
+  void probe() {
+    {
+      const std::lock_guard lock(mutex);
+      if (server != nullptr) server->state().device.wake();
+    }
+    probeTimer.expires_after(deviceSilence / kProbes);
+    probeTimer.async_wait([this](boost::system::error_code) { probe(); });
+  }
+
+  Answer answer(std::string_view target) {
+    const std::lock_guard lock(mutex);
+    if (target == "/metrics") return metrics();
+    if (target == "/healthz") return health();
+    if (target == "/readyz") return readiness();
+    return {.status = http::status::not_found, .body = "There are /metrics, /healthz and /readyz.\n"};
+  }
+
+  Answer metrics() const {
+    Families families = programFamilies(version, server != nullptr ? server->deviceInfo().name : "");
+    if (server != nullptr) {
+      append(families, serverFamilies(*server));
+      append(families, sceneFamilies(server->state().scenesNow()));
+    }
+    return {.contentType = "text/plain; version=0.0.4; charset=utf-8",
+            .body = prometheus::TextSerializer().Serialize(families)};
+  }
+
+  Answer health() const {
+    if (server == nullptr) return {.body = "ok\n"};
+    const auto silence = schedule::Clock::now() - server->state().device.lastAnswer();
+    if (silence <= deviceSilence) return {.body = "ok\n"};
+    return {.status = http::status::service_unavailable,
+            .body = fmt::format("The device thread has not answered for {:.1f} s. The log has the reason if "
+                                "the device was lost.\n",
+                                schedule::seconds(silence))};
+  }
+
+  Answer readiness() const {
+    if (phase == Phase::serving) return {.body = "ok\n"};
+    return {.status = http::status::service_unavailable,
+            .body = phase == Phase::starting ? "The server is starting.\n" : "The server is stopping.\n"};
+  }
+};
+
+MonitoringEndpoint::MonitoringEndpoint(const MonitoringOptions& options)
+    : state_(std::make_unique<State>(options)) {}
+
+MonitoringEndpoint::~MonitoringEndpoint() = default;
+
+std::uint16_t MonitoringEndpoint::port() const {
+  return state_->port;
+}
+
+void MonitoringEndpoint::started(hosting::SceneServer& server) {
+  const std::lock_guard lock(state_->mutex);
+  state_->phase = State::Phase::serving;
+  state_->server = &server;
+  server.state().device.wake();
+}
+
+void MonitoringEndpoint::stopping() {
+  const std::lock_guard lock(state_->mutex);
+  state_->phase = State::Phase::stopping;
+}
+
+void MonitoringEndpoint::stopped() {
+  const std::lock_guard lock(state_->mutex);
+  state_->phase = State::Phase::stopping;
+  state_->server = nullptr;
+}
+
+}  // namespace clothstream::monitoring

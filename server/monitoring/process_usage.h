@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: MIT
+// Resources that this process uses, from /proc/self.
+#pragma once
+
+#include <cstdint>
+
+namespace clothstream::monitoring {
+
+// 0 for what the system does not say.
+struct ProcessUsage {
+  std::uint64_t residentBytes = 0;
+  std::uint64_t openDescriptors = 0;
+  std::uint64_t threads = 0;
+};
+
+ProcessUsage processUsage();
+
+}  // namespace clothstream::monitoring
