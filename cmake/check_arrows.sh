@@ -8,6 +8,7 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 readonly ARROWS='
 proto/parameters   |
 proto/text         |
+proto/tls          |
 server/model       | proto/parameters
 server/vulkan      |
 proto/codec        |
@@ -25,20 +26,21 @@ server/hosting     | proto/text server/scene server/delivery server/schedule ser
 server/session     | server/hosting server/scene server/delivery server/schedule server/messages server/telemetry proto/codec clothstream
 server/recording   | server/model server/vulkan server/simulation server/messages server/scene server/schedule server/telemetry proto/codec proto/recording clothstream
 server/step        | server/model server/vulkan server/simulation server/messages
+server/tls         | proto/tls
 server/endpoint/listen | server/schedule server/telemetry
-server/endpoint/grpc | server/endpoint/listen server/session server/hosting server/schedule server/telemetry clothstream grpc/health
-server/endpoint/web | server/endpoint/listen server/session server/hosting
+server/endpoint/grpc | server/endpoint/listen server/tls server/session server/hosting server/schedule server/telemetry clothstream grpc/health
+server/endpoint/web | server/endpoint/listen server/tls server/telemetry server/session server/hosting
 server/monitoring  | server/hosting server/scene server/telemetry server/endpoint/listen server/endpoint/web
 server/options     | server/hosting server/recording server/step server/scene server/model
-server/main.cpp    | server/options server/endpoint server/monitoring server/hosting server/recording server/step server/simulation server/messages server/model server/telemetry server/vulkan
+server/main.cpp    | server/options server/tls server/endpoint server/monitoring server/hosting server/recording server/step server/simulation server/messages server/model server/telemetry server/vulkan
 clients/core       | proto/codec proto/parameters
 clients/core/stream | clients/core/core.h clients/core/wire proto/codec
 clients/core/wire  | clients/core/core.h proto/codec proto/parameters
-clients/grpc       | clients/core clothstream
+clients/grpc       | clients/core proto/tls clothstream
 clients/library    | clients/core clients/grpc
 clients/files      | proto/codec clothstream
-clients/load       | clients/core clients/grpc proto/codec clothstream
-clients/cli        | proto/text clients/core clients/grpc clients/files clients/load proto/codec proto/parameters proto/recording clothstream
+clients/load       | clients/core clients/grpc proto/codec proto/tls clothstream
+clients/cli        | proto/text clients/core clients/grpc clients/files clients/load proto/codec proto/parameters proto/recording proto/tls clothstream
 '
 # rooms that may include these headers
 readonly OUTSIDE='

@@ -37,18 +37,21 @@
 #include "server/simulation/software_threads.h"
 #include "server/step/step.h"
 #include "server/telemetry/log.h"
+#include "server/tls/certificate.h"
+#include "server/tls/qr_code.h"
+#include "server/tls/server_tls.h"
 #include "server/vulkan/device.h"
 
 namespace clothstream {
 namespace {
 
-// Blocks SIGINT, SIGTERM and SIGUSR1 in every thread; wait() takes them. Must be created before any other
+// Blocks SIGINT, SIGTERM, SIGHUP and SIGUSR1 in every thread; wait() takes them. Must be created before any other
 // thread.
 class Signals {
  public:
   Signals() {
     sigemptyset(&set_);
-    for (const int signal : {SIGINT, SIGTERM, SIGUSR1}) sigaddset(&set_, signal);
+    for (const int signal : {SIGINT, SIGTERM, SIGHUP, SIGUSR1}) sigaddset(&set_, signal);
     pthread_sigmask(SIG_BLOCK, &set_, nullptr);
     std::signal(SIGPIPE, SIG_IGN);  // a closed peer is reported as an error of its socket
     std::signal(SIGXFSZ, SIG_IGN);  // a file at its size limit is reported like a full disk
@@ -180,15 +183,77 @@ std::string localAddress(const std::string& host, std::uint16_t port) {
                                              : fmt::format("[{}]:{}", host, port);
 }
 
-// Returns after SIGINT, SIGTERM or --seconds. Prints the report on SIGUSR1.
-void waitForStop(const Signals& signals, const ProgramOptions& options,
+// Names and addresses that a certificate of the server's own has.
+std::vector<std::string> namesOf(const ProgramOptions& options) {
+  std::vector<std::string> names = tls::namesOfThisMachine();
+  for (const std::string& name : options.publicNames)
+    if (name != "*") names.push_back(name);
+  return names;
+}
+
+// Null without TLS.
+std::shared_ptr<tls::ServerTls> openTls(const ProgramOptions& options) {
+  std::string clientCa;
+  if (!options.tlsClientCa.empty()) clientCa = tls::readCertificates(options.tlsClientCa);
+  if (options.tlsSelf) {
+    if (options.stateDirectory.empty())
+      throw std::runtime_error("--tls self needs a directory for its key: use --state-dir DIR");
+    return std::make_shared<tls::ServerTls>(
+        [directory = options.stateDirectory / "tls", names = namesOf(options)] {
+          return tls::selfSigned(directory, names);
+        },
+        std::move(clientCa));
+  }
+  if (options.tlsCertificate.empty()) return nullptr;
+  return std::make_shared<tls::ServerTls>(
+      [chain = options.tlsCertificate, key = options.tlsKey] {
+        tls::Certificate certificate = tls::readCertificate(chain, key);
+        if (tls::expiryOf(certificate) < std::chrono::system_clock::now())
+          spdlog::warn("the certificate in {} has expired; clients will refuse it", chain.string());
+        return certificate;
+      },
+      std::move(clientCa));
+}
+
+void reload(tls::ServerTls& tls) {
+  try {
+    tls.reload();
+    spdlog::info("the certificate is read again");
+  } catch (const std::exception& failure) {
+    spdlog::error("the old certificate stays in use: {}", failure.what());
+  }
+}
+
+// The first address of this machine that others in its network can reach; empty if there is none.
+std::string addressInNetwork(const ProgramOptions& options) {
+  if (options.host != "0.0.0.0" && options.host != "::") return options.host;
+  for (const std::string& name : tls::namesOfThisMachine())
+    if (name.find('.') != std::string::npos && name.find_first_not_of("0123456789.") == std::string::npos &&
+        !name.starts_with("127."))
+      return name;
+  return {};
+}
+
+// Prints what a person needs to reach the page from another device: address, QR code and fingerprint.
+void printHomeAddresses(const ProgramOptions& options, std::uint16_t port, const std::string& fingerprint) {
+  fmt::print("key     {}\n", fingerprint);
+  const std::string host = addressInNetwork(options);
+  if (host.empty() || host == "127.0.0.1" || host == "::1" || host == "localhost") return;
+  const std::string address = fmt::format("https://{}/", localAddress(host, port));
+  fmt::print("type    {}\n{}", address, tls::qrCode(address));
+}
+
+// Returns after SIGINT, SIGTERM or --seconds, and after SIGHUP without TLS. Reloads the certificate on SIGHUP,
+// and prints the report on SIGUSR1.
+void waitForStop(const Signals& signals, const ProgramOptions& options, tls::ServerTls* tls,
                  const std::function<std::string()>& report) {
   using Clock = std::chrono::steady_clock;
   std::optional<Clock::time_point> end;
   if (options.stopAfter) end = Clock::now() + *options.stopAfter;
   while (!end || Clock::now() < *end) {
     const int signal = end ? signals.wait(*end - Clock::now()) : signals.wait();
-    if (signal == SIGINT || signal == SIGTERM) return;
+    if (signal == SIGINT || signal == SIGTERM || (signal == SIGHUP && tls == nullptr)) return;
+    if (signal == SIGHUP) reload(*tls);
     if (signal != SIGUSR1) continue;
     fmt::print("{}", report());
     std::fflush(stdout);
@@ -238,6 +303,7 @@ class Monitored {
                                                       const std::string& intro,
                                                       const std::function<std::string()>& report) {
   std::unique_ptr<EndGuard> guard;
+  const std::shared_ptr<tls::ServerTls> tls = openTls(options);
   {
     const std::filesystem::path page = options.page.empty() ? pageNextToProgram() : options.page;
     if (page.empty())
@@ -250,17 +316,21 @@ class Monitored {
                                              .maxConnections = options.maxConnections,
                                              .connections = limits,
                                              .publicNames = options.publicNames,
+                                             .tls = tls,
                                              .allowedOrigins = options.allowedOrigins});
     const endpoint::GrpcEndpoint rpc(server, {.host = options.host,
                                               .port = options.grpcPort,
                                               .maxStreams = options.maxConnections,
-                                              .connections = limits});
+                                              .connections = limits,
+                                              .tls = tls});
 
-    fmt::print("{}page    http://{}/\ngRPC    {}\n", intro, localAddress(options.host, web.port()),
+    fmt::print("{}page    http{}://{}/\ngRPC    {}{}\n", intro, tls ? "s" : "",
+               localAddress(options.host, web.port()), tls ? "https://" : "",
                localAddress(options.host, rpc.port()));
+    if (options.tlsSelf) printHomeAddresses(options, web.port(), tls->fingerprint());
     std::fflush(stdout);
     const Monitored monitored(monitoring, server);
-    waitForStop(signals, options, report);
+    waitForStop(signals, options, tls.get(), report);
     spdlog::info("stopping");
     guard = std::make_unique<EndGuard>(signals, options.drain);
     monitored.stopping();

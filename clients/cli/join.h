@@ -10,11 +10,12 @@
 
 #include "clients/cli/exit_code.h"
 #include "clients/core/core.h"
+#include "clients/grpc/address.h"
 
 namespace clothstream::cli {
 
 struct JoinOptions {
-  std::string address;  // from completeAddress()
+  ServerAddress address = std::string(kDefaultAddress);
   std::string scene;
   std::string name;  // name that others see
   cs_role role = CS_ROLE_UNSPECIFIED;

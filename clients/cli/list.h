@@ -5,11 +5,12 @@
 #include <string>
 
 #include "clients/cli/exit_code.h"
+#include "clients/grpc/address.h"
 
 namespace clothstream::cli {
 
 struct ListOptions {
-  std::string address;  // from completeAddress()
+  ServerAddress address = std::string(kDefaultAddress);
   bool json = false;
 };
 

@@ -134,7 +134,7 @@ void LoadCommand::add(CLI::App& app) {
   command_ = app.add_subcommand("load", "Run a load test with many participants and print what they receive");
   command_->add_option(
       "ADDRESS", address_,
-      "HOST or HOST:PORT of the server's gRPC endpoint, default 127.0.0.1:50051; with --web, of its web "
+      "HOST or HOST:PORT of the server's gRPC endpoint, default 127.0.0.1:50051, with https:// before it for TLS; with --web, of its web "
       "endpoint, default 127.0.0.1:8080");
   command_->add_option("--scene", options_.scene, "Scene to join; default: the server's default scene");
   command_
@@ -183,10 +183,8 @@ void LoadCommand::add(CLI::App& app) {
 void LoadCommand::check() {
   if (!parsed()) return;
   if (address_.empty()) address_ = web_ ? std::string("127.0.0.1") : std::string(kDefaultAddress);
-  if (web_ && address_.find(':') == std::string::npos) address_ += kWebPort;
-  auto address = completeAddress(address_);
-  if (!address) throw CLI::ValidationError("ADDRESS", address.error());
-  address_ = *address;
+  const std::size_t host = address_.find("://");
+  if (web_ && address_.find(':', host == std::string::npos ? 0 : host + 3) == std::string::npos) address_ += kWebPort;
   if (options_.viewers > options_.participants)
     throw CLI::ValidationError("--viewers", "must not exceed --participants");
   options_.decoders = decoders_.value_or(options_.participants);
@@ -197,8 +195,8 @@ void LoadCommand::check() {
                                fmt::format("there is no process {} on this machine", *serverPid_));
 }
 
-ExitCode LoadCommand::run() const {
-  const auto links = web_ ? load::makeWebLinks(address_) : load::makeGrpcLinks(address_);
+ExitCode LoadCommand::run(const ServerAddress& address) const {
+  const auto links = web_ ? load::makeWebLinks(address) : load::makeGrpcLinks(address);
   const bool shows = !json_ && isatty(STDOUT_FILENO) != 0;
   std::optional<double> before, after;
   const auto serverCpuNow = [&] { return serverPid_ ? cpuSeconds(*serverPid_) : std::nullopt; };
@@ -221,7 +219,7 @@ ExitCode LoadCommand::run() const {
   const ExitCode loss = exitCodeOf(report.firstLoss.kind);
   if (report.joined == 0 && report.lost > 0)
     return printError(
-        Error{loss, fmt::format("no participant could join at {}: {}", address_, report.firstLoss.text)});
+        Error{loss, fmt::format("no participant could join at {}: {}", address.address, report.firstLoss.text)});
   fmt::print("{}\n", json_ ? json(report, serverCpu) : text(report, serverCpu));
   if (report.lost > 0)
     return printError(Error{loss, fmt::format("{} participants were refused or disconnected; the first: {}",

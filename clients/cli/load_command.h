@@ -9,6 +9,7 @@
 #include <CLI/CLI.hpp>
 
 #include "clients/cli/exit_code.h"
+#include "clients/grpc/address.h"
 #include "clients/load/load.h"
 
 namespace clothstream::cli {
@@ -18,10 +19,12 @@ class LoadCommand {
  public:
   void add(CLI::App& app);
   bool parsed() const { return command_->parsed(); }
-  // Checks the options together. Throws CLI::ValidationError.
+  // Checks the options together, and fills in the default address. Throws CLI::ValidationError.
   void check();
+  // As the user wrote it.
+  const std::string& address() const { return address_; }
   // SIGINT and SIGTERM must be blocked in every thread; they end the test early.
-  ExitCode run() const;
+  ExitCode run(const ServerAddress& address) const;
 
  private:
   load::LoadOptions options_;

@@ -21,6 +21,7 @@
 #include "clients/cli/signals.h"
 #include "clients/core/core.h"
 #include "clients/grpc/address.h"
+#include "proto/tls/fingerprint.h"
 
 namespace {
 
@@ -46,23 +47,51 @@ std::array<float, 4> parseCollider(const std::string& text) {
   return values;
 }
 
-std::string addressOf(const std::string& text) {
-  auto address = completeAddress(text);
-  if (!address) throw CLI::ValidationError("ADDRESS", address.error());
-  return *address;
-}
+// How to recognise a server with TLS, for all commands that connect.
+struct TrustOptions {
+  std::string caFile, fingerprint;
+
+  void add(CLI::App& app) {
+    CLI::Option* const ca =
+        app.add_option("--ca", caFile,
+                       "PEM file of the authorities that may have signed the certificate of an https:// "
+                       "server. Default: those of the system")
+            ->check(CLI::ExistingFile);
+    app.add_option("--fingerprint", fingerprint,
+                   "Key of an https:// server with a certificate of its own, as the server prints it")
+        ->excludes(ca);
+  }
+
+  ServerAddress addressOf(const std::string& text) const {
+    auto address = completeAddress(text);
+    if (!address) throw CLI::ValidationError("ADDRESS", address.error());
+    ServerAddress server(std::move(*address));
+    server.caFile = caFile;
+    if (!fingerprint.empty()) {
+      const auto normal = normalFingerprint(fingerprint);
+      if (!normal)
+        throw CLI::ValidationError("--fingerprint", "must have 64 hexadecimal digits, as the server prints them");
+      server.fingerprint = *normal;
+    }
+    if (!server.isEncrypted() && !(caFile.empty() && fingerprint.empty()))
+      throw CLI::ValidationError("ADDRESS", "must begin with https:// for --ca and --fingerprint");
+    return server;
+  }
+};
 
 int run(int argc, char** argv) {
   CLI::App app("Follows and records scenes of a clothstream-server; encodes motion files.", "clothstream");
   app.require_subcommand(1);
   app.set_version_flag("--version", CLOTHSTREAM_VERSION);
 
+  TrustOptions trust;
+  trust.add(app);
   std::string address(kDefaultAddress);
   JoinOptions joinOptions;
   std::vector<std::string> colliders;
   CLI::App& joinCommand =
       *app.add_subcommand("join", "Join a scene, show the stream, print a summary at the end");
-  joinCommand.add_option("ADDRESS", address, "HOST or HOST:PORT of the server")->capture_default_str();
+  joinCommand.add_option("ADDRESS", address, "HOST or HOST:PORT of the server; https:// before it means TLS")->capture_default_str();
   joinCommand.add_option("--scene", joinOptions.scene, "Scene to join; default: the server's default scene");
   std::string role;
   joinCommand.add_option("--name", joinOptions.name, "Name that other participants see, at most 64 bytes");
@@ -102,11 +131,11 @@ int run(int argc, char** argv) {
   SetOptions setOptions;
   CLI::App& setCommand = *app.add_subcommand("set", "Change parameters of a running scene");
   addSetOptions(setCommand, setOptions);
-  setCommand.add_option("ADDRESS", address, "HOST or HOST:PORT of the server")->capture_default_str();
+  setCommand.add_option("ADDRESS", address, "HOST or HOST:PORT of the server; https:// before it means TLS")->capture_default_str();
 
   ListOptions listOptions;
   CLI::App& listCommand = *app.add_subcommand("list", "List the scenes of a server");
-  listCommand.add_option("ADDRESS", address, "HOST or HOST:PORT of the server")->capture_default_str();
+  listCommand.add_option("ADDRESS", address, "HOST or HOST:PORT of the server; https:// before it means TLS")->capture_default_str();
   listCommand.add_flag("--json", listOptions.json, "Print a JSON array");
 
   SceneCommands sceneCommands;
@@ -122,13 +151,14 @@ int run(int argc, char** argv) {
   loadCommand.add(app);
 
   app.footer(exitCodeHelp());
-  for (CLI::App* command : app.get_subcommands({})) command->footer(exitCodeHelp());
+  for (CLI::App* command : app.get_subcommands({})) command->footer(exitCodeHelp())->fallthrough();
 
   try {
     app.parse(argc, argv);
     sceneCommands.check();
     loadCommand.check();
-    joinOptions.address = listOptions.address = setOptions.address = addressOf(address);
+    if (loadCommand.parsed()) address = loadCommand.address();
+    joinOptions.address = listOptions.address = setOptions.address = trust.addressOf(address);
     if (setCommand.parsed() && !changesAnything(setOptions))
       throw CLI::ValidationError("set", "nothing to change is given; see clothstream set --help");
     if (colliders.size() > CS_MAX_COLLIDERS)
@@ -141,7 +171,7 @@ int run(int argc, char** argv) {
   blockEndingSignals();
   if (motionCommands.parsed()) return motionCommands.run();
   if (recordingCommands.parsed()) return recordingCommands.run(joinOptions.address, CLOTHSTREAM_VERSION);
-  if (loadCommand.parsed()) return loadCommand.run();
+  if (loadCommand.parsed()) return loadCommand.run(joinOptions.address);
   if (sceneCommands.parsed()) return sceneCommands.run(joinOptions.address);
   if (setCommand.parsed()) return set(setOptions);
   return listCommand.parsed() ? list(listOptions) : join(joinOptions);

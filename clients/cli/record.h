@@ -6,11 +6,12 @@
 #include <string>
 
 #include "clients/cli/exit_code.h"
+#include "clients/grpc/address.h"
 
 namespace clothstream::cli {
 
 struct RecordOptions {
-  std::string address;  // from completeAddress()
+  ServerAddress address = std::string(kDefaultAddress);
   std::string scene;    // empty: the server's default scene
   std::string output;
   std::optional<double> seconds;  // not set: until a signal

@@ -15,7 +15,7 @@ void RecordingCommands::add(CLI::App& app, std::string& address) {
       ->add_option("--seconds", recordOptions_.seconds,
                    "Stop after this time; default: at an interrupt (Ctrl-C)")
       ->check(CLI::PositiveNumber);
-  record_->add_option("--server", address, "HOST or HOST:PORT of the server")->capture_default_str();
+  record_->add_option("--server", address, "HOST or HOST:PORT of the server; https:// before it means TLS")->capture_default_str();
 
   info_ = app.add_subcommand("info", "Show the content of a recording and check all of it");
   info_->add_option("FILE", infoOptions_.recording, "The recording")->required();
@@ -49,7 +49,7 @@ bool RecordingCommands::parsed() const {
   return record_->parsed() || info_->parsed() || recover_->parsed() || export_->parsed();
 }
 
-ExitCode RecordingCommands::run(const std::string& address, const std::string& program) {
+ExitCode RecordingCommands::run(const ServerAddress& address, const std::string& program) {
   // Makes a file size limit an error like a full disk.
   std::signal(SIGXFSZ, SIG_IGN);
   if (info_->parsed()) return info(infoOptions_);

@@ -10,6 +10,7 @@
 #include "clients/cli/info.h"
 #include "clients/cli/record.h"
 #include "clients/cli/recover.h"
+#include "clients/grpc/address.h"
 
 namespace clothstream::cli {
 
@@ -19,7 +20,7 @@ class RecordingCommands {
   // The parser stores the server's address in `address`.
   void add(CLI::App& app, std::string& address);
   bool parsed() const;
-  ExitCode run(const std::string& address, const std::string& program);
+  ExitCode run(const ServerAddress& address, const std::string& program);
 
  private:
   RecordOptions recordOptions_;

@@ -41,7 +41,7 @@ ExitCode done(const tl::expected<void, Failure>& result) {
 void SceneCommands::add(CLI::App& app, std::string& address) {
   const auto command = [&](const char* name, const char* what) { return app.add_subcommand(name, what); };
   const auto takesAddress = [&](CLI::App* added) {
-    added->add_option("--server", address, "HOST or HOST:PORT of the server")->capture_default_str();
+    added->add_option("--server", address, "HOST or HOST:PORT of the server; https:// before it means TLS")->capture_default_str();
   };
   create_ = command("create", "Create a scene on a server from a JSON file or a built-in scene");
   CLI::Option* file = create_->add_option("FILE", options_.file, "Scene in JSON");
@@ -105,7 +105,7 @@ ExitCode SceneCommands::create() const {
   return kOk;
 }
 
-ExitCode SceneCommands::control(const std::string& address) const {
+ExitCode SceneCommands::control(const ServerAddress& address) const {
   v1::ControlSceneRequest request;
   request.set_name(options_.name);
   if (pause_->parsed() || resume_->parsed()) request.set_paused(pause_->parsed());
@@ -123,7 +123,7 @@ ExitCode SceneCommands::control(const std::string& address) const {
   return kOk;
 }
 
-ExitCode SceneCommands::record(const std::string& address) const {
+ExitCode SceneCommands::record(const ServerAddress& address) const {
   if (startRecording_->parsed()) {
     const auto file = startRecording(address, options_.name, options_.recording);
     if (!file) return printError(exitCodeOf(file.error().kind), file.error().text);
@@ -136,7 +136,7 @@ ExitCode SceneCommands::record(const std::string& address) const {
   return kOk;
 }
 
-ExitCode SceneCommands::run(const std::string& address) {
+ExitCode SceneCommands::run(const ServerAddress& address) {
   options_.address = address;
   if (create_->parsed()) return create();
   if (delete_->parsed()) return done(deleteScene(address, options_.name));

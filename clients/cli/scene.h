@@ -10,11 +10,12 @@
 #include <CLI/CLI.hpp>
 
 #include "clients/cli/exit_code.h"
+#include "clients/grpc/address.h"
 
 namespace clothstream::cli {
 
 struct SceneOptions {
-  std::string address;                // from completeAddress()
+  ServerAddress address = std::string(kDefaultAddress);
   std::string file;                   // create: scene in JSON
   std::string named;                  // create: built-in scene instead of a file
   std::string name;                   // scene; create: new name of the scene
@@ -33,12 +34,12 @@ class SceneCommands {
   // Checks the options together. Throws CLI::ValidationError.
   void check() const;
   bool parsed() const;
-  ExitCode run(const std::string& address);
+  ExitCode run(const ServerAddress& address);
 
  private:
   ExitCode create() const;
-  ExitCode control(const std::string& address) const;
-  ExitCode record(const std::string& address) const;
+  ExitCode control(const ServerAddress& address) const;
+  ExitCode record(const ServerAddress& address) const;
 
   SceneOptions options_;
   CLI::App *create_ = nullptr, *delete_ = nullptr, *pause_ = nullptr, *resume_ = nullptr, *reset_ = nullptr;

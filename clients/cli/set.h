@@ -8,11 +8,12 @@
 
 #include "clients/cli/exit_code.h"
 #include "clients/core/core.h"
+#include "clients/grpc/address.h"
 
 namespace clothstream::cli {
 
 struct SetOptions {
-  std::string address;  // result of completeAddress()
+  ServerAddress address = std::string(kDefaultAddress);
   std::string scene;
   std::string cloth;                 // empty: every cloth
   cs_cloth_settings settings;        // values that are not given stay as cs_keep_cloth_settings sets them

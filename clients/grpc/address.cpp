@@ -9,7 +9,7 @@
 namespace clothstream {
 namespace {
 
-constexpr std::string_view kDefaultPort = "50051";
+constexpr std::string_view kDefaultPort = "50051", kTls = "https://";
 
 bool isPort(std::string_view text) {
   std::uint16_t port = 0;
@@ -25,7 +25,18 @@ bool isHost(std::string_view text) {
 
 }  // namespace
 
+bool ServerAddress::isEncrypted() const {
+  return address.starts_with(kTls);
+}
+
+std::string ServerAddress::hostAndPort() const {
+  return isEncrypted() ? address.substr(kTls.size()) : address;
+}
+
 tl::expected<std::string, std::string> completeAddress(std::string_view text) {
+  const bool encrypted = text.starts_with(kTls);
+  if (encrypted) text.remove_prefix(kTls.size());
+  if (encrypted && text.ends_with('/')) text.remove_suffix(1);
   std::string_view host = text, port = kDefaultPort;
   const std::size_t colon = text.rfind(':');
   bool v6 = false;
@@ -49,7 +60,7 @@ tl::expected<std::string, std::string> completeAddress(std::string_view text) {
     return tl::unexpected("the address \"" + std::string(text) +
                           "\" has no valid port after the host; use 1 to 65535");
   std::string address;
-  address.append(v6 ? "[" : "").append(host).append(v6 ? "]:" : ":").append(port);
+  address.append(encrypted ? kTls : "").append(v6 ? "[" : "").append(host).append(v6 ? "]:" : ":").append(port);
   return address;
 }
 

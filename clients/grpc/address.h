@@ -4,6 +4,7 @@
 
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include <tl/expected.hpp>
 
@@ -11,8 +12,25 @@ namespace clothstream {
 
 inline constexpr std::string_view kDefaultAddress = "127.0.0.1:50051";
 
-// Accepts "host", "host:port", "[v6]", "[v6]:port" or a bare v6 address. The default port is 50051.
-// The error names the mistake and the allowed form.
+// Accepts "host", "host:port", "[v6]", "[v6]:port" or a bare v6 address, each also after "https://", which
+// means TLS. The default port is 50051. The error names the mistake and the allowed form.
 [[nodiscard]] tl::expected<std::string, std::string> completeAddress(std::string_view text);
+
+// Where a server is, and how to recognise it.
+struct ServerAddress {
+  // From completeAddress(). Most servers need no more.
+  ServerAddress(std::string complete) : address(std::move(complete)) {}  // NOLINT(google-explicit-constructor)
+  ServerAddress(const char* complete) : address(complete) {}             // NOLINT(google-explicit-constructor)
+
+  bool isEncrypted() const;
+  // HOST:PORT.
+  std::string hostAndPort() const;
+
+  std::string address;
+  // With TLS, the server must have a certificate of an authority in this PEM file; empty means the authorities
+  // of the system. With a fingerprint (fingerprintOf), the server must have this key instead, whatever its
+  // name.
+  std::string caFile{}, fingerprint{};
+};
 
 }  // namespace clothstream

@@ -2,9 +2,19 @@
 // Channel arguments and texts of failures.
 #include "clients/grpc/channel.h"
 
+#include <fstream>
+#include <functional>
+#include <sstream>
+#include <stdexcept>
+#include <utility>
+
 #include <fmt/format.h>
 #include <grpcpp/create_channel.h>
 #include <grpcpp/security/credentials.h>
+#include <grpcpp/security/tls_certificate_verifier.h>
+#include <grpcpp/security/tls_credentials_options.h>
+
+#include "proto/tls/fingerprint.h"
 
 namespace clothstream {
 namespace {
@@ -16,38 +26,80 @@ std::string inBrackets(const std::string& text) {
   return text.empty() ? text : fmt::format(" ({})", text);
 }
 
+// Accepts only the server with this key. Names and dates of its certificate do not matter.
+class FingerprintVerifier final : public grpc::experimental::ExternalCertificateVerifier {
+ public:
+  explicit FingerprintVerifier(std::string fingerprint) : fingerprint_(std::move(fingerprint)) {}
+
+  bool Verify(grpc::experimental::TlsCustomVerificationCheckRequest* request,
+              std::function<void(grpc::Status)>, grpc::Status* status) override {
+    const grpc::string_ref certificate = request->peer_cert();
+    const auto shown = fingerprintOf({certificate.data(), certificate.size()});
+    *status = shown == fingerprint_
+                  ? grpc::Status::OK
+                  : grpc::Status(grpc::StatusCode::UNAUTHENTICATED,
+                                 fmt::format("the server has the fingerprint {}", shown.value_or("none")));
+    return true;  // the check is complete
+  }
+  void Cancel(grpc::experimental::TlsCustomVerificationCheckRequest*) override {}
+
+ private:
+  const std::string fingerprint_;
+};
+
+std::shared_ptr<grpc::ChannelCredentials> credentialsOf(const ServerAddress& server) {
+  if (!server.isEncrypted()) return grpc::InsecureChannelCredentials();
+  if (!server.fingerprint.empty()) {
+    grpc::experimental::TlsChannelCredentialsOptions options;
+    options.set_verify_server_certs(false);
+    options.set_check_call_host(false);
+    options.set_certificate_verifier(
+        grpc::experimental::ExternalCertificateVerifier::Create<FingerprintVerifier>(server.fingerprint));
+    return grpc::experimental::TlsCredentials(options);
+  }
+  grpc::SslCredentialsOptions options;
+  if (!server.caFile.empty()) {
+    std::ifstream file(server.caFile, std::ios::binary);
+    std::ostringstream text;
+    if (!file || !(text << file.rdbuf()))
+      throw std::runtime_error(fmt::format("cannot read the certificates in {}", server.caFile));
+    options.pem_root_certs = text.str();
+  }
+  return grpc::SslCredentials(options);
+}
+
 }  // namespace
 
-std::shared_ptr<grpc::Channel> makeChannel(const std::string& address) {
+std::shared_ptr<grpc::Channel> makeChannel(const ServerAddress& server) {
   grpc::ChannelArguments arguments;
   arguments.SetMaxReceiveMessageSize(kMaxMessageBytes);
   // A separate connection per client, so that two clients of a process do not share flow control.
   arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
-  return grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments);
+  return grpc::CreateCustomChannel(server.hostAndPort(), credentialsOf(server), arguments);
 }
 
-Failure notJoined(const std::string& address, const grpc::Status& status) {
+Failure notJoined(const ServerAddress& server, const grpc::Status& status) {
   using Kind = Failure::Kind;
   switch (status.error_code()) {
     case grpc::StatusCode::UNAVAILABLE:
     case grpc::StatusCode::DEADLINE_EXCEEDED:
       return {Kind::unreachable,
-              fmt::format("No server answers at {}: is clothstream-server running there?{}", address,
+              fmt::format("No server answers at {}: is clothstream-server running there?{}", server.address,
                           inBrackets(status.error_message()))};
     case grpc::StatusCode::OK:
-      return {Kind::refused, fmt::format("The server at {} ended the stream before it began.", address)};
+      return {Kind::refused, fmt::format("The server at {} ended the stream before it began.", server.address)};
     case grpc::StatusCode::UNIMPLEMENTED:
       return {Kind::refused, fmt::format("The server at {} is not a clothstream-server of this release{}.",
-                                         address, inBrackets(status.error_message()))};
+                                         server.address, inBrackets(status.error_message()))};
     default:
-      return {Kind::refused, fmt::format("The server at {} refuses: {}", address, status.error_message())};
+      return {Kind::refused, fmt::format("The server at {} refuses: {}", server.address, status.error_message())};
   }
 }
 
-Failure lost(const std::string& address, const grpc::Status& status) {
-  if (status.ok()) return {Failure::Kind::lost, fmt::format("The server at {} ended the stream.", address)};
+Failure lost(const ServerAddress& server, const grpc::Status& status) {
+  if (status.ok()) return {Failure::Kind::lost, fmt::format("The server at {} ended the stream.", server.address)};
   return {Failure::Kind::lost,
-          fmt::format("The stream from {} is lost{}.", address, inBrackets(status.error_message()))};
+          fmt::format("The stream from {} is lost{}.", server.address, inBrackets(status.error_message()))};
 }
 
 }  // namespace clothstream

@@ -51,7 +51,7 @@ void* tagOf(Operation operation) {
 
 class GrpcClient::Stream {
  public:
-  Stream(std::string address, const GrpcClientOptions& options, OnEvents onEvents)
+  Stream(ServerAddress address, const GrpcClientOptions& options, OnEvents onEvents)
       : address_(std::move(address)),
         options_(options),
         onEvents_(std::move(onEvents)),
@@ -80,13 +80,13 @@ class GrpcClient::Stream {
       const auto until = std::min(deadline, SteadyClock::now() + kCancelInterval);
       if (changed_.wait_until(lock, until, [&] { return wasJoined_ || ended_; })) return ended_;
       if (options_.cancelled && options_.cancelled())
-        return Failure{Failure::Kind::unreachable, fmt::format("Gave up before {} answered.", address_)};
+        return Failure{Failure::Kind::unreachable, fmt::format("Gave up before {} answered.", address_.address)};
     }
     return Failure{
         Failure::Kind::unreachable,
         fmt::format("No clothstream-server answers at {} within {} s: is it running there, and is the "
                     "address right?",
-                    address_, seconds(options_.joinTimeout))};
+                    address_.address, seconds(options_.joinTimeout))};
   }
 
   void lock() {
@@ -125,7 +125,7 @@ class GrpcClient::Stream {
 
   // State of one connection.
   struct Call {
-    explicit Call(const std::string& address) : stub(makeChannel(address)) {}
+    explicit Call(const ServerAddress& address) : stub(makeChannel(address)) {}
 
     grpc::GenericStub stub;
     grpc::ClientContext context;
@@ -298,12 +298,12 @@ class GrpcClient::Stream {
       const bool saidByServer = cs_error_code(core_.get()) != 0;
       const char* text = cs_error_text(core_.get());
       return {Failure::Kind::refused,
-              saidByServer ? fmt::format("The server at {} refuses: {}", address_, text) : text};
+              saidByServer ? fmt::format("The server at {} refuses: {}", address_.address, text) : text};
     }
     if (leaving_) return {Failure::Kind::lost, "The client left the stream."};
     if (call_->silent && !call_->status.ok() && !reconnects_)
       return {Failure::Kind::lost,
-              fmt::format("The server at {} has sent nothing for {} s: the stream is lost.", address_,
+              fmt::format("The server at {} has sent nothing for {} s: the stream is lost.", address_.address,
                           seconds(options_.silenceTimeout))};
     if (!wasJoined_) return notJoined(address_, call_->status);
     Failure failure = lost(address_, call_->status);
@@ -324,7 +324,7 @@ class GrpcClient::Stream {
     }
   }
 
-  const std::string address_;
+  const ServerAddress address_;
   const GrpcClientOptions options_;
   const OnEvents onEvents_;
   grpc::CompletionQueue queue_;
@@ -354,7 +354,7 @@ GrpcClient::GrpcClient(std::unique_ptr<Stream> stream) : stream_(std::move(strea
 
 GrpcClient::~GrpcClient() = default;
 
-tl::expected<std::unique_ptr<GrpcClient>, Failure> GrpcClient::join(const std::string& address,
+tl::expected<std::unique_ptr<GrpcClient>, Failure> GrpcClient::join(const ServerAddress& address,
                                                                     const GrpcClientOptions& options,
                                                                     OnEvents onEvents) {
   auto stream = std::make_unique<Stream>(address, options, std::move(onEvents));

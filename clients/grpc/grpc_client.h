@@ -14,6 +14,7 @@
 #include <tl/expected.hpp>
 
 #include "clients/core/core.h"
+#include "clients/grpc/address.h"
 #include "clients/grpc/failure.h"
 
 namespace clothstream {
@@ -48,7 +49,7 @@ class GrpcClient {
 
   // `address` must come from completeAddress(). Returns when the description is complete.
   [[nodiscard]] static tl::expected<std::unique_ptr<GrpcClient>, Failure> join(
-      const std::string& address, const GrpcClientOptions& options, OnEvents onEvents);
+      const ServerAddress& address, const GrpcClientOptions& options, OnEvents onEvents);
   // Leaves the scene if the stream has not ended. Waits at most 0.5 s for the server.
   ~GrpcClient();
   GrpcClient(const GrpcClient&) = delete;

@@ -35,7 +35,7 @@ bool upload(Stream& stream, const std::string& bytes, const CreateSceneOptions& 
 }
 
 template <typename Response, typename Request, typename Call>
-tl::expected<Response, Failure> call(const std::string& address, const Request& request, const Call& method) {
+tl::expected<Response, Failure> call(const ServerAddress& address, const Request& request, const Call& method) {
   const auto stub = v1::ClothStream::NewStub(makeChannel(address));
   grpc::ClientContext context;
   context.set_deadline(std::chrono::system_clock::now() + kTimeout);
@@ -52,7 +52,7 @@ tl::expected<void, Failure> nothingOf(tl::expected<v1::SceneSummary, Failure> sc
 
 }  // namespace
 
-tl::expected<std::string, Failure> createScene(const std::string& address,
+tl::expected<std::string, Failure> createScene(const ServerAddress& address,
                                                const CreateSceneOptions& options) {
   const auto stub = v1::ClothStream::NewStub(makeChannel(address));
   grpc::ClientContext context;
@@ -81,11 +81,11 @@ tl::expected<std::string, Failure> createScene(const std::string& address,
   if (answer.has_create_scene()) return answer.create_scene().scene().name();
   if (answer.has_error())
     return tl::unexpected(
-        Failure{Failure::Kind::refused, "The server at " + address + " refuses: " + answer.error().text()});
+        Failure{Failure::Kind::refused, "The server at " + address.address + " refuses: " + answer.error().text()});
   return tl::unexpected(sent ? notJoined(address, status) : lost(address, status));
 }
 
-tl::expected<void, Failure> deleteScene(const std::string& address, const std::string& name) {
+tl::expected<void, Failure> deleteScene(const ServerAddress& address, const std::string& name) {
   v1::DeleteSceneRequest request;
   request.set_name(name);
   const auto done = call<v1::DeleteSceneResponse>(address, request, &v1::ClothStream::Stub::DeleteScene);
@@ -93,7 +93,7 @@ tl::expected<void, Failure> deleteScene(const std::string& address, const std::s
   return {};
 }
 
-tl::expected<void, Failure> controlScene(const std::string& address, const std::string& name,
+tl::expected<void, Failure> controlScene(const ServerAddress& address, const std::string& name,
                                          std::optional<bool> paused, bool reset) {
   v1::ControlSceneRequest request;
   request.set_name(name);
@@ -102,14 +102,14 @@ tl::expected<void, Failure> controlScene(const std::string& address, const std::
   return nothingOf(controlScene(address, request));
 }
 
-tl::expected<v1::SceneSummary, Failure> controlScene(const std::string& address,
+tl::expected<v1::SceneSummary, Failure> controlScene(const ServerAddress& address,
                                                      const v1::ControlSceneRequest& request) {
   auto response = call<v1::ControlSceneResponse>(address, request, &v1::ClothStream::Stub::ControlScene);
   if (!response) return tl::unexpected(std::move(response).error());
   return std::move(*response->mutable_scene());
 }
 
-tl::expected<std::string, Failure> startRecording(const std::string& address, const std::string& scene,
+tl::expected<std::string, Failure> startRecording(const ServerAddress& address, const std::string& scene,
                                                   const std::string& file) {
   v1::StartRecordingRequest request;
   request.set_scene(scene);
@@ -119,7 +119,7 @@ tl::expected<std::string, Failure> startRecording(const std::string& address, co
   return response->file();
 }
 
-tl::expected<v1::StopRecordingResponse, Failure> stopRecording(const std::string& address,
+tl::expected<v1::StopRecordingResponse, Failure> stopRecording(const ServerAddress& address,
                                                                const std::string& scene) {
   v1::StopRecordingRequest request;
   request.set_scene(scene);

@@ -10,6 +10,7 @@
 
 #include <tl/expected.hpp>
 
+#include "clients/grpc/address.h"
 #include "clients/grpc/failure.h"
 #include "clothstream/v1/session.pb.h"
 
@@ -26,25 +27,25 @@ struct CreateSceneOptions {
 };
 
 // Returns the name of the new scene. `address` must come from completeAddress().
-[[nodiscard]] tl::expected<std::string, Failure> createScene(const std::string& address,
+[[nodiscard]] tl::expected<std::string, Failure> createScene(const ServerAddress& address,
                                                              const CreateSceneOptions& options);
 
-[[nodiscard]] tl::expected<void, Failure> deleteScene(const std::string& address, const std::string& name);
+[[nodiscard]] tl::expected<void, Failure> deleteScene(const ServerAddress& address, const std::string& name);
 
 // Pauses or resumes the scene, and resets its cloths to their start. An empty name is the default scene.
-[[nodiscard]] tl::expected<void, Failure> controlScene(const std::string& address, const std::string& name,
+[[nodiscard]] tl::expected<void, Failure> controlScene(const ServerAddress& address, const std::string& name,
                                                        std::optional<bool> paused, bool reset);
 
 // Records the scene to a file on the server and returns the name of the file. If `file` is empty, the server
 // chooses the name.
-[[nodiscard]] tl::expected<std::string, Failure> startRecording(const std::string& address,
+[[nodiscard]] tl::expected<std::string, Failure> startRecording(const ServerAddress& address,
                                                                 const std::string& scene,
                                                                 const std::string& file);
-[[nodiscard]] tl::expected<v1::StopRecordingResponse, Failure> stopRecording(const std::string& address,
+[[nodiscard]] tl::expected<v1::StopRecordingResponse, Failure> stopRecording(const ServerAddress& address,
                                                                              const std::string& scene);
 
 // Sends a whole request and returns the state of the scene after it.
-[[nodiscard]] tl::expected<v1::SceneSummary, Failure> controlScene(const std::string& address,
+[[nodiscard]] tl::expected<v1::SceneSummary, Failure> controlScene(const ServerAddress& address,
                                                                    const v1::ControlSceneRequest& request);
 
 }  // namespace clothstream

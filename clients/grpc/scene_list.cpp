@@ -7,7 +7,7 @@
 
 namespace clothstream {
 
-tl::expected<std::vector<SceneSummary>, Failure> listScenes(const std::string& address,
+tl::expected<std::vector<SceneSummary>, Failure> listScenes(const ServerAddress& address,
                                                             std::chrono::milliseconds timeout) {
   const auto stub = v1::ClothStream::NewStub(makeChannel(address));
   grpc::ClientContext context;

@@ -9,6 +9,7 @@
 
 #include <tl/expected.hpp>
 
+#include "clients/grpc/address.h"
 #include "clients/grpc/failure.h"
 
 namespace clothstream {
@@ -21,6 +22,6 @@ struct SceneSummary {
 
 // `address` must come from completeAddress().
 [[nodiscard]] tl::expected<std::vector<SceneSummary>, Failure> listScenes(
-    const std::string& address, std::chrono::milliseconds timeout = std::chrono::milliseconds(10'000));
+    const ServerAddress& address, std::chrono::milliseconds timeout = std::chrono::milliseconds(10'000));
 
 }  // namespace clothstream

@@ -21,7 +21,7 @@ constexpr const char* kJoinMethod = "/clothstream.v1.ClothStream/Join";
 // read, which marks the end of the stream.
 class GrpcLink final : public Link, private grpc::ClientBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer> {
  public:
-  GrpcLink(const std::string& address, LinkListener& listener)
+  GrpcLink(const ServerAddress& address, LinkListener& listener)
       : listener_(listener), stub_(makeChannel(address)) {
     stub_.PrepareBidiStreamingCall(&context_, kJoinMethod, grpc::StubOptions(), this);
     AddHold();
@@ -125,7 +125,7 @@ class GrpcLink final : public Link, private grpc::ClientBidiReactor<grpc::ByteBu
 
 class GrpcLinks final : public Links {
  public:
-  explicit GrpcLinks(std::string address) : address_(std::move(address)) {
+  explicit GrpcLinks(ServerAddress address) : address_(std::move(address)) {
     // Same setting as in server/endpoint/grpc/grpc_endpoint.cpp.
     absl::SetMutexDeadlockDetectionMode(absl::OnDeadlockCycle::kIgnore);
   }
@@ -134,12 +134,12 @@ class GrpcLinks final : public Links {
   }
 
  private:
-  const std::string address_;
+  const ServerAddress address_;
 };
 
 }  // namespace
 
-std::unique_ptr<Links> makeGrpcLinks(const std::string& address) {
+std::unique_ptr<Links> makeGrpcLinks(const ServerAddress& address) {
   return std::make_unique<GrpcLinks>(address);
 }
 

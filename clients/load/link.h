@@ -7,6 +7,8 @@
 #include <span>
 #include <string>
 
+#include "clients/grpc/address.h"
+
 namespace clothstream::load {
 
 // Receives the events of a link. A thread of the Links makes one call at a time; closed() is the last.
@@ -44,8 +46,8 @@ class Links {
   virtual std::unique_ptr<Link> open(LinkListener& listener) = 0;
 };
 
-// `address` is HOST:PORT.
-std::unique_ptr<Links> makeGrpcLinks(const std::string& address);
-std::unique_ptr<Links> makeWebLinks(const std::string& address);
+// `address` is from completeAddress(), or HOST:PORT.
+std::unique_ptr<Links> makeGrpcLinks(const ServerAddress& address);
+std::unique_ptr<Links> makeWebLinks(const ServerAddress& address);
 
 }  // namespace clothstream::load

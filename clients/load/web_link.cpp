@@ -5,6 +5,7 @@
 #include <deque>
 #include <mutex>
 #include <thread>
+#include <type_traits>
 #include <utility>
 
 #include <boost/asio/connect.hpp>
@@ -12,16 +13,22 @@
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/post.hpp>
+#include <boost/asio/ssl/context.hpp>
+#include <boost/asio/ssl/host_name_verification.hpp>
 #include <boost/beast/core/flat_buffer.hpp>
 #include <boost/beast/core/tcp_stream.hpp>
+#include <boost/beast/ssl/ssl_stream.hpp>
+#include <boost/beast/websocket/ssl.hpp>
 #include <boost/beast/websocket/stream.hpp>
 
 #include "clients/load/link.h"
+#include "proto/tls/fingerprint.h"
 
 namespace clothstream::load {
 namespace {
 
 namespace net = boost::asio;
+namespace ssl = net::ssl;
 namespace beast = boost::beast;
 namespace websocket = beast::websocket;
 using beast::error_code;
@@ -38,11 +45,35 @@ struct Address {
   }
 };
 
-// Members belong to the thread of the Links, except underway_ and those that the mutex guards.
+using Plain = beast::tcp_stream;
+using Encrypted = beast::ssl_stream<beast::tcp_stream>;
+
+ssl::context contextFor(const ServerAddress& server) {
+  ssl::context context(ssl::context::tls_client);
+  context.set_verify_mode(ssl::verify_peer);
+  if (!server.fingerprint.empty()) {
+    context.set_verify_callback([fingerprint = server.fingerprint](bool, ssl::verify_context& shown) {
+      X509* const certificate = X509_STORE_CTX_get_current_cert(shown.native_handle());
+      return X509_STORE_CTX_get_error_depth(shown.native_handle()) > 0 ||
+             fingerprintOf(*certificate) == fingerprint;
+    });
+    return context;
+  }
+  if (server.caFile.empty())
+    context.set_default_verify_paths();
+  else
+    context.load_verify_file(server.caFile);
+  context.set_verify_callback(ssl::host_name_verification(Address(server.hostAndPort()).host));
+  return context;
+}
+
+// Transport is Plain or Encrypted. Members belong to the thread of the Links, except underway_ and those that the mutex guards.
+template <typename Transport>
 class WebLink final : public Link {
  public:
-  WebLink(net::io_context& io, const Address& address, LinkListener& listener)
-      : io_(io), address_(address), listener_(listener), resolver_(io), stream_(io) {
+  // `context` is used for Encrypted.
+  WebLink(net::io_context& io, ssl::context& context, const Address& address, LinkListener& listener)
+      : io_(io), address_(address), listener_(listener), resolver_(io), stream_(makeTransport(io, context)) {
     post([this] { resolve(); });
   }
 
@@ -76,6 +107,13 @@ class WebLink final : public Link {
   }
 
  private:
+  static Transport makeTransport(net::io_context& io, ssl::context& context) {
+    if constexpr (std::is_same_v<Transport, Encrypted>)
+      return Encrypted(io, context);
+    else
+      return Plain(io);
+  }
+
   // Counts a task until it has run. The link exists at least as long.
   template <class Task>
   void post(Task task) {
@@ -103,10 +141,21 @@ class WebLink final : public Link {
                             tracked([this](const tcp::resolver::results_type& found) { connect(found); }));
   }
   void connect(const tcp::resolver::results_type& found) {
-    stream_.next_layer().async_connect(found, tracked([this](auto&&...) { shakeHands(); }));
+    beast::get_lowest_layer(stream_).async_connect(found, tracked([this](auto&&...) { shakeHands(); }));
   }
   void shakeHands() {
-    stream_.next_layer().socket().set_option(tcp::no_delay(true));
+    beast::get_lowest_layer(stream_).socket().set_option(tcp::no_delay(true));
+    if constexpr (std::is_same_v<Transport, Encrypted>) {
+      // SSL_set_tlsext_host_name(), which is a macro with an old-style cast.
+      std::string host = address_.host;
+      SSL_ctrl(stream_.next_layer().native_handle(), SSL_CTRL_SET_TLSEXT_HOSTNAME, TLSEXT_NAMETYPE_host_name,
+               host.data());
+      stream_.next_layer().async_handshake(ssl::stream_base::client, tracked([this] { upgrade(); }));
+    } else {
+      upgrade();
+    }
+  }
+  void upgrade() {
     stream_.binary(true);
     stream_.read_message_max(0);
     stream_.async_handshake(address_.host + ":" + address_.port, "/stream", tracked([this] {
@@ -148,7 +197,7 @@ class WebLink final : public Link {
     ended_ = true;
     why_ = error == websocket::error::closed ? std::string(stream_.reason().reason.c_str()) : error.message();
     resolver_.cancel();
-    stream_.next_layer().close();
+    beast::get_lowest_layer(stream_).close();
   }
   void finished() {
     if (--underway_ > 0 || !ended_) return;
@@ -163,7 +212,7 @@ class WebLink final : public Link {
   const Address address_;
   LinkListener& listener_;
   tcp::resolver resolver_;
-  websocket::stream<beast::tcp_stream> stream_;
+  websocket::stream<Transport> stream_;
   beast::flat_buffer incoming_;
   std::deque<std::string> waiting_;
   std::string why_;
@@ -179,18 +228,24 @@ class WebLink final : public Link {
 
 class WebLinks final : public Links {
  public:
-  explicit WebLinks(const std::string& address)
-      : address_(address), work_(net::make_work_guard(io_)), thread_([this] { io_.run(); }) {}
+  explicit WebLinks(const ServerAddress& server)
+      : address_(server.hostAndPort()),
+        encrypted_(server.isEncrypted()),
+        context_(contextFor(server)),
+        work_(net::make_work_guard(io_)), thread_([this] { io_.run(); }) {}
   ~WebLinks() override {
     work_.reset();
     thread_.join();
   }
   std::unique_ptr<Link> open(LinkListener& listener) override {
-    return std::make_unique<WebLink>(io_, address_, listener);
+    if (encrypted_) return std::make_unique<WebLink<Encrypted>>(io_, context_, address_, listener);
+    return std::make_unique<WebLink<Plain>>(io_, context_, address_, listener);
   }
 
  private:
   const Address address_;
+  const bool encrypted_;
+  ssl::context context_;
   net::io_context io_;
   net::executor_work_guard<net::io_context::executor_type> work_;
   std::thread thread_;
@@ -198,7 +253,7 @@ class WebLinks final : public Links {
 
 }  // namespace
 
-std::unique_ptr<Links> makeWebLinks(const std::string& address) {
+std::unique_ptr<Links> makeWebLinks(const ServerAddress& address) {
   return std::make_unique<WebLinks>(address);
 }
 

@@ -21,11 +21,12 @@ constexpr NumberRange kSubsteps{.min = 1, .max = 256};
 constexpr NumberRange kTicks{.min = 1, .max = 1e9};
 constexpr NumberRange kThreads{.min = 0, .max = 64};
 
-std::filesystem::path defaultCacheDirectory() {
-  if (const char* cache = std::getenv("XDG_CACHE_HOME"); cache != nullptr && *cache != '\0')
-    return std::filesystem::path(cache) / "clothstream";
+// The user's directory of a kind: that of the variable, or one in the home directory; empty without both.
+std::filesystem::path userDirectory(const char* variable, const char* inHome) {
+  if (const char* directory = std::getenv(variable); directory != nullptr && *directory != '\0')
+    return std::filesystem::path(directory) / "clothstream";
   if (const char* home = std::getenv("HOME"); home != nullptr && *home != '\0')
-    return std::filesystem::path(home) / ".cache" / "clothstream";
+    return std::filesystem::path(home) / inHome / "clothstream";
   return {};
 }
 
@@ -33,7 +34,7 @@ std::filesystem::path defaultCacheDirectory() {
 struct Parsed {
   ProgramOptions options;
   std::vector<std::string> changeable;
-  std::string record, recordings, config;
+  std::string record, recordings, config, tls = "off";
   bool ownersAlone = false;
   bool listDevices = false, listMaterials = false, printConfig = false, printMarkdown = false;
 };
@@ -163,6 +164,30 @@ void addNetworkOptions(OptionTable& table, ProgramOptions& options) {
   table.text("--metrics-host", options.metricsHost, "ADDRESS", "Address to listen on with --metrics-port");
 }
 
+void addTlsOptions(OptionTable& table, Parsed& parsed) {
+  ProgramOptions& options = parsed.options;
+  table.group("TLS");
+  table.text("--tls", parsed.tls, "KIND",
+             "self: use a certificate of the server's own, for a home network; off", checkChoice({"self", "off"}));
+  table.text("--tls-certificate", options.tlsCertificate, "FILE",
+             "PEM file with the certificate of the server and the chain to its authority. Turns TLS on. SIGHUP "
+             "reads it again");
+  table.text("--tls-key", options.tlsKey, "FILE", "PEM file with the private key of that certificate");
+  table.text("--tls-client-ca", options.tlsClientCa, "FILE",
+             "PEM file of authorities: clients with a certificate must have it from one of these. Clients "
+             "without one are accepted");
+}
+
+// Checks the options together.
+void checkTls(const ProgramOptions& options) {
+  if (options.tlsCertificate.empty() != options.tlsKey.empty())
+    throw OptionError("--tls-certificate and --tls-key belong together: give both");
+  if (options.tlsSelf && !options.tlsCertificate.empty())
+    throw OptionError("--tls self excludes --tls-certificate: use one of them");
+  if (!options.tlsClientCa.empty() && !options.tlsSelf && options.tlsCertificate.empty())
+    throw OptionError("--tls-client-ca needs TLS: add --tls-certificate and --tls-key, or --tls self");
+}
+
 void addDeviceOptions(OptionTable& table, ProgramOptions& options) {
   table.text("--device", options.server.device.select, "DEVICE",
              "Index of a Vulkan device, or part of its name. By default the best device is used");
@@ -185,6 +210,9 @@ void addProgramOptions(OptionTable& table, Parsed& parsed) {
       "--drain", parsed.options.drain, {.min = 0.1, .max = 600, .type = "SECONDS"},
       "Seconds after SIGINT or SIGTERM within which the server ends, even if the device or the disk does "
       "not answer. A second signal ends it at once");
+  table.showDefault(table.text("--state-dir", parsed.options.stateDirectory, "DIR",
+                               "Directory of what the server keeps for its next start: the key of --tls self"),
+                    "$XDG_STATE_HOME/clothstream or $HOME/.local/state/clothstream");
   table.text("--config", parsed.config, "FILE", "Read options from this TOML file");
   table.action("--print-config", parsed.printConfig, "Print the effective options as a TOML file, and exit");
   table.action("--help-markdown", parsed.printMarkdown, "Print this help as a page of Markdown, and exit");
@@ -289,7 +317,8 @@ void printMarkdown(const OptionTable& table) {
 std::variant<ProgramOptions, int> parseOptions(int argc, const char* const* argv) {
   Parsed parsed;
   ProgramOptions& options = parsed.options;
-  options.server.device.cacheDirectory = defaultCacheDirectory();
+  options.server.device.cacheDirectory = userDirectory("XDG_CACHE_HOME", ".cache");
+  options.stateDirectory = userDirectory("XDG_STATE_HOME", ".local/state");
 
   CLI::App app{"Simulates cloth with Vulkan and streams it to browsers and gRPC clients.",
                "clothstream-server"};
@@ -304,6 +333,7 @@ std::variant<ProgramOptions, int> parseOptions(int argc, const char* const* argv
   addSceneOptions(table, parsed);
   addParticipantOptions(table, parsed);
   addNetworkOptions(table, options);
+  addTlsOptions(table, parsed);
   table.group("Device");
   addDeviceOptions(table, options);
   table.action("--list-devices", parsed.listDevices, "List the Vulkan devices, and exit");
@@ -317,6 +347,8 @@ std::variant<ProgramOptions, int> parseOptions(int argc, const char* const* argv
     app.parse(argc, argv);
     options.warnings = table.applySources(environ, configFile(parsed));
     if (!parsed.changeable.empty()) options.server.participantsMay = toPermissions(parsed.changeable);
+    options.tlsSelf = parsed.tls == "self";
+    checkTls(options);
     if (parsed.ownersAlone) options.server.outsideControl = false;
   } catch (const CLI::ExtrasError&) {
     fmt::print(stderr, "{}\nRun with --help for more information.\n",

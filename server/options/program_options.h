@@ -53,10 +53,14 @@ struct ProgramOptions {
   double connectionsPerSecond = 200;
   std::string metricsHost = "127.0.0.1";
   std::optional<std::uint16_t> metricsPort;  // unset: no monitoring
+  // TLS for both endpoints: with a certificate of its own, or with that in the files.
+  bool tlsSelf = false;
+  std::filesystem::path tlsCertificate, tlsKey, tlsClientCa;  // empty: none
 
   // Program.
   std::string logLevel = "info", logFormat = "text";
   std::optional<std::chrono::nanoseconds> stopAfter;
+  std::filesystem::path stateDirectory;  // what the server keeps for its next start
   std::chrono::milliseconds drain{10'000};  // after a signal, until the process ends
   std::vector<std::string> warnings;        // about environment variables, for the log
 

@@ -60,14 +60,16 @@ enum class Refusal : std::uint8_t {
   connectionRate,        // too many new ones per second
   connectionRateOfAddress,
   stopping,       // the server stops
+  handshake,      // TLS was not agreed on
   callRate,       // too many calls per second from one address
   createdScenes,  // too many scenes exist
   budget,         // the price of a scene exceeds what is left
 };
 // Names for metrics and reports, in the order of Refusal.
-inline constexpr std::array<std::string_view, 8> kRefusalNames{
-    "connections", "connections of address", "connection rate", "connection rate of address", "stopping",
-    "call rate",   "created scenes",         "budget"};
+inline constexpr std::array<std::string_view, 9> kRefusalNames{
+    "connections", "connections of address", "connection rate", "connection rate of address",
+    "stopping",    "handshake",              "call rate",       "created scenes",
+    "budget"};
 
 struct ServerMetrics {
   void refuse(Refusal reason) { refusals[static_cast<std::size_t>(reason)].add(); }

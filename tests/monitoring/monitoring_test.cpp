@@ -185,8 +185,8 @@ TEST_F(MonitoringTest, CountsRefusedConnectionsByReason) {
   while (refused.receive()) {
   }
   const Exposition read = scrape();
-  EXPECT_EQ(read.value("clothstream_refused_connections_total", {{"reason", "stopping"}}), 1);
-  EXPECT_EQ(read.value("clothstream_refused_connections_total", {{"reason", "full"}}), 0);
+  EXPECT_EQ(read.value("clothstream_refusals_total", {{"reason", "stopping"}}), 1);
+  EXPECT_EQ(read.value("clothstream_refusals_total", {{"reason", "connections"}}), 0);
 }
 
 TEST_F(MonitoringTest, ReadinessFollowsStartAndStop) {

@@ -14,7 +14,7 @@ class CallRate {
   // Per second, with twice as many at once.
   static constexpr double kCallsPerSecond = 100;
   // A call that reads or makes a whole scene counts as this many.
-  static constexpr double kSceneCost = 10;
+  static constexpr double kSceneCost = 4;
 
   // `peer` is the address as gRPC writes it, such as ipv4:192.0.2.1:50000. Returns false if the call is too
   // many.

@@ -16,13 +16,13 @@
 #include <grpcpp/ext/proto_server_reflection_plugin.h>
 #include <grpcpp/grpcpp.h>
 #include <grpcpp/resource_quota.h>
-#include <grpcpp/security/server_credentials.h>
 #include <grpcpp/server.h>
 #include <grpcpp/server_builder.h>
 #include <spdlog/spdlog.h>
 
 #include "server/endpoint/grpc/acceptor.h"
 #include "server/endpoint/grpc/call.h"
+#include "server/endpoint/grpc/credentials.h"
 #include "server/endpoint/grpc/health.h"
 #include "server/endpoint/grpc/service.h"
 #include "server/hosting/server_state.h"
@@ -98,7 +98,7 @@ struct GrpcEndpoint::State {
         options.host, options.port, limits,
         builder.experimental().AddExternalConnectionAcceptor(
             grpc::ServerBuilder::experimental_type::ExternalConnectionType::FROM_FD,
-            grpc::InsecureServerCredentials()),
+            credentialsOf(options.tls.get())),
         scenes.state().metrics);
     builder.RegisterService(&service);
     builder.RegisterService(&health);

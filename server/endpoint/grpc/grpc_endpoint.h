@@ -12,6 +12,9 @@
 namespace clothstream::hosting {
 class SceneServer;
 }
+namespace clothstream::tls {
+class ServerTls;
+}
 
 namespace clothstream::endpoint {
 
@@ -22,6 +25,8 @@ struct GrpcEndpointOptions {
   std::size_t maxStreams = 256;
   // `connections` is ignored: it follows from maxStreams.
   ConnectionLimits connections{};
+  // Null: no TLS. Must outlive the endpoint.
+  std::shared_ptr<const tls::ServerTls> tls{};
 };
 
 // Join forwards the bytes of a session::Session unchanged. SceneServer answers the unary calls. When a

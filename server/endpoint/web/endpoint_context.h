@@ -14,6 +14,7 @@
 #include "server/endpoint/listen/admission.h"
 #include "server/endpoint/web/host_names.h"
 #include "server/endpoint/web/page.h"
+#include "server/tls/server_tls.h"
 
 namespace clothstream::hosting {
 class SceneServer;
@@ -28,6 +29,7 @@ struct WebEndpointContext {
   boost::asio::io_context& io;
   const Page page;
   const HostNames names;
+  const std::shared_ptr<const tls::ServerTls> tls;  // null without TLS
   const std::vector<std::string> allowedOrigins;
   const std::size_t maxConnections;
   std::size_t connections = 0;

@@ -5,11 +5,13 @@
 #include <chrono>
 #include <utility>
 
+#include <boost/beast/core/detect_ssl.hpp>
 #include <boost/beast/http/read.hpp>
 #include <boost/beast/http/write.hpp>
 #include <boost/beast/websocket/rfc6455.hpp>
 
 #include "server/endpoint/web/web_socket_stream.h"
+#include "server/hosting/server_state.h"
 
 namespace clothstream::endpoint {
 namespace {
@@ -18,6 +20,7 @@ namespace beast = boost::beast;
 namespace http = beast::http;
 using namespace std::chrono_literals;
 
+constexpr auto kHandshakeTimeout = 5s;  // of TLS
 constexpr auto kRequestTimeout = 5s;    // for a whole header and between requests
 constexpr auto kResponseTimeout = 30s;  // for a file over a slow link
 constexpr auto kDrainTimeout = 1s;
@@ -60,14 +63,36 @@ HttpConnection::HttpConnection(boost::asio::ip::tcp::socket&& socket, WebEndpoin
     : endpoint_(endpoint),
       slot_(std::make_unique<ConnectionSlot>(endpoint, std::move(ticket))),
       beyondLimit_(endpoint.connections > endpoint.maxConnections),
-      socket_(std::move(socket)) {}
+      stream_(std::move(socket)) {}
+
+void HttpConnection::start() {
+  endpoint_.tls ? detectTls() : read();
+}
+
+void HttpConnection::detectTls() {
+  stream_.next_layer().expires_after(kHandshakeTimeout);
+  beast::async_detect_ssl(stream_.next_layer(), buffer_,
+                          [self = shared_from_this()](beast::error_code error, bool isTls) {
+                            if (!error) isTls ? self->shakeHands() : self->read();
+                          });
+}
+
+void HttpConnection::shakeHands() {
+  stream_.async_handshake(endpoint_.tls->context(), buffer_.data(),
+                          [self = shared_from_this()](beast::error_code error, std::size_t used) {
+                            if (error)
+                              return self->endpoint_.server.state().metrics.refuse(telemetry::Refusal::handshake);
+                            self->buffer_.consume(used);
+                            self->read();
+                          });
+}
 
 void HttpConnection::read() {
   parser_.emplace();
   parser_->header_limit(kMaxHeaderBytes);
-  socket_.expires_after(kRequestTimeout);
+  stream_.next_layer().expires_after(kRequestTimeout);
   http::async_read_header(
-      socket_, buffer_, *parser_,
+      stream_, buffer_, *parser_,
       [self = shared_from_this()](beast::error_code error, std::size_t) { self->onHeader(error); });
 }
 
@@ -92,6 +117,7 @@ void HttpConnection::onHeader(beast::error_code error) {
     return refuse(
         http::status::misdirected_request,
         "This server does not have the name of the Host field. The server option --public-name adds it.\n");
+  if (endpoint_.tls && !stream_.isEncrypted()) return write(redirection(parser_->get()));
   const std::string_view target = view(parser_->get().target());
   if (target.substr(0, target.find('?')) == "/stream") return answerStream(parser_->get());
   write(answer(parser_->get()));
@@ -109,9 +135,18 @@ void HttpConnection::answerStream(const Request& request) {
         request, http::status::forbidden,
         "Pages of this origin may not open /stream. The server option --allow-origin allows them.\n"));
   }
-  socket_.expires_never();  // the WebSocket sets its own timeouts
-  std::make_shared<WebSocketStream>(std::move(socket_), endpoint_, std::move(slot_))
+  stream_.next_layer().expires_never();  // the WebSocket sets its own timeouts
+  std::make_shared<WebSocketStream>(std::move(stream_), endpoint_, std::move(slot_))
       ->accept(parser_->release());
+}
+
+HttpConnection::Response HttpConnection::redirection(const Request& request) const {
+  Response response =
+      plainAnswer(request, http::status::permanent_redirect, "This server uses TLS: the address begins with https.\n");
+  response.set(http::field::location, "https://" + std::string(request[http::field::host]) +
+                                          std::string(request.target()));
+  response.keep_alive(false);
+  return response;
 }
 
 HttpConnection::Response HttpConnection::answer(const Request& request) const {
@@ -148,8 +183,8 @@ void HttpConnection::write(Response&& response) {
   response_.set(http::field::server, "clothstream");
   if (response_.result() != http::status::not_modified) response_.content_length(response_.body().size());
   if (parser_->get().method() == http::verb::head) response_.body() = {};
-  socket_.expires_after(kResponseTimeout);
-  http::async_write(socket_, response_, [self = shared_from_this()](beast::error_code error, std::size_t) {
+  stream_.next_layer().expires_after(kResponseTimeout);
+  http::async_write(stream_, response_, [self = shared_from_this()](beast::error_code error, std::size_t) {
     self->onWritten(error);
   });
 }
@@ -157,16 +192,17 @@ void HttpConnection::write(Response&& response) {
 void HttpConnection::onWritten(beast::error_code error) {
   if (error) return;
   if (response_.keep_alive()) return read();
-  socket_.socket().shutdown(boost::asio::ip::tcp::socket::shutdown_send, error);
-  socket_.expires_after(kDrainTimeout);
-  drain();
+  stream_.next_layer().expires_after(kDrainTimeout);
+  stream_.async_end([self = shared_from_this()](beast::error_code) {
+    if (!self->stream_.isEncrypted()) self->drain();
+  });
 }
 
 // Reads the rest of the request: closing a socket with unread bytes resets the connection, and the reset may
 // overtake the response.
 void HttpConnection::drain() {
   buffer_.clear();
-  socket_.async_read_some(buffer_.prepare(kMaxHeaderBytes),
+  stream_.async_read_some(buffer_.prepare(kMaxHeaderBytes),
                           [self = shared_from_this()](beast::error_code error, std::size_t) {
                             if (!error) self->drain();
                           });

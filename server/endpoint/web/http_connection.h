@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// One HTTP connection: answers requests for the page until it closes, times out or becomes a WebSocket.
+// One HTTP connection, with TLS if the endpoint has it: answers requests for the page until it closes, times
+// out or becomes a WebSocket.
 #pragma once
 
 #include <cstddef>
@@ -9,13 +10,13 @@
 
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/beast/core/flat_buffer.hpp>
-#include <boost/beast/core/tcp_stream.hpp>
 #include <boost/beast/http/empty_body.hpp>
 #include <boost/beast/http/message.hpp>
 #include <boost/beast/http/parser.hpp>
 #include <boost/beast/http/span_body.hpp>
 
 #include "server/endpoint/web/endpoint_context.h"
+#include "server/endpoint/web/web_stream.h"
 
 namespace clothstream::endpoint {
 
@@ -27,14 +28,19 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection> {
   HttpConnection(boost::asio::ip::tcp::socket&& socket, WebEndpointContext& endpoint,
                  Admission::Ticket ticket);
 
-  void read();
+  void start();
 
  private:
   using Request = boost::beast::http::request<boost::beast::http::empty_body>;
   using Response = boost::beast::http::response<boost::beast::http::span_body<const char>>;
 
+  // With TLS: a client that begins without it gets a redirection.
+  void detectTls();
+  void shakeHands();
+  void read();
   void onHeader(boost::beast::error_code error);
   void answerStream(const Request& request);
+  Response redirection(const Request& request) const;
   Response answer(const Request& request) const;
   Response answerFile(const Request& request, const PageFile& file) const;
   void write(Response&& response);
@@ -44,7 +50,7 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection> {
   WebEndpointContext& endpoint_;
   std::unique_ptr<ConnectionSlot> slot_;
   const bool beyondLimit_;
-  boost::beast::tcp_stream socket_;
+  WebStream stream_;
   boost::beast::flat_buffer buffer_{kMaxHeaderBytes};
   std::optional<boost::beast::http::request_parser<boost::beast::http::empty_body>> parser_;
   Response response_;

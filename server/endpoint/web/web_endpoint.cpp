@@ -62,6 +62,7 @@ struct WebEndpoint::State {
                 .io = io,
                 .page = Page(options.pageDirectory),
                 .names = HostNames(options.publicNames),
+                .tls = options.tls,
                 .allowedOrigins = options.allowedOrigins,
                 .maxConnections = options.maxConnections,
                 .streams = {}},
@@ -112,7 +113,7 @@ struct WebEndpoint::State {
     auto ticket = admission.admit(peer.address(), schedule::Clock::now());
     if (!ticket) return context.server.state().metrics.refuse(ticket.error());
     sendFresh(socket);
-    std::make_shared<HttpConnection>(std::move(socket), context, std::move(*ticket))->read();
+    std::make_shared<HttpConnection>(std::move(socket), context, std::move(*ticket))->start();
   }
 
   void stop() {

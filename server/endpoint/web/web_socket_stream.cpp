@@ -22,7 +22,7 @@ namespace ws = beast::websocket;
 using namespace std::chrono_literals;
 
 constexpr const char* kSubprotocol = "clothstream.v1";
-constexpr auto kHandshakeTimeout = 2s;
+constexpr auto kUpgradeTimeout = 2s;
 constexpr auto kClosingTimeout = 2s;
 // After half of this time without a byte the server sends a ping; after all of it the client counts as
 // vanished.
@@ -52,13 +52,13 @@ ws::close_reason reasonOf(const session::Closing& closing) {
 
 }  // namespace
 
-WebSocketStream::WebSocketStream(beast::tcp_stream&& socket, WebEndpointContext& endpoint,
+WebSocketStream::WebSocketStream(WebStream&& stream, WebEndpointContext& endpoint,
                                  std::unique_ptr<ConnectionSlot> slot)
-    : endpoint_(endpoint), slot_(std::move(slot)), socket_(std::move(socket)), closingTimer_(endpoint.io) {
+    : endpoint_(endpoint), slot_(std::move(slot)), socket_(std::move(stream)), closingTimer_(endpoint.io) {
   socket_.binary(true);
   socket_.auto_fragment(false);
   socket_.read_message_max(session::kMaxClientMessageBytes);
-  socket_.set_option(ws::stream_base::timeout{kHandshakeTimeout, kIdleTimeout, true});
+  socket_.set_option(ws::stream_base::timeout{kUpgradeTimeout, kIdleTimeout, true});
 }
 
 void WebSocketStream::accept(http::request<http::empty_body>&& request) {
@@ -87,7 +87,7 @@ void WebSocketStream::open() {
       if (const auto self = weak.lock()) self->pump();
     });
   };
-  session_ = session::Session::open(endpoint_.server, peerOf(socket_.next_layer()), std::move(wake));
+  session_ = session::Session::open(endpoint_.server, peerOf(beast::get_lowest_layer(socket_)), std::move(wake));
   read();
   pump();
 }
@@ -152,7 +152,7 @@ void WebSocketStream::end() {
   closing_ = true;
   leave();
   closingTimer_.cancel();
-  socket_.next_layer().close();
+  beast::get_lowest_layer(socket_).close();
   endpoint_.streams.erase(shared_from_this());
   if (endpoint_.stopping && endpoint_.streams.empty()) endpoint_.io.stop();
 }

@@ -9,12 +9,12 @@
 
 #include <boost/asio/steady_timer.hpp>
 #include <boost/beast/core/flat_buffer.hpp>
-#include <boost/beast/core/tcp_stream.hpp>
 #include <boost/beast/http/empty_body.hpp>
 #include <boost/beast/http/message.hpp>
 #include <boost/beast/websocket/stream.hpp>
 
 #include "server/endpoint/web/endpoint_context.h"
+#include "server/endpoint/web/web_stream.h"
 #include "server/session/session.h"
 
 namespace clothstream::endpoint {
@@ -23,7 +23,7 @@ namespace clothstream::endpoint {
 // pending.
 class WebSocketStream : public std::enable_shared_from_this<WebSocketStream> {
  public:
-  WebSocketStream(boost::beast::tcp_stream&& socket, WebEndpointContext& endpoint,
+  WebSocketStream(WebStream&& stream, WebEndpointContext& endpoint,
                   std::unique_ptr<ConnectionSlot> slot);
 
   void accept(boost::beast::http::request<boost::beast::http::empty_body>&& request);
@@ -48,7 +48,7 @@ class WebSocketStream : public std::enable_shared_from_this<WebSocketStream> {
   WebEndpointContext& endpoint_;
   std::unique_ptr<ConnectionSlot> slot_;
   // No permessage-deflate, since frames are compressed already.
-  boost::beast::websocket::stream<boost::beast::tcp_stream, false> socket_;
+  boost::beast::websocket::stream<WebStream, false> socket_;
   boost::beast::http::request<boost::beast::http::empty_body> request_;
   boost::beast::flat_buffer incoming_;
   std::shared_ptr<session::Session> session_;

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: MIT
+// What the endpoints need for TLS: the present certificate, replaced while connections continue.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <string>
+
+#include <boost/asio/ssl/context.hpp>
+
+#include "server/tls/certificate.h"
+
+namespace clothstream::tls {
+
+// A file without a name, in memory. Others read it by its path.
+class MemoryFile {
+ public:
+  MemoryFile();  // empty; throws std::system_error
+  ~MemoryFile();
+  MemoryFile(const MemoryFile&) = delete;
+  MemoryFile& operator=(const MemoryFile&) = delete;
+
+  // Path in /proc, valid in this process.
+  const std::string& path() const { return path_; }
+  void write(const std::string& content);  // throws std::system_error
+
+ private:
+  int descriptor_;
+  std::string path_;
+};
+
+// TLS 1.2 or newer. Thread-safe.
+class ServerTls {
+ public:
+  // `load` returns the certificate, now and at each reload(). `clientCa`: PEM text of the authorities whose
+  // client certificates are accepted; empty asks for none. A client without a certificate is accepted. Throws
+  // what `load` throws, and std::runtime_error if OpenSSL refuses the certificate.
+  ServerTls(std::function<Certificate()> load, std::string clientCa);
+
+  // Loads the certificate again, for new connections. Throws as the constructor does, and keeps the old one.
+  void reload();
+
+  // For a new connection over HTTP/1.1.
+  std::shared_ptr<boost::asio::ssl::context> context() const;
+  // SHA-256 of the public key (fingerprintOf).
+  std::string fingerprint() const;
+
+  // Files with the present certificate, for gRPC.
+  const std::string& chainPath() const { return chain_.path(); }
+  const std::string& keyPath() const { return key_.path(); }
+  // Empty without client certificates.
+  std::string clientCaPath() const { return clientCa_.empty() ? "" : clientCaFile_.path(); }
+
+ private:
+  const std::function<Certificate()> load_;
+  const std::string clientCa_;
+  MemoryFile chain_, key_, clientCaFile_;
+  mutable std::mutex mutex_;
+  std::shared_ptr<boost::asio::ssl::context> context_;
+  std::string fingerprint_;
+};
+
+}  // namespace clothstream::tls
