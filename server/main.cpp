@@ -45,8 +45,8 @@
 namespace clothstream {
 namespace {
 
-// Blocks SIGINT, SIGTERM, SIGHUP and SIGUSR1 in every thread; wait() takes them. Must be created before any other
-// thread.
+// Blocks SIGINT, SIGTERM, SIGHUP and SIGUSR1 in every thread; wait() takes them. Must be created before any
+// other thread.
 class Signals {
  public:
   Signals() {
@@ -243,8 +243,8 @@ void printHomeAddresses(const ProgramOptions& options, std::uint16_t port, const
   fmt::print("type    {}\n{}", address, tls::qrCode(address));
 }
 
-// Returns after SIGINT, SIGTERM or --seconds, and after SIGHUP without TLS. Reloads the certificate on SIGHUP,
-// and prints the report on SIGUSR1.
+// Returns after SIGINT, SIGTERM or --seconds, and after SIGHUP without TLS. Reloads the certificate on
+// SIGHUP, and prints the report on SIGUSR1.
 void waitForStop(const Signals& signals, const ProgramOptions& options, tls::ServerTls* tls,
                  const std::function<std::string()>& report) {
   using Clock = std::chrono::steady_clock;

@@ -132,10 +132,10 @@ std::string text(load::LoadReport& report, std::optional<double> serverCpu) {
 
 void LoadCommand::add(CLI::App& app) {
   command_ = app.add_subcommand("load", "Run a load test with many participants and print what they receive");
-  command_->add_option(
-      "ADDRESS", address_,
-      "HOST or HOST:PORT of the server's gRPC endpoint, default 127.0.0.1:50051, with https:// before it for TLS; with --web, of its web "
-      "endpoint, default 127.0.0.1:8080");
+  command_->add_option("ADDRESS", address_,
+                       "HOST or HOST:PORT of the server's gRPC endpoint, default 127.0.0.1:50051, with "
+                       "https:// before it for TLS; with --web, of its web "
+                       "endpoint, default 127.0.0.1:8080");
   command_->add_option("--scene", options_.scene, "Scene to join; default: the server's default scene");
   command_
       ->add_option("--participants", options_.participants, "Number of participants that read at full speed")
@@ -184,7 +184,8 @@ void LoadCommand::check() {
   if (!parsed()) return;
   if (address_.empty()) address_ = web_ ? std::string("127.0.0.1") : std::string(kDefaultAddress);
   const std::size_t host = address_.find("://");
-  if (web_ && address_.find(':', host == std::string::npos ? 0 : host + 3) == std::string::npos) address_ += kWebPort;
+  if (web_ && address_.find(':', host == std::string::npos ? 0 : host + 3) == std::string::npos)
+    address_ += kWebPort;
   if (options_.viewers > options_.participants)
     throw CLI::ValidationError("--viewers", "must not exceed --participants");
   options_.decoders = decoders_.value_or(options_.participants);
@@ -218,8 +219,8 @@ ExitCode LoadCommand::run(const ServerAddress& address) const {
   if (before && after) serverCpu = *after - *before;
   const ExitCode loss = exitCodeOf(report.firstLoss.kind);
   if (report.joined == 0 && report.lost > 0)
-    return printError(
-        Error{loss, fmt::format("no participant could join at {}: {}", address.address, report.firstLoss.text)});
+    return printError(Error{
+        loss, fmt::format("no participant could join at {}: {}", address.address, report.firstLoss.text)});
   fmt::print("{}\n", json_ ? json(report, serverCpu) : text(report, serverCpu));
   if (report.lost > 0)
     return printError(Error{loss, fmt::format("{} participants were refused or disconnected; the first: {}",

@@ -70,7 +70,8 @@ struct TrustOptions {
     if (!fingerprint.empty()) {
       const auto normal = normalFingerprint(fingerprint);
       if (!normal)
-        throw CLI::ValidationError("--fingerprint", "must have 64 hexadecimal digits, as the server prints them");
+        throw CLI::ValidationError("--fingerprint",
+                                   "must have 64 hexadecimal digits, as the server prints them");
       server.fingerprint = *normal;
     }
     if (!server.isEncrypted() && !(caFile.empty() && fingerprint.empty()))
@@ -91,7 +92,8 @@ int run(int argc, char** argv) {
   std::vector<std::string> colliders;
   CLI::App& joinCommand =
       *app.add_subcommand("join", "Join a scene, show the stream, print a summary at the end");
-  joinCommand.add_option("ADDRESS", address, "HOST or HOST:PORT of the server; https:// before it means TLS")->capture_default_str();
+  joinCommand.add_option("ADDRESS", address, "HOST or HOST:PORT of the server; https:// before it means TLS")
+      ->capture_default_str();
   joinCommand.add_option("--scene", joinOptions.scene, "Scene to join; default: the server's default scene");
   std::string role;
   joinCommand.add_option("--name", joinOptions.name, "Name that other participants see, at most 64 bytes");
@@ -131,11 +133,13 @@ int run(int argc, char** argv) {
   SetOptions setOptions;
   CLI::App& setCommand = *app.add_subcommand("set", "Change parameters of a running scene");
   addSetOptions(setCommand, setOptions);
-  setCommand.add_option("ADDRESS", address, "HOST or HOST:PORT of the server; https:// before it means TLS")->capture_default_str();
+  setCommand.add_option("ADDRESS", address, "HOST or HOST:PORT of the server; https:// before it means TLS")
+      ->capture_default_str();
 
   ListOptions listOptions;
   CLI::App& listCommand = *app.add_subcommand("list", "List the scenes of a server");
-  listCommand.add_option("ADDRESS", address, "HOST or HOST:PORT of the server; https:// before it means TLS")->capture_default_str();
+  listCommand.add_option("ADDRESS", address, "HOST or HOST:PORT of the server; https:// before it means TLS")
+      ->capture_default_str();
   listCommand.add_flag("--json", listOptions.json, "Print a JSON array");
 
   SceneCommands sceneCommands;

@@ -12,7 +12,7 @@ namespace clothstream::cli {
 
 struct RecordOptions {
   ServerAddress address = std::string(kDefaultAddress);
-  std::string scene;    // empty: the server's default scene
+  std::string scene;  // empty: the server's default scene
   std::string output;
   std::optional<double> seconds;  // not set: until a signal
   std::string program;            // name and version of this program

@@ -15,7 +15,8 @@ void RecordingCommands::add(CLI::App& app, std::string& address) {
       ->add_option("--seconds", recordOptions_.seconds,
                    "Stop after this time; default: at an interrupt (Ctrl-C)")
       ->check(CLI::PositiveNumber);
-  record_->add_option("--server", address, "HOST or HOST:PORT of the server; https:// before it means TLS")->capture_default_str();
+  record_->add_option("--server", address, "HOST or HOST:PORT of the server; https:// before it means TLS")
+      ->capture_default_str();
 
   info_ = app.add_subcommand("info", "Show the content of a recording and check all of it");
   info_->add_option("FILE", infoOptions_.recording, "The recording")->required();

@@ -41,7 +41,8 @@ ExitCode done(const tl::expected<void, Failure>& result) {
 void SceneCommands::add(CLI::App& app, std::string& address) {
   const auto command = [&](const char* name, const char* what) { return app.add_subcommand(name, what); };
   const auto takesAddress = [&](CLI::App* added) {
-    added->add_option("--server", address, "HOST or HOST:PORT of the server; https:// before it means TLS")->capture_default_str();
+    added->add_option("--server", address, "HOST or HOST:PORT of the server; https:// before it means TLS")
+        ->capture_default_str();
   };
   create_ = command("create", "Create a scene on a server from a JSON file or a built-in scene");
   CLI::Option* file = create_->add_option("FILE", options_.file, "Scene in JSON");

@@ -60,7 +60,11 @@ tl::expected<std::string, std::string> completeAddress(std::string_view text) {
     return tl::unexpected("the address \"" + std::string(text) +
                           "\" has no valid port after the host; use 1 to 65535");
   std::string address;
-  address.append(encrypted ? kTls : "").append(v6 ? "[" : "").append(host).append(v6 ? "]:" : ":").append(port);
+  address.append(encrypted ? kTls : "")
+      .append(v6 ? "[" : "")
+      .append(host)
+      .append(v6 ? "]:" : ":")
+      .append(port);
   return address;
 }
 

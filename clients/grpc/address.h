@@ -19,17 +19,18 @@ inline constexpr std::string_view kDefaultAddress = "127.0.0.1:50051";
 // Where a server is, and how to recognise it.
 struct ServerAddress {
   // From completeAddress(). Most servers need no more.
-  ServerAddress(std::string complete) : address(std::move(complete)) {}  // NOLINT(google-explicit-constructor)
-  ServerAddress(const char* complete) : address(complete) {}             // NOLINT(google-explicit-constructor)
+  ServerAddress(std::string complete)
+      : address(std::move(complete)) {}                       // NOLINT(google-explicit-constructor)
+  ServerAddress(const char* complete) : address(complete) {}  // NOLINT(google-explicit-constructor)
 
   bool isEncrypted() const;
   // HOST:PORT.
   std::string hostAndPort() const;
 
   std::string address;
-  // With TLS, the server must have a certificate of an authority in this PEM file; empty means the authorities
-  // of the system. With a fingerprint (fingerprintOf), the server must have this key instead, whatever its
-  // name.
+  // With TLS, the server must have a certificate of an authority in this PEM file; empty means the
+  // authorities of the system. With a fingerprint (fingerprintOf), the server must have this key instead,
+  // whatever its name.
   std::string caFile{}, fingerprint{};
 };
 

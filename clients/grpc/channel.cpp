@@ -6,6 +6,7 @@
 #include <functional>
 #include <sstream>
 #include <stdexcept>
+#include <string_view>
 #include <utility>
 
 #include <fmt/format.h>
@@ -21,6 +22,18 @@ namespace {
 
 // Enough for a key frame of the largest scene. A description travels in small chunks.
 constexpr int kMaxMessageBytes = 256 * 1024 * 1024;
+
+// Empty unless the text of gRPC is about the server's certificate.
+std::string whyNotTrusted(const std::string& text) {
+  constexpr std::string_view kShown = "the server has the fingerprint ";
+  if (const std::size_t at = text.find(kShown); at != std::string::npos)
+    return text.substr(at, text.find(')', at) - at) +
+           ". If this is right, use it with --fingerprint; otherwise somebody else answers.";
+  if (text.find("certificate verify failed") != std::string::npos)
+    return "no known authority has signed its certificate. Use --ca FILE, or --fingerprint with what the "
+           "server prints.";
+  return {};
+}
 
 std::string inBrackets(const std::string& text) {
   return text.empty() ? text : fmt::format(" ({})", text);
@@ -82,22 +95,29 @@ Failure notJoined(const ServerAddress& server, const grpc::Status& status) {
   using Kind = Failure::Kind;
   switch (status.error_code()) {
     case grpc::StatusCode::UNAVAILABLE:
+      if (const std::string why = whyNotTrusted(status.error_message()); !why.empty())
+        return {Kind::refused,
+                fmt::format("The server at {} is not the one expected: {}", server.address, why)};
+      [[fallthrough]];
     case grpc::StatusCode::DEADLINE_EXCEEDED:
       return {Kind::unreachable,
               fmt::format("No server answers at {}: is clothstream-server running there?{}", server.address,
                           inBrackets(status.error_message()))};
     case grpc::StatusCode::OK:
-      return {Kind::refused, fmt::format("The server at {} ended the stream before it began.", server.address)};
+      return {Kind::refused,
+              fmt::format("The server at {} ended the stream before it began.", server.address)};
     case grpc::StatusCode::UNIMPLEMENTED:
       return {Kind::refused, fmt::format("The server at {} is not a clothstream-server of this release{}.",
                                          server.address, inBrackets(status.error_message()))};
     default:
-      return {Kind::refused, fmt::format("The server at {} refuses: {}", server.address, status.error_message())};
+      return {Kind::refused,
+              fmt::format("The server at {} refuses: {}", server.address, status.error_message())};
   }
 }
 
 Failure lost(const ServerAddress& server, const grpc::Status& status) {
-  if (status.ok()) return {Failure::Kind::lost, fmt::format("The server at {} ended the stream.", server.address)};
+  if (status.ok())
+    return {Failure::Kind::lost, fmt::format("The server at {} ended the stream.", server.address)};
   return {Failure::Kind::lost,
           fmt::format("The stream from {} is lost{}.", server.address, inBrackets(status.error_message()))};
 }

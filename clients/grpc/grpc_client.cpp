@@ -80,7 +80,8 @@ class GrpcClient::Stream {
       const auto until = std::min(deadline, SteadyClock::now() + kCancelInterval);
       if (changed_.wait_until(lock, until, [&] { return wasJoined_ || ended_; })) return ended_;
       if (options_.cancelled && options_.cancelled())
-        return Failure{Failure::Kind::unreachable, fmt::format("Gave up before {} answered.", address_.address)};
+        return Failure{Failure::Kind::unreachable,
+                       fmt::format("Gave up before {} answered.", address_.address)};
     }
     return Failure{
         Failure::Kind::unreachable,

@@ -35,7 +35,8 @@ bool upload(Stream& stream, const std::string& bytes, const CreateSceneOptions& 
 }
 
 template <typename Response, typename Request, typename Call>
-tl::expected<Response, Failure> call(const ServerAddress& address, const Request& request, const Call& method) {
+tl::expected<Response, Failure> call(const ServerAddress& address, const Request& request,
+                                     const Call& method) {
   const auto stub = v1::ClothStream::NewStub(makeChannel(address));
   grpc::ClientContext context;
   context.set_deadline(std::chrono::system_clock::now() + kTimeout);
@@ -80,8 +81,8 @@ tl::expected<std::string, Failure> createScene(const ServerAddress& address,
   const grpc::Status status = stream->Finish();
   if (answer.has_create_scene()) return answer.create_scene().scene().name();
   if (answer.has_error())
-    return tl::unexpected(
-        Failure{Failure::Kind::refused, "The server at " + address.address + " refuses: " + answer.error().text()});
+    return tl::unexpected(Failure{Failure::Kind::refused,
+                                  "The server at " + address.address + " refuses: " + answer.error().text()});
   return tl::unexpected(sent ? notJoined(address, status) : lost(address, status));
 }
 

@@ -67,7 +67,8 @@ ssl::context contextFor(const ServerAddress& server) {
   return context;
 }
 
-// Transport is Plain or Encrypted. Members belong to the thread of the Links, except underway_ and those that the mutex guards.
+// Transport is Plain or Encrypted. Members belong to the thread of the Links, except underway_ and those that
+// the mutex guards.
 template <typename Transport>
 class WebLink final : public Link {
  public:
@@ -232,7 +233,8 @@ class WebLinks final : public Links {
       : address_(server.hostAndPort()),
         encrypted_(server.isEncrypted()),
         context_(contextFor(server)),
-        work_(net::make_work_guard(io_)), thread_([this] { io_.run(); }) {}
+        work_(net::make_work_guard(io_)),
+        thread_([this] { io_.run(); }) {}
   ~WebLinks() override {
     work_.reset();
     thread_.join();

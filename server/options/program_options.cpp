@@ -168,10 +168,12 @@ void addTlsOptions(OptionTable& table, Parsed& parsed) {
   ProgramOptions& options = parsed.options;
   table.group("TLS");
   table.text("--tls", parsed.tls, "KIND",
-             "self: use a certificate of the server's own, for a home network; off", checkChoice({"self", "off"}));
-  table.text("--tls-certificate", options.tlsCertificate, "FILE",
-             "PEM file with the certificate of the server and the chain to its authority. Turns TLS on. SIGHUP "
-             "reads it again");
+             "self: use a certificate of the server's own, for a home network; off",
+             checkChoice({"self", "off"}));
+  table.text(
+      "--tls-certificate", options.tlsCertificate, "FILE",
+      "PEM file with the certificate of the server and the chain to its authority. Turns TLS on. SIGHUP "
+      "reads it again");
   table.text("--tls-key", options.tlsKey, "FILE", "PEM file with the private key of that certificate");
   table.text("--tls-client-ca", options.tlsClientCa, "FILE",
              "PEM file of authorities: clients with a certificate must have it from one of these. Clients "
@@ -210,9 +212,10 @@ void addProgramOptions(OptionTable& table, Parsed& parsed) {
       "--drain", parsed.options.drain, {.min = 0.1, .max = 600, .type = "SECONDS"},
       "Seconds after SIGINT or SIGTERM within which the server ends, even if the device or the disk does "
       "not answer. A second signal ends it at once");
-  table.showDefault(table.text("--state-dir", parsed.options.stateDirectory, "DIR",
-                               "Directory of what the server keeps for its next start: the key of --tls self"),
-                    "$XDG_STATE_HOME/clothstream or $HOME/.local/state/clothstream");
+  table.showDefault(
+      table.text("--state-dir", parsed.options.stateDirectory, "DIR",
+                 "Directory of what the server keeps for its next start: the key of --tls self"),
+      "$XDG_STATE_HOME/clothstream or $HOME/.local/state/clothstream");
   table.text("--config", parsed.config, "FILE", "Read options from this TOML file");
   table.action("--print-config", parsed.printConfig, "Print the effective options as a TOML file, and exit");
   table.action("--help-markdown", parsed.printMarkdown, "Print this help as a page of Markdown, and exit");

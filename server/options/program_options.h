@@ -60,7 +60,7 @@ struct ProgramOptions {
   // Program.
   std::string logLevel = "info", logFormat = "text";
   std::optional<std::chrono::nanoseconds> stopAfter;
-  std::filesystem::path stateDirectory;  // what the server keeps for its next start
+  std::filesystem::path stateDirectory;     // what the server keeps for its next start
   std::chrono::milliseconds drain{10'000};  // after a signal, until the process ends
   std::vector<std::string> warnings;        // about environment variables, for the log
 

@@ -67,8 +67,10 @@ enum class Refusal : std::uint8_t {
 };
 // Names for metrics and reports, in the order of Refusal.
 inline constexpr std::array<std::string_view, 9> kRefusalNames{
-    "connections", "connections of address", "connection rate", "connection rate of address",
-    "stopping",    "handshake",              "call rate",       "created scenes",
+    "connections",     "connections of address",
+    "connection rate", "connection rate of address",
+    "stopping",        "handshake",
+    "call rate",       "created scenes",
     "budget"};
 
 struct ServerMetrics {

@@ -18,13 +18,13 @@
 #include <fmt/ranges.h>
 #include <ifaddrs.h>
 #include <net/if.h>
-#include <sys/stat.h>
 #include <openssl/err.h>
 #include <openssl/evp.h>
 #include <openssl/pem.h>
 #include <openssl/rand.h>
 #include <openssl/x509.h>
 #include <openssl/x509v3.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 namespace clothstream::tls {
@@ -109,10 +109,10 @@ void writeFile(const fs::path& file, const std::string& content, mode_t mode) {
   };
   const int descriptor = ::open(next.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, mode);
   if (descriptor < 0) fail(next);
-  const bool written = ::fchmod(descriptor, mode) == 0 &&
-                       ::write(descriptor, content.data(), content.size()) ==
-                           static_cast<ssize_t>(content.size()) &&
-                       ::fsync(descriptor) == 0;
+  const bool written =
+      ::fchmod(descriptor, mode) == 0 &&
+      ::write(descriptor, content.data(), content.size()) == static_cast<ssize_t>(content.size()) &&
+      ::fsync(descriptor) == 0;
   if (::close(descriptor) != 0 || !written) fail(next);
   if (::rename(next.c_str(), file.c_str()) != 0) fail(file);
 }
@@ -167,8 +167,7 @@ X509Certificate makeCertificate(EVP_PKEY& key, const std::vector<std::string>& n
         "certificate");
   check(X509_set_issuer_name(&x509, subject), "certificate");
   std::vector<std::string> alternatives;
-  for (const std::string& name : names)
-    alternatives.push_back((isAddress(name) ? "IP:" : "DNS:") + name);
+  for (const std::string& name : names) alternatives.push_back((isAddress(name) ? "IP:" : "DNS:") + name);
   addExtension(x509, NID_subject_alt_name, fmt::format("{}", fmt::join(alternatives, ",")));
   addExtension(x509, NID_basic_constraints, "critical,CA:FALSE");
   addExtension(x509, NID_key_usage, "critical,digitalSignature");
@@ -178,9 +177,8 @@ X509Certificate makeCertificate(EVP_PKEY& key, const std::vector<std::string>& n
 }
 
 bool hasName(X509& certificate, const std::string& name) {
-  return isAddress(name)
-             ? X509_check_ip_asc(&certificate, name.c_str(), 0) == 1
-             : X509_check_host(&certificate, name.c_str(), name.size(), 0, nullptr) == 1;
+  return isAddress(name) ? X509_check_ip_asc(&certificate, name.c_str(), 0) == 1
+                         : X509_check_host(&certificate, name.c_str(), name.size(), 0, nullptr) == 1;
 }
 
 std::chrono::system_clock::time_point expiryOf(X509& certificate) {
@@ -201,8 +199,7 @@ bool isDnsName(const std::string& name) {
 Certificate readCertificate(const fs::path& chain, const fs::path& key) {
   Certificate certificate{readFile(chain), readFile(key)};
   const X509Certificate first = firstCertificate(certificate.chain);
-  if (!first)
-    throw std::runtime_error(fmt::format("{} has no certificate in PEM format", chain.string()));
+  if (!first) throw std::runtime_error(fmt::format("{} has no certificate in PEM format", chain.string()));
   const Key privateKey = keyOf(certificate.key);
   if (!privateKey)
     throw std::runtime_error(
@@ -273,9 +270,10 @@ Certificate selfSigned(const fs::path& directory, const std::vector<std::string>
   const std::string keyText = readFile(keyFile);
   const Key key = keyOf(keyText);
   if (!key)
-    throw std::runtime_error(fmt::format("{} has no private key: delete it to get a new one, which clients "
-                                         "must be told of",
-                                         keyFile.string()));
+    throw std::runtime_error(
+        fmt::format("{} has no private key: delete it to get a new one, which clients "
+                    "must be told of",
+                    keyFile.string()));
   std::string chain = fs::exists(chainFile) ? readFile(chainFile) : "";
   const X509Certificate old = firstCertificate(chain);
   const bool usable = old && X509_check_private_key(old.get(), key.get()) == 1 &&

@@ -15,7 +15,8 @@ struct Certificate {
   std::string key;
 };
 
-// Throws std::runtime_error with the file and its fault: unreadable, not PEM, or a key of another certificate.
+// Throws std::runtime_error with the file and its fault: unreadable, not PEM, or a key of another
+// certificate.
 Certificate readCertificate(const std::filesystem::path& chain, const std::filesystem::path& key);
 
 // PEM text of a file with one or more certificates. Throws as readCertificate() does.

@@ -20,10 +20,12 @@ TEST(Address, WithoutPortGets50051) {
 TEST(Address, KeepsItsPort) {
   EXPECT_EQ(completeAddress("cloth.example:6000"), "cloth.example:6000");
   EXPECT_EQ(completeAddress("[fe80::1]:6000"), "[fe80::1]:6000");
+  EXPECT_EQ(completeAddress("https://cloth.example"), "https://cloth.example:50051");
+  EXPECT_EQ(completeAddress("https://[::1]:6000/"), "https://[::1]:6000");
 }
 
 TEST(Address, IsRefusedWithReason) {
-  for (const char* text : {"", ":50051", "http://host", "a b", "[::1", "[]:1"}) {
+  for (const char* text : {"", ":50051", "http://host", "https://", "a b", "[::1", "[]:1"}) {
     const auto address = completeAddress(text);
     ASSERT_FALSE(address) << text;
     EXPECT_THAT(address.error(), HasSubstr("the address"));

@@ -4,7 +4,6 @@
 
 #include <chrono>
 #include <csignal>
-#include <functional>
 #include <iostream>
 #include <memory>
 #include <string>
@@ -15,20 +14,14 @@
 #include <gtest/gtest.h>
 
 #include "tests/e2e/process.h"
+#include "tests/support/eventually.h"
 
 namespace clothstream::e2e {
 
 // Enough for sanitizers, validation and software Vulkan on a busy machine.
 inline constexpr std::chrono::seconds kPatience{60};
 
-// Polls until `holds` returns true. Returns false after kPatience.
-inline bool eventually(const std::function<bool()>& holds) {
-  using Clock = std::chrono::steady_clock;
-  for (const auto end = Clock::now() + kPatience; Clock::now() < end;
-       std::this_thread::sleep_for(std::chrono::milliseconds(5)))
-    if (holds()) return true;
-  return false;
-}
+using tests::eventually;
 
 class RunningServer : public ::testing::Test {
  protected:

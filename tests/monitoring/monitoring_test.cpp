@@ -28,6 +28,7 @@
 #include "tests/endpoint/web_client.h"
 #include "tests/monitoring/exposition.h"
 #include "tests/serving/small_scene.h"
+#include "tests/support/eventually.h"
 
 namespace clothstream::tests {
 namespace {
@@ -36,14 +37,6 @@ using namespace std::chrono_literals;
 using testing::HasSubstr;
 
 const MetricLabels kSmall{{"scene", "small"}};
-
-// Polls until `holds` returns true. Returns false after kPatience.
-bool eventually(const std::function<bool()>& holds) {
-  const auto end = std::chrono::steady_clock::now() + kPatience;
-  for (; std::chrono::steady_clock::now() < end; std::this_thread::sleep_for(5ms))
-    if (holds()) return true;
-  return false;
-}
 
 Response get(const monitoring::MonitoringEndpoint& endpoint, const std::string& target,
              const std::string& method = "GET") {

@@ -78,13 +78,13 @@ void HttpConnection::detectTls() {
 }
 
 void HttpConnection::shakeHands() {
-  stream_.async_handshake(endpoint_.tls->context(), buffer_.data(),
-                          [self = shared_from_this()](beast::error_code error, std::size_t used) {
-                            if (error)
-                              return self->endpoint_.server.state().metrics.refuse(telemetry::Refusal::handshake);
-                            self->buffer_.consume(used);
-                            self->read();
-                          });
+  stream_.async_handshake(
+      endpoint_.tls->context(), buffer_.data(),
+      [self = shared_from_this()](beast::error_code error, std::size_t used) {
+        if (error) return self->endpoint_.server.state().metrics.refuse(telemetry::Refusal::handshake);
+        self->buffer_.consume(used);
+        self->read();
+      });
 }
 
 void HttpConnection::read() {
@@ -141,10 +141,10 @@ void HttpConnection::answerStream(const Request& request) {
 }
 
 HttpConnection::Response HttpConnection::redirection(const Request& request) const {
-  Response response =
-      plainAnswer(request, http::status::permanent_redirect, "This server uses TLS: the address begins with https.\n");
-  response.set(http::field::location, "https://" + std::string(request[http::field::host]) +
-                                          std::string(request.target()));
+  Response response = plainAnswer(request, http::status::permanent_redirect,
+                                  "This server uses TLS: the address begins with https.\n");
+  response.set(http::field::location,
+               "https://" + std::string(request[http::field::host]) + std::string(request.target()));
   response.keep_alive(false);
   return response;
 }

@@ -31,12 +31,12 @@ struct WebEndpointOptions {
   ConnectionLimits connections{};
   // Names, in addition to those of this machine and to addresses, under which browsers reach the endpoint
   // (HostNames). Requests for other names are answered with 421.
-  std::vector<std::string> publicNames;
+  std::vector<std::string> publicNames{};
   // Null: HTTP. Else HTTPS; requests without TLS are redirected.
-  std::shared_ptr<const tls::ServerTls> tls;
+  std::shared_ptr<const tls::ServerTls> tls{};
   // Origins of other pages that may open /stream, such as "https://example.org"; "*" allows every page. The
   // endpoint's own page and clients that send no origin are always allowed.
-  std::vector<std::string> allowedOrigins;
+  std::vector<std::string> allowedOrigins{};
 };
 
 // Answers GET and HEAD for the page's files and for /healthz ("ok" while the server runs). /stream upgrades

@@ -87,7 +87,8 @@ void WebSocketStream::open() {
       if (const auto self = weak.lock()) self->pump();
     });
   };
-  session_ = session::Session::open(endpoint_.server, peerOf(beast::get_lowest_layer(socket_)), std::move(wake));
+  session_ =
+      session::Session::open(endpoint_.server, peerOf(beast::get_lowest_layer(socket_)), std::move(wake));
   read();
   pump();
 }

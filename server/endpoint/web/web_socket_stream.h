@@ -23,8 +23,7 @@ namespace clothstream::endpoint {
 // pending.
 class WebSocketStream : public std::enable_shared_from_this<WebSocketStream> {
  public:
-  WebSocketStream(WebStream&& stream, WebEndpointContext& endpoint,
-                  std::unique_ptr<ConnectionSlot> slot);
+  WebSocketStream(WebStream&& stream, WebEndpointContext& endpoint, std::unique_ptr<ConnectionSlot> slot);
 
   void accept(boost::beast::http::request<boost::beast::http::empty_body>&& request);
 
