@@ -28,8 +28,8 @@ server/recording   | server/model server/vulkan server/simulation server/message
 server/step        | server/model server/vulkan server/simulation server/messages
 server/tls         | proto/tls
 server/endpoint/listen | server/schedule server/telemetry
-server/endpoint/grpc | server/endpoint/listen server/tls server/session server/hosting server/schedule server/telemetry clothstream grpc/health
-server/endpoint/web | server/endpoint/listen server/tls server/telemetry server/session server/hosting
+server/endpoint/grpc | server/endpoint/listen server/tls server/session server/hosting server/telemetry clothstream grpc/health
+server/endpoint/web | server/endpoint/listen server/tls server/session server/hosting
 server/monitoring  | server/hosting server/scene server/telemetry server/endpoint/listen server/endpoint/web
 server/options     | server/hosting server/recording server/step server/scene server/model
 server/main.cpp    | server/options server/tls server/endpoint server/monitoring server/hosting server/recording server/step server/simulation server/messages server/model server/telemetry server/vulkan
@@ -48,6 +48,9 @@ readonly OUTSIDE='
 <grpcpp/           | server/endpoint/grpc clients/grpc clients/load
 <boost/beast       | server/endpoint/web server/monitoring clients/load
 <prometheus/       | server/monitoring
+<openssl/          | proto/tls server/tls
+<boost/asio/ssl    | server/tls server/endpoint/web clients/load
+<qrencode          | server/tls
 <Eigen/            | server/model server/reference
 '
 
